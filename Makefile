@@ -1,0 +1,33 @@
+# Two commands matter: `make run` (see a robot walk on soft ground, then train one) and `make test`.
+JOBS ?= $(shell nproc)
+MINUTES ?= 5
+CMAKE_FLAGS ?=
+
+.PHONY: setup build test run bench clean help
+
+help:
+	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
+	@echo "make test    set up, build, run every test"
+	@echo "make build   set up, build build/mild"
+	@echo "make bench   set up, build, measure speed and memory"
+	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
+	@echo "make clean   remove build/"
+
+setup:
+	@scripts/setup.sh
+
+build: setup
+	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
+	@cmake --build build --parallel $(JOBS)
+
+test: build
+	@ctest --test-dir build --output-on-failure --parallel $(JOBS) --timeout 280
+
+run: build
+	@MINUTES=$(MINUTES) scripts/run.sh
+
+bench: build
+	@build/mild bench
+
+clean:
+	rm -rf build

@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# Installs what building, running and testing need, and nothing that is already there. Safe to repeat.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+packages=(
+    build-essential cmake
+    libdnnl-dev libinih-dev libcjson-dev
+    libcmocka-dev
+    libglfw3-dev libgl-dev libosmesa6-dev libegl-dev libegl1 libgl1-mesa-dri
+    ffmpeg
+    python3-venv
+)
+
+if ! command -v dpkg-query >/dev/null; then
+    echo "setup: this script installs Debian packages, and dpkg-query is not here." >&2
+    echo "setup: install the equivalents of: ${packages[*]}" >&2
+    echo "setup: then build with: cmake -S . -B build -DMUJOCO_ROOT=FOLDER && cmake --build build" >&2
+    exit 1
+fi
+
+installed=$(dpkg-query -W -f='${Package} ${db:Status-Status}\n' "${packages[@]}" 2>/dev/null || true)
+missing=()
+for package in "${packages[@]}"; do
+    grep -qx "$package installed" <<<"$installed" || missing+=("$package")
+done
+
+if ((${#missing[@]})); then
+    if (($(id -u) != 0)); then
+        echo "setup: Debian packages are missing. Ask an administrator to run this one command, then repeat yours:" >&2
+        echo >&2
+        echo "    apt-get update && apt-get install --no-install-recommends -y ${missing[*]}" >&2
+        echo >&2
+        exit 1
+    fi
+    echo "setup: installing ${missing[*]}"
+    export DEBIAN_FRONTEND=noninteractive
+    apt-get -qq update
+    apt-get -qq install --no-install-recommends -y "${missing[@]}"
+fi
+
+# The private environment holds the MuJoCo wheel (library and headers) and matplotlib (figures). The copy of the
+# requirements inside it is written last, so that an interrupted installation is taken up again.
+if ! cmp -s scripts/requirements.txt .venv/requirements.installed; then
+    echo "setup: preparing .venv ($(paste -sd' ' scripts/requirements.txt))"
+    python=/usr/bin/python3
+    [ -x "$python" ] || python=python3
+    [ -x .venv/bin/python ] || "$python" -m venv .venv
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check -r scripts/requirements.txt
+    cp scripts/requirements.txt .venv/requirements.installed
+fi
