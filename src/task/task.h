@@ -1,25 +1,134 @@
-/* One environment, top to bottom: observe, reward, randomise, terminate; and many of them over all cores, writing
- * straight into the learner's batch. Same seed, same numbers, whatever the thread count. */
+/* One environment, top to bottom: command, act, observe, reward, randomise, terminate (learning.md sections 2 to 6).
+ * A TaskEnv is one pointer-free block (its ground memory follows it), so that copying, hashing and saving are one line.
+ * Every random number is a function of (seed, environment, tick), so a run depends on no thread count. */
 #ifndef MILD_TASK_H
 #define MILD_TASK_H
 
 #include <stdint.h>
 
-#include "base/pool.h"
 #include "mild/error.h"
-#include "mild/field.h"
 #include "robot/robot.h"
+#include "task/task_def.h"
 
-#define TASK_OBSERVATION 47 /* one frame (learning.md section 3) */
-#define TASK_FRAMES 6       /* H + 1, newest last */
-#define TASK_ACTIONS 12
-#define TASK_ESTIMATES 11
-#define TASK_REWARDS 24
-#define TASK_CRITIC 98
-#define TASK_POLICY_HZ 100
+#define TASK_OBSERVATION 47 /* one frame: see observe.c */
+#define TASK_FRAMES 6       /* H + 1, newest last (paper, H = 5) */
+#define TASK_HISTORY (TASK_FRAMES * TASK_OBSERVATION)
+#define TASK_ACTIONS ROBOT_JOINTS
+#define TASK_ESTIMATES 11 /* base velocity 3, feet velocities 6, feet heights 2 */
+#define TASK_CRITIC 100
+#define TASK_PERIOD 0.01 /* [s] policy step: 100 Hz (paper) */
 
-typedef struct TaskDef TaskDef; /* all of the task's config; see task_def.h */
+/* Scale of the feet heights among the estimates, so that centimetres weigh in the regression like m/s. */
+#define TASK_HEIGHT_SCALE 10.0
 
+typedef struct {
+    uint64_t seed;
+    uint32_t index; /* environment number: its stream of random numbers */
+    uint32_t tick;  /* policy steps since creation, never reset */
+    /* episode */
+    uint32_t step, step_limit;
+    double phase;             /* [-] gait clock in [0, 1) */
+    double command[3];        /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
+    double command_seen[3];   /* what the policy sees: one policy step late */
+    int command_frozen;       /* bool: eval and play set the command themselves */
+    /* what was drawn for this episode */
+    RobotVariation variation;
+    MildTerrain terrain;
+    double kp_scale[ROBOT_JOINTS], kd_scale[ROBOT_JOINTS], strength[ROBOT_JOINTS], motor_offset[ROBOT_JOINTS];
+    int lag_command, lag_motor, lag_imu; /* [physics steps] */
+    double push[6];           /* [m/s, rad/s] last push, for the critic; fades */
+    /* state */
+    RobotState robot;
+    float action[3][TASK_ACTIONS]; /* now, one and two steps ago */
+    float history[TASK_HISTORY];
+    double base_twist[6];     /* world, one policy step ago */
+    double joint_speed[ROBOT_JOINTS]; /* one policy step ago */
+    double air_time[ROBOT_FEET];
+    /* sums over the running episode, for the log */
+    double reward_sum, term_sum[TASK_REWARD_COUNT], speed_error_sum;
+} TaskEnv;
+
+/* What one policy step gave. */
+typedef struct {
+    float reward;
+    uint8_t done, timeout, valid; /* valid 0: a number went bad; the sample must get no weight */
+    /* of the episode that just ended (done) */
+    uint32_t length;
+    float episode_reward, episode_terms[TASK_REWARD_COUNT], episode_speed_error;
+} TaskStep;
+
+/* Where the next observation goes; any pointer may be NULL. */
+typedef struct {
+    float *history;  /* [TASK_HISTORY] noisy, newest frame last */
+    float *critic;   /* [TASK_CRITIC] */
+    float *estimate; /* [TASK_ESTIMATES] the truth the heads regress to */
+    float *frame;    /* [TASK_OBSERVATION] newest noisy frame: the decoder's target */
+} TaskView;
+
+/* Called after every physics step, before memory moves on: measures and pictures hang here. */
+typedef struct {
+    void (*physics_step)(void *context, const TaskEnv *env, const RobotSim *sim, const double *torque);
+    void *context;
+} TaskProbe;
+
+size_t task_env_bytes(const Robot *robot); /* TaskEnv and its ground memory, a multiple of 64 */
+MildGround *task_env_ground(TaskEnv *env);
+
+void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed, uint32_t index);
+/* Draws a new episode and writes its first observation. */
+void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const TaskView *view);
+/* As reset, but the caller has chosen the terrain and whether the engine's rigid ground is used. */
+void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const MildTerrain *terrain,
+                       int rigid, const TaskView *view);
+/* One policy step. When the episode ends a new one is drawn (auto_reset) and its first observation written. */
+TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const float *action,
+                       int auto_reset, const TaskView *view, const TaskProbe *probe);
+
+/* ---- parts, each in a file of its own ---- */
+
+/* Readings of one instant (observe.c). */
+typedef struct {
+    double omega[3], gravity[3]; /* base frame */
+    double q[ROBOT_JOINTS], qd[ROBOT_JOINTS];
+} TaskReading;
+void task_read_imu(const RobotSim *sim, TaskReading *reading);
+void task_read_motors(const RobotSim *sim, TaskReading *reading);
+/* Pushes the frame made from the readings into the history and writes the view. */
+void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, const TaskReading *reading,
+                  int first, const TaskView *view);
+
+/* Everything a reward term may look at, computed once per policy step (reward.c). */
+typedef struct {
+    const TaskDef *def;
+    const TaskEnv *env;
+    const double *pose; /* default pose */
+    double velocity[3]; /* base, heading frame [m/s] */
+    double omega[3];    /* base, base frame [rad/s] */
+    double gravity[3];  /* unit gravity in the base frame */
+    double twist_change; /* norm of the change of base twist in this step */
+    double q[ROBOT_JOINTS], qd[ROBOT_JOINTS], qd_before[ROBOT_JOINTS], torque[ROBOT_JOINTS];
+    double base_height; /* above the stance soles [m] */
+    double foot_height[ROBOT_FEET], foot_force[ROBOT_FEET], foot_speed[ROBOT_FEET];
+    double landed_air_time; /* sum over feet that touched down in this step */
+    int contact[ROBOT_FEET], stance[ROBOT_FEET], either[ROBOT_FEET]; /* either: both states are right */
+    double wanted_height[ROBOT_FEET];
+    double foot_distance, knee_distance;
+    int standing;
+} TaskMotion;
+/* Weighted terms per second into terms; returns the clipped sum times the period. */
+double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
+
+/* Draws ground, robot and sensors of an episode (randomize.c). */
+void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);
+void task_draw_command(TaskEnv *env, const TaskDef *def);
+
+/* Gait clock (gait.c): foot 0 stands while sin(2 pi phase) >= 0, foot 1 while < 0. */
+int task_is_standing(const double command[3]);
+int task_gait_stance(double phase, int standing, int foot);
+double task_gait_height(const TaskDef *def, double phase, int standing, int foot);
+void task_gait_reference(const TaskDef *def, const double *pose, double phase, int standing, double q[ROBOT_JOINTS]);
+
+/* Mirror symmetry left <-> right: o'_i = sign_i o_index_i. */
 extern const int task_mirror_observation_index[TASK_OBSERVATION];
 extern const float task_mirror_observation_sign[TASK_OBSERVATION];
 extern const int task_mirror_action_index[TASK_ACTIONS];

@@ -1,0 +1,297 @@
+/* The policy step, read top to bottom. */
+#include <math.h>
+#include <string.h>
+
+#include "base/random.h"
+#include "task/task.h"
+
+#define RANDOM_USE_START 0x53544152u
+#define RANDOM_USE_PUSH 0x50555348u
+#define CONTACT_FORCE 5.0 /* [N] */
+
+static size_t env_header_bytes(void) {
+    return (sizeof(TaskEnv) + 63) / 64 * 64;
+}
+
+size_t task_env_bytes(const Robot *robot) {
+    return env_header_bytes() + mild_ground_bytes(robot_soles(robot), ROBOT_FEET);
+}
+
+MildGround *task_env_ground(TaskEnv *env) {
+    return (MildGround *)(void *)((char *)env + env_header_bytes());
+}
+
+void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed, uint32_t index) {
+    memset(env, 0, task_env_bytes(robot));
+    mild_ground_init(task_env_ground(env), robot_soles(robot), ROBOT_FEET);
+    env->seed = seed;
+    env->index = index;
+    env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
+}
+
+/* ---- start of an episode ---- */
+
+/* How deep the default pose stands on the material below, so that episodes start neither in the air nor buried:
+ * bisection of the element law for half the robot's weight per foot. */
+static double standing_depth(const Robot *robot, const MildMaterial *material) {
+    const MildSole *sole = robot_soles(robot)[0];
+    double wanted = 0.5 * robot_total_mass(robot) * 9.81 / mild_sole_elements(sole), low = 0, high = 0.2;
+    for (int i = 0; i < 20; i++) {
+        double middle = 0.5 * (low + high);
+        *(mild_element_law(material, mild_sole_pitch(sole), middle).force < wanted ? &low : &high) = middle;
+    }
+    return low;
+}
+
+static void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot) {
+    const RandomizeDef *z = &def->randomize;
+    Random r = random_at(env->seed ^ RANDOM_USE_START, env->index, env->tick);
+    const double *pose = robot_default_pose(robot);
+    memset(&env->robot, 0, sizeof env->robot);
+    double yaw = env->command_frozen ? 0 : 3.141592653589793 * (2 * random_unit(&r) - 1);
+    const MildMaterial *material = &env->terrain.materials[mild_terrain_material_at(&env->terrain, 0, 0)];
+    double depth = env->variation.rigid ? 0 : standing_depth(robot, material);
+    env->robot.qpos[2] = env->terrain.height + robot_stand_height(robot) - depth + 0.002;
+    env->robot.qpos[3] = cos(0.5 * yaw);
+    env->robot.qpos[6] = sin(0.5 * yaw);
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        double q = pose[i] + z->initial_joint * (2 * random_unit(&r) - 1);
+        env->robot.qpos[7 + i] = fmin(fmax(q, robot_joint_low(robot)[i]), robot_joint_high(robot)[i]);
+    }
+    for (int i = 0; i < 6; i++) {
+        env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&r) - 1);
+    }
+    env->phase = random_unit(&r) < 0.5 ? 0 : 0.5;
+    /* The very first episodes end at different times, so that the environments never march in step. */
+    env->step = env->tick == 0 && !env->command_frozen ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit) : 0;
+}
+
+static void base_twist(const RobotSim *sim, double twist[6]) {
+    const double *qvel = robot_sim_qvel(sim);
+    memcpy(twist, qvel, 6 * sizeof *twist);
+}
+
+static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const TaskView *view) {
+    mild_ground_reset(task_env_ground(env));
+    draw_start(env, def, robot);
+    if (!env->command_frozen) {
+        task_draw_command(env, def);
+    }
+    memcpy(env->command_seen, env->command, sizeof env->command);
+    memset(env->action, 0, sizeof env->action);
+    memset(env->air_time, 0, sizeof env->air_time);
+    memset(env->joint_speed, 0, sizeof env->joint_speed);
+    memset(env->push, 0, sizeof env->push);
+    memset(env->term_sum, 0, sizeof env->term_sum);
+    env->reward_sum = env->speed_error_sum = 0;
+    robot_sim_load(sim, &env->robot, &env->variation);
+    base_twist(sim, env->base_twist);
+    TaskReading reading;
+    task_read_imu(sim, &reading);
+    task_read_motors(sim, &reading);
+    task_observe(env, def, robot, sim, &reading, 1, view);
+}
+
+void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const TaskView *view) {
+    task_randomize(env, def, robot);
+    start_episode(env, def, robot, sim, view);
+}
+
+void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const MildTerrain *terrain,
+                       int rigid, const TaskView *view) {
+    task_randomize(env, def, robot);
+    env->terrain = *terrain;
+    env->variation.rigid = rigid;
+    env->variation.rigid_friction = 0.8;
+    start_episode(env, def, robot, sim, view);
+}
+
+/* ---- one policy step ---- */
+
+static void accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
+    memmove(env->action[1], env->action[0], 2 * sizeof env->action[0]);
+    float limit = (float)def->action_clip;
+    for (int i = 0; i < TASK_ACTIONS; i++) {
+        float a = action[i];
+        env->action[0][i] = !(a > -limit) ? -limit : a > limit ? limit : a;
+    }
+}
+
+static void push_base(TaskEnv *env, const TaskDef *def) {
+    const RandomizeDef *z = &def->randomize;
+    for (int i = 0; i < 6; i++) {
+        env->push[i] *= 0.95;
+    }
+    uint32_t interval = (uint32_t)(z->push_interval / TASK_PERIOD + 0.5);
+    if (interval == 0 || env->step == 0 || (env->step + env->index * 97u) % interval != 0) {
+        return;
+    }
+    Random r = random_at(env->seed ^ RANDOM_USE_PUSH, env->index, env->tick);
+    for (int i = 0; i < 6; i++) {
+        double size = i == 2 ? 0 : i < 3 ? z->push_linear : z->push_angular;
+        env->push[i] = size * (2 * random_unit(&r) - 1);
+        env->robot.qvel[i] += env->push[i];
+    }
+}
+
+/* tau = strength clip(Kp (q0 + scale a - q + offset) - Kd qd), learning.md section 2. */
+static void pd_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                      const float *action, double torque[ROBOT_JOINTS]) {
+    const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim) + 6;
+    const double *pose = robot_default_pose(robot), *effort = robot_effort(robot);
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        double target = pose[i] + def->action_scale * (double)action[i] + env->motor_offset[i];
+        double tau = def->kp[i % 6] * env->kp_scale[i] * (target - q[i]) - def->kd[i % 6] * env->kd_scale[i] * qd[i];
+        double limit = def->torque_share * effort[i];
+        tau *= env->strength[i];
+        torque[i] = tau > limit ? limit : tau < -limit ? -limit : tau;
+    }
+}
+
+/* Physics steps of one policy period with the three latencies. Returns 1 when a number went bad. */
+static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, TaskReading *reading,
+                       double torque[ROBOT_JOINTS], const TaskProbe *probe) {
+    int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
+    for (int k = 0; k <= steps; k++) {
+        if (k == steps - env->lag_imu) {
+            task_read_imu(sim, reading);
+        }
+        if (k == steps - env->lag_motor) {
+            task_read_motors(sim, reading);
+        }
+        if (k == steps) {
+            break;
+        }
+        pd_torque(env, def, robot, sim, env->action[k >= env->lag_command ? 0 : 1], torque);
+        if (robot_sim_step(sim, torque, NULL, &env->terrain, task_env_ground(env))) {
+            return 1;
+        }
+        if (probe) {
+            probe->physics_step(probe->context, env, sim, torque);
+        }
+    }
+    return 0;
+}
+
+static void feet_motion(TaskEnv *env, const TaskDef *def, const RobotSim *sim, TaskMotion *m) {
+    double stance_height = 0;
+    int stances = 0;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        const double *v = foot->sole_center_velocity, *force = foot->force;
+        m->foot_height[f] = foot->sole_height;
+        m->foot_speed[f] = sqrt(v[0] * v[0] + v[1] * v[1]);
+        m->foot_force[f] = sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
+        m->contact[f] = force[2] > CONTACT_FORCE;
+        m->stance[f] = task_gait_stance(env->phase, m->standing, f);
+        m->either[f] = !m->standing && fabs(sin(6.283185307179586 * env->phase)) < def->double_support;
+        m->wanted_height[f] = task_gait_height(def, env->phase, m->standing, f);
+        if (m->contact[f]) {
+            m->landed_air_time += fmin(env->air_time[f], 0.5);
+            env->air_time[f] = 0;
+        } else {
+            env->air_time[f] += TASK_PERIOD;
+        }
+        if (m->stance[f]) {
+            stance_height += foot->sole_center[2];
+            stances++;
+        }
+    }
+    m->base_height = robot_sim_qpos(sim)[2] - stance_height / (stances ? stances : 1);
+}
+
+static TaskMotion describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                                  const double torque[ROBOT_JOINTS]) {
+    TaskMotion m = {.def = def, .env = env, .pose = robot_default_pose(robot)};
+    const double *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
+    double heading = atan2(rotation[3], rotation[0]), c = cos(heading), s = sin(heading), twist[6], change = 0;
+    m.standing = task_is_standing(env->command);
+    m.velocity[0] = c * qvel[0] + s * qvel[1];
+    m.velocity[1] = -s * qvel[0] + c * qvel[1];
+    m.velocity[2] = qvel[2];
+    base_twist(sim, twist);
+    for (int i = 0; i < 3; i++) {
+        m.omega[i] = qvel[3 + i];
+        m.gravity[i] = -rotation[6 + i];
+    }
+    for (int i = 0; i < 6; i++) {
+        change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
+    }
+    m.twist_change = sqrt(change);
+    memcpy(env->base_twist, twist, sizeof twist);
+    memcpy(m.q, robot_sim_qpos(sim) + 7, sizeof m.q);
+    memcpy(m.qd, qvel + 6, sizeof m.qd);
+    memcpy(m.qd_before, env->joint_speed, sizeof m.qd_before);
+    memcpy(env->joint_speed, m.qd, sizeof m.qd);
+    memcpy(m.torque, torque, sizeof m.torque);
+    m.foot_distance = robot_sim_foot_distance(sim);
+    m.knee_distance = robot_sim_knee_distance(sim);
+    feet_motion(env, def, sim, &m);
+    return m;
+}
+
+static int has_fallen(const TaskEnv *env, const TaskDef *def, const RobotSim *sim) {
+    return robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) || robot_sim_body_clearance(sim, &env->terrain) < 0;
+}
+
+static void advance_clock(TaskEnv *env, const TaskDef *def) {
+    env->tick++;
+    env->step++;
+    memcpy(env->command_seen, env->command, sizeof env->command);
+    env->phase += TASK_PERIOD / def->gait_period;
+    env->phase -= floor(env->phase);
+    uint32_t interval = (uint32_t)(def->command_interval / TASK_PERIOD + 0.5);
+    if (!env->command_frozen && interval && env->step % interval == 0) {
+        task_draw_command(env, def);
+    }
+}
+
+static void report_episode(const TaskEnv *env, TaskStep *out) {
+    out->length = env->step;
+    out->episode_reward = (float)env->reward_sum;
+    out->episode_speed_error = (float)(env->speed_error_sum / (env->step ? env->step : 1));
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        out->episode_terms[i] = (float)env->term_sum[i];
+    }
+}
+
+TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const float *action,
+                       int auto_reset, const TaskView *view, const TaskProbe *probe) {
+    TaskStep out = {.valid = 1};
+    TaskReading reading;
+    double torque[ROBOT_JOINTS], terms[TASK_REWARD_COUNT];
+    accept_action(env, def, action);
+    push_base(env, def);
+    robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL);
+    robot_sim_load(sim, &env->robot, &env->variation);
+    int bad = run_physics(env, def, robot, sim, &reading, torque, probe);
+    if (!bad) {
+        robot_sim_store(sim, &env->robot);
+        TaskMotion motion = describe_motion(env, def, robot, sim, torque);
+        out.reward = (float)task_reward(&motion, terms);
+        bad = !isfinite(out.reward);
+        env->speed_error_sum += hypot(motion.velocity[0] - env->command[0], motion.velocity[1] - env->command[1]);
+    }
+    if (bad) {
+        out.reward = 0;
+        out.valid = 0;
+    } else {
+        env->reward_sum += (double)out.reward;
+        for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+            env->term_sum[i] += terms[i] * TASK_PERIOD;
+        }
+    }
+    advance_clock(env, def);
+    int fallen = bad || has_fallen(env, def, sim);
+    out.timeout = !fallen && env->step >= env->step_limit;
+    out.done = fallen || out.timeout;
+    if (out.done) {
+        report_episode(env, &out);
+    }
+    if (out.done && auto_reset) {
+        task_env_reset(env, def, robot, sim, view);
+    } else if (!bad) {
+        task_observe(env, def, robot, sim, &reading, 0, view);
+    }
+    return out;
+}

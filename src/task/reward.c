@@ -1,0 +1,169 @@
+/* Every reward of learning.md section 5, each its own short function, in one table with its weight. */
+#include <math.h>
+#include <string.h>
+
+#include "task/task.h"
+
+static double square(double x) {
+    return x * x;
+}
+
+static double clamp(double x, double low, double high) {
+    return x < low ? low : x > high ? high : x;
+}
+
+static double reward_linear_velocity(const TaskMotion *m) {
+    double error = square(m->velocity[0] - m->env->command[0]) + square(m->velocity[1] - m->env->command[1]);
+    return exp(-m->def->reward.tracking_sharpness * error);
+}
+
+static double reward_yaw_rate(const TaskMotion *m) {
+    return exp(-m->def->reward.tracking_sharpness * square(m->omega[2] - m->env->command[2]));
+}
+
+/* The paper prints a positive weight on an error; read as a reward that falls with the error (learning.md section 5).
+ * Paid only where a foot should swing, so that standing still earns nothing here. */
+static double reward_feet_clearance(const TaskMotion *m) {
+    double sum = 0;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        if (!m->stance[f]) {
+            sum += exp(-m->def->reward.clearance_sharpness * fabs(m->foot_height[f] - m->wanted_height[f]));
+        }
+    }
+    return sum;
+}
+
+static double reward_gait(const TaskMotion *m) {
+    double sum = 0;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        sum += m->either[f] || m->contact[f] == m->stance[f] ? 1 : -0.3;
+    }
+    return sum / ROBOT_FEET;
+}
+
+static double reward_slip(const TaskMotion *m) {
+    double sum = 0;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        sum += m->contact[f] ? m->foot_speed[f] : 0;
+    }
+    return sum;
+}
+
+static double reward_base_acceleration(const TaskMotion *m) {
+    return exp(-3 * m->twist_change);
+}
+
+static double reward_action_smoothness(const TaskMotion *m) {
+    double sum = 0;
+    for (int i = 0; i < TASK_ACTIONS; i++) {
+        double a = m->env->action[0][i], a1 = m->env->action[1][i], a2 = m->env->action[2][i];
+        sum += square(a - a1) + square(a - 2 * a1 + a2);
+    }
+    return sum;
+}
+
+static double reward_reference_motion(const TaskMotion *m) {
+    double reference[ROBOT_JOINTS], sum = 0;
+    task_gait_reference(m->def, m->pose, m->env->phase, m->standing, reference);
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        sum += square(m->q[i] - reference[i]);
+    }
+    double d = sqrt(sum);
+    return exp(-2 * d) - 0.2 * clamp(d, 0, 0.5);
+}
+
+static double reward_default_pose(const TaskMotion *m) {
+    double roll_yaw = 0, all = 0;
+    for (int leg = 0; leg < 2; leg++) {
+        double roll = m->q[6 * leg] - m->pose[6 * leg], yaw = m->q[6 * leg + 1] - m->pose[6 * leg + 1];
+        roll_yaw += sqrt(square(roll) + square(yaw));
+    }
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        all += square(m->q[i] - m->pose[i]);
+    }
+    return exp(-100 * clamp(roll_yaw - 0.1, 0, 50)) - 0.01 * sqrt(all);
+}
+
+static double reward_base_height(const TaskMotion *m) {
+    return exp(-100 * fabs(m->base_height - m->def->reward.base_height));
+}
+
+static double within(double distance, const double limits[2]) {
+    double below = clamp(limits[0] - distance, 0, 0.5), above = clamp(distance - limits[1], 0, 0.5);
+    return 0.5 * (exp(-100 * below) + exp(-100 * above));
+}
+
+static double reward_feet_distance(const TaskMotion *m) {
+    return within(m->foot_distance, m->def->reward.feet_distance);
+}
+
+static double reward_knee_distance(const TaskMotion *m) {
+    return within(m->knee_distance, m->def->reward.knee_distance);
+}
+
+static double reward_orientation(const TaskMotion *m) {
+    double tilt = sqrt(square(m->gravity[0]) + square(m->gravity[1]));
+    return 0.5 * (exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + exp(-20 * tilt));
+}
+
+static double reward_air_time(const TaskMotion *m) {
+    return m->standing ? 0 : m->landed_air_time;
+}
+
+static double reward_base_motion(const TaskMotion *m) {
+    return 0.5 * (exp(-10 * square(m->velocity[2])) + exp(-5 * sqrt(square(m->omega[0]) + square(m->omega[1]))));
+}
+
+static double reward_contact_force(const TaskMotion *m) {
+    double sum = 0;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        sum += clamp(m->foot_force[f] - 500, 0, 400);
+    }
+    return sum;
+}
+
+static double reward_torque(const TaskMotion *m) {
+    double sum = 0;
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        sum += square(m->torque[i]);
+    }
+    return sum;
+}
+
+static double reward_joint_speed(const TaskMotion *m) {
+    double sum = 0;
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        sum += square(m->qd[i]);
+    }
+    return sum;
+}
+
+static double reward_joint_acceleration(const TaskMotion *m) {
+    double sum = 0;
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        sum += square((m->qd[i] - m->qd_before[i]) / TASK_PERIOD);
+    }
+    return sum;
+}
+
+/* The legs are about 0.10 m wide; the engine computes no contact between them. */
+static double reward_collision(const TaskMotion *m) {
+    return (m->foot_distance < 0.10) + (m->knee_distance < 0.09);
+}
+
+typedef double (*RewardFunction)(const TaskMotion *);
+#define TASK_REWARD_FUNCTION(name, weight, help) reward_##name,
+static const RewardFunction reward_functions[TASK_REWARD_COUNT] = {TASK_REWARD_LIST(TASK_REWARD_FUNCTION)};
+
+double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]) {
+    double sum = 0;
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        double weight = motion->def->reward.weight[i];
+        terms[i] = weight == 0 ? 0 : weight * reward_functions[i](motion);
+        sum += terms[i];
+    }
+    if (motion->def->reward.clip_sum && sum < 0) {
+        sum = 0;
+    }
+    return sum * TASK_PERIOD;
+}

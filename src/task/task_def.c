@@ -1,0 +1,220 @@
+#include "task/task_def.h"
+
+#include "mild/ground.h"
+
+#define TASK_REWARD_NAME(name, weight, help) #name,
+const char *const task_reward_names[] = {TASK_REWARD_LIST(TASK_REWARD_NAME)};
+
+TaskDef task_def_default(void) {
+    TaskDef def = {
+        .physics_dt = 0.0025,
+        .action_scale = 0.5,
+        .action_clip = 8.0,
+        .torque_share = 0.85,
+        .kp = {50, 50, 70, 70, 20, 20},
+        .kd = {5, 5, 7, 7, 0.2, 0.2},
+        .episode = 24,
+        .command_interval = 8,
+        .vx = {0, 1.2},
+        .vy = {-0.3, 0.3},
+        .wz = {-1.5, 1.5},
+        .backward_share = 0.1,
+        .backward_vx = {-0.6, 0},
+        .standing_share = 0.05,
+        .straight_share = 0.4,
+        .gait_period = 0.8,
+        .swing_apex = 0.10,
+        .double_support = 0.1,
+        .clock = 1,
+        .observe_noise = 1,
+        .noise_q = 0.03,
+        .noise_qd = 0.19,
+        .noise_omega = 0.3,
+        .noise_gravity = 0.075,
+        .tilt_limit = 1.0,
+        .newton = 1,
+        .reward = {.clip_sum = 1,
+                   .base_height = 0.83,
+                   .clearance_sharpness = 20,
+                   .tracking_sharpness = 5,
+                   .feet_distance = {0.13, 0.26},
+                   .knee_distance = {0.12, 0.26},
+                   .reference_amplitude = 0.26},
+        .randomize = {.rigid_share = 0.1,
+                      .preset_share = 0.5,
+                      .preset_jitter = 0.2,
+                      .patch_share = 0.3,
+                      .patch_length = {1.0, 3.0},
+                      .k_pen = {8, 1400},
+                      .sigma_cone = {0.01e6, 0.24e6},
+                      .alpha = {0.698, 1.310},
+                      .nu = {0.8, 2.4},
+                      .c_g = {-1.4, 4.6},
+                      .c_d = {-6, 28},
+                      .phi = {0.50, 0.64},
+                      .mu = {0.2, 1.3},
+                      .rho = {1000, 1000},
+                      .recovery = {0, 1},
+                      .bed_depth = {0.10, 0.15},
+                      .sinkage_max = 0.09,
+                      .base_mass = {-4, 4},
+                      .com_offset = 0.006,
+                      .link_mass = {0.9, 1.1},
+                      .armature = {0.7, 1.3},
+                      .motor_offset = 0.035,
+                      .gain = {0.9, 1.1},
+                      .strength = {0.9, 1.1},
+                      .latency = {0.001, 0.010},
+                      .push_interval = 8,
+                      .push_linear = 0.4,
+                      .push_angular = 0.6,
+                      .initial_joint = 0.05,
+                      .initial_velocity = 0.1},
+    };
+#define TASK_REWARD_WEIGHT(name, value, help) def.reward.weight[REWARD_##name] = value;
+    TASK_REWARD_LIST(TASK_REWARD_WEIGHT)
+    return def;
+}
+
+void task_def_make_nominal(TaskDef *def) {
+    RandomizeDef *r = &def->randomize;
+    r->rigid_share = 0;
+    r->preset_share = 1;
+    r->preset_jitter = 0;
+    r->patch_share = 0;
+    r->base_mass[0] = r->base_mass[1] = 0;
+    r->com_offset = r->motor_offset = 0;
+    r->link_mass[0] = r->link_mass[1] = 1;
+    r->armature[0] = r->armature[1] = 1;
+    r->gain[0] = r->gain[1] = 1;
+    r->strength[0] = r->strength[1] = 1;
+    r->push_interval = 0;
+}
+
+#define D MILD_FIELD_DOUBLE
+#define B MILD_FIELD_BOOL
+#define T(member, type, count, min, max, help) MILD_FIELD(TaskDef, member, type, count, min, max, help)
+const MildField task_fields[] = {
+    T(physics_dt, D, 1, 0.0005, 0.005, "[s] physics step; 0.01 must be a whole multiple of it"),
+    T(action_scale, D, 1, 0.01, 2, "[rad] joint offset per unit of action"),
+    T(action_clip, D, 1, 0.1, 100, "[-] actions are clipped to +- this"),
+    T(torque_share, D, 1, 0.1, 1, "[-] torque limit as a share of the joint's effort"),
+    T(kp, D, 6, 0, 500, "[N m/rad] hip roll, yaw, pitch, knee, ankle pitch, roll"),
+    T(kd, D, 6, 0, 50, "[N m s/rad] as kp"),
+    T(episode, D, 1, 0.1, 1000, "[s] time-out"),
+    T(command_interval, D, 1, 0.1, 1000, "[s] between redraws of the command"),
+    T(vx, D, 2, -3, 3, "[m/s] forward command, low and high"),
+    T(vy, D, 2, -3, 3, "[m/s] sideways command, low and high"),
+    T(wz, D, 2, -3, 3, "[rad/s] turning command, low and high"),
+    T(backward_share, D, 1, 0, 1, "[-] share of commands that walk backward"),
+    T(backward_vx, D, 2, -3, 3, "[m/s] backward command, low and high"),
+    T(standing_share, D, 1, 0, 1, "[-] share of commands that stand"),
+    T(straight_share, D, 1, 0, 1, "[-] share of walking commands without sideways and turning parts"),
+    T(gait_period, D, 1, 0.2, 3, "[s] T of the clock"),
+    T(swing_apex, D, 1, 0, 0.4, "[m] wanted height of the swing foot above h0"),
+    T(double_support, D, 1, 0, 1, "[-] |sin| of the clock below which either contact state is right"),
+    T(clock, B, 1, 0, 1, "[bool] gait clock in the observation"),
+    T(observe_noise, B, 1, 0, 1, "[bool] sensor noise"),
+    T(noise_q, D, 1, 0, 1, "[rad] uniform +-"),
+    T(noise_qd, D, 1, 0, 5, "[-] uniform +-, after scaling by 0.05"),
+    T(noise_omega, D, 1, 0, 5, "[rad/s] uniform +-"),
+    T(noise_gravity, D, 1, 0, 1, "[-] uniform +-"),
+    T(tilt_limit, D, 1, 0.1, 3.1, "[rad] the episode ends when the base tilts further"),
+    T(newton, B, 1, 0, 1, "[bool] contact solver: the fast one; off: the paper's Gauss-Seidel"),
+};
+const int task_field_count = sizeof task_fields / sizeof *task_fields;
+
+#define R(member, type, count, min, max, help) MILD_FIELD(RewardDef, member, type, count, min, max, help)
+#define TASK_REWARD_FIELD(name, value, help) \
+    {#name, MILD_FIELD_DOUBLE, offsetof(RewardDef, weight) + sizeof(double) * REWARD_##name, 1, -1e3, 1e3, "[1/s] " help},
+const MildField reward_fields[] = {
+    TASK_REWARD_LIST(TASK_REWARD_FIELD)
+    R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
+    R(base_height, D, 1, 0.1, 2, "[m] nominal base height above the stance soles"),
+    R(clearance_sharpness, D, 1, 0, 1000, "[1/m] of feet_clearance"),
+    R(tracking_sharpness, D, 1, 0, 100, "[s^2/m^2] of linear_velocity and yaw_rate"),
+    R(feet_distance, D, 2, 0, 1, "[m] limits of the lateral distance of the feet"),
+    R(knee_distance, D, 2, 0, 1, "[m] limits of the lateral distance of the knees"),
+    R(reference_amplitude, D, 1, 0, 1, "[rad] of reference_motion"),
+};
+const int reward_field_count = sizeof reward_fields / sizeof *reward_fields;
+
+#define Z(member, count, min, max, help) MILD_FIELD(RandomizeDef, member, D, count, min, max, help)
+const MildField randomize_fields[] = {
+    Z(rigid_share, 1, 0, 1, "[-] share of episodes on the engine's rigid ground"),
+    Z(preset_share, 1, 0, 1, "[-] share of episodes on a named preset; the rest draws from the ranges below"),
+    Z(preset_jitter, 1, 0, 0.9, "[-] preset parameters times 1 +- this"),
+    Z(patch_share, 1, 0, 1, "[-] share of soft episodes whose ground changes in stripes"),
+    Z(patch_length, 2, 0.1, 100, "[m] length of a stripe, low and high"),
+    Z(k_pen, 2, 0, 1e6, "[N/m] range (paper)"),
+    Z(sigma_cone, 2, 0, 1e8, "[N/m^3] range (paper)"),
+    Z(alpha, 2, 0.1, 1.5, "[rad] range (paper)"),
+    Z(nu, 2, 0.05, 10, "[-] range (paper)"),
+    Z(c_g, 2, -10, 20, "[-] range (paper)"),
+    Z(c_d, 2, -50, 100, "[-] range (paper)"),
+    Z(phi, 2, 0.1, 1, "[-] range (paper)"),
+    Z(mu, 2, 0.01, 3, "[-] range (paper)"),
+    Z(rho, 2, 1, 5000, "[kg/m^3] range"),
+    Z(recovery, 2, 0, 1, "[-] range"),
+    Z(bed_depth, 2, 0.001, 10, "[m] range"),
+    Z(sinkage_max, 1, 0.005, 1, "[m] softer draws are made stiffer until one foot sinks no deeper"),
+    Z(base_mass, 2, -8, 20, "[kg] added to the base (paper)"),
+    Z(com_offset, 1, 0, 0.2, "[m] +- of the base's centre of mass (paper 0.006, vendor 0.06)"),
+    Z(link_mass, 2, 0.1, 3, "[-] range (vendor)"),
+    Z(armature, 2, 0.1, 5, "[-] range (vendor)"),
+    Z(motor_offset, 1, 0, 0.5, "[rad] +- (paper)"),
+    Z(gain, 2, 0.1, 3, "[-] of Kp and Kd (vendor)"),
+    Z(strength, 2, 0.1, 3, "[-] of the torque (vendor)"),
+    Z(latency, 2, 0, 0.01, "[s] of the command, motor readings and IMU readings, each (paper)"),
+    Z(push_interval, 1, 0, 1000, "[s] between pushes; 0: none (vendor)"),
+    Z(push_linear, 1, 0, 5, "[m/s] +- (vendor)"),
+    Z(push_angular, 1, 0, 5, "[rad/s] +- (vendor)"),
+    Z(initial_joint, 1, 0, 0.5, "[rad] +- around the default pose"),
+    Z(initial_velocity, 1, 0, 2, "[m/s] +- of the base"),
+};
+const int randomize_field_count = sizeof randomize_fields / sizeof *randomize_fields;
+
+static MildStatus check_range(const double *range, const char *name, MildError *error) {
+    if (range[0] <= range[1]) {
+        return MILD_OK;
+    }
+    return mild_fail(error, MILD_ERROR_RANGE, "%s: low %g is above high %g", name, range[0], range[1]);
+}
+
+MildStatus task_def_check(const TaskDef *def, MildError *error) {
+    MildStatus status = mild_fields_check(task_fields, task_field_count, def, "task", error);
+    if (status == MILD_OK) {
+        status = mild_fields_check(reward_fields, reward_field_count, &def->reward, "reward", error);
+    }
+    if (status == MILD_OK) {
+        status = mild_fields_check(randomize_fields, randomize_field_count, &def->randomize, "randomize", error);
+    }
+    double per_policy_step = 0.01 / def->physics_dt;
+    if (status == MILD_OK && !(per_policy_step - (int)(per_policy_step + 0.5) < 1e-9 &&
+                               (int)(per_policy_step + 0.5) - per_policy_step < 1e-9)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "task.physics_dt: 0.01 s is not a whole multiple of %g", def->physics_dt);
+    }
+    if (status == MILD_OK && def->randomize.rigid_share + def->randomize.preset_share > 1 + 1e-12) {
+        return mild_fail(error, MILD_ERROR_RANGE, "randomize: rigid_share + preset_share is above 1");
+    }
+    const struct {
+        const double *range;
+        const char *name;
+    } ranges[] = {
+        {def->vx, "task.vx"}, {def->vy, "task.vy"}, {def->wz, "task.wz"}, {def->backward_vx, "task.backward_vx"},
+        {def->randomize.k_pen, "randomize.k_pen"}, {def->randomize.sigma_cone, "randomize.sigma_cone"},
+        {def->randomize.alpha, "randomize.alpha"}, {def->randomize.nu, "randomize.nu"},
+        {def->randomize.c_g, "randomize.c_g"}, {def->randomize.c_d, "randomize.c_d"},
+        {def->randomize.phi, "randomize.phi"}, {def->randomize.mu, "randomize.mu"},
+        {def->randomize.rho, "randomize.rho"}, {def->randomize.recovery, "randomize.recovery"},
+        {def->randomize.bed_depth, "randomize.bed_depth"}, {def->randomize.base_mass, "randomize.base_mass"},
+        {def->randomize.link_mass, "randomize.link_mass"}, {def->randomize.armature, "randomize.armature"},
+        {def->randomize.gain, "randomize.gain"}, {def->randomize.strength, "randomize.strength"},
+        {def->randomize.latency, "randomize.latency"}, {def->randomize.patch_length, "randomize.patch_length"},
+        {def->reward.feet_distance, "reward.feet_distance"}, {def->reward.knee_distance, "reward.knee_distance"},
+    };
+    for (size_t i = 0; status == MILD_OK && i < sizeof ranges / sizeof *ranges; i++) {
+        status = check_range(ranges[i].range, ranges[i].name, error);
+    }
+    return status;
+}

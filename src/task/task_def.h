@@ -1,0 +1,106 @@
+/* The task's configuration: sections [task], [reward], [randomize] of a config file. Defaults are complete. */
+#ifndef MILD_TASK_DEF_H
+#define MILD_TASK_DEF_H
+
+#include "mild/error.h"
+#include "mild/field.h"
+
+/* Every reward term once: name, default weight, help. The struct, the config keys and the table of functions
+ * (reward.c) are all made from this list. Weights are per second; source: paper Table II and learning.md section 5. */
+#define TASK_REWARD_LIST(X)                                                                                           \
+    X(linear_velocity, 1.4, "exp(-5 |v_xy - command|^2), base heading frame (paper)")                                  \
+    X(yaw_rate, 1.1, "exp(-5 (w_z - command)^2) (paper)")                                                              \
+    X(feet_clearance, 2.4, "swing feet: exp(-20 |h - h_des(phase)|), h of the lowest sole point above h0 (paper)")    \
+    X(gait, 1.4, "mean over feet: 1 when contact matches the clock, else -0.3 (paper)")                                \
+    X(slip, -0.1, "[m/s] horizontal speed of feet in contact (paper)")                                                 \
+    X(base_acceleration, 0.2, "exp(-3 |change of base twist in one step|) (paper)")                                    \
+    X(action_smoothness, -0.003, "|a - a1|^2 + |a - 2 a1 + a2|^2 (paper)")                                             \
+    X(reference_motion, 2.2, "exp(-2 d) - 0.2 min(d, 0.5), d = |q - q_ref(phase)| (vendor)")                           \
+    X(default_pose, 0.8, "hip roll and yaw near the default pose (vendor)")                                            \
+    X(base_height, 0.2, "exp(-100 |height above the stance soles - nominal|) (vendor)")                                \
+    X(feet_distance, 0.2, "lateral distance of the feet within limits (vendor)")                                       \
+    X(knee_distance, 0.2, "lateral distance of the knees within limits (vendor)")                                      \
+    X(orientation, 1.0, "upright base (vendor)")                                                                       \
+    X(air_time, 1.5, "[s] time in the air, paid at touchdown, at most 0.5 (vendor)")                                   \
+    X(base_motion, 0.5, "small vertical and roll-pitch speed of the base (vendor)")                                    \
+    X(contact_force, -0.02, "[N] foot force above 500 N, at most 400 (vendor)")                                        \
+    X(torque, -1e-10, "[N^2 m^2] sum of squared torques (vendor)")                                                     \
+    X(joint_speed, -1e-5, "[rad^2/s^2] sum of squared joint speeds (vendor)")                                          \
+    X(joint_acceleration, -5e-9, "[rad^2/s^4] sum of squared joint accelerations (vendor)")                            \
+    X(collision, -1.0, "feet or knees closer than the legs are wide (vendor)")
+
+#define TASK_REWARD_ENUM(name, weight, help) REWARD_##name,
+enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };
+#undef TASK_REWARD_ENUM
+
+typedef struct {
+    double weight[TASK_REWARD_COUNT]; /* [1/s] */
+    int clip_sum;                     /* bool: the sum of a step is never below 0 (vendor) */
+    double base_height;               /* [m] nominal base height above the stance soles */
+    double clearance_sharpness;       /* [1/m] */
+    double tracking_sharpness;        /* [s^2/m^2] the 5 in the velocity terms */
+    double feet_distance[2], knee_distance[2]; /* [m] limits */
+    double reference_amplitude;       /* [rad] */
+} RewardDef;
+
+/* Domain randomisation; ranges are uniform. learning.md section 6. */
+typedef struct {
+    /* ground: shares of episodes; what remains after rigid and preset draws from the paper's ranges */
+    double rigid_share;     /* [-] engine contact */
+    double preset_share;    /* [-] a named preset, parameters times 1 +- preset_jitter */
+    double preset_jitter;   /* [-] */
+    double patch_share;     /* [-] soft episodes whose ground changes in stripes */
+    double patch_length[2]; /* [m] */
+    double k_pen[2], sigma_cone[2], alpha[2], nu[2], c_g[2], c_d[2], phi[2], mu[2], rho[2], recovery[2], bed_depth[2];
+    double sinkage_max;     /* [m] a draw whose one-foot static sinkage is deeper is made stiffer until it fits */
+    /* robot */
+    double base_mass[2];     /* [kg] added */
+    double com_offset;       /* [m] each axis, +- */
+    double link_mass[2];     /* [-] */
+    double armature[2];      /* [-] */
+    double motor_offset;     /* [rad] +- */
+    double gain[2];          /* [-] Kp and Kd, each joint */
+    double strength[2];      /* [-] torque */
+    double latency[2];       /* [s] command, motor reading, IMU reading: each drawn per episode */
+    double push_interval;    /* [s] 0: none */
+    double push_linear, push_angular; /* [m/s], [rad/s] */
+    double initial_joint;    /* [rad] +- around the default pose */
+    double initial_velocity; /* [m/s] +- of the base */
+} RandomizeDef;
+
+typedef struct {
+    double physics_dt;      /* [s] */
+    double action_scale;    /* [rad] per unit action */
+    double action_clip;     /* [-] */
+    double torque_share;    /* [-] of the joint's effort */
+    double kp[6], kd[6];    /* per leg */
+    double episode;         /* [s] */
+    double command_interval;/* [s] */
+    double vx[2], vy[2], wz[2];
+    double backward_share, backward_vx[2], standing_share, straight_share;
+    double gait_period;     /* [s] */
+    double swing_apex;      /* [m] */
+    double double_support;  /* [-] |sin(2 pi phase)| below which either contact state is right */
+    int clock;              /* bool: clock in the observation */
+    int observe_noise;      /* bool */
+    double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
+    double tilt_limit;      /* [rad] */
+    int newton;             /* bool: fast solver; off: the paper's sweeps */
+    RewardDef reward;
+    RandomizeDef randomize;
+} TaskDef;
+
+TaskDef task_def_default(void);
+/* Nothing random but sensor noise and latencies' mean: for evaluation and play. */
+void task_def_make_nominal(TaskDef *def);
+MildStatus task_def_check(const TaskDef *def, MildError *error);
+
+extern const MildField task_fields[];
+extern const int task_field_count;
+extern const MildField reward_fields[]; /* offsets into RewardDef */
+extern const int reward_field_count;
+extern const MildField randomize_fields[]; /* offsets into RandomizeDef */
+extern const int randomize_field_count;
+extern const char *const task_reward_names[];
+
+#endif

@@ -1,0 +1,172 @@
+#include "task/vec.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct Vec {
+    TaskDef def;
+    const Robot *robot;
+    Pool *pool;
+    int envs;
+    size_t stride;
+    char *state;    /* [envs][stride] TaskEnv and ground memory */
+    TaskStep *step; /* [envs] */
+    RobotSim **sim; /* [threads] */
+    VecStats stats; /* sums */
+    /* arguments of the call in flight */
+    const float *action;
+    const VecView *view;
+};
+
+static TaskEnv *env_at(const Vec *vec, int i) {
+    return (TaskEnv *)(void *)(vec->state + (size_t)i * vec->stride);
+}
+
+static TaskView view_at(const VecView *view, int i) {
+    size_t row = (size_t)i;
+    return (TaskView){
+        .history = view->history ? view->history + row * TASK_HISTORY : NULL,
+        .critic = view->critic ? view->critic + row * TASK_CRITIC : NULL,
+        .estimate = view->estimate ? view->estimate + row * TASK_ESTIMATES : NULL,
+        .frame = view->frame ? view->frame + row * TASK_OBSERVATION : NULL,
+    };
+}
+
+Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, uint64_t seed, MildError *error) {
+    if (task_def_check(def, error) != MILD_OK) {
+        return NULL;
+    }
+    Vec *vec = calloc(1, sizeof *vec);
+    if (!vec) {
+        mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
+        return NULL;
+    }
+    *vec = (Vec){.def = *def, .robot = robot, .pool = pool, .envs = envs, .stride = task_env_bytes(robot)};
+    vec->state = aligned_alloc(64, (size_t)envs * vec->stride);
+    vec->step = calloc((size_t)envs, sizeof *vec->step);
+    vec->sim = calloc((size_t)pool_threads(pool), sizeof(RobotSim *));
+    if (!vec->state || !vec->step || !vec->sim) {
+        mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory for %d", envs);
+        vec_destroy(vec);
+        return NULL;
+    }
+    for (int i = 0; i < pool_threads(pool); i++) {
+        vec->sim[i] = robot_sim_create(robot, def->physics_dt, error);
+        if (!vec->sim[i]) {
+            vec_destroy(vec);
+            return NULL;
+        }
+    }
+    for (int i = 0; i < envs; i++) {
+        task_env_init(env_at(vec, i), def, robot, seed, (uint32_t)i);
+    }
+    return vec;
+}
+
+void vec_destroy(Vec *vec) {
+    if (!vec) {
+        return;
+    }
+    for (int i = 0; vec->sim && i < pool_threads(vec->pool); i++) {
+        robot_sim_destroy(vec->sim[i]);
+    }
+    free(vec->sim);
+    free(vec->step);
+    free(vec->state);
+    free(vec);
+}
+
+static void reset_piece(void *context, int piece, int thread) {
+    Vec *vec = context;
+    TaskView view = view_at(vec->view, piece);
+    task_env_reset(env_at(vec, piece), &vec->def, vec->robot, vec->sim[thread], &view);
+}
+
+void vec_reset(Vec *vec, const VecView *first) {
+    vec->view = first;
+    pool_run(vec->pool, vec->envs, reset_piece, vec);
+}
+
+static void step_piece(void *context, int piece, int thread) {
+    Vec *vec = context;
+    TaskView view = view_at(vec->view, piece);
+    vec->step[piece] = task_env_step(env_at(vec, piece), &vec->def, vec->robot, vec->sim[thread],
+                                     vec->action + (size_t)piece * TASK_ACTIONS, 1, &view, NULL);
+}
+
+static void count_episode(Vec *vec, const TaskStep *step) {
+    VecStats *stats = &vec->stats;
+    stats->episodes++;
+    stats->falls += !step->timeout;
+    stats->length += step->length * TASK_PERIOD;
+    stats->reward += (double)step->episode_reward;
+    stats->speed_error += (double)step->episode_speed_error;
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        stats->terms[i] += (double)step->episode_terms[i];
+    }
+}
+
+void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout, uint8_t *valid,
+              const VecView *next) {
+    vec->action = action;
+    vec->view = next;
+    pool_run(vec->pool, vec->envs, step_piece, vec);
+    for (int i = 0; i < vec->envs; i++) {
+        const TaskStep *step = &vec->step[i];
+        reward[i] = step->reward;
+        done[i] = step->done;
+        timeout[i] = step->timeout;
+        valid[i] = step->valid;
+        vec->stats.diverged += !step->valid;
+        if (step->done) {
+            count_episode(vec, step);
+        }
+    }
+    vec->stats.steps += vec->envs;
+}
+
+VecStats vec_take_stats(Vec *vec) {
+    VecStats stats = vec->stats;
+    if (stats.episodes) {
+        double lived = stats.length > 0 ? stats.length : 1;
+        for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+            stats.terms[i] /= lived;
+        }
+        stats.length /= stats.episodes;
+        stats.reward /= stats.episodes;
+        stats.speed_error /= stats.episodes;
+    }
+    memset(&vec->stats, 0, sizeof vec->stats);
+    return stats;
+}
+
+void *vec_state(Vec *vec, size_t *bytes) {
+    *bytes = (size_t)vec->envs * vec->stride;
+    return vec->state;
+}
+
+size_t vec_bytes(const Vec *vec) {
+    return (size_t)vec->envs * (vec->stride + sizeof *vec->step);
+}
+
+static uint64_t hash_bytes(uint64_t hash, const void *data, size_t size) {
+    const unsigned char *bytes = data;
+    for (size_t i = 0; i < size; i++) {
+        hash = (hash ^ bytes[i]) * 0x100000001b3u;
+    }
+    return hash;
+}
+
+/* Member by member: the padding between members is not part of the state. */
+uint64_t vec_hash(const Vec *vec) {
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (int i = 0; i < vec->envs; i++) {
+        TaskEnv *env = env_at(vec, i);
+        hash = hash_bytes(hash, &env->robot, sizeof env->robot);
+        hash = hash_bytes(hash, env->history, sizeof env->history);
+        hash = hash_bytes(hash, env->command, sizeof env->command);
+        hash = hash_bytes(hash, &env->reward_sum, sizeof env->reward_sum);
+        hash = hash_bytes(hash, task_env_ground(env), mild_ground_bytes(robot_soles(vec->robot), ROBOT_FEET));
+    }
+    return hash;
+}

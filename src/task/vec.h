@@ -1,0 +1,41 @@
+/* Many environments over all cores, writing straight into the learner's batch. */
+#ifndef MILD_VEC_H
+#define MILD_VEC_H
+
+#include <stddef.h>
+
+#include "base/pool.h"
+#include "task/task.h"
+
+typedef struct Vec Vec;
+
+/* Rows of the batch at one time; each [envs][width]. Pointers may be NULL. */
+typedef struct {
+    float *history, *critic, *estimate, *frame;
+} VecView;
+
+/* Of the episodes that ended since the last vec_take_stats. */
+typedef struct {
+    int episodes, falls, diverged;
+    double steps;       /* policy steps */
+    double length;      /* [s] mean */
+    double reward;      /* mean sum of an episode */
+    double speed_error; /* [m/s] mean */
+    double terms[TASK_REWARD_COUNT]; /* mean per second lived */
+} VecStats;
+
+/* Borrows robot and pool; one RobotSim per thread. */
+Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, uint64_t seed, MildError *error);
+void vec_destroy(Vec *vec);
+void vec_reset(Vec *vec, const VecView *first);
+/* One policy step of all. action [envs][TASK_ACTIONS]; reward, done, timeout, valid [envs]; next: the observation after. */
+void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout, uint8_t *valid,
+              const VecView *next);
+VecStats vec_take_stats(Vec *vec);
+/* Everything that persists, one pointer-free block: save and load are a copy. */
+void *vec_state(Vec *vec, size_t *bytes);
+size_t vec_bytes(const Vec *vec);
+/* FNV-1a of everything that moves: robots, histories, commands, reward sums, ground memory. */
+uint64_t vec_hash(const Vec *vec);
+
+#endif
