@@ -1,0 +1,63 @@
+/* Command lines: named options bound to variables, config overrides, positional words, and help a stranger can read. */
+#ifndef MILD_CLI_H
+#define MILD_CLI_H
+
+#include <stdint.h>
+
+#include "mild/error.h"
+
+enum { CLI_LIST_MAX = 16, CLI_OVERRIDES_MAX = 64, CLI_EXIT_BAD_INPUT = 2 };
+
+typedef struct {
+    int count;
+    double value[CLI_LIST_MAX];
+} CliNumbers; /* "0.3,0.6" */
+
+typedef struct {
+    int count;
+    char name[CLI_LIST_MAX][64];
+} CliNames; /* "rubber,foam45" */
+
+/* target: FLAG int *, TEXT const char **, INT int *, UINT64 uint64_t *, NUMBER double *, NUMBERS CliNumbers *,
+ * NAMES CliNames *. What the target holds before parsing is the default. */
+typedef enum { CLI_FLAG, CLI_TEXT, CLI_INT, CLI_UINT64, CLI_NUMBER, CLI_NUMBERS, CLI_NAMES } CliType;
+
+typedef struct {
+    const char *name; /* without the dashes */
+    CliType type;
+    void *target;
+    double min, max;   /* inclusive, for each number; ignored for FLAG, TEXT, NAMES, UINT64 */
+    const char *value; /* what stands for the value in the help: "NAME[,NAME]"; NULL for a flag */
+    const char *help;  /* with unit and default */
+} CliOption;
+
+typedef struct {
+    const char *name;     /* "press" */
+    const char *usage;    /* "--ground NAME [options]" */
+    const char *summary;  /* sentences that say what the command does */
+    const CliOption *options;
+    int option_count;
+    const char *overrides; /* help on --section.key=value; NULL: the command takes none */
+    const char *examples;  /* whole lines, or NULL */
+    int positional_max;    /* words without dashes */
+} CliCommand;
+
+typedef struct {
+    const char *positional[CLI_LIST_MAX];
+    int positional_count;
+    const char *overrides[CLI_OVERRIDES_MAX]; /* "section.key=value" */
+    int override_count;
+    char joined[CLI_OVERRIDES_MAX][160]; /* storage of overrides given as two words */
+} CliArgs;
+
+typedef enum { CLI_RUN, CLI_DONE, CLI_BAD } CliOutcome;
+
+/* Parses argv[1..]. CLI_DONE: the help was asked for and printed, exit 0. CLI_BAD: one line went to stderr, exit
+ * CLI_EXIT_BAD_INPUT. */
+CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args);
+
+/* "mild COMMAND: text" on stderr; returns CLI_EXIT_BAD_INPUT so that `return cli_fail(...)` ends a command. */
+int cli_fail(const char *command, const MildError *error);
+int cli_fail_text(const char *command, const char *format, ...);
+
+#endif
