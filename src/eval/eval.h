@@ -1,0 +1,45 @@
+/* Trials and measures (learning.md section 8): one definition, used everywhere. */
+#ifndef MILD_EVAL_H
+#define MILD_EVAL_H
+
+#include "base/pool.h"
+#include "control/controller.h"
+#include "eval/scene.h"
+
+typedef struct {
+    double speed;   /* [m/s] commanded, forward */
+    int trials;
+    double seconds; /* [s] per trial */
+    uint64_t seed;  /* trial k uses stream k */
+} EvalDef;
+
+/* Means over the trials, SI units. */
+typedef struct {
+    char ground[160];
+    double speed;
+    int trials, success;  /* success: trials without termination */
+    double velocity;      /* [m/s] forward, over the part after the first 2 s */
+    double velocity_low, velocity_high; /* [m/s] 95 % interval of the mean over trials */
+    double cot;           /* [-] sum |tau qd| / (m g v) */
+    double torque_max;    /* [N m] over joints, time and trials */
+    double clearance;     /* [m] swing apex of the lowest sole point above h0 */
+    double penetration;   /* [m] deepest element of each stance */
+    double drift;         /* [m] horizontal travel of the sole between touchdown and lift-off */
+    double energy;        /* [J] integral |tau . qd| dt */
+    double com_oscillation; /* [m] peak to peak of the base height over the steady part */
+    double seconds;       /* [s] mean time on its feet */
+} EvalRow;
+
+/* `def` gives control, gait and sensors; its randomisation should be nominal (task_def_make_nominal). Trials run side by
+ * side over the pool; results depend on (def, scene, seed) only. */
+MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller, const Scene *scene,
+                    const EvalDef *eval, EvalRow *row, MildError *error);
+
+/* Heading hold used by eval and play: turns back to world x. Writes env->command and freezes it. */
+void eval_command(TaskEnv *env, double speed);
+
+/* Text table. */
+void eval_print_header(char *text, int size);
+void eval_print_row(const EvalRow *row, char *text, int size);
+
+#endif

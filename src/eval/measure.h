@@ -1,0 +1,25 @@
+/* What one trial does, watched at every physics step. */
+#ifndef MILD_MEASURE_H
+#define MILD_MEASURE_H
+
+#include "task/task.h"
+
+#define MEASURE_STEADY 2.0 /* [s] start of the steady part */
+
+typedef struct {
+    double time, dt;
+    double work;            /* [J] integral sum |tau qd| over the steady part */
+    double energy;          /* [J] integral |tau . qd| */
+    double torque_max;      /* [N m] */
+    double start_x, end_x, steady_time;
+    double base_low, base_high;
+    int in_stance[ROBOT_FEET];
+    double touchdown[ROBOT_FEET][2], apex[ROBOT_FEET], deepest[ROBOT_FEET];
+    double apex_sum, deepest_sum, drift_sum;
+    int swings, stances;
+} Measure;
+
+void measure_start(Measure *measure, double dt);
+void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque); /* a TaskProbe */
+
+#endif
