@@ -1,0 +1,380 @@
+#include "view/relief.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MASK_PER_PITCH 4
+#define SOLE_MARGIN 0.005  /* [m] the surface gives way this far beside the sole, so that its edge stays visible */
+#define UNDER_SOLE 0.0015  /* [m] drawn gap below the sole against flicker */
+#define CHANGE_SEEN 0.0003 /* [m] smaller changes are not worth an upload */
+#define SHADE_DEPTH 0.030  /* [m] depth at which pressed ground is about as dark as it gets */
+#define NO_DEPTH (-1e9f)
+
+/* Where a sole is, on a raster finer than its elements. */
+typedef struct {
+    double x_min, y_min, step, z;
+    int columns, rows;
+    double reach; /* [m] ankle to the farthest sole point */
+    unsigned char *inside;
+} SoleMask;
+
+typedef struct {
+    int i0, i1, j0, j1; /* half-open vertex range */
+} Box;
+
+typedef enum { GRAIN_FINE, GRAIN_GRID, GRAIN_BLADES, GRAIN_SPECKLE, GRAIN_CHECKER } Grain;
+
+typedef struct {
+    float rgb[3];
+    Grain grain;
+} Look;
+
+struct Relief {
+    int columns, rows; /* tiles */
+    int nx, ny;        /* vertices */
+    double x0, y0, cell, surface;
+    int rigid, feet;
+    MildTerrain terrain;
+    Look look[MILD_MATERIALS_MAX + 1]; /* last: rigid */
+    SoleMask mask[MILD_FEET_MAX];
+    Box last[MILD_FEET_MAX];
+    double position[MILD_FEET_MAX][3], rotation[MILD_FEET_MAX][9];
+    float *peak, *shown; /* [ny][nx] deepest and present depth of the surface */
+    unsigned char *touched, *dirty;
+    signed char *material; /* [tiles] */
+};
+
+/* ---- looks ---- */
+
+static const struct {
+    const char *name;
+    Look look;
+} looks[] = {
+    {"rubber", {{0.27F, 0.31F, 0.38F}, GRAIN_SPECKLE}},
+    {"foam60", {{0.47F, 0.60F, 0.74F}, GRAIN_GRID}},
+    {"foam45", {{0.93F, 0.80F, 0.46F}, GRAIN_GRID}},
+    {"foam28", {{0.93F, 0.66F, 0.58F}, GRAIN_GRID}},
+    {"foam25", {{0.80F, 0.70F, 0.86F}, GRAIN_GRID}},
+    {"grass", {{0.35F, 0.56F, 0.24F}, GRAIN_BLADES}},
+    {"sand_loose", {{0.84F, 0.69F, 0.44F}, GRAIN_FINE}},
+    {"sand_dense", {{0.69F, 0.53F, 0.35F}, GRAIN_FINE}},
+};
+static const Look rigid_look = {{0.66F, 0.67F, 0.68F}, GRAIN_CHECKER};
+
+static Look look_of(const char *name, const MildMaterial *material) {
+    for (size_t i = 0; name && i < sizeof looks / sizeof *looks; i++)
+        if (strcmp(name, looks[i].name) == 0)
+            return looks[i].look;
+    /* A ground of the user's own: elastic ones look like foam, plastic ones like sand. */
+    return material->recovery > 0.5 ? looks[2].look : looks[6].look;
+}
+
+static unsigned hash(unsigned x, unsigned y, unsigned z) {
+    unsigned h = x * 0x9e3779b1u ^ y * 0x85ebca77u ^ z * 0xc2b2ae3du;
+    h ^= h >> 15;
+    h *= 0x2c1b3c6du;
+    h ^= h >> 12;
+    h *= 0x297a2d39u;
+    return h ^ (h >> 15);
+}
+
+/* Noise in [-1, 1], one value per block of pixels, periodic in the tile so that tiles join. */
+static float noise(int px, int py, int width, int height, unsigned layer) {
+    unsigned h = hash((unsigned)((px % RELIEF_TILE_PIXELS) / width), (unsigned)((py % RELIEF_TILE_PIXELS) / height), layer);
+    return (float)(h & 0xffffu) / 32767.5F - 1.0F;
+}
+
+/* Relative brightness of the undisturbed ground at a pixel. */
+static float grain_shade(Grain grain, int px, int py) {
+    switch (grain) {
+    case GRAIN_FINE:
+        return 1.0F + 0.10F * noise(px, py, 1, 1, 1) + 0.05F * noise(px, py, 4, 4, 2);
+    case GRAIN_GRID: /* lines every 8 cm: a dent bends them */
+        return (px % 16 == 0 || py % 16 == 0 ? 0.80F : 1.0F) + 0.03F * noise(px, py, 2, 2, 3);
+    case GRAIN_BLADES:
+        return 1.0F + 0.22F * noise(px, py, 1, 4, 4) + 0.12F * noise(px, py, 4, 2, 5);
+    case GRAIN_SPECKLE:
+        return noise(px, py, 2, 2, 6) > 0.86F ? 1.7F : 1.0F + 0.05F * noise(px, py, 1, 1, 7);
+    default: /* checker of half a tile */
+        return ((px / 64 + py / 64) % 2 ? 0.94F : 1.0F) + 0.015F * noise(px, py, 1, 1, 8);
+    }
+}
+
+static void paint(const Look *look, int px, int py, float dark, unsigned char *rgb) {
+    float shade = grain_shade(look->grain, px, py) * (1.0F - dark);
+    for (int c = 0; c < 3; c++) {
+        float v = look->rgb[c] * shade * 255.0F;
+        rgb[c] = (unsigned char)(v < 0.0F ? 0.0F : v > 255.0F ? 255.0F : v);
+    }
+}
+
+/* ---- sole raster ---- */
+
+static int mask_create(SoleMask *mask, const MildSole *sole) {
+    int elements = mild_sole_elements(sole);
+    double half = 0.5 * mild_sole_pitch(sole) + SOLE_MARGIN, x_max = -1e9, y_max = -1e9;
+    const double *x = mild_sole_x(sole), *y = mild_sole_y(sole);
+    mask->z = mild_sole_z(sole);
+    mask->x_min = mask->y_min = 1e9;
+    mask->reach = 0;
+    for (int e = 0; e < elements; e++) {
+        mask->x_min = fmin(mask->x_min, x[e] - half), mask->y_min = fmin(mask->y_min, y[e] - half);
+        x_max = fmax(x_max, x[e] + half), y_max = fmax(y_max, y[e] + half);
+        mask->reach = fmax(mask->reach, hypot(hypot(x[e], y[e]), mask->z) + 1.5 * half);
+    }
+    mask->step = mild_sole_pitch(sole) / MASK_PER_PITCH;
+    mask->columns = (int)ceil((x_max - mask->x_min) / mask->step);
+    mask->rows = (int)ceil((y_max - mask->y_min) / mask->step);
+    mask->inside = calloc((size_t)mask->columns * (size_t)mask->rows, 1);
+    if (!mask->inside)
+        return 0;
+    for (int r = 0; r < mask->rows; r++)
+        for (int c = 0; c < mask->columns; c++) {
+            double px = mask->x_min + (c + 0.5) * mask->step, py = mask->y_min + (r + 0.5) * mask->step;
+            for (int e = 0; e < elements; e++)
+                if (fabs(px - x[e]) < half && fabs(py - y[e]) < half)
+                    mask->inside[r * mask->columns + c] = 1;
+        }
+    return 1;
+}
+
+/* Depth of the foot's sole plane under the vertical through (x, y), NO_DEPTH beside the sole. The plane's points p have
+ * n.(p - ankle) = z_sole, n the foot's z axis. */
+static float sole_depth(const Relief *relief, int foot, double x, double y) {
+    const SoleMask *mask = &relief->mask[foot];
+    const double *p = relief->position[foot], *r = relief->rotation[foot];
+    double dx = x - p[0], dy = y - p[1];
+    if (r[8] < 0.2) /* foot on its side */
+        return NO_DEPTH;
+    double dz = (mask->z - r[2] * dx - r[5] * dy) / r[8];
+    double sx = r[0] * dx + r[3] * dy + r[6] * dz, sy = r[1] * dx + r[4] * dy + r[7] * dz;
+    double fc = (sx - mask->x_min) / mask->step, fr = (sy - mask->y_min) / mask->step;
+    if (fc < 0 || fr < 0 || fc >= mask->columns || fr >= mask->rows || !mask->inside[(int)fr * mask->columns + (int)fc])
+        return NO_DEPTH;
+    return (float)(relief->surface - (p[2] + dz) + UNDER_SOLE);
+}
+
+/* ---- surface ---- */
+
+static const MildMaterial *material_at(const Relief *relief, double x, double y) {
+    return &relief->terrain.materials[mild_terrain_material_at(&relief->terrain, x, y)];
+}
+
+static void mark(Relief *relief, int i, int j) {
+    int c1 = i / RELIEF_TILE_CELLS, r1 = j / RELIEF_TILE_CELLS;
+    /* a vertex on an edge belongs to both neighbours */
+    int c0 = i % RELIEF_TILE_CELLS == 0 && c1 > 0 ? c1 - 1 : c1, r0 = j % RELIEF_TILE_CELLS == 0 && r1 > 0 ? r1 - 1 : r1;
+    for (int r = r0; r <= r1 && r < relief->rows; r++)
+        for (int c = c0; c <= c1 && c < relief->columns; c++)
+            relief->touched[r * relief->columns + c] = relief->dirty[r * relief->columns + c] = 1;
+}
+
+static void update_vertex(Relief *relief, int i, int j) {
+    double x = relief->x0 + i * relief->cell, y = relief->y0 + j * relief->cell;
+    float depth = NO_DEPTH;
+    for (int f = 0; f < relief->feet; f++)
+        depth = fmaxf(depth, sole_depth(relief, f, x, y));
+    size_t at = (size_t)j * (size_t)relief->nx + (size_t)i;
+    if (depth <= (float)UNDER_SOLE && relief->peak[at] <= 0.0F)
+        return;
+    relief->peak[at] = fmaxf(relief->peak[at], depth);
+    float left = (float)(1.0 - material_at(relief, x, y)->recovery) * relief->peak[at];
+    float shown = fmaxf(left, fmaxf(depth, 0.0F));
+    if (fabsf(shown - relief->shown[at]) > (float)CHANGE_SEEN) {
+        relief->shown[at] = shown;
+        mark(relief, i, j);
+    }
+}
+
+static Box foot_box(const Relief *relief, int foot) {
+    double reach = relief->mask[foot].reach;
+    const double *p = relief->position[foot];
+    Box box = {0, 0, 0, 0};
+    if (p[2] - reach > relief->surface)
+        return box;
+    double i0 = floor((p[0] - reach - relief->x0) / relief->cell), i1 = ceil((p[0] + reach - relief->x0) / relief->cell);
+    double j0 = floor((p[1] - reach - relief->y0) / relief->cell), j1 = ceil((p[1] + reach - relief->y0) / relief->cell);
+    box.i0 = (int)fmin(fmax(i0, 0), relief->nx), box.i1 = (int)fmin(fmax(i1, 0), relief->nx);
+    box.j0 = (int)fmin(fmax(j0, 0), relief->ny), box.j1 = (int)fmin(fmax(j1, 0), relief->ny);
+    return box;
+}
+
+static void update_box(Relief *relief, Box box) {
+    for (int j = box.j0; j < box.j1; j++)
+        for (int i = box.i0; i < box.i1; i++)
+            update_vertex(relief, i, j);
+}
+
+void relief_press(Relief *relief, const double (*position)[3], const double (*rotation)[9]) {
+    if (relief->rigid)
+        return;
+    memcpy(relief->position, position, (size_t)relief->feet * sizeof *position);
+    memcpy(relief->rotation, rotation, (size_t)relief->feet * sizeof *rotation);
+    for (int f = 0; f < relief->feet; f++) {
+        update_box(relief, relief->last[f]); /* where the foot was: springs back */
+        relief->last[f] = foot_box(relief, f);
+        update_box(relief, relief->last[f]);
+    }
+}
+
+/* ---- creation ---- */
+
+static void find_materials(Relief *relief) {
+    double edge = relief_tile_edge(relief);
+    for (int t = 0; t < relief->columns * relief->rows; t++) {
+        double center[2];
+        relief_tile_center(relief, t, center);
+        int first = -2;
+        for (int k = 0; k < 81; k++) { /* patches are larger than an eighth of a tile */
+            double x = center[0] + edge * ((k % 9) / 8.0 - 0.5) * 0.998, y = center[1] + edge * ((k / 9) / 8.0 - 0.5) * 0.998;
+            int m = relief->rigid ? RELIEF_RIGID : mild_terrain_material_at(&relief->terrain, x, y);
+            if (k == 0)
+                first = m;
+            else if (m != first)
+                first = -2, k = 81;
+        }
+        relief->material[t] = (signed char)first;
+    }
+}
+
+static int allocate(Relief *relief, const MildSole *const *soles) {
+    size_t vertices = (size_t)relief->nx * (size_t)relief->ny, tiles = (size_t)relief->columns * (size_t)relief->rows;
+    relief->peak = calloc(2 * vertices, sizeof *relief->peak);
+    relief->touched = calloc(3 * tiles, 1);
+    if (!relief->peak || !relief->touched)
+        return 0;
+    relief->shown = relief->peak + vertices;
+    relief->dirty = relief->touched + tiles;
+    relief->material = (signed char *)(relief->dirty + tiles);
+    for (int f = 0; f < relief->feet; f++)
+        if (!mask_create(&relief->mask[f], soles[f]))
+            return 0;
+    return 1;
+}
+
+Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const MildSole *const *soles, int feet,
+                      MildError *error) {
+    double edge = RELIEF_TILE_CELLS * def->cell;
+    double columns = ceil((def->x_max - def->x_min) / edge), rows = ceil((def->y_max - def->y_min) / edge);
+    if (!(def->cell > 0) || !(columns >= 1 && columns * rows <= 20000 && rows >= 1)) {
+        mild_fail(error, MILD_ERROR_RANGE, "ground picture: area %g x %g m at %g m is empty or too large",
+                  def->x_max - def->x_min, def->y_max - def->y_min, def->cell);
+        return NULL;
+    }
+    Relief *relief = calloc(1, sizeof *relief);
+    if (!relief) {
+        mild_fail(error, MILD_ERROR_MEMORY, "ground picture: out of memory");
+        return NULL;
+    }
+    relief->columns = (int)columns, relief->rows = (int)rows;
+    relief->nx = relief->columns * RELIEF_TILE_CELLS + 1, relief->ny = relief->rows * RELIEF_TILE_CELLS + 1;
+    relief->x0 = def->x_min, relief->y0 = 0.5 * (def->y_min + def->y_max - rows * edge);
+    relief->cell = def->cell, relief->rigid = def->rigid, relief->feet = feet;
+    relief->terrain = *terrain;
+    relief->surface = terrain->height;
+    for (int m = 0; m < terrain->material_count; m++)
+        relief->look[m] = look_of(def->names ? def->names[m] : NULL, &terrain->materials[m]);
+    relief->look[MILD_MATERIALS_MAX] = rigid_look;
+    if (!allocate(relief, soles)) {
+        mild_fail(error, MILD_ERROR_MEMORY, "ground picture: out of memory");
+        relief_destroy(relief);
+        return NULL;
+    }
+    find_materials(relief);
+    return relief;
+}
+
+void relief_destroy(Relief *relief) {
+    if (!relief)
+        return;
+    for (int f = 0; f < relief->feet; f++)
+        free(relief->mask[f].inside);
+    free(relief->peak);
+    free(relief->touched);
+    free(relief);
+}
+
+/* ---- tiles ---- */
+
+int relief_tile_columns(const Relief *relief) {
+    return relief->columns;
+}
+
+int relief_tile_rows(const Relief *relief) {
+    return relief->rows;
+}
+
+double relief_tile_edge(const Relief *relief) {
+    return RELIEF_TILE_CELLS * relief->cell;
+}
+
+double relief_surface(const Relief *relief) {
+    return relief->surface;
+}
+
+void relief_tile_center(const Relief *relief, int tile, double center[2]) {
+    double edge = relief_tile_edge(relief);
+    center[0] = relief->x0 + (tile % relief->columns + 0.5) * edge;
+    center[1] = relief->y0 + (tile / relief->columns + 0.5) * edge;
+}
+
+int relief_tile_material(const Relief *relief, int tile) {
+    return relief->material[tile];
+}
+
+int relief_tile_touched(const Relief *relief, int tile) {
+    return relief->touched[tile];
+}
+
+int relief_tile_take_dirty(Relief *relief, int tile) {
+    int dirty = relief->dirty[tile];
+    relief->dirty[tile] = 0;
+    return dirty;
+}
+
+static const float *tile_row(const Relief *relief, int tile, int row) {
+    size_t i = (size_t)(tile % relief->columns) * RELIEF_TILE_CELLS;
+    size_t j = (size_t)(tile / relief->columns) * RELIEF_TILE_CELLS + (size_t)row;
+    return relief->shown + j * (size_t)relief->nx + i;
+}
+
+void relief_tile_heights(const Relief *relief, int tile, double range, float *heights) {
+    for (int j = 0; j < RELIEF_TILE_VERTICES; j++) {
+        const float *row = tile_row(relief, tile, j);
+        for (int i = 0; i < RELIEF_TILE_VERTICES; i++)
+            *heights++ = fmaxf(0.0F, 1.0F - row[i] / (float)range);
+    }
+}
+
+static const Look *look_at(const Relief *relief, int material) {
+    return &relief->look[material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material];
+}
+
+void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb) {
+    double center[2], edge = relief_tile_edge(relief), pixel = edge / RELIEF_TILE_PIXELS;
+    relief_tile_center(relief, tile, center);
+    const int per_cell = RELIEF_TILE_PIXELS / RELIEF_TILE_CELLS;
+    for (int py = 0; py < RELIEF_TILE_PIXELS; py++) {
+        int up = RELIEF_TILE_PIXELS - 1 - py; /* pictures run down, y runs up */
+        const float *low = tile_row(relief, tile, up / per_cell), *high = low + relief->nx;
+        for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3) {
+            int i = px / per_cell;
+            float depth = 0.25F * (low[i] + low[i + 1] + high[i] + high[i + 1]);
+            double x = center[0] - 0.5 * edge + (px + 0.5) * pixel, y = center[1] - 0.5 * edge + (up + 0.5) * pixel;
+            int material = relief->rigid ? RELIEF_RIGID : mild_terrain_material_at(&relief->terrain, x, y);
+            float dark = 0.42F * (1.0F - expf(-depth / (float)SHADE_DEPTH));
+            paint(look_at(relief, material), px, py, dark, rgb);
+        }
+    }
+}
+
+void relief_flat_pixels(const Relief *relief, int material, unsigned char *rgb) {
+    for (int py = 0; py < RELIEF_TILE_PIXELS; py++)
+        for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3)
+            paint(look_at(relief, material), px, py, 0.0F, rgb);
+}
+
+void relief_material_color(const Relief *relief, int material, float rgb[3]) {
+    memcpy(rgb, look_at(relief, material)->rgb, 3 * sizeof *rgb);
+}

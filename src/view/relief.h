@@ -1,0 +1,49 @@
+/* The ground one can see: a height map under the walk that the soles press in and that springs back by its material's
+ * `recovery`. Drawing only: physics never reads it. The map is cut into square tiles so that a renderer refreshes only
+ * those that changed. Knows no renderer. */
+#ifndef VIEW_RELIEF_H
+#define VIEW_RELIEF_H
+
+#include "mild/ground.h"
+
+#define RELIEF_TILE_CELLS 64
+#define RELIEF_TILE_VERTICES (RELIEF_TILE_CELLS + 1)
+#define RELIEF_TILE_PIXELS 128
+#define RELIEF_RIGID (-1) /* material index of ground that never yields */
+
+typedef struct {
+    double x_min, x_max, y_min, y_max; /* [m] area drawn; rounded up to whole tiles */
+    double cell;                       /* [m] distance of vertices */
+    int rigid;                         /* bool: nothing yields */
+    const char *const *names;          /* [materials] preset names, for colours; NULL entries allowed */
+} ReliefDef;
+
+typedef struct Relief Relief;
+
+/* soles: [feet], borrowed. The terrain is copied. */
+Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const MildSole *const *soles, int feet,
+                      MildError *error);
+void relief_destroy(Relief *relief);
+/* Move the surface to the soles' present pose: position [feet][3] and rotation [feet][9] of the ankles. */
+void relief_press(Relief *relief, const double (*position)[3], const double (*rotation)[9]);
+
+int relief_tile_columns(const Relief *relief); /* along x */
+int relief_tile_rows(const Relief *relief);    /* along y */
+double relief_tile_edge(const Relief *relief); /* [m] */
+void relief_tile_center(const Relief *relief, int tile, double center[2]);
+double relief_surface(const Relief *relief); /* [m] undisturbed height */
+/* The one material of the tile (RELIEF_RIGID where nothing yields), or -2 when several meet in it. */
+int relief_tile_material(const Relief *relief, int tile);
+int relief_tile_touched(const Relief *relief, int tile);
+/* Whether the tile changed since this was last asked. */
+int relief_tile_take_dirty(Relief *relief, int tile);
+/* [VERTICES][VERTICES] rows along y: 1 at the surface, 0 at `range` below it. */
+void relief_tile_heights(const Relief *relief, int tile, double range, float *heights);
+/* [PIXELS][PIXELS][3] first row at y max; pressed ground is darker. */
+void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb);
+/* The same for untouched ground of one material, seamless between tiles. */
+void relief_flat_pixels(const Relief *relief, int material, unsigned char *rgb);
+/* Base colour of a material as drawn, 0..1. */
+void relief_material_color(const Relief *relief, int material, float rgb[3]);
+
+#endif

@@ -1,0 +1,512 @@
+#include "view/view.h"
+
+#include <math.h>
+#include <mujoco/mujoco.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "view/gl.h"
+#include "view/inset.h"
+#include "view/relief.h"
+
+#define VIEW_CELL 0.01      /* [m] vertices of the visible ground */
+#define VIEW_SLOTS 96       /* tiles that can be deformed or of mixed material at once */
+#define VIEW_DEPTH 0.20     /* [m] deepest print that can be drawn */
+#define VIEW_RADIUS 9.0     /* [m] tiles farther from the robot are drawn as plain floor */
+#define VIEW_FLOOR 40.0     /* [m] half size of the floor beyond */
+#define VIEW_GEOMS 4000
+#define VIEW_CAMERA_TIME 0.35 /* [s] the camera's lag */
+#define VIEW_LOOK_HEIGHT 0.43 /* [m] the camera looks at this height */
+#define VIEW_HIDDEN_GROUP 5
+#define VIEW_FORCE_SEEN 15.0 /* [N] smaller contact forces get no arrow */
+
+typedef struct {
+    int tile; /* -1: free */
+    int hfield, texture, material;
+    int drawn_once; /* bool: texture and heights are those of `tile` */
+} Slot;
+
+struct View {
+    ViewDef def;
+    const MildSole *const *soles;
+    MildTerrain terrain;
+    GlContext *gl;
+    Window *window;
+    mjModel *model;
+    mjData *data;
+    mjvScene scene;
+    mjrContext context;
+    mjvOption option;
+    mjvCamera camera;
+    int scene_made, context_made, tracking;
+    Relief *relief;
+    Slot slots[VIEW_SLOTS];
+    int *slot_of; /* [tiles] -1: none */
+    int flat_material[MILD_MATERIALS_MAX + 1]; /* model material of untouched ground; last: rigid */
+    int floor_material;
+    InsetLayout layout;
+    unsigned char *inset, *pixels, *flipped;
+};
+
+ViewDef view_def_default(void) {
+    return (ViewDef){.xml = "models/sa01/sa01.xml",
+                     .width = 960,
+                     .height = 540,
+                     .rate = 30,
+                     .x_min = -2,
+                     .x_max = 8,
+                     .y_min = -2,
+                     .y_max = 2,
+                     .pressure_max = 40e3,
+                     .force_arrow = 0.0012,
+                     .azimuth = 128,
+                     .elevation = -16,
+                     .distance = 2.1};
+}
+
+/* ---- the model for drawing: the robot's own file plus tiles of ground ---- */
+
+static void add_material(mjSpec *spec, const char *name, double repeat, int uniform) {
+    mjsTexture *texture = mjs_addTexture(spec);
+    mjs_setName(texture->element, name);
+    texture->type = mjTEXTURE_2D;
+    texture->builtin = mjBUILTIN_FLAT;
+    texture->width = texture->height = RELIEF_TILE_PIXELS;
+    mjsMaterial *material = mjs_addMaterial(spec, NULL);
+    mjs_setName(material->element, name);
+    mjs_setInStringVec(material->textures, mjTEXROLE_RGB, name);
+    material->texrepeat[0] = material->texrepeat[1] = (float)repeat;
+    material->texuniform = (mjtByte)uniform;
+}
+
+static void add_ground(mjSpec *spec, double edge) {
+    char name[32];
+    for (int i = 0; i < VIEW_SLOTS; i++) {
+        snprintf(name, sizeof name, "view_tile_%d", i);
+        add_material(spec, name, 1, 0);
+        mjsHField *hfield = mjs_addHField(spec);
+        mjs_setName(hfield->element, name);
+        hfield->nrow = hfield->ncol = RELIEF_TILE_VERTICES;
+        hfield->size[0] = hfield->size[1] = 0.5 * edge;
+        hfield->size[2] = VIEW_DEPTH;
+        hfield->size[3] = 0.01;
+    }
+    for (int m = 0; m <= MILD_MATERIALS_MAX; m++) {
+        snprintf(name, sizeof name, "view_flat_%d", m);
+        add_material(spec, name, 1, 0);
+    }
+    add_material(spec, "view_floor", 1.0 / edge, 1);
+}
+
+static mjModel *make_model(const ViewDef *def, double edge, MildError *error) {
+    char text[300] = "";
+    mjSpec *spec = mj_parseXML(def->xml, NULL, text, sizeof text);
+    if (!spec) {
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", def->xml, text);
+        return NULL;
+    }
+    spec->visual.global.offwidth = def->width;
+    spec->visual.global.offheight = def->height;
+    spec->visual.quality.offsamples = 4;
+    spec->visual.quality.shadowsize = 2048;
+    add_ground(spec, edge);
+    mjModel *model = mj_compile(spec, NULL);
+    if (!model)
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: cannot add the visible ground: %s", def->xml, mjs_getError(spec));
+    mj_deleteSpec(spec);
+    if (model && (model->nq != ROBOT_NQ || model->nv != ROBOT_NV)) {
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: has %d coordinates and %d speeds, the robot %d and %d", def->xml,
+                  (int)model->nq, (int)model->nv, ROBOT_NQ, ROBOT_NV);
+        mj_deleteModel(model);
+        return NULL;
+    }
+    return model;
+}
+
+static unsigned char *texture_pixels(mjModel *model, int texture) {
+    return model->tex_data + model->tex_adr[texture];
+}
+
+/* Finds the ids of what add_ground added and hides the floor of the file. */
+static void index_model(View *view) {
+    mjModel *model = view->model;
+    char name[32];
+    for (int i = 0; i < VIEW_SLOTS; i++) {
+        snprintf(name, sizeof name, "view_tile_%d", i);
+        view->slots[i] = (Slot){-1, mj_name2id(model, mjOBJ_HFIELD, name), mj_name2id(model, mjOBJ_TEXTURE, name),
+                                mj_name2id(model, mjOBJ_MATERIAL, name), 0};
+    }
+    for (int m = 0; m <= MILD_MATERIALS_MAX; m++) {
+        snprintf(name, sizeof name, "view_flat_%d", m);
+        view->flat_material[m] = mj_name2id(model, mjOBJ_MATERIAL, name);
+        int id = m == MILD_MATERIALS_MAX ? RELIEF_RIGID : m;
+        if (id == RELIEF_RIGID || m < view->terrain.material_count)
+            relief_flat_pixels(view->relief, id, texture_pixels(model, mj_name2id(model, mjOBJ_TEXTURE, name)));
+    }
+    view->floor_material = mj_name2id(model, mjOBJ_MATERIAL, "view_floor");
+    relief_flat_pixels(view->relief, RELIEF_RIGID, texture_pixels(model, mj_name2id(model, mjOBJ_TEXTURE, "view_floor")));
+    for (int g = 0; g < model->ngeom; g++)
+        if (model->geom_type[g] == mjGEOM_PLANE || model->geom_type[g] == mjGEOM_HFIELD)
+            model->geom_group[g] = VIEW_HIDDEN_GROUP;
+}
+
+/* ---- create, destroy ---- */
+
+static int open_context(View *view, MildError *error) {
+    if (view->def.window)
+        return (view->window = window_create(view->def.width, view->def.height, "mild", error)) != NULL;
+    return (view->gl = gl_create(error)) != NULL;
+}
+
+static Relief *make_relief(const View *view, MildError *error) {
+    const ViewDef *def = &view->def;
+    ReliefDef relief = {def->x_min, def->x_max, def->y_min, def->y_max, VIEW_CELL, def->rigid, def->names};
+    return relief_create(&relief, &view->terrain, view->soles, ROBOT_FEET, error);
+}
+
+static int make_buffers(View *view) {
+    int tiles = relief_tile_columns(view->relief) * relief_tile_rows(view->relief);
+    view->slot_of = malloc((size_t)tiles * sizeof *view->slot_of);
+    view->layout = inset_layout(view->soles, ROBOT_FEET, view->def.height / 72);
+    size_t frame = (size_t)view->def.width * (size_t)view->def.height * 3;
+    view->inset = malloc((size_t)view->layout.width * (size_t)view->layout.height * 3);
+    view->pixels = malloc(frame);
+    view->flipped = malloc(frame);
+    view->data = mj_makeData(view->model);
+    if (!view->slot_of || !view->inset || !view->pixels || !view->flipped || !view->data)
+        return 0;
+    for (int t = 0; t < tiles; t++)
+        view->slot_of[t] = -1;
+    return 1;
+}
+
+static void make_scene(View *view) {
+    mjv_defaultScene(&view->scene);
+    mjv_makeScene(view->model, &view->scene, VIEW_GEOMS);
+    view->scene_made = 1;
+    mjv_defaultOption(&view->option);
+    mjr_defaultContext(&view->context);
+    mjr_makeContext(view->model, &view->context, view->def.height >= 700 ? mjFONTSCALE_150 : mjFONTSCALE_100);
+    view->context_made = 1;
+    mjr_setBuffer(view->window ? mjFB_WINDOW : mjFB_OFFSCREEN, &view->context);
+    mjv_defaultCamera(&view->camera);
+    view->camera.azimuth = view->def.azimuth;
+    view->camera.elevation = view->def.elevation;
+    view->camera.distance = view->def.distance;
+}
+
+View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain, MildError *error) {
+    if (def->width < 64 || def->height < 64 || def->width > 7680 || def->height > 4320 || !(def->rate > 0)) {
+        mild_fail(error, MILD_ERROR_RANGE, "view: %d x %d pixels at %g frames/s is outside 64..7680 x 64..4320", def->width,
+                  def->height, def->rate);
+        return NULL;
+    }
+    View *view = calloc(1, sizeof *view);
+    if (!view) {
+        mild_fail(error, MILD_ERROR_MEMORY, "view: out of memory");
+        return NULL;
+    }
+    view->def = *def;
+    view->soles = robot_soles(robot);
+    view->terrain = *terrain;
+    view->relief = make_relief(view, error);
+    view->model = view->relief ? make_model(def, relief_tile_edge(view->relief), error) : NULL;
+    if (!view->model || !open_context(view, error)) {
+        view_destroy(view);
+        return NULL;
+    }
+    if (!make_buffers(view)) {
+        mild_fail(error, MILD_ERROR_MEMORY, "view: out of memory");
+        view_destroy(view);
+        return NULL;
+    }
+    index_model(view);
+    make_scene(view);
+    return view;
+}
+
+void view_destroy(View *view) {
+    if (!view)
+        return;
+    if (view->context_made)
+        mjr_freeContext(&view->context);
+    if (view->scene_made)
+        mjv_freeScene(&view->scene);
+    gl_destroy(view->gl);
+    window_destroy(view->window);
+    if (view->data)
+        mj_deleteData(view->data);
+    if (view->model)
+        mj_deleteModel(view->model);
+    relief_destroy(view->relief);
+    free(view->slot_of);
+    free(view->inset);
+    free(view->pixels);
+    free(view->flipped);
+    free(view);
+}
+
+MildStatus view_reset(View *view, const MildTerrain *terrain, MildError *error) {
+    view->terrain = *terrain;
+    Relief *relief = make_relief(view, error);
+    if (!relief)
+        return error ? error->status : MILD_ERROR_MEMORY;
+    relief_destroy(view->relief);
+    view->relief = relief;
+    for (int i = 0; i < VIEW_SLOTS; i++) {
+        if (view->slots[i].tile >= 0)
+            view->slot_of[view->slots[i].tile] = -1;
+        view->slots[i].tile = -1;
+    }
+    view->tracking = 0;
+    return MILD_OK;
+}
+
+const char *view_backend(const View *view) {
+    return view->window ? "GLFW" : gl_name(view->gl);
+}
+
+/* ---- ground ---- */
+
+void view_observe(View *view, const RobotSim *sim) {
+    double position[ROBOT_FEET][3], rotation[ROBOT_FEET][9];
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        memcpy(position[f], foot->position, sizeof position[f]);
+        memcpy(rotation[f], foot->rotation, sizeof rotation[f]);
+    }
+    relief_press(view->relief, (const double (*)[3])position, (const double (*)[9])rotation);
+}
+
+static double tile_distance(const View *view, int tile) {
+    double center[2];
+    relief_tile_center(view->relief, tile, center);
+    return hypot(center[0] - view->camera.lookat[0], center[1] - view->camera.lookat[1]);
+}
+
+/* A slot for the tile: a free one, else that of the tile farthest away (its heights stay in the relief). */
+static Slot *slot_take(View *view, int tile) {
+    Slot *best = NULL;
+    double farthest = tile_distance(view, tile);
+    for (int i = 0; i < VIEW_SLOTS; i++) {
+        Slot *slot = &view->slots[i];
+        if (slot->tile < 0) {
+            best = slot;
+            break;
+        }
+        if (tile_distance(view, slot->tile) > farthest) {
+            best = slot;
+            farthest = tile_distance(view, slot->tile);
+        }
+    }
+    if (!best)
+        return NULL;
+    if (best->tile >= 0)
+        view->slot_of[best->tile] = -1;
+    best->tile = tile;
+    best->drawn_once = 0;
+    view->slot_of[tile] = (int)(best - view->slots);
+    return best;
+}
+
+static void slot_refresh(View *view, Slot *slot) {
+    mjModel *model = view->model;
+    if (!relief_tile_take_dirty(view->relief, slot->tile) && slot->drawn_once)
+        return;
+    relief_tile_pixels(view->relief, slot->tile, texture_pixels(model, slot->texture));
+    mjr_uploadTexture(model, &view->context, slot->texture);
+    if (relief_tile_touched(view->relief, slot->tile)) {
+        relief_tile_heights(view->relief, slot->tile, VIEW_DEPTH, model->hfield_data + model->hfield_adr[slot->hfield]);
+        mjr_uploadHField(model, &view->context, slot->hfield);
+    }
+    slot->drawn_once = 1;
+}
+
+static mjvGeom *add_geom(View *view, int type, double sx, double sy, double sz, const double position[3], int material) {
+    if (view->scene.ngeom >= view->scene.maxgeom)
+        return NULL;
+    mjvGeom *geom = &view->scene.geoms[view->scene.ngeom++];
+    const float white[4] = {1, 1, 1, 1};
+    const double size[3] = {sx, sy, sz};
+    mjv_initGeom(geom, type, size, position, NULL, white);
+    geom->matid = material;
+    geom->category = mjCAT_STATIC;
+    geom->specular = 0.05F;
+    geom->shininess = 0.1F;
+    return geom;
+}
+
+static void draw_tile(View *view, int tile) {
+    double edge = relief_tile_edge(view->relief), center[2];
+    relief_tile_center(view->relief, tile, center);
+    double position[3] = {center[0], center[1], relief_surface(view->relief)};
+    int material = relief_tile_material(view->relief, tile), touched = relief_tile_touched(view->relief, tile);
+    Slot *slot = NULL;
+    if (touched || material == -2) {
+        slot = view->slot_of[tile] >= 0 ? &view->slots[view->slot_of[tile]] : slot_take(view, tile);
+        if (slot)
+            slot_refresh(view, slot);
+    }
+    if (slot && touched) {
+        position[2] -= VIEW_DEPTH;
+        mjvGeom *geom = add_geom(view, mjGEOM_HFIELD, 0.5 * edge, 0.5 * edge, VIEW_DEPTH, position, slot->material);
+        if (geom)
+            geom->dataid = slot->hfield;
+        return;
+    }
+    int look = material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material < 0 ? 0 : material;
+    add_geom(view, mjGEOM_PLANE, 0.5 * edge, 0.5 * edge, 0.1, position,
+             slot ? slot->material : view->flat_material[look]);
+}
+
+/* Four plates around the tiles: the floor must not lie under them, prints would show through. */
+static void draw_floor(View *view, double x0, double x1, double y0, double y1) {
+    double z = relief_surface(view->relief), far = VIEW_FLOOR, cx = 0.5 * (x0 + x1), cy = 0.5 * (y0 + y1);
+    double left[3] = {x0 - far, cy, z}, right[3] = {x1 + far, cy, z}, below[3] = {cx, y0 - far, z},
+           above[3] = {cx, y1 + far, z};
+    double wide = 0.5 * (x1 - x0) + 2 * far, high = 0.5 * (y1 - y0);
+    add_geom(view, mjGEOM_PLANE, far, high, 1, left, view->floor_material);
+    add_geom(view, mjGEOM_PLANE, far, high, 1, right, view->floor_material);
+    add_geom(view, mjGEOM_PLANE, wide, far, 1, below, view->floor_material);
+    add_geom(view, mjGEOM_PLANE, wide, far, 1, above, view->floor_material);
+}
+
+static int clamp_tile(double at, int count) {
+    return at < 0 ? 0 : at > count ? count : (int)at;
+}
+
+static void draw_ground(View *view) {
+    const Relief *relief = view->relief;
+    int columns = relief_tile_columns(relief), rows = relief_tile_rows(relief);
+    double edge = relief_tile_edge(relief), origin[2];
+    relief_tile_center(relief, 0, origin);
+    origin[0] -= 0.5 * edge, origin[1] -= 0.5 * edge;
+    const double *look = view->camera.lookat;
+    int c0 = clamp_tile(floor((look[0] - VIEW_RADIUS - origin[0]) / edge), columns);
+    int c1 = clamp_tile(ceil((look[0] + VIEW_RADIUS - origin[0]) / edge), columns);
+    int r0 = clamp_tile(floor((look[1] - VIEW_RADIUS - origin[1]) / edge), rows);
+    int r1 = clamp_tile(ceil((look[1] + VIEW_RADIUS - origin[1]) / edge), rows);
+    for (int r = r0; r < r1; r++)
+        for (int c = c0; c < c1; c++)
+            draw_tile(view, r * columns + c);
+    draw_floor(view, origin[0] + c0 * edge, origin[0] + c1 * edge, origin[1] + r0 * edge, origin[1] + r1 * edge);
+}
+
+/* ---- frame ---- */
+
+static void follow(View *view, const double *base) {
+    double share = view->tracking ? 1.0 - exp(-1.0 / (view->def.rate * VIEW_CAMERA_TIME)) : 1.0;
+    view->tracking = 1;
+    double target[3] = {base[0], base[1], relief_surface(view->relief) + VIEW_LOOK_HEIGHT};
+    for (int k = 0; k < 3; k++)
+        view->camera.lookat[k] += share * (target[k] - view->camera.lookat[k]);
+}
+
+static void draw_arrows(View *view, const RobotSim *sim) {
+    for (int f = 0; f < ROBOT_FEET && view->def.force_arrow > 0; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        double size = mju_norm3(foot->force);
+        if (size < VIEW_FORCE_SEEN || view->scene.ngeom >= view->scene.maxgeom)
+            continue;
+        double from[3], to[3];
+        mju_copy3(from, foot->sole_center);
+        if (foot->result.contacts > 0) { /* the centre of pressure; the engine's own contact reports none */
+            from[0] = foot->position[0] + foot->result.zmp_sole[0];
+            from[1] = foot->position[1] + foot->result.zmp_sole[1];
+        }
+        mju_addScl3(to, from, foot->force, view->def.force_arrow);
+        mjvGeom *geom = &view->scene.geoms[view->scene.ngeom++];
+        const float color[4] = {0.95F, 0.25F, 0.12F, 0.85F};
+        mjv_initGeom(geom, mjGEOM_ARROW, NULL, NULL, NULL, color);
+        mjv_connector(geom, mjGEOM_ARROW, 0.012, from, to);
+        geom->category = mjCAT_DECOR;
+    }
+}
+
+static const char *ground_name(const View *view, const RobotSim *sim) {
+    if (view->def.rigid)
+        return "rigid";
+    const double *left = robot_sim_foot(sim, 0)->sole_center, *right = robot_sim_foot(sim, 1)->sole_center;
+    int m = mild_terrain_material_at(&view->terrain, 0.5 * (left[0] + right[0]), 0.5 * (left[1] + right[1]));
+    return view->def.names && view->def.names[m] ? view->def.names[m] : "ground";
+}
+
+static void draw_text(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
+    char keys[120], values[240];
+    double depth[ROBOT_FEET];
+    for (int f = 0; f < ROBOT_FEET; f++)
+        depth[f] = 1e3 * fmax(0.0, -robot_sim_foot(sim, f)->sole_height);
+    snprintf(keys, sizeof keys, "ground\ncommand\nspeed\nsinkage L R\ntime%s", info->note ? "\n" : "");
+    snprintf(values, sizeof values, "%s\n%.2f m/s\n%.2f m/s\n%.0f  %.0f mm\n%.1f s%s%s", ground_name(view, sim),
+             info->command[0], info->speed, depth[0], depth[1], info->time, info->note ? "\n" : "",
+             info->note ? info->note : "");
+    mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, viewport, keys, values, &view->context);
+}
+
+static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
+    const double *normal[ROBOT_FEET];
+    for (int f = 0; f < ROBOT_FEET; f++)
+        normal[f] = mild_scratch_elements(robot_sim_scratch(sim), f).normal;
+    const InsetLayout *layout = &view->layout;
+    inset_draw(layout, view->soles, ROBOT_FEET, normal, view->def.pressure_max, view->inset);
+    mjrRect box = {viewport.width - layout->width - 10, 10, layout->width, layout->height};
+    mjr_drawPixels(view->inset, NULL, box, &view->context);
+    char text[32];
+    float x = (float)(box.left + layout->bar_left + 14) / (float)viewport.width, height = (float)viewport.height;
+    snprintf(text, sizeof text, "%.0f", view->def.pressure_max / 1e3);
+    mjr_text(mjFONT_NORMAL, text, &view->context, x, (float)(box.bottom + layout->bar_top - 12) / height, 1, 1, 1);
+    mjr_text(mjFONT_NORMAL, "0", &view->context, x, (float)(box.bottom + layout->bar_bottom) / height, 1, 1, 1);
+    mjr_text(mjFONT_NORMAL, "sole pressure kPa", &view->context, (float)(box.left + 10) / (float)viewport.width,
+             (float)(box.bottom + layout->bar_top + 10) / height, 0.9F, 0.9F, 0.9F);
+}
+
+/* Directional lights throw shadows only near their own position: they walk with the camera. */
+static void move_lights(View *view) {
+    for (int i = 0; i < view->scene.nlight; i++) {
+        mjvLight *light = &view->scene.lights[i];
+        if (light->headlight || light->type != mjLIGHT_DIRECTIONAL)
+            continue;
+        light->pos[0] += (float)view->camera.lookat[0];
+        light->pos[1] += (float)view->camera.lookat[1];
+    }
+}
+
+void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
+    const double *qpos = robot_sim_qpos(sim);
+    memcpy(view->data->qpos, qpos, ROBOT_NQ * sizeof *qpos);
+    mj_kinematics(view->model, view->data);
+    mj_comPos(view->model, view->data);
+    mj_camlight(view->model, view->data);
+    view_observe(view, sim);
+    follow(view, qpos);
+    mjv_updateScene(view->model, view->data, &view->option, NULL, &view->camera, mjCAT_ALL, &view->scene);
+    move_lights(view);
+    draw_ground(view);
+    draw_arrows(view, sim);
+
+    mjrRect viewport = {0, 0, view->def.width, view->def.height};
+    if (view->window)
+        window_size(view->window, &viewport.width, &viewport.height);
+    mjr_render(viewport, &view->scene, &view->context);
+    draw_text(view, viewport, sim, info);
+    if (!view->def.rigid)
+        draw_inset(view, viewport, sim);
+    if (view->window)
+        return;
+    mjr_readPixels(view->flipped, NULL, viewport, &view->context);
+    size_t row = (size_t)viewport.width * 3, rows = (size_t)viewport.height;
+    for (size_t r = 0; r < rows; r++)
+        memcpy(view->pixels + r * row, view->flipped + (rows - 1 - r) * row, row);
+}
+
+const unsigned char *view_pixels(const View *view) {
+    return view->window ? NULL : view->pixels;
+}
+
+void view_show(View *view, WindowInput *input) {
+    window_show(view->window, input);
+    view->camera.azimuth += input->turn * 180.0 / mjPI;
+    view->camera.elevation = fmin(fmax(view->camera.elevation + input->lift * 180.0 / mjPI, -89), -2);
+    view->camera.distance = fmin(fmax(view->camera.distance * exp(-input->zoom), 0.5), 15);
+}

@@ -1,0 +1,27 @@
+/* A window with an OpenGL context, when the program was built with GLFW and there is a display. */
+#ifndef VIEW_WINDOW_H
+#define VIEW_WINDOW_H
+
+#include "mild/error.h"
+
+typedef struct Window Window;
+
+typedef struct {
+    int quit;       /* bool: Esc or the window was closed */
+    int paused;     /* bool: toggled by space */
+    int reset;      /* bool: R was pressed since the last call */
+    double time_scale;  /* [-] 1 is real time; - and = change it */
+    double command[3];  /* [m/s, m/s, rad/s] change wished since the last call: arrows and Q/E */
+    double turn, lift, zoom; /* camera: mouse drag [rad], wheel [-], since the last call */
+} WindowInput;
+
+/* Whether this build has windows at all. */
+int window_available(void);
+/* Makes the window's context current on the calling thread (which must be the main one). */
+Window *window_create(int width, int height, const char *title, MildError *error);
+void window_destroy(Window *window);
+void window_size(Window *window, int *width, int *height); /* [pixels] of the framebuffer */
+/* Shows what was drawn and collects the keys. */
+void window_show(Window *window, WindowInput *input);
+
+#endif
