@@ -1,0 +1,68 @@
+#include <string.h>
+
+#include "mild/ground.h"
+
+/* The ranges are what the equations bear, wider than the draws of the paper's Table III. */
+#define FIELD(member, low, high, help) MILD_FIELD(MildMaterial, member, MILD_FIELD_DOUBLE, 1, low, high, help)
+const MildField mild_material_fields[] = {
+    FIELD(k_pen, 1.0, 1e5, "[N/m] penetration stiffness of one element at the surface"),
+    FIELD(sigma_cone, 0.0, 5e6, "[N/m^3] depth-dependent conical stress"),
+    FIELD(alpha, 0.1, 1.5, "[rad] shear band angle"),
+    FIELD(nu, 0.1, 10.0, "[-] recruitment rate"),
+    FIELD(c_g, -1.4, 10.0, "[-] surrounding mass scale; negative only acts with passive = false"),
+    FIELD(c_d, -6.0, 100.0, "[-] inertial drag scale; below 1/2 only acts with passive = false"),
+    FIELD(phi, 0.05, 0.75, "[-] volume fraction"),
+    FIELD(rho, 1.0, 5000.0, "[kg/m^3] grain density"),
+    FIELD(mu, 0.0, 3.0, "[-] friction coefficient"),
+    FIELD(k_drift, 0.0, 1e5, "[N/m^2] drift stiffness per element"),
+    FIELD(b_drift, 0.0, 100.0, "[N s/m] drift damping per element"),
+    FIELD(recovery, 0.0, 1.0, "[-] share of the depth that springs back: 1 elastic, 0 plastic"),
+    FIELD(bed_depth, 0.001, 10.0, "[m] firm bottom below the surface"),
+    MILD_FIELD(MildMaterial, passive, MILD_FIELD_BOOL, 1, 0, 1, "[-] clamp c_g >= 0 and c_d >= 1/2: no energy is created"),
+};
+const int mild_material_field_count = (int)(sizeof mild_material_fields / sizeof *mild_material_fields);
+
+/* physics.md section 6. Foams and rubber weigh grams: no added mass. Friction, drift and bed are our choice. */
+typedef struct {
+    const char *name;
+    MildMaterial material;
+} Preset;
+/*              k_pen sigma_cone alpha  nu   c_g  c_d   phi   rho     mu   k_drift b_drift recovery bed passive */
+static const Preset presets[] = {
+    {"rubber", {1400.0, 0.24e6, 1.310, 0.8, 0.0, 1.0, 0.57, 1000.0, 1.0, 100.0, 0.02, 1.0, 0.10, 1}},
+    {"foam60", {850.0, 0.20e6, 1.20, 1.2, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1}},
+    {"foam45", {480.0, 0.17e6, 1.10, 1.6, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1}},
+    {"foam28", {190.0, 0.13e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1}},
+    {"foam25", {150.0, 0.11e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1}},
+    {"grass", {550.0, 0.24e6, 1.10, 1.6, 0.5, 1.0, 0.50, 1000.0, 0.7, 300.0, 0.05, 0.5, 0.10, 1}},
+    {"sand_loose", {380.0, 0.15e6, 1.047, 2.0, 2.7, 17.2, 0.57, 1000.0, 0.6, 400.0, 0.10, 0.0, 0.15, 1}},
+    {"sand_dense", {700.0, 0.24e6, 1.047, 1.6, 2.7, 17.2, 0.62, 1000.0, 0.7, 800.0, 0.10, 0.0, 0.15, 1}},
+};
+#define PRESETS ((int)(sizeof presets / sizeof *presets))
+
+int mild_material_preset_count(void) {
+    return PRESETS;
+}
+
+const char *mild_material_preset_name(int index) {
+    return index >= 0 && index < PRESETS ? presets[index].name : NULL;
+}
+
+int mild_material_preset(const char *name, MildMaterial *material) {
+    for (int i = 0; i < PRESETS; i++) {
+        if (strcmp(presets[i].name, name) != 0) continue;
+        *material = presets[i].material;
+        return 1;
+    }
+    return 0;
+}
+
+MildMaterial mild_material_default(void) {
+    MildMaterial material = {0};
+    mild_material_preset("sand_loose", &material);
+    return material;
+}
+
+MildStatus mild_material_check(const MildMaterial *material, MildError *error) {
+    return mild_fields_check(mild_material_fields, mild_material_field_count, material, "ground", error);
+}
