@@ -38,7 +38,7 @@ RobotVariation robot_variation_nominal(void);
 typedef struct {
     double position[3], rotation[9], velocity[6];
     double force[3], torque[3]; /* [N, N m] of the ground on the foot, at the ankle, mean over the step */
-    double sole_height; /* [m] lowest sole point above the undisturbed ground h0, negative when sunk */
+    double sole_height; /* [m] lowest sole point above the undisturbed ground h0 (of z = 0 after a load), negative when sunk */
     double sole_center[3]; /* [m] centre of the sole, world */
     double sole_center_velocity[3]; /* [m/s] */
     MildFootResult result;
@@ -54,6 +54,9 @@ const double *robot_default_pose(const Robot *robot); /* [ROBOT_JOINTS] rad */
 const double *robot_joint_low(const Robot *robot);    /* [ROBOT_JOINTS] rad */
 const double *robot_joint_high(const Robot *robot);
 const double *robot_effort(const Robot *robot);       /* [ROBOT_JOINTS] N m */
+/* const mjModel * of the whole file with its shapes, cameras and lights, for pictures: same qpos; the sims' own model has only
+ * what a step needs. */
+const void *robot_visual_model(const Robot *robot);
 
 /* One per thread. dt: physics step [s], 0.0005 .. 0.005. */
 RobotSim *robot_sim_create(const Robot *robot, double dt, MildError *error);
@@ -81,7 +84,7 @@ double robot_sim_knee_distance(const RobotSim *sim);
 double robot_sim_foot_distance(const RobotSim *sim);
 const MildScratch *robot_sim_scratch(const RobotSim *sim);
 const MildContactResult *robot_sim_contact(const RobotSim *sim);
-/* The engine's objects, for the renderer and tests (mjModel *, mjData *). */
+/* The engine's objects of this workspace, for tests (mjModel *, mjData *); pictures use robot_visual_model. */
 void *robot_sim_model(RobotSim *sim);
 void *robot_sim_data(RobotSim *sim);
 

@@ -1,0 +1,344 @@
+/* One physics step of a robot whose feet stand on our ground. Between steps the pose-dependent quantities (kinematics, feet's
+ * Jacobian and twist) are those of the current state, so a step begins with the dynamics and ends with the next pose. */
+#include "robot/sim.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+
+#define QVEL_MAX 1e3 /* [m/s, rad/s] beyond: the numbers went bad */
+
+static double split(RobotSim *sim, double *phase, double since) {
+    if (!sim->phases) {
+        return 0.0;
+    }
+    double now = clock_seconds();
+    *phase += now - since;
+    return now;
+}
+
+RobotSim *robot_sim_create(const Robot *robot, double dt, MildError *error) {
+    if (!(dt >= 0.0001 && dt <= 0.01)) {
+        mild_fail(error, MILD_ERROR_RANGE, "robot: time step %g s is outside 0.0001 .. 0.01", dt);
+        return NULL;
+    }
+    RobotSim *sim = calloc(1, sizeof *sim);
+    mjModel *model = sim ? mj_copyModel(NULL, robot->model) : NULL;
+    mjData *data = model ? mj_makeData(model) : NULL;
+    if (!data) {
+        mj_deleteModel(model);
+        free(sim);
+        mild_fail(error, MILD_ERROR_MEMORY, "robot: out of memory");
+        return NULL;
+    }
+    sim->robot = robot;
+    sim->model = model;
+    sim->data = data;
+    sim->dt = dt;
+    sim->scratch = mild_scratch_create(robot_soles(robot), ROBOT_FEET, error);
+    if (!sim->scratch) {
+        robot_sim_destroy(sim);
+        return NULL;
+    }
+    model->opt.timestep = dt;
+    sim->input.feet = ROBOT_FEET;
+    sim->input.dt = dt;
+    RobotState stand = {.qpos = {0, 0, robot->stand_height, 1, 0, 0, 0}};
+    memcpy(stand.qpos + 7, robot->pose, sizeof robot->pose);
+    RobotVariation nominal = robot_variation_nominal();
+    robot_sim_load(sim, &stand, &nominal);
+    return sim;
+}
+
+void robot_sim_destroy(RobotSim *sim) {
+    if (!sim) {
+        return;
+    }
+    mild_scratch_destroy(sim->scratch);
+    mj_deleteData(sim->data);
+    mj_deleteModel(sim->model);
+    free(sim);
+}
+
+void robot_sim_set_solver(RobotSim *sim, MildSolver solver) {
+    sim->input.solver = solver;
+}
+
+double robot_sim_dt(const RobotSim *sim) {
+    return sim->dt;
+}
+
+/* Lowest point of the sole's outline above `height` [m]. */
+static double lowest_sole_point(const Robot *robot, int foot, const double position[3], const double turn[9], double height) {
+    double least = 1e9;
+    for (int i = 0; i < robot->outline_points[foot]; i++) {
+        double z = turn[6] * robot->outline[foot][2 * i] + turn[7] * robot->outline[foot][2 * i + 1];
+        least = z < least ? z : least;
+    }
+    return position[2] + turn[8] * robot->sole_z + least - height;
+}
+
+/* Pose, twist and sole of a foot from the current kinematics. terrain: NULL for z = 0. */
+static void observe_foot(RobotSim *sim, int f, const MildTerrain *terrain) {
+    const mjData *d = sim->data;
+    RobotFoot *foot = &sim->feet[f];
+    int body = sim->robot->foot_body[f];
+    memcpy(foot->position, d->xpos + 3 * body, sizeof foot->position);
+    memcpy(foot->rotation, d->xmat + 9 * body, sizeof foot->rotation);
+    foot_map_twist(sim, f, d->qvel, NULL, foot->velocity);
+    const double *c = sim->robot->sole_center[f], *turn = foot->rotation, *w = foot->velocity + 3;
+    double arm[3];
+    for (int k = 0; k < 3; k++) {
+        arm[k] = turn[3 * k] * c[0] + turn[3 * k + 1] * c[1] + turn[3 * k + 2] * c[2];
+        foot->sole_center[k] = foot->position[k] + arm[k];
+    }
+    foot->sole_center_velocity[0] = foot->velocity[0] + w[1] * arm[2] - w[2] * arm[1];
+    foot->sole_center_velocity[1] = foot->velocity[1] + w[2] * arm[0] - w[0] * arm[2];
+    foot->sole_center_velocity[2] = foot->velocity[2] + w[0] * arm[1] - w[1] * arm[0];
+    double height = terrain ? mild_terrain_height_at(terrain, foot->sole_center[0], foot->sole_center[1]) : 0.0;
+    foot->sole_height = lowest_sole_point(sim->robot, f, foot->position, foot->rotation, height);
+}
+
+/* Everything that depends on qpos and qvel only. */
+static void update_pose(RobotSim *sim, const MildTerrain *terrain) {
+    mj_kinematics(sim->model, sim->data);
+    mj_comPos(sim->model, sim->data);
+    foot_map_jacobian(sim);
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        observe_foot(sim, f, terrain);
+    }
+}
+
+void robot_sim_load(RobotSim *sim, const RobotState *state, const RobotVariation *variation) {
+    mjData *d = sim->data;
+    variation_apply(sim, variation);
+    memcpy(d->qpos, state->qpos, sizeof state->qpos);
+    memcpy(d->qvel, state->qvel, sizeof state->qvel);
+    memcpy(d->qacc_warmstart, state->warmstart, sizeof state->warmstart);
+    d->time = 0.0;
+    memset(sim->feet, 0, sizeof sim->feet);
+    memset(&sim->contact, 0, sizeof sim->contact);
+    update_pose(sim, NULL);
+}
+
+void robot_sim_store(const RobotSim *sim, RobotState *state) {
+    memcpy(state->qpos, sim->data->qpos, sizeof state->qpos);
+    memcpy(state->qvel, sim->data->qvel, sizeof state->qvel);
+    memcpy(state->warmstart, sim->data->qacc_warmstart, sizeof state->warmstart);
+}
+
+/* Generalised force of a push (force, torque, world) at the base's centre of mass. */
+static void add_push(RobotSim *sim, const double *push) {
+    mjData *d = sim->data;
+    int base = sim->robot->base_body;
+    const double *turn = d->xmat + 9 * base;
+    double arm[3], moment[3];
+    for (int k = 0; k < 3; k++) {
+        arm[k] = d->xipos[3 * base + k] - d->xpos[3 * base + k];
+    }
+    moment[0] = push[3] + arm[1] * push[2] - arm[2] * push[1];
+    moment[1] = push[4] + arm[2] * push[0] - arm[0] * push[2];
+    moment[2] = push[5] + arm[0] * push[1] - arm[1] * push[0];
+    for (int k = 0; k < 3; k++) {
+        d->qfrc_smooth[k] += push[k];
+        d->qfrc_smooth[3 + k] += turn[k] * moment[0] + turn[3 + k] * moment[1] + turn[6 + k] * moment[2];
+    }
+}
+
+/* M, its factor, the bias b and the acceleration without ground: M qacc_smooth = tau - b. */
+static void smooth_dynamics(RobotSim *sim, const double *torque, const double *push) {
+    mjModel *m = sim->model;
+    mjData *d = sim->data;
+    mj_makeM(m, d);
+    mj_factorM(m, d);
+    mj_comVel(m, d);
+    mj_rne(m, d, 0, d->qfrc_bias);
+    for (int i = 0; i < ROBOT_NV; i++) {
+        d->qfrc_smooth[i] = (i < ROBOT_LEG ? 0.0 : torque[i - ROBOT_LEG]) - d->qfrc_bias[i];
+    }
+    if (push) {
+        add_push(sim, push);
+    }
+    mj_solveM(m, d, d->qacc_smooth, d->qfrc_smooth, 1);
+}
+
+/* What the ground asks of an engine: where the feet are, A and the free twist. */
+static void ground_input(RobotSim *sim) {
+    MildContactInput *input = &sim->input;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        memcpy(input->position[f], sim->feet[f].position, sizeof input->position[f]);
+        memcpy(input->rotation[f], sim->feet[f].rotation, sizeof input->rotation[f]);
+        memcpy(input->velocity[f], sim->feet[f].velocity, sizeof input->velocity[f]);
+    }
+}
+
+static void add_ground_wrench(RobotSim *sim) {
+    mjData *d = sim->data;
+    double wrench[ROBOT_FEET][6], force[ROBOT_NV], acceleration[ROBOT_NV];
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        memcpy(wrench[f], sim->contact.foot[f].force, 3 * sizeof(double));
+        memcpy(wrench[f] + 3, sim->contact.foot[f].torque, 3 * sizeof(double));
+    }
+    foot_map_wrench(sim, wrench, force, acceleration);
+    for (int i = 0; i < ROBOT_NV; i++) {
+        d->qfrc_smooth[i] += force[i];
+        d->qacc_smooth[i] += acceleration[i];
+    }
+}
+
+static int any_joint_beyond_limit(const RobotSim *sim) {
+    const double *q = sim->data->qpos + 7;
+    int beyond = 0;
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        beyond |= q[i] <= sim->robot->low[i] || q[i] >= sim->robot->high[i];
+    }
+    return beyond;
+}
+
+/* Joint limits (and the engine's contacts when there are any); without rows the smooth acceleration stands. */
+static void constrain(RobotSim *sim) {
+    mjModel *m = sim->model;
+    mjData *d = sim->data;
+    if (d->ncon == 0 && !any_joint_beyond_limit(sim)) {
+        memcpy(d->qacc, d->qacc_smooth, ROBOT_NV * sizeof(double));
+        return;
+    }
+    mj_makeConstraint(m, d);
+    mj_projectConstraint(m, d);
+    mj_referenceConstraint(m, d);
+    mj_fwdConstraint(m, d);
+}
+
+/* Semi-implicit Euler, the engine's own default: velocity first, then the pose with the new velocity. */
+static int integrate(RobotSim *sim) {
+    mjData *d = sim->data;
+    int bad = 0;
+    for (int i = 0; i < ROBOT_NV; i++) {
+        d->qvel[i] += sim->dt * d->qacc[i];
+        bad |= !(fabs(d->qvel[i]) < QVEL_MAX); /* NaN included */
+    }
+    if (bad) {
+        return 1;
+    }
+    memcpy(d->qacc_warmstart, d->qacc, ROBOT_NV * sizeof(double));
+    mj_integratePos(sim->model, d->qpos, d->qvel, sim->dt);
+    d->time += sim->dt;
+    return 0;
+}
+
+int robot_sim_step(RobotSim *sim, const double *torque, const double *push, const MildTerrain *terrain, MildGround *ground) {
+    RobotPhases none, *phases = sim->phases ? sim->phases : &none;
+    double t = sim->phases ? clock_seconds() : 0.0;
+    mjData *d = sim->data;
+
+    smooth_dynamics(sim, torque, push);
+    ground_input(sim);
+    d->ncon = 0;
+    t = split(sim, &phases->smooth, t);
+    if (sim->variation.rigid) {
+        d->geom_xpos[3 * sim->robot->floor_geom + 2] = terrain->height;
+        mj_collision(sim->model, d);
+        t = split(sim, &phases->ground, t);
+    } else {
+        foot_map_inverse_inertia(sim);
+        for (int f = 0; f < ROBOT_FEET; f++) {
+            foot_map_twist(sim, f, d->qvel, d->qacc_smooth, sim->input.free_velocity + 6 * f);
+        }
+        t = split(sim, &phases->map, t);
+        mild_ground_solve(ground, terrain, &sim->input, sim->scratch, &sim->contact);
+        mild_ground_advance(ground, terrain, &sim->input, sim->scratch, &sim->contact);
+        t = split(sim, &phases->ground, t);
+        add_ground_wrench(sim);
+    }
+    constrain(sim);
+    if (sim->variation.rigid) {
+        rigid_contact_result(sim);
+    }
+    int bad = integrate(sim);
+    if (!bad) {
+        update_pose(sim, terrain);
+        for (int f = 0; f < ROBOT_FEET; f++) {
+            sim->feet[f].result = sim->contact.foot[f];
+            memcpy(sim->feet[f].force, sim->contact.foot[f].force, sizeof sim->feet[f].force);
+            memcpy(sim->feet[f].torque, sim->contact.foot[f].torque, sizeof sim->feet[f].torque);
+        }
+    }
+    split(sim, &phases->finish, t);
+    phases->steps += sim->phases != NULL;
+    return bad;
+}
+
+void robot_sim_time_phases(RobotSim *sim, RobotPhases *phases) {
+    sim->phases = phases;
+}
+
+const double *robot_sim_qpos(const RobotSim *sim) {
+    return sim->data->qpos;
+}
+
+const double *robot_sim_qvel(const RobotSim *sim) {
+    return sim->data->qvel;
+}
+
+const double *robot_sim_base_rotation(const RobotSim *sim) {
+    return sim->data->xmat + 9 * sim->robot->base_body;
+}
+
+const RobotFoot *robot_sim_foot(const RobotSim *sim, int foot) {
+    return &sim->feet[foot];
+}
+
+double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain) {
+    const Robot *robot = sim->robot;
+    double least = 1e9;
+    for (int s = 0; s < ROBOT_SHELLS; s++) {
+        const double *p = sim->data->xpos + 3 * robot->shell_body[s];
+        const double *turn = sim->data->xmat + 9 * robot->shell_body[s];
+        const double *c = robot->shell_center[s], *half = robot->shell_half[s];
+        double low = p[2], at[2] = {p[0], p[1]};
+        for (int k = 0; k < 3; k++) {
+            low += turn[6 + k] * c[k] - fabs(turn[6 + k]) * half[k];
+            at[0] += turn[k] * c[k];
+            at[1] += turn[3 + k] * c[k];
+        }
+        least = fmin(least, low - mild_terrain_height_at(terrain, at[0], at[1]));
+    }
+    return least;
+}
+
+/* Component of b - a along the base's lateral axis laid level [m]. */
+static double lateral_distance(const RobotSim *sim, const double *a, const double *b) {
+    const double *turn = robot_sim_base_rotation(sim);
+    double x = turn[0], y = turn[3], length = sqrt(x * x + y * y); /* heading: the base's x axis, level */
+    if (length < 1e-9) {
+        return 0.0;
+    }
+    return fabs((-y * (b[0] - a[0]) + x * (b[1] - a[1])) / length);
+}
+
+double robot_sim_knee_distance(const RobotSim *sim) {
+    const int *knee = sim->robot->knee_body;
+    return lateral_distance(sim, sim->data->xpos + 3 * knee[1], sim->data->xpos + 3 * knee[0]);
+}
+
+double robot_sim_foot_distance(const RobotSim *sim) {
+    return lateral_distance(sim, sim->feet[1].sole_center, sim->feet[0].sole_center);
+}
+
+const MildScratch *robot_sim_scratch(const RobotSim *sim) {
+    return sim->scratch;
+}
+
+const MildContactResult *robot_sim_contact(const RobotSim *sim) {
+    return &sim->contact;
+}
+
+void *robot_sim_model(RobotSim *sim) {
+    return sim->model;
+}
+
+void *robot_sim_data(RobotSim *sim) {
+    return sim->data;
+}

@@ -1,0 +1,46 @@
+/* Domain randomisation: one workspace's model brought from the nominal robot to a varied one. */
+#include <string.h>
+
+#include "robot/sim.h"
+
+/* Mass and inertia of one body; the shape of the mass distribution stays, so the inertia scales with the mass. */
+static void scale_body(mjModel *m, const mjModel *nominal, int body, double mass) {
+    double scale = mass / nominal->body_mass[body];
+    m->body_mass[body] = mass;
+    for (int k = 0; k < 3; k++) {
+        m->body_inertia[3 * body + k] = scale * nominal->body_inertia[3 * body + k];
+    }
+}
+
+static void sum_subtrees(mjModel *m) {
+    memcpy(m->body_subtreemass, m->body_mass, sizeof(double) * (size_t)m->nbody);
+    for (int b = (int)m->nbody - 1; b > 0; b--) {
+        m->body_subtreemass[m->body_parentid[b]] += m->body_subtreemass[b];
+    }
+}
+
+/* The engine's reference constants of the nominal robot (body_invweight0, dof_M0, stat) stay: they only set how soft joint
+ * limits and rigid contacts are regularised. */
+void variation_apply(RobotSim *sim, const RobotVariation *variation) {
+    if (memcmp(variation, &sim->variation, sizeof *variation) == 0) {
+        return;
+    }
+    mjModel *m = sim->model;
+    const mjModel *nominal = sim->robot->model;
+    int base = sim->robot->base_body;
+    sim->variation = *variation;
+    scale_body(m, nominal, base, nominal->body_mass[base] * variation->link_mass_scale[0] + variation->base_mass_add);
+    for (int k = 0; k < 3; k++) {
+        m->body_ipos[3 * base + k] = nominal->body_ipos[3 * base + k] + variation->com_offset[k];
+    }
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        int body = m->jnt_bodyid[1 + i], dof = ROBOT_LEG + i;
+        scale_body(m, nominal, body, nominal->body_mass[body] * variation->link_mass_scale[1 + i]);
+        m->dof_armature[dof] = variation->armature_scale * nominal->dof_armature[dof];
+    }
+    sum_subtrees(m);
+    for (int p = 0; p < m->npair; p++) {
+        m->pair_friction[5 * p] = variation->rigid_friction;
+        m->pair_friction[5 * p + 1] = variation->rigid_friction;
+    }
+}
