@@ -140,6 +140,16 @@ VecStats vec_take_stats(Vec *vec) {
     return stats;
 }
 
+void vec_take_times(Vec *vec, double *physics, double *ground) {
+    *physics = *ground = 0;
+    for (int i = 0; i < pool_threads(vec->pool); i++) {
+        double in_physics, in_ground;
+        robot_sim_take_times(vec->sim[i], &in_physics, &in_ground);
+        *physics += in_physics;
+        *ground += in_ground;
+    }
+}
+
 void *vec_state(Vec *vec, size_t *bytes) {
     *bytes = (size_t)vec->envs * vec->stride;
     return vec->state;

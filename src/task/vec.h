@@ -32,6 +32,8 @@ void vec_reset(Vec *vec, const VecView *first);
 void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout, uint8_t *valid,
               const VecView *next);
 VecStats vec_take_stats(Vec *vec);
+/* Thread time [s] spent in physics, and in the ground as part of it, since the last call. */
+void vec_take_times(Vec *vec, double *physics, double *ground);
 /* Everything that persists, one pointer-free block: save and load are a copy. */
 void *vec_state(Vec *vec, size_t *bytes);
 size_t vec_bytes(const Vec *vec);

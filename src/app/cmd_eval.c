@@ -1,0 +1,181 @@
+/* mild eval: trials of a policy on grounds and speeds; a table and a JSON file. */
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "app/build.h"
+#include "app/cli.h"
+#include "app/commands.h"
+#include "app/config.h"
+#include "app/grounds.h"
+#include "app/paths.h"
+#include "control/controller.h"
+#include "eval/eval.h"
+
+enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
+
+typedef struct {
+    const char *policy, *json;
+    CliNames grounds;
+    CliNumbers speeds;
+    double patch;
+    int threads;
+    EvalDef eval;
+    TaskDef task;
+    const CliArgs *args;
+    EvalRow rows[ROWS_MAX];
+    int row_count;
+} Eval;
+
+static cJSON *row_json(const EvalRow *row) {
+    cJSON *o = cJSON_CreateObject();
+    cJSON_AddStringToObject(o, "ground", row->ground);
+    const struct {
+        const char *name;
+        double value;
+    } values[] = {{"speed", row->speed}, {"trials", row->trials}, {"success", row->success}, {"velocity", row->velocity},
+                  {"cot", row->cot}, {"torque_max", row->torque_max}, {"clearance", row->clearance},
+                  {"penetration", row->penetration}, {"drift", row->drift}, {"energy", row->energy},
+                  {"velocity_low", row->velocity_low}, {"velocity_high", row->velocity_high},
+                  {"com_oscillation", row->com_oscillation}, {"seconds", row->seconds}};
+    for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
+        cJSON_AddNumberToObject(o, values[i].name, values[i].value);
+    }
+    return o;
+}
+
+static MildStatus write_json(const Eval *e, MildError *error) {
+    cJSON *root = cJSON_CreateObject(), *rows = cJSON_AddArrayToObject(root, "rows");
+    cJSON_AddStringToObject(root, "policy", e->policy);
+    cJSON_AddStringToObject(root, "robot", "sa01");
+    cJSON_AddStringToObject(root, "version", build_version());
+    for (int i = 0; i < e->row_count; i++) {
+        cJSON_AddItemToArray(rows, row_json(&e->rows[i]));
+    }
+    char *text = cJSON_Print(root);
+    MildStatus status = text ? path_write(e->json, text, strlen(text), error)
+                             : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    free(text);
+    cJSON_Delete(root);
+    return status;
+}
+
+/* The scene with --ground.KEY=VALUE laid over each of its grounds, and --task.KEY=VALUE over the task. */
+static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildError *error) {
+    MildStatus status = scene_make(scene, name, e->patch, error);
+    for (int i = 0; status == MILD_OK && i < scene->terrain.material_count; i++) {
+        const ConfigSection sections[] = {{"task", task_fields, task_field_count, &e->task},
+                                          grounds_section(&scene->terrain.materials[i])};
+        status = config_overrides(sections, 2, e->args->overrides, e->args->override_count, error);
+        if (status == MILD_OK) status = mild_material_check(&scene->terrain.materials[i], error);
+    }
+    if (status == MILD_OK) status = task_def_check(&e->task, error);
+    return status;
+}
+
+static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller, MildError *error) {
+    char line[256];
+    eval_print_header(line, sizeof line);
+    printf("%s\n", line);
+    for (int g = 0; g < e->grounds.count; g++) {
+        Scene scene;
+        MildStatus status = make_scene(e, e->grounds.name[g], &scene, error);
+        for (int s = 0; status == MILD_OK && s < e->speeds.count; s++) {
+            e->eval.speed = e->speeds.value[s];
+            EvalRow *row = &e->rows[e->row_count];
+            status = eval_run(&e->task, robot, pool, controller, &scene, &e->eval, row, error);
+            if (status == MILD_OK) {
+                e->row_count++;
+                eval_print_row(row, line, sizeof line);
+                printf("%s\n", line);
+                fflush(stdout);
+            }
+        }
+        if (status != MILD_OK) {
+            return status;
+        }
+    }
+    return e->json ? write_json(e, error) : MILD_OK;
+}
+
+/* All grounds are checked before the first trial: a typing error in the last one should not cost an hour. */
+static MildStatus check_grounds(Eval *e, MildError *error) {
+    MildStatus status = MILD_OK;
+    Scene scene;
+    for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
+        status = make_scene(e, e->grounds.name[g], &scene, error);
+    }
+    return status;
+}
+
+static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
+    char path[PATH_SIZE];
+    e->task = task_def_default();
+    task_def_make_nominal(&e->task);
+    e->args = args;
+    MildStatus status = check_grounds(e, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    Pool *pool = pool_create(e->threads);
+    Robot *robot = pool ? robot_create(path_data("models/sa01/sa01.xml", path), error) : NULL;
+    Controller controller = {0};
+    if (!robot) {
+        status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
+    }
+    if (status == MILD_OK) status = controller_learned(e->policy, pool, e->eval.trials, &controller, error);
+    if (status == MILD_OK) status = evaluate(e, robot, pool, &controller, error);
+    controller_destroy(&controller);
+    robot_destroy(robot);
+    pool_destroy(pool);
+    return status;
+}
+
+int cmd_eval(int argc, char **argv) {
+    Eval *e = calloc(1, sizeof *e);
+    CliArgs *args = calloc(1, sizeof *args);
+    if (!e || !args) {
+        return cli_fail_text("eval", "out of memory");
+    }
+    char shipped[PATH_SIZE];
+    e->policy = path_data("policies/mild.safetensors", shipped);
+    e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
+    e->patch = 2.5;
+    e->speeds = (CliNumbers){1, {0.6}};
+    e->grounds.count = 3;
+    strcpy(e->grounds.name[0], "rigid");
+    strcpy(e->grounds.name[1], "foam45");
+    strcpy(e->grounds.name[2], "sand_loose");
+    const CliOption options[] = {
+        {"policy", CLI_TEXT, &e->policy, 0, 0, "FILE", "policy to try (policies/mild.safetensors)"},
+        {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
+         "grounds, a row each; rubber+foam45 is a course of both (rigid,foam45,sand_loose)"},
+        {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]", "[m/s] commanded forward speeds, a row each (0.6)"},
+        {"trials", CLI_INT, &e->eval.trials, 1, 10000, "N", "trials per row, each with its own start and noise (10)"},
+        {"seconds", CLI_NUMBER, &e->eval.seconds, 0.1, 3600, "T", "[s] length of a trial (20)"},
+        {"patch", CLI_NUMBER, &e->patch, 0.1, 1000, "L", "[m] length of each ground of a course (2.5)"},
+        {"seed", CLI_UINT64, &e->eval.seed, 0, 0, "S", "same seed, same trials (1)"},
+        {"threads", CLI_INT, &e->threads, 0, 1024, "N", "0: one per core; the table does not depend on it (0)"},
+        {"json", CLI_TEXT, &e->json, 0, 0, "FILE", "write the table as JSON as well"},
+    };
+    const CliCommand command = {
+        .name = "eval", .usage = "--policy FILE --ground NAME[,NAME] --speed V[,V] [options]",
+        .summary = "Walks a policy over grounds and speeds and prints one row for each: trials without a fall, measured\n"
+                   "speed with its 95 % interval, cost of transport, largest torque, foot clearance above the\n"
+                   "undisturbed ground, sinkage and slip of each stance, energy. Sensors are noisy and late as in\n"
+                   "training; the robot itself is nominal and nobody pushes it.",
+        .options = options, .option_count = sizeof options / sizeof *options,
+        .overrides = "any key of sections [task] and [ground], e.g. --task.physics_dt=0.001 --ground.mu=0.4",
+        .examples = "  mild eval --ground rigid,foam45,sand_loose --speed 0.3,0.6\n",
+    };
+    CliOutcome outcome = cli_parse(&command, argc, argv, args);
+    int code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    if (outcome == CLI_RUN) {
+        MildError error = {0};
+        code = run_eval(e, args, &error) == MILD_OK ? 0 : cli_fail("eval", &error);
+    }
+    free(e);
+    free(args);
+    return code;
+}
