@@ -25,11 +25,11 @@ int cli_fail_text(const char *command, const char *format, ...) {
 
 /* ---- help ---- */
 
-/* Words of `text`, broken at HELP_WIDTH, continued at `indent`; the cursor stands at `column` already. */
+/* Words of `text`, line ends counting as blanks, broken at HELP_WIDTH, continued at `indent`; the cursor stands at `column` already. */
 static void print_wrapped(const char *text, int column, int indent) {
     while (*text) {
-        text += strspn(text, " ");
-        int length = (int)strcspn(text, " ");
+        text += strspn(text, " \n");
+        int length = (int)strcspn(text, " \n");
         if (length == 0) break;
         if (column > indent && column + 1 + length > HELP_WIDTH) {
             printf("\n%*s", indent, "");

@@ -1,0 +1,213 @@
+#include "app/bench.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "app/paths.h"
+#include "app/train.h"
+#include "base/clock.h"
+#include "robot/bench.h"
+
+static const char *const bench_preset = "sand_loose";
+
+void bench_add(BenchReport *report, const char *bench, const char *name, double value, const char *unit) {
+    assert(report->count < BENCH_ROWS_MAX);
+    report->rows[report->count++] = (BenchRow){bench, name, unit, value};
+}
+
+static int compare_doubles(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(double *values, int count) {
+    qsort(values, (size_t)count, sizeof *values, compare_doubles);
+    return count % 2 ? values[count / 2] : 0.5 * (values[count / 2 - 1] + values[count / 2]);
+}
+
+static Robot *open_robot(MildError *error) {
+    char path[PATH_SIZE];
+    return robot_create(path_data("models/sa01/sa01.xml", path), error);
+}
+
+MildStatus bench_step(const ExperimentDef *def, BenchReport *report, MildError *error) {
+    enum { REPEATS = 15, STEPS = 1000 };
+    Robot *robot = open_robot(error);
+    if (!robot) return MILD_ERROR_IO;
+    RobotBench result;
+    MildStatus status = robot_bench_step(robot, bench_preset, def->task.physics_dt, REPEATS, STEPS, &result, error);
+    robot_destroy(robot);
+    if (status != MILD_OK) return status;
+    const RobotPhases *phases = &result.newton_phases;
+    bench_add(report, "step", "ratio_to_rigid", result.newton / result.engine_rigid, "-");
+    bench_add(report, "step", "newton", result.newton, "us");
+    bench_add(report, "step", "gauss_seidel", result.gauss_seidel, "us");
+    bench_add(report, "step", "engine_rigid", result.engine_rigid, "us");
+    bench_add(report, "step", "engine_free", result.engine_free, "us");
+    bench_add(report, "step", "rigid", result.rigid, "us");
+    bench_add(report, "step", "newton_smooth", phases->smooth, "us");
+    bench_add(report, "step", "newton_map", phases->map, "us");
+    bench_add(report, "step", "newton_ground", phases->ground, "us");
+    bench_add(report, "step", "newton_finish", phases->finish, "us");
+    bench_add(report, "step", "newton_iterations", result.iterations, "-");
+    return MILD_OK;
+}
+
+/* ---- the ground alone ---- */
+
+enum { GROUND_REPEATS = 15, GROUND_STEPS = 1000, ROWS = 6 * MILD_FEET_MAX };
+
+typedef struct {
+    MildTerrain terrain;
+    MildContactInput input;
+    MildGround *ground;
+    MildScratch *scratch;
+} GroundBench;
+
+/* Two feet that carry 33 kg together: A couples them as a trunk would, gravity acts over one step, soles at `depth`. */
+static void ground_input(MildContactInput *input, const Robot *robot, double dt, double depth, double slip) {
+    const double linear = 1.0 / 20, angular = 1.0 / 0.3, coupling = 0.6;
+    *input = (MildContactInput){.feet = ROBOT_FEET, .dt = dt};
+    for (int i = 0; i < ROWS; i++) {
+        double diagonal = i % 6 < 3 ? linear : angular;
+        input->inverse_inertia[i * ROWS + i] = diagonal;
+        input->inverse_inertia[i * ROWS + (i + 6) % ROWS] = coupling * diagonal;
+    }
+    for (int foot = 0; foot < ROBOT_FEET; foot++) {
+        input->position[foot][1] = foot ? -0.1 : 0.1;
+        input->position[foot][2] = -depth - mild_sole_z(robot_soles(robot)[foot]);
+        for (int i = 0; i < 3; i++) input->rotation[foot][4 * i] = 1;
+        input->velocity[foot][0] = input->free_velocity[6 * foot] = slip;
+        input->free_velocity[6 * foot + 2] = -9.81 * dt;
+    }
+}
+
+static double ground_time(GroundBench *bench, int advance) {
+    double times[GROUND_REPEATS];
+    MildContactResult result;
+    for (int repeat = 0; repeat < GROUND_REPEATS; repeat++) {
+        double start = clock_seconds();
+        for (int step = 0; step < GROUND_STEPS; step++) {
+            mild_ground_solve(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
+            if (advance) mild_ground_advance(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
+        }
+        times[repeat] = clock_seconds() - start;
+    }
+    return median(times, GROUND_REPEATS) / GROUND_STEPS * 1e9;
+}
+
+/* The memory is that of a foot which went down to where it is now. */
+static void ground_press_in(GroundBench *bench, const Robot *robot, double dt, double depth) {
+    MildContactResult result;
+    mild_ground_reset(bench->ground);
+    for (double at = 0; at < depth; at += 0.001) {
+        ground_input(&bench->input, robot, dt, at, 0);
+        for (int foot = 0; foot < ROBOT_FEET; foot++) bench->input.free_velocity[6 * foot + 2] = -0.001 / dt;
+        memset(bench->input.inverse_inertia, 0, sizeof bench->input.inverse_inertia);
+        mild_ground_solve(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
+        mild_ground_advance(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
+    }
+}
+
+static void ground_cases(GroundBench *bench, const Robot *robot, double dt, BenchReport *report) {
+    const double depth = 0.015, slip = 0.2;
+    static const char *const names[2][2] = {{"newton_stick", "newton_slip"}, {"gauss_seidel_stick", "gauss_seidel_slip"}};
+    for (int solver = 0; solver < 2; solver++) {
+        for (int slips = 0; slips < 2; slips++) {
+            ground_press_in(bench, robot, dt, depth);
+            ground_input(&bench->input, robot, dt, depth, slips ? slip : 0);
+            bench->input.solver = solver ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON;
+            bench_add(report, "ground", names[solver][slips], ground_time(bench, 0), "ns");
+        }
+    }
+    ground_press_in(bench, robot, dt, depth);
+    ground_input(&bench->input, robot, dt, depth, 0);
+    bench_add(report, "ground", "newton_stick_advance", ground_time(bench, 1), "ns");
+}
+
+MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError *error) {
+    Robot *robot = open_robot(error);
+    if (!robot) return MILD_ERROR_IO;
+    const MildSole *const *soles = robot_soles(robot);
+    MildMaterial material;
+    mild_material_preset(bench_preset, &material);
+    GroundBench bench = {.terrain = mild_terrain_uniform(&material)};
+    void *block = aligned_alloc(64, mild_ground_bytes(soles, ROBOT_FEET));
+    bench.scratch = mild_scratch_create(soles, ROBOT_FEET, error);
+    MildStatus status = MILD_OK;
+    if (block && bench.scratch) {
+        bench.ground = mild_ground_init(block, soles, ROBOT_FEET);
+        ground_cases(&bench, robot, def->task.physics_dt, report);
+        bench_add(report, "ground", "elements", mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");
+    } else {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    }
+    mild_scratch_destroy(bench.scratch);
+    free(block);
+    robot_destroy(robot);
+    return status;
+}
+
+/* ---- training ---- */
+
+/* Thread time inside the environments becomes wall time by the number of threads. */
+static void train_rows(const TrainTimes *sum, double steps, double wall, int threads, BenchReport *report) {
+    double ground = sum->ground / threads, physics = sum->physics / threads - ground;
+    bench_add(report, "train", "policy_steps_per_s", steps / wall, "1/s");
+    bench_add(report, "train", "physics", 1e6 * physics / steps, "us/step");
+    bench_add(report, "train", "ground", 1e6 * ground / steps, "us/step");
+    bench_add(report, "train", "task", 1e6 * (sum->environments - physics - ground) / steps, "us/step");
+    bench_add(report, "train", "inference", 1e6 * sum->inference / steps, "us/step");
+    bench_add(report, "train", "update", 1e6 * sum->update / steps, "us/step");
+    bench_add(report, "train", "other", 1e6 * (wall - sum->environments - sum->inference - sum->update) / steps, "us/step");
+    bench_add(report, "train", "threads", threads, "-");
+}
+
+MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError *error) {
+    const double seconds = 20;
+    Trainer *trainer = train_create(def, error);
+    if (!trainer) return error->status;
+    TrainReport iteration;
+    TrainTimes sum = {0};
+    train_iterate(trainer, &iteration); /* caches, kernels compiled by oneDNN */
+    double start = clock_seconds(), wall = 0, steps = 0;
+    while (wall < seconds) {
+        train_iterate(trainer, &iteration);
+        sum.environments += iteration.times.environments;
+        sum.inference += iteration.times.inference;
+        sum.update += iteration.times.update;
+        sum.physics += iteration.times.physics;
+        sum.ground += iteration.times.ground;
+        steps += (double)def->train.envs * def->ppo.steps;
+        wall = clock_seconds() - start;
+    }
+    train_rows(&sum, steps, wall, train_threads(trainer), report);
+    train_destroy(trainer);
+    return MILD_OK;
+}
+
+/* A field of /proc/self/status in bytes; 0 where there is none. */
+static double process_bytes(const char *key) {
+    char line[256];
+    double kibibytes = 0;
+    FILE *file = fopen("/proc/self/status", "r");
+    while (file && fgets(line, sizeof line, file)) {
+        if (strncmp(line, key, strlen(key)) == 0) kibibytes = strtod(line + strlen(key), NULL);
+    }
+    if (file) fclose(file);
+    return 1024 * kibibytes;
+}
+
+MildStatus bench_memory(const ExperimentDef *def, BenchReport *report, MildError *error) {
+    Trainer *trainer = train_create(def, error);
+    if (!trainer) return error->status;
+    TrainReport iteration;
+    train_iterate(trainer, &iteration); /* touches every page once */
+    bench_add(report, "memory", "envs", def->train.envs, "-");
+    bench_add(report, "memory", "training", (double)train_bytes(trainer), "B");
+    bench_add(report, "memory", "process_peak", process_bytes("VmHWM:"), "B");
+    train_destroy(trainer);
+    return MILD_OK;
+}

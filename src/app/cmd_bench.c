@@ -1,0 +1,118 @@
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "app/bench.h"
+#include "app/build.h"
+#include "app/cli.h"
+#include "app/commands.h"
+#include "app/report.h"
+#include "app/text.h"
+
+/* memory comes first: its peak is that of the whole process so far. */
+static const struct {
+    const char *name;
+    MildStatus (*run)(const ExperimentDef *def, BenchReport *report, MildError *error);
+} benches[] = {
+    {"memory", bench_memory},
+    {"step", bench_step},
+    {"ground", bench_ground},
+    {"train", bench_train},
+};
+enum { BENCHES = sizeof benches / sizeof *benches };
+
+static MildStatus save_json(const BenchReport *report, const char *path, MildError *error) {
+    char machine[256];
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "machine", build_machine(machine, sizeof machine));
+    cJSON_AddStringToObject(root, "version", build_version());
+    cJSON *rows = cJSON_AddArrayToObject(root, "rows");
+    for (int i = 0; i < report->count; i++) {
+        const BenchRow *row = &report->rows[i];
+        cJSON *object = cJSON_CreateObject();
+        cJSON_AddStringToObject(object, "bench", row->bench);
+        cJSON_AddStringToObject(object, "case", row->name);
+        cJSON_AddNumberToObject(object, "value", row->value);
+        cJSON_AddStringToObject(object, "unit", row->unit);
+        cJSON_AddItemToArray(rows, object);
+    }
+    return report_save(root, path, error);
+}
+
+static void print_rows(const BenchReport *report, int first) {
+    for (int i = first; i < report->count; i++) {
+        const BenchRow *row = &report->rows[i];
+        char bytes[32];
+        if (strcmp(row->unit, "B") == 0) {
+            printf("%-8s %-22s %14s\n", row->bench, row->name, text_bytes(row->value, bytes, sizeof bytes));
+        } else {
+            printf("%-8s %-22s %14.4g %s\n", row->bench, row->name, row->value, strcmp(row->unit, "-") ? row->unit : "");
+        }
+    }
+    fflush(stdout);
+}
+
+/* All names are checked before anything runs. */
+static int check_names(const CliArgs *args) {
+    const char *names[BENCHES];
+    for (int i = 0; i < BENCHES; i++) names[i] = benches[i].name;
+    for (int a = 0; a < args->positional_count; a++) {
+        const char *nearest = text_nearest(args->positional[a], names, BENCHES);
+        if (strcmp(nearest, args->positional[a]) != 0) {
+            return cli_fail_text("bench", "unknown bench '%s'; nearest is '%s'", args->positional[a], nearest);
+        }
+    }
+    return 0;
+}
+
+static int wanted(const CliArgs *args, const char *name) {
+    for (int a = 0; a < args->positional_count; a++) {
+        if (strcmp(args->positional[a], name) == 0) return 1;
+    }
+    return args->positional_count == 0;
+}
+
+static MildStatus run_benches(const CliArgs *args, BenchReport *report, MildError *error) {
+    ExperimentDef def = experiment_def_default();
+    MildStatus status = experiment_read(&def, NULL, args->overrides, args->override_count, error);
+    char machine[256];
+    if (status == MILD_OK) printf("%s, mild %s\n", build_machine(machine, sizeof machine), build_version());
+    fflush(stdout);
+    for (int i = 0; i < BENCHES && status == MILD_OK; i++) {
+        int first = report->count;
+        if (!wanted(args, benches[i].name)) continue;
+        status = benches[i].run(&def, report, error);
+        if (status == MILD_OK) print_rows(report, first);
+    }
+    return status;
+}
+
+int cmd_bench(int argc, char **argv) {
+    const char *json = NULL;
+    const CliOption options[] = {
+        {"json", CLI_TEXT, &json, 0, 0, "FILE", "write {machine, version, rows: [{bench, case, value, unit}]}; - for standard output"},
+    };
+    const CliCommand command = {
+        .name = "bench",
+        .usage = "[NAME ...] [--json FILE]",
+        .summary = "Measures speed and memory on this machine; without a name, everything (under a minute). step: one physics "
+                   "step on soft ground beside the engine's own contact, same robot, same pose, same run; ratio_to_rigid is "
+                   "newton over engine_rigid. ground: the contact solver alone. train: policy steps per second, rollout and "
+                   "update, and where the time of a step goes. memory: what training holds.",
+        .options = options,
+        .option_count = 1,
+        .overrides = "any key of configs/default.ini, e.g. --train.envs=256 --train.threads=1 --task.physics_dt=0.001",
+        .examples = "  mild bench step\n  mild bench train memory --json bench.json\n",
+        .positional_max = BENCHES,
+    };
+    CliArgs args;
+    CliOutcome outcome = cli_parse(&command, argc, argv, &args);
+    if (outcome != CLI_RUN) return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    int bad = check_names(&args);
+    if (bad) return bad;
+    BenchReport report = {.count = 0};
+    MildError error = {0};
+    MildStatus status = run_benches(&args, &report, &error);
+    if (status == MILD_OK && json) status = save_json(&report, json, &error);
+    return status == MILD_OK ? 0 : cli_fail("bench", &error);
+}

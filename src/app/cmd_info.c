@@ -1,0 +1,167 @@
+#include <cjson/cJSON.h>
+#include <mujoco/mujoco.h>
+#include <oneapi/dnnl/dnnl.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "app/build.h"
+#include "app/cli.h"
+#include "app/commands.h"
+#include "app/experiment.h"
+#include "app/grounds.h"
+#include "app/text.h"
+
+/* Where the numbers of a preset come from; docs/ has the details. */
+static const struct {
+    const char *ground, *what, *source;
+} sources[] = {
+    {"rubber", "sports-hall rubber mat", "stiff end of the paper's ranges; elastic"},
+    {"foam60", "foam of 60 kg/m^3", "k_pen from a Gibson-Ashby foam on a 50 mm slab; weighs grams: no added mass"},
+    {"foam45", "foam of 45 kg/m^3", "as foam60"},
+    {"foam28", "foam of 28 kg/m^3", "as foam60"},
+    {"foam25", "foam of 25 kg/m^3", "as foam60"},
+    {"grass", "lawn", "inside the paper's ranges; half of the depth springs back"},
+    {"sand_loose", "loose dry sand", "inside the paper's ranges; inertia (c_g, c_d, phi) after Choi et al. 2023"},
+    {"sand_dense", "packed dry sand", "as sand_loose, denser"},
+};
+enum { SOURCES = sizeof sources / sizeof *sources };
+
+static void print_preset_table(void) {
+    int presets = mild_material_preset_count();
+    printf("%-12s", "");
+    for (int p = 0; p < presets; p++) printf("%11s", mild_material_preset_name(p));
+    printf("\n");
+    for (int f = 0; f < mild_material_field_count; f++) {
+        printf("  %-10s", mild_material_fields[f].name);
+        for (int p = 0; p < presets; p++) {
+            MildMaterial material;
+            char value[64];
+            mild_material_preset(mild_material_preset_name(p), &material);
+            mild_field_print(&mild_material_fields[f], &material, value, sizeof value);
+            printf("%11s", value);
+        }
+        printf("\n");
+    }
+}
+
+/* 40 kg is the paper's robot: 77 elements of 19.5 mm under each foot. */
+static void print_sinkage(void) {
+    static const struct {
+        const char *label;
+        int elements;
+    } stances[] = {{"two feet", 154}, {"one foot", 77}};
+    printf("\nsinkage of 40 kg at rest [mm]\n");
+    for (int s = 0; s < 2; s++) {
+        printf("  %-10s", stances[s].label);
+        for (int p = 0; p < mild_material_preset_count(); p++) {
+            MildMaterial material;
+            mild_material_preset(mild_material_preset_name(p), &material);
+            printf("%11.1f", 1e3 * grounds_sinkage(&material, 0.0195, stances[s].elements, 40 * 9.81));
+        }
+        printf("\n");
+    }
+}
+
+static int info_grounds(void) {
+    printf("presets, SI units; any value can be replaced on the command line, e.g. --ground.k_pen=500\n\n");
+    print_preset_table();
+    print_sinkage();
+    printf("\nparameters\n");
+    for (int f = 0; f < mild_material_field_count; f++) {
+        const MildField *field = &mild_material_fields[f];
+        char range[48] = "true or false";
+        if (field->type != MILD_FIELD_BOOL) snprintf(range, sizeof range, "%g .. %g", field->min, field->max);
+        printf("  %-10s  %-16s %s\n", field->name, range, field->help);
+    }
+    printf("\nsources\n");
+    for (int i = 0; i < SOURCES; i++) printf("  %-10s  %s; %s\n", sources[i].ground, sources[i].what, sources[i].source);
+    printf("\n`rigid` is the engine's own contact: no parameters, for train, eval and play.\n");
+    return 0;
+}
+
+static int info_models(void) {
+    printf("ground models\n"
+           "  mild    every element of the sole (19.5 mm squares, 77 per foot) meets a cone of ground that grows with\n"
+           "          depth: stiffness, inertia of the moved ground, drag, friction, drift, unloading (the paper's model)\n"
+           "  rigid   the engine's own contact at the corners of the soles, for comparison\n"
+           "\nsolvers of mild (--task.newton)\n"
+           "  newton        the step as one small convex problem; default\n"
+           "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n"
+           "\nrobots\n"
+           "  sa01    models/sa01/sa01.xml: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
+    return 0;
+}
+
+static int info_config(void) {
+    ExperimentDef def = experiment_def_default();
+    ConfigSection sections[EXPERIMENT_SECTIONS];
+    experiment_sections(&def, sections);
+    printf("# Every key with its default. A config file holds what differs; --section.key=value changes one key for one run.\n");
+    config_print(sections, EXPERIMENT_SECTIONS, 1, stdout);
+    return 0;
+}
+
+static int info_build(void) {
+    const dnnl_version_t *dnnl = dnnl_version();
+    printf("mild      %s\n", build_version());
+    printf("compiler  %s, %s\n", build_compiler(), build_type());
+    printf("flags     %s\n", build_flags());
+    printf("MuJoCo    %s (headers %d.%d.%d)\n", mj_versionString(), mjVERSION_HEADER / 100, mjVERSION_HEADER / 10 % 10,
+           mjVERSION_HEADER % 10);
+    printf("oneDNN    %d.%d.%d\n", dnnl->major, dnnl->minor, dnnl->patch);
+    printf("cJSON     %s\n", cJSON_Version());
+    printf("inih      system library\n");
+    return 0;
+}
+
+static const char *instruction_set(void) {
+    switch (dnnl_get_effective_cpu_isa()) {
+    case dnnl_cpu_isa_avx: return "AVX";
+    case dnnl_cpu_isa_avx2: return "AVX2";
+    case dnnl_cpu_isa_avx512_core: return "AVX-512";
+    case dnnl_cpu_isa_avx512_core_vnni: return "AVX-512 with VNNI";
+    case dnnl_cpu_isa_avx512_core_bf16: return "AVX-512 with BF16";
+    default: return "as oneDNN finds it";
+    }
+}
+
+static int info_devices(void) {
+    char machine[256], memory[32];
+    printf("processor  %s\n", build_machine(machine, sizeof machine));
+    printf("memory     %s\n", text_bytes(build_memory_bytes(), memory, sizeof memory));
+    printf("networks   oneDNN on the processor, %s\n", instruction_set());
+    printf("GPU        not used: this version computes on the processor only\n");
+    return 0;
+}
+
+static const struct {
+    const char *name;
+    int (*print)(void);
+} topics[] = {
+    {"grounds", info_grounds}, {"models", info_models}, {"config", info_config},
+    {"build", info_build},     {"devices", info_devices},
+};
+enum { TOPICS = sizeof topics / sizeof *topics };
+
+int cmd_info(int argc, char **argv) {
+    const CliCommand command = {
+        .name = "info",
+        .usage = "grounds | models | config | build | devices",
+        .summary = "grounds: presets with every parameter, its unit, range and source. models: ground models, solvers, robots. "
+                   "config: every key with its default, range and meaning, as a complete config file. build: version, compiler, "
+                   "libraries. devices: what this machine computes with.",
+        .examples = "  mild info grounds\n  mild info config > my.ini\n",
+        .positional_max = 1,
+    };
+    CliArgs args;
+    CliOutcome outcome = cli_parse(&command, argc, argv, &args);
+    if (outcome != CLI_RUN) return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    if (!args.positional_count) return cli_fail_text("info", "about what? mild info %s", command.usage);
+    const char *names[TOPICS];
+    for (int i = 0; i < TOPICS; i++) {
+        if (strcmp(args.positional[0], topics[i].name) == 0) return topics[i].print();
+        names[i] = topics[i].name;
+    }
+    return cli_fail_text("info", "unknown topic '%s'; nearest is '%s'", args.positional[0],
+                         text_nearest(args.positional[0], names, TOPICS));
+}

@@ -1,0 +1,84 @@
+#include "app/progress.h"
+
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "app/text.h"
+#include "base/clock.h"
+
+static const double terminal_interval = 0.1, file_interval = 10.0; /* [s] */
+
+Progress progress_begin(const char *what) {
+    double now = clock_seconds();
+    return (Progress){.what = what, .start = now, .shown = now - file_interval, .terminal = isatty(STDERR_FILENO)};
+}
+
+/* A line wider than the terminal would wrap, and its first half could no longer be overwritten. */
+static void cut_to_terminal(char *line) {
+    struct winsize window;
+    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1 && strlen(line) >= window.ws_col) {
+        line[window.ws_col - 1] = '\0';
+    }
+}
+
+static void show_line(Progress *progress, double share, const char *format, va_list arguments) {
+    char line[400], time[32];
+    double elapsed = clock_seconds() - progress->start;
+    int length = snprintf(line, sizeof line, "%s", progress->what);
+    if (share >= 0) length += snprintf(line + length, sizeof line - (size_t)length, " %3.0f %%", 100 * (share < 1 ? share : 1));
+    length += snprintf(line + length, sizeof line - (size_t)length, "  %s", text_duration(elapsed, time, sizeof time));
+    if (share > 0.005 && share < 1) {
+        text_duration(elapsed * (1 - share) / share, time, sizeof time);
+        length += snprintf(line + length, sizeof line - (size_t)length, ", %s left", time);
+    }
+    length += snprintf(line + length, sizeof line - (size_t)length, "  ");
+    vsnprintf(line + length, sizeof line - (size_t)length, format, arguments);
+    if (progress->terminal) {
+        cut_to_terminal(line);
+        fprintf(stderr, "\r%-*s", progress->width, line);
+        progress->width = (int)strlen(line);
+    } else {
+        fprintf(stderr, "%s\n", line);
+    }
+    fflush(stderr);
+}
+
+void progress_show(Progress *progress, double share, const char *format, ...) {
+    double now = clock_seconds();
+    if (now - progress->shown < (progress->terminal ? terminal_interval : file_interval)) return;
+    progress->shown = now;
+    va_list arguments;
+    va_start(arguments, format);
+    show_line(progress, share, format, arguments);
+    va_end(arguments);
+}
+
+void progress_end(Progress *progress, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    show_line(progress, -1, format, arguments);
+    va_end(arguments);
+    if (progress->terminal) fputc('\n', stderr);
+}
+
+static volatile sig_atomic_t interrupted;
+
+static void on_interrupt(int signal_number) {
+    if (interrupted) _exit(128 + signal_number);
+    interrupted = 1;
+}
+
+void interrupt_install(void) {
+    struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = SA_RESTART};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+}
+
+int interrupt_requested(void) {
+    return interrupted != 0;
+}
