@@ -19,10 +19,10 @@ struct Pool {
     int threads; /* caller included */
     pthread_mutex_t mutex;
     pthread_cond_t start, done;
-    unsigned run;    /* number of the run now open; under mutex */
-    int open;        /* bool: late sleepers may still join this run; under mutex */
-    int active;      /* workers inside the run; under mutex */
-    int stop;        /* bool; under mutex */
+    unsigned run; /* number of the run now open; under mutex */
+    int open;     /* bool: late sleepers may still join this run; under mutex */
+    int active;   /* workers inside the run; under mutex */
+    int stop;     /* bool; under mutex */
     int pieces;
     void (*work)(void *context, int piece, int thread);
     void *context;

@@ -1,0 +1,334 @@
+#include "learn/loss.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "learn/vector.h"
+
+#define HALF_LOG_2PI 0.91893853320467274
+/* The log-variance is used within these bounds, so that no early step can overflow e^logvar. */
+#define LOGVAR_MIN (-12.0f)
+#define LOGVAR_MAX 6.0f
+
+size_t loss_carve(const Network *network, int rows, int mirrored, float *block, LossChunk *chunk) {
+    const PolicyDef *def = &network->def;
+    const Mlp *const mlps[] = {&network->encoder, &network->decoder, &network->modulation, &network->actor,
+                               &network->critic};
+    size_t used = 0, n = (size_t)rows, all = (size_t)(rows + mirrored), widest = 0;
+    for (int i = 0; i < NETWORK_MLPS; i++) {
+        size_t width = (size_t)mlp_widest(mlps[i]);
+        widest = width > widest ? width : widest;
+    }
+    struct {
+        float **at;
+        size_t count;
+    } areas[] = {
+        {&chunk->history, all * (size_t)network->history},
+        {&chunk->estimate, n * (size_t)def->estimates},
+        {&chunk->clean, n * (size_t)def->observation},
+        {&chunk->noise, n * (size_t)def->latent},
+        {&chunk->action, n * (size_t)def->actions},
+        {&chunk->old_mean, n * (size_t)def->actions},
+        {&chunk->old_log_prob, n},
+        {&chunk->advantage, n},
+        {&chunk->critic, n * (size_t)def->critic_input},
+        {&chunk->old_value, n},
+        {&chunk->returns, n},
+        {&chunk->decoder_input, n * (size_t)network->decoder_input},
+        {&chunk->spread, n * (size_t)def->latent},
+        {&chunk->d_mean, all * (size_t)def->actions},
+        {&chunk->d_heads, all * (size_t)network->heads},
+        {&chunk->d_theta, all * (size_t)network->theta},
+        {&chunk->d_actor_input, all * (size_t)(def->estimates + def->latent)},
+        {&chunk->d_feet, all * (size_t)def->feet_velocity_count},
+        {&chunk->d_decoded, n * (size_t)def->observation},
+        {&chunk->d_decoder_input, n * (size_t)network->decoder_input},
+        {&chunk->d_value, n},
+        {&chunk->work[0], all * widest},
+        {&chunk->work[1], all * widest},
+    };
+    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
+        *areas[i].at = mlp_carve(block, &used, areas[i].count);
+    }
+    network_carve(network, rows + mirrored, block, &used, &chunk->outputs);
+    mlp_carve_outputs(&network->decoder, rows, block, &used, &chunk->decoder);
+    mlp_carve_outputs(&network->critic, rows, block, &used, &chunk->value);
+    return used;
+}
+
+void loss_mirror_row(const LossContext *context, LossChunk *chunk, int from, int to) {
+    const int observation = context->network->def.observation, width = context->network->history;
+    const int *index = context->mirror->observation_index;
+    const float *sign = context->mirror->observation_sign;
+    const float *o = chunk->history + (int64_t)from * width;
+    float *m = chunk->history + (int64_t)to * width;
+    for (int f = 0; f < width; f += observation) {
+        for (int i = 0; i < observation; i++) {
+            m[f + i] = sign[i] * o[f + index[i]];
+        }
+    }
+}
+
+float loss_log_prob(int actions, const float *action, const float *mean, const float *std) {
+    double sum = 0.0;
+    for (int j = 0; j < actions; j++) {
+        double t = ((double)action[j] - mean[j]) / std[j];
+        sum -= 0.5 * t * t + log(std[j]) + HALF_LOG_2PI;
+    }
+    return (float)sum;
+}
+
+/* Clipped surrogate of one sample, -min(r A, clip(r) A), r = exp(log_prob - old_log_prob). Gradient:
+ *   d/dlog_prob = -A r where the first branch is the smaller one, else 0;
+ *   dlog_prob/dmean = (a - mean)/std^2,  dlog_prob/dlog_std = ((a - mean)/std)^2 - 1. */
+static void surrogate_row(const LossContext *c, const LossChunk *chunk, int r, const float *constant, const float *mean,
+                          float *d_mean, float *d_log_std, LossSums *sums) {
+    const int actions = c->network->def.actions;
+    const float *action = chunk->action + (int64_t)r * actions, *old_mean = chunk->old_mean + (int64_t)r * actions;
+    const float *inverse = constant;
+    float log_prob = constant[actions], kl = constant[actions + 1];
+    float t[NETWORK_ACTIONS_MAX];
+    for (int j = 0; j < actions; j++) {
+        t[j] = (action[j] - mean[j]) * inverse[j];
+        log_prob -= 0.5f * t[j] * t[j];
+        float shift = (old_mean[j] - mean[j]) * inverse[j];
+        kl += 0.5f * shift * shift;
+    }
+    const float clip = (float)c->def->clip, advantage = chunk->advantage[r];
+    float ratio = expf(log_prob - chunk->old_log_prob[r]);
+    float held = fminf(fmaxf(ratio, 1.0f - clip), 1.0f + clip);
+    float free_term = ratio * advantage, held_term = held * advantage;
+    float d_log_prob = free_term <= held_term ? -free_term * c->sample_weight * (float)(1.0 - c->def->epsilon) : 0.0f;
+    for (int j = 0; j < actions; j++) {
+        d_mean[j] = d_log_prob * t[j] * inverse[j];
+        d_log_std[j] += d_log_prob * (t[j] * t[j] - 1.0f);
+    }
+    sums->surrogate -= free_term <= held_term || isnan(free_term) ? free_term : held_term;
+    sums->clipped += ratio != held;
+    sums->kl += kl;
+}
+
+/* What surrogate_row needs and no sample changes: 1/std, then the constants of log_prob and of
+ * KL(old || new) = sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
+static void surrogate_constants(const LossContext *c, float *constant) {
+    const int actions = c->network->def.actions;
+    double log_prob = 0.0, kl = 0.0;
+    for (int j = 0; j < actions; j++) {
+        double ratio = (double)c->old_std[j] / c->std[j];
+        constant[j] = 1.0f / c->std[j];
+        log_prob -= log(c->std[j]) + HALF_LOG_2PI;
+        kl += 0.5 * ratio * ratio - 0.5 - log(ratio);
+    }
+    constant[actions] = (float)log_prob;
+    constant[actions + 1] = (float)kl;
+}
+
+/* Surrogate and entropy sum log std: writes d_mean of the samples and the gradient of log std. */
+static void policy_loss(const LossContext *c, LossChunk *chunk, const float *mean, float *d_log_std, float beta,
+                        LossSums *sums) {
+    const int actions = c->network->def.actions;
+    float constant[NETWORK_ACTIONS_MAX + 2];
+    surrogate_constants(c, constant);
+    float entropy_share = (float)((1.0 - c->def->epsilon) * c->def->entropy) * c->sample_weight * (float)chunk->rows;
+    for (int j = 0; j < actions; j++) {
+        d_log_std[j] = beta * d_log_std[j] - entropy_share;
+    }
+    for (int r = 0; r < chunk->rows; r++) {
+        surrogate_row(c, chunk, r, constant, mean + (int64_t)r * actions, chunk->d_mean + (int64_t)r * actions,
+                      d_log_std, sums);
+    }
+}
+
+/* mean over samples and actions of (mean(o) - M_a mean(M_o o))^2, gradient through both: either side may be the better one. */
+static void mirror_loss(const LossContext *c, LossChunk *chunk, const float *mean, LossSums *sums) {
+    const int actions = c->network->def.actions;
+    const float weight = 2.0f * (float)c->def->mirror_weight * c->mirror_weight / (float)actions;
+    const float *image = mean + (int64_t)chunk->rows * actions;
+    float *d_mean = chunk->d_mean, *d_image = chunk->d_mean + (int64_t)chunk->rows * actions;
+    memset(d_image, 0, (size_t)chunk->mirrored * (size_t)actions * sizeof *d_image);
+    for (int r = 0; r < chunk->mirrored; r++) {
+        float sum = 0.0f;
+        for (int j = 0; j < actions; j++) {
+            int k = c->mirror->action_index[j];
+            float sign = c->mirror->action_sign[j], gap = mean[j] - sign * image[k];
+            sum += gap * gap;
+            d_mean[j] += weight * gap;
+            d_image[k] -= weight * sign * gap;
+        }
+        sums->mirror += (double)sum / actions;
+        mean += actions, image += actions, d_mean += actions, d_image += actions;
+    }
+}
+
+static float held_logvar(float logvar) {
+    return logvar < LOGVAR_MIN ? LOGVAR_MIN : logvar > LOGVAR_MAX ? LOGVAR_MAX : logvar;
+}
+
+/* z = mu + exp(logvar/2) noise; decoder input [z | estimates]. */
+static void sample_latent(const LossContext *c, LossChunk *chunk, const float *heads) {
+    const int latent = c->network->def.latent, estimates = c->network->def.estimates;
+    float *input = chunk->decoder_input, *spread = chunk->spread;
+    const float *noise = chunk->noise;
+    for (int r = 0; r < chunk->rows; r++) {
+        const float *mu = heads + estimates, *logvar = mu + latent;
+#pragma omp simd
+        for (int j = 0; j < latent; j++) {
+            spread[j] = vector_exp(0.5f * held_logvar(logvar[j]));
+            input[j] = mu[j] + spread[j] * noise[j];
+        }
+        memcpy(input + latent, heads, (size_t)estimates * sizeof *input);
+        heads += c->network->heads, input += c->network->decoder_input, spread += latent, noise += latent;
+    }
+}
+
+/* MSE(o, decoded): mean over samples and over the frame. */
+static void reconstruction_loss(const LossContext *c, LossChunk *chunk, const float *decoded, LossSums *sums) {
+    const int width = c->network->def.observation;
+    const float weight = 2.0f * (float)c->def->epsilon * c->sample_weight / (float)width;
+    const float *clean = chunk->clean;
+    float *d = chunk->d_decoded;
+    for (int r = 0; r < chunk->rows; r++, decoded += width, clean += width, d += width) {
+        float sum = 0.0f;
+#pragma omp simd reduction(+ : sum)
+        for (int j = 0; j < width; j++) {
+            float gap = decoded[j] - clean[j];
+            sum += gap * gap;
+            d[j] = weight * gap;
+        }
+        sums->reconstruction += (double)sum / width;
+    }
+}
+
+/* MSE of each group of estimates; adds to d (row of the heads' gradient). */
+static void estimate_row(const LossContext *c, const float *estimate, const float *target, float *d, LossSums *sums) {
+    const PolicyDef *def = &c->network->def;
+    const int ends[LOSS_GROUPS + 1] = {0, def->feet_velocity_offset,
+                                       def->feet_velocity_offset + def->feet_velocity_count, def->estimates};
+    for (int g = 0; g < LOSS_GROUPS; g++) {
+        int width = ends[g + 1] - ends[g];
+        if (width == 0) {
+            continue;
+        }
+        float sum = 0.0f, weight = 2.0f * (float)c->def->epsilon * c->sample_weight / (float)width;
+        for (int j = ends[g]; j < ends[g + 1]; j++) {
+            float gap = estimate[j] - target[j];
+            sum += gap * gap;
+            d[j] += weight * gap;
+        }
+        sums->estimate[g] += (double)sum / width;
+    }
+}
+
+/* KL(N(mu, e^lv) || N(0, I)) = -1/2 sum (1 + lv - mu^2 - e^lv), and the decoder's gradient through the sampled z. Outside
+ * its bounds the log-variance feels only a gradient that leads back inside. */
+static void latent_row(const LossContext *c, const float *mu, const float *logvar, const float *spread,
+                       const float *noise, const float *d_z, float *d_mu, float *d_logvar, LossSums *sums) {
+    const int latent = c->network->def.latent;
+    const float weight = (float)(c->def->epsilon * c->def->kl_weight) * c->sample_weight;
+    float sum = 0.0f;
+#pragma omp simd reduction(+ : sum)
+    for (int j = 0; j < latent; j++) {
+        float held = held_logvar(logvar[j]), variance = spread[j] * spread[j];
+        sum += mu[j] * mu[j] + variance - 1.0f - held;
+        d_mu[j] += d_z[j] + weight * mu[j];
+        float d = 0.5f * (d_z[j] * spread[j] * noise[j] + weight * (variance - 1.0f));
+        float outward = (logvar[j] - held) * d;
+        d_logvar[j] = outward < 0.0f ? 0.0f : d;
+    }
+    sums->vae_kl += 0.5 * (double)sum;
+}
+
+/* Back through z~ = theta1 mu + theta2: d_heads (estimates and mu; logvar 0) and d_theta. */
+static void modulation_backward(const LossContext *c, LossChunk *chunk, int all, const float *heads) {
+    const Network *n = c->network;
+    const int estimates = n->def.estimates, latent = n->def.latent, per_dimension = n->def.modulation_per_dimension;
+    const float *theta = network_theta(n, &chunk->outputs), *d_input = chunk->d_actor_input;
+    float *d_heads = chunk->d_heads, *d_theta = chunk->d_theta;
+    memset(d_theta, 0, (size_t)all * (size_t)n->theta * sizeof *d_theta);
+    for (int r = 0; r < all; r++) {
+        const float *mu = heads + estimates, *d_latent = d_input + estimates;
+        memcpy(d_heads, d_input, (size_t)estimates * sizeof *d_heads);
+        for (int j = 0; j < latent; j++) {
+            d_heads[estimates + j] = d_latent[j] * theta[per_dimension ? j : 0];
+            d_heads[estimates + latent + j] = 0.0f;
+            d_theta[per_dimension ? j : 0] += d_latent[j] * mu[j];
+            d_theta[per_dimension ? latent + j : 1] += d_latent[j];
+        }
+        heads += n->heads, d_heads += n->heads, theta += n->theta, d_theta += n->theta, d_input += estimates + latent;
+    }
+}
+
+/* Regression part of the heads' gradient, and the modulation's through the estimated feet velocities. */
+static void heads_backward(const LossContext *c, LossChunk *chunk, int all, const float *heads, LossSums *sums) {
+    const Network *n = c->network;
+    const int estimates = n->def.estimates, latent = n->def.latent, feet = n->def.feet_velocity_count;
+    for (int r = 0; r < all; r++) {
+        float *d = chunk->d_heads + (int64_t)r * n->heads;
+        for (int j = 0; j < feet; j++) {
+            d[n->def.feet_velocity_offset + j] += chunk->d_feet[(int64_t)r * feet + j];
+        }
+    }
+    for (int r = 0; r < chunk->rows; r++, heads += n->heads) {
+        float *d = chunk->d_heads + (int64_t)r * n->heads;
+        const float *d_input = chunk->d_decoder_input + (int64_t)r * n->decoder_input;
+        for (int j = 0; j < estimates; j++) {
+            d[j] += d_input[latent + j];
+        }
+        estimate_row(c, heads, chunk->estimate + (int64_t)r * estimates, d, sums);
+        latent_row(c, heads + estimates, heads + estimates + latent, chunk->spread + (int64_t)r * latent,
+                   chunk->noise + (int64_t)r * latent, d_input, d + estimates, d + estimates + latent, sums);
+    }
+}
+
+void loss_actor(const LossContext *c, LossChunk *chunk, float *gradient, float beta, LossSums *sums) {
+    const Network *n = c->network;
+    const PolicyDef *def = &n->def;
+    const int all = chunk->rows + chunk->mirrored;
+    NetworkOutputs *out = &chunk->outputs;
+    const float *mean = network_forward(n, c->parameters, all, chunk->history, out);
+    const float *heads = network_heads(n, out);
+    sample_latent(c, chunk, heads);
+    const float *decoded =
+        mlp_forward(&n->decoder, c->parameters, chunk->rows, chunk->decoder_input, n->decoder_input, &chunk->decoder);
+
+    policy_loss(c, chunk, mean, gradient + n->log_std, beta, sums);
+    if (chunk->mirrored > 0) {
+        mirror_loss(c, chunk, mean, sums);
+    }
+    reconstruction_loss(c, chunk, decoded, sums);
+
+    mlp_backward(&n->decoder, c->parameters, chunk->rows, chunk->decoder_input, n->decoder_input, &chunk->decoder,
+                 chunk->d_decoded, chunk->work, gradient, beta,
+                 (MlpInputGradient){chunk->d_decoder_input, 0, n->decoder_input});
+    mlp_backward(&n->actor, c->parameters, all, out->actor_input, n->actor_input, &out->actor, chunk->d_mean,
+                 chunk->work, gradient, beta,
+                 (MlpInputGradient){chunk->d_actor_input, def->observation, def->estimates + def->latent});
+    modulation_backward(c, chunk, all, heads);
+    mlp_backward(&n->modulation, c->parameters, all, heads + def->feet_velocity_offset, n->heads, &out->modulation,
+                 chunk->d_theta, chunk->work, gradient, beta,
+                 (MlpInputGradient){chunk->d_feet, 0, def->feet_velocity_count});
+    heads_backward(c, chunk, all, heads, sums);
+    mlp_backward(&n->encoder, c->parameters, all, chunk->history, n->history, &out->encoder, chunk->d_heads,
+                 chunk->work, gradient, beta, (MlpInputGradient){0});
+}
+
+/* Value loss max((V - R)^2, (V_old + clip(V - V_old) - R)^2); where the clipped branch is the larger one, its gradient is
+ * that of V inside the clip range and 0 outside. */
+void loss_critic(const LossContext *c, LossChunk *chunk, float *gradient, float beta, LossSums *sums) {
+    const Network *n = c->network;
+    const float *value =
+        mlp_forward(&n->critic, c->parameters, chunk->rows, chunk->critic, n->def.critic_input, &chunk->value);
+    const float clip = (float)c->def->clip;
+    const float weight = 2.0f * (float)((1.0 - c->def->epsilon) * c->def->value_weight) * c->sample_weight;
+    for (int r = 0; r < chunk->rows; r++) {
+        float gap = value[r] - chunk->returns[r], move = value[r] - chunk->old_value[r];
+        float held_move = move < -clip ? -clip : move > clip ? clip : move;
+        float held_gap = chunk->old_value[r] + held_move - chunk->returns[r];
+        int held = c->def->clip_value && held_gap * held_gap > gap * gap;
+        float used = held ? held_gap : gap;
+        sums->value += (double)used * used;
+        chunk->d_value[r] = held && held_move != move ? 0.0f : weight * used;
+    }
+    mlp_backward(&n->critic, c->parameters, chunk->rows, chunk->critic, n->def.critic_input, &chunk->value,
+                 chunk->d_value, chunk->work, gradient, beta, (MlpInputGradient){0});
+}

@@ -1,0 +1,193 @@
+#include "learn/policy.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "learn/policy_private.h"
+#include "learn/product.h"
+
+/* Rows go through the networks in chunks of this many, and chunks are dealt to this many pieces of work, each with its own
+ * scratch: neither depends on the number of threads. */
+#define POLICY_CHUNK 128
+#define POLICY_SLOTS 16
+
+PolicyDef policy_def_default(void) {
+    return (PolicyDef){
+        .observation = 47,
+        .frames = 6,
+        .critic_input = 98,
+        .actions = 12,
+        .estimates = 11,
+        .feet_velocity_offset = 3,
+        .feet_velocity_count = 6,
+        .latent = 16,
+        .encoder_hidden = {256, 128},
+        .decoder_hidden = {64, 128},
+        .modulation_hidden = 32,
+        .modulation_per_dimension = 0,
+        .actor_hidden = {512, 256, 128},
+        .critic_hidden = {768, 256, 128},
+        .init_std = 0.8,
+    };
+}
+
+const MildField policy_fields[] = {
+    MILD_FIELD(PolicyDef, latent, MILD_FIELD_INT, 1, 1, 1024, "[-] width of the latent z"),
+    MILD_FIELD(PolicyDef, encoder_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
+               "[-] widths of the encoder's hidden layers, 0 ends the list"),
+    MILD_FIELD(PolicyDef, decoder_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
+               "[-] widths of the decoder's hidden layers, 0 ends the list"),
+    MILD_FIELD(PolicyDef, modulation_hidden, MILD_FIELD_INT, 1, 1, 8192, "[-] width of the modulation's hidden layer"),
+    MILD_FIELD(PolicyDef, modulation_per_dimension, MILD_FIELD_BOOL, 1, 0, 1,
+               "[-] theta1, theta2 per latent dimension instead of scalars"),
+    MILD_FIELD(PolicyDef, actor_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
+               "[-] widths of the actor's hidden layers, 0 ends the list"),
+    MILD_FIELD(PolicyDef, critic_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
+               "[-] widths of the critic's hidden layers, 0 ends the list"),
+    MILD_FIELD(PolicyDef, init_std, MILD_FIELD_DOUBLE, 1, 1e-3, 10.0,
+               "[-] initial standard deviation of the action noise"),
+};
+const int policy_field_count = (int)(sizeof policy_fields / sizeof *policy_fields);
+
+static size_t carve_slot(const Network *network, float *block, NetworkOutputs *outputs, MlpOutputs *critic) {
+    size_t act = 0, value = 0;
+    network_carve(network, POLICY_CHUNK, block, &act, outputs);
+    mlp_carve_outputs(&network->critic, POLICY_CHUNK, block, &value, critic);
+    return act > value ? act : value;
+}
+
+static void *aligned_floats(size_t count) {
+    return aligned_alloc(64, (count * sizeof(float) + 63) / 64 * 64);
+}
+
+Policy *policy_create(const PolicyDef *def, uint64_t seed, MildError *error) {
+    Network network;
+    if (network_layout(&network, def, error)) {
+        return NULL;
+    }
+    NetworkOutputs outputs;
+    MlpOutputs critic;
+    size_t slot_floats = carve_slot(&network, NULL, &outputs, &critic);
+    Policy *policy = calloc(1, sizeof *policy);
+    if (policy) {
+        policy->network = network;
+        policy->slot_floats = slot_floats;
+        policy->parameters = aligned_floats((size_t)network.count);
+        policy->std = aligned_floats((size_t)def->actions);
+        policy->scratch = aligned_floats(POLICY_SLOTS * slot_floats);
+    }
+    if (!policy || !policy->parameters || !policy->std || !policy->scratch) {
+        policy_destroy(policy);
+        mild_fail(error, MILD_ERROR_MEMORY, "no memory for a policy of %lld parameters", (long long)network.count);
+        return NULL;
+    }
+    network_initialise(&policy->network, policy->parameters, seed);
+    return policy;
+}
+
+void policy_destroy(Policy *policy) {
+    if (policy) {
+        free(policy->parameters);
+        free(policy->std);
+        free(policy->scratch);
+        free(policy);
+    }
+}
+
+const PolicyDef *policy_def(const Policy *policy) {
+    return &policy->network.def;
+}
+
+int64_t policy_parameter_count(const Policy *policy) {
+    return policy->network.count;
+}
+
+float *policy_parameters(Policy *policy) {
+    return policy->parameters;
+}
+
+const float *policy_std(const Policy *policy) {
+    const float *log_std = policy->parameters + policy->network.log_std;
+    for (int i = 0; i < policy->network.def.actions; i++) {
+        policy->std[i] = expf(log_std[i]);
+    }
+    return policy->std;
+}
+
+typedef struct {
+    Policy *policy;
+    int rows, slots;
+    const float *input;
+    float *actions, *estimates, *latent, *values;
+} PolicyJob;
+
+static void act_chunk(const PolicyJob *job, int first, int rows, const NetworkOutputs *outputs) {
+    const Network *network = &job->policy->network;
+    const PolicyDef *def = &network->def;
+    const float *mean = network_forward(network, job->policy->parameters, rows,
+                                        job->input + (int64_t)first * network->history, outputs);
+    memcpy(job->actions + (int64_t)first * def->actions, mean, (size_t)rows * (size_t)def->actions * sizeof *mean);
+    const float *input = outputs->actor_input + def->observation;
+    for (int r = 0; r < rows; r++, input += network->actor_input) {
+        if (job->estimates) {
+            memcpy(job->estimates + (int64_t)(first + r) * def->estimates, input,
+                   (size_t)def->estimates * sizeof *input);
+        }
+        if (job->latent) {
+            memcpy(job->latent + (int64_t)(first + r) * def->latent, input + def->estimates,
+                   (size_t)def->latent * sizeof *input);
+        }
+    }
+}
+
+static void value_chunk(const PolicyJob *job, int first, int rows, const MlpOutputs *outputs) {
+    const Network *network = &job->policy->network;
+    int width = network->def.critic_input;
+    const float *value = mlp_forward(&network->critic, job->policy->parameters, rows,
+                                     job->input + (int64_t)first * width, width, outputs);
+    memcpy(job->values + first, value, (size_t)rows * sizeof *value);
+}
+
+static void run_slot(void *context, int slot, int thread) {
+    (void)thread;
+    const PolicyJob *job = context;
+    NetworkOutputs outputs;
+    MlpOutputs critic;
+    carve_slot(&job->policy->network, job->policy->scratch + (size_t)slot * job->policy->slot_floats, &outputs,
+               &critic);
+    int entered = product_enter();
+    for (int first = slot * POLICY_CHUNK; first < job->rows; first += job->slots * POLICY_CHUNK) {
+        int rows = job->rows - first < POLICY_CHUNK ? job->rows - first : POLICY_CHUNK;
+        if (job->values) {
+            value_chunk(job, first, rows, &critic);
+        } else {
+            act_chunk(job, first, rows, &outputs);
+        }
+    }
+    product_leave(entered);
+}
+
+static void run_job(PolicyJob *job, Pool *pool) {
+    int chunks = (job->rows + POLICY_CHUNK - 1) / POLICY_CHUNK;
+    job->slots = chunks < POLICY_SLOTS ? chunks : POLICY_SLOTS;
+    if (pool) {
+        pool_run(pool, job->slots, run_slot, job);
+    } else {
+        for (int slot = 0; slot < job->slots; slot++) {
+            run_slot(job, slot, 0);
+        }
+    }
+}
+
+void policy_act(Policy *policy, Pool *pool, int rows, const float *history, float *actions, float *estimates,
+                float *latent) {
+    PolicyJob job = {
+        .policy = policy, .rows = rows, .input = history, .actions = actions, .estimates = estimates, .latent = latent};
+    run_job(&job, pool);
+}
+
+void policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values) {
+    PolicyJob job = {.policy = policy, .rows = rows, .input = critic, .values = values};
+    run_job(&job, pool);
+}

@@ -1,0 +1,15 @@
+/* What the learner may see of a policy and its users may not. */
+#ifndef MILD_POLICY_PRIVATE_H
+#define MILD_POLICY_PRIVATE_H
+
+#include "learn/network.h"
+
+struct Policy {
+    Network network;
+    float *parameters; /* [network.count] */
+    float *std;        /* [actions] */
+    float *scratch;    /* POLICY_SLOTS areas of slot_floats */
+    size_t slot_floats;
+};
+
+#endif

@@ -1,0 +1,380 @@
+#include "learn/ppo.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/random.h"
+#include "learn/noise.h"
+#include "learn/ppo_private.h"
+
+PpoDef ppo_def_default(void) {
+    return (PpoDef){
+        .steps = 24,
+        .epochs = 4,
+        .minibatches = 4,
+        .gamma = 0.994,
+        .lambda = 0.9,
+        .clip = 0.2,
+        .entropy = 0.001,
+        .value_weight = 1.0,
+        .clip_value = 1,
+        .learning_rate = 1e-3,
+        .learning_rate_min = 1e-5,
+        .learning_rate_max = 2e-3,
+        .kl_target = 0.01,
+        .max_gradient_norm = 1.0,
+        .epsilon = 0.3,
+        .kl_weight = 0.001,
+        .mirror_weight = 1.0,
+        .mirror_share = 0.5,
+        .std_min = 0.05,
+    };
+}
+
+const MildField ppo_fields[] = {
+    MILD_FIELD(PpoDef, steps, MILD_FIELD_INT, 1, 1, 1024, "[-] rollout length per environment"),
+    MILD_FIELD(PpoDef, epochs, MILD_FIELD_INT, 1, 1, 64, "[-] passes over each rollout"),
+    MILD_FIELD(PpoDef, minibatches, MILD_FIELD_INT, 1, 1, 1024, "[-] optimiser steps per pass"),
+    MILD_FIELD(PpoDef, gamma, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] discount per policy step"),
+    MILD_FIELD(PpoDef, lambda, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] decay of generalised advantage estimation"),
+    MILD_FIELD(PpoDef, clip, MILD_FIELD_DOUBLE, 1, 0.01, 10.0,
+               "[-] clip range of the probability ratio, and of the value's move"),
+    MILD_FIELD(PpoDef, entropy, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] weight of the entropy bonus"),
+    MILD_FIELD(PpoDef, value_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0, "[-] weight of the value loss"),
+    MILD_FIELD(PpoDef, clip_value, MILD_FIELD_BOOL, 1, 0, 1, "[-] clip the value loss"),
+    MILD_FIELD(PpoDef, learning_rate, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] first learning rate"),
+    MILD_FIELD(PpoDef, learning_rate_min, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] least adapted learning rate"),
+    MILD_FIELD(PpoDef, learning_rate_max, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] greatest adapted learning rate"),
+    MILD_FIELD(PpoDef, kl_target, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[nat] divergence the learning rate aims at; 0 keeps the rate fixed"),
+    MILD_FIELD(PpoDef, max_gradient_norm, MILD_FIELD_DOUBLE, 1, 1e-6, 1e6,
+               "[-] the gradient is shortened to this norm"),
+    MILD_FIELD(PpoDef, epsilon, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] share of the regression loss in the joint loss"),
+    MILD_FIELD(PpoDef, kl_weight, MILD_FIELD_DOUBLE, 1, 0.0, 10.0,
+               "[-] weight of the latent's divergence from N(0, I)"),
+    MILD_FIELD(PpoDef, mirror_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0, "[-] weight of the mirror symmetry loss"),
+    MILD_FIELD(PpoDef, mirror_share, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] share of each minibatch that the mirror loss sees"),
+    MILD_FIELD(PpoDef, std_min, MILD_FIELD_DOUBLE, 1, 1e-4, 1.0, "[-] floor of the action noise's standard deviation"),
+};
+const int ppo_field_count = (int)(sizeof ppo_fields / sizeof *ppo_fields);
+
+/* Lays the batch into the block; NULL only counts bytes. */
+static size_t batch_layout(PpoBatch *b, const Network *n, char *block) {
+    const size_t samples = (size_t)b->steps * (size_t)b->envs, more = samples + (size_t)b->envs;
+    struct {
+        float **at;
+        size_t count;
+    } areas[] = {
+        {&b->history, more * (size_t)n->history},
+        {&b->critic, more * (size_t)n->def.critic_input},
+        {&b->target, more * (size_t)n->def.estimates},
+        {&b->clean, more * (size_t)n->def.observation},
+        {&b->action, samples * (size_t)n->def.actions},
+        {&b->mean, samples * (size_t)n->def.actions},
+        {&b->log_prob, samples},
+        {&b->reward, samples},
+        {&b->value, more},
+        {&b->advantage, samples},
+        {&b->returns, samples},
+    };
+    size_t used = 0;
+    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
+        *areas[i].at = mlp_carve((float *)(void *)block, &used, areas[i].count);
+    }
+    used *= sizeof(float);
+    uint8_t **flags[] = {&b->done, &b->timeout, &b->valid};
+    for (size_t i = 0; i < sizeof flags / sizeof *flags; i++, used += samples) {
+        *flags[i] = block ? (uint8_t *)block + used : NULL;
+    }
+    return used;
+}
+
+/* Allocates and counts; NULL when out of memory. */
+static void *take(Ppo *ppo, size_t bytes) {
+    bytes = (bytes + 63) / 64 * 64;
+    ppo->bytes += bytes;
+    return aligned_alloc(64, bytes);
+}
+
+static int take_mirror(Ppo *ppo, const PpoMirror *mirror) {
+    const PolicyDef *def = policy_def(ppo->policy);
+    const size_t observation = (size_t)def->observation, actions = (size_t)def->actions;
+    ppo->mirror_index = take(ppo, (observation + actions) * sizeof *ppo->mirror_index);
+    ppo->mirror_sign = take(ppo, (observation + actions) * sizeof *ppo->mirror_sign);
+    if (!ppo->mirror_index || !ppo->mirror_sign) {
+        return 0;
+    }
+    memcpy(ppo->mirror_index, mirror->observation_index, observation * sizeof *ppo->mirror_index);
+    memcpy(ppo->mirror_index + observation, mirror->action_index, actions * sizeof *ppo->mirror_index);
+    memcpy(ppo->mirror_sign, mirror->observation_sign, observation * sizeof *ppo->mirror_sign);
+    memcpy(ppo->mirror_sign + observation, mirror->action_sign, actions * sizeof *ppo->mirror_sign);
+    ppo->mirror = (PpoMirror){ppo->mirror_index, ppo->mirror_sign, ppo->mirror_index + observation,
+                              ppo->mirror_sign + observation};
+    ppo->mirror_rows = (int)(ppo->def.mirror_share * PPO_CHUNK + 0.5);
+    return 1;
+}
+
+static int take_all(Ppo *ppo, const PpoMirror *mirror) {
+    const Network *n = &ppo->policy->network;
+    const size_t count = (size_t)n->count, samples = (size_t)ppo->batch.steps * (size_t)ppo->batch.envs;
+    ppo->bytes = sizeof *ppo;
+    if (mirror && mirror->observation_index && ppo->def.mirror_weight > 0.0 && !take_mirror(ppo, mirror)) {
+        return 0;
+    }
+    LossChunk chunk;
+    ppo->stride = (count + 15) / 16 * 16;
+    ppo->scratch_floats = loss_carve(n, PPO_CHUNK, ppo->mirror_rows, NULL, &chunk);
+    size_t batch_bytes = batch_layout(&ppo->batch, n, NULL);
+    ppo->batch_block = take(ppo, batch_bytes);
+    ppo->gradient = take(ppo, PPO_SHARDS * ppo->stride * sizeof(float));
+    ppo->first = take(ppo, count * sizeof(float));
+    ppo->second = take(ppo, count * sizeof(float));
+    ppo->scratch = take(ppo, (size_t)pool_threads(ppo->pool) * ppo->scratch_floats * sizeof(float));
+    ppo->order = take(ppo, samples * sizeof *ppo->order);
+    if (!ppo->batch_block || !ppo->gradient || !ppo->first || !ppo->second || !ppo->scratch || !ppo->order) {
+        return 0;
+    }
+    memset(ppo->batch_block, 0, batch_bytes);
+    batch_layout(&ppo->batch, n, ppo->batch_block);
+    memset(ppo->batch.valid, 1, samples);
+    memset(ppo->first, 0, count * sizeof(float));
+    memset(ppo->second, 0, count * sizeof(float));
+    return 1;
+}
+
+static MildStatus check_mirror(const PolicyDef *def, const PpoMirror *mirror, MildError *error) {
+    for (int i = 0; mirror && mirror->observation_index && i < def->observation; i++) {
+        if (mirror->observation_index[i] < 0 || mirror->observation_index[i] >= def->observation) {
+            return mild_fail(error, MILD_ERROR_RANGE, "mirror: observation %d maps to %d of %d", i,
+                             mirror->observation_index[i], def->observation);
+        }
+    }
+    for (int i = 0; mirror && mirror->observation_index && i < def->actions; i++) {
+        if (mirror->action_index[i] < 0 || mirror->action_index[i] >= def->actions) {
+            return mild_fail(error, MILD_ERROR_RANGE, "mirror: action %d maps to %d of %d", i, mirror->action_index[i],
+                             def->actions);
+        }
+    }
+    return MILD_OK;
+}
+
+static MildStatus check_def(const PpoDef *def, int envs, MildError *error) {
+    MildStatus status = mild_fields_check(ppo_fields, ppo_field_count, def, "ppo", error);
+    if (status) {
+        return status;
+    }
+    if (envs < 1 || (int64_t)envs * def->steps > 1 << 28) {
+        return mild_fail(error, MILD_ERROR_RANGE, "%d environments of %d steps: between 1 and 2^28 samples can be held",
+                         envs, def->steps);
+    }
+    if (def->learning_rate_min > def->learning_rate_max) {
+        return mild_fail(error, MILD_ERROR_RANGE, "ppo.learning_rate_min = %g is above ppo.learning_rate_max = %g",
+                         def->learning_rate_min, def->learning_rate_max);
+    }
+    return MILD_OK;
+}
+
+Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror, int envs, uint64_t seed,
+                MildError *error) {
+    if (check_def(def, envs, error) || check_mirror(policy_def(policy), mirror, error)) {
+        return NULL;
+    }
+    Ppo *ppo = calloc(1, sizeof *ppo);
+    if (ppo) {
+        ppo->def = *def;
+        ppo->policy = policy;
+        ppo->pool = pool;
+        ppo->seed = seed;
+        ppo->learning_rate = def->learning_rate;
+        ppo->batch.steps = def->steps;
+        ppo->batch.envs = envs;
+    }
+    if (!ppo || !take_all(ppo, mirror)) {
+        mild_fail(error, MILD_ERROR_MEMORY, "no memory for a rollout of %d x %d samples; lower train.envs or ppo.steps",
+                  envs, def->steps);
+        ppo_destroy(ppo);
+        return NULL;
+    }
+    return ppo;
+}
+
+void ppo_destroy(Ppo *ppo) {
+    if (ppo) {
+        free(ppo->mirror_index);
+        free(ppo->mirror_sign);
+        free(ppo->batch_block);
+        free(ppo->gradient);
+        free(ppo->first);
+        free(ppo->second);
+        free(ppo->scratch);
+        free(ppo->order);
+        free(ppo);
+    }
+}
+
+PpoBatch *ppo_batch(Ppo *ppo) {
+    return &ppo->batch;
+}
+
+size_t ppo_bytes(const Ppo *ppo) {
+    return ppo->bytes;
+}
+
+int64_t ppo_iteration(const Ppo *ppo) {
+    return ppo->iteration;
+}
+
+void ppo_act(Ppo *ppo, int t) {
+    const Network *n = &ppo->policy->network;
+    PpoBatch *b = &ppo->batch;
+    const int actions = n->def.actions, envs = b->envs;
+    const int64_t first = (int64_t)t * envs;
+    float *mean = b->mean + first * actions, *action = b->action + first * actions;
+    policy_act(ppo->policy, ppo->pool, envs, b->history + first * n->history, mean, NULL, NULL);
+    Random key = random_at(ppo->seed, (uint32_t)ppo->iteration, (uint32_t)t);
+    noise_normal(random_bits(&key), 0, envs * actions, action);
+    const float *std = policy_std(ppo->policy);
+    for (int env = 0; env < envs; env++) {
+        for (int j = 0; j < actions; j++) {
+            action[env * actions + j] = mean[env * actions + j] + std[j] * action[env * actions + j];
+        }
+        b->log_prob[first + env] = loss_log_prob(actions, action + env * actions, mean + env * actions, std);
+    }
+}
+
+/* Fisher-Yates: a pure function of (seed, iteration, epoch). */
+static void shuffle(Ppo *ppo, int epoch) {
+    Random random = random_at(ppo->seed ^ 0x6f72646572u, (uint32_t)ppo->iteration, (uint32_t)epoch);
+    for (int i = ppo->samples - 1; i > 0; i--) {
+        int j = (int)random_index(&random, (uint32_t)i + 1u), held = ppo->order[i];
+        ppo->order[i] = ppo->order[j];
+        ppo->order[j] = held;
+    }
+}
+
+/* The rate that keeps the divergence from the rollout's policy near its target [vendor: factor 1.5]. */
+static void adapt_learning_rate(Ppo *ppo, double kl) {
+    const PpoDef *def = &ppo->def;
+    if (def->kl_target <= 0.0) {
+        return;
+    }
+    if (kl > 2.0 * def->kl_target) {
+        ppo->learning_rate /= 1.5;
+    } else if (kl > 0.0 && kl < 0.5 * def->kl_target) {
+        ppo->learning_rate *= 1.5;
+    }
+    ppo->learning_rate = fmin(fmax(ppo->learning_rate, def->learning_rate_min), def->learning_rate_max);
+}
+
+static double entropy_of(const LossContext *context) {
+    double entropy = 0.0;
+    for (int j = 0; j < context->network->def.actions; j++) {
+        entropy += log(context->std[j]) + 1.4189385332046727; /* (1 + ln 2 pi) / 2 */
+    }
+    return entropy;
+}
+
+/* Adds a minibatch's means to the report; 0 when one of them is not finite. */
+static int report_minibatch(PpoReport *report, const LossContext *context, const LossSums *s, double norm) {
+    const double w = context->sample_weight;
+    const double check = s->surrogate + s->kl + s->reconstruction + s->vae_kl + s->estimate[0] + s->estimate[1] +
+                         s->estimate[2] + s->mirror + s->value + norm;
+    if (!isfinite(check)) {
+        return 0;
+    }
+    report->surrogate += w * s->surrogate;
+    report->kl += w * s->kl;
+    report->clip_share += w * s->clipped;
+    report->vae_reconstruction += w * s->reconstruction;
+    report->vae_kl += w * s->vae_kl;
+    for (int g = 0; g < LOSS_GROUPS; g++) {
+        report->estimate_loss[g] += w * s->estimate[g];
+    }
+    report->mirror += context->mirror_weight * s->mirror;
+    report->value_loss += w * s->value;
+    report->entropy += entropy_of(context);
+    report->gradient_norm += norm;
+    return 1;
+}
+
+static int update_minibatch(Ppo *ppo, LossContext *context, const int *samples, int count, uint32_t draw,
+                            PpoReport *report) {
+    const int mirrored = ppo_mirrored(ppo, count);
+    context->sample_weight = 1.0f / (float)count;
+    context->mirror_weight = mirrored > 0 ? 1.0f / (float)mirrored : 0.0f;
+    memcpy(context->std, policy_std(ppo->policy), (size_t)context->network->def.actions * sizeof *context->std);
+    LossSums sums;
+    double norm;
+    ppo_gradient(ppo, context, samples, count, draw, &sums, &norm);
+    if (!report_minibatch(report, context, &sums, norm)) {
+        report->skipped++;
+        return 0;
+    }
+    adapt_learning_rate(ppo, sums.kl / count);
+    ppo_optimise(ppo, norm > ppo->def.max_gradient_norm ? ppo->def.max_gradient_norm / norm : 1.0);
+    return 1;
+}
+
+/* Sums over minibatches become means. */
+static void finish_report(const Ppo *ppo, PpoReport *report, int minibatches) {
+    const double w = minibatches > 0 ? 1.0 / minibatches : 0.0;
+    double *const means[] = {
+        &report->surrogate,        &report->value_loss,       &report->entropy,          &report->kl,
+        &report->clip_share,       &report->gradient_norm,    &report->mirror,           &report->vae_kl,
+        &report->estimate_loss[0], &report->estimate_loss[1], &report->estimate_loss[2], &report->vae_reconstruction};
+    for (size_t i = 0; i < sizeof means / sizeof *means; i++) {
+        *means[i] *= w;
+    }
+    const int actions = policy_def(ppo->policy)->actions;
+    const float *std = policy_std(ppo->policy);
+    for (int j = 0; j < actions; j++) {
+        report->action_std += (double)std[j] / actions;
+    }
+    report->learning_rate = ppo->learning_rate;
+}
+
+/* What the last step saw is what the next rollout starts from. */
+static void carry_over(Ppo *ppo) {
+    const Network *n = &ppo->policy->network;
+    PpoBatch *b = &ppo->batch;
+    const struct {
+        float *at;
+        int width;
+    } areas[] = {{b->history, n->history},
+                 {b->critic, n->def.critic_input},
+                 {b->target, n->def.estimates},
+                 {b->clean, n->def.observation}};
+    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
+        size_t floats = (size_t)b->envs * (size_t)areas[i].width;
+        memcpy(areas[i].at, areas[i].at + (size_t)b->steps * floats, floats * sizeof(float));
+    }
+}
+
+void ppo_update(Ppo *ppo, PpoReport *report) {
+    const Network *n = &ppo->policy->network;
+    PpoBatch *b = &ppo->batch;
+    *report = (PpoReport){0};
+    policy_value(ppo->policy, ppo->pool, (b->steps + 1) * b->envs, b->critic, b->value);
+    ppo_returns(ppo, report);
+
+    LossContext context = {.def = &ppo->def, .network = n, .parameters = ppo->policy->parameters};
+    context.mirror = ppo->mirror.observation_index ? &ppo->mirror : NULL;
+    memcpy(context.old_std, policy_std(ppo->policy), (size_t)n->def.actions * sizeof *context.old_std);
+    int done = 0;
+    for (int epoch = 0; epoch < ppo->def.epochs; epoch++) {
+        shuffle(ppo, epoch);
+        for (int m = 0; m < ppo->def.minibatches; m++) {
+            int begin = (int)((int64_t)ppo->samples * m / ppo->def.minibatches),
+                end = (int)((int64_t)ppo->samples * (m + 1) / ppo->def.minibatches);
+            if (begin < end) {
+                done += update_minibatch(ppo, &context, ppo->order + begin, end - begin,
+                                         (uint32_t)(epoch * ppo->def.minibatches + m), report);
+            }
+        }
+    }
+    finish_report(ppo, report, done);
+    carry_over(ppo);
+    ppo->iteration++;
+}

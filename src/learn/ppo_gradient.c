@@ -1,0 +1,192 @@
+#include <math.h>
+#include <string.h>
+
+#include "base/random.h"
+#include "learn/adam.h"
+#include "learn/noise.h"
+#include "learn/ppo_private.h"
+#include "learn/product.h"
+
+typedef struct {
+    Ppo *ppo;
+    const LossContext *loss;
+    const int *samples;
+    int count;
+    uint32_t draw;
+    LossSums sums[2 * PPO_SHARDS];
+    double squares[PPO_RANGES];
+} GradientJob;
+
+static int shard_begin(int count, int shard) {
+    return (int)((int64_t)count * shard / PPO_SHARDS);
+}
+
+static int chunk_mirrored(const Ppo *ppo, int rows) {
+    return ppo->mirror.observation_index ? (int)(ppo->def.mirror_share * rows + 0.5) : 0;
+}
+
+int ppo_mirrored(const Ppo *ppo, int count) {
+    int total = 0;
+    for (int s = 0; s < PPO_SHARDS; s++) {
+        int end = shard_begin(count, s + 1);
+        for (int at = shard_begin(count, s); at < end; at += PPO_CHUNK) {
+            total += chunk_mirrored(ppo, end - at < PPO_CHUNK ? end - at : PPO_CHUNK);
+        }
+    }
+    return total;
+}
+
+static void copy_row(float *to, int row, const float *from, int64_t sample, int width) {
+    memcpy(to + (int64_t)row * width, from + sample * width, (size_t)width * sizeof *to);
+}
+
+static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
+    const Ppo *ppo = job->ppo;
+    const Network *n = &ppo->policy->network;
+    const PpoBatch *b = &ppo->batch;
+    for (int r = 0; r < chunk->rows; r++) {
+        int64_t i = job->samples[at + r];
+        copy_row(chunk->history, r, b->history, i, n->history);
+        copy_row(chunk->estimate, r, b->target, i, n->def.estimates);
+        copy_row(chunk->clean, r, b->clean, i, n->def.observation);
+        copy_row(chunk->action, r, b->action, i, n->def.actions);
+        copy_row(chunk->old_mean, r, b->mean, i, n->def.actions);
+        chunk->old_log_prob[r] = b->log_prob[i];
+        chunk->advantage[r] = b->advantage[i];
+    }
+    for (int r = 0; r < chunk->mirrored; r++) {
+        loss_mirror_row(job->loss, chunk, r, chunk->rows + r);
+    }
+    Random key = random_at(ppo->seed ^ 0x76616573u, (uint32_t)ppo->iteration, job->draw);
+    noise_normal(random_bits(&key), 2 * (int64_t)at * n->def.latent, chunk->rows * n->def.latent, chunk->noise);
+}
+
+static void gather_critic(const GradientJob *job, int at, LossChunk *chunk) {
+    const PpoBatch *b = &job->ppo->batch;
+    const int width = job->ppo->policy->network.def.critic_input;
+    for (int r = 0; r < chunk->rows; r++) {
+        int64_t i = job->samples[at + r];
+        copy_row(chunk->critic, r, b->critic, i, width);
+        chunk->old_value[r] = b->value[i];
+        chunk->returns[r] = b->returns[i];
+    }
+}
+
+/* An empty shard's half of the gradient: nothing will overwrite what the last minibatch left there. */
+static void clear_half(const Network *n, int critic, float *gradient) {
+    if (critic) {
+        memset(gradient + n->critic_first, 0, (size_t)(n->log_std - n->critic_first) * sizeof *gradient);
+    } else {
+        memset(gradient, 0, (size_t)n->critic_first * sizeof *gradient);
+        memset(gradient + n->log_std, 0, (size_t)(n->count - n->log_std) * sizeof *gradient);
+    }
+}
+
+/* Pieces 0 .. PPO_SHARDS-1: the actor's half of a shard (the longer one, so it starts first); the rest: the critic's. */
+static void gradient_piece(void *context, int piece, int thread) {
+    GradientJob *job = context;
+    Ppo *ppo = job->ppo;
+    const Network *n = &ppo->policy->network;
+    const int critic = piece >= PPO_SHARDS, shard = piece % PPO_SHARDS;
+    float *gradient = ppo->gradient + (size_t)shard * ppo->stride;
+    LossChunk chunk;
+    loss_carve(n, PPO_CHUNK, ppo->mirror_rows, ppo->scratch + (size_t)thread * ppo->scratch_floats, &chunk);
+    int entered = product_enter(), begin = shard_begin(job->count, shard), end = shard_begin(job->count, shard + 1);
+    if (begin == end) {
+        clear_half(n, critic, gradient);
+    }
+    for (int at = begin; at < end; at += PPO_CHUNK) {
+        chunk.rows = end - at < PPO_CHUNK ? end - at : PPO_CHUNK;
+        chunk.mirrored = chunk_mirrored(ppo, chunk.rows);
+        float beta = at == begin ? 0.0f : 1.0f;
+        if (critic) {
+            gather_critic(job, at, &chunk);
+            loss_critic(job->loss, &chunk, gradient, beta, &job->sums[piece]);
+        } else {
+            gather_actor(job, at, &chunk);
+            loss_actor(job->loss, &chunk, gradient, beta, &job->sums[piece]);
+        }
+    }
+    product_leave(entered);
+}
+
+static int64_t range_begin(int64_t count, int range) {
+    return range >= PPO_RANGES ? count : count * range / PPO_RANGES / 16 * 16;
+}
+
+/* Sum of the shards into shard 0 over a range, and that range's share of the squared norm. */
+static void reduce_piece(void *context, int range, int thread) {
+    (void)thread;
+    GradientJob *job = context;
+    const Ppo *ppo = job->ppo;
+    int64_t begin = range_begin(ppo->policy->network.count, range),
+            end = range_begin(ppo->policy->network.count, range + 1);
+    float *restrict sum = ppo->gradient;
+    const float *g = ppo->gradient;
+    const size_t s = ppo->stride;
+    double squares = 0.0;
+    _Static_assert(PPO_SHARDS == 8, "the sum below names every shard");
+#pragma omp simd reduction(+ : squares)
+    for (int64_t i = begin; i < end; i++) {
+        const size_t k = (size_t)i;
+        float x = ((sum[k] + g[s + k]) + (g[2 * s + k] + g[3 * s + k])) +
+                  ((g[4 * s + k] + g[5 * s + k]) + (g[6 * s + k] + g[7 * s + k]));
+        sum[k] = x;
+        squares += (double)x * x;
+    }
+    job->squares[range] = squares;
+}
+
+static void add_sums(LossSums *to, const LossSums *from) {
+    to->surrogate += from->surrogate;
+    to->kl += from->kl;
+    to->clipped += from->clipped;
+    to->reconstruction += from->reconstruction;
+    to->vae_kl += from->vae_kl;
+    for (int g = 0; g < LOSS_GROUPS; g++) {
+        to->estimate[g] += from->estimate[g];
+    }
+    to->mirror += from->mirror;
+    to->value += from->value;
+}
+
+void ppo_gradient(Ppo *ppo, const LossContext *context, const int *samples, int count, uint32_t draw, LossSums *sums,
+                  double *norm) {
+    GradientJob job = {.ppo = ppo, .loss = context, .samples = samples, .count = count, .draw = draw};
+    pool_run(ppo->pool, 2 * PPO_SHARDS, gradient_piece, &job);
+    pool_run(ppo->pool, PPO_RANGES, reduce_piece, &job);
+    *sums = (LossSums){0};
+    for (int piece = 0; piece < 2 * PPO_SHARDS; piece++) {
+        add_sums(sums, &job.sums[piece]);
+    }
+    double squares = 0.0;
+    for (int range = 0; range < PPO_RANGES; range++) {
+        squares += job.squares[range];
+    }
+    *norm = sqrt(squares);
+}
+
+typedef struct {
+    Ppo *ppo;
+    AdamStep step;
+} OptimiseJob;
+
+static void optimise_piece(void *context, int range, int thread) {
+    (void)thread;
+    const OptimiseJob *job = context;
+    const Ppo *ppo = job->ppo;
+    int64_t begin = range_begin(ppo->policy->network.count, range),
+            end = range_begin(ppo->policy->network.count, range + 1);
+    adam_apply(job->step, end - begin, ppo->gradient + begin, ppo->policy->parameters + begin, ppo->first + begin,
+               ppo->second + begin);
+}
+
+void ppo_optimise(Ppo *ppo, double gradient_scale) {
+    OptimiseJob job = {ppo, adam_step(ppo->learning_rate, ++ppo->adam_steps, gradient_scale)};
+    pool_run(ppo->pool, PPO_RANGES, optimise_piece, &job);
+    const Network *n = &ppo->policy->network;
+    float floor = (float)log(ppo->def.std_min);
+    for (int64_t i = n->log_std; i < n->count; i++) {
+        ppo->policy->parameters[i] = fmaxf(ppo->policy->parameters[i], floor);
+    }
+}

@@ -1,0 +1,49 @@
+/* The learner's insides, shared by its files and their tests. */
+#ifndef MILD_PPO_PRIVATE_H
+#define MILD_PPO_PRIVATE_H
+
+#include "learn/loss.h"
+#include "learn/policy_private.h"
+#include "learn/ppo.h"
+
+/* A minibatch is cut into PPO_SHARDS equal runs of samples, each with its own gradient, and a shard into chunks; sums go
+ * in the order of shards. None of this depends on the number of threads. */
+#define PPO_SHARDS 8
+#define PPO_CHUNK 256
+#define PPO_RANGES 64 /* pieces of the parameter arrays in reduction and optimiser */
+
+struct Ppo {
+    PpoDef def;
+    Policy *policy;
+    Pool *pool;
+    PpoMirror mirror; /* into mirror_block; observation_index NULL: none */
+    int *mirror_index;
+    float *mirror_sign;
+    uint64_t seed;
+    PpoBatch batch;
+    int64_t iteration, adam_steps;
+    double learning_rate;
+    void *batch_block;
+    float *gradient; /* [PPO_SHARDS][stride]; the sum ends in shard 0 */
+    size_t stride;
+    float *first, *second; /* Adam's moments */
+    float *scratch;        /* [threads][scratch_floats] */
+    size_t scratch_floats;
+    int mirror_rows; /* images per full chunk */
+    int *order;      /* [steps * envs] the valid samples, shuffled every epoch */
+    int samples;     /* how many of them */
+    size_t bytes;
+};
+
+/* Generalised advantage estimation from batch->value; fills advantage (normalised over the valid samples), returns, and
+ * ppo->order with the valid samples. */
+void ppo_returns(Ppo *ppo, PpoReport *report);
+
+/* Gradient of the loss over `count` samples into ppo->gradient (shard 0), its norm, and the sums. */
+void ppo_gradient(Ppo *ppo, const LossContext *context, const int *samples, int count, uint32_t draw, LossSums *sums,
+                  double *norm);
+/* Samples of the minibatch that get a mirror image. */
+int ppo_mirrored(const Ppo *ppo, int count);
+void ppo_optimise(Ppo *ppo, double gradient_scale);
+
+#endif
