@@ -85,7 +85,7 @@ static double reward_default_pose(const TaskMotion *m) {
 }
 
 static double reward_base_height(const TaskMotion *m) {
-    return exp(-100 * fabs(m->base_height - m->def->reward.base_height));
+    return exp(-100 * fabs(m->base_height - m->def->reward.nominal_height));
 }
 
 static double within(double distance, const double limits[2]) {
@@ -94,11 +94,11 @@ static double within(double distance, const double limits[2]) {
 }
 
 static double reward_feet_distance(const TaskMotion *m) {
-    return within(m->foot_distance, m->def->reward.feet_distance);
+    return within(m->foot_distance, m->def->reward.feet_range);
 }
 
 static double reward_knee_distance(const TaskMotion *m) {
-    return within(m->knee_distance, m->def->reward.knee_distance);
+    return within(m->knee_distance, m->def->reward.knee_range);
 }
 
 static double reward_orientation(const TaskMotion *m) {

@@ -34,11 +34,11 @@ TaskDef task_def_default(void) {
         .tilt_limit = 1.0,
         .newton = 1,
         .reward = {.clip_sum = 1,
-                   .base_height = 0.83,
+                   .nominal_height = 0.83,
                    .clearance_sharpness = 20,
                    .tracking_sharpness = 5,
-                   .feet_distance = {0.13, 0.26},
-                   .knee_distance = {0.12, 0.26},
+                   .feet_range = {0.13, 0.26},
+                   .knee_range = {0.12, 0.26},
                    .reference_amplitude = 0.26},
         .randomize = {.rigid_share = 0.1,
                       .preset_share = 0.5,
@@ -130,11 +130,11 @@ const int task_field_count = sizeof task_fields / sizeof *task_fields;
 const MildField reward_fields[] = {
     TASK_REWARD_LIST(TASK_REWARD_FIELD)
     R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
-    R(base_height, D, 1, 0.1, 2, "[m] nominal base height above the stance soles"),
+    R(nominal_height, D, 1, 0.1, 2, "[m] nominal base height above the stance soles"),
     R(clearance_sharpness, D, 1, 0, 1000, "[1/m] of feet_clearance"),
     R(tracking_sharpness, D, 1, 0, 100, "[s^2/m^2] of linear_velocity and yaw_rate"),
-    R(feet_distance, D, 2, 0, 1, "[m] limits of the lateral distance of the feet"),
-    R(knee_distance, D, 2, 0, 1, "[m] limits of the lateral distance of the knees"),
+    R(feet_range, D, 2, 0, 1, "[m] limits of the lateral distance of the feet"),
+    R(knee_range, D, 2, 0, 1, "[m] limits of the lateral distance of the knees"),
     R(reference_amplitude, D, 1, 0, 1, "[rad] of reference_motion"),
 };
 const int reward_field_count = sizeof reward_fields / sizeof *reward_fields;
@@ -211,7 +211,7 @@ MildStatus task_def_check(const TaskDef *def, MildError *error) {
         {def->randomize.link_mass, "randomize.link_mass"}, {def->randomize.armature, "randomize.armature"},
         {def->randomize.gain, "randomize.gain"}, {def->randomize.strength, "randomize.strength"},
         {def->randomize.latency, "randomize.latency"}, {def->randomize.patch_length, "randomize.patch_length"},
-        {def->reward.feet_distance, "reward.feet_distance"}, {def->reward.knee_distance, "reward.knee_distance"},
+        {def->reward.feet_range, "reward.feet_range"}, {def->reward.knee_range, "reward.knee_range"},
     };
     for (size_t i = 0; status == MILD_OK && i < sizeof ranges / sizeof *ranges; i++) {
         status = check_range(ranges[i].range, ranges[i].name, error);

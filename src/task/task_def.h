@@ -36,10 +36,10 @@ enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };
 typedef struct {
     double weight[TASK_REWARD_COUNT]; /* [1/s] */
     int clip_sum;                     /* bool: the sum of a step is never below 0 (vendor) */
-    double base_height;               /* [m] nominal base height above the stance soles */
+    double nominal_height;            /* [m] nominal base height above the stance soles */
     double clearance_sharpness;       /* [1/m] */
     double tracking_sharpness;        /* [s^2/m^2] the 5 in the velocity terms */
-    double feet_distance[2], knee_distance[2]; /* [m] limits */
+    double feet_range[2], knee_range[2]; /* [m] limits */
     double reference_amplitude;       /* [rad] */
 } RewardDef;
 
