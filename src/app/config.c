@@ -1,6 +1,5 @@
 #include "app/config.h"
 
-#include <ctype.h>
 #include <errno.h>
 #include <ini.h>
 #include <stdlib.h>
@@ -87,16 +86,25 @@ static void reader_check_header(Reader *reader, const char *line) {
     }
 }
 
-/* fgets over the text. Indentation is dropped, for inih would take an indented line as more of the value before;
- * comment lines of any length become empty ones. */
+/* Characters of the line before its comment: "; ..." or "# ..." at its start or after a blank. */
+static size_t code_length(const char *line) {
+    size_t length = 0;
+    for (; line[length] && line[length] != '\n'; length++) {
+        int blank_before = length == 0 || line[length - 1] == ' ' || line[length - 1] == '\t';
+        if (blank_before && (line[length] == ';' || line[length] == '#')) break;
+    }
+    return length;
+}
+
+/* fgets over the text. Indentation is dropped, for inih would take an indented line as more of the value before. */
 static char *reader_line(char *buffer, int size, void *stream) {
     Reader *reader = stream;
     if (reader->status != MILD_OK || !*reader->rest) return NULL;
     reader->line++;
     const char *line = reader->rest + strspn(reader->rest, " \t\r");
-    size_t length = strcspn(line, "\n");
-    reader->rest = line[length] ? line + length + 1 : line + length;
-    if (*line == ';' || *line == '#') length = 0;
+    size_t length = code_length(line);
+    reader->rest = line + strcspn(line, "\n");
+    if (*reader->rest) reader->rest++;
     if ((int)length > size - 2) {
         char where[WHERE_MAX];
         reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: line longer than %d characters",

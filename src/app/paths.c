@@ -72,26 +72,29 @@ static int write_all(int file, const char *data, size_t size) {
     return 0;
 }
 
+/* Opens, writes, syncs, closes; returns 0 or the error number. */
+static int write_file(const char *path, int flags, const void *data, size_t size) {
+    int file = open(path, O_WRONLY | flags, 0666);
+    if (file < 0) return errno;
+    int failed = write_all(file, data, size) != 0 || (flags && fsync(file) != 0) ? errno : 0;
+    if (close(file) != 0 && !failed) failed = errno;
+    return failed;
+}
+
 MildStatus path_write(const char *path, const void *data, size_t size, MildError *error) {
     char temporary[PATH_SIZE];
     if (snprintf(temporary, sizeof temporary, "%s.tmp", path) >= (int)sizeof temporary) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", path);
     }
-    int file = open(temporary, O_WRONLY | O_CREAT | O_TRUNC, 0666);
-    if (file < 0) return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", path, strerror(errno));
-    int failed = write_all(file, data, size) != 0 || fsync(file) != 0;
-    int reason = errno;
-    if (close(file) != 0 && !failed) {
-        failed = 1;
-        reason = errno;
+    struct stat info;
+    int failed, device = stat(path, &info) == 0 && !S_ISREG(info.st_mode);
+    if (device) { /* /dev/stdout and pipes are written to, not replaced */
+        failed = write_file(path, 0, data, size);
+    } else {
+        failed = write_file(temporary, O_CREAT | O_TRUNC, data, size);
+        if (!failed && rename(temporary, path) != 0) failed = errno;
+        if (failed) unlink(temporary);
     }
-    if (!failed && rename(temporary, path) != 0) {
-        failed = 1;
-        reason = errno;
-    }
-    if (failed) {
-        unlink(temporary);
-        return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", path, strerror(reason));
-    }
+    if (failed) return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", path, strerror(failed));
     return MILD_OK;
 }

@@ -18,7 +18,8 @@ MildStatus path_join(const char *folder, const char *name, char path[PATH_SIZE],
 /* Makes the folder and its parents; fine when it is there. */
 MildStatus path_make_folder(const char *folder, MildError *error);
 
-/* Writes a temporary file beside `path`, syncs, renames: after a crash or on a full disk the old file is still whole. */
+/* Writes a temporary file beside `path`, syncs, renames: after a crash or on a full disk the old file is still whole.
+ * Devices and pipes are written to directly. */
 MildStatus path_write(const char *path, const void *data, size_t size, MildError *error);
 
 #endif

@@ -1,0 +1,95 @@
+#!/usr/bin/env bash
+# The program as a user meets it: what it says, how it exits, what it writes. Usage: test_cli.sh PATH_TO_MILD
+set -u
+mild=$1
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+failures=0
+
+fail() {
+    echo "FAIL: $*" >&2
+    failures=$((failures + 1))
+}
+
+# expect CODE PATTERN COMMAND...: exit code, and a pattern in what it prints (both streams).
+expect() {
+    local code=$1 pattern=$2 output
+    shift 2
+    output=$("$@" 2>&1 </dev/null)
+    local got=$?
+    [ "$got" = "$code" ] || fail "exit $got instead of $code: $* -> $output"
+    grep -q -- "$pattern" <<<"$output" || fail "no '$pattern' in the output of: $* -> $output"
+}
+
+# bad PATTERN COMMAND...: one line of error that holds the pattern, exit code 2.
+bad() {
+    expect 2 "$@"
+    shift
+    local lines
+    lines=$("$@" 2>&1 >/dev/null </dev/null | wc -l)
+    [ "$lines" = 1 ] || fail "$lines lines of error instead of one: $*"
+}
+
+expect 0 'usage: mild COMMAND' "$mild" --help
+expect 0 'mild [0-9]*\.[0-9]*\.[0-9]*' "$mild" --version
+expect 2 'usage: mild COMMAND' "$mild"
+bad "nearest is 'press'" "$mild" pres
+for command in train eval play press bench info; do
+    expect 0 "usage: mild $command" "$mild" "$command" --help
+    bad "unknown option --no-such" "$mild" "$command" --no-such
+done
+
+# mistakes in configs and overrides
+printf '[train]\nenvs = 4\niteration = 1\n' >bad_key.ini
+printf '[train]\nenvs = 0\n' >bad_value.ini
+bad "bad_key.ini:3: unknown key 'train.iteration'; nearest is 'train.iterations'" "$mild" train --config bad_key.ini --out run
+bad "bad_value.ini:2: .*outside 1 .. 65536" "$mild" train --config bad_value.ini --out run
+bad "missing.ini" "$mild" train --config missing.ini --out run
+bad "nearest is 'train.envs'" "$mild" train --out run --train.env=4
+bad "nearest is 'train'" "$mild" train --out run --trian.envs=4
+bad "outside" "$mild" train --out run --ppo.gamma=1.5
+[ ! -e run ] || fail "a refused training left a folder"
+
+# press
+bad "nearest is 'sand_loose'" "$mild" press --ground sand_lose
+bad "which ground" "$mild" press
+bad "rigid" "$mild" press --ground rigid
+bad "nearest is 'ground.k_pen'" "$mild" press --ground sand_loose --ground.k_pem=500
+bad "outside" "$mild" press --ground sand_loose --ground.k_pen=-5
+bad "outside" "$mild" press --ground sand_loose --depth 7
+bad "not a number" "$mild" press --ground sand_loose --speed fast
+bad "neither LENGTH,WIDTH" "$mild" press --ground sand_loose --plate 0.1
+bad "only ground model" "$mild" press --ground sand_loose --model con_cone
+bad "No space left" "$mild" press --ground sand_loose --csv /dev/full
+expect 0 'peak .* N' "$mild" press --ground foam45 --plate 0.1,0.1 --csv press.csv
+[ "$(head -1 press.csv)" = "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m" ] || fail "columns of press.csv"
+awk -F, 'NR > 1 && NF != 7 { exit 1 } NR > 2 && $1 <= time { exit 1 } { time = $1 } $2 > depth { depth = $2 } END { exit !(NR > 100 && depth == 0.03) }' press.csv ||
+    fail "rows of press.csv"
+expect 0 'peak .* N' "$mild" press --ground sand_loose --plate sole --tilt 5
+peak() { "$mild" press --ground sand_loose "$@" | sed -n 's/^peak \([0-9.]*\) N.*/\1/p'; }
+awk "BEGIN { exit !($(peak --ground.k_pen=500) > $(peak) && $(peak --ground.k_pen=380) == $(peak)) }" ||
+    fail "--ground.k_pen does not change the force"
+# the last override wins
+[ "$(peak --ground.k_pen=380 --ground.k_pen=500)" = "$(peak --ground.k_pen=500)" ] || fail "order of overrides"
+
+# info
+expect 0 'sand_dense' "$mild" info grounds
+expect 0 'k_pen .*\[N/m\]' "$mild" info grounds
+expect 0 'newton' "$mild" info models
+expect 0 'MuJoCo' "$mild" info build
+expect 0 'processor' "$mild" info devices
+bad "nearest is 'grounds'" "$mild" info ground
+"$mild" info config >complete.ini
+bad "which ground\|unknown\|--out" "$mild" train --config complete.ini # the printed config is read back without complaint
+
+# bench
+bad "nearest is 'step'" "$mild" bench stepp
+expect 0 'newton_stick' "$mild" bench ground --json bench.json
+grep -q '"case":.*"newton_stick"' bench.json || fail "bench.json"
+for key in machine version rows bench case value unit; do
+    grep -q "\"$key\":" bench.json || fail "bench.json lacks $key"
+done
+
+[ $failures = 0 ] && echo "command line: all as expected"
+exit $((failures > 0))
