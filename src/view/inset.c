@@ -5,8 +5,8 @@
 
 #define INSET_MARGIN 10
 #define INSET_BAR 10
-#define INSET_LABELS 46 /* [pixels] room for the numbers beside the bar */
-#define INSET_TITLE 20
+#define INSET_LABELS 40 /* [pixels] room for the numbers beside the bar */
+#define INSET_TITLE 24
 
 static const unsigned char background[3] = {30, 33, 38}, idle[3] = {70, 74, 80}, mark[3] = {255, 255, 255};
 
@@ -39,7 +39,7 @@ static int cells_along(double length, double pitch) {
 }
 
 InsetLayout inset_layout(const MildSole *const *soles, int feet, int cell) {
-    InsetLayout layout = {INSET_MARGIN, 0, cell, 0, 0, 0};
+    InsetLayout layout = {.width = INSET_MARGIN, .cell = cell};
     int rows = 0;
     for (int f = 0; f < feet; f++) {
         Extent e = sole_extent(soles[f]);
@@ -52,7 +52,10 @@ InsetLayout inset_layout(const MildSole *const *soles, int feet, int cell) {
     layout.bar_left = layout.width;
     layout.bar_bottom = INSET_MARGIN;
     layout.bar_top = INSET_MARGIN + rows * cell;
-    layout.width += INSET_BAR + INSET_LABELS;
+    layout.bar_right = layout.bar_left + INSET_BAR;
+    layout.width = layout.bar_right + INSET_LABELS;
+    layout.title_bottom = layout.bar_top + INSET_MARGIN / 2;
+    layout.title_height = INSET_TITLE;
     return layout;
 }
 

@@ -8,7 +8,8 @@
 typedef struct {
     int width, height; /* [pixels] of the whole inset */
     int cell;          /* [pixels] edge of one element */
-    int bar_left, bar_bottom, bar_top; /* [pixels] where the colour bar is, for the labels */
+    int bar_left, bar_right, bar_bottom, bar_top; /* [pixels] where the colour bar is, for the labels */
+    int title_bottom, title_height;               /* [pixels] room for a title */
 } InsetLayout;
 
 /* rows grow upward as OpenGL's pictures do */

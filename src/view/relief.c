@@ -9,6 +9,7 @@
 #define UNDER_SOLE 0.0015  /* [m] drawn gap below the sole against flicker */
 #define CHANGE_SEEN 0.0003 /* [m] smaller changes are not worth an upload */
 #define SHADE_DEPTH 0.030  /* [m] depth at which pressed ground is about as dark as it gets */
+#define TILE_INNER (RELIEF_TILE_PIXELS - 2 * RELIEF_TILE_MARGIN)
 #define NO_DEPTH (-1e9f)
 
 /* Where a sole is, on a raster finer than its elements. */
@@ -52,8 +53,8 @@ static const struct {
     Look look;
 } looks[] = {
     {"rubber", {{0.27F, 0.31F, 0.38F}, GRAIN_SPECKLE}},
-    {"foam60", {{0.47F, 0.60F, 0.74F}, GRAIN_GRID}},
-    {"foam45", {{0.93F, 0.80F, 0.46F}, GRAIN_GRID}},
+    {"foam60", {{0.44F, 0.56F, 0.70F}, GRAIN_GRID}},
+    {"foam45", {{0.82F, 0.78F, 0.66F}, GRAIN_GRID}},
     {"foam28", {{0.93F, 0.66F, 0.58F}, GRAIN_GRID}},
     {"foam25", {{0.80F, 0.70F, 0.86F}, GRAIN_GRID}},
     {"grass", {{0.35F, 0.56F, 0.24F}, GRAIN_BLADES}},
@@ -79,25 +80,27 @@ static unsigned hash(unsigned x, unsigned y, unsigned z) {
     return h ^ (h >> 15);
 }
 
-/* Noise in [-1, 1], one value per block of pixels, periodic in the tile so that tiles join. */
+/* Noise in [-1, 1], one value per block of pixels. */
 static float noise(int px, int py, int width, int height, unsigned layer) {
-    unsigned h = hash((unsigned)((px % RELIEF_TILE_PIXELS) / width), (unsigned)((py % RELIEF_TILE_PIXELS) / height), layer);
+    unsigned h = hash((unsigned)(px / width), (unsigned)(py / height), layer);
     return (float)(h & 0xffffu) / 32767.5F - 1.0F;
 }
 
-/* Relative brightness of the undisturbed ground at a pixel. */
+/* Relative brightness of the undisturbed ground at a pixel; periodic in the tile so that tiles join. */
 static float grain_shade(Grain grain, int px, int py) {
+    px = (px + TILE_INNER - RELIEF_TILE_MARGIN) % TILE_INNER;
+    py = (py + TILE_INNER - RELIEF_TILE_MARGIN) % TILE_INNER;
     switch (grain) {
     case GRAIN_FINE:
         return 1.0F + 0.10F * noise(px, py, 1, 1, 1) + 0.05F * noise(px, py, 4, 4, 2);
     case GRAIN_GRID: /* lines every 8 cm: a dent bends them */
-        return (px % 16 == 0 || py % 16 == 0 ? 0.80F : 1.0F) + 0.03F * noise(px, py, 2, 2, 3);
+        return (px % 15 == 0 || py % 15 == 0 ? 0.80F : 1.0F) + 0.03F * noise(px, py, 2, 2, 3);
     case GRAIN_BLADES:
         return 1.0F + 0.22F * noise(px, py, 1, 4, 4) + 0.12F * noise(px, py, 4, 2, 5);
     case GRAIN_SPECKLE:
         return noise(px, py, 2, 2, 6) > 0.86F ? 1.7F : 1.0F + 0.05F * noise(px, py, 1, 1, 7);
     default: /* checker of half a tile */
-        return ((px / 64 + py / 64) % 2 ? 0.94F : 1.0F) + 0.015F * noise(px, py, 1, 1, 8);
+        return ((px / (TILE_INNER / 2) + py / (TILE_INNER / 2)) % 2 ? 0.94F : 1.0F) + 0.015F * noise(px, py, 1, 1, 8);
     }
 }
 
@@ -351,17 +354,22 @@ static const Look *look_at(const Relief *relief, int material) {
     return &relief->look[material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material];
 }
 
+/* Tile coordinate in [0, 1) of a pixel's centre; the margin shows what lies on the edge. */
+static double inner(int pixel) {
+    return fmin(fmax((pixel - RELIEF_TILE_MARGIN + 0.5) / TILE_INNER, 0.0), 1.0 - 1e-9);
+}
+
 void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb) {
-    double center[2], edge = relief_tile_edge(relief), pixel = edge / RELIEF_TILE_PIXELS;
+    double center[2], edge = relief_tile_edge(relief);
     relief_tile_center(relief, tile, center);
-    const int per_cell = RELIEF_TILE_PIXELS / RELIEF_TILE_CELLS;
     for (int py = 0; py < RELIEF_TILE_PIXELS; py++) {
-        int up = RELIEF_TILE_PIXELS - 1 - py; /* pictures run down, y runs up */
-        const float *low = tile_row(relief, tile, up / per_cell), *high = low + relief->nx;
+        double v = inner(RELIEF_TILE_PIXELS - 1 - py); /* pictures run down, y runs up */
+        const float *low = tile_row(relief, tile, (int)(v * RELIEF_TILE_CELLS)), *high = low + relief->nx;
         for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3) {
-            int i = px / per_cell;
+            double u = inner(px);
+            int i = (int)(u * RELIEF_TILE_CELLS);
             float depth = 0.25F * (low[i] + low[i + 1] + high[i] + high[i + 1]);
-            double x = center[0] - 0.5 * edge + (px + 0.5) * pixel, y = center[1] - 0.5 * edge + (up + 0.5) * pixel;
+            double x = center[0] + (u - 0.5) * edge, y = center[1] + (v - 0.5) * edge;
             int material = relief->rigid ? RELIEF_RIGID : mild_terrain_material_at(&relief->terrain, x, y);
             float dark = 0.42F * (1.0F - expf(-depth / (float)SHADE_DEPTH));
             paint(look_at(relief, material), px, py, dark, rgb);

@@ -9,6 +9,7 @@
 #define RELIEF_TILE_CELLS 64
 #define RELIEF_TILE_VERTICES (RELIEF_TILE_CELLS + 1)
 #define RELIEF_TILE_PIXELS 128
+#define RELIEF_TILE_MARGIN 4 /* [pixels] of a tile's picture beyond its edges, so that filtering takes nothing from afar */
 #define RELIEF_RIGID (-1) /* material index of ground that never yields */
 
 typedef struct {
@@ -39,7 +40,7 @@ int relief_tile_touched(const Relief *relief, int tile);
 int relief_tile_take_dirty(Relief *relief, int tile);
 /* [VERTICES][VERTICES] rows along y: 1 at the surface, 0 at `range` below it. */
 void relief_tile_heights(const Relief *relief, int tile, double range, float *heights);
-/* [PIXELS][PIXELS][3] first row at y max; pressed ground is darker. */
+/* [PIXELS][PIXELS][3] first row at y max, margin included; pressed ground is darker. */
 void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb);
 /* The same for untouched ground of one material, seamless between tiles. */
 void relief_flat_pixels(const Relief *relief, int material, unsigned char *rgb);

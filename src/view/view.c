@@ -11,13 +11,14 @@
 #include "view/relief.h"
 
 #define VIEW_CELL 0.01      /* [m] vertices of the visible ground */
+#define VIEW_OVERLAP 1.0015  /* [-] tiles are drawn this much larger, so that no crack opens between them */
 #define VIEW_SLOTS 96       /* tiles that can be deformed or of mixed material at once */
 #define VIEW_DEPTH 0.20     /* [m] deepest print that can be drawn */
 #define VIEW_RADIUS 9.0     /* [m] tiles farther from the robot are drawn as plain floor */
 #define VIEW_FLOOR 40.0     /* [m] half size of the floor beyond */
 #define VIEW_GEOMS 4000
 #define VIEW_CAMERA_TIME 0.35 /* [s] the camera's lag */
-#define VIEW_LOOK_HEIGHT 0.43 /* [m] the camera looks at this height */
+#define VIEW_LOOK_HEIGHT 0.50 /* [m] the camera looks at this height */
 #define VIEW_HIDDEN_GROUP 5
 #define VIEW_FORCE_SEEN 15.0 /* [N] smaller contact forces get no arrow */
 
@@ -53,7 +54,7 @@ ViewDef view_def_default(void) {
     return (ViewDef){.xml = "models/sa01/sa01.xml",
                      .width = 960,
                      .height = 540,
-                     .rate = 30,
+                     .rate = 25,
                      .x_min = -2,
                      .x_max = 8,
                      .y_min = -2,
@@ -62,7 +63,7 @@ ViewDef view_def_default(void) {
                      .force_arrow = 0.0012,
                      .azimuth = 128,
                      .elevation = -16,
-                     .distance = 2.1};
+                     .distance = 2.35};
 }
 
 /* ---- the model for drawing: the robot's own file plus tiles of ground ---- */
@@ -81,22 +82,25 @@ static void add_material(mjSpec *spec, const char *name, double repeat, int unif
 }
 
 static void add_ground(mjSpec *spec, double edge) {
+    static const float level[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES] = {0};
+    const double share = 1.0 - 2.0 * RELIEF_TILE_MARGIN / RELIEF_TILE_PIXELS; /* of the picture that a tile shows */
     char name[32];
     for (int i = 0; i < VIEW_SLOTS; i++) {
         snprintf(name, sizeof name, "view_tile_%d", i);
-        add_material(spec, name, 1, 0);
+        add_material(spec, name, share, 0);
         mjsHField *hfield = mjs_addHField(spec);
         mjs_setName(hfield->element, name);
         hfield->nrow = hfield->ncol = RELIEF_TILE_VERTICES;
-        hfield->size[0] = hfield->size[1] = 0.5 * edge;
+        hfield->size[0] = hfield->size[1] = 0.5 * VIEW_OVERLAP * edge;
         hfield->size[2] = VIEW_DEPTH;
         hfield->size[3] = 0.01;
+        mjs_setFloat(hfield->userdata, level, RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES);
     }
     for (int m = 0; m <= MILD_MATERIALS_MAX; m++) {
         snprintf(name, sizeof name, "view_flat_%d", m);
-        add_material(spec, name, 1, 0);
+        add_material(spec, name, share, 0);
     }
-    add_material(spec, "view_floor", 1.0 / edge, 1);
+    add_material(spec, "view_floor", share / edge, 1);
 }
 
 static mjModel *make_model(const ViewDef *def, double edge, MildError *error) {
@@ -453,12 +457,13 @@ static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     mjrRect box = {viewport.width - layout->width - 10, 10, layout->width, layout->height};
     mjr_drawPixels(view->inset, NULL, box, &view->context);
     char text[32];
-    float x = (float)(box.left + layout->bar_left + 14) / (float)viewport.width, height = (float)viewport.height;
+    mjrRect title = {box.left, box.bottom + layout->title_bottom, box.width, layout->title_height};
+    mjr_label(title, mjFONT_NORMAL, "sole pressure, kPa", 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
     snprintf(text, sizeof text, "%.0f", view->def.pressure_max / 1e3);
-    mjr_text(mjFONT_NORMAL, text, &view->context, x, (float)(box.bottom + layout->bar_top - 12) / height, 1, 1, 1);
-    mjr_text(mjFONT_NORMAL, "0", &view->context, x, (float)(box.bottom + layout->bar_bottom) / height, 1, 1, 1);
-    mjr_text(mjFONT_NORMAL, "sole pressure kPa", &view->context, (float)(box.left + 10) / (float)viewport.width,
-             (float)(box.bottom + layout->bar_top + 10) / height, 0.9F, 0.9F, 0.9F);
+    mjrRect label = {box.left + layout->bar_right, box.bottom + layout->bar_top - 16, layout->width - layout->bar_right, 16};
+    mjr_label(label, mjFONT_NORMAL, text, 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
+    label.bottom = box.bottom + layout->bar_bottom;
+    mjr_label(label, mjFONT_NORMAL, "0", 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
 }
 
 /* Directional lights throw shadows only near their own position: they walk with the camera. */
