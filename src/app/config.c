@@ -72,17 +72,20 @@ static const char *reader_where(const Reader *reader, char *where) {
     return where;
 }
 
-/* inih tells neither empty nor unknown sections: look at the header line itself. */
-static void reader_check_header(Reader *reader, const char *line) {
+/* inih passes over empty sections and reads on behind a syntax error: look at the line itself, so that the first
+ * mistake is the one reported. line: without its comment, ended by a newline. */
+static void reader_check_line(Reader *reader, const char *line) {
     char name[64], where[WHERE_MAX];
-    size_t length = strcspn(line + 1, "]\n");
-    if (line[1 + length] != ']') return; /* inih reports the syntax */
-    if (length >= sizeof name) length = sizeof name - 1;
-    memcpy(name, line + 1, length);
-    name[length] = '\0';
-    const char *nearest = NULL;
-    if (!section_find(reader->sections, reader->count, name, &nearest)) {
-        reader->status = section_fail(reader_where(reader, where), name, nearest, reader->error);
+    reader_where(reader, where);
+    size_t length = strcspn(line, "]\n");
+    if (*line == '[' && line[length] == ']') {
+        snprintf(name, sizeof name, "%.*s", (int)length - 1, line + 1);
+        const char *nearest = NULL;
+        if (!section_find(reader->sections, reader->count, name, &nearest)) {
+            reader->status = section_fail(where, name, nearest, reader->error);
+        }
+    } else if (*line == '[' || (*line != '\n' && !strpbrk(line, "=:"))) {
+        reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: neither `key = value` nor `[section]`", where);
     }
 }
 
@@ -103,8 +106,8 @@ static char *reader_line(char *buffer, int size, void *stream) {
     reader->line++;
     const char *line = reader->rest + strspn(reader->rest, " \t\r");
     size_t length = code_length(line);
-    reader->rest = line + strcspn(line, "\n");
-    if (*reader->rest) reader->rest++;
+    while (length > 0 && (line[length - 1] == ' ' || line[length - 1] == '\t' || line[length - 1] == '\r')) length--;
+    reader->rest = strchr(line, '\n') ? strchr(line, '\n') + 1 : line + strlen(line);
     if ((int)length > size - 2) {
         char where[WHERE_MAX];
         reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: line longer than %d characters",
@@ -114,7 +117,7 @@ static char *reader_line(char *buffer, int size, void *stream) {
     memcpy(buffer, line, length);
     buffer[length] = '\n';
     buffer[length + 1] = '\0';
-    if (*buffer == '[') reader_check_header(reader, buffer);
+    reader_check_line(reader, buffer);
     return reader->status == MILD_OK ? buffer : NULL;
 }
 
@@ -164,6 +167,7 @@ static MildStatus reader_check_complete(const Reader *reader) {
 MildStatus config_read_text(const ConfigSection *sections, int count, const char *text, const char *name, int complete,
                             MildError *error) {
     Reader reader = {.sections = sections, .count = count, .name = name, .rest = text, .error = error};
+    if (strncmp(text, "\xef\xbb\xbf", 3) == 0) reader.rest += 3; /* byte order mark of some editors */
     if (count > SECTIONS_MAX) return mild_fail(error, MILD_ERROR_ARGUMENT, "config: more than %d sections", SECTIONS_MAX);
     int keys = 0;
     for (int i = 0; i < count; i++) {
@@ -174,7 +178,7 @@ MildStatus config_read_text(const ConfigSection *sections, int count, const char
     if (!reader.seen) return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", name);
     int bad_line = ini_parse_stream(reader_line, &reader, reader_key, &reader);
     if (reader.status == MILD_OK && bad_line) {
-        reader.status = mild_fail(error, MILD_ERROR_FORMAT, "%.140s:%d: neither `key = value` nor `[section]`", name, bad_line);
+        reader.status = mild_fail(error, MILD_ERROR_FORMAT, "%.140s:%d: not a line of a config", name, bad_line);
     }
     if (reader.status == MILD_OK && complete) reader.status = reader_check_complete(&reader);
     free(reader.seen);

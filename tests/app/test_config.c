@@ -54,7 +54,7 @@ static void test_reads_every_type(void **state) {
     (void)state;
     Fixture f = fixture();
     bind(&f);
-    const char *text = "; remark\n# remark, longer than any line inih takes: 0123456789012345678901234567890123456789012345678901234"
+    const char *text = "\xef\xbb\xbf; remark\n# remark, longer than any line inih takes: 0123456789012345678901234567890123456789012345678901234"
                        "56789012345678901234567890123456789012345678901234567890123456789012345678901234567890123456789012345678\n"
                        "[sample]\n  stiffness = 2.5 ; remark\n\tpair: -0.5, 0.5 # remark\r\n"
                        "count=7\n\n  on = true\nseed = 18446744073709551615\nname = sand\n[ground]\nk_pen=500";
@@ -82,6 +82,7 @@ static void test_mistakes(void **state) {
         {"[sample]\nseed = -1", {"x.ini:2:", "sample.seed", ""}},
         {"[sample]\nname = much too long", {"x.ini:2:", "sample.name", ""}},
         {"[sample]\ncount\n", {"x.ini:2:", "key = value", ""}},
+        {"[sample]\ncount\ncuont=1\n", {"x.ini:2:", "key = value", ""}},
         {"[sample\ncount=1\n", {"x.ini:1:", "[section]", ""}},
         {"count = 1\n", {"x.ini:1:", "before the first [section]", ""}},
         {"[sample]\ncount = 1\ncount = 1\n", {"x.ini:3:", "already set on line 2", ""}},
