@@ -131,7 +131,7 @@ static void policy_loss(const LossContext *c, LossChunk *chunk, const float *mea
     surrogate_constants(c, constant);
     float entropy_share = (float)((1.0 - c->def->epsilon) * c->def->entropy) * c->sample_weight * (float)chunk->rows;
     for (int j = 0; j < actions; j++) {
-        d_log_std[j] = beta * d_log_std[j] - entropy_share;
+        d_log_std[j] = (beta == 0.0f ? 0.0f : d_log_std[j]) - entropy_share; /* 0 * NaN would stay NaN */
     }
     for (int r = 0; r < chunk->rows; r++) {
         surrogate_row(c, chunk, r, constant, mean + (int64_t)r * actions, chunk->d_mean + (int64_t)r * actions,

@@ -1,0 +1,189 @@
+#include "learn/policy_file.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "learn/policy_private.h"
+
+/* The def's shape fields: the task sets them, so they are no config keys, but a file must state them. */
+static const MildField shape_fields[] = {
+    MILD_FIELD(PolicyDef, observation, MILD_FIELD_INT, 1, 1, 16384, "[-] width of one frame"),
+    MILD_FIELD(PolicyDef, frames, MILD_FIELD_INT, 1, 1, 16384, "[-] frames in the history"),
+    MILD_FIELD(PolicyDef, critic_input, MILD_FIELD_INT, 1, 1, 16384, "[-] width of the critic's input"),
+    MILD_FIELD(PolicyDef, actions, MILD_FIELD_INT, 1, 1, NETWORK_ACTIONS_MAX, "[-] actions"),
+    MILD_FIELD(PolicyDef, estimates, MILD_FIELD_INT, 1, 1, 16384, "[-] estimates"),
+    MILD_FIELD(PolicyDef, feet_velocity_offset, MILD_FIELD_INT, 1, 0, 16384,
+               "[-] first estimate of the feet velocities"),
+    MILD_FIELD(PolicyDef, feet_velocity_count, MILD_FIELD_INT, 1, 1, 16384, "[-] estimates of feet velocities"),
+};
+#define SHAPE_FIELDS ((int)(sizeof shape_fields / sizeof *shape_fields))
+
+static const MildField *file_field(int index) {
+    return index < SHAPE_FIELDS ? &shape_fields[index] : &policy_fields[index - SHAPE_FIELDS];
+}
+
+static void add_tensor(PolicyTensors *tensors, const char *net, int index, const char *what, const float *data,
+                       int rows, int columns) {
+    char *name = tensors->name[tensors->count];
+    snprintf(name, sizeof tensors->name[0], "%s.%d.%s", net, index, what);
+    tensors->tensor[tensors->count++] =
+        (Safetensor){.name = name,
+                     .type = SAFETENSORS_F32,
+                     .rank = columns > 0 ? 2 : 1,
+                     .shape = {rows, columns},
+                     .data = data,
+                     .bytes = sizeof(float) * (size_t)rows * (size_t)(columns > 0 ? columns : 1)};
+}
+
+void policy_file_tensors(const Network *network, const float *parameters, PolicyTensors *tensors) {
+    tensors->count = 0;
+    for (int n = 0; n < NETWORK_MLPS; n++) {
+        const char *name;
+        const Mlp *mlp = network_mlp(network, n, &name);
+        for (int l = 0; l < mlp->layers; l++) {
+            const MlpLayer *layer = &mlp->layer[l];
+            add_tensor(tensors, name, 2 * l, "weight", parameters + layer->weight, layer->out, layer->in);
+            add_tensor(tensors, name, 2 * l, "bias", parameters + layer->bias, layer->out, 0);
+        }
+    }
+    add_tensor(tensors, "", 0, "", parameters + network->log_std, network->def.actions, 0);
+    strcpy(tensors->name[tensors->count - 1], "log_std");
+}
+
+static void add_text(PolicyTexts *texts, const char *key, const char *value) {
+    texts->text[texts->count++] = (SafetensorsText){key, value};
+}
+
+void policy_file_texts(const Network *network, const char *kind, const char *note, PolicyTexts *texts) {
+    texts->count = 0;
+    add_text(texts, "kind", kind);
+    add_text(texts, "version", POLICY_FILE_VERSION);
+    add_text(texts, "note", note ? note : "");
+    for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
+        const int at = texts->count;
+        snprintf(texts->key[at], sizeof texts->key[at], "policy.%s", file_field(f)->name);
+        mild_field_print(file_field(f), &network->def, texts->value[at], sizeof texts->value[at]);
+        add_text(texts, texts->key[at], texts->value[at]);
+    }
+}
+
+MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef *def, MildError *error) {
+    const char *kind = safetensors_text(file, "kind"), *version = safetensors_text(file, "version");
+    if (!kind || (strcmp(kind, POLICY_KIND) != 0 && strcmp(kind, POLICY_CHECKPOINT_KIND) != 0)) {
+        return mild_fail(error, MILD_ERROR_FORMAT, "%s: holds no policy of mild; give a file that `mild train` wrote",
+                         path);
+    }
+    if (!version || strcmp(version, POLICY_FILE_VERSION) != 0) {
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%s: has file version %.20s, this program reads version " POLICY_FILE_VERSION, path,
+                         version ? version : "(none)");
+    }
+    *def = policy_def_default();
+    for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
+        const MildField *field = file_field(f);
+        char key[48];
+        snprintf(key, sizeof key, "policy.%s", field->name);
+        const char *text = safetensors_text(file, key);
+        MildError inner = {0};
+        if (!text || mild_field_parse(field, def, text, "policy", &inner)) {
+            return mild_fail(error, MILD_ERROR_FORMAT, "%s: %.200s; the file is of no use to this program", path,
+                             text ? inner.text : key);
+        }
+    }
+    return MILD_OK;
+}
+
+static MildStatus wrong_tensor(const char *path, const char *name, const char *what, MildError *error) {
+    return mild_fail(error, MILD_ERROR_FORMAT, "%s: tensor %.64s %s; the file does not fit the network it states", path,
+                     name, what);
+}
+
+/* Nothing but the policy's tensors and a checkpoint's may be there. */
+static MildStatus check_strangers(const Safetensors *file, const char *path, const PolicyTensors *wanted,
+                                  MildError *error) {
+    for (int i = 0; i < safetensors_count(file); i++) {
+        const char *name = safetensors_at(file, i)->name;
+        int known = strncmp(name, "train.", 6) == 0;
+        for (int k = 0; k < wanted->count && !known; k++) {
+            known = strcmp(name, wanted->name[k]) == 0;
+        }
+        if (!known) {
+            return wrong_tensor(path, name, "is not part of a policy", error);
+        }
+    }
+    return MILD_OK;
+}
+
+MildStatus policy_file_parameters(const Safetensors *file, const char *path, const Network *network, float *parameters,
+                                  MildError *error) {
+    PolicyTensors wanted;
+    policy_file_tensors(network, parameters, &wanted);
+    for (int k = 0; k < wanted.count; k++) {
+        const Safetensor *want = &wanted.tensor[k], *have = safetensors_find(file, want->name);
+        if (!have) return wrong_tensor(path, want->name, "is missing", error);
+        if (have->type != want->type || have->rank != want->rank ||
+            memcmp(have->shape, want->shape, sizeof have->shape) != 0) {
+            return wrong_tensor(path, want->name, "has another type or shape", error);
+        }
+        memcpy(parameters + ((const float *)want->data - parameters), have->data, have->bytes);
+    }
+    for (int64_t i = 0; i < network->count; i++) {
+        if (!isfinite(parameters[i])) {
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: holds weights that are not finite; take an older checkpoint", path);
+        }
+    }
+    return check_strangers(file, path, &wanted, error);
+}
+
+MildStatus policy_save(const Policy *policy, const char *path, const char *note, MildError *error) {
+    PolicyTensors tensors;
+    PolicyTexts texts;
+    policy_file_tensors(&policy->network, policy->parameters, &tensors);
+    policy_file_texts(&policy->network, POLICY_KIND, note, &texts);
+    return safetensors_write(path, tensors.tensor, tensors.count, texts.text, texts.count, error);
+}
+
+/* The size that the def asks for is compared with the file before anything of that size is allocated. */
+Policy *policy_file_policy(const Safetensors *file, const char *path, MildError *error) {
+    PolicyDef def;
+    Network network;
+    MildError inner = {0};
+    if (policy_file_def(file, path, &def, error)) {
+        return NULL;
+    }
+    if (network_layout(&network, &def, &inner)) {
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: %.200s; the file is of no use to this program", path, inner.text);
+        return NULL;
+    }
+    size_t bytes = 0;
+    for (int i = 0; i < safetensors_count(file); i++) {
+        bytes += safetensors_at(file, i)->bytes;
+    }
+    if ((uint64_t)network.count > bytes / sizeof(float)) {
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: states a network larger than the file; take an older checkpoint",
+                  path);
+        return NULL;
+    }
+    Policy *policy = policy_create(&def, 0, error);
+    if (policy && policy_file_parameters(file, path, &policy->network, policy->parameters, error)) {
+        policy_destroy(policy);
+        return NULL;
+    }
+    return policy;
+}
+
+Policy *policy_load(const char *path, char *note, int note_size, MildError *error) {
+    Safetensors *file = safetensors_read(path, error);
+    if (!file) {
+        return NULL;
+    }
+    Policy *policy = policy_file_policy(file, path, error);
+    if (policy && note && note_size > 0) {
+        const char *text = safetensors_text(file, "note");
+        snprintf(note, (size_t)note_size, "%s", text ? text : "");
+    }
+    safetensors_destroy(file);
+    return policy;
+}

@@ -1,0 +1,159 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "learn/policy_file.h"
+#include "learn/ppo_private.h"
+
+enum { COUNTER_ITERATION, COUNTER_ADAM_STEPS, COUNTER_SEED, COUNTERS };
+
+#define TRAIN_TENSORS 9
+
+static Safetensor tensor_of(const char *name, SafetensorsType type, const void *data, int64_t count) {
+    const size_t sizes[] = {4, 8, 8, 1};
+    return (Safetensor){
+        .name = name, .type = type, .rank = 1, .shape = {count}, .data = data, .bytes = sizes[type] * (size_t)count};
+}
+
+/* What resuming needs beside the policy; the batch's rows of time 0 are what the next rollout starts from. */
+static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const void *extra, size_t extra_size,
+                         Safetensor tensors[TRAIN_TENSORS]) {
+    const Network *n = &ppo->policy->network;
+    const PpoBatch *b = &ppo->batch;
+    const int64_t envs = b->envs;
+    int count = 0;
+    tensors[count++] = tensor_of("train.counters", SAFETENSORS_I64, counters, COUNTERS);
+    tensors[count++] = tensor_of("train.learning_rate", SAFETENSORS_F64, &ppo->learning_rate, 1);
+    tensors[count++] = tensor_of("train.first_moment", SAFETENSORS_F32, ppo->first, n->count);
+    tensors[count++] = tensor_of("train.second_moment", SAFETENSORS_F32, ppo->second, n->count);
+    tensors[count++] = tensor_of("train.history", SAFETENSORS_F32, b->history, envs * n->history);
+    tensors[count++] = tensor_of("train.critic", SAFETENSORS_F32, b->critic, envs * n->def.critic_input);
+    tensors[count++] = tensor_of("train.target", SAFETENSORS_F32, b->target, envs * n->def.estimates);
+    tensors[count++] = tensor_of("train.clean", SAFETENSORS_F32, b->clean, envs * n->def.observation);
+    if (extra_size > 0) {
+        tensors[count++] = tensor_of("train.extra", SAFETENSORS_U8, extra, (int64_t)extra_size);
+    }
+    return count;
+}
+
+MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size, const char *note,
+                    MildError *error) {
+    PolicyTensors policy;
+    PolicyTexts texts;
+    Safetensor all[TRAIN_TENSORS + POLICY_TENSORS_MAX];
+    const int64_t counters[COUNTERS] = {ppo->iteration, ppo->adam_steps, (int64_t)ppo->seed};
+    int count = train_tensors(ppo, counters, extra, extra_size, all);
+    policy_file_tensors(&ppo->policy->network, ppo->policy->parameters, &policy);
+    policy_file_texts(&ppo->policy->network, POLICY_CHECKPOINT_KIND, note, &texts);
+    /* the caller's bytes last, so that every number before them stays aligned */
+    const int numbers = extra_size > 0 ? count - 1 : count;
+    const Safetensor last = all[count - 1];
+    memcpy(all + numbers, policy.tensor, (size_t)policy.count * sizeof *all);
+    if (numbers < count) {
+        all[numbers + policy.count] = last;
+    }
+    return safetensors_write(path, all, count + policy.count, texts.text, texts.count, error);
+}
+
+static MildStatus check_same_network(const Safetensors *file, const char *path, const Network *network,
+                                     MildError *error) {
+    PolicyDef def;
+    MildStatus status = policy_file_def(file, path, &def, error);
+    if (status) {
+        return status;
+    }
+    PolicyTexts ours;
+    policy_file_texts(network, POLICY_CHECKPOINT_KIND, "", &ours);
+    for (int i = 0; i < ours.count; i++) {
+        const char *key = ours.text[i].key, *theirs = safetensors_text(file, key);
+        if (strcmp(key, "note") != 0 && strcmp(key, "policy.init_std") != 0 &&
+            strcmp(ours.text[i].value, theirs) != 0) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "%s: its %s is '%.60s', this run's is '%.60s'; resume with the checkpoint's config", path,
+                             key, theirs, ours.text[i].value);
+        }
+    }
+    return MILD_OK;
+}
+
+static MildStatus check_train(const Safetensors *file, const char *path, const Safetensor *wanted, int count,
+                              MildError *error) {
+    for (int i = 0; i < count; i++) {
+        const Safetensor *have = safetensors_find(file, wanted[i].name);
+        if (!have || have->type != wanted[i].type || have->bytes != wanted[i].bytes) {
+            return mild_fail(
+                error, MILD_ERROR_ARGUMENT,
+                "%s: %s holds %zu bytes, this run needs %zu; resume with the checkpoint's config (train.envs, task)",
+                path, wanted[i].name, have ? have->bytes : (size_t)0, wanted[i].bytes);
+        }
+    }
+    if (!safetensors_find(file, "train.extra") != (count < TRAIN_TENSORS)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "%s: holds an environment state that this run does not expect",
+                         path);
+    }
+    return MILD_OK;
+}
+
+static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters[COUNTERS], double learning_rate,
+                       void *extra) {
+    const struct {
+        const char *name;
+        void *to;
+    } areas[] = {
+        {"train.first_moment", ppo->first},
+        {"train.second_moment", ppo->second},
+        {"train.history", ppo->batch.history},
+        {"train.critic", ppo->batch.critic},
+        {"train.target", ppo->batch.target},
+        {"train.clean", ppo->batch.clean},
+        {"train.extra", extra},
+    };
+    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
+        const Safetensor *have = safetensors_find(file, areas[i].name);
+        if (have) {
+            memcpy(areas[i].to, have->data, have->bytes);
+        }
+    }
+    ppo->iteration = counters[COUNTER_ITERATION];
+    ppo->adam_steps = counters[COUNTER_ADAM_STEPS];
+    ppo->seed = (uint64_t)counters[COUNTER_SEED];
+    ppo->learning_rate = learning_rate;
+}
+
+/* Everything is checked, the parameters into a spare array first, before anything of `ppo` changes. */
+static MildStatus load_open(Ppo *ppo, const Safetensors *file, const char *path, void *extra, size_t extra_size,
+                            float *spare, MildError *error) {
+    const Network *n = &ppo->policy->network;
+    Safetensor wanted[TRAIN_TENSORS];
+    int64_t counters[COUNTERS] = {0};
+    double learning_rate;
+    int count = train_tensors(ppo, counters, extra, extra_size, wanted);
+    MildStatus status = check_same_network(file, path, n, error);
+    if (!status) status = policy_file_parameters(file, path, n, spare, error);
+    if (!status) status = check_train(file, path, wanted, count, error);
+    if (status) {
+        return status;
+    }
+    memcpy(counters, safetensors_find(file, "train.counters")->data, sizeof counters);
+    memcpy(&learning_rate, safetensors_find(file, "train.learning_rate")->data, sizeof learning_rate);
+    if (counters[COUNTER_ITERATION] < 0 || counters[COUNTER_ADAM_STEPS] < 0 ||
+        !(learning_rate >= 0.0 && learning_rate <= 1.0)) {
+        return mild_fail(error, MILD_ERROR_FORMAT, "%s: its counters make no sense; take an older checkpoint", path);
+    }
+    memcpy(ppo->policy->parameters, spare, (size_t)n->count * sizeof *spare);
+    take_train(ppo, file, counters, learning_rate, extra);
+    return MILD_OK;
+}
+
+MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error) {
+    Safetensors *file = safetensors_read(path, error);
+    if (!file) {
+        return error ? error->status : MILD_ERROR_IO;
+    }
+    float *spare = malloc((size_t)ppo->policy->network.count * sizeof *spare);
+    MildStatus status = spare ? load_open(ppo, file, path, extra, extra_size, spare, error)
+                              : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
+    free(spare);
+    safetensors_destroy(file);
+    return status;
+}

@@ -1,0 +1,119 @@
+/* A toy task: two point masses on a line, told to reach 0 and stay there. Mirroring changes every sign. */
+#ifndef MILD_TEST_LEARN_TOY_H
+#define MILD_TEST_LEARN_TOY_H
+
+#include <string.h>
+
+#include "check.h"
+#include "learn/ppo.h"
+
+#define TOY_OBSERVATION 6 /* positions, velocities, last action */
+#define TOY_FRAMES 2
+#define TOY_EPISODE 60
+#define TOY_ENVS_MAX 64
+
+typedef struct {
+    double x[2], v[2], last[2];
+    float frames[TOY_FRAMES * TOY_OBSERVATION];
+    uint32_t step, episode;
+} ToyEnv;
+
+typedef struct {
+    int envs;
+    ToyEnv env[TOY_ENVS_MAX];
+    double reward; /* mean of the last rollout */
+} Toy;
+
+static inline PolicyDef toy_policy_def(void) {
+    PolicyDef def = policy_def_default();
+    def.observation = TOY_OBSERVATION;
+    def.frames = TOY_FRAMES;
+    def.critic_input = 6;
+    def.actions = 2;
+    def.estimates = 4;
+    def.feet_velocity_offset = 1;
+    def.feet_velocity_count = 2;
+    def.latent = 4;
+    def.encoder_hidden[0] = 32, def.encoder_hidden[1] = 0;
+    def.decoder_hidden[0] = 32, def.decoder_hidden[1] = 0;
+    def.modulation_hidden = 8;
+    def.actor_hidden[0] = 32, def.actor_hidden[1] = 32, def.actor_hidden[2] = 0;
+    def.critic_hidden[0] = 32, def.critic_hidden[1] = 32, def.critic_hidden[2] = 0;
+    return def;
+}
+
+static inline PpoMirror toy_mirror(void) {
+    static const int index[TOY_OBSERVATION] = {0, 1, 2, 3, 4, 5};
+    static const float sign[TOY_OBSERVATION] = {-1, -1, -1, -1, -1, -1};
+    return (PpoMirror){index, sign, index, sign};
+}
+
+static inline void toy_reset(ToyEnv *env, int number) {
+    Random random = random_at(99, (uint32_t)number, env->episode++);
+    memset(env->frames, 0, sizeof env->frames);
+    for (int i = 0; i < 2; i++) {
+        env->x[i] = random_uniform(&random, -1.0, 1.0);
+        env->v[i] = env->last[i] = 0.0;
+    }
+    env->step = 0;
+}
+
+static inline void toy_observe(ToyEnv *env, PpoBatch *b, int t, int e) {
+    const int64_t row = (int64_t)t * b->envs + e;
+    const double now[TOY_OBSERVATION] = {env->x[0], env->x[1], env->v[0], env->v[1], env->last[0], env->last[1]};
+    memmove(env->frames, env->frames + TOY_OBSERVATION, sizeof env->frames - TOY_OBSERVATION * sizeof(float));
+    for (int i = 0; i < TOY_OBSERVATION; i++) {
+        env->frames[(TOY_FRAMES - 1) * TOY_OBSERVATION + i] = (float)now[i];
+        b->critic[row * 6 + i] = (float)now[i];
+        b->clean[row * TOY_OBSERVATION + i] = (float)now[i];
+    }
+    memcpy(b->history + row * TOY_FRAMES * TOY_OBSERVATION, env->frames, sizeof env->frames);
+    for (int i = 0; i < 4; i++) {
+        b->target[row * 4 + i] = (float)now[i];
+    }
+}
+
+static inline double toy_step(ToyEnv *env, const float *action) {
+    double reward = 0.0;
+    for (int i = 0; i < 2; i++) {
+        double a = action[i] < -2.0f ? -2.0 : action[i] > 2.0f ? 2.0 : action[i];
+        env->v[i] += 0.1 * (4.0 * a - 0.5 * env->v[i]);
+        env->x[i] += 0.1 * env->v[i];
+        env->last[i] = a;
+        reward += 0.5 * exp(-4.0 * env->x[i] * env->x[i]);
+    }
+    env->step++;
+    return reward;
+}
+
+static inline void toy_start(Toy *toy, Ppo *ppo) {
+    memset(toy, 0, sizeof *toy);
+    toy->envs = ppo_batch(ppo)->envs;
+    for (int e = 0; e < toy->envs; e++) {
+        toy_reset(&toy->env[e], e);
+        toy_observe(&toy->env[e], ppo_batch(ppo), 0, e);
+    }
+}
+
+static inline void toy_rollout(Toy *toy, Ppo *ppo) {
+    PpoBatch *b = ppo_batch(ppo);
+    toy->reward = 0.0;
+    for (int t = 0; t < b->steps; t++) {
+        ppo_act(ppo, t);
+        for (int e = 0; e < b->envs; e++) {
+            const int64_t i = (int64_t)t * b->envs + e;
+            ToyEnv *env = &toy->env[e];
+            b->reward[i] = (float)toy_step(env, b->action + i * 2);
+            b->timeout[i] = env->step >= TOY_EPISODE;
+            b->done[i] = b->timeout[i] || fabs(env->x[0]) > 3.0 || fabs(env->x[1]) > 3.0;
+            b->valid[i] = 1;
+            toy->reward += b->reward[i] / ((double)b->steps * b->envs);
+            if (b->done[i]) {
+                toy_reset(env, e);
+            }
+            toy_observe(env, b, t + 1, e);
+        }
+    }
+}
+
+#endif
