@@ -79,7 +79,7 @@ static MildStatus events_open(Log *log, const char *folder, int64_t resume_after
     char name[128], host[64] = "host";
     double now = wall_time();
     gethostname(host, sizeof host - 1);
-    snprintf(name, sizeof name, "events.out.tfevents.%.0f.%s.%ld", now, host, (long)getpid());
+    snprintf(name, sizeof name, "events.out.tfevents.%.6f.%s.%ld", now, host, (long)getpid());
     MildStatus status = path_join(folder, name, log->events_path, error);
     if (status != MILD_OK) return status;
     log->events = fopen(log->events_path, "wb");
