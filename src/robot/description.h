@@ -24,7 +24,14 @@ struct Robot {
     double pose[ROBOT_JOINTS], low[ROBOT_JOINTS], high[ROBOT_JOINTS];  /* [rad] */
     double effort[ROBOT_JOINTS];                                       /* [N m] */
     double total_mass, stand_height;
+    /* the balanced stand (stand.c): default pose leaning forward until the centre of mass is over the soles' centre */
+    double lean;                       /* [rad] */
+    double lean_base[3];               /* [m] base above a point on the ground midway below the ankles */
+    double lean_torque[ROBOT_JOINTS];  /* [N m] that holds it at rest */
 };
+
+/* Fills the balanced stand; 0, or 1 when out of memory. */
+int stand_prepare(Robot *robot);
 
 /* Name of joint or link i in joint order ("leg_l1", ...); add "_joint" or "_link". */
 const char *robot_limb_name(int i);

@@ -72,18 +72,17 @@ static void backward_substitute(const mjModel *m, const mjData *d, int foot, dou
     }
 }
 
-/* block += sum over rows k of outer(left_k, right_k) / D_k. */
-static void accumulate(const mjData *d, double (*left)[ROBOT_LANES], double (*right)[ROBOT_LANES], int foot, int rows,
-                       double block[6][ROBOT_LANES]) {
+/* Row r of the sum over rows k of outer(left_k, right_k) / D_k. */
+static void inner_row(const double *inverse_d, const double (*left)[ROBOT_LANES], const double (*right)[ROBOT_LANES], int rows,
+                      int r, double out[ROBOT_LANES]) {
+    double sum[ROBOT_LANES] = {0};
     for (int k = 0; k < rows; k++) {
-        double weight = d->qLDiagInv[foot_dof(foot, k)];
-        for (int r = 0; r < 6; r++) {
-            double scaled = weight * left[k][r];
-            for (int c = 0; c < ROBOT_LANES; c++) {
-                block[r][c] += scaled * right[k][c];
-            }
+        double scaled = inverse_d[k] * left[k][r];
+        for (int c = 0; c < ROBOT_LANES; c++) {
+            sum[c] += scaled * right[k][c];
         }
     }
+    memcpy(out, sum, sizeof sum);
 }
 
 void foot_map_inverse_inertia(RobotSim *sim) {
@@ -94,13 +93,17 @@ void foot_map_inverse_inertia(RobotSim *sim) {
         backward_substitute(sim->model, sim->data, f, map->half[f]);
     }
     for (int f = 0; f < ROBOT_FEET; f++) {
+        double inverse_d[ROBOT_FOOT_DOFS];
+        for (int k = 0; k < ROBOT_FOOT_DOFS; k++) {
+            inverse_d[k] = sim->data->qLDiagInv[foot_dof(f, k)];
+        }
         for (int g = 0; g <= f; g++) { /* feet share the base's rows only */
-            double block[6][ROBOT_LANES] = {{0}};
-            accumulate(sim->data, map->half[f], map->half[g], f, f == g ? ROBOT_FOOT_DOFS : ROBOT_LEG, block);
             for (int r = 0; r < 6; r++) {
-                for (int c = 0; c < 6; c++) {
-                    a[(6 * f + r) * 12 + 6 * g + c] = block[r][c];
-                    a[(6 * g + c) * 12 + 6 * f + r] = block[r][c];
+                double row[ROBOT_LANES];
+                inner_row(inverse_d, map->half[f], map->half[g], f == g ? ROBOT_FOOT_DOFS : ROBOT_LEG, r, row);
+                memcpy(a + (6 * f + r) * 12 + 6 * g, row, 6 * sizeof *a);
+                for (int c = 0; c < 6 && g < f; c++) {
+                    a[(6 * g + c) * 12 + 6 * f + r] = row[c];
                 }
             }
         }

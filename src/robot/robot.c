@@ -224,7 +224,7 @@ static MildStatus read_stand(Robot *robot, const char *path, MildError *error) {
     robot->stand_height = data->xpos[3 * robot->base_body + 2] - (ankle + robot->sole_z);
     robot->total_mass = m->body_subtreemass[robot->base_body];
     mj_deleteData(data);
-    return MILD_OK;
+    return stand_prepare(robot) ? mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path) : MILD_OK;
 }
 
 static MildStatus read_robot(Robot *robot, const char *path, MildError *error) {

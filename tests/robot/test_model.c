@@ -1,0 +1,390 @@
+/* The model file against the published numbers: models/sa01/sa01.json, read here independently of MuJoCo. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <cjson/cJSON.h>
+#include <mujoco/mujoco.h>
+
+#include "base/random.h"
+#include "robot/robot.h"
+
+#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define NUMBERS MILD_SOURCE_DIR "/models/sa01/sa01.json"
+#define LINKS (ROBOT_JOINTS + 1)
+
+typedef struct {
+    char name[LINKS][32];
+    int parent[LINKS]; /* link */
+    double mass[LINKS], com[LINKS][3], inertia[LINKS][9];
+    double origin[LINKS][3], axis[LINKS][3], armature[LINKS]; /* of the joint above the link; 0 unused */
+} Tree;
+
+static Robot *robot;
+static RobotSim *sim;
+static cJSON *numbers;
+static Tree tree;
+
+static char *read_file(const char *path) {
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    fseek(file, 0, SEEK_END);
+    long size = ftell(file);
+    rewind(file);
+    char *text = calloc(1, (size_t)size + 1);
+    assert_non_null(text);
+    assert_int_equal(fread(text, 1, (size_t)size, file), size);
+    fclose(file);
+    return text;
+}
+
+static double number(const cJSON *object, const char *name) {
+    const cJSON *item = cJSON_GetObjectItem(object, name);
+    assert_non_null(item);
+    return item->valuedouble;
+}
+
+static void vector(const cJSON *object, const char *name, double *out) {
+    for (int k = 0; k < 3; k++) {
+        out[k] = cJSON_GetArrayItem(cJSON_GetObjectItem(object, name), k)->valuedouble;
+    }
+}
+
+static int link_index(const char *name) {
+    for (int i = 0; i < LINKS; i++) {
+        if (strcmp(tree.name[i], name) == 0) {
+            return i;
+        }
+    }
+    fail_msg("unknown link %s", name);
+    return -1;
+}
+
+static void read_tree(void) {
+    const cJSON *links = cJSON_GetObjectItem(numbers, "links"), *joints = cJSON_GetObjectItem(numbers, "joints");
+    for (int i = 0; i < LINKS; i++) {
+        const cJSON *link = cJSON_GetArrayItem(links, i), *about = cJSON_GetObjectItem(link, "inertia_about_com");
+        snprintf(tree.name[i], sizeof tree.name[i], "%s", cJSON_GetObjectItem(link, "name")->valuestring);
+        tree.mass[i] = number(link, "mass");
+        vector(link, "com_xyz", tree.com[i]);
+        double xx = number(about, "ixx"), yy = number(about, "iyy"), zz = number(about, "izz");
+        double xy = number(about, "ixy"), xz = number(about, "ixz"), yz = number(about, "iyz");
+        double full[9] = {xx, xy, xz, xy, yy, yz, xz, yz, zz};
+        memcpy(tree.inertia[i], full, sizeof full);
+    }
+    for (int j = 0; j < ROBOT_JOINTS; j++) {
+        const cJSON *joint = cJSON_GetArrayItem(joints, j);
+        int child = link_index(cJSON_GetObjectItem(joint, "child")->valuestring);
+        assert_int_equal(child, j + 1);
+        tree.parent[child] = link_index(cJSON_GetObjectItem(joint, "parent")->valuestring);
+        vector(joint, "origin_xyz", tree.origin[child]);
+        vector(joint, "axis", tree.axis[child]);
+        tree.armature[child] = number(joint, "mjcf_armature");
+    }
+}
+
+static void multiply(const double *a, const double *b, double *out) {
+    double product[9];
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            product[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
+        }
+    }
+    memcpy(out, product, sizeof product);
+}
+
+static void rotate(const double *turn, const double *v, double *out) {
+    for (int i = 0; i < 3; i++) {
+        out[i] = turn[3 * i] * v[0] + turn[3 * i + 1] * v[1] + turn[3 * i + 2] * v[2];
+    }
+}
+
+static void cross(const double *a, const double *b, double *out) {
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* Rodrigues: rotation by `angle` about a unit axis. */
+static void axis_rotation(const double *n, double angle, double *turn) {
+    double c = cos(angle), s = sin(angle), k = 1.0 - c;
+    double full[9] = {c + k * n[0] * n[0],        k * n[0] * n[1] - s * n[2], k * n[0] * n[2] + s * n[1],
+                      k * n[1] * n[0] + s * n[2], c + k * n[1] * n[1],        k * n[1] * n[2] - s * n[0],
+                      k * n[2] * n[0] - s * n[1], k * n[2] * n[1] + s * n[0], c + k * n[2] * n[2]};
+    memcpy(turn, full, sizeof full);
+}
+
+static void quaternion_rotation(const double *q, double *turn) {
+    double w = q[0], x = q[1], y = q[2], z = q[3];
+    double full[9] = {1 - 2 * (y * y + z * z), 2 * (x * y - w * z),     2 * (x * z + w * y),
+                      2 * (x * y + w * z),     1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                      2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
+    memcpy(turn, full, sizeof full);
+}
+
+static void link_poses(const double *qpos, double position[LINKS][3], double turn[LINKS][9]) {
+    memcpy(position[0], qpos, 3 * sizeof(double));
+    quaternion_rotation(qpos + 3, turn[0]);
+    for (int i = 1; i < LINKS; i++) {
+        int p = tree.parent[i];
+        double offset[3], about[9];
+        rotate(turn[p], tree.origin[i], offset);
+        for (int k = 0; k < 3; k++) {
+            position[i][k] = position[p][k] + offset[k];
+        }
+        axis_rotation(tree.axis[i], qpos[6 + i], about);
+        multiply(turn[p], about, turn[i]);
+    }
+}
+
+/* M = sum over links of m Jv^T Jv + Jw^T I Jw, plus rotor armature on the diagonal. */
+static void mass_matrix(const double *qpos, double *mass) {
+    double position[LINKS][3], turn[LINKS][9];
+    link_poses(qpos, position, turn);
+    memset(mass, 0, ROBOT_NV * ROBOT_NV * sizeof *mass);
+    for (int i = 0; i < LINKS; i++) {
+        double jv[ROBOT_NV][3] = {{0}}, jw[ROBOT_NV][3] = {{0}}, com[3], arm[3], turned[9], transposed[9], world[9];
+        rotate(turn[i], tree.com[i], com);
+        for (int k = 0; k < 3; k++) {
+            com[k] += position[i][k];
+            jv[k][k] = 1.0;
+        }
+        for (int k = 0; k < 3; k++) {
+            double axis[3] = {turn[0][k], turn[0][3 + k], turn[0][6 + k]};
+            for (int r = 0; r < 3; r++) {
+                arm[r] = com[r] - position[0][r];
+            }
+            memcpy(jw[3 + k], axis, sizeof axis);
+            cross(axis, arm, jv[3 + k]);
+        }
+        for (int a = i; a > 0; a = tree.parent[a]) {
+            rotate(turn[a], tree.axis[a], jw[5 + a]);
+            for (int r = 0; r < 3; r++) {
+                arm[r] = com[r] - position[a][r];
+            }
+            cross(jw[5 + a], arm, jv[5 + a]);
+        }
+        multiply(turn[i], tree.inertia[i], turned);
+        for (int k = 0; k < 9; k++) {
+            transposed[k] = turn[i][3 * (k % 3) + k / 3];
+        }
+        multiply(turned, transposed, world);
+        for (int r = 0; r < ROBOT_NV; r++) {
+            double spun[3];
+            rotate(world, jw[r], spun);
+            for (int c = 0; c < ROBOT_NV; c++) {
+                for (int k = 0; k < 3; k++) {
+                    mass[r * ROBOT_NV + c] += tree.mass[i] * jv[r][k] * jv[c][k] + spun[k] * jw[c][k];
+                }
+            }
+        }
+    }
+    for (int i = 1; i < LINKS; i++) {
+        mass[(5 + i) * (ROBOT_NV + 1)] += tree.armature[i];
+    }
+}
+
+static RobotState random_state(uint32_t index) {
+    Random random = random_at(5, index, 0);
+    RobotState state = {0};
+    double norm = 0.0;
+    for (int i = 0; i < 3; i++) {
+        state.qpos[i] = random_uniform(&random, -1, 1);
+    }
+    for (int i = 3; i < 7; i++) {
+        state.qpos[i] = random_normal(&random);
+        norm += state.qpos[i] * state.qpos[i];
+    }
+    for (int i = 3; i < 7; i++) {
+        state.qpos[i] /= sqrt(norm);
+    }
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        state.qpos[7 + i] = random_uniform(&random, robot_joint_low(robot)[i], robot_joint_high(robot)[i]);
+    }
+    return state;
+}
+
+static RobotState stand_state(void) {
+    RobotState state = {.qpos = {0, 0, robot_stand_height(robot), 1, 0, 0, 0}};
+    memcpy(state.qpos + 7, robot_default_pose(robot), ROBOT_JOINTS * sizeof(double));
+    return state;
+}
+
+static int setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    robot = robot_create(MODEL, &error);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
+    sim = robot_sim_create(robot, 0.001, &error);
+    char *text = read_file(NUMBERS);
+    numbers = cJSON_Parse(text);
+    free(text);
+    if (!sim || !numbers) {
+        return 1;
+    }
+    read_tree();
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    robot_sim_destroy(sim);
+    robot_destroy(robot);
+    cJSON_Delete(numbers);
+    return 0;
+}
+
+static void near(double value, double expected, double tolerance, const char *what) {
+    if (!(fabs(value - expected) <= tolerance)) {
+        fail_msg("%s: %.9g instead of %.9g", what, value, expected);
+    }
+}
+
+static void test_limits_and_masses(void **unused) {
+    (void)unused;
+    near(robot_total_mass(robot), number(numbers, "total_mass_kg"), 1e-9, "total mass");
+    const mjModel *m = robot_sim_model(sim);
+    const cJSON *joints = cJSON_GetObjectItem(numbers, "joints");
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        const cJSON *joint = cJSON_GetArrayItem(joints, i), *range = cJSON_GetObjectItem(joint, "mjcf_range");
+        near(robot_joint_low(robot)[i], cJSON_GetArrayItem(range, 0)->valuedouble, 1e-12, "low");
+        near(robot_joint_high(robot)[i], cJSON_GetArrayItem(range, 1)->valuedouble, 1e-12, "high");
+        near(robot_effort(robot)[i], number(joint, "effort_Nm"), 1e-12, "effort");
+        near(robot_default_pose(robot)[i], number(joint, "q_default_training"), 1e-12, "pose");
+        near(m->dof_armature[6 + i], number(joint, "mjcf_armature"), 1e-12, "armature");
+        near(m->dof_damping[6 + i] + m->dof_frictionloss[6 + i], 0.0, 0.0, "damping and friction");
+        assert_string_equal(mj_id2name(m, mjOBJ_JOINT, 1 + i), cJSON_GetObjectItem(joint, "name")->valuestring);
+    }
+}
+
+/* JSON's derived_standing.training_default was computed by its authors from the same links. */
+static void test_standing(void **unused) {
+    (void)unused;
+    const cJSON *expected = cJSON_GetObjectItem(cJSON_GetObjectItem(numbers, "derived_standing"), "training_default");
+    double ankle[3], com[3], inertia[9] = {0}, position[LINKS][3], turn[LINKS][9];
+    vector(expected, "ankle_xyz_left", ankle);
+    vector(expected, "com_in_base", com);
+    RobotState state = stand_state();
+    RobotVariation nominal = robot_variation_nominal();
+    robot_sim_load(sim, &state, &nominal);
+    const mjModel *m = robot_sim_model(sim);
+    const mjData *d = robot_sim_data(sim);
+    near(robot_stand_height(robot), number(expected, "base_above_sole"), 1e-6, "base above sole");
+    near(d->subtree_com[3 + 2], number(expected, "com_above_sole"), 1e-6, "com above sole");
+    near(robot_sim_foot(sim, 0)->sole_height, 0.0, 1e-12, "left sole");
+    near(robot_sim_foot(sim, 1)->sole_height, 0.0, 1e-12, "right sole");
+    for (int k = 0; k < 3; k++) {
+        near(robot_sim_foot(sim, 0)->position[k] - state.qpos[k], ankle[k], 1e-6, "left ankle");
+        near(d->subtree_com[3 + k] - state.qpos[k], com[k], 1e-6, "com in base");
+    }
+    link_poses(state.qpos, position, turn);
+    for (int b = 1; b < m->nbody; b++) { /* composite inertia about the common centre of mass, from MuJoCo's own bodies */
+        double arm[3], local[9] = {0}, turned[9], transposed[9], world[9];
+        for (int k = 0; k < 3; k++) {
+            arm[k] = d->xipos[3 * b + k] - d->subtree_com[3 + k];
+            local[4 * k] = m->body_inertia[3 * b + k];
+        }
+        double square = arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2];
+        multiply(d->ximat + 9 * b, local, turned);
+        for (int k = 0; k < 9; k++) {
+            transposed[k] = d->ximat[9 * b + 3 * (k % 3) + k / 3];
+        }
+        multiply(turned, transposed, world);
+        for (int k = 0; k < 9; k++) {
+            inertia[k] += world[k] + m->body_mass[b] * ((k % 4 == 0 ? square : 0.0) - arm[k / 3] * arm[k % 3]);
+        }
+    }
+    const cJSON *rows = cJSON_GetObjectItem(expected, "composite_inertia_about_com");
+    for (int k = 0; k < 9; k++) {
+        near(inertia[k], cJSON_GetArrayItem(cJSON_GetArrayItem(rows, k / 3), k % 3)->valuedouble, 2e-6, "composite inertia");
+    }
+}
+
+static void test_mass_matrix(void **unused) {
+    (void)unused;
+    double worst = 0.0;
+    for (uint32_t draw = 0; draw < 50; draw++) {
+        RobotState state = random_state(draw);
+        RobotVariation nominal = robot_variation_nominal();
+        robot_sim_load(sim, &state, &nominal);
+        double expected[ROBOT_NV * ROBOT_NV], engine[ROBOT_NV * ROBOT_NV];
+        mass_matrix(state.qpos, expected);
+        const mjModel *m = robot_sim_model(sim);
+        mjData *d = robot_sim_data(sim);
+        mj_makeM(m, d);
+        mj_fullM(m, engine, d->qM);
+        for (int i = 0; i < ROBOT_NV * ROBOT_NV; i++) {
+            worst = fmax(worst, fabs(engine[i] - expected[i]));
+        }
+    }
+    print_message("mass matrix: worst difference %.2e\n", worst);
+    assert_true(worst < 1e-7); /* MuJoCo's diagonalisation of an inertia stops at 1e-6 rad */
+}
+
+static void test_variation(void **unused) {
+    (void)unused;
+    RobotVariation varied = robot_variation_nominal(), nominal = varied;
+    varied.base_mass_add = 2.5;
+    varied.com_offset[0] = 0.01;
+    varied.link_mass_scale[4] = 1.2;
+    varied.armature_scale = 0.5;
+    varied.rigid_friction = 0.33;
+    RobotState state = stand_state();
+    robot_sim_load(sim, &state, &varied);
+    const mjModel *m = robot_sim_model(sim);
+    near(m->body_subtreemass[1], robot_total_mass(robot) + 2.5 + 0.2 * tree.mass[4], 1e-9, "varied mass");
+    near(m->body_ipos[3], tree.com[0][0] + 0.01, 1e-12, "varied com");
+    near(m->dof_armature[6], 0.021, 1e-12, "varied armature");
+    near(m->pair_friction[0], 0.33, 1e-12, "varied friction");
+    robot_sim_load(sim, &state, &nominal);
+    near(m->body_subtreemass[1], robot_total_mass(robot), 1e-12, "mass back");
+    near(m->pair_friction[0], 0.8, 1e-12, "friction back");
+}
+
+/* The model with `word` misspelt everywhere must be refused with one line that names it. */
+static void refuse(const char *word, const char *path) {
+    char *text = read_file(MODEL);
+    for (char *at = strstr(text, word); at; at = strstr(at, word)) {
+        *at++ = 'x';
+    }
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    fputs(text, file);
+    fclose(file);
+    free(text);
+    MildError error = {0};
+    assert_null(robot_create(path, &error));
+    print_message("%s\n", error.text);
+    assert_non_null(strstr(error.text, word));
+    assert_null(strchr(error.text, '\n'));
+    remove(path);
+}
+
+static void test_refusals(void **unused) {
+    (void)unused;
+    refuse("leg_r6_link", "robot_missing_foot.xml");
+    refuse("leg_l4_joint", "robot_missing_joint.xml");
+    refuse("sole_outline_right", "robot_missing_sole.xml");
+    refuse("base_link_box", "robot_missing_box.xml");
+    MildError error = {0};
+    assert_null(robot_create("no_such_file.xml", &error));
+    print_message("%s\n", error.text);
+    assert_non_null(strstr(error.text, "no_such_file.xml"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_limits_and_masses), cmocka_unit_test(test_standing),  cmocka_unit_test(test_mass_matrix),
+        cmocka_unit_test(test_variation),         cmocka_unit_test(test_refusals),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

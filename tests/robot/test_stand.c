@@ -1,0 +1,170 @@
+/* Standing ten seconds with the stand gains on every ground, at every physics step from 0.5 to 5 ms. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "robot/stand.h"
+
+#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define SECONDS 10.0
+#define FALLEN 0.7 /* [m] base height */
+
+typedef struct {
+    int stands;
+    double seconds;       /* [s] until it fell, or all */
+    double depth;         /* [m] mean over feet and the last two seconds */
+    double creep;         /* [m] change of the mean depth in the last two seconds */
+    double drift;         /* [m] of the soles' centres from where they first rested, horizontal */
+    double tilt;          /* [rad] of the soles at the end, the larger */
+    double torque;        /* [N m] largest in the last two seconds */
+} Stand;
+
+static Robot *robot;
+
+static int setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    robot = robot_create(MODEL, &error);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    robot_destroy(robot);
+    return 0;
+}
+
+static double mean_depth(const RobotSim *sim) {
+    return 0.5 * (robot_sim_foot(sim, 0)->result.depth_mean + robot_sim_foot(sim, 1)->result.depth_mean);
+}
+
+static double sole_drift(const RobotSim *sim, double start[ROBOT_FEET][3]) {
+    double worst = 0.0;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        const double *now = robot_sim_foot(sim, f)->sole_center;
+        worst = fmax(worst, hypot(now[0] - start[f][0], now[1] - start[f][1]));
+    }
+    return worst;
+}
+
+static double static_sinkage(const MildMaterial *material) {
+    const MildSole *const *soles = robot_soles(robot);
+    int elements = mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]);
+    return robot_static_sinkage(material, mild_sole_pitch(soles[0]), elements, 9.81 * robot_total_mass(robot));
+}
+
+/* material: NULL for rigid ground. */
+static Stand stand(const MildMaterial *material, double dt, int balance, MildSolver solver) {
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, dt, &error);
+    assert_non_null(sim);
+    robot_sim_set_solver(sim, solver);
+    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
+    assert_non_null(block);
+    MildGround *ground = mild_ground_init(block, robot_soles(robot), ROBOT_FEET);
+    MildMaterial any = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
+    RobotVariation variation = robot_variation_nominal();
+    variation.rigid = material == NULL;
+    RobotState state = robot_stand_state(robot, balance, material ? static_sinkage(material) : 0.0);
+    robot_sim_load(sim, &state, &variation);
+    double start[ROBOT_FEET][3], late = 0.0;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        memcpy(start[f], robot_sim_foot(sim, f)->sole_center, sizeof start[f]);
+    }
+    Stand result = {.stands = 1};
+    int steps = (int)(SECONDS / dt + 0.5), tail = (int)(2.0 / dt + 0.5);
+    for (int i = 0; i < steps && result.stands; i++) {
+        double torque[ROBOT_JOINTS];
+        robot_stand_torque(robot, sim, balance, torque);
+        int bad = robot_sim_step(sim, torque, NULL, &terrain, ground);
+        result.stands = !bad && robot_sim_qpos(sim)[2] > FALLEN;
+        result.seconds = (i + 1) * dt;
+        late = i == steps - tail ? mean_depth(sim) : late;
+        if (i >= steps - tail) {
+            result.depth += mean_depth(sim) / tail;
+            for (int k = 0; k < ROBOT_JOINTS; k++) {
+                result.torque = fmax(result.torque, fabs(torque[k]));
+            }
+        }
+    }
+    result.creep = mean_depth(sim) - late;
+    result.drift = sole_drift(sim, start);
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        result.tilt = fmax(result.tilt, acos(fmin(1.0, robot_sim_foot(sim, f)->rotation[8])));
+    }
+    free(block);
+    robot_sim_destroy(sim);
+    return result;
+}
+
+static void check_balanced(const char *name, const MildMaterial *material, double dt, MildSolver solver) {
+    Stand result = stand(material, dt, 1, solver);
+    double expected = material ? static_sinkage(material) : 0.0;
+    print_message("%-11s %.1f ms %s %5.2f s depth %6.3f of %6.3f mm, creep %8.5f mm, drift %.4f mm, tilt %.4f rad, torque %.1f N m\n",
+                  name, 1e3 * dt, result.stands ? "stands" : "FELL  ", result.seconds, 1e3 * result.depth, 1e3 * expected,
+                  1e3 * result.creep, 1e3 * result.drift, result.tilt, result.torque);
+    assert_true(result.stands);
+    assert_true(fabs(result.creep) < 1e-4);
+    assert_true(result.drift < 3e-3);
+    if (material) {
+        assert_true(fabs(result.depth - expected) < 0.15 * expected);
+    }
+}
+
+static void test_stands_everywhere(void **unused) {
+    (void)unused;
+    static const double steps[] = {0.0005, 0.001, 0.0025, 0.005};
+    for (int s = 0; s < 4; s++) {
+        check_balanced("rigid", NULL, steps[s], MILD_SOLVER_NEWTON);
+        for (int p = 0; p < mild_material_preset_count(); p++) {
+            MildMaterial material;
+            assert_true(mild_material_preset(mild_material_preset_name(p), &material));
+            check_balanced(mild_material_preset_name(p), &material, steps[s], MILD_SOLVER_NEWTON);
+        }
+    }
+}
+
+static void test_stands_with_the_papers_solver(void **unused) {
+    (void)unused;
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        MildMaterial material;
+        assert_true(mild_material_preset(mild_material_preset_name(p), &material));
+        check_balanced(mild_material_preset_name(p), &material, 0.0025, MILD_SOLVER_GAUSS_SEIDEL);
+    }
+}
+
+/* Joints held at the default pose without balance: rigid ground carries that, soft foam cannot (see stand.c). */
+static void test_plain_gains(void **unused) {
+    (void)unused;
+    Stand rigid = stand(NULL, 0.001, 0, MILD_SOLVER_NEWTON);
+    assert_true(rigid.stands);
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        MildMaterial material;
+        assert_true(mild_material_preset(mild_material_preset_name(p), &material));
+        Stand result = stand(&material, 0.001, 0, MILD_SOLVER_NEWTON);
+        print_message("plain gains on %-11s %s after %.2f s\n", mild_material_preset_name(p), result.stands ? "stand" : "fall",
+                      result.seconds);
+        if (strcmp(mild_material_preset_name(p), "foam25") == 0) {
+            assert_false(result.stands);
+        }
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_stands_everywhere),
+        cmocka_unit_test(test_stands_with_the_papers_solver),
+        cmocka_unit_test(test_plain_gains),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,381 @@
+/* The step: against the engine's own step, against dense algebra, momentum, determinism. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <mujoco/mujoco.h>
+
+#include "base/random.h"
+#include "robot/sim.h"
+#include "robot/stand.h"
+
+#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define ROWS 12
+
+static Robot *robot;
+
+static int setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    robot = robot_create(MODEL, &error);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    robot_destroy(robot);
+    return 0;
+}
+
+static MildTerrain preset_terrain(const char *name) {
+    MildMaterial material;
+    assert_true(mild_material_preset(name, &material));
+    return mild_terrain_uniform(&material);
+}
+
+static MildGround *new_ground(void) {
+    size_t bytes = mild_ground_bytes(robot_soles(robot), ROBOT_FEET);
+    void *block = calloc(1, bytes);
+    assert_non_null(block);
+    return mild_ground_init(block, robot_soles(robot), ROBOT_FEET);
+}
+
+static RobotSim *new_sim(double dt) {
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, dt, &error);
+    assert_non_null(sim);
+    return sim;
+}
+
+/* A state near the ground with all joints inside their ranges. */
+static RobotState random_state(uint32_t index) {
+    Random random = random_at(11, index, 0);
+    RobotState state = robot_stand_state(robot, 0, 0.005);
+    for (int i = 0; i < 4; i++) {
+        state.qpos[3 + i] += random_uniform(&random, -0.1, 0.1);
+    }
+    double norm = 0.0;
+    for (int i = 3; i < 7; i++) {
+        norm += state.qpos[i] * state.qpos[i];
+    }
+    for (int i = 3; i < 7; i++) {
+        state.qpos[i] /= sqrt(norm);
+    }
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        state.qpos[7 + i] += random_uniform(&random, -0.1, 0.1);
+    }
+    for (int i = 0; i < ROBOT_NV; i++) {
+        state.qvel[i] = random_uniform(&random, -0.5, 0.5);
+    }
+    return state;
+}
+
+/* Our rigid step is the engine's step, joint limits and contacts included. */
+static void test_rigid_is_the_engine(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation rigid = robot_variation_nominal();
+    rigid.rigid = 1;
+    MildTerrain terrain = preset_terrain("sand_loose");
+    mjModel *m = robot_sim_model(sim);
+    mjData *engine = mj_makeData(m);
+    double worst = 0.0;
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        RobotState state = random_state(draw);
+        mj_resetData(m, engine);
+        robot_sim_load(sim, &state, &rigid);
+        memcpy(engine->qpos, state.qpos, sizeof state.qpos);
+        memcpy(engine->qvel, state.qvel, sizeof state.qvel);
+        for (int i = 0; i < 300; i++) { /* with no torque the robot collapses into its joint limits */
+            double torque[ROBOT_JOINTS] = {0};
+            if (draw % 2 == 0) {
+                robot_stand_torque(robot, sim, 0, torque);
+            }
+            memcpy(engine->qfrc_applied + 6, torque, sizeof torque);
+            mj_step(m, engine);
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
+        }
+        for (int i = 0; i < ROBOT_NQ; i++) {
+            worst = fmax(worst, fabs(engine->qpos[i] - robot_sim_qpos(sim)[i]));
+        }
+    }
+    print_message("rigid against mj_step: worst %.2e\n", worst);
+    assert_true(worst < 1e-9);
+    mj_deleteData(engine);
+    robot_sim_destroy(sim);
+}
+
+/* Dense J of both feet from the engine. */
+static void dense_jacobian(RobotSim *sim, double j[ROWS * ROBOT_NV]) {
+    static const char *const names[ROBOT_FEET] = {"leg_l6_link", "leg_r6_link"};
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        const mjModel *m = robot_sim_model(sim);
+        double *rows = j + 6 * f * ROBOT_NV;
+        mj_jacBody(m, robot_sim_data(sim), rows, rows + 3 * ROBOT_NV, mj_name2id(m, mjOBJ_BODY, names[f]));
+    }
+}
+
+/* x <- M^-1 x by Gaussian elimination on the full matrix. */
+static void dense_solve(const double *mass, double *x) {
+    double a[ROBOT_NV][ROBOT_NV + 1];
+    for (int i = 0; i < ROBOT_NV; i++) {
+        memcpy(a[i], mass + i * ROBOT_NV, ROBOT_NV * sizeof(double));
+        a[i][ROBOT_NV] = x[i];
+    }
+    for (int p = 0; p < ROBOT_NV; p++) {
+        for (int i = p + 1; i < ROBOT_NV; i++) {
+            double factor = a[i][p] / a[p][p];
+            for (int k = p; k <= ROBOT_NV; k++) {
+                a[i][k] -= factor * a[p][k];
+            }
+        }
+    }
+    for (int i = ROBOT_NV - 1; i >= 0; i--) {
+        double sum = a[i][ROBOT_NV];
+        for (int k = i + 1; k < ROBOT_NV; k++) {
+            sum -= a[i][k] * x[k];
+        }
+        x[i] = sum / a[i][i];
+    }
+}
+
+static void test_map_against_dense(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation nominal = robot_variation_nominal();
+    double worst_a = 0.0, worst_wrench = 0.0, worst_twist = 0.0;
+    for (uint32_t draw = 0; draw < 50; draw++) {
+        RobotState state = random_state(draw);
+        robot_sim_load(sim, &state, &nominal);
+        const mjModel *m = robot_sim_model(sim);
+        mjData *d = robot_sim_data(sim);
+        mj_makeM(m, d);
+        mj_factorM(m, d);
+        foot_map_inverse_inertia(sim);
+        double mass[ROBOT_NV * ROBOT_NV], j[ROWS * ROBOT_NV], solved[ROWS * ROBOT_NV];
+        mj_fullM(m, mass, d->qM);
+        dense_jacobian(sim, j);
+        memcpy(solved, j, sizeof solved);
+        for (int r = 0; r < ROWS; r++) {
+            dense_solve(mass, solved + r * ROBOT_NV);
+            double twist = 0.0;
+            for (int k = 0; k < ROBOT_NV; k++) {
+                twist += j[r * ROBOT_NV + k] * state.qvel[k];
+            }
+            worst_twist = fmax(worst_twist, fabs(twist - robot_sim_foot(sim, r / 6)->velocity[r % 6]));
+        }
+        for (int r = 0; r < ROWS; r++) {
+            for (int c = 0; c < ROWS; c++) {
+                double sum = 0.0;
+                for (int k = 0; k < ROBOT_NV; k++) {
+                    sum += j[r * ROBOT_NV + k] * solved[c * ROBOT_NV + k];
+                }
+                worst_a = fmax(worst_a, fabs(sum - sim->input.inverse_inertia[r * ROWS + c]) / (1.0 + fabs(sum)));
+            }
+        }
+        double wrench[ROBOT_FEET][6], force[ROBOT_NV], acceleration[ROBOT_NV];
+        for (int r = 0; r < ROWS; r++) {
+            wrench[r / 6][r % 6] = sin(1.0 + r);
+        }
+        foot_map_wrench(sim, wrench, force, acceleration);
+        for (int k = 0; k < ROBOT_NV; k++) {
+            double f = 0.0, a = 0.0;
+            for (int r = 0; r < ROWS; r++) {
+                f += j[r * ROBOT_NV + k] * wrench[r / 6][r % 6];
+                a += solved[r * ROBOT_NV + k] * wrench[r / 6][r % 6];
+            }
+            worst_wrench = fmax(worst_wrench, fabs(f - force[k]));
+            worst_wrench = fmax(worst_wrench, fabs(a - acceleration[k]) / (1.0 + fabs(a)));
+        }
+    }
+    print_message("A %.2e, wrench %.2e, twist %.2e from dense\n", worst_a, worst_wrench, worst_twist);
+    assert_true(worst_a < 1e-10 && worst_wrench < 1e-10 && worst_twist < 1e-12);
+    robot_sim_destroy(sim);
+}
+
+/* Foot twist after a soft step = what the contact solver promised: the robot and the solver see the same A and V^. */
+static void test_twist_is_the_solvers(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    MildTerrain terrain = preset_terrain("sand_loose");
+    MildGround *ground = new_ground();
+    RobotVariation nominal = robot_variation_nominal();
+    double worst = 0.0;
+    for (uint32_t draw = 0; draw < 40; draw++) {
+        RobotState state = random_state(draw);
+        robot_sim_load(sim, &state, &nominal);
+        mild_ground_reset(ground);
+        double torque[ROBOT_JOINTS], j[ROWS * ROBOT_NV];
+        robot_stand_torque(robot, sim, 0, torque);
+        dense_jacobian(sim, j);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        for (int r = 0; r < ROWS; r++) {
+            double twist = 0.0;
+            for (int k = 0; k < ROBOT_NV; k++) {
+                twist += j[r * ROBOT_NV + k] * robot_sim_qvel(sim)[k];
+            }
+            worst = fmax(worst, fabs(twist - robot_sim_contact(sim)->velocity[r]));
+        }
+    }
+    print_message("foot twist after the step against the solver's: worst %.2e\n", worst);
+    assert_true(worst < 1e-6);
+    free(ground);
+    robot_sim_destroy(sim);
+}
+
+static void momentum(RobotSim *sim, double out[3]) {
+    const mjModel *m = robot_sim_model(sim);
+    mjData *d = robot_sim_data(sim);
+    mj_comVel(m, d);
+    mj_subtreeVel(m, d);
+    for (int k = 0; k < 3; k++) {
+        out[k] = m->body_subtreemass[1] * d->subtree_linvel[3 + k];
+    }
+}
+
+/* Change of momentum = dt (weight + push + foot forces), in contact and in the air. */
+static void test_momentum(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.0005);
+    MildTerrain terrain = preset_terrain("foam60");
+    MildGround *ground = new_ground();
+    RobotVariation nominal = robot_variation_nominal();
+    const double push[6] = {30, -20, 10, 1, 2, 3};
+    double worst = 0.0;
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        RobotState state = random_state(draw);
+        state.qpos[2] += draw % 2 ? 0.5 : 0.0;
+        memset(state.qvel, 0, sizeof state.qvel); /* the engine's Euler step conserves momentum to first order in the speed */
+        robot_sim_load(sim, &state, &nominal);
+        mild_ground_reset(ground);
+        double torque[ROBOT_JOINTS], before[3], after[3];
+        robot_stand_torque(robot, sim, 0, torque);
+        momentum(sim, before);
+        assert_int_equal(robot_sim_step(sim, torque, push, &terrain, ground), 0);
+        momentum(sim, after);
+        for (int k = 0; k < 3; k++) {
+            double force = push[k] + robot_sim_foot(sim, 0)->force[k] + robot_sim_foot(sim, 1)->force[k];
+            force -= k == 2 ? 9.81 * robot_total_mass(robot) : 0.0;
+            worst = fmax(worst, fabs(after[k] - before[k] - robot_sim_dt(sim) * force));
+        }
+    }
+    print_message("momentum balance of a step: worst %.2e N s\n", worst);
+    assert_true(worst < 5e-3);
+    free(ground);
+    robot_sim_destroy(sim);
+}
+
+typedef struct {
+    RobotState state;
+    RobotVariation variation;
+    MildTerrain terrain;
+    MildGround *ground;
+} Case;
+
+static void advance_case(RobotSim *sim, Case *one) {
+    double torque[ROBOT_JOINTS];
+    robot_sim_load(sim, &one->state, &one->variation);
+    robot_stand_torque(robot, sim, 0, torque);
+    assert_int_equal(robot_sim_step(sim, torque, NULL, &one->terrain, one->ground), 0);
+    robot_sim_store(sim, &one->state);
+}
+
+/* A step depends on (state, variation, terrain, ground) only, not on what the workspace did before. */
+static void test_determinism(void **unused) {
+    (void)unused;
+    static const char *const names[4] = {"sand_loose", "foam45", "grass", "rubber"};
+    Case shared[4], alone[4];
+    RobotSim *sim = new_sim(0.001);
+    for (int i = 0; i < 4; i++) {
+        shared[i] = (Case){random_state((uint32_t)i), robot_variation_nominal(), preset_terrain(names[i]), new_ground()};
+        shared[i].variation.rigid = i == 2;
+        shared[i].variation.base_mass_add = i;
+        alone[i] = shared[i];
+        alone[i].ground = new_ground();
+    }
+    for (int step = 0; step < 300; step++) {
+        for (int i = 0; i < 4; i++) {
+            advance_case(sim, &shared[i]);
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        RobotSim *own = new_sim(0.001);
+        robot_sim_load(own, &alone[i].state, &alone[i].variation);
+        for (int step = 0; step < 300; step++) { /* without a load in between: storing and loading changes nothing */
+            double torque[ROBOT_JOINTS];
+            robot_stand_torque(robot, own, 0, torque);
+            assert_int_equal(robot_sim_step(own, torque, NULL, &alone[i].terrain, alone[i].ground), 0);
+        }
+        robot_sim_store(own, &alone[i].state);
+        assert_memory_equal(&alone[i].state, &shared[i].state, sizeof shared[i].state);
+        assert_memory_equal(alone[i].ground, shared[i].ground, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
+        robot_sim_destroy(own);
+        free(alone[i].ground);
+        free(shared[i].ground);
+    }
+    robot_sim_destroy(sim);
+}
+
+static void test_bad_numbers(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    MildTerrain terrain = preset_terrain("sand_loose");
+    MildGround *ground = new_ground();
+    RobotVariation nominal = robot_variation_nominal();
+    RobotState state = robot_stand_state(robot, 0, 0.0);
+    double torque[ROBOT_JOINTS] = {0};
+    torque[3] = NAN;
+    robot_sim_load(sim, &state, &nominal);
+    assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 1);
+    mild_ground_reset(ground);
+    torque[3] = 1e9;
+    robot_sim_load(sim, &state, &nominal);
+    assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 1);
+    mild_ground_reset(ground);
+    torque[3] = 0.0;
+    robot_sim_load(sim, &state, &nominal);
+    assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+    free(ground);
+    robot_sim_destroy(sim);
+}
+
+static void test_clearance_and_distances(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    MildTerrain terrain = preset_terrain("sand_loose");
+    RobotVariation nominal = robot_variation_nominal();
+    RobotState state = robot_stand_state(robot, 0, 0.0);
+    robot_sim_load(sim, &state, &nominal);
+    /* shank box: 0.32 below the knee axis of a shank leaning 0.24 rad, plus its corner */
+    double ankle = 0.055, expected = ankle + 0.37 * cos(0.24) - (0.32 * cos(0.24) + 0.025 * sin(0.24));
+    assert_true(fabs(robot_sim_body_clearance(sim, &terrain) - expected) < 1e-9);
+    assert_true(fabs(robot_sim_foot_distance(sim) - 2 * (0.07513 + 0.0055)) < 3e-4);
+    assert_true(fabs(robot_sim_knee_distance(sim) - 2 * 0.07506) < 1e-4);
+    state.qpos[3] = cos(0.4);
+    state.qpos[6] = sin(0.4); /* heading does not matter */
+    robot_sim_load(sim, &state, &nominal);
+    assert_true(fabs(robot_sim_knee_distance(sim) - 2 * 0.07506) < 1e-4);
+    state.qpos[2] = 0.1;
+    robot_sim_load(sim, &state, &nominal);
+    assert_true(robot_sim_body_clearance(sim, &terrain) < 0.0);
+    robot_sim_destroy(sim);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_rigid_is_the_engine), cmocka_unit_test(test_map_against_dense),
+        cmocka_unit_test(test_twist_is_the_solvers), cmocka_unit_test(test_momentum),
+        cmocka_unit_test(test_determinism),          cmocka_unit_test(test_bad_numbers),
+        cmocka_unit_test(test_clearance_and_distances),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
