@@ -102,8 +102,8 @@ static double ground_time(GroundBench *bench, int advance) {
 static void ground_press_in(GroundBench *bench, const Robot *robot, double dt, double depth) {
     MildContactResult result;
     mild_ground_reset(bench->ground);
-    for (double at = 0; at < depth; at += 0.001) {
-        ground_input(&bench->input, robot, dt, at, 0);
+    for (int millimetre = 0; millimetre < 1e3 * depth; millimetre++) {
+        ground_input(&bench->input, robot, dt, 1e-3 * millimetre, 0);
         for (int foot = 0; foot < ROBOT_FEET; foot++) bench->input.free_velocity[6 * foot + 2] = -0.001 / dt;
         memset(bench->input.inverse_inertia, 0, sizeof bench->input.inverse_inertia);
         mild_ground_solve(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
@@ -113,7 +113,8 @@ static void ground_press_in(GroundBench *bench, const Robot *robot, double dt, d
 
 static void ground_cases(GroundBench *bench, const Robot *robot, double dt, BenchReport *report) {
     const double depth = 0.015, slip = 0.2;
-    static const char *const names[2][2] = {{"newton_stick", "newton_slip"}, {"gauss_seidel_stick", "gauss_seidel_slip"}};
+    static const char *const names[2][2] = {{"newton_stick", "newton_slip"},
+                                            {"gauss_seidel_stick", "gauss_seidel_slip"}};
     for (int solver = 0; solver < 2; solver++) {
         for (int slips = 0; slips < 2; slips++) {
             ground_press_in(bench, robot, dt, depth);
@@ -161,7 +162,8 @@ static void train_rows(const TrainTimes *sum, double steps, double wall, int thr
     bench_add(report, "train", "task", 1e6 * (sum->environments - physics - ground) / steps, "us/step");
     bench_add(report, "train", "inference", 1e6 * sum->inference / steps, "us/step");
     bench_add(report, "train", "update", 1e6 * sum->update / steps, "us/step");
-    bench_add(report, "train", "other", 1e6 * (wall - sum->environments - sum->inference - sum->update) / steps, "us/step");
+    bench_add(report, "train", "other", 1e6 * (wall - sum->environments - sum->inference - sum->update) / steps,
+              "us/step");
     bench_add(report, "train", "threads", threads, "-");
 }
 

@@ -120,28 +120,22 @@ static int set_list(const CliCommand *command, const CliOption *option, const ch
         if (failed) return failed;
         rest = rest[length] ? rest + length + 1 : NULL;
     }
-    *(option->type == CLI_NUMBERS ? &((CliNumbers *)option->target)->count : &((CliNames *)option->target)->count) = count;
+    *(option->type == CLI_NUMBERS ? &((CliNumbers *)option->target)->count : &((CliNames *)option->target)->count) =
+        count;
     return 0;
 }
 
 static int set_option(const CliCommand *command, const CliOption *option, const char *text) {
     switch (option->type) {
-    case CLI_FLAG:
-        *(int *)option->target = 1;
-        return 0;
-    case CLI_TEXT:
-        *(const char **)option->target = text;
-        return 0;
-    case CLI_INT:
-        return set_int(command, option, text);
+    case CLI_FLAG: *(int *)option->target = 1; return 0;
+    case CLI_TEXT: *(const char **)option->target = text; return 0;
+    case CLI_INT: return set_int(command, option, text);
     case CLI_UINT64:
         if (text_uint64(text, option->target)) return 0;
         return cli_fail_text(command->name, "--%s: '%s' is not a whole number from 0", option->name, text);
-    case CLI_NUMBER:
-        return set_number(command, option, text, option->target);
+    case CLI_NUMBER: return set_number(command, option, text, option->target);
     case CLI_NUMBERS:
-    case CLI_NAMES:
-        return set_list(command, option, text);
+    case CLI_NAMES: return set_list(command, option, text);
     }
     return CLI_EXIT_BAD_INPUT;
 }
@@ -185,7 +179,8 @@ static int take_option(const CliCommand *command, int argc, char **argv, int *in
             return set_option(command, option, NULL);
         }
         if (equals) return set_option(command, option, equals + 1);
-        if (*index + 1 >= argc) return cli_fail_text(command->name, "--%s needs a value: --%s %s", name, name, option->value);
+        if (*index + 1 >= argc)
+            return cli_fail_text(command->name, "--%s needs a value: --%s %s", name, name, option->value);
         return set_option(command, option, argv[++*index]);
     }
     return fail_unknown(command, name);

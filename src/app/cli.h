@@ -32,9 +32,9 @@ typedef struct {
 } CliOption;
 
 typedef struct {
-    const char *name;     /* "press" */
-    const char *usage;    /* "--ground NAME [options]" */
-    const char *summary;  /* sentences that say what the command does */
+    const char *name;    /* "press" */
+    const char *usage;   /* "--ground NAME [options]" */
+    const char *summary; /* sentences that say what the command does */
     const CliOption *options;
     int option_count;
     const char *overrides; /* help on --section.key=value; NULL: the command takes none */

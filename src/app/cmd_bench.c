@@ -39,17 +39,18 @@ static MildStatus save_json(const BenchReport *report, const char *path, MildErr
     return report_save(root, path, error);
 }
 
-static void print_rows(const BenchReport *report, int first) {
+static void print_rows(const BenchReport *report, int first, FILE *file) {
     for (int i = first; i < report->count; i++) {
         const BenchRow *row = &report->rows[i];
         char bytes[32];
         if (strcmp(row->unit, "B") == 0) {
-            printf("%-8s %-22s %14s\n", row->bench, row->name, text_bytes(row->value, bytes, sizeof bytes));
+            fprintf(file, "%-8s %-22s %14s\n", row->bench, row->name, text_bytes(row->value, bytes, sizeof bytes));
         } else {
-            printf("%-8s %-22s %14.4g %s\n", row->bench, row->name, row->value, strcmp(row->unit, "-") ? row->unit : "");
+            fprintf(file, "%-8s %-22s %14.4g %s\n", row->bench, row->name, row->value,
+                    strcmp(row->unit, "-") ? row->unit : "");
         }
     }
-    fflush(stdout);
+    fflush(file);
 }
 
 /* All names are checked before anything runs. */
@@ -72,17 +73,17 @@ static int wanted(const CliArgs *args, const char *name) {
     return args->positional_count == 0;
 }
 
-static MildStatus run_benches(const CliArgs *args, BenchReport *report, MildError *error) {
+static MildStatus run_benches(const CliArgs *args, FILE *file, BenchReport *report, MildError *error) {
     ExperimentDef def = experiment_def_default();
     MildStatus status = experiment_read(&def, NULL, args->overrides, args->override_count, error);
     char machine[256];
-    if (status == MILD_OK) printf("%s, mild %s\n", build_machine(machine, sizeof machine), build_version());
-    fflush(stdout);
+    if (status == MILD_OK) fprintf(file, "%s, mild %s\n", build_machine(machine, sizeof machine), build_version());
+    fflush(file);
     for (int i = 0; i < BENCHES && status == MILD_OK; i++) {
         int first = report->count;
         if (!wanted(args, benches[i].name)) continue;
         status = benches[i].run(&def, report, error);
-        if (status == MILD_OK) print_rows(report, first);
+        if (status == MILD_OK) print_rows(report, first, file);
     }
     return status;
 }
@@ -90,15 +91,17 @@ static MildStatus run_benches(const CliArgs *args, BenchReport *report, MildErro
 int cmd_bench(int argc, char **argv) {
     const char *json = NULL;
     const CliOption options[] = {
-        {"json", CLI_TEXT, &json, 0, 0, "FILE", "write {machine, version, rows: [{bench, case, value, unit}]}; - for standard output"},
+        {"json", CLI_TEXT, &json, 0, 0, "FILE",
+         "write {machine, version, rows: [{bench, case, value, unit}]}; - for standard output"},
     };
     const CliCommand command = {
         .name = "bench",
         .usage = "[NAME ...] [--json FILE]",
-        .summary = "Measures speed and memory on this machine; without a name, everything (under a minute). step: one physics "
-                   "step on soft ground beside the engine's own contact, same robot, same pose, same run; ratio_to_rigid is "
-                   "newton over engine_rigid. ground: the contact solver alone. train: policy steps per second, rollout and "
-                   "update, and where the time of a step goes. memory: what training holds.",
+        .summary =
+            "Measures speed and memory on this machine; without a name, everything (under a minute). step: one physics "
+            "step on soft ground beside the engine's own contact, same robot, same pose, same run; ratio_to_rigid is "
+            "newton over engine_rigid. ground: the contact solver alone. train: policy steps per second, rollout and "
+            "update, and where the time of a step goes. memory: what training holds.",
         .options = options,
         .option_count = 1,
         .overrides = "any key of configs/default.ini, e.g. --train.envs=256 --train.threads=1 --task.physics_dt=0.001",
@@ -112,7 +115,8 @@ int cmd_bench(int argc, char **argv) {
     if (bad) return bad;
     BenchReport report = {.count = 0};
     MildError error = {0};
-    MildStatus status = run_benches(&args, &report, &error);
+    FILE *table = json && strcmp(json, "-") == 0 ? stderr : stdout;
+    MildStatus status = run_benches(&args, table, &report, &error);
     if (status == MILD_OK && json) status = save_json(&report, json, &error);
     return status == MILD_OK ? 0 : cli_fail("bench", &error);
 }

@@ -74,21 +74,23 @@ static int info_grounds(void) {
         printf("  %-10s  %-16s %s\n", field->name, range, field->help);
     }
     printf("\nsources\n");
-    for (int i = 0; i < SOURCES; i++) printf("  %-10s  %s; %s\n", sources[i].ground, sources[i].what, sources[i].source);
+    for (int i = 0; i < SOURCES; i++)
+        printf("  %-10s  %s; %s\n", sources[i].ground, sources[i].what, sources[i].source);
     printf("\n`rigid` is the engine's own contact: no parameters, for train, eval and play.\n");
     return 0;
 }
 
 static int info_models(void) {
-    printf("ground models\n"
-           "  mild    every element of the sole (19.5 mm squares, 77 per foot) meets a cone of ground that grows with\n"
-           "          depth: stiffness, inertia of the moved ground, drag, friction, drift, unloading (the paper's model)\n"
-           "  rigid   the engine's own contact at the corners of the soles, for comparison\n"
-           "\nsolvers of mild (--task.newton)\n"
-           "  newton        the step as one small convex problem; default\n"
-           "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n"
-           "\nrobots\n"
-           "  sa01    models/sa01/sa01.xml: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
+    printf(
+        "ground models\n"
+        "  mild    every element of the sole (19.5 mm squares, 77 per foot) meets a cone of ground that grows with\n"
+        "          depth: stiffness, inertia of the moved ground, drag, friction, drift, unloading; the paper's model\n"
+        "  rigid   the engine's own contact at the corners of the soles, for comparison\n"
+        "\nsolvers of mild (--task.newton)\n"
+        "  newton        the step as one small convex problem; default\n"
+        "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n"
+        "\nrobots\n"
+        "  sa01    models/sa01/sa01.xml: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
     return 0;
 }
 
@@ -96,7 +98,8 @@ static int info_config(void) {
     ExperimentDef def = experiment_def_default();
     ConfigSection sections[EXPERIMENT_SECTIONS];
     experiment_sections(&def, sections);
-    printf("# Every key with its default. A config file holds what differs; --section.key=value changes one key for one run.\n");
+    printf(
+        "# Every key with its default. A config file holds what differs; --section.key=value changes one for one run.\n");
     config_print(sections, EXPERIMENT_SECTIONS, 1, stdout);
     return 0;
 }
@@ -138,7 +141,7 @@ static const struct {
     const char *name;
     int (*print)(void);
 } topics[] = {
-    {"grounds", info_grounds}, {"models", info_models}, {"config", info_config},
+    {"grounds", info_grounds}, {"models", info_models},   {"config", info_config},
     {"build", info_build},     {"devices", info_devices},
 };
 enum { TOPICS = sizeof topics / sizeof *topics };
@@ -147,9 +150,9 @@ int cmd_info(int argc, char **argv) {
     const CliCommand command = {
         .name = "info",
         .usage = "grounds | models | config | build | devices",
-        .summary = "grounds: presets with every parameter, its unit, range and source. models: ground models, solvers, robots. "
-                   "config: every key with its default, range and meaning, as a complete config file. build: version, compiler, "
-                   "libraries. devices: what this machine computes with.",
+        .summary = "grounds: presets with every parameter, its unit, range and source. models: ground models, "
+                   "solvers, robots. config: every key with its default, range and meaning, as a complete config file. "
+                   "build: version, compiler, libraries. devices: what this machine computes with.",
         .examples = "  mild info grounds\n  mild info config > my.ini\n",
         .positional_max = 1,
     };

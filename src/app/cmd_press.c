@@ -46,12 +46,14 @@ static MildStatus tool_open(Tool *tool, const char *text, MildError *error) {
     snprintf(length_text, sizeof length_text, "%s", text);
     comma = strchr(length_text, ',');
     if (comma) *comma = '\0';
-    if (!comma || strlen(text) >= sizeof length_text || !text_double(length_text, &length) || !text_double(comma + 1, &width)) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--plate: '%.40s' is neither LENGTH,WIDTH in metres nor `sole`", text);
+    if (!comma || strlen(text) >= sizeof length_text || !text_double(length_text, &length) ||
+        !text_double(comma + 1, &width)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--plate: '%.40s' is neither LENGTH,WIDTH in metres nor `sole`",
+                         text);
     }
     if (!(length >= 0.0195 && length <= 1 && width >= 0.0195 && width <= 1)) {
-        return mild_fail(error, MILD_ERROR_RANGE, "--plate: %g x %g m is outside 0.0195 .. 1 m (one element to a metre)", length,
-                         width);
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "--plate: %g x %g m is outside 0.0195 .. 1 m (one element to a metre)", length, width);
     }
     tool->plate = press_plate_create(length, width, error);
     tool->sole = tool->plate;
@@ -95,11 +97,12 @@ static void table_print(const PressResult *result) {
 }
 
 static void summary_print(const PressOptions *options, const Tool *tool, const PressResult *result, FILE *file) {
-    fprintf(file, "%s under %s: %d elements, %.4f m^2, to %.1f mm at %g m/s", options->ground, tool->name, result->elements,
-            result->area, 1e3 * options->depth, options->speed);
+    fprintf(file, "%s under %s: %d elements, %.4f m^2, to %.1f mm at %g m/s", options->ground, tool->name,
+            result->elements, result->area, 1e3 * options->depth, options->speed);
     if (options->tilt_deg != 0) fprintf(file, ", tilted %g deg", options->tilt_deg);
-    fprintf(file, "\npeak %.1f N (%.2f kPa), work in %.3f J, given back %.3f J, print left %.1f mm\n", result->peak_force,
-            1e-3 * result->peak_force / result->area, result->work_in, result->work_out, 1e3 * fmax(result->print_depth, 0));
+    fprintf(file, "\npeak %.1f N (%.2f kPa), work in %.3f J, given back %.3f J, print left %.1f mm\n",
+            result->peak_force, 1e-3 * result->peak_force / result->area, result->work_in, result->work_out,
+            1e3 * fmax(result->print_depth, 0));
 }
 
 static int options_read(int argc, char **argv, PressOptions *options, CliArgs *args) {
@@ -119,9 +122,10 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
     const CliCommand command = {
         .name = "press",
         .usage = "--ground NAME [options]",
-        .summary = "Press a plate or the robot's sole into a ground at constant speed, draw it out again, and record the "
-                   "force. Depth, moments and zero moment point are those of the plate's centre (for the sole: the point "
-                   "under the ankle).",
+        .summary =
+            "Press a plate or the robot's sole into a ground at constant speed, draw it out again, and record the "
+            "force. Depth, moments and zero moment point are those of the plate's centre (for the sole: the point "
+            "under the ankle).",
         .options = table,
         .option_count = sizeof table / sizeof *table,
         .overrides = "any parameter of the ground, e.g. --ground.k_pen=500; `mild info grounds` lists them",
@@ -154,13 +158,15 @@ int cmd_press(int argc, char **argv) {
     if (code) return code < 0 ? 0 : code;
     if (!options.ground) return cli_fail_text("press", "which ground? --ground NAME (mild info grounds lists all)");
     if (strcmp(options.model, "mild") != 0) {
-        return cli_fail_text("press", "--model: '%s' is not known; `mild` is the only ground model so far", options.model);
+        return cli_fail_text("press", "--model: '%s' is not known; `mild` is the only ground model so far",
+                             options.model);
     }
     MildError error;
     PressDef def = {.depth = options.depth, .speed = options.speed, .tilt = options.tilt_deg * acos(-1.0) / 180};
     if (grounds_find(options.ground, &def.material, NULL, &error) != MILD_OK) return cli_fail("press", &error);
     ConfigSection section = grounds_section(&def.material);
-    if (config_overrides(&section, 1, args.overrides, args.override_count, &error) != MILD_OK) return cli_fail("press", &error);
+    if (config_overrides(&section, 1, args.overrides, args.override_count, &error) != MILD_OK)
+        return cli_fail("press", &error);
     Tool tool;
     MildStatus status = tool_open(&tool, options.plate, &error);
     if (status == MILD_OK) status = press_report(&options, &tool, &def, &error);

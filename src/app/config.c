@@ -58,11 +58,11 @@ static MildStatus key_set(const ConfigSection *sections, int count, const char *
 typedef struct {
     const ConfigSection *sections;
     int count;
-    const char *name;  /* of the file, for messages */
-    const char *rest;  /* text not yet read */
-    int line;          /* of the text last handed to inih, from 1 */
+    const char *name;        /* of the file, for messages */
+    const char *rest;        /* text not yet read */
+    int line;                /* of the text last handed to inih, from 1 */
     int first[SECTIONS_MAX]; /* index of the section's first flag in seen */
-    int *seen;         /* [keys] line on which the key was set, 0: not yet */
+    int *seen;               /* [keys] line on which the key was set, 0: not yet */
     MildStatus status;
     MildError *error;
 } Reader;
@@ -85,7 +85,8 @@ static void reader_check_line(Reader *reader, const char *line) {
             reader->status = section_fail(where, name, nearest, reader->error);
         }
     } else if (*line == '[' || (*line != '\n' && !strpbrk(line, "=:"))) {
-        reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: neither `key = value` nor `[section]`", where);
+        reader->status =
+            mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: neither `key = value` nor `[section]`", where);
     }
 }
 
@@ -124,7 +125,8 @@ static char *reader_line(char *buffer, int size, void *stream) {
 static int *reader_seen(Reader *reader, const char *section_name, const MildField *field) {
     for (int i = 0; i < reader->count; i++) {
         const ConfigSection *section = &reader->sections[i];
-        if (strcmp(section->name, section_name) == 0) return &reader->seen[reader->first[i] + (field - section->fields)];
+        if (strcmp(section->name, section_name) == 0)
+            return &reader->seen[reader->first[i] + (field - section->fields)];
     }
     return NULL;
 }
@@ -135,8 +137,8 @@ static int reader_key(void *user, const char *section, const char *key, const ch
     char where[WHERE_MAX];
     reader_where(reader, where);
     if (!*section) {
-        reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: key '%.60s' stands before the first [section]",
-                                   where, key);
+        reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT,
+                                   "%s: key '%.60s' stands before the first [section]", where, key);
         return 0;
     }
     const MildField *field = NULL;
@@ -144,8 +146,8 @@ static int reader_key(void *user, const char *section, const char *key, const ch
     if (reader->status != MILD_OK) return 0;
     int *seen = reader_seen(reader, section, field);
     if (*seen) {
-        reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: key '%s.%s' was already set on line %d", where,
-                                   section, key, *seen);
+        reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: key '%s.%s' was already set on line %d",
+                                   where, section, key, *seen);
         return 0;
     }
     *seen = reader->line;
@@ -156,8 +158,9 @@ static MildStatus reader_check_complete(const Reader *reader) {
     for (int i = 0; i < reader->count; i++) {
         for (int j = 0; j < reader->sections[i].count; j++) {
             if (!reader->seen[reader->first[i] + j]) {
-                return mild_fail(reader->error, MILD_ERROR_FORMAT, "%.140s: key '%s.%s' is missing; this file must be complete",
-                                 reader->name, reader->sections[i].name, reader->sections[i].fields[j].name);
+                return mild_fail(reader->error, MILD_ERROR_FORMAT,
+                                 "%.140s: key '%s.%s' is missing; this file must be complete", reader->name,
+                                 reader->sections[i].name, reader->sections[i].fields[j].name);
             }
         }
     }
@@ -168,7 +171,8 @@ MildStatus config_read_text(const ConfigSection *sections, int count, const char
                             MildError *error) {
     Reader reader = {.sections = sections, .count = count, .name = name, .rest = text, .error = error};
     if (strncmp(text, "\xef\xbb\xbf", 3) == 0) reader.rest += 3; /* byte order mark of some editors */
-    if (count > SECTIONS_MAX) return mild_fail(error, MILD_ERROR_ARGUMENT, "config: more than %d sections", SECTIONS_MAX);
+    if (count > SECTIONS_MAX)
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "config: more than %d sections", SECTIONS_MAX);
     int keys = 0;
     for (int i = 0; i < count; i++) {
         reader.first[i] = keys;
@@ -196,11 +200,11 @@ static char *file_text(const char *path, MildError *error) {
     size_t size = text ? fread(text, 1, FILE_MAX + 1, file) : 0;
     int failed = ferror(file);
     fclose(file);
-    const char *reason = !text                     ? "out of memory"
-                         : failed                  ? "cannot read config (is it a folder?)"
-                         : size > FILE_MAX         ? "larger than 1 MiB: this is no config"
+    const char *reason = !text                      ? "out of memory"
+                         : failed                   ? "cannot read config (is it a folder?)"
+                         : size > FILE_MAX          ? "larger than 1 MiB: this is no config"
                          : memchr(text, '\0', size) ? "holds binary data: this is no config"
-                                                   : NULL;
+                                                    : NULL;
     if (reason) {
         mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", path, reason);
         free(text);

@@ -43,7 +43,7 @@ static void put_varint(Buffer *buffer, uint64_t value) {
 }
 
 static void put_key(Buffer *buffer, int field, int wire) {
-    put_varint(buffer, (uint64_t)(field * 8 + wire));
+    put_varint(buffer, (uint64_t)field * 8 + (uint64_t)wire);
 }
 
 static void put_double(Buffer *buffer, int field, double value) {

@@ -38,8 +38,9 @@ MildStatus experiment_check(const ExperimentDef *def, MildError *error) {
                          def->ppo.learning_rate_min, def->ppo.learning_rate_max);
     }
     if ((int64_t)def->train.envs * def->ppo.steps < def->ppo.minibatches) {
-        return mild_fail(error, MILD_ERROR_RANGE, "ppo.minibatches %d: train.envs %d x ppo.steps %d gives fewer samples",
-                         def->ppo.minibatches, def->train.envs, def->ppo.steps);
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "ppo.minibatches %d: train.envs %d x ppo.steps %d gives fewer samples", def->ppo.minibatches,
+                         def->train.envs, def->ppo.steps);
     }
     return MILD_OK;
 }

@@ -11,7 +11,8 @@ MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, Mi
     if (rigid) *rigid = is_rigid;
     if (is_rigid && rigid) return MILD_OK;
     if (is_rigid) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "ground 'rigid' is the engine's own contact and has no soft-ground law");
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "ground 'rigid' is the engine's own contact and has no soft-ground law");
     }
     if (mild_material_preset(name, material)) return MILD_OK;
     const char *names[NAMES_MAX];
@@ -20,7 +21,8 @@ MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, Mi
         names[count] = mild_material_preset_name(count);
     }
     if (rigid) names[count++] = "rigid";
-    return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown ground '%.60s'; nearest is '%s' (mild info grounds lists all)", name,
+    return mild_fail(error, MILD_ERROR_ARGUMENT,
+                     "unknown ground '%.60s'; nearest is '%s' (mild info grounds lists all)", name,
                      text_nearest(name, names, count));
 }
 

@@ -54,7 +54,8 @@ static MildStatus csv_cut(FILE *csv, const char *path, const char *header, int64
     }
     free(line);
     if (!same) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: its columns are not this version's; resume into a copy without it", path);
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%s: its columns are not this version's; resume into a copy without it", path);
     }
     if (fseek(csv, keep, SEEK_SET) != 0 || ftruncate(fileno(csv), keep) != 0) return io_fail(path, error);
     return MILD_OK;
@@ -98,8 +99,8 @@ Log *log_open(const char *folder, const char *const *columns, int count, int64_t
     }
     log->columns = columns;
     log->count = count;
-    if (path_join(folder, "log.csv", log->csv_path, error) != MILD_OK || csv_open(log, resume_after, error) != MILD_OK ||
-        events_open(log, folder, resume_after, error) != MILD_OK) {
+    if (path_join(folder, "log.csv", log->csv_path, error) != MILD_OK ||
+        csv_open(log, resume_after, error) != MILD_OK || events_open(log, folder, resume_after, error) != MILD_OK) {
         log_close(log);
         return NULL;
     }

@@ -22,7 +22,8 @@ static const struct {
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
 static void print_help(FILE *file) {
-    fprintf(file, "mild %s: soft ground for legged robots\n\nusage: mild COMMAND [options]\n\ncommands:\n", build_version());
+    fprintf(file, "mild %s: soft ground for legged robots\n\nusage: mild COMMAND [options]\n\ncommands:\n",
+            build_version());
     for (int i = 0; i < COMMANDS; i++) fprintf(file, "  %-8s%s\n", commands[i].name, commands[i].help);
     fprintf(file, "\n`mild COMMAND --help` tells the rest. Exit code: 0 fine, 2 bad input.\n\n"
                   "a first look:\n"

@@ -23,11 +23,11 @@ enum { PRESS_STEPS = 1000, PRESS_ROWS = 2 * PRESS_STEPS + 1 }; /* rows 0 .. PRES
 
 typedef struct {
     PressRow rows[PRESS_ROWS];
-    double peak_force;      /* [N] */
+    double peak_force;        /* [N] */
     double work_in, work_out; /* [J] force times way, down and up */
-    double print_depth;     /* [m] depth at which the force had vanished on the way up */
+    double print_depth;       /* [m] depth at which the force had vanished on the way up */
     int elements;
-    double area;            /* [m^2] of all elements */
+    double area; /* [m^2] of all elements */
 } PressResult;
 
 /* Runs on a sole of any outline; NULL result fields are not allowed. */

@@ -29,7 +29,8 @@ static void show_line(Progress *progress, double share, const char *format, va_l
     char line[400], time[32];
     double elapsed = clock_seconds() - progress->start;
     int length = snprintf(line, sizeof line, "%s", progress->what);
-    if (share >= 0) length += snprintf(line + length, sizeof line - (size_t)length, " %3.0f %%", 100 * (share < 1 ? share : 1));
+    if (share >= 0)
+        length += snprintf(line + length, sizeof line - (size_t)length, " %3.0f %%", 100 * (share < 1 ? share : 1));
     length += snprintf(line + length, sizeof line - (size_t)length, "  %s", text_duration(elapsed, time, sizeof time));
     if (share > 0.005 && share < 1) {
         text_duration(elapsed * (1 - share) / share, time, sizeof time);

@@ -3,10 +3,10 @@
 #define MILD_PROGRESS_H
 
 typedef struct {
-    const char *what;   /* "training" */
+    const char *what;    /* "training" */
     double start, shown; /* [s] clock */
-    int terminal;       /* bool */
-    int width;          /* characters of the line on the terminal, to be overwritten */
+    int terminal;        /* bool */
+    int width;           /* characters of the line on the terminal, to be overwritten */
 } Progress;
 
 Progress progress_begin(const char *what);

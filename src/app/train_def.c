@@ -1,8 +1,13 @@
 #include "app/train_def.h"
 
 TrainDef train_def_default(void) {
-    return (TrainDef){.envs = 1024, .iterations = 0, .minutes = 60, .checkpoint_every = 50, .keep_checkpoints = 3,
-                      .seed = 1, .threads = 0};
+    return (TrainDef){.envs = 1024,
+                      .iterations = 0,
+                      .minutes = 60,
+                      .checkpoint_every = 50,
+                      .keep_checkpoints = 3,
+                      .seed = 1,
+                      .threads = 0};
 }
 
 #define FIELD(member, type, min, max, help) MILD_FIELD(TrainDef, member, type, 1, min, max, help)

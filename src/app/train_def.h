@@ -13,7 +13,7 @@ typedef struct {
     int checkpoint_every; /* iterations */
     int keep_checkpoints; /* the newest so many stay */
     uint64_t seed;
-    int threads;          /* 0: one per core */
+    int threads; /* 0: one per core */
 } TrainDef;
 
 TrainDef train_def_default(void);

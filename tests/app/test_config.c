@@ -54,10 +54,12 @@ static void test_reads_every_type(void **state) {
     (void)state;
     Fixture f = fixture();
     bind(&f);
-    const char *text = "\xef\xbb\xbf; remark\n# remark, longer than any line inih takes: 0123456789012345678901234567890123456789012345678901234"
-                       "56789012345678901234567890123456789012345678901234567890123456789012345678901234567890123456789012345678\n"
-                       "[sample]\n  stiffness = 2.5 ; remark\n\tpair: -0.5, 0.5 # remark\r\n"
-                       "count=7\n\n  on = true\nseed = 18446744073709551615\nname = sand\n[ground]\nk_pen=500";
+    const char *text =
+        "\xef\xbb\xbf; remark\n# remark, longer than any line inih takes: "
+        "0123456789012345678901234567890123456789012345678901234"
+        "56789012345678901234567890123456789012345678901234567890123456789012345678901234567890123456789012345678\n"
+        "[sample]\n  stiffness = 2.5 ; remark\n\tpair: -0.5, 0.5 # remark\r\n"
+        "count=7\n\n  on = true\nseed = 18446744073709551615\nname = sand\n[ground]\nk_pen=500";
     assert_int_equal(config_read_text(f.sections, 2, text, "x.ini", 0, &f.error), MILD_OK);
     assert_true(f.sample.stiffness == 2.5 && f.sample.pair[0] == -0.5 && f.sample.pair[1] == 0.5);
     assert_true(f.sample.count == 7 && f.sample.on == 1 && f.sample.seed == UINT64_MAX);
@@ -110,8 +112,8 @@ static void test_missing_key_of_complete_file(void **state) {
     (void)state;
     Fixture f = fixture();
     bind(&f);
-    assert_int_not_equal(config_read_text(f.sections, 2, "[sample]\nstiffness=1\npair=0 1\ncount=1\non=0\nseed=1\n", "x.ini", 1,
-                                          &f.error),
+    assert_int_not_equal(config_read_text(f.sections, 2, "[sample]\nstiffness=1\npair=0 1\ncount=1\non=0\nseed=1\n",
+                                          "x.ini", 1, &f.error),
                          MILD_OK);
     assert_text(f.error.text, "'sample.name' is missing");
 }
@@ -123,8 +125,10 @@ static void test_overrides(void **state) {
     const char *const good[] = {"sample.count=3", "ground.k_pen=600", "sample.count=4"};
     assert_int_equal(config_overrides(f.sections, 2, good, 3, &f.error), MILD_OK);
     assert_true(f.sample.count == 4 && f.material.k_pen == 600);
-    const char *const bad[] = {"sample.count=99", "sample.cuont=1", "smaple.count=1", "sample.=1", ".count=1", "sample.count"};
-    const char *const message[] = {"1 .. 10", "'sample.count'", "'sample'", "section.key", "section.key", "section.key"};
+    const char *const bad[] = {"sample.count=99", "sample.cuont=1", "smaple.count=1",
+                               "sample.=1",       ".count=1",       "sample.count"};
+    const char *const message[] = {"1 .. 10",     "'sample.count'", "'sample'",
+                                   "section.key", "section.key",    "section.key"};
     for (int i = 0; i < 6; i++) {
         assert_int_not_equal(config_override(f.sections, 2, bad[i], &f.error), MILD_OK);
         assert_text(f.error.text, bad[i]);
@@ -137,7 +141,8 @@ static void test_round_trip(void **state) {
     (void)state;
     Fixture f = fixture(), g = fixture();
     bind(&f);
-    f.sample = (Sample){.stiffness = 0.1 + 0.2, .pair = {-1.0 / 3, 1e-17}, .count = 9, .on = 1, .seed = UINT64_MAX, .name = "sand"};
+    f.sample = (Sample){
+        .stiffness = 0.1 + 0.2, .pair = {-1.0 / 3, 1e-17}, .count = 9, .on = 1, .seed = UINT64_MAX, .name = "sand"};
     f.material.sigma_cone = 123456.789012345678;
     for (int comments = 0; comments < 2; comments++) {
         char *text = config_text(f.sections, 2, comments);
@@ -170,9 +175,11 @@ static void test_default_ini(void **state) {
     if (config_read(read_sections, EXPERIMENT_SECTIONS, MILD_SOURCE_DIR "/configs/default.ini", 1, &error) != MILD_OK) {
         fail_msg("%s; regenerate with: build/mild info config > configs/default.ini", error.text);
     }
-    char *ours = config_text(sections, EXPERIMENT_SECTIONS, 0), *theirs = config_text(read_sections, EXPERIMENT_SECTIONS, 0);
+    char *ours = config_text(sections, EXPERIMENT_SECTIONS, 0),
+         *theirs = config_text(read_sections, EXPERIMENT_SECTIONS, 0);
     if (strcmp(ours, theirs) != 0) {
-        fail_msg("configs/default.ini differs from the defaults; regenerate with: build/mild info config > configs/default.ini");
+        fail_msg("configs/default.ini differs from the defaults; regenerate with: build/mild info config > "
+                 "configs/default.ini");
     }
     free(ours);
     free(theirs);
@@ -186,7 +193,8 @@ static void test_keys_are_unique(void **state) {
     experiment_sections(&def, sections);
     for (int s = 0; s < EXPERIMENT_SECTIONS; s++) {
         for (int i = 0; i < sections[s].count; i++) {
-            const MildField *first = mild_field_find(sections[s].fields, sections[s].count, sections[s].fields[i].name, NULL);
+            const MildField *first =
+                mild_field_find(sections[s].fields, sections[s].count, sections[s].fields[i].name, NULL);
             if (first != &sections[s].fields[i]) fail_msg("key %s.%s stands twice", sections[s].name, first->name);
         }
     }
