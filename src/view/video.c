@@ -74,7 +74,12 @@ static MildStatus spawn_ffmpeg(Video *video, double fps, MildError *error) {
     posix_spawn_file_actions_adddup2(&actions, video->errors, STDOUT_FILENO);
     if (ends[1] != STDIN_FILENO)
         posix_spawn_file_actions_addclose(&actions, ends[1]);
-    int failure = posix_spawnp(&video->child, "ffmpeg", &actions, NULL, arguments, environ);
+    /* A process group of its own: Ctrl-C ends our loop, and ffmpeg then gets to finish the file. */
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    int failure = posix_spawnp(&video->child, "ffmpeg", &actions, &attributes, arguments, environ);
+    posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
     close(ends[1]);
     if (failure) {

@@ -437,14 +437,13 @@ static const char *ground_name(const View *view, const RobotSim *sim) {
 }
 
 static void draw_text(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
-    char keys[120], values[240];
+    const char *keys = info->fell ? "ground\ncommand\nspeed\nsinkage L R\ntime\n" : "ground\ncommand\nspeed\nsinkage L R\ntime";
+    char values[240];
     double depth[ROBOT_FEET];
     for (int f = 0; f < ROBOT_FEET; f++)
         depth[f] = 1e3 * fmax(0.0, -robot_sim_foot(sim, f)->sole_height);
-    snprintf(keys, sizeof keys, "ground\ncommand\nspeed\nsinkage L R\ntime%s", info->note ? "\n" : "");
-    snprintf(values, sizeof values, "%s\n%.2f m/s\n%.2f m/s\n%.0f  %.0f mm\n%.1f s%s%s", ground_name(view, sim),
-             info->command[0], info->speed, depth[0], depth[1], info->time, info->note ? "\n" : "",
-             info->note ? info->note : "");
+    snprintf(values, sizeof values, "%s\n%.2f m/s\n%.2f m/s\n%.0f  %.0f mm\n%.1f s%s", ground_name(view, sim),
+             info->command[0], info->speed, depth[0], depth[1], info->time, info->fell ? "\nfell" : "");
     mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, viewport, keys, values, &view->context);
 }
 

@@ -26,7 +26,7 @@ typedef struct {
     double time;       /* [s] */
     double command[3]; /* [m/s, m/s, rad/s] */
     double speed;      /* [m/s] measured, forward */
-    const char *note;  /* one more line, or NULL */
+    int fell;          /* bool */
 } ViewInfo;
 
 typedef struct View View;

@@ -1,0 +1,324 @@
+/* mild play: watch a policy walk a course; video or window, a table per ground, a picture of sole pressure. */
+#include <math.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "app/cli.h"
+#include "app/commands.h"
+#include "app/config.h"
+#include "app/experiment.h"
+#include "app/grounds.h"
+#include "app/paths.h"
+#include "app/play.h"
+#include "app/progress.h"
+
+extern char **environ;
+
+#define GRAVITY 9.81
+#define AREA_MARGIN 2.0   /* [m] ground drawn beyond the walk */
+#define WINDOW_AREA 12.0  /* [m] ground drawn around the start of a window's walk */
+#define COURSE_EXTRA 3.0  /* [s] a course gets for starting and stopping */
+#define COURSE_LEAST 12.0 /* [s] */
+
+typedef struct {
+    const char *policy, *config, *video, *pressure;
+    CliNames grounds;
+    double patch;
+    int width, height;
+    const CliArgs *args;
+    TaskDef task;
+    Scene scene;
+    const char *names[MILD_MATERIALS_MAX];
+    Play play;
+} Command;
+
+/* ---- set-up ---- */
+
+static void stand_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
+    (void)self;
+    (void)envs;
+    memset(actions, 0, (size_t)rows * TASK_ACTIONS * sizeof *actions);
+}
+
+static void stand_destroy(void *self) {
+    (void)self;
+}
+
+/* "stand" is no file: the default pose held by the stand gains, a baseline that needs no training. */
+static MildStatus make_controller(const char *policy, Controller *controller, MildError *error) {
+    static int nothing;
+    if (strcmp(policy, "stand") != 0) return controller_learned(policy, NULL, 1, controller, error);
+    *controller = (Controller){&nothing, "stand", stand_act, stand_destroy};
+    return MILD_OK;
+}
+
+static MildStatus make_task(Command *c, MildError *error) {
+    c->task = task_def_default();
+    if (c->config) {
+        ExperimentDef experiment = experiment_def_default();
+        MildStatus status = experiment_read(&experiment, c->config, NULL, 0, error);
+        if (status != MILD_OK) return status;
+        c->task = experiment.task;
+    }
+    task_def_make_nominal(&c->task);
+    return MILD_OK;
+}
+
+/* The course "a+b+c" of --ground a,b,c, with --ground.KEY=VALUE laid over each of its grounds and --task.KEY=VALUE over
+ * the task. */
+static MildStatus make_scene(Command *c, MildError *error) {
+    char name[sizeof c->scene.name] = "";
+    for (int g = 0; g < c->grounds.count; g++) {
+        MildMaterial unused;
+        int rigid;
+        MildStatus status = grounds_find(c->grounds.name[g], &unused, &rigid, error);
+        if (status != MILD_OK) return status;
+        if (rigid && c->grounds.count > 1) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT, "--ground: rigid is the engine's own contact and stands alone");
+        }
+        size_t used = strlen(name);
+        if (used + strlen(c->grounds.name[g]) + 2 > sizeof name) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT, "--ground: the course is too long");
+        }
+        snprintf(name + used, sizeof name - used, "%s%s", g ? "+" : "", c->grounds.name[g]);
+        c->names[g] = c->grounds.name[g];
+    }
+    MildStatus status = scene_make(&c->scene, name, c->patch, error);
+    for (int i = 0; status == MILD_OK && i < c->scene.terrain.material_count; i++) {
+        const ConfigSection sections[] = {{"task", task_fields, task_field_count, &c->task},
+                                          grounds_section(&c->scene.terrain.materials[i])};
+        status = config_overrides(sections, 2, c->args->overrides, c->args->override_count, error);
+        if (status == MILD_OK) status = mild_material_check(&c->scene.terrain.materials[i], error);
+    }
+    return status == MILD_OK ? task_def_check(&c->task, error) : status;
+}
+
+static MildStatus make_parent(const char *path, MildError *error) {
+    char folder[PATH_SIZE];
+    if (snprintf(folder, sizeof folder, "%s", path) >= (int)sizeof folder) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", path);
+    }
+    char *slash = strrchr(folder, '/');
+    if (!slash || slash == folder) return MILD_OK;
+    *slash = '\0';
+    return path_make_folder(folder, error);
+}
+
+static MildStatus make_view(Command *c, const char *xml, MildError *error) {
+    ViewDef def = view_def_default();
+    Play *play = &c->play;
+    double reach = play->speed * play->seconds;
+    def.xml = xml;
+    def.width = c->width, def.height = c->height;
+    def.rigid = c->scene.rigid;
+    def.names = c->names;
+    def.window = play->window;
+    def.x_min = play->window ? -WINDOW_AREA : fmin(reach, 0) - AREA_MARGIN;
+    def.x_max = play->window ? WINDOW_AREA : fmax(reach, 0) + AREA_MARGIN;
+    if (play->window) def.y_min = -WINDOW_AREA, def.y_max = WINDOW_AREA;
+    play->rate = def.rate;
+    play->view = view_create(&def, play->robot, &c->scene.terrain, error);
+    if (!play->view) return error->status;
+    if (c->video) {
+        play->video = video_open(c->video, def.width, def.height, def.rate, error);
+        if (!play->video) return error->status;
+    }
+    return MILD_OK;
+}
+
+/* ---- results ---- */
+
+static void print_table(const Command *c) {
+    const Play *play = &c->play;
+    double weight = robot_total_mass(play->robot) * GRAVITY;
+    printf("%-12s %9s %7s %9s %8s %10s %9s %5s\n", "ground", "distance", "time", "speed", "upright", "clearance", "sinkage",
+           "COT");
+    for (int i = 0; i < c->grounds.count; i++) {
+        const PlayLeg *leg = &play->leg[i];
+        const Measure *m = &leg->measure;
+        if (leg->steps == 0) {
+            printf("%-12s   not reached\n", c->names[i]);
+            continue;
+        }
+        double distance = leg->end_x - leg->start_x, time = leg->steps * c->task.physics_dt;
+        double steady = fabs(m->end_x - m->start_x);
+        printf("%-12s %7.2f m %5.1f s %5.2f m/s %8s %7.0f mm %6.1f mm ", c->names[i], distance, time, distance / time,
+               leg->fell ? "fell" : "yes", m->swings ? 1e3 * m->apex_sum / m->swings : 0.0,
+               m->stances ? 1e3 * m->deepest_sum / m->stances : 0.0);
+        if (steady > 0.1) {
+            printf("%5.2f\n", m->work / (weight * steady));
+        } else {
+            printf("%5s\n", "-");
+        }
+    }
+}
+
+/* Runs scripts/pressure.py in the private environment, else with the system's Python. */
+static MildStatus draw_pressure(const char *data, const char *picture, MildError *error) {
+    char python[PATH_SIZE], script[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE];
+    path_data(".venv/bin/python", python);
+    path_data("scripts/pressure.py", script);
+    snprintf(from, sizeof from, "%s", data);
+    snprintf(to, sizeof to, "%s", picture);
+    if (access(python, X_OK) != 0) snprintf(python, sizeof python, "python3");
+    char *arguments[] = {python, script, from, to, NULL};
+    pid_t child;
+    int code = 0, failure = posix_spawnp(&child, python, NULL, NULL, arguments, environ);
+    if (failure == 0) waitpid(child, &code, 0);
+    if (failure == 0 && WIFEXITED(code) && WEXITSTATUS(code) == 0) return MILD_OK;
+    return mild_fail(error, MILD_ERROR_IO,
+                     "%s: not drawn, Python with matplotlib is needed (make setup); the numbers are in %s", picture, data);
+}
+
+/* The CSV beside the picture; a name ending in .csv wants no picture. */
+static MildStatus save_pressure(const Command *c, MildError *error) {
+    char data[PATH_SIZE], names[MILD_MATERIALS_MAX][96];
+    const char *labels[MILD_MATERIALS_MAX], *dot = strrchr(c->pressure, '.');
+    const char *slash = strrchr(c->pressure, '/');
+    int any = 0, stem = dot && (!slash || dot > slash) ? (int)(dot - c->pressure) : (int)strlen(c->pressure);
+    if (snprintf(data, sizeof data, "%.*s.csv", stem, c->pressure) >= (int)sizeof data) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", c->pressure);
+    }
+    for (int i = 0; i < c->grounds.count; i++) {
+        int repeat = 1;
+        for (int k = 0; k < i; k++) repeat += strcmp(c->names[k], c->names[i]) == 0;
+        snprintf(names[i], sizeof names[i], repeat > 1 ? "%s (%d)" : "%s", c->names[i], repeat);
+        labels[i] = names[i];
+        any += pressure_stances(c->play.pressure, i);
+    }
+    if (any == 0) return mild_fail(error, MILD_ERROR_ARGUMENT, "%s: the robot took no step, there is nothing to draw", c->pressure);
+    MildStatus status = pressure_write(c->play.pressure, data, labels, error);
+    if (status == MILD_OK && strcmp(data, c->pressure) != 0) status = draw_pressure(data, c->pressure, error);
+    return status;
+}
+
+/* ---- the command ---- */
+
+static MildStatus finish_video(Command *c, MildStatus status, MildError *error) {
+    MildError closing = {0};
+    Play *play = &c->play;
+    MildStatus closed = video_close(play->video, &closing);
+    play->video = NULL;
+    if (status == MILD_OK && closed != MILD_OK) {
+        *error = closing;
+        return closed;
+    }
+    return status;
+}
+
+static MildStatus walk(Command *c, MildError *error) {
+    Play *play = &c->play;
+    interrupt_install();
+    MildStatus status = play_run(play, error);
+    if (play->video) status = finish_video(c, status, error);
+    if (status != MILD_OK) return status;
+    print_table(c);
+    if (c->video) printf("video %s: %d frames\n", c->video, play->frames);
+    if (!c->pressure) return MILD_OK;
+    status = save_pressure(c, error);
+    if (status == MILD_OK) printf("sole pressure %s\n", c->pressure);
+    return status;
+}
+
+static MildStatus prepare(Command *c, const char *xml, MildError *error) {
+    Play *play = &c->play;
+    MildStatus status = MILD_OK;
+    if (c->pressure && c->scene.rigid) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--pressure: rigid ground has no elements, choose a soft one");
+    }
+    if (c->video) status = make_parent(c->video, error);
+    if (status == MILD_OK && c->pressure) status = make_parent(c->pressure, error);
+    if (status == MILD_OK) status = make_controller(c->policy, play->controller, error);
+    if (status == MILD_OK && c->pressure) {
+        play->pressure = pressure_create(play->robot, c->scene.terrain.material_count, c->task.physics_dt, error);
+        if (!play->pressure) status = error->status;
+    }
+    if (status == MILD_OK && (c->video || play->window)) status = make_view(c, xml, error);
+    return status;
+}
+
+static MildStatus run_play(Command *c, MildError *error) {
+    char xml[PATH_SIZE];
+    Play *play = &c->play;
+    Controller controller = {0};
+    MildStatus status = make_task(c, error);
+    if (status == MILD_OK) status = make_scene(c, error);
+    if (status != MILD_OK) return status;
+    if (play->seconds == 0) {
+        double course = c->grounds.count * c->patch / fmax(fabs(play->speed), 0.1) + COURSE_EXTRA;
+        play->seconds = fmax(course, COURSE_LEAST);
+    }
+    Robot *robot = robot_create(path_data("models/sa01/sa01.xml", xml), error);
+    if (!robot) return error->status;
+    play->task = &c->task, play->scene = &c->scene, play->robot = robot, play->controller = &controller;
+    play->window = !c->video && !c->pressure;
+    status = prepare(c, xml, error);
+    if (status == MILD_OK) status = walk(c, error);
+    if (play->video) finish_video(c, status, error);
+    view_destroy(play->view);
+    pressure_destroy(play->pressure);
+    controller_destroy(&controller);
+    robot_destroy(robot);
+    return status;
+}
+
+static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
+    const CliOption options[] = {
+        {"policy", CLI_TEXT, &c->policy, 0, 0, "FILE",
+         "policy to watch, or `stand` to hold the default pose (policies/mild.safetensors)"},
+        {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]", "ground, or several crossed in order (sand_loose)"},
+        {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L", "[m] length of each ground of a course (2)"},
+        {"video", CLI_TEXT, &c->video, 0, 0, "FILE.mp4", "film it; without this and --pressure a window opens"},
+        {"pressure", CLI_TEXT, &c->pressure, 0, 0, "FILE.png",
+         "sole pressure per ground: a picture and its numbers as CSV beside it"},
+        {"speed", CLI_NUMBER, &c->play.speed, -1, 1, "V", "[m/s] commanded forward speed (0.6)"},
+        {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T", "[s] length of the walk; 0: long enough for the course (0)"},
+        {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S", "start and sensor noise (1)"},
+        {"config", CLI_TEXT, &c->config, 0, 0, "FILE", "config the policy was trained with, for its [task]"},
+        {"width", CLI_INT, &c->width, 64, 7680, "N", "[pixels] (960)"},
+        {"height", CLI_INT, &c->height, 64, 4320, "N", "[pixels] (540)"},
+    };
+    const CliCommand command = {
+        .name = "play",
+        .usage = "--policy FILE --ground NAME[,NAME] [--video FILE.mp4] [--pressure FILE.png] [options]",
+        .summary = "Watch a policy walk. Several grounds make a course that is crossed in order. In the window: arrow keys "
+                   "change speed and turn, Q and E step sideways, space pauses, - and = change the pace, R starts again, "
+                   "mouse turns the camera, Esc quits. Afterwards a table: a row for each ground.",
+        .options = options,
+        .option_count = sizeof options / sizeof *options,
+        .overrides = "any key of sections [task] and [ground], e.g. --task.physics_dt=0.001 --ground.mu=0.4",
+        .examples = "  mild play --ground rubber,foam45,sand_loose --video out/walk.mp4 --pressure out/pressure.png\n"
+                    "  mild play --ground foam28 --speed 0.4\n",
+    };
+    CliOutcome outcome = cli_parse(&command, argc, argv, args);
+    if (outcome != CLI_RUN) return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    MildError error = {0};
+    c->args = args;
+    return run_play(c, &error) == MILD_OK ? 0 : cli_fail("play", &error);
+}
+
+int cmd_play(int argc, char **argv) {
+    Command *c = calloc(1, sizeof *c);
+    CliArgs *args = calloc(1, sizeof *args);
+    int code = CLI_EXIT_BAD_INPUT;
+    if (c && args) {
+        char shipped[PATH_SIZE];
+        c->policy = path_data("policies/mild.safetensors", shipped);
+        c->patch = 2;
+        c->width = 960, c->height = 540;
+        c->play.speed = 0.6;
+        c->play.seed = 1;
+        c->grounds.count = 1;
+        strcpy(c->grounds.name[0], "sand_loose");
+        code = parse_and_run(c, args, argc, argv);
+    } else {
+        cli_fail_text("play", "out of memory");
+    }
+    free(c);
+    free(args);
+    return code;
+}
