@@ -1,0 +1,192 @@
+/* Frames of the real robot on soft ground, and the sole pressure gathered from it. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "robot/stand.h"
+#include "view/pressure.h"
+#include "view/view.h"
+
+#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define DT 0.002
+
+static const char *names[] = {"sand_loose"};
+static Robot *robot;
+static RobotSim *sim;
+static MildTerrain terrain;
+static MildGround *ground;
+
+static int setup(void **state) {
+    (void)state;
+    MildError error = {0};
+    MildMaterial sand;
+    assert_true(mild_material_preset("sand_loose", &sand));
+    terrain = mild_terrain_uniform(&sand);
+    robot = robot_create(MODEL, &error);
+    if (!robot)
+        fail_msg("%s", error.text);
+    sim = robot_sim_create(robot, DT, &error);
+    assert_non_null(sim);
+    ground = mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), ROBOT_FEET)), robot_soles(robot),
+                              ROBOT_FEET);
+    return 0;
+}
+
+static int teardown(void **state) {
+    (void)state;
+    free(ground);
+    robot_sim_destroy(sim);
+    robot_destroy(robot);
+    return 0;
+}
+
+static void load_at(double height) {
+    RobotVariation nominal = robot_variation_nominal();
+    RobotState start = robot_stand_state(robot, 1, 0.0);
+    start.qpos[2] += height;
+    mild_ground_reset(ground);
+    robot_sim_load(sim, &start, &nominal);
+}
+
+static void step(void) {
+    double torque[ROBOT_JOINTS];
+    robot_stand_torque(robot, sim, 1, torque);
+    assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+}
+
+static View *small_view(MildError *error) {
+    ViewDef def = view_def_default();
+    def.xml = MODEL;
+    def.width = 240, def.height = 136;
+    def.x_min = -1, def.x_max = 1, def.y_min = -1, def.y_max = 1;
+    def.names = names;
+    return view_create(&def, robot, &terrain, error);
+}
+
+static int pixels_different(const unsigned char *a, const unsigned char *b, size_t count) {
+    int different = 0;
+    for (size_t i = 0; i < count; i++)
+        different += abs((int)a[i] - (int)b[i]) > 12;
+    return different;
+}
+
+/* The robot lands in sand and is taken away: the picture must show it, and then the prints that it left. */
+static void robot_and_prints_are_seen(void **state) {
+    (void)state;
+    const size_t bytes = (size_t)240 * 136 * 3;
+    MildError error = {0};
+    View *view = small_view(&error);
+    if (!view) { /* a machine without any OpenGL: the error must say what to install */
+        assert_non_null(strstr(error.text, "apt-get"));
+        skip();
+    }
+    ViewInfo info = {0};
+    unsigned char *empty = malloc(bytes), *standing = malloc(bytes);
+    load_at(3.0); /* out of sight; the step clears the contact forces */
+    step();
+    view_frame(view, sim, &info);
+    memcpy(empty, view_pixels(view), bytes);
+    load_at(0.01);
+    for (int i = 0; i < 250; i++) {
+        step();
+        if (i % 5 == 0)
+            view_observe(view, sim);
+    }
+    view_frame(view, sim, &info);
+    memcpy(standing, view_pixels(view), bytes);
+    load_at(3.0);
+    step();
+    view_frame(view, sim, &info);
+    int robot_pixels = pixels_different(empty, standing, bytes), prints = pixels_different(empty, view_pixels(view), bytes);
+    print_message("%s: robot changes %d samples of %zu, its prints %d\n", view_backend(view), robot_pixels, bytes, prints);
+    assert_true(robot_pixels > 1000);
+    assert_true(prints > 20 && prints < robot_pixels);
+    assert_int_equal(view_reset(view, &terrain, &error), MILD_OK);
+    view_frame(view, sim, &info);
+    assert_true(pixels_different(empty, view_pixels(view), bytes) < prints / 4);
+    free(empty);
+    free(standing);
+    view_destroy(view);
+}
+
+static void bad_model_and_size_are_one_line(void **state) {
+    (void)state;
+    MildError error = {0};
+    ViewDef def = view_def_default();
+    def.xml = "/nowhere/robot.xml";
+    assert_null(view_create(&def, robot, &terrain, &error));
+    assert_non_null(strstr(error.text, "/nowhere/robot.xml"));
+    def = view_def_default();
+    def.width = 8;
+    assert_null(view_create(&def, robot, &terrain, &error));
+    assert_int_equal(error.status, MILD_ERROR_RANGE);
+}
+
+/* Mean pressure times area over a stance is the mean force of that stance. */
+static void pressure_carries_the_weight(void **state) {
+    (void)state;
+    MildError error = {0};
+    Pressure *pressure = pressure_create(robot, 1, DT, &error);
+    assert_non_null(pressure);
+    load_at(0.001);
+    double force = 0;
+    int samples = 0;
+    for (int i = 0; i < 400; i++) {
+        step();
+        pressure_observe(pressure, sim, &terrain);
+        double now = 0;
+        const double *normal = mild_scratch_elements(robot_sim_scratch(sim), 0).normal;
+        for (int e = 0; e < mild_sole_elements(robot_soles(robot)[0]); e++)
+            now += normal[e];
+        if (now >= 20)
+            force += now, samples++;
+    }
+    assert_int_equal(pressure_stances(pressure, 0), 0); /* still standing */
+    load_at(0.3);
+    step();
+    pressure_observe(pressure, sim, &terrain);
+    assert_int_equal(pressure_stances(pressure, 0), ROBOT_FEET);
+
+    char path[] = "/tmp/mild_pressure_XXXXXX", line[200];
+    close(mkstemp(path));
+    assert_int_equal(pressure_write(pressure, path, names, &error), MILD_OK);
+    FILE *file = fopen(path, "r");
+    double sum = 0, pitch = mild_sole_pitch(robot_soles(robot)[0]);
+    int elements = 0, points = 0;
+    assert_non_null(fgets(line, sizeof line, file));
+    assert_string_equal(line, "ground,foot,what,index,x_m,y_m,mean_kpa,peak_kpa\n");
+    while (fgets(line, sizeof line, file)) {
+        int index;
+        double x, y, mean, peak;
+        if (sscanf(line, "sand_loose,left,element,%d,%lf,%lf,%lf,%lf", &index, &x, &y, &mean, &peak) == 5) {
+            assert_true(peak >= mean - 1e-3);
+            sum += 1e3 * mean * pitch * pitch;
+            elements++;
+        }
+        points += strstr(line, "left,path") != NULL;
+    }
+    fclose(file);
+    unlink(path);
+    print_message("left foot: mean force %.2f N in the CSV, %.2f N in the steps\n", sum, force / samples);
+    assert_int_equal(elements, mild_sole_elements(robot_soles(robot)[0]));
+    assert_int_equal(points, PRESSURE_PATH);
+    assert_true(fabs(sum - force / samples) < 1e-3 * sum);
+    pressure_destroy(pressure);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(robot_and_prints_are_seen),
+        cmocka_unit_test(bad_model_and_size_are_one_line),
+        cmocka_unit_test(pressure_carries_the_weight),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
