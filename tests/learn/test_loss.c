@@ -1,0 +1,357 @@
+/* The joint loss and its gradient: against PyTorch's stored values, and against central differences of the loss written
+ * down a second time in double precision. */
+#include "check.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "learn/loss.h"
+#include "learn/policy_file.h"
+#include "learn/product.h"
+
+#define ROWS 40
+#define MIRRORED 20
+
+/* As in make_reference.py. */
+static const int mirror_o[] = {0, 2, 1, 4, 3}, mirror_a[] = {1, 0};
+static const float sign_o[] = {-1, 1, 1, -1, -1}, sign_a[] = {-1, -1};
+static const PpoMirror mirror = {mirror_o, sign_o, mirror_a, sign_a};
+
+static PpoDef reference_def(void) {
+    PpoDef def = ppo_def_default();
+    def.clip = 0.2;
+    def.entropy = 0.01;
+    def.value_weight = 0.7;
+    def.epsilon = 0.3;
+    def.kl_weight = 0.05;
+    def.mirror_weight = 0.9;
+    return def;
+}
+
+typedef struct {
+    PpoDef def;
+    Network network;
+    LossContext context;
+    LossChunk chunk;
+    LossSums sums;
+    float *parameters, *gradient, *block;
+} Case;
+
+static void case_open(Case *c, PolicyDef policy_def) {
+    MildError error = {0};
+    memset(c, 0, sizeof *c);
+    c->def = reference_def();
+    assert_int_equal(network_layout(&c->network, &policy_def, &error), MILD_OK);
+    c->parameters = calloc((size_t)c->network.count, sizeof(float));
+    c->gradient = calloc((size_t)c->network.count, sizeof(float));
+    c->block = aligned_alloc(64, loss_carve(&c->network, ROWS, MIRRORED, NULL, &c->chunk) * sizeof(float));
+    assert_true(c->parameters && c->gradient && c->block);
+    loss_carve(&c->network, ROWS, MIRRORED, c->block, &c->chunk);
+    c->chunk.rows = ROWS;
+    c->chunk.mirrored = MIRRORED;
+    c->context = (LossContext){.def = &c->def,
+                               .network = &c->network,
+                               .mirror = &mirror,
+                               .parameters = c->parameters,
+                               .sample_weight = 1.0f / ROWS,
+                               .mirror_weight = 1.0f / MIRRORED};
+}
+
+static void case_close(Case *c) {
+    free(c->parameters);
+    free(c->gradient);
+    free(c->block);
+}
+
+/* Gradient left by an earlier minibatch must not show: it starts as NaN. */
+static void case_run(Case *c) {
+    const int entered = product_enter();
+    for (int r = 0; r < MIRRORED; r++) {
+        loss_mirror_row(&c->context, &c->chunk, r, ROWS + r);
+    }
+    for (int j = 0; j < c->network.def.actions; j++) {
+        c->context.std[j] = expf(c->parameters[c->network.log_std + j]);
+    }
+    for (int64_t i = 0; i < c->network.count; i++) {
+        c->gradient[i] = NAN;
+    }
+    c->sums = (LossSums){0};
+    loss_actor(&c->context, &c->chunk, c->gradient, 0.0f, &c->sums);
+    loss_critic(&c->context, &c->chunk, c->gradient, 0.0f, &c->sums);
+    product_leave(entered);
+}
+
+static void assert_near(const char *what, double ours, double theirs, double tolerance, double *worst) {
+    double gap = fabs(ours - theirs) / fmax(1.0, fabs(theirs));
+    *worst = fmax(*worst, gap);
+    if (!(gap <= tolerance)) {
+        print_error("%s: %.9g, reference %.9g\n", what, ours, theirs);
+        fail();
+    }
+}
+
+/* ---- PyTorch ---- */
+
+static void take_input(const Safetensors *file, const char *name, float *to) {
+    char key[64];
+    snprintf(key, sizeof key, "train.input.%s", name);
+    const Safetensor *tensor = safetensors_find(file, key);
+    assert_non_null(tensor);
+    memcpy(to, tensor->data, tensor->bytes);
+}
+
+static void take_inputs(const Safetensors *file, Case *c) {
+    LossChunk *chunk = &c->chunk;
+    take_input(file, "history", chunk->history);
+    take_input(file, "estimate", chunk->estimate);
+    take_input(file, "clean", chunk->clean);
+    take_input(file, "noise", chunk->noise);
+    take_input(file, "action", chunk->action);
+    take_input(file, "old_mean", chunk->old_mean);
+    take_input(file, "old_log_prob", chunk->old_log_prob);
+    take_input(file, "advantage", chunk->advantage);
+    take_input(file, "critic", chunk->critic);
+    take_input(file, "old_value", chunk->old_value);
+    take_input(file, "returns", chunk->returns);
+    take_input(file, "old_std", c->context.old_std);
+}
+
+static void test_matches_pytorch(void **state) {
+    (void)state;
+    MildError error = {0};
+    const char *path = MILD_SOURCE_DIR "/tests/learn/reference.safetensors";
+    Safetensors *file = safetensors_read(path, &error);
+    assert_non_null(file);
+    Case c;
+    case_open(&c, small_def());
+    assert_int_equal(policy_file_parameters(file, path, &c.network, c.parameters, &error), MILD_OK);
+    take_inputs(file, &c);
+    case_run(&c);
+
+    float terms[11];
+    double worst_loss = 0.0, worst_gradient = 0.0;
+    memcpy(terms, safetensors_find(file, "train.losses")->data, sizeof terms);
+    const double ours[] = {c.sums.surrogate / ROWS,      c.sums.kl / ROWS,          c.sums.clipped / ROWS,
+                           c.sums.reconstruction / ROWS, c.sums.vae_kl / ROWS,      c.sums.estimate[0] / ROWS,
+                           c.sums.estimate[1] / ROWS,    c.sums.estimate[2] / ROWS, c.sums.mirror / MIRRORED,
+                           c.sums.value / ROWS};
+    for (size_t i = 0; i < sizeof ours / sizeof *ours; i++) {
+        assert_near("loss", ours[i], terms[i], 1e-5, &worst_loss);
+    }
+    assert_true(terms[2] > 0.1f && terms[2] < 0.9f); /* both branches of the clip are there */
+
+    PolicyTensors names;
+    policy_file_tensors(&c.network, c.gradient, &names);
+    for (int k = 0; k < names.count; k++) {
+        char key[64];
+        snprintf(key, sizeof key, "train.gradient.%s", names.name[k]);
+        const Safetensor *want = safetensors_find(file, key);
+        assert_non_null(want);
+        assert_int_equal(want->bytes, names.tensor[k].bytes);
+        for (size_t i = 0; i < want->bytes / sizeof(float); i++) {
+            float theirs;
+            memcpy(&theirs, (const char *)want->data + i * sizeof theirs, sizeof theirs);
+            assert_near(names.name[k], ((const float *)names.tensor[k].data)[i], theirs, 1e-5, &worst_gradient);
+        }
+    }
+    print_message("worst against PyTorch: losses %.1e, gradients %.1e\n", worst_loss, worst_gradient);
+    safetensors_destroy(file);
+    case_close(&c);
+}
+
+/* ---- the loss in double, straight from its formulas ---- */
+
+static void mlp_double(const Mlp *mlp, const double *p, const double *x, double *y) {
+    double in[64], out[64];
+    memcpy(in, x, (size_t)mlp->layer[0].in * sizeof *x);
+    for (int l = 0; l < mlp->layers; l++) {
+        const MlpLayer *layer = &mlp->layer[l];
+        for (int i = 0; i < layer->out; i++) {
+            out[i] = p[layer->bias + i];
+            for (int j = 0; j < layer->in; j++) {
+                out[i] += p[layer->weight + i * layer->in + j] * in[j];
+            }
+            if (l < mlp->layers - 1 && out[i] < 0.0) {
+                out[i] = expm1(out[i]);
+            }
+        }
+        memcpy(in, out, (size_t)layer->out * sizeof *out);
+    }
+    memcpy(y, out, (size_t)mlp->layer[mlp->layers - 1].out * sizeof *y);
+}
+
+static void act_double(const Network *n, const double *p, const double *history, double *heads, double *mean) {
+    const PolicyDef *d = &n->def;
+    double theta[64], input[64];
+    mlp_double(&n->encoder, p, history, heads);
+    mlp_double(&n->modulation, p, heads + d->feet_velocity_offset, theta);
+    memcpy(input, history + n->history - d->observation, (size_t)d->observation * sizeof *input);
+    memcpy(input + d->observation, heads, (size_t)d->estimates * sizeof *input);
+    for (int j = 0; j < d->latent; j++) {
+        int a = d->modulation_per_dimension ? j : 0, b = d->modulation_per_dimension ? d->latent + j : 1;
+        input[d->observation + d->estimates + j] = theta[a] * heads[d->estimates + j] + theta[b];
+    }
+    mlp_double(&n->actor, p, input, mean);
+}
+
+static double regression_double(const Case *c, const double *p, const double *heads, int r) {
+    const Network *n = &c->network;
+    const PolicyDef *d = &n->def;
+    double input[64], decoded[64], loss = 0.0;
+    const int ends[] = {0, d->feet_velocity_offset, d->feet_velocity_offset + d->feet_velocity_count, d->estimates};
+    for (int j = 0; j < d->latent; j++) {
+        double mu = heads[d->estimates + j], logvar = heads[d->estimates + d->latent + j];
+        input[j] = mu + exp(0.5 * logvar) * (double)c->chunk.noise[r * d->latent + j];
+        loss -= 0.5 * c->def.kl_weight * (1.0 + logvar - mu * mu - exp(logvar));
+    }
+    memcpy(input + d->latent, heads, (size_t)d->estimates * sizeof *input);
+    mlp_double(&n->decoder, p, input, decoded);
+    for (int j = 0; j < d->observation; j++) {
+        loss += pow(decoded[j] - (double)c->chunk.clean[r * d->observation + j], 2) / d->observation;
+    }
+    for (int g = 0; g < 3; g++) {
+        for (int j = ends[g]; j < ends[g + 1]; j++) {
+            loss += pow(heads[j] - (double)c->chunk.estimate[r * d->estimates + j], 2) / (ends[g + 1] - ends[g]);
+        }
+    }
+    return loss;
+}
+
+static double policy_double(const Case *c, const double *p, const double *mean, int r) {
+    const Network *n = &c->network;
+    const int actions = n->def.actions;
+    double log_prob = 0.0, entropy = 0.0;
+    for (int j = 0; j < actions; j++) {
+        double log_std = p[n->log_std + j], t = ((double)c->chunk.action[r * actions + j] - mean[j]) / exp(log_std);
+        log_prob -= 0.5 * t * t + log_std + 0.5 * log(2.0 * 3.14159265358979323846);
+        entropy += log_std + 0.5 + 0.5 * log(2.0 * 3.14159265358979323846);
+    }
+    double ratio = exp(log_prob - (double)c->chunk.old_log_prob[r]), advantage = c->chunk.advantage[r];
+    double held = fmin(fmax(ratio, 1.0 - c->def.clip), 1.0 + c->def.clip);
+    double critic[64], value;
+    for (int i = 0; i < n->def.critic_input; i++) {
+        critic[i] = c->chunk.critic[r * n->def.critic_input + i];
+    }
+    mlp_double(&n->critic, p, critic, &value);
+    double old = c->chunk.old_value[r], returns = c->chunk.returns[r];
+    double held_value = old + fmin(fmax(value - old, -c->def.clip), c->def.clip);
+    double value_loss = pow(value - returns, 2);
+    value_loss = c->def.clip_value ? fmax(value_loss, pow(held_value - returns, 2)) : value_loss;
+    return -fmin(ratio * advantage, held * advantage) - c->def.entropy * entropy + c->def.value_weight * value_loss;
+}
+
+static double loss_double(const Case *c, const double *p) {
+    const Network *n = &c->network;
+    const PolicyDef *d = &n->def;
+    double loss = 0.0;
+    for (int r = 0; r < ROWS; r++) {
+        double history[64], image[64], heads[64], mean[8], turned[8];
+        for (int i = 0; i < n->history; i++) {
+            int f = i / d->observation * d->observation, k = i % d->observation;
+            history[i] = c->chunk.history[r * n->history + i];
+            image[i] = (double)sign_o[k] * (double)c->chunk.history[r * n->history + f + mirror_o[k]];
+        }
+        act_double(n, p, history, heads, mean);
+        loss += c->def.epsilon * regression_double(c, p, heads, r) / ROWS;
+        loss += (1.0 - c->def.epsilon) * policy_double(c, p, mean, r) / ROWS;
+        act_double(n, p, image, heads, turned);
+        for (int j = 0; r < MIRRORED && j < d->actions; j++) {
+            loss += c->def.mirror_weight * pow(mean[j] - (double)sign_a[j] * turned[mirror_a[j]], 2) /
+                    (MIRRORED * d->actions);
+        }
+    }
+    return loss;
+}
+
+static void fill_inputs(Case *c, Random *random) {
+    LossChunk *k = &c->chunk;
+    const PolicyDef *d = &c->network.def;
+    fill_normal(c->parameters, c->network.count, 0.35, random);
+    fill_normal(k->history, ROWS * c->network.history, 1.0, random);
+    fill_normal(k->estimate, ROWS * d->estimates, 1.0, random);
+    fill_normal(k->clean, ROWS * d->observation, 1.0, random);
+    fill_normal(k->noise, ROWS * d->latent, 1.0, random);
+    fill_normal(k->action, ROWS * d->actions, 1.0, random);
+    fill_normal(k->old_mean, ROWS * d->actions, 1.0, random);
+    fill_normal(k->advantage, ROWS, 1.0, random);
+    fill_normal(k->critic, ROWS * d->critic_input, 1.0, random);
+    fill_normal(k->old_value, ROWS, 0.5, random);
+    fill_normal(k->returns, ROWS, 1.0, random);
+    for (int r = 0; r < ROWS; r++) {
+        k->old_log_prob[r] = (float)(-2.5 + 0.3 * random_normal(random));
+    }
+    for (int j = 0; j < d->actions; j++) {
+        c->context.old_std[j] = 1.0f;
+    }
+}
+
+/* Central differences with step 1e-6 in double leave about 1e-9; single precision about 1e-6. A parameter whose difference
+ * straddles a corner of the loss would show as an outlier: with these draws there is none. */
+static void check_differences(PolicyDef policy_def, int clip_value, uint64_t seed) {
+    Case c;
+    Random random = random_at(seed, 0, 0);
+    case_open(&c, policy_def);
+    c.def.clip_value = clip_value;
+    fill_inputs(&c, &random);
+    case_run(&c);
+    double *p = calloc((size_t)c.network.count, sizeof *p), worst = 0.0;
+    assert_non_null(p);
+    for (int64_t i = 0; i < c.network.count; i++) {
+        p[i] = c.parameters[i];
+    }
+    for (int64_t i = 0; i < c.network.count; i++) {
+        const double step = 1e-6, at = p[i];
+        p[i] = at + step;
+        double high = loss_double(&c, p);
+        p[i] = at - step;
+        double low = loss_double(&c, p);
+        p[i] = at;
+        assert_near("gradient", c.gradient[i], (high - low) / (2.0 * step), 2e-5, &worst);
+    }
+    print_message("worst against differences: %.1e over %d parameters\n", worst, (int)c.network.count);
+    free(p);
+    case_close(&c);
+}
+
+static void test_matches_differences(void **state) {
+    (void)state;
+    PolicyDef def = small_def();
+    check_differences(def, 1, 1);
+    def.modulation_per_dimension = 1;
+    check_differences(def, 0, 2);
+    def.feet_velocity_offset = 0;                                              /* no first group of estimates */
+    def.actor_hidden[0] = 0, def.actor_hidden[1] = 0, def.actor_hidden[2] = 0; /* a linear actor */
+    check_differences(def, 1, 3);
+}
+
+/* Chunks add up: the gradient with beta 1 on top of another is their sum. */
+static void test_chunks_add(void **state) {
+    (void)state;
+    Case c;
+    Random random = random_at(4, 0, 0);
+    case_open(&c, small_def());
+    fill_inputs(&c, &random);
+    case_run(&c);
+    float *once = calloc((size_t)c.network.count, sizeof *once);
+    assert_non_null(once);
+    memcpy(once, c.gradient, (size_t)c.network.count * sizeof *once);
+    loss_actor(&c.context, &c.chunk, c.gradient, 1.0f, &c.sums);
+    loss_critic(&c.context, &c.chunk, c.gradient, 1.0f, &c.sums);
+    double worst = 0.0;
+    for (int64_t i = 0; i < c.network.count; i++) {
+        assert_near("twice", c.gradient[i], 2.0 * (double)once[i], 1e-5, &worst);
+    }
+    free(once);
+    case_close(&c);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_matches_pytorch),
+        cmocka_unit_test(test_matches_differences),
+        cmocka_unit_test(test_chunks_add),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

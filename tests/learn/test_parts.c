@@ -1,0 +1,177 @@
+/* The learner's small parts: elementwise functions, noise, advantages, Adam. */
+#include "check.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "learn/adam.h"
+#include "learn/noise.h"
+#include "learn/ppo_private.h"
+#include "learn/vector.h"
+
+static void test_elementwise_functions(void **state) {
+    (void)state;
+    double worst_exp = 0.0, worst_log = 0.0, worst_elu = 0.0;
+    for (double x = -87.0; x < 88.0; x += 1e-3) {
+        float at = (float)x;
+        worst_exp = fmax(worst_exp, fabs((double)vector_exp(at) / exp((double)at) - 1.0));
+        double elu = at > 0.0f ? (double)at : expm1((double)at);
+        worst_elu = fmax(worst_elu, fabs((double)vector_elu(at) - elu) / fmax(1.0, fabs(elu)));
+        double slope = at > 0.0f ? 1.0 : exp((double)at);
+        worst_elu = fmax(worst_elu, fabs((double)vector_elu_slope(vector_elu(at)) - slope));
+    }
+    for (double x = 1e-30; x < 1e30; x *= 1.001) {
+        float at = (float)x;
+        double exact = log((double)at);
+        worst_log = fmax(worst_log, fabs((double)vector_log(at) - exact) / fmax(1.0, fabs(exact)));
+    }
+    print_message("worst: exp %.1e, elu %.1e, log %.1e\n", worst_exp, worst_elu, worst_log);
+    assert_true(worst_exp < 4e-7 && worst_elu < 4e-7 && worst_log < 3e-7);
+    assert_true(vector_elu(0.0f) == 0.0f && vector_log(1.0f) == 0.0f && vector_exp(0.0f) == 1.0f);
+    assert_true(isnan(vector_elu(NAN)) && isnan(vector_exp(NAN)));
+    assert_true(vector_elu(-INFINITY) == -1.0f && vector_elu(1e30f) == 1e30f);
+}
+
+static void test_noise_is_normal(void **state) {
+    (void)state;
+    enum { COUNT = 1 << 20 };
+    float *x = malloc(COUNT * sizeof *x);
+    assert_non_null(x);
+    noise_normal(0x123456789abcdefu, 0, COUNT, x);
+    double moment[5] = {0}, neighbours = 0.0, pairs = 0.0;
+    int tail = 0;
+    for (int i = 0; i < COUNT; i++) {
+        double v = x[i];
+        for (int k = 1; k <= 4; k++) {
+            moment[k] += pow(v, k) / COUNT;
+        }
+        neighbours += i > 0 ? v * (double)x[i - 1] / COUNT : 0.0;
+        pairs += i > 1 ? fabs(v) * fabs((double)x[i - 2]) / COUNT : 0.0;
+        tail += fabs(v) > 3.0;
+    }
+    print_message("moments %.4f %.4f %.4f %.4f, neighbours %.4f, beyond 3 sigma %.5f\n", moment[1], moment[2],
+                  moment[3], moment[4], neighbours, (double)tail / COUNT);
+    assert_true(fabs(moment[1]) < 5e-3 && fabs(moment[2] - 1.0) < 7e-3 && fabs(moment[3]) < 2e-2 &&
+                fabs(moment[4] - 3.0) < 5e-2);
+    assert_true(fabs(neighbours) < 5e-3 && fabs(pairs - 2.0 / 3.14159265) < 5e-3);
+    assert_true(fabs((double)tail / COUNT - 0.0027) < 3e-4);
+    free(x);
+}
+
+static void test_noise_depends_on_key_and_place_only(void **state) {
+    (void)state;
+    float whole[1000], part[1000], other[1000];
+    noise_normal(77, 0, 1000, whole);
+    for (int first = 0; first < 1000; first += 34) {
+        int count = 1000 - first < 34 ? 1000 - first : 34;
+        noise_normal(77, first, count, part + first);
+    }
+    assert_memory_equal(whole, part, sizeof whole);
+    noise_normal(78, 0, 1000, other);
+    int same = 0;
+    for (int i = 0; i < 1000; i++) {
+        same += whole[i] == other[i];
+    }
+    assert_true(same < 3);
+}
+
+static void test_adam(void **state) {
+    (void)state;
+    enum { COUNT = 37 };
+    float p[COUNT], m[COUNT] = {0}, v[COUNT] = {0}, g[COUNT];
+    double pd[COUNT], md[COUNT] = {0}, vd[COUNT] = {0}, worst = 0.0;
+    Random random = random_at(1, 2, 3);
+    fill_normal(p, COUNT, 1.0, &random);
+    for (int i = 0; i < COUNT; i++) {
+        pd[i] = p[i];
+    }
+    for (int t = 1; t <= 50; t++) {
+        fill_normal(g, COUNT, 0.1, &random);
+        adam_apply(adam_step(0.01, t, 0.5), COUNT, g, p, m, v);
+        for (int i = 0; i < COUNT; i++) {
+            double grad = 0.5 * (double)g[i];
+            md[i] = 0.9 * md[i] + 0.1 * grad;
+            vd[i] = 0.999 * vd[i] + 0.001 * grad * grad;
+            pd[i] -= 0.01 * (md[i] / (1.0 - pow(0.9, t))) / (sqrt(vd[i] / (1.0 - pow(0.999, t))) + 1e-8);
+            worst = fmax(worst, fabs(pd[i] - (double)p[i]));
+        }
+    }
+    print_message("Adam, 50 steps: worst %.1e\n", worst);
+    assert_true(worst < 5e-6);
+}
+
+#define STEPS 30
+#define ENVS 5
+
+/* Discounted sum by its definition, A_t = sum_k (gamma lambda)^k delta_t+k up to the end of the episode. */
+static double advantage_by_sum(const PpoDef *def, const PpoBatch *b, int t, int env) {
+    double sum = 0.0, weight = 1.0;
+    for (int k = t; k < STEPS; k++) {
+        const int i = k * ENVS + env;
+        double next = b->done[i] ? (b->timeout[i] ? (double)b->value[i] : 0.0) : (double)b->value[i + ENVS];
+        sum += weight * ((double)b->reward[i] + def->gamma * next - (double)b->value[i]);
+        weight *= def->gamma * def->lambda;
+        if (b->done[i] || (k + 1 < STEPS && !b->valid[i + ENVS])) {
+            break;
+        }
+    }
+    return sum;
+}
+
+static void test_advantages(void **state) {
+    (void)state;
+    MildError error = {0};
+    PolicyDef policy_def = small_def();
+    PpoDef def = ppo_def_default();
+    def.steps = STEPS;
+    Policy *policy = policy_create(&policy_def, 1, &error);
+    Pool *pool = pool_create(1);
+    Ppo *ppo = ppo_create(&def, policy, pool, NULL, ENVS, 1, &error);
+    assert_non_null(ppo);
+    PpoBatch *b = ppo_batch(ppo);
+    Random random = random_at(9, 9, 9);
+    fill_normal(b->value, (STEPS + 1) * ENVS, 1.0, &random);
+    fill_normal(b->reward, STEPS * ENVS, 1.0, &random);
+    for (int i = 0; i < STEPS * ENVS; i++) {
+        b->done[i] = random_unit(&random) < 0.1;
+        b->timeout[i] = b->done[i] && random_unit(&random) < 0.5;
+        b->valid[i] = random_unit(&random) > 0.05;
+    }
+    PpoReport report = {0};
+    ppo_returns(ppo, &report);
+    double sum = 0.0, squares = 0.0, worst = 0.0, gap = 0.0, direct[STEPS * ENVS];
+    for (int k = 0; k < ppo->samples; k++) {
+        int i = ppo->order[k];
+        direct[k] = advantage_by_sum(&def, b, i / ENVS, i % ENVS);
+        worst = fmax(worst, fabs(direct[k] + (double)b->value[i] - (double)b->returns[i]));
+        sum += direct[k] / ppo->samples;
+    }
+    for (int k = 0; k < ppo->samples; k++) {
+        squares += pow(direct[k] - sum, 2) / ppo->samples;
+    }
+    int valid = 0;
+    for (int i = 0; i < STEPS * ENVS; i++) {
+        valid += b->valid[i];
+    }
+    for (int k = 0; k < ppo->samples; k++) {
+        gap = fmax(gap, fabs((direct[k] - sum) / sqrt(squares) - (double)b->advantage[ppo->order[k]]));
+    }
+    print_message("worst: return %.1e, normalised advantage %.1e over %d samples\n", worst, gap, ppo->samples);
+    assert_int_equal(ppo->samples, valid);
+    assert_true(worst < 1e-5 && gap < 1e-5 && fabs(report.advantage_std - sqrt(squares)) < 1e-5);
+    ppo_destroy(ppo);
+    policy_destroy(policy);
+    pool_destroy(pool);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_elementwise_functions),
+        cmocka_unit_test(test_noise_is_normal),
+        cmocka_unit_test(test_noise_depends_on_key_and_place_only),
+        cmocka_unit_test(test_adam),
+        cmocka_unit_test(test_advantages),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,294 @@
+/* Acting, and the policy's file: round trip, damage of every kind, a full disk, memory running out. */
+#include "check.h"
+
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "learn/policy_private.h"
+#include "learn/ppo.h"
+#include "learn/safetensors.h"
+
+#define PATH "build_test_policy.safetensors"
+
+static Policy *small_policy(uint64_t seed) {
+    MildError error = {0};
+    PolicyDef def = small_def();
+    Policy *policy = policy_create(&def, seed, &error);
+    assert_non_null(policy);
+    return policy;
+}
+
+static size_t parameter_bytes(const Policy *policy) {
+    return (size_t)policy_parameter_count(policy) * sizeof(float);
+}
+
+/* Whole networks of the default size, rows beyond one chunk: with and without a pool the same bits; estimates and latent
+ * are the parts of the actor's input. */
+static void test_act_and_value(void **state) {
+    (void)state;
+    enum { ROWS = 300 };
+    MildError error = {0};
+    PolicyDef def = policy_def_default();
+    Policy *policy = policy_create(&def, 3, &error);
+    Pool *pool = pool_create(3);
+    assert_true(policy && pool);
+    assert_int_equal(policy_parameter_count(policy), 637461);
+    Random random = random_at(5, 0, 0);
+    static float history[ROWS * 282], critic[ROWS * 98], actions[2][ROWS * 12], estimates[2][ROWS * 11],
+        latent[2][ROWS * 16], values[2][ROWS];
+    fill_normal(history, ROWS * 282, 1.0, &random);
+    fill_normal(critic, ROWS * 98, 1.0, &random);
+    policy_act(policy, NULL, ROWS, history, actions[0], estimates[0], latent[0]);
+    policy_act(policy, pool, ROWS, history, actions[1], estimates[1], latent[1]);
+    policy_value(policy, NULL, ROWS, critic, values[0]);
+    policy_value(policy, pool, ROWS, critic, values[1]);
+    assert_memory_equal(actions[0], actions[1], sizeof actions[0]);
+    assert_memory_equal(estimates[0], estimates[1], sizeof estimates[0]);
+    assert_memory_equal(latent[0], latent[1], sizeof latent[0]);
+    assert_memory_equal(values[0], values[1], sizeof values[0]);
+    policy_act(policy, NULL, ROWS, history, actions[1], NULL, NULL);
+    assert_memory_equal(actions[0], actions[1], sizeof actions[0]);
+    /* one row alone: other kernels, the same numbers to rounding */
+    double worst = 0.0;
+    policy_act(policy, NULL, 1, history + 200 * 282, actions[1], estimates[1], latent[1]);
+    for (int j = 0; j < 12; j++) {
+        worst = fmax(worst, fabs((double)actions[1][j] - (double)actions[0][200 * 12 + j]));
+    }
+    print_message("one row against a batch: %.1e\n", worst);
+    assert_true(worst < 1e-5);
+    for (int j = 0; j < 12; j++) {
+        assert_true(fabs((double)policy_std(policy)[j] - def.init_std) < 1e-6);
+    }
+    policy_destroy(policy);
+    pool_destroy(pool);
+}
+
+/* theta1 = 1, theta2 = 0 at the start: the modulated latent is the encoder's mu. */
+static void test_modulation_starts_at_identity(void **state) {
+    (void)state;
+    for (int per_dimension = 0; per_dimension < 2; per_dimension++) {
+        MildError error = {0};
+        PolicyDef def = small_def();
+        def.modulation_per_dimension = per_dimension;
+        Policy *policy = policy_create(&def, 8, &error);
+        float history[15], actions[2], latent[4], *block;
+        Random random = random_at(6, 0, 0);
+        fill_normal(history, 15, 1.0, &random);
+        policy_act(policy, NULL, 1, history, actions, NULL, latent);
+        NetworkOutputs outputs;
+        size_t used = 0;
+        network_carve(&policy->network, 1, NULL, &used, &outputs);
+        block = aligned_alloc(64, used * sizeof(float));
+        assert_non_null(block);
+        used = 0;
+        network_carve(&policy->network, 1, block, &used, &outputs);
+        network_forward(&policy->network, policy->parameters, 1, history, &outputs);
+        assert_memory_equal(latent, network_heads(&policy->network, &outputs) + def.estimates, sizeof latent);
+        free(block);
+        policy_destroy(policy);
+    }
+}
+
+static void test_round_trip(void **state) {
+    (void)state;
+    MildError error = {0};
+    Policy *policy = small_policy(4);
+    const char *note = "say \"crc32\":\"00000000\", tab\t, \xc3\xa9";
+    char back[64];
+    assert_int_equal(policy_save(policy, PATH, note, &error), MILD_OK);
+    Policy *loaded = policy_load(PATH, back, sizeof back, &error);
+    assert_non_null(loaded);
+    assert_string_equal(back, note);
+    assert_memory_equal(policy_def(loaded), policy_def(policy), sizeof(PolicyDef));
+    assert_memory_equal(policy_parameters(loaded), policy_parameters(policy), parameter_bytes(policy));
+    assert_int_equal(access(PATH ".tmp", F_OK), -1);
+    policy_destroy(loaded);
+    policy_destroy(policy);
+    unlink(PATH);
+}
+
+static unsigned char *read_bytes(const char *path, size_t *size) {
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    fseek(file, 0, SEEK_END);
+    *size = (size_t)ftell(file);
+    rewind(file);
+    unsigned char *bytes = malloc(*size);
+    assert_non_null(bytes);
+    assert_int_equal(fread(bytes, 1, *size, file), *size);
+    fclose(file);
+    return bytes;
+}
+
+static void write_bytes(const char *path, const unsigned char *bytes, size_t size) {
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, size, file), size);
+    fclose(file);
+}
+
+/* Refused with one line that names the file. */
+static void assert_refused(const char *path) {
+    MildError error = {0};
+    Policy *policy = policy_load(path, NULL, 0, &error);
+    assert_null(policy);
+    assert_int_not_equal(error.status, MILD_OK);
+    assert_non_null(strstr(error.text, path));
+    assert_null(strchr(error.text, '\n'));
+}
+
+static void test_damaged_files(void **state) {
+    (void)state;
+    MildError error = {0};
+    Policy *policy = small_policy(4);
+    assert_int_equal(policy_save(policy, PATH, "damage", &error), MILD_OK);
+    size_t size;
+    unsigned char *bytes = read_bytes(PATH, &size);
+    for (size_t cut = 0; cut < 50; cut++) {
+        write_bytes(PATH, bytes, size * cut / 50);
+        assert_refused(PATH);
+    }
+    write_bytes(PATH, bytes, size - 1);
+    assert_refused(PATH);
+    Random random = random_at(12, 0, 0);
+    for (int flip = 0; flip < 600; flip++) { /* every bit of the first bytes, then anywhere */
+        size_t at = flip < 200 ? (size_t)flip / 8 : random_index(&random, (uint32_t)size);
+        unsigned char mask = (unsigned char)(1u << (flip % 8));
+        bytes[at] ^= mask;
+        write_bytes(PATH, bytes, size);
+        assert_refused(PATH);
+        bytes[at] ^= mask;
+    }
+    unlink(PATH);
+    assert_refused(PATH);
+    assert_refused("/");
+    assert_refused("no/such/folder/policy.safetensors");
+    free(bytes);
+    policy_destroy(policy);
+}
+
+/* Files with a right checksum whose header lies. */
+static void test_lying_headers(void **state) {
+    (void)state;
+    static const char *const swaps[][2] = {
+        {"\"shape\":[12,15]", "\"shape\":[15,12]"},
+        {"\"shape\":[12,15]", "\"shape\":[12,16]"},
+        {"\"shape\":[12,15]", "\"shape\":[1e99]"},
+        {"\"shape\":[12,15]", "\"shape\":[-1,1]"},
+        {"[0,720]", "[4,724]"},
+        {"[0,720]", "[0,719]"},
+        {"[0,720]", "[720,0]"},
+        {"[0,720]", "[0,1e9]"},
+        {"\"F32\"", "\"F16\""},
+        {"\"F32\"", "\"F64\""},
+        {"\"policy.latent\":\"4\"", "\"policy.latent\":\"5\""},
+        {"\"policy.latent\":\"4\"", "\"policy.latent\":\"x\""},
+        {"\"policy.latent\"", "\"policy.latenz\""},
+        {"\"policy.frames\":\"3\"", "\"policy.frames\":\"0\""},
+        {"\"12 8 0 0\"", "\"12 0 8 0\""},
+        {"\"12 8 0 0\"", "\"8192 0 \""},
+        {"\"kind\":\"mild policy\"", "\"kind\":\"wild policy\""},
+        {"\"version\":\"1\"", "\"version\":\"2\""},
+        {"\"log_std\"", "\"log_sdt\""},
+        {"\"encoder.2.bias\"", "\"encoder.0.bias\""},
+        {"{\"__metadata__\":{", "{\"__metadata__\":["},
+        {"\"note\":\"lies\"", "\"note\":123456"},
+        {"\"policy.feet_velocity_count\":\"3\"", "\"policy.feet_velocity_count\":\"7\""},
+    };
+    MildError error = {0};
+    Policy *policy = small_policy(4);
+    assert_int_equal(policy_save(policy, PATH, "lies", &error), MILD_OK);
+    size_t size;
+    unsigned char *bytes = read_bytes(PATH, &size), *lie = malloc(size);
+    assert_non_null(lie);
+    for (size_t i = 0; i < sizeof swaps / sizeof *swaps; i++) {
+        memcpy(lie, bytes, size);
+        const char *from = swaps[i][0], *to = swaps[i][1];
+        size_t length = strlen(from), at = 8;
+        while (at + length < size && memcmp(lie + at, from, length) != 0) {
+            at++;
+        }
+        assert_true(at + length < size);
+        size_t kept = strlen(to) < length ? strlen(to) : length;
+        memset(lie + at, ' ', length);
+        memcpy(lie + at, to, kept);
+        assert_true(safetensors_seal(lie, size));
+        write_bytes(PATH, lie, size);
+        assert_refused(PATH);
+    }
+    memcpy(lie, bytes, size);
+    const float bad = NAN;
+    memcpy(lie + size - sizeof bad, &bad, sizeof bad);
+    assert_true(safetensors_seal(lie, size));
+    write_bytes(PATH, lie, size);
+    assert_refused(PATH);
+    free(lie);
+    free(bytes);
+    unlink(PATH);
+    policy_destroy(policy);
+}
+
+/* A disk that fills up half way: the old file stays, no temporary one is left. */
+static void test_full_disk(void **state) {
+    (void)state;
+    MildError error = {0};
+    Policy *old = small_policy(1), *fresh = small_policy(2);
+    assert_int_equal(policy_save(old, PATH, "old", &error), MILD_OK);
+    struct rlimit before, tight;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    tight = before;
+    tight.rlim_cur = 2000;
+    void (*handler)(int) = signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &tight), 0);
+    MildStatus status = policy_save(fresh, PATH, "new", &error);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    signal(SIGXFSZ, handler);
+    assert_int_equal(status, MILD_ERROR_IO);
+    assert_non_null(strstr(error.text, PATH));
+    assert_int_equal(access(PATH ".tmp", F_OK), -1);
+    char note[8];
+    Policy *kept = policy_load(PATH, note, sizeof note, &error);
+    assert_non_null(kept);
+    assert_string_equal(note, "old");
+    assert_int_equal(policy_save(fresh, "no/such/folder/policy.safetensors", "", &error), MILD_ERROR_IO);
+    policy_destroy(kept);
+    policy_destroy(old);
+    policy_destroy(fresh);
+    unlink(PATH);
+}
+
+static void test_unusable_defs(void **state) {
+    (void)state;
+    MildError error = {0};
+    PolicyDef def = small_def();
+    def.encoder_hidden[0] = 0;
+    assert_null(policy_create(&def, 1, &error));
+    def = small_def();
+    def.feet_velocity_count = 6;
+    assert_null(policy_create(&def, 1, &error));
+    def = small_def();
+    def.init_std = NAN;
+    assert_null(policy_create(&def, 1, &error));
+    def = small_def();
+    def.actions = NETWORK_ACTIONS_MAX + 1;
+    assert_null(policy_create(&def, 1, &error));
+    def = small_def();
+    def.frames = 16384;
+    assert_null(policy_create(&def, 1, &error));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_act_and_value), cmocka_unit_test(test_modulation_starts_at_identity),
+        cmocka_unit_test(test_round_trip),    cmocka_unit_test(test_damaged_files),
+        cmocka_unit_test(test_lying_headers), cmocka_unit_test(test_full_disk),
+        cmocka_unit_test(test_unusable_defs),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
