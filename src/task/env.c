@@ -64,6 +64,7 @@ static void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot) {
     env->phase = random_unit(&r) < 0.5 ? 0 : 0.5;
     /* The very first episodes end at different times, so that the environments never march in step. */
     env->step = env->tick == 0 && !env->command_frozen ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit) : 0;
+    env->step_first = env->step;
 }
 
 static void base_twist(const RobotSim *sim, double twist[6]) {
@@ -247,9 +248,9 @@ static void advance_clock(TaskEnv *env, const TaskDef *def) {
 }
 
 static void report_episode(const TaskEnv *env, TaskStep *out) {
-    out->length = env->step;
+    out->length = env->step - env->step_first;
     out->episode_reward = (float)env->reward_sum;
-    out->episode_speed_error = (float)(env->speed_error_sum / (env->step ? env->step : 1));
+    out->episode_speed_error = (float)(env->speed_error_sum / (out->length ? out->length : 1));
     for (int i = 0; i < TASK_REWARD_COUNT; i++) {
         out->episode_terms[i] = (float)env->term_sum[i];
     }

@@ -26,7 +26,7 @@ typedef struct {
     uint32_t index; /* environment number: its stream of random numbers */
     uint32_t tick;  /* policy steps since creation, never reset */
     /* episode */
-    uint32_t step, step_limit;
+    uint32_t step, step_limit, step_first; /* step_first: where the clock of this episode began */
     double phase;             /* [-] gait clock in [0, 1) */
     double command[3];        /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
     double command_seen[3];   /* what the policy sees: one policy step late */

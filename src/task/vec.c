@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "robot/bench.h"
+
 struct Vec {
     TaskDef def;
     const Robot *robot;
@@ -12,6 +14,7 @@ struct Vec {
     char *state;    /* [envs][stride] TaskEnv and ground memory */
     TaskStep *step; /* [envs] */
     RobotSim **sim; /* [threads] */
+    RobotPhases *phases; /* [threads] */
     VecStats stats; /* sums */
     /* arguments of the call in flight */
     const float *action;
@@ -45,7 +48,8 @@ Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, ui
     vec->state = aligned_alloc(64, (size_t)envs * vec->stride);
     vec->step = calloc((size_t)envs, sizeof *vec->step);
     vec->sim = calloc((size_t)pool_threads(pool), sizeof(RobotSim *));
-    if (!vec->state || !vec->step || !vec->sim) {
+    vec->phases = calloc((size_t)pool_threads(pool), sizeof *vec->phases);
+    if (!vec->state || !vec->step || !vec->sim || !vec->phases) {
         mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory for %d", envs);
         vec_destroy(vec);
         return NULL;
@@ -56,6 +60,7 @@ Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, ui
             vec_destroy(vec);
             return NULL;
         }
+        robot_sim_time_phases(vec->sim[i], &vec->phases[i]);
     }
     for (int i = 0; i < envs; i++) {
         task_env_init(env_at(vec, i), def, robot, seed, (uint32_t)i);
@@ -71,6 +76,7 @@ void vec_destroy(Vec *vec) {
         robot_sim_destroy(vec->sim[i]);
     }
     free(vec->sim);
+    free(vec->phases);
     free(vec->step);
     free(vec->state);
     free(vec);
@@ -143,10 +149,10 @@ VecStats vec_take_stats(Vec *vec) {
 void vec_take_times(Vec *vec, double *physics, double *ground) {
     *physics = *ground = 0;
     for (int i = 0; i < pool_threads(vec->pool); i++) {
-        double in_physics, in_ground;
-        robot_sim_take_times(vec->sim[i], &in_physics, &in_ground);
-        *physics += in_physics;
-        *ground += in_ground;
+        RobotPhases *phases = &vec->phases[i];
+        *physics += phases->smooth + phases->map + phases->ground + phases->finish;
+        *ground += phases->ground;
+        memset(phases, 0, sizeof *phases);
     }
 }
 
