@@ -2,6 +2,7 @@
  * learning allocate nothing of their own. The allocator of this executable counts and fails. */
 #include "check.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -54,6 +55,11 @@ void *calloc(size_t items, size_t size) {
 
 void *aligned_alloc(size_t alignment, size_t size) {
     return fails() ? NULL : count(__libc_memalign(alignment, size));
+}
+
+int posix_memalign(void **block, size_t alignment, size_t size) {
+    *block = aligned_alloc(alignment, size);
+    return *block ? 0 : ENOMEM;
 }
 
 void *realloc(void *block, size_t size) {
