@@ -38,24 +38,6 @@ typedef struct {
 
 /* ---- set-up ---- */
 
-static void stand_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
-    (void)self;
-    (void)envs;
-    memset(actions, 0, (size_t)rows * TASK_ACTIONS * sizeof *actions);
-}
-
-static void stand_destroy(void *self) {
-    (void)self;
-}
-
-/* "stand" is no file: the default pose held by the stand gains, a baseline that needs no training. */
-static MildStatus make_controller(const char *policy, Controller *controller, MildError *error) {
-    static int nothing;
-    if (strcmp(policy, "stand") != 0) return controller_learned(policy, NULL, 1, controller, error);
-    *controller = (Controller){&nothing, "stand", stand_act, stand_destroy};
-    return MILD_OK;
-}
-
 static MildStatus make_task(Command *c, MildError *error) {
     c->task = task_def_default();
     if (c->config) {
@@ -78,7 +60,8 @@ static MildStatus make_scene(Command *c, MildError *error) {
         MildStatus status = grounds_find(c->grounds.name[g], &unused, &rigid, error);
         if (status != MILD_OK) return status;
         if (rigid && c->grounds.count > 1) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT, "--ground: rigid is the engine's own contact and stands alone");
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "--ground: rigid is the engine's own contact and stands alone");
         }
         size_t used = strlen(name);
         if (used + strlen(c->grounds.name[g]) + 2 > sizeof name) {
@@ -135,8 +118,8 @@ static MildStatus make_view(Command *c, const char *xml, MildError *error) {
 static void print_table(const Command *c) {
     const Play *play = &c->play;
     double weight = robot_total_mass(play->robot) * GRAVITY;
-    printf("%-12s %9s %7s %9s %8s %10s %9s %5s\n", "ground", "distance", "time", "speed", "upright", "clearance", "sinkage",
-           "COT");
+    printf("%-12s %9s %7s %9s %8s %10s %9s %5s\n", "ground", "distance", "time", "speed", "upright", "clearance",
+           "sinkage", "COT");
     for (int i = 0; i < c->grounds.count; i++) {
         const PlayLeg *leg = &play->leg[i];
         const Measure *m = &leg->measure;
@@ -171,7 +154,8 @@ static MildStatus draw_pressure(const char *data, const char *picture, MildError
     if (failure == 0) waitpid(child, &code, 0);
     if (failure == 0 && WIFEXITED(code) && WEXITSTATUS(code) == 0) return MILD_OK;
     return mild_fail(error, MILD_ERROR_IO,
-                     "%s: not drawn, Python with matplotlib is needed (make setup); the numbers are in %s", picture, data);
+                     "%s: not drawn, Python with matplotlib is needed (make setup); the numbers are in %s", picture,
+                     data);
 }
 
 /* The CSV beside the picture; a name ending in .csv wants no picture. */
@@ -190,7 +174,9 @@ static MildStatus save_pressure(const Command *c, MildError *error) {
         labels[i] = names[i];
         any += pressure_stances(c->play.pressure, i);
     }
-    if (any == 0) return mild_fail(error, MILD_ERROR_ARGUMENT, "%s: the robot took no step, there is nothing to draw", c->pressure);
+    if (any == 0)
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "%s: the robot took no step, there is nothing to draw",
+                         c->pressure);
     MildStatus status = pressure_write(c->play.pressure, data, labels, error);
     if (status == MILD_OK && strcmp(data, c->pressure) != 0) status = draw_pressure(data, c->pressure, error);
     return status;
@@ -232,7 +218,7 @@ static MildStatus prepare(Command *c, const char *xml, MildError *error) {
     }
     if (c->video) status = make_parent(c->video, error);
     if (status == MILD_OK && c->pressure) status = make_parent(c->pressure, error);
-    if (status == MILD_OK) status = make_controller(c->policy, play->controller, error);
+    if (status == MILD_OK) status = controller_learned(c->policy, NULL, 1, play->controller, error);
     if (status == MILD_OK && c->pressure) {
         play->pressure = pressure_create(play->robot, c->scene.terrain.material_count, c->task.physics_dt, error);
         if (!play->pressure) status = error->status;
@@ -268,15 +254,15 @@ static MildStatus run_play(Command *c, MildError *error) {
 
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     const CliOption options[] = {
-        {"policy", CLI_TEXT, &c->policy, 0, 0, "FILE",
-         "policy to watch, or `stand` to hold the default pose (policies/mild.safetensors)"},
+        {"policy", CLI_TEXT, &c->policy, 0, 0, "FILE", "policy to watch (policies/mild.safetensors)"},
         {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]", "ground, or several crossed in order (sand_loose)"},
         {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L", "[m] length of each ground of a course (2)"},
         {"video", CLI_TEXT, &c->video, 0, 0, "FILE.mp4", "film it; without this and --pressure a window opens"},
         {"pressure", CLI_TEXT, &c->pressure, 0, 0, "FILE.png",
          "sole pressure per ground: a picture and its numbers as CSV beside it"},
         {"speed", CLI_NUMBER, &c->play.speed, -1, 1, "V", "[m/s] commanded forward speed (0.6)"},
-        {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T", "[s] length of the walk; 0: long enough for the course (0)"},
+        {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
+         "[s] length of the walk; 0: long enough for the course (0)"},
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S", "start and sensor noise (1)"},
         {"config", CLI_TEXT, &c->config, 0, 0, "FILE", "config the policy was trained with, for its [task]"},
         {"width", CLI_INT, &c->width, 64, 7680, "N", "[pixels] (960)"},
@@ -285,9 +271,10 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     const CliCommand command = {
         .name = "play",
         .usage = "--policy FILE --ground NAME[,NAME] [--video FILE.mp4] [--pressure FILE.png] [options]",
-        .summary = "Watch a policy walk. Several grounds make a course that is crossed in order. In the window: arrow keys "
-                   "change speed and turn, Q and E step sideways, space pauses, - and = change the pace, R starts again, "
-                   "mouse turns the camera, Esc quits. Afterwards a table: a row for each ground.",
+        .summary =
+            "Watch a policy walk. Several grounds make a course that is crossed in order. In the window: arrow keys "
+            "change speed and turn, Q and E step sideways, space pauses, - and = change the pace, R starts again, "
+            "mouse turns the camera, Esc quits. Afterwards a table: a row for each ground.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .overrides = "any key of sections [task] and [ground], e.g. --task.physics_dt=0.001 --ground.mu=0.4",

@@ -10,19 +10,24 @@
 #include "eval/eval.h"
 
 #define START_TIME 1.0  /* [s] standing up and starting, not counted in speeds and pressures */
-#define FALL_TIME 0.6   /* [s] still filmed after a fall */
+#define FALL_TIME 1.0   /* [s] the last picture stays after a fall */
 #define SPEED_TIME 0.5  /* [s] the shown speed is a running mean over about this long */
+#define OWED_MAX 0.2    /* [s] of walking that a slow machine makes up for at once */
+#define WINDOW_TIME 1e6 /* [s] a window's walk has no end */
 #define SPEED_MAX 1.0   /* [m/s], [rad/s] that the keys can command */
 
 /* The walk's own state. */
 typedef struct {
     Play *play;
+    TaskDef task; /* the caller's, with an episode as long as the walk */
     TaskEnv *env;
     RobotSim *sim;
     double command[3]; /* [m/s, m/s, rad/s] wished by keys */
     int steer;         /* bool: keys were used; until then the heading is held */
     double speed;      /* [m/s] shown */
     double end;        /* [s] */
+    int ground;        /* material under the base */
+    int lost;          /* bool: numbers went bad, the state must not be drawn */
 } Walk;
 
 /* TaskProbe: every physics step. */
@@ -30,7 +35,8 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
     Walk *walk = context;
     Play *play = walk->play;
     const double *qpos = robot_sim_qpos(sim);
-    PlayLeg *leg = &play->leg[mild_terrain_material_at(&env->terrain, qpos[0], qpos[1])];
+    walk->ground = mild_terrain_material_at(&env->terrain, qpos[0], qpos[1]);
+    PlayLeg *leg = &play->leg[walk->ground];
     play->time += robot_sim_dt(sim);
     if (play->time < START_TIME || play->fell) return;
     if (leg->steps++ == 0) {
@@ -51,7 +57,7 @@ static void start(Walk *walk) {
     Play *play = walk->play;
     TaskView none = {0};
     set_command(walk);
-    task_env_reset_on(walk->env, play->task, play->robot, walk->sim, &play->scene->terrain, play->scene->rigid, &none);
+    task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &play->scene->terrain, play->scene->rigid, &none);
     walk->speed = 0;
 }
 
@@ -61,23 +67,22 @@ static void step(Walk *walk) {
     TaskView none = {0};
     TaskProbe probe = {watch, walk};
     play->controller->act(play->controller->self, 1, &walk->env, action);
-    TaskStep out = task_env_step(walk->env, play->task, play->robot, walk->sim, action, 0, &none, &probe);
-    const double *qpos = robot_sim_qpos(walk->sim), *rotation = robot_sim_base_rotation(walk->sim);
-    const double *qvel = robot_sim_qvel(walk->sim);
+    TaskStep out = task_env_step(walk->env, &walk->task, play->robot, walk->sim, action, 0, &none, &probe);
+    const double *rotation = robot_sim_base_rotation(walk->sim), *qvel = robot_sim_qvel(walk->sim);
     double forward = (rotation[0] * qvel[0] + rotation[3] * qvel[1]) / fmax(hypot(rotation[0], rotation[3]), 1e-6);
     walk->speed += TASK_PERIOD / SPEED_TIME * (forward - walk->speed);
-    if (out.done && !out.timeout && !play->fell) {
-        play->fell = 1;
-        play->leg[mild_terrain_material_at(&walk->env->terrain, qpos[0], qpos[1])].fell = 1;
-        walk->end = fmin(walk->end, play->time + FALL_TIME);
-    }
-    if (!out.valid) walk->end = play->time; /* numbers went bad: nothing more to see */
     set_command(walk);
-    if (play->view) view_observe(play->view, walk->sim);
+    if (play->view && out.valid) view_observe(play->view, walk->sim);
+    if (!out.done || out.timeout) return;
+    play->fell = 1;
+    play->leg[walk->ground].fell = 1;
+    walk->end = play->time; /* only soles meet the ground: there is nothing to see below a fall */
+    walk->lost = !out.valid;
 }
 
 static MildStatus frame(Walk *walk, MildError *error) {
     Play *play = walk->play;
+    if (walk->lost) return MILD_OK;
     ViewInfo info = {.time = play->time, .speed = walk->speed, .fell = play->fell};
     memcpy(info.command, walk->env->command, sizeof info.command);
     view_frame(play->view, walk->sim, &info);
@@ -89,11 +94,14 @@ static MildStatus run_filmed(Walk *walk, MildError *error) {
     Play *play = walk->play;
     Progress progress = progress_begin("playing");
     MildStatus status = MILD_OK;
-    for (long k = 0; status == MILD_OK && play->time < walk->end && !interrupt_requested(); k++) {
+    while (status == MILD_OK && play->time < walk->end && !interrupt_requested()) {
         if (play->view && play->time * play->rate >= play->frames) status = frame(walk, error);
         if (status == MILD_OK) step(walk);
         progress_show(&progress, play->time / walk->end, "%.1f s walked, x %.2f m, %.2f m/s", play->time,
                       robot_sim_qpos(walk->sim)[0], walk->speed);
+    }
+    for (int k = 0; play->video && play->fell && status == MILD_OK && k < FALL_TIME * play->rate; k++) {
+        status = frame(walk, error);
     }
     progress_end(&progress, "%.1f s walked, x %.2f m%s", play->time, robot_sim_qpos(walk->sim)[0],
                  play->fell ? ", fell" : "");
@@ -109,55 +117,54 @@ static void wait_until(double time) {
 
 static MildStatus restart(Walk *walk, MildError *error) {
     Play *play = walk->play;
-    play->fell = 0;
+    play->fell = walk->lost = 0;
     play->time = 0;
     start(walk);
     return view_reset(play->view, &play->scene->terrain, error);
 }
 
+static void take_keys(Walk *walk, const WindowInput *input) {
+    for (int c = 0; c < 3; c++) {
+        if (c > 0 && input->command[c] != 0) walk->steer = 1;
+        walk->command[c] = fmin(fmax(walk->command[c] + input->command[c], -SPEED_MAX), SPEED_MAX);
+    }
+}
+
 static MildStatus run_window(Walk *walk, MildError *error) {
     Play *play = walk->play;
     WindowInput input = {.time_scale = 1};
-    double shown = clock_seconds(), owed = 0; /* owed: [s] of the walk that real time is ahead */
+    double shown = clock_seconds(), fallen = 0, owed = 0; /* owed: [s] of the walk that real time is ahead */
     MildStatus status = MILD_OK;
     while (status == MILD_OK && !input.quit && !interrupt_requested()) {
         status = frame(walk, error);
         view_show(play->view, &input);
-        for (int c = 0; c < 3; c++) {
-            if (input.command[c] != 0) walk->steer = walk->steer || c > 0;
-            walk->command[c] = fmin(fmax(walk->command[c] + input.command[c], -SPEED_MAX), SPEED_MAX);
-        }
-        if (input.reset || (play->fell && play->time >= walk->end)) {
-            walk->end = INFINITY;
-            status = restart(walk, error);
-        }
+        take_keys(walk, &input);
+        if (input.reset || (play->fell && shown > fallen + FALL_TIME)) status = restart(walk, error);
         wait_until(shown + 1.0 / play->rate);
         double now = clock_seconds();
-        owed = input.paused ? 0 : fmin(owed + (now - shown) * input.time_scale, 0.2);
-        for (; owed >= TASK_PERIOD && play->time < walk->end; owed -= TASK_PERIOD) step(walk);
+        owed = input.paused ? 0 : fmin(owed + (now - shown) * input.time_scale, OWED_MAX);
+        for (; owed >= TASK_PERIOD && !play->fell; owed -= TASK_PERIOD) step(walk);
         shown = now;
+        if (!play->fell) fallen = now;
     }
     return status;
 }
 
 MildStatus play_run(Play *play, MildError *error) {
-    TaskDef task = *play->task;
-    task.episode = play->window ? 1e6 : play->seconds + 1.0;
-    Walk walk = {.play = play, .command = {play->speed, 0, 0}, .end = play->window ? INFINITY : play->seconds};
-    const TaskDef *given = play->task;
-    play->task = &task;
+    Walk walk = {.play = play, .task = *play->task, .command = {play->speed, 0, 0}};
+    walk.end = play->seconds;
+    walk.task.episode = play->window ? WINDOW_TIME : play->seconds + 1.0;
     walk.env = aligned_alloc(64, task_env_bytes(play->robot));
-    walk.sim = robot_sim_create(play->robot, task.physics_dt, error);
+    walk.sim = robot_sim_create(play->robot, walk.task.physics_dt, error);
     MildStatus status = MILD_OK;
-    if (!walk.env || !walk.sim)
-        status = walk.env ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    if (!walk.sim) status = error->status;
+    if (!walk.env) status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     if (status == MILD_OK) {
-        task_env_init(walk.env, &task, play->robot, play->seed, 0);
+        task_env_init(walk.env, &walk.task, play->robot, play->seed, 0);
         start(&walk);
         status = play->window ? run_window(&walk, error) : run_filmed(&walk, error);
     }
     robot_sim_destroy(walk.sim);
     free(walk.env);
-    play->task = given;
     return status;
 }

@@ -12,9 +12,9 @@
 /* What happened on one ground of the course. */
 typedef struct {
     Measure measure;
-    int steps;              /* physics steps counted, after the start */
-    double start_x, end_x;  /* [m] */
-    int fell;               /* bool: here */
+    int steps;             /* physics steps counted, after the start */
+    double start_x, end_x; /* [m] */
+    int fell;              /* bool: here */
 } PlayLeg;
 
 typedef struct {
@@ -23,16 +23,16 @@ typedef struct {
     const Robot *robot;
     const Scene *scene;
     Controller *controller;
-    View *view;         /* NULL: not watched */
-    Video *video;       /* NULL: none, or a window */
-    Pressure *pressure; /* NULL: not measured */
+    View *view;                  /* NULL: not watched */
+    Video *video;                /* NULL: none, or a window */
+    Pressure *pressure;          /* NULL: not measured */
     double seconds, speed, rate; /* [s], [m/s], [1/s] frames */
     uint64_t seed;
-    int window;         /* bool: real time, keys */
+    int window; /* bool: real time, keys */
     /* filled */
     PlayLeg leg[MILD_MATERIALS_MAX];
-    double time;        /* [s] walked */
-    int fell;           /* bool */
+    double time; /* [s] walked */
+    int fell;    /* bool */
     int frames;
 } Play;
 

@@ -43,8 +43,17 @@ static int egl_make_current(GlContext *context, void *library, EGLDisplay displa
     if (!initialize || !bind_api || !choose || !create || !current || !destroy || !terminate ||
         !initialize(display, NULL, NULL))
         return 0;
-    const EGLint attributes[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_RED_SIZE, 8,
-                                 EGL_GREEN_SIZE,   8,               EGL_BLUE_SIZE,       8,              EGL_NONE};
+    const EGLint attributes[] = {EGL_SURFACE_TYPE,
+                                 EGL_PBUFFER_BIT,
+                                 EGL_RENDERABLE_TYPE,
+                                 EGL_OPENGL_BIT,
+                                 EGL_RED_SIZE,
+                                 8,
+                                 EGL_GREEN_SIZE,
+                                 8,
+                                 EGL_BLUE_SIZE,
+                                 8,
+                                 EGL_NONE};
     EGLConfig config;
     EGLint count = 0;
     if (bind_api(EGL_OPENGL_API) && choose(display, attributes, &config, 1, &count) && count > 0) {
@@ -53,8 +62,7 @@ static int egl_make_current(GlContext *context, void *library, EGLDisplay displa
             context->display = display;
             return 1;
         }
-        if (context->egl != EGL_NO_CONTEXT)
-            destroy(display, context->egl);
+        if (context->egl != EGL_NO_CONTEXT) destroy(display, context->egl);
     }
     terminate(display);
     return 0;
@@ -63,8 +71,7 @@ static int egl_make_current(GlContext *context, void *library, EGLDisplay displa
 /* Devices first (a GPU without a display), then Mesa's surfaceless platform (software), then whatever is default. */
 static int egl_open(GlContext *context) {
     void *library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_GLOBAL);
-    if (!library)
-        return 0;
+    if (!library) return 0;
     void *(*address)(const char *);
     EGLDisplay (*get_display)(EGLNativeDisplayType);
     load(library, "eglGetProcAddress", &address);
@@ -85,8 +92,7 @@ static int egl_open(GlContext *context) {
     if (query_devices && platform_display) {
         EGLDeviceEXT devices[GL_DEVICES_MAX];
         EGLint found = 0;
-        if (!query_devices(GL_DEVICES_MAX, devices, &found))
-            found = 0;
+        if (!query_devices(GL_DEVICES_MAX, devices, &found)) found = 0;
         for (int i = 0; i < found; i++)
             candidates[count++] = platform_display(EGL_PLATFORM_DEVICE_EXT, devices[i], NULL);
         candidates[count++] = platform_display(EGL_PLATFORM_SURFACELESS_MESA, NULL, NULL);
@@ -103,10 +109,8 @@ static int egl_open(GlContext *context) {
 
 static int osmesa_open(GlContext *context) {
     void *library = dlopen("libOSMesa.so.8", RTLD_NOW | RTLD_GLOBAL);
-    if (!library)
-        library = dlopen("libOSMesa.so", RTLD_NOW | RTLD_GLOBAL);
-    if (!library)
-        return 0;
+    if (!library) library = dlopen("libOSMesa.so", RTLD_NOW | RTLD_GLOBAL);
+    if (!library) return 0;
     void *(*create)(unsigned format, int depth, int stencil, int accumulation, void *share);
     unsigned char (*current)(void *context, void *buffer, unsigned type, int width, int height);
     load(library, "OSMesaCreateContextExt", &create);
@@ -129,8 +133,7 @@ GlContext *gl_create(MildError *error) {
         mild_fail(error, MILD_ERROR_MEMORY, "rendering: out of memory");
         return NULL;
     }
-    if (egl_open(context) || osmesa_open(context))
-        return context;
+    if (egl_open(context) || osmesa_open(context)) return context;
     free(context);
     mild_fail(error, MILD_ERROR_IO,
               "rendering: neither EGL nor OSMesa gives an OpenGL context; install one: "
@@ -139,8 +142,7 @@ GlContext *gl_create(MildError *error) {
 }
 
 void gl_destroy(GlContext *context) {
-    if (!context)
-        return;
+    if (!context) return;
     if (context->osmesa) {
         void (*destroy)(void *);
         load(context->library, "OSMesaDestroyContext", &destroy);

@@ -12,12 +12,12 @@ static const unsigned char background[3] = {30, 33, 38}, idle[3] = {70, 74, 80},
 
 /* Perceptually even ramp from violet to yellow, in nine stops taken from the viridis family (CC0). */
 static void ramp(double t, unsigned char rgb[3]) {
-    static const unsigned char stops[9][3] = {{68, 1, 84},    {71, 44, 122},  {59, 81, 139},  {44, 113, 142}, {33, 144, 141},
-                                              {39, 173, 129}, {92, 200, 99},  {170, 220, 50}, {253, 231, 37}};
+    static const unsigned char stops[9][3] = {{68, 1, 84},    {71, 44, 122},  {59, 81, 139},
+                                              {44, 113, 142}, {33, 144, 141}, {39, 173, 129},
+                                              {92, 200, 99},  {170, 220, 50}, {253, 231, 37}};
     double s = fmin(fmax(t, 0.0), 1.0) * 8.0;
     int i = s >= 8.0 ? 7 : (int)s;
-    for (int c = 0; c < 3; c++)
-        rgb[c] = (unsigned char)(stops[i][c] + (s - i) * (stops[i + 1][c] - stops[i][c]));
+    for (int c = 0; c < 3; c++) rgb[c] = (unsigned char)(stops[i][c] + (s - i) * (stops[i + 1][c] - stops[i][c]));
 }
 
 typedef struct {
@@ -68,8 +68,8 @@ static void fill(const InsetLayout *layout, int left, int bottom, int width, int
 
 /* Draws one foot with its left edge at `left`; returns the width used. Foot x points up, foot y to the left, as one sees
  * one's own feet. */
-static int draw_sole(const InsetLayout *layout, const MildSole *sole, const double *normal, double pressure_max, int left,
-                     unsigned char *rgb) {
+static int draw_sole(const InsetLayout *layout, const MildSole *sole, const double *normal, double pressure_max,
+                     int left, unsigned char *rgb) {
     Extent e = sole_extent(sole);
     double pitch = mild_sole_pitch(sole), area = pitch * pitch, sum = 0, sum_x = 0, sum_y = 0;
     const double *x = mild_sole_x(sole), *y = mild_sole_y(sole);

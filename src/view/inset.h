@@ -6,8 +6,8 @@
 #include "mild/ground.h"
 
 typedef struct {
-    int width, height; /* [pixels] of the whole inset */
-    int cell;          /* [pixels] edge of one element */
+    int width, height;                            /* [pixels] of the whole inset */
+    int cell;                                     /* [pixels] edge of one element */
     int bar_left, bar_right, bar_bottom, bar_top; /* [pixels] where the colour bar is, for the labels */
     int title_bottom, title_height;               /* [pixels] room for a title */
 } InsetLayout;

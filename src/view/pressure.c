@@ -6,9 +6,9 @@
 #include <string.h>
 #include <unistd.h>
 
-#define STANCE_FORCE 20.0    /* [N] normal force from which a foot stands */
-#define STANCE_MAX 2.0       /* [s] a longer stance is standing about, no step */
-#define STANCE_MIN 0.05      /* [s] a shorter one is a scuff */
+#define STANCE_FORCE 20.0 /* [N] normal force from which a foot stands */
+#define STANCE_MAX 2.0    /* [s] a longer stance is standing about, no step */
+#define STANCE_MIN 0.05   /* [s] a shorter one is a scuff */
 #define STANCE_SAMPLES 4096
 
 /* Sums over the finished stances of one foot on one material. */
@@ -43,8 +43,7 @@ Pressure *pressure_create(const Robot *robot, int materials, double dt, MildErro
     }
     const MildSole *const *soles = robot_soles(robot);
     size_t elements = 0;
-    for (int f = 0; f < ROBOT_FEET; f++)
-        elements += (size_t)mild_sole_elements(soles[f]);
+    for (int f = 0; f < ROBOT_FEET; f++) elements += (size_t)mild_sole_elements(soles[f]);
     Pressure *pressure = calloc(1, sizeof *pressure);
     double *block = calloc(2 * elements * ((size_t)materials + 1), sizeof *block);
     if (!pressure || !block) {
@@ -73,8 +72,7 @@ Pressure *pressure_create(const Robot *robot, int materials, double dt, MildErro
 }
 
 void pressure_destroy(Pressure *pressure) {
-    if (!pressure)
-        return;
+    if (!pressure) return;
     free(pressure->block);
     free(pressure);
 }
@@ -87,8 +85,7 @@ static void finish_stance(Pressure *pressure, int foot) {
         Tally *tally = &pressure->tally[stance->material][foot];
         for (int i = 0; i < mild_sole_elements(pressure->soles[foot]); i++) {
             tally->sum[i] += stance->sum[i];
-            if (stance->peak[i] > tally->peak[i])
-                tally->peak[i] = stance->peak[i];
+            if (stance->peak[i] > tally->peak[i]) tally->peak[i] = stance->peak[i];
         }
         tally->samples += samples;
         tally->stances++;
@@ -119,12 +116,10 @@ void pressure_observe(Pressure *pressure, const RobotSim *sim, const MildTerrain
         const double *x = mild_sole_x(sole), *y = mild_sole_y(sole);
         int elements = mild_sole_elements(sole);
         double force = 0, fx = 0, fy = 0;
-        for (int i = 0; i < elements; i++)
-            force += normal[i], fx += normal[i] * x[i], fy += normal[i] * y[i];
+        for (int i = 0; i < elements; i++) force += normal[i], fx += normal[i] * x[i], fy += normal[i] * y[i];
         Stance *stance = &pressure->stance[f];
         if (force < STANCE_FORCE) {
-            if (stance->material != -1)
-                finish_stance(pressure, f);
+            if (stance->material != -1) finish_stance(pressure, f);
             continue;
         }
         const double *center = robot_sim_foot(sim, f)->sole_center;
@@ -133,8 +128,7 @@ void pressure_observe(Pressure *pressure, const RobotSim *sim, const MildTerrain
             start_stance(pressure, f, material);
         else if (stance->material != material)
             stance->material = -2;
-        if (stance->samples >= pressure->max_samples)
-            continue;
+        if (stance->samples >= pressure->max_samples) continue;
         for (int i = 0; i < elements; i++) {
             stance->sum[i] += normal[i];
             stance->peak[i] = normal[i] > stance->peak[i] ? normal[i] : stance->peak[i];
@@ -147,8 +141,7 @@ void pressure_observe(Pressure *pressure, const RobotSim *sim, const MildTerrain
 
 int pressure_stances(const Pressure *pressure, int material) {
     int stances = 0;
-    for (int f = 0; f < ROBOT_FEET; f++)
-        stances += pressure->tally[material][f].stances;
+    for (int f = 0; f < ROBOT_FEET; f++) stances += pressure->tally[material][f].stances;
     return stances;
 }
 
@@ -171,13 +164,11 @@ MildStatus pressure_write(const Pressure *pressure, const char *path, const char
         return mild_fail(error, MILD_ERROR_ARGUMENT, "sole pressure: the path is longer than %d characters",
                          (int)sizeof temporary - 6);
     FILE *file = fopen(temporary, "w");
-    if (!file)
-        return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", temporary, strerror(errno));
+    if (!file) return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", temporary, strerror(errno));
     fprintf(file, "ground,foot,what,index,x_m,y_m,mean_kpa,peak_kpa\n");
     for (int m = 0; m < pressure->materials; m++)
         for (int f = 0; f < ROBOT_FEET; f++)
-            if (pressure->tally[m][f].stances > 0)
-                write_foot(pressure, m, f, names[m], file);
+            if (pressure->tally[m][f].stances > 0) write_foot(pressure, m, f, names[m], file);
     int failed = ferror(file);
     failed = fclose(file) != 0 || failed;
     if (failed || rename(temporary, path) != 0) {

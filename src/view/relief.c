@@ -52,21 +52,16 @@ static const struct {
     const char *name;
     Look look;
 } looks[] = {
-    {"rubber", {{0.27F, 0.31F, 0.38F}, GRAIN_SPECKLE}},
-    {"foam60", {{0.44F, 0.56F, 0.70F}, GRAIN_GRID}},
-    {"foam45", {{0.82F, 0.78F, 0.66F}, GRAIN_GRID}},
-    {"foam28", {{0.93F, 0.66F, 0.58F}, GRAIN_GRID}},
-    {"foam25", {{0.80F, 0.70F, 0.86F}, GRAIN_GRID}},
-    {"grass", {{0.35F, 0.56F, 0.24F}, GRAIN_BLADES}},
-    {"sand_loose", {{0.84F, 0.69F, 0.44F}, GRAIN_FINE}},
-    {"sand_dense", {{0.69F, 0.53F, 0.35F}, GRAIN_FINE}},
+    {"rubber", {{0.27F, 0.31F, 0.38F}, GRAIN_SPECKLE}},  {"foam60", {{0.44F, 0.56F, 0.70F}, GRAIN_GRID}},
+    {"foam45", {{0.82F, 0.78F, 0.66F}, GRAIN_GRID}},     {"foam28", {{0.93F, 0.66F, 0.58F}, GRAIN_GRID}},
+    {"foam25", {{0.80F, 0.70F, 0.86F}, GRAIN_GRID}},     {"grass", {{0.35F, 0.56F, 0.24F}, GRAIN_BLADES}},
+    {"sand_loose", {{0.84F, 0.69F, 0.44F}, GRAIN_FINE}}, {"sand_dense", {{0.69F, 0.53F, 0.35F}, GRAIN_FINE}},
 };
 static const Look rigid_look = {{0.66F, 0.67F, 0.68F}, GRAIN_CHECKER};
 
 static Look look_of(const char *name, const MildMaterial *material) {
     for (size_t i = 0; name && i < sizeof looks / sizeof *looks; i++)
-        if (strcmp(name, looks[i].name) == 0)
-            return looks[i].look;
+        if (strcmp(name, looks[i].name) == 0) return looks[i].look;
     /* A ground of the user's own: elastic ones look like foam, plastic ones like sand. */
     return material->recovery > 0.5 ? looks[2].look : looks[6].look;
 }
@@ -91,14 +86,11 @@ static float grain_shade(Grain grain, int px, int py) {
     px = (px + TILE_INNER - RELIEF_TILE_MARGIN) % TILE_INNER;
     py = (py + TILE_INNER - RELIEF_TILE_MARGIN) % TILE_INNER;
     switch (grain) {
-    case GRAIN_FINE:
-        return 1.0F + 0.10F * noise(px, py, 1, 1, 1) + 0.05F * noise(px, py, 4, 4, 2);
+    case GRAIN_FINE: return 1.0F + 0.10F * noise(px, py, 1, 1, 1) + 0.05F * noise(px, py, 4, 4, 2);
     case GRAIN_GRID: /* lines every 8 cm: a dent bends them */
         return (px % 15 == 0 || py % 15 == 0 ? 0.80F : 1.0F) + 0.03F * noise(px, py, 2, 2, 3);
-    case GRAIN_BLADES:
-        return 1.0F + 0.22F * noise(px, py, 1, 4, 4) + 0.12F * noise(px, py, 4, 2, 5);
-    case GRAIN_SPECKLE:
-        return noise(px, py, 2, 2, 6) > 0.86F ? 1.7F : 1.0F + 0.05F * noise(px, py, 1, 1, 7);
+    case GRAIN_BLADES: return 1.0F + 0.22F * noise(px, py, 1, 4, 4) + 0.12F * noise(px, py, 4, 2, 5);
+    case GRAIN_SPECKLE: return noise(px, py, 2, 2, 6) > 0.86F ? 1.7F : 1.0F + 0.05F * noise(px, py, 1, 1, 7);
     default: /* checker of half a tile */
         return ((px / (TILE_INNER / 2) + py / (TILE_INNER / 2)) % 2 ? 0.94F : 1.0F) + 0.015F * noise(px, py, 1, 1, 8);
     }
@@ -130,14 +122,12 @@ static int mask_create(SoleMask *mask, const MildSole *sole) {
     mask->columns = (int)ceil((x_max - mask->x_min) / mask->step);
     mask->rows = (int)ceil((y_max - mask->y_min) / mask->step);
     mask->inside = calloc((size_t)mask->columns * (size_t)mask->rows, 1);
-    if (!mask->inside)
-        return 0;
+    if (!mask->inside) return 0;
     for (int r = 0; r < mask->rows; r++)
         for (int c = 0; c < mask->columns; c++) {
             double px = mask->x_min + (c + 0.5) * mask->step, py = mask->y_min + (r + 0.5) * mask->step;
             for (int e = 0; e < elements; e++)
-                if (fabs(px - x[e]) < half && fabs(py - y[e]) < half)
-                    mask->inside[r * mask->columns + c] = 1;
+                if (fabs(px - x[e]) < half && fabs(py - y[e]) < half) mask->inside[r * mask->columns + c] = 1;
         }
     return 1;
 }
@@ -167,7 +157,8 @@ static const MildMaterial *material_at(const Relief *relief, double x, double y)
 static void mark(Relief *relief, int i, int j) {
     int c1 = i / RELIEF_TILE_CELLS, r1 = j / RELIEF_TILE_CELLS;
     /* a vertex on an edge belongs to both neighbours */
-    int c0 = i % RELIEF_TILE_CELLS == 0 && c1 > 0 ? c1 - 1 : c1, r0 = j % RELIEF_TILE_CELLS == 0 && r1 > 0 ? r1 - 1 : r1;
+    int c0 = i % RELIEF_TILE_CELLS == 0 && c1 > 0 ? c1 - 1 : c1,
+        r0 = j % RELIEF_TILE_CELLS == 0 && r1 > 0 ? r1 - 1 : r1;
     for (int r = r0; r <= r1 && r < relief->rows; r++)
         for (int c = c0; c <= c1 && c < relief->columns; c++)
             relief->touched[r * relief->columns + c] = relief->dirty[r * relief->columns + c] = 1;
@@ -176,11 +167,9 @@ static void mark(Relief *relief, int i, int j) {
 static void update_vertex(Relief *relief, int i, int j) {
     double x = relief->x0 + i * relief->cell, y = relief->y0 + j * relief->cell;
     float depth = NO_DEPTH;
-    for (int f = 0; f < relief->feet; f++)
-        depth = fmaxf(depth, sole_depth(relief, f, x, y));
+    for (int f = 0; f < relief->feet; f++) depth = fmaxf(depth, sole_depth(relief, f, x, y));
     size_t at = (size_t)j * (size_t)relief->nx + (size_t)i;
-    if (depth <= (float)UNDER_SOLE && relief->peak[at] <= 0.0F)
-        return;
+    if (depth <= (float)UNDER_SOLE && relief->peak[at] <= 0.0F) return;
     relief->peak[at] = fmaxf(relief->peak[at], depth);
     float left = (float)(1.0 - material_at(relief, x, y)->recovery) * relief->peak[at];
     float shown = fmaxf(left, fmaxf(depth, 0.0F));
@@ -194,10 +183,11 @@ static Box foot_box(const Relief *relief, int foot) {
     double reach = relief->mask[foot].reach;
     const double *p = relief->position[foot];
     Box box = {0, 0, 0, 0};
-    if (p[2] - reach > relief->surface)
-        return box;
-    double i0 = floor((p[0] - reach - relief->x0) / relief->cell), i1 = ceil((p[0] + reach - relief->x0) / relief->cell);
-    double j0 = floor((p[1] - reach - relief->y0) / relief->cell), j1 = ceil((p[1] + reach - relief->y0) / relief->cell);
+    if (p[2] - reach > relief->surface) return box;
+    double i0 = floor((p[0] - reach - relief->x0) / relief->cell),
+           i1 = ceil((p[0] + reach - relief->x0) / relief->cell);
+    double j0 = floor((p[1] - reach - relief->y0) / relief->cell),
+           j1 = ceil((p[1] + reach - relief->y0) / relief->cell);
     box.i0 = (int)fmin(fmax(i0, 0), relief->nx), box.i1 = (int)fmin(fmax(i1, 0), relief->nx);
     box.j0 = (int)fmin(fmax(j0, 0), relief->ny), box.j1 = (int)fmin(fmax(j1, 0), relief->ny);
     return box;
@@ -205,13 +195,11 @@ static Box foot_box(const Relief *relief, int foot) {
 
 static void update_box(Relief *relief, Box box) {
     for (int j = box.j0; j < box.j1; j++)
-        for (int i = box.i0; i < box.i1; i++)
-            update_vertex(relief, i, j);
+        for (int i = box.i0; i < box.i1; i++) update_vertex(relief, i, j);
 }
 
 void relief_press(Relief *relief, const double (*position)[3], const double (*rotation)[9]) {
-    if (relief->rigid)
-        return;
+    if (relief->rigid) return;
     memcpy(relief->position, position, (size_t)relief->feet * sizeof *position);
     memcpy(relief->rotation, rotation, (size_t)relief->feet * sizeof *rotation);
     for (int f = 0; f < relief->feet; f++) {
@@ -230,7 +218,8 @@ static void find_materials(Relief *relief) {
         relief_tile_center(relief, t, center);
         int first = -2;
         for (int k = 0; k < 81; k++) { /* patches are larger than an eighth of a tile */
-            double x = center[0] + edge * ((k % 9) / 8.0 - 0.5) * 0.998, y = center[1] + edge * ((k / 9) / 8.0 - 0.5) * 0.998;
+            double x = center[0] + edge * ((k % 9) / 8.0 - 0.5) * 0.998,
+                   y = center[1] + edge * ((k / 9) / 8.0 - 0.5) * 0.998;
             int m = relief->rigid ? RELIEF_RIGID : mild_terrain_material_at(&relief->terrain, x, y);
             if (k == 0)
                 first = m;
@@ -245,14 +234,12 @@ static int allocate(Relief *relief, const MildSole *const *soles) {
     size_t vertices = (size_t)relief->nx * (size_t)relief->ny, tiles = (size_t)relief->columns * (size_t)relief->rows;
     relief->peak = calloc(2 * vertices, sizeof *relief->peak);
     relief->touched = calloc(3 * tiles, 1);
-    if (!relief->peak || !relief->touched)
-        return 0;
+    if (!relief->peak || !relief->touched) return 0;
     relief->shown = relief->peak + vertices;
     relief->dirty = relief->touched + tiles;
     relief->material = (signed char *)(relief->dirty + tiles);
     for (int f = 0; f < relief->feet; f++)
-        if (!mask_create(&relief->mask[f], soles[f]))
-            return 0;
+        if (!mask_create(&relief->mask[f], soles[f])) return 0;
     return 1;
 }
 
@@ -289,10 +276,8 @@ Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const Mi
 }
 
 void relief_destroy(Relief *relief) {
-    if (!relief)
-        return;
-    for (int f = 0; f < relief->feet; f++)
-        free(relief->mask[f].inside);
+    if (!relief) return;
+    for (int f = 0; f < relief->feet; f++) free(relief->mask[f].inside);
     free(relief->peak);
     free(relief->touched);
     free(relief);
@@ -345,8 +330,7 @@ static const float *tile_row(const Relief *relief, int tile, int row) {
 void relief_tile_heights(const Relief *relief, int tile, double range, float *heights) {
     for (int j = 0; j < RELIEF_TILE_VERTICES; j++) {
         const float *row = tile_row(relief, tile, j);
-        for (int i = 0; i < RELIEF_TILE_VERTICES; i++)
-            *heights++ = fmaxf(0.0F, 1.0F - row[i] / (float)range);
+        for (int i = 0; i < RELIEF_TILE_VERTICES; i++) *heights++ = fmaxf(0.0F, 1.0F - row[i] / (float)range);
     }
 }
 
@@ -379,8 +363,7 @@ void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb) {
 
 void relief_flat_pixels(const Relief *relief, int material, unsigned char *rgb) {
     for (int py = 0; py < RELIEF_TILE_PIXELS; py++)
-        for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3)
-            paint(look_at(relief, material), px, py, 0.0F, rgb);
+        for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3) paint(look_at(relief, material), px, py, 0.0F, rgb);
 }
 
 void relief_material_color(const Relief *relief, int material, float rgb[3]) {

@@ -9,7 +9,8 @@
 #define RELIEF_TILE_CELLS 64
 #define RELIEF_TILE_VERTICES (RELIEF_TILE_CELLS + 1)
 #define RELIEF_TILE_PIXELS 128
-#define RELIEF_TILE_MARGIN 4 /* [pixels] of a tile's picture beyond its edges, so that filtering takes nothing from afar */
+#define RELIEF_TILE_MARGIN                                                                                             \
+    4                     /* [pixels] of a tile's picture beyond its edges, so that filtering takes nothing from afar */
 #define RELIEF_RIGID (-1) /* material index of ground that never yields */
 
 typedef struct {

@@ -30,14 +30,11 @@ static void last_error_line(int file, char *line, size_t size) {
     line[0] = '\0';
     off_t length = lseek(file, 0, SEEK_END);
     off_t start = length > (off_t)sizeof text - 1 ? length - (off_t)sizeof text + 1 : 0;
-    if (length <= 0 || lseek(file, start, SEEK_SET) < 0)
-        return;
+    if (length <= 0 || lseek(file, start, SEEK_SET) < 0) return;
     ssize_t got = read(file, text, sizeof text - 1);
-    if (got <= 0)
-        return;
+    if (got <= 0) return;
     text[got] = '\0';
-    while (got > 0 && (text[got - 1] == '\n' || text[got - 1] == '\r'))
-        text[--got] = '\0';
+    while (got > 0 && (text[got - 1] == '\n' || text[got - 1] == '\r')) text[--got] = '\0';
     const char *last = strrchr(text, '\n');
     last = last ? last + 1 : text;
     size_t keep = strlen(last) < size ? strlen(last) : size - 1;
@@ -47,8 +44,7 @@ static void last_error_line(int file, char *line, size_t size) {
 
 static int error_file(void) {
     FILE *file = tmpfile();
-    if (!file)
-        return -1;
+    if (!file) return -1;
     int descriptor = fcntl(fileno(file), F_DUPFD_CLOEXEC, 3);
     fclose(file);
     return descriptor;
@@ -63,17 +59,42 @@ static MildStatus spawn_ffmpeg(Video *video, double fps, MildError *error) {
     char size[32], rate[32];
     snprintf(size, sizeof size, "%dx%d", video->width, video->height);
     snprintf(rate, sizeof rate, "%g", fps);
-    char *arguments[] = {"ffmpeg", "-nostdin",  "-loglevel", "error",   "-y",       "-f",        "rawvideo", "-pix_fmt",
-                         "rgb24",  "-s",        size,        "-r",      rate,       "-i",        "pipe:0",   "-an",
-                         "-c:v",   "libx264",   "-preset",   "veryfast", "-crf",    "20",        "-pix_fmt", "yuv420p",
-                         "-movflags", "+faststart", "-f",    "mp4",     video->temporary, NULL};
+    char *arguments[] = {"ffmpeg",
+                         "-nostdin",
+                         "-loglevel",
+                         "error",
+                         "-y",
+                         "-f",
+                         "rawvideo",
+                         "-pix_fmt",
+                         "rgb24",
+                         "-s",
+                         size,
+                         "-r",
+                         rate,
+                         "-i",
+                         "pipe:0",
+                         "-an",
+                         "-c:v",
+                         "libx264",
+                         "-preset",
+                         "veryfast",
+                         "-crf",
+                         "20",
+                         "-pix_fmt",
+                         "yuv420p",
+                         "-movflags",
+                         "+faststart",
+                         "-f",
+                         "mp4",
+                         video->temporary,
+                         NULL};
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
     posix_spawn_file_actions_adddup2(&actions, video->errors, STDERR_FILENO);
     posix_spawn_file_actions_adddup2(&actions, video->errors, STDOUT_FILENO);
-    if (ends[1] != STDIN_FILENO)
-        posix_spawn_file_actions_addclose(&actions, ends[1]);
+    if (ends[1] != STDIN_FILENO) posix_spawn_file_actions_addclose(&actions, ends[1]);
     /* A process group of its own: Ctrl-C ends our loop, and ffmpeg then gets to finish the file. */
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
@@ -130,8 +151,7 @@ static int finish_ffmpeg(Video *video) {
     int code = 0;
     while (waitpid(video->child, &code, 0) < 0 && errno == EINTR)
         ;
-    if (WIFEXITED(code) && WEXITSTATUS(code) == 0)
-        return 1;
+    if (WIFEXITED(code) && WEXITSTATUS(code) == 0) return 1;
     char line[200];
     last_error_line(video->errors, line, sizeof line);
     video->status = MILD_ERROR_IO;
@@ -140,13 +160,11 @@ static int finish_ffmpeg(Video *video) {
 }
 
 MildStatus video_frame(Video *video, const unsigned char *rgb, MildError *error) {
-    if (video->status != MILD_OK)
-        return mild_fail(error, video->status, "video %s: %s", video->path, video->text);
+    if (video->status != MILD_OK) return mild_fail(error, video->status, "video %s: %s", video->path, video->text);
     size_t left = (size_t)video->width * (size_t)video->height * 3;
     while (left > 0) {
         ssize_t sent = send(video->pipe, rgb, left, MSG_NOSIGNAL);
-        if (sent < 0 && errno == EINTR)
-            continue;
+        if (sent < 0 && errno == EINTR) continue;
         if (sent <= 0) {
             if (finish_ffmpeg(video)) { /* it left early and called that success */
                 video->status = MILD_ERROR_IO;
@@ -162,17 +180,14 @@ MildStatus video_frame(Video *video, const unsigned char *rgb, MildError *error)
 }
 
 MildStatus video_close(Video *video, MildError *error) {
-    if (!video)
-        return MILD_OK;
-    if (video->pipe >= 0)
-        finish_ffmpeg(video);
+    if (!video) return MILD_OK;
+    if (video->pipe >= 0) finish_ffmpeg(video);
     MildStatus status = video->status;
     if (status != MILD_OK)
         mild_fail(error, status, "video %s: %s", video->path, video->text);
     else if (rename(video->temporary, video->path) != 0)
         status = mild_fail(error, MILD_ERROR_IO, "video %s: cannot rename: %s", video->path, strerror(errno));
-    if (status != MILD_OK)
-        unlink(video->temporary);
+    if (status != MILD_OK) unlink(video->temporary);
     close(video->errors);
     free(video);
     return status;

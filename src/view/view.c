@@ -11,7 +11,7 @@
 #include "view/relief.h"
 
 #define VIEW_CELL 0.01      /* [m] vertices of the visible ground */
-#define VIEW_OVERLAP 1.0015  /* [-] tiles are drawn this much larger, so that no crack opens between them */
+#define VIEW_OVERLAP 1.0015 /* [-] tiles are drawn this much larger, so that no crack opens between them */
 #define VIEW_SLOTS 96       /* tiles that can be deformed or of mixed material at once */
 #define VIEW_DEPTH 0.20     /* [m] deepest print that can be drawn */
 #define VIEW_RADIUS 9.0     /* [m] tiles farther from the robot are drawn as plain floor */
@@ -43,7 +43,7 @@ struct View {
     int scene_made, context_made, tracking;
     Relief *relief;
     Slot slots[VIEW_SLOTS];
-    int *slot_of; /* [tiles] -1: none */
+    int *slot_of;                              /* [tiles] -1: none */
     int flat_material[MILD_MATERIALS_MAX + 1]; /* model material of untouched ground; last: rigid */
     int floor_material;
     InsetLayout layout;
@@ -149,7 +149,8 @@ static void index_model(View *view) {
             relief_flat_pixels(view->relief, id, texture_pixels(model, mj_name2id(model, mjOBJ_TEXTURE, name)));
     }
     view->floor_material = mj_name2id(model, mjOBJ_MATERIAL, "view_floor");
-    relief_flat_pixels(view->relief, RELIEF_RIGID, texture_pixels(model, mj_name2id(model, mjOBJ_TEXTURE, "view_floor")));
+    relief_flat_pixels(view->relief, RELIEF_RIGID,
+                       texture_pixels(model, mj_name2id(model, mjOBJ_TEXTURE, "view_floor")));
     for (int g = 0; g < model->ngeom; g++)
         if (model->geom_type[g] == mjGEOM_PLANE || model->geom_type[g] == mjGEOM_HFIELD)
             model->geom_group[g] = VIEW_HIDDEN_GROUP;
@@ -178,10 +179,8 @@ static int make_buffers(View *view) {
     view->pixels = malloc(frame);
     view->flipped = malloc(frame);
     view->data = mj_makeData(view->model);
-    if (!view->slot_of || !view->inset || !view->pixels || !view->flipped || !view->data)
-        return 0;
-    for (int t = 0; t < tiles; t++)
-        view->slot_of[t] = -1;
+    if (!view->slot_of || !view->inset || !view->pixels || !view->flipped || !view->data) return 0;
+    for (int t = 0; t < tiles; t++) view->slot_of[t] = -1;
     return 1;
 }
 
@@ -202,8 +201,8 @@ static void make_scene(View *view) {
 
 View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain, MildError *error) {
     if (def->width < 64 || def->height < 64 || def->width > 7680 || def->height > 4320 || !(def->rate > 0)) {
-        mild_fail(error, MILD_ERROR_RANGE, "view: %d x %d pixels at %g frames/s is outside 64..7680 x 64..4320", def->width,
-                  def->height, def->rate);
+        mild_fail(error, MILD_ERROR_RANGE, "view: %d x %d pixels at %g frames/s is outside 64..7680 x 64..4320",
+                  def->width, def->height, def->rate);
         return NULL;
     }
     View *view = calloc(1, sizeof *view);
@@ -231,18 +230,13 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
 }
 
 void view_destroy(View *view) {
-    if (!view)
-        return;
-    if (view->context_made)
-        mjr_freeContext(&view->context);
-    if (view->scene_made)
-        mjv_freeScene(&view->scene);
+    if (!view) return;
+    if (view->context_made) mjr_freeContext(&view->context);
+    if (view->scene_made) mjv_freeScene(&view->scene);
     gl_destroy(view->gl);
     window_destroy(view->window);
-    if (view->data)
-        mj_deleteData(view->data);
-    if (view->model)
-        mj_deleteModel(view->model);
+    if (view->data) mj_deleteData(view->data);
+    if (view->model) mj_deleteModel(view->model);
     relief_destroy(view->relief);
     free(view->slot_of);
     free(view->inset);
@@ -254,13 +248,11 @@ void view_destroy(View *view) {
 MildStatus view_reset(View *view, const MildTerrain *terrain, MildError *error) {
     view->terrain = *terrain;
     Relief *relief = make_relief(view, error);
-    if (!relief)
-        return error ? error->status : MILD_ERROR_MEMORY;
+    if (!relief) return error ? error->status : MILD_ERROR_MEMORY;
     relief_destroy(view->relief);
     view->relief = relief;
     for (int i = 0; i < VIEW_SLOTS; i++) {
-        if (view->slots[i].tile >= 0)
-            view->slot_of[view->slots[i].tile] = -1;
+        if (view->slots[i].tile >= 0) view->slot_of[view->slots[i].tile] = -1;
         view->slots[i].tile = -1;
     }
     view->tracking = 0;
@@ -280,7 +272,7 @@ void view_observe(View *view, const RobotSim *sim) {
         memcpy(position[f], foot->position, sizeof position[f]);
         memcpy(rotation[f], foot->rotation, sizeof rotation[f]);
     }
-    relief_press(view->relief, (const double (*)[3])position, (const double (*)[9])rotation);
+    relief_press(view->relief, (const double(*)[3])position, (const double(*)[9])rotation);
 }
 
 static double tile_distance(const View *view, int tile) {
@@ -304,10 +296,8 @@ static Slot *slot_take(View *view, int tile) {
             farthest = tile_distance(view, slot->tile);
         }
     }
-    if (!best)
-        return NULL;
-    if (best->tile >= 0)
-        view->slot_of[best->tile] = -1;
+    if (!best) return NULL;
+    if (best->tile >= 0) view->slot_of[best->tile] = -1;
     best->tile = tile;
     best->drawn_once = 0;
     view->slot_of[tile] = (int)(best - view->slots);
@@ -316,8 +306,7 @@ static Slot *slot_take(View *view, int tile) {
 
 static void slot_refresh(View *view, Slot *slot) {
     mjModel *model = view->model;
-    if (!relief_tile_take_dirty(view->relief, slot->tile) && slot->drawn_once)
-        return;
+    if (!relief_tile_take_dirty(view->relief, slot->tile) && slot->drawn_once) return;
     relief_tile_pixels(view->relief, slot->tile, texture_pixels(model, slot->texture));
     mjr_uploadTexture(model, &view->context, slot->texture);
     if (relief_tile_touched(view->relief, slot->tile)) {
@@ -327,9 +316,9 @@ static void slot_refresh(View *view, Slot *slot) {
     slot->drawn_once = 1;
 }
 
-static mjvGeom *add_geom(View *view, int type, double sx, double sy, double sz, const double position[3], int material) {
-    if (view->scene.ngeom >= view->scene.maxgeom)
-        return NULL;
+static mjvGeom *add_geom(View *view, int type, double sx, double sy, double sz, const double position[3],
+                         int material) {
+    if (view->scene.ngeom >= view->scene.maxgeom) return NULL;
     mjvGeom *geom = &view->scene.geoms[view->scene.ngeom++];
     const float white[4] = {1, 1, 1, 1};
     const double size[3] = {sx, sy, sz};
@@ -349,14 +338,12 @@ static void draw_tile(View *view, int tile) {
     Slot *slot = NULL;
     if (touched || material == -2) {
         slot = view->slot_of[tile] >= 0 ? &view->slots[view->slot_of[tile]] : slot_take(view, tile);
-        if (slot)
-            slot_refresh(view, slot);
+        if (slot) slot_refresh(view, slot);
     }
     if (slot && touched) {
         position[2] -= VIEW_DEPTH;
         mjvGeom *geom = add_geom(view, mjGEOM_HFIELD, 0.5 * edge, 0.5 * edge, VIEW_DEPTH, position, slot->material);
-        if (geom)
-            geom->dataid = slot->hfield;
+        if (geom) geom->dataid = slot->hfield;
         return;
     }
     int look = material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material < 0 ? 0 : material;
@@ -392,8 +379,7 @@ static void draw_ground(View *view) {
     int r0 = clamp_tile(floor((look[1] - VIEW_RADIUS - origin[1]) / edge), rows);
     int r1 = clamp_tile(ceil((look[1] + VIEW_RADIUS - origin[1]) / edge), rows);
     for (int r = r0; r < r1; r++)
-        for (int c = c0; c < c1; c++)
-            draw_tile(view, r * columns + c);
+        for (int c = c0; c < c1; c++) draw_tile(view, r * columns + c);
     draw_floor(view, origin[0] + c0 * edge, origin[0] + c1 * edge, origin[1] + r0 * edge, origin[1] + r1 * edge);
 }
 
@@ -403,16 +389,14 @@ static void follow(View *view, const double *base) {
     double share = view->tracking ? 1.0 - exp(-1.0 / (view->def.rate * VIEW_CAMERA_TIME)) : 1.0;
     view->tracking = 1;
     double target[3] = {base[0], base[1], relief_surface(view->relief) + VIEW_LOOK_HEIGHT};
-    for (int k = 0; k < 3; k++)
-        view->camera.lookat[k] += share * (target[k] - view->camera.lookat[k]);
+    for (int k = 0; k < 3; k++) view->camera.lookat[k] += share * (target[k] - view->camera.lookat[k]);
 }
 
 static void draw_arrows(View *view, const RobotSim *sim) {
     for (int f = 0; f < ROBOT_FEET && view->def.force_arrow > 0; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         double size = mju_norm3(foot->force);
-        if (size < VIEW_FORCE_SEEN || view->scene.ngeom >= view->scene.maxgeom)
-            continue;
+        if (size < VIEW_FORCE_SEEN || view->scene.ngeom >= view->scene.maxgeom) continue;
         double from[3], to[3];
         mju_copy3(from, foot->sole_center);
         if (foot->result.contacts > 0) { /* the centre of pressure; the engine's own contact reports none */
@@ -429,19 +413,18 @@ static void draw_arrows(View *view, const RobotSim *sim) {
 }
 
 static const char *ground_name(const View *view, const RobotSim *sim) {
-    if (view->def.rigid)
-        return "rigid";
+    if (view->def.rigid) return "rigid";
     const double *left = robot_sim_foot(sim, 0)->sole_center, *right = robot_sim_foot(sim, 1)->sole_center;
     int m = mild_terrain_material_at(&view->terrain, 0.5 * (left[0] + right[0]), 0.5 * (left[1] + right[1]));
     return view->def.names && view->def.names[m] ? view->def.names[m] : "ground";
 }
 
 static void draw_text(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
-    const char *keys = info->fell ? "ground\ncommand\nspeed\nsinkage L R\ntime\n" : "ground\ncommand\nspeed\nsinkage L R\ntime";
+    const char *keys =
+        info->fell ? "ground\ncommand\nspeed\nsinkage L R\ntime\n" : "ground\ncommand\nspeed\nsinkage L R\ntime";
     char values[240];
     double depth[ROBOT_FEET];
-    for (int f = 0; f < ROBOT_FEET; f++)
-        depth[f] = 1e3 * fmax(0.0, -robot_sim_foot(sim, f)->sole_height);
+    for (int f = 0; f < ROBOT_FEET; f++) depth[f] = 1e3 * fmax(0.0, -robot_sim_foot(sim, f)->sole_height);
     snprintf(values, sizeof values, "%s\n%.2f m/s\n%.2f m/s\n%.0f  %.0f mm\n%.1f s%s", ground_name(view, sim),
              info->command[0], info->speed, depth[0], depth[1], info->time, info->fell ? "\nfell" : "");
     mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, viewport, keys, values, &view->context);
@@ -449,8 +432,7 @@ static void draw_text(View *view, mjrRect viewport, const RobotSim *sim, const V
 
 static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     const double *normal[ROBOT_FEET];
-    for (int f = 0; f < ROBOT_FEET; f++)
-        normal[f] = mild_scratch_elements(robot_sim_scratch(sim), f).normal;
+    for (int f = 0; f < ROBOT_FEET; f++) normal[f] = mild_scratch_elements(robot_sim_scratch(sim), f).normal;
     const InsetLayout *layout = &view->layout;
     inset_draw(layout, view->soles, ROBOT_FEET, normal, view->def.pressure_max, view->inset);
     mjrRect box = {viewport.width - layout->width - 10, 10, layout->width, layout->height};
@@ -459,7 +441,8 @@ static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     mjrRect title = {box.left, box.bottom + layout->title_bottom, box.width, layout->title_height};
     mjr_label(title, mjFONT_NORMAL, "sole pressure, kPa", 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
     snprintf(text, sizeof text, "%.0f", view->def.pressure_max / 1e3);
-    mjrRect label = {box.left + layout->bar_right, box.bottom + layout->bar_top - 16, layout->width - layout->bar_right, 16};
+    mjrRect label = {box.left + layout->bar_right, box.bottom + layout->bar_top - 16, layout->width - layout->bar_right,
+                     16};
     mjr_label(label, mjFONT_NORMAL, text, 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
     label.bottom = box.bottom + layout->bar_bottom;
     mjr_label(label, mjFONT_NORMAL, "0", 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
@@ -469,8 +452,7 @@ static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
 static void move_lights(View *view) {
     for (int i = 0; i < view->scene.nlight; i++) {
         mjvLight *light = &view->scene.lights[i];
-        if (light->headlight || light->type != mjLIGHT_DIRECTIONAL)
-            continue;
+        if (light->headlight || light->type != mjLIGHT_DIRECTIONAL) continue;
         light->pos[0] += (float)view->camera.lookat[0];
         light->pos[1] += (float)view->camera.lookat[1];
     }
@@ -490,18 +472,14 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     draw_arrows(view, sim);
 
     mjrRect viewport = {0, 0, view->def.width, view->def.height};
-    if (view->window)
-        window_size(view->window, &viewport.width, &viewport.height);
+    if (view->window) window_size(view->window, &viewport.width, &viewport.height);
     mjr_render(viewport, &view->scene, &view->context);
     draw_text(view, viewport, sim, info);
-    if (!view->def.rigid)
-        draw_inset(view, viewport, sim);
-    if (view->window)
-        return;
+    if (!view->def.rigid) draw_inset(view, viewport, sim);
+    if (view->window) return;
     mjr_readPixels(view->flipped, NULL, viewport, &view->context);
     size_t row = (size_t)viewport.width * 3, rows = (size_t)viewport.height;
-    for (size_t r = 0; r < rows; r++)
-        memcpy(view->pixels + r * row, view->flipped + (rows - 1 - r) * row, row);
+    for (size_t r = 0; r < rows; r++) memcpy(view->pixels + r * row, view->flipped + (rows - 1 - r) * row, row);
 }
 
 const unsigned char *view_pixels(const View *view) {

@@ -8,15 +8,15 @@
 #include "view/window.h"
 
 typedef struct {
-    const char *xml;    /* the robot's MJCF, as given to robot_create */
-    int width, height;  /* [pixels] */
-    double rate;        /* [1/s] frames */
-    int window;         /* bool: show in a window; otherwise view_pixels */
-    int rigid;          /* bool: the ground never yields */
-    double x_min, x_max, y_min, y_max; /* [m] ground drawn as such; a plain floor beyond */
-    const char *const *names; /* [materials of the terrain] for colours and text; NULL: unnamed */
-    double pressure_max; /* [Pa] top of the pressure scale */
-    double force_arrow;  /* [m/N] length of the ground reaction arrows; 0: none */
+    const char *xml;                     /* the robot's MJCF, as given to robot_create */
+    int width, height;                   /* [pixels] */
+    double rate;                         /* [1/s] frames */
+    int window;                          /* bool: show in a window; otherwise view_pixels */
+    int rigid;                           /* bool: the ground never yields */
+    double x_min, x_max, y_min, y_max;   /* [m] ground drawn as such; a plain floor beyond */
+    const char *const *names;            /* [materials of the terrain] for colours and text; NULL: unnamed */
+    double pressure_max;                 /* [Pa] top of the pressure scale */
+    double force_arrow;                  /* [m/N] length of the ground reaction arrows; 0: none */
     double azimuth, elevation, distance; /* [deg], [deg], [m] of the camera about the robot */
 } ViewDef;
 ViewDef view_def_default(void);

@@ -44,7 +44,7 @@ static void press(double x, double y, double depth) {
     const double position[1][3] = {{x, y, 0.055 - depth}};
     double rotation[1][9];
     memcpy(rotation[0], identity, sizeof identity);
-    relief_press(relief, position, (const double (*)[9])rotation);
+    relief_press(relief, position, (const double(*)[9])rotation);
 }
 
 /* Drawn depth at the vertex nearest to (x, y). */
@@ -63,9 +63,9 @@ static double depth_at(double x, double y) {
 static double print_after_lift(const char *material) {
     make(material, 0);
     press(0.1, 0.05, DEPTH);
-    assert_true(fabs(depth_at(0.15, 0.05) - DEPTH) < 0.002);  /* under the sole */
-    assert_true(fabs(depth_at(0.15, 0.20)) < 1e-6);           /* beside it */
-    assert_true(fabs(depth_at(-0.05, 0.05)) < 1e-6);          /* behind the heel */
+    assert_true(fabs(depth_at(0.15, 0.05) - DEPTH) < 0.002); /* under the sole */
+    assert_true(fabs(depth_at(0.15, 0.20)) < 1e-6);          /* beside it */
+    assert_true(fabs(depth_at(-0.05, 0.05)) < 1e-6);         /* behind the heel */
     press(0.1, 0.05, -0.05);
     double left = depth_at(0.15, 0.05);
     destroy();

@@ -62,8 +62,7 @@ static void whole_file_under_its_name(void **state) {
     snprintf(path, sizeof path, "%s/walk.mp4", folder);
     snprintf(part, sizeof part, "%s.part", path);
     Video *video = video_open(path, WIDTH, HEIGHT, 25, &error);
-    if (!video)
-        fail_msg("%s", error.text);
+    if (!video) fail_msg("%s", error.text);
     for (int i = 0; i < FRAMES; i++) {
         paint(rgb, i);
         assert_int_equal(video_frame(video, rgb, &error), MILD_OK);
@@ -106,8 +105,7 @@ static void failing_ffmpeg_is_one_line(void **state) {
     Video *video = video_open(path, WIDTH, HEIGHT, 25, &error);
     assert_non_null(video);
     MildStatus status = MILD_OK;
-    for (int i = 0; i < 500 && status == MILD_OK; i++)
-        status = video_frame(video, rgb, &error);
+    for (int i = 0; i < 500 && status == MILD_OK; i++) status = video_frame(video, rgb, &error);
     assert_int_equal(video_close(video, &error), MILD_ERROR_IO);
     assert_non_null(strstr(error.text, "nowhere"));
     assert_null(strchr(error.text, '\n'));

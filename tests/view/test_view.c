@@ -31,8 +31,7 @@ static int setup(void **state) {
     assert_true(mild_material_preset("sand_loose", &sand));
     terrain = mild_terrain_uniform(&sand);
     robot = robot_create(MODEL, &error);
-    if (!robot)
-        fail_msg("%s", error.text);
+    if (!robot) fail_msg("%s", error.text);
     sim = robot_sim_create(robot, DT, &error);
     assert_non_null(sim);
     ground = mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), ROBOT_FEET)), robot_soles(robot),
@@ -73,8 +72,7 @@ static View *small_view(MildError *error) {
 
 static int pixels_different(const unsigned char *a, const unsigned char *b, size_t count) {
     int different = 0;
-    for (size_t i = 0; i < count; i++)
-        different += abs((int)a[i] - (int)b[i]) > 12;
+    for (size_t i = 0; i < count; i++) different += abs((int)a[i] - (int)b[i]) > 12;
     return different;
 }
 
@@ -97,16 +95,17 @@ static void robot_and_prints_are_seen(void **state) {
     load_at(0.01);
     for (int i = 0; i < 250; i++) {
         step();
-        if (i % 5 == 0)
-            view_observe(view, sim);
+        if (i % 5 == 0) view_observe(view, sim);
     }
     view_frame(view, sim, &info);
     memcpy(standing, view_pixels(view), bytes);
     load_at(3.0);
     step();
     view_frame(view, sim, &info);
-    int robot_pixels = pixels_different(empty, standing, bytes), prints = pixels_different(empty, view_pixels(view), bytes);
-    print_message("%s: robot changes %d samples of %zu, its prints %d\n", view_backend(view), robot_pixels, bytes, prints);
+    int robot_pixels = pixels_different(empty, standing, bytes),
+        prints = pixels_different(empty, view_pixels(view), bytes);
+    print_message("%s: robot changes %d samples of %zu, its prints %d\n", view_backend(view), robot_pixels, bytes,
+                  prints);
     assert_true(robot_pixels > 1000);
     assert_true(prints > 20 && prints < robot_pixels);
     assert_int_equal(view_reset(view, &terrain, &error), MILD_OK);
@@ -144,10 +143,8 @@ static void pressure_carries_the_weight(void **state) {
         pressure_observe(pressure, sim, &terrain);
         double now = 0;
         const double *normal = mild_scratch_elements(robot_sim_scratch(sim), 0).normal;
-        for (int e = 0; e < mild_sole_elements(robot_soles(robot)[0]); e++)
-            now += normal[e];
-        if (now >= 20)
-            force += now, samples++;
+        for (int e = 0; e < mild_sole_elements(robot_soles(robot)[0]); e++) now += normal[e];
+        if (now >= 20) force += now, samples++;
     }
     assert_int_equal(pressure_stances(pressure, 0), 0); /* still standing */
     load_at(0.3);
