@@ -57,7 +57,8 @@ MildStatus bench_step(const ExperimentDef *def, BenchReport *report, MildError *
 
 /* ---- the ground alone ---- */
 
-enum { GROUND_REPEATS = 15, GROUND_STEPS = 1000, ROWS = 6 * MILD_FEET_MAX };
+enum { GROUND_REPEATS = 15, ROWS = 6 * MILD_FEET_MAX };
+static const double ground_repeat = 0.02; /* [s] */
 
 typedef struct {
     MildTerrain terrain;
@@ -84,18 +85,24 @@ static void ground_input(MildContactInput *input, const Robot *robot, double dt,
     }
 }
 
+/* Seconds that `steps` steps take. */
+static double ground_run(GroundBench *bench, int steps, int advance) {
+    MildContactResult result;
+    double start = clock_seconds();
+    for (int step = 0; step < steps; step++) {
+        mild_ground_solve(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
+        if (advance) mild_ground_advance(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
+    }
+    return clock_seconds() - start;
+}
+
+/* [ns] per step: the median of repeats that last about as long whatever a step costs. */
 static double ground_time(GroundBench *bench, int advance) {
     double times[GROUND_REPEATS];
-    MildContactResult result;
-    for (int repeat = 0; repeat < GROUND_REPEATS; repeat++) {
-        double start = clock_seconds();
-        for (int step = 0; step < GROUND_STEPS; step++) {
-            mild_ground_solve(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
-            if (advance) mild_ground_advance(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
-        }
-        times[repeat] = clock_seconds() - start;
-    }
-    return median(times, GROUND_REPEATS) / GROUND_STEPS * 1e9;
+    int steps = 1;
+    while (steps < (1 << 20) && ground_run(bench, steps, advance) < 0.5 * ground_repeat) steps *= 2;
+    for (int repeat = 0; repeat < GROUND_REPEATS; repeat++) times[repeat] = ground_run(bench, steps, advance);
+    return median(times, GROUND_REPEATS) / steps * 1e9;
 }
 
 /* The memory is that of a foot which went down to where it is now. */
