@@ -1,6 +1,6 @@
 #include <math.h>
 
-#include "mild/ground.h"
+#include "ground/contact.h"
 
 MildTerrain mild_terrain_uniform(const MildMaterial *material) {
     MildTerrain terrain = {.material_count = 1};
@@ -44,4 +44,10 @@ double mild_terrain_height_at(const MildTerrain *terrain, double x, double y) {
     (void)x;
     (void)y;
     return terrain->height;
+}
+
+void terrain_heights(const MildTerrain *terrain, const double *x, const double *y, int count, double *height) {
+    (void)x;
+    (void)y;
+    for (int i = 0; i < count; i++) height[i] = terrain->height;
 }

@@ -1,0 +1,94 @@
+/* One contact step, inside: the compacted list of elements that may touch, and the per-step law of each. */
+#ifndef MILD_GROUND_CONTACT_H
+#define MILD_GROUND_CONTACT_H
+
+#include "ground/law.h"
+
+#define CONTACT_LANES 8         /* lists are padded to whole vectors; padding never makes a force */
+#define CONTACT_SLIP_SPEED 1e-6 /* [m/s] width of the friction law's stick region; a standing foot creeps slower than this */
+#define CONTACT_ELASTIC 1e-4    /* [m] least elastic travel of the unloading line: plastic ground is elastic that far */
+#define TWIST_MAX (6 * MILD_FEET_MAX)
+
+struct MildGround {
+    int32_t feet;
+    int32_t elements[MILD_FEET_MAX], padded[MILD_FEET_MAX];
+    int32_t touched[MILD_FEET_MAX]; /* elements that remember something */
+    int32_t reserved[9];            /* to 64 bytes, so that the arrays behind are aligned */
+};
+
+/* Memory of one foot, arrays inside the state block. */
+typedef struct {
+    double *depth_max;   /* [m] u_max, 0 = untouched */
+    double *front_speed; /* [m/s] downward speed of the added mass while the element leads the front, else 0 */
+    double *drift;       /* [m] d_D */
+    double *pending_x, *pending_y; /* [m] horizontal motion not yet counted into d_D */
+    int32_t *material;   /* the material it touched down on, -1 = none */
+} Memory;
+
+Memory ground_memory(const MildGround *ground, int foot);
+
+/* Height of the ground under `count` points. */
+void terrain_heights(const MildTerrain *terrain, const double *x, const double *y, int count, double *height);
+
+/* Structure of arrays over the slots: foot 0's list, padding, foot 1's list, padding. */
+typedef struct {
+    double *px, *py, *pz; /* [m] ankle -> element, world axes */
+    /* normal law of this step, see step.h */
+    double *depth, *front, *front_force, *line, *gap, *reach, *front_speed, *speed, *blend, *mass, *drag_now,
+        *explicit_impulse;
+    double *flat, *cone, *full, *inverse_full, *drag, *bed, *bed_stiffness; /* Law */
+    double *mu, *drift_radius, *damping; /* [-], [N s], [N s/m * s] */
+    double *k_drift, *b_drift, *recovery, *mass_rate; /* material, for the preparation */
+    double *depth_max, *drift;                       /* memory, compacted */
+    /* written by the passes */
+    double *ix, *iy, *iz;                         /* [N s] impulse */
+    double *fx, *fy;                              /* [N s] friction without the drift damping; sweeps only */
+    double *hxx, *hxy, *hyy, *hzz, *hxz, *hyz;     /* [kg] minus the impulse's derivative by the element's velocity */
+} Slots;
+#define SLOT_ARRAYS (sizeof(Slots) / sizeof(double *))
+
+typedef struct {
+    int elements, padded, active, start; /* start: first slot of the foot's list */
+    double center_x, center_y, radius;  /* [m] centroid in the foot frame; reach of the sole from the ankle */
+    const double *x, *y;                 /* [m] element centres in the foot frame */
+    double z, pitch;
+    double *depth, *normal, *tangent_x, *tangent_y, *point_x, *point_y, *point_z; /* MildElements */
+    int32_t *element; /* [active] element of each slot, ascending */
+} FootScratch;
+
+/* Law of a material as last derived; valid while the material's bytes stay the same. */
+typedef struct {
+    MildMaterial material;
+    Law law;
+    int known;
+} DerivedLaw;
+
+struct MildScratch {
+    int feet, slots; /* slots: in use by this solve, whole vectors */
+    FootScratch foot[MILD_FEET_MAX];
+    Slots slot;
+    int32_t *slot_material; /* whose law stands in the slot's Law arrays; -1 none */
+    DerivedLaw derived[MILD_FEET_MAX][MILD_MATERIALS_MAX];
+    double wrench[TWIST_MAX]; /* [N s, N m s] sum of B^T I at the last pass */
+    double hessian[MILD_FEET_MAX][36]; /* [kg ...] per foot, minus d wrench / d twist, row major */
+    double *block; /* the one allocation behind all arrays */
+};
+
+/* Fills the lists and each slot's law for this step; returns the number of elements that may touch. */
+int contact_prepare(const MildGround *ground, const MildTerrain *terrain, const MildContactInput *input, MildScratch *scratch);
+
+/* Impulses of every slot at foot twists V, and their wrench. */
+void contact_pass(MildScratch *scratch, double dt, const double *twist);
+/* hessian from the h arrays of the last pass. */
+void contact_hessian(MildScratch *scratch);
+/* sqrt(R^T A R) for R = P - wrench: the residual in the metric of kinetic energy. */
+double contact_residual(int n, const double *inverse_inertia, const double *impulse, const double *wrench);
+
+static inline int foot_end(const FootScratch *foot) {
+    return foot->start + (foot->active + CONTACT_LANES - 1) / CONTACT_LANES * CONTACT_LANES;
+}
+
+void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result);
+void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result);
+
+#endif

@@ -1,0 +1,166 @@
+#include "ground/step.h"
+
+/* The normal law at every slot of a foot: branch-free, so that it runs in vectors. */
+static void foot_normal(const Slots *s, int start, int end, double dt, const double *V) {
+    const double v2 = V[2], w0 = V[3], w1 = V[4];
+#pragma omp simd
+    for (int i = start; i < end; i++) {
+        double impulse, slope;
+        step_normal(s, i, dt, w1 * s->px[i] - w0 * s->py[i] - v2, &impulse, &slope);
+        s->iz[i] = impulse;
+        s->hzz[i] = slope;
+    }
+}
+
+/* Coulomb friction and drift resistance of radius r = mu I_z + dt k_D d_D u (paper eqs 14 and 15), made single-valued by a
+ * stick region |v| < eps, plus the drift damping: I = -(r/max(|v|, eps) + dt b_D) v. Both oppose the new velocity, so they
+ * can neither push a resting foot nor reverse a motion. */
+static void foot_tangent(const Slots *s, int start, int end, const double *V) {
+    const double v0 = V[0], v1 = V[1], w0 = V[3], w1 = V[4], w2 = V[5];
+#pragma omp simd
+    for (int i = start; i < end; i++) {
+        double vx = v0 + w1 * s->pz[i] - w2 * s->py[i], vy = v1 + w2 * s->px[i] - w0 * s->pz[i];
+        double speed = sqrt(vx * vx + vy * vy), along = 1.0 / (speed > CONTACT_SLIP_SPEED ? speed : CONTACT_SLIP_SPEED);
+        double pull = (s->mu[i] * s->iz[i] + s->drift_radius[i]) * along, b = s->damping[i];
+        double nx = vx * along, ny = vy * along, slip = speed > CONTACT_SLIP_SPEED ? pull : 0.0;
+        double couple = s->mu[i] * s->hzz[i];
+        s->ix[i] = -(pull + b) * vx;
+        s->iy[i] = -(pull + b) * vy;
+        s->hxx[i] = pull + b - slip * nx * nx;
+        s->hyy[i] = pull + b - slip * ny * ny;
+        s->hxy[i] = -slip * nx * ny;
+        s->hxz[i] = -couple * nx; /* the friction bound falls as the foot rises */
+        s->hyz[i] = -couple * ny;
+    }
+}
+
+/* sum of B^T I = (sum I, sum p x I). */
+static void foot_wrench(const Slots *s, int start, int end, double *wrench) {
+    double fx = 0.0, fy = 0.0, fz = 0.0, tx = 0.0, ty = 0.0, tz = 0.0;
+#pragma omp simd reduction(+ : fx, fy, fz, tx, ty, tz)
+    for (int i = start; i < end; i++) {
+        double px = s->px[i], py = s->py[i], pz = s->pz[i], ix = s->ix[i], iy = s->iy[i], iz = s->iz[i];
+        fx += ix;
+        fy += iy;
+        fz += iz;
+        tx += py * iz - pz * iy;
+        ty += pz * ix - px * iz;
+        tz += px * iy - py * ix;
+    }
+    wrench[0] = fx;
+    wrench[1] = fy;
+    wrench[2] = fz;
+    wrench[3] = tx;
+    wrench[4] = ty;
+    wrench[5] = tz;
+}
+
+void contact_pass(MildScratch *scratch, double dt, const double *twist) {
+    for (int f = 0; f < scratch->feet; f++) {
+        int start = scratch->foot[f].start, end = foot_end(&scratch->foot[f]);
+        foot_normal(&scratch->slot, start, end, dt, twist + 6 * f);
+        foot_tangent(&scratch->slot, start, end, twist + 6 * f);
+        foot_wrench(&scratch->slot, start, end, scratch->wrench + 6 * f);
+    }
+}
+
+/* With the rows Jx = (1,0,0, 0,pz,-py), Jy = (0,1,0, -pz,0,px), Jz = (0,0,1, py,-px,0) of B and the element's
+ * X = hxx Jx + hxy Jy + hxz Jz,  Y = hxy Jx + hyy Jy + hyz Jz,  Z = hzz Jz
+ * the sum of B^T h B has the rows  X, Y, Z, py Z - pz Y, pz X - px Z, px Y - py X. */
+static void hessian_linear(const Slots *s, int start, int end, double *H) {
+    double x0 = 0.0, x1 = 0.0, x2 = 0.0, x3 = 0.0, x4 = 0.0, x5 = 0.0, y1 = 0.0, y2 = 0.0, y3 = 0.0, y4 = 0.0, y5 = 0.0;
+    double z2 = 0.0, z3 = 0.0, z4 = 0.0;
+#pragma omp simd reduction(+ : x0, x1, x2, x3, x4, x5, y1, y2, y3, y4, y5, z2, z3, z4)
+    for (int i = start; i < end; i++) {
+        double px = s->px[i], py = s->py[i], pz = s->pz[i], hxx = s->hxx[i], hxy = s->hxy[i], hyy = s->hyy[i];
+        double hxz = s->hxz[i], hyz = s->hyz[i], hzz = s->hzz[i];
+        x0 += hxx;
+        x1 += hxy;
+        x2 += hxz;
+        x3 += hxz * py - hxy * pz;
+        x4 += hxx * pz - hxz * px;
+        x5 += hxy * px - hxx * py;
+        y1 += hyy;
+        y2 += hyz;
+        y3 += hyz * py - hyy * pz;
+        y4 += hxy * pz - hyz * px;
+        y5 += hyy * px - hxy * py;
+        z2 += hzz;
+        z3 += hzz * py;
+        z4 += hzz * px;
+    }
+    const double rows[18] = {x0, x1, x2, x3, x4, x5, x1, y1, y2, y3, y4, y5, 0.0, 0.0, z2, z3, -z4, 0.0};
+    for (int k = 0; k < 18; k++) H[k] = rows[k];
+}
+
+static void hessian_angular_x(const Slots *s, int start, int end, double *row) {
+    double r0 = 0.0, r1 = 0.0, r2 = 0.0, r3 = 0.0, r4 = 0.0, r5 = 0.0;
+#pragma omp simd reduction(+ : r0, r1, r2, r3, r4, r5)
+    for (int i = start; i < end; i++) {
+        double px = s->px[i], py = s->py[i], pz = s->pz[i], hxy = s->hxy[i], hyy = s->hyy[i], hyz = s->hyz[i];
+        double hzz = s->hzz[i];
+        r0 -= pz * hxy;
+        r1 -= pz * hyy;
+        r2 += py * hzz - pz * hyz;
+        r3 += py * hzz * py - pz * (hyz * py - hyy * pz);
+        r4 -= py * hzz * px + pz * (hxy * pz - hyz * px);
+        r5 -= pz * (hyy * px - hxy * py);
+    }
+    const double values[6] = {r0, r1, r2, r3, r4, r5};
+    for (int k = 0; k < 6; k++) row[k] = values[k];
+}
+
+static void hessian_angular_y(const Slots *s, int start, int end, double *row) {
+    double r0 = 0.0, r1 = 0.0, r2 = 0.0, r3 = 0.0, r4 = 0.0, r5 = 0.0;
+#pragma omp simd reduction(+ : r0, r1, r2, r3, r4, r5)
+    for (int i = start; i < end; i++) {
+        double px = s->px[i], py = s->py[i], pz = s->pz[i], hxx = s->hxx[i], hxy = s->hxy[i], hxz = s->hxz[i];
+        double hzz = s->hzz[i];
+        r0 += pz * hxx;
+        r1 += pz * hxy;
+        r2 += pz * hxz - px * hzz;
+        r3 += pz * (hxz * py - hxy * pz) - px * hzz * py;
+        r4 += pz * (hxx * pz - hxz * px) + px * hzz * px;
+        r5 += pz * (hxy * px - hxx * py);
+    }
+    const double values[6] = {r0, r1, r2, r3, r4, r5};
+    for (int k = 0; k < 6; k++) row[k] = values[k];
+}
+
+static void hessian_angular_z(const Slots *s, int start, int end, double *row) {
+    double r0 = 0.0, r1 = 0.0, r2 = 0.0, r3 = 0.0, r4 = 0.0, r5 = 0.0;
+#pragma omp simd reduction(+ : r0, r1, r2, r3, r4, r5)
+    for (int i = start; i < end; i++) {
+        double px = s->px[i], py = s->py[i], pz = s->pz[i], hxx = s->hxx[i], hxy = s->hxy[i], hyy = s->hyy[i];
+        double hxz = s->hxz[i], hyz = s->hyz[i];
+        r0 += px * hxy - py * hxx;
+        r1 += px * hyy - py * hxy;
+        r2 += px * hyz - py * hxz;
+        r3 += px * (hyz * py - hyy * pz) - py * (hxz * py - hxy * pz);
+        r4 += px * (hxy * pz - hyz * px) - py * (hxx * pz - hxz * px);
+        r5 += px * (hyy * px - hxy * py) - py * (hxy * px - hxx * py);
+    }
+    const double values[6] = {r0, r1, r2, r3, r4, r5};
+    for (int k = 0; k < 6; k++) row[k] = values[k];
+}
+
+void contact_hessian(MildScratch *scratch) {
+    for (int f = 0; f < scratch->feet; f++) {
+        int start = scratch->foot[f].start, end = foot_end(&scratch->foot[f]);
+        double *H = scratch->hessian[f];
+        hessian_linear(&scratch->slot, start, end, H);
+        hessian_angular_x(&scratch->slot, start, end, H + 18);
+        hessian_angular_y(&scratch->slot, start, end, H + 24);
+        hessian_angular_z(&scratch->slot, start, end, H + 30);
+    }
+}
+
+double contact_residual(int n, const double *inverse_inertia, const double *impulse, const double *wrench) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        double row = 0.0;
+        for (int j = 0; j < n; j++) row += inverse_inertia[i * n + j] * (impulse[j] - wrench[j]);
+        sum += (impulse[i] - wrench[i]) * row;
+    }
+    return sqrt(fmax(sum, 0.0));
+}

@@ -1,0 +1,144 @@
+#include <string.h>
+
+#include "ground/step.h"
+
+#define SWEEP_TOLERANCE 1e-10
+#define SWEEP_LIMIT 5000
+#define SWEEP_LEAST_G 1e-9 /* [1/kg] a foot that cannot move sideways needs no friction; keeps beta finite */
+
+/* Algorithm 1 of the paper. The foot twists are kept up to date, so a velocity prediction costs O(1) and a sweep O(N);
+ * the mean over the preceding elements in delta_rb is a running mean. */
+typedef struct {
+    int n;
+    double dt;
+    const double *A;
+    double twist[TWIST_MAX];
+    double before[MILD_FEET_MAX][2]; /* sums of the preceding elements' (v_j - omega x p_j), horizontal */
+    int preceding[MILD_FEET_MAX];
+} Sweep;
+
+/* V += A B^T dI */
+static void sweep_apply(Sweep *sweep, int f, const double *p, const double *change) {
+    const double wrench[6] = {change[0], change[1], change[2], p[1] * change[2] - p[2] * change[1],
+                              p[2] * change[0] - p[0] * change[2], p[0] * change[1] - p[1] * change[0]};
+    for (int k = 0; k < 6; k++) {
+        const double *row = sweep->A + (6 * f + k) * sweep->n; /* A is symmetric */
+        for (int j = 0; j < sweep->n; j++) sweep->twist[j] += row[j] * wrench[k];
+    }
+}
+
+/* Diagonal of G = B A B^T at one element. */
+static void element_inverse_mass(const Sweep *sweep, int f, const double *p, double *G) {
+    const double J[3][6] = {{1, 0, 0, 0, p[2], -p[1]}, {0, 1, 0, -p[2], 0, p[0]}, {0, 0, 1, p[1], -p[0], 0}};
+    for (int axis = 0; axis < 3; axis++) {
+        G[axis] = 0.0;
+        for (int i = 0; i < 6; i++)
+            for (int j = 0; j < 6; j++) G[axis] += J[axis][i] * sweep->A[(6 * f + i) * sweep->n + 6 * f + j] * J[axis][j];
+    }
+}
+
+/* Implicit normal impulse: one Newton step on I - I(w), where a change dI slows the element by G_zz dI. */
+static double element_normal(const Slots *s, int i, double dt, double w, double G) {
+    double target, slope;
+    step_normal(s, i, dt, w, &target, &slope);
+    return fmax(s->iz[i] + (target - s->iz[i]) / (1.0 + G * slope), 0.0);
+}
+
+/* Paper eqs 12, 13: predict, correct by the continuity error, project on the friction disc. The stick region of width eps
+ * adds the compliance eps/r, so that the fixed point is the law of foot_tangent in pass.c. */
+static void element_friction(const Slots *s, int i, const double *v, const double *delta, double G) {
+    double radius = s->mu[i] * s->iz[i] + s->drift_radius[i];
+    double compliance = radius > 0.0 ? CONTACT_SLIP_SPEED / radius : 0.0;
+    double beta = 0.5 / (G + compliance), gamma = 0.1 * beta;
+    double x = s->fx[i] - gamma * delta[0] - beta * (v[0] + compliance * s->fx[i]);
+    double y = s->fy[i] - gamma * delta[1] - beta * (v[1] + compliance * s->fy[i]);
+    double length = sqrt(x * x + y * y), scale = length > radius ? radius / length : 1.0;
+    s->fx[i] = x * scale;
+    s->fy[i] = y * scale;
+}
+
+/* One line of the inner loop of Algorithm 1; returns |change of impulse|. */
+static double sweep_element(Sweep *sweep, const Slots *s, int f, int i) {
+    const double *V = sweep->twist + 6 * f, p[3] = {s->px[i], s->py[i], s->pz[i]};
+    double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]}, v[2] = {V[0] + turn[0], V[1] + turn[1]};
+    double w = -(V[2] + V[3] * p[1] - V[4] * p[0]), delta[2] = {0.0, 0.0}, G[3];
+    /* Paper eqs 10, 11 with v_i - v_j - omega x (p_i - p_j) as a vector. */
+    for (int k = 0; k < 2; k++) {
+        if (sweep->preceding[f] > 0) delta[k] = v[k] - turn[k] - sweep->before[f][k] / sweep->preceding[f];
+        sweep->before[f][k] += v[k] - turn[k];
+    }
+    sweep->preceding[f]++;
+    element_inverse_mass(sweep, f, p, G);
+    double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G), old[3] = {s->ix[i], s->iy[i], s->iz[i]}, fx = s->fx[i], fy = s->fy[i];
+    s->iz[i] = element_normal(s, i, sweep->dt, w, G[2]);
+    element_friction(s, i, v, delta, G_xy);
+    double b = s->damping[i], relax = 1.0 / (1.0 + b * G_xy); /* implicit drift damping, as for the normal part */
+    double bx = old[0] - fx, by = old[1] - fy;
+    s->ix[i] = s->fx[i] + bx - relax * (b * v[0] + bx);
+    s->iy[i] = s->fy[i] + by - relax * (b * v[1] + by);
+    const double change[3] = {s->ix[i] - old[0], s->iy[i] - old[1], s->iz[i] - old[2]};
+    sweep_apply(sweep, f, p, change);
+    return fabs(change[0]) + fabs(change[1]) + fabs(change[2]);
+}
+
+/* Start: I_xy = 0, I_z = dt F_GM at the present velocity. Returns the sum of |I|. */
+static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInput *input) {
+    const Slots *s = &scratch->slot;
+    memcpy(sweep->twist, input->free_velocity, (size_t)sweep->n * sizeof(double));
+    for (int f = 0; f < scratch->feet; f++) {
+        const double *V = input->velocity[f];
+        for (int i = scratch->foot[f].start; i < scratch->foot[f].start + scratch->foot[f].active; i++) {
+            const double p[3] = {s->px[i], s->py[i], s->pz[i]};
+            double w = -(V[2] + V[3] * p[1] - V[4] * p[0]), slope;
+            s->fx[i] = s->fy[i] = s->ix[i] = s->iy[i] = 0.0;
+            step_normal(s, i, input->dt, w, &s->iz[i], &slope);
+            sweep_apply(sweep, f, p, (const double[3]){0.0, 0.0, s->iz[i]});
+        }
+    }
+}
+
+/* Sum of B^T I over the slots as they stand, and sum of |I|. */
+static double sweep_wrench(const MildScratch *scratch, double *wrench) {
+    const Slots *s = &scratch->slot;
+    double total = 0.0;
+    memset(wrench, 0, TWIST_MAX * sizeof *wrench);
+    for (int f = 0; f < scratch->feet; f++) {
+        double *W = wrench + 6 * f;
+        for (int i = scratch->foot[f].start; i < scratch->foot[f].start + scratch->foot[f].active; i++) {
+            W[0] += s->ix[i];
+            W[1] += s->iy[i];
+            W[2] += s->iz[i];
+            W[3] += s->py[i] * s->iz[i] - s->pz[i] * s->iy[i];
+            W[4] += s->pz[i] * s->ix[i] - s->px[i] * s->iz[i];
+            W[5] += s->px[i] * s->iy[i] - s->py[i] * s->ix[i];
+            total += fabs(s->ix[i]) + fabs(s->iy[i]) + fabs(s->iz[i]);
+        }
+    }
+    return total;
+}
+
+void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
+    Sweep sweep = {.n = 6 * scratch->feet, .dt = input->dt, .A = input->inverse_inertia};
+    int limit = input->max_iterations > 0 ? input->max_iterations : SWEEP_LIMIT, iterations = 0;
+    double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE, change = INFINITY, total = 0.0;
+    sweep_start(&sweep, scratch, input);
+    while (iterations < limit && !(change <= tolerance * total)) {
+        iterations++;
+        change = 0.0;
+        memset(sweep.before, 0, sizeof sweep.before);
+        memset(sweep.preceding, 0, sizeof sweep.preceding);
+        for (int f = 0; f < scratch->feet; f++)
+            for (int i = scratch->foot[f].start; i < scratch->foot[f].start + scratch->foot[f].active; i++)
+                change += sweep_element(&sweep, &scratch->slot, f, i);
+        total = sweep_wrench(scratch, scratch->wrench);
+        if (isnan(change)) break;
+    }
+    result->iterations = iterations;
+    result->residual = total > 0.0 ? change / total : change;
+    result->converged = change <= tolerance * total;
+    for (int i = 0; i < sweep.n; i++) {
+        double sum = input->free_velocity[i];
+        for (int j = 0; j < sweep.n; j++) sum += sweep.A[i * sweep.n + j] * scratch->wrench[j];
+        result->velocity[i] = sum;
+    }
+}
