@@ -16,8 +16,8 @@ typedef struct {
 /* phases: NULL stops the timing. */
 void robot_sim_time_phases(RobotSim *sim, RobotPhases *phases);
 
-/* Medians over the repeats of one run in which the cases take turns [us per physics step]. The robot stands in its default pose
- * under the stand gains; the engine's rows use mj_step on the same model and pose. */
+/* Medians over the repeats of one run in which the cases take turns [us per physics step]. The robot stands balanced (stand.h);
+ * the engine's rows use mj_step on the same model and pose. */
 typedef struct {
     double engine_free;  /* mj_step, hanging: no contact */
     double engine_rigid; /* mj_step, eight sole corners on its floor */

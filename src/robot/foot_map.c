@@ -60,29 +60,32 @@ void foot_map_twist(const RobotSim *sim, int foot, const double *velocity, const
 /* rows <- L^-T rows, leaves first: row j of every ancestor j of i loses L_ij times row i. */
 static void backward_substitute(const mjModel *m, const mjData *d, int foot, double rows[ROBOT_FOOT_DOFS][ROBOT_LANES]) {
     for (int k = ROBOT_FOOT_DOFS - 1; k > 0; k--) {
-        const double *factor = d->qLD + m->M_rowadr[foot_dof(foot, k)];
-        double mine[ROBOT_LANES];
-        memcpy(mine, rows[k], sizeof mine);
+        const double *restrict factor = d->qLD + m->M_rowadr[foot_dof(foot, k)];
+        const double *restrict mine = rows[k];
         for (int j = 0; j < k; j++) {
-            double l = factor[j];
+            double *restrict ancestor = rows[j];
+#pragma omp simd
             for (int c = 0; c < ROBOT_LANES; c++) {
-                rows[j][c] -= l * mine[c];
+                ancestor[c] -= factor[j] * mine[c];
             }
         }
     }
 }
 
-/* Row r of the sum over rows k of outer(left_k, right_k) / D_k. */
-static void inner_row(const double *inverse_d, const double (*left)[ROBOT_LANES], const double (*right)[ROBOT_LANES], int rows,
-                      int r, double out[ROBOT_LANES]) {
-    double sum[ROBOT_LANES] = {0};
+/* block = sum over rows k of outer(left_k, right_k) / D_k. */
+static void inner_product(const double *inverse_d, const double left[][ROBOT_LANES], const double right[][ROBOT_LANES], int rows,
+                          double block[6][ROBOT_LANES]) {
+    double sum[6][ROBOT_LANES] = {{0}}; /* stays in registers */
     for (int k = 0; k < rows; k++) {
-        double scaled = inverse_d[k] * left[k][r];
-        for (int c = 0; c < ROBOT_LANES; c++) {
-            sum[c] += scaled * right[k][c];
+        for (int r = 0; r < 6; r++) {
+            double scaled = inverse_d[k] * left[k][r];
+#pragma omp simd
+            for (int c = 0; c < ROBOT_LANES; c++) {
+                sum[r][c] += scaled * right[k][c];
+            }
         }
     }
-    memcpy(out, sum, sizeof sum);
+    memcpy(block, sum, sizeof sum);
 }
 
 void foot_map_inverse_inertia(RobotSim *sim) {
@@ -90,20 +93,17 @@ void foot_map_inverse_inertia(RobotSim *sim) {
     double *a = sim->input.inverse_inertia;
     memcpy(map->half, map->jacobian, sizeof map->half);
     for (int f = 0; f < ROBOT_FEET; f++) {
-        backward_substitute(sim->model, sim->data, f, map->half[f]);
-    }
-    for (int f = 0; f < ROBOT_FEET; f++) {
-        double inverse_d[ROBOT_FOOT_DOFS];
+        double inverse_d[ROBOT_FOOT_DOFS], block[6][ROBOT_LANES];
         for (int k = 0; k < ROBOT_FOOT_DOFS; k++) {
             inverse_d[k] = sim->data->qLDiagInv[foot_dof(f, k)];
         }
+        backward_substitute(sim->model, sim->data, f, map->half[f]);
         for (int g = 0; g <= f; g++) { /* feet share the base's rows only */
+            inner_product(inverse_d, map->half[f], map->half[g], f == g ? ROBOT_FOOT_DOFS : ROBOT_LEG, block);
             for (int r = 0; r < 6; r++) {
-                double row[ROBOT_LANES];
-                inner_row(inverse_d, map->half[f], map->half[g], f == g ? ROBOT_FOOT_DOFS : ROBOT_LEG, r, row);
-                memcpy(a + (6 * f + r) * 12 + 6 * g, row, 6 * sizeof *a);
+                memcpy(a + (6 * f + r) * 12 + 6 * g, block[r], 6 * sizeof *a);
                 for (int c = 0; c < 6 && g < f; c++) {
-                    a[(6 * g + c) * 12 + 6 * f + r] = row[c];
+                    a[(6 * g + c) * 12 + 6 * f + r] = block[r][c];
                 }
             }
         }

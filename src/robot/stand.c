@@ -5,10 +5,12 @@
 
 #include "robot/description.h"
 
-/* Soft ground is a spring under the feet. Its stiffness against tilting is the sum over elements of K x^2, in pitch 78 N m/rad for
- * both feet on 25 kg/m^3 foam and 1300 on rubber. Gravity topples with m g h = 205 N m/rad, and the joints, in series with the ground
- * and with each other, leave it stable only above 460 N m/rad: with joints held still the robot falls on all foams, at any
- * gain on the softer ones. The balanced stand therefore
+/* Soft ground is a spring under the feet. Its stiffness against pitching is the sum over elements of K x^2 [N m/rad], for both feet
+ * level at rest: rubber 1250, foam60 660, sand_dense 390, grass 320, foam45 230, sand_loose 110, foam28 90, foam25 80.
+ * Gravity topples with m g h = 205; the joints are in series with the ground and with each other, and the potential of the whole (sole
+ * tilt, ankle, knee, hip) has a minimum only above 460. Besides, the default pose has its centre of mass 40 mm behind the
+ * middle of the soles, so the heels sink first: released there with joints held still the robot falls backwards on every soft ground
+ * in 1 to 2 s, on rubber and foam60 by overshoot. The balanced stand therefore
  * - puts the centre of mass over the middle of the soles, so that the feet sink level,
  * - feeds the weight forward, so that the joints need no error to carry it,
  * - servoes the legs in the world instead of on the tilting soles: an ankle's error is the shank's tilt, not the joint's, and the
@@ -54,22 +56,21 @@ static void pd(const Robot *robot, const double *q, const double *qd, const doub
     }
 }
 
-static const double none[ROBOT_JOINTS];
-
-void robot_stand_pd(const Robot *robot, const double *q, const double *qd, double *torque) {
-    pd(robot, q, qd, none, none, torque);
+void robot_stand_pd(const Robot *robot, int balance, const double *q, const double *qd, double *torque) {
+    static const double none[ROBOT_JOINTS];
+    double offset[ROBOT_JOINTS] = {0};
+    offset[4] = offset[10] = balance ? -robot->lean : 0.0;
+    pd(robot, q, qd, offset, balance ? robot->lean_torque : none, torque);
 }
 
 void robot_stand_torque(const Robot *robot, const RobotSim *sim, int balance, double *torque) {
     const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim) + 6;
     if (!balance) {
-        robot_stand_pd(robot, q, qd, torque);
+        robot_stand_pd(robot, 0, q, qd, torque);
         return;
     }
     double offset[ROBOT_JOINTS] = {0};
-    for (int f = 0; f < ROBOT_FEET; f++) {
-        offset[ROBOT_LEG * f + 4] = -robot->lean;
-    }
+    offset[4] = offset[10] = -robot->lean;
     answer_tilt(robot, sim, offset);
     pd(robot, q, qd, offset, robot->lean_torque, torque);
 }

@@ -9,8 +9,8 @@
  * middle of the soles, the weight is fed forward, and q0 answers the base's tilt. torque: [ROBOT_JOINTS]. */
 void robot_stand_torque(const Robot *robot, const RobotSim *sim, int balance, double *torque);
 
-/* The same with balance 0, from the joints' positions and velocities alone. */
-void robot_stand_pd(const Robot *robot, const double *q, const double *qd, double *torque);
+/* The same without the answer to the tilt, from the joints' positions and velocities alone. */
+void robot_stand_pd(const Robot *robot, int balance, const double *q, const double *qd, double *torque);
 
 /* The robot at rest in that pose, soles `sinkage` [m] below z = 0. */
 RobotState robot_stand_state(const Robot *robot, int balance, double sinkage);
