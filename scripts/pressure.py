@@ -55,9 +55,9 @@ def draw_foot(axes, foot, key, norm, shift, path):
 
 
 def draw(grounds, path):
-    width = 2.3 * len(grounds) + 1.6
+    width = 2.3 * max(len(grounds), 2) + 1.6
     figure, panels = plt.subplots(len(ROWS), len(grounds), figsize=(width, 6.4), squeeze=False, layout="constrained")
-    for (key, title), row in zip(ROWS, panels):
+    for index, ((key, title), row) in enumerate(zip(ROWS, panels)):
         top = max(max(values(foot["element"], key)) for feet in grounds.values() for foot in feet.values())
         norm = Normalize(0, top)
         for axes, (ground, feet) in zip(row, grounds.items()):
@@ -70,7 +70,7 @@ def draw(grounds, path):
                 axes.text(side * half, min(xs) - 0.025, name, ha="center", va="top", fontsize=8, color="0.35")
             axes.set(xlim=(-2 * half, 2 * half), ylim=(min(xs) - 0.05, max(xs) + 0.02), aspect="equal")
             axes.axis("off")
-            if row is panels[0]:
+            if index == 0:
                 axes.set_title(ground, fontsize=11)
         bar = figure.colorbar(cells, ax=row.tolist(), shrink=0.85, pad=0.02)
         bar.set_label(f"{title} [kPa]")

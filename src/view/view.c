@@ -17,8 +17,13 @@
 #define VIEW_RADIUS 9.0     /* [m] tiles farther from the robot are drawn as plain floor */
 #define VIEW_FLOOR 40.0     /* [m] half size of the floor beyond */
 #define VIEW_GEOMS 4000
-#define VIEW_CAMERA_TIME 0.35 /* [s] the camera's lag */
-#define VIEW_LOOK_HEIGHT 0.50 /* [m] the camera looks at this height */
+#define VIEW_CAMERA_TIME 0.35      /* [s] the camera's lag */
+#define VIEW_LOOK_HEIGHT 0.50      /* [m] the camera looks at this height */
+#define VIEW_CLOSE_TIME 0.20       /* [s] the same of the camera on the feet */
+#define VIEW_CLOSE_HEIGHT 0.04     /* [m] */
+#define VIEW_CLOSE_TURN 22.0       /* [deg] it looks more from the side */
+#define VIEW_CLOSE_ELEVATION -22.0 /* [deg] */
+#define VIEW_CLOSE_DISTANCE 0.80   /* [m] */
 #define VIEW_HIDDEN_GROUP 5
 #define VIEW_FORCE_SEEN 15.0 /* [N] smaller contact forces get no arrow */
 
@@ -39,8 +44,9 @@ struct View {
     mjvScene scene;
     mjrContext context;
     mjvOption option;
-    mjvCamera camera;
-    int scene_made, context_made, tracking;
+    mjvCamera camera, close; /* close: on the feet */
+    int scene_made, context_made;
+    int jumped; /* bool: the cameras start anew */
     Relief *relief;
     Slot slots[VIEW_SLOTS];
     int *slot_of;                              /* [tiles] -1: none */
@@ -61,6 +67,7 @@ ViewDef view_def_default(void) {
                      .y_max = 2,
                      .pressure_max = 40e3,
                      .force_arrow = 0.0012,
+                     .closeup = 1,
                      .azimuth = 128,
                      .elevation = -16,
                      .distance = 2.35};
@@ -197,6 +204,10 @@ static void make_scene(View *view) {
     view->camera.azimuth = view->def.azimuth;
     view->camera.elevation = view->def.elevation;
     view->camera.distance = view->def.distance;
+    mjv_defaultCamera(&view->close);
+    view->close.elevation = VIEW_CLOSE_ELEVATION;
+    view->close.distance = VIEW_CLOSE_DISTANCE;
+    view->jumped = 1;
 }
 
 View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain, MildError *error) {
@@ -255,7 +266,7 @@ MildStatus view_reset(View *view, const MildTerrain *terrain, MildError *error) 
         if (view->slots[i].tile >= 0) view->slot_of[view->slots[i].tile] = -1;
         view->slots[i].tile = -1;
     }
-    view->tracking = 0;
+    view->jumped = 1;
     return MILD_OK;
 }
 
@@ -385,9 +396,13 @@ static void draw_ground(View *view) {
 
 /* ---- frame ---- */
 
+/* Share of the way to its target that a camera with this lag goes in one frame. */
+static double camera_share(const View *view, double lag) {
+    return 1.0 - exp(-1.0 / (view->def.rate * lag));
+}
+
 static void follow(View *view, const double *base) {
-    double share = view->tracking ? 1.0 - exp(-1.0 / (view->def.rate * VIEW_CAMERA_TIME)) : 1.0;
-    view->tracking = 1;
+    double share = view->jumped ? 1.0 : camera_share(view, VIEW_CAMERA_TIME);
     double target[3] = {base[0], base[1], relief_surface(view->relief) + VIEW_LOOK_HEIGHT};
     for (int k = 0; k < 3; k++) view->camera.lookat[k] += share * (target[k] - view->camera.lookat[k]);
 }
@@ -458,6 +473,26 @@ static void move_lights(View *view) {
     }
 }
 
+/* The feet once more from near the ground, in the upper right corner: there one sees them sink. No shadows: a second
+ * shadow pass costs more than the rest of this small picture. */
+static void draw_closeup(View *view, mjrRect viewport, const RobotSim *sim) {
+    const double *left = robot_sim_foot(sim, 0)->sole_center, *right = robot_sim_foot(sim, 1)->sole_center;
+    double share = view->jumped ? 1.0 : camera_share(view, VIEW_CLOSE_TIME);
+    view->jumped = 0;
+    mjvCamera *camera = &view->close;
+    for (int k = 0; k < 2; k++) camera->lookat[k] += share * (0.5 * (left[k] + right[k]) - camera->lookat[k]);
+    camera->lookat[2] = relief_surface(view->relief) + VIEW_CLOSE_HEIGHT;
+    camera->azimuth = view->camera.azimuth - VIEW_CLOSE_TURN;
+    mjrRect box = {viewport.width - (viewport.width * 2) / 5 - 10, viewport.height - viewport.height / 3 - 10,
+                   (viewport.width * 2) / 5, viewport.height / 3};
+    mjrRect frame = {box.left - 2, box.bottom - 2, box.width + 4, box.height + 4};
+    mjr_rectangle(frame, 0.12F, 0.13F, 0.15F, 1);
+    mjv_updateCamera(view->model, view->data, camera, &view->scene);
+    view->scene.flags[mjRND_SHADOW] = 0;
+    mjr_render(box, &view->scene, &view->context);
+    view->scene.flags[mjRND_SHADOW] = 1;
+}
+
 void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     const double *qpos = robot_sim_qpos(sim);
     memcpy(view->data->qpos, qpos, ROBOT_NQ * sizeof *qpos);
@@ -474,6 +509,7 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     mjrRect viewport = {0, 0, view->def.width, view->def.height};
     if (view->window) window_size(view->window, &viewport.width, &viewport.height);
     mjr_render(viewport, &view->scene, &view->context);
+    if (view->def.closeup) draw_closeup(view, viewport, sim);
     draw_text(view, viewport, sim, info);
     if (!view->def.rigid) draw_inset(view, viewport, sim);
     if (view->window) return;
