@@ -55,7 +55,7 @@ static const struct {
     {"rubber", {{0.27F, 0.31F, 0.38F}, GRAIN_SPECKLE}},  {"foam60", {{0.44F, 0.56F, 0.70F}, GRAIN_GRID}},
     {"foam45", {{0.82F, 0.78F, 0.66F}, GRAIN_GRID}},     {"foam28", {{0.82F, 0.58F, 0.52F}, GRAIN_GRID}},
     {"foam25", {{0.70F, 0.60F, 0.76F}, GRAIN_GRID}},     {"grass", {{0.35F, 0.56F, 0.24F}, GRAIN_BLADES}},
-    {"sand_loose", {{0.84F, 0.69F, 0.44F}, GRAIN_FINE}}, {"sand_dense", {{0.69F, 0.53F, 0.35F}, GRAIN_FINE}},
+    {"sand_loose", {{0.76F, 0.62F, 0.40F}, GRAIN_FINE}}, {"sand_dense", {{0.69F, 0.53F, 0.35F}, GRAIN_FINE}},
 };
 static const Look rigid_look = {{0.66F, 0.67F, 0.68F}, GRAIN_CHECKER};
 

@@ -24,6 +24,7 @@
 #define VIEW_CLOSE_TURN 22.0       /* [deg] it looks more from the side */
 #define VIEW_CLOSE_ELEVATION -22.0 /* [deg] */
 #define VIEW_CLOSE_DISTANCE 0.80   /* [m] */
+#define VIEW_LABEL 24              /* [pixels] height of a label */
 #define VIEW_HIDDEN_GROUP 5
 #define VIEW_FORCE_SEEN 15.0 /* [N] smaller contact forces get no arrow */
 
@@ -456,8 +457,8 @@ static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     mjrRect title = {box.left, box.bottom + layout->title_bottom, box.width, layout->title_height};
     mjr_label(title, mjFONT_NORMAL, "sole pressure, kPa", 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
     snprintf(text, sizeof text, "%.0f", view->def.pressure_max / 1e3);
-    mjrRect label = {box.left + layout->bar_right, box.bottom + layout->bar_top - 16, layout->width - layout->bar_right,
-                     16};
+    mjrRect label = {box.left + layout->bar_right, box.bottom + layout->bar_top - VIEW_LABEL,
+                     layout->width - layout->bar_right, VIEW_LABEL};
     mjr_label(label, mjFONT_NORMAL, text, 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
     label.bottom = box.bottom + layout->bar_bottom;
     mjr_label(label, mjFONT_NORMAL, "0", 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
