@@ -119,8 +119,10 @@ static double median(double *values, int count) {
     return values[count / 2];
 }
 
-/* Median time of the cases first .. last in us per step. They take turns, so a slow moment of the machine hits all of them. */
-static MildStatus measure(Bench *bench, int first, int last, int repeats, int steps, double medians[CASES], MildError *error) {
+/* Median time of the cases first .. last in us per step. They take turns, so a slow moment of the machine hits all
+ * of them. */
+static MildStatus measure(Bench *bench, int first, int last, int repeats, int steps, double medians[CASES],
+                          MildError *error) {
     static const char *const names[CASES] = {"engine free", "engine rigid", "rigid", "newton", "gauss_seidel"};
     double times[CASES][REPEATS_MAX];
     for (int r = -1; r < repeats; r++) { /* the first round warms up */
@@ -154,12 +156,13 @@ static void measure_phases(Bench *bench, int steps, RobotPhases *phases) {
     }
 }
 
-MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, int repeats, int steps, RobotBench *result,
-                            MildError *error) {
+MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, int repeats, int steps,
+                            RobotBench *result, MildError *error) {
     Bench bench = {.robot = robot};
     MildMaterial material;
     if (repeats < 1 || repeats > REPEATS_MAX || steps < 1) {
-        return mild_fail(error, MILD_ERROR_RANGE, "robot bench: repeats must be 1 .. %d and steps positive", REPEATS_MAX);
+        return mild_fail(error, MILD_ERROR_RANGE, "robot bench: repeats must be 1 .. %d and steps positive",
+                         REPEATS_MAX);
     }
     if (!mild_material_preset(preset, &material)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "robot bench: unknown ground '%s'", preset);
@@ -177,8 +180,11 @@ MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, i
         status = measure(&bench, GAUSS_SEIDEL, GAUSS_SEIDEL, SWEEP_REPEATS, SWEEP_STEPS, medians, error);
     }
     if (status == MILD_OK) {
-        *result = (RobotBench){.engine_free = medians[ENGINE_FREE], .engine_rigid = medians[ENGINE_RIGID],
-                               .rigid = medians[RIGID], .newton = medians[NEWTON], .gauss_seidel = medians[GAUSS_SEIDEL]};
+        *result = (RobotBench){.engine_free = medians[ENGINE_FREE],
+                               .engine_rigid = medians[ENGINE_RIGID],
+                               .rigid = medians[RIGID],
+                               .newton = medians[NEWTON],
+                               .gauss_seidel = medians[GAUSS_SEIDEL]};
         result->iterations = bench.iterations / (double)bench.newton_steps;
         measure_phases(&bench, steps, &result->newton_phases);
     }

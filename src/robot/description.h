@@ -16,8 +16,8 @@ struct Robot {
     MildSole *soles[ROBOT_FEET];
     double outline[ROBOT_FEET][2 * ROBOT_OUTLINE_MAX]; /* [m] x y, foot frame */
     int outline_points[ROBOT_FEET];
-    double sole_z;                      /* [m] */
-    double sole_center[ROBOT_FEET][3];  /* [m] foot frame, middle of the outline's bounds */
+    double sole_z;                     /* [m] */
+    double sole_center[ROBOT_FEET][3]; /* [m] foot frame, middle of the outline's bounds */
     int base_body, foot_body[ROBOT_FEET], knee_body[ROBOT_FEET], floor_geom;
     int shell_body[ROBOT_SHELLS];
     double shell_center[ROBOT_SHELLS][3], shell_half[ROBOT_SHELLS][3]; /* [m] body frame */
@@ -25,9 +25,9 @@ struct Robot {
     double effort[ROBOT_JOINTS];                                       /* [N m] */
     double total_mass, stand_height;
     /* the balanced stand (stand.c): default pose leaning forward until the centre of mass is over the soles' centre */
-    double lean;                       /* [rad] */
-    double lean_base[3];               /* [m] base above a point on the ground midway below the ankles */
-    double lean_torque[ROBOT_JOINTS];  /* [N m] that holds it at rest */
+    double lean;                      /* [rad] */
+    double lean_base[3];              /* [m] base above a point on the ground midway below the ankles */
+    double lean_torque[ROBOT_JOINTS]; /* [N m] that holds it at rest */
 };
 
 /* Fills the balanced stand; 0, or 1 when out of memory. */

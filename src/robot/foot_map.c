@@ -1,5 +1,5 @@
-/* The feet seen from the robot's 18 degrees of freedom. A foot moves with the base's six and its own leg's six only, and the
- * engine's factor M = L^T D L has the same sparsity (a leg's rows hold that leg and the base). So
+/* The feet seen from the robot's 18 degrees of freedom. A foot moves with the base's six and its own leg's six
+ * only, and the engine's factor M = L^T D L has the same sparsity (a leg's rows hold that leg and the base). So
  *     A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T J^T)
  * needs one backward substitution per foot on six right-hand sides at once, which is one vector register per row. */
 #include <string.h>
@@ -31,7 +31,7 @@ void foot_map_jacobian(RobotSim *sim) {
         double arm[3] = {ankle[0] - base[0], ankle[1] - base[1], ankle[2] - base[2]};
         for (int k = 0; k < 3; k++) {
             memset(rows[k], 0, sizeof rows[k]);
-            rows[k][k] = 1.0; /* linear velocity: world axes */
+            rows[k][k] = 1.0;                                     /* linear velocity: world axes */
             double axis[3] = {turn[k], turn[3 + k], turn[6 + k]}; /* angular velocity: base axes */
             hinge_row(rows[3 + k], axis, arm);
         }
@@ -44,7 +44,8 @@ void foot_map_jacobian(RobotSim *sim) {
     }
 }
 
-void foot_map_twist(const RobotSim *sim, int foot, const double *velocity, const double *acceleration, double twist[6]) {
+void foot_map_twist(const RobotSim *sim, int foot, const double *velocity, const double *acceleration,
+                    double twist[6]) {
     double sum[ROBOT_LANES] = {0};
     for (int k = 0; k < ROBOT_FOOT_DOFS; k++) {
         int dof = foot_dof(foot, k);
@@ -58,7 +59,8 @@ void foot_map_twist(const RobotSim *sim, int foot, const double *velocity, const
 }
 
 /* rows <- L^-T rows, leaves first: row j of every ancestor j of i loses L_ij times row i. */
-static void backward_substitute(const mjModel *m, const mjData *d, int foot, double rows[ROBOT_FOOT_DOFS][ROBOT_LANES]) {
+static void backward_substitute(const mjModel *m, const mjData *d, int foot,
+                                double rows[ROBOT_FOOT_DOFS][ROBOT_LANES]) {
     for (int k = ROBOT_FOOT_DOFS - 1; k > 0; k--) {
         const double *restrict factor = d->qLD + m->M_rowadr[foot_dof(foot, k)];
         const double *restrict mine = rows[k];
@@ -73,8 +75,8 @@ static void backward_substitute(const mjModel *m, const mjData *d, int foot, dou
 }
 
 /* block = sum over rows k of outer(left_k, right_k) / D_k. */
-static void inner_product(const double *inverse_d, const double left[][ROBOT_LANES], const double right[][ROBOT_LANES], int rows,
-                          double block[6][ROBOT_LANES]) {
+static void inner_product(const double *inverse_d, const double left[][ROBOT_LANES], const double right[][ROBOT_LANES],
+                          int rows, double block[6][ROBOT_LANES]) {
     double sum[6][ROBOT_LANES] = {{0}}; /* stays in registers */
     for (int k = 0; k < rows; k++) {
         for (int r = 0; r < 6; r++) {

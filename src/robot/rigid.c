@@ -42,8 +42,8 @@ static void add_contact(RobotSim *sim, int c) {
 }
 
 /* Central axis F x tau / |F|^2 and the point of zero moment on the sole plane (physics.md section 2). */
-static void finish_foot(const RobotSim *sim, int foot) {
-    MildFootResult *result = (MildFootResult *)&sim->contact.foot[foot];
+static void finish_foot(RobotSim *sim, int foot) {
+    MildFootResult *result = &sim->contact.foot[foot];
     const double *force = result->force, *torque = result->torque, *turn = sim->input.rotation[foot];
     double square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2];
     if (result->contacts == 0 || square <= 0.0 || force[2] <= 0.0) {

@@ -26,7 +26,8 @@ RobotVariation robot_variation_nominal(void) {
 }
 
 /* Id of a named object, or -1 with a message that names it. */
-static int find(const mjModel *model, int type, const char *kind, const char *name, const char *path, MildError *error) {
+static int find(const mjModel *model, int type, const char *kind, const char *name, const char *path,
+                MildError *error) {
     int id = mj_name2id(model, type, name);
     if (id < 0) {
         mild_fail(error, MILD_ERROR_FORMAT, "%s: the robot's %s '%s' is missing", path, kind, name);
@@ -118,8 +119,8 @@ static MildStatus read_joints(Robot *robot, const char *path, MildError *error) 
         if (id != 1 + i || m->jnt_type[id] != mjJNT_HINGE || m->jnt_type[0] != mjJNT_FREE ||
             m->body_parentid[m->jnt_bodyid[id]] != parent) {
             return mild_fail(error, MILD_ERROR_FORMAT,
-                             "%s: joint '%s' must be hinge %d of a free base with two chains of six, left leg first", path,
-                             name, i + 1);
+                             "%s: joint '%s' must be hinge %d of a free base with two chains of six, left leg first",
+                             path, name, i + 1);
         }
         if (!m->jnt_limited[id] || !m->jnt_actfrclimited[id]) {
             return mild_fail(error, MILD_ERROR_FORMAT, "%s: joint '%s' needs range and actuatorfrcrange", path, name);
@@ -129,7 +130,8 @@ static MildStatus read_joints(Robot *robot, const char *path, MildError *error) 
         robot->effort[i] = m->jnt_actfrcrange[2 * id + 1];
     }
     if (m->nq != ROBOT_NQ || m->nv != ROBOT_NV) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: %d degrees of freedom instead of %d", path, (int)m->nv, ROBOT_NV);
+        return mild_fail(error, MILD_ERROR_FORMAT, "%s: %d degrees of freedom instead of %d", path, (int)m->nv,
+                         ROBOT_NV);
     }
     return MILD_OK;
 }

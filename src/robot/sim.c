@@ -1,5 +1,6 @@
-/* One physics step of a robot whose feet stand on our ground. Between steps the pose-dependent quantities (kinematics, feet's
- * Jacobian and twist) are those of the current state, so a step begins with the dynamics and ends with the next pose. */
+/* One physics step of a robot whose feet stand on our ground. Between steps the pose-dependent quantities
+ * (kinematics, feet's Jacobian and twist) are those of the current state, so a step begins with the dynamics and
+ * ends with the next pose. */
 #include "robot/sim.h"
 
 #include <math.h>
@@ -71,7 +72,8 @@ double robot_sim_dt(const RobotSim *sim) {
 }
 
 /* Lowest point of the sole's outline above `height` [m]. */
-static double lowest_sole_point(const Robot *robot, int foot, const double position[3], const double turn[9], double height) {
+static double lowest_sole_point(const Robot *robot, int foot, const double position[3], const double turn[9],
+                                double height) {
     double least = 1e9;
     for (int i = 0; i < robot->outline_points[foot]; i++) {
         double z = turn[6] * robot->outline[foot][2 * i] + turn[7] * robot->outline[foot][2 * i + 1];
@@ -164,13 +166,21 @@ static void smooth_dynamics(RobotSim *sim, const double *torque, const double *p
     mj_solveM(m, d, d->qacc_smooth, d->qfrc_smooth, 1);
 }
 
-/* What the ground asks of an engine: where the feet are, A and the free twist. */
-static void ground_input(RobotSim *sim) {
+/* Where the feet are: fixed before the step, because forces refer to the pose they were computed in. */
+static void place_feet(RobotSim *sim) {
     MildContactInput *input = &sim->input;
     for (int f = 0; f < ROBOT_FEET; f++) {
         memcpy(input->position[f], sim->feet[f].position, sizeof input->position[f]);
         memcpy(input->rotation[f], sim->feet[f].rotation, sizeof input->rotation[f]);
         memcpy(input->velocity[f], sim->feet[f].velocity, sizeof input->velocity[f]);
+    }
+}
+
+/* What the feet would do without ground: A = J M^-1 J^T and V^ = J (nu + dt a). */
+static void free_feet(RobotSim *sim) {
+    foot_map_inverse_inertia(sim);
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        foot_map_twist(sim, f, sim->data->qvel, sim->data->qacc_smooth, sim->input.free_velocity + 6 * f);
     }
 }
 
@@ -228,42 +238,45 @@ static int integrate(RobotSim *sim) {
     return 0;
 }
 
-int robot_sim_step(RobotSim *sim, const double *torque, const double *push, const MildTerrain *terrain, MildGround *ground) {
-    RobotPhases none, *phases = sim->phases ? sim->phases : &none;
+static void report_forces(RobotSim *sim) {
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        RobotFoot *foot = &sim->feet[f];
+        foot->result = sim->contact.foot[f];
+        memcpy(foot->force, foot->result.force, sizeof foot->force);
+        memcpy(foot->torque, foot->result.torque, sizeof foot->torque);
+    }
+}
+
+/* physics.md section 4 with the feet's 12 rows; mild/ground.h shows the same step for any engine. */
+int robot_sim_step(RobotSim *sim, const double *torque, const double *push, const MildTerrain *terrain,
+                   MildGround *ground) {
+    RobotPhases none = {0}, *phases = sim->phases ? sim->phases : &none;
     double t = sim->phases ? clock_seconds() : 0.0;
-    mjData *d = sim->data;
+    int rigid = sim->variation.rigid;
 
     smooth_dynamics(sim, torque, push);
-    ground_input(sim);
-    d->ncon = 0;
+    place_feet(sim);
+    sim->data->ncon = 0;
     t = split(sim, &phases->smooth, t);
-    if (sim->variation.rigid) {
-        d->geom_xpos[3 * sim->robot->floor_geom + 2] = terrain->height;
-        mj_collision(sim->model, d);
+    if (rigid) {
+        sim->data->geom_xpos[3 * sim->robot->floor_geom + 2] = terrain->height;
+        mj_collision(sim->model, sim->data);
         t = split(sim, &phases->ground, t);
+        constrain(sim);
+        rigid_contact_result(sim);
     } else {
-        foot_map_inverse_inertia(sim);
-        for (int f = 0; f < ROBOT_FEET; f++) {
-            foot_map_twist(sim, f, d->qvel, d->qacc_smooth, sim->input.free_velocity + 6 * f);
-        }
+        free_feet(sim);
         t = split(sim, &phases->map, t);
         mild_ground_solve(ground, terrain, &sim->input, sim->scratch, &sim->contact);
         mild_ground_advance(ground, terrain, &sim->input, sim->scratch, &sim->contact);
         t = split(sim, &phases->ground, t);
         add_ground_wrench(sim);
-    }
-    constrain(sim);
-    if (sim->variation.rigid) {
-        rigid_contact_result(sim);
+        constrain(sim);
     }
     int bad = integrate(sim);
     if (!bad) {
         update_pose(sim, terrain);
-        for (int f = 0; f < ROBOT_FEET; f++) {
-            sim->feet[f].result = sim->contact.foot[f];
-            memcpy(sim->feet[f].force, sim->contact.foot[f].force, sizeof sim->feet[f].force);
-            memcpy(sim->feet[f].torque, sim->contact.foot[f].torque, sizeof sim->feet[f].torque);
-        }
+        report_forces(sim);
     }
     split(sim, &phases->finish, t);
     phases->steps += sim->phases != NULL;

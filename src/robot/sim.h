@@ -5,7 +5,7 @@
 #include "robot/bench.h"
 #include "robot/description.h"
 
-#define ROBOT_LANES 8 /* six twist components, padded to one vector register */
+#define ROBOT_LANES 8      /* six twist components, padded to one vector register */
 #define ROBOT_FOOT_DOFS 12 /* base six, then the leg's six: the only ones that move a foot */
 
 /* The feet's Jacobian and its half-solved form, transposed: row = degree of freedom, column = twist component. */

@@ -287,7 +287,8 @@ static void test_standing(void **unused) {
         near(d->subtree_com[3 + k] - state.qpos[k], com[k], 1e-6, "com in base");
     }
     link_poses(state.qpos, position, turn);
-    for (int b = 1; b < m->nbody; b++) { /* composite inertia about the common centre of mass, from MuJoCo's own bodies */
+    for (int b = 1; b < m->nbody;
+         b++) { /* composite inertia about the common centre of mass, from MuJoCo's own bodies */
         double arm[3], local[9] = {0}, turned[9], transposed[9], world[9];
         for (int k = 0; k < 3; k++) {
             arm[k] = d->xipos[3 * b + k] - d->subtree_com[3 + k];
@@ -305,7 +306,8 @@ static void test_standing(void **unused) {
     }
     const cJSON *rows = cJSON_GetObjectItem(expected, "composite_inertia_about_com");
     for (int k = 0; k < 9; k++) {
-        near(inertia[k], cJSON_GetArrayItem(cJSON_GetArrayItem(rows, k / 3), k % 3)->valuedouble, 2e-6, "composite inertia");
+        near(inertia[k], cJSON_GetArrayItem(cJSON_GetArrayItem(rows, k / 3), k % 3)->valuedouble, 2e-6,
+             "composite inertia");
     }
 }
 
@@ -383,7 +385,7 @@ static void test_refusals(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_limits_and_masses), cmocka_unit_test(test_standing),  cmocka_unit_test(test_mass_matrix),
+        cmocka_unit_test(test_limits_and_masses), cmocka_unit_test(test_standing), cmocka_unit_test(test_mass_matrix),
         cmocka_unit_test(test_variation),         cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -17,13 +17,13 @@
 
 typedef struct {
     int stands;
-    double seconds;       /* [s] until it fell, or all */
-    double depth;         /* [m] mean over feet and the last two seconds */
-    double creep;         /* [m] change of the mean depth in the last two seconds */
-    double drift;         /* [m] of the soles' centres from where they first rested, horizontal */
-    double tilt;          /* [rad] of the soles at the end, the larger */
-    double height;        /* [m] of the base at the end */
-    double torque;        /* [N m] largest in the last two seconds */
+    double seconds; /* [s] until it fell, or all */
+    double depth;   /* [m] mean over feet and the last two seconds */
+    double creep;   /* [m] change of the mean depth in the last two seconds */
+    double drift;   /* [m] of the soles' centres from where they first rested, horizontal */
+    double tilt;    /* [rad] of the soles at the end, the larger */
+    double height;  /* [m] of the base at the end */
+    double torque;  /* [N m] largest in the last two seconds */
 } Stand;
 
 static Robot *robot;
@@ -112,9 +112,10 @@ static Stand stand(const MildMaterial *material, double dt, double seconds, int 
 static void check_balanced(const char *name, const MildMaterial *material, double dt) {
     Stand result = stand(material, dt, SECONDS, 1, MILD_SOLVER_NEWTON);
     double expected = material ? static_sinkage(material) : 0.0;
-    print_message("%-11s %.1f ms %s %5.2f s depth %6.3f of %6.3f mm, creep %8.5f mm, drift %.4f mm, tilt %.4f rad, torque %.1f N m\n",
-                  name, 1e3 * dt, result.stands ? "stands" : "FELL  ", result.seconds, 1e3 * result.depth, 1e3 * expected,
-                  1e3 * result.creep, 1e3 * result.drift, result.tilt, result.torque);
+    print_message(
+        "%-11s %.1f ms %s %5.2f s depth %6.3f of %6.3f mm, creep %8.5f, drift %.4f mm, tilt %.4f rad, %.1f N m\n", name,
+        1e3 * dt, result.stands ? "stands" : "FELL  ", result.seconds, 1e3 * result.depth, 1e3 * expected,
+        1e3 * result.creep, 1e3 * result.drift, result.tilt, result.torque);
     assert_true(result.stands);
     assert_true(fabs(result.creep) < 1e-4);
     assert_true(result.drift < 3e-3);
@@ -148,7 +149,8 @@ static void test_papers_solver(void **unused) {
             assert_true(result.stands);
             height[s] = result.height;
         }
-        print_message("%-11s base after 3 steps differs by %.1e m\n", mild_material_preset_name(p), height[1] - height[0]);
+        print_message("%-11s base after 3 steps differs by %.1e m\n", mild_material_preset_name(p),
+                      height[1] - height[0]);
         assert_true(fabs(height[1] - height[0]) < 1e-6);
     }
 }
@@ -162,8 +164,8 @@ static void test_plain_gains(void **unused) {
         MildMaterial material;
         assert_true(mild_material_preset(mild_material_preset_name(p), &material));
         Stand result = stand(&material, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
-        print_message("plain gains on %-11s %s after %.2f s\n", mild_material_preset_name(p), result.stands ? "stand" : "fall",
-                      result.seconds);
+        print_message("plain gains on %-11s %s after %.2f s\n", mild_material_preset_name(p),
+                      result.stands ? "stand" : "fall", result.seconds);
         if (strcmp(mild_material_preset_name(p), "foam25") == 0) {
             assert_false(result.stands);
         }

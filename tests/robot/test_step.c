@@ -254,7 +254,8 @@ static void test_momentum(void **unused) {
     for (uint32_t draw = 0; draw < 20; draw++) {
         RobotState state = random_state(draw);
         state.qpos[2] += draw % 2 ? 0.5 : 0.0;
-        memset(state.qvel, 0, sizeof state.qvel); /* the engine's Euler step conserves momentum to first order in the speed */
+        memset(state.qvel, 0,
+               sizeof state.qvel); /* the engine's Euler step conserves momentum to first order in the speed */
         robot_sim_load(sim, &state, &nominal);
         mild_ground_reset(ground);
         double torque[ROBOT_JOINTS], before[3], after[3];
@@ -296,7 +297,8 @@ static void test_determinism(void **unused) {
     Case shared[4], alone[4];
     RobotSim *sim = new_sim(0.001);
     for (int i = 0; i < 4; i++) {
-        shared[i] = (Case){random_state((uint32_t)i), robot_variation_nominal(), preset_terrain(names[i]), new_ground()};
+        shared[i] =
+            (Case){random_state((uint32_t)i), robot_variation_nominal(), preset_terrain(names[i]), new_ground()};
         shared[i].variation.rigid = i == 2;
         shared[i].variation.base_mass_add = i;
         alone[i] = shared[i];
@@ -370,12 +372,28 @@ static void test_clearance_and_distances(void **unused) {
     robot_sim_destroy(sim);
 }
 
+/* The benchmark runs and reports positive times; how long they are is not a test's business. */
+static void test_bench(void **unused) {
+    (void)unused;
+    RobotBench bench = {0};
+    MildError error = {0};
+    assert_int_equal(robot_bench_step(robot, "foam60", 0.0025, 3, 20, &bench, &error), MILD_OK);
+    assert_true(bench.engine_free > 0 && bench.engine_rigid > 0 && bench.rigid > 0 && bench.newton > 0);
+    assert_true(bench.gauss_seidel > 0 && bench.newton_phases.ground > 0 && bench.iterations >= 1);
+    assert_int_not_equal(robot_bench_step(robot, "no_such_ground", 0.0025, 3, 20, &bench, &error), MILD_OK);
+    assert_non_null(strstr(error.text, "no_such_ground"));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rigid_is_the_engine), cmocka_unit_test(test_map_against_dense),
-        cmocka_unit_test(test_twist_is_the_solvers), cmocka_unit_test(test_momentum),
-        cmocka_unit_test(test_determinism),          cmocka_unit_test(test_bad_numbers),
+        cmocka_unit_test(test_rigid_is_the_engine),
+        cmocka_unit_test(test_map_against_dense),
+        cmocka_unit_test(test_twist_is_the_solvers),
+        cmocka_unit_test(test_momentum),
+        cmocka_unit_test(test_determinism),
+        cmocka_unit_test(test_bad_numbers),
         cmocka_unit_test(test_clearance_and_distances),
+        cmocka_unit_test(test_bench),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
