@@ -1,4 +1,5 @@
 /* mild play: watch a policy walk a course; video or window, a table per ground, a picture of sole pressure. */
+#include <errno.h>
 #include <math.h>
 #include <spawn.h>
 #include <stdio.h>
@@ -151,7 +152,7 @@ static MildStatus draw_pressure(const char *data, const char *picture, MildError
     char *arguments[] = {python, script, from, to, NULL};
     pid_t child;
     int code = 0, failure = posix_spawnp(&child, python, NULL, NULL, arguments, environ);
-    if (failure == 0) waitpid(child, &code, 0);
+    while (failure == 0 && waitpid(child, &code, 0) < 0 && errno == EINTR) continue;
     if (failure == 0 && WIFEXITED(code) && WEXITSTATUS(code) == 0) return MILD_OK;
     return mild_fail(error, MILD_ERROR_IO,
                      "%s: not drawn, Python with matplotlib is needed (make setup); the numbers are in %s", picture,

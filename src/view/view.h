@@ -17,7 +17,7 @@ typedef struct {
     const char *const *names;            /* [materials of the terrain] for colours and text; NULL: unnamed */
     double pressure_max;                 /* [Pa] top of the pressure scale */
     double force_arrow;                  /* [m/N] length of the ground reaction arrows; 0: none */
-    int closeup;         /* bool: the feet from near the ground, in the upper right corner */
+    int closeup;                         /* bool: the feet from near the ground, in the upper right corner */
     double azimuth, elevation, distance; /* [deg], [deg], [m] of the camera about the robot */
 } ViewDef;
 ViewDef view_def_default(void);
