@@ -179,8 +179,8 @@ static void observation_by_hand(void **state) {
     assert_float_equal(b.frame[3], 1.0, 1e-6); /* 2 x 0.5 m/s */
     assert_float_equal(b.frame[8], -1.0, 0.01); /* gravity points down in the base frame */
     for (int i = 0; i < ROBOT_JOINTS; i++) {
-        assert_float_equal(b.frame[9 + i], qpos[7 + i] - pose[i], 1e-6);
-        assert_float_equal(b.frame[21 + i], 0.05 * qvel[6 + i], 1e-6);
+        assert_float_equal(b.frame[9 + i], (qpos[7 + i] - pose[i]), 1e-6);
+        assert_float_equal(b.frame[21 + i], (0.05 * qvel[6 + i]), 1e-6);
         assert_float_equal(b.frame[33 + i], action[i], 1e-7);
     }
     assert_float_equal(b.frame[45], sin(6.283185307179586 * phase), 1e-6);
