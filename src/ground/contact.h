@@ -77,8 +77,8 @@ struct MildScratch {
 /* Fills the lists and each slot's law for this step; returns the number of elements that may touch. */
 int contact_prepare(const MildGround *ground, const MildTerrain *terrain, const MildContactInput *input, MildScratch *scratch);
 
-/* Impulses of every slot at foot twists V, and their wrench. */
-void contact_pass(MildScratch *scratch, double dt, const double *twist);
+/* Impulses of every slot at foot twists V, their derivatives (exact, or a safe upper bound), and their wrench. */
+void contact_pass(MildScratch *scratch, double dt, const double *twist, int exact);
 /* hessian from the h arrays of the last pass. */
 void contact_hessian(MildScratch *scratch);
 /* sqrt(R^T A R) for R = P - wrench: the residual in the metric of kinetic energy. */

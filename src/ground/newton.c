@@ -5,6 +5,7 @@
 #define NEWTON_TOLERANCE 1e-9
 #define NEWTON_ITERATIONS 60
 #define NEWTON_HALVINGS 6
+#define NEWTON_SEARCHES 12
 
 /* One point of the search: impulse P, foot twists V = V^ + A P. */
 typedef struct {
@@ -21,7 +22,7 @@ static void point_twist(int n, const MildContactInput *input, Point *point) {
 }
 
 static void point_evaluate(MildScratch *scratch, const MildContactInput *input, int n, Point *point) {
-    contact_pass(scratch, input->dt, point->twist);
+    contact_pass(scratch, input->dt, point->twist, 1);
     point->residual = contact_residual(n, input->inverse_inertia, point->impulse, scratch->wrench);
 }
 
@@ -81,6 +82,58 @@ static void point_between(int n, const Point *from, const Point *to, double t, P
     }
 }
 
+/* Newton's step with halving on the residual. False when nothing on the way was better. */
+static int newton_exact(MildScratch *scratch, const MildContactInput *input, int n, const Point *at, Point *next) {
+    if (!newton_step(scratch, input, n, at->twist, next->impulse)) return 0;
+    point_twist(n, input, next);
+    point_evaluate(scratch, input, n, next);
+    if (next->residual < at->residual) return 1;
+    const Point full = *next;
+    double t = 1.0;
+    for (int k = 0; k < NEWTON_HALVINGS; k++) {
+        t *= 0.5;
+        point_between(n, at, &full, t, next);
+        point_evaluate(scratch, input, n, next);
+        if (next->residual < (1.0 - 0.1 * t) * at->residual) return 1;
+    }
+    return 0;
+}
+
+/* Slope of the convex function along the step, up to its length: dV . (P - W). */
+static double step_slope(int n, const Point *from, const Point *to, const Point *here, const double *wrench) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) sum += (to->twist[i] - from->twist[i]) * (here->impulse[i] - wrench[i]);
+    return sum;
+}
+
+/* A step that cannot fail on the convex function with the friction bounds as they are at each point: majorised Hessian,
+ * then the root of the slope along the step by bisection and secants. */
+static int newton_safe(MildScratch *scratch, const MildContactInput *input, int n, const Point *at, Point *next) {
+    contact_pass(scratch, input->dt, at->twist, 0);
+    contact_hessian(scratch);
+    if (!newton_step(scratch, input, n, at->twist, next->impulse)) return 0;
+    point_twist(n, input, next);
+    const Point full = *next;
+    double low = 0.0, high = 1.0, start = step_slope(n, at, &full, at, scratch->wrench), slope_low = start;
+    point_evaluate(scratch, input, n, next);
+    double slope = step_slope(n, at, &full, next, scratch->wrench), slope_high = slope;
+    for (int k = 0; k < NEWTON_SEARCHES && slope > 0.1 * fabs(start); k++) {
+        double t = k % 2 ? 0.5 * (low + high) : low + (high - low) * slope_low / (slope_low - slope_high);
+        point_between(n, at, &full, t, next);
+        point_evaluate(scratch, input, n, next);
+        slope = step_slope(n, at, &full, next, scratch->wrench);
+        if (slope > 0.0) {
+            high = t;
+            slope_high = slope;
+        } else {
+            low = t;
+            slope_low = slope;
+            if (slope > -0.1 * fabs(start)) break;
+        }
+    }
+    return 1;
+}
+
 static double newton_scale(int n, const MildContactInput *input, const double *impulse) {
     static const double zero[TWIST_MAX];
     return contact_residual(n, input->inverse_inertia, impulse, zero);
@@ -88,31 +141,23 @@ static double newton_scale(int n, const MildContactInput *input, const double *i
 
 void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
     int n = 6 * scratch->feet, limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
-    double tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
-    Point at, next;
+    double tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE, scale = 0.0;
+    Point at = {.residual = INFINITY}, best = at, next;
     memcpy(at.twist, input->velocity, (size_t)n * sizeof(double));
-    contact_pass(scratch, input->dt, at.twist);
-    at.residual = INFINITY;
-    double scale = 0.0;
+    contact_pass(scratch, input->dt, at.twist, 1);
     int iterations = 0;
     while (iterations < limit) {
         iterations++;
         contact_hessian(scratch);
-        if (!newton_step(scratch, input, n, at.twist, next.impulse)) break;
-        point_twist(n, input, &next);
-        point_evaluate(scratch, input, n, &next);
-        if (next.residual > at.residual) {
-            Point full = next;
-            double t = 1.0;
-            for (int k = 0; k < NEWTON_HALVINGS && next.residual > at.residual; k++) {
-                t *= 0.5;
-                point_between(n, &at, &full, t, &next);
-                point_evaluate(scratch, input, n, &next);
-            }
-        }
+        if (!newton_exact(scratch, input, n, &at, &next) && !newton_safe(scratch, input, n, &at, &next)) break;
         at = next;
+        if (at.residual < best.residual) best = at;
         scale = newton_scale(n, input, at.impulse);
         if (at.residual <= tolerance * scale) break;
+    }
+    if (best.residual < at.residual) {
+        at = best;
+        contact_pass(scratch, input->dt, at.twist, 1);
     }
     result->iterations = iterations;
     result->residual = scale > 0.0 ? at.residual / scale : at.residual;

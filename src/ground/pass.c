@@ -14,16 +14,17 @@ static void foot_normal(const Slots *s, int start, int end, double dt, const dou
 
 /* Coulomb friction and drift resistance of radius r = mu I_z + dt k_D d_D u (paper eqs 14 and 15), made single-valued by a
  * stick region |v| < eps, plus the drift damping: I = -(r/max(|v|, eps) + dt b_D) v. Both oppose the new velocity, so they
- * can neither push a resting foot nor reverse a motion. */
-static void foot_tangent(const Slots *s, int start, int end, const double *V) {
+ * can neither push a resting foot nor reverse a motion. With exact = 0 the derivative is that of the quadratic that touches
+ * |v| from above (no loss of stiffness along the slip, no coupling to the normal force): safe, but slow to converge. */
+static void foot_tangent(const Slots *s, int start, int end, const double *V, double exact) {
     const double v0 = V[0], v1 = V[1], w0 = V[3], w1 = V[4], w2 = V[5];
 #pragma omp simd
     for (int i = start; i < end; i++) {
         double vx = v0 + w1 * s->pz[i] - w2 * s->py[i], vy = v1 + w2 * s->px[i] - w0 * s->pz[i];
         double speed = sqrt(vx * vx + vy * vy), along = 1.0 / (speed > CONTACT_SLIP_SPEED ? speed : CONTACT_SLIP_SPEED);
         double pull = (s->mu[i] * s->iz[i] + s->drift_radius[i]) * along, b = s->damping[i];
-        double nx = vx * along, ny = vy * along, slip = speed > CONTACT_SLIP_SPEED ? pull : 0.0;
-        double couple = s->mu[i] * s->hzz[i];
+        double nx = vx * along, ny = vy * along, slip = exact * (speed > CONTACT_SLIP_SPEED ? pull : 0.0);
+        double couple = exact * s->mu[i] * s->hzz[i];
         s->ix[i] = -(pull + b) * vx;
         s->iy[i] = -(pull + b) * vy;
         s->hxx[i] = pull + b - slip * nx * nx;
@@ -55,11 +56,11 @@ static void foot_wrench(const Slots *s, int start, int end, double *wrench) {
     wrench[5] = tz;
 }
 
-void contact_pass(MildScratch *scratch, double dt, const double *twist) {
+void contact_pass(MildScratch *scratch, double dt, const double *twist, int exact) {
     for (int f = 0; f < scratch->feet; f++) {
         int start = scratch->foot[f].start, end = foot_end(&scratch->foot[f]);
         foot_normal(&scratch->slot, start, end, dt, twist + 6 * f);
-        foot_tangent(&scratch->slot, start, end, twist + 6 * f);
+        foot_tangent(&scratch->slot, start, end, twist + 6 * f, (double)exact);
         foot_wrench(&scratch->slot, start, end, scratch->wrench + 6 * f);
     }
 }

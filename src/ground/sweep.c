@@ -57,8 +57,8 @@ static void element_friction(const Slots *s, int i, const double *v, const doubl
     s->fy[i] = y * scale;
 }
 
-/* One line of the inner loop of Algorithm 1; returns |change of impulse|. */
-static double sweep_element(Sweep *sweep, const Slots *s, int f, int i) {
+/* One line of the inner loop of Algorithm 1; the change of impulse acts at once. */
+static void sweep_element(Sweep *sweep, const Slots *s, int f, int i) {
     const double *V = sweep->twist + 6 * f, p[3] = {s->px[i], s->py[i], s->pz[i]};
     double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]}, v[2] = {V[0] + turn[0], V[1] + turn[1]};
     double w = -(V[2] + V[3] * p[1] - V[4] * p[0]), delta[2] = {0.0, 0.0}, G[3];
@@ -78,10 +78,9 @@ static double sweep_element(Sweep *sweep, const Slots *s, int f, int i) {
     s->iy[i] = s->fy[i] + by - relax * (b * v[1] + by);
     const double change[3] = {s->ix[i] - old[0], s->iy[i] - old[1], s->iz[i] - old[2]};
     sweep_apply(sweep, f, p, change);
-    return fabs(change[0]) + fabs(change[1]) + fabs(change[2]);
 }
 
-/* Start: I_xy = 0, I_z = dt F_GM at the present velocity. Returns the sum of |I|. */
+/* Start: I_xy = 0, I_z = dt F_GM at the present velocity. */
 static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInput *input) {
     const Slots *s = &scratch->slot;
     memcpy(sweep->twist, input->free_velocity, (size_t)sweep->n * sizeof(double));
@@ -97,10 +96,9 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
     }
 }
 
-/* Sum of B^T I over the slots as they stand, and sum of |I|. */
-static double sweep_wrench(const MildScratch *scratch, double *wrench) {
+/* Sum of B^T I over the slots as they stand. */
+static void sweep_wrench(const MildScratch *scratch, double *wrench) {
     const Slots *s = &scratch->slot;
-    double total = 0.0;
     memset(wrench, 0, TWIST_MAX * sizeof *wrench);
     for (int f = 0; f < scratch->feet; f++) {
         double *W = wrench + 6 * f;
@@ -111,34 +109,37 @@ static double sweep_wrench(const MildScratch *scratch, double *wrench) {
             W[3] += s->py[i] * s->iz[i] - s->pz[i] * s->iy[i];
             W[4] += s->pz[i] * s->ix[i] - s->px[i] * s->iz[i];
             W[5] += s->px[i] * s->iy[i] - s->py[i] * s->ix[i];
-            total += fabs(s->ix[i]) + fabs(s->iy[i]) + fabs(s->iz[i]);
         }
     }
-    return total;
 }
 
 void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
     Sweep sweep = {.n = 6 * scratch->feet, .dt = input->dt, .A = input->inverse_inertia};
+    static const double zero[TWIST_MAX];
     int limit = input->max_iterations > 0 ? input->max_iterations : SWEEP_LIMIT, iterations = 0;
-    double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE, change = INFINITY, total = 0.0;
+    double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE, change = INFINITY, scale = 0.0;
+    double *wrench = scratch->wrench, before[TWIST_MAX];
     sweep_start(&sweep, scratch, input);
-    while (iterations < limit && !(change <= tolerance * total)) {
+    sweep_wrench(scratch, wrench);
+    while (iterations < limit && !(change <= tolerance * scale)) {
         iterations++;
-        change = 0.0;
+        memcpy(before, wrench, sizeof before);
         memset(sweep.before, 0, sizeof sweep.before);
         memset(sweep.preceding, 0, sizeof sweep.preceding);
         for (int f = 0; f < scratch->feet; f++)
             for (int i = scratch->foot[f].start; i < scratch->foot[f].start + scratch->foot[f].active; i++)
-                change += sweep_element(&sweep, &scratch->slot, f, i);
-        total = sweep_wrench(scratch, scratch->wrench);
+                sweep_element(&sweep, &scratch->slot, f, i);
+        sweep_wrench(scratch, wrench);
+        change = contact_residual(sweep.n, sweep.A, before, wrench);
+        scale = contact_residual(sweep.n, sweep.A, wrench, zero);
         if (isnan(change)) break;
     }
     result->iterations = iterations;
-    result->residual = total > 0.0 ? change / total : change;
-    result->converged = change <= tolerance * total;
+    result->residual = scale > 0.0 ? change / scale : change;
+    result->converged = change <= tolerance * scale;
     for (int i = 0; i < sweep.n; i++) {
         double sum = input->free_velocity[i];
-        for (int j = 0; j < sweep.n; j++) sum += sweep.A[i * sweep.n + j] * scratch->wrench[j];
+        for (int j = 0; j < sweep.n; j++) sum += sweep.A[i * sweep.n + j] * wrench[j];
         result->velocity[i] = sum;
     }
 }
