@@ -1,0 +1,252 @@
+/* What the ground's tests share: the reference soles, random materials, a free rigid body on each foot. */
+#ifndef GROUND_KIT_H
+#define GROUND_KIT_H
+
+#include <math.h>
+#include <stdarg.h>
+#include <setjmp.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "mild/ground.h"
+
+#define KIT_PITCH 0.0195
+#define KIT_SOLE_Z (-0.055)
+#define KIT_GRAVITY 9.81
+
+/* SplitMix64: the ground layer stands below base, so its tests carry their own numbers. */
+static inline double kit_uniform(uint64_t *state, double low, double high) {
+    uint64_t x = *state += 0x9e3779b97f4a7c15u;
+    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+    x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+    x ^= x >> 31;
+    return low + (high - low) * ((double)(x >> 11) * 0x1.0p-53);
+}
+
+static inline int kit_index(uint64_t *state, int count) {
+    return (int)kit_uniform(state, 0.0, (double)count);
+}
+
+/* Left sole of the reference robot, y range at x [m]; the right one is its mirror image. */
+static const double kit_outline[19][3] = {
+    {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044}, {-0.045, -0.045, 0.047}, {-0.03, -0.046, 0.049},
+    {-0.015, -0.046, 0.051}, {0.0, -0.041, 0.041},   {0.015, -0.041, 0.041},  {0.03, -0.041, 0.041},
+    {0.045, -0.041, 0.041},  {0.06, -0.046, 0.057},  {0.075, -0.046, 0.057},  {0.09, -0.046, 0.057},
+    {0.105, -0.046, 0.057},  {0.12, -0.046, 0.057},  {0.135, -0.046, 0.057},  {0.15, -0.046, 0.057},
+    {0.165, -0.045, 0.049},  {0.18, -0.038, 0.039},  {0.195, -0.016, 0.015}};
+
+static inline MildSole *kit_sole(int right, int target) {
+    double outline[2 * 38], sign = right ? -1.0 : 1.0;
+    for (int i = 0; i < 19; i++) {
+        outline[2 * i] = outline[2 * (37 - i)] = kit_outline[i][0];
+        outline[2 * i + 1] = sign * kit_outline[i][1];
+        outline[2 * (37 - i) + 1] = sign * kit_outline[i][2];
+    }
+    MildSoleDef def = {outline, 38, KIT_PITCH, KIT_SOLE_Z, target};
+    MildError error = {0};
+    MildSole *sole = mild_sole_create(&def, &error);
+    if (!sole) fail_msg("%s", error.text);
+    return sole;
+}
+
+/* A level plate of columns x rows elements under the reference point. */
+static inline MildSole *kit_plate(int columns, int rows) {
+    double x = 0.5 * columns * KIT_PITCH, y = 0.5 * rows * KIT_PITCH;
+    double outline[8] = {-x, -y, x, -y, x, y, -x, y};
+    MildSoleDef def = {outline, 4, KIT_PITCH, KIT_SOLE_Z, columns * rows};
+    MildError error = {0};
+    MildSole *sole = mild_sole_create(&def, &error);
+    if (!sole) fail_msg("%s", error.text);
+    return sole;
+}
+
+/* Uniform in the paper's Table III. */
+static inline MildMaterial kit_material(uint64_t *random) {
+    MildMaterial m = mild_material_default();
+    m.k_pen = kit_uniform(random, 8.0, 1400.0);
+    m.sigma_cone = kit_uniform(random, 0.01e6, 0.24e6);
+    m.alpha = kit_uniform(random, 0.698, 1.310);
+    m.nu = kit_uniform(random, 0.8, 2.4);
+    m.c_g = kit_uniform(random, -1.4, 4.6);
+    m.c_d = kit_uniform(random, -6.0, 28.0);
+    m.phi = kit_uniform(random, 0.50, 0.64);
+    m.rho = kit_uniform(random, 1000.0, 2600.0);
+    m.mu = kit_uniform(random, 0.2, 1.3);
+    m.k_drift = kit_uniform(random, 100.0, 1000.0);
+    m.b_drift = kit_uniform(random, 0.02, 0.1);
+    m.recovery = kit_uniform(random, -0.3, 1.3);
+    m.recovery = m.recovery < 0.0 ? 0.0 : (m.recovery > 1.0 ? 1.0 : m.recovery); /* both ends often */
+    m.bed_depth = kit_uniform(random, 0.10, 0.15);
+    return m;
+}
+
+/* A whole contact problem with its memory. */
+typedef struct {
+    int feet;
+    const MildSole *soles[MILD_FEET_MAX];
+    MildScratch *scratch;
+    MildGround *ground;
+    size_t bytes;
+    MildTerrain terrain;
+    MildContactInput input;
+    MildContactResult result;
+    double mass[MILD_FEET_MAX], inertia[MILD_FEET_MAX], center[MILD_FEET_MAX][3]; /* body on each foot: kg, kg m^2, [m] foot frame */
+} Kit;
+
+static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right, const MildMaterial *material, double dt) {
+    memset(kit, 0, sizeof *kit);
+    kit->feet = feet;
+    kit->soles[0] = left;
+    kit->soles[1] = right;
+    MildError error = {0};
+    kit->scratch = mild_scratch_create(kit->soles, feet, &error);
+    if (!kit->scratch) fail_msg("%s", error.text);
+    kit->bytes = mild_ground_bytes(kit->soles, feet);
+    kit->ground = mild_ground_init(aligned_alloc(64, kit->bytes), kit->soles, feet);
+    kit->terrain = mild_terrain_uniform(material);
+    kit->input.feet = feet;
+    kit->input.dt = dt;
+    for (int f = 0; f < feet; f++) {
+        for (int k = 0; k < 3; k++) kit->input.rotation[f][4 * k] = 1.0;
+        kit->input.position[f][1] = f ? -0.1 : 0.1;
+        kit->input.position[f][2] = -KIT_SOLE_Z;
+        kit->mass[f] = 20.0;
+        kit->inertia[f] = 0.5;
+    }
+}
+
+static inline void kit_close(Kit *kit) {
+    mild_scratch_destroy(kit->scratch);
+    free(kit->ground);
+}
+
+static inline void kit_cross(const double *a, const double *b, double *c) {
+    c[0] = a[1] * b[2] - a[2] * b[1];
+    c[1] = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* World vector ankle -> centre of mass. */
+static inline void kit_center(const Kit *kit, int f, double *r) {
+    const double *R = kit->input.rotation[f], *c = kit->center[f];
+    for (int k = 0; k < 3; k++) r[k] = R[3 * k] * c[0] + R[3 * k + 1] * c[1] + R[3 * k + 2] * c[2];
+}
+
+/* A of a free body (ball inertia): wrench at the ankle -> change of twist at the ankle. */
+static inline void kit_inverse_inertia(Kit *kit) {
+    int n = 6 * kit->feet;
+    memset(kit->input.inverse_inertia, 0, sizeof kit->input.inverse_inertia);
+    for (int f = 0; f < kit->feet; f++) {
+        double r[3];
+        kit_center(kit, f, r);
+        for (int k = 0; k < 6; k++) {
+            double wrench[6] = {0}, lever[3], turn[3], swing[3];
+            wrench[k] = 1.0;
+            kit_cross(r, wrench, lever);
+            for (int j = 0; j < 3; j++) turn[j] = (wrench[3 + j] - lever[j]) / kit->inertia[f];
+            kit_cross(turn, r, swing);
+            for (int j = 0; j < 3; j++) {
+                kit->input.inverse_inertia[(6 * f + j) * n + 6 * f + k] = wrench[j] / kit->mass[f] - swing[j];
+                kit->input.inverse_inertia[(6 * f + 3 + j) * n + 6 * f + k] = turn[j];
+            }
+        }
+    }
+}
+
+static inline void kit_rotate(double *R, const double *turn) {
+    double angle = sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
+    if (angle == 0.0) return;
+    double x = turn[0] / angle, y = turn[1] / angle, z = turn[2] / angle, c = cos(angle), s = sin(angle), t = 1.0 - c;
+    const double Q[9] = {t * x * x + c,     t * x * y - s * z, t * x * z + s * y, t * x * y + s * z, t * y * y + c,
+                         t * y * z - s * x, t * x * z - s * y, t * y * z + s * x, t * z * z + c};
+    double out[9];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) out[3 * i + j] = Q[3 * i] * R[j] + Q[3 * i + 1] * R[3 + j] + Q[3 * i + 2] * R[6 + j];
+    memcpy(R, out, sizeof out);
+}
+
+/* V^ of free bodies under gravity and a force at the centre of mass [N], gyroscopic terms of a ball being zero. */
+static inline void kit_free(Kit *kit, const double force[][3]) {
+    for (int f = 0; f < kit->feet; f++) {
+        const double *V = kit->input.velocity[f];
+        double r[3], spin[3], centripetal[3];
+        kit_center(kit, f, r);
+        kit_cross(V + 3, r, spin);
+        kit_cross(V + 3, spin, centripetal); /* the ankle's acceleration is the centre's minus omega x (omega x r) */
+        for (int k = 0; k < 3; k++) {
+            double acceleration = (force ? force[f][k] / kit->mass[f] : 0.0) - (k == 2 ? KIT_GRAVITY : 0.0);
+            kit->input.free_velocity[6 * f + k] = V[k] + kit->input.dt * (acceleration - centripetal[k]);
+            kit->input.free_velocity[6 * f + 3 + k] = V[3 + k];
+        }
+    }
+}
+
+static inline void kit_solve(Kit *kit) {
+    mild_ground_solve(kit->ground, &kit->terrain, &kit->input, kit->scratch, &kit->result);
+}
+
+/* Semi-implicit, as engines do. */
+static inline void kit_advance(Kit *kit) {
+    mild_ground_advance(kit->ground, &kit->terrain, &kit->input, kit->scratch, &kit->result);
+    for (int f = 0; f < kit->feet; f++) {
+        double turn[3];
+        memcpy(kit->input.velocity[f], kit->result.velocity + 6 * f, 6 * sizeof(double));
+        for (int k = 0; k < 3; k++) {
+            kit->input.position[f][k] += kit->input.dt * kit->input.velocity[f][k];
+            turn[k] = kit->input.dt * kit->input.velocity[f][3 + k];
+        }
+        kit_rotate(kit->input.rotation[f], turn);
+    }
+}
+
+static inline void kit_step(Kit *kit, const double force[][3]) {
+    kit_inverse_inertia(kit);
+    kit_free(kit, force);
+    kit_solve(kit);
+    kit_advance(kit);
+}
+
+/* Makes the present state of the problem a random one: posture, twist, memory, a coupled inverse inertia of random rank. */
+static inline void kit_random_inertia(Kit *kit, uint64_t *random, int rank) {
+    int n = 6 * kit->feet;
+    double G[12][12];
+    kit_inverse_inertia(kit);
+    if (rank >= n && kit->feet == 1) return;
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k < rank; k++) G[i][k] = kit_uniform(random, -0.3, 0.3) * (i % 6 >= 3 ? 3.0 : 1.0);
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            double sum = rank < n ? 0.0 : kit->input.inverse_inertia[i * n + j];
+            for (int k = 0; k < rank; k++) sum += G[i][k] * G[j][k];
+            kit->input.inverse_inertia[i * n + j] = sum;
+        }
+}
+
+static inline void kit_random_state(Kit *kit, uint64_t *random) {
+    for (int f = 0; f < kit->feet; f++) {
+        kit->mass[f] = exp(kit_uniform(random, log(1.0), log(40.0)));
+        kit->inertia[f] = kit->mass[f] * kit_uniform(random, 0.002, 0.1);
+        kit->center[f][0] = kit_uniform(random, -0.05, 0.1);
+        kit->center[f][1] = kit_uniform(random, -0.05, 0.05);
+        kit->center[f][2] = kit_uniform(random, -0.02, 0.5);
+        double tilt = kit_uniform(random, 0.0, 1.0) < 0.3 ? 0.0 : 0.25;
+        double turn[3] = {kit_uniform(random, -tilt, tilt), kit_uniform(random, -tilt, tilt), kit_uniform(random, -3.0, 3.0)};
+        double R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+        kit_rotate(R, turn);
+        memcpy(kit->input.rotation[f], R, sizeof R);
+        double drop = R[6] * 0.06 + R[8] * KIT_SOLE_Z; /* height of the sole's middle below the ankle */
+        kit->input.position[f][2] = -drop - kit_uniform(random, -0.003, 0.025);
+        double fast = kit_uniform(random, 0.0, 1.0) < 0.3 ? 0.01 : 1.0;
+        for (int k = 0; k < 3; k++) {
+            kit->input.velocity[f][k] = fast * kit_uniform(random, -0.5, 0.5);
+            kit->input.velocity[f][3 + k] = fast * kit_uniform(random, -2.0, 2.0);
+        }
+    }
+}
+
+#endif

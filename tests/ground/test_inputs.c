@@ -1,0 +1,175 @@
+/* Fields, terrain and sole: what is refused, and that the message names the field. */
+#include "ground_kit.h"
+
+typedef struct {
+    double range[2];
+    int count, flag;
+    uint64_t seed;
+    char name[8];
+} Sample;
+
+static const MildField sample_fields[] = {
+    MILD_FIELD(Sample, range, MILD_FIELD_DOUBLE, 2, -1.0, 1.0, "[m] a range"),
+    MILD_FIELD(Sample, count, MILD_FIELD_INT, 1, 0, 9, "[-] a count"),
+    MILD_FIELD(Sample, flag, MILD_FIELD_BOOL, 1, 0, 1, "[-] a switch"),
+    MILD_FIELD(Sample, seed, MILD_FIELD_UINT64, 1, 0, 1.9e19, "[-] a seed"),
+    MILD_FIELD(Sample, name, MILD_FIELD_TEXT, 8, 0, 0, "[-] a name"),
+};
+#define SAMPLE_FIELDS 5
+
+static void test_field_parse(void **state) {
+    (void)state;
+    static const char *const good[SAMPLE_FIELDS] = {" 0.1, -0.25", "7", "yes", "18446744073709551615", "abc def"};
+    static const char *const bad[][2] = {{"range", "0.1"},    {"range", "0.1 0.2 0.3"}, {"range", "0.1 x"}, {"range", "nan 0"},
+                                         {"range", "0.1 2"},  {"range", "0.1 0.2z"},    {"range", ""},      {"count", "1.5"},
+                                         {"count", "10"},     {"count", "99999999999"}, {"flag", "2"},      {"flag", "maybe"},
+                                         {"seed", "-1"},      {"name", "too long a name"}};
+    Sample sample = {{0, 0}, 0, 0, 0, ""};
+    MildError error;
+    for (int i = 0; i < SAMPLE_FIELDS; i++)
+        assert_int_equal(mild_field_parse(&sample_fields[i], &sample, good[i], "s", &error), MILD_OK);
+    assert_true(sample.range[0] == 0.1 && sample.range[1] == -0.25 && sample.count == 7 && sample.flag == 1);
+    assert_true(sample.seed == UINT64_MAX);
+    assert_string_equal(sample.name, "abc def");
+    Sample before = sample;
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        const MildField *field = mild_field_find(sample_fields, SAMPLE_FIELDS, bad[i][0], NULL);
+        assert_true(mild_field_parse(field, &sample, bad[i][1], "s", &error) != MILD_OK);
+        assert_non_null(strstr(error.text, bad[i][0]));
+        assert_memory_equal(&before, &sample, sizeof sample);
+    }
+}
+
+static void test_field_print(void **state) {
+    (void)state;
+    uint64_t random = 3;
+    MildError error;
+    char text[64], small[4];
+    for (int i = 0; i < 2000; i++) {
+        Sample sample = {{kit_uniform(&random, -1, 1), 1.0 / (3 + i)}, i % 10, i % 2, (uint64_t)i << 50, "n"}, back = {0};
+        for (int f = 0; f < SAMPLE_FIELDS; f++) {
+            int length = mild_field_print(&sample_fields[f], &sample, text, sizeof text);
+            assert_int_equal(length, (int)strlen(text));
+            assert_int_equal(mild_field_parse(&sample_fields[f], &back, text, "s", &error), MILD_OK);
+            assert_int_equal(mild_field_print(&sample_fields[f], &sample, small, sizeof small), length);
+        }
+        assert_true(back.range[0] == sample.range[0] && back.range[1] == sample.range[1] && back.seed == sample.seed);
+    }
+}
+
+static void test_field_find(void **state) {
+    (void)state;
+    const char *nearest;
+    assert_null(mild_field_find(mild_material_fields, mild_material_field_count, "kpen", &nearest));
+    assert_string_equal(nearest, "k_pen");
+    assert_null(mild_field_find(mild_material_fields, mild_material_field_count, "recovry", &nearest));
+    assert_string_equal(nearest, "recovery");
+    assert_non_null(mild_field_find(mild_material_fields, mild_material_field_count, "mu", &nearest));
+}
+
+static void test_material_refused(void **state) {
+    (void)state;
+    for (int f = 0; f < mild_material_field_count; f++) {
+        const MildField *field = &mild_material_fields[f];
+        if (field->type != MILD_FIELD_DOUBLE) continue;
+        const double bad[3] = {NAN, field->max * 1.01 + 1.0, INFINITY};
+        for (int i = 0; i < 3; i++) {
+            MildMaterial m = mild_material_default();
+            MildError error = {0};
+            memcpy((char *)&m + field->offset, &bad[i], sizeof bad[i]);
+            assert_int_equal(mild_material_check(&m, &error), MILD_ERROR_RANGE);
+            assert_non_null(strstr(error.text, field->name));
+        }
+    }
+}
+
+static void test_terrain(void **state) {
+    (void)state;
+    MildMaterial m = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&m);
+    MildError error = {0};
+    terrain.materials[1] = m;
+    terrain.material_count = 2;
+    MildPatch strip = {1.0, 2.0, -INFINITY, INFINITY, 1};
+    assert_int_equal(mild_terrain_add_patch(&terrain, &strip, &error), MILD_OK);
+    assert_int_equal(mild_terrain_material_at(&terrain, 0.999, 5.0), 0);
+    assert_int_equal(mild_terrain_material_at(&terrain, 1.0, 5.0), 1);
+    assert_int_equal(mild_terrain_material_at(&terrain, 2.0, 5.0), 0);
+    const struct {
+        MildPatch patch;
+        const char *names;
+    } bad[] = {{{3, 3, 0, 1, 1}, "x_min"}, {{NAN, 4, 0, 1, 1}, "x_min"}, {{3, 4, 1, 0, 1}, "y_min"}, {{3, 4, 0, NAN, 1}, "y_m"},
+               {{3, 4, 0, 1, 2}, "material"}, {{3, 4, 0, 1, -1}, "material"}, {{1.5, 4, 0, 1, 1}, "overlaps"}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_true(mild_terrain_add_patch(&terrain, &bad[i].patch, &error) != MILD_OK);
+        assert_non_null(strstr(error.text, bad[i].names));
+        assert_int_equal(terrain.patch_count, 1);
+    }
+    for (int i = 1; i < MILD_PATCHES_MAX; i++) {
+        MildPatch patch = {2.0 + i, 3.0 + i, 0.0, 1.0, 1};
+        assert_int_equal(mild_terrain_add_patch(&terrain, &patch, &error), MILD_OK);
+    }
+    MildPatch last = {90.0, 91.0, 0.0, 1.0, 1};
+    assert_true(mild_terrain_add_patch(&terrain, &last, &error) != MILD_OK);
+    assert_non_null(strstr(error.text, "patch_count"));
+}
+
+static void test_sole_counts(void **state) {
+    (void)state;
+    for (int target = 0; target <= 77; target += 77) {
+        MildSole *left = kit_sole(0, target), *right = kit_sole(1, target);
+        int n = mild_sole_elements(left);
+        print_message("sole with target %d: %d elements, %.4f m^2\n", target, n, n * KIT_PITCH * KIT_PITCH);
+        assert_int_equal(n, mild_sole_elements(right));
+        assert_int_equal(n, target ? target : 64);
+        for (int i = 0; i < n; i++) { /* the right sole mirrors the left one */
+            int found = 0;
+            for (int j = 0; j < n; j++)
+                found += fabs(mild_sole_x(left)[i] - mild_sole_x(right)[j]) < 1e-9 &&
+                         fabs(mild_sole_y(left)[i] + mild_sole_y(right)[j]) < 1e-9;
+            assert_int_equal(found, 1);
+        }
+        mild_sole_destroy(left);
+        mild_sole_destroy(right);
+    }
+    for (int n = 1; n <= 90; n++) {
+        double box[8] = {-0.075, -0.045, 0.195, -0.045, 0.195, 0.055, -0.075, 0.055};
+        MildSoleDef def = {box, 4, KIT_PITCH, KIT_SOLE_Z, n};
+        MildError error = {0};
+        MildSole *sole = mild_sole_create(&def, &error);
+        if (!sole) {
+            assert_true(n > 77);
+            assert_non_null(strstr(error.text, "target_elements"));
+            continue;
+        }
+        assert_int_equal(mild_sole_elements(sole), n);
+        mild_sole_destroy(sole);
+    }
+}
+
+static void test_sole_refused(void **state) {
+    (void)state;
+    double square[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1}, bow[8] = {0, 0, 0.1, 0.1, 0.1, 0, 0, 0.12};
+    double line[8] = {0, 0, 0.1, 0, 0.2, 0, 0.3, 0}, nan[8] = {0, 0, NAN, 0, 0.1, 0.1, 0, 0.1};
+    const struct {
+        MildSoleDef def;
+        const char *names;
+    } bad[] = {{{square, 2, KIT_PITCH, 0, 0}, "points"},      {{NULL, 4, KIT_PITCH, 0, 0}, "points"},
+               {{square, 4, 0.0, 0, 0}, "pitch"},             {{square, 4, NAN, 0, 0}, "pitch"},
+               {{square, 4, KIT_PITCH, NAN, 0}, "sole_z"},    {{square, 4, KIT_PITCH, 0, -1}, "target_elements"},
+               {{square, 4, KIT_PITCH, 0, 500}, "target_elements"}, {{bow, 4, KIT_PITCH, 0, 0}, "outline"},
+               {{line, 4, KIT_PITCH, 0, 0}, "outline"},       {{nan, 4, KIT_PITCH, 0, 0}, "outline"}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        MildError error = {0};
+        assert_null(mild_sole_create(&bad[i].def, &error));
+        assert_non_null(strstr(error.text, bad[i].names));
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_field_parse),      cmocka_unit_test(test_field_print), cmocka_unit_test(test_field_find),
+        cmocka_unit_test(test_material_refused), cmocka_unit_test(test_terrain),     cmocka_unit_test(test_sole_counts),
+        cmocka_unit_test(test_sole_refused)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

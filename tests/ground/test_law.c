@@ -1,0 +1,112 @@
+/* Element law, materials and static sinkage. */
+#include "ground_kit.h"
+
+/* S_flat and S_cone as the paper prints them, the flat one frozen at zero once the cone is complete. */
+static void areas(const MildMaterial *m, double u, double *flat, double *cone) {
+    double pi = acos(-1.0), R = KIT_PITCH / sqrt(pi), r = fmax(R - m->nu * u / tan(m->alpha), 0.0);
+    *flat = pi * r * r;
+    *cone = (pi * R * R - *flat) / cos(m->alpha);
+}
+
+static void quadrature(const MildMaterial *m, double u, double *force, double *added_mass) {
+    enum { PANELS = 4000 };
+    double sum_flat = 0.0, sum_cone = 0.0, h = u / PANELS, area = KIT_PITCH * KIT_PITCH;
+    for (int i = 0; i <= PANELS; i++) {
+        double flat, cone, weight = (i == 0 || i == PANELS) ? 1.0 : (i % 2 ? 4.0 : 2.0);
+        areas(m, i * h, &flat, &cone);
+        sum_flat += weight * flat * h / 3.0;
+        sum_cone += weight * cone * h / 3.0;
+    }
+    *force = m->k_pen / area * sum_flat + m->sigma_cone * sum_cone;
+    *added_mass = m->c_g * m->phi * m->rho * m->nu * sum_flat;
+}
+
+static void test_quadrature(void **state) {
+    (void)state;
+    uint64_t random = 1;
+    double worst = 0.0, worst_slope = 0.0;
+    for (int draw = 0; draw < 500; draw++) {
+        MildMaterial m = kit_material(&random);
+        m.passive = 0;
+        double u = kit_uniform(&random, 0.0, 0.1), force, mass, h = 1e-6;
+        quadrature(&m, u, &force, &mass);
+        MildElementLaw law = mild_element_law(&m, KIT_PITCH, u), up = mild_element_law(&m, KIT_PITCH, u + h);
+        worst = fmax(worst, fabs(law.force - force) / (fabs(force) + 1e-6));
+        worst = fmax(worst, fabs(law.added_mass - mass) / (fabs(mass) + 1e-6));
+        if (u + h > m.bed_depth) continue;
+        worst_slope = fmax(worst_slope, fabs((up.force - law.force) / h - law.stiffness) / law.stiffness);
+        double rate = (up.added_mass - law.added_mass) / h;
+        worst_slope = fmax(worst_slope, fabs(rate - law.added_mass_per_depth) / (fabs(m.c_g * m.rho * KIT_PITCH * KIT_PITCH) + 1e-9));
+    }
+    print_message("law against quadrature: worst relative %.1e, slopes %.1e\n", worst, worst_slope);
+    assert_true(worst < 1e-6);
+    assert_true(worst_slope < 2e-3);
+}
+
+static void test_vector(void **state) {
+    (void)state;
+    MildMaterial m = mild_material_default();
+    m.k_pen = 380.25;
+    m.sigma_cone = 0.15e6;
+    m.alpha = acos(-1.0) / 3.0;
+    m.nu = 2.0;
+    const double depth[4] = {0.005, 0.010, 0.020, 0.040}, force[4] = {1.325, 1.986, 3.127, 5.408};
+    double worst = 0.0;
+    for (int i = 0; i < 4; i++) worst = fmax(worst, fabs(mild_element_law(&m, KIT_PITCH, depth[i]).force - force[i]));
+    print_message("test vector: worst %.2e N, late slope %.3f N/m\n", worst, mild_element_law(&m, KIT_PITCH, 0.03).stiffness);
+    assert_true(worst < 6e-4);
+    assert_float_equal(mild_element_law(&m, KIT_PITCH, 0.03).stiffness, 114.08, 6e-3);
+    assert_float_equal(mild_element_law(&m, KIT_PITCH, 0.0).stiffness, 380.25, 1e-9);
+    assert_true(mild_element_law(&m, KIT_PITCH, 0.0).force == 0.0);
+    double tiny = mild_element_law(&m, KIT_PITCH, 1e-12).force / 1e-12;
+    assert_true(fabs(tiny / 380.25 - 1.0) < 1e-9);
+}
+
+static void test_firm_bed(void **state) {
+    (void)state;
+    MildMaterial m = mild_material_default();
+    double above = mild_element_law(&m, KIT_PITCH, m.bed_depth).force;
+    double below = mild_element_law(&m, KIT_PITCH, m.bed_depth + 0.001).force;
+    print_message("one millimetre into the bed: %.1f N more\n", below - above);
+    assert_true(below - above > 15.0);
+}
+
+static double sinkage(const MildMaterial *m, double load) {
+    double low = 0.0, high = 0.3;
+    for (int i = 0; i < 80; i++) {
+        double middle = 0.5 * (low + high);
+        if (mild_element_law(m, KIT_PITCH, middle).force < load) low = middle;
+        else high = middle;
+    }
+    return 1e3 * low;
+}
+
+static void test_presets(void **state) {
+    (void)state;
+    static const struct {
+        const char *name;
+        double two, one, tolerance;
+    } table[] = {{"rubber", 1.9, 3.8, 0.1},     {"foam60", 3.3, 7.7, 0.1},    {"foam45", 8, 25, 0.5},
+                 {"foam28", 23, 49, 0.6},       {"foam25", 28, 58, 0.6},      {"grass", 6, 17.5, 0.5},
+                 {"sand_loose", 15, 37, 0.5},   {"sand_dense", 5, 17, 0.5}};
+    assert_int_equal(mild_material_preset_count(), 8);
+    for (int i = 0; i < 8; i++) {
+        MildMaterial m;
+        MildError error;
+        assert_string_equal(mild_material_preset_name(i), table[i].name);
+        assert_true(mild_material_preset(table[i].name, &m));
+        assert_int_equal(mild_material_check(&m, &error), MILD_OK);
+        double weight = 40.0 * KIT_GRAVITY, two = sinkage(&m, weight / 154.0), one = sinkage(&m, weight / 77.0);
+        print_message("%-10s sinks %5.2f / %5.2f mm (table %.1f / %.1f)\n", table[i].name, two, one, table[i].two, table[i].one);
+        assert_true(fabs(two - table[i].two) < table[i].tolerance && fabs(one - table[i].one) < table[i].tolerance);
+    }
+    MildMaterial m;
+    assert_false(mild_material_preset("rigid", &m));
+    assert_null(mild_material_preset_name(8));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_quadrature), cmocka_unit_test(test_vector),
+                                       cmocka_unit_test(test_firm_bed), cmocka_unit_test(test_presets)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
