@@ -1,0 +1,418 @@
+/* The contact problem: both solvers against each other and against a dense slow reference; symmetries; purity. */
+#include "ground_kit.h"
+
+static MildSole *soles[4]; /* left 77, right 77, one element, plate of six */
+
+static int open_soles(void **state) {
+    (void)state;
+    soles[0] = kit_sole(0, 77);
+    soles[1] = kit_sole(1, 77);
+    soles[2] = kit_plate(1, 1);
+    soles[3] = kit_plate(3, 2);
+    return 0;
+}
+
+static int close_soles(void **state) {
+    (void)state;
+    for (int i = 0; i < 4; i++) mild_sole_destroy(soles[i]);
+    return 0;
+}
+
+/* A random problem with a history; false when nothing touches. */
+static int random_problem(Kit *kit, uint64_t *random, int small) {
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    MildMaterial m = kit_material(random);
+    int feet = 1 + kit_index(random, 2);
+    MildSole *left = small ? soles[2 + kit_index(random, 2)] : soles[0], *right = small ? soles[2 + kit_index(random, 2)] : soles[1];
+    kit_open(kit, feet, left, right, &m, steps[kit_index(random, 3)]);
+    kit_random_state(kit, random);
+    int history = kit_index(random, 10), n = 6 * feet;
+    for (int s = 0; s < history; s++) kit_step(kit, NULL);
+    int rank = kit_uniform(random, 0.0, 1.0) < 0.3 ? 1 + kit_index(random, n - 1) : n;
+    kit_random_inertia(kit, random, rank);
+    kit_free(kit, NULL);
+    if (rank < n) /* a guided foot moves freely only where its guide lets it */
+        for (int i = 0; i < n; i++) {
+            kit->input.free_velocity[i] = kit->input.velocity[i / 6][i % 6];
+            for (int j = 0; j < n; j++)
+                kit->input.free_velocity[i] += kit->input.inverse_inertia[i * n + j] * 100.0 * kit->input.dt * sin(i + 3.0 * j);
+        }
+    kit_solve(kit);
+    return kit->result.foot[0].contacts + kit->result.foot[1].contacts > 0;
+}
+
+static double twist_difference(const Kit *kit, const double *a, const double *b) {
+    double difference = 0.0, size = 1e-3;
+    for (int i = 0; i < 6 * kit->feet; i++) {
+        difference = fmax(difference, fabs(a[i] - b[i]));
+        size = fmax(size, fmax(fabs(a[i]), fabs(kit->input.velocity[i / 6][i % 6])));
+    }
+    return difference / size;
+}
+
+static void test_newton_converges(void **state) {
+    (void)state;
+    uint64_t random = 21;
+    int problems = 0, failed = 0, most = 0;
+    double total = 0.0, pull = 0.0, excess = 0.0;
+    for (int t = 0; t < 6000; t++) {
+        Kit kit;
+        if (random_problem(&kit, &random, t % 4 == 0)) {
+            problems++;
+            failed += !kit.result.converged;
+            most = kit.result.iterations > most ? kit.result.iterations : most;
+            total += kit.result.iterations;
+            for (int f = 0; f < kit.feet; f++) {
+                MildElements e = mild_scratch_elements(kit.scratch, f);
+                for (int i = 0; i < mild_sole_elements(kit.soles[f]); i++) {
+                    pull = fmin(pull, e.normal[i]);
+                    if (e.depth[i] <= 0.0) /* no drift resistance: Coulomb's bound alone */
+                        excess = fmax(excess, hypot(e.tangent_x[i], e.tangent_y[i]) - kit.terrain.materials[0].mu * e.normal[i]);
+                }
+            }
+        }
+        kit_close(&kit);
+    }
+    print_message("newton: %d problems, %d not converged, %.1f iterations in the mean, %d at most; pull %.1e N, beyond the cone %.1e N\n",
+                  problems, failed, total / problems, most, -pull, excess);
+    assert_true(problems > 4000);
+    assert_true(failed * 500 < problems);
+    assert_true(pull >= 0.0);
+    assert_true(excess < 1e-6);
+}
+
+static void test_solvers_agree(void **state) {
+    (void)state;
+    uint64_t random = 22;
+    int compared = 0, slow = 0;
+    double worst = 0.0;
+    for (int t = 0; t < 250; t++) {
+        Kit kit;
+        if (random_problem(&kit, &random, t % 2) && kit.result.converged) {
+            MildContactResult newton = kit.result;
+            kit.input.solver = MILD_SOLVER_GAUSS_SEIDEL;
+            kit.input.max_iterations = 2000;
+            kit.input.tolerance = 1e-12;
+            kit_solve(&kit);
+            if (kit.result.converged) {
+                double difference = twist_difference(&kit, newton.velocity, kit.result.velocity);
+                worst = fmax(worst, difference);
+                compared++;
+            } else {
+                slow++;
+            }
+        }
+        kit_close(&kit);
+    }
+    print_message("newton against sweeps: %d problems, worst twist difference %.1e; %d need more than 2000 sweeps\n", compared,
+                  worst, slow);
+    assert_true(compared > 100);
+    assert_true(worst < 1e-6);
+}
+
+/* ---- dense slow reference: explicit 3N impulses, damped fixed point on the law itself, seen only through solve ---- */
+
+/* Velocity of every element from the impulses of all, by the double sum that the paper prints (eq 8). */
+static void dense_velocities(const Kit *kit, int f_of[], double p[][3], double impulse[][3], int count, double velocity[][3]) {
+    int n = 6 * kit->feet;
+    for (int i = 0; i < count; i++) {
+        double V[6];
+        for (int k = 0; k < 6; k++) V[k] = kit->input.free_velocity[6 * f_of[i] + k];
+        for (int j = 0; j < count; j++) {
+            double lever[3], wrench[6];
+            kit_cross(p[j], impulse[j], lever);
+            for (int k = 0; k < 3; k++) {
+                wrench[k] = impulse[j][k];
+                wrench[3 + k] = lever[k];
+            }
+            for (int k = 0; k < 6; k++)
+                for (int c = 0; c < 6; c++)
+                    V[k] += kit->input.inverse_inertia[(6 * f_of[i] + k) * n + 6 * f_of[j] + c] * wrench[c];
+        }
+        double turn[3];
+        kit_cross(V + 3, p[i], turn);
+        for (int k = 0; k < 3; k++) velocity[i][k] = V[k] + turn[k];
+    }
+}
+
+/* Virgin, memoryless ground without added mass or drift, feet slow before the step: the law is short enough to be written
+ * again from physics: I_z = dt (mean of F_g over the part of the step inside the ground), Coulomb friction with stick. */
+static double reference_normal(const MildMaterial *m, double dt, double u0, double w) {
+    double u1 = u0 + dt * w, a = fmax(u0, 0.0);
+    if (u1 <= a) { /* unloading line */
+        if (u0 <= 0.0) return 0.0;
+        MildElementLaw law = mild_element_law(m, KIT_PITCH, a);
+        double line = fmax(law.force / fmax(m->recovery * a, fmin(1e-4, a)), law.stiffness);
+        return fmax(0.0, dt * (law.force + line * (u1 - a)));
+    }
+    double sum = 0.0;
+    for (int i = 0; i < 3; i++) {
+        static const double node[3] = {-0.7745966692414834, 0.0, 0.7745966692414834}, weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+        sum += weight[i] * mild_element_law(m, KIT_PITCH, 0.5 * (a + u1) + 0.5 * (u1 - a) * node[i]).force;
+    }
+    return dt * sum * (u1 - a) / (u1 - fmin(u0, a));
+}
+
+static void test_dense_reference(void **state) {
+    (void)state;
+    uint64_t random = 23;
+    double worst = 0.0;
+    int compared = 0;
+    for (int t = 0; t < 60; t++) {
+        MildMaterial m = kit_material(&random);
+        m.c_g = 0.0;
+        m.b_drift = m.k_drift = 0.0;
+        Kit kit;
+        kit_open(&kit, 1 + t % 2, soles[3], soles[2], &m, t % 3 ? 1e-3 : 5e-3);
+        kit_random_state(&kit, &random);
+        for (int f = 0; f < kit.feet; f++) { /* slow: below the speed where chi acts */
+            for (int k = 0; k < 6; k++) kit.input.velocity[f][k] *= 0.01;
+            kit.input.position[f][2] = -KIT_SOLE_Z - 0.004;
+        }
+        kit_random_inertia(&kit, &random, 6 * kit.feet);
+        kit_free(&kit, NULL);
+        for (int i = 0; i < 6 * kit.feet; i++) kit.input.free_velocity[i] += kit_uniform(&random, -0.3, 0.3);
+        kit_solve(&kit);
+        enum { MOST = 16, SWEEPS = 60000 };
+        int count = 0, f_of[MOST];
+        double p[MOST][3], u0[MOST], impulse[MOST][3] = {{0}}, velocity[MOST][3], change = 1.0;
+        for (int f = 0; f < kit.feet; f++) {
+            MildElements e = mild_scratch_elements(kit.scratch, f);
+            for (int i = 0; i < mild_sole_elements(kit.soles[f]); i++, count++) {
+                f_of[count] = f;
+                u0[count] = e.depth[i];
+                p[count][0] = e.point_x[i] - kit.input.position[f][0];
+                p[count][1] = e.point_y[i] - kit.input.position[f][1];
+                p[count][2] = e.point_z[i] - kit.input.position[f][2];
+            }
+        }
+        double heaviest = 0.0; /* largest diagonal of G bounds the step of the relaxed fixed point */
+        for (int i = 0; i < count; i++)
+            for (int k = 0; k < 3; k++) {
+                double unit[MOST][3] = {{0}}, zero[MOST][3] = {{0}}, a[MOST][3], b[MOST][3];
+                unit[i][k] = 1.0;
+                dense_velocities(&kit, f_of, p, unit, count, a);
+                dense_velocities(&kit, f_of, p, zero, count, b);
+                heaviest = fmax(heaviest, a[i][k] - b[i][k]);
+            }
+        double relax = 0.7 / (heaviest * count);
+        for (int s = 0; s < SWEEPS && change > 1e-15; s++) {
+            dense_velocities(&kit, f_of, p, impulse, count, velocity);
+            change = 0.0;
+            for (int i = 0; i < count; i++) {
+                double target = reference_normal(&m, kit.input.dt, u0[i], -velocity[i][2]), old = impulse[i][2];
+                double slope = (reference_normal(&m, kit.input.dt, u0[i], -velocity[i][2] + 1e-6) - target) / 1e-6;
+                impulse[i][2] += (target - old) * relax / (relax + slope + 1e-12) * (slope > relax ? 1.0 : 0.5);
+                double x = impulse[i][0] - relax * velocity[i][0], y = impulse[i][1] - relax * velocity[i][1];
+                double scale = fmin(1.0, m.mu * impulse[i][2] / fmax(hypot(x, y), 1e-300));
+                change = fmax(change, fabs(impulse[i][2] - old) + hypot(x * scale - impulse[i][0], y * scale - impulse[i][1]));
+                impulse[i][0] = x * scale;
+                impulse[i][1] = y * scale;
+            }
+        }
+        if (change <= 1e-13 && kit.result.converged) {
+            compared++;
+            dense_velocities(&kit, f_of, p, impulse, count, velocity);
+            for (int i = 0; i < count; i++) {
+                double turn[3];
+                const double *V = kit.result.velocity + 6 * f_of[i];
+                kit_cross(V + 3, p[i], turn);
+                for (int k = 0; k < 3; k++) worst = fmax(worst, fabs(V[k] + turn[k] - velocity[i][k]));
+            }
+        }
+        kit_close(&kit);
+    }
+    print_message("newton against the dense reference: %d problems, worst element velocity difference %.1e m/s\n", compared, worst);
+    assert_true(compared > 20);
+    assert_true(worst < 3e-6); /* the stick region's width is 1e-6 m/s */
+}
+
+/* ---- invariances ---- */
+
+static void turn_vector(double *v, double c, double s) {
+    double x = c * v[0] - s * v[1], y = s * v[0] + c * v[1];
+    v[0] = x;
+    v[1] = y;
+}
+
+/* The same problem seen from axes turned about z (or mirrored in y) must give the turned answer. */
+static void test_symmetry(void **state) {
+    (void)state;
+    uint64_t random = 24;
+    double worst_turn = 0.0, worst_mirror = 0.0;
+    for (int t = 0; t < 300; t++) {
+        MildMaterial m = kit_material(&random);
+        Kit a, b;
+        kit_open(&a, 2, soles[0], soles[1], &m, 1e-3);
+        kit_random_state(&a, &random);
+        kit_inverse_inertia(&a);
+        kit_free(&a, NULL);
+        kit_solve(&a);
+        kit_open(&b, 2, soles[0], soles[1], &m, 1e-3);
+        b.input = a.input;
+        memcpy(b.mass, a.mass, sizeof a.mass);
+        memcpy(b.inertia, a.inertia, sizeof a.inertia);
+        memcpy(b.center, a.center, sizeof a.center);
+        double angle = kit_uniform(&random, -3.0, 3.0), c = cos(angle), s = sin(angle), turn[3] = {0, 0, angle};
+        for (int f = 0; f < 2; f++) {
+            turn_vector(b.input.position[f], c, s);
+            kit_rotate(b.input.rotation[f], turn);
+            turn_vector(b.input.velocity[f], c, s);
+            turn_vector(b.input.velocity[f] + 3, c, s);
+        }
+        kit_inverse_inertia(&b);
+        kit_free(&b, NULL);
+        kit_solve(&b);
+        if (a.result.converged && b.result.converged) {
+            double expected[12];
+            memcpy(expected, a.result.velocity, sizeof expected);
+            for (int k = 0; k < 4; k++) turn_vector(expected + 3 * k, c, s);
+            worst_turn = fmax(worst_turn, twist_difference(&b, expected, b.result.velocity));
+        }
+        kit_close(&b);
+        /* Mirror: foot 0 takes foot 1's place; the right sole is the left one's image. */
+        kit_open(&b, 2, soles[0], soles[1], &m, 1e-3);
+        for (int f = 0; f < 2; f++) {
+            int g = 1 - f;
+            b.mass[f] = a.mass[g];
+            b.inertia[f] = a.inertia[g];
+            for (int k = 0; k < 3; k++) {
+                double sign = k == 1 ? -1.0 : 1.0;
+                b.center[f][k] = sign * a.center[g][k];
+                b.input.position[f][k] = sign * a.input.position[g][k];
+                b.input.velocity[f][k] = sign * a.input.velocity[g][k];
+                b.input.velocity[f][3 + k] = -sign * a.input.velocity[g][3 + k];
+                for (int j = 0; j < 3; j++)
+                    b.input.rotation[f][3 * k + j] = sign * (j == 1 ? -1.0 : 1.0) * a.input.rotation[g][3 * k + j];
+            }
+        }
+        kit_inverse_inertia(&b);
+        kit_free(&b, NULL);
+        kit_solve(&b);
+        if (a.result.converged && b.result.converged) {
+            double expected[12];
+            for (int f = 0; f < 2; f++)
+                for (int k = 0; k < 3; k++) {
+                    double sign = k == 1 ? -1.0 : 1.0;
+                    expected[6 * f + k] = sign * a.result.velocity[6 * (1 - f) + k];
+                    expected[6 * f + 3 + k] = -sign * a.result.velocity[6 * (1 - f) + 3 + k];
+                }
+            worst_mirror = fmax(worst_mirror, twist_difference(&b, expected, b.result.velocity));
+        }
+        kit_close(&a);
+        kit_close(&b);
+    }
+    print_message("symmetry: worst twist difference turned %.1e, mirrored %.1e\n", worst_turn, worst_mirror);
+    assert_true(worst_turn < 1e-6 && worst_mirror < 1e-6);
+}
+
+/* The outline drawn the other way round and mirrored columns change the order of the elements, not the answer: a plate
+ * turned by half a turn in its own frame is the same plate with its elements in reverse order. */
+static void test_element_order(void **state) {
+    (void)state;
+    uint64_t random = 25;
+    double worst = 0.0;
+    MildSole *plate = kit_plate(11, 7);
+    for (int t = 0; t < 200; t++) {
+        MildMaterial m = kit_material(&random);
+        Kit a, b;
+        kit_open(&a, 1, plate, NULL, &m, 1e-3);
+        kit_random_state(&a, &random);
+        kit_inverse_inertia(&a);
+        kit_free(&a, NULL);
+        kit_open(&b, 1, plate, NULL, &m, 1e-3);
+        b.input = a.input;
+        for (int k = 0; k < 3; k++) {
+            b.input.rotation[0][3 * k] *= -1.0;
+            b.input.rotation[0][3 * k + 1] *= -1.0;
+        }
+        kit_solve(&a);
+        kit_solve(&b);
+        if (a.result.converged && b.result.converged)
+            worst = fmax(worst, twist_difference(&a, a.result.velocity, b.result.velocity));
+        kit_close(&a);
+        kit_close(&b);
+    }
+    print_message("element order reversed: worst twist difference %.1e\n", worst);
+    mild_sole_destroy(plate);
+    assert_true(worst < 1e-6);
+}
+
+/* solve reads the memory and may be repeated; scratch carries nothing from one problem to the next. */
+static void test_pure(void **state) {
+    (void)state;
+    uint64_t random = 26;
+    for (int t = 0; t < 200; t++) {
+        Kit kit;
+        random_problem(&kit, &random, 0);
+        kit.input.solver = t % 5 ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL;
+        kit.input.max_iterations = 50;
+        void *before = malloc(kit.bytes);
+        memcpy(before, kit.ground, kit.bytes);
+        kit_solve(&kit);
+        MildContactResult first = kit.result;
+        MildContactInput input = kit.input;
+        kit.input.velocity[0][0] += 0.3; /* another problem in between */
+        kit_solve(&kit);
+        kit.input = input;
+        kit_solve(&kit);
+        assert_memory_equal(before, kit.ground, kit.bytes);
+        assert_memory_equal(&first, &kit.result, sizeof first);
+        MildError error;
+        MildScratch *fresh = mild_scratch_create(kit.soles, kit.feet, &error);
+        mild_ground_solve(kit.ground, &kit.terrain, &kit.input, fresh, &kit.result);
+        assert_memory_equal(&first, &kit.result, sizeof first);
+        mild_scratch_destroy(fresh);
+        free(before);
+        kit_close(&kit);
+    }
+}
+
+/* Wrench, zero moment points and element arrays fit together. */
+static void test_outputs(void **state) {
+    (void)state;
+    uint64_t random = 27;
+    double worst = 0.0, worst_zmp = 0.0;
+    for (int t = 0; t < 500; t++) {
+        Kit kit;
+        if (random_problem(&kit, &random, 0))
+            for (int f = 0; f < kit.feet; f++) {
+                const MildFootResult *r = &kit.result.foot[f];
+                MildElements e = mild_scratch_elements(kit.scratch, f);
+                double sum[6] = {0}, size = 1e-9;
+                for (int i = 0; i < mild_sole_elements(kit.soles[f]); i++) {
+                    double force[3] = {e.tangent_x[i], e.tangent_y[i], e.normal[i]}, torque[3];
+                    double p[3] = {e.point_x[i] - kit.input.position[f][0], e.point_y[i] - kit.input.position[f][1],
+                                   e.point_z[i] - kit.input.position[f][2]};
+                    kit_cross(p, force, torque);
+                    for (int k = 0; k < 3; k++) {
+                        sum[k] += force[k];
+                        sum[3 + k] += torque[k];
+                        size += fabs(force[k]);
+                    }
+                }
+                for (int k = 0; k < 3; k++) {
+                    worst = fmax(worst, fabs(sum[k] - r->force[k]) / size);
+                    worst = fmax(worst, fabs(sum[3 + k] - r->torque[k]) / size);
+                }
+                if (r->contacts == 0) continue;
+                double along[3], F = sqrt(r->force[0] * r->force[0] + r->force[1] * r->force[1] + r->force[2] * r->force[2]);
+                kit_cross(r->zmp_axis, r->force, along); /* what is left of the torque is parallel to the force */
+                double left[3] = {r->torque[0] - along[0], r->torque[1] - along[1], r->torque[2] - along[2]}, cross[3];
+                kit_cross(left, r->force, cross);
+                for (int k = 0; k < 3; k++) worst_zmp = fmax(worst_zmp, fabs(cross[k]) / (F * F));
+            }
+        kit_close(&kit);
+    }
+    print_message("outputs: elements against wrench %.1e, central axis %.1e m\n", worst, worst_zmp);
+    assert_true(worst < 1e-12);
+    assert_true(worst_zmp < 1e-12);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_newton_converges), cmocka_unit_test(test_solvers_agree),
+                                       cmocka_unit_test(test_dense_reference),  cmocka_unit_test(test_symmetry),
+                                       cmocka_unit_test(test_element_order),    cmocka_unit_test(test_pure),
+                                       cmocka_unit_test(test_outputs)};
+    return cmocka_run_group_tests(tests, open_soles, close_soles);
+}

@@ -1,0 +1,254 @@
+/* One foot on the ground over time: published impact depths, no creep, no energy from nothing, memory. */
+#include "ground_kit.h"
+
+/* Choi 2023 set; physics: dK/du = (M g - F_g - 2 c_d m_a' K)/(M + m_a) integrates to these first stops [mm]. */
+static MildMaterial choi(void) {
+    MildMaterial m = mild_material_default();
+    m.k_pen = 1e6 * KIT_PITCH * KIT_PITCH;
+    m.sigma_cone = 0.15e6;
+    m.alpha = acos(-1.0) / 3.0;
+    m.nu = 2.0;
+    m.c_g = 2.7;
+    m.c_d = 17.2;
+    m.phi = 0.57;
+    m.rho = 1000.0;
+    return m;
+}
+
+static double stop_depth(double mass, double dt, double gap) {
+    MildSole *sole = kit_plate(11, 7);
+    MildMaterial m = choi();
+    Kit kit;
+    kit_open(&kit, 1, sole, NULL, &m, dt);
+    kit.mass[0] = mass;
+    kit.inertia[0] = 0.05 * mass;
+    kit.input.position[0][2] += gap;
+    kit.input.velocity[0][2] = -0.5;
+    double deepest = 0.0;
+    for (int s = 0; s < (int)(0.5 / dt) && kit.input.velocity[0][2] < 0.0; s++) {
+        kit_step(&kit, NULL);
+        deepest = fmax(deepest, mild_ground_depth_max(kit.ground, 0)[0]);
+    }
+    kit_close(&kit);
+    mild_sole_destroy(sole);
+    return 1e3 * deepest;
+}
+
+static void test_exact_impact(void **state) {
+    (void)state;
+    static const double mass[3] = {1.0, 3.0, 20.0}, exact[3] = {1.221, 3.384, 38.98}, dt[3] = {0.25e-3, 1e-3, 5e-3};
+    static const double allowed[3] = {0.01, 0.03, 0.08};
+    for (int d = 0; d < 3; d++)
+        for (int i = 0; i < 3; i++) {
+            double worst = 0.0;
+            for (int g = 0; g < 5; g++) { /* the ground is met at different moments of a step */
+                double error = stop_depth(mass[i], dt[d], 0.2 * g * 0.5 * dt[d]) / exact[i] - 1.0;
+                if (fabs(error) > fabs(worst)) worst = error;
+            }
+            print_message("impact %4.0f kg at %.2f ms: stops within %+.2f %% of %.3f mm\n", mass[i], 1e3 * dt[d], 100.0 * worst,
+                          exact[i]);
+            assert_true(fabs(worst) < allowed[d]);
+        }
+}
+
+static void test_no_creep(void **state) {
+    (void)state;
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    MildSole *sole = kit_sole(0, 77);
+    double worst_down = 0.0, worst_side = 0.0;
+    for (int p = 0; p < mild_material_preset_count(); p++)
+        for (int d = 0; d < 3; d++)
+            for (int side = 0; side < 2; side++) {
+                MildMaterial m;
+                mild_material_preset(mild_material_preset_name(p), &m);
+                Kit kit;
+                kit_open(&kit, 1, sole, NULL, &m, steps[d]);
+                kit.center[0][0] = 0.0622;
+                kit.center[0][1] = 0.0035;
+                kit.center[0][2] = KIT_SOLE_Z - 0.005; /* a low weight: a lateral load tilts it little */
+                double start[3], force[1][3] = {{side ? 0.4 * m.mu * 20.0 * KIT_GRAVITY : 0.0, 0.0, 0.0}};
+                int settle = (int)(2.0 / steps[d]), run = (int)(10.0 / steps[d]);
+                for (int s = 0; s < settle; s++) { /* brought to rest by hand: foam and rubber have no damping of their own */
+                    kit_step(&kit, (const double(*)[3])force);
+                    for (int k = 0; k < 6; k++) kit.input.velocity[0][k] *= exp(-30.0 * steps[d]);
+                }
+                memcpy(start, kit.input.position[0], sizeof start);
+                for (int s = 0; s < run; s++) kit_step(&kit, (const double(*)[3])force);
+                double down = fabs(kit.input.position[0][2] - start[2]);
+                double sideways = hypot(kit.input.position[0][0] - start[0], kit.input.position[0][1] - start[1]);
+                if (down > 1e-4 || sideways > 1e-4)
+                    print_message("%s dt %g load %d: %.4f mm down, %.4f mm sideways\n", mild_material_preset_name(p), steps[d],
+                                  side, 1e3 * down, 1e3 * sideways);
+                worst_down = fmax(worst_down, down);
+                worst_side = fmax(worst_side, sideways);
+                kit_close(&kit);
+            }
+    print_message("creep in 10 s: worst %.5f mm down, %.5f mm sideways\n", 1e3 * worst_down, 1e3 * worst_side);
+    mild_sole_destroy(sole);
+    assert_true(worst_down < 1e-4 && worst_side < 1e-4);
+}
+
+/* Work of the ground on the foot over one step, at the mean twist: exactly the change of kinetic energy it causes. */
+static double ground_work(const Kit *kit, int f, const double *before) {
+    const MildFootResult *result = &kit->result.foot[f];
+    double work = 0.0;
+    for (int k = 0; k < 3; k++) {
+        work += 0.5 * kit->input.dt * result->force[k] * (before[k] + kit->result.velocity[6 * f + k]);
+        work += 0.5 * kit->input.dt * result->torque[k] * (before[3 + k] + kit->result.velocity[6 * f + 3 + k]);
+    }
+    return work;
+}
+
+/* Feet thrown and shaken at random until they leave the ground: whatever happened between, the ground has taken energy. */
+static void test_passive(void **state) {
+    (void)state;
+    uint64_t random = 11;
+    MildSole *sole = kit_sole(0, 77);
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    double worst = -INFINITY, worst_share = -INFINITY;
+    int cycles = 0;
+    for (int draw = 0; draw < 3000; draw++) {
+        MildMaterial m = kit_material(&random);
+        Kit kit;
+        double dt = steps[kit_index(&random, 3)];
+        kit_open(&kit, 1, sole, NULL, &m, dt);
+        kit_random_state(&kit, &random);
+        kit.input.position[0][2] += 0.05 + 0.1;
+        double work = 0.0, taken = 0.0, shake[3], spring = kit_uniform(&random, 2.0, 8.0), force[1][3];
+        for (int k = 0; k < 3; k++) shake[k] = kit_uniform(&random, 0.0, 1.0);
+        for (int s = 0; s < (int)(0.6 / dt); s++) {
+            double t = s * dt, before[6];
+            memcpy(before, kit.input.velocity[0], sizeof before);
+            for (int k = 0; k < 3; k++)
+                force[0][k] = kit.mass[0] * KIT_GRAVITY * (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t : shake[k] * sin(20 * t));
+            kit_step(&kit, (const double(*)[3])force);
+            double w = ground_work(&kit, 0, before);
+            work += w;
+            taken += fabs(w);
+            if (kit.result.foot[0].contacts == 0 && mild_ground_depth_max(kit.ground, 0)[0] == 0.0) {
+                int touched = 0;
+                for (int e = 0; e < 77; e++) touched += mild_ground_depth_max(kit.ground, 0)[e] > 0.0;
+                if (touched == 0 && taken > 0.0) { /* a closed cycle */
+                    cycles++;
+                    worst = fmax(worst, work);
+                    if (taken > 1e-6) worst_share = fmax(worst_share, work / taken);
+                    work = taken = 0.0;
+                }
+            }
+        }
+        kit_close(&kit);
+    }
+    print_message("passivity: %d closed cycles, most energy gained %.2e J, share %.2e\n", cycles, worst, worst_share);
+    mild_sole_destroy(sole);
+    assert_true(cycles > 1000);
+    assert_true(worst < 1e-9);
+}
+
+/* A foot moved up and down by hand (A = 0): the work over a closed cycle, force times displacement. */
+static void test_passive_by_hand(void **state) {
+    (void)state;
+    uint64_t random = 13;
+    MildSole *sole = kit_plate(2, 1);
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    double worst = -INFINITY;
+    for (int draw = 0; draw < 3000; draw++) {
+        MildMaterial m = kit_material(&random);
+        Kit kit;
+        double dt = steps[draw % 3], period = kit_uniform(&random, 0.2, 2.0), depth = kit_uniform(&random, 0.002, 0.08);
+        double wobble = kit_uniform(&random, 0.0, 0.3) * depth, z = 0.01, work = 0.0, taken = 0.0;
+        kit_open(&kit, 1, sole, NULL, &m, dt);
+        kit.input.position[0][2] = -KIT_SOLE_Z + z;
+        for (double t = dt; t < period + 0.02; t += dt) {
+            double next = 0.01 - (depth + 0.01) * pow(sin(3.14159 * fmin(t / period, 1.0)), 2.0) + (t < period ? wobble * (1 - cos(50.0 * t)) : 0.0);
+            kit.input.free_velocity[2] = (next - z) / dt;
+            z = next;
+            kit_solve(&kit);
+            kit_advance(&kit);
+            double w = kit.result.foot[0].force[2] * kit.input.velocity[0][2] * dt;
+            work += w;
+            taken += fabs(w);
+        }
+        if (taken > 0.0) worst = fmax(worst, work / taken);
+        kit_close(&kit);
+    }
+    print_message("passivity by hand: largest share of the work given back in excess %.2e\n", worst);
+    mild_sole_destroy(sole);
+    assert_true(worst < 0.0);
+}
+
+static void test_memory(void **state) {
+    (void)state;
+    MildMaterial sand = mild_material_default(), foam;
+    mild_material_preset("foam28", &foam);
+    MildSole *sole = kit_plate(3, 3);
+    double rise[2];
+    for (int i = 0; i < 2; i++) { /* pressed by hand at constant speed: A = 0 makes the foot immovable */
+        Kit kit;
+        kit_open(&kit, 1, sole, NULL, i ? &foam : &sand, 1e-3);
+        double down = 0.0, up = 0.0;
+        for (int s = 0; s < 410; s++) {
+            double speed = s < 200 ? -0.1 : 0.1;
+            kit.input.velocity[0][2] = kit.input.free_velocity[2] = speed;
+            kit_solve(&kit);
+            kit_advance(&kit);
+            if (s < 200) down = kit.result.foot[0].force[2];
+            else if (kit.result.foot[0].force[2] > 0.0) up = 1e-4 * (s - 199);
+        }
+        print_message("%s: %.2f N at 20 mm, pushes back over %.2f mm\n", i ? "foam28" : "sand_loose", down, 1e3 * up);
+        rise[i] = up;
+        for (int e = 0; e < 9; e++) assert_true(mild_ground_depth_max(kit.ground, 0)[e] == 0.0);
+        kit_close(&kit);
+    }
+    assert_true(rise[0] < 3e-4);
+    assert_true(rise[1] > 0.0195);
+    mild_sole_destroy(sole);
+}
+
+/* A foot that slides from one material onto another keeps the law it touched down on. */
+static void test_border(void **state) {
+    (void)state;
+    MildMaterial foam, rubber;
+    mild_material_preset("foam28", &foam);
+    mild_material_preset("rubber", &rubber);
+    MildSole *sole = kit_plate(1, 1);
+    MildError error;
+    Kit kit;
+    kit_open(&kit, 1, sole, NULL, &foam, 1e-3);
+    kit.terrain.materials[1] = rubber;
+    kit.terrain.material_count = 2;
+    assert_int_equal(mild_terrain_add_patch(&kit.terrain, &(MildPatch){0.05, INFINITY, -INFINITY, INFINITY, 1}, &error), MILD_OK);
+    double last = 0.0, jump = 0.0;
+    for (int s = 0; s < 200; s++) {
+        kit.input.velocity[0][2] = kit.input.free_velocity[2] = s < 100 ? -0.1 : 0.0;
+        kit.input.velocity[0][0] = kit.input.free_velocity[0] = s < 100 ? 0.0 : 1.0;
+        kit_solve(&kit);
+        kit_advance(&kit);
+        if (s > 100) jump = fmax(jump, fabs(kit.result.foot[0].force[2] - last));
+        last = kit.result.foot[0].force[2];
+    }
+    print_message("sliding from foam onto rubber: the force jumps by %.2e N\n", jump);
+    assert_true(jump < 1e-9);
+    kit.input.position[0][2] = 0.1;
+    kit.input.velocity[0][2] = kit.input.free_velocity[2] = 0.0;
+    kit_solve(&kit);
+    kit_advance(&kit);
+    kit.input.position[0][2] = -KIT_SOLE_Z;
+    kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.1;
+    for (int s = 0; s < 100; s++) {
+        kit_solve(&kit);
+        kit_advance(&kit);
+    }
+    double expected = mild_element_law(&rubber, KIT_PITCH, 0.01).force;
+    print_message("lifted and set down again: %.2f N, rubber's law %.2f N\n", kit.result.foot[0].force[2], expected);
+    assert_true(fabs(kit.result.foot[0].force[2] / expected - 1.0) < 0.02);
+    kit_close(&kit);
+    mild_sole_destroy(sole);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_exact_impact), cmocka_unit_test(test_memory),
+                                       cmocka_unit_test(test_border), cmocka_unit_test(test_passive),
+                                       cmocka_unit_test(test_passive_by_hand),
+                                       cmocka_unit_test(test_no_creep)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
