@@ -86,7 +86,7 @@ static MildStatus open_case(Bench *bench, int which, double dt, MildError *error
     int elements = mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]);
     RobotState state = robot_stand_state(
         bench->robot, 1, soft ? robot_static_sinkage(&bench->terrain.materials[0], pitch, elements, weight) : 0.0);
-    robot_sim_set_solver(bench->sims[which], which == GAUSS_SEIDEL ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON);
+    robot_sim_set_solver(bench->sims[which], which == GAUSS_SEIDEL ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON, 0, 0);
     robot_sim_load(bench->sims[which], &state, &variation);
     if (which == ENGINE_FREE || which == ENGINE_RIGID) {
         bench->engine[which] = mj_makeData(robot_sim_model(bench->sims[which]));

@@ -61,7 +61,8 @@ const void *robot_visual_model(const Robot *robot);
 /* One per thread. dt: physics step [s], 0.0001 .. 0.01. */
 RobotSim *robot_sim_create(const Robot *robot, double dt, MildError *error);
 void robot_sim_destroy(RobotSim *sim);
-void robot_sim_set_solver(RobotSim *sim, MildSolver solver);
+/* tolerance: relative, 0 = the solver's default; iterations: hard bound, 0 = the solver's default. */
+void robot_sim_set_solver(RobotSim *sim, MildSolver solver, double tolerance, int iterations);
 double robot_sim_dt(const RobotSim *sim);
 
 /* Applies the variation to the workspace's own model (cheap when unchanged) and loads the state; kinematics and foot

@@ -63,8 +63,10 @@ void robot_sim_destroy(RobotSim *sim) {
     free(sim);
 }
 
-void robot_sim_set_solver(RobotSim *sim, MildSolver solver) {
+void robot_sim_set_solver(RobotSim *sim, MildSolver solver, double tolerance, int iterations) {
     sim->input.solver = solver;
+    sim->input.tolerance = tolerance;
+    sim->input.max_iterations = iterations;
 }
 
 double robot_sim_dt(const RobotSim *sim) {
@@ -321,14 +323,14 @@ double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain)
     return least;
 }
 
-/* Component of b - a along the base's lateral axis laid level [m]. */
+/* Component of b - a along the base's lateral axis (to the left) laid level [m]; negative when the legs are crossed. */
 static double lateral_distance(const RobotSim *sim, const double *a, const double *b) {
     const double *turn = robot_sim_base_rotation(sim);
     double x = turn[0], y = turn[3], length = sqrt(x * x + y * y); /* heading: the base's x axis, level */
     if (length < 1e-9) {
         return 0.0;
     }
-    return fabs((-y * (b[0] - a[0]) + x * (b[1] - a[1])) / length);
+    return (-y * (b[0] - a[0]) + x * (b[1] - a[1])) / length;
 }
 
 double robot_sim_knee_distance(const RobotSim *sim) {

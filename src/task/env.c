@@ -8,6 +8,7 @@
 #define RANDOM_USE_START 0x53544152u
 #define RANDOM_USE_PUSH 0x50555348u
 #define CONTACT_FORCE 5.0 /* [N] */
+#define LEGS_CROSSED 0.03 /* [m] lateral distance of the sole centres */
 
 static size_t env_header_bytes(void) {
     return (sizeof(TaskEnv) + 63) / 64 * 64;
@@ -231,8 +232,9 @@ static TaskMotion describe_motion(TaskEnv *env, const TaskDef *def, const Robot 
     return m;
 }
 
+/* Also when a foot has passed through the other leg: the engine computes no contact between them. */
 static int has_fallen(const TaskEnv *env, const TaskDef *def, const RobotSim *sim) {
-    return robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) || robot_sim_body_clearance(sim, &env->terrain) < 0;
+    return robot_sim_foot_distance(sim) < LEGS_CROSSED || robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) || robot_sim_body_clearance(sim, &env->terrain) < 0;
 }
 
 static void advance_clock(TaskEnv *env, const TaskDef *def) {
@@ -263,7 +265,8 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     double torque[ROBOT_JOINTS], terms[TASK_REWARD_COUNT];
     accept_action(env, def, action);
     push_base(env, def);
-    robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL);
+    robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
+                         def->contact_tolerance, def->contact_iterations);
     robot_sim_load(sim, &env->robot, &env->variation);
     int bad = run_physics(env, def, robot, sim, &reading, torque, probe);
     if (!bad) {

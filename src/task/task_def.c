@@ -33,6 +33,8 @@ TaskDef task_def_default(void) {
         .noise_gravity = 0.075,
         .tilt_limit = 1.0,
         .newton = 1,
+        .contact_tolerance = 1e-4,
+        .contact_iterations = 20,
         .reward = {.clip_sum = 1,
                    .nominal_height = 0.83,
                    .clearance_sharpness = 20,
@@ -121,6 +123,8 @@ const MildField task_fields[] = {
     T(noise_gravity, D, 1, 0, 1, "[-] uniform +-"),
     T(tilt_limit, D, 1, 0.1, 3.1, "[rad] the episode ends when the base tilts further"),
     T(newton, B, 1, 0, 1, "[bool] contact solver: the fast one; off: the paper's Gauss-Seidel"),
+    T(contact_tolerance, D, 1, 1e-12, 0.1, "[-] relative residual at which the contact solver stops"),
+    T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000, "[-] hard bound of the contact solver's work"),
 };
 const int task_field_count = sizeof task_fields / sizeof *task_fields;
 

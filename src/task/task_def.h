@@ -86,6 +86,8 @@ typedef struct {
     double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
     double tilt_limit;      /* [rad] */
     int newton;             /* bool: fast solver; off: the paper's sweeps */
+    double contact_tolerance; /* [-] relative residual at which the contact solver stops */
+    int contact_iterations; /* [-] hard bound of its work */
     RewardDef reward;
     RandomizeDef randomize;
 } TaskDef;

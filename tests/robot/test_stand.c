@@ -68,7 +68,7 @@ static Stand stand(const MildMaterial *material, double dt, double seconds, int 
     MildError error = {0};
     RobotSim *sim = robot_sim_create(robot, dt, &error);
     assert_non_null(sim);
-    robot_sim_set_solver(sim, solver);
+    robot_sim_set_solver(sim, solver, 0, 0);
     void *block = calloc(1, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
     assert_non_null(block);
     MildGround *ground = mild_ground_init(block, robot_soles(robot), ROBOT_FEET);
