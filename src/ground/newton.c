@@ -26,8 +26,9 @@ static void point_evaluate(MildScratch *scratch, const MildContactInput *input, 
     point->residual = contact_residual(n, input->inverse_inertia, point->impulse, scratch->wrench);
 }
 
-/* Gaussian elimination with partial pivoting; x holds the right side, then the solution. */
-static int solve_dense(int n, double a[TWIST_MAX][TWIST_MAX], double *x) {
+/* Gaussian elimination with partial pivoting; x holds the right side, then the solution. Inline, so that n is a constant
+ * in each of its two uses. */
+static inline int solve_dense(int n, double a[TWIST_MAX][TWIST_MAX], double *x) {
     for (int k = 0; k < n; k++) {
         int pivot = k;
         for (int i = k + 1; i < n; i++)
@@ -58,21 +59,27 @@ static int solve_dense(int n, double a[TWIST_MAX][TWIST_MAX], double *x) {
 }
 
 /* The law linearised at twist V: W + H (V - V^ - A P) = P, that is (I + H A) P = W + H (V - V^). */
-static int newton_step(const MildScratch *scratch, const MildContactInput *input, int n, const double *twist, double *impulse) {
+static inline int newton_step_of(const MildScratch *scratch, const MildContactInput *input, int n, const double *twist,
+                                 double *impulse) {
     double matrix[TWIST_MAX][TWIST_MAX];
-    memset(matrix, 0, sizeof matrix);
     for (int i = 0; i < n; i++) {
         const double *H = scratch->hessian[i / 6] + 6 * (i % 6);
         int first = i / 6 * 6;
-        double sum = scratch->wrench[i];
+        double sum = scratch->wrench[i], row[TWIST_MAX] = {0.0};
         for (int k = 0; k < 6; k++) {
             sum += H[k] * (twist[first + k] - input->free_velocity[first + k]);
-            for (int j = 0; j < n; j++) matrix[i][j] += H[k] * input->inverse_inertia[(first + k) * n + j];
+            for (int j = 0; j < n; j++) row[j] += H[k] * input->inverse_inertia[(first + k) * n + j];
         }
-        matrix[i][i] += 1.0;
+        row[i] += 1.0;
+        for (int j = 0; j < n; j++) matrix[i][j] = row[j];
         impulse[i] = sum;
     }
     return solve_dense(n, matrix, impulse);
+}
+
+static int newton_step(const MildScratch *scratch, const MildContactInput *input, int n, const double *twist, double *impulse) {
+    return n == 6 ? newton_step_of(scratch, input, 6, twist, impulse)
+                  : newton_step_of(scratch, input, TWIST_MAX, twist, impulse);
 }
 
 static void point_between(int n, const Point *from, const Point *to, double t, Point *point) {

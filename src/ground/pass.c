@@ -94,55 +94,37 @@ static void hessian_linear(const Slots *s, int start, int end, double *H) {
     for (int k = 0; k < 18; k++) H[k] = rows[k];
 }
 
-static void hessian_angular_x(const Slots *s, int start, int end, double *row) {
-    double r0 = 0.0, r1 = 0.0, r2 = 0.0, r3 = 0.0, r4 = 0.0, r5 = 0.0;
-#pragma omp simd reduction(+ : r0, r1, r2, r3, r4, r5)
-    for (int i = start; i < end; i++) {
-        double px = s->px[i], py = s->py[i], pz = s->pz[i], hxy = s->hxy[i], hyy = s->hyy[i], hyz = s->hyz[i];
-        double hzz = s->hzz[i];
-        r0 -= pz * hxy;
-        r1 -= pz * hyy;
-        r2 += py * hzz - pz * hyz;
-        r3 += py * hzz * py - pz * (hyz * py - hyy * pz);
-        r4 -= py * hzz * px + pz * (hxy * pz - hyz * px);
-        r5 -= pz * (hyy * px - hxy * py);
-    }
-    const double values[6] = {r0, r1, r2, r3, r4, r5};
-    for (int k = 0; k < 6; k++) row[k] = values[k];
-}
-
-static void hessian_angular_y(const Slots *s, int start, int end, double *row) {
-    double r0 = 0.0, r1 = 0.0, r2 = 0.0, r3 = 0.0, r4 = 0.0, r5 = 0.0;
-#pragma omp simd reduction(+ : r0, r1, r2, r3, r4, r5)
-    for (int i = start; i < end; i++) {
-        double px = s->px[i], py = s->py[i], pz = s->pz[i], hxx = s->hxx[i], hxy = s->hxy[i], hxz = s->hxz[i];
-        double hzz = s->hzz[i];
-        r0 += pz * hxx;
-        r1 += pz * hxy;
-        r2 += pz * hxz - px * hzz;
-        r3 += pz * (hxz * py - hxy * pz) - px * hzz * py;
-        r4 += pz * (hxx * pz - hxz * px) + px * hzz * px;
-        r5 += pz * (hxy * px - hxx * py);
-    }
-    const double values[6] = {r0, r1, r2, r3, r4, r5};
-    for (int k = 0; k < 6; k++) row[k] = values[k];
-}
-
-static void hessian_angular_z(const Slots *s, int start, int end, double *row) {
-    double r0 = 0.0, r1 = 0.0, r2 = 0.0, r3 = 0.0, r4 = 0.0, r5 = 0.0;
-#pragma omp simd reduction(+ : r0, r1, r2, r3, r4, r5)
+static void hessian_angular(const Slots *s, int start, int end, double *H) {
+    double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0;
+    double b5 = 0.0, c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;
+#pragma omp simd reduction(+ : a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, c0, c1, c2, c3, c4, c5)
     for (int i = start; i < end; i++) {
         double px = s->px[i], py = s->py[i], pz = s->pz[i], hxx = s->hxx[i], hxy = s->hxy[i], hyy = s->hyy[i];
-        double hxz = s->hxz[i], hyz = s->hyz[i];
-        r0 += px * hxy - py * hxx;
-        r1 += px * hyy - py * hxy;
-        r2 += px * hyz - py * hxz;
-        r3 += px * (hyz * py - hyy * pz) - py * (hxz * py - hxy * pz);
-        r4 += px * (hxy * pz - hyz * px) - py * (hxx * pz - hxz * px);
-        r5 += px * (hyy * px - hxy * py) - py * (hxy * px - hxx * py);
+        double hxz = s->hxz[i], hyz = s->hyz[i], hzz = s->hzz[i];
+        double x3 = hxz * py - hxy * pz, x4 = hxx * pz - hxz * px, x5 = hxy * px - hxx * py;
+        double y3 = hyz * py - hyy * pz, y4 = hxy * pz - hyz * px, y5 = hyy * px - hxy * py;
+        double z3 = hzz * py, z4 = hzz * px;
+        a0 += pz * hxy; /* the signs of pz Y are set below */
+        a1 += pz * hyy;
+        a2 += py * hzz - pz * hyz;
+        a3 += py * z3 - pz * y3;
+        a4 += py * z4 + pz * y4;
+        a5 += pz * y5;
+        b0 += pz * hxx;
+        b1 += pz * hxy;
+        b2 += pz * hxz - px * hzz;
+        b3 += pz * x3 - px * z3;
+        b4 += pz * x4 + px * z4;
+        b5 += pz * x5;
+        c0 += px * hxy - py * hxx;
+        c1 += px * hyy - py * hxy;
+        c2 += px * hyz - py * hxz;
+        c3 += px * y3 - py * x3;
+        c4 += px * y4 - py * x4;
+        c5 += px * y5 - py * x5;
     }
-    const double values[6] = {r0, r1, r2, r3, r4, r5};
-    for (int k = 0; k < 6; k++) row[k] = values[k];
+    const double rows[18] = {-a0, -a1, a2, a3, -a4, -a5, b0, b1, b2, b3, b4, b5, c0, c1, c2, c3, c4, c5};
+    for (int k = 0; k < 18; k++) H[k] = rows[k];
 }
 
 void contact_hessian(MildScratch *scratch) {
@@ -150,9 +132,7 @@ void contact_hessian(MildScratch *scratch) {
         int start = scratch->foot[f].start, end = foot_end(&scratch->foot[f]);
         double *H = scratch->hessian[f];
         hessian_linear(&scratch->slot, start, end, H);
-        hessian_angular_x(&scratch->slot, start, end, H + 18);
-        hessian_angular_y(&scratch->slot, start, end, H + 24);
-        hessian_angular_z(&scratch->slot, start, end, H + 30);
+        hessian_angular(&scratch->slot, start, end, H + 18);
     }
 }
 

@@ -31,27 +31,33 @@ static double foot_descent(const FootScratch *foot, const double *V) {
     return step_max(-V[2], 0.0) + foot->radius * sqrt(V[3] * V[3] + V[4] * V[4]);
 }
 
+/* Lists the elements that may touch, in order. All or none, the common cases, are found without a branch per element. */
 static void foot_list(FootScratch *foot, const MildContactInput *input, int f) {
     double descent = step_max(foot_descent(foot, input->velocity[f]), foot_descent(foot, input->free_velocity + 6 * f));
-    double least = -PREPARE_MARGIN - input->dt * (descent + PREPARE_EXTRA_SPEED);
-    int active = 0;
-    for (int i = 0; i < foot->elements; i++) {
+    double least = -PREPARE_MARGIN - input->dt * (descent + PREPARE_EXTRA_SPEED), near = 0.0;
+#pragma omp simd reduction(+ : near)
+    for (int i = 0; i < foot->elements; i++) near += foot->depth[i] > least ? 1.0 : 0.0;
+    foot->active = (int)near;
+    if (foot->active == 0) return;
+    int all = foot->active == foot->elements, active = 0;
+    for (int i = 0; all && i < foot->elements; i++) foot->element[i] = i;
+    for (int i = 0; !all && i < foot->elements; i++) {
         foot->element[active] = i;
         active += foot->depth[i] > least;
     }
-    foot->active = active;
 }
 
-static const Law *material_law(MildScratch *scratch, const MildTerrain *terrain, int f, int material) {
-    DerivedLaw *derived = &scratch->derived[f][material];
-    const MildMaterial *wanted = &terrain->materials[material];
-    if (!derived->known || memcmp(&derived->material, wanted, sizeof *wanted) != 0) {
-        FootScratch *foot = &scratch->foot[f];
+/* Derives the laws of the terrain's materials anew where their numbers have changed. */
+static void foot_laws(MildScratch *scratch, const MildTerrain *terrain, int f) {
+    const FootScratch *foot = &scratch->foot[f];
+    for (int m = 0; m < terrain->material_count; m++) {
+        DerivedLaw *derived = &scratch->derived[f][m];
+        const MildMaterial *wanted = &terrain->materials[m];
+        if (derived->known && memcmp(&derived->material, wanted, sizeof *wanted) == 0) continue;
         *derived = (DerivedLaw){*wanted, law_of(wanted, foot->pitch), 1};
         for (int i = foot->start; i < foot->start + foot->padded; i++)
-            if (scratch->slot_material[i] == material) scratch->slot_material[i] = -1;
+            if (scratch->slot_material[i] == m) scratch->slot_material[i] = -1;
     }
-    return &derived->law;
 }
 
 static void slot_set_law(const Slots *s, int i, const Law *law, const MildMaterial *material) {
@@ -72,19 +78,19 @@ static void slot_set_law(const Slots *s, int i, const Law *law, const MildMateri
 /* Material of each slot: the one it touched down on, so that a foot sliding over a border keeps its law. */
 static void slots_materials(MildScratch *scratch, const MildTerrain *terrain, const Memory *memory, int f) {
     const FootScratch *foot = &scratch->foot[f];
-    int checked = -1;
-    const Law *law = NULL;
+    int one = terrain->patch_count == 0, wrong = 0;
+    for (int k = 0; one && k < foot->active; k++) { /* uniform ground whose law stands in the slots already */
+        int m = memory->material[foot->element[k]];
+        wrong += (m > 0) | (scratch->slot_material[foot->start + k] != 0);
+    }
+    if (one && wrong == 0) return;
     for (int k = 0; k < foot->active; k++) {
         int i = foot->start + k, e = foot->element[k], m = memory->material[e];
         if (m < 0 || m >= terrain->material_count)
-            m = terrain->patch_count ? mild_terrain_material_at(terrain, foot->point_x[e], foot->point_y[e]) : 0;
-        if (m != checked) {
-            law = material_law(scratch, terrain, f, m);
-            checked = m;
-        }
+            m = mild_terrain_material_at(terrain, foot->point_x[e], foot->point_y[e]);
         if (scratch->slot_material[i] == m) continue;
         scratch->slot_material[i] = m;
-        slot_set_law(&scratch->slot, i, law, &terrain->materials[m]);
+        slot_set_law(&scratch->slot, i, &scratch->derived[f][m].law, &terrain->materials[m]);
     }
 }
 
@@ -115,6 +121,7 @@ static void slots_gather(MildScratch *scratch, const Memory *memory, const doubl
  * after recovery * a, but not within CONTACT_ELASTIC. It is never flatter than the loading curve at a, and so never above
  * it: a concave curve lies above its chords, a convex one above its tangent; in the bed the steepest slope is taken. */
 static void slots_prepare(const Slots *s, int start, int end, double dt, const double *now, const double *free) {
+    double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = start; i < end; i++) {
         double u0 = s->depth[i], used = s->depth_max[i], a = step_max(step_max(u0, used), 0.0);
@@ -127,7 +134,7 @@ static void slots_prepare(const Slots *s, int start, int end, double dt, const d
         s->front_force[i] = force;
         s->line[i] = step_max(force / (travel + STEP_TINY), steepest + s->cone[i] + bed);
         s->gap[i] = used > 0.0 ? 0.0 : step_max(-u0, 0.0);
-        double reach = (a - u0) / dt, py = s->py[i], px = s->px[i], added = s->mass_rate[i] * flat_share;
+        double reach = (a - u0) * rate, py = s->py[i], px = s->px[i], added = s->mass_rate[i] * flat_share;
         double speed = step_max(now[4] * px - now[3] * py - now[2], 0.0), w_free = free[4] * px - free[3] * py - free[2];
         double blend = (speed - PREPARE_BLEND_SLOW) * (1.0 / (PREPARE_BLEND_FAST - PREPARE_BLEND_SLOW));
         s->reach[i] = reach;
@@ -153,6 +160,7 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain, const 
         foot_list(foot, input, f);
         if (foot->active == 0) continue;
         Memory memory = ground_memory(ground, f);
+        foot_laws(scratch, terrain, f);
         slots_materials(scratch, terrain, &memory, f);
         slots_gather(scratch, &memory, input->rotation[f], f);
         slots_prepare(&scratch->slot, foot->start, foot_end(foot), input->dt, input->velocity[f],

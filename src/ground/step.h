@@ -43,8 +43,9 @@ static inline void step_normal(const Slots *s, int i, double dt, double w, doubl
     double mean_slope = flat * (2.0 * cm * cm + c1_square) * (1.0 / 6.0) + 0.5 * cone;
     double in_bed = a + d - s->bed[i];
 
-    double gap = s->gap[i], path = 1.0 / (d + gap + STEP_TINY), share = (d + STEP_TINY) * path;
-    double w0 = s->speed[i], blend = s->blend[i], wc = step_min(step_max(w, 0.0), w0), sum = 1.0 / (w0 + wc + STEP_TINY);
+    double gap = s->gap[i], w0 = s->speed[i], blend = s->blend[i], wc = step_min(step_max(w, 0.0), w0);
+    double way = d + gap + STEP_TINY, speeds = w0 + wc + STEP_TINY, both = 1.0 / (way * speeds); /* one division for two */
+    double path = speeds * both, sum = way * both, share = (d + STEP_TINY) * path;
     double chi = 1.0 - blend * (0.5 - wc * sum), braking = (w > 0.0 ? 1.0 : 0.0) * (w < w0 ? 1.0 : 0.0);
     double chi_slope = braking * blend * w0 * sum * sum;
 

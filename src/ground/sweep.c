@@ -3,7 +3,7 @@
 #include "ground/step.h"
 
 #define SWEEP_TOLERANCE 1e-10
-#define SWEEP_LIMIT 5000
+#define SWEEP_LIMIT 1000
 #define SWEEP_LEAST_G 1e-9 /* [1/kg] a foot that cannot move sideways needs no friction; keeps beta finite */
 
 /* Algorithm 1 of the paper. The foot twists are kept up to date, so a velocity prediction costs O(1) and a sweep O(N);

@@ -1,0 +1,153 @@
+/* Stepping allocates nothing, bad numbers stop nothing, and a state block is bytes: copy, continue, same answer. */
+#include "ground_kit.h"
+
+#if defined(__SANITIZE_ADDRESS__)
+#define COUNTING 0 /* the sanitizer brings its own allocator */
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define COUNTING 0
+#endif
+#endif
+#ifndef COUNTING
+#define COUNTING 1
+#endif
+
+static int allocations, fail_at; /* fail_at: the allocation that fails, 0 = none */
+
+#if COUNTING
+extern void *__libc_malloc(size_t size);
+extern void *__libc_calloc(size_t count, size_t size);
+extern void *__libc_memalign(size_t alignment, size_t size);
+
+static int allocation_fails(void) {
+    allocations++;
+    return fail_at > 0 && --fail_at == 0;
+}
+
+void *malloc(size_t size) {
+    return allocation_fails() ? NULL : __libc_malloc(size);
+}
+
+void *calloc(size_t count, size_t size) {
+    return allocation_fails() ? NULL : __libc_calloc(count, size);
+}
+
+void *aligned_alloc(size_t alignment, size_t size) {
+    return allocation_fails() ? NULL : __libc_memalign(alignment, size);
+}
+#endif
+
+static void test_no_allocation(void **state) {
+    (void)state;
+    uint64_t random = 31;
+    MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
+    MildMaterial m = mild_material_default();
+    Kit kit;
+    kit_open(&kit, 2, left, right, &m, 1e-3);
+    int before = allocations, steps = 0;
+    for (int t = 0; t < 200; t++) {
+        kit_random_state(&kit, &random);
+        kit.terrain.materials[0] = kit_material(&random);
+        kit.input.solver = t % 10 ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL;
+        kit.input.max_iterations = t % 10 ? 0 : 20;
+        for (int s = 0; s < 20; s++, steps++) kit_step(&kit, NULL);
+        mild_ground_reset(kit.ground);
+    }
+    print_message("%d steps, %d allocations (counted: %s)\n", steps, allocations - before, COUNTING ? "yes" : "no");
+    assert_int_equal(allocations, before);
+    kit_close(&kit);
+    mild_sole_destroy(left);
+    mild_sole_destroy(right);
+}
+
+static void test_failing_allocation(void **state) {
+    (void)state;
+    if (!COUNTING) skip();
+    MildSole *sole = kit_sole(0, 77);
+    const MildSole *soles[1] = {sole};
+    double box[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1};
+    MildSoleDef def = {box, 4, KIT_PITCH, KIT_SOLE_Z, 0};
+    int refused = 0;
+    for (int n = 1; n <= 5; n++) {
+        MildError error = {0};
+        fail_at = n;
+        MildSole *made = mild_sole_create(&def, &error);
+        if (!made) assert_int_equal(error.status, MILD_ERROR_MEMORY);
+        refused += !made;
+        mild_sole_destroy(made);
+        fail_at = n;
+        MildScratch *scratch = mild_scratch_create(soles, 1, &error);
+        if (!scratch) assert_int_equal(error.status, MILD_ERROR_MEMORY);
+        refused += !scratch;
+        mild_scratch_destroy(scratch);
+        fail_at = 0;
+    }
+    print_message("the n-th allocation failing: %d clean refusals\n", refused);
+    assert_int_equal(refused, 5);
+    mild_sole_destroy(sole);
+}
+
+static void test_bad_numbers(void **state) {
+    (void)state;
+    uint64_t random = 32;
+    MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
+    MildMaterial m = mild_material_default();
+    static const double bad[3] = {NAN, INFINITY, 1e300};
+    for (int t = 0; t < 120; t++) {
+        Kit kit;
+        kit_open(&kit, 2, left, right, &m, 1e-3);
+        kit_random_state(&kit, &random);
+        kit_inverse_inertia(&kit);
+        kit_free(&kit, NULL);
+        double *victims[5] = {&kit.input.position[0][2], &kit.input.rotation[1][4], &kit.input.velocity[0][1],
+                              &kit.input.inverse_inertia[13], &kit.input.free_velocity[8]};
+        *victims[t % 5] = bad[t / 5 % 3];
+        kit.input.solver = t % 2 ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON;
+        kit.input.max_iterations = 40;
+        kit_solve(&kit);
+        kit_advance(&kit);
+        mild_ground_reset(kit.ground); /* and the ground is as good as new */
+        kit_random_state(&kit, &random);
+        for (int f = 0; f < 2; f++) kit.input.position[f][0] = kit.input.position[f][1] = 0.1 * f;
+        kit.input.solver = MILD_SOLVER_NEWTON;
+        kit_step(&kit, NULL);
+        for (int i = 0; i < 12; i++) assert_true(isfinite(kit.result.velocity[i]));
+        kit_close(&kit);
+    }
+    mild_sole_destroy(left);
+    mild_sole_destroy(right);
+}
+
+static void test_copy_continues(void **state) {
+    (void)state;
+    uint64_t random = 33;
+    MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
+    MildMaterial m = mild_material_default();
+    Kit a, b;
+    kit_open(&a, 2, left, right, &m, 1e-3);
+    kit_random_state(&a, &random);
+    for (int s = 0; s < 100; s++) kit_step(&a, NULL);
+    kit_open(&b, 2, left, right, &m, 1e-3);
+    assert_int_equal(b.bytes % 64, 0);
+    memcpy(b.ground, a.ground, a.bytes);
+    b.input = a.input;
+    memcpy(b.mass, a.mass, sizeof a.mass);
+    memcpy(b.inertia, a.inertia, sizeof a.inertia);
+    memcpy(b.center, a.center, sizeof a.center);
+    for (int s = 0; s < 100; s++) {
+        kit_step(&a, NULL);
+        kit_step(&b, NULL);
+    }
+    assert_memory_equal(a.ground, b.ground, a.bytes);
+    assert_memory_equal(&a.input, &b.input, sizeof a.input);
+    kit_close(&a);
+    kit_close(&b);
+    mild_sole_destroy(left);
+    mild_sole_destroy(right);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_allocation), cmocka_unit_test(test_failing_allocation),
+                                       cmocka_unit_test(test_bad_numbers), cmocka_unit_test(test_copy_continues)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
