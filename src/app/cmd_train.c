@@ -25,7 +25,7 @@ typedef struct {
     Log *log;
     char column_text[COLUMNS][48];
     const char *column[COLUMNS];
-    char note[256];
+    char note[1024];
 } Run;
 
 static const char *const fixed_columns[COLUMNS_FIXED] = {
@@ -126,33 +126,26 @@ static MildStatus write_config(const Run *run, MildError *error) {
     MildStatus status = path_join(run->out, "config.ini", path, error);
     if (status == MILD_OK) status = path_write(path, text, strlen(text), error);
     if (status == MILD_OK) status = path_join(run->out, "version.txt", path, error);
-    char line[512];
+    char line[sizeof run->note + 64];
     snprintf(line, sizeof line, "%s\n%s\n", build_version(), run->note);
     if (status == MILD_OK) status = path_write(path, line, strlen(line), error);
     free(text);
     return status;
 }
 
-/* A checkpoint that does not load (killed machine, broken disk) is passed over for the one before it. */
+/* A checkpoint that does not load (killed machine, broken disk) is passed over for the one before it; one of another
+ * config is not: those before it are no better. */
 static MildStatus resume(Run *run, MildError *error) {
-    int64_t oldest, limit = INT64_MAX;
-    int count;
+    int64_t oldest, number = newest_checkpoint(run->out, INT64_MAX, &oldest, &(int){0});
     for (;;) {
         char path[PATH_SIZE];
-        int64_t number = newest_checkpoint(run->out, limit, &oldest, &count);
-        if (number < 0) {
-            return limit == INT64_MAX
-                       ? mild_fail(error, MILD_ERROR_IO, "%s: no checkpoint to resume from; drop --resume to start anew", run->out)
-                       : error->status;
-        }
         MildStatus status = checkpoint_path(run, number, path, error);
         if (status == MILD_OK) status = train_load(run->trainer, path, error);
-        if (status == MILD_OK) {
-            printf("resumed %s\n", path);
-            return MILD_OK;
-        }
+        if (status == MILD_OK) printf("resumed %s\n", path);
+        if (status == MILD_OK || status == MILD_ERROR_ARGUMENT) return status;
+        number = newest_checkpoint(run->out, number, &oldest, &(int){0});
+        if (number < 0) return status;
         fprintf(stderr, "mild train: %s; trying the checkpoint before\n", error->text);
-        limit = number;
     }
 }
 
@@ -204,7 +197,8 @@ static MildStatus train_loop(Run *run, MildError *error) {
     return status;
 }
 
-static MildStatus prepare(Run *run, MildError *error) {
+/* A new run takes a folder without checkpoints, a resumed one a folder with some. */
+static MildStatus check_folder(const Run *run, MildError *error) {
     int64_t oldest;
     int count;
     newest_checkpoint(run->out, INT64_MAX, &oldest, &count);
@@ -212,11 +206,53 @@ static MildStatus prepare(Run *run, MildError *error) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "%s holds %d checkpoints: add --resume to go on, or choose another --out", run->out, count);
     }
+    if (run->resume && count == 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "%s: no checkpoint to resume from; drop --resume to start anew",
+                         run->out);
+    }
+    return MILD_OK;
+}
+
+/* What made the policy, as far as it fits; the run folder's config.ini has every key. */
+static void write_note(Run *run, const CliArgs *args) {
+    const char *folder = run->resume ? run->out : "configs", *name = run->resume ? "config" : "default";
+    int size = (int)sizeof run->note;
+    int used = run->config ? snprintf(run->note, sizeof run->note, "mild train --config %s", run->config)
+                           : snprintf(run->note, sizeof run->note, "mild train --config %s/%s.ini", folder, name);
+    for (int i = 0; i < args->override_count && used < size; i++) {
+        used += snprintf(run->note + used, (size_t)(size - used), " --%s", args->overrides[i]);
+    }
+    if (used < size) {
+        snprintf(run->note + used, (size_t)(size - used), ", seed %" PRIu64 ", version %s", run->def.train.seed,
+                 build_version());
+    }
+}
+
+/* A resumed run keeps the config it began with; --config and overrides still change it. */
+static MildStatus read_config(Run *run, const CliArgs *args, MildError *error) {
+    char path[PATH_SIZE];
+    const char *config = run->config;
+    if (run->resume && !config) {
+        MildStatus status = path_join(run->out, "config.ini", path, error);
+        if (status != MILD_OK) return status;
+        config = path;
+    }
+    run->def = experiment_def_default();
+    return experiment_read(&run->def, config, args->overrides, args->override_count, error);
+}
+
+static MildStatus prepare(Run *run, const CliArgs *args, MildError *error) {
+    MildStatus status = check_folder(run, error);
+    if (status == MILD_OK) status = read_config(run, args, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    write_note(run, args);
     run->trainer = train_create(&run->def, error);
     if (!run->trainer) {
         return error->status;
     }
-    MildStatus status = path_make_folder(run->out, error);
+    status = path_make_folder(run->out, error);
     if (status == MILD_OK && run->resume) status = resume(run, error);
     if (status == MILD_OK) status = write_config(run, error);
     if (status != MILD_OK) {
@@ -231,12 +267,15 @@ int cmd_train(int argc, char **argv) {
     Run *run = calloc(1, sizeof *run);
     CliArgs *args = calloc(1, sizeof *args);
     if (!run || !args) {
+        free(run);
+        free(args);
         return cli_fail_text("train", "out of memory");
     }
     const CliOption options[] = {
         {"config", CLI_TEXT, &run->config, 0, 0, "FILE.ini", "what to change of configs/default.ini"},
         {"out", CLI_TEXT, &run->out, 0, 0, "FOLDER", "run folder: config, log, checkpoints, policy.safetensors"},
-        {"resume", CLI_FLAG, &run->resume, 0, 0, NULL, "go on from the newest checkpoint in the run folder"},
+        {"resume", CLI_FLAG, &run->resume, 0, 0, NULL,
+         "go on from the newest checkpoint in the run folder, with its config.ini unless --config is given"},
     };
     const CliCommand command = {
         .name = "train", .usage = "--config FILE.ini --out FOLDER [--resume] [--section.key=value]",
@@ -254,11 +293,7 @@ int cmd_train(int argc, char **argv) {
     } else if (!run->out) {
         code = cli_fail_text("train", "--out FOLDER is missing");
     } else {
-        run->def = experiment_def_default();
-        MildStatus status = experiment_read(&run->def, run->config, args->overrides, args->override_count, &error);
-        snprintf(run->note, sizeof run->note, "mild train --config %s, seed %" PRIu64 ", version %s",
-                 run->config ? run->config : "configs/default.ini", run->def.train.seed, build_version());
-        if (status == MILD_OK) status = prepare(run, &error);
+        MildStatus status = prepare(run, args, &error);
         if (status == MILD_OK) status = train_loop(run, &error);
         code = status == MILD_OK ? 0 : cli_fail("train", &error);
     }
