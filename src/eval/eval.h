@@ -18,10 +18,10 @@ typedef struct {
     char ground[160];
     double speed;
     int trials, success;  /* success: trials without termination */
-    double velocity;      /* [m/s] forward, over the part after the first 2 s */
+    double velocity;      /* [m/s] forward, over the part after the first 2 s; trials that lasted that long */
     double velocity_low, velocity_high; /* [m/s] 95 % interval of the mean over trials */
     double cot;           /* [-] sum |tau qd| / (m g v) */
-    double torque_max;    /* [N m] over joints, time and trials */
+    double torque_max;    /* [N m] largest over joints and time, mean over trials */
     double clearance;     /* [m] swing apex of the lowest sole point above h0 */
     double penetration;   /* [m] deepest element of each stance */
     double drift;         /* [m] horizontal travel of the sole between touchdown and lift-off */

@@ -13,8 +13,13 @@ void measure_start(Measure *measure, double dt) {
     measure->base_high = -1e9;
 }
 
-static void measure_foot(Measure *m, int f, const TaskEnv *env, const RobotFoot *foot, int rigid) {
-    (void)env;
+static void end_stance(Measure *m, int f, double x, double y) {
+    m->deepest_sum += m->deepest[f];
+    m->drift_sum += hypot(x - m->touchdown[f][0], y - m->touchdown[f][1]);
+    m->stances++;
+}
+
+static void measure_foot(Measure *m, int f, const RobotFoot *foot, int rigid) {
     int contact = foot->force[2] > CONTACT_FORCE;
     double x = foot->sole_center[0], y = foot->sole_center[1];
     if (contact && !m->in_stance[f]) {
@@ -26,12 +31,12 @@ static void measure_foot(Measure *m, int f, const TaskEnv *env, const RobotFoot 
         m->touchdown[f][1] = y;
         m->deepest[f] = 0;
     } else if (!contact && m->in_stance[f]) {
-        m->deepest_sum += m->deepest[f];
-        m->drift_sum += hypot(x - m->touchdown[f][0], y - m->touchdown[f][1]);
-        m->stances++;
+        end_stance(m, f, x, y);
         m->apex[f] = 0;
     }
     m->in_stance[f] = contact;
+    m->last[f][0] = x;
+    m->last[f][1] = y;
     if (contact) {
         m->deepest[f] = fmax(m->deepest[f], rigid ? 0 : foot->result.depth_max);
     } else {
@@ -61,6 +66,15 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
         m->base_high = fmax(m->base_high, qpos[2]);
     }
     for (int f = 0; f < ROBOT_FEET; f++) {
-        measure_foot(m, f, env, robot_sim_foot(sim, f), env->variation.rigid);
+        measure_foot(m, f, robot_sim_foot(sim, f), env->variation.rigid);
+    }
+}
+
+void measure_finish(Measure *m) {
+    int lifted = m->stances > 0;
+    for (int f = 0; f < ROBOT_FEET && !lifted; f++) {
+        if (m->in_stance[f]) {
+            end_stance(m, f, m->last[f][0], m->last[f][1]);
+        }
     }
 }

@@ -9,6 +9,9 @@ static MildStatus find_preset(const char *name, MildMaterial *material, MildErro
     if (mild_material_preset(name, material)) {
         return MILD_OK;
     }
+    if (strcmp(name, "rigid") == 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "rigid is the engine's own floor: it cannot be a part of a course");
+    }
     char known[256] = "rigid";
     for (int i = 0; i < mild_material_preset_count(); i++) {
         size_t used = strlen(known);
