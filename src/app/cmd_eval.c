@@ -10,6 +10,7 @@
 #include "app/config.h"
 #include "app/grounds.h"
 #include "app/paths.h"
+#include "app/report.h"
 #include "control/controller.h"
 #include "eval/eval.h"
 
@@ -46,19 +47,15 @@ static cJSON *row_json(const EvalRow *row) {
 }
 
 static MildStatus write_json(const Eval *e, MildError *error) {
-    cJSON *root = cJSON_CreateObject(), *rows = cJSON_AddArrayToObject(root, "rows");
+    cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "policy", e->policy);
     cJSON_AddStringToObject(root, "robot", "sa01");
     cJSON_AddStringToObject(root, "version", build_version());
+    cJSON *rows = cJSON_AddArrayToObject(root, "rows");
     for (int i = 0; i < e->row_count; i++) {
         cJSON_AddItemToArray(rows, row_json(&e->rows[i]));
     }
-    char *text = cJSON_Print(root);
-    MildStatus status = text ? path_write(e->json, text, strlen(text), error)
-                             : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
-    free(text);
-    cJSON_Delete(root);
-    return status;
+    return report_save(root, e->json, error);
 }
 
 /* The scene with --ground.KEY=VALUE laid over each of its grounds, and --task.KEY=VALUE over the task. */
@@ -76,8 +73,9 @@ static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildError 
 
 static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller, MildError *error) {
     char line[256];
+    FILE *table = e->json && strcmp(e->json, "-") == 0 ? stderr : stdout;
     eval_print_header(line, sizeof line);
-    printf("%s\n", line);
+    fprintf(table, "%s\n", line);
     for (int g = 0; g < e->grounds.count; g++) {
         Scene scene;
         MildStatus status = make_scene(e, e->grounds.name[g], &scene, error);
@@ -88,8 +86,8 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
             if (status == MILD_OK) {
                 e->row_count++;
                 eval_print_row(row, line, sizeof line);
-                printf("%s\n", line);
-                fflush(stdout);
+                fprintf(table, "%s\n", line);
+                fflush(table);
             }
         }
         if (status != MILD_OK) {
@@ -136,6 +134,8 @@ int cmd_eval(int argc, char **argv) {
     Eval *e = calloc(1, sizeof *e);
     CliArgs *args = calloc(1, sizeof *args);
     if (!e || !args) {
+        free(e);
+        free(args);
         return cli_fail_text("eval", "out of memory");
     }
     char shipped[PATH_SIZE];
@@ -157,7 +157,7 @@ int cmd_eval(int argc, char **argv) {
         {"patch", CLI_NUMBER, &e->patch, 0.1, 1000, "L", "[m] length of each ground of a course (2.5)"},
         {"seed", CLI_UINT64, &e->eval.seed, 0, 0, "S", "same seed, same trials (1)"},
         {"threads", CLI_INT, &e->threads, 0, 1024, "N", "0: one per core; the table does not depend on it (0)"},
-        {"json", CLI_TEXT, &e->json, 0, 0, "FILE", "write the table as JSON as well"},
+        {"json", CLI_TEXT, &e->json, 0, 0, "FILE", "write the table as JSON as well; - for standard output"},
     };
     const CliCommand command = {
         .name = "eval", .usage = "--policy FILE --ground NAME[,NAME] --speed V[,V] [options]",
