@@ -70,7 +70,13 @@ static void draw_stripes(Random *r, const RandomizeDef *def, const Robot *robot,
     double x = -0.5 * MILD_PATCHES_MAX * 0.5 * (def->patch_length[0] + def->patch_length[1]);
     for (int i = 0; i < MILD_PATCHES_MAX; i++) {
         double length = draw(r, def->patch_length);
-        MildPatch patch = {x, x + length, -1e3, 1e3, (int)random_index(r, 3)};
+        MildPatch patch;
+        memset(&patch, 0, sizeof patch); /* its padding too: environments are saved and compared byte by byte */
+        patch.x_min = x;
+        patch.x_max = x + length;
+        patch.y_min = -1e3;
+        patch.y_max = 1e3;
+        patch.material = (int)random_index(r, 3);
         mild_terrain_add_patch(terrain, &patch, NULL);
         x += length;
     }
