@@ -1,0 +1,120 @@
+#!/usr/bin/env bash
+# Training and evaluation as a user runs them, on tiny networks: a resumed run equals one left alone, a full disk loses
+# nothing, a run folder cannot be taken twice, the evaluation's JSON keeps its contract. Usage: test_train.sh PATH_TO_MILD
+set -u
+mild=$(realpath "$1")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+failures=0
+
+fail() {
+    echo "FAIL: $*" >&2
+    failures=$((failures + 1))
+}
+
+# bad PATTERN COMMAND...: exit code 2 and one line of error, progress apart, that holds the pattern.
+bad() {
+    local pattern=$1 errors
+    shift
+    errors=$("$@" 2>&1 >/dev/null </dev/null)
+    local got=$?
+    errors=$(grep -v '^training ' <<<"$errors")
+    [ "$got" = 2 ] || fail "exit $got instead of 2: $* -> $errors"
+    [ "$(wc -l <<<"$errors")" = 1 ] || fail "more than one line of error: $* -> $errors"
+    grep -q -- "$pattern" <<<"$errors" || fail "no '$pattern' in the error of: $* -> $errors"
+}
+
+good() {
+    local output
+    output=$("$@" 2>&1 </dev/null) || fail "exit $?: $* -> $output"
+}
+
+same() {
+    cmp "$1" "$2" || fail "$1 and $2 differ"
+}
+
+# All but the header of two safetensors files: it holds the note, which names the command.
+same_numbers() {
+    numbers "$1" >one.numbers
+    numbers "$2" >other.numbers
+    cmp one.numbers other.numbers || fail "$1 and $2 differ"
+}
+
+numbers() {
+    tail -c +$(($(od -An -t u8 -N 8 "$1") + 9)) "$1"
+}
+
+# The log without the two columns that tell the time it took.
+log_numbers() {
+    awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) timed[i] = $i ~ /^rate\// }
+        { for (i = 1; i <= NF; i++) if (!timed[i]) printf "%s,", $i; print "" }' "$1/log.csv"
+}
+
+tiny=(--train.envs=16 --train.minutes=0 --train.threads=2 --train.checkpoint_every=1 --ppo.steps=12
+    --policy.actor_hidden=32,0,0,0 --policy.critic_hidden=32,0,0,0 --policy.encoder_hidden=32,0,0,0
+    --policy.decoder_hidden=32,0,0,0)
+last=checkpoint_000000004.safetensors
+
+# left alone, and stopped after two iterations
+good "$mild" train --out whole "${tiny[@]}" --train.iterations=4
+good "$mild" train --out part "${tiny[@]}" --train.iterations=2
+cp -r part full
+cp -r part torn
+
+# bit for bit, checkpoint and log, with another number of threads and nothing but the folder's own config
+good "$mild" train --out part --resume --train.iterations=4 --train.threads=1
+same_numbers whole/$last part/$last
+same_numbers whole/policy.safetensors part/policy.safetensors
+[ "$(log_numbers whole)" = "$(log_numbers part)" ] || fail "the logs of the whole and of the resumed run differ"
+[ "$(ls part/checkpoint_* | wc -l)" = 3 ] || fail "not the last three checkpoints are kept"
+
+# a full disk (here: no file above 64 KiB) while saving
+policy_before=$(cksum <full/policy.safetensors)
+(
+    failures=0
+    trap '' XFSZ
+    ulimit -f 64
+    bad "cannot be written" "$mild" train --out full "${tiny[@]}" --train.iterations=4 --resume
+    exit $failures
+) || fail "full disk"
+[ "$(cksum <full/policy.safetensors)" = "$policy_before" ] || fail "a full disk changed the policy"
+[ -z "$(find full -name '*.tmp')" ] || fail "a full disk left a temporary file"
+good "$mild" train --out full "${tiny[@]}" --train.iterations=4 --resume
+good "$mild" eval --policy full/checkpoint_000000002.safetensors --ground rigid --trials 1 --seconds 0.1
+same_numbers whole/$last full/$last
+
+# a torn checkpoint is passed over for the one before it
+truncate -s 1000 torn/checkpoint_000000002.safetensors
+good "$mild" train --out torn "${tiny[@]}" --train.iterations=4 --resume
+same_numbers whole/$last torn/$last
+
+# mistakes
+bad "holds 3 checkpoints" "$mild" train --out whole
+bad "resume with the checkpoint's config" "$mild" train --out whole --resume --train.envs=8
+bad "no checkpoint to resume from" "$mild" train --out nowhere --resume
+[ ! -e nowhere ] || fail "a refused resume left a folder"
+printf 'X' | dd of=torn/policy.safetensors bs=1 seek=20000 conv=notrunc 2>/dev/null
+bad "damaged" "$mild" eval --policy torn/policy.safetensors
+bad "cannot be opened" "$mild" eval --policy nowhere.safetensors
+bad "unknown ground 'foam54'" "$mild" eval --policy whole/policy.safetensors --ground rigid,foam54
+bad "part of a course" "$mild" eval --policy whole/policy.safetensors --ground rubber+rigid
+
+# the evaluation's JSON: its keys, in the contract's order, and numbers as they must be
+good "$mild" eval --policy whole/policy.safetensors --ground rigid,rubber+sand_loose --speed 0,0.6 --trials 2 --seconds 3 \
+    --json eval.json
+json=$(tr -d ' \t\n' <eval.json)
+number='-\?[0-9][0-9.e+-]*'
+row='{"ground":"[a-z0-9_+]*"'
+for key in speed trials success velocity cot torque_max clearance penetration drift energy; do row+=",\"$key\":$number"; done
+row+="\(,\"[a-z_]*\":$number\)*}"
+grep -qx "{\"policy\":\"whole/policy.safetensors\",\"robot\":\"sa01\",\"version\":\"[0-9.]*[^\"]*\",\"rows\":\[$row\(,$row\)\{3\}\]}" \
+    <<<"$json" || fail "eval.json: $json"
+good "$mild" eval --policy whole/policy.safetensors --ground rigid,rubber+sand_loose --speed 0,0.6 --trials 2 --seconds 3 \
+    --threads 1 --json again.json
+same eval.json again.json
+"$mild" eval --policy whole/policy.safetensors --ground rigid --trials 1 --seconds 0.1 --json - 2>/dev/null | head -c 1 |
+    grep -q '{' || fail "--json -: standard output is not the JSON alone"
+
+[ $failures = 0 ] && echo "training and evaluation: all as expected"
+exit $((failures > 0))
