@@ -4,7 +4,8 @@
 #include <string.h>
 
 #define CONTACT_FORCE 5.0  /* [N] */
-#define SWING_HEIGHT 0.005 /* [m] a lift lower than this is no swing: sensor of chatter */
+#define SWING_HEIGHT 0.005 /* [m] a lift lower than this is no swing */
+#define CHATTER_TIME 0.03   /* [s] a shorter loss of contact does not end a stance */
 
 void measure_start(Measure *measure, double dt) {
     memset(measure, 0, sizeof *measure);
@@ -13,34 +14,39 @@ void measure_start(Measure *measure, double dt) {
     measure->base_high = -1e9;
 }
 
-static void end_stance(Measure *m, int f, double x, double y) {
+static void start_stance(Measure *m, int f, const double *at) {
+    if (m->apex[f] > SWING_HEIGHT) {
+        m->apex_sum += m->apex[f];
+        m->swings++;
+    }
+    m->in_stance[f] = 1;
+    m->touchdown[f][0] = at[0];
+    m->touchdown[f][1] = at[1];
+    m->deepest[f] = 0;
+}
+
+static void end_stance(Measure *m, int f) {
+    m->in_stance[f] = 0;
     m->deepest_sum += m->deepest[f];
-    m->drift_sum += hypot(x - m->touchdown[f][0], y - m->touchdown[f][1]);
+    m->drift_sum += hypot(m->last[f][0] - m->touchdown[f][0], m->last[f][1] - m->touchdown[f][1]);
     m->stances++;
 }
 
 static void measure_foot(Measure *m, int f, const RobotFoot *foot, int rigid) {
-    int contact = foot->force[2] > CONTACT_FORCE;
-    double x = foot->sole_center[0], y = foot->sole_center[1];
-    if (contact && !m->in_stance[f]) {
-        if (m->apex[f] > SWING_HEIGHT) {
-            m->apex_sum += m->apex[f];
-            m->swings++;
+    if (foot->force[2] > CONTACT_FORCE) {
+        if (!m->in_stance[f]) {
+            start_stance(m, f, foot->sole_center);
         }
-        m->touchdown[f][0] = x;
-        m->touchdown[f][1] = y;
-        m->deepest[f] = 0;
-    } else if (!contact && m->in_stance[f]) {
-        end_stance(m, f, x, y);
-        m->apex[f] = 0;
-    }
-    m->in_stance[f] = contact;
-    m->last[f][0] = x;
-    m->last[f][1] = y;
-    if (contact) {
+        m->air_time[f] = m->apex[f] = 0;
+        m->last[f][0] = foot->sole_center[0];
+        m->last[f][1] = foot->sole_center[1];
         m->deepest[f] = fmax(m->deepest[f], rigid ? 0 : foot->result.depth_max);
-    } else {
-        m->apex[f] = fmax(m->apex[f], foot->sole_height);
+        return;
+    }
+    m->air_time[f] += m->dt;
+    m->apex[f] = fmax(m->apex[f], foot->sole_height);
+    if (m->in_stance[f] && m->air_time[f] > CHATTER_TIME) {
+        end_stance(m, f);
     }
 }
 
@@ -74,7 +80,7 @@ void measure_finish(Measure *m) {
     int lifted = m->stances > 0;
     for (int f = 0; f < ROBOT_FEET && !lifted; f++) {
         if (m->in_stance[f]) {
-            end_stance(m, f, m->last[f][0], m->last[f][1]);
+            end_stance(m, f);
         }
     }
 }

@@ -14,7 +14,8 @@ typedef struct {
     double start_x, end_x, steady_time;
     double base_low, base_high;
     int in_stance[ROBOT_FEET];
-    double touchdown[ROBOT_FEET][2], last[ROBOT_FEET][2], apex[ROBOT_FEET], deepest[ROBOT_FEET];
+    double touchdown[ROBOT_FEET][2], last[ROBOT_FEET][2]; /* [m] sole centre at the first and the latest contact */
+    double apex[ROBOT_FEET], air_time[ROBOT_FEET], deepest[ROBOT_FEET];
     double apex_sum, deepest_sum, drift_sum;
     int swings, stances;
 } Measure;
