@@ -97,7 +97,7 @@ const double *mild_sole_x(const MildSole *sole);
 const double *mild_sole_y(const MildSole *sole);
 double mild_sole_z(const MildSole *sole);
 
-/* ---- element law, closed forms (eqs 1-5 of the paper as read in physics.md section 2) ---- */
+/* ---- element law, closed forms (eqs 1-5 of the paper as read in docs/model.md) ---- */
 typedef struct {
     double force;          /* F_g [N] quasistatic */
     double stiffness;      /* dF_g/du [N/m] */

@@ -30,7 +30,7 @@ static void foot_loaded(const MildScratch *scratch, int f, MildFootResult *resul
     result->depth_mean = loaded > 0.0 ? sum / loaded : 0.0;
 }
 
-/* Wrench and zero moment point. Paper eq 16: r = [F]x^+ tau, which for the true torque tau = p x F is F x tau/|F|^2, the
+/* Wrench and zero moment point. Paper eq 15: r = [F]x^+ tau, which for the true torque tau = p x F is F x tau/|F|^2, the
  * point of the wrench's central axis nearest the ankle. On the sole: the point where the horizontal torque vanishes. */
 static void foot_result(const MildScratch *scratch, const MildContactInput *input, int f, MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];

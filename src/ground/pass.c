@@ -12,7 +12,7 @@ static void foot_normal(const Slots *s, int start, int end, double dt, const dou
     }
 }
 
-/* Coulomb friction and drift resistance of radius r = mu I_z + dt k_D d_D u (paper eqs 14 and 15), made single-valued by a
+/* Coulomb friction and drift resistance of radius r = mu I_z + dt k_D d_D u (paper eqs 13 and 14), made single-valued by a
  * stick region |v| < eps, plus the drift damping: I = -(r/max(|v|, eps) + dt b_D) v. Both oppose the new velocity, so they
  * can neither push a resting foot nor reverse a motion. With exact = 0 the derivative is that of the quadratic that touches
  * |v| from above (no loss of stiffness along the slip, no coupling to the normal force): safe, but slow to converge. */

@@ -44,7 +44,7 @@ static double element_normal(const Slots *s, int i, double dt, double w, double 
     return fmax(s->iz[i] + (target - s->iz[i]) / (1.0 + G * slope), 0.0);
 }
 
-/* Paper eqs 12, 13: predict, correct by the continuity error, project on the friction disc. The stick region of width eps
+/* Paper eq 13: predict, correct by the continuity error, project on the friction disc. The stick region of width eps
  * adds the compliance eps/r, so that the fixed point is the law of foot_tangent in pass.c. */
 static void element_friction(const Slots *s, int i, const double *v, const double *delta, double G) {
     double radius = s->mu[i] * s->iz[i] + s->drift_radius[i];
@@ -62,7 +62,7 @@ static void sweep_element(Sweep *sweep, const Slots *s, int f, int i) {
     const double *V = sweep->twist + 6 * f, p[3] = {s->px[i], s->py[i], s->pz[i]};
     double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]}, v[2] = {V[0] + turn[0], V[1] + turn[1]};
     double w = -(V[2] + V[3] * p[1] - V[4] * p[0]), delta[2] = {0.0, 0.0}, G[3];
-    /* Paper eqs 10, 11 with v_i - v_j - omega x (p_i - p_j) as a vector. */
+    /* Paper eqs 11, 12 with v_i - v_j - omega x (p_i - p_j) as a vector. */
     for (int k = 0; k < 2; k++) {
         if (sweep->preceding[f] > 0) delta[k] = v[k] - turn[k] - sweep->before[f][k] / sweep->preceding[f];
         sweep->before[f][k] += v[k] - turn[k];

@@ -1,7 +1,7 @@
 /* Loss and gradient of one chunk of samples. Two independent halves: the actor's (encoder, modulation, actor, decoder,
  * log std) and the critic's.
  *
- *   L = (1-eps) (surrogate - w_H entropy + w_V value) + eps (recon + phi KL + sum over groups MSE) + w_M mirror   (eq 17)
+ *   L = (1-eps) (surrogate - w_H entropy + w_V value) + eps (recon + phi KL + sum over groups MSE) + w_M mirror   (eq 16)
  *
  * Means are over the minibatch: the caller gives 1 / (its samples), so that chunks and shards simply add up. */
 #ifndef MILD_LOSS_H

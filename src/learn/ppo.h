@@ -1,4 +1,4 @@
-/* Proximal policy optimisation (Schulman et al. 2017) with asymmetric critic, joint VAE loss (paper eqs 17-18), mirror
+/* Proximal policy optimisation (Schulman et al. 2017) with asymmetric critic, joint VAE loss (paper eqs 16-17), mirror
  * loss and KL-adapted learning rate. Loss = epsilon*loss_reg + (1-epsilon)*(surrogate + value + entropy) + mirror. */
 #ifndef MILD_PPO_H
 #define MILD_PPO_H
@@ -17,7 +17,7 @@ typedef struct {
     double learning_rate, learning_rate_min, learning_rate_max;
     double kl_target;   /* 0: fixed learning rate */
     double max_gradient_norm;
-    double epsilon;     /* 0.3: share of loss_reg in the joint loss (eq 17) */
+    double epsilon;     /* 0.3: share of loss_reg in the joint loss (eq 16) */
     double kl_weight;   /* phi of the VAE's KL term */
     double mirror_weight;
     double mirror_share; /* share of each minibatch on which the mirror loss is evaluated */

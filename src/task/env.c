@@ -8,7 +8,6 @@
 #define RANDOM_USE_START 0x53544152u
 #define RANDOM_USE_PUSH 0x50555348u
 #define CONTACT_FORCE 5.0 /* [N] */
-#define LEGS_CROSSED 0.03 /* [m] lateral distance of the sole centres */
 
 static size_t env_header_bytes(void) {
     return (sizeof(TaskEnv) + 63) / 64 * 64;
@@ -136,11 +135,13 @@ static void push_base(TaskEnv *env, const TaskDef *def) {
     }
 }
 
-/* tau = strength clip(Kp (q0 + scale a - q + offset) - Kd qd), learning.md section 2. */
+/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). */
 static void pd_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
                       const float *action, double torque[ROBOT_JOINTS]) {
     const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim) + 6;
-    const double *pose = robot_default_pose(robot), *effort = robot_effort(robot);
+    const double *effort = robot_effort(robot);
+    double pose[ROBOT_JOINTS];
+    task_assist_pose(env, def, robot, pose);
     for (int i = 0; i < ROBOT_JOINTS; i++) {
         double target = pose[i] + def->action_scale * (double)action[i] + env->motor_offset[i];
         double tau = def->kp[i % 6] * env->kp_scale[i] * (target - q[i]) - def->kd[i % 6] * env->kd_scale[i] * qd[i];
@@ -165,7 +166,8 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
             break;
         }
         pd_torque(env, def, robot, sim, env->action[k >= env->lag_command ? 0 : 1], torque);
-        if (robot_sim_step(sim, torque, NULL, &env->terrain, task_env_ground(env))) {
+        double wrench[6], *hand = task_assist(env, def, robot, sim, wrench) ? wrench : NULL;
+        if (robot_sim_step(sim, torque, hand, &env->terrain, task_env_ground(env))) {
             return 1;
         }
         if (probe) {
@@ -234,7 +236,8 @@ static TaskMotion describe_motion(TaskEnv *env, const TaskDef *def, const Robot 
 
 /* Also when a foot has passed through the other leg: the engine computes no contact between them. */
 static int has_fallen(const TaskEnv *env, const TaskDef *def, const RobotSim *sim) {
-    return robot_sim_foot_distance(sim) < LEGS_CROSSED || robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) || robot_sim_body_clearance(sim, &env->terrain) < 0;
+    return robot_sim_foot_distance(sim) < def->crossing_limit ||
+           robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) || robot_sim_body_clearance(sim, &env->terrain) < 0;
 }
 
 static void advance_clock(TaskEnv *env, const TaskDef *def) {

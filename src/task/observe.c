@@ -137,6 +137,7 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const RobotSim 
     *out++ = (float)(env->lag_motor * step);
     *out++ = (float)(env->lag_imu * step);
     *out++ = (float)env->variation.rigid_friction;
+    *out++ = (float)task_assist_share(env, def);
 }
 
 void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, const TaskReading *reading,

@@ -21,13 +21,14 @@ static double reward_yaw_rate(const TaskMotion *m) {
     return exp(-m->def->reward.tracking_sharpness * square(m->omega[2] - m->env->command[2]));
 }
 
-/* The paper prints a positive weight on an error; read as a reward that falls with the error (learning.md section 5).
- * Paid only where a foot should swing, so that standing still earns nothing here. */
+/* The paper prints a positive weight on an error; of learning.md's two readings this is the one that pays nothing to a
+ * foot that stays down (exp(-k error) pays it a third of a perfect swing) and has a slope from the first millimetre.
+ * Scaled so that following h_des = apex sin(pi s) gives 1 on average over the swing. */
 static double reward_feet_clearance(const TaskMotion *m) {
     double sum = 0;
     for (int f = 0; f < ROBOT_FEET; f++) {
         if (!m->stance[f]) {
-            sum += exp(-m->def->reward.clearance_sharpness * fabs(m->foot_height[f] - m->wanted_height[f]));
+            sum += 1.5707963 * clamp(m->foot_height[f], 0, m->wanted_height[f]) / m->def->swing_apex;
         }
     }
     return sum;
@@ -106,8 +107,10 @@ static double reward_orientation(const TaskMotion *m) {
     return 0.5 * (exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + exp(-20 * tilt));
 }
 
+/* A lump at touchdown: divided by the period, so that it is not spread over one step like a rate (the vendor's product
+ * with dt leaves a hundredth of it, which no learner notices). */
 static double reward_air_time(const TaskMotion *m) {
-    return m->standing ? 0 : m->landed_air_time;
+    return m->standing ? 0 : m->landed_air_time / TASK_PERIOD;
 }
 
 static double reward_base_motion(const TaskMotion *m) {

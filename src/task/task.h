@@ -15,7 +15,7 @@
 #define TASK_HISTORY (TASK_FRAMES * TASK_OBSERVATION)
 #define TASK_ACTIONS ROBOT_JOINTS
 #define TASK_ESTIMATES 11 /* base velocity 3, feet velocities 6, feet heights 2 */
-#define TASK_CRITIC 100
+#define TASK_CRITIC 101
 #define TASK_PERIOD 0.01 /* [s] policy step: 100 Hz (paper) */
 
 /* Scale of the feet heights among the estimates, so that centimetres weigh in the regression like m/s. */
@@ -36,12 +36,13 @@ typedef struct {
     MildTerrain terrain;
     double kp_scale[ROBOT_JOINTS], kd_scale[ROBOT_JOINTS], strength[ROBOT_JOINTS], motor_offset[ROBOT_JOINTS];
     int lag_command, lag_motor, lag_imu; /* [physics steps] */
+    double assist;            /* [-] share of the helping hand in this episode, drawn in [0, 1) */
     double push[6];           /* [m/s, rad/s] last push, for the critic; fades */
     /* state */
     RobotState robot;
     float action[3][TASK_ACTIONS]; /* now, one and two steps ago */
     float history[TASK_HISTORY];
-    double base_twist[6];     /* world, one policy step ago */
+    double base_twist[6];     /* one policy step ago: linear in the world, angular in the base frame */
     double joint_speed[ROBOT_JOINTS]; /* one policy step ago */
     double air_time[ROBOT_FEET];
     /* sums over the running episode, for the log */
@@ -121,6 +122,12 @@ double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
 /* Draws ground, robot and sensors of an episode (randomize.c). */
 void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);
 void task_draw_command(TaskEnv *env, const TaskDef *def);
+
+/* Help while learning starts (assist.c). The hand on the base: force, torque, world; returns 0 when there is none. The
+ * pose that actions are added to: the default pose, led along the reference gait while help lasts. */
+double task_assist_share(const TaskEnv *env, const TaskDef *def);
+int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, double wrench[6]);
+void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double pose[ROBOT_JOINTS]);
 
 /* Gait clock (gait.c): foot 0 stands while sin(2 pi phase) >= 0, foot 1 while < 0. */
 int task_is_standing(const double command[3]);

@@ -32,16 +32,17 @@ TaskDef task_def_default(void) {
         .noise_omega = 0.3,
         .noise_gravity = 0.075,
         .tilt_limit = 1.0,
+        .crossing_limit = 0.0,
+        .assist_time = 60,
         .newton = 1,
         .contact_tolerance = 1e-4,
         .contact_iterations = 20,
         .reward = {.clip_sum = 1,
                    .nominal_height = 0.83,
-                   .clearance_sharpness = 20,
                    .tracking_sharpness = 5,
                    .feet_range = {0.13, 0.26},
                    .knee_range = {0.12, 0.26},
-                   .reference_amplitude = 0.26},
+                   .reference_amplitude = 0.40},
         .randomize = {.rigid_share = 0.1,
                       .preset_share = 0.5,
                       .preset_jitter = 0.2,
@@ -58,7 +59,7 @@ TaskDef task_def_default(void) {
                       .rho = {1000, 1000},
                       .recovery = {0, 1},
                       .bed_depth = {0.10, 0.15},
-                      .sinkage_max = 0.09,
+                      .sinkage_max = 0.07,
                       .base_mass = {-4, 4},
                       .com_offset = 0.006,
                       .link_mass = {0.9, 1.1},
@@ -91,6 +92,7 @@ void task_def_make_nominal(TaskDef *def) {
     r->gain[0] = r->gain[1] = 1;
     r->strength[0] = r->strength[1] = 1;
     r->push_interval = 0;
+    def->assist_time = 0;
 }
 
 #define D MILD_FIELD_DOUBLE
@@ -113,7 +115,7 @@ const MildField task_fields[] = {
     T(standing_share, D, 1, 0, 1, "[-] share of commands that stand"),
     T(straight_share, D, 1, 0, 1, "[-] share of walking commands without sideways and turning parts"),
     T(gait_period, D, 1, 0.2, 3, "[s] T of the clock"),
-    T(swing_apex, D, 1, 0, 0.4, "[m] wanted height of the swing foot above h0"),
+    T(swing_apex, D, 1, 0.01, 0.4, "[m] wanted height of the swing foot above h0"),
     T(double_support, D, 1, 0, 1, "[-] |sin| of the clock below which either contact state is right"),
     T(clock, B, 1, 0, 1, "[bool] gait clock in the observation"),
     T(observe_noise, B, 1, 0, 1, "[bool] sensor noise"),
@@ -122,6 +124,8 @@ const MildField task_fields[] = {
     T(noise_omega, D, 1, 0, 5, "[rad/s] uniform +-"),
     T(noise_gravity, D, 1, 0, 1, "[-] uniform +-"),
     T(tilt_limit, D, 1, 0.1, 3.1, "[rad] the episode ends when the base tilts further"),
+    T(crossing_limit, D, 1, -1, 1, "[m] the episode ends when the feet come laterally closer; the legs have no contact"),
+    T(assist_time, D, 1, 0, 1e6, "[s] of each robot's life over which the helping hand on its base fades; 0: none"),
     T(newton, B, 1, 0, 1, "[bool] contact solver: the fast one; off: the paper's Gauss-Seidel"),
     T(contact_tolerance, D, 1, 1e-12, 0.1, "[-] relative residual at which the contact solver stops"),
     T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000, "[-] hard bound of the contact solver's work"),
@@ -135,7 +139,6 @@ const MildField reward_fields[] = {
     TASK_REWARD_LIST(TASK_REWARD_FIELD)
     R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
     R(nominal_height, D, 1, 0.1, 2, "[m] nominal base height above the stance soles"),
-    R(clearance_sharpness, D, 1, 0, 1000, "[1/m] of feet_clearance"),
     R(tracking_sharpness, D, 1, 0, 100, "[s^2/m^2] of linear_velocity and yaw_rate"),
     R(feet_range, D, 2, 0, 1, "[m] limits of the lateral distance of the feet"),
     R(knee_range, D, 2, 0, 1, "[m] limits of the lateral distance of the knees"),
@@ -164,11 +167,11 @@ const MildField randomize_fields[] = {
     Z(sinkage_max, 1, 0.005, 1, "[m] softer draws are made stiffer until one foot sinks no deeper"),
     Z(base_mass, 2, -8, 20, "[kg] added to the base (paper)"),
     Z(com_offset, 1, 0, 0.2, "[m] +- of the base's centre of mass (paper 0.006, vendor 0.06)"),
-    Z(link_mass, 2, 0.1, 3, "[-] range (vendor)"),
-    Z(armature, 2, 0.1, 5, "[-] range (vendor)"),
+    Z(link_mass, 2, 0.1, 3, "[-] range (as the vendor, narrower)"),
+    Z(armature, 2, 0.1, 5, "[-] range (as the vendor, narrower)"),
     Z(motor_offset, 1, 0, 0.5, "[rad] +- (paper)"),
-    Z(gain, 2, 0.1, 3, "[-] of Kp and Kd (vendor)"),
-    Z(strength, 2, 0.1, 3, "[-] of the torque (vendor)"),
+    Z(gain, 2, 0.1, 3, "[-] of Kp and Kd (as the vendor, narrower)"),
+    Z(strength, 2, 0.1, 3, "[-] of the torque (as the vendor, narrower)"),
     Z(latency, 2, 0, 0.01, "[s] of the command, motor readings and IMU readings, each (paper)"),
     Z(push_interval, 1, 0, 1000, "[s] between pushes; 0: none (vendor)"),
     Z(push_linear, 1, 0, 5, "[m/s] +- (vendor)"),

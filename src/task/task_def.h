@@ -10,7 +10,7 @@
 #define TASK_REWARD_LIST(X)                                                                                           \
     X(linear_velocity, 1.4, "exp(-5 |v_xy - command|^2), base heading frame (paper)")                                  \
     X(yaw_rate, 1.1, "exp(-5 (w_z - command)^2) (paper)")                                                              \
-    X(feet_clearance, 2.4, "swing feet: exp(-20 |h - h_des(phase)|), h of the lowest sole point above h0 (paper)")    \
+    X(feet_clearance, 2.4, "swing feet: clip(h, 0, h_des(phase)), h of the lowest sole point above h0 (paper)")    \
     X(gait, 1.4, "mean over feet: 1 when contact matches the clock, else -0.3 (paper)")                                \
     X(slip, -0.1, "[m/s] horizontal speed of feet in contact (paper)")                                                 \
     X(base_acceleration, 0.2, "exp(-3 |change of base twist in one step|) (paper)")                                    \
@@ -37,7 +37,6 @@ typedef struct {
     double weight[TASK_REWARD_COUNT]; /* [1/s] */
     int clip_sum;                     /* bool: the sum of a step is never below 0 (vendor) */
     double nominal_height;            /* [m] nominal base height above the stance soles */
-    double clearance_sharpness;       /* [1/m] */
     double tracking_sharpness;        /* [s^2/m^2] the 5 in the velocity terms */
     double feet_range[2], knee_range[2]; /* [m] limits */
     double reference_amplitude;       /* [rad] */
@@ -85,6 +84,8 @@ typedef struct {
     int observe_noise;      /* bool */
     double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
     double tilt_limit;      /* [rad] */
+    double crossing_limit;  /* [m] lateral distance of the feet below which the episode ends */
+    double assist_time;     /* [s] of each environment's life over which the helping hand fades; 0: none */
     int newton;             /* bool: fast solver; off: the paper's sweeps */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */
     int contact_iterations; /* [-] hard bound of its work */
@@ -93,7 +94,7 @@ typedef struct {
 } TaskDef;
 
 TaskDef task_def_default(void);
-/* Nothing random but sensor noise and latencies' mean: for evaluation and play. */
+/* The nominal robot, undisturbed, for evaluation and play; sensor noise, latencies and the start are still drawn. */
 void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);
 
