@@ -15,7 +15,7 @@
 #include "app/train.h"
 #include "base/clock.h"
 
-enum { COLUMNS_FIXED = 24, COLUMNS = COLUMNS_FIXED + TASK_REWARD_COUNT };
+enum { COLUMNS_FIXED = 25, COLUMNS = COLUMNS_FIXED + TASK_REWARD_COUNT };
 
 typedef struct {
     const char *config, *out;
@@ -33,7 +33,8 @@ static const char *const fixed_columns[COLUMNS_FIXED] = {
     "episode/diverged",    "loss/surrogate",        "loss/value",          "loss/entropy",    "loss/kl",
     "loss/clip_share",     "loss/mirror",           "loss/reconstruction", "loss/vae_kl",     "loss/base_velocity",
     "loss/feet_velocity",  "loss/feet_height",      "ppo/learning_rate",   "ppo/gradient",    "ppo/action_std",
-    "ppo/explained",       "ppo/skipped",           "rate/steps_per_s",    "rate/steps"};
+    "ppo/explained",       "ppo/skipped",           "rate/steps_per_s",    "rate/steps",
+    "episode/assist"};
 
 static void name_columns(Run *run) {
     for (int i = 0; i < COLUMNS; i++) {
@@ -53,7 +54,8 @@ static void fill_row(const Run *run, const TrainReport *r, double row[COLUMNS]) 
         r->episodes.diverged, r->ppo.surrogate, r->ppo.value_loss, r->ppo.entropy, r->ppo.kl,
         r->ppo.clip_share, r->ppo.mirror, r->ppo.vae_reconstruction, r->ppo.vae_kl, r->ppo.estimate_loss[0],
         r->ppo.estimate_loss[1], r->ppo.estimate_loss[2], r->ppo.learning_rate, r->ppo.gradient_norm, r->ppo.action_std,
-        r->ppo.explained_variance, r->ppo.skipped, r->steps_per_s, per_iteration * (double)train_iteration(run->trainer)};
+        r->ppo.explained_variance, r->ppo.skipped, r->steps_per_s, per_iteration * (double)train_iteration(run->trainer),
+        r->episodes.assist};
     memcpy(row, fixed, sizeof fixed);
     memcpy(row + COLUMNS_FIXED, r->episodes.terms, sizeof r->episodes.terms);
 }

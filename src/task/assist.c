@@ -1,24 +1,36 @@
-/* Help for the first minutes of a robot's life, after the assistance curriculum of Yu, Turk and Liu 2018 ("Learning
- * symmetric and low-energy locomotion"). Balance is so hard with the paper's soft ankles that a beginner learns to stand
- * stiff and never finds out that stepping pays. While a hand holds the trunk upright and draws it along, and the legs are
- * led through the reference gait, stepping comes by itself and is rewarded from the start; the help fades with the
- * environment's age, and each episode draws its own share of it, so that every amount down to none is met at any time.
+/* Help for beginners, after the assistance curriculum of Yu, Turk and Liu 2018 ("Learning symmetric and low-energy
+ * locomotion"). Balance is so hard with the paper's soft ankles that a beginner learns to stand stiff and never finds out
+ * that stepping pays. While a hand holds the trunk upright and draws it along, and the legs are led through the reference
+ * gait, stepping comes by itself and is rewarded from the start. Each robot's level of help decays while it stays on its
+ * feet and rises when it falls: it settles where episodes last about four seconds, and goes to nothing as they last longer.
  * Never present in evaluation (task_def_make_nominal): there actions are deviations from the time-invariant pose. */
 #include <math.h>
 
 #include "task/task.h"
 
-#define ASSIST_TILT 600.0        /* [N m/rad] */
-#define ASSIST_TILT_DAMPING 60.0 /* [N m s/rad] */
-#define ASSIST_DRAW 200.0        /* [N s/m] towards the commanded velocity */
-#define ASSIST_DRAW_LIMIT 80.0   /* [N] */
+#define ASSIST_TILT 300.0        /* [N m/rad] */
+#define ASSIST_TILT_DAMPING 30.0 /* [N m s/rad] */
+#define ASSIST_DRAW 100.0        /* [N s/m] towards the commanded velocity */
+#define ASSIST_DRAW_LIMIT 30.0   /* [N] more, and it leans into the hand */
 #define ASSIST_WEIGHT 0.5        /* [-] share of the weight carried */
 #define ASSIST_LEAD 1.3          /* [-] of the reference gait: the joints lag behind their targets */
+#define ASSIST_GRACE 2.0         /* [s] on its feet before the level decays */
+#define ASSIST_DECAY 8.0         /* [s] */
+#define ASSIST_RISE 1.3          /* [-] at a fall */
+#define ASSIST_LEAST 0.01        /* [-] added at a fall */
 #define GRAVITY 9.81
 
 double task_assist_share(const TaskEnv *env, const TaskDef *def) {
-    double age = env->tick * TASK_PERIOD, fade = def->assist_time > 0 ? 1 - age / def->assist_time : 0;
-    return fmax(fade, 0) * fmin(1.5 * env->assist, 1);
+    return def->assist ? env->assist_level * env->assist_draw : 0;
+}
+
+/* One policy step; level stays where falls every 2 s + decay ln(ASSIST_RISE) balance. */
+void task_assist_adapt(TaskEnv *env, int fallen) {
+    if (fallen) {
+        env->assist_level = fmin(1, ASSIST_RISE * env->assist_level + ASSIST_LEAST);
+    } else if ((env->step - env->step_first) * TASK_PERIOD > ASSIST_GRACE) {
+        env->assist_level *= 1 - TASK_PERIOD / ASSIST_DECAY;
+    }
 }
 
 void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double pose[ROBOT_JOINTS]) {

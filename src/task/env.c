@@ -27,6 +27,7 @@ void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_
     env->seed = seed;
     env->index = index;
     env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
+    env->assist_level = 1;
 }
 
 /* ---- start of an episode ---- */
@@ -292,6 +293,7 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     int fallen = bad || has_fallen(env, def, sim);
     out.timeout = !fallen && env->step >= env->step_limit;
     out.done = fallen || out.timeout;
+    task_assist_adapt(env, fallen);
     if (out.done) {
         report_episode(env, &out);
     }

@@ -112,7 +112,7 @@ void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot) {
         env->strength[i] = strength;
         env->motor_offset[i] = spread(&r, z->motor_offset);
     }
-    env->assist = random_unit(&r);
+    env->assist_draw = random_uniform(&r, 0.5, 1);
     env->lag_command = draw_lag(&r, def);
     env->lag_motor = draw_lag(&r, def);
     env->lag_imu = draw_lag(&r, def);

@@ -36,7 +36,8 @@ typedef struct {
     MildTerrain terrain;
     double kp_scale[ROBOT_JOINTS], kd_scale[ROBOT_JOINTS], strength[ROBOT_JOINTS], motor_offset[ROBOT_JOINTS];
     int lag_command, lag_motor, lag_imu; /* [physics steps] */
-    double assist;            /* [-] share of the helping hand in this episode, drawn in [0, 1) */
+    double assist_level;      /* [-] helping hand: falls with time on its feet, rises with falls; lives across episodes */
+    double assist_draw;       /* [-] this episode's share of the level, in [0.5, 1) */
     double push[6];           /* [m/s, rad/s] last push, for the critic; fades */
     /* state */
     RobotState robot;
@@ -126,6 +127,7 @@ void task_draw_command(TaskEnv *env, const TaskDef *def);
 /* Help while learning starts (assist.c). The hand on the base: force, torque, world; returns 0 when there is none. The
  * pose that actions are added to: the default pose, led along the reference gait while help lasts. */
 double task_assist_share(const TaskEnv *env, const TaskDef *def);
+void task_assist_adapt(TaskEnv *env, int fallen);
 int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, double wrench[6]);
 void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double pose[ROBOT_JOINTS]);
 

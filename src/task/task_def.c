@@ -33,7 +33,7 @@ TaskDef task_def_default(void) {
         .noise_gravity = 0.075,
         .tilt_limit = 1.0,
         .crossing_limit = 0.0,
-        .assist_time = 60,
+        .assist = 1,
         .newton = 1,
         .contact_tolerance = 1e-4,
         .contact_iterations = 20,
@@ -92,7 +92,7 @@ void task_def_make_nominal(TaskDef *def) {
     r->gain[0] = r->gain[1] = 1;
     r->strength[0] = r->strength[1] = 1;
     r->push_interval = 0;
-    def->assist_time = 0;
+    def->assist = 0;
 }
 
 #define D MILD_FIELD_DOUBLE
@@ -125,7 +125,7 @@ const MildField task_fields[] = {
     T(noise_gravity, D, 1, 0, 1, "[-] uniform +-"),
     T(tilt_limit, D, 1, 0.1, 3.1, "[rad] the episode ends when the base tilts further"),
     T(crossing_limit, D, 1, -1, 1, "[m] the episode ends when the feet come laterally closer; the legs have no contact"),
-    T(assist_time, D, 1, 0, 1e6, "[s] of each robot's life over which the helping hand on its base fades; 0: none"),
+    T(assist, B, 1, 0, 1, "[bool] helping hand for beginners, fading as a robot stays on its feet"),
     T(newton, B, 1, 0, 1, "[bool] contact solver: the fast one; off: the paper's Gauss-Seidel"),
     T(contact_tolerance, D, 1, 1e-12, 0.1, "[-] relative residual at which the contact solver stops"),
     T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000, "[-] hard bound of the contact solver's work"),

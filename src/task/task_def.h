@@ -20,7 +20,7 @@
     X(base_height, 0.2, "exp(-100 |height above the stance soles - nominal|) (vendor)")                                \
     X(feet_distance, 0.2, "lateral distance of the feet within limits (vendor)")                                       \
     X(knee_distance, 0.2, "lateral distance of the knees within limits (vendor)")                                      \
-    X(orientation, 1.0, "upright base (vendor)")                                                                       \
+    X(orientation, 1.5, "upright base (vendor)")                                                                       \
     X(air_time, 1.5, "[s] time in the air, paid at touchdown, at most 0.5 (vendor)")                                   \
     X(base_motion, 0.5, "small vertical and roll-pitch speed of the base (vendor)")                                    \
     X(contact_force, -0.02, "[N] foot force above 500 N, at most 400 (vendor)")                                        \
@@ -85,7 +85,7 @@ typedef struct {
     double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
     double tilt_limit;      /* [rad] */
     double crossing_limit;  /* [m] lateral distance of the feet below which the episode ends */
-    double assist_time;     /* [s] of each environment's life over which the helping hand fades; 0: none */
+    int assist;             /* bool: helping hand for beginners (assist.c) */
     int newton;             /* bool: fast solver; off: the paper's sweeps */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */
     int contact_iterations; /* [-] hard bound of its work */

@@ -21,6 +21,7 @@ typedef struct {
     double length;      /* [s] mean */
     double reward;      /* mean sum of an episode */
     double speed_error; /* [m/s] mean */
+    double assist;      /* [-] mean level of help of all robots now */
     double terms[TASK_REWARD_COUNT]; /* mean per second lived */
 } VecStats;
 
