@@ -39,7 +39,7 @@ static cJSON *row_json(const EvalRow *row) {
                   {"cot", row->cot}, {"torque_max", row->torque_max}, {"clearance", row->clearance},
                   {"penetration", row->penetration}, {"drift", row->drift}, {"energy", row->energy},
                   {"velocity_low", row->velocity_low}, {"velocity_high", row->velocity_high},
-                  {"com_oscillation", row->com_oscillation}, {"seconds", row->seconds}};
+                  {"base_oscillation", row->base_oscillation}, {"seconds", row->seconds}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }

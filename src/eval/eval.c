@@ -61,11 +61,38 @@ static double student_95(int samples) {
     return samples < 2 ? 0 : samples <= 10 ? table[samples] : 1.96 + 2.6 / (samples - 1);
 }
 
+/* Speed, cost of transport and base motion over the steady part of the trials that stayed up; of all when none did: a robot
+ * that dives forward and falls is not fast. */
+static void summarise_motion(const Trials *t, EvalRow *row) {
+    double weight = robot_total_mass(t->robot) * GRAVITY, v_sum = 0, v_square = 0;
+    int steady = 0;
+    for (int i = 0; i < t->eval->trials; i++) {
+        const Measure *m = &t->measure[i];
+        if (m->steady_time <= 0.5 || (row->success && t->over[i])) {
+            continue;
+        }
+        double distance = m->end_x - m->start_x, v = distance / m->steady_time;
+        v_sum += v;
+        v_square += v * v;
+        row->cot += m->work / (weight * fmax(fabs(distance), 1e-3));
+        row->base_oscillation += m->base_high - m->base_low;
+        steady++;
+    }
+    if (!steady) {
+        return;
+    }
+    row->velocity = v_sum / steady;
+    double variance = fmax(v_square / steady - row->velocity * row->velocity, 0) * steady / fmax(steady - 1, 1);
+    double half = student_95(steady) * sqrt(variance / steady);
+    row->velocity_low = row->velocity - half;
+    row->velocity_high = row->velocity + half;
+    row->cot /= steady;
+    row->base_oscillation /= steady;
+}
+
 static void summarise(const Trials *t, EvalRow *row) {
-    int n = t->eval->trials;
-    double weight = robot_total_mass(t->robot) * GRAVITY, v_sum = 0, v_square = 0, cot = 0;
+    int n = t->eval->trials, swings = 0, stances = 0;
     double apex = 0, deepest = 0, drift = 0;
-    int swings = 0, stances = 0, steady = 0;
     *row = (EvalRow){.speed = t->eval->speed, .trials = n};
     snprintf(row->ground, sizeof row->ground, "%s", t->scene->name);
     for (int i = 0; i < n; i++) {
@@ -80,24 +107,8 @@ static void summarise(const Trials *t, EvalRow *row) {
         deepest += m->deepest_sum;
         drift += m->drift_sum;
         stances += m->stances;
-        if (m->steady_time > 0.5) {
-            double distance = m->end_x - m->start_x, v = distance / m->steady_time;
-            v_sum += v;
-            v_square += v * v;
-            cot += m->work / (weight * fmax(fabs(distance), 1e-3));
-            row->com_oscillation += m->base_high - m->base_low;
-            steady++;
-        }
     }
-    if (steady) {
-        row->velocity = v_sum / steady;
-        double variance = fmax(v_square / steady - row->velocity * row->velocity, 0) * steady / fmax(steady - 1, 1);
-        double half = student_95(steady) * sqrt(variance / steady);
-        row->velocity_low = row->velocity - half;
-        row->velocity_high = row->velocity + half;
-        row->cot = cot / steady;
-        row->com_oscillation /= steady;
-    }
+    summarise_motion(t, row);
     row->clearance = swings ? apex / swings : 0;
     row->penetration = stances ? deepest / stances : 0;
     row->drift = stances ? drift / stances : 0;

@@ -26,7 +26,7 @@ typedef struct {
     double penetration;   /* [m] deepest element of each stance */
     double drift;         /* [m] horizontal travel of the sole between touchdown and lift-off */
     double energy;        /* [J] integral |tau . qd| dt */
-    double com_oscillation; /* [m] peak to peak of the base height over the steady part */
+    double base_oscillation; /* [m] peak to peak of the base height over the steady part */
     double seconds;       /* [s] mean time on its feet */
 } EvalRow;
 

@@ -192,7 +192,7 @@ static void feet_motion(TaskEnv *env, const TaskDef *def, const RobotSim *sim, T
         m->either[f] = !m->standing && fabs(sin(6.283185307179586 * env->phase)) < def->double_support;
         m->wanted_height[f] = task_gait_height(def, env->phase, m->standing, f);
         if (m->contact[f]) {
-            m->landed_air_time += fmin(env->air_time[f], 0.5);
+            m->landed_air_time += fmin(env->air_time[f], 0.5 * def->gait_period);
             env->air_time[f] = 0;
         } else {
             env->air_time[f] += TASK_PERIOD;

@@ -23,12 +23,14 @@ static double reward_yaw_rate(const TaskMotion *m) {
 
 /* The paper prints a positive weight on an error; of learning.md's two readings this is the one that pays nothing to a
  * foot that stays down (exp(-k error) pays it a third of a perfect swing) and has a slope from the first millimetre.
- * Scaled so that following h_des = apex sin(pi s) gives 1 on average over the swing. */
+ * Lifting higher than wanted costs half as fast as lifting pays. Scaled so that following h_des = apex sin(pi s) gives 1
+ * on average over the swing. */
 static double reward_feet_clearance(const TaskMotion *m) {
     double sum = 0;
     for (int f = 0; f < ROBOT_FEET; f++) {
         if (!m->stance[f]) {
-            sum += 1.5707963 * clamp(m->foot_height[f], 0, m->wanted_height[f]) / m->def->swing_apex;
+            double h = m->foot_height[f], wanted = m->wanted_height[f];
+            sum += 1.5707963 * (clamp(h, 0, wanted) - 0.5 * clamp(h - wanted, 0, 0.3)) / m->def->swing_apex;
         }
     }
     return sum;
@@ -83,7 +85,7 @@ static double reward_default_pose(const TaskMotion *m) {
     for (int i = 0; i < ROBOT_JOINTS; i++) {
         all += square(m->q[i] - m->pose[i]);
     }
-    return 0.5 * (exp(-100 * clamp(roll_yaw - 0.1, 0, 50)) + exp(-5 * roll_yaw)) - 0.01 * sqrt(all);
+    return 0.5 * (exp(-100 * clamp(roll_yaw - 0.1, 0, 50)) + exp(-3 * roll_yaw)) - 0.01 * sqrt(all);
 }
 
 static double reward_base_height(const TaskMotion *m) {

@@ -10,18 +10,18 @@
 #define TASK_REWARD_LIST(X)                                                                                           \
     X(linear_velocity, 1.4, "exp(-5 |v_xy - command|^2), base heading frame (paper)")                                  \
     X(yaw_rate, 1.1, "exp(-5 (w_z - command)^2) (paper)")                                                              \
-    X(feet_clearance, 2.4, "swing feet: clip(h, 0, h_des(phase)), h of the lowest sole point above h0 (paper)")    \
+    X(feet_clearance, 2.4, "swing feet: clip(h, 0, h_des) less half of what is above h_des, h of the lowest sole point above h0 (paper)")    \
     X(gait, 1.4, "mean over feet: 1 when contact matches the clock, else -0.3 (paper)")                                \
     X(slip, -0.1, "[m/s] horizontal speed of feet in contact (paper)")                                                 \
     X(base_acceleration, 0.2, "exp(-3 |change of base twist in one step|) (paper)")                                    \
     X(action_smoothness, -0.003, "|a - a1|^2 + |a - 2 a1 + a2|^2 (paper)")                                             \
     X(reference_motion, 2.2, "exp(-2 d) - 0.2 min(d, 0.5), d = |q - q_ref(phase)| (vendor)")                           \
-    X(default_pose, 0.8, "hip roll and yaw near the default pose (vendor)")                                            \
+    X(default_pose, 1.2, "hip roll and yaw near the default pose (vendor)")                                            \
     X(base_height, 0.2, "exp(-100 |height above the stance soles - nominal|) (vendor)")                                \
     X(feet_distance, 0.2, "lateral distance of the feet within limits (vendor)")                                       \
     X(knee_distance, 0.2, "lateral distance of the knees within limits (vendor)")                                      \
     X(orientation, 1.5, "upright base (vendor)")                                                                       \
-    X(air_time, 1.5, "[s] time in the air, paid at touchdown, at most 0.5 (vendor)")                                   \
+    X(air_time, 1.0, "[s] time in the air, paid at touchdown, at most half a gait period (vendor)")                                   \
     X(base_motion, 0.5, "small vertical and roll-pitch speed of the base (vendor)")                                    \
     X(contact_force, -0.02, "[N] foot force above 500 N, at most 400 (vendor)")                                        \
     X(torque, -1e-10, "[N^2 m^2] sum of squared torques (vendor)")                                                     \
