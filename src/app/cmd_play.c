@@ -199,7 +199,6 @@ static MildStatus finish_video(Command *c, MildStatus status, MildError *error) 
 
 static MildStatus walk(Command *c, MildError *error) {
     Play *play = &c->play;
-    interrupt_install();
     MildStatus status = play_run(play, error);
     if (play->video) status = finish_video(c, status, error);
     if (status != MILD_OK) return status;
@@ -214,6 +213,7 @@ static MildStatus walk(Command *c, MildError *error) {
 static MildStatus prepare(Command *c, const char *xml, MildError *error) {
     Play *play = &c->play;
     MildStatus status = MILD_OK;
+    interrupt_install();
     if (c->pressure && c->scene.rigid) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--pressure: rigid ground has no elements, choose a soft one");
     }

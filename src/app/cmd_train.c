@@ -165,7 +165,6 @@ static MildStatus train_loop(Run *run, MildError *error) {
     int64_t diverged = 0, skipped = 0;
     int first = 1;
     MildStatus status = MILD_OK;
-    interrupt_install();
     while (status == MILD_OK && !interrupt_requested()) {
         TrainReport report;
         double row[COLUMNS];
@@ -295,6 +294,7 @@ int cmd_train(int argc, char **argv) {
     } else if (!run->out) {
         code = cli_fail_text("train", "--out FOLDER is missing");
     } else {
+        interrupt_install();
         MildStatus status = prepare(run, args, &error);
         if (status == MILD_OK) status = train_loop(run, &error);
         code = status == MILD_OK ? 0 : cli_fail("train", &error);

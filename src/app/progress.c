@@ -1,7 +1,9 @@
 #include "app/progress.h"
 
+#include <pthread.h>
 #include <signal.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/ioctl.h>
@@ -66,20 +68,34 @@ void progress_end(Progress *progress, const char *format, ...) {
     if (progress->terminal) fputc('\n', stderr);
 }
 
-static volatile sig_atomic_t interrupted;
+/* oneDNN 2.6's generated kernels keep data below the stack pointer, where the kernel puts the frame of a signal handler: a
+ * Ctrl-C in the middle of a product corrupted the heap. So no thread that computes ever runs a handler: the signals are
+ * blocked (threads made later inherit that) and a thread of their own waits for them. */
+static atomic_int interrupted;
 
-static void on_interrupt(int signal_number) {
-    if (interrupted) _exit(128 + signal_number);
-    interrupted = 1;
+static void *wait_for_signals(void *signals) {
+    for (int signal_number; sigwait(signals, &signal_number) == 0;) {
+        if (atomic_exchange(&interrupted, 1)) {
+            _exit(128 + signal_number);
+        }
+    }
+    return NULL;
 }
 
 void interrupt_install(void) {
-    struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = SA_RESTART};
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, NULL);
-    sigaction(SIGTERM, &action, NULL);
+    static sigset_t signals;
+    pthread_t thread;
+    sigemptyset(&signals);
+    sigaddset(&signals, SIGINT);
+    sigaddset(&signals, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals, NULL);
+    if (pthread_create(&thread, NULL, wait_for_signals, &signals) == 0) {
+        pthread_detach(thread);
+    } else {
+        pthread_sigmask(SIG_UNBLOCK, &signals, NULL); /* better an abrupt end than none */
+    }
 }
 
 int interrupt_requested(void) {
-    return interrupted != 0;
+    return atomic_load(&interrupted);
 }
