@@ -16,7 +16,7 @@ PolicyDef policy_def_default(void) {
     return (PolicyDef){
         .observation = 47,
         .frames = 6,
-        .critic_input = 101,
+        .critic_input = 104,
         .actions = 12,
         .estimates = 11,
         .feet_velocity_offset = 3,

@@ -83,6 +83,7 @@ static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, 
     memset(env->action, 0, sizeof env->action);
     memset(env->air_time, 0, sizeof env->air_time);
     memset(env->joint_speed, 0, sizeof env->joint_speed);
+    memset(env->smooth_velocity, 0, sizeof env->smooth_velocity);
     memset(env->push, 0, sizeof env->push);
     memset(env->term_sum, 0, sizeof env->term_sum);
     env->reward_sum = env->speed_error_sum = 0;
@@ -223,6 +224,10 @@ static TaskMotion describe_motion(TaskEnv *env, const TaskDef *def, const Robot 
         change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
     }
     m.twist_change = sqrt(change);
+    const double now[3] = {m.velocity[0], m.velocity[1], m.omega[2]};
+    for (int i = 0; i < 3; i++) {
+        env->smooth_velocity[i] += TASK_PERIOD / def->reward.tracking_time * (now[i] - env->smooth_velocity[i]);
+    }
     memcpy(env->base_twist, twist, sizeof twist);
     memcpy(m.q, robot_sim_qpos(sim) + 7, sizeof m.q);
     memcpy(m.qd, qvel + 6, sizeof m.qd);
@@ -278,7 +283,8 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
         TaskMotion motion = describe_motion(env, def, robot, sim, torque);
         out.reward = (float)task_reward(&motion, terms);
         bad = !isfinite(out.reward);
-        env->speed_error_sum += hypot(motion.velocity[0] - env->command[0], motion.velocity[1] - env->command[1]);
+        env->speed_error_sum +=
+            hypot(env->smooth_velocity[0] - env->command[0], env->smooth_velocity[1] - env->command[1]);
     }
     if (bad) {
         out.reward = 0;

@@ -138,6 +138,9 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const RobotSim 
     *out++ = (float)(env->lag_imu * step);
     *out++ = (float)env->variation.rigid_friction;
     *out++ = (float)task_assist_share(env, def);
+    for (int i = 0; i < 3; i++) {
+        *out++ = (float)env->smooth_velocity[i];
+    }
 }
 
 void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, const TaskReading *reading,

@@ -12,13 +12,20 @@ static double clamp(double x, double low, double high) {
     return x < low ? low : x > high ? high : x;
 }
 
+/* exp(-k e^2) of the paper, and beside it the same six times as sharp: the first reaches out to a beginner, the second tells
+ * 0.5 from 0.6 m/s. Both on the velocity smoothed over half a gait period: the sway of every step is no error, and hid it. */
+static double tracking(const TaskMotion *m, double error_square) {
+    double k = m->def->reward.tracking_sharpness;
+    return 0.5 * (exp(-k * error_square) + exp(-6 * k * error_square));
+}
+
 static double reward_linear_velocity(const TaskMotion *m) {
-    double error = square(m->velocity[0] - m->env->command[0]) + square(m->velocity[1] - m->env->command[1]);
-    return exp(-m->def->reward.tracking_sharpness * error);
+    const double *v = m->env->smooth_velocity, *command = m->env->command;
+    return tracking(m, square(v[0] - command[0]) + square(v[1] - command[1]));
 }
 
 static double reward_yaw_rate(const TaskMotion *m) {
-    return exp(-m->def->reward.tracking_sharpness * square(m->omega[2] - m->env->command[2]));
+    return tracking(m, square(m->env->smooth_velocity[2] - m->env->command[2]));
 }
 
 /* The paper prints a positive weight on an error; of learning.md's two readings this is the one that pays nothing to a

@@ -15,7 +15,7 @@
 #define TASK_HISTORY (TASK_FRAMES * TASK_OBSERVATION)
 #define TASK_ACTIONS ROBOT_JOINTS
 #define TASK_ESTIMATES 11 /* base velocity 3, feet velocities 6, feet heights 2 */
-#define TASK_CRITIC 101
+#define TASK_CRITIC 104
 #define TASK_PERIOD 0.01 /* [s] policy step: 100 Hz (paper) */
 
 /* Scale of the feet heights among the estimates, so that centimetres weigh in the regression like m/s. */
@@ -44,6 +44,7 @@ typedef struct {
     float action[3][TASK_ACTIONS]; /* now, one and two steps ago */
     float history[TASK_HISTORY];
     double base_twist[6];     /* one policy step ago: linear in the world, angular in the base frame */
+    double smooth_velocity[3]; /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over reward.tracking_time */
     double joint_speed[ROBOT_JOINTS]; /* one policy step ago */
     double air_time[ROBOT_FEET];
     /* sums over the running episode, for the log */

@@ -40,6 +40,7 @@ TaskDef task_def_default(void) {
         .reward = {.clip_sum = 1,
                    .nominal_height = 0.83,
                    .tracking_sharpness = 5,
+                   .tracking_time = 0.4,
                    .feet_range = {0.13, 0.26},
                    .knee_range = {0.12, 0.26},
                    .reference_amplitude = 0.40},
@@ -139,6 +140,7 @@ const MildField reward_fields[] = {
     TASK_REWARD_LIST(TASK_REWARD_FIELD)
     R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
     R(nominal_height, D, 1, 0.1, 2, "[m] nominal base height above the stance soles"),
+    R(tracking_time, D, 1, 0.01, 10, "[s] over which the tracked velocity is smoothed"),
     R(tracking_sharpness, D, 1, 0, 100, "[s^2/m^2] of linear_velocity and yaw_rate"),
     R(feet_range, D, 2, 0, 1, "[m] limits of the lateral distance of the feet"),
     R(knee_range, D, 2, 0, 1, "[m] limits of the lateral distance of the knees"),

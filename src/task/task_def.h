@@ -8,8 +8,8 @@
 /* Every reward term once: name, default weight, help. The struct, the config keys and the table of functions
  * (reward.c) are all made from this list. Weights are per second; source: paper Table II and learning.md section 5. */
 #define TASK_REWARD_LIST(X)                                                                                           \
-    X(linear_velocity, 1.4, "exp(-5 |v_xy - command|^2), base heading frame (paper)")                                  \
-    X(yaw_rate, 1.1, "exp(-5 (w_z - command)^2) (paper)")                                                              \
+    X(linear_velocity, 2.0, "mean of exp(-k e^2), exp(-6 k e^2), e = |v_xy - command|, smoothed, heading frame (paper)")                                  \
+    X(yaw_rate, 1.1, "the same of w_z - command (paper)")                                                              \
     X(feet_clearance, 2.4, "swing feet: clip(h, 0, h_des) less half of what is above h_des, h of the lowest sole point above h0 (paper)")    \
     X(gait, 1.4, "mean over feet: 1 when contact matches the clock, else -0.3 (paper)")                                \
     X(slip, -0.1, "[m/s] horizontal speed of feet in contact (paper)")                                                 \
@@ -37,7 +37,8 @@ typedef struct {
     double weight[TASK_REWARD_COUNT]; /* [1/s] */
     int clip_sum;                     /* bool: the sum of a step is never below 0 (vendor) */
     double nominal_height;            /* [m] nominal base height above the stance soles */
-    double tracking_sharpness;        /* [s^2/m^2] the 5 in the velocity terms */
+    double tracking_sharpness;        /* [s^2/m^2] k = 5 in the velocity terms */
+    double tracking_time;             /* [s] over which the tracked velocity is smoothed */
     double feet_range[2], knee_range[2]; /* [m] limits */
     double reference_amplitude;       /* [rad] */
 } RewardDef;
