@@ -35,6 +35,7 @@ static void test_act_and_value(void **state) {
     enum { ROWS = 300 };
     MildError error = {0};
     PolicyDef def = policy_def_default();
+    def.critic_input = 98; /* of any task */
     Policy *policy = policy_create(&def, 3, &error);
     Pool *pool = pool_create(3);
     assert_true(policy && pool);
