@@ -2,14 +2,17 @@
 JOBS ?= $(shell nproc)
 MINUTES ?= 5
 CMAKE_FLAGS ?=
+PREFIX ?= /usr/local
+MARCH ?= native
 
-.PHONY: setup build test run bench clean help
+.PHONY: setup build test run bench install clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
 	@echo "make test    set up, build, run every test"
 	@echo "make build   set up, build build/mild"
 	@echo "make bench   set up, build, measure speed and memory"
+	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
 
@@ -28,6 +31,13 @@ run: build
 
 bench: build
 	@build/mild bench
+
+# The library needs no setup; its own folder, so that a program that runs from build/ is left alone.
+install:
+	@cmake -S . -B build/library -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_APP=OFF -DMILD_TESTS=OFF \
+		-DMILD_MARCH=$(MARCH) -DCMAKE_INSTALL_PREFIX=$(PREFIX) $(CMAKE_FLAGS)
+	@cmake --build build/library --parallel $(JOBS)
+	@cmake --install build/library
 
 clean:
 	rm -rf build

@@ -2,6 +2,10 @@
 #ifndef MILD_ERROR_H
 #define MILD_ERROR_H
 
+#include "mild/api.h"
+
+MILD_API_BEGIN
+
 typedef enum {
     MILD_OK = 0,
     MILD_ERROR_ARGUMENT, /* a value the caller gave is not usable */
@@ -18,5 +22,7 @@ typedef struct {
 
 /* Fill *error (may be NULL) printf-style; returns status so that `return mild_fail(...)` reads well. Thread safe. */
 MildStatus mild_fail(MildError *error, MildStatus status, const char *format, ...);
+
+MILD_API_END
 
 #endif

@@ -6,6 +6,8 @@
 
 #include "mild/error.h"
 
+MILD_API_BEGIN
+
 typedef enum { MILD_FIELD_DOUBLE, MILD_FIELD_INT, MILD_FIELD_BOOL, MILD_FIELD_TEXT, MILD_FIELD_UINT64 } MildFieldType;
 
 /* BOOL is stored as int; TEXT as char[count]; the others as arrays of `count` values (count 1 for a scalar). */
@@ -32,5 +34,7 @@ int mild_field_print(const MildField *field, const void *def, char *text, size_t
 
 /* Field by name, or NULL; *nearest (may be NULL) receives the name with the smallest edit distance. */
 const MildField *mild_field_find(const MildField *fields, int count, const char *name, const char **nearest);
+
+MILD_API_END
 
 #endif

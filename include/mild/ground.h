@@ -18,9 +18,7 @@
 #include "mild/error.h"
 #include "mild/field.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+MILD_API_BEGIN
 
 #define MILD_FEET_MAX 2
 #define MILD_MATERIALS_MAX 12
@@ -172,7 +170,6 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int foot);
 /* Largest depth each element has reached since it touched [m]; array of mild_sole_elements(). */
 const double *mild_ground_depth_max(const MildGround *ground, int foot);
 
-#ifdef __cplusplus
-}
-#endif
+MILD_API_END
+
 #endif

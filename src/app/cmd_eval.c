@@ -8,6 +8,7 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/config.h"
+#include "app/experiment.h"
 #include "app/grounds.h"
 #include "app/paths.h"
 #include "app/report.h"
@@ -17,7 +18,7 @@
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
 
 typedef struct {
-    const char *policy, *json;
+    const char *policy, *config, *json;
     CliNames grounds;
     CliNumbers speeds;
     double patch;
@@ -109,10 +110,9 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
 
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     char path[PATH_SIZE];
-    e->task = task_def_default();
-    task_def_make_nominal(&e->task);
     e->args = args;
-    MildStatus status = check_grounds(e, error);
+    MildStatus status = experiment_nominal_task(&e->task, e->config, error);
+    if (status == MILD_OK) status = check_grounds(e, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -149,6 +149,7 @@ int cmd_eval(int argc, char **argv) {
     strcpy(e->grounds.name[2], "sand_loose");
     const CliOption options[] = {
         {"policy", CLI_TEXT, &e->policy, 0, 0, "FILE", "policy to try (policies/mild.safetensors)"},
+        {"config", CLI_TEXT, &e->config, 0, 0, "FILE", "config the policy was trained with, for its [task]"},
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
          "grounds, a row each; rubber+foam45 is a course of both (rigid,foam45,sand_loose)"},
         {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]", "[m/s] commanded forward speeds, a row each (0.6)"},

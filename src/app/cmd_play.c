@@ -39,18 +39,6 @@ typedef struct {
 
 /* ---- set-up ---- */
 
-static MildStatus make_task(Command *c, MildError *error) {
-    c->task = task_def_default();
-    if (c->config) {
-        ExperimentDef experiment = experiment_def_default();
-        MildStatus status = experiment_read(&experiment, c->config, NULL, 0, error);
-        if (status != MILD_OK) return status;
-        c->task = experiment.task;
-    }
-    task_def_make_nominal(&c->task);
-    return MILD_OK;
-}
-
 /* The course "a+b+c" of --ground a,b,c, with --ground.KEY=VALUE laid over each of its grounds and --task.KEY=VALUE over
  * the task. */
 static MildStatus make_scene(Command *c, MildError *error) {
@@ -232,7 +220,7 @@ static MildStatus run_play(Command *c, MildError *error) {
     char xml[PATH_SIZE];
     Play *play = &c->play;
     Controller controller = {0};
-    MildStatus status = make_task(c, error);
+    MildStatus status = experiment_nominal_task(&c->task, c->config, error);
     if (status == MILD_OK) status = make_scene(c, error);
     if (status != MILD_OK) return status;
     if (play->seconds == 0) {

@@ -56,3 +56,11 @@ MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *
     if (status == MILD_OK) status = experiment_check(def, error);
     return status;
 }
+
+MildStatus experiment_nominal_task(TaskDef *task, const char *config, MildError *error) {
+    ExperimentDef def = experiment_def_default();
+    MildStatus status = config ? experiment_read(&def, config, NULL, 0, error) : MILD_OK;
+    *task = def.task;
+    task_def_make_nominal(task);
+    return status;
+}

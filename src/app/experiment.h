@@ -29,4 +29,7 @@ MildStatus experiment_check(const ExperimentDef *def, MildError *error);
 MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides, int override_count,
                            MildError *error);
 
+/* The task for evaluation and play: of the config the policy was trained with (NULL: the defaults), made nominal. */
+MildStatus experiment_nominal_task(TaskDef *task, const char *config, MildError *error);
+
 #endif
