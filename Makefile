@@ -36,7 +36,7 @@ bench: build
 install:
 	@cmake -S . -B build/library -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_APP=OFF -DMILD_TESTS=OFF \
 		-DMILD_MARCH=$(MARCH) -DCMAKE_INSTALL_PREFIX=$(PREFIX) $(CMAKE_FLAGS)
-	@cmake --build build/library --parallel $(JOBS)
+	@cmake --build build/library --parallel $(JOBS) --target mild_shared mild_static
 	@cmake --install build/library
 
 clean:

@@ -1,0 +1,40 @@
+# libmild for other programs: the ground layer's objects as a shared and a static library, and their installation.
+# MILD_MARCH decides where the installed library runs: `native` is this machine only, x86-64-v3 any of the last decade.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set_target_properties(layer_ground PROPERTIES C_VISIBILITY_PRESET hidden) # but for what MILD_API_BEGIN makes visible
+add_library(mild_shared SHARED $<TARGET_OBJECTS:layer_ground>)
+add_library(mild_static STATIC $<TARGET_OBJECTS:layer_ground>)
+# while the version begins with 0, a new minor version may change the interface
+set_target_properties(mild_shared PROPERTIES EXPORT_NAME mild VERSION ${PROJECT_VERSION}
+  SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+foreach(library mild_shared mild_static)
+  set_target_properties(${library} PROPERTIES OUTPUT_NAME mild LINKER_LANGUAGE C)
+  target_include_directories(${library} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(${library} PUBLIC m)
+endforeach()
+
+set(package ${CMAKE_INSTALL_LIBDIR}/cmake/mild)
+set(package_version ${CMAKE_BINARY_DIR}/generated/mildConfigVersion.cmake)
+write_basic_package_version_file(${package_version} COMPATIBILITY SameMinorVersion)
+file(RELATIVE_PATH prefix_from_pc /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
+string(REGEX REPLACE "/$" "" prefix_from_pc ${prefix_from_pc})
+file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/generated/mild.pc @ONLY CONTENT [=[
+prefix=${pcfiledir}/@prefix_from_pc@
+libdir=${prefix}/@CMAKE_INSTALL_LIBDIR@
+includedir=${prefix}/@CMAKE_INSTALL_INCLUDEDIR@
+
+Name: mild
+Description: Soft ground for legged robots: two-way, per-element contact forces
+Version: @PROJECT_VERSION@
+Cflags: -I${includedir}
+Libs: -L${libdir} -lmild
+Libs.private: -lm
+]=])
+
+install(TARGETS mild_shared mild_static EXPORT mild COMPONENT library)
+install(EXPORT mild FILE mildConfig.cmake NAMESPACE mild:: DESTINATION ${package} COMPONENT library)
+install(FILES ${package_version} DESTINATION ${package} COMPONENT library)
+install(FILES ${CMAKE_BINARY_DIR}/generated/mild.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT library)
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/include/mild DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT library)
