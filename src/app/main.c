@@ -16,6 +16,7 @@ static const struct {
     {"eval", cmd_eval, "walk a policy over grounds and speeds, and print what came out"},
     {"play", cmd_play, "watch a policy: video, window, picture of sole pressure"},
     {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
+    {"fit", cmd_fit, "find a ground's parameters from recorded presses"},
     {"bench", cmd_bench, "measure speed and memory on this machine"},
     {"info", cmd_info, "grounds, models, config keys, build, devices"},
 };

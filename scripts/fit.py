@@ -1,0 +1,52 @@
+#!/usr/bin/env python3
+"""Draws what `mild fit --figure` found: fit.py DATA_fit.csv PICTURE.png
+
+Above the measured forces and the fitted law over depth, below what is left between them."""
+import csv
+import sys
+from collections import OrderedDict
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402
+
+
+def read(path):
+    """{record: [row, ...]} in the file's order; numbers in SI units."""
+    records = OrderedDict()
+    with open(path, newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            records.setdefault(row["record"], []).append({key: float(value) for key, value in row.items()})
+    return records
+
+
+def draw(records, path):
+    figure, (above, below) = plt.subplots(
+        2, 1, sharex=True, figsize=(7, 6), height_ratios=(3, 1), layout="constrained"
+    )
+    for index, (record, rows) in enumerate(records.items()):
+        depth = [1e3 * row["depth_m"] for row in rows]
+        speed = sorted(row["speed_m_s"] for row in rows)[len(rows) // 2]
+        label = f"record {record}" + (f", {speed:.3g} m/s" if speed > 0 else "")
+        color = f"C{index}"
+        above.plot(depth, [row["force_n"] for row in rows], ".", color=color, markersize=3, alpha=0.5, label=label)
+        above.plot(depth, [row["fit_n"] for row in rows], color=color, linewidth=2)
+        below.plot(depth, [row["force_n"] - row["fit_n"] for row in rows], ".", color=color, markersize=2)
+    above.set(ylabel="force [N]", title="measured (dots) and fitted (lines)")
+    above.legend(frameon=False)
+    below.axhline(0, color="0.4", linewidth=0.8)
+    below.set(xlabel="depth [mm]", ylabel="difference [N]")
+    for axes in (above, below):
+        axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(path, dpi=150)
+
+
+def main(arguments):
+    if len(arguments) != 2:
+        sys.exit(__doc__)
+    draw(read(arguments[0]), arguments[1])
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,109 @@
+#!/usr/bin/env bash
+# `mild press` to `mild fit` and back, and every bad record refused with nothing written. Usage: test_fit.sh PATH_TO_MILD
+set -u
+mild=$(realpath "$1")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+failures=0
+
+fail() {
+    echo "FAIL: $*" >&2
+    failures=$((failures + 1))
+}
+
+# noise SEED <press.csv: 2 % of every force, normally distributed.
+noise() {
+    awk -F, -v OFS=, -v seed="$1" 'BEGIN { srand(seed) } NR > 1 {
+        $3 *= 1 + 0.02 * sqrt(-2 * log(1 - rand())) * cos(6.283185307179586 * rand()) } { print }'
+}
+
+# value FILE NAME: of a parameter in the JSON.
+value() {
+    tr -d ' \t\n' <"$1" | sed -n "s/.*\"$2\":{\"value\":\([^,]*\),.*/\1/p"
+}
+
+# near NAME VALUE TRUTH PERCENT
+near() {
+    awk -v v="$2" -v t="$3" -v p="$4" -v n="$1" 'BEGIN { e = 100 * (v / t - 1); printf "%-24s %6.2f %%\n", n, e
+        exit !(v != "" && e < p && e > -p) }' || fail "$1: '$2' is not within $4 % of $3"
+}
+
+# bad PATTERN COMMAND...: exit 2, one line that holds the pattern, nothing written.
+bad() {
+    local pattern=$1 output code
+    shift
+    rm -f out.json out.png out_fit.csv
+    output=$("$@" --json out.json --figure out.png 2>&1 >/dev/null </dev/null)
+    code=$?
+    [ "$code" = 2 ] || fail "exit $code instead of 2: $* -> $output"
+    [ "$(wc -l <<<"$output")" = 1 ] || fail "not one line: $* -> $output"
+    grep -q -- "$pattern" <<<"$output" || fail "no '$pattern': $* -> $output"
+    [ ! -e out.json ] && [ ! -e out.png ] && [ ! -e out_fit.csv ] || fail "something was written: $*"
+}
+
+echo "errors of the fit with 2 % noise, seed 5"
+while read -r ground k_pen sigma_cone; do
+    "$mild" press --ground "$ground" --plate 0.2,0.1 --depth 0.04 --csv press.csv >/dev/null || fail "press $ground"
+    noise 5 <press.csv >"$ground.csv"
+    "$mild" fit "$ground.csv" --plate 0.2,0.1 --ground "$ground" --json fit.json >table.txt || fail "fit $ground"
+    near "$ground k_pen" "$(value fit.json k_pen)" "$k_pen" 5
+    near "$ground sigma_cone" "$(value fit.json sigma_cone)" "$sigma_cone" 5
+done <<'GROUNDS'
+rubber 1400 240000
+foam60 850 200000
+foam45 480 170000
+foam28 190 130000
+foam25 150 110000
+grass 550 240000
+sand_loose 380 150000
+sand_dense 700 240000
+GROUNDS
+grep -q 'residual .* N, .* % of the force' table.txt || fail "no residual in the table"
+
+# two speeds tell the drag; alpha and nu are one
+"$mild" press --ground sand_loose --depth 0.04 --speed 1 --csv fast.csv >/dev/null
+"$mild" fit sand_loose.csv fast.csv --plate 0.2,0.1 --fit k_pen,sigma_cone,alpha,nu,c_d --json fit.json >table.txt
+near "two speeds: c_d" "$(value fit.json c_d)" 17.2 5
+near "two speeds: alpha" "$(value fit.json alpha)" 1.047 5
+grep -q '^nu and alpha: .*cannot tell them apart' table.txt || fail "alpha and nu are not said to be one"
+"$mild" fit sand_loose.csv --plate 0.2,0.1 --fit k_pen,c_d | grep -q '^c_d: .*do not differ in speed' || fail "c_d at one speed"
+
+# the columns may stand in any order, with remarks and Windows line ends
+printf '\xef\xbb\xbf# a remark\r\nforce_n, depth_m\r\n' >order.csv
+awk -F, 'NR > 1 { printf "%s, %s\r\n", $3, $2 }' sand_loose.csv >>order.csv
+"$mild" fit order.csv --plate 0.2,0.1 --json fit.json >/dev/null || fail "columns in another order"
+near "another order: k_pen" "$(value fit.json k_pen)" 380 5
+
+"$mild" fit --help | grep -q 'usage: mild fit DATA.csv' || fail "no help"
+
+# bad input
+fit=("$mild" fit)
+plate=(--plate 0.2,0.1)
+edit() { awk -F, -v OFS=, "$1" sand_loose.csv >bad.csv; }
+bad 'missing.csv: cannot open.*mild press' "${fit[@]}" missing.csv "${plate[@]}"
+bad 'which record' "${fit[@]}" "${plate[@]}"
+bad '--plate' "${fit[@]}" sand_loose.csv
+bad '--plate' "${fit[@]}" sand_loose.csv --plate 0.2
+bad "unknown parameter 'k_pem'; nearest is 'k_pen'" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pem
+bad "nearest is 'sand_loose'" "${fit[@]}" sand_loose.csv "${plate[@]}" --ground sand_lose
+bad 'alpha' "${fit[@]}" sand_loose.csv "${plate[@]}" --alpha 2
+edit '{ print $1, $2 }' && bad 'bad.csv:1: no column force_n; name' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $3 = "nan" } { print }' && bad "bad.csv:9: force_n 'nan' is not a finite number; correct" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $2 = "" } { print }' && bad 'bad.csv:9: depth_m is missing; fill' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { print $1; next } { print }' && bad 'bad.csv:9: depth_m is missing' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $2 = "1 mm" } { print }' && bad "bad.csv:9: depth_m '1 mm'" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $1 = 0 } { print }' && bad 'bad.csv:9: time_s 0 does not come after' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR > 1 { $2 *= 1000 } { print }' && bad 'depth_m .* is beyond 2; it must be in metres' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR > 1 { $2 = -$2 } { print }' && bad 'depth_m: 0 of 2001 rows.*positive down' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR > 1 { $3 = -$3 } { print }' && bad 'force_n does not push back' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR < 9 { print }' && bad 'depth_m: 6 of 7 rows.*at least 8' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 1 { print $0, "depth_m"; next } { print }' && bad 'two columns are named depth_m' "${fit[@]}" bad.csv "${plate[@]}"
+: >bad.csv && bad 'bad.csv: empty' "${fit[@]}" bad.csv "${plate[@]}"
+head -c 3000 "$mild" >bad.csv && bad 'bad.csv:' "${fit[@]}" bad.csv "${plate[@]}"
+cp sand_loose.csv out_fit.csv
+"${fit[@]}" out_fit.csv "${plate[@]}" --figure out.png >/dev/null 2>&1 && fail "a record was written over"
+cmp -s sand_loose.csv out_fit.csv || fail "a record was changed"
+
+[ "$failures" = 0 ] && echo "all fine"
+exit $((failures > 0))
