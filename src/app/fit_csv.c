@@ -186,7 +186,7 @@ MildStatus fit_csv_read_file(FILE *file, const char *name, FitPoint **points, in
     int first = *count, rows = 0;
     MildStatus status = csv_header(&csv, error);
     if (status == MILD_OK) status = csv_rows(&csv, points, count, error);
-    if (status == MILD_OK) status = csv_loading(&csv, *points + first, *count - first, &rows, error);
+    if (status == MILD_OK) status = csv_loading(&csv, *points ? *points + first : NULL, *count - first, &rows, error);
     *count = first + rows;
     free(csv.line);
     return status;

@@ -99,6 +99,7 @@ edit 'NR > 1 { $2 = -$2 } { print }' && bad 'depth_m: 0 of 2001 rows.*positive d
 edit 'NR > 1 { $3 = -$3 } { print }' && bad 'force_n does not push back' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR < 9 { print }' && bad 'depth_m: 6 of 7 rows.*at least 8' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 1 { print $0, "depth_m"; next } { print }' && bad 'two columns are named depth_m' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 1' && bad 'depth_m: 0 of 0 rows' "${fit[@]}" bad.csv "${plate[@]}"
 : >bad.csv && bad 'bad.csv: empty' "${fit[@]}" bad.csv "${plate[@]}"
 head -c 3000 "$mild" >bad.csv && bad 'bad.csv:' "${fit[@]}" bad.csv "${plate[@]}"
 cp sand_loose.csv out_fit.csv

@@ -40,7 +40,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fclose(file);
     if (status == MILD_OK) {
         check(count >= FIT_POINTS_MIN);
-        if (count < 24) fit(points, count); /* short ones, for speed */
+        if (count < 24 && size % 16 == 0) fit(points, count); /* few and short ones: a fit takes longer than a file */
     } else {
         check(error.status == status && error.text[0]);
     }
