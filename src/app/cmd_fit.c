@@ -1,23 +1,18 @@
 /* mild fit: parameters of a ground from recorded presses, with intervals; table, JSON, picture. */
-#include <errno.h>
 #include <math.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/fit_csv.h"
 #include "app/grounds.h"
+#include "app/figure.h"
 #include "app/paths.h"
 #include "app/press.h"
 #include "app/report.h"
 #include "app/text.h"
-
-extern char **environ;
 
 typedef struct {
     const char *ground, *json, *figure;
@@ -215,29 +210,11 @@ static MildStatus data_write(const FitWork *work, const CliArgs *args, const cha
     return status;
 }
 
-/* scripts/fit.py in the private environment, else with the system's Python. */
-static MildStatus figure_draw(const char *data, const char *picture, MildError *error) {
-    char python[PATH_SIZE], script[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE];
-    path_data(".venv/bin/python", python);
-    path_data("scripts/fit.py", script);
-    snprintf(from, sizeof from, "%s", data);
-    snprintf(to, sizeof to, "%s", picture);
-    if (access(python, X_OK) != 0) snprintf(python, sizeof python, "python3");
-    char *arguments[] = {python, script, from, to, NULL};
-    pid_t child;
-    int code = 0, failure = posix_spawnp(&child, python, NULL, NULL, arguments, environ);
-    while (failure == 0 && waitpid(child, &code, 0) < 0 && errno == EINTR) continue;
-    if (failure == 0 && WIFEXITED(code) && WEXITSTATUS(code) == 0) return MILD_OK;
-    return mild_fail(error, MILD_ERROR_IO,
-                     "%.150s: not drawn, Python with matplotlib is needed (make setup); the numbers are in %.150s",
-                     picture, data);
-}
-
 static MildStatus figure_save(const FitWork *work, const CliArgs *args, const char *figure, MildError *error) {
     char data[PATH_SIZE];
     MildStatus status = figure_data(figure, data, error);
     if (status == MILD_OK) status = data_write(work, args, data, error);
-    if (status == MILD_OK) status = figure_draw(data, figure, error);
+    if (status == MILD_OK) status = figure_draw("scripts/fit.py", data, figure, error);
     return status;
 }
 

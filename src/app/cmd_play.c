@@ -1,23 +1,18 @@
 /* mild play: watch a policy walk a course; video or window, a table per ground, a picture of sole pressure. */
-#include <errno.h>
 #include <math.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/config.h"
 #include "app/experiment.h"
 #include "app/grounds.h"
+#include "app/figure.h"
 #include "app/paths.h"
 #include "app/play.h"
 #include "app/progress.h"
-
-extern char **environ;
 
 #define GRAVITY 9.81
 #define AREA_MARGIN 2.0   /* [m] ground drawn beyond the walk */
@@ -129,24 +124,6 @@ static void print_table(const Command *c) {
     }
 }
 
-/* Runs scripts/pressure.py in the private environment, else with the system's Python. */
-static MildStatus draw_pressure(const char *data, const char *picture, MildError *error) {
-    char python[PATH_SIZE], script[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE];
-    path_data(".venv/bin/python", python);
-    path_data("scripts/pressure.py", script);
-    snprintf(from, sizeof from, "%s", data);
-    snprintf(to, sizeof to, "%s", picture);
-    if (access(python, X_OK) != 0) snprintf(python, sizeof python, "python3");
-    char *arguments[] = {python, script, from, to, NULL};
-    pid_t child;
-    int code = 0, failure = posix_spawnp(&child, python, NULL, NULL, arguments, environ);
-    while (failure == 0 && waitpid(child, &code, 0) < 0 && errno == EINTR) continue;
-    if (failure == 0 && WIFEXITED(code) && WEXITSTATUS(code) == 0) return MILD_OK;
-    return mild_fail(error, MILD_ERROR_IO,
-                     "%s: not drawn, Python with matplotlib is needed (make setup); the numbers are in %s", picture,
-                     data);
-}
-
 /* The CSV beside the picture; a name ending in .csv wants no picture. */
 static MildStatus save_pressure(const Command *c, MildError *error) {
     char data[PATH_SIZE], names[MILD_MATERIALS_MAX][96];
@@ -167,7 +144,7 @@ static MildStatus save_pressure(const Command *c, MildError *error) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "%s: the robot took no step, there is nothing to draw",
                          c->pressure);
     MildStatus status = pressure_write(c->play.pressure, data, labels, error);
-    if (status == MILD_OK && strcmp(data, c->pressure) != 0) status = draw_pressure(data, c->pressure, error);
+    if (status == MILD_OK && strcmp(data, c->pressure) != 0) status = figure_draw("scripts/pressure.py", data, c->pressure, error);
     return status;
 }
 
