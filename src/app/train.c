@@ -114,7 +114,7 @@ int64_t train_iteration(const Trainer *trainer) {
 }
 
 Policy *train_policy(Trainer *trainer) {
-    return trainer->policy;
+    return ppo_average(trainer->ppo);
 }
 
 size_t train_bytes(const Trainer *trainer) {

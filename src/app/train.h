@@ -27,7 +27,7 @@ void train_destroy(Trainer *trainer);
 /* One rollout and one update. */
 void train_iterate(Trainer *trainer, TrainReport *report);
 int64_t train_iteration(const Trainer *trainer);
-Policy *train_policy(Trainer *trainer);
+Policy *train_policy(Trainer *trainer); /* what gets saved: the averaged weights with ppo.average */
 size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */
 int train_threads(const Trainer *trainer);
 

@@ -29,6 +29,8 @@ PpoDef ppo_def_default(void) {
         .mirror_weight = 1.0,
         .mirror_share = 0.5,
         .std_min = 0.05,
+        .anneal_factor = 0.1,
+        .std_max = {10.0, 10.0},
     };
 }
 
@@ -57,6 +59,14 @@ const MildField ppo_fields[] = {
     MILD_FIELD(PpoDef, mirror_share, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
                "[-] share of each minibatch that the mirror loss sees"),
     MILD_FIELD(PpoDef, std_min, MILD_FIELD_DOUBLE, 1, 1e-4, 1.0, "[-] floor of the action noise's standard deviation"),
+    MILD_FIELD(PpoDef, anneal, MILD_FIELD_INT, 2, 0, 1e9,
+               "[-] first and last iteration of the anneal that ends a run; equal: none"),
+    MILD_FIELD(PpoDef, anneal_factor, MILD_FIELD_DOUBLE, 1, 1e-6, 1.0,
+               "[-] kl_target and learning_rate_max are multiplied by this by the end of the anneal"),
+    MILD_FIELD(PpoDef, std_max, MILD_FIELD_DOUBLE, 2, 1e-4, 10.0,
+               "[-] ceiling of the action noise's standard deviation, before and after the anneal"),
+    MILD_FIELD(PpoDef, average, MILD_FIELD_DOUBLE, 1, 0.0, 0.9999,
+               "[-] decay per iteration of the running mean of the weights that is saved as the policy; 0: none"),
 };
 const int ppo_field_count = (int)(sizeof ppo_fields / sizeof *ppo_fields);
 
@@ -133,6 +143,14 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     ppo->second = take(ppo, count * sizeof(float));
     ppo->scratch = take(ppo, (size_t)pool_threads(ppo->pool) * ppo->scratch_floats * sizeof(float));
     ppo->order = take(ppo, samples * sizeof *ppo->order);
+    if (ppo->def.average > 0.0) {
+        ppo->average = policy_create(policy_def(ppo->policy), ppo->seed, NULL);
+        ppo->bytes += count * sizeof(float);
+        if (!ppo->average) {
+            return 0;
+        }
+        memcpy(policy_parameters(ppo->average), ppo->policy->parameters, count * sizeof(float));
+    }
     if (!ppo->batch_block || !ppo->gradient || !ppo->first || !ppo->second || !ppo->scratch || !ppo->order) {
         return 0;
     }
@@ -202,6 +220,7 @@ Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *
 
 void ppo_destroy(Ppo *ppo) {
     if (ppo) {
+        policy_destroy(ppo->average);
         free(ppo->mirror_index);
         free(ppo->mirror_sign);
         free(ppo->batch_block);
@@ -220,6 +239,10 @@ PpoBatch *ppo_batch(Ppo *ppo) {
 
 size_t ppo_bytes(const Ppo *ppo) {
     return ppo->bytes;
+}
+
+Policy *ppo_average(Ppo *ppo) {
+    return ppo->average ? ppo->average : ppo->policy;
 }
 
 int64_t ppo_iteration(const Ppo *ppo) {
@@ -254,18 +277,44 @@ static void shuffle(Ppo *ppo, int epoch) {
     }
 }
 
+/* 0 before the anneal, 1 after it: a function of the iteration alone, so that a resumed run goes on alike. */
+static double anneal_share(const Ppo *ppo) {
+    const int first = ppo->def.anneal[0], last = ppo->def.anneal[1];
+    return first < last ? fmin(fmax((double)(ppo->iteration - first) / (last - first), 0.0), 1.0) : 0.0;
+}
+
 /* The rate that keeps the divergence from the rollout's policy near its target [vendor: factor 1.5]. */
 static void adapt_learning_rate(Ppo *ppo, double kl) {
     const PpoDef *def = &ppo->def;
-    if (def->kl_target <= 0.0) {
-        return;
-    }
-    if (kl > 2.0 * def->kl_target) {
+    const double anneal = pow(def->anneal_factor, anneal_share(ppo)), target = anneal * def->kl_target;
+    if (kl > 2.0 * target) {
         ppo->learning_rate /= 1.5;
-    } else if (kl > 0.0 && kl < 0.5 * def->kl_target) {
+    } else if (kl > 0.0 && kl < 0.5 * target) {
         ppo->learning_rate *= 1.5;
     }
-    ppo->learning_rate = fmin(fmax(ppo->learning_rate, def->learning_rate_min), def->learning_rate_max);
+    const double most = fmax(anneal * def->learning_rate_max, def->learning_rate_min);
+    ppo->learning_rate = fmin(fmax(ppo->learning_rate, def->learning_rate_min), most);
+}
+
+/* Between the updates, so that what the rollout samples from is what the update compares with. */
+static void bound_noise(Ppo *ppo) {
+    const double *std_max = ppo->def.std_max;
+    const float ceiling = (float)(log(std_max[0]) + anneal_share(ppo) * log(std_max[1] / std_max[0]));
+    const Network *n = &ppo->policy->network;
+    for (int64_t i = n->log_std; i < n->count; i++) {
+        ppo->policy->parameters[i] = fminf(ppo->policy->parameters[i], ceiling);
+    }
+}
+
+/* Young averages forget faster, or the first weights would stay in them for long. */
+static void average_weights(Ppo *ppo) {
+    const double young = (1.0 + (double)ppo->iteration) / (10.0 + (double)ppo->iteration);
+    const float step = (float)(1.0 - fmin(ppo->def.average, young));
+    const float *now = ppo->policy->parameters;
+    float *mean = policy_parameters(ppo->average);
+    for (int64_t i = 0; i < ppo->policy->network.count; i++) {
+        mean[i] += step * (now[i] - mean[i]);
+    }
 }
 
 static double entropy_of(const LossContext *context) {
@@ -312,7 +361,9 @@ static int update_minibatch(Ppo *ppo, LossContext *context, const int *samples, 
         report->skipped++;
         return 0;
     }
-    adapt_learning_rate(ppo, sums.kl / count);
+    if (ppo->def.kl_target > 0.0) {
+        adapt_learning_rate(ppo, sums.kl / count);
+    }
     ppo_optimise(ppo, norm > ppo->def.max_gradient_norm ? ppo->def.max_gradient_norm / norm : 1.0);
     return 1;
 }
@@ -373,6 +424,10 @@ void ppo_update(Ppo *ppo, PpoReport *report) {
                                          (uint32_t)(epoch * ppo->def.minibatches + m), report);
             }
         }
+    }
+    bound_noise(ppo);
+    if (ppo->average) {
+        average_weights(ppo);
     }
     finish_report(ppo, report, done);
     carry_over(ppo);

@@ -22,6 +22,10 @@ typedef struct {
     double mirror_weight;
     double mirror_share; /* share of each minibatch on which the mirror loss is evaluated */
     double std_min;     /* floor of the action noise */
+    int anneal[2];      /* first and last iteration of the end game; equal: none */
+    double anneal_factor; /* what KL target and greatest rate are multiplied by at its end */
+    double std_max[2];  /* ceiling of the action noise before and after it */
+    double average;     /* decay per iteration of the weights' running mean, which is what gets saved as the policy; 0: none */
 } PpoDef;
 PpoDef ppo_def_default(void);
 extern const MildField ppo_fields[];
@@ -69,6 +73,8 @@ void ppo_act(Ppo *ppo, int t);
 /* Values, GAE, epochs of minibatches; moves history[steps] etc. to index 0 for the next rollout; iteration += 1. */
 void ppo_update(Ppo *ppo, PpoReport *report);
 int64_t ppo_iteration(const Ppo *ppo);
+/* The running mean of the weights (Polyak and Juditsky 1992), or the policy itself with def.average = 0. Owned by ppo. */
+Policy *ppo_average(Ppo *ppo);
 
 /* Everything that resuming needs: parameters, moments, rate, counters, plus an opaque block of the caller (the
  * environments' state). One safetensors file with CRC32, temporary name then rename. On load nothing is changed unless the

@@ -7,7 +7,7 @@
 
 enum { COUNTER_ITERATION, COUNTER_ADAM_STEPS, COUNTER_SEED, COUNTERS };
 
-#define TRAIN_TENSORS 9
+#define TRAIN_TENSORS 10
 
 static Safetensor tensor_of(const char *name, SafetensorsType type, const void *data, int64_t count) {
     const size_t sizes[] = {4, 8, 8, 1};
@@ -30,6 +30,9 @@ static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const
     tensors[count++] = tensor_of("train.critic", SAFETENSORS_F32, b->critic, envs * n->def.critic_input);
     tensors[count++] = tensor_of("train.target", SAFETENSORS_F32, b->target, envs * n->def.estimates);
     tensors[count++] = tensor_of("train.clean", SAFETENSORS_F32, b->clean, envs * n->def.observation);
+    if (ppo->average) {
+        tensors[count++] = tensor_of("train.average", SAFETENSORS_F32, policy_parameters(ppo->average), n->count);
+    }
     if (extra_size > 0) {
         tensors[count++] = tensor_of("train.extra", SAFETENSORS_U8, extra, (int64_t)extra_size);
     }
@@ -77,9 +80,12 @@ static MildStatus check_same_network(const Safetensors *file, const char *path, 
 }
 
 static MildStatus check_train(const Safetensors *file, const char *path, const Safetensor *wanted, int count,
-                              MildError *error) {
+                              int has_extra, MildError *error) {
     for (int i = 0; i < count; i++) {
         const Safetensor *have = safetensors_find(file, wanted[i].name);
+        if (!have && strcmp(wanted[i].name, "train.average") == 0) {
+            continue; /* the run had none: it starts from the weights */
+        }
         if (!have || have->type != wanted[i].type || have->bytes != wanted[i].bytes) {
             return mild_fail(
                 error, MILD_ERROR_ARGUMENT,
@@ -87,7 +93,7 @@ static MildStatus check_train(const Safetensors *file, const char *path, const S
                 path, wanted[i].name, have ? have->bytes : (size_t)0, wanted[i].bytes);
         }
     }
-    if (!safetensors_find(file, "train.extra") != (count < TRAIN_TENSORS)) {
+    if (!safetensors_find(file, "train.extra") != !has_extra) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "%s: holds an environment state that this run does not expect",
                          path);
     }
@@ -106,11 +112,12 @@ static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters
         {"train.critic", ppo->batch.critic},
         {"train.target", ppo->batch.target},
         {"train.clean", ppo->batch.clean},
+        {"train.average", ppo->average ? policy_parameters(ppo->average) : NULL},
         {"train.extra", extra},
     };
     for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
         const Safetensor *have = safetensors_find(file, areas[i].name);
-        if (have) {
+        if (have && areas[i].to) {
             memcpy(areas[i].to, have->data, have->bytes);
         }
     }
@@ -130,7 +137,7 @@ static MildStatus load_open(Ppo *ppo, const Safetensors *file, const char *path,
     int count = train_tensors(ppo, counters, extra, extra_size, wanted);
     MildStatus status = check_same_network(file, path, n, error);
     if (!status) status = policy_file_parameters(file, path, n, spare, error);
-    if (!status) status = check_train(file, path, wanted, count, error);
+    if (!status) status = check_train(file, path, wanted, count, extra_size > 0, error);
     if (status) {
         return status;
     }
@@ -141,6 +148,9 @@ static MildStatus load_open(Ppo *ppo, const Safetensors *file, const char *path,
         return mild_fail(error, MILD_ERROR_FORMAT, "%s: its counters make no sense; take an older checkpoint", path);
     }
     memcpy(ppo->policy->parameters, spare, (size_t)n->count * sizeof *spare);
+    if (ppo->average) {
+        memcpy(policy_parameters(ppo->average), spare, (size_t)n->count * sizeof *spare);
+    }
     take_train(ppo, file, counters, learning_rate, extra);
     return MILD_OK;
 }

@@ -23,6 +23,7 @@ struct Ppo {
     PpoBatch batch;
     int64_t iteration, adam_steps;
     double learning_rate;
+    Policy *average; /* NULL: none */
     void *batch_block;
     float *gradient; /* [PPO_SHARDS][stride]; the sum ends in shard 0 */
     size_t stride;

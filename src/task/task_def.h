@@ -8,8 +8,8 @@
 /* Every reward term once: name, default weight, help. The struct, the config keys and the table of functions
  * (reward.c) are all made from this list. Weights are per second; source: paper Table II and learning.md section 5. */
 #define TASK_REWARD_LIST(X)                                                                                           \
-    X(linear_velocity, 2.0, "mean of exp(-k e^2), exp(-6 k e^2), e = |v_xy - command|, smoothed, heading frame (paper)")                                  \
-    X(yaw_rate, 1.1, "the same of w_z - command (paper)")                                                              \
+    X(linear_velocity, 2.0, "f(v_x - command) f(v_y - command), f(e) = (exp(-k e^2) + exp(-|e|/width))/2, smoothed, heading frame (paper)") \
+    X(yaw_rate, 1.1, "f(w_z - command) (paper)")                                                                      \
     X(feet_clearance, 2.4, "swing feet: clip(h, 0, h_des) less half of what is above h_des, h of the lowest sole point above h0 (paper)")    \
     X(gait, 1.4, "mean over feet: 1 when contact matches the clock, else -0.3 (paper)")                                \
     X(slip, -0.1, "[m/s] horizontal speed of feet in contact (paper)")                                                 \
@@ -38,6 +38,7 @@ typedef struct {
     int clip_sum;                     /* bool: the sum of a step is never below 0 (vendor) */
     double nominal_height;            /* [m] nominal base height above the stance soles */
     double tracking_sharpness;        /* [s^2/m^2] k = 5 in the velocity terms */
+    double tracking_width;            /* [m/s] of the sharp part of the velocity terms */
     double tracking_time;             /* [s] over which the tracked velocity is smoothed */
     double feet_range[2], knee_range[2]; /* [m] limits */
     double reference_amplitude;       /* [rad] */
