@@ -153,47 +153,55 @@ static MildStatus resume(Run *run, MildError *error) {
 
 /* ---- the loop ---- */
 
-static double share_done(const Run *run, double seconds, int64_t done) {
-    double by_time = run->def.train.minutes > 0 ? seconds / (60 * run->def.train.minutes) : -1;
-    double by_count = run->def.train.iterations > 0 ? (double)done / run->def.train.iterations : -1;
+/* What the progress line shows. */
+typedef struct {
+    Progress bar;
+    double start;     /* [s] */
+    int64_t first;    /* iteration at the start */
+    double steps_per_s, reward, length, falls; /* smoothed, but for falls */
+    int64_t bad;      /* diverged environments and skipped minibatches */
+} Display;
+
+static double share_done(const Run *run, const Display *display) {
+    const TrainDef *def = &run->def.train;
+    double done = (double)(train_iteration(run->trainer) - display->first);
+    double by_time = def->minutes > 0 ? (clock_seconds() - display->start) / (60 * def->minutes) : -1;
+    double by_count = def->iterations > 0 ? (def->iterations > display->first ? done / (double)(def->iterations - display->first) : 1) : -1;
     return by_time > by_count ? by_time : by_count;
 }
 
+static void display_take(Display *display, const Run *run, const TrainReport *r) {
+    double keep = train_iteration(run->trainer) == display->first + 1 ? 0 : 0.9;
+    display->steps_per_s = keep * display->steps_per_s + (1 - keep) * r->steps_per_s;
+    display->reward = keep * display->reward + (1 - keep) * r->reward_per_step / TASK_PERIOD;
+    if (r->episodes.episodes) {
+        display->length = display->length > 0 ? 0.9 * display->length + 0.1 * r->episodes.length : r->episodes.length;
+        display->falls = (double)r->episodes.falls / r->episodes.episodes;
+    }
+    display->bad += r->episodes.diverged + r->ppo.skipped;
+    progress_show(&display->bar, share_done(run, display),
+                  "iteration %" PRId64 "  %.0f steps/s  reward %.2f/s  episode %.1f s  falls %.0f %%  diverged %" PRId64,
+                  train_iteration(run->trainer), display->steps_per_s, display->reward, display->length, 100 * display->falls,
+                  display->bad);
+}
+
 static MildStatus train_loop(Run *run, MildError *error) {
-    Progress progress = progress_begin("training");
-    double start = clock_seconds(), steps_per_s = 0, reward = 0, length = 0, falls = 0;
-    int64_t diverged = 0, skipped = 0;
-    int first = 1;
+    Display display = {.bar = progress_begin("training"), .start = clock_seconds(), .first = train_iteration(run->trainer)};
     MildStatus status = MILD_OK;
-    while (status == MILD_OK && !interrupt_requested()) {
+    while (status == MILD_OK && !interrupt_requested() && share_done(run, &display) < 1) {
         TrainReport report;
         double row[COLUMNS];
-        if (share_done(run, clock_seconds() - start, train_iteration(run->trainer)) >= 1) {
-            break;
-        }
         train_iterate(run->trainer, &report);
         fill_row(run, &report, row);
         int64_t iteration = train_iteration(run->trainer);
         status = log_row(run->log, iteration, row, error);
-        double keep = first ? 0 : 0.9;
-        first = 0;
-        steps_per_s = keep * steps_per_s + (1 - keep) * report.steps_per_s;
-        reward = keep * reward + (1 - keep) * report.reward_per_step / TASK_PERIOD;
-        if (report.episodes.episodes) {
-            length = length > 0 ? 0.9 * length + 0.1 * report.episodes.length : report.episodes.length;
-            falls = (double)report.episodes.falls / report.episodes.episodes;
-        }
-        diverged += report.episodes.diverged;
-        skipped += report.ppo.skipped;
-        progress_show(&progress, share_done(run, clock_seconds() - start, iteration),
-                      "iteration %" PRId64 "  %.0f steps/s  reward %.2f/s  episode %.1f s  falls %.0f %%  diverged %" PRId64,
-                      iteration, steps_per_s, reward, length, 100 * falls, diverged + skipped);
+        display_take(&display, run, &report);
         if (status == MILD_OK && iteration % run->def.train.checkpoint_every == 0) {
             status = save_checkpoint(run, error);
         }
     }
-    progress_end(&progress, "iteration %" PRId64 "  %.0f steps/s  reward %.2f/s  episode %.1f s  diverged %" PRId64,
-                 train_iteration(run->trainer), steps_per_s, reward, length, diverged + skipped);
+    progress_end(&display.bar, "iteration %" PRId64 "  %.0f steps/s  reward %.2f/s  episode %.1f s  diverged %" PRId64,
+                 train_iteration(run->trainer), display.steps_per_s, display.reward, display.length, display.bad);
     if (status == MILD_OK) status = save_checkpoint(run, error);
     return status;
 }

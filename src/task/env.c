@@ -267,33 +267,40 @@ static void report_episode(const TaskEnv *env, TaskStep *out) {
     }
 }
 
+/* The reward of the step just made; 0 when a number went bad. */
+static int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
+                       const double torque[ROBOT_JOINTS], float *reward) {
+    double terms[TASK_REWARD_COUNT];
+    robot_sim_store(sim, &env->robot);
+    TaskMotion motion = describe_motion(env, def, robot, sim, torque);
+    *reward = (float)task_reward(&motion, terms);
+    if (!isfinite(*reward)) {
+        return 0;
+    }
+    env->speed_error_sum +=
+        hypot(env->smooth_velocity[0] - env->command[0], env->smooth_velocity[1] - env->command[1]);
+    env->reward_sum += (double)*reward;
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        env->term_sum[i] += terms[i] * TASK_PERIOD;
+    }
+    return 1;
+}
+
 TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const float *action,
                        int auto_reset, const TaskView *view, const TaskProbe *probe) {
     TaskStep out = {.valid = 1};
     TaskReading reading;
-    double torque[ROBOT_JOINTS], terms[TASK_REWARD_COUNT];
+    double torque[ROBOT_JOINTS];
     accept_action(env, def, action);
     push_base(env, def);
     robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
                          def->contact_tolerance, def->contact_iterations);
     robot_sim_load(sim, &env->robot, &env->variation);
-    int bad = run_physics(env, def, robot, sim, &reading, torque, probe);
-    if (!bad) {
-        robot_sim_store(sim, &env->robot);
-        TaskMotion motion = describe_motion(env, def, robot, sim, torque);
-        out.reward = (float)task_reward(&motion, terms);
-        bad = !isfinite(out.reward);
-        env->speed_error_sum +=
-            hypot(env->smooth_velocity[0] - env->command[0], env->smooth_velocity[1] - env->command[1]);
-    }
+    int bad = run_physics(env, def, robot, sim, &reading, torque, probe) ||
+              !take_reward(env, def, robot, sim, torque, &out.reward);
     if (bad) {
         out.reward = 0;
         out.valid = 0;
-    } else {
-        env->reward_sum += (double)out.reward;
-        for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-            env->term_sum[i] += terms[i] * TASK_PERIOD;
-        }
     }
     advance_clock(env, def);
     int fallen = bad || has_fallen(env, def, sim);

@@ -1,6 +1,6 @@
-#include "task/task_def.h"
+#include <math.h>
 
-#include "mild/ground.h"
+#include "task/task.h"
 
 #define TASK_REWARD_NAME(name, weight, help) #name,
 const char *const task_reward_names[] = {TASK_REWARD_LIST(TASK_REWARD_NAME)};
@@ -185,47 +185,33 @@ const MildField randomize_fields[] = {
 };
 const int randomize_field_count = sizeof randomize_fields / sizeof *randomize_fields;
 
-static MildStatus check_range(const double *range, const char *name, MildError *error) {
-    if (range[0] <= range[1]) {
-        return MILD_OK;
+/* Every pair of numbers in these tables is a range. */
+static MildStatus check_section(const MildField *fields, int count, const void *def, const char *section,
+                                MildError *error) {
+    MildStatus status = mild_fields_check(fields, count, def, section, error);
+    for (int i = 0; status == MILD_OK && i < count; i++) {
+        const double *range = (const double *)(const void *)((const char *)def + fields[i].offset);
+        if (fields[i].type == MILD_FIELD_DOUBLE && fields[i].count == 2 && range[0] > range[1]) {
+            status = mild_fail(error, MILD_ERROR_RANGE, "%s.%s: low %g is above high %g", section, fields[i].name, range[0],
+                               range[1]);
+        }
     }
-    return mild_fail(error, MILD_ERROR_RANGE, "%s: low %g is above high %g", name, range[0], range[1]);
+    return status;
 }
 
 MildStatus task_def_check(const TaskDef *def, MildError *error) {
-    MildStatus status = mild_fields_check(task_fields, task_field_count, def, "task", error);
+    MildStatus status = check_section(task_fields, task_field_count, def, "task", error);
+    if (status == MILD_OK) status = check_section(reward_fields, reward_field_count, &def->reward, "reward", error);
     if (status == MILD_OK) {
-        status = mild_fields_check(reward_fields, reward_field_count, &def->reward, "reward", error);
+        status = check_section(randomize_fields, randomize_field_count, &def->randomize, "randomize", error);
     }
-    if (status == MILD_OK) {
-        status = mild_fields_check(randomize_fields, randomize_field_count, &def->randomize, "randomize", error);
-    }
-    double per_policy_step = 0.01 / def->physics_dt;
-    if (status == MILD_OK && !(per_policy_step - (int)(per_policy_step + 0.5) < 1e-9 &&
-                               (int)(per_policy_step + 0.5) - per_policy_step < 1e-9)) {
-        return mild_fail(error, MILD_ERROR_RANGE, "task.physics_dt: 0.01 s is not a whole multiple of %g", def->physics_dt);
+    double steps = TASK_PERIOD / def->physics_dt;
+    if (status == MILD_OK && !(fabs(steps - floor(steps + 0.5)) < 1e-9)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "task.physics_dt: %g s is not a whole multiple of %g", TASK_PERIOD,
+                         def->physics_dt);
     }
     if (status == MILD_OK && def->randomize.rigid_share + def->randomize.preset_share > 1 + 1e-12) {
         return mild_fail(error, MILD_ERROR_RANGE, "randomize: rigid_share + preset_share is above 1");
-    }
-    const struct {
-        const double *range;
-        const char *name;
-    } ranges[] = {
-        {def->vx, "task.vx"}, {def->vy, "task.vy"}, {def->wz, "task.wz"}, {def->backward_vx, "task.backward_vx"},
-        {def->randomize.k_pen, "randomize.k_pen"}, {def->randomize.sigma_cone, "randomize.sigma_cone"},
-        {def->randomize.alpha, "randomize.alpha"}, {def->randomize.nu, "randomize.nu"},
-        {def->randomize.c_g, "randomize.c_g"}, {def->randomize.c_d, "randomize.c_d"},
-        {def->randomize.phi, "randomize.phi"}, {def->randomize.mu, "randomize.mu"},
-        {def->randomize.rho, "randomize.rho"}, {def->randomize.recovery, "randomize.recovery"},
-        {def->randomize.bed_depth, "randomize.bed_depth"}, {def->randomize.base_mass, "randomize.base_mass"},
-        {def->randomize.link_mass, "randomize.link_mass"}, {def->randomize.armature, "randomize.armature"},
-        {def->randomize.gain, "randomize.gain"}, {def->randomize.strength, "randomize.strength"},
-        {def->randomize.latency, "randomize.latency"}, {def->randomize.patch_length, "randomize.patch_length"},
-        {def->reward.feet_range, "reward.feet_range"}, {def->reward.knee_range, "reward.knee_range"},
-    };
-    for (size_t i = 0; status == MILD_OK && i < sizeof ranges / sizeof *ranges; i++) {
-        status = check_range(ranges[i].range, ranges[i].name, error);
     }
     return status;
 }
