@@ -1,17 +1,11 @@
 /* Standing ten seconds with the stand gains on every ground, at every physics step from 0.5 to 5 ms. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "robot_kit.h"
 
 #include "robot/stand.h"
 
-#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
 #define SECONDS 10.0
 #define FALLEN 0.7 /* [m] base height */
 
@@ -25,24 +19,6 @@ typedef struct {
     double height;  /* [m] of the base at the end */
     double torque;  /* [N m] largest in the last two seconds */
 } Stand;
-
-static Robot *robot;
-
-static int setup(void **unused) {
-    (void)unused;
-    MildError error = {0};
-    robot = robot_create(MODEL, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
-    return 0;
-}
-
-static int teardown(void **unused) {
-    (void)unused;
-    robot_destroy(robot);
-    return 0;
-}
 
 static double mean_depth(const RobotSim *sim) {
     return 0.5 * (robot_sim_foot(sim, 0)->result.depth_mean + robot_sim_foot(sim, 1)->result.depth_mean);
@@ -65,13 +41,9 @@ static double static_sinkage(const MildMaterial *material) {
 
 /* material: NULL for rigid ground. */
 static Stand stand(const MildMaterial *material, double dt, double seconds, int balance, MildSolver solver) {
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, dt, &error);
-    assert_non_null(sim);
+    RobotSim *sim = new_sim(dt);
     robot_sim_set_solver(sim, solver, 0, 0);
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
-    assert_non_null(block);
-    MildGround *ground = mild_ground_init(block, robot_soles(robot), ROBOT_FEET);
+    MildGround *ground = new_ground();
     MildMaterial any = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
     RobotVariation variation = robot_variation_nominal();
@@ -104,7 +76,7 @@ static Stand stand(const MildMaterial *material, double dt, double seconds, int 
     for (int f = 0; f < ROBOT_FEET; f++) {
         result.tilt = fmax(result.tilt, acos(fmin(1.0, robot_sim_foot(sim, f)->rotation[8])));
     }
-    free(block);
+    free(ground);
     robot_sim_destroy(sim);
     return result;
 }
@@ -130,8 +102,7 @@ static void test_stands_everywhere(void **unused) {
     for (int s = 0; s < 4; s++) {
         check_balanced("rigid", NULL, steps[s]);
         for (int p = 0; p < mild_material_preset_count(); p++) {
-            MildMaterial material;
-            assert_true(mild_material_preset(mild_material_preset_name(p), &material));
+            MildMaterial material = preset(mild_material_preset_name(p));
             check_balanced(mild_material_preset_name(p), &material, steps[s]);
         }
     }
@@ -141,8 +112,7 @@ static void test_stands_everywhere(void **unused) {
 static void test_papers_solver(void **unused) {
     (void)unused;
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial material;
-        assert_true(mild_material_preset(mild_material_preset_name(p), &material));
+        MildMaterial material = preset(mild_material_preset_name(p));
         double height[2];
         for (int s = 0; s < 2; s++) {
             Stand result = stand(&material, 0.0025, 0.0075, 1, s ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON);
@@ -161,8 +131,7 @@ static void test_plain_gains(void **unused) {
     Stand rigid = stand(NULL, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
     assert_true(rigid.stands);
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        MildMaterial material;
-        assert_true(mild_material_preset(mild_material_preset_name(p), &material));
+        MildMaterial material = preset(mild_material_preset_name(p));
         Stand result = stand(&material, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
         print_message("plain gains on %-11s %s after %.2f s\n", mild_material_preset_name(p),
                       result.stands ? "stand" : "fall", result.seconds);

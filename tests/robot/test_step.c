@@ -1,13 +1,8 @@
 /* The step: against the engine's own step, against dense algebra, momentum, determinism. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
+#include "robot_kit.h"
 
 #include <mujoco/mujoco.h>
 
@@ -15,46 +10,7 @@
 #include "robot/sim.h"
 #include "robot/stand.h"
 
-#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
 #define ROWS 12
-
-static Robot *robot;
-
-static int setup(void **unused) {
-    (void)unused;
-    MildError error = {0};
-    robot = robot_create(MODEL, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
-    return 0;
-}
-
-static int teardown(void **unused) {
-    (void)unused;
-    robot_destroy(robot);
-    return 0;
-}
-
-static MildTerrain preset_terrain(const char *name) {
-    MildMaterial material;
-    assert_true(mild_material_preset(name, &material));
-    return mild_terrain_uniform(&material);
-}
-
-static MildGround *new_ground(void) {
-    size_t bytes = mild_ground_bytes(robot_soles(robot), ROBOT_FEET);
-    void *block = calloc(1, bytes);
-    assert_non_null(block);
-    return mild_ground_init(block, robot_soles(robot), ROBOT_FEET);
-}
-
-static RobotSim *new_sim(double dt) {
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, dt, &error);
-    assert_non_null(sim);
-    return sim;
-}
 
 /* A state near the ground with all joints inside their ranges. */
 static RobotState random_state(uint32_t index) {

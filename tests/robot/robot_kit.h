@@ -1,0 +1,60 @@
+/* What the tests of the robot layer share: the robot of the repository, a workspace, a ground. */
+#ifndef ROBOT_KIT_H
+#define ROBOT_KIT_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "robot/robot.h"
+
+#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+
+static Robot *robot;
+
+static inline int setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    robot = robot_create(MODEL, &error);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
+    return 0;
+}
+
+static inline int teardown(void **unused) {
+    (void)unused;
+    robot_destroy(robot);
+    return 0;
+}
+
+static inline RobotSim *new_sim(double dt) {
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, dt, &error);
+    assert_non_null(sim);
+    return sim;
+}
+
+/* To be freed by the caller. */
+static inline MildGround *new_ground(void) {
+    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
+    assert_non_null(block);
+    return mild_ground_init(block, robot_soles(robot), ROBOT_FEET);
+}
+
+static inline MildMaterial preset(const char *name) {
+    MildMaterial material;
+    assert_true(mild_material_preset(name, &material));
+    return material;
+}
+
+static inline MildTerrain preset_terrain(const char *name) {
+    MildMaterial material = preset(name);
+    return mild_terrain_uniform(&material);
+}
+
+#endif
