@@ -126,6 +126,8 @@ typedef struct {
     double torque[3];  /* [N m] about the ankle, world, p x F */
     double zmp_axis[3];  /* [m] from the ankle: point of the central axis nearest the ankle, F x tau/|F|^2 */
     double zmp_sole[2];  /* [m] from the ankle, world axes, on the plane through the sole centre */
+    double pressure_center[3]; /* [m] world: sum of p f over sum of f, f the elements' normal forces; 0 without load.
+                                  For a level sole it is the ankle plus zmp_sole */
     double area;         /* [m^2] sum of loaded elements */
     double depth_max, depth_mean; /* [m] over the loaded elements */
     int contacts;        /* loaded elements */
@@ -158,12 +160,22 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain, con
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain, const MildContactInput *input,
                          const MildScratch *scratch, const MildContactResult *result);
 
-/* Per-element output of the last solve, for foot f; arrays of mild_sole_elements(). */
+typedef enum {
+    MILD_ELEMENT_FREE = 0,      /* carries no normal force */
+    MILD_ELEMENT_UNLOADING = 1, /* loaded on the unloading line: not deeper than it has been */
+    MILD_ELEMENT_VIRGIN = 2     /* loaded and deeper at the end of the step than ever since it touched */
+} MildElementState;
+
+/* Per-element output of the last solve, for foot f; arrays of mild_sole_elements(). Made on demand inside the scratch: ask
+ * after each solve; the arrays hold until the next one. Cost: one pass over the foot's elements. */
 typedef struct {
-    const double *depth;   /* [m] u, negative above the ground */
-    const double *normal;  /* [N] */
+    const double *depth;   /* [m] u at the start of the step, negative above the ground */
+    const double *normal;  /* [N] mean over the step */
     const double *tangent_x, *tangent_y; /* [N] world */
     const double *point_x, *point_y, *point_z; /* [m] world */
+    const double *flat;    /* [-] share of the element's area still flat after the step (eq 1): 1 untouched, 0 cone complete */
+    const uint8_t *state;  /* MildElementState */
+    const uint8_t *slip;   /* bool: loaded and sliding, friction at its bound; 0 sticks or carries nothing */
 } MildElements;
 MildElements mild_scratch_elements(const MildScratch *scratch, int foot);
 

@@ -2,32 +2,64 @@
 
 #include "ground/contact.h"
 
-/* Forces of the slots back to the elements, in N. */
-static void foot_scatter(MildScratch *scratch, int f, double rate) {
-    FootScratch *foot = &scratch->foot[f];
+/* Slots back to elements: forces in N, and what each element did in the step. */
+static void foot_scatter(const MildScratch *scratch, int f) {
+    const FootScratch *foot = &scratch->foot[f];
     const Slots *s = &scratch->slot;
+    const double *V = scratch->velocity + 6 * f, dt = scratch->dt, rate = 1.0 / dt;
     for (int k = 0; k < foot->active; k++) {
         int i = foot->start + k, e = foot->element[k];
+        double vx = V[0] + V[4] * s->pz[i] - V[5] * s->py[i], vy = V[1] + V[5] * s->px[i] - V[3] * s->pz[i];
+        double u1 = s->depth[i] + dt * (V[4] * s->px[i] - V[3] * s->py[i] - V[2]);
+        int loaded = s->iz[i] > 0.0, deeper = u1 > s->front[i];
+        double open = 1.0 - (deeper ? u1 : s->front[i]) * s->inverse_full[i];
         foot->normal[e] = s->iz[i] * rate;
         foot->tangent_x[e] = s->ix[i] * rate;
         foot->tangent_y[e] = s->iy[i] * rate;
+        foot->flat[e] = open > 0.0 ? open * open : 0.0;
+        foot->state[e] = (uint8_t)(!loaded ? MILD_ELEMENT_FREE : deeper ? MILD_ELEMENT_VIRGIN : MILD_ELEMENT_UNLOADING);
+        foot->slip[e] = loaded && vx * vx + vy * vy > CONTACT_SLIP_SPEED * CONTACT_SLIP_SPEED;
     }
 }
 
-static void foot_loaded(const MildScratch *scratch, int f, MildFootResult *result) {
+MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
+    const FootScratch *foot = &scratch->foot[f];
+    size_t bytes = (size_t)foot->padded * sizeof(double);
+    memset(foot->normal, 0, bytes);
+    memset(foot->tangent_x, 0, bytes);
+    memset(foot->tangent_y, 0, bytes);
+    memset(foot->state, 0, 2 * (size_t)foot->padded); /* and slip behind it */
+    for (int e = 0; e < foot->padded; e++) foot->flat[e] = 1.0;
+    foot_scatter(scratch, f);
+    return (MildElements){foot->depth,   foot->normal,  foot->tangent_x, foot->tangent_y, foot->point_x,
+                          foot->point_y, foot->point_z, foot->flat,      foot->state,     foot->slip};
+}
+
+/* What is summed over the loaded elements. */
+static void foot_loaded(const MildScratch *scratch, const double *position, int f, MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
     const Slots *s = &scratch->slot;
-    double sum = 0.0, deepest = 0.0, loaded = 0.0;
-    for (int i = foot->start; i < foot->start + foot->active; i++) {
+    double sum = 0.0, deepest = 0.0, loaded = 0.0, force = 0.0, x = 0.0, y = 0.0, z = 0.0;
+    int end = foot_end(foot);
+#pragma omp simd reduction(+ : sum, loaded, force, x, y, z) reduction(max : deepest)
+    for (int i = foot->start; i < end; i++) {
         double on = s->iz[i] > 0.0 ? 1.0 : 0.0, depth = on * s->depth[i];
         loaded += on;
         sum += depth;
         deepest = depth > deepest ? depth : deepest;
+        force += s->iz[i];
+        x += s->px[i] * s->iz[i];
+        y += s->py[i] * s->iz[i];
+        z += s->pz[i] * s->iz[i];
     }
     result->contacts = (int)loaded;
     result->area = loaded * foot->pitch * foot->pitch;
     result->depth_max = deepest;
-    result->depth_mean = loaded > 0.0 ? sum / loaded : 0.0;
+    if (!(loaded > 0.0)) return;
+    result->depth_mean = sum / loaded;
+    result->pressure_center[0] = position[0] + x / force;
+    result->pressure_center[1] = position[1] + y / force;
+    result->pressure_center[2] = position[2] + z / force;
 }
 
 /* Wrench and zero moment point. Paper eq 15: r = [F]x^+ tau, which for the true torque tau = p x F is F x tau/|F|^2, the
@@ -51,24 +83,23 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
         result->zmp_sole[0] = (z * F[0] - tau[1]) / F[2];
         result->zmp_sole[1] = (tau[0] + z * F[1]) / F[2];
     }
-    foot_loaded(scratch, f, result);
+    foot_loaded(scratch, input->position[f], f, result);
 }
 
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain, const MildContactInput *input,
                        MildScratch *scratch, MildContactResult *result) {
+    size_t bytes = 6 * (size_t)scratch->feet * sizeof(double);
     memset(result, 0, sizeof *result);
+    scratch->dt = input->dt;
     if (contact_prepare(ground, terrain, input, scratch) == 0) {
-        memcpy(result->velocity, input->free_velocity, 6 * (size_t)scratch->feet * sizeof(double));
+        memcpy(result->velocity, input->free_velocity, bytes);
         result->converged = 1;
-        return;
-    }
-    if (input->solver == MILD_SOLVER_GAUSS_SEIDEL)
+    } else if (input->solver == MILD_SOLVER_GAUSS_SEIDEL) {
         sweep_solve(scratch, input, result);
-    else
+    } else {
         newton_solve(scratch, input, result);
-    for (int f = 0; f < scratch->feet; f++) {
-        if (scratch->foot[f].active == 0) continue;
-        foot_scatter(scratch, f, 1.0 / input->dt);
-        foot_result(scratch, input, f, &result->foot[f]);
     }
+    memcpy(scratch->velocity, result->velocity, bytes);
+    for (int f = 0; f < scratch->feet; f++)
+        if (scratch->foot[f].active > 0) foot_result(scratch, input, f, &result->foot[f]);
 }

@@ -52,7 +52,8 @@ typedef struct {
     double center_x, center_y, radius;  /* [m] centroid in the foot frame; reach of the sole from the ankle */
     const double *x, *y;                 /* [m] element centres in the foot frame */
     double z, pitch;
-    double *depth, *normal, *tangent_x, *tangent_y, *point_x, *point_y, *point_z; /* MildElements */
+    double *depth, *normal, *tangent_x, *tangent_y, *point_x, *point_y, *point_z, *flat; /* MildElements */
+    uint8_t *state, *slip;
     int32_t *element; /* [active] element of each slot, ascending */
 } FootScratch;
 
@@ -70,6 +71,7 @@ struct MildScratch {
     int32_t *slot_material; /* whose law stands in the slot's Law arrays; -1 none */
     DerivedLaw derived[MILD_FEET_MAX][MILD_MATERIALS_MAX];
     double wrench[TWIST_MAX]; /* [N s, N m s] sum of B^T I at the last pass */
+    double velocity[TWIST_MAX], dt; /* of the last solve: V+ and the step */
     double hessian[MILD_FEET_MAX][36]; /* [kg ...] per foot, minus d wrench / d twist, row major */
     double *block; /* the one allocation behind all arrays */
 };

@@ -20,10 +20,6 @@ static void foot_place(FootScratch *foot, const MildTerrain *terrain, const doub
     terrain_heights(terrain, foot->point_x, foot->point_y, foot->padded, foot->depth);
 #pragma omp simd
     for (int i = 0; i < foot->padded; i++) foot->depth[i] -= foot->point_z[i];
-    size_t bytes = (size_t)foot->padded * sizeof(double);
-    memset(foot->normal, 0, bytes);
-    memset(foot->tangent_x, 0, bytes);
-    memset(foot->tangent_y, 0, bytes);
 }
 
 /* Fastest any point of the foot can come down under twist V. */
@@ -114,6 +110,7 @@ static void slots_gather(MildScratch *scratch, const Memory *memory, const doubl
         s->px[i] = s->py[i] = s->pz[i] = 0.0;
         s->depth[i] = -1e3; /* never reaches the ground */
         s->depth_max[i] = s->front_speed[i] = s->drift[i] = 0.0;
+        s->ix[i] = s->iy[i] = s->iz[i] = 0.0;
     }
 }
 

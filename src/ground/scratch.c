@@ -3,7 +3,7 @@
 
 #include "ground/contact.h"
 
-#define FOOT_ARRAYS 7 /* depth, normal, tangent x y, point x y z */
+#define FOOT_ARRAYS 9 /* depth, normal, tangent x y, point x y z, flat; state and slip share one */
 
 static int padded(const MildSole *sole) {
     return (mild_sole_elements(sole) + CONTACT_LANES - 1) / CONTACT_LANES * CONTACT_LANES;
@@ -37,6 +37,9 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at, int32
     foot->point_x = take(at, foot->padded);
     foot->point_y = take(at, foot->padded);
     foot->point_z = take(at, foot->padded);
+    foot->flat = take(at, foot->padded);
+    foot->state = (uint8_t *)take(at, foot->padded);
+    foot->slip = foot->state + foot->padded;
     foot->element = element;
 }
 
@@ -81,9 +84,4 @@ void mild_scratch_destroy(MildScratch *scratch) {
     if (!scratch) return;
     free(scratch->block);
     free(scratch);
-}
-
-MildElements mild_scratch_elements(const MildScratch *scratch, int foot) {
-    const FootScratch *f = &scratch->foot[foot];
-    return (MildElements){f->depth, f->normal, f->tangent_x, f->tangent_y, f->point_x, f->point_y, f->point_z};
 }

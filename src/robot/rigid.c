@@ -35,6 +35,7 @@ static void add_contact(RobotSim *sim, int c) {
     for (int k = 0; k < 3; k++) {
         result->force[k] += force[k];
         result->torque[k] += torque[k];
+        result->pressure_center[k] += contact->pos[k] * force[2]; /* the floor is level: normal = vertical */
     }
     result->depth_max = fmax(result->depth_max, -contact->dist);
     result->depth_mean += -contact->dist;
@@ -52,6 +53,7 @@ static void finish_foot(RobotSim *sim, int foot) {
     cross(force, torque, result->zmp_axis);
     for (int k = 0; k < 3; k++) {
         result->zmp_axis[k] /= square;
+        result->pressure_center[k] /= force[2];
     }
     const double *center = sim->robot->sole_center[foot];
     double sole = turn[6] * center[0] + turn[7] * center[1] + turn[8] * center[2];

@@ -118,6 +118,18 @@ static void test_bad_numbers(void **state) {
     mild_sole_destroy(right);
 }
 
+/* A robot's ground is small enough for thousands of robots. */
+static void test_state_bytes(void **state) {
+    (void)state;
+    MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
+    const MildSole *soles[2] = {left, right};
+    size_t bytes = mild_ground_bytes(soles, 2);
+    print_message("state: %zu bytes for two feet of 77 elements, %zu per foot\n", bytes, bytes / 2);
+    assert_true(bytes / 2 < 16384);
+    mild_sole_destroy(left);
+    mild_sole_destroy(right);
+}
+
 static void test_copy_continues(void **state) {
     (void)state;
     uint64_t random = 33;
@@ -148,6 +160,7 @@ static void test_copy_continues(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_allocation), cmocka_unit_test(test_failing_allocation),
-                                       cmocka_unit_test(test_bad_numbers), cmocka_unit_test(test_copy_continues)};
+                                       cmocka_unit_test(test_bad_numbers), cmocka_unit_test(test_copy_continues),
+                                       cmocka_unit_test(test_state_bytes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -373,7 +373,28 @@ static void test_pure(void **state) {
     }
 }
 
-/* Wrench, zero moment points and element arrays fit together. */
+/* What each element says of itself follows from the forces, the memory and the motion. */
+static int check_states(const Kit *kit, int f, const MildElements *e) {
+    const double *V = kit->result.velocity + 6 * f, *deepest = mild_ground_depth_max(kit->ground, f);
+    double full = KIT_PITCH / sqrt(acos(-1.0)) * tan(kit->terrain.materials[0].alpha) / kit->terrain.materials[0].nu;
+    int good = 1;
+    for (int i = 0; i < mild_sole_elements(kit->soles[f]); i++) {
+        double p[3], turn[3], v[3];
+        const double point[3] = {e->point_x[i], e->point_y[i], e->point_z[i]};
+        for (int k = 0; k < 3; k++) p[k] = point[k] - kit->input.position[f][k];
+        kit_cross(V + 3, p, turn);
+        for (int k = 0; k < 3; k++) v[k] = V[k] + turn[k];
+        double before = fmax(fmax(e->depth[i], deepest[i]), 0.0), after = e->depth[i] - kit->input.dt * v[2];
+        double deep = fmax(before, after), flat = deep < full ? pow(1.0 - deep / full, 2.0) : 0.0;
+        int loaded = e->normal[i] > 0.0, virgin = loaded && after > before;
+        good &= e->state[i] == (virgin ? MILD_ELEMENT_VIRGIN : loaded ? MILD_ELEMENT_UNLOADING : MILD_ELEMENT_FREE);
+        good &= fabs(e->flat[i] - flat) < 1e-9;
+        good &= fabs(hypot(v[0], v[1]) - 1e-6) < 1e-9 || e->slip[i] == (loaded && hypot(v[0], v[1]) > 1e-6);
+    }
+    return good;
+}
+
+/* Wrench, zero moment points, pressure centre and element arrays fit together. */
 static void test_outputs(void **state) {
     (void)state;
     uint64_t random = 27;
@@ -400,7 +421,15 @@ static void test_outputs(void **state) {
                     worst = fmax(worst, fabs(sum[k] - r->force[k]) / size);
                     worst = fmax(worst, fabs(sum[3 + k] - r->torque[k]) / size);
                 }
+                assert_true(check_states(&kit, f, &e));
                 if (r->contacts == 0) continue;
+                double center[3] = {0};
+                for (int i = 0; i < mild_sole_elements(kit.soles[f]); i++) {
+                    center[0] += e.point_x[i] * e.normal[i];
+                    center[1] += e.point_y[i] * e.normal[i];
+                    center[2] += e.point_z[i] * e.normal[i];
+                }
+                for (int k = 0; k < 3; k++) worst_zmp = fmax(worst_zmp, fabs(center[k] / r->force[2] - r->pressure_center[k]));
                 double along[3], F = sqrt(r->force[0] * r->force[0] + r->force[1] * r->force[1] + r->force[2] * r->force[2]);
                 kit_cross(r->zmp_axis, r->force, along); /* what is left of the torque is parallel to the force */
                 double left[3] = {r->torque[0] - along[0], r->torque[1] - along[1], r->torque[2] - along[2]}, cross[3];
