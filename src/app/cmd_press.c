@@ -5,15 +5,18 @@
 
 #include "app/cli.h"
 #include "app/commands.h"
+#include "app/figure.h"
 #include "app/grounds.h"
 #include "app/paths.h"
 #include "app/press.h"
 #include "app/text.h"
 #include "robot/robot.h"
 
+/* NaN: not given. */
 typedef struct {
-    const char *ground, *model, *plate, *csv;
-    double depth, speed, tilt_deg;
+    const char *ground, *model, *plate, *csv, *figure;
+    double depth, back, force, force_back, speed, tilt_deg, drag, drag_speed, drop, impact, mass, seconds, step;
+    int cycles;
 } PressOptions;
 
 /* The sole to press with, and the robot that owns it when it is the robot's. */
@@ -61,19 +64,30 @@ static MildStatus tool_open(Tool *tool, const char *text, MildError *error) {
     return tool->plate ? MILD_OK : MILD_ERROR_ARGUMENT;
 }
 
-static MildStatus csv_write(const PressResult *result, const char *path, MildError *error) {
+/* The contract's seven columns; motion other than straight down and up needs four more. */
+static char *csv_text(const PressResult *result, int more, size_t *size) {
     char *text = NULL;
-    size_t size = 0;
-    FILE *memory = open_memstream(&text, &size);
-    if (!memory) return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
-    fprintf(memory, "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m\n");
-    for (int i = 0; i < PRESS_ROWS; i++) {
+    FILE *memory = open_memstream(&text, size);
+    if (!memory) return NULL;
+    fprintf(memory, "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m%s\n",
+            more ? ",force_x_n,force_y_n,x_m,tilt_rad" : "");
+    for (int i = 0; i < result->count; i++) {
         const PressRow *row = &result->rows[i];
-        fprintf(memory, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n", row->time, row->depth, row->force, row->moment_x,
+        fprintf(memory, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", row->time, row->depth, row->force, row->moment_x,
                 row->moment_y, row->zmp_x, row->zmp_y);
+        if (more) fprintf(memory, ",%.9g,%.9g,%.9g,%.9g", row->force_x, row->force_y, row->x, row->tilt);
+        fputc('\n', memory);
     }
+    if (fclose(memory) == 0) return text;
+    free(text);
+    return NULL;
+}
+
+static MildStatus csv_write(const PressResult *result, int more, const char *path, MildError *error) {
+    size_t size = 0;
+    char *text = csv_text(result, more, &size);
     MildStatus status = MILD_OK;
-    if (fclose(memory) != 0) {
+    if (!text) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
     } else if (strcmp(path, "-") != 0) {
         status = path_write(path, text, size, error);
@@ -84,75 +98,278 @@ static MildStatus csv_write(const PressResult *result, const char *path, MildErr
     return status;
 }
 
-/* Eleven depths, the force on the way down and up beside each other. */
-static void table_print(const PressResult *result) {
-    enum { LINES = 10 };
+/* The picture's numbers: the CSV asked for, else FILE.csv beside FILE.png. */
+static MildStatus figure_save(const PressOptions *options, const PressResult *result, int more, MildError *error) {
+    char data[PATH_SIZE];
+    const char *figure = options->figure, *dot = strrchr(figure, '.'), *slash = strrchr(figure, '/');
+    int stem = dot && (!slash || dot > slash) ? (int)(dot - figure) : (int)strlen(figure);
+    if (options->csv && strcmp(options->csv, "-") != 0)
+        return figure_draw("scripts/press.py", options->csv, figure, error);
+    if (snprintf(data, PATH_SIZE, "%.*s.csv", stem, figure) >= PATH_SIZE)
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", figure);
+    MildStatus status = csv_write(result, more, data, error);
+    return status == MILD_OK ? figure_draw("scripts/press.py", data, figure, error) : status;
+}
+
+/* ---- what is said ---- */
+
+enum { TABLE_LINES = 10 };
+
+static int is_dropped(const PressOptions *options) {
+    return isfinite(options->drop) || isfinite(options->impact);
+}
+
+/* First row of a way and the one behind its last. */
+static void way_find(const PressResult *result, int way, int *first, int *end) {
+    for (*first = 0; *first < result->count && result->rows[*first].way < way; ++*first) continue;
+    for (*end = *first; *end < result->count && result->rows[*end].way == way; ++*end) continue;
+}
+
+/* Row of a way whose depth is nearest. */
+static const PressRow *way_at(const PressResult *result, int way, double depth) {
+    int first, end;
+    way_find(result, way, &first, &end);
+    const PressRow *best = &result->rows[first];
+    for (int i = first; i < end; i++) {
+        if (fabs(result->rows[i].depth - depth) < fabs(best->depth - depth)) best = &result->rows[i];
+    }
+    return best;
+}
+
+/* Eleven depths, the force on the first way down and on the last way up beside each other. */
+static void table_depths(const PressResult *result) {
+    int first, end, last = result->rows[result->count - 1].way;
+    way_find(result, 0, &first, &end);
     printf("%10s  %12s  %12s\n", "depth [mm]", "down [N]", "up [N]");
-    for (int line = 0; line <= LINES; line++) {
-        int down = line * PRESS_STEPS / LINES;
-        const PressRow *row = &result->rows[down];
-        printf("%10.2f  %12.3f  %12.3f\n", 1e3 * row->depth, row->force, result->rows[PRESS_ROWS - 1 - down].force);
+    for (int line = 0; line <= TABLE_LINES; line++) {
+        const PressRow *row = &result->rows[first + line * (end - 1 - first) / TABLE_LINES];
+        printf("%10.2f  %12.3f  %12.3f\n", 1e3 * row->depth, row->force, way_at(result, last, row->depth)->force);
+    }
+}
+
+static void table_cycles(const PressResult *result, int cycles) {
+    printf("%6s  %14s  %14s  %14s  %14s\n", "cycle", "turn [mm]", "force [N]", "back [mm]", "force [N]");
+    for (int cycle = 0; cycle < cycles; cycle++) {
+        int first, end, down = cycles <= 2 * TABLE_LINES || cycle < TABLE_LINES || cycle >= cycles - TABLE_LINES;
+        if (!down) continue;
+        way_find(result, 2 * cycle, &first, &end);
+        const PressRow *turn = &result->rows[end - 1];
+        way_find(result, 2 * cycle + 1, &first, &end);
+        const PressRow *back = &result->rows[end - 1];
+        printf("%6d  %14.3f  %14.3f  %14.3f  %14.3f\n", cycle + 1, 1e3 * turn->depth, turn->force, 1e3 * back->depth,
+               back->force);
+    }
+}
+
+static void table_drag(const PressResult *result) {
+    int first, end;
+    way_find(result, 1, &first, &end);
+    printf("%10s  %16s  %14s\n", "way [mm]", "sideways [N]", "up [N]");
+    for (int line = 0; line <= TABLE_LINES; line++) {
+        const PressRow *row = &result->rows[first + line * (end - 1 - first) / TABLE_LINES];
+        printf("%10.2f  %16.3f  %14.3f\n", 1e3 * row->x, row->force_x, row->force);
+    }
+}
+
+/* From the touch to twice the time of the first stop. */
+static void table_drop(const PressResult *result) {
+    int touch = 0, last;
+    while (touch < result->count - 1 && result->rows[touch].contacts == 0) touch++;
+    double until = 2 * result->stop_time - result->rows[touch].time;
+    for (last = touch; last < result->count - 1 && result->rows[last].time < until; last++) continue;
+    printf("%10s  %12s  %12s  %12s\n", "time [ms]", "depth [mm]", "force [N]", "tilt [deg]");
+    for (int line = 0; line <= TABLE_LINES; line++) {
+        const PressRow *row = &result->rows[touch + line * (last - touch) / TABLE_LINES];
+        printf("%10.2f  %12.3f  %12.3f  %12.2f\n", 1e3 * row->time, 1e3 * row->depth, row->force,
+               row->tilt * 180 / acos(-1.0));
+    }
+}
+
+static void table_print(const PressOptions *options, const PressResult *result) {
+    if (is_dropped(options)) {
+        table_drop(result);
+    } else if (isfinite(options->drag)) {
+        table_depths(result);
+        printf("\n");
+        table_drag(result);
+    } else if (options->cycles > 1) {
+        table_cycles(result, options->cycles);
+    } else {
+        table_depths(result);
     }
     printf("\n");
 }
 
-static void summary_print(const PressOptions *options, const Tool *tool, const PressResult *result, FILE *file) {
-    fprintf(file, "%s under %s: %d elements, %.4f m^2, to %.1f mm at %g m/s", options->ground, tool->name,
-            result->elements, result->area, 1e3 * options->depth, options->speed);
+static void drop_summary(const PressOptions *options, const PressResult *result, FILE *file) {
+    fprintf(file, ", %g kg dropped from %g mm at %g m/s", options->mass, isfinite(options->drop) ? 1e3 * options->drop : 0,
+            isfinite(options->impact) ? options->impact : 0);
     if (options->tilt_deg != 0) fprintf(file, ", tilted %g deg", options->tilt_deg);
+    fprintf(file, "\n");
+    if (result->stop_time > 0) {
+        fprintf(file, "first stop %.3f mm deep after %.2f ms, ", 1e3 * result->stop_depth, 1e3 * result->stop_time);
+    } else {
+        fprintf(file, "no stop within %g s, ", options->seconds);
+    }
+    fprintf(file, "peak %.1f N; at the end %.3f mm deep, %.3g m/s\n", result->peak_force,
+            1e3 * result->rows[result->count - 1].depth, result->rest_speed);
+}
+
+static void summary_print(const PressOptions *options, const Tool *tool, const PressResult *result, FILE *file) {
+    fprintf(file, "%s under %s: %d elements, %.4f m^2", options->ground, tool->name, result->elements, result->area);
+    if (is_dropped(options)) {
+        drop_summary(options, result, file);
+        return;
+    }
+    double deepest = 0;
+    for (int i = 0; i < result->count; i++) deepest = fmax(deepest, result->rows[i].depth);
+    fprintf(file, ", to %.1f mm at %g m/s", 1e3 * deepest, options->speed);
+    if (options->tilt_deg != 0) fprintf(file, ", tilted %g deg", options->tilt_deg);
+    if (isfinite(options->drag)) fprintf(file, ", dragged %g mm at %g m/s", 1e3 * options->drag, options->drag_speed);
     fprintf(file, "\npeak %.1f N (%.2f kPa), work in %.3f J, given back %.3f J, print left %.1f mm\n",
             result->peak_force, 1e-3 * result->peak_force / result->area, result->work_in, result->work_out,
             1e3 * fmax(result->print_depth, 0));
+    if (isfinite(options->drag)) fprintf(file, "work sideways %.3f J\n", result->work_drag);
 }
+
+/* ---- the command ---- */
+
+static const char summary[] =
+    "Move a plate or the robot's sole through a ground and record what the ground answers. By hand it goes down at "
+    "constant speed and up again, in cycles (--cycles), or sideways while it is down (--drag); with --drop or --impact "
+    "it is a free body that falls. Depth, moments and zero moment point are those of the plate's centre (for the sole: "
+    "the point under the ankle). Once out of the ground, its print is forgotten.";
+
+static const char examples[] =
+    "  mild press --ground sand_loose\n"
+    "  mild press --ground foam45 --plate sole --depth 0.02 --tilt 5 --csv foam.csv\n"
+    "  mild press --ground sand_loose --ground.recovery=0.5 --depth 0.03,0.02 --cycles 3 --figure cycles.png\n"
+    "  mild press --ground sand_dense --force 300,50 --cycles 5\n"
+    "  mild press --ground grass --depth 0.02 --drag 0.1 --drag-speed 0.05 --figure drag.png\n"
+    "  mild press --ground sand_loose --drop 0.05 --mass 20 --tilt 5 --figure drop.png\n";
 
 static int options_read(int argc, char **argv, PressOptions *options, CliArgs *args) {
     char grounds[200], ground_help[320];
+    CliNumbers depth = {0}, force = {0};
     snprintf(ground_help, sizeof ground_help, "one of %s", grounds_names(grounds, sizeof grounds));
     const CliOption table[] = {
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
         {"model", CLI_TEXT, &options->model, 0, 0, "NAME", "ground model; `mild` (default) is the only one so far"},
         {"plate", CLI_TEXT, &options->plate, 0, 0, "L,W|sole",
          "[m] length and width of a plate, or the robot's sole (default 0.2,0.1)"},
-        {"depth", CLI_NUMBER, &options->depth, 1e-4, 1, "D", "[m] how deep it goes (default 0.03)"},
-        {"speed", CLI_NUMBER, &options->speed, 1e-5, 10, "V", "[m/s] down, then up (default 0.01)"},
         {"tilt", CLI_NUMBER, &options->tilt_deg, -45, 45, "DEG", "[deg] front edge down (default 0)"},
+        {"depth", CLI_NUMBERS, &depth, 0, 1, "D[,BACK]",
+         "[m] how deep it goes (default 0.03), and how far each cycle comes back (default: out of the ground)"},
+        {"force", CLI_NUMBERS, &force, 0, 1e6, "F[,BACK]",
+         "[N] instead of --depth: turn where the ground pushes this hard, and where it still pushes this hard"},
+        {"speed", CLI_NUMBER, &options->speed, 1e-5, 10, "V", "[m/s] down and up (default 0.01)"},
+        {"cycles", CLI_INT, &options->cycles, 1, 1000, "N", "times down and back (default 1)"},
+        {"drag", CLI_NUMBER, &options->drag, 1e-4, 10, "X",
+         "[m] once down, this far sideways (forward, along the plate's length) at the same depth"},
+        {"drag-speed", CLI_NUMBER, &options->drag_speed, 1e-5, 10, "V", "[m/s] sideways (default that of --speed)"},
+        {"drop", CLI_NUMBER, &options->drop, 0, 10, "H", "[m] let it fall from this height above the ground"},
+        {"impact", CLI_NUMBER, &options->impact, 0, 20, "V", "[m/s] downward speed at which the fall begins"},
+        {"mass", CLI_NUMBER, &options->mass, 1e-3, 1e4, "M",
+         "[kg] of what falls, spread evenly over the plate (default 20, half the robot)"},
+        {"seconds", CLI_NUMBER, &options->seconds, 1e-3, 100, "T", "[s] of the fall that are recorded (default 1)"},
+        {"step", CLI_NUMBER, &options->step, 1e-7, 1, "DT",
+         "[s] between rows (default: a thousandth of the way down, with --force 0.02 mm of it; 0.0001 falling)"},
         {"csv", CLI_TEXT, &options->csv, 0, 0, "FILE",
-         "write time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m; - for standard output"},
+         "write time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m, and force_x_n,force_y_n,x_m,tilt_rad "
+         "when dragged or dropped; - for standard output"},
+        {"figure", CLI_TEXT, &options->figure, 0, 0, "FILE.png",
+         "draw it; its numbers stand in the CSV, else beside it as FILE.csv"},
     };
     const CliCommand command = {
         .name = "press",
         .usage = "--ground NAME [options]",
-        .summary =
-            "Press a plate or the robot's sole into a ground at constant speed, draw it out again, and record the "
-            "force. Depth, moments and zero moment point are those of the plate's centre (for the sole: the point "
-            "under the ankle).",
+        .summary = summary,
         .options = table,
         .option_count = sizeof table / sizeof *table,
         .overrides = "any parameter of the ground, e.g. --ground.k_pen=500; `mild info grounds` lists them",
-        .examples = "  mild press --ground sand_loose\n"
-                    "  mild press --ground foam45 --plate sole --depth 0.02 --tilt 5 --csv foam.csv\n"
-                    "  mild press --ground sand_loose --ground.k_pen=500 --csv - | head\n",
+        .examples = examples,
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     if (outcome == CLI_BAD) return CLI_EXIT_BAD_INPUT;
+    if (depth.count > 2 || force.count > 2)
+        return cli_fail_text("press", "--%s: at most two values, the turn and the way back",
+                             depth.count > 2 ? "depth" : "force");
+    if (depth.count > 0) options->depth = depth.value[0];
+    if (depth.count > 1) options->back = depth.value[1];
+    if (force.count > 0) options->force = force.value[0];
+    if (force.count > 1) options->force_back = force.value[1];
     return outcome == CLI_DONE ? -1 : 0;
 }
 
+/* What does not go together. */
+static MildStatus options_check(const PressOptions *o, MildError *error) {
+    const int by_hand = isfinite(o->depth) || isfinite(o->force) || isfinite(o->speed) || o->cycles || isfinite(o->drag);
+    if (is_dropped(o) && by_hand)
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--%s: what falls goes where it goes; leave out --depth, --force, --speed, --cycles, --drag",
+                         isfinite(o->drop) ? "drop" : "impact");
+    if (!is_dropped(o) && (isfinite(o->mass) || isfinite(o->seconds)))
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--%s: only what falls needs it; add --drop H or --impact V",
+                         isfinite(o->mass) ? "mass" : "seconds");
+    if (isfinite(o->depth) && isfinite(o->force))
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--force: turns where the ground pushes so hard; leave out --depth");
+    if (o->depth <= 0 || o->force <= 0)
+        return mild_fail(error, MILD_ERROR_RANGE, "--%s: the turn must lie above 0", o->depth <= 0 ? "depth" : "force");
+    if (isfinite(o->drag) && o->cycles > 1)
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--drag: goes sideways once; leave out --cycles");
+    if (isfinite(o->drag_speed) && !isfinite(o->drag))
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--drag-speed: how far? --drag X");
+    if (isfinite(o->back) && !(o->back < o->depth))
+        return mild_fail(error, MILD_ERROR_RANGE, "--depth: the way back, %g m, must end above %g m", o->back, o->depth);
+    if (isfinite(o->force_back) && !(o->force_back < o->force))
+        return mild_fail(error, MILD_ERROR_RANGE, "--force: the way back must end below %g N", o->force);
+    return MILD_OK;
+}
+
+static double or_else(double value, double otherwise) {
+    return isfinite(value) ? value : otherwise;
+}
+
+/* Defaults of what was not given. */
+static PressDef options_def(PressOptions *o) {
+    o->speed = or_else(o->speed, 0.01);
+    o->mass = or_else(o->mass, 20);
+    o->seconds = or_else(o->seconds, 1);
+    o->cycles = o->cycles ? o->cycles : 1;
+    o->drag_speed = or_else(o->drag_speed, o->speed);
+    return (PressDef){.tilt = o->tilt_deg * acos(-1.0) / 180,
+                      .step = or_else(o->step, 0),
+                      .speed = o->speed,
+                      .depth = or_else(o->depth, 0.03),
+                      .back = o->back,
+                      .force = or_else(o->force, 0),
+                      .force_back = o->force_back,
+                      .cycles = o->cycles,
+                      .drag = or_else(o->drag, 0),
+                      .drag_speed = o->drag_speed,
+                      .mass = is_dropped(o) ? o->mass : 0,
+                      .height = or_else(o->drop, 0),
+                      .impact = or_else(o->impact, 0),
+                      .seconds = o->seconds};
+}
+
 static MildStatus press_report(const PressOptions *options, const Tool *tool, const PressDef *def, MildError *error) {
-    PressResult *result = malloc(sizeof *result);
-    if (!result) return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
-    MildStatus status = press_run(def, tool->sole, result, error);
-    if (status == MILD_OK && options->csv) status = csv_write(result, options->csv, error);
+    PressResult result;
+    int more = is_dropped(options) || isfinite(options->drag);
+    MildStatus status = press_run(def, tool->sole, &result, error);
+    if (status == MILD_OK && options->csv) status = csv_write(&result, more, options->csv, error);
+    if (status == MILD_OK && options->figure) status = figure_save(options, &result, more, error);
     if (status == MILD_OK) {
-        if (!options->csv) table_print(result);
-        summary_print(options, tool, result, options->csv && strcmp(options->csv, "-") == 0 ? stderr : stdout);
+        if (!options->csv) table_print(options, &result);
+        summary_print(options, tool, &result, options->csv && strcmp(options->csv, "-") == 0 ? stderr : stdout);
     }
-    free(result);
+    press_result_close(&result);
     return status;
 }
 
 int cmd_press(int argc, char **argv) {
-    PressOptions options = {.model = "mild", .plate = "0.2,0.1", .depth = 0.03, .speed = 0.01};
+    PressOptions options = {.model = "mild", .plate = "0.2,0.1", .depth = NAN, .back = NAN, .force = NAN,
+                            .force_back = NAN, .speed = NAN, .drag = NAN, .drag_speed = NAN, .drop = NAN,
+                            .impact = NAN, .mass = NAN, .seconds = NAN, .step = NAN};
     CliArgs args;
     int code = options_read(argc, argv, &options, &args);
     if (code) return code < 0 ? 0 : code;
@@ -162,7 +379,8 @@ int cmd_press(int argc, char **argv) {
                              options.model);
     }
     MildError error;
-    PressDef def = {.depth = options.depth, .speed = options.speed, .tilt = options.tilt_deg * acos(-1.0) / 180};
+    if (options_check(&options, &error) != MILD_OK) return cli_fail("press", &error);
+    PressDef def = options_def(&options);
     if (grounds_find(options.ground, &def.material, NULL, &error) != MILD_OK) return cli_fail("press", &error);
     ConfigSection section = grounds_section(&def.material);
     if (config_overrides(&section, 1, args.overrides, args.override_count, &error) != MILD_OK)

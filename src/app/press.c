@@ -3,9 +3,16 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double paper_pitch = 0.0195; /* [m] */
+#include "app/press_body.h"
+
+static const double paper_pitch = 0.0195, gravity = 9.81; /* [m], [m/s^2] */
+
+enum { WAY_STEPS = 1000, ROWS_MAX = 4000000 };
 
 typedef struct {
+    const PressDef *def;
+    const MildSole *sole;
+    PressResult *result;
     MildTerrain terrain;
     MildContactInput input;
     MildContactResult contact;
@@ -13,6 +20,9 @@ typedef struct {
     MildScratch *scratch;
     void *block;
     double offset[3]; /* [m] ankle -> reference point, world */
+    double start;     /* [m] depth at which the lowest element touches */
+    double deepest;   /* [m] of the reference point since the first touch */
+    double time;
 } Press;
 
 MildSole *press_plate_create(double length, double width, MildError *error) {
@@ -22,20 +32,40 @@ MildSole *press_plate_create(double length, double width, MildError *error) {
     return mild_sole_create(&def, error);
 }
 
+void press_result_close(PressResult *result) {
+    free(result->rows);
+    result->rows = NULL;
+}
+
+/* ---- the ground under the sole ---- */
+
 static void press_close(Press *press) {
     mild_scratch_destroy(press->scratch);
     free(press->block);
 }
 
-/* A = 0: an infinitely heavy foot, so that the twist after each step is the prescribed one. */
-static MildStatus press_open(Press *press, const PressDef *def, const MildSole *sole, MildError *error) {
-    *press = (Press){.terrain = mild_terrain_uniform(&def->material)};
-    size_t bytes = mild_ground_bytes(&sole, 1);
-    press->block = aligned_alloc(64, bytes);
-    press->scratch = press->block ? mild_scratch_create(&sole, 1, error) : NULL;
+static void press_pose(Press *press) {
+    for (int i = 0; i < 3; i++) press->offset[i] = press->input.rotation[0][3 * i + 2] * mild_sole_z(press->sole);
+}
+
+/* Height of the lowest element above the reference point [m], at most 0. */
+static double lowest_element(const Press *press) {
+    const double *down = &press->input.rotation[0][6]; /* third row: world z of a foot vector */
+    double lowest = 0;
+    for (int i = 0; i < mild_sole_elements(press->sole); i++) {
+        lowest = fmin(lowest, down[0] * mild_sole_x(press->sole)[i] + down[1] * mild_sole_y(press->sole)[i]);
+    }
+    return lowest;
+}
+
+static MildStatus press_open(Press *press, const PressDef *def, const MildSole *sole, PressResult *result,
+                             MildError *error) {
+    *press = (Press){.def = def, .sole = sole, .result = result, .terrain = mild_terrain_uniform(&def->material)};
+    press->block = aligned_alloc(64, mild_ground_bytes(&sole, 1));
     if (!press->block) return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
+    press->scratch = mild_scratch_create(&sole, 1, error);
     if (!press->scratch) {
-        press_close(press);
+        free(press->block);
         return MILD_ERROR_MEMORY;
     }
     press->ground = mild_ground_init(press->block, &sole, 1);
@@ -44,69 +74,247 @@ static MildStatus press_open(Press *press, const PressDef *def, const MildSole *
     press->input.feet = 1;
     press->input.solver = def->solver;
     for (int i = 0; i < 9; i++) press->input.rotation[0][i] = rotation[i];
-    for (int i = 0; i < 3; i++) press->offset[i] = rotation[3 * i + 2] * mild_sole_z(sole);
+    press_pose(press);
+    press->start = press->deepest = lowest_element(press);
     return MILD_OK;
 }
 
-/* Height of the lowest element above the reference point [m], at most 0. */
-static double lowest_element(const Press *press, const MildSole *sole) {
-    const double *down = &press->input.rotation[0][6]; /* third row: world z of a foot vector */
-    double lowest = 0;
-    for (int i = 0; i < mild_sole_elements(sole); i++) {
-        lowest = fmin(lowest, down[0] * mild_sole_x(sole)[i] + down[1] * mild_sole_y(sole)[i]);
-    }
-    return lowest;
+static double press_depth(const Press *press) {
+    return press->terrain.height - press->input.position[0][2] - press->offset[2];
 }
 
+static void press_place(Press *press, double depth) {
+    press->input.position[0][2] = press->terrain.height - depth - press->offset[2];
+}
+
+static void press_solve(Press *press) {
+    mild_ground_solve(press->ground, &press->terrain, &press->input, press->scratch, &press->contact);
+}
+
+static void press_advance(Press *press) {
+    mild_ground_advance(press->ground, &press->terrain, &press->input, press->scratch, &press->contact);
+}
+
+/* ---- rows ---- */
+
 /* Moments move from the ankle to the reference point: M_ref = M - offset x F. */
-static PressRow press_row(const Press *press, double time, double depth) {
+static PressRow press_row(const Press *press) {
     const MildFootResult *foot = &press->contact.foot[0];
-    const double *p = press->offset, *f = foot->force;
-    PressRow row = {.time = time, .depth = depth, .force = f[2], .contacts = foot->contacts};
+    const double *p = press->offset, *f = foot->force, *R = press->input.rotation[0];
+    PressRow row = {.time = press->time, .depth = press_depth(press), .force = f[2], .contacts = foot->contacts};
+    row.force_x = f[0];
+    row.force_y = f[1];
+    row.x = press->input.position[0][0] + p[0];
+    row.tilt = atan2(-R[6], R[8]);
     row.moment_x = foot->torque[0] - (p[1] * f[2] - p[2] * f[1]);
     row.moment_y = foot->torque[1] - (p[2] * f[0] - p[0] * f[2]);
-    row.zmp_x = f[2] > 0 ? foot->zmp_sole[0] - p[0] : NAN;
-    row.zmp_y = f[2] > 0 ? foot->zmp_sole[1] - p[1] : NAN;
+    row.way = press->result->ways;
     return row;
 }
 
-/* One step from `depth` at downward speed `speed`: solve, then move the ground's memory. */
-static void press_step(Press *press, double depth, double speed) {
-    MildContactInput *input = &press->input;
-    input->position[0][2] = press->terrain.height - depth - press->offset[2];
-    input->velocity[0][2] = input->free_velocity[2] = -speed;
-    mild_ground_solve(press->ground, &press->terrain, input, press->scratch, &press->contact);
-    mild_ground_advance(press->ground, &press->terrain, input, press->scratch, &press->contact);
+/* Mean of what is measured; place and time are the first's. */
+static PressRow row_mean(PressRow row, const PressRow *other) {
+    row.force = 0.5 * (row.force + other->force);
+    row.force_x = 0.5 * (row.force_x + other->force_x);
+    row.force_y = 0.5 * (row.force_y + other->force_y);
+    row.moment_x = 0.5 * (row.moment_x + other->moment_x);
+    row.moment_y = 0.5 * (row.moment_y + other->moment_y);
+    return row;
 }
 
-static void press_sum_up(PressResult *result) {
-    const PressRow *rows = result->rows;
-    result->print_depth = rows[PRESS_STEPS].depth;
-    for (int i = 1; i < PRESS_ROWS; i++) {
-        double way = rows[i].depth - rows[i - 1].depth;
-        *(way > 0 ? &result->work_in : &result->work_out) += rows[i].force * fabs(way);
-        result->peak_force = fmax(result->peak_force, rows[i].force);
-        if (i > PRESS_STEPS && rows[i].force > 0) result->print_depth = rows[i].depth;
+static MildStatus rows_add(PressResult *result, PressRow row, MildError *error) {
+    if (result->count == result->room) {
+        int room = 2 * result->room + 2 * WAY_STEPS + 1;
+        PressRow *more = room <= 2 * ROWS_MAX ? realloc(result->rows, sizeof *more * (size_t)room) : NULL;
+        if (!more) return mild_fail(error, MILD_ERROR_MEMORY, "press: too many rows; take fewer or longer steps");
+        result->rows = more;
+        result->room = room;
     }
+    row.zmp_x = row.force > 0 ? -row.moment_y / row.force : NAN; /* at the height of the reference point */
+    row.zmp_y = row.force > 0 ? row.moment_x / row.force : NAN;
+    result->rows[result->count++] = row;
+    result->peak_force = fmax(result->peak_force, row.force);
+    return MILD_OK;
+}
+
+/* Force of the step just solved times its way. */
+static void work_add(Press *press, const PressRow *step, double down, double forward) {
+    PressResult *result = press->result;
+    *(down > 0 ? &result->work_in : &result->work_out) += step->force * fabs(down);
+    result->work_drag -= step->force_x * forward;
+    if (down < 0 && step->force > 0) result->print_depth = step->depth + down;
+}
+
+/* ---- moved by hand: A = 0, an infinitely heavy foot whose twist after each step is the prescribed one ---- */
+
+/* A step of `dt` from here at the given speeds; changes nothing. */
+static PressRow hand_solve(Press *press, double dt, double forward, double down) {
+    MildContactInput *input = &press->input;
+    input->dt = dt;
+    input->velocity[0][0] = input->free_velocity[0] = forward;
+    input->velocity[0][2] = input->free_velocity[2] = -down;
+    press_solve(press);
+    return press_row(press);
+}
+
+/* Virgin ground from the step's beginning to its end; a step that crosses the old front is not. */
+static int hand_virgin(const Press *press, const PressRow *step, double to) {
+    return to > step->depth && step->depth > press->deepest - 1e-9;
+}
+
+/* Takes the step just solved and reads the force where it ends, at depth `to`. */
+static MildStatus hand_accept(Press *press, const PressRow *step, double forward, double to, MildError *error) {
+    double dt = press->input.dt, down = (to - step->depth) / dt;
+    int virgin = hand_virgin(press, step, to);
+    work_add(press, step, to - step->depth, forward * dt);
+    press_advance(press);
+    press->time += dt;
+    press->input.position[0][0] += forward * dt;
+    press_place(press, to);
+    press->deepest = to > press->start ? fmax(press->deepest, to) : press->start; /* left the ground: all forgotten */
+    PressRow row = *step;
+    if (virgin) {
+        PressRow next = hand_solve(press, dt, forward, down);
+        row = row_mean(row, &next);
+        row.contacts = next.contacts;
+    }
+    row.time = press->time;
+    row.depth = to;
+    row.x = press->input.position[0][0] + press->offset[0];
+    return rows_add(press->result, row, error);
+}
+
+/* The force at the end of the step, to second order; on the unloading line it is the step's own. */
+static double hand_end_force(const Press *press, const PressRow *step, double to) {
+    double before = press->result->rows[press->result->count - 1].force;
+    return hand_virgin(press, step, to) ? 2 * step->force - before : step->force;
+}
+
+/* Cuts a step that would pass `force` to where it gets there. */
+static PressRow hand_cut(Press *press, double dt, double down, double force) {
+    double low = 0, high = dt, from = press_depth(press);
+    PressRow step = {0};
+    for (int i = 0; i < 40; i++) {
+        double middle = 0.5 * (low + high);
+        step = hand_solve(press, middle, 0, down);
+        int passes = (hand_end_force(press, &step, from + middle * down) - force) * down >= 0;
+        *(passes ? &high : &low) = middle;
+    }
+    return step;
+}
+
+/* Down or up to a depth, or to where the force gets to `force` (NaN: never) if that comes first; *reached says so. */
+static MildStatus hand_vertical(Press *press, double to, double force, int *reached, MildError *error) {
+    double from = press_depth(press), way = to - from, speed = press->def->speed, down = copysign(speed, way);
+    int steps = (int)fmax(ceil(fabs(way) / speed / press->def->step - 1e-6), 1);
+    MildStatus status = MILD_OK;
+    *reached = 0;
+    for (int i = 1; i <= steps && status == MILD_OK && !*reached; i++) {
+        double next = i < steps ? from + way * i / steps : to, dt = (next - press_depth(press)) / down;
+        PressRow step = hand_solve(press, dt, 0, down);
+        *reached = (hand_end_force(press, &step, next) - force) * down >= 0;
+        if (*reached) {
+            step = hand_cut(press, dt, down, force);
+            next = step.depth + press->input.dt * down;
+        }
+        status = hand_accept(press, &step, 0, next, error);
+    }
+    press->result->ways++;
+    return status;
+}
+
+static MildStatus hand_drag(Press *press, MildError *error) {
+    const PressDef *def = press->def;
+    MildStatus status = MILD_OK;
+    for (int i = 0; i < WAY_STEPS && status == MILD_OK; i++) {
+        PressRow step = hand_solve(press, def->drag / def->drag_speed / WAY_STEPS, def->drag_speed, 0);
+        status = hand_accept(press, &step, def->drag_speed, step.depth, error);
+    }
+    press->result->ways++;
+    return status;
+}
+
+static MildStatus hand_run(Press *press, MildError *error) {
+    const PressDef *def = press->def;
+    int to_force = def->force > 0, reached, cycles = def->cycles > 0 ? def->cycles : 1;
+    double down = to_force ? press->start + PRESS_DEEPEST : def->depth, push = to_force ? def->force : NAN;
+    double pull = to_force ? def->force_back : NAN, up = isfinite(def->back) ? def->back : press->start;
+    press_place(press, press->start);
+    MildStatus status = rows_add(press->result, press_row(press), error);
+    for (int cycle = 0; cycle < cycles && status == MILD_OK; cycle++) {
+        status = hand_vertical(press, down, push, &reached, error);
+        if (status == MILD_OK && to_force && !reached)
+            return mild_fail(error, MILD_ERROR_RANGE, "--force: the ground pushes with %g N at most, %g m deep",
+                             press->result->peak_force, PRESS_DEEPEST);
+        if (status == MILD_OK && def->drag > 0) status = hand_drag(press, error);
+        if (status == MILD_OK) status = hand_vertical(press, up, pull, &reached, error);
+    }
+    if (status == MILD_OK && press_depth(press) > press->start)
+        status = hand_vertical(press, press->start, NAN, &reached, error);
+    return status;
+}
+
+/* ---- dropped ---- */
+
+static int untouched(const Press *press) {
+    const double *deepest = mild_ground_depth_max(press->ground, 0);
+    for (int i = 0; i < mild_sole_elements(press->sole); i++)
+        if (deepest[i] > 0) return 0;
+    return 1;
+}
+
+/* Semi-implicit, as engines do; the row stands in the middle of the step (on the unloading line at its end, where its
+ * force is taken). */
+static MildStatus drop_step(Press *press, const PressBody *body, MildError *error) {
+    PressResult *result = press->result;
+    MildContactInput *input = &press->input;
+    double before = press_depth(press), x = input->position[0][0] + press->offset[0], dt = input->dt;
+    press_body_free(body, gravity, input);
+    press_solve(press);
+    PressRow row = press_row(press);
+    press_advance(press);
+    press_body_move(input, press->contact.velocity);
+    press_pose(press);
+    press->time += dt;
+    double depth = press_depth(press), way = input->position[0][0] + press->offset[0] - x;
+    double share = depth < before && row.force > 0 ? 1 : 0.5;
+    work_add(press, &row, depth - before, way);
+    if (result->stop_time == 0 && input->velocity[0][2] >= 0 && depth > press->start) {
+        result->stop_time = press->time;
+        result->stop_depth = fmax(before, depth);
+    }
+    if (untouched(press)) result->print_depth = 0;
+    row.time = press->time - (1 - share) * dt;
+    row.depth = before + share * (depth - before);
+    return rows_add(result, row, error);
+}
+
+static MildStatus drop_run(Press *press, MildError *error) {
+    const PressDef *def = press->def;
+    PressBody body = press_body(press->sole, def->mass);
+    int steps = (int)ceil(def->seconds / def->step - 1e-6);
+    press->input.dt = def->step;
+    press->input.velocity[0][2] = -def->impact;
+    press_place(press, press->start - def->height);
+    MildStatus status = MILD_OK;
+    for (int i = 0; i < steps && status == MILD_OK; i++) status = drop_step(press, &body, error);
+    const double *V = press->input.velocity[0];
+    press->result->rest_speed = sqrt(V[0] * V[0] + V[1] * V[1] + V[2] * V[2]);
+    return status;
 }
 
 MildStatus press_run(const PressDef *def, const MildSole *sole, PressResult *result, MildError *error) {
     Press press;
+    PressDef whole = *def;
+    double pitch = mild_sole_pitch(sole);
+    int elements = mild_sole_elements(sole);
+    *result = (PressResult){.elements = elements, .area = elements * pitch * pitch};
     MildStatus status = mild_material_check(&def->material, error);
-    if (status == MILD_OK) status = press_open(&press, def, sole, error);
+    if (status == MILD_OK) status = press_open(&press, &whole, sole, result, error);
     if (status != MILD_OK) return status;
-    double pitch = mild_sole_pitch(sole), start = lowest_element(&press, sole);
-    double dt = (def->depth - start) / def->speed / PRESS_STEPS;
-    *result = (PressResult){.elements = mild_sole_elements(sole), .area = mild_sole_elements(sole) * pitch * pitch};
-    press.input.dt = dt;
-    result->rows[0] = press_row(&press, 0, start);
-    for (int i = 1; i < PRESS_ROWS; i++) {
-        int steps_down = i <= PRESS_STEPS ? i : PRESS_ROWS - 1 - i;
-        press_step(&press, result->rows[i - 1].depth, i <= PRESS_STEPS ? def->speed : -def->speed);
-        double depth = start + (def->depth - start) * steps_down / PRESS_STEPS;
-        result->rows[i] = press_row(&press, i * dt, depth);
-    }
-    press_sum_up(result);
+    double way = def->force > 0 ? 0.02e-3 * WAY_STEPS : def->depth - press.start;
+    if (!(whole.step > 0)) whole.step = def->mass > 0 ? 1e-4 : way / def->speed / WAY_STEPS;
+    status = def->mass > 0 ? drop_run(&press, error) : hand_run(&press, error);
     press_close(&press);
-    return MILD_OK;
+    return status;
 }

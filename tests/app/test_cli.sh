@@ -61,6 +61,12 @@ bad "outside" "$mild" press --ground sand_loose --depth 7
 bad "not a number" "$mild" press --ground sand_loose --speed fast
 bad "neither LENGTH,WIDTH" "$mild" press --ground sand_loose --plate 0.1
 bad "only ground model" "$mild" press --ground sand_loose --model con_cone
+bad "only what falls" "$mild" press --ground sand_loose --mass 5
+bad "leave out --depth" "$mild" press --ground sand_loose --drop 0.1 --depth 0.02
+bad "way back" "$mild" press --ground sand_loose --depth 0.02,0.03
+bad "way back" "$mild" press --ground sand_loose --force 100,200
+bad "leave out --cycles" "$mild" press --ground sand_loose --drag 0.1 --cycles 2
+bad "pushes with" "$mild" press --ground sand_loose --force 1e6
 bad "No space left" "$mild" press --ground sand_loose --csv /dev/full
 expect 0 'peak .* N' "$mild" press --ground foam45 --plate 0.1,0.1 --csv press.csv
 [ "$(head -1 press.csv)" = "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m" ] || fail "columns of press.csv"
