@@ -29,7 +29,7 @@ typedef struct {
     FitResult result;
 } FitWork;
 
-static const char *const units[FIT_PARAMETERS] = {"N/m", "N/m^3", "rad", "-", "-"};
+static const char *const units[FIT_PARAMETERS] = {"N/m", "N/m^3", "rad", "-", "-", "-"};
 
 static int options_read(int argc, char **argv, FitOptions *options, CliArgs *args) {
     char grounds[200], ground_help[400];
@@ -39,7 +39,7 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
     const CliOption table[] = {
         {"plate", CLI_NUMBERS, &options->plate, 0.0195, 1, "L,W", "[m] length and width of the plate that was pressed"},
         {"fit", CLI_NAMES, &options->fit, 0, 0, "NAME[,NAME]",
-         "what to fit, of k_pen, sigma_cone, alpha, nu, c_d (default k_pen,sigma_cone)"},
+         "what to fit, of k_pen, sigma_cone, alpha, nu, c_g, c_d (default k_pen,sigma_cone)"},
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
         {"alpha", CLI_NUMBER, &options->alpha, 0.1, 1.5, "A", "[rad] shear band angle, held or start of its fit"},
         {"nu", CLI_NUMBER, &options->nu, 0.1, 10, "N", "[-] recruitment rate, held or start of its fit"},
@@ -53,8 +53,9 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
         .summary =
             "Find the parameters of a ground from presses of a level plate: values with 95 % intervals, and which of "
             "them the data cannot tell. A CSV has a header line with depth_m and force_n, and time_s or speed_m_s "
-            "where speed matters; several files may have several speeds, which c_d needs. Rows that are not deeper "
-            "than all before (unloading) are left out. The intervals take the errors of the rows as independent.",
+            "where speed matters; several files may have several speeds, which c_d needs, or a drop, which c_g needs too. "
+            "Rows that are not deeper than all before (unloading) are left out. The intervals take the errors of the "
+            "rows as independent.",
         .options = table,
         .option_count = sizeof table / sizeof *table,
         .overrides = "any parameter of the ground, e.g. --ground.bed_depth=0.05; `mild info grounds` lists them",
@@ -76,7 +77,7 @@ static MildStatus names_read(const CliNames *names, FitDef *def, MildError *erro
         }
         if (found) continue;
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--fit: unknown parameter '%s'; nearest is '%s' (k_pen, sigma_cone, alpha, nu, c_d)",
+                         "--fit: unknown parameter '%s'; nearest is '%s' (k_pen, sigma_cone, alpha, nu, c_g, c_d)",
                          names->name[i], text_nearest(names->name[i], fit_names, FIT_PARAMETERS));
     }
     return MILD_OK;
@@ -132,8 +133,8 @@ static void say_held(const FitResult *result, FitName name) {
     case FIT_HELD:
     case FIT_FITTED: break;
     case FIT_NO_SPEEDS:
-        printf("c_d: the rows do not differ in speed, the data cannot tell it; %s (add a press at another speed)\n",
-               held);
+        printf("%s: the rows do not differ in speed, the data cannot tell it; %s (add a press at another speed)\n",
+               fit_names[name], held);
         break;
     case FIT_NO_MASS: printf("c_d: this ground has no added mass (c_g = 0), c_d has no effect; %s\n", held); break;
     case FIT_NO_EFFECT: printf("%s: has no effect on these forces; %s\n", fit_names[name], held); break;
@@ -197,7 +198,7 @@ static MildStatus data_write(const FitWork *work, const CliArgs *args, const cha
         for (int i = work->first[f]; i < work->first[f + 1]; i++) {
             const FitPoint *p = &work->points[i];
             fprintf(memory, "%d,%.9g,%.9g,%.9g,%.9g\n", f + 1, p->depth, p->force, p->speed,
-                    fit_force(&def, p->depth, p->speed));
+                    fit_force(&def, p));
         }
     }
     MildStatus status = MILD_OK;

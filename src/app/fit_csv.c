@@ -23,6 +23,7 @@ typedef struct {
     char *line;
     size_t size;
     int number;              /* of the line, from 1 */
+    int columns;             /* in the header */
     int column[CSV_COLUMNS]; /* place in the line, -1: absent */
     double time;             /* of the row before */
 } Csv;
@@ -77,7 +78,7 @@ static MildStatus csv_header(Csv *csv, MildError *error) {
     if (status != MILD_OK) return status;
     if (!line)
         return mild_fail(error, MILD_ERROR_FORMAT, "%.200s: empty; a header line and rows are needed", csv->path);
-    int count = csv_split(line, cells);
+    int count = csv->columns = csv_split(line, cells);
     for (int c = 0; c < CSV_COLUMNS; c++) {
         csv->column[c] = -1;
         for (int i = 0; i < count; i++) {
@@ -123,6 +124,12 @@ static MildStatus csv_row(Csv *csv, char *line, FitPoint *point, MildError *erro
     if (count < 0) {
         return mild_fail(error, MILD_ERROR_FORMAT, "%.200s:%d: more than %d columns; keep those needed", csv->path,
                          csv->number, CSV_COLUMNS_MAX);
+    }
+    while (count > csv->columns && !*cells[count - 1]) count--; /* commas at the end */
+    if (count > csv->columns) {
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%.200s:%d: %d values under %d columns; a decimal point, not a comma, is needed", csv->path,
+                         csv->number, count, csv->columns);
     }
     for (int c = 0; c < CSV_COLUMNS && status == MILD_OK; c++)
         status = csv_cell(csv, (CsvColumn)c, cells, count, values[c], error);

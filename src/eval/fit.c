@@ -11,12 +11,12 @@
 #define FIT_LOOSE 0.25 /* relative half width from which a correlated parameter counts as not told */
 #define FIT_SPEEDS 1.3 /* least ratio of speeds that tells drag */
 
-enum { P = FIT_PARAMETERS, FIT_ITERATIONS = 100, FIT_STARTS = 5 };
+enum { P = FIT_PARAMETERS, FIT_ITERATIONS = 100, FIT_STARTS = 5, LOCAL_ROWS = 200 };
 
-const char *const fit_names[FIT_PARAMETERS] = {"k_pen", "sigma_cone", "alpha", "nu", "c_d"};
+const char *const fit_names[FIT_PARAMETERS] = {"k_pen", "sigma_cone", "alpha", "nu", "c_g", "c_d"};
 
 /* What is given up first when several parameters have one effect. */
-static const FitName give_up[FIT_PARAMETERS] = {FIT_NU, FIT_ALPHA, FIT_C_D, FIT_SIGMA_CONE, FIT_K_PEN};
+static const FitName give_up[FIT_PARAMETERS] = {FIT_NU, FIT_ALPHA, FIT_C_G, FIT_C_D, FIT_SIGMA_CONE, FIT_K_PEN};
 
 /* The working arrays of one run. */
 typedef struct {
@@ -32,14 +32,16 @@ typedef struct {
 } Fit;
 
 double *fit_value(MildMaterial *material, FitName name) {
-    double *const values[P] = {&material->k_pen, &material->sigma_cone, &material->alpha, &material->nu,
-                               &material->c_d};
+    double *const values[P] = {&material->k_pen, &material->sigma_cone, &material->alpha,
+                               &material->nu,    &material->c_g,        &material->c_d};
     return values[name];
 }
 
 void fit_range(const MildMaterial *material, FitName name, double *low, double *high) {
     const MildField *field = mild_field_find(mild_material_fields, mild_material_field_count, fit_names[name], NULL);
-    *low = name == FIT_C_D && material->passive ? 0.5 : field->min;
+    *low = field->min;
+    if (material->passive && name == FIT_C_D) *low = 0.5;
+    if (material->passive && name == FIT_C_G) *low = 0;
     *high = field->max;
 }
 
@@ -47,9 +49,10 @@ static double drag_scale(const MildMaterial *material) {
     return material->passive ? fmax(material->c_d, 0.5) : material->c_d;
 }
 
-double fit_force(const FitDef *def, double depth, double speed) {
-    MildElementLaw law = mild_element_law(&def->material, def->pitch, fmax(depth, 0));
-    return def->elements * (law.force + drag_scale(&def->material) * law.added_mass_per_depth * speed * speed);
+double fit_force(const FitDef *def, const FitPoint *point) {
+    MildElementLaw law = mild_element_law(&def->material, def->pitch, fmax(point->depth, 0));
+    double drag = drag_scale(&def->material) * law.added_mass_per_depth * point->speed * point->speed;
+    return def->elements * (law.force + drag + law.added_mass * point->acceleration);
 }
 
 int fit_loading(FitPoint *points, int count) {
@@ -63,30 +66,11 @@ int fit_loading(FitPoint *points, int count) {
     return kept;
 }
 
-void fit_speeds(FitPoint *points, int count) {
-    int half = count / 20 > 2 ? count / 20 : 2;
-    for (int i = 0; i < count; i++) {
-        int first = i > half ? i - half : 0, last = i + half < count ? i + half : count - 1;
-        double time = 0, depth = 0, square = 0, product = 0, rows = last - first + 1;
-        if (isfinite(points[i].speed)) continue;
-        for (int k = first; k <= last; k++) {
-            time += points[k].time / rows;
-            depth += points[k].depth / rows;
-        }
-        for (int k = first; k <= last; k++) {
-            double t = points[k].time - time;
-            square += t * t;
-            product += t * (points[k].depth - depth);
-        }
-        points[i].speed = square > 0 ? fmax(product / square, 0) : 0; /* also 0 when time is NaN */
-    }
-}
-
 static double fit_miss(Fit *fit) {
     double sum = 0;
     for (int i = 0; i < fit->count; i++) {
         const FitPoint *point = &fit->points[i];
-        fit->miss[i] = point->force - fit_force(&fit->def, point->depth, point->speed);
+        fit->miss[i] = point->force - fit_force(&fit->def, point);
         sum += fit->miss[i] * fit->miss[i];
     }
     return sum;
@@ -101,10 +85,10 @@ static void fit_columns(Fit *fit) {
         double up = fmin(centre + step, high), down = fmax(centre - step, low), *column = fit->column + p * fit->count;
         *value = up;
         for (int i = 0; i < fit->count; i++)
-            column[i] = fit_force(&fit->def, fit->points[i].depth, fit->points[i].speed);
+            column[i] = fit_force(&fit->def, &fit->points[i]);
         *value = down;
         for (int i = 0; i < fit->count; i++) {
-            column[i] -= fit_force(&fit->def, fit->points[i].depth, fit->points[i].speed);
+            column[i] -= fit_force(&fit->def, &fit->points[i]);
             column[i] /= up - down;
         }
         *value = centre;
@@ -137,6 +121,41 @@ static int invert(double a[P][P], int n, double inverse[P][P]) {
         }
     }
     return 1;
+}
+
+/* Speed and acceleration of row `i` from a least squares polynomial of the depths around it: a quartic, whose bias a
+ * braking plate needs, through a twentieth of the rows; a parabola where they are few. 0 where the times do not tell. At most
+ * LOCAL_ROWS of the window are looked at, so that a long record costs no more than its length. */
+static void local_motion(const FitPoint *points, int count, int i, double *speed, double *acceleration) {
+    int half = count / 40 > 4 ? count / 40 : 4, rows = 2 * half + 1 < count ? 2 * half + 1 : count;
+    int first = i - half > 0 ? (i + half < count ? i - half : count - rows) : 0, stride = 1 + rows / LOCAL_ROWS;
+    int terms = rows >= 15 ? 5 : 3;
+    double now = points[i].time, reach = fmax(now - points[first].time, points[first + rows - 1].time - now);
+    double moment[2 * P] = {0}, depth[P] = {0}, normal[P][P], inverse[P][P];
+    for (int k = first; k < first + rows; k += stride) {
+        double t = (points[k].time - now) / reach, power = 1;
+        for (int n = 0; n < 2 * terms - 1; n++, power *= t) {
+            moment[n] += power / rows;
+            if (n < terms) depth[n] += power * (points[k].depth - points[i].depth) / rows;
+        }
+    }
+    *speed = *acceleration = 0;
+    for (int a = 0; a < terms; a++)
+        for (int b = 0; b < terms; b++) normal[a][b] = moment[a + b];
+    if (!(reach > 0) || !invert(normal, terms, inverse)) return;
+    for (int a = 0; a < terms; a++) {
+        *speed += inverse[1][a] * depth[a] / reach;
+        *acceleration += 2 * inverse[2][a] * depth[a] / (reach * reach);
+    }
+    *speed = fmax(*speed, 0);
+}
+
+void fit_speeds(FitPoint *points, int count) {
+    for (int i = 0; i < count; i++) {
+        double speed;
+        local_motion(points, count, i, &speed, &points[i].acceleration);
+        if (!isfinite(points[i].speed)) points[i].speed = speed;
+    }
 }
 
 /* The free parameters that may move: not those at a bound that the gradient pushes against. */
@@ -364,17 +383,20 @@ static double fit_reduce(Fit *fit, const FitDef *def, FitResult *result) {
     return fit_miss(fit);
 }
 
-/* c_d is told by rows of different speed on a ground that has added mass. */
+/* Rows of different speed on a ground that has added mass tell c_d, or c_g with it. */
 static void hold_drag(Fit *fit, const FitDef *def, FitResult *result) {
+    static const FitName rate[] = {FIT_C_D, FIT_C_G};
     const MildMaterial *m = &def->material;
     double slowest = INFINITY, fastest = 0, added = m->passive ? fmax(m->c_g, 0) : m->c_g;
     for (int i = 0; i < fit->count; i++) {
         slowest = fmin(slowest, fit->points[i].speed);
         fastest = fmax(fastest, fit->points[i].speed);
     }
-    if (!fit->def.free[FIT_C_D]) return;
-    FitParameter why = {.state = added == 0 ? FIT_NO_MASS : FIT_NO_SPEEDS};
-    if (added == 0 || fastest <= FIT_SPEEDS * slowest) hold(fit, def, FIT_C_D, &result->parameter[FIT_C_D], &why);
+    int same = fastest <= FIT_SPEEDS * slowest, massless = added == 0 && !def->free[FIT_C_G];
+    for (int k = 0; k < 2; k++) {
+        FitParameter why = {.state = massless ? FIT_NO_MASS : FIT_NO_SPEEDS};
+        if (def->free[rate[k]] && (same || massless)) hold(fit, def, rate[k], &result->parameter[rate[k]], &why);
+    }
 }
 
 static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count, MildError *error) {
@@ -387,7 +409,9 @@ static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count
     if (def->elements < 1 || !(def->pitch > 0))
         return mild_fail(error, MILD_ERROR_RANGE, "fit: the plate has no element");
     for (int i = 0; i < count; i++) {
-        if (isfinite(points[i].depth) && isfinite(points[i].force) && isfinite(points[i].speed)) continue;
+        if (isfinite(points[i].depth) && isfinite(points[i].force) && isfinite(points[i].speed) &&
+            isfinite(points[i].acceleration))
+            continue;
         return mild_fail(error, MILD_ERROR_RANGE, "fit: row %d is not finite", i + 1);
     }
     return MILD_OK;

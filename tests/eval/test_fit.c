@@ -31,7 +31,7 @@ static void press(const FitDef *truth, FitPoint *out, int rows, double depth, do
     double peak = 0;
     for (int i = 0; i < rows; i++) {
         out[i] = (FitPoint){.time = NAN, .depth = depth * (i + 1) / rows, .speed = speed};
-        out[i].force = fit_force(truth, out[i].depth, speed);
+        out[i].force = fit_force(truth, &out[i]);
         peak = fmax(peak, out[i].force);
     }
     for (int i = 0; i < rows; i++) {
@@ -87,7 +87,7 @@ static void exact(void **state) {
         def.material.c_d = def.free[FIT_C_D] ? 5 : 1;
         for (int half = 0; half < 2; half++)
             press(&truth, points + half * ROWS, ROWS, 0.04, half ? 1 : 0.01, NOISE_OF_ROW, 1);
-        for (int i = 0; i < 2 * ROWS; i++) points[i].force = fit_force(&truth, points[i].depth, points[i].speed);
+        for (int i = 0; i < 2 * ROWS; i++) points[i].force = fit_force(&truth, &points[i]);
         FitResult result = run(&def, 2 * ROWS);
         for (int p = 0; p < FIT_PARAMETERS; p++) {
             double value = *fit_value(&truth.material, (FitName)p);

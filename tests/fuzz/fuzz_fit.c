@@ -14,7 +14,7 @@ static void check(int right) {
 }
 
 static void fit(const FitPoint *points, int count) {
-    FitDef def = {.material = mild_material_default(), .elements = 55, .pitch = 0.0195, .free = {1, 1, 1, 1, 1}};
+    FitDef def = {.material = mild_material_default(), .elements = 55, .pitch = 0.0195, .free = {1, 1, 1, 1, 1, 1}};
     FitResult result;
     MildError error;
     check(fit_run(&def, points, count, &result, &error) == MILD_OK);
