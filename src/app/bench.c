@@ -206,10 +206,10 @@ MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError 
     if (!trainer) return error->status;
     TrainReport iteration;
     TrainTimes sum = {0};
-    train_iterate(trainer, &iteration); /* caches, kernels compiled by oneDNN */
+    MildStatus status = train_iterate(trainer, &iteration, error); /* caches, kernels compiled by oneDNN */
     double start = clock_seconds(), wall = 0, steps = 0;
-    while (wall < seconds) {
-        train_iterate(trainer, &iteration);
+    while (status == MILD_OK && wall < seconds) {
+        status = train_iterate(trainer, &iteration, error);
         sum.environments += iteration.times.environments;
         sum.inference += iteration.times.inference;
         sum.update += iteration.times.update;
@@ -218,9 +218,9 @@ MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError 
         steps += (double)def->train.envs * def->ppo.steps;
         wall = clock_seconds() - start;
     }
-    train_rows(&sum, steps, wall, train_threads(trainer), report);
+    if (status == MILD_OK) train_rows(&sum, steps, wall, train_threads(trainer), report);
     train_destroy(trainer);
-    return MILD_OK;
+    return status;
 }
 
 /* A field of /proc/self/status in bytes; 0 where there is none. */
@@ -239,7 +239,10 @@ MildStatus bench_memory(const ExperimentDef *def, BenchReport *report, MildError
     Trainer *trainer = train_create(def, error);
     if (!trainer) return error->status;
     TrainReport iteration;
-    train_iterate(trainer, &iteration); /* touches every page once */
+    if (train_iterate(trainer, &iteration, error)) { /* touches every page once */
+        train_destroy(trainer);
+        return error->status;
+    }
     bench_add(report, "memory", "envs", def->train.envs, "-");
     bench_add(report, "memory", "training", (double)train_bytes(trainer), "B");
     bench_add(report, "memory", "process_peak", process_bytes("VmHWM:"), "B");

@@ -10,6 +10,7 @@
 #include "app/experiment.h"
 #include "app/grounds.h"
 #include "app/text.h"
+#include "gpu/learner.h"
 
 /* Where the numbers of a preset come from; docs/ has the details. */
 static const struct {
@@ -129,11 +130,12 @@ static const char *instruction_set(void) {
 }
 
 static int info_devices(void) {
-    char machine[256], memory[32];
+    char machine[256], memory[32], gpu[512];
+    gpu_device(gpu, sizeof gpu);
     printf("processor  %s\n", build_machine(machine, sizeof machine));
     printf("memory     %s\n", text_bytes(build_memory_bytes(), memory, sizeof memory));
     printf("networks   oneDNN on the processor, %s\n", instruction_set());
-    printf("GPU        not used: this version computes on the processor only\n");
+    printf("GPU        %s\n", gpu);
     return 0;
 }
 

@@ -191,7 +191,10 @@ static MildStatus train_loop(Run *run, MildError *error) {
     while (status == MILD_OK && !interrupt_requested() && share_done(run, &display) < 1) {
         TrainReport report;
         double row[COLUMNS];
-        train_iterate(run->trainer, &report);
+        status = train_iterate(run->trainer, &report, error);
+        if (status != MILD_OK) {
+            break;
+        }
         fill_row(run, &report, row);
         int64_t iteration = train_iteration(run->trainer);
         status = log_row(run->log, iteration, row, error);

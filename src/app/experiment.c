@@ -1,5 +1,7 @@
 #include "app/experiment.h"
 
+#include <string.h>
+
 #include "app/paths.h"
 #include "task/task.h"
 
@@ -36,6 +38,9 @@ MildStatus experiment_check(const ExperimentDef *def, MildError *error) {
     if (def->ppo.learning_rate_min > def->ppo.learning_rate_max) {
         return mild_fail(error, MILD_ERROR_RANGE, "ppo.learning_rate_min %g is above ppo.learning_rate_max %g",
                          def->ppo.learning_rate_min, def->ppo.learning_rate_max);
+    }
+    if (strcmp(def->train.device, "cpu") != 0 && strcmp(def->train.device, "cuda") != 0) {
+        return mild_fail(error, MILD_ERROR_RANGE, "train.device = %s: neither cpu nor cuda", def->train.device);
     }
     if ((int64_t)def->train.envs * def->ppo.steps < def->ppo.minibatches) {
         return mild_fail(error, MILD_ERROR_RANGE,

@@ -7,6 +7,14 @@
 #include "app/commands.h"
 #include "app/text.h"
 
+#ifndef MILD_VIEW
+int cmd_play(int argc, char **argv) {
+    (void)argc;
+    (void)argv;
+    return cli_fail_text("play", "built without drawing; configure with -DMILD_VIEW=ON");
+}
+#endif
+
 static const struct {
     const char *name;
     int (*run)(int argc, char **argv);

@@ -5,6 +5,7 @@
 
 #include "app/paths.h"
 #include "base/clock.h"
+#include "gpu/learner.h"
 
 struct Trainer {
     ExperimentDef def;
@@ -59,6 +60,9 @@ static int build(Trainer *trainer, MildError *error) {
     if (!trainer->ppo) {
         return 0;
     }
+    if (strcmp(def->train.device, "cuda") == 0 && gpu_learner_attach(trainer->ppo, error)) {
+        return 0;
+    }
     trainer->vec = vec_create(&def->task, trainer->robot, trainer->pool, def->train.envs, def->train.seed, error);
     return trainer->vec != NULL;
 }
@@ -79,7 +83,7 @@ Trainer *train_create(const ExperimentDef *def, MildError *error) {
     return trainer;
 }
 
-void train_iterate(Trainer *trainer, TrainReport *report) {
+MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error) {
     PpoBatch *batch = ppo_batch(trainer->ppo);
     size_t envs = (size_t)batch->envs, actions = (size_t)trainer->def.policy.actions;
     TrainTimes times = {0};
@@ -107,6 +111,7 @@ void train_iterate(Trainer *trainer, TrainReport *report) {
     report->episodes = vec_take_stats(trainer->vec);
     report->steps_per_s = (double)(envs * (size_t)batch->steps) / wall;
     report->reward_per_step = reward / (double)(envs * (size_t)batch->steps);
+    return ppo_status(trainer->ppo, error);
 }
 
 int64_t train_iteration(const Trainer *trainer) {

@@ -24,8 +24,8 @@ typedef struct {
 
 Trainer *train_create(const ExperimentDef *def, MildError *error);
 void train_destroy(Trainer *trainer);
-/* One rollout and one update. */
-void train_iterate(Trainer *trainer, TrainReport *report);
+/* One rollout and one update. Fails when train.device does. */
+MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
 int64_t train_iteration(const Trainer *trainer);
 Policy *train_policy(Trainer *trainer); /* what gets saved: the averaged weights with ppo.average */
 size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */

@@ -13,7 +13,8 @@ typedef struct {
     int checkpoint_every; /* iterations */
     int keep_checkpoints; /* the newest so many stay */
     uint64_t seed;
-    int threads; /* 0: one per core */
+    int threads;    /* 0: one per core */
+    char device[8]; /* of the networks: cpu, cuda */
 } TrainDef;
 
 TrainDef train_def_default(void);

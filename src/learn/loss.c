@@ -6,9 +6,6 @@
 #include "learn/vector.h"
 
 #define HALF_LOG_2PI 0.91893853320467274
-/* The log-variance is used within these bounds, so that no early step can overflow e^logvar. */
-#define LOGVAR_MIN (-12.0f)
-#define LOGVAR_MAX 6.0f
 
 size_t loss_carve(const Network *network, int rows, int mirrored, float *block, LossChunk *chunk) {
     const PolicyDef *def = &network->def;
@@ -108,9 +105,7 @@ static void surrogate_row(const LossContext *c, const LossChunk *chunk, int r, c
     sums->kl += kl;
 }
 
-/* What surrogate_row needs and no sample changes: 1/std, then the constants of log_prob and of
- * KL(old || new) = sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
-static void surrogate_constants(const LossContext *c, float *constant) {
+void loss_surrogate_constants(const LossContext *c, float *constant) {
     const int actions = c->network->def.actions;
     double log_prob = 0.0, kl = 0.0;
     for (int j = 0; j < actions; j++) {
@@ -128,7 +123,7 @@ static void policy_loss(const LossContext *c, LossChunk *chunk, const float *mea
                         LossSums *sums) {
     const int actions = c->network->def.actions;
     float constant[NETWORK_ACTIONS_MAX + 2];
-    surrogate_constants(c, constant);
+    loss_surrogate_constants(c, constant);
     float entropy_share = (float)((1.0 - c->def->epsilon) * c->def->entropy) * c->sample_weight * (float)chunk->rows;
     for (int j = 0; j < actions; j++) {
         d_log_std[j] = (beta == 0.0f ? 0.0f : d_log_std[j]) - entropy_share; /* 0 * NaN would stay NaN */
@@ -161,7 +156,7 @@ static void mirror_loss(const LossContext *c, LossChunk *chunk, const float *mea
 }
 
 static float held_logvar(float logvar) {
-    return logvar < LOGVAR_MIN ? LOGVAR_MIN : logvar > LOGVAR_MAX ? LOGVAR_MAX : logvar;
+    return logvar < LOSS_LOGVAR_MIN ? LOSS_LOGVAR_MIN : logvar > LOSS_LOGVAR_MAX ? LOSS_LOGVAR_MAX : logvar;
 }
 
 /* z = mu + exp(logvar/2) noise; decoder input [z | estimates]. */

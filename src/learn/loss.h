@@ -13,6 +13,10 @@
 #define LOSS_GROUPS                                                                                                    \
     3 /* estimates before, in and after the feet velocities: base velocity, feet velocities, feet heights */
 
+/* The log-variance is used within these bounds, so that no early step can overflow e^logvar. */
+#define LOSS_LOGVAR_MIN (-12.0f)
+#define LOSS_LOGVAR_MAX 6.0f
+
 /* Constants of one minibatch. */
 typedef struct {
     const PpoDef *def;
@@ -53,6 +57,10 @@ void loss_mirror_row(const LossContext *context, LossChunk *chunk, int from, int
 /* Add to the sums and to the gradient's ranges of their half (beta 0 overwrites instead). */
 void loss_actor(const LossContext *context, LossChunk *chunk, float *gradient, float beta, LossSums *sums);
 void loss_critic(const LossContext *context, LossChunk *chunk, float *gradient, float beta, LossSums *sums);
+
+/* What no sample changes in the surrogate: 1/std [actions], then the constants of log_prob and of
+ * KL(old || new) = sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
+void loss_surrogate_constants(const LossContext *context, float *constant);
 
 /* log of the normal density of `action`, independent dimensions. */
 float loss_log_prob(int actions, const float *action, const float *mean, const float *std);

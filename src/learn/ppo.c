@@ -136,13 +136,14 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     LossChunk chunk;
     ppo->stride = (count + 15) / 16 * 16;
     ppo->scratch_floats = loss_carve(n, PPO_CHUNK, ppo->mirror_rows, NULL, &chunk);
-    size_t batch_bytes = batch_layout(&ppo->batch, n, NULL);
-    ppo->batch_block = take(ppo, batch_bytes);
+    ppo->batch_bytes = batch_layout(&ppo->batch, n, NULL);
+    ppo->batch_block = take(ppo, ppo->batch_bytes);
     ppo->gradient = take(ppo, PPO_SHARDS * ppo->stride * sizeof(float));
     ppo->first = take(ppo, count * sizeof(float));
     ppo->second = take(ppo, count * sizeof(float));
     ppo->scratch = take(ppo, (size_t)pool_threads(ppo->pool) * ppo->scratch_floats * sizeof(float));
     ppo->order = take(ppo, samples * sizeof *ppo->order);
+    ppo->draw = take(ppo, samples * sizeof *ppo->draw);
     if (ppo->def.average > 0.0) {
         ppo->average = policy_create(policy_def(ppo->policy), ppo->seed, NULL);
         ppo->bytes += count * sizeof(float);
@@ -151,10 +152,11 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
         }
         memcpy(policy_parameters(ppo->average), ppo->policy->parameters, count * sizeof(float));
     }
-    if (!ppo->batch_block || !ppo->gradient || !ppo->first || !ppo->second || !ppo->scratch || !ppo->order) {
+    if (!ppo->batch_block || !ppo->gradient || !ppo->first || !ppo->second || !ppo->scratch || !ppo->order ||
+        !ppo->draw) {
         return 0;
     }
-    memset(ppo->batch_block, 0, batch_bytes);
+    memset(ppo->batch_block, 0, ppo->batch_bytes);
     batch_layout(&ppo->batch, n, ppo->batch_block);
     memset(ppo->batch.valid, 1, samples);
     memset(ppo->first, 0, count * sizeof(float));
@@ -220,6 +222,9 @@ Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *
 
 void ppo_destroy(Ppo *ppo) {
     if (ppo) {
+        if (ppo->backend.destroy) {
+            ppo->backend.destroy(ppo->backend.self);
+        }
         policy_destroy(ppo->average);
         free(ppo->mirror_index);
         free(ppo->mirror_sign);
@@ -229,6 +234,7 @@ void ppo_destroy(Ppo *ppo) {
         free(ppo->second);
         free(ppo->scratch);
         free(ppo->order);
+        free(ppo->draw);
         free(ppo);
     }
 }
@@ -249,29 +255,77 @@ int64_t ppo_iteration(const Ppo *ppo) {
     return ppo->iteration;
 }
 
+void ppo_use(Ppo *ppo, const PpoBackend *backend) {
+    ppo->backend = *backend;
+}
+
+MildStatus ppo_status(const Ppo *ppo, MildError *error) {
+    return ppo->error.status ? mild_fail(error, ppo->error.status, "%s", ppo->error.text) : MILD_OK;
+}
+
+typedef struct {
+    Ppo *ppo;
+    int t;
+    uint64_t key;
+    const float *std;
+} ActJob;
+
+/* Actions around the means of the piece's environments, two at a time so that the noise begins at an even number. */
+static void act_piece(void *context, int piece, int thread) {
+    (void)thread;
+    const ActJob *job = context;
+    PpoBatch *b = &job->ppo->batch;
+    const int actions = policy_def(job->ppo->policy)->actions, pairs = (b->envs + 1) / 2;
+    int first = 2 * ppo_piece_begin(pairs, piece), end = 2 * ppo_piece_begin(pairs, piece + 1);
+    end = end < b->envs ? end : b->envs;
+    const int64_t row = (int64_t)job->t * b->envs + first;
+    float *mean = b->mean + row * actions, *action = b->action + row * actions;
+    noise_normal(job->key, (int64_t)first * actions, (end - first) * actions, action);
+    for (int env = 0; env < end - first; env++, mean += actions, action += actions) {
+        for (int j = 0; j < actions; j++) {
+            action[j] = mean[j] + job->std[j] * action[j];
+        }
+        b->log_prob[row + env] = loss_log_prob(actions, action, mean, job->std);
+    }
+}
+
 void ppo_act(Ppo *ppo, int t) {
     const Network *n = &ppo->policy->network;
     PpoBatch *b = &ppo->batch;
-    const int actions = n->def.actions, envs = b->envs;
-    const int64_t first = (int64_t)t * envs;
-    float *mean = b->mean + first * actions, *action = b->action + first * actions;
-    policy_act(ppo->policy, ppo->pool, envs, b->history + first * n->history, mean, NULL, NULL);
+    const int64_t first = (int64_t)t * b->envs;
+    if (ppo->backend.act) {
+        ppo->backend.act(ppo->backend.self, t, &ppo->error);
+    } else {
+        policy_act(ppo->policy, ppo->pool, b->envs, b->history + first * n->history, b->mean + first * n->def.actions,
+                   NULL, NULL);
+    }
     Random key = random_at(ppo->seed, (uint32_t)ppo->iteration, (uint32_t)t);
-    noise_normal(random_bits(&key), 0, envs * actions, action);
-    const float *std = policy_std(ppo->policy);
-    for (int env = 0; env < envs; env++) {
-        for (int j = 0; j < actions; j++) {
-            action[env * actions + j] = mean[env * actions + j] + std[j] * action[env * actions + j];
-        }
-        b->log_prob[first + env] = loss_log_prob(actions, action + env * actions, mean + env * actions, std);
+    ActJob job = {ppo, t, random_bits(&key), policy_std(ppo->policy)};
+    pool_run(ppo->pool, PPO_PIECES, act_piece, &job);
+}
+
+typedef struct {
+    Ppo *ppo;
+    Random random;
+} ShuffleJob;
+
+static void draw_piece(void *context, int piece, int thread) {
+    (void)thread;
+    const ShuffleJob *job = context;
+    const int end = ppo_piece_begin(job->ppo->samples, piece + 1);
+    for (int k = ppo_piece_begin(job->ppo->samples, piece); k < end; k++) {
+        Random random = job->random;
+        random.use = (uint32_t)k;
+        job->ppo->draw[k] = (int)random_index(&random, (uint32_t)(job->ppo->samples - k));
     }
 }
 
 /* Fisher-Yates: a pure function of (seed, iteration, epoch). */
 static void shuffle(Ppo *ppo, int epoch) {
-    Random random = random_at(ppo->seed ^ 0x6f72646572u, (uint32_t)ppo->iteration, (uint32_t)epoch);
+    ShuffleJob job = {ppo, random_at(ppo->seed ^ 0x6f72646572u, (uint32_t)ppo->iteration, (uint32_t)epoch)};
+    pool_run(ppo->pool, PPO_PIECES, draw_piece, &job);
     for (int i = ppo->samples - 1; i > 0; i--) {
-        int j = (int)random_index(&random, (uint32_t)i + 1u), held = ppo->order[i];
+        int j = ppo->draw[ppo->samples - 1 - i], held = ppo->order[i];
         ppo->order[i] = ppo->order[j];
         ppo->order[j] = held;
     }
@@ -350,7 +404,7 @@ static int report_minibatch(PpoReport *report, const LossContext *context, const
 
 static int update_minibatch(Ppo *ppo, LossContext *context, const int *samples, int count, uint32_t draw,
                             PpoReport *report) {
-    const int mirrored = ppo_mirrored(ppo, count);
+    const int mirrored = ppo_mirrored(ppo, count, NULL);
     context->sample_weight = 1.0f / (float)count;
     context->mirror_weight = mirrored > 0 ? 1.0f / (float)mirrored : 0.0f;
     memcpy(context->std, policy_std(ppo->policy), (size_t)context->network->def.actions * sizeof *context->std);
@@ -407,7 +461,11 @@ void ppo_update(Ppo *ppo, PpoReport *report) {
     const Network *n = &ppo->policy->network;
     PpoBatch *b = &ppo->batch;
     *report = (PpoReport){0};
-    policy_value(ppo->policy, ppo->pool, (b->steps + 1) * b->envs, b->critic, b->value);
+    if (ppo->backend.values) {
+        ppo->backend.values(ppo->backend.self, &ppo->error);
+    } else {
+        policy_value(ppo->policy, ppo->pool, (b->steps + 1) * b->envs, b->critic, b->value);
+    }
     ppo_returns(ppo, report);
 
     LossContext context = {.def = &ppo->def, .network = n, .parameters = ppo->policy->parameters};

@@ -75,6 +75,8 @@ void ppo_update(Ppo *ppo, PpoReport *report);
 int64_t ppo_iteration(const Ppo *ppo);
 /* The running mean of the weights (Polyak and Juditsky 1992), or the policy itself with def.average = 0. Owned by ppo. */
 Policy *ppo_average(Ppo *ppo);
+/* What stopped the compute backend, if anything did; the parameters are still those of the last good step. */
+MildStatus ppo_status(const Ppo *ppo, MildError *error);
 
 /* Everything that resuming needs: parameters, moments, rate, counters, plus an opaque block of the caller (the
  * environments' state). One safetensors file with CRC32, temporary name then rename. On load nothing is changed unless the

@@ -25,15 +25,34 @@ static int chunk_mirrored(const Ppo *ppo, int rows) {
     return ppo->mirror.observation_index ? (int)(ppo->def.mirror_share * rows + 0.5) : 0;
 }
 
-int ppo_mirrored(const Ppo *ppo, int count) {
+int ppo_mirrored(const Ppo *ppo, int count, int *which) {
     int total = 0;
     for (int s = 0; s < PPO_SHARDS; s++) {
         int end = shard_begin(count, s + 1);
         for (int at = shard_begin(count, s); at < end; at += PPO_CHUNK) {
-            total += chunk_mirrored(ppo, end - at < PPO_CHUNK ? end - at : PPO_CHUNK);
+            int images = chunk_mirrored(ppo, end - at < PPO_CHUNK ? end - at : PPO_CHUNK);
+            for (int r = 0; which && r < images; r++) {
+                which[total + r] = at + r;
+            }
+            total += images;
         }
     }
     return total;
+}
+
+uint64_t ppo_latent_key(const Ppo *ppo, uint32_t draw) {
+    Random key = random_at(ppo->seed ^ 0x76616573u, (uint32_t)ppo->iteration, draw);
+    return random_bits(&key);
+}
+
+/* A chunk that begins at sample `at` takes its numbers from 2 at latent onward (gather_actor). */
+void ppo_latent_rows(int count, int *row) {
+    for (int s = 0; s < PPO_SHARDS; s++) {
+        int begin = shard_begin(count, s), end = shard_begin(count, s + 1);
+        for (int p = begin; p < end; p++) {
+            row[p] = p + begin + (p - begin) / PPO_CHUNK * PPO_CHUNK;
+        }
+    }
 }
 
 static void copy_row(float *to, int row, const float *from, int64_t sample, int width) {
@@ -57,8 +76,8 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
     for (int r = 0; r < chunk->mirrored; r++) {
         loss_mirror_row(job->loss, chunk, r, chunk->rows + r);
     }
-    Random key = random_at(ppo->seed ^ 0x76616573u, (uint32_t)ppo->iteration, job->draw);
-    noise_normal(random_bits(&key), 2 * (int64_t)at * n->def.latent, chunk->rows * n->def.latent, chunk->noise);
+    noise_normal(ppo_latent_key(ppo, job->draw), 2 * (int64_t)at * n->def.latent, chunk->rows * n->def.latent,
+                 chunk->noise);
 }
 
 static void gather_critic(const GradientJob *job, int at, LossChunk *chunk) {
@@ -137,6 +156,19 @@ static void reduce_piece(void *context, int range, int thread) {
     job->squares[range] = squares;
 }
 
+/* A backend leaves the sum in shard 0 itself. */
+static void square_piece(void *context, int range, int thread) {
+    (void)thread;
+    GradientJob *job = context;
+    const Ppo *ppo = job->ppo;
+    int64_t end = range_begin(ppo->policy->network.count, range + 1);
+    double squares = 0.0;
+    for (int64_t i = range_begin(ppo->policy->network.count, range); i < end; i++) {
+        squares += (double)ppo->gradient[i] * ppo->gradient[i];
+    }
+    job->squares[range] = squares;
+}
+
 static void add_sums(LossSums *to, const LossSums *from) {
     to->surrogate += from->surrogate;
     to->kl += from->kl;
@@ -153,11 +185,21 @@ static void add_sums(LossSums *to, const LossSums *from) {
 void ppo_gradient(Ppo *ppo, const LossContext *context, const int *samples, int count, uint32_t draw, LossSums *sums,
                   double *norm) {
     GradientJob job = {.ppo = ppo, .loss = context, .samples = samples, .count = count, .draw = draw};
-    pool_run(ppo->pool, 2 * PPO_SHARDS, gradient_piece, &job);
-    pool_run(ppo->pool, PPO_RANGES, reduce_piece, &job);
+    const PpoBackend *backend = &ppo->backend;
     *sums = (LossSums){0};
-    for (int piece = 0; piece < 2 * PPO_SHARDS; piece++) {
-        add_sums(sums, &job.sums[piece]);
+    if (backend->gradient) {
+        if (backend->gradient(backend->self, context, samples, count, ppo_latent_key(ppo, draw), ppo->gradient, sums,
+                              &ppo->error)) {
+            *norm = NAN; /* drops the minibatch */
+            return;
+        }
+        pool_run(ppo->pool, PPO_RANGES, square_piece, &job);
+    } else {
+        pool_run(ppo->pool, 2 * PPO_SHARDS, gradient_piece, &job);
+        pool_run(ppo->pool, PPO_RANGES, reduce_piece, &job);
+        for (int piece = 0; piece < 2 * PPO_SHARDS; piece++) {
+            add_sums(sums, &job.sums[piece]);
+        }
     }
     double squares = 0.0;
     for (int range = 0; range < PPO_RANGES; range++) {

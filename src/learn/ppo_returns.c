@@ -46,11 +46,18 @@ static Moments moments_of(const Ppo *ppo, const float *x) {
     return (Moments){sum / n, sqrt(squares / n)};
 }
 
+static void returns_piece(void *context, int piece, int thread) {
+    (void)thread;
+    Ppo *ppo = context;
+    const int end = ppo_piece_begin(ppo->batch.envs, piece + 1);
+    for (int env = ppo_piece_begin(ppo->batch.envs, piece); env < end; env++) {
+        environment_returns(&ppo->def, &ppo->batch, env);
+    }
+}
+
 void ppo_returns(Ppo *ppo, PpoReport *report) {
     PpoBatch *b = &ppo->batch;
-    for (int env = 0; env < b->envs; env++) {
-        environment_returns(&ppo->def, b, env);
-    }
+    pool_run(ppo->pool, PPO_PIECES, returns_piece, ppo);
     ppo->samples = 0;
     for (int i = 0; i < b->steps * b->envs; i++) {
         if (sample_usable(b, i)) {

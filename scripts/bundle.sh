@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# Makes build/bundle: the program without drawing, with CUDA, and every library it needs but libc and CUDA's, to be copied
+# as one folder to a machine that has an NVIDIA driver and cuBLAS 13 and nothing else. docs/gpu.md says how to use it.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+bundle=build/bundle
+jobs=${JOBS:-$(nproc)}
+
+rm -rf "$bundle"
+mkdir -p "$bundle/bin" "$bundle/lib"
+for march in x86-64-v3 x86-64-v4; do
+    cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_CUDA=ON -DMILD_VIEW=OFF \
+        -DMILD_MARCH=$march -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
+        -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' >/dev/null
+    cmake --build "build/$march" --parallel "$jobs" --target mild gpu_test_gpu >/dev/null
+    strip -o "$bundle/bin/mild-$march" "build/$march/mild"
+done
+strip -o "$bundle/bin/test_gpu" build/x86-64-v3/tests/gpu_test_gpu
+
+# what ldd names, less libc, the loader and CUDA
+ldd build/x86-64-v3/mild build/x86-64-v3/tests/gpu_test_gpu | awk '$2 == "=>" { print $3 }' | sort -u |
+    grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
+cp -r models configs "$bundle/"
+
+cat >"$bundle/run" <<'RUN'
+#!/bin/sh
+# run PROGRAM ARGUMENTS: starts mild or test_gpu of this folder with the cuBLAS that this machine has.
+here=$(dirname "$(readlink -f "$0")")
+program=$1
+shift
+wheel=$(python3 -c 'import nvidia; print(list(nvidia.__path__)[0])' 2>/dev/null)
+for folder in /usr/local/cuda*/lib64 /usr/local/cuda*/targets/x86_64-linux/lib "$wheel"/cu13/lib "$wheel"/cublas/lib; do
+    [ -e "$folder/libcublas.so.13" ] && LD_LIBRARY_PATH=$folder${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH} && break
+done
+export LD_LIBRARY_PATH
+if [ "$program" = mild ]; then
+    program=mild-x86-64-v3
+    grep -q avx512vl /proc/cpuinfo && program=mild-x86-64-v4
+fi
+exec "$here/bin/$program" "$@"
+RUN
+chmod +x "$bundle/run"
+du -sh "$bundle"
