@@ -138,7 +138,7 @@ typedef struct {
     double velocity[6 * MILD_FEET_MAX]; /* V+ after the step */
     double residual;   /* relative, at exit */
     int iterations;
-    int converged;     /* bool */
+    int converged;     /* bool; 0 whenever a pose or a result is not finite, or dt is not positive */
 } MildContactResult;
 
 typedef struct MildGround MildGround; /* memory of all feet: one pointer-free block of mild_ground_bytes() bytes */

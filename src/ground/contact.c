@@ -86,6 +86,23 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
     foot_loaded(scratch, input->position[f], f, result);
 }
 
+/* 0 when every value is finite, else NaN: 0 x is 0 for finite x only. */
+static double finite_sum(const double *values, int count) {
+    double sum = 0.0;
+    for (int i = 0; i < count; i++) sum += 0.0 * values[i];
+    return sum;
+}
+
+/* A foot at NaN touches nothing and so meets no equation that fails: look at where the feet are and how they move. A step
+ * of no length has no forces. */
+static int all_finite(const MildContactInput *input, const MildContactResult *result, int feet) {
+    double sum = finite_sum(result->velocity, 6 * feet), rate = 1.0 / input->dt;
+    for (int f = 0; f < feet; f++)
+        sum += finite_sum(input->position[f], 3) + finite_sum(input->rotation[f], 9) +
+               finite_sum(result->foot[f].force, 3) + finite_sum(result->foot[f].torque, 3);
+    return sum == 0.0 && rate > 0.0 && isfinite(rate);
+}
+
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain, const MildContactInput *input,
                        MildScratch *scratch, MildContactResult *result) {
     size_t bytes = 6 * (size_t)scratch->feet * sizeof(double);
@@ -102,4 +119,5 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain, con
     memcpy(scratch->velocity, result->velocity, bytes);
     for (int f = 0; f < scratch->feet; f++)
         if (scratch->foot[f].active > 0) foot_result(scratch, input, f, &result->foot[f]);
+    result->converged = result->converged && all_finite(input, result, scratch->feet);
 }

@@ -196,16 +196,18 @@ static int edit_distance(const char *a, const char *b) {
 }
 
 const MildField *mild_field_find(const MildField *fields, int count, const char *name, const char **nearest) {
-    const MildField *found = NULL;
     int least = FIELD_NAME_MAX + 1;
     if (nearest) *nearest = NULL;
-    for (int f = 0; f < count && !found; f++) {
-        if (strcmp(fields[f].name, name) == 0) found = &fields[f];
-        int distance = edit_distance(fields[f].name, name);
-        if (nearest && distance < least) {
-            least = distance;
-            *nearest = fields[f].name;
-        }
+    for (int f = 0; f < count; f++) {
+        if (strcmp(fields[f].name, name) != 0) continue;
+        if (nearest) *nearest = fields[f].name;
+        return &fields[f];
     }
-    return found;
+    for (int f = 0; nearest && f < count; f++) {
+        int distance = edit_distance(fields[f].name, name);
+        if (distance >= least) continue;
+        least = distance;
+        *nearest = fields[f].name;
+    }
+    return NULL;
 }

@@ -6,6 +6,7 @@
 #include "mild/ground.h"
 
 #define SOLE_ELEMENTS_MAX 65536
+#define SOLE_POINTS_MAX 4096 /* the search for crossing edges takes their square */
 #define RASTER_PHASES 16 /* raster offsets tried along each axis */
 
 struct MildSole {
@@ -53,6 +54,8 @@ static int edges_cross(const double *a, const double *b, const double *c, const 
 static MildStatus def_check(const MildSoleDef *def, MildError *error) {
     if (!def->outline || def->points < 3)
         return mild_fail(error, MILD_ERROR_ARGUMENT, "sole.points = %d: an outline needs at least 3", def->points);
+    if (def->points > SOLE_POINTS_MAX)
+        return mild_fail(error, MILD_ERROR_RANGE, "sole.points = %d: at most %d", def->points, SOLE_POINTS_MAX);
     for (int i = 0; i < 2 * def->points; i++)
         if (!isfinite(def->outline[i]) || fabs(def->outline[i]) > 10.0)
             return mild_fail(error, MILD_ERROR_RANGE, "sole.outline[%d] = %g is not within 10 m", i / 2, def->outline[i]);

@@ -79,6 +79,23 @@ static MildStatus check_same_network(const Safetensors *file, const char *path, 
     return MILD_OK;
 }
 
+/* A weight's number: bad ones would spoil all weights at the first update. (A bad observation costs its minibatch.) */
+static int is_weights(const char *name) {
+    return strcmp(name, "train.average") == 0 || strcmp(name, "train.first_moment") == 0 ||
+           strcmp(name, "train.second_moment") == 0;
+}
+
+static int all_finite(const Safetensor *tensor) {
+    for (size_t i = 0; i < tensor->bytes; i += sizeof(float)) {
+        float value;
+        memcpy(&value, (const char *)tensor->data + i, sizeof value);
+        if (!isfinite(value)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 static MildStatus check_train(const Safetensors *file, const char *path, const Safetensor *wanted, int count,
                               int has_extra, MildError *error) {
     for (int i = 0; i < count; i++) {
@@ -91,6 +108,10 @@ static MildStatus check_train(const Safetensors *file, const char *path, const S
                 error, MILD_ERROR_ARGUMENT,
                 "%s: %s holds %zu bytes, this run needs %zu; resume with the checkpoint's config (train.envs, task)",
                 path, wanted[i].name, have ? have->bytes : (size_t)0, wanted[i].bytes);
+        }
+        if (is_weights(wanted[i].name) && !all_finite(have)) {
+            return mild_fail(error, MILD_ERROR_FORMAT, "%s: %s holds numbers that are not finite; take an older checkpoint",
+                             path, wanted[i].name);
         }
     }
     if (!safetensors_find(file, "train.extra") != !has_extra) {
@@ -128,7 +149,7 @@ static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters
 }
 
 /* Everything is checked, the parameters into a spare array first, before anything of `ppo` changes. */
-static MildStatus load_open(Ppo *ppo, const Safetensors *file, const char *path, void *extra, size_t extra_size,
+static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra, size_t extra_size,
                             float *spare, MildError *error) {
     const Network *n = &ppo->policy->network;
     Safetensor wanted[TRAIN_TENSORS];
@@ -155,15 +176,20 @@ static MildStatus load_open(Ppo *ppo, const Safetensors *file, const char *path,
     return MILD_OK;
 }
 
-MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error) {
-    Safetensors *file = safetensors_read(path, error);
-    if (!file) {
-        return error ? error->status : MILD_ERROR_IO;
-    }
+MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra, size_t extra_size,
+                         MildError *error) {
     float *spare = malloc((size_t)ppo->policy->network.count * sizeof *spare);
-    MildStatus status = spare ? load_open(ppo, file, path, extra, extra_size, spare, error)
+    MildStatus status = spare ? take_file(ppo, file, path, extra, extra_size, spare, error)
                               : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
     free(spare);
+    return status;
+}
+
+MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error) {
+    MildError cause = {0};
+    Safetensors *file = safetensors_read(path, &cause);
+    MildStatus status = file ? ppo_load_file(ppo, file, path, extra, extra_size, &cause) : cause.status;
+    if (error && status != MILD_OK) *error = cause;
     safetensors_destroy(file);
     return status;
 }

@@ -5,6 +5,7 @@
 #include "learn/backend.h"
 #include "learn/policy_private.h"
 #include "learn/ppo.h"
+#include "learn/safetensors.h"
 
 /* A minibatch is cut into PPO_SHARDS equal runs of samples, each with its own gradient, and a shard into chunks; sums go
  * in the order of shards. None of this depends on the number of threads. */
@@ -60,5 +61,9 @@ int ppo_mirrored(const Ppo *ppo, int count, int *which);
 uint64_t ppo_latent_key(const Ppo *ppo, uint32_t draw);
 void ppo_latent_rows(int count, int *row);
 void ppo_optimise(Ppo *ppo, double gradient_scale);
+
+/* ppo_load from an open file; `path` names it in messages. */
+MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra, size_t extra_size,
+                         MildError *error);
 
 #endif

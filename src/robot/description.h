@@ -9,6 +9,7 @@
 #define ROBOT_LEG 6           /* joints of one leg */
 #define ROBOT_SHELLS 3        /* boxes that must not touch the ground: base, shanks */
 #define ROBOT_OUTLINE_MAX 128 /* points of a sole outline */
+#define ROBOT_ELEMENTS_MAX 65536
 
 struct Robot {
     mjModel *model;  /* bodies, joints, floor and sole corners: what a step needs */

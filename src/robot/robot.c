@@ -193,6 +193,10 @@ static MildStatus read_soles(Robot *robot, const char *path, MildError *error) {
     if (!elements) {
         return MILD_ERROR_FORMAT;
     }
+    if (!(*elements >= 0.0 && *elements <= ROBOT_ELEMENTS_MAX)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "%s: 'sole_elements' = %g is outside 0 .. %d", path, *elements,
+                         ROBOT_ELEMENTS_MAX);
+    }
     robot->sole_z = *z;
     for (int f = 0; f < ROBOT_FEET; f++) {
         MildStatus status = read_outline(robot, f, path, error);

@@ -1,11 +1,7 @@
-/* libFuzzer target: any text as a config file. It may fail, never crash, and what it accepts must print and read back
- * to the same values. Build with -DMILD_FUZZ=ON and clang, run: build-fuzz/tests/fuzz_config tests/fuzz/config */
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
+/* Any text as a config file. It may fail, never crash, and what it accepts must print and read back to the same values. */
 #include "app/experiment.h"
 #include "app/grounds.h"
+#include "fuzz.h"
 
 enum { SECTIONS = EXPERIMENT_SECTIONS + 1 };
 
@@ -22,26 +18,30 @@ static void target_init(Target *target) {
     target->sections[EXPERIMENT_SECTIONS] = grounds_section(&target->material);
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+static void check_round_trip(const Target *first, int comments) {
+    static Target second;
+    MildError error;
+    target_init(&second);
+    char *once = config_text(first->sections, SECTIONS, comments);
+    fuzz_check(once && config_read_text(second.sections, SECTIONS, once, "again", 1, &error) == MILD_OK);
+    char *plain = config_text(first->sections, SECTIONS, 0), *twice = config_text(second.sections, SECTIONS, 0);
+    fuzz_check(plain && twice && strcmp(plain, twice) == 0);
+    free(once);
+    free(plain);
+    free(twice);
+}
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    static Target first, second;
-    MildError error;
+    static Target first;
+    MildError error = {0};
     char *text = malloc(size + 1);
-    if (!text) return 0;
+    fuzz_check(text != NULL);
     memcpy(text, data, size);
     text[size] = '\0';
     target_init(&first);
-    if (config_read_text(first.sections, SECTIONS, text, "fuzz", 0, &error) == MILD_OK) {
-        char *once = config_text(first.sections, SECTIONS, size % 2 == 0);
-        target_init(&second);
-        if (!once || config_read_text(second.sections, SECTIONS, once, "again", 1, &error) != MILD_OK) abort();
-        char *plain = config_text(first.sections, SECTIONS, 0), *twice = config_text(second.sections, SECTIONS, 0);
-        if (!plain || !twice || strcmp(plain, twice) != 0) abort();
-        free(once);
-        free(plain);
-        free(twice);
-    }
+    MildStatus status = config_read_text(first.sections, SECTIONS, text, "fuzz", 0, &error);
+    fuzz_check(status == MILD_OK || (error.status == status && error.text[0]));
+    if (status == MILD_OK && fuzz_sample(data, size, 64)) check_round_trip(&first, size % 2 == 0);
     config_override(first.sections, SECTIONS, text, &error);
     free(text);
     return 0;

@@ -150,6 +150,7 @@ static void test_sole_counts(void **state) {
 static void test_sole_refused(void **state) {
     (void)state;
     double square[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1}, bow[8] = {0, 0, 0.1, 0.1, 0.1, 0, 0, 0.12};
+    static double many[2 * 5000];
     double line[8] = {0, 0, 0.1, 0, 0.2, 0, 0.3, 0}, nan[8] = {0, 0, NAN, 0, 0.1, 0.1, 0, 0.1};
     const struct {
         MildSoleDef def;
@@ -157,6 +158,7 @@ static void test_sole_refused(void **state) {
     } bad[] = {{{square, 2, KIT_PITCH, 0, 0}, "points"},      {{NULL, 4, KIT_PITCH, 0, 0}, "points"},
                {{square, 4, 0.0, 0, 0}, "pitch"},             {{square, 4, NAN, 0, 0}, "pitch"},
                {{square, 4, KIT_PITCH, NAN, 0}, "sole_z"},    {{square, 4, KIT_PITCH, 0, -1}, "target_elements"},
+               {{many, 5000, KIT_PITCH, 0, 0}, "points"},
                {{square, 4, KIT_PITCH, 0, 500}, "target_elements"}, {{bow, 4, KIT_PITCH, 0, 0}, "outline"},
                {{line, 4, KIT_PITCH, 0, 0}, "outline"},       {{nan, 4, KIT_PITCH, 0, 0}, "outline"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
@@ -166,10 +168,44 @@ static void test_sole_refused(void **state) {
     }
 }
 
+/* Every number of a standing foot's input in turn becomes NaN, infinite or huge: the step comes back, and what it calls
+ * converged is finite. The fuzz target tests/fuzz/fuzz_solve.c goes further. */
+static void test_hostile_numbers(void **state) {
+    (void)state;
+    static const double hostile[] = {NAN, INFINITY, -INFINITY, 1e300, -1e300};
+    int refused = 0, tried = 0;
+    for (int test = 0; test < 2 * 5 * 60; test++) {
+        MildMaterial material = mild_material_default();
+        MildSole *sole = kit_plate(3, 2);
+        Kit kit;
+        kit_open(&kit, 1, sole, NULL, &material, 1e-3);
+        kit.input.position[0][2] += test % 2 ? 1.0 : -0.01; /* in the air, in the ground */
+        kit_inverse_inertia(&kit);
+        kit_free(&kit, NULL);
+        double *const areas[] = {kit.input.position[0], kit.input.rotation[0], kit.input.velocity[0], kit.input.inverse_inertia,
+                                 kit.input.free_velocity};
+        static const int counts[] = {3, 9, 6, 36, 6};
+        int area = 0, index = test / 10;
+        while (index >= counts[area]) index -= counts[area++];
+        areas[area][index] = hostile[test / 2 % 5];
+        kit_solve(&kit);
+        const MildFootResult *foot = &kit.result.foot[0];
+        double sum = foot->force[0] + foot->force[1] + foot->force[2] + foot->torque[0] + foot->torque[1] + foot->torque[2];
+        for (int i = 0; i < 6; i++) sum += kit.result.velocity[i];
+        assert_true(!kit.result.converged || isfinite(sum));
+        if (area < 2) assert_true(!kit.result.converged || fabs(areas[area][index]) == 1e300);
+        tried++;
+        refused += !kit.result.converged;
+        kit_close(&kit);
+        mild_sole_destroy(sole);
+    }
+    print_message("hostile numbers: %d of %d steps not converged\n", refused, tried);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_field_parse),      cmocka_unit_test(test_field_print), cmocka_unit_test(test_field_find),
         cmocka_unit_test(test_material_refused), cmocka_unit_test(test_terrain),     cmocka_unit_test(test_sole_counts),
-        cmocka_unit_test(test_sole_refused)};
+        cmocka_unit_test(test_sole_refused),     cmocka_unit_test(test_hostile_numbers)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

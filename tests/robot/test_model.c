@@ -352,11 +352,11 @@ static void test_variation(void **unused) {
     near(m->pair_friction[0], 0.8, 1e-12, "friction back");
 }
 
-/* The model with `word` misspelt everywhere must be refused with one line that names it. */
-static void refuse(const char *word, const char *path) {
+/* The model with `from` written as `to`, of the same length, must be refused with one line that names `what`. */
+static void refuse(const char *from, const char *to, const char *what, const char *path) {
     char *text = read_file(MODEL);
-    for (char *at = strstr(text, word); at; at = strstr(at, word)) {
-        *at++ = 'x';
+    for (char *at = strstr(text, from); at; at = strstr(at, from)) {
+        memcpy(at, to, strlen(to));
     }
     FILE *file = fopen(path, "wb");
     assert_non_null(file);
@@ -366,17 +366,18 @@ static void refuse(const char *word, const char *path) {
     MildError error = {0};
     assert_null(robot_create(path, &error));
     print_message("%s\n", error.text);
-    assert_non_null(strstr(error.text, word));
+    assert_non_null(strstr(error.text, what));
     assert_null(strchr(error.text, '\n'));
     remove(path);
 }
 
 static void test_refusals(void **unused) {
     (void)unused;
-    refuse("leg_r6_link", "robot_missing_foot.xml");
-    refuse("leg_l4_joint", "robot_missing_joint.xml");
-    refuse("sole_outline_right", "robot_missing_sole.xml");
-    refuse("base_link_box", "robot_missing_box.xml");
+    refuse("leg_r6_link", "xeg_r6_link", "leg_r6_link", "robot_missing_foot.xml");
+    refuse("leg_l4_joint", "xeg_l4_joint", "leg_l4_joint", "robot_missing_joint.xml");
+    refuse("sole_outline_right", "xole_outline_right", "sole_outline_right", "robot_missing_sole.xml");
+    refuse("base_link_box", "xase_link_box", "base_link_box", "robot_missing_box.xml");
+    refuse("data=\"77\"", "data=\"-7\"", "sole_elements", "robot_elements.xml");
     MildError error = {0};
     assert_null(robot_create("no_such_file.xml", &error));
     print_message("%s\n", error.text);
