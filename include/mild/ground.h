@@ -24,7 +24,26 @@ MILD_API_BEGIN
 #define MILD_MATERIALS_MAX 12
 #define MILD_PATCHES_MAX 16
 
-/* ---- material: the element law's parameters (paper Table III, physics.md sections 2, 3, 6) ---- */
+/* ---- ground models: the paper's and its rivals behind one contract (docs/model.md section 15) ----
+ * A model is where the elements are (con_*: one in the middle of the sole, mild_sole_concentric; the others: the raster)
+ * and what a material means to an element. Solvers, memory, friction, drift and results are the same for all. */
+typedef enum {
+    MILD_MODEL_MILD,       /* a developing cone under every element (the paper) */
+    MILD_MODEL_CON_CONE,   /* one developing cone under the whole sole (Choi et al. 2023) */
+    MILD_MODEL_CON_SPRING, /* one yielding spring (Lynch et al. 2020): F = k_pen u going down, up to that at rest, 0 up */
+    MILD_MODEL_ECC_SPRING, /* the same spring under every element */
+    MILD_MODEL_ECC_QUASI,  /* resistive force theory under every element (Li et al. 2013), no inertia */
+    MILD_MODEL_RIGID       /* the engine's own contact: a name only, no material has it */
+} MildModel;
+#define MILD_MODELS 6
+
+extern const char *const mild_model_names[MILD_MODELS];
+/* False when the name is unknown. */
+int mild_model_find(const char *name, MildModel *model);
+/* True for con_cone and con_spring. */
+int mild_model_is_concentric(MildModel model);
+
+/* ---- material: the element law's parameters (paper Table III, docs/model.md) ---- */
 typedef struct {
     double k_pen;      /* [N/m] penetration stiffness of one element at the surface */
     double sigma_cone; /* [N/m^3] depth-dependent conical stress */
@@ -39,7 +58,9 @@ typedef struct {
     double b_drift;    /* [N s/m] drift damping b_D per element */
     double recovery;   /* [-] share of the depth that springs back: 1 elastic, 0 plastic */
     double bed_depth;  /* [m] firm bottom below the surface */
+    double zeta;       /* [-] ecc_quasi: 1 is 1e6 N/m^3 under a level plate going straight down */
     int passive;       /* bool: clamp c_g >= 0 and c_d >= 1/2 so that no energy is created */
+    int model;         /* MildModel, not MILD_MODEL_RIGID */
 } MildMaterial;
 
 extern const MildField mild_material_fields[];
@@ -52,6 +73,7 @@ MildMaterial mild_material_default(void);
 int mild_material_preset(const char *name, MildMaterial *material);
 int mild_material_preset_count(void);
 const char *mild_material_preset_name(int index);
+/* Every range, and that the model is one with a material (not rigid). */
 MildStatus mild_material_check(const MildMaterial *material, MildError *error);
 
 /* ---- terrain: height and material under a point; pointer-free, copyable, may change between steps ---- */
@@ -94,6 +116,9 @@ double mild_sole_pitch(const MildSole *sole);
 const double *mild_sole_x(const MildSole *sole);
 const double *mild_sole_y(const MildSole *sole);
 double mild_sole_z(const MildSole *sole);
+/* One element at the sole's centroid with the area of all its elements, for the concentric models: it carries force, but
+ * no moment about its centre. NULL when out of memory. */
+MildSole *mild_sole_concentric(const MildSole *sole, MildError *error);
 
 /* ---- element law, closed forms (eqs 1-5 of the paper as read in docs/model.md) ---- */
 typedef struct {
@@ -104,6 +129,14 @@ typedef struct {
 } MildElementLaw;
 /* The law of one element of area pitch^2 at depth u >= 0 (virgin loading), firm bed included. */
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth);
+/* Depth [m] at which the level sole carries `load` [N] at rest, going down slowly on virgin ground. */
+double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load);
+/* The material of a rival model that compares fairly with `mild`, a material of MILD_MODEL_MILD: under `load` [N] (half
+ * the robot's weight) one level foot sinks as deep. Friction, drift, recovery and bed are mild's where the rival has them.
+ * sole: the raster; the result is for that raster, or for mild_sole_concentric of it when the model is concentric.
+ * Fails for rigid, for a material of another model, and without a load. */
+MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole, double load,
+                            MildMaterial *rival, MildError *error);
 
 /* ---- one contact step ---- */
 typedef enum { MILD_SOLVER_NEWTON = 0, MILD_SOLVER_GAUSS_SEIDEL = 1 } MildSolver;

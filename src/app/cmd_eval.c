@@ -18,14 +18,14 @@
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
 
 typedef struct {
-    const char *policy, *config, *json;
+    const char *policy, *config, *model, *json;
     CliNames grounds;
     CliNumbers speeds;
     double patch;
     int threads;
     EvalDef eval;
     TaskDef task;
-    const CliArgs *args;
+    GroundsDef finish;
     EvalRow rows[ROWS_MAX];
     int row_count;
 } Eval;
@@ -51,6 +51,7 @@ static MildStatus write_json(const Eval *e, MildError *error) {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "policy", e->policy);
     cJSON_AddStringToObject(root, "robot", "sa01");
+    cJSON_AddStringToObject(root, "model", mild_model_names[e->finish.model]);
     cJSON_AddStringToObject(root, "version", build_version());
     cJSON *rows = cJSON_AddArrayToObject(root, "rows");
     for (int i = 0; i < e->row_count; i++) {
@@ -59,15 +60,9 @@ static MildStatus write_json(const Eval *e, MildError *error) {
     return report_save(root, e->json, error);
 }
 
-/* The scene with --ground.KEY=VALUE laid over each of its grounds, and --task.KEY=VALUE over the task. */
 static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildError *error) {
     MildStatus status = scene_make(scene, name, e->patch, error);
-    for (int i = 0; status == MILD_OK && i < scene->terrain.material_count; i++) {
-        const ConfigSection sections[] = {{"task", task_fields, task_field_count, &e->task},
-                                          grounds_section(&scene->terrain.materials[i])};
-        status = config_overrides(sections, 2, e->args->overrides, e->args->override_count, error);
-        if (status == MILD_OK) status = mild_material_check(&scene->terrain.materials[i], error);
-    }
+    if (status == MILD_OK) status = grounds_finish_scene(&e->finish, scene, error);
     if (status == MILD_OK) status = task_def_check(&e->task, error);
     return status;
 }
@@ -75,6 +70,7 @@ static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildError 
 static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller, MildError *error) {
     char line[256];
     FILE *table = e->json && strcmp(e->json, "-") == 0 ? stderr : stdout;
+    if (e->finish.model != MILD_MODEL_MILD) fprintf(table, "ground model %s\n", mild_model_names[e->finish.model]);
     eval_print_header(line, sizeof line);
     fprintf(table, "%s\n", line);
     for (int g = 0; g < e->grounds.count; g++) {
@@ -110,16 +106,19 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
 
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     char path[PATH_SIZE];
-    e->args = args;
+    MildModel model;
     MildStatus status = experiment_nominal_task(&e->task, e->config, error);
-    if (status == MILD_OK) status = check_grounds(e, error);
+    if (status == MILD_OK) status = grounds_model(e->model, args, &model, error);
     if (status != MILD_OK) {
         return status;
     }
     Pool *pool = pool_create(e->threads);
     Robot *robot = pool ? robot_create(path_data("models/sa01/sa01.xml", path), error) : NULL;
     Controller controller = {0};
-    if (!robot) {
+    if (robot) {
+        e->finish = grounds_for_robot(model, robot, &e->task, args);
+        status = check_grounds(e, error);
+    } else {
         status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
     }
     if (status == MILD_OK) status = controller_learned(e->policy, pool, e->eval.trials, &controller, error);
@@ -138,7 +137,7 @@ int cmd_eval(int argc, char **argv) {
         free(args);
         return cli_fail_text("eval", "out of memory");
     }
-    char shipped[PATH_SIZE];
+    char shipped[PATH_SIZE], model_help[200];
     e->policy = path_data("policies/mild.safetensors", shipped);
     e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
     e->patch = 2.5;
@@ -152,6 +151,7 @@ int cmd_eval(int argc, char **argv) {
         {"config", CLI_TEXT, &e->config, 0, 0, "FILE", "config the policy was trained with, for its [task]"},
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
          "grounds, a row each; rubber+foam45 is a course of both (rigid,foam45,sand_loose)"},
+        {"model", CLI_TEXT, &e->model, 0, 0, "NAME", grounds_model_help(model_help, sizeof model_help)},
         {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]", "[m/s] commanded forward speeds, a row each (0.6)"},
         {"trials", CLI_INT, &e->eval.trials, 1, 10000, "N", "trials per row, each with its own start and noise (10)"},
         {"seconds", CLI_NUMBER, &e->eval.seconds, 0.1, 3600, "T", "[s] length of a trial (20)"},

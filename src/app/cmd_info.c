@@ -45,49 +45,92 @@ static void print_preset_table(void) {
     }
 }
 
-/* 40 kg is the paper's robot: 77 elements of 19.5 mm under each foot. */
-static void print_sinkage(void) {
-    static const struct {
-        const char *label;
-        int elements;
-    } stances[] = {{"two feet", 154}, {"one foot", 77}};
+/* The paper's robot: 40 kg, 77 elements of 19.5 mm under each foot. */
+static MildSole *paper_sole(void) {
+    const double pitch = 0.0195, x = 5.5 * pitch, y = 3.5 * pitch;
+    const double outline[] = {-x, -y, x, -y, x, y, -x, y};
+    const MildSoleDef def = {.outline = outline, .points = 4, .pitch = pitch, .target_elements = 77};
+    return mild_sole_create(&def, NULL);
+}
+static const double paper_weight = 40 * 9.81; /* [N] */
+
+static void print_sinkage(const MildSole *sole) {
     printf("\nsinkage of 40 kg at rest [mm]\n");
-    for (int s = 0; s < 2; s++) {
-        printf("  %-10s", stances[s].label);
+    for (int feet = 2; feet >= 1; feet--) {
+        printf("  %-10s", feet == 2 ? "two feet" : "one foot");
         for (int p = 0; p < mild_material_preset_count(); p++) {
             MildMaterial material;
             mild_material_preset(mild_material_preset_name(p), &material);
-            printf("%11.1f", 1e3 * grounds_sinkage(&material, 0.0195, stances[s].elements, 40 * 9.81));
+            printf("%11.1f", 1e3 * mild_sole_sinkage(sole, &material, paper_weight / feet));
         }
         printf("\n");
     }
 }
 
+static const struct {
+    const char *what, *source;
+} models[MILD_MODELS] = {
+    [MILD_MODEL_MILD] = {"a developing cone under every element", "the paper"},
+    [MILD_MODEL_CON_CONE] = {"one developing cone under the whole sole", "Choi et al. 2023, its numbers scaled"},
+    [MILD_MODEL_CON_SPRING] = {"one yielding spring under the sole's middle", "Lynch et al. 2020"},
+    [MILD_MODEL_ECC_SPRING] = {"a yielding spring under every element", "Lynch et al. 2024"},
+    [MILD_MODEL_ECC_QUASI] = {"resistive force theory under every element", "Li et al. 2013, Xiong et al. 2017"},
+    [MILD_MODEL_RIGID] = {"the engine's own contact: train, eval, play; no parameters", "MuJoCo"},
+};
+
+/* One number that the model is matched by, on every preset. */
+static void print_matched(const MildSole *sole, MildModel model, const char *key) {
+    const MildField *field = mild_field_find(mild_material_fields, mild_material_field_count, key, NULL);
+    printf("  %-10s %-10s", mild_model_names[model], key);
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        MildMaterial mild, rival;
+        mild_material_preset(mild_material_preset_name(p), &mild);
+        if (mild_model_match(model, &mild, sole, paper_weight / 2, &rival, NULL) != MILD_OK) continue;
+        printf("%11.4g", *(const double *)(const void *)((const char *)&rival + field->offset));
+    }
+    printf("\n");
+}
+
+static void print_models(const MildSole *sole) {
+    printf("\nmodels (--model NAME), and where they come from\n");
+    for (int m = 0; m < MILD_MODELS; m++)
+        printf("  %-10s  %s; %s\n", mild_model_names[m], models[m].what, models[m].source);
+    printf("\nrivals under 20 kg on one foot, matched to sink as deep as mild; k_pen is that of one element, for con_* of the\n"
+           "whole sole. con_cone keeps alpha 1.047, nu 2, c_g 2.7, c_d 17.2, phi 0.57, rho 1000; springs and ecc_quasi have\n"
+           "no inertia and no recovery; ecc_quasi has its friction in zeta. The rest is the preset's.\n");
+    print_matched(sole, MILD_MODEL_CON_CONE, "k_pen");
+    print_matched(sole, MILD_MODEL_CON_CONE, "sigma_cone");
+    print_matched(sole, MILD_MODEL_CON_SPRING, "k_pen");
+    print_matched(sole, MILD_MODEL_ECC_SPRING, "k_pen");
+    print_matched(sole, MILD_MODEL_ECC_QUASI, "zeta");
+}
+
 static int info_grounds(void) {
+    MildSole *sole = paper_sole();
+    if (!sole) return cli_fail_text("info", "out of memory");
     printf("presets, SI units; any value can be replaced on the command line, e.g. --ground.k_pen=500\n\n");
     print_preset_table();
-    print_sinkage();
+    print_sinkage(sole);
+    print_models(sole);
+    mild_sole_destroy(sole);
     printf("\nparameters\n");
     for (int f = 0; f < mild_material_field_count; f++) {
         const MildField *field = &mild_material_fields[f];
         char range[48] = "true or false";
-        if (field->type != MILD_FIELD_BOOL) snprintf(range, sizeof range, "%g .. %g", field->min, field->max);
+        if (field->type == MILD_FIELD_NAME) snprintf(range, sizeof range, "see models");
+        if (field->type == MILD_FIELD_DOUBLE) snprintf(range, sizeof range, "%g .. %g", field->min, field->max);
         printf("  %-10s  %-16s %s\n", field->name, range, field->help);
     }
     printf("\nsources\n");
     for (int i = 0; i < SOURCES; i++)
         printf("  %-10s  %s; %s\n", sources[i].ground, sources[i].what, sources[i].source);
-    printf("\n`rigid` is the engine's own contact: no parameters, for train, eval and play.\n");
     return 0;
 }
 
 static int info_models(void) {
     printf(
-        "ground models\n"
-        "  mild    every element of the sole (19.5 mm squares, 77 per foot) meets a cone of ground that grows with\n"
-        "          depth: stiffness, inertia of the moved ground, drag, friction, drift, unloading; the paper's model\n"
-        "  rigid   the engine's own contact at the corners of the soles, for comparison\n"
-        "\nsolvers of mild (--task.newton)\n"
+        "ground models: mild info grounds\n"
+        "\nsolvers of the soft ones (--task.newton)\n"
         "  newton        the step as one small convex problem; default\n"
         "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n"
         "\nrobots\n"

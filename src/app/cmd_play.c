@@ -21,11 +21,11 @@
 #define COURSE_LEAST 12.0 /* [s] */
 
 typedef struct {
-    const char *policy, *config, *video, *pressure;
+    const char *policy, *config, *model, *video, *pressure;
     CliNames grounds;
     double patch;
     int width, height;
-    const CliArgs *args;
+    GroundsDef finish;
     TaskDef task;
     Scene scene;
     const char *names[MILD_MATERIALS_MAX];
@@ -34,8 +34,7 @@ typedef struct {
 
 /* ---- set-up ---- */
 
-/* The course "a+b+c" of --ground a,b,c, with --ground.KEY=VALUE laid over each of its grounds and --task.KEY=VALUE over
- * the task. */
+/* The course "a+b+c" of --ground a,b,c. */
 static MildStatus make_scene(Command *c, MildError *error) {
     char name[sizeof c->scene.name] = "";
     for (int g = 0; g < c->grounds.count; g++) {
@@ -55,12 +54,7 @@ static MildStatus make_scene(Command *c, MildError *error) {
         c->names[g] = c->grounds.name[g];
     }
     MildStatus status = scene_make(&c->scene, name, c->patch, error);
-    for (int i = 0; status == MILD_OK && i < c->scene.terrain.material_count; i++) {
-        const ConfigSection sections[] = {{"task", task_fields, task_field_count, &c->task},
-                                          grounds_section(&c->scene.terrain.materials[i])};
-        status = config_overrides(sections, 2, c->args->overrides, c->args->override_count, error);
-        if (status == MILD_OK) status = mild_material_check(&c->scene.terrain.materials[i], error);
-    }
+    if (status == MILD_OK) status = grounds_finish_scene(&c->finish, &c->scene, error);
     return status == MILD_OK ? task_def_check(&c->task, error) : status;
 }
 
@@ -193,12 +187,13 @@ static MildStatus prepare(Command *c, const char *xml, MildError *error) {
     return status;
 }
 
-static MildStatus run_play(Command *c, MildError *error) {
+static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     char xml[PATH_SIZE];
     Play *play = &c->play;
     Controller controller = {0};
+    MildModel model;
     MildStatus status = experiment_nominal_task(&c->task, c->config, error);
-    if (status == MILD_OK) status = make_scene(c, error);
+    if (status == MILD_OK) status = grounds_model(c->model, args, &model, error);
     if (status != MILD_OK) return status;
     if (play->seconds == 0) {
         double course = c->grounds.count * c->patch / fmax(fabs(play->speed), 0.1) + COURSE_EXTRA;
@@ -206,9 +201,11 @@ static MildStatus run_play(Command *c, MildError *error) {
     }
     Robot *robot = robot_create(path_data("models/sa01/sa01.xml", xml), error);
     if (!robot) return error->status;
+    c->finish = grounds_for_robot(model, robot, &c->task, args);
     play->task = &c->task, play->scene = &c->scene, play->robot = robot, play->controller = &controller;
     play->window = !c->video && !c->pressure;
-    status = prepare(c, xml, error);
+    status = make_scene(c, error);
+    if (status == MILD_OK) status = prepare(c, xml, error);
     if (status == MILD_OK) status = walk(c, error);
     if (play->video) finish_video(c, status, error);
     view_destroy(play->view);
@@ -219,9 +216,11 @@ static MildStatus run_play(Command *c, MildError *error) {
 }
 
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
+    char model_help[200];
     const CliOption options[] = {
         {"policy", CLI_TEXT, &c->policy, 0, 0, "FILE", "policy to watch (policies/mild.safetensors)"},
         {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]", "ground, or several crossed in order (sand_loose)"},
+        {"model", CLI_TEXT, &c->model, 0, 0, "NAME", grounds_model_help(model_help, sizeof model_help)},
         {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L", "[m] length of each ground of a course (2)"},
         {"video", CLI_TEXT, &c->video, 0, 0, "FILE.mp4", "film it; without this and --pressure a window opens"},
         {"pressure", CLI_TEXT, &c->pressure, 0, 0, "FILE.png",
@@ -250,8 +249,7 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     if (outcome != CLI_RUN) return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     MildError error = {0};
-    c->args = args;
-    return run_play(c, &error) == MILD_OK ? 0 : cli_fail("play", &error);
+    return run_play(c, args, &error) == MILD_OK ? 0 : cli_fail("play", &error);
 }
 
 int cmd_play(int argc, char **argv) {

@@ -22,27 +22,32 @@ typedef struct {
 /* The sole to press with, and the robot that owns it when it is the robot's. */
 typedef struct {
     Robot *robot;
-    MildSole *plate;
-    const MildSole *sole;
+    MildSole *plate, *concentric;
+    const MildSole *raster, *sole; /* sole: what the model presses with */
     char name[64];
 } Tool;
 
 static void tool_close(Tool *tool) {
-    if (tool->plate) mild_sole_destroy(tool->plate);
-    if (tool->robot) robot_destroy(tool->robot);
+    mild_sole_destroy(tool->plate);
+    mild_sole_destroy(tool->concentric);
+    robot_destroy(tool->robot);
+}
+
+static MildStatus tool_open_robot(Tool *tool, MildError *error) {
+    char path[PATH_SIZE];
+    if (!tool->robot) tool->robot = robot_create(path_data("models/sa01/sa01.xml", path), error);
+    return tool->robot ? MILD_OK : error->status;
 }
 
 static MildStatus tool_open_sole(Tool *tool, MildError *error) {
-    char path[PATH_SIZE];
-    tool->robot = robot_create(path_data("models/sa01/sa01.xml", path), error);
-    if (!tool->robot) return MILD_ERROR_IO;
-    tool->sole = robot_soles(tool->robot)[ROBOT_FOOT_LEFT];
+    MildStatus status = tool_open_robot(tool, error);
+    if (status != MILD_OK) return status;
+    tool->sole = tool->raster = robot_rasters(tool->robot)[ROBOT_FOOT_LEFT];
     snprintf(tool->name, sizeof tool->name, "the robot's left sole");
     return MILD_OK;
 }
 
 static MildStatus tool_open(Tool *tool, const char *text, MildError *error) {
-    *tool = (Tool){0};
     if (strcmp(text, "sole") == 0) return tool_open_sole(tool, error);
     char length_text[32], *comma;
     double length, width;
@@ -59,9 +64,29 @@ static MildStatus tool_open(Tool *tool, const char *text, MildError *error) {
                          "--plate: %g x %g m is outside 0.0195 .. 1 m (one element to a metre)", length, width);
     }
     tool->plate = press_plate_create(length, width, error);
-    tool->sole = tool->plate;
+    tool->sole = tool->raster = tool->plate;
     snprintf(tool->name, sizeof tool->name, "a plate of %g x %g m", length, width);
     return tool->plate ? MILD_OK : MILD_ERROR_ARGUMENT;
+}
+
+static double sole_area(const MildSole *sole) {
+    return mild_sole_elements(sole) * mild_sole_pitch(sole) * mild_sole_pitch(sole);
+}
+
+/* The material of the model, matched on this tool under the pressure of half the robot on its own sole; and the sole that
+ * the model presses with. */
+static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *args, MildMaterial *material,
+                                 MildError *error) {
+    GroundsDef finish = {.model = model, .sole = tool->raster, .load = 1, .args = args};
+    MildStatus status = model == MILD_MODEL_MILD ? MILD_OK : tool_open_robot(tool, error);
+    if (status == MILD_OK && tool->robot)
+        finish.load = robot_half_weight(tool->robot) * sole_area(tool->raster) / sole_area(robot_rasters(tool->robot)[0]);
+    if (status == MILD_OK) status = grounds_finish(&finish, material, error);
+    if (status == MILD_OK && mild_model_is_concentric(model)) {
+        tool->sole = tool->concentric = mild_sole_concentric(tool->raster, error);
+        if (!tool->concentric) status = error->status;
+    }
+    return status;
 }
 
 /* The contract's seven columns; motion other than straight down and up needs four more. */
@@ -214,8 +239,10 @@ static void drop_summary(const PressOptions *options, const PressResult *result,
             1e3 * result->rows[result->count - 1].depth, result->rest_speed);
 }
 
-static void summary_print(const PressOptions *options, const Tool *tool, const PressResult *result, FILE *file) {
-    fprintf(file, "%s under %s: %d elements, %.4f m^2", options->ground, tool->name, result->elements, result->area);
+static void summary_print(const PressOptions *options, const Tool *tool, const char *model, const PressResult *result,
+                          FILE *file) {
+    fprintf(file, "%s (%s) under %s: %d element%s, %.4f m^2", options->ground, model, tool->name, result->elements,
+            result->elements == 1 ? "" : "s", result->area);
     if (is_dropped(options)) {
         drop_summary(options, result, file);
         return;
@@ -248,12 +275,12 @@ static const char examples[] =
     "  mild press --ground sand_loose --drop 0.05 --mass 20 --tilt 5 --figure drop.png\n";
 
 static int options_read(int argc, char **argv, PressOptions *options, CliArgs *args) {
-    char grounds[200], ground_help[320];
+    char grounds[200], ground_help[320], model_help[200];
     CliNumbers depth = {0}, force = {0};
     snprintf(ground_help, sizeof ground_help, "one of %s", grounds_names(grounds, sizeof grounds));
     const CliOption table[] = {
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
-        {"model", CLI_TEXT, &options->model, 0, 0, "NAME", "ground model; `mild` (default) is the only one so far"},
+        {"model", CLI_TEXT, &options->model, 0, 0, "NAME", grounds_model_help(model_help, sizeof model_help)},
         {"plate", CLI_TEXT, &options->plate, 0, 0, "L,W|sole",
          "[m] length and width of a plate, or the robot's sole (default 0.2,0.1)"},
         {"tilt", CLI_NUMBER, &options->tilt_deg, -45, 45, "DEG", "[deg] front edge down (default 0)"},
@@ -360,33 +387,31 @@ static MildStatus press_report(const PressOptions *options, const Tool *tool, co
     if (status == MILD_OK && options->figure) status = figure_save(options, &result, more, error);
     if (status == MILD_OK) {
         if (!options->csv) table_print(options, &result);
-        summary_print(options, tool, &result, options->csv && strcmp(options->csv, "-") == 0 ? stderr : stdout);
+        summary_print(options, tool, mild_model_names[def->material.model], &result,
+                      options->csv && strcmp(options->csv, "-") == 0 ? stderr : stdout);
     }
     press_result_close(&result);
     return status;
 }
 
 int cmd_press(int argc, char **argv) {
-    PressOptions options = {.model = "mild", .plate = "0.2,0.1", .depth = NAN, .back = NAN, .force = NAN,
+    PressOptions options = {.plate = "0.2,0.1", .depth = NAN, .back = NAN, .force = NAN,
                             .force_back = NAN, .speed = NAN, .drag = NAN, .drag_speed = NAN, .drop = NAN,
                             .impact = NAN, .mass = NAN, .seconds = NAN, .step = NAN};
     CliArgs args;
     int code = options_read(argc, argv, &options, &args);
     if (code) return code < 0 ? 0 : code;
     if (!options.ground) return cli_fail_text("press", "which ground? --ground NAME (mild info grounds lists all)");
-    if (strcmp(options.model, "mild") != 0) {
-        return cli_fail_text("press", "--model: '%s' is not known; `mild` is the only ground model so far",
-                             options.model);
-    }
     MildError error;
-    if (options_check(&options, &error) != MILD_OK) return cli_fail("press", &error);
+    MildModel model;
+    Tool tool = {0};
+    MildStatus status = options_check(&options, &error);
+    if (status != MILD_OK) return cli_fail("press", &error);
     PressDef def = options_def(&options);
-    if (grounds_find(options.ground, &def.material, NULL, &error) != MILD_OK) return cli_fail("press", &error);
-    ConfigSection section = grounds_section(&def.material);
-    if (config_overrides(&section, 1, args.overrides, args.override_count, &error) != MILD_OK)
-        return cli_fail("press", &error);
-    Tool tool;
-    MildStatus status = tool_open(&tool, options.plate, &error);
+    status = grounds_find(options.ground, &def.material, NULL, &error);
+    if (status == MILD_OK) status = grounds_model(options.model, &args, &model, &error);
+    if (status == MILD_OK) status = tool_open(&tool, options.plate, &error);
+    if (status == MILD_OK) status = tool_set_model(&tool, model, &args, &def.material, &error);
     if (status == MILD_OK) status = press_report(&options, &tool, &def, &error);
     tool_close(&tool);
     return status == MILD_OK ? 0 : cli_fail("press", &error);

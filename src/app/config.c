@@ -250,6 +250,9 @@ static void print_help(const MildField *field, FILE *file) {
     fprintf(file, "# %s", field->help);
     if (field->type == MILD_FIELD_BOOL || field->type == MILD_FIELD_TEXT) {
         fputc('\n', file);
+    } else if (field->type == MILD_FIELD_NAME) {
+        for (int i = 0; i <= (int)field->max; i++) fprintf(file, "%s%s", i ? ", " : " (", field->names[i]);
+        fputs(")\n", file);
     } else if (field->min > -1e15 && field->max < 1e15) {
         fprintf(file, " (%g .. %g)\n", field->min, field->max);
     } else {

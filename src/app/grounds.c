@@ -26,30 +26,80 @@ MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, Mi
                      text_nearest(name, names, count));
 }
 
+MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model, MildError *error) {
+    static const char key[] = "ground.model=";
+    const char *name = option;
+    for (int i = 0; i < args->override_count; i++) {
+        if (strncmp(args->overrides[i], key, sizeof key - 1) != 0) continue;
+        const char *other = args->overrides[i] + sizeof key - 1;
+        if (option && strcmp(option, other) != 0)
+            return mild_fail(error, MILD_ERROR_ARGUMENT, "--model %.40s and --%.60s: which one?", option, args->overrides[i]);
+        name = other;
+    }
+    *model = MILD_MODEL_MILD;
+    if (!name || mild_model_find(name, model)) return MILD_OK;
+    return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown ground model '%.60s'; nearest is '%s' (mild info grounds lists all)",
+                     name, text_nearest(name, (const char **)mild_model_names, MILD_MODELS));
+}
+
+GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, const CliArgs *args) {
+    robot_set_model(robot, model);
+    return (GroundsDef){model, robot_rasters(robot)[0], robot_half_weight(robot), args, task};
+}
+
 ConfigSection grounds_section(MildMaterial *material) {
     return (ConfigSection){"ground", mild_material_fields, mild_material_field_count, material};
 }
 
-const char *grounds_names(char *text, size_t size) {
+static MildStatus overlay(const GroundsDef *def, MildMaterial *material, MildError *error) {
+    const ConfigSection sections[] = {grounds_section(material),
+                                      {"task", task_fields, task_field_count, def->task}};
+    return config_overrides(sections, def->task ? 2 : 1, def->args->overrides, def->args->override_count, error);
+}
+
+MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildError *error) {
+    MildMaterial mild = *material;
+    material->model = (int)def->model;
+    MildStatus status = mild_material_check(material, error);
+    if (status == MILD_OK) status = mild_model_match(def->model, &mild, def->sole, def->load, material, error);
+    if (status == MILD_OK) status = overlay(def, material, error);
+    return status == MILD_OK ? mild_material_check(material, error) : status;
+}
+
+MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *error) {
+    MildStatus status = MILD_OK;
+    if (def->model == MILD_MODEL_RIGID) {
+        MildMaterial unused = mild_material_default();
+        scene->rigid = 1;
+        return overlay(def, &unused, error);
+    }
+    for (int i = 0; status == MILD_OK && i < scene->terrain.material_count; i++)
+        status = grounds_finish(def, &scene->terrain.materials[i], error);
+    return status;
+}
+
+static const char *list_names(int count, const char *(*name)(int), char *text, size_t size) {
     size_t length = 0;
     text[0] = '\0';
-    for (int i = 0; i < mild_material_preset_count(); i++) {
-        int added = snprintf(text + length, size - length, "%s%s", i ? " " : "", mild_material_preset_name(i));
+    for (int i = 0; i < count; i++) {
+        int added = snprintf(text + length, size - length, "%s%s", i ? " " : "", name(i));
         if (added < 0 || (size_t)added >= size - length) break;
         length += (size_t)added;
     }
     return text;
 }
 
-double grounds_sinkage(const MildMaterial *material, double pitch, int elements, double load) {
-    double low = 0, high = 2 * material->bed_depth + 1;
-    for (int i = 0; i < 60; i++) { /* F_g grows with depth: halve the bracket */
-        double middle = 0.5 * (low + high);
-        if (elements * mild_element_law(material, pitch, middle).force < load) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return 0.5 * (low + high);
+static const char *model_name(int index) {
+    return mild_model_names[index];
+}
+
+const char *grounds_names(char *text, size_t size) {
+    return list_names(mild_material_preset_count(), mild_material_preset_name, text, size);
+}
+
+const char *grounds_model_help(char *text, size_t size) {
+    char names[120];
+    list_names(MILD_MODELS, model_name, names, sizeof names);
+    snprintf(text, size, "ground model: %s; matched to mild's sinkage (mild)", names);
+    return text;
 }

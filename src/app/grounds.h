@@ -3,7 +3,10 @@
 #define MILD_GROUNDS_H
 
 #include "app/config.h"
-#include "mild/ground.h"
+#include "app/cli.h"
+#include "eval/scene.h"
+#include "robot/robot.h"
+#include "task/task_def.h"
 
 /* The preset's material; an unknown name fails with the nearest known one. `rigid` is no material: it fails unless
  * *rigid is given, which it sets. */
@@ -12,10 +15,28 @@ MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, Mi
 /* Section [ground] bound to `material`: --ground.k_pen=500. */
 ConfigSection grounds_section(MildMaterial *material);
 
+/* The model that --model NAME (NULL: not given) or --ground.model=NAME asks for; mild without either. */
+MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model, MildError *error);
+
+/* What a command does to the grounds it was told by name. */
+typedef struct {
+    MildModel model;
+    const MildSole *sole; /* the raster a rival of mild is matched on */
+    double load;          /* [N] under it */
+    const CliArgs *args;  /* --ground.KEY=VALUE, laid over the matched material; and --task.KEY=VALUE */
+    TaskDef *task;        /* NULL: the command takes no --task */
+} GroundsDef;
+
+/* For the robot: matched under half its weight, overrides from `args`, and the robot gets the soles of the model. */
+GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, const CliArgs *args);
+/* A preset becomes the material of the model, with the overrides laid over it. */
+MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildError *error);
+/* The same for every ground of a scene; the model rigid puts it on the engine's own contact. */
+MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *error);
+
+/* Help on --model; returns `text`. */
+const char *grounds_model_help(char *text, size_t size);
 /* "rubber foam60 ... sand_dense", for help texts; returns `text`. */
 const char *grounds_names(char *text, size_t size);
-
-/* Static sinkage [m] of a load [N] on `elements` equal elements of edge `pitch`. */
-double grounds_sinkage(const MildMaterial *material, double pitch, int elements, double load);
 
 #endif

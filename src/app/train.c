@@ -47,6 +47,7 @@ static int build(Trainer *trainer, MildError *error) {
     if (!trainer->robot) {
         return 0;
     }
+    robot_set_model(trainer->robot, (MildModel)def->task.randomize.model);
     trainer->pool = pool_create(def->train.threads);
     if (!trainer->pool) {
         mild_fail(error, MILD_ERROR_MEMORY, "cannot start %d threads", def->train.threads);

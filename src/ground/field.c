@@ -3,6 +3,7 @@
 #include <ctype.h>
 #include <errno.h>
 #include <inttypes.h>
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,6 +24,7 @@ static size_t field_value_size(MildFieldType type) {
     case MILD_FIELD_UINT64: return sizeof(uint64_t);
     case MILD_FIELD_TEXT: return sizeof(char);
     case MILD_FIELD_INT:
+    case MILD_FIELD_NAME:
     case MILD_FIELD_BOOL: break;
     }
     return sizeof(int);
@@ -101,13 +103,15 @@ static int parse_value(MildFieldType type, const char *text, size_t length, Valu
         value->unsigned64 = strtoull(word, &end, 0);
         return *end == 0 && errno == 0 && word[0] != '-';
     case MILD_FIELD_BOOL: return parse_bool(text, length, value);
+    case MILD_FIELD_NAME:
     case MILD_FIELD_TEXT: break;
     }
     return 0;
 }
 
 static const char *type_name(MildFieldType type) {
-    static const char *const names[] = {"a number", "an integer", "true or false", "a text", "an unsigned integer"};
+    static const char *const names[] = {"a number", "an integer",           "true or false",
+                                        "a text",   "an unsigned integer", "a name"};
     return names[type];
 }
 
@@ -120,9 +124,44 @@ static MildStatus parse_text(const MildField *field, void *def, const char *text
     return MILD_OK;
 }
 
+/* Levenshtein distance, two rows. */
+static int edit_distance(const char *a, const char *b) {
+    int rows[2][FIELD_NAME_MAX + 1], *above = rows[0], *row = rows[1];
+    int a_length = (int)strnlen(a, FIELD_NAME_MAX), b_length = (int)strnlen(b, FIELD_NAME_MAX);
+    for (int j = 0; j <= b_length; j++) above[j] = j;
+    for (int i = 1; i <= a_length; i++) {
+        row[0] = i;
+        for (int j = 1; j <= b_length; j++) {
+            int replace = above[j - 1] + (a[i - 1] != b[j - 1]), drop = above[j] + 1, add = row[j - 1] + 1;
+            int least = drop < add ? drop : add;
+            row[j] = replace < least ? replace : least;
+        }
+        int *swap = above;
+        above = row;
+        row = swap;
+    }
+    return above[b_length];
+}
+
+static MildStatus parse_name(const MildField *field, void *def, const char *text, const char *section, MildError *error) {
+    int index = 0, count = (int)field->max + 1, nearest = 0, least = INT_MAX;
+    while (index < count && strcmp(field->names[index], text) != 0) index++;
+    if (index < count) {
+        memcpy((char *)def + field->offset, &index, sizeof index);
+        return MILD_OK;
+    }
+    for (int i = 0; i < count; i++) {
+        int distance = edit_distance(field->names[i], text);
+        if (distance < least) least = distance, nearest = i;
+    }
+    return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: unknown name '%.60s'; nearest is '%s'", section, field->name, text,
+                     field->names[nearest]);
+}
+
 MildStatus mild_field_parse(const MildField *field, void *def, const char *text, const char *section, MildError *error) {
     static const char separators[] = " \t\r\n,";
     if (field->type == MILD_FIELD_TEXT) return parse_text(field, def, text, section, error);
+    if (field->type == MILD_FIELD_NAME) return parse_name(field, def, text, section, error);
     Value values[FIELD_VALUES_MAX];
     int count = 0;
     for (const char *at = text + strspn(text, separators); *at; at += strspn(at, separators), count++) {
@@ -157,6 +196,7 @@ static int print_value(MildFieldType type, Value value, char *text, size_t size)
     case MILD_FIELD_UINT64: return snprintf(text, size, "%" PRIu64, value.unsigned64);
     case MILD_FIELD_BOOL: return snprintf(text, size, "%s", value.integer ? "true" : "false");
     case MILD_FIELD_INT:
+    case MILD_FIELD_NAME:
     case MILD_FIELD_TEXT: break;
     }
     return snprintf(text, size, "%d", value.integer);
@@ -164,6 +204,7 @@ static int print_value(MildFieldType type, Value value, char *text, size_t size)
 
 int mild_field_print(const MildField *field, const void *def, char *text, size_t size) {
     if (field->type == MILD_FIELD_TEXT) return snprintf(text, size, "%s", (const char *)def + field->offset);
+    if (field->type == MILD_FIELD_NAME) return snprintf(text, size, "%s", field->names[field_load(field, def, 0).integer]);
     int total = 0;
     for (int i = 0; i < field->count; i++) {
         size_t used = (size_t)total < size ? (size_t)total : size;
@@ -174,25 +215,6 @@ int mild_field_print(const MildField *field, const void *def, char *text, size_t
         total += print_value(field->type, field_load(field, def, i), text + used, size - used);
     }
     return total;
-}
-
-/* Levenshtein distance, two rows. */
-static int edit_distance(const char *a, const char *b) {
-    int rows[2][FIELD_NAME_MAX + 1], *above = rows[0], *row = rows[1];
-    int a_length = (int)strnlen(a, FIELD_NAME_MAX), b_length = (int)strnlen(b, FIELD_NAME_MAX);
-    for (int j = 0; j <= b_length; j++) above[j] = j;
-    for (int i = 1; i <= a_length; i++) {
-        row[0] = i;
-        for (int j = 1; j <= b_length; j++) {
-            int replace = above[j - 1] + (a[i - 1] != b[j - 1]), drop = above[j] + 1, add = row[j - 1] + 1;
-            int least = drop < add ? drop : add;
-            row[j] = replace < least ? replace : least;
-        }
-        int *swap = above;
-        above = row;
-        row = swap;
-    }
-    return above[b_length];
 }
 
 const MildField *mild_field_find(const MildField *fields, int count, const char *name, const char **nearest) {

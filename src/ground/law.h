@@ -8,7 +8,10 @@
  *     F_g = (k_pen - kappa) P + kappa u      K = (k_pen - kappa) (1 - t)^2 + kappa
  *     m_a = c_g phi rho nu s P               m_a' = c_g phi rho nu s (1 - t)^2
  * Nothing cancels at small u or small nu/tan(alpha), because u_f is the only length left. F_g is concave when
- * k_pen > kappa, convex otherwise, and straight past u_f. */
+ * k_pen > kappa, convex otherwise, and straight past u_f.
+ *
+ * The rival models are the same law with other numbers: a yielding spring is kappa = k_pen without a flat part, resistive
+ * force theory kappa = zeta 1e6 s (its orientation dependence: resist.h); neither has inertia. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H
 
@@ -30,8 +33,20 @@ typedef struct {
     double bed_stiffness; /* [N/m] */
 } Law;
 
+#define LAW_RESIST_STRESS 1e6 /* [N/m^3] of a level plate going straight down at zeta = 1 (Li et al. 2013) */
+
+/* F_g = slope u: the cone is complete at once. */
+static inline Law law_straight(double slope, double area, double bed) {
+    return (Law){.cone = slope, .full = 1e-9, .inverse_full = 1e9, .bed = bed, .bed_stiffness = LAW_BED_STRESS * area};
+}
+
 static inline Law law_of(const MildMaterial *material, double pitch) {
-    double area = pitch * pitch, kappa = material->sigma_cone * area / cos(material->alpha);
+    double area = pitch * pitch;
+    if (material->model == MILD_MODEL_CON_SPRING || material->model == MILD_MODEL_ECC_SPRING)
+        return law_straight(material->k_pen, area, material->bed_depth);
+    if (material->model == MILD_MODEL_ECC_QUASI)
+        return law_straight(material->zeta * LAW_RESIST_STRESS * area, area, material->bed_depth);
+    double kappa = material->sigma_cone * area / cos(material->alpha);
     double c_g = material->c_g, c_d = material->c_d;
     if (material->passive) { /* passive exactly when c_g >= 0 and c_d >= 1/2 */
         c_g = fmax(c_g, 0.0);

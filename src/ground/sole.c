@@ -252,6 +252,21 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
     return sole;
 }
 
+MildSole *mild_sole_concentric(const MildSole *sole, MildError *error) {
+    MildSole *one = malloc(sizeof *one + 2 * sizeof(double));
+    if (!one) {
+        mild_fail(error, MILD_ERROR_MEMORY, "sole: out of memory for one element");
+        return NULL;
+    }
+    *one = (MildSole){.elements = 1, .pitch = sole->pitch * sqrt((double)sole->elements), .z = sole->z};
+    one->values[0] = one->values[1] = 0.0;
+    for (int i = 0; i < sole->elements; i++) {
+        one->values[0] += sole->values[i] / sole->elements;
+        one->values[1] += sole->values[sole->elements + i] / sole->elements;
+    }
+    return one;
+}
+
 void mild_sole_destroy(MildSole *sole) {
     free(sole);
 }

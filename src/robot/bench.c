@@ -82,10 +82,8 @@ static MildStatus open_case(Bench *bench, int which, double dt, MildError *error
     RobotVariation variation = robot_variation_nominal();
     variation.rigid = which == ENGINE_RIGID || which == RIGID;
     int soft = which == NEWTON || which == GAUSS_SEIDEL;
-    const double weight = 9.81 * robot_total_mass(bench->robot), pitch = mild_sole_pitch(soles[0]);
-    int elements = mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]);
-    RobotState state = robot_stand_state(
-        bench->robot, 1, soft ? robot_static_sinkage(&bench->terrain.materials[0], pitch, elements, weight) : 0.0);
+    double depth = mild_sole_sinkage(soles[0], &bench->terrain.materials[0], robot_half_weight(bench->robot));
+    RobotState state = robot_stand_state(bench->robot, 1, soft ? depth : 0.0);
     robot_sim_set_solver(bench->sims[which], which == GAUSS_SEIDEL ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON, 0, 0);
     robot_sim_load(bench->sims[which], &state, &variation);
     if (which == ENGINE_FREE || which == ENGINE_RIGID) {

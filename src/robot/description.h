@@ -14,7 +14,8 @@
 struct Robot {
     mjModel *model;  /* bodies, joints, floor and sole corners: what a step needs */
     mjModel *visual; /* the whole file, for pictures */
-    MildSole *soles[ROBOT_FEET];
+    MildSole *soles[ROBOT_FEET], *concentric[ROBOT_FEET]; /* the rasters, and one element in the middle of each */
+    int is_concentric;                                    /* bool: which of them the feet have */
     double outline[ROBOT_FEET][2 * ROBOT_OUTLINE_MAX]; /* [m] x y, foot frame */
     int outline_points[ROBOT_FEET];
     double sole_z;                     /* [m] */

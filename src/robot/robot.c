@@ -205,7 +205,8 @@ static MildStatus read_soles(Robot *robot, const char *path, MildError *error) {
         }
         MildSoleDef def = {robot->outline[f], robot->outline_points[f], *pitch, *z, (int)*elements};
         robot->soles[f] = mild_sole_create(&def, error);
-        if (!robot->soles[f]) {
+        robot->concentric[f] = robot->soles[f] ? mild_sole_concentric(robot->soles[f], error) : NULL;
+        if (!robot->concentric[f]) {
             return MILD_ERROR_FORMAT;
         }
     }
@@ -261,6 +262,7 @@ void robot_destroy(Robot *robot) {
     }
     for (int f = 0; f < ROBOT_FEET; f++) {
         mild_sole_destroy(robot->soles[f]);
+        mild_sole_destroy(robot->concentric[f]);
     }
     mj_deleteModel(robot->model);
     mj_deleteModel(robot->visual);
@@ -268,11 +270,28 @@ void robot_destroy(Robot *robot) {
 }
 
 const MildSole *const *robot_soles(const Robot *robot) {
+    return (const MildSole *const *)(robot->is_concentric ? robot->concentric : robot->soles);
+}
+
+const MildSole *const *robot_rasters(const Robot *robot) {
     return (const MildSole *const *)robot->soles;
+}
+
+void robot_set_model(Robot *robot, MildModel model) {
+    robot->is_concentric = mild_model_is_concentric(model);
+}
+
+MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild, MildMaterial *rival,
+                             MildError *error) {
+    return mild_model_match(model, mild, robot->soles[0], robot_half_weight(robot), rival, error);
 }
 
 double robot_total_mass(const Robot *robot) {
     return robot->total_mass;
+}
+
+double robot_half_weight(const Robot *robot) {
+    return -0.5 * robot->total_mass * robot->model->opt.gravity[2];
 }
 
 double robot_stand_height(const Robot *robot) {

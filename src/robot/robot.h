@@ -47,8 +47,16 @@ typedef struct {
 /* Loads models/sa01/sa01.xml (or another MJCF with the same names); names the missing foot or joint. */
 Robot *robot_create(const char *xml_path, MildError *error);
 void robot_destroy(Robot *robot);
-const MildSole *const *robot_soles(const Robot *robot); /* [ROBOT_FEET] */
+const MildSole *const *robot_soles(const Robot *robot);   /* [ROBOT_FEET] that the feet have: see robot_set_model */
+const MildSole *const *robot_rasters(const Robot *robot); /* [ROBOT_FEET] of the outlines, whatever the model */
+/* Gives the feet the soles of a ground model: one element in the middle for the concentric ones, the rasters otherwise
+ * (the default). Before sims and ground memory are made. */
+void robot_set_model(Robot *robot, MildModel model);
+/* mild_model_match for this robot: one raster sole under half the robot's weight. */
+MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild, MildMaterial *rival,
+                             MildError *error);
 double robot_total_mass(const Robot *robot);
+double robot_half_weight(const Robot *robot); /* [N] */
 double robot_stand_height(const Robot *robot);        /* [m] base above the sole in the default pose */
 const double *robot_default_pose(const Robot *robot); /* [ROBOT_JOINTS] rad */
 const double *robot_joint_low(const Robot *robot);    /* [ROBOT_JOINTS] rad */

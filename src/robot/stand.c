@@ -129,12 +129,3 @@ int stand_prepare(Robot *robot) {
     mj_deleteData(d);
     return 0;
 }
-
-double robot_static_sinkage(const MildMaterial *material, double pitch, int elements, double weight) {
-    double low = 0.0, high = 2.0 * material->bed_depth;
-    for (int i = 0; i < 60; i++) { /* the law rises with depth: bisection */
-        double middle = 0.5 * (low + high);
-        *(mild_element_law(material, pitch, middle).force * elements < weight ? &low : &high) = middle;
-    }
-    return 0.5 * (low + high);
-}

@@ -16,7 +16,4 @@ void robot_stand_pd(const Robot *robot, int balance, const double *q, const doub
 /* The robot at rest in that pose, soles `sinkage` [m] below z = 0. */
 RobotState robot_stand_state(const Robot *robot, int balance, double sinkage);
 
-/* Depth [m] at which `elements` elements carry `weight` [N] by the element law alone. */
-double robot_static_sinkage(const MildMaterial *material, double pitch, int elements, double weight);
-
 #endif

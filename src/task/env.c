@@ -32,16 +32,9 @@ void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_
 
 /* ---- start of an episode ---- */
 
-/* How deep the default pose stands on the material below, so that episodes start neither in the air nor buried:
- * bisection of the element law for half the robot's weight per foot. */
+/* So that episodes start neither in the air nor buried. */
 static double standing_depth(const Robot *robot, const MildMaterial *material) {
-    const MildSole *sole = robot_soles(robot)[0];
-    double wanted = 0.5 * robot_total_mass(robot) * 9.81 / mild_sole_elements(sole), low = 0, high = 0.2;
-    for (int i = 0; i < 20; i++) {
-        double middle = 0.5 * (low + high);
-        *(mild_element_law(material, mild_sole_pitch(sole), middle).force < wanted ? &low : &high) = middle;
-    }
-    return low;
+    return mild_sole_sinkage(robot_soles(robot)[0], material, robot_half_weight(robot));
 }
 
 static void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot) {

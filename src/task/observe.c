@@ -87,12 +87,13 @@ static void write_estimates(const RobotSim *sim, float *estimate) {
     }
 }
 
-/* Ground under the base, each parameter scaled to about one. */
-static float *write_ground(const TaskEnv *env, const RobotSim *sim, float *out) {
+/* Ground under the base, each parameter scaled to about one; an element that stands for a whole sole as one of its cells. */
+static float *write_ground(const TaskEnv *env, const Robot *robot, const RobotSim *sim, float *out) {
     const double *qpos = robot_sim_qpos(sim);
     const MildMaterial *m = &env->terrain.materials[mild_terrain_material_at(&env->terrain, qpos[0], qpos[1])];
-    const double values[] = {m->k_pen / 500, m->sigma_cone / 1e5, m->alpha, m->nu, m->c_g / 4, m->c_d / 20, m->phi,
-                             m->mu, m->k_drift / 500, m->b_drift * 10, m->recovery, m->bed_depth * 10};
+    double cells = mild_model_is_concentric((MildModel)m->model) ? mild_sole_elements(robot_rasters(robot)[0]) : 1;
+    const double values[] = {m->k_pen / 500 / cells, m->sigma_cone / 1e5, m->alpha, m->nu, m->c_g / 4, m->c_d / 20, m->phi,
+                             m->mu, m->k_drift / 500 / cells, m->b_drift * 10 / cells, m->recovery, m->bed_depth * 10};
     int rigid = env->variation.rigid;
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         *out++ = rigid ? 0 : (float)values[i];
@@ -101,7 +102,7 @@ static float *write_ground(const TaskEnv *env, const RobotSim *sim, float *out) 
     return out;
 }
 
-static void write_critic(const TaskEnv *env, const TaskDef *def, const RobotSim *sim, const float *clean, float *critic) {
+static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, const float *clean, float *critic) {
     float *out = critic;
     memcpy(out, clean, TASK_OBSERVATION * sizeof *out);
     out += TASK_OBSERVATION;
@@ -128,7 +129,7 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const RobotSim 
     for (int i = 0; i < 3; i++) {
         *out++ = (float)(env->variation.com_offset[i] * 100);
     }
-    out = write_ground(env, sim, out);
+    out = write_ground(env, robot, sim, out);
     *out++ = (float)(robot_sim_qpos(sim)[2] - env->terrain.height);
     *out++ = (float)env->strength[0];
     *out++ = (float)env->variation.armature_scale;
@@ -175,6 +176,6 @@ void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const Ro
         task_read_imu(sim, &now);
         task_read_motors(sim, &now);
         make_frame(env, def, pose, &now, clean);
-        write_critic(env, def, sim, clean, view->critic);
+        write_critic(env, def, robot, sim, clean, view->critic);
     }
 }

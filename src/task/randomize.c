@@ -1,4 +1,5 @@
 /* What is drawn once per episode (learning.md section 6) and the commands (section 5). */
+#include <assert.h>
 #include <string.h>
 
 #include "base/random.h"
@@ -29,7 +30,7 @@ static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
 /* The quasistatic force is linear in (k_pen, sigma_cone): one factor makes a too soft draw carry the robot on one foot
  * at sinkage_max. Without it a fifth of the paper's draws swallows the foot (physics.md section 2). */
 static void limit_sinkage(MildMaterial *m, const Robot *robot, double sinkage) {
-    const MildSole *sole = robot_soles(robot)[0];
+    const MildSole *sole = robot_rasters(robot)[0];
     MildMaterial bottomless = *m;
     bottomless.bed_depth = 1e3;
     double wanted = robot_total_mass(robot) * 9.81 / mild_sole_elements(sole);
@@ -59,7 +60,12 @@ static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot 
 
 static MildMaterial draw_material(Random *r, const RandomizeDef *def, const Robot *robot) {
     double preset = def->rigid_share < 1 ? def->preset_share / (1 - def->rigid_share) : 0;
-    return random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot);
+    MildMaterial m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot), rival;
+    if (def->model == MILD_MODEL_RIGID) return m; /* the engine's contact reads none of it */
+    MildStatus status = robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL);
+    assert(status == MILD_OK);
+    (void)status;
+    return rival;
 }
 
 /* Stripes across x around the start, three materials in random order. */
@@ -90,7 +96,7 @@ void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot) {
     const RandomizeDef *z = &def->randomize;
     Random r = random_at(env->seed ^ RANDOM_USE_EPISODE, env->index, env->tick);
     env->variation = robot_variation_nominal();
-    env->variation.rigid = random_unit(&r) < z->rigid_share;
+    env->variation.rigid = random_unit(&r) < z->rigid_share || z->model == MILD_MODEL_RIGID;
     MildMaterial material = draw_material(&r, z, robot);
     env->terrain = mild_terrain_uniform(&material);
     if (random_unit(&r) < z->patch_share) {

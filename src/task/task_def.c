@@ -136,7 +136,7 @@ const int task_field_count = sizeof task_fields / sizeof *task_fields;
 
 #define R(member, type, count, min, max, help) MILD_FIELD(RewardDef, member, type, count, min, max, help)
 #define TASK_REWARD_FIELD(name, value, help) \
-    {#name, MILD_FIELD_DOUBLE, offsetof(RewardDef, weight) + sizeof(double) * REWARD_##name, 1, -1e3, 1e3, "[1/s] " help},
+    {#name, MILD_FIELD_DOUBLE, offsetof(RewardDef, weight) + sizeof(double) * REWARD_##name, 1, -1e3, 1e3, "[1/s] " help, NULL},
 const MildField reward_fields[] = {
     TASK_REWARD_LIST(TASK_REWARD_FIELD)
     R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
@@ -152,6 +152,7 @@ const int reward_field_count = sizeof reward_fields / sizeof *reward_fields;
 
 #define Z(member, count, min, max, help) MILD_FIELD(RandomizeDef, member, D, count, min, max, help)
 const MildField randomize_fields[] = {
+    MILD_FIELD_CHOICE(RandomizeDef, model, mild_model_names, MILD_MODELS, "[-] ground model, matched to mild on each draw"),
     Z(rigid_share, 1, 0, 1, "[-] share of episodes on the engine's rigid ground"),
     Z(preset_share, 1, 0, 1, "[-] share of episodes on a named preset; the rest draws from the ranges below"),
     Z(preset_jitter, 1, 0, 0.9, "[-] preset parameters times 1 +- this"),

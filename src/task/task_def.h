@@ -46,6 +46,7 @@ typedef struct {
 
 /* Domain randomisation; ranges are uniform. learning.md section 6. */
 typedef struct {
+    int model;              /* MildModel of the soft episodes, matched to mild's draws; rigid: all on the engine's contact */
     /* ground: shares of episodes; what remains after rigid and preset draws from the paper's ranges */
     double rigid_share;     /* [-] engine contact */
     double preset_share;    /* [-] a named preset, parameters times 1 +- preset_jitter */

@@ -60,7 +60,10 @@ bad "outside" "$mild" press --ground sand_loose --ground.k_pen=-5
 bad "outside" "$mild" press --ground sand_loose --depth 7
 bad "not a number" "$mild" press --ground sand_loose --speed fast
 bad "neither LENGTH,WIDTH" "$mild" press --ground sand_loose --plate 0.1
-bad "only ground model" "$mild" press --ground sand_loose --model con_cone
+bad "engine's own contact" "$mild" press --ground sand_loose --model rigid
+bad "nearest is 'con_cone'" "$mild" press --ground sand_loose --model con_cnoe
+bad "which one" "$mild" press --ground sand_loose --model con_cone --ground.model=mild
+bad "nearest is 'ecc_spring'" "$mild" eval --ground sand_loose --ground.model=ecc_sprin
 bad "only what falls" "$mild" press --ground sand_loose --mass 5
 bad "leave out --depth" "$mild" press --ground sand_loose --drop 0.1 --depth 0.02
 bad "way back" "$mild" press --ground sand_loose --depth 0.02,0.03
@@ -79,6 +82,16 @@ awk "BEGIN { exit !($(peak --ground.k_pen=500) > $(peak) && $(peak --ground.k_pe
     fail "--ground.k_pen does not change the force"
 # the last override wins
 [ "$(peak --ground.k_pen=380 --ground.k_pen=500)" = "$(peak --ground.k_pen=500)" ] || fail "order of overrides"
+
+# ground models: the same by --model and by override; overrides are laid over the matched numbers
+[ "$(peak --model ecc_spring)" = "$(peak --ground.model=ecc_spring)" ] || fail "--model and --ground.model differ"
+awk "BEGIN { exit !($(peak --model ecc_spring --ground.k_pen=500) > $(peak --model ecc_spring)) }" || fail "matched k_pen kept"
+expect 0 'ground model con_spring' "$mild" eval --model con_spring --ground sand_loose --trials 1 --seconds 0.2 --json rival.json
+grep -q '"model":.*"con_spring"' rival.json || fail "rival.json"
+for model in con_cone con_spring ecc_spring ecc_quasi; do
+    expect 0 "iteration" "$mild" train --out "run_$model" --train.envs=2 --train.iterations=1 --ppo.steps=4 --ppo.minibatches=2 \
+        "--randomize.model=$model"
+done
 
 # info
 expect 0 'sand_dense' "$mild" info grounds

@@ -83,10 +83,8 @@ static void explicit_step(const Case *one, const double *torque) {
 
 static void case_open(Case *one, const char *name, double dt, int explicit_soil) {
     const MildSole *const *soles = robot_soles(robot);
-    int elements = mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]);
     *one = (Case){preset(name), preset_terrain(name), explicit_soil ? NULL : new_ground(), new_sim(dt)};
-    double weight = 9.81 * robot_total_mass(robot);
-    double sinkage = robot_static_sinkage(&one->material, mild_sole_pitch(soles[0]), elements, weight);
+    double sinkage = mild_sole_sinkage(soles[0], &one->material, robot_half_weight(robot));
     RobotState state = robot_stand_state(robot, 1, sinkage);
     RobotVariation nominal = robot_variation_nominal();
     robot_sim_load(one->sim, &state, &nominal);

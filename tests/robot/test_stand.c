@@ -34,9 +34,7 @@ static double sole_drift(const RobotSim *sim, double start[ROBOT_FEET][3]) {
 }
 
 static double static_sinkage(const MildMaterial *material) {
-    const MildSole *const *soles = robot_soles(robot);
-    int elements = mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]);
-    return robot_static_sinkage(material, mild_sole_pitch(soles[0]), elements, 9.81 * robot_total_mass(robot));
+    return mild_sole_sinkage(robot_soles(robot)[0], material, robot_half_weight(robot));
 }
 
 /* material: NULL for rigid ground. */

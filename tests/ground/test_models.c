@@ -1,0 +1,396 @@
+/* The contract of the ground models: every soft model through the same tests, and each rival matched to mild. */
+#include "ground_kit.h"
+
+#define SOFT_MODELS MILD_MODEL_RIGID
+#define LOAD (20.0 * KIT_GRAVITY) /* [N] half of the paper's robot */
+
+static MildSole *raster[2], *center[2]; /* left, right */
+
+static int make_soles(void **state) {
+    (void)state;
+    MildError error = {0};
+    for (int right = 0; right < 2; right++) {
+        raster[right] = kit_sole(right, 77);
+        center[right] = mild_sole_concentric(raster[right], &error);
+        if (!center[right]) return 1;
+    }
+    return 0;
+}
+
+static int drop_soles(void **state) {
+    (void)state;
+    for (int right = 0; right < 2; right++) {
+        mild_sole_destroy(raster[right]);
+        mild_sole_destroy(center[right]);
+    }
+    return 0;
+}
+
+static MildSole *sole_of(int model, int right) {
+    return mild_model_is_concentric((MildModel)model) ? center[right] : raster[right];
+}
+
+static MildMaterial rival_of(int model, const MildMaterial *mild) {
+    MildMaterial rival;
+    MildError error = {0};
+    assert_int_equal(mild_model_match((MildModel)model, mild, raster[0], LOAD, &rival, &error), MILD_OK);
+    assert_int_equal(rival.model, model);
+    return rival;
+}
+
+static MildMaterial preset(const char *name) {
+    MildMaterial m;
+    assert_true(mild_material_preset(name, &m));
+    return m;
+}
+
+/* ---- matching ---- */
+
+/* Force of the level sole pushed slowly to `depth` by hand: A = 0. */
+static double pressed_force(int model, const MildMaterial *material, double depth) {
+    enum { STEPS = 200 };
+    Kit kit;
+    kit_open(&kit, 1, sole_of(model, 0), NULL, material, depth / 0.01 / STEPS);
+    kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.01;
+    double before = 0.0, force = 0.0;
+    for (int s = 0; s <= STEPS; s++) { /* means over the steps before and after the depth */
+        kit_solve(&kit);
+        kit_advance(&kit);
+        before = force;
+        force = kit.result.foot[0].force[2];
+    }
+    kit_close(&kit);
+    return 0.5 * (before + force);
+}
+
+static void test_matched(void **state) {
+    (void)state;
+    double worst_depth = 0.0, worst_force = 0.0;
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        MildMaterial mild = preset(mild_material_preset_name(p));
+        double depth = mild_sole_sinkage(raster[0], &mild, LOAD);
+        for (int model = 0; model < SOFT_MODELS; model++) {
+            MildMaterial rival = rival_of(model, &mild);
+            MildError error = {0};
+            if (mild_material_check(&rival, &error) != MILD_OK) fail_msg("%s", error.text);
+            double sinks = mild_sole_sinkage(sole_of(model, 0), &rival, LOAD);
+            worst_depth = fmax(worst_depth, fabs(sinks - depth));
+            worst_force = fmax(worst_force, fabs(pressed_force(model, &rival, depth) / LOAD - 1.0));
+        }
+    }
+    print_message("matched: sinkage within %.2e mm of mild's, force pressed to that depth within %.2e\n", 1e3 * worst_depth,
+                  worst_force);
+    assert_true(worst_depth < 1e-7); /* the bar is 0.1 mm */
+    assert_true(worst_force < 2e-3); /* con_cone's drag at 1 cm/s */
+}
+
+static void test_refusals(void **state) {
+    (void)state;
+    MildMaterial mild = mild_material_default(), rival = mild, spring = rival_of(MILD_MODEL_ECC_SPRING, &mild);
+    MildError error = {0};
+    MildModel model;
+    assert_int_not_equal(mild_model_match(MILD_MODEL_RIGID, &mild, raster[0], LOAD, &rival, &error), MILD_OK);
+    assert_non_null(strstr(error.text, "rigid"));
+    assert_int_not_equal(mild_model_match(MILD_MODEL_CON_CONE, &spring, raster[0], LOAD, &rival, &error), MILD_OK);
+    assert_non_null(strstr(error.text, "ecc_spring"));
+    assert_int_not_equal(mild_model_match(MILD_MODEL_CON_CONE, &mild, raster[0], NAN, &rival, &error), MILD_OK);
+    mild.model = MILD_MODEL_RIGID;
+    assert_int_not_equal(mild_material_check(&mild, &error), MILD_OK);
+    assert_non_null(strstr(error.text, "ground.model"));
+    mild.model = 17;
+    assert_int_not_equal(mild_material_check(&mild, &error), MILD_OK);
+    for (int m = 0; m < MILD_MODELS; m++) assert_true(mild_model_find(mild_model_names[m], &model) && (int)model == m);
+    assert_false(mild_model_find("ecc_sprin", &model));
+}
+
+/* ---- rest ---- */
+
+/* A body that cannot turn, let down under strong damping until it rests. */
+static void settle(Kit *kit, int model, const MildMaterial *material, double dt) {
+    kit_open(kit, 1, sole_of(model, 0), NULL, material, dt);
+    kit->inertia[0] = 1e6;
+    for (int s = 0; s < (int)(4.0 / dt); s++) {
+        kit_step(kit, NULL);
+        for (int k = 0; k < 6; k++) kit->input.velocity[0][k] *= exp(-100.0 * dt);
+    }
+}
+
+static double depth_of(const Kit *kit) {
+    return -KIT_SOLE_Z - kit->input.position[0][2];
+}
+
+static void test_equilibrium(void **state) {
+    (void)state;
+    static const double steps[2] = {1e-3, 5e-3};
+    double worst = 0.0;
+    for (int model = 0; model < SOFT_MODELS; model++)
+        for (int p = 0; p < mild_material_preset_count(); p++)
+            for (int d = 0; d < 2; d++) {
+                MildMaterial mild = preset(mild_material_preset_name(p)), rival = rival_of(model, &mild);
+                double wanted = mild_sole_sinkage(raster[0], &mild, LOAD);
+                Kit kit;
+                settle(&kit, model, &rival, steps[d]);
+                double miss = fabs(depth_of(&kit) - wanted), force = kit.result.foot[0].force[2] / LOAD - 1.0;
+                if (miss > 1e-4 || fabs(force) > 1e-3)
+                    print_message("%s on %s, dt %g: %.3f mm instead of %.3f, force off by %.1e\n", mild_model_names[model],
+                                  mild_material_preset_name(p), steps[d], 1e3 * depth_of(&kit), 1e3 * wanted, force);
+                worst = fmax(worst, miss);
+                assert_true(miss < 1e-4 && fabs(force) < 1e-3);
+                kit_close(&kit);
+            }
+    print_message("at rest: within %.4f mm of the closed form\n", 1e3 * worst);
+}
+
+static void test_no_creep(void **state) {
+    (void)state;
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    static const char *const grounds[2] = {"sand_loose", "foam28"};
+    double worst[2] = {0.0, 0.0};
+    for (int model = 0; model < MILD_MODEL_ECC_QUASI; model++)
+        for (int g = 0; g < 2; g++)
+            for (int d = 0; d < 3; d++) {
+                MildMaterial mild = preset(grounds[g]), rival = rival_of(model, &mild);
+                Kit kit;
+                settle(&kit, model, &rival, steps[d]);
+                const double side = 0.4 * rival.mu;
+                const double force[1][3] = {{side * LOAD, 0.0, 0.0}}, back[1][3] = {{0.0, 0.0, 0.0}};
+                for (int s = 0; s < (int)(0.2 / steps[d]); s++) kit_step(&kit, force);
+                double start[3];
+                memcpy(start, kit.input.position[0], sizeof start);
+                for (int s = 0; s < (int)(10.0 / steps[d]); s++) kit_step(&kit, s * steps[d] < 5.0 ? force : back);
+                double down = fabs(kit.input.position[0][2] - start[2]), sideways = fabs(kit.input.position[0][0] - start[0]);
+                if (down > 1e-4 || sideways > 1e-4)
+                    print_message("%s on %s, dt %g: %.4f mm down, %.4f mm sideways\n", mild_model_names[model], grounds[g],
+                                  steps[d], 1e3 * down, 1e3 * sideways);
+                worst[0] = fmax(worst[0], down);
+                worst[1] = fmax(worst[1], sideways);
+                kit_close(&kit);
+            }
+    print_message("creep in 10 s: worst %.5f mm down, %.5f mm sideways\n", 1e3 * worst[0], 1e3 * worst[1]);
+    assert_true(worst[0] < 1e-4 && worst[1] < 1e-4);
+}
+
+/* ---- energy ---- */
+
+/* Work of the ground on the foot over one step, at the mean twist: exactly the change of kinetic energy it causes. */
+static double ground_work(const Kit *kit, const double *before) {
+    const MildFootResult *result = &kit->result.foot[0];
+    double work = 0.0;
+    for (int k = 0; k < 3; k++) {
+        work += 0.5 * kit->input.dt * result->force[k] * (before[k] + kit->result.velocity[k]);
+        work += 0.5 * kit->input.dt * result->torque[k] * (before[3 + k] + kit->result.velocity[3 + k]);
+    }
+    return work;
+}
+
+static int untouched(const Kit *kit) {
+    int touched = 0;
+    for (int e = 0; e < mild_sole_elements(kit->soles[0]); e++) touched += mild_ground_depth_max(kit->ground, 0)[e] > 0.0;
+    return touched == 0;
+}
+
+/* A foot thrown and shaken at random; *worst: most energy gained over a cycle from air to air. It is hard to turn: on one
+ * element it would tumble, and at 20 rad/s an engine's linear step alone loses count of the depth (28 N on the bed). */
+static int thrown(int model, uint64_t *random, double *worst) {
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    MildMaterial mild = kit_material(random), rival = rival_of(model, &mild);
+    double dt = steps[kit_index(random, 3)], work = 0.0, taken = 0.0, shake[3], spring = kit_uniform(random, 2.0, 8.0);
+    int cycles = 0;
+    Kit kit;
+    kit_open(&kit, 1, sole_of(model, 0), NULL, &rival, dt);
+    kit_random_state(&kit, random);
+    kit.inertia[0] = 3.0 * kit.mass[0];
+    kit.input.position[0][2] += 0.15;
+    for (int k = 0; k < 3; k++) shake[k] = kit_uniform(random, 0.0, 1.0);
+    for (int s = 0; s < (int)(0.6 / dt); s++) {
+        double t = s * dt, before[6], force[1][3], weight = kit.mass[0] * KIT_GRAVITY;
+        memcpy(before, kit.input.velocity[0], sizeof before);
+        force[0][0] = weight * shake[0] * sin(20.0 * t);
+        force[0][1] = weight * shake[1] * sin(31.0 * t);
+        force[0][2] = weight * (1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t);
+        kit_step(&kit, (const double(*)[3])force);
+        double w = ground_work(&kit, before);
+        work += w;
+        taken += fabs(w);
+        if (kit.result.foot[0].contacts == 0 && taken > 0.0 && untouched(&kit)) {
+            cycles++;
+            *worst = fmax(*worst, work);
+            work = taken = 0.0;
+        }
+    }
+    kit_close(&kit);
+    return cycles;
+}
+
+static void test_passive(void **state) {
+    (void)state;
+    for (int model = 0; model < SOFT_MODELS; model++) {
+        uint64_t random = 11;
+        double worst = -INFINITY;
+        int cycles = 0;
+        for (int draw = 0; draw < 600; draw++) cycles += thrown(model, &random, &worst);
+        print_message("passivity of %-10s: %4d closed cycles, most energy gained %.2e J\n", mild_model_names[model], cycles,
+                      worst);
+        assert_true(cycles > 50);
+        assert_true(worst < 1e-9);
+    }
+}
+
+/* ---- symmetry ---- */
+
+/* The same state seen in a world turned by `angle` about z, mirrored in y when `mirror`. */
+static void turn_state(const Kit *from, Kit *to, double angle, int mirror) {
+    double c = cos(angle), s = sin(angle), m = mirror ? -1.0 : 1.0;
+    const double Q[9] = {c, -s * m, 0, s, c * m, 0, 0, 0, 1}; /* turn after mirror */
+    const double *R = from->input.rotation[0], *p = from->input.position[0], *V = from->input.velocity[0];
+    for (int i = 0; i < 3; i++) {
+        to->input.position[0][i] = Q[3 * i] * p[0] + Q[3 * i + 1] * p[1] + Q[3 * i + 2] * p[2];
+        to->input.velocity[0][i] = Q[3 * i] * V[0] + Q[3 * i + 1] * V[1] + Q[3 * i + 2] * V[2];
+        to->input.velocity[0][3 + i] = m * (Q[3 * i] * V[3] + Q[3 * i + 1] * V[4] + Q[3 * i + 2] * V[5]);
+        for (int j = 0; j < 3; j++) { /* Q R M: the foot's own y is mirrored too */
+            double sum = Q[3 * i] * R[j] + Q[3 * i + 1] * R[3 + j] + Q[3 * i + 2] * R[6 + j];
+            to->input.rotation[0][3 * i + j] = j == 1 ? m * sum : sum;
+        }
+    }
+    to->mass[0] = from->mass[0];
+    to->inertia[0] = from->inertia[0];
+    memcpy(to->center[0], from->center[0], sizeof to->center[0]);
+    to->center[0][1] *= m;
+}
+
+static void test_symmetry(void **state) {
+    (void)state;
+    double worst = 0.0;
+    uint64_t random = 5;
+    for (int draw = 0; draw < 400; draw++) {
+        int model = draw % SOFT_MODELS, mirror = draw % 2;
+        MildMaterial mild = kit_material(&random), rival = rival_of(model, &mild);
+        Kit one, other, back;
+        kit_open(&one, 1, sole_of(model, 0), NULL, &rival, 1e-3);
+        kit_open(&other, 1, sole_of(model, mirror), NULL, &rival, 1e-3);
+        kit_random_state(&one, &random);
+        one.input.tolerance = other.input.tolerance = 1e-12;
+        double angle = kit_uniform(&random, -3.0, 3.0);
+        turn_state(&one, &other, angle, mirror);
+        for (int s = 0; s < 20; s++) {
+            kit_step(&one, NULL);
+            kit_step(&other, NULL);
+        }
+        back = other; /* its inputs are replaced by the turned ones of `one` */
+        turn_state(&one, &back, angle, mirror);
+        double miss = 0.0, scale = 1e-3;
+        for (int k = 0; k < 6; k++) {
+            miss = fmax(miss, fabs(back.input.velocity[0][k] - other.input.velocity[0][k]));
+            scale = fmax(scale, fabs(other.input.velocity[0][k]));
+        }
+        worst = fmax(worst, miss / scale);
+        kit_close(&one);
+        kit_close(&other);
+    }
+    print_message("symmetry: a turned and mirrored world differs by %.1e after 20 steps\n", worst);
+    assert_true(worst < 1e-6);
+}
+
+/* ---- solvers, state ---- */
+
+static void test_solvers_agree(void **state) {
+    (void)state;
+    for (int model = 0; model < SOFT_MODELS; model++) {
+        uint64_t random = 21;
+        double worst = 0.0;
+        int both = 0, draws = 60;
+        for (int draw = 0; draw < draws; draw++) {
+            MildMaterial mild = kit_material(&random), rival = rival_of(model, &mild);
+            Kit kit;
+            kit_open(&kit, 1, sole_of(model, 0), NULL, &rival, 1e-3);
+            kit_random_state(&kit, &random);
+            for (int s = 0; s < 5; s++) kit_step(&kit, NULL); /* with memory */
+            kit_inverse_inertia(&kit);
+            kit_free(&kit, NULL);
+            kit.input.tolerance = 1e-11;
+            kit_solve(&kit);
+            MildContactResult newton = kit.result;
+            kit.input.solver = MILD_SOLVER_GAUSS_SEIDEL;
+            kit.input.tolerance = 1e-13;
+            kit.input.max_iterations = 20000;
+            kit_solve(&kit);
+            double miss = 0.0, scale = 0.0;
+            for (int k = 0; k < 6; k++) {
+                miss = fmax(miss, fabs(newton.velocity[k] - kit.result.velocity[k]));
+                scale = fmax(scale, fabs(newton.velocity[k]));
+            }
+            if (newton.converged && kit.result.converged) {
+                both++;
+                worst = fmax(worst, miss / scale);
+            }
+            kit_close(&kit);
+        }
+        print_message("solvers on %-10s: %d of %d converge in both, twists within %.1e\n", mild_model_names[model], both, draws,
+                      worst);
+        assert_true(both > draws * 9 / 10);
+        assert_true(worst < 1e-6);
+    }
+}
+
+static void test_copy_continues(void **state) {
+    (void)state;
+    uint64_t random = 31;
+    for (int model = 0; model < SOFT_MODELS; model++) {
+        MildMaterial mild = preset("sand_loose"), rival = rival_of(model, &mild);
+        Kit kit, copy;
+        kit_open(&kit, 1, sole_of(model, 0), NULL, &rival, 1e-3);
+        kit_random_state(&kit, &random);
+        for (int s = 0; s < 50; s++) kit_step(&kit, NULL);
+        kit_open(&copy, 1, sole_of(model, 0), NULL, &rival, 1e-3);
+        MildGround *ground = copy.ground;
+        MildScratch *scratch = copy.scratch;
+        copy = kit;
+        copy.ground = ground;
+        copy.scratch = scratch;
+        memcpy(copy.ground, kit.ground, kit.bytes);
+        for (int s = 0; s < 50; s++) {
+            kit_step(&kit, NULL);
+            kit_step(&copy, NULL);
+        }
+        assert_memory_equal(kit.ground, copy.ground, kit.bytes);
+        assert_memory_equal(kit.input.position, copy.input.position, sizeof kit.input.position);
+        kit_close(&kit);
+        kit_close(&copy);
+    }
+}
+
+/* A concentric model carries no moment about its element, however the foot stands; the others do. */
+static void test_moment(void **state) {
+    (void)state;
+    MildMaterial mild = preset("sand_loose");
+    for (int model = 0; model < SOFT_MODELS; model++) {
+        MildMaterial rival = rival_of(model, &mild);
+        Kit kit;
+        kit_open(&kit, 1, sole_of(model, 0), NULL, &rival, 1e-3);
+        const double turn[3] = {0.0, 0.1, 0.0};
+        kit_rotate(kit.input.rotation[0], turn);
+        double x = mild_sole_x(center[0])[0], y = mild_sole_y(center[0])[0], p[3], moment[3];
+        const double *R = kit.input.rotation[0];
+        for (int k = 0; k < 3; k++) p[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * KIT_SOLE_Z;
+        kit.input.position[0][2] = -p[2] - 0.01;
+        kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.05;
+        kit_solve(&kit);
+        const MildFootResult *foot = &kit.result.foot[0];
+        kit_cross(p, foot->force, moment);
+        double about = hypot(foot->torque[0] - moment[0], foot->torque[1] - moment[1]);
+        print_message("%-10s tilted by 0.1 rad: %.1f N, %.2e N m about the middle of the sole\n", mild_model_names[model],
+                      foot->force[2], about);
+        assert_true(foot->force[2] > 10.0);
+        if (mild_model_is_concentric((MildModel)model)) assert_true(about < 1e-9);
+        else assert_true(about > 1.0);
+        kit_close(&kit);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_matched),      cmocka_unit_test(test_refusals), cmocka_unit_test(test_equilibrium),
+        cmocka_unit_test(test_no_creep),     cmocka_unit_test(test_passive),  cmocka_unit_test(test_symmetry),
+        cmocka_unit_test(test_solvers_agree), cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_moment)};
+    return cmocka_run_group_tests(tests, make_soles, drop_soles);
+}
