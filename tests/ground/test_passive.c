@@ -1,0 +1,146 @@
+/* The ground creates no energy: random materials of the paper's ranges, random motions. The number of draws is the first
+ * argument (default 3000); 100 000 of them are what docs/model.md reports. */
+#include "ground_kit.h"
+
+static int draws = 3000;
+
+/* Work of the ground on the foot over one step, at the mean twist: exactly the change of kinetic energy it causes. */
+static double ground_work(const Kit *kit, int f, const double *before) {
+    const MildFootResult *result = &kit->result.foot[f];
+    double work = 0.0;
+    for (int k = 0; k < 3; k++) {
+        work += 0.5 * kit->input.dt * result->force[k] * (before[k] + kit->result.velocity[6 * f + k]);
+        work += 0.5 * kit->input.dt * result->torque[k] * (before[3 + k] + kit->result.velocity[6 * f + 3 + k]);
+    }
+    return work;
+}
+
+/* Feet thrown and shaken at random until they leave the ground: whatever happened between, the ground has taken energy. */
+static void test_passive(void **state) {
+    (void)state;
+    uint64_t random = 11;
+    MildSole *sole = kit_sole(0, 77);
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    double worst = -INFINITY, worst_share = -INFINITY;
+    int cycles = 0;
+    for (int draw = 0; draw < draws; draw++) {
+        MildMaterial m = kit_material(&random);
+        Kit kit;
+        double dt = steps[kit_index(&random, 3)];
+        kit_open(&kit, 1, sole, NULL, &m, dt);
+        kit_random_state(&kit, &random);
+        kit.input.position[0][2] += 0.05 + 0.1;
+        double work = 0.0, taken = 0.0, shake[3], spring = kit_uniform(&random, 2.0, 8.0), force[1][3];
+        for (int k = 0; k < 3; k++) shake[k] = kit_uniform(&random, 0.0, 1.0);
+        for (int s = 0; s < (int)(0.6 / dt); s++) {
+            double t = s * dt, before[6];
+            memcpy(before, kit.input.velocity[0], sizeof before);
+            for (int k = 0; k < 3; k++)
+                force[0][k] = kit.mass[0] * KIT_GRAVITY * (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t : shake[k] * sin(20 * t));
+            kit_step(&kit, (const double(*)[3])force);
+            double w = ground_work(&kit, 0, before);
+            work += w;
+            taken += fabs(w);
+            if (kit.result.foot[0].contacts == 0 && mild_ground_depth_max(kit.ground, 0)[0] == 0.0) {
+                int touched = 0;
+                for (int e = 0; e < 77; e++) touched += mild_ground_depth_max(kit.ground, 0)[e] > 0.0;
+                if (touched == 0 && taken > 0.0) { /* a closed cycle */
+                    cycles++;
+                    worst = fmax(worst, work);
+                    if (taken > 1e-6) worst_share = fmax(worst_share, work / taken);
+                    work = taken = 0.0;
+                }
+            }
+        }
+        kit_close(&kit);
+    }
+    print_message("thrown and shaken: %d draws, %d closed cycles, most energy gained %.2e J, share %.2e\n", draws, cycles, worst, worst_share);
+    mild_sole_destroy(sole);
+    assert_true(cycles > draws / 3);
+    assert_true(worst < 1e-9);
+}
+
+/* A foot moved up and down by hand (A = 0): the work over a closed cycle, force times displacement. */
+static void test_passive_by_hand(void **state) {
+    (void)state;
+    uint64_t random = 13;
+    MildSole *sole = kit_plate(2, 1);
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    double worst = -INFINITY;
+    for (int draw = 0; draw < draws; draw++) {
+        MildMaterial m = kit_material(&random);
+        Kit kit;
+        double dt = steps[draw % 3], period = kit_uniform(&random, 0.2, 2.0), depth = kit_uniform(&random, 0.002, 0.08);
+        double wobble = kit_uniform(&random, 0.0, 0.3) * depth, z = 0.01, work = 0.0, taken = 0.0;
+        kit_open(&kit, 1, sole, NULL, &m, dt);
+        kit.input.position[0][2] = -KIT_SOLE_Z + z;
+        for (double t = dt; t < period + 0.02; t += dt) {
+            double next = 0.01 - (depth + 0.01) * pow(sin(3.14159 * fmin(t / period, 1.0)), 2.0) + (t < period ? wobble * (1 - cos(50.0 * t)) : 0.0);
+            kit.input.free_velocity[2] = (next - z) / dt;
+            z = next;
+            kit_solve(&kit);
+            kit_advance(&kit);
+            double w = kit.result.foot[0].force[2] * kit.input.velocity[0][2] * dt;
+            work += w;
+            taken += fabs(w);
+        }
+        if (taken > 0.0) worst = fmax(worst, work / taken);
+        kit_close(&kit);
+    }
+    print_message("down and up by hand: %d draws, largest share of the work given back in excess %.2e\n", draws, worst);
+    mild_sole_destroy(sole);
+    assert_true(worst < 0.0);
+}
+
+/* A foot led by hand (A = 0) around a closed loop of height, place and tilt, over and over. The first time the ground
+ * yields; from then on each round must cost work, or none. */
+static void test_loops(void **state) {
+    (void)state;
+    uint64_t random = 17;
+    MildSole *sole = kit_sole(0, 77);
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    double worst = -INFINITY, worst_share = -INFINITY;
+    for (int draw = 0; draw < draws; draw++) {
+        MildMaterial m = kit_material(&random);
+        Kit kit;
+        double size[3], phase[3], at[3] = {0}, depth = kit_uniform(&random, 0.0, 0.04);
+        kit_open(&kit, 1, sole, NULL, &m, steps[draw % 3]);
+        kit.input.position[0][2] -= depth;
+        for (int k = 0; k < 3; k++) {
+            size[k] = kit_uniform(&random, 0.0, k == 2 ? 0.2 : 0.03) * kit_index(&random, 2);
+            phase[k] = kit_uniform(&random, 0.0, 6.28);
+        }
+        int round = (int)(kit_uniform(&random, 0.05, 0.4) / kit.input.dt);
+        for (int r = 0; r < 3; r++) {
+            double work = 0.0, taken = 0.0;
+            for (int s = 1; s <= round; s++) {
+                double *V = kit.input.free_velocity;
+                for (int k = 0; k < 3; k++) { /* x, z, tilt about y */
+                    double next = size[k] * sin(phase[k] + 6.283185307179586 * s / round) - size[k] * sin(phase[k]);
+                    V[2 * k] = (next - at[k]) / kit.input.dt;
+                    at[k] = next;
+                }
+                kit_solve(&kit);
+                kit_advance(&kit);
+                const MildFootResult *foot = &kit.result.foot[0];
+                double w = kit.input.dt * (foot->force[0] * V[0] + foot->force[2] * V[2] + foot->torque[1] * V[4]);
+                work += w;
+                taken += fabs(w);
+            }
+            if (r == 0 || taken == 0.0) continue;
+            worst = fmax(worst, work);
+            worst_share = fmax(worst_share, work / taken);
+        }
+        kit_close(&kit);
+    }
+    print_message("closed loops by hand: %d draws, most energy gained in a round %.2e J, share %.2e\n", draws, worst, worst_share);
+    mild_sole_destroy(sole);
+    assert_true(worst < 1e-9);
+}
+
+int main(int argc, char **argv) {
+    if (argc > 1) draws = atoi(argv[1]);
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_passive), cmocka_unit_test(test_passive_by_hand),
+                                       cmocka_unit_test(test_loops)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
