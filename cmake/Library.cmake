@@ -5,7 +5,20 @@ include(CMakePackageConfigHelpers)
 
 set_target_properties(layer_ground PROPERTIES C_VISIBILITY_PRESET hidden) # but for what MILD_API_BEGIN makes visible
 add_library(mild_shared SHARED $<TARGET_OBJECTS:layer_ground>)
-add_library(mild_static STATIC $<TARGET_OBJECTS:layer_ground>)
+
+# A static library is an archive of objects, and what they call each other is global in each: one object of all, in which
+# hidden symbols become local, exports what the shared library does. Needs GNU's or LLVM's objcopy.
+if(CMAKE_OBJCOPY)
+  set(mild_object ${CMAKE_BINARY_DIR}/generated/mild.o)
+  add_custom_command(OUTPUT ${mild_object}
+    COMMAND ${CMAKE_C_COMPILER} -r -nostdlib -o ${mild_object}.all $<TARGET_OBJECTS:layer_ground>
+    COMMAND ${CMAKE_OBJCOPY} --localize-hidden ${mild_object}.all ${mild_object}
+    DEPENDS layer_ground $<TARGET_OBJECTS:layer_ground> COMMAND_EXPAND_LISTS VERBATIM)
+  set_source_files_properties(${mild_object} PROPERTIES EXTERNAL_OBJECT TRUE GENERATED TRUE)
+  add_library(mild_static STATIC ${mild_object})
+else()
+  add_library(mild_static STATIC $<TARGET_OBJECTS:layer_ground>)
+endif()
 # while the version begins with 0, a new minor version may change the interface
 set_target_properties(mild_shared PROPERTIES EXPORT_NAME mild VERSION ${PROJECT_VERSION}
   SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})

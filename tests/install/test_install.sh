@@ -26,6 +26,12 @@ export PKG_CONFIG_PATH="$work/$lib/pkgconfig"
 # Only the interface is visible.
 foreign=$(nm -D --defined-only "$lib/libmild.so" | awk '$3 !~ /^mild_/ { print $3 }')
 [ -z "$foreign" ] || fail "libmild.so exports $foreign"
+foreign=$(nm -g --defined-only "$lib/libmild.a" | awk 'NF == 3 && $3 !~ /^mild_/ { print $3 }')
+[ -z "$foreign" ] || fail "libmild.a exports $foreign"
+for library in so a; do
+    nm -g --defined-only "$lib/libmild.$library" | awk '$3 ~ /^mild_/ { print $3 }' | sort >"$library.names"
+done
+cmp so.names a.names || fail "libmild.so and libmild.a export different functions"
 
 # Every header compiles alone, in C and in C++, and C++ finds the functions.
 for header in prefix/include/mild/*.h; do
