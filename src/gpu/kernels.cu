@@ -9,12 +9,18 @@
 #define LOGVAR_MIN (-12.0f)
 #define LOGVAR_MAX 6.0f
 
-static unsigned blocks_of(int64_t items) {
-    return items > 0 ? (unsigned)((items + THREADS - 1) / THREADS) : 1u;
+#ifndef LAUNCH /* the tests run the kernels on the processor */
+#define LAUNCH(kernel, grid, block, stream, ...) kernel<<<grid, block, 0, stream>>>(__VA_ARGS__)
+#endif
+
+static const dim3 line = {THREADS, 1, 1}; /* of threads: the block of every kernel but one */
+
+static dim3 blocks_of(int64_t items) {
+    return {items > 0 ? (unsigned)((items + THREADS - 1) / THREADS) : 1u, 1, 1};
 }
 
 int gpu_blocks(int rows) {
-    return (int)blocks_of(rows);
+    return (int)blocks_of(rows).x;
 }
 
 static __device__ int64_t item() {
@@ -25,9 +31,9 @@ static __device__ int64_t item() {
 static __device__ void add_block_sum(double x, double *to) {
     __shared__ double part[THREADS];
     part[threadIdx.x] = x;
-    for (int half = THREADS / 2; half > 0; half /= 2) {
+    for (unsigned half = THREADS / 2; half > 0; half /= 2) {
         __syncthreads();
-        if ((int)threadIdx.x < half) part[threadIdx.x] += part[threadIdx.x + half];
+        if (threadIdx.x < half) part[threadIdx.x] += part[threadIdx.x + half];
     }
     if (threadIdx.x == 0) *to += part[0];
     __syncthreads();
@@ -42,7 +48,7 @@ static __global__ void gather(int64_t count, int width, const int *index, const 
 
 void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, const float *from, float *to) {
     int64_t count = (int64_t)rows * width;
-    gather<<<blocks_of(count), THREADS, 0, stream>>>(count, width, index, from, to);
+    LAUNCH(gather, blocks_of(count), line, stream, count, width, index, from, to);
 }
 
 static __global__ void mirror_history(GpuImages m, const float *history, float *to) {
@@ -55,7 +61,7 @@ static __global__ void mirror_history(GpuImages m, const float *history, float *
 }
 
 void gpu_mirror_history(cudaStream_t stream, GpuImages m, const float *history, float *to) {
-    mirror_history<<<blocks_of((int64_t)m.images * m.frames * m.observation), THREADS, 0, stream>>>(m, history, to);
+    LAUNCH(mirror_history, blocks_of((int64_t)m.images * m.frames * m.observation), line, stream, m, history, to);
 }
 
 static __global__ void latent_noise(int64_t count, int latent, uint32_t key0, uint32_t key1, const int *row,
@@ -70,8 +76,8 @@ static __global__ void latent_noise(int64_t count, int latent, uint32_t key0, ui
 
 void gpu_latent_noise(cudaStream_t stream, int rows, int latent, uint64_t key, const int *row, float *noise) {
     int64_t count = (int64_t)rows * latent;
-    latent_noise<<<blocks_of(count), THREADS, 0, stream>>>(count, latent, (uint32_t)key, (uint32_t)(key >> 32), row,
-                                                           noise);
+    LAUNCH(latent_noise, blocks_of(count), line, stream, count, latent, (uint32_t)key, (uint32_t)(key >> 32), row,
+           noise);
 }
 
 /* ---- layers ---- */
@@ -85,7 +91,7 @@ static __global__ void add_bias(int64_t count, int width, int elu, const float *
 
 void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float *bias, float *y) {
     int64_t count = (int64_t)rows * width;
-    add_bias<<<blocks_of(count), THREADS, 0, stream>>>(count, width, elu, bias, y);
+    LAUNCH(add_bias, blocks_of(count), line, stream, count, width, elu, bias, y);
 }
 
 /* Block (column group, slice of rows): LANES partial sums a column, added in order. */
@@ -121,9 +127,9 @@ static __global__ void add_slices(int width, const float *partial, float beta, f
 
 void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d, float *partial, float beta,
                        float *d_bias) {
-    const dim3 grid((unsigned)((width + COLUMNS - 1) / COLUMNS), GPU_SUM_SLICES), block(COLUMNS, LANES);
-    bias_backward<<<grid, block, 0, stream>>>(rows, width, y, d, partial);
-    add_slices<<<blocks_of(width), THREADS, 0, stream>>>(width, partial, beta, d_bias);
+    const dim3 grid = {(unsigned)((width + COLUMNS - 1) / COLUMNS), GPU_SUM_SLICES, 1}, block = {COLUMNS, LANES, 1};
+    LAUNCH(bias_backward, grid, block, stream, rows, width, y, d, partial);
+    LAUNCH(add_slices, blocks_of(width), line, stream, width, partial, beta, d_bias);
 }
 
 /* ---- joints of the networks ---- */
@@ -149,8 +155,8 @@ static __global__ void actor_input(GpuWidths w, int rows, const float *history, 
 
 void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, const float *history, const float *heads,
                      const float *theta, float *input) {
-    actor_input<<<blocks_of((int64_t)rows * (w.observation + w.estimates + w.latent)), THREADS, 0, stream>>>(
-        w, rows, history, heads, theta, input);
+    LAUNCH(actor_input, blocks_of((int64_t)rows * (w.observation + w.estimates + w.latent)), line, stream, w, rows,
+           history, heads, theta, input);
 }
 
 static __device__ float held_logvar(float logvar) {
@@ -178,8 +184,8 @@ static __global__ void sample_latent(GpuWidths w, int rows, const float *heads, 
 
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads, const float *noise,
                        float *spread, float *input) {
-    sample_latent<<<blocks_of((int64_t)rows * (w.latent + w.estimates)), THREADS, 0, stream>>>(w, rows, heads, noise,
-                                                                                               spread, input);
+    LAUNCH(sample_latent, blocks_of((int64_t)rows * (w.latent + w.estimates)), line, stream, w, rows, heads, noise,
+           spread, input);
 }
 
 /* ---- losses: one thread a sample ---- */
@@ -217,7 +223,7 @@ static __global__ void surrogate(GpuSurrogate s, int rows, double *sums) {
 }
 
 void gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums) {
-    surrogate<<<blocks_of(rows), THREADS, 0, stream>>>(s, rows, sums);
+    LAUNCH(surrogate, blocks_of(rows), line, stream, s, rows, sums);
 }
 
 /* A sample has at most one image: no two threads write one row. action_index is a permutation. */
@@ -241,7 +247,7 @@ static __global__ void mirror_loss(GpuMirror m, int images, double *sums) {
 }
 
 void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums) {
-    mirror_loss<<<blocks_of(images), THREADS, 0, stream>>>(m, images, sums);
+    LAUNCH(mirror_loss, blocks_of(images), line, stream, m, images, sums);
 }
 
 static __global__ void reconstruction(int rows, int width, float weight, const float *decoded, const float *clean,
@@ -258,7 +264,7 @@ static __global__ void reconstruction(int rows, int width, float weight, const f
 
 void gpu_reconstruction(cudaStream_t stream, int rows, int width, float weight, const float *decoded,
                         const float *clean, float *d, double *sums) {
-    reconstruction<<<blocks_of(rows), THREADS, 0, stream>>>(rows, width, weight, decoded, clean, d, sums);
+    LAUNCH(reconstruction, blocks_of(rows), line, stream, rows, width, weight, decoded, clean, d, sums);
 }
 
 static __global__ void modulation_backward(GpuWidths w, int rows, const float *heads, const float *theta,
@@ -289,7 +295,7 @@ static __global__ void modulation_backward(GpuWidths w, int rows, const float *h
 
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads, const float *theta,
                              const float *d_input, float *d_heads, float *d_theta) {
-    modulation_backward<<<blocks_of(rows), THREADS, 0, stream>>>(w, rows, heads, theta, d_input, d_heads, d_theta);
+    LAUNCH(modulation_backward, blocks_of(rows), line, stream, w, rows, heads, theta, d_input, d_heads, d_theta);
 }
 
 /* Mean of squares of the estimates [begin, end) of one sample; adds to d. */
@@ -342,7 +348,7 @@ static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all
 }
 
 void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
-    heads_backward<<<blocks_of(all), THREADS, 0, stream>>>(w, h, rows, all, sums);
+    LAUNCH(heads_backward, blocks_of(all), line, stream, w, h, rows, all, sums);
 }
 
 static __global__ void value_loss(int rows, int clip_value, float clip, float weight, const float *value,
@@ -363,6 +369,6 @@ static __global__ void value_loss(int rows, int clip_value, float clip, float we
 
 void gpu_value_loss(cudaStream_t stream, int rows, int clip_value, float clip, float weight, const float *value,
                     const float *returns, const float *old_value, float *d, double *sums) {
-    value_loss<<<blocks_of(rows), THREADS, 0, stream>>>(rows, clip_value, clip, weight, value, returns, old_value, d,
-                                                        sums);
+    LAUNCH(value_loss, blocks_of(rows), line, stream, rows, clip_value, clip, weight, value, returns, old_value, d,
+           sums);
 }

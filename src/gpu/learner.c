@@ -9,7 +9,9 @@
 #include "learn/ppo_private.h"
 
 /* Rows go through the networks in chunks of at most this many: enough to fill a large GPU, and a bound on its memory. */
+#ifndef GPU_ROWS
 #define GPU_ROWS 32768
+#endif
 
 _Static_assert(GPU_ACTIONS_MAX == NETWORK_ACTIONS_MAX, "one bound");
 
