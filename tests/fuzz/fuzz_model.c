@@ -60,14 +60,18 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     restore();
     Bytes bytes = {data, data + size};
     MildError error = {0};
-    Robot robot = {.visual = loaded.visual, .model = edited};
+    Robot *robot = calloc(1, sizeof *robot);
+    fuzz_check(robot != NULL);
+    robot->visual = loaded.visual;
+    robot->model = edited;
     while (bytes.at < bytes.end) edit(&bytes, edited);
-    MildStatus status = read_bodies(&robot, "fuzz", &error);
-    status = status == MILD_OK ? read_joints(&robot, "fuzz", &error) : status;
-    status = status == MILD_OK ? read_shells(&robot, "fuzz", &error) : status;
-    status = status == MILD_OK ? read_soles(&robot, "fuzz", &error) : status;
+    MildStatus status = read_bodies(robot, "fuzz", &error);
+    status = status == MILD_OK ? read_joints(robot, "fuzz", &error) : status;
+    status = status == MILD_OK ? read_shells(robot, "fuzz", &error) : status;
+    status = status == MILD_OK ? read_soles(robot, "fuzz", &error) : status;
     fuzz_check(status == MILD_OK || (error.status != MILD_OK && error.text[0]));
-    fuzz_check(status != MILD_OK || (robot.soles[0] && robot.soles[1]));
-    for (int f = 0; f < ROBOT_FEET; f++) mild_sole_destroy(robot.soles[f]);
+    fuzz_check(status != MILD_OK || (robot->soles[0] && robot->soles[1]));
+    robot->visual = robot->model = NULL;
+    robot_destroy(robot);
     return 0;
 }

@@ -6,25 +6,37 @@
 
 enum { STEPS = 2, NEWTON_WORK = 16, SWEEPS = 6 };
 
-static MildSole *soles[MILD_FEET_MAX];
-static MildScratch *scratch[MILD_FEET_MAX]; /* for one foot, for two */
-static MildGround *ground[MILD_FEET_MAX];
+/* What a model stands on: the raster, or one element in its middle. */
+typedef struct {
+    MildSole *soles[MILD_FEET_MAX];
+    MildScratch *scratch[MILD_FEET_MAX]; /* for one foot, for two */
+    MildGround *ground[MILD_FEET_MAX];
+} Feet;
+
+static Feet raster, concentric;
+
+static void feet_finish(Feet *feet) {
+    const MildSole *const *all = (const MildSole *const *)feet->soles;
+    for (int count = 1; count <= MILD_FEET_MAX; count++) {
+        feet->scratch[count - 1] = mild_scratch_create(all, count, NULL);
+        void *block = malloc(mild_ground_bytes(all, count));
+        fuzz_check(feet->scratch[count - 1] && block);
+        feet->ground[count - 1] = mild_ground_init(block, all, count);
+    }
+}
 
 static void make_feet(void) {
-    static const double outline[2][8] = {{-0.03, -0.02, 0.03, -0.02, 0.03, 0.02, -0.03, 0.02},
-                                         {-0.05, -0.02, 0.05, -0.02, 0.05, 0.02, -0.05, 0.02}};
+    static const double outline[2][8] = {{-0.02, -0.01, 0.02, -0.01, 0.02, 0.01, -0.02, 0.01},
+                                         {-0.02, -0.02, 0.02, -0.02, 0.02, 0.02, -0.02, 0.02}};
     for (int f = 0; f < MILD_FEET_MAX; f++) {
         MildSoleDef def = {.outline = outline[f], .points = 4, .pitch = 0.0195, .sole_z = -0.05};
-        soles[f] = mild_sole_create(&def, NULL);
-        fuzz_check(soles[f] != NULL);
+        raster.soles[f] = mild_sole_create(&def, NULL);
+        fuzz_check(raster.soles[f] != NULL);
+        concentric.soles[f] = mild_sole_concentric(raster.soles[f], NULL);
+        fuzz_check(concentric.soles[f] != NULL);
     }
-    for (int feet = 1; feet <= MILD_FEET_MAX; feet++) {
-        const MildSole *const *all = (const MildSole *const *)soles;
-        scratch[feet - 1] = mild_scratch_create(all, feet, NULL);
-        void *block = malloc(mild_ground_bytes(all, feet));
-        fuzz_check(scratch[feet - 1] && block);
-        ground[feet - 1] = mild_ground_init(block, all, feet);
-    }
+    feet_finish(&raster);
+    feet_finish(&concentric);
 }
 
 /* Feet just in the ground, level and at rest, 5 kg each. */
@@ -59,7 +71,7 @@ static void check_finite(const double *values, int count) {
     for (int i = 0; i < count; i++) fuzz_check(isfinite(values[i]));
 }
 
-static void check_result(const MildContactInput *input, const MildContactResult *result, const MildScratch *used) {
+static void check_result(const MildContactInput *input, const MildContactResult *result, const Feet *feet) {
     fuzz_check(result->iterations >= 0 && result->iterations <= (input->max_iterations ? input->max_iterations : 60));
     if (!result->converged) return;
     check_finite(result->velocity, 6 * input->feet);
@@ -67,14 +79,17 @@ static void check_result(const MildContactInput *input, const MildContactResult 
         const MildFootResult *foot = &result->foot[f];
         check_finite(foot->force, 3);
         check_finite(foot->torque, 3);
-        check_finite(mild_scratch_elements(used, f).normal, mild_sole_elements(soles[f]));
-        fuzz_check(foot->contacts >= 0 && foot->contacts <= mild_sole_elements(soles[f]));
+        check_finite(mild_scratch_elements(feet->scratch[input->feet - 1], f).normal,
+                     mild_sole_elements(feet->soles[f]));
+        fuzz_check(foot->contacts >= 0 && foot->contacts <= mild_sole_elements(feet->soles[f]));
     }
 }
 
 static MildTerrain take_terrain(Bytes *bytes) {
-    MildMaterial material, other;
-    mild_material_preset(mild_material_preset_name(take_below(bytes, mild_material_preset_count())), &material);
+    MildMaterial preset, material, other;
+    mild_material_preset(mild_material_preset_name(take_below(bytes, mild_material_preset_count())), &preset);
+    MildModel model = (MildModel)take_below(bytes, MILD_MODEL_RIGID);
+    fuzz_check(mild_model_match(model, &preset, raster.soles[0], 20.0, &material, NULL) == MILD_OK);
     MildTerrain terrain = mild_terrain_uniform(&material);
     if (take_below(bytes, 2) == 0) return terrain;
     other = material;
@@ -86,31 +101,38 @@ static MildTerrain take_terrain(Bytes *bytes) {
     return terrain;
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    if (!soles[0]) make_feet();
-    Bytes bytes = {data, data + size};
-    MildTerrain terrain = take_terrain(&bytes);
-    int feet = 1 + take_below(&bytes, MILD_FEET_MAX);
-    MildGround *memory = ground[feet - 1];
-    MildScratch *work = scratch[feet - 1];
+/* Lifted, every element forgets; put down again on ordinary ground, the foot is carried. */
+static void check_usable(const Feet *feet, int count, const MildMaterial *material) {
+    MildGround *memory = feet->ground[count - 1];
+    MildScratch *work = feet->scratch[count - 1];
+    MildTerrain terrain = mild_terrain_uniform(material);
+    MildContactInput away = quiet_input(count), quiet = away;
     MildContactResult result;
-    mild_ground_reset(memory);
-    for (int step = 0; step < STEPS && bytes.at < bytes.end; step++) {
-        MildContactInput input = quiet_input(feet);
-        spoil(&bytes, &input);
-        mild_ground_solve(memory, &terrain, &input, work, &result);
-        check_result(&input, &result, work);
-        mild_ground_advance(memory, &terrain, &input, work, &result);
-    }
-    if (!fuzz_sample(data, size, 4)) return 0;
-    MildContactInput away = quiet_input(feet), quiet = away;
-    for (int f = 0; f < feet; f++) away.position[f][2] = 10.0; /* lifted, every element forgets */
+    for (int f = 0; f < count; f++) away.position[f][2] = 10.0;
     mild_ground_solve(memory, &terrain, &away, work, &result);
     fuzz_check(result.converged);
     mild_ground_advance(memory, &terrain, &away, work, &result);
-    terrain = mild_terrain_uniform(&terrain.materials[0]);
     mild_ground_solve(memory, &terrain, &quiet, work, &result);
-    check_result(&quiet, &result, work);
+    check_result(&quiet, &result, feet);
     fuzz_check(result.converged && result.foot[0].force[2] > 0.0);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    if (!raster.soles[0]) make_feet();
+    Bytes bytes = {data, data + size};
+    MildTerrain terrain = take_terrain(&bytes);
+    const Feet *feet = mild_model_is_concentric((MildModel)terrain.materials[0].model) ? &concentric : &raster;
+    int count = 1 + take_below(&bytes, MILD_FEET_MAX);
+    MildGround *memory = feet->ground[count - 1];
+    mild_ground_reset(memory);
+    for (int step = 0; step < STEPS && bytes.at < bytes.end; step++) {
+        MildContactInput input = quiet_input(count);
+        MildContactResult result;
+        spoil(&bytes, &input);
+        mild_ground_solve(memory, &terrain, &input, feet->scratch[count - 1], &result);
+        check_result(&input, &result, feet);
+        mild_ground_advance(memory, &terrain, &input, feet->scratch[count - 1], &result);
+    }
+    if (fuzz_sample(data, size, 4)) check_usable(feet, count, &terrain.materials[0]);
     return 0;
 }
