@@ -144,6 +144,23 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *ro
     }
 }
 
+/* An episode's first frame stands for those before it. */
+static void remember(TaskEnv *env, const TaskDef *def, const float frame[TASK_OBSERVATION], int first) {
+    const size_t bytes = sizeof env->frames[0];
+    if (first) {
+        for (int i = 0; i < TASK_FRAMES_HELD - 1; i++) {
+            memcpy(env->frames[i], frame, bytes);
+        }
+    } else {
+        memmove(env->frames[0], env->frames[1], (TASK_FRAMES_HELD - 1) * bytes);
+    }
+    memcpy(env->frames[TASK_FRAMES_HELD - 1], frame, bytes);
+    for (int i = 0; i < TASK_FRAMES; i++) {
+        int age = (TASK_FRAMES - 1 - i) * def->history_stride;
+        memcpy(env->history + i * TASK_OBSERVATION, env->frames[TASK_FRAMES_HELD - 1 - age], bytes);
+    }
+}
+
 void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, const TaskReading *reading,
                   int first, const TaskView *view) {
     const double *pose = robot_default_pose(robot);
@@ -152,20 +169,12 @@ void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const Ro
     if (def->observe_noise) {
         add_noise(env, def, frame);
     }
-    float *newest = env->history + TASK_HISTORY - TASK_OBSERVATION;
-    if (first) {
-        for (int i = 0; i < TASK_FRAMES; i++) {
-            memcpy(env->history + i * TASK_OBSERVATION, frame, sizeof frame);
-        }
-    } else {
-        memmove(env->history, env->history + TASK_OBSERVATION, sizeof(float) * (TASK_HISTORY - TASK_OBSERVATION));
-        memcpy(newest, frame, sizeof frame);
-    }
+    remember(env, def, frame, first);
     if (view->history) {
         memcpy(view->history, env->history, sizeof env->history);
     }
     if (view->frame) {
-        memcpy(view->frame, newest, sizeof frame);
+        memcpy(view->frame, frame, sizeof frame);
     }
     if (view->estimate) {
         write_estimates(sim, view->estimate);
