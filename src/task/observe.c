@@ -155,9 +155,19 @@ static void remember(TaskEnv *env, const TaskDef *def, const float frame[TASK_OB
         memmove(env->frames[0], env->frames[1], (TASK_FRAMES_HELD - 1) * bytes);
     }
     memcpy(env->frames[TASK_FRAMES_HELD - 1], frame, bytes);
-    for (int i = 0; i < TASK_FRAMES; i++) {
-        int age = (TASK_FRAMES - 1 - i) * def->history_stride;
-        memcpy(env->history + i * TASK_OBSERVATION, env->frames[TASK_FRAMES_HELD - 1 - age], bytes);
+    memcpy(env->history + TASK_HISTORY - TASK_OBSERVATION, frame, bytes);
+    for (int i = 0; i < TASK_FRAMES - 1; i++) {
+        float *mean = env->history + i * TASK_OBSERVATION;
+        int oldest = TASK_FRAMES_HELD - 1 - (TASK_FRAMES - 1 - i) * def->history_stride;
+        memcpy(mean, env->frames[oldest], bytes);
+        for (int k = 1; k < def->history_stride; k++) {
+            for (int j = 0; j < TASK_OBSERVATION; j++) {
+                mean[j] += env->frames[oldest + k][j];
+            }
+        }
+        for (int j = 0; j < TASK_OBSERVATION; j++) {
+            mean[j] /= (float)def->history_stride;
+        }
     }
 }
 

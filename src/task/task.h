@@ -13,7 +13,7 @@
 #define TASK_OBSERVATION 47 /* one frame: see observe.c */
 #define TASK_FRAMES 6       /* H + 1, newest last (paper, H = 5) */
 #define TASK_HISTORY (TASK_FRAMES * TASK_OBSERVATION)
-#define TASK_STRIDE_MAX 4 /* greatest task.history_stride */
+#define TASK_STRIDE_MAX 16 /* greatest task.history_stride */
 #define TASK_FRAMES_HELD ((TASK_FRAMES - 1) * TASK_STRIDE_MAX + 1)
 #define TASK_ACTIONS ROBOT_JOINTS
 #define TASK_ESTIMATES 11 /* base velocity 3, feet velocities 6, feet heights 2 */
@@ -45,7 +45,7 @@ typedef struct {
     RobotState robot;
     float action[3][TASK_ACTIONS]; /* now, one and two steps ago */
     float frames[TASK_FRAMES_HELD][TASK_OBSERVATION]; /* every policy step's, newest last */
-    float history[TASK_HISTORY];                      /* what the policy sees of them: every history_stride-th */
+    float history[TASK_HISTORY];                      /* what the policy sees of them: the newest, and five means */
     double base_twist[6];     /* one policy step ago: linear in the world, angular in the base frame */
     double smooth_velocity[3]; /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over reward.tracking_time */
     double joint_speed[ROBOT_JOINTS]; /* one policy step ago */

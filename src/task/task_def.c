@@ -120,7 +120,7 @@ const MildField task_fields[] = {
     T(gait_period, D, 1, 0.2, 3, "[s] T of the clock"),
     T(swing_apex, D, 1, 0.01, 0.4, "[m] wanted height of the swing foot above h0"),
     T(double_support, D, 1, 0, 1, "[-] |sin| of the clock below which either contact state is right"),
-    T(history_stride, MILD_FIELD_INT, 1, 1, TASK_STRIDE_MAX, "[-] policy steps between two of the six frames of the history"),
+    T(history_stride, MILD_FIELD_INT, 1, 1, TASK_STRIDE_MAX, "[-] policy steps that each of the five older frames of the history is the mean of"),
     T(clock, B, 1, 0, 1, "[bool] gait clock in the observation"),
     T(observe_noise, B, 1, 0, 1, "[bool] sensor noise"),
     T(noise_q, D, 1, 0, 1, "[rad] uniform +-"),

@@ -83,7 +83,7 @@ typedef struct {
     double gait_period;     /* [s] */
     double swing_apex;      /* [m] */
     double double_support;  /* [-] |sin(2 pi phase)| below which either contact state is right */
-    int history_stride;     /* policy steps between two frames of the history */
+    int history_stride;     /* policy steps that each older frame of the history is the mean of */
     int clock;              /* bool: clock in the observation */
     int observe_noise;      /* bool */
     double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
