@@ -27,8 +27,11 @@ def draw(records, path):
     )
     for index, (record, rows) in enumerate(records.items()):
         depth = [1e3 * row["depth_m"] for row in rows]
-        speed = sorted(row["speed_m_s"] for row in rows)[len(rows) // 2]
-        label = f"record {record}" + (f", {speed:.3g} m/s" if speed > 0 else "")
+        speed = sorted(row["speed_m_s"] for row in rows)
+        label = f"record {record}"
+        if speed[-1] > 0:
+            constant = speed[-1] < 1.3 * speed[0]
+            label += f", {speed[len(speed) // 2]:.3g} m/s" if constant else f", {speed[0]:.2g} to {speed[-1]:.2g} m/s"
         color = f"C{index}"
         above.plot(depth, [row["force_n"] for row in rows], ".", color=color, markersize=3, alpha=0.5, label=label)
         above.plot(depth, [row["fit_n"] for row in rows], color=color, linewidth=2)

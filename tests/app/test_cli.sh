@@ -77,6 +77,11 @@ awk -F, 'NR == 1 { next } NF != 7 || (NR > 2 && $1 <= time) { exit 1 } { time = 
     END { exit !(NR > 100 && depth == 0.03) }' press.csv ||
     fail "rows of press.csv"
 expect 0 'peak .* N' "$mild" press --ground sand_loose --plate sole --tilt 5
+expect 0 'work sideways' "$mild" press --ground grass --depth 0.01 --drag 0.05 --figure drag.png
+[ -s drag.png ] && [ "$(head -1 drag.csv)" = "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m,force_x_n,force_y_n,x_m,tilt_rad" ] ||
+    fail "figure or columns of a drag"
+expect 0 'first stop' "$mild" press --ground sand_dense --drop 0.05 --mass 5
+expect 0 '^ *3 .* 300.000 ' "$mild" press --ground foam45 --force 300,50 --cycles 3
 peak() { "$mild" press --ground sand_loose "$@" | sed -n 's/^peak \([0-9.]*\) N.*/\1/p'; }
 awk "BEGIN { exit !($(peak --ground.k_pen=500) > $(peak) && $(peak --ground.k_pen=380) == $(peak)) }" ||
     fail "--ground.k_pen does not change the force"

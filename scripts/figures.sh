@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# Makes the curves of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage]; all of them without a name.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+mild=build/mild
+work=out/figures
+python=.venv/bin/python
+[ -x "$python" ] || python=python3
+mkdir -p "$work"
+
+# record NAME OPTIONS...: one press as $work/NAME.csv
+record() {
+    local name=$1
+    shift
+    "$mild" press "$@" --csv "$work/$name.csv" >/dev/null
+}
+
+presets() {
+    "$mild" info grounds >"$work/grounds.txt"
+    for ground in rubber foam60 foam45 foam28 foam25 grass sand_loose sand_dense; do
+        record "$ground" --ground "$ground" --plate sole --depth 0.06 --speed 0.001
+    done
+    local bed=(--ground.bed_depth=1)
+    record softest --ground sand_loose --plate sole --depth 0.06 --speed 0.001 "${bed[@]}" \
+        --ground.k_pen=8 --ground.sigma_cone=0.01e6 --ground.alpha=0.698 --ground.nu=2.4
+    record hardest --ground sand_loose --plate sole --depth 0.06 --speed 0.001 "${bed[@]}" \
+        --ground.k_pen=1400 --ground.sigma_cone=0.24e6 --ground.alpha=1.310 --ground.nu=0.8
+}
+
+recovery() {
+    for share in 1 0.5 0; do
+        record "recovery_$share" --ground sand_loose --plate 0.2,0.1 --depth 0.02,0.002 --cycles 2 --speed 0.001 \
+            --ground.recovery=$share
+    done
+}
+
+# A flat, straight ground (kappa = k_pen, u_f = 1.6 m, drag without inertia) obeys Katsuragi and Durian's equation with
+# d1 = M/(n c_d m_a') = 0.0105 m and k = n k_pen = 2000 N/m; sand's drag ends where its cones are complete.
+impact() {
+    for speed in 0.5 1 2; do
+        record "flat_$speed" --ground sand_loose --plate 0.0975,0.0975 --impact $speed --mass 0.5 --step 2e-5 --seconds 0.2 \
+            --ground.alpha=1.5 --ground.nu=0.1 --ground.k_pen=80 --ground.sigma_cone=14882.6 --ground.c_d=100 \
+            --ground.c_g=1 --ground.phi=0.5 --ground.bed_depth=1
+        record "sand_$speed" --ground sand_loose --plate 0.2,0.1 --impact $speed --mass 5 --step 2e-5 --seconds 0.4
+    done
+}
+
+for name in "${@:-all}"; do
+    case $name in
+    presets | recovery | impact) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
+    sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
+    all) for each in presets recovery impact sinkage; do "$0" "$each"; done ;;
+    *) echo "figures: no figure '$name'; there are presets recovery impact sinkage" >&2 && exit 2 ;;
+    esac
+done
