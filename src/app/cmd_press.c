@@ -274,6 +274,27 @@ static const char examples[] =
     "  mild press --ground grass --depth 0.02 --drag 0.1 --drag-speed 0.05 --figure drag.png\n"
     "  mild press --ground sand_loose --drop 0.05 --mass 20 --tilt 5 --figure drop.png\n";
 
+static CliOutcome options_parse(const CliOption *table, int count, int argc, char **argv, CliArgs *args) {
+    const CliCommand command = {
+        .name = "press",
+        .usage = "--ground NAME [options]",
+        .summary = summary,
+        .options = table,
+        .option_count = count,
+        .overrides = "any parameter of the ground, e.g. --ground.k_pen=500; `mild info grounds` lists them",
+        .examples = examples,
+    };
+    return cli_parse(&command, argc, argv, args);
+}
+
+/* "turn,back" */
+static int turn_take(const char *name, const CliNumbers *list, double *turn, double *back) {
+    if (list->count > 2) return cli_fail_text("press", "--%s: at most two values, the turn and the way back", name);
+    if (list->count > 0) *turn = list->value[0];
+    if (list->count > 1) *back = list->value[1];
+    return 0;
+}
+
 static int options_read(int argc, char **argv, PressOptions *options, CliArgs *args) {
     char grounds[200], ground_help[320], model_help[200];
     CliNumbers depth = {0}, force = {0};
@@ -306,25 +327,12 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
         {"figure", CLI_TEXT, &options->figure, 0, 0, "FILE.png",
          "draw it; its numbers stand in the CSV, else beside it as FILE.csv"},
     };
-    const CliCommand command = {
-        .name = "press",
-        .usage = "--ground NAME [options]",
-        .summary = summary,
-        .options = table,
-        .option_count = sizeof table / sizeof *table,
-        .overrides = "any parameter of the ground, e.g. --ground.k_pen=500; `mild info grounds` lists them",
-        .examples = examples,
-    };
-    CliOutcome outcome = cli_parse(&command, argc, argv, args);
-    if (outcome == CLI_BAD) return CLI_EXIT_BAD_INPUT;
-    if (depth.count > 2 || force.count > 2)
-        return cli_fail_text("press", "--%s: at most two values, the turn and the way back",
-                             depth.count > 2 ? "depth" : "force");
-    if (depth.count > 0) options->depth = depth.value[0];
-    if (depth.count > 1) options->back = depth.value[1];
-    if (force.count > 0) options->force = force.value[0];
-    if (force.count > 1) options->force_back = force.value[1];
-    return outcome == CLI_DONE ? -1 : 0;
+    CliOutcome outcome = options_parse(table, sizeof table / sizeof *table, argc, argv, args);
+    if (outcome == CLI_DONE) return -1;
+    if (outcome == CLI_BAD || turn_take("depth", &depth, &options->depth, &options->back) ||
+        turn_take("force", &force, &options->force, &options->force_back))
+        return CLI_EXIT_BAD_INPUT;
+    return 0;
 }
 
 /* What does not go together. */

@@ -7,7 +7,7 @@
 
 static const double paper_pitch = 0.0195, gravity = 9.81; /* [m], [m/s^2] */
 
-enum { WAY_STEPS = 1000, ROWS_MAX = 4000000 };
+enum { WAY_STEPS = 1000, ROWS_MAX = 2500000 };
 
 typedef struct {
     const PressDef *def;
@@ -125,7 +125,7 @@ static PressRow row_mean(PressRow row, const PressRow *other) {
 static MildStatus rows_add(PressResult *result, PressRow row, MildError *error) {
     if (result->count == result->room) {
         int room = 2 * result->room + 2 * WAY_STEPS + 1;
-        PressRow *more = room <= 2 * ROWS_MAX ? realloc(result->rows, sizeof *more * (size_t)room) : NULL;
+        PressRow *more = result->count < ROWS_MAX ? realloc(result->rows, sizeof *more * (size_t)room) : NULL;
         if (!more) return mild_fail(error, MILD_ERROR_MEMORY, "press: too many rows; take fewer or longer steps");
         result->rows = more;
         result->room = room;
