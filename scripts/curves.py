@@ -85,8 +85,9 @@ def recovery(folder, path):
         depth, force = [1e3 * d for d in data["depth_m"]], data["force_n"]
         turns = [i for i in range(1, len(depth) - 1) if (depth[i] - depth[i - 1]) * (depth[i + 1] - depth[i]) < 0]
         ends = [0] + turns + [len(depth) - 1]
-        for k, (color, style, name) in enumerate((("#1f5fa8", "-", "loading"), ("#d1702e", "-", "unloading"),
-                                                  ("#3d8c40", "--", "again"))):
+        styles = (("#1f5fa8", "-", "loading"), ("#d1702e", "-", "unloading"), ("#3d8c40", "--", "loading again"),
+                  ("#8a4a9e", ":", "unloading again"))
+        for k, (color, style, name) in enumerate(styles):
             axes.plot(depth[ends[k]:ends[k + 1] + 1], force[ends[k]:ends[k + 1] + 1], style, color=color, linewidth=2,
                       label=name)
         axes.set(title=f"recovery {share} ({text})", xlabel="depth [mm]")

@@ -29,7 +29,7 @@ presets() {
 
 recovery() {
     for share in 1 0.5 0; do
-        record "recovery_$share" --ground sand_loose --plate 0.2,0.1 --depth 0.02,0.002 --cycles 2 --speed 0.001 \
+        record "recovery_$share" --ground sand_loose --plate 0.2,0.1 --depth 0.015,0.003,0.025 --speed 0.001 \
             --ground.recovery=$share
     done
 }

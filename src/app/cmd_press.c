@@ -15,7 +15,8 @@
 /* NaN: not given. */
 typedef struct {
     const char *ground, *model, *plate, *csv, *figure;
-    double depth, back, force, force_back, speed, tilt_deg, drag, drag_speed, drop, impact, mass, seconds, step;
+    CliNumbers depth, force; /* the turns */
+    double speed, tilt_deg, drag, drag_speed, drop, impact, mass, seconds, step;
     int cycles;
 } PressOptions;
 
@@ -172,17 +173,17 @@ static void table_depths(const PressResult *result) {
     }
 }
 
-static void table_cycles(const PressResult *result, int cycles) {
-    printf("%6s  %14s  %14s  %14s  %14s\n", "cycle", "turn [mm]", "force [N]", "back [mm]", "force [N]");
-    for (int cycle = 0; cycle < cycles; cycle++) {
-        int first, end, down = cycles <= 2 * TABLE_LINES || cycle < TABLE_LINES || cycle >= cycles - TABLE_LINES;
-        if (!down) continue;
-        way_find(result, 2 * cycle, &first, &end);
-        const PressRow *turn = &result->rows[end - 1];
-        way_find(result, 2 * cycle + 1, &first, &end);
-        const PressRow *back = &result->rows[end - 1];
-        printf("%6d  %14.3f  %14.3f  %14.3f  %14.3f\n", cycle + 1, 1e3 * turn->depth, turn->force, 1e3 * back->depth,
-               back->force);
+static void table_turns(const PressResult *result) {
+    int pairs = result->ways / 2;
+    printf("%6s  %14s  %14s  %14s  %14s\n", "", "down to [mm]", "force [N]", "up to [mm]", "force [N]");
+    for (int pair = 0; pair < pairs; pair++) {
+        int first, down, up;
+        if (pair >= TABLE_LINES && pair < pairs - TABLE_LINES) continue;
+        way_find(result, 2 * pair, &first, &down);
+        way_find(result, 2 * pair + 1, &first, &up);
+        const PressRow *low = &result->rows[down - 1], *high = &result->rows[up - 1];
+        printf("%6d  %14.3f  %14.3f  %14.3f  %14.3f\n", pair + 1, 1e3 * low->depth, low->force, 1e3 * high->depth,
+               high->force);
     }
 }
 
@@ -217,8 +218,8 @@ static void table_print(const PressOptions *options, const PressResult *result) 
         table_depths(result);
         printf("\n");
         table_drag(result);
-    } else if (options->cycles > 1) {
-        table_cycles(result, options->cycles);
+    } else if (result->ways > 2) {
+        table_turns(result);
     } else {
         table_depths(result);
     }
@@ -262,14 +263,14 @@ static void summary_print(const PressOptions *options, const Tool *tool, const c
 
 static const char summary[] =
     "Move a plate or the robot's sole through a ground and record what the ground answers. By hand it goes down at "
-    "constant speed and up again, in cycles (--cycles), or sideways while it is down (--drag); with --drop or --impact "
+    "constant speed and up again, over several turns or cycles, or sideways while it is down (--drag); with --drop or --impact "
     "it is a free body that falls. Depth, moments and zero moment point are those of the plate's centre (for the sole: "
     "the point under the ankle). Once out of the ground, its print is forgotten.";
 
 static const char examples[] =
     "  mild press --ground sand_loose\n"
     "  mild press --ground foam45 --plate sole --depth 0.02 --tilt 5 --csv foam.csv\n"
-    "  mild press --ground sand_loose --ground.recovery=0.5 --depth 0.03,0.02 --cycles 3 --figure cycles.png\n"
+    "  mild press --ground grass --depth 0.01,0.002,0.03 --figure reload.png\n"
     "  mild press --ground sand_dense --force 300,50 --cycles 5\n"
     "  mild press --ground grass --depth 0.02 --drag 0.1 --drag-speed 0.05 --figure drag.png\n"
     "  mild press --ground sand_loose --drop 0.05 --mass 20 --tilt 5 --figure drop.png\n";
@@ -287,17 +288,8 @@ static CliOutcome options_parse(const CliOption *table, int count, int argc, cha
     return cli_parse(&command, argc, argv, args);
 }
 
-/* "turn,back" */
-static int turn_take(const char *name, const CliNumbers *list, double *turn, double *back) {
-    if (list->count > 2) return cli_fail_text("press", "--%s: at most two values, the turn and the way back", name);
-    if (list->count > 0) *turn = list->value[0];
-    if (list->count > 1) *back = list->value[1];
-    return 0;
-}
-
 static int options_read(int argc, char **argv, PressOptions *options, CliArgs *args) {
     char grounds[200], ground_help[320], model_help[200];
-    CliNumbers depth = {0}, force = {0};
     snprintf(ground_help, sizeof ground_help, "one of %s", grounds_names(grounds, sizeof grounds));
     const CliOption table[] = {
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
@@ -305,12 +297,12 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
         {"plate", CLI_TEXT, &options->plate, 0, 0, "L,W|sole",
          "[m] length and width of a plate, or the robot's sole (default 0.2,0.1)"},
         {"tilt", CLI_NUMBER, &options->tilt_deg, -45, 45, "DEG", "[deg] front edge down (default 0)"},
-        {"depth", CLI_NUMBERS, &depth, 0, 1, "D[,BACK]",
-         "[m] how deep it goes (default 0.03), and how far each cycle comes back (default: out of the ground)"},
-        {"force", CLI_NUMBERS, &force, 0, 1e6, "F[,BACK]",
-         "[N] instead of --depth: turn where the ground pushes this hard, and where it still pushes this hard"},
+        {"depth", CLI_NUMBERS, &options->depth, 0, 1, "D[,BACK,...]",
+         "[m] how deep it goes (default 0.03), how far it comes back, and so on, at last out of the ground"},
+        {"force", CLI_NUMBERS, &options->force, 0, 1e6, "F[,BACK,...]",
+         "[N] instead of --depth: turn where the ground pushes this hard"},
         {"speed", CLI_NUMBER, &options->speed, 1e-5, 10, "V", "[m/s] down and up (default 0.01)"},
-        {"cycles", CLI_INT, &options->cycles, 1, 1000, "N", "times down and back (default 1)"},
+        {"cycles", CLI_INT, &options->cycles, 1, 1000, "N", "times through all turns (default 1)"},
         {"drag", CLI_NUMBER, &options->drag, 1e-4, 10, "X",
          "[m] once down, this far sideways (forward, along the plate's length) at the same depth"},
         {"drag-speed", CLI_NUMBER, &options->drag_speed, 1e-5, 10, "V", "[m/s] sideways (default that of --speed)"},
@@ -328,36 +320,39 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
          "draw it; its numbers stand in the CSV, else beside it as FILE.csv"},
     };
     CliOutcome outcome = options_parse(table, sizeof table / sizeof *table, argc, argv, args);
-    if (outcome == CLI_DONE) return -1;
-    if (outcome == CLI_BAD || turn_take("depth", &depth, &options->depth, &options->back) ||
-        turn_take("force", &force, &options->force, &options->force_back))
-        return CLI_EXIT_BAD_INPUT;
-    return 0;
+    if (outcome == CLI_BAD) return CLI_EXIT_BAD_INPUT;
+    return outcome == CLI_DONE ? -1 : 0;
+}
+
+/* Down and back must take turns. */
+static MildStatus turns_check(const char *name, const CliNumbers *turns, MildError *error) {
+    const double *at = turns->value;
+    if (turns->count > 0 && !(at[0] > 0)) return mild_fail(error, MILD_ERROR_RANGE, "--%s: the turn must lie above 0", name);
+    for (int i = 1; i < turns->count; i++) {
+        if (i % 2 ? at[i] < at[i - 1] : at[i] > at[i - 1]) continue;
+        return mild_fail(error, MILD_ERROR_RANGE, "--%s: from %g to %g is no way %s; ways down and back alternate", name,
+                         at[i - 1], at[i], i % 2 ? "back" : "down");
+    }
+    return MILD_OK;
 }
 
 /* What does not go together. */
 static MildStatus options_check(const PressOptions *o, MildError *error) {
-    const int by_hand = isfinite(o->depth) || isfinite(o->force) || isfinite(o->speed) || o->cycles || isfinite(o->drag);
-    if (is_dropped(o) && by_hand)
+    const CliNumbers *turns = o->force.count ? &o->force : &o->depth;
+    if (is_dropped(o) && (turns->count || isfinite(o->speed) || o->cycles || isfinite(o->drag)))
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--%s: what falls goes where it goes; leave out --depth, --force, --speed, --cycles, --drag",
                          isfinite(o->drop) ? "drop" : "impact");
     if (!is_dropped(o) && (isfinite(o->mass) || isfinite(o->seconds)))
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--%s: only what falls needs it; add --drop H or --impact V",
                          isfinite(o->mass) ? "mass" : "seconds");
-    if (isfinite(o->depth) && isfinite(o->force))
+    if (o->depth.count && o->force.count)
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--force: turns where the ground pushes so hard; leave out --depth");
-    if (o->depth <= 0 || o->force <= 0)
-        return mild_fail(error, MILD_ERROR_RANGE, "--%s: the turn must lie above 0", o->depth <= 0 ? "depth" : "force");
-    if (isfinite(o->drag) && o->cycles > 1)
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--drag: goes sideways once; leave out --cycles");
+    if (isfinite(o->drag) && (o->cycles > 1 || turns->count > 1))
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--drag: goes sideways once; leave out --cycles and further turns");
     if (isfinite(o->drag_speed) && !isfinite(o->drag))
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--drag-speed: how far? --drag X");
-    if (isfinite(o->back) && !(o->back < o->depth))
-        return mild_fail(error, MILD_ERROR_RANGE, "--depth: the way back, %g m, must end above %g m", o->back, o->depth);
-    if (isfinite(o->force_back) && !(o->force_back < o->force))
-        return mild_fail(error, MILD_ERROR_RANGE, "--force: the way back must end below %g N", o->force);
-    return MILD_OK;
+    return turns_check(o->force.count ? "force" : "depth", turns, error);
 }
 
 static double or_else(double value, double otherwise) {
@@ -369,22 +364,23 @@ static PressDef options_def(PressOptions *o) {
     o->speed = or_else(o->speed, 0.01);
     o->mass = or_else(o->mass, 20);
     o->seconds = or_else(o->seconds, 1);
-    o->cycles = o->cycles ? o->cycles : 1;
     o->drag_speed = or_else(o->drag_speed, o->speed);
-    return (PressDef){.tilt = o->tilt_deg * acos(-1.0) / 180,
-                      .step = or_else(o->step, 0),
-                      .speed = o->speed,
-                      .depth = or_else(o->depth, 0.03),
-                      .back = o->back,
-                      .force = or_else(o->force, 0),
-                      .force_back = o->force_back,
-                      .cycles = o->cycles,
-                      .drag = or_else(o->drag, 0),
-                      .drag_speed = o->drag_speed,
-                      .mass = is_dropped(o) ? o->mass : 0,
-                      .height = or_else(o->drop, 0),
-                      .impact = or_else(o->impact, 0),
-                      .seconds = o->seconds};
+    const CliNumbers *turns = o->force.count ? &o->force : &o->depth;
+    PressDef def = {.tilt = o->tilt_deg * acos(-1.0) / 180,
+                    .step = or_else(o->step, 0),
+                    .speed = o->speed,
+                    .turns = turns->count ? turns->count : 1,
+                    .turn = {0.03},
+                    .by_force = o->force.count > 0,
+                    .cycles = o->cycles,
+                    .drag = or_else(o->drag, 0),
+                    .drag_speed = o->drag_speed,
+                    .mass = is_dropped(o) ? o->mass : 0,
+                    .height = or_else(o->drop, 0),
+                    .impact = or_else(o->impact, 0),
+                    .seconds = o->seconds};
+    for (int i = 0; i < turns->count; i++) def.turn[i] = turns->value[i];
+    return def;
 }
 
 static MildStatus press_report(const PressOptions *options, const Tool *tool, const PressDef *def, MildError *error) {
@@ -403,9 +399,8 @@ static MildStatus press_report(const PressOptions *options, const Tool *tool, co
 }
 
 int cmd_press(int argc, char **argv) {
-    PressOptions options = {.plate = "0.2,0.1", .depth = NAN, .back = NAN, .force = NAN,
-                            .force_back = NAN, .speed = NAN, .drag = NAN, .drag_speed = NAN, .drop = NAN,
-                            .impact = NAN, .mass = NAN, .seconds = NAN, .step = NAN};
+    PressOptions options = {.plate = "0.2,0.1", .speed = NAN,  .drag = NAN,    .drag_speed = NAN, .drop = NAN,
+                            .impact = NAN,      .mass = NAN,   .seconds = NAN, .step = NAN};
     CliArgs args;
     int code = options_read(argc, argv, &options, &args);
     if (code) return code < 0 ? 0 : code;

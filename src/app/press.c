@@ -234,24 +234,35 @@ static MildStatus hand_drag(Press *press, MildError *error) {
     return status;
 }
 
+static MildStatus hand_out(Press *press, MildError *error) {
+    int reached;
+    return press_depth(press) > press->start ? hand_vertical(press, press->start, NAN, &reached, error) : MILD_OK;
+}
+
+/* Even turns end ways down, odd ones ways up. */
+static MildStatus hand_turn(Press *press, int index, MildError *error) {
+    const PressDef *def = press->def;
+    int reached, ends_down = index % 2 == 0;
+    double depth = def->by_force ? press->start + ends_down * PRESS_DEEPEST : fmax(def->turn[index], press->start);
+    MildStatus status = hand_vertical(press, depth, def->by_force ? def->turn[index] : NAN, &reached, error);
+    if (status != MILD_OK || !def->by_force || !ends_down || reached) return status;
+    return mild_fail(error, MILD_ERROR_RANGE, "--force: the ground pushes with %g N at most, %g m deep",
+                     press->result->peak_force, PRESS_DEEPEST);
+}
+
 static MildStatus hand_run(Press *press, MildError *error) {
     const PressDef *def = press->def;
-    int to_force = def->force > 0, reached, cycles = def->cycles > 0 ? def->cycles : 1;
-    double down = to_force ? press->start + PRESS_DEEPEST : def->depth, push = to_force ? def->force : NAN;
-    double pull = to_force ? def->force_back : NAN, up = isfinite(def->back) ? def->back : press->start;
+    int cycles = def->cycles > 0 ? def->cycles : 1;
     press_place(press, press->start);
     MildStatus status = rows_add(press->result, press_row(press), error);
     for (int cycle = 0; cycle < cycles && status == MILD_OK; cycle++) {
-        status = hand_vertical(press, down, push, &reached, error);
-        if (status == MILD_OK && to_force && !reached)
-            return mild_fail(error, MILD_ERROR_RANGE, "--force: the ground pushes with %g N at most, %g m deep",
-                             press->result->peak_force, PRESS_DEEPEST);
-        if (status == MILD_OK && def->drag > 0) status = hand_drag(press, error);
-        if (status == MILD_OK) status = hand_vertical(press, up, pull, &reached, error);
+        for (int i = 0; i < def->turns && status == MILD_OK; i++) {
+            status = hand_turn(press, i, error);
+            if (status == MILD_OK && i == 0 && cycle == 0 && def->drag > 0) status = hand_drag(press, error);
+        }
+        if (status == MILD_OK && def->turns % 2) status = hand_out(press, error);
     }
-    if (status == MILD_OK && press_depth(press) > press->start)
-        status = hand_vertical(press, press->start, NAN, &reached, error);
-    return status;
+    return status == MILD_OK ? hand_out(press, error) : status;
 }
 
 /* ---- dropped ---- */
@@ -312,7 +323,7 @@ MildStatus press_run(const PressDef *def, const MildSole *sole, PressResult *res
     MildStatus status = mild_material_check(&def->material, error);
     if (status == MILD_OK) status = press_open(&press, &whole, sole, result, error);
     if (status != MILD_OK) return status;
-    double way = def->force > 0 ? 0.02e-3 * WAY_STEPS : def->depth - press.start;
+    double way = def->by_force ? 0.02e-3 * WAY_STEPS : def->turn[0] - press.start;
     if (!(whole.step > 0)) whole.step = def->mass > 0 ? 1e-4 : way / def->speed / WAY_STEPS;
     status = def->mass > 0 ? drop_run(&press, error) : hand_run(&press, error);
     press_close(&press);

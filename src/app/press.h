@@ -5,19 +5,20 @@
 
 #include "mild/ground.h"
 
-/* All zero but material, speed and depth: once down and up. A body is dropped when `mass` is above 0. */
+enum { PRESS_TURNS_MAX = 16 };
+
+/* All zero but material, speed and one turn: once down and up. A body is dropped when `mass` is above 0. */
 typedef struct {
     MildMaterial material;
     MildSolver solver;
     double tilt; /* [rad] about y, front edge down positive */
-    double step; /* [s] 0: a thousandth of the way down by hand (0.02 mm where the depth is not known), 1e-4 dropped */
+    double step; /* [s] 0: a thousandth of the first way by hand (0.02 mm with by_force), 1e-4 dropped */
 
-    double speed;      /* [m/s] down and up */
-    double depth;      /* [m] of the reference point at the turn; unused with force */
-    double back;       /* [m] depth at which a cycle ends; NaN: above the ground */
-    double force;      /* [N] > 0: turn where the ground pushes this hard */
-    double force_back; /* [N] >= 0: with force, a cycle ends here; NaN: above the ground */
-    int cycles;        /* times down and back; 0 counts as 1 */
+    double speed; /* [m/s] down and up */
+    int turns;    /* down to the first, up to the second, down to the third ...; after the last above the ground */
+    double turn[PRESS_TURNS_MAX]; /* [m] depth of the reference point; with by_force [N] how hard the ground pushes */
+    int by_force;                 /* bool */
+    int cycles;                   /* how often through all turns; 0 counts as 1 */
     double drag;       /* [m] > 0: after the first way down along +x at constant depth, then up */
     double drag_speed; /* [m/s] */
 

@@ -66,8 +66,9 @@ bad "which one" "$mild" press --ground sand_loose --model con_cone --ground.mode
 bad "nearest is 'ecc_spring'" "$mild" eval --ground sand_loose --ground.model=ecc_sprin
 bad "only what falls" "$mild" press --ground sand_loose --mass 5
 bad "leave out --depth" "$mild" press --ground sand_loose --drop 0.1 --depth 0.02
-bad "way back" "$mild" press --ground sand_loose --depth 0.02,0.03
-bad "way back" "$mild" press --ground sand_loose --force 100,200
+bad "no way back" "$mild" press --ground sand_loose --depth 0.02,0.03
+bad "no way down" "$mild" press --ground sand_loose --force 200,100,50
+bad "above 0" "$mild" press --ground sand_loose --depth 0
 bad "leave out --cycles" "$mild" press --ground sand_loose --drag 0.1 --cycles 2
 bad "pushes with" "$mild" press --ground sand_loose --force 1e6
 bad "No space left" "$mild" press --ground sand_loose --csv /dev/full

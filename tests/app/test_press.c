@@ -15,7 +15,7 @@
 static PressResult result;
 
 static PressDef definition(const char *ground) {
-    PressDef def = {.depth = 0.03, .speed = 1e-3, .back = NAN, .force_back = NAN};
+    PressDef def = {.turns = 1, .turn = {0.03}, .speed = 1e-3};
     assert_true(mild_material_preset(ground, &def.material));
     return def;
 }
@@ -97,12 +97,33 @@ static void test_moments(void **state) {
     assert_true(fabs(tilted->zmp_y) < 1e-3);
 }
 
+/* Down again past the old turn, the force goes on along the law. */
+static void test_reload(void **state) {
+    (void)state;
+    double worst = 0;
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        PressDef def = definition(mild_material_preset_name(p));
+        def.turns = 3;
+        def.turn[0] = 0.01;
+        def.turn[1] = 0.002;
+        def.turn[2] = 0.02;
+        press(&def);
+        assert_true(turn_of(0)->depth == 0.01 && turn_of(1)->depth == 0.002 && turn_of(2)->depth == 0.02);
+        assert_int_equal(result.ways, 4); /* and out */
+        double before = law(&def.material, 0.01, 0), after = law(&def.material, 0.02, 0);
+        worst = fmax(worst, fmax(fabs(turn_of(0)->force / before - 1), fabs(turn_of(2)->force / after - 1)));
+    }
+    printf("loaded, unloaded, loaded deeper: worst %.1e\n", worst);
+    assert_true(worst < 1e-4);
+}
+
 /* Cycles between two depths give back what the line holds; between two forces they turn at those forces. */
 static void test_cycles(void **state) {
     (void)state;
     PressDef def = definition("foam45");
     def.cycles = 4;
-    def.back = 0.01;
+    def.turns = 2;
+    def.turn[1] = 0.01;
     press(&def);
     assert_int_equal(turn_of(8)->way, 8); /* four times down and back, then out */
     for (int cycle = 1; cycle < 4; cycle++) {
@@ -112,8 +133,10 @@ static void test_cycles(void **state) {
     double worst = 0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
         def = definition(mild_material_preset_name(p));
-        def.force = 300;
-        def.force_back = 50;
+        def.by_force = 1;
+        def.turns = 2;
+        def.turn[0] = 300;
+        def.turn[1] = 50;
         def.cycles = 3;
         press(&def);
         for (int way = 0; way < 6; way++)
@@ -165,13 +188,14 @@ static void test_drop(void **state) {
 static void test_bad_material(void **state) {
     (void)state;
     MildError error = {0};
-    PressDef def = {.material = mild_material_default(), .depth = 0.03, .speed = 0.01};
+    PressDef def = {.material = mild_material_default(), .turns = 1, .turn = {0.03}, .speed = 0.01};
     def.material.k_pen = NAN;
     MildSole *plate = press_plate_create(0.1, 0.1, &error);
     press_result_close(&result);
     assert_int_equal(press_run(&def, plate, &result, &error), MILD_ERROR_RANGE);
     def = definition("foam25");
-    def.force = 1e6;
+    def.by_force = 1;
+    def.turn[0] = 1e6;
     assert_int_equal(press_run(&def, plate, &result, &error), MILD_ERROR_RANGE);
     assert_non_null(strstr(error.text, "--force"));
     mild_sole_destroy(plate);
@@ -183,6 +207,7 @@ int main(void) {
         cmocka_unit_test(test_law),
         cmocka_unit_test(test_energy),
         cmocka_unit_test(test_moments),
+        cmocka_unit_test(test_reload),
         cmocka_unit_test(test_cycles),
         cmocka_unit_test(test_drag),
         cmocka_unit_test(test_drop),
