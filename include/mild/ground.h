@@ -32,10 +32,11 @@ typedef enum {
     MILD_MODEL_CON_CONE,   /* one developing cone under the whole sole (Choi et al. 2023) */
     MILD_MODEL_CON_SPRING, /* one yielding spring (Lynch et al. 2020): F = k_pen u going down, up to that at rest, 0 up */
     MILD_MODEL_ECC_SPRING, /* the same spring under every element */
-    MILD_MODEL_ECC_QUASI,  /* resistive force theory under every element (Li et al. 2013), no inertia */
+    MILD_MODEL_ECC_QUASI,  /* resistive force theory in the plane of motion of every element (Li et al. 2013) */
+    MILD_MODEL_ECC_QUASI_3D, /* the same in three dimensions (Agarwal et al. 2023) */
     MILD_MODEL_RIGID       /* the engine's own contact: a name only, no material has it */
 } MildModel;
-#define MILD_MODELS 6
+#define MILD_MODELS 7
 
 extern const char *const mild_model_names[MILD_MODELS];
 /* False when the name is unknown. */
@@ -58,7 +59,7 @@ typedef struct {
     double b_drift;    /* [N s/m] drift damping b_D per element */
     double recovery;   /* [-] share of the depth that springs back: 1 elastic, 0 plastic */
     double bed_depth;  /* [m] firm bottom below the surface */
-    double zeta;       /* [-] ecc_quasi: 1 is 1e6 N/m^3 under a level plate going straight down */
+    double zeta;       /* [-] ecc_quasi*: 1 is 1e6 N/m^3 under a level plate going straight down */
     int passive;       /* bool: clamp c_g >= 0 and c_d >= 1/2 so that no energy is created */
     int model;         /* MildModel, not MILD_MODEL_RIGID */
 } MildMaterial;
@@ -137,6 +138,15 @@ double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, dou
  * Fails for rigid, for a material of another model, and without a load. */
 MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole, double load,
                             MildMaterial *rival, MildError *error);
+
+/* Resistive force theory: coefficients that zeta 1e6 N/m^3 times depth times area turn into force [N].
+ * In the plane (Li et al. 2013): beta [rad] slope of the plate, positive when its leading face looks forward and down; gamma
+ * [rad] direction of motion below the horizontal, 0 .. pi/2. alpha: resistance backward, upward; (0.007, 1) for a level
+ * plate straight down.
+ * In space (Agarwal et al. 2023, level plate straight down scaled to 1): unit normal out of the plate into the ground, unit
+ * direction of motion, world; alpha: force of the ground on the plate. 0 for a face that trails. */
+void mild_resist_plane(double beta, double gamma, double alpha[2]);
+void mild_resist_space(const double normal[3], const double direction[3], double alpha[3]);
 
 /* ---- one contact step ---- */
 typedef enum { MILD_SOLVER_NEWTON = 0, MILD_SOLVER_GAUSS_SEIDEL = 1 } MildSolver;

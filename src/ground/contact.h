@@ -40,6 +40,7 @@ typedef struct {
     double *mu, *drift_radius, *damping; /* [-], [N s], [N s/m * s] */
     double *k_drift, *b_drift, *recovery, *mass_rate; /* material, for the preparation */
     double *depth_max, *drift;                       /* memory, compacted */
+    double *lead; /* [m] ahead of the element that it carries its front; 0 but for resistive force theory, see resist.c */
     /* written by the passes */
     double *ix, *iy, *iz;                         /* [N s] impulse */
     double *fx, *fy;                              /* [N s] friction without the drift damping; sweeps only */

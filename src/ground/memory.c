@@ -92,7 +92,7 @@ static int foot_advance(const Memory *memory, const MildScratch *scratch, int f,
         int leads = u1 > s->front[i] && w > s->reach[i];
         /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the next step. */
         memory->front_speed[e] = leads ? (s->front_speed[i] > s->reach[i] || s->gap[i] > 0.0 ? w : w - s->reach[i]) : 0.0;
-        memory->depth_max[e] = u1 > s->front[i] ? u1 : s->front[i];
+        memory->depth_max[e] = u1 + s->lead[i] > s->front[i] ? u1 + s->lead[i] : s->front[i];
         memory->material[e] = scratch->slot_material[i];
         element_drift(memory, e, dt * (V[0] + V[4] * s->pz[i] - V[5] * s->py[i]),
                       dt * (V[1] + V[5] * s->px[i] - V[3] * s->pz[i]));

@@ -1,5 +1,6 @@
 #include <string.h>
 
+#include "ground/resist.h"
 #include "ground/step.h"
 
 #define PREPARE_MARGIN 1e-3      /* [m] elements this close to the ground are listed */
@@ -69,6 +70,7 @@ static void slot_set_law(const Slots *s, int i, const Law *law, const MildMateri
     s->k_drift[i] = material->k_drift;
     s->b_drift[i] = material->b_drift;
     s->recovery[i] = material->recovery;
+    s->lead[i] = 0.0;
 }
 
 /* Material of each slot: the one it touched down on, so that a foot sliding over a border keeps its law. */
@@ -162,6 +164,7 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain, const 
         slots_gather(scratch, &memory, input->rotation[f], f);
         slots_prepare(&scratch->slot, foot->start, foot_end(foot), input->dt, input->velocity[f],
                       input->free_velocity + 6 * f);
+        slots_resist(scratch, terrain, f, input->dt, input->rotation[f], input->velocity[f]);
         total += foot->active;
     }
     return total;
