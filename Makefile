@@ -5,7 +5,7 @@ CMAKE_FLAGS ?=
 PREFIX ?= /usr/local
 MARCH ?= native
 
-.PHONY: setup build test run bench install clean help
+.PHONY: setup build test run bench install docs clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -13,6 +13,7 @@ help:
 	@echo "make build   set up, build build/mild"
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
+	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
 
@@ -38,6 +39,11 @@ install:
 		-DMILD_MARCH=$(MARCH) -DCMAKE_INSTALL_PREFIX=$(PREFIX) $(CMAKE_FLAGS)
 	@cmake --build build/library --parallel $(JOBS) --target mild_shared mild_static
 	@cmake --install build/library
+
+docs:
+	@mkdir -p build
+	@scripts/api.py include/mild/*.h >build/api.md
+	@echo build/api.md
 
 clean:
 	rm -rf build

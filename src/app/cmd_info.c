@@ -75,6 +75,7 @@ static const struct {
     [MILD_MODEL_CON_SPRING] = {"one yielding spring under the sole's middle", "Lynch et al. 2020"},
     [MILD_MODEL_ECC_SPRING] = {"a yielding spring under every element", "Lynch et al. 2024"},
     [MILD_MODEL_ECC_QUASI] = {"resistive force theory under every element", "Li et al. 2013, Xiong et al. 2017"},
+    [MILD_MODEL_ECC_QUASI_3D] = {"the same in three dimensions", "Agarwal et al. 2023"},
     [MILD_MODEL_RIGID] = {"the engine's own contact: train, eval, play; no parameters", "MuJoCo"},
 };
 
@@ -94,10 +95,10 @@ static void print_matched(const MildSole *sole, MildModel model, const char *key
 static void print_models(const MildSole *sole) {
     printf("\nmodels (--model NAME), and where they come from\n");
     for (int m = 0; m < MILD_MODELS; m++)
-        printf("  %-10s  %s; %s\n", mild_model_names[m], models[m].what, models[m].source);
+        printf("  %-12s  %s; %s\n", mild_model_names[m], models[m].what, models[m].source);
     printf("\nrivals under 20 kg on one foot, matched to sink as deep as mild; k_pen is that of one element, for con_* of the\n"
-           "whole sole. con_cone keeps alpha 1.047, nu 2, c_g 2.7, c_d 17.2, phi 0.57, rho 1000; springs and ecc_quasi have\n"
-           "no inertia and no recovery; ecc_quasi has its friction in zeta. The rest is the preset's.\n");
+           "whole sole. con_cone keeps alpha 1.047, nu 2, c_g 2.7, c_d 17.2, phi 0.57, rho 1000; springs and ecc_quasi* have\n"
+           "no inertia and no recovery; ecc_quasi* have their friction in zeta. The rest is the preset's.\n");
     print_matched(sole, MILD_MODEL_CON_CONE, "k_pen");
     print_matched(sole, MILD_MODEL_CON_CONE, "sigma_cone");
     print_matched(sole, MILD_MODEL_CON_SPRING, "k_pen");

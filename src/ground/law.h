@@ -44,7 +44,7 @@ static inline Law law_of(const MildMaterial *material, double pitch) {
     double area = pitch * pitch;
     if (material->model == MILD_MODEL_CON_SPRING || material->model == MILD_MODEL_ECC_SPRING)
         return law_straight(material->k_pen, area, material->bed_depth);
-    if (material->model == MILD_MODEL_ECC_QUASI)
+    if (material->model == MILD_MODEL_ECC_QUASI || material->model == MILD_MODEL_ECC_QUASI_3D)
         return law_straight(material->zeta * LAW_RESIST_STRESS * area, area, material->bed_depth);
     double kappa = material->sigma_cone * area / cos(material->alpha);
     double c_g = material->c_g, c_d = material->c_d;

@@ -2,7 +2,8 @@
 
 #include "mild/ground.h"
 
-const char *const mild_model_names[MILD_MODELS] = {"mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi", "rigid"};
+const char *const mild_model_names[MILD_MODELS] = {"mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi",
+                                                   "ecc_quasi_3d", "rigid"};
 
 /* The ranges are what the equations bear, wider than the draws of the paper's Table III. */
 #define FIELD(member, low, high, help) MILD_FIELD(MildMaterial, member, MILD_FIELD_DOUBLE, 1, low, high, help)
@@ -20,7 +21,7 @@ const MildField mild_material_fields[] = {
     FIELD(b_drift, 0.0, 100.0, "[N s/m] drift damping per element"),
     FIELD(recovery, 0.0, 1.0, "[-] share of the depth that springs back: 1 elastic, 0 plastic"),
     FIELD(bed_depth, 0.001, 10.0, "[m] firm bottom below the surface"),
-    FIELD(zeta, 0.0, 100.0, "[-] ecc_quasi: stress in 1e6 N/m^3 of a level plate going straight down"),
+    FIELD(zeta, 0.0, 100.0, "[-] ecc_quasi*: stress in 1e6 N/m^3 of a level plate going straight down"),
     MILD_FIELD(MildMaterial, passive, MILD_FIELD_BOOL, 1, 0, 1, "[-] clamp c_g >= 0 and c_d >= 1/2: no energy is created"),
     MILD_FIELD_CHOICE(MildMaterial, model, mild_model_names, MILD_MODELS, "[-] ground model"),
 };

@@ -78,6 +78,6 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
     if (mild_model_is_concentric(model)) material_concentrate(rival, cells);
     if (model == MILD_MODEL_CON_CONE) rival_cone(rival, pressure, area, depth);
     if (model == MILD_MODEL_CON_SPRING || model == MILD_MODEL_ECC_SPRING) rival_spring(rival, pressure, area, depth);
-    if (model == MILD_MODEL_ECC_QUASI) rival_quasi(rival, pressure, depth);
+    if (model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D) rival_quasi(rival, pressure, depth);
     return MILD_OK;
 }

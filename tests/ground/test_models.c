@@ -108,7 +108,7 @@ static void test_refusals(void **state) {
 /* A body that cannot turn, let down under strong damping until it rests. */
 static void settle(Kit *kit, int model, const MildMaterial *material, double dt) {
     kit_open(kit, 1, sole_of(model, 0), NULL, material, dt);
-    kit->inertia[0] = 1e6;
+    kit->inertia[0] = 1e12;
     for (int s = 0; s < (int)(4.0 / dt); s++) {
         kit_step(kit, NULL);
         for (int k = 0; k < 6; k++) kit->input.velocity[0][k] *= exp(-100.0 * dt);
@@ -146,13 +146,14 @@ static void test_no_creep(void **state) {
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     static const char *const grounds[2] = {"sand_loose", "foam28"};
     double worst[2] = {0.0, 0.0};
-    for (int model = 0; model < MILD_MODEL_ECC_QUASI; model++)
+    for (int model = 0; model < SOFT_MODELS; model++)
         for (int g = 0; g < 2; g++)
             for (int d = 0; d < 3; d++) {
                 MildMaterial mild = preset(grounds[g]), rival = rival_of(model, &mild);
                 Kit kit;
                 settle(&kit, model, &rival, steps[d]);
-                const double side = 0.4 * rival.mu;
+                /* resistive force theory carries 0.13 (2D) and 0.05 (3D) of the weight sideways, the others mu times it */
+                const double side = rival.mu > 0.0 ? 0.4 * rival.mu : 0.02;
                 const double force[1][3] = {{side * LOAD, 0.0, 0.0}}, back[1][3] = {{0.0, 0.0, 0.0}};
                 for (int s = 0; s < (int)(0.2 / steps[d]); s++) kit_step(&kit, force);
                 double start[3];
@@ -229,9 +230,9 @@ static void test_passive(void **state) {
         double worst = -INFINITY;
         int cycles = 0;
         for (int draw = 0; draw < 600; draw++) cycles += thrown(model, &random, &worst);
-        print_message("passivity of %-10s: %4d closed cycles, most energy gained %.2e J\n", mild_model_names[model], cycles,
+        print_message("passivity of %-12s: %4d closed cycles, most energy gained %.2e J\n", mild_model_names[model], cycles,
                       worst);
-        assert_true(cycles > 50);
+        assert_true(cycles > 30);
         assert_true(worst < 1e-9);
     }
 }
@@ -297,8 +298,8 @@ static void test_solvers_agree(void **state) {
     (void)state;
     for (int model = 0; model < SOFT_MODELS; model++) {
         uint64_t random = 21;
-        double worst = 0.0;
-        int both = 0, draws = 60;
+        double worst = 0.0, residual = 0.0;
+        int both = 0, newton_alone = 0, draws = 60;
         for (int draw = 0; draw < draws; draw++) {
             MildMaterial mild = kit_material(&random), rival = rival_of(model, &mild);
             Kit kit;
@@ -307,7 +308,7 @@ static void test_solvers_agree(void **state) {
             for (int s = 0; s < 5; s++) kit_step(&kit, NULL); /* with memory */
             kit_inverse_inertia(&kit);
             kit_free(&kit, NULL);
-            kit.input.tolerance = 1e-11;
+            kit.input.tolerance = 0.0; /* newton: 1e-9 */
             kit_solve(&kit);
             MildContactResult newton = kit.result;
             kit.input.solver = MILD_SOLVER_GAUSS_SEIDEL;
@@ -319,15 +320,19 @@ static void test_solvers_agree(void **state) {
                 miss = fmax(miss, fabs(newton.velocity[k] - kit.result.velocity[k]));
                 scale = fmax(scale, fabs(newton.velocity[k]));
             }
+            residual = fmax(residual, newton.residual);
+            newton_alone += newton.converged && !kit.result.converged; /* sweeps where a foot turns about a point under it */
             if (newton.converged && kit.result.converged) {
                 both++;
                 worst = fmax(worst, miss / scale);
             }
             kit_close(&kit);
         }
-        print_message("solvers on %-10s: %d of %d converge in both, twists within %.1e\n", mild_model_names[model], both, draws,
-                      worst);
-        assert_true(both > draws * 9 / 10);
+        print_message("solvers on %-12s: of %d steps %d converge in both, %d in newton alone; newton's worst residual %.1e; "
+                      "twists within %.1e\n",
+                      mild_model_names[model], draws, both, newton_alone, residual, worst);
+        assert_true(residual < 1e-5);
+        assert_true(both > draws * 4 / 5);
         assert_true(worst < 1e-6);
     }
 }
@@ -378,7 +383,7 @@ static void test_moment(void **state) {
         const MildFootResult *foot = &kit.result.foot[0];
         kit_cross(p, foot->force, moment);
         double about = hypot(foot->torque[0] - moment[0], foot->torque[1] - moment[1]);
-        print_message("%-10s tilted by 0.1 rad: %.1f N, %.2e N m about the middle of the sole\n", mild_model_names[model],
+        print_message("%-12s tilted by 0.1 rad: %.1f N, %.2e N m about the middle of the sole\n", mild_model_names[model],
                       foot->force[2], about);
         assert_true(foot->force[2] > 10.0);
         if (mild_model_is_concentric((MildModel)model)) assert_true(about < 1e-9);
