@@ -21,6 +21,7 @@
 
 #include "mild/error.h"
 #include "mild/field.h"
+#include "mild/map.h"
 
 MILD_API_BEGIN
 
@@ -89,7 +90,7 @@ const char *mild_material_preset_name(int index);
  * else checks materials: what is not checked is computed with. */
 MildStatus mild_material_check(const MildMaterial *material, MildError *error);
 
-/* ---- terrain: height and material under a point; pointer-free, copyable, may change between steps ---- */
+/* ---- terrain: height and material under a point; small, copyable, may change between steps ---- */
 /* A rectangle of another material. */
 typedef struct {
     double x_min, x_max, y_min, y_max; /* [m] world rectangle, half-open */
@@ -100,20 +101,34 @@ typedef struct {
  * material that they touched down on (docs/model.md section 5). */
 typedef struct {
     int material_count, patch_count; /* in use of the arrays below */
-    double height; /* [m] undisturbed surface h0 */
+    double height; /* [m] undisturbed surface h0; added to the map's */
     MildMaterial materials[MILD_MATERIALS_MAX]; /* [material_count], checked */
-    MildPatch patches[MILD_PATCHES_MAX]; /* the first patch that holds the point wins; material 0 elsewhere */
+    MildPatch patches[MILD_PATCHES_MAX]; /* the first patch that holds the point wins, else the map, else material 0 */
+    double map_x, map_y;                 /* [m] world point that lies on the map's origin */
+    const MildMap *map;                  /* borrowed, shared; NULL: a level surface without a pattern */
 } MildTerrain;
+
+/* Two materials that blend near a border. */
+typedef struct {
+    int first, second; /* indices into materials; first: the nearer */
+    double share;      /* [-] of the second, at most 1/2; 0 away from a border */
+} MildBlend;
 
 /* One material everywhere, surface at z = 0. */
 MildTerrain mild_terrain_uniform(const MildMaterial *material);
 /* Appends a patch; infinite edges make strips and half planes. Fails, with the terrain unchanged, when it is full, the patch
  * empty, NaN, overlapping an earlier one, or of an unknown material. */
 MildStatus mild_terrain_add_patch(MildTerrain *terrain, const MildPatch *patch, MildError *error);
-/* Index of the material at the world's (x, y) [m]. */
+/* Lays the terrain on a map (NULL: none). Fails, and changes nothing, when the map has a label without a material. */
+MildStatus mild_terrain_set_map(MildTerrain *terrain, const MildMap *map, MildError *error);
+/* Index of the material at the world's (x, y) [m]; at a border the nearer one. */
 int mild_terrain_material_at(const MildTerrain *terrain, double x, double y);
-/* [m] Undisturbed surface h0 at (x, y). */
+/* Both materials there. */
+MildBlend mild_terrain_blend_at(const MildTerrain *terrain, double x, double y);
+/* [m] Undisturbed surface h0 at (x, y); O(1), any finite point. */
 double mild_terrain_height_at(const MildTerrain *terrain, double x, double y);
+/* [-] gradient of h0 at (x, y). */
+void mild_terrain_slope_at(const MildTerrain *terrain, double x, double y, double slope[2]);
 
 /* ---- sole: the footprint of one foot, rasterised from its outline (docs/model.md section 4) ---- */
 
@@ -233,6 +248,20 @@ MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet
 /* Forget everything: the feet were moved. */
 void mild_ground_reset(MildGround *ground);
 
+/* The same for ground that remembers prints: pressed ground keeps its depth after lift-off, and a later element finds it
+ * (docs/model.md section 5). Prints live in the block, in `tiles` squares of 8 x 8 cells of half the first sole's pitch;
+ * when they are used up the oldest are forgotten. A print of a foot of 0.27 x 0.10 m takes about ten tiles.
+ * tiles: rounded up to a multiple of 8, at most MILD_PRINT_TILES_MAX; 0: no prints, as above. */
+#define MILD_PRINT_TILES_MAX 65536
+size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tiles);
+/* Initialise a block of that size, as mild_ground_init does. */
+MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, int feet, int tiles);
+/* [B] of the block of an initialised ground. */
+size_t mild_ground_size(const MildGround *ground);
+/* [m] greatest depth the ground at (x, y) remembers, 0 where there is no print. Its surface is (1 - recovery) of it
+ * below h0. */
+double mild_ground_print_at(const MildGround *ground, double x, double y);
+
 /* NULL when feet is not 1 .. MILD_FEET_MAX or out of memory. soles: [feet], copied. */
 MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildError *error);
 /* May be NULL. */
@@ -258,8 +287,8 @@ typedef enum {
 /* Per-element output of the last solve for one foot; arrays of mild_sole_elements(). */
 typedef struct {
     const double *depth;   /* [m] u at the start of the step, negative above the ground */
-    const double *normal;  /* [N] mean over the step */
-    const double *tangent_x, *tangent_y; /* [N] world */
+    const double *normal;  /* [N] vertical part of the element's force, mean over the step */
+    const double *tangent_x, *tangent_y; /* [N] horizontal part, world */
     const double *point_x, *point_y, *point_z; /* [m] world */
     const double *flat;    /* [-] share of the element's area still flat after the step (eq 1): 1 untouched, 0 cone complete */
     const uint8_t *state;  /* MildElementState */

@@ -1,10 +1,10 @@
 #include <string.h>
 
-#include "ground/contact.h"
+#include "ground/prints.h"
 
 #define MEMORY_BAND 1e-5 /* [m] horizontal motion below this is jitter, not drift */
 #define MEMORY_CAP 0.1   /* [m] longest drift that still hardens the ground */
-#define MEMORY_DOUBLES 5
+#define MEMORY_DOUBLES 8
 
 static int32_t padded_elements(const MildSole *sole) {
     return (int32_t)((mild_sole_elements(sole) + CONTACT_LANES - 1) / CONTACT_LANES * CONTACT_LANES);
@@ -14,56 +14,84 @@ static size_t foot_bytes(int32_t padded) {
     return ((size_t)padded * (MEMORY_DOUBLES * sizeof(double) + sizeof(int32_t)) + 63) / 64 * 64;
 }
 
-size_t mild_ground_bytes(const MildSole *const *soles, int feet) {
-    size_t bytes = sizeof(MildGround);
-    for (int f = 0; f < feet; f++) bytes += foot_bytes(padded_elements(soles[f]));
+static size_t feet_bytes(const int32_t *padded, int feet) {
+    size_t bytes = 0;
+    for (int f = 0; f < feet; f++) bytes += foot_bytes(padded[f]);
     return bytes;
 }
 
-Memory ground_memory(const MildGround *ground, int foot) {
-    size_t offset = sizeof(MildGround);
-    for (int f = 0; f < foot; f++) offset += foot_bytes(ground->padded[f]);
-    /* The one place where the block is seen as arrays; callers of a const ground only read through it. */
-    double *values = (double *)((uintptr_t)ground + offset);
-    size_t n = (size_t)ground->padded[foot];
-    return (Memory){values, values + n, values + 2 * n, values + 3 * n, values + 4 * n, (int32_t *)(values + 5 * n)};
+size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tiles) {
+    int32_t padded[MILD_FEET_MAX];
+    for (int f = 0; f < feet; f++) padded[f] = padded_elements(soles[f]);
+    return sizeof(MildGround) + feet_bytes(padded, feet) + (prints_bytes(prints_round(tiles)) + 63) / 64 * 64;
 }
 
-MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet) {
-    memset(block, 0, mild_ground_bytes(soles, feet));
+size_t mild_ground_bytes(const MildSole *const *soles, int feet) {
+    return mild_ground_bytes_prints(soles, feet, 0);
+}
+
+size_t mild_ground_size(const MildGround *ground) {
+    return sizeof(MildGround) + feet_bytes(ground->padded, ground->feet) + (prints_bytes(ground->tiles) + 63) / 64 * 64;
+}
+
+Memory ground_memory(const MildGround *ground, int foot) {
+    /* The one place where the block is seen as arrays; callers of a const ground only read through it. */
+    double *at = (double *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground->padded, foot));
+    size_t n = (size_t)ground->padded[foot];
+    return (Memory){at,         at + n,     at + 2 * n, at + 3 * n, at + 4 * n,
+                    at + 5 * n, at + 6 * n, at + 7 * n, (int32_t *)(at + MEMORY_DOUBLES * n)};
+}
+
+/* Behind the feet; read as ground_memory is. */
+Prints ground_prints(const MildGround *ground) {
+    PrintKey *keys = (PrintKey *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground->padded, ground->feet));
+    return (Prints){keys, (uint16_t *)(keys + ground->tiles), ground->tiles, 1.0 / ground->print_cell, ground->print_time};
+}
+
+MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, int feet, int tiles) {
+    memset(block, 0, mild_ground_bytes_prints(soles, feet, tiles));
     MildGround *ground = block;
     ground->feet = feet;
     for (int f = 0; f < feet; f++) {
         ground->elements[f] = mild_sole_elements(soles[f]);
         ground->padded[f] = padded_elements(soles[f]);
     }
+    ground->tiles = prints_round(tiles);
+    ground->print_cell = 0.5 * mild_sole_pitch(soles[0]);
     mild_ground_reset(ground);
     return ground;
+}
+
+MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet) {
+    return mild_ground_init_prints(block, soles, feet, 0);
 }
 
 static void foot_forget(MildGround *ground, int foot) {
     Memory memory = ground_memory(ground, foot);
     size_t n = (size_t)ground->padded[foot];
     memset(memory.depth_max, 0, MEMORY_DOUBLES * n * sizeof(double));
-    for (size_t i = 0; i < n; i++) memory.material[i] = -1;
+    for (size_t i = 0; i < n; i++) memory.material[i] = MATERIAL_NONE;
     ground->touched[foot] = 0;
 }
 
 void mild_ground_reset(MildGround *ground) {
     for (int f = 0; f < ground->feet; f++) foot_forget(ground, f);
+    Prints prints = ground_prints(ground);
+    prints_clear(&prints);
+    ground->print_time = 0;
 }
 
 const double *mild_ground_depth_max(const MildGround *ground, int foot) {
     return ground_memory(ground, foot).depth_max;
 }
 
-static void element_forget(const Memory *memory, int e) {
+static void element_forget(const Memory *memory, int e, int32_t material) {
     memory->depth_max[e] = 0.0;
     memory->front_speed[e] = 0.0;
     memory->drift[e] = 0.0;
     memory->pending_x[e] = 0.0;
     memory->pending_y[e] = 0.0;
-    memory->material[e] = -1;
+    memory->material[e] = material;
 }
 
 /* d_D is the length of the horizontal path (paper: accumulated, not end to end). Motion is collected until it leaves the
@@ -76,37 +104,93 @@ static void element_drift(const Memory *memory, int e, double sx, double sy) {
     memory->pending_y[e] = counts ? 0.0 : y;
 }
 
-static int foot_advance(const Memory *memory, const MildScratch *scratch, int f, double dt, const double *V) {
-    const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &scratch->slot;
+/* The elements of a foot in one step. */
+typedef struct {
+    const FootScratch *foot;
+    const Slots *slot;
+    const Prints *prints; /* NULL: lifted ground forgets */
+    const double *rotation, *V;
+    double dt, height; /* height: of the terrain, its map aside */
+} Advance;
+
+/* Lifted off: out of the ground; where prints stay, as soon as its own print no longer presses on it. */
+static int element_lifted(const Advance *a, int i, double u1) {
+    const Slots *s = a->slot;
+    if (!(u1 > 0.0)) return 1;
+    return a->prints && s->recovery[i] < 1.0 && s->front_force[i] + s->line[i] * (u1 - s->front[i]) <= 0.0;
+}
+
+/* What an element that carried something leaves behind, where it lifts off and in each cell that it slides out of; sliding
+ * into a deeper print it takes over that depth. A greater depth never means more force, so this gives no energy. */
+static void element_print(const Advance *a, const Memory *memory, int i, int e, int lifted) {
+    const Slots *s = a->slot;
+    if (!(s->recovery[i] < 1.0)) return;
+    double x0 = a->foot->point_x[e], y0 = a->foot->point_y[e];
+    double x1 = x0 + a->dt * (a->V[0] + a->V[4] * s->pz[i] - a->V[5] * s->py[i]);
+    double y1 = y0 + a->dt * (a->V[1] + a->V[5] * s->px[i] - a->V[3] * s->pz[i]);
+    if (!lifted && prints_same_cell(a->prints, x0, y0, x1, y1)) return;
+    prints_press(a->prints, &(PrintElement){x0, y0, a->foot->pitch, a->rotation}, lifted ? s->front[i] : memory->depth_max[e]);
+    if (lifted) return;
+    double found = prints_read(a->prints, &(PrintElement){x1, y1, a->foot->pitch, a->rotation});
+    if (found <= memory->depth_max[e]) return;
+    memory->depth_max[e] = found;
+    memory->front_speed[e] = 0.0;
+}
+
+static void element_advance(const Advance *a, const Memory *memory, int i, int e, int32_t material, double w, double u1) {
+    const Slots *s = a->slot;
+    const double *V = a->V;
+    int leads = u1 > s->front[i] && w > s->reach[i];
+    /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the next step. */
+    memory->front_speed[e] = leads ? (s->front_speed[i] > s->reach[i] || s->gap[i] > 0.0 ? w : w - s->reach[i]) : 0.0;
+    memory->depth_max[e] = u1 + s->lead[i] > s->front[i] ? u1 + s->lead[i] : s->front[i];
+    memory->material[e] = material;
+    element_drift(memory, e, a->dt * (V[0] + V[4] * s->pz[i] - V[5] * s->py[i]),
+                  a->dt * (V[1] + V[5] * s->px[i] - V[3] * s->pz[i]));
+}
+
+/* The tangent plane that the step took the ground for, through the depth it took for the element's. */
+static void element_plane(const Advance *a, const Memory *memory, int i, int e) {
+    const Slots *s = a->slot;
+    const FootScratch *foot = a->foot;
+    memory->slope_x[e] = s->slope_x[i];
+    memory->slope_y[e] = s->slope_y[i];
+    memory->plane[e] = s->depth[i] - s->slope_x[i] * foot->point_x[e] - s->slope_y[i] * foot->point_y[e] +
+                       foot->point_z[e] - a->height;
+}
+
+static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
+    const FootScratch *foot = a->foot;
+    int32_t lifted_material = a->prints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
     int next = 0, touched = 0;
     for (int k = 0; k < foot->active; k++, next++) {
         int i = foot->start + k, e = foot->element[k];
-        for (; next < e; next++) element_forget(memory, next);
-        double w = -(V[2] + V[3] * s->py[i] - V[4] * s->px[i]), u1 = s->depth[i] + dt * w;
-        if (!(u1 > 0.0)) {
-            element_forget(memory, e);
-            continue;
-        }
-        touched++;
-        int leads = u1 > s->front[i] && w > s->reach[i];
-        /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the next step. */
-        memory->front_speed[e] = leads ? (s->front_speed[i] > s->reach[i] || s->gap[i] > 0.0 ? w : w - s->reach[i]) : 0.0;
-        memory->depth_max[e] = u1 + s->lead[i] > s->front[i] ? u1 + s->lead[i] : s->front[i];
-        memory->material[e] = scratch->slot_material[i];
-        element_drift(memory, e, dt * (V[0] + V[4] * s->pz[i] - V[5] * s->py[i]),
-                      dt * (V[1] + V[5] * s->px[i] - V[3] * s->pz[i]));
+        for (; next < e; next++) element_forget(memory, next, MATERIAL_NONE);
+        double w = slot_descent(a->slot, i, a->V), u1 = a->slot->depth[i] + a->dt * w;
+        int lifted = element_lifted(a, i, u1), carried = memory->material[e] >= 0;
+        if (lifted)
+            element_forget(memory, e, lifted_material);
+        else
+            element_advance(a, memory, i, e, material[i], w, u1);
+        if (a->prints && (carried || !lifted)) element_print(a, memory, i, e, lifted);
+        if (foot->uneven) element_plane(a, memory, i, e);
+        touched += !lifted || lifted_material != MATERIAL_NONE;
     }
-    for (; next < foot->elements; next++) element_forget(memory, next);
+    for (; next < foot->elements; next++) element_forget(memory, next, MATERIAL_NONE);
     return touched;
 }
 
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain, const MildContactInput *input,
                          const MildScratch *scratch, const MildContactResult *result) {
-    (void)terrain; /* prints would move its surface */
+    if (ground->tiles > 0 && ++ground->print_time == 0) ground->print_time = 1; /* 0 marks an empty tile */
+    Prints prints = ground_prints(ground);
     for (int f = 0; f < ground->feet; f++) {
-        if (ground->touched[f] == 0 && scratch->foot[f].active == 0) continue;
+        const FootScratch *foot = &scratch->foot[f];
+        ground->uneven[f] = foot->uneven;
+        if (ground->touched[f] == 0 && foot->active == 0) continue;
         Memory memory = ground_memory(ground, f);
-        ground->touched[f] = foot_advance(&memory, scratch, f, input->dt, result->velocity + 6 * f);
+        Advance advance = {foot,      &scratch->slot,  ground->tiles > 0 ? &prints : NULL, input->rotation[f],
+                           result->velocity + 6 * f, input->dt,       terrain->height};
+        ground->touched[f] = foot_advance(&advance, &memory, scratch->slot_material);
     }
 }

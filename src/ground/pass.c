@@ -12,6 +12,27 @@ static void foot_normal(const Slots *s, int start, int end, double dt, const dou
     }
 }
 
+/* The same where the ground is not level. */
+static void foot_normal_uneven(const Slots *s, int start, int end, double dt, const double *V) {
+#pragma omp simd
+    for (int i = start; i < end; i++) {
+        double impulse, slope;
+        step_normal(s, i, dt, slot_descent(s, i, V), &impulse, &slope);
+        s->iz[i] = impulse;
+        s->hzz[i] = slope;
+    }
+}
+
+/* The normal impulse is I_z g, g = (-slope, 1): the gradient of -u, so that it does work exactly where u changes. Its
+ * vertical part is the paper's; the horizontal one joins the friction. */
+static void foot_lean(const Slots *s, int start, int end) {
+#pragma omp simd
+    for (int i = start; i < end; i++) {
+        s->ix[i] -= s->slope_x[i] * s->iz[i];
+        s->iy[i] -= s->slope_y[i] * s->iz[i];
+    }
+}
+
 /* Coulomb friction and drift resistance of radius r = mu I_z + dt k_D d_D u (paper eqs 13 and 14), made single-valued by a
  * stick region |v| < eps, plus the drift damping: I = -(r/max(|v|, eps) + dt b_D) v. Both oppose the new velocity, so they
  * can neither push a resting foot nor reverse a motion. With exact = 0 the derivative is that of the quadratic that touches
@@ -59,8 +80,10 @@ static void foot_wrench(const Slots *s, int start, int end, double *wrench) {
 void contact_pass(MildScratch *scratch, double dt, const double *twist, int exact) {
     for (int f = 0; f < scratch->feet; f++) {
         int start = scratch->foot[f].start, end = foot_end(&scratch->foot[f]);
-        foot_normal(&scratch->slot, start, end, dt, twist + 6 * f);
+        int uneven = scratch->foot[f].uneven;
+        (uneven ? foot_normal_uneven : foot_normal)(&scratch->slot, start, end, dt, twist + 6 * f);
         foot_tangent(&scratch->slot, start, end, twist + 6 * f, (double)exact);
+        if (uneven) foot_lean(&scratch->slot, start, end);
         foot_wrench(&scratch->slot, start, end, scratch->wrench + 6 * f);
     }
 }
@@ -127,12 +150,29 @@ static void hessian_angular(const Slots *s, int start, int end, double *H) {
     for (int k = 0; k < 18; k++) H[k] = rows[k];
 }
 
+/* What g != (0, 0, 1) adds to minus the impulse's derivative, an element's 3 x 3 block: with k = hzz, the friction's
+ * coupling c = (hxz, hyz, 0) and e = (0, 0, 1)
+ *     k (g g^T - e e^T) + c (g - e)^T,
+ * carried to the foot's twist by B^T: each vector v becomes (v, p x v). */
+static void hessian_uneven(const Slots *s, int start, int end, double *H) {
+    for (int i = start; i < end; i++) {
+        double px = s->px[i], py = s->py[i], pz = s->pz[i], a = -s->slope_x[i], b = -s->slope_y[i];
+        double k = s->hzz[i], cx = s->hxz[i], cy = s->hyz[i];
+        const double lean[6] = {a, b, 0.0, -pz * b, pz * a, px * b - py * a}, up[6] = {0.0, 0.0, 1.0, py, -px, 0.0};
+        const double couple[6] = {cx, cy, 0.0, -pz * cy, pz * cx, px * cy - py * cx};
+        for (int r = 0; r < 6; r++)
+            for (int c = 0; c < 6; c++)
+                H[6 * r + c] += k * (lean[r] * (up[c] + lean[c]) + up[r] * lean[c]) + couple[r] * lean[c];
+    }
+}
+
 void contact_hessian(MildScratch *scratch) {
     for (int f = 0; f < scratch->feet; f++) {
         int start = scratch->foot[f].start, end = foot_end(&scratch->foot[f]);
         double *H = scratch->hessian[f];
         hessian_linear(&scratch->slot, start, end, H);
         hessian_angular(&scratch->slot, start, end, H + 18);
+        if (scratch->foot[f].uneven) hessian_uneven(&scratch->slot, start, end, H);
     }
 }
 

@@ -1,5 +1,6 @@
 #include <string.h>
 
+#include "ground/prints.h"
 #include "ground/resist.h"
 #include "ground/step.h"
 
@@ -7,6 +8,15 @@
 #define PREPARE_EXTRA_SPEED 2.0  /* [m/s] an impact at the heel may swing the toe down faster than its free motion */
 #define PREPARE_BLEND_SLOW 0.02  /* [m/s] below: chi = 1; see step.h */
 #define PREPARE_BLEND_FAST 0.05  /* [m/s] above: chi in full */
+
+static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
+    for (int i = 0; i < foot->padded; i++) {
+        double slope[2];
+        foot->depth[i] = terrain_surface(terrain, foot->point_x[i], foot->point_y[i], slope) - foot->point_z[i];
+        foot->slope_x[i] = slope[0];
+        foot->slope_y[i] = slope[1];
+    }
+}
 
 /* Where every element is, and how deep. */
 static void foot_place(FootScratch *foot, const MildTerrain *terrain, const double *position, const double *R) {
@@ -18,19 +28,26 @@ static void foot_place(FootScratch *foot, const MildTerrain *terrain, const doub
         foot->point_y[i] = cy + R[3] * x[i] + R[4] * y[i];
         foot->point_z[i] = cz + R[6] * x[i] + R[7] * y[i];
     }
-    terrain_heights(terrain, foot->point_x, foot->point_y, foot->padded, foot->depth);
+    foot->uneven = !terrain_is_level(terrain);
+    if (foot->uneven) {
+        foot_surface(foot, terrain);
+        return;
+    }
+    const double height = terrain->height;
 #pragma omp simd
-    for (int i = 0; i < foot->padded; i++) foot->depth[i] -= foot->point_z[i];
+    for (int i = 0; i < foot->padded; i++) foot->depth[i] = height - foot->point_z[i];
 }
 
-/* Fastest any point of the foot can come down under twist V. */
-static double foot_descent(const FootScratch *foot, const double *V) {
-    return step_max(-V[2], 0.0) + foot->radius * sqrt(V[3] * V[3] + V[4] * V[4]);
+/* Fastest any point of the foot can come down under twist V, or the ground come up to it. */
+static double foot_descent(const FootScratch *foot, const double *V, double steepest) {
+    double tilt = V[3] * V[3] + V[4] * V[4], level = sqrt(V[0] * V[0] + V[1] * V[1]);
+    return step_max(-V[2], 0.0) + foot->radius * sqrt(tilt) + steepest * (level + foot->radius * sqrt(tilt + V[5] * V[5]));
 }
 
 /* Lists the elements that may touch, in order. All or none, the common cases, are found without a branch per element. */
-static void foot_list(FootScratch *foot, const MildContactInput *input, int f) {
-    double descent = step_max(foot_descent(foot, input->velocity[f]), foot_descent(foot, input->free_velocity + 6 * f));
+static void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f) {
+    double descent = step_max(foot_descent(foot, input->velocity[f], steepest),
+                              foot_descent(foot, input->free_velocity + 6 * f, steepest));
     double least = -PREPARE_MARGIN - input->dt * (descent + PREPARE_EXTRA_SPEED), near = 0.0;
 #pragma omp simd reduction(+ : near)
     for (int i = 0; i < foot->elements; i++) near += foot->depth[i] > least ? 1.0 : 0.0;
@@ -44,6 +61,11 @@ static void foot_list(FootScratch *foot, const MildContactInput *input, int f) {
     }
 }
 
+/* Bool: a mixture, coded as in Memory, has material m in it. */
+static int mixture_has(int32_t mixture, int m) {
+    return mixture >= 0 && ((mixture & 0xff) == m || (mixture >> 16 > 0 && (mixture >> 8 & 0xff) == m));
+}
+
 /* Derives the laws of the terrain's materials anew where their numbers have changed. */
 static void foot_laws(MildScratch *scratch, const MildTerrain *terrain, int f) {
     const FootScratch *foot = &scratch->foot[f];
@@ -53,7 +75,7 @@ static void foot_laws(MildScratch *scratch, const MildTerrain *terrain, int f) {
         if (derived->known && memcmp(&derived->material, wanted, sizeof *wanted) == 0) continue;
         *derived = (DerivedLaw){*wanted, law_of(wanted, foot->pitch), 1};
         for (int i = foot->start; i < foot->start + foot->padded; i++)
-            if (scratch->slot_material[i] == m) scratch->slot_material[i] = -1;
+            if (mixture_has(scratch->slot_material[i], m)) scratch->slot_material[i] = MATERIAL_NONE;
     }
 }
 
@@ -73,10 +95,28 @@ static void slot_set_law(const Slots *s, int i, const Law *law, const MildMateri
     s->lead[i] = 0.0;
 }
 
+/* Every number of the law that the steps use, and friction and recovery, change linearly from one material to the other. A
+ * mean of two passive laws is one: it has c_d m >= m/2 too. */
+static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, int32_t mixture) {
+    const DerivedLaw *a = &derived[mixture & 0xff], *b = &derived[mixture >> 8 & 0xff];
+    const Law *p = &a->law, *q = &b->law;
+    const MildMaterial *m = &a->material, *n = &b->material;
+    double t = (mixture >> 16) / 255.0;
+#define MIX(x, y) ((x) + t * ((y) - (x)))
+    Law law = {.flat = MIX(p->flat, q->flat), .cone = MIX(p->cone, q->cone), .full = MIX(p->full, q->full),
+               .mass = MIX(p->mass, q->mass), .drag = MIX(p->drag, q->drag), .bed = MIX(p->bed, q->bed),
+               .bed_stiffness = MIX(p->bed_stiffness, q->bed_stiffness)};
+    MildMaterial material = {.mu = MIX(m->mu, n->mu), .k_drift = MIX(m->k_drift, n->k_drift),
+                             .b_drift = MIX(m->b_drift, n->b_drift), .recovery = MIX(m->recovery, n->recovery)};
+#undef MIX
+    law.inverse_full = 1.0 / law.full;
+    slot_set_law(s, i, &law, &material);
+}
+
 /* Material of each slot: the one it touched down on, so that a foot sliding over a border keeps its law. */
 static void slots_materials(MildScratch *scratch, const MildTerrain *terrain, const Memory *memory, int f) {
     const FootScratch *foot = &scratch->foot[f];
-    int one = terrain->patch_count == 0, wrong = 0;
+    int one = terrain_is_uniform(terrain), wrong = 0, count = terrain->material_count;
     for (int k = 0; one && k < foot->active; k++) { /* uniform ground whose law stands in the slots already */
         int m = memory->material[foot->element[k]];
         wrong += (m > 0) | (scratch->slot_material[foot->start + k] != 0);
@@ -84,11 +124,14 @@ static void slots_materials(MildScratch *scratch, const MildTerrain *terrain, co
     if (one && wrong == 0) return;
     for (int k = 0; k < foot->active; k++) {
         int i = foot->start + k, e = foot->element[k], m = memory->material[e];
-        if (m < 0 || m >= terrain->material_count)
-            m = mild_terrain_material_at(terrain, foot->point_x[e], foot->point_y[e]);
+        if (m < 0 || (m & 0xff) >= count || (m >> 8 & 0xff) >= count)
+            m = terrain_mixture(terrain, foot->point_x[e], foot->point_y[e]);
         if (scratch->slot_material[i] == m) continue;
         scratch->slot_material[i] = m;
-        slot_set_law(&scratch->slot, i, &scratch->derived[f][m].law, &terrain->materials[m]);
+        if (m <= 0xff)
+            slot_set_law(&scratch->slot, i, &scratch->derived[f][m].law, &terrain->materials[m]);
+        else
+            slot_set_mixture(&scratch->slot, i, scratch->derived[f], m);
     }
 }
 
@@ -116,10 +159,51 @@ static void slots_gather(MildScratch *scratch, const Memory *memory, const doubl
     }
 }
 
+/* Uneven ground under the slots. The step takes the ground under an element for its tangent plane there. Where the ground
+ * rises faster, the element would find itself deeper without having been pressed down, with energy from nowhere; so an
+ * element goes on from the depth that the last step's plane gives, if that is less, as long as it stays in the ground. */
+static void slots_uneven(const MildScratch *scratch, const MildGround *ground, const Memory *memory, double height, int f) {
+    const FootScratch *foot = &scratch->foot[f];
+    const Slots *s = &scratch->slot;
+    for (int k = 0; k < foot->active; k++) {
+        int i = foot->start + k, e = foot->element[k], m = memory->material[e];
+        s->slope_x[i] = foot->slope_x[e];
+        s->slope_y[i] = foot->slope_y[e];
+        if (!ground->uneven[f] || m == MATERIAL_NONE || (m == MATERIAL_FREE && s->depth[i] <= 0.0)) continue;
+        double plane = height + memory->plane[e] + memory->slope_x[e] * foot->point_x[e] +
+                       memory->slope_y[e] * foot->point_y[e] - foot->point_z[e];
+        s->depth[i] = step_min(s->depth[i], plane);
+    }
+    for (int i = foot->start + foot->active; i < foot_end(foot); i++) s->slope_x[i] = s->slope_y[i] = 0.0;
+}
+
+/* An element that carries nothing finds what the ground under it remembers. Below h0, in a print, it takes at least the
+ * depth whose unloading line ends where it is, so that moving sideways in a print never loads it. */
+static void slots_prints(const MildScratch *scratch, const Prints *prints, const Memory *memory, const double *R, int f) {
+    const FootScratch *foot = &scratch->foot[f];
+    const Slots *s = &scratch->slot;
+    for (int k = 0; k < foot->active; k++) {
+        int i = foot->start + k, e = foot->element[k], m = memory->material[e];
+        double lasting = 1.0 - s->recovery[i], u0 = s->depth[i];
+        if (m >= 0 || !(lasting > 0.0)) continue;
+        double found = prints_read(prints, &(PrintElement){foot->point_x[e], foot->point_y[e], foot->pitch, R});
+        double free = m == MATERIAL_FREE && u0 > 0.0 ? step_max(u0 / lasting, u0 + CONTACT_ELASTIC) : 0.0;
+        s->depth_max[i] = step_max(found, free);
+    }
+}
+
+/* Slopes of a foot that has left uneven ground; level ground is not to pay for them. */
+static void slots_level(const MildScratch *scratch, const FootScratch *foot) {
+    size_t bytes = (size_t)foot->padded * sizeof(double);
+    memset(scratch->slot.slope_x + foot->start, 0, bytes);
+    memset(scratch->slot.slope_y + foot->start, 0, bytes);
+}
+
 /* Everything of step.h that does not depend on the new velocity. The unloading line runs from (a, F_g(a)) to zero force
  * after recovery * a, but not within CONTACT_ELASTIC. It is never flatter than the loading curve at a, and so never above
  * it: a concave curve lies above its chords, a convex one above its tangent; in the bed the steepest slope is taken. */
-static void slots_prepare(const Slots *s, int start, int end, double dt, const double *now, const double *free) {
+static inline void slots_prepare(const Slots *s, int start, int end, double dt, const double *now, const double *free,
+                                 int uneven) {
     double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = start; i < end; i++) {
@@ -134,7 +218,8 @@ static void slots_prepare(const Slots *s, int start, int end, double dt, const d
         s->line[i] = step_max(force / (travel + STEP_TINY), steepest + s->cone[i] + bed);
         s->gap[i] = used > 0.0 ? 0.0 : step_max(-u0, 0.0);
         double reach = (a - u0) * rate, py = s->py[i], px = s->px[i], added = s->mass_rate[i] * flat_share;
-        double speed = step_max(now[4] * px - now[3] * py - now[2], 0.0), w_free = free[4] * px - free[3] * py - free[2];
+        double w_now = uneven ? slot_descent(s, i, now) : now[4] * px - now[3] * py - now[2], speed = step_max(w_now, 0.0);
+        double w_free = uneven ? slot_descent(s, i, free) : free[4] * px - free[3] * py - free[2];
         double blend = (speed - PREPARE_BLEND_SLOW) * (1.0 / (PREPARE_BLEND_FAST - PREPARE_BLEND_SLOW));
         s->reach[i] = reach;
         s->front_speed[i] = step_max(s->front_speed[i], reach);
@@ -153,18 +238,25 @@ static void slots_prepare(const Slots *s, int start, int end, double dt, const d
 
 int contact_prepare(const MildGround *ground, const MildTerrain *terrain, const MildContactInput *input, MildScratch *scratch) {
     int total = 0;
+    Prints prints = ground_prints(ground);
     for (int f = 0; f < scratch->feet; f++) {
         FootScratch *foot = &scratch->foot[f];
-        foot_place(foot, terrain, input->position[f], input->rotation[f]);
-        foot_list(foot, input, f);
+        const double *now = input->velocity[f], *free = input->free_velocity + 6 * f, *R = input->rotation[f];
+        if (foot->uneven && terrain_is_level(terrain)) slots_level(scratch, foot);
+        foot_place(foot, terrain, input->position[f], R);
+        foot_list(foot, input, foot->uneven ? terrain_steepest(terrain) : 0.0, f);
         if (foot->active == 0) continue;
         Memory memory = ground_memory(ground, f);
         foot_laws(scratch, terrain, f);
         slots_materials(scratch, terrain, &memory, f);
-        slots_gather(scratch, &memory, input->rotation[f], f);
-        slots_prepare(&scratch->slot, foot->start, foot_end(foot), input->dt, input->velocity[f],
-                      input->free_velocity + 6 * f);
-        slots_resist(scratch, terrain, f, input->dt, input->rotation[f], input->velocity[f]);
+        slots_gather(scratch, &memory, R, f);
+        if (foot->uneven) slots_uneven(scratch, ground, &memory, terrain->height, f);
+        if (ground->tiles > 0) slots_prints(scratch, &prints, &memory, R, f);
+        if (foot->uneven)
+            slots_prepare(&scratch->slot, foot->start, foot_end(foot), input->dt, now, free, 1);
+        else
+            slots_prepare(&scratch->slot, foot->start, foot_end(foot), input->dt, now, free, 0);
+        slots_resist(scratch, terrain, f, input->dt, R, now);
         total += foot->active;
     }
     return total;

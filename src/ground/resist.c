@@ -114,7 +114,8 @@ void slots_resist(MildScratch *scratch, const MildTerrain *terrain, int f, doubl
     double side = rotation[8] > 0.0 ? -1.0 : 1.0; /* of the sole's two faces the one that looks down */
     const double normal[3] = {side * rotation[2], side * rotation[5], step_min(side * rotation[8], -1e-6)};
     for (int k = 0; k < foot->active; k++) {
-        int i = foot->start + k, m = scratch->slot_material[i], model = terrain->materials[m].model;
+        int i = foot->start + k, m = scratch->slot_material[i] & 0xff; /* the nearer at a border */
+        int model = terrain->materials[m].model;
         if (!model_is_resistive(model)) continue;
         double px = s->px[i], py = s->py[i], pz = s->pz[i], down[2], level[2];
         Way way = element_way(twist[0] + twist[4] * pz - twist[5] * py, twist[1] + twist[5] * px - twist[3] * pz,

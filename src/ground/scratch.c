@@ -3,7 +3,7 @@
 
 #include "ground/contact.h"
 
-#define FOOT_ARRAYS 9 /* depth, normal, tangent x y, point x y z, flat; state and slip share one */
+#define FOOT_ARRAYS 11 /* depth, normal, tangent x y, point x y z, flat, slope x y; state and slip share one */
 
 static int padded(const MildSole *sole) {
     return (mild_sole_elements(sole) + CONTACT_LANES - 1) / CONTACT_LANES * CONTACT_LANES;
@@ -38,6 +38,8 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at, int32
     foot->point_y = take(at, foot->padded);
     foot->point_z = take(at, foot->padded);
     foot->flat = take(at, foot->padded);
+    foot->slope_x = take(at, foot->padded);
+    foot->slope_y = take(at, foot->padded);
     foot->state = (uint8_t *)take(at, foot->padded);
     foot->slip = foot->state + foot->padded;
     foot->element = element;

@@ -27,9 +27,10 @@ static void sweep_apply(Sweep *sweep, int f, const double *p, const double *chan
     }
 }
 
-/* Diagonal of G = B A B^T at one element. */
-static void element_inverse_mass(const Sweep *sweep, int f, const double *p, double *G) {
-    const double J[3][6] = {{1, 0, 0, 0, p[2], -p[1]}, {0, 1, 0, -p[2], 0, p[0]}, {0, 0, 1, p[1], -p[0], 0}};
+/* Diagonal of G = B A B^T at one element: along x, along y, and along (-slope, 1), the normal impulse's direction. */
+static void element_inverse_mass(const Sweep *sweep, int f, const double *p, double a, double b, double *G) {
+    const double J[3][6] = {{1, 0, 0, 0, p[2], -p[1]}, {0, 1, 0, -p[2], 0, p[0]},
+                            {-a, -b, 1, p[1] + b * p[2], -p[0] - a * p[2], a * p[1] - b * p[0]}};
     for (int axis = 0; axis < 3; axis++) {
         G[axis] = 0.0;
         for (int i = 0; i < 6; i++)
@@ -61,21 +62,22 @@ static void element_friction(const Slots *s, int i, const double *v, const doubl
 static void sweep_element(Sweep *sweep, const Slots *s, int f, int i) {
     const double *V = sweep->twist + 6 * f, p[3] = {s->px[i], s->py[i], s->pz[i]};
     double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]}, v[2] = {V[0] + turn[0], V[1] + turn[1]};
-    double w = -(V[2] + V[3] * p[1] - V[4] * p[0]), delta[2] = {0.0, 0.0}, G[3];
+    double w = slot_descent(s, i, V), delta[2] = {0.0, 0.0}, G[3];
     /* Paper eqs 11, 12 with v_i - v_j - omega x (p_i - p_j) as a vector. */
     for (int k = 0; k < 2; k++) {
         if (sweep->preceding[f] > 0) delta[k] = v[k] - turn[k] - sweep->before[f][k] / sweep->preceding[f];
         sweep->before[f][k] += v[k] - turn[k];
     }
     sweep->preceding[f]++;
-    element_inverse_mass(sweep, f, p, G);
+    element_inverse_mass(sweep, f, p, s->slope_x[i], s->slope_y[i], G);
     double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G), old[3] = {s->ix[i], s->iy[i], s->iz[i]}, fx = s->fx[i], fy = s->fy[i];
     s->iz[i] = element_normal(s, i, sweep->dt, w, G[2]);
     element_friction(s, i, v, delta, G_xy);
     double b = s->damping[i], relax = 1.0 / (1.0 + b * G_xy); /* implicit drift damping, as for the normal part */
-    double bx = old[0] - fx, by = old[1] - fy;
-    s->ix[i] = s->fx[i] + bx - relax * (b * v[0] + bx);
-    s->iy[i] = s->fy[i] + by - relax * (b * v[1] + by);
+    double nx = s->slope_x[i] * s->iz[i], ny = s->slope_y[i] * s->iz[i]; /* the normal impulse leans downhill */
+    double bx = old[0] + s->slope_x[i] * old[2] - fx, by = old[1] + s->slope_y[i] * old[2] - fy;
+    s->ix[i] = s->fx[i] + bx - relax * (b * v[0] + bx) - nx;
+    s->iy[i] = s->fy[i] + by - relax * (b * v[1] + by) - ny;
     const double change[3] = {s->ix[i] - old[0], s->iy[i] - old[1], s->iz[i] - old[2]};
     sweep_apply(sweep, f, p, change);
 }
@@ -88,10 +90,12 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
         const double *V = input->velocity[f];
         for (int i = scratch->foot[f].start; i < scratch->foot[f].start + scratch->foot[f].active; i++) {
             const double p[3] = {s->px[i], s->py[i], s->pz[i]};
-            double w = -(V[2] + V[3] * p[1] - V[4] * p[0]), slope;
-            s->fx[i] = s->fy[i] = s->ix[i] = s->iy[i] = 0.0;
-            step_normal(s, i, input->dt, w, &s->iz[i], &slope);
-            sweep_apply(sweep, f, p, (const double[3]){0.0, 0.0, s->iz[i]});
+            double slope;
+            s->fx[i] = s->fy[i] = 0.0;
+            step_normal(s, i, input->dt, slot_descent(s, i, V), &s->iz[i], &slope);
+            s->ix[i] = -s->slope_x[i] * s->iz[i];
+            s->iy[i] = -s->slope_y[i] * s->iz[i];
+            sweep_apply(sweep, f, p, (const double[3]){s->ix[i], s->iy[i], s->iz[i]});
         }
     }
 }
