@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "app/paths.h"
 #include "app/text.h"
 
 enum { HELP_COLUMN = 28, HELP_WIDTH = 100 };
@@ -125,10 +126,21 @@ static int set_list(const CliCommand *command, const CliOption *option, const ch
     return 0;
 }
 
+/* Trials of an hour must not end at a folder that is not there. */
+static int set_output(const CliCommand *command, const CliOption *option, const char *path) {
+    MildError error = {0};
+    if (strcmp(path, "-") != 0 && path_check_write(path, &error) != MILD_OK) {
+        return cli_fail_text(command->name, "--%s: %s", option->name, error.text);
+    }
+    *(const char **)option->target = path;
+    return 0;
+}
+
 static int set_option(const CliCommand *command, const CliOption *option, const char *text) {
     switch (option->type) {
     case CLI_FLAG: *(int *)option->target = 1; return 0;
     case CLI_TEXT: *(const char **)option->target = text; return 0;
+    case CLI_OUTPUT: return set_output(command, option, text);
     case CLI_INT: return set_int(command, option, text);
     case CLI_UINT64:
         if (text_uint64(text, option->target)) return 0;

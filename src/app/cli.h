@@ -18,15 +18,15 @@ typedef struct {
     char name[CLI_LIST_MAX][64];
 } CliNames; /* "rubber,foam45" */
 
-/* target: FLAG int *, TEXT const char **, INT int *, UINT64 uint64_t *, NUMBER double *, NUMBERS CliNumbers *,
+/* target: FLAG int *, TEXT const char **, OUTPUT the same (a file to be written, or `-`; refused at once when it cannot be), INT int *, UINT64 uint64_t *, NUMBER double *, NUMBERS CliNumbers *,
  * NAMES CliNames *. What the target holds before parsing is the default. */
-typedef enum { CLI_FLAG, CLI_TEXT, CLI_INT, CLI_UINT64, CLI_NUMBER, CLI_NUMBERS, CLI_NAMES } CliType;
+typedef enum { CLI_FLAG, CLI_TEXT, CLI_OUTPUT, CLI_INT, CLI_UINT64, CLI_NUMBER, CLI_NUMBERS, CLI_NAMES } CliType;
 
 typedef struct {
     const char *name; /* without the dashes */
     CliType type;
     void *target;
-    double min, max;   /* inclusive, for each number; ignored for FLAG, TEXT, NAMES, UINT64 */
+    double min, max;   /* inclusive, for each number; ignored for FLAG, TEXT, OUTPUT, NAMES, UINT64 */
     const char *value; /* what stands for the value in the help: "NAME[,NAME]"; NULL for a flag */
     const char *help;  /* with unit and default */
 } CliOption;

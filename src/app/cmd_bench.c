@@ -91,7 +91,7 @@ static MildStatus run_benches(const CliArgs *args, FILE *file, BenchReport *repo
 int cmd_bench(int argc, char **argv) {
     const char *json = NULL;
     const CliOption options[] = {
-        {"json", CLI_TEXT, &json, 0, 0, "FILE",
+        {"json", CLI_OUTPUT, &json, 0, 0, "FILE",
          "write {machine, version, rows: [{bench, case, value, unit}]}; - for standard output"},
     };
     const CliCommand command = {

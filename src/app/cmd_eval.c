@@ -158,7 +158,7 @@ int cmd_eval(int argc, char **argv) {
         {"patch", CLI_NUMBER, &e->patch, 0.1, 1000, "L", "[m] length of each ground of a course (2.5)"},
         {"seed", CLI_UINT64, &e->eval.seed, 0, 0, "S", "same seed, same trials (1)"},
         {"threads", CLI_INT, &e->threads, 0, 1024, "N", "0: one per core; the table does not depend on it (0)"},
-        {"json", CLI_TEXT, &e->json, 0, 0, "FILE", "write the table as JSON as well; - for standard output"},
+        {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE", "write the table as JSON as well; - for standard output"},
     };
     const CliCommand command = {
         .name = "eval", .usage = "--policy FILE --ground NAME[,NAME] --speed V[,V] [options]",

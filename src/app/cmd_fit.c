@@ -43,8 +43,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
         {"alpha", CLI_NUMBER, &options->alpha, 0.1, 1.5, "A", "[rad] shear band angle, held or start of its fit"},
         {"nu", CLI_NUMBER, &options->nu, 0.1, 10, "N", "[-] recruitment rate, held or start of its fit"},
-        {"json", CLI_TEXT, &options->json, 0, 0, "FILE", "write values and intervals; - for standard output"},
-        {"figure", CLI_TEXT, &options->figure, 0, 0, "FILE.png",
+        {"json", CLI_OUTPUT, &options->json, 0, 0, "FILE", "write values and intervals; - for standard output"},
+        {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
          "picture of data and fit, and its numbers beside it as FILE_fit.csv"},
     };
     const CliCommand command = {

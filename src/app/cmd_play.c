@@ -58,15 +58,19 @@ static MildStatus make_scene(Command *c, MildError *error) {
     return status == MILD_OK ? task_def_check(&c->task, error) : status;
 }
 
-static MildStatus make_parent(const char *path, MildError *error) {
+/* Makes the file's folder, and finds out whether the file can be written before anybody walks. */
+static MildStatus make_place(const char *path, MildError *error) {
     char folder[PATH_SIZE];
     if (snprintf(folder, sizeof folder, "%s", path) >= (int)sizeof folder) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", path);
     }
     char *slash = strrchr(folder, '/');
-    if (!slash || slash == folder) return MILD_OK;
-    *slash = '\0';
-    return path_make_folder(folder, error);
+    MildStatus status = MILD_OK;
+    if (slash && slash != folder) {
+        *slash = '\0';
+        status = path_make_folder(folder, error);
+    }
+    return status == MILD_OK ? path_check_write(path, error) : status;
 }
 
 static MildStatus make_view(Command *c, const char *xml, MildError *error) {
@@ -176,9 +180,9 @@ static MildStatus prepare(Command *c, const char *xml, MildError *error) {
     if (c->pressure && c->scene.rigid) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--pressure: rigid ground has no elements, choose a soft one");
     }
-    if (c->video) status = make_parent(c->video, error);
-    if (status == MILD_OK && c->pressure) status = make_parent(c->pressure, error);
-    if (status == MILD_OK) status = controller_learned(c->policy, NULL, 1, play->controller, error);
+    status = controller_learned(c->policy, NULL, 1, play->controller, error);
+    if (status == MILD_OK && c->video) status = make_place(c->video, error);
+    if (status == MILD_OK && c->pressure) status = make_place(c->pressure, error);
     if (status == MILD_OK && c->pressure) {
         play->pressure = pressure_create(play->robot, c->scene.terrain.material_count, c->task.physics_dt, error);
         if (!play->pressure) status = error->status;

@@ -313,10 +313,10 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
         {"seconds", CLI_NUMBER, &options->seconds, 1e-3, 100, "T", "[s] of the fall that are recorded (default 1)"},
         {"step", CLI_NUMBER, &options->step, 1e-7, 1, "DT",
          "[s] between rows (default: a thousandth of the way down, with --force 0.02 mm of it; 0.0001 falling)"},
-        {"csv", CLI_TEXT, &options->csv, 0, 0, "FILE",
+        {"csv", CLI_OUTPUT, &options->csv, 0, 0, "FILE",
          "write time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m, and force_x_n,force_y_n,x_m,tilt_rad "
          "when dragged or dropped; - for standard output"},
-        {"figure", CLI_TEXT, &options->figure, 0, 0, "FILE.png",
+        {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
          "draw it; its numbers stand in the CSV, else beside it as FILE.csv"},
     };
     CliOutcome outcome = options_parse(table, sizeof table / sizeof *table, argc, argv, args);

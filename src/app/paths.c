@@ -81,20 +81,49 @@ static int write_file(const char *path, int flags, const void *data, size_t size
     return failed;
 }
 
+/* Devices and pipes are written to, not replaced. */
+static int is_device(const char *path) {
+    struct stat info;
+    return stat(path, &info) == 0 && !S_ISREG(info.st_mode);
+}
+
+/* The file that stands in for `path` until it is whole. */
+static MildStatus temporary_path(const char *path, char temporary[PATH_SIZE], MildError *error) {
+    if (!*path) return mild_fail(error, MILD_ERROR_ARGUMENT, "the name of the file is empty");
+    if (snprintf(temporary, PATH_SIZE, "%s.tmp", path) < PATH_SIZE) return MILD_OK;
+    return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", path);
+}
+
+static MildStatus cannot_write(const char *path, int failure, MildError *error) {
+    return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", path, strerror(failure));
+}
+
+MildStatus path_check_write(const char *path, MildError *error) {
+    char temporary[PATH_SIZE];
+    MildStatus status = temporary_path(path, temporary, error);
+    if (status != MILD_OK) return status;
+    int failed = 0;
+    if (is_device(path)) { /* not opened: the reader of a pipe would see its end */
+        struct stat info;
+        failed = stat(path, &info) == 0 && S_ISDIR(info.st_mode) ? EISDIR : access(path, W_OK) != 0 ? errno : 0;
+    } else {
+        failed = write_file(temporary, O_CREAT | O_TRUNC, "", 0);
+        if (!failed) unlink(temporary);
+    }
+    return failed ? cannot_write(path, failed, error) : MILD_OK;
+}
+
 MildStatus path_write(const char *path, const void *data, size_t size, MildError *error) {
     char temporary[PATH_SIZE];
-    if (snprintf(temporary, sizeof temporary, "%s.tmp", path) >= (int)sizeof temporary) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", path);
-    }
-    struct stat info;
-    int failed, device = stat(path, &info) == 0 && !S_ISREG(info.st_mode);
-    if (device) { /* /dev/stdout and pipes are written to, not replaced */
+    MildStatus status = temporary_path(path, temporary, error);
+    if (status != MILD_OK) return status;
+    int failed;
+    if (is_device(path)) {
         failed = write_file(path, 0, data, size);
     } else {
         failed = write_file(temporary, O_CREAT | O_TRUNC, data, size);
         if (!failed && rename(temporary, path) != 0) failed = errno;
         if (failed) unlink(temporary);
     }
-    if (failed) return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", path, strerror(failed));
-    return MILD_OK;
+    return failed ? cannot_write(path, failed, error) : MILD_OK;
 }

@@ -18,6 +18,9 @@ MildStatus path_join(const char *folder, const char *name, char path[PATH_SIZE],
 /* Makes the folder and its parents; fine when it is there. */
 MildStatus path_make_folder(const char *folder, MildError *error);
 
+/* Whether path_write could begin: what stands in its way is said before the work, not after it. Leaves nothing behind. */
+MildStatus path_check_write(const char *path, MildError *error);
+
 /* Writes a temporary file beside `path`, syncs, renames: after a crash or on a full disk the old file is still whole.
  * Devices and pipes are written to directly. */
 MildStatus path_write(const char *path, const void *data, size_t size, MildError *error);

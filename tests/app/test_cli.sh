@@ -1,35 +1,6 @@
 #!/usr/bin/env bash
 # The program as a user meets it: what it says, how it exits, what it writes. Usage: test_cli.sh PATH_TO_MILD
-set -u
-mild=$(realpath "$1")
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-failures=0
-
-fail() {
-    echo "FAIL: $*" >&2
-    failures=$((failures + 1))
-}
-
-# expect CODE PATTERN COMMAND...: exit code, and a pattern in what it prints (both streams).
-expect() {
-    local code=$1 pattern=$2 output
-    shift 2
-    output=$("$@" 2>&1 </dev/null)
-    local got=$?
-    [ "$got" = "$code" ] || fail "exit $got instead of $code: $* -> $output"
-    grep -q -- "$pattern" <<<"$output" || fail "no '$pattern' in the output of: $* -> $output"
-}
-
-# bad PATTERN COMMAND...: one line of error that holds the pattern, exit code 2.
-bad() {
-    expect 2 "$@"
-    shift
-    local lines
-    lines=$("$@" 2>&1 >/dev/null </dev/null | wc -l)
-    [ "$lines" = 1 ] || fail "$lines lines of error instead of one: $*"
-}
+source "$(dirname "$0")/../kit.sh" "$1"
 
 expect 0 'usage: mild COMMAND' "$mild" --help
 expect 0 'mild [0-9]*\.[0-9]*\.[0-9]*' "$mild" --version
@@ -117,5 +88,4 @@ for key in machine version rows bench case value unit; do
     grep -q "\"$key\":" bench.json || fail "bench.json lacks $key"
 done
 
-[ $failures = 0 ] && echo "command line: all as expected"
-exit $((failures > 0))
+finish "command line: all as expected"

@@ -1,16 +1,6 @@
 #!/usr/bin/env bash
 # `mild press` to `mild fit` and back, and every bad record refused with nothing written. Usage: test_fit.sh PATH_TO_MILD
-set -u
-mild=$(realpath "$1")
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-failures=0
-
-fail() {
-    echo "FAIL: $*" >&2
-    failures=$((failures + 1))
-}
+source "$(dirname "$0")/../kit.sh" "$1"
 
 # noise SEED <press.csv: 2 % of every force, normally distributed.
 noise() {
@@ -29,17 +19,9 @@ near() {
         exit !(v != "" && e < p && e > -p) }' || fail "$1: '$2' is not within $4 % of $3"
 }
 
-# bad PATTERN COMMAND...: exit 2, one line that holds the pattern, nothing written.
-bad() {
-    local pattern=$1 output code
-    shift
-    rm -f out.json out.png out_fit.csv
-    output=$("$@" --json out.json --figure out.png 2>&1 >/dev/null </dev/null)
-    code=$?
-    [ "$code" = 2 ] || fail "exit $code instead of 2: $* -> $output"
-    [ "$(wc -l <<<"$output")" = 1 ] || fail "not one line: $* -> $output"
-    grep -q -- "$pattern" <<<"$output" || fail "no '$pattern': $* -> $output"
-    [ ! -e out.json ] && [ ! -e out.png ] && [ ! -e out_fit.csv ] || fail "something was written: $*"
+# refuse PATTERN COMMAND...: bad, with everything that could be written asked for.
+refuse() {
+    bad "$@" --json out.json --figure out.png
 }
 
 echo "errors of the fit without noise, and with 2 % noise, seeds 5, 6, 7"
@@ -98,34 +80,33 @@ near "another order: k_pen" "$(value fit.json k_pen)" 380 5
 fit=("$mild" fit)
 plate=(--plate 0.2,0.1)
 edit() { awk -F, -v OFS=, "$1" sand_loose.csv >bad.csv; }
-bad 'missing.csv: cannot open.*mild press' "${fit[@]}" missing.csv "${plate[@]}"
-bad 'which record' "${fit[@]}" "${plate[@]}"
-bad '--plate' "${fit[@]}" sand_loose.csv
-bad '--plate' "${fit[@]}" sand_loose.csv --plate 0.2
-bad "unknown parameter 'k_pem'; nearest is 'k_pen'" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pem
-bad "nearest is 'sand_loose'" "${fit[@]}" sand_loose.csv "${plate[@]}" --ground sand_lose
-bad 'alpha' "${fit[@]}" sand_loose.csv "${plate[@]}" --alpha 2
-edit '{ print $1, $2 }' && bad 'bad.csv:1: no column force_n; name' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $3 = "nan" } { print }' && bad "bad.csv:9: force_n 'nan' is not a finite number; correct" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $2 = "" } { print }' && bad 'bad.csv:9: depth_m is missing; fill' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { print $1; next } { print }' && bad 'bad.csv:9: depth_m is missing' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $2 = "1 mm" } { print }' && bad "bad.csv:9: depth_m '1 mm'" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $3 = "1e999" } { print }' && bad "bad.csv:9: force_n '1e999' is not a finite" "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $3 = "12,5" } { print }' && bad 'bad.csv:9: 8 values under 7 columns; a decimal point' "${fit[@]}" bad.csv "${plate[@]}"
+refuse 'missing.csv: cannot open.*mild press' "${fit[@]}" missing.csv "${plate[@]}"
+refuse 'which record' "${fit[@]}" "${plate[@]}"
+refuse '--plate' "${fit[@]}" sand_loose.csv
+refuse '--plate' "${fit[@]}" sand_loose.csv --plate 0.2
+refuse "unknown parameter 'k_pem'; nearest is 'k_pen'" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pem
+refuse "nearest is 'sand_loose'" "${fit[@]}" sand_loose.csv "${plate[@]}" --ground sand_lose
+refuse 'alpha' "${fit[@]}" sand_loose.csv "${plate[@]}" --alpha 2
+edit '{ print $1, $2 }' && refuse 'bad.csv:1: no column force_n; name' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $3 = "nan" } { print }' && refuse "bad.csv:9: force_n 'nan' is not a finite number; correct" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $2 = "" } { print }' && refuse 'bad.csv:9: depth_m is missing; fill' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { print $1; next } { print }' && refuse 'bad.csv:9: depth_m is missing' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $2 = "1 mm" } { print }' && refuse "bad.csv:9: depth_m '1 mm'" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $3 = "1e999" } { print }' && refuse "bad.csv:9: force_n '1e999' is not a finite" "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $3 = "12,5" } { print }' && refuse 'bad.csv:9: 8 values under 7 columns; a decimal point' "${fit[@]}" bad.csv "${plate[@]}"
 awk 'BEGIN { print "depth_m,force_n"; for (i = 0; i <= 1000000; i++) print i * 1e-8 "," i }' >bad.csv
-bad 'bad.csv:1000002: more than 1000000 rows; take every tenth' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 9 { $1 = 0 } { print }' && bad 'bad.csv:9: time_s 0 does not come after' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR > 1 { $2 *= 1000 } { print }' && bad 'depth_m .* is beyond 2; it must be in metres' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR > 1 { $2 = -$2 } { print }' && bad 'depth_m: 0 of 2001 rows.*positive down' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR > 1 { $3 = -$3 } { print }' && bad 'force_n does not push back' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR < 9 { print }' && bad 'depth_m: 6 of 7 rows.*at least 8' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 1 { print $0, "depth_m"; next } { print }' && bad 'two columns are named depth_m' "${fit[@]}" bad.csv "${plate[@]}"
-edit 'NR == 1' && bad 'depth_m: 0 of 0 rows' "${fit[@]}" bad.csv "${plate[@]}"
-: >bad.csv && bad 'bad.csv: empty' "${fit[@]}" bad.csv "${plate[@]}"
-head -c 3000 "$mild" >bad.csv && bad 'bad.csv:' "${fit[@]}" bad.csv "${plate[@]}"
+refuse 'bad.csv:1000002: more than 1000000 rows; take every tenth' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 9 { $1 = 0 } { print }' && refuse 'bad.csv:9: time_s 0 does not come after' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR > 1 { $2 *= 1000 } { print }' && refuse 'depth_m .* is beyond 2; it must be in metres' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR > 1 { $2 = -$2 } { print }' && refuse 'depth_m: 0 of 2001 rows.*positive down' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR > 1 { $3 = -$3 } { print }' && refuse 'force_n does not push back' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR < 9 { print }' && refuse 'depth_m: 6 of 7 rows.*at least 8' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 1 { print $0, "depth_m"; next } { print }' && refuse 'two columns are named depth_m' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR == 1' && refuse 'depth_m: 0 of 0 rows' "${fit[@]}" bad.csv "${plate[@]}"
+: >bad.csv && refuse 'bad.csv: empty' "${fit[@]}" bad.csv "${plate[@]}"
+head -c 3000 "$mild" >bad.csv && refuse 'bad.csv:' "${fit[@]}" bad.csv "${plate[@]}"
 cp sand_loose.csv out_fit.csv
 "${fit[@]}" out_fit.csv "${plate[@]}" --figure out.png >/dev/null 2>&1 && fail "a record was written over"
 cmp -s sand_loose.csv out_fit.csv || fail "a record was changed"
 
-[ "$failures" = 0 ] && echo "all fine"
-exit $((failures > 0))
+finish "fit: all as expected"

@@ -1,29 +1,7 @@
 #!/usr/bin/env bash
 # Training and evaluation as a user runs them, on tiny networks: a resumed run equals one left alone, a full disk loses
 # nothing, a run folder cannot be taken twice, the evaluation's JSON keeps its contract. Usage: test_train.sh PATH_TO_MILD
-set -u
-mild=$(realpath "$1")
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-failures=0
-
-fail() {
-    echo "FAIL: $*" >&2
-    failures=$((failures + 1))
-}
-
-# bad PATTERN COMMAND...: exit code 2 and one line of error, progress apart, that holds the pattern.
-bad() {
-    local pattern=$1 errors
-    shift
-    errors=$("$@" 2>&1 >/dev/null </dev/null)
-    local got=$?
-    errors=$(grep -v '^training ' <<<"$errors")
-    [ "$got" = 2 ] || fail "exit $got instead of 2: $* -> $errors"
-    [ "$(wc -l <<<"$errors")" = 1 ] || fail "more than one line of error: $* -> $errors"
-    grep -q -- "$pattern" <<<"$errors" || fail "no '$pattern' in the error of: $* -> $errors"
-}
+source "$(dirname "$0")/../kit.sh" "$1"
 
 good() {
     local output
@@ -75,7 +53,7 @@ policy_before=$(cksum <full/policy.safetensors)
     failures=0
     trap '' XFSZ
     ulimit -f 64
-    bad "cannot be written" "$mild" train --out full "${tiny[@]}" --train.iterations=4 --resume
+    expect 2 "cannot be written" "$mild" train --out full "${tiny[@]}" --train.iterations=4 --resume
     exit $failures
 ) || fail "full disk"
 [ "$(cksum <full/policy.safetensors)" = "$policy_before" ] || fail "a full disk changed the policy"
@@ -108,7 +86,7 @@ number='-\?[0-9][0-9.e+-]*'
 row='{"ground":"[a-z0-9_+]*"'
 for key in speed trials success velocity cot torque_max clearance penetration drift energy; do row+=",\"$key\":$number"; done
 row+="\(,\"[a-z_]*\":$number\)*}"
-grep -qx "{\"policy\":\"whole/policy.safetensors\",\"robot\":\"sa01\",\"version\":\"[0-9.]*[^\"]*\",\"rows\":\[$row\(,$row\)\{3\}\]}" \
+grep -qx "{\"policy\":\"whole/policy.safetensors\",\"robot\":\"sa01\",\"model\":\"mild\",\"version\":\"[0-9.]*[^\"]*\",\"rows\":\[$row\(,$row\)\{3\}\]}" \
     <<<"$json" || fail "eval.json: $json"
 good "$mild" eval --policy whole/policy.safetensors --ground rigid,rubber+sand_loose --speed 0,0.6 --trials 2 --seconds 3 \
     --threads 1 --json again.json
@@ -116,5 +94,4 @@ same eval.json again.json
 "$mild" eval --policy whole/policy.safetensors --ground rigid --trials 1 --seconds 0.1 --json - 2>/dev/null | head -c 1 |
     grep -q '{' || fail "--json -: standard output is not the JSON alone"
 
-[ $failures = 0 ] && echo "training and evaluation: all as expected"
-exit $((failures > 0))
+finish "training and evaluation: all as expected"

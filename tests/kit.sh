@@ -1,0 +1,43 @@
+# What the tests of the program share: an empty folder to work in, failures counted, bad input checked. To be sourced with the
+# program's path: source kit.sh PATH_TO_MILD
+set -u
+mild=$(realpath "$1")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+failures=0
+
+fail() {
+    echo "FAIL: $*" >&2
+    failures=$((failures + 1))
+}
+
+# finish TEXT: says it when nothing failed, and exits.
+finish() {
+    [ "$failures" = 0 ] && echo "$1"
+    exit $((failures > 0))
+}
+
+# expect CODE PATTERN COMMAND...: exit code, and a pattern in what it prints (both streams).
+expect() {
+    local code=$1 pattern=$2 output
+    shift 2
+    output=$("$@" 2>&1 </dev/null)
+    local got=$?
+    [ "$got" = "$code" ] || fail "exit $got instead of $code: $* -> $output"
+    grep -q -- "$pattern" <<<"$output" || fail "no '$pattern' in the output of: $* -> $output"
+}
+
+# bad PATTERN COMMAND...: exit code 2, one line of error (progress apart) that holds the pattern, no file made or lost.
+bad() {
+    local pattern=$1 errors before
+    shift
+    before=$(find . | sort)
+    errors=$("$@" 2>&1 >/dev/null </dev/null)
+    local got=$?
+    errors=$(grep -v '^training ' <<<"$errors")
+    [ "$got" = 2 ] || fail "exit $got instead of 2: $* -> $errors"
+    [ "$(wc -l <<<"$errors")" = 1 ] || fail "more than one line of error: $* -> $errors"
+    grep -q -- "$pattern" <<<"$errors" || fail "no '$pattern' in the error of: $* -> $errors"
+    [ "$(find . | sort)" = "$before" ] || fail "files came or went: $*"
+}
