@@ -56,7 +56,7 @@ static size_t crc_position(const unsigned char *bytes, size_t size) {
     const size_t key = sizeof CRC_KEY - 1;
     size_t end = size < PREFIX ? 0 : PREFIX + (size_t)header_length(bytes);
     for (size_t i = PREFIX; i + key + CRC_DIGITS < end; i++) {
-        if (memcmp(bytes + i, CRC_KEY, key) == 0) {
+        if (bytes[i] == '"' && memcmp(bytes + i, CRC_KEY, key) == 0) {
             return bytes[i + key + CRC_DIGITS] == '"' ? i + key : 0;
         }
     }

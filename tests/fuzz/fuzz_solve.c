@@ -4,24 +4,28 @@
 #include "fuzz.h"
 #include "mild/ground.h"
 
-enum { STEPS = 2, NEWTON_WORK = 16, SWEEPS = 6 };
+enum { STEPS = 2, NEWTON_WORK = 16, SWEEPS = 6, PRINT_TILES = 8 };
 
 /* What a model stands on: the raster, or one element in its middle. */
 typedef struct {
     MildSole *soles[MILD_FEET_MAX];
-    MildScratch *scratch[MILD_FEET_MAX]; /* for one foot, for two */
-    MildGround *ground[MILD_FEET_MAX];
+    MildScratch *scratch[MILD_FEET_MAX];  /* for one foot, for two */
+    MildGround *ground[2][MILD_FEET_MAX]; /* without prints, with */
 } Feet;
 
 static Feet raster, concentric;
+static MildMap *maps[3]; /* none, rough ground of two materials, a slope */
 
 static void feet_finish(Feet *feet) {
     const MildSole *const *all = (const MildSole *const *)feet->soles;
     for (int count = 1; count <= MILD_FEET_MAX; count++) {
         feet->scratch[count - 1] = mild_scratch_create(all, count, NULL);
-        void *block = malloc(mild_ground_bytes(all, count));
-        fuzz_check(feet->scratch[count - 1] && block);
-        feet->ground[count - 1] = mild_ground_init(block, all, count);
+        fuzz_check(feet->scratch[count - 1] != NULL);
+        for (int prints = 0; prints < 2; prints++) {
+            void *block = malloc(mild_ground_bytes_prints(all, count, PRINT_TILES * prints));
+            fuzz_check(block != NULL);
+            feet->ground[prints][count - 1] = mild_ground_init_prints(block, all, count, PRINT_TILES * prints);
+        }
     }
 }
 
@@ -37,6 +41,17 @@ static void make_feet(void) {
     }
     feet_finish(&raster);
     feet_finish(&concentric);
+    MildMapDef rough = mild_map_def_default(), slope = rough;
+    rough.kind = MILD_MAP_ROUGH;
+    rough.cell = 0.05;
+    rough.size = 1.6;
+    rough.patches = MILD_PATTERN_CHECKER;
+    rough.patch_size = 0.1;
+    rough.border = 0.1;
+    slope.kind = MILD_MAP_SLOPE;
+    maps[1] = mild_map_create(&rough, NULL);
+    maps[2] = mild_map_create(&slope, NULL);
+    fuzz_check(maps[1] && maps[2]);
 }
 
 /* Feet just in the ground, level and at rest, 5 kg each. */
@@ -96,6 +111,7 @@ static MildTerrain take_terrain(Bytes *bytes) {
     double *value = (double *)((char *)&other + mild_material_fields[take_below(bytes, 13)].offset);
     *value = take_number(bytes, 1.0);
     if (mild_material_check(&other, NULL) == MILD_OK) terrain.materials[terrain.material_count++] = other;
+    mild_terrain_set_map(&terrain, maps[take_below(bytes, 3)], NULL); /* refused when there is one material only */
     MildPatch patch = {take_number(bytes, 0.1), take_number(bytes, 0.1), -1.0, 1.0, terrain.material_count - 1};
     mild_terrain_add_patch(&terrain, &patch, NULL);
     return terrain;
@@ -103,7 +119,7 @@ static MildTerrain take_terrain(Bytes *bytes) {
 
 /* Lifted, every element forgets; put down again on ordinary ground, the foot is carried. */
 static void check_usable(const Feet *feet, int count, const MildMaterial *material) {
-    MildGround *memory = feet->ground[count - 1];
+    MildGround *memory = feet->ground[0][count - 1];
     MildScratch *work = feet->scratch[count - 1];
     MildTerrain terrain = mild_terrain_uniform(material);
     MildContactInput away = quiet_input(count), quiet = away;
@@ -123,7 +139,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     MildTerrain terrain = take_terrain(&bytes);
     const Feet *feet = mild_model_is_concentric((MildModel)terrain.materials[0].model) ? &concentric : &raster;
     int count = 1 + take_below(&bytes, MILD_FEET_MAX);
-    MildGround *memory = feet->ground[count - 1];
+    int prints = take_below(&bytes, 2);
+    MildGround *memory = feet->ground[prints][count - 1];
     mild_ground_reset(memory);
     for (int step = 0; step < STEPS && bytes.at < bytes.end; step++) {
         MildContactInput input = quiet_input(count);
@@ -133,6 +150,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         check_result(&input, &result, feet);
         mild_ground_advance(memory, &terrain, &input, feet->scratch[count - 1], &result);
     }
-    if (fuzz_sample(data, size, 4)) check_usable(feet, count, &terrain.materials[0]);
+    if (!prints && fuzz_sample(data, size, 4)) check_usable(feet, count, &terrain.materials[0]);
     return 0;
 }
