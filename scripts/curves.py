@@ -172,8 +172,48 @@ def sinkage(folder, path):
     finish(figure, [axes], path)
 
 
+MODELS = {  # colour, line, name in the legend
+    "mild": ("#0b4f8a", "-", "mild"),
+    "ecc_spring": ("#3d8c40", "-", "ecc_spring"),
+    "ecc_quasi": ("#d9972e", "-", "ecc_quasi"),
+    "ecc_quasi_3d": ("#a8551c", (0, (4, 2)), "ecc_quasi_3d"),
+    "con_cone": ("#7a4fa3", "-", "con_cone"),
+    "con_spring": ("#c23b3b", (0, (4, 2)), "con_spring"),
+}
+TILTS = (0, 1, 2, 3, 4, 6, 8, 10, 12, 14, 17, 20)
+
+
+def at_depth(data, wanted, column):
+    """On the way down."""
+    depth, values = data["depth_m"], data[column]
+    for i in range(1, len(depth)):
+        if depth[i] >= wanted:
+            share = (wanted - depth[i - 1]) / (depth[i] - depth[i - 1])
+            return values[i - 1] + share * (values[i] - values[i - 1])
+    return math.nan
+
+
+def eccentric(folder, path):
+    figure, (force, moment, tilt) = plt.subplots(1, 3, figsize=(12, 4), layout="constrained")
+    for model, (color, line, name) in MODELS.items():
+        style = {"color": color, "linestyle": line, "linewidth": 1.8, "label": name}
+        data = read(folder, f"{model}_10")
+        depth, push = down(data)
+        turn = data["moment_y_nm"][1:len(depth) + 1]
+        force.plot([1e3 * d for d in depth], push, **style)
+        moment.plot([1e3 * d for d in depth], [-m for m in turn], **style)
+        righting = [-at_depth(read(folder, f"{model}_{t}"), 0.015, "moment_y_nm") for t in TILTS]
+        tilt.plot(TILTS, righting, **style)
+    force.set(xlabel="depth of the plate's middle [mm]", ylabel="force [N]", title="tilted by 10°")
+    moment.set(xlabel="depth of the plate's middle [mm]", ylabel="righting moment [N m]", title="tilted by 10°")
+    tilt.set(xlabel="tilt [deg]", ylabel="righting moment [N m]", title="middle 15 mm deep")
+    tilt.text(20, 0.2, "con_cone, con_spring", ha="right", va="bottom", fontsize=9, color=MODELS["con_cone"][0])
+    force.legend(frameon=False, fontsize=9)
+    finish(figure, [force, moment, tilt], path)
+
+
 def main(arguments):
-    figures = {"presets": presets, "recovery": recovery, "impact": impact, "sinkage": sinkage}
+    figures = {"presets": presets, "recovery": recovery, "impact": impact, "sinkage": sinkage, "eccentric": eccentric}
     if len(arguments) != 3 or arguments[0] not in figures:
         sys.exit(__doc__)
     figures[arguments[0]](arguments[1], arguments[2])

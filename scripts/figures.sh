@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the curves of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage]; all of them without a name.
+# Makes the curves of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric]; all of them without a name.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -45,11 +45,21 @@ impact() {
     done
 }
 
+# A plate of 11 x 7 elements tilted front edge down, under every model.
+eccentric() {
+    for model in mild con_cone con_spring ecc_spring ecc_quasi ecc_quasi_3d; do
+        for tilt in 0 1 2 3 4 6 8 10 12 14 17 20; do
+            record "${model}_$tilt" --ground sand_loose --model "$model" --plate 0.2145,0.1365 --depth 0.02 --speed 0.001 \
+                --tilt $tilt
+        done
+    done
+}
+
 for name in "${@:-all}"; do
     case $name in
-    presets | recovery | impact) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
+    presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage; do "$0" "$each"; done ;;
-    *) echo "figures: no figure '$name'; there are presets recovery impact sinkage" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric; do "$0" "$each"; done ;;
+    *) echo "figures: no figure '$name'; there are presets recovery impact sinkage eccentric" >&2 && exit 2 ;;
     esac
 done
