@@ -57,7 +57,9 @@ typedef struct {
     double *mu, *drift_radius, *damping; /* [-], [N s], [N s/m * s] */
     double *k_drift, *b_drift, *recovery, *mass_rate; /* material, for the preparation */
     double *depth_max, *drift;                       /* memory, compacted */
-    double *lead; /* [m] ahead of the element that it carries its front; 0 but for resistive force theory, see resist.c */
+    /* resistive force theory, see resist.c: [N/m] the law's cone before it depends on direction; [m] how far ahead of the
+     * element its front is, 0 for the other models */
+    double *strength, *lead;
     /* written by the passes */
     double *ix, *iy, *iz;                         /* [N s] impulse */
     double *fx, *fy;                              /* [N s] friction without the drift damping; sweeps only */

@@ -92,6 +92,7 @@ static void slot_set_law(const Slots *s, int i, const Law *law, const MildMateri
     s->k_drift[i] = material->k_drift;
     s->b_drift[i] = material->b_drift;
     s->recovery[i] = material->recovery;
+    s->strength[i] = law->cone;
     s->lead[i] = 0.0;
 }
 

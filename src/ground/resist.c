@@ -86,18 +86,18 @@ static void way_alpha(int model, const Way *way, const double *normal, double le
     alpha[1] = force[2];
 }
 
-static void slot_resist(const Slots *s, int i, const Law *law, double dt, double sideways, double downward) {
-    double u0 = s->depth[i], peak = RESIST_PEAK * law->cone, share = step_min(step_max(downward / RESIST_PEAK, 0.0), 1.0);
+static void slot_resist(const Slots *s, int i, double dt, double sideways, double downward) {
+    double u0 = s->depth[i], level = s->strength[i], peak = RESIST_PEAK * level, share = step_min(step_max(downward / RESIST_PEAK, 0.0), 1.0);
     double lead = CONTACT_ELASTIC * (1.0 - share);
     double led = u0 > 0.0 ? step_min(u0 + lead, u0 / (share + STEP_TINY)) : 0.0, a = step_max(led, s->front[i]);
-    double in_bed = a - law->bed, bed = in_bed > 0.0 ? law->bed_stiffness : 0.0;
+    double in_bed = a - s->bed[i], bed = in_bed > 0.0 ? s->bed_stiffness[i] : 0.0;
     s->cone[i] = share * peak;
     s->lead[i] = lead;
     s->front[i] = a;
     s->front_force[i] = peak * a + bed * in_bed;
     s->line[i] = step_max(s->front_force[i] / (step_min(CONTACT_ELASTIC, a) + STEP_TINY), peak + bed);
     s->reach[i] = (a - u0) / dt;
-    s->drift_radius[i] += dt * law->cone * step_max(sideways, 0.0) * step_max(u0, 0.0);
+    s->drift_radius[i] += dt * level * step_max(sideways, 0.0) * step_max(u0, 0.0);
 }
 
 static int any_resistive(const MildTerrain *terrain) {
@@ -114,14 +114,13 @@ void slots_resist(MildScratch *scratch, const MildTerrain *terrain, int f, doubl
     double side = rotation[8] > 0.0 ? -1.0 : 1.0; /* of the sole's two faces the one that looks down */
     const double normal[3] = {side * rotation[2], side * rotation[5], step_min(side * rotation[8], -1e-6)};
     for (int k = 0; k < foot->active; k++) {
-        int i = foot->start + k, m = scratch->slot_material[i] & 0xff; /* the nearer at a border */
-        int model = terrain->materials[m].model;
-        if (!model_is_resistive(model)) continue;
+        int i = foot->start + k, model = terrain->materials[scratch->slot_material[i] & 0xff].model; /* the nearer one's */
+        if (!model_is_resistive(model) || s->flat[i] != 0.0) continue; /* blended with a cone: as a level plate */
         double px = s->px[i], py = s->py[i], pz = s->pz[i], down[2], level[2];
         Way way = element_way(twist[0] + twist[4] * pz - twist[5] * py, twist[1] + twist[5] * px - twist[3] * pz,
-                              twist[4] * px - twist[3] * py - twist[2], normal);
+                              slot_descent(s, i, twist), normal);
         way_alpha(model, &way, normal, way.speed, way.down + RESIST_REST, down);
         way_alpha(model, &way, normal, way.speed + RESIST_REST, way.down, level);
-        slot_resist(s, i, &scratch->derived[f][m].law, dt, level[0], down[1]);
+        slot_resist(s, i, dt, level[0], down[1]);
     }
 }
