@@ -333,10 +333,13 @@ Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *pa
     const char *end = NULL;
     cJSON *header = cJSON_ParseWithLengthOpts((const char *)bytes + PREFIX, length, &end, 0);
     int count = cJSON_IsObject(header) ? cJSON_GetArraySize(header) : -1;
-    Safetensors *file =
-        count >= 0 && count <= TENSORS_MAX ? calloc(1, sizeof *file + (size_t)count * sizeof(Safetensor)) : NULL;
+    int readable = count >= 0 && count <= TENSORS_MAX;
+    Safetensors *file = readable ? calloc(1, sizeof *file + (size_t)count * sizeof(Safetensor)) : NULL;
     if (!file) {
-        damaged(path, "its header cannot be read", error);
+        if (readable)
+            mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
+        else
+            damaged(path, "its header cannot be read", error);
         cJSON_Delete(header);
         free(bytes);
         return NULL;
