@@ -161,25 +161,45 @@ static void ground_cases(GroundBench *bench, const Robot *robot, double dt, Benc
     }
 }
 
-MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError *error) {
-    Robot *robot = open_robot(error);
-    if (!robot) return MILD_ERROR_IO;
+/* Newton on each rival of mild at rest: one element for the concentric ones. */
+static const char *const rival_names[MILD_MODELS] = {
+    [MILD_MODEL_CON_CONE] = "newton_con_cone",       [MILD_MODEL_CON_SPRING] = "newton_con_spring",
+    [MILD_MODEL_ECC_SPRING] = "newton_ecc_spring",   [MILD_MODEL_ECC_QUASI] = "newton_ecc_quasi",
+    [MILD_MODEL_ECC_QUASI_3D] = "newton_ecc_quasi_3d"};
+
+static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchReport *report, MildError *error) {
+    MildMaterial mild, material;
+    robot_set_model(robot, model);
+    mild_material_preset(bench_preset, &mild);
+    MildStatus status = robot_match_model(robot, model, &mild, &material, error);
+    if (status != MILD_OK) return status;
     const MildSole *const *soles = robot_soles(robot);
-    MildMaterial material;
-    mild_material_preset(bench_preset, &material);
     GroundBench bench = {.terrain = mild_terrain_uniform(&material)};
     void *block = aligned_alloc(64, mild_ground_bytes(soles, ROBOT_FEET));
     bench.scratch = mild_scratch_create(soles, ROBOT_FEET, error);
-    MildStatus status = MILD_OK;
     if (block && bench.scratch) {
         bench.ground = mild_ground_init(block, soles, ROBOT_FEET);
-        ground_cases(&bench, robot, def->task.physics_dt, report);
-        bench_add(report, "ground", "elements", mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");
+        if (model == MILD_MODEL_MILD) {
+            ground_cases(&bench, robot, dt, report);
+            bench_add(report, "ground", "elements", mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");
+        } else {
+            ground_settle(&bench, robot, dt);
+            bench_add(report, "ground", rival_names[model], ground_time(&bench, 0), "ns");
+        }
     } else {
         status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     }
     mild_scratch_destroy(bench.scratch);
     free(block);
+    return status;
+}
+
+MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError *error) {
+    Robot *robot = open_robot(error);
+    if (!robot) return MILD_ERROR_IO;
+    MildStatus status = MILD_OK;
+    for (int model = 0; model < MILD_MODEL_RIGID && status == MILD_OK; model++)
+        status = ground_model((MildModel)model, robot, def->task.physics_dt, report, error);
     robot_destroy(robot);
     return status;
 }
