@@ -29,7 +29,7 @@ MILD_API_BEGIN
 #define MILD_MATERIALS_MAX 12 /* in one terrain */
 #define MILD_PATCHES_MAX 16 /* in one terrain */
 
-/* ---- ground models: the paper's and its rivals behind one contract (docs/model.md section 21) ----
+/* ---- ground models: the paper's and its rivals behind one contract (docs/model.md, "Ground models") ----
  * A model is where the elements are (con_*: one in the middle of the sole, mild_sole_concentric; the others: the raster)
  * and what a material means to an element. Solvers, memory, friction, drift and results are the same for all. */
 typedef enum {
