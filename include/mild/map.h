@@ -41,7 +41,7 @@ typedef struct {
     uint64_t seed;     /* of rough */
     int patches;       /* MildPattern */
     double patch_size; /* [m] */
-    int patch_count;   /* materials that stripes and checker take in turn */
+    int patch_count;   /* materials that stripes and checker take in turn, 1 .. 255 */
     double border;     /* [m] width over which two materials blend; 0: a sharp border */
     /* of kind and patches `image`; read by mild_map_create, not kept */
     const double *heights;           /* [height_rows][height_columns] [-] */
@@ -53,7 +53,7 @@ typedef struct {
 /* Level ground of one material; the other numbers are those of a moderate terrain, used as soon as `kind` or `patches`
  * says so. */
 MildMapDef mild_map_def_default(void);
-/* All but the images: validation, config keys, help. */
+/* All but patch_count and the images: validation, config keys, help. */
 extern const MildField mild_map_fields[];
 extern const int mild_map_field_count;
 
@@ -72,6 +72,8 @@ size_t mild_map_bytes(const MildMap *map);
 int mild_map_label_count(const MildMap *map);
 /* Bool: the height is the same everywhere. */
 int mild_map_is_level(const MildMap *map);
+/* [m] Edges of the rectangle that repeats, or that an image covers: the larger of heights and labels; 0 for a plane. */
+void mild_map_extent(const MildMap *map, double *x, double *y);
 /* [m] lowest and highest point of what repeats; infinite on a slope. */
 void mild_map_range(const MildMap *map, double *low, double *high);
 

@@ -25,6 +25,7 @@ typedef struct {
     int threads;
     EvalDef eval;
     TaskDef task;
+    TerrainDef terrain;
     GroundsDef finish;
     EvalRow rows[ROWS_MAX];
     int row_count;
@@ -60,10 +61,12 @@ static MildStatus write_json(const Eval *e, MildError *error) {
     return report_save(root, e->json, error);
 }
 
-static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildError *error) {
+static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildMap **map, MildError *error) {
+    *map = NULL;
     MildStatus status = scene_make(scene, name, e->patch, error);
     if (status == MILD_OK) status = grounds_finish_scene(&e->finish, scene, error);
     if (status == MILD_OK) status = task_def_check(&e->task, error);
+    if (status == MILD_OK) status = grounds_lay_map(&e->finish, scene, map, error);
     return status;
 }
 
@@ -75,7 +78,8 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
     fprintf(table, "%s\n", line);
     for (int g = 0; g < e->grounds.count; g++) {
         Scene scene;
-        MildStatus status = make_scene(e, e->grounds.name[g], &scene, error);
+        MildMap *map;
+        MildStatus status = make_scene(e, e->grounds.name[g], &scene, &map, error);
         for (int s = 0; status == MILD_OK && s < e->speeds.count; s++) {
             e->eval.speed = e->speeds.value[s];
             EvalRow *row = &e->rows[e->row_count];
@@ -87,6 +91,7 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
                 fflush(table);
             }
         }
+        mild_map_destroy(map);
         if (status != MILD_OK) {
             return status;
         }
@@ -99,7 +104,9 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
     MildStatus status = MILD_OK;
     Scene scene;
     for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
-        status = make_scene(e, e->grounds.name[g], &scene, error);
+        MildMap *map;
+        status = make_scene(e, e->grounds.name[g], &scene, &map, error);
+        mild_map_destroy(map);
     }
     return status;
 }
@@ -116,7 +123,7 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     Robot *robot = pool ? robot_create(path_data("models/sa01/sa01.xml", path), error) : NULL;
     Controller controller = {0};
     if (robot) {
-        e->finish = grounds_for_robot(model, robot, &e->task, args);
+        e->finish = grounds_for_robot(model, robot, &e->task, &e->terrain, args);
         status = check_grounds(e, error);
     } else {
         status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
@@ -141,6 +148,7 @@ int cmd_eval(int argc, char **argv) {
     e->policy = path_data("policies/mild.safetensors", shipped);
     e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
     e->patch = 2.5;
+    e->terrain = terrain_def_default();
     e->speeds = (CliNumbers){1, {0.6}};
     e->grounds.count = 3;
     strcpy(e->grounds.name[0], "rigid");
@@ -167,8 +175,9 @@ int cmd_eval(int argc, char **argv) {
                    "undisturbed ground, sinkage and slip of each stance, energy. Sensors are noisy and late as in\n"
                    "training; the robot itself is nominal and nobody pushes it.",
         .options = options, .option_count = sizeof options / sizeof *options,
-        .overrides = "any key of sections [task] and [ground], e.g. --task.physics_dt=0.001 --ground.mu=0.4",
-        .examples = "  mild eval --ground rigid,foam45,sand_loose --speed 0.3,0.6\n",
+        .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 --terrain.kind=waves --terrain.memory=true",
+        .examples = "  mild eval --ground rigid,foam45,sand_loose --speed 0.3,0.6\n"
+                    "  mild eval --ground sand_loose --terrain.kind=rough --terrain.amplitude=0.02\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     int code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;

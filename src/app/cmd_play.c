@@ -27,6 +27,8 @@ typedef struct {
     int width, height;
     GroundsDef finish;
     TaskDef task;
+    TerrainDef terrain;
+    MildMap *map;
     Scene scene;
     const char *names[MILD_MATERIALS_MAX];
     Play play;
@@ -55,6 +57,7 @@ static MildStatus make_scene(Command *c, MildError *error) {
     }
     MildStatus status = scene_make(&c->scene, name, c->patch, error);
     if (status == MILD_OK) status = grounds_finish_scene(&c->finish, &c->scene, error);
+    if (status == MILD_OK) status = grounds_lay_map(&c->finish, &c->scene, &c->map, error);
     return status == MILD_OK ? task_def_check(&c->task, error) : status;
 }
 
@@ -205,7 +208,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     }
     Robot *robot = robot_create(path_data("models/sa01/sa01.xml", xml), error);
     if (!robot) return error->status;
-    c->finish = grounds_for_robot(model, robot, &c->task, args);
+    c->finish = grounds_for_robot(model, robot, &c->task, &c->terrain, args);
     play->task = &c->task, play->scene = &c->scene, play->robot = robot, play->controller = &controller;
     play->window = !c->video && !c->pressure;
     status = make_scene(c, error);
@@ -216,6 +219,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     pressure_destroy(play->pressure);
     controller_destroy(&controller);
     robot_destroy(robot);
+    mild_map_destroy(c->map);
     return status;
 }
 
@@ -246,9 +250,10 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
             "mouse turns the camera, Esc quits. Afterwards a table: a row for each ground.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
-        .overrides = "any key of sections [task] and [ground], e.g. --task.physics_dt=0.001 --ground.mu=0.4",
+        .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 --terrain.kind=waves --terrain.memory=true",
         .examples = "  mild play --ground rubber,foam45,sand_loose --video out/walk.mp4 --pressure out/pressure.png\n"
-                    "  mild play --ground foam28 --speed 0.4\n",
+                    "  mild play --ground foam28 --speed 0.4\n"
+                    "  mild play --ground sand_loose --terrain.kind=waves --terrain.memory=true --video out/waves.mp4\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     if (outcome != CLI_RUN) return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
@@ -264,6 +269,7 @@ int cmd_play(int argc, char **argv) {
         char shipped[PATH_SIZE];
         c->policy = path_data("policies/mild.safetensors", shipped);
         c->patch = 2;
+        c->terrain = terrain_def_default();
         c->width = 960, c->height = 540;
         c->play.speed = 0.6;
         c->play.seed = 1;

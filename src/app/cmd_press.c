@@ -77,8 +77,8 @@ static double sole_area(const MildSole *sole) {
 /* The material of the model, matched on this tool under the pressure of half the robot on its own sole; and the sole that
  * the model presses with. */
 static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *args, MildMaterial *material,
-                                 MildError *error) {
-    GroundsDef finish = {.model = model, .sole = tool->raster, .load = 1, .args = args};
+                                 TerrainDef *terrain, MildError *error) {
+    GroundsDef finish = {.model = model, .sole = tool->raster, .load = 1, .args = args, .terrain = terrain};
     MildStatus status = model == MILD_MODEL_MILD ? MILD_OK : tool_open_robot(tool, error);
     if (status == MILD_OK && tool->robot)
         finish.load = robot_half_weight(tool->robot) * sole_area(tool->raster) / sole_area(robot_rasters(tool->robot)[0]);
@@ -282,7 +282,7 @@ static CliOutcome options_parse(const CliOption *table, int count, int argc, cha
         .summary = summary,
         .options = table,
         .option_count = count,
-        .overrides = "any parameter of the ground, e.g. --ground.k_pen=500; `mild info grounds` lists them",
+        .overrides = "any key of sections [ground] and [terrain], e.g. --ground.k_pen=500 --terrain.kind=waves; `mild info grounds` lists the first",
         .examples = examples,
     };
     return cli_parse(&command, argc, argv, args);
@@ -411,11 +411,17 @@ int cmd_press(int argc, char **argv) {
     MildStatus status = options_check(&options, &error);
     if (status != MILD_OK) return cli_fail("press", &error);
     PressDef def = options_def(&options);
+    TerrainDef terrain = terrain_def_default();
+    MildMap *map = NULL;
     status = grounds_find(options.ground, &def.material, NULL, &error);
     if (status == MILD_OK) status = grounds_model(options.model, &args, &model, &error);
     if (status == MILD_OK) status = tool_open(&tool, options.plate, &error);
-    if (status == MILD_OK) status = tool_set_model(&tool, model, &args, &def.material, &error);
+    if (status == MILD_OK) status = tool_set_model(&tool, model, &args, &def.material, &terrain, &error);
+    if (status == MILD_OK) status = terrain_make(&terrain, 1, &map, &error);
+    def.map = map;
+    def.print_tiles = terrain_print_tiles(&terrain);
     if (status == MILD_OK) status = press_report(&options, &tool, &def, &error);
     tool_close(&tool);
+    mild_map_destroy(map);
     return status == MILD_OK ? 0 : cli_fail("press", &error);
 }

@@ -11,6 +11,7 @@ ExperimentDef experiment_def_default(void) {
         .ppo = ppo_def_default(),
         .policy = policy_def_default(),
         .task = task_def_default(),
+        .terrain = terrain_def_default(),
     };
     def.policy.observation = TASK_OBSERVATION;
     def.policy.frames = TASK_FRAMES;
@@ -27,6 +28,7 @@ void experiment_sections(ExperimentDef *def, ConfigSection sections[EXPERIMENT_S
     sections[3] = (ConfigSection){"task", task_fields, task_field_count, &def->task};
     sections[4] = (ConfigSection){"reward", reward_fields, reward_field_count, &def->task.reward};
     sections[5] = (ConfigSection){"randomize", randomize_fields, randomize_field_count, &def->task.randomize};
+    sections[6] = terrain_section(&def->terrain);
 }
 
 MildStatus experiment_check(const ExperimentDef *def, MildError *error) {
@@ -34,6 +36,10 @@ MildStatus experiment_check(const ExperimentDef *def, MildError *error) {
     if (status == MILD_OK) status = mild_fields_check(ppo_fields, ppo_field_count, &def->ppo, "ppo", error);
     if (status == MILD_OK) status = mild_fields_check(policy_fields, policy_field_count, &def->policy, "policy", error);
     if (status == MILD_OK) status = task_def_check(&def->task, error);
+    if (status == MILD_OK) {
+        ConfigSection terrain = terrain_section((TerrainDef[]){def->terrain});
+        status = mild_fields_check(terrain.fields, terrain.count, terrain.def, terrain.name, error);
+    }
     if (status != MILD_OK) return status;
     if (def->ppo.learning_rate_min > def->ppo.learning_rate_max) {
         return mild_fail(error, MILD_ERROR_RANGE, "ppo.learning_rate_min %g is above ppo.learning_rate_max %g",

@@ -1,8 +1,9 @@
-/* Everything that defines a training run: sections [train] [ppo] [policy] [task] [reward] [randomize]. */
+/* Everything that defines a training run: sections [train] [ppo] [policy] [task] [reward] [randomize] [terrain]. */
 #ifndef MILD_EXPERIMENT_H
 #define MILD_EXPERIMENT_H
 
 #include "app/config.h"
+#include "app/terrain.h"
 #include "app/train_def.h"
 #include "learn/ppo.h"
 #include "task/task_def.h"
@@ -12,9 +13,10 @@ typedef struct {
     PpoDef ppo;
     PolicyDef policy;
     TaskDef task;
+    TerrainDef terrain;
 } ExperimentDef;
 
-enum { EXPERIMENT_SECTIONS = 6 };
+enum { EXPERIMENT_SECTIONS = 7 };
 
 /* The defaults of every layer; the policy's widths are the task's. */
 ExperimentDef experiment_def_default(void);

@@ -42,9 +42,9 @@ MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *mod
                      name, text_nearest(name, (const char **)mild_model_names, MILD_MODELS));
 }
 
-GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, const CliArgs *args) {
+GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain, const CliArgs *args) {
     robot_set_model(robot, model);
-    return (GroundsDef){model, robot_rasters(robot)[0], robot_half_weight(robot), args, task};
+    return (GroundsDef){model, robot_rasters(robot)[0], robot_half_weight(robot), args, task, terrain};
 }
 
 ConfigSection grounds_section(MildMaterial *material) {
@@ -52,9 +52,11 @@ ConfigSection grounds_section(MildMaterial *material) {
 }
 
 static MildStatus overlay(const GroundsDef *def, MildMaterial *material, MildError *error) {
-    const ConfigSection sections[] = {grounds_section(material),
-                                      {"task", task_fields, task_field_count, def->task}};
-    return config_overrides(sections, def->task ? 2 : 1, def->args->overrides, def->args->override_count, error);
+    ConfigSection sections[3] = {grounds_section(material)};
+    int count = 1;
+    if (def->task) sections[count++] = (ConfigSection){"task", task_fields, task_field_count, def->task};
+    if (def->terrain) sections[count++] = terrain_section(def->terrain);
+    return config_overrides(sections, count, def->args->overrides, def->args->override_count, error);
 }
 
 MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildError *error) {
@@ -76,6 +78,28 @@ MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *
     for (int i = 0; status == MILD_OK && i < scene->terrain.material_count; i++)
         status = grounds_finish(def, &scene->terrain.materials[i], error);
     return status;
+}
+
+MildStatus grounds_lay_map(const GroundsDef *def, Scene *scene, MildMap **map, MildError *error) {
+    MildTerrain *terrain = &scene->terrain;
+    MildMap *made = NULL;
+    *map = NULL;
+    if (scene->rigid && terrain_has_map(def->terrain))
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "rigid is the engine's own level floor: leave out --terrain.kind and --terrain.patches, or name a soft ground");
+    MildStatus status = terrain_make(def->terrain, terrain->material_count, &made, error);
+    if (status == MILD_OK) status = mild_terrain_set_map(terrain, made, error);
+    if (status != MILD_OK) {
+        mild_map_destroy(made);
+        return status;
+    }
+    if (def->terrain->map.patches != MILD_PATTERN_NONE) terrain->patch_count = 0;
+    *map = made;
+    if (def->task) {
+        def->task->map = made;
+        def->task->print_tiles = terrain_print_tiles(def->terrain);
+    }
+    return MILD_OK;
 }
 
 static const char *list_names(int count, const char *(*name)(int), char *text, size_t size) {

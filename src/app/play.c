@@ -154,7 +154,7 @@ MildStatus play_run(Play *play, MildError *error) {
     Walk walk = {.play = play, .task = *play->task, .command = {play->speed, 0, 0}};
     walk.end = play->seconds;
     walk.task.episode = play->window ? WINDOW_TIME : play->seconds + 1.0;
-    walk.env = aligned_alloc(64, task_env_bytes(play->robot));
+    walk.env = aligned_alloc(64, task_env_bytes(&walk.task, play->robot));
     walk.sim = robot_sim_create(play->robot, walk.task.physics_dt, error);
     MildStatus status = MILD_OK;
     if (!walk.sim) status = error->status;

@@ -61,14 +61,16 @@ static double lowest_element(const Press *press) {
 static MildStatus press_open(Press *press, const PressDef *def, const MildSole *sole, PressResult *result,
                              MildError *error) {
     *press = (Press){.def = def, .sole = sole, .result = result, .terrain = mild_terrain_uniform(&def->material)};
-    press->block = aligned_alloc(64, mild_ground_bytes(&sole, 1));
+    if (mild_terrain_set_map(&press->terrain, def->map, error) != MILD_OK) return error->status;
+    press->terrain.height = -mild_terrain_height_at(&press->terrain, 0, 0);
+    press->block = aligned_alloc(64, mild_ground_bytes_prints(&sole, 1, def->print_tiles));
     if (!press->block) return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
     press->scratch = mild_scratch_create(&sole, 1, error);
     if (!press->scratch) {
         free(press->block);
         return MILD_ERROR_MEMORY;
     }
-    press->ground = mild_ground_init(press->block, &sole, 1);
+    press->ground = mild_ground_init_prints(press->block, &sole, 1, def->print_tiles);
     double c = cos(def->tilt), s = sin(def->tilt);
     const double rotation[9] = {c, 0, s, 0, 1, 0, -s, 0, c}; /* about y */
     press->input.feet = 1;
@@ -80,11 +82,11 @@ static MildStatus press_open(Press *press, const PressDef *def, const MildSole *
 }
 
 static double press_depth(const Press *press) {
-    return press->terrain.height - press->input.position[0][2] - press->offset[2];
+    return -press->input.position[0][2] - press->offset[2];
 }
 
 static void press_place(Press *press, double depth) {
-    press->input.position[0][2] = press->terrain.height - depth - press->offset[2];
+    press->input.position[0][2] = -depth - press->offset[2];
 }
 
 static void press_solve(Press *press) {

@@ -10,6 +10,8 @@ enum { PRESS_TURNS_MAX = 16 };
 /* All zero but material, speed and one turn: once down and up. A body is dropped when `mass` is above 0. */
 typedef struct {
     MildMaterial material;
+    const MildMap *map; /* borrowed; NULL: level. Its height at the start is depth 0 */
+    int print_tiles;    /* see mild_ground_bytes_prints */
     MildSolver solver;
     double tilt; /* [rad] about y, front edge down positive */
     double step; /* [s] 0: a thousandth of the first way by hand (0.02 mm with by_force), 1e-4 dropped */

@@ -7,8 +7,11 @@
 #include "base/clock.h"
 #include "gpu/learner.h"
 
+enum { TRAIN_MATERIALS = 3 }; /* drawn for the pattern of a terrain, as for stripes */
+
 struct Trainer {
     ExperimentDef def;
+    MildMap *map; /* NULL: level ground */
     Robot *robot;
     Pool *pool;
     Policy *policy;
@@ -21,6 +24,7 @@ void train_destroy(Trainer *trainer) {
         return;
     }
     vec_destroy(trainer->vec);
+    mild_map_destroy(trainer->map);
     ppo_destroy(trainer->ppo);
     policy_destroy(trainer->policy);
     pool_destroy(trainer->pool);
@@ -64,6 +68,11 @@ static int build(Trainer *trainer, MildError *error) {
     if (strcmp(def->train.device, "cuda") == 0 && gpu_learner_attach(trainer->ppo, error)) {
         return 0;
     }
+    if (terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error) != MILD_OK) {
+        return 0;
+    }
+    trainer->def.task.map = trainer->map;
+    trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
     trainer->vec = vec_create(&def->task, trainer->robot, trainer->pool, def->train.envs, def->train.seed, error);
     return trainer->vec != NULL;
 }

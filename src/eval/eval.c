@@ -136,7 +136,7 @@ static MildStatus make_trials(Trials *t, int trials, int threads, MildError *err
     t->over = calloc((size_t)trials, 1);
     int good = t->env && t->sim && t->measure && t->action && t->over;
     for (int i = 0; good && i < trials; i++) {
-        t->env[i] = aligned_alloc(64, task_env_bytes(t->robot));
+        t->env[i] = aligned_alloc(64, task_env_bytes(t->def, t->robot));
         good = t->env[i] != NULL;
     }
     if (!good) {

@@ -68,8 +68,9 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
         m->steady_time += m->dt;
         m->end_x = qpos[0];
         m->work += power_abs * m->dt;
-        m->base_low = fmin(m->base_low, qpos[2]);
-        m->base_high = fmax(m->base_high, qpos[2]);
+        double height = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]);
+        m->base_low = fmin(m->base_low, height);
+        m->base_high = fmax(m->base_high, height);
     }
     for (int f = 0; f < ROBOT_FEET; f++) {
         measure_foot(m, f, robot_sim_foot(sim, f), env->variation.rigid);

@@ -16,7 +16,6 @@ const MildField mild_map_fields[] = {
     MILD_FIELD(MildMapDef, seed, MILD_FIELD_UINT64, 1, 0, 1.8446744073709552e19, "[-] rough: which random heights"),
     MILD_FIELD_CHOICE(MildMapDef, patches, patterns, COUNT(patterns), "[-] pattern of the materials"),
     FIELD(patch_size, 0.01, 1000.0, "[m] width of a stripe, edge of a field, edge of a label image's pixel"),
-    MILD_FIELD(MildMapDef, patch_count, MILD_FIELD_INT, 1, 1, 12, "[-] materials that stripes and checker take in turn"),
     FIELD(border, 0.0, 100.0, "[m] width over which neighbouring materials blend; 0: a sharp border"),
 };
 const int mild_map_field_count = COUNT(mild_map_fields);
@@ -88,6 +87,12 @@ int mild_map_label_count(const MildMap *map) {
 
 int mild_map_is_level(const MildMap *map) {
     return map->height == NULL && map->slope == 0.0;
+}
+
+void mild_map_extent(const MildMap *map, double *x, double *y) {
+    const Grid *h = &map->heights, *l = &map->labels; /* all 0 when there is none */
+    *x = fmax(h->columns * h->cell_x, l->columns * l->cell_x);
+    *y = fmax(h->rows * h->cell_y, l->rows * l->cell_y);
 }
 
 void mild_map_range(const MildMap *map, double *low, double *high) {

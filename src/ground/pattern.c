@@ -1,4 +1,5 @@
 /* The labels of a map: which material each cell has, and near a border how much of the neighbour's. */
+#include <limits.h>
 #include <stdlib.h>
 
 #include "ground/map.h"
@@ -80,6 +81,8 @@ static MildStatus pattern_make(MildMap *map, const MildMapDef *def, int columns,
 MildStatus pattern_fill(MildMap *map, const MildMapDef *def, MildError *error) {
     int count = def->patch_count;
     if (def->patches == MILD_PATTERN_NONE) return MILD_OK;
+    if (count < 1 || count > UCHAR_MAX)
+        return mild_fail(error, MILD_ERROR_RANGE, "terrain.patches: patch_count = %d is outside 1 .. %d", count, UCHAR_MAX);
     if (def->border > def->patch_size)
         return mild_fail(error, MILD_ERROR_RANGE, "terrain.border = %g is wider than terrain.patch_size = %g", def->border,
                          def->patch_size);

@@ -87,6 +87,8 @@ const double *robot_sim_qpos(const RobotSim *sim);
 const double *robot_sim_qvel(const RobotSim *sim);
 const double *robot_sim_base_rotation(const RobotSim *sim); /* [9] base -> world, row major */
 const RobotFoot *robot_sim_foot(const RobotSim *sim, int foot);
+/* [m] Lowest point of both soles above the terrain under it; the feet's sole_height is taken above this terrain too. */
+double robot_sim_sole_clearance(RobotSim *sim, const MildTerrain *terrain);
 /* Kinematic contact test against the undisturbed ground: lowest point of the base box and of each shank [m]; < 0
  * touches. */
 double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain);

@@ -73,15 +73,32 @@ double robot_sim_dt(const RobotSim *sim) {
     return sim->dt;
 }
 
-/* Lowest point of the sole's outline above `height` [m]. */
-static double lowest_sole_point(const Robot *robot, int foot, const double position[3], const double turn[9],
-                                double height) {
+/* Lowest point of the sole's outline above z = 0 [m]. */
+static double lowest_sole_point(const Robot *robot, int foot, const double position[3], const double turn[9]) {
     double least = 1e9;
     for (int i = 0; i < robot->outline_points[foot]; i++) {
         double z = turn[6] * robot->outline[foot][2 * i] + turn[7] * robot->outline[foot][2 * i + 1];
         least = z < least ? z : least;
     }
-    return position[2] + turn[8] * robot->sole_z + least - height;
+    return position[2] + turn[8] * robot->sole_z + least;
+}
+
+/* The same above the ground under each point. */
+static double lowest_above_map(const Robot *robot, int foot, const double position[3], const double turn[9],
+                               const MildTerrain *terrain) {
+    double least = 1e9, c = robot->sole_z;
+    for (int i = 0; i < robot->outline_points[foot]; i++) {
+        double a = robot->outline[foot][2 * i], b = robot->outline[foot][2 * i + 1];
+        double x = position[0] + turn[0] * a + turn[1] * b + turn[2] * c, y = position[1] + turn[3] * a + turn[4] * b + turn[5] * c;
+        double z = position[2] + turn[6] * a + turn[7] * b + turn[8] * c;
+        least = fmin(least, z - mild_terrain_height_at(terrain, x, y));
+    }
+    return least;
+}
+
+static double sole_height(const Robot *robot, int f, const RobotFoot *foot, const MildTerrain *terrain) {
+    if (terrain && terrain->map) return lowest_above_map(robot, f, foot->position, foot->rotation, terrain);
+    return lowest_sole_point(robot, f, foot->position, foot->rotation) - (terrain ? terrain->height : 0.0);
 }
 
 /* Pose, twist and sole of a foot from the current kinematics. terrain: NULL for z = 0. */
@@ -101,8 +118,7 @@ static void observe_foot(RobotSim *sim, int f, const MildTerrain *terrain) {
     foot->sole_center_velocity[0] = foot->velocity[0] + w[1] * arm[2] - w[2] * arm[1];
     foot->sole_center_velocity[1] = foot->velocity[1] + w[2] * arm[0] - w[0] * arm[2];
     foot->sole_center_velocity[2] = foot->velocity[2] + w[0] * arm[1] - w[1] * arm[0];
-    double height = terrain ? mild_terrain_height_at(terrain, foot->sole_center[0], foot->sole_center[1]) : 0.0;
-    foot->sole_height = lowest_sole_point(sim->robot, f, foot->position, foot->rotation, height);
+    foot->sole_height = sole_height(sim->robot, f, foot, terrain);
 }
 
 /* Everything that depends on qpos and qvel only. */
@@ -125,6 +141,15 @@ void robot_sim_load(RobotSim *sim, const RobotState *state, const RobotVariation
     memset(sim->feet, 0, sizeof sim->feet);
     memset(&sim->contact, 0, sizeof sim->contact);
     update_pose(sim, NULL);
+}
+
+double robot_sim_sole_clearance(RobotSim *sim, const MildTerrain *terrain) {
+    double least = 1e9;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        sim->feet[f].sole_height = sole_height(sim->robot, f, &sim->feet[f], terrain);
+        least = fmin(least, sim->feet[f].sole_height);
+    }
+    return least;
 }
 
 void robot_sim_store(const RobotSim *sim, RobotState *state) {

@@ -13,8 +13,8 @@ static size_t env_header_bytes(void) {
     return (sizeof(TaskEnv) + 63) / 64 * 64;
 }
 
-size_t task_env_bytes(const Robot *robot) {
-    return env_header_bytes() + mild_ground_bytes(robot_soles(robot), ROBOT_FEET);
+size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
+    return env_header_bytes() + mild_ground_bytes_prints(robot_soles(robot), ROBOT_FEET, def->print_tiles);
 }
 
 MildGround *task_env_ground(TaskEnv *env) {
@@ -22,12 +22,20 @@ MildGround *task_env_ground(TaskEnv *env) {
 }
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed, uint32_t index) {
-    memset(env, 0, task_env_bytes(robot));
-    mild_ground_init(task_env_ground(env), robot_soles(robot), ROBOT_FEET);
+    memset(env, 0, task_env_bytes(def, robot));
+    mild_ground_init_prints(task_env_ground(env), robot_soles(robot), ROBOT_FEET, def->print_tiles);
     env->seed = seed;
     env->index = index;
     env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
     env->assist_level = 1;
+}
+
+static void lend_map(TaskEnv *env, const TaskDef *def) {
+    env->terrain.map = env->variation.rigid ? NULL : def->map;
+}
+
+static void return_map(TaskEnv *env) {
+    env->terrain.map = NULL;
 }
 
 /* ---- start of an episode ---- */
@@ -66,9 +74,20 @@ static void base_twist(const RobotSim *sim, double twist[6]) {
     memcpy(twist, qvel, 6 * sizeof *twist);
 }
 
+/* On uneven ground the lowest sole point starts as deep as both soles do on level ground. */
+static void start_on_map(TaskEnv *env, const Robot *robot, RobotSim *sim) {
+    double level = env->robot.qpos[2] - env->terrain.height - robot_stand_height(robot);
+    robot_sim_load(sim, &env->robot, &env->variation);
+    env->robot.qpos[2] += level - robot_sim_sole_clearance(sim, &env->terrain);
+}
+
 static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const TaskView *view) {
     mild_ground_reset(task_env_ground(env));
+    lend_map(env, def);
     draw_start(env, def, robot);
+    if (env->terrain.map && !mild_map_is_level(env->terrain.map)) {
+        start_on_map(env, robot, sim);
+    }
     if (!env->command_frozen) {
         task_draw_command(env, def);
     }
@@ -81,11 +100,13 @@ static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, 
     memset(env->term_sum, 0, sizeof env->term_sum);
     env->reward_sum = env->speed_error_sum = 0;
     robot_sim_load(sim, &env->robot, &env->variation);
+    robot_sim_sole_clearance(sim, &env->terrain);
     base_twist(sim, env->base_twist);
     TaskReading reading;
     task_read_imu(sim, &reading);
     task_read_motors(sim, &reading);
     task_observe(env, def, robot, sim, &reading, 1, view);
+    return_map(env);
 }
 
 void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const TaskView *view) {
@@ -286,6 +307,7 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     double torque[ROBOT_JOINTS];
     accept_action(env, def, action);
     push_base(env, def);
+    lend_map(env, def);
     robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
                          def->contact_tolerance, def->contact_iterations);
     robot_sim_load(sim, &env->robot, &env->variation);
@@ -308,5 +330,6 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     } else if (!bad) {
         task_observe(env, def, robot, sim, &reading, 0, view);
     }
+    return_map(env);
     return out;
 }

@@ -130,7 +130,7 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *ro
         *out++ = (float)(env->variation.com_offset[i] * 100);
     }
     out = write_ground(env, robot, sim, out);
-    *out++ = (float)(robot_sim_qpos(sim)[2] - env->terrain.height);
+    *out++ = (float)(robot_sim_qpos(sim)[2] - mild_terrain_height_at(&env->terrain, robot_sim_qpos(sim)[0], robot_sim_qpos(sim)[1]));
     *out++ = (float)env->strength[0];
     *out++ = (float)env->variation.armature_scale;
     double step = def->physics_dt / TASK_PERIOD;

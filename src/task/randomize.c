@@ -6,6 +6,7 @@
 #include "task/task.h"
 
 #define RANDOM_USE_EPISODE 0x45504953u
+#define RANDOM_USE_MAP 0x4d415050u
 #define RANDOM_USE_COMMAND 0x434f4d4du
 
 static double draw(Random *r, const double range[2]) {
@@ -88,6 +89,17 @@ static void draw_stripes(Random *r, const RandomizeDef *def, const Robot *robot,
     }
 }
 
+/* Somewhere on the map, a material for each of its labels. */
+static void draw_on_map(Random *r, const TaskDef *def, const Robot *robot, MildTerrain *terrain) {
+    double x, y;
+    mild_map_extent(def->map, &x, &y);
+    terrain->map_x = spread(r, 0.5 * x);
+    terrain->map_y = spread(r, 0.5 * y);
+    while (terrain->material_count < mild_map_label_count(def->map)) {
+        terrain->materials[terrain->material_count++] = draw_material(r, &def->randomize, robot);
+    }
+}
+
 static int draw_lag(Random *r, const TaskDef *def) {
     return (int)(draw(r, def->randomize.latency) / def->physics_dt + 0.5);
 }
@@ -99,7 +111,8 @@ void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot) {
     env->variation.rigid = random_unit(&r) < z->rigid_share || z->model == MILD_MODEL_RIGID;
     MildMaterial material = draw_material(&r, z, robot);
     env->terrain = mild_terrain_uniform(&material);
-    if (random_unit(&r) < z->patch_share) {
+    int striped = random_unit(&r) < z->patch_share;
+    if (striped && !(def->map && mild_map_label_count(def->map) > 1)) {
         draw_stripes(&r, z, robot, &env->terrain);
     }
     env->variation.rigid_friction = draw(&r, z->mu);
@@ -119,6 +132,10 @@ void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot) {
         env->motor_offset[i] = spread(&r, z->motor_offset);
     }
     env->assist_draw = random_uniform(&r, 0.5, 1);
+    if (def->map) {
+        Random place = random_at(env->seed ^ RANDOM_USE_MAP, env->index, env->tick);
+        draw_on_map(&place, def, robot, &env->terrain);
+    }
     env->lag_command = draw_lag(&r, def);
     env->lag_motor = draw_lag(&r, def);
     env->lag_imu = draw_lag(&r, def);

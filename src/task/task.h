@@ -35,7 +35,7 @@ typedef struct {
     int command_frozen;       /* bool: eval and play set the command themselves */
     /* what was drawn for this episode */
     RobotVariation variation;
-    MildTerrain terrain;
+    MildTerrain terrain; /* its map is lent by TaskDef during a call and NULL between calls: the block holds no pointer */
     double kp_scale[ROBOT_JOINTS], kd_scale[ROBOT_JOINTS], strength[ROBOT_JOINTS], motor_offset[ROBOT_JOINTS];
     int lag_command, lag_motor, lag_imu; /* [physics steps] */
     double assist_level;      /* [-] helping hand: falls with time on its feet, rises with falls; lives across episodes */
@@ -77,13 +77,13 @@ typedef struct {
     void *context;
 } TaskProbe;
 
-size_t task_env_bytes(const Robot *robot); /* TaskEnv and its ground memory, a multiple of 64 */
+size_t task_env_bytes(const TaskDef *def, const Robot *robot); /* TaskEnv and its ground memory, a multiple of 64 */
 MildGround *task_env_ground(TaskEnv *env);
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed, uint32_t index);
 /* Draws a new episode and writes its first observation. */
 void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const TaskView *view);
-/* As reset, but the caller has chosen the terrain and whether the engine's rigid ground is used. */
+/* As reset, but the caller has chosen the terrain (its map aside, which is the TaskDef's) and whether the engine's rigid ground is used. */
 void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const MildTerrain *terrain,
                        int rigid, const TaskView *view);
 /* One policy step. When the episode ends a new one is drawn (auto_reset) and its first observation written. */

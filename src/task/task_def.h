@@ -4,6 +4,7 @@
 
 #include "mild/error.h"
 #include "mild/field.h"
+#include "mild/map.h"
 
 /* Every reward term once: name, default weight, help. The struct, the config keys and the table of functions
  * (reward.c) are all made from this list. Weights are per second; source: paper Table II and learning.md section 5. */
@@ -95,6 +96,9 @@ typedef struct {
     int contact_iterations; /* [-] hard bound of its work */
     RewardDef reward;
     RandomizeDef randomize;
+    /* not of the config */
+    const MildMap *map; /* borrowed: shape and pattern of soft ground; NULL: level. Rigid ground stays level */
+    int print_tiles;    /* of prints, see mild_ground_bytes_prints */
 } TaskDef;
 
 TaskDef task_def_default(void);

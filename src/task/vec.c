@@ -44,7 +44,7 @@ Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, ui
         mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
         return NULL;
     }
-    *vec = (Vec){.def = *def, .robot = robot, .pool = pool, .envs = envs, .stride = task_env_bytes(robot)};
+    *vec = (Vec){.def = *def, .robot = robot, .pool = pool, .envs = envs, .stride = task_env_bytes(def, robot)};
     vec->state = aligned_alloc(64, (size_t)envs * vec->stride);
     vec->step = calloc((size_t)envs, sizeof *vec->step);
     vec->sim = calloc((size_t)pool_threads(pool), sizeof(RobotSim *));
@@ -185,7 +185,7 @@ uint64_t vec_hash(const Vec *vec) {
         hash = hash_bytes(hash, env->history, sizeof env->history);
         hash = hash_bytes(hash, env->command, sizeof env->command);
         hash = hash_bytes(hash, &env->reward_sum, sizeof env->reward_sum);
-        hash = hash_bytes(hash, task_env_ground(env), mild_ground_bytes(robot_soles(vec->robot), ROBOT_FEET));
+        hash = hash_bytes(hash, task_env_ground(env), mild_ground_size(task_env_ground(env)));
     }
     return hash;
 }

@@ -34,14 +34,16 @@ typedef struct {
 struct Relief {
     int columns, rows; /* tiles */
     int nx, ny;        /* vertices */
-    double x0, y0, cell, surface;
-    int rigid, feet;
+    double x0, y0, cell;
+    double low, high; /* [m] of the undisturbed surface drawn */
+    int uneven, rigid, feet;
     MildTerrain terrain;
     Look look[MILD_MATERIALS_MAX + 1]; /* last: rigid */
     SoleMask mask[MILD_FEET_MAX];
     Box last[MILD_FEET_MAX];
     double position[MILD_FEET_MAX][3], rotation[MILD_FEET_MAX][9];
     float *peak, *shown; /* [ny][nx] deepest and present depth of the surface */
+    float *base;         /* [ny][nx] [m] undisturbed height */
     unsigned char *touched, *dirty;
     signed char *material; /* [tiles] */
 };
@@ -134,7 +136,7 @@ static int mask_create(SoleMask *mask, const MildSole *sole) {
 
 /* Depth of the foot's sole plane under the vertical through (x, y), NO_DEPTH beside the sole. The plane's points p have
  * n.(p - ankle) = z_sole, n the foot's z axis. */
-static float sole_depth(const Relief *relief, int foot, double x, double y) {
+static float sole_depth(const Relief *relief, int foot, double x, double y, double surface) {
     const SoleMask *mask = &relief->mask[foot];
     const double *p = relief->position[foot], *r = relief->rotation[foot];
     double dx = x - p[0], dy = y - p[1];
@@ -145,7 +147,7 @@ static float sole_depth(const Relief *relief, int foot, double x, double y) {
     double fc = (sx - mask->x_min) / mask->step, fr = (sy - mask->y_min) / mask->step;
     if (fc < 0 || fr < 0 || fc >= mask->columns || fr >= mask->rows || !mask->inside[(int)fr * mask->columns + (int)fc])
         return NO_DEPTH;
-    return (float)(relief->surface - (p[2] + dz) + UNDER_SOLE);
+    return (float)(surface - (p[2] + dz) + UNDER_SOLE);
 }
 
 /* ---- surface ---- */
@@ -166,9 +168,9 @@ static void mark(Relief *relief, int i, int j) {
 
 static void update_vertex(Relief *relief, int i, int j) {
     double x = relief->x0 + i * relief->cell, y = relief->y0 + j * relief->cell;
-    float depth = NO_DEPTH;
-    for (int f = 0; f < relief->feet; f++) depth = fmaxf(depth, sole_depth(relief, f, x, y));
     size_t at = (size_t)j * (size_t)relief->nx + (size_t)i;
+    float depth = NO_DEPTH;
+    for (int f = 0; f < relief->feet; f++) depth = fmaxf(depth, sole_depth(relief, f, x, y, (double)relief->base[at]));
     if (depth <= (float)UNDER_SOLE && relief->peak[at] <= 0.0F) return;
     relief->peak[at] = fmaxf(relief->peak[at], depth);
     float left = (float)(1.0 - material_at(relief, x, y)->recovery) * relief->peak[at];
@@ -183,7 +185,7 @@ static Box foot_box(const Relief *relief, int foot) {
     double reach = relief->mask[foot].reach;
     const double *p = relief->position[foot];
     Box box = {0, 0, 0, 0};
-    if (p[2] - reach > relief->surface) return box;
+    if (p[2] - reach > relief->high) return box;
     double i0 = floor((p[0] - reach - relief->x0) / relief->cell),
            i1 = ceil((p[0] + reach - relief->x0) / relief->cell);
     double j0 = floor((p[1] - reach - relief->y0) / relief->cell),
@@ -232,15 +234,26 @@ static void find_materials(Relief *relief) {
 
 static int allocate(Relief *relief, const MildSole *const *soles) {
     size_t vertices = (size_t)relief->nx * (size_t)relief->ny, tiles = (size_t)relief->columns * (size_t)relief->rows;
-    relief->peak = calloc(2 * vertices, sizeof *relief->peak);
+    relief->peak = calloc(3 * vertices, sizeof *relief->peak);
     relief->touched = calloc(3 * tiles, 1);
     if (!relief->peak || !relief->touched) return 0;
     relief->shown = relief->peak + vertices;
+    relief->base = relief->shown + vertices;
     relief->dirty = relief->touched + tiles;
     relief->material = (signed char *)(relief->dirty + tiles);
     for (int f = 0; f < relief->feet; f++)
         if (!mask_create(&relief->mask[f], soles[f])) return 0;
     return 1;
+}
+
+static void find_heights(Relief *relief) {
+    relief->low = INFINITY, relief->high = -INFINITY;
+    for (int j = 0; j < relief->ny; j++)
+        for (int i = 0; i < relief->nx; i++) {
+            double z = mild_terrain_height_at(&relief->terrain, relief->x0 + i * relief->cell, relief->y0 + j * relief->cell);
+            relief->base[(size_t)j * (size_t)relief->nx + (size_t)i] = (float)z;
+            relief->low = fmin(relief->low, z), relief->high = fmax(relief->high, z);
+        }
 }
 
 Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const MildSole *const *soles, int feet,
@@ -262,7 +275,7 @@ Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const Mi
     relief->x0 = def->x_min, relief->y0 = 0.5 * (def->y_min + def->y_max - rows * edge);
     relief->cell = def->cell, relief->rigid = def->rigid, relief->feet = feet;
     relief->terrain = *terrain;
-    relief->surface = terrain->height;
+    relief->uneven = terrain->map && !mild_map_is_level(terrain->map);
     for (int m = 0; m < terrain->material_count; m++)
         relief->look[m] = look_of(def->names ? def->names[m] : NULL, &terrain->materials[m]);
     relief->look[MILD_MATERIALS_MAX] = rigid_look;
@@ -271,6 +284,7 @@ Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const Mi
         relief_destroy(relief);
         return NULL;
     }
+    find_heights(relief);
     find_materials(relief);
     return relief;
 }
@@ -297,8 +311,20 @@ double relief_tile_edge(const Relief *relief) {
     return RELIEF_TILE_CELLS * relief->cell;
 }
 
-double relief_surface(const Relief *relief) {
-    return relief->surface;
+int relief_is_uneven(const Relief *relief) {
+    return relief->uneven;
+}
+
+double relief_low(const Relief *relief) {
+    return relief->low;
+}
+
+double relief_high(const Relief *relief) {
+    return relief->high;
+}
+
+double relief_height_at(const Relief *relief, double x, double y) {
+    return mild_terrain_height_at(&relief->terrain, x, y);
 }
 
 void relief_tile_center(const Relief *relief, int tile, double center[2]) {
@@ -327,10 +353,11 @@ static const float *tile_row(const Relief *relief, int tile, int row) {
     return relief->shown + j * (size_t)relief->nx + i;
 }
 
-void relief_tile_heights(const Relief *relief, int tile, double range, float *heights) {
+void relief_tile_heights(const Relief *relief, int tile, double depth, float *heights) {
+    float low = (float)(relief->low - depth), scale = 1.0F / (float)(relief->high - relief->low + depth);
     for (int j = 0; j < RELIEF_TILE_VERTICES; j++) {
-        const float *row = tile_row(relief, tile, j);
-        for (int i = 0; i < RELIEF_TILE_VERTICES; i++) *heights++ = fmaxf(0.0F, 1.0F - row[i] / (float)range);
+        const float *shown = tile_row(relief, tile, j), *base = relief->base + (shown - relief->shown);
+        for (int i = 0; i < RELIEF_TILE_VERTICES; i++) *heights++ = fmaxf(0.0F, (base[i] - shown[i] - low) * scale);
     }
 }
 

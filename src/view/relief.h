@@ -22,7 +22,7 @@ typedef struct {
 
 typedef struct Relief Relief;
 
-/* soles: [feet], borrowed. The terrain is copied. */
+/* soles: [feet], borrowed. The terrain is copied, its map borrowed. */
 Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const MildSole *const *soles, int feet,
                       MildError *error);
 void relief_destroy(Relief *relief);
@@ -33,14 +33,18 @@ int relief_tile_columns(const Relief *relief); /* along x */
 int relief_tile_rows(const Relief *relief);    /* along y */
 double relief_tile_edge(const Relief *relief); /* [m] */
 void relief_tile_center(const Relief *relief, int tile, double center[2]);
-double relief_surface(const Relief *relief); /* [m] undisturbed height */
+int relief_is_uneven(const Relief *relief);
+/* [m] of the undisturbed surface: lowest and highest of the area drawn, and at a point. */
+double relief_low(const Relief *relief);
+double relief_high(const Relief *relief);
+double relief_height_at(const Relief *relief, double x, double y);
 /* The one material of the tile (RELIEF_RIGID where nothing yields), or -2 when several meet in it. */
 int relief_tile_material(const Relief *relief, int tile);
 int relief_tile_touched(const Relief *relief, int tile);
 /* Whether the tile changed since this was last asked. */
 int relief_tile_take_dirty(Relief *relief, int tile);
-/* [VERTICES][VERTICES] rows along y: 1 at the surface, 0 at `range` below it. */
-void relief_tile_heights(const Relief *relief, int tile, double range, float *heights);
+/* [VERTICES][VERTICES] rows along y: 1 at relief_high, 0 at `depth` below relief_low. */
+void relief_tile_heights(const Relief *relief, int tile, double depth, float *heights);
 /* [PIXELS][PIXELS][3] first row at y max, margin included; pressed ground is darker. */
 void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb);
 /* The same for untouched ground of one material, seamless between tiles. */

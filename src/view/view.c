@@ -13,8 +13,10 @@
 #define VIEW_CELL 0.01      /* [m] vertices of the visible ground */
 #define VIEW_OVERLAP 1.0015 /* [-] tiles are drawn this much larger, so that no crack opens between them */
 #define VIEW_SLOTS 96       /* tiles that can be deformed or of mixed material at once */
+#define VIEW_SLOTS_UNEVEN 192 /* the same where every tile has a shape */
 #define VIEW_DEPTH 0.20     /* [m] deepest print that can be drawn */
 #define VIEW_RADIUS 9.0     /* [m] tiles farther from the robot are drawn as plain floor */
+#define VIEW_RADIUS_UNEVEN 4.0 /* [m] */
 #define VIEW_FLOOR 40.0     /* [m] half size of the floor beyond */
 #define VIEW_GEOMS 4000
 #define VIEW_CAMERA_TIME 0.35      /* [s] the camera's lag */
@@ -49,7 +51,8 @@ struct View {
     int scene_made, context_made;
     int jumped; /* bool: the cameras start anew */
     Relief *relief;
-    Slot slots[VIEW_SLOTS];
+    Slot slots[VIEW_SLOTS_UNEVEN];
+    int slot_count;
     int *slot_of;                              /* [tiles] -1: none */
     int flat_material[MILD_MATERIALS_MAX + 1]; /* model material of untouched ground; last: rigid */
     int floor_material;
@@ -89,18 +92,19 @@ static void add_material(mjSpec *spec, const char *name, double repeat, int unif
     material->texuniform = (mjtByte)uniform;
 }
 
-static void add_ground(mjSpec *spec, double edge) {
+static void add_ground(mjSpec *spec, const Relief *relief, int slots) {
+    double edge = relief_tile_edge(relief);
     static const float level[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES] = {0};
     const double share = 1.0 - 2.0 * RELIEF_TILE_MARGIN / RELIEF_TILE_PIXELS; /* of the picture that a tile shows */
     char name[32];
-    for (int i = 0; i < VIEW_SLOTS; i++) {
+    for (int i = 0; i < slots; i++) {
         snprintf(name, sizeof name, "view_tile_%d", i);
         add_material(spec, name, share, 0);
         mjsHField *hfield = mjs_addHField(spec);
         mjs_setName(hfield->element, name);
         hfield->nrow = hfield->ncol = RELIEF_TILE_VERTICES;
         hfield->size[0] = hfield->size[1] = 0.5 * VIEW_OVERLAP * edge;
-        hfield->size[2] = VIEW_DEPTH;
+        hfield->size[2] = VIEW_DEPTH + relief_high(relief) - relief_low(relief);
         hfield->size[3] = 0.01;
         mjs_setFloat(hfield->userdata, level, RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES);
     }
@@ -111,7 +115,7 @@ static void add_ground(mjSpec *spec, double edge) {
     add_material(spec, "view_floor", share / edge, 1);
 }
 
-static mjModel *make_model(const ViewDef *def, double edge, MildError *error) {
+static mjModel *make_model(const ViewDef *def, const Relief *relief, int slots, MildError *error) {
     char text[300] = "";
     mjSpec *spec = mj_parseXML(def->xml, NULL, text, sizeof text);
     if (!spec) {
@@ -122,7 +126,7 @@ static mjModel *make_model(const ViewDef *def, double edge, MildError *error) {
     spec->visual.global.offheight = def->height;
     spec->visual.quality.offsamples = 4;
     spec->visual.quality.shadowsize = 2048;
-    add_ground(spec, edge);
+    add_ground(spec, relief, slots);
     mjModel *model = mj_compile(spec, NULL);
     if (!model)
         mild_fail(error, MILD_ERROR_FORMAT, "%s: cannot add the visible ground: %s", def->xml, mjs_getError(spec));
@@ -144,7 +148,7 @@ static unsigned char *texture_pixels(mjModel *model, int texture) {
 static void index_model(View *view) {
     mjModel *model = view->model;
     char name[32];
-    for (int i = 0; i < VIEW_SLOTS; i++) {
+    for (int i = 0; i < view->slot_count; i++) {
         snprintf(name, sizeof name, "view_tile_%d", i);
         view->slots[i] = (Slot){-1, mj_name2id(model, mjOBJ_HFIELD, name), mj_name2id(model, mjOBJ_TEXTURE, name),
                                 mj_name2id(model, mjOBJ_MATERIAL, name), 0};
@@ -226,7 +230,8 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->soles = robot_soles(robot);
     view->terrain = *terrain;
     view->relief = make_relief(view, error);
-    view->model = view->relief ? make_model(def, relief_tile_edge(view->relief), error) : NULL;
+    view->slot_count = view->relief && relief_is_uneven(view->relief) ? VIEW_SLOTS_UNEVEN : VIEW_SLOTS;
+    view->model = view->relief ? make_model(def, view->relief, view->slot_count, error) : NULL;
     if (!view->model || !open_context(view, error)) {
         view_destroy(view);
         return NULL;
@@ -263,7 +268,7 @@ MildStatus view_reset(View *view, const MildTerrain *terrain, MildError *error) 
     if (!relief) return error ? error->status : MILD_ERROR_MEMORY;
     relief_destroy(view->relief);
     view->relief = relief;
-    for (int i = 0; i < VIEW_SLOTS; i++) {
+    for (int i = 0; i < view->slot_count; i++) {
         if (view->slots[i].tile >= 0) view->slot_of[view->slots[i].tile] = -1;
         view->slots[i].tile = -1;
     }
@@ -297,7 +302,7 @@ static double tile_distance(const View *view, int tile) {
 static Slot *slot_take(View *view, int tile) {
     Slot *best = NULL;
     double farthest = tile_distance(view, tile);
-    for (int i = 0; i < VIEW_SLOTS; i++) {
+    for (int i = 0; i < view->slot_count; i++) {
         Slot *slot = &view->slots[i];
         if (slot->tile < 0) {
             best = slot;
@@ -321,7 +326,7 @@ static void slot_refresh(View *view, Slot *slot) {
     if (!relief_tile_take_dirty(view->relief, slot->tile) && slot->drawn_once) return;
     relief_tile_pixels(view->relief, slot->tile, texture_pixels(model, slot->texture));
     mjr_uploadTexture(model, &view->context, slot->texture);
-    if (relief_tile_touched(view->relief, slot->tile)) {
+    if (relief_tile_touched(view->relief, slot->tile) || relief_is_uneven(view->relief)) {
         relief_tile_heights(view->relief, slot->tile, VIEW_DEPTH, model->hfield_data + model->hfield_adr[slot->hfield]);
         mjr_uploadHField(model, &view->context, slot->hfield);
     }
@@ -345,15 +350,16 @@ static mjvGeom *add_geom(View *view, int type, double sx, double sy, double sz, 
 static void draw_tile(View *view, int tile) {
     double edge = relief_tile_edge(view->relief), center[2];
     relief_tile_center(view->relief, tile, center);
-    double position[3] = {center[0], center[1], relief_surface(view->relief)};
-    int material = relief_tile_material(view->relief, tile), touched = relief_tile_touched(view->relief, tile);
+    double position[3] = {center[0], center[1], relief_height_at(view->relief, center[0], center[1])};
+    int material = relief_tile_material(view->relief, tile);
+    int touched = relief_tile_touched(view->relief, tile) || relief_is_uneven(view->relief);
     Slot *slot = NULL;
     if (touched || material == -2) {
         slot = view->slot_of[tile] >= 0 ? &view->slots[view->slot_of[tile]] : slot_take(view, tile);
         if (slot) slot_refresh(view, slot);
     }
     if (slot && touched) {
-        position[2] -= VIEW_DEPTH;
+        position[2] = relief_low(view->relief) - VIEW_DEPTH;
         mjvGeom *geom = add_geom(view, mjGEOM_HFIELD, 0.5 * edge, 0.5 * edge, VIEW_DEPTH, position, slot->material);
         if (geom) geom->dataid = slot->hfield;
         return;
@@ -365,7 +371,7 @@ static void draw_tile(View *view, int tile) {
 
 /* Four plates around the tiles: the floor must not lie under them, prints would show through. */
 static void draw_floor(View *view, double x0, double x1, double y0, double y1) {
-    double z = relief_surface(view->relief), far = VIEW_FLOOR, cx = 0.5 * (x0 + x1), cy = 0.5 * (y0 + y1);
+    double z = relief_low(view->relief), far = VIEW_FLOOR, cx = 0.5 * (x0 + x1), cy = 0.5 * (y0 + y1);
     double left[3] = {x0 - far, cy, z}, right[3] = {x1 + far, cy, z}, below[3] = {cx, y0 - far, z},
            above[3] = {cx, y1 + far, z};
     double wide = 0.5 * (x1 - x0) + 2 * far, high = 0.5 * (y1 - y0);
@@ -382,14 +388,14 @@ static int clamp_tile(double at, int count) {
 static void draw_ground(View *view) {
     const Relief *relief = view->relief;
     int columns = relief_tile_columns(relief), rows = relief_tile_rows(relief);
-    double edge = relief_tile_edge(relief), origin[2];
+    double edge = relief_tile_edge(relief), origin[2], radius = relief_is_uneven(relief) ? VIEW_RADIUS_UNEVEN : VIEW_RADIUS;
     relief_tile_center(relief, 0, origin);
     origin[0] -= 0.5 * edge, origin[1] -= 0.5 * edge;
     const double *look = view->camera.lookat;
-    int c0 = clamp_tile(floor((look[0] - VIEW_RADIUS - origin[0]) / edge), columns);
-    int c1 = clamp_tile(ceil((look[0] + VIEW_RADIUS - origin[0]) / edge), columns);
-    int r0 = clamp_tile(floor((look[1] - VIEW_RADIUS - origin[1]) / edge), rows);
-    int r1 = clamp_tile(ceil((look[1] + VIEW_RADIUS - origin[1]) / edge), rows);
+    int c0 = clamp_tile(floor((look[0] - radius - origin[0]) / edge), columns);
+    int c1 = clamp_tile(ceil((look[0] + radius - origin[0]) / edge), columns);
+    int r0 = clamp_tile(floor((look[1] - radius - origin[1]) / edge), rows);
+    int r1 = clamp_tile(ceil((look[1] + radius - origin[1]) / edge), rows);
     for (int r = r0; r < r1; r++)
         for (int c = c0; c < c1; c++) draw_tile(view, r * columns + c);
     draw_floor(view, origin[0] + c0 * edge, origin[0] + c1 * edge, origin[1] + r0 * edge, origin[1] + r1 * edge);
@@ -404,7 +410,7 @@ static double camera_share(const View *view, double lag) {
 
 static void follow(View *view, const double *base) {
     double share = view->jumped ? 1.0 : camera_share(view, VIEW_CAMERA_TIME);
-    double target[3] = {base[0], base[1], relief_surface(view->relief) + VIEW_LOOK_HEIGHT};
+    double target[3] = {base[0], base[1], relief_height_at(view->relief, base[0], base[1]) + VIEW_LOOK_HEIGHT};
     for (int k = 0; k < 3; k++) view->camera.lookat[k] += share * (target[k] - view->camera.lookat[k]);
 }
 
@@ -482,7 +488,7 @@ static void draw_closeup(View *view, mjrRect viewport, const RobotSim *sim) {
     view->jumped = 0;
     mjvCamera *camera = &view->close;
     for (int k = 0; k < 2; k++) camera->lookat[k] += share * (0.5 * (left[k] + right[k]) - camera->lookat[k]);
-    camera->lookat[2] = relief_surface(view->relief) + VIEW_CLOSE_HEIGHT;
+    camera->lookat[2] = relief_height_at(view->relief, camera->lookat[0], camera->lookat[1]) + VIEW_CLOSE_HEIGHT;
     camera->azimuth = view->camera.azimuth - VIEW_CLOSE_TURN;
     mjrRect box = {viewport.width - (viewport.width * 2) / 5 - 10, viewport.height - viewport.height / 3 - 10,
                    (viewport.width * 2) / 5, viewport.height / 3};

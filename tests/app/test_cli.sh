@@ -70,6 +70,15 @@ for model in con_cone con_spring ecc_spring ecc_quasi; do
         "--randomize.model=$model"
 done
 
+# terrain
+bad "rigid is the engine's own level floor" "$mild" eval --ground rigid --terrain.kind=waves
+bad "terrain.image is empty" "$mild" press --ground sand_loose --terrain.kind=image
+printf 'no picture' >not.png
+bad "terrain.image = not.png: is not a PNG" "$mild" press --ground sand_loose --terrain.kind=image --terrain.image=not.png
+bad "unknown name 'wave'; nearest is 'waves'" "$mild" press --ground sand_loose --terrain.kind=wave
+bad "terrain.border" "$mild" press --ground sand_loose --terrain.patches=stripes --terrain.border=9
+awk "BEGIN { exit !($(peak --depth 0.005 --terrain.kind=slope --terrain.slope=0.5) != $(peak --depth 0.005)) }" || fail "--terrain.kind does not change the force"
+
 # info
 expect 0 'sand_dense' "$mild" info grounds
 expect 0 'k_pen .*\[N/m\]' "$mild" info grounds

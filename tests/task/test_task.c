@@ -119,7 +119,7 @@ static void bench_start(Bench *b, int rigid, double speed) {
     b->def.observe_noise = 0;
     b->def.randomize.latency[0] = b->def.randomize.latency[1] = 0;
     b->def.randomize.initial_joint = b->def.randomize.initial_velocity = 0;
-    b->env = aligned_alloc(64, task_env_bytes(robot));
+    b->env = aligned_alloc(64, task_env_bytes(&b->def, robot));
     b->sim = robot_sim_create(robot, b->def.physics_dt, &error);
     assert_non_null(b->sim);
     b->view = (TaskView){b->history, b->critic, b->estimate, b->frame};

@@ -140,11 +140,49 @@ static void rigid_ground_never_yields(void **state) {
     destroy();
 }
 
+/* On uneven ground heights are those of the map, and a print lies as deep below it as on level ground. */
+static void prints_follow_the_map(void **state) {
+    (void)state;
+    MildError error = {0};
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_WAVES;
+    def.amplitude = 0.05;
+    MildMap *map = mild_map_create(&def, &error);
+    make("sand_loose", 0);
+    const MildSole *soles[1] = {sole};
+    const char *names[1] = {"sand_loose"};
+    ReliefDef area = {-1, 1, -1, 1, CELL, 0, names};
+    terrain.map = map;
+    relief_destroy(relief);
+    relief = relief_create(&area, &terrain, soles, 1, &error);
+    assert_true(relief_is_uneven(relief) && relief_low(relief) < -0.045 && relief_high(relief) > 0.045);
+    static float heights[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES];
+    double edge = relief_tile_edge(relief), center[2], worst = 0, range = relief_high(relief) - relief_low(relief) + RANGE;
+    press(0.05, 0.0, DEPTH);
+    for (int tile = 0; tile < relief_tile_columns(relief) * relief_tile_rows(relief); tile++) {
+        relief_tile_center(relief, tile, center);
+        relief_tile_heights(relief, tile, RANGE, heights);
+        for (int j = 0; j < RELIEF_TILE_VERTICES; j += 4)
+            for (int i = 0; i < RELIEF_TILE_VERTICES; i += 4) {
+                double x = center[0] - 0.5 * edge + CELL * i, y = center[1] - 0.5 * edge + CELL * j;
+                double z = relief_low(relief) - RANGE + range * (double)heights[j * RELIEF_TILE_VERTICES + i];
+                double wanted = mild_terrain_height_at(&terrain, x, y);
+                if (x > -0.01 && x < 0.24 && fabs(y) < 0.045) wanted = fmin(wanted, -DEPTH);
+                else if (x > -0.05 && x < 0.28 && fabs(y) < 0.075) continue; /* beside the sole's edge */
+                worst = fmax(worst, fabs(z - wanted));
+            }
+    }
+    print_message("drawn heights on waves: off by %.2f mm\n", 1e3 * worst);
+    assert_true(worst < 2.5e-3);
+    destroy();
+    mild_map_destroy(map);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(recovery_by_material),      cmocka_unit_test(print_stays_when_the_foot_walks_on),
         cmocka_unit_test(tiles_agree_on_their_edge), cmocka_unit_test(pressed_ground_is_darker),
-        cmocka_unit_test(rigid_ground_never_yields),
+        cmocka_unit_test(rigid_ground_never_yields), cmocka_unit_test(prints_follow_the_map),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

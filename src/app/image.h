@@ -1,0 +1,16 @@
+/* Grey pictures from PNG files. */
+#ifndef MILD_IMAGE_H
+#define MILD_IMAGE_H
+
+#include "mild/error.h"
+
+typedef struct {
+    int columns, rows;
+    double *grey; /* [rows][columns] [-] 0 black .. 1 white, the file's own values (no gamma); first row at the top */
+} Image;
+
+/* Any PNG: colours become their luminance, transparency is left out. Fails with the file's name and what is wrong. */
+MildStatus image_read(const char *path, Image *image, MildError *error);
+void image_close(Image *image);
+
+#endif

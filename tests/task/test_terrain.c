@@ -1,0 +1,161 @@
+/* Robots on one map: results independent of thread count, state without pointers that continues bit for bit, heights of start,
+ * feet and base above the ground under them. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/random.h"
+#include "task/vec.h"
+
+enum { ENVS = 12, STEPS = 120, TILES = 64 };
+
+static Robot *robot;
+static MildMap *map;
+
+static int setup(void **state) {
+    (void)state;
+    MildError error = {0};
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_ROUGH;
+    def.amplitude = 0.03;
+    def.patches = MILD_PATTERN_CHECKER;
+    def.border = 0.1;
+    map = mild_map_create(&def, &error);
+    robot = map ? robot_create(MILD_SOURCE_DIR "/models/sa01/sa01.xml", &error) : NULL;
+    if (!robot) fprintf(stderr, "%s\n", error.text);
+    return robot == NULL;
+}
+
+static int teardown(void **state) {
+    (void)state;
+    robot_destroy(robot);
+    mild_map_destroy(map);
+    return 0;
+}
+
+static TaskDef task_on_map(void) {
+    TaskDef def = task_def_default();
+    def.map = map;
+    def.print_tiles = TILES;
+    return def;
+}
+
+typedef struct {
+    Pool *pool;
+    Vec *vec;
+    float *action, *reward;
+    uint8_t *flags;
+    int step;
+} Run;
+
+static void run_open(Run *run, int threads) {
+    TaskDef def = task_on_map();
+    MildError error = {0};
+    *run = (Run){.pool = pool_create(threads)};
+    run->vec = vec_create(&def, robot, run->pool, ENVS, 7, &error);
+    assert_non_null(run->vec);
+    run->action = calloc(ENVS * TASK_ACTIONS, sizeof *run->action);
+    run->reward = calloc(ENVS, sizeof *run->reward);
+    run->flags = calloc(ENVS, 3);
+    VecView none = {0};
+    vec_reset(run->vec, &none);
+}
+
+static void run_steps(Run *run, int steps) {
+    VecView none = {0};
+    for (int t = 0; t < steps; t++, run->step++) {
+        for (int i = 0; i < ENVS * TASK_ACTIONS; i++) {
+            Random r = random_at(5, (uint32_t)i, (uint32_t)run->step);
+            run->action[i] = (float)(0.5 * random_normal(&r));
+        }
+        vec_step(run->vec, run->action, run->reward, run->flags, run->flags + ENVS, run->flags + 2 * ENVS, &none);
+    }
+}
+
+static void run_close(Run *run) {
+    vec_destroy(run->vec);
+    pool_destroy(run->pool);
+    free(run->action);
+    free(run->reward);
+    free(run->flags);
+}
+
+static void test_threads(void **state) {
+    (void)state;
+    uint64_t hash[3];
+    for (int i = 0; i < 3; i++) {
+        Run run;
+        run_open(&run, i == 0 ? 1 : 3);
+        run_steps(&run, STEPS);
+        hash[i] = vec_hash(run.vec);
+        run_close(&run);
+    }
+    printf("map and prints, 1, 3 and 3 threads: %016llx\n", (unsigned long long)hash[0]);
+    assert_true(hash[0] == hash[1] && hash[1] == hash[2]);
+}
+
+/* Saved half way, loaded into robots of another history: the rest is the same. No address is among the bytes. */
+static void test_save(void **state) {
+    (void)state;
+    Run a, b;
+    size_t bytes;
+    run_open(&a, 2);
+    run_steps(&a, STEPS / 2);
+    void *block = vec_state(a.vec, &bytes);
+    char *saved = malloc(bytes);
+    memcpy(saved, block, bytes);
+    for (size_t at = 0; at + sizeof map <= bytes; at += sizeof(int32_t)) assert_memory_not_equal(saved + at, &map, sizeof map);
+    run_steps(&a, STEPS / 2);
+    run_open(&b, 2);
+    run_steps(&b, STEPS / 2);
+    run_steps(&b, 7);
+    b.step = STEPS / 2;
+    memcpy(vec_state(b.vec, &bytes), saved, bytes);
+    run_steps(&b, STEPS / 2);
+    assert_true(vec_hash(a.vec) == vec_hash(b.vec));
+    printf("%zu bytes a robot, %d tiles of prints among them\n", bytes / ENVS, TILES);
+    free(saved);
+    run_close(&a);
+    run_close(&b);
+}
+
+/* Wherever a robot starts, its lowest sole point begins as deep as on level ground; nobody stands in the air or falls through. */
+static void test_start(void **state) {
+    (void)state;
+    TaskDef def = task_on_map();
+    def.randomize.rigid_share = 0;
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, def.physics_dt, &error);
+    TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
+    TaskView none = {0};
+    double deepest = 0, shallowest = 1, apart = 0;
+    for (int i = 0; i < 40; i++) {
+        task_env_init(env, &def, robot, 3, (uint32_t)i);
+        task_env_reset(env, &def, robot, sim, &none);
+        assert_null(env->terrain.map);
+        MildTerrain terrain = env->terrain;
+        terrain.map = map;
+        double clearance = robot_sim_sole_clearance(sim, &terrain), base = mild_terrain_height_at(&terrain, 0, 0);
+        deepest = fmin(deepest, clearance);
+        shallowest = fmin(shallowest, -clearance);
+        apart = fmax(apart, fabs(robot_sim_qpos(sim)[2] - base - robot_stand_height(robot)));
+        assert_true(terrain.material_count >= 2);
+    }
+    printf("starts: lowest sole point %.1f to %.1f mm deep, base at most %.0f mm from its height on level ground\n",
+           1e3 * shallowest, -1e3 * deepest, 1e3 * apart);
+    assert_true(deepest > -0.06 && shallowest > -0.003 && apart < 0.12);
+    free(env);
+    robot_sim_destroy(sim);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_threads), cmocka_unit_test(test_save), cmocka_unit_test(test_start)};
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
