@@ -1,11 +1,13 @@
 # Two commands matter: `make run` (see a robot walk on soft ground, then train one) and `make test`.
 JOBS ?= $(shell nproc)
 MINUTES ?= 5
+RUNS ?= 10000000
+TARGETS ?=
 CMAKE_FLAGS ?=
 PREFIX ?= /usr/local
 MARCH ?= native
 
-.PHONY: setup build test run bench install docs clean help
+.PHONY: setup build test run bench install docs fuzz clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -13,6 +15,7 @@ help:
 	@echo "make build   set up, build build/mild"
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
+	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; about 10 minutes a target)"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -39,6 +42,10 @@ install:
 		-DMILD_MARCH=$(MARCH) -DCMAKE_INSTALL_PREFIX=$(PREFIX) $(CMAKE_FLAGS)
 	@cmake --build build/library --parallel $(JOBS) --target mild_shared mild_static
 	@cmake --install build/library
+
+# Set up as for a build; not `build` itself, for it has a folder and a compiler of its own.
+fuzz: setup
+	@RUNS=$(RUNS) scripts/fuzz.sh $(TARGETS)
 
 docs:
 	@mkdir -p build

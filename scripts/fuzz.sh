@@ -1,0 +1,63 @@
+#!/usr/bin/env bash
+# Runs the fuzz targets of tests/fuzz one after the other, with clang's address and undefined-behaviour sanitizers. What they
+# learn stays in build/fuzz/work; an input that fails is left in build/fuzz and printed.
+# Usage: scripts/fuzz.sh [TARGET ...]; RUNS executions each (10 million), at most MINUTES each (no limit). `merge` as first word
+# instead rewrites tests/fuzz/corpus with the smallest inputs that reach everything found so far.
+set -eu
+cd "$(dirname "$0")/.."
+runs=${RUNS:-10000000} minutes=${MINUTES:-0} build=build/fuzz
+merge=0
+if [ "${1:-}" = merge ]; then
+    merge=1
+    shift
+fi
+command -v clang >/dev/null || { echo "fuzz: clang is needed: apt-get install clang" >&2; exit 2; }
+all=$(grep -o '^ *mild_fuzz([a-z]*' tests/CMakeLists.txt | sed 's/.*(//')
+targets=${*:-$all}
+cmake -S . -B $build -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_COMPILER=clang -DMILD_SANITIZE=ON -DMILD_FUZZ=ON --log-level=WARNING
+cmake --build $build --parallel "${JOBS:-$(nproc)}" --target $(printf 'fuzz_%s ' $targets) >/dev/null
+# a stack trace for every allocation costs a third of the speed
+export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=4:max_malloc_fill_size=0
+
+# Longest input worth trying: of a policy the header alone has 2 kB.
+length() {
+    case $1 in
+    policy | checkpoint) echo 3500 ;;
+    config | fit | png) echo 512 ;;
+    *) echo 256 ;;
+    esac
+}
+
+fuzz() {
+    local target=$1 kept=tests/fuzz/corpus/$1 dictionary=tests/fuzz/dict/$1.dict options=()
+    if [ "$target" = config ]; then
+        dictionary=$build/config.dict
+        grep -oE '^[a-z_0-9]+ =|^\[[a-z]+\]' configs/default.ini | sort -u | sed 's/.*/"&"/' >"$dictionary"
+    fi
+    [ ! -e "$dictionary" ] || options+=("-dict=$dictionary")
+    mkdir -p $build/work/"$target"
+    $build/tests/fuzz_"$target" -runs="$runs" -max_total_time=$((60 * minutes)) -max_len="$(length "$target")" -timeout=60 \
+        -rss_limit_mb=4000 -artifact_prefix=$build/"$target"- -print_final_stats=1 "${options[@]}" $build/work/"$target" \
+        "$kept" >$build/"$target".log 2>&1 || {
+        grep -E 'SUMMARY|Test unit written' $build/"$target".log >&2
+        return 1
+    }
+    echo "$target: $(sed -n 's/^stat::number_of_executed_units: *//p' $build/"$target".log) executions, no finding"
+}
+
+# Files named found_* are findings of the past and stay.
+minimise() {
+    local target=$1 kept=tests/fuzz/corpus/$1 fresh=$build/merge/$1
+    rm -rf "$fresh"
+    mkdir -p "$fresh" "$kept"
+    $build/tests/fuzz_"$target" -set_cover_merge=1 -use_counters=0 "$fresh" $build/work/"$target" "$kept" >$build/"$target".log 2>&1
+    find "$kept" -type f ! -name '*_*' ! -name '*.*' ! -name whole -delete
+    cp "$fresh"/* "$kept"/
+    echo "$target: $(find "$kept" -type f | wc -l) inputs, $(du -sb "$kept" | cut -f1) bytes"
+}
+
+failed=0
+for target in $targets; do
+    if [ $merge = 1 ]; then minimise "$target"; else fuzz "$target" || failed=1; fi
+done
+exit $failed
