@@ -70,18 +70,21 @@ static void test_passive(void **state) {
     assert_true(worst < 1e-9);
 }
 
-/* A foot moved up and down by hand (A = 0): the work over a closed cycle, force times displacement. */
+/* A foot moved up and down by hand (A = 0). Two accounts of the work: impulse times mean speed, what the kinetic energy of
+ * a body changes by, which must never be a gain; and impulse times the step's way, dt times the new speed, which differs
+ * by the braking factor's half step: on straight elastic ground, whose cycles cost nothing, it can come out above zero. */
 static void test_passive_by_hand(void **state) {
     (void)state;
     MildSole *sole = kit_plate(2, 1);
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
-    double worst = -INFINITY;
+    double worst = -INFINITY, worst_way = -INFINITY;
+    int gains = 0;
     for (int draw = first; draw < first + draws; draw++) {
         uint64_t random = draw_seed(13, draw, 16);
         MildMaterial m = kit_material(&random);
         Kit kit;
         double dt = steps[draw % 3], period = kit_uniform(&random, 0.2, 2.0), depth = kit_uniform(&random, 0.002, 0.08);
-        double wobble = kit_uniform(&random, 0.0, 0.3) * depth, z = 0.01, work = 0.0, taken = 0.0;
+        double wobble = kit_uniform(&random, 0.0, 0.3) * depth, z = 0.01, work = 0.0, way = 0.0, taken = 0.0;
         kit_open(&kit, 1, sole, NULL, &m, dt);
         kit.input.position[0][2] = -KIT_SOLE_Z + z;
         for (double t = dt; t < period + 0.02; t += dt) {
@@ -89,17 +92,22 @@ static void test_passive_by_hand(void **state) {
             kit.input.free_velocity[2] = (next - z) / dt;
             z = next;
             kit_solve(&kit);
+            double w = kit.result.foot[0].force[2] * kit.result.velocity[2] * dt;
+            work += ground_work(&kit, 0, kit.input.velocity[0]);
             kit_advance(&kit);
-            double w = kit.result.foot[0].force[2] * kit.input.velocity[0][2] * dt;
-            work += w;
+            way += w;
             taken += fabs(w);
         }
-        if (taken > 0.0) worst = fmax(worst, work / taken);
         kit_close(&kit);
+        if (taken == 0.0) continue;
+        worst = fmax(worst, work / taken);
+        worst_way = fmax(worst_way, way / taken);
+        gains += way > 0.0;
     }
-    print_message("down and up by hand: %d draws, largest share of the work given back in excess %.2e\n", draws, worst);
+    print_message("down and up by hand: %d draws, most work given back in excess, as a share: %.2e at the mean speed, %.2e along "
+                  "the way (%d draws above 0)\n", draws, worst, worst_way, gains);
     mild_sole_destroy(sole);
-    assert_true(worst < 0.0);
+    assert_true(worst < 0.0 && worst_way < 5e-3);
 }
 
 /* One step along the loop: x, z and tilt about y; returns the ground's work on the foot. */
@@ -111,9 +119,9 @@ static double loop_step(Kit *kit, const double size[3], const double phase[3], d
         at[k] = next;
     }
     kit_solve(kit);
+    double work = ground_work(kit, 0, kit->input.velocity[0]);
     kit_advance(kit);
-    const MildFootResult *foot = &kit->result.foot[0];
-    return kit->input.dt * (foot->force[0] * V[0] + foot->force[2] * V[2] + foot->torque[1] * V[4]);
+    return work;
 }
 
 /* A foot led by hand (A = 0) around a closed loop of height, place and tilt, over and over. The first time the ground
