@@ -79,7 +79,7 @@ static MildStatus decode(Reader *reader, Image *image) {
     return MILD_OK;
 }
 
-static MildStatus read_file(Reader *reader, Image *image) {
+static MildStatus read_open(Reader *reader, Image *image) {
     unsigned char signature[SIGNATURE];
     if (fread(signature, 1, SIGNATURE, reader->file) != SIGNATURE || png_sig_cmp(signature, 0, SIGNATURE) != 0)
         return mild_fail(reader->error, MILD_ERROR_FORMAT, "%.200s: is not a PNG image", reader->path);
@@ -93,16 +93,23 @@ static MildStatus read_file(Reader *reader, Image *image) {
     return status;
 }
 
-MildStatus image_read(const char *path, Image *image, MildError *error) {
+MildStatus image_read_file(FILE *file, const char *name, Image *image, MildError *error) {
     MildError local = {0};
     memset(image, 0, sizeof *image);
-    Reader reader = {.path = path, .file = fopen(path, "rb"), .error = &local};
-    if (!reader.file) return mild_fail(error, MILD_ERROR_IO, "%.200s: cannot read: %s", path, strerror(errno));
-    MildStatus status = read_file(&reader, image);
-    fclose(reader.file);
+    Reader reader = {.path = name, .file = file, .error = &local};
+    MildStatus status = read_open(&reader, image);
     if (status == MILD_OK) return MILD_OK;
     image_close(image);
     return mild_fail(error, status, "%s", local.text);
+}
+
+MildStatus image_read(const char *path, Image *image, MildError *error) {
+    memset(image, 0, sizeof *image);
+    FILE *file = fopen(path, "rb");
+    if (!file) return mild_fail(error, MILD_ERROR_IO, "%.200s: cannot read: %s", path, strerror(errno));
+    MildStatus status = image_read_file(file, path, image, error);
+    fclose(file);
+    return status;
 }
 
 void image_close(Image *image) {

@@ -2,6 +2,8 @@
 #ifndef MILD_IMAGE_H
 #define MILD_IMAGE_H
 
+#include <stdio.h>
+
 #include "mild/error.h"
 
 typedef struct {
@@ -11,6 +13,8 @@ typedef struct {
 
 /* Any PNG: colours become their luminance, transparency is left out. Fails with the file's name and what is wrong. */
 MildStatus image_read(const char *path, Image *image, MildError *error);
+/* The same from an open file, which `name` stands for in messages. */
+MildStatus image_read_file(FILE *file, const char *name, Image *image, MildError *error);
 void image_close(Image *image);
 
 #endif

@@ -32,7 +32,7 @@ static int takes_long(const MildMapDef *def) {
     double shape = fmax(def->size, def->wavelength) / def->cell;
     double field = def->patch_size / def->cell * fmax(def->patch_count, EDGE), reach = 2.0 + def->border / def->cell;
     double work = fmax(shape * shape, field * field * reach * reach);
-    return work > WORK && work < 1e11;
+    return work > WORK && work < 1e22; /* stripes: the root of it */
 }
 
 static void check_queries(Bytes *bytes, const MildTerrain *terrain, const MildMap *map) {
