@@ -38,7 +38,7 @@ typedef struct {
 
 struct View {
     ViewDef def;
-    const MildSole *const *soles;
+    const MildSole *const *soles, *const *rasters; /* what the feet have; their shape, for the prints */
     MildTerrain terrain;
     GlContext *gl;
     Window *window;
@@ -179,7 +179,7 @@ static int open_context(View *view, MildError *error) {
 static Relief *make_relief(const View *view, MildError *error) {
     const ViewDef *def = &view->def;
     ReliefDef relief = {def->x_min, def->x_max, def->y_min, def->y_max, VIEW_CELL, def->rigid, def->names};
-    return relief_create(&relief, &view->terrain, view->soles, ROBOT_FEET, error);
+    return relief_create(&relief, &view->terrain, view->rasters, ROBOT_FEET, error);
 }
 
 static int make_buffers(View *view) {
@@ -228,6 +228,7 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     }
     view->def = *def;
     view->soles = robot_soles(robot);
+    view->rasters = robot_rasters(robot);
     view->terrain = *terrain;
     view->relief = make_relief(view, error);
     view->slot_count = view->relief && relief_is_uneven(view->relief) ? VIEW_SLOTS_UNEVEN : VIEW_SLOTS;
