@@ -42,8 +42,10 @@ static void random_actions(float *action, int envs, int t, double size) {
     }
 }
 
-static uint64_t rollout(int threads, int envs, int steps, VecStats *stats) {
+static uint64_t rollout(int threads, int envs, int steps, MildModel model, VecStats *stats) {
     TaskDef def = task_def_default();
+    def.randomize.model = (int)model;
+    robot_set_model(robot, model);
     Pool *pool = pool_create(threads);
     MildError error = {0};
     Vec *vec = vec_create(&def, robot, pool, envs, 7, &error);
@@ -68,6 +70,7 @@ static uint64_t rollout(int threads, int envs, int steps, VecStats *stats) {
     *stats = vec_take_stats(vec);
     vec_destroy(vec);
     pool_destroy(pool);
+    robot_set_model(robot, MILD_MODEL_MILD);
     free(history);
     free(critic);
     free(action);
@@ -79,15 +82,26 @@ static uint64_t rollout(int threads, int envs, int steps, VecStats *stats) {
 static void same_numbers_whatever_the_thread_count(void **state) {
     (void)state;
     VecStats stats;
-    uint64_t one = rollout(1, ENVS, STEPS, &stats);
+    uint64_t one = rollout(1, ENVS, STEPS, MILD_MODEL_MILD, &stats);
     printf("hash of %d robots x %d steps: %016llx; %d episodes, %d falls, %d diverged\n", ENVS, STEPS,
            (unsigned long long)one, stats.episodes, stats.falls, stats.diverged);
     assert_true(stats.falls > 0);
     assert_int_equal(stats.diverged, 0);
     for (int threads = 2; threads <= 3; threads++) {
-        assert_true(one == rollout(threads, ENVS, STEPS, &stats));
+        assert_true(one == rollout(threads, ENVS, STEPS, MILD_MODEL_MILD, &stats));
     }
-    assert_true(one == rollout(1, ENVS, STEPS, &stats));
+    assert_true(one == rollout(1, ENVS, STEPS, MILD_MODEL_MILD, &stats));
+}
+
+static void every_ground_model_is_trained_on(void **state) {
+    (void)state;
+    for (int model = 0; model < MILD_MODELS; model++) {
+        VecStats stats;
+        rollout(2, 12, 100, (MildModel)model, &stats);
+        printf("%-12s %3d episodes, mean %.2f s, %d diverged\n", mild_model_names[model], stats.episodes, stats.length,
+               stats.diverged);
+        assert_int_equal(stats.diverged, 0);
+    }
 }
 
 static void mirror_is_an_involution(void **state) {
@@ -256,6 +270,7 @@ int main(void) {
         cmocka_unit_test(bad_numbers_end_the_episode),
         cmocka_unit_test(ranges_are_checked),
         cmocka_unit_test(same_numbers_whatever_the_thread_count),
+        cmocka_unit_test(every_ground_model_is_trained_on),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
