@@ -7,7 +7,7 @@
 
 #include "app/text.h"
 
-enum { SECTIONS_MAX = 16, FILE_MAX = 1 << 20, VALUE_MAX = 512, WHERE_MAX = 160 };
+enum { SECTIONS_MAX = 16, FILE_MAX = 1 << 20, VALUE_MAX = 512, WHERE_MAX = 160, TEXT_MAX = 150 };
 
 static const ConfigSection *section_find(const ConfigSection *sections, int count, const char *name,
                                          const char **nearest) {
@@ -40,6 +40,23 @@ static MildStatus key_fail(const ConfigSection *sections, int count, const Confi
                      key, home, nearest ? nearest : "");
 }
 
+/* Characters of the line before its comment: "; ..." or "# ..." at its start or after a blank. */
+static size_t code_length(const char *line) {
+    size_t length = 0;
+    for (; line[length] && line[length] != '\n'; length++) {
+        int blank_before = length == 0 || line[length - 1] == ' ' || line[length - 1] == '\t';
+        if (blank_before && (line[length] == ';' || line[length] == '#')) break;
+    }
+    return length;
+}
+
+/* Whether a line of a config file could hold the text: it must come back from there when a run is resumed. */
+static int text_fits_line(const char *text) {
+    size_t length = strlen(text);
+    int blanks = length > 0 && (strchr(" \t", text[0]) || strchr(" \t", text[length - 1]));
+    return length <= TEXT_MAX && code_length(text) == length && !blanks;
+}
+
 static MildStatus key_set(const ConfigSection *sections, int count, const char *section_name, const char *key,
                           const char *value, const char *where, const MildField **field_set, MildError *error) {
     const char *nearest = NULL;
@@ -47,6 +64,10 @@ static MildStatus key_set(const ConfigSection *sections, int count, const char *
     if (!section) return section_fail(where, section_name, nearest, error);
     const MildField *field = mild_field_find(section->fields, section->count, key, &nearest);
     if (!field) return key_fail(sections, count, section, key, nearest, where, error);
+    if (field->type == MILD_FIELD_TEXT && !text_fits_line(value))
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "%s: %s.%s: a text has at most %d characters, no blanks around it, and no ; or # behind a blank", where,
+                         section->name, key, TEXT_MAX);
     MildError cause = {0};
     MildStatus status = mild_field_parse(field, section->def, value, section->name, &cause);
     if (status != MILD_OK) return mild_fail(error, status, "%s: %s", where, cause.text);
@@ -88,16 +109,6 @@ static void reader_check_line(Reader *reader, const char *line) {
         reader->status =
             mild_fail(reader->error, MILD_ERROR_FORMAT, "%s: neither `key = value` nor `[section]`", where);
     }
-}
-
-/* Characters of the line before its comment: "; ..." or "# ..." at its start or after a blank. */
-static size_t code_length(const char *line) {
-    size_t length = 0;
-    for (; line[length] && line[length] != '\n'; length++) {
-        int blank_before = length == 0 || line[length - 1] == ' ' || line[length - 1] == '\t';
-        if (blank_before && (line[length] == ';' || line[length] == '#')) break;
-    }
-    return length;
 }
 
 /* fgets over the text. Indentation is dropped, for inih would take an indented line as more of the value before. */
@@ -225,6 +236,8 @@ MildStatus config_read(const ConfigSection *sections, int count, const char *pat
 
 MildStatus config_override(const ConfigSection *sections, int count, const char *text, MildError *error) {
     char section[64], key[64], where[WHERE_MAX];
+    if (strpbrk(text, "\r\n"))
+        return mild_fail(error, MILD_ERROR_FORMAT, "--%.*s: an override is one line", (int)strcspn(text, "\r\n"), text);
     snprintf(where, sizeof where, "--%.120s", text);
     const char *dot = strchr(text, '.'), *equals = strchr(text, '=');
     if (!dot || !equals || dot > equals || dot == text || dot + 1 == equals || dot - text >= (int)sizeof section ||

@@ -58,7 +58,7 @@ static void pattern_blend(MildMap *map, double border, int i, int j) {
             nearest = way;
             here->second = (unsigned char)other;
         }
-    here->share = (unsigned char)lround(255.0 * (0.5 - nearest / border));
+    here->share = (unsigned char)lround(255.0 * fmax(0.5 - nearest / border, 0.0)); /* a subnormal border has no half */
 }
 
 static MildStatus pattern_make(MildMap *map, const MildMapDef *def, int columns, int rows, int repeats, PatternLabel label,

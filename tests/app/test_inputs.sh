@@ -44,6 +44,27 @@ for option in speed trials seconds patch seed threads; do bad "--$option" "$mild
 for option in patch speed seconds seed width height; do bad "--$option" "$mild" play --video x.mp4 "--$option" -1e9; done
 for option in trials seconds threads; do bad "--$option" "$mild" eval "--$option" -1; done
 
+# a text that a config file could not hold would be lost in the run folder
+for value in ' x.png' 'x.png ' 'a #1.png' 'a ;1.png' $'a\nb.png' "$(printf '%0199d' 0)"; do
+    bad "terrain.image" "$mild" train --out run "--terrain.image=$value"
+done
+
+# terrain: pictures that are none, patterns that do not fit
+head -c 2000 "$mild" >binary.png
+printf '\x89PNG\r\n\x1a\n' >cut.png
+for file in binary.png cut.png missing.png zeros folder; do
+    mkdir -p folder
+    [ "$file" != zeros ] || head -c 100 /dev/zero >zeros
+    for command in press eval; do
+        bad "terrain.image.*$file" "$mild" "$command" --ground sand_loose --terrain.kind=image "--terrain.image=$file"
+        bad "terrain.labels.*$file" "$mild" "$command" --ground sand_loose --terrain.patches=image "--terrain.labels=$file"
+    done
+done
+rm -r folder
+bad "terrain.cell" "$mild" press --ground sand_loose --terrain.kind=rough --terrain.cell=0.001 --terrain.size=1000
+bad "terrain.border" "$mild" press --ground sand_loose --terrain.patches=stripes --terrain.border=9
+bad "terrain" "$mild" eval --ground rigid --terrain.kind=waves
+
 # a policy or a config that is none
 printf 'no policy' >text.safetensors
 head -c 4096 "$mild" >binary.safetensors

@@ -1,4 +1,5 @@
-/* Any text as a config file. It may fail, never crash, and what it accepts must print and read back to the same values. */
+/* Any text as a config file, and as an override. It may fail, never crash, and what it accepts must print and read back to the
+ * same values. */
 #include "app/experiment.h"
 #include "app/grounds.h"
 #include "fuzz.h"
@@ -42,7 +43,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     MildStatus status = config_read_text(first.sections, SECTIONS, text, "fuzz", 0, &error);
     fuzz_check(status == MILD_OK || (error.status == status && error.text[0]));
     if (status == MILD_OK && fuzz_sample(data, size, 64)) check_round_trip(&first, size % 2 == 0);
-    config_override(first.sections, SECTIONS, text, &error);
+    target_init(&first);
+    status = config_override(first.sections, SECTIONS, text, &error);
+    if (status == MILD_OK && fuzz_sample(data, size, 64)) check_round_trip(&first, 0);
     free(text);
     return 0;
 }
