@@ -1,4 +1,4 @@
-/* Trials and measures (learning.md section 8): one definition, used everywhere. */
+/* Trials and measures (docs/task.md section 12): one definition, used everywhere. */
 #ifndef MILD_EVAL_H
 #define MILD_EVAL_H
 

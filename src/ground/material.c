@@ -27,7 +27,7 @@ const MildField mild_material_fields[] = {
 };
 const int mild_material_field_count = (int)(sizeof mild_material_fields / sizeof *mild_material_fields);
 
-/* physics.md section 6. Foams and rubber weigh grams: no added mass. Friction, drift and bed are our choice. */
+/* docs/model.md section 10. Foams and rubber weigh grams: no added mass. Friction, drift and bed are our choice. */
 typedef struct {
     const char *name;
     MildMaterial material;

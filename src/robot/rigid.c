@@ -42,7 +42,7 @@ static void add_contact(RobotSim *sim, int c) {
     result->contacts++;
 }
 
-/* Central axis F x tau / |F|^2 and the point of zero moment on the sole plane (physics.md section 2). */
+/* Central axis F x tau / |F|^2 and the point of zero moment on the sole plane (docs/model.md section 9). */
 static void finish_foot(RobotSim *sim, int foot) {
     MildFootResult *result = &sim->contact.foot[foot];
     const double *force = result->force, *torque = result->torque, *turn = sim->input.rotation[foot];

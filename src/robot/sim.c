@@ -274,7 +274,7 @@ static void report_forces(RobotSim *sim) {
     }
 }
 
-/* physics.md section 4 with the feet's 12 rows; mild/ground.h shows the same step for any engine. */
+/* docs/task.md section 2, with the feet's 12 rows; mild/ground.h shows the same step for any engine. */
 int robot_sim_step(RobotSim *sim, const double *torque, const double *push, const MildTerrain *terrain,
                    MildGround *ground) {
     RobotPhases none = {0}, *phases = sim->phases ? sim->phases : &none;

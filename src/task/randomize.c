@@ -1,4 +1,4 @@
-/* What is drawn once per episode (learning.md section 6) and the commands (section 5). */
+/* What is drawn once per episode (docs/task.md section 11) and the commands (section 10). */
 #include <assert.h>
 #include <string.h>
 
@@ -29,7 +29,7 @@ static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
 }
 
 /* The quasistatic force is linear in (k_pen, sigma_cone): one factor makes a too soft draw carry the robot on one foot
- * at sinkage_max. Without it a fifth of the paper's draws swallows the foot (physics.md section 2). */
+ * at sinkage_max. Without it a fifth of the paper's draws swallows the foot (docs/task.md section 11). */
 static void limit_sinkage(MildMaterial *m, const Robot *robot, double sinkage) {
     const MildSole *sole = robot_rasters(robot)[0];
     MildMaterial bottomless = *m;

@@ -1,4 +1,4 @@
-/* Every reward of learning.md section 5, each its own short function, in one table with its weight. */
+/* Every reward of docs/task.md section 8, each its own short function, in one table with its weight. */
 #include <math.h>
 #include <string.h>
 
@@ -30,10 +30,10 @@ static double reward_yaw_rate(const TaskMotion *m) {
     return tracking(m, m->env->smooth_velocity[2] - m->env->command[2]);
 }
 
-/* The paper prints a positive weight on an error; of learning.md's two readings this is the one that pays nothing to a
- * foot that stays down (exp(-k error) pays it a third of a perfect swing) and has a slope from the first millimetre.
- * Lifting higher than wanted costs half as fast as lifting pays. Scaled so that following h_des = apex sin(pi s) gives 1
- * on average over the swing. */
+/* The paper prints a positive weight on an error; of the readings in docs/task.md section 8 this is the one that pays
+ * nothing to a foot that stays down (exp(-k error) pays it a third of a perfect swing) and has a slope from the first
+ * millimetre. Lifting higher than wanted costs half as fast as lifting pays. Scaled so that following h_des = apex sin(pi s)
+ * gives 1 on average over the swing. */
 static double reward_feet_clearance(const TaskMotion *m) {
     double sum = 0;
     for (int f = 0; f < ROBOT_FEET; f++) {

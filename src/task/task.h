@@ -1,4 +1,4 @@
-/* One environment, top to bottom: command, act, observe, reward, randomise, terminate (learning.md sections 2 to 6).
+/* One environment, top to bottom: command, act, observe, reward, randomise, terminate (docs/task.md sections 4 to 11).
  * A TaskEnv is one pointer-free block (its ground memory follows it), so that copying, hashing and saving are one line.
  * Every random number is a function of (seed, environment, tick), so a run depends on no thread count. */
 #ifndef MILD_TASK_H

@@ -7,7 +7,7 @@
 #include "mild/map.h"
 
 /* Every reward term once: name, default weight, help. The struct, the config keys and the table of functions
- * (reward.c) are all made from this list. Weights are per second; source: paper Table II and learning.md section 5. */
+ * (reward.c) are all made from this list. Weights are per second; source: paper Table II and docs/task.md section 8. */
 #define TASK_REWARD_LIST(X)                                                                                           \
     X(linear_velocity, 2.0, "f(v_x - command) f(v_y - command), f(e) = (exp(-k e^2) + exp(-|e|/width))/2, smoothed, heading frame (paper)") \
     X(yaw_rate, 1.1, "f(w_z - command) (paper)")                                                                      \
@@ -45,7 +45,7 @@ typedef struct {
     double reference_amplitude;       /* [rad] */
 } RewardDef;
 
-/* Domain randomisation; ranges are uniform. learning.md section 6. */
+/* Domain randomisation; ranges are uniform. docs/task.md section 11. */
 typedef struct {
     int model;              /* MildModel of the soft episodes, matched to mild's draws; rigid: all on the engine's contact */
     /* ground: shares of episodes; what remains after rigid and preset draws from the paper's ranges */
