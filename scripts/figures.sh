@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the curves of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric]; all of them without a name.
+# Makes the curves of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain]; all of them without a name.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -55,11 +55,20 @@ eccentric() {
     done
 }
 
+# A robot between the prints it has left on waves of two materials: the picture after five seconds.
+terrain() {
+    "$mild" play --ground sand_dense,sand_loose --speed 0.5 --seconds 5.2 --video "$work/terrain.mp4" \
+        --terrain.kind=waves --terrain.amplitude=0.04 --terrain.wavelength=1.6 --terrain.memory=true \
+        --terrain.patches=checker --terrain.patch_size=1.2 --terrain.border=0.3
+    ffmpeg -loglevel error -y -ss 5 -i "$work/terrain.mp4" -frames:v 1 docs/terrain.png
+}
+
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
+    terrain) terrain ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric; do "$0" "$each"; done ;;
-    *) echo "figures: no figure '$name'; there are presets recovery impact sinkage eccentric" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain; do "$0" "$each"; done ;;
+    *) echo "figures: no figure '$name'; there are presets recovery impact sinkage eccentric terrain" >&2 && exit 2 ;;
     esac
 done

@@ -161,6 +161,31 @@ static void ground_cases(GroundBench *bench, const Robot *robot, double dt, Benc
     }
 }
 
+/* The standing step on waves, and on ground that remembers prints; beside newton_stick_advance. */
+static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double dt, BenchReport *report, MildError *error) {
+    enum { TILES = 128 };
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_WAVES;
+    MildMap *map = mild_map_create(&def, error);
+    void *block = aligned_alloc(64, mild_ground_bytes_prints(robot_soles(robot), ROBOT_FEET, TILES));
+    MildStatus status = map ? MILD_OK : error->status;
+    if (status == MILD_OK && !block) status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    if (status == MILD_OK) {
+        MildGround *without = bench->ground;
+        bench->terrain.map = map;
+        ground_settle(bench, robot, dt);
+        bench_add(report, "ground", "newton_uneven_advance", ground_time(bench, 1), "ns");
+        bench->terrain.map = NULL;
+        bench->ground = mild_ground_init_prints(block, robot_soles(robot), ROBOT_FEET, TILES);
+        ground_settle(bench, robot, dt);
+        bench_add(report, "ground", "newton_prints_advance", ground_time(bench, 1), "ns");
+        bench->ground = without;
+    }
+    mild_map_destroy(map);
+    free(block);
+    return status;
+}
+
 /* Newton on each rival of mild at rest: one element for the concentric ones. */
 static const char *const rival_names[MILD_MODELS] = {
     [MILD_MODEL_CON_CONE] = "newton_con_cone",       [MILD_MODEL_CON_SPRING] = "newton_con_spring",
@@ -181,6 +206,7 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
         bench.ground = mild_ground_init(block, soles, ROBOT_FEET);
         if (model == MILD_MODEL_MILD) {
             ground_cases(&bench, robot, dt, report);
+            status = ground_terrain(&bench, robot, dt, report, error);
             bench_add(report, "ground", "elements", mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");
         } else {
             ground_settle(&bench, robot, dt);

@@ -353,11 +353,11 @@ static const float *tile_row(const Relief *relief, int tile, int row) {
     return relief->shown + j * (size_t)relief->nx + i;
 }
 
-void relief_tile_heights(const Relief *relief, int tile, double depth, float *heights) {
+void relief_tile_heights(const Relief *relief, int tile, double depth, int step, float *heights) {
     float low = (float)(relief->low - depth), scale = 1.0F / (float)(relief->high - relief->low + depth);
-    for (int j = 0; j < RELIEF_TILE_VERTICES; j++) {
+    for (int j = 0; j < RELIEF_TILE_VERTICES; j += step) {
         const float *shown = tile_row(relief, tile, j), *base = relief->base + (shown - relief->shown);
-        for (int i = 0; i < RELIEF_TILE_VERTICES; i++) *heights++ = fmaxf(0.0F, (base[i] - shown[i] - low) * scale);
+        for (int i = 0; i < RELIEF_TILE_VERTICES; i += step) *heights++ = fmaxf(0.0F, (base[i] - shown[i] - low) * scale);
     }
 }
 

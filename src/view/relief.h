@@ -43,8 +43,8 @@ int relief_tile_material(const Relief *relief, int tile);
 int relief_tile_touched(const Relief *relief, int tile);
 /* Whether the tile changed since this was last asked. */
 int relief_tile_take_dirty(Relief *relief, int tile);
-/* [VERTICES][VERTICES] rows along y: 1 at relief_high, 0 at `depth` below relief_low. */
-void relief_tile_heights(const Relief *relief, int tile, double depth, float *heights);
+/* Every step-th vertex (a divisor of RELIEF_TILE_CELLS), rows along y: 1 at relief_high, 0 at `depth` below relief_low. */
+void relief_tile_heights(const Relief *relief, int tile, double depth, int step, float *heights);
 /* [PIXELS][PIXELS][3] first row at y max, margin included; pressed ground is darker. */
 void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb);
 /* The same for untouched ground of one material, seamless between tiles. */

@@ -14,6 +14,7 @@
 #define VIEW_OVERLAP 1.0015 /* [-] tiles are drawn this much larger, so that no crack opens between them */
 #define VIEW_SLOTS 96       /* tiles that can be deformed or of mixed material at once */
 #define VIEW_SLOTS_UNEVEN 192 /* the same where every tile has a shape */
+#define VIEW_COARSE 4       /* vertices along an edge of a tile without prints are drawn this much farther apart */
 #define VIEW_DEPTH 0.20     /* [m] deepest print that can be drawn */
 #define VIEW_RADIUS 9.0     /* [m] tiles farther from the robot are drawn as plain floor */
 #define VIEW_RADIUS_UNEVEN 4.0 /* [m] */
@@ -327,8 +328,12 @@ static void slot_refresh(View *view, Slot *slot) {
     if (!relief_tile_take_dirty(view->relief, slot->tile) && slot->drawn_once) return;
     relief_tile_pixels(view->relief, slot->tile, texture_pixels(model, slot->texture));
     mjr_uploadTexture(model, &view->context, slot->texture);
-    if (relief_tile_touched(view->relief, slot->tile) || relief_is_uneven(view->relief)) {
-        relief_tile_heights(view->relief, slot->tile, VIEW_DEPTH, model->hfield_data + model->hfield_adr[slot->hfield]);
+    int touched = relief_tile_touched(view->relief, slot->tile);
+    if (touched || relief_is_uneven(view->relief)) {
+        int step = touched ? 1 : VIEW_COARSE;
+        model->hfield_nrow[slot->hfield] = model->hfield_ncol[slot->hfield] = RELIEF_TILE_CELLS / step + 1;
+        relief_tile_heights(view->relief, slot->tile, VIEW_DEPTH, step,
+                            model->hfield_data + model->hfield_adr[slot->hfield]);
         mjr_uploadHField(model, &view->context, slot->hfield);
     }
     slot->drawn_once = 1;

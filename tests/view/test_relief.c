@@ -55,7 +55,7 @@ static double depth_at(double x, double y) {
     int column = (int)floor((x - first[0]) / edge + 0.5), row = (int)floor((y - first[1]) / edge + 0.5);
     int tile = row * relief_tile_columns(relief) + column;
     relief_tile_center(relief, tile, center);
-    relief_tile_heights(relief, tile, RANGE, heights);
+    relief_tile_heights(relief, tile, RANGE, 1, heights);
     int i = (int)lround((x - center[0] + 0.5 * edge) / CELL), j = (int)lround((y - center[1] + 0.5 * edge) / CELL);
     return RANGE * (1.0 - (double)heights[j * RELIEF_TILE_VERTICES + i]);
 }
@@ -104,8 +104,8 @@ static void tiles_agree_on_their_edge(void **state) {
     assert_false(relief_tile_take_dirty(relief, 0));
     assert_false(relief_tile_touched(relief, 2));
     static float a[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES], b[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES];
-    relief_tile_heights(relief, 0, RANGE, a);
-    relief_tile_heights(relief, 1, RANGE, b);
+    relief_tile_heights(relief, 0, RANGE, 1, a);
+    relief_tile_heights(relief, 1, RANGE, 1, b);
     int low = 0;
     for (int j = 0; j < RELIEF_TILE_VERTICES; j++) {
         assert_true(a[j * RELIEF_TILE_VERTICES + RELIEF_TILE_CELLS] == b[j * RELIEF_TILE_VERTICES]);
@@ -161,7 +161,7 @@ static void prints_follow_the_map(void **state) {
     press(0.05, 0.0, DEPTH);
     for (int tile = 0; tile < relief_tile_columns(relief) * relief_tile_rows(relief); tile++) {
         relief_tile_center(relief, tile, center);
-        relief_tile_heights(relief, tile, RANGE, heights);
+        relief_tile_heights(relief, tile, RANGE, 1, heights);
         for (int j = 0; j < RELIEF_TILE_VERTICES; j += 4)
             for (int i = 0; i < RELIEF_TILE_VERTICES; i += 4) {
                 double x = center[0] - 0.5 * edge + CELL * i, y = center[1] - 0.5 * edge + CELL * j;
