@@ -30,14 +30,16 @@ expect() {
 
 # bad PATTERN COMMAND...: exit code 2, one line of error (progress apart) that holds the pattern, no file made or lost.
 bad() {
-    local pattern=$1 errors before
+    local pattern=$1 errors before line kept=()
     shift
-    before=$(find . | sort)
+    before=$(find .)
     errors=$("$@" 2>&1 >/dev/null </dev/null)
     local got=$?
-    errors=$(grep -v '^training ' <<<"$errors")
+    while IFS= read -r line; do
+        [[ $line = 'training '* ]] || kept+=("$line")
+    done <<<"$errors"
     [ "$got" = 2 ] || fail "exit $got instead of 2: $* -> $errors"
-    [ "$(wc -l <<<"$errors")" = 1 ] || fail "more than one line of error: $* -> $errors"
-    grep -q -- "$pattern" <<<"$errors" || fail "no '$pattern' in the error of: $* -> $errors"
-    [ "$(find . | sort)" = "$before" ] || fail "files came or went: $*"
+    [ "${#kept[@]}" = 1 ] || fail "not one line of error: $* -> $errors"
+    grep -q -- "$pattern" <<<"${kept[*]}" || fail "no '$pattern' in the error of: $* -> $errors"
+    [ "$(find .)" = "$before" ] || fail "files came or went: $*"
 }

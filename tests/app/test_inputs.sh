@@ -3,7 +3,7 @@
 # written or read are found out before the work begins. Usage: test_inputs.sh PATH_TO_MILD
 source "$(dirname "$0")/../kit.sh" "$1"
 
-# every key of the config: not a number, out of range, not there
+# every key of the config: not a number, too many numbers
 keys=0
 section=
 while read -r key _; do
@@ -14,7 +14,6 @@ while read -r key _; do
         name=$section.$key
         bad "$name" "$mild" train --out run "--$name=nan"
         bad "$name" "$mild" train --out run "--$name=1 2 3 4 5 6 7 8 9 10 11 12 13"
-        bad "$name" "$mild" train --out run "--$name="
         keys=$((keys + 1))
         ;;
     esac
