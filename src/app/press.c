@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "app/press_body.h"
 
@@ -18,10 +19,10 @@ typedef struct {
     MildContactResult contact;
     MildGround *ground;
     MildScratch *scratch;
-    void *block;
+    void *block; /* the ground, and behind it room for a copy */
+    void *spare;
     double offset[3]; /* [m] ankle -> reference point, world */
     double start;     /* [m] depth at which the lowest element touches */
-    double deepest;   /* [m] of the reference point since the first touch */
     double time;
 } Press;
 
@@ -63,7 +64,8 @@ static MildStatus press_open(Press *press, const PressDef *def, const MildSole *
     *press = (Press){.def = def, .sole = sole, .result = result, .terrain = mild_terrain_uniform(&def->material)};
     if (mild_terrain_set_map(&press->terrain, def->map, error) != MILD_OK) return error->status;
     press->terrain.height = -mild_terrain_height_at(&press->terrain, 0, 0);
-    press->block = aligned_alloc(64, mild_ground_bytes_prints(&sole, 1, def->print_tiles));
+    size_t bytes = mild_ground_bytes_prints(&sole, 1, def->print_tiles);
+    press->block = aligned_alloc(64, 2 * bytes);
     if (!press->block) return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
     press->scratch = mild_scratch_create(&sole, 1, error);
     if (!press->scratch) {
@@ -71,13 +73,14 @@ static MildStatus press_open(Press *press, const PressDef *def, const MildSole *
         return MILD_ERROR_MEMORY;
     }
     press->ground = mild_ground_init_prints(press->block, &sole, 1, def->print_tiles);
+    press->spare = (char *)press->block + bytes;
     double c = cos(def->tilt), s = sin(def->tilt);
     const double rotation[9] = {c, 0, s, 0, 1, 0, -s, 0, c}; /* about y */
     press->input.feet = 1;
     press->input.solver = def->solver;
     for (int i = 0; i < 9; i++) press->input.rotation[0][i] = rotation[i];
     press_pose(press);
-    press->start = press->deepest = lowest_element(press);
+    press->start = lowest_element(press);
     return MILD_OK;
 }
 
@@ -111,16 +114,6 @@ static PressRow press_row(const Press *press) {
     row.moment_x = foot->torque[0] - (p[1] * f[2] - p[2] * f[1]);
     row.moment_y = foot->torque[1] - (p[2] * f[0] - p[0] * f[2]);
     row.way = press->result->ways;
-    return row;
-}
-
-/* Mean of what is measured; place and time are the first's. */
-static PressRow row_mean(PressRow row, const PressRow *other) {
-    row.force = 0.5 * (row.force + other->force);
-    row.force_x = 0.5 * (row.force_x + other->force_x);
-    row.force_y = 0.5 * (row.force_y + other->force_y);
-    row.moment_x = 0.5 * (row.moment_x + other->moment_x);
-    row.moment_y = 0.5 * (row.moment_y + other->moment_y);
     return row;
 }
 
@@ -159,37 +152,33 @@ static PressRow hand_solve(Press *press, double dt, double forward, double down)
     return press_row(press);
 }
 
-/* Virgin ground from the step's beginning to its end; a step that crosses the old front is not. */
-static int hand_virgin(const Press *press, const PressRow *step, double to) {
-    return to > step->depth && step->depth > press->deepest - 1e-9;
-}
-
-/* Takes the step just solved and reads the force where it ends, at depth `to`. */
+/* Takes the step just solved. A step's force is the mean about the depth it starts from, so the force at the end, depth
+ * `to`, is that of the step which would follow. */
 static MildStatus hand_accept(Press *press, const PressRow *step, double forward, double to, MildError *error) {
     double dt = press->input.dt, down = (to - step->depth) / dt;
-    int virgin = hand_virgin(press, step, to);
-    work_add(press, step, to - step->depth, forward * dt);
     press_advance(press);
     press->time += dt;
     press->input.position[0][0] += forward * dt;
     press_place(press, to);
-    press->deepest = to > press->start ? fmax(press->deepest, to) : press->start; /* left the ground: all forgotten */
-    PressRow row = *step;
-    if (virgin) {
-        PressRow next = hand_solve(press, dt, forward, down);
-        row = row_mean(row, &next);
-        row.contacts = next.contacts;
-    }
-    row.time = press->time;
-    row.depth = to;
-    row.x = press->input.position[0][0] + press->offset[0];
+    PressRow row = hand_solve(press, dt, forward, down), mean = *step;
+    mean.force = 0.5 * (step->force + row.force);
+    mean.force_x = 0.5 * (step->force_x + row.force_x);
+    work_add(press, &mean, to - step->depth, forward * dt);
     return rows_add(press->result, row, error);
 }
 
-/* The force at the end of the step, to second order; on the unloading line it is the step's own. */
-static double hand_end_force(const Press *press, const PressRow *step, double to) {
-    double before = press->result->rows[press->result->count - 1].force;
-    return hand_virgin(press, step, to) ? 2 * step->force - before : step->force;
+/* The force at the end of the step just solved, which stays the last solved. */
+static double hand_end_force(Press *press, const PressRow *step, double to) {
+    double dt = press->input.dt, down = (to - step->depth) / dt;
+    size_t bytes = mild_ground_size(press->ground);
+    memcpy(press->spare, press->ground, bytes);
+    press_advance(press);
+    press_place(press, to);
+    PressRow next = hand_solve(press, dt, 0, down);
+    memcpy(press->ground, press->spare, bytes);
+    press_place(press, step->depth);
+    hand_solve(press, dt, 0, down);
+    return next.force;
 }
 
 /* Cuts a step that would pass `force` to where it gets there. */

@@ -10,9 +10,9 @@ static void foot_scatter(const MildScratch *scratch, int f) {
     for (int k = 0; k < foot->active; k++) {
         int i = foot->start + k, e = foot->element[k];
         double vx = V[0] + V[4] * s->pz[i] - V[5] * s->py[i], vy = V[1] + V[5] * s->px[i] - V[3] * s->pz[i];
-        double u1 = s->depth[i] + dt * slot_descent(s, i, V);
-        int loaded = s->iz[i] > 0.0, deeper = u1 > s->front[i];
-        double open = 1.0 - (deeper ? u1 : s->front[i]) * s->inverse_full[i];
+        double m1 = s->depth[i] + 0.5 * dt * slot_descent(s, i, V);
+        int loaded = s->iz[i] > 0.0, deeper = m1 > s->front[i];
+        double open = 1.0 - (s->deep[i] + (deeper ? m1 - s->front[i] : 0.0)) * s->inverse_full[i];
         foot->normal[e] = s->iz[i] * rate;
         foot->tangent_x[e] = s->ix[i] * rate;
         foot->tangent_y[e] = s->iy[i] * rate;

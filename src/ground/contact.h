@@ -28,6 +28,7 @@ struct MildGround {
 /* Memory of one foot, arrays inside the state block. */
 typedef struct {
     double *depth_max;   /* [m] u_max, 0 = untouched */
+    double *middle;      /* [m] depth in the middle of the last step, where the next one's way begins */
     double *front_speed; /* [m/s] downward speed of the added mass while the element leads the front, else 0 */
     double *drift;       /* [m] d_D */
     double *pending_x, *pending_y; /* [m] horizontal motion not yet counted into d_D */
@@ -51,18 +52,17 @@ typedef struct {
     double *px, *py, *pz; /* [m] ankle -> element, world axes */
     double *slope_x, *slope_y; /* [-] gradient of the ground under it; 0 where the foot is not `uneven` */
     /* normal law of this step, see step.h */
-    double *depth, *front, *front_force, *line, *gap, *reach, *front_speed, *speed, *blend, *mass, *drag_now,
+    double *depth, *middle, *front, *deep, *line, *slack, *stretch, *reach, *front_speed, *speed, *mass, *join, *leave,
         *explicit_impulse;
     double *flat, *cone, *full, *inverse_full, *drag, *bed, *bed_stiffness; /* Law */
     double *mu, *drift_radius, *damping; /* [-], [N s], [N s/m * s] */
     double *k_drift, *b_drift, *recovery, *mass_rate; /* material, for the preparation */
     double *depth_max, *drift;                       /* memory, compacted */
-    /* resistive force theory, see resist.c: [N/m] the law's cone before it depends on direction; [m] how far ahead of the
-     * element its front is, 0 for the other models */
-    double *strength, *lead;
+    double *strength; /* [N/m] the law's cone before it depends on direction; resistive force theory, see resist.c */
     /* written by the passes */
     double *ix, *iy, *iz;                         /* [N s] impulse */
     double *fx, *fy;                              /* [N s] friction without the drift damping; sweeps only */
+    double *lx, *ly;                              /* [-] direction of friction as an unknown of its own; see pass.c */
     double *hxx, *hxy, *hyy, *hzz, *hxz, *hyz;     /* [kg] minus the impulse's derivative by the element's velocity */
 } Slots;
 #define SLOT_ARRAYS (sizeof(Slots) / sizeof(double *))
@@ -87,7 +87,7 @@ typedef struct {
 } DerivedLaw;
 
 struct MildScratch {
-    int feet, slots; /* slots: in use by this solve, whole vectors */
+    int feet;
     FootScratch foot[MILD_FEET_MAX];
     Slots slot;
     int32_t *slot_material; /* whose law stands in the slot's Law arrays, coded as in Memory; -1 none */
@@ -101,8 +101,12 @@ struct MildScratch {
 /* Fills the lists and each slot's law for this step; returns the number of elements that may touch. */
 int contact_prepare(const MildGround *ground, const MildTerrain *terrain, const MildContactInput *input, MildScratch *scratch);
 
-/* Impulses of every slot at foot twists V, their derivatives (exact, or a safe upper bound), and their wrench. */
-void contact_pass(MildScratch *scratch, double dt, const double *twist, int exact);
+/* Impulses of every slot at foot twists V, their derivatives and their wrench; eps [m/s]: width of the stick region. */
+void contact_pass(MildScratch *scratch, double dt, const double *twist, double eps);
+/* Friction directions l carried over a step from one twist to another, and put into the derivatives of the last pass. */
+void contact_dual_start(MildScratch *scratch, const double *twist, double eps);
+void contact_dual(MildScratch *scratch, const double *from, const double *twist, double eps);
+void contact_dual_stiffness(MildScratch *scratch, const double *twist, double eps);
 /* hessian from the h arrays of the last pass. */
 void contact_hessian(MildScratch *scratch);
 /* sqrt(R^T A R) for R = P - wrench: the residual in the metric of kinetic energy. */

@@ -4,7 +4,7 @@
 
 #define MEMORY_BAND 1e-5 /* [m] horizontal motion below this is jitter, not drift */
 #define MEMORY_CAP 0.1   /* [m] longest drift that still hardens the ground */
-#define MEMORY_DOUBLES 8
+#define MEMORY_DOUBLES 9
 
 static int32_t padded_elements(const MildSole *sole) {
     return (int32_t)((mild_sole_elements(sole) + CONTACT_LANES - 1) / CONTACT_LANES * CONTACT_LANES);
@@ -39,7 +39,7 @@ Memory ground_memory(const MildGround *ground, int foot) {
     double *at = (double *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground->padded, foot));
     size_t n = (size_t)ground->padded[foot];
     return (Memory){at,         at + n,     at + 2 * n, at + 3 * n, at + 4 * n,
-                    at + 5 * n, at + 6 * n, at + 7 * n, (int32_t *)(at + MEMORY_DOUBLES * n)};
+                    at + 5 * n, at + 6 * n, at + 7 * n, at + 8 * n, (int32_t *)(at + MEMORY_DOUBLES * n)};
 }
 
 /* Behind the feet; read as ground_memory is. */
@@ -85,8 +85,9 @@ const double *mild_ground_depth_max(const MildGround *ground, int foot) {
     return ground_memory(ground, foot).depth_max;
 }
 
-static void element_forget(const Memory *memory, int e, int32_t material) {
+static void element_forget(const Memory *memory, int e, int32_t material, double middle) {
     memory->depth_max[e] = 0.0;
+    memory->middle[e] = middle;
     memory->front_speed[e] = 0.0;
     memory->drift[e] = 0.0;
     memory->pending_x[e] = 0.0;
@@ -114,10 +115,10 @@ typedef struct {
 } Advance;
 
 /* Lifted off: out of the ground; where prints stay, as soon as its own print no longer presses on it. */
-static int element_lifted(const Advance *a, int i, double u1) {
+static int element_lifted(const Advance *a, int i, double m1) {
     const Slots *s = a->slot;
-    if (!(u1 > 0.0)) return 1;
-    return a->prints && s->recovery[i] < 1.0 && s->front_force[i] + s->line[i] * (u1 - s->front[i]) <= 0.0;
+    if (!(m1 > 0.0)) return 1;
+    return a->prints && s->recovery[i] < 1.0 && m1 <= s->slack[i];
 }
 
 /* What an element that carried something leaves behind, where it lifts off and in each cell that it slides out of; sliding
@@ -129,7 +130,7 @@ static void element_print(const Advance *a, const Memory *memory, int i, int e, 
     double x1 = x0 + a->dt * (a->V[0] + a->V[4] * s->pz[i] - a->V[5] * s->py[i]);
     double y1 = y0 + a->dt * (a->V[1] + a->V[5] * s->px[i] - a->V[3] * s->pz[i]);
     if (!lifted && prints_same_cell(a->prints, x0, y0, x1, y1)) return;
-    prints_press(a->prints, &(PrintElement){x0, y0, a->foot->pitch, a->rotation}, lifted ? s->front[i] : memory->depth_max[e]);
+    prints_press(a->prints, &(PrintElement){x0, y0, a->foot->pitch, a->rotation}, lifted ? s->deep[i] : memory->depth_max[e]);
     if (lifted) return;
     double found = prints_read(a->prints, &(PrintElement){x1, y1, a->foot->pitch, a->rotation});
     if (found <= memory->depth_max[e]) return;
@@ -137,13 +138,23 @@ static void element_print(const Advance *a, const Memory *memory, int i, int e, 
     memory->front_speed[e] = 0.0;
 }
 
-static void element_advance(const Advance *a, const Memory *memory, int i, int e, int32_t material, double w, double u1) {
+/* How deep the element has been in this step. A foot that turns round within it was deepest between its ends: elastic ground
+ * took it to the top of the parabola through them. */
+static double element_peak(const Slots *s, int i, double dt, double w, double m1) {
+    double w0 = s->speed[i], m0 = s->middle[i];
+    if (!(w < 0.0 && w0 > 0.0)) return m1;
+    double top = m0 + 0.5 * dt * w0 * w0 / (w0 - w);
+    return m1 + s->recovery[i] * fmax(top - m1, 0.0);
+}
+
+static void element_advance(const Advance *a, const Memory *memory, int i, int e, int32_t material, double w, double m1) {
     const Slots *s = a->slot;
     const double *V = a->V;
-    int leads = u1 > s->front[i] && w > s->reach[i];
+    int leads = m1 > s->front[i] && w > s->reach[i], joined = s->front_speed[i] > s->reach[i] || !(s->depth_max[i] > 0.0);
     /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the next step. */
-    memory->front_speed[e] = leads ? (s->front_speed[i] > s->reach[i] || s->gap[i] > 0.0 ? w : w - s->reach[i]) : 0.0;
-    memory->depth_max[e] = u1 + s->lead[i] > s->front[i] ? u1 + s->lead[i] : s->front[i];
+    memory->front_speed[e] = leads ? (joined ? w : w - s->reach[i]) : 0.0;
+    memory->depth_max[e] = s->deep[i] + fmax(element_peak(s, i, a->dt, w, m1) - s->front[i], 0.0);
+    memory->middle[e] = fmin(m1, memory->depth_max[e]);
     memory->material[e] = material;
     element_drift(memory, e, a->dt * (V[0] + V[4] * s->pz[i] - V[5] * s->py[i]),
                   a->dt * (V[1] + V[5] * s->px[i] - V[3] * s->pz[i]));
@@ -165,18 +176,18 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
     int next = 0, touched = 0;
     for (int k = 0; k < foot->active; k++, next++) {
         int i = foot->start + k, e = foot->element[k];
-        for (; next < e; next++) element_forget(memory, next, MATERIAL_NONE);
-        double w = slot_descent(a->slot, i, a->V), u1 = a->slot->depth[i] + a->dt * w;
-        int lifted = element_lifted(a, i, u1), carried = memory->material[e] >= 0;
+        for (; next < e; next++) element_forget(memory, next, MATERIAL_NONE, 0.0);
+        double w = slot_descent(a->slot, i, a->V), m1 = a->slot->depth[i] + 0.5 * a->dt * w;
+        int lifted = element_lifted(a, i, m1), carried = memory->material[e] >= 0;
         if (lifted)
-            element_forget(memory, e, lifted_material);
+            element_forget(memory, e, lifted_material, m1);
         else
-            element_advance(a, memory, i, e, material[i], w, u1);
+            element_advance(a, memory, i, e, material[i], w, m1);
         if (a->prints && (carried || !lifted)) element_print(a, memory, i, e, lifted);
         if (foot->uneven) element_plane(a, memory, i, e);
         touched += !lifted || lifted_material != MATERIAL_NONE;
     }
-    for (; next < foot->elements; next++) element_forget(memory, next, MATERIAL_NONE);
+    for (; next < foot->elements; next++) element_forget(memory, next, MATERIAL_NONE, 0.0);
     return touched;
 }
 

@@ -3,9 +3,13 @@
 #include "ground/contact.h"
 
 #define NEWTON_TOLERANCE 1e-9
-#define NEWTON_ITERATIONS 60
+#define NEWTON_ITERATIONS 100 /* 30 are the most that random problems have needed */
+#define NEWTON_PLAIN 12       /* of them without the detour over wide stick regions */
 #define NEWTON_HALVINGS 6
-#define NEWTON_SEARCHES 12
+#define NEWTON_WIDE 0.1       /* [m/s] first stick region of the detour */
+#define NEWTON_NARROW 0.3     /* each is this much narrower than the one before */
+#define NEWTON_LEVEL 1e-2     /* relative residual at which the next one begins */
+#define NEWTON_PATIENCE 6     /* or this many steps */
 
 /* One point of the search: impulse P, foot twists V = V^ + A P. */
 typedef struct {
@@ -21,8 +25,8 @@ static void point_twist(int n, const MildContactInput *input, Point *point) {
     }
 }
 
-static void point_evaluate(MildScratch *scratch, const MildContactInput *input, int n, Point *point) {
-    contact_pass(scratch, input->dt, point->twist, 1);
+static void point_evaluate(MildScratch *scratch, const MildContactInput *input, int n, double eps, Point *point) {
+    contact_pass(scratch, input->dt, point->twist, eps);
     point->residual = contact_residual(n, input->inverse_inertia, point->impulse, scratch->wrench);
 }
 
@@ -82,6 +86,19 @@ static int newton_step(const MildScratch *scratch, const MildContactInput *input
                   : newton_step_of(scratch, input, TWIST_MAX, twist, impulse);
 }
 
+static double newton_scale(int n, const MildContactInput *input, const double *impulse) {
+    static const double zero[TWIST_MAX];
+    return contact_residual(n, input->inverse_inertia, impulse, zero);
+}
+
+/* Newton's step from the last pass; false when the numbers have gone bad. */
+static int newton_move(MildScratch *scratch, const MildContactInput *input, int n, Point *at, Point *next) {
+    contact_hessian(scratch);
+    if (!newton_step(scratch, input, n, at->twist, next->impulse)) return 0;
+    point_twist(n, input, next);
+    return 1;
+}
+
 static void point_between(int n, const Point *from, const Point *to, double t, Point *point) {
     for (int i = 0; i < n; i++) {
         point->impulse[i] = from->impulse[i] + t * (to->impulse[i] - from->impulse[i]);
@@ -89,82 +106,78 @@ static void point_between(int n, const Point *from, const Point *to, double t, P
     }
 }
 
-/* Newton's step with halving on the residual. False when nothing on the way was better. */
-static int newton_exact(MildScratch *scratch, const MildContactInput *input, int n, const Point *at, Point *next) {
-    if (!newton_step(scratch, input, n, at->twist, next->impulse)) return 0;
-    point_twist(n, input, next);
-    point_evaluate(scratch, input, n, next);
-    if (next->residual < at->residual) return 1;
+/* Halves the step until the residual falls; false when it does not. */
+static int newton_halve(MildScratch *scratch, const MildContactInput *input, int n, double eps, const Point *at, Point *next) {
     const Point full = *next;
     double t = 1.0;
     for (int k = 0; k < NEWTON_HALVINGS; k++) {
         t *= 0.5;
         point_between(n, at, &full, t, next);
-        point_evaluate(scratch, input, n, next);
+        point_evaluate(scratch, input, n, eps, next);
         if (next->residual < (1.0 - 0.1 * t) * at->residual) return 1;
     }
     return 0;
 }
 
-/* Slope of the convex function along the step, up to its length: dV . (P - W). */
-static double step_slope(int n, const Point *from, const Point *to, const Point *here, const double *wrench) {
-    double sum = 0.0;
-    for (int i = 0; i < n; i++) sum += (to->twist[i] - from->twist[i]) * (here->impulse[i] - wrench[i]);
-    return sum;
-}
-
-/* A step that cannot fail on the convex function with the friction bounds as they are at each point: majorised Hessian,
- * then the root of the slope along the step by bisection and secants. */
-static int newton_safe(MildScratch *scratch, const MildContactInput *input, int n, const Point *at, Point *next) {
-    contact_pass(scratch, input->dt, at->twist, 0);
-    contact_hessian(scratch);
-    if (!newton_step(scratch, input, n, at->twist, next->impulse)) return 0;
-    point_twist(n, input, next);
-    const Point full = *next;
-    double low = 0.0, high = 1.0, start = step_slope(n, at, &full, at, scratch->wrench), slope_low = start;
-    point_evaluate(scratch, input, n, next);
-    double slope = step_slope(n, at, &full, next, scratch->wrench), slope_high = slope;
-    for (int k = 0; k < NEWTON_SEARCHES && slope > 0.1 * fabs(start); k++) {
-        double t = k % 2 ? 0.5 * (low + high) : low + (high - low) * slope_low / (slope_low - slope_high);
-        point_between(n, at, &full, t, next);
-        point_evaluate(scratch, input, n, next);
-        slope = step_slope(n, at, &full, next, scratch->wrench);
-        if (slope > 0.0) {
-            high = t;
-            slope_high = slope;
-        } else {
-            low = t;
-            slope_low = slope;
-            if (slope > -0.1 * fabs(start)) break;
-        }
+/* Newton's method as it stands, as long as the residual falls. The common case: standing is one step, walking two or three. */
+static int newton_plain(MildScratch *scratch, const MildContactInput *input, int n, double tolerance, int limit, Point *at) {
+    Point next;
+    int steps = 0;
+    contact_pass(scratch, input->dt, at->twist, CONTACT_SLIP_SPEED);
+    while (steps < limit && newton_move(scratch, input, n, at, &next)) {
+        steps++;
+        point_evaluate(scratch, input, n, CONTACT_SLIP_SPEED, &next);
+        if (!(next.residual < at->residual) && !newton_halve(scratch, input, n, CONTACT_SLIP_SPEED, at, &next)) break;
+        *at = next;
+        if (at->residual <= tolerance * newton_scale(n, input, at->impulse)) break;
     }
-    return 1;
+    return steps;
 }
 
-static double newton_scale(int n, const MildContactInput *input, const double *impulse) {
-    static const double zero[TWIST_MAX];
-    return contact_residual(n, input->inverse_inertia, impulse, zero);
+/* The detour where Newton's method alone does not arrive: a foot that turns about a point under its sole has an element
+ * whose velocity must be found to within the stick region, a needle's eye of 1e-6 m/s. With a wide region the problem is
+ * easy; it is then narrowed step by step, the friction's directions l being kept from one region to the next. */
+static int newton_narrow(MildScratch *scratch, const MildContactInput *input, int n, double tolerance, int limit, Point *best) {
+    double eps = NEWTON_WIDE;
+    Point at = {.residual = INFINITY}, next;
+    memcpy(at.twist, input->velocity, (size_t)n * sizeof(double));
+    int steps = 0, patience = NEWTON_PATIENCE;
+    contact_pass(scratch, input->dt, at.twist, eps);
+    contact_dual_start(scratch, at.twist, eps);
+    while (steps < limit && newton_move(scratch, input, n, &at, &next)) {
+        steps++;
+        point_evaluate(scratch, input, n, eps, &next);
+        if (!(next.residual < at.residual)) newton_halve(scratch, input, n, eps, &at, &next); /* a small step if in vain */
+        contact_dual(scratch, at.twist, next.twist, eps);
+        at = next;
+        if (!(at.residual < INFINITY)) break;
+        double scale = newton_scale(n, input, at.impulse);
+        if (eps == CONTACT_SLIP_SPEED) {
+            if (at.residual < best->residual) *best = at;
+            if (at.residual <= tolerance * scale) break;
+        } else if (at.residual <= NEWTON_LEVEL * scale || --patience == 0) {
+            patience = NEWTON_PATIENCE;
+            eps = fmax(NEWTON_NARROW * eps, CONTACT_SLIP_SPEED);
+            contact_pass(scratch, input->dt, at.twist, eps);
+            at.residual = INFINITY;
+        }
+        contact_dual_stiffness(scratch, at.twist, eps);
+    }
+    return steps;
 }
 
 void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
     int n = 6 * scratch->feet, limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
-    double tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE, scale = 0.0;
-    Point at = {.residual = INFINITY}, best = at, next;
+    double tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
+    Point at = {.residual = INFINITY};
     memcpy(at.twist, input->velocity, (size_t)n * sizeof(double));
-    contact_pass(scratch, input->dt, at.twist, 1);
-    int iterations = 0;
-    while (iterations < limit) {
-        iterations++;
-        contact_hessian(scratch);
-        if (!newton_exact(scratch, input, n, &at, &next) && !newton_safe(scratch, input, n, &at, &next)) break;
-        at = next;
-        if (at.residual < best.residual) best = at;
+    int plain = limit < NEWTON_PLAIN ? limit : NEWTON_PLAIN;
+    int iterations = newton_plain(scratch, input, n, tolerance, plain, &at);
+    double scale = newton_scale(n, input, at.impulse);
+    if (!(at.residual <= tolerance * scale)) {
+        iterations += newton_narrow(scratch, input, n, tolerance, limit - iterations, &at);
+        contact_pass(scratch, input->dt, at.twist, CONTACT_SLIP_SPEED);
         scale = newton_scale(n, input, at.impulse);
-        if (at.residual <= tolerance * scale) break;
-    }
-    if (best.residual < at.residual) {
-        at = best;
-        contact_pass(scratch, input->dt, at.twist, 1);
     }
     result->iterations = iterations;
     result->residual = scale > 0.0 ? at.residual / scale : at.residual;

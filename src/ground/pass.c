@@ -1,3 +1,5 @@
+#include <string.h>
+
 #include "ground/step.h"
 
 /* The normal law at every slot of a foot: branch-free, so that it runs in vectors. */
@@ -35,17 +37,15 @@ static void foot_lean(const Slots *s, int start, int end) {
 
 /* Coulomb friction and drift resistance of radius r = mu I_z + dt k_D d_D u (paper eqs 13 and 14), made single-valued by a
  * stick region |v| < eps, plus the drift damping: I = -(r/max(|v|, eps) + dt b_D) v. Both oppose the new velocity, so they
- * can neither push a resting foot nor reverse a motion. With exact = 0 the derivative is that of the quadratic that touches
- * |v| from above (no loss of stiffness along the slip, no coupling to the normal force): safe, but slow to converge. */
-static void foot_tangent(const Slots *s, int start, int end, const double *V, double exact) {
+ * can neither push a resting foot nor reverse a motion. */
+static void foot_tangent(const Slots *s, int start, int end, const double *V, double eps) {
     const double v0 = V[0], v1 = V[1], w0 = V[3], w1 = V[4], w2 = V[5];
 #pragma omp simd
     for (int i = start; i < end; i++) {
         double vx = v0 + w1 * s->pz[i] - w2 * s->py[i], vy = v1 + w2 * s->px[i] - w0 * s->pz[i];
-        double speed = sqrt(vx * vx + vy * vy), along = 1.0 / (speed > CONTACT_SLIP_SPEED ? speed : CONTACT_SLIP_SPEED);
+        double speed = sqrt(vx * vx + vy * vy), along = 1.0 / (speed > eps ? speed : eps);
         double pull = (s->mu[i] * s->iz[i] + s->drift_radius[i]) * along, b = s->damping[i];
-        double nx = vx * along, ny = vy * along, slip = exact * (speed > CONTACT_SLIP_SPEED ? pull : 0.0);
-        double couple = exact * s->mu[i] * s->hzz[i];
+        double nx = vx * along, ny = vy * along, slip = speed > eps ? pull : 0.0, couple = s->mu[i] * s->hzz[i];
         s->ix[i] = -(pull + b) * vx;
         s->iy[i] = -(pull + b) * vy;
         s->hxx[i] = pull + b - slip * nx * nx;
@@ -53,6 +53,39 @@ static void foot_tangent(const Slots *s, int start, int end, const double *V, do
         s->hxy[i] = -slip * nx * ny;
         s->hxz[i] = -couple * nx; /* the friction bound falls as the foot rises */
         s->hyz[i] = -couple * ny;
+    }
+}
+
+/* The friction's direction as an unknown of its own (Chan, Golub and Mulet's method for sums of norms): l stands for
+ * v/max(|v|, eps) and obeys |v| l = v, linearised at the old v as l = (v_new - l_old (n . dv))/|v_old| and kept in the unit
+ * disc. A slipping element then loses stiffness along l and n instead of n twice: one whose direction is still in doubt,
+ * as at the point a foot turns about, stays stiff, where Newton's method on v alone jumps to and fro across it. */
+static void foot_dual(const Slots *s, int start, int end, const double *from, const double *V, double eps) {
+#pragma omp simd
+    for (int i = start; i < end; i++) {
+        double px = s->px[i], py = s->py[i], pz = s->pz[i];
+        double ox = from[0] + from[4] * pz - from[5] * py, oy = from[1] + from[5] * px - from[3] * pz;
+        double vx = V[0] + V[4] * pz - V[5] * py, vy = V[1] + V[5] * px - V[3] * pz;
+        double before = sqrt(ox * ox + oy * oy), ahead = 1.0 / (before > eps ? before : eps);
+        double turn = before > eps ? ahead * (ox * (vx - ox) + oy * (vy - oy)) : 0.0;
+        double lx = (vx - s->lx[i] * turn) * ahead, ly = (vy - s->ly[i] * turn) * ahead, square = lx * lx + ly * ly;
+        double shorten = 1.0 / sqrt(square > 1.0 ? square : 1.0);
+        s->lx[i] = lx * shorten;
+        s->ly[i] = ly * shorten;
+    }
+}
+
+/* Puts l into the derivatives that foot_tangent has just made at V. */
+static void foot_dual_stiffness(const Slots *s, int start, int end, const double *V, double eps) {
+#pragma omp simd
+    for (int i = start; i < end; i++) {
+        double vx = V[0] + V[4] * s->pz[i] - V[5] * s->py[i], vy = V[1] + V[5] * s->px[i] - V[3] * s->pz[i];
+        double speed = sqrt(vx * vx + vy * vy), along = 1.0 / (speed > eps ? speed : eps), nx = vx * along, ny = vy * along;
+        double slip = speed > eps ? (s->mu[i] * s->iz[i] + s->drift_radius[i]) * along : 0.0;
+        double mx = nx - s->lx[i], my = ny - s->ly[i];
+        s->hxx[i] += slip * nx * mx;
+        s->hyy[i] += slip * ny * my;
+        s->hxy[i] += 0.5 * slip * (nx * my + ny * mx);
     }
 }
 
@@ -77,15 +110,35 @@ static void foot_wrench(const Slots *s, int start, int end, double *wrench) {
     wrench[5] = tz;
 }
 
-void contact_pass(MildScratch *scratch, double dt, const double *twist, int exact) {
+void contact_pass(MildScratch *scratch, double dt, const double *twist, double eps) {
     for (int f = 0; f < scratch->feet; f++) {
         int start = scratch->foot[f].start, end = foot_end(&scratch->foot[f]);
         int uneven = scratch->foot[f].uneven;
         (uneven ? foot_normal_uneven : foot_normal)(&scratch->slot, start, end, dt, twist + 6 * f);
-        foot_tangent(&scratch->slot, start, end, twist + 6 * f, (double)exact);
+        foot_tangent(&scratch->slot, start, end, twist + 6 * f, eps);
         if (uneven) foot_lean(&scratch->slot, start, end);
         foot_wrench(&scratch->slot, start, end, scratch->wrench + 6 * f);
     }
+}
+
+void contact_dual(MildScratch *scratch, const double *from, const double *twist, double eps) {
+    for (int f = 0; f < scratch->feet; f++)
+        foot_dual(&scratch->slot, scratch->foot[f].start, foot_end(&scratch->foot[f]), from + 6 * f, twist + 6 * f, eps);
+}
+
+void contact_dual_start(MildScratch *scratch, const double *twist, double eps) {
+    for (int f = 0; f < scratch->feet; f++) {
+        int start = scratch->foot[f].start;
+        size_t bytes = (size_t)(foot_end(&scratch->foot[f]) - start) * sizeof(double);
+        memset(scratch->slot.lx + start, 0, bytes);
+        memset(scratch->slot.ly + start, 0, bytes);
+    }
+    contact_dual(scratch, twist, twist, eps); /* from nothing: l = v/max(|v|, eps) */
+}
+
+void contact_dual_stiffness(MildScratch *scratch, const double *twist, double eps) {
+    for (int f = 0; f < scratch->feet; f++)
+        foot_dual_stiffness(&scratch->slot, scratch->foot[f].start, foot_end(&scratch->foot[f]), twist + 6 * f, eps);
 }
 
 /* With the rows Jx = (1,0,0, 0,pz,-py), Jy = (0,1,0, -pz,0,px), Jz = (0,0,1, py,-px,0) of B and the element's

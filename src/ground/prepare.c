@@ -6,8 +6,6 @@
 
 #define PREPARE_MARGIN 1e-3      /* [m] elements this close to the ground are listed */
 #define PREPARE_EXTRA_SPEED 2.0  /* [m/s] an impact at the heel may swing the toe down faster than its free motion */
-#define PREPARE_BLEND_SLOW 0.02  /* [m/s] below: chi = 1; see step.h */
-#define PREPARE_BLEND_FAST 0.05  /* [m/s] above: chi in full */
 
 static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
     for (int i = 0; i < foot->padded; i++) {
@@ -93,7 +91,6 @@ static void slot_set_law(const Slots *s, int i, const Law *law, const MildMateri
     s->b_drift[i] = material->b_drift;
     s->recovery[i] = material->recovery;
     s->strength[i] = law->cone;
-    s->lead[i] = 0.0;
 }
 
 /* Every number of the law that the steps use, and friction and recovery, change linearly from one material to the other. A
@@ -149,13 +146,14 @@ static void slots_gather(MildScratch *scratch, const Memory *memory, const doubl
         s->pz[i] = cz + R[6] * x + R[7] * y;
         s->depth[i] = foot->depth[e];
         s->depth_max[i] = memory->depth_max[e];
+        s->middle[i] = memory->middle[e];
         s->front_speed[i] = memory->front_speed[e];
         s->drift[i] = memory->drift[e];
     }
     for (int i = foot->start + foot->active; i < foot_end(foot); i++) {
         s->px[i] = s->py[i] = s->pz[i] = 0.0;
         s->depth[i] = -1e3; /* never reaches the ground */
-        s->depth_max[i] = s->front_speed[i] = s->drift[i] = 0.0;
+        s->depth_max[i] = s->middle[i] = s->front_speed[i] = s->drift[i] = 0.0;
         s->ix[i] = s->iy[i] = s->iz[i] = 0.0;
     }
 }
@@ -185,10 +183,10 @@ static void slots_prints(const MildScratch *scratch, const Prints *prints, const
     const Slots *s = &scratch->slot;
     for (int k = 0; k < foot->active; k++) {
         int i = foot->start + k, e = foot->element[k], m = memory->material[e];
-        double lasting = 1.0 - s->recovery[i], u0 = s->depth[i];
+        double lasting = 1.0 - s->recovery[i], m0 = memory->middle[e];
         if (m >= 0 || !(lasting > 0.0)) continue;
         double found = prints_read(prints, &(PrintElement){foot->point_x[e], foot->point_y[e], foot->pitch, R});
-        double free = m == MATERIAL_FREE && u0 > 0.0 ? step_max(u0 / lasting, u0 + CONTACT_ELASTIC) : 0.0;
+        double free = m == MATERIAL_FREE && m0 > 0.0 ? step_max(m0 / lasting, m0 + CONTACT_ELASTIC) : 0.0;
         s->depth_max[i] = step_max(found, free);
     }
 }
@@ -208,30 +206,34 @@ static inline void slots_prepare(const Slots *s, int start, int end, double dt, 
     double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = start; i < end; i++) {
-        double u0 = s->depth[i], used = s->depth_max[i], a = step_max(step_max(u0, used), 0.0);
+        double py = s->py[i], px = s->px[i], u0 = s->depth[i], used = s->depth_max[i];
+        double w_now = uneven ? slot_descent(s, i, now) : now[4] * px - now[3] * py - now[2];
+        double w_free = uneven ? slot_descent(s, i, free) : free[4] * px - free[3] * py - free[2];
+        double m0 = s->middle[i] > 0.0 ? s->middle[i] : u0 - 0.5 * dt * w_now, a = step_max(step_max(m0, used), 0.0);
         double c0 = step_max(1.0 - a * s->inverse_full[i], 0.0), flat_share = s->full[i] * (1.0 / 3.0) * (1.0 - c0 * c0 * c0);
         double in_bed = a - s->bed[i], bed_stiffness = s->bed_stiffness[i], bed = in_bed > 0.0 ? bed_stiffness : 0.0;
         double force = s->flat[i] * flat_share + s->cone[i] * a + bed * in_bed;
         double travel = step_max(s->recovery[i] * a, step_min(CONTACT_ELASTIC, a));
         double curve = s->flat[i] * c0 * c0, flat = step_max(s->flat[i], 0.0), steepest = in_bed > 0.0 ? flat : curve;
+        double line = step_max(force / (travel + STEP_TINY), steepest + s->cone[i] + bed), slack = a - force / (line + STEP_TINY);
+        s->middle[i] = m0;
         s->front[i] = a;
-        s->front_force[i] = force;
-        s->line[i] = step_max(force / (travel + STEP_TINY), steepest + s->cone[i] + bed);
-        s->gap[i] = used > 0.0 ? 0.0 : step_max(-u0, 0.0);
-        double reach = (a - u0) * rate, py = s->py[i], px = s->px[i], added = s->mass_rate[i] * flat_share;
-        double w_now = uneven ? slot_descent(s, i, now) : now[4] * px - now[3] * py - now[2], speed = step_max(w_now, 0.0);
-        double w_free = uneven ? slot_descent(s, i, free) : free[4] * px - free[3] * py - free[2];
-        double blend = (speed - PREPARE_BLEND_SLOW) * (1.0 / (PREPARE_BLEND_FAST - PREPARE_BLEND_SLOW));
+        s->deep[i] = a;
+        s->line[i] = line;
+        s->slack[i] = slack;
+        s->stretch[i] = step_max(m0 - slack, 0.0);
+        double speed = step_max(w_now, 0.0), reach = step_max(2.0 * (a - u0) * rate, 0.0), added = s->mass_rate[i] * flat_share;
         s->reach[i] = reach;
         s->front_speed[i] = step_max(s->front_speed[i], reach);
         s->speed[i] = speed;
-        s->blend[i] = step_min(step_max(blend, 0.0), 1.0);
         s->mass[i] = step_max(added, 0.0);
+        double drag = step_max(s->drag[i], 0.0), mass_rate = step_max(s->mass_rate[i], 0.0);
+        s->join[i] = 0.5 * (drag + mass_rate);
+        s->leave[i] = 0.5 * (drag - mass_rate);
         /* Energy-creating parameters (passive = false) cannot be implicit: they enter with the free motion. */
         double pull = step_min(s->drag[i], 0.0), inside = u0 > 0.0 ? 1.0 : 0.0;
-        s->explicit_impulse[i] = inside * (u0 >= used ? 1.0 : 0.0) *
+        s->explicit_impulse[i] = inside * (m0 >= used ? 1.0 : 0.0) *
                                  (step_min(added, 0.0) * (w_free - s->front_speed[i]) + pull * c0 * c0 * dt * speed * speed);
-        s->drag_now[i] = step_max(s->drag[i], 0.0);
         s->drift_radius[i] = dt * s->k_drift[i] * s->drift[i] * step_max(u0, 0.0);
         s->damping[i] = dt * s->b_drift[i] * inside;
     }

@@ -12,8 +12,8 @@
  * level for the other.
  *
  * No energy from a changing direction: the elastic travel (CONTACT_ELASTIC) belongs to the peak whatever the direction, so
- * it stores what a function of depth and front alone says; and an element that yields below the peak carries its front
- * `lead` = travel (1 - share) deeper, so that the line through the new front has just the yield force where it stands. */
+ * it stores what a function of depth and front alone says; an element that yields below the peak does so on the way up that
+ * line, at `front`, before it gets to the depth `deep` that it remembers: travel (1 - share) deeper. */
 #include "ground/resist.h"
 
 #include "ground/step.h"
@@ -87,16 +87,18 @@ static void way_alpha(int model, const Way *way, const double *normal, double le
 }
 
 static void slot_resist(const Slots *s, int i, double dt, double sideways, double downward) {
-    double u0 = s->depth[i], level = s->strength[i], peak = RESIST_PEAK * level, share = step_min(step_max(downward / RESIST_PEAK, 0.0), 1.0);
-    double lead = CONTACT_ELASTIC * (1.0 - share);
-    double led = u0 > 0.0 ? step_min(u0 + lead, u0 / (share + STEP_TINY)) : 0.0, a = step_max(led, s->front[i]);
-    double in_bed = a - s->bed[i], bed = in_bed > 0.0 ? s->bed_stiffness[i] : 0.0;
+    double u0 = s->depth[i], m0 = s->middle[i], level = s->strength[i], peak = RESIST_PEAK * level;
+    double share = step_min(step_max(downward / RESIST_PEAK, 0.0), 1.0), lead = CONTACT_ELASTIC * (1.0 - share);
+    double led = m0 > 0.0 ? step_min(m0 + lead, m0 / (share + STEP_TINY)) : 0.0, deep = step_max(led, s->deep[i]);
+    double in_bed = deep - s->bed[i], bed = in_bed > 0.0 ? s->bed_stiffness[i] : 0.0, force = peak * deep + bed * in_bed;
+    double line = step_max(force / (step_min(CONTACT_ELASTIC, deep) + STEP_TINY), peak + bed), slack = deep - force / line;
     s->cone[i] = share * peak;
-    s->lead[i] = lead;
-    s->front[i] = a;
-    s->front_force[i] = peak * a + bed * in_bed;
-    s->line[i] = step_max(s->front_force[i] / (step_min(CONTACT_ELASTIC, a) + STEP_TINY), peak + bed);
-    s->reach[i] = (a - u0) / dt;
+    s->deep[i] = deep;
+    s->line[i] = line;
+    s->slack[i] = slack;
+    s->stretch[i] = step_max(m0 - slack, 0.0);
+    s->front[i] = slack + (share * peak * deep + bed * in_bed) / line;
+    s->reach[i] = step_max(2.0 * (s->front[i] - u0) / dt, 0.0);
     s->drift_radius[i] += dt * level * step_max(sideways, 0.0) * step_max(u0, 0.0);
 }
 

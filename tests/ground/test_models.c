@@ -52,15 +52,14 @@ static double pressed_force(int model, const MildMaterial *material, double dept
     Kit kit;
     kit_open(&kit, 1, sole_of(model, 0), NULL, material, depth / 0.01 / STEPS);
     kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.01;
-    double before = 0.0, force = 0.0;
-    for (int s = 0; s <= STEPS; s++) { /* means over the steps before and after the depth */
+    double force = 0.0;
+    for (int s = 0; s <= STEPS; s++) { /* a step's force is the mean about the depth it starts from */
         kit_solve(&kit);
         kit_advance(&kit);
-        before = force;
         force = kit.result.foot[0].force[2];
     }
     kit_close(&kit);
-    return 0.5 * (before + force);
+    return force;
 }
 
 static void test_matched(void **state) {
@@ -81,7 +80,7 @@ static void test_matched(void **state) {
     print_message("matched: sinkage within %.2e mm of mild's, force pressed to that depth within %.2e\n", 1e3 * worst_depth,
                   worst_force);
     assert_true(worst_depth < 1e-7); /* the bar is 0.1 mm */
-    assert_true(worst_force < 2e-3); /* con_cone's drag at 1 cm/s */
+    assert_true(worst_force < 5e-3); /* con_cone's drag at 1 cm/s; ecc_quasi's front, up to 0.1 mm ahead of 1.9 mm */
 }
 
 static void test_refusals(void **state) {
@@ -111,7 +110,7 @@ static void settle(Kit *kit, int model, const MildMaterial *material, double dt)
     kit->inertia[0] = 1e12;
     for (int s = 0; s < (int)(4.0 / dt); s++) {
         kit_step(kit, NULL);
-        for (int k = 0; k < 6; k++) kit->input.velocity[0][k] *= exp(-100.0 * dt);
+        for (int k = 0; k < 6; k++) kit->input.velocity[0][k] *= exp(-150.0 * dt);
     }
 }
 
@@ -202,18 +201,19 @@ static double exact_stop(const MildMaterial *m, double pitch, int elements, doub
     return u;
 }
 
-/* Where a body first stops; the ground is met at different moments of a step. */
-static double worst_stop(const MildMaterial *m, double mass, double dt, double exact) {
+/* Where a body dropped from rest first stops; the ground is met at different moments of a step. */
+static double worst_stop(const MildMaterial *m, double mass, double dt) {
+    const MildSole *sole = sole_of(m->model, 0);
     double worst = 0.0;
     for (int g = 0; g < 5; g++) {
         Kit kit;
         kit_open(&kit, 1, sole_of(m->model, 0), NULL, m, dt);
         kit.mass[0] = mass;
         kit.inertia[0] = 1e12;
-        kit.input.position[0][2] += 0.2 * g * 0.5 * dt;
-        kit.input.velocity[0][2] = -0.5;
-        double deepest = 0.0;
-        while (kit.input.velocity[0][2] < 0.0) {
+        double height = 0.125 / KIT_GRAVITY + 0.2 * g * 0.5 * dt, deepest = 0.0;
+        double exact = exact_stop(m, mild_sole_pitch(sole), mild_sole_elements(sole), mass, sqrt(2.0 * KIT_GRAVITY * height));
+        kit.input.position[0][2] += height;
+        while (kit.input.velocity[0][2] <= 0.0) {
             kit_step(&kit, NULL);
             deepest = fmax(deepest, depth_of(&kit));
         }
@@ -226,16 +226,17 @@ static double worst_stop(const MildMaterial *m, double mass, double dt, double e
 
 static void test_impact(void **state) {
     (void)state;
-    static const double masses[3] = {1.0, 3.0, 20.0}, steps[3] = {0.25e-3, 1e-3, 5e-3}, allowed[3] = {0.01, 0.03, 0.08};
+    static const double masses[3] = {1.0, 3.0, 20.0}, steps[3] = {0.25e-3, 1e-3, 5e-3};
+    static const double allowed[3][3] = {{0.01, 0.03, 0.15}, {0.01, 0.03, 0.05}, {0.01, 0.03, 0.02}}; /* 1 kg stops within 5 ms */
     for (int model = 0; model < SOFT_MODELS; model++) {
         MildMaterial mild = mild_material_default(), m = model == MILD_MODEL_CON_CONE ? choi() : rival_of(model, &mild);
         const MildSole *sole = sole_of(model, 0);
         for (int i = 0; i < 3; i++) {
             double exact = exact_stop(&m, mild_sole_pitch(sole), mild_sole_elements(sole), masses[i], 0.5), worst[3];
-            for (int d = 0; d < 3; d++) worst[d] = worst_stop(&m, masses[i], steps[d], exact);
+            for (int d = 0; d < 3; d++) worst[d] = worst_stop(&m, masses[i], steps[d]);
             print_message("%-12s %4.0f kg at 0.5 m/s: %7.3f mm exact; %+.2f %+.2f %+.2f %% at 0.25, 1, 5 ms\n",
                           mild_model_names[model], masses[i], 1e3 * exact, 1e2 * worst[0], 1e2 * worst[1], 1e2 * worst[2]);
-            for (int d = 0; d < 3; d++) assert_true(fabs(worst[d]) < allowed[d]);
+            for (int d = 0; d < 3; d++) assert_true(fabs(worst[d]) < allowed[i][d]);
         }
     }
 }

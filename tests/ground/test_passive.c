@@ -141,7 +141,7 @@ static void test_passive_by_hand(void **state) {
     assert_true(worst < 0.0 && worst_way < 5e-3);
 }
 
-/* One step along the loop: x, z and tilt about y; returns the ground's work on the foot. */
+/* One step along the loop: x, z and tilt about y; returns the ground's work on the foot, at the mean twist. */
 static double loop_step(Kit *kit, const double size[3], const double phase[3], double turn, double at[3]) {
     double *V = kit->input.free_velocity;
     for (int k = 0; k < 3; k++) {
