@@ -42,7 +42,7 @@ static inline void step_normal(const Slots *s, int i, double dt, double w, doubl
     double c0 = step_max(1.0 - b * inverse_full, 0.0), cm = step_max(1.0 - (b + 0.5 * d) * inverse_full, 0.0);
     double c1 = step_max(1.0 - (b + d) * inverse_full, 0.0), third = s->full[i] * (1.0 / 3.0);
     double c0_cube = c0 * c0 * c0, c1_square = c1 * c1, c1_cube = c1_square * c1, share = d * per_way;
-    double in_bed = b + d - s->bed[i], bed = in_bed > 0.0 ? s->bed_stiffness[i] : 0.0;
+    double in_bed = b + d - s->bed[i], stiffness = s->bed_stiffness[i], bed = in_bed > 0.0 ? stiffness : 0.0;
     double mean_cube = (c0_cube + 4.0 * cm * cm * cm + c1_cube) * (1.0 / 6.0);
     double mean = flat * third * (1.0 - mean_cube) + cone * (b + 0.5 * d) + bed * in_bed;
     double mean_slope = flat * (2.0 * cm * cm + c1_square) * (1.0 / 6.0) + 0.5 * cone + bed;
