@@ -80,6 +80,9 @@ static void to_base(const double *rotation, const double *v, float *out) {
 static void write_estimates(const RobotSim *sim, float *estimate) {
     const double *rotation = robot_sim_base_rotation(sim);
     to_base(rotation, robot_sim_qvel(sim), estimate);
+    for (int i = 0; i < 3; i++) {
+        estimate[i] *= (float)TASK_VELOCITY_SCALE;
+    }
     for (int f = 0; f < ROBOT_FEET; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         to_base(rotation, foot->sole_center_velocity, estimate + 3 + 3 * f);

@@ -22,6 +22,8 @@
 
 /* Scale of the feet heights among the estimates, so that centimetres weigh in the regression like m/s. */
 #define TASK_HEIGHT_SCALE 10.0
+/* Scale of the base velocity: 0.05 m/s are a tenth of a walk, and must be seen, by the regression and by the actor. */
+#define TASK_VELOCITY_SCALE 4.0
 
 typedef struct {
     uint64_t seed;
