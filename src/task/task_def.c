@@ -25,7 +25,7 @@ TaskDef task_def_default(void) {
         .gait_period = 0.8,
         .swing_apex = 0.10,
         .double_support = 0.1,
-        .history_stride = 1,
+        .history_stride = 8,
         .clock = 1,
         .observe_noise = 1,
         .noise_q = 0.03,
