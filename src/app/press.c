@@ -265,8 +265,7 @@ static int untouched(const Press *press) {
     return 1;
 }
 
-/* Semi-implicit, as engines do; the row stands in the middle of the step (on the unloading line at its end, where its
- * force is taken). */
+/* Semi-implicit, as engines do; the row stands at the start of the step, about which its force is the mean. */
 static MildStatus drop_step(Press *press, const PressBody *body, MildError *error) {
     PressResult *result = press->result;
     MildContactInput *input = &press->input;
@@ -279,16 +278,13 @@ static MildStatus drop_step(Press *press, const PressBody *body, MildError *erro
     press_pose(press);
     press->time += dt;
     double depth = press_depth(press), way = input->position[0][0] + press->offset[0] - x;
-    double share = depth < before && row.force > 0 ? 1 : 0.5;
     work_add(press, &row, depth - before, way);
     if (result->stop_time == 0 && input->velocity[0][2] >= 0 && depth > press->start) {
         result->stop_time = press->time;
         result->stop_depth = fmax(before, depth);
     }
     if (untouched(press)) result->print_depth = 0;
-    row.time = press->time - (1 - share) * dt;
-    row.depth = before + share * (depth - before);
-    return rows_add(result, row, error);
+    return rows_add(result, row, error); /* with the time and depth before the step */
 }
 
 static MildStatus drop_run(Press *press, MildError *error) {

@@ -55,13 +55,21 @@ static unsigned char *make_labels(const Image *image, int materials) {
     return labels;
 }
 
+/* A picture that nothing would read is a mistake. */
+static MildStatus check_used(const char *key, const char *path, int used, const char *switched, MildError *error) {
+    if (!*path || used) return MILD_OK;
+    return mild_fail(error, MILD_ERROR_ARGUMENT, "terrain.%s = %s is not used: set terrain.%s = image", key, path, switched);
+}
+
 MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, MildError *error) {
     MildMapDef want = def->map;
     Image heights = {0}, labels = {0};
     unsigned char *label = NULL;
-    MildStatus status = MILD_OK;
     *map = NULL;
-    if (!terrain_has_map(def)) return MILD_OK;
+    MildStatus status = check_used("image", def->image, def->map.kind == MILD_MAP_IMAGE, "kind", error);
+    if (status == MILD_OK)
+        status = check_used("labels", def->labels, def->map.patches == MILD_PATTERN_IMAGE, "patches", error);
+    if (status != MILD_OK || !terrain_has_map(def)) return status;
     want.patch_count = materials;
     if (want.kind == MILD_MAP_IMAGE) status = read_image("image", def->image, &heights, error);
     if (status == MILD_OK && want.patches == MILD_PATTERN_IMAGE) {
