@@ -1,7 +1,11 @@
-/* The contact problem: both solvers against each other and against a dense slow reference; symmetries; purity. */
-#include "ground_kit.h"
+/* The contact problem: both solvers against each other and against a dense slow reference; symmetries; purity.
+ * `ground_test_solver COUNT [FIRST]` runs the reference alone, on problems FIRST .. FIRST + COUNT - 1. */
+#include "dense.h"
 
-static MildSole *soles[4]; /* left 77, right 77, one element, plate of six */
+#define SOLES 8
+
+static int first_problem = 0, problem_count = 2000;
+static MildSole *soles[SOLES]; /* left 77, right 77, one element, plates of six and more */
 
 static int open_soles(void **state) {
     (void)state;
@@ -9,22 +13,25 @@ static int open_soles(void **state) {
     soles[1] = kit_sole(1, 77);
     soles[2] = kit_plate(1, 1);
     soles[3] = kit_plate(3, 2);
+    soles[4] = kit_plate(2, 1);
+    soles[5] = kit_plate(5, 3);
+    soles[6] = kit_plate(7, 5);
+    soles[7] = kit_plate(11, 6);
     return 0;
 }
 
 static int close_soles(void **state) {
     (void)state;
-    for (int i = 0; i < 4; i++) mild_sole_destroy(soles[i]);
+    for (int i = 0; i < SOLES; i++) mild_sole_destroy(soles[i]);
     return 0;
 }
 
-/* A random problem with a history; false when nothing touches. */
-static int random_problem(Kit *kit, uint64_t *random, int small) {
-    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
-    MildMaterial m = kit_material(random);
+/* A random problem on a ground, with a history, on robot's soles or on one of the first so many small ones; false when
+ * nothing touches. */
+static int problem_on(Kit *kit, uint64_t *random, int small, const MildMaterial *m, double dt) {
     int feet = 1 + kit_index(random, 2);
-    MildSole *left = small ? soles[2 + kit_index(random, 2)] : soles[0], *right = small ? soles[2 + kit_index(random, 2)] : soles[1];
-    kit_open(kit, feet, left, right, &m, steps[kit_index(random, 3)]);
+    MildSole *left = soles[small ? 2 + kit_index(random, small) : 0], *right = soles[small ? 2 + kit_index(random, small) : 1];
+    kit_open(kit, feet, left, right, m, dt);
     kit_random_state(kit, random);
     int history = kit_index(random, 10), n = 6 * feet;
     for (int s = 0; s < history; s++) kit_step(kit, NULL);
@@ -39,6 +46,27 @@ static int random_problem(Kit *kit, uint64_t *random, int small) {
         }
     kit_solve(kit);
     return kit->result.foot[0].contacts + kit->result.foot[1].contacts > 0;
+}
+
+static int random_problem(Kit *kit, uint64_t *random, int small) {
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    MildMaterial m = kit_material(random);
+    return problem_on(kit, random, small ? 2 : 0, &m, steps[kit_index(random, 3)]);
+}
+
+/* The problem of that number: a third on sand with its drag and added mass, a third on small soles; a fifth of all on a
+ * firm bed that a foot can reach. */
+static int numbered_problem(Kit *kit, int number) {
+    static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
+    uint64_t random = (uint64_t)number * 1000003u + 28;
+    MildMaterial m = kit_material(&random), sand = mild_material_default();
+    if (number % 3 == 1) {
+        sand.mu = m.mu;
+        sand.recovery = m.recovery;
+        m = sand;
+    }
+    if (number % 5 == 4) m.bed_depth = kit_uniform(&random, 0.001, 0.02);
+    return problem_on(kit, &random, number % 3 == 2 ? SOLES - 2 : 0, &m, steps[kit_index(&random, 3)]);
 }
 
 static double twist_difference(const Kit *kit, const double *a, const double *b) {
@@ -113,6 +141,78 @@ static void test_solvers_agree(void **state) {
                   "%d need more than 2000 sweeps\n", compared, worst, creeping, worst_creep, slow);
     assert_true(compared > 150);
     assert_true(creeping <= 2 && worst_creep < 1e-6);
+}
+
+/* ---- the dense reference ---- */
+
+/* The worst of what was seen, and in which problem. */
+typedef struct {
+    double value;
+    int number;
+} Worst;
+
+/* Two answers compared: distance in the metric of kinetic energy, and the largest difference of twist, radians on a lever
+ * of 0.1 m, by the largest that contact changed. */
+typedef struct {
+    int problems;
+    Worst energy, twist;
+} Compared;
+
+static void worst_of(Worst *worst, double value, int number) {
+    if (!(value <= worst->value)) *worst = (Worst){value, number};
+}
+
+static void compare(Compared *seen, const Dense *dense, const double *one, const double *other, int number) {
+    double difference = 0.0, changed = 0.0;
+    for (int i = 0; i < dense->n; i++) {
+        double lever = i % 6 < 3 ? 1.0 : 0.1;
+        difference = fmax(difference, lever * fabs(one[i] - other[i]));
+        changed = fmax(changed, lever * fabs(dense->twist[i] - dense->free[i]));
+    }
+    seen->problems++;
+    worst_of(&seen->energy, dense_distance(dense, one, other), number);
+    worst_of(&seen->twist, difference / changed, number);
+}
+
+static void print_compared(const char *what, const Compared *seen) {
+    print_message("%s: %d problems, worst difference %.1e of the change by contact in kinetic energy's metric (number %d), "
+                  "%.1e in the twist (number %d)\n", what, seen->problems, seen->energy.value, seen->energy.number,
+                  seen->twist.value, seen->twist.number);
+}
+
+/* Sweeps get 500 each; where they need more they are left out. */
+static void test_dense_reference(void **state) {
+    (void)state;
+    static Dense dense;
+    Compared newton = {0}, sweeps = {0};
+    int touching = 0, unsolved = 0, unsettled = 0, long_way = 0, singular = 0;
+    for (int number = first_problem; number < first_problem + problem_count; number++) {
+        Kit kit;
+        if (numbered_problem(&kit, number)) {
+            MildContactResult answer = kit.result;
+            dense_open(&dense, &kit);
+            int settled = dense_solve(&dense);
+            touching++;
+            unsettled += !settled;
+            unsolved += !answer.converged;
+            long_way += answer.iterations > 12;
+            singular += dense.rank < dense.n;
+            if (settled) compare(&newton, &dense, answer.velocity, dense.twist, number);
+            kit.input.solver = MILD_SOLVER_GAUSS_SEIDEL;
+            kit.input.max_iterations = 500;
+            kit.input.tolerance = 1e-12;
+            kit_solve(&kit);
+            if (kit.result.converged) compare(&sweeps, &dense, kit.result.velocity, answer.velocity, number);
+        }
+        kit_close(&kit);
+    }
+    print_message("dense reference: %d of %d problems touch, %d with a singular A, %d in more than 12 Newton steps; "
+                  "not solved: %d by newton, %d by the reference\n", touching, problem_count, singular, long_way, unsolved, unsettled);
+    print_compared("newton against the reference", &newton);
+    print_compared("sweeps against newton", &sweeps);
+    assert_int_equal(unsolved + unsettled, 0);
+    assert_true(newton.energy.value < 1e-6 && newton.twist.value < 1e-6);
+    assert_true(sweeps.energy.value < 1e-6 && sweeps.twist.value < 1e-6);
 }
 
 /* ---- invariances ---- */
@@ -329,10 +429,14 @@ static void test_outputs(void **state) {
     assert_true(worst_zmp < 1e-12);
 }
 
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_newton_converges), cmocka_unit_test(test_solvers_agree),
-                                       cmocka_unit_test(test_symmetry),
+int main(int count, char **arguments) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense_reference),  cmocka_unit_test(test_newton_converges),
+                                       cmocka_unit_test(test_solvers_agree),    cmocka_unit_test(test_symmetry),
                                        cmocka_unit_test(test_element_order),    cmocka_unit_test(test_pure),
                                        cmocka_unit_test(test_outputs)};
-    return cmocka_run_group_tests(tests, open_soles, close_soles);
+    const struct CMUnitTest reference[] = {cmocka_unit_test(test_dense_reference)};
+    if (count < 2) return cmocka_run_group_tests(tests, open_soles, close_soles);
+    problem_count = atoi(arguments[1]);
+    if (count > 2) first_problem = atoi(arguments[2]);
+    return cmocka_run_group_tests(reference, open_soles, close_soles);
 }
