@@ -2,8 +2,8 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
+#include "base/clock.h"
 #include "robot/sim.h"
 #include "robot/stand.h"
 
@@ -25,13 +25,6 @@ typedef struct {
     double iterations;
     long newton_steps;
 } Bench;
-
-/* This thread's processor time [s]: the slices that other programs take do not count. */
-static double thread_seconds(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
 
 /* mj_step under the stand torque of the pose in the engine's own data. */
 static void engine_steps(Bench *bench, int which, int steps) {
@@ -60,14 +53,14 @@ static int our_steps(Bench *bench, int which, int steps) {
 
 /* Seconds per step of one case; negative when the robot's numbers went bad. */
 static double time_case(Bench *bench, int which, int steps) {
-    double start = thread_seconds();
+    double start = clock_thread_seconds();
     int bad = 0;
     if (which == ENGINE_FREE || which == ENGINE_RIGID) {
         engine_steps(bench, which, steps);
     } else {
         bad = our_steps(bench, which, steps);
     }
-    return bad ? -1.0 : (thread_seconds() - start) / steps;
+    return bad ? -1.0 : (clock_thread_seconds() - start) / steps;
 }
 
 static MildStatus open_case(Bench *bench, int which, double dt, MildError *error) {

@@ -97,6 +97,7 @@ double robot_sim_knee_distance(const RobotSim *sim);
 double robot_sim_foot_distance(const RobotSim *sim);
 const MildScratch *robot_sim_scratch(const RobotSim *sim);
 const MildContactResult *robot_sim_contact(const RobotSim *sim);
+const MildContactInput *robot_sim_contact_input(const RobotSim *sim); /* of the last step on soft ground */
 /* The engine's objects of this workspace, for tests (mjModel *, mjData *); pictures use robot_visual_model. */
 void *robot_sim_model(RobotSim *sim);
 void *robot_sim_data(RobotSim *sim);

@@ -375,6 +375,10 @@ const MildContactResult *robot_sim_contact(const RobotSim *sim) {
     return &sim->contact;
 }
 
+const MildContactInput *robot_sim_contact_input(const RobotSim *sim) {
+    return &sim->input;
+}
+
 void *robot_sim_model(RobotSim *sim) {
     return sim->model;
 }

@@ -1,0 +1,39 @@
+/* A recorded walk, one policy period after the other, to be stepped again from the same states. */
+#ifndef ROBOT_REPLAY_H
+#define ROBOT_REPLAY_H
+
+#include "robot/robot.h"
+
+enum { REPLAY_STEPS_MAX = 100 }; /* physics steps of a period */
+
+/* One period: the state and the ground's memory before it, and the torques of its physics steps. */
+typedef struct {
+    RobotState state;
+    MildGround *ground;
+    double torque[REPLAY_STEPS_MAX][ROBOT_JOINTS];
+} ReplayPeriod;
+
+typedef struct {
+    int periods, steps; /* steps: of each period */
+    double dt;          /* [s] */
+    RobotVariation variation;
+    MildTerrain terrain;
+    ReplayPeriod *period; /* [periods] */
+} Replay;
+
+/* NULL when out of memory. The periods are empty, the ground's memories untouched. */
+Replay *replay_create(const Robot *robot, int periods, int steps, double dt, MildError *error);
+void replay_destroy(Replay *replay); /* may be NULL */
+
+/* Means over all steps, from the least of the repeats of each period [us per physics step]. */
+typedef struct {
+    double tight, loose;                       /* robot_sim_step on the ground: at the solver's default tolerance, at `tolerance` */
+    double tight_iterations, loose_iterations; /* Newton iterations per step */
+    double engine; /* mj_step from the same states; the floor lies under the soles that sank into soft ground */
+} ReplayTimes;
+
+/* The cases take turns at every period. */
+MildStatus replay_time(const Replay *replay, const Robot *robot, double tolerance, int repeats, ReplayTimes *times,
+                       MildError *error);
+
+#endif
