@@ -27,7 +27,7 @@ void replay_destroy(Replay *replay); /* may be NULL */
 
 /* Means over all steps, from the least of the repeats of each period [us per physics step]. */
 typedef struct {
-    double tight, loose;                       /* robot_sim_step on the ground: at the solver's default tolerance, at `tolerance` */
+    double tight, loose; /* robot_sim_step on the ground: at the solver's default tolerance, at `tolerance` */
     double tight_iterations, loose_iterations; /* Newton iterations per step */
     double engine; /* mj_step from the same states; the floor lies under the soles that sank into soft ground */
 } ReplayTimes;
