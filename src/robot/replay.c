@@ -15,8 +15,8 @@ typedef struct {
     RobotSim *soft, *rigid;
     mjData *engine;
     MildGround *ground;
-    double tolerance;
-    double iterations[CASES];
+    ReplayStop stop[CASES]; /* of ours */
+    double iterations[CASES], unconverged[CASES];
     int bad;
 } Player;
 
@@ -51,12 +51,13 @@ static double play_soft(Player *player, const ReplayPeriod *period, int which) {
     RobotSim *sim = player->soft;
     const Replay *replay = player->replay;
     memcpy(player->ground, period->ground, mild_ground_size(period->ground));
-    robot_sim_set_solver(sim, MILD_SOLVER_NEWTON, which == LOOSE ? player->tolerance : 0.0, 0);
+    robot_sim_set_solver(sim, MILD_SOLVER_NEWTON, player->stop[which].tolerance, player->stop[which].iterations);
     robot_sim_load(sim, &period->state, &replay->variation);
     double start = clock_seconds();
     for (int s = 0; s < replay->steps; s++) {
         player->bad |= robot_sim_step(sim, period->torque[s], NULL, &replay->terrain, player->ground);
         player->iterations[which] += robot_sim_contact(sim)->iterations;
+        player->unconverged[which] += !robot_sim_contact(sim)->converged;
     }
     return clock_seconds() - start;
 }
@@ -103,9 +104,9 @@ static void play_all(Player *player, int repeats, double sums[CASES]) {
     }
 }
 
-MildStatus replay_time(const Replay *replay, const Robot *robot, double tolerance, int repeats, ReplayTimes *times,
+MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loose, int repeats, ReplayTimes *times,
                        MildError *error) {
-    Player player = {.replay = replay, .robot = robot, .tolerance = tolerance};
+    Player player = {.replay = replay, .robot = robot, .stop[LOOSE] = loose};
     MildStatus status = MILD_OK;
     double sums[CASES] = {0}, steps = (double)replay->periods * replay->steps;
     RobotVariation rigid = replay->variation;
@@ -127,7 +128,8 @@ MildStatus replay_time(const Replay *replay, const Robot *robot, double toleranc
                            .loose = 1e6 * sums[LOOSE] / steps,
                            .engine = 1e6 * sums[ENGINE] / steps,
                            .tight_iterations = player.iterations[TIGHT] / steps / repeats,
-                           .loose_iterations = player.iterations[LOOSE] / steps / repeats};
+                           .loose_iterations = player.iterations[LOOSE] / steps / repeats,
+                           .loose_unconverged = player.unconverged[LOOSE] / steps / repeats};
     mj_deleteData(player.engine);
     robot_sim_destroy(player.soft);
     robot_sim_destroy(player.rigid);

@@ -25,15 +25,22 @@ typedef struct {
 Replay *replay_create(const Robot *robot, int periods, int steps, double dt, MildError *error);
 void replay_destroy(Replay *replay); /* may be NULL */
 
+/* When a contact solver stops, see robot_sim_set_solver. */
+typedef struct {
+    double tolerance;
+    int iterations;
+} ReplayStop;
+
 /* Means over all steps, from the least of the repeats of each period [us per physics step]. */
 typedef struct {
-    double tight, loose; /* robot_sim_step on the ground: at the solver's default tolerance, at `tolerance` */
-    double tight_iterations, loose_iterations; /* Newton iterations per step */
-    double engine; /* mj_step from the same states; the floor lies under the soles that sank into soft ground */
+    double tight, loose; /* robot_sim_step on the ground, Newton with its default stop and with `loose` */
+    double engine;       /* mj_step from the same states; the floor lies under the soles that sank into soft ground */
+    double tight_iterations, loose_iterations; /* per step */
+    double loose_unconverged;                  /* [-] share of the steps */
 } ReplayTimes;
 
 /* The cases take turns at every period. */
-MildStatus replay_time(const Replay *replay, const Robot *robot, double tolerance, int repeats, ReplayTimes *times,
+MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loose, int repeats, ReplayTimes *times,
                        MildError *error);
 
 #endif
