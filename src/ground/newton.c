@@ -3,13 +3,15 @@
 #include "ground/contact.h"
 
 #define NEWTON_TOLERANCE 1e-9
-#define NEWTON_ITERATIONS 100 /* 30 are the most that random problems have needed */
+#define NEWTON_ITERATIONS 400 /* hard bound of work */
+#define NEWTON_FIRST 100      /* of them before a second, more patient detour: 1 in 10 000 random problems */
 #define NEWTON_PLAIN 12       /* of them without the detour over wide stick regions */
 #define NEWTON_HALVINGS 6
 #define NEWTON_WIDE 0.1       /* [m/s] first stick region of the detour */
 #define NEWTON_NARROW 0.3     /* each is this much narrower than the one before */
 #define NEWTON_LEVEL 1e-2     /* relative residual at which the next one begins */
 #define NEWTON_PATIENCE 6     /* or this many steps */
+#define NEWTON_PATIENT 20     /* and on the second detour */
 
 /* One point of the search: impulse P, foot twists V = V^ + A P. */
 typedef struct {
@@ -137,11 +139,12 @@ static int newton_plain(MildScratch *scratch, const MildContactInput *input, int
 /* The detour where Newton's method alone does not arrive: a foot that turns about a point under its sole has an element
  * whose velocity must be found to within the stick region, a needle's eye of 1e-6 m/s. With a wide region the problem is
  * easy; it is then narrowed step by step, the friction's directions l being kept from one region to the next. */
-static int newton_narrow(MildScratch *scratch, const MildContactInput *input, int n, double tolerance, int limit, Point *best) {
+static int newton_narrow(MildScratch *scratch, const MildContactInput *input, int n, double tolerance, int limit, int patience,
+                         Point *best) {
     double eps = NEWTON_WIDE;
     Point at = {.residual = INFINITY}, next;
     memcpy(at.twist, input->velocity, (size_t)n * sizeof(double));
-    int steps = 0, patience = NEWTON_PATIENCE;
+    int steps = 0, left = patience;
     contact_pass(scratch, input->dt, at.twist, eps);
     contact_dual_start(scratch, at.twist, eps);
     while (steps < limit && newton_move(scratch, input, n, &at, &next)) {
@@ -155,8 +158,8 @@ static int newton_narrow(MildScratch *scratch, const MildContactInput *input, in
         if (eps == CONTACT_SLIP_SPEED) {
             if (at.residual < best->residual) *best = at;
             if (at.residual <= tolerance * scale) break;
-        } else if (at.residual <= NEWTON_LEVEL * scale || --patience == 0) {
-            patience = NEWTON_PATIENCE;
+        } else if (at.residual <= NEWTON_LEVEL * scale || --left == 0) {
+            left = patience;
             eps = fmax(NEWTON_NARROW * eps, CONTACT_SLIP_SPEED);
             contact_pass(scratch, input->dt, at.twist, eps);
             at.residual = INFINITY;
@@ -174,8 +177,9 @@ void newton_solve(MildScratch *scratch, const MildContactInput *input, MildConta
     int plain = limit < NEWTON_PLAIN ? limit : NEWTON_PLAIN;
     int iterations = newton_plain(scratch, input, n, tolerance, plain, &at);
     double scale = newton_scale(n, input, at.impulse);
-    if (!(at.residual <= tolerance * scale)) {
-        iterations += newton_narrow(scratch, input, n, tolerance, limit - iterations, &at);
+    for (int second = 0; second < 2 && !(at.residual <= tolerance * scale); second++) {
+        int end = !second && limit > NEWTON_FIRST ? NEWTON_FIRST : limit, patience = second ? NEWTON_PATIENT : NEWTON_PATIENCE;
+        iterations += newton_narrow(scratch, input, n, tolerance, end - iterations, patience, &at);
         contact_pass(scratch, input->dt, at.twist, CONTACT_SLIP_SPEED);
         scale = newton_scale(n, input, at.impulse);
     }

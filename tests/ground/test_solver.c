@@ -215,6 +215,24 @@ static void test_dense_reference(void **state) {
     assert_true(sweeps.energy.value < 1e-6 && sweeps.twist.value < 1e-6);
 }
 
+/* Two whole feet, mu > 1: the second detour's problems among 42 750. */
+static void test_second_detour(void **state) {
+    (void)state;
+    static const int numbers[4] = {12229, 15949, 17844, 27024};
+    static Dense dense;
+    Compared newton = {0};
+    for (int k = 0; k < 4; k++) {
+        Kit kit;
+        assert_true(numbered_problem(&kit, numbers[k]));
+        dense_open(&dense, &kit);
+        assert_true(dense_solve(&dense) && kit.result.converged);
+        compare(&newton, &dense, kit.result.velocity, dense.twist, numbers[k]);
+        kit_close(&kit);
+    }
+    print_compared("second detour", &newton);
+    assert_true(newton.energy.value < 1e-6 && newton.twist.value < 1e-6);
+}
+
 /* ---- invariances ---- */
 
 static void turn_vector(double *v, double c, double s) {
@@ -430,7 +448,8 @@ static void test_outputs(void **state) {
 }
 
 int main(int count, char **arguments) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense_reference),  cmocka_unit_test(test_newton_converges),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense_reference),  cmocka_unit_test(test_second_detour),
+                                       cmocka_unit_test(test_newton_converges),
                                        cmocka_unit_test(test_solvers_agree),    cmocka_unit_test(test_symmetry),
                                        cmocka_unit_test(test_element_order),    cmocka_unit_test(test_pure),
                                        cmocka_unit_test(test_outputs)};
