@@ -147,25 +147,26 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *ro
     }
 }
 
+static float *frame_back(TaskEnv *env, int age) {
+    return env->frames[(env->newest + TASK_FRAMES_HELD - (uint32_t)age) % TASK_FRAMES_HELD];
+}
+
 /* An episode's first frame stands for those before it. */
 static void remember(TaskEnv *env, const TaskDef *def, const float frame[TASK_OBSERVATION], int first) {
     const size_t bytes = sizeof env->frames[0];
-    if (first) {
-        for (int i = 0; i < TASK_FRAMES_HELD - 1; i++) {
-            memcpy(env->frames[i], frame, bytes);
-        }
-    } else {
-        memmove(env->frames[0], env->frames[1], (TASK_FRAMES_HELD - 1) * bytes);
+    env->newest = (env->newest + 1) % TASK_FRAMES_HELD;
+    for (int age = 0; age < (first ? TASK_FRAMES_HELD : 1); age++) {
+        memcpy(frame_back(env, age), frame, bytes);
     }
-    memcpy(env->frames[TASK_FRAMES_HELD - 1], frame, bytes);
     memcpy(env->history + TASK_HISTORY - TASK_OBSERVATION, frame, bytes);
     for (int i = 0; i < TASK_FRAMES - 1; i++) {
         float *mean = env->history + i * TASK_OBSERVATION;
-        int oldest = TASK_FRAMES_HELD - 1 - (TASK_FRAMES - 1 - i) * def->history_stride;
-        memcpy(mean, env->frames[oldest], bytes);
+        int oldest = (TASK_FRAMES - 1 - i) * def->history_stride;
+        memcpy(mean, frame_back(env, oldest), bytes);
         for (int k = 1; k < def->history_stride; k++) {
+            const float *next = frame_back(env, oldest - k);
             for (int j = 0; j < TASK_OBSERVATION; j++) {
-                mean[j] += env->frames[oldest + k][j];
+                mean[j] += next[j];
             }
         }
         for (int j = 0; j < TASK_OBSERVATION; j++) {

@@ -46,7 +46,8 @@ typedef struct {
     /* state */
     RobotState robot;
     float action[3][TASK_ACTIONS]; /* now, one and two steps ago */
-    float frames[TASK_FRAMES_HELD][TASK_OBSERVATION]; /* every policy step's, newest last */
+    float frames[TASK_FRAMES_HELD][TASK_OBSERVATION]; /* ring of every policy step's */
+    uint32_t newest;                                  /* frame in the ring */
     float history[TASK_HISTORY];                      /* what the policy sees of them: the newest, and five means */
     double base_twist[6];     /* one policy step ago: linear in the world, angular in the base frame */
     double smooth_velocity[3]; /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over reward.tracking_time */
