@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs the fuzz targets of tests/fuzz one after the other, with clang's address and undefined-behaviour sanitizers. What they
-# learn stays in build/fuzz/work; an input that fails is left in build/fuzz and printed.
+# learn stays in build/fuzz/learned; an input that fails is left in build/fuzz and printed.
 # Usage: scripts/fuzz.sh [TARGET ...]; RUNS executions each (10 million), at most MINUTES each (no limit). `merge` as first word
 # instead rewrites tests/fuzz/corpus with the smallest inputs that reach everything found so far.
 set -eu
@@ -35,9 +35,9 @@ fuzz() {
         grep -oE '^[a-z_0-9]+ =|^\[[a-z]+\]' configs/default.ini | sort -u | sed 's/.*/"&"/' >"$dictionary"
     fi
     [ ! -e "$dictionary" ] || options+=("-dict=$dictionary")
-    mkdir -p $build/work/"$target"
+    mkdir -p $build/learned/"$target"
     $build/tests/fuzz_"$target" -runs="$runs" -max_total_time=$((60 * minutes)) -max_len="$(length "$target")" -timeout=60 \
-        -rss_limit_mb=4000 -artifact_prefix=$build/"$target"- -print_final_stats=1 "${options[@]}" $build/work/"$target" \
+        -rss_limit_mb=4000 -artifact_prefix=$build/"$target"- -print_final_stats=1 "${options[@]}" $build/learned/"$target" \
         "$kept" >$build/"$target".log 2>&1 || {
         grep -E 'SUMMARY|Test unit written' $build/"$target".log >&2
         return 1
@@ -50,7 +50,7 @@ minimise() {
     local target=$1 kept=tests/fuzz/corpus/$1 fresh=$build/merge/$1
     rm -rf "$fresh"
     mkdir -p "$fresh" "$kept"
-    $build/tests/fuzz_"$target" -set_cover_merge=1 -use_counters=0 "$fresh" $build/work/"$target" "$kept" >$build/"$target".log 2>&1
+    $build/tests/fuzz_"$target" -set_cover_merge=1 -use_counters=0 "$fresh" $build/learned/"$target" "$kept" >$build/"$target".log 2>&1
     find "$kept" -type f ! -name '*_*' ! -name '*.*' ! -name whole -delete
     cp "$fresh"/* "$kept"/
     echo "$target: $(find "$kept" -type f | wc -l) inputs, $(du -sb "$kept" | cut -f1) bytes"

@@ -30,7 +30,6 @@ static int lifted(const Kit *kit) {
 typedef struct {
     int cycles, missed, draw; /* missed: steps that did not converge; draw: the worst */
     double worst, share;      /* [J], [-] most energy gained in a cycle, and as a share of the energy exchanged */
-    double solved;            /* [J] the same over the cycles whose steps all converged */
 } Thrown;
 
 /* A foot thrown and shaken at random: between touch and lift-off the ground must have taken energy, whatever happened. */
@@ -61,7 +60,6 @@ static void throw_foot(int draw, MildSole *sole, Thrown *thrown) {
         if (work > thrown->worst) thrown->draw = draw;
         thrown->worst = fmax(thrown->worst, work);
         if (taken > 1e-6) thrown->share = fmax(thrown->share, work / taken);
-        if (missed == 0) thrown->solved = fmax(thrown->solved, work);
         thrown->missed += missed;
         work = taken = 0.0;
         missed = 0;
@@ -70,14 +68,14 @@ static void throw_foot(int draw, MildSole *sole, Thrown *thrown) {
 }
 
 static void thrown_print(const char *name, int count, const Thrown *thrown) {
-    print_message("%s: %d draws, %d closed cycles, most energy gained %.2e J (draw %d), share %.2e; %d steps did not converge, "
-                  "cycles without them %.2e J\n", name, count, thrown->cycles, thrown->worst, thrown->draw, thrown->share,
-                  thrown->missed, thrown->solved);
+    print_message("%s: %d draws, %d closed cycles, most energy gained %.2e J (draw %d), share %.2e; %d steps did not converge\n",
+                  name, count, thrown->cycles, thrown->worst, thrown->draw, thrown->share,
+                  thrown->missed);
 }
 
 static void test_passive(void **state) {
     (void)state;
-    Thrown thrown = {.worst = -INFINITY, .share = -INFINITY, .solved = -INFINITY};
+    Thrown thrown = {.worst = -INFINITY, .share = -INFINITY};
     MildSole *sole = kit_sole(0, 77);
     for (int draw = first; draw < first + draws; draw++) throw_foot(draw, sole, &thrown);
     thrown_print("thrown and shaken", draws, &thrown);
@@ -86,24 +84,25 @@ static void test_passive(void **state) {
     assert_true(thrown.worst < 1e-9);
 }
 
-/* Draws of the first 100 000 in which steps were left unsolved and created energy: light bodies whose weight stands 0.4 m
- * above the sole, slipping at mu around 1, 5 ms. What was solved must be passive here too; the rest is printed. */
+/* Draws of the first 100 000 in which an earlier Newton left steps unsolved, which created up to 1 kJ: light bodies whose
+ * weight stands 0.4 m above the sole, slipping at mu around 1, 5 ms. Every step must be solved. */
 static void test_hard_draws(void **state) {
     (void)state;
     static const int hard[] = {6808,  8426,  11042, 14138, 25711, 38501, 45813, 48178, 48274,
                                54556, 58123, 65792, 73707, 75306, 84820, 85364, 89614, 99430};
     enum { HARD = sizeof hard / sizeof *hard };
-    Thrown thrown = {.worst = -INFINITY, .share = -INFINITY, .solved = -INFINITY};
+    Thrown thrown = {.worst = -INFINITY, .share = -INFINITY};
     MildSole *sole = kit_sole(0, 77);
     for (int i = 0; i < HARD; i++) throw_foot(hard[i], sole, &thrown);
     thrown_print("hard draws", HARD, &thrown);
     mild_sole_destroy(sole);
-    assert_true(thrown.solved < 1e-9);
+    assert_int_equal(thrown.missed, 0);
+    assert_true(thrown.worst < 1e-9);
 }
 
 /* A foot moved up and down by hand (A = 0). Two accounts of the work: impulse times mean speed, what the kinetic energy of
- * a body changes by, which must never be a gain; and impulse times the step's way, dt times the new speed, which differs
- * by the braking factor's half step: on straight elastic ground, whose cycles cost nothing, it can come out above zero. */
+ * a body changes by, which must never be a gain; and impulse times the step's way, dt times the new speed, half a step
+ * later. */
 static void test_passive_by_hand(void **state) {
     (void)state;
     MildSole *sole = kit_plate(2, 1);
@@ -138,7 +137,7 @@ static void test_passive_by_hand(void **state) {
     print_message("down and up by hand: %d draws, most work given back in excess, as a share: %.2e at the mean speed, %.2e along "
                   "the way (%d draws above 0)\n", draws, worst, worst_way, gains);
     mild_sole_destroy(sole);
-    assert_true(worst < 0.0 && worst_way < 5e-3);
+    assert_true(worst < 0.0 && worst_way < 0.0);
 }
 
 /* One step along the loop: x, z and tilt about y; returns the ground's work on the foot, at the mean twist. */
