@@ -10,43 +10,95 @@
 #define DENSE_SMALL 1e-12  /* relative motion at which a method rests */
 #define DENSE_JACOBI 60
 #define DENSE_SINGULAR 1e-13 /* least eigenvalue by the largest */
+#define DENSE_AT_ONCE 1e-9  /* [m] u_f of a law without a flat part */
+#define DENSE_REST 1e-3     /* [m/s] resistive force theory at rest, docs/model.md section 19 */
+#define DENSE_PEAK 1.08     /* [-] its greatest coefficient there */
 
 /* ---- the element's law ---- */
 
 /* P(u) = u_f/3 (1 - (1 - t)^3), t = min(u/u_f, 1): the flat area's integral over the depth, by the element's area. */
-static double cone_share(const Dense *d, double u) {
-    double left = 1.0 - fmin(u / d->full, 1.0);
-    return d->full / 3.0 * (1.0 - left * left * left);
+static double cone_share(const DenseLaw *law, double u) {
+    double left = 1.0 - fmin(u / law->full, 1.0);
+    return law->full / 3.0 * (1.0 - left * left * left);
 }
 
-static double cone_force(const Dense *d, double u) {
-    return (d->k_pen - d->kappa) * cone_share(d, u) + d->kappa * u;
+/* Share of the element's area that is still flat. */
+static double cone_flat(const DenseLaw *law, double u) {
+    double left = 1.0 - fmin(u / law->full, 1.0);
+    return left * left;
 }
 
-static double cone_slope(const Dense *d, double u) {
-    double left = 1.0 - fmin(u / d->full, 1.0);
-    return (d->k_pen - d->kappa) * left * left + d->kappa;
+static double cone_force(const DenseLaw *law, double u) {
+    return (law->k_pen - law->kappa) * cone_share(law, u) + law->kappa * u;
 }
 
-/* Integral of the ground's force from m0 to m1: the unloading line up to a, virgin ground by Simpson's rule beyond, the bed
- * with its force at m1. */
-static double law_work(const Dense *d, const DenseElement *e, double m1) {
-    double from = fmax(e->m0 - e->slack, 0.0), to = fmax(fmin(m1, e->a) - e->slack, 0.0), way = m1 - e->a;
-    double work = 0.5 * e->line * (to - from) * (to + from);
+static double cone_slope(const DenseLaw *law, double u) {
+    return (law->k_pen - law->kappa) * cone_flat(law, u) + law->kappa;
+}
+
+/* Integral of the ground's force from m0 to m1: the unloading line up to the front, virgin ground by Simpson's rule beyond,
+ * the bed with its force at m1. */
+static double law_work(const DenseElement *e, double m1) {
+    const DenseLaw *law = &e->law;
+    double from = fmax(e->m0 - e->slack, 0.0), to = fmax(fmin(m1, e->front) - e->slack, 0.0), way = m1 - e->front;
+    double work = 0.5 * e->line * (to - from) * (to + from), u = e->deep;
     if (way <= 0.0) return work;
-    double simpson = (cone_force(d, e->a) + 4.0 * cone_force(d, e->a + 0.5 * way) + cone_force(d, m1)) / 6.0;
-    return work + way * (simpson + d->bed_stiffness * fmax(m1 - d->bed, 0.0));
+    double simpson = (cone_force(law, u) + 4.0 * cone_force(law, u + 0.5 * way) + cone_force(law, u + way)) / 6.0;
+    return work + way * (simpson + law->bed_stiffness * fmax(u + way - law->bed, 0.0));
 }
 
-static double law_normal(const Dense *d, const DenseElement *e, double w) {
-    double m1 = e->u0 + 0.5 * d->dt * w, way = m1 - e->m0, force = e->line * fmax(e->m0 - e->slack, 0.0);
-    if (fabs(way) > 1e-16) force = law_work(d, e, m1) / way;
-    if (fmin(m1, e->m0) > e->slack && m1 <= e->a) force = e->line * (0.5 * (e->m0 + m1) - e->slack); /* nothing cancels */
-    double impulse = d->dt * force + e->mass * (fmax(w, e->reach) - e->w_a), down = fmax(w, 0.0);
-    double before = d->drag < 1.0 ? fmin(down, e->w0) : e->w0;
-    if (m1 > e->a)
-        impulse += (d->mass_rate * cone_share(d, m1) - e->mass) * 0.5 * (d->drag * (before + down) + down - before);
-    return fmax(impulse + d->dt * STEP_LAG * e->line * fmin(w + e->w0, 0.0), 0.0);
+static double law_normal(double dt, const DenseElement *e, double w) {
+    const DenseLaw *law = &e->law;
+    double m1 = e->u0 + 0.5 * dt * w, way = m1 - e->m0, force = e->line * fmax(e->m0 - e->slack, 0.0);
+    if (fabs(way) > 1e-16) force = law_work(e, m1) / way;
+    if (fmin(m1, e->m0) > e->slack && m1 <= e->front) force = e->line * (0.5 * (e->m0 + m1) - e->slack); /* nothing cancels */
+    double impulse = dt * force + e->mass * (fmax(w, e->reach) - e->w_a), down = fmax(w, 0.0);
+    double mass = fmax(law->mass_rate, 0.0), drag = fmax(law->drag_rate, 0.0), before = drag < mass ? fmin(down, e->w0) : e->w0;
+    if (m1 > e->front) {
+        double gained = cone_share(law, e->deep + m1 - e->front) - cone_share(law, e->deep);
+        impulse += gained * 0.5 * (drag * (before + down) + mass * (down - before));
+    }
+    return fmax(impulse + dt * STEP_LAG * e->line * fmin(w + e->w0, 0.0) + e->active, 0.0);
+}
+
+/* ---- what the ground is made of ---- */
+
+static int is_resistive(const MildMaterial *m) {
+    return m->model == MILD_MODEL_ECC_QUASI || m->model == MILD_MODEL_ECC_QUASI_3D;
+}
+
+/* A cone that is complete at once: yielding springs and resistive force theory. */
+static int is_straight(const MildMaterial *m) {
+    return is_resistive(m) || m->model == MILD_MODEL_CON_SPRING || m->model == MILD_MODEL_ECC_SPRING;
+}
+
+static DenseLaw law_material(const MildMaterial *m, double pitch) {
+    double area = pitch * pitch, c_g = m->passive ? fmax(m->c_g, 0.0) : m->c_g, c_d = m->passive ? fmax(m->c_d, 0.5) : m->c_d;
+    DenseLaw law = {.bed = m->bed_depth, .bed_stiffness = LAW_BED_STRESS * area, .recovery = m->recovery,
+                    .mu = m->mu, .k_drift = m->k_drift, .b_drift = m->b_drift};
+    if (is_straight(m)) {
+        law.k_pen = law.kappa = is_resistive(m) ? m->zeta * LAW_RESIST_STRESS * area : m->k_pen;
+        law.full = DENSE_AT_ONCE;
+        return law;
+    }
+    law.k_pen = m->k_pen;
+    law.kappa = m->sigma_cone * area / cos(m->alpha);
+    law.full = sqrt(area / acos(-1.0)) * tan(m->alpha) / m->nu;
+    law.mass_rate = c_g * m->phi * m->rho * m->nu * area;
+    law.drag_rate = c_d * law.mass_rate;
+    return law;
+}
+
+/* All numbers of one law change linearly into the other's. */
+static DenseLaw law_blend(const DenseLaw *one, const DenseLaw *other, double share) {
+    enum { NUMBERS = sizeof(DenseLaw) / sizeof(double) };
+    double a[NUMBERS], b[NUMBERS];
+    DenseLaw law;
+    memcpy(a, one, sizeof a);
+    memcpy(b, other, sizeof b);
+    for (int k = 0; k < NUMBERS; k++) a[k] = (1.0 - share) * a[k] + share * b[k];
+    memcpy(&law, a, sizeof a);
+    return law;
 }
 
 /* ---- the problem ---- */
@@ -85,57 +137,164 @@ static void dense_factor(Dense *d, const double *A) {
 
 /* The line runs from (a, F(a)) to no force after recovery a, not within CONTACT_ELASTIC, and is never flatter than F at a;
  * in the bed the steepest slope is taken. */
-static void element_line(const Dense *d, DenseElement *e) {
-    double in_bed = fmax(e->a - d->bed, 0.0), force = cone_force(d, e->a) + d->bed_stiffness * in_bed;
-    double travel = fmax(d->recovery * e->a, fmin(CONTACT_ELASTIC, e->a));
-    double slope = in_bed > 0.0 ? fmax(d->k_pen, d->kappa) + d->bed_stiffness : cone_slope(d, e->a);
+static void element_line(DenseElement *e) {
+    const DenseLaw *law = &e->law;
+    double a = e->deep, in_bed = fmax(a - law->bed, 0.0), force = cone_force(law, a) + law->bed_stiffness * in_bed;
+    double travel = fmax(law->recovery * a, fmin(CONTACT_ELASTIC, a));
+    double slope = in_bed > 0.0 ? fmax(law->k_pen, law->kappa) + law->bed_stiffness : cone_slope(law, a);
     e->line = travel > 0.0 ? fmax(force / travel, slope) : slope;
-    e->slack = e->a - force / e->line;
+    e->slack = a - force / e->line;
+}
+
+/* ---- resistive force theory ---- */
+
+/* Resistance backward and upward on a face with normal n (into the ground) that moves along the heading at these speeds. */
+static void resist_alpha(int model, const double *n, const double *heading, double level, double down, double alpha[2]) {
+    double gamma = atan2(down, level);
+    if (model == MILD_MODEL_ECC_QUASI) {
+        mild_resist_plane(atan2(n[0] * heading[0] + n[1] * heading[1], -n[2]), gamma, alpha);
+        return;
+    }
+    const double direction[3] = {cos(gamma) * heading[0], cos(gamma) * heading[1], -sin(gamma)};
+    double force[3];
+    mild_resist_space(n, direction, force);
+    alpha[0] = -force[0] * heading[0] - force[1] * heading[1];
+    alpha[1] = force[2];
+}
+
+/* The line is that of the greatest coefficient. It gives the yield force, a share of it, at the front, which lies behind the
+ * depth that the line belongs to and never behind the element. v: the element's velocity, w: du/dt, now. */
+static void element_resist(double dt, DenseElement *e, int model, const double *n, const double *v, double w) {
+    DenseLaw *law = &e->law;
+    double tilt = hypot(n[0], n[1]), heading[2] = {v[0], v[1]}, level = hypot(v[0], v[1]), down = fmax(w, 0.0), x[2], z[2];
+    for (int k = 0; k < 2 && tilt > 0.0; k++) heading[k] += DENSE_REST * n[k] / tilt;
+    double length = hypot(heading[0], heading[1]), strength = law->kappa;
+    for (int k = 0; k < 2 && length > 0.0; k++) heading[k] /= length;
+    resist_alpha(model, n, heading, level + DENSE_REST, down, x);
+    resist_alpha(model, n, heading, level, down + DENSE_REST, z);
+    double share = fmin(fmax(z[1] / DENSE_PEAK, 0.0), 1.0), peak = DENSE_PEAK * strength;
+    if (e->m0 > 0.0) {
+        double least = e->m0 + CONTACT_ELASTIC * (1.0 - share); /* deeper than the elastic travel; or else */
+        if (share * least > e->m0) least = e->m0 / share;
+        e->deep = fmax(e->deep, least);
+    }
+    double bed = law->bed_stiffness * fmax(e->deep - law->bed, 0.0);
+    e->line = e->deep > CONTACT_ELASTIC ? (peak * e->deep + bed) / CONTACT_ELASTIC : peak;
+    if (bed > 0.0) e->line = fmax(e->line, peak + law->bed_stiffness);
+    e->slack = e->deep - (peak * e->deep + bed) / e->line;
+    e->front = e->slack + (share * peak * e->deep + bed) / e->line;
+    e->radius += dt * strength * fmax(x[0], 0.0) * fmax(e->u0, 0.0);
+    law->k_pen = law->kappa = share * peak;
+}
+
+/* ---- what an element finds and remembers ---- */
+
+/* A foot of the kit, and of the element in hand its place in the world. */
+typedef struct {
+    const Kit *kit;
+    int f;
+    Memory memory;
+    double pitch, normal[3]; /* of the face that looks down */
+    int i;
+    double p[3], at[3], slope[2]; /* ankle -> element, world point, gradient of the ground */
+} Find;
+
+/* Depth under the ground as it is here or, if that is less, under the plane that the last step took it for. */
+static double find_depth(const Find *find) {
+    const MildTerrain *terrain = &find->kit->terrain;
+    const Memory *memory = &find->memory;
+    int i = find->i, code = memory->material[i];
+    double here = mild_terrain_height_at(terrain, find->at[0], find->at[1]) - find->at[2];
+    if (!terrain->map || mild_map_is_level(terrain->map) || !find->kit->ground->uneven[find->f]) return here;
+    if (code == MATERIAL_NONE || (code == MATERIAL_FREE && here <= 0.0)) return here;
+    double plane = memory->plane[i] + memory->slope_x[i] * find->at[0] + memory->slope_y[i] * find->at[1];
+    return fmin(here, terrain->height + plane - find->at[2]);
+}
+
+/* u_max: the element's own; when it carries nothing the print's under it, and at least the one whose line ends here. */
+static double find_deepest(const Find *find, double recovery) {
+    const MildGround *ground = find->kit->ground;
+    const double *R = find->kit->input.rotation[find->f];
+    double deepest = find->memory.depth_max[find->i], m0 = find->memory.middle[find->i], sum = 0.0;
+    if (ground->tiles == 0 || find->memory.material[find->i] >= 0 || recovery >= 1.0) return deepest;
+    for (int k = 0; k < 9; k++) {
+        double a = (k % 3 - 1) * find->pitch / 3.0, b = (k / 3 - 1) * find->pitch / 3.0;
+        sum += mild_ground_print_at(ground, find->at[0] + R[0] * a + R[1] * b, find->at[1] + R[3] * a + R[4] * b);
+    }
+    deepest = sum / 9.0;
+    if (find->memory.material[find->i] == MATERIAL_FREE && m0 > 0.0)
+        deepest = fmax(deepest, fmax(m0 / (1.0 - recovery), m0 + CONTACT_ELASTIC));
+    return deepest;
+}
+
+/* Law of the material, or the two that blend, that it touched down on or finds; returns the model whose resistance has a
+ * direction, or -1. Blended with a cone there is none: both are as under a level plate. */
+static int find_law(const Find *find, DenseLaw *law) {
+    const MildTerrain *terrain = &find->kit->terrain;
+    int code = find->memory.material[find->i];
+    MildBlend blend = {code & 0xff, code >> 8 & 0xff, (code >> 16) / 255.0};
+    if (code < 0) blend = mild_terrain_blend_at(terrain, find->at[0], find->at[1]);
+    const MildMaterial *first = &terrain->materials[blend.first], *second = &terrain->materials[blend.second];
+    DenseLaw one = law_material(first, find->pitch), other = law_material(second, find->pitch);
+    *law = blend.share > 0.0 ? law_blend(&one, &other, blend.share) : one;
+    return is_resistive(first) && (blend.share == 0.0 || is_straight(second)) ? first->model : -1;
+}
+
+/* Velocity of a point at p, and the speed at which its depth grows, of a foot's twist. */
+static void point_velocity(const Find *find, const double *twist, double v[4]) {
+    kit_cross(twist + 3, find->p, v);
+    for (int k = 0; k < 3; k++) v[k] += twist[k];
+    v[3] = find->slope[0] * v[0] + find->slope[1] * v[1] - v[2];
+}
+
+static void dense_element(Dense *d, const Find *find) {
+    DenseElement *e = &d->element[d->elements++];
+    const Memory *memory = &find->memory;
+    int i = find->i, model = find_law(find, &e->law);
+    double now[4], deepest = find_deepest(find, e->law.recovery);
+    point_velocity(find, find->kit->input.velocity[find->f], now);
+    for (int c = -1; c < d->rank; c++) { /* -1: the free twist */
+        double twist[6], v[4];
+        for (int k = 0; k < 6; k++) twist[k] = c < 0 ? d->free[6 * find->f + k] : d->L[6 * find->f + k][c];
+        point_velocity(find, twist, v);
+        for (int k = 0; k < 4; k++) *(c < 0 ? &e->free[k] : &e->C[k][c]) = v[k];
+    }
+    e->u0 = find_depth(find);
+    e->w0 = fmax(now[3], 0.0);
+    e->m0 = memory->middle[i] > 0.0 ? memory->middle[i] : e->u0 - 0.5 * d->dt * now[3];
+    e->front = e->deep = fmax(fmax(e->m0, deepest), 0.0);
+    e->reach = fmax(2.0 * (e->front - e->u0) / d->dt, 0.0);
+    e->w_a = fmax(memory->front_speed[i], e->reach);
+    e->mass = fmax(e->law.mass_rate, 0.0) * cone_share(&e->law, e->deep);
+    e->radius = d->dt * e->law.k_drift * memory->drift[i] * fmax(e->u0, 0.0);
+    e->damping = e->u0 > 0.0 ? d->dt * e->law.b_drift : 0.0;
+    if (e->u0 > 0.0 && e->m0 >= deepest)
+        e->active = fmin(e->law.mass_rate, 0.0) * cone_share(&e->law, e->deep) * (e->free[3] - e->w_a) +
+                    fmin(e->law.drag_rate, 0.0) * cone_flat(&e->law, e->deep) * d->dt * e->w0 * e->w0;
+    element_line(e);
+    if (model >= 0) element_resist(d->dt, e, model, find->normal, now, now[3]);
 }
 
 static void dense_foot(Dense *d, const Kit *kit, int f) {
     const MildSole *sole = kit->soles[f];
-    const MildMaterial *m = &kit->terrain.materials[0];
-    const double *R = kit->input.rotation[f], *V = kit->input.velocity[f];
-    Memory memory = ground_memory(kit->ground, f);
-    for (int i = 0; i < mild_sole_elements(sole); i++) {
-        DenseElement *e = &d->element[d->elements++];
-        double x = mild_sole_x(sole)[i], y = mild_sole_y(sole)[i], z = mild_sole_z(sole), p[3], turn[3];
-        for (int k = 0; k < 3; k++) p[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
-        kit_cross(V + 3, p, turn);
-        double w_now = -(V[2] + turn[2]);
-        e->u0 = kit->terrain.height - kit->input.position[f][2] - p[2];
-        e->w0 = fmax(w_now, 0.0);
-        e->m0 = memory.middle[i] > 0.0 ? memory.middle[i] : e->u0 - 0.5 * d->dt * w_now;
-        e->a = fmax(fmax(e->m0, memory.depth_max[i]), 0.0);
-        e->reach = fmax(2.0 * (e->a - e->u0) / d->dt, 0.0);
-        e->w_a = fmax(memory.front_speed[i], e->reach);
-        e->mass = d->mass_rate * cone_share(d, e->a);
-        e->radius = d->dt * m->k_drift * memory.drift[i] * fmax(e->u0, 0.0);
-        e->damping = e->u0 > 0.0 ? d->dt * m->b_drift : 0.0;
-        element_line(d, e);
-        for (int c = -1; c < d->rank; c++) { /* -1: the free twist */
-            double twist[6];
-            for (int k = 0; k < 6; k++) twist[k] = c < 0 ? d->free[6 * f + k] : d->L[6 * f + k][c];
-            kit_cross(twist + 3, p, turn);
-            for (int k = 0; k < 3; k++) *(c < 0 ? &e->free[k] : &e->C[k][c]) = twist[k] + turn[k];
+    const double *R = kit->input.rotation[f], side = R[8] > 0.0 ? -1.0 : 1.0;
+    Find find = {.kit = kit, .f = f, .memory = ground_memory(kit->ground, f), .pitch = mild_sole_pitch(sole),
+                 .normal = {side * R[2], side * R[5], side * R[8]}};
+    for (find.i = 0; find.i < mild_sole_elements(sole); find.i++) {
+        double x = mild_sole_x(sole)[find.i], y = mild_sole_y(sole)[find.i], z = mild_sole_z(sole);
+        for (int k = 0; k < 3; k++) {
+            find.p[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * z;
+            find.at[k] = kit->input.position[f][k] + find.p[k];
         }
+        mild_terrain_slope_at(&kit->terrain, find.at[0], find.at[1], find.slope);
+        dense_element(d, &find);
     }
 }
 
 void dense_open(Dense *dense, const Kit *kit) {
-    const MildMaterial *m = &kit->terrain.materials[0];
-    double area = KIT_PITCH * KIT_PITCH;
-    *dense = (Dense){.n = 6 * kit->feet, .dt = kit->input.dt};
-    dense->k_pen = m->k_pen;
-    dense->kappa = m->sigma_cone * area / cos(m->alpha);
-    dense->full = sqrt(area / acos(-1.0)) * tan(m->alpha) / m->nu;
-    dense->mass_rate = fmax(m->c_g, 0.0) * m->phi * m->rho * m->nu * area;
-    dense->drag = fmax(m->c_d, 0.5);
-    dense->bed = m->bed_depth;
-    dense->bed_stiffness = LAW_BED_STRESS * area;
-    dense->recovery = m->recovery;
-    dense->mu = m->mu;
+    memset(dense, 0, sizeof *dense);
+    dense->n = 6 * kit->feet;
+    dense->dt = kit->input.dt;
     memcpy(dense->free, kit->input.free_velocity, sizeof dense->free);
     dense_factor(dense, kit->input.inverse_inertia);
     for (int f = 0; f < kit->feet; f++) dense_foot(dense, kit, f);
@@ -144,13 +303,14 @@ void dense_open(Dense *dense, const Kit *kit) {
 /* ---- its minimum ---- */
 
 static void element_velocity(const Dense *d, const DenseElement *e, const double *y, double *v) {
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 4; k++) {
         v[k] = e->free[k];
         for (int c = 0; c < d->rank; c++) v[k] += e->C[k][c] * y[c];
     }
 }
 
-/* Gradient y - sum C^T I and, if wanted, the Hessian 1 + sum C^T K C; the normal law's slope by difference. */
+/* Gradient y - sum C^T I and, if wanted, the Hessian 1 + sum C^T K C; the normal law's slope by difference. The normal
+ * impulse acts along -grad u: its power is -I_z du/dt, so its row of C is minus that of du/dt. */
 static void dense_gradient(const Dense *d, const double *y, double eps, double *g, double H[12][12]) {
     int n = d->rank;
     memcpy(g, y, 12 * sizeof *g);
@@ -158,19 +318,19 @@ static void dense_gradient(const Dense *d, const double *y, double eps, double *
         for (int c = 0; c < n; c++) H[r][c] = r == c;
     for (int i = 0; i < d->elements; i++) {
         const DenseElement *e = &d->element[i];
-        double v[3];
+        double v[4];
         element_velocity(d, e, y, v);
         double speed = hypot(v[0], v[1]), pull = d->bound[i] / fmax(speed, eps), drag = pull + e->damping;
-        const double I[3] = {-drag * v[0], -drag * v[1], law_normal(d, e, -v[2])};
-        for (int c = 0; c < n; c++) g[c] -= e->C[0][c] * I[0] + e->C[1][c] * I[1] + e->C[2][c] * I[2];
+        const double I[3] = {-drag * v[0], -drag * v[1], law_normal(d->dt, e, v[3])};
+        for (int c = 0; c < n; c++) g[c] -= e->C[0][c] * I[0] + e->C[1][c] * I[1] - e->C[3][c] * I[2];
         if (!H) continue;
-        double h = 1e-7, stiff = (law_normal(d, e, -v[2] + h) - law_normal(d, e, -v[2] - h)) / (2.0 * h);
+        double h = 1e-7, stiff = (law_normal(d->dt, e, v[3] + h) - law_normal(d->dt, e, v[3] - h)) / (2.0 * h);
         double nx = speed > eps ? v[0] / speed : 0.0, ny = speed > eps ? v[1] / speed : 0.0;
         double xx = drag - pull * nx * nx, xy = -pull * nx * ny, yy = drag - pull * ny * ny;
         if (drag == 0.0 && stiff == 0.0) continue;
         for (int r = 0; r < n; r++) {
-            double X = xx * e->C[0][r] + xy * e->C[1][r], Y = xy * e->C[0][r] + yy * e->C[1][r], Z = stiff * e->C[2][r];
-            for (int c = 0; c <= r; c++) H[r][c] += X * e->C[0][c] + Y * e->C[1][c] + Z * e->C[2][c];
+            double X = xx * e->C[0][r] + xy * e->C[1][r], Y = xy * e->C[0][r] + yy * e->C[1][r], W = stiff * e->C[3][r];
+            for (int c = 0; c <= r; c++) H[r][c] += X * e->C[0][c] + Y * e->C[1][c] + W * e->C[3][c];
         }
     }
 }
@@ -250,9 +410,9 @@ static int dense_minimum(Dense *d) {
 static void dense_bounds(Dense *d, double share) {
     for (int i = 0; i < d->elements; i++) {
         const DenseElement *e = &d->element[i];
-        double v[3];
+        double v[4];
         element_velocity(d, e, d->y, v);
-        d->bound[i] += share * (d->mu * law_normal(d, e, -v[2]) + e->radius - d->bound[i]);
+        d->bound[i] += share * (e->law.mu * law_normal(d->dt, e, v[3]) + e->radius - d->bound[i]);
     }
 }
 
@@ -274,6 +434,18 @@ int dense_solve(Dense *d) {
     }
     for (int i = 0; i < d->n; i++) d->twist[i] = d->free[i] + dot(d->rank, d->L[i], d->y);
     return settled;
+}
+
+void dense_start(Dense *d, const double *twist) {
+    for (int c = 0; c < d->rank; c++) { /* the columns of L are orthogonal */
+        double along = 0.0, length = 0.0;
+        for (int i = 0; i < d->n; i++) {
+            along += d->L[i][c] * (twist[i] - d->free[i]);
+            length += d->L[i][c] * d->L[i][c];
+        }
+        d->y[c] = along / length;
+    }
+    dense_bounds(d, 1.0);
 }
 
 double dense_distance(const Dense *d, const double *one, const double *other) {

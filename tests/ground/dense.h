@@ -14,29 +14,39 @@
 
 #define DENSE_ELEMENTS 192
 
-/* One element: what it remembers, its unloading line, the drift's friction and how it moves with y. */
+/* What the ground under one element is made of; of two materials that blend, the mean. */
 typedef struct {
-    double u0, m0, a, w0, reach, w_a; /* [m], [m/s], as in docs/model.md section 6 */
-    double line, slack;               /* [N/m], [m] */
-    double mass;                      /* [kg] m_a(a) */
-    double radius, damping;           /* [N s], [kg] */
-    double free[3], C[3][12];         /* velocity at y = 0, and its change by y */
+    double k_pen, kappa, full;             /* [N/m], [N/m], [m]: F_g = (k_pen - kappa) P(u) + kappa u */
+    double mass_rate, drag_rate;           /* [kg/m] m_a = mass_rate P; drag_rate is c_d times that */
+    double bed, bed_stiffness;             /* [m], [N/m] */
+    double recovery, mu, k_drift, b_drift; /* of the material */
+} DenseLaw;
+
+/* One element: what it remembers, its unloading line, the drift's friction and how it moves with y. Virgin ground begins at
+ * `front` with the force of the depth `deep`; only resistive force theory tells them apart. */
+typedef struct {
+    DenseLaw law;
+    double u0, m0, front, deep, w0, reach, w_a; /* [m], [m/s], as in docs/model.md section 6 */
+    double line, slack;                         /* [N/m], [m] */
+    double mass, active;                        /* [kg] m_a(a); [N s] what parameters that create energy give, explicitly */
+    double radius, damping;                     /* [N s], [kg] */
+    double free[4], C[4][12];                   /* velocity and du/dt at y = 0, and their change by y */
 } DenseElement;
 
 typedef struct {
     int n, rank, elements;
     double dt, free[12], L[12][12];
-    double k_pen, kappa, full, mass_rate, drag; /* F_g = (k_pen - kappa) P + kappa u up to u_f; m_a = mass_rate P; c_d */
-    double bed, bed_stiffness, recovery, mu;
     DenseElement element[DENSE_ELEMENTS];
     double bound[DENSE_ELEMENTS]; /* [N s] radius of friction */
     double y[12], twist[12];      /* the answer */
 } Dense;
 
-/* Reads the problem, not its solution, out of a kit on level ground of one passive developing cone. */
+/* Reads the problem, not its solution, out of a kit on any ground. */
 void dense_open(Dense *dense, const Kit *kit);
-/* False when the bounds never settle. */
+/* Goes on from `y` and `bound`, 0 when opened; false when the bounds never settle. Coulomb's law can have several solutions. */
 int dense_solve(Dense *dense);
+/* Puts y and the bounds where these twists have them. */
+void dense_start(Dense *dense, const double *twist);
 /* Distance of two twists by what contact changed, V+ - V^ of the answer, all in the metric of kinetic energy: the root of a
  * quotient of energies, one number for metres and radians and for any rank of A. */
 double dense_distance(const Dense *dense, const double *one, const double *other);

@@ -120,6 +120,13 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
     }
 }
 
+/* Ground that remembers prints. */
+static inline void kit_prints(Kit *kit, int tiles) {
+    free(kit->ground);
+    kit->bytes = mild_ground_bytes_prints(kit->soles, kit->feet, tiles);
+    kit->ground = mild_ground_init_prints(aligned_alloc(64, kit->bytes), kit->soles, kit->feet, tiles);
+}
+
 static inline void kit_close(Kit *kit) {
     mild_scratch_destroy(kit->scratch);
     free(kit->ground);

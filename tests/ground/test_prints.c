@@ -7,9 +7,7 @@
 /* The kit with a ground that remembers prints. */
 static void prints_open(Kit *kit, int feet, MildSole *left, MildSole *right, const MildMaterial *material, double dt, int tiles) {
     kit_open(kit, feet, left, right, material, dt);
-    free(kit->ground);
-    kit->bytes = mild_ground_bytes_prints(kit->soles, feet, tiles);
-    kit->ground = mild_ground_init_prints(aligned_alloc(64, kit->bytes), kit->soles, feet, tiles);
+    kit_prints(kit, tiles);
     assert_int_equal(mild_ground_size(kit->ground), kit->bytes);
     assert_int_equal(kit->bytes % 64, 0);
 }

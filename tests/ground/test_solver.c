@@ -1,11 +1,13 @@
 /* The contact problem: both solvers against each other and against a dense slow reference; symmetries; purity.
- * `ground_test_solver COUNT [FIRST]` runs the reference alone, on problems FIRST .. FIRST + COUNT - 1. */
+ * `ground_test_solver COUNT [FIRST]` runs the reference alone, on problems FIRST .. FIRST + COUNT - 1 of cones on level ground
+ * and of every other kind. */
 #include "dense.h"
 
 #define SOLES 8
 
-static int first_problem = 0, problem_count = 2000;
+static int first_problem = 0, problem_count = 2000, kind_count = 100;
 static MildSole *soles[SOLES]; /* left 77, right 77, one element, plates of six and more */
+static MildSole *centers[SOLES]; /* of each, for the concentric models */
 
 static int open_soles(void **state) {
     (void)state;
@@ -17,23 +19,30 @@ static int open_soles(void **state) {
     soles[5] = kit_plate(5, 3);
     soles[6] = kit_plate(7, 5);
     soles[7] = kit_plate(11, 6);
+    for (int i = 0; i < SOLES; i++) centers[i] = mild_sole_concentric(soles[i], NULL);
     return 0;
 }
 
 static int close_soles(void **state) {
     (void)state;
-    for (int i = 0; i < SOLES; i++) mild_sole_destroy(soles[i]);
+    for (int i = 0; i < SOLES; i++) {
+        mild_sole_destroy(soles[i]);
+        mild_sole_destroy(centers[i]);
+    }
     return 0;
 }
 
-/* A random problem on a ground, with a history, on robot's soles or on one of the first so many small ones; false when
- * nothing touches. */
-static int problem_on(Kit *kit, uint64_t *random, int small, const MildMaterial *m, double dt) {
+/* Feet in a random state on a ground: on robot's soles or on one of the first so many small ones. */
+static void problem_open(Kit *kit, uint64_t *random, MildSole *const *from, int small, const MildMaterial *m, double dt) {
     int feet = 1 + kit_index(random, 2);
-    MildSole *left = soles[small ? 2 + kit_index(random, small) : 0], *right = soles[small ? 2 + kit_index(random, small) : 1];
+    MildSole *left = from[small ? 2 + kit_index(random, small) : 0], *right = from[small ? 2 + kit_index(random, small) : 1];
     kit_open(kit, feet, left, right, m, dt);
     kit_random_state(kit, random);
-    int history = kit_index(random, 10), n = 6 * feet;
+}
+
+/* Gives the feet a history, then a random inertia, and solves; false when nothing touches. */
+static int problem_solve(Kit *kit, uint64_t *random) {
+    int history = kit_index(random, 10), n = 6 * kit->feet;
     for (int s = 0; s < history; s++) kit_step(kit, NULL);
     int rank = kit_uniform(random, 0.0, 1.0) < 0.3 ? 1 + kit_index(random, n - 1) : n;
     kit_random_inertia(kit, random, rank);
@@ -46,6 +55,11 @@ static int problem_on(Kit *kit, uint64_t *random, int small, const MildMaterial 
         }
     kit_solve(kit);
     return kit->result.foot[0].contacts + kit->result.foot[1].contacts > 0;
+}
+
+static int problem_on(Kit *kit, uint64_t *random, int small, const MildMaterial *m, double dt) {
+    problem_open(kit, random, soles, small, m, dt);
+    return problem_solve(kit, random);
 }
 
 static int random_problem(Kit *kit, uint64_t *random, int small) {
@@ -67,6 +81,117 @@ static int numbered_problem(Kit *kit, int number) {
     }
     if (number % 5 == 4) m.bed_depth = kit_uniform(&random, 0.001, 0.02);
     return problem_on(kit, &random, number % 3 == 2 ? SOLES - 2 : 0, &m, steps[kit_index(&random, 3)]);
+}
+
+/* ---- problems beyond cones on level ground ---- */
+
+typedef enum { SPRING, CONCENTRIC, QUASI, QUASI_3D, UNEVEN, BLEND, PRINTS, ACTIVE, EVERYTHING, KINDS } Kind;
+static const char *const kind_names[KINDS] = {"springs", "con_cone and con_spring", "ecc_quasi", "ecc_quasi_3d", "uneven ground",
+                                              "materials that blend", "prints", "passive = false", "everything at once"};
+
+/* One of the models of the raster, with numbers for it. */
+static MildMaterial material_of(uint64_t *random, MildModel model) {
+    MildMaterial m = kit_material(random);
+    m.model = (int)model;
+    if (model == MILD_MODEL_MILD || model == MILD_MODEL_ECC_SPRING) return m;
+    m.zeta = kit_uniform(random, 0.05, 1.5);
+    if (kit_index(random, 2)) m.mu = 0.0; /* as matched, and with friction on top */
+    if (kit_index(random, 2)) m.k_drift = m.b_drift = 0.0;
+    return m;
+}
+
+static MildMaterial kind_material(Kind kind, uint64_t *random) {
+    static const MildModel models[4] = {MILD_MODEL_MILD, MILD_MODEL_ECC_SPRING, MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D};
+    MildModel model = kind == EVERYTHING ? models[kit_index(random, 4)] : kind == SPRING ? MILD_MODEL_ECC_SPRING :
+                      kind == QUASI ? MILD_MODEL_ECC_QUASI : kind == QUASI_3D ? MILD_MODEL_ECC_QUASI_3D : MILD_MODEL_MILD;
+    MildMaterial m = material_of(random, model);
+    if (kit_index(random, 5) == 0) m.bed_depth = kit_uniform(random, 0.001, 0.02);
+    m.passive = kind == ACTIVE ? 0 : kind == EVERYTHING ? kit_index(random, 3) > 0 : 1;
+    return m;
+}
+
+/* A concentric rival of a cone on the sole that the problem's feet stand on, matched at some load. */
+static void problem_match(Kit *kit, uint64_t *random) {
+    MildMaterial *m = &kit->terrain.materials[0], mild = *m;
+    double load = kit_uniform(random, 5.0, 20.0) * mild_sole_elements(soles[0]);
+    MildError error;
+    MildModel model = kit_index(random, 2) ? MILD_MODEL_CON_CONE : MILD_MODEL_CON_SPRING;
+    if (mild_model_match(model, &mild, soles[0], load, m, &error) != MILD_OK) fail_msg("%s", error.text);
+    m->recovery = mild.recovery;
+}
+
+/* Random heights, a random pattern or both; the surface is where the feet were put. */
+static MildMap *problem_map(Kit *kit, uint64_t *random, int uneven, int pattern) {
+    static const MildMapKind shapes[4] = {MILD_MAP_SLOPE, MILD_MAP_STEPS, MILD_MAP_WAVES, MILD_MAP_ROUGH};
+    MildMapDef def = mild_map_def_default();
+    def.kind = uneven ? (int)shapes[kit_index(random, 4)] : MILD_MAP_FLAT;
+    def.cell = kit_uniform(random, 0.01, 0.03);
+    def.size = 1.0;
+    def.amplitude = kit_uniform(random, 0.0, 0.03);
+    def.wavelength = kit_uniform(random, 0.1, 0.8);
+    def.slope = kit_uniform(random, -0.4, 0.4);
+    def.seed = (uint64_t)kit_index(random, 1000);
+    def.patches = pattern ? MILD_PATTERN_STRIPES + kit_index(random, 2) : MILD_PATTERN_NONE;
+    def.patch_size = kit_uniform(random, 0.03, 0.2);
+    def.patch_count = kit->terrain.material_count - 1;
+    def.border = kit_index(random, 4) ? kit_uniform(random, 0.01, def.patch_size) : 0.0;
+    MildError error;
+    MildMap *map = mild_map_create(&def, &error);
+    if (!map || mild_terrain_set_map(&kit->terrain, map, &error) != MILD_OK) fail_msg("%s", error.text);
+    kit->terrain.height = kit_uniform(random, -0.1, 0.1);
+    kit->terrain.map_x = kit_uniform(random, -1.0, 1.0);
+    kit->terrain.map_y = kit_uniform(random, -1.0, 1.0);
+    for (int f = 0; f < kit->feet; f++) {
+        double *p = kit->input.position[f];
+        for (int k = 0; k < 2; k++) p[k] += kit_uniform(random, -0.5, 0.5);
+        p[2] += mild_terrain_height_at(&kit->terrain, p[0], p[1]);
+    }
+    return map;
+}
+
+/* Up to four materials in the map's pattern and one more in a rectangle near a foot. */
+static void problem_materials(Kit *kit, Kind kind, uint64_t *random) {
+    int count = 3 + kit_index(random, 3);
+    double x = kit_uniform(random, -0.5, 0.5), y = kit_uniform(random, -0.5, 0.5);
+    MildPatch patch = {x, x + kit_uniform(random, 0.01, 0.5), y, y + kit_uniform(random, 0.01, 0.5), count - 1};
+    while (kit->terrain.material_count < count)
+        kit->terrain.materials[kit->terrain.material_count++] = kind_material(kind, random);
+    mild_terrain_add_patch(&kit->terrain, &patch, NULL);
+}
+
+/* The feet have been here before: they leave their prints and come back nearby. */
+static void problem_visit(Kit *kit, uint64_t *random) {
+    MildContactInput first = kit->input;
+    kit_prints(kit, 64);
+    int visit = 1 + kit_index(random, 20);
+    for (int s = 0; s < visit; s++) kit_step(kit, NULL);
+    for (int f = 0; f < kit->feet; f++) {
+        kit->input.position[f][2] += 1.0;
+        memset(kit->input.velocity[f], 0, sizeof kit->input.velocity[f]);
+    }
+    kit_step(kit, NULL);
+    kit->input = first;
+    for (int f = 0; f < kit->feet; f++) {
+        double turn[3] = {0.0, 0.0, kit_uniform(random, -0.3, 0.3)};
+        kit_rotate(kit->input.rotation[f], turn);
+        for (int k = 0; k < 3; k++) kit->input.position[f][k] += kit_uniform(random, -0.005, 0.005);
+    }
+}
+
+/* *map: to be destroyed after the kit, may be NULL. */
+static int kind_problem(Kit *kit, MildMap **map, Kind kind, int number) {
+    static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
+    uint64_t random = (uint64_t)number * 1000003u + 29 + (uint64_t)kind * 7919u;
+    MildMaterial m = kind_material(kind, &random);
+    double dt = steps[kit_index(&random, 3)];
+    int all = kind == EVERYTHING;
+    problem_open(kit, &random, kind == CONCENTRIC ? centers : soles, number % 2 ? SOLES - 2 : 0, &m, dt);
+    *map = NULL;
+    if (kind == CONCENTRIC) problem_match(kit, &random);
+    if (kind == BLEND || all) problem_materials(kit, kind, &random);
+    if (kind == UNEVEN || kind == BLEND || all) *map = problem_map(kit, &random, kind != BLEND, kind != UNEVEN);
+    if (kind == PRINTS || all) problem_visit(kit, &random);
+    return problem_solve(kit, &random);
 }
 
 static double twist_difference(const Kit *kit, const double *a, const double *b) {
@@ -213,6 +338,53 @@ static void test_dense_reference(void **state) {
     assert_int_equal(unsolved + unsettled, 0);
     assert_true(newton.energy.value < 1e-6 && newton.twist.value < 1e-6);
     assert_true(sweeps.energy.value < 1e-6 && sweeps.twist.value < 1e-6);
+}
+
+/* The same on every other kind of ground; a line for each. Where friction has two solutions the reference starts again from
+ * Newton's and must stay there. */
+static void test_dense_kinds(void **state) {
+    (void)state;
+    static Dense dense;
+    int wrong = 0;
+    for (Kind kind = 0; kind < KINDS; kind++) {
+        Compared newton = {0}, sweeps = {0};
+        Worst residual = {0};
+        int unsolved = 0, unsettled = 0, most = 0, several = 0;
+        for (int number = first_problem; number < first_problem + kind_count; number++) {
+            Kit kit;
+            MildMap *map;
+            if (kind_problem(&kit, &map, kind, number)) {
+                MildContactResult answer = kit.result;
+                dense_open(&dense, &kit);
+                int settled = dense_solve(&dense);
+                unsettled += !settled;
+                unsolved += !answer.converged;
+                most = answer.iterations > most ? answer.iterations : most;
+                if (answer.converged) worst_of(&residual, answer.residual, number);
+                else print_message("%s: newton leaves number %d\n", kind_names[kind], number);
+                if (settled && answer.converged && dense_distance(&dense, answer.velocity, dense.twist) > 1e-6) {
+                    dense_start(&dense, answer.velocity); /* Newton's answer is another solution, or none */
+                    settled = dense_solve(&dense);
+                    several++;
+                }
+                if (settled && answer.converged) compare(&newton, &dense, answer.velocity, dense.twist, number);
+                kit.input.solver = MILD_SOLVER_GAUSS_SEIDEL;
+                kit.input.max_iterations = 200;
+                kit.input.tolerance = 1e-12;
+                kit_solve(&kit);
+                if (kit.result.converged && answer.converged) compare(&sweeps, &dense, kit.result.velocity, answer.velocity, number);
+            }
+            kit_close(&kit);
+            mild_map_destroy(map);
+        }
+        print_message("%s: %d problems, worst energy error %.1e (number %d), twist %.1e (number %d), worst residual %.1e, "
+                      "iterations at most %d; several solutions in %d; sweeps against newton in %d, %.1e (number %d); "
+                      "not solved: %d by newton, %d by the reference\n", kind_names[kind], newton.problems,
+                      newton.energy.value, newton.energy.number, newton.twist.value, newton.twist.number, residual.value, most,
+                      several, sweeps.problems, sweeps.energy.value, sweeps.energy.number, unsolved, unsettled);
+        wrong += unsolved + unsettled > 0 || !(newton.energy.value < 1e-8 && newton.twist.value < 1e-7 && sweeps.energy.value < 1e-6);
+    }
+    assert_int_equal(wrong, 0);
 }
 
 /* Two whole feet, mu > 1: the second detour's problems among 42 750. */
@@ -448,14 +620,15 @@ static void test_outputs(void **state) {
 }
 
 int main(int count, char **arguments) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense_reference),  cmocka_unit_test(test_second_detour),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense_reference),  cmocka_unit_test(test_dense_kinds),
+                                       cmocka_unit_test(test_second_detour),
                                        cmocka_unit_test(test_newton_converges),
                                        cmocka_unit_test(test_solvers_agree),    cmocka_unit_test(test_symmetry),
                                        cmocka_unit_test(test_element_order),    cmocka_unit_test(test_pure),
                                        cmocka_unit_test(test_outputs)};
-    const struct CMUnitTest reference[] = {cmocka_unit_test(test_dense_reference)};
+    const struct CMUnitTest reference[] = {cmocka_unit_test(test_dense_reference), cmocka_unit_test(test_dense_kinds)};
     if (count < 2) return cmocka_run_group_tests(tests, open_soles, close_soles);
-    problem_count = atoi(arguments[1]);
+    problem_count = kind_count = atoi(arguments[1]);
     if (count > 2) first_problem = atoi(arguments[2]);
     return cmocka_run_group_tests(reference, open_soles, close_soles);
 }
