@@ -84,9 +84,9 @@ MildStatus grounds_lay_map(const GroundsDef *def, Scene *scene, MildMap **map, M
     MildTerrain *terrain = &scene->terrain;
     MildMap *made = NULL;
     *map = NULL;
-    if (scene->rigid && terrain_has_map(def->terrain))
+    if (scene->rigid && def->terrain->map.patches != MILD_PATTERN_NONE)
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "rigid is the engine's own level floor: leave out --terrain.kind and --terrain.patches, or name a soft ground");
+                         "rigid is the engine's own contact and has no materials: leave out --terrain.patches");
     MildStatus status = terrain_make(def->terrain, terrain->material_count, &made, error);
     if (status == MILD_OK) status = mild_terrain_set_map(terrain, made, error);
     if (status != MILD_OK) {

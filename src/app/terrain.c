@@ -33,7 +33,8 @@ ConfigSection terrain_section(TerrainDef *def) {
     return (ConfigSection){"terrain", fields, mild_map_field_count + OWN_FIELDS, def};
 }
 
-int terrain_has_map(const TerrainDef *def) {
+/* Whether it is anything but level ground without a pattern. */
+static int terrain_has_map(const TerrainDef *def) {
     return def->map.kind != MILD_MAP_FLAT || def->map.patches != MILD_PATTERN_NONE;
 }
 

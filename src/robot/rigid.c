@@ -1,4 +1,5 @@
-/* What the engine's own contact did to the feet, in the terms of the soft ground. */
+/* The engine's own contact under the eight sole corners: where the ground is not level, and what it did to the feet in the
+ * terms of the soft ground. */
 #include <math.h>
 #include <string.h>
 
@@ -10,8 +11,65 @@ static void cross(const double a[3], const double b[3], double out[3]) {
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* Adds contact c to the foot it belongs to. The contact frame's first axis points from geom 0 to geom 1. */
-static void add_contact(RobotSim *sim, int c) {
+/* ---- uneven ground ---- */
+
+/* Rows: the unit normal, and the tangents that the engine takes. */
+static void tangent_frame(const double slope[2], double frame[9]) {
+    double scale = 1.0 / sqrt(1.0 + slope[0] * slope[0] + slope[1] * slope[1]);
+    const double normal[3] = {-slope[0] * scale, -slope[1] * scale, scale};
+    int axis = fabs(normal[1]) < 0.5 ? 1 : 2;
+    for (int k = 0; k < 3; k++) {
+        frame[k] = normal[k];
+        frame[3 + k] = (k == axis) - normal[axis] * normal[k];
+    }
+    mju_normalize3(frame + 3);
+    cross(frame, frame + 3, frame + 6);
+}
+
+/* The engine's contact of a plane and a sphere, the plane being the tangent plane under the sphere's centre: exact on a
+ * slope, off by the ground's curvature times radius^2/2 elsewhere. */
+static void collide_corner(RobotSim *sim, const MildTerrain *terrain, int pair) {
+    const mjModel *m = sim->model;
+    int floor = sim->robot->floor_geom, corner = m->pair_geom1[pair] == floor ? m->pair_geom2[pair] : m->pair_geom1[pair];
+    const double *center = sim->data->geom_xpos + 3 * corner;
+    double radius = m->geom_size[3 * corner], slope[2];
+    mjContact contact = {.includemargin = m->pair_margin[pair] - m->pair_gap[pair], .dim = m->pair_dim[pair],
+                         .geom1 = floor, .geom2 = corner, .geom = {floor, corner},
+                         .flex = {-1, -1}, .elem = {-1, -1}, .vert = {-1, -1}, .efc_address = -1};
+    mild_terrain_slope_at(terrain, center[0], center[1], slope);
+    tangent_frame(slope, contact.frame);
+    contact.dist = (center[2] - mild_terrain_height_at(terrain, center[0], center[1])) * contact.frame[2] - radius;
+    if (!(contact.dist < m->pair_margin[pair])) {
+        return;
+    }
+    for (int k = 0; k < 3; k++) {
+        contact.pos[k] = center[k] - (0.5 * contact.dist + radius) * contact.frame[k];
+    }
+    contact.exclude = contact.dist >= contact.includemargin;
+    memcpy(contact.friction, m->pair_friction + 5 * pair, sizeof contact.friction);
+    memcpy(contact.solref, m->pair_solref + mjNREF * pair, sizeof contact.solref);
+    memcpy(contact.solreffriction, m->pair_solreffriction + mjNREF * pair, sizeof contact.solreffriction);
+    memcpy(contact.solimp, m->pair_solimp + mjNIMP * pair, sizeof contact.solimp);
+    mj_addContact(m, sim->data, &contact);
+}
+
+void rigid_collide(RobotSim *sim, const MildTerrain *terrain) {
+    if (!terrain->map || mild_map_is_level(terrain->map)) {
+        sim->data->geom_xpos[3 * sim->robot->floor_geom + 2] = terrain->height;
+        mj_collision(sim->model, sim->data);
+        return;
+    }
+    sim->data->ncon = 0;
+    for (int pair = 0; pair < sim->model->npair; pair++) {
+        collide_corner(sim, terrain, pair);
+    }
+}
+
+/* ---- results ---- */
+
+/* Adds contact c to the foot it belongs to, and the vertical part of its normal force to that foot's load. The contact
+ * frame's first axis points from geom 0 to geom 1. */
+static void add_contact(RobotSim *sim, int c, double load[ROBOT_FEET]) {
     const mjData *d = sim->data;
     const mjContact *contact = d->contact + c;
     int floor_first = contact->geom[0] == sim->robot->floor_geom;
@@ -23,6 +81,7 @@ static void add_contact(RobotSim *sim, int c) {
     if (local[0] <= 0.0) {
         return;
     }
+    double normal = fabs(contact->frame[2]) * local[0];
     for (int k = 0; k < 3; k++) {
         double sum = 0.0;
         for (int r = 0; r < 3; r++) {
@@ -35,40 +94,45 @@ static void add_contact(RobotSim *sim, int c) {
     for (int k = 0; k < 3; k++) {
         result->force[k] += force[k];
         result->torque[k] += torque[k];
-        result->pressure_center[k] += contact->pos[k] * force[2]; /* the floor is level: normal = vertical */
+        result->pressure_center[k] += contact->pos[k] * normal;
     }
+    load[foot] += normal;
     result->depth_max = fmax(result->depth_max, -contact->dist);
     result->depth_mean += -contact->dist;
     result->contacts++;
 }
 
 /* Central axis F x tau / |F|^2 and the point of zero moment on the sole plane (docs/model.md section 9). */
-static void finish_foot(RobotSim *sim, int foot) {
+static void finish_foot(RobotSim *sim, int foot, double load) {
     MildFootResult *result = &sim->contact.foot[foot];
     const double *force = result->force, *torque = result->torque, *turn = sim->input.rotation[foot];
     double square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2];
-    if (result->contacts == 0 || square <= 0.0 || force[2] <= 0.0) {
+    if (result->contacts == 0 || square <= 0.0) {
         return;
     }
+    result->depth_mean /= result->contacts;
     cross(force, torque, result->zmp_axis);
     for (int k = 0; k < 3; k++) {
         result->zmp_axis[k] /= square;
-        result->pressure_center[k] /= force[2];
+        result->pressure_center[k] /= load;
+    }
+    if (force[2] <= 0.0) {
+        return;
     }
     const double *center = sim->robot->sole_center[foot];
     double sole = turn[6] * center[0] + turn[7] * center[1] + turn[8] * center[2];
     result->zmp_sole[0] = (sole * force[0] - torque[1]) / force[2];
     result->zmp_sole[1] = (torque[0] + sole * force[1]) / force[2];
-    result->depth_mean /= result->contacts;
 }
 
 void rigid_contact_result(RobotSim *sim) {
+    double load[ROBOT_FEET] = {0};
     memset(&sim->contact, 0, sizeof sim->contact);
     for (int c = 0; c < sim->data->ncon; c++) {
-        add_contact(sim, c);
+        add_contact(sim, c, load);
     }
     for (int f = 0; f < ROBOT_FEET; f++) {
-        finish_foot(sim, f);
+        finish_foot(sim, f, load[f]);
         foot_map_twist(sim, f, sim->data->qvel, sim->data->qacc, sim->contact.velocity + 6 * f);
     }
     sim->contact.iterations = sim->data->solver_niter[0];

@@ -286,8 +286,7 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push, cons
     sim->data->ncon = 0;
     t = split(sim, &phases->smooth, t);
     if (rigid) {
-        sim->data->geom_xpos[3 * sim->robot->floor_geom + 2] = terrain->height;
-        mj_collision(sim->model, sim->data);
+        rigid_collide(sim, terrain);
         t = split(sim, &phases->ground, t);
         constrain(sim);
         rigid_contact_result(sim);

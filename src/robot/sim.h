@@ -40,7 +40,9 @@ void foot_map_inverse_inertia(RobotSim *sim);
 /* generalised force J^T w [NV] and its acceleration M^-1 J^T w [NV] of one wrench (force, torque) per foot. */
 void foot_map_wrench(const RobotSim *sim, double wrench[ROBOT_FEET][6], double *force, double *acceleration);
 
-/* The engine's own contact: wrench on each foot, mean over the step, into sim->contact. */
+/* The engine's own contact: finds the contacts of the sole corners with the ground. */
+void rigid_collide(RobotSim *sim, const MildTerrain *terrain);
+/* And, once they are solved, the wrench on each foot, mean over the step, into sim->contact. */
 void rigid_contact_result(RobotSim *sim);
 
 #endif

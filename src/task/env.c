@@ -31,7 +31,7 @@ void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_
 }
 
 static void lend_map(TaskEnv *env, const TaskDef *def) {
-    env->terrain.map = env->variation.rigid ? NULL : def->map;
+    env->terrain.map = def->map;
 }
 
 static void return_map(TaskEnv *env) {

@@ -71,7 +71,10 @@ for model in con_cone con_spring ecc_spring ecc_quasi; do
 done
 
 # terrain
-bad "rigid is the engine's own level floor" "$mild" eval --ground rigid --terrain.kind=waves
+bad "rigid is the engine's own contact and has no materials" "$mild" eval --ground rigid --terrain.patches=stripes
+for option in "--ground rigid" "--ground sand_loose --model rigid"; do
+    expect 0 ' 1/1 ' "$mild" eval $option --terrain.kind=waves --speed 0.3 --trials 1 --seconds 0.2
+done
 bad "terrain.image is empty" "$mild" press --ground sand_loose --terrain.kind=image
 printf 'no picture' >not.png
 bad "terrain.image = not.png: is not a PNG" "$mild" press --ground sand_loose --terrain.kind=image --terrain.image=not.png

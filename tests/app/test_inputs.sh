@@ -62,7 +62,7 @@ done
 rm -r folder
 bad "terrain.cell" "$mild" press --ground sand_loose --terrain.kind=rough --terrain.cell=0.001 --terrain.size=1000
 bad "terrain.border" "$mild" press --ground sand_loose --terrain.patches=stripes --terrain.border=9
-bad "terrain" "$mild" eval --ground rigid --terrain.kind=waves
+bad "terrain" "$mild" eval --ground rigid --terrain.kind=waves --terrain.patches=checker
 
 # a policy or a config that is none
 printf 'no policy' >text.safetensors

@@ -155,7 +155,40 @@ static void test_start(void **state) {
     robot_sim_destroy(sim);
 }
 
+/* On rigid ground too: 2 mm above the map's highest point under a sole, and half a second later the feet are on it. */
+static void test_rigid(void **state) {
+    (void)state;
+    TaskDef def = task_on_map();
+    def.randomize.rigid_share = 1;
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, def.physics_dt, &error);
+    TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
+    TaskView none = {0};
+    double off = 0, deepest = 0, highest = -1;
+    for (int i = 0; i < 20; i++) {
+        task_env_init(env, &def, robot, 4, (uint32_t)i);
+        task_env_reset(env, &def, robot, sim, &none);
+        MildTerrain terrain = env->terrain;
+        terrain.map = map;
+        off = fmax(off, fabs(robot_sim_sole_clearance(sim, &terrain) - 0.002));
+        for (int s = 0; s < 200; s++) {
+            double torque[ROBOT_JOINTS] = {0};
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, task_env_ground(env)), 0);
+        }
+        double clearance = robot_sim_sole_clearance(sim, &terrain);
+        deepest = fmin(deepest, clearance);
+        highest = fmax(highest, clearance);
+    }
+    printf("rigid starts: off by %.1e m; limp for half a second, lowest sole points %.1f to %.1f mm above the map\n", off,
+           1e3 * deepest, 1e3 * highest);
+    assert_true(off < 1e-9);
+    assert_true(deepest > -0.02 && highest < 0.002);
+    free(env);
+    robot_sim_destroy(sim);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_threads), cmocka_unit_test(test_save), cmocka_unit_test(test_start)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_threads), cmocka_unit_test(test_save),
+                                       cmocka_unit_test(test_start), cmocka_unit_test(test_rigid)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

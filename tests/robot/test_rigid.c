@@ -1,0 +1,221 @@
+/* The engine's contact on uneven ground: against the engine itself on a level and on a tilted floor; friction on a slope;
+ * standing on waves. */
+#include <math.h>
+#include <string.h>
+
+#include <mujoco/mujoco.h>
+
+#include "robot_kit.h"
+
+#include "base/random.h"
+#include "robot/stand.h"
+
+static MildMap *make_map(const MildMapDef *def) {
+    MildError error = {0};
+    MildMap *map = mild_map_create(def, &error);
+    if (!map) {
+        fail_msg("%s", error.text);
+    }
+    return map;
+}
+
+static MildMap *slope_map(double slope) {
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_SLOPE;
+    def.slope = slope;
+    return make_map(&def);
+}
+
+static RobotVariation rigid_variation(double friction) {
+    RobotVariation variation = robot_variation_nominal();
+    variation.rigid = 1;
+    variation.rigid_friction = friction;
+    return variation;
+}
+
+/* Standing, a little off and in motion. */
+static RobotState random_state(uint32_t draw) {
+    RobotState state = robot_stand_state(robot, 0, 0.0);
+    Random random = random_at(6, draw, 0);
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        state.qpos[7 + i] += random_uniform(&random, -0.1, 0.1);
+    }
+    for (int i = 0; i < ROBOT_NV; i++) {
+        state.qvel[i] = random_uniform(&random, -0.5, 0.5);
+    }
+    return state;
+}
+
+/* A map that happens to be level is the level floor, to the last bit. */
+static void test_level(void **unused) {
+    (void)unused;
+    const double heights[4] = {0.5, 0.5, 0.5, 0.5};
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_IMAGE;
+    def.amplitude = 0.5;
+    def.heights = heights;
+    def.height_columns = def.height_rows = 2;
+    MildMap *map = make_map(&def);
+    assert_false(mild_map_is_level(map));
+    RobotSim *sim = new_sim(0.001), *other = new_sim(0.001);
+    RobotVariation rigid = rigid_variation(0.8);
+    MildTerrain flat = preset_terrain("sand_loose"), mapped = flat;
+    flat.height = 0.25;
+    mapped.map = map;
+    int contacts = 0;
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        RobotState state = random_state(draw);
+        state.qpos[2] += 0.25;
+        robot_sim_load(sim, &state, &rigid);
+        robot_sim_load(other, &state, &rigid);
+        for (int i = 0; i < 300; i++) {
+            double torque[ROBOT_JOINTS];
+            robot_stand_torque(robot, sim, 0, torque);
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &flat, NULL), 0);
+            assert_int_equal(robot_sim_step(other, torque, NULL, &mapped, NULL), 0);
+            contacts += robot_sim_foot(sim, 0)->result.contacts;
+            assert_memory_equal(robot_sim_contact(sim), robot_sim_contact(other), sizeof(MildContactResult));
+            assert_memory_equal(robot_sim_qpos(sim), robot_sim_qpos(other), sizeof state.qpos);
+        }
+    }
+    assert_true(contacts > 1000);
+    robot_sim_destroy(sim);
+    robot_sim_destroy(other);
+    mild_map_destroy(map);
+}
+
+/* A slope is the engine's own floor, tilted. */
+static void test_slope_is_the_engine(void **unused) {
+    (void)unused;
+    static const double slopes[3] = {-0.3, 0.1, 0.5};
+    double worst = 0.0;
+    for (uint32_t draw = 0; draw < 12; draw++) {
+        double slope = slopes[draw % 3], tilt = -atan(slope);
+        MildMap *map = slope_map(slope);
+        MildTerrain terrain = preset_terrain("sand_loose");
+        terrain.map = map;
+        RobotSim *sim = new_sim(0.001);
+        mjModel *m = robot_sim_model(sim);
+        mjData *engine = mj_makeData(m);
+        RobotState state = random_state(draw);
+        RobotVariation rigid = rigid_variation(0.8);
+        int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
+        m->geom_quat[4 * floor] = cos(0.5 * tilt);
+        m->geom_quat[4 * floor + 2] = sin(0.5 * tilt);
+        m->geom_sameframe[floor] = mjSAMEFRAME_NONE;
+        robot_sim_load(sim, &state, &rigid);
+        memcpy(engine->qpos, state.qpos, sizeof state.qpos);
+        memcpy(engine->qvel, state.qvel, sizeof state.qvel);
+        for (int i = 0; i < 300; i++) {
+            double torque[ROBOT_JOINTS];
+            robot_stand_torque(robot, sim, 0, torque);
+            memcpy(engine->qfrc_applied + 6, torque, sizeof torque);
+            mj_step(m, engine);
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
+        }
+        for (int i = 0; i < ROBOT_NQ; i++) {
+            worst = fmax(worst, fabs(engine->qpos[i] - robot_sim_qpos(sim)[i]));
+        }
+        mj_deleteData(engine);
+        robot_sim_destroy(sim);
+        mild_map_destroy(map);
+    }
+    print_message("slope against mj_step on a tilted floor: worst %.2e\n", worst);
+    assert_true(worst < 1e-9);
+}
+
+/* A robot with held joints is put on a slope with its soles flat, for two seconds. [m] down the slope: how far its centre of
+ * mass has come, and how far a foot has gone in the second second. */
+static void slide(double slope, double friction, double *fallen, double *crept) {
+    MildMap *map = slope_map(-slope);
+    MildTerrain terrain = preset_terrain("sand_loose");
+    terrain.map = map;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation rigid = rigid_variation(friction);
+    RobotState state = robot_stand_state(robot, 0, 0.0);
+    const mjData *d = robot_sim_data(sim);
+    double tilt = atan(slope), height = state.qpos[2], start, half = 0.0;
+    state.qpos[0] = height * sin(tilt);
+    state.qpos[2] = height * cos(tilt);
+    state.qpos[3] = cos(0.5 * tilt);
+    state.qpos[5] = sin(0.5 * tilt);
+    robot_sim_load(sim, &state, &rigid);
+    start = d->subtree_com[3];
+    for (int i = 0; i < 2000; i++) {
+        double torque[ROBOT_JOINTS];
+        robot_stand_torque(robot, sim, 0, torque);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
+        half = i == 1000 ? robot_sim_foot(sim, 0)->sole_center[0] : half;
+    }
+    *fallen = (d->subtree_com[3] - start) / cos(tilt);
+    *crept = (robot_sim_foot(sim, 0)->sole_center[0] - half) / cos(tilt);
+    robot_sim_destroy(sim);
+    mild_map_destroy(map);
+}
+
+/* Above the angle of friction it slides as a block does, (sin - mu cos) g t^2/2 and the sway of its joints; below it stays,
+ * but for the creep of the engine's friction. */
+static void test_friction(void **unused) {
+    (void)unused;
+    const double slope = 0.03, angle = atan(slope);
+    double fallen, crept;
+    slide(slope, 0.01, &fallen, &crept);
+    double block = (sin(angle) - 0.01 * cos(angle)) * 9.81 * 2.0;
+    print_message("slope of 0.03: friction 0.01 slides %.0f mm in 2 s, a block %.0f mm\n", 1e3 * fallen, 1e3 * block);
+    assert_true(fabs(fallen - block) < 0.1 * block);
+    slide(slope, 0.06, &fallen, &crept);
+    print_message("slope of 0.03: friction 0.06 creeps %.2f mm/s\n", 1e3 * crept);
+    assert_true(fabs(crept) < 0.002);
+}
+
+/* Wherever it stands on waves, the lowest corner of either foot is neither 2 mm in the ground nor above it. */
+static void test_waves(void **unused) {
+    (void)unused;
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_WAVES;
+    MildMap *map = make_map(&def);
+    RobotSim *sim = new_sim(0.0025);
+    RobotVariation rigid = rigid_variation(0.8);
+    const mjModel *m = robot_sim_model(sim);
+    const mjData *d = robot_sim_data(sim);
+    double deepest = 0.0, highest = 0.0;
+    int stood = 0;
+    for (uint32_t place = 0; place < 16; place++) {
+        MildTerrain terrain = preset_terrain("sand_loose");
+        Random random = random_at(7, place, 0);
+        terrain.map = map;
+        terrain.map_x = random_uniform(&random, -1.0, 1.0);
+        terrain.map_y = random_uniform(&random, -1.0, 1.0);
+        RobotState state = robot_stand_state(robot, 1, 0.0);
+        robot_sim_load(sim, &state, &rigid);
+        state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain);
+        robot_sim_load(sim, &state, &rigid);
+        for (int i = 0; i < 800; i++) {
+            double torque[ROBOT_JOINTS];
+            robot_stand_torque(robot, sim, 1, torque);
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
+            for (int f = 0; i >= 400 && f < ROBOT_FEET; f++) {
+                double least = 1.0;
+                for (int p = 4 * f; p < 4 * f + 4; p++) {
+                    const double *c = d->geom_xpos + 3 * m->pair_geom2[p];
+                    least = fmin(least, c[2] - m->geom_size[3 * m->pair_geom2[p]] - mild_terrain_height_at(&terrain, c[0], c[1]));
+                }
+                deepest = fmin(deepest, least);
+                highest = fmax(highest, least);
+            }
+        }
+        stood += robot_sim_qpos(sim)[2] > 0.7;
+    }
+    print_message("waves of 20 mm: %d of 16 stand; the lowest corner of a foot %.2f mm in to %.2f mm above the ground\n", stood,
+                  -1e3 * deepest, 1e3 * highest);
+    robot_sim_destroy(sim);
+    mild_map_destroy(map);
+    assert_int_equal(stood, 16);
+    assert_true(deepest > -0.002 && highest < 0.002);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_level), cmocka_unit_test(test_slope_is_the_engine),
+                                       cmocka_unit_test(test_friction), cmocka_unit_test(test_waves)};
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
