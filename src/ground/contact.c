@@ -1,16 +1,16 @@
 #include <string.h>
 
-#include "ground/contact.h"
+#include "ground/friction.h"
 
 /* Slots back to elements: forces in N, and what each element did in the step. */
 static void foot_scatter(const MildScratch *scratch, int f) {
     const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &scratch->slot;
-    const double *V = scratch->velocity + 6 * f, dt = scratch->dt, rate = 1.0 / dt;
+    const Slots *s = &foot->slot;
+    const Motion motion = foot_motion(foot, scratch->velocity + 6 * f);
+    const double dt = scratch->dt, rate = 1.0 / dt;
     for (int k = 0; k < foot->active; k++) {
-        int i = foot->start + k, e = foot->element[k];
-        double vx = V[0] + V[4] * s->pz[i] - V[5] * s->py[i], vy = V[1] + V[5] * s->px[i] - V[3] * s->pz[i];
-        double m1 = s->depth[i] + 0.5 * dt * slot_descent(s, i, V);
+        int i = k, e = foot->element[k];
+        double m1 = s->depth[i] + 0.5 * dt * slot_descent(s, i, &motion);
         int loaded = s->iz[i] > 0.0, deeper = m1 > s->front[i];
         double open = 1.0 - (s->deep[i] + (deeper ? m1 - s->front[i] : 0.0)) * s->inverse_full[i];
         foot->normal[e] = s->iz[i] * rate;
@@ -18,7 +18,7 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         foot->tangent_y[e] = s->iy[i] * rate;
         foot->flat[e] = open > 0.0 ? open * open : 0.0;
         foot->state[e] = (uint8_t)(!loaded ? MILD_ELEMENT_FREE : deeper ? MILD_ELEMENT_VIRGIN : MILD_ELEMENT_UNLOADING);
-        foot->slip[e] = loaded && vx * vx + vy * vy > CONTACT_SLIP_SPEED * CONTACT_SLIP_SPEED;
+        foot->slip[e] = loaded && friction_slides(s, i, motion_at(motion.x, s->x[i], s->y[i]), motion_at(motion.y, s->x[i], s->y[i]));
     }
 }
 
@@ -30,6 +30,7 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
     memset(foot->tangent_y, 0, bytes);
     memset(foot->state, 0, 2 * (size_t)foot->padded); /* and slip behind it */
     for (int e = 0; e < foot->padded; e++) foot->flat[e] = 1.0;
+    foot_points(&scratch->foot[f]);
     foot_scatter(scratch, f);
     return (MildElements){foot->depth,   foot->normal,  foot->tangent_x, foot->tangent_y, foot->point_x,
                           foot->point_y, foot->point_z, foot->flat,      foot->state,     foot->slip};
@@ -38,28 +39,26 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
 /* What is summed over the loaded elements. */
 static void foot_loaded(const MildScratch *scratch, const double *position, int f, MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &scratch->slot;
-    double sum = 0.0, deepest = 0.0, loaded = 0.0, force = 0.0, x = 0.0, y = 0.0, z = 0.0;
+    const Slots *s = &foot->slot;
+    double sum = 0.0, deepest = 0.0, loaded = 0.0, force = 0.0, x = 0.0, y = 0.0;
     int end = foot_end(foot);
-#pragma omp simd reduction(+ : sum, loaded, force, x, y, z) reduction(max : deepest)
-    for (int i = foot->start; i < end; i++) {
+#pragma omp simd reduction(+ : sum, loaded, force, x, y) reduction(max : deepest)
+    for (int i = 0; i < end; i++) {
         double on = s->iz[i] > 0.0 ? 1.0 : 0.0, depth = on * s->depth[i];
         loaded += on;
         sum += depth;
         deepest = depth > deepest ? depth : deepest;
         force += s->iz[i];
-        x += s->px[i] * s->iz[i];
-        y += s->py[i] * s->iz[i];
-        z += s->pz[i] * s->iz[i];
+        x += s->x[i] * s->iz[i];
+        y += s->y[i] * s->iz[i];
     }
     result->contacts = (int)loaded;
     result->area = loaded * foot->pitch * foot->pitch;
     result->depth_max = deepest;
     if (!(loaded > 0.0)) return;
     result->depth_mean = sum / loaded;
-    result->pressure_center[0] = position[0] + x / force;
-    result->pressure_center[1] = position[1] + y / force;
-    result->pressure_center[2] = position[2] + z / force;
+    for (int k = 0; k < 3; k++)
+        result->pressure_center[k] = position[k] + foot->arm[0][k] + (x * foot->arm[1][k] + y * foot->arm[2][k]) / force;
 }
 
 /* Wrench and zero moment point. Paper eq 15: r = [F]x^+ tau, which for the true torque tau = p x F is F x tau/|F|^2, the

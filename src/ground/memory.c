@@ -1,10 +1,11 @@
 #include <string.h>
 
 #include "ground/prints.h"
+#include "ground/step.h"
 
 #define MEMORY_BAND 1e-5 /* [m] horizontal motion below this is jitter, not drift */
 #define MEMORY_CAP 0.1   /* [m] longest drift that still hardens the ground */
-#define MEMORY_DOUBLES 9
+#define MEMORY_DOUBLES 12
 
 static int32_t padded_elements(const MildSole *sole) {
     return (int32_t)((mild_sole_elements(sole) + CONTACT_LANES - 1) / CONTACT_LANES * CONTACT_LANES);
@@ -37,9 +38,24 @@ size_t mild_ground_size(const MildGround *ground) {
 Memory ground_memory(const MildGround *ground, int foot) {
     /* The one place where the block is seen as arrays; callers of a const ground only read through it. */
     double *at = (double *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground->padded, foot));
-    size_t n = (size_t)ground->padded[foot];
-    return (Memory){at,         at + n,     at + 2 * n, at + 3 * n, at + 4 * n,
-                    at + 5 * n, at + 6 * n, at + 7 * n, at + 8 * n, (int32_t *)(at + MEMORY_DOUBLES * n)};
+    Memory memory;
+    double **arrays[] = {&memory.depth_max, &memory.middle, &memory.front_speed, &memory.drift,  &memory.pending_x, &memory.pending_y,
+                         &memory.held_x,    &memory.held_y, &memory.grip,        &memory.plane, &memory.slope_x,   &memory.slope_y};
+    for (int k = 0; k < MEMORY_DOUBLES; k++, at += ground->padded[foot]) *arrays[k] = at;
+    memory.material = (int32_t *)at;
+    return memory;
+}
+
+void slots_remember(Slots *s, const Memory *memory) {
+    s->depth_max = memory->depth_max;
+    s->remembered_middle = memory->middle;
+    s->remembered_speed = memory->front_speed;
+    s->drift = memory->drift;
+    s->pending_x = memory->pending_x;
+    s->pending_y = memory->pending_y;
+    s->held_x = memory->held_x;
+    s->held_y = memory->held_y;
+    s->held_grip = memory->grip;
 }
 
 /* Behind the feet; read as ground_memory is. */
@@ -85,38 +101,32 @@ const double *mild_ground_depth_max(const MildGround *ground, int foot) {
     return ground_memory(ground, foot).depth_max;
 }
 
-static void element_forget(const Memory *memory, int e, int32_t material, double middle) {
+static void element_forget(const Memory *memory, int e, int32_t material) {
     memory->depth_max[e] = 0.0;
-    memory->middle[e] = middle;
+    memory->middle[e] = 0.0;
     memory->front_speed[e] = 0.0;
     memory->drift[e] = 0.0;
     memory->pending_x[e] = 0.0;
     memory->pending_y[e] = 0.0;
+    memory->held_x[e] = 0.0;
+    memory->held_y[e] = 0.0;
+    memory->grip[e] = 0.0;
     memory->material[e] = material;
-}
-
-/* d_D is the length of the horizontal path (paper: accumulated, not end to end). Motion is collected until it leaves the
- * dead band, so that the count depends neither on the step size nor on jitter. */
-static void element_drift(const Memory *memory, int e, double sx, double sy) {
-    double x = memory->pending_x[e] + sx, y = memory->pending_y[e] + sy, square = x * x + y * y;
-    int counts = square > MEMORY_BAND * MEMORY_BAND;
-    if (counts) memory->drift[e] = fmin(memory->drift[e] + sqrt(square), MEMORY_CAP);
-    memory->pending_x[e] = counts ? 0.0 : x;
-    memory->pending_y[e] = counts ? 0.0 : y;
 }
 
 /* The elements of a foot in one step. */
 typedef struct {
     const FootScratch *foot;
-    const Slots *slot;
+    Slots slot;
     const Prints *prints; /* NULL: lifted ground forgets */
-    const double *rotation, *V;
+    const double *rotation;
+    Motion motion; /* after the step */
     double dt, height; /* height: of the terrain, its map aside */
 } Advance;
 
 /* Lifted off: out of the ground; where prints stay, as soon as its own print no longer presses on it. */
 static int element_lifted(const Advance *a, int i, double m1) {
-    const Slots *s = a->slot;
+    const Slots *s = &a->slot;
     if (!(m1 > 0.0)) return 1;
     return a->prints && s->recovery[i] < 1.0 && m1 <= s->slack[i];
 }
@@ -124,11 +134,11 @@ static int element_lifted(const Advance *a, int i, double m1) {
 /* What an element that carried something leaves behind, where it lifts off and in each cell that it slides out of; sliding
  * into a deeper print it takes over that depth. A greater depth never means more force, so this gives no energy. */
 static void element_print(const Advance *a, const Memory *memory, int i, int e, int lifted) {
-    const Slots *s = a->slot;
+    const Slots *s = &a->slot;
     if (!(s->recovery[i] < 1.0)) return;
     double x0 = a->foot->point_x[e], y0 = a->foot->point_y[e];
-    double x1 = x0 + a->dt * (a->V[0] + a->V[4] * s->pz[i] - a->V[5] * s->py[i]);
-    double y1 = y0 + a->dt * (a->V[1] + a->V[5] * s->px[i] - a->V[3] * s->pz[i]);
+    double x1 = x0 + a->dt * motion_at(a->motion.x, s->x[i], s->y[i]);
+    double y1 = y0 + a->dt * motion_at(a->motion.y, s->x[i], s->y[i]);
     if (!lifted && prints_same_cell(a->prints, x0, y0, x1, y1)) return;
     prints_press(a->prints, &(PrintElement){x0, y0, a->foot->pitch, a->rotation}, lifted ? s->deep[i] : memory->depth_max[e]);
     if (lifted) return;
@@ -138,31 +148,59 @@ static void element_print(const Advance *a, const Memory *memory, int i, int e, 
     memory->front_speed[e] = 0.0;
 }
 
-/* How deep the element has been in this step. A foot that turns round within it was deepest between its ends: elastic ground
- * took it to the top of the parabola through them. */
-static double element_peak(const Slots *s, int i, double dt, double w, double m1) {
-    double w0 = s->speed[i], m0 = s->middle[i];
-    if (!(w < 0.0 && w0 > 0.0)) return m1;
-    double top = m0 + 0.5 * dt * w0 * w0 / (w0 - w);
-    return m1 + s->recovery[i] * fmax(top - m1, 0.0);
+/* The memory of an element that goes on. Branch-free, so that it runs in vectors. */
+ALWAYS_INLINE void element_advance(const Slots *s, const Memory *memory, int i, int e, double dt, double rate, double vx, double vy,
+                                   double w, double m1, double stays) {
+    /* A foot that turns round within the step was deepest between its ends: elastic ground took it to the top of the parabola
+     * through them. */
+    double m0 = s->middle[i], w0 = s->speed[i], front = s->front[i], reach = s->reach[i], turns = w < 0.0 && w0 > 0.0 ? 1.0 : 0.0;
+    double top = m0 + 0.5 * dt * w0 * w0 / (w0 - turns * w + STEP_TINY), past = turns * s->recovery[i] * step_max(top - m1, 0.0);
+    double depth_max = s->deep[i] + step_max(m1 + past - front, 0.0);
+    /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the next step. */
+    double before = s->front_speed[i] > reach || !(s->depth_max[i] > 0.0) ? 0.0 : reach, leads = m1 > front && w > reach ? stays : 0.0;
+    memory->depth_max[e] = stays * depth_max;
+    memory->middle[e] = step_min(m1, stays > 0.0 ? depth_max : m1);
+    memory->front_speed[e] = leads * (w - before);
+    /* Drift: motion is collected until it leaves the dead band, so that the count depends neither on the step size nor on
+     * jitter. d_D is the length of the path (paper: accumulated, not end to end). */
+    double x = s->pending_x[i] + dt * vx, y = s->pending_y[i] + dt * vy, square = x * x + y * y;
+    double counts = square > MEMORY_BAND * MEMORY_BAND ? 1.0 : 0.0, pends = stays * (1.0 - counts);
+    memory->drift[e] = stays * step_min(s->drift[i] + counts * sqrt(square), MEMORY_CAP);
+    memory->pending_x[e] = pends * x;
+    memory->pending_y[e] = pends * y;
+    /* What stays held when the element rests, see friction.h. */
+    double held_x = s->hold_x[i] - s->grip[i] * vx, held_y = s->hold_y[i] - s->grip[i] * vy;
+    double bound = s->mu[i] * s->iz[i] + s->drift_radius[i], held = sqrt(held_x * held_x + held_y * held_y);
+    double share = stays * rate * (held > bound ? bound / held : 1.0);
+    memory->held_x[e] = share * held_x;
+    memory->held_y[e] = share * held_y;
+    memory->grip[e] = stays * rate * rate * s->grip[i];
 }
 
-static void element_advance(const Advance *a, const Memory *memory, int i, int e, int32_t material, double w, double m1) {
-    const Slots *s = a->slot;
-    const double *V = a->V;
-    int leads = m1 > s->front[i] && w > s->reach[i], joined = s->front_speed[i] > s->reach[i] || !(s->depth_max[i] > 0.0);
-    /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the next step. */
-    memory->front_speed[e] = leads ? (joined ? w : w - s->reach[i]) : 0.0;
-    memory->depth_max[e] = s->deep[i] + fmax(element_peak(s, i, a->dt, w, m1) - s->front[i], 0.0);
-    memory->middle[e] = fmin(m1, memory->depth_max[e]);
-    memory->material[e] = material;
-    element_drift(memory, e, a->dt * (V[0] + V[4] * s->pz[i] - V[5] * s->py[i]),
-                  a->dt * (V[1] + V[5] * s->px[i] - V[3] * s->pz[i]));
+/* All elements are listed, on level ground without prints. Returns how many stay in the ground. */
+static int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material) {
+    const FootScratch *foot = a->foot;
+    const Slots local = a->slot, *s = &local;
+    const Memory own = *all, *memory = &own;
+    const Motion m = a->motion;
+    double dt = a->dt, rate = 1.0 / dt, touched = 0.0;
+    int elements = foot->elements;
+    int32_t *remembered = memory->material;
+#pragma omp simd reduction(+ : touched)
+    for (int i = 0; i < elements; i++) {
+        double x = s->x[i], y = s->y[i], w = -(m.z[0] + m.z[1] * x + m.z[2] * y), m1 = s->depth[i] + 0.5 * dt * w;
+        double stays = m1 > 0.0 ? 1.0 : 0.0;
+        element_advance(s, memory, i, i, dt, rate, m.x[0] + m.x[1] * x + m.x[2] * y, m.y[0] + m.y[1] * x + m.y[2] * y, w, m1, stays);
+        touched += stays;
+    }
+    const double *depth_max = memory->depth_max;
+    for (int e = 0; e < elements; e++) remembered[e] = depth_max[e] > 0.0 ? material[e] : MATERIAL_NONE;
+    return (int)touched;
 }
 
 /* The tangent plane that the step took the ground for, through the depth it took for the element's. */
 static void element_plane(const Advance *a, const Memory *memory, int i, int e) {
-    const Slots *s = a->slot;
+    const Slots *s = &a->slot;
     const FootScratch *foot = a->foot;
     memory->slope_x[e] = s->slope_x[i];
     memory->slope_y[e] = s->slope_y[i];
@@ -172,22 +210,23 @@ static void element_plane(const Advance *a, const Memory *memory, int i, int e) 
 
 static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
     const FootScratch *foot = a->foot;
+    const Slots *s = &a->slot;
+    const Motion *m = &a->motion;
     int32_t lifted_material = a->prints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
     int next = 0, touched = 0;
     for (int k = 0; k < foot->active; k++, next++) {
-        int i = foot->start + k, e = foot->element[k];
-        for (; next < e; next++) element_forget(memory, next, MATERIAL_NONE, 0.0);
-        double w = slot_descent(a->slot, i, a->V), m1 = a->slot->depth[i] + 0.5 * a->dt * w;
+        int i = k, e = foot->element[k];
+        for (; next < e; next++) element_forget(memory, next, MATERIAL_NONE);
+        double w = slot_descent(s, i, m), m1 = s->depth[i] + 0.5 * a->dt * w;
         int lifted = element_lifted(a, i, m1), carried = memory->material[e] >= 0;
-        if (lifted)
-            element_forget(memory, e, lifted_material, m1);
-        else
-            element_advance(a, memory, i, e, material[i], w, m1);
+        element_advance(s, memory, i, e, a->dt, 1.0 / a->dt, motion_at(m->x, s->x[i], s->y[i]), motion_at(m->y, s->x[i], s->y[i]),
+                        w, m1, lifted ? 0.0 : 1.0);
+        memory->material[e] = lifted ? lifted_material : material[i];
         if (a->prints && (carried || !lifted)) element_print(a, memory, i, e, lifted);
         if (foot->uneven) element_plane(a, memory, i, e);
         touched += !lifted || lifted_material != MATERIAL_NONE;
     }
-    for (; next < foot->elements; next++) element_forget(memory, next, MATERIAL_NONE, 0.0);
+    for (; next < foot->elements; next++) element_forget(memory, next, MATERIAL_NONE);
     return touched;
 }
 
@@ -200,8 +239,10 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain, const M
         ground->uneven[f] = foot->uneven;
         if (ground->touched[f] == 0 && foot->active == 0) continue;
         Memory memory = ground_memory(ground, f);
-        Advance advance = {foot,      &scratch->slot,  ground->tiles > 0 ? &prints : NULL, input->rotation[f],
-                           result->velocity + 6 * f, input->dt,       terrain->height};
-        ground->touched[f] = foot_advance(&advance, &memory, scratch->slot_material);
+        Advance advance = {foot, foot->slot, ground->tiles > 0 ? &prints : NULL, input->rotation[f],
+                           foot_motion(foot, result->velocity + 6 * f), input->dt, terrain->height};
+        int simple = foot->active == foot->elements && !foot->uneven && ground->tiles == 0;
+        if (simple) slots_remember(&advance.slot, &memory); /* of this ground; the step may have been solved on a copy */
+        ground->touched[f] = (simple ? foot_advance_all : foot_advance)(&advance, &memory, foot->slot_material);
     }
 }

@@ -4,191 +4,256 @@
 
 #define NEWTON_TOLERANCE 1e-9
 #define NEWTON_ITERATIONS 400 /* hard bound of work */
-#define NEWTON_FIRST 100      /* of them before a second, more patient detour: 1 in 10 000 random problems */
-#define NEWTON_PLAIN 12       /* of them without the detour over wide stick regions */
+#define NEWTON_PLAIN 20       /* of them without held bounds */
+#define NEWTON_ROUND 20       /* with the bounds held once */
+#define NEWTON_TRY 6          /* plain ones after each round */
 #define NEWTON_HALVINGS 6
-#define NEWTON_WIDE 0.1       /* [m/s] first stick region of the detour */
-#define NEWTON_NARROW 0.3     /* each is this much narrower than the one before */
-#define NEWTON_LEVEL 1e-2     /* relative residual at which the next one begins */
-#define NEWTON_PATIENCE 6     /* or this many steps */
-#define NEWTON_PATIENT 20     /* and on the second detour */
+#define NEWTON_SEARCH 30      /* bisections along a step */
+#define NEWTON_GROWTH 8.0 /* an elimination's factors beyond this are worth a search for a pivot */
+/* A row of up to 2 x 6 numbers, in whole vectors. Written with the compiler's vector type: what it makes of plain loops over
+ * so short rows takes three times as long. */
+enum { NEWTON_VECTOR = 8, NEWTON_VECTORS = 2, NEWTON_LANES = NEWTON_VECTOR * NEWTON_VECTORS };
+typedef double Vector __attribute__((vector_size(NEWTON_VECTOR * sizeof(double))));
+typedef union {
+    double at[NEWTON_LANES];
+    Vector part[NEWTON_VECTORS];
+} Row;
+
+/* The loaded feet's rows of the problem: `first` is the row of the first one; what lies beyond the last is zero. */
+typedef struct {
+    Row A[TWIST_MAX], free;
+    double tolerance, dt;
+    int limit, first;
+} System;
 
 /* One point of the search: impulse P, foot twists V = V^ + A P. */
 typedef struct {
-    double impulse[TWIST_MAX], twist[TWIST_MAX];
+    Row impulse, twist;
     double residual;
 } Point;
 
-static void point_twist(int n, const MildContactInput *input, Point *point) {
-    for (int i = 0; i < n; i++) {
-        double sum = input->free_velocity[i];
-        for (int j = 0; j < n; j++) sum += input->inverse_inertia[i * n + j] * point->impulse[j];
-        point->twist[i] = sum;
-    }
+static void system_open(System *system, const MildScratch *scratch, const MildContactInput *input, int first, int n) {
+    int stride = 6 * scratch->feet;
+    memset(system, 0, sizeof *system);
+    system->first = first;
+    for (int i = 0; i < n; i++)
+        memcpy(system->A[i].at, input->inverse_inertia + (first + i) * stride + first, (size_t)n * sizeof(double));
+    memcpy(system->free.at, input->free_velocity + first, (size_t)n * sizeof(double));
+    system->tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
+    system->limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
+    system->dt = input->dt;
 }
 
-static void point_evaluate(MildScratch *scratch, const MildContactInput *input, int n, double eps, Point *point) {
-    contact_pass(scratch, input->dt, point->twist, eps);
-    point->residual = contact_residual(n, input->inverse_inertia, point->impulse, scratch->wrench);
+/* All that follows is compiled for one and for two loaded feet: n rows in `parts` vectors. */
+
+/* y += A x; A is symmetric. */
+ALWAYS_INLINE void system_times(const System *system, const double *x, Row *y, int n, int parts) {
+    for (int j = 0; j < n; j++)
+        for (int p = 0; p < parts; p++) y->part[p] += x[j] * system->A[j].part[p];
 }
 
-/* Gaussian elimination with partial pivoting; x holds the right side, then the solution. Inline, so that n is a constant
- * in each of its two uses. */
-static inline int solve_dense(int n, double a[TWIST_MAX][TWIST_MAX], double *x) {
+/* sqrt(x^T A x): in the metric of kinetic energy. */
+ALWAYS_INLINE double system_norm(const System *system, const double *x, int n, int parts) {
+    Row y = {{0.0}};
+    double sum = 0.0;
+    system_times(system, x, &y, n, parts);
+    for (int i = 0; i < n; i++) sum += x[i] * y.at[i];
+    return sqrt(fmax(sum, 0.0));
+}
+
+ALWAYS_INLINE void point_evaluate(const System *system, MildScratch *scratch, Point *point, int n, int parts) {
+    double apart[TWIST_MAX];
+    contact_pass(scratch, system->dt, point->twist.at - system->first);
+    for (int i = 0; i < n; i++) apart[i] = point->impulse.at[i] - scratch->wrench[system->first + i];
+    point->residual = system_norm(system, apart, n, parts);
+}
+
+/* The row at or below k with the largest number in column k; 0 when there is none. */
+static int rows_pivot(Row *M, int k, int n) {
+    int pivot = k;
+    for (int i = k + 1; i < n; i++)
+        if (fabs(M[i].at[k]) > fabs(M[pivot].at[k])) pivot = i;
+    Row row = M[k];
+    M[k] = M[pivot];
+    M[pivot] = row;
+    return fabs(M[k].at[k]) > 0.0;
+}
+
+/* Gaussian elimination of the rows [M | right side], the right side in column n; x = M^-1 right. The diagonal is the pivot
+ * unless a factor grows. */
+ALWAYS_INLINE int rows_eliminate(Row *M, double *x, int n, int parts) {
+    double inverse[TWIST_MAX];
     for (int k = 0; k < n; k++) {
-        int pivot = k;
-        for (int i = k + 1; i < n; i++)
-            if (fabs(a[i][k]) > fabs(a[pivot][k])) pivot = i;
-        if (!(fabs(a[pivot][k]) > 0.0)) return 0;
-        if (pivot != k) {
-            for (int j = k; j < n; j++) {
-                double swap = a[k][j];
-                a[k][j] = a[pivot][j];
-                a[pivot][j] = swap;
-            }
-            double swap = x[k];
-            x[k] = x[pivot];
-            x[pivot] = swap;
+        double grown = 0.0, own = 1.0 / M[k].at[k];
+        for (int i = k + 1; i < n; i++) grown += fabs(M[i].at[k] * own) <= NEWTON_GROWTH ? 0.0 : 1.0;
+        if (grown > 0.0) {
+            if (!rows_pivot(M, k, n)) return 0;
+            own = 1.0 / M[k].at[k];
         }
-        double inverse = 1.0 / a[k][k];
+        inverse[k] = own;
         for (int i = k + 1; i < n; i++) {
-            double factor = a[i][k] * inverse;
-            for (int j = k + 1; j < n; j++) a[i][j] -= factor * a[k][j];
-            x[i] -= factor * x[k];
+            double factor = M[i].at[k] * own;
+            for (int p = 0; p < parts; p++) M[i].part[p] -= factor * M[k].part[p];
         }
     }
-    for (int i = n - 1; i >= 0; i--) {
-        for (int j = i + 1; j < n; j++) x[i] -= a[i][j] * x[j];
-        x[i] /= a[i][i];
+    for (int i = 0; i < n; i++) x[i] = M[i].at[n];
+    for (int j = n - 1; j >= 0; j--) {
+        x[j] *= inverse[j];
+        for (int i = 0; i < j; i++) x[i] -= M[i].at[j] * x[j];
     }
     return 1;
 }
 
-/* The law linearised at twist V: W + H (V - V^ - A P) = P, that is (I + H A) P = W + H (V - V^). */
-static inline int newton_step_of(const MildScratch *scratch, const MildContactInput *input, int n, const double *twist,
-                                 double *impulse) {
-    double matrix[TWIST_MAX][TWIST_MAX];
-    for (int i = 0; i < n; i++) {
-        const double *H = scratch->hessian[i / 6] + 6 * (i % 6);
-        int first = i / 6 * 6;
-        double sum = scratch->wrench[i], row[TWIST_MAX] = {0.0};
-        for (int k = 0; k < 6; k++) {
-            sum += H[k] * (twist[first + k] - input->free_velocity[first + k]);
-            for (int j = 0; j < n; j++) row[j] += H[k] * input->inverse_inertia[(first + k) * n + j];
-        }
-        row[i] += 1.0;
-        for (int j = 0; j < n; j++) matrix[i][j] = row[j];
-        impulse[i] = sum;
-    }
-    return solve_dense(n, matrix, impulse);
-}
-
-static int newton_step(const MildScratch *scratch, const MildContactInput *input, int n, const double *twist, double *impulse) {
-    return n == 6 ? newton_step_of(scratch, input, 6, twist, impulse)
-                  : newton_step_of(scratch, input, TWIST_MAX, twist, impulse);
-}
-
-static double newton_scale(int n, const MildContactInput *input, const double *impulse) {
-    static const double zero[TWIST_MAX];
-    return contact_residual(n, input->inverse_inertia, impulse, zero);
-}
-
-/* Newton's step from the last pass; false when the numbers have gone bad. */
-static int newton_move(MildScratch *scratch, const MildContactInput *input, int n, Point *at, Point *next) {
+/* The law of the last pass, at V, linearised with H = -dW/dV: W + H (V - V^ - A P) = P, that is (1 + H A) P = W + H (V - V^).
+ * The right side is column n of A while the rows are made. */
+ALWAYS_INLINE int point_newton(System *system, MildScratch *scratch, const Point *at, Point *next, int n, int parts) {
+    Row M[TWIST_MAX];
     contact_hessian(scratch);
-    if (!newton_step(scratch, input, n, at->twist, next->impulse)) return 0;
-    point_twist(n, input, next);
+    for (int k = 0; k < n; k++) system->A[k].at[n] = at->twist.at[k] - system->free.at[k];
+    for (int i = 0; i < n; i++) {
+        M[i] = (Row){{0.0}};
+        M[i].at[i] = 1.0;
+        M[i].at[n] = scratch->wrench[system->first + i];
+    }
+    for (int i = 0; i < n; i++) {
+        const double *H = scratch->hessian[(system->first + i) / 6] + 6 * (i % 6);
+        for (int k = 0; k < 6; k++)
+            for (int p = 0; p < parts; p++) M[i].part[p] += H[k] * system->A[i / 6 * 6 + k].part[p];
+    }
+    for (int k = 0; k < n; k++) system->A[k].at[n] = 0.0;
+    memset(next, 0, sizeof *next);
+    if (!rows_eliminate(M, next->impulse.at, n, parts)) return 0;
+    next->twist = system->free;
+    system_times(system, next->impulse.at, &next->twist, n, parts);
     return 1;
 }
 
-static void point_between(int n, const Point *from, const Point *to, double t, Point *point) {
+ALWAYS_INLINE void point_between(const Point *from, const Point *to, double t, Point *point, int n) {
     for (int i = 0; i < n; i++) {
-        point->impulse[i] = from->impulse[i] + t * (to->impulse[i] - from->impulse[i]);
-        point->twist[i] = from->twist[i] + t * (to->twist[i] - from->twist[i]);
+        point->impulse.at[i] = from->impulse.at[i] + t * (to->impulse.at[i] - from->impulse.at[i]);
+        point->twist.at[i] = from->twist.at[i] + t * (to->twist.at[i] - from->twist.at[i]);
     }
 }
 
-/* Halves the step until the residual falls; false when it does not. */
-static int newton_halve(MildScratch *scratch, const MildContactInput *input, int n, double eps, const Point *at, Point *next) {
+/* Halves the step until the residual falls. In vain, the shortest stands: it may lead over a kink of the law. */
+ALWAYS_INLINE void point_halve(const System *system, MildScratch *scratch, const Point *at, Point *next, int n, int parts) {
     const Point full = *next;
     double t = 1.0;
     for (int k = 0; k < NEWTON_HALVINGS; k++) {
         t *= 0.5;
-        point_between(n, at, &full, t, next);
-        point_evaluate(scratch, input, n, eps, next);
-        if (next->residual < (1.0 - 0.1 * t) * at->residual) return 1;
+        point_between(at, &full, t, next, n);
+        point_evaluate(system, scratch, next, n, parts);
+        if (next->residual < (1.0 - 0.1 * t) * at->residual) return;
     }
-    return 0;
 }
 
-/* Newton's method as it stands, as long as the residual falls. The common case: standing is one step, walking two or three. */
-static int newton_plain(MildScratch *scratch, const MildContactInput *input, int n, double tolerance, int limit, Point *at) {
+/* Newton's method from the point `at`, whose pass has been made. Standing takes one step, walking two to four. */
+ALWAYS_INLINE int newton_plain(System *system, MildScratch *scratch, Point *at, int limit, int n, int parts) {
     Point next;
     int steps = 0;
-    contact_pass(scratch, input->dt, at->twist, CONTACT_SLIP_SPEED);
-    while (steps < limit && newton_move(scratch, input, n, at, &next)) {
+    while (steps < limit && point_newton(system, scratch, at, &next, n, parts)) {
         steps++;
-        point_evaluate(scratch, input, n, CONTACT_SLIP_SPEED, &next);
-        if (!(next.residual < at->residual) && !newton_halve(scratch, input, n, CONTACT_SLIP_SPEED, at, &next)) break;
+        point_evaluate(system, scratch, &next, n, parts);
+        if (!(next.residual < at->residual)) point_halve(system, scratch, at, &next, n, parts);
         *at = next;
-        if (at->residual <= tolerance * newton_scale(n, input, at->impulse)) break;
+        if (at->residual <= system->tolerance * system_norm(system, at->impulse.at, n, parts)) break;
     }
     return steps;
 }
 
-/* The detour where Newton's method alone does not arrive: a foot that turns about a point under its sole has an element
- * whose velocity must be found to within the stick region, a needle's eye of 1e-6 m/s. With a wide region the problem is
- * easy; it is then narrowed step by step, the friction's directions l being kept from one region to the next. */
-static int newton_narrow(MildScratch *scratch, const MildContactInput *input, int n, double tolerance, int limit, int patience,
-                         Point *best) {
-    double eps = NEWTON_WIDE;
-    Point at = {.residual = INFINITY}, next;
-    memcpy(at.twist, input->velocity, (size_t)n * sizeof(double));
-    int steps = 0, left = patience;
-    contact_pass(scratch, input->dt, at.twist, eps);
-    contact_dual_start(scratch, at.twist, eps);
-    while (steps < limit && newton_move(scratch, input, n, &at, &next)) {
+/* Slope along the step from one point to another of the function that held bounds make: (P - W)^T A dP. */
+static double step_slope(const System *system, MildScratch *scratch, const Point *from, const Point *to, double t, Point *point, int n) {
+    double slope = 0.0;
+    point_between(from, to, t, point, n);
+    contact_pass_held(scratch, system->dt, point->twist.at - system->first);
+    for (int i = 0; i < n; i++)
+        slope += (point->impulse.at[i] - scratch->wrench[system->first + i]) * (to->twist.at[i] - from->twist.at[i]);
+    return slope;
+}
+
+/* Where the bounds' dependence on I_z leads Newton's method astray, or it runs in circles over kinks: with the bounds held, the
+ * step is the minimum of a convex function, and a search along each step finds it from anywhere. Bounds and minimum follow each
+ * other, with shorter steps when they do not come closer. */
+static int newton_held(System *system, MildScratch *scratch, Point *at, int limit, int n) {
+    int steps = 0;
+    Point next, middle;
+    while (steps < limit) {
+        contact_pass_held(scratch, system->dt, at->twist.at - system->first);
+        if (!point_newton(system, scratch, at, &next, n, NEWTON_VECTORS)) break;
         steps++;
-        point_evaluate(scratch, input, n, eps, &next);
-        if (!(next.residual < at.residual)) newton_halve(scratch, input, n, eps, &at, &next); /* a small step if in vain */
-        contact_dual(scratch, at.twist, next.twist, eps);
-        at = next;
-        if (!(at.residual < INFINITY)) break;
-        double scale = newton_scale(n, input, at.impulse);
-        if (eps == CONTACT_SLIP_SPEED) {
-            if (at.residual < best->residual) *best = at;
-            if (at.residual <= tolerance * scale) break;
-        } else if (at.residual <= NEWTON_LEVEL * scale || --left == 0) {
-            left = patience;
-            eps = fmax(NEWTON_NARROW * eps, CONTACT_SLIP_SPEED);
-            contact_pass(scratch, input->dt, at.twist, eps);
-            at.residual = INFINITY;
+        double start = step_slope(system, scratch, at, &next, 0.0, &middle, n);
+        double end = step_slope(system, scratch, at, &next, 1.0, &middle, n), low = 0.0, high = 1.0;
+        for (int k = 0; k < NEWTON_SEARCH && fabs(end) > 0.1 * fabs(start); k++) {
+            if (end < 0.0 && high == 1.0) break;
+            double t = 0.5 * (low + high);
+            end = step_slope(system, scratch, at, &next, t, &middle, n);
+            *(end < 0.0 ? &low : &high) = t;
         }
-        contact_dual_stiffness(scratch, at.twist, eps);
+        double moved[TWIST_MAX];
+        for (int i = 0; i < n; i++) moved[i] = middle.impulse.at[i] - at->impulse.at[i];
+        *at = middle;
+        if (system_norm(system, moved, n, NEWTON_VECTORS) <= 0.1 * system->tolerance * system_norm(system, at->impulse.at, n, NEWTON_VECTORS)) break;
     }
     return steps;
+}
+
+static int newton_patient(System *system, MildScratch *scratch, Point *best, int limit, int n) {
+    Point at = *best;
+    int steps = 0;
+    double share = 1.0, last = INFINITY;
+    contact_pass(scratch, system->dt, at.twist.at - system->first);
+    contact_bounds(scratch, 1.0);
+    for (int round = 0; steps < limit; round++) {
+        int held = newton_held(system, scratch, &at, limit - steps < NEWTON_ROUND ? limit - steps : NEWTON_ROUND, n);
+        if (held == 0) break; /* the numbers have gone bad */
+        steps += held;
+        point_evaluate(system, scratch, &at, n, NEWTON_VECTORS);
+        contact_bounds(scratch, share);
+        Point tried = at;
+        if (steps < limit) steps += newton_plain(system, scratch, &tried, limit - steps < NEWTON_TRY ? limit - steps : NEWTON_TRY, n, NEWTON_VECTORS);
+        if (tried.residual < best->residual) *best = tried;
+        if (at.residual < best->residual) *best = at;
+        if (best->residual <= system->tolerance * system_norm(system, best->impulse.at, n, NEWTON_VECTORS)) break;
+        if (round % 4 == 3) {
+            if (at.residual > 0.5 * last) share = fmax(0.5 * share, 0.02);
+            last = at.residual;
+        }
+    }
+    contact_pass(scratch, system->dt, best->twist.at - system->first);
+    return steps;
+}
+
+ALWAYS_INLINE void system_solve(System *system, MildScratch *scratch, const double *start, MildContactResult *result, int n, int parts) {
+    Point at = {.residual = INFINITY};
+    memcpy(at.twist.at, start, (size_t)n * sizeof(double));
+    contact_pass(scratch, system->dt, at.twist.at - system->first);
+    int plain = system->limit < NEWTON_PLAIN ? system->limit : NEWTON_PLAIN;
+    int steps = newton_plain(system, scratch, &at, plain, n, parts);
+    double scale = system_norm(system, at.impulse.at, n, parts);
+    if (!(at.residual <= system->tolerance * scale) && steps < system->limit) {
+        steps += newton_patient(system, scratch, &at, system->limit - steps, n);
+        scale = system_norm(system, at.impulse.at, n, parts);
+    }
+    result->iterations = steps;
+    result->residual = scale > 0.0 ? at.residual / scale : at.residual;
+    result->converged = at.residual <= system->tolerance * scale;
 }
 
 void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
-    int n = 6 * scratch->feet, limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
-    double tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
-    Point at = {.residual = INFINITY};
-    memcpy(at.twist, input->velocity, (size_t)n * sizeof(double));
-    int plain = limit < NEWTON_PLAIN ? limit : NEWTON_PLAIN;
-    int iterations = newton_plain(scratch, input, n, tolerance, plain, &at);
-    double scale = newton_scale(n, input, at.impulse);
-    for (int second = 0; second < 2 && !(at.residual <= tolerance * scale); second++) {
-        int end = !second && limit > NEWTON_FIRST ? NEWTON_FIRST : limit, patience = second ? NEWTON_PATIENT : NEWTON_PATIENCE;
-        iterations += newton_narrow(scratch, input, n, tolerance, end - iterations, patience, &at);
-        contact_pass(scratch, input->dt, at.twist, CONTACT_SLIP_SPEED);
-        scale = newton_scale(n, input, at.impulse);
-    }
-    result->iterations = iterations;
-    result->residual = scale > 0.0 ? at.residual / scale : at.residual;
-    result->converged = at.residual <= tolerance * scale;
-    for (int i = 0; i < n; i++) {
+    int stride = 6 * scratch->feet, first = 0, end = scratch->feet;
+    while (scratch->foot[first].active == 0) first++;
+    while (scratch->foot[end - 1].active == 0) end--;
+    int n = 6 * (end - first);
+    System system;
+    memset(scratch->wrench, 0, sizeof scratch->wrench);
+    system_open(&system, scratch, input, 6 * first, n);
+    if (n == 6)
+        system_solve(&system, scratch, input->velocity[first], result, 6, 1);
+    else
+        system_solve(&system, scratch, input->velocity[first], result, TWIST_MAX, 2);
+    for (int i = 0; i < stride; i++) {
         double sum = input->free_velocity[i];
-        for (int j = 0; j < n; j++) sum += input->inverse_inertia[i * n + j] * scratch->wrench[j];
+        for (int j = 6 * first; j < 6 * end; j++) sum += input->inverse_inertia[i * stride + j] * scratch->wrench[j];
         result->velocity[i] = sum;
     }
 }

@@ -1,231 +1,183 @@
 #include <string.h>
 
-#include "ground/step.h"
+#include "ground/friction.h"
 
-/* The normal law at every slot of a foot: branch-free, so that it runs in vectors. */
-static void foot_normal(const Slots *s, int start, int end, double dt, const double *V) {
-    const double v2 = V[2], w0 = V[3], w1 = V[4];
-#pragma omp simd
-    for (int i = start; i < end; i++) {
-        double impulse, slope;
-        step_normal(s, i, dt, w1 * s->px[i] - w0 * s->py[i] - v2, &impulse, &slope);
-        s->iz[i] = impulse;
-        s->hzz[i] = slope;
+/* Impulses at every slot of a foot and minus their derivatives by the element's velocity, branch-free, so that it runs in
+ * vectors. Where the ground is not level the normal impulse is I_z g, g = (-slope, 1): the gradient of -u, so that it does work
+ * exactly where u changes; its vertical part is the paper's. With f = -d friction/dv, k = -dI_z/dw and c = g + d friction/dI_z
+ *     h = -dI/dv = f + k c g^T.
+ * sums: of I, x I and y I. held: the bounds of friction are. */
+ALWAYS_INLINE void foot_pass(const Slots *slot, int end, double dt, const Motion *m, int uneven, int held, double sums[9]) {
+    const Slots local = *slot, *s = &local;
+    const double x0 = m->x[0], x1 = m->x[1], x2 = m->x[2], y0 = m->y[0], y1 = m->y[1], y2 = m->y[2];
+    const double z0 = m->z[0], z1 = m->z[1], z2 = m->z[2];
+    double f0 = 0.0, f1 = 0.0, f2 = 0.0, a0 = 0.0, a1 = 0.0, a2 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0;
+#pragma omp simd reduction(+ : f0, f1, f2, a0, a1, a2, b0, b1, b2)
+    for (int i = 0; i < end; i++) {
+        double x = s->x[i], y = s->y[i], vx = x0 + x1 * x + x2 * y, vy = y0 + y1 * x + y2 * y, w = -(z0 + z1 * x + z2 * y);
+        double gx = uneven ? -s->slope_x[i] : 0.0, gy = uneven ? -s->slope_y[i] : 0.0, iz, k, ix, iy, hxz, hyz;
+        if (uneven) w -= gx * vx + gy * vy;
+        step_normal(s, i, dt, w, &iz, &k);
+        double mu = s->mu[i], bound = mu * iz + s->drift_radius[i];
+        friction_at(s, i, held ? s->bound[i] : bound, held ? 0.0 : mu, vx, vy, &ix, &iy, &hxz, &hyz);
+        hxz *= k;
+        hyz *= k;
+        if (uneven) {
+            ix += gx * iz;
+            iy += gy * iz;
+            hxz += k * gx;
+            hyz += k * gy;
+            s->hyx[i] = s->hxy[i] + hyz * gx;
+            s->hxx[i] += hxz * gx;
+            s->hxy[i] += hxz * gy;
+            s->hyy[i] += hyz * gy;
+            s->hzx[i] = k * gx;
+            s->hzy[i] = k * gy;
+        }
+        s->hxz[i] = hxz;
+        s->hyz[i] = hyz;
+        s->hzz[i] = k;
+        s->iz[i] = iz;
+        s->ix[i] = ix;
+        s->iy[i] = iy;
+        f0 += ix;
+        f1 += iy;
+        f2 += iz;
+        a0 += x * ix;
+        a1 += x * iy;
+        a2 += x * iz;
+        b0 += y * ix;
+        b1 += y * iy;
+        b2 += y * iz;
     }
+    const double all[9] = {f0, f1, f2, a0, a1, a2, b0, b1, b2};
+    memcpy(sums, all, sizeof all);
 }
 
-/* The same where the ground is not level. */
-static void foot_normal_uneven(const Slots *s, int start, int end, double dt, const double *V) {
-#pragma omp simd
-    for (int i = start; i < end; i++) {
-        double impulse, slope;
-        step_normal(s, i, dt, slot_descent(s, i, V), &impulse, &slope);
-        s->iz[i] = impulse;
-        s->hzz[i] = slope;
-    }
+/* p x I */
+static inline void cross_add(const double *p, const double *I, double *torque) {
+    torque[0] += p[1] * I[2] - p[2] * I[1];
+    torque[1] += p[2] * I[0] - p[0] * I[2];
+    torque[2] += p[0] * I[1] - p[1] * I[0];
 }
 
-/* The normal impulse is I_z g, g = (-slope, 1): the gradient of -u, so that it does work exactly where u changes. Its
- * vertical part is the paper's; the horizontal one joins the friction. */
-static void foot_lean(const Slots *s, int start, int end) {
-#pragma omp simd
-    for (int i = start; i < end; i++) {
-        s->ix[i] -= s->slope_x[i] * s->iz[i];
-        s->iy[i] -= s->slope_y[i] * s->iz[i];
-    }
-}
-
-/* Coulomb friction and drift resistance of radius r = mu I_z + dt k_D d_D u (paper eqs 13 and 14), made single-valued by a
- * stick region |v| < eps, plus the drift damping: I = -(r/max(|v|, eps) + dt b_D) v. Both oppose the new velocity, so they
- * can neither push a resting foot nor reverse a motion. */
-static void foot_tangent(const Slots *s, int start, int end, const double *V, double eps) {
-    const double v0 = V[0], v1 = V[1], w0 = V[3], w1 = V[4], w2 = V[5];
-#pragma omp simd
-    for (int i = start; i < end; i++) {
-        double vx = v0 + w1 * s->pz[i] - w2 * s->py[i], vy = v1 + w2 * s->px[i] - w0 * s->pz[i];
-        double speed = sqrt(vx * vx + vy * vy), along = 1.0 / (speed > eps ? speed : eps);
-        double pull = (s->mu[i] * s->iz[i] + s->drift_radius[i]) * along, b = s->damping[i];
-        double nx = vx * along, ny = vy * along, slip = speed > eps ? pull : 0.0, couple = s->mu[i] * s->hzz[i];
-        s->ix[i] = -(pull + b) * vx;
-        s->iy[i] = -(pull + b) * vy;
-        s->hxx[i] = pull + b - slip * nx * nx;
-        s->hyy[i] = pull + b - slip * ny * ny;
-        s->hxy[i] = -slip * nx * ny;
-        s->hxz[i] = -couple * nx; /* the friction bound falls as the foot rises */
-        s->hyz[i] = -couple * ny;
-    }
-}
-
-/* The friction's direction as an unknown of its own (Chan, Golub and Mulet's method for sums of norms): l stands for
- * v/max(|v|, eps) and obeys |v| l = v, linearised at the old v as l = (v_new - l_old (n . dv))/|v_old| and kept in the unit
- * disc. A slipping element then loses stiffness along l and n instead of n twice: one whose direction is still in doubt,
- * as at the point a foot turns about, stays stiff, where Newton's method on v alone jumps to and fro across it. */
-static void foot_dual(const Slots *s, int start, int end, const double *from, const double *V, double eps) {
-#pragma omp simd
-    for (int i = start; i < end; i++) {
-        double px = s->px[i], py = s->py[i], pz = s->pz[i];
-        double ox = from[0] + from[4] * pz - from[5] * py, oy = from[1] + from[5] * px - from[3] * pz;
-        double vx = V[0] + V[4] * pz - V[5] * py, vy = V[1] + V[5] * px - V[3] * pz;
-        double before = sqrt(ox * ox + oy * oy), ahead = 1.0 / (before > eps ? before : eps);
-        double turn = before > eps ? ahead * (ox * (vx - ox) + oy * (vy - oy)) : 0.0;
-        double lx = (vx - s->lx[i] * turn) * ahead, ly = (vy - s->ly[i] * turn) * ahead, square = lx * lx + ly * ly;
-        double shorten = 1.0 / sqrt(square > 1.0 ? square : 1.0);
-        s->lx[i] = lx * shorten;
-        s->ly[i] = ly * shorten;
-    }
-}
-
-/* Puts l into the derivatives that foot_tangent has just made at V. */
-static void foot_dual_stiffness(const Slots *s, int start, int end, const double *V, double eps) {
-#pragma omp simd
-    for (int i = start; i < end; i++) {
-        double vx = V[0] + V[4] * s->pz[i] - V[5] * s->py[i], vy = V[1] + V[5] * s->px[i] - V[3] * s->pz[i];
-        double speed = sqrt(vx * vx + vy * vy), along = 1.0 / (speed > eps ? speed : eps), nx = vx * along, ny = vy * along;
-        double slip = speed > eps ? (s->mu[i] * s->iz[i] + s->drift_radius[i]) * along : 0.0;
-        double mx = nx - s->lx[i], my = ny - s->ly[i];
-        s->hxx[i] += slip * nx * mx;
-        s->hyy[i] += slip * ny * my;
-        s->hxy[i] += 0.5 * slip * (nx * my + ny * mx);
-    }
-}
-
-/* sum of B^T I = (sum I, sum p x I). */
-static void foot_wrench(const Slots *s, int start, int end, double *wrench) {
-    double fx = 0.0, fy = 0.0, fz = 0.0, tx = 0.0, ty = 0.0, tz = 0.0;
-#pragma omp simd reduction(+ : fx, fy, fz, tx, ty, tz)
-    for (int i = start; i < end; i++) {
-        double px = s->px[i], py = s->py[i], pz = s->pz[i], ix = s->ix[i], iy = s->iy[i], iz = s->iz[i];
-        fx += ix;
-        fy += iy;
-        fz += iz;
-        tx += py * iz - pz * iy;
-        ty += pz * ix - px * iz;
-        tz += px * iy - py * ix;
-    }
-    wrench[0] = fx;
-    wrench[1] = fy;
-    wrench[2] = fz;
-    wrench[3] = tx;
-    wrench[4] = ty;
-    wrench[5] = tz;
-}
-
-void contact_pass(MildScratch *scratch, double dt, const double *twist, double eps) {
+ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, int held) {
     for (int f = 0; f < scratch->feet; f++) {
-        int start = scratch->foot[f].start, end = foot_end(&scratch->foot[f]);
-        int uneven = scratch->foot[f].uneven;
-        (uneven ? foot_normal_uneven : foot_normal)(&scratch->slot, start, end, dt, twist + 6 * f);
-        foot_tangent(&scratch->slot, start, end, twist + 6 * f, eps);
-        if (uneven) foot_lean(&scratch->slot, start, end);
-        foot_wrench(&scratch->slot, start, end, scratch->wrench + 6 * f);
+        const FootScratch *foot = &scratch->foot[f];
+        if (foot->active == 0) continue;
+        double sums[9] = {0.0}, *wrench = scratch->wrench + 6 * f;
+        Motion motion = foot_motion(foot, twist + 6 * f);
+        if (foot->uneven)
+            foot_pass(&foot->slot, foot_end(foot), dt, &motion, 1, held, sums);
+        else
+            foot_pass(&foot->slot, foot_end(foot), dt, &motion, 0, held, sums);
+        /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 */
+        memcpy(wrench, sums, 3 * sizeof *sums);
+        memset(wrench + 3, 0, 3 * sizeof *wrench);
+        for (int k = 0; k < 3; k++) cross_add(foot->arm[k], sums + 3 * k, wrench + 3);
     }
 }
 
-void contact_dual(MildScratch *scratch, const double *from, const double *twist, double eps) {
-    for (int f = 0; f < scratch->feet; f++)
-        foot_dual(&scratch->slot, scratch->foot[f].start, foot_end(&scratch->foot[f]), from + 6 * f, twist + 6 * f, eps);
+void contact_pass(MildScratch *scratch, double dt, const double *twist) {
+    pass(scratch, dt, twist, 0);
 }
 
-void contact_dual_start(MildScratch *scratch, const double *twist, double eps) {
+void contact_pass_held(MildScratch *scratch, double dt, const double *twist) {
+    pass(scratch, dt, twist, 1);
+}
+
+void contact_bounds(MildScratch *scratch, double share) {
     for (int f = 0; f < scratch->feet; f++) {
-        int start = scratch->foot[f].start;
-        size_t bytes = (size_t)(foot_end(&scratch->foot[f]) - start) * sizeof(double);
-        memset(scratch->slot.lx + start, 0, bytes);
-        memset(scratch->slot.ly + start, 0, bytes);
+        const Slots *s = &scratch->foot[f].slot;
+        for (int i = 0; i < foot_end(&scratch->foot[f]); i++)
+            s->bound[i] += share * (s->mu[i] * s->iz[i] + s->drift_radius[i] - s->bound[i]);
     }
-    contact_dual(scratch, twist, twist, eps); /* from nothing: l = v/max(|v|, eps) */
 }
 
-void contact_dual_stiffness(MildScratch *scratch, const double *twist, double eps) {
-    for (int f = 0; f < scratch->feet; f++)
-        foot_dual_stiffness(&scratch->slot, scratch->foot[f].start, foot_end(&scratch->foot[f]), twist + 6 * f, eps);
-}
+/* Sums of each entry of h times 1, x, y, x^2, xy, y^2. They hold the whole foot, since p is linear in x and y. */
+typedef double Moments[3][3][6];
 
-/* With the rows Jx = (1,0,0, 0,pz,-py), Jy = (0,1,0, -pz,0,px), Jz = (0,0,1, py,-px,0) of B and the element's
- * X = hxx Jx + hxy Jy + hxz Jz,  Y = hxy Jx + hyy Jy + hyz Jz,  Z = hzz Jz
- * the sum of B^T h B has the rows  X, Y, Z, py Z - pz Y, pz X - px Z, px Y - py X. */
-static void hessian_linear(const Slots *s, int start, int end, double *H) {
-    double x0 = 0.0, x1 = 0.0, x2 = 0.0, x3 = 0.0, x4 = 0.0, x5 = 0.0, y1 = 0.0, y2 = 0.0, y3 = 0.0, y4 = 0.0, y5 = 0.0;
-    double z2 = 0.0, z3 = 0.0, z4 = 0.0;
-#pragma omp simd reduction(+ : x0, x1, x2, x3, x4, x5, y1, y2, y3, y4, y5, z2, z3, z4)
-    for (int i = start; i < end; i++) {
-        double px = s->px[i], py = s->py[i], pz = s->pz[i], hxx = s->hxx[i], hxy = s->hxy[i], hyy = s->hyy[i];
-        double hxz = s->hxz[i], hyz = s->hyz[i], hzz = s->hzz[i];
-        x0 += hxx;
-        x1 += hxy;
-        x2 += hxz;
-        x3 += hxz * py - hxy * pz;
-        x4 += hxx * pz - hxz * px;
-        x5 += hxy * px - hxx * py;
-        y1 += hyy;
-        y2 += hyz;
-        y3 += hyz * py - hyy * pz;
-        y4 += hxy * pz - hyz * px;
-        y5 += hyy * px - hxy * py;
-        z2 += hzz;
-        z3 += hzz * py;
-        z4 += hzz * px;
-    }
-    const double rows[18] = {x0, x1, x2, x3, x4, x5, x1, y1, y2, y3, y4, y5, 0.0, 0.0, z2, z3, -z4, 0.0};
-    for (int k = 0; k < 18; k++) H[k] = rows[k];
-}
-
-static void hessian_angular(const Slots *s, int start, int end, double *H) {
-    double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0;
-    double b5 = 0.0, c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;
+/* Of three entries at a time: as many sums as the registers hold. */
+static void moments(const Slots *s, int end, const double *a, const double *b, const double *c, double sums[3][6]) {
+    const double *xs = s->x, *ys = s->y;
+    double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0, b5 = 0.0;
+    double c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;
 #pragma omp simd reduction(+ : a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, c0, c1, c2, c3, c4, c5)
-    for (int i = start; i < end; i++) {
-        double px = s->px[i], py = s->py[i], pz = s->pz[i], hxx = s->hxx[i], hxy = s->hxy[i], hyy = s->hyy[i];
-        double hxz = s->hxz[i], hyz = s->hyz[i], hzz = s->hzz[i];
-        double x3 = hxz * py - hxy * pz, x4 = hxx * pz - hxz * px, x5 = hxy * px - hxx * py;
-        double y3 = hyz * py - hyy * pz, y4 = hxy * pz - hyz * px, y5 = hyy * px - hxy * py;
-        double z3 = hzz * py, z4 = hzz * px;
-        a0 += pz * hxy; /* the signs of pz Y are set below */
-        a1 += pz * hyy;
-        a2 += py * hzz - pz * hyz;
-        a3 += py * z3 - pz * y3;
-        a4 += py * z4 + pz * y4;
-        a5 += pz * y5;
-        b0 += pz * hxx;
-        b1 += pz * hxy;
-        b2 += pz * hxz - px * hzz;
-        b3 += pz * x3 - px * z3;
-        b4 += pz * x4 + px * z4;
-        b5 += pz * x5;
-        c0 += px * hxy - py * hxx;
-        c1 += px * hyy - py * hxy;
-        c2 += px * hyz - py * hxz;
-        c3 += px * y3 - py * x3;
-        c4 += px * y4 - py * x4;
-        c5 += px * y5 - py * x5;
+    for (int i = 0; i < end; i++) {
+        double x = xs[i], y = ys[i], xx = x * x, xy = x * y, yy = y * y;
+        a0 += a[i];
+        a1 += a[i] * x;
+        a2 += a[i] * y;
+        a3 += a[i] * xx;
+        a4 += a[i] * xy;
+        a5 += a[i] * yy;
+        b0 += b[i];
+        b1 += b[i] * x;
+        b2 += b[i] * y;
+        b3 += b[i] * xx;
+        b4 += b[i] * xy;
+        b5 += b[i] * yy;
+        c0 += c[i];
+        c1 += c[i] * x;
+        c2 += c[i] * y;
+        c3 += c[i] * xx;
+        c4 += c[i] * xy;
+        c5 += c[i] * yy;
     }
-    const double rows[18] = {-a0, -a1, a2, a3, -a4, -a5, b0, b1, b2, b3, b4, b5, c0, c1, c2, c3, c4, c5};
-    for (int k = 0; k < 18; k++) H[k] = rows[k];
+    const double all[3][6] = {{a0, a1, a2, a3, a4, a5}, {b0, b1, b2, b3, b4, b5}, {c0, c1, c2, c3, c4, c5}};
+    memcpy(sums, all, sizeof all);
 }
 
-/* What g != (0, 0, 1) adds to minus the impulse's derivative, an element's 3 x 3 block: with k = hzz, the friction's
- * coupling c = (hxz, hyz, 0) and e = (0, 0, 1)
- *     k (g g^T - e e^T) + c (g - e)^T,
- * carried to the foot's twist by B^T: each vector v becomes (v, p x v). */
-static void hessian_uneven(const Slots *s, int start, int end, double *H) {
-    for (int i = start; i < end; i++) {
-        double px = s->px[i], py = s->py[i], pz = s->pz[i], a = -s->slope_x[i], b = -s->slope_y[i];
-        double k = s->hzz[i], cx = s->hxz[i], cy = s->hyz[i];
-        const double lean[6] = {a, b, 0.0, -pz * b, pz * a, px * b - py * a}, up[6] = {0.0, 0.0, 1.0, py, -px, 0.0};
-        const double couple[6] = {cx, cy, 0.0, -pz * cy, pz * cx, px * cy - py * cx};
-        for (int r = 0; r < 6; r++)
-            for (int c = 0; c < 6; c++)
-                H[6 * r + c] += k * (lean[r] * (up[c] + lean[c]) + up[r] * lean[c]) + couple[r] * lean[c];
+static void foot_moments(const FootScratch *foot, Moments M) {
+    const Slots *s = &foot->slot;
+    int end = foot_end(foot);
+    moments(s, end, s->hxx, s->hxy, s->hxz, M[0]);
+    if (foot->uneven) {
+        moments(s, end, s->hyx, s->hyy, s->hyz, M[1]);
+        moments(s, end, s->hzx, s->hzy, s->hzz, M[2]);
+        return;
+    }
+    double rest[3][6];
+    moments(s, end, s->hyy, s->hyz, s->hzz, rest);
+    memcpy(M[1][0], M[0][1], sizeof M[1][0]);
+    memcpy(M[1][1], rest, 2 * sizeof *rest);
+    memset(M[2], 0, 2 * sizeof M[2][0]);
+    memcpy(M[2][2], rest[2], sizeof *rest);
+}
+
+/* H = sum of B^T h B, B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the moments of h by the products of those,
+ *     force rows   [M_00, N_0],   N_k = -sum over l of M_kl [arm_l]x
+ *     torque rows  sum over k of [arm_k]x [M_k0, N_k] */
+static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
+    static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    memset(H, 0, 36 * sizeof *H);
+    for (int k = 0; k < 3; k++) {
+        double rows[3][6] = {{0.0}};
+        for (int r = 0; r < 3; r++) {
+            for (int c = 0; c < 3; c++) rows[r][c] = M[r][c][k];
+            for (int l = 0; l < 3; l++) { /* -m [q]x = q x m */
+                const int at = product[k][l];
+                cross_add(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]}, rows[r] + 3);
+            }
+        }
+        const double *q = foot->arm[k];
+        for (int c = 0; c < 6; c++) {
+            if (k == 0)
+                for (int r = 0; r < 3; r++) H[6 * r + c] = rows[r][c];
+            H[18 + c] += q[1] * rows[2][c] - q[2] * rows[1][c];
+            H[24 + c] += q[2] * rows[0][c] - q[0] * rows[2][c];
+            H[30 + c] += q[0] * rows[1][c] - q[1] * rows[0][c];
+        }
     }
 }
 
 void contact_hessian(MildScratch *scratch) {
     for (int f = 0; f < scratch->feet; f++) {
-        int start = scratch->foot[f].start, end = foot_end(&scratch->foot[f]);
-        double *H = scratch->hessian[f];
-        hessian_linear(&scratch->slot, start, end, H);
-        hessian_angular(&scratch->slot, start, end, H + 18);
-        if (scratch->foot[f].uneven) hessian_uneven(&scratch->slot, start, end, H);
+        const FootScratch *foot = &scratch->foot[f];
+        if (foot->active == 0) continue;
+        Moments sums;
+        foot_moments(foot, sums);
+        foot_hessian(foot, sums, scratch->hessian[f]);
     }
 }
 

@@ -1,10 +1,11 @@
 #include <string.h>
 
+#include "ground/friction.h"
 #include "ground/prints.h"
 #include "ground/resist.h"
-#include "ground/step.h"
 
 #define PREPARE_MARGIN 1e-3      /* [m] elements this close to the ground are listed */
+#define PREPARE_NEVER (-1e3)     /* [m] depth of the padding: it never reaches the ground */
 #define PREPARE_EXTRA_SPEED 2.0  /* [m/s] an impact at the heel may swing the toe down faster than its free motion */
 
 static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
@@ -16,24 +17,38 @@ static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
     }
 }
 
-/* Where every element is, and how deep. */
-static void foot_place(FootScratch *foot, const MildTerrain *terrain, const double *position, const double *R) {
-    double cx = position[0] + R[2] * foot->z, cy = position[1] + R[5] * foot->z, cz = position[2] + R[8] * foot->z;
-    const double *x = foot->x, *y = foot->y;
+void foot_points(const FootScratch *foot) {
+    const double *x = foot->x, *y = foot->y, *o = foot->origin, *e = foot->arm[1], *n = foot->arm[2];
+    const double ox = o[0] + foot->arm[0][0], oy = o[1] + foot->arm[0][1], oz = o[2] + foot->arm[0][2];
+    const double ex = e[0], ey = e[1], ez = e[2], nx = n[0], ny = n[1], nz = n[2];
 #pragma omp simd
     for (int i = 0; i < foot->padded; i++) {
-        foot->point_x[i] = cx + R[0] * x[i] + R[1] * y[i];
-        foot->point_y[i] = cy + R[3] * x[i] + R[4] * y[i];
-        foot->point_z[i] = cz + R[6] * x[i] + R[7] * y[i];
+        foot->point_x[i] = ox + ex * x[i] + nx * y[i];
+        foot->point_y[i] = oy + ey * x[i] + ny * y[i];
+        foot->point_z[i] = oz + ez * x[i] + nz * y[i];
+    }
+}
+
+/* How deep every element is; and where it is, if the ground is not the same everywhere. */
+static void foot_place(FootScratch *foot, const MildTerrain *terrain, int prints, const double *position, const double *R) {
+    for (int k = 0; k < 3; k++) {
+        foot->origin[k] = position[k];
+        foot->arm[0][k] = R[3 * k + 2] * foot->z;
+        foot->arm[1][k] = R[3 * k];
+        foot->arm[2][k] = R[3 * k + 1];
     }
     foot->uneven = !terrain_is_level(terrain);
+    if (foot->uneven || prints || !terrain_is_uniform(terrain)) foot_points(foot);
     if (foot->uneven) {
         foot_surface(foot, terrain);
         return;
     }
-    const double height = terrain->height;
+    const double *x = foot->x, *y = foot->y, ez = foot->arm[1][2], nz = foot->arm[2][2];
+    const double above = terrain->height - position[2] - foot->arm[0][2];
+    double *depth = foot->depth;
 #pragma omp simd
-    for (int i = 0; i < foot->padded; i++) foot->depth[i] = height - foot->point_z[i];
+    for (int i = 0; i < foot->padded; i++) depth[i] = above - ez * x[i] - nz * y[i];
+    for (int i = foot->elements; i < foot->padded; i++) depth[i] = PREPARE_NEVER;
 }
 
 /* Fastest any point of the foot can come down under twist V, or the ground come up to it. */
@@ -52,11 +67,12 @@ static void foot_list(FootScratch *foot, const MildContactInput *input, double s
     foot->active = (int)near;
     if (foot->active == 0) return;
     int all = foot->active == foot->elements, active = 0;
-    for (int i = 0; all && i < foot->elements; i++) foot->element[i] = i;
-    for (int i = 0; !all && i < foot->elements; i++) {
+    if (all && foot->whole) return;
+    for (int i = 0; i < foot->elements; i++) {
         foot->element[active] = i;
-        active += foot->depth[i] > least;
+        active += all | (foot->depth[i] > least);
     }
+    foot->whole = all;
 }
 
 /* Bool: a mixture, coded as in Memory, has material m in it. */
@@ -65,15 +81,14 @@ static int mixture_has(int32_t mixture, int m) {
 }
 
 /* Derives the laws of the terrain's materials anew where their numbers have changed. */
-static void foot_laws(MildScratch *scratch, const MildTerrain *terrain, int f) {
-    const FootScratch *foot = &scratch->foot[f];
+static void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
     for (int m = 0; m < terrain->material_count; m++) {
-        DerivedLaw *derived = &scratch->derived[f][m];
+        DerivedLaw *derived = &foot->derived[m];
         const MildMaterial *wanted = &terrain->materials[m];
         if (derived->known && memcmp(&derived->material, wanted, sizeof *wanted) == 0) continue;
         *derived = (DerivedLaw){*wanted, law_of(wanted, foot->pitch), 1};
-        for (int i = foot->start; i < foot->start + foot->padded; i++)
-            if (mixture_has(scratch->slot_material[i], m)) scratch->slot_material[i] = MATERIAL_NONE;
+        for (int i = 0; i < foot->padded; i++)
+            if (mixture_has(foot->slot_material[i], m)) foot->slot_material[i] = MATERIAL_NONE;
     }
 }
 
@@ -112,77 +127,80 @@ static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, i
 }
 
 /* Material of each slot: the one it touched down on, so that a foot sliding over a border keeps its law. */
-static void slots_materials(MildScratch *scratch, const MildTerrain *terrain, const Memory *memory, int f) {
-    const FootScratch *foot = &scratch->foot[f];
-    int one = terrain_is_uniform(terrain), wrong = 0, count = terrain->material_count;
-    for (int k = 0; one && k < foot->active; k++) { /* uniform ground whose law stands in the slots already */
-        int m = memory->material[foot->element[k]];
-        wrong += (m > 0) | (scratch->slot_material[foot->start + k] != 0);
+static void slots_materials(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory) {
+    int count = terrain->material_count;
+    if (terrain_is_uniform(terrain)) { /* whose law stands in the slots already */
+        const int32_t *remembered = memory->material, *set = foot->slot_material;
+        int32_t wrong = 0;
+        for (int e = 0; e < foot->elements; e++) wrong |= remembered[e] > 0;
+        for (int k = 0; k < foot->active; k++) wrong |= set[k];
+        if (!wrong) return;
     }
-    if (one && wrong == 0) return;
-    for (int k = 0; k < foot->active; k++) {
-        int i = foot->start + k, e = foot->element[k], m = memory->material[e];
+    for (int i = 0; i < foot->active; i++) {
+        int e = foot->element[i], m = memory->material[e];
         if (m < 0 || (m & 0xff) >= count || (m >> 8 & 0xff) >= count)
             m = terrain_mixture(terrain, foot->point_x[e], foot->point_y[e]);
-        if (scratch->slot_material[i] == m) continue;
-        scratch->slot_material[i] = m;
+        if (foot->slot_material[i] == m) continue;
+        foot->slot_material[i] = m;
         if (m <= 0xff)
-            slot_set_law(&scratch->slot, i, &scratch->derived[f][m].law, &terrain->materials[m]);
+            slot_set_law(&foot->slot, i, &foot->derived[m].law, &terrain->materials[m]);
         else
-            slot_set_mixture(&scratch->slot, i, scratch->derived[f], m);
+            slot_set_mixture(&foot->slot, i, foot->derived, m);
     }
 }
 
-static void slots_gather(MildScratch *scratch, const Memory *memory, const double *R, int f) {
-    const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &scratch->slot;
-    double cx = R[2] * foot->z, cy = R[5] * foot->z, cz = R[8] * foot->z;
-#pragma omp simd
-    for (int k = 0; k < foot->active; k++) {
-        int i = foot->start + k, e = foot->element[k];
-        double x = foot->x[e], y = foot->y[e];
-        s->px[i] = cx + R[0] * x + R[1] * y;
-        s->py[i] = cy + R[3] * x + R[4] * y;
-        s->pz[i] = cz + R[6] * x + R[7] * y;
-        s->depth[i] = foot->depth[e];
-        s->depth_max[i] = memory->depth_max[e];
-        s->middle[i] = memory->middle[e];
-        s->front_speed[i] = memory->front_speed[e];
-        s->drift[i] = memory->drift[e];
-    }
-    for (int i = foot->start + foot->active; i < foot_end(foot); i++) {
-        s->px[i] = s->py[i] = s->pz[i] = 0.0;
-        s->depth[i] = -1e3; /* never reaches the ground */
-        s->depth_max[i] = s->middle[i] = s->front_speed[i] = s->drift[i] = 0.0;
-        s->ix[i] = s->iy[i] = s->iz[i] = 0.0;
-    }
+/* All elements are listed, on level ground without prints: their numbers are read where they lie. */
+static void slots_direct(FootScratch *foot, const Memory *memory) {
+    Slots *s = &foot->slot;
+    s->x = foot->x;
+    s->y = foot->y;
+    s->depth = foot->depth;
+    slots_remember(s, memory);
 }
 
-/* Uneven ground under the slots. The step takes the ground under an element for its tangent plane there. Where the ground
+/* The list's elements side by side. */
+static void slots_gather(FootScratch *foot, const Memory *memory) {
+    Slots from = foot->own, *s = &foot->slot;
+    from.x = foot->x;
+    from.y = foot->y;
+    from.depth = foot->depth;
+    slots_remember(&from, memory);
+    *s = foot->own;
+    const double *const all[] = {from.x, from.y, from.depth, from.depth_max, from.remembered_middle, from.remembered_speed,
+                                 from.drift, from.pending_x, from.pending_y, from.held_x, from.held_y, from.held_grip};
+    double *const listed[] = {s->x, s->y, s->depth, s->depth_max, s->remembered_middle, s->remembered_speed,
+                              s->drift, s->pending_x, s->pending_y, s->held_x, s->held_y, s->held_grip};
+    int end = foot_end(foot), active = foot->active;
+    for (size_t a = 0; a < sizeof all / sizeof *all; a++) {
+        for (int i = 0; i < active; i++) listed[a][i] = all[a][foot->element[i]];
+        for (int i = active; i < end; i++) listed[a][i] = 0.0;
+    }
+    for (int i = active; i < end; i++) s->depth[i] = PREPARE_NEVER;
+}
+
+/* Uneven ground under the slots; before: it was uneven in the last step, too. The step takes the ground under an element for its tangent plane there. Where the ground
  * rises faster, the element would find itself deeper without having been pressed down, with energy from nowhere; so an
  * element goes on from the depth that the last step's plane gives, if that is less, as long as it stays in the ground. */
-static void slots_uneven(const MildScratch *scratch, const MildGround *ground, const Memory *memory, double height, int f) {
-    const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &scratch->slot;
-    for (int k = 0; k < foot->active; k++) {
-        int i = foot->start + k, e = foot->element[k], m = memory->material[e];
+static void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory, double height) {
+    const Slots *s = &foot->slot;
+    for (int i = 0; i < foot->active; i++) {
+        int e = foot->element[i], m = memory->material[e];
         s->slope_x[i] = foot->slope_x[e];
         s->slope_y[i] = foot->slope_y[e];
-        if (!ground->uneven[f] || m == MATERIAL_NONE || (m == MATERIAL_FREE && s->depth[i] <= 0.0)) continue;
+        if (!before || m == MATERIAL_NONE || (m == MATERIAL_FREE && s->depth[i] <= 0.0)) continue;
         double plane = height + memory->plane[e] + memory->slope_x[e] * foot->point_x[e] +
                        memory->slope_y[e] * foot->point_y[e] - foot->point_z[e];
         s->depth[i] = step_min(s->depth[i], plane);
     }
-    for (int i = foot->start + foot->active; i < foot_end(foot); i++) s->slope_x[i] = s->slope_y[i] = 0.0;
+    for (int i = foot->active; i < foot_end(foot); i++) s->slope_x[i] = s->slope_y[i] = 0.0;
 }
 
 /* An element that carries nothing finds what the ground under it remembers. Below h0, in a print, it takes at least the
  * depth whose unloading line ends where it is, so that moving sideways in a print never loads it. */
-static void slots_prints(const MildScratch *scratch, const Prints *prints, const Memory *memory, const double *R, int f) {
-    const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &scratch->slot;
-    for (int k = 0; k < foot->active; k++) {
-        int i = foot->start + k, e = foot->element[k], m = memory->material[e];
+static void slots_prints(const FootScratch *foot, const Prints *prints, const Memory *memory, const double *R) {
+    const Slots *s = &foot->slot;
+    for (int i = 0; i < foot->active; i++) {
+        int e = foot->element[i], m = memory->material[e];
         double lasting = 1.0 - s->recovery[i], m0 = memory->middle[e];
         if (m >= 0 || !(lasting > 0.0)) continue;
         double found = prints_read(prints, &(PrintElement){foot->point_x[e], foot->point_y[e], foot->pitch, R});
@@ -192,24 +210,26 @@ static void slots_prints(const MildScratch *scratch, const Prints *prints, const
 }
 
 /* Slopes of a foot that has left uneven ground; level ground is not to pay for them. */
-static void slots_level(const MildScratch *scratch, const FootScratch *foot) {
+static void slots_level(const FootScratch *foot) {
     size_t bytes = (size_t)foot->padded * sizeof(double);
-    memset(scratch->slot.slope_x + foot->start, 0, bytes);
-    memset(scratch->slot.slope_y + foot->start, 0, bytes);
+    memset(foot->own.slope_x, 0, bytes);
+    memset(foot->own.slope_y, 0, bytes);
 }
 
 /* Everything of step.h that does not depend on the new velocity. The unloading line runs from (a, F_g(a)) to zero force
  * after recovery * a, but not within CONTACT_ELASTIC. It is never flatter than the loading curve at a, and so never above
  * it: a concave curve lies above its chords, a convex one above its tangent; in the bed the steepest slope is taken. */
-static inline void slots_prepare(const Slots *s, int start, int end, double dt, const double *now, const double *free,
+ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, const Motion *now, const Motion *free,
                                  int uneven) {
+    const Slots local = *slot, *s = &local;
     double rate = 1.0 / dt;
+    const double now0 = now->z[0], now1 = now->z[1], now2 = now->z[2], free0 = free->z[0], free1 = free->z[1], free2 = free->z[2];
 #pragma omp simd
-    for (int i = start; i < end; i++) {
-        double py = s->py[i], px = s->px[i], u0 = s->depth[i], used = s->depth_max[i];
-        double w_now = uneven ? slot_descent(s, i, now) : now[4] * px - now[3] * py - now[2];
-        double w_free = uneven ? slot_descent(s, i, free) : free[4] * px - free[3] * py - free[2];
-        double m0 = s->middle[i] > 0.0 ? s->middle[i] : u0 - 0.5 * dt * w_now, a = step_max(step_max(m0, used), 0.0);
+    for (int i = 0; i < end; i++) {
+        double u0 = s->depth[i], used = s->depth_max[i];
+        double w_now = uneven ? slot_descent(s, i, now) : -(now0 + now1 * s->x[i] + now2 * s->y[i]);
+        double w_free = uneven ? slot_descent(s, i, free) : -(free0 + free1 * s->x[i] + free2 * s->y[i]);
+        double old = s->remembered_middle[i], m0 = old > 0.0 ? old : u0 - 0.5 * dt * w_now, a = step_max(step_max(m0, used), 0.0);
         double c0 = step_max(1.0 - a * s->inverse_full[i], 0.0), flat_share = s->full[i] * (1.0 / 3.0) * (1.0 - c0 * c0 * c0);
         double in_bed = a - s->bed[i], bed_stiffness = s->bed_stiffness[i], bed = in_bed > 0.0 ? bed_stiffness : 0.0;
         double force = s->flat[i] * flat_share + s->cone[i] * a + bed * in_bed;
@@ -224,7 +244,7 @@ static inline void slots_prepare(const Slots *s, int start, int end, double dt, 
         s->stretch[i] = step_max(m0 - slack, 0.0);
         double speed = step_max(w_now, 0.0), reach = step_max(2.0 * (a - u0) * rate, 0.0), added = s->mass_rate[i] * flat_share;
         s->reach[i] = reach;
-        s->front_speed[i] = step_max(s->front_speed[i], reach);
+        s->front_speed[i] = step_max(s->remembered_speed[i], reach);
         s->speed[i] = speed;
         s->mass[i] = step_max(added, 0.0);
         double drag = step_max(s->drag[i], 0.0), mass_rate = step_max(s->mass_rate[i], 0.0);
@@ -236,30 +256,40 @@ static inline void slots_prepare(const Slots *s, int start, int end, double dt, 
                                  (step_min(added, 0.0) * (w_free - s->front_speed[i]) + pull * c0 * c0 * dt * speed * speed);
         s->drift_radius[i] = dt * s->k_drift[i] * s->drift[i] * step_max(u0, 0.0);
         s->damping[i] = dt * s->b_drift[i] * inside;
+        slot_grip(s, i, dt, force);
     }
+}
+
+static void foot_prepare(FootScratch *foot, const MildGround *ground, int f, const MildTerrain *terrain, const MildContactInput *input) {
+    const Memory memory = ground_memory(ground, f);
+    const double *R = input->rotation[f];
+    foot_laws(foot, terrain);
+    if (foot->active == foot->elements && !foot->uneven && ground->tiles == 0)
+        slots_direct(foot, &memory);
+    else
+        slots_gather(foot, &memory);
+    slots_materials(foot, terrain, &memory);
+    if (foot->uneven) slots_uneven(foot, ground->uneven[f], &memory, terrain->height);
+    if (ground->tiles > 0) {
+        Prints prints = ground_prints(ground);
+        slots_prints(foot, &prints, &memory, R);
+    }
+    Motion now = foot_motion(foot, input->velocity[f]), free = foot_motion(foot, input->free_velocity + 6 * f);
+    if (foot->uneven)
+        slots_prepare(&foot->slot, foot_end(foot), input->dt, &now, &free, 1);
+    else
+        slots_prepare(&foot->slot, foot_end(foot), input->dt, &now, &free, 0);
+    slots_resist(foot, terrain, input->dt, R, &now);
 }
 
 int contact_prepare(const MildGround *ground, const MildTerrain *terrain, const MildContactInput *input, MildScratch *scratch) {
     int total = 0;
-    Prints prints = ground_prints(ground);
     for (int f = 0; f < scratch->feet; f++) {
         FootScratch *foot = &scratch->foot[f];
-        const double *now = input->velocity[f], *free = input->free_velocity + 6 * f, *R = input->rotation[f];
-        if (foot->uneven && terrain_is_level(terrain)) slots_level(scratch, foot);
-        foot_place(foot, terrain, input->position[f], R);
+        if (foot->uneven && terrain_is_level(terrain)) slots_level(foot);
+        foot_place(foot, terrain, ground->tiles > 0, input->position[f], input->rotation[f]);
         foot_list(foot, input, foot->uneven ? terrain_steepest(terrain) : 0.0, f);
-        if (foot->active == 0) continue;
-        Memory memory = ground_memory(ground, f);
-        foot_laws(scratch, terrain, f);
-        slots_materials(scratch, terrain, &memory, f);
-        slots_gather(scratch, &memory, R, f);
-        if (foot->uneven) slots_uneven(scratch, ground, &memory, terrain->height, f);
-        if (ground->tiles > 0) slots_prints(scratch, &prints, &memory, R, f);
-        if (foot->uneven)
-            slots_prepare(&scratch->slot, foot->start, foot_end(foot), input->dt, now, free, 1);
-        else
-            slots_prepare(&scratch->slot, foot->start, foot_end(foot), input->dt, now, free, 0);
-        slots_resist(scratch, terrain, f, input->dt, R, now);
+        if (foot->active > 0) foot_prepare(foot, ground, f, terrain, input);
         total += foot->active;
     }
     return total;

@@ -16,7 +16,7 @@
  * line, at `front`, before it gets to the depth `deep` that it remembers: travel (1 - share) deeper. */
 #include "ground/resist.h"
 
-#include "ground/step.h"
+#include "ground/friction.h"
 
 #define RESIST_REST 1e-3  /* [m/s] */
 #define RESIST_PEAK 1.08  /* greatest alpha_z of both theories: 1 (2D, level, straight down), 1.076 (3D, 27 degrees) */
@@ -100,6 +100,7 @@ static void slot_resist(const Slots *s, int i, double dt, double sideways, doubl
     s->front[i] = slack + (share * peak * deep + bed * in_bed) / line;
     s->reach[i] = step_max(2.0 * (s->front[i] - u0) / dt, 0.0);
     s->drift_radius[i] += dt * level * step_max(sideways, 0.0) * step_max(u0, 0.0);
+    slot_grip(s, i, dt, share * peak * deep + bed * in_bed);
 }
 
 static int any_resistive(const MildTerrain *terrain) {
@@ -108,19 +109,17 @@ static int any_resistive(const MildTerrain *terrain) {
     return any;
 }
 
-void slots_resist(MildScratch *scratch, const MildTerrain *terrain, int f, double dt, const double *rotation,
-                  const double *twist) {
+void slots_resist(const FootScratch *foot, const MildTerrain *terrain, double dt, const double *rotation, const Motion *now) {
     if (!any_resistive(terrain)) return;
-    const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &scratch->slot;
+    const Slots *s = &foot->slot;
     double side = rotation[8] > 0.0 ? -1.0 : 1.0; /* of the sole's two faces the one that looks down */
     const double normal[3] = {side * rotation[2], side * rotation[5], step_min(side * rotation[8], -1e-6)};
-    for (int k = 0; k < foot->active; k++) {
-        int i = foot->start + k, model = terrain->materials[scratch->slot_material[i] & 0xff].model; /* the nearer one's */
+    for (int i = 0; i < foot->active; i++) {
+        int model = terrain->materials[foot->slot_material[i] & 0xff].model; /* the nearer one's */
         if (!model_is_resistive(model) || s->flat[i] != 0.0) continue; /* blended with a cone: as a level plate */
-        double px = s->px[i], py = s->py[i], pz = s->pz[i], down[2], level[2];
-        Way way = element_way(twist[0] + twist[4] * pz - twist[5] * py, twist[1] + twist[5] * px - twist[3] * pz,
-                              slot_descent(s, i, twist), normal);
+        double x = s->x[i], y = s->y[i], down[2], level[2];
+        Way way = element_way(motion_at(now->x, x, y), motion_at(now->y, x, y), slot_descent(s, i, now), normal);
+        if (way.speed * FRICTION_LAG < 1.0) way.speed = 0.0; /* friction may hold it yet */
         way_alpha(model, &way, normal, way.speed, way.down + RESIST_REST, down);
         way_alpha(model, &way, normal, way.speed + RESIST_REST, way.down, level);
         slot_resist(s, i, dt, level[0], down[1]);

@@ -9,8 +9,7 @@ static inline int model_is_resistive(int model) {
 }
 
 /* After slots_prepare: the law of the foot's resistive slots for the way they move at the start of the step. rotation: of
- * the foot; twist: now. */
-void slots_resist(MildScratch *scratch, const MildTerrain *terrain, int f, double dt, const double *rotation,
-                  const double *twist);
+ * the foot; now: how it moves. */
+void slots_resist(const FootScratch *foot, const MildTerrain *terrain, double dt, const double *rotation, const Motion *now);
 
 #endif

@@ -15,7 +15,7 @@ static double *take(double **at, int count) {
     return taken;
 }
 
-static void foot_set(FootScratch *foot, const MildSole *sole, double **at, int32_t *element) {
+static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     foot->elements = mild_sole_elements(sole);
     foot->padded = padded(sole);
     foot->z = mild_sole_z(sole);
@@ -42,7 +42,6 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at, int32
     foot->slope_y = take(at, foot->padded);
     foot->state = (uint8_t *)take(at, foot->padded);
     foot->slip = foot->state + foot->padded;
-    foot->element = element;
 }
 
 MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildError *error) {
@@ -65,19 +64,18 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     memset(block, 0, bytes);
     scratch->feet = feet;
     scratch->block = block;
-    double *at = block, **arrays[SLOT_ARRAYS];
-    for (size_t k = 0; k < SLOT_ARRAYS; k++) {
-        arrays[k] = (double **)&scratch->slot + k;
-        *arrays[k] = take(&at, slots);
-    }
+    double *at = block;
     int32_t *integers = (int32_t *)(block + doubles);
-    scratch->slot_material = integers;
-    for (int i = 0; i < slots; i++) scratch->slot_material[i] = -1;
-    int32_t *element = integers + slots;
     for (int f = 0; f < feet; f++) {
-        foot_set(&scratch->foot[f], soles[f], &at, element);
-        scratch->foot[f].start = (int)(element - integers) - slots;
-        element += scratch->foot[f].padded;
+        FootScratch *foot = &scratch->foot[f];
+        foot_set(foot, soles[f], &at);
+        double **arrays = (double **)&foot->own;
+        for (size_t k = 0; k < SLOT_ARRAYS; k++) arrays[k] = take(&at, foot->padded);
+        foot->slot = foot->own;
+        foot->element = integers;
+        foot->slot_material = integers + foot->padded;
+        for (int i = 0; i < foot->padded; i++) foot->slot_material[i] = MATERIAL_NONE;
+        integers += 2 * foot->padded;
     }
     return scratch;
 }

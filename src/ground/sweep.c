@@ -1,6 +1,6 @@
 #include <string.h>
 
-#include "ground/step.h"
+#include "ground/friction.h"
 
 #define SWEEP_TOLERANCE 1e-10
 #define SWEEP_LIMIT 1000
@@ -45,24 +45,26 @@ static double element_normal(const Slots *s, int i, double dt, double w, double 
     return fmax(s->iz[i] + (target - s->iz[i]) / (1.0 + G * slope), 0.0);
 }
 
-/* Paper eq 13: predict, correct by the continuity error, project on the friction disc. The stick region of width eps
- * adds the compliance eps/r, so that the fixed point is the law of foot_tangent in pass.c. */
+/* Paper eq 13: predict, correct by the continuity error, project on the friction disc. Where friction.h's t holds, the law
+ * is v = (dt f - I)/(dt^2 k + c), a compliance beside G; where it does not, I has the direction of t at any scale. */
 static void element_friction(const Slots *s, int i, const double *v, const double *delta, double G) {
-    double radius = s->mu[i] * s->iz[i] + s->drift_radius[i];
-    double compliance = radius > 0.0 ? CONTACT_SLIP_SPEED / radius : 0.0;
-    double beta = 0.5 / (G + compliance), gamma = 0.1 * beta;
-    double x = s->fx[i] - gamma * delta[0] - beta * (v[0] + compliance * s->fx[i]);
-    double y = s->fy[i] - gamma * delta[1] - beta * (v[1] + compliance * s->fy[i]);
+    double radius = s->mu[i] * s->iz[i] + s->drift_radius[i], stiff = s->grip[i] + FRICTION_LAG * radius;
+    double compliance = stiff > 0.0 ? 1.0 / stiff : 0.0, beta = 0.5 / (G + compliance), gamma = 0.1 * beta;
+    double x = s->fx[i] - gamma * delta[0] - beta * (v[0] + compliance * (s->fx[i] - s->hold_x[i]));
+    double y = s->fy[i] - gamma * delta[1] - beta * (v[1] + compliance * (s->fy[i] - s->hold_y[i]));
     double length = sqrt(x * x + y * y), scale = length > radius ? radius / length : 1.0;
     s->fx[i] = x * scale;
     s->fy[i] = y * scale;
 }
 
 /* One line of the inner loop of Algorithm 1; the change of impulse acts at once. */
-static void sweep_element(Sweep *sweep, const Slots *s, int f, int i) {
-    const double *V = sweep->twist + 6 * f, p[3] = {s->px[i], s->py[i], s->pz[i]};
+static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
+    const Slots *s = &foot->slot;
+    const double *V = sweep->twist + 6 * f;
+    double p[3];
+    slot_arm(foot, s, i, p);
     double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]}, v[2] = {V[0] + turn[0], V[1] + turn[1]};
-    double w = slot_descent(s, i, V), delta[2] = {0.0, 0.0}, G[3];
+    double w = s->slope_x[i] * v[0] + s->slope_y[i] * v[1] - (V[2] + V[3] * p[1] - V[4] * p[0]), delta[2] = {0.0, 0.0}, G[3];
     /* Paper eqs 11, 12 with v_i - v_j - omega x (p_i - p_j) as a vector. */
     for (int k = 0; k < 2; k++) {
         if (sweep->preceding[f] > 0) delta[k] = v[k] - turn[k] - sweep->before[f][k] / sweep->preceding[f];
@@ -84,15 +86,16 @@ static void sweep_element(Sweep *sweep, const Slots *s, int f, int i) {
 
 /* Start: I_xy = 0, I_z = dt F_GM at the present velocity. */
 static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInput *input) {
-    const Slots *s = &scratch->slot;
     memcpy(sweep->twist, input->free_velocity, (size_t)sweep->n * sizeof(double));
     for (int f = 0; f < scratch->feet; f++) {
-        const double *V = input->velocity[f];
-        for (int i = scratch->foot[f].start; i < scratch->foot[f].start + scratch->foot[f].active; i++) {
-            const double p[3] = {s->px[i], s->py[i], s->pz[i]};
-            double slope;
+        const FootScratch *foot = &scratch->foot[f];
+        const Slots *s = &foot->slot;
+        const Motion motion = foot_motion(foot, input->velocity[f]);
+        for (int i = 0; i < scratch->foot[f].active; i++) {
+            double slope, p[3];
+            slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
-            step_normal(s, i, input->dt, slot_descent(s, i, V), &s->iz[i], &slope);
+            step_normal(s, i, input->dt, slot_descent(s, i, &motion), &s->iz[i], &slope);
             s->ix[i] = -s->slope_x[i] * s->iz[i];
             s->iy[i] = -s->slope_y[i] * s->iz[i];
             sweep_apply(sweep, f, p, (const double[3]){s->ix[i], s->iy[i], s->iz[i]});
@@ -102,17 +105,19 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
 
 /* Sum of B^T I over the slots as they stand. */
 static void sweep_wrench(const MildScratch *scratch, double *wrench) {
-    const Slots *s = &scratch->slot;
     memset(wrench, 0, TWIST_MAX * sizeof *wrench);
     for (int f = 0; f < scratch->feet; f++) {
+        const Slots *s = &scratch->foot[f].slot;
         double *W = wrench + 6 * f;
-        for (int i = scratch->foot[f].start; i < scratch->foot[f].start + scratch->foot[f].active; i++) {
+        for (int i = 0; i < scratch->foot[f].active; i++) {
+            double p[3];
+            slot_arm(&scratch->foot[f], s, i, p);
             W[0] += s->ix[i];
             W[1] += s->iy[i];
             W[2] += s->iz[i];
-            W[3] += s->py[i] * s->iz[i] - s->pz[i] * s->iy[i];
-            W[4] += s->pz[i] * s->ix[i] - s->px[i] * s->iz[i];
-            W[5] += s->px[i] * s->iy[i] - s->py[i] * s->ix[i];
+            W[3] += p[1] * s->iz[i] - p[2] * s->iy[i];
+            W[4] += p[2] * s->ix[i] - p[0] * s->iz[i];
+            W[5] += p[0] * s->iy[i] - p[1] * s->ix[i];
         }
     }
 }
@@ -131,8 +136,8 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
         memset(sweep.before, 0, sizeof sweep.before);
         memset(sweep.preceding, 0, sizeof sweep.preceding);
         for (int f = 0; f < scratch->feet; f++)
-            for (int i = scratch->foot[f].start; i < scratch->foot[f].start + scratch->foot[f].active; i++)
-                sweep_element(&sweep, &scratch->slot, f, i);
+            for (int i = 0; i < scratch->foot[f].active; i++)
+                sweep_element(&sweep, &scratch->foot[f], f, i);
         sweep_wrench(scratch, wrench);
         change = contact_residual(sweep.n, sweep.A, before, wrench);
         scale = contact_residual(sweep.n, sweep.A, wrench, zero);

@@ -1,11 +1,9 @@
 #include "dense.h"
 
 #include "ground/contact.h"
-#include "ground/step.h" /* STEP_LAG */
+#include "ground/friction.h" /* its constants and STEP_LAG */
 
-#define DENSE_WIDE 0.1     /* [m/s] first stick region */
-#define DENSE_NARROW 0.5   /* each is that much narrower */
-#define DENSE_STEPS 60     /* of Newton's method in one region */
+#define DENSE_STEPS 200    /* of Newton's method at given bounds */
 #define DENSE_ROUNDS 3000
 #define DENSE_SMALL 1e-12  /* relative motion at which a method rests */
 #define DENSE_JACOBI 60
@@ -168,6 +166,7 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
     DenseLaw *law = &e->law;
     double tilt = hypot(n[0], n[1]), heading[2] = {v[0], v[1]}, level = hypot(v[0], v[1]), down = fmax(w, 0.0), x[2], z[2];
     for (int k = 0; k < 2 && tilt > 0.0; k++) heading[k] += DENSE_REST * n[k] / tilt;
+    if (level * STEP_LAG < FRICTION_ELASTIC) level = 0.0; /* friction may hold it yet */
     double length = hypot(heading[0], heading[1]), strength = law->kappa;
     for (int k = 0; k < 2 && length > 0.0; k++) heading[k] /= length;
     resist_alpha(model, n, heading, level + DENSE_REST, down, x);
@@ -188,6 +187,14 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
 }
 
 /* ---- what an element finds and remembers ---- */
+
+/* What friction holds: k from the bound at the front's yield force; the force held falls where k has fallen. */
+static void element_hold(double dt, DenseElement *e, double x, double y, double old) {
+    double k = (e->law.mu * e->line * (e->front - e->slack) + e->radius / dt) / FRICTION_ELASTIC, keeps = k < old ? k / old : 1.0;
+    e->grip = dt * dt * k;
+    e->hold[0] = dt * keeps * x;
+    e->hold[1] = dt * keeps * y;
+}
 
 /* A foot of the kit, and of the element in hand its place in the world. */
 typedef struct {
@@ -273,6 +280,7 @@ static void dense_element(Dense *d, const Find *find) {
                     fmin(e->law.drag_rate, 0.0) * cone_flat(&e->law, e->deep) * d->dt * e->w0 * e->w0;
     element_line(e);
     if (model >= 0) element_resist(d->dt, e, model, find->normal, now, now[3]);
+    element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->grip[i]);
 }
 
 static void dense_foot(Dense *d, const Kit *kit, int f) {
@@ -311,7 +319,7 @@ static void element_velocity(const Dense *d, const DenseElement *e, const double
 
 /* Gradient y - sum C^T I and, if wanted, the Hessian 1 + sum C^T K C; the normal law's slope by difference. The normal
  * impulse acts along -grad u: its power is -I_z du/dt, so its row of C is minus that of du/dt. */
-static void dense_gradient(const Dense *d, const double *y, double eps, double *g, double H[12][12]) {
+static void dense_gradient(const Dense *d, const double *y, double *g, double H[12][12]) {
     int n = d->rank;
     memcpy(g, y, 12 * sizeof *g);
     for (int r = 0; H && r < n; r++)
@@ -320,14 +328,15 @@ static void dense_gradient(const Dense *d, const double *y, double eps, double *
         const DenseElement *e = &d->element[i];
         double v[4];
         element_velocity(d, e, y, v);
-        double speed = hypot(v[0], v[1]), pull = d->bound[i] / fmax(speed, eps), drag = pull + e->damping;
-        const double I[3] = {-drag * v[0], -drag * v[1], law_normal(d->dt, e, v[3])};
+        double r = d->bound[i], along = e->grip + r * STEP_LAG / FRICTION_ELASTIC;
+        double tx = e->hold[0] - along * v[0], ty = e->hold[1] - along * v[1], t = hypot(tx, ty), share = t > r ? r / t : 1.0;
+        const double I[3] = {share * tx - e->damping * v[0], share * ty - e->damping * v[1], law_normal(d->dt, e, v[3])};
         for (int c = 0; c < n; c++) g[c] -= e->C[0][c] * I[0] + e->C[1][c] * I[1] - e->C[3][c] * I[2];
         if (!H) continue;
         double h = 1e-7, stiff = (law_normal(d->dt, e, v[3] + h) - law_normal(d->dt, e, v[3] - h)) / (2.0 * h);
-        double nx = speed > eps ? v[0] / speed : 0.0, ny = speed > eps ? v[1] / speed : 0.0;
-        double xx = drag - pull * nx * nx, xy = -pull * nx * ny, yy = drag - pull * ny * ny;
-        if (drag == 0.0 && stiff == 0.0) continue;
+        double nx = t > r ? tx / t : 0.0, ny = t > r ? ty / t : 0.0, pull = share * along;
+        double xx = e->damping + pull * (1.0 - nx * nx), xy = -pull * nx * ny, yy = e->damping + pull * (1.0 - ny * ny);
+        if (xx + yy == 0.0 && stiff == 0.0) continue;
         for (int r = 0; r < n; r++) {
             double X = xx * e->C[0][r] + xy * e->C[1][r], Y = xy * e->C[0][r] + yy * e->C[1][r], W = stiff * e->C[3][r];
             for (int c = 0; c <= r; c++) H[r][c] += X * e->C[0][c] + Y * e->C[1][c] + W * e->C[3][c];
@@ -363,47 +372,40 @@ static double dot(int n, const double *a, const double *b) {
 }
 
 /* Slope of the function along the line, at y + t x. */
-static double dense_along(const Dense *d, const double *y, const double *x, double eps, double t) {
+static double dense_along(const Dense *d, const double *y, const double *x, double t) {
     double at[12] = {0}, g[12];
     for (int i = 0; i < d->rank; i++) at[i] = y[i] + t * x[i];
-    dense_gradient(d, at, eps, g, NULL);
+    dense_gradient(d, at, g, NULL);
     return dot(d->rank, g, x);
 }
 
 /* Where the slope along x vanishes: the lowest point of the line. A full step is kept that nearly reaches it. */
-static double dense_line(const Dense *d, const double *y, const double *x, double eps, double slope) {
-    double low = 0.0, high = 1.0, at = dense_along(d, y, x, eps, 1.0);
+static double dense_line(const Dense *d, const double *y, const double *x, double slope) {
+    double low = 0.0, high = 1.0, at = dense_along(d, y, x, 1.0);
     if (fabs(at) <= 0.1 * fabs(slope)) return 1.0;
     for (int k = 0; k < 30 && at < 0.0; k++) {
         low = high;
         high *= 2.0;
-        at = dense_along(d, y, x, eps, high);
+        at = dense_along(d, y, x, high);
     }
     for (int k = 0; k < 40; k++) {
         double middle = 0.5 * (low + high);
-        *(dense_along(d, y, x, eps, middle) < 0.0 ? &low : &high) = middle;
+        *(dense_along(d, y, x, middle) < 0.0 ? &low : &high) = middle;
     }
     return 0.5 * (low + high);
 }
 
-/* Newton's method with an exact line search at one width of the stick region; true when it rests. */
-static int dense_region(Dense *d, double eps, double rest) {
+/* The minimum at the present bounds, by Newton's method with an exact line search; true when it rests. */
+static int dense_minimum(Dense *d) {
     for (int k = 0; k < DENSE_STEPS; k++) {
         double g[12], H[12][12], x[12] = {0};
-        dense_gradient(d, d->y, eps, g, H);
+        dense_gradient(d, d->y, g, H);
         dense_direction(d->rank, H, g, x);
-        if (dot(d->rank, x, x) <= rest * rest * dot(d->rank, d->y, d->y)) return 1;
-        double t = dense_line(d, d->y, x, eps, dot(d->rank, g, x));
+        if (dot(d->rank, x, x) <= DENSE_SMALL * DENSE_SMALL * dot(d->rank, d->y, d->y)) return 1;
+        double t = dense_line(d, d->y, x, dot(d->rank, g, x));
         for (int i = 0; i < d->rank; i++) d->y[i] += t * x[i];
     }
     return 0;
-}
-
-/* The minimum at the present bounds. */
-static int dense_minimum(Dense *d) {
-    if (dense_region(d, CONTACT_SLIP_SPEED, DENSE_SMALL)) return 1;
-    for (double eps = DENSE_WIDE; eps > CONTACT_SLIP_SPEED; eps *= DENSE_NARROW) dense_region(d, eps, 1e-6);
-    return dense_region(d, CONTACT_SLIP_SPEED, DENSE_SMALL);
 }
 
 /* Moves every bound by a share of the way to what the normal impulses ask for. */

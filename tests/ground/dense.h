@@ -2,8 +2,8 @@
  *
  * A = L L^T makes V = V^ + L y of every twist that impulses can reach, whatever the rank of A. With the bounds r of friction
  * held, the step is the minimum over y of a convex function,
- *     1/2 |y|^2 + sum over elements of  integral of -I_z dw  + r huber(|v|) + dt b_D |v|^2/2,
- * and |y - y*| <= |gradient|: a minimum found is the minimum. The bounds r = mu I_z + dt k_D d_D u then follow the normal
+ *     1/2 |y|^2 + sum over elements of  integral of -I_z dw  + (|t|^2 - max(|t| - r, 0)^2)/(2 k) + dt b_D |v|^2/2
+ * with t = hold - k v, k = grip + r STEP_LAG/FRICTION_ELASTIC,  |y - y*| <= |gradient|: a minimum found is the minimum. The bounds r = mu I_z + dt k_D d_D u then follow the normal
  * impulses, again and again, until nothing moves.
  *
  * Shared with the library: its constants and what it remembers between steps. */
@@ -30,6 +30,7 @@ typedef struct {
     double line, slack;                         /* [N/m], [m] */
     double mass, active;                        /* [kg] m_a(a); [N s] what parameters that create energy give, explicitly */
     double radius, damping;                     /* [N s], [kg] */
+    double hold[2], grip;                       /* [N s], [kg] friction that is held, see src/ground/friction.h */
     double free[4], C[4][12];                   /* velocity and du/dt at y = 0, and their change by y */
 } DenseElement;
 
