@@ -39,7 +39,7 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
 /* What is summed over the loaded elements. */
 static void foot_loaded(const MildScratch *scratch, const double *position, int f, MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
-    const Slots *s = &foot->slot;
+    const Slots local = foot->slot, *s = &local;
     double sum = 0.0, deepest = 0.0, loaded = 0.0, force = 0.0, x = 0.0, y = 0.0;
     int end = foot_end(foot);
 #pragma omp simd reduction(+ : sum, loaded, force, x, y) reduction(max : deepest)

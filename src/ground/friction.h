@@ -17,9 +17,9 @@
 #define FRICTION_ELASTIC 2e-5                      /* [m] */
 #define FRICTION_LAG (STEP_LAG / FRICTION_ELASTIC) /* [s/m] c/r: without a force held, friction reaches its bound at 4 mm/s */
 
-/* What holds the element at rest: k from the bound at the front's yield force [N]. */
-static inline void slot_grip(const Slots *s, int i, double dt, double yield) {
-    double k = (s->mu[i] * yield + s->drift_radius[i] / dt) * (1.0 / FRICTION_ELASTIC), old = s->held_grip[i];
+/* What holds the element at rest: k from the bound at the front's yield force [N]; rate = 1/dt. */
+static inline void slot_grip(const Slots *s, int i, double dt, double rate, double yield) {
+    double k = (s->mu[i] * yield + s->drift_radius[i] * rate) * (1.0 / FRICTION_ELASTIC), old = s->held_grip[i];
     double keeps = k < old ? k / old : 1.0;
     s->grip[i] = dt * dt * k;
     s->hold_x[i] = dt * keeps * s->held_x[i];

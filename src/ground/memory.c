@@ -184,17 +184,17 @@ static int foot_advance_all(const Advance *a, const Memory *all, const int32_t *
     const Memory own = *all, *memory = &own;
     const Motion m = a->motion;
     double dt = a->dt, rate = 1.0 / dt, touched = 0.0;
-    int elements = foot->elements;
+    int end = foot->padded; /* the padding lies in the air */
     int32_t *remembered = memory->material;
 #pragma omp simd reduction(+ : touched)
-    for (int i = 0; i < elements; i++) {
+    for (int i = 0; i < end; i++) {
         double x = s->x[i], y = s->y[i], w = -(m.z[0] + m.z[1] * x + m.z[2] * y), m1 = s->depth[i] + 0.5 * dt * w;
         double stays = m1 > 0.0 ? 1.0 : 0.0;
         element_advance(s, memory, i, i, dt, rate, m.x[0] + m.x[1] * x + m.x[2] * y, m.y[0] + m.y[1] * x + m.y[2] * y, w, m1, stays);
         touched += stays;
     }
     const double *depth_max = memory->depth_max;
-    for (int e = 0; e < elements; e++) remembered[e] = depth_max[e] > 0.0 ? material[e] : MATERIAL_NONE;
+    for (int e = 0; e < end; e++) remembered[e] = depth_max[e] > 0.0 ? material[e] : MATERIAL_NONE;
     return (int)touched;
 }
 

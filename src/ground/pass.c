@@ -2,27 +2,40 @@
 
 #include "ground/friction.h"
 
-/* Impulses at every slot of a foot and minus their derivatives by the element's velocity, branch-free, so that it runs in
- * vectors. Where the ground is not level the normal impulse is I_z g, g = (-slope, 1): the gradient of -u, so that it does work
- * exactly where u changes; its vertical part is the paper's. With f = -d friction/dv, k = -dI_z/dw and c = g + d friction/dI_z
+/* The passes over a foot's slots are branch-free, so that they run in vectors; and two, since one alone would be a chain of
+ * operations too long for the processor to work on several vectors at once. */
+
+/* Normal impulses and their derivatives. */
+ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven) {
+    const Slots local = *slot, *s = &local;
+    const Motion v = *m;
+#pragma omp simd
+    for (int i = 0; i < end; i++) {
+        double w = uneven ? slot_descent(s, i, &v) : -(v.z[0] + v.z[1] * s->x[i] + v.z[2] * s->y[i]), iz, k;
+        step_normal(s, i, dt, w, &iz, &k);
+        s->iz[i] = iz;
+        s->hzz[i] = k;
+    }
+}
+
+/* Friction, and all that is summed. Where the ground is not level the normal impulse is I_z g, g = (-slope, 1): the gradient of
+ * -u, so that it does work exactly where u changes; its vertical part is the paper's. With f = -d friction/dv, k = -dI_z/dw and
+ * c = g + d friction/dI_z
  *     h = -dI/dv = f + k c g^T.
  * sums: of I, x I and y I. held: the bounds of friction are. */
-ALWAYS_INLINE void foot_pass(const Slots *slot, int end, double dt, const Motion *m, int uneven, int held, double sums[9]) {
+ALWAYS_INLINE void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held, double sums[9]) {
     const Slots local = *slot, *s = &local;
     const double x0 = m->x[0], x1 = m->x[1], x2 = m->x[2], y0 = m->y[0], y1 = m->y[1], y2 = m->y[2];
-    const double z0 = m->z[0], z1 = m->z[1], z2 = m->z[2];
     double f0 = 0.0, f1 = 0.0, f2 = 0.0, a0 = 0.0, a1 = 0.0, a2 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0;
 #pragma omp simd reduction(+ : f0, f1, f2, a0, a1, a2, b0, b1, b2)
     for (int i = 0; i < end; i++) {
-        double x = s->x[i], y = s->y[i], vx = x0 + x1 * x + x2 * y, vy = y0 + y1 * x + y2 * y, w = -(z0 + z1 * x + z2 * y);
-        double gx = uneven ? -s->slope_x[i] : 0.0, gy = uneven ? -s->slope_y[i] : 0.0, iz, k, ix, iy, hxz, hyz;
-        if (uneven) w -= gx * vx + gy * vy;
-        step_normal(s, i, dt, w, &iz, &k);
-        double mu = s->mu[i], bound = mu * iz + s->drift_radius[i];
-        friction_at(s, i, held ? s->bound[i] : bound, held ? 0.0 : mu, vx, vy, &ix, &iy, &hxz, &hyz);
+        double x = s->x[i], y = s->y[i], vx = x0 + x1 * x + x2 * y, vy = y0 + y1 * x + y2 * y, iz = s->iz[i], k = s->hzz[i];
+        double mu = s->mu[i], bound = held ? s->bound[i] : mu * iz + s->drift_radius[i], ix, iy, hxz, hyz;
+        friction_at(s, i, bound, held ? 0.0 : mu, vx, vy, &ix, &iy, &hxz, &hyz);
         hxz *= k;
         hyz *= k;
         if (uneven) {
+            double gx = -s->slope_x[i], gy = -s->slope_y[i];
             ix += gx * iz;
             iy += gy * iz;
             hxz += k * gx;
@@ -36,8 +49,6 @@ ALWAYS_INLINE void foot_pass(const Slots *slot, int end, double dt, const Motion
         }
         s->hxz[i] = hxz;
         s->hyz[i] = hyz;
-        s->hzz[i] = k;
-        s->iz[i] = iz;
         s->ix[i] = ix;
         s->iy[i] = iy;
         f0 += ix;
@@ -67,10 +78,13 @@ ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, in
         if (foot->active == 0) continue;
         double sums[9] = {0.0}, *wrench = scratch->wrench + 6 * f;
         Motion motion = foot_motion(foot, twist + 6 * f);
-        if (foot->uneven)
-            foot_pass(&foot->slot, foot_end(foot), dt, &motion, 1, held, sums);
-        else
-            foot_pass(&foot->slot, foot_end(foot), dt, &motion, 0, held, sums);
+        if (foot->uneven) {
+            foot_normal(&foot->slot, foot_end(foot), dt, &motion, 1);
+            foot_friction(&foot->slot, foot_end(foot), &motion, 1, held, sums);
+        } else {
+            foot_normal(&foot->slot, foot_end(foot), dt, &motion, 0);
+            foot_friction(&foot->slot, foot_end(foot), &motion, 0, held, sums);
+        }
         /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 */
         memcpy(wrench, sums, 3 * sizeof *sums);
         memset(wrench + 3, 0, 3 * sizeof *wrench);

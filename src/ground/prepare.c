@@ -41,14 +41,14 @@ static void foot_place(FootScratch *foot, const MildTerrain *terrain, int prints
     if (foot->uneven || prints || !terrain_is_uniform(terrain)) foot_points(foot);
     if (foot->uneven) {
         foot_surface(foot, terrain);
-        return;
-    }
-    const double *x = foot->x, *y = foot->y, ez = foot->arm[1][2], nz = foot->arm[2][2];
-    const double above = terrain->height - position[2] - foot->arm[0][2];
-    double *depth = foot->depth;
+    } else {
+        const double *x = foot->x, *y = foot->y, ez = foot->arm[1][2], nz = foot->arm[2][2];
+        const double above = terrain->height - position[2] - foot->arm[0][2];
+        double *depth = foot->depth;
 #pragma omp simd
-    for (int i = 0; i < foot->padded; i++) depth[i] = above - ez * x[i] - nz * y[i];
-    for (int i = foot->elements; i < foot->padded; i++) depth[i] = PREPARE_NEVER;
+        for (int i = 0; i < foot->padded; i++) depth[i] = above - ez * x[i] - nz * y[i];
+    }
+    for (int i = foot->elements; i < foot->padded; i++) foot->depth[i] = PREPARE_NEVER;
 }
 
 /* Fastest any point of the foot can come down under twist V, or the ground come up to it. */
@@ -62,8 +62,9 @@ static void foot_list(FootScratch *foot, const MildContactInput *input, double s
     double descent = step_max(foot_descent(foot, input->velocity[f], steepest),
                               foot_descent(foot, input->free_velocity + 6 * f, steepest));
     double least = -PREPARE_MARGIN - input->dt * (descent + PREPARE_EXTRA_SPEED), near = 0.0;
+    const double *depth = foot->depth;
 #pragma omp simd reduction(+ : near)
-    for (int i = 0; i < foot->elements; i++) near += foot->depth[i] > least ? 1.0 : 0.0;
+    for (int i = 0; i < foot->padded; i++) near += depth[i] > least ? 1.0 : 0.0; /* the padding lies deep in the air */
     foot->active = (int)near;
     if (foot->active == 0) return;
     int all = foot->active == foot->elements, active = 0;
@@ -235,7 +236,9 @@ ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, const Mo
         double force = s->flat[i] * flat_share + s->cone[i] * a + bed * in_bed;
         double travel = step_max(s->recovery[i] * a, step_min(CONTACT_ELASTIC, a));
         double curve = s->flat[i] * c0 * c0, flat = step_max(s->flat[i], 0.0), steepest = in_bed > 0.0 ? flat : curve;
-        double line = step_max(force / (travel + STEP_TINY), steepest + s->cone[i] + bed), slack = a - force / (line + STEP_TINY);
+        double steep = steepest + s->cone[i] + bed, chord = force >= steep * travel ? 1.0 : 0.0; /* one division serves both */
+        double over = force / ((chord > 0.0 ? travel : steep) + STEP_TINY), line = chord > 0.0 ? over : steep;
+        double slack = a - (chord > 0.0 ? travel : over);
         s->middle[i] = m0;
         s->front[i] = a;
         s->deep[i] = a;
@@ -256,7 +259,7 @@ ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, const Mo
                                  (step_min(added, 0.0) * (w_free - s->front_speed[i]) + pull * c0 * c0 * dt * speed * speed);
         s->drift_radius[i] = dt * s->k_drift[i] * s->drift[i] * step_max(u0, 0.0);
         s->damping[i] = dt * s->b_drift[i] * inside;
-        slot_grip(s, i, dt, force);
+        slot_grip(s, i, dt, rate, force);
     }
 }
 

@@ -100,7 +100,7 @@ static void slot_resist(const Slots *s, int i, double dt, double sideways, doubl
     s->front[i] = slack + (share * peak * deep + bed * in_bed) / line;
     s->reach[i] = step_max(2.0 * (s->front[i] - u0) / dt, 0.0);
     s->drift_radius[i] += dt * level * step_max(sideways, 0.0) * step_max(u0, 0.0);
-    slot_grip(s, i, dt, share * peak * deep + bed * in_bed);
+    slot_grip(s, i, dt, 1.0 / dt, share * peak * deep + bed * in_bed);
 }
 
 static int any_resistive(const MildTerrain *terrain) {

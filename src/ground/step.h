@@ -9,7 +9,8 @@
  * with m1, so I(w) never falls with w and the whole step is the minimum of a convex function. Beyond E,
  *     mass    m_a(a) (max(w, reach) - w_a): the added mass moves with the front at w_a and joins without bouncing
  *     growth  (m_a(m1) - m_a(a)) (c_d (w0 + w)/2 + (w - w0)/2): drag, and mass that is recruited at w0 and leaves at w
- *     damping dt T line min(w + max(w0, 0), 0): unloading ground lags behind the foot by T = STEP_LAG
+ *     damping dt T line e(w + max(w0, 0)): unloading ground lags behind the foot by T = STEP_LAG; e(s) is 0 for s > 0, s + E/2
+ *             below -E and -s^2/(2 E) between, so that a resting foot has no kink under it (E = STEP_EASE)
  * c_d < 1 takes min(w, w0) for w0: so the last term never pushes and gives no energy for c_d >= 1/2. */
 #ifndef MILD_GROUND_STEP_H
 #define MILD_GROUND_STEP_H
@@ -17,7 +18,8 @@
 #include "ground/contact.h"
 
 #define STEP_TINY 1e-30
-#define STEP_LAG 5e-3 /* [s] of the force behind the depth on the unloading line; the same at every step size */
+#define STEP_LAG 5e-3  /* [s] of the force behind the depth on the unloading line; the same at every step size */
+#define STEP_EASE 2e-6 /* [m/s] over which it begins */
 
 static inline double step_max(double a, double b) {
     return a > b ? a : b;
@@ -51,12 +53,13 @@ static inline void step_normal(const Slots *s, int i, double dt, double w, doubl
     double w0 = s->speed[i], reach = s->reach[i], mass = s->mass[i], growth = third * (c0_cube - c1_cube);
     double down = step_max(w, 0.0), join = s->join[i], leave = s->leave[i], old = leave < 0.0 ? step_min(down, w0) : w0;
     double recruited = join * down + leave * old, recruited_slope = w > 0.0 ? join + (old < w0 ? leave : 0.0) : 0.0;
-    double lag = dt * STEP_LAG * line, back = step_min(w + w0, 0.0);
+    double lag = dt * STEP_LAG * line, back = w + w0, begin = step_min(step_max(back, -STEP_EASE), 0.0);
+    double eased = step_min(back + STEP_EASE, 0.0) - begin * begin * (0.5 / STEP_EASE);
 
     double value = dt * (on_line * line_share + mean * share) + mass * (step_max(w, reach) - s->front_speed[i]) +
-                   growth * recruited + lag * back + s->explicit_impulse[i];
+                   growth * recruited + lag * eased + s->explicit_impulse[i];
     double rate = 0.5 * dt * dt * (virgin > 0.0 ? virgin_slope : line_slope) + (w > reach ? mass : 0.0) +
-                  virgin * 0.5 * dt * c1_square * recruited + growth * recruited_slope + (back < 0.0 ? lag : 0.0);
+                  virgin * 0.5 * dt * c1_square * recruited + growth * recruited_slope + lag * begin * (-1.0 / STEP_EASE);
     double pushes = value > 0.0 ? 1.0 : 0.0;
     *impulse = pushes * value;
     *slope = pushes * rate;

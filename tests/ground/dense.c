@@ -56,7 +56,8 @@ static double law_normal(double dt, const DenseElement *e, double w) {
         double gained = cone_share(law, e->deep + m1 - e->front) - cone_share(law, e->deep);
         impulse += gained * 0.5 * (drag * (before + down) + mass * (down - before));
     }
-    return fmax(impulse + dt * STEP_LAG * e->line * fmin(w + e->w0, 0.0) + e->active, 0.0);
+    double back = fmin(w + e->w0, 0.0), eased = back < -STEP_EASE ? back + 0.5 * STEP_EASE : -0.5 * back * back / STEP_EASE;
+    return fmax(impulse + dt * STEP_LAG * e->line * eased + e->active, 0.0);
 }
 
 /* ---- what the ground is made of ---- */
