@@ -177,35 +177,36 @@ ALWAYS_INLINE void element_advance(const Slots *s, const Memory *memory, int i, 
     memory->grip[e] = stays * rate * rate * s->grip[i];
 }
 
-/* All elements are listed, on level ground without prints. Returns how many stay in the ground. */
-static int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material) {
-    const FootScratch *foot = a->foot;
+/* The tangent plane that the step took the ground for, through the depth it took for the element's. */
+ALWAYS_INLINE void element_plane(const FootScratch *foot, double height, const Slots *s, const Memory *memory, int i, int e) {
+    double slope_x = s->slope_x[i], slope_y = s->slope_y[i];
+    memory->slope_x[e] = slope_x;
+    memory->slope_y[e] = slope_y;
+    memory->plane[e] = s->depth[i] - slope_x * foot->point_x[e] - slope_y * foot->point_y[e] + foot->point_z[e] - height;
+}
+
+/* All elements are listed, on ground without prints. Returns how many stay in the ground. */
+ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material, int uneven) {
+    const FootScratch foot = *a->foot;
     const Slots local = a->slot, *s = &local;
     const Memory own = *all, *memory = &own;
     const Motion m = a->motion;
-    double dt = a->dt, rate = 1.0 / dt, touched = 0.0;
-    int end = foot->padded; /* the padding lies in the air */
-    int32_t *remembered = memory->material;
+    double dt = a->dt, rate = 1.0 / dt, height = a->height, touched = 0.0;
+    int end = foot.padded; /* the padding lies in the air */
 #pragma omp simd reduction(+ : touched)
     for (int i = 0; i < end; i++) {
-        double x = s->x[i], y = s->y[i], w = -(m.z[0] + m.z[1] * x + m.z[2] * y), m1 = s->depth[i] + 0.5 * dt * w;
-        double stays = m1 > 0.0 ? 1.0 : 0.0;
-        element_advance(s, memory, i, i, dt, rate, m.x[0] + m.x[1] * x + m.x[2] * y, m.y[0] + m.y[1] * x + m.y[2] * y, w, m1, stays);
+        double x = s->x[i], y = s->y[i], vx = m.x[0] + m.x[1] * x + m.x[2] * y, vy = m.y[0] + m.y[1] * x + m.y[2] * y;
+        double w = -(m.z[0] + m.z[1] * x + m.z[2] * y);
+        if (uneven) w += s->slope_x[i] * vx + s->slope_y[i] * vy;
+        double m1 = s->depth[i] + 0.5 * dt * w, stays = m1 > 0.0 ? 1.0 : 0.0;
+        element_advance(s, memory, i, i, dt, rate, vx, vy, w, m1, stays);
+        if (uneven) element_plane(&foot, height, s, memory, i, i);
         touched += stays;
     }
     const double *depth_max = memory->depth_max;
-    for (int e = 0; e < end; e++) remembered[e] = depth_max[e] > 0.0 ? material[e] : MATERIAL_NONE;
-    return (int)touched;
-}
-
-/* The tangent plane that the step took the ground for, through the depth it took for the element's. */
-static void element_plane(const Advance *a, const Memory *memory, int i, int e) {
-    const Slots *s = &a->slot;
-    const FootScratch *foot = a->foot;
-    memory->slope_x[e] = s->slope_x[i];
-    memory->slope_y[e] = s->slope_y[i];
-    memory->plane[e] = s->depth[i] - s->slope_x[i] * foot->point_x[e] - s->slope_y[i] * foot->point_y[e] +
-                       foot->point_z[e] - a->height;
+    int32_t *remembered = memory->material, lifted = uneven ? MATERIAL_FREE : MATERIAL_NONE;
+    for (int i = 0; i < end; i++) remembered[i] = depth_max[i] > 0.0 ? material[i] : lifted;
+    return uneven ? foot.elements : (int)touched;
 }
 
 static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
@@ -223,7 +224,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
                         w, m1, lifted ? 0.0 : 1.0);
         memory->material[e] = lifted ? lifted_material : material[i];
         if (a->prints && (carried || !lifted)) element_print(a, memory, i, e, lifted);
-        if (foot->uneven) element_plane(a, memory, i, e);
+        if (foot->uneven) element_plane(foot, a->height, s, memory, i, e);
         touched += !lifted || lifted_material != MATERIAL_NONE;
     }
     for (; next < foot->elements; next++) element_forget(memory, next, MATERIAL_NONE);
@@ -241,8 +242,13 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain, const M
         Memory memory = ground_memory(ground, f);
         Advance advance = {foot, foot->slot, ground->tiles > 0 ? &prints : NULL, input->rotation[f],
                            foot_motion(foot, result->velocity + 6 * f), input->dt, terrain->height};
-        int simple = foot->active == foot->elements && !foot->uneven && ground->tiles == 0;
-        if (simple) slots_remember(&advance.slot, &memory); /* of this ground; the step may have been solved on a copy */
-        ground->touched[f] = (simple ? foot_advance_all : foot_advance)(&advance, &memory, foot->slot_material);
+        int all = foot->active == foot->elements && ground->tiles == 0;
+        if (all) slots_remember(&advance.slot, &memory); /* of this ground; the step may have been solved on a copy */
+        if (all && foot->uneven)
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1);
+        else if (all)
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0);
+        else
+            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material);
     }
 }

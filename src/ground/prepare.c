@@ -150,13 +150,17 @@ static void slots_materials(const FootScratch *foot, const MildTerrain *terrain,
     }
 }
 
-/* All elements are listed, on level ground without prints: their numbers are read where they lie. */
+/* All elements are listed, on ground without prints: their numbers are read where they lie. */
 static void slots_direct(FootScratch *foot, const Memory *memory) {
     Slots *s = &foot->slot;
+    *s = foot->own;
     s->x = foot->x;
     s->y = foot->y;
-    s->depth = foot->depth;
     slots_remember(s, memory);
+    if (foot->uneven) /* which may lessen the depth */
+        memcpy(s->depth, foot->depth, (size_t)foot->padded * sizeof *s->depth);
+    else
+        s->depth = foot->depth;
 }
 
 /* The list's elements side by side. */
@@ -220,16 +224,17 @@ static void slots_level(const FootScratch *foot) {
 /* Everything of step.h that does not depend on the new velocity. The unloading line runs from (a, F_g(a)) to zero force
  * after recovery * a, but not within CONTACT_ELASTIC. It is never flatter than the loading curve at a, and so never above
  * it: a concave curve lies above its chords, a convex one above its tangent; in the bed the steepest slope is taken. */
-ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, const Motion *now, const Motion *free,
-                                 int uneven) {
+ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, Motion now, Motion free, int uneven) {
     const Slots local = *slot, *s = &local;
     double rate = 1.0 / dt;
-    const double now0 = now->z[0], now1 = now->z[1], now2 = now->z[2], free0 = free->z[0], free1 = free->z[1], free2 = free->z[2];
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        double u0 = s->depth[i], used = s->depth_max[i];
-        double w_now = uneven ? slot_descent(s, i, now) : -(now0 + now1 * s->x[i] + now2 * s->y[i]);
-        double w_free = uneven ? slot_descent(s, i, free) : -(free0 + free1 * s->x[i] + free2 * s->y[i]);
+        double x = s->x[i], y = s->y[i], u0 = s->depth[i], used = s->depth_max[i];
+        double w_now = -(now.z[0] + now.z[1] * x + now.z[2] * y), w_free = -(free.z[0] + free.z[1] * x + free.z[2] * y);
+        if (uneven) {
+            w_now += s->slope_x[i] * (now.x[0] + now.x[1] * x + now.x[2] * y) + s->slope_y[i] * (now.y[0] + now.y[1] * x + now.y[2] * y);
+            w_free += s->slope_x[i] * (free.x[0] + free.x[1] * x + free.x[2] * y) + s->slope_y[i] * (free.y[0] + free.y[1] * x + free.y[2] * y);
+        }
         double old = s->remembered_middle[i], m0 = old > 0.0 ? old : u0 - 0.5 * dt * w_now, a = step_max(step_max(m0, used), 0.0);
         double c0 = step_max(1.0 - a * s->inverse_full[i], 0.0), flat_share = s->full[i] * (1.0 / 3.0) * (1.0 - c0 * c0 * c0);
         double in_bed = a - s->bed[i], bed_stiffness = s->bed_stiffness[i], bed = in_bed > 0.0 ? bed_stiffness : 0.0;
@@ -267,7 +272,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f, con
     const Memory memory = ground_memory(ground, f);
     const double *R = input->rotation[f];
     foot_laws(foot, terrain);
-    if (foot->active == foot->elements && !foot->uneven && ground->tiles == 0)
+    if (foot->active == foot->elements && ground->tiles == 0)
         slots_direct(foot, &memory);
     else
         slots_gather(foot, &memory);
@@ -279,9 +284,9 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f, con
     }
     Motion now = foot_motion(foot, input->velocity[f]), free = foot_motion(foot, input->free_velocity + 6 * f);
     if (foot->uneven)
-        slots_prepare(&foot->slot, foot_end(foot), input->dt, &now, &free, 1);
+        slots_prepare(&foot->slot, foot_end(foot), input->dt, now, free, 1);
     else
-        slots_prepare(&foot->slot, foot_end(foot), input->dt, &now, &free, 0);
+        slots_prepare(&foot->slot, foot_end(foot), input->dt, now, free, 0);
     slots_resist(foot, terrain, input->dt, R, &now);
 }
 
