@@ -58,7 +58,7 @@ typedef struct {
     double *slope_x, *slope_y; /* [-] gradient of the ground under it; 0 where the foot is not `uneven` */
     /* normal law of this step, see step.h */
     double *depth, *middle, *front, *deep, *line, *slack, *stretch, *reach, *front_speed, *speed, *mass, *join, *leave,
-        *explicit_impulse;
+        *bend, *stopped, *explicit_impulse;
     double *flat, *cone, *full, *inverse_full, *drag, *bed, *bed_stiffness; /* Law */
     double *mu, *drift_radius, *damping; /* [-], [N s], [N s/m * s] */
     double *hold_x, *hold_y, *grip;      /* [N s], [N s], [kg] friction at rest: dt the force held, dt^2 its stiffness */

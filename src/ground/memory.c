@@ -151,11 +151,7 @@ static void element_print(const Advance *a, const Memory *memory, int i, int e, 
 /* The memory of an element that goes on. Branch-free, so that it runs in vectors. */
 ALWAYS_INLINE void element_advance(const Slots *s, const Memory *memory, int i, int e, double dt, double rate, double vx, double vy,
                                    double w, double m1, double stays) {
-    /* A foot that turns round within the step was deepest between its ends: elastic ground took it to the top of the parabola
-     * through them. */
-    double m0 = s->middle[i], w0 = s->speed[i], front = s->front[i], reach = s->reach[i], turns = w < 0.0 && w0 > 0.0 ? 1.0 : 0.0;
-    double top = m0 + 0.5 * dt * w0 * w0 / (w0 - turns * w + STEP_TINY), past = turns * s->recovery[i] * step_max(top - m1, 0.0);
-    double depth_max = s->deep[i] + step_max(m1 + past - front, 0.0);
+    double front = s->front[i], reach = s->reach[i], depth_max = s->deep[i] + step_max(m1 - front, 0.0);
     /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the next step. */
     double before = s->front_speed[i] > reach || !(s->depth_max[i] > 0.0) ? 0.0 : reach, leads = m1 > front && w > reach ? stays : 0.0;
     memory->depth_max[e] = stays * depth_max;
@@ -185,15 +181,20 @@ ALWAYS_INLINE void element_plane(const FootScratch *foot, double height, const S
     memory->plane[e] = s->depth[i] - slope_x * foot->point_x[e] - slope_y * foot->point_y[e] + foot->point_z[e] - height;
 }
 
+/* An element that turned round within the step has been deeper. */
+static void element_peak(const Slots *s, const Memory *memory, int i, int e, double w, double m1) {
+    memory->depth_max[e] = fmax(memory->depth_max[e], s->deep[i] + step_peak(s, i, w, m1) - s->front[i]);
+}
+
 /* All elements are listed, on ground without prints. Returns how many stay in the ground. */
 ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material, int uneven) {
     const FootScratch foot = *a->foot;
     const Slots local = a->slot, *s = &local;
     const Memory own = *all, *memory = &own;
     const Motion m = a->motion;
-    double dt = a->dt, rate = 1.0 / dt, height = a->height, touched = 0.0;
+    double dt = a->dt, rate = 1.0 / dt, height = a->height, touched = 0.0, turned = 0.0;
     int end = foot.padded; /* the padding lies in the air */
-#pragma omp simd reduction(+ : touched)
+#pragma omp simd reduction(+ : touched, turned)
     for (int i = 0; i < end; i++) {
         double x = s->x[i], y = s->y[i], vx = m.x[0] + m.x[1] * x + m.x[2] * y, vy = m.y[0] + m.y[1] * x + m.y[2] * y;
         double w = -(m.z[0] + m.z[1] * x + m.z[2] * y);
@@ -202,6 +203,11 @@ ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const in
         element_advance(s, memory, i, i, dt, rate, vx, vy, w, m1, stays);
         if (uneven) element_plane(&foot, height, s, memory, i, i);
         touched += stays;
+        turned += step_turns(s->speed[i], w) ? stays : 0.0;
+    }
+    for (int i = 0; turned > 0.0 && i < foot.elements; i++) {
+        double w = slot_descent(s, i, &m), m1 = s->depth[i] + 0.5 * dt * w;
+        if (m1 > 0.0) element_peak(s, memory, i, i, w, m1);
     }
     const double *depth_max = memory->depth_max;
     int32_t *remembered = memory->material, lifted = uneven ? MATERIAL_FREE : MATERIAL_NONE;
@@ -222,6 +228,7 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
         int lifted = element_lifted(a, i, m1), carried = memory->material[e] >= 0;
         element_advance(s, memory, i, e, a->dt, 1.0 / a->dt, motion_at(m->x, s->x[i], s->y[i]), motion_at(m->y, s->x[i], s->y[i]),
                         w, m1, lifted ? 0.0 : 1.0);
+        if (!lifted) element_peak(s, memory, i, e, w, m1);
         memory->material[e] = lifted ? lifted_material : material[i];
         if (a->prints && (carried || !lifted)) element_print(a, memory, i, e, lifted);
         if (foot->uneven) element_plane(foot, a->height, s, memory, i, e);

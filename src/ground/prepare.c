@@ -221,6 +221,38 @@ static void slots_level(const FootScratch *foot) {
     memset(foot->own.slope_y, 0, bytes);
 }
 
+/* Bool: at its present speed an element on ground with drag goes on into virgin ground, by more than is soon made good. */
+static int slots_sink(const Slots *slot, int end, double dt) {
+    const double *depth = slot->depth, *speed = slot->speed, *front = slot->front, *leave = slot->leave;
+    double sinking = 0.0;
+#pragma omp simd reduction(+ : sinking)
+    for (int i = 0; i < end; i++) {
+        double way = step_virgin_way(depth[i], speed[i], front[i], dt);
+        sinking += leave[i] > 0.0 ? way : 0.0;
+    }
+    return sinking > 0.0;
+}
+
+/* The drag of elements that sink, and their speed at the front, see step.h. F: about the middle of the step. */
+static void slots_drag(const Slots *slot, int end, double dt, const Motion *now, const Motion *free) {
+    const Slots local = *slot, *s = &local;
+    const Motion before = *now, after = *free;
+#pragma omp simd
+    for (int i = 0; i < end; i++) {
+        double u0 = s->depth[i], a = s->front[i], b = step_max(u0, a), speed = s->speed[i], third = s->full[i] * (1.0 / 3.0);
+        double extra = step_max(2.0 * s->leave[i], 0.0), sinks = step_virgin_way(u0, speed, a, dt) > 0.0 ? 1.0 : 0.0;
+        double c0 = step_max(1.0 - a * s->inverse_full[i], 0.0), c1 = step_max(1.0 - b * s->inverse_full[i], 0.0);
+        double square = c0 * c0, cube = square * c0, slope = s->flat[i] * square + s->cone[i];
+        double force = s->flat[i] * third * (1.0 - cube) + s->cone[i] * a + 0.5 * slope * (b - a);
+        double gain = step_max(slot_descent(s, i, &after) - slot_descent(s, i, &before), 0.0) / dt * step_max(a - s->middle[i], 0.0);
+        double drag = extra > 0.0 ? sinks : 0.0, hit = sqrt(speed * speed + 2.0 * drag * gain);
+        double still = step_min(STEP_STILL + sqrt(force / (extra * square * hit * hit + STEP_TINY)), STEP_STILL_MOST);
+        s->speed[i] = hit;
+        s->bend[i] = drag * extra * (still - 0.5) / (hit + STEP_TINY);
+        s->stopped[i] = drag * third * (cube - c1 * c1 * c1);
+    }
+}
+
 /* Everything of step.h that does not depend on the new velocity. The unloading line runs from (a, F_g(a)) to zero force
  * after recovery * a, but not within CONTACT_ELASTIC. It is never flatter than the loading curve at a, and so never above
  * it: a concave curve lies above its chords, a convex one above its tangent; in the bed the steepest slope is taken. */
@@ -254,6 +286,7 @@ ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, Motion n
         s->reach[i] = reach;
         s->front_speed[i] = step_max(s->remembered_speed[i], reach);
         s->speed[i] = speed;
+        s->bend[i] = s->stopped[i] = 0.0;
         s->mass[i] = step_max(added, 0.0);
         double drag = step_max(s->drag[i], 0.0), mass_rate = step_max(s->mass_rate[i], 0.0);
         s->join[i] = 0.5 * (drag + mass_rate);
@@ -287,6 +320,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f, con
         slots_prepare(&foot->slot, foot_end(foot), input->dt, now, free, 1);
     else
         slots_prepare(&foot->slot, foot_end(foot), input->dt, now, free, 0);
+    if (slots_sink(&foot->slot, foot_end(foot), input->dt)) slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free);
     slots_resist(foot, terrain, input->dt, R, &now);
 }
 

@@ -45,18 +45,24 @@ static double law_work(const DenseElement *e, double m1) {
     return work + way * (simpson + law->bed_stiffness * fmax(u + way - law->bed, 0.0));
 }
 
+/* Impulse of the mass that is recruited in the step, and of drag, by the growth of P. */
+static double law_recruited(const DenseElement *e, double down) {
+    double mass = fmax(e->law.mass_rate, 0.0), extra = fmax(e->law.drag_rate, 0.0) - mass, lost = fmax(e->hit - down, 0.0);
+    if (extra < 0.0) return mass * down + 0.5 * extra * (down + fmin(down, e->w0));
+    return mass * down + extra * (0.5 * (e->hit + down) + (lost > 0.0 ? (e->still - 0.5) * lost * lost / e->hit : 0.0));
+}
+
 static double law_normal(double dt, const DenseElement *e, double w) {
     const DenseLaw *law = &e->law;
     double m1 = e->u0 + 0.5 * dt * w, way = m1 - e->m0, force = e->line * fmax(e->m0 - e->slack, 0.0);
     if (fabs(way) > 1e-16) force = law_work(e, m1) / way;
     if (fmin(m1, e->m0) > e->slack && m1 <= e->front) force = e->line * (0.5 * (e->m0 + m1) - e->slack); /* nothing cancels */
-    double impulse = dt * force + e->mass * (fmax(w, e->reach) - e->w_a), down = fmax(w, 0.0);
-    double mass = fmax(law->mass_rate, 0.0), drag = fmax(law->drag_rate, 0.0), before = drag < mass ? fmin(down, e->w0) : e->w0;
+    double impulse = dt * force + e->mass * (fmax(w, e->reach) - e->w_a);
     if (m1 > e->front) {
         double gained = cone_share(law, e->deep + m1 - e->front) - cone_share(law, e->deep);
-        impulse += gained * 0.5 * (drag * (before + down) + mass * (down - before));
+        impulse += fmax(gained, fmin(2.0 * gained, e->stopped)) * law_recruited(e, fmax(w, 0.0));
     }
-    double back = fmin(w + e->w0, 0.0), eased = back < -STEP_EASE ? back + 0.5 * STEP_EASE : -0.5 * back * back / STEP_EASE;
+    double back = fmin(w + e->hit, 0.0), eased = back < -STEP_EASE ? back + 0.5 * STEP_EASE : -0.5 * back * back / STEP_EASE;
     return fmax(impulse + dt * STEP_LAG * e->line * eased + e->active, 0.0);
 }
 
@@ -255,6 +261,19 @@ static void point_velocity(const Find *find, const double *twist, double v[4]) {
     v[3] = find->slope[0] * v[0] + find->slope[1] * v[1] - v[2];
 }
 
+/* How the drag of an element that goes on into virgin ground counts: see src/ground/step.h. */
+static void element_drag(double dt, DenseElement *e, double gained) {
+    const DenseLaw *law = &e->law;
+    double a = e->front, extra = fmax(law->drag_rate, 0.0) - fmax(law->mass_rate, 0.0), deep = fmax(e->u0, a);
+    e->hit = e->w0;
+    e->still = 0.5;
+    if (!(extra > 0.0 && e->u0 + 0.5 * dt * e->w0 > a + CONTACT_ELASTIC)) return;
+    double force = cone_force(law, a) + 0.5 * cone_slope(law, a) * (deep - a), drag = extra * cone_flat(law, a);
+    e->hit = sqrt(e->w0 * e->w0 + 2.0 * fmax(gained, 0.0) / dt * (a - e->m0));
+    e->still = fmin(STEP_STILL + sqrt(force / fmax(drag * e->hit * e->hit, 1e-300)), STEP_STILL_MOST);
+    e->stopped = cone_share(law, deep) - cone_share(law, a);
+}
+
 static void dense_element(Dense *d, const Find *find) {
     DenseElement *e = &d->element[d->elements++];
     const Memory *memory = &find->memory;
@@ -280,6 +299,7 @@ static void dense_element(Dense *d, const Find *find) {
         e->active = fmin(e->law.mass_rate, 0.0) * cone_share(&e->law, e->deep) * (e->free[3] - e->w_a) +
                     fmin(e->law.drag_rate, 0.0) * cone_flat(&e->law, e->deep) * d->dt * e->w0 * e->w0;
     element_line(e);
+    element_drag(d->dt, e, e->free[3] - now[3]);
     if (model >= 0) element_resist(d->dt, e, model, find->normal, now, now[3]);
     element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->grip[i]);
 }

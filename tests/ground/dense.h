@@ -28,6 +28,7 @@ typedef struct {
     DenseLaw law;
     double u0, m0, front, deep, w0, reach, w_a; /* [m], [m/s], as in docs/model.md section 6 */
     double line, slack;                         /* [N/m], [m] */
+    double hit, still, stopped;                 /* [m/s], [-], [m] of the drag, see src/ground/step.h; the last without m_a' */
     double mass, active;                        /* [kg] m_a(a); [N s] what parameters that create energy give, explicitly */
     double radius, damping;                     /* [N s], [kg] */
     double hold[2], grip;                       /* [N s], [kg] friction that is held, see src/ground/friction.h */

@@ -14,14 +14,15 @@ static MildMaterial choi(void) {
     return m;
 }
 
-/* dK/du = (M g - F_g - 2 c_d m_a' K)/(M + m_a), K = w^2/2, from K = g h at the surface to K = 0: depth of the first stop [m]. */
+/* dK/du = (M g - F_g - 2 c_d m_a' K)/(M + m_a), K = w^2/2, from K = g h at the surface to K = 0: depth of the first stop [m].
+ * A plate of 77 elements. */
 static double exact_slope(const MildMaterial *m, double mass, double u, double K) {
     MildElementLaw law = mild_element_law(m, KIT_PITCH, u);
     return (mass * KIT_GRAVITY - 77.0 * law.force - 2.0 * m->c_d * 77.0 * law.added_mass_per_depth * K) / (mass + 77.0 * law.added_mass);
 }
 
 static double exact_stop(const MildMaterial *m, double mass, double height) {
-    double u = 0.0, K = KIT_GRAVITY * height, step = 1e-6;
+    double u = 0.0, K = KIT_GRAVITY * height, step = 4e-6;
     for (;;) {
         double a = exact_slope(m, mass, u, K), b = exact_slope(m, mass, u + 0.5 * step, K + 0.5 * step * a), next = K + step * b;
         if (next <= 0.0) return u + step * K / (K - next);
@@ -51,7 +52,7 @@ static double stop_depth(const MildMaterial *m, double mass, double dt, double h
 static void test_exact_impact(void **state) {
     (void)state;
     static const double mass[3] = {1.0, 3.0, 20.0}, published[3] = {1.221e-3, 3.384e-3, 38.98e-3}, dt[4] = {0.25e-3, 1e-3, 2.5e-3, 5e-3};
-    static const double allowed[4][3] = {{0.005, 0.002, 0.002}, {0.01, 0.005, 0.002}, {0.05, 0.02, 0.005}, {0.15, 0.04, 0.01}};
+    static const double allowed[4][3] = {{0.005, 0.002, 0.002}, {0.01, 0.005, 0.002}, {0.03, 0.01, 0.002}, {0.08, 0.02, 0.002}};
     MildMaterial m = choi();
     double fall = 0.125 / KIT_GRAVITY;
     for (int i = 0; i < 3; i++) assert_true(fabs(exact_stop(&m, mass[i], fall) / published[i] - 1.0) < 5e-4);
@@ -66,6 +67,87 @@ static void test_exact_impact(void **state) {
             print_message("impact %4.0f kg at %.2f ms: stops within %+.2f %% of the exact depth\n", mass[i], 1e3 * dt[d], 100.0 * worst);
             assert_true(fabs(worst) < allowed[d][i]);
         }
+}
+
+/* Deepest print of a plate dropped from rest, a level body that falls and springs up for 0.3 s more [m]. */
+static double drop_depth(MildSole *sole, const MildMaterial *m, double mass, double dt, double height) {
+    Kit kit;
+    kit_open(&kit, 1, sole, NULL, m, dt);
+    kit.mass[0] = mass;
+    kit.inertia[0] = 1e12;
+    kit.input.position[0][2] += height;
+    double deepest = 0.0;
+    for (double t = 0.0; t < sqrt(2.0 * height / KIT_GRAVITY) + 0.3; t += dt) {
+        kit_step(&kit, NULL);
+        deepest = fmax(deepest, mild_ground_depth_max(kit.ground, 0)[0]);
+    }
+    kit_close(&kit);
+    return deepest;
+}
+
+/* Drops at 5 ms against the exact impact: every mass, speed, ground, and moment of a step at which the ground is met. Half a
+ * step's way at 1 m/s is 2.5 mm, and an engine has gone it before the ground can answer; 1 kg stops on dense sand after 1.5. */
+static void test_drops(void **state) {
+    (void)state;
+    enum { MASSES = 8, SPEEDS = 5, PHASES = 8, GROUNDS = 5 };
+    static const char *const grounds[GROUNDS] = {"sand_loose", "sand_dense", "grass", "foam45", "rubber"};
+    static const double mass[MASSES] = {1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 40.0}, speed[SPEEDS] = {0.2, 0.3, 0.5, 0.7, 1.0};
+    static const double allowed[MASSES] = {0.22, 0.17, 0.06, 0.018, 0.015, 0.01, 0.005, 0.005}, dt = 5e-3;
+    MildSole *sole = kit_plate(11, 7);
+    for (int i = 0; i < MASSES; i++) {
+        double low = 0.0, high = 0.0, slow = 0.0;
+        for (int g = 0; g < GROUNDS; g++)
+            for (int s = 0; s < SPEEDS; s++)
+                for (int p = 0; p < PHASES; p++) {
+                    MildMaterial m;
+                    assert_true(mild_material_preset(grounds[g], &m));
+                    double height = 0.5 * speed[s] * speed[s] / KIT_GRAVITY + speed[s] * dt * p / PHASES;
+                    double error = drop_depth(sole, &m, mass[i], dt, height) / exact_stop(&m, mass[i], height) - 1.0;
+                    low = fmin(low, error);
+                    high = fmax(high, error);
+                    if (s < 2) slow = fmax(slow, fabs(error));
+                }
+        print_message("drop of %4g kg at 5 ms: prints within %+.2f and %+.2f %% of the exact depth; up to 0.3 m/s %.2f %%\n",
+                      mass[i], 100.0 * low, 100.0 * high, 100.0 * slow);
+        assert_true(fmax(-low, high) < allowed[i]);
+    }
+    mild_sole_destroy(sole);
+}
+
+/* An element led by hand (A = 0) into some state: its impulse must never fall with the speed of descent. */
+static void test_rises(void **state) {
+    (void)state;
+    enum { DRAWS = 3000, SPEEDS = 400 };
+    static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+    MildSole *sole = kit_plate(1, 1);
+    uint64_t random = 29;
+    double worst = 0.0;
+    for (int draw = 0; draw < DRAWS; draw++) {
+        MildMaterial m = kit_material(&random);
+        Kit kit;
+        kit_open(&kit, 1, sole, NULL, &m, steps[draw % 3]);
+        double fast = kit_uniform(&random, 0.0, 1.0) < 0.3 ? 0.02 : 1.5;
+        for (int s = kit_index(&random, 6); s >= 0; s--) { /* down, mostly */
+            kit.input.free_velocity[2] = -kit_uniform(&random, -0.3, 1.0) * fast;
+            kit_solve(&kit);
+            kit_advance(&kit);
+        }
+        kit.input.position[0][2] -= kit_uniform(&random, 0.0, 1.0) < 0.3 ? kit_uniform(&random, 0.0, 0.01) : 0.0;
+        double last = 0.0, most = 0.0, drop = 0.0;
+        for (int k = 0; k < SPEEDS; k++) {
+            kit.input.free_velocity[2] = fast * (1.2 - 3.0 * k / SPEEDS);
+            kit_solve(&kit);
+            double impulse = kit.result.foot[0].force[2] * kit.input.dt;
+            drop = fmax(drop, last - impulse);
+            most = fmax(most, impulse);
+            last = impulse;
+        }
+        if (most > 0.0) worst = fmax(worst, drop / most);
+        kit_close(&kit);
+    }
+    print_message("impulse over the speed of descent: falls by at most %.1e of its greatest value\n", worst);
+    mild_sole_destroy(sole);
+    assert_true(worst < 1e-9);
 }
 
 static void test_no_creep(void **state) {
@@ -175,7 +257,8 @@ static void test_border(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_exact_impact), cmocka_unit_test(test_memory),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_exact_impact), cmocka_unit_test(test_drops),
+                                       cmocka_unit_test(test_rises), cmocka_unit_test(test_memory),
                                        cmocka_unit_test(test_border), cmocka_unit_test(test_no_creep)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
