@@ -8,6 +8,8 @@
 
 static const double paper_pitch = 0.0195, gravity = 9.81; /* [m], [m/s^2] */
 
+#define HAND_TINY 1e-4 /* [-] of a step */
+
 enum { WAY_STEPS = 1000, ROWS_MAX = 2500000 };
 
 typedef struct {
@@ -152,33 +154,44 @@ static PressRow hand_solve(Press *press, double dt, double forward, double down)
     return press_row(press);
 }
 
-/* Takes the step just solved. A step's force is the mean about the depth it starts from, so the force at the end, depth
- * `to`, is that of the step which would follow. */
-static MildStatus hand_accept(Press *press, const PressRow *step, double forward, double to, MildError *error) {
-    double dt = press->input.dt, down = (to - step->depth) / dt;
-    press_advance(press);
-    press->time += dt;
-    press->input.position[0][0] += forward * dt;
-    press_place(press, to);
-    PressRow row = hand_solve(press, dt, forward, down), mean = *step;
+/* Takes the step just solved, which ends at depth `to` as `row` says. */
+static MildStatus hand_take(Press *press, const PressRow *step, double forward, double to, PressRow row, MildError *error) {
+    double dt = press->input.dt;
+    PressRow mean = *step;
     mean.force = 0.5 * (step->force + row.force);
     mean.force_x = 0.5 * (step->force_x + row.force_x);
     work_add(press, &mean, to - step->depth, forward * dt);
     return rows_add(press->result, row, error);
 }
 
-/* The force at the end of the step just solved, which stays the last solved. */
-static double hand_end_force(Press *press, const PressRow *step, double to) {
-    double dt = press->input.dt, down = (to - step->depth) / dt;
+/* Takes a step at constant depth. A step's force is the mean about the place it starts from, so the force at its end is that
+ * of the step which would follow. */
+static MildStatus hand_accept(Press *press, const PressRow *step, double forward, MildError *error) {
+    double dt = press->input.dt;
+    press_advance(press);
+    press->time += dt;
+    press->input.position[0][0] += forward * dt;
+    return hand_take(press, step, forward, step->depth, hand_solve(press, dt, forward, 0), error);
+}
+
+/* The row at the end of the step just solved, which stays the last solved: the force at the depth `to` itself, over a tiny step
+ * that follows a tiny step. The mean over a whole one would blunt the kink where the ground yields. */
+static PressRow hand_end(Press *press, const PressRow *step, double to) {
+    double dt = press->input.dt, down = (to - step->depth) / dt, tiny = HAND_TINY * dt;
     size_t bytes = mild_ground_size(press->ground);
     memcpy(press->spare, press->ground, bytes);
     press_advance(press);
     press_place(press, to);
-    PressRow next = hand_solve(press, dt, 0, down);
+    hand_solve(press, tiny, 0, down);
+    press_advance(press);
+    press_place(press, to + tiny * down);
+    PressRow row = hand_solve(press, tiny, 0, down);
     memcpy(press->ground, press->spare, bytes);
     press_place(press, step->depth);
     hand_solve(press, dt, 0, down);
-    return next.force;
+    row.depth = to;
+    row.time = press->time + dt;
+    return row;
 }
 
 /* Cuts a step that would pass `force` to where it gets there. */
@@ -188,7 +201,7 @@ static PressRow hand_cut(Press *press, double dt, double down, double force) {
     for (int i = 0; i < 40; i++) {
         double middle = 0.5 * (low + high);
         step = hand_solve(press, middle, 0, down);
-        int passes = (hand_end_force(press, &step, from + middle * down) - force) * down >= 0;
+        int passes = (hand_end(press, &step, from + middle * down).force - force) * down >= 0;
         *(passes ? &high : &low) = middle;
     }
     return step;
@@ -202,13 +215,17 @@ static MildStatus hand_vertical(Press *press, double to, double force, int *reac
     *reached = 0;
     for (int i = 1; i <= steps && status == MILD_OK && !*reached; i++) {
         double next = i < steps ? from + way * i / steps : to, dt = (next - press_depth(press)) / down;
-        PressRow step = hand_solve(press, dt, 0, down);
-        *reached = (hand_end_force(press, &step, next) - force) * down >= 0;
+        PressRow step = hand_solve(press, dt, 0, down), end = hand_end(press, &step, next);
+        *reached = (end.force - force) * down >= 0;
         if (*reached) {
             step = hand_cut(press, dt, down, force);
             next = step.depth + press->input.dt * down;
+            end = hand_end(press, &step, next);
         }
-        status = hand_accept(press, &step, 0, next, error);
+        press_advance(press);
+        press->time += press->input.dt;
+        press_place(press, next);
+        status = hand_take(press, &step, 0, next, end, error);
     }
     press->result->ways++;
     return status;
@@ -219,7 +236,7 @@ static MildStatus hand_drag(Press *press, MildError *error) {
     MildStatus status = MILD_OK;
     for (int i = 0; i < WAY_STEPS && status == MILD_OK; i++) {
         PressRow step = hand_solve(press, def->drag / def->drag_speed / WAY_STEPS, def->drag_speed, 0);
-        status = hand_accept(press, &step, def->drag_speed, step.depth, error);
+        status = hand_accept(press, &step, def->drag_speed, error);
     }
     press->result->ways++;
     return status;
