@@ -57,7 +57,7 @@ typedef struct {
     double *x, *y; /* [m] element's centre in the foot frame */
     double *slope_x, *slope_y; /* [-] gradient of the ground under it; 0 where the foot is not `uneven` */
     /* normal law of this step, see step.h */
-    double *depth, *middle, *front, *deep, *line, *slack, *stretch, *reach, *front_speed, *speed, *mass, *join, *leave,
+    double *depth, *middle, *front, *deep, *line, *slack, *reach, *front_speed, *speed, *mass, *join, *leave,
         *bend, *stopped, *explicit_impulse;
     double *flat, *cone, *full, *inverse_full, *drag, *bed, *bed_stiffness; /* Law */
     double *mu, *drift_radius, *damping; /* [-], [N s], [N s/m * s] */
@@ -84,6 +84,7 @@ typedef struct {
 typedef struct {
     int elements, padded, active; /* active: slots in use */
     int whole; /* bool: element[] lists all */
+    int bent;                            /* bool: the slots' bend, stopped and explicit_impulse are not all 0 */
     int uneven;                          /* bool: the ground under it is not level; otherwise all its slopes are 0 */
     double origin[3]; /* [m] the ankle, world */
     double arm[3][3]; /* [m] ankle -> the frame's point (0, 0, sole), then the frame's x and y axes: p = arm0 + x arm1 + y arm2 */
@@ -116,10 +117,10 @@ void foot_points(const FootScratch *foot);
 /* Fills the lists and each slot's law for this step; returns the number of elements that may touch. */
 int contact_prepare(const MildGround *ground, const MildTerrain *terrain, const MildContactInput *input, MildScratch *scratch);
 
-/* Impulses of every slot at foot twists V, their derivatives and their wrench. */
-void contact_pass(MildScratch *scratch, double dt, const double *twist);
+/* Impulses of every slot at the loaded feet's twists V, their derivatives and their wrench. twist: rows `first` and on. */
+void contact_pass(MildScratch *scratch, double dt, const double *twist, int first);
 /* The same with the bounds of friction held at slot.bound, which makes the impulses minus the gradient of a convex function. */
-void contact_pass_held(MildScratch *scratch, double dt, const double *twist);
+void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int first);
 /* Moves these by a share of the way to what the normal impulses of the last pass ask for. */
 void contact_bounds(MildScratch *scratch, double share);
 /* hessian from the derivatives of the last pass. */

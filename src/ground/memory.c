@@ -148,29 +148,32 @@ static void element_print(const Advance *a, const Memory *memory, int i, int e, 
     memory->front_speed[e] = 0.0;
 }
 
-/* The memory of an element that goes on. Branch-free, so that it runs in vectors. */
+/* The memory of an element that stays in the ground, or forgets. Branch-free, so that it runs in vectors; chosen, not multiplied
+ * by 0, which would keep what is not a number. */
 ALWAYS_INLINE void element_advance(const Slots *s, const Memory *memory, int i, int e, double dt, double rate, double vx, double vy,
                                    double w, double m1, double stays) {
     double front = s->front[i], reach = s->reach[i], depth_max = s->deep[i] + step_max(m1 - front, 0.0);
     /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the next step. */
-    double before = s->front_speed[i] > reach || !(s->depth_max[i] > 0.0) ? 0.0 : reach, leads = m1 > front && w > reach ? stays : 0.0;
-    memory->depth_max[e] = stays * depth_max;
+    double before = s->front_speed[i] > reach || !(s->depth_max[i] > 0.0) ? 0.0 : reach, speed = w - before;
+    double leads = m1 > front && w > reach ? stays : 0.0;
+    memory->depth_max[e] = stays > 0.0 ? depth_max : 0.0;
     memory->middle[e] = step_min(m1, stays > 0.0 ? depth_max : m1);
-    memory->front_speed[e] = leads * (w - before);
+    memory->front_speed[e] = leads > 0.0 ? speed : 0.0;
     /* Drift: motion is collected until it leaves the dead band, so that the count depends neither on the step size nor on
      * jitter. d_D is the length of the path (paper: accumulated, not end to end). */
     double x = s->pending_x[i] + dt * vx, y = s->pending_y[i] + dt * vy, square = x * x + y * y;
     double counts = square > MEMORY_BAND * MEMORY_BAND ? 1.0 : 0.0, pends = stays * (1.0 - counts);
-    memory->drift[e] = stays * step_min(s->drift[i] + counts * sqrt(square), MEMORY_CAP);
-    memory->pending_x[e] = pends * x;
-    memory->pending_y[e] = pends * y;
+    double drift = step_min(s->drift[i] + counts * sqrt(square), MEMORY_CAP);
+    memory->drift[e] = stays > 0.0 ? drift : 0.0;
+    memory->pending_x[e] = pends > 0.0 ? x : 0.0;
+    memory->pending_y[e] = pends > 0.0 ? y : 0.0;
     /* What stays held when the element rests, see friction.h. */
     double held_x = s->hold_x[i] - s->grip[i] * vx, held_y = s->hold_y[i] - s->grip[i] * vy;
     double bound = s->mu[i] * s->iz[i] + s->drift_radius[i], held = sqrt(held_x * held_x + held_y * held_y);
-    double share = stays * rate * (held > bound ? bound / held : 1.0);
-    memory->held_x[e] = share * held_x;
-    memory->held_y[e] = share * held_y;
-    memory->grip[e] = stays * rate * rate * s->grip[i];
+    double share = rate * (held > bound ? bound / held : 1.0), grip = rate * rate * s->grip[i];
+    memory->held_x[e] = stays > 0.0 ? share * held_x : 0.0;
+    memory->held_y[e] = stays > 0.0 ? share * held_y : 0.0;
+    memory->grip[e] = stays > 0.0 ? grip : 0.0;
 }
 
 /* The tangent plane that the step took the ground for, through the depth it took for the element's. */
@@ -193,7 +196,7 @@ ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const in
     const Memory own = *all, *memory = &own;
     const Motion m = a->motion;
     double dt = a->dt, rate = 1.0 / dt, height = a->height, touched = 0.0, turned = 0.0;
-    int end = foot.padded; /* the padding lies in the air */
+    int end = foot.padded;
 #pragma omp simd reduction(+ : touched, turned)
     for (int i = 0; i < end; i++) {
         double x = s->x[i], y = s->y[i], vx = m.x[0] + m.x[1] * x + m.x[2] * y, vy = m.y[0] + m.y[1] * x + m.y[2] * y;
@@ -209,6 +212,7 @@ ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const in
         double w = slot_descent(s, i, &m), m1 = s->depth[i] + 0.5 * dt * w;
         if (m1 > 0.0) element_peak(s, memory, i, i, w, m1);
     }
+    for (int i = foot.elements; i < end; i++) element_forget(memory, i, MATERIAL_NONE); /* the padding */
     const double *depth_max = memory->depth_max;
     int32_t *remembered = memory->material, lifted = uneven ? MATERIAL_FREE : MATERIAL_NONE;
     for (int i = 0; i < end; i++) remembered[i] = depth_max[i] > 0.0 ? material[i] : lifted;

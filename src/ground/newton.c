@@ -34,10 +34,12 @@ typedef struct {
 
 static void system_open(System *system, const MildScratch *scratch, const MildContactInput *input, int first, int n) {
     int stride = 6 * scratch->feet;
-    memset(system, 0, sizeof *system);
     system->first = first;
-    for (int i = 0; i < n; i++)
+    system->free = (Row){{0.0}};
+    for (int i = 0; i < n; i++) {
+        system->A[i] = (Row){{0.0}};
         memcpy(system->A[i].at, input->inverse_inertia + (first + i) * stride + first, (size_t)n * sizeof(double));
+    }
     memcpy(system->free.at, input->free_velocity + first, (size_t)n * sizeof(double));
     system->tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
     system->limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
@@ -63,7 +65,7 @@ ALWAYS_INLINE double system_norm(const System *system, const double *x, int n, i
 
 ALWAYS_INLINE void point_evaluate(const System *system, MildScratch *scratch, Point *point, int n, int parts) {
     double apart[TWIST_MAX];
-    contact_pass(scratch, system->dt, point->twist.at - system->first);
+    contact_pass(scratch, system->dt, point->twist.at, system->first);
     for (int i = 0; i < n; i++) apart[i] = point->impulse.at[i] - scratch->wrench[system->first + i];
     point->residual = system_norm(system, apart, n, parts);
 }
@@ -104,23 +106,25 @@ ALWAYS_INLINE int rows_eliminate(Row *M, double *x, int n, int parts) {
     return 1;
 }
 
-/* The law of the last pass, at V, linearised with H = -dW/dV: W + H (V - V^ - A P) = P, that is (1 + H A) P = W + H (V - V^).
- * The right side is column n of A while the rows are made. */
-ALWAYS_INLINE int point_newton(System *system, MildScratch *scratch, const Point *at, Point *next, int n, int parts) {
+/* The law of the last pass, at V, linearised with H = -dW/dV: W + H (V - V^ - A P) = P, that is (1 + H A) P = W + H (V - V^). */
+ALWAYS_INLINE int point_newton(const System *system, MildScratch *scratch, const Point *at, Point *next, int n, int parts) {
+    static const Row unit[TWIST_MAX + 1] = {{{1}}, {{0, 1}}, {{[2] = 1}}, {{[3] = 1}}, {{[4] = 1}}, {{[5] = 1}}, {{[6] = 1}},
+                                            {{[7] = 1}}, {{[8] = 1}}, {{[9] = 1}}, {{[10] = 1}}, {{[11] = 1}}, {{[12] = 1}}};
     Row M[TWIST_MAX];
+    double moved[TWIST_MAX];
     contact_hessian(scratch);
-    for (int k = 0; k < n; k++) system->A[k].at[n] = at->twist.at[k] - system->free.at[k];
+    for (int k = 0; k < n; k++) moved[k] = at->twist.at[k] - system->free.at[k];
     for (int i = 0; i < n; i++) {
-        M[i] = (Row){{0.0}};
-        M[i].at[i] = 1.0;
-        M[i].at[n] = scratch->wrench[system->first + i];
+        int foot = i / 6 * 6;
+        const double *H = scratch->hessian[(system->first + foot) / 6] + 6 * (i - foot);
+        double right = scratch->wrench[system->first + i];
+        Row row = unit[i];
+        for (int k = 0; k < 6; k++) {
+            right += H[k] * moved[foot + k];
+            for (int p = 0; p < parts; p++) row.part[p] += H[k] * system->A[foot + k].part[p];
+        }
+        for (int p = 0; p < parts; p++) M[i].part[p] = row.part[p] + right * unit[n].part[p];
     }
-    for (int i = 0; i < n; i++) {
-        const double *H = scratch->hessian[(system->first + i) / 6] + 6 * (i % 6);
-        for (int k = 0; k < 6; k++)
-            for (int p = 0; p < parts; p++) M[i].part[p] += H[k] * system->A[i / 6 * 6 + k].part[p];
-    }
-    for (int k = 0; k < n; k++) system->A[k].at[n] = 0.0;
     memset(next, 0, sizeof *next);
     if (!rows_eliminate(M, next->impulse.at, n, parts)) return 0;
     next->twist = system->free;
@@ -148,7 +152,7 @@ ALWAYS_INLINE void point_halve(const System *system, MildScratch *scratch, const
 }
 
 /* Newton's method from the point `at`, whose pass has been made. Standing takes one step, walking two to four. */
-ALWAYS_INLINE int newton_plain(System *system, MildScratch *scratch, Point *at, int limit, int n, int parts) {
+ALWAYS_INLINE int newton_plain(const System *system, MildScratch *scratch, Point *at, int limit, int n, int parts) {
     Point next;
     int steps = 0;
     while (steps < limit && point_newton(system, scratch, at, &next, n, parts)) {
@@ -165,7 +169,7 @@ ALWAYS_INLINE int newton_plain(System *system, MildScratch *scratch, Point *at, 
 static double step_slope(const System *system, MildScratch *scratch, const Point *from, const Point *to, double t, Point *point, int n) {
     double slope = 0.0;
     point_between(from, to, t, point, n);
-    contact_pass_held(scratch, system->dt, point->twist.at - system->first);
+    contact_pass_held(scratch, system->dt, point->twist.at, system->first);
     for (int i = 0; i < n; i++)
         slope += (point->impulse.at[i] - scratch->wrench[system->first + i]) * (to->twist.at[i] - from->twist.at[i]);
     return slope;
@@ -174,11 +178,11 @@ static double step_slope(const System *system, MildScratch *scratch, const Point
 /* Where the bounds' dependence on I_z leads Newton's method astray, or it runs in circles over kinks: with the bounds held, the
  * step is the minimum of a convex function, and a search along each step finds it from anywhere. Bounds and minimum follow each
  * other, with shorter steps when they do not come closer. */
-static int newton_held(System *system, MildScratch *scratch, Point *at, int limit, int n) {
+static int newton_held(const System *system, MildScratch *scratch, Point *at, int limit, int n) {
     int steps = 0;
     Point next, middle;
     while (steps < limit) {
-        contact_pass_held(scratch, system->dt, at->twist.at - system->first);
+        contact_pass_held(scratch, system->dt, at->twist.at, system->first);
         if (!point_newton(system, scratch, at, &next, n, NEWTON_VECTORS)) break;
         steps++;
         double start = step_slope(system, scratch, at, &next, 0.0, &middle, n);
@@ -197,11 +201,11 @@ static int newton_held(System *system, MildScratch *scratch, Point *at, int limi
     return steps;
 }
 
-static int newton_patient(System *system, MildScratch *scratch, Point *best, int limit, int n) {
+static int newton_patient(const System *system, MildScratch *scratch, Point *best, int limit, int n) {
     Point at = *best;
     int steps = 0;
     double share = 1.0, last = INFINITY;
-    contact_pass(scratch, system->dt, at.twist.at - system->first);
+    contact_pass(scratch, system->dt, at.twist.at, system->first);
     contact_bounds(scratch, 1.0);
     for (int round = 0; steps < limit; round++) {
         int held = newton_held(system, scratch, &at, limit - steps < NEWTON_ROUND ? limit - steps : NEWTON_ROUND, n);
@@ -219,14 +223,14 @@ static int newton_patient(System *system, MildScratch *scratch, Point *best, int
             last = at.residual;
         }
     }
-    contact_pass(scratch, system->dt, best->twist.at - system->first);
+    contact_pass(scratch, system->dt, best->twist.at, system->first);
     return steps;
 }
 
-ALWAYS_INLINE void system_solve(System *system, MildScratch *scratch, const double *start, MildContactResult *result, int n, int parts) {
+ALWAYS_INLINE void system_solve(const System *system, MildScratch *scratch, const double *start, MildContactResult *result, int n, int parts) {
     Point at = {.residual = INFINITY};
     memcpy(at.twist.at, start, (size_t)n * sizeof(double));
-    contact_pass(scratch, system->dt, at.twist.at - system->first);
+    contact_pass(scratch, system->dt, at.twist.at, system->first);
     int plain = system->limit < NEWTON_PLAIN ? system->limit : NEWTON_PLAIN;
     int steps = newton_plain(system, scratch, &at, plain, n, parts);
     double scale = system_norm(system, at.impulse.at, n, parts);

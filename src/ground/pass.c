@@ -6,13 +6,13 @@
  * operations too long for the processor to work on several vectors at once. */
 
 /* Normal impulses and their derivatives. */
-ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven) {
+ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven, int bent) {
     const Slots local = *slot, *s = &local;
     const Motion v = *m;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
         double w = uneven ? slot_descent(s, i, &v) : -(v.z[0] + v.z[1] * s->x[i] + v.z[2] * s->y[i]), iz, k;
-        step_normal(s, i, dt, w, &iz, &k);
+        step_normal(s, i, dt, bent, w, &iz, &k);
         s->iz[i] = iz;
         s->hzz[i] = k;
     }
@@ -72,17 +72,20 @@ static inline void cross_add(const double *p, const double *I, double *torque) {
     torque[2] += p[0] * I[1] - p[1] * I[0];
 }
 
-ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, int held) {
+ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, int first, int held) {
     for (int f = 0; f < scratch->feet; f++) {
         const FootScratch *foot = &scratch->foot[f];
         if (foot->active == 0) continue;
         double sums[9] = {0.0}, *wrench = scratch->wrench + 6 * f;
-        Motion motion = foot_motion(foot, twist + 6 * f);
+        Motion motion = foot_motion(foot, twist + (6 * f - first));
         if (foot->uneven) {
-            foot_normal(&foot->slot, foot_end(foot), dt, &motion, 1);
+            foot_normal(&foot->slot, foot_end(foot), dt, &motion, 1, 1);
             foot_friction(&foot->slot, foot_end(foot), &motion, 1, held, sums);
         } else {
-            foot_normal(&foot->slot, foot_end(foot), dt, &motion, 0);
+            if (foot->bent)
+                foot_normal(&foot->slot, foot_end(foot), dt, &motion, 0, 1);
+            else
+                foot_normal(&foot->slot, foot_end(foot), dt, &motion, 0, 0);
             foot_friction(&foot->slot, foot_end(foot), &motion, 0, held, sums);
         }
         /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 */
@@ -92,12 +95,12 @@ ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, in
     }
 }
 
-void contact_pass(MildScratch *scratch, double dt, const double *twist) {
-    pass(scratch, dt, twist, 0);
+void contact_pass(MildScratch *scratch, double dt, const double *twist, int first) {
+    pass(scratch, dt, twist, first, 0);
 }
 
-void contact_pass_held(MildScratch *scratch, double dt, const double *twist) {
-    pass(scratch, dt, twist, 1);
+void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int first) {
+    pass(scratch, dt, twist, first, 1);
 }
 
 void contact_bounds(MildScratch *scratch, double share) {

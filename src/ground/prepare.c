@@ -5,7 +5,7 @@
 #include "ground/resist.h"
 
 #define PREPARE_MARGIN 1e-3      /* [m] elements this close to the ground are listed */
-#define PREPARE_NEVER (-1e3)     /* [m] depth of the padding: it never reaches the ground */
+#define PREPARE_NEVER (-1e3)     /* [m] depth of the padding */
 #define PREPARE_EXTRA_SPEED 2.0  /* [m/s] an impact at the heel may swing the toe down faster than its free motion */
 
 static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
@@ -63,8 +63,9 @@ static void foot_list(FootScratch *foot, const MildContactInput *input, double s
                               foot_descent(foot, input->free_velocity + 6 * f, steepest));
     double least = -PREPARE_MARGIN - input->dt * (descent + PREPARE_EXTRA_SPEED), near = 0.0;
     const double *depth = foot->depth;
+    int end = least < PREPARE_NEVER ? foot->elements : foot->padded; /* whole vectors, unless that would list the padding */
 #pragma omp simd reduction(+ : near)
-    for (int i = 0; i < foot->padded; i++) near += depth[i] > least ? 1.0 : 0.0; /* the padding lies deep in the air */
+    for (int i = 0; i < end; i++) near += depth[i] > least ? 1.0 : 0.0;
     foot->active = (int)near;
     if (foot->active == 0) return;
     int all = foot->active == foot->elements, active = 0;
@@ -100,6 +101,8 @@ static void slot_set_law(const Slots *s, int i, const Law *law, const MildMateri
     s->inverse_full[i] = law->inverse_full;
     s->drag[i] = law->drag;
     s->mass_rate[i] = law->mass;
+    s->join[i] = 0.5 * (step_max(law->drag, 0.0) + step_max(law->mass, 0.0));
+    s->leave[i] = 0.5 * (step_max(law->drag, 0.0) - step_max(law->mass, 0.0));
     s->bed[i] = law->bed;
     s->bed_stiffness[i] = law->bed_stiffness;
     s->mu[i] = material->mu;
@@ -125,6 +128,16 @@ static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, i
 #undef MIX
     law.inverse_full = 1.0 / law.full;
     slot_set_law(s, i, &law, &material);
+}
+
+/* The padding has no law: whatever its depth, it makes no force. */
+static void slots_pad(const FootScratch *foot) {
+    static const Law none;
+    static const MildMaterial nothing;
+    for (int i = foot->active; i < foot_end(foot); i++) {
+        foot->slot_material[i] = MATERIAL_NONE;
+        slot_set_law(&foot->slot, i, &none, &nothing);
+    }
 }
 
 /* Material of each slot: the one it touched down on, so that a foot sliding over a border keeps its law. */
@@ -181,6 +194,7 @@ static void slots_gather(FootScratch *foot, const Memory *memory) {
         for (int i = active; i < end; i++) listed[a][i] = 0.0;
     }
     for (int i = active; i < end; i++) s->depth[i] = PREPARE_NEVER;
+    slots_pad(foot);
 }
 
 /* Uneven ground under the slots; before: it was uneven in the last step, too. The step takes the ground under an element for its tangent plane there. Where the ground
@@ -256,17 +270,15 @@ static void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
 /* Everything of step.h that does not depend on the new velocity. The unloading line runs from (a, F_g(a)) to zero force
  * after recovery * a, but not within CONTACT_ELASTIC. It is never flatter than the loading curve at a, and so never above
  * it: a concave curve lies above its chords, a convex one above its tangent; in the bed the steepest slope is taken. */
-ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, Motion now, Motion free, int uneven) {
+ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, Motion now, int uneven) {
     const Slots local = *slot, *s = &local;
     double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
         double x = s->x[i], y = s->y[i], u0 = s->depth[i], used = s->depth_max[i];
-        double w_now = -(now.z[0] + now.z[1] * x + now.z[2] * y), w_free = -(free.z[0] + free.z[1] * x + free.z[2] * y);
-        if (uneven) {
+        double w_now = -(now.z[0] + now.z[1] * x + now.z[2] * y);
+        if (uneven)
             w_now += s->slope_x[i] * (now.x[0] + now.x[1] * x + now.x[2] * y) + s->slope_y[i] * (now.y[0] + now.y[1] * x + now.y[2] * y);
-            w_free += s->slope_x[i] * (free.x[0] + free.x[1] * x + free.x[2] * y) + s->slope_y[i] * (free.y[0] + free.y[1] * x + free.y[2] * y);
-        }
         double old = s->remembered_middle[i], m0 = old > 0.0 ? old : u0 - 0.5 * dt * w_now, a = step_max(step_max(m0, used), 0.0);
         double c0 = step_max(1.0 - a * s->inverse_full[i], 0.0), flat_share = s->full[i] * (1.0 / 3.0) * (1.0 - c0 * c0 * c0);
         double in_bed = a - s->bed[i], bed_stiffness = s->bed_stiffness[i], bed = in_bed > 0.0 ? bed_stiffness : 0.0;
@@ -281,24 +293,37 @@ ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, Motion n
         s->deep[i] = a;
         s->line[i] = line;
         s->slack[i] = slack;
-        s->stretch[i] = step_max(m0 - slack, 0.0);
         double speed = step_max(w_now, 0.0), reach = step_max(2.0 * (a - u0) * rate, 0.0), added = s->mass_rate[i] * flat_share;
         s->reach[i] = reach;
         s->front_speed[i] = step_max(s->remembered_speed[i], reach);
         s->speed[i] = speed;
-        s->bend[i] = s->stopped[i] = 0.0;
         s->mass[i] = step_max(added, 0.0);
-        double drag = step_max(s->drag[i], 0.0), mass_rate = step_max(s->mass_rate[i], 0.0);
-        s->join[i] = 0.5 * (drag + mass_rate);
-        s->leave[i] = 0.5 * (drag - mass_rate);
-        /* Energy-creating parameters (passive = false) cannot be implicit: they enter with the free motion. */
-        double pull = step_min(s->drag[i], 0.0), inside = u0 > 0.0 ? 1.0 : 0.0;
-        s->explicit_impulse[i] = inside * (m0 >= used ? 1.0 : 0.0) *
-                                 (step_min(added, 0.0) * (w_free - s->front_speed[i]) + pull * c0 * c0 * dt * speed * speed);
         s->drift_radius[i] = dt * s->k_drift[i] * s->drift[i] * step_max(u0, 0.0);
-        s->damping[i] = dt * s->b_drift[i] * inside;
+        s->damping[i] = u0 > 0.0 ? dt * s->b_drift[i] : 0.0;
         slot_grip(s, i, dt, rate, force);
     }
+}
+
+/* Bool: there are parameters that create energy (passive = false). They cannot be implicit and enter with the free motion. */
+static int slots_explicit(const FootScratch *foot, int materials, double dt, const Motion *free) {
+    const Slots *s = &foot->slot;
+    int any = 0;
+    for (int m = 0; m < materials; m++) any |= foot->derived[m].law.mass < 0.0 || foot->derived[m].law.drag < 0.0;
+    for (int i = 0; any && i < foot->active; i++) {
+        double a = s->front[i], c0 = step_max(1.0 - a * s->inverse_full[i], 0.0), speed = s->speed[i];
+        double added = s->mass_rate[i] * s->full[i] * (1.0 / 3.0) * (1.0 - c0 * c0 * c0);
+        if (!(s->depth[i] > 0.0) || s->middle[i] < s->depth_max[i]) continue;
+        s->explicit_impulse[i] = step_min(added, 0.0) * (slot_descent(s, i, free) - s->front_speed[i]) +
+                                 step_min(s->drag[i], 0.0) * c0 * c0 * dt * speed * speed;
+    }
+    return any;
+}
+
+static void slots_unbend(const FootScratch *foot) {
+    size_t bytes = (size_t)foot->padded * sizeof(double);
+    memset(foot->own.bend, 0, bytes);
+    memset(foot->own.stopped, 0, bytes);
+    memset(foot->own.explicit_impulse, 0, bytes);
 }
 
 static void foot_prepare(FootScratch *foot, const MildGround *ground, int f, const MildTerrain *terrain, const MildContactInput *input) {
@@ -317,10 +342,15 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f, con
     }
     Motion now = foot_motion(foot, input->velocity[f]), free = foot_motion(foot, input->free_velocity + 6 * f);
     if (foot->uneven)
-        slots_prepare(&foot->slot, foot_end(foot), input->dt, now, free, 1);
+        slots_prepare(&foot->slot, foot_end(foot), input->dt, now, 1);
     else
-        slots_prepare(&foot->slot, foot_end(foot), input->dt, now, free, 0);
-    if (slots_sink(&foot->slot, foot_end(foot), input->dt)) slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free);
+        slots_prepare(&foot->slot, foot_end(foot), input->dt, now, 0);
+    if (foot->bent) slots_unbend(foot);
+    foot->bent = slots_explicit(foot, terrain->material_count, input->dt, &free);
+    if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
+        slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free);
+        foot->bent = 1;
+    }
     slots_resist(foot, terrain, input->dt, R, &now);
 }
 

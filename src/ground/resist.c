@@ -96,7 +96,6 @@ static void slot_resist(const Slots *s, int i, double dt, double sideways, doubl
     s->deep[i] = deep;
     s->line[i] = line;
     s->slack[i] = slack;
-    s->stretch[i] = step_max(m0 - slack, 0.0);
     s->front[i] = slack + (share * peak * deep + bed * in_bed) / line;
     s->reach[i] = step_max(2.0 * (s->front[i] - u0) / dt, 0.0);
     s->drift_radius[i] += dt * level * step_max(sideways, 0.0) * step_max(u0, 0.0);

@@ -46,13 +46,14 @@ static inline double step_virgin_way(double depth, double speed, double front, d
     return step_max(depth + 0.5 * dt * speed - front - CONTACT_ELASTIC, 0.0);
 }
 
-/* [N s] impulse and [kg] its slope at downward speed w. */
-ALWAYS_INLINE void step_normal(const Slots *s, int i, double dt, double w, double *impulse, double *slope) {
+/* [N s] impulse and [kg] its slope at downward speed w. bent: the slots' bend, stopped and explicit_impulse
+ * are not all 0. */
+ALWAYS_INLINE void step_normal(const Slots *s, int i, double dt, int bent, double w, double *impulse, double *slope) {
     double a = s->front[i], m0 = s->middle[i], m1 = s->depth[i] + 0.5 * dt * w, d = step_max(m1 - a, 0.0);
     double per_way = 1.0 / (fabs(m1 - m0) + STEP_TINY), virgin = m1 > a ? 1.0 : 0.0;
 
     /* Unloading line, force line * l, l the stretch from where it carries nothing. */
-    double line = s->line[i], l0 = s->stretch[i], end = step_min(m1, a) - s->slack[i], l1 = step_max(end, 0.0);
+    double line = s->line[i], slack = s->slack[i], l0 = step_max(m0 - slack, 0.0), end = step_min(m1, a) - slack, l1 = step_max(end, 0.0);
     double on_line = 0.5 * line * (l0 + l1), line_share = (fabs(l1 - l0) + STEP_TINY) * per_way;
     double line_slope = 0.5 * line * line_share * (end > 0.0 ? 2.0 - line_share : line_share);
 
@@ -67,18 +68,18 @@ ALWAYS_INLINE void step_normal(const Slots *s, int i, double dt, double w, doubl
     double mean_slope = flat * (2.0 * cm * cm + c1_square) * (1.0 / 6.0) + 0.5 * cone + bed;
     double virgin_slope = share * mean_slope + ((a - m0) * mean - on_line * (l1 - l0)) * per_way * per_way;
 
-    double reach = s->reach[i], mass = s->mass[i], growth = third * (c0_cube - c1_cube), stop = s->stopped[i];
-    double twice = 2.0 * growth, stopped = step_max(growth, step_min(twice, stop));
-    double stopped_slope = growth < stop ? twice < stop ? 2.0 : 0.0 : 1.0; /* [-] of that of growth */
-    double h = s->speed[i], down = step_max(w, 0.0), lost = step_max(h - down, 0.0), bend = s->bend[i];
+    double reach = s->reach[i], mass = s->mass[i], growth = third * (c0_cube - c1_cube), stop = bent ? s->stopped[i] : 0.0;
+    double twice = 2.0 * growth, stopped = bent ? step_max(growth, step_min(twice, stop)) : growth;
+    double stopped_slope = bent && growth < stop ? twice < stop ? 2.0 : 0.0 : 1.0; /* [-] of that of growth */
+    double h = s->speed[i], down = step_max(w, 0.0), lost = step_max(h - down, 0.0), bend = bent ? s->bend[i] : 0.0;
     double join = s->join[i], leave = s->leave[i], old = leave < 0.0 ? step_min(down, h) : h;
-    double recruited = join * down + leave * old + bend * lost * lost;
-    double recruited_slope = w > 0.0 ? join + (old < h ? leave : 0.0) - 2.0 * bend * lost : 0.0;
+    double recruited = join * down + leave * old + (bent ? bend * lost * lost : 0.0);
+    double recruited_slope = w > 0.0 ? join + (old < h ? leave : 0.0) - (bent ? 2.0 * bend * lost : 0.0) : 0.0;
     double lag = dt * STEP_LAG * line, back = w + h, begin = step_min(step_max(back, -STEP_EASE), 0.0);
     double eased = step_min(back + STEP_EASE, 0.0) - begin * begin * (0.5 / STEP_EASE);
 
     double value = dt * (on_line * line_share + mean * share) + mass * (step_max(w, reach) - s->front_speed[i]) +
-                   stopped * recruited + lag * eased + s->explicit_impulse[i];
+                   stopped * recruited + lag * eased + (bent ? s->explicit_impulse[i] : 0.0);
     double rate = 0.5 * dt * dt * (virgin > 0.0 ? virgin_slope : line_slope) + (w > reach ? mass : 0.0) +
                   stopped_slope * virgin * 0.5 * dt * c1_square * recruited + stopped * recruited_slope +
                   lag * begin * (-1.0 / STEP_EASE);

@@ -41,7 +41,7 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
 /* Implicit normal impulse: one Newton step on I - I(w), where a change dI slows the element by G_zz dI. */
 static double element_normal(const Slots *s, int i, double dt, double w, double G) {
     double target, slope;
-    step_normal(s, i, dt, w, &target, &slope);
+    step_normal(s, i, dt, 1, w, &target, &slope);
     return fmax(s->iz[i] + (target - s->iz[i]) / (1.0 + G * slope), 0.0);
 }
 
@@ -95,7 +95,7 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
             double slope, p[3];
             slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
-            step_normal(s, i, input->dt, slot_descent(s, i, &motion), &s->iz[i], &slope);
+            step_normal(s, i, input->dt, 1, slot_descent(s, i, &motion), &s->iz[i], &slope);
             s->ix[i] = -s->slope_x[i] * s->iz[i];
             s->iy[i] = -s->slope_y[i] * s->iz[i];
             sweep_apply(sweep, f, p, (const double[3]){s->ix[i], s->iy[i], s->iz[i]});

@@ -87,7 +87,7 @@ static void check_finite(const double *values, int count) {
 }
 
 static void check_result(const MildContactInput *input, const MildContactResult *result, const Feet *feet) {
-    fuzz_check(result->iterations >= 0 && result->iterations <= (input->max_iterations ? input->max_iterations : 60));
+    fuzz_check(result->iterations >= 0 && result->iterations <= (input->max_iterations ? input->max_iterations : 400));
     if (!result->converged) return;
     check_finite(result->velocity, 6 * input->feet);
     for (int f = 0; f < input->feet; f++) {
