@@ -46,6 +46,10 @@ static MildMaterial preset(const char *name) {
 
 /* ---- matching ---- */
 
+/* [m] by how much resistive force theory yields deeper than the element is, going straight down: the elastic travel belongs to
+ * its greatest coefficient, 1.08 (src/ground/resist.c). 7 um: 0.4 % of the force at 1.9 mm. */
+#define RESIST_LEAD (1e-4 * (1.0 - 1.0 / 1.08))
+
 /* Force of the level sole pushed slowly to `depth` by hand: A = 0. */
 static double pressed_force(int model, const MildMaterial *material, double depth) {
     enum { STEPS = 200 };
@@ -74,13 +78,15 @@ static void test_matched(void **state) {
             if (mild_material_check(&rival, &error) != MILD_OK) fail_msg("%s", error.text);
             double sinks = mild_sole_sinkage(sole_of(model, 0), &rival, LOAD);
             worst_depth = fmax(worst_depth, fabs(sinks - depth));
-            worst_force = fmax(worst_force, fabs(pressed_force(model, &rival, depth) / LOAD - 1.0));
+            double off = pressed_force(model, &rival, depth) / LOAD - 1.0;
+            if (model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D) off -= RESIST_LEAD / depth;
+            worst_force = fmax(worst_force, fabs(off));
         }
     }
-    print_message("matched: sinkage within %.2e mm of mild's, force pressed to that depth within %.2e\n", 1e3 * worst_depth,
-                  worst_force);
+    print_message("matched: sinkage within %.2e mm of mild's, force pressed to that depth, the lead aside, within %.2e\n",
+                  1e3 * worst_depth, worst_force);
     assert_true(worst_depth < 1e-7); /* the bar is 0.1 mm */
-    assert_true(worst_force < 5e-3); /* con_cone's drag at 1 cm/s; ecc_quasi's front, up to 0.1 mm ahead of 1.9 mm */
+    assert_true(worst_force < 2e-3); /* con_cone's drag at 1 cm/s */
 }
 
 static void test_refusals(void **state) {
