@@ -1,5 +1,6 @@
 #include "app/config.h"
 
+#include <ctype.h>
 #include <errno.h>
 #include <ini.h>
 #include <stdlib.h>
@@ -53,7 +54,7 @@ static size_t code_length(const char *line) {
 /* Whether a line of a config file could hold the text: it must come back from there when a run is resumed. */
 static int text_fits_line(const char *text) {
     size_t length = strlen(text);
-    int blanks = length > 0 && (strchr(" \t", text[0]) || strchr(" \t", text[length - 1]));
+    int blanks = length > 0 && (isspace((unsigned char)text[0]) || isspace((unsigned char)text[length - 1]));
     return length <= TEXT_MAX && code_length(text) == length && !blanks;
 }
 
