@@ -176,17 +176,26 @@ ALWAYS_INLINE void element_advance(const Slots *s, const Memory *memory, int i, 
     memory->grip[e] = stays > 0.0 ? grip : 0.0;
 }
 
+/* An element that turned round within the step has been deeper. */
+static void element_peak(const Slots *s, const Memory *memory, int i, int e, double w, double m1) {
+    memory->depth_max[e] = fmax(memory->depth_max[e], s->deep[i] + step_peak(s, i, w, m1) - s->front[i]);
+}
+
+/* The same for all elements of a foot. Kept apart: addresses that others get to know do not stay in registers. */
+static void foot_peaks(const Advance *a, const Memory *memory) {
+    const Slots *s = &a->slot;
+    for (int i = 0; i < a->foot->elements; i++) {
+        double w = slot_descent(s, i, &a->motion), m1 = s->depth[i] + 0.5 * a->dt * w;
+        if (m1 > 0.0) element_peak(s, memory, i, i, w, m1);
+    }
+}
+
 /* The tangent plane that the step took the ground for, through the depth it took for the element's. */
 ALWAYS_INLINE void element_plane(const FootScratch *foot, double height, const Slots *s, const Memory *memory, int i, int e) {
     double slope_x = s->slope_x[i], slope_y = s->slope_y[i];
     memory->slope_x[e] = slope_x;
     memory->slope_y[e] = slope_y;
     memory->plane[e] = s->depth[i] - slope_x * foot->point_x[e] - slope_y * foot->point_y[e] + foot->point_z[e] - height;
-}
-
-/* An element that turned round within the step has been deeper. */
-static void element_peak(const Slots *s, const Memory *memory, int i, int e, double w, double m1) {
-    memory->depth_max[e] = fmax(memory->depth_max[e], s->deep[i] + step_peak(s, i, w, m1) - s->front[i]);
 }
 
 /* All elements are listed, on ground without prints. Returns how many stay in the ground. */
@@ -208,10 +217,7 @@ ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const in
         touched += stays;
         turned += step_turns(s->speed[i], w) ? stays : 0.0;
     }
-    for (int i = 0; turned > 0.0 && i < foot.elements; i++) {
-        double w = slot_descent(s, i, &m), m1 = s->depth[i] + 0.5 * dt * w;
-        if (m1 > 0.0) element_peak(s, memory, i, i, w, m1);
-    }
+    if (turned > 0.0) foot_peaks(a, all);
     for (int i = foot.elements; i < end; i++) element_forget(memory, i, MATERIAL_NONE); /* the padding */
     const double *depth_max = memory->depth_max;
     int32_t *remembered = memory->material, lifted = uneven ? MATERIAL_FREE : MATERIAL_NONE;
