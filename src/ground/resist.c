@@ -27,14 +27,14 @@ static const double A00 = 0.206, A10 = 0.169, B11 = 0.212, B01 = 0.358, BM11 = 0
 static const double C11 = -0.124, C01 = 0.253, CM11 = 0.007, D10 = 0.088;
 
 /* c2, s2: cosine and sine of 2 beta; c, s: of gamma. */
-static void plane_alpha(double c2, double s2, double c, double s, double alpha[2]) {
+ALWAYS_INLINE void plane_alpha(double c2, double s2, double c, double s, double *ax, double *az) {
     double sum = s2 * c + c2 * s, difference = c2 * s - s2 * c; /* sin(2 beta + gamma), sin(-2 beta + gamma) */
-    alpha[0] = C11 * (c2 * c - s2 * s) + C01 * c + CM11 * difference + D10 * s2;
-    alpha[1] = A00 + A10 * c2 + B11 * sum + B01 * s + BM11 * difference;
+    *ax = C11 * (c2 * c - s2 * s) + C01 * c + CM11 * difference + D10 * s2;
+    *az = A00 + A10 * c2 + B11 * sum + B01 * s + BM11 * difference;
 }
 
 void mild_resist_plane(double beta, double gamma, double alpha[2]) {
-    plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma), alpha);
+    plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma), &alpha[0], &alpha[1]);
 }
 
 /* Powers of x1 = sin(gamma) = -v_z, x2 = cos(beta) = -n_z, x3 = n . v, and the coefficients of f1, f2, f3 (Agarwal et al.
@@ -47,80 +47,129 @@ static const double space_coefficients[3][20] = {
     {-0.02634, -0.03436, 0.45256,  0.00835,  0.02553, -1.31290, -0.05532, 0.06790,  -0.16404, 0.02287,
      0.02927,  0.95406,  -0.00131, -0.11028, 0.01487, -0.02730, 0.10911,  -0.04097, 0.07881,  -0.27519}};
 
+/* Those polynomials for one plate, x2 held: of 1, x1, x3, x1^2, x1 x3, x3^2, x1^3, x1^2 x3, x1 x3^2, x3^3. */
+typedef double Cubic[10];
+
+static void cubic_at(const double *c, double y, Cubic a) {
+    const double square = y * y;
+    a[0] = c[0] + c[2] * y + c[5] * square + c[11] * square * y;
+    a[1] = c[1] + c[7] * y + c[13] * square;
+    a[2] = c[3] + c[8] * y + c[16] * square;
+    a[3] = c[4] + c[14] * y;
+    a[4] = c[9] + c[19] * y;
+    a[5] = c[6] + c[15] * y;
+    a[6] = c[10];
+    a[7] = c[17];
+    a[8] = c[18];
+    a[9] = c[12];
+}
+
+ALWAYS_INLINE double cubic(const double *a, double x, double z) {
+    return a[0] + x * (a[1] + x * (a[3] + x * a[6])) + z * (a[2] + z * (a[5] + z * a[9]) + x * (a[4] + x * a[7] + z * a[8]));
+}
+
 void mild_resist_space(const double normal[3], const double direction[3], double alpha[3]) {
-    double x = -direction[2], y = -normal[2], z = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
-    const double powers[20] = {1.0,       x,         y,         z,         x * x,     y * y,     z * z,
-                               x * y,     y * z,     z * x,     x * x * x, y * y * y, z * z * z, x * y * y,
-                               y * x * x, y * z * z, z * y * y, z * x * x, x * z * z, x * y * z};
-    double f[3] = {0.0, 0.0, 0.0};
-    for (int k = 0; k < 3; k++)
-        for (int i = 0; i < 20; i++) f[k] += space_coefficients[k][i] * powers[i];
+    double x = -direction[2], z = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2], f[3];
+    for (int k = 0; k < 3; k++) {
+        Cubic a;
+        cubic_at(space_coefficients[k], -normal[2], a);
+        f[k] = cubic(a, x, z);
+    }
     double scale = z < 0.0 ? 0.0 : 1.0 / RESIST_LEVEL; /* a trailing face feels nothing */
     for (int k = 0; k < 3; k++) alpha[k] = scale * (f[0] * normal[k] + f[1] * direction[k] - (k == 2 ? f[2] : 0.0));
 }
 
-/* How an element moves: horizontal speed and unit heading (0 when neither motion nor tilt gives one), downward speed. */
+/* The sole as a plate: its normal into the ground, and the polynomials at that normal. */
 typedef struct {
-    double speed, x, y, down;
-} Way;
+    double normal[3], tilt;
+    Cubic f[3];
+} Plate;
 
-static Way element_way(double vx, double vy, double down, const double *normal) {
-    double tilt = sqrt(normal[0] * normal[0] + normal[1] * normal[1]) + STEP_TINY;
-    double x = vx + RESIST_REST * normal[0] / tilt, y = vy + RESIST_REST * normal[1] / tilt, length = sqrt(x * x + y * y);
-    double scale = length > STEP_TINY ? 1.0 / length : 0.0;
-    return (Way){sqrt(vx * vx + vy * vy), x * scale, y * scale, step_max(down, 0.0)};
+static Plate plate_of(const double *rotation) {
+    double side = rotation[8] > 0.0 ? -1.0 : 1.0; /* of the sole's two faces the one that looks down */
+    Plate plate = {.normal = {side * rotation[2], side * rotation[5], step_min(side * rotation[8], -1e-6)}};
+    plate.tilt = sqrt(plate.normal[0] * plate.normal[0] + plate.normal[1] * plate.normal[1]) + STEP_TINY;
+    for (int k = 0; k < 3; k++) cubic_at(space_coefficients[k], -plate.normal[2], plate.f[k]);
+    return plate;
 }
 
-/* alpha_x resisting the heading at level, downward speeds (level, down), and alpha_z. */
-static void way_alpha(int model, const Way *way, const double *normal, double level, double down, double alpha[2]) {
+/* alpha_x against the heading at level and downward speeds, and alpha_z; lean: the normal's part along the heading. */
+ALWAYS_INLINE void plate_alpha(const Plate *plate, int model, double lean, double level, double down, double *ax, double *az) {
     double scale = 1.0 / sqrt(level * level + down * down), c = level * scale, s = down * scale;
     if (model == MILD_MODEL_ECC_QUASI) {
-        double slope = (normal[0] * way->x + normal[1] * way->y) / -normal[2], whole = 1.0 / (1.0 + slope * slope);
-        plane_alpha((1.0 - slope * slope) * whole, 2.0 * slope * whole, c, s, alpha);
-        return;
+        double slope = lean * (-1.0 / plate->normal[2]), whole = 1.0 / (1.0 + slope * slope);
+        plane_alpha((1.0 - slope * slope) * whole, 2.0 * slope * whole, c, s, ax, az);
+    } else {
+        double z = lean * c - plate->normal[2] * s, faces = z < 0.0 ? 0.0 : 1.0 / RESIST_LEVEL;
+        double f1 = cubic(plate->f[0], s, z), f2 = cubic(plate->f[1], s, z), f3 = cubic(plate->f[2], s, z);
+        *ax = -faces * (f1 * lean + f2 * c);
+        *az = faces * (f1 * plate->normal[2] - f2 * s - f3);
     }
-    const double direction[3] = {c * way->x, c * way->y, -s};
-    double force[3];
-    mild_resist_space(normal, direction, force);
-    alpha[0] = -(force[0] * way->x + force[1] * way->y);
-    alpha[1] = force[2];
 }
 
-static void slot_resist(const Slots *s, int i, double dt, double sideways, double downward) {
+ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, double sideways, double downward) {
     double u0 = s->depth[i], m0 = s->middle[i], level = s->strength[i], peak = RESIST_PEAK * level;
     double share = step_min(step_max(downward / RESIST_PEAK, 0.0), 1.0), lead = CONTACT_ELASTIC * (1.0 - share);
     double led = m0 > 0.0 ? step_min(m0 + lead, m0 / (share + STEP_TINY)) : 0.0, deep = step_max(led, s->deep[i]);
-    double in_bed = deep - s->bed[i], bed = in_bed > 0.0 ? s->bed_stiffness[i] : 0.0, force = peak * deep + bed * in_bed;
-    double line = step_max(force / (step_min(CONTACT_ELASTIC, deep) + STEP_TINY), peak + bed), slack = deep - force / line;
+    double in_bed = deep - s->bed[i], stiffness = s->bed_stiffness[i], bed = in_bed > 0.0 ? stiffness : 0.0;
+    double force = peak * deep + bed * in_bed;
+    double line = step_max(force / (step_min(CONTACT_ELASTIC, deep) + STEP_TINY), peak + bed), inverse = 1.0 / line;
+    double slack = deep - force * inverse, front = slack + (share * peak * deep + bed * in_bed) * inverse;
     s->cone[i] = share * peak;
     s->deep[i] = deep;
     s->line[i] = line;
     s->slack[i] = slack;
-    s->front[i] = slack + (share * peak * deep + bed * in_bed) / line;
-    s->reach[i] = step_max(2.0 * (s->front[i] - u0) / dt, 0.0);
+    s->front[i] = front;
+    s->reach[i] = step_max(2.0 * (front - u0) * rate, 0.0);
     s->drift_radius[i] += dt * level * step_max(sideways, 0.0) * step_max(u0, 0.0);
-    slot_grip(s, i, dt, 1.0 / dt, share * peak * deep + bed * in_bed);
+    slot_grip(s, i, dt, rate, share * peak * deep + bed * in_bed);
 }
 
-static int any_resistive(const MildTerrain *terrain) {
+/* The slots from `start` on that stand on this model. */
+ALWAYS_INLINE void slots_model(const Slots *slot, int start, int end, double dt, const Plate *sole, const Motion *now, int model) {
+    const Slots local = *slot, *s = &local;
+    const Plate plate = *sole;
+    const Motion m = *now;
+    double rate = 1.0 / dt, rest_x = RESIST_REST * plate.normal[0] / plate.tilt, rest_y = RESIST_REST * plate.normal[1] / plate.tilt;
+#pragma omp simd
+    for (int i = start; i < end; i++) {
+        double x = s->x[i], y = s->y[i], vx = m.x[0] + m.x[1] * x + m.x[2] * y, vy = m.y[0] + m.y[1] * x + m.y[2] * y;
+        double w = s->slope_x[i] * vx + s->slope_y[i] * vy - (m.z[0] + m.z[1] * x + m.z[2] * y), down = step_max(w, 0.0);
+        /* heading: of the motion, at rest of the tilt; any where there is neither, as a level plate's are all alike */
+        double hx = vx + rest_x, hy = vy + rest_y, length = sqrt(hx * hx + hy * hy), scale = 1.0 / (length + STEP_TINY);
+        double lean = (plate.normal[0] * hx + plate.normal[1] * hy) * scale;
+        double moves = sqrt(vx * vx + vy * vy), speed = moves * FRICTION_LAG < 1.0 ? 0.0 : moves; /* friction may hold it yet */
+        double down_x, down_z, level_x, level_z;
+        plate_alpha(&plate, model, lean, speed, down + RESIST_REST, &down_x, &down_z);
+        plate_alpha(&plate, model, lean, speed + RESIST_REST, down, &level_x, &level_z);
+        slot_resist(s, i, dt, rate, level_x, down_z);
+    }
+}
+
+/* Bool: there is such a material; only: there is no other. */
+static int terrain_resists(const MildTerrain *terrain, int model, int *only) {
     int any = 0;
-    for (int m = 0; m < terrain->material_count; m++) any |= model_is_resistive(terrain->materials[m].model);
+    *only = 1;
+    for (int m = 0; m < terrain->material_count; m++) {
+        any |= terrain->materials[m].model == model;
+        *only &= terrain->materials[m].model == model;
+    }
     return any;
 }
 
 void slots_resist(const FootScratch *foot, const MildTerrain *terrain, double dt, const double *rotation, const Motion *now) {
-    if (!any_resistive(terrain)) return;
+    static const int models[2] = {MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D};
     const Slots *s = &foot->slot;
-    double side = rotation[8] > 0.0 ? -1.0 : 1.0; /* of the sole's two faces the one that looks down */
-    const double normal[3] = {side * rotation[2], side * rotation[5], step_min(side * rotation[8], -1e-6)};
-    for (int i = 0; i < foot->active; i++) {
-        int model = terrain->materials[foot->slot_material[i] & 0xff].model; /* the nearer one's */
-        if (!model_is_resistive(model) || s->flat[i] != 0.0) continue; /* blended with a cone: as a level plate */
-        double x = s->x[i], y = s->y[i], down[2], level[2];
-        Way way = element_way(motion_at(now->x, x, y), motion_at(now->y, x, y), slot_descent(s, i, now), normal);
-        if (way.speed * FRICTION_LAG < 1.0) way.speed = 0.0; /* friction may hold it yet */
-        way_alpha(model, &way, normal, way.speed, way.down + RESIST_REST, down);
-        way_alpha(model, &way, normal, way.speed + RESIST_REST, way.down, level);
-        slot_resist(s, i, dt, level[0], down[1]);
+    for (int k = 0; k < 2; k++) {
+        int only, model = models[k];
+        if (!terrain_resists(terrain, model, &only)) continue;
+        Plate plate = plate_of(rotation);
+        if (only && k == 0) slots_model(s, 0, foot->active, dt, &plate, now, MILD_MODEL_ECC_QUASI);
+        if (only && k == 1) slots_model(s, 0, foot->active, dt, &plate, now, MILD_MODEL_ECC_QUASI_3D);
+        for (int i = 0; !only && i < foot->active; i++) {
+            if (terrain->materials[foot->slot_material[i] & 0xff].model != model) continue; /* the nearer one's */
+            if (s->flat[i] != 0.0) continue; /* blended with a cone: as a level plate */
+            slots_model(s, i, i + 1, dt, &plate, now, model);
+        }
     }
 }
