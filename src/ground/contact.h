@@ -121,13 +121,10 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain, const 
 void contact_pass(MildScratch *scratch, double dt, const double *twist, int first);
 /* The same with the bounds of friction held at slot.bound, which makes the impulses minus the gradient of a convex function. */
 void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int first);
-/* Moves these by a share of the way to what the normal impulses of the last pass ask for. */
+/* Moves these by a share of the way to what the normal impulses of the last pass ask for; share = 1 sets them. */
 void contact_bounds(MildScratch *scratch, double share);
 /* hessian from the derivatives of the last pass. */
 void contact_hessian(MildScratch *scratch);
-/* sqrt(R^T A R) for R = P - wrench: the residual in the metric of kinetic energy. */
-double contact_residual(int n, const double *inverse_inertia, const double *impulse, const double *wrench);
-
 /* A foot's velocity field: that of the element at (x, y) in its frame has the component x[0] + x[1] x + x[2] y along the world's
  * x axis, and so on. */
 typedef struct {

@@ -106,8 +106,10 @@ void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int
 void contact_bounds(MildScratch *scratch, double share) {
     for (int f = 0; f < scratch->feet; f++) {
         const Slots *s = &scratch->foot[f].slot;
-        for (int i = 0; i < foot_end(&scratch->foot[f]); i++)
-            s->bound[i] += share * (s->mu[i] * s->iz[i] + s->drift_radius[i] - s->bound[i]);
+        for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
+            double now = s->mu[i] * s->iz[i] + s->drift_radius[i];
+            s->bound[i] = share < 1.0 ? s->bound[i] + share * (now - s->bound[i]) : now; /* at first it may be anything */
+        }
     }
 }
 
@@ -196,14 +198,4 @@ void contact_hessian(MildScratch *scratch) {
         foot_moments(foot, sums);
         foot_hessian(foot, sums, scratch->hessian[f]);
     }
-}
-
-double contact_residual(int n, const double *inverse_inertia, const double *impulse, const double *wrench) {
-    double sum = 0.0;
-    for (int i = 0; i < n; i++) {
-        double row = 0.0;
-        for (int j = 0; j < n; j++) row += inverse_inertia[i * n + j] * (impulse[j] - wrench[j]);
-        sum += (impulse[i] - wrench[i]) * row;
-    }
-    return sqrt(fmax(sum, 0.0));
 }

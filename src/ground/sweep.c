@@ -91,7 +91,7 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
         const FootScratch *foot = &scratch->foot[f];
         const Slots *s = &foot->slot;
         const Motion motion = foot_motion(foot, input->velocity[f]);
-        for (int i = 0; i < scratch->foot[f].active; i++) {
+        for (int i = 0; i < foot_end(foot); i++) { /* so that the padding holds 0 */
             double slope, p[3];
             slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
@@ -122,6 +122,17 @@ static void sweep_wrench(const MildScratch *scratch, double *wrench) {
     }
 }
 
+/* sqrt(x^T A x), x = a - b: in the metric of kinetic energy. */
+static double sweep_distance(const Sweep *sweep, const double *a, const double *b) {
+    double sum = 0.0;
+    for (int i = 0; i < sweep->n; i++) {
+        double row = 0.0;
+        for (int j = 0; j < sweep->n; j++) row += sweep->A[i * sweep->n + j] * (a[j] - b[j]);
+        sum += (a[i] - b[i]) * row;
+    }
+    return sqrt(fmax(sum, 0.0));
+}
+
 void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
     Sweep sweep = {.n = 6 * scratch->feet, .dt = input->dt, .A = input->inverse_inertia};
     static const double zero[TWIST_MAX];
@@ -139,8 +150,8 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
             for (int i = 0; i < scratch->foot[f].active; i++)
                 sweep_element(&sweep, &scratch->foot[f], f, i);
         sweep_wrench(scratch, wrench);
-        change = contact_residual(sweep.n, sweep.A, before, wrench);
-        scale = contact_residual(sweep.n, sweep.A, wrench, zero);
+        change = sweep_distance(&sweep, wrench, before);
+        scale = sweep_distance(&sweep, wrench, zero);
         if (isnan(change)) break;
     }
     result->iterations = iterations;
