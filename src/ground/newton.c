@@ -19,6 +19,8 @@ typedef union {
     Vector part[NEWTON_VECTORS];
 } Row;
 
+_Static_assert(TWIST_MAX < NEWTON_LANES, "a row holds all feet and a right side");
+
 /* The loaded feet's rows of the problem: `first` is the row of the first one; what lies beyond the last is zero. */
 typedef struct {
     Row A[TWIST_MAX], free;
@@ -44,6 +46,10 @@ static void system_open(System *system, const MildScratch *scratch, const MildCo
     system->tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
     system->limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
     system->dt = input->dt;
+}
+
+static int least(int a, int b) {
+    return a < b ? a : b;
 }
 
 /* All that follows is compiled for one and for two loaded feet: n rows in `parts` vectors. */
@@ -151,96 +157,100 @@ ALWAYS_INLINE void point_halve(const System *system, MildScratch *scratch, const
     }
 }
 
-/* Newton's method from the point `at`, whose pass has been made. Standing takes one step, walking two to four. */
-ALWAYS_INLINE int newton_plain(const System *system, MildScratch *scratch, Point *at, int limit, int n, int parts) {
-    Point next;
-    int steps = 0;
-    while (steps < limit && point_newton(system, scratch, at, &next, n, parts)) {
+ALWAYS_INLINE int point_solves(const System *system, const Point *point, int n, int parts) {
+    return point->residual <= system->tolerance * system_norm(system, point->impulse.at, n, parts);
+}
+
+/* Newton's method from the best point so far, whose pass has been made; leaves there the best that it has seen. Returns the
+ * steps done. */
+ALWAYS_INLINE int newton_plain(const System *system, MildScratch *scratch, Point *best, int limit, int n, int parts) {
+    Point at = *best, next;
+    int steps = 0, solved = 0;
+    while (!solved && steps < limit && point_newton(system, scratch, &at, &next, n, parts)) {
         steps++;
         point_evaluate(system, scratch, &next, n, parts);
-        if (!(next.residual < at->residual)) point_halve(system, scratch, at, &next, n, parts);
-        *at = next;
-        if (at->residual <= system->tolerance * system_norm(system, at->impulse.at, n, parts)) break;
+        if (!(next.residual < at.residual)) point_halve(system, scratch, &at, &next, n, parts);
+        at = next;
+        solved = point_solves(system, &at, n, parts);
+        if (solved || at.residual < best->residual) *best = at;
     }
     return steps;
 }
 
-/* Slope along the step from one point to another of the function that held bounds make: (P - W)^T A dP. */
-static double step_slope(const System *system, MildScratch *scratch, const Point *from, const Point *to, double t, Point *point, int n) {
+/* Slope along the step between two points of the function that held bounds make, at a point whose pass was the last:
+ * (P - W)^T A dP. */
+static double step_slope(const System *system, const MildScratch *scratch, const Point *at, const Point *from, const Point *to,
+                         int n) {
     double slope = 0.0;
-    point_between(from, to, t, point, n);
-    contact_pass_held(scratch, system->dt, point->twist.at, system->first);
     for (int i = 0; i < n; i++)
-        slope += (point->impulse.at[i] - scratch->wrench[system->first + i]) * (to->twist.at[i] - from->twist.at[i]);
+        slope += (at->impulse.at[i] - scratch->wrench[system->first + i]) * (to->twist.at[i] - from->twist.at[i]);
     return slope;
 }
 
-/* Where the bounds' dependence on I_z leads Newton's method astray, or it runs in circles over kinks: with the bounds held, the
- * step is the minimum of a convex function, and a search along each step finds it from anywhere. Bounds and minimum follow each
- * other, with shorter steps when they do not come closer. */
+/* With the bounds of friction held the step is the minimum of a convex function, and a search along each step finds it from
+ * anywhere. */
 static int newton_held(const System *system, MildScratch *scratch, Point *at, int limit, int n) {
-    int steps = 0;
-    Point next, middle;
-    while (steps < limit) {
-        contact_pass_held(scratch, system->dt, at->twist.at, system->first);
-        if (!point_newton(system, scratch, at, &next, n, NEWTON_VECTORS)) break;
+    int steps = 0, moves = 1;
+    Point full, next;
+    contact_pass_held(scratch, system->dt, at->twist.at, system->first);
+    while (moves && steps < limit && point_newton(system, scratch, at, &full, n, NEWTON_VECTORS)) {
         steps++;
-        double start = step_slope(system, scratch, at, &next, 0.0, &middle, n);
-        double end = step_slope(system, scratch, at, &next, 1.0, &middle, n), low = 0.0, high = 1.0;
-        for (int k = 0; k < NEWTON_SEARCH && fabs(end) > 0.1 * fabs(start); k++) {
-            if (end < 0.0 && high == 1.0) break;
-            double t = 0.5 * (low + high);
-            end = step_slope(system, scratch, at, &next, t, &middle, n);
+        double start = step_slope(system, scratch, at, at, &full, n), end, low = 0.0, high = 1.0, t = 1.0;
+        for (int k = 0; k <= NEWTON_SEARCH; k++) {
+            point_between(at, &full, t, &next, n);
+            contact_pass_held(scratch, system->dt, next.twist.at, system->first);
+            end = step_slope(system, scratch, &next, at, &full, n);
+            if (!(fabs(end) > 0.1 * fabs(start)) || (end < 0.0 && t == 1.0)) break;
             *(end < 0.0 ? &low : &high) = t;
+            t = 0.5 * (low + high);
         }
-        double moved[TWIST_MAX];
-        for (int i = 0; i < n; i++) moved[i] = middle.impulse.at[i] - at->impulse.at[i];
-        *at = middle;
-        if (system_norm(system, moved, n, NEWTON_VECTORS) <= 0.1 * system->tolerance * system_norm(system, at->impulse.at, n, NEWTON_VECTORS)) break;
+        double moved[TWIST_MAX], scale = system_norm(system, next.impulse.at, n, NEWTON_VECTORS);
+        for (int i = 0; i < n; i++) moved[i] = next.impulse.at[i] - at->impulse.at[i];
+        *at = next;
+        moves = !(system_norm(system, moved, n, NEWTON_VECTORS) <= 0.1 * system->tolerance * scale);
     }
     return steps;
 }
 
+/* Where the bounds' dependence on I_z leads Newton's method astray, or it runs in circles over kinks: minimum at held bounds
+ * and bounds at the minimum follow each other, with shorter steps when they do not come closer. */
 static int newton_patient(const System *system, MildScratch *scratch, Point *best, int limit, int n) {
     Point at = *best;
     int steps = 0;
     double share = 1.0, last = INFINITY;
+    if (isinf(at.residual)) at.twist = system->free; /* without an impulse */
     contact_pass(scratch, system->dt, at.twist.at, system->first);
     contact_bounds(scratch, 1.0);
-    for (int round = 0; steps < limit; round++) {
-        int held = newton_held(system, scratch, &at, limit - steps < NEWTON_ROUND ? limit - steps : NEWTON_ROUND, n);
+    for (int round = 1; steps < limit && !point_solves(system, best, n, NEWTON_VECTORS); round++) {
+        int held = newton_held(system, scratch, &at, least(limit - steps, NEWTON_ROUND), n);
         if (held == 0) break; /* the numbers have gone bad */
         steps += held;
         point_evaluate(system, scratch, &at, n, NEWTON_VECTORS);
         contact_bounds(scratch, share);
         Point tried = at;
-        if (steps < limit) steps += newton_plain(system, scratch, &tried, limit - steps < NEWTON_TRY ? limit - steps : NEWTON_TRY, n, NEWTON_VECTORS);
+        steps += newton_plain(system, scratch, &tried, least(limit - steps, NEWTON_TRY), n, NEWTON_VECTORS);
         if (tried.residual < best->residual) *best = tried;
-        if (at.residual < best->residual) *best = at;
-        if (best->residual <= system->tolerance * system_norm(system, best->impulse.at, n, NEWTON_VECTORS)) break;
-        if (round % 4 == 3) {
-            if (at.residual > 0.5 * last) share = fmax(0.5 * share, 0.02);
-            last = at.residual;
-        }
+        if (round % 4 > 0) continue;
+        if (at.residual > 0.5 * last) share = fmax(0.5 * share, 0.02);
+        last = at.residual;
     }
-    contact_pass(scratch, system->dt, best->twist.at, system->first);
     return steps;
 }
 
-ALWAYS_INLINE void system_solve(const System *system, MildScratch *scratch, const double *start, MildContactResult *result, int n, int parts) {
-    Point at = {.residual = INFINITY};
-    memcpy(at.twist.at, start, (size_t)n * sizeof(double));
-    contact_pass(scratch, system->dt, at.twist.at, system->first);
-    int plain = system->limit < NEWTON_PLAIN ? system->limit : NEWTON_PLAIN;
-    int steps = newton_plain(system, scratch, &at, plain, n, parts);
-    double scale = system_norm(system, at.impulse.at, n, parts);
-    if (!(at.residual <= system->tolerance * scale) && steps < system->limit) {
-        steps += newton_patient(system, scratch, &at, system->limit - steps, n);
-        scale = system_norm(system, at.impulse.at, n, parts);
+ALWAYS_INLINE void system_solve(const System *system, MildScratch *scratch, const double *start, MildContactResult *result, int n,
+                                int parts) {
+    Point best = {.residual = INFINITY};
+    memcpy(best.twist.at, start, (size_t)n * sizeof(double));
+    contact_pass(scratch, system->dt, best.twist.at, system->first);
+    int steps = newton_plain(system, scratch, &best, least(system->limit, NEWTON_PLAIN), n, parts);
+    if (!point_solves(system, &best, n, parts)) {
+        steps += newton_patient(system, scratch, &best, system->limit - steps, n);
+        contact_pass(scratch, system->dt, best.twist.at, system->first);
     }
+    double scale = system_norm(system, best.impulse.at, n, parts);
     result->iterations = steps;
-    result->residual = scale > 0.0 ? at.residual / scale : at.residual;
-    result->converged = at.residual <= system->tolerance * scale;
+    result->residual = scale > 0.0 ? best.residual / scale : best.residual;
+    result->converged = best.residual <= system->tolerance * scale;
 }
 
 void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
