@@ -204,7 +204,8 @@ typedef struct {
     double position[MILD_FEET_MAX][3];     /* [m] ankle, world */
     double rotation[MILD_FEET_MAX][9];     /* [-] foot -> world, row major, orthonormal */
     double velocity[MILD_FEET_MAX][6];     /* [m/s, rad/s] twist at the ankle (linear, angular), world axes, now */
-    double inverse_inertia[6 * MILD_FEET_MAX * 6 * MILD_FEET_MAX]; /* [1/kg, ...] A = J M^-1 J^T, row major with stride 6*feet, symmetric PSD, may be singular */
+    double inverse_inertia[6 * MILD_FEET_MAX * 6 * MILD_FEET_MAX]; /* [1/kg, ...] A = J M^-1 J^T, row major with stride
+                                                                      6*feet, symmetric PSD, may be singular */
     double free_velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] V^ = J (nu + dt M^-1 (tau - b)): twists without ground */
     MildSolver solver;  /* which of the two */
     double tolerance;   /* [-] of the residual; 0 = default, 1e-9 (sweeps 1e-10) */
@@ -230,7 +231,7 @@ typedef struct {
     double velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] twists at the ankles after the step, V+ = V^ + A W */
     double residual;   /* [-] relative, in the metric of kinetic energy, at exit */
     int iterations;    /* Newton steps or sweeps done */
-    int converged;     /* bool; 0 whenever a pose or a result is not finite, or dt is not positive */
+    int converged;     /* bool; 0 whenever a pose or a result is not finite, a material's number NaN, or dt not positive */
 } MildContactResult;
 
 /* ---- memory and working arrays (docs/model.md section 5) ---- */

@@ -18,7 +18,8 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         foot->tangent_y[e] = s->iy[i] * rate;
         foot->flat[e] = open > 0.0 ? open * open : 0.0;
         foot->state[e] = (uint8_t)(!loaded ? MILD_ELEMENT_FREE : deeper ? MILD_ELEMENT_VIRGIN : MILD_ELEMENT_UNLOADING);
-        foot->slip[e] = loaded && friction_slides(s, i, motion_at(motion.x, s->x[i], s->y[i]), motion_at(motion.y, s->x[i], s->y[i]));
+        double vx = motion_at(motion.x, s->x[i], s->y[i]), vy = motion_at(motion.y, s->x[i], s->y[i]);
+        foot->slip[e] = loaded && friction_slides(s, i, vx, vy);
     }
 }
 
@@ -116,7 +117,11 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain, con
         newton_solve(scratch, input, result);
     }
     memcpy(scratch->velocity, result->velocity, bytes);
-    for (int f = 0; f < scratch->feet; f++)
-        if (scratch->foot[f].active > 0) foot_result(scratch, input, f, &result->foot[f]);
-    result->converged = result->converged && all_finite(input, result, scratch->feet);
+    int nan = 0;
+    for (int f = 0; f < scratch->feet; f++) {
+        if (scratch->foot[f].active == 0) continue;
+        foot_result(scratch, input, f, &result->foot[f]);
+        nan |= scratch->foot[f].nan;
+    }
+    result->converged = result->converged && !nan && all_finite(input, result, scratch->feet);
 }

@@ -63,7 +63,8 @@ typedef struct {
     double *mu, *drift_radius, *damping; /* [-], [N s], [N s/m * s] */
     double *hold_x, *hold_y, *grip;      /* [N s], [N s], [kg] friction at rest: dt the force held, dt^2 its stiffness */
     double *k_drift, *b_drift, *recovery, *mass_rate; /* material, for the preparation */
-    double *depth_max, *remembered_middle, *remembered_speed, *drift, *pending_x, *pending_y, *held_x, *held_y, *held_grip; /* memory */
+    double *depth_max, *remembered_middle, *remembered_speed, *drift; /* memory */
+    double *pending_x, *pending_y, *held_x, *held_y, *held_grip;
     double *strength; /* [N/m] the law's cone before it depends on direction; resistive force theory, see resist.c */
     /* written by the passes */
     double *ix, *iy, *iz;                         /* [N s] impulse */
@@ -78,12 +79,13 @@ typedef struct {
 typedef struct {
     MildMaterial material;
     Law law;
-    int known;
+    int known, nan; /* bools; nan: a number of it is none */
 } DerivedLaw;
 
 typedef struct {
     int elements, padded, active; /* active: slots in use */
     int whole; /* bool: element[] lists all */
+    int nan;   /* bool: a material of the terrain is not a number */
     int bent;                            /* bool: the slots' bend, stopped and explicit_impulse are not all 0 */
     int uneven;                          /* bool: the ground under it is not level; otherwise all its slopes are 0 */
     double origin[3]; /* [m] the ankle, world */

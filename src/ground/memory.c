@@ -39,8 +39,9 @@ Memory ground_memory(const MildGround *ground, int foot) {
     /* The one place where the block is seen as arrays; callers of a const ground only read through it. */
     double *at = (double *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground->padded, foot));
     Memory memory;
-    double **arrays[] = {&memory.depth_max, &memory.middle, &memory.front_speed, &memory.drift,  &memory.pending_x, &memory.pending_y,
-                         &memory.held_x,    &memory.held_y, &memory.grip,        &memory.plane, &memory.slope_x,   &memory.slope_y};
+    double **arrays[] = {&memory.depth_max, &memory.middle, &memory.front_speed, &memory.drift, &memory.pending_x,
+                         &memory.pending_y, &memory.held_x, &memory.held_y,      &memory.grip,  &memory.plane,
+                         &memory.slope_x,   &memory.slope_y};
     for (int k = 0; k < MEMORY_DOUBLES; k++, at += ground->padded[foot]) *arrays[k] = at;
     memory.material = (int32_t *)at;
     return memory;
@@ -150,8 +151,8 @@ static void element_print(const Advance *a, const Memory *memory, int i, int e, 
 
 /* The memory of an element that stays in the ground, or forgets. Branch-free, so that it runs in vectors; chosen, not multiplied
  * by 0, which would keep what is not a number. */
-ALWAYS_INLINE void element_advance(const Slots *s, const Memory *memory, int i, int e, double dt, double rate, double vx, double vy,
-                                   double w, double m1, double stays) {
+ALWAYS_INLINE void element_advance(const Slots *s, const Memory *memory, int i, int e, double dt, double rate, double vx,
+                                   double vy, double w, double m1, double stays) {
     double front = s->front[i], reach = s->reach[i], depth_max = s->deep[i] + step_max(m1 - front, 0.0);
     /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the next step. */
     double before = s->front_speed[i] > reach || !(s->depth_max[i] > 0.0) ? 0.0 : reach, speed = w - before;

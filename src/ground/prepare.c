@@ -82,13 +82,24 @@ static int mixture_has(int32_t mixture, int m) {
     return mixture >= 0 && ((mixture & 0xff) == m || (mixture >> 16 > 0 && (mixture >> 8 & 0xff) == m));
 }
 
+static int law_is_nan(const Law *law, const MildMaterial *m) {
+    double sum = law->flat + law->cone + law->full + law->mass + law->drag + law->bed_stiffness;
+    return isnan(sum + law->inverse_full + m->mu + m->k_drift + m->b_drift + m->recovery) || isnan(law->bed);
+}
+
 /* Derives the laws of the terrain's materials anew where their numbers have changed. */
 static void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
+    foot->nan = 0;
     for (int m = 0; m < terrain->material_count; m++) {
         DerivedLaw *derived = &foot->derived[m];
         const MildMaterial *wanted = &terrain->materials[m];
-        if (derived->known && memcmp(&derived->material, wanted, sizeof *wanted) == 0) continue;
-        *derived = (DerivedLaw){*wanted, law_of(wanted, foot->pitch), 1};
+        if (derived->known && memcmp(&derived->material, wanted, sizeof *wanted) == 0) {
+            foot->nan |= derived->nan;
+            continue;
+        }
+        *derived = (DerivedLaw){*wanted, law_of(wanted, foot->pitch), 1, 0};
+        derived->nan = law_is_nan(&derived->law, wanted);
+        foot->nan |= derived->nan;
         for (int i = 0; i < foot->padded; i++)
             if (mixture_has(foot->slot_material[i], m)) foot->slot_material[i] = MATERIAL_NONE;
     }
@@ -197,9 +208,10 @@ static void slots_gather(FootScratch *foot, const Memory *memory) {
     slots_pad(foot);
 }
 
-/* Uneven ground under the slots; before: it was uneven in the last step, too. The step takes the ground under an element for its tangent plane there. Where the ground
- * rises faster, the element would find itself deeper without having been pressed down, with energy from nowhere; so an
- * element goes on from the depth that the last step's plane gives, if that is less, as long as it stays in the ground. */
+/* Uneven ground under the slots; before: it was uneven in the last step, too. The step takes the ground under an element for
+ * its tangent plane there. Where the ground rises faster, the element would find itself deeper without having been pressed
+ * down, with energy from nowhere; so an element goes on from the depth that the last step's plane gives, if that is less, as
+ * long as it stays in the ground. */
 static void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory, double height) {
     const Slots *s = &foot->slot;
     for (int i = 0; i < foot->active; i++) {
@@ -258,7 +270,8 @@ static void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
         double c0 = step_max(1.0 - a * s->inverse_full[i], 0.0), c1 = step_max(1.0 - b * s->inverse_full[i], 0.0);
         double square = c0 * c0, cube = square * c0, slope = s->flat[i] * square + s->cone[i];
         double force = s->flat[i] * third * (1.0 - cube) + s->cone[i] * a + 0.5 * slope * (b - a);
-        double gain = step_max(slot_descent(s, i, &after) - slot_descent(s, i, &before), 0.0) / dt * step_max(a - s->middle[i], 0.0);
+        double faster = step_max(slot_descent(s, i, &after) - slot_descent(s, i, &before), 0.0);
+        double gain = faster / dt * step_max(a - s->middle[i], 0.0);
         double drag = extra > 0.0 ? sinks : 0.0, hit = sqrt(speed * speed + 2.0 * drag * gain);
         double still = step_min(STEP_STILL + sqrt(force / (extra * square * hit * hit + STEP_TINY)), STEP_STILL_MOST);
         s->speed[i] = hit;
@@ -278,7 +291,8 @@ ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, Motion n
         double x = s->x[i], y = s->y[i], u0 = s->depth[i], used = s->depth_max[i];
         double w_now = -(now.z[0] + now.z[1] * x + now.z[2] * y);
         if (uneven)
-            w_now += s->slope_x[i] * (now.x[0] + now.x[1] * x + now.x[2] * y) + s->slope_y[i] * (now.y[0] + now.y[1] * x + now.y[2] * y);
+            w_now += s->slope_x[i] * (now.x[0] + now.x[1] * x + now.x[2] * y) +
+                     s->slope_y[i] * (now.y[0] + now.y[1] * x + now.y[2] * y);
         double old = s->remembered_middle[i], m0 = old > 0.0 ? old : u0 - 0.5 * dt * w_now, a = step_max(step_max(m0, used), 0.0);
         double c0 = step_max(1.0 - a * s->inverse_full[i], 0.0), flat_share = s->full[i] * (1.0 / 3.0) * (1.0 - c0 * c0 * c0);
         double in_bed = a - s->bed[i], bed_stiffness = s->bed_stiffness[i], bed = in_bed > 0.0 ? bed_stiffness : 0.0;
@@ -326,7 +340,8 @@ static void slots_unbend(const FootScratch *foot) {
     memset(foot->own.explicit_impulse, 0, bytes);
 }
 
-static void foot_prepare(FootScratch *foot, const MildGround *ground, int f, const MildTerrain *terrain, const MildContactInput *input) {
+static void foot_prepare(FootScratch *foot, const MildGround *ground, int f, const MildTerrain *terrain,
+                         const MildContactInput *input) {
     const Memory memory = ground_memory(ground, f);
     const double *R = input->rotation[f];
     foot_laws(foot, terrain);

@@ -126,11 +126,12 @@ ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, do
 }
 
 /* The slots from `start` on that stand on this model. */
-ALWAYS_INLINE void slots_model(const Slots *slot, int start, int end, double dt, const Plate *sole, const Motion *now, int model) {
+ALWAYS_INLINE void slots_model(const Slots *slot, int start, int end, double dt, const Plate *sole, const Motion *now,
+                               int model) {
     const Slots local = *slot, *s = &local;
     const Plate plate = *sole;
     const Motion m = *now;
-    double rate = 1.0 / dt, rest_x = RESIST_REST * plate.normal[0] / plate.tilt, rest_y = RESIST_REST * plate.normal[1] / plate.tilt;
+    double rate = 1.0 / dt, rest = RESIST_REST / plate.tilt, rest_x = rest * plate.normal[0], rest_y = rest * plate.normal[1];
 #pragma omp simd
     for (int i = start; i < end; i++) {
         double x = s->x[i], y = s->y[i], vx = m.x[0] + m.x[1] * x + m.x[2] * y, vy = m.y[0] + m.y[1] * x + m.y[2] * y;

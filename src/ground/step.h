@@ -53,7 +53,8 @@ ALWAYS_INLINE void step_normal(const Slots *s, int i, double dt, int bent, doubl
     double per_way = 1.0 / (fabs(m1 - m0) + STEP_TINY), virgin = m1 > a ? 1.0 : 0.0;
 
     /* Unloading line, force line * l, l the stretch from where it carries nothing. */
-    double line = s->line[i], slack = s->slack[i], l0 = step_max(m0 - slack, 0.0), end = step_min(m1, a) - slack, l1 = step_max(end, 0.0);
+    double line = s->line[i], slack = s->slack[i], end = step_min(m1, a) - slack;
+    double l0 = step_max(m0 - slack, 0.0), l1 = step_max(end, 0.0);
     double on_line = 0.5 * line * (l0 + l1), line_share = (fabs(l1 - l0) + STEP_TINY) * per_way;
     double line_slope = 0.5 * line * line_share * (end > 0.0 ? 2.0 - line_share : line_share);
 

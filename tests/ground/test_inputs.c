@@ -202,10 +202,38 @@ static void test_hostile_numbers(void **state) {
     print_message("hostile numbers: %d of %d steps not converged\n", refused, tried);
 }
 
+/* A material that nobody checked: a step on NaN is not called converged, the next one on sound ground is. */
+static void test_hostile_material(void **state) {
+    (void)state;
+    static const char *const used[] = {"k_pen", "sigma_cone", "alpha", "nu", "phi", "rho", "mu", "k_drift", "b_drift", "recovery", "bed_depth"};
+    MildSole *sole = kit_plate(3, 2);
+    MildMaterial sound = mild_material_default();
+    Kit kit;
+    kit_open(&kit, 1, sole, NULL, &sound, 1e-3);
+    kit.input.position[0][2] -= 0.01;
+    kit_inverse_inertia(&kit);
+    kit_free(&kit, NULL);
+    for (size_t i = 0; i < sizeof used / sizeof *used; i++)
+        for (int solver = 0; solver < 2; solver++) {
+            kit.input.solver = (MildSolver)solver;
+            for (int f = 0; f < mild_material_field_count; f++)
+                if (strcmp(mild_material_fields[f].name, used[i]) == 0)
+                    *(double *)((char *)&kit.terrain.materials[0] + mild_material_fields[f].offset) = NAN;
+            kit_solve(&kit);
+            assert_int_equal(kit.result.converged, 0);
+            kit.terrain.materials[0] = sound;
+            kit_solve(&kit);
+            assert_int_equal(kit.result.converged, 1);
+        }
+    kit_close(&kit);
+    mild_sole_destroy(sole);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_field_parse),      cmocka_unit_test(test_field_print), cmocka_unit_test(test_field_find),
         cmocka_unit_test(test_material_refused), cmocka_unit_test(test_terrain),     cmocka_unit_test(test_sole_counts),
-        cmocka_unit_test(test_sole_refused),     cmocka_unit_test(test_hostile_numbers)};
+        cmocka_unit_test(test_sole_refused),     cmocka_unit_test(test_hostile_numbers),
+        cmocka_unit_test(test_hostile_material)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
