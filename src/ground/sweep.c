@@ -4,6 +4,7 @@
 
 #define SWEEP_TOLERANCE 1e-10
 #define SWEEP_LIMIT 1000
+#define SWEEP_REST 1e-6 /* of the impulses themselves: where a guide holds the feet, friction may still turn that moves nothing */
 #define SWEEP_LEAST_G 1e-9 /* [1/kg] a foot that cannot move sideways needs no friction; keeps beta finite */
 
 /* Algorithm 1 of the paper. The foot twists are kept up to date, so a velocity prediction costs O(1) and a sweep O(N);
@@ -15,6 +16,7 @@ typedef struct {
     double twist[TWIST_MAX];
     double before[MILD_FEET_MAX][2]; /* sums of the preceding elements' (v_j - omega x p_j), horizontal */
     int preceding[MILD_FEET_MAX];
+    double changed, total; /* [N s] sums over the elements of a sweep: of the impulses' changes (e of Algorithm 1), and of them */
 } Sweep;
 
 /* V += A B^T dI */
@@ -81,6 +83,8 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     s->ix[i] = s->fx[i] + bx - relax * (b * v[0] + bx) - nx;
     s->iy[i] = s->fy[i] + by - relax * (b * v[1] + by) - ny;
     const double change[3] = {s->ix[i] - old[0], s->iy[i] - old[1], s->iz[i] - old[2]};
+    sweep->changed += fabs(change[0]) + fabs(change[1]) + fabs(change[2]);
+    sweep->total += fabs(s->ix[i]) + fabs(s->iy[i]) + fabs(s->iz[i]);
     sweep_apply(sweep, f, p, change);
 }
 
@@ -141,8 +145,10 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
     double *wrench = scratch->wrench, before[TWIST_MAX];
     sweep_start(&sweep, scratch, input);
     sweep_wrench(scratch, wrench);
-    while (iterations < limit && !(change <= tolerance * scale)) {
+    int rests = 0;
+    while (iterations < limit && !(rests && change <= tolerance * scale)) {
         iterations++;
+        sweep.changed = sweep.total = 0.0;
         memcpy(before, wrench, sizeof before);
         memset(sweep.before, 0, sizeof sweep.before);
         memset(sweep.preceding, 0, sizeof sweep.preceding);
@@ -152,11 +158,12 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
         sweep_wrench(scratch, wrench);
         change = sweep_distance(&sweep, wrench, before);
         scale = sweep_distance(&sweep, wrench, zero);
+        rests = sweep.changed <= SWEEP_REST * sweep.total;
         if (isnan(change)) break;
     }
     result->iterations = iterations;
     result->residual = scale > 0.0 ? change / scale : change;
-    result->converged = change <= tolerance * scale;
+    result->converged = rests && change <= tolerance * scale;
     for (int i = 0; i < sweep.n; i++) {
         double sum = input->free_velocity[i];
         for (int j = 0; j < sweep.n; j++) sum += sweep.A[i * sweep.n + j] * wrench[j];
