@@ -5,8 +5,8 @@
 #include "ground/law.h"
 
 #define CONTACT_LANES 8         /* lists are padded to whole vectors; padding never makes a force */
-#define CONTACT_ELASTIC 1e-4    /* [m] least elastic travel of the unloading line, and that of friction: ground that yields is
-                                   elastic that far */
+#define CONTACT_ELASTIC 1e-4    /* [m] least elastic travel of the unloading line: plastic ground is elastic that far; friction's
+                                   own is in friction.h */
 /* For loops over the slots in two variants: compiled into its caller with constant arguments, with a copy of Slots, so that
  * the compiler keeps the arrays' addresses in registers; else it reads them anew, and the loop is not in vectors. */
 #define ALWAYS_INLINE static inline __attribute__((always_inline))

@@ -164,8 +164,7 @@ static void foot_moments(const FootScratch *foot, Moments M) {
     memcpy(M[2][2], rest[2], sizeof *rest);
 }
 
-/* H = sum of B^T h B, B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the moments of h by the products of
- * those,
+/* H = sum of B^T h B, B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the moments of h by their products,
  *     force rows   [M_00, N_0],   N_k = -sum over l of M_kl [arm_l]x
  *     torque rows  sum over k of [arm_k]x [M_k0, N_k] */
 static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {

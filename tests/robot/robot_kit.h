@@ -10,6 +10,7 @@
 
 #include <cmocka.h>
 
+#include "base/random.h"
 #include "robot/robot.h"
 
 #define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
@@ -55,6 +56,12 @@ static inline MildMaterial preset(const char *name) {
 static inline MildTerrain preset_terrain(const char *name) {
     MildMaterial material = preset(name);
     return mild_terrain_uniform(&material);
+}
+
+/* Joints a little off their places, all of it in motion. */
+static inline void kit_disturb(RobotState *state, Random *random) {
+    for (int i = 0; i < ROBOT_JOINTS; i++) state->qpos[7 + i] += random_uniform(random, -0.1, 0.1);
+    for (int i = 0; i < ROBOT_NV; i++) state->qvel[i] = random_uniform(random, -0.5, 0.5);
 }
 
 #endif

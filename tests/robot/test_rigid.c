@@ -7,7 +7,6 @@
 
 #include "robot_kit.h"
 
-#include "base/random.h"
 #include "robot/stand.h"
 
 static MildMap *make_map(const MildMapDef *def) {
@@ -37,12 +36,7 @@ static RobotVariation rigid_variation(double friction) {
 static RobotState random_state(uint32_t draw) {
     RobotState state = robot_stand_state(robot, 0, 0.0);
     Random random = random_at(6, draw, 0);
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        state.qpos[7 + i] += random_uniform(&random, -0.1, 0.1);
-    }
-    for (int i = 0; i < ROBOT_NV; i++) {
-        state.qvel[i] = random_uniform(&random, -0.5, 0.5);
-    }
+    kit_disturb(&state, &random);
     return state;
 }
 

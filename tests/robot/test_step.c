@@ -6,7 +6,6 @@
 
 #include <mujoco/mujoco.h>
 
-#include "base/random.h"
 #include "robot/sim.h"
 #include "robot/stand.h"
 
@@ -26,12 +25,7 @@ static RobotState random_state(uint32_t index) {
     for (int i = 3; i < 7; i++) {
         state.qpos[i] /= sqrt(norm);
     }
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        state.qpos[7 + i] += random_uniform(&random, -0.1, 0.1);
-    }
-    for (int i = 0; i < ROBOT_NV; i++) {
-        state.qvel[i] = random_uniform(&random, -0.5, 0.5);
-    }
+    kit_disturb(&state, &random);
     return state;
 }
 
