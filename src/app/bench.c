@@ -13,7 +13,8 @@
 
 static const char *const bench_preset = "sand_loose";
 
-void bench_add(BenchReport *report, const char *bench, const char *name, double value, const char *unit) {
+void bench_add(BenchReport *report, const char *bench, const char *name, double value,
+               const char *unit) {
     assert(report->count < BENCH_ROWS_MAX);
     BenchRow *row = &report->rows[report->count++];
     *row = (BenchRow){.bench = bench, .unit = unit, .value = value};
@@ -28,11 +29,16 @@ Robot *bench_robot(MildError *error) {
 MildStatus bench_step(const ExperimentDef *def, BenchReport *report, MildError *error) {
     enum { REPEATS = 15, STEPS = 1000 };
     Robot *robot = bench_robot(error);
-    if (!robot) return MILD_ERROR_IO;
+    if (!robot) {
+        return MILD_ERROR_IO;
+    }
     RobotBench result;
-    MildStatus status = robot_bench_step(robot, bench_preset, def->task.physics_dt, REPEATS, STEPS, &result, error);
+    MildStatus status =
+        robot_bench_step(robot, bench_preset, def->task.physics_dt, REPEATS, STEPS, &result, error);
     robot_destroy(robot);
-    if (status != MILD_OK) return status;
+    if (status != MILD_OK) {
+        return status;
+    }
     const RobotPhases *phases = &result.newton_phases;
     bench_add(report, "step", "ratio_to_rigid", result.newton / result.engine_rigid, "-");
     bench_add(report, "step", "newton", result.newton, "us");
@@ -70,8 +76,8 @@ static void sole_center(const MildSole *sole, double center[2]) {
     }
 }
 
-/* Two level feet that stand: A couples them as a trunk would, and the smooth forces press each with half of 33 kg at the
- * centre of its sole, V^ = V + dt A w. The feet touch the surface and rest. */
+/* Two level feet that stand: A couples them as a trunk would, and the smooth forces press each with
+ * half of 33 kg at the centre of its sole, V^ = V + dt A w. The feet touch the surface and rest. */
 static void ground_input(MildContactInput *input, const MildSole *const *soles, double dt) {
     const double linear = 1.0 / 20, angular = 1.0 / 0.3, coupling = 0.6, load = 33.0 / 2 * 9.81;
     double wrench[ROWS] = {0};
@@ -85,7 +91,9 @@ static void ground_input(MildContactInput *input, const MildSole *const *soles, 
         wrench[6 * foot + 4] = load * center[0];
         input->position[foot][1] = foot ? -0.1 : 0.1;
         input->position[foot][2] = -mild_sole_z(sole);
-        for (int i = 0; i < 3; i++) input->rotation[foot][4 * i] = 1;
+        for (int i = 0; i < 3; i++) {
+            input->rotation[foot][4 * i] = 1;
+        }
     }
     for (int i = 0; i < ROWS; i++) {
         double diagonal = i % 6 < 3 ? linear : angular;
@@ -102,7 +110,10 @@ static double ground_run(GroundBench *bench, int steps, int advance) {
     double start = clock_thread_seconds();
     for (int step = 0; step < steps; step++) {
         mild_ground_solve(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
-        if (advance) mild_ground_advance(bench->ground, &bench->terrain, &bench->input, bench->scratch, &result);
+        if (advance) {
+            mild_ground_advance(bench->ground, &bench->terrain, &bench->input, bench->scratch,
+                                &result);
+        }
     }
     return clock_thread_seconds() - start;
 }
@@ -111,8 +122,12 @@ static double ground_run(GroundBench *bench, int steps, int advance) {
 static double ground_time(GroundBench *bench, int advance) {
     double least = INFINITY;
     int steps = 1;
-    while (steps < (1 << 20) && ground_run(bench, steps, advance) < 0.5 * ground_repeat) steps *= 2;
-    for (int repeat = 0; repeat < GROUND_REPEATS; repeat++) least = fmin(least, ground_run(bench, steps, advance));
+    while (steps < (1 << 20) && ground_run(bench, steps, advance) < 0.5 * ground_repeat) {
+        steps *= 2;
+    }
+    for (int repeat = 0; repeat < GROUND_REPEATS; repeat++) {
+        least = fmin(least, ground_run(bench, steps, advance));
+    }
     return least / steps * 1e9;
 }
 
@@ -130,7 +145,9 @@ static void ground_settle(GroundBench *bench, const MildSole *const *soles, doub
         for (int i = 0; i < ROWS; i++) {
             bench->input.velocity[i / 6][i % 6] = result.velocity[i];
             bench->input.free_velocity[i] = result.velocity[i] + push[i];
-            if (i % 6 < 3) bench->input.position[i / 6][i % 6] += dt * result.velocity[i];
+            if (i % 6 < 3) {
+                bench->input.position[i / 6][i % 6] += dt * result.velocity[i];
+            }
         }
     }
 }
@@ -159,14 +176,18 @@ static void ground_cases(GroundBench *bench, const Robot *robot, double dt, Benc
 }
 
 /* The standing step on waves, and on ground that remembers prints; beside newton_stick_advance. */
-static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double dt, BenchReport *report, MildError *error) {
+static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double dt,
+                                 BenchReport *report, MildError *error) {
     enum { TILES = 128 };
     MildMapDef def = mild_map_def_default();
     def.kind = MILD_MAP_WAVES;
     MildMap *map = mild_map_create(&def, error);
-    void *block = aligned_alloc(64, mild_ground_bytes_prints(robot_soles(robot), ROBOT_FEET, TILES));
+    void *block =
+        aligned_alloc(64, mild_ground_bytes_prints(robot_soles(robot), ROBOT_FEET, TILES));
     MildStatus status = map ? MILD_OK : error->status;
-    if (status == MILD_OK && !block) status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    if (status == MILD_OK && !block) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    }
     if (status == MILD_OK) {
         MildGround *without = bench->ground;
         bench->terrain.map = map;
@@ -184,17 +205,22 @@ static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double 
 }
 
 /* Newton on each rival of mild at rest: one element for the concentric ones. */
-static const char *const rival_names[MILD_MODELS] = {
-    [MILD_MODEL_CON_CONE] = "newton_con_cone",       [MILD_MODEL_CON_SPRING] = "newton_con_spring",
-    [MILD_MODEL_ECC_SPRING] = "newton_ecc_spring",   [MILD_MODEL_ECC_QUASI] = "newton_ecc_quasi",
-    [MILD_MODEL_ECC_QUASI_3D] = "newton_ecc_quasi_3d"};
+static const char *const rival_names[MILD_MODELS] = {[MILD_MODEL_CON_CONE] = "newton_con_cone",
+                                                     [MILD_MODEL_CON_SPRING] = "newton_con_spring",
+                                                     [MILD_MODEL_ECC_SPRING] = "newton_ecc_spring",
+                                                     [MILD_MODEL_ECC_QUASI] = "newton_ecc_quasi",
+                                                     [MILD_MODEL_ECC_QUASI_3D] =
+                                                         "newton_ecc_quasi_3d"};
 
-static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchReport *report, MildError *error) {
+static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchReport *report,
+                               MildError *error) {
     MildMaterial mild, material;
     robot_set_model(robot, model);
     mild_material_preset(bench_preset, &mild);
     MildStatus status = robot_match_model(robot, model, &mild, &material, error);
-    if (status != MILD_OK) return status;
+    if (status != MILD_OK) {
+        return status;
+    }
     const MildSole *const *soles = robot_soles(robot);
     GroundBench bench = {.terrain = mild_terrain_uniform(&material)};
     void *block = aligned_alloc(64, mild_ground_bytes(soles, ROBOT_FEET));
@@ -204,7 +230,8 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
         if (model == MILD_MODEL_MILD) {
             ground_cases(&bench, robot, dt, report);
             status = ground_terrain(&bench, robot, dt, report, error);
-            bench_add(report, "ground", "elements", mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");
+            bench_add(report, "ground", "elements",
+                      mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");
         } else {
             ground_settle(&bench, soles, dt);
             bench_add(report, "ground", rival_names[model], ground_time(&bench, 0), "ns");
@@ -219,52 +246,68 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
 
 MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError *error) {
     Robot *robot = bench_robot(error);
-    if (!robot) return MILD_ERROR_IO;
+    if (!robot) {
+        return MILD_ERROR_IO;
+    }
     MildStatus status = MILD_OK;
-    for (int model = 0; model < MILD_MODEL_RIGID && status == MILD_OK; model++)
+    for (int model = 0; model < MILD_MODEL_RIGID && status == MILD_OK; model++) {
         status = ground_model((MildModel)model, robot, def->task.physics_dt, report, error);
+    }
     robot_destroy(robot);
     return status;
 }
 
 /* ---- how the cost grows with the number of elements ---- */
 
-/* Plates of the same size, weight and ground, in ever finer elements: what a material says of one element of the paper's
- * raster is shared out by area. */
+/* Plates of the same size, weight and ground, in ever finer elements: what a material says of one
+ * element of the paper's raster is shared out by area. */
 static MildSole *elements_plate(int columns, int rows, MildMaterial *material, MildError *error) {
     const double paper_pitch = 0.0195, paper_elements = 77;
     double share = paper_elements / (columns * rows), pitch = paper_pitch * sqrt(share);
-    double x = 0.5 * columns * pitch, y = 0.5 * rows * pitch, outline[8] = {-x, -y, x, -y, x, y, -x, y};
+    double x = 0.5 * columns * pitch, y = 0.5 * rows * pitch,
+           outline[8] = {-x, -y, x, -y, x, y, -x, y};
     material->k_pen *= share;
     material->k_drift *= share;
     material->b_drift *= share;
-    MildSoleDef def = {.outline = outline, .points = 4, .pitch = pitch, .sole_z = -0.055, .target_elements = columns * rows};
+    MildSoleDef def = {.outline = outline,
+                       .points = 4,
+                       .pitch = pitch,
+                       .sole_z = -0.055,
+                       .target_elements = columns * rows};
     return mild_sole_create(&def, error);
 }
 
 /* Standing, then slipping: [ns] per element of a solve and an advance. */
-static void elements_times(GroundBench *bench, const MildSole *const *soles, double dt, BenchReport *report) {
+static void elements_times(GroundBench *bench, const MildSole *const *soles, double dt,
+                           BenchReport *report) {
     static const char *const names[2] = {"stick", "slip"};
     int elements = mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]);
     ground_settle(bench, soles, dt);
     for (int slips = 0; slips < 2; slips++) {
         char name[40];
-        if (slips) ground_slip(&bench->input);
+        if (slips) {
+            ground_slip(&bench->input);
+        }
         snprintf(name, sizeof name, "%s_%d", names[slips], elements);
         bench_add(report, "elements", name, ground_time(bench, 1) / elements, "ns/element");
     }
 }
 
-static MildStatus elements_case(int columns, int rows, double dt, BenchReport *report, MildError *error) {
+static MildStatus elements_case(int columns, int rows, double dt, BenchReport *report,
+                                MildError *error) {
     MildMaterial material;
     mild_material_preset(bench_preset, &material);
     MildSole *sole = elements_plate(columns, rows, &material, error);
-    if (!sole) return error->status;
+    if (!sole) {
+        return error->status;
+    }
     const MildSole *const soles[ROBOT_FEET] = {sole, sole};
     GroundBench bench = {.terrain = mild_terrain_uniform(&material)};
     void *block = aligned_alloc(64, mild_ground_bytes(soles, ROBOT_FEET));
     bench.scratch = mild_scratch_create(soles, ROBOT_FEET, error);
-    MildStatus status = block && bench.scratch ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    MildStatus status = block && bench.scratch
+                            ? MILD_OK
+                            : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     if (status == MILD_OK) {
         bench.ground = mild_ground_init(block, soles, ROBOT_FEET);
         elements_times(&bench, soles, dt, report);
@@ -278,34 +321,40 @@ static MildStatus elements_case(int columns, int rows, double dt, BenchReport *r
 MildStatus bench_elements(const ExperimentDef *def, BenchReport *report, MildError *error) {
     static const int plates[][2] = {{5, 2}, {5, 5}, {10, 5}, {11, 7}, {15, 10}, {25, 14}, {40, 25}};
     MildStatus status = MILD_OK;
-    for (size_t i = 0; i < sizeof plates / sizeof *plates && status == MILD_OK; i++)
+    for (size_t i = 0; i < sizeof plates / sizeof *plates && status == MILD_OK; i++) {
         status = elements_case(plates[i][0], plates[i][1], def->task.physics_dt, report, error);
+    }
     return status;
 }
 
 /* ---- training ---- */
 
 /* Thread time inside the environments becomes wall time by the number of threads. */
-static void train_rows(const TrainTimes *sum, double steps, double wall, int threads, BenchReport *report) {
+static void train_rows(const TrainTimes *sum, double steps, double wall, int threads,
+                       BenchReport *report) {
     double ground = sum->ground / threads, physics = sum->physics / threads - ground;
     bench_add(report, "train", "policy_steps_per_s", steps / wall, "1/s");
     bench_add(report, "train", "physics", 1e6 * physics / steps, "us/step");
     bench_add(report, "train", "ground", 1e6 * ground / steps, "us/step");
-    bench_add(report, "train", "task", 1e6 * (sum->environments - physics - ground) / steps, "us/step");
+    bench_add(report, "train", "task", 1e6 * (sum->environments - physics - ground) / steps,
+              "us/step");
     bench_add(report, "train", "inference", 1e6 * sum->inference / steps, "us/step");
     bench_add(report, "train", "update", 1e6 * sum->update / steps, "us/step");
-    bench_add(report, "train", "other", 1e6 * (wall - sum->environments - sum->inference - sum->update) / steps,
-              "us/step");
+    bench_add(report, "train", "other",
+              1e6 * (wall - sum->environments - sum->inference - sum->update) / steps, "us/step");
     bench_add(report, "train", "threads", threads, "-");
 }
 
 MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError *error) {
     const double seconds = 20;
     Trainer *trainer = train_create(def, error);
-    if (!trainer) return error->status;
+    if (!trainer) {
+        return error->status;
+    }
     TrainReport iteration;
     TrainTimes sum = {0};
-    MildStatus status = train_iterate(trainer, &iteration, error); /* caches, kernels compiled by oneDNN */
+    MildStatus status =
+        train_iterate(trainer, &iteration, error); /* caches, kernels compiled by oneDNN */
     double start = clock_seconds(), wall = 0, steps = 0;
     while (status == MILD_OK && wall < seconds) {
         status = train_iterate(trainer, &iteration, error);
@@ -317,7 +366,9 @@ MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError 
         steps += (double)def->train.envs * def->ppo.steps;
         wall = clock_seconds() - start;
     }
-    if (status == MILD_OK) train_rows(&sum, steps, wall, train_threads(trainer), report);
+    if (status == MILD_OK) {
+        train_rows(&sum, steps, wall, train_threads(trainer), report);
+    }
     train_destroy(trainer);
     return status;
 }
@@ -328,15 +379,21 @@ static double process_bytes(const char *key) {
     double kibibytes = 0;
     FILE *file = fopen("/proc/self/status", "r");
     while (file && fgets(line, sizeof line, file)) {
-        if (strncmp(line, key, strlen(key)) == 0) kibibytes = strtod(line + strlen(key), NULL);
+        if (strncmp(line, key, strlen(key)) == 0) {
+            kibibytes = strtod(line + strlen(key), NULL);
+        }
     }
-    if (file) fclose(file);
+    if (file) {
+        fclose(file);
+    }
     return 1024 * kibibytes;
 }
 
 MildStatus bench_memory(const ExperimentDef *def, BenchReport *report, MildError *error) {
     Trainer *trainer = train_create(def, error);
-    if (!trainer) return error->status;
+    if (!trainer) {
+        return error->status;
+    }
     TrainReport iteration;
     if (train_iterate(trainer, &iteration, error)) { /* touches every page once */
         train_destroy(trainer);

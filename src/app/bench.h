@@ -18,14 +18,18 @@ typedef struct {
     int count;
 } BenchReport;
 
-void bench_add(BenchReport *report, const char *bench, const char *name, double value, const char *unit);
+void bench_add(BenchReport *report, const char *bench, const char *name, double value,
+               const char *unit);
 
 /* The shipped robot; NULL, with the reason in *error. */
 Robot *bench_robot(MildError *error);
-/* Records the shipped policy at 0.6 m/s on a ground (scene.h); replay_destroy it. NULL when it falls, too. */
-Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground, int periods, MildError *error);
+/* Records the shipped policy at 0.6 m/s on a ground (scene.h); replay_destroy it. NULL when it
+ * falls, too. */
+Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
+                          int periods, MildError *error);
 
-/* One physics step of the robot standing on sand: ours beside the engine's own contact, in turns, medians. */
+/* One physics step of the robot standing on sand: ours beside the engine's own contact, in turns,
+ * medians. */
 MildStatus bench_step(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The ground alone: solve and advance of two soles, 154 elements in contact. */
 MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError *error);

@@ -9,8 +9,8 @@
 #include "robot/stand.h"
 
 enum { SOLVERS = 2, TWIST = 6 * ROBOT_FEET, PROBLEMS_MAX = 400 };
-static const double solver_error = 1e-6;              /* [-] both stop here */
-static const double never = 1e-15;                    /* [-] a tolerance that does not stop them earlier */
+static const double solver_error = 1e-6; /* [-] both stop here */
+static const double never = 1e-15;       /* [-] a tolerance that does not stop them earlier */
 static const int solver_limit[SOLVERS] = {100, 2048}; /* most iterations that are tried */
 static const int solver_repeats[SOLVERS] = {20, 3};   /* the least time counts */
 static const char *const solver_names[SOLVERS] = {"newton", "gauss_seidel"};
@@ -23,11 +23,13 @@ typedef struct {
     MildScratch *scratch;
     double exact[TWIST]; /* [N s, N m s] the feet's impulses, by Newton to the last digits */
     double times[SOLVERS][PROBLEMS_MAX]; /* [us] */
-    int problems, without_exact; /* without: Newton did not converge, so there is nothing to compare with */
-    int short_of[SOLVERS];       /* problems not at solver_error within the limit, timed at the limit */
+    int problems,
+        without_exact; /* without: Newton did not converge, so there is nothing to compare with */
+    int short_of[SOLVERS]; /* problems not at solver_error within the limit, timed at the limit */
 } SolverBench;
 
-static void impulses(const MildContactInput *input, const MildContactResult *result, double impulse[TWIST]) {
+static void impulses(const MildContactInput *input, const MildContactResult *result,
+                     double impulse[TWIST]) {
     for (int i = 0; i < TWIST; i++) {
         const MildFootResult *foot = &result->foot[i / 6];
         impulse[i] = input->dt * (i % 6 < 3 ? foot->force[i % 6] : foot->torque[i % 6 - 3]);
@@ -37,12 +39,16 @@ static void impulses(const MildContactInput *input, const MildContactResult *res
 /* x^T A x, twice the kinetic energy that the impulses x give. */
 static double energy(const MildContactInput *input, const double x[TWIST]) {
     double sum = 0;
-    for (int i = 0; i < TWIST; i++)
-        for (int j = 0; j < TWIST; j++) sum += x[i] * input->inverse_inertia[i * TWIST + j] * x[j];
+    for (int i = 0; i < TWIST; i++) {
+        for (int j = 0; j < TWIST; j++) {
+            sum += x[i] * input->inverse_inertia[i * TWIST + j] * x[j];
+        }
+    }
     return fmax(sum, 0);
 }
 
-static void solve(SolverBench *bench, int solver, double tolerance, int iterations, MildContactResult *result) {
+static void solve(SolverBench *bench, int solver, double tolerance, int iterations,
+                  MildContactResult *result) {
     MildContactInput *input = &bench->input;
     input->solver = solver ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON;
     input->tolerance = tolerance;
@@ -50,17 +56,21 @@ static void solve(SolverBench *bench, int solver, double tolerance, int iteratio
     mild_ground_solve(bench->ground, &bench->terrain, input, bench->scratch, result);
 }
 
-/* [-] Distance from the exact impulses in the metric of kinetic energy, after that many iterations. */
+/* [-] Distance from the exact impulses in the metric of kinetic energy, after that many iterations.
+ */
 static double error_after(SolverBench *bench, int solver, int iterations) {
     MildContactResult result;
     double difference[TWIST];
     solve(bench, solver, never, iterations, &result);
     impulses(&bench->input, &result, difference);
-    for (int i = 0; i < TWIST; i++) difference[i] -= bench->exact[i];
+    for (int i = 0; i < TWIST; i++) {
+        difference[i] -= bench->exact[i];
+    }
     return sqrt(energy(&bench->input, difference) / energy(&bench->input, bench->exact));
 }
 
-/* The fewest iterations with that error: doubling, then bisection. The limit when there are none. */
+/* The fewest iterations with that error: doubling, then bisection. The limit when there are none.
+ */
 static int fewest_iterations(SolverBench *bench, int solver) {
     int low = 0, high = 1, limit = solver_limit[solver];
     while (!(error_after(bench, solver, high) <= solver_error)) {
@@ -83,7 +93,9 @@ static void solver_problem(SolverBench *bench) {
     MildContactResult result;
     solve(bench, 0, 1e-11, 0, &result);
     impulses(&bench->input, &result, bench->exact);
-    if (energy(&bench->input, bench->exact) == 0) return;
+    if (energy(&bench->input, bench->exact) == 0) {
+        return;
+    }
     if (!result.converged) {
         bench->without_exact++;
         return;
@@ -123,15 +135,27 @@ static MildMaterial random_material(Random *r) {
 
 /* A foot turned by yaw, then pitch and roll, with its sole's middle near the surface. */
 static void random_foot(MildContactInput *input, int foot, const MildSole *sole, Random *r) {
-    double tilt = random_unit(r) < 0.3 ? 0 : 0.25, fast = random_unit(r) < 0.3 ? 0.01 : 1, yaw = random_uniform(r, -3, 3);
+    double tilt = random_unit(r) < 0.3 ? 0 : 0.25, fast = random_unit(r) < 0.3 ? 0.01 : 1,
+           yaw = random_uniform(r, -3, 3);
     double pitch = random_uniform(r, -tilt, tilt), roll = random_uniform(r, -tilt, tilt);
-    double cy = cos(yaw), sy = sin(yaw), cp = cos(pitch), sp = sin(pitch), cr = cos(roll), sr = sin(roll);
-    const double R[9] = {cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr,
-                         sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, -sp, cp * sr, cp * cr};
+    double cy = cos(yaw), sy = sin(yaw), cp = cos(pitch), sp = sin(pitch), cr = cos(roll),
+           sr = sin(roll);
+    const double R[9] = {cy * cp,
+                         cy * sp * sr - sy * cr,
+                         cy * sp * cr + sy * sr,
+                         sy * cp,
+                         sy * sp * sr + cy * cr,
+                         sy * sp * cr - cy * sr,
+                         -sp,
+                         cp * sr,
+                         cp * cr};
     memcpy(input->rotation[foot], R, sizeof R);
     input->position[foot][1] = foot ? -0.1 : 0.1;
-    input->position[foot][2] = -R[6] * 0.06 - R[8] * mild_sole_z(sole) - random_uniform(r, -0.003, 0.025);
-    for (int i = 0; i < 6; i++) input->velocity[foot][i] = fast * (i < 3 ? 0.5 : 2.0) * random_uniform(r, -1, 1);
+    input->position[foot][2] =
+        -R[6] * 0.06 - R[8] * mild_sole_z(sole) - random_uniform(r, -0.003, 0.025);
+    for (int i = 0; i < 6; i++) {
+        input->velocity[foot][i] = fast * (i < 3 ? 0.5 : 2.0) * random_uniform(r, -1, 1);
+    }
 }
 
 /* Free bodies, and on top a random coupling of all twists. */
@@ -139,19 +163,31 @@ static void random_inertia(MildContactInput *input, Random *r) {
     double G[TWIST][TWIST];
     memset(input->inverse_inertia, 0, sizeof input->inverse_inertia);
     for (int foot = 0; foot < ROBOT_FEET; foot++) {
-        double mass = exp(random_uniform(r, log(1), log(40))), inertia = mass * random_uniform(r, 0.002, 0.1);
-        for (int i = 6 * foot; i < 6 * foot + 6; i++) input->inverse_inertia[i * TWIST + i] = 1 / (i % 6 < 3 ? mass : inertia);
+        double mass = exp(random_uniform(r, log(1), log(40))),
+               inertia = mass * random_uniform(r, 0.002, 0.1);
+        for (int i = 6 * foot; i < 6 * foot + 6; i++) {
+            input->inverse_inertia[i * TWIST + i] = 1 / (i % 6 < 3 ? mass : inertia);
+        }
     }
-    for (int i = 0; i < TWIST; i++)
-        for (int k = 0; k < TWIST; k++) G[i][k] = random_uniform(r, -0.3, 0.3) * (i % 6 < 3 ? 1 : 3);
-    for (int i = 0; i < TWIST; i++)
-        for (int j = 0; j < TWIST; j++)
-            for (int k = 0; k < TWIST; k++) input->inverse_inertia[i * TWIST + j] += G[i][k] * G[j][k];
+    for (int i = 0; i < TWIST; i++) {
+        for (int k = 0; k < TWIST; k++) {
+            G[i][k] = random_uniform(r, -0.3, 0.3) * (i % 6 < 3 ? 1 : 3);
+        }
+    }
+    for (int i = 0; i < TWIST; i++) {
+        for (int j = 0; j < TWIST; j++) {
+            for (int k = 0; k < TWIST; k++) {
+                input->inverse_inertia[i * TWIST + j] += G[i][k] * G[j][k];
+            }
+        }
+    }
 }
 
 static void free_fall(MildContactInput *input) {
-    for (int i = 0; i < TWIST; i++)
-        input->free_velocity[i] = input->velocity[i / 6][i % 6] - (i % 6 == 2 ? 9.81 * input->dt : 0);
+    for (int i = 0; i < TWIST; i++) {
+        input->free_velocity[i] =
+            input->velocity[i / 6][i % 6] - (i % 6 == 2 ? 9.81 * input->dt : 0);
+    }
 }
 
 static void random_problem(SolverBench *bench, const MildSole *const *soles, uint32_t number) {
@@ -161,7 +197,9 @@ static void random_problem(SolverBench *bench, const MildSole *const *soles, uin
     MildMaterial material = random_material(&r);
     bench->terrain = mild_terrain_uniform(&material);
     *input = (MildContactInput){.feet = ROBOT_FEET, .dt = steps[random_index(&r, 3)]};
-    for (int foot = 0; foot < ROBOT_FEET; foot++) random_foot(input, foot, soles[foot], &r);
+    for (int foot = 0; foot < ROBOT_FEET; foot++) {
+        random_foot(input, foot, soles[foot], &r);
+    }
     random_inertia(input, &r);
     mild_ground_reset(bench->ground);
     uint32_t history = random_index(&r, 10);
@@ -172,7 +210,9 @@ static void random_problem(SolverBench *bench, const MildSole *const *soles, uin
         mild_ground_advance(bench->ground, &bench->terrain, input, bench->scratch, &result);
         for (int i = 0; i < TWIST; i++) {
             input->velocity[i / 6][i % 6] = result.velocity[i];
-            if (i % 6 < 3) input->position[i / 6][i % 6] += input->dt * result.velocity[i];
+            if (i % 6 < 3) {
+                input->position[i / 6][i % 6] += input->dt * result.velocity[i];
+            }
         }
     }
     free_fall(input);
@@ -182,7 +222,8 @@ static void random_problem(SolverBench *bench, const MildSole *const *soles, uin
 /* ---- the robot's problems ---- */
 
 /* Steps the robot on `ground`, and takes the contact problem of that step. */
-static void robot_problem(SolverBench *bench, RobotSim *sim, const double *torque, const MildTerrain *terrain, MildGround *ground) {
+static void robot_problem(SolverBench *bench, RobotSim *sim, const double *torque,
+                          const MildTerrain *terrain, MildGround *ground) {
     memcpy(bench->ground, ground, mild_ground_size(ground));
     robot_sim_step(sim, torque, NULL, terrain, ground);
     bench->terrain = *terrain;
@@ -191,10 +232,12 @@ static void robot_problem(SolverBench *bench, RobotSim *sim, const double *torqu
 }
 
 /* Sinks in from the surface, balanced by the stand torques, until it rests. */
-static MildStatus standing_problems(SolverBench *bench, const Robot *robot, double dt, int count, MildError *error) {
+static MildStatus standing_problems(SolverBench *bench, const Robot *robot, double dt, int count,
+                                    MildError *error) {
     RobotSim *sim = robot_sim_create(robot, dt, error);
     void *block = aligned_alloc(64, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
-    MildStatus status = sim && block ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    MildStatus status =
+        sim && block ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     if (status == MILD_OK) {
         MildGround *ground = mild_ground_init(block, robot_soles(robot), ROBOT_FEET);
         MildMaterial sand = mild_material_default();
@@ -214,7 +257,8 @@ static MildStatus standing_problems(SolverBench *bench, const Robot *robot, doub
 }
 
 /* The first step of every recorded period of the walk. */
-static MildStatus walking_problems(SolverBench *bench, const ExperimentDef *def, const Robot *robot, int count, MildError *error) {
+static MildStatus walking_problems(SolverBench *bench, const ExperimentDef *def, const Robot *robot,
+                                   int count, MildError *error) {
     Replay *replay = bench_record_walk(def, robot, "sand_loose", count, error);
     RobotSim *sim = replay ? robot_sim_create(robot, replay->dt, error) : NULL;
     for (int p = 0; sim && p < replay->periods; p++) {
@@ -230,8 +274,8 @@ static MildStatus walking_problems(SolverBench *bench, const ExperimentDef *def,
 
 /* ---- rows ---- */
 
-static void solver_row(BenchReport *report, const char *set, const char *solver, const char *what, double value,
-                       const char *unit) {
+static void solver_row(BenchReport *report, const char *set, const char *solver, const char *what,
+                       double value, const char *unit) {
     char name[40];
     snprintf(name, sizeof name, "%s_%s_%s", set, solver, what);
     bench_add(report, "solver", name, value, unit);
@@ -253,10 +297,14 @@ static void solver_rows(SolverBench *bench, const char *set, BenchReport *report
         of[solver][0] = times[n / 2];
         of[solver][1] = times[(int)ceil(0.99 * n) - 1];
         of[solver][2] = times[n - 1];
-        for (int i = 0; i < 3; i++) solver_row(report, set, solver_names[solver], what[i], of[solver][i], "us");
+        for (int i = 0; i < 3; i++) {
+            solver_row(report, set, solver_names[solver], what[i], of[solver][i], "us");
+        }
         solver_row(report, set, solver_names[solver], "short", bench->short_of[solver], "-");
     }
-    for (int i = 0; i < 3; i++) solver_row(report, set, "ratio", what[i], of[1][i] / of[0][i], "-");
+    for (int i = 0; i < 3; i++) {
+        solver_row(report, set, "ratio", what[i], of[1][i] / of[0][i], "-");
+    }
     solver_row(report, set, "problems", "compared", n, "-");
     solver_row(report, set, "problems", "without_exact", bench->without_exact, "-");
     bench->problems = bench->without_exact = bench->short_of[0] = bench->short_of[1] = 0;
@@ -265,7 +313,9 @@ static void solver_rows(SolverBench *bench, const char *set, BenchReport *report
 MildStatus bench_solver(const ExperimentDef *def, BenchReport *report, MildError *error) {
     enum { RANDOM = 250, STANDING = 50, WALKING = 100 };
     Robot *robot = bench_robot(error);
-    if (!robot) return MILD_ERROR_IO;
+    if (!robot) {
+        return MILD_ERROR_IO;
+    }
     const MildSole *const *soles = robot_soles(robot);
     SolverBench *bench = calloc(1, sizeof *bench);
     void *block = aligned_alloc(64, mild_ground_bytes(soles, ROBOT_FEET));
@@ -276,12 +326,20 @@ MildStatus bench_solver(const ExperimentDef *def, BenchReport *report, MildError
     } else {
         bench->scratch = scratch;
         bench->ground = mild_ground_init(block, soles, ROBOT_FEET);
-        for (uint32_t i = 0; i < RANDOM; i++) random_problem(bench, soles, i);
+        for (uint32_t i = 0; i < RANDOM; i++) {
+            random_problem(bench, soles, i);
+        }
         solver_rows(bench, "random", report);
         status = standing_problems(bench, robot, def->task.physics_dt, STANDING, error);
-        if (status == MILD_OK) solver_rows(bench, "standing", report);
-        if (status == MILD_OK) status = walking_problems(bench, def, robot, WALKING, error);
-        if (status == MILD_OK) solver_rows(bench, "walking", report);
+        if (status == MILD_OK) {
+            solver_rows(bench, "standing", report);
+        }
+        if (status == MILD_OK) {
+            status = walking_problems(bench, def, robot, WALKING, error);
+        }
+        if (status == MILD_OK) {
+            solver_rows(bench, "walking", report);
+        }
     }
     mild_scratch_destroy(scratch);
     free(block);

@@ -7,7 +7,8 @@
 #include "control/controller.h"
 #include "eval/eval.h"
 
-static const double walk_speed = 0.6, walk_settle = 1.0; /* [m/s] commanded, [s] before the record begins */
+static const double walk_speed = 0.6,
+                    walk_settle = 1.0; /* [m/s] commanded, [s] before the record begins */
 
 /* A robot that walks. */
 typedef struct {
@@ -21,11 +22,14 @@ typedef struct {
     int step;             /* of the period */
 } Walk;
 
-static void record_torque(void *context, const TaskEnv *env, const RobotSim *sim, const double *torque) {
+static void record_torque(void *context, const TaskEnv *env, const RobotSim *sim,
+                          const double *torque) {
     Walk *walk = context;
     (void)env;
     (void)sim;
-    if (walk->period) memcpy(walk->period->torque[walk->step++], torque, sizeof walk->period->torque[0]);
+    if (walk->period) {
+        memcpy(walk->period->torque[walk->step++], torque, sizeof walk->period->torque[0]);
+    }
 }
 
 static int walk_step(Walk *walk, ReplayPeriod *period) {
@@ -40,7 +44,8 @@ static int walk_step(Walk *walk, ReplayPeriod *period) {
     walk->period = period;
     walk->step = 0;
     walk->controller.act(walk->controller.self, 1, &walk->env, action);
-    TaskStep step = task_env_step(walk->env, &walk->def, walk->robot, walk->sim, action, 0, &none, &probe);
+    TaskStep step =
+        task_env_step(walk->env, &walk->def, walk->robot, walk->sim, action, 0, &none, &probe);
     eval_command(walk->env, walk_speed);
     return !step.done;
 }
@@ -50,8 +55,11 @@ static MildStatus walk_open(Walk *walk, MildError *error) {
     walk->pool = pool_create(1);
     walk->sim = robot_sim_create(walk->robot, walk->def.physics_dt, error);
     walk->env = aligned_alloc(64, task_env_bytes(&walk->def, walk->robot));
-    if (!walk->pool || !walk->sim || !walk->env) return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
-    return controller_learned(path_data("policies/mild.safetensors", path), walk->pool, 1, &walk->controller, error);
+    if (!walk->pool || !walk->sim || !walk->env) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    }
+    return controller_learned(path_data("policies/mild.safetensors", path), walk->pool, 1,
+                              &walk->controller, error);
 }
 
 static void walk_close(Walk *walk) {
@@ -66,15 +74,21 @@ static MildStatus walk_record(Walk *walk, const Scene *scene, Replay *replay, Mi
     TaskView none = {0};
     task_env_init(walk->env, &walk->def, walk->robot, seed, 0);
     eval_command(walk->env, walk_speed);
-    task_env_reset_on(walk->env, &walk->def, walk->robot, walk->sim, &scene->terrain, scene->rigid, &none);
+    task_env_reset_on(walk->env, &walk->def, walk->robot, walk->sim, &scene->terrain, scene->rigid,
+                      &none);
     replay->variation = walk->env->variation;
     replay->terrain = walk->env->terrain;
     int settle = (int)(walk_settle / TASK_PERIOD), upright = 1;
-    for (int i = -settle; i < replay->periods && upright; i++) upright = walk_step(walk, i < 0 ? NULL : &replay->period[i]);
-    return upright ? MILD_OK : mild_fail(error, MILD_ERROR_RANGE, "bench: the shipped policy fell on %s", scene->name);
+    for (int i = -settle; i < replay->periods && upright; i++) {
+        upright = walk_step(walk, i < 0 ? NULL : &replay->period[i]);
+    }
+    return upright ? MILD_OK
+                   : mild_fail(error, MILD_ERROR_RANGE, "bench: the shipped policy fell on %s",
+                               scene->name);
 }
 
-Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground, int periods, MildError *error) {
+Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
+                          int periods, MildError *error) {
     Walk walk = {.def = def->task, .robot = robot};
     Scene scene;
     task_def_make_nominal(&walk.def);
@@ -82,15 +96,22 @@ Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const ch
     int steps = (int)(TASK_PERIOD / walk.def.physics_dt + 0.5);
     Replay *replay = replay_create(robot, periods, steps, walk.def.physics_dt, error);
     MildStatus status = replay ? scene_make(&scene, ground, 1.0, error) : error->status;
-    if (status == MILD_OK) status = walk_open(&walk, error);
-    if (status == MILD_OK) status = walk_record(&walk, &scene, replay, error);
+    if (status == MILD_OK) {
+        status = walk_open(&walk, error);
+    }
+    if (status == MILD_OK) {
+        status = walk_record(&walk, &scene, replay, error);
+    }
     walk_close(&walk);
-    if (status == MILD_OK) return replay;
+    if (status == MILD_OK) {
+        return replay;
+    }
     replay_destroy(replay);
     return NULL;
 }
 
-static void walk_row(BenchReport *report, const char *ground, const char *what, double value, const char *unit) {
+static void walk_row(BenchReport *report, const char *ground, const char *what, double value,
+                     const char *unit) {
     char name[40];
     snprintf(name, sizeof name, "%s_%s", ground, what);
     bench_add(report, "walk", name, value, unit);
@@ -118,8 +139,12 @@ MildStatus bench_walk(const ExperimentDef *def, BenchReport *report, MildError *
         ReplayTimes times;
         Replay *replay = bench_record_walk(def, robot, grounds[g], PERIODS, error);
         status = replay ? replay_time(replay, robot, loose, REPEATS, &times, error) : error->status;
-        if (status == MILD_OK && !replay->variation.rigid) walk_rows(report, grounds[g], &times);
-        if (status == MILD_OK && replay->variation.rigid) walk_row(report, grounds[g], "engine_rigid", times.engine, "us");
+        if (status == MILD_OK && !replay->variation.rigid) {
+            walk_rows(report, grounds[g], &times);
+        }
+        if (status == MILD_OK && replay->variation.rigid) {
+            walk_row(report, grounds[g], "engine_rigid", times.engine, "us");
+        }
         replay_destroy(replay);
     }
     robot_destroy(robot);

@@ -43,7 +43,9 @@ const char *build_machine(char *text, size_t size) {
             break;
         }
     }
-    if (file) fclose(file);
+    if (file) {
+        fclose(file);
+    }
     int cores = build_cores();
     snprintf(text, size, "%s, %d core%s", name, cores, cores == 1 ? "" : "s");
     return text;

@@ -26,12 +26,15 @@ int cli_fail_text(const char *command, const char *format, ...) {
 
 /* ---- help ---- */
 
-/* Words of `text`, line ends counting as blanks, broken at HELP_WIDTH, continued at `indent`; the cursor stands at `column` already. */
+/* Words of `text`, line ends counting as blanks, broken at HELP_WIDTH, continued at `indent`; the
+ * cursor stands at `column` already. */
 static void print_wrapped(const char *text, int column, int indent) {
     while (*text) {
         text += strspn(text, " \n");
         int length = (int)strcspn(text, " \n");
-        if (length == 0) break;
+        if (length == 0) {
+            break;
+        }
         if (column > indent && column + 1 + length > HELP_WIDTH) {
             printf("\n%*s", indent, "");
             column = indent;
@@ -65,21 +68,27 @@ static void print_command_help(const CliCommand *command) {
         printf("\noverrides:\n");
         print_option("SECTION.KEY=VALUE", NULL, command->overrides);
     }
-    if (command->examples) printf("\nexamples:\n%s", command->examples);
+    if (command->examples) {
+        printf("\nexamples:\n%s", command->examples);
+    }
 }
 
 /* ---- values ---- */
 
 static int out_of_range(const CliCommand *command, const CliOption *option, const char *text) {
-    return cli_fail_text(command->name, "--%s: %s is outside %g .. %g", option->name, text, option->min, option->max);
+    return cli_fail_text(command->name, "--%s: %s is outside %g .. %g", option->name, text,
+                         option->min, option->max);
 }
 
-static int set_number(const CliCommand *command, const CliOption *option, const char *text, double *target) {
+static int set_number(const CliCommand *command, const CliOption *option, const char *text,
+                      double *target) {
     double number;
     if (!text_double(text, &number)) {
         return cli_fail_text(command->name, "--%s: '%s' is not a number", option->name, text);
     }
-    if (!(number >= option->min && number <= option->max)) return out_of_range(command, option, text);
+    if (!(number >= option->min && number <= option->max)) {
+        return out_of_range(command, option, text);
+    }
     *target = number;
     return 0;
 }
@@ -89,17 +98,23 @@ static int set_int(const CliCommand *command, const CliOption *option, const cha
     if (!text_int(text, &number)) {
         return cli_fail_text(command->name, "--%s: '%s' is not a whole number", option->name, text);
     }
-    if (number < option->min || number > option->max) return out_of_range(command, option, text);
+    if (number < option->min || number > option->max) {
+        return out_of_range(command, option, text);
+    }
     *(int *)option->target = number;
     return 0;
 }
 
 /* One piece of a comma list into slot `index`. */
-static int set_piece(const CliCommand *command, const CliOption *option, const char *piece, int index) {
+static int set_piece(const CliCommand *command, const CliOption *option, const char *piece,
+                     int index) {
     if (index >= CLI_LIST_MAX) {
-        return cli_fail_text(command->name, "--%s: more than %d values", option->name, (int)CLI_LIST_MAX);
+        return cli_fail_text(command->name, "--%s: more than %d values", option->name,
+                             (int)CLI_LIST_MAX);
     }
-    if (!*piece) return cli_fail_text(command->name, "--%s: an empty value in the list", option->name);
+    if (!*piece) {
+        return cli_fail_text(command->name, "--%s: an empty value in the list", option->name);
+    }
     if (option->type == CLI_NUMBERS) {
         return set_number(command, option, piece, &((CliNumbers *)option->target)->value[index]);
     }
@@ -118,11 +133,13 @@ static int set_list(const CliCommand *command, const CliOption *option, const ch
         memcpy(piece, rest, length);
         piece[length] = '\0';
         int failed = set_piece(command, option, piece, count);
-        if (failed) return failed;
+        if (failed) {
+            return failed;
+        }
         rest = rest[length] ? rest + length + 1 : NULL;
     }
-    *(option->type == CLI_NUMBERS ? &((CliNumbers *)option->target)->count : &((CliNames *)option->target)->count) =
-        count;
+    *(option->type == CLI_NUMBERS ? &((CliNumbers *)option->target)->count
+                                  : &((CliNames *)option->target)->count) = count;
     return 0;
 }
 
@@ -143,8 +160,11 @@ static int set_option(const CliCommand *command, const CliOption *option, const 
     case CLI_OUTPUT: return set_output(command, option, text);
     case CLI_INT: return set_int(command, option, text);
     case CLI_UINT64:
-        if (text_uint64(text, option->target)) return 0;
-        return cli_fail_text(command->name, "--%s: '%s' is not a whole number from 0", option->name, text);
+        if (text_uint64(text, option->target)) {
+            return 0;
+        }
+        return cli_fail_text(command->name, "--%s: '%s' is not a whole number from 0", option->name,
+                             text);
     case CLI_NUMBER: return set_number(command, option, text, option->target);
     case CLI_NUMBERS:
     case CLI_NAMES: return set_list(command, option, text);
@@ -157,22 +177,30 @@ static int set_option(const CliCommand *command, const CliOption *option, const 
 static int fail_unknown(const CliCommand *command, const char *name) {
     const char *names[64];
     int count = 0;
-    for (int i = 0; i < command->option_count && count < 63; i++) names[count++] = command->options[i].name;
+    for (int i = 0; i < command->option_count && count < 63; i++) {
+        names[count++] = command->options[i].name;
+    }
     names[count++] = "help";
-    return cli_fail_text(command->name, "unknown option --%s; nearest is --%s (mild %s --help lists all)", name,
+    return cli_fail_text(command->name,
+                         "unknown option --%s; nearest is --%s (mild %s --help lists all)", name,
                          text_nearest(name, names, count), command->name);
 }
 
-static int take_override(const CliCommand *command, int argc, char **argv, int *index, CliArgs *args) {
+static int take_override(const CliCommand *command, int argc, char **argv, int *index,
+                         CliArgs *args) {
     const char *word = argv[*index] + 2;
     if (args->override_count >= CLI_OVERRIDES_MAX) {
         return cli_fail_text(command->name, "more than %d overrides", (int)CLI_OVERRIDES_MAX);
     }
     if (!strchr(word, '=')) { /* "--train.minutes 5" is as good as "--train.minutes=5" */
-        if (*index + 1 >= argc) return cli_fail_text(command->name, "--%s needs a value: --%s=VALUE", word, word);
+        if (*index + 1 >= argc) {
+            return cli_fail_text(command->name, "--%s needs a value: --%s=VALUE", word, word);
+        }
         char *joined = args->joined[args->override_count];
         int length = snprintf(joined, sizeof args->joined[0], "%s=%s", word, argv[++*index]);
-        if (length >= (int)sizeof args->joined[0]) return cli_fail_text(command->name, "--%s: value too long", word);
+        if (length >= (int)sizeof args->joined[0]) {
+            return cli_fail_text(command->name, "--%s: value too long", word);
+        }
         word = joined;
     }
     args->overrides[args->override_count++] = word;
@@ -185,14 +213,22 @@ static int take_option(const CliCommand *command, int argc, char **argv, int *in
     snprintf(name, sizeof name, "%.*s", equals ? (int)(equals - word) : (int)strlen(word), word);
     for (int i = 0; i < command->option_count; i++) {
         const CliOption *option = &command->options[i];
-        if (strcmp(option->name, name) != 0) continue;
+        if (strcmp(option->name, name) != 0) {
+            continue;
+        }
         if (option->type == CLI_FLAG) {
-            if (equals) return cli_fail_text(command->name, "--%s takes no value", name);
+            if (equals) {
+                return cli_fail_text(command->name, "--%s takes no value", name);
+            }
             return set_option(command, option, NULL);
         }
-        if (equals) return set_option(command, option, equals + 1);
-        if (*index + 1 >= argc)
-            return cli_fail_text(command->name, "--%s needs a value: --%s %s", name, name, option->value);
+        if (equals) {
+            return set_option(command, option, equals + 1);
+        }
+        if (*index + 1 >= argc) {
+            return cli_fail_text(command->name, "--%s needs a value: --%s %s", name, name,
+                                 option->value);
+        }
         return set_option(command, option, argv[++*index]);
     }
     return fail_unknown(command, name);
@@ -203,14 +239,18 @@ static int take_word(const CliCommand *command, int argc, char **argv, int *inde
     if (strncmp(word, "--", 2) == 0 && word[2]) {
         const char *dot = strchr(word, '.'), *equals = strchr(word, '=');
         int is_override = dot && (!equals || dot < equals);
-        if (is_override && command->overrides) return take_override(command, argc, argv, index, args);
+        if (is_override && command->overrides) {
+            return take_override(command, argc, argv, index, args);
+        }
         return take_option(command, argc, argv, index);
     }
     if (word[0] == '-' && word[1]) {
-        return cli_fail_text(command->name, "unknown option %s; options start with two dashes", word);
+        return cli_fail_text(command->name, "unknown option %s; options start with two dashes",
+                             word);
     }
     if (args->positional_count >= command->positional_max) {
-        return cli_fail_text(command->name, "unexpected word '%s' (mild %s --help)", word, command->name);
+        return cli_fail_text(command->name, "unexpected word '%s' (mild %s --help)", word,
+                             command->name);
     }
     args->positional[args->positional_count++] = word;
     return 0;
@@ -225,7 +265,9 @@ CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *
         }
     }
     for (int i = 1; i < argc; i++) {
-        if (take_word(command, argc, argv, &i, args)) return CLI_BAD;
+        if (take_word(command, argc, argv, &i, args)) {
+            return CLI_BAD;
+        }
     }
     return CLI_RUN;
 }

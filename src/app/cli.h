@@ -1,4 +1,5 @@
-/* Command lines: named options bound to variables, config overrides, positional words, and help a stranger can read. */
+/* Command lines: named options bound to variables, config overrides, positional words, and help a
+ * stranger can read. */
 #ifndef MILD_CLI_H
 #define MILD_CLI_H
 
@@ -18,15 +19,25 @@ typedef struct {
     char name[CLI_LIST_MAX][64];
 } CliNames; /* "rubber,foam45" */
 
-/* target: FLAG int *, TEXT const char **, OUTPUT the same (a file to be written, or `-`; refused at once when it cannot be), INT int *, UINT64 uint64_t *, NUMBER double *, NUMBERS CliNumbers *,
+/* target: FLAG int *, TEXT const char **, OUTPUT the same (a file to be written, or `-`; refused at
+ * once when it cannot be), INT int *, UINT64 uint64_t *, NUMBER double *, NUMBERS CliNumbers *,
  * NAMES CliNames *. What the target holds before parsing is the default. */
-typedef enum { CLI_FLAG, CLI_TEXT, CLI_OUTPUT, CLI_INT, CLI_UINT64, CLI_NUMBER, CLI_NUMBERS, CLI_NAMES } CliType;
+typedef enum {
+    CLI_FLAG,
+    CLI_TEXT,
+    CLI_OUTPUT,
+    CLI_INT,
+    CLI_UINT64,
+    CLI_NUMBER,
+    CLI_NUMBERS,
+    CLI_NAMES
+} CliType;
 
 typedef struct {
     const char *name; /* without the dashes */
     CliType type;
     void *target;
-    double min, max;   /* inclusive, for each number; ignored for FLAG, TEXT, OUTPUT, NAMES, UINT64 */
+    double min, max; /* inclusive, for each number; ignored for FLAG, TEXT, OUTPUT, NAMES, UINT64 */
     const char *value; /* what stands for the value in the help: "NAME[,NAME]"; NULL for a flag */
     const char *help;  /* with unit and default */
 } CliOption;
@@ -52,11 +63,12 @@ typedef struct {
 
 typedef enum { CLI_RUN, CLI_DONE, CLI_BAD } CliOutcome;
 
-/* Parses argv[1..]. CLI_DONE: the help was asked for and printed, exit 0. CLI_BAD: one line went to stderr, exit
- * CLI_EXIT_BAD_INPUT. */
+/* Parses argv[1..]. CLI_DONE: the help was asked for and printed, exit 0. CLI_BAD: one line went to
+ * stderr, exit CLI_EXIT_BAD_INPUT. */
 CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args);
 
-/* "mild COMMAND: text" on stderr; returns CLI_EXIT_BAD_INPUT so that `return cli_fail(...)` ends a command. */
+/* "mild COMMAND: text" on stderr; returns CLI_EXIT_BAD_INPUT so that `return cli_fail(...)` ends a
+ * command. */
 int cli_fail(const char *command, const MildError *error);
 int cli_fail_text(const char *command, const char *format, ...);
 

@@ -14,12 +14,8 @@ static const struct {
     const char *name;
     MildStatus (*run)(const ExperimentDef *def, BenchReport *report, MildError *error);
 } benches[] = {
-    {"memory", bench_memory},
-    {"step", bench_step},
-    {"ground", bench_ground},
-    {"elements", bench_elements},
-    {"solver", bench_solver},
-    {"walk", bench_walk},
+    {"memory", bench_memory},     {"step", bench_step},     {"ground", bench_ground},
+    {"elements", bench_elements}, {"solver", bench_solver}, {"walk", bench_walk},
     {"train", bench_train},
 };
 enum { BENCHES = sizeof benches / sizeof *benches };
@@ -47,7 +43,8 @@ static void print_rows(const BenchReport *report, int first, FILE *file) {
         const BenchRow *row = &report->rows[i];
         char bytes[32];
         if (strcmp(row->unit, "B") == 0) {
-            fprintf(file, "%-8s %-28s %14s\n", row->bench, row->name, text_bytes(row->value, bytes, sizeof bytes));
+            fprintf(file, "%-8s %-28s %14s\n", row->bench, row->name,
+                    text_bytes(row->value, bytes, sizeof bytes));
         } else {
             fprintf(file, "%-8s %-28s %14.4g %s\n", row->bench, row->name, row->value,
                     strcmp(row->unit, "-") ? row->unit : "");
@@ -59,11 +56,14 @@ static void print_rows(const BenchReport *report, int first, FILE *file) {
 /* All names are checked before anything runs. */
 static int check_names(const CliArgs *args) {
     const char *names[BENCHES];
-    for (int i = 0; i < BENCHES; i++) names[i] = benches[i].name;
+    for (int i = 0; i < BENCHES; i++) {
+        names[i] = benches[i].name;
+    }
     for (int a = 0; a < args->positional_count; a++) {
         const char *nearest = text_nearest(args->positional[a], names, BENCHES);
         if (strcmp(nearest, args->positional[a]) != 0) {
-            return cli_fail_text("bench", "unknown bench '%s'; nearest is '%s'", args->positional[a], nearest);
+            return cli_fail_text("bench", "unknown bench '%s'; nearest is '%s'",
+                                 args->positional[a], nearest);
         }
     }
     return 0;
@@ -71,22 +71,31 @@ static int check_names(const CliArgs *args) {
 
 static int wanted(const CliArgs *args, const char *name) {
     for (int a = 0; a < args->positional_count; a++) {
-        if (strcmp(args->positional[a], name) == 0) return 1;
+        if (strcmp(args->positional[a], name) == 0) {
+            return 1;
+        }
     }
     return args->positional_count == 0;
 }
 
-static MildStatus run_benches(const CliArgs *args, FILE *file, BenchReport *report, MildError *error) {
+static MildStatus run_benches(const CliArgs *args, FILE *file, BenchReport *report,
+                              MildError *error) {
     ExperimentDef def = experiment_def_default();
     MildStatus status = experiment_read(&def, NULL, args->overrides, args->override_count, error);
     char machine[256];
-    if (status == MILD_OK) fprintf(file, "%s, mild %s\n", build_machine(machine, sizeof machine), build_version());
+    if (status == MILD_OK) {
+        fprintf(file, "%s, mild %s\n", build_machine(machine, sizeof machine), build_version());
+    }
     fflush(file);
     for (int i = 0; i < BENCHES && status == MILD_OK; i++) {
         int first = report->count;
-        if (!wanted(args, benches[i].name)) continue;
+        if (!wanted(args, benches[i].name)) {
+            continue;
+        }
         status = benches[i].run(&def, report, error);
-        if (status == MILD_OK) print_rows(report, first, file);
+        if (status == MILD_OK) {
+            print_rows(report, first, file);
+        }
     }
     return status;
 }
@@ -100,28 +109,39 @@ int cmd_bench(int argc, char **argv) {
     const CliCommand command = {
         .name = "bench",
         .usage = "[NAME ...] [--json FILE]",
-        .summary =
-            "Measures speed and memory on this machine; without a name, everything (a few minutes). step: one physics "
-            "step on soft ground beside the engine's own contact, same robot, same pose, same run; ratio_to_rigid is "
-            "newton over engine_rigid. ground: the contact solver alone. elements: its cost per element, "
-            "20 to 2000 of them. solver: newton against the paper's gauss_seidel sweeps on the same problems, both to the "
-            "same error. walk: as step, on the states and torques of the shipped policy's walk. train: policy steps per second, rollout and "
-            "update, and where the time of a step goes. memory: what training holds.",
+        .summary = "Measures speed and memory on this machine; without a name, everything (a few "
+                   "minutes). step: one physics "
+                   "step on soft ground beside the engine's own contact, same robot, same pose, "
+                   "same run; ratio_to_rigid is "
+                   "newton over engine_rigid. ground: the contact solver alone. elements: its cost "
+                   "per element, "
+                   "20 to 2000 of them. solver: newton against the paper's gauss_seidel sweeps on "
+                   "the same problems, both to the "
+                   "same error. walk: as step, on the states and torques of the shipped policy's "
+                   "walk. train: policy steps per second, rollout and "
+                   "update, and where the time of a step goes. memory: what training holds.",
         .options = options,
         .option_count = 1,
-        .overrides = "any key of configs/default.ini, e.g. --train.envs=256 --train.threads=1 --task.physics_dt=0.001",
+        .overrides = "any key of configs/default.ini, e.g. --train.envs=256 --train.threads=1 "
+                     "--task.physics_dt=0.001",
         .examples = "  mild bench step\n  mild bench train memory --json bench.json\n",
         .positional_max = BENCHES,
     };
     CliArgs args;
     CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    if (outcome != CLI_RUN) {
+        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    }
     int bad = check_names(&args);
-    if (bad) return bad;
+    if (bad) {
+        return bad;
+    }
     BenchReport report = {.count = 0};
     MildError error = {0};
     FILE *table = json && strcmp(json, "-") == 0 ? stderr : stdout;
     MildStatus status = run_benches(&args, table, &report, &error);
-    if (status == MILD_OK && json) status = save_json(&report, json, &error);
+    if (status == MILD_OK && json) {
+        status = save_json(&report, json, &error);
+    }
     return status == MILD_OK ? 0 : cli_fail("bench", &error);
 }

@@ -37,11 +37,20 @@ static cJSON *row_json(const EvalRow *row) {
     const struct {
         const char *name;
         double value;
-    } values[] = {{"speed", row->speed}, {"trials", row->trials}, {"success", row->success}, {"velocity", row->velocity},
-                  {"cot", row->cot}, {"torque_max", row->torque_max}, {"clearance", row->clearance},
-                  {"penetration", row->penetration}, {"drift", row->drift}, {"energy", row->energy},
-                  {"velocity_low", row->velocity_low}, {"velocity_high", row->velocity_high},
-                  {"base_oscillation", row->base_oscillation}, {"seconds", row->seconds}};
+    } values[] = {{"speed", row->speed},
+                  {"trials", row->trials},
+                  {"success", row->success},
+                  {"velocity", row->velocity},
+                  {"cot", row->cot},
+                  {"torque_max", row->torque_max},
+                  {"clearance", row->clearance},
+                  {"penetration", row->penetration},
+                  {"drift", row->drift},
+                  {"energy", row->energy},
+                  {"velocity_low", row->velocity_low},
+                  {"velocity_high", row->velocity_high},
+                  {"base_oscillation", row->base_oscillation},
+                  {"seconds", row->seconds}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }
@@ -61,19 +70,29 @@ static MildStatus write_json(const Eval *e, MildError *error) {
     return report_save(root, e->json, error);
 }
 
-static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildMap **map, MildError *error) {
+static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildMap **map,
+                             MildError *error) {
     *map = NULL;
     MildStatus status = scene_make(scene, name, e->patch, error);
-    if (status == MILD_OK) status = grounds_finish_scene(&e->finish, scene, error);
-    if (status == MILD_OK) status = task_def_check(&e->task, error);
-    if (status == MILD_OK) status = grounds_lay_map(&e->finish, scene, map, error);
+    if (status == MILD_OK) {
+        status = grounds_finish_scene(&e->finish, scene, error);
+    }
+    if (status == MILD_OK) {
+        status = task_def_check(&e->task, error);
+    }
+    if (status == MILD_OK) {
+        status = grounds_lay_map(&e->finish, scene, map, error);
+    }
     return status;
 }
 
-static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller, MildError *error) {
+static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                           MildError *error) {
     char line[256];
     FILE *table = e->json && strcmp(e->json, "-") == 0 ? stderr : stdout;
-    if (e->finish.model != MILD_MODEL_MILD) fprintf(table, "ground model %s\n", mild_model_names[e->finish.model]);
+    if (e->finish.model != MILD_MODEL_MILD) {
+        fprintf(table, "ground model %s\n", mild_model_names[e->finish.model]);
+    }
     eval_print_header(line, sizeof line);
     fprintf(table, "%s\n", line);
     for (int g = 0; g < e->grounds.count; g++) {
@@ -99,7 +118,8 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
     return e->json ? write_json(e, error) : MILD_OK;
 }
 
-/* All grounds are checked before the first trial: a typing error in the last one should not cost an hour. */
+/* All grounds are checked before the first trial: a typing error in the last one should not cost an
+ * hour. */
 static MildStatus check_grounds(Eval *e, MildError *error) {
     MildStatus status = MILD_OK;
     Scene scene;
@@ -115,7 +135,9 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     char path[PATH_SIZE];
     MildModel model;
     MildStatus status = experiment_nominal_task(&e->task, e->config, error);
-    if (status == MILD_OK) status = grounds_model(e->model, args, &model, error);
+    if (status == MILD_OK) {
+        status = grounds_model(e->model, args, &model, error);
+    }
     if (status != MILD_OK) {
         return status;
     }
@@ -128,8 +150,12 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     } else {
         status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
     }
-    if (status == MILD_OK) status = controller_learned(e->policy, pool, e->eval.trials, &controller, error);
-    if (status == MILD_OK) status = evaluate(e, robot, pool, &controller, error);
+    if (status == MILD_OK) {
+        status = controller_learned(e->policy, pool, e->eval.trials, &controller, error);
+    }
+    if (status == MILD_OK) {
+        status = evaluate(e, robot, pool, &controller, error);
+    }
     controller_destroy(&controller);
     robot_destroy(robot);
     pool_destroy(pool);
@@ -156,28 +182,42 @@ int cmd_eval(int argc, char **argv) {
     strcpy(e->grounds.name[2], "sand_loose");
     const CliOption options[] = {
         {"policy", CLI_TEXT, &e->policy, 0, 0, "FILE", "policy to try (policies/mild.safetensors)"},
-        {"config", CLI_TEXT, &e->config, 0, 0, "FILE", "config the policy was trained with, for its [task]"},
+        {"config", CLI_TEXT, &e->config, 0, 0, "FILE",
+         "config the policy was trained with, for its [task]"},
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
          "grounds, a row each; rubber+foam45 is a course of both (rigid,foam45,sand_loose)"},
-        {"model", CLI_TEXT, &e->model, 0, 0, "NAME", grounds_model_help(model_help, sizeof model_help)},
-        {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]", "[m/s] commanded forward speeds, a row each (0.6)"},
-        {"trials", CLI_INT, &e->eval.trials, 1, 10000, "N", "trials per row, each with its own start and noise (10)"},
+        {"model", CLI_TEXT, &e->model, 0, 0, "NAME",
+         grounds_model_help(model_help, sizeof model_help)},
+        {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]",
+         "[m/s] commanded forward speeds, a row each (0.6)"},
+        {"trials", CLI_INT, &e->eval.trials, 1, 10000, "N",
+         "trials per row, each with its own start and noise (10)"},
         {"seconds", CLI_NUMBER, &e->eval.seconds, 0.1, 3600, "T", "[s] length of a trial (20)"},
-        {"patch", CLI_NUMBER, &e->patch, 0.1, 1000, "L", "[m] length of each ground of a course (2.5)"},
+        {"patch", CLI_NUMBER, &e->patch, 0.1, 1000, "L",
+         "[m] length of each ground of a course (2.5)"},
         {"seed", CLI_UINT64, &e->eval.seed, 0, 0, "S", "same seed, same trials (1)"},
-        {"threads", CLI_INT, &e->threads, 0, 1024, "N", "0: one per core; the table does not depend on it (0)"},
-        {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE", "write the table as JSON as well; - for standard output"},
+        {"threads", CLI_INT, &e->threads, 0, 1024, "N",
+         "0: one per core; the table does not depend on it (0)"},
+        {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
+         "write the table as JSON as well; - for standard output"},
     };
     const CliCommand command = {
-        .name = "eval", .usage = "--policy FILE --ground NAME[,NAME] --speed V[,V] [options]",
-        .summary = "Walks a policy over grounds and speeds and prints one row for each: trials without a fall, measured\n"
-                   "speed with its 95 % interval, cost of transport, largest torque, foot clearance above the\n"
-                   "undisturbed ground, sinkage and slip of each stance, energy. Sensors are noisy and late as in\n"
+        .name = "eval",
+        .usage = "--policy FILE --ground NAME[,NAME] --speed V[,V] [options]",
+        .summary = "Walks a policy over grounds and speeds and prints one row for each: trials "
+                   "without a fall, measured\n"
+                   "speed with its 95 % interval, cost of transport, largest torque, foot "
+                   "clearance above the\n"
+                   "undisturbed ground, sinkage and slip of each stance, energy. Sensors are noisy "
+                   "and late as in\n"
                    "training; the robot itself is nominal and nobody pushes it.",
-        .options = options, .option_count = sizeof options / sizeof *options,
-        .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 --terrain.kind=waves --terrain.memory=true",
-        .examples = "  mild eval --ground rigid,foam45,sand_loose --speed 0.3,0.6\n"
-                    "  mild eval --ground sand_loose --terrain.kind=rough --terrain.amplitude=0.02\n",
+        .options = options,
+        .option_count = sizeof options / sizeof *options,
+        .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "
+                     "--terrain.kind=waves --terrain.memory=true",
+        .examples =
+            "  mild eval --ground rigid,foam45,sand_loose --speed 0.3,0.6\n"
+            "  mild eval --ground sand_loose --terrain.kind=rough --terrain.amplitude=0.02\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     int code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;

@@ -6,9 +6,9 @@
 
 #include "app/cli.h"
 #include "app/commands.h"
+#include "app/figure.h"
 #include "app/fit_csv.h"
 #include "app/grounds.h"
-#include "app/figure.h"
 #include "app/paths.h"
 #include "app/press.h"
 #include "app/report.h"
@@ -37,35 +37,46 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
              "what is not fitted is held at this ground's value (default sand_loose); one of %s",
              grounds_names(grounds, sizeof grounds));
     const CliOption table[] = {
-        {"plate", CLI_NUMBERS, &options->plate, 0.0195, 1, "L,W", "[m] length and width of the plate that was pressed"},
+        {"plate", CLI_NUMBERS, &options->plate, 0.0195, 1, "L,W",
+         "[m] length and width of the plate that was pressed"},
         {"fit", CLI_NAMES, &options->fit, 0, 0, "NAME[,NAME]",
          "what to fit, of k_pen, sigma_cone, alpha, nu, c_g, c_d (default k_pen,sigma_cone)"},
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
-        {"alpha", CLI_NUMBER, &options->alpha, 0.1, 1.5, "A", "[rad] shear band angle, held or start of its fit"},
-        {"nu", CLI_NUMBER, &options->nu, 0.1, 10, "N", "[-] recruitment rate, held or start of its fit"},
-        {"json", CLI_OUTPUT, &options->json, 0, 0, "FILE", "write values and intervals; - for standard output"},
+        {"alpha", CLI_NUMBER, &options->alpha, 0.1, 1.5, "A",
+         "[rad] shear band angle, held or start of its fit"},
+        {"nu", CLI_NUMBER, &options->nu, 0.1, 10, "N",
+         "[-] recruitment rate, held or start of its fit"},
+        {"json", CLI_OUTPUT, &options->json, 0, 0, "FILE",
+         "write values and intervals; - for standard output"},
         {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
          "picture of data and fit, and its numbers beside it as FILE_fit.csv"},
     };
     const CliCommand command = {
         .name = "fit",
         .usage = "DATA.csv [DATA2.csv ...] --plate L,W [options]",
-        .summary =
-            "Find the parameters of a ground from presses of a level plate: values with 95 % intervals, and which of "
-            "them the data cannot tell. A CSV has a header line with depth_m and force_n, and time_s or speed_m_s "
-            "where speed matters; several files may have several speeds, which c_d needs, or a drop, which c_g needs too. "
-            "Rows that are not deeper than all before (unloading) are left out. The intervals take the errors of the "
-            "rows as independent.",
+        .summary = "Find the parameters of a ground from presses of a level plate: values with 95 "
+                   "% intervals, and which of "
+                   "them the data cannot tell. A CSV has a header line with depth_m and force_n, "
+                   "and time_s or speed_m_s "
+                   "where speed matters; several files may have several speeds, which c_d needs, "
+                   "or a drop, which c_g needs too. "
+                   "Rows that are not deeper than all before (unloading) are left out. The "
+                   "intervals take the errors of the "
+                   "rows as independent.",
         .options = table,
         .option_count = sizeof table / sizeof *table,
-        .overrides = "any parameter of the ground, e.g. --ground.bed_depth=0.05; `mild info grounds` lists them",
+        .overrides = "any parameter of the ground, e.g. --ground.bed_depth=0.05; `mild info "
+                     "grounds` lists them",
         .examples = "  mild press --ground grass --depth 0.04 --csv grass.csv\n"
                     "  mild fit grass.csv --plate 0.2,0.1 --ground grass --figure grass.png\n"
-                    "  mild fit slow.csv fast.csv --plate 0.2,0.1 --fit k_pen,sigma_cone,alpha,c_d --json out.json\n",
+                    "  mild fit slow.csv fast.csv --plate 0.2,0.1 --fit k_pen,sigma_cone,alpha,c_d "
+                    "--json out.json\n",
         .positional_max = CLI_LIST_MAX,
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
-    if (outcome == CLI_BAD) return CLI_EXIT_BAD_INPUT;
+    if (outcome == CLI_BAD) {
+        return CLI_EXIT_BAD_INPUT;
+    }
     return outcome == CLI_DONE ? -1 : 0;
 }
 
@@ -73,27 +84,45 @@ static MildStatus names_read(const CliNames *names, FitDef *def, MildError *erro
     for (int i = 0; i < names->count; i++) {
         int found = 0;
         for (int p = 0; p < FIT_PARAMETERS; p++) {
-            if (strcmp(names->name[i], fit_names[p]) == 0) def->free[p] = found = 1;
+            if (strcmp(names->name[i], fit_names[p]) == 0) {
+                def->free[p] = found = 1;
+            }
         }
-        if (found) continue;
+        if (found) {
+            continue;
+        }
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--fit: unknown parameter '%s'; nearest is '%s' (k_pen, sigma_cone, alpha, nu, c_g, c_d)",
+                         "--fit: unknown parameter '%s'; nearest is '%s' (k_pen, sigma_cone, "
+                         "alpha, nu, c_g, c_d)",
                          names->name[i], text_nearest(names->name[i], fit_names, FIT_PARAMETERS));
     }
     return MILD_OK;
 }
 
-static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitDef *def, MildError *error) {
+static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitDef *def,
+                           MildError *error) {
     MildStatus status = grounds_find(options->ground, &def->material, NULL, error);
-    if (status != MILD_OK) return status;
+    if (status != MILD_OK) {
+        return status;
+    }
     ConfigSection section = grounds_section(&def->material);
     status = config_overrides(&section, 1, args->overrides, args->override_count, error);
-    if (status == MILD_OK) status = names_read(&options->fit, def, error);
-    if (status != MILD_OK) return status;
-    if (isfinite(options->alpha)) def->material.alpha = options->alpha;
-    if (isfinite(options->nu)) def->material.nu = options->nu;
+    if (status == MILD_OK) {
+        status = names_read(&options->fit, def, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    if (isfinite(options->alpha)) {
+        def->material.alpha = options->alpha;
+    }
+    if (isfinite(options->nu)) {
+        def->material.nu = options->nu;
+    }
     MildSole *plate = press_plate_create(options->plate.value[0], options->plate.value[1], error);
-    if (!plate) return error->status;
+    if (!plate) {
+        return error->status;
+    }
     def->elements = mild_sole_elements(plate); /* press's own raster */
     def->pitch = mild_sole_pitch(plate);
     mild_sole_destroy(plate);
@@ -104,20 +133,25 @@ static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitDe
 static MildStatus figure_data(const char *figure, char data[PATH_SIZE], MildError *error) {
     const char *dot = strrchr(figure, '.'), *slash = strrchr(figure, '/');
     int stem = dot && (!slash || dot > slash) ? (int)(dot - figure) : (int)strlen(figure);
-    if (snprintf(data, PATH_SIZE, "%.*s_fit.csv", stem, figure) < PATH_SIZE) return MILD_OK;
+    if (snprintf(data, PATH_SIZE, "%.*s_fit.csv", stem, figure) < PATH_SIZE) {
+        return MILD_OK;
+    }
     return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", figure);
 }
 
 /* What would be written over what is read. */
 static MildStatus outputs_check(const FitOptions *options, const CliArgs *args, MildError *error) {
     char data[PATH_SIZE] = "";
-    if (options->figure && figure_data(options->figure, data, error) != MILD_OK) return error->status;
+    if (options->figure && figure_data(options->figure, data, error) != MILD_OK) {
+        return error->status;
+    }
     for (int i = 0; i < args->positional_count; i++) {
         const char *record = args->positional[i];
         if (strcmp(record, data) == 0 || (options->json && strcmp(record, options->json) == 0) ||
             (options->figure && strcmp(record, options->figure) == 0)) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
-                             "%.200s is a record and would be written over; name another file", record);
+                             "%.200s is a record and would be written over; name another file",
+                             record);
         }
     }
     return MILD_OK;
@@ -133,16 +167,24 @@ static void say_held(const FitResult *result, FitName name) {
     case FIT_HELD:
     case FIT_FITTED: break;
     case FIT_NO_SPEEDS:
-        printf("%s: the rows do not differ in speed, the data cannot tell it; %s (add a press at another speed)\n",
+        printf("%s: the rows do not differ in speed, the data cannot tell it; %s (add a press at "
+               "another speed)\n",
                fit_names[name], held);
         break;
-    case FIT_NO_MASS: printf("c_d: this ground has no added mass (c_g = 0), c_d has no effect; %s\n", held); break;
-    case FIT_NO_EFFECT: printf("%s: has no effect on these forces; %s\n", fit_names[name], held); break;
-    case FIT_TIED:
-        printf("%s and %s: the data cannot tell them apart (correlation %.3f); %s is held at %.4g\n", fit_names[name],
-               fit_names[p->partner], p->correlation, fit_names[name], p->value);
+    case FIT_NO_MASS:
+        printf("c_d: this ground has no added mass (c_g = 0), c_d has no effect; %s\n", held);
         break;
-    case FIT_WIDE: printf("%s: the data do not tell it, any value fits; %s\n", fit_names[name], held); break;
+    case FIT_NO_EFFECT:
+        printf("%s: has no effect on these forces; %s\n", fit_names[name], held);
+        break;
+    case FIT_TIED:
+        printf(
+            "%s and %s: the data cannot tell them apart (correlation %.3f); %s is held at %.4g\n",
+            fit_names[name], fit_names[p->partner], p->correlation, fit_names[name], p->value);
+        break;
+    case FIT_WIDE:
+        printf("%s: the data do not tell it, any value fits; %s\n", fit_names[name], held);
+        break;
     }
 }
 
@@ -152,21 +194,26 @@ static void table_print(const FitWork *work, int files) {
     for (int i = 0; i < FIT_PARAMETERS; i++) {
         const FitParameter *p = &result->parameter[i];
         if (p->state == FIT_FITTED) {
-            printf("%-12s %12.5g %12.5g %12.5g  %s\n", fit_names[i], p->value, p->low, p->high, units[i]);
+            printf("%-12s %12.5g %12.5g %12.5g  %s\n", fit_names[i], p->value, p->low, p->high,
+                   units[i]);
         } else {
             printf("%-12s %12.5g %12s %12s  %s\n", fit_names[i], p->value, "held", "", units[i]);
         }
     }
-    printf("residual %.4g N, %.2f %% of the force (root mean square); %d loading rows of %d file%s, %d elements\n",
-           result->residual, 100 * result->residual_share, result->points, files, files == 1 ? "" : "s",
-           work->def.elements);
-    for (int i = 0; i < FIT_PARAMETERS; i++) say_held(result, (FitName)i);
+    printf("residual %.4g N, %.2f %% of the force (root mean square); %d loading rows of %d "
+           "file%s, %d elements\n",
+           result->residual, 100 * result->residual_share, result->points, files,
+           files == 1 ? "" : "s", work->def.elements);
+    for (int i = 0; i < FIT_PARAMETERS; i++) {
+        say_held(result, (FitName)i);
+    }
 }
 
 static MildStatus json_save(const FitResult *result, const char *path, MildError *error) {
     cJSON *root = cJSON_CreateObject(), *fitted = cJSON_AddObjectToObject(root, "parameters");
     cJSON *held = cJSON_AddObjectToObject(root, "held");
-    int whole = root && fitted && held && cJSON_AddNumberToObject(root, "residual", result->residual);
+    int whole =
+        root && fitted && held && cJSON_AddNumberToObject(root, "residual", result->residual);
     for (int i = 0; i < FIT_PARAMETERS && whole; i++) {
         const FitParameter *p = &result->parameter[i];
         if (p->state != FIT_FITTED) {
@@ -175,7 +222,8 @@ static MildStatus json_save(const FitResult *result, const char *path, MildError
         }
         cJSON *item = cJSON_AddObjectToObject(fitted, fit_names[i]);
         whole = item && cJSON_AddNumberToObject(item, "value", p->value) &&
-                cJSON_AddNumberToObject(item, "low", p->low) && cJSON_AddNumberToObject(item, "high", p->high);
+                cJSON_AddNumberToObject(item, "low", p->low) &&
+                cJSON_AddNumberToObject(item, "high", p->high);
     }
     if (!whole) {
         cJSON_Delete(root);
@@ -186,11 +234,14 @@ static MildStatus json_save(const FitResult *result, const char *path, MildError
 
 /* ---- the picture ---- */
 
-static MildStatus data_write(const FitWork *work, const CliArgs *args, const char *path, MildError *error) {
+static MildStatus data_write(const FitWork *work, const CliArgs *args, const char *path,
+                             MildError *error) {
     char *text = NULL;
     size_t size = 0;
     FILE *memory = open_memstream(&text, &size);
-    if (!memory) return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
+    if (!memory) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
+    }
     FitDef def = work->def;
     def.material = work->result.material;
     fprintf(memory, "record,depth_m,force_n,speed_m_s,fit_n\n");
@@ -211,47 +262,73 @@ static MildStatus data_write(const FitWork *work, const CliArgs *args, const cha
     return status;
 }
 
-static MildStatus figure_save(const FitWork *work, const CliArgs *args, const char *figure, MildError *error) {
+static MildStatus figure_save(const FitWork *work, const CliArgs *args, const char *figure,
+                              MildError *error) {
     char data[PATH_SIZE];
     MildStatus status = figure_data(figure, data, error);
-    if (status == MILD_OK) status = data_write(work, args, data, error);
-    if (status == MILD_OK) status = figure_draw("scripts/fit.py", data, figure, error);
+    if (status == MILD_OK) {
+        status = data_write(work, args, data, error);
+    }
+    if (status == MILD_OK) {
+        status = figure_draw("scripts/fit.py", data, figure, error);
+    }
     return status;
 }
 
 /* ---- the command ---- */
 
-static MildStatus fit_report(const FitOptions *options, const CliArgs *args, FitWork *work, MildError *error) {
+static MildStatus fit_report(const FitOptions *options, const CliArgs *args, FitWork *work,
+                             MildError *error) {
     MildStatus status = MILD_OK;
     for (int f = 0; f < args->positional_count && status == MILD_OK; f++) {
         status = fit_csv_read(args->positional[f], &work->points, &work->count, error);
         work->first[f + 1] = work->count;
     }
-    if (status == MILD_OK) status = fit_run(&work->def, work->points, work->count, &work->result, error);
-    if (status != MILD_OK) return status;
-    if (!options->json || strcmp(options->json, "-") != 0) table_print(work, args->positional_count);
-    if (options->json) status = json_save(&work->result, options->json, error);
-    if (status == MILD_OK && options->figure) status = figure_save(work, args, options->figure, error);
+    if (status == MILD_OK) {
+        status = fit_run(&work->def, work->points, work->count, &work->result, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    if (!options->json || strcmp(options->json, "-") != 0) {
+        table_print(work, args->positional_count);
+    }
+    if (options->json) {
+        status = json_save(&work->result, options->json, error);
+    }
+    if (status == MILD_OK && options->figure) {
+        status = figure_save(work, args, options->figure, error);
+    }
     return status;
 }
 
 int cmd_fit(int argc, char **argv) {
-    FitOptions options = {
-        .ground = "sand_loose", .fit = {.count = 2, .name = {"k_pen", "sigma_cone"}}, .alpha = NAN, .nu = NAN};
+    FitOptions options = {.ground = "sand_loose",
+                          .fit = {.count = 2, .name = {"k_pen", "sigma_cone"}},
+                          .alpha = NAN,
+                          .nu = NAN};
     CliArgs args;
     int code = options_read(argc, argv, &options, &args);
-    if (code) return code < 0 ? 0 : code;
+    if (code) {
+        return code < 0 ? 0 : code;
+    }
     if (!args.positional_count) {
-        return cli_fail_text("fit", "which record? mild fit DATA.csv --plate L,W (mild press --csv writes one)");
+        return cli_fail_text(
+            "fit", "which record? mild fit DATA.csv --plate L,W (mild press --csv writes one)");
     }
     if (options.plate.count != 2) {
-        return cli_fail_text("fit", "--plate: LENGTH,WIDTH in metres of the plate that was pressed are needed");
+        return cli_fail_text(
+            "fit", "--plate: LENGTH,WIDTH in metres of the plate that was pressed are needed");
     }
     MildError error;
     FitWork work = {0};
     MildStatus status = def_make(&options, &args, &work.def, &error);
-    if (status == MILD_OK) status = outputs_check(&options, &args, &error);
-    if (status == MILD_OK) status = fit_report(&options, &args, &work, &error);
+    if (status == MILD_OK) {
+        status = outputs_check(&options, &args, &error);
+    }
+    if (status == MILD_OK) {
+        status = fit_report(&options, &args, &work, &error);
+    }
     free(work.points);
     return status == MILD_OK ? 0 : cli_fail("fit", &error);
 }

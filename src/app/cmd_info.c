@@ -17,12 +17,14 @@ static const struct {
     const char *ground, *what, *source;
 } sources[] = {
     {"rubber", "sports-hall rubber mat", "stiff end of the paper's ranges; elastic"},
-    {"foam60", "foam of 60 kg/m^3", "k_pen from a Gibson-Ashby foam on a 50 mm slab; weighs grams: no added mass"},
+    {"foam60", "foam of 60 kg/m^3",
+     "k_pen from a Gibson-Ashby foam on a 50 mm slab; weighs grams: no added mass"},
     {"foam45", "foam of 45 kg/m^3", "as foam60"},
     {"foam28", "foam of 28 kg/m^3", "as foam60"},
     {"foam25", "foam of 25 kg/m^3", "as foam60"},
     {"grass", "lawn", "inside the paper's ranges; half of the depth springs back"},
-    {"sand_loose", "loose dry sand", "inside the paper's ranges; inertia (c_g, c_d, phi) after Choi et al. 2023"},
+    {"sand_loose", "loose dry sand",
+     "inside the paper's ranges; inertia (c_g, c_d, phi) after Choi et al. 2023"},
     {"sand_dense", "packed dry sand", "as sand_loose, denser"},
 };
 enum { SOURCES = sizeof sources / sizeof *sources };
@@ -30,7 +32,9 @@ enum { SOURCES = sizeof sources / sizeof *sources };
 static void print_preset_table(void) {
     int presets = mild_material_preset_count();
     printf("%-12s", "");
-    for (int p = 0; p < presets; p++) printf("%11s", mild_material_preset_name(p));
+    for (int p = 0; p < presets; p++) {
+        printf("%11s", mild_material_preset_name(p));
+    }
     printf("\n");
     for (int f = 0; f < mild_material_field_count; f++) {
         printf("  %-10s", mild_material_fields[f].name);
@@ -49,7 +53,8 @@ static void print_preset_table(void) {
 static MildSole *paper_sole(void) {
     const double pitch = 0.0195, x = 5.5 * pitch, y = 3.5 * pitch;
     const double outline[] = {-x, -y, x, -y, x, y, -x, y};
-    const MildSoleDef def = {.outline = outline, .points = 4, .pitch = pitch, .target_elements = 77};
+    const MildSoleDef def = {
+        .outline = outline, .points = 4, .pitch = pitch, .target_elements = 77};
     return mild_sole_create(&def, NULL);
 }
 static const double paper_weight = 40 * 9.81; /* [N] */
@@ -71,22 +76,27 @@ static const struct {
     const char *what, *source;
 } models[MILD_MODELS] = {
     [MILD_MODEL_MILD] = {"a developing cone under every element", "the paper"},
-    [MILD_MODEL_CON_CONE] = {"one developing cone under the whole sole", "Choi et al. 2023, its numbers scaled"},
+    [MILD_MODEL_CON_CONE] = {"one developing cone under the whole sole",
+                             "Choi et al. 2023, its numbers scaled"},
     [MILD_MODEL_CON_SPRING] = {"one yielding spring under the sole's middle", "Lynch et al. 2020"},
     [MILD_MODEL_ECC_SPRING] = {"a yielding spring under every element", "Lynch et al. 2024"},
-    [MILD_MODEL_ECC_QUASI] = {"resistive force theory under every element", "Li et al. 2013, Xiong et al. 2017"},
+    [MILD_MODEL_ECC_QUASI] = {"resistive force theory under every element",
+                              "Li et al. 2013, Xiong et al. 2017"},
     [MILD_MODEL_ECC_QUASI_3D] = {"the same in three dimensions", "Agarwal et al. 2023"},
     [MILD_MODEL_RIGID] = {"the engine's own contact: train, eval, play; no parameters", "MuJoCo"},
 };
 
 /* One number that the model is matched by, on every preset. */
 static void print_matched(const MildSole *sole, MildModel model, const char *key) {
-    const MildField *field = mild_field_find(mild_material_fields, mild_material_field_count, key, NULL);
+    const MildField *field =
+        mild_field_find(mild_material_fields, mild_material_field_count, key, NULL);
     printf("  %-10s %-10s", mild_model_names[model], key);
     for (int p = 0; p < mild_material_preset_count(); p++) {
         MildMaterial mild, rival;
         mild_material_preset(mild_material_preset_name(p), &mild);
-        if (mild_model_match(model, &mild, sole, paper_weight / 2, &rival, NULL) != MILD_OK) continue;
+        if (mild_model_match(model, &mild, sole, paper_weight / 2, &rival, NULL) != MILD_OK) {
+            continue;
+        }
         printf("%11.4g", *(const double *)(const void *)((const char *)&rival + field->offset));
     }
     printf("\n");
@@ -94,11 +104,15 @@ static void print_matched(const MildSole *sole, MildModel model, const char *key
 
 static void print_models(const MildSole *sole) {
     printf("\nmodels (--model NAME), and where they come from\n");
-    for (int m = 0; m < MILD_MODELS; m++)
+    for (int m = 0; m < MILD_MODELS; m++) {
         printf("  %-12s  %s; %s\n", mild_model_names[m], models[m].what, models[m].source);
-    printf("\nrivals under 20 kg on one foot, matched to sink as deep as mild; k_pen is that of one element, for con_* of the\n"
-           "whole sole. con_cone keeps alpha 1.047, nu 2, c_g 2.7, c_d 17.2, phi 0.57, rho 1000; springs and ecc_quasi* have\n"
-           "no inertia and no recovery; ecc_quasi* have their friction in zeta. The rest is the preset's.\n");
+    }
+    printf("\nrivals under 20 kg on one foot, matched to sink as deep as mild; k_pen is that of "
+           "one element, for con_* of the\n"
+           "whole sole. con_cone keeps alpha 1.047, nu 2, c_g 2.7, c_d 17.2, phi 0.57, rho 1000; "
+           "springs and ecc_quasi* have\n"
+           "no inertia and no recovery; ecc_quasi* have their friction in zeta. The rest is the "
+           "preset's.\n");
     print_matched(sole, MILD_MODEL_CON_CONE, "k_pen");
     print_matched(sole, MILD_MODEL_CON_CONE, "sigma_cone");
     print_matched(sole, MILD_MODEL_CON_SPRING, "k_pen");
@@ -108,8 +122,11 @@ static void print_models(const MildSole *sole) {
 
 static int info_grounds(void) {
     MildSole *sole = paper_sole();
-    if (!sole) return cli_fail_text("info", "out of memory");
-    printf("presets, SI units; any value can be replaced on the command line, e.g. --ground.k_pen=500\n\n");
+    if (!sole) {
+        return cli_fail_text("info", "out of memory");
+    }
+    printf("presets, SI units; any value can be replaced on the command line, e.g. "
+           "--ground.k_pen=500\n\n");
     print_preset_table();
     print_sinkage(sole);
     print_models(sole);
@@ -118,24 +135,28 @@ static int info_grounds(void) {
     for (int f = 0; f < mild_material_field_count; f++) {
         const MildField *field = &mild_material_fields[f];
         char range[48] = "true or false";
-        if (field->type == MILD_FIELD_NAME) snprintf(range, sizeof range, "see models");
-        if (field->type == MILD_FIELD_DOUBLE) snprintf(range, sizeof range, "%g .. %g", field->min, field->max);
+        if (field->type == MILD_FIELD_NAME) {
+            snprintf(range, sizeof range, "see models");
+        }
+        if (field->type == MILD_FIELD_DOUBLE) {
+            snprintf(range, sizeof range, "%g .. %g", field->min, field->max);
+        }
         printf("  %-10s  %-16s %s\n", field->name, range, field->help);
     }
     printf("\nsources\n");
-    for (int i = 0; i < SOURCES; i++)
+    for (int i = 0; i < SOURCES; i++) {
         printf("  %-10s  %s; %s\n", sources[i].ground, sources[i].what, sources[i].source);
+    }
     return 0;
 }
 
 static int info_models(void) {
-    printf(
-        "ground models: mild info grounds\n"
-        "\nsolvers of the soft ones (--task.newton)\n"
-        "  newton        the step as one small convex problem; default\n"
-        "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n"
-        "\nrobots\n"
-        "  sa01    models/sa01/sa01.xml: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
+    printf("ground models: mild info grounds\n"
+           "\nsolvers of the soft ones (--task.newton)\n"
+           "  newton        the step as one small convex problem; default\n"
+           "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n"
+           "\nrobots\n"
+           "  sa01    models/sa01/sa01.xml: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
     return 0;
 }
 
@@ -143,8 +164,8 @@ static int info_config(void) {
     ExperimentDef def = experiment_def_default();
     ConfigSection sections[EXPERIMENT_SECTIONS];
     experiment_sections(&def, sections);
-    printf(
-        "# Every key with its default. A config file holds what differs; --section.key=value changes one for one run.\n");
+    printf("# Every key with its default. A config file holds what differs; --section.key=value "
+           "changes one for one run.\n");
     config_print(sections, EXPERIMENT_SECTIONS, 1, stdout);
     return 0;
 }
@@ -154,8 +175,8 @@ static int info_build(void) {
     printf("mild      %s\n", build_version());
     printf("compiler  %s, %s\n", build_compiler(), build_type());
     printf("flags     %s\n", build_flags());
-    printf("MuJoCo    %s (headers %d.%d.%d)\n", mj_versionString(), mjVERSION_HEADER / 100, mjVERSION_HEADER / 10 % 10,
-           mjVERSION_HEADER % 10);
+    printf("MuJoCo    %s (headers %d.%d.%d)\n", mj_versionString(), mjVERSION_HEADER / 100,
+           mjVERSION_HEADER / 10 % 10, mjVERSION_HEADER % 10);
     printf("oneDNN    %d.%d.%d\n", dnnl->major, dnnl->minor, dnnl->patch);
     printf("cJSON     %s\n", cJSON_Version());
     printf("inih      system library\n");
@@ -196,19 +217,27 @@ int cmd_info(int argc, char **argv) {
     const CliCommand command = {
         .name = "info",
         .usage = "grounds | models | config | build | devices",
-        .summary = "grounds: presets with every parameter, its unit, range and source. models: ground models, "
-                   "solvers, robots. config: every key with its default, range and meaning, as a complete config file. "
+        .summary = "grounds: presets with every parameter, its unit, range and source. models: "
+                   "ground models, "
+                   "solvers, robots. config: every key with its default, range and meaning, as a "
+                   "complete config file. "
                    "build: version, compiler, libraries. devices: what this machine computes with.",
         .examples = "  mild info grounds\n  mild info config > my.ini\n",
         .positional_max = 1,
     };
     CliArgs args;
     CliOutcome outcome = cli_parse(&command, argc, argv, &args);
-    if (outcome != CLI_RUN) return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
-    if (!args.positional_count) return cli_fail_text("info", "about what? mild info %s", command.usage);
+    if (outcome != CLI_RUN) {
+        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    }
+    if (!args.positional_count) {
+        return cli_fail_text("info", "about what? mild info %s", command.usage);
+    }
     const char *names[TOPICS];
     for (int i = 0; i < TOPICS; i++) {
-        if (strcmp(args.positional[0], topics[i].name) == 0) return topics[i].print();
+        if (strcmp(args.positional[0], topics[i].name) == 0) {
+            return topics[i].print();
+        }
         names[i] = topics[i].name;
     }
     return cli_fail_text("info", "unknown topic '%s'; nearest is '%s'", args.positional[0],

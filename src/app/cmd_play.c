@@ -1,4 +1,5 @@
-/* mild play: watch a policy walk a course; video or window, a table per ground, a picture of sole pressure. */
+/* mild play: watch a policy walk a course; video or window, a table per ground, a picture of sole
+ * pressure. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,8 +9,8 @@
 #include "app/commands.h"
 #include "app/config.h"
 #include "app/experiment.h"
-#include "app/grounds.h"
 #include "app/figure.h"
+#include "app/grounds.h"
 #include "app/paths.h"
 #include "app/play.h"
 #include "app/progress.h"
@@ -43,7 +44,9 @@ static MildStatus make_scene(Command *c, MildError *error) {
         MildMaterial unused;
         int rigid;
         MildStatus status = grounds_find(c->grounds.name[g], &unused, &rigid, error);
-        if (status != MILD_OK) return status;
+        if (status != MILD_OK) {
+            return status;
+        }
         if (rigid && c->grounds.count > 1) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
                              "--ground: rigid is the engine's own contact and stands alone");
@@ -56,8 +59,12 @@ static MildStatus make_scene(Command *c, MildError *error) {
         c->names[g] = c->grounds.name[g];
     }
     MildStatus status = scene_make(&c->scene, name, c->patch, error);
-    if (status == MILD_OK) status = grounds_finish_scene(&c->finish, &c->scene, error);
-    if (status == MILD_OK) status = grounds_lay_map(&c->finish, &c->scene, &c->map, error);
+    if (status == MILD_OK) {
+        status = grounds_finish_scene(&c->finish, &c->scene, error);
+    }
+    if (status == MILD_OK) {
+        status = grounds_lay_map(&c->finish, &c->scene, &c->map, error);
+    }
     return status == MILD_OK ? task_def_check(&c->task, error) : status;
 }
 
@@ -87,13 +94,19 @@ static MildStatus make_view(Command *c, const char *xml, MildError *error) {
     def.window = play->window;
     def.x_min = play->window ? -WINDOW_AREA : fmin(reach, 0) - AREA_MARGIN;
     def.x_max = play->window ? WINDOW_AREA : fmax(reach, 0) + AREA_MARGIN;
-    if (play->window) def.y_min = -WINDOW_AREA, def.y_max = WINDOW_AREA;
+    if (play->window) {
+        def.y_min = -WINDOW_AREA, def.y_max = WINDOW_AREA;
+    }
     play->rate = def.rate;
     play->view = view_create(&def, play->robot, &c->scene.terrain, error);
-    if (!play->view) return error->status;
+    if (!play->view) {
+        return error->status;
+    }
     if (c->video) {
         play->video = video_open(c->video, def.width, def.height, def.rate, error);
-        if (!play->video) return error->status;
+        if (!play->video) {
+            return error->status;
+        }
     }
     return MILD_OK;
 }
@@ -103,8 +116,8 @@ static MildStatus make_view(Command *c, const char *xml, MildError *error) {
 static void print_table(const Command *c) {
     const Play *play = &c->play;
     double weight = robot_total_mass(play->robot) * GRAVITY;
-    printf("%-12s %9s %7s %9s %8s %10s %9s %5s\n", "ground", "distance", "time", "speed", "upright", "clearance",
-           "sinkage", "COT");
+    printf("%-12s %9s %7s %9s %8s %10s %9s %5s\n", "ground", "distance", "time", "speed", "upright",
+           "clearance", "sinkage", "COT");
     for (int i = 0; i < c->grounds.count; i++) {
         const PlayLeg *leg = &play->leg[i];
         const Measure *m = &leg->measure;
@@ -114,8 +127,9 @@ static void print_table(const Command *c) {
         }
         double distance = leg->end_x - leg->start_x, time = leg->steps * c->task.physics_dt;
         double steady = fabs(m->end_x - m->start_x);
-        printf("%-12s %7.2f m %5.1f s %5.2f m/s %8s %7.0f mm %6.1f mm ", c->names[i], distance, time, distance / time,
-               leg->fell ? "fell" : "yes", m->swings ? 1e3 * m->apex_sum / m->swings : 0.0,
+        printf("%-12s %7.2f m %5.1f s %5.2f m/s %8s %7.0f mm %6.1f mm ", c->names[i], distance,
+               time, distance / time, leg->fell ? "fell" : "yes",
+               m->swings ? 1e3 * m->apex_sum / m->swings : 0.0,
                m->stances ? 1e3 * m->deepest_sum / m->stances : 0.0);
         if (steady > 0.1) {
             printf("%5.2f\n", m->work / (weight * steady));
@@ -130,22 +144,28 @@ static MildStatus save_pressure(const Command *c, MildError *error) {
     char data[PATH_SIZE], names[MILD_MATERIALS_MAX][96];
     const char *labels[MILD_MATERIALS_MAX], *dot = strrchr(c->pressure, '.');
     const char *slash = strrchr(c->pressure, '/');
-    int any = 0, stem = dot && (!slash || dot > slash) ? (int)(dot - c->pressure) : (int)strlen(c->pressure);
+    int any = 0,
+        stem = dot && (!slash || dot > slash) ? (int)(dot - c->pressure) : (int)strlen(c->pressure);
     if (snprintf(data, sizeof data, "%.*s.csv", stem, c->pressure) >= (int)sizeof data) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", c->pressure);
     }
     for (int i = 0; i < c->grounds.count; i++) {
         int repeat = 1;
-        for (int k = 0; k < i; k++) repeat += strcmp(c->names[k], c->names[i]) == 0;
+        for (int k = 0; k < i; k++) {
+            repeat += strcmp(c->names[k], c->names[i]) == 0;
+        }
         snprintf(names[i], sizeof names[i], repeat > 1 ? "%s (%d)" : "%s", c->names[i], repeat);
         labels[i] = names[i];
         any += pressure_stances(c->play.pressure, i);
     }
-    if (any == 0)
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "%s: the robot took no step, there is nothing to draw",
-                         c->pressure);
+    if (any == 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "%s: the robot took no step, there is nothing to draw", c->pressure);
+    }
     MildStatus status = pressure_write(c->play.pressure, data, labels, error);
-    if (status == MILD_OK && strcmp(data, c->pressure) != 0) status = figure_draw("scripts/pressure.py", data, c->pressure, error);
+    if (status == MILD_OK && strcmp(data, c->pressure) != 0) {
+        status = figure_draw("scripts/pressure.py", data, c->pressure, error);
+    }
     return status;
 }
 
@@ -166,13 +186,23 @@ static MildStatus finish_video(Command *c, MildStatus status, MildError *error) 
 static MildStatus walk(Command *c, MildError *error) {
     Play *play = &c->play;
     MildStatus status = play_run(play, error);
-    if (play->video) status = finish_video(c, status, error);
-    if (status != MILD_OK) return status;
+    if (play->video) {
+        status = finish_video(c, status, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
     print_table(c);
-    if (c->video) printf("video %s: %d frames\n", c->video, play->frames);
-    if (!c->pressure) return MILD_OK;
+    if (c->video) {
+        printf("video %s: %d frames\n", c->video, play->frames);
+    }
+    if (!c->pressure) {
+        return MILD_OK;
+    }
     status = save_pressure(c, error);
-    if (status == MILD_OK) printf("sole pressure %s\n", c->pressure);
+    if (status == MILD_OK) {
+        printf("sole pressure %s\n", c->pressure);
+    }
     return status;
 }
 
@@ -181,16 +211,26 @@ static MildStatus prepare(Command *c, const char *xml, MildError *error) {
     MildStatus status = MILD_OK;
     interrupt_install();
     if (c->pressure && c->scene.rigid) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--pressure: rigid ground has no elements, choose a soft one");
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--pressure: rigid ground has no elements, choose a soft one");
     }
     status = controller_learned(c->policy, NULL, 1, play->controller, error);
-    if (status == MILD_OK && c->video) status = make_place(c->video, error);
-    if (status == MILD_OK && c->pressure) status = make_place(c->pressure, error);
-    if (status == MILD_OK && c->pressure) {
-        play->pressure = pressure_create(play->robot, c->scene.terrain.material_count, c->task.physics_dt, error);
-        if (!play->pressure) status = error->status;
+    if (status == MILD_OK && c->video) {
+        status = make_place(c->video, error);
     }
-    if (status == MILD_OK && (c->video || play->window)) status = make_view(c, xml, error);
+    if (status == MILD_OK && c->pressure) {
+        status = make_place(c->pressure, error);
+    }
+    if (status == MILD_OK && c->pressure) {
+        play->pressure = pressure_create(play->robot, c->scene.terrain.material_count,
+                                         c->task.physics_dt, error);
+        if (!play->pressure) {
+            status = error->status;
+        }
+    }
+    if (status == MILD_OK && (c->video || play->window)) {
+        status = make_view(c, xml, error);
+    }
     return status;
 }
 
@@ -200,21 +240,34 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     Controller controller = {0};
     MildModel model;
     MildStatus status = experiment_nominal_task(&c->task, c->config, error);
-    if (status == MILD_OK) status = grounds_model(c->model, args, &model, error);
-    if (status != MILD_OK) return status;
+    if (status == MILD_OK) {
+        status = grounds_model(c->model, args, &model, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
     if (play->seconds == 0) {
         double course = c->grounds.count * c->patch / fmax(fabs(play->speed), 0.1) + COURSE_EXTRA;
         play->seconds = fmax(course, COURSE_LEAST);
     }
     Robot *robot = robot_create(path_data("models/sa01/sa01.xml", xml), error);
-    if (!robot) return error->status;
+    if (!robot) {
+        return error->status;
+    }
     c->finish = grounds_for_robot(model, robot, &c->task, &c->terrain, args);
-    play->task = &c->task, play->scene = &c->scene, play->robot = robot, play->controller = &controller;
+    play->task = &c->task, play->scene = &c->scene, play->robot = robot,
+    play->controller = &controller;
     play->window = !c->video && !c->pressure;
     status = make_scene(c, error);
-    if (status == MILD_OK) status = prepare(c, xml, error);
-    if (status == MILD_OK) status = walk(c, error);
-    if (play->video) finish_video(c, status, error);
+    if (status == MILD_OK) {
+        status = prepare(c, xml, error);
+    }
+    if (status == MILD_OK) {
+        status = walk(c, error);
+    }
+    if (play->video) {
+        finish_video(c, status, error);
+    }
     view_destroy(play->view);
     pressure_destroy(play->pressure);
     controller_destroy(&controller);
@@ -226,37 +279,50 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     char model_help[200];
     const CliOption options[] = {
-        {"policy", CLI_TEXT, &c->policy, 0, 0, "FILE", "policy to watch (policies/mild.safetensors)"},
-        {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]", "ground, or several crossed in order (sand_loose)"},
-        {"model", CLI_TEXT, &c->model, 0, 0, "NAME", grounds_model_help(model_help, sizeof model_help)},
-        {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L", "[m] length of each ground of a course (2)"},
-        {"video", CLI_TEXT, &c->video, 0, 0, "FILE.mp4", "film it; without this and --pressure a window opens"},
+        {"policy", CLI_TEXT, &c->policy, 0, 0, "FILE",
+         "policy to watch (policies/mild.safetensors)"},
+        {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]",
+         "ground, or several crossed in order (sand_loose)"},
+        {"model", CLI_TEXT, &c->model, 0, 0, "NAME",
+         grounds_model_help(model_help, sizeof model_help)},
+        {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L",
+         "[m] length of each ground of a course (2)"},
+        {"video", CLI_TEXT, &c->video, 0, 0, "FILE.mp4",
+         "film it; without this and --pressure a window opens"},
         {"pressure", CLI_TEXT, &c->pressure, 0, 0, "FILE.png",
          "sole pressure per ground: a picture and its numbers as CSV beside it"},
         {"speed", CLI_NUMBER, &c->play.speed, -1, 1, "V", "[m/s] commanded forward speed (0.6)"},
         {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
          "[s] length of the walk; 0: long enough for the course (0)"},
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S", "start and sensor noise (1)"},
-        {"config", CLI_TEXT, &c->config, 0, 0, "FILE", "config the policy was trained with, for its [task]"},
+        {"config", CLI_TEXT, &c->config, 0, 0, "FILE",
+         "config the policy was trained with, for its [task]"},
         {"width", CLI_INT, &c->width, 64, 7680, "N", "[pixels] (960)"},
         {"height", CLI_INT, &c->height, 64, 4320, "N", "[pixels] (540)"},
     };
     const CliCommand command = {
         .name = "play",
-        .usage = "--policy FILE --ground NAME[,NAME] [--video FILE.mp4] [--pressure FILE.png] [options]",
-        .summary =
-            "Watch a policy walk. Several grounds make a course that is crossed in order. In the window: arrow keys "
-            "change speed and turn, Q and E step sideways, space pauses, - and = change the pace, R starts again, "
-            "mouse turns the camera, Esc quits. Afterwards a table: a row for each ground.",
+        .usage =
+            "--policy FILE --ground NAME[,NAME] [--video FILE.mp4] [--pressure FILE.png] [options]",
+        .summary = "Watch a policy walk. Several grounds make a course that is crossed in order. "
+                   "In the window: arrow keys "
+                   "change speed and turn, Q and E step sideways, space pauses, - and = change the "
+                   "pace, R starts again, "
+                   "mouse turns the camera, Esc quits. Afterwards a table: a row for each ground.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
-        .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 --terrain.kind=waves --terrain.memory=true",
-        .examples = "  mild play --ground rubber,foam45,sand_loose --video out/walk.mp4 --pressure out/pressure.png\n"
+        .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "
+                     "--terrain.kind=waves --terrain.memory=true",
+        .examples = "  mild play --ground rubber,foam45,sand_loose --video out/walk.mp4 --pressure "
+                    "out/pressure.png\n"
                     "  mild play --ground foam28 --speed 0.4\n"
-                    "  mild play --ground sand_loose --terrain.kind=waves --terrain.memory=true --video out/waves.mp4\n",
+                    "  mild play --ground sand_loose --terrain.kind=waves --terrain.memory=true "
+                    "--video out/waves.mp4\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
-    if (outcome != CLI_RUN) return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    if (outcome != CLI_RUN) {
+        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    }
     MildError error = {0};
     return run_play(c, args, &error) == MILD_OK ? 0 : cli_fail("play", &error);
 }

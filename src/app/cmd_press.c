@@ -36,33 +36,42 @@ static void tool_close(Tool *tool) {
 
 static MildStatus tool_open_robot(Tool *tool, MildError *error) {
     char path[PATH_SIZE];
-    if (!tool->robot) tool->robot = robot_create(path_data("models/sa01/sa01.xml", path), error);
+    if (!tool->robot) {
+        tool->robot = robot_create(path_data("models/sa01/sa01.xml", path), error);
+    }
     return tool->robot ? MILD_OK : error->status;
 }
 
 static MildStatus tool_open_sole(Tool *tool, MildError *error) {
     MildStatus status = tool_open_robot(tool, error);
-    if (status != MILD_OK) return status;
+    if (status != MILD_OK) {
+        return status;
+    }
     tool->sole = tool->raster = robot_rasters(tool->robot)[ROBOT_FOOT_LEFT];
     snprintf(tool->name, sizeof tool->name, "the robot's left sole");
     return MILD_OK;
 }
 
 static MildStatus tool_open(Tool *tool, const char *text, MildError *error) {
-    if (strcmp(text, "sole") == 0) return tool_open_sole(tool, error);
+    if (strcmp(text, "sole") == 0) {
+        return tool_open_sole(tool, error);
+    }
     char length_text[32], *comma;
     double length, width;
     snprintf(length_text, sizeof length_text, "%s", text);
     comma = strchr(length_text, ',');
-    if (comma) *comma = '\0';
+    if (comma) {
+        *comma = '\0';
+    }
     if (!comma || strlen(text) >= sizeof length_text || !text_double(length_text, &length) ||
         !text_double(comma + 1, &width)) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--plate: '%.40s' is neither LENGTH,WIDTH in metres nor `sole`",
-                         text);
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--plate: '%.40s' is neither LENGTH,WIDTH in metres nor `sole`", text);
     }
     if (!(length >= 0.0195 && length <= 1 && width >= 0.0195 && width <= 1)) {
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "--plate: %g x %g m is outside 0.0195 .. 1 m (one element to a metre)", length, width);
+                         "--plate: %g x %g m is outside 0.0195 .. 1 m (one element to a metre)",
+                         length, width);
     }
     tool->plate = press_plate_create(length, width, error);
     tool->sole = tool->raster = tool->plate;
@@ -74,18 +83,25 @@ static double sole_area(const MildSole *sole) {
     return mild_sole_elements(sole) * mild_sole_pitch(sole) * mild_sole_pitch(sole);
 }
 
-/* The material of the model, matched on this tool under the pressure of half the robot on its own sole; and the sole that
- * the model presses with. */
-static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *args, MildMaterial *material,
-                                 TerrainDef *terrain, MildError *error) {
-    GroundsDef finish = {.model = model, .sole = tool->raster, .load = 1, .args = args, .terrain = terrain};
+/* The material of the model, matched on this tool under the pressure of half the robot on its own
+ * sole; and the sole that the model presses with. */
+static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *args,
+                                 MildMaterial *material, TerrainDef *terrain, MildError *error) {
+    GroundsDef finish = {
+        .model = model, .sole = tool->raster, .load = 1, .args = args, .terrain = terrain};
     MildStatus status = model == MILD_MODEL_MILD ? MILD_OK : tool_open_robot(tool, error);
-    if (status == MILD_OK && tool->robot)
-        finish.load = robot_half_weight(tool->robot) * sole_area(tool->raster) / sole_area(robot_rasters(tool->robot)[0]);
-    if (status == MILD_OK) status = grounds_finish(&finish, material, error);
+    if (status == MILD_OK && tool->robot) {
+        finish.load = robot_half_weight(tool->robot) * sole_area(tool->raster) /
+                      sole_area(robot_rasters(tool->robot)[0]);
+    }
+    if (status == MILD_OK) {
+        status = grounds_finish(&finish, material, error);
+    }
     if (status == MILD_OK && mild_model_is_concentric(model)) {
         tool->sole = tool->concentric = mild_sole_concentric(tool->raster, error);
-        if (!tool->concentric) status = error->status;
+        if (!tool->concentric) {
+            status = error->status;
+        }
     }
     return status;
 }
@@ -94,22 +110,29 @@ static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *arg
 static char *csv_text(const PressResult *result, int more, size_t *size) {
     char *text = NULL;
     FILE *memory = open_memstream(&text, size);
-    if (!memory) return NULL;
+    if (!memory) {
+        return NULL;
+    }
     fprintf(memory, "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m%s\n",
             more ? ",force_x_n,force_y_n,x_m,tilt_rad" : "");
     for (int i = 0; i < result->count; i++) {
         const PressRow *row = &result->rows[i];
-        fprintf(memory, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", row->time, row->depth, row->force, row->moment_x,
-                row->moment_y, row->zmp_x, row->zmp_y);
-        if (more) fprintf(memory, ",%.9g,%.9g,%.9g,%.9g", row->force_x, row->force_y, row->x, row->tilt);
+        fprintf(memory, "%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g", row->time, row->depth, row->force,
+                row->moment_x, row->moment_y, row->zmp_x, row->zmp_y);
+        if (more) {
+            fprintf(memory, ",%.9g,%.9g,%.9g,%.9g", row->force_x, row->force_y, row->x, row->tilt);
+        }
         fputc('\n', memory);
     }
-    if (fclose(memory) == 0) return text;
+    if (fclose(memory) == 0) {
+        return text;
+    }
     free(text);
     return NULL;
 }
 
-static MildStatus csv_write(const PressResult *result, int more, const char *path, MildError *error) {
+static MildStatus csv_write(const PressResult *result, int more, const char *path,
+                            MildError *error) {
     size_t size = 0;
     char *text = csv_text(result, more, &size);
     MildStatus status = MILD_OK;
@@ -125,14 +148,18 @@ static MildStatus csv_write(const PressResult *result, int more, const char *pat
 }
 
 /* The picture's numbers: the CSV asked for, else FILE.csv beside FILE.png. */
-static MildStatus figure_save(const PressOptions *options, const PressResult *result, int more, MildError *error) {
+static MildStatus figure_save(const PressOptions *options, const PressResult *result, int more,
+                              MildError *error) {
     char data[PATH_SIZE];
-    const char *figure = options->figure, *dot = strrchr(figure, '.'), *slash = strrchr(figure, '/');
+    const char *figure = options->figure, *dot = strrchr(figure, '.'),
+               *slash = strrchr(figure, '/');
     int stem = dot && (!slash || dot > slash) ? (int)(dot - figure) : (int)strlen(figure);
-    if (options->csv && strcmp(options->csv, "-") != 0)
+    if (options->csv && strcmp(options->csv, "-") != 0) {
         return figure_draw("scripts/press.py", options->csv, figure, error);
-    if (snprintf(data, PATH_SIZE, "%.*s.csv", stem, figure) >= PATH_SIZE)
+    }
+    if (snprintf(data, PATH_SIZE, "%.*s.csv", stem, figure) >= PATH_SIZE) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", figure);
+    }
     MildStatus status = csv_write(result, more, data, error);
     return status == MILD_OK ? figure_draw("scripts/press.py", data, figure, error) : status;
 }
@@ -147,8 +174,12 @@ static int is_dropped(const PressOptions *options) {
 
 /* First row of a way and the one behind its last. */
 static void way_find(const PressResult *result, int way, int *first, int *end) {
-    for (*first = 0; *first < result->count && result->rows[*first].way < way; ++*first) continue;
-    for (*end = *first; *end < result->count && result->rows[*end].way == way; ++*end) continue;
+    for (*first = 0; *first < result->count && result->rows[*first].way < way; ++*first) {
+        continue;
+    }
+    for (*end = *first; *end < result->count && result->rows[*end].way == way; ++*end) {
+        continue;
+    }
 }
 
 /* Row of a way whose depth is nearest. */
@@ -157,7 +188,9 @@ static const PressRow *way_at(const PressResult *result, int way, double depth) 
     way_find(result, way, &first, &end);
     const PressRow *best = &result->rows[first];
     for (int i = first; i < end; i++) {
-        if (fabs(result->rows[i].depth - depth) < fabs(best->depth - depth)) best = &result->rows[i];
+        if (fabs(result->rows[i].depth - depth) < fabs(best->depth - depth)) {
+            best = &result->rows[i];
+        }
     }
     return best;
 }
@@ -169,21 +202,25 @@ static void table_depths(const PressResult *result) {
     printf("%10s  %12s  %12s\n", "depth [mm]", "down [N]", "up [N]");
     for (int line = 0; line <= TABLE_LINES; line++) {
         const PressRow *row = &result->rows[first + line * (end - 1 - first) / TABLE_LINES];
-        printf("%10.2f  %12.3f  %12.3f\n", 1e3 * row->depth, row->force, way_at(result, last, row->depth)->force);
+        printf("%10.2f  %12.3f  %12.3f\n", 1e3 * row->depth, row->force,
+               way_at(result, last, row->depth)->force);
     }
 }
 
 static void table_turns(const PressResult *result) {
     int pairs = result->ways / 2;
-    printf("%6s  %14s  %14s  %14s  %14s\n", "", "down to [mm]", "force [N]", "up to [mm]", "force [N]");
+    printf("%6s  %14s  %14s  %14s  %14s\n", "", "down to [mm]", "force [N]", "up to [mm]",
+           "force [N]");
     for (int pair = 0; pair < pairs; pair++) {
         int first, down, up;
-        if (pair >= TABLE_LINES && pair < pairs - TABLE_LINES) continue;
+        if (pair >= TABLE_LINES && pair < pairs - TABLE_LINES) {
+            continue;
+        }
         way_find(result, 2 * pair, &first, &down);
         way_find(result, 2 * pair + 1, &first, &up);
         const PressRow *low = &result->rows[down - 1], *high = &result->rows[up - 1];
-        printf("%6d  %14.3f  %14.3f  %14.3f  %14.3f\n", pair + 1, 1e3 * low->depth, low->force, 1e3 * high->depth,
-               high->force);
+        printf("%6d  %14.3f  %14.3f  %14.3f  %14.3f\n", pair + 1, 1e3 * low->depth, low->force,
+               1e3 * high->depth, high->force);
     }
 }
 
@@ -200,9 +237,13 @@ static void table_drag(const PressResult *result) {
 /* From the touch to twice the time of the first stop. */
 static void table_drop(const PressResult *result) {
     int touch = 0, last;
-    while (touch < result->count - 1 && result->rows[touch].contacts == 0) touch++;
+    while (touch < result->count - 1 && result->rows[touch].contacts == 0) {
+        touch++;
+    }
     double until = 2 * result->stop_time - result->rows[touch].time;
-    for (last = touch; last < result->count - 1 && result->rows[last].time < until; last++) continue;
+    for (last = touch; last < result->count - 1 && result->rows[last].time < until; last++) {
+        continue;
+    }
     printf("%10s  %12s  %12s  %12s\n", "time [ms]", "depth [mm]", "force [N]", "tilt [deg]");
     for (int line = 0; line <= TABLE_LINES; line++) {
         const PressRow *row = &result->rows[touch + line * (last - touch) / TABLE_LINES];
@@ -227,12 +268,16 @@ static void table_print(const PressOptions *options, const PressResult *result) 
 }
 
 static void drop_summary(const PressOptions *options, const PressResult *result, FILE *file) {
-    fprintf(file, ", %g kg dropped from %g mm at %g m/s", options->mass, isfinite(options->drop) ? 1e3 * options->drop : 0,
+    fprintf(file, ", %g kg dropped from %g mm at %g m/s", options->mass,
+            isfinite(options->drop) ? 1e3 * options->drop : 0,
             isfinite(options->impact) ? options->impact : 0);
-    if (options->tilt_deg != 0) fprintf(file, ", tilted %g deg", options->tilt_deg);
+    if (options->tilt_deg != 0) {
+        fprintf(file, ", tilted %g deg", options->tilt_deg);
+    }
     fprintf(file, "\n");
     if (result->stop_time > 0) {
-        fprintf(file, "first stop %.3f mm deep after %.2f ms, ", 1e3 * result->stop_depth, 1e3 * result->stop_time);
+        fprintf(file, "first stop %.3f mm deep after %.2f ms, ", 1e3 * result->stop_depth,
+                1e3 * result->stop_time);
     } else {
         fprintf(file, "no stop within %g s, ", options->seconds);
     }
@@ -240,31 +285,43 @@ static void drop_summary(const PressOptions *options, const PressResult *result,
             1e3 * result->rows[result->count - 1].depth, result->rest_speed);
 }
 
-static void summary_print(const PressOptions *options, const Tool *tool, const char *model, const PressResult *result,
-                          FILE *file) {
-    fprintf(file, "%s (%s) under %s: %d element%s, %.4f m^2", options->ground, model, tool->name, result->elements,
-            result->elements == 1 ? "" : "s", result->area);
+static void summary_print(const PressOptions *options, const Tool *tool, const char *model,
+                          const PressResult *result, FILE *file) {
+    fprintf(file, "%s (%s) under %s: %d element%s, %.4f m^2", options->ground, model, tool->name,
+            result->elements, result->elements == 1 ? "" : "s", result->area);
     if (is_dropped(options)) {
         drop_summary(options, result, file);
         return;
     }
     double deepest = 0;
-    for (int i = 0; i < result->count; i++) deepest = fmax(deepest, result->rows[i].depth);
+    for (int i = 0; i < result->count; i++) {
+        deepest = fmax(deepest, result->rows[i].depth);
+    }
     fprintf(file, ", to %.1f mm at %g m/s", 1e3 * deepest, options->speed);
-    if (options->tilt_deg != 0) fprintf(file, ", tilted %g deg", options->tilt_deg);
-    if (isfinite(options->drag)) fprintf(file, ", dragged %g mm at %g m/s", 1e3 * options->drag, options->drag_speed);
-    fprintf(file, "\npeak %.1f N (%.2f kPa), work in %.3f J, given back %.3f J, print left %.1f mm\n",
-            result->peak_force, 1e-3 * result->peak_force / result->area, result->work_in, result->work_out,
-            1e3 * fmax(result->print_depth, 0));
-    if (isfinite(options->drag)) fprintf(file, "work sideways %.3f J\n", result->work_drag);
+    if (options->tilt_deg != 0) {
+        fprintf(file, ", tilted %g deg", options->tilt_deg);
+    }
+    if (isfinite(options->drag)) {
+        fprintf(file, ", dragged %g mm at %g m/s", 1e3 * options->drag, options->drag_speed);
+    }
+    fprintf(file,
+            "\npeak %.1f N (%.2f kPa), work in %.3f J, given back %.3f J, print left %.1f mm\n",
+            result->peak_force, 1e-3 * result->peak_force / result->area, result->work_in,
+            result->work_out, 1e3 * fmax(result->print_depth, 0));
+    if (isfinite(options->drag)) {
+        fprintf(file, "work sideways %.3f J\n", result->work_drag);
+    }
 }
 
 /* ---- the command ---- */
 
 static const char summary[] =
-    "Move a plate or the robot's sole through a ground and record what the ground answers. By hand it goes down at "
-    "constant speed and up again, over several turns or cycles, or sideways while it is down (--drag); with --drop or --impact "
-    "it is a free body that falls. Depth, moments and zero moment point are those of the plate's centre (for the sole: "
+    "Move a plate or the robot's sole through a ground and record what the ground answers. By hand "
+    "it goes down at "
+    "constant speed and up again, over several turns or cycles, or sideways while it is down "
+    "(--drag); with --drop or --impact "
+    "it is a free body that falls. Depth, moments and zero moment point are those of the plate's "
+    "centre (for the sole: "
     "the point under the ankle). Once out of the ground, its print is forgotten.";
 
 static const char examples[] =
@@ -275,14 +332,16 @@ static const char examples[] =
     "  mild press --ground grass --depth 0.02 --drag 0.1 --drag-speed 0.05 --figure drag.png\n"
     "  mild press --ground sand_loose --drop 0.05 --mass 20 --tilt 5 --figure drop.png\n";
 
-static CliOutcome options_parse(const CliOption *table, int count, int argc, char **argv, CliArgs *args) {
+static CliOutcome options_parse(const CliOption *table, int count, int argc, char **argv,
+                                CliArgs *args) {
     const CliCommand command = {
         .name = "press",
         .usage = "--ground NAME [options]",
         .summary = summary,
         .options = table,
         .option_count = count,
-        .overrides = "any key of sections [ground] and [terrain], e.g. --ground.k_pen=500 --terrain.kind=waves; `mild info grounds` lists the first",
+        .overrides = "any key of sections [ground] and [terrain], e.g. --ground.k_pen=500 "
+                     "--terrain.kind=waves; `mild info grounds` lists the first",
         .examples = examples,
     };
     return cli_parse(&command, argc, argv, args);
@@ -293,44 +352,60 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
     snprintf(ground_help, sizeof ground_help, "one of %s", grounds_names(grounds, sizeof grounds));
     const CliOption table[] = {
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
-        {"model", CLI_TEXT, &options->model, 0, 0, "NAME", grounds_model_help(model_help, sizeof model_help)},
+        {"model", CLI_TEXT, &options->model, 0, 0, "NAME",
+         grounds_model_help(model_help, sizeof model_help)},
         {"plate", CLI_TEXT, &options->plate, 0, 0, "L,W|sole",
          "[m] length and width of a plate, or the robot's sole (default 0.2,0.1)"},
-        {"tilt", CLI_NUMBER, &options->tilt_deg, -45, 45, "DEG", "[deg] front edge down (default 0)"},
+        {"tilt", CLI_NUMBER, &options->tilt_deg, -45, 45, "DEG",
+         "[deg] front edge down (default 0)"},
         {"depth", CLI_NUMBERS, &options->depth, 0, 1, "D[,BACK,...]",
-         "[m] how deep it goes (default 0.03), how far it comes back, and so on, at last out of the ground"},
+         "[m] how deep it goes (default 0.03), how far it comes back, and so on, at last out of "
+         "the ground"},
         {"force", CLI_NUMBERS, &options->force, 0, 1e6, "F[,BACK,...]",
          "[N] instead of --depth: turn where the ground pushes this hard"},
         {"speed", CLI_NUMBER, &options->speed, 1e-5, 10, "V", "[m/s] down and up (default 0.01)"},
         {"cycles", CLI_INT, &options->cycles, 1, 1000, "N", "times through all turns (default 1)"},
         {"drag", CLI_NUMBER, &options->drag, 1e-4, 10, "X",
          "[m] once down, this far sideways (forward, along the plate's length) at the same depth"},
-        {"drag-speed", CLI_NUMBER, &options->drag_speed, 1e-5, 10, "V", "[m/s] sideways (default that of --speed)"},
-        {"drop", CLI_NUMBER, &options->drop, 0, 10, "H", "[m] let it fall from this height above the ground"},
-        {"impact", CLI_NUMBER, &options->impact, 0, 20, "V", "[m/s] downward speed at which the fall begins"},
+        {"drag-speed", CLI_NUMBER, &options->drag_speed, 1e-5, 10, "V",
+         "[m/s] sideways (default that of --speed)"},
+        {"drop", CLI_NUMBER, &options->drop, 0, 10, "H",
+         "[m] let it fall from this height above the ground"},
+        {"impact", CLI_NUMBER, &options->impact, 0, 20, "V",
+         "[m/s] downward speed at which the fall begins"},
         {"mass", CLI_NUMBER, &options->mass, 1e-3, 1e4, "M",
          "[kg] of what falls, spread evenly over the plate (default 20, half the robot)"},
-        {"seconds", CLI_NUMBER, &options->seconds, 1e-3, 100, "T", "[s] of the fall that are recorded (default 1)"},
+        {"seconds", CLI_NUMBER, &options->seconds, 1e-3, 100, "T",
+         "[s] of the fall that are recorded (default 1)"},
         {"step", CLI_NUMBER, &options->step, 1e-7, 1, "DT",
-         "[s] between rows (default: a thousandth of the way down, with --force 0.02 mm of it; 0.0001 falling)"},
+         "[s] between rows (default: a thousandth of the way down, with --force 0.02 mm of it; "
+         "0.0001 falling)"},
         {"csv", CLI_OUTPUT, &options->csv, 0, 0, "FILE",
-         "write time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m, and force_x_n,force_y_n,x_m,tilt_rad "
+         "write time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m, and "
+         "force_x_n,force_y_n,x_m,tilt_rad "
          "when dragged or dropped; - for standard output"},
         {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
          "draw it; its numbers stand in the CSV, else beside it as FILE.csv"},
     };
     CliOutcome outcome = options_parse(table, sizeof table / sizeof *table, argc, argv, args);
-    if (outcome == CLI_BAD) return CLI_EXIT_BAD_INPUT;
+    if (outcome == CLI_BAD) {
+        return CLI_EXIT_BAD_INPUT;
+    }
     return outcome == CLI_DONE ? -1 : 0;
 }
 
 /* Down and back must take turns. */
 static MildStatus turns_check(const char *name, const CliNumbers *turns, MildError *error) {
     const double *at = turns->value;
-    if (turns->count > 0 && !(at[0] > 0)) return mild_fail(error, MILD_ERROR_RANGE, "--%s: the turn must lie above 0", name);
+    if (turns->count > 0 && !(at[0] > 0)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "--%s: the turn must lie above 0", name);
+    }
     for (int i = 1; i < turns->count; i++) {
-        if (i % 2 ? at[i] < at[i - 1] : at[i] > at[i - 1]) continue;
-        return mild_fail(error, MILD_ERROR_RANGE, "--%s: from %g to %g is no way %s; ways down and back alternate", name,
+        if (i % 2 ? at[i] < at[i - 1] : at[i] > at[i - 1]) {
+            continue;
+        }
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "--%s: from %g to %g is no way %s; ways down and back alternate", name,
                          at[i - 1], at[i], i % 2 ? "back" : "down");
     }
     return MILD_OK;
@@ -339,19 +414,28 @@ static MildStatus turns_check(const char *name, const CliNumbers *turns, MildErr
 /* What does not go together. */
 static MildStatus options_check(const PressOptions *o, MildError *error) {
     const CliNumbers *turns = o->force.count ? &o->force : &o->depth;
-    if (is_dropped(o) && (turns->count || isfinite(o->speed) || o->cycles || isfinite(o->drag)))
+    if (is_dropped(o) && (turns->count || isfinite(o->speed) || o->cycles || isfinite(o->drag))) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--%s: what falls goes where it goes; leave out --depth, --force, --speed, --cycles, --drag",
+                         "--%s: what falls goes where it goes; leave out --depth, --force, "
+                         "--speed, --cycles, --drag",
                          isfinite(o->drop) ? "drop" : "impact");
-    if (!is_dropped(o) && (isfinite(o->mass) || isfinite(o->seconds)))
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--%s: only what falls needs it; add --drop H or --impact V",
+    }
+    if (!is_dropped(o) && (isfinite(o->mass) || isfinite(o->seconds))) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--%s: only what falls needs it; add --drop H or --impact V",
                          isfinite(o->mass) ? "mass" : "seconds");
-    if (o->depth.count && o->force.count)
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--force: turns where the ground pushes so hard; leave out --depth");
-    if (isfinite(o->drag) && (o->cycles > 1 || turns->count > 1))
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--drag: goes sideways once; leave out --cycles and further turns");
-    if (isfinite(o->drag_speed) && !isfinite(o->drag))
+    }
+    if (o->depth.count && o->force.count) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--force: turns where the ground pushes so hard; leave out --depth");
+    }
+    if (isfinite(o->drag) && (o->cycles > 1 || turns->count > 1)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--drag: goes sideways once; leave out --cycles and further turns");
+    }
+    if (isfinite(o->drag_speed) && !isfinite(o->drag)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--drag-speed: how far? --drag X");
+    }
     return turns_check(o->force.count ? "force" : "depth", turns, error);
 }
 
@@ -379,18 +463,27 @@ static PressDef options_def(PressOptions *o) {
                     .height = or_else(o->drop, 0),
                     .impact = or_else(o->impact, 0),
                     .seconds = o->seconds};
-    for (int i = 0; i < turns->count; i++) def.turn[i] = turns->value[i];
+    for (int i = 0; i < turns->count; i++) {
+        def.turn[i] = turns->value[i];
+    }
     return def;
 }
 
-static MildStatus press_report(const PressOptions *options, const Tool *tool, const PressDef *def, MildError *error) {
+static MildStatus press_report(const PressOptions *options, const Tool *tool, const PressDef *def,
+                               MildError *error) {
     PressResult result;
     int more = is_dropped(options) || isfinite(options->drag);
     MildStatus status = press_run(def, tool->sole, &result, error);
-    if (status == MILD_OK && options->csv) status = csv_write(&result, more, options->csv, error);
-    if (status == MILD_OK && options->figure) status = figure_save(options, &result, more, error);
+    if (status == MILD_OK && options->csv) {
+        status = csv_write(&result, more, options->csv, error);
+    }
+    if (status == MILD_OK && options->figure) {
+        status = figure_save(options, &result, more, error);
+    }
     if (status == MILD_OK) {
-        if (!options->csv) table_print(options, &result);
+        if (!options->csv) {
+            table_print(options, &result);
+        }
         summary_print(options, tool, mild_model_names[def->material.model], &result,
                       options->csv && strcmp(options->csv, "-") == 0 ? stderr : stdout);
     }
@@ -399,28 +492,51 @@ static MildStatus press_report(const PressOptions *options, const Tool *tool, co
 }
 
 int cmd_press(int argc, char **argv) {
-    PressOptions options = {.plate = "0.2,0.1", .speed = NAN,  .drag = NAN,    .drag_speed = NAN, .drop = NAN,
-                            .impact = NAN,      .mass = NAN,   .seconds = NAN, .step = NAN};
+    PressOptions options = {.plate = "0.2,0.1",
+                            .speed = NAN,
+                            .drag = NAN,
+                            .drag_speed = NAN,
+                            .drop = NAN,
+                            .impact = NAN,
+                            .mass = NAN,
+                            .seconds = NAN,
+                            .step = NAN};
     CliArgs args;
     int code = options_read(argc, argv, &options, &args);
-    if (code) return code < 0 ? 0 : code;
-    if (!options.ground) return cli_fail_text("press", "which ground? --ground NAME (mild info grounds lists all)");
+    if (code) {
+        return code < 0 ? 0 : code;
+    }
+    if (!options.ground) {
+        return cli_fail_text("press", "which ground? --ground NAME (mild info grounds lists all)");
+    }
     MildError error;
     MildModel model;
     Tool tool = {0};
     MildStatus status = options_check(&options, &error);
-    if (status != MILD_OK) return cli_fail("press", &error);
+    if (status != MILD_OK) {
+        return cli_fail("press", &error);
+    }
     PressDef def = options_def(&options);
     TerrainDef terrain = terrain_def_default();
     MildMap *map = NULL;
     status = grounds_find(options.ground, &def.material, NULL, &error);
-    if (status == MILD_OK) status = grounds_model(options.model, &args, &model, &error);
-    if (status == MILD_OK) status = tool_open(&tool, options.plate, &error);
-    if (status == MILD_OK) status = tool_set_model(&tool, model, &args, &def.material, &terrain, &error);
-    if (status == MILD_OK) status = terrain_make(&terrain, 1, &map, &error);
+    if (status == MILD_OK) {
+        status = grounds_model(options.model, &args, &model, &error);
+    }
+    if (status == MILD_OK) {
+        status = tool_open(&tool, options.plate, &error);
+    }
+    if (status == MILD_OK) {
+        status = tool_set_model(&tool, model, &args, &def.material, &terrain, &error);
+    }
+    if (status == MILD_OK) {
+        status = terrain_make(&terrain, 1, &map, &error);
+    }
     def.map = map;
     def.print_tiles = terrain_print_tiles(&terrain);
-    if (status == MILD_OK) status = press_report(&options, &tool, &def, &error);
+    if (status == MILD_OK) {
+        status = press_report(&options, &tool, &def, &error);
+    }
     tool_close(&tool);
     mild_map_destroy(map);
     return status == MILD_OK ? 0 : cli_fail("press", &error);

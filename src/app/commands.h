@@ -1,4 +1,5 @@
-/* One function per command, one file per function: cmd_NAME.c. argv[0] is the command's name; returns the exit code. */
+/* One function per command, one file per function: cmd_NAME.c. argv[0] is the command's name;
+ * returns the exit code. */
 #ifndef MILD_COMMANDS_H
 #define MILD_COMMANDS_H
 

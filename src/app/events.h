@@ -1,5 +1,6 @@
-/* TensorBoard event files, scalars only: the few fields of event.proto and summary.proto encoded by hand, framed as
- * TFRecord (length, masked CRC32C of the length, data, masked CRC32C of the data). */
+/* TensorBoard event files, scalars only: the few fields of event.proto and summary.proto encoded by
+ * hand, framed as TFRecord (length, masked CRC32C of the length, data, masked CRC32C of the data).
+ */
 #ifndef MILD_EVENTS_H
 #define MILD_EVENTS_H
 
@@ -11,12 +12,14 @@ enum { EVENTS_TAG_MAX = 100 };
 /* First record of every file. */
 int events_write_version(FILE *file, double wall_time);
 
-/* A session starts at `step`: readers forget what earlier files of the folder say from that step on. */
+/* A session starts at `step`: readers forget what earlier files of the folder say from that step
+ * on. */
 int events_write_start(FILE *file, double wall_time, int64_t step);
 
-/* One event with a scalar per tag (tags are cut at EVENTS_TAG_MAX characters). Each returns 0 when all was written. */
-int events_write_scalars(FILE *file, double wall_time, int64_t step, const char *const *tags, const double *values,
-                         int count);
+/* One event with a scalar per tag (tags are cut at EVENTS_TAG_MAX characters). Each returns 0 when
+ * all was written. */
+int events_write_scalars(FILE *file, double wall_time, int64_t step, const char *const *tags,
+                         const double *values, int count);
 
 uint32_t events_crc32c(const void *data, size_t size);
 

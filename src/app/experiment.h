@@ -1,4 +1,5 @@
-/* Everything that defines a training run: sections [train] [ppo] [policy] [task] [reward] [randomize] [terrain]. */
+/* Everything that defines a training run: sections [train] [ppo] [policy] [task] [reward]
+ * [randomize] [terrain]. */
 #ifndef MILD_EXPERIMENT_H
 #define MILD_EXPERIMENT_H
 
@@ -27,11 +28,13 @@ void experiment_sections(ExperimentDef *def, ConfigSection sections[EXPERIMENT_S
 /* Every range, and what must fit together across keys. */
 MildStatus experiment_check(const ExperimentDef *def, MildError *error);
 
-/* configs/default.ini, then the overlay file (NULL: none), then overrides "section.key=value", then the check. */
-MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides, int override_count,
-                           MildError *error);
+/* configs/default.ini, then the overlay file (NULL: none), then overrides "section.key=value", then
+ * the check. */
+MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides,
+                           int override_count, MildError *error);
 
-/* The task for evaluation and play: of the config the policy was trained with (NULL: the defaults), made nominal. */
+/* The task for evaluation and play: of the config the policy was trained with (NULL: the defaults),
+ * made nominal. */
 MildStatus experiment_nominal_task(TaskDef *task, const char *config, MildError *error);
 
 #endif

@@ -10,19 +10,27 @@
 
 extern char **environ;
 
-MildStatus figure_draw(const char *script, const char *data, const char *picture, MildError *error) {
+MildStatus figure_draw(const char *script, const char *data, const char *picture,
+                       MildError *error) {
     char python[PATH_SIZE], code_path[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE];
     path_data(".venv/bin/python", python);
     path_data(script, code_path);
     snprintf(from, sizeof from, "%s", data);
     snprintf(to, sizeof to, "%s", picture);
-    if (access(python, X_OK) != 0) snprintf(python, sizeof python, "python3");
+    if (access(python, X_OK) != 0) {
+        snprintf(python, sizeof python, "python3");
+    }
     char *arguments[] = {python, code_path, from, to, NULL};
     pid_t child;
     int code = 0, failure = posix_spawnp(&child, python, NULL, NULL, arguments, environ);
-    while (failure == 0 && waitpid(child, &code, 0) < 0 && errno == EINTR) continue;
-    if (failure == 0 && WIFEXITED(code) && WEXITSTATUS(code) == 0) return MILD_OK;
+    while (failure == 0 && waitpid(child, &code, 0) < 0 && errno == EINTR) {
+        continue;
+    }
+    if (failure == 0 && WIFEXITED(code) && WEXITSTATUS(code) == 0) {
+        return MILD_OK;
+    }
     return mild_fail(error, MILD_ERROR_IO,
-                     "%.150s: not drawn, Python with matplotlib is needed (make setup); the numbers are in %.150s",
+                     "%.150s: not drawn, Python with matplotlib is needed (make setup); the "
+                     "numbers are in %.150s",
                      picture, data);
 }

@@ -8,43 +8,61 @@ enum { NAMES_MAX = 32 };
 
 MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, MildError *error) {
     int is_rigid = strcmp(name, "rigid") == 0;
-    if (rigid) *rigid = is_rigid;
-    if (is_rigid && rigid) return MILD_OK;
+    if (rigid) {
+        *rigid = is_rigid;
+    }
+    if (is_rigid && rigid) {
+        return MILD_OK;
+    }
     if (is_rigid) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "ground 'rigid' is the engine's own contact and has no soft-ground law");
     }
-    if (mild_material_preset(name, material)) return MILD_OK;
+    if (mild_material_preset(name, material)) {
+        return MILD_OK;
+    }
     const char *names[NAMES_MAX];
     int count = 0;
     for (; count < mild_material_preset_count() && count < NAMES_MAX - 1; count++) {
         names[count] = mild_material_preset_name(count);
     }
-    if (rigid) names[count++] = "rigid";
+    if (rigid) {
+        names[count++] = "rigid";
+    }
     return mild_fail(error, MILD_ERROR_ARGUMENT,
                      "unknown ground '%.60s'; nearest is '%s' (mild info grounds lists all)", name,
                      text_nearest(name, names, count));
 }
 
-MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model, MildError *error) {
+MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model,
+                         MildError *error) {
     static const char key[] = "ground.model=";
     const char *name = option;
     for (int i = 0; i < args->override_count; i++) {
-        if (strncmp(args->overrides[i], key, sizeof key - 1) != 0) continue;
+        if (strncmp(args->overrides[i], key, sizeof key - 1) != 0) {
+            continue;
+        }
         const char *other = args->overrides[i] + sizeof key - 1;
-        if (option && strcmp(option, other) != 0)
-            return mild_fail(error, MILD_ERROR_ARGUMENT, "--model %.40s and --%.60s: which one?", option, args->overrides[i]);
+        if (option && strcmp(option, other) != 0) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT, "--model %.40s and --%.60s: which one?",
+                             option, args->overrides[i]);
+        }
         name = other;
     }
     *model = MILD_MODEL_MILD;
-    if (!name || mild_model_find(name, model)) return MILD_OK;
-    return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown ground model '%.60s'; nearest is '%s' (mild info grounds lists all)",
+    if (!name || mild_model_find(name, model)) {
+        return MILD_OK;
+    }
+    return mild_fail(error, MILD_ERROR_ARGUMENT,
+                     "unknown ground model '%.60s'; nearest is '%s' (mild info grounds lists all)",
                      name, text_nearest(name, (const char **)mild_model_names, MILD_MODELS));
 }
 
-GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain, const CliArgs *args) {
+GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain,
+                             const CliArgs *args) {
     robot_set_model(robot, model);
-    return (GroundsDef){model, robot_rasters(robot)[0], robot_half_weight(robot), args, task, terrain};
+    return (GroundsDef){model,  robot_rasters(robot)[0], robot_half_weight(robot), args, task,
+                        terrain};
 }
 
 ConfigSection grounds_section(MildMaterial *material) {
@@ -54,17 +72,26 @@ ConfigSection grounds_section(MildMaterial *material) {
 static MildStatus overlay(const GroundsDef *def, MildMaterial *material, MildError *error) {
     ConfigSection sections[3] = {grounds_section(material)};
     int count = 1;
-    if (def->task) sections[count++] = (ConfigSection){"task", task_fields, task_field_count, def->task};
-    if (def->terrain) sections[count++] = terrain_section(def->terrain);
-    return config_overrides(sections, count, def->args->overrides, def->args->override_count, error);
+    if (def->task) {
+        sections[count++] = (ConfigSection){"task", task_fields, task_field_count, def->task};
+    }
+    if (def->terrain) {
+        sections[count++] = terrain_section(def->terrain);
+    }
+    return config_overrides(sections, count, def->args->overrides, def->args->override_count,
+                            error);
 }
 
 MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildError *error) {
     MildMaterial mild = *material;
     material->model = (int)def->model;
     MildStatus status = mild_material_check(material, error);
-    if (status == MILD_OK) status = mild_model_match(def->model, &mild, def->sole, def->load, material, error);
-    if (status == MILD_OK) status = overlay(def, material, error);
+    if (status == MILD_OK) {
+        status = mild_model_match(def->model, &mild, def->sole, def->load, material, error);
+    }
+    if (status == MILD_OK) {
+        status = overlay(def, material, error);
+    }
     return status == MILD_OK ? mild_material_check(material, error) : status;
 }
 
@@ -75,8 +102,9 @@ MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *
         scene->rigid = 1;
         return overlay(def, &unused, error);
     }
-    for (int i = 0; status == MILD_OK && i < scene->terrain.material_count; i++)
+    for (int i = 0; status == MILD_OK && i < scene->terrain.material_count; i++) {
         status = grounds_finish(def, &scene->terrain.materials[i], error);
+    }
     return status;
 }
 
@@ -84,16 +112,22 @@ MildStatus grounds_lay_map(const GroundsDef *def, Scene *scene, MildMap **map, M
     MildTerrain *terrain = &scene->terrain;
     MildMap *made = NULL;
     *map = NULL;
-    if (scene->rigid && def->terrain->map.patches != MILD_PATTERN_NONE)
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "rigid is the engine's own contact and has no materials: leave out --terrain.patches");
+    if (scene->rigid && def->terrain->map.patches != MILD_PATTERN_NONE) {
+        return mild_fail(
+            error, MILD_ERROR_ARGUMENT,
+            "rigid is the engine's own contact and has no materials: leave out --terrain.patches");
+    }
     MildStatus status = terrain_make(def->terrain, terrain->material_count, &made, error);
-    if (status == MILD_OK) status = mild_terrain_set_map(terrain, made, error);
+    if (status == MILD_OK) {
+        status = mild_terrain_set_map(terrain, made, error);
+    }
     if (status != MILD_OK) {
         mild_map_destroy(made);
         return status;
     }
-    if (def->terrain->map.patches != MILD_PATTERN_NONE) terrain->patch_count = 0;
+    if (def->terrain->map.patches != MILD_PATTERN_NONE) {
+        terrain->patch_count = 0;
+    }
     *map = made;
     if (def->task) {
         def->task->map = made;
@@ -107,7 +141,9 @@ static const char *list_names(int count, const char *(*name)(int), char *text, s
     text[0] = '\0';
     for (int i = 0; i < count; i++) {
         int added = snprintf(text + length, size - length, "%s%s", i ? " " : "", name(i));
-        if (added < 0 || (size_t)added >= size - length) break;
+        if (added < 0 || (size_t)added >= size - length) {
+            break;
+        }
         length += (size_t)added;
     }
     return text;

@@ -8,10 +8,12 @@
 
 typedef struct {
     int columns, rows;
-    double *grey; /* [rows][columns] [-] 0 black .. 1 white, the file's own values (no gamma); first row at the top */
+    double *grey; /* [rows][columns] [-] 0 black .. 1 white, the file's own values (no gamma); first
+                     row at the top */
 } Image;
 
-/* Any PNG: colours become their luminance, transparency is left out. Fails with the file's name and what is wrong. */
+/* Any PNG: colours become their luminance, transparency is left out. Fails with the file's name and
+ * what is wrong. */
 MildStatus image_read(const char *path, Image *image, MildError *error);
 /* The same from an open file, which `name` stands for in messages. */
 MildStatus image_read_file(FILE *file, const char *name, Image *image, MildError *error);

@@ -1,4 +1,5 @@
-/* The program `mild`: a table of commands. Only in this layer text becomes structs and errors become exits. */
+/* The program `mild`: a table of commands. Only in this layer text becomes structs and errors
+ * become exits. */
 #include <stdio.h>
 #include <string.h>
 
@@ -31,13 +32,18 @@ static const struct {
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
 static void print_help(FILE *file) {
-    fprintf(file, "mild %s: soft ground for legged robots\n\nusage: mild COMMAND [options]\n\ncommands:\n",
-            build_version());
-    for (int i = 0; i < COMMANDS; i++) fprintf(file, "  %-8s%s\n", commands[i].name, commands[i].help);
-    fprintf(file, "\n`mild COMMAND --help` tells the rest. Exit code: 0 fine, 2 bad input.\n\n"
-                  "a first look:\n"
-                  "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
-                  "  mild press --ground foam45 --depth 0.03\n");
+    fprintf(
+        file,
+        "mild %s: soft ground for legged robots\n\nusage: mild COMMAND [options]\n\ncommands:\n",
+        build_version());
+    for (int i = 0; i < COMMANDS; i++) {
+        fprintf(file, "  %-8s%s\n", commands[i].name, commands[i].help);
+    }
+    fprintf(file,
+            "\n`mild COMMAND --help` tells the rest. Exit code: 0 fine, 2 bad input.\n\n"
+            "a first look:\n"
+            "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
+            "  mild press --ground foam45 --depth 0.03\n");
 }
 
 int main(int argc, char **argv) {
@@ -45,7 +51,8 @@ int main(int argc, char **argv) {
         print_help(stderr);
         return CLI_EXIT_BAD_INPUT;
     }
-    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 || strcmp(argv[1], "help") == 0) {
+    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 ||
+        strcmp(argv[1], "help") == 0) {
         print_help(stdout);
         return 0;
     }
@@ -55,10 +62,12 @@ int main(int argc, char **argv) {
     }
     const char *names[COMMANDS];
     for (int i = 0; i < COMMANDS; i++) {
-        if (strcmp(argv[1], commands[i].name) == 0) return commands[i].run(argc - 1, argv + 1);
+        if (strcmp(argv[1], commands[i].name) == 0) {
+            return commands[i].run(argc - 1, argv + 1);
+        }
         names[i] = commands[i].name;
     }
-    fprintf(stderr, "mild: unknown command '%s'; nearest is '%s' (mild --help lists all)\n", argv[1],
-            text_nearest(argv[1], names, COMMANDS));
+    fprintf(stderr, "mild: unknown command '%s'; nearest is '%s' (mild --help lists all)\n",
+            argv[1], text_nearest(argv[1], names, COMMANDS));
     return CLI_EXIT_BAD_INPUT;
 }

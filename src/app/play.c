@@ -38,26 +38,33 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
     walk->ground = mild_terrain_material_at(&env->terrain, qpos[0], qpos[1]);
     PlayLeg *leg = &play->leg[walk->ground];
     play->time += robot_sim_dt(sim);
-    if (play->time < START_TIME || play->fell) return;
+    if (play->time < START_TIME || play->fell) {
+        return;
+    }
     if (leg->steps++ == 0) {
         measure_start(&leg->measure, robot_sim_dt(sim));
         leg->start_x = qpos[0];
     }
     leg->end_x = qpos[0];
     measure_step(&leg->measure, env, sim, torque);
-    if (play->pressure) pressure_observe(play->pressure, sim, &env->terrain);
+    if (play->pressure) {
+        pressure_observe(play->pressure, sim, &env->terrain);
+    }
 }
 
 static void set_command(Walk *walk) {
     eval_command(walk->env, walk->command[0]);
-    if (walk->steer) memcpy(walk->env->command, walk->command, sizeof walk->command);
+    if (walk->steer) {
+        memcpy(walk->env->command, walk->command, sizeof walk->command);
+    }
 }
 
 static void start(Walk *walk) {
     Play *play = walk->play;
     TaskView none = {0};
     set_command(walk);
-    task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &play->scene->terrain, play->scene->rigid, &none);
+    task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &play->scene->terrain,
+                      play->scene->rigid, &none);
     walk->speed = 0;
 }
 
@@ -67,13 +74,19 @@ static void step(Walk *walk) {
     TaskView none = {0};
     TaskProbe probe = {watch, walk};
     play->controller->act(play->controller->self, 1, &walk->env, action);
-    TaskStep out = task_env_step(walk->env, &walk->task, play->robot, walk->sim, action, 0, &none, &probe);
+    TaskStep out =
+        task_env_step(walk->env, &walk->task, play->robot, walk->sim, action, 0, &none, &probe);
     const double *rotation = robot_sim_base_rotation(walk->sim), *qvel = robot_sim_qvel(walk->sim);
-    double forward = (rotation[0] * qvel[0] + rotation[3] * qvel[1]) / fmax(hypot(rotation[0], rotation[3]), 1e-6);
+    double forward = (rotation[0] * qvel[0] + rotation[3] * qvel[1]) /
+                     fmax(hypot(rotation[0], rotation[3]), 1e-6);
     walk->speed += TASK_PERIOD / SPEED_TIME * (forward - walk->speed);
     set_command(walk);
-    if (play->view && out.valid) view_observe(play->view, walk->sim);
-    if (!out.done || out.timeout) return;
+    if (play->view && out.valid) {
+        view_observe(play->view, walk->sim);
+    }
+    if (!out.done || out.timeout) {
+        return;
+    }
     play->fell = 1;
     play->leg[walk->ground].fell = 1;
     walk->end = play->time; /* only soles meet the ground: there is nothing to see below a fall */
@@ -82,7 +95,9 @@ static void step(Walk *walk) {
 
 static MildStatus frame(Walk *walk, MildError *error) {
     Play *play = walk->play;
-    if (walk->lost) return MILD_OK;
+    if (walk->lost) {
+        return MILD_OK;
+    }
     ViewInfo info = {.time = play->time, .speed = walk->speed, .fell = play->fell};
     memcpy(info.command, walk->env->command, sizeof info.command);
     view_frame(play->view, walk->sim, &info);
@@ -95,12 +110,17 @@ static MildStatus run_filmed(Walk *walk, MildError *error) {
     Progress progress = progress_begin("playing");
     MildStatus status = MILD_OK;
     while (status == MILD_OK && play->time < walk->end && !interrupt_requested()) {
-        if (play->view && play->time * play->rate >= play->frames) status = frame(walk, error);
-        if (status == MILD_OK) step(walk);
-        progress_show(&progress, play->time / walk->end, "%.1f s walked, x %.2f m, %.2f m/s", play->time,
-                      robot_sim_qpos(walk->sim)[0], walk->speed);
+        if (play->view && play->time * play->rate >= play->frames) {
+            status = frame(walk, error);
+        }
+        if (status == MILD_OK) {
+            step(walk);
+        }
+        progress_show(&progress, play->time / walk->end, "%.1f s walked, x %.2f m, %.2f m/s",
+                      play->time, robot_sim_qpos(walk->sim)[0], walk->speed);
     }
-    for (int k = 0; play->video && play->fell && status == MILD_OK && k < FALL_TIME * play->rate; k++) {
+    for (int k = 0; play->video && play->fell && status == MILD_OK && k < FALL_TIME * play->rate;
+         k++) {
         status = frame(walk, error);
     }
     progress_end(&progress, "%.1f s walked, x %.2f m%s", play->time, robot_sim_qpos(walk->sim)[0],
@@ -110,7 +130,9 @@ static MildStatus run_filmed(Walk *walk, MildError *error) {
 
 static void wait_until(double time) {
     double left = time - clock_seconds();
-    if (left <= 0) return;
+    if (left <= 0) {
+        return;
+    }
     struct timespec pause = {(time_t)left, (long)(1e9 * (left - floor(left)))};
     nanosleep(&pause, NULL);
 }
@@ -125,7 +147,9 @@ static MildStatus restart(Walk *walk, MildError *error) {
 
 static void take_keys(Walk *walk, const WindowInput *input) {
     for (int c = 0; c < 3; c++) {
-        if (c > 0 && input->command[c] != 0) walk->steer = 1;
+        if (c > 0 && input->command[c] != 0) {
+            walk->steer = 1;
+        }
         walk->command[c] = fmin(fmax(walk->command[c] + input->command[c], -SPEED_MAX), SPEED_MAX);
     }
 }
@@ -133,19 +157,26 @@ static void take_keys(Walk *walk, const WindowInput *input) {
 static MildStatus run_window(Walk *walk, MildError *error) {
     Play *play = walk->play;
     WindowInput input = {.time_scale = 1};
-    double shown = clock_seconds(), fallen = 0, owed = 0; /* owed: [s] of the walk that real time is ahead */
+    double shown = clock_seconds(), fallen = 0,
+           owed = 0; /* owed: [s] of the walk that real time is ahead */
     MildStatus status = MILD_OK;
     while (status == MILD_OK && !input.quit && !interrupt_requested()) {
         status = frame(walk, error);
         view_show(play->view, &input);
         take_keys(walk, &input);
-        if (input.reset || (play->fell && shown > fallen + FALL_TIME)) status = restart(walk, error);
+        if (input.reset || (play->fell && shown > fallen + FALL_TIME)) {
+            status = restart(walk, error);
+        }
         wait_until(shown + 1.0 / play->rate);
         double now = clock_seconds();
         owed = input.paused ? 0 : fmin(owed + (now - shown) * input.time_scale, OWED_MAX);
-        for (; owed >= TASK_PERIOD && !play->fell; owed -= TASK_PERIOD) step(walk);
+        for (; owed >= TASK_PERIOD && !play->fell; owed -= TASK_PERIOD) {
+            step(walk);
+        }
         shown = now;
-        if (!play->fell) fallen = now;
+        if (!play->fell) {
+            fallen = now;
+        }
     }
     return status;
 }
@@ -157,8 +188,12 @@ MildStatus play_run(Play *play, MildError *error) {
     walk.env = aligned_alloc(64, task_env_bytes(&walk.task, play->robot));
     walk.sim = robot_sim_create(play->robot, walk.task.physics_dt, error);
     MildStatus status = MILD_OK;
-    if (!walk.sim) status = error->status;
-    if (!walk.env) status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    if (!walk.sim) {
+        status = error->status;
+    }
+    if (!walk.env) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    }
     if (status == MILD_OK) {
         task_env_init(walk.env, &walk.task, play->robot, play->seed, 0);
         start(&walk);

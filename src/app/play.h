@@ -1,4 +1,5 @@
-/* One robot walking a course while it is watched: measured per ground, filmed, shown in a window. */
+/* One robot walking a course while it is watched: measured per ground, filmed, shown in a window.
+ */
 #ifndef MILD_PLAY_H
 #define MILD_PLAY_H
 

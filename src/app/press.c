@@ -48,7 +48,9 @@ static void press_close(Press *press) {
 }
 
 static void press_pose(Press *press) {
-    for (int i = 0; i < 3; i++) press->offset[i] = press->input.rotation[0][3 * i + 2] * mild_sole_z(press->sole);
+    for (int i = 0; i < 3; i++) {
+        press->offset[i] = press->input.rotation[0][3 * i + 2] * mild_sole_z(press->sole);
+    }
 }
 
 /* Height of the lowest element above the reference point [m], at most 0. */
@@ -56,19 +58,27 @@ static double lowest_element(const Press *press) {
     const double *down = &press->input.rotation[0][6]; /* third row: world z of a foot vector */
     double lowest = 0;
     for (int i = 0; i < mild_sole_elements(press->sole); i++) {
-        lowest = fmin(lowest, down[0] * mild_sole_x(press->sole)[i] + down[1] * mild_sole_y(press->sole)[i]);
+        lowest = fmin(lowest, down[0] * mild_sole_x(press->sole)[i] +
+                                  down[1] * mild_sole_y(press->sole)[i]);
     }
     return lowest;
 }
 
-static MildStatus press_open(Press *press, const PressDef *def, const MildSole *sole, PressResult *result,
-                             MildError *error) {
-    *press = (Press){.def = def, .sole = sole, .result = result, .terrain = mild_terrain_uniform(&def->material)};
-    if (mild_terrain_set_map(&press->terrain, def->map, error) != MILD_OK) return error->status;
+static MildStatus press_open(Press *press, const PressDef *def, const MildSole *sole,
+                             PressResult *result, MildError *error) {
+    *press = (Press){.def = def,
+                     .sole = sole,
+                     .result = result,
+                     .terrain = mild_terrain_uniform(&def->material)};
+    if (mild_terrain_set_map(&press->terrain, def->map, error) != MILD_OK) {
+        return error->status;
+    }
     press->terrain.height = -mild_terrain_height_at(&press->terrain, 0, 0);
     size_t bytes = mild_ground_bytes_prints(&sole, 1, def->print_tiles);
     press->block = aligned_alloc(64, 2 * bytes);
-    if (!press->block) return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
+    if (!press->block) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
+    }
     press->scratch = mild_scratch_create(&sole, 1, error);
     if (!press->scratch) {
         free(press->block);
@@ -80,7 +90,9 @@ static MildStatus press_open(Press *press, const PressDef *def, const MildSole *
     const double rotation[9] = {c, 0, s, 0, 1, 0, -s, 0, c}; /* about y */
     press->input.feet = 1;
     press->input.solver = def->solver;
-    for (int i = 0; i < 9; i++) press->input.rotation[0][i] = rotation[i];
+    for (int i = 0; i < 9; i++) {
+        press->input.rotation[0][i] = rotation[i];
+    }
     press_pose(press);
     press->start = lowest_element(press);
     return MILD_OK;
@@ -95,11 +107,13 @@ static void press_place(Press *press, double depth) {
 }
 
 static void press_solve(Press *press) {
-    mild_ground_solve(press->ground, &press->terrain, &press->input, press->scratch, &press->contact);
+    mild_ground_solve(press->ground, &press->terrain, &press->input, press->scratch,
+                      &press->contact);
 }
 
 static void press_advance(Press *press) {
-    mild_ground_advance(press->ground, &press->terrain, &press->input, press->scratch, &press->contact);
+    mild_ground_advance(press->ground, &press->terrain, &press->input, press->scratch,
+                        &press->contact);
 }
 
 /* ---- rows ---- */
@@ -108,7 +122,10 @@ static void press_advance(Press *press) {
 static PressRow press_row(const Press *press) {
     const MildFootResult *foot = &press->contact.foot[0];
     const double *p = press->offset, *f = foot->force, *R = press->input.rotation[0];
-    PressRow row = {.time = press->time, .depth = press_depth(press), .force = f[2], .contacts = foot->contacts};
+    PressRow row = {.time = press->time,
+                    .depth = press_depth(press),
+                    .force = f[2],
+                    .contacts = foot->contacts};
     row.force_x = f[0];
     row.force_y = f[1];
     row.x = press->input.position[0][0] + p[0];
@@ -122,12 +139,17 @@ static PressRow press_row(const Press *press) {
 static MildStatus rows_add(PressResult *result, PressRow row, MildError *error) {
     if (result->count == result->room) {
         int room = 2 * result->room + 2 * WAY_STEPS + 1;
-        PressRow *more = result->count < ROWS_MAX ? realloc(result->rows, sizeof *more * (size_t)room) : NULL;
-        if (!more) return mild_fail(error, MILD_ERROR_MEMORY, "press: too many rows; take fewer or longer steps");
+        PressRow *more =
+            result->count < ROWS_MAX ? realloc(result->rows, sizeof *more * (size_t)room) : NULL;
+        if (!more) {
+            return mild_fail(error, MILD_ERROR_MEMORY,
+                             "press: too many rows; take fewer or longer steps");
+        }
         result->rows = more;
         result->room = room;
     }
-    row.zmp_x = row.force > 0 ? -row.moment_y / row.force : NAN; /* at the height of the reference point */
+    row.zmp_x =
+        row.force > 0 ? -row.moment_y / row.force : NAN; /* at the height of the reference point */
     row.zmp_y = row.force > 0 ? row.moment_x / row.force : NAN;
     result->rows[result->count++] = row;
     result->peak_force = fmax(result->peak_force, row.force);
@@ -139,10 +161,13 @@ static void work_add(Press *press, const PressRow *step, double down, double for
     PressResult *result = press->result;
     *(down > 0 ? &result->work_in : &result->work_out) += step->force * fabs(down);
     result->work_drag -= step->force_x * forward;
-    if (down < 0 && step->force > 0) result->print_depth = step->depth + down;
+    if (down < 0 && step->force > 0) {
+        result->print_depth = step->depth + down;
+    }
 }
 
-/* ---- moved by hand: A = 0, an infinitely heavy foot whose twist after each step is the prescribed one ---- */
+/* ---- moved by hand: A = 0, an infinitely heavy foot whose twist after each step is the prescribed
+ * one ---- */
 
 /* A step of `dt` from here at the given speeds; changes nothing. */
 static PressRow hand_solve(Press *press, double dt, double forward, double down) {
@@ -155,7 +180,8 @@ static PressRow hand_solve(Press *press, double dt, double forward, double down)
 }
 
 /* Takes the step just solved, which ends at depth `to` as `row` says. */
-static MildStatus hand_take(Press *press, const PressRow *step, double forward, double to, PressRow row, MildError *error) {
+static MildStatus hand_take(Press *press, const PressRow *step, double forward, double to,
+                            PressRow row, MildError *error) {
     double dt = press->input.dt;
     PressRow mean = *step;
     mean.force = 0.5 * (step->force + row.force);
@@ -164,9 +190,10 @@ static MildStatus hand_take(Press *press, const PressRow *step, double forward, 
     return rows_add(press->result, row, error);
 }
 
-/* Takes a step at constant depth. A step's force is the mean about the place it starts from, so the force at its end is that
- * of the step which would follow. */
-static MildStatus hand_accept(Press *press, const PressRow *step, double forward, MildError *error) {
+/* Takes a step at constant depth. A step's force is the mean about the place it starts from, so the
+ * force at its end is that of the step which would follow. */
+static MildStatus hand_accept(Press *press, const PressRow *step, double forward,
+                              MildError *error) {
     double dt = press->input.dt;
     press_advance(press);
     press->time += dt;
@@ -174,8 +201,9 @@ static MildStatus hand_accept(Press *press, const PressRow *step, double forward
     return hand_take(press, step, forward, step->depth, hand_solve(press, dt, forward, 0), error);
 }
 
-/* The row at the end of the step just solved, which stays the last solved: the force at the depth `to` itself, over a tiny step
- * that follows a tiny step. The mean over a whole one would blunt the kink where the ground yields. */
+/* The row at the end of the step just solved, which stays the last solved: the force at the depth
+ * `to` itself, over a tiny step that follows a tiny step. The mean over a whole one would blunt the
+ * kink where the ground yields. */
 static PressRow hand_end(Press *press, const PressRow *step, double to) {
     double dt = press->input.dt, down = (to - step->depth) / dt, tiny = HAND_TINY * dt;
     size_t bytes = mild_ground_size(press->ground);
@@ -207,14 +235,18 @@ static PressRow hand_cut(Press *press, double dt, double down, double force) {
     return step;
 }
 
-/* Down or up to a depth, or to where the force gets to `force` (NaN: never) if that comes first; *reached says so. */
-static MildStatus hand_vertical(Press *press, double to, double force, int *reached, MildError *error) {
-    double from = press_depth(press), way = to - from, speed = press->def->speed, down = copysign(speed, way);
+/* Down or up to a depth, or to where the force gets to `force` (NaN: never) if that comes first;
+ * *reached says so. */
+static MildStatus hand_vertical(Press *press, double to, double force, int *reached,
+                                MildError *error) {
+    double from = press_depth(press), way = to - from, speed = press->def->speed,
+           down = copysign(speed, way);
     int steps = (int)fmax(ceil(fabs(way) / speed / press->def->step - 1e-6), 1);
     MildStatus status = MILD_OK;
     *reached = 0;
     for (int i = 1; i <= steps && status == MILD_OK && !*reached; i++) {
-        double next = i < steps ? from + way * i / steps : to, dt = (next - press_depth(press)) / down;
+        double next = i < steps ? from + way * i / steps : to,
+               dt = (next - press_depth(press)) / down;
         PressRow step = hand_solve(press, dt, 0, down), end = hand_end(press, &step, next);
         *reached = (end.force - force) * down >= 0;
         if (*reached) {
@@ -235,7 +267,8 @@ static MildStatus hand_drag(Press *press, MildError *error) {
     const PressDef *def = press->def;
     MildStatus status = MILD_OK;
     for (int i = 0; i < WAY_STEPS && status == MILD_OK; i++) {
-        PressRow step = hand_solve(press, def->drag / def->drag_speed / WAY_STEPS, def->drag_speed, 0);
+        PressRow step =
+            hand_solve(press, def->drag / def->drag_speed / WAY_STEPS, def->drag_speed, 0);
         status = hand_accept(press, &step, def->drag_speed, error);
     }
     press->result->ways++;
@@ -244,17 +277,24 @@ static MildStatus hand_drag(Press *press, MildError *error) {
 
 static MildStatus hand_out(Press *press, MildError *error) {
     int reached;
-    return press_depth(press) > press->start ? hand_vertical(press, press->start, NAN, &reached, error) : MILD_OK;
+    return press_depth(press) > press->start
+               ? hand_vertical(press, press->start, NAN, &reached, error)
+               : MILD_OK;
 }
 
 /* Even turns end ways down, odd ones ways up. */
 static MildStatus hand_turn(Press *press, int index, MildError *error) {
     const PressDef *def = press->def;
     int reached, ends_down = index % 2 == 0;
-    double depth = def->by_force ? press->start + ends_down * PRESS_DEEPEST : fmax(def->turn[index], press->start);
-    MildStatus status = hand_vertical(press, depth, def->by_force ? def->turn[index] : NAN, &reached, error);
-    if (status != MILD_OK || !def->by_force || !ends_down || reached) return status;
-    return mild_fail(error, MILD_ERROR_RANGE, "--force: the ground pushes with %g N at most, %g m deep",
+    double depth = def->by_force ? press->start + ends_down * PRESS_DEEPEST
+                                 : fmax(def->turn[index], press->start);
+    MildStatus status =
+        hand_vertical(press, depth, def->by_force ? def->turn[index] : NAN, &reached, error);
+    if (status != MILD_OK || !def->by_force || !ends_down || reached) {
+        return status;
+    }
+    return mild_fail(error, MILD_ERROR_RANGE,
+                     "--force: the ground pushes with %g N at most, %g m deep",
                      press->result->peak_force, PRESS_DEEPEST);
 }
 
@@ -266,9 +306,13 @@ static MildStatus hand_run(Press *press, MildError *error) {
     for (int cycle = 0; cycle < cycles && status == MILD_OK; cycle++) {
         for (int i = 0; i < def->turns && status == MILD_OK; i++) {
             status = hand_turn(press, i, error);
-            if (status == MILD_OK && i == 0 && cycle == 0 && def->drag > 0) status = hand_drag(press, error);
+            if (status == MILD_OK && i == 0 && cycle == 0 && def->drag > 0) {
+                status = hand_drag(press, error);
+            }
         }
-        if (status == MILD_OK && def->turns % 2) status = hand_out(press, error);
+        if (status == MILD_OK && def->turns % 2) {
+            status = hand_out(press, error);
+        }
     }
     return status == MILD_OK ? hand_out(press, error) : status;
 }
@@ -277,16 +321,21 @@ static MildStatus hand_run(Press *press, MildError *error) {
 
 static int untouched(const Press *press) {
     const double *deepest = mild_ground_depth_max(press->ground, 0);
-    for (int i = 0; i < mild_sole_elements(press->sole); i++)
-        if (deepest[i] > 0) return 0;
+    for (int i = 0; i < mild_sole_elements(press->sole); i++) {
+        if (deepest[i] > 0) {
+            return 0;
+        }
+    }
     return 1;
 }
 
-/* Semi-implicit, as engines do; the row stands at the start of the step, about which its force is the mean. */
+/* Semi-implicit, as engines do; the row stands at the start of the step, about which its force is
+ * the mean. */
 static MildStatus drop_step(Press *press, const PressBody *body, MildError *error) {
     PressResult *result = press->result;
     MildContactInput *input = &press->input;
-    double before = press_depth(press), x = input->position[0][0] + press->offset[0], dt = input->dt;
+    double before = press_depth(press), x = input->position[0][0] + press->offset[0],
+           dt = input->dt;
     press_body_free(body, gravity, input);
     press_solve(press);
     PressRow row = press_row(press);
@@ -300,7 +349,9 @@ static MildStatus drop_step(Press *press, const PressBody *body, MildError *erro
         result->stop_time = press->time;
         result->stop_depth = fmax(before, depth);
     }
-    if (untouched(press)) result->print_depth = 0;
+    if (untouched(press)) {
+        result->print_depth = 0;
+    }
     return rows_add(result, row, error); /* with the time and depth before the step */
 }
 
@@ -312,23 +363,32 @@ static MildStatus drop_run(Press *press, MildError *error) {
     press->input.velocity[0][2] = -def->impact;
     press_place(press, press->start - def->height);
     MildStatus status = MILD_OK;
-    for (int i = 0; i < steps && status == MILD_OK; i++) status = drop_step(press, &body, error);
+    for (int i = 0; i < steps && status == MILD_OK; i++) {
+        status = drop_step(press, &body, error);
+    }
     const double *V = press->input.velocity[0];
     press->result->rest_speed = sqrt(V[0] * V[0] + V[1] * V[1] + V[2] * V[2]);
     return status;
 }
 
-MildStatus press_run(const PressDef *def, const MildSole *sole, PressResult *result, MildError *error) {
+MildStatus press_run(const PressDef *def, const MildSole *sole, PressResult *result,
+                     MildError *error) {
     Press press;
     PressDef whole = *def;
     double pitch = mild_sole_pitch(sole);
     int elements = mild_sole_elements(sole);
     *result = (PressResult){.elements = elements, .area = elements * pitch * pitch};
     MildStatus status = mild_material_check(&def->material, error);
-    if (status == MILD_OK) status = press_open(&press, &whole, sole, result, error);
-    if (status != MILD_OK) return status;
+    if (status == MILD_OK) {
+        status = press_open(&press, &whole, sole, result, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
     double way = def->by_force ? 0.02e-3 * WAY_STEPS : def->turn[0] - press.start;
-    if (!(whole.step > 0)) whole.step = def->mass > 0 ? 1e-4 : way / def->speed / WAY_STEPS;
+    if (!(whole.step > 0)) {
+        whole.step = def->mass > 0 ? 1e-4 : way / def->speed / WAY_STEPS;
+    }
     status = def->mass > 0 ? drop_run(&press, error) : hand_run(&press, error);
     press_close(&press);
     return status;

@@ -13,7 +13,8 @@ typedef struct {
 
 PressBody press_body(const MildSole *sole, double mass);
 
-/* Fills A = J M^-1 J^T and the free twist at the ankle under gravity for foot 0 of `input`, from its pose and twist. */
+/* Fills A = J M^-1 J^T and the free twist at the ankle under gravity for foot 0 of `input`, from
+ * its pose and twist. */
 void press_body_free(const PressBody *body, double gravity, MildContactInput *input);
 
 /* Moves foot 0 by dt at its new twist. */

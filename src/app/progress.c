@@ -16,13 +16,17 @@ static const double terminal_interval = 0.1, file_interval = 10.0; /* [s] */
 
 Progress progress_begin(const char *what) {
     double now = clock_seconds();
-    return (Progress){.what = what, .start = now, .shown = now - file_interval, .terminal = isatty(STDERR_FILENO)};
+    return (Progress){.what = what,
+                      .start = now,
+                      .shown = now - file_interval,
+                      .terminal = isatty(STDERR_FILENO)};
 }
 
 /* A line wider than the terminal would wrap, and its first half could no longer be overwritten. */
 static void cut_to_terminal(char *line) {
     struct winsize window;
-    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1 && strlen(line) >= window.ws_col) {
+    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1 &&
+        strlen(line) >= window.ws_col) {
         line[window.ws_col - 1] = '\0';
     }
 }
@@ -31,9 +35,12 @@ static void show_line(Progress *progress, double share, const char *format, va_l
     char line[400], time[32];
     double elapsed = clock_seconds() - progress->start;
     int length = snprintf(line, sizeof line, "%s", progress->what);
-    if (share >= 0)
-        length += snprintf(line + length, sizeof line - (size_t)length, " %3.0f %%", 100 * (share < 1 ? share : 1));
-    length += snprintf(line + length, sizeof line - (size_t)length, "  %s", text_duration(elapsed, time, sizeof time));
+    if (share >= 0) {
+        length += snprintf(line + length, sizeof line - (size_t)length, " %3.0f %%",
+                           100 * (share < 1 ? share : 1));
+    }
+    length += snprintf(line + length, sizeof line - (size_t)length, "  %s",
+                       text_duration(elapsed, time, sizeof time));
     if (share > 0.005 && share < 1) {
         text_duration(elapsed * (1 - share) / share, time, sizeof time);
         length += snprintf(line + length, sizeof line - (size_t)length, ", %s left", time);
@@ -52,7 +59,9 @@ static void show_line(Progress *progress, double share, const char *format, va_l
 
 void progress_show(Progress *progress, double share, const char *format, ...) {
     double now = clock_seconds();
-    if (now - progress->shown < (progress->terminal ? terminal_interval : file_interval)) return;
+    if (now - progress->shown < (progress->terminal ? terminal_interval : file_interval)) {
+        return;
+    }
     progress->shown = now;
     va_list arguments;
     va_start(arguments, format);
@@ -65,12 +74,15 @@ void progress_end(Progress *progress, const char *format, ...) {
     va_start(arguments, format);
     show_line(progress, -1, format, arguments);
     va_end(arguments);
-    if (progress->terminal) fputc('\n', stderr);
+    if (progress->terminal) {
+        fputc('\n', stderr);
+    }
 }
 
-/* oneDNN 2.6's generated kernels keep data below the stack pointer, where the kernel puts the frame of a signal handler: a
- * Ctrl-C in the middle of a product corrupted the heap. So no thread that computes ever runs a handler: the signals are
- * blocked (threads made later inherit that) and a thread of their own waits for them. */
+/* oneDNN 2.6's generated kernels keep data below the stack pointer, where the kernel puts the frame
+ * of a signal handler: a Ctrl-C in the middle of a product corrupted the heap. So no thread that
+ * computes ever runs a handler: the signals are blocked (threads made later inherit that) and a
+ * thread of their own waits for them. */
 static atomic_int interrupted;
 
 static void *wait_for_signals(void *signals) {

@@ -15,8 +15,9 @@ typedef struct {
 TerrainDef terrain_def_default(void);
 ConfigSection terrain_section(TerrainDef *def);
 
-/* The map it describes for `materials` materials (a label image's black is the first of them, its white the last); *map is
- * NULL for level ground without a pattern. Destroy it with mild_map_destroy. */
+/* The map it describes for `materials` materials (a label image's black is the first of them, its
+ * white the last); *map is NULL for level ground without a pattern. Destroy it with
+ * mild_map_destroy. */
 MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, MildError *error);
 /* Tiles for mild_ground_bytes_prints; 0 without memory. */
 int terrain_print_tiles(const TerrainDef *def);

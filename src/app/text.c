@@ -17,7 +17,9 @@ static int smallest(int a, int b, int c) {
 int text_distance(const char *a, const char *b) {
     int row[NAME_MAX_LENGTH + 1];
     int length_b = (int)strnlen(b, NAME_MAX_LENGTH);
-    for (int j = 0; j <= length_b; j++) row[j] = j;
+    for (int j = 0; j <= length_b; j++) {
+        row[j] = j;
+    }
     for (int i = 1; i <= NAME_MAX_LENGTH && a[i - 1]; i++) {
         int diagonal = row[0];
         row[0] = i;
@@ -47,7 +49,9 @@ int text_double(const char *text, double *value) {
     char *end;
     errno = 0;
     double number = strtod(text, &end);
-    if (end == text || *end || errno || !isfinite(number)) return 0;
+    if (end == text || *end || errno || !isfinite(number)) {
+        return 0;
+    }
     *value = number;
     return 1;
 }
@@ -56,7 +60,9 @@ int text_int(const char *text, int *value) {
     char *end;
     errno = 0;
     long number = strtol(text, &end, 10);
-    if (end == text || *end || errno || number < INT_MIN || number > INT_MAX) return 0;
+    if (end == text || *end || errno || number < INT_MIN || number > INT_MAX) {
+        return 0;
+    }
     *value = (int)number;
     return 1;
 }
@@ -64,9 +70,13 @@ int text_int(const char *text, int *value) {
 int text_uint64(const char *text, uint64_t *value) {
     char *end;
     errno = 0;
-    if (text[0] < '0' || text[0] > '9') return 0; /* strtoull would take a minus sign */
+    if (text[0] < '0' || text[0] > '9') {
+        return 0; /* strtoull would take a minus sign */
+    }
     unsigned long long number = strtoull(text, &end, 10);
-    if (*end || errno) return 0;
+    if (*end || errno) {
+        return 0;
+    }
     *value = number;
     return 1;
 }

@@ -61,7 +61,8 @@ static int build(Trainer *trainer, MildError *error) {
     if (!trainer->policy) {
         return 0;
     }
-    trainer->ppo = ppo_create(&def->ppo, trainer->policy, trainer->pool, &mirror, def->train.envs, def->train.seed, error);
+    trainer->ppo = ppo_create(&def->ppo, trainer->policy, trainer->pool, &mirror, def->train.envs,
+                              def->train.seed, error);
     if (!trainer->ppo) {
         return 0;
     }
@@ -73,7 +74,8 @@ static int build(Trainer *trainer, MildError *error) {
     }
     trainer->def.task.map = trainer->map;
     trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
-    trainer->vec = vec_create(&def->task, trainer->robot, trainer->pool, def->train.envs, def->train.seed, error);
+    trainer->vec = vec_create(&def->task, trainer->robot, trainer->pool, def->train.envs,
+                              def->train.seed, error);
     return trainer->vec != NULL;
 }
 
@@ -104,8 +106,8 @@ MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error
         double between = clock_seconds();
         size_t row = (size_t)t * envs;
         VecView next = view_of(batch, t + 1, &trainer->def);
-        vec_step(trainer->vec, batch->action + row * actions, batch->reward + row, batch->done + row,
-                 batch->timeout + row, batch->valid + row, &next);
+        vec_step(trainer->vec, batch->action + row * actions, batch->reward + row,
+                 batch->done + row, batch->timeout + row, batch->valid + row, &next);
         times.inference += between - before;
         times.environments += clock_seconds() - between;
     }

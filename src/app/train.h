@@ -1,4 +1,5 @@
-/* A training run in memory: robots, networks, learner, put together from an experiment. Knows no file but checkpoints. */
+/* A training run in memory: robots, networks, learner, put together from an experiment. Knows no
+ * file but checkpoints. */
 #ifndef MILD_TRAIN_H
 #define MILD_TRAIN_H
 
@@ -11,7 +12,8 @@ typedef struct Trainer Trainer;
 /* Wall time of one iteration [s]. */
 typedef struct {
     double rollout, inference, environments, update;
-    double physics, ground; /* thread time inside environments, summed over the threads; ground is part of physics */
+    double physics, ground; /* thread time inside environments, summed over the threads; ground is
+                               part of physics */
 } TrainTimes;
 
 typedef struct {
@@ -31,7 +33,8 @@ Policy *train_policy(Trainer *trainer); /* what gets saved: the averaged weights
 size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */
 int train_threads(const Trainer *trainer);
 
-/* All that resuming needs, in one checksummed file; a resumed run equals one that was never stopped, bit for bit. */
+/* All that resuming needs, in one checksummed file; a resumed run equals one that was never
+ * stopped, bit for bit. */
 MildStatus train_save(Trainer *trainer, const char *path, const char *note, MildError *error);
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error);
 

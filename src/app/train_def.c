@@ -18,9 +18,12 @@ const MildField train_fields[] = {
     FIELD(minutes, MILD_FIELD_DOUBLE, 0, 1e6, "[min] wall time; 0: no limit"),
     FIELD(checkpoint_every, MILD_FIELD_INT, 1, 1e9, "[-] iterations between checkpoints"),
     FIELD(keep_checkpoints, MILD_FIELD_INT, 1, 1000, "[-] the newest so many checkpoints are kept"),
-    FIELD(seed, MILD_FIELD_UINT64, 0, 18446744073709551616.0, "[-] same seed, same config: same numbers"),
-    FIELD(threads, MILD_FIELD_INT, 0, 1024, "[-] threads; 0: one per core; results do not depend on it"),
+    FIELD(seed, MILD_FIELD_UINT64, 0, 18446744073709551616.0,
+          "[-] same seed, same config: same numbers"),
+    FIELD(threads, MILD_FIELD_INT, 0, 1024,
+          "[-] threads; 0: one per core; results do not depend on it"),
     MILD_FIELD(TrainDef, device, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->device, 0, 0,
-               "[-] of the networks: cpu or cuda (docs/gpu.md); robots and ground use every core either way"),
+               "[-] of the networks: cpu or cuda (docs/gpu.md); robots and ground use every core "
+               "either way"),
 };
 const int train_field_count = sizeof train_fields / sizeof *train_fields;

@@ -40,7 +40,8 @@ static void pool_drain(Pool *pool, int thread) {
     }
 }
 
-/* A worker that wakes after the run has closed goes back to sleep, so a run waits only for those who took part. */
+/* A worker that wakes after the run has closed goes back to sleep, so a run waits only for those
+ * who took part. */
 static void *pool_worker(void *argument) {
     PoolWorker *worker = argument;
     Pool *pool = worker->pool;
@@ -126,7 +127,8 @@ int pool_threads(const Pool *pool) {
     return pool->threads;
 }
 
-void pool_run(Pool *pool, int pieces, void (*work)(void *context, int piece, int thread), void *context) {
+void pool_run(Pool *pool, int pieces, void (*work)(void *context, int piece, int thread),
+              void *context) {
     pool->pieces = pieces;
     pool->work = work;
     pool->context = context;

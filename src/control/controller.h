@@ -1,4 +1,5 @@
-/* Who moves the robots. A controller is one file that fills this contract; evaluation and play know nothing else. */
+/* Who moves the robots. A controller is one file that fills this contract; evaluation and play know
+ * nothing else. */
 #ifndef MILD_CONTROLLER_H
 #define MILD_CONTROLLER_H
 
@@ -13,9 +14,10 @@ typedef struct {
     void (*destroy)(void *self);
 } Controller;
 
-/* The paper's controller: a trained policy file, deterministic (z = mu, mean action). pool may be NULL.
- * Fails when the file does not hold a policy of this task's shape. */
-MildStatus controller_learned(const char *path, Pool *pool, int rows_max, Controller *controller, MildError *error);
+/* The paper's controller: a trained policy file, deterministic (z = mu, mean action). pool may be
+ * NULL. Fails when the file does not hold a policy of this task's shape. */
+MildStatus controller_learned(const char *path, Pool *pool, int rows_max, Controller *controller,
+                              MildError *error);
 void controller_destroy(Controller *controller);
 
 #endif

@@ -14,7 +14,8 @@ typedef struct {
 static void learned_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
     Learned *learned = self;
     for (int i = 0; i < rows; i++) {
-        memcpy(learned->history + (size_t)i * TASK_HISTORY, envs[i]->history, sizeof envs[i]->history);
+        memcpy(learned->history + (size_t)i * TASK_HISTORY, envs[i]->history,
+               sizeof envs[i]->history);
     }
     policy_act(learned->policy, learned->pool, rows, learned->history, actions, NULL, NULL);
 }
@@ -26,16 +27,20 @@ static void learned_destroy(void *self) {
     free(learned);
 }
 
-MildStatus controller_learned(const char *path, Pool *pool, int rows_max, Controller *controller, MildError *error) {
+MildStatus controller_learned(const char *path, Pool *pool, int rows_max, Controller *controller,
+                              MildError *error) {
     Policy *policy = policy_load(path, NULL, 0, error);
     if (!policy) {
         return error ? error->status : MILD_ERROR_FORMAT;
     }
     const PolicyDef *def = policy_def(policy);
-    if (def->observation != TASK_OBSERVATION || def->frames != TASK_FRAMES || def->actions != TASK_ACTIONS) {
+    if (def->observation != TASK_OBSERVATION || def->frames != TASK_FRAMES ||
+        def->actions != TASK_ACTIONS) {
         mild_fail(error, MILD_ERROR_FORMAT,
-                  "%s: a policy for %d observations x %d frames and %d actions; this task needs %d x %d and %d", path,
-                  def->observation, def->frames, def->actions, TASK_OBSERVATION, TASK_FRAMES, TASK_ACTIONS);
+                  "%s: a policy for %d observations x %d frames and %d actions; this task needs %d "
+                  "x %d and %d",
+                  path, def->observation, def->frames, def->actions, TASK_OBSERVATION, TASK_FRAMES,
+                  TASK_ACTIONS);
         policy_destroy(policy);
         return MILD_ERROR_FORMAT;
     }

@@ -17,7 +17,8 @@ void eval_command(TaskEnv *env, double speed) {
     env->command_frozen = 1;
     env->command[0] = speed;
     env->command[1] = 0;
-    env->command[2] = speed == 0 ? 0 : fmin(fmax(-HEADING_GAIN * yaw, -HEADING_LIMIT), HEADING_LIMIT);
+    env->command[2] =
+        speed == 0 ? 0 : fmin(fmax(-HEADING_GAIN * yaw, -HEADING_LIMIT), HEADING_LIMIT);
 }
 
 typedef struct {
@@ -25,11 +26,11 @@ typedef struct {
     const Robot *robot;
     const Scene *scene;
     const EvalDef *eval;
-    TaskEnv **env;     /* [trials] */
-    RobotSim **sim;    /* [threads] */
-    Measure *measure;  /* [trials] */
-    float *action;     /* [trials][TASK_ACTIONS] */
-    uint8_t *over;     /* [trials] fell or diverged */
+    TaskEnv **env;    /* [trials] */
+    RobotSim **sim;   /* [threads] */
+    Measure *measure; /* [trials] */
+    float *action;    /* [trials][TASK_ACTIONS] */
+    uint8_t *over;    /* [trials] fell or diverged */
 } Trials;
 
 static void start_trial(void *context, int trial, int thread) {
@@ -38,7 +39,8 @@ static void start_trial(void *context, int trial, int thread) {
     TaskEnv *env = t->env[trial];
     task_env_init(env, t->def, t->robot, t->eval->seed, (uint32_t)trial);
     eval_command(env, t->eval->speed);
-    task_env_reset_on(env, t->def, t->robot, t->sim[thread], &t->scene->terrain, t->scene->rigid, &none);
+    task_env_reset_on(env, t->def, t->robot, t->sim[thread], &t->scene->terrain, t->scene->rigid,
+                      &none);
     measure_start(&t->measure[trial], t->def->physics_dt);
 }
 
@@ -55,14 +57,15 @@ static void step_trial(void *context, int trial, int thread) {
     eval_command(t->env[trial], t->eval->speed);
 }
 
-/* Student's t for 95 %, two sided: table up to 10 trials, then 1.96 + 2.6 / (degrees of freedom), within 0.5 %. */
+/* Student's t for 95 %, two sided: table up to 10 trials, then 1.96 + 2.6 / (degrees of freedom),
+ * within 0.5 %. */
 static double student_95(int samples) {
     static const double table[] = {0, 0, 12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26};
     return samples < 2 ? 0 : samples <= 10 ? table[samples] : 1.96 + 2.6 / (samples - 1);
 }
 
-/* Speed, cost of transport and base motion over the steady part of the trials that stayed up; of all when none did: a robot
- * that dives forward and falls is not fast. */
+/* Speed, cost of transport and base motion over the steady part of the trials that stayed up; of
+ * all when none did: a robot that dives forward and falls is not fast. */
 static void summarise_motion(const Trials *t, EvalRow *row) {
     double weight = robot_total_mass(t->robot) * GRAVITY, v_sum = 0, v_square = 0;
     int steady = 0;
@@ -82,7 +85,8 @@ static void summarise_motion(const Trials *t, EvalRow *row) {
         return;
     }
     row->velocity = v_sum / steady;
-    double variance = fmax(v_square / steady - row->velocity * row->velocity, 0) * steady / fmax(steady - 1, 1);
+    double variance =
+        fmax(v_square / steady - row->velocity * row->velocity, 0) * steady / fmax(steady - 1, 1);
     double half = student_95(steady) * sqrt(variance / steady);
     row->velocity_low = row->velocity - half;
     row->velocity_high = row->velocity + half;
@@ -140,7 +144,8 @@ static MildStatus make_trials(Trials *t, int trials, int threads, MildError *err
         good = t->env[i] != NULL;
     }
     if (!good) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "evaluation: out of memory for %d trials", trials);
+        return mild_fail(error, MILD_ERROR_MEMORY, "evaluation: out of memory for %d trials",
+                         trials);
     }
     for (int i = 0; i < threads; i++) {
         t->sim[i] = robot_sim_create(t->robot, t->def->physics_dt, error);
@@ -151,8 +156,8 @@ static MildStatus make_trials(Trials *t, int trials, int threads, MildError *err
     return MILD_OK;
 }
 
-MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller, const Scene *scene,
-                    const EvalDef *eval, EvalRow *row, MildError *error) {
+MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller,
+                    const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error) {
     TaskDef local = *def;
     local.episode = eval->seconds;
     Trials t = {.def = &local, .robot = robot, .scene = scene, .eval = eval};
@@ -171,13 +176,15 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
 }
 
 void eval_print_header(char *text, int size) {
-    snprintf(text, (size_t)size, "%-26s %5s %7s %14s %5s %7s %7s %7s %7s %7s", "ground", "m/s", "upright", "measured m/s",
-             "COT", "Nm max", "clear", "sink", "drift", "J/s");
+    snprintf(text, (size_t)size, "%-26s %5s %7s %14s %5s %7s %7s %7s %7s %7s", "ground", "m/s",
+             "upright", "measured m/s", "COT", "Nm max", "clear", "sink", "drift", "J/s");
 }
 
 void eval_print_row(const EvalRow *row, char *text, int size) {
-    snprintf(text, (size_t)size, "%-26s %5.2f %4d/%-2d %6.3f +- %5.3f %5.2f %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f",
+    snprintf(text, (size_t)size,
+             "%-26s %5.2f %4d/%-2d %6.3f +- %5.3f %5.2f %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f",
              row->ground, row->speed, row->success, row->trials, row->velocity,
-             0.5 * (row->velocity_high - row->velocity_low), row->cot, row->torque_max, 1e3 * row->clearance,
-             1e3 * row->penetration, 1e3 * row->drift, row->seconds > 0 ? row->energy / row->seconds : 0);
+             0.5 * (row->velocity_high - row->velocity_low), row->cot, row->torque_max,
+             1e3 * row->clearance, 1e3 * row->penetration, 1e3 * row->drift,
+             row->seconds > 0 ? row->energy / row->seconds : 0);
 }

@@ -7,7 +7,7 @@
 #include "eval/scene.h"
 
 typedef struct {
-    double speed;   /* [m/s] commanded, forward */
+    double speed; /* [m/s] commanded, forward */
     int trials;
     double seconds; /* [s] per trial */
     uint64_t seed;  /* trial k uses stream k */
@@ -17,23 +17,25 @@ typedef struct {
 typedef struct {
     char ground[160];
     double speed;
-    int trials, success;  /* success: trials without termination */
-    double velocity;      /* [m/s] forward, over the part after the first 2 s; trials that lasted that long */
+    int trials, success; /* success: trials without termination */
+    double velocity; /* [m/s] forward, over the part after the first 2 s; trials that lasted that
+                        long */
     double velocity_low, velocity_high; /* [m/s] 95 % interval of the mean over trials */
-    double cot;           /* [-] sum |tau qd| / (m g v) */
-    double torque_max;    /* [N m] largest over joints and time, mean over trials */
-    double clearance;     /* [m] swing apex of the lowest sole point above h0 */
-    double penetration;   /* [m] deepest element of each stance */
-    double drift;         /* [m] horizontal travel of the sole between touchdown and lift-off */
-    double energy;        /* [J] integral |tau . qd| dt */
+    double cot;                         /* [-] sum |tau qd| / (m g v) */
+    double torque_max;                  /* [N m] largest over joints and time, mean over trials */
+    double clearance;                   /* [m] swing apex of the lowest sole point above h0 */
+    double penetration;                 /* [m] deepest element of each stance */
+    double drift;            /* [m] horizontal travel of the sole between touchdown and lift-off */
+    double energy;           /* [J] integral |tau . qd| dt */
     double base_oscillation; /* [m] peak to peak of the base height over the steady part */
-    double seconds;       /* [s] mean time on its feet */
+    double seconds;          /* [s] mean time on its feet */
 } EvalRow;
 
-/* `def` gives control, gait and sensors; its randomisation should be nominal (task_def_make_nominal). Trials run side by
- * side over the pool; results depend on (def, scene, seed) only. */
-MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller, const Scene *scene,
-                    const EvalDef *eval, EvalRow *row, MildError *error);
+/* `def` gives control, gait and sensors; its randomisation should be nominal
+ * (task_def_make_nominal). Trials run side by side over the pool; results depend on (def, scene,
+ * seed) only. */
+MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller,
+                    const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error);
 
 /* Heading hold used by eval and play: turns back to world x. Writes env->command and freezes it. */
 void eval_command(TaskEnv *env, double speed);

@@ -5,10 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FIT_DIFFERENCE 1e-5 /* relative step of the central differences; exact where F is linear */
-#define FIT_DEPENDENT 1e-5  /* a column whose part of its own is smaller than this is a mixture of the others */
+#define FIT_DIFFERENCE                                                                             \
+    1e-5 /* relative step of the central differences; exact where F is linear   \
+                             */
+#define FIT_DEPENDENT                                                                              \
+    1e-5 /* a column whose part of its own is smaller than this is a mixture of the others */
 #define FIT_CORRELATION 0.95
-#define FIT_LOOSE 0.25 /* relative half width from which a correlated parameter counts as not told */
+#define FIT_LOOSE                                                                                  \
+    0.25 /* relative half width from which a correlated parameter counts as not told */
 #define FIT_SPEEDS 1.3 /* least ratio of speeds that tells drag */
 
 enum { P = FIT_PARAMETERS, FIT_ITERATIONS = 100, FIT_STARTS = 5, LOCAL_ROWS = 200 };
@@ -16,7 +20,8 @@ enum { P = FIT_PARAMETERS, FIT_ITERATIONS = 100, FIT_STARTS = 5, LOCAL_ROWS = 20
 const char *const fit_names[FIT_PARAMETERS] = {"k_pen", "sigma_cone", "alpha", "nu", "c_g", "c_d"};
 
 /* What is given up first when several parameters have one effect. */
-static const FitName give_up[FIT_PARAMETERS] = {FIT_NU, FIT_ALPHA, FIT_C_G, FIT_C_D, FIT_SIGMA_CONE, FIT_K_PEN};
+static const FitName give_up[FIT_PARAMETERS] = {FIT_NU,  FIT_ALPHA,      FIT_C_G,
+                                                FIT_C_D, FIT_SIGMA_CONE, FIT_K_PEN};
 
 /* The working arrays of one run. */
 typedef struct {
@@ -38,10 +43,15 @@ double *fit_value(MildMaterial *material, FitName name) {
 }
 
 void fit_range(const MildMaterial *material, FitName name, double *low, double *high) {
-    const MildField *field = mild_field_find(mild_material_fields, mild_material_field_count, fit_names[name], NULL);
+    const MildField *field =
+        mild_field_find(mild_material_fields, mild_material_field_count, fit_names[name], NULL);
     *low = field->min;
-    if (material->passive && name == FIT_C_D) *low = 0.5;
-    if (material->passive && name == FIT_C_G) *low = 0;
+    if (material->passive && name == FIT_C_D) {
+        *low = 0.5;
+    }
+    if (material->passive && name == FIT_C_G) {
+        *low = 0;
+    }
     *high = field->max;
 }
 
@@ -51,7 +61,8 @@ static double drag_scale(const MildMaterial *material) {
 
 double fit_force(const FitDef *def, const FitPoint *point) {
     MildElementLaw law = mild_element_law(&def->material, def->pitch, fmax(point->depth, 0));
-    double drag = drag_scale(&def->material) * law.added_mass_per_depth * point->speed * point->speed;
+    double drag =
+        drag_scale(&def->material) * law.added_mass_per_depth * point->speed * point->speed;
     return def->elements * (law.force + drag + law.added_mass * point->acceleration);
 }
 
@@ -59,7 +70,9 @@ int fit_loading(FitPoint *points, int count) {
     int kept = 0;
     double deepest = DBL_MIN; /* at 0 the law says nothing */
     for (int i = 0; i < count; i++) {
-        if (!(points[i].depth >= deepest)) continue;
+        if (!(points[i].depth >= deepest)) {
+            continue;
+        }
         deepest = points[i].depth;
         points[kept++] = points[i];
     }
@@ -78,14 +91,18 @@ static double fit_miss(Fit *fit) {
 
 static void fit_columns(Fit *fit) {
     for (int p = 0; p < P; p++) {
-        if (!fit->def.free[p]) continue;
+        if (!fit->def.free[p]) {
+            continue;
+        }
         double *value = fit_value(&fit->def.material, (FitName)p), centre = *value, low, high;
         fit_range(&fit->def.material, (FitName)p, &low, &high);
         double step = FIT_DIFFERENCE * fmax(fabs(centre), 1e-3 * (high - low));
-        double up = fmin(centre + step, high), down = fmax(centre - step, low), *column = fit->column + p * fit->count;
+        double up = fmin(centre + step, high), down = fmax(centre - step, low),
+               *column = fit->column + p * fit->count;
         *value = up;
-        for (int i = 0; i < fit->count; i++)
+        for (int i = 0; i < fit->count; i++) {
             column[i] = fit_force(&fit->def, &fit->points[i]);
+        }
         *value = down;
         for (int i = 0; i < fit->count; i++) {
             column[i] -= fit_force(&fit->def, &fit->points[i]);
@@ -97,16 +114,23 @@ static void fit_columns(Fit *fit) {
 
 static double dot(const double *a, const double *b, int count) {
     double sum = 0;
-    for (int i = 0; i < count; i++) sum += a[i] * b[i];
+    for (int i = 0; i < count; i++) {
+        sum += a[i] * b[i];
+    }
     return sum;
 }
 
 /* Inverse of the n x n positive definite `a` (stride P) by Gauss-Jordan; 0 when it is singular. */
 static int invert(double a[P][P], int n, double inverse[P][P]) {
-    for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++) inverse[i][j] = i == j;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            inverse[i][j] = i == j;
+        }
+    }
     for (int k = 0; k < n; k++) {
-        if (!(a[k][k] > 1e-14)) return 0;
+        if (!(a[k][k] > 1e-14)) {
+            return 0;
+        }
         double pivot = 1 / a[k][k];
         for (int j = 0; j < n; j++) {
             a[k][j] *= pivot;
@@ -123,26 +147,37 @@ static int invert(double a[P][P], int n, double inverse[P][P]) {
     return 1;
 }
 
-/* Speed and acceleration of row `i` from a least squares polynomial of the depths around it: a quartic, whose bias a
- * braking plate needs, through a twentieth of the rows; a parabola where they are few. 0 where the times do not tell. At most
- * LOCAL_ROWS of the window are looked at, so that a long record costs no more than its length. */
-static void local_motion(const FitPoint *points, int count, int i, double *speed, double *acceleration) {
+/* Speed and acceleration of row `i` from a least squares polynomial of the depths around it: a
+ * quartic, whose bias a braking plate needs, through a twentieth of the rows; a parabola where they
+ * are few. 0 where the times do not tell. At most LOCAL_ROWS of the window are looked at, so that a
+ * long record costs no more than its length. */
+static void local_motion(const FitPoint *points, int count, int i, double *speed,
+                         double *acceleration) {
     int half = count / 40 > 4 ? count / 40 : 4, rows = 2 * half + 1 < count ? 2 * half + 1 : count;
-    int first = i - half > 0 ? (i + half < count ? i - half : count - rows) : 0, stride = 1 + rows / LOCAL_ROWS;
+    int first = i - half > 0 ? (i + half < count ? i - half : count - rows) : 0,
+        stride = 1 + rows / LOCAL_ROWS;
     int terms = rows >= 15 ? 5 : 3;
-    double now = points[i].time, reach = fmax(now - points[first].time, points[first + rows - 1].time - now);
+    double now = points[i].time,
+           reach = fmax(now - points[first].time, points[first + rows - 1].time - now);
     double moment[2 * P] = {0}, depth[P] = {0}, normal[P][P], inverse[P][P];
     for (int k = first; k < first + rows; k += stride) {
         double t = (points[k].time - now) / reach, power = 1;
         for (int n = 0; n < 2 * terms - 1; n++, power *= t) {
             moment[n] += power / rows;
-            if (n < terms) depth[n] += power * (points[k].depth - points[i].depth) / rows;
+            if (n < terms) {
+                depth[n] += power * (points[k].depth - points[i].depth) / rows;
+            }
         }
     }
     *speed = *acceleration = 0;
-    for (int a = 0; a < terms; a++)
-        for (int b = 0; b < terms; b++) normal[a][b] = moment[a + b];
-    if (!(reach > 0) || !invert(normal, terms, inverse)) return;
+    for (int a = 0; a < terms; a++) {
+        for (int b = 0; b < terms; b++) {
+            normal[a][b] = moment[a + b];
+        }
+    }
+    if (!(reach > 0) || !invert(normal, terms, inverse)) {
+        return;
+    }
     for (int a = 0; a < terms; a++) {
         *speed += inverse[1][a] * depth[a] / reach;
         *acceleration += 2 * inverse[2][a] * depth[a] / (reach * reach);
@@ -154,7 +189,9 @@ void fit_speeds(FitPoint *points, int count) {
     for (int i = 0; i < count; i++) {
         double speed;
         local_motion(points, count, i, &speed, &points[i].acceleration);
-        if (!isfinite(points[i].speed)) points[i].speed = speed;
+        if (!isfinite(points[i].speed)) {
+            points[i].speed = speed;
+        }
     }
 }
 
@@ -164,10 +201,14 @@ static int movable(const Fit *fit, int names[P]) {
     int n = 0;
     for (int p = 0; p < P; p++) {
         double low, high, value = *fit_value(&material, (FitName)p);
-        if (!fit->def.free[p]) continue;
+        if (!fit->def.free[p]) {
+            continue;
+        }
         fit_range(&material, (FitName)p, &low, &high);
         double pull = dot(fit->column + p * fit->count, fit->miss, fit->count);
-        if ((value <= low && pull < 0) || (value >= high && pull > 0)) continue;
+        if ((value <= low && pull < 0) || (value >= high && pull > 0)) {
+            continue;
+        }
         names[n++] = p;
     }
     return n;
@@ -181,13 +222,20 @@ static void fit_step(Fit *fit, const int names[P], int n, double lambda) {
         column[a] = fit->column + names[a] * fit->count;
         length[a] = sqrt(dot(column[a], column[a], fit->count)) + DBL_MIN;
     }
-    for (int a = 0; a < n; a++)
-        for (int b = 0; b < n; b++)
-            normal[a][b] = dot(column[a], column[b], fit->count) / (length[a] * length[b]) + (a == b) * lambda;
-    if (!invert(normal, n, inverse)) return;
+    for (int a = 0; a < n; a++) {
+        for (int b = 0; b < n; b++) {
+            normal[a][b] =
+                dot(column[a], column[b], fit->count) / (length[a] * length[b]) + (a == b) * lambda;
+        }
+    }
+    if (!invert(normal, n, inverse)) {
+        return;
+    }
     for (int a = 0; a < n; a++) {
         double move = 0, low, high, *value = fit_value(&fit->def.material, (FitName)names[a]);
-        for (int b = 0; b < n; b++) move += inverse[a][b] * dot(column[b], fit->miss, fit->count) / length[b];
+        for (int b = 0; b < n; b++) {
+            move += inverse[a][b] * dot(column[b], fit->miss, fit->count) / length[b];
+        }
         fit_range(&fit->def.material, (FitName)names[a], &low, &high);
         *value = fmin(fmax(*value + move / length[a], low), high);
     }
@@ -205,21 +253,26 @@ static double fit_descend(Fit *fit) {
         for (; n > 0 && lambda < 1e8; lambda *= 10) {
             fit_step(fit, names, n, lambda);
             sum = fit_miss(fit);
-            if (sum < best) break;
+            if (sum < best) {
+                break;
+            }
             fit->def.material = before;
             fit_miss(fit);
         }
         int done = !(sum < best * (1 - 1e-12));
         best = fmin(sum, best);
         lambda = fmax(lambda * 0.1, 1e-14);
-        if (done) break;
+        if (done) {
+            break;
+        }
     }
     return best;
 }
 
 /* Least squares from several starts: the shape (u_f) can have more than one valley. */
 static double fit_solve(Fit *fit) {
-    static const double alphas[FIT_STARTS] = {0, 0.5, 0.9, 1.25, 1.45}, nus[FIT_STARTS] = {0, 0.4, 1, 2.5, 6};
+    static const double alphas[FIT_STARTS] = {0, 0.5, 0.9, 1.25, 1.45},
+                        nus[FIT_STARTS] = {0, 0.4, 1, 2.5, 6};
     MildMaterial start = fit->def.material, found = start;
     double least = INFINITY;
     int shape = fit->def.free[FIT_ALPHA] || fit->def.free[FIT_NU];
@@ -231,7 +284,9 @@ static double fit_solve(Fit *fit) {
             fit->def.material.nu = nus[s];
         }
         double sum = fit_descend(fit);
-        if (!(sum < least)) continue;
+        if (!(sum < least)) {
+            continue;
+        }
         least = sum;
         found = fit->def.material;
     }
@@ -245,32 +300,47 @@ static void project_out(const Fit *fit, int n, double *vector) {
     for (int k = 0; k < 2 * n; k++) {
         const double *direction = fit->basis + k % n * fit->count;
         double along = dot(direction, vector, fit->count);
-        for (int i = 0; i < fit->count; i++) vector[i] -= along * direction[i];
+        for (int i = 0; i < fit->count; i++) {
+            vector[i] -= along * direction[i];
+        }
     }
 }
 
-/* The own part of column p: orthogonal to all other free columns. own/|own|^2 is p's row of the pseudoinverse of J, so
- * the covariance of the estimates follows without inverting J'J. */
+/* The own part of column p: orthogonal to all other free columns. own/|own|^2 is p's row of the
+ * pseudoinverse of J, so the covariance of the estimates follows without inverting J'J. */
 static void own_part(Fit *fit, int p) {
     int n = 0, count = fit->count;
     size_t bytes = sizeof(double) * (size_t)count;
     for (int q = 0; q < P; q++) {
-        if (q == p || !fit->def.free[q]) continue;
+        if (q == p || !fit->def.free[q]) {
+            continue;
+        }
         double *vector = fit->basis + n * count, *column = fit->column + q * count;
         memcpy(vector, column, bytes);
-        if (n) project_out(fit, n, vector);
+        if (n) {
+            project_out(fit, n, vector);
+        }
         double length = sqrt(dot(vector, vector, count));
-        if (!(length > FIT_DEPENDENT * sqrt(dot(column, column, count)))) continue;
-        for (int i = 0; i < count; i++) vector[i] /= length;
+        if (!(length > FIT_DEPENDENT * sqrt(dot(column, column, count)))) {
+            continue;
+        }
+        for (int i = 0; i < count; i++) {
+            vector[i] /= length;
+        }
         n++;
     }
     double *own = fit->own + p * count, *column = fit->column + p * count;
     memcpy(own, column, bytes);
-    if (n) project_out(fit, n, own);
+    if (n) {
+        project_out(fit, n, own);
+    }
     double square = dot(own, own, count) + DBL_MIN;
-    for (int i = 0; i < count; i++) { /* the basis and own together span all columns, whichever p it is */
+    for (int i = 0; i < count;
+         i++) { /* the basis and own together span all columns, whichever p it is */
         fit->leverage[i] = own[i] * own[i] / square;
-        for (int k = 0; k < n; k++) fit->leverage[i] += fit->basis[k * count + i] * fit->basis[k * count + i];
+        for (int k = 0; k < n; k++) {
+            fit->leverage[i] += fit->basis[k * count + i] * fit->basis[k * count + i];
+        }
     }
     fit->own_share[p] = sqrt(dot(own, own, count) / (dot(column, column, count) + DBL_MIN));
 }
@@ -280,7 +350,8 @@ static double own_correlation(const Fit *fit, int p, int q) {
     return dot(a, b, fit->count) / sqrt(dot(a, a, fit->count) * dot(b, b, fit->count));
 }
 
-/* 97.5 % point of Student's t with `n` degrees of freedom (Abramowitz and Stegun 26.7.5; 1 % at n = 3). */
+/* 97.5 % point of Student's t with `n` degrees of freedom (Abramowitz and Stegun 26.7.5; 1 % at n =
+ * 3). */
 static double student(double n) {
     const double z = 1.959963984540054, z2 = z * z;
     double g1 = z * (z2 + 1) / 4, g2 = z * ((5 * z2 + 16) * z2 + 3) / 96;
@@ -288,8 +359,8 @@ static double student(double n) {
     return z + ((g3 / n + g2) / n + g1) / n;
 }
 
-/* Half of the 95 % interval. Rows need not be equally noisy: variance = sum (g r/(1 - h))^2 with g = own/|own|^2 and the
- * leverage h of each row, "HC3" of MacKinnon and White 1985. */
+/* Half of the 95 % interval. Rows need not be equally noisy: variance = sum (g r/(1 - h))^2 with g
+ * = own/|own|^2 and the leverage h of each row, "HC3" of MacKinnon and White 1985. */
 static double half_width(const Fit *fit, int p, int free) {
     const double *own = fit->own + p * fit->count;
     double sum = 0;
@@ -300,7 +371,8 @@ static double half_width(const Fit *fit, int p, int free) {
     return student(fit->count - free) * sqrt(sum) / dot(own, own, fit->count);
 }
 
-/* What a half width is compared with: the value; for sigma_cone, which may be 0, at least that of a straight law. */
+/* What a half width is compared with: the value; for sigma_cone, which may be 0, at least that of a
+ * straight law. */
 static double typical(const Fit *fit, int p) {
     MildMaterial material = fit->def.material;
     double value = fabs(*fit_value(&material, (FitName)p));
@@ -314,29 +386,43 @@ static FitParameter judge(const Fit *fit, int p, int free) {
     const double *column = fit->column + p * fit->count;
     double low, high, force = 0;
     fit_range(&fit->def.material, (FitName)p, &low, &high);
-    for (int i = 0; i < fit->count; i++) force += fit->points[i].force * fit->points[i].force;
+    for (int i = 0; i < fit->count; i++) {
+        force += fit->points[i].force * fit->points[i].force;
+    }
     if (!(sqrt(dot(column, column, fit->count)) * (high - low) > 1e-9 * sqrt(force))) {
         verdict.state = FIT_NO_EFFECT;
         return verdict;
     }
     for (int k = P - 1; k >= 0 && fit->own_share[p] < FIT_DEPENDENT; k--) {
         FitName q = give_up[k];
-        if (!fit->def.free[q] || (int)q == p || fit->own_share[q] >= FIT_DEPENDENT) continue;
+        if (!fit->def.free[q] || (int)q == p || fit->own_share[q] >= FIT_DEPENDENT) {
+            continue;
+        }
         verdict.state = FIT_TIED;
         verdict.partner = q;
         verdict.correlation = 1;
     }
-    if (verdict.state == FIT_TIED) return verdict;
+    if (verdict.state == FIT_TIED) {
+        return verdict;
+    }
     double half = half_width(fit, p, free), strongest = FIT_CORRELATION;
     for (int q = 0; q < P; q++) {
-        if (!fit->def.free[q] || q == p) continue;
+        if (!fit->def.free[q] || q == p) {
+            continue;
+        }
         double correlation = own_correlation(fit, p, q);
-        int loose = half > FIT_LOOSE * typical(fit, p) || half_width(fit, q, free) > FIT_LOOSE * typical(fit, q);
-        if (!loose || !(fabs(correlation) > strongest)) continue;
+        int loose = half > FIT_LOOSE * typical(fit, p) ||
+                    half_width(fit, q, free) > FIT_LOOSE * typical(fit, q);
+        if (!loose || !(fabs(correlation) > strongest)) {
+            continue;
+        }
         strongest = fabs(correlation);
-        verdict = (FitParameter){.state = FIT_TIED, .partner = (FitName)q, .correlation = correlation};
+        verdict =
+            (FitParameter){.state = FIT_TIED, .partner = (FitName)q, .correlation = correlation};
     }
-    if (verdict.state == FIT_FITTED && !(2 * half <= 0.5 * (high - low))) verdict.state = FIT_WIDE;
+    if (verdict.state == FIT_FITTED && !(2 * half <= 0.5 * (high - low))) {
+        verdict.state = FIT_WIDE;
+    }
     MildMaterial material = fit->def.material;
     verdict.value = *fit_value(&material, (FitName)p);
     verdict.low = fmax(verdict.value - half, low);
@@ -346,11 +432,14 @@ static FitParameter judge(const Fit *fit, int p, int free) {
 
 static int free_count(const Fit *fit) {
     int free = 0;
-    for (int p = 0; p < P; p++) free += fit->def.free[p] != 0;
+    for (int p = 0; p < P; p++) {
+        free += fit->def.free[p] != 0;
+    }
     return free;
 }
 
-static void hold(Fit *fit, const FitDef *def, FitName name, FitParameter *parameter, const FitParameter *why) {
+static void hold(Fit *fit, const FitDef *def, FitName name, FitParameter *parameter,
+                 const FitParameter *why) {
     MildMaterial given = def->material;
     fit->def.free[name] = 0;
     *parameter = *why;
@@ -358,27 +447,38 @@ static void hold(Fit *fit, const FitDef *def, FitName name, FitParameter *parame
     *fit_value(&fit->def.material, name) = *fit_value(&given, name);
 }
 
-/* Fits, gives up the parameter the data tell least, and fits again until all that are left are told. nu goes first: the
- * one exact tie of the law (sigma_cone, alpha, nu, and c_d with drag) ends with it. */
+/* Fits, gives up the parameter the data tell least, and fits again until all that are left are
+ * told. nu goes first: the one exact tie of the law (sigma_cone, alpha, nu, and c_d with drag) ends
+ * with it. */
 static double fit_reduce(Fit *fit, const FitDef *def, FitResult *result) {
     static const FitState order[] = {FIT_NO_EFFECT, FIT_TIED, FIT_WIDE};
     double sum = fit_miss(fit);
     for (int free = free_count(fit); free > 0; free = free_count(fit)) {
         int given_up = 0;
         sum = fit_solve(fit);
-        for (int p = 0; p < P; p++)
-            if (fit->def.free[p]) own_part(fit, p);
-        for (int p = 0; p < P; p++)
-            if (fit->def.free[p]) result->parameter[p] = judge(fit, p, free);
+        for (int p = 0; p < P; p++) {
+            if (fit->def.free[p]) {
+                own_part(fit, p);
+            }
+        }
+        for (int p = 0; p < P; p++) {
+            if (fit->def.free[p]) {
+                result->parameter[p] = judge(fit, p, free);
+            }
+        }
         for (int o = 0; o < 3 && !given_up; o++) {
             for (int k = 0; k < P && !given_up; k++) {
                 FitParameter verdict = result->parameter[give_up[k]];
-                if (!fit->def.free[give_up[k]] || verdict.state != order[o]) continue;
+                if (!fit->def.free[give_up[k]] || verdict.state != order[o]) {
+                    continue;
+                }
                 hold(fit, def, give_up[k], &result->parameter[give_up[k]], &verdict);
                 given_up = 1;
             }
         }
-        if (!given_up) return sum;
+        if (!given_up) {
+            return sum;
+        }
     }
     return fit_miss(fit);
 }
@@ -395,50 +495,71 @@ static void hold_drag(Fit *fit, const FitDef *def, FitResult *result) {
     int same = fastest <= FIT_SPEEDS * slowest, massless = added == 0 && !def->free[FIT_C_G];
     for (int k = 0; k < 2; k++) {
         FitParameter why = {.state = massless ? FIT_NO_MASS : FIT_NO_SPEEDS};
-        if (def->free[rate[k]] && (same || massless)) hold(fit, def, rate[k], &result->parameter[rate[k]], &why);
+        if (def->free[rate[k]] && (same || massless)) {
+            hold(fit, def, rate[k], &result->parameter[rate[k]], &why);
+        }
     }
 }
 
-static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count, MildError *error) {
+static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count,
+                            MildError *error) {
     MildStatus status = mild_material_check(&def->material, error);
-    if (status != MILD_OK) return status;
-    if (count < FIT_POINTS_MIN) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "fit: %d loading rows, at least %d are needed", count,
-                         FIT_POINTS_MIN);
+    if (status != MILD_OK) {
+        return status;
     }
-    if (def->elements < 1 || !(def->pitch > 0))
+    if (count < FIT_POINTS_MIN) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "fit: %d loading rows, at least %d are needed",
+                         count, FIT_POINTS_MIN);
+    }
+    if (def->elements < 1 || !(def->pitch > 0)) {
         return mild_fail(error, MILD_ERROR_RANGE, "fit: the plate has no element");
+    }
     for (int i = 0; i < count; i++) {
         if (isfinite(points[i].depth) && isfinite(points[i].force) && isfinite(points[i].speed) &&
-            isfinite(points[i].acceleration))
+            isfinite(points[i].acceleration)) {
             continue;
+        }
         return mild_fail(error, MILD_ERROR_RANGE, "fit: row %d is not finite", i + 1);
     }
     return MILD_OK;
 }
 
-MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result, MildError *error) {
+MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,
+                   MildError *error) {
     MildStatus status = fit_check(def, points, count, error);
-    if (status != MILD_OK) return status;
+    if (status != MILD_OK) {
+        return status;
+    }
     size_t rows = (size_t)count;
     double *block = malloc(sizeof *block * rows * (3 * P + 2));
-    if (!block) return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
-    Fit fit = {.def = *def, .points = points, .count = count, .miss = block, .column = block + rows};
+    if (!block) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
+    }
+    Fit fit = {
+        .def = *def, .points = points, .count = count, .miss = block, .column = block + rows};
     fit.own = fit.column + P * rows;
     fit.basis = fit.own + P * rows;
     fit.leverage = fit.basis + P * rows;
     *result = (FitResult){.points = count};
-    for (int p = 0; p < P; p++) result->parameter[p] = (FitParameter){.low = NAN, .high = NAN};
+    for (int p = 0; p < P; p++) {
+        result->parameter[p] = (FitParameter){.low = NAN, .high = NAN};
+    }
     for (int p = 0; p < P; p++) { /* a start inside the bounds: passive grounds clamp c_d */
         double low, high, *value = fit_value(&fit.def.material, (FitName)p);
         fit_range(&fit.def.material, (FitName)p, &low, &high);
-        if (def->free[p]) *value = fmin(fmax(*value, low), high);
+        if (def->free[p]) {
+            *value = fmin(fmax(*value, low), high);
+        }
     }
     hold_drag(&fit, def, result);
     double sum = fit_reduce(&fit, def, result), force = 0;
-    for (int i = 0; i < count; i++) force += points[i].force * points[i].force;
+    for (int i = 0; i < count; i++) {
+        force += points[i].force * points[i].force;
+    }
     result->material = fit.def.material;
-    for (int p = 0; p < P; p++) result->parameter[p].value = *fit_value(&result->material, (FitName)p);
+    for (int p = 0; p < P; p++) {
+        result->parameter[p].value = *fit_value(&result->material, (FitName)p);
+    }
     result->residual = sqrt(sum / count);
     result->residual_share = force > 0 ? sqrt(sum / force) : 0;
     free(block);

@@ -5,7 +5,7 @@
 
 #define CONTACT_FORCE 5.0  /* [N] */
 #define SWING_HEIGHT 0.005 /* [m] a lift lower than this is no swing */
-#define CHATTER_TIME 0.03   /* [s] a shorter loss of contact does not end a stance */
+#define CHATTER_TIME 0.03  /* [s] a shorter loss of contact does not end a stance */
 
 void measure_start(Measure *measure, double dt) {
     memset(measure, 0, sizeof *measure);

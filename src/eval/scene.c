@@ -10,7 +10,8 @@ static MildStatus find_preset(const char *name, MildMaterial *material, MildErro
         return MILD_OK;
     }
     if (strcmp(name, "rigid") == 0) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "rigid is the engine's own floor: it cannot be a part of a course");
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "rigid is the engine's own floor: it cannot be a part of a course");
     }
     char known[256] = "rigid";
     for (int i = 0; i < mild_material_preset_count(); i++) {
@@ -49,7 +50,8 @@ MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildE
         if (count == 0) {
             scene->terrain = mild_terrain_uniform(&material);
         } else if (count >= MILD_MATERIALS_MAX) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT, "a course has at most %d grounds: %s", MILD_MATERIALS_MAX, name);
+            return mild_fail(error, MILD_ERROR_ARGUMENT, "a course has at most %d grounds: %s",
+                             MILD_MATERIALS_MAX, name);
         } else {
             scene->terrain.materials[scene->terrain.material_count++] = material;
         }

@@ -1,4 +1,5 @@
-/* A ground to walk on, by name: one preset, `rigid`, or a course of presets crossed in order ("rubber+foam45+sand_loose"). */
+/* A ground to walk on, by name: one preset, `rigid`, or a course of presets crossed in order
+ * ("rubber+foam45+sand_loose"). */
 #ifndef MILD_SCENE_H
 #define MILD_SCENE_H
 
@@ -10,7 +11,8 @@ typedef struct {
     int rigid; /* bool: the engine's own contact */
 } Scene;
 
-/* patch_length [m]: how far each ground of a course reaches; the first also lies behind the start, the last goes on. */
+/* patch_length [m]: how far each ground of a course reaches; the first also lies behind the start,
+ * the last goes on. */
 MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildError *error);
 /* Name of the ground under x. */
 const char *scene_ground_at(const Scene *scene, double x, double y, char *text, int size);

@@ -33,20 +33,28 @@ static __device__ void add_block_sum(double x, double *to) {
     part[threadIdx.x] = x;
     for (unsigned half = THREADS / 2; half > 0; half /= 2) {
         __syncthreads();
-        if (threadIdx.x < half) part[threadIdx.x] += part[threadIdx.x + half];
+        if (threadIdx.x < half) {
+            part[threadIdx.x] += part[threadIdx.x + half];
+        }
     }
-    if (threadIdx.x == 0) *to += part[0];
+    if (threadIdx.x == 0) {
+        *to += part[0];
+    }
     __syncthreads();
 }
 
 /* ---- rows ---- */
 
-static __global__ void gather(int64_t count, int width, const int *index, const float *from, float *to) {
+static __global__ void gather(int64_t count, int width, const int *index, const float *from,
+                              float *to) {
     int64_t i = item();
-    if (i < count) to[i] = from[(int64_t)index[i / width] * width + i % width];
+    if (i < count) {
+        to[i] = from[(int64_t)index[i / width] * width + i % width];
+    }
 }
 
-void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, const float *from, float *to) {
+void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, const float *from,
+                float *to) {
     int64_t count = (int64_t)rows * width;
     LAUNCH(gather, blocks_of(count), line, stream, count, width, index, from, to);
 }
@@ -54,37 +62,45 @@ void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, cons
 static __global__ void mirror_history(GpuImages m, const float *history, float *to) {
     int64_t i = item();
     const int width = m.frames * m.observation;
-    if (i >= (int64_t)m.images * width) return;
+    if (i >= (int64_t)m.images * width) {
+        return;
+    }
     int image = (int)(i / width), column = (int)(i % width), k = column % m.observation;
     const float *row = history + (int64_t)(m.which[image] - m.first) * width;
     to[i] = m.sign[k] * row[column - k + m.index[k]];
 }
 
 void gpu_mirror_history(cudaStream_t stream, GpuImages m, const float *history, float *to) {
-    LAUNCH(mirror_history, blocks_of((int64_t)m.images * m.frames * m.observation), line, stream, m, history, to);
+    LAUNCH(mirror_history, blocks_of((int64_t)m.images * m.frames * m.observation), line, stream, m,
+           history, to);
 }
 
-static __global__ void latent_noise(int64_t count, int latent, uint32_t key0, uint32_t key1, const int *row,
-                                    float *noise) {
+static __global__ void latent_noise(int64_t count, int latent, uint32_t key0, uint32_t key1,
+                                    const int *row, float *noise) {
     int64_t i = item();
-    if (i >= count) return;
+    if (i >= count) {
+        return;
+    }
     int64_t number = (int64_t)row[i / latent] * latent + i % latent;
     float even, odd;
     noise_pair(key0, key1, (uint32_t)(number / 2), &even, &odd);
     noise[i] = number % 2 ? odd : even;
 }
 
-void gpu_latent_noise(cudaStream_t stream, int rows, int latent, uint64_t key, const int *row, float *noise) {
+void gpu_latent_noise(cudaStream_t stream, int rows, int latent, uint64_t key, const int *row,
+                      float *noise) {
     int64_t count = (int64_t)rows * latent;
-    LAUNCH(latent_noise, blocks_of(count), line, stream, count, latent, (uint32_t)key, (uint32_t)(key >> 32), row,
-           noise);
+    LAUNCH(latent_noise, blocks_of(count), line, stream, count, latent, (uint32_t)key,
+           (uint32_t)(key >> 32), row, noise);
 }
 
 /* ---- layers ---- */
 
 static __global__ void add_bias(int64_t count, int width, int elu, const float *bias, float *y) {
     int64_t i = item();
-    if (i >= count) return;
+    if (i >= count) {
+        return;
+    }
     float x = y[i] + bias[i % width];
     y[i] = elu ? vector_elu(x) : x;
 }
@@ -95,13 +111,14 @@ void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float
 }
 
 /* Block (column group, slice of rows): LANES partial sums a column, added in order. */
-static __global__ void bias_backward(int rows, int width, const float *y, float *d, float *partial) {
+static __global__ void bias_backward(int rows, int width, const float *y, float *d,
+                                     float *partial) {
     __shared__ float part[LANES][COLUMNS];
     const int column = (int)(blockIdx.x * COLUMNS + threadIdx.x), slice = (int)blockIdx.y;
     const int end = (int)((int64_t)rows * (slice + 1) / GPU_SUM_SLICES);
     float sum = 0.0f;
-    for (int r = (int)((int64_t)rows * slice / GPU_SUM_SLICES) + (int)threadIdx.y; column < width && r < end;
-         r += LANES) {
+    for (int r = (int)((int64_t)rows * slice / GPU_SUM_SLICES) + (int)threadIdx.y;
+         column < width && r < end; r += LANES) {
         int64_t i = (int64_t)r * width + column;
         float x = d[i];
         if (y) {
@@ -112,22 +129,31 @@ static __global__ void bias_backward(int rows, int width, const float *y, float 
     }
     part[threadIdx.y][threadIdx.x] = sum;
     __syncthreads();
-    if (threadIdx.y > 0 || column >= width) return;
-    for (int lane = 1; lane < LANES; lane++) sum += part[lane][threadIdx.x];
+    if (threadIdx.y > 0 || column >= width) {
+        return;
+    }
+    for (int lane = 1; lane < LANES; lane++) {
+        sum += part[lane][threadIdx.x];
+    }
     partial[slice * width + column] = sum;
 }
 
 static __global__ void add_slices(int width, const float *partial, float beta, float *sum) {
     int column = (int)item();
-    if (column >= width) return;
+    if (column >= width) {
+        return;
+    }
     float total = 0.0f;
-    for (int slice = 0; slice < GPU_SUM_SLICES; slice++) total += partial[slice * width + column];
+    for (int slice = 0; slice < GPU_SUM_SLICES; slice++) {
+        total += partial[slice * width + column];
+    }
     sum[column] = beta == 0.0f ? total : sum[column] + total;
 }
 
-void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d, float *partial, float beta,
-                       float *d_bias) {
-    const dim3 grid = {(unsigned)((width + COLUMNS - 1) / COLUMNS), GPU_SUM_SLICES, 1}, block = {COLUMNS, LANES, 1};
+void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d,
+                       float *partial, float beta, float *d_bias) {
+    const dim3 grid = {(unsigned)((width + COLUMNS - 1) / COLUMNS), GPU_SUM_SLICES, 1},
+               block = {COLUMNS, LANES, 1};
     LAUNCH(bias_backward, grid, block, stream, rows, width, y, d, partial);
     LAUNCH(add_slices, blocks_of(width), line, stream, width, partial, beta, d_bias);
 }
@@ -135,11 +161,13 @@ void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y,
 /* ---- joints of the networks ---- */
 
 /* One thread a number of the input [newest frame | estimates | theta1 mu + theta2]. */
-static __global__ void actor_input(GpuWidths w, int rows, const float *history, const float *heads, const float *theta,
-                                   float *input) {
+static __global__ void actor_input(GpuWidths w, int rows, const float *history, const float *heads,
+                                   const float *theta, float *input) {
     int64_t i = item();
     const int width = w.observation + w.estimates + w.latent;
-    if (i >= (int64_t)rows * width) return;
+    if (i >= (int64_t)rows * width) {
+        return;
+    }
     const int64_t r = i / width;
     const int column = (int)(i % width), head = column - w.observation, j = head - w.estimates;
     const float *h = heads + r * (w.estimates + 2 * w.latent);
@@ -153,10 +181,10 @@ static __global__ void actor_input(GpuWidths w, int rows, const float *history, 
     }
 }
 
-void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, const float *history, const float *heads,
-                     const float *theta, float *input) {
-    LAUNCH(actor_input, blocks_of((int64_t)rows * (w.observation + w.estimates + w.latent)), line, stream, w, rows,
-           history, heads, theta, input);
+void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, const float *history,
+                     const float *heads, const float *theta, float *input) {
+    LAUNCH(actor_input, blocks_of((int64_t)rows * (w.observation + w.estimates + w.latent)), line,
+           stream, w, rows, history, heads, theta, input);
 }
 
 static __device__ float held_logvar(float logvar) {
@@ -164,11 +192,13 @@ static __device__ float held_logvar(float logvar) {
 }
 
 /* One thread a number of the decoder's input [z | estimates]. */
-static __global__ void sample_latent(GpuWidths w, int rows, const float *heads, const float *noise, float *spread,
-                                     float *input) {
+static __global__ void sample_latent(GpuWidths w, int rows, const float *heads, const float *noise,
+                                     float *spread, float *input) {
     int64_t i = item();
     const int width = w.latent + w.estimates;
-    if (i >= (int64_t)rows * width) return;
+    if (i >= (int64_t)rows * width) {
+        return;
+    }
     const int64_t r = i / width;
     const int j = (int)(i % width);
     const float *h = heads + r * (w.estimates + 2 * w.latent);
@@ -182,10 +212,10 @@ static __global__ void sample_latent(GpuWidths w, int rows, const float *heads, 
     input[i] = mu[j] + s * noise[r * w.latent + j];
 }
 
-void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads, const float *noise,
-                       float *spread, float *input) {
-    LAUNCH(sample_latent, blocks_of((int64_t)rows * (w.latent + w.estimates)), line, stream, w, rows, heads, noise,
-           spread, input);
+void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
+                       const float *noise, float *spread, float *input) {
+    LAUNCH(sample_latent, blocks_of((int64_t)rows * (w.latent + w.estimates)), line, stream, w,
+           rows, heads, noise, spread, input);
 }
 
 /* ---- losses: one thread a sample ---- */
@@ -199,7 +229,8 @@ static __global__ void surrogate(GpuSurrogate s, int rows, double *sums) {
                     *mean = s.mean + r * actions;
         float log_prob = s.constant[actions], kl = s.constant[actions + 1];
         for (int j = 0; j < actions; j++) {
-            float t = (action[j] - mean[j]) * s.constant[j], shift = (old_mean[j] - mean[j]) * s.constant[j];
+            float t = (action[j] - mean[j]) * s.constant[j],
+                  shift = (old_mean[j] - mean[j]) * s.constant[j];
             log_prob -= 0.5f * t * t;
             kl += 0.5f * shift * shift;
         }
@@ -234,7 +265,9 @@ static __global__ void mirror_loss(GpuMirror m, int images, double *sums) {
         const int64_t sample = m.which[r] - m.first;
         const float *mean = m.mean + sample * m.actions, *image = m.image + r * m.actions;
         float *d_mean = m.d_mean + sample * m.actions, *d_image = m.d_image + r * m.actions;
-        for (int j = 0; j < m.actions; j++) d_image[j] = 0.0f;
+        for (int j = 0; j < m.actions; j++) {
+            d_image[j] = 0.0f;
+        }
         for (int j = 0; j < m.actions; j++) {
             int k = m.index[j];
             float gap = mean[j] - m.sign[j] * image[k];
@@ -250,8 +283,8 @@ void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums)
     LAUNCH(mirror_loss, blocks_of(images), line, stream, m, images, sums);
 }
 
-static __global__ void reconstruction(int rows, int width, float weight, const float *decoded, const float *clean,
-                                      float *d, double *sums) {
+static __global__ void reconstruction(int rows, int width, float weight, const float *decoded,
+                                      const float *clean, float *d, double *sums) {
     const int64_t r = item();
     float sum = 0.0f;
     for (int64_t i = r * width; r < rows && i < (r + 1) * width; i++) {
@@ -259,23 +292,30 @@ static __global__ void reconstruction(int rows, int width, float weight, const f
         sum += gap * gap;
         d[i] = weight * gap;
     }
-    add_block_sum((double)sum / width, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
+    add_block_sum((double)sum / width,
+                  sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
 }
 
-void gpu_reconstruction(cudaStream_t stream, int rows, int width, float weight, const float *decoded,
-                        const float *clean, float *d, double *sums) {
-    LAUNCH(reconstruction, blocks_of(rows), line, stream, rows, width, weight, decoded, clean, d, sums);
+void gpu_reconstruction(cudaStream_t stream, int rows, int width, float weight,
+                        const float *decoded, const float *clean, float *d, double *sums) {
+    LAUNCH(reconstruction, blocks_of(rows), line, stream, rows, width, weight, decoded, clean, d,
+           sums);
 }
 
-static __global__ void modulation_backward(GpuWidths w, int rows, const float *heads, const float *theta,
-                                           const float *d_input, float *d_heads, float *d_theta) {
+static __global__ void modulation_backward(GpuWidths w, int rows, const float *heads,
+                                           const float *theta, const float *d_input, float *d_heads,
+                                           float *d_theta) {
     const int64_t r = item();
-    if (r >= rows) return;
+    if (r >= rows) {
+        return;
+    }
     const int width = w.per_dimension ? 2 * w.latent : 2;
     heads += r * (w.estimates + 2 * w.latent), d_heads += r * (w.estimates + 2 * w.latent);
     theta += r * width, d_theta += r * width, d_input += r * (w.estimates + w.latent);
     float scale = 0.0f, shift = 0.0f;
-    for (int j = 0; j < w.estimates; j++) d_heads[j] = d_input[j];
+    for (int j = 0; j < w.estimates; j++) {
+        d_heads[j] = d_input[j];
+    }
     for (int j = 0; j < w.latent; j++) {
         float d = d_input[w.estimates + j], d_scale = d * heads[w.estimates + j];
         d_heads[w.estimates + j] = d * theta[w.per_dimension ? j : 0];
@@ -293,15 +333,19 @@ static __global__ void modulation_backward(GpuWidths w, int rows, const float *h
     }
 }
 
-void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads, const float *theta,
-                             const float *d_input, float *d_heads, float *d_theta) {
-    LAUNCH(modulation_backward, blocks_of(rows), line, stream, w, rows, heads, theta, d_input, d_heads, d_theta);
+void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
+                             const float *theta, const float *d_input, float *d_heads,
+                             float *d_theta) {
+    LAUNCH(modulation_backward, blocks_of(rows), line, stream, w, rows, heads, theta, d_input,
+           d_heads, d_theta);
 }
 
 /* Mean of squares of the estimates [begin, end) of one sample; adds to d. */
-static __device__ double estimate_group(int begin, int end, float sample_weight, const float *estimate,
-                                        const float *target, float *d) {
-    if (begin == end) return 0.0;
+static __device__ double estimate_group(int begin, int end, float sample_weight,
+                                        const float *estimate, const float *target, float *d) {
+    if (begin == end) {
+        return 0.0;
+    }
     float sum = 0.0f, weight = sample_weight / (float)(end - begin);
     for (int j = begin; j < end; j++) {
         float gap = estimate[j] - target[j];
@@ -311,8 +355,8 @@ static __device__ double estimate_group(int begin, int end, float sample_weight,
     return (double)sum / (end - begin);
 }
 
-static __device__ double latent_row(int latent, float weight, const float *mu, const float *spread, const float *noise,
-                                    const float *d_z, float *d_mu) {
+static __device__ double latent_row(int latent, float weight, const float *mu, const float *spread,
+                                    const float *noise, const float *d_z, float *d_mu) {
     const float *logvar = mu + latent;
     float *d_logvar = d_mu + latent, sum = 0.0f;
     for (int j = 0; j < latent; j++) {
@@ -331,28 +375,37 @@ static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all
     const int width = w.estimates + 2 * w.latent, feet_end = w.feet_offset + w.feet_count;
     double group[3] = {0.0, 0.0, 0.0}, divergence = 0.0;
     float *d = h.d_heads + r * width;
-    for (int j = 0; r < all && j < w.feet_count; j++) d[w.feet_offset + j] += h.d_feet[r * w.feet_count + j];
+    for (int j = 0; r < all && j < w.feet_count; j++) {
+        d[w.feet_offset + j] += h.d_feet[r * w.feet_count + j];
+    }
     if (r < rows) {
         const float *heads = h.heads + r * width, *target = h.estimate + r * w.estimates;
         const float *d_input = h.d_decoder_input + r * (w.latent + w.estimates);
-        for (int j = 0; j < w.estimates; j++) d[j] += d_input[w.latent + j];
+        for (int j = 0; j < w.estimates; j++) {
+            d[j] += d_input[w.latent + j];
+        }
         group[0] = estimate_group(0, w.feet_offset, h.estimate_weight, heads, target, d);
         group[1] = estimate_group(w.feet_offset, feet_end, h.estimate_weight, heads, target, d);
         group[2] = estimate_group(feet_end, w.estimates, h.estimate_weight, heads, target, d);
-        divergence = latent_row(w.latent, h.latent_weight, heads + w.estimates, h.spread + r * w.latent,
-                                h.noise + r * w.latent, d_input, d + w.estimates);
+        divergence =
+            latent_row(w.latent, h.latent_weight, heads + w.estimates, h.spread + r * w.latent,
+                       h.noise + r * w.latent, d_input, d + w.estimates);
     }
     double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
-    for (int g = 0; g < 3; g++) add_block_sum(group[g], own + GPU_SUM_ESTIMATE + g);
+    for (int g = 0; g < 3; g++) {
+        add_block_sum(group[g], own + GPU_SUM_ESTIMATE + g);
+    }
     add_block_sum(divergence, own + GPU_SUM_VAE_KL);
 }
 
-void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
+void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all,
+                        double *sums) {
     LAUNCH(heads_backward, blocks_of(all), line, stream, w, h, rows, all, sums);
 }
 
-static __global__ void value_loss(int rows, int clip_value, float clip, float weight, const float *value,
-                                  const float *returns, const float *old_value, float *d, double *sums) {
+static __global__ void value_loss(int rows, int clip_value, float clip, float weight,
+                                  const float *value, const float *returns, const float *old_value,
+                                  float *d, double *sums) {
     const int64_t r = item();
     double loss = 0.0;
     if (r < rows) {
@@ -367,8 +420,9 @@ static __global__ void value_loss(int rows, int clip_value, float clip, float we
     add_block_sum(loss, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_VALUE);
 }
 
-void gpu_value_loss(cudaStream_t stream, int rows, int clip_value, float clip, float weight, const float *value,
-                    const float *returns, const float *old_value, float *d, double *sums) {
-    LAUNCH(value_loss, blocks_of(rows), line, stream, rows, clip_value, clip, weight, value, returns, old_value, d,
-           sums);
+void gpu_value_loss(cudaStream_t stream, int rows, int clip_value, float clip, float weight,
+                    const float *value, const float *returns, const float *old_value, float *d,
+                    double *sums) {
+    LAUNCH(value_loss, blocks_of(rows), line, stream, rows, clip_value, clip, weight, value,
+           returns, old_value, d, sums);
 }

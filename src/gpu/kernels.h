@@ -1,6 +1,7 @@
-/* The learner's elementwise passes on the GPU; products are cuBLAS'. Each is the loop of the same name in src/learn (mlp.c,
- * network.c, loss.c) over device arrays, row-major [rows][width], and only enqueues work on the stream: errors show at the
- * next call of the runtime. No result depends on the order in which blocks run: every sum has one fixed tree. */
+/* The learner's elementwise passes on the GPU; products are cuBLAS'. Each is the loop of the same
+ * name in src/learn (mlp.c, network.c, loss.c) over device arrays, row-major [rows][width], and
+ * only enqueues work on the stream: errors show at the next call of the runtime. No result depends
+ * on the order in which blocks run: every sum has one fixed tree. */
 #ifndef MILD_GPU_KERNELS_H
 #define MILD_GPU_KERNELS_H
 
@@ -10,7 +11,8 @@
 #define GPU_ACTIONS_MAX 64
 #define GPU_SUM_SLICES 128 /* a column sum adds up this many partial sums */
 
-/* Sums over samples as LossSums has them; every block of a pass adds to its own row of sums [blocks][GPU_SUMS]. */
+/* Sums over samples as LossSums has them; every block of a pass adds to its own row of sums
+ * [blocks][GPU_SUMS]. */
 enum {
     GPU_SUM_SURROGATE,
     GPU_SUM_KL,
@@ -30,7 +32,8 @@ extern "C" {
 int gpu_blocks(int rows); /* of sums, for passes over so many rows */
 
 /* to[r] = from[index[r]], rows of `width`. */
-void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, const float *from, float *to);
+void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, const float *from,
+                float *to);
 /* Row m of `to` is the mirror image of row which[m] - first of history, frame by frame. */
 typedef struct {
     int images, frames, observation, first;
@@ -39,22 +42,24 @@ typedef struct {
 } GpuImages;
 void gpu_mirror_history(cudaStream_t stream, GpuImages images, const float *history, float *to);
 /* noise [rows][latent]: numbers row[r] * latent .. of the stream `key` (noise.h). */
-void gpu_latent_noise(cudaStream_t stream, int rows, int latent, uint64_t key, const int *row, float *noise);
+void gpu_latent_noise(cudaStream_t stream, int rows, int latent, uint64_t key, const int *row,
+                      float *noise);
 
 void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float *bias, float *y);
-/* d *= slope(y) unless y is NULL; d_bias = beta d_bias + column sums of d. partial: [GPU_SUM_SLICES][width]. */
-void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d, float *partial, float beta,
-                       float *d_bias);
+/* d *= slope(y) unless y is NULL; d_bias = beta d_bias + column sums of d. partial:
+ * [GPU_SUM_SLICES][width]. */
+void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d,
+                       float *partial, float beta, float *d_bias);
 
 /* Widths of the networks' joints. */
 typedef struct {
     int history, observation, estimates, latent, per_dimension, feet_offset, feet_count, actions;
 } GpuWidths;
 
-void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, const float *history, const float *heads,
-                     const float *theta, float *input);
-void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads, const float *noise,
-                       float *spread, float *input);
+void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, const float *history,
+                     const float *heads, const float *theta, float *input);
+void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
+                       const float *noise, float *spread, float *input);
 
 typedef struct {
     int actions;
@@ -76,21 +81,25 @@ typedef struct {
 } GpuMirror;
 void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums);
 
-void gpu_reconstruction(cudaStream_t stream, int rows, int width, float weight, const float *decoded,
-                        const float *clean, float *d, double *sums);
-void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads, const float *theta,
-                             const float *d_input, float *d_heads, float *d_theta);
+void gpu_reconstruction(cudaStream_t stream, int rows, int width, float weight,
+                        const float *decoded, const float *clean, float *d, double *sums);
+void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
+                             const float *theta, const float *d_input, float *d_heads,
+                             float *d_theta);
 
-/* The regression's part for the first `rows` of `all`, the modulation's through the feet velocities for all. */
+/* The regression's part for the first `rows` of `all`, the modulation's through the feet velocities
+ * for all. */
 typedef struct {
     float estimate_weight, latent_weight; /* of a sample */
     const float *heads, *estimate, *spread, *noise, *d_feet, *d_decoder_input;
     float *d_heads;
 } GpuHeads;
-void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all, double *sums);
+void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all,
+                        double *sums);
 
-void gpu_value_loss(cudaStream_t stream, int rows, int clip_value, float clip, float weight, const float *value,
-                    const float *returns, const float *old_value, float *d, double *sums);
+void gpu_value_loss(cudaStream_t stream, int rows, int clip_value, float clip, float weight,
+                    const float *value, const float *returns, const float *old_value, float *d,
+                    double *sums);
 
 #ifdef __cplusplus
 }

@@ -8,7 +8,8 @@
 #include "gpu/mlp.h"
 #include "learn/ppo_private.h"
 
-/* Rows go through the networks in chunks of at most this many: enough to fill a large GPU, and a bound on its memory. */
+/* Rows go through the networks in chunks of at most this many: enough to fill a large GPU, and a
+ * bound on its memory. */
 #ifndef GPU_ROWS
 #define GPU_ROWS 32768
 #endif
@@ -58,8 +59,10 @@ static int widest_layer(const Network *network) {
 static size_t layout(GpuLearner *g, char *block) {
     const Network *n = &g->ppo->policy->network;
     const PpoBatch *host = &g->ppo->batch;
-    const size_t samples = (size_t)host->steps * (size_t)host->envs, more = samples + (size_t)host->envs;
-    const size_t mirror = (size_t)(n->def.observation + n->def.actions), minibatch = (size_t)g->minibatch;
+    const size_t samples = (size_t)host->steps * (size_t)host->envs,
+                 more = samples + (size_t)host->envs;
+    const size_t mirror = (size_t)(n->def.observation + n->def.actions),
+                 minibatch = (size_t)g->minibatch;
     const struct {
         float **at;
         size_t count;
@@ -94,7 +97,8 @@ static size_t layout(GpuLearner *g, char *block) {
     return used;
 }
 
-/* Locks what travels often into memory, where copies are several times as fast. Where that fails they are only slower. */
+/* Locks what travels often into memory, where copies are several times as fast. Where that fails
+ * they are only slower. */
 static void pin(GpuLearner *g, int slot, void *memory, size_t bytes) {
     if (cudaHostRegister(memory, bytes, cudaHostRegisterDefault) == cudaSuccess) {
         g->pinned[slot] = memory;
@@ -128,8 +132,9 @@ static void learner_destroy(void *self) {
 /* ---- traffic ---- */
 
 static MildStatus check(cudaError_t code, const char *what, MildError *error) {
-    return code == cudaSuccess ? MILD_OK
-                               : mild_fail(error, MILD_ERROR_IO, "GPU: %s: %s", what, cudaGetErrorString(code));
+    return code == cudaSuccess
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_IO, "GPU: %s: %s", what, cudaGetErrorString(code));
 }
 
 static void upload(GpuLearner *g, void *to, const void *from, size_t bytes) {
@@ -150,7 +155,8 @@ static MildStatus finish(GpuLearner *g, const char *what, MildError *error) {
     cudaError_t launched = cudaGetLastError(), ran = cudaStreamSynchronize(g->queue.stream);
     MildStatus status = check(launched ? launched : ran, what, error);
     if (status == MILD_OK && g->queue.status) {
-        status = mild_fail(error, MILD_ERROR_IO, "GPU: %s: %s", what, cublasGetStatusString(g->queue.status));
+        status = mild_fail(error, MILD_ERROR_IO, "GPU: %s: %s", what,
+                           cublasGetStatusString(g->queue.status));
     }
     return status;
 }
@@ -162,11 +168,14 @@ static float *forward(GpuLearner *g, int rows, const float *history) {
     const Network *n = &g->ppo->policy->network;
     const NetworkOutputs *out = &g->chunk.outputs;
     GpuQueue *q = &g->queue;
-    const float *heads = gpu_mlp_forward(q, &n->encoder, g->parameters, rows, history, n->history, &out->encoder);
-    const float *theta = gpu_mlp_forward(q, &n->modulation, g->parameters, rows, heads + n->def.feet_velocity_offset,
-                                         n->heads, &out->modulation);
+    const float *heads =
+        gpu_mlp_forward(q, &n->encoder, g->parameters, rows, history, n->history, &out->encoder);
+    const float *theta =
+        gpu_mlp_forward(q, &n->modulation, g->parameters, rows, heads + n->def.feet_velocity_offset,
+                        n->heads, &out->modulation);
     gpu_actor_input(q->stream, g->widths, rows, history, heads, theta, out->actor_input);
-    return gpu_mlp_forward(q, &n->actor, g->parameters, rows, out->actor_input, n->actor_input, &out->actor);
+    return gpu_mlp_forward(q, &n->actor, g->parameters, rows, out->actor_input, n->actor_input,
+                           &out->actor);
 }
 
 static MildStatus learner_act(void *self, int t, MildError *error) {
@@ -178,7 +187,8 @@ static MildStatus learner_act(void *self, int t, MildError *error) {
     for (int first = 0; first < b->envs; first += g->rows) {
         const int rows = b->envs - first < g->rows ? b->envs - first : g->rows;
         const size_t row = (size_t)t * (size_t)b->envs + (size_t)first;
-        upload(g, g->chunk.history, b->history + row * history, (size_t)rows * history * sizeof(float));
+        upload(g, g->chunk.history, b->history + row * history,
+               (size_t)rows * history * sizeof(float));
         const float *mean = forward(g, rows, g->chunk.history);
         download(g, b->mean + row * actions, mean, (size_t)rows * actions * sizeof(float));
     }
@@ -189,20 +199,25 @@ static MildStatus learner_act(void *self, int t, MildError *error) {
 static void upload_batch(GpuLearner *g) {
     const PolicyDef *def = policy_def(g->ppo->policy);
     const PpoBatch *host = &g->ppo->batch, *b = &g->batch;
-    const size_t samples = (size_t)host->steps * (size_t)host->envs, more = samples + (size_t)host->envs;
+    const size_t samples = (size_t)host->steps * (size_t)host->envs,
+                 more = samples + (size_t)host->envs;
     const struct {
         float *to;
         const float *from;
         size_t rows;
         int width;
     } areas[] = {
-        {b->critic, host->critic, more, def->critic_input}, {b->history, host->history, samples, g->widths.history},
-        {b->target, host->target, samples, def->estimates}, {b->clean, host->clean, samples, def->observation},
-        {b->action, host->action, samples, def->actions},   {b->mean, host->mean, samples, def->actions},
+        {b->critic, host->critic, more, def->critic_input},
+        {b->history, host->history, samples, g->widths.history},
+        {b->target, host->target, samples, def->estimates},
+        {b->clean, host->clean, samples, def->observation},
+        {b->action, host->action, samples, def->actions},
+        {b->mean, host->mean, samples, def->actions},
         {b->log_prob, host->log_prob, samples, 1},
     };
     for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
-        upload(g, areas[i].to, areas[i].from, areas[i].rows * (size_t)areas[i].width * sizeof(float));
+        upload(g, areas[i].to, areas[i].from,
+               areas[i].rows * (size_t)areas[i].width * sizeof(float));
     }
 }
 
@@ -216,9 +231,10 @@ static MildStatus learner_values(void *self, MildError *error) {
     for (int first = 0; first < count; first += g->rows) {
         const int rows = count - first < g->rows ? count - first : g->rows;
         const float *value = gpu_mlp_forward(&g->queue, &n->critic, g->parameters, rows,
-                                             g->batch.critic + (size_t)first * (size_t)width, width, &g->chunk.value);
-        cudaMemcpyAsync(g->batch.value + first, value, (size_t)rows * sizeof *value, cudaMemcpyDeviceToDevice,
-                        g->queue.stream);
+                                             g->batch.critic + (size_t)first * (size_t)width, width,
+                                             &g->chunk.value);
+        cudaMemcpyAsync(g->batch.value + first, value, (size_t)rows * sizeof *value,
+                        cudaMemcpyDeviceToDevice, g->queue.stream);
     }
     download(g, host->value, g->batch.value, (size_t)count * sizeof(float));
     return finish(g, "values", error);
@@ -262,12 +278,14 @@ static void gather(GpuLearner *g, const ChunkJob *job) {
     if (c->mirrored > 0) {
         const GpuImages images = {c->mirrored, def->frames,     def->observation, job->at,
                                   job->which,  g->mirror_index, g->mirror_sign};
-        gpu_mirror_history(stream, images, c->history, c->history + (size_t)c->rows * (size_t)g->widths.history);
+        gpu_mirror_history(stream, images, c->history,
+                           c->history + (size_t)c->rows * (size_t)g->widths.history);
     }
     gpu_latent_noise(stream, c->rows, def->latent, job->latent_key, job->latent_row, c->noise);
 }
 
-/* policy_loss and mirror_loss. The samples' gradients of log std lie in a work area until their sum is taken. */
+/* policy_loss and mirror_loss. The samples' gradients of log std lie in a work area until their sum
+ * is taken. */
 static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean) {
     const LossContext *loss = job->loss;
     const PolicyDef *def = policy_def(g->ppo->policy);
@@ -287,8 +305,8 @@ static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean)
                       .d_log_std = c->work[0]};
     loss_surrogate_constants(loss, s.constant);
     gpu_surrogate(g->queue.stream, s, c->rows, g->sums);
-    gpu_bias_backward(g->queue.stream, c->rows, actions, NULL, s.d_log_std, g->queue.partial, job->beta,
-                      g->gradient + g->ppo->policy->network.log_std);
+    gpu_bias_backward(g->queue.stream, c->rows, actions, NULL, s.d_log_std, g->queue.partial,
+                      job->beta, g->gradient + g->ppo->policy->network.log_std);
     if (c->mirrored > 0) {
         const size_t images = (size_t)c->rows * (size_t)actions;
         const GpuMirror m = {actions,
@@ -296,7 +314,8 @@ static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean)
                              job->which,
                              g->mirror_index + def->observation,
                              g->mirror_sign + def->observation,
-                             2.0f * (float)loss->def->mirror_weight * loss->mirror_weight / (float)actions,
+                             2.0f * (float)loss->def->mirror_weight * loss->mirror_weight /
+                                 (float)actions,
                              mean,
                              mean + images,
                              c->d_mean,
@@ -314,23 +333,28 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
     NetworkOutputs *out = &c->outputs;
     const int rows = c->rows, all = rows + c->mirrored, estimates = n->def.estimates;
     const float epsilon = (float)loss->def->epsilon * loss->sample_weight, beta = job->beta;
-    const float *mean = forward(g, all, c->history), *heads = network_heads(n, out), *theta = network_theta(n, out);
+    const float *mean = forward(g, all, c->history), *heads = network_heads(n, out),
+                *theta = network_theta(n, out);
     gpu_sample_latent(q->stream, g->widths, rows, heads, c->noise, c->spread, c->decoder_input);
-    const float *decoded =
-        gpu_mlp_forward(q, &n->decoder, g->parameters, rows, c->decoder_input, n->decoder_input, &c->decoder);
+    const float *decoded = gpu_mlp_forward(q, &n->decoder, g->parameters, rows, c->decoder_input,
+                                           n->decoder_input, &c->decoder);
 
     action_losses(g, job, mean);
-    gpu_reconstruction(q->stream, rows, n->def.observation, 2.0f * epsilon / (float)n->def.observation, decoded,
-                       c->clean, c->d_decoded, g->sums);
+    gpu_reconstruction(q->stream, rows, n->def.observation,
+                       2.0f * epsilon / (float)n->def.observation, decoded, c->clean, c->d_decoded,
+                       g->sums);
 
-    gpu_mlp_backward(q, &n->decoder, g->parameters, rows, c->decoder_input, n->decoder_input, &c->decoder, c->d_decoded,
-                     c->work, g->gradient, beta, (MlpInputGradient){c->d_decoder_input, 0, n->decoder_input});
-    gpu_mlp_backward(q, &n->actor, g->parameters, all, out->actor_input, n->actor_input, &out->actor, c->d_mean,
-                     c->work, g->gradient, beta,
-                     (MlpInputGradient){c->d_actor_input, n->def.observation, estimates + n->def.latent});
-    gpu_modulation_backward(q->stream, g->widths, all, heads, theta, c->d_actor_input, c->d_heads, c->d_theta);
-    gpu_mlp_backward(q, &n->modulation, g->parameters, all, heads + n->def.feet_velocity_offset, n->heads,
-                     &out->modulation, c->d_theta, c->work, g->gradient, beta,
+    gpu_mlp_backward(q, &n->decoder, g->parameters, rows, c->decoder_input, n->decoder_input,
+                     &c->decoder, c->d_decoded, c->work, g->gradient, beta,
+                     (MlpInputGradient){c->d_decoder_input, 0, n->decoder_input});
+    gpu_mlp_backward(
+        q, &n->actor, g->parameters, all, out->actor_input, n->actor_input, &out->actor, c->d_mean,
+        c->work, g->gradient, beta,
+        (MlpInputGradient){c->d_actor_input, n->def.observation, estimates + n->def.latent});
+    gpu_modulation_backward(q->stream, g->widths, all, heads, theta, c->d_actor_input, c->d_heads,
+                            c->d_theta);
+    gpu_mlp_backward(q, &n->modulation, g->parameters, all, heads + n->def.feet_velocity_offset,
+                     n->heads, &out->modulation, c->d_theta, c->work, g->gradient, beta,
                      (MlpInputGradient){c->d_feet, 0, n->def.feet_velocity_count});
     const GpuHeads h = {2.0f * epsilon, epsilon * (float)loss->def->kl_weight,
                         heads,          c->estimate,
@@ -338,8 +362,8 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
                         c->d_feet,      c->d_decoder_input,
                         c->d_heads};
     gpu_heads_backward(q->stream, g->widths, h, rows, all, g->sums);
-    gpu_mlp_backward(q, &n->encoder, g->parameters, all, c->history, n->history, &out->encoder, c->d_heads, c->work,
-                     g->gradient, beta, (MlpInputGradient){0});
+    gpu_mlp_backward(q, &n->encoder, g->parameters, all, c->history, n->history, &out->encoder,
+                     c->d_heads, c->work, g->gradient, beta, (MlpInputGradient){0});
 }
 
 /* loss_critic. */
@@ -348,19 +372,21 @@ static void critic_half(GpuLearner *g, const ChunkJob *job) {
     const PpoDef *def = loss->def;
     const Network *n = &g->ppo->policy->network;
     LossChunk *c = &g->chunk;
-    const float weight = 2.0f * (float)((1.0 - def->epsilon) * def->value_weight) * loss->sample_weight;
-    const float *value =
-        gpu_mlp_forward(&g->queue, &n->critic, g->parameters, c->rows, c->critic, n->def.critic_input, &c->value);
-    gpu_value_loss(g->queue.stream, c->rows, def->clip_value, (float)def->clip, weight, value, c->returns, c->old_value,
-                   c->d_value, g->sums);
-    gpu_mlp_backward(&g->queue, &n->critic, g->parameters, c->rows, c->critic, n->def.critic_input, &c->value,
-                     c->d_value, c->work, g->gradient, job->beta, (MlpInputGradient){0});
+    const float weight =
+        2.0f * (float)((1.0 - def->epsilon) * def->value_weight) * loss->sample_weight;
+    const float *value = gpu_mlp_forward(&g->queue, &n->critic, g->parameters, c->rows, c->critic,
+                                         n->def.critic_input, &c->value);
+    gpu_value_loss(g->queue.stream, c->rows, def->clip_value, (float)def->clip, weight, value,
+                   c->returns, c->old_value, c->d_value, g->sums);
+    gpu_mlp_backward(&g->queue, &n->critic, g->parameters, c->rows, c->critic, n->def.critic_input,
+                     &c->value, c->d_value, c->work, g->gradient, job->beta, (MlpInputGradient){0});
 }
 
 /* Everything of a minibatch that the chunks read. */
 static void upload_minibatch(GpuLearner *g, const int *samples, int count) {
     const PpoBatch *host = &g->ppo->batch;
-    const size_t all = (size_t)host->steps * (size_t)host->envs * sizeof(float), indices = (size_t)count * sizeof(int);
+    const size_t all = (size_t)host->steps * (size_t)host->envs * sizeof(float),
+                 indices = (size_t)count * sizeof(int);
     if (count != g->known_count) {
         ppo_latent_rows(count, g->host_rows);
         g->images = ppo_mirrored(g->ppo, count, g->host_rows + g->minibatch);
@@ -372,7 +398,8 @@ static void upload_minibatch(GpuLearner *g, const int *samples, int count) {
     upload(g, g->batch.advantage, host->advantage, all);
     upload(g, g->batch.returns, host->returns, all);
     upload(g, g->order, samples, indices);
-    cudaMemsetAsync(g->sums, 0, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums, g->queue.stream);
+    cudaMemsetAsync(g->sums, 0, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums,
+                    g->queue.stream);
 }
 
 /* Images whose sample comes before `end`; `which` ascends. */
@@ -394,22 +421,25 @@ static void add_sums(const GpuLearner *g, LossSums *sums) {
         .clipped = total[GPU_SUM_CLIPPED],
         .reconstruction = total[GPU_SUM_RECONSTRUCTION],
         .vae_kl = total[GPU_SUM_VAE_KL],
-        .estimate = {total[GPU_SUM_ESTIMATE], total[GPU_SUM_ESTIMATE + 1], total[GPU_SUM_ESTIMATE + 2]},
+        .estimate = {total[GPU_SUM_ESTIMATE], total[GPU_SUM_ESTIMATE + 1],
+                     total[GPU_SUM_ESTIMATE + 2]},
         .mirror = total[GPU_SUM_MIRROR],
         .value = total[GPU_SUM_VALUE],
     };
 }
 
-static MildStatus learner_gradient(void *self, const LossContext *context, const int *samples, int count,
-                                   uint64_t latent_key, float *gradient, LossSums *sums, MildError *error) {
+static MildStatus learner_gradient(void *self, const LossContext *context, const int *samples,
+                                   int count, uint64_t latent_key, float *gradient, LossSums *sums,
+                                   MildError *error) {
     GpuLearner *g = self;
     upload_minibatch(g, samples, count);
     for (int at = 0, image = 0; at < count; at += g->rows) {
         g->chunk.rows = count - at < g->rows ? count - at : g->rows;
         const int next = images_before(g, image, at + g->chunk.rows);
         g->chunk.mirrored = next - image;
-        const ChunkJob job = {context,          latent_key, g->order + at,        g->latent_row + at,
-                              g->which + image, at,         at == 0 ? 0.0f : 1.0f};
+        const ChunkJob job = {
+            context,          latent_key, g->order + at,        g->latent_row + at,
+            g->which + image, at,         at == 0 ? 0.0f : 1.0f};
         gather(g, &job);
         actor_half(g, &job);
         critic_half(g, &job);
@@ -432,7 +462,8 @@ int gpu_device(char *text, size_t size) {
         code = cudaGetDeviceProperties(&properties, 0);
     }
     if (code != cudaSuccess || count == 0) {
-        snprintf(text, size, "no CUDA device: %s", code ? cudaGetErrorString(code) : "none is installed");
+        snprintf(text, size, "no CUDA device: %s",
+                 code ? cudaGetErrorString(code) : "none is installed");
         return 0;
     }
     snprintf(text, size, "%s, %.0f GiB, compute capability %d.%d", properties.name,
@@ -443,13 +474,19 @@ int gpu_device(char *text, size_t size) {
 static void set_sizes(GpuLearner *g) {
     const Ppo *ppo = g->ppo;
     const PolicyDef *def = policy_def(ppo->policy);
-    const int64_t samples = (int64_t)ppo->batch.steps * ppo->batch.envs, all = samples + ppo->batch.envs;
+    const int64_t samples = (int64_t)ppo->batch.steps * ppo->batch.envs,
+                  all = samples + ppo->batch.envs;
     g->rows = all < GPU_ROWS ? (int)all : GPU_ROWS;
     g->minibatch = (int)((samples + ppo->def.minibatches - 1) / ppo->def.minibatches);
     g->sum_blocks = gpu_blocks(2 * g->rows);
-    g->widths =
-        (GpuWidths){ppo->policy->network.history,  def->observation,          def->estimates,           def->latent,
-                    def->modulation_per_dimension, def->feet_velocity_offset, def->feet_velocity_count, def->actions};
+    g->widths = (GpuWidths){ppo->policy->network.history,
+                            def->observation,
+                            def->estimates,
+                            def->latent,
+                            def->modulation_per_dimension,
+                            def->feet_velocity_offset,
+                            def->feet_velocity_count,
+                            def->actions};
 }
 
 static MildStatus open_device(GpuLearner *g, MildError *error) {
@@ -458,9 +495,11 @@ static MildStatus open_device(GpuLearner *g, MildError *error) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "%s; train.device = cpu needs none", device);
     }
     const size_t bytes = layout(g, NULL);
-    MildStatus status = check(cudaStreamCreateWithFlags(&g->queue.stream, cudaStreamNonBlocking), device, error);
+    MildStatus status =
+        check(cudaStreamCreateWithFlags(&g->queue.stream, cudaStreamNonBlocking), device, error);
     if (!status && cudaMalloc(&g->block, bytes) != cudaSuccess) {
-        status = mild_fail(error, MILD_ERROR_MEMORY, "%s: no %.1f GiB free; lower train.envs or ppo.steps", device,
+        status = mild_fail(error, MILD_ERROR_MEMORY,
+                           "%s: no %.1f GiB free; lower train.envs or ppo.steps", device,
                            (double)bytes / 1073741824.0);
     }
     if (!status && (cublasCreate(&g->queue.blas) != CUBLAS_STATUS_SUCCESS ||

@@ -13,11 +13,12 @@ typedef struct {
     float *partial;        /* [GPU_SUM_SLICES][widest layer] of the column sums */
 } GpuQueue;
 
-/* As mlp_forward and mlp_backward. They enqueue; what goes wrong shows in status and when the stream is waited for. */
-float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows, const float *x, int ldx,
-                       const MlpOutputs *outputs);
-void gpu_mlp_backward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows, const float *x, int ldx,
-                      const MlpOutputs *outputs, float *d_last, float *const work[2], float *gradient, float beta,
-                      MlpInputGradient input);
+/* As mlp_forward and mlp_backward. They enqueue; what goes wrong shows in status and when the
+ * stream is waited for. */
+float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
+                       const float *x, int ldx, const MlpOutputs *outputs);
+void gpu_mlp_backward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
+                      const float *x, int ldx, const MlpOutputs *outputs, float *d_last,
+                      float *const work[2], float *gradient, float beta, MlpInputGradient input);
 
 #endif

@@ -17,8 +17,11 @@ static void foot_scatter(const MildScratch *scratch, int f) {
         foot->tangent_x[e] = s->ix[i] * rate;
         foot->tangent_y[e] = s->iy[i] * rate;
         foot->flat[e] = open > 0.0 ? open * open : 0.0;
-        foot->state[e] = (uint8_t)(!loaded ? MILD_ELEMENT_FREE : deeper ? MILD_ELEMENT_VIRGIN : MILD_ELEMENT_UNLOADING);
-        double vx = motion_at(motion.x, s->x[i], s->y[i]), vy = motion_at(motion.y, s->x[i], s->y[i]);
+        foot->state[e] = (uint8_t)(!loaded  ? MILD_ELEMENT_FREE
+                                   : deeper ? MILD_ELEMENT_VIRGIN
+                                            : MILD_ELEMENT_UNLOADING);
+        double vx = motion_at(motion.x, s->x[i], s->y[i]),
+               vy = motion_at(motion.y, s->x[i], s->y[i]);
         foot->slip[e] = loaded && friction_slides(s, i, vx, vy);
     }
 }
@@ -30,15 +33,19 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
     memset(foot->tangent_x, 0, bytes);
     memset(foot->tangent_y, 0, bytes);
     memset(foot->state, 0, 2 * (size_t)foot->padded); /* and slip behind it */
-    for (int e = 0; e < foot->padded; e++) foot->flat[e] = 1.0;
+    for (int e = 0; e < foot->padded; e++) {
+        foot->flat[e] = 1.0;
+    }
     foot_points(&scratch->foot[f]);
     foot_scatter(scratch, f);
-    return (MildElements){foot->depth,   foot->normal,  foot->tangent_x, foot->tangent_y, foot->point_x,
-                          foot->point_y, foot->point_z, foot->flat,      foot->state,     foot->slip};
+    return (MildElements){foot->depth,   foot->normal,  foot->tangent_x, foot->tangent_y,
+                          foot->point_x, foot->point_y, foot->point_z,   foot->flat,
+                          foot->state,   foot->slip};
 }
 
 /* What is summed over the loaded elements. */
-static void foot_loaded(const MildScratch *scratch, const double *position, int f, MildFootResult *result) {
+static void foot_loaded(const MildScratch *scratch, const double *position, int f,
+                        MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
     const Slots local = foot->slot, *s = &local;
     double sum = 0.0, deepest = 0.0, loaded = 0.0, force = 0.0, x = 0.0, y = 0.0;
@@ -56,15 +63,21 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
     result->contacts = (int)loaded;
     result->area = loaded * foot->pitch * foot->pitch;
     result->depth_max = deepest;
-    if (!(loaded > 0.0)) return;
+    if (!(loaded > 0.0)) {
+        return;
+    }
     result->depth_mean = sum / loaded;
-    for (int k = 0; k < 3; k++)
-        result->pressure_center[k] = position[k] + foot->arm[0][k] + (x * foot->arm[1][k] + y * foot->arm[2][k]) / force;
+    for (int k = 0; k < 3; k++) {
+        result->pressure_center[k] =
+            position[k] + foot->arm[0][k] + (x * foot->arm[1][k] + y * foot->arm[2][k]) / force;
+    }
 }
 
-/* Wrench and zero moment point. Paper eq 15: r = [F]x^+ tau, which for the true torque tau = p x F is F x tau/|F|^2, the
- * point of the wrench's central axis nearest the ankle. On the sole: the point where the horizontal torque vanishes. */
-static void foot_result(const MildScratch *scratch, const MildContactInput *input, int f, MildFootResult *result) {
+/* Wrench and zero moment point. Paper eq 15: r = [F]x^+ tau, which for the true torque tau = p x F
+ * is F x tau/|F|^2, the point of the wrench's central axis nearest the ankle. On the sole: the
+ * point where the horizontal torque vanishes. */
+static void foot_result(const MildScratch *scratch, const MildContactInput *input, int f,
+                        MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
     const double *R = input->rotation[f];
     double *F = result->force, *tau = result->torque;
@@ -73,11 +86,12 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
         tau[k] = scratch->wrench[6 * f + 3 + k] / input->dt;
     }
     double square = F[0] * F[0] + F[1] * F[1] + F[2] * F[2];
-    if (square > 0.0)
+    if (square > 0.0) {
         for (int k = 0; k < 3; k++) {
             int i = (k + 1) % 3, j = (k + 2) % 3;
             result->zmp_axis[k] = (F[i] * tau[j] - F[j] * tau[i]) / square;
         }
+    }
     double z = R[6] * foot->center_x + R[7] * foot->center_y + R[8] * foot->z;
     if (F[2] > 0.0) {
         result->zmp_sole[0] = (z * F[0] - tau[1]) / F[2];
@@ -89,22 +103,26 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
 /* 0 when every value is finite, else NaN: 0 x is 0 for finite x only. */
 static double finite_sum(const double *values, int count) {
     double sum = 0.0;
-    for (int i = 0; i < count; i++) sum += 0.0 * values[i];
+    for (int i = 0; i < count; i++) {
+        sum += 0.0 * values[i];
+    }
     return sum;
 }
 
-/* A foot at NaN touches nothing and so meets no equation that fails: look at where the feet are and how they move. A step
- * of no length has no forces. */
+/* A foot at NaN touches nothing and so meets no equation that fails: look at where the feet are and
+ * how they move. A step of no length has no forces. */
 static int all_finite(const MildContactInput *input, const MildContactResult *result, int feet) {
     double sum = finite_sum(result->velocity, 6 * feet), rate = 1.0 / input->dt;
-    for (int f = 0; f < feet; f++)
+    for (int f = 0; f < feet; f++) {
         sum += finite_sum(input->position[f], 3) + finite_sum(input->rotation[f], 9) +
                finite_sum(result->foot[f].force, 3) + finite_sum(result->foot[f].torque, 3);
+    }
     return sum == 0.0 && rate > 0.0 && isfinite(rate);
 }
 
-void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain, const MildContactInput *input,
-                       MildScratch *scratch, MildContactResult *result) {
+void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
+                       const MildContactInput *input, MildScratch *scratch,
+                       MildContactResult *result) {
     size_t bytes = 6 * (size_t)scratch->feet * sizeof(double);
     memset(result, 0, sizeof *result);
     scratch->dt = input->dt;
@@ -119,7 +137,9 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain, con
     memcpy(scratch->velocity, result->velocity, bytes);
     int nan = 0;
     for (int f = 0; f < scratch->feet; f++) {
-        if (scratch->foot[f].active == 0) continue;
+        if (scratch->foot[f].active == 0) {
+            continue;
+        }
         foot_result(scratch, input, f, &result->foot[f]);
         nan |= scratch->foot[f].nan;
     }

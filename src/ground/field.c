@@ -9,8 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FIELD_VALUES_MAX 64 /* longest array a text may fill: nothing is written before all of it parsed */
-#define FIELD_NAME_MAX 63   /* longer names are cut in the edit distance */
+#define FIELD_VALUES_MAX                                                                           \
+    64 /* longest array a text may fill: nothing is written before all of it parsed */
+#define FIELD_NAME_MAX 63 /* longer names are cut in the edit distance */
 
 typedef union {
     double number;
@@ -38,55 +39,77 @@ static Value field_load(const MildField *field, const void *def, int index) {
 }
 
 static double value_as_double(MildFieldType type, Value value) {
-    if (type == MILD_FIELD_DOUBLE) return value.number;
-    if (type == MILD_FIELD_UINT64) return (double)value.unsigned64;
+    if (type == MILD_FIELD_DOUBLE) {
+        return value.number;
+    }
+    if (type == MILD_FIELD_UINT64) {
+        return (double)value.unsigned64;
+    }
     return (double)value.integer;
 }
 
-static MildStatus value_check(const MildField *field, Value value, const char *section, MildError *error) {
+static MildStatus value_check(const MildField *field, Value value, const char *section,
+                              MildError *error) {
     double x = value_as_double(field->type, value);
-    if (x >= field->min && x <= field->max) return MILD_OK; /* false for NaN */
-    return mild_fail(error, MILD_ERROR_RANGE, "%s.%s = %.9g is outside %.9g .. %.9g: %s", section, field->name, x,
-                     field->min, field->max, field->help);
+    if (x >= field->min && x <= field->max) {
+        return MILD_OK; /* false for NaN */
+    }
+    return mild_fail(error, MILD_ERROR_RANGE, "%s.%s = %.9g is outside %.9g .. %.9g: %s", section,
+                     field->name, x, field->min, field->max, field->help);
 }
 
-MildStatus mild_fields_check(const MildField *fields, int count, const void *def, const char *section, MildError *error) {
+MildStatus mild_fields_check(const MildField *fields, int count, const void *def,
+                             const char *section, MildError *error) {
     for (int f = 0; f < count; f++) {
         const MildField *field = &fields[f];
         if (field->type == MILD_FIELD_TEXT) {
-            if (!memchr((const char *)def + field->offset, 0, (size_t)field->count))
-                return mild_fail(error, MILD_ERROR_RANGE, "%s.%s has no end within %d characters", section, field->name,
-                                 field->count);
+            if (!memchr((const char *)def + field->offset, 0, (size_t)field->count)) {
+                return mild_fail(error, MILD_ERROR_RANGE, "%s.%s has no end within %d characters",
+                                 section, field->name, field->count);
+            }
             continue;
         }
         for (int i = 0; i < field->count; i++) {
             MildStatus status = value_check(field, field_load(field, def, i), section, error);
-            if (status != MILD_OK) return status;
+            if (status != MILD_OK) {
+                return status;
+            }
         }
     }
     return MILD_OK;
 }
 
 static int text_equal(const char *text, size_t length, const char *word) {
-    if (strlen(word) != length) return 0;
-    for (size_t i = 0; i < length; i++)
-        if (tolower((unsigned char)text[i]) != word[i]) return 0;
+    if (strlen(word) != length) {
+        return 0;
+    }
+    for (size_t i = 0; i < length; i++) {
+        if (tolower((unsigned char)text[i]) != word[i]) {
+            return 0;
+        }
+    }
     return 1;
 }
 
 static int parse_bool(const char *text, size_t length, Value *value) {
-    static const char *const yes[] = {"1", "true", "yes", "on"}, *const no[] = {"0", "false", "no", "off"};
+    static const char *const yes[] = {"1", "true", "yes", "on"}, *const no[] = {"0", "false", "no",
+                                                                                "off"};
     for (int i = 0; i < 4; i++) {
         value->integer = text_equal(text, length, yes[i]);
-        if (value->integer || text_equal(text, length, no[i])) return 1;
+        if (value->integer || text_equal(text, length, no[i])) {
+            return 1;
+        }
     }
     return 0;
 }
 
-/* One value of `length` characters at `text`; false when it is not exactly one value of that type. */
+/* One value of `length` characters at `text`; false when it is not exactly one value of that type.
+ */
 static int parse_value(MildFieldType type, const char *text, size_t length, Value *value) {
     char word[64], *end = word;
-    if (length == 0 || length >= sizeof word) return 0;
+    if (length == 0 || length >= sizeof word) {
+        return 0;
+    }
     memcpy(word, text, length);
     word[length] = 0;
     errno = 0;
@@ -110,16 +133,18 @@ static int parse_value(MildFieldType type, const char *text, size_t length, Valu
 }
 
 static const char *type_name(MildFieldType type) {
-    static const char *const names[] = {"a number", "an integer",           "true or false",
+    static const char *const names[] = {"a number", "an integer",          "true or false",
                                         "a text",   "an unsigned integer", "a name"};
     return names[type];
 }
 
-static MildStatus parse_text(const MildField *field, void *def, const char *text, const char *section, MildError *error) {
+static MildStatus parse_text(const MildField *field, void *def, const char *text,
+                             const char *section, MildError *error) {
     size_t length = strlen(text);
-    if (length >= (size_t)field->count)
-        return mild_fail(error, MILD_ERROR_RANGE, "%s.%s: text of %zu characters, at most %d fit", section, field->name,
-                         length, field->count - 1);
+    if (length >= (size_t)field->count) {
+        return mild_fail(error, MILD_ERROR_RANGE, "%s.%s: text of %zu characters, at most %d fit",
+                         section, field->name, length, field->count - 1);
+    }
     memcpy((char *)def + field->offset, text, length + 1);
     return MILD_OK;
 }
@@ -128,11 +153,14 @@ static MildStatus parse_text(const MildField *field, void *def, const char *text
 static int edit_distance(const char *a, const char *b) {
     int rows[2][FIELD_NAME_MAX + 1], *above = rows[0], *row = rows[1];
     int a_length = (int)strnlen(a, FIELD_NAME_MAX), b_length = (int)strnlen(b, FIELD_NAME_MAX);
-    for (int j = 0; j <= b_length; j++) above[j] = j;
+    for (int j = 0; j <= b_length; j++) {
+        above[j] = j;
+    }
     for (int i = 1; i <= a_length; i++) {
         row[0] = i;
         for (int j = 1; j <= b_length; j++) {
-            int replace = above[j - 1] + (a[i - 1] != b[j - 1]), drop = above[j] + 1, add = row[j - 1] + 1;
+            int replace = above[j - 1] + (a[i - 1] != b[j - 1]), drop = above[j] + 1,
+                add = row[j - 1] + 1;
             int least = drop < add ? drop : add;
             row[j] = replace < least ? replace : least;
         }
@@ -143,44 +171,62 @@ static int edit_distance(const char *a, const char *b) {
     return above[b_length];
 }
 
-static MildStatus parse_name(const MildField *field, void *def, const char *text, const char *section, MildError *error) {
+static MildStatus parse_name(const MildField *field, void *def, const char *text,
+                             const char *section, MildError *error) {
     int index = 0, count = (int)field->max + 1, nearest = 0, least = INT_MAX;
-    while (index < count && strcmp(field->names[index], text) != 0) index++;
+    while (index < count && strcmp(field->names[index], text) != 0) {
+        index++;
+    }
     if (index < count) {
         memcpy((char *)def + field->offset, &index, sizeof index);
         return MILD_OK;
     }
     for (int i = 0; i < count; i++) {
         int distance = edit_distance(field->names[i], text);
-        if (distance < least) least = distance, nearest = i;
+        if (distance < least) {
+            least = distance, nearest = i;
+        }
     }
-    return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: unknown name '%.60s'; nearest is '%s'", section, field->name, text,
-                     field->names[nearest]);
+    return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: unknown name '%.60s'; nearest is '%s'",
+                     section, field->name, text, field->names[nearest]);
 }
 
-MildStatus mild_field_parse(const MildField *field, void *def, const char *text, const char *section, MildError *error) {
+MildStatus mild_field_parse(const MildField *field, void *def, const char *text,
+                            const char *section, MildError *error) {
     static const char separators[] = " \t\r\n,";
-    if (field->type == MILD_FIELD_TEXT) return parse_text(field, def, text, section, error);
-    if (field->type == MILD_FIELD_NAME) return parse_name(field, def, text, section, error);
+    if (field->type == MILD_FIELD_TEXT) {
+        return parse_text(field, def, text, section, error);
+    }
+    if (field->type == MILD_FIELD_NAME) {
+        return parse_name(field, def, text, section, error);
+    }
     Value values[FIELD_VALUES_MAX];
     int count = 0;
-    for (const char *at = text + strspn(text, separators); *at; at += strspn(at, separators), count++) {
+    for (const char *at = text + strspn(text, separators); *at;
+         at += strspn(at, separators), count++) {
         size_t length = strcspn(at, separators);
-        if (count == field->count || count == FIELD_VALUES_MAX)
-            return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: more than %d values in '%s'", section, field->name,
-                             field->count, text);
-        if (!parse_value(field->type, at, length, &values[count]))
-            return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: '%.*s' is not %s: %s", section, field->name, (int)length,
-                             at, type_name(field->type), field->help);
+        if (count == field->count || count == FIELD_VALUES_MAX) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: more than %d values in '%s'",
+                             section, field->name, field->count, text);
+        }
+        if (!parse_value(field->type, at, length, &values[count])) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: '%.*s' is not %s: %s", section,
+                             field->name, (int)length, at, type_name(field->type), field->help);
+        }
         MildStatus status = value_check(field, values[count], section, error);
-        if (status != MILD_OK) return status;
+        if (status != MILD_OK) {
+            return status;
+        }
         at += length;
     }
-    if (count != field->count)
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: %d of %d values in '%s'", section, field->name, count,
-                         field->count, text);
+    if (count != field->count) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: %d of %d values in '%s'", section,
+                         field->name, count, field->count, text);
+    }
     size_t size = field_value_size(field->type);
-    for (int i = 0; i < count; i++) memcpy((char *)def + field->offset + (size_t)i * size, &values[i], size);
+    for (int i = 0; i < count; i++) {
+        memcpy((char *)def + field->offset + (size_t)i * size, &values[i], size);
+    }
     return MILD_OK;
 }
 
@@ -190,7 +236,9 @@ static int print_value(MildFieldType type, Value value, char *text, size_t size)
         for (int digits = 6; digits < 17; digits++) { /* the shortest that reads back exactly */
             char shorter[40];
             snprintf(shorter, sizeof shorter, "%.*g", digits, value.number);
-            if (strtod(shorter, NULL) == value.number) return snprintf(text, size, "%s", shorter);
+            if (strtod(shorter, NULL) == value.number) {
+                return snprintf(text, size, "%s", shorter);
+            }
         }
         return snprintf(text, size, "%.17g", value.number);
     case MILD_FIELD_UINT64: return snprintf(text, size, "%" PRIu64, value.unsigned64);
@@ -203,8 +251,12 @@ static int print_value(MildFieldType type, Value value, char *text, size_t size)
 }
 
 int mild_field_print(const MildField *field, const void *def, char *text, size_t size) {
-    if (field->type == MILD_FIELD_TEXT) return snprintf(text, size, "%s", (const char *)def + field->offset);
-    if (field->type == MILD_FIELD_NAME) return snprintf(text, size, "%s", field->names[field_load(field, def, 0).integer]);
+    if (field->type == MILD_FIELD_TEXT) {
+        return snprintf(text, size, "%s", (const char *)def + field->offset);
+    }
+    if (field->type == MILD_FIELD_NAME) {
+        return snprintf(text, size, "%s", field->names[field_load(field, def, 0).integer]);
+    }
     int total = 0;
     for (int i = 0; i < field->count; i++) {
         size_t used = (size_t)total < size ? (size_t)total : size;
@@ -217,17 +269,26 @@ int mild_field_print(const MildField *field, const void *def, char *text, size_t
     return total;
 }
 
-const MildField *mild_field_find(const MildField *fields, int count, const char *name, const char **nearest) {
+const MildField *mild_field_find(const MildField *fields, int count, const char *name,
+                                 const char **nearest) {
     int least = FIELD_NAME_MAX + 1;
-    if (nearest) *nearest = NULL;
+    if (nearest) {
+        *nearest = NULL;
+    }
     for (int f = 0; f < count; f++) {
-        if (strcmp(fields[f].name, name) != 0) continue;
-        if (nearest) *nearest = fields[f].name;
+        if (strcmp(fields[f].name, name) != 0) {
+            continue;
+        }
+        if (nearest) {
+            *nearest = fields[f].name;
+        }
         return &fields[f];
     }
     for (int f = 0; nearest && f < count; f++) {
         int distance = edit_distance(fields[f].name, name);
-        if (distance >= least) continue;
+        if (distance >= least) {
+            continue;
+        }
         least = distance;
         *nearest = fields[f].name;
     }

@@ -2,21 +2,29 @@
 
 #include <stdlib.h>
 
-#define FIELD(member, low, high, help) MILD_FIELD(MildMapDef, member, MILD_FIELD_DOUBLE, 1, low, high, help)
+#define FIELD(member, low, high, help)                                                             \
+    MILD_FIELD(MildMapDef, member, MILD_FIELD_DOUBLE, 1, low, high, help)
 #define COUNT(names) ((int)(sizeof(names) / sizeof *(names)))
 static const char *const kinds[] = {"flat", "slope", "steps", "waves", "rough", "image"};
 static const char *const patterns[] = {"none", "stripes", "checker", "image"};
 const MildField mild_map_fields[] = {
     MILD_FIELD_CHOICE(MildMapDef, kind, kinds, COUNT(kinds), "[-] shape of the surface"),
-    FIELD(cell, 0.001, 1.0, "[m] distance of the heights' grid points (of an image: of its pixels)"),
+    FIELD(cell, 0.001, 1.0,
+          "[m] distance of the heights' grid points (of an image: of its pixels)"),
     FIELD(size, 0.1, 1000.0, "[m] rough: the pattern repeats after this length"),
-    FIELD(amplitude, 0.0, 5.0, "[m] waves, rough: greatest height above and below the mean; steps, image: height"),
-    FIELD(wavelength, 0.02, 100.0, "[m] waves: of the wave; steps: one up and one down; rough: between random heights"),
+    FIELD(amplitude, 0.0, 5.0,
+          "[m] waves, rough: greatest height above and below the mean; steps, image: height"),
+    FIELD(wavelength, 0.02, 100.0,
+          "[m] waves: of the wave; steps: one up and one down; rough: between random heights"),
     FIELD(slope, -1.0, 1.0, "[-] slope: rise per metre along x"),
-    MILD_FIELD(MildMapDef, seed, MILD_FIELD_UINT64, 1, 0, 1.8446744073709552e19, "[-] rough: which random heights"),
-    MILD_FIELD_CHOICE(MildMapDef, patches, patterns, COUNT(patterns), "[-] pattern of the materials"),
-    FIELD(patch_size, 0.01, 1000.0, "[m] width of a stripe, edge of a field, edge of a label image's pixel"),
-    FIELD(border, 0.0, 100.0, "[m] width over which neighbouring materials blend; 0: a sharp border"),
+    MILD_FIELD(MildMapDef, seed, MILD_FIELD_UINT64, 1, 0, 1.8446744073709552e19,
+               "[-] rough: which random heights"),
+    MILD_FIELD_CHOICE(MildMapDef, patches, patterns, COUNT(patterns),
+                      "[-] pattern of the materials"),
+    FIELD(patch_size, 0.01, 1000.0,
+          "[m] width of a stripe, edge of a field, edge of a label image's pixel"),
+    FIELD(border, 0.0, 100.0,
+          "[m] width over which neighbouring materials blend; 0: a sharp border"),
 };
 const int mild_map_field_count = COUNT(mild_map_fields);
 
@@ -38,19 +46,27 @@ static void map_measure(MildMap *map) {
     double along_x = 0.0, along_y = 0.0;
     map->low = INFINITY;
     map->high = -INFINITY;
-    for (int j = 0; j <= grid->rows; j++)
+    for (int j = 0; j <= grid->rows; j++) {
         for (int i = 0; i <= grid->columns; i++) {
             const float *at = map->height + (size_t)j * stride + (size_t)i;
             map->low = fmin(map->low, (double)*at);
             map->high = fmax(map->high, (double)*at);
-            if (i < grid->columns) along_x = fmax(along_x, fabs((double)at[1] - (double)*at) * grid->inverse_x);
-            if (j < grid->rows) along_y = fmax(along_y, fabs((double)at[stride] - (double)*at) * grid->inverse_y);
+            if (i < grid->columns) {
+                along_x = fmax(along_x, fabs((double)at[1] - (double)*at) * grid->inverse_x);
+            }
+            if (j < grid->rows) {
+                along_y = fmax(along_y, fabs((double)at[stride] - (double)*at) * grid->inverse_y);
+            }
         }
+    }
     map->steepest = sqrt(along_x * along_x + along_y * along_y);
 }
 
 MildMap *mild_map_create(const MildMapDef *def, MildError *error) {
-    if (mild_fields_check(mild_map_fields, mild_map_field_count, def, "terrain", error) != MILD_OK) return NULL;
+    if (mild_fields_check(mild_map_fields, mild_map_field_count, def, "terrain", error) !=
+        MILD_OK) {
+        return NULL;
+    }
     MildMap *map = calloc(1, sizeof *map);
     if (!map) {
         mild_fail(error, MILD_ERROR_MEMORY, "terrain: out of memory");
@@ -61,17 +77,25 @@ MildMap *mild_map_create(const MildMapDef *def, MildError *error) {
         mild_map_destroy(map);
         return NULL;
     }
-    if (map->height) map_measure(map);
+    if (map->height) {
+        map_measure(map);
+    }
     map->steepest += fabs(map->slope);
     const Grid *h = &map->heights, *l = &map->labels;
     map->bytes = sizeof *map;
-    if (map->height) map->bytes += ((size_t)h->columns + 1) * ((size_t)h->rows + 1) * sizeof *map->height;
-    if (map->label) map->bytes += (size_t)l->columns * (size_t)l->rows * sizeof *map->label;
+    if (map->height) {
+        map->bytes += ((size_t)h->columns + 1) * ((size_t)h->rows + 1) * sizeof *map->height;
+    }
+    if (map->label) {
+        map->bytes += (size_t)l->columns * (size_t)l->rows * sizeof *map->label;
+    }
     return map;
 }
 
 void mild_map_destroy(MildMap *map) {
-    if (!map) return;
+    if (!map) {
+        return;
+    }
     free(map->height);
     free(map->label);
     free(map);
@@ -106,12 +130,15 @@ double map_surface(const MildMap *map, double x, double y, double slope[2]) {
     double height = map->slope * x;
     slope[0] = map->slope;
     slope[1] = 0.0;
-    if (!map->height) return height;
+    if (!map->height) {
+        return height;
+    }
     GridPlace a = grid_place((x - grid->x0) * grid->inverse_x, grid->columns, grid->repeats);
     GridPlace b = grid_place((y - grid->y0) * grid->inverse_y, grid->rows, grid->repeats);
     size_t stride = (size_t)grid->columns + 1;
     const float *at = map->height + (size_t)b.cell * stride + (size_t)a.cell;
-    double h00 = (double)at[0], h10 = (double)at[1], h01 = (double)at[stride], h11 = (double)at[stride + 1];
+    double h00 = (double)at[0], h10 = (double)at[1], h01 = (double)at[stride],
+           h11 = (double)at[stride + 1];
     double low = h00 + a.share * (h10 - h00), high = h01 + a.share * (h11 - h01);
     slope[0] += a.inside * grid->inverse_x * ((h10 - h00) + b.share * ((h11 - h01) - (h10 - h00)));
     slope[1] += b.inside * grid->inverse_y * (high - low);
@@ -119,7 +146,9 @@ double map_surface(const MildMap *map, double x, double y, double slope[2]) {
 }
 
 Label map_label(const MildMap *map, double x, double y) {
-    if (!map->label) return (Label){0, 0, 0};
+    if (!map->label) {
+        return (Label){0, 0, 0};
+    }
     const Grid *grid = &map->labels;
     GridPlace a = grid_place((x - grid->x0) * grid->inverse_x, grid->columns, grid->repeats);
     GridPlace b = grid_place((y - grid->y0) * grid->inverse_y, grid->rows, grid->repeats);

@@ -9,7 +9,8 @@
 /* Cells along x and y; cell (0, 0) begins at (x0, y0). */
 typedef struct {
     int columns, rows;
-    int repeats; /* bool: beyond the last cell comes the first again; otherwise the border goes on */
+    int repeats; /* bool: beyond the last cell comes the first again; otherwise the border goes on
+                  */
     double x0, y0, cell_x, cell_y; /* [m] */
     double inverse_x, inverse_y;   /* [1/m] */
 } Grid;
@@ -18,19 +19,25 @@ static inline Grid grid_make(int columns, int rows, double cell_x, double cell_y
     return (Grid){columns, rows, repeats, 0.0, 0.0, cell_x, cell_y, 1.0 / cell_x, 1.0 / cell_y};
 }
 
-/* One coordinate: the cell it lies in, the share of the way through it, and 1 within the grid, 0 beyond its border. */
+/* One coordinate: the cell it lies in, the share of the way through it, and 1 within the grid, 0
+ * beyond its border. */
 typedef struct {
     int cell;
     double share, inside;
 } GridPlace;
 
-/* at: [cells] from the grid's begin. The comparisons are false for NaN, so that any number gives a valid cell. */
+/* at: [cells] from the grid's begin. The comparisons are false for NaN, so that any number gives a
+ * valid cell. */
 static inline GridPlace grid_place(double at, int cells, int repeats) {
     double end = (double)cells;
-    if (repeats) at -= end * floor(at / end);
+    if (repeats) {
+        at -= end * floor(at / end);
+    }
     double clamped = at > 0.0 ? (at < end ? at : end) : 0.0;
     int cell = (int)clamped;
-    if (cell >= cells) cell = cells - 1;
+    if (cell >= cells) {
+        cell = cells - 1;
+    }
     return (GridPlace){cell, clamped - (double)cell, repeats || (at > 0.0 && at < end) ? 1.0 : 0.0};
 }
 
@@ -53,7 +60,8 @@ struct MildMap {
 double map_surface(const MildMap *map, double x, double y, double slope[2]);
 Label map_label(const MildMap *map, double x, double y);
 
-/* Fill map->heights and map->height (shape.c), map->labels and map->label (pattern.c) as `def` says. */
+/* Fill map->heights and map->height (shape.c), map->labels and map->label (pattern.c) as `def`
+ * says. */
 MildStatus shape_fill(MildMap *map, const MildMapDef *def, MildError *error);
 MildStatus pattern_fill(MildMap *map, const MildMapDef *def, MildError *error);
 

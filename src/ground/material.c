@@ -2,11 +2,12 @@
 
 #include "mild/ground.h"
 
-const char *const mild_model_names[MILD_MODELS] = {"mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi",
-                                                   "ecc_quasi_3d", "rigid"};
+const char *const mild_model_names[MILD_MODELS] = {
+    "mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi", "ecc_quasi_3d", "rigid"};
 
 /* The ranges are what the equations bear, wider than the draws of the paper's Table III. */
-#define FIELD(member, low, high, help) MILD_FIELD(MildMaterial, member, MILD_FIELD_DOUBLE, 1, low, high, help)
+#define FIELD(member, low, high, help)                                                             \
+    MILD_FIELD(MildMaterial, member, MILD_FIELD_DOUBLE, 1, low, high, help)
 const MildField mild_material_fields[] = {
     FIELD(k_pen, 1.0, 1e7, "[N/m] penetration stiffness of one element at the surface"),
     FIELD(sigma_cone, 0.0, 5e6, "[N/m^3] depth-dependent conical stress"),
@@ -21,27 +22,40 @@ const MildField mild_material_fields[] = {
     FIELD(b_drift, 0.0, 100.0, "[N s/m] drift damping per element"),
     FIELD(recovery, 0.0, 1.0, "[-] share of the depth that springs back: 1 elastic, 0 plastic"),
     FIELD(bed_depth, 0.001, 10.0, "[m] firm bottom below the surface"),
-    FIELD(zeta, 0.0, 100.0, "[-] ecc_quasi*: stress in 1e6 N/m^3 of a level plate going straight down"),
-    MILD_FIELD(MildMaterial, passive, MILD_FIELD_BOOL, 1, 0, 1, "[-] clamp c_g >= 0 and c_d >= 1/2: no energy is created"),
+    FIELD(zeta, 0.0, 100.0,
+          "[-] ecc_quasi*: stress in 1e6 N/m^3 of a level plate going straight down"),
+    MILD_FIELD(MildMaterial, passive, MILD_FIELD_BOOL, 1, 0, 1,
+               "[-] clamp c_g >= 0 and c_d >= 1/2: no energy is created"),
     MILD_FIELD_CHOICE(MildMaterial, model, mild_model_names, MILD_MODELS, "[-] ground model"),
 };
-const int mild_material_field_count = (int)(sizeof mild_material_fields / sizeof *mild_material_fields);
+const int mild_material_field_count =
+    (int)(sizeof mild_material_fields / sizeof *mild_material_fields);
 
-/* docs/model.md section 10. Foams and rubber weigh grams: no added mass. Friction, drift and bed are our choice. */
+/* docs/model.md section 10. Foams and rubber weigh grams: no added mass. Friction, drift and bed
+ * are our choice. */
 typedef struct {
     const char *name;
     MildMaterial material;
 } Preset;
-/*              k_pen sigma_cone alpha  nu   c_g  c_d   phi   rho     mu   k_drift b_drift recovery bed zeta passive model */
+/*              k_pen sigma_cone alpha  nu   c_g  c_d   phi   rho     mu   k_drift b_drift recovery
+ * bed zeta passive model */
 static const Preset presets[] = {
-    {"rubber", {1400.0, 0.24e6, 1.310, 0.8, 0.0, 1.0, 0.57, 1000.0, 1.0, 100.0, 0.02, 1.0, 0.10, 1.0, 1, 0}},
-    {"foam60", {850.0, 0.20e6, 1.20, 1.2, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1.0, 1, 0}},
-    {"foam45", {480.0, 0.17e6, 1.10, 1.6, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1.0, 1, 0}},
-    {"foam28", {190.0, 0.13e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1.0, 1, 0}},
-    {"foam25", {150.0, 0.11e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1.0, 1, 0}},
-    {"grass", {550.0, 0.24e6, 1.10, 1.6, 0.5, 1.0, 0.50, 1000.0, 0.7, 300.0, 0.05, 0.5, 0.10, 1.0, 1, 0}},
-    {"sand_loose", {380.0, 0.15e6, 1.047, 2.0, 2.7, 17.2, 0.57, 1000.0, 0.6, 400.0, 0.10, 0.0, 0.15, 1.0, 1, 0}},
-    {"sand_dense", {700.0, 0.24e6, 1.047, 1.6, 2.7, 17.2, 0.62, 1000.0, 0.7, 800.0, 0.10, 0.0, 0.15, 1.0, 1, 0}},
+    {"rubber",
+     {1400.0, 0.24e6, 1.310, 0.8, 0.0, 1.0, 0.57, 1000.0, 1.0, 100.0, 0.02, 1.0, 0.10, 1.0, 1, 0}},
+    {"foam60",
+     {850.0, 0.20e6, 1.20, 1.2, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1.0, 1, 0}},
+    {"foam45",
+     {480.0, 0.17e6, 1.10, 1.6, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1.0, 1, 0}},
+    {"foam28",
+     {190.0, 0.13e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1.0, 1, 0}},
+    {"foam25",
+     {150.0, 0.11e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1.0, 1, 0}},
+    {"grass",
+     {550.0, 0.24e6, 1.10, 1.6, 0.5, 1.0, 0.50, 1000.0, 0.7, 300.0, 0.05, 0.5, 0.10, 1.0, 1, 0}},
+    {"sand_loose",
+     {380.0, 0.15e6, 1.047, 2.0, 2.7, 17.2, 0.57, 1000.0, 0.6, 400.0, 0.10, 0.0, 0.15, 1.0, 1, 0}},
+    {"sand_dense",
+     {700.0, 0.24e6, 1.047, 1.6, 2.7, 17.2, 0.62, 1000.0, 0.7, 800.0, 0.10, 0.0, 0.15, 1.0, 1, 0}},
 };
 #define PRESETS ((int)(sizeof presets / sizeof *presets))
 
@@ -55,7 +69,9 @@ const char *mild_material_preset_name(int index) {
 
 int mild_material_preset(const char *name, MildMaterial *material) {
     for (int i = 0; i < PRESETS; i++) {
-        if (strcmp(presets[i].name, name) != 0) continue;
+        if (strcmp(presets[i].name, name) != 0) {
+            continue;
+        }
         *material = presets[i].material;
         return 1;
     }
@@ -70,7 +86,9 @@ MildMaterial mild_material_default(void) {
 
 int mild_model_find(const char *name, MildModel *model) {
     for (int i = 0; i < MILD_MODELS; i++) {
-        if (strcmp(mild_model_names[i], name) != 0) continue;
+        if (strcmp(mild_model_names[i], name) != 0) {
+            continue;
+        }
         *model = (MildModel)i;
         return 1;
     }
@@ -78,9 +96,12 @@ int mild_model_find(const char *name, MildModel *model) {
 }
 
 MildStatus mild_material_check(const MildMaterial *material, MildError *error) {
-    if (material->model == MILD_MODEL_RIGID)
+    if (material->model == MILD_MODEL_RIGID) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "ground.model = rigid is the engine's own contact, which has no soft ground: choose mild, con_cone, "
+                         "ground.model = rigid is the engine's own contact, which has no soft "
+                         "ground: choose mild, con_cone, "
                          "con_spring, ecc_spring or ecc_quasi");
-    return mild_fields_check(mild_material_fields, mild_material_field_count, material, "ground", error);
+    }
+    return mild_fields_check(mild_material_fields, mild_material_field_count, material, "ground",
+                             error);
 }

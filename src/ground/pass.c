@@ -2,35 +2,41 @@
 
 #include "ground/friction.h"
 
-/* The passes over a foot's slots are branch-free, so that they run in vectors; and two, since one alone would be a chain of
- * operations too long for the processor to work on several vectors at once. */
+/* The passes over a foot's slots are branch-free, so that they run in vectors; and two, since one
+ * alone would be a chain of operations too long for the processor to work on several vectors at
+ * once. */
 
 /* Normal impulses and their derivatives. */
-ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven, int bent) {
+ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven,
+                               int bent) {
     const Slots local = *slot, *s = &local;
     const Motion v = *m;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        double w = uneven ? slot_descent(s, i, &v) : -(v.z[0] + v.z[1] * s->x[i] + v.z[2] * s->y[i]), iz, k;
+        double w = uneven ? slot_descent(s, i, &v)
+                          : -(v.z[0] + v.z[1] * s->x[i] + v.z[2] * s->y[i]),
+               iz, k;
         step_normal(s, i, dt, bent, w, &iz, &k);
         s->iz[i] = iz;
         s->hzz[i] = k;
     }
 }
 
-/* Friction, and all that is summed. Where the ground is not level the normal impulse is I_z g, g = (-slope, 1): the gradient of
- * -u, so that it does work exactly where u changes; its vertical part is the paper's. With f = -d friction/dv, k = -dI_z/dw and
- * c = g + d friction/dI_z
- *     h = -dI/dv = f + k c g^T.
- * sums: of I, x I and y I. held: the bounds of friction are. */
-ALWAYS_INLINE void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held, double sums[9]) {
+/* Friction, and all that is summed. Where the ground is not level the normal impulse is I_z g, g =
+ * (-slope, 1): the gradient of -u, so that it does work exactly where u changes; its vertical part
+ * is the paper's. With f = -d friction/dv, k = -dI_z/dw and c = g + d friction/dI_z h = -dI/dv = f
+ * + k c g^T. sums: of I, x I and y I. held: the bounds of friction are. */
+ALWAYS_INLINE void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
+                                 double sums[9]) {
     const Slots local = *slot, *s = &local;
     const double x0 = m->x[0], x1 = m->x[1], x2 = m->x[2], y0 = m->y[0], y1 = m->y[1], y2 = m->y[2];
     double f0 = 0.0, f1 = 0.0, f2 = 0.0, a0 = 0.0, a1 = 0.0, a2 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0;
 #pragma omp simd reduction(+ : f0, f1, f2, a0, a1, a2, b0, b1, b2)
     for (int i = 0; i < end; i++) {
-        double x = s->x[i], y = s->y[i], vx = x0 + x1 * x + x2 * y, vy = y0 + y1 * x + y2 * y, iz = s->iz[i], k = s->hzz[i];
-        double mu = s->mu[i], bound = held ? s->bound[i] : mu * iz + s->drift_radius[i], ix, iy, hxz, hyz;
+        double x = s->x[i], y = s->y[i], vx = x0 + x1 * x + x2 * y, vy = y0 + y1 * x + y2 * y,
+               iz = s->iz[i], k = s->hzz[i];
+        double mu = s->mu[i], bound = held ? s->bound[i] : mu * iz + s->drift_radius[i], ix, iy,
+               hxz, hyz;
         friction_at(s, i, bound, held ? 0.0 : mu, vx, vy, &ix, &iy, &hxz, &hyz);
         hxz *= k;
         hyz *= k;
@@ -75,23 +81,28 @@ static inline void cross_add(const double *p, const double *I, double *torque) {
 ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, int first, int held) {
     for (int f = 0; f < scratch->feet; f++) {
         const FootScratch *foot = &scratch->foot[f];
-        if (foot->active == 0) continue;
+        if (foot->active == 0) {
+            continue;
+        }
         double sums[9] = {0.0}, *wrench = scratch->wrench + 6 * f;
         Motion motion = foot_motion(foot, twist + (6 * f - first));
         if (foot->uneven) {
             foot_normal(&foot->slot, foot_end(foot), dt, &motion, 1, 1);
             foot_friction(&foot->slot, foot_end(foot), &motion, 1, held, sums);
         } else {
-            if (foot->bent)
+            if (foot->bent) {
                 foot_normal(&foot->slot, foot_end(foot), dt, &motion, 0, 1);
-            else
+            } else {
                 foot_normal(&foot->slot, foot_end(foot), dt, &motion, 0, 0);
+            }
             foot_friction(&foot->slot, foot_end(foot), &motion, 0, held, sums);
         }
         /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 */
         memcpy(wrench, sums, 3 * sizeof *sums);
         memset(wrench + 3, 0, 3 * sizeof *wrench);
-        for (int k = 0; k < 3; k++) cross_add(foot->arm[k], sums + 3 * k, wrench + 3);
+        for (int k = 0; k < 3; k++) {
+            cross_add(foot->arm[k], sums + 3 * k, wrench + 3);
+        }
     }
 }
 
@@ -108,20 +119,25 @@ void contact_bounds(MildScratch *scratch, double share) {
         const Slots *s = &scratch->foot[f].slot;
         for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
             double now = s->mu[i] * s->iz[i] + s->drift_radius[i];
-            s->bound[i] = share < 1.0 ? s->bound[i] + share * (now - s->bound[i]) : now; /* at first it may be anything */
+            s->bound[i] = share < 1.0 ? s->bound[i] + share * (now - s->bound[i])
+                                      : now; /* at first it may be anything */
         }
     }
 }
 
-/* Sums of each entry of h times 1, x, y, x^2, xy, y^2. They hold the whole foot, since p is linear in x and y. */
+/* Sums of each entry of h times 1, x, y, x^2, xy, y^2. They hold the whole foot, since p is linear
+ * in x and y. */
 typedef double Moments[3][3][6];
 
 /* Of three entries at a time: as many sums as the registers hold. */
-static void moments(const Slots *s, int end, const double *a, const double *b, const double *c, double sums[3][6]) {
+static void moments(const Slots *s, int end, const double *a, const double *b, const double *c,
+                    double sums[3][6]) {
     const double *xs = s->x, *ys = s->y;
-    double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0, b5 = 0.0;
+    double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0,
+           b3 = 0.0, b4 = 0.0, b5 = 0.0;
     double c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;
-#pragma omp simd reduction(+ : a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, c0, c1, c2, c3, c4, c5)
+#pragma omp simd reduction(+ : a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, c0, c1, c2, c3, c4, \
+                               c5)
     for (int i = 0; i < end; i++) {
         double x = xs[i], y = ys[i], xx = x * x, xy = x * y, yy = y * y;
         a0 += a[i];
@@ -143,7 +159,8 @@ static void moments(const Slots *s, int end, const double *a, const double *b, c
         c4 += c[i] * xy;
         c5 += c[i] * yy;
     }
-    const double all[3][6] = {{a0, a1, a2, a3, a4, a5}, {b0, b1, b2, b3, b4, b5}, {c0, c1, c2, c3, c4, c5}};
+    const double all[3][6] = {
+        {a0, a1, a2, a3, a4, a5}, {b0, b1, b2, b3, b4, b5}, {c0, c1, c2, c3, c4, c5}};
     memcpy(sums, all, sizeof all);
 }
 
@@ -164,25 +181,31 @@ static void foot_moments(const FootScratch *foot, Moments M) {
     memcpy(M[2][2], rest[2], sizeof *rest);
 }
 
-/* H = sum of B^T h B, B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the moments of h by their products,
- *     force rows   [M_00, N_0],   N_k = -sum over l of M_kl [arm_l]x
- *     torque rows  sum over k of [arm_k]x [M_k0, N_k] */
+/* H = sum of B^T h B, B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the moments
+ * of h by their products, force rows   [M_00, N_0],   N_k = -sum over l of M_kl [arm_l]x torque
+ * rows  sum over k of [arm_k]x [M_k0, N_k] */
 static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
     static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     memset(H, 0, 36 * sizeof *H);
     for (int k = 0; k < 3; k++) {
         double rows[3][6] = {{0.0}};
         for (int r = 0; r < 3; r++) {
-            for (int c = 0; c < 3; c++) rows[r][c] = M[r][c][k];
+            for (int c = 0; c < 3; c++) {
+                rows[r][c] = M[r][c][k];
+            }
             for (int l = 0; l < 3; l++) { /* -m [q]x = q x m */
                 const int at = product[k][l];
-                cross_add(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]}, rows[r] + 3);
+                cross_add(foot->arm[l], (const double[3]){M[r][0][at], M[r][1][at], M[r][2][at]},
+                          rows[r] + 3);
             }
         }
         const double *q = foot->arm[k];
         for (int c = 0; c < 6; c++) {
-            if (k == 0)
-                for (int r = 0; r < 3; r++) H[6 * r + c] = rows[r][c];
+            if (k == 0) {
+                for (int r = 0; r < 3; r++) {
+                    H[6 * r + c] = rows[r][c];
+                }
+            }
             H[18 + c] += q[1] * rows[2][c] - q[2] * rows[1][c];
             H[24 + c] += q[2] * rows[0][c] - q[0] * rows[2][c];
             H[30 + c] += q[0] * rows[1][c] - q[1] * rows[0][c];
@@ -193,7 +216,9 @@ static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
 void contact_hessian(MildScratch *scratch) {
     for (int f = 0; f < scratch->feet; f++) {
         const FootScratch *foot = &scratch->foot[f];
-        if (foot->active == 0) continue;
+        if (foot->active == 0) {
+            continue;
+        }
         Moments sums;
         foot_moments(foot, sums);
         foot_hessian(foot, sums, scratch->hessian[f]);

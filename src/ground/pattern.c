@@ -1,4 +1,5 @@
-/* The labels of a map: which material each cell has, and near a border how much of the neighbour's. */
+/* The labels of a map: which material each cell has, and near a border how much of the neighbour's.
+ */
 #include <limits.h>
 #include <stdlib.h>
 
@@ -23,75 +24,113 @@ static int label_image(const MildMapDef *def, int i, int j) {
 }
 
 /* Cells of a field: one where borders are sharp, else small ones that follow the blend. */
-static MildStatus pattern_allocate(MildMap *map, const MildMapDef *def, int columns, int rows, int repeats,
-                                   MildError *error) {
-    double fine = def->border > 0.0 ? ceil(def->patch_size / def->cell - 1e-9) : 1.0, cell = def->patch_size / fine;
+static MildStatus pattern_allocate(MildMap *map, const MildMapDef *def, int columns, int rows,
+                                   int repeats, MildError *error) {
+    double fine = def->border > 0.0 ? ceil(def->patch_size / def->cell - 1e-9) : 1.0,
+           cell = def->patch_size / fine;
     double fine_y = rows > 1 ? fine : 1.0, cells = columns * fine * (rows * fine_y);
-    double reach = 2.0 * ceil(0.5 * def->border / cell) + 1.0, window = rows > 1 ? reach * reach : reach;
-    if (cells > MILD_MAP_POINTS_MAX || cells * window > PATTERN_WORK)
+    double reach = 2.0 * ceil(0.5 * def->border / cell) + 1.0,
+           window = rows > 1 ? reach * reach : reach;
+    if (cells > MILD_MAP_POINTS_MAX || cells * window > PATTERN_WORK) {
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "terrain.patches: %g cells with a border of %g m are too many: larger terrain.cell or smaller border",
+                         "terrain.patches: %g cells with a border of %g m are too many: larger "
+                         "terrain.cell or smaller border",
                          cells, def->border);
-    map->labels = grid_make(columns * (int)fine, rows * (int)fine_y, cell, def->patch_size / fine_y, repeats);
+    }
+    map->labels =
+        grid_make(columns * (int)fine, rows * (int)fine_y, cell, def->patch_size / fine_y, repeats);
     map->label = malloc((size_t)cells * sizeof *map->label);
     return map->label ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "terrain: out of memory");
 }
 
 static int neighbour(int index, int count, int repeats) {
-    if (repeats) return (index % count + count) % count;
+    if (repeats) {
+        return (index % count + count) % count;
+    }
     return index < 0 ? 0 : index >= count ? count - 1 : index;
 }
 
-/* At distance d from the nearest cell of another label the neighbour's share is 1/2 - d/border: across a straight border
- * of width b the mixture changes linearly from one material to the other. */
+/* At distance d from the nearest cell of another label the neighbour's share is 1/2 - d/border:
+ * across a straight border of width b the mixture changes linearly from one material to the other.
+ */
 static void pattern_blend(MildMap *map, double border, int i, int j) {
     const Grid *grid = &map->labels;
     Label *here = &map->label[(size_t)j * (size_t)grid->columns + (size_t)i];
     double cell = grid->cell_x, nearest = 0.5 * border;
     int reach = (int)ceil(nearest / cell), reach_y = grid->rows > 1 ? reach : 0;
-    for (int dj = -reach_y; dj <= reach_y; dj++)
+    for (int dj = -reach_y; dj <= reach_y; dj++) {
         for (int di = -reach; di <= reach; di++) {
-            int column = neighbour(i + di, grid->columns, grid->repeats), row = neighbour(j + dj, grid->rows, grid->repeats);
+            int column = neighbour(i + di, grid->columns, grid->repeats),
+                row = neighbour(j + dj, grid->rows, grid->repeats);
             int other = map->label[(size_t)row * (size_t)grid->columns + (size_t)column].first;
-            double x = cell * fmax(abs(di) - 0.5, 0.0), y = cell * fmax(abs(dj) - 0.5, 0.0), way = sqrt(x * x + y * y);
-            if (other == here->first || way >= nearest) continue;
+            double x = cell * fmax(abs(di) - 0.5, 0.0), y = cell * fmax(abs(dj) - 0.5, 0.0),
+                   way = sqrt(x * x + y * y);
+            if (other == here->first || way >= nearest) {
+                continue;
+            }
             nearest = way;
             here->second = (unsigned char)other;
         }
-    here->share = (unsigned char)lround(255.0 * fmax(0.5 - nearest / border, 0.0)); /* a subnormal border has no half */
+    }
+    here->share = (unsigned char)lround(
+        255.0 * fmax(0.5 - nearest / border, 0.0)); /* a subnormal border has no half */
 }
 
-static MildStatus pattern_make(MildMap *map, const MildMapDef *def, int columns, int rows, int repeats, PatternLabel label,
-                               MildError *error) {
+static MildStatus pattern_make(MildMap *map, const MildMapDef *def, int columns, int rows,
+                               int repeats, PatternLabel label, MildError *error) {
     MildStatus status = pattern_allocate(map, def, columns, rows, repeats, error);
-    if (status != MILD_OK) return status;
+    if (status != MILD_OK) {
+        return status;
+    }
     const Grid *grid = &map->labels;
     int fine = grid->columns / columns, fine_y = grid->rows / rows;
-    for (int j = 0; j < grid->rows; j++)
+    for (int j = 0; j < grid->rows; j++) {
         for (int i = 0; i < grid->columns; i++) {
             int first = label(def, i / fine, j / fine_y);
-            if (first >= map->label_count) map->label_count = first + 1;
-            map->label[(size_t)j * (size_t)grid->columns + (size_t)i] = (Label){(unsigned char)first, 0, 0};
+            if (first >= map->label_count) {
+                map->label_count = first + 1;
+            }
+            map->label[(size_t)j * (size_t)grid->columns + (size_t)i] =
+                (Label){(unsigned char)first, 0, 0};
         }
-    for (int j = 0; def->border > 0.0 && j < grid->rows; j++)
-        for (int i = 0; i < grid->columns; i++) pattern_blend(map, def->border, i, j);
+    }
+    for (int j = 0; def->border > 0.0 && j < grid->rows; j++) {
+        for (int i = 0; i < grid->columns; i++) {
+            pattern_blend(map, def->border, i, j);
+        }
+    }
     return MILD_OK;
 }
 
 MildStatus pattern_fill(MildMap *map, const MildMapDef *def, MildError *error) {
     int count = def->patch_count;
-    if (def->patches == MILD_PATTERN_NONE) return MILD_OK;
-    if (count < 1 || count > UCHAR_MAX)
-        return mild_fail(error, MILD_ERROR_RANGE, "terrain.patches: patch_count = %d is outside 1 .. %d", count, UCHAR_MAX);
-    if (def->border > def->patch_size)
-        return mild_fail(error, MILD_ERROR_RANGE, "terrain.border = %g is wider than terrain.patch_size = %g", def->border,
+    if (def->patches == MILD_PATTERN_NONE) {
+        return MILD_OK;
+    }
+    if (count < 1 || count > UCHAR_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "terrain.patches: patch_count = %d is outside 1 .. %d", count, UCHAR_MAX);
+    }
+    if (def->border > def->patch_size) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "terrain.border = %g is wider than terrain.patch_size = %g", def->border,
                          def->patch_size);
-    if (def->patches == MILD_PATTERN_STRIPES) return pattern_make(map, def, count, 1, 1, label_stripes, error);
-    if (def->patches == MILD_PATTERN_CHECKER) return pattern_make(map, def, count, count, 1, label_checker, error);
-    if (!def->labels || def->label_columns < 1 || def->label_rows < 1)
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "terrain.patches = image needs an image of labels (terrain.labels)");
-    MildStatus status = pattern_make(map, def, def->label_columns, def->label_rows, 0, label_image, error);
-    if (status != MILD_OK) return status;
+    }
+    if (def->patches == MILD_PATTERN_STRIPES) {
+        return pattern_make(map, def, count, 1, 1, label_stripes, error);
+    }
+    if (def->patches == MILD_PATTERN_CHECKER) {
+        return pattern_make(map, def, count, count, 1, label_checker, error);
+    }
+    if (!def->labels || def->label_columns < 1 || def->label_rows < 1) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "terrain.patches = image needs an image of labels (terrain.labels)");
+    }
+    MildStatus status =
+        pattern_make(map, def, def->label_columns, def->label_rows, 0, label_image, error);
+    if (status != MILD_OK) {
+        return status;
+    }
     map->labels.x0 = -0.5 * def->label_columns * def->patch_size;
     map->labels.y0 = -0.5 * def->label_rows * def->patch_size;
     return MILD_OK;

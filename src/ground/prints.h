@@ -1,19 +1,22 @@
-/* What pressed ground remembers: the greatest depth of each cell of a world-fixed grid, in a bounded cache of tiles. Like a
- * processor's cache it has sets of PRINT_WAYS tiles, chosen by a hash of the tile's place; a new tile takes the place of
- * the oldest in its set. Every access is O(1) and allocates nothing. */
+/* What pressed ground remembers: the greatest depth of each cell of a world-fixed grid, in a
+ * bounded cache of tiles. Like a processor's cache it has sets of PRINT_WAYS tiles, chosen by a
+ * hash of the tile's place; a new tile takes the place of the oldest in its set. Every access is
+ * O(1) and allocates nothing. */
 #ifndef MILD_GROUND_PRINTS_H
 #define MILD_GROUND_PRINTS_H
 
 #include "ground/contact.h"
 
-#define PRINT_EDGE 8      /* cells along a tile's edge */
-#define PRINT_WAYS 8      /* tiles in a set */
-#define PRINT_UNIT 1e-5   /* [m] depths are stored as whole multiples, up to 0.65 m */
-#define PRINT_SAMPLES 3   /* points along an element's edge at which it touches the cells, see prints.c */
+#define PRINT_EDGE 8    /* cells along a tile's edge */
+#define PRINT_WAYS 8    /* tiles in a set */
+#define PRINT_UNIT 1e-5 /* [m] depths are stored as whole multiples, up to 0.65 m */
+#define PRINT_SAMPLES                                                                              \
+    3 /* points along an element's edge at which it touches the cells, see prints.c */
 
 typedef struct {
-    uint32_t place; /* column and row of the tile, 16 bits each: the world repeats after 65536 tiles */
-    uint32_t time;  /* of the last change; 0: empty */
+    uint32_t
+        place; /* column and row of the tile, 16 bits each: the world repeats after 65536 tiles */
+    uint32_t time; /* of the last change; 0: empty */
 } PrintKey;
 
 typedef struct {

@@ -8,8 +8,9 @@ static inline int model_is_resistive(int model) {
     return model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
 }
 
-/* After slots_prepare: the law of the foot's resistive slots for the way they move at the start of the step. rotation: of
- * the foot; now: how it moves. */
-void slots_resist(const FootScratch *foot, const MildTerrain *terrain, double dt, const double *rotation, const Motion *now);
+/* After slots_prepare: the law of the foot's resistive slots for the way they move at the start of
+ * the step. rotation: of the foot; now: how it moves. */
+void slots_resist(const FootScratch *foot, const MildTerrain *terrain, double dt,
+                  const double *rotation, const Motion *now);
 
 #endif

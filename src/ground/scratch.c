@@ -3,7 +3,8 @@
 
 #include "ground/contact.h"
 
-#define FOOT_ARRAYS 11 /* depth, normal, tangent x y, point x y z, flat, slope x y; state and slip share one */
+#define FOOT_ARRAYS                                                                                \
+    11 /* depth, normal, tangent x y, point x y z, flat, slope x y; state and slip share one */
 
 static int padded(const MildSole *sole) {
     return (mild_sole_elements(sole) + CONTACT_LANES - 1) / CONTACT_LANES * CONTACT_LANES;
@@ -50,8 +51,11 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
         return NULL;
     }
     int slots = 0;
-    for (int f = 0; f < feet; f++) slots += padded(soles[f]);
-    size_t doubles = (size_t)slots * (SLOT_ARRAYS + FOOT_ARRAYS + 2), bytes = doubles * sizeof(double);
+    for (int f = 0; f < feet; f++) {
+        slots += padded(soles[f]);
+    }
+    size_t doubles = (size_t)slots * (SLOT_ARRAYS + FOOT_ARRAYS + 2),
+           bytes = doubles * sizeof(double);
     bytes = (bytes + 2 * (size_t)slots * sizeof(int32_t) + 63) / 64 * 64;
     MildScratch *scratch = calloc(1, sizeof *scratch);
     double *block = aligned_alloc(64, bytes);
@@ -70,18 +74,24 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
         FootScratch *foot = &scratch->foot[f];
         foot_set(foot, soles[f], &at);
         double **arrays = (double **)&foot->own;
-        for (size_t k = 0; k < SLOT_ARRAYS; k++) arrays[k] = take(&at, foot->padded);
+        for (size_t k = 0; k < SLOT_ARRAYS; k++) {
+            arrays[k] = take(&at, foot->padded);
+        }
         foot->slot = foot->own;
         foot->element = integers;
         foot->slot_material = integers + foot->padded;
-        for (int i = 0; i < foot->padded; i++) foot->slot_material[i] = MATERIAL_NONE;
+        for (int i = 0; i < foot->padded; i++) {
+            foot->slot_material[i] = MATERIAL_NONE;
+        }
         integers += 2 * foot->padded;
     }
     return scratch;
 }
 
 void mild_scratch_destroy(MildScratch *scratch) {
-    if (!scratch) return;
+    if (!scratch) {
+        return;
+    }
     free(scratch->block);
     free(scratch);
 }

@@ -33,56 +33,76 @@ static double smooth(double t) {
 
 static double height_rough(const MildMapDef *def, double x, double y) {
     int points = (int)fmax(1.0, round(def->size / def->wavelength));
-    GridPlace a = grid_place(x / def->size * points, points, 1), b = grid_place(y / def->size * points, points, 1);
+    GridPlace a = grid_place(x / def->size * points, points, 1),
+              b = grid_place(y / def->size * points, points, 1);
     int i1 = (a.cell + 1) % points, j1 = (b.cell + 1) % points;
     double s = smooth(a.share), t = smooth(b.share);
-    double low = (1.0 - s) * lattice_height(def->seed, a.cell, b.cell) + s * lattice_height(def->seed, i1, b.cell);
-    double high = (1.0 - s) * lattice_height(def->seed, a.cell, j1) + s * lattice_height(def->seed, i1, j1);
+    double low = (1.0 - s) * lattice_height(def->seed, a.cell, b.cell) +
+                 s * lattice_height(def->seed, i1, b.cell);
+    double high =
+        (1.0 - s) * lattice_height(def->seed, a.cell, j1) + s * lattice_height(def->seed, i1, j1);
     return def->amplitude * ((1.0 - t) * low + t * high);
 }
 
-static MildStatus shape_allocate(MildMap *map, double columns, double rows, double cell_x, double cell_y, int repeats,
-                                 MildError *error) {
-    if ((columns + 1.0) * (rows + 1.0) > MILD_MAP_POINTS_MAX)
-        return mild_fail(error, MILD_ERROR_RANGE, "terrain.cell = %g makes %g x %g points, at most %d fit: larger cells",
+static MildStatus shape_allocate(MildMap *map, double columns, double rows, double cell_x,
+                                 double cell_y, int repeats, MildError *error) {
+    if ((columns + 1.0) * (rows + 1.0) > MILD_MAP_POINTS_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "terrain.cell = %g makes %g x %g points, at most %d fit: larger cells",
                          cell_x, columns + 1.0, rows + 1.0, MILD_MAP_POINTS_MAX);
+    }
     map->heights = grid_make((int)columns, (int)rows, cell_x, cell_y, repeats);
     map->height = malloc((size_t)((columns + 1.0) * (rows + 1.0)) * sizeof *map->height);
     return map->height ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "terrain: out of memory");
 }
 
-/* One period of a formula; a whole number of cells fills it. The last points are the first ones again. */
-static MildStatus shape_formula(MildMap *map, const MildMapDef *def, double period, int along_y, ShapeHeight height,
-                                MildError *error) {
-    double columns = ceil(period / def->cell - 1e-9), rows = along_y ? columns : 1.0, cell = period / columns;
+/* One period of a formula; a whole number of cells fills it. The last points are the first ones
+ * again. */
+static MildStatus shape_formula(MildMap *map, const MildMapDef *def, double period, int along_y,
+                                ShapeHeight height, MildError *error) {
+    double columns = ceil(period / def->cell - 1e-9), rows = along_y ? columns : 1.0,
+           cell = period / columns;
     MildStatus status = shape_allocate(map, columns, rows, cell, cell, 1, error);
-    if (status != MILD_OK) return status;
+    if (status != MILD_OK) {
+        return status;
+    }
     const Grid *grid = &map->heights;
-    for (int j = 0; j <= grid->rows; j++)
-        for (int i = 0; i <= grid->columns; i++)
+    for (int j = 0; j <= grid->rows; j++) {
+        for (int i = 0; i <= grid->columns; i++) {
             map->height[(size_t)j * ((size_t)grid->columns + 1) + (size_t)i] =
                 (float)height(def, (i % grid->columns) * cell, (j % grid->rows) * cell);
+        }
+    }
     return MILD_OK;
 }
 
 static MildStatus shape_image(MildMap *map, const MildMapDef *def, MildError *error) {
     int columns = def->height_columns, rows = def->height_rows;
-    if (!def->heights || columns < 2 || rows < 2)
+    if (!def->heights || columns < 2 || rows < 2) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "terrain.kind = image needs an image of at least 2 x 2 heights (terrain.image), got %d x %d",
+                         "terrain.kind = image needs an image of at least 2 x 2 heights "
+                         "(terrain.image), got %d x %d",
                          def->heights ? columns : 0, def->heights ? rows : 0);
-    MildStatus status = shape_allocate(map, columns - 1.0, rows - 1.0, def->cell, def->cell, 0, error);
-    if (status != MILD_OK) return status;
+    }
+    MildStatus status =
+        shape_allocate(map, columns - 1.0, rows - 1.0, def->cell, def->cell, 0, error);
+    if (status != MILD_OK) {
+        return status;
+    }
     map->heights.x0 = -0.5 * (columns - 1) * def->cell;
     map->heights.y0 = -0.5 * (rows - 1) * def->cell;
-    for (int j = 0; j < rows; j++)
+    for (int j = 0; j < rows; j++) {
         for (int i = 0; i < columns; i++) {
-            double height = def->amplitude * def->heights[(size_t)(rows - 1 - j) * (size_t)columns + (size_t)i];
-            if (!isfinite(height) || fabs(height) > 1e3)
-                return mild_fail(error, MILD_ERROR_RANGE, "terrain.image: height %g at row %d, column %d is not usable",
+            double height =
+                def->amplitude * def->heights[(size_t)(rows - 1 - j) * (size_t)columns + (size_t)i];
+            if (!isfinite(height) || fabs(height) > 1e3) {
+                return mild_fail(error, MILD_ERROR_RANGE,
+                                 "terrain.image: height %g at row %d, column %d is not usable",
                                  height, rows - 1 - j, i);
+            }
             map->height[(size_t)j * (size_t)columns + (size_t)i] = (float)height;
         }
+    }
     return MILD_OK;
 }
 

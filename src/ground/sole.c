@@ -7,7 +7,7 @@
 
 #define SOLE_ELEMENTS_MAX 65536
 #define SOLE_POINTS_MAX 4096 /* the search for crossing edges takes their square */
-#define RASTER_PHASES 16 /* raster offsets tried along each axis */
+#define RASTER_PHASES 16     /* raster offsets tried along each axis */
 
 struct MildSole {
     int elements;
@@ -52,38 +52,57 @@ static int edges_cross(const double *a, const double *b, const double *c, const 
 }
 
 static MildStatus def_check(const MildSoleDef *def, MildError *error) {
-    if (!def->outline || def->points < 3)
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "sole.points = %d: an outline needs at least 3", def->points);
-    if (def->points > SOLE_POINTS_MAX)
-        return mild_fail(error, MILD_ERROR_RANGE, "sole.points = %d: at most %d", def->points, SOLE_POINTS_MAX);
-    for (int i = 0; i < 2 * def->points; i++)
-        if (!isfinite(def->outline[i]) || fabs(def->outline[i]) > 10.0)
-            return mild_fail(error, MILD_ERROR_RANGE, "sole.outline[%d] = %g is not within 10 m", i / 2, def->outline[i]);
-    if (!(def->pitch >= 1e-3 && def->pitch <= 1.0))
-        return mild_fail(error, MILD_ERROR_RANGE, "sole.pitch = %g is outside 0.001 .. 1: [m] element edge", def->pitch);
-    if (!isfinite(def->sole_z))
+    if (!def->outline || def->points < 3) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "sole.points = %d: an outline needs at least 3", def->points);
+    }
+    if (def->points > SOLE_POINTS_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE, "sole.points = %d: at most %d", def->points,
+                         SOLE_POINTS_MAX);
+    }
+    for (int i = 0; i < 2 * def->points; i++) {
+        if (!isfinite(def->outline[i]) || fabs(def->outline[i]) > 10.0) {
+            return mild_fail(error, MILD_ERROR_RANGE, "sole.outline[%d] = %g is not within 10 m",
+                             i / 2, def->outline[i]);
+        }
+    }
+    if (!(def->pitch >= 1e-3 && def->pitch <= 1.0)) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "sole.pitch = %g is outside 0.001 .. 1: [m] element edge", def->pitch);
+    }
+    if (!isfinite(def->sole_z)) {
         return mild_fail(error, MILD_ERROR_RANGE, "sole.sole_z = %g is not finite", def->sole_z);
-    if (def->target_elements < 0 || def->target_elements > SOLE_ELEMENTS_MAX)
-        return mild_fail(error, MILD_ERROR_RANGE, "sole.target_elements = %d is outside 0 .. %d", def->target_elements,
-                         SOLE_ELEMENTS_MAX);
-    for (int i = 0; i < def->points; i++)
-        for (int j = i + 1; j < def->points; j++)
-            if (edges_cross(&def->outline[2 * i], &def->outline[2 * ((i + 1) % def->points)], &def->outline[2 * j],
-                            &def->outline[2 * ((j + 1) % def->points)]))
-                return mild_fail(error, MILD_ERROR_ARGUMENT, "sole.outline crosses itself: edges %d and %d", i, j);
+    }
+    if (def->target_elements < 0 || def->target_elements > SOLE_ELEMENTS_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE, "sole.target_elements = %d is outside 0 .. %d",
+                         def->target_elements, SOLE_ELEMENTS_MAX);
+    }
+    for (int i = 0; i < def->points; i++) {
+        for (int j = i + 1; j < def->points; j++) {
+            if (edges_cross(&def->outline[2 * i], &def->outline[2 * ((i + 1) % def->points)],
+                            &def->outline[2 * j], &def->outline[2 * ((j + 1) % def->points)])) {
+                return mild_fail(error, MILD_ERROR_ARGUMENT,
+                                 "sole.outline crosses itself: edges %d and %d", i, j);
+            }
+        }
+    }
     Outline outline = outline_measure(def);
-    if (!(outline.area > 0.0)) return mild_fail(error, MILD_ERROR_RANGE, "sole.outline encloses no area");
+    if (!(outline.area > 0.0)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "sole.outline encloses no area");
+    }
     double cells = ((outline.high[0] - outline.low[0]) / def->pitch + 2.0) *
                    ((outline.high[1] - outline.low[1]) / def->pitch + 2.0);
-    if (cells > SOLE_ELEMENTS_MAX)
-        return mild_fail(error, MILD_ERROR_RANGE, "sole.pitch = %g makes %.0f cells, at most %d", def->pitch, cells,
-                         SOLE_ELEMENTS_MAX);
+    if (cells > SOLE_ELEMENTS_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE, "sole.pitch = %g makes %.0f cells, at most %d",
+                         def->pitch, cells, SOLE_ELEMENTS_MAX);
+    }
     return MILD_OK;
 }
 
-/* The part of a convex strip: keep the points where sign * (p[axis] - bound) >= 0 (Sutherland-Hodgman). `out` has room
- * for twice `count` points. */
-static int clip_half(const double *in, int count, double *out, int axis, double bound, double sign) {
+/* The part of a convex strip: keep the points where sign * (p[axis] - bound) >= 0
+ * (Sutherland-Hodgman). `out` has room for twice `count` points. */
+static int clip_half(const double *in, int count, double *out, int axis, double bound,
+                     double sign) {
     int kept = 0;
     for (int i = 0; i < count; i++) {
         const double *p = &in[2 * i], *q = &in[2 * ((i + 1) % count)];
@@ -93,27 +112,33 @@ static int clip_half(const double *in, int count, double *out, int axis, double 
         }
         if ((dp > 0.0 && dq < 0.0) || (dp < 0.0 && dq > 0.0)) {
             double t = dp / (dp - dq);
-            for (int k = 0; k < 2; k++) out[2 * kept + k] = p[k] + t * (q[k] - p[k]);
+            for (int k = 0; k < 2; k++) {
+                out[2 * kept + k] = p[k] + t * (q[k] - p[k]);
+            }
             out[2 * kept++ + axis] = bound;
         }
     }
     return kept;
 }
 
-/* Share of a cell that the outline covers, 0 .. 1. Clipping a polygon by a rectangle may leave edges that run back and
- * forth along the border; they enclose nothing, so the area is exact for concave outlines too. */
+/* Share of a cell that the outline covers, 0 .. 1. Clipping a polygon by a rectangle may leave
+ * edges that run back and forth along the border; they enclose nothing, so the area is exact for
+ * concave outlines too. */
 static double cell_coverage(const MildSoleDef *def, const double *corner, double *work) {
     int count = def->points;
     double *a = work, *b = work + 32 * (size_t)def->points;
     memcpy(a, def->outline, 2 * (size_t)count * sizeof *a);
     for (int axis = 0; axis < 2 && count; axis++) {
         count = clip_half(a, count, b, axis, corner[axis], 1.0);
-        if (count) count = clip_half(b, count, a, axis, corner[axis] + def->pitch, -1.0);
+        if (count) {
+            count = clip_half(b, count, a, axis, corner[axis] + def->pitch, -1.0);
+        }
     }
     double twice = 0.0;
     for (int i = 0; i < count; i++) {
         int j = (i + 1) % count;
-        twice += (a[2 * i] - corner[0]) * (a[2 * j + 1] - corner[1]) - (a[2 * j] - corner[0]) * (a[2 * i + 1] - corner[1]);
+        twice += (a[2 * i] - corner[0]) * (a[2 * j + 1] - corner[1]) -
+                 (a[2 * j] - corner[0]) * (a[2 * i + 1] - corner[1]);
     }
     return 0.5 * fabs(twice) / (def->pitch * def->pitch);
 }
@@ -122,13 +147,15 @@ static int point_inside(const MildSoleDef *def, double x, double y) {
     int inside = 0;
     for (int i = 0; i < def->points; i++) {
         const double *p = &def->outline[2 * i], *q = &def->outline[2 * ((i + 1) % def->points)];
-        if ((p[1] > y) != (q[1] > y) && x < p[0] + (y - p[1]) / (q[1] - p[1]) * (q[0] - p[0])) inside = !inside;
+        if ((p[1] > y) != (q[1] > y) && x < p[0] + (y - p[1]) / (q[1] - p[1]) * (q[0] - p[0])) {
+            inside = !inside;
+        }
     }
     return inside;
 }
 
-/* The raster whose cell borders run at phase[k] * pitch beside the middle of the outline's box: measured from the
- * middle, so that mirrored outlines get mirrored rasters. */
+/* The raster whose cell borders run at phase[k] * pitch beside the middle of the outline's box:
+ * measured from the middle, so that mirrored outlines get mirrored rasters. */
 static Raster raster_at(const MildSoleDef *def, const Outline *outline, const double *phase) {
     Raster raster;
     int cells[2];
@@ -143,41 +170,55 @@ static Raster raster_at(const MildSoleDef *def, const Outline *outline, const do
     return raster;
 }
 
-/* Cells whose centre is inside; *off_center: distance between the centroids of these cells and of the outline. */
-static int raster_count(const MildSoleDef *def, const Outline *outline, const Raster *raster, double *off_center) {
+/* Cells whose centre is inside; *off_center: distance between the centroids of these cells and of
+ * the outline. */
+static int raster_count(const MildSoleDef *def, const Outline *outline, const Raster *raster,
+                        double *off_center) {
     int count = 0;
     double sum[2] = {0.0, 0.0};
-    for (int i = 0; i < raster->columns; i++)
+    for (int i = 0; i < raster->columns; i++) {
         for (int j = 0; j < raster->rows; j++) {
-            double x = raster->origin[0] + (i + 0.5) * def->pitch, y = raster->origin[1] + (j + 0.5) * def->pitch;
-            if (!point_inside(def, x, y)) continue;
+            double x = raster->origin[0] + (i + 0.5) * def->pitch,
+                   y = raster->origin[1] + (j + 0.5) * def->pitch;
+            if (!point_inside(def, x, y)) {
+                continue;
+            }
             count++;
             sum[0] += x;
             sum[1] += y;
         }
-    *off_center = count ? hypot(sum[0] / count - outline->center[0], sum[1] / count - outline->center[1]) : INFINITY;
+    }
+    *off_center =
+        count ? hypot(sum[0] / count - outline->center[0], sum[1] / count - outline->center[1])
+              : INFINITY;
     return count;
 }
 
-/* The offset whose count comes nearest to the target (none given: to the outline's area); among equals the one with the
- * nearest centroid. */
+/* The offset whose count comes nearest to the target (none given: to the outline's area); among
+ * equals the one with the nearest centroid. */
 static Raster raster_choose(const MildSoleDef *def, const Outline *outline) {
     int best_miss = INT32_MAX;
     double best_off = INFINITY;
     Raster best = {{0.0, 0.0}, 0, 0};
-    int phases = def->target_elements ? RASTER_PHASES : 2; /* without a target: a border or a centre in the middle */
-    int target = def->target_elements ? def->target_elements : (int)lround(outline->area / (def->pitch * def->pitch));
-    for (int i = 0; i < phases; i++)
+    int phases = def->target_elements
+                     ? RASTER_PHASES
+                     : 2; /* without a target: a border or a centre in the middle */
+    int target = def->target_elements ? def->target_elements
+                                      : (int)lround(outline->area / (def->pitch * def->pitch));
+    for (int i = 0; i < phases; i++) {
         for (int j = 0; j < phases; j++) {
             double phase[2] = {(double)i / phases, (double)j / phases}, off;
             Raster raster = raster_at(def, outline, phase);
             int count = raster_count(def, outline, &raster, &off);
             int miss = abs(count - target);
-            if (miss > best_miss || (miss == best_miss && off >= best_off - 1e-9)) continue;
+            if (miss > best_miss || (miss == best_miss && off >= best_off - 1e-9)) {
+                continue;
+            }
             best_miss = miss;
             best_off = off;
             best = raster;
         }
+    }
     return best;
 }
 
@@ -189,8 +230,12 @@ typedef struct {
 /* Centres inside first, then by coverage; the cell number makes the order total. */
 static int cell_compare(const void *left, const void *right) {
     const Cell *a = left, *b = right;
-    if (a->inside != b->inside) return b->inside - a->inside;
-    if (a->coverage != b->coverage) return a->coverage < b->coverage ? 1 : -1;
+    if (a->inside != b->inside) {
+        return b->inside - a->inside;
+    }
+    if (a->coverage != b->coverage) {
+        return a->coverage < b->coverage ? 1 : -1;
+    }
     return a->cell - b->cell;
 }
 
@@ -198,8 +243,10 @@ static int cell_compare_place(const void *left, const void *right) {
     return ((const Cell *)left)->cell - ((const Cell *)right)->cell;
 }
 
-/* Fills `cells` sorted so that the first *chosen make the sole. Returns false when the target is out of reach. */
-static int cells_choose(const MildSoleDef *def, const Raster *raster, Cell *cells, double *work, int *chosen) {
+/* Fills `cells` sorted so that the first *chosen make the sole. Returns false when the target is
+ * out of reach. */
+static int cells_choose(const MildSoleDef *def, const Raster *raster, Cell *cells, double *work,
+                        int *chosen) {
     int total = raster->columns * raster->rows, inside = 0;
     for (int cell = 0; cell < total; cell++) {
         double corner[2] = {raster->origin[0] + cell / raster->rows * def->pitch,
@@ -211,26 +258,34 @@ static int cells_choose(const MildSoleDef *def, const Raster *raster, Cell *cell
     }
     qsort(cells, (size_t)total, sizeof *cells, cell_compare);
     *chosen = def->target_elements ? def->target_elements : inside;
-    if (*chosen < 1 || *chosen > total || !(cells[*chosen - 1].coverage > 1e-9)) return 0;
+    if (*chosen < 1 || *chosen > total || !(cells[*chosen - 1].coverage > 1e-9)) {
+        return 0;
+    }
     qsort(cells, (size_t)*chosen, sizeof *cells, cell_compare_place);
     return 1;
 }
 
-static MildSole *sole_from_cells(const MildSoleDef *def, const Raster *raster, const Cell *cells, int count) {
+static MildSole *sole_from_cells(const MildSoleDef *def, const Raster *raster, const Cell *cells,
+                                 int count) {
     MildSole *sole = malloc(sizeof *sole + 2 * (size_t)count * sizeof(double));
-    if (!sole) return NULL;
+    if (!sole) {
+        return NULL;
+    }
     sole->elements = count;
     sole->pitch = def->pitch;
     sole->z = def->sole_z;
     for (int i = 0; i < count; i++) {
         sole->values[i] = raster->origin[0] + (cells[i].cell / raster->rows + 0.5) * def->pitch;
-        sole->values[count + i] = raster->origin[1] + (cells[i].cell % raster->rows + 0.5) * def->pitch;
+        sole->values[count + i] =
+            raster->origin[1] + (cells[i].cell % raster->rows + 0.5) * def->pitch;
     }
     return sole;
 }
 
 MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
-    if (def_check(def, error) != MILD_OK) return NULL;
+    if (def_check(def, error) != MILD_OK) {
+        return NULL;
+    }
     Outline outline = outline_measure(def);
     Raster raster = raster_choose(def, &outline);
     MildSole *sole = NULL;
@@ -240,15 +295,20 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
     Cell *cells = malloc(((size_t)raster.columns * (size_t)raster.rows + 1) * sizeof *cells);
     if (work && cells) {
         reached = cells_choose(def, &raster, cells, work, &chosen);
-        if (reached) sole = sole_from_cells(def, &raster, cells, chosen);
+        if (reached) {
+            sole = sole_from_cells(def, &raster, cells, chosen);
+        }
     }
     free(cells);
     free(work);
-    if (!reached)
-        mild_fail(error, MILD_ERROR_RANGE, "sole.target_elements = %d: cells of pitch %g that touch the outline do not suffice",
-                  def->target_elements, def->pitch);
-    else if (!sole)
+    if (!reached) {
+        mild_fail(
+            error, MILD_ERROR_RANGE,
+            "sole.target_elements = %d: cells of pitch %g that touch the outline do not suffice",
+            def->target_elements, def->pitch);
+    } else if (!sole) {
         mild_fail(error, MILD_ERROR_MEMORY, "sole: out of memory for %d elements", chosen);
+    }
     return sole;
 }
 
@@ -258,7 +318,8 @@ MildSole *mild_sole_concentric(const MildSole *sole, MildError *error) {
         mild_fail(error, MILD_ERROR_MEMORY, "sole: out of memory for one element");
         return NULL;
     }
-    *one = (MildSole){.elements = 1, .pitch = sole->pitch * sqrt((double)sole->elements), .z = sole->z};
+    *one = (MildSole){
+        .elements = 1, .pitch = sole->pitch * sqrt((double)sole->elements), .z = sole->z};
     one->values[0] = one->values[1] = 0.0;
     for (int i = 0; i < sole->elements; i++) {
         one->values[0] += sole->values[i] / sole->elements;

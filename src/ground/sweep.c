@@ -4,54 +4,76 @@
 
 #define SWEEP_TOLERANCE 1e-10
 #define SWEEP_LIMIT 1000
-#define SWEEP_REST 1e-6 /* of the impulses themselves: where a guide holds the feet, friction may still turn that moves nothing */
-#define SWEEP_LEAST_G 1e-9 /* [1/kg] a foot that cannot move sideways needs no friction; keeps beta finite */
+#define SWEEP_REST                                                                                 \
+    1e-6 /* of the impulses themselves: where a guide holds the feet, friction may still turn that \
+            moves nothing */
+#define SWEEP_LEAST_G                                                                              \
+    1e-9 /* [1/kg] a foot that cannot move sideways needs no friction; keeps beta finite */
 
-/* Algorithm 1 of the paper. The foot twists are kept up to date, so a velocity prediction costs O(1) and a sweep O(N);
- * the mean over the preceding elements in delta_rb is a running mean. */
+/* Algorithm 1 of the paper. The foot twists are kept up to date, so a velocity prediction costs
+ * O(1) and a sweep O(N); the mean over the preceding elements in delta_rb is a running mean. */
 typedef struct {
     int n;
     double dt;
     const double *A;
     double twist[TWIST_MAX];
-    double before[MILD_FEET_MAX][2]; /* sums of the preceding elements' (v_j - omega x p_j), horizontal */
+    double before[MILD_FEET_MAX]
+                 [2]; /* sums of the preceding elements' (v_j - omega x p_j), horizontal */
     int preceding[MILD_FEET_MAX];
-    double changed, total; /* [N s] sums over the elements of a sweep: of the impulses' changes (e of Algorithm 1), and of them */
+    double changed, total; /* [N s] sums over the elements of a sweep: of the impulses' changes (e
+                              of Algorithm 1), and of them */
 } Sweep;
 
 /* V += A B^T dI */
 static void sweep_apply(Sweep *sweep, int f, const double *p, const double *change) {
-    const double wrench[6] = {change[0], change[1], change[2], p[1] * change[2] - p[2] * change[1],
-                              p[2] * change[0] - p[0] * change[2], p[0] * change[1] - p[1] * change[0]};
+    const double wrench[6] = {change[0],
+                              change[1],
+                              change[2],
+                              p[1] * change[2] - p[2] * change[1],
+                              p[2] * change[0] - p[0] * change[2],
+                              p[0] * change[1] - p[1] * change[0]};
     for (int k = 0; k < 6; k++) {
         const double *row = sweep->A + (6 * f + k) * sweep->n; /* A is symmetric */
-        for (int j = 0; j < sweep->n; j++) sweep->twist[j] += row[j] * wrench[k];
+        for (int j = 0; j < sweep->n; j++) {
+            sweep->twist[j] += row[j] * wrench[k];
+        }
     }
 }
 
-/* Diagonal of G = B A B^T at one element: along x, along y, and along (-slope, 1), the normal impulse's direction. */
-static void element_inverse_mass(const Sweep *sweep, int f, const double *p, double a, double b, double *G) {
-    const double J[3][6] = {{1, 0, 0, 0, p[2], -p[1]}, {0, 1, 0, -p[2], 0, p[0]},
+/* Diagonal of G = B A B^T at one element: along x, along y, and along (-slope, 1), the normal
+ * impulse's direction. */
+static void element_inverse_mass(const Sweep *sweep, int f, const double *p, double a, double b,
+                                 double *G) {
+    const double J[3][6] = {{1, 0, 0, 0, p[2], -p[1]},
+                            {0, 1, 0, -p[2], 0, p[0]},
                             {-a, -b, 1, p[1] + b * p[2], -p[0] - a * p[2], a * p[1] - b * p[0]}};
     for (int axis = 0; axis < 3; axis++) {
         G[axis] = 0.0;
-        for (int i = 0; i < 6; i++)
-            for (int j = 0; j < 6; j++) G[axis] += J[axis][i] * sweep->A[(6 * f + i) * sweep->n + 6 * f + j] * J[axis][j];
+        for (int i = 0; i < 6; i++) {
+            for (int j = 0; j < 6; j++) {
+                G[axis] += J[axis][i] * sweep->A[(6 * f + i) * sweep->n + 6 * f + j] * J[axis][j];
+            }
+        }
     }
 }
 
-/* Implicit normal impulse: one Newton step on I - I(w), where a change dI slows the element by G_zz dI. */
+/* Implicit normal impulse: one Newton step on I - I(w), where a change dI slows the element by G_zz
+ * dI. */
 static double element_normal(const Slots *s, int i, double dt, double w, double G) {
     double target, slope;
     step_normal(s, i, dt, 1, w, &target, &slope);
     return fmax(s->iz[i] + (target - s->iz[i]) / (1.0 + G * slope), 0.0);
 }
 
-/* Paper eq 13: predict, correct by the continuity error, project on the friction disc. Where friction.h's t holds, the law
- * is v = (dt f - I)/(dt^2 k + c), a compliance beside G; where it does not, I has the direction of t at any scale. */
-static void element_friction(const Slots *s, int i, const double *v, const double *delta, double G) {
-    double radius = s->mu[i] * s->iz[i] + s->drift_radius[i], stiff = s->grip[i] + FRICTION_LAG * radius;
-    double compliance = stiff > 0.0 ? 1.0 / stiff : 0.0, beta = 0.5 / (G + compliance), gamma = 0.1 * beta;
+/* Paper eq 13: predict, correct by the continuity error, project on the friction disc. Where
+ * friction.h's t holds, the law is v = (dt f - I)/(dt^2 k + c), a compliance beside G; where it
+ * does not, I has the direction of t at any scale. */
+static void element_friction(const Slots *s, int i, const double *v, const double *delta,
+                             double G) {
+    double radius = s->mu[i] * s->iz[i] + s->drift_radius[i],
+           stiff = s->grip[i] + FRICTION_LAG * radius;
+    double compliance = stiff > 0.0 ? 1.0 / stiff : 0.0, beta = 0.5 / (G + compliance),
+           gamma = 0.1 * beta;
     double x = s->fx[i] - gamma * delta[0] - beta * (v[0] + compliance * (s->fx[i] - s->hold_x[i]));
     double y = s->fy[i] - gamma * delta[1] - beta * (v[1] + compliance * (s->fy[i] - s->hold_y[i]));
     double length = sqrt(x * x + y * y), scale = length > radius ? radius / length : 1.0;
@@ -65,20 +87,27 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     const double *V = sweep->twist + 6 * f;
     double p[3];
     slot_arm(foot, s, i, p);
-    double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]}, v[2] = {V[0] + turn[0], V[1] + turn[1]};
-    double w = s->slope_x[i] * v[0] + s->slope_y[i] * v[1] - (V[2] + V[3] * p[1] - V[4] * p[0]), delta[2] = {0.0, 0.0}, G[3];
+    double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]},
+           v[2] = {V[0] + turn[0], V[1] + turn[1]};
+    double w = s->slope_x[i] * v[0] + s->slope_y[i] * v[1] - (V[2] + V[3] * p[1] - V[4] * p[0]),
+           delta[2] = {0.0, 0.0}, G[3];
     /* Paper eqs 11, 12 with v_i - v_j - omega x (p_i - p_j) as a vector. */
     for (int k = 0; k < 2; k++) {
-        if (sweep->preceding[f] > 0) delta[k] = v[k] - turn[k] - sweep->before[f][k] / sweep->preceding[f];
+        if (sweep->preceding[f] > 0) {
+            delta[k] = v[k] - turn[k] - sweep->before[f][k] / sweep->preceding[f];
+        }
         sweep->before[f][k] += v[k] - turn[k];
     }
     sweep->preceding[f]++;
     element_inverse_mass(sweep, f, p, s->slope_x[i], s->slope_y[i], G);
-    double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G), old[3] = {s->ix[i], s->iy[i], s->iz[i]}, fx = s->fx[i], fy = s->fy[i];
+    double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G), old[3] = {s->ix[i], s->iy[i], s->iz[i]},
+           fx = s->fx[i], fy = s->fy[i];
     s->iz[i] = element_normal(s, i, sweep->dt, w, G[2]);
     element_friction(s, i, v, delta, G_xy);
-    double b = s->damping[i], relax = 1.0 / (1.0 + b * G_xy); /* implicit drift damping, as for the normal part */
-    double nx = s->slope_x[i] * s->iz[i], ny = s->slope_y[i] * s->iz[i]; /* the normal impulse leans downhill */
+    double b = s->damping[i],
+           relax = 1.0 / (1.0 + b * G_xy); /* implicit drift damping, as for the normal part */
+    double nx = s->slope_x[i] * s->iz[i],
+           ny = s->slope_y[i] * s->iz[i]; /* the normal impulse leans downhill */
     double bx = old[0] + s->slope_x[i] * old[2] - fx, by = old[1] + s->slope_y[i] * old[2] - fy;
     s->ix[i] = s->fx[i] + bx - relax * (b * v[0] + bx) - nx;
     s->iy[i] = s->fy[i] + by - relax * (b * v[1] + by) - ny;
@@ -131,7 +160,9 @@ static double sweep_distance(const Sweep *sweep, const double *a, const double *
     double sum = 0.0;
     for (int i = 0; i < sweep->n; i++) {
         double row = 0.0;
-        for (int j = 0; j < sweep->n; j++) row += sweep->A[i * sweep->n + j] * (a[j] - b[j]);
+        for (int j = 0; j < sweep->n; j++) {
+            row += sweep->A[i * sweep->n + j] * (a[j] - b[j]);
+        }
         sum += (a[i] - b[i]) * row;
     }
     return sqrt(fmax(sum, 0.0));
@@ -141,7 +172,8 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
     Sweep sweep = {.n = 6 * scratch->feet, .dt = input->dt, .A = input->inverse_inertia};
     static const double zero[TWIST_MAX];
     int limit = input->max_iterations > 0 ? input->max_iterations : SWEEP_LIMIT, iterations = 0;
-    double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE, change = INFINITY, scale = 0.0;
+    double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE,
+           change = INFINITY, scale = 0.0;
     double *wrench = scratch->wrench, before[TWIST_MAX];
     sweep_start(&sweep, scratch, input);
     sweep_wrench(scratch, wrench);
@@ -152,21 +184,27 @@ void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContac
         memcpy(before, wrench, sizeof before);
         memset(sweep.before, 0, sizeof sweep.before);
         memset(sweep.preceding, 0, sizeof sweep.preceding);
-        for (int f = 0; f < scratch->feet; f++)
-            for (int i = 0; i < scratch->foot[f].active; i++)
+        for (int f = 0; f < scratch->feet; f++) {
+            for (int i = 0; i < scratch->foot[f].active; i++) {
                 sweep_element(&sweep, &scratch->foot[f], f, i);
+            }
+        }
         sweep_wrench(scratch, wrench);
         change = sweep_distance(&sweep, wrench, before);
         scale = sweep_distance(&sweep, wrench, zero);
         rests = sweep.changed <= SWEEP_REST * sweep.total;
-        if (isnan(change)) break;
+        if (isnan(change)) {
+            break;
+        }
     }
     result->iterations = iterations;
     result->residual = scale > 0.0 ? change / scale : change;
     result->converged = rests && change <= tolerance * scale;
     for (int i = 0; i < sweep.n; i++) {
         double sum = input->free_velocity[i];
-        for (int j = 0; j < sweep.n; j++) sum += sweep.A[i * sweep.n + j] * wrench[j];
+        for (int j = 0; j < sweep.n; j++) {
+            sum += sweep.A[i * sweep.n + j] * wrench[j];
+        }
         result->velocity[i] = sum;
     }
 }

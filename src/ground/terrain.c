@@ -14,29 +14,39 @@ static int patches_overlap(const MildPatch *a, const MildPatch *b) {
 }
 
 MildStatus mild_terrain_add_patch(MildTerrain *terrain, const MildPatch *patch, MildError *error) {
-    if (terrain->patch_count >= MILD_PATCHES_MAX)
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "terrain: patch_count is full, at most %d patches", MILD_PATCHES_MAX);
-    if (patch->material < 0 || patch->material >= terrain->material_count)
-        return mild_fail(error, MILD_ERROR_RANGE, "patch.material = %d is not one of %d materials", patch->material,
-                         terrain->material_count);
+    if (terrain->patch_count >= MILD_PATCHES_MAX) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "terrain: patch_count is full, at most %d patches", MILD_PATCHES_MAX);
+    }
+    if (patch->material < 0 || patch->material >= terrain->material_count) {
+        return mild_fail(error, MILD_ERROR_RANGE, "patch.material = %d is not one of %d materials",
+                         patch->material, terrain->material_count);
+    }
     /* Written so that NaN fails; infinite edges make half planes and strips. */
-    if (!(patch->x_min < patch->x_max))
-        return mild_fail(error, MILD_ERROR_RANGE, "patch.x_min = %g must be below patch.x_max = %g", patch->x_min,
-                         patch->x_max);
-    if (!(patch->y_min < patch->y_max))
-        return mild_fail(error, MILD_ERROR_RANGE, "patch.y_min = %g must be below patch.y_max = %g", patch->y_min,
-                         patch->y_max);
-    for (int i = 0; i < terrain->patch_count; i++)
-        if (patches_overlap(&terrain->patches[i], patch))
-            return mild_fail(error, MILD_ERROR_ARGUMENT, "patch.x_min .. y_max: the rectangle overlaps patch %d", i);
+    if (!(patch->x_min < patch->x_max)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "patch.x_min = %g must be below patch.x_max = %g",
+                         patch->x_min, patch->x_max);
+    }
+    if (!(patch->y_min < patch->y_max)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "patch.y_min = %g must be below patch.y_max = %g",
+                         patch->y_min, patch->y_max);
+    }
+    for (int i = 0; i < terrain->patch_count; i++) {
+        if (patches_overlap(&terrain->patches[i], patch)) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "patch.x_min .. y_max: the rectangle overlaps patch %d", i);
+        }
+    }
     terrain->patches[terrain->patch_count++] = *patch;
     return MILD_OK;
 }
 
 MildStatus mild_terrain_set_map(MildTerrain *terrain, const MildMap *map, MildError *error) {
-    if (map && map->label_count > terrain->material_count)
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "terrain.patches: label %d has no material, the terrain has %d",
+    if (map && map->label_count > terrain->material_count) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "terrain.patches: label %d has no material, the terrain has %d",
                          map->label_count - 1, terrain->material_count);
+    }
     terrain->map = map;
     return MILD_OK;
 }
@@ -45,10 +55,12 @@ MildStatus mild_terrain_set_map(MildTerrain *terrain, const MildMap *map, MildEr
 static Label terrain_label(const MildTerrain *terrain, double x, double y) {
     for (int i = 0; i < terrain->patch_count; i++) {
         const MildPatch *patch = &terrain->patches[i];
-        if (x >= patch->x_min && x < patch->x_max && y >= patch->y_min && y < patch->y_max)
+        if (x >= patch->x_min && x < patch->x_max && y >= patch->y_min && y < patch->y_max) {
             return (Label){(unsigned char)patch->material, 0, 0};
+        }
     }
-    return terrain->map ? map_label(terrain->map, x - terrain->map_x, y - terrain->map_y) : (Label){0, 0, 0};
+    return terrain->map ? map_label(terrain->map, x - terrain->map_x, y - terrain->map_y)
+                        : (Label){0, 0, 0};
 }
 
 int mild_terrain_material_at(const MildTerrain *terrain, double x, double y) {
@@ -79,7 +91,9 @@ double terrain_steepest(const MildTerrain *terrain) {
 
 double terrain_surface(const MildTerrain *terrain, double x, double y, double slope[2]) {
     slope[0] = slope[1] = 0.0;
-    double height = terrain->map ? map_surface(terrain->map, x - terrain->map_x, y - terrain->map_y, slope) : 0.0;
+    double height = terrain->map
+                        ? map_surface(terrain->map, x - terrain->map_x, y - terrain->map_y, slope)
+                        : 0.0;
     return terrain->height + height;
 }
 

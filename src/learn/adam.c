@@ -14,9 +14,10 @@ AdamStep adam_step(double learning_rate, int64_t t, double gradient_scale) {
     };
 }
 
-/* m = b1 m + (1-b1) g,  v = b2 v + (1-b2) g^2,  p -= lr m^ / (sqrt(v^) + eps), m^ and v^ without their start's bias. */
-void adam_apply(AdamStep step, int64_t count, const float *restrict gradient, float *restrict parameters,
-                float *restrict first, float *restrict second) {
+/* m = b1 m + (1-b1) g,  v = b2 v + (1-b2) g^2,  p -= lr m^ / (sqrt(v^) + eps), m^ and v^ without
+ * their start's bias. */
+void adam_apply(AdamStep step, int64_t count, const float *restrict gradient,
+                float *restrict parameters, float *restrict first, float *restrict second) {
 #pragma omp simd
     for (int64_t i = 0; i < count; i++) {
         float g = gradient[i] * step.gradient_scale;

@@ -12,6 +12,7 @@ typedef struct {
 
 /* t: number of this step, from 1. */
 AdamStep adam_step(double learning_rate, int64_t t, double gradient_scale);
-void adam_apply(AdamStep step, int64_t count, const float *gradient, float *parameters, float *first, float *second);
+void adam_apply(AdamStep step, int64_t count, const float *gradient, float *parameters,
+                float *first, float *second);
 
 #endif

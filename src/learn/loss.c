@@ -9,8 +9,8 @@
 
 size_t loss_carve(const Network *network, int rows, int mirrored, float *block, LossChunk *chunk) {
     const PolicyDef *def = &network->def;
-    const Mlp *const mlps[] = {&network->encoder, &network->decoder, &network->modulation, &network->actor,
-                               &network->critic};
+    const Mlp *const mlps[] = {&network->encoder, &network->decoder, &network->modulation,
+                               &network->actor, &network->critic};
     size_t used = 0, n = (size_t)rows, all = (size_t)(rows + mirrored), widest = 0;
     for (int i = 0; i < NETWORK_MLPS; i++) {
         size_t width = (size_t)mlp_widest(mlps[i]);
@@ -75,13 +75,15 @@ float loss_log_prob(int actions, const float *action, const float *mean, const f
     return (float)sum;
 }
 
-/* Clipped surrogate of one sample, -min(r A, clip(r) A), r = exp(log_prob - old_log_prob). Gradient:
- *   d/dlog_prob = -A r where the first branch is the smaller one, else 0;
- *   dlog_prob/dmean = (a - mean)/std^2,  dlog_prob/dlog_std = ((a - mean)/std)^2 - 1. */
-static void surrogate_row(const LossContext *c, const LossChunk *chunk, int r, const float *constant, const float *mean,
-                          float *d_mean, float *d_log_std, LossSums *sums) {
+/* Clipped surrogate of one sample, -min(r A, clip(r) A), r = exp(log_prob - old_log_prob).
+ * Gradient: d/dlog_prob = -A r where the first branch is the smaller one, else 0; dlog_prob/dmean =
+ * (a - mean)/std^2,  dlog_prob/dlog_std = ((a - mean)/std)^2 - 1. */
+static void surrogate_row(const LossContext *c, const LossChunk *chunk, int r,
+                          const float *constant, const float *mean, float *d_mean, float *d_log_std,
+                          LossSums *sums) {
     const int actions = c->network->def.actions;
-    const float *action = chunk->action + (int64_t)r * actions, *old_mean = chunk->old_mean + (int64_t)r * actions;
+    const float *action = chunk->action + (int64_t)r * actions,
+                *old_mean = chunk->old_mean + (int64_t)r * actions;
     const float *inverse = constant;
     float log_prob = constant[actions], kl = constant[actions + 1];
     float t[NETWORK_ACTIONS_MAX];
@@ -95,7 +97,9 @@ static void surrogate_row(const LossContext *c, const LossChunk *chunk, int r, c
     float ratio = expf(log_prob - chunk->old_log_prob[r]);
     float held = fminf(fmaxf(ratio, 1.0f - clip), 1.0f + clip);
     float free_term = ratio * advantage, held_term = held * advantage;
-    float d_log_prob = free_term <= held_term ? -free_term * c->sample_weight * (float)(1.0 - c->def->epsilon) : 0.0f;
+    float d_log_prob = free_term <= held_term
+                           ? -free_term * c->sample_weight * (float)(1.0 - c->def->epsilon)
+                           : 0.0f;
     for (int j = 0; j < actions; j++) {
         d_mean[j] = d_log_prob * t[j] * inverse[j];
         d_log_std[j] += d_log_prob * (t[j] * t[j] - 1.0f);
@@ -119,22 +123,25 @@ void loss_surrogate_constants(const LossContext *c, float *constant) {
 }
 
 /* Surrogate and entropy sum log std: writes d_mean of the samples and the gradient of log std. */
-static void policy_loss(const LossContext *c, LossChunk *chunk, const float *mean, float *d_log_std, float beta,
-                        LossSums *sums) {
+static void policy_loss(const LossContext *c, LossChunk *chunk, const float *mean, float *d_log_std,
+                        float beta, LossSums *sums) {
     const int actions = c->network->def.actions;
     float constant[NETWORK_ACTIONS_MAX + 2];
     loss_surrogate_constants(c, constant);
-    float entropy_share = (float)((1.0 - c->def->epsilon) * c->def->entropy) * c->sample_weight * (float)chunk->rows;
+    float entropy_share =
+        (float)((1.0 - c->def->epsilon) * c->def->entropy) * c->sample_weight * (float)chunk->rows;
     for (int j = 0; j < actions; j++) {
-        d_log_std[j] = (beta == 0.0f ? 0.0f : d_log_std[j]) - entropy_share; /* 0 * NaN would stay NaN */
+        d_log_std[j] =
+            (beta == 0.0f ? 0.0f : d_log_std[j]) - entropy_share; /* 0 * NaN would stay NaN */
     }
     for (int r = 0; r < chunk->rows; r++) {
-        surrogate_row(c, chunk, r, constant, mean + (int64_t)r * actions, chunk->d_mean + (int64_t)r * actions,
-                      d_log_std, sums);
+        surrogate_row(c, chunk, r, constant, mean + (int64_t)r * actions,
+                      chunk->d_mean + (int64_t)r * actions, d_log_std, sums);
     }
 }
 
-/* mean over samples and actions of (mean(o) - M_a mean(M_o o))^2, gradient through both: either side may be the better one. */
+/* mean over samples and actions of (mean(o) - M_a mean(M_o o))^2, gradient through both: either
+ * side may be the better one. */
 static void mirror_loss(const LossContext *c, LossChunk *chunk, const float *mean, LossSums *sums) {
     const int actions = c->network->def.actions;
     const float weight = 2.0f * (float)c->def->mirror_weight * c->mirror_weight / (float)actions;
@@ -156,7 +163,9 @@ static void mirror_loss(const LossContext *c, LossChunk *chunk, const float *mea
 }
 
 static float held_logvar(float logvar) {
-    return logvar < LOSS_LOGVAR_MIN ? LOSS_LOGVAR_MIN : logvar > LOSS_LOGVAR_MAX ? LOSS_LOGVAR_MAX : logvar;
+    return logvar < LOSS_LOGVAR_MIN   ? LOSS_LOGVAR_MIN
+           : logvar > LOSS_LOGVAR_MAX ? LOSS_LOGVAR_MAX
+                                      : logvar;
 }
 
 /* z = mu + exp(logvar/2) noise; decoder input [z | estimates]. */
@@ -172,12 +181,14 @@ static void sample_latent(const LossContext *c, LossChunk *chunk, const float *h
             input[j] = mu[j] + spread[j] * noise[j];
         }
         memcpy(input + latent, heads, (size_t)estimates * sizeof *input);
-        heads += c->network->heads, input += c->network->decoder_input, spread += latent, noise += latent;
+        heads += c->network->heads, input += c->network->decoder_input, spread += latent,
+            noise += latent;
     }
 }
 
 /* MSE(o, decoded): mean over samples and over the frame. */
-static void reconstruction_loss(const LossContext *c, LossChunk *chunk, const float *decoded, LossSums *sums) {
+static void reconstruction_loss(const LossContext *c, LossChunk *chunk, const float *decoded,
+                                LossSums *sums) {
     const int width = c->network->def.observation;
     const float weight = 2.0f * (float)c->def->epsilon * c->sample_weight / (float)width;
     const float *clean = chunk->clean;
@@ -195,10 +206,12 @@ static void reconstruction_loss(const LossContext *c, LossChunk *chunk, const fl
 }
 
 /* MSE of each group of estimates; adds to d (row of the heads' gradient). */
-static void estimate_row(const LossContext *c, const float *estimate, const float *target, float *d, LossSums *sums) {
+static void estimate_row(const LossContext *c, const float *estimate, const float *target, float *d,
+                         LossSums *sums) {
     const PolicyDef *def = &c->network->def;
     const int ends[LOSS_GROUPS + 1] = {0, def->feet_velocity_offset,
-                                       def->feet_velocity_offset + def->feet_velocity_count, def->estimates};
+                                       def->feet_velocity_offset + def->feet_velocity_count,
+                                       def->estimates};
     for (int g = 0; g < LOSS_GROUPS; g++) {
         int width = ends[g + 1] - ends[g];
         if (width == 0) {
@@ -214,10 +227,12 @@ static void estimate_row(const LossContext *c, const float *estimate, const floa
     }
 }
 
-/* KL(N(mu, e^lv) || N(0, I)) = -1/2 sum (1 + lv - mu^2 - e^lv), and the decoder's gradient through the sampled z. Outside
- * its bounds the log-variance feels only a gradient that leads back inside. */
-static void latent_row(const LossContext *c, const float *mu, const float *logvar, const float *spread,
-                       const float *noise, const float *d_z, float *d_mu, float *d_logvar, LossSums *sums) {
+/* KL(N(mu, e^lv) || N(0, I)) = -1/2 sum (1 + lv - mu^2 - e^lv), and the decoder's gradient through
+ * the sampled z. Outside its bounds the log-variance feels only a gradient that leads back inside.
+ */
+static void latent_row(const LossContext *c, const float *mu, const float *logvar,
+                       const float *spread, const float *noise, const float *d_z, float *d_mu,
+                       float *d_logvar, LossSums *sums) {
     const int latent = c->network->def.latent;
     const float weight = (float)(c->def->epsilon * c->def->kl_weight) * c->sample_weight;
     float sum = 0.0f;
@@ -234,9 +249,11 @@ static void latent_row(const LossContext *c, const float *mu, const float *logva
 }
 
 /* Back through z~ = theta1 mu + theta2: d_heads (estimates and mu; logvar 0) and d_theta. */
-static void modulation_backward(const LossContext *c, LossChunk *chunk, int all, const float *heads) {
+static void modulation_backward(const LossContext *c, LossChunk *chunk, int all,
+                                const float *heads) {
     const Network *n = c->network;
-    const int estimates = n->def.estimates, latent = n->def.latent, per_dimension = n->def.modulation_per_dimension;
+    const int estimates = n->def.estimates, latent = n->def.latent,
+              per_dimension = n->def.modulation_per_dimension;
     const float *theta = network_theta(n, &chunk->outputs), *d_input = chunk->d_actor_input;
     float *d_heads = chunk->d_heads, *d_theta = chunk->d_theta;
     memset(d_theta, 0, (size_t)all * (size_t)n->theta * sizeof *d_theta);
@@ -249,14 +266,18 @@ static void modulation_backward(const LossContext *c, LossChunk *chunk, int all,
             d_theta[per_dimension ? j : 0] += d_latent[j] * mu[j];
             d_theta[per_dimension ? latent + j : 1] += d_latent[j];
         }
-        heads += n->heads, d_heads += n->heads, theta += n->theta, d_theta += n->theta, d_input += estimates + latent;
+        heads += n->heads, d_heads += n->heads, theta += n->theta, d_theta += n->theta,
+            d_input += estimates + latent;
     }
 }
 
-/* Regression part of the heads' gradient, and the modulation's through the estimated feet velocities. */
-static void heads_backward(const LossContext *c, LossChunk *chunk, int all, const float *heads, LossSums *sums) {
+/* Regression part of the heads' gradient, and the modulation's through the estimated feet
+ * velocities. */
+static void heads_backward(const LossContext *c, LossChunk *chunk, int all, const float *heads,
+                           LossSums *sums) {
     const Network *n = c->network;
-    const int estimates = n->def.estimates, latent = n->def.latent, feet = n->def.feet_velocity_count;
+    const int estimates = n->def.estimates, latent = n->def.latent,
+              feet = n->def.feet_velocity_count;
     for (int r = 0; r < all; r++) {
         float *d = chunk->d_heads + (int64_t)r * n->heads;
         for (int j = 0; j < feet; j++) {
@@ -270,12 +291,14 @@ static void heads_backward(const LossContext *c, LossChunk *chunk, int all, cons
             d[j] += d_input[latent + j];
         }
         estimate_row(c, heads, chunk->estimate + (int64_t)r * estimates, d, sums);
-        latent_row(c, heads + estimates, heads + estimates + latent, chunk->spread + (int64_t)r * latent,
-                   chunk->noise + (int64_t)r * latent, d_input, d + estimates, d + estimates + latent, sums);
+        latent_row(c, heads + estimates, heads + estimates + latent,
+                   chunk->spread + (int64_t)r * latent, chunk->noise + (int64_t)r * latent, d_input,
+                   d + estimates, d + estimates + latent, sums);
     }
 }
 
-void loss_actor(const LossContext *c, LossChunk *chunk, float *gradient, float beta, LossSums *sums) {
+void loss_actor(const LossContext *c, LossChunk *chunk, float *gradient, float beta,
+                LossSums *sums) {
     const Network *n = c->network;
     const PolicyDef *def = &n->def;
     const int all = chunk->rows + chunk->mirrored;
@@ -283,8 +306,8 @@ void loss_actor(const LossContext *c, LossChunk *chunk, float *gradient, float b
     const float *mean = network_forward(n, c->parameters, all, chunk->history, out);
     const float *heads = network_heads(n, out);
     sample_latent(c, chunk, heads);
-    const float *decoded =
-        mlp_forward(&n->decoder, c->parameters, chunk->rows, chunk->decoder_input, n->decoder_input, &chunk->decoder);
+    const float *decoded = mlp_forward(&n->decoder, c->parameters, chunk->rows,
+                                       chunk->decoder_input, n->decoder_input, &chunk->decoder);
 
     policy_loss(c, chunk, mean, gradient + n->log_std, beta, sums);
     if (chunk->mirrored > 0) {
@@ -292,29 +315,32 @@ void loss_actor(const LossContext *c, LossChunk *chunk, float *gradient, float b
     }
     reconstruction_loss(c, chunk, decoded, sums);
 
-    mlp_backward(&n->decoder, c->parameters, chunk->rows, chunk->decoder_input, n->decoder_input, &chunk->decoder,
-                 chunk->d_decoded, chunk->work, gradient, beta,
+    mlp_backward(&n->decoder, c->parameters, chunk->rows, chunk->decoder_input, n->decoder_input,
+                 &chunk->decoder, chunk->d_decoded, chunk->work, gradient, beta,
                  (MlpInputGradient){chunk->d_decoder_input, 0, n->decoder_input});
-    mlp_backward(&n->actor, c->parameters, all, out->actor_input, n->actor_input, &out->actor, chunk->d_mean,
-                 chunk->work, gradient, beta,
-                 (MlpInputGradient){chunk->d_actor_input, def->observation, def->estimates + def->latent});
+    mlp_backward(
+        &n->actor, c->parameters, all, out->actor_input, n->actor_input, &out->actor, chunk->d_mean,
+        chunk->work, gradient, beta,
+        (MlpInputGradient){chunk->d_actor_input, def->observation, def->estimates + def->latent});
     modulation_backward(c, chunk, all, heads);
-    mlp_backward(&n->modulation, c->parameters, all, heads + def->feet_velocity_offset, n->heads, &out->modulation,
-                 chunk->d_theta, chunk->work, gradient, beta,
+    mlp_backward(&n->modulation, c->parameters, all, heads + def->feet_velocity_offset, n->heads,
+                 &out->modulation, chunk->d_theta, chunk->work, gradient, beta,
                  (MlpInputGradient){chunk->d_feet, 0, def->feet_velocity_count});
     heads_backward(c, chunk, all, heads, sums);
-    mlp_backward(&n->encoder, c->parameters, all, chunk->history, n->history, &out->encoder, chunk->d_heads,
-                 chunk->work, gradient, beta, (MlpInputGradient){0});
+    mlp_backward(&n->encoder, c->parameters, all, chunk->history, n->history, &out->encoder,
+                 chunk->d_heads, chunk->work, gradient, beta, (MlpInputGradient){0});
 }
 
-/* Value loss max((V - R)^2, (V_old + clip(V - V_old) - R)^2); where the clipped branch is the larger one, its gradient is
- * that of V inside the clip range and 0 outside. */
-void loss_critic(const LossContext *c, LossChunk *chunk, float *gradient, float beta, LossSums *sums) {
+/* Value loss max((V - R)^2, (V_old + clip(V - V_old) - R)^2); where the clipped branch is the
+ * larger one, its gradient is that of V inside the clip range and 0 outside. */
+void loss_critic(const LossContext *c, LossChunk *chunk, float *gradient, float beta,
+                 LossSums *sums) {
     const Network *n = c->network;
-    const float *value =
-        mlp_forward(&n->critic, c->parameters, chunk->rows, chunk->critic, n->def.critic_input, &chunk->value);
+    const float *value = mlp_forward(&n->critic, c->parameters, chunk->rows, chunk->critic,
+                                     n->def.critic_input, &chunk->value);
     const float clip = (float)c->def->clip;
-    const float weight = 2.0f * (float)((1.0 - c->def->epsilon) * c->def->value_weight) * c->sample_weight;
+    const float weight =
+        2.0f * (float)((1.0 - c->def->epsilon) * c->def->value_weight) * c->sample_weight;
     for (int r = 0; r < chunk->rows; r++) {
         float gap = value[r] - chunk->returns[r], move = value[r] - chunk->old_value[r];
         float held_move = move < -clip ? -clip : move > clip ? clip : move;
@@ -324,6 +350,6 @@ void loss_critic(const LossContext *c, LossChunk *chunk, float *gradient, float 
         sums->value += (double)used * used;
         chunk->d_value[r] = held && held_move != move ? 0.0f : weight * used;
     }
-    mlp_backward(&n->critic, c->parameters, chunk->rows, chunk->critic, n->def.critic_input, &chunk->value,
-                 chunk->d_value, chunk->work, gradient, beta, (MlpInputGradient){0});
+    mlp_backward(&n->critic, c->parameters, chunk->rows, chunk->critic, n->def.critic_input,
+                 &chunk->value, chunk->d_value, chunk->work, gradient, beta, (MlpInputGradient){0});
 }

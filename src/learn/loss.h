@@ -1,17 +1,20 @@
-/* Loss and gradient of one chunk of samples. Two independent halves: the actor's (encoder, modulation, actor, decoder,
- * log std) and the critic's.
+/* Loss and gradient of one chunk of samples. Two independent halves: the actor's (encoder,
+ * modulation, actor, decoder, log std) and the critic's.
  *
- *   L = (1-eps) (surrogate - w_H entropy + w_V value) + eps (recon + phi KL + sum over groups MSE) + w_M mirror   (eq 16)
+ *   L = (1-eps) (surrogate - w_H entropy + w_V value) + eps (recon + phi KL + sum over groups MSE)
+ * + w_M mirror   (eq 16)
  *
- * Means are over the minibatch: the caller gives 1 / (its samples), so that chunks and shards simply add up. */
+ * Means are over the minibatch: the caller gives 1 / (its samples), so that chunks and shards
+ * simply add up. */
 #ifndef MILD_LOSS_H
 #define MILD_LOSS_H
 
 #include "learn/network.h"
 #include "learn/ppo.h"
 
-#define LOSS_GROUPS                                                                                                    \
-    3 /* estimates before, in and after the feet velocities: base velocity, feet velocities, feet heights */
+#define LOSS_GROUPS                                                                                \
+    3 /* estimates before, in and after the feet velocities: base velocity, feet velocities, feet  \
+         heights */
 
 /* The log-variance is used within these bounds, so that no early step can overflow e^logvar. */
 #define LOSS_LOGVAR_MIN (-12.0f)
@@ -33,12 +36,13 @@ typedef struct {
     double surrogate, kl, clipped, reconstruction, vae_kl, estimate[LOSS_GROUPS], mirror, value;
 } LossSums;
 
-/* One chunk, `rows` samples; history holds `mirrored` more rows behind them, the mirror images of the first ones. */
+/* One chunk, `rows` samples; history holds `mirrored` more rows behind them, the mirror images of
+ * the first ones. */
 typedef struct {
     int rows, mirrored;
-    float *history;                                      /* [rows + mirrored][history] */
-    float *estimate, *clean;                             /* targets [rows][estimates], [rows][observation] */
-    float *noise;                                        /* [rows][latent] standard normal, for the sampled z */
+    float *history;          /* [rows + mirrored][history] */
+    float *estimate, *clean; /* targets [rows][estimates], [rows][observation] */
+    float *noise;            /* [rows][latent] standard normal, for the sampled z */
     float *action, *old_mean, *old_log_prob, *advantage; /* [rows][actions] twice, [rows] twice */
     float *critic, *old_value, *returns;                 /* [rows][critic_input], [rows] twice */
     NetworkOutputs outputs;
@@ -49,14 +53,17 @@ typedef struct {
     float *work[2];
 } LossChunk;
 
-/* Lays a chunk for at most `rows` samples and `mirrored` images into the block (NULL: only counts floats). */
+/* Lays a chunk for at most `rows` samples and `mirrored` images into the block (NULL: only counts
+ * floats). */
 size_t loss_carve(const Network *network, int rows, int mirrored, float *block, LossChunk *chunk);
 /* Copies row `from` of the chunk's history, mirrored, to row `to`. */
 void loss_mirror_row(const LossContext *context, LossChunk *chunk, int from, int to);
 
 /* Add to the sums and to the gradient's ranges of their half (beta 0 overwrites instead). */
-void loss_actor(const LossContext *context, LossChunk *chunk, float *gradient, float beta, LossSums *sums);
-void loss_critic(const LossContext *context, LossChunk *chunk, float *gradient, float beta, LossSums *sums);
+void loss_actor(const LossContext *context, LossChunk *chunk, float *gradient, float beta,
+                LossSums *sums);
+void loss_critic(const LossContext *context, LossChunk *chunk, float *gradient, float beta,
+                 LossSums *sums);
 
 /* What no sample changes in the surrogate: 1/std [actions], then the constants of log_prob and of
  * KL(old || new) = sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */

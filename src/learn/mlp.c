@@ -31,7 +31,8 @@ int mlp_widest(const Mlp *mlp) {
     return widest;
 }
 
-void mlp_initialise(const Mlp *mlp, float *parameters, uint64_t seed, uint32_t stream, double last_scale) {
+void mlp_initialise(const Mlp *mlp, float *parameters, uint64_t seed, uint32_t stream,
+                    double last_scale) {
     for (int l = 0; l < mlp->layers; l++) {
         const MlpLayer *layer = &mlp->layer[l];
         Random random = random_at(seed, stream, (uint32_t)l);
@@ -76,7 +77,8 @@ static void add_bias_elu(int rows, int width, const float *restrict bias, float 
 }
 
 /* d *= slope(y), and the bias' gradient += the column sums of d. */
-static void elu_backward(int rows, int width, const float *restrict y, float *restrict d, float *restrict d_bias) {
+static void elu_backward(int rows, int width, const float *restrict y, float *restrict d,
+                         float *restrict d_bias) {
     for (int r = 0; r < rows; r++, y += width, d += width) {
 #pragma omp simd
         for (int j = 0; j < width; j++) {
@@ -100,8 +102,8 @@ float *mlp_forward(const Mlp *mlp, const float *parameters, int rows, const floa
     int last = mlp->layers - 1;
     for (int l = 0; l <= last; l++) {
         const MlpLayer *layer = &mlp->layer[l];
-        product('N', 'T', rows, layer->out, layer->in, x, ldx, parameters + layer->weight, layer->in, 0.0f,
-                outputs->y[l], layer->out);
+        product('N', 'T', rows, layer->out, layer->in, x, ldx, parameters + layer->weight,
+                layer->in, 0.0f, outputs->y[l], layer->out);
         if (l == last) {
             add_bias(rows, layer->out, parameters + layer->bias, outputs->y[l]);
         } else {
@@ -114,22 +116,24 @@ float *mlp_forward(const Mlp *mlp, const float *parameters, int rows, const floa
 }
 
 /* Per layer, with d = dL/d(Wx + b):  dW = d^T x,  db = sum over rows of d,  dx = d W. */
-void mlp_backward(const Mlp *mlp, const float *parameters, int rows, const float *x, int ldx, const MlpOutputs *outputs,
-                  const float *d_last, float *const work[2], float *gradient, float beta, MlpInputGradient input) {
+void mlp_backward(const Mlp *mlp, const float *parameters, int rows, const float *x, int ldx,
+                  const MlpOutputs *outputs, const float *d_last, float *const work[2],
+                  float *gradient, float beta, MlpInputGradient input) {
     const float *d = d_last;
     for (int l = mlp->layers - 1; l >= 0; l--) {
         const MlpLayer *layer = &mlp->layer[l];
         const float *below = l > 0 ? outputs->y[l - 1] : x;
         int ld = l > 0 ? layer->in : ldx;
-        product('T', 'N', layer->out, layer->in, rows, d, layer->out, below, ld, beta, gradient + layer->weight,
-                layer->in);
+        product('T', 'N', layer->out, layer->in, rows, d, layer->out, below, ld, beta,
+                gradient + layer->weight, layer->in);
         float *next = work[l % 2];
         if (l > 0) {
-            product('N', 'N', rows, layer->in, layer->out, d, layer->out, parameters + layer->weight, layer->in, 0.0f,
-                    next, layer->in);
+            product('N', 'N', rows, layer->in, layer->out, d, layer->out,
+                    parameters + layer->weight, layer->in, 0.0f, next, layer->in);
         } else if (input.count > 0) {
-            product('N', 'N', rows, input.count, layer->out, d, layer->out, parameters + layer->weight + input.first,
-                    layer->in, 0.0f, input.x, input.count);
+            product('N', 'N', rows, input.count, layer->out, d, layer->out,
+                    parameters + layer->weight + input.first, layer->in, 0.0f, input.x,
+                    input.count);
         }
         if (l == mlp->layers - 1) {
             for (int j = 0; j < layer->out && beta == 0.0f; j++) {

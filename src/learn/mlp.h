@@ -1,5 +1,6 @@
-/* Multilayer perceptron with ELU after every layer but the last: y = W x + b, W [out][in] as PyTorch keeps it. Parameters
- * live in a flat array that the caller owns; a layer knows its offsets. */
+/* Multilayer perceptron with ELU after every layer but the last: y = W x + b, W [out][in] as
+ * PyTorch keeps it. Parameters live in a flat array that the caller owns; a layer knows its
+ * offsets. */
 #ifndef MILD_MLP_H
 #define MILD_MLP_H
 
@@ -25,19 +26,21 @@ typedef struct {
     float *y[MLP_LAYERS_MAX];
 } MlpOutputs;
 
-/* Where the gradient with respect to the input goes: columns first .. first+count-1, into x [rows][count] (overwritten).
- * count 0: not wanted. */
+/* Where the gradient with respect to the input goes: columns first .. first+count-1, into x
+ * [rows][count] (overwritten). count 0: not wanted. */
 typedef struct {
     float *x;
     int first, count;
 } MlpInputGradient;
 
-/* hidden: zero-terminated or POLICY_LAYERS_MAX widths. Parameters start at `offset`; returns the offset after them. */
+/* hidden: zero-terminated or POLICY_LAYERS_MAX widths. Parameters start at `offset`; returns the
+ * offset after them. */
 int64_t mlp_layout(Mlp *mlp, int in, const int *hidden, int out, int64_t offset);
 int mlp_widest(const Mlp *mlp); /* the widest layer output */
 
 /* Weights normal with variance 1/in (times last_scale^2 in the last layer), biases zero. */
-void mlp_initialise(const Mlp *mlp, float *parameters, uint64_t seed, uint32_t stream, double last_scale);
+void mlp_initialise(const Mlp *mlp, float *parameters, uint64_t seed, uint32_t stream,
+                    double last_scale);
 
 /* Takes `count` floats from a block, aligned to 64 bytes; with a NULL block it only counts. */
 float *mlp_carve(float *block, size_t *used, size_t count);
@@ -47,9 +50,11 @@ void mlp_carve_outputs(const Mlp *mlp, int rows, float *block, size_t *used, Mlp
 float *mlp_forward(const Mlp *mlp, const float *parameters, int rows, const float *x, int ldx,
                    const MlpOutputs *outputs);
 
-/* d_last [rows][out]: gradient with respect to the last output. work: two areas of rows * mlp_widest floats. gradient (laid
- * out as the parameters) becomes beta * gradient + this one, beta 0 or 1. */
-void mlp_backward(const Mlp *mlp, const float *parameters, int rows, const float *x, int ldx, const MlpOutputs *outputs,
-                  const float *d_last, float *const work[2], float *gradient, float beta, MlpInputGradient input);
+/* d_last [rows][out]: gradient with respect to the last output. work: two areas of rows *
+ * mlp_widest floats. gradient (laid out as the parameters) becomes beta * gradient + this one, beta
+ * 0 or 1. */
+void mlp_backward(const Mlp *mlp, const float *parameters, int rows, const float *x, int ldx,
+                  const MlpOutputs *outputs, const float *d_last, float *const work[2],
+                  float *gradient, float beta, MlpInputGradient input);
 
 #endif

@@ -8,17 +8,19 @@
 
 static MildStatus check_width(int value, int min, const char *name, MildError *error) {
     if (value < min || value > WIDTH_MAX) {
-        return mild_fail(error, MILD_ERROR_RANGE, "policy.%s = %d is outside %d..%d", name, value, min, WIDTH_MAX);
+        return mild_fail(error, MILD_ERROR_RANGE, "policy.%s = %d is outside %d..%d", name, value,
+                         min, WIDTH_MAX);
     }
     return MILD_OK;
 }
 
 static MildStatus check_hidden(const int *hidden, const char *name, MildError *error) {
     for (int l = 0; l < POLICY_LAYERS_MAX; l++) {
-        if (hidden[l] < 0 || hidden[l] > WIDTH_MAX || (l > 0 && hidden[l] > 0 && hidden[l - 1] == 0)) {
+        if (hidden[l] < 0 || hidden[l] > WIDTH_MAX ||
+            (l > 0 && hidden[l] > 0 && hidden[l - 1] == 0)) {
             return mild_fail(error, MILD_ERROR_RANGE,
-                             "policy.%s: width %d of layer %d is not usable (1..%d, then zeros)", name, hidden[l],
-                             l + 1, WIDTH_MAX);
+                             "policy.%s: width %d of layer %d is not usable (1..%d, then zeros)",
+                             name, hidden[l], l + 1, WIDTH_MAX);
         }
     }
     return MILD_OK;
@@ -26,28 +28,47 @@ static MildStatus check_hidden(const int *hidden, const char *name, MildError *e
 
 static MildStatus check_def(const PolicyDef *def, MildError *error) {
     MildStatus status = mild_fields_check(policy_fields, policy_field_count, def, "policy", error);
-    if (!status) status = check_width(def->observation, 1, "observation", error);
-    if (!status) status = check_width(def->frames, 1, "frames", error);
-    if (!status) status = check_width(def->critic_input, 1, "critic_input", error);
-    if (!status) status = check_width(def->estimates, 1, "estimates", error);
-    if (!status) status = check_hidden(def->encoder_hidden, "encoder_hidden", error);
-    if (!status) status = check_hidden(def->decoder_hidden, "decoder_hidden", error);
-    if (!status) status = check_hidden(def->actor_hidden, "actor_hidden", error);
-    if (!status) status = check_hidden(def->critic_hidden, "critic_hidden", error);
+    if (!status) {
+        status = check_width(def->observation, 1, "observation", error);
+    }
+    if (!status) {
+        status = check_width(def->frames, 1, "frames", error);
+    }
+    if (!status) {
+        status = check_width(def->critic_input, 1, "critic_input", error);
+    }
+    if (!status) {
+        status = check_width(def->estimates, 1, "estimates", error);
+    }
+    if (!status) {
+        status = check_hidden(def->encoder_hidden, "encoder_hidden", error);
+    }
+    if (!status) {
+        status = check_hidden(def->decoder_hidden, "decoder_hidden", error);
+    }
+    if (!status) {
+        status = check_hidden(def->actor_hidden, "actor_hidden", error);
+    }
+    if (!status) {
+        status = check_hidden(def->critic_hidden, "critic_hidden", error);
+    }
     if (status) {
         return status;
     }
     if ((int64_t)def->frames * def->observation > WIDTH_MAX) {
-        return mild_fail(error, MILD_ERROR_RANGE, "policy: %d frames of %d numbers are more than %d", def->frames,
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "policy: %d frames of %d numbers are more than %d", def->frames,
                          def->observation, WIDTH_MAX);
     }
     if (def->actions < 1 || def->actions > NETWORK_ACTIONS_MAX) {
-        return mild_fail(error, MILD_ERROR_RANGE, "policy.actions = %d is outside 1..%d", def->actions,
-                         NETWORK_ACTIONS_MAX);
+        return mild_fail(error, MILD_ERROR_RANGE, "policy.actions = %d is outside 1..%d",
+                         def->actions, NETWORK_ACTIONS_MAX);
     }
-    if (def->feet_velocity_offset < 0 || def->feet_velocity_count < 1 || def->feet_velocity_offset > def->estimates ||
+    if (def->feet_velocity_offset < 0 || def->feet_velocity_count < 1 ||
+        def->feet_velocity_offset > def->estimates ||
         def->feet_velocity_count > def->estimates - def->feet_velocity_offset) {
-        return mild_fail(error, MILD_ERROR_RANGE, "policy: feet velocities %d..+%d are not among the %d estimates",
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "policy: feet velocities %d..+%d are not among the %d estimates",
                          def->feet_velocity_offset, def->feet_velocity_count, def->estimates);
     }
     return MILD_OK;
@@ -66,9 +87,12 @@ MildStatus network_layout(Network *network, const PolicyDef *def, MildError *err
     network->theta = def->modulation_per_dimension ? 2 * def->latent : 2;
     network->actor_input = def->observation + def->estimates + def->latent;
     network->decoder_input = def->latent + def->estimates;
-    int64_t at = mlp_layout(&network->encoder, network->history, def->encoder_hidden, network->heads, 0);
-    at = mlp_layout(&network->decoder, network->decoder_input, def->decoder_hidden, def->observation, at);
-    at = mlp_layout(&network->modulation, def->feet_velocity_count, modulation_hidden, network->theta, at);
+    int64_t at =
+        mlp_layout(&network->encoder, network->history, def->encoder_hidden, network->heads, 0);
+    at = mlp_layout(&network->decoder, network->decoder_input, def->decoder_hidden,
+                    def->observation, at);
+    at = mlp_layout(&network->modulation, def->feet_velocity_count, modulation_hidden,
+                    network->theta, at);
     at = mlp_layout(&network->actor, network->actor_input, def->actor_hidden, def->actions, at);
     network->critic_first = at;
     network->log_std = mlp_layout(&network->critic, def->critic_input, def->critic_hidden, 1, at);
@@ -77,19 +101,22 @@ MildStatus network_layout(Network *network, const PolicyDef *def, MildError *err
 }
 
 const Mlp *network_mlp(const Network *network, int index, const char **name) {
-    static const char *const names[NETWORK_MLPS] = {"encoder", "decoder", "modulation", "actor", "critic"};
-    const Mlp *const mlps[NETWORK_MLPS] = {&network->encoder, &network->decoder, &network->modulation, &network->actor,
-                                           &network->critic};
+    static const char *const names[NETWORK_MLPS] = {"encoder", "decoder", "modulation", "actor",
+                                                    "critic"};
+    const Mlp *const mlps[NETWORK_MLPS] = {&network->encoder, &network->decoder,
+                                           &network->modulation, &network->actor, &network->critic};
     *name = names[index];
     return mlps[index];
 }
 
-/* The modulation starts at identity: its last layer's weights are zero, its biases theta1 = 1, theta2 = 0. */
+/* The modulation starts at identity: its last layer's weights are zero, its biases theta1 = 1,
+ * theta2 = 0. */
 void network_initialise(const Network *network, float *parameters, uint64_t seed) {
     const double last_scale[NETWORK_MLPS] = {0.5, 1.0, 0.0, 0.02, 1.0};
     for (int n = 0; n < NETWORK_MLPS; n++) {
         const char *name;
-        mlp_initialise(network_mlp(network, n, &name), parameters, seed, (uint32_t)n, last_scale[n]);
+        mlp_initialise(network_mlp(network, n, &name), parameters, seed, (uint32_t)n,
+                       last_scale[n]);
     }
     const MlpLayer *last = &network->modulation.layer[network->modulation.layers - 1];
     for (int i = 0; i < network->theta / 2; i++) {
@@ -100,7 +127,8 @@ void network_initialise(const Network *network, float *parameters, uint64_t seed
     }
 }
 
-void network_carve(const Network *network, int rows, float *block, size_t *used, NetworkOutputs *outputs) {
+void network_carve(const Network *network, int rows, float *block, size_t *used,
+                   NetworkOutputs *outputs) {
     mlp_carve_outputs(&network->encoder, rows, block, used, &outputs->encoder);
     mlp_carve_outputs(&network->modulation, rows, block, used, &outputs->modulation);
     mlp_carve_outputs(&network->actor, rows, block, used, &outputs->actor);
@@ -115,17 +143,22 @@ float *network_theta(const Network *network, const NetworkOutputs *outputs) {
     return outputs->modulation.y[network->modulation.layers - 1];
 }
 
-/* [newest frame | estimates | theta1 mu + theta2]; paper, "Terrain Estimator and Modulation Net". */
-static void fill_actor_input(const Network *network, int rows, const float *history, const NetworkOutputs *outputs) {
-    const int observation = network->def.observation, estimates = network->def.estimates, latent = network->def.latent;
+/* [newest frame | estimates | theta1 mu + theta2]; paper, "Terrain Estimator and Modulation Net".
+ */
+static void fill_actor_input(const Network *network, int rows, const float *history,
+                             const NetworkOutputs *outputs) {
+    const int observation = network->def.observation, estimates = network->def.estimates,
+              latent = network->def.latent;
     const int per_dimension = network->def.modulation_per_dimension;
     const float *heads = network_heads(network, outputs), *theta = network_theta(network, outputs);
     float *input = outputs->actor_input;
     for (int r = 0; r < rows; r++) {
-        memcpy(input, history + network->history - observation, (size_t)observation * sizeof *input);
+        memcpy(input, history + network->history - observation,
+               (size_t)observation * sizeof *input);
         memcpy(input + observation, heads, (size_t)estimates * sizeof *input);
         for (int j = 0; j < latent; j++) {
-            float theta1 = theta[per_dimension ? j : 0], theta2 = theta[per_dimension ? latent + j : 1];
+            float theta1 = theta[per_dimension ? j : 0],
+                  theta2 = theta[per_dimension ? latent + j : 1];
             input[observation + estimates + j] = theta1 * heads[estimates + j] + theta2;
         }
         history += network->history;
@@ -135,11 +168,13 @@ static void fill_actor_input(const Network *network, int rows, const float *hist
     }
 }
 
-float *network_forward(const Network *network, const float *parameters, int rows, const float *history,
-                       const NetworkOutputs *outputs) {
-    const float *heads = mlp_forward(&network->encoder, parameters, rows, history, network->history, &outputs->encoder);
-    mlp_forward(&network->modulation, parameters, rows, heads + network->def.feet_velocity_offset, network->heads,
-                &outputs->modulation);
+float *network_forward(const Network *network, const float *parameters, int rows,
+                       const float *history, const NetworkOutputs *outputs) {
+    const float *heads = mlp_forward(&network->encoder, parameters, rows, history, network->history,
+                                     &outputs->encoder);
+    mlp_forward(&network->modulation, parameters, rows, heads + network->def.feet_velocity_offset,
+                network->heads, &outputs->modulation);
     fill_actor_input(network, rows, history, outputs);
-    return mlp_forward(&network->actor, parameters, rows, outputs->actor_input, network->actor_input, &outputs->actor);
+    return mlp_forward(&network->actor, parameters, rows, outputs->actor_input,
+                       network->actor_input, &outputs->actor);
 }

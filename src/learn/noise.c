@@ -4,7 +4,8 @@
 
 #define NOISE_BLOCK 64
 
-static void noise_block(uint32_t key0, uint32_t key1, uint32_t pair, float *restrict even, float *restrict odd) {
+static void noise_block(uint32_t key0, uint32_t key1, uint32_t pair, float *restrict even,
+                        float *restrict odd) {
 #pragma omp simd
     for (int i = 0; i < NOISE_BLOCK; i++) {
         noise_pair(key0, key1, pair + (uint32_t)i, &even[i], &odd[i]);

@@ -7,8 +7,8 @@
 
 #include "learn/vector.h"
 
-/* Writes numbers first .. first+count-1 of the stream `key` to out; `first` must be even. Box-Muller on 24-bit uniforms, so
- * |number| <= 5.77. */
+/* Writes numbers first .. first+count-1 of the stream `key` to out; `first` must be even.
+ * Box-Muller on 24-bit uniforms, so |number| <= 5.77. */
 void noise_normal(uint64_t key, int64_t first, int count, float *out);
 
 /* 32-bit integer hash, a bijection without visible bias (Wellons 2018, "lowbias32"). */
@@ -20,7 +20,8 @@ static inline MILD_HD uint32_t noise_mix(uint32_t x) {
     return x ^ (x >> 16);
 }
 
-/* sin(pi a) and cos(pi a) for a in [-1/2, 1/2): Taylor series to a^11 and a^12, error below 1e-7. */
+/* sin(pi a) and cos(pi a) for a in [-1/2, 1/2): Taylor series to a^11 and a^12, error below 1e-7.
+ */
 static inline MILD_HD float noise_sin(float a) {
     float q = a * a;
     float p = -0.0073704309f;
@@ -42,9 +43,10 @@ static inline MILD_HD float noise_cos(float a) {
     return p * q + 1.0f;
 }
 
-/* Numbers 2 pair and 2 pair + 1 of the stream: radius sqrt(-2 ln u), angle 2 pi v. The angle is a uniform half turn with a
- * random sign in front, which keeps the series' argument small. */
-static inline MILD_HD void noise_pair(uint32_t key0, uint32_t key1, uint32_t pair, float *even, float *odd) {
+/* Numbers 2 pair and 2 pair + 1 of the stream: radius sqrt(-2 ln u), angle 2 pi v. The angle is a
+ * uniform half turn with a random sign in front, which keeps the series' argument small. */
+static inline MILD_HD void noise_pair(uint32_t key0, uint32_t key1, uint32_t pair, float *even,
+                                      float *odd) {
     uint32_t counter = pair * 0x9e3779b9u;
     uint32_t h0 = noise_mix(counter ^ key0), h1 = noise_mix(noise_mix(counter + key1) ^ key0);
     float u = (float)(int32_t)((h0 >> 8) + 1u) * 0x1.0p-24f;

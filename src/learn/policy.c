@@ -7,8 +7,8 @@
 #include "learn/policy_private.h"
 #include "learn/product.h"
 
-/* Rows go through the networks in chunks of this many, and chunks are dealt to this many pieces of work, each with its own
- * scratch: neither depends on the number of threads. */
+/* Rows go through the networks in chunks of this many, and chunks are dealt to this many pieces of
+ * work, each with its own scratch: neither depends on the number of threads. */
 #define POLICY_CHUNK 128
 #define POLICY_SLOTS 16
 
@@ -38,7 +38,8 @@ const MildField policy_fields[] = {
                "[-] widths of the encoder's hidden layers, 0 ends the list"),
     MILD_FIELD(PolicyDef, decoder_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
                "[-] widths of the decoder's hidden layers, 0 ends the list"),
-    MILD_FIELD(PolicyDef, modulation_hidden, MILD_FIELD_INT, 1, 1, 8192, "[-] width of the modulation's hidden layer"),
+    MILD_FIELD(PolicyDef, modulation_hidden, MILD_FIELD_INT, 1, 1, 8192,
+               "[-] width of the modulation's hidden layer"),
     MILD_FIELD(PolicyDef, modulation_per_dimension, MILD_FIELD_BOOL, 1, 0, 1,
                "[-] theta1, theta2 per latent dimension instead of scalars"),
     MILD_FIELD(PolicyDef, actor_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
@@ -50,7 +51,8 @@ const MildField policy_fields[] = {
 };
 const int policy_field_count = (int)(sizeof policy_fields / sizeof *policy_fields);
 
-static size_t carve_slot(const Network *network, float *block, NetworkOutputs *outputs, MlpOutputs *critic) {
+static size_t carve_slot(const Network *network, float *block, NetworkOutputs *outputs,
+                         MlpOutputs *critic) {
     size_t act = 0, value = 0;
     network_carve(network, POLICY_CHUNK, block, &act, outputs);
     mlp_carve_outputs(&network->critic, POLICY_CHUNK, block, &value, critic);
@@ -79,7 +81,8 @@ Policy *policy_create(const PolicyDef *def, uint64_t seed, MildError *error) {
     }
     if (!policy || !policy->parameters || !policy->std || !policy->scratch) {
         policy_destroy(policy);
-        mild_fail(error, MILD_ERROR_MEMORY, "no memory for a policy of %lld parameters", (long long)network.count);
+        mild_fail(error, MILD_ERROR_MEMORY, "no memory for a policy of %lld parameters",
+                  (long long)network.count);
         return NULL;
     }
     network_initialise(&policy->network, policy->parameters, seed);
@@ -127,7 +130,8 @@ static void act_chunk(const PolicyJob *job, int first, int rows, const NetworkOu
     const PolicyDef *def = &network->def;
     const float *mean = network_forward(network, job->policy->parameters, rows,
                                         job->input + (int64_t)first * network->history, outputs);
-    memcpy(job->actions + (int64_t)first * def->actions, mean, (size_t)rows * (size_t)def->actions * sizeof *mean);
+    memcpy(job->actions + (int64_t)first * def->actions, mean,
+           (size_t)rows * (size_t)def->actions * sizeof *mean);
     const float *input = outputs->actor_input + def->observation;
     for (int r = 0; r < rows; r++, input += network->actor_input) {
         if (job->estimates) {
@@ -154,8 +158,8 @@ static void run_slot(void *context, int slot, int thread) {
     const PolicyJob *job = context;
     NetworkOutputs outputs;
     MlpOutputs critic;
-    carve_slot(&job->policy->network, job->policy->scratch + (size_t)slot * job->policy->slot_floats, &outputs,
-               &critic);
+    carve_slot(&job->policy->network,
+               job->policy->scratch + (size_t)slot * job->policy->slot_floats, &outputs, &critic);
     int entered = product_enter();
     for (int first = slot * POLICY_CHUNK; first < job->rows; first += job->slots * POLICY_CHUNK) {
         int rows = job->rows - first < POLICY_CHUNK ? job->rows - first : POLICY_CHUNK;
@@ -180,10 +184,14 @@ static void run_job(PolicyJob *job, Pool *pool) {
     }
 }
 
-void policy_act(Policy *policy, Pool *pool, int rows, const float *history, float *actions, float *estimates,
-                float *latent) {
-    PolicyJob job = {
-        .policy = policy, .rows = rows, .input = history, .actions = actions, .estimates = estimates, .latent = latent};
+void policy_act(Policy *policy, Pool *pool, int rows, const float *history, float *actions,
+                float *estimates, float *latent) {
+    PolicyJob job = {.policy = policy,
+                     .rows = rows,
+                     .input = history,
+                     .actions = actions,
+                     .estimates = estimates,
+                     .latent = latent};
     run_job(&job, pool);
 }
 

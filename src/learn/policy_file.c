@@ -6,16 +6,19 @@
 
 #include "learn/policy_private.h"
 
-/* The def's shape fields: the task sets them, so they are no config keys, but a file must state them. */
+/* The def's shape fields: the task sets them, so they are no config keys, but a file must state
+ * them. */
 static const MildField shape_fields[] = {
     MILD_FIELD(PolicyDef, observation, MILD_FIELD_INT, 1, 1, 16384, "[-] width of one frame"),
     MILD_FIELD(PolicyDef, frames, MILD_FIELD_INT, 1, 1, 16384, "[-] frames in the history"),
-    MILD_FIELD(PolicyDef, critic_input, MILD_FIELD_INT, 1, 1, 16384, "[-] width of the critic's input"),
+    MILD_FIELD(PolicyDef, critic_input, MILD_FIELD_INT, 1, 1, 16384,
+               "[-] width of the critic's input"),
     MILD_FIELD(PolicyDef, actions, MILD_FIELD_INT, 1, 1, NETWORK_ACTIONS_MAX, "[-] actions"),
     MILD_FIELD(PolicyDef, estimates, MILD_FIELD_INT, 1, 1, 16384, "[-] estimates"),
     MILD_FIELD(PolicyDef, feet_velocity_offset, MILD_FIELD_INT, 1, 0, 16384,
                "[-] first estimate of the feet velocities"),
-    MILD_FIELD(PolicyDef, feet_velocity_count, MILD_FIELD_INT, 1, 1, 16384, "[-] estimates of feet velocities"),
+    MILD_FIELD(PolicyDef, feet_velocity_count, MILD_FIELD_INT, 1, 1, 16384,
+               "[-] estimates of feet velocities"),
 };
 #define SHAPE_FIELDS ((int)(sizeof shape_fields / sizeof *shape_fields))
 
@@ -23,8 +26,8 @@ static const MildField *file_field(int index) {
     return index < SHAPE_FIELDS ? &shape_fields[index] : &policy_fields[index - SHAPE_FIELDS];
 }
 
-static void add_tensor(PolicyTensors *tensors, const char *net, int index, const char *what, const float *data,
-                       int rows, int columns) {
+static void add_tensor(PolicyTensors *tensors, const char *net, int index, const char *what,
+                       const float *data, int rows, int columns) {
     char *name = tensors->name[tensors->count];
     snprintf(name, sizeof tensors->name[0], "%s.%d.%s", net, index, what);
     tensors->tensor[tensors->count++] =
@@ -43,7 +46,8 @@ void policy_file_tensors(const Network *network, const float *parameters, Policy
         const Mlp *mlp = network_mlp(network, n, &name);
         for (int l = 0; l < mlp->layers; l++) {
             const MlpLayer *layer = &mlp->layer[l];
-            add_tensor(tensors, name, 2 * l, "weight", parameters + layer->weight, layer->out, layer->in);
+            add_tensor(tensors, name, 2 * l, "weight", parameters + layer->weight, layer->out,
+                       layer->in);
             add_tensor(tensors, name, 2 * l, "bias", parameters + layer->bias, layer->out, 0);
         }
     }
@@ -55,7 +59,8 @@ static void add_text(PolicyTexts *texts, const char *key, const char *value) {
     texts->text[texts->count++] = (SafetensorsText){key, value};
 }
 
-void policy_file_texts(const Network *network, const char *kind, const char *note, PolicyTexts *texts) {
+void policy_file_texts(const Network *network, const char *kind, const char *note,
+                       PolicyTexts *texts) {
     texts->count = 0;
     add_text(texts, "kind", kind);
     add_text(texts, "version", POLICY_FILE_VERSION);
@@ -68,16 +73,18 @@ void policy_file_texts(const Network *network, const char *kind, const char *not
     }
 }
 
-MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef *def, MildError *error) {
+MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef *def,
+                           MildError *error) {
     const char *kind = safetensors_text(file, "kind"), *version = safetensors_text(file, "version");
     if (!kind || (strcmp(kind, POLICY_KIND) != 0 && strcmp(kind, POLICY_CHECKPOINT_KIND) != 0)) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: holds no policy of mild; give a file that `mild train` wrote",
-                         path);
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%s: holds no policy of mild; give a file that `mild train` wrote", path);
     }
     if (!version || strcmp(version, POLICY_FILE_VERSION) != 0) {
-        return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%s: has file version %.20s, this program reads version " POLICY_FILE_VERSION, path,
-                         version ? version : "(none)");
+        return mild_fail(
+            error, MILD_ERROR_FORMAT,
+            "%s: has file version %.20s, this program reads version " POLICY_FILE_VERSION, path,
+            version ? version : "(none)");
     }
     *def = policy_def_default();
     for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
@@ -87,21 +94,24 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
         const char *text = safetensors_text(file, key);
         MildError inner = {0};
         if (!text || mild_field_parse(field, def, text, "policy", &inner)) {
-            return mild_fail(error, MILD_ERROR_FORMAT, "%s: %.200s; the file is of no use to this program", path,
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: %.200s; the file is of no use to this program", path,
                              text ? inner.text : key);
         }
     }
     return MILD_OK;
 }
 
-static MildStatus wrong_tensor(const char *path, const char *name, const char *what, MildError *error) {
-    return mild_fail(error, MILD_ERROR_FORMAT, "%s: tensor %.64s %s; the file does not fit the network it states", path,
-                     name, what);
+static MildStatus wrong_tensor(const char *path, const char *name, const char *what,
+                               MildError *error) {
+    return mild_fail(error, MILD_ERROR_FORMAT,
+                     "%s: tensor %.64s %s; the file does not fit the network it states", path, name,
+                     what);
 }
 
 /* Nothing but the policy's tensors and a checkpoint's may be there. */
-static MildStatus check_strangers(const Safetensors *file, const char *path, const PolicyTensors *wanted,
-                                  MildError *error) {
+static MildStatus check_strangers(const Safetensors *file, const char *path,
+                                  const PolicyTensors *wanted, MildError *error) {
     for (int i = 0; i < safetensors_count(file); i++) {
         const char *name = safetensors_at(file, i)->name;
         int known = strncmp(name, "train.", 6) == 0;
@@ -115,13 +125,15 @@ static MildStatus check_strangers(const Safetensors *file, const char *path, con
     return MILD_OK;
 }
 
-MildStatus policy_file_parameters(const Safetensors *file, const char *path, const Network *network, float *parameters,
-                                  MildError *error) {
+MildStatus policy_file_parameters(const Safetensors *file, const char *path, const Network *network,
+                                  float *parameters, MildError *error) {
     PolicyTensors wanted;
     policy_file_tensors(network, parameters, &wanted);
     for (int k = 0; k < wanted.count; k++) {
         const Safetensor *want = &wanted.tensor[k], *have = safetensors_find(file, want->name);
-        if (!have) return wrong_tensor(path, want->name, "is missing", error);
+        if (!have) {
+            return wrong_tensor(path, want->name, "is missing", error);
+        }
         if (have->type != want->type || have->rank != want->rank ||
             memcmp(have->shape, want->shape, sizeof have->shape) != 0) {
             return wrong_tensor(path, want->name, "has another type or shape", error);
@@ -131,7 +143,8 @@ MildStatus policy_file_parameters(const Safetensors *file, const char *path, con
     for (int64_t i = 0; i < network->count; i++) {
         if (!isfinite(parameters[i])) {
             return mild_fail(error, MILD_ERROR_FORMAT,
-                             "%s: holds weights that are not finite; take an older checkpoint", path);
+                             "%s: holds weights that are not finite; take an older checkpoint",
+                             path);
         }
     }
     return check_strangers(file, path, &wanted, error);
@@ -145,7 +158,8 @@ MildStatus policy_save(const Policy *policy, const char *path, const char *note,
     return safetensors_write(path, tensors.tensor, tensors.count, texts.text, texts.count, error);
 }
 
-/* The size that the def asks for is compared with the file before anything of that size is allocated. */
+/* The size that the def asks for is compared with the file before anything of that size is
+ * allocated. */
 Policy *policy_file_policy(const Safetensors *file, const char *path, MildError *error) {
     PolicyDef def;
     Network network;
@@ -154,7 +168,8 @@ Policy *policy_file_policy(const Safetensors *file, const char *path, MildError 
         return NULL;
     }
     if (network_layout(&network, &def, &inner)) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: %.200s; the file is of no use to this program", path, inner.text);
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: %.200s; the file is of no use to this program",
+                  path, inner.text);
         return NULL;
     }
     size_t bytes = 0;
@@ -162,8 +177,8 @@ Policy *policy_file_policy(const Safetensors *file, const char *path, MildError 
         bytes += safetensors_at(file, i)->bytes;
     }
     if ((uint64_t)network.count > bytes / sizeof(float)) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: states a network larger than the file; take an older checkpoint",
-                  path);
+        mild_fail(error, MILD_ERROR_FORMAT,
+                  "%s: states a network larger than the file; take an older checkpoint", path);
         return NULL;
     }
     Policy *policy = policy_create(&def, 0, error);

@@ -1,6 +1,6 @@
-/* The tensors and texts of a policy in a safetensors file. Names are those of a PyTorch module whose members encoder,
- * decoder, modulation, actor and critic are nn.Sequential(Linear, ELU, Linear, ...): encoder.0.weight, encoder.2.weight, and
- * a parameter log_std. */
+/* The tensors and texts of a policy in a safetensors file. Names are those of a PyTorch module
+ * whose members encoder, decoder, modulation, actor and critic are nn.Sequential(Linear, ELU,
+ * Linear, ...): encoder.0.weight, encoder.2.weight, and a parameter log_std. */
 #ifndef MILD_POLICY_FILE_H
 #define MILD_POLICY_FILE_H
 
@@ -27,13 +27,15 @@ typedef struct {
 #define POLICY_FILE_VERSION "1"
 
 void policy_file_tensors(const Network *network, const float *parameters, PolicyTensors *tensors);
-void policy_file_texts(const Network *network, const char *kind, const char *note, PolicyTexts *texts);
+void policy_file_texts(const Network *network, const char *kind, const char *note,
+                       PolicyTexts *texts);
 
 /* The def that a file states; refused unless it is complete and valid. */
-MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef *def, MildError *error);
+MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef *def,
+                           MildError *error);
 /* The parameters of a network from the file: every tensor there, with its shape, finite. */
-MildStatus policy_file_parameters(const Safetensors *file, const char *path, const Network *network, float *parameters,
-                                  MildError *error);
+MildStatus policy_file_parameters(const Safetensors *file, const char *path, const Network *network,
+                                  float *parameters, MildError *error);
 /* A policy from an open file, as policy_load. */
 Policy *policy_file_policy(const Safetensors *file, const char *path, MildError *error);
 

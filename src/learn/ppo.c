@@ -39,34 +39,43 @@ const MildField ppo_fields[] = {
     MILD_FIELD(PpoDef, epochs, MILD_FIELD_INT, 1, 1, 64, "[-] passes over each rollout"),
     MILD_FIELD(PpoDef, minibatches, MILD_FIELD_INT, 1, 1, 1024, "[-] optimiser steps per pass"),
     MILD_FIELD(PpoDef, gamma, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] discount per policy step"),
-    MILD_FIELD(PpoDef, lambda, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] decay of generalised advantage estimation"),
+    MILD_FIELD(PpoDef, lambda, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] decay of generalised advantage estimation"),
     MILD_FIELD(PpoDef, clip, MILD_FIELD_DOUBLE, 1, 0.01, 10.0,
                "[-] clip range of the probability ratio, and of the value's move"),
     MILD_FIELD(PpoDef, entropy, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] weight of the entropy bonus"),
-    MILD_FIELD(PpoDef, value_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0, "[-] weight of the value loss"),
+    MILD_FIELD(PpoDef, value_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
+               "[-] weight of the value loss"),
     MILD_FIELD(PpoDef, clip_value, MILD_FIELD_BOOL, 1, 0, 1, "[-] clip the value loss"),
     MILD_FIELD(PpoDef, learning_rate, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] first learning rate"),
-    MILD_FIELD(PpoDef, learning_rate_min, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] least adapted learning rate"),
-    MILD_FIELD(PpoDef, learning_rate_max, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] greatest adapted learning rate"),
+    MILD_FIELD(PpoDef, learning_rate_min, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] least adapted learning rate"),
+    MILD_FIELD(PpoDef, learning_rate_max, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] greatest adapted learning rate"),
     MILD_FIELD(PpoDef, kl_target, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
                "[nat] divergence the learning rate aims at; 0 keeps the rate fixed"),
     MILD_FIELD(PpoDef, max_gradient_norm, MILD_FIELD_DOUBLE, 1, 1e-6, 1e6,
                "[-] the gradient is shortened to this norm"),
-    MILD_FIELD(PpoDef, epsilon, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] share of the regression loss in the joint loss"),
+    MILD_FIELD(PpoDef, epsilon, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] share of the regression loss in the joint loss"),
     MILD_FIELD(PpoDef, kl_weight, MILD_FIELD_DOUBLE, 1, 0.0, 10.0,
                "[-] weight of the latent's divergence from N(0, I)"),
-    MILD_FIELD(PpoDef, mirror_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0, "[-] weight of the mirror symmetry loss"),
+    MILD_FIELD(PpoDef, mirror_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
+               "[-] weight of the mirror symmetry loss"),
     MILD_FIELD(PpoDef, mirror_share, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
                "[-] share of each minibatch that the mirror loss sees"),
-    MILD_FIELD(PpoDef, std_min, MILD_FIELD_DOUBLE, 1, 1e-4, 1.0, "[-] floor of the action noise's standard deviation"),
+    MILD_FIELD(PpoDef, std_min, MILD_FIELD_DOUBLE, 1, 1e-4, 1.0,
+               "[-] floor of the action noise's standard deviation"),
     MILD_FIELD(PpoDef, anneal, MILD_FIELD_INT, 2, 0, 1e9,
                "[-] first and last iteration of the anneal that ends a run; equal: none"),
-    MILD_FIELD(PpoDef, anneal_factor, MILD_FIELD_DOUBLE, 1, 1e-6, 1.0,
-               "[-] kl_target and learning_rate_max are multiplied by this by the end of the anneal"),
+    MILD_FIELD(
+        PpoDef, anneal_factor, MILD_FIELD_DOUBLE, 1, 1e-6, 1.0,
+        "[-] kl_target and learning_rate_max are multiplied by this by the end of the anneal"),
     MILD_FIELD(PpoDef, std_max, MILD_FIELD_DOUBLE, 2, 1e-4, 10.0,
                "[-] ceiling of the action noise's standard deviation, before and after the anneal"),
     MILD_FIELD(PpoDef, average, MILD_FIELD_DOUBLE, 1, 0.0, 0.9999,
-               "[-] decay per iteration of the running mean of the weights that is saved as the policy; 0: none"),
+               "[-] decay per iteration of the running mean of the weights that is saved as the "
+               "policy; 0: none"),
 };
 const int ppo_field_count = (int)(sizeof ppo_fields / sizeof *ppo_fields);
 
@@ -117,7 +126,8 @@ static int take_mirror(Ppo *ppo, const PpoMirror *mirror) {
         return 0;
     }
     memcpy(ppo->mirror_index, mirror->observation_index, observation * sizeof *ppo->mirror_index);
-    memcpy(ppo->mirror_index + observation, mirror->action_index, actions * sizeof *ppo->mirror_index);
+    memcpy(ppo->mirror_index + observation, mirror->action_index,
+           actions * sizeof *ppo->mirror_index);
     memcpy(ppo->mirror_sign, mirror->observation_sign, observation * sizeof *ppo->mirror_sign);
     memcpy(ppo->mirror_sign + observation, mirror->action_sign, actions * sizeof *ppo->mirror_sign);
     ppo->mirror = (PpoMirror){ppo->mirror_index, ppo->mirror_sign, ppo->mirror_index + observation,
@@ -128,9 +138,11 @@ static int take_mirror(Ppo *ppo, const PpoMirror *mirror) {
 
 static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     const Network *n = &ppo->policy->network;
-    const size_t count = (size_t)n->count, samples = (size_t)ppo->batch.steps * (size_t)ppo->batch.envs;
+    const size_t count = (size_t)n->count,
+                 samples = (size_t)ppo->batch.steps * (size_t)ppo->batch.envs;
     ppo->bytes = sizeof *ppo;
-    if (mirror && mirror->observation_index && ppo->def.mirror_weight > 0.0 && !take_mirror(ppo, mirror)) {
+    if (mirror && mirror->observation_index && ppo->def.mirror_weight > 0.0 &&
+        !take_mirror(ppo, mirror)) {
         return 0;
     }
     LossChunk chunk;
@@ -152,8 +164,8 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
         }
         memcpy(policy_parameters(ppo->average), ppo->policy->parameters, count * sizeof(float));
     }
-    if (!ppo->batch_block || !ppo->gradient || !ppo->first || !ppo->second || !ppo->scratch || !ppo->order ||
-        !ppo->draw) {
+    if (!ppo->batch_block || !ppo->gradient || !ppo->first || !ppo->second || !ppo->scratch ||
+        !ppo->order || !ppo->draw) {
         return 0;
     }
     memset(ppo->batch_block, 0, ppo->batch_bytes);
@@ -173,8 +185,8 @@ static MildStatus check_mirror(const PolicyDef *def, const PpoMirror *mirror, Mi
     }
     for (int i = 0; mirror && mirror->observation_index && i < def->actions; i++) {
         if (mirror->action_index[i] < 0 || mirror->action_index[i] >= def->actions) {
-            return mild_fail(error, MILD_ERROR_RANGE, "mirror: action %d maps to %d of %d", i, mirror->action_index[i],
-                             def->actions);
+            return mild_fail(error, MILD_ERROR_RANGE, "mirror: action %d maps to %d of %d", i,
+                             mirror->action_index[i], def->actions);
         }
     }
     return MILD_OK;
@@ -186,18 +198,20 @@ static MildStatus check_def(const PpoDef *def, int envs, MildError *error) {
         return status;
     }
     if (envs < 1 || (int64_t)envs * def->steps > 1 << 28) {
-        return mild_fail(error, MILD_ERROR_RANGE, "%d environments of %d steps: between 1 and 2^28 samples can be held",
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "%d environments of %d steps: between 1 and 2^28 samples can be held",
                          envs, def->steps);
     }
     if (def->learning_rate_min > def->learning_rate_max) {
-        return mild_fail(error, MILD_ERROR_RANGE, "ppo.learning_rate_min = %g is above ppo.learning_rate_max = %g",
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "ppo.learning_rate_min = %g is above ppo.learning_rate_max = %g",
                          def->learning_rate_min, def->learning_rate_max);
     }
     return MILD_OK;
 }
 
-Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror, int envs, uint64_t seed,
-                MildError *error) {
+Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror, int envs,
+                uint64_t seed, MildError *error) {
     if (check_def(def, envs, error) || check_mirror(policy_def(policy), mirror, error)) {
         return NULL;
     }
@@ -212,8 +226,9 @@ Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *
         ppo->batch.envs = envs;
     }
     if (!ppo || !take_all(ppo, mirror)) {
-        mild_fail(error, MILD_ERROR_MEMORY, "no memory for a rollout of %d x %d samples; lower train.envs or ppo.steps",
-                  envs, def->steps);
+        mild_fail(error, MILD_ERROR_MEMORY,
+                  "no memory for a rollout of %d x %d samples; lower train.envs or ppo.steps", envs,
+                  def->steps);
         ppo_destroy(ppo);
         return NULL;
     }
@@ -270,7 +285,8 @@ typedef struct {
     const float *std;
 } ActJob;
 
-/* Actions around the means of the piece's environments, two at a time so that the noise begins at an even number. */
+/* Actions around the means of the piece's environments, two at a time so that the noise begins at
+ * an even number. */
 static void act_piece(void *context, int piece, int thread) {
     (void)thread;
     const ActJob *job = context;
@@ -296,8 +312,8 @@ void ppo_act(Ppo *ppo, int t) {
     if (ppo->backend.act) {
         ppo->backend.act(ppo->backend.self, t, &ppo->error);
     } else {
-        policy_act(ppo->policy, ppo->pool, b->envs, b->history + first * n->history, b->mean + first * n->def.actions,
-                   NULL, NULL);
+        policy_act(ppo->policy, ppo->pool, b->envs, b->history + first * n->history,
+                   b->mean + first * n->def.actions, NULL, NULL);
     }
     Random key = random_at(ppo->seed, (uint32_t)ppo->iteration, (uint32_t)t);
     ActJob job = {ppo, t, random_bits(&key), policy_std(ppo->policy)};
@@ -322,7 +338,8 @@ static void draw_piece(void *context, int piece, int thread) {
 
 /* Fisher-Yates: a pure function of (seed, iteration, epoch). */
 static void shuffle(Ppo *ppo, int epoch) {
-    ShuffleJob job = {ppo, random_at(ppo->seed ^ 0x6f72646572u, (uint32_t)ppo->iteration, (uint32_t)epoch)};
+    ShuffleJob job = {
+        ppo, random_at(ppo->seed ^ 0x6f72646572u, (uint32_t)ppo->iteration, (uint32_t)epoch)};
     pool_run(ppo->pool, PPO_PIECES, draw_piece, &job);
     for (int i = ppo->samples - 1; i > 0; i--) {
         int j = ppo->draw[ppo->samples - 1 - i], held = ppo->order[i];
@@ -331,16 +348,20 @@ static void shuffle(Ppo *ppo, int epoch) {
     }
 }
 
-/* 0 before the anneal, 1 after it: a function of the iteration alone, so that a resumed run goes on alike. */
+/* 0 before the anneal, 1 after it: a function of the iteration alone, so that a resumed run goes on
+ * alike. */
 static double anneal_share(const Ppo *ppo) {
     const int first = ppo->def.anneal[0], last = ppo->def.anneal[1];
-    return first < last ? fmin(fmax((double)(ppo->iteration - first) / (last - first), 0.0), 1.0) : 0.0;
+    return first < last ? fmin(fmax((double)(ppo->iteration - first) / (last - first), 0.0), 1.0)
+                        : 0.0;
 }
 
-/* The rate that keeps the divergence from the rollout's policy near its target [vendor: factor 1.5]. */
+/* The rate that keeps the divergence from the rollout's policy near its target [vendor:
+ * factor 1.5]. */
 static void adapt_learning_rate(Ppo *ppo, double kl) {
     const PpoDef *def = &ppo->def;
-    const double anneal = pow(def->anneal_factor, anneal_share(ppo)), target = anneal * def->kl_target;
+    const double anneal = pow(def->anneal_factor, anneal_share(ppo)),
+                 target = anneal * def->kl_target;
     if (kl > 2.0 * target) {
         ppo->learning_rate /= 1.5;
     } else if (kl > 0.0 && kl < 0.5 * target) {
@@ -353,7 +374,8 @@ static void adapt_learning_rate(Ppo *ppo, double kl) {
 /* Between the updates, so that what the rollout samples from is what the update compares with. */
 static void bound_noise(Ppo *ppo) {
     const double *std_max = ppo->def.std_max;
-    const float ceiling = (float)(log(std_max[0]) + anneal_share(ppo) * log(std_max[1] / std_max[0]));
+    const float ceiling =
+        (float)(log(std_max[0]) + anneal_share(ppo) * log(std_max[1] / std_max[0]));
     const Network *n = &ppo->policy->network;
     for (int64_t i = n->log_std; i < n->count; i++) {
         ppo->policy->parameters[i] = fminf(ppo->policy->parameters[i], ceiling);
@@ -380,10 +402,11 @@ static double entropy_of(const LossContext *context) {
 }
 
 /* Adds a minibatch's means to the report; 0 when one of them is not finite. */
-static int report_minibatch(PpoReport *report, const LossContext *context, const LossSums *s, double norm) {
+static int report_minibatch(PpoReport *report, const LossContext *context, const LossSums *s,
+                            double norm) {
     const double w = context->sample_weight;
-    const double check = s->surrogate + s->kl + s->reconstruction + s->vae_kl + s->estimate[0] + s->estimate[1] +
-                         s->estimate[2] + s->mirror + s->value + norm;
+    const double check = s->surrogate + s->kl + s->reconstruction + s->vae_kl + s->estimate[0] +
+                         s->estimate[1] + s->estimate[2] + s->mirror + s->value + norm;
     if (!isfinite(check)) {
         return 0;
     }
@@ -402,12 +425,13 @@ static int report_minibatch(PpoReport *report, const LossContext *context, const
     return 1;
 }
 
-static int update_minibatch(Ppo *ppo, LossContext *context, const int *samples, int count, uint32_t draw,
-                            PpoReport *report) {
+static int update_minibatch(Ppo *ppo, LossContext *context, const int *samples, int count,
+                            uint32_t draw, PpoReport *report) {
     const int mirrored = ppo_mirrored(ppo, count, NULL);
     context->sample_weight = 1.0f / (float)count;
     context->mirror_weight = mirrored > 0 ? 1.0f / (float)mirrored : 0.0f;
-    memcpy(context->std, policy_std(ppo->policy), (size_t)context->network->def.actions * sizeof *context->std);
+    memcpy(context->std, policy_std(ppo->policy),
+           (size_t)context->network->def.actions * sizeof *context->std);
     LossSums sums;
     double norm;
     ppo_gradient(ppo, context, samples, count, draw, &sums, &norm);
@@ -425,10 +449,12 @@ static int update_minibatch(Ppo *ppo, LossContext *context, const int *samples, 
 /* Sums over minibatches become means. */
 static void finish_report(const Ppo *ppo, PpoReport *report, int minibatches) {
     const double w = minibatches > 0 ? 1.0 / minibatches : 0.0;
-    double *const means[] = {
-        &report->surrogate,        &report->value_loss,       &report->entropy,          &report->kl,
-        &report->clip_share,       &report->gradient_norm,    &report->mirror,           &report->vae_kl,
-        &report->estimate_loss[0], &report->estimate_loss[1], &report->estimate_loss[2], &report->vae_reconstruction};
+    double *const means[] = {&report->surrogate,        &report->value_loss,
+                             &report->entropy,          &report->kl,
+                             &report->clip_share,       &report->gradient_norm,
+                             &report->mirror,           &report->vae_kl,
+                             &report->estimate_loss[0], &report->estimate_loss[1],
+                             &report->estimate_loss[2], &report->vae_reconstruction};
     for (size_t i = 0; i < sizeof means / sizeof *means; i++) {
         *means[i] *= w;
     }
@@ -470,7 +496,8 @@ void ppo_update(Ppo *ppo, PpoReport *report) {
 
     LossContext context = {.def = &ppo->def, .network = n, .parameters = ppo->policy->parameters};
     context.mirror = ppo->mirror.observation_index ? &ppo->mirror : NULL;
-    memcpy(context.old_std, policy_std(ppo->policy), (size_t)n->def.actions * sizeof *context.old_std);
+    memcpy(context.old_std, policy_std(ppo->policy),
+           (size_t)n->def.actions * sizeof *context.old_std);
     int done = 0;
     for (int epoch = 0; epoch < ppo->def.epochs; epoch++) {
         shuffle(ppo, epoch);

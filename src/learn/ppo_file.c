@@ -9,15 +9,21 @@ enum { COUNTER_ITERATION, COUNTER_ADAM_STEPS, COUNTER_SEED, COUNTERS };
 
 #define TRAIN_TENSORS 10
 
-static Safetensor tensor_of(const char *name, SafetensorsType type, const void *data, int64_t count) {
+static Safetensor tensor_of(const char *name, SafetensorsType type, const void *data,
+                            int64_t count) {
     const size_t sizes[] = {4, 8, 8, 1};
-    return (Safetensor){
-        .name = name, .type = type, .rank = 1, .shape = {count}, .data = data, .bytes = sizes[type] * (size_t)count};
+    return (Safetensor){.name = name,
+                        .type = type,
+                        .rank = 1,
+                        .shape = {count},
+                        .data = data,
+                        .bytes = sizes[type] * (size_t)count};
 }
 
-/* What resuming needs beside the policy; the batch's rows of time 0 are what the next rollout starts from. */
-static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const void *extra, size_t extra_size,
-                         Safetensor tensors[TRAIN_TENSORS]) {
+/* What resuming needs beside the policy; the batch's rows of time 0 are what the next rollout
+ * starts from. */
+static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const void *extra,
+                         size_t extra_size, Safetensor tensors[TRAIN_TENSORS]) {
     const Network *n = &ppo->policy->network;
     const PpoBatch *b = &ppo->batch;
     const int64_t envs = b->envs;
@@ -27,11 +33,15 @@ static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const
     tensors[count++] = tensor_of("train.first_moment", SAFETENSORS_F32, ppo->first, n->count);
     tensors[count++] = tensor_of("train.second_moment", SAFETENSORS_F32, ppo->second, n->count);
     tensors[count++] = tensor_of("train.history", SAFETENSORS_F32, b->history, envs * n->history);
-    tensors[count++] = tensor_of("train.critic", SAFETENSORS_F32, b->critic, envs * n->def.critic_input);
-    tensors[count++] = tensor_of("train.target", SAFETENSORS_F32, b->target, envs * n->def.estimates);
-    tensors[count++] = tensor_of("train.clean", SAFETENSORS_F32, b->clean, envs * n->def.observation);
+    tensors[count++] =
+        tensor_of("train.critic", SAFETENSORS_F32, b->critic, envs * n->def.critic_input);
+    tensors[count++] =
+        tensor_of("train.target", SAFETENSORS_F32, b->target, envs * n->def.estimates);
+    tensors[count++] =
+        tensor_of("train.clean", SAFETENSORS_F32, b->clean, envs * n->def.observation);
     if (ppo->average) {
-        tensors[count++] = tensor_of("train.average", SAFETENSORS_F32, policy_parameters(ppo->average), n->count);
+        tensors[count++] =
+            tensor_of("train.average", SAFETENSORS_F32, policy_parameters(ppo->average), n->count);
     }
     if (extra_size > 0) {
         tensors[count++] = tensor_of("train.extra", SAFETENSORS_U8, extra, (int64_t)extra_size);
@@ -39,8 +49,8 @@ static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const
     return count;
 }
 
-MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size, const char *note,
-                    MildError *error) {
+MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size,
+                    const char *note, MildError *error) {
     PolicyTensors policy;
     PolicyTexts texts;
     Safetensor all[TRAIN_TENSORS + POLICY_TENSORS_MAX];
@@ -58,8 +68,8 @@ MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t 
     return safetensors_write(path, all, count + policy.count, texts.text, texts.count, error);
 }
 
-static MildStatus check_same_network(const Safetensors *file, const char *path, const Network *network,
-                                     MildError *error) {
+static MildStatus check_same_network(const Safetensors *file, const char *path,
+                                     const Network *network, MildError *error) {
     PolicyDef def;
     MildStatus status = policy_file_def(file, path, &def, error);
     if (status) {
@@ -71,15 +81,17 @@ static MildStatus check_same_network(const Safetensors *file, const char *path, 
         const char *key = ours.text[i].key, *theirs = safetensors_text(file, key);
         if (strcmp(key, "note") != 0 && strcmp(key, "policy.init_std") != 0 &&
             strcmp(ours.text[i].value, theirs) != 0) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT,
-                             "%s: its %s is '%.60s', this run's is '%.60s'; resume with the checkpoint's config", path,
-                             key, theirs, ours.text[i].value);
+            return mild_fail(
+                error, MILD_ERROR_ARGUMENT,
+                "%s: its %s is '%.60s', this run's is '%.60s'; resume with the checkpoint's config",
+                path, key, theirs, ours.text[i].value);
         }
     }
     return MILD_OK;
 }
 
-/* A weight's number: bad ones would spoil all weights at the first update. (A bad observation costs its minibatch.) */
+/* A weight's number: bad ones would spoil all weights at the first update. (A bad observation costs
+ * its minibatch.) */
 static int is_weights(const char *name) {
     return strcmp(name, "train.average") == 0 || strcmp(name, "train.first_moment") == 0 ||
            strcmp(name, "train.second_moment") == 0;
@@ -96,33 +108,34 @@ static int all_finite(const Safetensor *tensor) {
     return 1;
 }
 
-static MildStatus check_train(const Safetensors *file, const char *path, const Safetensor *wanted, int count,
-                              int has_extra, MildError *error) {
+static MildStatus check_train(const Safetensors *file, const char *path, const Safetensor *wanted,
+                              int count, int has_extra, MildError *error) {
     for (int i = 0; i < count; i++) {
         const Safetensor *have = safetensors_find(file, wanted[i].name);
         if (!have && strcmp(wanted[i].name, "train.average") == 0) {
             continue; /* the run had none: it starts from the weights */
         }
         if (!have || have->type != wanted[i].type || have->bytes != wanted[i].bytes) {
-            return mild_fail(
-                error, MILD_ERROR_ARGUMENT,
-                "%s: %s holds %zu bytes, this run needs %zu; resume with the checkpoint's config (train.envs, task)",
-                path, wanted[i].name, have ? have->bytes : (size_t)0, wanted[i].bytes);
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "%s: %s holds %zu bytes, this run needs %zu; resume with the "
+                             "checkpoint's config (train.envs, task)",
+                             path, wanted[i].name, have ? have->bytes : (size_t)0, wanted[i].bytes);
         }
         if (is_weights(wanted[i].name) && !all_finite(have)) {
-            return mild_fail(error, MILD_ERROR_FORMAT, "%s: %s holds numbers that are not finite; take an older checkpoint",
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: %s holds numbers that are not finite; take an older checkpoint",
                              path, wanted[i].name);
         }
     }
     if (!safetensors_find(file, "train.extra") != !has_extra) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "%s: holds an environment state that this run does not expect",
-                         path);
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "%s: holds an environment state that this run does not expect", path);
     }
     return MILD_OK;
 }
 
-static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters[COUNTERS], double learning_rate,
-                       void *extra) {
+static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters[COUNTERS],
+                       double learning_rate, void *extra) {
     const struct {
         const char *name;
         void *to;
@@ -148,25 +161,32 @@ static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters
     ppo->learning_rate = learning_rate;
 }
 
-/* Everything is checked, the parameters into a spare array first, before anything of `ppo` changes. */
-static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra, size_t extra_size,
-                            float *spare, MildError *error) {
+/* Everything is checked, the parameters into a spare array first, before anything of `ppo` changes.
+ */
+static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra,
+                            size_t extra_size, float *spare, MildError *error) {
     const Network *n = &ppo->policy->network;
     Safetensor wanted[TRAIN_TENSORS];
     int64_t counters[COUNTERS] = {0};
     double learning_rate;
     int count = train_tensors(ppo, counters, extra, extra_size, wanted);
     MildStatus status = check_same_network(file, path, n, error);
-    if (!status) status = policy_file_parameters(file, path, n, spare, error);
-    if (!status) status = check_train(file, path, wanted, count, extra_size > 0, error);
+    if (!status) {
+        status = policy_file_parameters(file, path, n, spare, error);
+    }
+    if (!status) {
+        status = check_train(file, path, wanted, count, extra_size > 0, error);
+    }
     if (status) {
         return status;
     }
     memcpy(counters, safetensors_find(file, "train.counters")->data, sizeof counters);
-    memcpy(&learning_rate, safetensors_find(file, "train.learning_rate")->data, sizeof learning_rate);
+    memcpy(&learning_rate, safetensors_find(file, "train.learning_rate")->data,
+           sizeof learning_rate);
     if (counters[COUNTER_ITERATION] < 0 || counters[COUNTER_ADAM_STEPS] < 0 ||
         !(learning_rate >= 0.0 && learning_rate <= 1.0)) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: its counters make no sense; take an older checkpoint", path);
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%s: its counters make no sense; take an older checkpoint", path);
     }
     memcpy(ppo->policy->parameters, spare, (size_t)n->count * sizeof *spare);
     if (ppo->average) {
@@ -176,11 +196,12 @@ static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path,
     return MILD_OK;
 }
 
-MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra, size_t extra_size,
-                         MildError *error) {
+MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra,
+                         size_t extra_size, MildError *error) {
     float *spare = malloc((size_t)ppo->policy->network.count * sizeof *spare);
-    MildStatus status = spare ? take_file(ppo, file, path, extra, extra_size, spare, error)
-                              : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
+    MildStatus status = spare
+                            ? take_file(ppo, file, path, extra, extra_size, spare, error)
+                            : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
     free(spare);
     return status;
 }
@@ -188,8 +209,11 @@ MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, vo
 MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error) {
     MildError cause = {0};
     Safetensors *file = safetensors_read(path, &cause);
-    MildStatus status = file ? ppo_load_file(ppo, file, path, extra, extra_size, &cause) : cause.status;
-    if (error && status != MILD_OK) *error = cause;
+    MildStatus status =
+        file ? ppo_load_file(ppo, file, path, extra, extra_size, &cause) : cause.status;
+    if (error && status != MILD_OK) {
+        *error = cause;
+    }
     safetensors_destroy(file);
     return status;
 }

@@ -76,8 +76,8 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
     for (int r = 0; r < chunk->mirrored; r++) {
         loss_mirror_row(job->loss, chunk, r, chunk->rows + r);
     }
-    noise_normal(ppo_latent_key(ppo, job->draw), 2 * (int64_t)at * n->def.latent, chunk->rows * n->def.latent,
-                 chunk->noise);
+    noise_normal(ppo_latent_key(ppo, job->draw), 2 * (int64_t)at * n->def.latent,
+                 chunk->rows * n->def.latent, chunk->noise);
 }
 
 static void gather_critic(const GradientJob *job, int at, LossChunk *chunk) {
@@ -91,17 +91,20 @@ static void gather_critic(const GradientJob *job, int at, LossChunk *chunk) {
     }
 }
 
-/* An empty shard's half of the gradient: nothing will overwrite what the last minibatch left there. */
+/* An empty shard's half of the gradient: nothing will overwrite what the last minibatch left there.
+ */
 static void clear_half(const Network *n, int critic, float *gradient) {
     if (critic) {
-        memset(gradient + n->critic_first, 0, (size_t)(n->log_std - n->critic_first) * sizeof *gradient);
+        memset(gradient + n->critic_first, 0,
+               (size_t)(n->log_std - n->critic_first) * sizeof *gradient);
     } else {
         memset(gradient, 0, (size_t)n->critic_first * sizeof *gradient);
         memset(gradient + n->log_std, 0, (size_t)(n->count - n->log_std) * sizeof *gradient);
     }
 }
 
-/* Pieces 0 .. PPO_SHARDS-1: the actor's half of a shard (the longer one, so it starts first); the rest: the critic's. */
+/* Pieces 0 .. PPO_SHARDS-1: the actor's half of a shard (the longer one, so it starts first); the
+ * rest: the critic's. */
 static void gradient_piece(void *context, int piece, int thread) {
     GradientJob *job = context;
     Ppo *ppo = job->ppo;
@@ -109,8 +112,10 @@ static void gradient_piece(void *context, int piece, int thread) {
     const int critic = piece >= PPO_SHARDS, shard = piece % PPO_SHARDS;
     float *gradient = ppo->gradient + (size_t)shard * ppo->stride;
     LossChunk chunk;
-    loss_carve(n, PPO_CHUNK, ppo->mirror_rows, ppo->scratch + (size_t)thread * ppo->scratch_floats, &chunk);
-    int entered = product_enter(), begin = shard_begin(job->count, shard), end = shard_begin(job->count, shard + 1);
+    loss_carve(n, PPO_CHUNK, ppo->mirror_rows, ppo->scratch + (size_t)thread * ppo->scratch_floats,
+               &chunk);
+    int entered = product_enter(), begin = shard_begin(job->count, shard),
+        end = shard_begin(job->count, shard + 1);
     if (begin == end) {
         clear_half(n, critic, gradient);
     }
@@ -182,14 +187,15 @@ static void add_sums(LossSums *to, const LossSums *from) {
     to->value += from->value;
 }
 
-void ppo_gradient(Ppo *ppo, const LossContext *context, const int *samples, int count, uint32_t draw, LossSums *sums,
-                  double *norm) {
-    GradientJob job = {.ppo = ppo, .loss = context, .samples = samples, .count = count, .draw = draw};
+void ppo_gradient(Ppo *ppo, const LossContext *context, const int *samples, int count,
+                  uint32_t draw, LossSums *sums, double *norm) {
+    GradientJob job = {
+        .ppo = ppo, .loss = context, .samples = samples, .count = count, .draw = draw};
     const PpoBackend *backend = &ppo->backend;
     *sums = (LossSums){0};
     if (backend->gradient) {
-        if (backend->gradient(backend->self, context, samples, count, ppo_latent_key(ppo, draw), ppo->gradient, sums,
-                              &ppo->error)) {
+        if (backend->gradient(backend->self, context, samples, count, ppo_latent_key(ppo, draw),
+                              ppo->gradient, sums, &ppo->error)) {
             *norm = NAN; /* drops the minibatch */
             return;
         }
@@ -219,8 +225,8 @@ static void optimise_piece(void *context, int range, int thread) {
     const Ppo *ppo = job->ppo;
     int64_t begin = range_begin(ppo->policy->network.count, range),
             end = range_begin(ppo->policy->network.count, range + 1);
-    adam_apply(job->step, end - begin, ppo->gradient + begin, ppo->policy->parameters + begin, ppo->first + begin,
-               ppo->second + begin);
+    adam_apply(job->step, end - begin, ppo->gradient + begin, ppo->policy->parameters + begin,
+               ppo->first + begin, ppo->second + begin);
 }
 
 void ppo_optimise(Ppo *ppo, double gradient_scale) {

@@ -7,8 +7,9 @@ static int sample_usable(const PpoBatch *b, int64_t i) {
 }
 
 /* Backward over time for one environment:
- *   delta_t = r_t + gamma V(s_t+1) (1 - done) - V(s_t),  A_t = delta_t + gamma lambda (1 - done) A_t+1,
- * where an end by time has r_t += gamma V(s_t), as if the episode went on. An unusable sample cuts like an end. */
+ *   delta_t = r_t + gamma V(s_t+1) (1 - done) - V(s_t),  A_t = delta_t + gamma lambda (1 - done)
+ * A_t+1, where an end by time has r_t += gamma V(s_t), as if the episode went on. An unusable
+ * sample cuts like an end. */
 static void environment_returns(const PpoDef *def, PpoBatch *b, int env) {
     double advantage = 0.0, next_value = b->value[(int64_t)b->steps * b->envs + env];
     next_value = isfinite(next_value) ? next_value : 0.0;
@@ -68,7 +69,8 @@ void ppo_returns(Ppo *ppo, PpoReport *report) {
     report->value_mean = moments_of(ppo, b->value).mean;
     report->advantage_std = advantage.std;
     /* returns - value is the advantage before it is normalised */
-    report->explained_variance = returns.std > 0.0 ? 1.0 - pow(advantage.std / returns.std, 2) : 0.0;
+    report->explained_variance =
+        returns.std > 0.0 ? 1.0 - pow(advantage.std / returns.std, 2) : 0.0;
     for (int k = 0; k < ppo->samples; k++) {
         float *a = &b->advantage[ppo->order[k]];
         *a = (float)((*a - advantage.mean) / (advantage.std + 1e-8));

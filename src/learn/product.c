@@ -3,7 +3,8 @@
 #include <math.h>
 #include <oneapi/dnnl/dnnl.h>
 
-/* OpenMP's two calls, as its specification declares them: clang comes without omp.h. They set the calling thread only. */
+/* OpenMP's two calls, as its specification declares them: clang comes without omp.h. They set the
+ * calling thread only. */
 extern void omp_set_num_threads(int threads);
 extern int omp_get_max_threads(void);
 
@@ -17,9 +18,10 @@ void product_leave(int entered) {
     omp_set_num_threads(entered);
 }
 
-void product(char transpose_a, char transpose_b, int m, int n, int k, const float *a, int lda, const float *b, int ldb,
-             float beta, float *c, int ldc) {
-    if (dnnl_sgemm(transpose_a, transpose_b, m, n, k, 1.0f, a, lda, b, ldb, beta, c, ldc) == dnnl_success) {
+void product(char transpose_a, char transpose_b, int m, int n, int k, const float *a, int lda,
+             const float *b, int ldb, float beta, float *c, int ldc) {
+    if (dnnl_sgemm(transpose_a, transpose_b, m, n, k, 1.0f, a, lda, b, ldb, beta, c, ldc) ==
+        dnnl_success) {
         return;
     }
     for (int i = 0; i < m; i++) {

@@ -1,15 +1,18 @@
-/* Matrix products, row major, through oneDNN. Every product runs on the calling thread alone: the learner splits its work
- * into fixed pieces itself, so that no result depends on the number of threads. */
+/* Matrix products, row major, through oneDNN. Every product runs on the calling thread alone: the
+ * learner splits its work into fixed pieces itself, so that no result depends on the number of
+ * threads. */
 #ifndef MILD_PRODUCT_H
 #define MILD_PRODUCT_H
 
-/* Keep oneDNN's own team at one thread for this thread; returns what product_leave takes to restore the caller's setting. */
+/* Keep oneDNN's own team at one thread for this thread; returns what product_leave takes to restore
+ * the caller's setting. */
 int product_enter(void);
 void product_leave(int entered);
 
-/* c[m][n] = op(a) op(b) + beta c; op transposes where the flag is 'T'. ld*: floats between rows as stored. Should oneDNN
- * fail (out of memory), c is filled with NaN, which the learner drops and counts. */
-void product(char transpose_a, char transpose_b, int m, int n, int k, const float *a, int lda, const float *b, int ldb,
-             float beta, float *c, int ldc);
+/* c[m][n] = op(a) op(b) + beta c; op transposes where the flag is 'T'. ld*: floats between rows as
+ * stored. Should oneDNN fail (out of memory), c is filled with NaN, which the learner drops and
+ * counts. */
+void product(char transpose_a, char transpose_b, int m, int n, int k, const float *a, int lda,
+             const float *b, int ldb, float beta, float *c, int ldc);
 
 #endif

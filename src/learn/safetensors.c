@@ -31,8 +31,9 @@ static const size_t type_sizes[] = {4, 8, 8, 1};
 
 /* CRC-32 of IEEE 802.3 (reflected, polynomial 0x04c11db7), a nibble at a time. */
 static uint32_t crc_add(uint32_t crc, const unsigned char *bytes, size_t size) {
-    static const uint32_t table[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
-                                       0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
+    static const uint32_t table[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac,
+                                       0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
+                                       0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
                                        0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
     crc = ~crc;
     for (size_t i = 0; i < size; i++) {
@@ -50,8 +51,8 @@ static uint64_t header_length(const unsigned char *bytes) {
     return length;
 }
 
-/* Position of the checksum's digits, or 0. Inside a JSON text the quotes of CRC_KEY would be escaped, so the first match is
- * the key itself. */
+/* Position of the checksum's digits, or 0. Inside a JSON text the quotes of CRC_KEY would be
+ * escaped, so the first match is the key itself. */
 static size_t crc_position(const unsigned char *bytes, size_t size) {
     const size_t key = sizeof CRC_KEY - 1;
     size_t end = size < PREFIX ? 0 : PREFIX + (size_t)header_length(bytes);
@@ -63,7 +64,8 @@ static size_t crc_position(const unsigned char *bytes, size_t size) {
     return 0;
 }
 
-static void crc_text(const unsigned char *bytes, size_t size, size_t at, char text[CRC_DIGITS + 1]) {
+static void crc_text(const unsigned char *bytes, size_t size, size_t at,
+                     char text[CRC_DIGITS + 1]) {
     uint32_t crc = crc_add(0, bytes, at);
     crc = crc_add(crc, (const unsigned char *)"00000000", CRC_DIGITS);
     crc = crc_add(crc, bytes + at + CRC_DIGITS, size - at - CRC_DIGITS);
@@ -100,15 +102,19 @@ static int add_tensor(cJSON *header, const Safetensor *tensor, size_t begin) {
                        ? cJSON_AddArrayToObject(entry, "shape")
                        : NULL;
     for (int i = 0; shape && i < tensor->rank; i++) {
-        if (!cJSON_AddItemToArray(shape, cJSON_CreateNumber((double)tensor->shape[i]))) return 0;
+        if (!cJSON_AddItemToArray(shape, cJSON_CreateNumber((double)tensor->shape[i]))) {
+            return 0;
+        }
     }
     cJSON *offsets = shape ? cJSON_AddArrayToObject(entry, "data_offsets") : NULL;
     return offsets && cJSON_AddItemToArray(offsets, cJSON_CreateNumber((double)begin)) &&
-           cJSON_AddItemToArray(offsets, cJSON_CreateNumber((double)(begin + tensor_bytes(tensor))));
+           cJSON_AddItemToArray(offsets,
+                                cJSON_CreateNumber((double)(begin + tensor_bytes(tensor))));
 }
 
 /* The header as text (from malloc), or NULL when out of memory. */
-static char *make_header(const Safetensor *tensors, int tensor_count, const SafetensorsText *texts, int text_count) {
+static char *make_header(const Safetensor *tensors, int tensor_count, const SafetensorsText *texts,
+                         int text_count) {
     cJSON *header = cJSON_CreateObject();
     cJSON *metadata = header ? cJSON_AddObjectToObject(header, "__metadata__") : NULL;
     int ok = metadata && cJSON_AddStringToObject(metadata, "crc32", "00000000");
@@ -125,8 +131,10 @@ static char *make_header(const Safetensor *tensors, int tensor_count, const Safe
     return text;
 }
 
-/* The whole file in memory (from malloc), or NULL when out of memory. Spaces after the header align the data to 8. */
-static unsigned char *assemble(const char *header, const Safetensor *tensors, int tensor_count, size_t *size) {
+/* The whole file in memory (from malloc), or NULL when out of memory. Spaces after the header align
+ * the data to 8. */
+static unsigned char *assemble(const char *header, const Safetensor *tensors, int tensor_count,
+                               size_t *size) {
     size_t length = strlen(header), padded = (length + 7) / 8 * 8, at = PREFIX + padded;
     *size = at;
     for (int i = 0; i < tensor_count; i++) {
@@ -170,7 +178,8 @@ static int write_all(const char *path, const unsigned char *bytes, size_t size) 
     return failed;
 }
 
-/* A rename is on the disk only once its folder is; a file system that cannot flush folders loses nothing by it. */
+/* A rename is on the disk only once its folder is; a file system that cannot flush folders loses
+ * nothing by it. */
 static void flush_folder(const char *path, char *work) {
     const char *slash = strrchr(path, '/');
     size_t length = slash ? (size_t)(slash - path) + 1 : 0;
@@ -183,7 +192,8 @@ static void flush_folder(const char *path, char *work) {
     }
 }
 
-static MildStatus replace_file(const char *path, const unsigned char *bytes, size_t size, MildError *error) {
+static MildStatus replace_file(const char *path, const unsigned char *bytes, size_t size,
+                               MildError *error) {
     char *temporary = malloc(strlen(path) + 8);
     if (!temporary) {
         return mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to write it", path);
@@ -199,7 +209,8 @@ static MildStatus replace_file(const char *path, const unsigned char *bytes, siz
         flush_folder(path, temporary);
     }
     free(temporary);
-    return failed ? mild_fail(error, MILD_ERROR_IO, "%s: cannot be written (%s); what was there before is unchanged",
+    return failed ? mild_fail(error, MILD_ERROR_IO,
+                              "%s: cannot be written (%s); what was there before is unchanged",
                               path, strerror(failed))
                   : MILD_OK;
 }
@@ -209,8 +220,9 @@ MildStatus safetensors_write(const char *path, const Safetensor *tensors, int te
     char *header = make_header(tensors, tensor_count, texts, text_count);
     size_t size = 0;
     unsigned char *bytes = header ? assemble(header, tensors, tensor_count, &size) : NULL;
-    MildStatus status = bytes ? replace_file(path, bytes, size, error)
-                              : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to write it", path);
+    MildStatus status =
+        bytes ? replace_file(path, bytes, size, error)
+              : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to write it", path);
     cJSON_free(header);
     free(bytes);
     return status;
@@ -232,7 +244,8 @@ static int whole(const cJSON *item, uint64_t *value) {
 }
 
 static int parse_type(const cJSON *item, SafetensorsType *type) {
-    for (int i = 0; cJSON_IsString(item) && i < (int)(sizeof type_names / sizeof *type_names); i++) {
+    for (int i = 0; cJSON_IsString(item) && i < (int)(sizeof type_names / sizeof *type_names);
+         i++) {
         if (strcmp(item->valuestring, type_names[i]) == 0) {
             *type = (SafetensorsType)i;
             return 1;
@@ -241,19 +254,23 @@ static int parse_type(const cJSON *item, SafetensorsType *type) {
     return 0;
 }
 
-/* One entry; its size must be that of its shape and lie within the data. Returns what is wrong, or NULL. */
+/* One entry; its size must be that of its shape and lie within the data. Returns what is wrong, or
+ * NULL. */
 static const char *parse_tensor(const Safetensors *file, const cJSON *entry, Safetensor *tensor) {
     const cJSON *shape = cJSON_GetObjectItemCaseSensitive(entry, "shape");
     const cJSON *offsets = cJSON_GetObjectItemCaseSensitive(entry, "data_offsets");
     uint64_t begin, end, room = file->size - file->data;
     *tensor = (Safetensor){.name = entry->string};
-    if (!cJSON_IsObject(entry) || !parse_type(cJSON_GetObjectItemCaseSensitive(entry, "dtype"), &tensor->type)) {
+    if (!cJSON_IsObject(entry) ||
+        !parse_type(cJSON_GetObjectItemCaseSensitive(entry, "dtype"), &tensor->type)) {
         return "a tensor has a type that is none of F32, F64, I64, U8";
     }
-    if (!cJSON_IsArray(shape) || cJSON_GetArraySize(shape) > SAFETENSORS_RANK_MAX)
+    if (!cJSON_IsArray(shape) || cJSON_GetArraySize(shape) > SAFETENSORS_RANK_MAX) {
         return "a tensor has no usable shape";
-    if (!cJSON_IsArray(offsets) || cJSON_GetArraySize(offsets) != 2 || !whole(offsets->child, &begin) ||
-        !whole(offsets->child->next, &end) || begin > end || end > room) {
+    }
+    if (!cJSON_IsArray(offsets) || cJSON_GetArraySize(offsets) != 2 ||
+        !whole(offsets->child, &begin) || !whole(offsets->child->next, &end) || begin > end ||
+        end > room) {
         return "a tensor lies outside the data";
     }
     uint64_t bytes = type_sizes[tensor->type];
@@ -265,7 +282,9 @@ static const char *parse_tensor(const Safetensors *file, const cJSON *entry, Saf
         bytes *= width;
         tensor->shape[tensor->rank++] = (int64_t)width;
     }
-    if (bytes != end - begin) return "a tensor's shape does not fit its data";
+    if (bytes != end - begin) {
+        return "a tensor's shape does not fit its data";
+    }
     tensor->data = file->bytes + file->data + begin;
     tensor->bytes = (size_t)bytes;
     return NULL;
@@ -276,15 +295,20 @@ static int by_position(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* Sorted by position, each tensor begins where the one before ends, and the last ends the file; names are unique. */
+/* Sorted by position, each tensor begins where the one before ends, and the last ends the file;
+ * names are unique. */
 static const char *check_tiling(Safetensors *file) {
     qsort(file->tensor, (size_t)file->count, sizeof *file->tensor, by_position);
     const unsigned char *at = file->bytes + file->data;
     for (int i = 0; i < file->count; i++) {
-        if (file->tensor[i].data != at) return "tensors overlap or leave a gap";
+        if (file->tensor[i].data != at) {
+            return "tensors overlap or leave a gap";
+        }
         at += file->tensor[i].bytes;
         for (int j = 0; j < i; j++) {
-            if (strcmp(file->tensor[i].name, file->tensor[j].name) == 0) return "two tensors have the same name";
+            if (strcmp(file->tensor[i].name, file->tensor[j].name) == 0) {
+                return "two tensors have the same name";
+            }
         }
     }
     return at == file->bytes + file->size ? NULL : "the data is longer or shorter than the tensors";
@@ -293,23 +317,29 @@ static const char *check_tiling(Safetensors *file) {
 static const char *parse_header(Safetensors *file) {
     const cJSON *metadata = cJSON_GetObjectItemCaseSensitive(file->header, "__metadata__");
     for (const cJSON *text = metadata ? metadata->child : NULL; text; text = text->next) {
-        if (!cJSON_IsString(text)) return "a text in its metadata is no text";
+        if (!cJSON_IsString(text)) {
+            return "a text in its metadata is no text";
+        }
     }
     for (const cJSON *entry = file->header->child; entry; entry = entry->next) {
         if (entry == metadata) {
             continue;
         }
         const char *wrong = parse_tensor(file, entry, &file->tensor[file->count++]);
-        if (wrong) return wrong;
+        if (wrong) {
+            return wrong;
+        }
     }
     return check_tiling(file);
 }
 
 /* Everything that can be said before the JSON is looked at. */
-static MildStatus check_frame(const unsigned char *bytes, size_t size, const char *path, MildError *error) {
+static MildStatus check_frame(const unsigned char *bytes, size_t size, const char *path,
+                              MildError *error) {
     if (size < PREFIX + 2 || header_length(bytes) > HEADER_MAX || bytes[PREFIX] != '{') {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%s: no safetensors file (%zu bytes); give a policy or checkpoint of mild", path, size);
+                         "%s: no safetensors file (%zu bytes); give a policy or checkpoint of mild",
+                         path, size);
     }
     if (header_length(bytes) > size - PREFIX) {
         return damaged(path, "its header goes on past the end", error);
@@ -317,14 +347,17 @@ static MildStatus check_frame(const unsigned char *bytes, size_t size, const cha
     size_t at = crc_position(bytes, size);
     char text[CRC_DIGITS + 1];
     if (at == 0) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: has no checksum, so mild did not write it or it is damaged",
-                         path);
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%s: has no checksum, so mild did not write it or it is damaged", path);
     }
     crc_text(bytes, size, at, text);
-    return memcmp(text, bytes + at, CRC_DIGITS) ? damaged(path, "its checksum does not match", error) : MILD_OK;
+    return memcmp(text, bytes + at, CRC_DIGITS)
+               ? damaged(path, "its checksum does not match", error)
+               : MILD_OK;
 }
 
-Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *path, MildError *error) {
+Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *path,
+                               MildError *error) {
     if (check_frame(bytes, size, path, error)) {
         free(bytes);
         return NULL;
@@ -334,12 +367,14 @@ Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *pa
     cJSON *header = cJSON_ParseWithLengthOpts((const char *)bytes + PREFIX, length, &end, 0);
     int count = cJSON_IsObject(header) ? cJSON_GetArraySize(header) : -1;
     int readable = count >= 0 && count <= TENSORS_MAX;
-    Safetensors *file = readable ? calloc(1, sizeof *file + (size_t)count * sizeof(Safetensor)) : NULL;
+    Safetensors *file =
+        readable ? calloc(1, sizeof *file + (size_t)count * sizeof(Safetensor)) : NULL;
     if (!file) {
-        if (readable)
+        if (readable) {
             mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
-        else
+        } else {
             damaged(path, "its header cannot be read", error);
+        }
         cJSON_Delete(header);
         free(bytes);
         return NULL;
@@ -364,13 +399,16 @@ static unsigned char *read_all(const char *path, size_t *size, MildError *error)
     if (file < 0 || fstat(file, &about) || !S_ISREG(about.st_mode)) {
         mild_fail(error, MILD_ERROR_IO, "%s: cannot be opened (%s); check the path", path,
                   file < 0 ? strerror(errno) : "not a plain file");
-        if (file >= 0) close(file);
+        if (file >= 0) {
+            close(file);
+        }
         return NULL;
     }
     size_t done = 0;
     *size = (size_t)about.st_size;
     unsigned char *bytes = malloc(*size + 1);
-    for (ssize_t count = 1; bytes && done < *size && count > 0; done += count > 0 ? (size_t)count : 0) {
+    for (ssize_t count = 1; bytes && done < *size && count > 0;
+         done += count > 0 ? (size_t)count : 0) {
         count = read(file, bytes + done, *size - done);
     }
     close(file);

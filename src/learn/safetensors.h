@@ -1,6 +1,7 @@
-/* Safetensors files: 8 bytes of header length (little endian), a JSON header {name: {dtype, shape, data_offsets}} with texts
- * under __metadata__, then the data. Ours carry a CRC-32 of the whole file in the text "crc32", taken with its own eight
- * digits as zeros, so that one flipped bit anywhere is seen. */
+/* Safetensors files: 8 bytes of header length (little endian), a JSON header {name: {dtype, shape,
+ * data_offsets}} with texts under __metadata__, then the data. Ours carry a CRC-32 of the whole
+ * file in the text "crc32", taken with its own eight digits as zeros, so that one flipped bit
+ * anywhere is seen. */
 #ifndef MILD_SAFETENSORS_H
 #define MILD_SAFETENSORS_H
 
@@ -26,15 +27,18 @@ typedef struct {
     const char *key, *value;
 } SafetensorsText;
 
-/* Writes PATH.tmp beside `path`, flushes it to the disk and renames it; on failure the old file stays. */
+/* Writes PATH.tmp beside `path`, flushes it to the disk and renames it; on failure the old file
+ * stays. */
 MildStatus safetensors_write(const char *path, const Safetensor *tensors, int tensor_count,
                              const SafetensorsText *texts, int text_count, MildError *error);
 
 typedef struct Safetensors Safetensors;
 /* Read and check everything: sizes, offsets (the tensors tile the data), types, checksum. */
 Safetensors *safetensors_read(const char *path, MildError *error);
-/* The same from memory; takes over `bytes` (from malloc) in any case. `path` names it in messages. */
-Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *path, MildError *error);
+/* The same from memory; takes over `bytes` (from malloc) in any case. `path` names it in messages.
+ */
+Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *path,
+                               MildError *error);
 void safetensors_destroy(Safetensors *file);
 
 int safetensors_count(const Safetensors *file);

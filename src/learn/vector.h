@@ -1,4 +1,5 @@
-/* Elementwise functions without branches or calls, so that compilers turn the loops into vector code. */
+/* Elementwise functions without branches or calls, so that compilers turn the loops into vector
+ * code. */
 #ifndef MILD_VECTOR_H
 #define MILD_VECTOR_H
 
@@ -8,9 +9,11 @@
 #include "base/device.h"
 
 /* e^x to 3e-7 relative for x in [-87, 88]; the ends are held outside, NaN stays NaN.
- * e^x = 2^n e^r, n = round(x / ln 2), |r| <= ln(2)/2, e^r by its Taylor series to r^6/720 (error 1.2e-7 relative). */
+ * e^x = 2^n e^r, n = round(x / ln 2), |r| <= ln(2)/2, e^r by its Taylor series to r^6/720
+ * (error 1.2e-7 relative). */
 static inline MILD_HD float vector_exp(float x) {
-    const float shift = 12582912.0f; /* 1.5 * 2^23: adding it rounds to an integer held in the low bits */
+    const float shift =
+        12582912.0f; /* 1.5 * 2^23: adding it rounds to an integer held in the low bits */
     float held = x < -87.0f ? -87.0f : x;
     held = held > 88.0f ? 88.0f : held;
     float rounded = held * 1.44269504088896341f + shift;
@@ -41,8 +44,8 @@ static inline MILD_HD float vector_elu_slope(float y) {
     return y > 0.0f ? 1.0f : y + 1.0f;
 }
 
-/* Natural logarithm to 2e-7 for normal positive x. x = 2^e m with m in [sqrt(1/2), sqrt(2)); with s = (m-1)/(m+1),
- * ln m = 2 (s + s^3/3 + s^5/5 + ...), |s| <= 0.172, cut after s^9/9. */
+/* Natural logarithm to 2e-7 for normal positive x. x = 2^e m with m in [sqrt(1/2), sqrt(2)); with s
+ * = (m-1)/(m+1), ln m = 2 (s + s^3/3 + s^5/5 + ...), |s| <= 0.172, cut after s^9/9. */
 static inline MILD_HD float vector_log(float x) {
     uint32_t bits;
     memcpy(&bits, &x, sizeof bits);

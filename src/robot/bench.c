@@ -9,10 +9,13 @@
 
 #define REPEATS_MAX 1000
 #define WARM_STEPS 500
-#define SWEEP_REPEATS 3 /* the paper's sweeps are slower by orders of magnitude: few steps, after the others */
+#define SWEEP_REPEATS                                                                              \
+    3 /* the paper's sweeps are slower by orders of magnitude: few steps, after the others */
 #define SWEEP_STEPS 2
 #define PHASE_WINDOWS 10
-#define HANG_HEIGHT 1000.0 /* [m] above the floor: falls for the whole bench without reaching it */
+#define HANG_HEIGHT                                                                                \
+    1000.0 /* [m] above the floor: falls for the whole bench without reaching it   \
+                            */
 
 enum { ENGINE_FREE, ENGINE_RIGID, RIGID, NEWTON, GAUSS_SEIDEL, CASES };
 
@@ -75,9 +78,12 @@ static MildStatus open_case(Bench *bench, int which, double dt, MildError *error
     RobotVariation variation = robot_variation_nominal();
     variation.rigid = which == ENGINE_RIGID || which == RIGID;
     int soft = which == NEWTON || which == GAUSS_SEIDEL;
-    double depth = mild_sole_sinkage(soles[0], &bench->terrain.materials[0], robot_half_weight(bench->robot));
+    double depth =
+        mild_sole_sinkage(soles[0], &bench->terrain.materials[0], robot_half_weight(bench->robot));
     RobotState state = robot_stand_state(bench->robot, 1, soft ? depth : 0.0);
-    robot_sim_set_solver(bench->sims[which], which == GAUSS_SEIDEL ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON, 0, 0);
+    robot_sim_set_solver(bench->sims[which],
+                         which == GAUSS_SEIDEL ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON, 0,
+                         0);
     robot_sim_load(bench->sims[which], &state, &variation);
     if (which == ENGINE_FREE || which == ENGINE_RIGID) {
         bench->engine[which] = mj_makeData(robot_sim_model(bench->sims[which]));
@@ -110,17 +116,19 @@ static double median(double *values, int count) {
     return values[count / 2];
 }
 
-/* Median time of the cases first .. last in us per step. They take turns, so a slow moment of the machine hits all
- * of them. */
-static MildStatus measure(Bench *bench, int first, int last, int repeats, int steps, double medians[CASES],
-                          MildError *error) {
-    static const char *const names[CASES] = {"engine free", "engine rigid", "rigid", "newton", "gauss_seidel"};
+/* Median time of the cases first .. last in us per step. They take turns, so a slow moment of the
+ * machine hits all of them. */
+static MildStatus measure(Bench *bench, int first, int last, int repeats, int steps,
+                          double medians[CASES], MildError *error) {
+    static const char *const names[CASES] = {"engine free", "engine rigid", "rigid", "newton",
+                                             "gauss_seidel"};
     double times[CASES][REPEATS_MAX];
     for (int r = -1; r < repeats; r++) { /* the first round warms up */
         for (int c = first; c <= last; c++) {
             double seconds = time_case(bench, c, r < 0 && c != GAUSS_SEIDEL ? WARM_STEPS : steps);
             if (seconds < 0.0) {
-                return mild_fail(error, MILD_ERROR_RANGE, "robot bench: the case '%s' diverged", names[c]);
+                return mild_fail(error, MILD_ERROR_RANGE, "robot bench: the case '%s' diverged",
+                                 names[c]);
             }
             times[c][r < 0 ? 0 : r] = 1e6 * seconds;
         }
@@ -131,7 +139,8 @@ static MildStatus measure(Bench *bench, int first, int last, int repeats, int st
     return MILD_OK;
 }
 
-/* Runs of their own, because reading the clock in every phase costs time; the quietest window counts. [us] */
+/* Runs of their own, because reading the clock in every phase costs time; the quietest window
+ * counts. [us] */
 static void measure_phases(Bench *bench, int steps, RobotPhases *phases) {
     double least = 1e300;
     for (int w = 0; w < PHASE_WINDOWS; w++) {
@@ -139,21 +148,23 @@ static void measure_phases(Bench *bench, int steps, RobotPhases *phases) {
         robot_sim_time_phases(bench->sims[NEWTON], &sum);
         our_steps(bench, NEWTON, steps);
         robot_sim_time_phases(bench->sims[NEWTON], NULL);
-        double scale = 1e6 / (double)sum.steps, total = scale * (sum.smooth + sum.map + sum.ground + sum.finish);
+        double scale = 1e6 / (double)sum.steps,
+               total = scale * (sum.smooth + sum.map + sum.ground + sum.finish);
         if (total < least) {
             least = total;
-            *phases = (RobotPhases){scale * sum.smooth, scale * sum.map, scale * sum.ground, scale * sum.finish, 1};
+            *phases = (RobotPhases){scale * sum.smooth, scale * sum.map, scale * sum.ground,
+                                    scale * sum.finish, 1};
         }
     }
 }
 
-MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, int repeats, int steps,
-                            RobotBench *result, MildError *error) {
+MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, int repeats,
+                            int steps, RobotBench *result, MildError *error) {
     Bench bench = {.robot = robot};
     MildMaterial material;
     if (repeats < 1 || repeats > REPEATS_MAX || steps < 1) {
-        return mild_fail(error, MILD_ERROR_RANGE, "robot bench: repeats must be 1 .. %d and steps positive",
-                         REPEATS_MAX);
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "robot bench: repeats must be 1 .. %d and steps positive", REPEATS_MAX);
     }
     if (!mild_material_preset(preset, &material)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "robot bench: unknown ground '%s'", preset);
@@ -168,7 +179,8 @@ MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, i
         status = measure(&bench, ENGINE_FREE, NEWTON, repeats, steps, medians, error);
     }
     if (status == MILD_OK) {
-        status = measure(&bench, GAUSS_SEIDEL, GAUSS_SEIDEL, SWEEP_REPEATS, SWEEP_STEPS, medians, error);
+        status =
+            measure(&bench, GAUSS_SEIDEL, GAUSS_SEIDEL, SWEEP_REPEATS, SWEEP_STEPS, medians, error);
     }
     if (status == MILD_OK) {
         *result = (RobotBench){.engine_free = medians[ENGINE_FREE],

@@ -8,7 +8,8 @@
 typedef struct {
     double smooth; /* [s] mass matrix, factor, bias, smooth acceleration */
     double map;    /* [s] A = J M^-1 J^T and the free twist */
-    double ground; /* [s] mild_ground_solve and mild_ground_advance, or the engine's collision when rigid */
+    double ground; /* [s] mild_ground_solve and mild_ground_advance, or the engine's collision when
+                      rigid */
     double finish; /* [s] wrench, joint limits or engine contact solver, integration, next pose */
     long steps;
 } RobotPhases;
@@ -16,8 +17,8 @@ typedef struct {
 /* phases: NULL stops the timing. */
 void robot_sim_time_phases(RobotSim *sim, RobotPhases *phases);
 
-/* Medians over the repeats of one run in which the cases take turns [us per physics step]. The robot stands
- * balanced (stand.h); the engine's rows use mj_step on the same model and pose. */
+/* Medians over the repeats of one run in which the cases take turns [us per physics step]. The
+ * robot stands balanced (stand.h); the engine's rows use mj_step on the same model and pose. */
 typedef struct {
     double engine_free;        /* mj_step, hanging: no contact */
     double engine_rigid;       /* mj_step, eight sole corners on its floor */
@@ -29,7 +30,7 @@ typedef struct {
 } RobotBench;
 
 /* preset: ground of the soft cases, e.g. "sand_loose"; repeats of `steps` steps per case. */
-MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, int repeats, int steps,
-                            RobotBench *bench, MildError *error);
+MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, int repeats,
+                            int steps, RobotBench *bench, MildError *error);
 
 #endif

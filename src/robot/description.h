@@ -14,8 +14,9 @@
 struct Robot {
     mjModel *model;  /* bodies, joints, floor and sole corners: what a step needs */
     mjModel *visual; /* the whole file, for pictures */
-    MildSole *soles[ROBOT_FEET], *concentric[ROBOT_FEET]; /* the rasters, and one element in the middle of each */
-    int is_concentric;                                    /* bool: which of them the feet have */
+    MildSole *soles[ROBOT_FEET],
+        *concentric[ROBOT_FEET]; /* the rasters, and one element in the middle of each */
+    int is_concentric;           /* bool: which of them the feet have */
     double outline[ROBOT_FEET][2 * ROBOT_OUTLINE_MAX]; /* [m] x y, foot frame */
     int outline_points[ROBOT_FEET];
     double sole_z;                     /* [m] */
@@ -26,9 +27,10 @@ struct Robot {
     double pose[ROBOT_JOINTS], low[ROBOT_JOINTS], high[ROBOT_JOINTS];  /* [rad] */
     double effort[ROBOT_JOINTS];                                       /* [N m] */
     double total_mass, stand_height;
-    /* the balanced stand (stand.c): default pose leaning forward until the centre of mass is over the soles' centre */
-    double lean;                      /* [rad] */
-    double lean_base[3];              /* [m] base above a point on the ground midway below the ankles */
+    /* the balanced stand (stand.c): default pose leaning forward until the centre of mass is over
+     * the soles' centre */
+    double lean;         /* [rad] */
+    double lean_base[3]; /* [m] base above a point on the ground midway below the ankles */
     double lean_torque[ROBOT_JOINTS]; /* [N m] that holds it at rest */
 };
 

@@ -1,7 +1,7 @@
-/* The feet seen from the robot's 18 degrees of freedom. A foot moves with the base's six and its own leg's six
- * only, and the engine's factor M = L^T D L has the same sparsity (a leg's rows hold that leg and the base). So
- *     A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T J^T)
- * needs one backward substitution per foot on six right-hand sides at once, which is one vector register per row. */
+/* The feet seen from the robot's 18 degrees of freedom. A foot moves with the base's six and its
+ * own leg's six only, and the engine's factor M = L^T D L has the same sparsity (a leg's rows hold
+ * that leg and the base). So A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T J^T) needs one backward
+ * substitution per foot on six right-hand sides at once, which is one vector register per row. */
 #include <string.h>
 
 #include "robot/sim.h"
@@ -44,8 +44,8 @@ void foot_map_jacobian(RobotSim *sim) {
     }
 }
 
-void foot_map_twist(const RobotSim *sim, int foot, const double *velocity, const double *acceleration,
-                    double twist[6]) {
+void foot_map_twist(const RobotSim *sim, int foot, const double *velocity,
+                    const double *acceleration, double twist[6]) {
     double sum[ROBOT_LANES] = {0};
     for (int k = 0; k < ROBOT_FOOT_DOFS; k++) {
         int dof = foot_dof(foot, k);
@@ -75,8 +75,9 @@ static void backward_substitute(const mjModel *m, const mjData *d, int foot,
 }
 
 /* block = sum over rows k of outer(left_k, right_k) / D_k. */
-static void inner_product(const double *inverse_d, const double left[][ROBOT_LANES], const double right[][ROBOT_LANES],
-                          int rows, double block[6][ROBOT_LANES]) {
+static void inner_product(const double *inverse_d, const double left[][ROBOT_LANES],
+                          const double right[][ROBOT_LANES], int rows,
+                          double block[6][ROBOT_LANES]) {
     double sum[6][ROBOT_LANES] = {{0}}; /* stays in registers */
     for (int k = 0; k < rows; k++) {
         for (int r = 0; r < 6; r++) {
@@ -101,7 +102,8 @@ void foot_map_inverse_inertia(RobotSim *sim) {
         }
         backward_substitute(sim->model, sim->data, f, map->half[f]);
         for (int g = 0; g <= f; g++) { /* feet share the base's rows only */
-            inner_product(inverse_d, map->half[f], map->half[g], f == g ? ROBOT_FOOT_DOFS : ROBOT_LEG, block);
+            inner_product(inverse_d, map->half[f], map->half[g],
+                          f == g ? ROBOT_FOOT_DOFS : ROBOT_LEG, block);
             for (int r = 0; r < 6; r++) {
                 memcpy(a + (6 * f + r) * 12 + 6 * g, block[r], 6 * sizeof *a);
                 for (int c = 0; c < 6 && g < f; c++) {
@@ -125,7 +127,8 @@ static void forward_substitute(const mjModel *m, const mjData *d, double *x) {
     }
 }
 
-void foot_map_wrench(const RobotSim *sim, double wrench[ROBOT_FEET][6], double *force, double *acceleration) {
+void foot_map_wrench(const RobotSim *sim, double wrench[ROBOT_FEET][6], double *force,
+                     double *acceleration) {
     memset(force, 0, ROBOT_NV * sizeof *force);
     memset(acceleration, 0, ROBOT_NV * sizeof *acceleration);
     for (int f = 0; f < ROBOT_FEET; f++) {

@@ -21,8 +21,12 @@ typedef struct {
 } Player;
 
 void replay_destroy(Replay *replay) {
-    if (!replay) return;
-    for (int p = 0; replay->period && p < replay->periods; p++) free(replay->period[p].ground);
+    if (!replay) {
+        return;
+    }
+    for (int p = 0; replay->period && p < replay->periods; p++) {
+        free(replay->period[p].ground);
+    }
     free(replay->period);
     free(replay);
 }
@@ -39,8 +43,12 @@ Replay *replay_create(const Robot *robot, int periods, int steps, double dt, Mil
         replay->period = calloc((size_t)periods, sizeof *replay->period);
     }
     int good = replay && replay->period;
-    for (int p = 0; good && p < periods; p++) good = (replay->period[p].ground = new_ground(robot)) != NULL;
-    if (good) return replay;
+    for (int p = 0; good && p < periods; p++) {
+        good = (replay->period[p].ground = new_ground(robot)) != NULL;
+    }
+    if (good) {
+        return replay;
+    }
     replay_destroy(replay);
     mild_fail(error, MILD_ERROR_MEMORY, "replay: out of memory for %d periods", periods);
     return NULL;
@@ -51,24 +59,29 @@ static double play_soft(Player *player, const ReplayPeriod *period, int which) {
     RobotSim *sim = player->soft;
     const Replay *replay = player->replay;
     memcpy(player->ground, period->ground, mild_ground_size(period->ground));
-    robot_sim_set_solver(sim, MILD_SOLVER_NEWTON, player->stop[which].tolerance, player->stop[which].iterations);
+    robot_sim_set_solver(sim, MILD_SOLVER_NEWTON, player->stop[which].tolerance,
+                         player->stop[which].iterations);
     robot_sim_load(sim, &period->state, &replay->variation);
     double start = clock_seconds();
     for (int s = 0; s < replay->steps; s++) {
-        player->bad |= robot_sim_step(sim, period->torque[s], NULL, &replay->terrain, player->ground);
+        player->bad |=
+            robot_sim_step(sim, period->torque[s], NULL, &replay->terrain, player->ground);
         player->iterations[which] += robot_sim_contact(sim)->iterations;
         player->unconverged[which] += !robot_sim_contact(sim)->converged;
     }
     return clock_seconds() - start;
 }
 
-/* [m] The upper of the soles that sank into soft ground, else 0: a floor there carries both and throws neither out. */
+/* [m] The upper of the soles that sank into soft ground, else 0: a floor there carries both and
+ * throws neither out. */
 static double sunk_floor(Player *player, const ReplayPeriod *period) {
     double floor = -INFINITY;
     robot_sim_load(player->soft, &period->state, &player->replay->variation);
     for (int f = 0; f < ROBOT_FEET; f++) {
         double height = robot_sim_foot(player->soft, f)->sole_height;
-        if (height < 0.0) floor = fmax(floor, height);
+        if (height < 0.0) {
+            floor = fmax(floor, height);
+        }
     }
     return floor > -INFINITY && !player->replay->variation.rigid ? floor : 0.0;
 }
@@ -100,12 +113,14 @@ static void play_all(Player *player, int repeats, double sums[CASES]) {
             least[ENGINE] = fmin(least[ENGINE], play_engine(player, period));
             least[LOOSE] = fmin(least[LOOSE], play_soft(player, period, LOOSE));
         }
-        for (int c = 0; c < CASES; c++) sums[c] += least[c];
+        for (int c = 0; c < CASES; c++) {
+            sums[c] += least[c];
+        }
     }
 }
 
-MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loose, int repeats, ReplayTimes *times,
-                       MildError *error) {
+MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loose, int repeats,
+                       ReplayTimes *times, MildError *error) {
     Player player = {.replay = replay, .robot = robot, .stop[LOOSE] = loose};
     MildStatus status = MILD_OK;
     double sums[CASES] = {0}, steps = (double)replay->periods * replay->steps;
@@ -122,7 +137,9 @@ MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loos
         status = mild_fail(error, MILD_ERROR_MEMORY, "replay: out of memory");
     } else {
         play_all(&player, repeats, sums);
-        if (player.bad) status = mild_fail(error, MILD_ERROR_RANGE, "replay: the recorded walk diverged");
+        if (player.bad) {
+            status = mild_fail(error, MILD_ERROR_RANGE, "replay: the recorded walk diverged");
+        }
     }
     *times = (ReplayTimes){.tight = 1e6 * sums[TIGHT] / steps,
                            .loose = 1e6 * sums[LOOSE] / steps,

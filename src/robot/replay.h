@@ -33,14 +33,16 @@ typedef struct {
 
 /* Means over all steps, from the least of the repeats of each period [us per physics step]. */
 typedef struct {
-    double tight, loose; /* robot_sim_step on the ground, Newton with its default stop and with `loose` */
-    double engine;       /* mj_step from the same states; the floor lies under the soles that sank into soft ground */
+    double tight,
+        loose;     /* robot_sim_step on the ground, Newton with its default stop and with `loose` */
+    double engine; /* mj_step from the same states; the floor lies under the soles that sank into
+                      soft ground */
     double tight_iterations, loose_iterations; /* per step */
     double loose_unconverged;                  /* [-] share of the steps */
 } ReplayTimes;
 
 /* The cases take turns at every period. */
-MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loose, int repeats, ReplayTimes *times,
-                       MildError *error);
+MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loose, int repeats,
+                       ReplayTimes *times, MildError *error);
 
 #endif

@@ -1,5 +1,5 @@
-/* The engine's own contact under the eight sole corners: where the ground is not level, and what it did to the feet in the
- * terms of the soft ground. */
+/* The engine's own contact under the eight sole corners: where the ground is not level, and what it
+ * did to the feet in the terms of the soft ground. */
 #include <math.h>
 #include <string.h>
 
@@ -26,19 +26,28 @@ static void tangent_frame(const double slope[2], double frame[9]) {
     cross(frame, frame + 3, frame + 6);
 }
 
-/* The engine's contact of a plane and a sphere, the plane being the tangent plane under the sphere's centre: exact on a
- * slope, off by the ground's curvature times radius^2/2 elsewhere. */
+/* The engine's contact of a plane and a sphere, the plane being the tangent plane under the
+ * sphere's centre: exact on a slope, off by the ground's curvature times radius^2/2 elsewhere. */
 static void collide_corner(RobotSim *sim, const MildTerrain *terrain, int pair) {
     const mjModel *m = sim->model;
-    int floor = sim->robot->floor_geom, corner = m->pair_geom1[pair] == floor ? m->pair_geom2[pair] : m->pair_geom1[pair];
+    int floor = sim->robot->floor_geom,
+        corner = m->pair_geom1[pair] == floor ? m->pair_geom2[pair] : m->pair_geom1[pair];
     const double *center = sim->data->geom_xpos + 3 * corner;
     double radius = m->geom_size[3 * corner], slope[2];
-    mjContact contact = {.includemargin = m->pair_margin[pair] - m->pair_gap[pair], .dim = m->pair_dim[pair],
-                         .geom1 = floor, .geom2 = corner, .geom = {floor, corner},
-                         .flex = {-1, -1}, .elem = {-1, -1}, .vert = {-1, -1}, .efc_address = -1};
+    mjContact contact = {.includemargin = m->pair_margin[pair] - m->pair_gap[pair],
+                         .dim = m->pair_dim[pair],
+                         .geom1 = floor,
+                         .geom2 = corner,
+                         .geom = {floor, corner},
+                         .flex = {-1, -1},
+                         .elem = {-1, -1},
+                         .vert = {-1, -1},
+                         .efc_address = -1};
     mild_terrain_slope_at(terrain, center[0], center[1], slope);
     tangent_frame(slope, contact.frame);
-    contact.dist = (center[2] - mild_terrain_height_at(terrain, center[0], center[1])) * contact.frame[2] - radius;
+    contact.dist =
+        (center[2] - mild_terrain_height_at(terrain, center[0], center[1])) * contact.frame[2] -
+        radius;
     if (!(contact.dist < m->pair_margin[pair])) {
         return;
     }
@@ -48,7 +57,8 @@ static void collide_corner(RobotSim *sim, const MildTerrain *terrain, int pair) 
     contact.exclude = contact.dist >= contact.includemargin;
     memcpy(contact.friction, m->pair_friction + 5 * pair, sizeof contact.friction);
     memcpy(contact.solref, m->pair_solref + mjNREF * pair, sizeof contact.solref);
-    memcpy(contact.solreffriction, m->pair_solreffriction + mjNREF * pair, sizeof contact.solreffriction);
+    memcpy(contact.solreffriction, m->pair_solreffriction + mjNREF * pair,
+           sizeof contact.solreffriction);
     memcpy(contact.solimp, m->pair_solimp + mjNIMP * pair, sizeof contact.solimp);
     mj_addContact(m, sim->data, &contact);
 }
@@ -67,8 +77,8 @@ void rigid_collide(RobotSim *sim, const MildTerrain *terrain) {
 
 /* ---- results ---- */
 
-/* Adds contact c to the foot it belongs to, and the vertical part of its normal force to that foot's load. The contact
- * frame's first axis points from geom 0 to geom 1. */
+/* Adds contact c to the foot it belongs to, and the vertical part of its normal force to that
+ * foot's load. The contact frame's first axis points from geom 0 to geom 1. */
 static void add_contact(RobotSim *sim, int c, double load[ROBOT_FEET]) {
     const mjData *d = sim->data;
     const mjContact *contact = d->contact + c;
@@ -102,10 +112,12 @@ static void add_contact(RobotSim *sim, int c, double load[ROBOT_FEET]) {
     result->contacts++;
 }
 
-/* Central axis F x tau / |F|^2 and the point of zero moment on the sole plane (docs/model.md section 9). */
+/* Central axis F x tau / |F|^2 and the point of zero moment on the sole plane (docs/model.md
+ * section 9). */
 static void finish_foot(RobotSim *sim, int foot, double load) {
     MildFootResult *result = &sim->contact.foot[foot];
-    const double *force = result->force, *torque = result->torque, *turn = sim->input.rotation[foot];
+    const double *force = result->force, *torque = result->torque,
+                 *turn = sim->input.rotation[foot];
     double square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2];
     if (result->contacts == 0 || square <= 0.0) {
         return;

@@ -6,8 +6,9 @@
 
 #include "robot/description.h"
 
-static const char *const limb_names[ROBOT_JOINTS] = {"leg_l1", "leg_l2", "leg_l3", "leg_l4", "leg_l5", "leg_l6",
-                                                     "leg_r1", "leg_r2", "leg_r3", "leg_r4", "leg_r5", "leg_r6"};
+static const char *const limb_names[ROBOT_JOINTS] = {"leg_l1", "leg_l2", "leg_l3", "leg_l4",
+                                                     "leg_l5", "leg_l6", "leg_r1", "leg_r2",
+                                                     "leg_r3", "leg_r4", "leg_r5", "leg_r6"};
 static const char *const foot_links[ROBOT_FEET] = {"leg_l6_link", "leg_r6_link"};
 static const char *const knee_links[ROBOT_FEET] = {"leg_l4_link", "leg_r4_link"};
 static const char *const shell_links[ROBOT_SHELLS] = {"base_link", "leg_l4_link", "leg_r4_link"};
@@ -26,8 +27,8 @@ RobotVariation robot_variation_nominal(void) {
 }
 
 /* Id of a named object, or -1 with a message that names it. */
-static int find(const mjModel *model, int type, const char *kind, const char *name, const char *path,
-                MildError *error) {
+static int find(const mjModel *model, int type, const char *kind, const char *name,
+                const char *path, MildError *error) {
     int id = mj_name2id(model, type, name);
     if (id < 0) {
         mild_fail(error, MILD_ERROR_FORMAT, "%s: the robot's %s '%s' is missing", path, kind, name);
@@ -44,7 +45,8 @@ static void one_line(char *text) {
     }
 }
 
-/* A step pays for every geom whose pose it computes, so the working model keeps only the geoms that collide. */
+/* A step pays for every geom whose pose it computes, so the working model keeps only the geoms that
+ * collide. */
 static void strip_for_physics(mjSpec *spec) {
     static const mjtObj dropped[] = {mjOBJ_CAMERA, mjOBJ_LIGHT, mjOBJ_ACTUATOR, mjOBJ_SITE};
     for (size_t k = 0; k < sizeof dropped / sizeof dropped[0]; k++) {
@@ -105,7 +107,8 @@ static MildStatus read_bodies(Robot *robot, const char *path, MildError *error) 
     return MILD_OK;
 }
 
-/* The step relies on this order of degrees of freedom: base, left leg, right leg; and on limbs being chains. */
+/* The step relies on this order of degrees of freedom: base, left leg, right leg; and on limbs
+ * being chains. */
 static MildStatus read_joints(Robot *robot, const char *path, MildError *error) {
     const mjModel *m = robot->model;
     for (int i = 0; i < ROBOT_JOINTS; i++) {
@@ -119,19 +122,21 @@ static MildStatus read_joints(Robot *robot, const char *path, MildError *error) 
         if (id != 1 + i || m->jnt_type[id] != mjJNT_HINGE || m->jnt_type[0] != mjJNT_FREE ||
             m->body_parentid[m->jnt_bodyid[id]] != parent) {
             return mild_fail(error, MILD_ERROR_FORMAT,
-                             "%s: joint '%s' must be hinge %d of a free base with two chains of six, left leg first",
+                             "%s: joint '%s' must be hinge %d of a free base with two chains of "
+                             "six, left leg first",
                              path, name, i + 1);
         }
         if (!m->jnt_limited[id] || !m->jnt_actfrclimited[id]) {
-            return mild_fail(error, MILD_ERROR_FORMAT, "%s: joint '%s' needs range and actuatorfrcrange", path, name);
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: joint '%s' needs range and actuatorfrcrange", path, name);
         }
         robot->low[i] = m->jnt_range[2 * id];
         robot->high[i] = m->jnt_range[2 * id + 1];
         robot->effort[i] = m->jnt_actfrcrange[2 * id + 1];
     }
     if (m->nq != ROBOT_NQ || m->nv != ROBOT_NV) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: %d degrees of freedom instead of %d", path, (int)m->nv,
-                         ROBOT_NV);
+        return mild_fail(error, MILD_ERROR_FORMAT, "%s: %d degrees of freedom instead of %d", path,
+                         (int)m->nv, ROBOT_NV);
     }
     return MILD_OK;
 }
@@ -153,7 +158,8 @@ static MildStatus read_shells(Robot *robot, const char *path, MildError *error) 
 }
 
 /* Values of <custom><numeric name=...>, or NULL with a message. */
-static const double *read_numeric(const mjModel *m, const char *name, int *count, const char *path, MildError *error) {
+static const double *read_numeric(const mjModel *m, const char *name, int *count, const char *path,
+                                  MildError *error) {
     int id = find(m, mjOBJ_NUMERIC, "custom numeric", name, path, error);
     if (id < 0) {
         return NULL;
@@ -169,7 +175,8 @@ static MildStatus read_outline(Robot *robot, int foot, const char *path, MildErr
         return MILD_ERROR_FORMAT;
     }
     if (count % 2 != 0 || count < 6 || count > 2 * ROBOT_OUTLINE_MAX) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: '%s' needs 3 to %d pairs x y, has %d numbers", path,
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%s: '%s' needs 3 to %d pairs x y, has %d numbers", path,
                          outline_names[foot], ROBOT_OUTLINE_MAX, count);
     }
     memcpy(robot->outline[foot], data, sizeof(double) * (size_t)count);
@@ -189,13 +196,14 @@ static MildStatus read_soles(Robot *robot, const char *path, MildError *error) {
     int one = 0;
     const double *z = read_numeric(robot->model, "sole_z", &one, path, error);
     const double *pitch = z ? read_numeric(robot->model, "sole_pitch", &one, path, error) : NULL;
-    const double *elements = pitch ? read_numeric(robot->model, "sole_elements", &one, path, error) : NULL;
+    const double *elements =
+        pitch ? read_numeric(robot->model, "sole_elements", &one, path, error) : NULL;
     if (!elements) {
         return MILD_ERROR_FORMAT;
     }
     if (!(*elements >= 0.0 && *elements <= ROBOT_ELEMENTS_MAX)) {
-        return mild_fail(error, MILD_ERROR_RANGE, "%s: 'sole_elements' = %g is outside 0 .. %d", path, *elements,
-                         ROBOT_ELEMENTS_MAX);
+        return mild_fail(error, MILD_ERROR_RANGE, "%s: 'sole_elements' = %g is outside 0 .. %d",
+                         path, *elements, ROBOT_ELEMENTS_MAX);
     }
     robot->sole_z = *z;
     for (int f = 0; f < ROBOT_FEET; f++) {
@@ -205,7 +213,8 @@ static MildStatus read_soles(Robot *robot, const char *path, MildError *error) {
         }
         MildSoleDef def = {robot->outline[f], robot->outline_points[f], *pitch, *z, (int)*elements};
         robot->soles[f] = mild_sole_create(&def, error);
-        robot->concentric[f] = robot->soles[f] ? mild_sole_concentric(robot->soles[f], error) : NULL;
+        robot->concentric[f] =
+            robot->soles[f] ? mild_sole_concentric(robot->soles[f], error) : NULL;
         if (!robot->concentric[f]) {
             return MILD_ERROR_FORMAT;
         }
@@ -231,7 +240,8 @@ static MildStatus read_stand(Robot *robot, const char *path, MildError *error) {
     robot->stand_height = data->xpos[3 * robot->base_body + 2] - (ankle + robot->sole_z);
     robot->total_mass = m->body_subtreemass[robot->base_body];
     mj_deleteData(data);
-    return stand_prepare(robot) ? mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path) : MILD_OK;
+    return stand_prepare(robot) ? mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path)
+                                : MILD_OK;
 }
 
 static MildStatus read_robot(Robot *robot, const char *path, MildError *error) {
@@ -281,8 +291,8 @@ void robot_set_model(Robot *robot, MildModel model) {
     robot->is_concentric = mild_model_is_concentric(model);
 }
 
-MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild, MildMaterial *rival,
-                             MildError *error) {
+MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild,
+                             MildMaterial *rival, MildError *error) {
     return mild_model_match(model, mild, robot->soles[0], robot_half_weight(robot), rival, error);
 }
 

@@ -1,6 +1,6 @@
-/* One physics step of a robot whose feet stand on our ground. Between steps the pose-dependent quantities
- * (kinematics, feet's Jacobian and twist) are those of the current state, so a step begins with the dynamics and
- * ends with the next pose. */
+/* One physics step of a robot whose feet stand on our ground. Between steps the pose-dependent
+ * quantities (kinematics, feet's Jacobian and twist) are those of the current state, so a step
+ * begins with the dynamics and ends with the next pose. */
 #include "robot/sim.h"
 
 #include <math.h>
@@ -74,31 +74,38 @@ double robot_sim_dt(const RobotSim *sim) {
 }
 
 /* Lowest point of the sole's outline above z = 0 [m]. */
-static double lowest_sole_point(const Robot *robot, int foot, const double position[3], const double turn[9]) {
+static double lowest_sole_point(const Robot *robot, int foot, const double position[3],
+                                const double turn[9]) {
     double least = 1e9;
     for (int i = 0; i < robot->outline_points[foot]; i++) {
-        double z = turn[6] * robot->outline[foot][2 * i] + turn[7] * robot->outline[foot][2 * i + 1];
+        double z =
+            turn[6] * robot->outline[foot][2 * i] + turn[7] * robot->outline[foot][2 * i + 1];
         least = z < least ? z : least;
     }
     return position[2] + turn[8] * robot->sole_z + least;
 }
 
 /* The same above the ground under each point. */
-static double lowest_above_map(const Robot *robot, int foot, const double position[3], const double turn[9],
-                               const MildTerrain *terrain) {
+static double lowest_above_map(const Robot *robot, int foot, const double position[3],
+                               const double turn[9], const MildTerrain *terrain) {
     double least = 1e9, c = robot->sole_z;
     for (int i = 0; i < robot->outline_points[foot]; i++) {
         double a = robot->outline[foot][2 * i], b = robot->outline[foot][2 * i + 1];
-        double x = position[0] + turn[0] * a + turn[1] * b + turn[2] * c, y = position[1] + turn[3] * a + turn[4] * b + turn[5] * c;
+        double x = position[0] + turn[0] * a + turn[1] * b + turn[2] * c,
+               y = position[1] + turn[3] * a + turn[4] * b + turn[5] * c;
         double z = position[2] + turn[6] * a + turn[7] * b + turn[8] * c;
         least = fmin(least, z - mild_terrain_height_at(terrain, x, y));
     }
     return least;
 }
 
-static double sole_height(const Robot *robot, int f, const RobotFoot *foot, const MildTerrain *terrain) {
-    if (terrain && terrain->map) return lowest_above_map(robot, f, foot->position, foot->rotation, terrain);
-    return lowest_sole_point(robot, f, foot->position, foot->rotation) - (terrain ? terrain->height : 0.0);
+static double sole_height(const Robot *robot, int f, const RobotFoot *foot,
+                          const MildTerrain *terrain) {
+    if (terrain && terrain->map) {
+        return lowest_above_map(robot, f, foot->position, foot->rotation, terrain);
+    }
+    return lowest_sole_point(robot, f, foot->position, foot->rotation) -
+           (terrain ? terrain->height : 0.0);
 }
 
 /* Pose, twist and sole of a foot from the current kinematics. terrain: NULL for z = 0. */
@@ -172,7 +179,8 @@ static void add_push(RobotSim *sim, const double *push) {
     moment[2] = push[5] + arm[0] * push[1] - arm[1] * push[0];
     for (int k = 0; k < 3; k++) {
         d->qfrc_smooth[k] += push[k];
-        d->qfrc_smooth[3 + k] += turn[k] * moment[0] + turn[3 + k] * moment[1] + turn[6 + k] * moment[2];
+        d->qfrc_smooth[3 + k] +=
+            turn[k] * moment[0] + turn[3 + k] * moment[1] + turn[6 + k] * moment[2];
     }
 }
 
@@ -193,7 +201,8 @@ static void smooth_dynamics(RobotSim *sim, const double *torque, const double *p
     mj_solveM(m, d, d->qacc_smooth, d->qfrc_smooth, 1);
 }
 
-/* Where the feet are: fixed before the step, because forces refer to the pose they were computed in. */
+/* Where the feet are: fixed before the step, because forces refer to the pose they were computed
+ * in. */
 static void place_feet(RobotSim *sim) {
     MildContactInput *input = &sim->input;
     for (int f = 0; f < ROBOT_FEET; f++) {
@@ -207,7 +216,8 @@ static void place_feet(RobotSim *sim) {
 static void free_feet(RobotSim *sim) {
     foot_map_inverse_inertia(sim);
     for (int f = 0; f < ROBOT_FEET; f++) {
-        foot_map_twist(sim, f, sim->data->qvel, sim->data->qacc_smooth, sim->input.free_velocity + 6 * f);
+        foot_map_twist(sim, f, sim->data->qvel, sim->data->qacc_smooth,
+                       sim->input.free_velocity + 6 * f);
     }
 }
 
@@ -234,7 +244,8 @@ static int any_joint_beyond_limit(const RobotSim *sim) {
     return beyond;
 }
 
-/* Joint limits (and the engine's contacts when there are any); without rows the smooth acceleration stands. */
+/* Joint limits (and the engine's contacts when there are any); without rows the smooth acceleration
+ * stands. */
 static void constrain(RobotSim *sim) {
     mjModel *m = sim->model;
     mjData *d = sim->data;
@@ -248,7 +259,8 @@ static void constrain(RobotSim *sim) {
     mj_fwdConstraint(m, d);
 }
 
-/* Semi-implicit Euler, the engine's own default: velocity first, then the pose with the new velocity. */
+/* Semi-implicit Euler, the engine's own default: velocity first, then the pose with the new
+ * velocity. */
 static int integrate(RobotSim *sim) {
     mjData *d = sim->data;
     int bad = 0;
@@ -274,9 +286,10 @@ static void report_forces(RobotSim *sim) {
     }
 }
 
-/* docs/task.md section 2, with the feet's 12 rows; mild/ground.h shows the same step for any engine. */
-int robot_sim_step(RobotSim *sim, const double *torque, const double *push, const MildTerrain *terrain,
-                   MildGround *ground) {
+/* docs/task.md section 2, with the feet's 12 rows; mild/ground.h shows the same step for any
+ * engine. */
+int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
+                   const MildTerrain *terrain, MildGround *ground) {
     RobotPhases none = {0}, *phases = sim->phases ? sim->phases : &none;
     double t = sim->phases ? clock_seconds() : 0.0;
     int rigid = sim->variation.rigid;
@@ -347,10 +360,12 @@ double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain)
     return least;
 }
 
-/* Component of b - a along the base's lateral axis (to the left) laid level [m]; negative when the legs are crossed. */
+/* Component of b - a along the base's lateral axis (to the left) laid level [m]; negative when the
+ * legs are crossed. */
 static double lateral_distance(const RobotSim *sim, const double *a, const double *b) {
     const double *turn = robot_sim_base_rotation(sim);
-    double x = turn[0], y = turn[3], length = sqrt(x * x + y * y); /* heading: the base's x axis, level */
+    double x = turn[0], y = turn[3],
+           length = sqrt(x * x + y * y); /* heading: the base's x axis, level */
     if (length < 1e-9) {
         return 0.0;
     }

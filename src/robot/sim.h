@@ -8,7 +8,8 @@
 #define ROBOT_LANES 8      /* six twist components, padded to one vector register */
 #define ROBOT_FOOT_DOFS 12 /* base six, then the leg's six: the only ones that move a foot */
 
-/* The feet's Jacobian and its half-solved form, transposed: row = degree of freedom, column = twist component. */
+/* The feet's Jacobian and its half-solved form, transposed: row = degree of freedom, column = twist
+ * component. */
 typedef struct {
     double jacobian[ROBOT_FEET][ROBOT_FOOT_DOFS][ROBOT_LANES]; /* J^T */
     double half[ROBOT_FEET][ROBOT_FOOT_DOFS][ROBOT_LANES];     /* L^-T J^T with M = L^T D L */
@@ -34,11 +35,14 @@ void variation_apply(RobotSim *sim, const RobotVariation *variation);
 /* J of both feet at the current pose. */
 void foot_map_jacobian(RobotSim *sim);
 /* Twist of foot f, J nu + dt J a; acceleration may be NULL. */
-void foot_map_twist(const RobotSim *sim, int foot, const double *velocity, const double *acceleration, double twist[6]);
+void foot_map_twist(const RobotSim *sim, int foot, const double *velocity,
+                    const double *acceleration, double twist[6]);
 /* A = J M^-1 J^T into the contact input; needs the factorised mass matrix. */
 void foot_map_inverse_inertia(RobotSim *sim);
-/* generalised force J^T w [NV] and its acceleration M^-1 J^T w [NV] of one wrench (force, torque) per foot. */
-void foot_map_wrench(const RobotSim *sim, double wrench[ROBOT_FEET][6], double *force, double *acceleration);
+/* generalised force J^T w [NV] and its acceleration M^-1 J^T w [NV] of one wrench (force, torque)
+ * per foot. */
+void foot_map_wrench(const RobotSim *sim, double wrench[ROBOT_FEET][6], double *force,
+                     double *acceleration);
 
 /* The engine's own contact: finds the contacts of the sole corners with the ground. */
 void rigid_collide(RobotSim *sim, const MildTerrain *terrain);

@@ -3,7 +3,8 @@
 
 #include "robot/sim.h"
 
-/* Mass and inertia of one body; the shape of the mass distribution stays, so the inertia scales with the mass. */
+/* Mass and inertia of one body; the shape of the mass distribution stays, so the inertia scales
+ * with the mass. */
 static void scale_body(mjModel *m, const mjModel *nominal, int body, double mass) {
     double scale = mass / nominal->body_mass[body];
     m->body_mass[body] = mass;
@@ -19,8 +20,8 @@ static void sum_subtrees(mjModel *m) {
     }
 }
 
-/* The engine's reference constants of the nominal robot (body_invweight0, dof_M0, stat) stay: they only set how
- * soft joint limits and rigid contacts are regularised. */
+/* The engine's reference constants of the nominal robot (body_invweight0, dof_M0, stat) stay: they
+ * only set how soft joint limits and rigid contacts are regularised. */
 void variation_apply(RobotSim *sim, const RobotVariation *variation) {
     if (memcmp(variation, &sim->variation, sizeof *variation) == 0) {
         return;
@@ -29,7 +30,8 @@ void variation_apply(RobotSim *sim, const RobotVariation *variation) {
     const mjModel *nominal = sim->robot->model;
     int base = sim->robot->base_body;
     sim->variation = *variation;
-    scale_body(m, nominal, base, nominal->body_mass[base] * variation->link_mass_scale[0] + variation->base_mass_add);
+    scale_body(m, nominal, base,
+               nominal->body_mass[base] * variation->link_mass_scale[0] + variation->base_mass_add);
     for (int k = 0; k < 3; k++) {
         m->body_ipos[3 * base + k] = nominal->body_ipos[3 * base + k] + variation->com_offset[k];
     }

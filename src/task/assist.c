@@ -1,9 +1,11 @@
-/* Help for beginners, after the assistance curriculum of Yu, Turk and Liu 2018 ("Learning symmetric and low-energy
- * locomotion"). Balance is so hard with the paper's soft ankles that a beginner learns to stand stiff and never finds out
- * that stepping pays. While a hand holds the trunk upright and draws it along, and the legs are led through the reference
- * gait, stepping comes by itself and is rewarded from the start. Each robot's level of help decays while it stays on its
- * feet and rises when it falls: it settles where episodes last about four seconds, and goes to nothing as they last longer.
- * Never present in evaluation (task_def_make_nominal): there actions are deviations from the time-invariant pose. */
+/* Help for beginners, after the assistance curriculum of Yu, Turk and Liu 2018 ("Learning symmetric
+ * and low-energy locomotion"). Balance is so hard with the paper's soft ankles that a beginner
+ * learns to stand stiff and never finds out that stepping pays. While a hand holds the trunk
+ * upright and draws it along, and the legs are led through the reference gait, stepping comes by
+ * itself and is rewarded from the start. Each robot's level of help decays while it stays on its
+ * feet and rises when it falls: it settles where episodes last about four seconds, and goes to
+ * nothing as they last longer. Never present in evaluation (task_def_make_nominal): there actions
+ * are deviations from the time-invariant pose. */
 #include <math.h>
 
 #include "task/task.h"
@@ -13,11 +15,11 @@
 #define ASSIST_DRAW 100.0        /* [N s/m] towards the commanded velocity */
 #define ASSIST_DRAW_LIMIT 30.0   /* [N] more, and it leans into the hand */
 #define ASSIST_WEIGHT 0.5        /* [-] share of the weight carried */
-#define ASSIST_LEAD 1.3          /* [-] of the reference gait: the joints lag behind their targets */
-#define ASSIST_GRACE 2.0         /* [s] on its feet before the level decays */
-#define ASSIST_DECAY 8.0         /* [s] */
-#define ASSIST_RISE 1.3          /* [-] at a fall */
-#define ASSIST_LEAST 0.01        /* [-] added at a fall */
+#define ASSIST_LEAD 1.3   /* [-] of the reference gait: the joints lag behind their targets */
+#define ASSIST_GRACE 2.0  /* [s] on its feet before the level decays */
+#define ASSIST_DECAY 8.0  /* [s] */
+#define ASSIST_RISE 1.3   /* [-] at a fall */
+#define ASSIST_LEAST 0.01 /* [-] added at a fall */
 #define GRAVITY 9.81
 
 double task_assist_share(const TaskEnv *env, const TaskDef *def) {
@@ -33,7 +35,8 @@ void task_assist_adapt(TaskEnv *env, int fallen) {
     }
 }
 
-void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double pose[ROBOT_JOINTS]) {
+void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                      double pose[ROBOT_JOINTS]) {
     double share = task_assist_share(env, def), reference[ROBOT_JOINTS];
     const double *rest = robot_default_pose(robot);
     task_gait_reference(def, rest, env->phase, task_is_standing(env->command), reference);
@@ -42,20 +45,23 @@ void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot
     }
 }
 
-int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, double wrench[6]) {
+int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                double wrench[6]) {
     double share = task_assist_share(env, def);
     if (share == 0) {
         return 0;
     }
     const double *turn = robot_sim_base_rotation(sim), *v = robot_sim_qvel(sim);
     double heading = atan2(turn[3], turn[0]), c = cos(heading), s = sin(heading);
-    double wanted[2] = {c * env->command[0] - s * env->command[1], s * env->command[0] + c * env->command[1]};
+    double wanted[2] = {c * env->command[0] - s * env->command[1],
+                        s * env->command[0] + c * env->command[1]};
     for (int i = 0; i < 2; i++) {
         double pull = ASSIST_DRAW * (wanted[i] - v[i]);
         wrench[i] = share * fmin(fmax(pull, -ASSIST_DRAW_LIMIT), ASSIST_DRAW_LIMIT);
     }
     wrench[2] = share * ASSIST_WEIGHT * GRAVITY * robot_total_mass(robot);
-    /* The base's z axis in the world is u = (turn[2], turn[5], turn[8]); u x e_z turns it upright. */
+    /* The base's z axis in the world is u = (turn[2], turn[5], turn[8]); u x e_z turns it upright.
+     */
     double omega[3];
     for (int i = 0; i < 3; i++) {
         omega[i] = turn[3 * i] * v[3] + turn[3 * i + 1] * v[4] + turn[3 * i + 2] * v[5];

@@ -14,14 +14,16 @@ static size_t env_header_bytes(void) {
 }
 
 size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
-    return env_header_bytes() + mild_ground_bytes_prints(robot_soles(robot), ROBOT_FEET, def->print_tiles);
+    return env_header_bytes() +
+           mild_ground_bytes_prints(robot_soles(robot), ROBOT_FEET, def->print_tiles);
 }
 
 MildGround *task_env_ground(TaskEnv *env) {
     return (MildGround *)(void *)((char *)env + env_header_bytes());
 }
 
-void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed, uint32_t index) {
+void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
+                   uint32_t index) {
     memset(env, 0, task_env_bytes(def, robot));
     mild_ground_init_prints(task_env_ground(env), robot_soles(robot), ROBOT_FEET, def->print_tiles);
     env->seed = seed;
@@ -51,21 +53,26 @@ static void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot) {
     const double *pose = robot_default_pose(robot);
     memset(&env->robot, 0, sizeof env->robot);
     double yaw = env->command_frozen ? 0 : 3.141592653589793 * (2 * random_unit(&r) - 1);
-    const MildMaterial *material = &env->terrain.materials[mild_terrain_material_at(&env->terrain, 0, 0)];
+    const MildMaterial *material =
+        &env->terrain.materials[mild_terrain_material_at(&env->terrain, 0, 0)];
     double depth = env->variation.rigid ? 0 : standing_depth(robot, material);
     env->robot.qpos[2] = env->terrain.height + robot_stand_height(robot) - depth + 0.002;
     env->robot.qpos[3] = cos(0.5 * yaw);
     env->robot.qpos[6] = sin(0.5 * yaw);
     for (int i = 0; i < ROBOT_JOINTS; i++) {
         double q = pose[i] + z->initial_joint * (2 * random_unit(&r) - 1);
-        env->robot.qpos[7 + i] = fmin(fmax(q, robot_joint_low(robot)[i]), robot_joint_high(robot)[i]);
+        env->robot.qpos[7 + i] =
+            fmin(fmax(q, robot_joint_low(robot)[i]), robot_joint_high(robot)[i]);
     }
     for (int i = 0; i < 6; i++) {
         env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&r) - 1);
     }
     env->phase = random_unit(&r) < 0.5 ? 0 : 0.5;
-    /* The very first episodes end at different times, so that the environments never march in step. */
-    env->step = env->tick == 0 && !env->command_frozen ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit) : 0;
+    /* The very first episodes end at different times, so that the environments never march in step.
+     */
+    env->step = env->tick == 0 && !env->command_frozen
+                    ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit)
+                    : 0;
     env->step_first = env->step;
 }
 
@@ -81,7 +88,8 @@ static void start_on_map(TaskEnv *env, const Robot *robot, RobotSim *sim) {
     env->robot.qpos[2] += level - robot_sim_sole_clearance(sim, &env->terrain);
 }
 
-static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const TaskView *view) {
+static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
+                          const TaskView *view) {
     mild_ground_reset(task_env_ground(env));
     lend_map(env, def);
     draw_start(env, def, robot);
@@ -109,13 +117,14 @@ static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, 
     return_map(env);
 }
 
-void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const TaskView *view) {
+void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
+                    const TaskView *view) {
     task_randomize(env, def, robot);
     start_episode(env, def, robot, sim, view);
 }
 
-void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const MildTerrain *terrain,
-                       int rigid, const TaskView *view) {
+void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
+                       const MildTerrain *terrain, int rigid, const TaskView *view) {
     task_randomize(env, def, robot);
     env->terrain = *terrain;
     env->variation.rigid = rigid;
@@ -152,15 +161,16 @@ static void push_base(TaskEnv *env, const TaskDef *def) {
 }
 
 /* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). */
-static void pd_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
-                      const float *action, double torque[ROBOT_JOINTS]) {
+static void pd_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                      const RobotSim *sim, const float *action, double torque[ROBOT_JOINTS]) {
     const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim) + 6;
     const double *effort = robot_effort(robot);
     double pose[ROBOT_JOINTS];
     task_assist_pose(env, def, robot, pose);
     for (int i = 0; i < ROBOT_JOINTS; i++) {
         double target = pose[i] + def->action_scale * (double)action[i] + env->motor_offset[i];
-        double tau = def->kp[i % 6] * env->kp_scale[i] * (target - q[i]) - def->kd[i % 6] * env->kd_scale[i] * qd[i];
+        double tau = def->kp[i % 6] * env->kp_scale[i] * (target - q[i]) -
+                     def->kd[i % 6] * env->kd_scale[i] * qd[i];
         double limit = def->torque_share * effort[i];
         tau *= env->strength[i];
         torque[i] = tau > limit ? limit : tau < -limit ? -limit : tau;
@@ -168,8 +178,8 @@ static void pd_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot
 }
 
 /* Physics steps of one policy period with the three latencies. Returns 1 when a number went bad. */
-static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, TaskReading *reading,
-                       double torque[ROBOT_JOINTS], const TaskProbe *probe) {
+static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
+                       TaskReading *reading, double torque[ROBOT_JOINTS], const TaskProbe *probe) {
     int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
     for (int k = 0; k <= steps; k++) {
         if (k == steps - env->lag_imu) {
@@ -204,7 +214,8 @@ static void feet_motion(TaskEnv *env, const TaskDef *def, const RobotSim *sim, T
         m->foot_force[f] = sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
         m->contact[f] = force[2] > CONTACT_FORCE;
         m->stance[f] = task_gait_stance(env->phase, m->standing, f);
-        m->either[f] = !m->standing && fabs(sin(6.283185307179586 * env->phase)) < def->double_support;
+        m->either[f] =
+            !m->standing && fabs(sin(6.283185307179586 * env->phase)) < def->double_support;
         m->wanted_height[f] = task_gait_height(def, env->phase, m->standing, f);
         if (m->contact[f]) {
             m->landed_air_time += fmin(env->air_time[f], 0.5 * def->gait_period);
@@ -220,11 +231,12 @@ static void feet_motion(TaskEnv *env, const TaskDef *def, const RobotSim *sim, T
     m->base_height = robot_sim_qpos(sim)[2] - stance_height / (stances ? stances : 1);
 }
 
-static TaskMotion describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
-                                  const double torque[ROBOT_JOINTS]) {
+static TaskMotion describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                  const RobotSim *sim, const double torque[ROBOT_JOINTS]) {
     TaskMotion m = {.def = def, .env = env, .pose = robot_default_pose(robot)};
     const double *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
-    double heading = atan2(rotation[3], rotation[0]), c = cos(heading), s = sin(heading), twist[6], change = 0;
+    double heading = atan2(rotation[3], rotation[0]), c = cos(heading), s = sin(heading), twist[6],
+           change = 0;
     m.standing = task_is_standing(env->command);
     m.velocity[0] = c * qvel[0] + s * qvel[1];
     m.velocity[1] = -s * qvel[0] + c * qvel[1];
@@ -240,7 +252,8 @@ static TaskMotion describe_motion(TaskEnv *env, const TaskDef *def, const Robot 
     m.twist_change = sqrt(change);
     const double now[3] = {m.velocity[0], m.velocity[1], m.omega[2]};
     for (int i = 0; i < 3; i++) {
-        env->smooth_velocity[i] += TASK_PERIOD / def->reward.tracking_time * (now[i] - env->smooth_velocity[i]);
+        env->smooth_velocity[i] +=
+            TASK_PERIOD / def->reward.tracking_time * (now[i] - env->smooth_velocity[i]);
     }
     memcpy(env->base_twist, twist, sizeof twist);
     memcpy(m.q, robot_sim_qpos(sim) + 7, sizeof m.q);
@@ -254,10 +267,12 @@ static TaskMotion describe_motion(TaskEnv *env, const TaskDef *def, const Robot 
     return m;
 }
 
-/* Also when a foot has passed through the other leg: the engine computes no contact between them. */
+/* Also when a foot has passed through the other leg: the engine computes no contact between them.
+ */
 static int has_fallen(const TaskEnv *env, const TaskDef *def, const RobotSim *sim) {
     return robot_sim_foot_distance(sim) < def->crossing_limit ||
-           robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) || robot_sim_body_clearance(sim, &env->terrain) < 0;
+           robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) ||
+           robot_sim_body_clearance(sim, &env->terrain) < 0;
 }
 
 static void advance_clock(TaskEnv *env, const TaskDef *def) {
@@ -300,8 +315,9 @@ static int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     return 1;
 }
 
-TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const float *action,
-                       int auto_reset, const TaskView *view, const TaskProbe *probe) {
+TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
+                       const float *action, int auto_reset, const TaskView *view,
+                       const TaskProbe *probe) {
     TaskStep out = {.valid = 1};
     TaskReading reading;
     double torque[ROBOT_JOINTS];

@@ -25,7 +25,8 @@ double task_gait_height(const TaskDef *def, double phase, int standing, int foot
 }
 
 /* Vendor's reference: the swing leg bends by (-A, 2A, -A) |sin| in hip pitch, knee, ankle pitch. */
-void task_gait_reference(const TaskDef *def, const double *pose, double phase, int standing, double q[ROBOT_JOINTS]) {
+void task_gait_reference(const TaskDef *def, const double *pose, double phase, int standing,
+                         double q[ROBOT_JOINTS]) {
     for (int i = 0; i < ROBOT_JOINTS; i++) {
         q[i] = pose[i];
     }

@@ -5,7 +5,8 @@
  *   9..20  q - q_default [rad]
  *   21..32 qd times 0.05
  *   33..44 last action
- *   45..46 sin, cos of the gait clock; (0, 0) when standing: unlike the vendor's (0, 1) it is its own mirror image */
+ *   45..46 sin, cos of the gait clock; (0, 0) when standing: unlike the vendor's (0, 1) it is its
+ * own mirror image */
 #include <math.h>
 #include <string.h>
 
@@ -15,15 +16,15 @@
 #define TWO_PI 6.283185307179586
 #define RANDOM_USE_NOISE 0x4e4f4953u
 
-/* Mirror in the x-z plane: y components, roll, yaw and their rates change sign; legs change places; the clock turns by
- * half a period, (sin, cos) -> (-sin, -cos). */
+/* Mirror in the x-z plane: y components, roll, yaw and their rates change sign; legs change places;
+ * the clock turns by half a period, (sin, cos) -> (-sin, -cos). */
 #define LEG(first) first, first + 1, first + 2, first + 3, first + 4, first + 5
 #define LEG_SIGN -1, -1, 1, 1, 1, -1
 const int task_mirror_observation_index[TASK_OBSERVATION] = {
     0, 1, 2, 3, 4, 5, 6, 7, 8, LEG(15), LEG(9), LEG(27), LEG(21), LEG(39), LEG(33), 45, 46};
 const float task_mirror_observation_sign[TASK_OBSERVATION] = {
-    -1, 1,        -1,       1,        -1,       -1,       1,        -1, 1, LEG_SIGN, LEG_SIGN,
-    LEG_SIGN, LEG_SIGN, LEG_SIGN, LEG_SIGN, -1, -1};
+    -1,       1,        -1,       1,        -1,       -1,       1,  -1, 1,
+    LEG_SIGN, LEG_SIGN, LEG_SIGN, LEG_SIGN, LEG_SIGN, LEG_SIGN, -1, -1};
 const int task_mirror_action_index[TASK_ACTIONS] = {LEG(6), LEG(0)};
 const float task_mirror_action_sign[TASK_ACTIONS] = {LEG_SIGN, LEG_SIGN};
 
@@ -40,8 +41,8 @@ void task_read_motors(const RobotSim *sim, TaskReading *reading) {
     memcpy(reading->qd, robot_sim_qvel(sim) + 6, sizeof reading->qd);
 }
 
-static void make_frame(const TaskEnv *env, const TaskDef *def, const double *pose, const TaskReading *reading,
-                       float frame[TASK_OBSERVATION]) {
+static void make_frame(const TaskEnv *env, const TaskDef *def, const double *pose,
+                       const TaskReading *reading, float frame[TASK_OBSERVATION]) {
     const double command_scale[3] = {2, 2, 1};
     for (int i = 0; i < 3; i++) {
         frame[i] = (float)reading->omega[i];
@@ -90,13 +91,28 @@ static void write_estimates(const RobotSim *sim, float *estimate) {
     }
 }
 
-/* Ground under the base, each parameter scaled to about one; an element that stands for a whole sole as one of its cells. */
-static float *write_ground(const TaskEnv *env, const Robot *robot, const RobotSim *sim, float *out) {
+/* Ground under the base, each parameter scaled to about one; an element that stands for a whole
+ * sole as one of its cells. */
+static float *write_ground(const TaskEnv *env, const Robot *robot, const RobotSim *sim,
+                           float *out) {
     const double *qpos = robot_sim_qpos(sim);
-    const MildMaterial *m = &env->terrain.materials[mild_terrain_material_at(&env->terrain, qpos[0], qpos[1])];
-    double cells = mild_model_is_concentric((MildModel)m->model) ? mild_sole_elements(robot_rasters(robot)[0]) : 1;
-    const double values[] = {m->k_pen / 500 / cells, m->sigma_cone / 1e5, m->alpha, m->nu, m->c_g / 4, m->c_d / 20, m->phi,
-                             m->mu, m->k_drift / 500 / cells, m->b_drift * 10 / cells, m->recovery, m->bed_depth * 10};
+    const MildMaterial *m =
+        &env->terrain.materials[mild_terrain_material_at(&env->terrain, qpos[0], qpos[1])];
+    double cells = mild_model_is_concentric((MildModel)m->model)
+                       ? mild_sole_elements(robot_rasters(robot)[0])
+                       : 1;
+    const double values[] = {m->k_pen / 500 / cells,
+                             m->sigma_cone / 1e5,
+                             m->alpha,
+                             m->nu,
+                             m->c_g / 4,
+                             m->c_d / 20,
+                             m->phi,
+                             m->mu,
+                             m->k_drift / 500 / cells,
+                             m->b_drift * 10 / cells,
+                             m->recovery,
+                             m->bed_depth * 10};
     int rigid = env->variation.rigid;
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         *out++ = rigid ? 0 : (float)values[i];
@@ -105,7 +121,8 @@ static float *write_ground(const TaskEnv *env, const Robot *robot, const RobotSi
     return out;
 }
 
-static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, const float *clean, float *critic) {
+static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                         const RobotSim *sim, const float *clean, float *critic) {
     float *out = critic;
     memcpy(out, clean, TASK_OBSERVATION * sizeof *out);
     out += TASK_OBSERVATION;
@@ -133,7 +150,9 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *ro
         *out++ = (float)(env->variation.com_offset[i] * 100);
     }
     out = write_ground(env, robot, sim, out);
-    *out++ = (float)(robot_sim_qpos(sim)[2] - mild_terrain_height_at(&env->terrain, robot_sim_qpos(sim)[0], robot_sim_qpos(sim)[1]));
+    *out++ = (float)(robot_sim_qpos(sim)[2] - mild_terrain_height_at(&env->terrain,
+                                                                     robot_sim_qpos(sim)[0],
+                                                                     robot_sim_qpos(sim)[1]));
     *out++ = (float)env->strength[0];
     *out++ = (float)env->variation.armature_scale;
     double step = def->physics_dt / TASK_PERIOD;
@@ -152,7 +171,8 @@ static float *frame_back(TaskEnv *env, int age) {
 }
 
 /* An episode's first frame stands for those before it. */
-static void remember(TaskEnv *env, const TaskDef *def, const float frame[TASK_OBSERVATION], int first) {
+static void remember(TaskEnv *env, const TaskDef *def, const float frame[TASK_OBSERVATION],
+                     int first) {
     const size_t bytes = sizeof env->frames[0];
     env->newest = (env->newest + 1) % TASK_FRAMES_HELD;
     for (int age = 0; age < (first ? TASK_FRAMES_HELD : 1); age++) {
@@ -175,8 +195,8 @@ static void remember(TaskEnv *env, const TaskDef *def, const float frame[TASK_OB
     }
 }
 
-void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, const TaskReading *reading,
-                  int first, const TaskView *view) {
+void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                  const TaskReading *reading, int first, const TaskView *view) {
     const double *pose = robot_default_pose(robot);
     float frame[TASK_OBSERVATION];
     make_frame(env, def, pose, reading, frame);

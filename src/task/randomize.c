@@ -20,16 +20,20 @@ static double spread(Random *r, double half_width) {
 /* A named ground with each of its numbers a little off. */
 static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
     MildMaterial m = mild_material_default();
-    mild_material_preset(mild_material_preset_name((int)random_index(r, (uint32_t)mild_material_preset_count())), &m);
-    double *const jittered[] = {&m.k_pen, &m.sigma_cone, &m.mu, &m.c_d, &m.c_g, &m.k_drift, &m.b_drift};
+    mild_material_preset(
+        mild_material_preset_name((int)random_index(r, (uint32_t)mild_material_preset_count())),
+        &m);
+    double *const jittered[] = {&m.k_pen, &m.sigma_cone, &m.mu,     &m.c_d,
+                                &m.c_g,   &m.k_drift,    &m.b_drift};
     for (size_t i = 0; i < sizeof jittered / sizeof *jittered; i++) {
         *jittered[i] *= 1 + spread(r, def->preset_jitter);
     }
     return m;
 }
 
-/* The quasistatic force is linear in (k_pen, sigma_cone): one factor makes a too soft draw carry the robot on one foot
- * at sinkage_max. Without it a fifth of the paper's draws swallows the foot (docs/task.md section 11). */
+/* The quasistatic force is linear in (k_pen, sigma_cone): one factor makes a too soft draw carry
+ * the robot on one foot at sinkage_max. Without it a fifth of the paper's draws swallows the foot
+ * (docs/task.md section 11). */
 static void limit_sinkage(MildMaterial *m, const Robot *robot, double sinkage) {
     const MildSole *sole = robot_rasters(robot)[0];
     MildMaterial bottomless = *m;
@@ -61,8 +65,11 @@ static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot 
 
 static MildMaterial draw_material(Random *r, const RandomizeDef *def, const Robot *robot) {
     double preset = def->rigid_share < 1 ? def->preset_share / (1 - def->rigid_share) : 0;
-    MildMaterial m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot), rival;
-    if (def->model == MILD_MODEL_RIGID) return m; /* the engine's contact reads none of it */
+    MildMaterial m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot),
+                 rival;
+    if (def->model == MILD_MODEL_RIGID) {
+        return m; /* the engine's contact reads none of it */
+    }
     MildStatus status = robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL);
     assert(status == MILD_OK);
     (void)status;
@@ -70,7 +77,8 @@ static MildMaterial draw_material(Random *r, const RandomizeDef *def, const Robo
 }
 
 /* Stripes across x around the start, three materials in random order. */
-static void draw_stripes(Random *r, const RandomizeDef *def, const Robot *robot, MildTerrain *terrain) {
+static void draw_stripes(Random *r, const RandomizeDef *def, const Robot *robot,
+                         MildTerrain *terrain) {
     while (terrain->material_count < 3) {
         terrain->materials[terrain->material_count++] = draw_material(r, def, robot);
     }
@@ -78,7 +86,9 @@ static void draw_stripes(Random *r, const RandomizeDef *def, const Robot *robot,
     for (int i = 0; i < MILD_PATCHES_MAX; i++) {
         double length = draw(r, def->patch_length);
         MildPatch patch;
-        memset(&patch, 0, sizeof patch); /* its padding too: environments are saved and compared byte by byte */
+        memset(
+            &patch, 0,
+            sizeof patch); /* its padding too: environments are saved and compared byte by byte */
         patch.x_min = x;
         patch.x_max = x + length;
         patch.y_min = -1e3;

@@ -1,4 +1,5 @@
-/* Every reward of docs/task.md section 8, each its own short function, in one table with its weight. */
+/* Every reward of docs/task.md section 8, each its own short function, in one table with its
+ * weight. */
 #include <math.h>
 #include <string.h>
 
@@ -12,12 +13,13 @@ static double clamp(double x, double low, double high) {
     return x < low ? low : x > high ? high : x;
 }
 
-/* exp(-k e^2) of the paper reaches out to a beginner, but is flat at its top: 0.05 m/s too slow costs 1 % of it. Beside it
- * exp(-|e|/width) keeps its slope down to no error at all. Both on the velocity smoothed over half a gait period: the sway
- * of every step is no error, and hid it. */
+/* exp(-k e^2) of the paper reaches out to a beginner, but is flat at its top: 0.05 m/s too slow
+ * costs 1 % of it. Beside it exp(-|e|/width) keeps its slope down to no error at all. Both on the
+ * velocity smoothed over half a gait period: the sway of every step is no error, and hid it. */
 static double tracking(const TaskMotion *m, double error) {
     const RewardDef *def = &m->def->reward;
-    return 0.5 * (exp(-def->tracking_sharpness * square(error)) + exp(-fabs(error) / def->tracking_width));
+    return 0.5 * (exp(-def->tracking_sharpness * square(error)) +
+                  exp(-fabs(error) / def->tracking_width));
 }
 
 /* The parts apart: in the norm of both a little sway would hide what is missing forward. */
@@ -30,16 +32,18 @@ static double reward_yaw_rate(const TaskMotion *m) {
     return tracking(m, m->env->smooth_velocity[2] - m->env->command[2]);
 }
 
-/* The paper prints a positive weight on an error; of the readings in docs/task.md section 8 this is the one that pays
- * nothing to a foot that stays down (exp(-k error) pays it a third of a perfect swing) and has a slope from the first
- * millimetre. Lifting higher than wanted costs half as fast as lifting pays. Scaled so that following h_des = apex sin(pi s)
- * gives 1 on average over the swing. */
+/* The paper prints a positive weight on an error; of the readings in docs/task.md section 8 this is
+ * the one that pays nothing to a foot that stays down (exp(-k error) pays it a third of a perfect
+ * swing) and has a slope from the first millimetre. Lifting higher than wanted costs half as fast
+ * as lifting pays. Scaled so that following h_des = apex sin(pi s) gives 1 on average over the
+ * swing. */
 static double reward_feet_clearance(const TaskMotion *m) {
     double sum = 0;
     for (int f = 0; f < ROBOT_FEET; f++) {
         if (!m->stance[f]) {
             double h = m->foot_height[f], wanted = m->wanted_height[f];
-            sum += 1.5707963 * (clamp(h, 0, wanted) - 0.5 * clamp(h - wanted, 0, 0.3)) / m->def->swing_apex;
+            sum += 1.5707963 * (clamp(h, 0, wanted) - 0.5 * clamp(h - wanted, 0, 0.3)) /
+                   m->def->swing_apex;
         }
     }
     return sum;
@@ -88,7 +92,8 @@ static double reward_reference_motion(const TaskMotion *m) {
 static double reward_default_pose(const TaskMotion *m) {
     double roll_yaw = 0, all = 0;
     for (int leg = 0; leg < 2; leg++) {
-        double roll = m->q[6 * leg] - m->pose[6 * leg], yaw = m->q[6 * leg + 1] - m->pose[6 * leg + 1];
+        double roll = m->q[6 * leg] - m->pose[6 * leg],
+               yaw = m->q[6 * leg + 1] - m->pose[6 * leg + 1];
         roll_yaw += sqrt(square(roll) + square(yaw));
     }
     for (int i = 0; i < ROBOT_JOINTS; i++) {
@@ -119,14 +124,15 @@ static double reward_orientation(const TaskMotion *m) {
     return 0.5 * (exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + exp(-4 * tilt));
 }
 
-/* A lump at touchdown: divided by the period, so that it is not spread over one step like a rate (the vendor's product
- * with dt leaves a hundredth of it, which no learner notices). */
+/* A lump at touchdown: divided by the period, so that it is not spread over one step like a rate
+ * (the vendor's product with dt leaves a hundredth of it, which no learner notices). */
 static double reward_air_time(const TaskMotion *m) {
     return m->standing ? 0 : m->landed_air_time / TASK_PERIOD;
 }
 
 static double reward_base_motion(const TaskMotion *m) {
-    return 0.5 * (exp(-10 * square(m->velocity[2])) + exp(-5 * sqrt(square(m->omega[0]) + square(m->omega[1]))));
+    return 0.5 * (exp(-10 * square(m->velocity[2])) +
+                  exp(-5 * sqrt(square(m->omega[0]) + square(m->omega[1]))));
 }
 
 static double reward_contact_force(const TaskMotion *m) {
@@ -168,7 +174,8 @@ static double reward_collision(const TaskMotion *m) {
 
 typedef double (*RewardFunction)(const TaskMotion *);
 #define TASK_REWARD_FUNCTION(name, weight, help) reward_##name,
-static const RewardFunction reward_functions[TASK_REWARD_COUNT] = {TASK_REWARD_LIST(TASK_REWARD_FUNCTION)};
+static const RewardFunction reward_functions[TASK_REWARD_COUNT] = {
+    TASK_REWARD_LIST(TASK_REWARD_FUNCTION)};
 
 double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]) {
     double sum = 0;

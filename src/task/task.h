@@ -1,6 +1,7 @@
-/* One environment, top to bottom: command, act, observe, reward, randomise, terminate (docs/task.md sections 4 to 11).
- * A TaskEnv is one pointer-free block (its ground memory follows it), so that copying, hashing and saving are one line.
- * Every random number is a function of (seed, environment, tick), so a run depends on no thread count. */
+/* One environment, top to bottom: command, act, observe, reward, randomise, terminate (docs/task.md
+ * sections 4 to 11). A TaskEnv is one pointer-free block (its ground memory follows it), so that
+ * copying, hashing and saving are one line. Every random number is a function of (seed,
+ * environment, tick), so a run depends on no thread count. */
 #ifndef MILD_TASK_H
 #define MILD_TASK_H
 
@@ -20,9 +21,11 @@
 #define TASK_CRITIC 104
 #define TASK_PERIOD 0.01 /* [s] policy step: 100 Hz (paper) */
 
-/* Scale of the feet heights among the estimates, so that centimetres weigh in the regression like m/s. */
+/* Scale of the feet heights among the estimates, so that centimetres weigh in the regression like
+ * m/s. */
 #define TASK_HEIGHT_SCALE 10.0
-/* Scale of the base velocity: 0.05 m/s are a tenth of a walk, and must be seen, by the regression and by the actor. */
+/* Scale of the base velocity: 0.05 m/s are a tenth of a walk, and must be seen, by the regression
+ * and by the actor. */
 #define TASK_VELOCITY_SCALE 4.0
 
 typedef struct {
@@ -31,26 +34,30 @@ typedef struct {
     uint32_t tick;  /* policy steps since creation, never reset */
     /* episode */
     uint32_t step, step_limit, step_first; /* step_first: where the clock of this episode began */
-    double phase;             /* [-] gait clock in [0, 1) */
-    double command[3];        /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
-    double command_seen[3];   /* what the policy sees: one policy step late */
-    int command_frozen;       /* bool: eval and play set the command themselves */
+    double phase;                          /* [-] gait clock in [0, 1) */
+    double command[3];                     /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
+    double command_seen[3];                /* what the policy sees: one policy step late */
+    int command_frozen;                    /* bool: eval and play set the command themselves */
     /* what was drawn for this episode */
     RobotVariation variation;
-    MildTerrain terrain; /* its map is lent by TaskDef during a call and NULL between calls: the block holds no pointer */
-    double kp_scale[ROBOT_JOINTS], kd_scale[ROBOT_JOINTS], strength[ROBOT_JOINTS], motor_offset[ROBOT_JOINTS];
+    MildTerrain terrain; /* its map is lent by TaskDef during a call and NULL between calls: the
+                            block holds no pointer */
+    double kp_scale[ROBOT_JOINTS], kd_scale[ROBOT_JOINTS], strength[ROBOT_JOINTS],
+        motor_offset[ROBOT_JOINTS];
     int lag_command, lag_motor, lag_imu; /* [physics steps] */
-    double assist_level;      /* [-] helping hand: falls with time on its feet, rises with falls; lives across episodes */
-    double assist_draw;       /* [-] this episode's share of the level, in [0.5, 1) */
-    double push[6];           /* [m/s, rad/s] last push, for the critic; fades */
+    double assist_level; /* [-] helping hand: falls with time on its feet, rises with falls; lives
+                            across episodes */
+    double assist_draw;  /* [-] this episode's share of the level, in [0.5, 1) */
+    double push[6];      /* [m/s, rad/s] last push, for the critic; fades */
     /* state */
     RobotState robot;
-    float action[3][TASK_ACTIONS]; /* now, one and two steps ago */
+    float action[3][TASK_ACTIONS];                    /* now, one and two steps ago */
     float frames[TASK_FRAMES_HELD][TASK_OBSERVATION]; /* ring of every policy step's */
     uint32_t newest;                                  /* frame in the ring */
-    float history[TASK_HISTORY];                      /* what the policy sees of them: the newest, and five means */
-    double base_twist[6];     /* one policy step ago: linear in the world, angular in the base frame */
-    double smooth_velocity[3]; /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over reward.tracking_time */
+    float history[TASK_HISTORY]; /* what the policy sees of them: the newest, and five means */
+    double base_twist[6]; /* one policy step ago: linear in the world, angular in the base frame */
+    double smooth_velocity[3];        /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over
+                                         reward.tracking_time */
     double joint_speed[ROBOT_JOINTS]; /* one policy step ago */
     double air_time[ROBOT_FEET];
     /* sums over the running episode, for the log */
@@ -76,22 +83,29 @@ typedef struct {
 
 /* Called after every physics step, before memory moves on: measures and pictures hang here. */
 typedef struct {
-    void (*physics_step)(void *context, const TaskEnv *env, const RobotSim *sim, const double *torque);
+    void (*physics_step)(void *context, const TaskEnv *env, const RobotSim *sim,
+                         const double *torque);
     void *context;
 } TaskProbe;
 
-size_t task_env_bytes(const TaskDef *def, const Robot *robot); /* TaskEnv and its ground memory, a multiple of 64 */
+size_t task_env_bytes(const TaskDef *def,
+                      const Robot *robot); /* TaskEnv and its ground memory, a multiple of 64 */
 MildGround *task_env_ground(TaskEnv *env);
 
-void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed, uint32_t index);
+void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
+                   uint32_t index);
 /* Draws a new episode and writes its first observation. */
-void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const TaskView *view);
-/* As reset, but the caller has chosen the terrain (its map aside, which is the TaskDef's) and whether the engine's rigid ground is used. */
-void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const MildTerrain *terrain,
-                       int rigid, const TaskView *view);
-/* One policy step. When the episode ends a new one is drawn (auto_reset) and its first observation written. */
-TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim, const float *action,
-                       int auto_reset, const TaskView *view, const TaskProbe *probe);
+void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
+                    const TaskView *view);
+/* As reset, but the caller has chosen the terrain (its map aside, which is the TaskDef's) and
+ * whether the engine's rigid ground is used. */
+void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
+                       const MildTerrain *terrain, int rigid, const TaskView *view);
+/* One policy step. When the episode ends a new one is drawn (auto_reset) and its first observation
+ * written. */
+TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
+                       const float *action, int auto_reset, const TaskView *view,
+                       const TaskProbe *probe);
 
 /* ---- parts, each in a file of its own ---- */
 
@@ -103,23 +117,24 @@ typedef struct {
 void task_read_imu(const RobotSim *sim, TaskReading *reading);
 void task_read_motors(const RobotSim *sim, TaskReading *reading);
 /* Pushes the frame made from the readings into the history and writes the view. */
-void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, const TaskReading *reading,
-                  int first, const TaskView *view);
+void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                  const TaskReading *reading, int first, const TaskView *view);
 
 /* Everything a reward term may look at, computed once per policy step (reward.c). */
 typedef struct {
     const TaskDef *def;
     const TaskEnv *env;
-    const double *pose; /* default pose */
-    double velocity[3]; /* base, heading frame [m/s] */
-    double omega[3];    /* base, base frame [rad/s] */
-    double gravity[3];  /* unit gravity in the base frame */
+    const double *pose;  /* default pose */
+    double velocity[3];  /* base, heading frame [m/s] */
+    double omega[3];     /* base, base frame [rad/s] */
+    double gravity[3];   /* unit gravity in the base frame */
     double twist_change; /* norm of the change of base twist in this step */
     double q[ROBOT_JOINTS], qd[ROBOT_JOINTS], qd_before[ROBOT_JOINTS], torque[ROBOT_JOINTS];
     double base_height; /* above the stance soles [m] */
     double foot_height[ROBOT_FEET], foot_force[ROBOT_FEET], foot_speed[ROBOT_FEET];
     double landed_air_time; /* sum over feet that touched down in this step */
-    int contact[ROBOT_FEET], stance[ROBOT_FEET], either[ROBOT_FEET]; /* either: both states are right */
+    int contact[ROBOT_FEET], stance[ROBOT_FEET],
+        either[ROBOT_FEET]; /* either: both states are right */
     double wanted_height[ROBOT_FEET];
     double foot_distance, knee_distance;
     int standing;
@@ -131,18 +146,22 @@ double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
 void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);
 void task_draw_command(TaskEnv *env, const TaskDef *def);
 
-/* Help while learning starts (assist.c). The hand on the base: force, torque, world; returns 0 when there is none. The
- * pose that actions are added to: the default pose, led along the reference gait while help lasts. */
+/* Help while learning starts (assist.c). The hand on the base: force, torque, world; returns 0 when
+ * there is none. The pose that actions are added to: the default pose, led along the reference gait
+ * while help lasts. */
 double task_assist_share(const TaskEnv *env, const TaskDef *def);
 void task_assist_adapt(TaskEnv *env, int fallen);
-int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim, double wrench[6]);
-void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double pose[ROBOT_JOINTS]);
+int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                double wrench[6]);
+void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                      double pose[ROBOT_JOINTS]);
 
 /* Gait clock (gait.c): foot 0 stands while sin(2 pi phase) >= 0, foot 1 while < 0. */
 int task_is_standing(const double command[3]);
 int task_gait_stance(double phase, int standing, int foot);
 double task_gait_height(const TaskDef *def, double phase, int standing, int foot);
-void task_gait_reference(const TaskDef *def, const double *pose, double phase, int standing, double q[ROBOT_JOINTS]);
+void task_gait_reference(const TaskDef *def, const double *pose, double phase, int standing,
+                         double q[ROBOT_JOINTS]);
 
 /* Mirror symmetry left <-> right: o'_i = sign_i o_index_i. */
 extern const int task_mirror_observation_index[TASK_OBSERVATION];

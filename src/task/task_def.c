@@ -100,7 +100,8 @@ void task_def_make_nominal(TaskDef *def) {
 
 #define D MILD_FIELD_DOUBLE
 #define B MILD_FIELD_BOOL
-#define T(member, type, count, min, max, help) MILD_FIELD(TaskDef, member, type, count, min, max, help)
+#define T(member, type, count, min, max, help)                                                     \
+    MILD_FIELD(TaskDef, member, type, count, min, max, help)
 const MildField task_fields[] = {
     T(physics_dt, D, 1, 0.0005, 0.005, "[s] physics step; 0.01 must be a whole multiple of it"),
     T(action_scale, D, 1, 0.01, 2, "[rad] joint offset per unit of action"),
@@ -116,11 +117,14 @@ const MildField task_fields[] = {
     T(backward_share, D, 1, 0, 1, "[-] share of commands that walk backward"),
     T(backward_vx, D, 2, -3, 3, "[m/s] backward command, low and high"),
     T(standing_share, D, 1, 0, 1, "[-] share of commands that stand"),
-    T(straight_share, D, 1, 0, 1, "[-] share of walking commands without sideways and turning parts"),
+    T(straight_share, D, 1, 0, 1,
+      "[-] share of walking commands without sideways and turning parts"),
     T(gait_period, D, 1, 0.2, 3, "[s] T of the clock"),
     T(swing_apex, D, 1, 0.01, 0.4, "[m] wanted height of the swing foot above h0"),
-    T(double_support, D, 1, 0, 1, "[-] |sin| of the clock below which either contact state is right"),
-    T(history_stride, MILD_FIELD_INT, 1, 1, TASK_STRIDE_MAX, "[-] policy steps that each of the five older frames of the history is the mean of"),
+    T(double_support, D, 1, 0, 1,
+      "[-] |sin| of the clock below which either contact state is right"),
+    T(history_stride, MILD_FIELD_INT, 1, 1, TASK_STRIDE_MAX,
+      "[-] policy steps that each of the five older frames of the history is the mean of"),
     T(clock, B, 1, 0, 1, "[bool] gait clock in the observation"),
     T(observe_noise, B, 1, 0, 1, "[bool] sensor noise"),
     T(noise_q, D, 1, 0, 1, "[rad] uniform +-"),
@@ -128,20 +132,31 @@ const MildField task_fields[] = {
     T(noise_omega, D, 1, 0, 5, "[rad/s] uniform +-"),
     T(noise_gravity, D, 1, 0, 1, "[-] uniform +-"),
     T(tilt_limit, D, 1, 0.1, 3.1, "[rad] the episode ends when the base tilts further"),
-    T(crossing_limit, D, 1, -1, 1, "[m] the episode ends when the feet come laterally closer; the legs have no contact"),
+    T(crossing_limit, D, 1, -1, 1,
+      "[m] the episode ends when the feet come laterally closer; the legs have no contact"),
     T(assist, B, 1, 0, 1, "[bool] helping hand for beginners, fading as a robot stays on its feet"),
     T(newton, B, 1, 0, 1, "[bool] contact solver: the fast one; off: the paper's Gauss-Seidel"),
-    T(contact_tolerance, D, 1, 1e-12, 0.1, "[-] relative residual at which the contact solver stops"),
-    T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000, "[-] hard bound of the contact solver's work"),
+    T(contact_tolerance, D, 1, 1e-12, 0.1,
+      "[-] relative residual at which the contact solver stops"),
+    T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000,
+      "[-] hard bound of the contact solver's work"),
 };
 const int task_field_count = sizeof task_fields / sizeof *task_fields;
 
-#define R(member, type, count, min, max, help) MILD_FIELD(RewardDef, member, type, count, min, max, help)
-#define TASK_REWARD_FIELD(name, value, help) \
-    {#name, MILD_FIELD_DOUBLE, offsetof(RewardDef, weight) + sizeof(double) * REWARD_##name, 1, -1e3, 1e3, "[1/s] " help, NULL},
+#define R(member, type, count, min, max, help)                                                     \
+    MILD_FIELD(RewardDef, member, type, count, min, max, help)
+#define TASK_REWARD_FIELD(name, value, help)                                                       \
+    {#name,                                                                                        \
+     MILD_FIELD_DOUBLE,                                                                            \
+     offsetof(RewardDef, weight) + sizeof(double) * REWARD_##name,                                 \
+     1,                                                                                            \
+     -1e3,                                                                                         \
+     1e3,                                                                                          \
+     "[1/s] " help,                                                                                \
+     NULL},
 const MildField reward_fields[] = {
     TASK_REWARD_LIST(TASK_REWARD_FIELD)
-    R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
+        R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
     R(nominal_height, D, 1, 0.1, 2, "[m] nominal base height above the stance soles"),
     R(tracking_time, D, 1, 0.01, 10, "[s] over which the tracked velocity is smoothed"),
     R(tracking_sharpness, D, 1, 0, 100, "[s^2/m^2] k of linear_velocity and yaw_rate"),
@@ -154,9 +169,11 @@ const int reward_field_count = sizeof reward_fields / sizeof *reward_fields;
 
 #define Z(member, count, min, max, help) MILD_FIELD(RandomizeDef, member, D, count, min, max, help)
 const MildField randomize_fields[] = {
-    MILD_FIELD_CHOICE(RandomizeDef, model, mild_model_names, MILD_MODELS, "[-] ground model, matched to mild on each draw"),
+    MILD_FIELD_CHOICE(RandomizeDef, model, mild_model_names, MILD_MODELS,
+                      "[-] ground model, matched to mild on each draw"),
     Z(rigid_share, 1, 0, 1, "[-] share of episodes on the engine's rigid ground"),
-    Z(preset_share, 1, 0, 1, "[-] share of episodes on a named preset; the rest draws from the ranges below"),
+    Z(preset_share, 1, 0, 1,
+      "[-] share of episodes on a named preset; the rest draws from the ranges below"),
     Z(preset_jitter, 1, 0, 0.9, "[-] preset parameters times 1 +- this"),
     Z(patch_share, 1, 0, 1, "[-] share of soft episodes whose ground changes in stripes"),
     Z(patch_length, 2, 0.1, 100, "[m] length of a stripe, low and high"),
@@ -189,14 +206,14 @@ const MildField randomize_fields[] = {
 const int randomize_field_count = sizeof randomize_fields / sizeof *randomize_fields;
 
 /* Every pair of numbers in these tables is a range. */
-static MildStatus check_section(const MildField *fields, int count, const void *def, const char *section,
-                                MildError *error) {
+static MildStatus check_section(const MildField *fields, int count, const void *def,
+                                const char *section, MildError *error) {
     MildStatus status = mild_fields_check(fields, count, def, section, error);
     for (int i = 0; status == MILD_OK && i < count; i++) {
         const double *range = (const double *)(const void *)((const char *)def + fields[i].offset);
         if (fields[i].type == MILD_FIELD_DOUBLE && fields[i].count == 2 && range[0] > range[1]) {
-            status = mild_fail(error, MILD_ERROR_RANGE, "%s.%s: low %g is above high %g", section, fields[i].name, range[0],
-                               range[1]);
+            status = mild_fail(error, MILD_ERROR_RANGE, "%s.%s: low %g is above high %g", section,
+                               fields[i].name, range[0], range[1]);
         }
     }
     return status;
@@ -204,17 +221,22 @@ static MildStatus check_section(const MildField *fields, int count, const void *
 
 MildStatus task_def_check(const TaskDef *def, MildError *error) {
     MildStatus status = check_section(task_fields, task_field_count, def, "task", error);
-    if (status == MILD_OK) status = check_section(reward_fields, reward_field_count, &def->reward, "reward", error);
     if (status == MILD_OK) {
-        status = check_section(randomize_fields, randomize_field_count, &def->randomize, "randomize", error);
+        status = check_section(reward_fields, reward_field_count, &def->reward, "reward", error);
+    }
+    if (status == MILD_OK) {
+        status = check_section(randomize_fields, randomize_field_count, &def->randomize,
+                               "randomize", error);
     }
     double steps = TASK_PERIOD / def->physics_dt;
     if (status == MILD_OK && !(fabs(steps - floor(steps + 0.5)) < 1e-9)) {
-        return mild_fail(error, MILD_ERROR_RANGE, "task.physics_dt: %g s is not a whole multiple of %g", TASK_PERIOD,
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "task.physics_dt: %g s is not a whole multiple of %g", TASK_PERIOD,
                          def->physics_dt);
     }
     if (status == MILD_OK && def->randomize.rigid_share + def->randomize.preset_share > 1 + 1e-12) {
-        return mild_fail(error, MILD_ERROR_RANGE, "randomize: rigid_share + preset_share is above 1");
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "randomize: rigid_share + preset_share is above 1");
     }
     return status;
 }

@@ -1,4 +1,5 @@
-/* The task's configuration: sections [task], [reward], [randomize] of a config file. Defaults are complete. */
+/* The task's configuration: sections [task], [reward], [randomize] of a config file. Defaults are
+ * complete. */
 #ifndef MILD_TASK_DEF_H
 #define MILD_TASK_DEF_H
 
@@ -6,28 +7,34 @@
 #include "mild/field.h"
 #include "mild/map.h"
 
-/* Every reward term once: name, default weight, help. The struct, the config keys and the table of functions
- * (reward.c) are all made from this list. Weights are per second; source: paper Table II and docs/task.md section 8. */
-#define TASK_REWARD_LIST(X)                                                                                           \
-    X(linear_velocity, 2.0, "f(v_x - command) f(v_y - command), f(e) = (exp(-k e^2) + exp(-|e|/width))/2, smoothed, heading frame (paper)") \
-    X(yaw_rate, 1.1, "f(w_z - command) (paper)")                                                                      \
-    X(feet_clearance, 2.4, "swing feet: clip(h, 0, h_des) less half of what is above h_des, h of the lowest sole point above h0 (paper)")    \
-    X(gait, 1.4, "mean over feet: 1 when contact matches the clock, else -0.3 (paper)")                                \
-    X(slip, -0.1, "[m/s] horizontal speed of feet in contact (paper)")                                                 \
-    X(base_acceleration, 0.2, "exp(-3 |change of base twist in one step|) (paper)")                                    \
-    X(action_smoothness, -0.003, "|a - a1|^2 + |a - 2 a1 + a2|^2 (paper)")                                             \
-    X(reference_motion, 2.2, "exp(-2 d) - 0.2 min(d, 0.5), d = |q - q_ref(phase)| (vendor)")                           \
-    X(default_pose, 1.2, "hip roll and yaw near the default pose (vendor)")                                            \
-    X(base_height, 0.2, "exp(-100 |height above the stance soles - nominal|) (vendor)")                                \
-    X(feet_distance, 0.2, "lateral distance of the feet within limits (vendor)")                                       \
-    X(knee_distance, 0.2, "lateral distance of the knees within limits (vendor)")                                      \
-    X(orientation, 1.5, "upright base (vendor)")                                                                       \
-    X(air_time, 1.0, "[s] time in the air, paid at touchdown, at most half a gait period (vendor)")                                   \
-    X(base_motion, 0.5, "small vertical and roll-pitch speed of the base (vendor)")                                    \
-    X(contact_force, -0.02, "[N] foot force above 500 N, at most 400 (vendor)")                                        \
-    X(torque, -1e-10, "[N^2 m^2] sum of squared torques (vendor)")                                                     \
-    X(joint_speed, -1e-5, "[rad^2/s^2] sum of squared joint speeds (vendor)")                                          \
-    X(joint_acceleration, -5e-9, "[rad^2/s^4] sum of squared joint accelerations (vendor)")                            \
+/* Every reward term once: name, default weight, help. The struct, the config keys and the table of
+ * functions (reward.c) are all made from this list. Weights are per second; source: paper Table II
+ * and docs/task.md section 8. */
+#define TASK_REWARD_LIST(X)                                                                        \
+    X(linear_velocity, 2.0,                                                                        \
+      "f(v_x - command) f(v_y - command), f(e) = (exp(-k e^2) + exp(-|e|/width))/2, smoothed, "    \
+      "heading frame (paper)")                                                                     \
+    X(yaw_rate, 1.1, "f(w_z - command) (paper)")                                                   \
+    X(feet_clearance, 2.4,                                                                         \
+      "swing feet: clip(h, 0, h_des) less half of what is above h_des, h of the lowest sole "      \
+      "point above h0 (paper)")                                                                    \
+    X(gait, 1.4, "mean over feet: 1 when contact matches the clock, else -0.3 (paper)")            \
+    X(slip, -0.1, "[m/s] horizontal speed of feet in contact (paper)")                             \
+    X(base_acceleration, 0.2, "exp(-3 |change of base twist in one step|) (paper)")                \
+    X(action_smoothness, -0.003, "|a - a1|^2 + |a - 2 a1 + a2|^2 (paper)")                         \
+    X(reference_motion, 2.2, "exp(-2 d) - 0.2 min(d, 0.5), d = |q - q_ref(phase)| (vendor)")       \
+    X(default_pose, 1.2, "hip roll and yaw near the default pose (vendor)")                        \
+    X(base_height, 0.2, "exp(-100 |height above the stance soles - nominal|) (vendor)")            \
+    X(feet_distance, 0.2, "lateral distance of the feet within limits (vendor)")                   \
+    X(knee_distance, 0.2, "lateral distance of the knees within limits (vendor)")                  \
+    X(orientation, 1.5, "upright base (vendor)")                                                   \
+    X(air_time, 1.0,                                                                               \
+      "[s] time in the air, paid at touchdown, at most half a gait period (vendor)")               \
+    X(base_motion, 0.5, "small vertical and roll-pitch speed of the base (vendor)")                \
+    X(contact_force, -0.02, "[N] foot force above 500 N, at most 400 (vendor)")                    \
+    X(torque, -1e-10, "[N^2 m^2] sum of squared torques (vendor)")                                 \
+    X(joint_speed, -1e-5, "[rad^2/s^2] sum of squared joint speeds (vendor)")                      \
+    X(joint_acceleration, -5e-9, "[rad^2/s^4] sum of squared joint accelerations (vendor)")        \
     X(collision, -1.0, "feet or knees closer than the legs are wide (vendor)")
 
 #define TASK_REWARD_ENUM(name, weight, help) REWARD_##name,
@@ -35,74 +42,80 @@ enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };
 #undef TASK_REWARD_ENUM
 
 typedef struct {
-    double weight[TASK_REWARD_COUNT]; /* [1/s] */
-    int clip_sum;                     /* bool: the sum of a step is never below 0 (vendor) */
-    double nominal_height;            /* [m] nominal base height above the stance soles */
-    double tracking_sharpness;        /* [s^2/m^2] k = 5 in the velocity terms */
-    double tracking_width;            /* [m/s] of the sharp part of the velocity terms */
-    double tracking_time;             /* [s] over which the tracked velocity is smoothed */
+    double weight[TASK_REWARD_COUNT];    /* [1/s] */
+    int clip_sum;                        /* bool: the sum of a step is never below 0 (vendor) */
+    double nominal_height;               /* [m] nominal base height above the stance soles */
+    double tracking_sharpness;           /* [s^2/m^2] k = 5 in the velocity terms */
+    double tracking_width;               /* [m/s] of the sharp part of the velocity terms */
+    double tracking_time;                /* [s] over which the tracked velocity is smoothed */
     double feet_range[2], knee_range[2]; /* [m] limits */
-    double reference_amplitude;       /* [rad] */
+    double reference_amplitude;          /* [rad] */
 } RewardDef;
 
 /* Domain randomisation; ranges are uniform. docs/task.md section 11. */
 typedef struct {
-    int model;              /* MildModel of the soft episodes, matched to mild's draws; rigid: all on the engine's contact */
-    /* ground: shares of episodes; what remains after rigid and preset draws from the paper's ranges */
+    int model; /* MildModel of the soft episodes, matched to mild's draws; rigid: all on the
+                  engine's contact */
+    /* ground: shares of episodes; what remains after rigid and preset draws from the paper's ranges
+     */
     double rigid_share;     /* [-] engine contact */
     double preset_share;    /* [-] a named preset, parameters times 1 +- preset_jitter */
     double preset_jitter;   /* [-] */
     double patch_share;     /* [-] soft episodes whose ground changes in stripes */
     double patch_length[2]; /* [m] */
-    double k_pen[2], sigma_cone[2], alpha[2], nu[2], c_g[2], c_d[2], phi[2], mu[2], rho[2], recovery[2], bed_depth[2];
-    double sinkage_max;     /* [m] a draw whose one-foot static sinkage is deeper is made stiffer until it fits */
+    double k_pen[2], sigma_cone[2], alpha[2], nu[2], c_g[2], c_d[2], phi[2], mu[2], rho[2],
+        recovery[2], bed_depth[2];
+    double sinkage_max; /* [m] a draw whose one-foot static sinkage is deeper is made stiffer until
+                           it fits */
     /* robot */
-    double base_mass[2];     /* [kg] added */
-    double com_offset;       /* [m] each axis, +- */
-    double link_mass[2];     /* [-] */
-    double armature[2];      /* [-] */
-    double motor_offset;     /* [rad] +- */
-    double gain[2];          /* [-] Kp and Kd, each joint */
-    double strength[2];      /* [-] torque */
-    double latency[2];       /* [s] command, motor reading, IMU reading: each drawn per episode */
-    double push_interval;    /* [s] 0: none */
+    double base_mass[2];  /* [kg] added */
+    double com_offset;    /* [m] each axis, +- */
+    double link_mass[2];  /* [-] */
+    double armature[2];   /* [-] */
+    double motor_offset;  /* [rad] +- */
+    double gain[2];       /* [-] Kp and Kd, each joint */
+    double strength[2];   /* [-] torque */
+    double latency[2];    /* [s] command, motor reading, IMU reading: each drawn per episode */
+    double push_interval; /* [s] 0: none */
     double push_linear, push_angular; /* [m/s], [rad/s] */
-    double initial_joint;    /* [rad] +- around the default pose */
-    double initial_velocity; /* [m/s] +- of the base */
+    double initial_joint;             /* [rad] +- around the default pose */
+    double initial_velocity;          /* [m/s] +- of the base */
 } RandomizeDef;
 
 typedef struct {
-    double physics_dt;      /* [s] */
-    double action_scale;    /* [rad] per unit action */
-    double action_clip;     /* [-] */
-    double torque_share;    /* [-] of the joint's effort */
-    double kp[6], kd[6];    /* per leg */
-    double episode;         /* [s] */
-    double command_interval;/* [s] */
+    double physics_dt;       /* [s] */
+    double action_scale;     /* [rad] per unit action */
+    double action_clip;      /* [-] */
+    double torque_share;     /* [-] of the joint's effort */
+    double kp[6], kd[6];     /* per leg */
+    double episode;          /* [s] */
+    double command_interval; /* [s] */
     double vx[2], vy[2], wz[2];
     double backward_share, backward_vx[2], standing_share, straight_share;
-    double gait_period;     /* [s] */
-    double swing_apex;      /* [m] */
-    double double_support;  /* [-] |sin(2 pi phase)| below which either contact state is right */
-    int history_stride;     /* policy steps that each older frame of the history is the mean of */
-    int clock;              /* bool: clock in the observation */
-    int observe_noise;      /* bool */
+    double gait_period;    /* [s] */
+    double swing_apex;     /* [m] */
+    double double_support; /* [-] |sin(2 pi phase)| below which either contact state is right */
+    int history_stride;    /* policy steps that each older frame of the history is the mean of */
+    int clock;             /* bool: clock in the observation */
+    int observe_noise;     /* bool */
     double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
-    double tilt_limit;      /* [rad] */
-    double crossing_limit;  /* [m] lateral distance of the feet below which the episode ends */
-    int assist;             /* bool: helping hand for beginners (assist.c) */
-    int newton;             /* bool: fast solver; off: the paper's sweeps */
+    double tilt_limit;                                    /* [rad] */
+    double crossing_limit;    /* [m] lateral distance of the feet below which the episode ends */
+    int assist;               /* bool: helping hand for beginners (assist.c) */
+    int newton;               /* bool: fast solver; off: the paper's sweeps */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */
-    int contact_iterations; /* [-] hard bound of its work */
+    int contact_iterations;   /* [-] hard bound of its work */
     RewardDef reward;
     RandomizeDef randomize;
     /* not of the config */
-    const MildMap *map; /* borrowed: shape and pattern of soft ground; NULL: level. Rigid ground stays level */
-    int print_tiles;    /* of prints, see mild_ground_bytes_prints */
+    const MildMap *
+        map; /* borrowed: shape and pattern of soft ground; NULL: level. Rigid ground stays level */
+    int print_tiles; /* of prints, see mild_ground_bytes_prints */
 } TaskDef;
 
 TaskDef task_def_default(void);
-/* The nominal robot, undisturbed, for evaluation and play; sensor noise, latencies and the start are still drawn. */
+/* The nominal robot, undisturbed, for evaluation and play; sensor noise, latencies and the start
+ * are still drawn. */
 void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);
 

@@ -11,11 +11,11 @@ struct Vec {
     Pool *pool;
     int envs;
     size_t stride;
-    char *state;    /* [envs][stride] TaskEnv and ground memory */
-    TaskStep *step; /* [envs] */
-    RobotSim **sim; /* [threads] */
+    char *state;         /* [envs][stride] TaskEnv and ground memory */
+    TaskStep *step;      /* [envs] */
+    RobotSim **sim;      /* [threads] */
     RobotPhases *phases; /* [threads] */
-    VecStats stats; /* sums */
+    VecStats stats;      /* sums */
     /* arguments of the call in flight */
     const float *action;
     const VecView *view;
@@ -35,7 +35,8 @@ static TaskView view_at(const VecView *view, int i) {
     };
 }
 
-Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, uint64_t seed, MildError *error) {
+Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, uint64_t seed,
+                MildError *error) {
     if (task_def_check(def, error) != MILD_OK) {
         return NULL;
     }
@@ -44,7 +45,11 @@ Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, ui
         mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
         return NULL;
     }
-    *vec = (Vec){.def = *def, .robot = robot, .pool = pool, .envs = envs, .stride = task_env_bytes(def, robot)};
+    *vec = (Vec){.def = *def,
+                 .robot = robot,
+                 .pool = pool,
+                 .envs = envs,
+                 .stride = task_env_bytes(def, robot)};
     vec->state = aligned_alloc(64, (size_t)envs * vec->stride);
     vec->step = calloc((size_t)envs, sizeof *vec->step);
     vec->sim = calloc((size_t)pool_threads(pool), sizeof(RobotSim *));
@@ -112,8 +117,8 @@ static void count_episode(Vec *vec, const TaskStep *step) {
     }
 }
 
-void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout, uint8_t *valid,
-              const VecView *next) {
+void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout,
+              uint8_t *valid, const VecView *next) {
     vec->action = action;
     vec->view = next;
     pool_run(vec->pool, vec->envs, step_piece, vec);

@@ -17,21 +17,23 @@ typedef struct {
 /* Of the episodes that ended since the last vec_take_stats. */
 typedef struct {
     int episodes, falls, diverged;
-    double steps;       /* policy steps */
-    double length;      /* [s] mean */
-    double reward;      /* mean sum of an episode */
-    double speed_error; /* [m/s] mean */
-    double assist;      /* [-] mean level of help of all robots now */
+    double steps;                    /* policy steps */
+    double length;                   /* [s] mean */
+    double reward;                   /* mean sum of an episode */
+    double speed_error;              /* [m/s] mean */
+    double assist;                   /* [-] mean level of help of all robots now */
     double terms[TASK_REWARD_COUNT]; /* mean per second lived */
 } VecStats;
 
 /* Borrows robot and pool; one RobotSim per thread. */
-Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, uint64_t seed, MildError *error);
+Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, uint64_t seed,
+                MildError *error);
 void vec_destroy(Vec *vec);
 void vec_reset(Vec *vec, const VecView *first);
-/* One policy step of all. action [envs][TASK_ACTIONS]; reward, done, timeout, valid [envs]; next: the observation after. */
-void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout, uint8_t *valid,
-              const VecView *next);
+/* One policy step of all. action [envs][TASK_ACTIONS]; reward, done, timeout, valid [envs]; next:
+ * the observation after. */
+void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout,
+              uint8_t *valid, const VecView *next);
 VecStats vec_take_stats(Vec *vec);
 /* Thread time [s] spent in physics, and in the ground as part of it, since the last call. */
 void vec_take_times(Vec *vec, double *physics, double *ground);

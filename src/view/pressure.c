@@ -38,12 +38,15 @@ struct Pressure {
 
 Pressure *pressure_create(const Robot *robot, int materials, double dt, MildError *error) {
     if (!(dt > 0) || materials < 1 || materials > MILD_MATERIALS_MAX) {
-        mild_fail(error, MILD_ERROR_ARGUMENT, "sole pressure: %d materials at %g s per step", materials, dt);
+        mild_fail(error, MILD_ERROR_ARGUMENT, "sole pressure: %d materials at %g s per step",
+                  materials, dt);
         return NULL;
     }
     const MildSole *const *soles = robot_soles(robot);
     size_t elements = 0;
-    for (int f = 0; f < ROBOT_FEET; f++) elements += (size_t)mild_sole_elements(soles[f]);
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        elements += (size_t)mild_sole_elements(soles[f]);
+    }
     Pressure *pressure = calloc(1, sizeof *pressure);
     double *block = calloc(2 * elements * ((size_t)materials + 1), sizeof *block);
     if (!pressure || !block) {
@@ -72,29 +75,37 @@ Pressure *pressure_create(const Robot *robot, int materials, double dt, MildErro
 }
 
 void pressure_destroy(Pressure *pressure) {
-    if (!pressure) return;
+    if (!pressure) {
+        return;
+    }
     free(pressure->block);
     free(pressure);
 }
 
-/* Adds the finished stance to its tally: element sums as they are, the path resampled over 0..100 % of the stance. */
+/* Adds the finished stance to its tally: element sums as they are, the path resampled over 0..100 %
+ * of the stance. */
 static void finish_stance(Pressure *pressure, int foot) {
     Stance *stance = &pressure->stance[foot];
     int samples = stance->samples;
-    if (stance->material >= 0 && samples >= pressure->min_samples && samples < pressure->max_samples) {
+    if (stance->material >= 0 && samples >= pressure->min_samples &&
+        samples < pressure->max_samples) {
         Tally *tally = &pressure->tally[stance->material][foot];
         for (int i = 0; i < mild_sole_elements(pressure->soles[foot]); i++) {
             tally->sum[i] += stance->sum[i];
-            if (stance->peak[i] > tally->peak[i]) tally->peak[i] = stance->peak[i];
+            if (stance->peak[i] > tally->peak[i]) {
+                tally->peak[i] = stance->peak[i];
+            }
         }
         tally->samples += samples;
         tally->stances++;
         for (int k = 0; k < PRESSURE_PATH; k++) {
             double at = (double)k * (samples - 1) / (PRESSURE_PATH - 1);
             int low = (int)at < samples - 1 ? (int)at : samples - 2;
-            for (int c = 0; c < 2; c++)
+            for (int c = 0; c < 2; c++) {
                 tally->path[k][c] +=
-                    stance->center[low][c] + (at - low) * (stance->center[low + 1][c] - stance->center[low][c]);
+                    stance->center[low][c] +
+                    (at - low) * (stance->center[low + 1][c] - stance->center[low][c]);
+            }
         }
     }
     stance->material = -1;
@@ -116,19 +127,26 @@ void pressure_observe(Pressure *pressure, const RobotSim *sim, const MildTerrain
         const double *x = mild_sole_x(sole), *y = mild_sole_y(sole);
         int elements = mild_sole_elements(sole);
         double force = 0, fx = 0, fy = 0;
-        for (int i = 0; i < elements; i++) force += normal[i], fx += normal[i] * x[i], fy += normal[i] * y[i];
+        for (int i = 0; i < elements; i++) {
+            force += normal[i], fx += normal[i] * x[i], fy += normal[i] * y[i];
+        }
         Stance *stance = &pressure->stance[f];
         if (force < STANCE_FORCE) {
-            if (stance->material != -1) finish_stance(pressure, f);
+            if (stance->material != -1) {
+                finish_stance(pressure, f);
+            }
             continue;
         }
         const double *center = robot_sim_foot(sim, f)->sole_center;
         int material = mild_terrain_material_at(terrain, center[0], center[1]);
-        if (stance->material == -1)
+        if (stance->material == -1) {
             start_stance(pressure, f, material);
-        else if (stance->material != material)
+        } else if (stance->material != material) {
             stance->material = -2;
-        if (stance->samples >= pressure->max_samples) continue;
+        }
+        if (stance->samples >= pressure->max_samples) {
+            continue;
+        }
         for (int i = 0; i < elements; i++) {
             stance->sum[i] += normal[i];
             stance->peak[i] = normal[i] > stance->peak[i] ? normal[i] : stance->peak[i];
@@ -141,38 +159,55 @@ void pressure_observe(Pressure *pressure, const RobotSim *sim, const MildTerrain
 
 int pressure_stances(const Pressure *pressure, int material) {
     int stances = 0;
-    for (int f = 0; f < ROBOT_FEET; f++) stances += pressure->tally[material][f].stances;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        stances += pressure->tally[material][f].stances;
+    }
     return stances;
 }
 
-static void write_foot(const Pressure *pressure, int material, int foot, const char *name, FILE *file) {
+static void write_foot(const Pressure *pressure, int material, int foot, const char *name,
+                       FILE *file) {
     static const char *const feet[ROBOT_FEET] = {"left", "right"};
     const MildSole *sole = pressure->soles[foot];
     const Tally *tally = &pressure->tally[material][foot];
     double kilopascal = 1e-3 / (mild_sole_pitch(sole) * mild_sole_pitch(sole));
-    for (int i = 0; i < mild_sole_elements(sole); i++)
-        fprintf(file, "%s,%s,element,%d,%.5f,%.5f,%.4f,%.4f\n", name, feet[foot], i, mild_sole_x(sole)[i],
-                mild_sole_y(sole)[i], kilopascal * tally->sum[i] / (double)tally->samples, kilopascal * tally->peak[i]);
-    for (int k = 0; k < PRESSURE_PATH; k++)
-        fprintf(file, "%s,%s,path,%d,%.5f,%.5f,,\n", name, feet[foot], 100 * k / (PRESSURE_PATH - 1),
-                tally->path[k][0] / tally->stances, tally->path[k][1] / tally->stances);
+    for (int i = 0; i < mild_sole_elements(sole); i++) {
+        fprintf(file, "%s,%s,element,%d,%.5f,%.5f,%.4f,%.4f\n", name, feet[foot], i,
+                mild_sole_x(sole)[i], mild_sole_y(sole)[i],
+                kilopascal * tally->sum[i] / (double)tally->samples, kilopascal * tally->peak[i]);
+    }
+    for (int k = 0; k < PRESSURE_PATH; k++) {
+        fprintf(file, "%s,%s,path,%d,%.5f,%.5f,,\n", name, feet[foot],
+                100 * k / (PRESSURE_PATH - 1), tally->path[k][0] / tally->stances,
+                tally->path[k][1] / tally->stances);
+    }
 }
 
-MildStatus pressure_write(const Pressure *pressure, const char *path, const char *const *names, MildError *error) {
+MildStatus pressure_write(const Pressure *pressure, const char *path, const char *const *names,
+                          MildError *error) {
     char temporary[1024];
-    if (snprintf(temporary, sizeof temporary, "%s.part", path) >= (int)sizeof temporary)
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "sole pressure: the path is longer than %d characters",
+    if (snprintf(temporary, sizeof temporary, "%s.part", path) >= (int)sizeof temporary) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "sole pressure: the path is longer than %d characters",
                          (int)sizeof temporary - 6);
+    }
     FILE *file = fopen(temporary, "w");
-    if (!file) return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", temporary, strerror(errno));
+    if (!file) {
+        return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", temporary, strerror(errno));
+    }
     fprintf(file, "ground,foot,what,index,x_m,y_m,mean_kpa,peak_kpa\n");
-    for (int m = 0; m < pressure->materials; m++)
-        for (int f = 0; f < ROBOT_FEET; f++)
-            if (pressure->tally[m][f].stances > 0) write_foot(pressure, m, f, names[m], file);
+    for (int m = 0; m < pressure->materials; m++) {
+        for (int f = 0; f < ROBOT_FEET; f++) {
+            if (pressure->tally[m][f].stances > 0) {
+                write_foot(pressure, m, f, names[m], file);
+            }
+        }
+    }
     int failed = ferror(file);
     failed = fclose(file) != 0 || failed;
     if (failed || rename(temporary, path) != 0) {
-        MildStatus status = mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", path, strerror(errno));
+        MildStatus status =
+            mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", path, strerror(errno));
         unlink(temporary);
         return status;
     }

@@ -5,7 +5,8 @@
 #include <string.h>
 
 #define MASK_PER_PITCH 4
-#define SOLE_MARGIN 0.005  /* [m] the surface gives way this far beside the sole, so that its edge stays visible */
+#define SOLE_MARGIN                                                                                \
+    0.005 /* [m] the surface gives way this far beside the sole, so that its edge stays visible */
 #define UNDER_SOLE 0.0015  /* [m] drawn gap below the sole against flicker */
 #define CHANGE_SEEN 0.0003 /* [m] smaller changes are not worth an upload */
 #define SHADE_DEPTH 0.030  /* [m] depth at which pressed ground is about as dark as it gets */
@@ -54,16 +55,23 @@ static const struct {
     const char *name;
     Look look;
 } looks[] = {
-    {"rubber", {{0.27F, 0.31F, 0.38F}, GRAIN_SPECKLE}},  {"foam60", {{0.44F, 0.56F, 0.70F}, GRAIN_GRID}},
-    {"foam45", {{0.82F, 0.78F, 0.66F}, GRAIN_GRID}},     {"foam28", {{0.82F, 0.58F, 0.52F}, GRAIN_GRID}},
-    {"foam25", {{0.70F, 0.60F, 0.76F}, GRAIN_GRID}},     {"grass", {{0.35F, 0.56F, 0.24F}, GRAIN_BLADES}},
-    {"sand_loose", {{0.76F, 0.62F, 0.40F}, GRAIN_FINE}}, {"sand_dense", {{0.69F, 0.53F, 0.35F}, GRAIN_FINE}},
+    {"rubber", {{0.27F, 0.31F, 0.38F}, GRAIN_SPECKLE}},
+    {"foam60", {{0.44F, 0.56F, 0.70F}, GRAIN_GRID}},
+    {"foam45", {{0.82F, 0.78F, 0.66F}, GRAIN_GRID}},
+    {"foam28", {{0.82F, 0.58F, 0.52F}, GRAIN_GRID}},
+    {"foam25", {{0.70F, 0.60F, 0.76F}, GRAIN_GRID}},
+    {"grass", {{0.35F, 0.56F, 0.24F}, GRAIN_BLADES}},
+    {"sand_loose", {{0.76F, 0.62F, 0.40F}, GRAIN_FINE}},
+    {"sand_dense", {{0.69F, 0.53F, 0.35F}, GRAIN_FINE}},
 };
 static const Look rigid_look = {{0.66F, 0.67F, 0.68F}, GRAIN_CHECKER};
 
 static Look look_of(const char *name, const MildMaterial *material) {
-    for (size_t i = 0; name && i < sizeof looks / sizeof *looks; i++)
-        if (strcmp(name, looks[i].name) == 0) return looks[i].look;
+    for (size_t i = 0; name && i < sizeof looks / sizeof *looks; i++) {
+        if (strcmp(name, looks[i].name) == 0) {
+            return looks[i].look;
+        }
+    }
     /* A ground of the user's own: elastic ones look like foam, plastic ones like sand. */
     return material->recovery > 0.5 ? looks[2].look : looks[6].look;
 }
@@ -83,7 +91,8 @@ static float noise(int px, int py, int width, int height, unsigned layer) {
     return (float)(h & 0xffffu) / 32767.5F - 1.0F;
 }
 
-/* Relative brightness of the undisturbed ground at a pixel; periodic in the tile so that tiles join. */
+/* Relative brightness of the undisturbed ground at a pixel; periodic in the tile so that tiles
+ * join. */
 static float grain_shade(Grain grain, int px, int py) {
     px = (px + TILE_INNER - RELIEF_TILE_MARGIN) % TILE_INNER;
     py = (py + TILE_INNER - RELIEF_TILE_MARGIN) % TILE_INNER;
@@ -91,10 +100,13 @@ static float grain_shade(Grain grain, int px, int py) {
     case GRAIN_FINE: return 1.0F + 0.10F * noise(px, py, 1, 1, 1) + 0.05F * noise(px, py, 4, 4, 2);
     case GRAIN_GRID: /* lines every 8 cm: a dent bends them */
         return (px % 15 == 0 || py % 15 == 0 ? 0.80F : 1.0F) + 0.03F * noise(px, py, 2, 2, 3);
-    case GRAIN_BLADES: return 1.0F + 0.22F * noise(px, py, 1, 4, 4) + 0.12F * noise(px, py, 4, 2, 5);
-    case GRAIN_SPECKLE: return noise(px, py, 2, 2, 6) > 0.86F ? 1.7F : 1.0F + 0.05F * noise(px, py, 1, 1, 7);
+    case GRAIN_BLADES:
+        return 1.0F + 0.22F * noise(px, py, 1, 4, 4) + 0.12F * noise(px, py, 4, 2, 5);
+    case GRAIN_SPECKLE:
+        return noise(px, py, 2, 2, 6) > 0.86F ? 1.7F : 1.0F + 0.05F * noise(px, py, 1, 1, 7);
     default: /* checker of half a tile */
-        return ((px / (TILE_INNER / 2) + py / (TILE_INNER / 2)) % 2 ? 0.94F : 1.0F) + 0.015F * noise(px, py, 1, 1, 8);
+        return ((px / (TILE_INNER / 2) + py / (TILE_INNER / 2)) % 2 ? 0.94F : 1.0F) +
+               0.015F * noise(px, py, 1, 1, 8);
     }
 }
 
@@ -124,29 +136,39 @@ static int mask_create(SoleMask *mask, const MildSole *sole) {
     mask->columns = (int)ceil((x_max - mask->x_min) / mask->step);
     mask->rows = (int)ceil((y_max - mask->y_min) / mask->step);
     mask->inside = calloc((size_t)mask->columns * (size_t)mask->rows, 1);
-    if (!mask->inside) return 0;
-    for (int r = 0; r < mask->rows; r++)
+    if (!mask->inside) {
+        return 0;
+    }
+    for (int r = 0; r < mask->rows; r++) {
         for (int c = 0; c < mask->columns; c++) {
-            double px = mask->x_min + (c + 0.5) * mask->step, py = mask->y_min + (r + 0.5) * mask->step;
-            for (int e = 0; e < elements; e++)
-                if (fabs(px - x[e]) < half && fabs(py - y[e]) < half) mask->inside[r * mask->columns + c] = 1;
+            double px = mask->x_min + (c + 0.5) * mask->step,
+                   py = mask->y_min + (r + 0.5) * mask->step;
+            for (int e = 0; e < elements; e++) {
+                if (fabs(px - x[e]) < half && fabs(py - y[e]) < half) {
+                    mask->inside[r * mask->columns + c] = 1;
+                }
+            }
         }
+    }
     return 1;
 }
 
-/* Depth of the foot's sole plane under the vertical through (x, y), NO_DEPTH beside the sole. The plane's points p have
- * n.(p - ankle) = z_sole, n the foot's z axis. */
+/* Depth of the foot's sole plane under the vertical through (x, y), NO_DEPTH beside the sole. The
+ * plane's points p have n.(p - ankle) = z_sole, n the foot's z axis. */
 static float sole_depth(const Relief *relief, int foot, double x, double y, double surface) {
     const SoleMask *mask = &relief->mask[foot];
     const double *p = relief->position[foot], *r = relief->rotation[foot];
     double dx = x - p[0], dy = y - p[1];
-    if (r[8] < 0.2) /* foot on its side */
+    if (r[8] < 0.2) { /* foot on its side */
         return NO_DEPTH;
+    }
     double dz = (mask->z - r[2] * dx - r[5] * dy) / r[8];
     double sx = r[0] * dx + r[3] * dy + r[6] * dz, sy = r[1] * dx + r[4] * dy + r[7] * dz;
     double fc = (sx - mask->x_min) / mask->step, fr = (sy - mask->y_min) / mask->step;
-    if (fc < 0 || fr < 0 || fc >= mask->columns || fr >= mask->rows || !mask->inside[(int)fr * mask->columns + (int)fc])
+    if (fc < 0 || fr < 0 || fc >= mask->columns || fr >= mask->rows ||
+        !mask->inside[(int)fr * mask->columns + (int)fc]) {
         return NO_DEPTH;
+    }
     return (float)(surface - (p[2] + dz) + UNDER_SOLE);
 }
 
@@ -161,17 +183,23 @@ static void mark(Relief *relief, int i, int j) {
     /* a vertex on an edge belongs to both neighbours */
     int c0 = i % RELIEF_TILE_CELLS == 0 && c1 > 0 ? c1 - 1 : c1,
         r0 = j % RELIEF_TILE_CELLS == 0 && r1 > 0 ? r1 - 1 : r1;
-    for (int r = r0; r <= r1 && r < relief->rows; r++)
-        for (int c = c0; c <= c1 && c < relief->columns; c++)
+    for (int r = r0; r <= r1 && r < relief->rows; r++) {
+        for (int c = c0; c <= c1 && c < relief->columns; c++) {
             relief->touched[r * relief->columns + c] = relief->dirty[r * relief->columns + c] = 1;
+        }
+    }
 }
 
 static void update_vertex(Relief *relief, int i, int j) {
     double x = relief->x0 + i * relief->cell, y = relief->y0 + j * relief->cell;
     size_t at = (size_t)j * (size_t)relief->nx + (size_t)i;
     float depth = NO_DEPTH;
-    for (int f = 0; f < relief->feet; f++) depth = fmaxf(depth, sole_depth(relief, f, x, y, (double)relief->base[at]));
-    if (depth <= (float)UNDER_SOLE && relief->peak[at] <= 0.0F) return;
+    for (int f = 0; f < relief->feet; f++) {
+        depth = fmaxf(depth, sole_depth(relief, f, x, y, (double)relief->base[at]));
+    }
+    if (depth <= (float)UNDER_SOLE && relief->peak[at] <= 0.0F) {
+        return;
+    }
     relief->peak[at] = fmaxf(relief->peak[at], depth);
     float left = (float)(1.0 - material_at(relief, x, y)->recovery) * relief->peak[at];
     float shown = fmaxf(left, fmaxf(depth, 0.0F));
@@ -185,7 +213,9 @@ static Box foot_box(const Relief *relief, int foot) {
     double reach = relief->mask[foot].reach;
     const double *p = relief->position[foot];
     Box box = {0, 0, 0, 0};
-    if (p[2] - reach > relief->high) return box;
+    if (p[2] - reach > relief->high) {
+        return box;
+    }
     double i0 = floor((p[0] - reach - relief->x0) / relief->cell),
            i1 = ceil((p[0] + reach - relief->x0) / relief->cell);
     double j0 = floor((p[1] - reach - relief->y0) / relief->cell),
@@ -196,12 +226,17 @@ static Box foot_box(const Relief *relief, int foot) {
 }
 
 static void update_box(Relief *relief, Box box) {
-    for (int j = box.j0; j < box.j1; j++)
-        for (int i = box.i0; i < box.i1; i++) update_vertex(relief, i, j);
+    for (int j = box.j0; j < box.j1; j++) {
+        for (int i = box.i0; i < box.i1; i++) {
+            update_vertex(relief, i, j);
+        }
+    }
 }
 
 void relief_press(Relief *relief, const double (*position)[3], const double (*rotation)[9]) {
-    if (relief->rigid) return;
+    if (relief->rigid) {
+        return;
+    }
     memcpy(relief->position, position, (size_t)relief->feet * sizeof *position);
     memcpy(relief->rotation, rotation, (size_t)relief->feet * sizeof *rotation);
     for (int f = 0; f < relief->feet; f++) {
@@ -223,45 +258,56 @@ static void find_materials(Relief *relief) {
             double x = center[0] + edge * ((k % 9) / 8.0 - 0.5) * 0.998,
                    y = center[1] + edge * ((k / 9) / 8.0 - 0.5) * 0.998;
             int m = relief->rigid ? RELIEF_RIGID : mild_terrain_material_at(&relief->terrain, x, y);
-            if (k == 0)
+            if (k == 0) {
                 first = m;
-            else if (m != first)
+            } else if (m != first) {
                 first = -2, k = 81;
+            }
         }
         relief->material[t] = (signed char)first;
     }
 }
 
 static int allocate(Relief *relief, const MildSole *const *soles) {
-    size_t vertices = (size_t)relief->nx * (size_t)relief->ny, tiles = (size_t)relief->columns * (size_t)relief->rows;
+    size_t vertices = (size_t)relief->nx * (size_t)relief->ny,
+           tiles = (size_t)relief->columns * (size_t)relief->rows;
     relief->peak = calloc(3 * vertices, sizeof *relief->peak);
     relief->touched = calloc(3 * tiles, 1);
-    if (!relief->peak || !relief->touched) return 0;
+    if (!relief->peak || !relief->touched) {
+        return 0;
+    }
     relief->shown = relief->peak + vertices;
     relief->base = relief->shown + vertices;
     relief->dirty = relief->touched + tiles;
     relief->material = (signed char *)(relief->dirty + tiles);
-    for (int f = 0; f < relief->feet; f++)
-        if (!mask_create(&relief->mask[f], soles[f])) return 0;
+    for (int f = 0; f < relief->feet; f++) {
+        if (!mask_create(&relief->mask[f], soles[f])) {
+            return 0;
+        }
+    }
     return 1;
 }
 
 static void find_heights(Relief *relief) {
     relief->low = INFINITY, relief->high = -INFINITY;
-    for (int j = 0; j < relief->ny; j++)
+    for (int j = 0; j < relief->ny; j++) {
         for (int i = 0; i < relief->nx; i++) {
-            double z = mild_terrain_height_at(&relief->terrain, relief->x0 + i * relief->cell, relief->y0 + j * relief->cell);
+            double z = mild_terrain_height_at(&relief->terrain, relief->x0 + i * relief->cell,
+                                              relief->y0 + j * relief->cell);
             relief->base[(size_t)j * (size_t)relief->nx + (size_t)i] = (float)z;
             relief->low = fmin(relief->low, z), relief->high = fmax(relief->high, z);
         }
+    }
 }
 
-Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const MildSole *const *soles, int feet,
-                      MildError *error) {
+Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain,
+                      const MildSole *const *soles, int feet, MildError *error) {
     double edge = RELIEF_TILE_CELLS * def->cell;
-    double columns = ceil((def->x_max - def->x_min) / edge), rows = ceil((def->y_max - def->y_min) / edge);
+    double columns = ceil((def->x_max - def->x_min) / edge),
+           rows = ceil((def->y_max - def->y_min) / edge);
     if (!(def->cell > 0) || !(columns >= 1 && columns * rows <= 20000 && rows >= 1)) {
-        mild_fail(error, MILD_ERROR_RANGE, "ground picture: area %g x %g m at %g m is empty or too large",
+        mild_fail(error, MILD_ERROR_RANGE,
+                  "ground picture: area %g x %g m at %g m is empty or too large",
                   def->x_max - def->x_min, def->y_max - def->y_min, def->cell);
         return NULL;
     }
@@ -271,13 +317,15 @@ Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const Mi
         return NULL;
     }
     relief->columns = (int)columns, relief->rows = (int)rows;
-    relief->nx = relief->columns * RELIEF_TILE_CELLS + 1, relief->ny = relief->rows * RELIEF_TILE_CELLS + 1;
+    relief->nx = relief->columns * RELIEF_TILE_CELLS + 1,
+    relief->ny = relief->rows * RELIEF_TILE_CELLS + 1;
     relief->x0 = def->x_min, relief->y0 = 0.5 * (def->y_min + def->y_max - rows * edge);
     relief->cell = def->cell, relief->rigid = def->rigid, relief->feet = feet;
     relief->terrain = *terrain;
     relief->uneven = terrain->map && !mild_map_is_level(terrain->map);
-    for (int m = 0; m < terrain->material_count; m++)
+    for (int m = 0; m < terrain->material_count; m++) {
         relief->look[m] = look_of(def->names ? def->names[m] : NULL, &terrain->materials[m]);
+    }
     relief->look[MILD_MATERIALS_MAX] = rigid_look;
     if (!allocate(relief, soles)) {
         mild_fail(error, MILD_ERROR_MEMORY, "ground picture: out of memory");
@@ -290,8 +338,12 @@ Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const Mi
 }
 
 void relief_destroy(Relief *relief) {
-    if (!relief) return;
-    for (int f = 0; f < relief->feet; f++) free(relief->mask[f].inside);
+    if (!relief) {
+        return;
+    }
+    for (int f = 0; f < relief->feet; f++) {
+        free(relief->mask[f].inside);
+    }
     free(relief->peak);
     free(relief->touched);
     free(relief);
@@ -354,10 +406,14 @@ static const float *tile_row(const Relief *relief, int tile, int row) {
 }
 
 void relief_tile_heights(const Relief *relief, int tile, double depth, int step, float *heights) {
-    float low = (float)(relief->low - depth), scale = 1.0F / (float)(relief->high - relief->low + depth);
+    float low = (float)(relief->low - depth),
+          scale = 1.0F / (float)(relief->high - relief->low + depth);
     for (int j = 0; j < RELIEF_TILE_VERTICES; j += step) {
-        const float *shown = tile_row(relief, tile, j), *base = relief->base + (shown - relief->shown);
-        for (int i = 0; i < RELIEF_TILE_VERTICES; i += step) *heights++ = fmaxf(0.0F, (base[i] - shown[i] - low) * scale);
+        const float *shown = tile_row(relief, tile, j),
+                    *base = relief->base + (shown - relief->shown);
+        for (int i = 0; i < RELIEF_TILE_VERTICES; i += step) {
+            *heights++ = fmaxf(0.0F, (base[i] - shown[i] - low) * scale);
+        }
     }
 }
 
@@ -375,13 +431,15 @@ void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb) {
     relief_tile_center(relief, tile, center);
     for (int py = 0; py < RELIEF_TILE_PIXELS; py++) {
         double v = inner(RELIEF_TILE_PIXELS - 1 - py); /* pictures run down, y runs up */
-        const float *low = tile_row(relief, tile, (int)(v * RELIEF_TILE_CELLS)), *high = low + relief->nx;
+        const float *low = tile_row(relief, tile, (int)(v * RELIEF_TILE_CELLS)),
+                    *high = low + relief->nx;
         for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3) {
             double u = inner(px);
             int i = (int)(u * RELIEF_TILE_CELLS);
             float depth = 0.25F * (low[i] + low[i + 1] + high[i] + high[i + 1]);
             double x = center[0] + (u - 0.5) * edge, y = center[1] + (v - 0.5) * edge;
-            int material = relief->rigid ? RELIEF_RIGID : mild_terrain_material_at(&relief->terrain, x, y);
+            int material =
+                relief->rigid ? RELIEF_RIGID : mild_terrain_material_at(&relief->terrain, x, y);
             float dark = 0.42F * (1.0F - expf(-depth / (float)SHADE_DEPTH));
             paint(look_at(relief, material), px, py, dark, rgb);
         }
@@ -389,8 +447,11 @@ void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb) {
 }
 
 void relief_flat_pixels(const Relief *relief, int material, unsigned char *rgb) {
-    for (int py = 0; py < RELIEF_TILE_PIXELS; py++)
-        for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3) paint(look_at(relief, material), px, py, 0.0F, rgb);
+    for (int py = 0; py < RELIEF_TILE_PIXELS; py++) {
+        for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3) {
+            paint(look_at(relief, material), px, py, 0.0F, rgb);
+        }
+    }
 }
 
 void relief_material_color(const Relief *relief, int material, float rgb[3]) {

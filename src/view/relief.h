@@ -1,6 +1,6 @@
-/* The ground one can see: a height map under the walk that the soles press in and that springs back by its material's
- * `recovery`. Drawing only: physics never reads it. The map is cut into square tiles so that a renderer refreshes only
- * those that changed. Knows no renderer. */
+/* The ground one can see: a height map under the walk that the soles press in and that springs back
+ * by its material's `recovery`. Drawing only: physics never reads it. The map is cut into square
+ * tiles so that a renderer refreshes only those that changed. Knows no renderer. */
 #ifndef VIEW_RELIEF_H
 #define VIEW_RELIEF_H
 
@@ -9,24 +9,26 @@
 #define RELIEF_TILE_CELLS 64
 #define RELIEF_TILE_VERTICES (RELIEF_TILE_CELLS + 1)
 #define RELIEF_TILE_PIXELS 128
-#define RELIEF_TILE_MARGIN                                                                                             \
-    4                     /* [pixels] of a tile's picture beyond its edges, so that filtering takes nothing from afar */
+#define RELIEF_TILE_MARGIN                                                                         \
+    4 /* [pixels] of a tile's picture beyond its edges, so that filtering takes nothing from afar  \
+       */
 #define RELIEF_RIGID (-1) /* material index of ground that never yields */
 
 typedef struct {
     double x_min, x_max, y_min, y_max; /* [m] area drawn; rounded up to whole tiles */
     double cell;                       /* [m] distance of vertices */
     int rigid;                         /* bool: nothing yields */
-    const char *const *names;          /* [materials] preset names, for colours; NULL entries allowed */
+    const char *const *names; /* [materials] preset names, for colours; NULL entries allowed */
 } ReliefDef;
 
 typedef struct Relief Relief;
 
 /* soles: [feet], borrowed. The terrain is copied, its map borrowed. */
-Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain, const MildSole *const *soles, int feet,
-                      MildError *error);
+Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain,
+                      const MildSole *const *soles, int feet, MildError *error);
 void relief_destroy(Relief *relief);
-/* Move the surface to the soles' present pose: position [feet][3] and rotation [feet][9] of the ankles. */
+/* Move the surface to the soles' present pose: position [feet][3] and rotation [feet][9] of the
+ * ankles. */
 void relief_press(Relief *relief, const double (*position)[3], const double (*rotation)[9]);
 
 int relief_tile_columns(const Relief *relief); /* along x */
@@ -38,12 +40,14 @@ int relief_is_uneven(const Relief *relief);
 double relief_low(const Relief *relief);
 double relief_high(const Relief *relief);
 double relief_height_at(const Relief *relief, double x, double y);
-/* The one material of the tile (RELIEF_RIGID where nothing yields), or -2 when several meet in it. */
+/* The one material of the tile (RELIEF_RIGID where nothing yields), or -2 when several meet in it.
+ */
 int relief_tile_material(const Relief *relief, int tile);
 int relief_tile_touched(const Relief *relief, int tile);
 /* Whether the tile changed since this was last asked. */
 int relief_tile_take_dirty(Relief *relief, int tile);
-/* Every step-th vertex (a divisor of RELIEF_TILE_CELLS), rows along y: 1 at relief_high, 0 at `depth` below relief_low. */
+/* Every step-th vertex (a divisor of RELIEF_TILE_CELLS), rows along y: 1 at relief_high, 0 at
+ * `depth` below relief_low. */
 void relief_tile_heights(const Relief *relief, int tile, double depth, int step, float *heights);
 /* [PIXELS][PIXELS][3] first row at y max, margin included; pressed ground is darker. */
 void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb);

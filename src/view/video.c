@@ -30,11 +30,17 @@ static void last_error_line(int file, char *line, size_t size) {
     line[0] = '\0';
     off_t length = lseek(file, 0, SEEK_END);
     off_t start = length > (off_t)sizeof text - 1 ? length - (off_t)sizeof text + 1 : 0;
-    if (length <= 0 || lseek(file, start, SEEK_SET) < 0) return;
+    if (length <= 0 || lseek(file, start, SEEK_SET) < 0) {
+        return;
+    }
     ssize_t got = read(file, text, sizeof text - 1);
-    if (got <= 0) return;
+    if (got <= 0) {
+        return;
+    }
     text[got] = '\0';
-    while (got > 0 && (text[got - 1] == '\n' || text[got - 1] == '\r')) text[--got] = '\0';
+    while (got > 0 && (text[got - 1] == '\n' || text[got - 1] == '\r')) {
+        text[--got] = '\0';
+    }
     const char *last = strrchr(text, '\n');
     last = last ? last + 1 : text;
     size_t keep = strlen(last) < size ? strlen(last) : size - 1;
@@ -44,17 +50,22 @@ static void last_error_line(int file, char *line, size_t size) {
 
 static int error_file(void) {
     FILE *file = tmpfile();
-    if (!file) return -1;
+    if (!file) {
+        return -1;
+    }
     int descriptor = fcntl(fileno(file), F_DUPFD_CLOEXEC, 3);
     fclose(file);
     return descriptor;
 }
 
-/* Frames travel over a socket pair: unlike a pipe it can be written without a SIGPIPE when ffmpeg dies. */
+/* Frames travel over a socket pair: unlike a pipe it can be written without a SIGPIPE when ffmpeg
+ * dies. */
 static MildStatus spawn_ffmpeg(Video *video, double fps, MildError *error) {
     int ends[2];
-    if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0)
-        return mild_fail(error, MILD_ERROR_IO, "video %s: no pipe: %s", video->path, strerror(errno));
+    if (socketpair(AF_UNIX, SOCK_STREAM, 0, ends) != 0) {
+        return mild_fail(error, MILD_ERROR_IO, "video %s: no pipe: %s", video->path,
+                         strerror(errno));
+    }
     fcntl(ends[0], F_SETFD, FD_CLOEXEC);
     char size[32], rate[32];
     snprintf(size, sizeof size, "%dx%d", video->width, video->height);
@@ -94,7 +105,9 @@ static MildStatus spawn_ffmpeg(Video *video, double fps, MildError *error) {
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDIN_FILENO);
     posix_spawn_file_actions_adddup2(&actions, video->errors, STDERR_FILENO);
     posix_spawn_file_actions_adddup2(&actions, video->errors, STDOUT_FILENO);
-    if (ends[1] != STDIN_FILENO) posix_spawn_file_actions_addclose(&actions, ends[1]);
+    if (ends[1] != STDIN_FILENO) {
+        posix_spawn_file_actions_addclose(&actions, ends[1]);
+    }
     /* A process group of its own: Ctrl-C ends our loop, and ffmpeg then gets to finish the file. */
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
@@ -105,7 +118,8 @@ static MildStatus spawn_ffmpeg(Video *video, double fps, MildError *error) {
     close(ends[1]);
     if (failure) {
         close(ends[0]);
-        return mild_fail(error, MILD_ERROR_IO, "video %s: cannot start ffmpeg (%s); install it: apt-get install ffmpeg",
+        return mild_fail(error, MILD_ERROR_IO,
+                         "video %s: cannot start ffmpeg (%s); install it: apt-get install ffmpeg",
                          video->path, strerror(failure));
     }
     video->pipe = ends[0];
@@ -114,8 +128,9 @@ static MildStatus spawn_ffmpeg(Video *video, double fps, MildError *error) {
 
 Video *video_open(const char *path, int width, int height, double fps, MildError *error) {
     if (width <= 0 || height <= 0 || width % 2 || height % 2 || !(fps > 0)) {
-        mild_fail(error, MILD_ERROR_ARGUMENT, "video %s: size %d x %d must be positive and even, fps %g positive", path,
-                  width, height, fps);
+        mild_fail(error, MILD_ERROR_ARGUMENT,
+                  "video %s: size %d x %d must be positive and even, fps %g positive", path, width,
+                  height, fps);
         return NULL;
     }
     Video *video = calloc(1, sizeof *video);
@@ -125,7 +140,8 @@ Video *video_open(const char *path, int width, int height, double fps, MildError
     }
     video->width = width, video->height = height, video->pipe = -1;
     if (snprintf(video->path, sizeof video->path, "%s", path) >= (int)sizeof video->path) {
-        mild_fail(error, MILD_ERROR_ARGUMENT, "video: the path is longer than %d characters", VIDEO_PATH - 1);
+        mild_fail(error, MILD_ERROR_ARGUMENT, "video: the path is longer than %d characters",
+                  VIDEO_PATH - 1);
         free(video);
         return NULL;
     }
@@ -151,7 +167,9 @@ static int finish_ffmpeg(Video *video) {
     int code = 0;
     while (waitpid(video->child, &code, 0) < 0 && errno == EINTR)
         ;
-    if (WIFEXITED(code) && WEXITSTATUS(code) == 0) return 1;
+    if (WIFEXITED(code) && WEXITSTATUS(code) == 0) {
+        return 1;
+    }
     char line[200];
     last_error_line(video->errors, line, sizeof line);
     video->status = MILD_ERROR_IO;
@@ -160,15 +178,20 @@ static int finish_ffmpeg(Video *video) {
 }
 
 MildStatus video_frame(Video *video, const unsigned char *rgb, MildError *error) {
-    if (video->status != MILD_OK) return mild_fail(error, video->status, "video %s: %s", video->path, video->text);
+    if (video->status != MILD_OK) {
+        return mild_fail(error, video->status, "video %s: %s", video->path, video->text);
+    }
     size_t left = (size_t)video->width * (size_t)video->height * 3;
     while (left > 0) {
         ssize_t sent = send(video->pipe, rgb, left, MSG_NOSIGNAL);
-        if (sent < 0 && errno == EINTR) continue;
+        if (sent < 0 && errno == EINTR) {
+            continue;
+        }
         if (sent <= 0) {
             if (finish_ffmpeg(video)) { /* it left early and called that success */
                 video->status = MILD_ERROR_IO;
-                snprintf(video->text, sizeof video->text, "ffmpeg stopped reading after %d frames", video->frames);
+                snprintf(video->text, sizeof video->text, "ffmpeg stopped reading after %d frames",
+                         video->frames);
             }
             return mild_fail(error, video->status, "video %s: %s", video->path, video->text);
         }
@@ -180,14 +203,22 @@ MildStatus video_frame(Video *video, const unsigned char *rgb, MildError *error)
 }
 
 MildStatus video_close(Video *video, MildError *error) {
-    if (!video) return MILD_OK;
-    if (video->pipe >= 0) finish_ffmpeg(video);
+    if (!video) {
+        return MILD_OK;
+    }
+    if (video->pipe >= 0) {
+        finish_ffmpeg(video);
+    }
     MildStatus status = video->status;
-    if (status != MILD_OK)
+    if (status != MILD_OK) {
         mild_fail(error, status, "video %s: %s", video->path, video->text);
-    else if (rename(video->temporary, video->path) != 0)
-        status = mild_fail(error, MILD_ERROR_IO, "video %s: cannot rename: %s", video->path, strerror(errno));
-    if (status != MILD_OK) unlink(video->temporary);
+    } else if (rename(video->temporary, video->path) != 0) {
+        status = mild_fail(error, MILD_ERROR_IO, "video %s: cannot rename: %s", video->path,
+                           strerror(errno));
+    }
+    if (status != MILD_OK) {
+        unlink(video->temporary);
+    }
     close(video->errors);
     free(video);
     return status;

@@ -10,15 +10,17 @@
 #include "view/inset.h"
 #include "view/relief.h"
 
-#define VIEW_CELL 0.01      /* [m] vertices of the visible ground */
-#define VIEW_OVERLAP 1.0015 /* [-] tiles are drawn this much larger, so that no crack opens between them */
-#define VIEW_SLOTS 96       /* tiles that can be deformed or of mixed material at once */
+#define VIEW_CELL 0.01 /* [m] vertices of the visible ground */
+#define VIEW_OVERLAP                                                                               \
+    1.0015 /* [-] tiles are drawn this much larger, so that no crack opens between them */
+#define VIEW_SLOTS 96         /* tiles that can be deformed or of mixed material at once */
 #define VIEW_SLOTS_UNEVEN 192 /* the same where every tile has a shape */
-#define VIEW_COARSE 4       /* vertices along an edge of a tile without prints are drawn this much farther apart */
-#define VIEW_DEPTH 0.20     /* [m] deepest print that can be drawn */
-#define VIEW_RADIUS 9.0     /* [m] tiles farther from the robot are drawn as plain floor */
+#define VIEW_COARSE                                                                                \
+    4 /* vertices along an edge of a tile without prints are drawn this much farther apart */
+#define VIEW_DEPTH 0.20        /* [m] deepest print that can be drawn */
+#define VIEW_RADIUS 9.0        /* [m] tiles farther from the robot are drawn as plain floor */
 #define VIEW_RADIUS_UNEVEN 4.0 /* [m] */
-#define VIEW_FLOOR 40.0     /* [m] half size of the floor beyond */
+#define VIEW_FLOOR 40.0        /* [m] half size of the floor beyond */
 #define VIEW_GEOMS 4000
 #define VIEW_CAMERA_TIME 0.35      /* [s] the camera's lag */
 #define VIEW_LOOK_HEIGHT 0.50      /* [m] the camera looks at this height */
@@ -39,7 +41,8 @@ typedef struct {
 
 struct View {
     ViewDef def;
-    const MildSole *const *soles, *const *rasters; /* what the feet have; their shape, for the prints */
+    const MildSole *const *soles,
+        *const *rasters; /* what the feet have; their shape, for the prints */
     MildTerrain terrain;
     GlContext *gl;
     Window *window;
@@ -96,7 +99,8 @@ static void add_material(mjSpec *spec, const char *name, double repeat, int unif
 static void add_ground(mjSpec *spec, const Relief *relief, int slots) {
     double edge = relief_tile_edge(relief);
     static const float level[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES] = {0};
-    const double share = 1.0 - 2.0 * RELIEF_TILE_MARGIN / RELIEF_TILE_PIXELS; /* of the picture that a tile shows */
+    const double share =
+        1.0 - 2.0 * RELIEF_TILE_MARGIN / RELIEF_TILE_PIXELS; /* of the picture that a tile shows */
     char name[32];
     for (int i = 0; i < slots; i++) {
         snprintf(name, sizeof name, "view_tile_%d", i);
@@ -129,11 +133,14 @@ static mjModel *make_model(const ViewDef *def, const Relief *relief, int slots, 
     spec->visual.quality.shadowsize = 2048;
     add_ground(spec, relief, slots);
     mjModel *model = mj_compile(spec, NULL);
-    if (!model)
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: cannot add the visible ground: %s", def->xml, mjs_getError(spec));
+    if (!model) {
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: cannot add the visible ground: %s", def->xml,
+                  mjs_getError(spec));
+    }
     mj_deleteSpec(spec);
     if (model && (model->nq != ROBOT_NQ || model->nv != ROBOT_NV)) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: has %d coordinates and %d speeds, the robot %d and %d", def->xml,
+        mild_fail(error, MILD_ERROR_FORMAT,
+                  "%s: has %d coordinates and %d speeds, the robot %d and %d", def->xml,
                   (int)model->nq, (int)model->nv, ROBOT_NQ, ROBOT_NV);
         mj_deleteModel(model);
         return NULL;
@@ -151,35 +158,43 @@ static void index_model(View *view) {
     char name[32];
     for (int i = 0; i < view->slot_count; i++) {
         snprintf(name, sizeof name, "view_tile_%d", i);
-        view->slots[i] = (Slot){-1, mj_name2id(model, mjOBJ_HFIELD, name), mj_name2id(model, mjOBJ_TEXTURE, name),
+        view->slots[i] = (Slot){-1, mj_name2id(model, mjOBJ_HFIELD, name),
+                                mj_name2id(model, mjOBJ_TEXTURE, name),
                                 mj_name2id(model, mjOBJ_MATERIAL, name), 0};
     }
     for (int m = 0; m <= MILD_MATERIALS_MAX; m++) {
         snprintf(name, sizeof name, "view_flat_%d", m);
         view->flat_material[m] = mj_name2id(model, mjOBJ_MATERIAL, name);
         int id = m == MILD_MATERIALS_MAX ? RELIEF_RIGID : m;
-        if (id == RELIEF_RIGID || m < view->terrain.material_count)
-            relief_flat_pixels(view->relief, id, texture_pixels(model, mj_name2id(model, mjOBJ_TEXTURE, name)));
+        if (id == RELIEF_RIGID || m < view->terrain.material_count) {
+            relief_flat_pixels(view->relief, id,
+                               texture_pixels(model, mj_name2id(model, mjOBJ_TEXTURE, name)));
+        }
     }
     view->floor_material = mj_name2id(model, mjOBJ_MATERIAL, "view_floor");
     relief_flat_pixels(view->relief, RELIEF_RIGID,
                        texture_pixels(model, mj_name2id(model, mjOBJ_TEXTURE, "view_floor")));
-    for (int g = 0; g < model->ngeom; g++)
-        if (model->geom_type[g] == mjGEOM_PLANE || model->geom_type[g] == mjGEOM_HFIELD)
+    for (int g = 0; g < model->ngeom; g++) {
+        if (model->geom_type[g] == mjGEOM_PLANE || model->geom_type[g] == mjGEOM_HFIELD) {
             model->geom_group[g] = VIEW_HIDDEN_GROUP;
+        }
+    }
 }
 
 /* ---- create, destroy ---- */
 
 static int open_context(View *view, MildError *error) {
-    if (view->def.window)
-        return (view->window = window_create(view->def.width, view->def.height, "mild", error)) != NULL;
+    if (view->def.window) {
+        return (view->window = window_create(view->def.width, view->def.height, "mild", error)) !=
+               NULL;
+    }
     return (view->gl = gl_create(error)) != NULL;
 }
 
 static Relief *make_relief(const View *view, MildError *error) {
     const ViewDef *def = &view->def;
-    ReliefDef relief = {def->x_min, def->x_max, def->y_min, def->y_max, VIEW_CELL, def->rigid, def->names};
+    ReliefDef relief = {def->x_min, def->x_max, def->y_min, def->y_max,
+                        VIEW_CELL,  def->rigid, def->names};
     return relief_create(&relief, &view->terrain, view->rasters, ROBOT_FEET, error);
 }
 
@@ -192,8 +207,12 @@ static int make_buffers(View *view) {
     view->pixels = malloc(frame);
     view->flipped = malloc(frame);
     view->data = mj_makeData(view->model);
-    if (!view->slot_of || !view->inset || !view->pixels || !view->flipped || !view->data) return 0;
-    for (int t = 0; t < tiles; t++) view->slot_of[t] = -1;
+    if (!view->slot_of || !view->inset || !view->pixels || !view->flipped || !view->data) {
+        return 0;
+    }
+    for (int t = 0; t < tiles; t++) {
+        view->slot_of[t] = -1;
+    }
     return 1;
 }
 
@@ -203,7 +222,8 @@ static void make_scene(View *view) {
     view->scene_made = 1;
     mjv_defaultOption(&view->option);
     mjr_defaultContext(&view->context);
-    mjr_makeContext(view->model, &view->context, view->def.height >= 700 ? mjFONTSCALE_150 : mjFONTSCALE_100);
+    mjr_makeContext(view->model, &view->context,
+                    view->def.height >= 700 ? mjFONTSCALE_150 : mjFONTSCALE_100);
     view->context_made = 1;
     mjr_setBuffer(view->window ? mjFB_WINDOW : mjFB_OFFSCREEN, &view->context);
     mjv_defaultCamera(&view->camera);
@@ -216,10 +236,13 @@ static void make_scene(View *view) {
     view->jumped = 1;
 }
 
-View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain, MildError *error) {
-    if (def->width < 64 || def->height < 64 || def->width > 7680 || def->height > 4320 || !(def->rate > 0)) {
-        mild_fail(error, MILD_ERROR_RANGE, "view: %d x %d pixels at %g frames/s is outside 64..7680 x 64..4320",
-                  def->width, def->height, def->rate);
+View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain,
+                  MildError *error) {
+    if (def->width < 64 || def->height < 64 || def->width > 7680 || def->height > 4320 ||
+        !(def->rate > 0)) {
+        mild_fail(error, MILD_ERROR_RANGE,
+                  "view: %d x %d pixels at %g frames/s is outside 64..7680 x 64..4320", def->width,
+                  def->height, def->rate);
         return NULL;
     }
     View *view = calloc(1, sizeof *view);
@@ -232,7 +255,8 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->rasters = robot_rasters(robot);
     view->terrain = *terrain;
     view->relief = make_relief(view, error);
-    view->slot_count = view->relief && relief_is_uneven(view->relief) ? VIEW_SLOTS_UNEVEN : VIEW_SLOTS;
+    view->slot_count =
+        view->relief && relief_is_uneven(view->relief) ? VIEW_SLOTS_UNEVEN : VIEW_SLOTS;
     view->model = view->relief ? make_model(def, view->relief, view->slot_count, error) : NULL;
     if (!view->model || !open_context(view, error)) {
         view_destroy(view);
@@ -249,13 +273,23 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
 }
 
 void view_destroy(View *view) {
-    if (!view) return;
-    if (view->context_made) mjr_freeContext(&view->context);
-    if (view->scene_made) mjv_freeScene(&view->scene);
+    if (!view) {
+        return;
+    }
+    if (view->context_made) {
+        mjr_freeContext(&view->context);
+    }
+    if (view->scene_made) {
+        mjv_freeScene(&view->scene);
+    }
     gl_destroy(view->gl);
     window_destroy(view->window);
-    if (view->data) mj_deleteData(view->data);
-    if (view->model) mj_deleteModel(view->model);
+    if (view->data) {
+        mj_deleteData(view->data);
+    }
+    if (view->model) {
+        mj_deleteModel(view->model);
+    }
     relief_destroy(view->relief);
     free(view->slot_of);
     free(view->inset);
@@ -267,11 +301,15 @@ void view_destroy(View *view) {
 MildStatus view_reset(View *view, const MildTerrain *terrain, MildError *error) {
     view->terrain = *terrain;
     Relief *relief = make_relief(view, error);
-    if (!relief) return error ? error->status : MILD_ERROR_MEMORY;
+    if (!relief) {
+        return error ? error->status : MILD_ERROR_MEMORY;
+    }
     relief_destroy(view->relief);
     view->relief = relief;
     for (int i = 0; i < view->slot_count; i++) {
-        if (view->slots[i].tile >= 0) view->slot_of[view->slots[i].tile] = -1;
+        if (view->slots[i].tile >= 0) {
+            view->slot_of[view->slots[i].tile] = -1;
+        }
         view->slots[i].tile = -1;
     }
     view->jumped = 1;
@@ -300,7 +338,8 @@ static double tile_distance(const View *view, int tile) {
     return hypot(center[0] - view->camera.lookat[0], center[1] - view->camera.lookat[1]);
 }
 
-/* A slot for the tile: a free one, else that of the tile farthest away (its heights stay in the relief). */
+/* A slot for the tile: a free one, else that of the tile farthest away (its heights stay in the
+ * relief). */
 static Slot *slot_take(View *view, int tile) {
     Slot *best = NULL;
     double farthest = tile_distance(view, tile);
@@ -315,8 +354,12 @@ static Slot *slot_take(View *view, int tile) {
             farthest = tile_distance(view, slot->tile);
         }
     }
-    if (!best) return NULL;
-    if (best->tile >= 0) view->slot_of[best->tile] = -1;
+    if (!best) {
+        return NULL;
+    }
+    if (best->tile >= 0) {
+        view->slot_of[best->tile] = -1;
+    }
     best->tile = tile;
     best->drawn_once = 0;
     view->slot_of[tile] = (int)(best - view->slots);
@@ -325,13 +368,16 @@ static Slot *slot_take(View *view, int tile) {
 
 static void slot_refresh(View *view, Slot *slot) {
     mjModel *model = view->model;
-    if (!relief_tile_take_dirty(view->relief, slot->tile) && slot->drawn_once) return;
+    if (!relief_tile_take_dirty(view->relief, slot->tile) && slot->drawn_once) {
+        return;
+    }
     relief_tile_pixels(view->relief, slot->tile, texture_pixels(model, slot->texture));
     mjr_uploadTexture(model, &view->context, slot->texture);
     int touched = relief_tile_touched(view->relief, slot->tile);
     if (touched || relief_is_uneven(view->relief)) {
         int step = touched ? 1 : VIEW_COARSE;
-        model->hfield_nrow[slot->hfield] = model->hfield_ncol[slot->hfield] = RELIEF_TILE_CELLS / step + 1;
+        model->hfield_nrow[slot->hfield] = model->hfield_ncol[slot->hfield] =
+            RELIEF_TILE_CELLS / step + 1;
         relief_tile_heights(view->relief, slot->tile, VIEW_DEPTH, step,
                             model->hfield_data + model->hfield_adr[slot->hfield]);
         mjr_uploadHField(model, &view->context, slot->hfield);
@@ -339,9 +385,11 @@ static void slot_refresh(View *view, Slot *slot) {
     slot->drawn_once = 1;
 }
 
-static mjvGeom *add_geom(View *view, int type, double sx, double sy, double sz, const double position[3],
-                         int material) {
-    if (view->scene.ngeom >= view->scene.maxgeom) return NULL;
+static mjvGeom *add_geom(View *view, int type, double sx, double sy, double sz,
+                         const double position[3], int material) {
+    if (view->scene.ngeom >= view->scene.maxgeom) {
+        return NULL;
+    }
     mjvGeom *geom = &view->scene.geoms[view->scene.ngeom++];
     const float white[4] = {1, 1, 1, 1};
     const double size[3] = {sx, sy, sz};
@@ -356,18 +404,24 @@ static mjvGeom *add_geom(View *view, int type, double sx, double sy, double sz, 
 static void draw_tile(View *view, int tile) {
     double edge = relief_tile_edge(view->relief), center[2];
     relief_tile_center(view->relief, tile, center);
-    double position[3] = {center[0], center[1], relief_height_at(view->relief, center[0], center[1])};
+    double position[3] = {center[0], center[1],
+                          relief_height_at(view->relief, center[0], center[1])};
     int material = relief_tile_material(view->relief, tile);
     int touched = relief_tile_touched(view->relief, tile) || relief_is_uneven(view->relief);
     Slot *slot = NULL;
     if (touched || material == -2) {
         slot = view->slot_of[tile] >= 0 ? &view->slots[view->slot_of[tile]] : slot_take(view, tile);
-        if (slot) slot_refresh(view, slot);
+        if (slot) {
+            slot_refresh(view, slot);
+        }
     }
     if (slot && touched) {
         position[2] = relief_low(view->relief) - VIEW_DEPTH;
-        mjvGeom *geom = add_geom(view, mjGEOM_HFIELD, 0.5 * edge, 0.5 * edge, VIEW_DEPTH, position, slot->material);
-        if (geom) geom->dataid = slot->hfield;
+        mjvGeom *geom = add_geom(view, mjGEOM_HFIELD, 0.5 * edge, 0.5 * edge, VIEW_DEPTH, position,
+                                 slot->material);
+        if (geom) {
+            geom->dataid = slot->hfield;
+        }
         return;
     }
     int look = material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material < 0 ? 0 : material;
@@ -377,7 +431,8 @@ static void draw_tile(View *view, int tile) {
 
 /* Four plates around the tiles: the floor must not lie under them, prints would show through. */
 static void draw_floor(View *view, double x0, double x1, double y0, double y1) {
-    double z = relief_low(view->relief), far = VIEW_FLOOR, cx = 0.5 * (x0 + x1), cy = 0.5 * (y0 + y1);
+    double z = relief_low(view->relief), far = VIEW_FLOOR, cx = 0.5 * (x0 + x1),
+           cy = 0.5 * (y0 + y1);
     double left[3] = {x0 - far, cy, z}, right[3] = {x1 + far, cy, z}, below[3] = {cx, y0 - far, z},
            above[3] = {cx, y1 + far, z};
     double wide = 0.5 * (x1 - x0) + 2 * far, high = 0.5 * (y1 - y0);
@@ -394,7 +449,8 @@ static int clamp_tile(double at, int count) {
 static void draw_ground(View *view) {
     const Relief *relief = view->relief;
     int columns = relief_tile_columns(relief), rows = relief_tile_rows(relief);
-    double edge = relief_tile_edge(relief), origin[2], radius = relief_is_uneven(relief) ? VIEW_RADIUS_UNEVEN : VIEW_RADIUS;
+    double edge = relief_tile_edge(relief), origin[2],
+           radius = relief_is_uneven(relief) ? VIEW_RADIUS_UNEVEN : VIEW_RADIUS;
     relief_tile_center(relief, 0, origin);
     origin[0] -= 0.5 * edge, origin[1] -= 0.5 * edge;
     const double *look = view->camera.lookat;
@@ -402,9 +458,13 @@ static void draw_ground(View *view) {
     int c1 = clamp_tile(ceil((look[0] + radius - origin[0]) / edge), columns);
     int r0 = clamp_tile(floor((look[1] - radius - origin[1]) / edge), rows);
     int r1 = clamp_tile(ceil((look[1] + radius - origin[1]) / edge), rows);
-    for (int r = r0; r < r1; r++)
-        for (int c = c0; c < c1; c++) draw_tile(view, r * columns + c);
-    draw_floor(view, origin[0] + c0 * edge, origin[0] + c1 * edge, origin[1] + r0 * edge, origin[1] + r1 * edge);
+    for (int r = r0; r < r1; r++) {
+        for (int c = c0; c < c1; c++) {
+            draw_tile(view, r * columns + c);
+        }
+    }
+    draw_floor(view, origin[0] + c0 * edge, origin[0] + c1 * edge, origin[1] + r0 * edge,
+               origin[1] + r1 * edge);
 }
 
 /* ---- frame ---- */
@@ -416,18 +476,24 @@ static double camera_share(const View *view, double lag) {
 
 static void follow(View *view, const double *base) {
     double share = view->jumped ? 1.0 : camera_share(view, VIEW_CAMERA_TIME);
-    double target[3] = {base[0], base[1], relief_height_at(view->relief, base[0], base[1]) + VIEW_LOOK_HEIGHT};
-    for (int k = 0; k < 3; k++) view->camera.lookat[k] += share * (target[k] - view->camera.lookat[k]);
+    double target[3] = {base[0], base[1],
+                        relief_height_at(view->relief, base[0], base[1]) + VIEW_LOOK_HEIGHT};
+    for (int k = 0; k < 3; k++) {
+        view->camera.lookat[k] += share * (target[k] - view->camera.lookat[k]);
+    }
 }
 
 static void draw_arrows(View *view, const RobotSim *sim) {
     for (int f = 0; f < ROBOT_FEET && view->def.force_arrow > 0; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         double size = mju_norm3(foot->force);
-        if (size < VIEW_FORCE_SEEN || view->scene.ngeom >= view->scene.maxgeom) continue;
+        if (size < VIEW_FORCE_SEEN || view->scene.ngeom >= view->scene.maxgeom) {
+            continue;
+        }
         double from[3], to[3];
         mju_copy3(from, foot->sole_center);
-        if (foot->result.contacts > 0) { /* the centre of pressure; the engine's own contact reports none */
+        if (foot->result.contacts >
+            0) { /* the centre of pressure; the engine's own contact reports none */
             from[0] = foot->position[0] + foot->result.zmp_sole[0];
             from[1] = foot->position[1] + foot->result.zmp_sole[1];
         }
@@ -441,33 +507,43 @@ static void draw_arrows(View *view, const RobotSim *sim) {
 }
 
 static const char *ground_name(const View *view, const RobotSim *sim) {
-    if (view->def.rigid) return "rigid";
-    const double *left = robot_sim_foot(sim, 0)->sole_center, *right = robot_sim_foot(sim, 1)->sole_center;
-    int m = mild_terrain_material_at(&view->terrain, 0.5 * (left[0] + right[0]), 0.5 * (left[1] + right[1]));
+    if (view->def.rigid) {
+        return "rigid";
+    }
+    const double *left = robot_sim_foot(sim, 0)->sole_center,
+                 *right = robot_sim_foot(sim, 1)->sole_center;
+    int m = mild_terrain_material_at(&view->terrain, 0.5 * (left[0] + right[0]),
+                                     0.5 * (left[1] + right[1]));
     return view->def.names && view->def.names[m] ? view->def.names[m] : "ground";
 }
 
 static void draw_text(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
-    const char *keys =
-        info->fell ? "ground\ncommand\nspeed\nsinkage L R\ntime\n" : "ground\ncommand\nspeed\nsinkage L R\ntime";
+    const char *keys = info->fell ? "ground\ncommand\nspeed\nsinkage L R\ntime\n"
+                                  : "ground\ncommand\nspeed\nsinkage L R\ntime";
     char values[240];
     double depth[ROBOT_FEET];
-    for (int f = 0; f < ROBOT_FEET; f++) depth[f] = 1e3 * fmax(0.0, -robot_sim_foot(sim, f)->sole_height);
-    snprintf(values, sizeof values, "%s\n%.2f m/s\n%.2f m/s\n%.0f  %.0f mm\n%.1f s%s", ground_name(view, sim),
-             info->command[0], info->speed, depth[0], depth[1], info->time, info->fell ? "\nfell" : "");
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        depth[f] = 1e3 * fmax(0.0, -robot_sim_foot(sim, f)->sole_height);
+    }
+    snprintf(values, sizeof values, "%s\n%.2f m/s\n%.2f m/s\n%.0f  %.0f mm\n%.1f s%s",
+             ground_name(view, sim), info->command[0], info->speed, depth[0], depth[1], info->time,
+             info->fell ? "\nfell" : "");
     mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, viewport, keys, values, &view->context);
 }
 
 static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     const double *normal[ROBOT_FEET];
-    for (int f = 0; f < ROBOT_FEET; f++) normal[f] = mild_scratch_elements(robot_sim_scratch(sim), f).normal;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        normal[f] = mild_scratch_elements(robot_sim_scratch(sim), f).normal;
+    }
     const InsetLayout *layout = &view->layout;
     inset_draw(layout, view->soles, ROBOT_FEET, normal, view->def.pressure_max, view->inset);
     mjrRect box = {viewport.width - layout->width - 10, 10, layout->width, layout->height};
     mjr_drawPixels(view->inset, NULL, box, &view->context);
     char text[32];
     mjrRect title = {box.left, box.bottom + layout->title_bottom, box.width, layout->title_height};
-    mjr_label(title, mjFONT_NORMAL, "sole pressure, kPa", 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
+    mjr_label(title, mjFONT_NORMAL, "sole pressure, kPa", 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F,
+              &view->context);
     snprintf(text, sizeof text, "%.0f", view->def.pressure_max / 1e3);
     mjrRect label = {box.left + layout->bar_right, box.bottom + layout->bar_top - VIEW_LABEL,
                      layout->width - layout->bar_right, VIEW_LABEL};
@@ -480,24 +556,31 @@ static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
 static void move_lights(View *view) {
     for (int i = 0; i < view->scene.nlight; i++) {
         mjvLight *light = &view->scene.lights[i];
-        if (light->headlight || light->type != mjLIGHT_DIRECTIONAL) continue;
+        if (light->headlight || light->type != mjLIGHT_DIRECTIONAL) {
+            continue;
+        }
         light->pos[0] += (float)view->camera.lookat[0];
         light->pos[1] += (float)view->camera.lookat[1];
     }
 }
 
-/* The feet once more from near the ground, in the upper right corner: there one sees them sink. No shadows: a second
- * shadow pass costs more than the rest of this small picture. */
+/* The feet once more from near the ground, in the upper right corner: there one sees them sink. No
+ * shadows: a second shadow pass costs more than the rest of this small picture. */
 static void draw_closeup(View *view, mjrRect viewport, const RobotSim *sim) {
-    const double *left = robot_sim_foot(sim, 0)->sole_center, *right = robot_sim_foot(sim, 1)->sole_center;
+    const double *left = robot_sim_foot(sim, 0)->sole_center,
+                 *right = robot_sim_foot(sim, 1)->sole_center;
     double share = view->jumped ? 1.0 : camera_share(view, VIEW_CLOSE_TIME);
     view->jumped = 0;
     mjvCamera *camera = &view->close;
-    for (int k = 0; k < 2; k++) camera->lookat[k] += share * (0.5 * (left[k] + right[k]) - camera->lookat[k]);
-    camera->lookat[2] = relief_height_at(view->relief, camera->lookat[0], camera->lookat[1]) + VIEW_CLOSE_HEIGHT;
+    for (int k = 0; k < 2; k++) {
+        camera->lookat[k] += share * (0.5 * (left[k] + right[k]) - camera->lookat[k]);
+    }
+    camera->lookat[2] =
+        relief_height_at(view->relief, camera->lookat[0], camera->lookat[1]) + VIEW_CLOSE_HEIGHT;
     camera->azimuth = view->camera.azimuth - VIEW_CLOSE_TURN;
-    mjrRect box = {viewport.width - (viewport.width * 2) / 5 - 10, viewport.height - viewport.height / 3 - 10,
-                   (viewport.width * 2) / 5, viewport.height / 3};
+    mjrRect box = {viewport.width - (viewport.width * 2) / 5 - 10,
+                   viewport.height - viewport.height / 3 - 10, (viewport.width * 2) / 5,
+                   viewport.height / 3};
     mjrRect frame = {box.left - 2, box.bottom - 2, box.width + 4, box.height + 4};
     mjr_rectangle(frame, 0.12F, 0.13F, 0.15F, 1);
     mjv_updateCamera(view->model, view->data, camera, &view->scene);
@@ -514,21 +597,32 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     mj_camlight(view->model, view->data);
     view_observe(view, sim);
     follow(view, qpos);
-    mjv_updateScene(view->model, view->data, &view->option, NULL, &view->camera, mjCAT_ALL, &view->scene);
+    mjv_updateScene(view->model, view->data, &view->option, NULL, &view->camera, mjCAT_ALL,
+                    &view->scene);
     move_lights(view);
     draw_ground(view);
     draw_arrows(view, sim);
 
     mjrRect viewport = {0, 0, view->def.width, view->def.height};
-    if (view->window) window_size(view->window, &viewport.width, &viewport.height);
+    if (view->window) {
+        window_size(view->window, &viewport.width, &viewport.height);
+    }
     mjr_render(viewport, &view->scene, &view->context);
-    if (view->def.closeup) draw_closeup(view, viewport, sim);
+    if (view->def.closeup) {
+        draw_closeup(view, viewport, sim);
+    }
     draw_text(view, viewport, sim, info);
-    if (!view->def.rigid) draw_inset(view, viewport, sim);
-    if (view->window) return;
+    if (!view->def.rigid) {
+        draw_inset(view, viewport, sim);
+    }
+    if (view->window) {
+        return;
+    }
     mjr_readPixels(view->flipped, NULL, viewport, &view->context);
     size_t row = (size_t)viewport.width * 3, rows = (size_t)viewport.height;
-    for (size_t r = 0; r < rows; r++) memcpy(view->pixels + r * row, view->flipped + (rows - 1 - r) * row, row);
+    for (size_t r = 0; r < rows; r++) {
+        memcpy(view->pixels + r * row, view->flipped + (rows - 1 - r) * row, row);
+    }
 }
 
 const unsigned char *view_pixels(const View *view) {
@@ -538,6 +632,7 @@ const unsigned char *view_pixels(const View *view) {
 void view_show(View *view, WindowInput *input) {
     window_show(view->window, input);
     view->camera.azimuth += input->turn * 180.0 / mjPI;
-    view->camera.elevation = fmin(fmax(view->camera.elevation + input->lift * 180.0 / mjPI, -89), -2);
+    view->camera.elevation =
+        fmin(fmax(view->camera.elevation + input->lift * 180.0 / mjPI, -89), -2);
     view->camera.distance = fmin(fmax(view->camera.distance * exp(-input->zoom), 0.5), 15);
 }

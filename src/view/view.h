@@ -1,6 +1,6 @@
-/* Pictures of a robot on its ground: offscreen (for videos) or in a window. The soft surface is drawn as a height map
- * that the soles press in; sole pressure in the lower right corner, text in the upper left. One per process is enough;
- * create, use and destroy it on one thread. */
+/* Pictures of a robot on its ground: offscreen (for videos) or in a window. The soft surface is
+ * drawn as a height map that the soles press in; sole pressure in the lower right corner, text in
+ * the upper left. One per process is enough; create, use and destroy it on one thread. */
 #ifndef VIEW_VIEW_H
 #define VIEW_VIEW_H
 
@@ -8,16 +8,16 @@
 #include "view/window.h"
 
 typedef struct {
-    const char *xml;                     /* the robot's MJCF, as given to robot_create */
-    int width, height;                   /* [pixels] */
-    double rate;                         /* [1/s] frames */
-    int window;                          /* bool: show in a window; otherwise view_pixels */
-    int rigid;                           /* bool: the ground never yields */
-    double x_min, x_max, y_min, y_max;   /* [m] ground drawn as such; a plain floor beyond */
-    const char *const *names;            /* [materials of the terrain] for colours and text; NULL: unnamed */
-    double pressure_max;                 /* [Pa] top of the pressure scale */
-    double force_arrow;                  /* [m/N] length of the ground reaction arrows; 0: none */
-    int closeup;                         /* bool: the feet from near the ground, in the upper right corner */
+    const char *xml;                   /* the robot's MJCF, as given to robot_create */
+    int width, height;                 /* [pixels] */
+    double rate;                       /* [1/s] frames */
+    int window;                        /* bool: show in a window; otherwise view_pixels */
+    int rigid;                         /* bool: the ground never yields */
+    double x_min, x_max, y_min, y_max; /* [m] ground drawn as such; a plain floor beyond */
+    const char *const *names; /* [materials of the terrain] for colours and text; NULL: unnamed */
+    double pressure_max;      /* [Pa] top of the pressure scale */
+    double force_arrow;       /* [m/N] length of the ground reaction arrows; 0: none */
+    int closeup;              /* bool: the feet from near the ground, in the upper right corner */
     double azimuth, elevation, distance; /* [deg], [deg], [m] of the camera about the robot */
 } ViewDef;
 ViewDef view_def_default(void);
@@ -31,11 +31,13 @@ typedef struct {
 } ViewInfo;
 
 typedef struct View View;
-View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain, MildError *error);
+View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *terrain,
+                  MildError *error);
 void view_destroy(View *view);
 const char *view_backend(const View *view); /* "EGL", "OSMesa" or "GLFW" */
 
-/* Moves the visible ground to the feet. Call it every policy step or so: a print made between two frames must stay. */
+/* Moves the visible ground to the feet. Call it every policy step or so: a print made between two
+ * frames must stay. */
 void view_observe(View *view, const RobotSim *sim);
 /* Draws one frame. */
 void view_frame(View *view, const RobotSim *sim, const ViewInfo *info);
@@ -43,7 +45,8 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info);
 const unsigned char *view_pixels(const View *view);
 /* Window only: shows the frame and returns keys. */
 void view_show(View *view, WindowInput *input);
-/* A new episode on the same course: the ground is smooth again and the camera jumps to the robot. */
+/* A new episode on the same course: the ground is smooth again and the camera jumps to the robot.
+ */
 MildStatus view_reset(View *view, const MildTerrain *terrain, MildError *error);
 
 #endif

@@ -24,7 +24,9 @@ int window_available(void) {
 static void on_key(GLFWwindow *handle, int key, int scancode, int action, int modifiers) {
     (void)scancode;
     (void)modifiers;
-    if (action == GLFW_RELEASE) return;
+    if (action == GLFW_RELEASE) {
+        return;
+    }
     WindowInput *input = &((Window *)glfwGetWindowUserPointer(handle))->input;
     switch (key) {
     case GLFW_KEY_ESCAPE: input->quit = 1; break;
@@ -45,7 +47,9 @@ static void on_key(GLFWwindow *handle, int key, int scancode, int action, int mo
 static void on_button(GLFWwindow *handle, int button, int action, int modifiers) {
     (void)modifiers;
     Window *window = glfwGetWindowUserPointer(handle);
-    if (button == GLFW_MOUSE_BUTTON_LEFT) window->dragging = action == GLFW_PRESS;
+    if (button == GLFW_MOUSE_BUTTON_LEFT) {
+        window->dragging = action == GLFW_PRESS;
+    }
     glfwGetCursorPos(handle, &window->mouse_x, &window->mouse_y);
 }
 
@@ -70,9 +74,12 @@ Window *window_create(int width, int height, const char *title, MildError *error
     }
     Window *window = calloc(1, sizeof *window);
     glfwWindowHint(GLFW_SAMPLES, 4);
-    if (window) window->handle = glfwCreateWindow(width, height, title, NULL, NULL);
+    if (window) {
+        window->handle = glfwCreateWindow(width, height, title, NULL, NULL);
+    }
     if (!window || !window->handle) {
-        mild_fail(error, MILD_ERROR_IO, "window: the display gives no OpenGL window; use --video FILE.mp4 instead");
+        mild_fail(error, MILD_ERROR_IO,
+                  "window: the display gives no OpenGL window; use --video FILE.mp4 instead");
         free(window);
         glfwTerminate();
         return NULL;
@@ -89,7 +96,9 @@ Window *window_create(int width, int height, const char *title, MildError *error
 }
 
 void window_destroy(Window *window) {
-    if (!window) return;
+    if (!window) {
+        return;
+    }
     glfwDestroyWindow(window->handle);
     glfwTerminate();
     free(window);
@@ -102,7 +111,9 @@ void window_size(Window *window, int *width, int *height) {
 void window_show(Window *window, WindowInput *input) {
     glfwSwapBuffers(window->handle);
     glfwPollEvents();
-    if (glfwWindowShouldClose(window->handle)) window->input.quit = 1;
+    if (glfwWindowShouldClose(window->handle)) {
+        window->input.quit = 1;
+    }
     *input = window->input;
     window->input.reset = 0;
     window->input.turn = window->input.lift = window->input.zoom = 0;
@@ -119,9 +130,10 @@ Window *window_create(int width, int height, const char *title, MildError *error
     (void)width;
     (void)height;
     (void)title;
-    mild_fail(error, MILD_ERROR_IO,
-              "window: this program was built without GLFW (apt-get install libglfw3-dev, then rebuild); "
-              "use --video FILE.mp4 instead");
+    mild_fail(
+        error, MILD_ERROR_IO,
+        "window: this program was built without GLFW (apt-get install libglfw3-dev, then rebuild); "
+        "use --video FILE.mp4 instead");
     return NULL;
 }
 

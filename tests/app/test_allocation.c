@@ -1,6 +1,7 @@
-/* Memory runs out at the n-th allocation of our own code, for every n, while something is created or read: an error that says
- * so each time, nothing leaked. The linker wraps the allocator (tests/CMakeLists.txt), so this runs under the address
- * sanitizer too; what MuJoCo and oneDNN allocate inside is theirs. */
+/* Memory runs out at the n-th allocation of our own code, for every n, while something is created
+ * or read: an error that says so each time, nothing leaked. The linker wraps the allocator
+ * (tests/CMakeLists.txt), so this runs under the address sanitizer too; what MuJoCo and oneDNN
+ * allocate inside is theirs. */
 #include <math.h>
 #include <pthread.h>
 #include <setjmp.h>
@@ -49,7 +50,9 @@ static int fails(void) {
 
 static void *take(void *block) {
     pthread_mutex_lock(&lock);
-    if (block && live_count < LIVE_MAX) live[live_count++] = block;
+    if (block && live_count < LIVE_MAX) {
+        live[live_count++] = block;
+    }
     pthread_mutex_unlock(&lock);
     return block;
 }
@@ -57,8 +60,12 @@ static void *take(void *block) {
 static void give(void *block) {
     pthread_mutex_lock(&lock);
     int i = live_count - 1;
-    while (i >= 0 && live[i] != block) i--;
-    if (i >= 0) live[i] = live[--live_count];
+    while (i >= 0 && live[i] != block) {
+        i--;
+    }
+    if (i >= 0) {
+        live[i] = live[--live_count];
+    }
     pthread_mutex_unlock(&lock);
 }
 
@@ -75,7 +82,9 @@ void *__wrap_aligned_alloc(size_t alignment, size_t size) {
 }
 
 void *__wrap_realloc(void *block, size_t size) {
-    if (fails()) return NULL;
+    if (fails()) {
+        return NULL;
+    }
     give(block);
     return take(__real_realloc(block, size));
 }
@@ -95,7 +104,8 @@ static MildSoleDef plate_def(void) {
 
 static int attempt_sole(MildError *error) {
     MildSoleDef def = plate_def();
-    MildSole *sole = mild_sole_create(&def, error), *middle = sole ? mild_sole_concentric(sole, error) : NULL;
+    MildSole *sole = mild_sole_create(&def, error),
+             *middle = sole ? mild_sole_concentric(sole, error) : NULL;
     int made = middle != NULL;
     mild_sole_destroy(middle);
     mild_sole_destroy(sole);
@@ -141,7 +151,9 @@ static int attempt_controller(MildError *error) {
 
 static int attempt_record(MildError *error) {
     char text[2000] = "depth_m,force_n\n";
-    for (int i = 0; i < 40; i++) snprintf(text + strlen(text), 30, "%g,%g\n", 1e-3 * i, 5.0 * i);
+    for (int i = 0; i < 40; i++) {
+        snprintf(text + strlen(text), 30, "%g,%g\n", 1e-3 * i, 5.0 * i);
+    }
     FILE *file = fmemopen(text, strlen(text), "r");
     assert_non_null(file);
     FitPoint *points = NULL;
@@ -174,10 +186,17 @@ static void fail_each(const char *name, Attempt attempt) {
         int made = attempt(&error);
         met = fail_at < 0;
         fail_at = -1;
-        if (live_count != before) fail_msg("%s: allocation %d failing leaks %d blocks", name, n, live_count - before);
-        if (made == met) fail_msg("%s: allocation %d failing: %s", name, n, made ? "created all the same" : error.text);
-        if (!made && (error.status != MILD_ERROR_MEMORY || !error.text[0]))
-            fail_msg("%s: allocation %d failing says: '%s' (%d)", name, n, error.text, (int)error.status);
+        if (live_count != before) {
+            fail_msg("%s: allocation %d failing leaks %d blocks", name, n, live_count - before);
+        }
+        if (made == met) {
+            fail_msg("%s: allocation %d failing: %s", name, n,
+                     made ? "created all the same" : error.text);
+        }
+        if (!made && (error.status != MILD_ERROR_MEMORY || !error.text[0])) {
+            fail_msg("%s: allocation %d failing says: '%s' (%d)", name, n, error.text,
+                     (int)error.status);
+        }
     }
     print_message("%-10s %3d allocations, each failed once\n", name, n - 1);
 }

@@ -38,7 +38,8 @@ typedef struct {
 } Fixture;
 
 static Fixture fixture(void) {
-    return (Fixture){.sample = {.stiffness = 1, .count = 2, .name = "a"}, .material = mild_material_default()};
+    return (Fixture){.sample = {.stiffness = 1, .count = 2, .name = "a"},
+                     .material = mild_material_default()};
 }
 
 static void bind(Fixture *f) {
@@ -47,7 +48,9 @@ static void bind(Fixture *f) {
 }
 
 static void assert_text(const char *text, const char *part) {
-    if (!strstr(text, part)) fail_msg("'%s' does not hold '%s'", text, part);
+    if (!strstr(text, part)) {
+        fail_msg("'%s' does not hold '%s'", text, part);
+    }
 }
 
 static void test_reads_every_type(void **state) {
@@ -57,7 +60,8 @@ static void test_reads_every_type(void **state) {
     const char *text =
         "\xef\xbb\xbf; remark\n# remark, longer than any line inih takes: "
         "0123456789012345678901234567890123456789012345678901234"
-        "56789012345678901234567890123456789012345678901234567890123456789012345678901234567890123456789012345678\n"
+        "567890123456789012345678901234567890123456789012345678901234567890123456789012345678901234"
+        "56789012345678\n"
         "[sample]\n  stiffness = 2.5 ; remark\n\tpair: -0.5, 0.5 # remark\r\n"
         "count=7\n\n  on = true\nseed = 18446744073709551615\nname = sand\n[ground]\nk_pen=500";
     assert_int_equal(config_read_text(f.sections, 2, text, "x.ini", 0, &f.error), MILD_OK);
@@ -72,7 +76,8 @@ static void test_mistakes(void **state) {
     const struct {
         const char *text, *message[3];
     } cases[] = {
-        {"[sample]\nstifness = 2", {"x.ini:2:", "unknown key 'sample.stifness'", "'sample.stiffness'"}},
+        {"[sample]\nstifness = 2",
+         {"x.ini:2:", "unknown key 'sample.stifness'", "'sample.stiffness'"}},
         {"[sample]\nk_pen = 2", {"x.ini:2:", "unknown key 'sample.k_pen'", "'ground.k_pen'"}},
         {"\n[sampel]\n", {"x.ini:2:", "unknown section 'sampel'", "'sample'"}},
         {"[sample]\ncount = 11", {"x.ini:2:", "sample.count", "1 .. 10"}},
@@ -92,8 +97,11 @@ static void test_mistakes(void **state) {
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         Fixture f = fixture();
         bind(&f);
-        assert_int_not_equal(config_read_text(f.sections, 2, cases[i].text, "x.ini", 0, &f.error), MILD_OK);
-        for (int m = 0; m < 3; m++) assert_text(f.error.text, cases[i].message[m]);
+        assert_int_not_equal(config_read_text(f.sections, 2, cases[i].text, "x.ini", 0, &f.error),
+                             MILD_OK);
+        for (int m = 0; m < 3; m++) {
+            assert_text(f.error.text, cases[i].message[m]);
+        }
         assert_null(strchr(f.error.text, '\n'));
     }
 }
@@ -112,9 +120,10 @@ static void test_missing_key_of_complete_file(void **state) {
     (void)state;
     Fixture f = fixture();
     bind(&f);
-    assert_int_not_equal(config_read_text(f.sections, 2, "[sample]\nstiffness=1\npair=0 1\ncount=1\non=0\nseed=1\n",
-                                          "x.ini", 1, &f.error),
-                         MILD_OK);
+    assert_int_not_equal(
+        config_read_text(f.sections, 2, "[sample]\nstiffness=1\npair=0 1\ncount=1\non=0\nseed=1\n",
+                         "x.ini", 1, &f.error),
+        MILD_OK);
     assert_text(f.error.text, "'sample.name' is missing");
 }
 
@@ -141,8 +150,12 @@ static void test_round_trip(void **state) {
     (void)state;
     Fixture f = fixture(), g = fixture();
     bind(&f);
-    f.sample = (Sample){
-        .stiffness = 0.1 + 0.2, .pair = {-1.0 / 3, 1e-17}, .count = 9, .on = 1, .seed = UINT64_MAX, .name = "sand"};
+    f.sample = (Sample){.stiffness = 0.1 + 0.2,
+                        .pair = {-1.0 / 3, 1e-17},
+                        .count = 9,
+                        .on = 1,
+                        .seed = UINT64_MAX,
+                        .name = "sand"};
     f.material.sigma_cone = 123456.789012345678;
     for (int comments = 0; comments < 2; comments++) {
         char *text = config_text(f.sections, 2, comments);
@@ -164,7 +177,8 @@ static void test_missing_file(void **state) {
     assert_int_not_equal(config_read(f.sections, 2, "/", 0, &f.error), MILD_OK);
 }
 
-/* The file is what the program prints: a default lives in one place, and a stale file is caught here. */
+/* The file is what the program prints: a default lives in one place, and a stale file is caught
+ * here. */
 static void test_default_ini(void **state) {
     (void)state;
     ExperimentDef def = experiment_def_default(), read = experiment_def_default();
@@ -172,13 +186,15 @@ static void test_default_ini(void **state) {
     experiment_sections(&def, sections);
     experiment_sections(&read, read_sections);
     MildError error = {0};
-    if (config_read(read_sections, EXPERIMENT_SECTIONS, MILD_SOURCE_DIR "/configs/default.ini", 1, &error) != MILD_OK) {
+    if (config_read(read_sections, EXPERIMENT_SECTIONS, MILD_SOURCE_DIR "/configs/default.ini", 1,
+                    &error) != MILD_OK) {
         fail_msg("%s; regenerate with: build/mild info config > configs/default.ini", error.text);
     }
     char *ours = config_text(sections, EXPERIMENT_SECTIONS, 0),
          *theirs = config_text(read_sections, EXPERIMENT_SECTIONS, 0);
     if (strcmp(ours, theirs) != 0) {
-        fail_msg("configs/default.ini differs from the defaults; regenerate with: build/mild info config > "
+        fail_msg("configs/default.ini differs from the defaults; regenerate with: build/mild info "
+                 "config > "
                  "configs/default.ini");
     }
     free(ours);
@@ -193,9 +209,11 @@ static void test_keys_are_unique(void **state) {
     experiment_sections(&def, sections);
     for (int s = 0; s < EXPERIMENT_SECTIONS; s++) {
         for (int i = 0; i < sections[s].count; i++) {
-            const MildField *first =
-                mild_field_find(sections[s].fields, sections[s].count, sections[s].fields[i].name, NULL);
-            if (first != &sections[s].fields[i]) fail_msg("key %s.%s stands twice", sections[s].name, first->name);
+            const MildField *first = mild_field_find(sections[s].fields, sections[s].count,
+                                                     sections[s].fields[i].name, NULL);
+            if (first != &sections[s].fields[i]) {
+                fail_msg("key %s.%s stands twice", sections[s].name, first->name);
+            }
         }
     }
 }
@@ -212,7 +230,8 @@ static void test_layers(void **state) {
     MildError error = {0};
     const char *const overrides[] = {"train.seed=6"};
     assert_int_equal(experiment_read(&def, path, overrides, 1, &error), MILD_OK);
-    assert_true(def.train.envs == 8 && def.train.seed == 6 && def.task.reward.weight[REWARD_slip] == -0.5);
+    assert_true(def.train.envs == 8 && def.train.seed == 6 &&
+                def.task.reward.weight[REWARD_slip] == -0.5);
     assert_int_equal(def.train.keep_checkpoints, train_def_default().keep_checkpoints);
     const char *const crossed[] = {"ppo.learning_rate_min=0.1", "ppo.learning_rate_max=0.01"};
     assert_int_not_equal(experiment_read(&def, path, crossed, 2, &error), MILD_OK);
@@ -222,11 +241,16 @@ static void test_layers(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_reads_every_type), cmocka_unit_test(test_mistakes),
-        cmocka_unit_test(test_long_line),        cmocka_unit_test(test_missing_key_of_complete_file),
-        cmocka_unit_test(test_overrides),        cmocka_unit_test(test_round_trip),
-        cmocka_unit_test(test_missing_file),     cmocka_unit_test(test_default_ini),
-        cmocka_unit_test(test_keys_are_unique),  cmocka_unit_test(test_layers),
+        cmocka_unit_test(test_reads_every_type),
+        cmocka_unit_test(test_mistakes),
+        cmocka_unit_test(test_long_line),
+        cmocka_unit_test(test_missing_key_of_complete_file),
+        cmocka_unit_test(test_overrides),
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_missing_file),
+        cmocka_unit_test(test_default_ini),
+        cmocka_unit_test(test_keys_are_unique),
+        cmocka_unit_test(test_layers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

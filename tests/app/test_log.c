@@ -1,4 +1,5 @@
-/* The run log: CSV that survives a kill, TensorBoard records whose frames check; files written whole or not at all. */
+/* The run log: CSV that survives a kill, TensorBoard records whose frames check; files written
+ * whole or not at all. */
 #include <dirent.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -30,9 +31,13 @@ static int remove_folder(void **state) {
     char path[PATH_SIZE];
     DIR *dir = opendir(folder);
     for (struct dirent *entry; dir && (entry = readdir(dir));) {
-        if (entry->d_name[0] != '.' && path_join(folder, entry->d_name, path, NULL) == MILD_OK) remove(path);
+        if (entry->d_name[0] != '.' && path_join(folder, entry->d_name, path, NULL) == MILD_OK) {
+            remove(path);
+        }
     }
-    if (dir) closedir(dir);
+    if (dir) {
+        closedir(dir);
+    }
     return rmdir(folder);
 }
 
@@ -48,8 +53,9 @@ static size_t read_file(const char *path, char *data, size_t size) {
 static void test_crc32c(void **state) {
     (void)state;
     static const unsigned char zeros[32] = {0};
-    assert_int_equal(events_crc32c("123456789", 9), 0xe3069283u); /* the check value of the CRC catalogue */
-    assert_int_equal(events_crc32c(zeros, 32), 0x8a9136aau);      /* RFC 3720, appendix B.4 */
+    assert_int_equal(events_crc32c("123456789", 9),
+                     0xe3069283u); /* the check value of the CRC catalogue */
+    assert_int_equal(events_crc32c(zeros, 32), 0x8a9136aau); /* RFC 3720, appendix B.4 */
 }
 
 static void test_csv_resume(void **state) {
@@ -60,7 +66,9 @@ static void test_csv_resume(void **state) {
     path_join(folder, "log.csv", path, NULL);
     Log *log = log_open(folder, columns, 2, -1, &error);
     assert_non_null(log);
-    for (int i = 1; i <= 4; i++) assert_int_equal(log_row(log, i, (double[]){0.5 * i, 1e9}, &error), MILD_OK);
+    for (int i = 1; i <= 4; i++) {
+        assert_int_equal(log_row(log, i, (double[]){0.5 * i, 1e9}, &error), MILD_OK);
+    }
     log_close(log);
     FILE *torn = fopen(path, "a"); /* killed in the middle of a row */
     fputs("5,2.5", torn);
@@ -77,7 +85,8 @@ static void test_csv_resume(void **state) {
 }
 
 static uint32_t little_endian(const unsigned char *bytes) {
-    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+    return (uint32_t)bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 |
+           (uint32_t)bytes[3] << 24;
 }
 
 static uint32_t masked(uint32_t crc) {
@@ -108,8 +117,11 @@ static void test_records(void **state) {
         const unsigned char *record = (const unsigned char *)data + at;
         uint32_t size = little_endian(record);
         assert_int_equal(little_endian(record + 8), masked(events_crc32c(record, 8)));
-        assert_int_equal(little_endian(record + 12 + size), masked(events_crc32c(record + 12, size)));
-        for (uint32_t i = 12; i + 6 < 12 + size; i++) scalars += memcmp(record + i, "group/", 6) == 0;
+        assert_int_equal(little_endian(record + 12 + size),
+                         masked(events_crc32c(record + 12, size)));
+        for (uint32_t i = 12; i + 6 < 12 + size; i++) {
+            scalars += memcmp(record + i, "group/", 6) == 0;
+        }
         at += 16 + size;
     }
     assert_int_equal(at, length);
@@ -144,7 +156,8 @@ static void test_text(void **state) {
     assert_string_equal(text_duration(3725, text, sizeof text), "1 h 02 min");
     assert_string_equal(text_duration(65, text, sizeof text), "1 min 05 s");
     double number;
-    assert_false(text_double("", &number) || text_double("1x", &number) || text_double("nan", &number));
+    assert_false(text_double("", &number) || text_double("1x", &number) ||
+                 text_double("nan", &number));
 }
 
 int main(void) {

@@ -26,21 +26,27 @@ static void press(const PressDef *def) {
     MildSole *plate = press_plate_create(0.2, 0.1, &error);
     assert_non_null(plate);
     press_result_close(&result);
-    if (press_run(def, plate, &result, &error) != MILD_OK) fail_msg("%s", error.text);
+    if (press_run(def, plate, &result, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
     mild_sole_destroy(plate);
 }
 
 static const PressRow *turn_of(int way) {
     const PressRow *last = result.rows;
-    for (int i = 0; i < result.count; i++)
-        if (result.rows[i].way == way) last = &result.rows[i];
+    for (int i = 0; i < result.count; i++) {
+        if (result.rows[i].way == way) {
+            last = &result.rows[i];
+        }
+    }
     return last;
 }
 
 /* F_g + c_d m_a' w^2 of all elements: at constant speed the added mass does not accelerate. */
 static double law(const MildMaterial *material, double depth, double speed) {
     MildElementLaw element = mild_element_law(material, 0.0195, depth);
-    return result.elements * (element.force + material->c_d * element.added_mass_per_depth * speed * speed);
+    return result.elements *
+           (element.force + material->c_d * element.added_mass_per_depth * speed * speed);
 }
 
 /* Force and depth of a row belong together, at any speed. */
@@ -56,7 +62,8 @@ static void test_law(void **state) {
             assert_true(result.rows[1000].depth == 0.03);
             for (int i = 2; i <= 1000; i++) {
                 double expected = law(&def.material, result.rows[i].depth, def.speed);
-                worst = fmax(worst, fabs(result.rows[i].force - expected) / law(&def.material, 0.03, 0));
+                worst = fmax(worst,
+                             fabs(result.rows[i].force - expected) / law(&def.material, 0.03, 0));
             }
         }
         printf("%g m/s: worst difference from the law %.2g of the slow peak\n", speeds[v], worst);
@@ -69,7 +76,8 @@ static void test_energy(void **state) {
     PressDef def = definition("foam45");
     press(&def);
     printf("foam45 gives back %.4f of %.4f J\n", result.work_out, result.work_in);
-    assert_true(result.work_out <= result.work_in * (1 + 1e-3) && result.work_out > 0.5 * result.work_in);
+    assert_true(result.work_out <= result.work_in * (1 + 1e-3) &&
+                result.work_out > 0.5 * result.work_in);
     assert_true(result.print_depth < 1e-3);
     def = definition("sand_loose");
     press(&def);
@@ -78,7 +86,8 @@ static void test_energy(void **state) {
     assert_true(result.print_depth > 0.029);
 }
 
-/* A level plate has no moment and its zero moment point in the middle; the front edge down moves both forward. */
+/* A level plate has no moment and its zero moment point in the middle; the front edge down moves
+ * both forward. */
 static void test_moments(void **state) {
     (void)state;
     PressDef def = definition("sand_loose");
@@ -108,16 +117,19 @@ static void test_reload(void **state) {
         def.turn[1] = 0.002;
         def.turn[2] = 0.02;
         press(&def);
-        assert_true(turn_of(0)->depth == 0.01 && turn_of(1)->depth == 0.002 && turn_of(2)->depth == 0.02);
+        assert_true(turn_of(0)->depth == 0.01 && turn_of(1)->depth == 0.002 &&
+                    turn_of(2)->depth == 0.02);
         assert_int_equal(result.ways, 4); /* and out */
         double before = law(&def.material, 0.01, 0), after = law(&def.material, 0.02, 0);
-        worst = fmax(worst, fmax(fabs(turn_of(0)->force / before - 1), fabs(turn_of(2)->force / after - 1)));
+        worst = fmax(
+            worst, fmax(fabs(turn_of(0)->force / before - 1), fabs(turn_of(2)->force / after - 1)));
     }
     printf("loaded, unloaded, loaded deeper: worst %.1e\n", worst);
     assert_true(worst < 1e-4);
 }
 
-/* Cycles between two depths give back what the line holds; between two forces they turn at those forces. */
+/* Cycles between two depths give back what the line holds; between two forces they turn at those
+ * forces. */
 static void test_cycles(void **state) {
     (void)state;
     PressDef def = definition("foam45");
@@ -139,14 +151,16 @@ static void test_cycles(void **state) {
         def.turn[1] = 50;
         def.cycles = 3;
         press(&def);
-        for (int way = 0; way < 6; way++)
+        for (int way = 0; way < 6; way++) {
             worst = fmax(worst, fabs(turn_of(way)->force / (way % 2 ? 50 : 300) - 1));
+        }
     }
     printf("turns at 300 and 50 N: worst %.1e\n", worst);
     assert_true(worst < 1e-9);
 }
 
-/* Sideways at constant depth u over the way d: friction mu F, drift k_D d u and damping b_D v of every element (eq 14). */
+/* Sideways at constant depth u over the way d: friction mu F, drift k_D d u and damping b_D v of
+ * every element (eq 14). */
 static void test_drag(void **state) {
     (void)state;
     double worst = 0;
@@ -158,7 +172,8 @@ static void test_drag(void **state) {
         const PressRow *end = turn_of(1);
         const MildMaterial *m = &def.material;
         double before = 0.05; /* the row is of the step that begins there */
-        double expected = m->mu * law(m, 0.03, 0) + result.elements * (m->k_drift * before * 0.03 + m->b_drift * 0.1);
+        double expected = m->mu * law(m, 0.03, 0) +
+                          result.elements * (m->k_drift * before * 0.03 + m->b_drift * 0.1);
         worst = fmax(worst, fabs(-end->force_x / expected - 1));
         assert_true(fabs(end->x - 0.05) < 1e-9 && fabs(end->force_y) < 1e-9);
         assert_true(result.work_drag > 0);
@@ -167,15 +182,18 @@ static void test_drag(void **state) {
     assert_true(worst < 1e-4);
 }
 
-/* What falls comes to rest: the ground takes the weight times the whole height; a tilted plate lands flat. */
+/* What falls comes to rest: the ground takes the weight times the whole height; a tilted plate
+ * lands flat. */
 static void test_drop(void **state) {
     (void)state;
     PressDef def = {.mass = 5, .height = 0.1, .seconds = 1};
     mild_material_preset("sand_dense", &def.material);
     press(&def);
     const PressRow *end = &result.rows[result.count - 1];
-    double fallen = def.mass * 9.81 * (def.height + end->depth), taken = result.work_in - result.work_out;
-    printf("dropped: stop %.3f mm, work %.4f J of %.4f J\n", 1e3 * result.stop_depth, taken, fallen);
+    double fallen = def.mass * 9.81 * (def.height + end->depth),
+           taken = result.work_in - result.work_out;
+    printf("dropped: stop %.3f mm, work %.4f J of %.4f J\n", 1e3 * result.stop_depth, taken,
+           fallen);
     assert_true(fabs(taken / fallen - 1) < 0.01);
     assert_true(fabs(end->force / (def.mass * 9.81) - 1) < 1e-3 && result.rest_speed < 1e-4);
     def.tilt = 0.1;
@@ -204,14 +222,10 @@ static void test_bad_material(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_law),
-        cmocka_unit_test(test_energy),
-        cmocka_unit_test(test_moments),
-        cmocka_unit_test(test_reload),
-        cmocka_unit_test(test_cycles),
-        cmocka_unit_test(test_drag),
-        cmocka_unit_test(test_drop),
-        cmocka_unit_test(test_bad_material),
+        cmocka_unit_test(test_law),     cmocka_unit_test(test_energy),
+        cmocka_unit_test(test_moments), cmocka_unit_test(test_reload),
+        cmocka_unit_test(test_cycles),  cmocka_unit_test(test_drag),
+        cmocka_unit_test(test_drop),    cmocka_unit_test(test_bad_material),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -30,7 +30,8 @@ static void scenes_by_name(void **state) {
     assert_int_not_equal(scene_make(&scene, "rubber+", 2, &error), MILD_OK);
 }
 
-/* The paper's gains do not balance (docs/task.md section 3): a policy of zeros must fall, and be counted as fallen. */
+/* The paper's gains do not balance (docs/task.md section 3): a policy of zeros must fall, and be
+ * counted as fallen. */
 static void zero_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
     (void)self;
     (void)envs;

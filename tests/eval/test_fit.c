@@ -1,5 +1,5 @@
-/* Parameters from noisy presses: they come back, their intervals hold the truth as often as they say, and what the data
- * cannot tell is named. Every noise is seeded; the seeds are printed. */
+/* Parameters from noisy presses: they come back, their intervals hold the truth as often as they
+ * say, and what the data cannot tell is named. Every noise is seeded; the seeds are printed. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,7 +14,10 @@
 #include "eval/fit.h"
 
 enum { ROWS = 1000, SEEDS = 5, DRAWS = 200 };
-typedef enum { NOISE_OF_PEAK, NOISE_OF_ROW } Noise; /* the same on every row, or in proportion to its force */
+typedef enum {
+    NOISE_OF_PEAK,
+    NOISE_OF_ROW
+} Noise; /* the same on every row, or in proportion to its force */
 
 static FitPoint points[2 * ROWS];
 
@@ -25,8 +28,8 @@ static FitDef plate(const char *ground) {
 }
 
 /* A press of the true ground to `depth` with noise of 2 %. */
-static void press(const FitDef *truth, FitPoint *out, int rows, double depth, double speed, Noise noise,
-                  uint64_t seed) {
+static void press(const FitDef *truth, FitPoint *out, int rows, double depth, double speed,
+                  Noise noise, uint64_t seed) {
     Random random = random_at(seed, (uint32_t)noise, 0);
     double peak = 0;
     for (int i = 0; i < rows; i++) {
@@ -35,14 +38,17 @@ static void press(const FitDef *truth, FitPoint *out, int rows, double depth, do
         peak = fmax(peak, out[i].force);
     }
     for (int i = 0; i < rows; i++) {
-        out[i].force += 0.02 * (noise == NOISE_OF_PEAK ? peak : out[i].force) * random_normal(&random);
+        out[i].force +=
+            0.02 * (noise == NOISE_OF_PEAK ? peak : out[i].force) * random_normal(&random);
     }
 }
 
 static FitResult run(const FitDef *def, int count) {
     FitResult result;
     MildError error = {0};
-    if (fit_run(def, points, count, &result, &error) != MILD_OK) fail_msg("%s", error.text);
+    if (fit_run(def, points, count, &result, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
     return result;
 }
 
@@ -60,7 +66,8 @@ static void recovery(void **state) {
     for (int g = 0; g < mild_material_preset_count(); g++) {
         for (int run_index = 0; run_index < 2 * SEEDS; run_index++) {
             FitDef truth = plate(mild_material_preset_name(g)), def = spoiled(&truth);
-            press(&truth, points, ROWS, 0.04, 0.01, (Noise)(run_index % 2), (uint64_t)(1 + run_index / 2));
+            press(&truth, points, ROWS, 0.04, 0.01, (Noise)(run_index % 2),
+                  (uint64_t)(1 + run_index / 2));
             FitResult result = run(&def, ROWS);
             for (int p = 0; p < 2; p++) {
                 double value = *fit_value(&truth.material, (FitName)p);
@@ -70,12 +77,13 @@ static void recovery(void **state) {
             assert_true(result.residual_share > 0.01 && result.residual_share < 0.05);
         }
     }
-    printf("2 %% noise, seeds 1 .. %d: worst error k_pen %.2f %%, sigma_cone %.2f %%\n", SEEDS, 100 * worst[0],
-           100 * worst[1]);
+    printf("2 %% noise, seeds 1 .. %d: worst error k_pen %.2f %%, sigma_cone %.2f %%\n", SEEDS,
+           100 * worst[0], 100 * worst[1]);
     assert_true(worst[0] < 0.05 && worst[1] < 0.05);
 }
 
-/* Without noise the truth comes back, also the shape and the drag, and the intervals shrink to nothing. */
+/* Without noise the truth comes back, also the shape and the drag, and the intervals shrink to
+ * nothing. */
 static void exact(void **state) {
     (void)state;
     double worst = 0;
@@ -85,9 +93,12 @@ static void exact(void **state) {
         def.free[FIT_ALPHA] = 1;
         def.free[FIT_C_D] = truth.material.c_g > 0;
         def.material.c_d = def.free[FIT_C_D] ? 5 : 1;
-        for (int half = 0; half < 2; half++)
+        for (int half = 0; half < 2; half++) {
             press(&truth, points + half * ROWS, ROWS, 0.04, half ? 1 : 0.01, NOISE_OF_ROW, 1);
-        for (int i = 0; i < 2 * ROWS; i++) points[i].force = fit_force(&truth, &points[i]);
+        }
+        for (int i = 0; i < 2 * ROWS; i++) {
+            points[i].force = fit_force(&truth, &points[i]);
+        }
         FitResult result = run(&def, 2 * ROWS);
         for (int p = 0; p < FIT_PARAMETERS; p++) {
             double value = *fit_value(&truth.material, (FitName)p);
@@ -99,7 +110,8 @@ static void exact(void **state) {
     assert_true(worst < 1e-4);
 }
 
-/* Share of draws whose interval holds the truth: 95 % with a standard deviation of 1.5 % for 200 draws. */
+/* Share of draws whose interval holds the truth: 95 % with a standard deviation of 1.5 % for 200
+ * draws. */
 static void cover(const char *ground, int shape, int rows, Noise noise) {
     int inside[FIT_PARAMETERS] = {0};
     for (int draw = 0; draw < DRAWS; draw++) {
@@ -114,8 +126,8 @@ static void cover(const char *ground, int shape, int rows, Noise noise) {
     }
     for (int p = 0; p < 2 + shape; p++) {
         double share = (double)inside[p] / DRAWS;
-        printf("%s, %d rows, noise of %s, seeds 1000 ..: %s inside in %.1f %% of %d\n", ground, rows,
-               noise == NOISE_OF_PEAK ? "peak" : "row", fit_names[p], 100 * share, DRAWS);
+        printf("%s, %d rows, noise of %s, seeds 1000 ..: %s inside in %.1f %% of %d\n", ground,
+               rows, noise == NOISE_OF_PEAK ? "peak" : "row", fit_names[p], 100 * share, DRAWS);
         assert_true(share >= 0.905 && share <= 0.99);
     }
 }
@@ -145,7 +157,8 @@ static void inseparable(void **state) {
     def = truth = plate("rubber");
     press(&truth, points, 50, 0.002, 0.01, NOISE_OF_PEAK, 8);
     result = run(&def, 50);
-    printf("2 mm deep: sigma_cone and k_pen tied, correlation %.3f\n", result.parameter[FIT_SIGMA_CONE].correlation);
+    printf("2 mm deep: sigma_cone and k_pen tied, correlation %.3f\n",
+           result.parameter[FIT_SIGMA_CONE].correlation);
     assert_int_equal(result.parameter[FIT_SIGMA_CONE].state, FIT_TIED);
     assert_int_equal(result.parameter[FIT_SIGMA_CONE].partner, FIT_K_PEN);
     assert_true(result.parameter[FIT_SIGMA_CONE].value == truth.material.sigma_cone);
@@ -173,18 +186,26 @@ static void drag(void **state) {
     assert_true(fabs(c_d->value / 17.2 - 1) < 0.05);
 }
 
-/* Down, up, down deeper: what counts is the way down on virgin ground; the speed comes from the times. */
+/* Down, up, down deeper: what counts is the way down on virgin ground; the speed comes from the
+ * times. */
 static void loading(void **state) {
     (void)state;
-    static const double depths[] = {-0.001, 0, 0.001, 0.002, 0.003, 0.002, 0.001, 0.002, 0.003, 0.004, 0.005, 0.004};
+    static const double depths[] = {-0.001, 0,     0.001, 0.002, 0.003, 0.002,
+                                    0.001,  0.002, 0.003, 0.004, 0.005, 0.004};
     enum { COUNT = sizeof depths / sizeof *depths };
-    for (int i = 0; i < COUNT; i++) points[i] = (FitPoint){.time = i, .depth = depths[i], .speed = NAN};
+    for (int i = 0; i < COUNT; i++) {
+        points[i] = (FitPoint){.time = i, .depth = depths[i], .speed = NAN};
+    }
     assert_int_equal(fit_loading(points, COUNT), 6); /* 3 mm counts both times */
     assert_true(points[3].time == 8 && points[5].depth == 0.005);
-    for (int i = 0; i < ROWS; i++) points[i] = (FitPoint){.time = 0.01 * i, .depth = 0.002 * i, .speed = NAN};
+    for (int i = 0; i < ROWS; i++) {
+        points[i] = (FitPoint){.time = 0.01 * i, .depth = 0.002 * i, .speed = NAN};
+    }
     points[3].speed = 7;
     fit_speeds(points, ROWS);
-    for (int i = 0; i < ROWS; i++) assert_true(fabs(points[i].speed - (i == 3 ? 7 : 0.2)) < 1e-9);
+    for (int i = 0; i < ROWS; i++) {
+        assert_true(fabs(points[i].speed - (i == 3 ? 7 : 0.2)) < 1e-9);
+    }
     points[0].speed = points[0].time = NAN;
     fit_speeds(points, 1);
     assert_true(points[0].speed == 0);
@@ -196,7 +217,8 @@ static void refused(void **state) {
     FitResult result;
     MildError error = {0};
     press(&def, points, ROWS, 0.04, 0.01, NOISE_OF_ROW, 1);
-    assert_int_equal(fit_run(&def, points, FIT_POINTS_MIN - 1, &result, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(fit_run(&def, points, FIT_POINTS_MIN - 1, &result, &error),
+                     MILD_ERROR_ARGUMENT);
     points[5].force = NAN;
     assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_RANGE);
     assert_non_null(strstr(error.text, "row 6"));

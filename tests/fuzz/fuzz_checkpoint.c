@@ -1,5 +1,5 @@
-/* Any bytes as a checkpoint to resume a tiny training from, with the checksum put right. Refused with a message and nothing
- * changed, or loaded whole and finite. */
+/* Any bytes as a checkpoint to resume a tiny training from, with the checksum put right. Refused
+ * with a message and nothing changed, or loaded whole and finite. */
 #include "fuzz.h"
 #include "learn/ppo_private.h"
 
@@ -13,8 +13,10 @@ static void make_ppo(void) {
     def.feet_velocity_offset = 0;
     def.feet_velocity_count = 1;
     def.encoder_hidden[0] = def.decoder_hidden[0] = def.actor_hidden[0] = def.critic_hidden[0] = 1;
-    for (int l = 1; l < POLICY_LAYERS_MAX; l++)
-        def.encoder_hidden[l] = def.decoder_hidden[l] = def.actor_hidden[l] = def.critic_hidden[l] = 0;
+    for (int l = 1; l < POLICY_LAYERS_MAX; l++) {
+        def.encoder_hidden[l] = def.decoder_hidden[l] = def.actor_hidden[l] = def.critic_hidden[l] =
+            0;
+    }
     def.modulation_hidden = 1;
     PpoDef learner = ppo_def_default();
     learner.average = 0.5;
@@ -26,11 +28,15 @@ static void make_ppo(void) {
 }
 
 static void check_finite(const float *values, int64_t count) {
-    for (int64_t i = 0; i < count; i++) fuzz_check(isfinite(values[i]));
+    for (int64_t i = 0; i < count; i++) {
+        fuzz_check(isfinite(values[i]));
+    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    if (!ppo) make_ppo();
+    if (!ppo) {
+        make_ppo();
+    }
     unsigned char *bytes = malloc(size + 1);
     fuzz_check(bytes != NULL);
     memcpy(bytes, data, size);

@@ -1,5 +1,5 @@
-/* Any text as a config file, and as an override. It may fail, never crash, and what it accepts must print and read back to the
- * same values. */
+/* Any text as a config file, and as an override. It may fail, never crash, and what it accepts must
+ * print and read back to the same values. */
 #include "app/experiment.h"
 #include "app/grounds.h"
 #include "fuzz.h"
@@ -24,8 +24,10 @@ static void check_round_trip(const Target *first, int comments) {
     MildError error;
     target_init(&second);
     char *once = config_text(first->sections, SECTIONS, comments);
-    fuzz_check(once && config_read_text(second.sections, SECTIONS, once, "again", 1, &error) == MILD_OK);
-    char *plain = config_text(first->sections, SECTIONS, 0), *twice = config_text(second.sections, SECTIONS, 0);
+    fuzz_check(once &&
+               config_read_text(second.sections, SECTIONS, once, "again", 1, &error) == MILD_OK);
+    char *plain = config_text(first->sections, SECTIONS, 0),
+         *twice = config_text(second.sections, SECTIONS, 0);
     fuzz_check(plain && twice && strcmp(plain, twice) == 0);
     free(once);
     free(plain);
@@ -42,10 +44,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     target_init(&first);
     MildStatus status = config_read_text(first.sections, SECTIONS, text, "fuzz", 0, &error);
     fuzz_check(status == MILD_OK || (error.status == status && error.text[0]));
-    if (status == MILD_OK && fuzz_sample(data, size, 64)) check_round_trip(&first, size % 2 == 0);
+    if (status == MILD_OK && fuzz_sample(data, size, 64)) {
+        check_round_trip(&first, size % 2 == 0);
+    }
     target_init(&first);
     status = config_override(first.sections, SECTIONS, text, &error);
-    if (status == MILD_OK && fuzz_sample(data, size, 64)) check_round_trip(&first, 0);
+    if (status == MILD_OK && fuzz_sample(data, size, 64)) {
+        check_round_trip(&first, 0);
+    }
     free(text);
     return 0;
 }

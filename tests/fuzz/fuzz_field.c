@@ -1,5 +1,5 @@
-/* Any text as the value of a field of every type: what is accepted is within its range and reads back from what is printed;
- * what is refused changes nothing. */
+/* Any text as the value of a field of every type: what is accepted is within its range and reads
+ * back from what is printed; what is refused changes nothing. */
 #include <stdio.h>
 
 #include "fuzz.h"
@@ -33,7 +33,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         MildError error = {0};
         MildStatus status = mild_field_parse(&fields[f], &values, text, "fuzz", &error);
         if (status != MILD_OK) {
-            fuzz_check(memcmp(&values, &start, sizeof start) == 0 && error.status == status && error.text[0]);
+            fuzz_check(memcmp(&values, &start, sizeof start) == 0 && error.status == status &&
+                       error.text[0]);
             continue;
         }
         fuzz_check(mild_fields_check(fields, FIELDS, &values, "fuzz", &error) == MILD_OK);

@@ -1,5 +1,5 @@
-/* Any bytes as a picture, with the checksums of its chunks put right so that the fuzzer gets past them. Refused with a message,
- * or grey values between 0 and 1. */
+/* Any bytes as a picture, with the checksums of its chunks put right so that the fuzzer gets past
+ * them. Refused with a message, or grey values between 0 and 1. */
 #include <stdio.h>
 #include <zlib.h>
 
@@ -16,16 +16,22 @@ static uint32_t number_at(const uint8_t *at) {
 static void seal(uint8_t *bytes, size_t size) {
     for (size_t at = SIGNATURE; at + FRAME <= size;) {
         size_t length = number_at(bytes + at);
-        if (length > size - at - FRAME) return;
+        if (length > size - at - FRAME) {
+            return;
+        }
         uLong crc = crc32(0, bytes + at + 4, (uInt)length + 4);
-        for (int i = 0; i < 4; i++) bytes[at + 8 + length + (size_t)i] = (uint8_t)(crc >> (24 - 8 * i));
+        for (int i = 0; i < 4; i++) {
+            bytes[at + 8 + length + (size_t)i] = (uint8_t)(crc >> (24 - 8 * i));
+        }
         at += length + FRAME;
     }
 }
 
 /* A small file may state a large picture, which takes long to fill. */
 static int takes_long(const uint8_t *bytes, size_t size) {
-    if (size < 24) return 0;
+    if (size < 24) {
+        return 0;
+    }
     double pixels = (double)number_at(bytes + 16) * number_at(bytes + 20);
     return pixels > PIXELS && pixels < PIXELS_REFUSED;
 }
@@ -35,7 +41,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     uint8_t *bytes = malloc(size + 1);
     fuzz_check(bytes != NULL);
     memcpy(bytes, data, size);
-    if (size >= SIGNATURE && size % 16 != 0) memcpy(bytes, signature, SIGNATURE);
+    if (size >= SIGNATURE && size % 16 != 0) {
+        memcpy(bytes, signature, SIGNATURE);
+    }
     seal(bytes, size);
     FILE *file = size && !takes_long(bytes, size) ? fmemopen(bytes, size, "r") : NULL;
     if (file) {
@@ -43,8 +51,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         MildError error = {0};
         if (image_read_file(file, "fuzz", &image, &error) == MILD_OK) {
             fuzz_check(image.columns > 0 && image.rows > 0);
-            for (int i = 0; i < image.columns * image.rows; i++)
+            for (int i = 0; i < image.columns * image.rows; i++) {
                 fuzz_check(image.grey[i] >= 0.0 && image.grey[i] <= 1.0);
+            }
         } else {
             fuzz_check(error.status != MILD_OK && error.text[0] && !image.grey);
         }

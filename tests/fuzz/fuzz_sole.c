@@ -1,5 +1,5 @@
-/* Any polygon as the outline of a sole: refused with a message, or a raster with the elements that it says, finite and
- * inside the outline's box. */
+/* Any polygon as the outline of a sole: refused with a message, or a raster with the elements that
+ * it says, finite and inside the outline's box. */
 #include "fuzz.h"
 #include "mild/ground.h"
 
@@ -21,7 +21,8 @@ static void check_sole(const MildSoleDef *def, const MildSole *sole) {
     }
     for (int i = 0; i < count; i++) {
         double x = mild_sole_x(sole)[i], y = mild_sole_y(sole)[i], margin = def->pitch;
-        fuzz_check(x > low[0] - margin && x < high[0] + margin && y > low[1] - margin && y < high[1] + margin);
+        fuzz_check(x > low[0] - margin && x < high[0] + margin && y > low[1] - margin &&
+                   y < high[1] + margin);
     }
 }
 
@@ -29,11 +30,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     Bytes bytes = {data, data + size};
     double outline[2 * POINTS_MAX];
     int kind = take_below(&bytes, 16);
-    MildSoleDef def = {.outline = outline, .points = take_below(&bytes, POINTS_MAX + 1), .pitch = take_pitch(&bytes)};
-    def.target_elements = kind == 0 ? take_below(&bytes, 32) : kind == 1 ? (int)take_byte(&bytes) - 64 : 0;
+    MildSoleDef def = {.outline = outline,
+                       .points = take_below(&bytes, POINTS_MAX + 1),
+                       .pitch = take_pitch(&bytes)};
+    def.target_elements = kind == 0   ? take_below(&bytes, 32)
+                          : kind == 1 ? (int)take_byte(&bytes) - 64
+                                      : 0;
     def.sole_z = kind == 2 ? take_number(&bytes, 0.1) : -0.05;
     double reach = def.pitch > 0.0 && def.pitch < 1.0 ? 2.0 * def.pitch : 0.15;
-    for (int i = 0; i < 2 * def.points; i++) outline[i] = take_number(&bytes, reach);
+    for (int i = 0; i < 2 * def.points; i++) {
+        outline[i] = take_number(&bytes, reach);
+    }
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
     if (sole) {

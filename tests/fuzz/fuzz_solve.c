@@ -1,6 +1,6 @@
-/* A contact step under hostile numbers: poses, twists, inverse inertias, time steps that are NaN, infinite, huge or simply
- * wrong. It comes back within its bound of work, what it calls converged is finite, and the memory stays usable: after all
- * that an ordinary step converges. */
+/* A contact step under hostile numbers: poses, twists, inverse inertias, time steps that are NaN,
+ * infinite, huge or simply wrong. It comes back within its bound of work, what it calls converged
+ * is finite, and the memory stays usable: after all that an ordinary step converges. */
 #include "fuzz.h"
 #include "mild/ground.h"
 
@@ -24,7 +24,8 @@ static void feet_finish(Feet *feet) {
         for (int prints = 0; prints < 2; prints++) {
             void *block = malloc(mild_ground_bytes_prints(all, count, PRINT_TILES * prints));
             fuzz_check(block != NULL);
-            feet->ground[prints][count - 1] = mild_ground_init_prints(block, all, count, PRINT_TILES * prints);
+            feet->ground[prints][count - 1] =
+                mild_ground_init_prints(block, all, count, PRINT_TILES * prints);
         }
     }
 }
@@ -59,9 +60,13 @@ static MildContactInput quiet_input(int feet) {
     MildContactInput input = {.feet = feet, .dt = 0.002};
     for (int f = 0; f < feet; f++) {
         input.position[f][2] = 0.045;
-        for (int k = 0; k < 3; k++) input.rotation[f][4 * k] = 1.0;
+        for (int k = 0; k < 3; k++) {
+            input.rotation[f][4 * k] = 1.0;
+        }
         input.free_velocity[6 * f + 2] = -0.02;
-        for (int k = 0; k < 6; k++) input.inverse_inertia[(6 * f + k) * (6 * feet + 1)] = k < 3 ? 0.2 : 20.0;
+        for (int k = 0; k < 6; k++) {
+            input.inverse_inertia[(6 * f + k) * (6 * feet + 1)] = k < 3 ? 0.2 : 20.0;
+        }
     }
     return input;
 }
@@ -71,11 +76,17 @@ static void spoil(Bytes *bytes, MildContactInput *input) {
     double *const areas[] = {&input->position[0][0], &input->rotation[0][0], &input->velocity[0][0],
                              input->inverse_inertia, input->free_velocity,   &input->dt,
                              &input->tolerance};
-    const int counts[] = {
-        3 * input->feet, 9 * input->feet, 6 * input->feet, 36 * input->feet * input->feet, 6 * input->feet, 1, 1};
+    const int counts[] = {3 * input->feet,
+                          9 * input->feet,
+                          6 * input->feet,
+                          36 * input->feet * input->feet,
+                          6 * input->feet,
+                          1,
+                          1};
     static const double usual[] = {0.1, 1.0, 2.0, 10.0, 2.0, 0.01, 1e-3};
     input->solver = take_below(bytes, 2) ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON;
-    input->max_iterations = input->solver == MILD_SOLVER_NEWTON ? take_below(bytes, NEWTON_WORK) : SWEEPS;
+    input->max_iterations =
+        input->solver == MILD_SOLVER_NEWTON ? take_below(bytes, NEWTON_WORK) : SWEEPS;
     for (int edits = take_below(bytes, 16); edits > 0; edits--) {
         int area = take_below(bytes, 7);
         areas[area][take_below(bytes, counts[area])] = take_number(bytes, usual[area]);
@@ -83,12 +94,18 @@ static void spoil(Bytes *bytes, MildContactInput *input) {
 }
 
 static void check_finite(const double *values, int count) {
-    for (int i = 0; i < count; i++) fuzz_check(isfinite(values[i]));
+    for (int i = 0; i < count; i++) {
+        fuzz_check(isfinite(values[i]));
+    }
 }
 
-static void check_result(const MildContactInput *input, const MildContactResult *result, const Feet *feet) {
-    fuzz_check(result->iterations >= 0 && result->iterations <= (input->max_iterations ? input->max_iterations : 400));
-    if (!result->converged) return;
+static void check_result(const MildContactInput *input, const MildContactResult *result,
+                         const Feet *feet) {
+    fuzz_check(result->iterations >= 0 &&
+               result->iterations <= (input->max_iterations ? input->max_iterations : 400));
+    if (!result->converged) {
+        return;
+    }
     check_finite(result->velocity, 6 * input->feet);
     for (int f = 0; f < input->feet; f++) {
         const MildFootResult *foot = &result->foot[f];
@@ -102,17 +119,24 @@ static void check_result(const MildContactInput *input, const MildContactResult 
 
 static MildTerrain take_terrain(Bytes *bytes) {
     MildMaterial preset, material, other;
-    mild_material_preset(mild_material_preset_name(take_below(bytes, mild_material_preset_count())), &preset);
+    mild_material_preset(mild_material_preset_name(take_below(bytes, mild_material_preset_count())),
+                         &preset);
     MildModel model = (MildModel)take_below(bytes, MILD_MODEL_RIGID);
     fuzz_check(mild_model_match(model, &preset, raster.soles[0], 20.0, &material, NULL) == MILD_OK);
     MildTerrain terrain = mild_terrain_uniform(&material);
-    if (take_below(bytes, 2) == 0) return terrain;
+    if (take_below(bytes, 2) == 0) {
+        return terrain;
+    }
     other = material;
     double *value = (double *)((char *)&other + mild_material_fields[take_below(bytes, 13)].offset);
     *value = take_number(bytes, 1.0);
-    if (mild_material_check(&other, NULL) == MILD_OK) terrain.materials[terrain.material_count++] = other;
-    mild_terrain_set_map(&terrain, maps[take_below(bytes, 3)], NULL); /* refused when there is one material only */
-    MildPatch patch = {take_number(bytes, 0.1), take_number(bytes, 0.1), -1.0, 1.0, terrain.material_count - 1};
+    if (mild_material_check(&other, NULL) == MILD_OK) {
+        terrain.materials[terrain.material_count++] = other;
+    }
+    mild_terrain_set_map(&terrain, maps[take_below(bytes, 3)],
+                         NULL); /* refused when there is one material only */
+    MildPatch patch = {take_number(bytes, 0.1), take_number(bytes, 0.1), -1.0, 1.0,
+                       terrain.material_count - 1};
     mild_terrain_add_patch(&terrain, &patch, NULL);
     return terrain;
 }
@@ -124,7 +148,9 @@ static void check_usable(const Feet *feet, int count, const MildMaterial *materi
     MildTerrain terrain = mild_terrain_uniform(material);
     MildContactInput away = quiet_input(count), quiet = away;
     MildContactResult result;
-    for (int f = 0; f < count; f++) away.position[f][2] = 10.0;
+    for (int f = 0; f < count; f++) {
+        away.position[f][2] = 10.0;
+    }
     mild_ground_solve(memory, &terrain, &away, work, &result);
     fuzz_check(result.converged);
     mild_ground_advance(memory, &terrain, &away, work, &result);
@@ -134,10 +160,13 @@ static void check_usable(const Feet *feet, int count, const MildMaterial *materi
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    if (!raster.soles[0]) make_feet();
+    if (!raster.soles[0]) {
+        make_feet();
+    }
     Bytes bytes = {data, data + size};
     MildTerrain terrain = take_terrain(&bytes);
-    const Feet *feet = mild_model_is_concentric((MildModel)terrain.materials[0].model) ? &concentric : &raster;
+    const Feet *feet =
+        mild_model_is_concentric((MildModel)terrain.materials[0].model) ? &concentric : &raster;
     int count = 1 + take_below(&bytes, MILD_FEET_MAX);
     int prints = take_below(&bytes, 2);
     MildGround *memory = feet->ground[prints][count - 1];
@@ -150,6 +179,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         check_result(&input, &result, feet);
         mild_ground_advance(memory, &terrain, &input, feet->scratch[count - 1], &result);
     }
-    if (!prints && fuzz_sample(data, size, 4)) check_usable(feet, count, &terrain.materials[0]);
+    if (!prints && fuzz_sample(data, size, 4)) {
+        check_usable(feet, count, &terrain.materials[0]);
+    }
     return 0;
 }

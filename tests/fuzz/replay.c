@@ -11,7 +11,9 @@ static int replay_file(const char *path) {
     struct stat about;
     FILE *file = fopen(path, "rb");
     if (!file || fstat(fileno(file), &about) != 0 || !S_ISREG(about.st_mode)) {
-        if (file) fclose(file);
+        if (file) {
+            fclose(file);
+        }
         return 0;
     }
     size_t size = (size_t)about.st_size;
@@ -27,12 +29,15 @@ int main(int argc, char **argv) {
     int files = 0;
     for (int i = 1; i < argc; i++) {
         DIR *folder = opendir(argv[i]);
-        for (struct dirent *entry = folder ? readdir(folder) : NULL; entry; entry = readdir(folder)) {
+        for (struct dirent *entry = folder ? readdir(folder) : NULL; entry;
+             entry = readdir(folder)) {
             char path[PATH_LENGTH];
             snprintf(path, sizeof path, "%s/%s", argv[i], entry->d_name);
             files += replay_file(path);
         }
-        if (folder) closedir(folder);
+        if (folder) {
+            closedir(folder);
+        }
     }
     printf("%d inputs\n", files);
     return files == 0;

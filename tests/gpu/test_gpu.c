@@ -1,5 +1,6 @@
-/* The learner on the GPU against the same learner on the processor. With MILD_CUDA on the device, skipped (77) where there
- * is none; else with small networks on a stand-in for CUDA (emulated/), which runs the same text of the layer. */
+/* The learner on the GPU against the same learner on the processor. With MILD_CUDA on the device,
+ * skipped (77) where there is none; else with small networks on a stand-in for CUDA (emulated/),
+ * which runs the same text of the layer. */
 #include "../learn/toy.h"
 
 #include <math.h>
@@ -36,9 +37,11 @@ static PpoMirror some_mirror(Learner *l, const PolicyDef *def) {
     return (PpoMirror){l->mirror_index, l->mirror_sign, l->mirror_index, l->mirror_sign};
 }
 
-static void learner_open(Learner *l, int cuda, const PolicyDef *policy, const PpoDef *def, int envs) {
+static void learner_open(Learner *l, int cuda, const PolicyDef *policy, const PpoDef *def,
+                         int envs) {
     MildError error = {0};
-    PpoMirror mirror = policy->observation == TOY_OBSERVATION ? toy_mirror() : some_mirror(l, policy);
+    PpoMirror mirror =
+        policy->observation == TOY_OBSERVATION ? toy_mirror() : some_mirror(l, policy);
     l->policy = policy_create(policy, 5, &error);
     l->pool = pool_create(cuda ? 1 : 0);
     assert_true(l->policy && l->pool);
@@ -55,7 +58,8 @@ static void learner_close(Learner *l) {
     pool_destroy(l->pool);
 }
 
-/* Random parameters (the modulation begins at zero otherwise) and a random rollout, the same in both. */
+/* Random parameters (the modulation begins at zero otherwise) and a random rollout, the same in
+ * both. */
 static void fill_both(Learner *a, Learner *b, uint64_t seed) {
     Random random = random_at(seed, 1, 2);
     const Network *n = &a->policy->network;
@@ -104,7 +108,8 @@ static double gradient_distance(const Learner *cpu, const Learner *gpu, const ch
         for (int l = 0; l < mlp->layers; l++) {
             const MlpLayer *layer = &mlp->layer[l];
             double before = worst;
-            worse(&worst, distance(a + layer->weight, b + layer->weight, layer->bias - layer->weight));
+            worse(&worst,
+                  distance(a + layer->weight, b + layer->weight, layer->bias - layer->weight));
             worse(&worst, distance(a + layer->bias, b + layer->bias, layer->out));
             *where = worst > before ? name : *where;
         }
@@ -113,10 +118,12 @@ static double gradient_distance(const Learner *cpu, const Learner *gpu, const ch
 }
 
 static double sums_distance(const LossSums *a, const LossSums *b) {
-    const double x[] = {a->surrogate,   a->kl,          a->clipped,     a->reconstruction, a->vae_kl,
-                        a->estimate[0], a->estimate[1], a->estimate[2], a->mirror,         a->value};
-    const double y[] = {b->surrogate,   b->kl,          b->clipped,     b->reconstruction, b->vae_kl,
-                        b->estimate[0], b->estimate[1], b->estimate[2], b->mirror,         b->value};
+    const double x[] = {a->surrogate, a->kl,          a->clipped,     a->reconstruction,
+                        a->vae_kl,    a->estimate[0], a->estimate[1], a->estimate[2],
+                        a->mirror,    a->value};
+    const double y[] = {b->surrogate, b->kl,          b->clipped,     b->reconstruction,
+                        b->vae_kl,    b->estimate[0], b->estimate[1], b->estimate[2],
+                        b->mirror,    b->value};
     double worst = 0.0;
     for (size_t i = 0; i < sizeof x / sizeof *x; i++) {
         worse(&worst, fabs(x[i] - y[i]) / (1e-3 + fabs(y[i])));
@@ -125,7 +132,8 @@ static double sums_distance(const LossSums *a, const LossSums *b) {
 }
 
 /* One gradient of the first `count` samples of an order, on both. */
-static void compare_gradient(Learner *cpu, Learner *gpu, int count, uint32_t draw, double worst[2]) {
+static void compare_gradient(Learner *cpu, Learner *gpu, int count, uint32_t draw,
+                             double worst[2]) {
     Learner *both[] = {cpu, gpu};
     LossSums sums[2];
     double norm[2];
@@ -188,7 +196,8 @@ static void compare_learner(const PolicyDef *policy, const PpoDef *def, int envs
     const int minibatch = (samples + def->minibatches - 1) / def->minibatches,
               counts[] = {minibatch, minibatch - 1, 300, 5};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-        compare_gradient(&cpu, &gpu, counts[i] < minibatch ? counts[i] : minibatch, (uint32_t)i, worst);
+        compare_gradient(&cpu, &gpu, counts[i] < minibatch ? counts[i] : minibatch, (uint32_t)i,
+                         worst);
     }
     learner_close(&cpu);
     learner_close(&gpu);
@@ -212,7 +221,8 @@ static void test_same_function(void **state) {
     def.minibatches = 1; /* more rows than one chunk on the device */
     compare_learner(&full, &def, 1500, worst);
 #endif
-    print_message("worst against the processor: gradient %.1e, sums %.1e, means %.1e, values %.1e (relative)\n",
+    print_message("worst against the processor: gradient %.1e, sums %.1e, means %.1e, values %.1e "
+                  "(relative)\n",
                   worst[0], worst[1], worst[2], worst[3]);
     assert_true(worst[0] < 1e-5 && worst[1] < 1e-5 && worst[2] < 1e-5 && worst[3] < 1e-5);
 }
@@ -243,11 +253,12 @@ static void test_repeats(void **state) {
     const size_t bytes = (size_t)policy_parameter_count(l[0].policy) * sizeof(float);
     assert_memory_equal(policy_parameters(l[0].policy), policy_parameters(l[1].policy), bytes);
     assert_memory_equal(&report[0], &report[1], sizeof *report);
-    print_message(
-        "after an update of %d steps, against the processor: parameters %.1e, value loss %.1e (relative)\n",
-        def.epochs * def.minibatches,
-        distance(policy_parameters(l[0].policy), policy_parameters(l[2].policy), policy_parameter_count(l[0].policy)),
-        fabs(report[0].value_loss / report[2].value_loss - 1.0));
+    print_message("after an update of %d steps, against the processor: parameters %.1e, value loss "
+                  "%.1e (relative)\n",
+                  def.epochs * def.minibatches,
+                  distance(policy_parameters(l[0].policy), policy_parameters(l[2].policy),
+                           policy_parameter_count(l[0].policy)),
+                  fabs(report[0].value_loss / report[2].value_loss - 1.0));
     for (int k = 0; k < 3; k++) {
         learner_close(&l[k]);
     }
@@ -310,7 +321,8 @@ static void test_learns_and_changes_device(void **state) {
         learner_close(&l);
     }
     unlink(path);
-    print_message("toy task: reward %.2f after 60 iterations on the GPU, %.2f after 60 more on the processor\n",
+    print_message("toy task: reward %.2f after 60 iterations on the GPU, %.2f after 60 more on the "
+                  "processor\n",
                   reward[0], reward[1]);
     assert_true(reward[0] > 0.6 && reward[1] > 0.8);
 }

@@ -3,18 +3,19 @@
 #include "ground/contact.h"
 #include "ground/friction.h" /* its constants and STEP_LAG */
 
-#define DENSE_STEPS 200    /* of Newton's method at given bounds */
+#define DENSE_STEPS 200 /* of Newton's method at given bounds */
 #define DENSE_ROUNDS 3000
-#define DENSE_SMALL 1e-12  /* relative motion at which a method rests */
+#define DENSE_SMALL 1e-12 /* relative motion at which a method rests */
 #define DENSE_JACOBI 60
 #define DENSE_SINGULAR 1e-13 /* least eigenvalue by the largest */
-#define DENSE_AT_ONCE 1e-9  /* [m] u_f of a law without a flat part */
-#define DENSE_REST 1e-3     /* [m/s] resistive force theory at rest, docs/model.md section 19 */
-#define DENSE_PEAK 1.08     /* [-] its greatest coefficient there */
+#define DENSE_AT_ONCE 1e-9   /* [m] u_f of a law without a flat part */
+#define DENSE_REST 1e-3      /* [m/s] resistive force theory at rest, docs/model.md section 19 */
+#define DENSE_PEAK 1.08      /* [-] its greatest coefficient there */
 
 /* ---- the element's law ---- */
 
-/* P(u) = u_f/3 (1 - (1 - t)^3), t = min(u/u_f, 1): the flat area's integral over the depth, by the element's area. */
+/* P(u) = u_f/3 (1 - (1 - t)^3), t = min(u/u_f, 1): the flat area's integral over the depth, by the
+ * element's area. */
 static double cone_share(const DenseLaw *law, double u) {
     double left = 1.0 - fmin(u / law->full, 1.0);
     return law->full / 3.0 * (1.0 - left * left * left);
@@ -34,35 +35,50 @@ static double cone_slope(const DenseLaw *law, double u) {
     return (law->k_pen - law->kappa) * cone_flat(law, u) + law->kappa;
 }
 
-/* Integral of the ground's force from m0 to m1: the unloading line up to the front, virgin ground by Simpson's rule beyond,
- * the bed with its force at m1. */
+/* Integral of the ground's force from m0 to m1: the unloading line up to the front, virgin ground
+ * by Simpson's rule beyond, the bed with its force at m1. */
 static double law_work(const DenseElement *e, double m1) {
     const DenseLaw *law = &e->law;
-    double from = fmax(e->m0 - e->slack, 0.0), to = fmax(fmin(m1, e->front) - e->slack, 0.0), way = m1 - e->front;
+    double from = fmax(e->m0 - e->slack, 0.0), to = fmax(fmin(m1, e->front) - e->slack, 0.0),
+           way = m1 - e->front;
     double work = 0.5 * e->line * (to - from) * (to + from), u = e->deep;
-    if (way <= 0.0) return work;
-    double simpson = (cone_force(law, u) + 4.0 * cone_force(law, u + 0.5 * way) + cone_force(law, u + way)) / 6.0;
+    if (way <= 0.0) {
+        return work;
+    }
+    double simpson =
+        (cone_force(law, u) + 4.0 * cone_force(law, u + 0.5 * way) + cone_force(law, u + way)) /
+        6.0;
     return work + way * (simpson + law->bed_stiffness * fmax(u + way - law->bed, 0.0));
 }
 
 /* Impulse of the mass that is recruited in the step, and of drag, by the growth of P. */
 static double law_recruited(const DenseElement *e, double down) {
-    double mass = fmax(e->law.mass_rate, 0.0), extra = fmax(e->law.drag_rate, 0.0) - mass, lost = fmax(e->hit - down, 0.0);
-    if (extra < 0.0) return mass * down + 0.5 * extra * (down + fmin(down, e->w0));
-    return mass * down + extra * (0.5 * (e->hit + down) + (lost > 0.0 ? (e->still - 0.5) * lost * lost / e->hit : 0.0));
+    double mass = fmax(e->law.mass_rate, 0.0), extra = fmax(e->law.drag_rate, 0.0) - mass,
+           lost = fmax(e->hit - down, 0.0);
+    if (extra < 0.0) {
+        return mass * down + 0.5 * extra * (down + fmin(down, e->w0));
+    }
+    return mass * down + extra * (0.5 * (e->hit + down) +
+                                  (lost > 0.0 ? (e->still - 0.5) * lost * lost / e->hit : 0.0));
 }
 
 static double law_normal(double dt, const DenseElement *e, double w) {
     const DenseLaw *law = &e->law;
-    double m1 = e->u0 + 0.5 * dt * w, way = m1 - e->m0, force = e->line * fmax(e->m0 - e->slack, 0.0);
-    if (fabs(way) > 1e-16) force = law_work(e, m1) / way;
-    if (fmin(m1, e->m0) > e->slack && m1 <= e->front) force = e->line * (0.5 * (e->m0 + m1) - e->slack); /* nothing cancels */
+    double m1 = e->u0 + 0.5 * dt * w, way = m1 - e->m0,
+           force = e->line * fmax(e->m0 - e->slack, 0.0);
+    if (fabs(way) > 1e-16) {
+        force = law_work(e, m1) / way;
+    }
+    if (fmin(m1, e->m0) > e->slack && m1 <= e->front) {
+        force = e->line * (0.5 * (e->m0 + m1) - e->slack); /* nothing cancels */
+    }
     double impulse = dt * force + e->mass * (fmax(w, e->reach) - e->w_a);
     if (m1 > e->front) {
         double gained = cone_share(law, e->deep + m1 - e->front) - cone_share(law, e->deep);
         impulse += fmax(gained, fmin(2.0 * gained, e->stopped)) * law_recruited(e, fmax(w, 0.0));
     }
-    double back = fmin(w + e->hit, 0.0), eased = back < -STEP_EASE ? back + 0.5 * STEP_EASE : -0.5 * back * back / STEP_EASE;
+    double back = fmin(w + e->hit, 0.0),
+           eased = back < -STEP_EASE ? back + 0.5 * STEP_EASE : -0.5 * back * back / STEP_EASE;
     return fmax(impulse + dt * STEP_LAG * e->line * eased + e->active, 0.0);
 }
 
@@ -74,13 +90,19 @@ static int is_resistive(const MildMaterial *m) {
 
 /* A cone that is complete at once: yielding springs and resistive force theory. */
 static int is_straight(const MildMaterial *m) {
-    return is_resistive(m) || m->model == MILD_MODEL_CON_SPRING || m->model == MILD_MODEL_ECC_SPRING;
+    return is_resistive(m) || m->model == MILD_MODEL_CON_SPRING ||
+           m->model == MILD_MODEL_ECC_SPRING;
 }
 
 static DenseLaw law_material(const MildMaterial *m, double pitch) {
-    double area = pitch * pitch, c_g = m->passive ? fmax(m->c_g, 0.0) : m->c_g, c_d = m->passive ? fmax(m->c_d, 0.5) : m->c_d;
-    DenseLaw law = {.bed = m->bed_depth, .bed_stiffness = LAW_BED_STRESS * area, .recovery = m->recovery,
-                    .mu = m->mu, .k_drift = m->k_drift, .b_drift = m->b_drift};
+    double area = pitch * pitch, c_g = m->passive ? fmax(m->c_g, 0.0) : m->c_g,
+           c_d = m->passive ? fmax(m->c_d, 0.5) : m->c_d;
+    DenseLaw law = {.bed = m->bed_depth,
+                    .bed_stiffness = LAW_BED_STRESS * area,
+                    .recovery = m->recovery,
+                    .mu = m->mu,
+                    .k_drift = m->k_drift,
+                    .b_drift = m->b_drift};
     if (is_straight(m)) {
         law.k_pen = law.kappa = is_resistive(m) ? m->zeta * LAW_RESIST_STRESS * area : m->k_pen;
         law.full = DENSE_AT_ONCE;
@@ -101,7 +123,9 @@ static DenseLaw law_blend(const DenseLaw *one, const DenseLaw *other, double sha
     DenseLaw law;
     memcpy(a, one, sizeof a);
     memcpy(b, other, sizeof b);
-    for (int k = 0; k < NUMBERS; k++) a[k] = (1.0 - share) * a[k] + share * b[k];
+    for (int k = 0; k < NUMBERS; k++) {
+        a[k] = (1.0 - share) * a[k] + share * b[k];
+    }
     memcpy(&law, a, sizeof a);
     return law;
 }
@@ -114,47 +138,71 @@ static void rotate(double *x, double *z, double c, double s) {
     *x = turned;
 }
 
-/* Eigenvectors of a symmetric matrix by Jacobi's rotations, scaled by the roots of the eigenvalues: A = L L^T. */
+/* Eigenvectors of a symmetric matrix by Jacobi's rotations, scaled by the roots of the eigenvalues:
+ * A = L L^T. */
 static void dense_factor(Dense *d, const double *A) {
     int n = d->n;
     double S[12][12], Q[12][12] = {{0}}, largest = 0.0;
     for (int i = 0; i < n; i++) {
         Q[i][i] = 1.0;
-        for (int j = 0; j < n; j++) S[i][j] = 0.5 * (A[i * n + j] + A[j * n + i]);
+        for (int j = 0; j < n; j++) {
+            S[i][j] = 0.5 * (A[i * n + j] + A[j * n + i]);
+        }
     }
-    for (int sweep = 0; sweep < DENSE_JACOBI; sweep++)
-        for (int p = 0; p < n; p++)
+    for (int sweep = 0; sweep < DENSE_JACOBI; sweep++) {
+        for (int p = 0; p < n; p++) {
             for (int q = p + 1; q < n; q++) {
-                double angle = 0.5 * atan2(2.0 * S[p][q], S[q][q] - S[p][p]), c = cos(angle), s = sin(angle);
-                if (S[p][q] == 0.0) continue;
-                for (int k = 0; k < n; k++) rotate(&S[k][p], &S[k][q], c, s);
-                for (int k = 0; k < n; k++) rotate(&S[p][k], &S[q][k], c, s);
-                for (int k = 0; k < n; k++) rotate(&Q[k][p], &Q[k][q], c, s);
+                double angle = 0.5 * atan2(2.0 * S[p][q], S[q][q] - S[p][p]), c = cos(angle),
+                       s = sin(angle);
+                if (S[p][q] == 0.0) {
+                    continue;
+                }
+                for (int k = 0; k < n; k++) {
+                    rotate(&S[k][p], &S[k][q], c, s);
+                }
+                for (int k = 0; k < n; k++) {
+                    rotate(&S[p][k], &S[q][k], c, s);
+                }
+                for (int k = 0; k < n; k++) {
+                    rotate(&Q[k][p], &Q[k][q], c, s);
+                }
                 S[p][q] = S[q][p] = 0.0;
             }
-    for (int k = 0; k < n; k++) largest = fmax(largest, S[k][k]);
+        }
+    }
     for (int k = 0; k < n; k++) {
-        if (S[k][k] <= DENSE_SINGULAR * largest) continue;
-        for (int i = 0; i < n; i++) d->L[i][d->rank] = sqrt(S[k][k]) * Q[i][k];
+        largest = fmax(largest, S[k][k]);
+    }
+    for (int k = 0; k < n; k++) {
+        if (S[k][k] <= DENSE_SINGULAR * largest) {
+            continue;
+        }
+        for (int i = 0; i < n; i++) {
+            d->L[i][d->rank] = sqrt(S[k][k]) * Q[i][k];
+        }
         d->rank++;
     }
 }
 
-/* The line runs from (a, F(a)) to no force after recovery a, not within CONTACT_ELASTIC, and is never flatter than F at a;
- * in the bed the steepest slope is taken. */
+/* The line runs from (a, F(a)) to no force after recovery a, not within CONTACT_ELASTIC, and is
+ * never flatter than F at a; in the bed the steepest slope is taken. */
 static void element_line(DenseElement *e) {
     const DenseLaw *law = &e->law;
-    double a = e->deep, in_bed = fmax(a - law->bed, 0.0), force = cone_force(law, a) + law->bed_stiffness * in_bed;
+    double a = e->deep, in_bed = fmax(a - law->bed, 0.0),
+           force = cone_force(law, a) + law->bed_stiffness * in_bed;
     double travel = fmax(law->recovery * a, fmin(CONTACT_ELASTIC, a));
-    double slope = in_bed > 0.0 ? fmax(law->k_pen, law->kappa) + law->bed_stiffness : cone_slope(law, a);
+    double slope =
+        in_bed > 0.0 ? fmax(law->k_pen, law->kappa) + law->bed_stiffness : cone_slope(law, a);
     e->line = travel > 0.0 ? fmax(force / travel, slope) : slope;
     e->slack = a - force / e->line;
 }
 
 /* ---- resistive force theory ---- */
 
-/* Resistance backward and upward on a face with normal n (into the ground) that moves along the heading at these speeds. */
-static void resist_alpha(int model, const double *n, const double *heading, double level, double down, double alpha[2]) {
+/* Resistance backward and upward on a face with normal n (into the ground) that moves along the
+ * heading at these speeds. */
+static void resist_alpha(int model, const double *n, const double *heading, double level,
+                         double down, double alpha[2]) {
     double gamma = atan2(down, level);
     if (model == MILD_MODEL_ECC_QUASI) {
         mild_resist_plane(atan2(n[0] * heading[0] + n[1] * heading[1], -n[2]), gamma, alpha);
@@ -167,26 +215,40 @@ static void resist_alpha(int model, const double *n, const double *heading, doub
     alpha[1] = force[2];
 }
 
-/* The line is that of the greatest coefficient. It gives the yield force, a share of it, at the front, which lies behind the
- * depth that the line belongs to and never behind the element. v: the element's velocity, w: du/dt, now. */
-static void element_resist(double dt, DenseElement *e, int model, const double *n, const double *v, double w) {
+/* The line is that of the greatest coefficient. It gives the yield force, a share of it, at the
+ * front, which lies behind the depth that the line belongs to and never behind the element. v: the
+ * element's velocity, w: du/dt, now. */
+static void element_resist(double dt, DenseElement *e, int model, const double *n, const double *v,
+                           double w) {
     DenseLaw *law = &e->law;
-    double tilt = hypot(n[0], n[1]), heading[2] = {v[0], v[1]}, level = hypot(v[0], v[1]), down = fmax(w, 0.0), x[2], z[2];
-    for (int k = 0; k < 2 && tilt > 0.0; k++) heading[k] += DENSE_REST * n[k] / tilt;
-    if (level * STEP_LAG < FRICTION_ELASTIC) level = 0.0; /* friction may hold it yet */
+    double tilt = hypot(n[0], n[1]), heading[2] = {v[0], v[1]}, level = hypot(v[0], v[1]),
+           down = fmax(w, 0.0), x[2], z[2];
+    for (int k = 0; k < 2 && tilt > 0.0; k++) {
+        heading[k] += DENSE_REST * n[k] / tilt;
+    }
+    if (level * STEP_LAG < FRICTION_ELASTIC) {
+        level = 0.0; /* friction may hold it yet */
+    }
     double length = hypot(heading[0], heading[1]), strength = law->kappa;
-    for (int k = 0; k < 2 && length > 0.0; k++) heading[k] /= length;
+    for (int k = 0; k < 2 && length > 0.0; k++) {
+        heading[k] /= length;
+    }
     resist_alpha(model, n, heading, level + DENSE_REST, down, x);
     resist_alpha(model, n, heading, level, down + DENSE_REST, z);
     double share = fmin(fmax(z[1] / DENSE_PEAK, 0.0), 1.0), peak = DENSE_PEAK * strength;
     if (e->m0 > 0.0) {
-        double least = e->m0 + CONTACT_ELASTIC * (1.0 - share); /* deeper than the elastic travel; or else */
-        if (share * least > e->m0) least = e->m0 / share;
+        double least =
+            e->m0 + CONTACT_ELASTIC * (1.0 - share); /* deeper than the elastic travel; or else */
+        if (share * least > e->m0) {
+            least = e->m0 / share;
+        }
         e->deep = fmax(e->deep, least);
     }
     double bed = law->bed_stiffness * fmax(e->deep - law->bed, 0.0);
     e->line = e->deep > CONTACT_ELASTIC ? (peak * e->deep + bed) / CONTACT_ELASTIC : peak;
-    if (bed > 0.0) e->line = fmax(e->line, peak + law->bed_stiffness);
+    if (bed > 0.0) {
+        e->line = fmax(e->line, peak + law->bed_stiffness);
+    }
     e->slack = e->deep - (peak * e->deep + bed) / e->line;
     e->front = e->slack + (share * peak * e->deep + bed) / e->line;
     e->radius += dt * strength * fmax(x[0], 0.0) * fmax(e->u0, 0.0);
@@ -195,9 +257,11 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
 
 /* ---- what an element finds and remembers ---- */
 
-/* What friction holds: k from the bound at the front's yield force; the force held falls where k has fallen. */
+/* What friction holds: k from the bound at the front's yield force; the force held falls where k
+ * has fallen. */
 static void element_hold(double dt, DenseElement *e, double x, double y, double old) {
-    double k = (e->law.mu * e->line * (e->front - e->slack) + e->radius / dt) / FRICTION_ELASTIC, keeps = k < old ? k / old : 1.0;
+    double k = (e->law.mu * e->line * (e->front - e->slack) + e->radius / dt) / FRICTION_ELASTIC,
+           keeps = k < old ? k / old : 1.0;
     e->grip = dt * dt * k;
     e->hold[0] = dt * keeps * x;
     e->hold[1] = dt * keeps * y;
@@ -213,42 +277,57 @@ typedef struct {
     double p[3], at[3], slope[2]; /* ankle -> element, world point, gradient of the ground */
 } Find;
 
-/* Depth under the ground as it is here or, if that is less, under the plane that the last step took it for. */
+/* Depth under the ground as it is here or, if that is less, under the plane that the last step took
+ * it for. */
 static double find_depth(const Find *find) {
     const MildTerrain *terrain = &find->kit->terrain;
     const Memory *memory = &find->memory;
     int i = find->i, code = memory->material[i];
     double here = mild_terrain_height_at(terrain, find->at[0], find->at[1]) - find->at[2];
-    if (!terrain->map || mild_map_is_level(terrain->map) || !find->kit->ground->uneven[find->f]) return here;
-    if (code == MATERIAL_NONE || (code == MATERIAL_FREE && here <= 0.0)) return here;
-    double plane = memory->plane[i] + memory->slope_x[i] * find->at[0] + memory->slope_y[i] * find->at[1];
+    if (!terrain->map || mild_map_is_level(terrain->map) || !find->kit->ground->uneven[find->f]) {
+        return here;
+    }
+    if (code == MATERIAL_NONE || (code == MATERIAL_FREE && here <= 0.0)) {
+        return here;
+    }
+    double plane =
+        memory->plane[i] + memory->slope_x[i] * find->at[0] + memory->slope_y[i] * find->at[1];
     return fmin(here, terrain->height + plane - find->at[2]);
 }
 
-/* u_max: the element's own; when it carries nothing the print's under it, and at least the one whose line ends here. */
+/* u_max: the element's own; when it carries nothing the print's under it, and at least the one
+ * whose line ends here. */
 static double find_deepest(const Find *find, double recovery) {
     const MildGround *ground = find->kit->ground;
     const double *R = find->kit->input.rotation[find->f];
     double deepest = find->memory.depth_max[find->i], m0 = find->memory.middle[find->i], sum = 0.0;
-    if (ground->tiles == 0 || find->memory.material[find->i] >= 0 || recovery >= 1.0) return deepest;
+    if (ground->tiles == 0 || find->memory.material[find->i] >= 0 || recovery >= 1.0) {
+        return deepest;
+    }
     for (int k = 0; k < 9; k++) {
         double a = (k % 3 - 1) * find->pitch / 3.0, b = (k / 3 - 1) * find->pitch / 3.0;
-        sum += mild_ground_print_at(ground, find->at[0] + R[0] * a + R[1] * b, find->at[1] + R[3] * a + R[4] * b);
+        sum += mild_ground_print_at(ground, find->at[0] + R[0] * a + R[1] * b,
+                                    find->at[1] + R[3] * a + R[4] * b);
     }
     deepest = sum / 9.0;
-    if (find->memory.material[find->i] == MATERIAL_FREE && m0 > 0.0)
+    if (find->memory.material[find->i] == MATERIAL_FREE && m0 > 0.0) {
         deepest = fmax(deepest, fmax(m0 / (1.0 - recovery), m0 + CONTACT_ELASTIC));
+    }
     return deepest;
 }
 
-/* Law of the material, or the two that blend, that it touched down on or finds; returns the model whose resistance has a
- * direction, or -1. Blended with a cone there is none: both are as under a level plate. */
+/* Law of the material, or the two that blend, that it touched down on or finds; returns the model
+ * whose resistance has a direction, or -1. Blended with a cone there is none: both are as under a
+ * level plate. */
 static int find_law(const Find *find, DenseLaw *law) {
     const MildTerrain *terrain = &find->kit->terrain;
     int code = find->memory.material[find->i];
     MildBlend blend = {code & 0xff, code >> 8 & 0xff, (code >> 16) / 255.0};
-    if (code < 0) blend = mild_terrain_blend_at(terrain, find->at[0], find->at[1]);
-    const MildMaterial *first = &terrain->materials[blend.first], *second = &terrain->materials[blend.second];
+    if (code < 0) {
+        blend = mild_terrain_blend_at(terrain, find->at[0], find->at[1]);
+    }
+    const MildMaterial *first = &terrain->materials[blend.first],
+                       *second = &terrain->materials[blend.second];
     DenseLaw one = law_material(first, find->pitch), other = law_material(second, find->pitch);
     *law = blend.share > 0.0 ? law_blend(&one, &other, blend.share) : one;
     return is_resistive(first) && (blend.share == 0.0 || is_straight(second)) ? first->model : -1;
@@ -257,20 +336,27 @@ static int find_law(const Find *find, DenseLaw *law) {
 /* Velocity of a point at p, and the speed at which its depth grows, of a foot's twist. */
 static void point_velocity(const Find *find, const double *twist, double v[4]) {
     kit_cross(twist + 3, find->p, v);
-    for (int k = 0; k < 3; k++) v[k] += twist[k];
+    for (int k = 0; k < 3; k++) {
+        v[k] += twist[k];
+    }
     v[3] = find->slope[0] * v[0] + find->slope[1] * v[1] - v[2];
 }
 
 /* How the drag of an element that goes on into virgin ground counts: see src/ground/step.h. */
 static void element_drag(double dt, DenseElement *e, double gained) {
     const DenseLaw *law = &e->law;
-    double a = e->front, extra = fmax(law->drag_rate, 0.0) - fmax(law->mass_rate, 0.0), deep = fmax(e->u0, a);
+    double a = e->front, extra = fmax(law->drag_rate, 0.0) - fmax(law->mass_rate, 0.0),
+           deep = fmax(e->u0, a);
     e->hit = e->w0;
     e->still = 0.5;
-    if (!(extra > 0.0 && e->u0 + 0.5 * dt * e->w0 > a + CONTACT_ELASTIC)) return;
-    double force = cone_force(law, a) + 0.5 * cone_slope(law, a) * (deep - a), drag = extra * cone_flat(law, a);
+    if (!(extra > 0.0 && e->u0 + 0.5 * dt * e->w0 > a + CONTACT_ELASTIC)) {
+        return;
+    }
+    double force = cone_force(law, a) + 0.5 * cone_slope(law, a) * (deep - a),
+           drag = extra * cone_flat(law, a);
     e->hit = sqrt(e->w0 * e->w0 + 2.0 * fmax(gained, 0.0) / dt * (a - e->m0));
-    e->still = fmin(STEP_STILL + sqrt(force / fmax(drag * e->hit * e->hit, 1e-300)), STEP_STILL_MOST);
+    e->still =
+        fmin(STEP_STILL + sqrt(force / fmax(drag * e->hit * e->hit, 1e-300)), STEP_STILL_MOST);
     e->stopped = cone_share(law, deep) - cone_share(law, a);
 }
 
@@ -282,9 +368,13 @@ static void dense_element(Dense *d, const Find *find) {
     point_velocity(find, find->kit->input.velocity[find->f], now);
     for (int c = -1; c < d->rank; c++) { /* -1: the free twist */
         double twist[6], v[4];
-        for (int k = 0; k < 6; k++) twist[k] = c < 0 ? d->free[6 * find->f + k] : d->L[6 * find->f + k][c];
+        for (int k = 0; k < 6; k++) {
+            twist[k] = c < 0 ? d->free[6 * find->f + k] : d->L[6 * find->f + k][c];
+        }
         point_velocity(find, twist, v);
-        for (int k = 0; k < 4; k++) *(c < 0 ? &e->free[k] : &e->C[k][c]) = v[k];
+        for (int k = 0; k < 4; k++) {
+            *(c < 0 ? &e->free[k] : &e->C[k][c]) = v[k];
+        }
     }
     e->u0 = find_depth(find);
     e->w0 = fmax(now[3], 0.0);
@@ -295,19 +385,26 @@ static void dense_element(Dense *d, const Find *find) {
     e->mass = fmax(e->law.mass_rate, 0.0) * cone_share(&e->law, e->deep);
     e->radius = d->dt * e->law.k_drift * memory->drift[i] * fmax(e->u0, 0.0);
     e->damping = e->u0 > 0.0 ? d->dt * e->law.b_drift : 0.0;
-    if (e->u0 > 0.0 && e->m0 >= deepest)
-        e->active = fmin(e->law.mass_rate, 0.0) * cone_share(&e->law, e->deep) * (e->free[3] - e->w_a) +
-                    fmin(e->law.drag_rate, 0.0) * cone_flat(&e->law, e->deep) * d->dt * e->w0 * e->w0;
+    if (e->u0 > 0.0 && e->m0 >= deepest) {
+        e->active =
+            fmin(e->law.mass_rate, 0.0) * cone_share(&e->law, e->deep) * (e->free[3] - e->w_a) +
+            fmin(e->law.drag_rate, 0.0) * cone_flat(&e->law, e->deep) * d->dt * e->w0 * e->w0;
+    }
     element_line(e);
     element_drag(d->dt, e, e->free[3] - now[3]);
-    if (model >= 0) element_resist(d->dt, e, model, find->normal, now, now[3]);
+    if (model >= 0) {
+        element_resist(d->dt, e, model, find->normal, now, now[3]);
+    }
     element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->grip[i]);
 }
 
 static void dense_foot(Dense *d, const Kit *kit, int f) {
     const MildSole *sole = kit->soles[f];
     const double *R = kit->input.rotation[f], side = R[8] > 0.0 ? -1.0 : 1.0;
-    Find find = {.kit = kit, .f = f, .memory = ground_memory(kit->ground, f), .pitch = mild_sole_pitch(sole),
+    Find find = {.kit = kit,
+                 .f = f,
+                 .memory = ground_memory(kit->ground, f),
+                 .pitch = mild_sole_pitch(sole),
                  .normal = {side * R[2], side * R[5], side * R[8]}};
     for (find.i = 0; find.i < mild_sole_elements(sole); find.i++) {
         double x = mild_sole_x(sole)[find.i], y = mild_sole_y(sole)[find.i], z = mild_sole_z(sole);
@@ -326,7 +423,9 @@ void dense_open(Dense *dense, const Kit *kit) {
     dense->dt = kit->input.dt;
     memcpy(dense->free, kit->input.free_velocity, sizeof dense->free);
     dense_factor(dense, kit->input.inverse_inertia);
-    for (int f = 0; f < kit->feet; f++) dense_foot(dense, kit, f);
+    for (int f = 0; f < kit->feet; f++) {
+        dense_foot(dense, kit, f);
+    }
 }
 
 /* ---- its minimum ---- */
@@ -334,33 +433,52 @@ void dense_open(Dense *dense, const Kit *kit) {
 static void element_velocity(const Dense *d, const DenseElement *e, const double *y, double *v) {
     for (int k = 0; k < 4; k++) {
         v[k] = e->free[k];
-        for (int c = 0; c < d->rank; c++) v[k] += e->C[k][c] * y[c];
+        for (int c = 0; c < d->rank; c++) {
+            v[k] += e->C[k][c] * y[c];
+        }
     }
 }
 
-/* Gradient y - sum C^T I and, if wanted, the Hessian 1 + sum C^T K C; the normal law's slope by difference. The normal
- * impulse acts along -grad u: its power is -I_z du/dt, so its row of C is minus that of du/dt. */
+/* Gradient y - sum C^T I and, if wanted, the Hessian 1 + sum C^T K C; the normal law's slope by
+ * difference. The normal impulse acts along -grad u: its power is -I_z du/dt, so its row of C is
+ * minus that of du/dt. */
 static void dense_gradient(const Dense *d, const double *y, double *g, double H[12][12]) {
     int n = d->rank;
     memcpy(g, y, 12 * sizeof *g);
-    for (int r = 0; H && r < n; r++)
-        for (int c = 0; c < n; c++) H[r][c] = r == c;
+    for (int r = 0; H && r < n; r++) {
+        for (int c = 0; c < n; c++) {
+            H[r][c] = r == c;
+        }
+    }
     for (int i = 0; i < d->elements; i++) {
         const DenseElement *e = &d->element[i];
         double v[4];
         element_velocity(d, e, y, v);
         double r = d->bound[i], along = e->grip + r * STEP_LAG / FRICTION_ELASTIC;
-        double tx = e->hold[0] - along * v[0], ty = e->hold[1] - along * v[1], t = hypot(tx, ty), share = t > r ? r / t : 1.0;
-        const double I[3] = {share * tx - e->damping * v[0], share * ty - e->damping * v[1], law_normal(d->dt, e, v[3])};
-        for (int c = 0; c < n; c++) g[c] -= e->C[0][c] * I[0] + e->C[1][c] * I[1] - e->C[3][c] * I[2];
-        if (!H) continue;
-        double h = 1e-7, stiff = (law_normal(d->dt, e, v[3] + h) - law_normal(d->dt, e, v[3] - h)) / (2.0 * h);
+        double tx = e->hold[0] - along * v[0], ty = e->hold[1] - along * v[1], t = hypot(tx, ty),
+               share = t > r ? r / t : 1.0;
+        const double I[3] = {share * tx - e->damping * v[0], share * ty - e->damping * v[1],
+                             law_normal(d->dt, e, v[3])};
+        for (int c = 0; c < n; c++) {
+            g[c] -= e->C[0][c] * I[0] + e->C[1][c] * I[1] - e->C[3][c] * I[2];
+        }
+        if (!H) {
+            continue;
+        }
+        double h = 1e-7, stiff = (law_normal(d->dt, e, v[3] + h) - law_normal(d->dt, e, v[3] - h)) /
+                                 (2.0 * h);
         double nx = t > r ? tx / t : 0.0, ny = t > r ? ty / t : 0.0, pull = share * along;
-        double xx = e->damping + pull * (1.0 - nx * nx), xy = -pull * nx * ny, yy = e->damping + pull * (1.0 - ny * ny);
-        if (xx + yy == 0.0 && stiff == 0.0) continue;
+        double xx = e->damping + pull * (1.0 - nx * nx), xy = -pull * nx * ny,
+               yy = e->damping + pull * (1.0 - ny * ny);
+        if (xx + yy == 0.0 && stiff == 0.0) {
+            continue;
+        }
         for (int r = 0; r < n; r++) {
-            double X = xx * e->C[0][r] + xy * e->C[1][r], Y = xy * e->C[0][r] + yy * e->C[1][r], W = stiff * e->C[3][r];
-            for (int c = 0; c <= r; c++) H[r][c] += X * e->C[0][c] + Y * e->C[1][c] + W * e->C[3][c];
+            double X = xx * e->C[0][r] + xy * e->C[1][r], Y = xy * e->C[0][r] + yy * e->C[1][r],
+                   W = stiff * e->C[3][r];
+            for (int c = 0; c <= r; c++) {
+                H[r][c] += X * e->C[0][c] + Y * e->C[1][c] + W * e->C[3][c];
+            }
         }
     }
 }
@@ -368,42 +486,57 @@ static void dense_gradient(const Dense *d, const double *y, double *g, double H[
 /* x = -H^-1 g by Cholesky's method, in place of H's lower half. */
 static void dense_direction(int n, double H[12][12], const double *g, double *x) {
     for (int j = 0; j < n; j++) {
-        for (int k = 0; k < j; k++) H[j][j] -= H[j][k] * H[j][k];
+        for (int k = 0; k < j; k++) {
+            H[j][j] -= H[j][k] * H[j][k];
+        }
         H[j][j] = sqrt(fmax(H[j][j], 0.5)); /* no eigenvalue is below 1 */
         for (int i = j + 1; i < n; i++) {
-            for (int k = 0; k < j; k++) H[i][j] -= H[i][k] * H[j][k];
+            for (int k = 0; k < j; k++) {
+                H[i][j] -= H[i][k] * H[j][k];
+            }
             H[i][j] /= H[j][j];
         }
     }
     for (int i = 0; i < n; i++) {
         x[i] = -g[i];
-        for (int k = 0; k < i; k++) x[i] -= H[i][k] * x[k];
+        for (int k = 0; k < i; k++) {
+            x[i] -= H[i][k] * x[k];
+        }
         x[i] /= H[i][i];
     }
     for (int i = n - 1; i >= 0; i--) {
-        for (int k = i + 1; k < n; k++) x[i] -= H[k][i] * x[k];
+        for (int k = i + 1; k < n; k++) {
+            x[i] -= H[k][i] * x[k];
+        }
         x[i] /= H[i][i];
     }
 }
 
 static double dot(int n, const double *a, const double *b) {
     double sum = 0.0;
-    for (int i = 0; i < n; i++) sum += a[i] * b[i];
+    for (int i = 0; i < n; i++) {
+        sum += a[i] * b[i];
+    }
     return sum;
 }
 
 /* Slope of the function along the line, at y + t x. */
 static double dense_along(const Dense *d, const double *y, const double *x, double t) {
     double at[12] = {0}, g[12];
-    for (int i = 0; i < d->rank; i++) at[i] = y[i] + t * x[i];
+    for (int i = 0; i < d->rank; i++) {
+        at[i] = y[i] + t * x[i];
+    }
     dense_gradient(d, at, g, NULL);
     return dot(d->rank, g, x);
 }
 
-/* Where the slope along x vanishes: the lowest point of the line. A full step is kept that nearly reaches it. */
+/* Where the slope along x vanishes: the lowest point of the line. A full step is kept that nearly
+ * reaches it. */
 static double dense_line(const Dense *d, const double *y, const double *x, double slope) {
     double low = 0.0, high = 1.0, at = dense_along(d, y, x, 1.0);
-    if (fabs(at) <= 0.1 * fabs(slope)) return 1.0;
+    if (fabs(at) <= 0.1 * fabs(slope)) {
+        return 1.0;
+    }
     for (int k = 0; k < 30 && at < 0.0; k++) {
         low = high;
         high *= 2.0;
@@ -416,15 +549,20 @@ static double dense_line(const Dense *d, const double *y, const double *x, doubl
     return 0.5 * (low + high);
 }
 
-/* The minimum at the present bounds, by Newton's method with an exact line search; true when it rests. */
+/* The minimum at the present bounds, by Newton's method with an exact line search; true when it
+ * rests. */
 static int dense_minimum(Dense *d) {
     for (int k = 0; k < DENSE_STEPS; k++) {
         double g[12], H[12][12], x[12] = {0};
         dense_gradient(d, d->y, g, H);
         dense_direction(d->rank, H, g, x);
-        if (dot(d->rank, x, x) <= DENSE_SMALL * DENSE_SMALL * dot(d->rank, d->y, d->y)) return 1;
+        if (dot(d->rank, x, x) <= DENSE_SMALL * DENSE_SMALL * dot(d->rank, d->y, d->y)) {
+            return 1;
+        }
         double t = dense_line(d, d->y, x, dot(d->rank, g, x));
-        for (int i = 0; i < d->rank; i++) d->y[i] += t * x[i];
+        for (int i = 0; i < d->rank; i++) {
+            d->y[i] += t * x[i];
+        }
     }
     return 0;
 }
@@ -446,16 +584,23 @@ int dense_solve(Dense *d) {
         double before[12], moved[12];
         memcpy(before, d->y, sizeof before);
         int found = dense_minimum(d);
-        for (int i = 0; i < d->rank; i++) moved[i] = d->y[i] - before[i];
+        for (int i = 0; i < d->rank; i++) {
+            moved[i] = d->y[i] - before[i];
+        }
         double change = sqrt(dot(d->rank, moved, moved));
-        settled = found && round > 1 && change <= share * DENSE_SMALL * sqrt(dot(d->rank, d->y, d->y));
+        settled =
+            found && round > 1 && change <= share * DENSE_SMALL * sqrt(dot(d->rank, d->y, d->y));
         if (round % 16 == 15) { /* bounds that run to and fro come to rest by smaller moves */
-            if (change > 0.5 * last) share = fmax(0.5 * share, 0.02);
+            if (change > 0.5 * last) {
+                share = fmax(0.5 * share, 0.02);
+            }
             last = change;
         }
         dense_bounds(d, share);
     }
-    for (int i = 0; i < d->n; i++) d->twist[i] = d->free[i] + dot(d->rank, d->L[i], d->y);
+    for (int i = 0; i < d->n; i++) {
+        d->twist[i] = d->free[i] + dot(d->rank, d->L[i], d->y);
+    }
     return settled;
 }
 

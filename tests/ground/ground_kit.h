@@ -1,10 +1,11 @@
-/* What the ground's tests share: the reference soles, random materials, a free rigid body on each foot. */
+/* What the ground's tests share: the reference soles, random materials, a free rigid body on each
+ * foot. */
 #ifndef GROUND_KIT_H
 #define GROUND_KIT_H
 
 #include <math.h>
-#include <stdarg.h>
 #include <setjmp.h>
+#include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -34,11 +35,13 @@ static inline int kit_index(uint64_t *state, int count) {
 
 /* Left sole of the reference robot, y range at x [m]; the right one is its mirror image. */
 static const double kit_outline[19][3] = {
-    {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044}, {-0.045, -0.045, 0.047}, {-0.03, -0.046, 0.049},
-    {-0.015, -0.046, 0.051}, {0.0, -0.041, 0.041},   {0.015, -0.041, 0.041},  {0.03, -0.041, 0.041},
-    {0.045, -0.041, 0.041},  {0.06, -0.046, 0.057},  {0.075, -0.046, 0.057},  {0.09, -0.046, 0.057},
-    {0.105, -0.046, 0.057},  {0.12, -0.046, 0.057},  {0.135, -0.046, 0.057},  {0.15, -0.046, 0.057},
-    {0.165, -0.045, 0.049},  {0.18, -0.038, 0.039},  {0.195, -0.016, 0.015}};
+    {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044},  {-0.045, -0.045, 0.047},
+    {-0.03, -0.046, 0.049},  {-0.015, -0.046, 0.051}, {0.0, -0.041, 0.041},
+    {0.015, -0.041, 0.041},  {0.03, -0.041, 0.041},   {0.045, -0.041, 0.041},
+    {0.06, -0.046, 0.057},   {0.075, -0.046, 0.057},  {0.09, -0.046, 0.057},
+    {0.105, -0.046, 0.057},  {0.12, -0.046, 0.057},   {0.135, -0.046, 0.057},
+    {0.15, -0.046, 0.057},   {0.165, -0.045, 0.049},  {0.18, -0.038, 0.039},
+    {0.195, -0.016, 0.015}};
 
 static inline MildSole *kit_sole(int right, int target) {
     double outline[2 * 38], sign = right ? -1.0 : 1.0;
@@ -50,7 +53,9 @@ static inline MildSole *kit_sole(int right, int target) {
     MildSoleDef def = {outline, 38, KIT_PITCH, KIT_SOLE_Z, target};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) fail_msg("%s", error.text);
+    if (!sole) {
+        fail_msg("%s", error.text);
+    }
     return sole;
 }
 
@@ -61,7 +66,9 @@ static inline MildSole *kit_plate(int columns, int rows) {
     MildSoleDef def = {outline, 4, KIT_PITCH, KIT_SOLE_Z, columns * rows};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) fail_msg("%s", error.text);
+    if (!sole) {
+        fail_msg("%s", error.text);
+    }
     return sole;
 }
 
@@ -80,7 +87,8 @@ static inline MildMaterial kit_material(uint64_t *random) {
     m.k_drift = kit_uniform(random, 100.0, 1000.0);
     m.b_drift = kit_uniform(random, 0.02, 0.1);
     m.recovery = kit_uniform(random, -0.3, 1.3);
-    m.recovery = m.recovery < 0.0 ? 0.0 : (m.recovery > 1.0 ? 1.0 : m.recovery); /* both ends often */
+    m.recovery =
+        m.recovery < 0.0 ? 0.0 : (m.recovery > 1.0 ? 1.0 : m.recovery); /* both ends often */
     m.bed_depth = kit_uniform(random, 0.10, 0.15);
     return m;
 }
@@ -95,24 +103,30 @@ typedef struct {
     MildTerrain terrain;
     MildContactInput input;
     MildContactResult result;
-    double mass[MILD_FEET_MAX], inertia[MILD_FEET_MAX], center[MILD_FEET_MAX][3]; /* body on each foot: kg, kg m^2, [m] foot frame */
+    double mass[MILD_FEET_MAX], inertia[MILD_FEET_MAX],
+        center[MILD_FEET_MAX][3]; /* body on each foot: kg, kg m^2, [m] foot frame */
 } Kit;
 
-static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right, const MildMaterial *material, double dt) {
+static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
+                            const MildMaterial *material, double dt) {
     memset(kit, 0, sizeof *kit);
     kit->feet = feet;
     kit->soles[0] = left;
     kit->soles[1] = right;
     MildError error = {0};
     kit->scratch = mild_scratch_create(kit->soles, feet, &error);
-    if (!kit->scratch) fail_msg("%s", error.text);
+    if (!kit->scratch) {
+        fail_msg("%s", error.text);
+    }
     kit->bytes = mild_ground_bytes(kit->soles, feet);
     kit->ground = mild_ground_init(aligned_alloc(64, kit->bytes), kit->soles, feet);
     kit->terrain = mild_terrain_uniform(material);
     kit->input.feet = feet;
     kit->input.dt = dt;
     for (int f = 0; f < feet; f++) {
-        for (int k = 0; k < 3; k++) kit->input.rotation[f][4 * k] = 1.0;
+        for (int k = 0; k < 3; k++) {
+            kit->input.rotation[f][4 * k] = 1.0;
+        }
         kit->input.position[f][1] = f ? -0.1 : 0.1;
         kit->input.position[f][2] = -KIT_SOLE_Z;
         kit->mass[f] = 20.0;
@@ -124,7 +138,8 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
 static inline void kit_prints(Kit *kit, int tiles) {
     free(kit->ground);
     kit->bytes = mild_ground_bytes_prints(kit->soles, kit->feet, tiles);
-    kit->ground = mild_ground_init_prints(aligned_alloc(64, kit->bytes), kit->soles, kit->feet, tiles);
+    kit->ground =
+        mild_ground_init_prints(aligned_alloc(64, kit->bytes), kit->soles, kit->feet, tiles);
 }
 
 static inline void kit_close(Kit *kit) {
@@ -141,7 +156,9 @@ static inline void kit_cross(const double *a, const double *b, double *c) {
 /* World vector ankle -> centre of mass. */
 static inline void kit_center(const Kit *kit, int f, double *r) {
     const double *R = kit->input.rotation[f], *c = kit->center[f];
-    for (int k = 0; k < 3; k++) r[k] = R[3 * k] * c[0] + R[3 * k + 1] * c[1] + R[3 * k + 2] * c[2];
+    for (int k = 0; k < 3; k++) {
+        r[k] = R[3 * k] * c[0] + R[3 * k + 1] * c[1] + R[3 * k + 2] * c[2];
+    }
 }
 
 /* A of a free body (ball inertia): wrench at the ankle -> change of twist at the ankle. */
@@ -155,10 +172,13 @@ static inline void kit_inverse_inertia(Kit *kit) {
             double wrench[6] = {0}, lever[3], turn[3], swing[3];
             wrench[k] = 1.0;
             kit_cross(r, wrench, lever);
-            for (int j = 0; j < 3; j++) turn[j] = (wrench[3 + j] - lever[j]) / kit->inertia[f];
+            for (int j = 0; j < 3; j++) {
+                turn[j] = (wrench[3 + j] - lever[j]) / kit->inertia[f];
+            }
             kit_cross(turn, r, swing);
             for (int j = 0; j < 3; j++) {
-                kit->input.inverse_inertia[(6 * f + j) * n + 6 * f + k] = wrench[j] / kit->mass[f] - swing[j];
+                kit->input.inverse_inertia[(6 * f + j) * n + 6 * f + k] =
+                    wrench[j] / kit->mass[f] - swing[j];
                 kit->input.inverse_inertia[(6 * f + 3 + j) * n + 6 * f + k] = turn[j];
             }
         }
@@ -167,27 +187,39 @@ static inline void kit_inverse_inertia(Kit *kit) {
 
 static inline void kit_rotate(double *R, const double *turn) {
     double angle = sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
-    if (angle == 0.0) return;
-    double x = turn[0] / angle, y = turn[1] / angle, z = turn[2] / angle, c = cos(angle), s = sin(angle), t = 1.0 - c;
-    const double Q[9] = {t * x * x + c,     t * x * y - s * z, t * x * z + s * y, t * x * y + s * z, t * y * y + c,
-                         t * y * z - s * x, t * x * z - s * y, t * y * z + s * x, t * z * z + c};
+    if (angle == 0.0) {
+        return;
+    }
+    double x = turn[0] / angle, y = turn[1] / angle, z = turn[2] / angle, c = cos(angle),
+           s = sin(angle), t = 1.0 - c;
+    const double Q[9] = {t * x * x + c,     t * x * y - s * z, t * x * z + s * y,
+                         t * x * y + s * z, t * y * y + c,     t * y * z - s * x,
+                         t * x * z - s * y, t * y * z + s * x, t * z * z + c};
     double out[9];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) out[3 * i + j] = Q[3 * i] * R[j] + Q[3 * i + 1] * R[3 + j] + Q[3 * i + 2] * R[6 + j];
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) {
+            out[3 * i + j] = Q[3 * i] * R[j] + Q[3 * i + 1] * R[3 + j] + Q[3 * i + 2] * R[6 + j];
+        }
+    }
     memcpy(R, out, sizeof out);
 }
 
-/* V^ of free bodies under gravity and a force at the centre of mass [N], gyroscopic terms of a ball being zero. */
+/* V^ of free bodies under gravity and a force at the centre of mass [N], gyroscopic terms of a ball
+ * being zero. */
 static inline void kit_free(Kit *kit, const double force[][3]) {
     for (int f = 0; f < kit->feet; f++) {
         const double *V = kit->input.velocity[f];
         double r[3], spin[3], centripetal[3];
         kit_center(kit, f, r);
         kit_cross(V + 3, r, spin);
-        kit_cross(V + 3, spin, centripetal); /* the ankle's acceleration is the centre's minus omega x (omega x r) */
+        kit_cross(
+            V + 3, spin,
+            centripetal); /* the ankle's acceleration is the centre's minus omega x (omega x r) */
         for (int k = 0; k < 3; k++) {
-            double acceleration = (force ? force[f][k] / kit->mass[f] : 0.0) - (k == 2 ? KIT_GRAVITY : 0.0);
-            kit->input.free_velocity[6 * f + k] = V[k] + kit->input.dt * (acceleration - centripetal[k]);
+            double acceleration =
+                (force ? force[f][k] / kit->mass[f] : 0.0) - (k == 2 ? KIT_GRAVITY : 0.0);
+            kit->input.free_velocity[6 * f + k] =
+                V[k] + kit->input.dt * (acceleration - centripetal[k]);
             kit->input.free_velocity[6 * f + 3 + k] = V[3 + k];
         }
     }
@@ -218,20 +250,29 @@ static inline void kit_step(Kit *kit, const double force[][3]) {
     kit_advance(kit);
 }
 
-/* Makes the present state of the problem a random one: posture, twist, memory, a coupled inverse inertia of random rank. */
+/* Makes the present state of the problem a random one: posture, twist, memory, a coupled inverse
+ * inertia of random rank. */
 static inline void kit_random_inertia(Kit *kit, uint64_t *random, int rank) {
     int n = 6 * kit->feet;
     double G[12][12];
     kit_inverse_inertia(kit);
-    if (rank >= n && kit->feet == 1) return;
-    for (int i = 0; i < n; i++)
-        for (int k = 0; k < rank; k++) G[i][k] = kit_uniform(random, -0.3, 0.3) * (i % 6 >= 3 ? 3.0 : 1.0);
-    for (int i = 0; i < n; i++)
+    if (rank >= n && kit->feet == 1) {
+        return;
+    }
+    for (int i = 0; i < n; i++) {
+        for (int k = 0; k < rank; k++) {
+            G[i][k] = kit_uniform(random, -0.3, 0.3) * (i % 6 >= 3 ? 3.0 : 1.0);
+        }
+    }
+    for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
             double sum = rank < n ? 0.0 : kit->input.inverse_inertia[i * n + j];
-            for (int k = 0; k < rank; k++) sum += G[i][k] * G[j][k];
+            for (int k = 0; k < rank; k++) {
+                sum += G[i][k] * G[j][k];
+            }
             kit->input.inverse_inertia[i * n + j] = sum;
         }
+    }
 }
 
 static inline void kit_random_state(Kit *kit, uint64_t *random) {
@@ -242,11 +283,13 @@ static inline void kit_random_state(Kit *kit, uint64_t *random) {
         kit->center[f][1] = kit_uniform(random, -0.05, 0.05);
         kit->center[f][2] = kit_uniform(random, -0.02, 0.5);
         double tilt = kit_uniform(random, 0.0, 1.0) < 0.3 ? 0.0 : 0.25;
-        double turn[3] = {kit_uniform(random, -tilt, tilt), kit_uniform(random, -tilt, tilt), kit_uniform(random, -3.0, 3.0)};
+        double turn[3] = {kit_uniform(random, -tilt, tilt), kit_uniform(random, -tilt, tilt),
+                          kit_uniform(random, -3.0, 3.0)};
         double R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
         kit_rotate(R, turn);
         memcpy(kit->input.rotation[f], R, sizeof R);
-        double drop = R[6] * 0.06 + R[8] * KIT_SOLE_Z; /* height of the sole's middle below the ankle */
+        double drop =
+            R[6] * 0.06 + R[8] * KIT_SOLE_Z; /* height of the sole's middle below the ankle */
         kit->input.position[f][2] = -drop - kit_uniform(random, -0.003, 0.025);
         double fast = kit_uniform(random, 0.0, 1.0) < 0.3 ? 0.01 : 1.0;
         for (int k = 0; k < 3; k++) {

@@ -19,16 +19,21 @@ static const MildField sample_fields[] = {
 
 static void test_field_parse(void **state) {
     (void)state;
-    static const char *const good[SAMPLE_FIELDS] = {" 0.1, -0.25", "7", "yes", "18446744073709551615", "abc def"};
-    static const char *const bad[][2] = {{"range", "0.1"},    {"range", "0.1 0.2 0.3"}, {"range", "0.1 x"}, {"range", "nan 0"},
-                                         {"range", "0.1 2"},  {"range", "0.1 0.2z"},    {"range", ""},      {"count", "1.5"},
-                                         {"count", "10"},     {"count", "99999999999"}, {"flag", "2"},      {"flag", "maybe"},
-                                         {"seed", "-1"},      {"name", "too long a name"}};
+    static const char *const good[SAMPLE_FIELDS] = {" 0.1, -0.25", "7", "yes",
+                                                    "18446744073709551615", "abc def"};
+    static const char *const bad[][2] = {
+        {"range", "0.1"},   {"range", "0.1 0.2 0.3"},   {"range", "0.1 x"}, {"range", "nan 0"},
+        {"range", "0.1 2"}, {"range", "0.1 0.2z"},      {"range", ""},      {"count", "1.5"},
+        {"count", "10"},    {"count", "99999999999"},   {"flag", "2"},      {"flag", "maybe"},
+        {"seed", "-1"},     {"name", "too long a name"}};
     Sample sample = {{0, 0}, 0, 0, 0, ""};
     MildError error;
-    for (int i = 0; i < SAMPLE_FIELDS; i++)
-        assert_int_equal(mild_field_parse(&sample_fields[i], &sample, good[i], "s", &error), MILD_OK);
-    assert_true(sample.range[0] == 0.1 && sample.range[1] == -0.25 && sample.count == 7 && sample.flag == 1);
+    for (int i = 0; i < SAMPLE_FIELDS; i++) {
+        assert_int_equal(mild_field_parse(&sample_fields[i], &sample, good[i], "s", &error),
+                         MILD_OK);
+    }
+    assert_true(sample.range[0] == 0.1 && sample.range[1] == -0.25 && sample.count == 7 &&
+                sample.flag == 1);
     assert_true(sample.seed == UINT64_MAX);
     assert_string_equal(sample.name, "abc def");
     Sample before = sample;
@@ -46,14 +51,22 @@ static void test_field_print(void **state) {
     MildError error;
     char text[64], small[4];
     for (int i = 0; i < 2000; i++) {
-        Sample sample = {{kit_uniform(&random, -1, 1), 1.0 / (3 + i)}, i % 10, i % 2, (uint64_t)i << 50, "n"}, back = {0};
+        Sample sample = {{kit_uniform(&random, -1, 1), 1.0 / (3 + i)},
+                         i % 10,
+                         i % 2,
+                         (uint64_t)i << 50,
+                         "n"},
+               back = {0};
         for (int f = 0; f < SAMPLE_FIELDS; f++) {
             int length = mild_field_print(&sample_fields[f], &sample, text, sizeof text);
             assert_int_equal(length, (int)strlen(text));
-            assert_int_equal(mild_field_parse(&sample_fields[f], &back, text, "s", &error), MILD_OK);
-            assert_int_equal(mild_field_print(&sample_fields[f], &sample, small, sizeof small), length);
+            assert_int_equal(mild_field_parse(&sample_fields[f], &back, text, "s", &error),
+                             MILD_OK);
+            assert_int_equal(mild_field_print(&sample_fields[f], &sample, small, sizeof small),
+                             length);
         }
-        assert_true(back.range[0] == sample.range[0] && back.range[1] == sample.range[1] && back.seed == sample.seed);
+        assert_true(back.range[0] == sample.range[0] && back.range[1] == sample.range[1] &&
+                    back.seed == sample.seed);
     }
 }
 
@@ -62,16 +75,20 @@ static void test_field_find(void **state) {
     const char *nearest;
     assert_null(mild_field_find(mild_material_fields, mild_material_field_count, "kpen", &nearest));
     assert_string_equal(nearest, "k_pen");
-    assert_null(mild_field_find(mild_material_fields, mild_material_field_count, "recovry", &nearest));
+    assert_null(
+        mild_field_find(mild_material_fields, mild_material_field_count, "recovry", &nearest));
     assert_string_equal(nearest, "recovery");
-    assert_non_null(mild_field_find(mild_material_fields, mild_material_field_count, "mu", &nearest));
+    assert_non_null(
+        mild_field_find(mild_material_fields, mild_material_field_count, "mu", &nearest));
 }
 
 static void test_material_refused(void **state) {
     (void)state;
     for (int f = 0; f < mild_material_field_count; f++) {
         const MildField *field = &mild_material_fields[f];
-        if (field->type != MILD_FIELD_DOUBLE) continue;
+        if (field->type != MILD_FIELD_DOUBLE) {
+            continue;
+        }
         const double bad[3] = {NAN, field->max * 1.01 + 1.0, INFINITY};
         for (int i = 0; i < 3; i++) {
             MildMaterial m = mild_material_default();
@@ -98,8 +115,10 @@ static void test_terrain(void **state) {
     const struct {
         MildPatch patch;
         const char *names;
-    } bad[] = {{{3, 3, 0, 1, 1}, "x_min"}, {{NAN, 4, 0, 1, 1}, "x_min"}, {{3, 4, 1, 0, 1}, "y_min"}, {{3, 4, 0, NAN, 1}, "y_m"},
-               {{3, 4, 0, 1, 2}, "material"}, {{3, 4, 0, 1, -1}, "material"}, {{1.5, 4, 0, 1, 1}, "overlaps"}};
+    } bad[] = {{{3, 3, 0, 1, 1}, "x_min"},     {{NAN, 4, 0, 1, 1}, "x_min"},
+               {{3, 4, 1, 0, 1}, "y_min"},     {{3, 4, 0, NAN, 1}, "y_m"},
+               {{3, 4, 0, 1, 2}, "material"},  {{3, 4, 0, 1, -1}, "material"},
+               {{1.5, 4, 0, 1, 1}, "overlaps"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         assert_true(mild_terrain_add_patch(&terrain, &bad[i].patch, &error) != MILD_OK);
         assert_non_null(strstr(error.text, bad[i].names));
@@ -119,14 +138,16 @@ static void test_sole_counts(void **state) {
     for (int target = 0; target <= 77; target += 77) {
         MildSole *left = kit_sole(0, target), *right = kit_sole(1, target);
         int n = mild_sole_elements(left);
-        print_message("sole with target %d: %d elements, %.4f m^2\n", target, n, n * KIT_PITCH * KIT_PITCH);
+        print_message("sole with target %d: %d elements, %.4f m^2\n", target, n,
+                      n * KIT_PITCH * KIT_PITCH);
         assert_int_equal(n, mild_sole_elements(right));
         assert_int_equal(n, target ? target : 64);
         for (int i = 0; i < n; i++) { /* the right sole mirrors the left one */
             int found = 0;
-            for (int j = 0; j < n; j++)
+            for (int j = 0; j < n; j++) {
                 found += fabs(mild_sole_x(left)[i] - mild_sole_x(right)[j]) < 1e-9 &&
                          fabs(mild_sole_y(left)[i] + mild_sole_y(right)[j]) < 1e-9;
+            }
             assert_int_equal(found, 1);
         }
         mild_sole_destroy(left);
@@ -155,12 +176,17 @@ static void test_sole_refused(void **state) {
     const struct {
         MildSoleDef def;
         const char *names;
-    } bad[] = {{{square, 2, KIT_PITCH, 0, 0}, "points"},      {{NULL, 4, KIT_PITCH, 0, 0}, "points"},
-               {{square, 4, 0.0, 0, 0}, "pitch"},             {{square, 4, NAN, 0, 0}, "pitch"},
-               {{square, 4, KIT_PITCH, NAN, 0}, "sole_z"},    {{square, 4, KIT_PITCH, 0, -1}, "target_elements"},
+    } bad[] = {{{square, 2, KIT_PITCH, 0, 0}, "points"},
+               {{NULL, 4, KIT_PITCH, 0, 0}, "points"},
+               {{square, 4, 0.0, 0, 0}, "pitch"},
+               {{square, 4, NAN, 0, 0}, "pitch"},
+               {{square, 4, KIT_PITCH, NAN, 0}, "sole_z"},
+               {{square, 4, KIT_PITCH, 0, -1}, "target_elements"},
                {{many, 5000, KIT_PITCH, 0, 0}, "points"},
-               {{square, 4, KIT_PITCH, 0, 500}, "target_elements"}, {{bow, 4, KIT_PITCH, 0, 0}, "outline"},
-               {{line, 4, KIT_PITCH, 0, 0}, "outline"},       {{nan, 4, KIT_PITCH, 0, 0}, "outline"}};
+               {{square, 4, KIT_PITCH, 0, 500}, "target_elements"},
+               {{bow, 4, KIT_PITCH, 0, 0}, "outline"},
+               {{line, 4, KIT_PITCH, 0, 0}, "outline"},
+               {{nan, 4, KIT_PITCH, 0, 0}, "outline"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         MildError error = {0};
         assert_null(mild_sole_create(&bad[i].def, &error));
@@ -168,8 +194,9 @@ static void test_sole_refused(void **state) {
     }
 }
 
-/* Every number of a standing foot's input in turn becomes NaN, infinite or huge: the step comes back, and what it calls
- * converged is finite. The fuzz target tests/fuzz/fuzz_solve.c goes further. */
+/* Every number of a standing foot's input in turn becomes NaN, infinite or huge: the step comes
+ * back, and what it calls converged is finite. The fuzz target tests/fuzz/fuzz_solve.c goes
+ * further. */
 static void test_hostile_numbers(void **state) {
     (void)state;
     static const double hostile[] = {NAN, INFINITY, -INFINITY, 1e300, -1e300};
@@ -182,18 +209,26 @@ static void test_hostile_numbers(void **state) {
         kit.input.position[0][2] += test % 2 ? 1.0 : -0.01; /* in the air, in the ground */
         kit_inverse_inertia(&kit);
         kit_free(&kit, NULL);
-        double *const areas[] = {kit.input.position[0], kit.input.rotation[0], kit.input.velocity[0], kit.input.inverse_inertia,
+        double *const areas[] = {kit.input.position[0], kit.input.rotation[0],
+                                 kit.input.velocity[0], kit.input.inverse_inertia,
                                  kit.input.free_velocity};
         static const int counts[] = {3, 9, 6, 36, 6};
         int area = 0, index = test / 10;
-        while (index >= counts[area]) index -= counts[area++];
+        while (index >= counts[area]) {
+            index -= counts[area++];
+        }
         areas[area][index] = hostile[test / 2 % 5];
         kit_solve(&kit);
         const MildFootResult *foot = &kit.result.foot[0];
-        double sum = foot->force[0] + foot->force[1] + foot->force[2] + foot->torque[0] + foot->torque[1] + foot->torque[2];
-        for (int i = 0; i < 6; i++) sum += kit.result.velocity[i];
+        double sum = foot->force[0] + foot->force[1] + foot->force[2] + foot->torque[0] +
+                     foot->torque[1] + foot->torque[2];
+        for (int i = 0; i < 6; i++) {
+            sum += kit.result.velocity[i];
+        }
         assert_true(!kit.result.converged || isfinite(sum));
-        if (area < 2) assert_true(!kit.result.converged || fabs(areas[area][index]) == 1e300);
+        if (area < 2) {
+            assert_true(!kit.result.converged || fabs(areas[area][index]) == 1e300);
+        }
         tried++;
         refused += !kit.result.converged;
         kit_close(&kit);
@@ -202,10 +237,13 @@ static void test_hostile_numbers(void **state) {
     print_message("hostile numbers: %d of %d steps not converged\n", refused, tried);
 }
 
-/* A material that nobody checked: a step on NaN is not called converged, the next one on sound ground is. */
+/* A material that nobody checked: a step on NaN is not called converged, the next one on sound
+ * ground is. */
 static void test_hostile_material(void **state) {
     (void)state;
-    static const char *const used[] = {"k_pen", "sigma_cone", "alpha", "nu", "phi", "rho", "mu", "k_drift", "b_drift", "recovery", "bed_depth"};
+    static const char *const used[] = {"k_pen",   "sigma_cone", "alpha",    "nu",
+                                       "phi",     "rho",        "mu",       "k_drift",
+                                       "b_drift", "recovery",   "bed_depth"};
     MildSole *sole = kit_plate(3, 2);
     MildMaterial sound = mild_material_default();
     Kit kit;
@@ -213,27 +251,32 @@ static void test_hostile_material(void **state) {
     kit.input.position[0][2] -= 0.01;
     kit_inverse_inertia(&kit);
     kit_free(&kit, NULL);
-    for (size_t i = 0; i < sizeof used / sizeof *used; i++)
+    for (size_t i = 0; i < sizeof used / sizeof *used; i++) {
         for (int solver = 0; solver < 2; solver++) {
             kit.input.solver = (MildSolver)solver;
-            for (int f = 0; f < mild_material_field_count; f++)
-                if (strcmp(mild_material_fields[f].name, used[i]) == 0)
-                    *(double *)((char *)&kit.terrain.materials[0] + mild_material_fields[f].offset) = NAN;
+            for (int f = 0; f < mild_material_field_count; f++) {
+                if (strcmp(mild_material_fields[f].name, used[i]) == 0) {
+                    *(double *)((char *)&kit.terrain.materials[0] +
+                                mild_material_fields[f].offset) = NAN;
+                }
+            }
             kit_solve(&kit);
             assert_int_equal(kit.result.converged, 0);
             kit.terrain.materials[0] = sound;
             kit_solve(&kit);
             assert_int_equal(kit.result.converged, 1);
         }
+    }
     kit_close(&kit);
     mild_sole_destroy(sole);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_field_parse),      cmocka_unit_test(test_field_print), cmocka_unit_test(test_field_find),
-        cmocka_unit_test(test_material_refused), cmocka_unit_test(test_terrain),     cmocka_unit_test(test_sole_counts),
-        cmocka_unit_test(test_sole_refused),     cmocka_unit_test(test_hostile_numbers),
+        cmocka_unit_test(test_field_parse),     cmocka_unit_test(test_field_print),
+        cmocka_unit_test(test_field_find),      cmocka_unit_test(test_material_refused),
+        cmocka_unit_test(test_terrain),         cmocka_unit_test(test_sole_counts),
+        cmocka_unit_test(test_sole_refused),    cmocka_unit_test(test_hostile_numbers),
         cmocka_unit_test(test_hostile_material)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,8 @@
 /* Element law, materials and static sinkage. */
 #include "ground_kit.h"
 
-/* S_flat and S_cone as the paper prints them, the flat one frozen at zero once the cone is complete. */
+/* S_flat and S_cone as the paper prints them, the flat one frozen at zero once the cone is
+ * complete. */
 static void areas(const MildMaterial *m, double u, double *flat, double *cone) {
     double pi = acos(-1.0), R = KIT_PITCH / sqrt(pi), r = fmax(R - m->nu * u / tan(m->alpha), 0.0);
     *flat = pi * r * r;
@@ -30,13 +31,18 @@ static void test_quadrature(void **state) {
         m.passive = 0;
         double u = kit_uniform(&random, 0.0, 0.1), force, mass, h = 1e-6;
         quadrature(&m, u, &force, &mass);
-        MildElementLaw law = mild_element_law(&m, KIT_PITCH, u), up = mild_element_law(&m, KIT_PITCH, u + h);
+        MildElementLaw law = mild_element_law(&m, KIT_PITCH, u),
+                       up = mild_element_law(&m, KIT_PITCH, u + h);
         worst = fmax(worst, fabs(law.force - force) / (fabs(force) + 1e-6));
         worst = fmax(worst, fabs(law.added_mass - mass) / (fabs(mass) + 1e-6));
-        if (u + h > m.bed_depth) continue;
-        worst_slope = fmax(worst_slope, fabs((up.force - law.force) / h - law.stiffness) / law.stiffness);
+        if (u + h > m.bed_depth) {
+            continue;
+        }
+        worst_slope =
+            fmax(worst_slope, fabs((up.force - law.force) / h - law.stiffness) / law.stiffness);
         double rate = (up.added_mass - law.added_mass) / h;
-        worst_slope = fmax(worst_slope, fabs(rate - law.added_mass_per_depth) / (fabs(m.c_g * m.rho * KIT_PITCH * KIT_PITCH) + 1e-9));
+        worst_slope = fmax(worst_slope, fabs(rate - law.added_mass_per_depth) /
+                                            (fabs(m.c_g * m.rho * KIT_PITCH * KIT_PITCH) + 1e-9));
     }
     print_message("law against quadrature: worst relative %.1e, slopes %.1e\n", worst, worst_slope);
     assert_true(worst < 1e-6);
@@ -52,8 +58,11 @@ static void test_vector(void **state) {
     m.nu = 2.0;
     const double depth[4] = {0.005, 0.010, 0.020, 0.040}, force[4] = {1.325, 1.986, 3.127, 5.408};
     double worst = 0.0;
-    for (int i = 0; i < 4; i++) worst = fmax(worst, fabs(mild_element_law(&m, KIT_PITCH, depth[i]).force - force[i]));
-    print_message("test vector: worst %.2e N, late slope %.3f N/m\n", worst, mild_element_law(&m, KIT_PITCH, 0.03).stiffness);
+    for (int i = 0; i < 4; i++) {
+        worst = fmax(worst, fabs(mild_element_law(&m, KIT_PITCH, depth[i]).force - force[i]));
+    }
+    print_message("test vector: worst %.2e N, late slope %.3f N/m\n", worst,
+                  mild_element_law(&m, KIT_PITCH, 0.03).stiffness);
     assert_true(worst < 6e-4);
     assert_float_equal(mild_element_law(&m, KIT_PITCH, 0.03).stiffness, 114.08, 6e-3);
     assert_float_equal(mild_element_law(&m, KIT_PITCH, 0.0).stiffness, 380.25, 1e-9);
@@ -75,8 +84,11 @@ static double sinkage(const MildMaterial *m, double load) {
     double low = 0.0, high = 0.3;
     for (int i = 0; i < 80; i++) {
         double middle = 0.5 * (low + high);
-        if (mild_element_law(m, KIT_PITCH, middle).force < load) low = middle;
-        else high = middle;
+        if (mild_element_law(m, KIT_PITCH, middle).force < load) {
+            low = middle;
+        } else {
+            high = middle;
+        }
     }
     return 1e3 * low;
 }
@@ -86,9 +98,9 @@ static void test_presets(void **state) {
     static const struct {
         const char *name;
         double two, one, tolerance;
-    } table[] = {{"rubber", 1.9, 3.8, 0.1},     {"foam60", 3.3, 7.7, 0.1},    {"foam45", 8, 25, 0.5},
-                 {"foam28", 23, 49, 0.6},       {"foam25", 28, 58, 0.6},      {"grass", 6, 17.5, 0.5},
-                 {"sand_loose", 15, 37, 0.5},   {"sand_dense", 5, 17, 0.5}};
+    } table[] = {{"rubber", 1.9, 3.8, 0.1},   {"foam60", 3.3, 7.7, 0.1}, {"foam45", 8, 25, 0.5},
+                 {"foam28", 23, 49, 0.6},     {"foam25", 28, 58, 0.6},   {"grass", 6, 17.5, 0.5},
+                 {"sand_loose", 15, 37, 0.5}, {"sand_dense", 5, 17, 0.5}};
     assert_int_equal(mild_material_preset_count(), 8);
     for (int i = 0; i < 8; i++) {
         MildMaterial m;
@@ -96,9 +108,12 @@ static void test_presets(void **state) {
         assert_string_equal(mild_material_preset_name(i), table[i].name);
         assert_true(mild_material_preset(table[i].name, &m));
         assert_int_equal(mild_material_check(&m, &error), MILD_OK);
-        double weight = 40.0 * KIT_GRAVITY, two = sinkage(&m, weight / 154.0), one = sinkage(&m, weight / 77.0);
-        print_message("%-10s sinks %5.2f / %5.2f mm (table %.1f / %.1f)\n", table[i].name, two, one, table[i].two, table[i].one);
-        assert_true(fabs(two - table[i].two) < table[i].tolerance && fabs(one - table[i].one) < table[i].tolerance);
+        double weight = 40.0 * KIT_GRAVITY, two = sinkage(&m, weight / 154.0),
+               one = sinkage(&m, weight / 77.0);
+        print_message("%-10s sinks %5.2f / %5.2f mm (table %.1f / %.1f)\n", table[i].name, two, one,
+                      table[i].two, table[i].one);
+        assert_true(fabs(two - table[i].two) < table[i].tolerance &&
+                    fabs(one - table[i].one) < table[i].tolerance);
     }
     MildMaterial m;
     assert_false(mild_material_preset("rigid", &m));
@@ -106,7 +121,8 @@ static void test_presets(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_quadrature), cmocka_unit_test(test_vector),
-                                       cmocka_unit_test(test_firm_bed), cmocka_unit_test(test_presets)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_quadrature), cmocka_unit_test(test_vector),
+        cmocka_unit_test(test_firm_bed), cmocka_unit_test(test_presets)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

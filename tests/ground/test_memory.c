@@ -1,4 +1,5 @@
-/* Stepping allocates nothing, bad numbers stop nothing, and a state block is bytes: copy, continue, same answer. */
+/* Stepping allocates nothing, bad numbers stop nothing, and a state block is bytes: copy, continue,
+ * same answer. */
 #include "ground_kit.h"
 
 #if defined(__SANITIZE_ADDRESS__)
@@ -50,10 +51,13 @@ static void test_no_allocation(void **state) {
         kit.terrain.materials[0] = kit_material(&random);
         kit.input.solver = t % 10 ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL;
         kit.input.max_iterations = t % 10 ? 0 : 20;
-        for (int s = 0; s < 20; s++, steps++) kit_step(&kit, NULL);
+        for (int s = 0; s < 20; s++, steps++) {
+            kit_step(&kit, NULL);
+        }
         mild_ground_reset(kit.ground);
     }
-    print_message("%d steps, %d allocations (counted: %s)\n", steps, allocations - before, COUNTING ? "yes" : "no");
+    print_message("%d steps, %d allocations (counted: %s)\n", steps, allocations - before,
+                  COUNTING ? "yes" : "no");
     assert_int_equal(allocations, before);
     kit_close(&kit);
     mild_sole_destroy(left);
@@ -62,7 +66,9 @@ static void test_no_allocation(void **state) {
 
 static void test_failing_allocation(void **state) {
     (void)state;
-    if (!COUNTING) skip();
+    if (!COUNTING) {
+        skip();
+    }
     MildSole *sole = kit_sole(0, 77);
     const MildSole *soles[1] = {sole};
     double box[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1};
@@ -72,12 +78,16 @@ static void test_failing_allocation(void **state) {
         MildError error = {0};
         fail_at = n;
         MildSole *made = mild_sole_create(&def, &error);
-        if (!made) assert_int_equal(error.status, MILD_ERROR_MEMORY);
+        if (!made) {
+            assert_int_equal(error.status, MILD_ERROR_MEMORY);
+        }
         refused += !made;
         mild_sole_destroy(made);
         fail_at = n;
         MildScratch *scratch = mild_scratch_create(soles, 1, &error);
-        if (!scratch) assert_int_equal(error.status, MILD_ERROR_MEMORY);
+        if (!scratch) {
+            assert_int_equal(error.status, MILD_ERROR_MEMORY);
+        }
         refused += !scratch;
         mild_scratch_destroy(scratch);
         fail_at = 0;
@@ -99,8 +109,9 @@ static void test_bad_numbers(void **state) {
         kit_random_state(&kit, &random);
         kit_inverse_inertia(&kit);
         kit_free(&kit, NULL);
-        double *victims[5] = {&kit.input.position[0][2], &kit.input.rotation[1][4], &kit.input.velocity[0][1],
-                              &kit.input.inverse_inertia[13], &kit.input.free_velocity[8]};
+        double *victims[5] = {&kit.input.position[0][2], &kit.input.rotation[1][4],
+                              &kit.input.velocity[0][1], &kit.input.inverse_inertia[13],
+                              &kit.input.free_velocity[8]};
         *victims[t % 5] = bad[t / 5 % 3];
         kit.input.solver = t % 2 ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON;
         kit.input.max_iterations = 40;
@@ -108,10 +119,14 @@ static void test_bad_numbers(void **state) {
         kit_advance(&kit);
         mild_ground_reset(kit.ground); /* and the ground is as good as new */
         kit_random_state(&kit, &random);
-        for (int f = 0; f < 2; f++) kit.input.position[f][0] = kit.input.position[f][1] = 0.1 * f;
+        for (int f = 0; f < 2; f++) {
+            kit.input.position[f][0] = kit.input.position[f][1] = 0.1 * f;
+        }
         kit.input.solver = MILD_SOLVER_NEWTON;
         kit_step(&kit, NULL);
-        for (int i = 0; i < 12; i++) assert_true(isfinite(kit.result.velocity[i]));
+        for (int i = 0; i < 12; i++) {
+            assert_true(isfinite(kit.result.velocity[i]));
+        }
         kit_close(&kit);
     }
     mild_sole_destroy(left);
@@ -138,7 +153,9 @@ static void test_copy_continues(void **state) {
     Kit a, b;
     kit_open(&a, 2, left, right, &m, 1e-3);
     kit_random_state(&a, &random);
-    for (int s = 0; s < 100; s++) kit_step(&a, NULL);
+    for (int s = 0; s < 100; s++) {
+        kit_step(&a, NULL);
+    }
     kit_open(&b, 2, left, right, &m, 1e-3);
     assert_int_equal(b.bytes % 64, 0);
     memcpy(b.ground, a.ground, a.bytes);
@@ -159,8 +176,9 @@ static void test_copy_continues(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_no_allocation), cmocka_unit_test(test_failing_allocation),
-                                       cmocka_unit_test(test_bad_numbers), cmocka_unit_test(test_copy_continues),
-                                       cmocka_unit_test(test_state_bytes)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_no_allocation), cmocka_unit_test(test_failing_allocation),
+        cmocka_unit_test(test_bad_numbers), cmocka_unit_test(test_copy_continues),
+        cmocka_unit_test(test_state_bytes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
-/* The contract of the ground models: every soft model through the same tests, and each rival matched to mild. */
+/* The contract of the ground models: every soft model through the same tests, and each rival
+ * matched to mild. */
 #include "ground_kit.h"
 
 #define SOFT_MODELS MILD_MODEL_RIGID
@@ -12,7 +13,9 @@ static int make_soles(void **state) {
     for (int right = 0; right < 2; right++) {
         raster[right] = kit_sole(right, 77);
         center[right] = mild_sole_concentric(raster[right], &error);
-        if (!center[right]) return 1;
+        if (!center[right]) {
+            return 1;
+        }
     }
     return 0;
 }
@@ -33,7 +36,8 @@ static MildSole *sole_of(int model, int right) {
 static MildMaterial rival_of(int model, const MildMaterial *mild) {
     MildMaterial rival;
     MildError error = {0};
-    assert_int_equal(mild_model_match((MildModel)model, mild, raster[0], LOAD, &rival, &error), MILD_OK);
+    assert_int_equal(mild_model_match((MildModel)model, mild, raster[0], LOAD, &rival, &error),
+                     MILD_OK);
     assert_int_equal(rival.model, model);
     return rival;
 }
@@ -46,8 +50,9 @@ static MildMaterial preset(const char *name) {
 
 /* ---- matching ---- */
 
-/* [m] by how much resistive force theory yields deeper than the element is, going straight down: the elastic travel belongs to
- * its greatest coefficient, 1.08 (src/ground/resist.c). 7 um: 0.4 % of the force at 1.9 mm. */
+/* [m] by how much resistive force theory yields deeper than the element is, going straight down:
+ * the elastic travel belongs to its greatest coefficient, 1.08 (src/ground/resist.c). 7 um: 0.4 %
+ * of the force at 1.9 mm. */
 #define RESIST_LEAD (1e-4 * (1.0 - 1.0 / 1.08))
 
 /* Force of the level sole pushed slowly to `depth` by hand: A = 0. */
@@ -57,7 +62,8 @@ static double pressed_force(int model, const MildMaterial *material, double dept
     kit_open(&kit, 1, sole_of(model, 0), NULL, material, depth / 0.01 / STEPS);
     kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.01;
     double force = 0.0;
-    for (int s = 0; s <= STEPS; s++) { /* a step's force is the mean about the depth it starts from */
+    for (int s = 0; s <= STEPS;
+         s++) { /* a step's force is the mean about the depth it starts from */
         kit_solve(&kit);
         kit_advance(&kit);
         force = kit.result.foot[0].force[2];
@@ -75,15 +81,20 @@ static void test_matched(void **state) {
         for (int model = 0; model < SOFT_MODELS; model++) {
             MildMaterial rival = rival_of(model, &mild);
             MildError error = {0};
-            if (mild_material_check(&rival, &error) != MILD_OK) fail_msg("%s", error.text);
+            if (mild_material_check(&rival, &error) != MILD_OK) {
+                fail_msg("%s", error.text);
+            }
             double sinks = mild_sole_sinkage(sole_of(model, 0), &rival, LOAD);
             worst_depth = fmax(worst_depth, fabs(sinks - depth));
             double off = pressed_force(model, &rival, depth) / LOAD - 1.0;
-            if (model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D) off -= RESIST_LEAD / depth;
+            if (model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D) {
+                off -= RESIST_LEAD / depth;
+            }
             worst_force = fmax(worst_force, fabs(off));
         }
     }
-    print_message("matched: sinkage within %.2e mm of mild's, force pressed to that depth, the lead aside, within %.2e\n",
+    print_message("matched: sinkage within %.2e mm of mild's, force pressed to that depth, the "
+                  "lead aside, within %.2e\n",
                   1e3 * worst_depth, worst_force);
     assert_true(worst_depth < 1e-7); /* the bar is 0.1 mm */
     assert_true(worst_force < 2e-3); /* con_cone's drag at 1 cm/s */
@@ -91,20 +102,26 @@ static void test_matched(void **state) {
 
 static void test_refusals(void **state) {
     (void)state;
-    MildMaterial mild = mild_material_default(), rival = mild, spring = rival_of(MILD_MODEL_ECC_SPRING, &mild);
+    MildMaterial mild = mild_material_default(), rival = mild,
+                 spring = rival_of(MILD_MODEL_ECC_SPRING, &mild);
     MildError error = {0};
     MildModel model;
-    assert_int_not_equal(mild_model_match(MILD_MODEL_RIGID, &mild, raster[0], LOAD, &rival, &error), MILD_OK);
+    assert_int_not_equal(mild_model_match(MILD_MODEL_RIGID, &mild, raster[0], LOAD, &rival, &error),
+                         MILD_OK);
     assert_non_null(strstr(error.text, "rigid"));
-    assert_int_not_equal(mild_model_match(MILD_MODEL_CON_CONE, &spring, raster[0], LOAD, &rival, &error), MILD_OK);
+    assert_int_not_equal(
+        mild_model_match(MILD_MODEL_CON_CONE, &spring, raster[0], LOAD, &rival, &error), MILD_OK);
     assert_non_null(strstr(error.text, "ecc_spring"));
-    assert_int_not_equal(mild_model_match(MILD_MODEL_CON_CONE, &mild, raster[0], NAN, &rival, &error), MILD_OK);
+    assert_int_not_equal(
+        mild_model_match(MILD_MODEL_CON_CONE, &mild, raster[0], NAN, &rival, &error), MILD_OK);
     mild.model = MILD_MODEL_RIGID;
     assert_int_not_equal(mild_material_check(&mild, &error), MILD_OK);
     assert_non_null(strstr(error.text, "ground.model"));
     mild.model = 17;
     assert_int_not_equal(mild_material_check(&mild, &error), MILD_OK);
-    for (int m = 0; m < MILD_MODELS; m++) assert_true(mild_model_find(mild_model_names[m], &model) && (int)model == m);
+    for (int m = 0; m < MILD_MODELS; m++) {
+        assert_true(mild_model_find(mild_model_names[m], &model) && (int)model == m);
+    }
     assert_false(mild_model_find("ecc_sprin", &model));
 }
 
@@ -116,7 +133,9 @@ static void settle(Kit *kit, int model, const MildMaterial *material, double dt)
     kit->inertia[0] = 1e12;
     for (int s = 0; s < (int)(4.0 / dt); s++) {
         kit_step(kit, NULL);
-        for (int k = 0; k < 6; k++) kit->input.velocity[0][k] *= exp(-150.0 * dt);
+        for (int k = 0; k < 6; k++) {
+            kit->input.velocity[0][k] *= exp(-150.0 * dt);
+        }
     }
 }
 
@@ -128,21 +147,27 @@ static void test_equilibrium(void **state) {
     (void)state;
     static const double steps[2] = {1e-3, 5e-3};
     double worst = 0.0;
-    for (int model = 0; model < SOFT_MODELS; model++)
-        for (int p = 0; p < mild_material_preset_count(); p++)
+    for (int model = 0; model < SOFT_MODELS; model++) {
+        for (int p = 0; p < mild_material_preset_count(); p++) {
             for (int d = 0; d < 2; d++) {
-                MildMaterial mild = preset(mild_material_preset_name(p)), rival = rival_of(model, &mild);
+                MildMaterial mild = preset(mild_material_preset_name(p)),
+                             rival = rival_of(model, &mild);
                 double wanted = mild_sole_sinkage(raster[0], &mild, LOAD);
                 Kit kit;
                 settle(&kit, model, &rival, steps[d]);
-                double miss = fabs(depth_of(&kit) - wanted), force = kit.result.foot[0].force[2] / LOAD - 1.0;
-                if (miss > 1e-4 || fabs(force) > 1e-3)
-                    print_message("%s on %s, dt %g: %.3f mm instead of %.3f, force off by %.1e\n", mild_model_names[model],
-                                  mild_material_preset_name(p), steps[d], 1e3 * depth_of(&kit), 1e3 * wanted, force);
+                double miss = fabs(depth_of(&kit) - wanted),
+                       force = kit.result.foot[0].force[2] / LOAD - 1.0;
+                if (miss > 1e-4 || fabs(force) > 1e-3) {
+                    print_message("%s on %s, dt %g: %.3f mm instead of %.3f, force off by %.1e\n",
+                                  mild_model_names[model], mild_material_preset_name(p), steps[d],
+                                  1e3 * depth_of(&kit), 1e3 * wanted, force);
+                }
                 worst = fmax(worst, miss);
                 assert_true(miss < 1e-4 && fabs(force) < 1e-3);
                 kit_close(&kit);
             }
+        }
+    }
     print_message("at rest: within %.4f mm of the closed form\n", 1e3 * worst);
 }
 
@@ -151,28 +176,40 @@ static void test_no_creep(void **state) {
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     static const char *const grounds[2] = {"sand_loose", "foam28"};
     double worst[2] = {0.0, 0.0};
-    for (int model = 0; model < SOFT_MODELS; model++)
-        for (int g = 0; g < 2; g++)
+    for (int model = 0; model < SOFT_MODELS; model++) {
+        for (int g = 0; g < 2; g++) {
             for (int d = 0; d < 3; d++) {
                 MildMaterial mild = preset(grounds[g]), rival = rival_of(model, &mild);
                 Kit kit;
                 settle(&kit, model, &rival, steps[d]);
-                /* resistive force theory carries 0.13 (2D) and 0.05 (3D) of the weight sideways, the others mu times it */
+                /* resistive force theory carries 0.13 (2D) and 0.05 (3D) of the weight sideways,
+                 * the others mu times it */
                 const double side = rival.mu > 0.0 ? 0.4 * rival.mu : 0.02;
-                const double force[1][3] = {{side * LOAD, 0.0, 0.0}}, back[1][3] = {{0.0, 0.0, 0.0}};
-                for (int s = 0; s < (int)(0.2 / steps[d]); s++) kit_step(&kit, force);
+                const double force[1][3] = {{side * LOAD, 0.0, 0.0}},
+                             back[1][3] = {{0.0, 0.0, 0.0}};
+                for (int s = 0; s < (int)(0.2 / steps[d]); s++) {
+                    kit_step(&kit, force);
+                }
                 double start[3];
                 memcpy(start, kit.input.position[0], sizeof start);
-                for (int s = 0; s < (int)(10.0 / steps[d]); s++) kit_step(&kit, s * steps[d] < 5.0 ? force : back);
-                double down = fabs(kit.input.position[0][2] - start[2]), sideways = fabs(kit.input.position[0][0] - start[0]);
-                if (down > 1e-4 || sideways > 1e-4)
-                    print_message("%s on %s, dt %g: %.4f mm down, %.4f mm sideways\n", mild_model_names[model], grounds[g],
-                                  steps[d], 1e3 * down, 1e3 * sideways);
+                for (int s = 0; s < (int)(10.0 / steps[d]); s++) {
+                    kit_step(&kit, s * steps[d] < 5.0 ? force : back);
+                }
+                double down = fabs(kit.input.position[0][2] - start[2]),
+                       sideways = fabs(kit.input.position[0][0] - start[0]);
+                if (down > 1e-4 || sideways > 1e-4) {
+                    print_message("%s on %s, dt %g: %.4f mm down, %.4f mm sideways\n",
+                                  mild_model_names[model], grounds[g], steps[d], 1e3 * down,
+                                  1e3 * sideways);
+                }
                 worst[0] = fmax(worst[0], down);
                 worst[1] = fmax(worst[1], sideways);
                 kit_close(&kit);
             }
-    print_message("creep in 10 s: worst %.5f mm down, %.5f mm sideways\n", 1e3 * worst[0], 1e3 * worst[1]);
+        }
+    }
+    print_message("creep in 10 s: worst %.5f mm down, %.5f mm sideways\n", 1e3 * worst[0],
+                  1e3 * worst[1]);
     assert_true(worst[0] < 1e-4 && worst[1] < 1e-4);
 }
 
@@ -194,15 +231,19 @@ static MildMaterial choi(void) {
     return m;
 }
 
-/* First stop [m] from dK/du = (M g - F_g - 2 c_d m_a' K)/(M + m_a), the exact impact equation, by small steps. */
-static double exact_stop(const MildMaterial *m, double pitch, int elements, double mass, double speed) {
+/* First stop [m] from dK/du = (M g - F_g - 2 c_d m_a' K)/(M + m_a), the exact impact equation, by
+ * small steps. */
+static double exact_stop(const MildMaterial *m, double pitch, int elements, double mass,
+                         double speed) {
     const double step = 1e-6;
     double energy = 0.5 * speed * speed, u = 0.0;
     for (; energy > 0.0; u += step) {
         MildElementLaw law = mild_element_law(m, pitch, u + 0.5 * step);
-        double n = elements, drag = 2.0 * m->c_d * n * law.added_mass_per_depth, weight = mass * KIT_GRAVITY - n * law.force;
+        double n = elements, drag = 2.0 * m->c_d * n * law.added_mass_per_depth,
+               weight = mass * KIT_GRAVITY - n * law.force;
         double inert = mass + n * law.added_mass;
-        energy = (energy * (1.0 - 0.5 * step * drag / inert) + step * weight / inert) / (1.0 + 0.5 * step * drag / inert);
+        energy = (energy * (1.0 - 0.5 * step * drag / inert) + step * weight / inert) /
+                 (1.0 + 0.5 * step * drag / inert);
     }
     return u;
 }
@@ -217,14 +258,17 @@ static double worst_stop(const MildMaterial *m, double mass, double dt) {
         kit.mass[0] = mass;
         kit.inertia[0] = 1e12;
         double height = 0.125 / KIT_GRAVITY + 0.2 * g * 0.5 * dt, deepest = 0.0;
-        double exact = exact_stop(m, mild_sole_pitch(sole), mild_sole_elements(sole), mass, sqrt(2.0 * KIT_GRAVITY * height));
+        double exact = exact_stop(m, mild_sole_pitch(sole), mild_sole_elements(sole), mass,
+                                  sqrt(2.0 * KIT_GRAVITY * height));
         kit.input.position[0][2] += height;
         while (kit.input.velocity[0][2] <= 0.0) {
             kit_step(&kit, NULL);
             deepest = fmax(deepest, depth_of(&kit));
         }
         double error = deepest / exact - 1.0;
-        if (fabs(error) > fabs(worst)) worst = error;
+        if (fabs(error) > fabs(worst)) {
+            worst = error;
+        }
         kit_close(&kit);
     }
     return worst;
@@ -233,52 +277,71 @@ static double worst_stop(const MildMaterial *m, double mass, double dt) {
 static void test_impact(void **state) {
     (void)state;
     static const double masses[3] = {1.0, 3.0, 20.0}, steps[3] = {0.25e-3, 1e-3, 5e-3};
-    static const double allowed[3][3] = {{0.01, 0.01, 0.15}, {0.005, 0.005, 0.02}, {0.002, 0.002, 0.005}}; /* 1 kg stops within 5 ms */
+    static const double allowed[3][3] = {{0.01, 0.01, 0.15},
+                                         {0.005, 0.005, 0.02},
+                                         {0.002, 0.002, 0.005}}; /* 1 kg stops within 5 ms */
     for (int model = 0; model < SOFT_MODELS; model++) {
-        MildMaterial mild = mild_material_default(), m = model == MILD_MODEL_CON_CONE ? choi() : rival_of(model, &mild);
+        MildMaterial mild = mild_material_default(),
+                     m = model == MILD_MODEL_CON_CONE ? choi() : rival_of(model, &mild);
         const MildSole *sole = sole_of(model, 0);
         for (int i = 0; i < 3; i++) {
-            double exact = exact_stop(&m, mild_sole_pitch(sole), mild_sole_elements(sole), masses[i], 0.5), worst[3];
-            for (int d = 0; d < 3; d++) worst[d] = worst_stop(&m, masses[i], steps[d]);
-            print_message("%-12s %4.0f kg at 0.5 m/s: %7.3f mm exact; %+.2f %+.2f %+.2f %% at 0.25, 1, 5 ms\n",
-                          mild_model_names[model], masses[i], 1e3 * exact, 1e2 * worst[0], 1e2 * worst[1], 1e2 * worst[2]);
-            for (int d = 0; d < 3; d++) assert_true(fabs(worst[d]) < allowed[i][d]);
+            double exact = exact_stop(&m, mild_sole_pitch(sole), mild_sole_elements(sole),
+                                      masses[i], 0.5),
+                   worst[3];
+            for (int d = 0; d < 3; d++) {
+                worst[d] = worst_stop(&m, masses[i], steps[d]);
+            }
+            print_message("%-12s %4.0f kg at 0.5 m/s: %7.3f mm exact; %+.2f %+.2f %+.2f %% at "
+                          "0.25, 1, 5 ms\n",
+                          mild_model_names[model], masses[i], 1e3 * exact, 1e2 * worst[0],
+                          1e2 * worst[1], 1e2 * worst[2]);
+            for (int d = 0; d < 3; d++) {
+                assert_true(fabs(worst[d]) < allowed[i][d]);
+            }
         }
     }
 }
 
 /* ---- energy ---- */
 
-/* Work of the ground on the foot over one step, at the mean twist: exactly the change of kinetic energy it causes. */
+/* Work of the ground on the foot over one step, at the mean twist: exactly the change of kinetic
+ * energy it causes. */
 static double ground_work(const Kit *kit, const double *before) {
     const MildFootResult *result = &kit->result.foot[0];
     double work = 0.0;
     for (int k = 0; k < 3; k++) {
         work += 0.5 * kit->input.dt * result->force[k] * (before[k] + kit->result.velocity[k]);
-        work += 0.5 * kit->input.dt * result->torque[k] * (before[3 + k] + kit->result.velocity[3 + k]);
+        work +=
+            0.5 * kit->input.dt * result->torque[k] * (before[3 + k] + kit->result.velocity[3 + k]);
     }
     return work;
 }
 
 static int untouched(const Kit *kit) {
     int touched = 0;
-    for (int e = 0; e < mild_sole_elements(kit->soles[0]); e++) touched += mild_ground_depth_max(kit->ground, 0)[e] > 0.0;
+    for (int e = 0; e < mild_sole_elements(kit->soles[0]); e++) {
+        touched += mild_ground_depth_max(kit->ground, 0)[e] > 0.0;
+    }
     return touched == 0;
 }
 
-/* A foot thrown and shaken at random; *worst: most energy gained over a cycle from air to air. It is hard to turn: on one
- * element it would tumble, and at 20 rad/s an engine's linear step alone loses count of the depth (28 N on the bed). */
+/* A foot thrown and shaken at random; *worst: most energy gained over a cycle from air to air. It
+ * is hard to turn: on one element it would tumble, and at 20 rad/s an engine's linear step alone
+ * loses count of the depth (28 N on the bed). */
 static int thrown(int model, uint64_t *random, double *worst) {
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     MildMaterial mild = kit_material(random), rival = rival_of(model, &mild);
-    double dt = steps[kit_index(random, 3)], work = 0.0, taken = 0.0, shake[3], spring = kit_uniform(random, 2.0, 8.0);
+    double dt = steps[kit_index(random, 3)], work = 0.0, taken = 0.0, shake[3],
+           spring = kit_uniform(random, 2.0, 8.0);
     int cycles = 0;
     Kit kit;
     kit_open(&kit, 1, sole_of(model, 0), NULL, &rival, dt);
     kit_random_state(&kit, random);
     kit.inertia[0] = 3.0 * kit.mass[0];
     kit.input.position[0][2] += 0.15;
-    for (int k = 0; k < 3; k++) shake[k] = kit_uniform(random, 0.0, 1.0);
+    for (int k = 0; k < 3; k++) {
+        shake[k] = kit_uniform(random, 0.0, 1.0);
+    }
     for (int s = 0; s < (int)(0.6 / dt); s++) {
         double t = s * dt, before[6], force[1][3], weight = kit.mass[0] * KIT_GRAVITY;
         memcpy(before, kit.input.velocity[0], sizeof before);
@@ -305,9 +368,11 @@ static void test_passive(void **state) {
         uint64_t random = 11;
         double worst = -INFINITY;
         int cycles = 0;
-        for (int draw = 0; draw < 250; draw++) cycles += thrown(model, &random, &worst);
-        print_message("passivity of %-12s: %4d closed cycles, most energy gained %.2e J\n", mild_model_names[model], cycles,
-                      worst);
+        for (int draw = 0; draw < 250; draw++) {
+            cycles += thrown(model, &random, &worst);
+        }
+        print_message("passivity of %-12s: %4d closed cycles, most energy gained %.2e J\n",
+                      mild_model_names[model], cycles, worst);
         assert_true(cycles > 10);
         assert_true(worst < 1e-9);
     }
@@ -319,11 +384,13 @@ static void test_passive(void **state) {
 static void turn_state(const Kit *from, Kit *to, double angle, int mirror) {
     double c = cos(angle), s = sin(angle), m = mirror ? -1.0 : 1.0;
     const double Q[9] = {c, -s * m, 0, s, c * m, 0, 0, 0, 1}; /* turn after mirror */
-    const double *R = from->input.rotation[0], *p = from->input.position[0], *V = from->input.velocity[0];
+    const double *R = from->input.rotation[0], *p = from->input.position[0],
+                 *V = from->input.velocity[0];
     for (int i = 0; i < 3; i++) {
         to->input.position[0][i] = Q[3 * i] * p[0] + Q[3 * i + 1] * p[1] + Q[3 * i + 2] * p[2];
         to->input.velocity[0][i] = Q[3 * i] * V[0] + Q[3 * i + 1] * V[1] + Q[3 * i + 2] * V[2];
-        to->input.velocity[0][3 + i] = m * (Q[3 * i] * V[3] + Q[3 * i + 1] * V[4] + Q[3 * i + 2] * V[5]);
+        to->input.velocity[0][3 + i] =
+            m * (Q[3 * i] * V[3] + Q[3 * i + 1] * V[4] + Q[3 * i + 2] * V[5]);
         for (int j = 0; j < 3; j++) { /* Q R M: the foot's own y is mirrored too */
             double sum = Q[3 * i] * R[j] + Q[3 * i + 1] * R[3 + j] + Q[3 * i + 2] * R[6 + j];
             to->input.rotation[0][3 * i + j] = j == 1 ? m * sum : sum;
@@ -370,13 +437,17 @@ static void test_symmetry(void **state) {
 
 /* ---- solvers, state ---- */
 
-/* The same step by both solvers, after a few that left memory; how far their twists differ, relative. */
-static double solve_twice(int model, uint64_t *random, MildContactResult *newton, MildContactResult *sweeps) {
+/* The same step by both solvers, after a few that left memory; how far their twists differ,
+ * relative. */
+static double solve_twice(int model, uint64_t *random, MildContactResult *newton,
+                          MildContactResult *sweeps) {
     MildMaterial mild = kit_material(random), rival = rival_of(model, &mild);
     Kit kit;
     kit_open(&kit, 1, sole_of(model, 0), NULL, &rival, 1e-3);
     kit_random_state(&kit, random);
-    for (int s = 0; s < 5; s++) kit_step(&kit, NULL);
+    for (int s = 0; s < 5; s++) {
+        kit_step(&kit, NULL);
+    }
     kit_inverse_inertia(&kit);
     kit_free(&kit, NULL);
     kit_solve(&kit);
@@ -401,17 +472,21 @@ static void test_solvers_agree(void **state) {
     for (int model = 0; model < SOFT_MODELS; model++) {
         uint64_t random = 21;
         double worst = 0.0, residual = 0.0;
-        int both = 0, newton_alone = 0; /* the sweeps do not end where a foot turns about a point under it */
+        int both = 0,
+            newton_alone = 0; /* the sweeps do not end where a foot turns about a point under it */
         for (int draw = 0; draw < DRAWS; draw++) {
             MildContactResult newton, sweeps;
             double miss = solve_twice(model, &random, &newton, &sweeps);
             residual = fmax(residual, newton.residual);
             newton_alone += newton.converged && !sweeps.converged;
-            if (!newton.converged || !sweeps.converged) continue;
+            if (!newton.converged || !sweeps.converged) {
+                continue;
+            }
             both++;
             worst = fmax(worst, miss);
         }
-        print_message("solvers on %-12s: of %d steps %d converge in both, %d in newton alone; newton's worst residual %.1e; "
+        print_message("solvers on %-12s: of %d steps %d converge in both, %d in newton alone; "
+                      "newton's worst residual %.1e; "
                       "twists within %.1e\n",
                       mild_model_names[model], DRAWS, both, newton_alone, residual, worst);
         assert_true(residual < 1e-5);
@@ -428,7 +503,9 @@ static void test_copy_continues(void **state) {
         Kit kit, copy;
         kit_open(&kit, 1, sole_of(model, 0), NULL, &rival, 1e-3);
         kit_random_state(&kit, &random);
-        for (int s = 0; s < 50; s++) kit_step(&kit, NULL);
+        for (int s = 0; s < 50; s++) {
+            kit_step(&kit, NULL);
+        }
         kit_open(&copy, 1, sole_of(model, 0), NULL, &rival, 1e-3);
         MildGround *ground = copy.ground;
         MildScratch *scratch = copy.scratch;
@@ -447,7 +524,8 @@ static void test_copy_continues(void **state) {
     }
 }
 
-/* A concentric model carries no moment about its element, however the foot stands; the others do. */
+/* A concentric model carries no moment about its element, however the foot stands; the others do.
+ */
 static void test_moment(void **state) {
     (void)state;
     MildMaterial mild = preset("sand_loose");
@@ -459,26 +537,33 @@ static void test_moment(void **state) {
         kit_rotate(kit.input.rotation[0], turn);
         double x = mild_sole_x(center[0])[0], y = mild_sole_y(center[0])[0], p[3], moment[3];
         const double *R = kit.input.rotation[0];
-        for (int k = 0; k < 3; k++) p[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * KIT_SOLE_Z;
+        for (int k = 0; k < 3; k++) {
+            p[k] = R[3 * k] * x + R[3 * k + 1] * y + R[3 * k + 2] * KIT_SOLE_Z;
+        }
         kit.input.position[0][2] = -p[2] - 0.01;
         kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.05;
         kit_solve(&kit);
         const MildFootResult *foot = &kit.result.foot[0];
         kit_cross(p, foot->force, moment);
         double about = hypot(foot->torque[0] - moment[0], foot->torque[1] - moment[1]);
-        print_message("%-12s tilted by 0.1 rad: %.1f N, %.2e N m about the middle of the sole\n", mild_model_names[model],
-                      foot->force[2], about);
+        print_message("%-12s tilted by 0.1 rad: %.1f N, %.2e N m about the middle of the sole\n",
+                      mild_model_names[model], foot->force[2], about);
         assert_true(foot->force[2] > 10.0);
-        if (mild_model_is_concentric((MildModel)model)) assert_true(about < 1e-9);
-        else assert_true(about > 1.0);
+        if (mild_model_is_concentric((MildModel)model)) {
+            assert_true(about < 1e-9);
+        } else {
+            assert_true(about > 1.0);
+        }
         kit_close(&kit);
     }
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_matched),      cmocka_unit_test(test_refusals), cmocka_unit_test(test_equilibrium),
-        cmocka_unit_test(test_no_creep),     cmocka_unit_test(test_impact),   cmocka_unit_test(test_passive),  cmocka_unit_test(test_symmetry),
-        cmocka_unit_test(test_solvers_agree), cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_moment)};
+        cmocka_unit_test(test_matched),        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_equilibrium),    cmocka_unit_test(test_no_creep),
+        cmocka_unit_test(test_impact),         cmocka_unit_test(test_passive),
+        cmocka_unit_test(test_symmetry),       cmocka_unit_test(test_solvers_agree),
+        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_moment)};
     return cmocka_run_group_tests(tests, make_soles, drop_soles);
 }

@@ -1,21 +1,26 @@
-/* The ground creates no energy: random materials of the paper's ranges, random motions. Arguments: number of draws
- * (default 3000) and the first (default 0); `ground_test_passive 100000` is what docs/model.md reports. */
+/* The ground creates no energy: random materials of the paper's ranges, random motions. Arguments:
+ * number of draws (default 3000) and the first (default 0); `ground_test_passive 100000` is what
+ * docs/model.md reports. */
 #include "ground_kit.h"
 
 static int draws = 3000, first = 0;
 
-/* SplitMix64 counts in equal steps: each draw begins `numbers` numbers, all that it uses, after the one before. */
+/* SplitMix64 counts in equal steps: each draw begins `numbers` numbers, all that it uses, after the
+ * one before. */
 static uint64_t draw_seed(uint64_t seed, int draw, int numbers) {
     return seed + (uint64_t)draw * (uint64_t)numbers * 0x9e3779b97f4a7c15u;
 }
 
-/* Work of the ground on the foot over one step, at the mean twist: exactly the change of kinetic energy it causes. */
+/* Work of the ground on the foot over one step, at the mean twist: exactly the change of kinetic
+ * energy it causes. */
 static double ground_work(const Kit *kit, int f, const double *before) {
     const MildFootResult *result = &kit->result.foot[f];
     double work = 0.0;
     for (int k = 0; k < 3; k++) {
-        work += 0.5 * kit->input.dt * result->force[k] * (before[k] + kit->result.velocity[6 * f + k]);
-        work += 0.5 * kit->input.dt * result->torque[k] * (before[3 + k] + kit->result.velocity[6 * f + 3 + k]);
+        work +=
+            0.5 * kit->input.dt * result->force[k] * (before[k] + kit->result.velocity[6 * f + k]);
+        work += 0.5 * kit->input.dt * result->torque[k] *
+                (before[3 + k] + kit->result.velocity[6 * f + 3 + k]);
     }
     return work;
 }
@@ -23,16 +28,20 @@ static double ground_work(const Kit *kit, int f, const double *before) {
 /* No element is in the ground or remembers it. */
 static int lifted(const Kit *kit) {
     int touched = kit->result.foot[0].contacts;
-    for (int e = 0; e < 77 && touched == 0; e++) touched += mild_ground_depth_max(kit->ground, 0)[e] > 0.0;
+    for (int e = 0; e < 77 && touched == 0; e++) {
+        touched += mild_ground_depth_max(kit->ground, 0)[e] > 0.0;
+    }
     return touched == 0;
 }
 
 typedef struct {
     int cycles, missed, draw; /* missed: steps that did not converge; draw: the worst */
-    double worst, share;      /* [J], [-] most energy gained in a cycle, and as a share of the energy exchanged */
+    double worst,
+        share; /* [J], [-] most energy gained in a cycle, and as a share of the energy exchanged */
 } Thrown;
 
-/* A foot thrown and shaken at random: between touch and lift-off the ground must have taken energy, whatever happened. */
+/* A foot thrown and shaken at random: between touch and lift-off the ground must have taken energy,
+ * whatever happened. */
 static void throw_foot(int draw, MildSole *sole, Thrown *thrown) {
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     uint64_t random = draw_seed(11, draw, 35);
@@ -43,23 +52,34 @@ static void throw_foot(int draw, MildSole *sole, Thrown *thrown) {
     kit_random_state(&kit, &random);
     kit.input.position[0][2] += 0.05 + 0.1;
     double work = 0.0, taken = 0.0, shake[3], spring = kit_uniform(&random, 2.0, 8.0), force[1][3];
-    for (int k = 0; k < 3; k++) shake[k] = kit_uniform(&random, 0.0, 1.0);
+    for (int k = 0; k < 3; k++) {
+        shake[k] = kit_uniform(&random, 0.0, 1.0);
+    }
     int missed = 0;
     for (int s = 0; s < (int)(0.6 / dt); s++) {
         double t = s * dt, before[6];
         memcpy(before, kit.input.velocity[0], sizeof before);
-        for (int k = 0; k < 3; k++)
-            force[0][k] = kit.mass[0] * KIT_GRAVITY * (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t : shake[k] * sin(20 * t));
+        for (int k = 0; k < 3; k++) {
+            force[0][k] = kit.mass[0] * KIT_GRAVITY *
+                          (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t
+                                  : shake[k] * sin(20 * t));
+        }
         kit_step(&kit, (const double(*)[3])force);
         double w = ground_work(&kit, 0, before);
         missed += !kit.result.converged;
         work += w;
         taken += fabs(w);
-        if (!lifted(&kit) || taken == 0.0) continue;
+        if (!lifted(&kit) || taken == 0.0) {
+            continue;
+        }
         thrown->cycles++; /* closed */
-        if (work > thrown->worst) thrown->draw = draw;
+        if (work > thrown->worst) {
+            thrown->draw = draw;
+        }
         thrown->worst = fmax(thrown->worst, work);
-        if (taken > 1e-6) thrown->share = fmax(thrown->share, work / taken);
+        if (taken > 1e-6) {
+            thrown->share = fmax(thrown->share, work / taken);
+        }
         thrown->missed += missed;
         work = taken = 0.0;
         missed = 0;
@@ -68,7 +88,8 @@ static void throw_foot(int draw, MildSole *sole, Thrown *thrown) {
 }
 
 static void thrown_print(const char *name, int count, const Thrown *thrown) {
-    print_message("%s: %d draws, %d closed cycles, most energy gained %.2e J (draw %d), share %.2e; %d steps did not converge\n",
+    print_message("%s: %d draws, %d closed cycles, most energy gained %.2e J (draw %d), share "
+                  "%.2e; %d steps did not converge\n",
                   name, count, thrown->cycles, thrown->worst, thrown->draw, thrown->share,
                   thrown->missed);
 }
@@ -77,15 +98,18 @@ static void test_passive(void **state) {
     (void)state;
     Thrown thrown = {.worst = -INFINITY, .share = -INFINITY};
     MildSole *sole = kit_sole(0, 77);
-    for (int draw = first; draw < first + draws; draw++) throw_foot(draw, sole, &thrown);
+    for (int draw = first; draw < first + draws; draw++) {
+        throw_foot(draw, sole, &thrown);
+    }
     thrown_print("thrown and shaken", draws, &thrown);
     mild_sole_destroy(sole);
     assert_true(thrown.cycles > 0);
     assert_true(thrown.worst < 1e-9);
 }
 
-/* Draws of the first 100 000 in which an earlier Newton left steps unsolved, which created up to 1 kJ: light bodies whose
- * weight stands 0.4 m above the sole, slipping at mu around 1, 5 ms. Every step must be solved. */
+/* Draws of the first 100 000 in which an earlier Newton left steps unsolved, which created up to 1
+ * kJ: light bodies whose weight stands 0.4 m above the sole, slipping at mu around 1, 5 ms. Every
+ * step must be solved. */
 static void test_hard_draws(void **state) {
     (void)state;
     static const int hard[] = {6808,  8426,  11042, 14138, 25711, 38501, 45813, 48178, 48274,
@@ -93,16 +117,18 @@ static void test_hard_draws(void **state) {
     enum { HARD = sizeof hard / sizeof *hard };
     Thrown thrown = {.worst = -INFINITY, .share = -INFINITY};
     MildSole *sole = kit_sole(0, 77);
-    for (int i = 0; i < HARD; i++) throw_foot(hard[i], sole, &thrown);
+    for (int i = 0; i < HARD; i++) {
+        throw_foot(hard[i], sole, &thrown);
+    }
     thrown_print("hard draws", HARD, &thrown);
     mild_sole_destroy(sole);
     assert_int_equal(thrown.missed, 0);
     assert_true(thrown.worst < 1e-9);
 }
 
-/* A foot moved up and down by hand (A = 0). Two accounts of the work: impulse times mean speed, what the kinetic energy of
- * a body changes by, which must never be a gain; and impulse times the step's way, dt times the new speed, half a step
- * later. */
+/* A foot moved up and down by hand (A = 0). Two accounts of the work: impulse times mean speed,
+ * what the kinetic energy of a body changes by, which must never be a gain; and impulse times the
+ * step's way, dt times the new speed, half a step later. */
 static void test_passive_by_hand(void **state) {
     (void)state;
     MildSole *sole = kit_plate(2, 1);
@@ -113,12 +139,15 @@ static void test_passive_by_hand(void **state) {
         uint64_t random = draw_seed(13, draw, 16);
         MildMaterial m = kit_material(&random);
         Kit kit;
-        double dt = steps[draw % 3], period = kit_uniform(&random, 0.2, 2.0), depth = kit_uniform(&random, 0.002, 0.08);
-        double wobble = kit_uniform(&random, 0.0, 0.3) * depth, z = 0.01, work = 0.0, way = 0.0, taken = 0.0;
+        double dt = steps[draw % 3], period = kit_uniform(&random, 0.2, 2.0),
+               depth = kit_uniform(&random, 0.002, 0.08);
+        double wobble = kit_uniform(&random, 0.0, 0.3) * depth, z = 0.01, work = 0.0, way = 0.0,
+               taken = 0.0;
         kit_open(&kit, 1, sole, NULL, &m, dt);
         kit.input.position[0][2] = -KIT_SOLE_Z + z;
         for (double t = dt; t < period + 0.02; t += dt) {
-            double next = 0.01 - (depth + 0.01) * pow(sin(3.14159 * fmin(t / period, 1.0)), 2.0) + (t < period ? wobble * (1 - cos(50.0 * t)) : 0.0);
+            double next = 0.01 - (depth + 0.01) * pow(sin(3.14159 * fmin(t / period, 1.0)), 2.0) +
+                          (t < period ? wobble * (1 - cos(50.0 * t)) : 0.0);
             kit.input.free_velocity[2] = (next - z) / dt;
             z = next;
             kit_solve(&kit);
@@ -129,19 +158,25 @@ static void test_passive_by_hand(void **state) {
             taken += fabs(w);
         }
         kit_close(&kit);
-        if (taken == 0.0) continue;
+        if (taken == 0.0) {
+            continue;
+        }
         worst = fmax(worst, work / taken);
         worst_way = fmax(worst_way, way / taken);
         gains += way > 0.0;
     }
-    print_message("down and up by hand: %d draws, most work given back in excess, as a share: %.2e at the mean speed, %.2e along "
-                  "the way (%d draws above 0)\n", draws, worst, worst_way, gains);
+    print_message("down and up by hand: %d draws, most work given back in excess, as a share: %.2e "
+                  "at the mean speed, %.2e along "
+                  "the way (%d draws above 0)\n",
+                  draws, worst, worst_way, gains);
     mild_sole_destroy(sole);
     assert_true(worst < 0.0 && worst_way < 0.0);
 }
 
-/* One step along the loop: x, z and tilt about y; returns the ground's work on the foot, at the mean twist. */
-static double loop_step(Kit *kit, const double size[3], const double phase[3], double turn, double at[3]) {
+/* One step along the loop: x, z and tilt about y; returns the ground's work on the foot, at the
+ * mean twist. */
+static double loop_step(Kit *kit, const double size[3], const double phase[3], double turn,
+                        double at[3]) {
     double *V = kit->input.free_velocity;
     for (int k = 0; k < 3; k++) {
         double next = size[k] * (sin(phase[k] + 6.283185307179586 * turn) - sin(phase[k]));
@@ -154,8 +189,8 @@ static double loop_step(Kit *kit, const double size[3], const double phase[3], d
     return work;
 }
 
-/* A foot led by hand (A = 0) around a closed loop of height, place and tilt, over and over. The first time the ground
- * yields; from then on each round must cost work, or none. */
+/* A foot led by hand (A = 0) around a closed loop of height, place and tilt, over and over. The
+ * first time the ground yields; from then on each round must cost work, or none. */
 static void test_loops(void **state) {
     (void)state;
     MildSole *sole = kit_sole(0, 77);
@@ -180,21 +215,30 @@ static void test_loops(void **state) {
                 work += w;
                 taken += fabs(w);
             }
-            if (r == 0 || taken == 0.0) continue;
+            if (r == 0 || taken == 0.0) {
+                continue;
+            }
             worst = fmax(worst, work);
             worst_share = fmax(worst_share, work / taken);
         }
         kit_close(&kit);
     }
-    print_message("closed loops by hand: %d draws, most energy gained in a round %.2e J, share %.2e\n", draws, worst, worst_share);
+    print_message(
+        "closed loops by hand: %d draws, most energy gained in a round %.2e J, share %.2e\n", draws,
+        worst, worst_share);
     mild_sole_destroy(sole);
     assert_true(worst < 1e-9);
 }
 
 int main(int argc, char **argv) {
-    if (argc > 1) draws = atoi(argv[1]);
-    if (argc > 2) first = atoi(argv[2]);
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_passive), cmocka_unit_test(test_hard_draws),
-                                       cmocka_unit_test(test_passive_by_hand), cmocka_unit_test(test_loops)};
+    if (argc > 1) {
+        draws = atoi(argv[1]);
+    }
+    if (argc > 2) {
+        first = atoi(argv[2]);
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_passive), cmocka_unit_test(test_hard_draws),
+        cmocka_unit_test(test_passive_by_hand), cmocka_unit_test(test_loops)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,11 +1,12 @@
-/* Prints: what a second step finds, energy with lifts and sideways shifts, bounded memory, bytes; parameters changed under a
- * standing foot. */
+/* Prints: what a second step finds, energy with lifts and sideways shifts, bounded memory, bytes;
+ * parameters changed under a standing foot. */
 #include "ground_kit.h"
 
 #define TILES 128
 
 /* The kit with a ground that remembers prints. */
-static void prints_open(Kit *kit, int feet, MildSole *left, MildSole *right, const MildMaterial *material, double dt, int tiles) {
+static void prints_open(Kit *kit, int feet, MildSole *left, MildSole *right,
+                        const MildMaterial *material, double dt, int tiles) {
     kit_open(kit, feet, left, right, material, dt);
     kit_prints(kit, tiles);
     assert_int_equal(mild_ground_size(kit->ground), kit->bytes);
@@ -15,15 +16,17 @@ static void prints_open(Kit *kit, int feet, MildSole *left, MildSole *right, con
 /* Moves the immovable foot (A = 0) to depth u at the speed of one step; returns the force. */
 static double move_to(Kit *kit, double u) {
     double z = -KIT_SOLE_Z - u;
-    kit->input.velocity[0][2] = kit->input.free_velocity[2] = (z - kit->input.position[0][2]) / kit->input.dt;
+    kit->input.velocity[0][2] = kit->input.free_velocity[2] =
+        (z - kit->input.position[0][2]) / kit->input.dt;
     kit_solve(kit);
     kit_advance(kit);
     kit->input.position[0][2] = z;
     return kit->result.foot[0].force[2];
 }
 
-/* Pressed to 20 mm, lifted out, pressed again at the same place: nothing until the print is met, then the unloading line up to
- * the old depth, then virgin ground. Elsewhere, and on elastic ground, the first curve again. */
+/* Pressed to 20 mm, lifted out, pressed again at the same place: nothing until the print is met,
+ * then the unloading line up to the old depth, then virgin ground. Elsewhere, and on elastic
+ * ground, the first curve again. */
 static void test_second_step(void **state) {
     (void)state;
     MildSole *sole = kit_plate(4, 4);
@@ -36,18 +39,30 @@ static void test_second_step(void **state) {
         Kit kit;
         prints_open(&kit, 1, sole, NULL, &m, 1e-3, TILES);
         double worst = 0.0, first_load = -1.0;
-        for (int s = 0; s <= 200; s++) move_to(&kit, 1e-4 * s);
-        for (int s = 200; s >= -50; s--) move_to(&kit, 1e-4 * s);
-        double print = mild_ground_print_at(kit.ground, 0.0, kit.input.position[0][1]), foot = 16.0;
-        double a = 0.02, top = mild_element_law(&m, KIT_PITCH, a).force, travel = fmax(recovery[r] * a, 1e-4);
-        for (int s = -50; s <= 300; s++) { /* the force of a step is the mean about the depth it starts from */
-            double u = 1e-4 * (s - 1), force = move_to(&kit, u + 1e-4) / foot;
-            double virgin = mild_element_law(&m, KIT_PITCH, fmax(u, 0.0)).force, line = fmax(top * (1.0 - (a - u) / travel), 0.0);
-            double expected = recovery[r] < 1.0 && u <= a - 1e-9 ? line : virgin;
-            if (first_load < 0.0 && force > 0.0) first_load = u;
-            if (u < a - 2e-4 || u > a + 2e-4) worst = fmax(worst, fabs(force - expected) / top);
+        for (int s = 0; s <= 200; s++) {
+            move_to(&kit, 1e-4 * s);
         }
-        print_message("recovery %.1f: print of %.2f mm, the second step is carried from %.2f mm on, off by %.1e of the load\n",
+        for (int s = 200; s >= -50; s--) {
+            move_to(&kit, 1e-4 * s);
+        }
+        double print = mild_ground_print_at(kit.ground, 0.0, kit.input.position[0][1]), foot = 16.0;
+        double a = 0.02, top = mild_element_law(&m, KIT_PITCH, a).force,
+               travel = fmax(recovery[r] * a, 1e-4);
+        for (int s = -50; s <= 300;
+             s++) { /* the force of a step is the mean about the depth it starts from */
+            double u = 1e-4 * (s - 1), force = move_to(&kit, u + 1e-4) / foot;
+            double virgin = mild_element_law(&m, KIT_PITCH, fmax(u, 0.0)).force,
+                   line = fmax(top * (1.0 - (a - u) / travel), 0.0);
+            double expected = recovery[r] < 1.0 && u <= a - 1e-9 ? line : virgin;
+            if (first_load < 0.0 && force > 0.0) {
+                first_load = u;
+            }
+            if (u < a - 2e-4 || u > a + 2e-4) {
+                worst = fmax(worst, fabs(force - expected) / top);
+            }
+        }
+        print_message("recovery %.1f: print of %.2f mm, the second step is carried from %.2f mm "
+                      "on, off by %.1e of the load\n",
                       recovery[r], 1e3 * print, 1e3 * first_load, worst);
         assert_true(fabs(print - (recovery[r] < 1.0 ? a : 0.0)) < 1e-5);
         assert_true(fabs(first_load - (recovery[r] < 1.0 ? a - travel : 0.0)) < 2.1e-4);
@@ -60,12 +75,15 @@ static void test_second_step(void **state) {
 /* Not at the sole's edge: there a cell may lie half outside. */
 static int has_neighbours(const MildSole *sole, int e) {
     int count = 0;
-    for (int i = 0; i < mild_sole_elements(sole); i++)
-        count += hypot(mild_sole_x(sole)[i] - mild_sole_x(sole)[e], mild_sole_y(sole)[i] - mild_sole_y(sole)[e]) < 1.5 * KIT_PITCH;
+    for (int i = 0; i < mild_sole_elements(sole); i++) {
+        count += hypot(mild_sole_x(sole)[i] - mild_sole_x(sole)[e],
+                       mild_sole_y(sole)[i] - mild_sole_y(sole)[e]) < 1.5 * KIT_PITCH;
+    }
     return count == 9;
 }
 
-/* A foot pressed down turned by any angle leaves no hole under its sole; a step beside the print finds virgin ground. */
+/* A foot pressed down turned by any angle leaves no hole under its sole; a step beside the print
+ * finds virgin ground. */
 static void test_no_holes(void **state) {
     (void)state;
     uint64_t random = 51;
@@ -78,25 +96,39 @@ static void test_no_holes(void **state) {
         prints_open(&kit, 1, sole, NULL, &sand, 1e-3, TILES);
         double turn[3] = {0.0, 0.0, kit_uniform(&random, -3.2, 3.2)};
         kit_rotate(kit.input.rotation[0], turn);
-        for (int k = 0; k < 2; k++) kit.input.position[0][k] = kit_uniform(&random, -5.0, 5.0);
-        for (int s = 0; s <= 100; s++) move_to(&kit, 1e-4 * s);
-        for (int s = 100; s >= -10; s--) move_to(&kit, 1e-4 * s);
+        for (int k = 0; k < 2; k++) {
+            kit.input.position[0][k] = kit_uniform(&random, -5.0, 5.0);
+        }
+        for (int s = 0; s <= 100; s++) {
+            move_to(&kit, 1e-4 * s);
+        }
+        for (int s = 100; s >= -10; s--) {
+            move_to(&kit, 1e-4 * s);
+        }
         const double *R = kit.input.rotation[0], *p = kit.input.position[0];
-        for (int e = 0; e < 77; e++)
+        for (int e = 0; e < 77; e++) {
             for (int k = 0; k < 49 && has_neighbours(sole, e); k++) {
-                double x = mild_sole_x(sole)[e] + KIT_PITCH * ((k % 7) / 6.0 - 0.5) * 0.6, y = mild_sole_y(sole)[e] + KIT_PITCH * ((k / 7) / 6.0 - 0.5) * 0.6;
-                holes += mild_ground_print_at(kit.ground, p[0] + R[0] * x + R[1] * y, p[1] + R[3] * x + R[4] * y) < 0.00999;
+                double x = mild_sole_x(sole)[e] + KIT_PITCH * ((k % 7) / 6.0 - 0.5) * 0.6,
+                       y = mild_sole_y(sole)[e] + KIT_PITCH * ((k / 7) / 6.0 - 0.5) * 0.6;
+                holes += mild_ground_print_at(kit.ground, p[0] + R[0] * x + R[1] * y,
+                                              p[1] + R[3] * x + R[4] * y) < 0.00999;
                 points++;
             }
-        for (int s = -10; s <= 90; s++) again = fmax(again, move_to(&kit, 1e-4 * s)); /* not yet carried in its own print */
-        for (int s = 90; s >= -10; s--) move_to(&kit, 1e-4 * s);
+        }
+        for (int s = -10; s <= 90; s++) {
+            again = fmax(again, move_to(&kit, 1e-4 * s)); /* not yet carried in its own print */
+        }
+        for (int s = 90; s >= -10; s--) {
+            move_to(&kit, 1e-4 * s);
+        }
         kit.input.position[0][0] += 0.4;
         move_to(&kit, 0.001);
         assert_true(move_to(&kit, 0.001) > 5.0);
         kit_close(&kit);
     }
     assert_true(points > 50000);
-    print_message("prints at any angle: %d holes at %d points; force in the own print %.1e N\n", holes, points, again);
+    print_message("prints at any angle: %d holes at %d points; force in the own print %.1e N\n",
+                  holes, points, again);
     assert_int_equal(holes, 0);
     assert_true(again < 1e-6);
     mild_sole_destroy(sole);
@@ -109,7 +141,9 @@ static void test_trail(void **state) {
     MildMaterial sand = mild_material_default();
     Kit kit;
     prints_open(&kit, 1, sole, NULL, &sand, 1e-3, TILES);
-    for (int s = 0; s <= 100; s++) move_to(&kit, 1e-4 * s);
+    for (int s = 0; s <= 100; s++) {
+        move_to(&kit, 1e-4 * s);
+    }
     kit.input.velocity[0][2] = kit.input.free_velocity[2] = 0.0;
     kit.input.velocity[0][0] = kit.input.free_velocity[0] = 0.5;
     for (int s = 0; s < 400; s++) {
@@ -117,15 +151,18 @@ static void test_trail(void **state) {
         kit_advance(&kit);
     }
     double least = 1.0;
-    for (double x = 0.0; x < 0.17; x += 0.002) least = fmin(least, mild_ground_print_at(kit.ground, x, kit.input.position[0][1]));
+    for (double x = 0.0; x < 0.17; x += 0.002) {
+        least = fmin(least, mild_ground_print_at(kit.ground, x, kit.input.position[0][1]));
+    }
     print_message("dragged 0.2 m: the trail is at least %.2f mm deep\n", 1e3 * least);
     assert_true(least > 0.0099);
     kit_close(&kit);
     mild_sole_destroy(sole);
 }
 
-/* Random feet on random, level and uneven, ground that remembers: pressed, lifted in their prints, moved aside and turned
- * there, pressed again. Whenever nothing is loaded, the ground has not given energy since the last time. */
+/* Random feet on random, level and uneven, ground that remembers: pressed, lifted in their prints,
+ * moved aside and turned there, pressed again. Whenever nothing is loaded, the ground has not given
+ * energy since the last time. */
 static void test_passive(void **state) {
     (void)state;
     uint64_t random = 52;
@@ -146,27 +183,40 @@ static void test_passive(void **state) {
         kit.terrain.map = map;
         kit_random_state(&kit, &random);
         kit.input.position[0][2] += 0.08;
-        double work = 0.0, total = 0.0, taken = 0.0, force[1][3], spin = kit_uniform(&random, 3.0, 12.0), swing = kit_uniform(&random, 0.2, 1.5);
+        double work = 0.0, total = 0.0, taken = 0.0, force[1][3],
+               spin = kit_uniform(&random, 3.0, 12.0), swing = kit_uniform(&random, 0.2, 1.5);
         double weight = kit.mass[0] * KIT_GRAVITY;
         for (int s = 0; s < (int)(1.2 / dt); s++) {
-            double t = s * dt, before[6], w = 0.0, lift = kit.input.position[0][2] + KIT_SOLE_Z + 0.01;
-            /* carried by a weak spring that hangs near the surface and moves up and down, aside and around */
-            force[0][2] = weight * (1.0 - 12.0 * lift + 0.9 * sin(spin * t) - 0.3 * kit.input.velocity[0][2]);
+            double t = s * dt, before[6], w = 0.0,
+                   lift = kit.input.position[0][2] + KIT_SOLE_Z + 0.01;
+            /* carried by a weak spring that hangs near the surface and moves up and down, aside and
+             * around */
+            force[0][2] =
+                weight * (1.0 - 12.0 * lift + 0.9 * sin(spin * t) - 0.3 * kit.input.velocity[0][2]);
             force[0][0] = weight * (swing * sin(5.0 * t) - 0.5 * kit.input.velocity[0][0]);
             force[0][1] = weight * (swing * cos(3.0 * t) - 0.5 * kit.input.velocity[0][1]);
             memcpy(before, kit.input.velocity[0], sizeof before);
             kit_step(&kit, (const double(*)[3])force);
             const MildFootResult *result = &kit.result.foot[0];
-            for (int k = 0; k < 3; k++)
-                w += 0.5 * dt * (result->force[k] * (before[k] + kit.result.velocity[k]) + result->torque[k] * (before[3 + k] + kit.result.velocity[3 + k]));
+            for (int k = 0; k < 3; k++) {
+                w += 0.5 * dt *
+                     (result->force[k] * (before[k] + kit.result.velocity[k]) +
+                      result->torque[k] * (before[3 + k] + kit.result.velocity[3 + k]));
+            }
             work += w;
             total += w;
             taken += fabs(w);
             whole = fmax(whole, total);
-            if (result->contacts > 0) continue;
+            if (result->contacts > 0) {
+                continue;
+            }
             int loaded = 0, deep = 0;
-            for (int e = 0; e < 77; e++) loaded += mild_ground_depth_max(kit.ground, 0)[e] > 0.0;
-            for (int e = 0; e < 77; e++) deep += mild_scratch_elements(kit.scratch, 0).depth[e] > 0.0;
+            for (int e = 0; e < 77; e++) {
+                loaded += mild_ground_depth_max(kit.ground, 0)[e] > 0.0;
+            }
+            for (int e = 0; e < 77; e++) {
+                deep += mild_scratch_elements(kit.scratch, 0).depth[e] > 0.0;
+            }
             if (loaded == 0 && taken > 0.0) {
                 cycles++;
                 inside += deep > 0;
@@ -177,21 +227,24 @@ static void test_passive(void **state) {
         kit_close(&kit);
         mild_map_destroy(map);
     }
-    print_message("passivity with prints: %d cycles, %d of them ended inside a print; most energy gained in one %.2e J, from the start %.2e J\n",
+    print_message("passivity with prints: %d cycles, %d of them ended inside a print; most energy "
+                  "gained in one %.2e J, from the start %.2e J\n",
                   cycles, inside, worst, whole);
     mild_sole_destroy(sole);
     assert_true(cycles > 10000 && inside > 300);
     assert_true(worst < 1e-9);
 }
 
-/* When the tiles are used up the oldest prints go; the block keeps its size and nothing is allocated. */
+/* When the tiles are used up the oldest prints go; the block keeps its size and nothing is
+ * allocated. */
 static void test_bounded(void **state) {
     (void)state;
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     MildMaterial sand = mild_material_default();
     const MildSole *soles[2] = {left, right};
     size_t none = mild_ground_bytes(soles, 2), some = mild_ground_bytes_prints(soles, 2, TILES);
-    print_message("state of two feet: %zu bytes without prints, %zu with %d tiles\n", none, some, TILES);
+    print_message("state of two feet: %zu bytes without prints, %zu with %d tiles\n", none, some,
+                  TILES);
     assert_true(none <= 2 * 16384 && some - none <= TILES * 136);
     Kit kit;
     prints_open(&kit, 1, left, NULL, &sand, 1e-3, TILES);
@@ -199,24 +252,32 @@ static void test_bounded(void **state) {
     enum { STEPS = 60 };
     for (int n = 0; n < STEPS; n++) {
         kit.input.position[0][0] = 0.31 * n;
-        for (int s = 0; s <= 20; s++) move_to(&kit, 1e-3 * s);
-        for (int s = 20; s >= -2; s--) move_to(&kit, 1e-3 * s);
+        for (int s = 0; s <= 20; s++) {
+            move_to(&kit, 1e-3 * s);
+        }
+        for (int s = 20; s >= -2; s--) {
+            move_to(&kit, 1e-3 * s);
+        }
     }
     for (int n = 0; n < STEPS; n++) {
-        int found = mild_ground_print_at(kit.ground, 0.31 * n + 0.05, kit.input.position[0][1]) > 0.0;
+        int found =
+            mild_ground_print_at(kit.ground, 0.31 * n + 0.05, kit.input.position[0][1]) > 0.0;
         kept += found;
         newest += found && n >= STEPS - 6;
     }
-    print_message("%d tiles keep %d of %d prints, the newest %d of 6 among them\n", TILES, kept, STEPS, newest);
+    print_message("%d tiles keep %d of %d prints, the newest %d of 6 among them\n", TILES, kept,
+                  STEPS, newest);
     assert_true(kept >= 8 && kept < 20 && newest == 6);
     mild_ground_reset(kit.ground);
-    assert_true(mild_ground_print_at(kit.ground, 0.31 * (STEPS - 1) + 0.05, kit.input.position[0][1]) == 0.0);
+    assert_true(mild_ground_print_at(kit.ground, 0.31 * (STEPS - 1) + 0.05,
+                                     kit.input.position[0][1]) == 0.0);
     kit_close(&kit);
     mild_sole_destroy(left);
     mild_sole_destroy(right);
 }
 
-/* A block with prints on uneven ground is bytes: copied half way, both go on alike; another scratch changes nothing. */
+/* A block with prints on uneven ground is bytes: copied half way, both go on alike; another scratch
+ * changes nothing. */
 static void test_copy_continues(void **state) {
     (void)state;
     uint64_t random = 53;
@@ -232,7 +293,9 @@ static void test_copy_continues(void **state) {
         a.terrain.map = map;
         kit_random_state(&a, &random);
         double shake[2][3] = {{10.0, 30.0, 100.0}, {-20.0, 10.0, 150.0}};
-        for (int s = 0; s < 150; s++) kit_step(&a, (const double(*)[3])shake);
+        for (int s = 0; s < 150; s++) {
+            kit_step(&a, (const double(*)[3])shake);
+        }
         prints_open(&b, 2, left, right, &m, 1e-3, TILES);
         memcpy(b.ground, a.ground, a.bytes);
         b.terrain = a.terrain;
@@ -260,49 +323,63 @@ static void test_no_creep(void **state) {
     static const double steps[2] = {1e-3, 5e-3};
     MildSole *sole = kit_sole(0, 77);
     double worst = 0.0;
-    for (int p = 0; p < mild_material_preset_count(); p++)
+    for (int p = 0; p < mild_material_preset_count(); p++) {
         for (int d = 0; d < 2; d++) {
             MildMaterial m;
             mild_material_preset(mild_material_preset_name(p), &m);
             Kit kit;
             prints_open(&kit, 1, sole, NULL, &m, steps[d], TILES);
-            kit.center[0][0] = 0.0622, kit.center[0][1] = 0.0035, kit.center[0][2] = KIT_SOLE_Z - 0.005;
+            kit.center[0][0] = 0.0622, kit.center[0][1] = 0.0035,
+            kit.center[0][2] = KIT_SOLE_Z - 0.005;
             for (int s = 0; s < (int)(2.0 / steps[d]); s++) {
                 kit_step(&kit, NULL);
-                for (int k = 0; k < 6; k++) kit.input.velocity[0][k] *= exp(-30.0 * steps[d]);
+                for (int k = 0; k < 6; k++) {
+                    kit.input.velocity[0][k] *= exp(-30.0 * steps[d]);
+                }
             }
             double start = kit.input.position[0][2];
-            for (int s = 0; s < (int)(10.0 / steps[d]); s++) kit_step(&kit, NULL);
+            for (int s = 0; s < (int)(10.0 / steps[d]); s++) {
+                kit_step(&kit, NULL);
+            }
             worst = fmax(worst, fabs(kit.input.position[0][2] - start));
             kit_close(&kit);
         }
+    }
     print_message("with prints, creep in 10 s: %.5f mm\n", 1e3 * worst);
     assert_true(worst < 1e-4);
     mild_sole_destroy(sole);
 }
 
-/* The material under a standing foot becomes another one. The foot sinks, or is thrown up; the ground then gives back no more
- * than the new material's unloading line holds at the depth where the foot stood. */
+/* The material under a standing foot becomes another one. The foot sinks, or is thrown up; the
+ * ground then gives back no more than the new material's unloading line holds at the depth where
+ * the foot stood. */
 static void test_changed_material(void **state) {
     (void)state;
     MildSole *sole = kit_sole(0, 77);
     double highest = 0.0, worst = -INFINITY;
-    for (int from = 0; from < mild_material_preset_count(); from++)
+    for (int from = 0; from < mild_material_preset_count(); from++) {
         for (int to = 0; to < mild_material_preset_count(); to++) {
             MildMaterial m;
             mild_material_preset(mild_material_preset_name(from), &m);
             Kit kit;
             prints_open(&kit, 1, sole, NULL, &m, 1e-3, from % 2 ? TILES : 0);
-            kit.center[0][0] = 0.0622, kit.center[0][1] = 0.0035, kit.center[0][2] = KIT_SOLE_Z - 0.005;
+            kit.center[0][0] = 0.0622, kit.center[0][1] = 0.0035,
+            kit.center[0][2] = KIT_SOLE_Z - 0.005;
             for (int s = 0; s < 800; s++) {
                 kit_step(&kit, NULL);
-                for (int k = 0; k < 6; k++) kit.input.velocity[0][k] *= 0.97;
+                for (int k = 0; k < 6; k++) {
+                    kit.input.velocity[0][k] *= 0.97;
+                }
             }
             mild_material_preset(mild_material_preset_name(to), &m);
             double stored = 0.0, work = 0.0, most = 0.0;
-            for (int e = 0; e < 77; e++) { /* a triangle under the line from the deepest point that the element remembers */
+            for (int e = 0; e < 77; e++) { /* a triangle under the line from the deepest point that
+                                              the element remembers */
                 double a = mild_ground_depth_max(kit.ground, 0)[e];
-                if (a > 0.0) stored += 0.5 * mild_element_law(&m, KIT_PITCH, a).force * fmax(m.recovery * a, 1e-4);
+                if (a > 0.0) {
+                    stored +=
+                        0.5 * mild_element_law(&m, KIT_PITCH, a).force * fmax(m.recovery * a, 1e-4);
+                }
             }
             kit.terrain.materials[0] = m;
             for (int s = 0; s < 500; s++) {
@@ -311,7 +388,10 @@ static void test_changed_material(void **state) {
                 kit_step(&kit, NULL);
                 for (int k = 0; k < 6; k++) {
                     assert_true(isfinite(kit.result.velocity[k]));
-                    work += 0.5 * 1e-3 * (k < 3 ? kit.result.foot[0].force[k] : kit.result.foot[0].torque[k - 3]) * (before[k] + kit.result.velocity[k]);
+                    work +=
+                        0.5 * 1e-3 *
+                        (k < 3 ? kit.result.foot[0].force[k] : kit.result.foot[0].torque[k - 3]) *
+                        (before[k] + kit.result.velocity[k]);
                 }
                 most = fmax(most, work);
                 highest = fmax(highest, kit.input.position[0][2] + KIT_SOLE_Z);
@@ -319,16 +399,20 @@ static void test_changed_material(void **state) {
             worst = fmax(worst, most - stored);
             kit_close(&kit);
         }
-    print_message("material changed under a standing foot, all pairs of presets: it rises to %.1f mm above the ground at most; "
-                  "energy given back beyond what the new material holds %.1e J\n", 1e3 * highest, worst);
+    }
+    print_message("material changed under a standing foot, all pairs of presets: it rises to %.1f "
+                  "mm above the ground at most; "
+                  "energy given back beyond what the new material holds %.1e J\n",
+                  1e3 * highest, worst);
     assert_true(worst < 1e-6 && highest < 0.2);
     mild_sole_destroy(sole);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_second_step),      cmocka_unit_test(test_no_holes),
-                                       cmocka_unit_test(test_trail),            cmocka_unit_test(test_bounded),
-                                       cmocka_unit_test(test_copy_continues),   cmocka_unit_test(test_changed_material),
-                                       cmocka_unit_test(test_no_creep),         cmocka_unit_test(test_passive)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_second_step),    cmocka_unit_test(test_no_holes),
+        cmocka_unit_test(test_trail),          cmocka_unit_test(test_bounded),
+        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_changed_material),
+        cmocka_unit_test(test_no_creep),       cmocka_unit_test(test_passive)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,13 +1,15 @@
-/* The same ground on finer grids: pitch 39, 19.5, 9.75 and 4.875 mm. The law's parameters belong to an element of the
- * paper's pitch; `at_pitch` keeps what a material is per area and per depth. What then converges is the footprint: the sum
- * over elements is the midpoint rule of an integral over the sole. docs/model.md, section 16. */
+/* The same ground on finer grids: pitch 39, 19.5, 9.75 and 4.875 mm. The law's parameters belong to
+ * an element of the paper's pitch; `at_pitch` keeps what a material is per area and per depth. What
+ * then converges is the footprint: the sum over elements is the midpoint rule of an integral over
+ * the sole. docs/model.md, section 16. */
 #include "ground_kit.h"
 
 enum { LEVELS = 4 };
 static const double pitches[LEVELS] = {0.039, 0.0195, 0.00975, 0.004875};
 
-/* With r = pitch/19.5 mm: stiffness and drift of an element go with its area; u_f = R tan(alpha)/nu stays when nu goes with
- * R; the added mass per area, c_g phi rho nu, stays when c_g goes against nu. */
+/* With r = pitch/19.5 mm: stiffness and drift of an element go with its area; u_f = R tan(alpha)/nu
+ * stays when nu goes with R; the added mass per area, c_g phi rho nu, stays when c_g goes against
+ * nu. */
 static MildMaterial at_pitch(const MildMaterial *material, double pitch) {
     MildMaterial m = *material;
     double r = pitch / KIT_PITCH;
@@ -24,7 +26,9 @@ static MildSole *plate(double length, double width, double pitch) {
     MildSoleDef def = {outline, 4, pitch, KIT_SOLE_Z, 0};
     MildError error = {0};
     MildSole *sole = mild_sole_create(&def, &error);
-    if (!sole) fail_msg("%s", error.text);
+    if (!sole) {
+        fail_msg("%s", error.text);
+    }
     return sole;
 }
 
@@ -32,13 +36,16 @@ static const double length = 0.234, width = 0.156; /* [m] whole elements at ever
 
 static void tilt(Kit *kit, double angle) {
     double turn[3] = {0.0, angle, 0.0};
-    kit_rotate(kit->input.rotation[0], turn); /* about the plate's centre: the ankle moves on a circle */
+    kit_rotate(kit->input.rotation[0],
+               turn); /* about the plate's centre: the ankle moves on a circle */
     kit->input.position[0][0] = -kit->input.rotation[0][2] * KIT_SOLE_Z;
     kit->input.position[0][2] = -kit->input.rotation[0][8] * KIT_SOLE_Z;
 }
 
-/* Force and moment about the plate's centre after it has gone down to `depth` at a walking foot's speed and stopped. */
-static void press(const MildMaterial *m, double pitch, double angle, double depth, double *force, double *moment) {
+/* Force and moment about the plate's centre after it has gone down to `depth` at a walking foot's
+ * speed and stopped. */
+static void press(const MildMaterial *m, double pitch, double angle, double depth, double *force,
+                  double *moment) {
     MildSole *sole = plate(length, width, pitch);
     Kit kit;
     kit_open(&kit, 1, sole, NULL, m, 1e-3);
@@ -47,7 +54,8 @@ static void press(const MildMaterial *m, double pitch, double angle, double dept
     kit.input.position[0][2] += above;
     int steps = (int)((above + depth) / step + 0.5);
     for (int s = 0; s < steps + 2; s++) { /* the added mass comes to rest in the last two */
-        kit.input.velocity[0][2] = kit.input.free_velocity[2] = s < steps ? -(above + depth) / steps / kit.input.dt : 0.0;
+        kit.input.velocity[0][2] = kit.input.free_velocity[2] =
+            s < steps ? -(above + depth) / steps / kit.input.dt : 0.0;
         kit_solve(&kit);
         kit_advance(&kit);
     }
@@ -59,14 +67,18 @@ static void press(const MildMaterial *m, double pitch, double angle, double dept
     mild_sole_destroy(sole);
 }
 
-/* The limit of small elements: integral of stress over the part of the plate that is in the ground. */
-static void limit(const MildMaterial *m, double angle, double depth, double *force, double *moment) {
+/* The limit of small elements: integral of stress over the part of the plate that is in the ground.
+ */
+static void limit(const MildMaterial *m, double angle, double depth, double *force,
+                  double *moment) {
     enum { PANELS = 200000 };
     double dx = length / PANELS;
     *force = *moment = 0.0;
     for (int i = 0; i < PANELS; i++) {
         double x = -0.5 * length + (i + 0.5) * dx, u = depth + x * sin(angle);
-        if (u <= 0.0) continue;
+        if (u <= 0.0) {
+            continue;
+        }
         double f = mild_element_law(m, KIT_PITCH, u).force / (KIT_PITCH * KIT_PITCH) * width * dx;
         *force += f;
         *moment -= x * cos(angle) * f;
@@ -79,7 +91,7 @@ static void test_level(void **state) {
     for (int p = 0; p < mild_material_preset_count(); p++) {
         MildMaterial base;
         mild_material_preset(mild_material_preset_name(p), &base);
-        for (double depth = 0.005; depth < 0.03; depth *= 2.0)
+        for (double depth = 0.005; depth < 0.03; depth *= 2.0) {
             for (int k = 0; k < LEVELS; k++) {
                 MildMaterial m = at_pitch(&base, pitches[k]);
                 double force, moment, wanted, none;
@@ -87,8 +99,11 @@ static void test_level(void **state) {
                 limit(&base, 0.0, depth, &wanted, &none);
                 worst = fmax(worst, fabs(force / wanted - 1.0));
             }
+        }
     }
-    print_message("level plate, every preset, 5 to 20 mm: any pitch gives the same force, worst %.1e\n", worst);
+    print_message(
+        "level plate, every preset, 5 to 20 mm: any pitch gives the same force, worst %.1e\n",
+        worst);
     assert_true(worst < 1e-9);
 }
 
@@ -96,9 +111,10 @@ static void test_tilted(void **state) {
     (void)state;
     static const char *const grounds[3] = {"sand_loose", "foam45", "rubber"};
     static const double angle = 5.0 * 3.14159265358979 / 180.0, depths[3] = {-0.004, 0.002, 0.010};
-    print_message("tilted 5 deg, error of force and of moment about the centre [%%] at pitch 39, 19.5, 9.75, 4.875 mm\n");
+    print_message("tilted 5 deg, error of force and of moment about the centre [%%] at pitch 39, "
+                  "19.5, 9.75, 4.875 mm\n");
     double worst[LEVELS] = {0};
-    for (int g = 0; g < 3; g++)
+    for (int g = 0; g < 3; g++) {
         for (int d = 0; d < 3; d++) {
             MildMaterial base;
             mild_material_preset(grounds[g], &base);
@@ -111,12 +127,16 @@ static void test_tilted(void **state) {
                 moment[k] = 100.0 * (moment[k] / turn - 1.0);
                 worst[k] = fmax(worst[k], fmax(fabs(force[k]), fabs(moment[k])));
             }
-            print_message("  %-10s centre %3.0f mm deep, %6.1f N %6.2f N m: force %6.2f %6.2f %6.2f %6.2f   moment %6.2f %6.2f %6.2f %6.2f\n",
-                          grounds[g], 1e3 * depths[d], wanted, turn, force[0], force[1], force[2], force[3], moment[0],
-                          moment[1], moment[2], moment[3]);
+            print_message("  %-10s centre %3.0f mm deep, %6.1f N %6.2f N m: force %6.2f %6.2f "
+                          "%6.2f %6.2f   moment %6.2f %6.2f %6.2f %6.2f\n",
+                          grounds[g], 1e3 * depths[d], wanted, turn, force[0], force[1], force[2],
+                          force[3], moment[0], moment[1], moment[2], moment[3]);
         }
+    }
     print_message("  worst %.2f %.2f %.2f %.2f %%\n", worst[0], worst[1], worst[2], worst[3]);
-    for (int k = 1; k < LEVELS; k++) assert_true(worst[k] < 0.5 * worst[k - 1]);
+    for (int k = 1; k < LEVELS; k++) {
+        assert_true(worst[k] < 0.5 * worst[k - 1]);
+    }
     assert_true(worst[3] < 0.1);
 }
 
@@ -137,22 +157,27 @@ static void test_drop(void **state) {
         kit.input.position[0][2] += 0.5 * length * sin(0.1);
         kit.input.velocity[0][0] = 0.3;
         kit.input.velocity[0][2] = -0.5;
-        for (int s = 0; s < 2000; s++) kit_step(&kit, NULL);
+        for (int s = 0; s < 2000; s++) {
+            kit_step(&kit, NULL);
+        }
         const double *R = kit.input.rotation[0], *p = kit.input.position[0];
         found[k][0] = -1e3 * (p[2] + R[8] * KIT_SOLE_Z);
         found[k][1] = 1e3 * (p[0] + R[2] * KIT_SOLE_Z);
         found[k][2] = atan2(-R[6], R[8]) * 180.0 / 3.14159265358979;
-        print_message("  tilted plate falls and slides, pitch %6.3f mm: rests %.3f mm deep, %.3f mm on, tilted %.3f deg\n",
+        print_message("  tilted plate falls and slides, pitch %6.3f mm: rests %.3f mm deep, %.3f "
+                      "mm on, tilted %.3f deg\n",
                       1e3 * pitches[k], found[k][0], found[k][1], found[k][2]);
         kit_close(&kit);
         mild_sole_destroy(sole);
     }
-    for (int i = 0; i < 2; i++) assert_true(fabs(found[2][i] / found[3][i] - 1.0) < 0.02);
+    for (int i = 0; i < 2; i++) {
+        assert_true(fabs(found[2][i] / found[3][i] - 1.0) < 0.02);
+    }
     assert_true(fabs(found[1][0] / found[3][0] - 1.0) < 0.03);
 }
 
-/* What a finer grid does when the numbers are left as they are, except the stiffness per area: u_f shrinks with the pitch,
- * and the limit is the complete cone from the surface on. */
+/* What a finer grid does when the numbers are left as they are, except the stiffness per area: u_f
+ * shrinks with the pitch, and the limit is the complete cone from the surface on. */
 static void test_definition(void **state) {
     (void)state;
     MildMaterial base = mild_material_default();
@@ -162,8 +187,10 @@ static void test_definition(void **state) {
         m.k_pen *= pitches[k] * pitches[k] / (KIT_PITCH * KIT_PITCH);
         press(&m, pitches[k], 0.0, 0.01, &force[k], &none);
     }
-    print_message("nu not scaled, 10 mm deep: %.1f %.1f %.1f %.1f N; complete cones alone %.1f N\n", force[0], force[1], force[2], force[3], cone);
-    assert_true(force[0] > force[1] && force[1] > force[2] && force[2] > force[3] && force[3] > cone);
+    print_message("nu not scaled, 10 mm deep: %.1f %.1f %.1f %.1f N; complete cones alone %.1f N\n",
+                  force[0], force[1], force[2], force[3], cone);
+    assert_true(force[0] > force[1] && force[1] > force[2] && force[2] > force[3] &&
+                force[3] > cone);
 }
 
 /* The sole's outline on grids: natural counts and their area. */
@@ -186,14 +213,18 @@ static void test_outline(void **state) {
         assert_non_null(sole);
         int count = mild_sole_elements(sole);
         double area = count * pitches[k] * pitches[k];
-        print_message("  outline of %.5f m^2, pitch %6.3f mm: %4d elements, area %+.2f %%\n", exact, 1e3 * pitches[k], count, 100.0 * (area / exact - 1.0));
-        if (k == LEVELS - 1) assert_true(fabs(area / exact - 1.0) < 0.01);
+        print_message("  outline of %.5f m^2, pitch %6.3f mm: %4d elements, area %+.2f %%\n", exact,
+                      1e3 * pitches[k], count, 100.0 * (area / exact - 1.0));
+        if (k == LEVELS - 1) {
+            assert_true(fabs(area / exact - 1.0) < 0.01);
+        }
         mild_sole_destroy(sole);
     }
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_level), cmocka_unit_test(test_tilted), cmocka_unit_test(test_drop),
-                                       cmocka_unit_test(test_definition), cmocka_unit_test(test_outline)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_level), cmocka_unit_test(test_tilted), cmocka_unit_test(test_drop),
+        cmocka_unit_test(test_definition), cmocka_unit_test(test_outline)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,9 +1,11 @@
-/* Resistive force theory: published values, symmetries, and the contact step against the coefficients. */
+/* Resistive force theory: published values, symmetries, and the contact step against the
+ * coefficients. */
 #include "ground_kit.h"
 
 #define PI 3.14159265358979323846
 
-static void unit(double beta, double heading, double *n) { /* normal of a plate that slopes by beta along heading */
+static void unit(double beta, double heading,
+                 double *n) { /* normal of a plate that slopes by beta along heading */
     n[0] = sin(beta) * cos(heading);
     n[1] = sin(beta) * sin(heading);
     n[2] = -cos(beta);
@@ -30,28 +32,37 @@ static void test_published(void **state) {
     mild_resist_space(n, v, space);
     print_message("3D, level plate straight down: %.6f\n", space[2]);
     assert_true(fabs(space[2] - 1.0) < 1e-4 && fabs(space[0]) < 1e-6);
-    /* Li et al. 2013: poppy seeds 0.254e6 loose, 0.464e6 close; the late slope of Choi's cone lies between. */
+    /* Li et al. 2013: poppy seeds 0.254e6 loose, 0.464e6 close; the late slope of Choi's cone lies
+     * between. */
     double late = 0.15e6 / cos(PI / 3.0);
-    print_message("sigma_cone/cos(alpha) of Choi's set %.3fe6 N/m^3, poppy seeds 0.254e6 .. 0.464e6\n", 1e-6 * late);
+    print_message(
+        "sigma_cone/cos(alpha) of Choi's set %.3fe6 N/m^3, poppy seeds 0.254e6 .. 0.464e6\n",
+        1e-6 * late);
     assert_true(late > 0.254e6 && late < 0.464e6);
 }
 
-/* alpha_z is greatest for a level plate going straight down; a leading plate is resisted; the ground never drives it. */
+/* alpha_z is greatest for a level plate going straight down; a leading plate is resisted; the
+ * ground never drives it. */
 static void test_signs(void **state) {
     (void)state;
     double greatest = 0.0, least_power = INFINITY, least_forward = INFINITY;
-    for (int i = -90; i <= 90; i++)
+    for (int i = -90; i <= 90; i++) {
         for (int j = 0; j <= 90; j++) {
             double beta = i * PI / 180.0, gamma = j * PI / 180.0, alpha[2];
             mild_resist_plane(beta, gamma, alpha);
             greatest = fmax(greatest, alpha[1]);
             least_power = fmin(least_power, alpha[0] * cos(gamma) + alpha[1] * sin(gamma));
-            if (i >= 0 && j < 90) least_forward = fmin(least_forward, alpha[0]);
+            if (i >= 0 && j < 90) {
+                least_forward = fmin(least_forward, alpha[0]);
+            }
         }
-    print_message("2D: greatest alpha_z %.4f, least resisting power %.4f, least alpha_x of a forward face %.4f\n", greatest,
-                  least_power, least_forward);
+    }
+    print_message("2D: greatest alpha_z %.4f, least resisting power %.4f, least alpha_x of a "
+                  "forward face %.4f\n",
+                  greatest, least_power, least_forward);
     assert_true(greatest < 1.0 + 1e-12 && least_power > 0.0);
-    assert_true(least_forward > -0.001); /* the printed C-11 = 0.007 breaks the fit's symmetry by as much */
+    assert_true(least_forward >
+                -0.001); /* the printed C-11 = 0.007 breaks the fit's symmetry by as much */
     uint64_t random = 3;
     double most = -INFINITY, peak = 0.0;
     for (int draw = 0; draw < 200000; draw++) {
@@ -59,7 +70,9 @@ static void test_signs(void **state) {
         unit(acos(kit_uniform(&random, 0.0, 1.0)), kit_uniform(&random, -PI, PI), n);
         moving(asin(kit_uniform(&random, 0.0, 1.0)), kit_uniform(&random, -PI, PI), v);
         mild_resist_space(n, v, alpha);
-        if (n[0] * v[0] + n[1] * v[1] + n[2] * v[2] > 0.0) most = fmax(most, alpha[0] * v[0] + alpha[1] * v[1] + alpha[2] * v[2]);
+        if (n[0] * v[0] + n[1] * v[1] + n[2] * v[2] > 0.0) {
+            most = fmax(most, alpha[0] * v[0] + alpha[1] * v[1] + alpha[2] * v[2]);
+        }
         peak = fmax(peak, alpha[2]);
     }
     print_message("3D: greatest alpha_z %.4f, greatest power given %.4f\n", peak, most);
@@ -71,8 +84,10 @@ static void test_symmetry(void **state) {
     uint64_t random = 4;
     double worst = 0.0;
     for (int draw = 0; draw < 2000; draw++) {
-        double beta = kit_uniform(&random, 0.0, 1.5), gamma = kit_uniform(&random, 0.0, 1.5), a = kit_uniform(&random, -PI, PI);
-        double b = kit_uniform(&random, -PI, PI), turn = kit_uniform(&random, -PI, PI), n[3], v[3], one[3], two[3], mirror[3];
+        double beta = kit_uniform(&random, 0.0, 1.5), gamma = kit_uniform(&random, 0.0, 1.5),
+               a = kit_uniform(&random, -PI, PI);
+        double b = kit_uniform(&random, -PI, PI), turn = kit_uniform(&random, -PI, PI), n[3], v[3],
+               one[3], two[3], mirror[3];
         unit(beta, a, n);
         moving(gamma, b, v);
         mild_resist_space(n, v, one);
@@ -85,13 +100,15 @@ static void test_symmetry(void **state) {
         worst = fmax(worst, fabs(two[0] - (one[0] * cos(turn) - one[1] * sin(turn))));
         worst = fmax(worst, fabs(two[1] - (one[0] * sin(turn) + one[1] * cos(turn))));
         worst = fmax(worst, fabs(two[2] - one[2]));
-        worst = fmax(worst, fmax(fabs(mirror[0] - one[0]), fmax(fabs(mirror[1] + one[1]), fabs(mirror[2] - one[2]))));
+        worst = fmax(worst, fmax(fabs(mirror[0] - one[0]),
+                                 fmax(fabs(mirror[1] + one[1]), fabs(mirror[2] - one[2]))));
     }
     print_message("3D: turned and mirrored within %.1e\n", worst);
     assert_true(worst < 1e-12);
 }
 
-/* Force on a plate of 5 x 3 elements tilted by beta about y, 20 mm deep in its middle, moved by hand at 0.2 m/s. */
+/* Force on a plate of 5 x 3 elements tilted by beta about y, 20 mm deep in its middle, moved by
+ * hand at 0.2 m/s. */
 static void plate_force(int model, double beta, double gamma, double *force, double *product) {
     const double dt = 1e-4, speed = 0.2, depth = 0.02, zeta = 0.254;
     MildSole *sole = kit_plate(5, 3);
@@ -106,15 +123,20 @@ static void plate_force(int model, double beta, double gamma, double *force, dou
     kit.input.velocity[0][0] = kit.input.free_velocity[0] = speed * cos(gamma);
     kit.input.velocity[0][2] = kit.input.free_velocity[2] = -speed * sin(gamma);
     const double *R = kit.input.rotation[0];
-    for (int s = 0; s < 20; s++) { /* deeper each time, so that all of it is virgin ground at the end */
-        kit.input.position[0][2] = -R[8] * KIT_SOLE_Z - depth - (gamma > 0.0 ? s * dt * speed * sin(gamma) : 0.0);
+    for (int s = 0; s < 20;
+         s++) { /* deeper each time, so that all of it is virgin ground at the end */
+        kit.input.position[0][2] =
+            -R[8] * KIT_SOLE_Z - depth - (gamma > 0.0 ? s * dt * speed * sin(gamma) : 0.0);
         kit_solve(&kit);
         mild_ground_advance(kit.ground, &kit.terrain, &kit.input, kit.scratch, &kit.result);
     }
     MildElements elements = mild_scratch_elements(kit.scratch, 0);
     *product = 0.0; /* area times depth of the elements in the ground, in the middle of the step */
-    for (int e = 0; e < 15; e++)
-        if (elements.depth[e] > 0.0) *product += KIT_PITCH * KIT_PITCH * (elements.depth[e] + 0.5 * dt * speed * sin(gamma));
+    for (int e = 0; e < 15; e++) {
+        if (elements.depth[e] > 0.0) {
+            *product += KIT_PITCH * KIT_PITCH * (elements.depth[e] + 0.5 * dt * speed * sin(gamma));
+        }
+    }
     *product *= zeta * 1e6;
     memcpy(force, kit.result.foot[0].force, 3 * sizeof(double));
     kit_close(&kit);
@@ -123,10 +145,11 @@ static void plate_force(int model, double beta, double gamma, double *force, dou
 
 static void test_contact_step(void **state) {
     (void)state;
-    static const double betas[4] = {0.0, 0.2, 0.4, -0.2}, gammas[5] = {0.0, 0.3, 0.8, 1.2, PI / 2.0};
+    static const double betas[4] = {0.0, 0.2, 0.4, -0.2},
+                        gammas[5] = {0.0, 0.3, 0.8, 1.2, PI / 2.0};
     double worst = 0.0;
-    for (int model = MILD_MODEL_ECC_QUASI; model <= MILD_MODEL_ECC_QUASI_3D; model++)
-        for (int b = 0; b < 4; b++)
+    for (int model = MILD_MODEL_ECC_QUASI; model <= MILD_MODEL_ECC_QUASI_3D; model++) {
+        for (int b = 0; b < 4; b++) {
             for (int g = 0; g < 5; g++) {
                 double alpha[3], n[3], v[3], force[3], product;
                 unit(betas[b], 0.0, n);
@@ -139,30 +162,44 @@ static void test_contact_step(void **state) {
                     alpha[0] = -alpha[0];
                 }
                 plate_force(model, betas[b], gammas[g], force, &product);
-                double back = cos(gammas[g]) > 1e-9 ? fmax(alpha[0], 0.0) : 0.0; /* across the motion: left out */
-                double up = fabs(force[2] / product - fmax(alpha[2], 0.0)), along = fabs(-force[0] / product - back);
-                if (up > 0.02 || along > 0.02)
-                    print_message("%s beta %.1f gamma %.1f: %.4f %.4f instead of %.4f %.4f\n", mild_model_names[model], betas[b],
-                                  gammas[g], -force[0] / product, force[2] / product, back, alpha[2]);
+                double back = cos(gammas[g]) > 1e-9 ? fmax(alpha[0], 0.0)
+                                                    : 0.0; /* across the motion: left out */
+                double up = fabs(force[2] / product - fmax(alpha[2], 0.0)),
+                       along = fabs(-force[0] / product - back);
+                if (up > 0.02 || along > 0.02) {
+                    print_message("%s beta %.1f gamma %.1f: %.4f %.4f instead of %.4f %.4f\n",
+                                  mild_model_names[model], betas[b], gammas[g], -force[0] / product,
+                                  force[2] / product, back, alpha[2]);
+                }
                 worst = fmax(worst, fmax(up, along));
             }
+        }
+    }
     print_message("contact step: coefficients met within %.4f of the level plate's\n", worst);
     assert_true(worst < 0.02);
 }
 
-/* Vertical work [J] that the ground gives, at its most, to a plate moved by hand around 20 mm of depth. cunning: down by
- * `size` while it slides and up again while it stands, the cycle that pays if the yield alone depends on the direction;
- * otherwise at random. */
+/* Vertical work [J] that the ground gives, at its most, to a plate moved by hand around 20 mm of
+ * depth. cunning: down by `size` while it slides and up again while it stands, the cycle that pays
+ * if the yield alone depends on the direction; otherwise at random. */
 static double shaken(Kit *kit, int cunning, double size, uint64_t *random) {
     enum { DOWN = 100, STEPS = 3000 };
-    static const double level[8] = {0.0, 0.0, 0.5, 1.0, 1.0, 1.0, 0.5, 0.0}; /* of size; slides in the first four steps */
+    static const double level[8] = {0.0, 0.0, 0.5, 1.0, 1.0,
+                                    1.0, 0.5, 0.0}; /* of size; slides in the first four steps */
     double z = 0.0, work = 0.0, most = -INFINITY;
     int slides = 0;
     for (int s = 0; s < STEPS; s++) {
-        double depth = 0.02 + size * (cunning ? level[s % 8] : kit_uniform(random, -1.0, 1.0)), speed;
-        if (kit_uniform(random, 0.0, 1.0) < 0.2) slides = kit_uniform(random, 0.0, 1.0) < 0.5;
-        if (cunning) slides = s % 8 < 4;
-        if (s < DOWN) depth = 2e-4 * s;
+        double depth = 0.02 + size * (cunning ? level[s % 8] : kit_uniform(random, -1.0, 1.0)),
+               speed;
+        if (kit_uniform(random, 0.0, 1.0) < 0.2) {
+            slides = kit_uniform(random, 0.0, 1.0) < 0.5;
+        }
+        if (cunning) {
+            slides = s % 8 < 4;
+        }
+        if (s < DOWN) {
+            depth = 2e-4 * s;
+        }
         speed = (depth - z) / kit->input.dt;
         kit->input.position[0][2] = -KIT_SOLE_Z * kit->input.rotation[0][8] - z;
         kit->input.velocity[0][0] = kit->input.free_velocity[0] = slides ? 0.2 : 0.0;
@@ -170,7 +207,9 @@ static double shaken(Kit *kit, int cunning, double size, uint64_t *random) {
         kit_solve(kit);
         mild_ground_advance(kit->ground, &kit->terrain, &kit->input, kit->scratch, &kit->result);
         z = depth;
-        if (s < DOWN) continue;
+        if (s < DOWN) {
+            continue;
+        }
         work -= kit->result.foot[0].force[2] * speed * kit->input.dt;
         most = fmax(most, work);
     }
@@ -180,31 +219,40 @@ static double shaken(Kit *kit, int cunning, double size, uint64_t *random) {
 static void test_shaken(void **state) {
     (void)state;
     MildSole *sole = kit_plate(5, 3);
-    const double load = 50.0, stored = 0.5 * load * 1e-4 * 2.0; /* [J] in the elastic travel, with room for more depth */
+    const double load = 50.0,
+                 stored = 0.5 * load * 1e-4 *
+                          2.0; /* [J] in the elastic travel, with room for more depth */
     uint64_t random = 8;
     for (int model = MILD_MODEL_ECC_QUASI; model <= MILD_MODEL_ECC_QUASI_3D; model++) {
         double most[2] = {-INFINITY, -INFINITY};
         for (int draw = 0; draw < 60; draw++) {
             MildMaterial mild = mild_material_default(), m;
             Kit kit;
-            assert_int_equal(mild_model_match((MildModel)model, &mild, sole, load, &m, NULL), MILD_OK);
+            assert_int_equal(mild_model_match((MildModel)model, &mild, sole, load, &m, NULL),
+                             MILD_OK);
             kit_open(&kit, 1, sole, NULL, &m, 1e-3);
             const double turn[3] = {0.0, kit_uniform(&random, -0.3, 0.3), 0.0};
-            if (draw % 3 == 0) kit_rotate(kit.input.rotation[0], turn);
+            if (draw % 3 == 0) {
+                kit_rotate(kit.input.rotation[0], turn);
+            }
             int cunning = draw % 2;
-            most[cunning] = fmax(most[cunning], shaken(&kit, cunning, exp(kit_uniform(&random, log(1e-6), log(3e-4))), &random));
+            most[cunning] = fmax(
+                most[cunning],
+                shaken(&kit, cunning, exp(kit_uniform(&random, log(1e-6), log(3e-4))), &random));
             kit_close(&kit);
         }
-        print_message("%-12s gives at most %.1e J shaken at random, %.1e J shaken cunningly; stored %.1e J\n",
-                      mild_model_names[model], most[0], most[1], stored);
+        print_message(
+            "%-12s gives at most %.1e J shaken at random, %.1e J shaken cunningly; stored %.1e J\n",
+            mild_model_names[model], most[0], most[1], stored);
         assert_true(most[0] < stored && most[1] < stored);
     }
     mild_sole_destroy(sole);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_published), cmocka_unit_test(test_signs),
-                                       cmocka_unit_test(test_symmetry), cmocka_unit_test(test_contact_step),
-                                       cmocka_unit_test(test_shaken)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_published), cmocka_unit_test(test_signs),
+        cmocka_unit_test(test_symmetry), cmocka_unit_test(test_contact_step),
+        cmocka_unit_test(test_shaken)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

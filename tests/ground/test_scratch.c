@@ -1,17 +1,20 @@
-/* What must not matter to the last bit: which ground a scratch served before, good or bad, where a ground's block lies, and by
- * which way through the code an element goes. */
+/* What must not matter to the last bit: which ground a scratch served before, good or bad, where a
+ * ground's block lies, and by which way through the code an element goes. */
 #include "ground_kit.h"
 
 enum { ROBOTS = 6 };
 
 static MildMaterial any_material(uint64_t *random) {
-    static const MildModel models[6] = {MILD_MODEL_MILD,      MILD_MODEL_MILD,      MILD_MODEL_MILD,
-                                        MILD_MODEL_ECC_SPRING, MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D};
+    static const MildModel models[6] = {MILD_MODEL_MILD,      MILD_MODEL_MILD,
+                                        MILD_MODEL_MILD,      MILD_MODEL_ECC_SPRING,
+                                        MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D};
     MildMaterial m = kit_index(random, 5) ? kit_material(random) : mild_material_default();
     m.model = (int)models[kit_index(random, 6)];
     m.zeta = kit_uniform(random, 0.05, 1.5);
     m.passive = kit_index(random, 4) > 0;
-    if (kit_index(random, 5) == 0) m.bed_depth = kit_uniform(random, 0.001, 0.02);
+    if (kit_index(random, 5) == 0) {
+        m.bed_depth = kit_uniform(random, 0.001, 0.02);
+    }
     return m;
 }
 
@@ -27,24 +30,39 @@ static MildMap *any_map(uint64_t *random) {
     def.border = kit_index(random, 2) ? 0.05 : 0.0;
     MildError error = {0};
     MildMap *map = mild_map_create(&def, &error);
-    if (!map) fail_msg("%s", error.text);
+    if (!map) {
+        fail_msg("%s", error.text);
+    }
     return map;
 }
 
 /* A robot on some ground; *map to be destroyed after it, may be NULL. */
-static void robot_open(Kit *kit, MildMap **map, int feet, MildSole *left, MildSole *right, uint64_t *random) {
+static void robot_open(Kit *kit, MildMap **map, int feet, MildSole *left, MildSole *right,
+                       uint64_t *random) {
     static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
     MildMaterial m = any_material(random);
     kit_open(kit, feet, left, right, &m, steps[kit_index(random, 3)]);
-    if (kit_index(random, 3) == 0) kit_prints(kit, 64);
+    if (kit_index(random, 3) == 0) {
+        kit_prints(kit, 64);
+    }
     *map = kit_index(random, 2) ? any_map(random) : NULL;
-    while (kit->terrain.material_count < 3) kit->terrain.materials[kit->terrain.material_count++] = any_material(random);
-    if (mild_terrain_set_map(&kit->terrain, *map, NULL) != MILD_OK) fail_msg("%s", "labels");
+    while (kit->terrain.material_count < 3) {
+        kit->terrain.materials[kit->terrain.material_count++] = any_material(random);
+    }
+    if (mild_terrain_set_map(&kit->terrain, *map, NULL) != MILD_OK) {
+        fail_msg("%s", "labels");
+    }
     kit_random_state(kit, random);
-    for (int f = 0; f < feet; f++)
-        kit->input.position[f][2] += mild_terrain_height_at(&kit->terrain, kit->input.position[f][0], kit->input.position[f][1]);
-    if (kit_index(random, 5) == 0) kit->input.solver = MILD_SOLVER_GAUSS_SEIDEL;
-    kit->input.max_iterations = kit->input.solver ? 40 : kit_index(random, 3) ? 0 : 1 + kit_index(random, 30);
+    for (int f = 0; f < feet; f++) {
+        kit->input.position[f][2] += mild_terrain_height_at(
+            &kit->terrain, kit->input.position[f][0], kit->input.position[f][1]);
+    }
+    if (kit_index(random, 5) == 0) {
+        kit->input.solver = MILD_SOLVER_GAUSS_SEIDEL;
+    }
+    kit->input.max_iterations = kit->input.solver      ? 40
+                                : kit_index(random, 3) ? 0
+                                                       : 1 + kit_index(random, 30);
 }
 
 /* Solves the robot's step with one number that is none. */
@@ -53,14 +71,18 @@ static void solve_bad(Kit robot, uint64_t *random) {
     kit_inverse_inertia(&robot);
     kit_free(&robot, NULL);
     MildContactInput *in = &robot.input;
-    double *victims[6] = {&in->position[0][2], &in->rotation[0][kit_index(random, 9)], &in->velocity[0][kit_index(random, 6)],
-                          &in->inverse_inertia[kit_index(random, 36)], &in->free_velocity[kit_index(random, 6)],
+    double *victims[6] = {&in->position[0][2],
+                          &in->rotation[0][kit_index(random, 9)],
+                          &in->velocity[0][kit_index(random, 6)],
+                          &in->inverse_inertia[kit_index(random, 36)],
+                          &in->free_velocity[kit_index(random, 6)],
                           &robot.terrain.materials[0].k_pen};
     *victims[kit_index(random, 6)] = bad[kit_index(random, 3)];
     kit_solve(&robot);
 }
 
-/* A copy of the robot's ground in a new block that starts 8 bytes after a multiple of 64, the old one freed. */
+/* A copy of the robot's ground in a new block that starts 8 bytes after a multiple of 64, the old
+ * one freed. */
 static void robot_move(Kit *robot, char **block) {
     char *moved = aligned_alloc(64, robot->bytes + 64);
     memcpy(moved + 8, robot->ground, robot->bytes);
@@ -71,29 +93,41 @@ static void robot_move(Kit *robot, char **block) {
 
 static void assert_same_elements(const Kit *a, const Kit *b) {
     for (int f = 0; f < a->feet; f++) {
-        MildElements p = mild_scratch_elements(a->scratch, f), q = mild_scratch_elements(b->scratch, f);
-        const double *const one[] = {p.depth, p.normal, p.tangent_x, p.tangent_y, p.point_x, p.point_y, p.point_z, p.flat};
-        const double *const other[] = {q.depth, q.normal, q.tangent_x, q.tangent_y, q.point_x, q.point_y, q.point_z, q.flat};
+        MildElements p = mild_scratch_elements(a->scratch, f),
+                     q = mild_scratch_elements(b->scratch, f);
+        const double *const one[] = {p.depth,   p.normal,  p.tangent_x, p.tangent_y,
+                                     p.point_x, p.point_y, p.point_z,   p.flat};
+        const double *const other[] = {q.depth,   q.normal,  q.tangent_x, q.tangent_y,
+                                       q.point_x, q.point_y, q.point_z,   q.flat};
         size_t count = (size_t)mild_sole_elements(a->soles[f]);
-        for (int k = 0; k < 8; k++) assert_memory_equal(one[k], other[k], count * sizeof(double));
+        for (int k = 0; k < 8; k++) {
+            assert_memory_equal(one[k], other[k], count * sizeof(double));
+        }
         assert_memory_equal(p.state, q.state, count);
         assert_memory_equal(p.slip, q.slip, count);
     }
 }
 
-/* One step of a robot with its own scratch, and of its twin with the common one, which others have used. */
+/* One step of a robot with its own scratch, and of its twin with the common one, which others have
+ * used. */
 static void step_both(Kit *own, Kit *twin, char **block, const Kit *other, uint64_t *random) {
     double force[MILD_FEET_MAX][3];
-    for (int i = 0; i < 3 * MILD_FEET_MAX; i++) force[i / 3][i % 3] = kit_uniform(random, -100.0, 100.0);
+    for (int i = 0; i < 3 * MILD_FEET_MAX; i++) {
+        force[i / 3][i % 3] = kit_uniform(random, -100.0, 100.0);
+    }
     kit_inverse_inertia(own);
     kit_free(own, (const double(*)[3])force);
     kit_solve(own);
     twin->input = own->input;
     twin->terrain = own->terrain;
     solve_bad(*other, random);
-    for (int k = kit_index(random, 2); k >= 0; k--) kit_solve(twin);
+    for (int k = kit_index(random, 2); k >= 0; k--) {
+        kit_solve(twin);
+    }
     robot_move(twin, block);
-    if (kit_index(random, 2)) assert_same_elements(own, twin);
+    if (kit_index(random, 2)) {
+        assert_same_elements(own, twin);
+    }
     kit_advance(own);
     kit_advance(twin);
     assert_memory_equal(&own->result, &twin->result, sizeof own->result);
@@ -102,18 +136,22 @@ static void step_both(Kit *own, Kit *twin, char **block, const Kit *other, uint6
 
 static int flies(const Kit *kit) {
     int wild = 0;
-    for (int i = 0; i < 6 * kit->feet; i++) wild |= !(fabs(kit->result.velocity[i]) < 100.0);
+    for (int i = 0; i < 6 * kit->feet; i++) {
+        wild |= !(fabs(kit->result.velocity[i]) < 100.0);
+    }
     return wild;
 }
 
-/* Rounds of robots on all kinds of ground that take turns, with materials that change and feet that are lifted. */
+/* Rounds of robots on all kinds of ground that take turns, with materials that change and feet that
+ * are lifted. */
 static void test_shared(void **state) {
     (void)state;
     int steps = 0, patient = 0;
     for (int round = 0; round < 12; round++) {
         uint64_t random = 900u + (unsigned)round;
         int feet = 1 + kit_index(&random, 2), small = round % 3;
-        MildSole *left = small ? kit_plate(small == 1 ? 1 : 7, small == 1 ? 1 : 5) : kit_sole(0, 77);
+        MildSole *left =
+            small ? kit_plate(small == 1 ? 1 : 7, small == 1 ? 1 : 5) : kit_sole(0, 77);
         MildSole *right = small ? kit_plate(5, 3) : kit_sole(1, 77);
         Kit own[ROBOTS], twin[ROBOTS];
         MildMap *maps[ROBOTS];
@@ -126,11 +164,17 @@ static void test_shared(void **state) {
         }
         for (int t = 0; t < 100; t++, steps++) {
             int r = kit_index(&random, ROBOTS);
-            if (kit_index(&random, 20) == 0) own[r].terrain.materials[0] = any_material(&random);
-            if (kit_index(&random, 20) == 0) own[r].input.position[0][2] += kit_uniform(&random, -0.01, 0.3);
+            if (kit_index(&random, 20) == 0) {
+                own[r].terrain.materials[0] = any_material(&random);
+            }
+            if (kit_index(&random, 20) == 0) {
+                own[r].input.position[0][2] += kit_uniform(&random, -0.01, 0.3);
+            }
             step_both(&own[r], &twin[r], &blocks[r], &twin[kit_index(&random, ROBOTS)], &random);
             patient += own[r].result.iterations > 20;
-            if (!flies(&own[r])) continue;
+            if (!flies(&own[r])) {
+                continue;
+            }
             mild_ground_reset(own[r].ground);
             mild_ground_reset(twin[r].ground);
             kit_random_state(&own[r], &random);
@@ -144,12 +188,14 @@ static void test_shared(void **state) {
         mild_sole_destroy(left);
         mild_sole_destroy(right);
     }
-    print_message("a scratch used in turn: %d steps as with their own, %d of more than 20 iterations\n", steps, patient);
+    print_message(
+        "a scratch used in turn: %d steps as with their own, %d of more than 20 iterations\n",
+        steps, patient);
     assert_true(patient > 20);
 }
 
-/* Ground that need not be the same to the code, but is: with prints where recovery = 1 leaves none (the elements are gathered,
- * not read where they lie), or a map whose heights are all 0. */
+/* Ground that need not be the same to the code, but is: with prints where recovery = 1 leaves none
+ * (the elements are gathered, not read where they lie), or a map whose heights are all 0. */
 static double path_difference(int prints, int draws) {
     static const double zero[4] = {0.0};
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
@@ -163,7 +209,9 @@ static double path_difference(int prints, int draws) {
     for (int draw = 0; draw < draws; draw++) {
         uint64_t random = 77u + (unsigned)draw;
         MildMaterial m = kit_material(&random);
-        if (prints) m.recovery = 1.0;
+        if (prints) {
+            m.recovery = 1.0;
+        }
         Kit a, b;
         kit_open(&a, 2, left, right, &m, draw % 2 ? 1e-3 : 5e-3);
         kit_random_state(&a, &random);
@@ -171,13 +219,19 @@ static double path_difference(int prints, int draws) {
         b.scratch = mild_scratch_create(b.soles, 2, NULL);
         b.ground = NULL;
         kit_prints(&b, prints ? 64 : 0);
-        if (!prints && mild_terrain_set_map(&b.terrain, map, NULL) != MILD_OK) fail_msg("%s", "labels");
+        if (!prints && mild_terrain_set_map(&b.terrain, map, NULL) != MILD_OK) {
+            fail_msg("%s", "labels");
+        }
         for (int t = 0; t < 40; t++) {
             b.input = a.input;
             kit_step(&a, NULL);
             kit_step(&b, NULL);
-            for (int i = 0; i < 12; i++) worst = fmax(worst, fabs(a.result.velocity[i] - b.result.velocity[i]));
-            for (int f = 0; f < 2; f++) assert_int_equal(a.result.foot[f].contacts, b.result.foot[f].contacts);
+            for (int i = 0; i < 12; i++) {
+                worst = fmax(worst, fabs(a.result.velocity[i] - b.result.velocity[i]));
+            }
+            for (int f = 0; f < 2; f++) {
+                assert_int_equal(a.result.foot[f].contacts, b.result.foot[f].contacts);
+            }
         }
         kit_close(&a);
         kit_close(&b);
@@ -191,12 +245,15 @@ static double path_difference(int prints, int draws) {
 static void test_paths(void **state) {
     (void)state;
     double prints = path_difference(1, 100), heights = path_difference(0, 100);
-    print_message("one step, listed and gathered: %.1e m/s or rad/s; level and with heights of 0: %.1e\n", prints, heights);
+    print_message(
+        "one step, listed and gathered: %.1e m/s or rad/s; level and with heights of 0: %.1e\n",
+        prints, heights);
     assert_true(prints < 1e-9);
     assert_true(heights < 1e-9);
 }
 
-/* A step at numbers that are none was kept; lifted and put down again, the foot stands as if nothing had been. */
+/* A step at numbers that are none was kept; lifted and put down again, the foot stands as if
+ * nothing had been. */
 static void test_bad_step_forgotten(void **state) {
     (void)state;
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
@@ -205,24 +262,33 @@ static void test_bad_step_forgotten(void **state) {
         Kit kit;
         uint64_t random = 40u;
         kit_open(&kit, 2, left, right, &m, 1e-3);
-        if (t % 2) kit_prints(&kit, 64);
+        if (t % 2) {
+            kit_prints(&kit, 64);
+        }
         MildContactInput good = kit.input;
         kit.input.position[0][2] += t % 4 < 2 ? -0.01 : 0.0; /* all or some listed */
-        for (int k = 0; t % 4 >= 2 && k < 2; k++) kit_random_state(&kit, &random);
+        for (int k = 0; t % 4 >= 2 && k < 2; k++) {
+            kit_random_state(&kit, &random);
+        }
         kit_inverse_inertia(&kit);
         kit_free(&kit, NULL);
-        double bad[3] = {NAN, INFINITY, 1e300}, *victims[3] = {&kit.input.inverse_inertia[26], &kit.input.free_velocity[2],
-                                                              &kit.input.velocity[1][4]};
+        double bad[3] = {NAN, INFINITY, 1e300},
+               *victims[3] = {&kit.input.inverse_inertia[26], &kit.input.free_velocity[2],
+                              &kit.input.velocity[1][4]};
         *victims[t / 4 % 3] = bad[t / 12];
         kit_solve(&kit);
         kit_advance(&kit);
         kit.input = good;
-        for (int f = 0; f < 2; f++) kit.input.position[f][2] += 0.5;
+        for (int f = 0; f < 2; f++) {
+            kit.input.position[f][2] += 0.5;
+        }
         kit_step(&kit, NULL);
         kit.input = good;
         for (int s = 0; s < 5; s++) {
             kit_step(&kit, NULL);
-            for (int i = 0; i < 12; i++) assert_true(fabs(kit.result.velocity[i]) < 1.0);
+            for (int i = 0; i < 12; i++) {
+                assert_true(fabs(kit.result.velocity[i]) < 1.0);
+            }
             assert_true(kit.result.converged);
         }
         kit_close(&kit);

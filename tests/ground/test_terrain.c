@@ -1,10 +1,13 @@
-/* Height maps and patterns against their formulas; contact on uneven ground: friction on a slope, energy, both solvers. */
+/* Height maps and patterns against their formulas; contact on uneven ground: friction on a slope,
+ * energy, both solvers. */
 #include "ground_kit.h"
 
 static MildMap *make_map(const MildMapDef *def) {
     MildError error = {0};
     MildMap *map = mild_map_create(def, &error);
-    if (!map) fail_msg("%s", error.text);
+    if (!map) {
+        fail_msg("%s", error.text);
+    }
     return map;
 }
 
@@ -20,15 +23,18 @@ static MildTerrain terrain_on(const MildMap *map, double height) {
     MildMaterial m = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&m);
     terrain.height = height;
-    for (; terrain.material_count < MILD_MATERIALS_MAX; terrain.material_count++)
+    for (; terrain.material_count < MILD_MATERIALS_MAX; terrain.material_count++) {
         terrain.materials[terrain.material_count] = m;
+    }
     MildError error = {0};
-    if (mild_terrain_set_map(&terrain, map, &error) != MILD_OK) fail_msg("%s", error.text);
+    if (mild_terrain_set_map(&terrain, map, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
     return terrain;
 }
 
-/* Waves and steps at random points: at grid points the formula, between them within the error of bilinear interpolation,
- * (2 pi/wavelength)^2 amplitude cell^2/8. */
+/* Waves and steps at random points: at grid points the formula, between them within the error of
+ * bilinear interpolation, (2 pi/wavelength)^2 amplitude cell^2/8. */
 static void test_shapes(void **state) {
     (void)state;
     uint64_t random = 41;
@@ -38,26 +44,33 @@ static void test_shapes(void **state) {
     MildTerrain terrain = terrain_on(map, 0.2);
     double cell = 0.7 / 35.0, at_points = 0.0, between = 0.0, slopes = 0.0;
     for (int t = 0; t < 20000; t++) {
-        double x = kit_uniform(&random, -20.0, 20.0), y = kit_uniform(&random, -20.0, 20.0), slope[2];
-        between = fmax(between, fabs(mild_terrain_height_at(&terrain, x, y) - 0.2 - 0.5 * amplitude * (sin(k * x) + sin(k * y))));
+        double x = kit_uniform(&random, -20.0, 20.0), y = kit_uniform(&random, -20.0, 20.0),
+               slope[2];
+        between = fmax(between, fabs(mild_terrain_height_at(&terrain, x, y) - 0.2 -
+                                     0.5 * amplitude * (sin(k * x) + sin(k * y))));
         mild_terrain_slope_at(&terrain, x, y, slope);
         slopes = fmax(slopes, fabs(slope[0] - 0.5 * amplitude * k * cos(k * x)));
         x = cell * round(x / cell), y = cell * round(y / cell);
-        at_points = fmax(at_points, fabs(mild_terrain_height_at(&terrain, x, y) - 0.2 - 0.5 * amplitude * (sin(k * x) + sin(k * y))));
+        at_points = fmax(at_points, fabs(mild_terrain_height_at(&terrain, x, y) - 0.2 -
+                                         0.5 * amplitude * (sin(k * x) + sin(k * y))));
     }
     double bound = k * k * amplitude * cell * cell / 8.0;
-    print_message("waves: off by %.1e m at grid points, %.1e between (bound %.1e), slope by %.1e\n", at_points, between, bound, slopes);
+    print_message("waves: off by %.1e m at grid points, %.1e between (bound %.1e), slope by %.1e\n",
+                  at_points, between, bound, slopes);
     assert_true(at_points < 1e-8 && between < bound + 1e-8);
     mild_map_destroy(map);
 
     def = shape(MILD_MAP_STEPS, 0.05, 0.8);
     map = make_map(&def);
     terrain = terrain_on(map, 0.0);
-    for (int t = -8; t < 8; t++)
-        for (double phase = -0.2; phase < 0.2; phase += 0.05) { /* clear of the risers at odd quarters */
+    for (int t = -8; t < 8; t++) {
+        for (double phase = -0.2; phase < 0.2;
+             phase += 0.05) { /* clear of the risers at odd quarters */
             assert_true(fabs(mild_terrain_height_at(&terrain, 0.8 * (t + phase), 3.0 * t)) < 1e-8);
-            assert_true(fabs(mild_terrain_height_at(&terrain, 0.8 * (t + phase + 0.5), 3.0 * t) - 0.05) < 1e-8);
+            assert_true(fabs(mild_terrain_height_at(&terrain, 0.8 * (t + phase + 0.5), 3.0 * t) -
+                             0.05) < 1e-8);
         }
+    }
     mild_map_destroy(map);
 
     def = shape(MILD_MAP_SLOPE, 0.0, 1.0);
@@ -86,27 +99,32 @@ static void test_rough(void **state) {
     double least = 1.0, most = -1.0, sum = 0.0, repeat = 0.0, differ = 0.0;
     enum { POINTS = 20000 };
     for (int t = 0; t < POINTS; t++) {
-        double x = kit_uniform(&random, -4.0, 4.0), y = kit_uniform(&random, -4.0, 4.0), h = mild_terrain_height_at(&terrain, x, y);
+        double x = kit_uniform(&random, -4.0, 4.0), y = kit_uniform(&random, -4.0, 4.0),
+               h = mild_terrain_height_at(&terrain, x, y);
         least = fmin(least, h), most = fmax(most, h), sum += h / POINTS;
         repeat = fmax(repeat, fabs(h - mild_terrain_height_at(&terrain, x + 4.0, y - 8.0)));
         differ = fmax(differ, fabs(h - mild_terrain_height_at(&second, x, y)));
     }
-    print_message("rough: %.1f .. %.1f mm, mean %.1f mm, repeats within %.0e m\n", 1e3 * least, 1e3 * most, 1e3 * sum, repeat);
+    print_message("rough: %.1f .. %.1f mm, mean %.1f mm, repeats within %.0e m\n", 1e3 * least,
+                  1e3 * most, 1e3 * sum, repeat);
     assert_true(least >= -0.04 && most <= 0.04 && most - least > 0.06 && fabs(sum) < 0.005);
     assert_true(repeat < 1e-9 && differ > 0.01);
     mild_map_destroy(map);
     mild_map_destroy(other);
 }
 
-/* A tilted plane as an image: bilinear interpolation gives it exactly (float heights: a relative 6e-8), slopes too; beyond
- * the border its last height goes on. */
+/* A tilted plane as an image: bilinear interpolation gives it exactly (float heights: a relative
+ * 6e-8), slopes too; beyond the border its last height goes on. */
 static void test_plane(void **state) {
     (void)state;
     enum { COLUMNS = 33, ROWS = 17 };
     uint64_t random = 43;
     static double heights[ROWS * COLUMNS];
-    for (int r = 0; r < ROWS; r++)
-        for (int c = 0; c < COLUMNS; c++) heights[r * COLUMNS + c] = 0.01 * c - 0.03 * (ROWS - 1 - r);
+    for (int r = 0; r < ROWS; r++) {
+        for (int c = 0; c < COLUMNS; c++) {
+            heights[r * COLUMNS + c] = 0.01 * c - 0.03 * (ROWS - 1 - r);
+        }
+    }
     MildMapDef def = shape(MILD_MAP_IMAGE, 2.0, 1.0);
     def.cell = 0.05;
     def.heights = heights;
@@ -116,7 +134,8 @@ static void test_plane(void **state) {
     terrain.map_x = 3.0, terrain.map_y = -1.0;
     double x0 = 3.0 - 0.8, y0 = -1.0 - 0.4, worst = 0.0, slopes = 0.0;
     for (int t = 0; t < 20000; t++) {
-        double x = kit_uniform(&random, x0 - 0.5, x0 + 2.1), y = kit_uniform(&random, y0 - 0.5, y0 + 1.3), slope[2];
+        double x = kit_uniform(&random, x0 - 0.5, x0 + 2.1),
+               y = kit_uniform(&random, y0 - 0.5, y0 + 1.3), slope[2];
         double u = fmin(fmax(x - x0, 0.0), 1.6), v = fmin(fmax(y - y0, 0.0), 0.8);
         worst = fmax(worst, fabs(mild_terrain_height_at(&terrain, x, y) - (0.4 * u - 1.2 * v)));
         mild_terrain_slope_at(&terrain, x, y, slope);
@@ -126,7 +145,8 @@ static void test_plane(void **state) {
     print_message("plane: off by %.1e m, slopes by %.1e\n", worst, slopes);
     assert_true(worst < 1e-7 && slopes < 3e-6);
     assert_true(isfinite(mild_terrain_height_at(&terrain, 1e300, -1e300)));
-    mild_terrain_height_at(&terrain, NAN, INFINITY); /* reads nothing outside the map: the sanitizer watches */
+    mild_terrain_height_at(&terrain, NAN,
+                           INFINITY); /* reads nothing outside the map: the sanitizer watches */
     mild_map_destroy(map);
 }
 
@@ -137,11 +157,16 @@ static void test_patterns(void **state) {
     def.patch_count = 3;
     MildMap *map = make_map(&def);
     MildTerrain terrain = terrain_on(map, 0.0);
-    for (int t = -7; t < 8; t++) assert_int_equal(mild_terrain_material_at(&terrain, 0.5 * t + 0.25, 0.3 * t), ((t % 3) + 3) % 3);
+    for (int t = -7; t < 8; t++) {
+        assert_int_equal(mild_terrain_material_at(&terrain, 0.5 * t + 0.25, 0.3 * t),
+                         ((t % 3) + 3) % 3);
+    }
     assert_int_equal(mild_map_label_count(map), 3);
     MildError error;
-    assert_int_equal(mild_terrain_add_patch(&terrain, &(MildPatch){0.0, 0.2, -1.0, 1.0, 5}, &error), MILD_OK);
-    assert_int_equal(mild_terrain_material_at(&terrain, 0.1, 0.0), 5); /* a patch wins over the map */
+    assert_int_equal(mild_terrain_add_patch(&terrain, &(MildPatch){0.0, 0.2, -1.0, 1.0, 5}, &error),
+                     MILD_OK);
+    assert_int_equal(mild_terrain_material_at(&terrain, 0.1, 0.0),
+                     5); /* a patch wins over the map */
     terrain.material_count = 2;
     assert_int_equal(mild_terrain_set_map(&terrain, map, &error), MILD_ERROR_ARGUMENT);
     assert_non_null(strstr(error.text, "label 2"));
@@ -151,10 +176,12 @@ static void test_patterns(void **state) {
     def.border = 0.2;
     map = make_map(&def);
     terrain = terrain_on(map, 0.0);
-    double worst = 0.0; /* along a line through the middle of fields: the mixture is linear across each border */
+    double worst = 0.0; /* along a line through the middle of fields: the mixture is linear across
+                           each border */
     for (double x = -0.249; x < 0.25; x += 0.001) {
         MildBlend blend = mild_terrain_blend_at(&terrain, x, 0.25);
-        double right = blend.first == 0 ? 1.0 - blend.share : blend.share; /* of material 0, right of x = 0 */
+        double right =
+            blend.first == 0 ? 1.0 - blend.share : blend.share; /* of material 0, right of x = 0 */
         worst = fmax(worst, fabs(right - fmin(fmax(0.5 + x / 0.2, 0.0), 1.0)));
         assert_int_equal(blend.first, x < 0.0 ? 2 : 0);
     }
@@ -168,7 +195,10 @@ static void test_patterns(void **state) {
     def.labels = labels, def.label_columns = 3, def.label_rows = 2;
     map = make_map(&def);
     terrain = terrain_on(map, 0.0);
-    for (int i = 0; i < 6; i++) assert_int_equal(mild_terrain_material_at(&terrain, 0.5 * (i % 3) - 0.5, i < 3 ? 0.25 : -0.25), i);
+    for (int i = 0; i < 6; i++) {
+        assert_int_equal(
+            mild_terrain_material_at(&terrain, 0.5 * (i % 3) - 0.5, i < 3 ? 0.25 : -0.25), i);
+    }
     assert_int_equal(mild_terrain_material_at(&terrain, 99.0, 99.0), 2);
     mild_map_destroy(map);
 }
@@ -182,7 +212,9 @@ static void test_refused(void **state) {
         const char *names;
     } bad[12];
     int count = 0;
-#define BAD(member, value, name) bad[count].def = mild_map_def_default(), bad[count].def.member = (value), bad[count++].names = name
+#define BAD(member, value, name)                                                                   \
+    bad[count].def = mild_map_def_default(), bad[count].def.member = (value),                      \
+    bad[count++].names = name
     BAD(cell, 0.0, "terrain.cell");
     BAD(cell, NAN, "terrain.cell");
     BAD(amplitude, -1.0, "terrain.amplitude");
@@ -206,7 +238,9 @@ static void test_refused(void **state) {
     for (int i = 0; i < count; i++) {
         MildError error = {0};
         MildMap *map = mild_map_create(&bad[i].def, &error);
-        if (map || !strstr(error.text, bad[i].names)) print_message("case %d: %s\n", i, error.text);
+        if (map || !strstr(error.text, bad[i].names)) {
+            print_message("case %d: %s\n", i, error.text);
+        }
         assert_null(map);
         assert_non_null(strstr(error.text, bad[i].names));
         assert_null(strchr(error.text, '\n'));
@@ -219,17 +253,20 @@ static void test_bytes(void **state) {
     rough.patches = MILD_PATTERN_CHECKER;
     rough.border = 0.1;
     MildMap *small = make_map(&waves), *large = make_map(&rough);
-    print_message("map of waves: %zu bytes, of 8 x 8 m rough ground with a pattern: %zu bytes, shared by every robot; a terrain: %zu\n",
+    print_message("map of waves: %zu bytes, of 8 x 8 m rough ground with a pattern: %zu bytes, "
+                  "shared by every robot; a terrain: %zu\n",
                   mild_map_bytes(small), mild_map_bytes(large), sizeof(MildTerrain));
-    assert_true(mild_map_bytes(small) < 8000 && mild_map_bytes(large) < 800000 && sizeof(MildTerrain) < 2500);
+    assert_true(mild_map_bytes(small) < 8000 && mild_map_bytes(large) < 800000 &&
+                sizeof(MildTerrain) < 2500);
     mild_map_destroy(small);
     mild_map_destroy(large);
 }
 
 /* ---- contact ---- */
 
-/* A plate on a slope. It slides exactly when slope > mu; then, forced to follow z = slope x and with F_x = (mu - slope) F_z,
- * it accelerates with a_x = (mu - slope) g/(1 - slope (mu - slope)). */
+/* A plate on a slope. It slides exactly when slope > mu; then, forced to follow z = slope x and
+ * with F_x = (mu - slope) F_z, it accelerates with a_x = (mu - slope) g/(1 - slope (mu - slope)).
+ */
 static void test_slope_friction(void **state) {
     (void)state;
     MildSole *sole = kit_plate(6, 6);
@@ -250,23 +287,34 @@ static void test_slope_friction(void **state) {
         kit.input.position[0][0] = kit.input.position[0][1] = 0.0;
         for (int s = 0; s < 500; s++) { /* brought to rest on the slope by hand */
             kit_step(&kit, NULL);
-            for (int k = 0; k < 6; k++) kit.input.velocity[0][k] *= 0.9;
+            for (int k = 0; k < 6; k++) {
+                kit.input.velocity[0][k] *= 0.9;
+            }
         }
         double from = kit.input.position[0][0], speed = kit.input.velocity[0][0];
-        for (int s = 0; s < 300; s++) kit_step(&kit, NULL);
-        double a = (kit.input.velocity[0][0] - speed) / 0.3, exact = mu < slope ? (mu - slope) * KIT_GRAVITY / (1.0 - slope * (mu - slope)) : 0.0;
-        if (mu < slope) worst = fmax(worst, fabs(a / exact - 1.0));
-        else creep = fmax(creep, fabs(kit.input.position[0][0] - from));
+        for (int s = 0; s < 300; s++) {
+            kit_step(&kit, NULL);
+        }
+        double a = (kit.input.velocity[0][0] - speed) / 0.3,
+               exact = mu < slope ? (mu - slope) * KIT_GRAVITY / (1.0 - slope * (mu - slope)) : 0.0;
+        if (mu < slope) {
+            worst = fmax(worst, fabs(a / exact - 1.0));
+        } else {
+            creep = fmax(creep, fabs(kit.input.position[0][0] - from));
+        }
         kit_close(&kit);
         mild_map_destroy(map);
     }
-    print_message("on slopes of 0.1 to 0.4: sliding acceleration off by %.2f %%, at rest %.1e m of creep in 0.3 s\n", 100 * worst, creep);
+    print_message("on slopes of 0.1 to 0.4: sliding acceleration off by %.2f %%, at rest %.1e m of "
+                  "creep in 0.3 s\n",
+                  100 * worst, creep);
     assert_true(worst < 0.02 && creep < 1e-5);
     mild_sole_destroy(sole);
 }
 
 static MildMap *random_map(uint64_t *random, double steepest) {
-    static const MildMapKind kinds[4] = {MILD_MAP_WAVES, MILD_MAP_ROUGH, MILD_MAP_STEPS, MILD_MAP_SLOPE};
+    static const MildMapKind kinds[4] = {MILD_MAP_WAVES, MILD_MAP_ROUGH, MILD_MAP_STEPS,
+                                         MILD_MAP_SLOPE};
     MildMapDef def = shape(kinds[kit_index(random, 4)], 0.0, kit_uniform(random, 0.15, 1.0));
     def.seed = (uint64_t)kit_index(random, 1000);
     def.size = 4.0;
@@ -275,7 +323,8 @@ static MildMap *random_map(uint64_t *random, double steepest) {
     return make_map(&def);
 }
 
-/* Feet thrown and shaken at random over uneven ground until they leave it: the ground has taken energy. */
+/* Feet thrown and shaken at random over uneven ground until they leave it: the ground has taken
+ * energy. */
 static void test_passive(void **state) {
     (void)state;
     uint64_t random = 44;
@@ -292,40 +341,58 @@ static void test_passive(void **state) {
         kit.terrain.map = map;
         kit.terrain.map_x = kit_uniform(&random, -5.0, 5.0);
         kit_random_state(&kit, &random);
-        kit.input.position[0][2] += 0.25 + mild_terrain_height_at(&kit.terrain, kit.input.position[0][0], kit.input.position[0][1]);
-        double work = 0.0, taken = 0.0, shake[3], spring = kit_uniform(&random, 2.0, 8.0), force[1][3];
-        for (int k = 0; k < 3; k++) shake[k] = kit_uniform(&random, 0.0, 1.0);
+        kit.input.position[0][2] +=
+            0.25 + mild_terrain_height_at(&kit.terrain, kit.input.position[0][0],
+                                          kit.input.position[0][1]);
+        double work = 0.0, taken = 0.0, shake[3], spring = kit_uniform(&random, 2.0, 8.0),
+               force[1][3];
+        for (int k = 0; k < 3; k++) {
+            shake[k] = kit_uniform(&random, 0.0, 1.0);
+        }
         for (int s = 0; s < (int)(0.7 / dt); s++) {
             double t = s * dt, before[6], w = 0.0;
             memcpy(before, kit.input.velocity[0], sizeof before);
-            for (int k = 0; k < 3; k++)
-                force[0][k] = kit.mass[0] * KIT_GRAVITY * (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t : shake[k] * sin(20 * t));
+            for (int k = 0; k < 3; k++) {
+                force[0][k] = kit.mass[0] * KIT_GRAVITY *
+                              (k == 2 ? 1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t
+                                      : shake[k] * sin(20 * t));
+            }
             kit_step(&kit, (const double(*)[3])force);
             const MildFootResult *result = &kit.result.foot[0];
-            for (int k = 0; k < 3; k++)
-                w += 0.5 * dt * (result->force[k] * (before[k] + kit.result.velocity[k]) + result->torque[k] * (before[3 + k] + kit.result.velocity[3 + k]));
+            for (int k = 0; k < 3; k++) {
+                w += 0.5 * dt *
+                     (result->force[k] * (before[k] + kit.result.velocity[k]) +
+                      result->torque[k] * (before[3 + k] + kit.result.velocity[3 + k]));
+            }
             work += w;
             taken += fabs(w);
             int touched = result->contacts;
-            for (int e = 0; e < 77; e++) touched += mild_ground_depth_max(kit.ground, 0)[e] > 0.0;
+            for (int e = 0; e < 77; e++) {
+                touched += mild_ground_depth_max(kit.ground, 0)[e] > 0.0;
+            }
             if (touched == 0 && taken > 0.0) { /* a closed cycle */
                 cycles++;
                 worst = fmax(worst, work);
-                if (taken > 1e-6) worst_share = fmax(worst_share, work / taken);
+                if (taken > 1e-6) {
+                    worst_share = fmax(worst_share, work / taken);
+                }
                 work = taken = 0.0;
             }
         }
         kit_close(&kit);
         mild_map_destroy(map);
     }
-    print_message("passivity on uneven ground: %d closed cycles, most energy gained %.2e J, share %.2e\n", cycles, worst, worst_share);
+    print_message(
+        "passivity on uneven ground: %d closed cycles, most energy gained %.2e J, share %.2e\n",
+        cycles, worst, worst_share);
     mild_sole_destroy(sole);
     assert_true(cycles > 300);
     assert_true(worst < 1e-9);
 }
 
-/* One element led by hand (A = 0) round after round through waves, deep in the troughs and lightly over the crests: where the
- * ground rises faster than its tangent the element must not be loaded for nothing. */
+/* One element led by hand (A = 0) round after round through waves, deep in the troughs and lightly
+ * over the crests: where the ground rises faster than its tangent the element must not be loaded
+ * for nothing. */
 static void test_passive_by_hand(void **state) {
     (void)state;
     uint64_t random = 47;
@@ -333,25 +400,34 @@ static void test_passive_by_hand(void **state) {
     double worst = -INFINITY;
     for (int draw = 0; draw < 400; draw++) {
         MildMaterial m = kit_material(&random);
-        m.c_g = 0.0, m.recovery = draw % 2 ? 1.0 : m.recovery, m.mu = 0.0, m.k_drift = m.b_drift = 0.0;
-        MildMapDef def = shape(MILD_MAP_WAVES, kit_uniform(&random, 0.0, 0.05), kit_uniform(&random, 0.2, 1.0));
+        m.c_g = 0.0, m.recovery = draw % 2 ? 1.0 : m.recovery, m.mu = 0.0,
+        m.k_drift = m.b_drift = 0.0;
+        MildMapDef def =
+            shape(MILD_MAP_WAVES, kit_uniform(&random, 0.0, 0.05), kit_uniform(&random, 0.2, 1.0));
         def.cell = 0.005;
         MildMap *map = make_map(&def);
         Kit kit;
-        double dt = draw % 3 ? 1e-3 : 5e-3, speed = kit_uniform(&random, 0.1, 1.0), deep = kit_uniform(&random, 0.002, 0.04);
-        double k = 2.0 * acos(-1.0) / def.wavelength, work = 0.0, taken = 0.0, share = kit_uniform(&random, 0.1, 0.9);
+        double dt = draw % 3 ? 1e-3 : 5e-3, speed = kit_uniform(&random, 0.1, 1.0),
+               deep = kit_uniform(&random, 0.002, 0.04);
+        double k = 2.0 * acos(-1.0) / def.wavelength, work = 0.0, taken = 0.0,
+               share = kit_uniform(&random, 0.1, 0.9);
         kit_open(&kit, 1, sole, NULL, &m, dt);
         kit.terrain.map = map;
         kit.input.position[0][0] = kit.input.position[0][1] = 0.0;
         for (double t = 0.0; t < 4.0 * def.wavelength / speed; t += dt) {
-            double x = kit.input.position[0][0] + speed * dt, u = deep * fmin(1.0, 20.0 * t) * (1.0 - share * sin(k * x));
+            double x = kit.input.position[0][0] + speed * dt,
+                   u = deep * fmin(1.0, 20.0 * t) * (1.0 - share * sin(k * x));
             double z = mild_terrain_height_at(&kit.terrain, x, 0.0) - u - KIT_SOLE_Z;
-            if (t + dt >= 4.0 * def.wavelength / speed) z += 0.2;
+            if (t + dt >= 4.0 * def.wavelength / speed) {
+                z += 0.2;
+            }
             kit.input.velocity[0][0] = kit.input.free_velocity[0] = speed;
-            kit.input.velocity[0][2] = kit.input.free_velocity[2] = (z - kit.input.position[0][2]) / dt;
+            kit.input.velocity[0][2] = kit.input.free_velocity[2] =
+                (z - kit.input.position[0][2]) / dt;
             kit_solve(&kit);
             kit_advance(&kit);
-            double w = dt * (kit.result.foot[0].force[0] * speed + kit.result.foot[0].force[2] * kit.input.velocity[0][2]);
+            double w = dt * (kit.result.foot[0].force[0] * speed +
+                             kit.result.foot[0].force[2] * kit.input.velocity[0][2]);
             work += w;
             taken += fabs(w);
         }
@@ -359,7 +435,8 @@ static void test_passive_by_hand(void **state) {
         kit_close(&kit);
         mild_map_destroy(map);
     }
-    print_message("led through waves by hand: largest share of the work given back in excess %.2e\n", worst);
+    print_message(
+        "led through waves by hand: largest share of the work given back in excess %.2e\n", worst);
     assert_true(worst < 0.0);
     mild_sole_destroy(sole);
 }
@@ -378,9 +455,13 @@ static void test_solvers(void **state) {
         kit_open(&kit, 1 + t % 2, left, right, &m, t % 3 ? 1e-3 : 5e-3);
         kit.terrain.map = map;
         kit_random_state(&kit, &random);
-        for (int f = 0; f < kit.feet; f++)
-            kit.input.position[f][2] += mild_terrain_height_at(&kit.terrain, kit.input.position[f][0], kit.input.position[f][1]);
-        for (int s = 0; s < t % 7; s++) kit_step(&kit, NULL);
+        for (int f = 0; f < kit.feet; f++) {
+            kit.input.position[f][2] += mild_terrain_height_at(
+                &kit.terrain, kit.input.position[f][0], kit.input.position[f][1]);
+        }
+        for (int s = 0; s < t % 7; s++) {
+            kit_step(&kit, NULL);
+        }
         kit_random_inertia(&kit, &random, 6 * kit.feet);
         kit_free(&kit, NULL);
         kit_solve(&kit);
@@ -402,12 +483,15 @@ static void test_solvers(void **state) {
                 difference = fmax(difference, fabs(newton.velocity[i] - kit.result.velocity[i]));
             }
             compared += kit.result.converged;
-            if (kit.result.converged) worst = fmax(worst, difference / size);
+            if (kit.result.converged) {
+                worst = fmax(worst, difference / size);
+            }
         }
         kit_close(&kit);
         mild_map_destroy(map);
     }
-    print_message("uneven ground: %d problems, %d not converged, %.1f iterations in the mean, %d at most; sweeps differ by %.1e in %d\n",
+    print_message("uneven ground: %d problems, %d not converged, %.1f iterations in the mean, %d "
+                  "at most; sweeps differ by %.1e in %d\n",
                   problems, failed, iterations / problems, most, worst, compared);
     assert_true(problems > 300 && failed * 100 < problems);
     assert_true(compared > 60 && worst < 1e-6);
@@ -441,22 +525,29 @@ static void test_translation(void **state) {
         b.mass[0] = a.mass[0], b.inertia[0] = a.inertia[0];
         double shift = t % 2 ? 2.0 * (1 + t / 8) : 0.09375 * t;
         b.input.position[0][0] += shift;
-        if (t % 2 == 0) b.terrain.map_x += shift;
+        if (t % 2 == 0) {
+            b.terrain.map_x += shift;
+        }
         for (int s = 0; s < 50; s++) {
             kit_step(&a, NULL);
             kit_step(&b, NULL);
         }
-        for (int k = 0; k < 6; k++) worst = fmax(worst, fabs(a.input.velocity[0][k] - b.input.velocity[0][k]));
+        for (int k = 0; k < 6; k++) {
+            worst = fmax(worst, fabs(a.input.velocity[0][k] - b.input.velocity[0][k]));
+        }
         kit_close(&a);
         kit_close(&b);
     }
-    print_message("moved by whole periods, or map and foot together: twists differ by %.1e after 50 steps\n", worst);
+    print_message(
+        "moved by whole periods, or map and foot together: twists differ by %.1e after 50 steps\n",
+        worst);
     assert_true(worst < 1e-7);
     mild_map_destroy(map);
     mild_sole_destroy(sole);
 }
 
-/* The force half way across a border lies between those of its two materials, by the law's linear mixture. */
+/* The force half way across a border lies between those of its two materials, by the law's linear
+ * mixture. */
 static void test_smooth_border(void **state) {
     (void)state;
     MildMaterial foam, rubber;
@@ -468,7 +559,8 @@ static void test_smooth_border(void **state) {
     def.border = 0.2, def.cell = 0.002;
     MildMap *map = make_map(&def);
     double last = 0.0, jump = 0.0, ends[2] = {0.0, 0.0}, middle = 0.0;
-    for (int i = 0; i <= 200; i++) { /* pressed 3 mm into the ground at 0.35 .. 0.65 m; the border is at 0.5 */
+    for (int i = 0; i <= 200;
+         i++) { /* pressed 3 mm into the ground at 0.35 .. 0.65 m; the border is at 0.5 */
         Kit kit;
         kit_open(&kit, 1, sole, NULL, &foam, 1e-3);
         kit.terrain.materials[1] = rubber;
@@ -481,14 +573,24 @@ static void test_smooth_border(void **state) {
             kit_advance(&kit);
         }
         double force = kit.result.foot[0].force[2];
-        if (i > 0) jump = fmax(jump, fabs(force - last));
-        if (i == 0) ends[0] = force;
-        if (i == 100) middle = force;
-        if (i == 200) ends[1] = force;
+        if (i > 0) {
+            jump = fmax(jump, fabs(force - last));
+        }
+        if (i == 0) {
+            ends[0] = force;
+        }
+        if (i == 100) {
+            middle = force;
+        }
+        if (i == 200) {
+            ends[1] = force;
+        }
         last = force;
         kit_close(&kit);
     }
-    print_message("across a border of 0.2 m: %.3f, %.3f, %.3f N; largest jump between points 1.5 mm apart %.4f N\n", ends[0], middle, ends[1], jump);
+    print_message("across a border of 0.2 m: %.3f, %.3f, %.3f N; largest jump between points 1.5 "
+                  "mm apart %.4f N\n",
+                  ends[0], middle, ends[1], jump);
     assert_true(ends[0] < middle && middle < ends[1] && jump < 0.02 * (ends[1] - ends[0]));
     assert_true(fabs(ends[0] / mild_element_law(&foam, KIT_PITCH, 3e-3).force - 1.0) < 0.01);
     assert_true(fabs(ends[1] / mild_element_law(&rubber, KIT_PITCH, 3e-3).force - 1.0) < 0.01);
@@ -498,10 +600,11 @@ static void test_smooth_border(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_shapes),      cmocka_unit_test(test_rough),         cmocka_unit_test(test_plane),
-        cmocka_unit_test(test_patterns),    cmocka_unit_test(test_refused),       cmocka_unit_test(test_bytes),
-        cmocka_unit_test(test_translation), cmocka_unit_test(test_smooth_border), cmocka_unit_test(test_slope_friction),
-        cmocka_unit_test(test_solvers),     cmocka_unit_test(test_passive_by_hand),
-        cmocka_unit_test(test_passive)};
+        cmocka_unit_test(test_shapes),          cmocka_unit_test(test_rough),
+        cmocka_unit_test(test_plane),           cmocka_unit_test(test_patterns),
+        cmocka_unit_test(test_refused),         cmocka_unit_test(test_bytes),
+        cmocka_unit_test(test_translation),     cmocka_unit_test(test_smooth_border),
+        cmocka_unit_test(test_slope_friction),  cmocka_unit_test(test_solvers),
+        cmocka_unit_test(test_passive_by_hand), cmocka_unit_test(test_passive)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
-/* Memory runs out at the n-th allocation, for every n: an error each time, nothing lost, nothing leaked; and acting and
- * learning allocate nothing of their own. The allocator of this executable counts and fails. */
+/* Memory runs out at the n-th allocation, for every n: an error each time, nothing lost, nothing
+ * leaked; and acting and learning allocate nothing of their own. The allocator of this executable
+ * counts and fails. */
 #include "check.h"
 
 #include <errno.h>
@@ -159,20 +160,21 @@ static void test_every_allocation_may_fail(void **state) {
     shared_pool = pool_create(1);
     shared_ppo = create_ppo(&error);
     assert_true(shared_policy && shared_pool && shared_ppo);
-    int policy = fail_each(attempt_policy), ppo = fail_each(attempt_ppo), pool = fail_each(attempt_pool);
+    int policy = fail_each(attempt_policy), ppo = fail_each(attempt_ppo),
+        pool = fail_each(attempt_pool);
     int save = fail_each(attempt_save);
     assert_true(attempt_save());
     int load_policy = fail_each(attempt_load_policy), load = fail_each(attempt_load);
-    print_message("allocations: policy %d, ppo %d, pool %d, save %d, load policy %d, resume %d\n", policy, ppo, pool,
-                  save, load_policy, load);
+    print_message("allocations: policy %d, ppo %d, pool %d, save %d, load policy %d, resume %d\n",
+                  policy, ppo, pool, save, load_policy, load);
     ppo_destroy(shared_ppo);
     policy_destroy(shared_policy);
     pool_destroy(shared_pool);
     unlink(PATH);
 }
 
-/* oneDNN's packing buffers are its own; whatever it takes it gives back, and a product that finds no memory only costs its
- * minibatch. */
+/* oneDNN's packing buffers are its own; whatever it takes it gives back, and a product that finds
+ * no memory only costs its minibatch. */
 static void test_learning_survives_without_memory(void **state) {
     (void)state;
     if (!COUNTS) {

@@ -1,5 +1,5 @@
-/* The joint loss and its gradient: against PyTorch's stored values, and against central differences of the loss written
- * down a second time in double precision. */
+/* The joint loss and its gradient: against PyTorch's stored values, and against central differences
+ * of the loss written down a second time in double precision. */
 #include "check.h"
 
 #include <math.h>
@@ -46,7 +46,8 @@ static void case_open(Case *c, PolicyDef policy_def) {
     assert_int_equal(network_layout(&c->network, &policy_def, &error), MILD_OK);
     c->parameters = calloc((size_t)c->network.count, sizeof(float));
     c->gradient = calloc((size_t)c->network.count, sizeof(float));
-    c->block = aligned_alloc(64, loss_carve(&c->network, ROWS, MIRRORED, NULL, &c->chunk) * sizeof(float));
+    c->block =
+        aligned_alloc(64, loss_carve(&c->network, ROWS, MIRRORED, NULL, &c->chunk) * sizeof(float));
     assert_true(c->parameters && c->gradient && c->block);
     loss_carve(&c->network, ROWS, MIRRORED, c->block, &c->chunk);
     c->chunk.rows = ROWS;
@@ -83,7 +84,8 @@ static void case_run(Case *c) {
     product_leave(entered);
 }
 
-static void assert_near(const char *what, double ours, double theirs, double tolerance, double *worst) {
+static void assert_near(const char *what, double ours, double theirs, double tolerance,
+                        double *worst) {
     double gap = fabs(ours - theirs) / fmax(1.0, fabs(theirs));
     *worst = fmax(*worst, gap);
     if (!(gap <= tolerance)) {
@@ -133,10 +135,11 @@ static void test_matches_pytorch(void **state) {
     float terms[11];
     double worst_loss = 0.0, worst_gradient = 0.0;
     memcpy(terms, safetensors_find(file, "train.losses")->data, sizeof terms);
-    const double ours[] = {c.sums.surrogate / ROWS,      c.sums.kl / ROWS,          c.sums.clipped / ROWS,
-                           c.sums.reconstruction / ROWS, c.sums.vae_kl / ROWS,      c.sums.estimate[0] / ROWS,
-                           c.sums.estimate[1] / ROWS,    c.sums.estimate[2] / ROWS, c.sums.mirror / MIRRORED,
-                           c.sums.value / ROWS};
+    const double ours[] = {c.sums.surrogate / ROWS,   c.sums.kl / ROWS,
+                           c.sums.clipped / ROWS,     c.sums.reconstruction / ROWS,
+                           c.sums.vae_kl / ROWS,      c.sums.estimate[0] / ROWS,
+                           c.sums.estimate[1] / ROWS, c.sums.estimate[2] / ROWS,
+                           c.sums.mirror / MIRRORED,  c.sums.value / ROWS};
     for (size_t i = 0; i < sizeof ours / sizeof *ours; i++) {
         assert_near("loss", ours[i], terms[i], 1e-5, &worst_loss);
     }
@@ -153,10 +156,12 @@ static void test_matches_pytorch(void **state) {
         for (size_t i = 0; i < want->bytes / sizeof(float); i++) {
             float theirs;
             memcpy(&theirs, (const char *)want->data + i * sizeof theirs, sizeof theirs);
-            assert_near(names.name[k], ((const float *)names.tensor[k].data)[i], theirs, 1e-5, &worst_gradient);
+            assert_near(names.name[k], ((const float *)names.tensor[k].data)[i], theirs, 1e-5,
+                        &worst_gradient);
         }
     }
-    print_message("worst against PyTorch: losses %.1e, gradients %.1e\n", worst_loss, worst_gradient);
+    print_message("worst against PyTorch: losses %.1e, gradients %.1e\n", worst_loss,
+                  worst_gradient);
     safetensors_destroy(file);
     case_close(&c);
 }
@@ -182,7 +187,8 @@ static void mlp_double(const Mlp *mlp, const double *p, const double *x, double 
     memcpy(y, out, (size_t)mlp->layer[mlp->layers - 1].out * sizeof *y);
 }
 
-static void act_double(const Network *n, const double *p, const double *history, double *heads, double *mean) {
+static void act_double(const Network *n, const double *p, const double *history, double *heads,
+                       double *mean) {
     const PolicyDef *d = &n->def;
     double theta[64], input[64];
     mlp_double(&n->encoder, p, history, heads);
@@ -190,7 +196,8 @@ static void act_double(const Network *n, const double *p, const double *history,
     memcpy(input, history + n->history - d->observation, (size_t)d->observation * sizeof *input);
     memcpy(input + d->observation, heads, (size_t)d->estimates * sizeof *input);
     for (int j = 0; j < d->latent; j++) {
-        int a = d->modulation_per_dimension ? j : 0, b = d->modulation_per_dimension ? d->latent + j : 1;
+        int a = d->modulation_per_dimension ? j : 0,
+            b = d->modulation_per_dimension ? d->latent + j : 1;
         input[d->observation + d->estimates + j] = theta[a] * heads[d->estimates + j] + theta[b];
     }
     mlp_double(&n->actor, p, input, mean);
@@ -200,7 +207,8 @@ static double regression_double(const Case *c, const double *p, const double *he
     const Network *n = &c->network;
     const PolicyDef *d = &n->def;
     double input[64], decoded[64], loss = 0.0;
-    const int ends[] = {0, d->feet_velocity_offset, d->feet_velocity_offset + d->feet_velocity_count, d->estimates};
+    const int ends[] = {0, d->feet_velocity_offset,
+                        d->feet_velocity_offset + d->feet_velocity_count, d->estimates};
     for (int j = 0; j < d->latent; j++) {
         double mu = heads[d->estimates + j], logvar = heads[d->estimates + d->latent + j];
         input[j] = mu + exp(0.5 * logvar) * (double)c->chunk.noise[r * d->latent + j];
@@ -209,11 +217,13 @@ static double regression_double(const Case *c, const double *p, const double *he
     memcpy(input + d->latent, heads, (size_t)d->estimates * sizeof *input);
     mlp_double(&n->decoder, p, input, decoded);
     for (int j = 0; j < d->observation; j++) {
-        loss += pow(decoded[j] - (double)c->chunk.clean[r * d->observation + j], 2) / d->observation;
+        loss +=
+            pow(decoded[j] - (double)c->chunk.clean[r * d->observation + j], 2) / d->observation;
     }
     for (int g = 0; g < 3; g++) {
         for (int j = ends[g]; j < ends[g + 1]; j++) {
-            loss += pow(heads[j] - (double)c->chunk.estimate[r * d->estimates + j], 2) / (ends[g + 1] - ends[g]);
+            loss += pow(heads[j] - (double)c->chunk.estimate[r * d->estimates + j], 2) /
+                    (ends[g + 1] - ends[g]);
         }
     }
     return loss;
@@ -224,11 +234,13 @@ static double policy_double(const Case *c, const double *p, const double *mean, 
     const int actions = n->def.actions;
     double log_prob = 0.0, entropy = 0.0;
     for (int j = 0; j < actions; j++) {
-        double log_std = p[n->log_std + j], t = ((double)c->chunk.action[r * actions + j] - mean[j]) / exp(log_std);
+        double log_std = p[n->log_std + j],
+               t = ((double)c->chunk.action[r * actions + j] - mean[j]) / exp(log_std);
         log_prob -= 0.5 * t * t + log_std + 0.5 * log(2.0 * 3.14159265358979323846);
         entropy += log_std + 0.5 + 0.5 * log(2.0 * 3.14159265358979323846);
     }
-    double ratio = exp(log_prob - (double)c->chunk.old_log_prob[r]), advantage = c->chunk.advantage[r];
+    double ratio = exp(log_prob - (double)c->chunk.old_log_prob[r]),
+           advantage = c->chunk.advantage[r];
     double held = fmin(fmax(ratio, 1.0 - c->def.clip), 1.0 + c->def.clip);
     double critic[64], value;
     for (int i = 0; i < n->def.critic_input; i++) {
@@ -239,7 +251,8 @@ static double policy_double(const Case *c, const double *p, const double *mean, 
     double held_value = old + fmin(fmax(value - old, -c->def.clip), c->def.clip);
     double value_loss = pow(value - returns, 2);
     value_loss = c->def.clip_value ? fmax(value_loss, pow(held_value - returns, 2)) : value_loss;
-    return -fmin(ratio * advantage, held * advantage) - c->def.entropy * entropy + c->def.value_weight * value_loss;
+    return -fmin(ratio * advantage, held * advantage) - c->def.entropy * entropy +
+           c->def.value_weight * value_loss;
 }
 
 static double loss_double(const Case *c, const double *p) {
@@ -251,14 +264,16 @@ static double loss_double(const Case *c, const double *p) {
         for (int i = 0; i < n->history; i++) {
             int f = i / d->observation * d->observation, k = i % d->observation;
             history[i] = c->chunk.history[r * n->history + i];
-            image[i] = (double)sign_o[k] * (double)c->chunk.history[r * n->history + f + mirror_o[k]];
+            image[i] =
+                (double)sign_o[k] * (double)c->chunk.history[r * n->history + f + mirror_o[k]];
         }
         act_double(n, p, history, heads, mean);
         loss += c->def.epsilon * regression_double(c, p, heads, r) / ROWS;
         loss += (1.0 - c->def.epsilon) * policy_double(c, p, mean, r) / ROWS;
         act_double(n, p, image, heads, turned);
         for (int j = 0; r < MIRRORED && j < d->actions; j++) {
-            loss += c->def.mirror_weight * pow(mean[j] - (double)sign_a[j] * turned[mirror_a[j]], 2) /
+            loss += c->def.mirror_weight *
+                    pow(mean[j] - (double)sign_a[j] * turned[mirror_a[j]], 2) /
                     (MIRRORED * d->actions);
         }
     }
@@ -287,8 +302,9 @@ static void fill_inputs(Case *c, Random *random) {
     }
 }
 
-/* Central differences with step 1e-6 in double leave about 1e-9; single precision about 1e-6. A parameter whose difference
- * straddles a corner of the loss would show as an outlier: with these draws there is none. */
+/* Central differences with step 1e-6 in double leave about 1e-9; single precision about 1e-6. A
+ * parameter whose difference straddles a corner of the loss would show as an outlier: with these
+ * draws there is none. */
 static void check_differences(PolicyDef policy_def, int clip_value, uint64_t seed) {
     Case c;
     Random random = random_at(seed, 0, 0);
@@ -310,7 +326,8 @@ static void check_differences(PolicyDef policy_def, int clip_value, uint64_t see
         p[i] = at;
         assert_near("gradient", c.gradient[i], (high - low) / (2.0 * step), 2e-5, &worst);
     }
-    print_message("worst against differences: %.1e over %d parameters\n", worst, (int)c.network.count);
+    print_message("worst against differences: %.1e over %d parameters\n", worst,
+                  (int)c.network.count);
     free(p);
     case_close(&c);
 }
@@ -321,7 +338,7 @@ static void test_matches_differences(void **state) {
     check_differences(def, 1, 1);
     def.modulation_per_dimension = 1;
     check_differences(def, 0, 2);
-    def.feet_velocity_offset = 0;                                              /* no first group of estimates */
+    def.feet_velocity_offset = 0; /* no first group of estimates */
     def.actor_hidden[0] = 0, def.actor_hidden[1] = 0, def.actor_hidden[2] = 0; /* a linear actor */
     check_differences(def, 1, 3);
 }

@@ -50,8 +50,8 @@ static void test_noise_is_normal(void **state) {
         pairs += i > 1 ? fabs(v) * fabs((double)x[i - 2]) / COUNT : 0.0;
         tail += fabs(v) > 3.0;
     }
-    print_message("moments %.4f %.4f %.4f %.4f, neighbours %.4f, beyond 3 sigma %.5f\n", moment[1], moment[2],
-                  moment[3], moment[4], neighbours, (double)tail / COUNT);
+    print_message("moments %.4f %.4f %.4f %.4f, neighbours %.4f, beyond 3 sigma %.5f\n", moment[1],
+                  moment[2], moment[3], moment[4], neighbours, (double)tail / COUNT);
     assert_true(fabs(moment[1]) < 5e-3 && fabs(moment[2] - 1.0) < 7e-3 && fabs(moment[3]) < 2e-2 &&
                 fabs(moment[4] - 3.0) < 5e-2);
     assert_true(fabs(neighbours) < 5e-3 && fabs(pairs - 2.0 / 3.14159265) < 5e-3);
@@ -93,7 +93,8 @@ static void test_adam(void **state) {
             double grad = 0.5 * (double)g[i];
             md[i] = 0.9 * md[i] + 0.1 * grad;
             vd[i] = 0.999 * vd[i] + 0.001 * grad * grad;
-            pd[i] -= 0.01 * (md[i] / (1.0 - pow(0.9, t))) / (sqrt(vd[i] / (1.0 - pow(0.999, t))) + 1e-8);
+            pd[i] -=
+                0.01 * (md[i] / (1.0 - pow(0.9, t))) / (sqrt(vd[i] / (1.0 - pow(0.999, t))) + 1e-8);
             worst = fmax(worst, fabs(pd[i] - (double)p[i]));
         }
     }
@@ -104,12 +105,14 @@ static void test_adam(void **state) {
 #define STEPS 30
 #define ENVS 5
 
-/* Discounted sum by its definition, A_t = sum_k (gamma lambda)^k delta_t+k up to the end of the episode. */
+/* Discounted sum by its definition, A_t = sum_k (gamma lambda)^k delta_t+k up to the end of the
+ * episode. */
 static double advantage_by_sum(const PpoDef *def, const PpoBatch *b, int t, int env) {
     double sum = 0.0, weight = 1.0;
     for (int k = t; k < STEPS; k++) {
         const int i = k * ENVS + env;
-        double next = b->done[i] ? (b->timeout[i] ? (double)b->value[i] : 0.0) : (double)b->value[i + ENVS];
+        double next =
+            b->done[i] ? (b->timeout[i] ? (double)b->value[i] : 0.0) : (double)b->value[i + ENVS];
         sum += weight * ((double)b->reward[i] + def->gamma * next - (double)b->value[i]);
         weight *= def->gamma * def->lambda;
         if (b->done[i] || (k + 1 < STEPS && !b->valid[i + ENVS])) {
@@ -155,9 +158,11 @@ static void test_advantages(void **state) {
         valid += b->valid[i];
     }
     for (int k = 0; k < ppo->samples; k++) {
-        gap = fmax(gap, fabs((direct[k] - sum) / sqrt(squares) - (double)b->advantage[ppo->order[k]]));
+        gap = fmax(gap,
+                   fabs((direct[k] - sum) / sqrt(squares) - (double)b->advantage[ppo->order[k]]));
     }
-    print_message("worst: return %.1e, normalised advantage %.1e over %d samples\n", worst, gap, ppo->samples);
+    print_message("worst: return %.1e, normalised advantage %.1e over %d samples\n", worst, gap,
+                  ppo->samples);
     assert_int_equal(ppo->samples, valid);
     assert_true(worst < 1e-5 && gap < 1e-5 && fabs(report.advantage_std - sqrt(squares)) < 1e-5);
     ppo_destroy(ppo);

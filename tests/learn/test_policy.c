@@ -1,4 +1,5 @@
-/* Acting, and the policy's file: round trip, damage of every kind, a full disk, memory running out. */
+/* Acting, and the policy's file: round trip, damage of every kind, a full disk, memory running out.
+ */
 #include "check.h"
 
 #include <math.h>
@@ -28,8 +29,8 @@ static size_t parameter_bytes(const Policy *policy) {
     return (size_t)policy_parameter_count(policy) * sizeof(float);
 }
 
-/* Whole networks of the default size, rows beyond one chunk: with and without a pool the same bits; estimates and latent
- * are the parts of the actor's input. */
+/* Whole networks of the default size, rows beyond one chunk: with and without a pool the same bits;
+ * estimates and latent are the parts of the actor's input. */
 static void test_act_and_value(void **state) {
     (void)state;
     enum { ROWS = 300 };
@@ -41,8 +42,8 @@ static void test_act_and_value(void **state) {
     assert_true(policy && pool);
     assert_int_equal(policy_parameter_count(policy), 637461);
     Random random = random_at(5, 0, 0);
-    static float history[ROWS * 282], critic[ROWS * 98], actions[2][ROWS * 12], estimates[2][ROWS * 11],
-        latent[2][ROWS * 16], values[2][ROWS];
+    static float history[ROWS * 282], critic[ROWS * 98], actions[2][ROWS * 12],
+        estimates[2][ROWS * 11], latent[2][ROWS * 16], values[2][ROWS];
     fill_normal(history, ROWS * 282, 1.0, &random);
     fill_normal(critic, ROWS * 98, 1.0, &random);
     policy_act(policy, NULL, ROWS, history, actions[0], estimates[0], latent[0]);
@@ -90,7 +91,8 @@ static void test_modulation_starts_at_identity(void **state) {
         used = 0;
         network_carve(&policy->network, 1, block, &used, &outputs);
         network_forward(&policy->network, policy->parameters, 1, history, &outputs);
-        assert_memory_equal(latent, network_heads(&policy->network, &outputs) + def.estimates, sizeof latent);
+        assert_memory_equal(latent, network_heads(&policy->network, &outputs) + def.estimates,
+                            sizeof latent);
         free(block);
         policy_destroy(policy);
     }
@@ -107,7 +109,8 @@ static void test_round_trip(void **state) {
     assert_non_null(loaded);
     assert_string_equal(back, note);
     assert_memory_equal(policy_def(loaded), policy_def(policy), sizeof(PolicyDef));
-    assert_memory_equal(policy_parameters(loaded), policy_parameters(policy), parameter_bytes(policy));
+    assert_memory_equal(policy_parameters(loaded), policy_parameters(policy),
+                        parameter_bytes(policy));
     assert_int_equal(access(PATH ".tmp", F_OK), -1);
     policy_destroy(loaded);
     policy_destroy(policy);
@@ -257,7 +260,8 @@ static void test_full_disk(void **state) {
     Policy *kept = policy_load(PATH, note, sizeof note, &error);
     assert_non_null(kept);
     assert_string_equal(note, "old");
-    assert_int_equal(policy_save(fresh, "no/such/folder/policy.safetensors", "", &error), MILD_ERROR_IO);
+    assert_int_equal(policy_save(fresh, "no/such/folder/policy.safetensors", "", &error),
+                     MILD_ERROR_IO);
     policy_destroy(kept);
     policy_destroy(old);
     policy_destroy(fresh);

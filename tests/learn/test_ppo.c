@@ -55,7 +55,8 @@ static PpoDef toy_ppo_def(void) {
     return def;
 }
 
-/* Shards, chunks and their order are fixed by the batch alone. 64 environments x 40 steps: several chunks per shard. */
+/* Shards, chunks and their order are fixed by the batch alone. 64 environments x 40 steps: several
+ * chunks per shard. */
 static void test_threads_change_nothing(void **state) {
     (void)state;
     Run one;
@@ -83,7 +84,8 @@ static void test_resume_is_as_if_never_stopped(void **state) {
 
     run_open(&first, 1, 16, toy_ppo_def());
     run_iterations(&first, 2);
-    assert_int_equal(ppo_save(first.ppo, path, &first.toy, sizeof first.toy, "toy", &error), MILD_OK);
+    assert_int_equal(ppo_save(first.ppo, path, &first.toy, sizeof first.toy, "toy", &error),
+                     MILD_OK);
     run_close(&first);
 
     run_open(&second, 2, 16, toy_ppo_def());
@@ -95,7 +97,8 @@ static void test_resume_is_as_if_never_stopped(void **state) {
     assert_memory_equal(&whole.toy, &second.toy, sizeof whole.toy);
 
     /* another size of the caller's state is refused and changes nothing */
-    assert_int_not_equal(ppo_load(second.ppo, path, &second.toy, sizeof second.toy - 1, &error), MILD_OK);
+    assert_int_not_equal(ppo_load(second.ppo, path, &second.toy, sizeof second.toy - 1, &error),
+                         MILD_OK);
     assert_int_not_equal(ppo_load(second.ppo, path, NULL, 0, &error), MILD_OK);
     assert_same_parameters(&whole, &second);
 
@@ -142,7 +145,8 @@ static void test_bad_numbers_are_dropped(void **state) {
     for (int64_t i = 0; i < policy_parameter_count(run.policy); i++) {
         assert_true(isfinite(policy_parameters(run.policy)[i]));
     }
-    assert_true(isfinite(report.surrogate) && isfinite(report.gradient_norm) && report.gradient_norm > 0.0);
+    assert_true(isfinite(report.surrogate) && isfinite(report.gradient_norm) &&
+                report.gradient_norm > 0.0);
     run_close(&run);
 }
 
@@ -161,8 +165,8 @@ static void test_invalid_samples_have_no_weight(void **state) {
             batch->valid[i] = 0;
             batch->reward[i] = batch->log_prob[i] = junk[k];
             batch->history[i * TOY_FRAMES * TOY_OBSERVATION] = junk[k];
-            batch->action[2 * i] = batch->mean[2 * i] = batch->target[4 * i] = batch->clean[i * TOY_OBSERVATION] =
-                junk[k];
+            batch->action[2 * i] = batch->mean[2 * i] = batch->target[4 * i] =
+                batch->clean[i * TOY_OBSERVATION] = junk[k];
         }
         ppo_update(runs[k]->ppo, &report[k]);
         assert_int_equal(report[k].skipped, 0);
@@ -188,7 +192,8 @@ static void test_nothing_valid_changes_nothing(void **state) {
     run_close(&b);
 }
 
-/* Resting anywhere in [-1, 1] earns 0.44 a step on average; the goal, reached at once, about 0.93. */
+/* Resting anywhere in [-1, 1] earns 0.44 a step on average; the goal, reached at once, about 0.93.
+ */
 static void test_learns_the_toy_task(void **state) {
     (void)state;
     Run run;
@@ -202,11 +207,13 @@ static void test_learns_the_toy_task(void **state) {
         first = iteration == 0 ? reward : first;
         assert_int_equal(report.skipped, 0);
     }
-    print_message("toy: reward %.3f -> %.3f in %d iterations, %.1f s; kl %.4f, rate %.1e, std %.2f, explained %.2f, "
+    print_message("toy: reward %.3f -> %.3f in %d iterations, %.1f s; kl %.4f, rate %.1e, std "
+                  "%.2f, explained %.2f, "
                   "estimates %.4f, "
                   "mirror %.4f\n",
-                  first, reward, iteration, clock_seconds() - begin, report.kl, report.learning_rate, report.action_std,
-                  report.explained_variance, report.estimate_loss[0], report.mirror);
+                  first, reward, iteration, clock_seconds() - begin, report.kl,
+                  report.learning_rate, report.action_std, report.explained_variance,
+                  report.estimate_loss[0], report.mirror);
     assert_true(reward >= 0.9);
     run_close(&run);
 }

@@ -1,4 +1,5 @@
-/* A toy task: two point masses on a line, told to reach 0 and stay there. Mirroring changes every sign. */
+/* A toy task: two point masses on a line, told to reach 0 and stay there. Mirroring changes every
+ * sign. */
 #ifndef MILD_TEST_LEARN_TOY_H
 #define MILD_TEST_LEARN_TOY_H
 
@@ -60,8 +61,10 @@ static inline void toy_reset(ToyEnv *env, int number) {
 
 static inline void toy_observe(ToyEnv *env, PpoBatch *b, int t, int e) {
     const int64_t row = (int64_t)t * b->envs + e;
-    const double now[TOY_OBSERVATION] = {env->x[0], env->x[1], env->v[0], env->v[1], env->last[0], env->last[1]};
-    memmove(env->frames, env->frames + TOY_OBSERVATION, sizeof env->frames - TOY_OBSERVATION * sizeof(float));
+    const double now[TOY_OBSERVATION] = {env->x[0], env->x[1],    env->v[0],
+                                         env->v[1], env->last[0], env->last[1]};
+    memmove(env->frames, env->frames + TOY_OBSERVATION,
+            sizeof env->frames - TOY_OBSERVATION * sizeof(float));
     for (int i = 0; i < TOY_OBSERVATION; i++) {
         env->frames[(TOY_FRAMES - 1) * TOY_OBSERVATION + i] = (float)now[i];
         b->critic[row * 6 + i] = (float)now[i];

@@ -60,8 +60,12 @@ static inline MildTerrain preset_terrain(const char *name) {
 
 /* Joints a little off their places, all of it in motion. */
 static inline void kit_disturb(RobotState *state, Random *random) {
-    for (int i = 0; i < ROBOT_JOINTS; i++) state->qpos[7 + i] += random_uniform(random, -0.1, 0.1);
-    for (int i = 0; i < ROBOT_NV; i++) state->qvel[i] = random_uniform(random, -0.5, 0.5);
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        state->qpos[7 + i] += random_uniform(random, -0.1, 0.1);
+    }
+    for (int i = 0; i < ROBOT_NV; i++) {
+        state->qvel[i] = random_uniform(random, -0.5, 0.5);
+    }
 }
 
 #endif

@@ -1,4 +1,5 @@
-/* The model file against the published numbers: models/sa01/sa01.json, read here independently of MuJoCo. */
+/* The model file against the published numbers: models/sa01/sa01.json, read here independently of
+ * MuJoCo. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -24,7 +25,8 @@ typedef struct {
     char name[LINKS][32];
     int parent[LINKS]; /* link */
     double mass[LINKS], com[LINKS][3], inertia[LINKS][9];
-    double origin[LINKS][3], axis[LINKS][3], armature[LINKS]; /* of the joint above the link; 0 unused */
+    double origin[LINKS][3], axis[LINKS][3],
+        armature[LINKS]; /* of the joint above the link; 0 unused */
 } Tree;
 
 static Robot *robot;
@@ -68,10 +70,13 @@ static int link_index(const char *name) {
 }
 
 static void read_tree(void) {
-    const cJSON *links = cJSON_GetObjectItem(numbers, "links"), *joints = cJSON_GetObjectItem(numbers, "joints");
+    const cJSON *links = cJSON_GetObjectItem(numbers, "links"),
+                *joints = cJSON_GetObjectItem(numbers, "joints");
     for (int i = 0; i < LINKS; i++) {
-        const cJSON *link = cJSON_GetArrayItem(links, i), *about = cJSON_GetObjectItem(link, "inertia_about_com");
-        snprintf(tree.name[i], sizeof tree.name[i], "%s", cJSON_GetObjectItem(link, "name")->valuestring);
+        const cJSON *link = cJSON_GetArrayItem(links, i),
+                    *about = cJSON_GetObjectItem(link, "inertia_about_com");
+        snprintf(tree.name[i], sizeof tree.name[i], "%s",
+                 cJSON_GetObjectItem(link, "name")->valuestring);
         tree.mass[i] = number(link, "mass");
         vector(link, "com_xyz", tree.com[i]);
         double xx = number(about, "ixx"), yy = number(about, "iyy"), zz = number(about, "izz");
@@ -94,7 +99,8 @@ static void multiply(const double *a, const double *b, double *out) {
     double product[9];
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) {
-            product[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
+            product[3 * i + j] =
+                a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
         }
     }
     memcpy(out, product, sizeof product);
@@ -115,9 +121,10 @@ static void cross(const double *a, const double *b, double *out) {
 /* Rodrigues: rotation by `angle` about a unit axis. */
 static void axis_rotation(const double *n, double angle, double *turn) {
     double c = cos(angle), s = sin(angle), k = 1.0 - c;
-    double full[9] = {c + k * n[0] * n[0],        k * n[0] * n[1] - s * n[2], k * n[0] * n[2] + s * n[1],
-                      k * n[1] * n[0] + s * n[2], c + k * n[1] * n[1],        k * n[1] * n[2] - s * n[0],
-                      k * n[2] * n[0] - s * n[1], k * n[2] * n[1] + s * n[0], c + k * n[2] * n[2]};
+    double full[9] = {
+        c + k * n[0] * n[0],        k * n[0] * n[1] - s * n[2], k * n[0] * n[2] + s * n[1],
+        k * n[1] * n[0] + s * n[2], c + k * n[1] * n[1],        k * n[1] * n[2] - s * n[0],
+        k * n[2] * n[0] - s * n[1], k * n[2] * n[1] + s * n[0], c + k * n[2] * n[2]};
     memcpy(turn, full, sizeof full);
 }
 
@@ -150,7 +157,8 @@ static void mass_matrix(const double *qpos, double *mass) {
     link_poses(qpos, position, turn);
     memset(mass, 0, ROBOT_NV * ROBOT_NV * sizeof *mass);
     for (int i = 0; i < LINKS; i++) {
-        double jv[ROBOT_NV][3] = {{0}}, jw[ROBOT_NV][3] = {{0}}, com[3], arm[3], turned[9], transposed[9], world[9];
+        double jv[ROBOT_NV][3] = {{0}}, jw[ROBOT_NV][3] = {{0}}, com[3], arm[3], turned[9],
+               transposed[9], world[9];
         rotate(turn[i], tree.com[i], com);
         for (int k = 0; k < 3; k++) {
             com[k] += position[i][k];
@@ -181,7 +189,8 @@ static void mass_matrix(const double *qpos, double *mass) {
             rotate(world, jw[r], spun);
             for (int c = 0; c < ROBOT_NV; c++) {
                 for (int k = 0; k < 3; k++) {
-                    mass[r * ROBOT_NV + c] += tree.mass[i] * jv[r][k] * jv[c][k] + spun[k] * jw[c][k];
+                    mass[r * ROBOT_NV + c] +=
+                        tree.mass[i] * jv[r][k] * jv[c][k] + spun[k] * jw[c][k];
                 }
             }
         }
@@ -206,7 +215,8 @@ static RobotState random_state(uint32_t index) {
         state.qpos[i] /= sqrt(norm);
     }
     for (int i = 0; i < ROBOT_JOINTS; i++) {
-        state.qpos[7 + i] = random_uniform(&random, robot_joint_low(robot)[i], robot_joint_high(robot)[i]);
+        state.qpos[7 + i] =
+            random_uniform(&random, robot_joint_low(robot)[i], robot_joint_high(robot)[i]);
     }
     return state;
 }
@@ -255,21 +265,24 @@ static void test_limits_and_masses(void **unused) {
     const mjModel *m = robot_sim_model(sim);
     const cJSON *joints = cJSON_GetObjectItem(numbers, "joints");
     for (int i = 0; i < ROBOT_JOINTS; i++) {
-        const cJSON *joint = cJSON_GetArrayItem(joints, i), *range = cJSON_GetObjectItem(joint, "mjcf_range");
+        const cJSON *joint = cJSON_GetArrayItem(joints, i),
+                    *range = cJSON_GetObjectItem(joint, "mjcf_range");
         near(robot_joint_low(robot)[i], cJSON_GetArrayItem(range, 0)->valuedouble, 1e-12, "low");
         near(robot_joint_high(robot)[i], cJSON_GetArrayItem(range, 1)->valuedouble, 1e-12, "high");
         near(robot_effort(robot)[i], number(joint, "effort_Nm"), 1e-12, "effort");
         near(robot_default_pose(robot)[i], number(joint, "q_default_training"), 1e-12, "pose");
         near(m->dof_armature[6 + i], number(joint, "mjcf_armature"), 1e-12, "armature");
         near(m->dof_damping[6 + i] + m->dof_frictionloss[6 + i], 0.0, 0.0, "damping and friction");
-        assert_string_equal(mj_id2name(m, mjOBJ_JOINT, 1 + i), cJSON_GetObjectItem(joint, "name")->valuestring);
+        assert_string_equal(mj_id2name(m, mjOBJ_JOINT, 1 + i),
+                            cJSON_GetObjectItem(joint, "name")->valuestring);
     }
 }
 
 /* JSON's derived_standing.training_default was computed by its authors from the same links. */
 static void test_standing(void **unused) {
     (void)unused;
-    const cJSON *expected = cJSON_GetObjectItem(cJSON_GetObjectItem(numbers, "derived_standing"), "training_default");
+    const cJSON *expected =
+        cJSON_GetObjectItem(cJSON_GetObjectItem(numbers, "derived_standing"), "training_default");
     double ankle[3], com[3], inertia[9] = {0}, position[LINKS][3], turn[LINKS][9];
     vector(expected, "ankle_xyz_left", ankle);
     vector(expected, "com_in_base", com);
@@ -301,13 +314,14 @@ static void test_standing(void **unused) {
         }
         multiply(turned, transposed, world);
         for (int k = 0; k < 9; k++) {
-            inertia[k] += world[k] + m->body_mass[b] * ((k % 4 == 0 ? square : 0.0) - arm[k / 3] * arm[k % 3]);
+            inertia[k] += world[k] +
+                          m->body_mass[b] * ((k % 4 == 0 ? square : 0.0) - arm[k / 3] * arm[k % 3]);
         }
     }
     const cJSON *rows = cJSON_GetObjectItem(expected, "composite_inertia_about_com");
     for (int k = 0; k < 9; k++) {
-        near(inertia[k], cJSON_GetArrayItem(cJSON_GetArrayItem(rows, k / 3), k % 3)->valuedouble, 2e-6,
-             "composite inertia");
+        near(inertia[k], cJSON_GetArrayItem(cJSON_GetArrayItem(rows, k / 3), k % 3)->valuedouble,
+             2e-6, "composite inertia");
     }
 }
 
@@ -343,7 +357,8 @@ static void test_variation(void **unused) {
     RobotState state = stand_state();
     robot_sim_load(sim, &state, &varied);
     const mjModel *m = robot_sim_model(sim);
-    near(m->body_subtreemass[1], robot_total_mass(robot) + 2.5 + 0.2 * tree.mass[4], 1e-9, "varied mass");
+    near(m->body_subtreemass[1], robot_total_mass(robot) + 2.5 + 0.2 * tree.mass[4], 1e-9,
+         "varied mass");
     near(m->body_ipos[3], tree.com[0][0] + 0.01, 1e-12, "varied com");
     near(m->dof_armature[6], 0.021, 1e-12, "varied armature");
     near(m->pair_friction[0], 0.33, 1e-12, "varied friction");
@@ -352,7 +367,8 @@ static void test_variation(void **unused) {
     near(m->pair_friction[0], 0.8, 1e-12, "friction back");
 }
 
-/* The model with `from` written as `to`, of the same length, must be refused with one line that names `what`. */
+/* The model with `from` written as `to`, of the same length, must be refused with one line that
+ * names `what`. */
 static void refuse(const char *from, const char *to, const char *what, const char *path) {
     char *text = read_file(MODEL);
     for (char *at = strstr(text, from); at; at = strstr(at, from)) {
@@ -375,7 +391,8 @@ static void test_refusals(void **unused) {
     (void)unused;
     refuse("leg_r6_link", "xeg_r6_link", "leg_r6_link", "robot_missing_foot.xml");
     refuse("leg_l4_joint", "xeg_l4_joint", "leg_l4_joint", "robot_missing_joint.xml");
-    refuse("sole_outline_right", "xole_outline_right", "sole_outline_right", "robot_missing_sole.xml");
+    refuse("sole_outline_right", "xole_outline_right", "sole_outline_right",
+           "robot_missing_sole.xml");
     refuse("base_link_box", "xase_link_box", "base_link_box", "robot_missing_box.xml");
     refuse("data=\"77\"", "data=\"-7\"", "sole_elements", "robot_elements.xml");
     MildError error = {0};
@@ -386,8 +403,9 @@ static void test_refusals(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_limits_and_masses), cmocka_unit_test(test_standing), cmocka_unit_test(test_mass_matrix),
-        cmocka_unit_test(test_variation),         cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_limits_and_masses), cmocka_unit_test(test_standing),
+        cmocka_unit_test(test_mass_matrix),       cmocka_unit_test(test_variation),
+        cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -1,5 +1,5 @@
-/* The engine's contact on uneven ground: against the engine itself on a level and on a tilted floor; friction on a slope;
- * standing on waves. */
+/* The engine's contact on uneven ground: against the engine itself on a level and on a tilted
+ * floor; friction on a slope; standing on waves. */
 #include <math.h>
 #include <string.h>
 
@@ -68,7 +68,8 @@ static void test_level(void **unused) {
             assert_int_equal(robot_sim_step(sim, torque, NULL, &flat, NULL), 0);
             assert_int_equal(robot_sim_step(other, torque, NULL, &mapped, NULL), 0);
             contacts += robot_sim_foot(sim, 0)->result.contacts;
-            assert_memory_equal(robot_sim_contact(sim), robot_sim_contact(other), sizeof(MildContactResult));
+            assert_memory_equal(robot_sim_contact(sim), robot_sim_contact(other),
+                                sizeof(MildContactResult));
             assert_memory_equal(robot_sim_qpos(sim), robot_sim_qpos(other), sizeof state.qpos);
         }
     }
@@ -118,8 +119,8 @@ static void test_slope_is_the_engine(void **unused) {
     assert_true(worst < 1e-9);
 }
 
-/* A robot with held joints is put on a slope with its soles flat, for two seconds. [m] down the slope: how far its centre of
- * mass has come, and how far a foot has gone in the second second. */
+/* A robot with held joints is put on a slope with its soles flat, for two seconds. [m] down the
+ * slope: how far its centre of mass has come, and how far a foot has gone in the second second. */
 static void slide(double slope, double friction, double *fallen, double *crept) {
     MildMap *map = slope_map(-slope);
     MildTerrain terrain = preset_terrain("sand_loose");
@@ -147,22 +148,24 @@ static void slide(double slope, double friction, double *fallen, double *crept) 
     mild_map_destroy(map);
 }
 
-/* Above the angle of friction it slides as a block does, (sin - mu cos) g t^2/2 and the sway of its joints; below it stays,
- * but for the creep of the engine's friction. */
+/* Above the angle of friction it slides as a block does, (sin - mu cos) g t^2/2 and the sway of its
+ * joints; below it stays, but for the creep of the engine's friction. */
 static void test_friction(void **unused) {
     (void)unused;
     const double slope = 0.03, angle = atan(slope);
     double fallen, crept;
     slide(slope, 0.01, &fallen, &crept);
     double block = (sin(angle) - 0.01 * cos(angle)) * 9.81 * 2.0;
-    print_message("slope of 0.03: friction 0.01 slides %.0f mm in 2 s, a block %.0f mm\n", 1e3 * fallen, 1e3 * block);
+    print_message("slope of 0.03: friction 0.01 slides %.0f mm in 2 s, a block %.0f mm\n",
+                  1e3 * fallen, 1e3 * block);
     assert_true(fabs(fallen - block) < 0.1 * block);
     slide(slope, 0.06, &fallen, &crept);
     print_message("slope of 0.03: friction 0.06 creeps %.2f mm/s\n", 1e3 * crept);
     assert_true(fabs(crept) < 0.002);
 }
 
-/* Wherever it stands on waves, the lowest corner of either foot is neither 2 mm in the ground nor above it. */
+/* Wherever it stands on waves, the lowest corner of either foot is neither 2 mm in the ground nor
+ * above it. */
 static void test_waves(void **unused) {
     (void)unused;
     MildMapDef def = mild_map_def_default();
@@ -192,7 +195,8 @@ static void test_waves(void **unused) {
                 double least = 1.0;
                 for (int p = 4 * f; p < 4 * f + 4; p++) {
                     const double *c = d->geom_xpos + 3 * m->pair_geom2[p];
-                    least = fmin(least, c[2] - m->geom_size[3 * m->pair_geom2[p]] - mild_terrain_height_at(&terrain, c[0], c[1]));
+                    least = fmin(least, c[2] - m->geom_size[3 * m->pair_geom2[p]] -
+                                            mild_terrain_height_at(&terrain, c[0], c[1]));
                 }
                 deepest = fmin(deepest, least);
                 highest = fmax(highest, least);
@@ -200,8 +204,9 @@ static void test_waves(void **unused) {
         }
         stood += robot_sim_qpos(sim)[2] > 0.7;
     }
-    print_message("waves of 20 mm: %d of 16 stand; the lowest corner of a foot %.2f mm in to %.2f mm above the ground\n", stood,
-                  -1e3 * deepest, 1e3 * highest);
+    print_message("waves of 20 mm: %d of 16 stand; the lowest corner of a foot %.2f mm in to %.2f "
+                  "mm above the ground\n",
+                  stood, -1e3 * deepest, 1e3 * highest);
     robot_sim_destroy(sim);
     mild_map_destroy(map);
     assert_int_equal(stood, 16);
@@ -209,7 +214,8 @@ static void test_waves(void **unused) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_level), cmocka_unit_test(test_slope_is_the_engine),
-                                       cmocka_unit_test(test_friction), cmocka_unit_test(test_waves)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_level), cmocka_unit_test(test_slope_is_the_engine),
+        cmocka_unit_test(test_friction), cmocka_unit_test(test_waves)};
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -1,4 +1,5 @@
-/* Standing ten seconds with the stand gains on every ground, at every physics step from 0.5 to 5 ms. */
+/* Standing ten seconds with the stand gains on every ground, at every physics step from 0.5 to 5
+ * ms. */
 #include <math.h>
 #include <string.h>
 
@@ -21,7 +22,8 @@ typedef struct {
 } Stand;
 
 static double mean_depth(const RobotSim *sim) {
-    return 0.5 * (robot_sim_foot(sim, 0)->result.depth_mean + robot_sim_foot(sim, 1)->result.depth_mean);
+    return 0.5 *
+           (robot_sim_foot(sim, 0)->result.depth_mean + robot_sim_foot(sim, 1)->result.depth_mean);
 }
 
 static double sole_drift(const RobotSim *sim, double start[ROBOT_FEET][3]) {
@@ -38,7 +40,8 @@ static double static_sinkage(const MildMaterial *material) {
 }
 
 /* material: NULL for rigid ground. */
-static Stand stand(const MildMaterial *material, double dt, double seconds, int balance, MildSolver solver) {
+static Stand stand(const MildMaterial *material, double dt, double seconds, int balance,
+                   MildSolver solver) {
     RobotSim *sim = new_sim(dt);
     robot_sim_set_solver(sim, solver, 0, 0);
     MildGround *ground = new_ground();
@@ -82,10 +85,11 @@ static Stand stand(const MildMaterial *material, double dt, double seconds, int 
 static void check_balanced(const char *name, const MildMaterial *material, double dt) {
     Stand result = stand(material, dt, SECONDS, 1, MILD_SOLVER_NEWTON);
     double expected = material ? static_sinkage(material) : 0.0;
-    print_message(
-        "%-11s %.1f ms %s %5.2f s depth %6.3f of %6.3f mm, creep %8.5f, drift %.4f mm, tilt %.4f rad, %.1f N m\n", name,
-        1e3 * dt, result.stands ? "stands" : "FELL  ", result.seconds, 1e3 * result.depth, 1e3 * expected,
-        1e3 * result.creep, 1e3 * result.drift, result.tilt, result.torque);
+    print_message("%-11s %.1f ms %s %5.2f s depth %6.3f of %6.3f mm, creep %8.5f, drift %.4f mm, "
+                  "tilt %.4f rad, %.1f N m\n",
+                  name, 1e3 * dt, result.stands ? "stands" : "FELL  ", result.seconds,
+                  1e3 * result.depth, 1e3 * expected, 1e3 * result.creep, 1e3 * result.drift,
+                  result.tilt, result.torque);
     assert_true(result.stands);
     assert_true(fabs(result.creep) < 1e-4);
     assert_true(result.drift < 3e-3);
@@ -113,7 +117,8 @@ static void test_papers_solver(void **unused) {
         MildMaterial material = preset(mild_material_preset_name(p));
         double height[2];
         for (int s = 0; s < 2; s++) {
-            Stand result = stand(&material, 0.0025, 0.0075, 1, s ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON);
+            Stand result = stand(&material, 0.0025, 0.0075, 1,
+                                 s ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON);
             assert_true(result.stands);
             height[s] = result.height;
         }
@@ -123,7 +128,8 @@ static void test_papers_solver(void **unused) {
     }
 }
 
-/* Joints held at the default pose without balance: rigid ground carries that, soft foam cannot (see stand.c). */
+/* Joints held at the default pose without balance: rigid ground carries that, soft foam cannot (see
+ * stand.c). */
 static void test_plain_gains(void **unused) {
     (void)unused;
     Stand rigid = stand(NULL, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);

@@ -45,7 +45,8 @@ static void test_rigid_is_the_engine(void **unused) {
         robot_sim_load(sim, &state, &rigid);
         memcpy(engine->qpos, state.qpos, sizeof state.qpos);
         memcpy(engine->qvel, state.qvel, sizeof state.qvel);
-        for (int i = 0; i < 300; i++) { /* with no torque the robot collapses into its joint limits */
+        for (int i = 0; i < 300;
+             i++) { /* with no torque the robot collapses into its joint limits */
             double torque[ROBOT_JOINTS] = {0};
             if (draw % 2 == 0) {
                 robot_stand_torque(robot, sim, 0, torque);
@@ -70,7 +71,8 @@ static void dense_jacobian(RobotSim *sim, double j[ROWS * ROBOT_NV]) {
     for (int f = 0; f < ROBOT_FEET; f++) {
         const mjModel *m = robot_sim_model(sim);
         double *rows = j + 6 * f * ROBOT_NV;
-        mj_jacBody(m, robot_sim_data(sim), rows, rows + 3 * ROBOT_NV, mj_name2id(m, mjOBJ_BODY, names[f]));
+        mj_jacBody(m, robot_sim_data(sim), rows, rows + 3 * ROBOT_NV,
+                   mj_name2id(m, mjOBJ_BODY, names[f]));
     }
 }
 
@@ -121,7 +123,8 @@ static void test_map_against_dense(void **unused) {
             for (int k = 0; k < ROBOT_NV; k++) {
                 twist += j[r * ROBOT_NV + k] * state.qvel[k];
             }
-            worst_twist = fmax(worst_twist, fabs(twist - robot_sim_foot(sim, r / 6)->velocity[r % 6]));
+            worst_twist =
+                fmax(worst_twist, fabs(twist - robot_sim_foot(sim, r / 6)->velocity[r % 6]));
         }
         for (int r = 0; r < ROWS; r++) {
             for (int c = 0; c < ROWS; c++) {
@@ -129,7 +132,8 @@ static void test_map_against_dense(void **unused) {
                 for (int k = 0; k < ROBOT_NV; k++) {
                     sum += j[r * ROBOT_NV + k] * solved[c * ROBOT_NV + k];
                 }
-                worst_a = fmax(worst_a, fabs(sum - sim->input.inverse_inertia[r * ROWS + c]) / (1.0 + fabs(sum)));
+                worst_a = fmax(worst_a, fabs(sum - sim->input.inverse_inertia[r * ROWS + c]) /
+                                            (1.0 + fabs(sum)));
             }
         }
         double wrench[ROBOT_FEET][6], force[ROBOT_NV], acceleration[ROBOT_NV];
@@ -147,12 +151,14 @@ static void test_map_against_dense(void **unused) {
             worst_wrench = fmax(worst_wrench, fabs(a - acceleration[k]) / (1.0 + fabs(a)));
         }
     }
-    print_message("A %.2e, wrench %.2e, twist %.2e from dense\n", worst_a, worst_wrench, worst_twist);
+    print_message("A %.2e, wrench %.2e, twist %.2e from dense\n", worst_a, worst_wrench,
+                  worst_twist);
     assert_true(worst_a < 1e-10 && worst_wrench < 1e-10 && worst_twist < 1e-12);
     robot_sim_destroy(sim);
 }
 
-/* Foot twist after a soft step = what the contact solver promised: the robot and the solver see the same A and V^. */
+/* Foot twist after a soft step = what the contact solver promised: the robot and the solver see the
+ * same A and V^. */
 static void test_twist_is_the_solvers(void **unused) {
     (void)unused;
     RobotSim *sim = new_sim(0.001);
@@ -204,8 +210,8 @@ static void test_momentum(void **unused) {
     for (uint32_t draw = 0; draw < 20; draw++) {
         RobotState state = random_state(draw);
         state.qpos[2] += draw % 2 ? 0.5 : 0.0;
-        memset(state.qvel, 0,
-               sizeof state.qvel); /* the engine's Euler step conserves momentum to first order in the speed */
+        memset(state.qvel, 0, sizeof state.qvel); /* the engine's Euler step conserves momentum to
+                                                     first order in the speed */
         robot_sim_load(sim, &state, &nominal);
         mild_ground_reset(ground);
         double torque[ROBOT_JOINTS], before[3], after[3];
@@ -214,7 +220,8 @@ static void test_momentum(void **unused) {
         assert_int_equal(robot_sim_step(sim, torque, push, &terrain, ground), 0);
         momentum(sim, after);
         for (int k = 0; k < 3; k++) {
-            double force = push[k] + robot_sim_foot(sim, 0)->force[k] + robot_sim_foot(sim, 1)->force[k];
+            double force =
+                push[k] + robot_sim_foot(sim, 0)->force[k] + robot_sim_foot(sim, 1)->force[k];
             force -= k == 2 ? 9.81 * robot_total_mass(robot) : 0.0;
             worst = fmax(worst, fabs(after[k] - before[k] - robot_sim_dt(sim) * force));
         }
@@ -240,15 +247,16 @@ static void advance_case(RobotSim *sim, Case *one) {
     robot_sim_store(sim, &one->state);
 }
 
-/* A step depends on (state, variation, terrain, ground) only, not on what the workspace did before. */
+/* A step depends on (state, variation, terrain, ground) only, not on what the workspace did before.
+ */
 static void test_determinism(void **unused) {
     (void)unused;
     static const char *const names[4] = {"sand_loose", "foam45", "grass", "rubber"};
     Case shared[4], alone[4];
     RobotSim *sim = new_sim(0.001);
     for (int i = 0; i < 4; i++) {
-        shared[i] =
-            (Case){random_state((uint32_t)i), robot_variation_nominal(), preset_terrain(names[i]), new_ground()};
+        shared[i] = (Case){random_state((uint32_t)i), robot_variation_nominal(),
+                           preset_terrain(names[i]), new_ground()};
         shared[i].variation.rigid = i == 2;
         shared[i].variation.base_mass_add = i;
         alone[i] = shared[i];
@@ -262,14 +270,17 @@ static void test_determinism(void **unused) {
     for (int i = 0; i < 4; i++) {
         RobotSim *own = new_sim(0.001);
         robot_sim_load(own, &alone[i].state, &alone[i].variation);
-        for (int step = 0; step < 300; step++) { /* without a load in between: storing and loading changes nothing */
+        for (int step = 0; step < 300;
+             step++) { /* without a load in between: storing and loading changes nothing */
             double torque[ROBOT_JOINTS];
             robot_stand_torque(robot, own, 0, torque);
-            assert_int_equal(robot_sim_step(own, torque, NULL, &alone[i].terrain, alone[i].ground), 0);
+            assert_int_equal(robot_sim_step(own, torque, NULL, &alone[i].terrain, alone[i].ground),
+                             0);
         }
         robot_sim_store(own, &alone[i].state);
         assert_memory_equal(&alone[i].state, &shared[i].state, sizeof shared[i].state);
-        assert_memory_equal(alone[i].ground, shared[i].ground, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
+        assert_memory_equal(alone[i].ground, shared[i].ground,
+                            mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
         robot_sim_destroy(own);
         free(alone[i].ground);
         free(shared[i].ground);
@@ -308,7 +319,8 @@ static void test_clearance_and_distances(void **unused) {
     RobotState state = robot_stand_state(robot, 0, 0.0);
     robot_sim_load(sim, &state, &nominal);
     /* shank box: 0.32 below the knee axis of a shank leaning 0.24 rad, plus its corner */
-    double ankle = 0.055, expected = ankle + 0.37 * cos(0.24) - (0.32 * cos(0.24) + 0.025 * sin(0.24));
+    double ankle = 0.055,
+           expected = ankle + 0.37 * cos(0.24) - (0.32 * cos(0.24) + 0.025 * sin(0.24));
     assert_true(fabs(robot_sim_body_clearance(sim, &terrain) - expected) < 1e-9);
     assert_true(fabs(robot_sim_foot_distance(sim) - 2 * (0.07513 + 0.0055)) < 3e-4);
     assert_true(fabs(robot_sim_knee_distance(sim) - 2 * 0.07506) < 1e-4);
@@ -328,9 +340,11 @@ static void test_bench(void **unused) {
     RobotBench bench = {0};
     MildError error = {0};
     assert_int_equal(robot_bench_step(robot, "foam60", 0.0025, 3, 20, &bench, &error), MILD_OK);
-    assert_true(bench.engine_free > 0 && bench.engine_rigid > 0 && bench.rigid > 0 && bench.newton > 0);
+    assert_true(bench.engine_free > 0 && bench.engine_rigid > 0 && bench.rigid > 0 &&
+                bench.newton > 0);
     assert_true(bench.gauss_seidel > 0 && bench.newton_phases.ground > 0 && bench.iterations >= 1);
-    assert_int_not_equal(robot_bench_step(robot, "no_such_ground", 0.0025, 3, 20, &bench, &error), MILD_OK);
+    assert_int_not_equal(robot_bench_step(robot, "no_such_ground", 0.0025, 3, 20, &bench, &error),
+                         MILD_OK);
     assert_non_null(strstr(error.text, "no_such_ground"));
 }
 

@@ -1,4 +1,5 @@
-/* The task: determinism over thread counts, mirror, observation by hand, rewards alive, bad numbers contained. */
+/* The task: determinism over thread counts, mirror, observation by hand, rewards alive, bad numbers
+ * contained. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -52,7 +53,8 @@ static uint64_t rollout(int threads, int envs, int steps, MildModel model, VecSt
     assert_non_null(vec);
     float *history = calloc((size_t)envs * TASK_HISTORY, sizeof *history);
     float *critic = calloc((size_t)envs * TASK_CRITIC, sizeof *critic);
-    float *action = calloc((size_t)envs * TASK_ACTIONS, sizeof *action), *reward = calloc((size_t)envs, sizeof *reward);
+    float *action = calloc((size_t)envs * TASK_ACTIONS, sizeof *action),
+          *reward = calloc((size_t)envs, sizeof *reward);
     uint8_t *flags = calloc((size_t)envs, 3);
     VecView view = {history, critic, NULL, NULL};
     vec_reset(vec, &view);
@@ -83,8 +85,8 @@ static void same_numbers_whatever_the_thread_count(void **state) {
     (void)state;
     VecStats stats;
     uint64_t one = rollout(1, ENVS, STEPS, MILD_MODEL_MILD, &stats);
-    printf("hash of %d robots x %d steps: %016llx; %d episodes, %d falls, %d diverged\n", ENVS, STEPS,
-           (unsigned long long)one, stats.episodes, stats.falls, stats.diverged);
+    printf("hash of %d robots x %d steps: %016llx; %d episodes, %d falls, %d diverged\n", ENVS,
+           STEPS, (unsigned long long)one, stats.episodes, stats.falls, stats.diverged);
     assert_true(stats.falls > 0);
     assert_int_equal(stats.diverged, 0);
     for (int threads = 2; threads <= 3; threads++) {
@@ -98,8 +100,8 @@ static void every_ground_model_is_trained_on(void **state) {
     for (int model = 0; model < MILD_MODELS; model++) {
         VecStats stats;
         rollout(2, 12, 100, (MildModel)model, &stats);
-        printf("%-12s %3d episodes, mean %.2f s, %d diverged\n", mild_model_names[model], stats.episodes, stats.length,
-               stats.diverged);
+        printf("%-12s %3d episodes, mean %.2f s, %d diverged\n", mild_model_names[model],
+               stats.episodes, stats.length, stats.diverged);
         assert_int_equal(stats.diverged, 0);
     }
 }
@@ -122,7 +124,8 @@ typedef struct {
     TaskDef def;
     TaskEnv *env;
     RobotSim *sim;
-    float history[TASK_HISTORY], critic[TASK_CRITIC], estimate[TASK_ESTIMATES], frame[TASK_OBSERVATION];
+    float history[TASK_HISTORY], critic[TASK_CRITIC], estimate[TASK_ESTIMATES],
+        frame[TASK_OBSERVATION];
     TaskView view;
 } Bench;
 
@@ -150,7 +153,8 @@ static void bench_end(Bench *b) {
     free(b->env);
 }
 
-/* Mirrored start and mirrored actions give the mirrored observation: mirror table and robot agree. */
+/* Mirrored start and mirrored actions give the mirrored observation: mirror table and robot agree.
+ */
 static void mirrored_motion_is_the_mirror_image(void **state) {
     (void)state;
     Bench a, b;
@@ -168,7 +172,8 @@ static void mirrored_motion_is_the_mirror_image(void **state) {
         task_env_step(a.env, &a.def, robot, a.sim, action, 0, &a.view, NULL);
         task_env_step(b.env, &b.def, robot, b.sim, mirrored, 0, &b.view, NULL);
         for (int i = 0; i < TASK_OBSERVATION; i++) {
-            float image = task_mirror_observation_sign[i] * a.frame[task_mirror_observation_index[i]];
+            float image =
+                task_mirror_observation_sign[i] * a.frame[task_mirror_observation_index[i]];
             worst = fmax(worst, (double)fabsf(image - b.frame[i]));
         }
     }
@@ -185,12 +190,13 @@ static void observation_by_hand(void **state) {
     float action[TASK_ACTIONS] = {0};
     action[3] = 0.25f;
     task_env_step(b.env, &b.def, robot, b.sim, action, 0, &b.view, NULL);
-    const double *qpos = robot_sim_qpos(b.sim), *qvel = robot_sim_qvel(b.sim), *pose = robot_default_pose(robot);
+    const double *qpos = robot_sim_qpos(b.sim), *qvel = robot_sim_qvel(b.sim),
+                 *pose = robot_default_pose(robot);
     double phase = b.env->phase;
     for (int i = 0; i < 3; i++) {
         assert_float_equal(b.frame[i], qvel[3 + i], 1e-6);
     }
-    assert_float_equal(b.frame[3], 1.0, 1e-6); /* 2 x 0.5 m/s */
+    assert_float_equal(b.frame[3], 1.0, 1e-6);  /* 2 x 0.5 m/s */
     assert_float_equal(b.frame[8], -1.0, 0.01); /* gravity points down in the base frame */
     for (int i = 0; i < ROBOT_JOINTS; i++) {
         assert_float_equal(b.frame[9 + i], (qpos[7 + i] - pose[i]), 1e-6);
@@ -200,7 +206,8 @@ static void observation_by_hand(void **state) {
     assert_float_equal(b.frame[45], sin(6.283185307179586 * phase), 1e-6);
     assert_float_equal(b.frame[46], cos(6.283185307179586 * phase), 1e-6);
     assert_memory_equal(b.history + TASK_HISTORY - TASK_OBSERVATION, b.frame, sizeof b.frame);
-    assert_memory_equal(b.critic, b.frame, sizeof b.frame); /* no noise: what the critic sees is what the actor sees */
+    assert_memory_equal(b.critic, b.frame,
+                        sizeof b.frame); /* no noise: what the critic sees is what the actor sees */
     bench_end(&b);
 }
 

@@ -1,5 +1,5 @@
-/* Robots on one map: results independent of thread count, state without pointers that continues bit for bit, heights of start,
- * feet and base above the ground under them. */
+/* Robots on one map: results independent of thread count, state without pointers that continues bit
+ * for bit, heights of start, feet and base above the ground under them. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -29,7 +29,9 @@ static int setup(void **state) {
     def.border = 0.1;
     map = mild_map_create(&def, &error);
     robot = map ? robot_create(MILD_SOURCE_DIR "/models/sa01/sa01.xml", &error) : NULL;
-    if (!robot) fprintf(stderr, "%s\n", error.text);
+    if (!robot) {
+        fprintf(stderr, "%s\n", error.text);
+    }
     return robot == NULL;
 }
 
@@ -75,7 +77,8 @@ static void run_steps(Run *run, int steps) {
             Random r = random_at(5, (uint32_t)i, (uint32_t)run->step);
             run->action[i] = (float)(0.5 * random_normal(&r));
         }
-        vec_step(run->vec, run->action, run->reward, run->flags, run->flags + ENVS, run->flags + 2 * ENVS, &none);
+        vec_step(run->vec, run->action, run->reward, run->flags, run->flags + ENVS,
+                 run->flags + 2 * ENVS, &none);
     }
 }
 
@@ -101,7 +104,8 @@ static void test_threads(void **state) {
     assert_true(hash[0] == hash[1] && hash[1] == hash[2]);
 }
 
-/* Saved half way, loaded into robots of another history: the rest is the same. No address is among the bytes. */
+/* Saved half way, loaded into robots of another history: the rest is the same. No address is among
+ * the bytes. */
 static void test_save(void **state) {
     (void)state;
     Run a, b;
@@ -111,7 +115,9 @@ static void test_save(void **state) {
     void *block = vec_state(a.vec, &bytes);
     char *saved = malloc(bytes);
     memcpy(saved, block, bytes);
-    for (size_t at = 0; at + sizeof map <= bytes; at += sizeof(int32_t)) assert_memory_not_equal(saved + at, &map, sizeof map);
+    for (size_t at = 0; at + sizeof map <= bytes; at += sizeof(int32_t)) {
+        assert_memory_not_equal(saved + at, &map, sizeof map);
+    }
     run_steps(&a, STEPS / 2);
     run_open(&b, 2);
     run_steps(&b, STEPS / 2);
@@ -126,7 +132,8 @@ static void test_save(void **state) {
     run_close(&b);
 }
 
-/* Wherever a robot starts, its lowest sole point begins as deep as on level ground; nobody stands in the air or falls through. */
+/* Wherever a robot starts, its lowest sole point begins as deep as on level ground; nobody stands
+ * in the air or falls through. */
 static void test_start(void **state) {
     (void)state;
     TaskDef def = task_on_map();
@@ -142,20 +149,23 @@ static void test_start(void **state) {
         assert_null(env->terrain.map);
         MildTerrain terrain = env->terrain;
         terrain.map = map;
-        double clearance = robot_sim_sole_clearance(sim, &terrain), base = mild_terrain_height_at(&terrain, 0, 0);
+        double clearance = robot_sim_sole_clearance(sim, &terrain),
+               base = mild_terrain_height_at(&terrain, 0, 0);
         deepest = fmin(deepest, clearance);
         shallowest = fmin(shallowest, -clearance);
         apart = fmax(apart, fabs(robot_sim_qpos(sim)[2] - base - robot_stand_height(robot)));
         assert_true(terrain.material_count >= 2);
     }
-    printf("starts: lowest sole point %.1f to %.1f mm deep, base at most %.0f mm from its height on level ground\n",
+    printf("starts: lowest sole point %.1f to %.1f mm deep, base at most %.0f mm from its height "
+           "on level ground\n",
            1e3 * shallowest, -1e3 * deepest, 1e3 * apart);
     assert_true(deepest > -0.06 && shallowest > -0.003 && apart < 0.12);
     free(env);
     robot_sim_destroy(sim);
 }
 
-/* On rigid ground too: 2 mm above the map's highest point under a sole, and half a second later the feet are on it. */
+/* On rigid ground too: 2 mm above the map's highest point under a sole, and half a second later the
+ * feet are on it. */
 static void test_rigid(void **state) {
     (void)state;
     TaskDef def = task_on_map();
@@ -179,8 +189,9 @@ static void test_rigid(void **state) {
         deepest = fmin(deepest, clearance);
         highest = fmax(highest, clearance);
     }
-    printf("rigid starts: off by %.1e m; limp for half a second, lowest sole points %.1f to %.1f mm above the map\n", off,
-           1e3 * deepest, 1e3 * highest);
+    printf("rigid starts: off by %.1e m; limp for half a second, lowest sole points %.1f to %.1f "
+           "mm above the map\n",
+           off, 1e3 * deepest, 1e3 * highest);
     assert_true(off < 1e-9);
     assert_true(deepest > -0.02 && highest < 0.002);
     free(env);

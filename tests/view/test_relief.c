@@ -52,11 +52,13 @@ static double depth_at(double x, double y) {
     static float heights[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES];
     double edge = relief_tile_edge(relief), first[2], center[2];
     relief_tile_center(relief, 0, first);
-    int column = (int)floor((x - first[0]) / edge + 0.5), row = (int)floor((y - first[1]) / edge + 0.5);
+    int column = (int)floor((x - first[0]) / edge + 0.5),
+        row = (int)floor((y - first[1]) / edge + 0.5);
     int tile = row * relief_tile_columns(relief) + column;
     relief_tile_center(relief, tile, center);
     relief_tile_heights(relief, tile, RANGE, 1, heights);
-    int i = (int)lround((x - center[0] + 0.5 * edge) / CELL), j = (int)lround((y - center[1] + 0.5 * edge) / CELL);
+    int i = (int)lround((x - center[0] + 0.5 * edge) / CELL),
+        j = (int)lround((y - center[1] + 0.5 * edge) / CELL);
     return RANGE * (1.0 - (double)heights[j * RELIEF_TILE_VERTICES + i]);
 }
 
@@ -74,9 +76,10 @@ static double print_after_lift(const char *material) {
 
 static void recovery_by_material(void **state) {
     (void)state;
-    double foam = print_after_lift("foam45"), sand = print_after_lift("sand_loose"), grass = print_after_lift("grass");
-    print_message("print left of %.0f mm: foam45 %.1f, grass %.1f, sand_loose %.1f mm\n", 1e3 * DEPTH, 1e3 * foam,
-                  1e3 * grass, 1e3 * sand);
+    double foam = print_after_lift("foam45"), sand = print_after_lift("sand_loose"),
+           grass = print_after_lift("grass");
+    print_message("print left of %.0f mm: foam45 %.1f, grass %.1f, sand_loose %.1f mm\n",
+                  1e3 * DEPTH, 1e3 * foam, 1e3 * grass, 1e3 * sand);
     assert_true(foam < 1e-6);
     assert_true(fabs(sand - DEPTH) < 0.002);
     assert_true(fabs(grass - 0.5 * DEPTH) < 0.002);
@@ -103,7 +106,8 @@ static void tiles_agree_on_their_edge(void **state) {
     assert_true(relief_tile_take_dirty(relief, 1));
     assert_false(relief_tile_take_dirty(relief, 0));
     assert_false(relief_tile_touched(relief, 2));
-    static float a[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES], b[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES];
+    static float a[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES],
+        b[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES];
     relief_tile_heights(relief, 0, RANGE, 1, a);
     relief_tile_heights(relief, 1, RANGE, 1, b);
     int low = 0;
@@ -125,7 +129,8 @@ static void pressed_ground_is_darker(void **state) {
     relief_tile_pixels(relief, tile, before);
     press(center[0] - 0.06, center[1], DEPTH);
     relief_tile_pixels(relief, tile, after);
-    size_t middle = 3 * (RELIEF_TILE_PIXELS / 2 * RELIEF_TILE_PIXELS + RELIEF_TILE_PIXELS / 2), corner = 0;
+    size_t middle = 3 * (RELIEF_TILE_PIXELS / 2 * RELIEF_TILE_PIXELS + RELIEF_TILE_PIXELS / 2),
+           corner = 0;
     assert_true(after[middle] < before[middle]);
     assert_int_equal(after[corner], before[corner]);
     destroy();
@@ -140,7 +145,8 @@ static void rigid_ground_never_yields(void **state) {
     destroy();
 }
 
-/* On uneven ground heights are those of the map, and a print lies as deep below it as on level ground. */
+/* On uneven ground heights are those of the map, and a print lies as deep below it as on level
+ * ground. */
 static void prints_follow_the_map(void **state) {
     (void)state;
     MildError error = {0};
@@ -155,22 +161,29 @@ static void prints_follow_the_map(void **state) {
     terrain.map = map;
     relief_destroy(relief);
     relief = relief_create(&area, &terrain, soles, 1, &error);
-    assert_true(relief_is_uneven(relief) && relief_low(relief) < -0.045 && relief_high(relief) > 0.045);
+    assert_true(relief_is_uneven(relief) && relief_low(relief) < -0.045 &&
+                relief_high(relief) > 0.045);
     static float heights[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES];
-    double edge = relief_tile_edge(relief), center[2], worst = 0, range = relief_high(relief) - relief_low(relief) + RANGE;
+    double edge = relief_tile_edge(relief), center[2], worst = 0,
+           range = relief_high(relief) - relief_low(relief) + RANGE;
     press(0.05, 0.0, DEPTH);
     for (int tile = 0; tile < relief_tile_columns(relief) * relief_tile_rows(relief); tile++) {
         relief_tile_center(relief, tile, center);
         relief_tile_heights(relief, tile, RANGE, 1, heights);
-        for (int j = 0; j < RELIEF_TILE_VERTICES; j += 4)
+        for (int j = 0; j < RELIEF_TILE_VERTICES; j += 4) {
             for (int i = 0; i < RELIEF_TILE_VERTICES; i += 4) {
                 double x = center[0] - 0.5 * edge + CELL * i, y = center[1] - 0.5 * edge + CELL * j;
-                double z = relief_low(relief) - RANGE + range * (double)heights[j * RELIEF_TILE_VERTICES + i];
+                double z = relief_low(relief) - RANGE +
+                           range * (double)heights[j * RELIEF_TILE_VERTICES + i];
                 double wanted = mild_terrain_height_at(&terrain, x, y);
-                if (x > -0.01 && x < 0.24 && fabs(y) < 0.045) wanted = fmin(wanted, -DEPTH);
-                else if (x > -0.05 && x < 0.28 && fabs(y) < 0.075) continue; /* beside the sole's edge */
+                if (x > -0.01 && x < 0.24 && fabs(y) < 0.045) {
+                    wanted = fmin(wanted, -DEPTH);
+                } else if (x > -0.05 && x < 0.28 && fabs(y) < 0.075) {
+                    continue; /* beside the sole's edge */
+                }
                 worst = fmax(worst, fabs(z - wanted));
             }
+        }
     }
     print_message("drawn heights on waves: off by %.2f mm\n", 1e3 * worst);
     assert_true(worst < 2.5e-3);
@@ -180,9 +193,12 @@ static void prints_follow_the_map(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(recovery_by_material),      cmocka_unit_test(print_stays_when_the_foot_walks_on),
-        cmocka_unit_test(tiles_agree_on_their_edge), cmocka_unit_test(pressed_ground_is_darker),
-        cmocka_unit_test(rigid_ground_never_yields), cmocka_unit_test(prints_follow_the_map),
+        cmocka_unit_test(recovery_by_material),
+        cmocka_unit_test(print_stays_when_the_foot_walks_on),
+        cmocka_unit_test(tiles_agree_on_their_edge),
+        cmocka_unit_test(pressed_ground_is_darker),
+        cmocka_unit_test(rigid_ground_never_yields),
+        cmocka_unit_test(prints_follow_the_map),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
-/* The video file: whole under its name with the right number of frames, or one clear line and no file. */
+/* The video file: whole under its name with the right number of frames, or one clear line and no
+ * file. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -41,7 +42,9 @@ static void paint(unsigned char *rgb, int frame) {
 static int counted_frames(const char *path) {
     char command[256], line[64] = "";
     snprintf(command, sizeof command,
-             "ffprobe -v error -count_frames -show_entries stream=nb_read_frames,width,height -of csv=p=0 %s", path);
+             "ffprobe -v error -count_frames -show_entries stream=nb_read_frames,width,height -of "
+             "csv=p=0 %s",
+             path);
     FILE *pipe = popen(command, "r");
     assert_non_null(pipe);
     char *got = fgets(line, sizeof line, pipe);
@@ -62,7 +65,9 @@ static void whole_file_under_its_name(void **state) {
     snprintf(path, sizeof path, "%s/walk.mp4", folder);
     snprintf(part, sizeof part, "%s.part", path);
     Video *video = video_open(path, WIDTH, HEIGHT, 25, &error);
-    if (!video) fail_msg("%s", error.text);
+    if (!video) {
+        fail_msg("%s", error.text);
+    }
     for (int i = 0; i < FRAMES; i++) {
         paint(rgb, i);
         assert_int_equal(video_frame(video, rgb, &error), MILD_OK);
@@ -105,7 +110,9 @@ static void failing_ffmpeg_is_one_line(void **state) {
     Video *video = video_open(path, WIDTH, HEIGHT, 25, &error);
     assert_non_null(video);
     MildStatus status = MILD_OK;
-    for (int i = 0; i < 500 && status == MILD_OK; i++) status = video_frame(video, rgb, &error);
+    for (int i = 0; i < 500 && status == MILD_OK; i++) {
+        status = video_frame(video, rgb, &error);
+    }
     assert_int_equal(video_close(video, &error), MILD_ERROR_IO);
     assert_non_null(strstr(error.text, "nowhere"));
     assert_null(strchr(error.text, '\n'));

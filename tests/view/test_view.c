@@ -31,11 +31,13 @@ static int setup(void **state) {
     assert_true(mild_material_preset("sand_loose", &sand));
     terrain = mild_terrain_uniform(&sand);
     robot = robot_create(MODEL, &error);
-    if (!robot) fail_msg("%s", error.text);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
     sim = robot_sim_create(robot, DT, &error);
     assert_non_null(sim);
-    ground = mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), ROBOT_FEET)), robot_soles(robot),
-                              ROBOT_FEET);
+    ground = mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), ROBOT_FEET)),
+                              robot_soles(robot), ROBOT_FEET);
     return 0;
 }
 
@@ -72,11 +74,14 @@ static View *small_view(MildError *error) {
 
 static int pixels_different(const unsigned char *a, const unsigned char *b, size_t count) {
     int different = 0;
-    for (size_t i = 0; i < count; i++) different += abs((int)a[i] - (int)b[i]) > 12;
+    for (size_t i = 0; i < count; i++) {
+        different += abs((int)a[i] - (int)b[i]) > 12;
+    }
     return different;
 }
 
-/* The robot lands in sand and is taken away: the picture must show it, and then the prints that it left. */
+/* The robot lands in sand and is taken away: the picture must show it, and then the prints that it
+ * left. */
 static void robot_and_prints_are_seen(void **state) {
     (void)state;
     const size_t bytes = (size_t)240 * 136 * 3;
@@ -95,7 +100,9 @@ static void robot_and_prints_are_seen(void **state) {
     load_at(0.01);
     for (int i = 0; i < 250; i++) {
         step();
-        if (i % 5 == 0) view_observe(view, sim);
+        if (i % 5 == 0) {
+            view_observe(view, sim);
+        }
     }
     view_frame(view, sim, &info);
     memcpy(standing, view_pixels(view), bytes);
@@ -104,8 +111,8 @@ static void robot_and_prints_are_seen(void **state) {
     view_frame(view, sim, &info);
     int robot_pixels = pixels_different(empty, standing, bytes),
         prints = pixels_different(empty, view_pixels(view), bytes);
-    print_message("%s: robot changes %d samples of %zu, its prints %d\n", view_backend(view), robot_pixels, bytes,
-                  prints);
+    print_message("%s: robot changes %d samples of %zu, its prints %d\n", view_backend(view),
+                  robot_pixels, bytes, prints);
     assert_true(robot_pixels > 1000);
     assert_true(prints > 20 && prints < robot_pixels);
     assert_int_equal(view_reset(view, &terrain, &error), MILD_OK);
@@ -143,8 +150,12 @@ static void pressure_carries_the_weight(void **state) {
         pressure_observe(pressure, sim, &terrain);
         double now = 0;
         const double *normal = mild_scratch_elements(robot_sim_scratch(sim), 0).normal;
-        for (int e = 0; e < mild_sole_elements(robot_soles(robot)[0]); e++) now += normal[e];
-        if (now >= 20) force += now, samples++;
+        for (int e = 0; e < mild_sole_elements(robot_soles(robot)[0]); e++) {
+            now += normal[e];
+        }
+        if (now >= 20) {
+            force += now, samples++;
+        }
     }
     assert_int_equal(pressure_stances(pressure, 0), 0); /* still standing */
     load_at(0.3);
@@ -163,7 +174,8 @@ static void pressure_carries_the_weight(void **state) {
     while (fgets(line, sizeof line, file)) {
         int index;
         double x, y, mean, peak;
-        if (sscanf(line, "sand_loose,left,element,%d,%lf,%lf,%lf,%lf", &index, &x, &y, &mean, &peak) == 5) {
+        if (sscanf(line, "sand_loose,left,element,%d,%lf,%lf,%lf,%lf", &index, &x, &y, &mean,
+                   &peak) == 5) {
             assert_true(peak >= mean - 1e-3);
             sum += 1e3 * mean * pitch * pitch;
             elements++;
@@ -172,7 +184,8 @@ static void pressure_carries_the_weight(void **state) {
     }
     fclose(file);
     unlink(path);
-    print_message("left foot: mean force %.2f N in the CSV, %.2f N in the steps\n", sum, force / samples);
+    print_message("left foot: mean force %.2f N in the CSV, %.2f N in the steps\n", sum,
+                  force / samples);
     assert_int_equal(elements, mild_sole_elements(robot_soles(robot)[0]));
     assert_int_equal(points, PRESSURE_PATH);
     assert_true(fabs(sum - force / samples) < 1e-3 * sum);

@@ -25,10 +25,13 @@ static inline cublasStatus_t cublasSetStream(cublasHandle_t handle, cudaStream_t
     return CUBLAS_STATUS_SUCCESS;
 }
 
-/* C = alpha op(A) op(B) + beta C by its definition, column-major: X(i, j) = x[i + j ldx]. C is not read where beta is 0. */
-static inline cublasStatus_t cublasSgemm(cublasHandle_t handle, cublasOperation_t op_a, cublasOperation_t op_b, int m,
-                                         int n, int k, const float *alpha, const float *a, int lda, const float *b,
-                                         int ldb, const float *beta, float *c, int ldc) {
+/* C = alpha op(A) op(B) + beta C by its definition, column-major: X(i, j) = x[i + j ldx]. C is not
+ * read where beta is 0. */
+static inline cublasStatus_t cublasSgemm(cublasHandle_t handle, cublasOperation_t op_a,
+                                         cublasOperation_t op_b, int m, int n, int k,
+                                         const float *alpha, const float *a, int lda,
+                                         const float *b, int ldb, const float *beta, float *c,
+                                         int ldc) {
     (void)handle;
     for (long j = 0; j < n; j++) {
         for (long i = 0; i < m; i++) {

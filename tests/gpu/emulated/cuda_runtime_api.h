@@ -1,6 +1,7 @@
-/* A stand-in for the CUDA runtime as far as src/gpu calls it: the device's memory is memory, and what is enqueued is done
- * at once. With it the layer runs on the processor, where the tests hold it against the learner; speed and what only a GPU
- * does (races between blocks, order of streams) it cannot show. */
+/* A stand-in for the CUDA runtime as far as src/gpu calls it: the device's memory is memory, and
+ * what is enqueued is done at once. With it the layer runs on the processor, where the tests hold
+ * it against the learner; speed and what only a GPU does (races between blocks, order of streams)
+ * it cannot show. */
 #ifndef MILD_EMULATED_CUDA_H
 #define MILD_EMULATED_CUDA_H
 
@@ -21,7 +22,8 @@ struct cudaDeviceProp {
     int major, minor;
 };
 
-extern int emulated_failure; /* > 0: so many waits succeed, then one reports failure and so do all after it */
+extern int emulated_failure; /* > 0: so many waits succeed, then one reports failure and so do all
+                                after it */
 
 static inline const char *cudaGetErrorString(cudaError_t code) {
     return code ? "out of memory" : "no error";
@@ -41,7 +43,9 @@ static inline cudaError_t cudaGetDeviceProperties(struct cudaDeviceProp *propert
 }
 static inline cudaError_t cudaMalloc(void **memory, size_t bytes) {
     *memory = malloc(bytes);
-    if (*memory) memset(*memory, 0xff, bytes); /* NaN: what nobody wrote shows */
+    if (*memory) {
+        memset(*memory, 0xff, bytes); /* NaN: what nobody wrote shows */
+    }
     return *memory ? cudaSuccess : cudaErrorMemoryAllocation;
 }
 static inline cudaError_t cudaFree(void *memory) {
@@ -67,10 +71,13 @@ static inline cudaError_t cudaStreamDestroy(cudaStream_t stream) {
 }
 static inline cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
     (void)stream;
-    if (emulated_failure > 1) emulated_failure--;
+    if (emulated_failure > 1) {
+        emulated_failure--;
+    }
     return emulated_failure == 1 ? cudaErrorMemoryAllocation : cudaSuccess;
 }
-static inline cudaError_t cudaMemcpyAsync(void *to, const void *from, size_t bytes, int kind, cudaStream_t stream) {
+static inline cudaError_t cudaMemcpyAsync(void *to, const void *from, size_t bytes, int kind,
+                                          cudaStream_t stream) {
     (void)kind, (void)stream;
     memcpy(to, from, bytes);
     return cudaSuccess;

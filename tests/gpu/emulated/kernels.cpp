@@ -1,4 +1,5 @@
-/* The kernels on the processor: the threads of a block are coroutines that take turns at every __syncthreads. */
+/* The kernels on the processor: the threads of a block are coroutines that take turns at every
+ * __syncthreads. */
 #include <setjmp.h>
 #include <ucontext.h>
 
@@ -28,7 +29,9 @@ size_t running;
 std::function<void()> body;
 
 void fiber_yield() {
-    if (!_setjmp(fibers[running].resume)) _longjmp(scheduler, 1);
+    if (!_setjmp(fibers[running].resume)) {
+        _longjmp(scheduler, 1);
+    }
 }
 
 void fiber_main() {
@@ -53,21 +56,29 @@ void fiber_resume(size_t i) {
     Fiber &fiber = fibers[i];
     running = i;
     threadIdx = fiber.thread;
-    if (_setjmp(scheduler)) return;
-    if (fiber.started) _longjmp(fiber.resume, 1);
+    if (_setjmp(scheduler)) {
+        return;
+    }
+    if (fiber.started) {
+        _longjmp(fiber.resume, 1);
+    }
     fiber_start(fiber);
 }
 
 void run_block(dim3 size) {
     const size_t count = size.x * size.y;
-    if (fibers.size() < count) fibers.resize(count); /* once: every block has as many threads */
+    if (fibers.size() < count) {
+        fibers.resize(count); /* once: every block has as many threads */
+    }
     for (size_t i = 0; i < count; i++) {
         fibers[i].finished = false;
         fibers[i].thread = uint3{unsigned(i % size.x), unsigned(i / size.x), 0};
     }
     for (size_t left = count; left > 0;) {
         for (size_t i = 0; i < count; i++) {
-            if (fibers[i].finished) continue;
+            if (fibers[i].finished) {
+                continue;
+            }
             fiber_resume(i);
             left -= fibers[i].finished;
         }
@@ -93,6 +104,7 @@ void __syncthreads() {
 #define __global__
 #define __device__
 #define __shared__ static
-#define LAUNCH(kernel, grid, block, stream, ...) ((void)(stream), launch(grid, block, [&] { kernel(__VA_ARGS__); }))
+#define LAUNCH(kernel, grid, block, stream, ...)                                                   \
+    ((void)(stream), launch(grid, block, [&] { kernel(__VA_ARGS__); }))
 
 #include "gpu/kernels.cu"
