@@ -45,7 +45,7 @@ if ! cmp -s scripts/requirements.txt .venv/requirements.installed; then
     echo "setup: preparing .venv ($(paste -sd' ' scripts/requirements.txt))"
     python=/usr/bin/python3
     [ -x "$python" ] || python=python3
-    [ -x .venv/bin/python ] || "$python" -m venv .venv
+    "$python" -m venv --clear .venv # from nothing: two MuJoCo wheels side by side would be ambiguous
     .venv/bin/python -m pip install --quiet --disable-pip-version-check -r scripts/requirements.txt
     cp scripts/requirements.txt .venv/requirements.installed
 fi

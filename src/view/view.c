@@ -84,7 +84,7 @@ ViewDef view_def_default(void) {
 /* ---- the model for drawing: the robot's own file plus tiles of ground ---- */
 
 static void add_material(mjSpec *spec, const char *name, double repeat, int uniform) {
-    mjsTexture *texture = mjs_addTexture(spec);
+    mjsTexture *texture = mjs_addTexture(spec, NULL);
     mjs_setName(texture->element, name);
     texture->type = mjTEXTURE_2D;
     texture->builtin = mjBUILTIN_FLAT;

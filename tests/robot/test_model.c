@@ -337,7 +337,7 @@ static void test_mass_matrix(void **unused) {
         const mjModel *m = robot_sim_model(sim);
         mjData *d = robot_sim_data(sim);
         mj_makeM(m, d);
-        mj_fullM(m, engine, d->qM);
+        mj_fullM(m, d, engine);
         for (int i = 0; i < ROBOT_NV * ROBOT_NV; i++) {
             worst = fmax(worst, fabs(engine[i] - expected[i]));
         }

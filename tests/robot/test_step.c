@@ -114,7 +114,7 @@ static void test_map_against_dense(void **unused) {
         mj_factorM(m, d);
         foot_map_inverse_inertia(sim);
         double mass[ROBOT_NV * ROBOT_NV], j[ROWS * ROBOT_NV], solved[ROWS * ROBOT_NV];
-        mj_fullM(m, mass, d->qM);
+        mj_fullM(m, d, mass);
         dense_jacobian(sim, j);
         memcpy(solved, j, sizeof solved);
         for (int r = 0; r < ROWS; r++) {
