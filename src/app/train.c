@@ -38,7 +38,7 @@ static VecView view_of(const PpoBatch *batch, int t, const ExperimentDef *def) {
         .history = batch->history + row * (size_t)(def->policy.frames * def->policy.observation),
         .critic = batch->critic + row * (size_t)def->policy.critic_input,
         .estimate = batch->target + row * (size_t)def->policy.estimates,
-        .frame = batch->clean + row * (size_t)def->policy.observation,
+        .frame = batch->frame + row * (size_t)def->policy.observation,
     };
 }
 

@@ -284,11 +284,11 @@ void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums)
 }
 
 static __global__ void reconstruction(int rows, int width, float weight, const float *decoded,
-                                      const float *clean, float *d, double *sums) {
+                                      const float *target, float *d, double *sums) {
     const int64_t r = item();
     float sum = 0.0f;
     for (int64_t i = r * width; r < rows && i < (r + 1) * width; i++) {
-        float gap = decoded[i] - clean[i];
+        float gap = decoded[i] - target[i];
         sum += gap * gap;
         d[i] = weight * gap;
     }
@@ -297,8 +297,8 @@ static __global__ void reconstruction(int rows, int width, float weight, const f
 }
 
 void gpu_reconstruction(cudaStream_t stream, int rows, int width, float weight,
-                        const float *decoded, const float *clean, float *d, double *sums) {
-    LAUNCH(reconstruction, blocks_of(rows), line, stream, rows, width, weight, decoded, clean, d,
+                        const float *decoded, const float *target, float *d, double *sums) {
+    LAUNCH(reconstruction, blocks_of(rows), line, stream, rows, width, weight, decoded, target, d,
            sums);
 }
 

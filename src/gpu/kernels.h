@@ -82,7 +82,7 @@ typedef struct {
 void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums);
 
 void gpu_reconstruction(cudaStream_t stream, int rows, int width, float weight,
-                        const float *decoded, const float *clean, float *d, double *sums);
+                        const float *decoded, const float *target, float *d, double *sums);
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
                              const float *theta, const float *d_input, float *d_heads,
                              float *d_theta);

@@ -74,7 +74,7 @@ static size_t layout(GpuLearner *g, char *block) {
         {&g->batch.history, samples * (size_t)n->history},
         {&g->batch.critic, more * (size_t)n->def.critic_input},
         {&g->batch.target, samples * (size_t)n->def.estimates},
-        {&g->batch.clean, samples * (size_t)n->def.observation},
+        {&g->batch.frame, samples * (size_t)n->def.observation},
         {&g->batch.action, samples * (size_t)n->def.actions},
         {&g->batch.mean, samples * (size_t)n->def.actions},
         {&g->batch.log_prob, samples},
@@ -210,7 +210,7 @@ static void upload_batch(GpuLearner *g) {
         {b->critic, host->critic, more, def->critic_input},
         {b->history, host->history, samples, g->widths.history},
         {b->target, host->target, samples, def->estimates},
-        {b->clean, host->clean, samples, def->observation},
+        {b->frame, host->frame, samples, def->observation},
         {b->action, host->action, samples, def->actions},
         {b->mean, host->mean, samples, def->actions},
         {b->log_prob, host->log_prob, samples, 1},
@@ -262,7 +262,7 @@ static void gather(GpuLearner *g, const ChunkJob *job) {
     } areas[] = {
         {c->history, b->history, g->widths.history},
         {c->estimate, b->target, def->estimates},
-        {c->clean, b->clean, def->observation},
+        {c->decoder_target, b->frame, def->observation},
         {c->action, b->action, def->actions},
         {c->old_mean, b->mean, def->actions},
         {c->old_log_prob, b->log_prob, 1},
@@ -341,8 +341,8 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
 
     action_losses(g, job, mean);
     gpu_reconstruction(q->stream, rows, n->def.observation,
-                       2.0f * epsilon / (float)n->def.observation, decoded, c->clean, c->d_decoded,
-                       g->sums);
+                       2.0f * epsilon / (float)n->def.observation, decoded, c->decoder_target,
+                       c->d_decoded, g->sums);
 
     gpu_mlp_backward(q, &n->decoder, g->parameters, rows, c->decoder_input, n->decoder_input,
                      &c->decoder, c->d_decoded, c->work, g->gradient, beta,

@@ -22,7 +22,7 @@ size_t loss_carve(const Network *network, int rows, int mirrored, float *block, 
     } areas[] = {
         {&chunk->history, all * (size_t)network->history},
         {&chunk->estimate, n * (size_t)def->estimates},
-        {&chunk->clean, n * (size_t)def->observation},
+        {&chunk->decoder_target, n * (size_t)def->observation},
         {&chunk->noise, n * (size_t)def->latent},
         {&chunk->action, n * (size_t)def->actions},
         {&chunk->old_mean, n * (size_t)def->actions},
@@ -191,13 +191,13 @@ static void reconstruction_loss(const LossContext *c, LossChunk *chunk, const fl
                                 LossSums *sums) {
     const int width = c->network->def.observation;
     const float weight = 2.0f * (float)c->def->epsilon * c->sample_weight / (float)width;
-    const float *clean = chunk->clean;
+    const float *target = chunk->decoder_target;
     float *d = chunk->d_decoded;
-    for (int r = 0; r < chunk->rows; r++, decoded += width, clean += width, d += width) {
+    for (int r = 0; r < chunk->rows; r++, decoded += width, target += width, d += width) {
         float sum = 0.0f;
 #pragma omp simd reduction(+ : sum)
         for (int j = 0; j < width; j++) {
-            float gap = decoded[j] - clean[j];
+            float gap = decoded[j] - target[j];
             sum += gap * gap;
             d[j] = weight * gap;
         }

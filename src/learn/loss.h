@@ -40,9 +40,9 @@ typedef struct {
  * the first ones. */
 typedef struct {
     int rows, mirrored;
-    float *history;          /* [rows + mirrored][history] */
-    float *estimate, *clean; /* targets [rows][estimates], [rows][observation] */
-    float *noise;            /* [rows][latent] standard normal, for the sampled z */
+    float *history;                   /* [rows + mirrored][history] */
+    float *estimate, *decoder_target; /* targets [rows][estimates], [rows][observation] */
+    float *noise;                     /* [rows][latent] standard normal, for the sampled z */
     float *action, *old_mean, *old_log_prob, *advantage; /* [rows][actions] twice, [rows] twice */
     float *critic, *old_value, *returns;                 /* [rows][critic_input], [rows] twice */
     NetworkOutputs outputs;

@@ -25,6 +25,7 @@ PpoDef ppo_def_default(void) {
         .kl_target = 0.01,
         .max_gradient_norm = 1.0,
         .epsilon = 0.3,
+        .decoder_target = PPO_TARGET_NEXT,
         .kl_weight = 0.001,
         .mirror_weight = 1.0,
         .mirror_share = 0.5,
@@ -33,6 +34,8 @@ PpoDef ppo_def_default(void) {
         .std_max = {10.0, 10.0},
     };
 }
+
+static const char *const target_names[PPO_TARGETS] = {"newest", "next"};
 
 const MildField ppo_fields[] = {
     MILD_FIELD(PpoDef, steps, MILD_FIELD_INT, 1, 1, 1024, "[-] rollout length per environment"),
@@ -58,6 +61,8 @@ const MildField ppo_fields[] = {
                "[-] the gradient is shortened to this norm"),
     MILD_FIELD(PpoDef, epsilon, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
                "[-] share of the regression loss in the joint loss"),
+    MILD_FIELD_CHOICE(PpoDef, decoder_target, target_names, PPO_TARGETS,
+                      "[-] frame that the decoder rebuilds: the newest or the next"),
     MILD_FIELD(PpoDef, kl_weight, MILD_FIELD_DOUBLE, 1, 0.0, 10.0,
                "[-] weight of the latent's divergence from N(0, I)"),
     MILD_FIELD(PpoDef, mirror_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
@@ -89,7 +94,7 @@ static size_t batch_layout(PpoBatch *b, const Network *n, char *block) {
         {&b->history, more * (size_t)n->history},
         {&b->critic, more * (size_t)n->def.critic_input},
         {&b->target, more * (size_t)n->def.estimates},
-        {&b->clean, more * (size_t)n->def.observation},
+        {&b->frame, more * (size_t)n->def.observation},
         {&b->action, samples * (size_t)n->def.actions},
         {&b->mean, samples * (size_t)n->def.actions},
         {&b->log_prob, samples},
@@ -476,10 +481,29 @@ static void carry_over(Ppo *ppo) {
     } areas[] = {{b->history, n->history},
                  {b->critic, n->def.critic_input},
                  {b->target, n->def.estimates},
-                 {b->clean, n->def.observation}};
+                 {b->frame, n->def.observation}};
     for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
         size_t floats = (size_t)b->envs * (size_t)areas[i].width;
         memcpy(areas[i].at, areas[i].at + (size_t)b->steps * floats, floats * sizeof(float));
+    }
+}
+
+/* Makes each frame of the piece's environments the one that follows it; the last of an episode, and
+ * one whose successor is not valid, stays. */
+static void shift_piece(void *context, int piece, int thread) {
+    (void)thread;
+    const Ppo *ppo = context;
+    const PpoBatch *b = &ppo->batch;
+    const int width = policy_def(ppo->policy)->observation;
+    const int first = ppo_piece_begin(b->envs, piece), end = ppo_piece_begin(b->envs, piece + 1);
+    for (int t = 0; t < b->steps; t++) {
+        for (int env = first; env < end; env++) {
+            const int64_t now = (int64_t)t * b->envs + env, next = now + b->envs;
+            if (!b->done[now] && (t + 1 == b->steps || b->valid[next])) {
+                memcpy(b->frame + now * width, b->frame + next * width,
+                       (size_t)width * sizeof *b->frame);
+            }
+        }
     }
 }
 
@@ -487,6 +511,9 @@ void ppo_update(Ppo *ppo, PpoReport *report) {
     const Network *n = &ppo->policy->network;
     PpoBatch *b = &ppo->batch;
     *report = (PpoReport){0};
+    if (ppo->def.decoder_target == PPO_TARGET_NEXT) {
+        pool_run(ppo->pool, PPO_PIECES, shift_piece, ppo);
+    }
     if (ppo->backend.values) {
         ppo->backend.values(ppo->backend.self, &ppo->error);
     } else {

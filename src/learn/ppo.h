@@ -6,6 +6,11 @@
 
 #include "learn/policy.h"
 
+/* Frame that the decoder rebuilds from z and the estimates: the newest one of the history, which
+ * the actor has anyway, or the one that follows it, which makes z predict how the ground answers.
+ * An episode's last frame has no successor and rebuilds itself. */
+typedef enum { PPO_TARGET_NEWEST, PPO_TARGET_NEXT, PPO_TARGETS } PpoTarget;
+
 typedef struct {
     int steps;       /* rollout length per environment, 24 */
     int epochs;      /* 4 */
@@ -18,8 +23,9 @@ typedef struct {
     double learning_rate, learning_rate_min, learning_rate_max;
     double kl_target; /* 0: fixed learning rate */
     double max_gradient_norm;
-    double epsilon;   /* 0.3: share of loss_reg in the joint loss (eq 16) */
-    double kl_weight; /* phi of the VAE's KL term */
+    double epsilon;     /* 0.3: share of loss_reg in the joint loss (eq 16) */
+    int decoder_target; /* a PpoTarget */
+    double kl_weight;   /* phi of the VAE's KL term */
     double mirror_weight;
     double mirror_share;  /* share of each minibatch on which the mirror loss is evaluated */
     double std_min;       /* floor of the action noise */
@@ -45,13 +51,13 @@ typedef struct {
 /* The rollout: the environments write straight into these arrays, time-major [t][env][...]. */
 typedef struct {
     int steps, envs;
-    float *history; /* [steps+1][envs][frames*observation] */
-    float *critic;  /* [steps+1][envs][critic_input] */
-    float *target;  /* [steps+1][envs][estimates] true estimates for the regression heads */
-    float *clean;  /* not used by PPO beyond the decoder target: [steps+1][envs][observation] newest
-                      frame */
-    float *action; /* [steps][envs][actions] sampled */
-    float *mean;   /* [steps][envs][actions] */
+    float *history;   /* [steps+1][envs][frames*observation] */
+    float *critic;    /* [steps+1][envs][critic_input] */
+    float *target;    /* [steps+1][envs][estimates] true estimates for the regression heads */
+    float *frame;     /* [steps+1][envs][observation] newest frame, as the policy saw it; the update
+                      turns rows 0 .. steps-1 into what the decoder is to rebuild */
+    float *action;    /* [steps][envs][actions] sampled */
+    float *mean;      /* [steps][envs][actions] */
     float *log_prob;  /* [steps][envs] */
     float *reward;    /* [steps][envs] */
     uint8_t *done;    /* [steps][envs] episode ended at this step (failure or time-out) */

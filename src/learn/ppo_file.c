@@ -38,7 +38,7 @@ static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const
     tensors[count++] =
         tensor_of("train.target", SAFETENSORS_F32, b->target, envs * n->def.estimates);
     tensors[count++] =
-        tensor_of("train.clean", SAFETENSORS_F32, b->clean, envs * n->def.observation);
+        tensor_of("train.frame", SAFETENSORS_F32, b->frame, envs * n->def.observation);
     if (ppo->average) {
         tensors[count++] =
             tensor_of("train.average", SAFETENSORS_F32, policy_parameters(ppo->average), n->count);
@@ -145,7 +145,7 @@ static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters
         {"train.history", ppo->batch.history},
         {"train.critic", ppo->batch.critic},
         {"train.target", ppo->batch.target},
-        {"train.clean", ppo->batch.clean},
+        {"train.frame", ppo->batch.frame},
         {"train.average", ppo->average ? policy_parameters(ppo->average) : NULL},
         {"train.extra", extra},
     };

@@ -67,7 +67,7 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
         int64_t i = job->samples[at + r];
         copy_row(chunk->history, r, b->history, i, n->history);
         copy_row(chunk->estimate, r, b->target, i, n->def.estimates);
-        copy_row(chunk->clean, r, b->clean, i, n->def.observation);
+        copy_row(chunk->decoder_target, r, b->frame, i, n->def.observation);
         copy_row(chunk->action, r, b->action, i, n->def.actions);
         copy_row(chunk->old_mean, r, b->mean, i, n->def.actions);
         chunk->old_log_prob[r] = b->log_prob[i];

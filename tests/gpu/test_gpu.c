@@ -72,7 +72,7 @@ static void fill_both(Learner *a, Learner *b, uint64_t seed) {
     fill_normal(x->history, more * n->history, 1.0, &random);
     fill_normal(x->critic, more * n->def.critic_input, 1.0, &random);
     fill_normal(x->target, more * n->def.estimates, 1.0, &random);
-    fill_normal(x->clean, more * n->def.observation, 1.0, &random);
+    fill_normal(x->frame, more * n->def.observation, 1.0, &random);
     fill_normal(x->reward, samples, 1.0, &random);
     for (int64_t i = 0; i < samples; i++) {
         x->done[i] = random_unit(&random) < 0.02;

@@ -108,7 +108,7 @@ static void take_inputs(const Safetensors *file, Case *c) {
     LossChunk *chunk = &c->chunk;
     take_input(file, "history", chunk->history);
     take_input(file, "estimate", chunk->estimate);
-    take_input(file, "clean", chunk->clean);
+    take_input(file, "clean", chunk->decoder_target);
     take_input(file, "noise", chunk->noise);
     take_input(file, "action", chunk->action);
     take_input(file, "old_mean", chunk->old_mean);
@@ -217,8 +217,8 @@ static double regression_double(const Case *c, const double *p, const double *he
     memcpy(input + d->latent, heads, (size_t)d->estimates * sizeof *input);
     mlp_double(&n->decoder, p, input, decoded);
     for (int j = 0; j < d->observation; j++) {
-        loss +=
-            pow(decoded[j] - (double)c->chunk.clean[r * d->observation + j], 2) / d->observation;
+        loss += pow(decoded[j] - (double)c->chunk.decoder_target[r * d->observation + j], 2) /
+                d->observation;
     }
     for (int g = 0; g < 3; g++) {
         for (int j = ends[g]; j < ends[g + 1]; j++) {
@@ -286,7 +286,7 @@ static void fill_inputs(Case *c, Random *random) {
     fill_normal(c->parameters, c->network.count, 0.35, random);
     fill_normal(k->history, ROWS * c->network.history, 1.0, random);
     fill_normal(k->estimate, ROWS * d->estimates, 1.0, random);
-    fill_normal(k->clean, ROWS * d->observation, 1.0, random);
+    fill_normal(k->decoder_target, ROWS * d->observation, 1.0, random);
     fill_normal(k->noise, ROWS * d->latent, 1.0, random);
     fill_normal(k->action, ROWS * d->actions, 1.0, random);
     fill_normal(k->old_mean, ROWS * d->actions, 1.0, random);

@@ -166,7 +166,7 @@ static void test_invalid_samples_have_no_weight(void **state) {
             batch->reward[i] = batch->log_prob[i] = junk[k];
             batch->history[i * TOY_FRAMES * TOY_OBSERVATION] = junk[k];
             batch->action[2 * i] = batch->mean[2 * i] = batch->target[4 * i] =
-                batch->clean[i * TOY_OBSERVATION] = junk[k];
+                batch->frame[i * TOY_OBSERVATION] = junk[k];
         }
         ppo_update(runs[k]->ppo, &report[k]);
         assert_int_equal(report[k].skipped, 0);
@@ -175,6 +175,37 @@ static void test_invalid_samples_have_no_weight(void **state) {
     assert_memory_equal(&report[0], &report[1], sizeof *report);
     run_close(&a);
     run_close(&b);
+}
+
+/* Each target is the frame one step later, but an episode's last frame stands for itself. */
+static void test_decoder_target_is_the_next_frame(void **state) {
+    (void)state;
+    enum { ENVS = 16, STEPS = 40, FLOATS = ENVS * TOY_OBSERVATION };
+    for (int target = 0; target < PPO_TARGETS; target++) {
+        Run run;
+        PpoDef def = toy_ppo_def();
+        def.decoder_target = target;
+        run_open(&run, 2, ENVS, def);
+        toy_rollout(&run.toy, run.ppo);
+        PpoBatch *b = ppo_batch(run.ppo);
+        b->done[5 * ENVS + 3] = 1;
+        b->valid[9 * ENVS + 7] = 0;
+        static float before[(STEPS + 1) * FLOATS];
+        memcpy(before, b->frame, sizeof before);
+        PpoReport report;
+        ppo_update(run.ppo, &report);
+        int moved = 0;
+        for (int i = ENVS; i < STEPS * ENVS; i++) { /* the update carried row 0 over */
+            int stays = target == PPO_TARGET_NEWEST || b->done[i] || i == 8 * ENVS + 7;
+            const float *expected = before + (i + (stays ? 0 : ENVS)) * TOY_OBSERVATION;
+            assert_memory_equal(b->frame + i * TOY_OBSERVATION, expected,
+                                TOY_OBSERVATION * sizeof *expected);
+            moved += !stays;
+        }
+        assert_true(target == PPO_TARGET_NEWEST ? moved == 0 : moved > 500);
+        assert_memory_equal(b->frame, before + STEPS * FLOATS, FLOATS * sizeof *before);
+        run_close(&run);
+    }
 }
 
 static void test_nothing_valid_changes_nothing(void **state) {
@@ -249,6 +280,7 @@ int main(void) {
         cmocka_unit_test(test_resume_is_as_if_never_stopped),
         cmocka_unit_test(test_another_run_is_refused),
         cmocka_unit_test(test_bad_numbers_are_dropped),
+        cmocka_unit_test(test_decoder_target_is_the_next_frame),
         cmocka_unit_test(test_invalid_samples_have_no_weight),
         cmocka_unit_test(test_nothing_valid_changes_nothing),
         cmocka_unit_test(test_learns_the_toy_task),

@@ -68,7 +68,7 @@ static inline void toy_observe(ToyEnv *env, PpoBatch *b, int t, int e) {
     for (int i = 0; i < TOY_OBSERVATION; i++) {
         env->frames[(TOY_FRAMES - 1) * TOY_OBSERVATION + i] = (float)now[i];
         b->critic[row * 6 + i] = (float)now[i];
-        b->clean[row * TOY_OBSERVATION + i] = (float)now[i];
+        b->frame[row * TOY_OBSERVATION + i] = (float)now[i];
     }
     memcpy(b->history + row * TOY_FRAMES * TOY_OBSERVATION, env->frames, sizeof env->frames);
     for (int i = 0; i < 4; i++) {
