@@ -2,12 +2,13 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "app/bench.h"
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/report.h"
-#include "app/text.h"
+#include "base/text.h"
+#include "bench/bench.h"
+#include "config/experiment_keys.h"
 
 /* memory comes first: its peak is that of the whole process so far. */
 static const struct {

@@ -7,12 +7,12 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/figure.h"
-#include "app/fit_csv.h"
 #include "app/grounds.h"
-#include "app/paths.h"
-#include "app/press.h"
 #include "app/report.h"
-#include "app/text.h"
+#include "base/paths.h"
+#include "base/text.h"
+#include "lab/fit_csv.h"
+#include "lab/press.h"
 
 typedef struct {
     const char *ground, *json, *figure;
@@ -105,7 +105,7 @@ static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitDe
     if (status != MILD_OK) {
         return status;
     }
-    ConfigSection section = grounds_section(&def->material);
+    ConfigSection section = ground_section(&def->material);
     status = config_overrides(&section, 1, args->overrides, args->override_count, error);
     if (status == MILD_OK) {
         status = names_read(&options->fit, def, error);

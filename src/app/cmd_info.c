@@ -7,9 +7,9 @@
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
-#include "app/experiment.h"
 #include "app/grounds.h"
-#include "app/text.h"
+#include "base/text.h"
+#include "config/experiment_keys.h"
 #include "gpu/learner.h"
 
 /* Where the numbers of a preset come from; docs/ has the details. */

@@ -7,13 +7,13 @@
 
 #include "app/cli.h"
 #include "app/commands.h"
-#include "app/config.h"
-#include "app/experiment.h"
 #include "app/figure.h"
 #include "app/grounds.h"
-#include "app/paths.h"
 #include "app/play.h"
 #include "app/progress.h"
+#include "base/paths.h"
+#include "config/config.h"
+#include "config/experiment_keys.h"
 
 #define GRAVITY 9.81
 #define AREA_MARGIN 2.0   /* [m] ground drawn beyond the walk */

@@ -7,9 +7,9 @@
 #include "app/commands.h"
 #include "app/figure.h"
 #include "app/grounds.h"
-#include "app/paths.h"
-#include "app/press.h"
-#include "app/text.h"
+#include "base/paths.h"
+#include "base/text.h"
+#include "lab/press.h"
 #include "robot/robot.h"
 
 /* NaN: not given. */

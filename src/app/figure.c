@@ -6,7 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "app/paths.h"
+#include "base/paths.h"
 
 extern char **environ;
 

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "app/text.h"
+#include "base/text.h"
 
 enum { NAMES_MAX = 32 };
 
@@ -65,12 +65,8 @@ GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, Terra
                         terrain};
 }
 
-ConfigSection grounds_section(MildMaterial *material) {
-    return (ConfigSection){"ground", mild_material_fields, mild_material_field_count, material};
-}
-
 static MildStatus overlay(const GroundsDef *def, MildMaterial *material, MildError *error) {
-    ConfigSection sections[3] = {grounds_section(material)};
+    ConfigSection sections[3] = {ground_section(material)};
     int count = 1;
     if (def->task) {
         sections[count++] = (ConfigSection){"task", task_fields, task_field_count, def->task};

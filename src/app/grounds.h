@@ -3,18 +3,15 @@
 #define MILD_GROUNDS_H
 
 #include "app/cli.h"
-#include "app/config.h"
-#include "app/terrain.h"
+#include "config/experiment_keys.h"
 #include "eval/scene.h"
 #include "robot/robot.h"
 #include "task/task_def.h"
+#include "task/terrain.h"
 
 /* The preset's material; an unknown name fails with the nearest known one. `rigid` is no material:
  * it fails unless *rigid is given, which it sets. */
 MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, MildError *error);
-
-/* Section [ground] bound to `material`: --ground.k_pen=500. */
-ConfigSection grounds_section(MildMaterial *material);
 
 /* The model that --model NAME (NULL: not given) or --ground.model=NAME asks for; mild without
  * either. */

@@ -6,7 +6,7 @@
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
-#include "app/text.h"
+#include "base/text.h"
 
 #ifndef MILD_VIEW
 int cmd_play(int argc, char **argv) {

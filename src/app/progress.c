@@ -9,8 +9,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "app/text.h"
 #include "base/clock.h"
+#include "base/text.h"
 
 static const double terminal_interval = 0.1, file_interval = 10.0; /* [s] */
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "app/paths.h"
+#include "base/paths.h"
 
 MildStatus report_save(cJSON *root, const char *path, MildError *error) {
     char *text = root ? cJSON_Print(root) : NULL;

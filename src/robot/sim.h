@@ -2,8 +2,8 @@
 #ifndef ROBOT_SIM_H
 #define ROBOT_SIM_H
 
-#include "robot/bench.h"
 #include "robot/description.h"
+#include "robot/phases.h"
 
 #define ROBOT_LANES 8      /* six twist components, padded to one vector register */
 #define ROBOT_FOOT_DOFS 12 /* base six, then the leg's six: the only ones that move a foot */

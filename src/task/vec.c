@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "robot/bench.h"
+#include "robot/phases.h"
 
 struct Vec {
     TaskDef def;

@@ -1,7 +1,6 @@
 /* Any text as a config file, and as an override. It may fail, never crash, and what it accepts must
  * print and read back to the same values. */
-#include "app/experiment.h"
-#include "app/grounds.h"
+#include "config/experiment_keys.h"
 #include "fuzz.h"
 
 enum { SECTIONS = EXPERIMENT_SECTIONS + 1 };
@@ -16,7 +15,7 @@ static void target_init(Target *target) {
     target->experiment = experiment_def_default();
     target->material = mild_material_default();
     experiment_sections(&target->experiment, target->sections);
-    target->sections[EXPERIMENT_SECTIONS] = grounds_section(&target->material);
+    target->sections[EXPERIMENT_SECTIONS] = ground_section(&target->material);
 }
 
 static void check_round_trip(const Target *first, int comments) {

@@ -2,8 +2,8 @@
  * times longer than a file) fitted to finite values inside their bounds. */
 #include <stdio.h>
 
-#include "app/fit_csv.h"
 #include "fuzz.h"
+#include "lab/fit_csv.h"
 
 static void fit(const FitPoint *points, int count) {
     FitDef def = {.material = mild_material_default(),

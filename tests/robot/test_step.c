@@ -334,20 +334,6 @@ static void test_clearance_and_distances(void **unused) {
     robot_sim_destroy(sim);
 }
 
-/* The benchmark runs and reports positive times; how long they are is not a test's business. */
-static void test_bench(void **unused) {
-    (void)unused;
-    RobotBench bench = {0};
-    MildError error = {0};
-    assert_int_equal(robot_bench_step(robot, "foam60", 0.0025, 3, 20, &bench, &error), MILD_OK);
-    assert_true(bench.engine_free > 0 && bench.engine_rigid > 0 && bench.rigid > 0 &&
-                bench.newton > 0);
-    assert_true(bench.gauss_seidel > 0 && bench.newton_phases.ground > 0 && bench.iterations >= 1);
-    assert_int_not_equal(robot_bench_step(robot, "no_such_ground", 0.0025, 3, 20, &bench, &error),
-                         MILD_OK);
-    assert_non_null(strstr(error.text, "no_such_ground"));
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rigid_is_the_engine),
@@ -357,7 +343,6 @@ int main(void) {
         cmocka_unit_test(test_determinism),
         cmocka_unit_test(test_bad_numbers),
         cmocka_unit_test(test_clearance_and_distances),
-        cmocka_unit_test(test_bench),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -1,0 +1,105 @@
+#include "base/text.h"
+
+#include <errno.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NAME_MAX_LENGTH = 63 };
+
+static int smallest(int a, int b, int c) {
+    int least = a < b ? a : b;
+    return least < c ? least : c;
+}
+
+int text_distance(const char *a, const char *b) {
+    int row[NAME_MAX_LENGTH + 1];
+    int length_b = (int)strnlen(b, NAME_MAX_LENGTH);
+    for (int j = 0; j <= length_b; j++) {
+        row[j] = j;
+    }
+    for (int i = 1; i <= NAME_MAX_LENGTH && a[i - 1]; i++) {
+        int diagonal = row[0];
+        row[0] = i;
+        for (int j = 1; j <= length_b; j++) {
+            int above = row[j];
+            row[j] = smallest(above + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1]));
+            diagonal = above;
+        }
+    }
+    return row[length_b];
+}
+
+const char *text_nearest(const char *name, const char *const *names, int count) {
+    const char *best = NULL;
+    int best_distance = INT_MAX;
+    for (int i = 0; i < count; i++) {
+        int distance = text_distance(name, names[i]);
+        if (distance < best_distance) {
+            best_distance = distance;
+            best = names[i];
+        }
+    }
+    return best;
+}
+
+int text_double(const char *text, double *value) {
+    char *end;
+    errno = 0;
+    double number = strtod(text, &end);
+    if (end == text || *end || errno || !isfinite(number)) {
+        return 0;
+    }
+    *value = number;
+    return 1;
+}
+
+int text_int(const char *text, int *value) {
+    char *end;
+    errno = 0;
+    long number = strtol(text, &end, 10);
+    if (end == text || *end || errno || number < INT_MIN || number > INT_MAX) {
+        return 0;
+    }
+    *value = (int)number;
+    return 1;
+}
+
+int text_uint64(const char *text, uint64_t *value) {
+    char *end;
+    errno = 0;
+    if (text[0] < '0' || text[0] > '9') {
+        return 0; /* strtoull would take a minus sign */
+    }
+    unsigned long long number = strtoull(text, &end, 10);
+    if (*end || errno) {
+        return 0;
+    }
+    *value = number;
+    return 1;
+}
+
+const char *text_bytes(double bytes, char *text, size_t size) {
+    static const char *const units[] = {"B", "KiB", "MiB", "GiB", "TiB"};
+    int unit = 0;
+    while (bytes >= 1024 && unit < 4) {
+        bytes /= 1024;
+        unit++;
+    }
+    snprintf(text, size, unit ? "%.2f %s" : "%.0f %s", bytes, units[unit]);
+    return text;
+}
+
+const char *text_duration(double seconds, char *text, size_t size) {
+    long whole = seconds > 0 && seconds < 1e9 ? (long)(seconds + 0.5) : 0;
+    if (whole >= 3600) {
+        snprintf(text, size, "%ld h %02ld min", whole / 3600, whole / 60 % 60);
+    } else if (whole >= 60) {
+        snprintf(text, size, "%ld min %02ld s", whole / 60, whole % 60);
+    } else {
+        snprintf(text, size, "%ld s", whole);
+    }
+    return text;
+}

@@ -1,0 +1,23 @@
+/* Small text tools of the program: the nearest valid name, numbers from text, lists. */
+#ifndef BASE_TEXT_H
+#define BASE_TEXT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* Levenshtein distance between two names; names beyond 63 characters count as cut there. */
+int text_distance(const char *a, const char *b);
+
+/* The name among names[0..count) with the smallest distance to `name`; NULL when count is 0. */
+const char *text_nearest(const char *name, const char *const *names, int count);
+
+/* The whole of `text` as a finite number or an integer; returns 0 when it is not one. */
+int text_double(const char *text, double *value);
+int text_int(const char *text, int *value);
+int text_uint64(const char *text, uint64_t *value);
+
+/* Bytes as "1.23 GiB" and a duration as "1 h 02 min", "4 min 05 s" or "12 s"; return `text`. */
+const char *text_bytes(double bytes, char *text, size_t size);
+const char *text_duration(double seconds, char *text, size_t size);
+
+#endif

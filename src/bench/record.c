@@ -1,0 +1,116 @@
+#include "bench/record.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/paths.h"
+#include "control/controller.h"
+#include "eval/eval.h"
+
+static const double walk_speed = 0.6,
+                    walk_settle = 1.0; /* [m/s] commanded, [s] before the record begins */
+
+Robot *bench_robot(MildError *error) {
+    char path[PATH_SIZE];
+    return robot_create(path_data("models/sa01/sa01.xml", path), error);
+}
+
+/* A robot that walks. */
+typedef struct {
+    TaskDef def;
+    const Robot *robot;
+    Pool *pool;
+    Controller controller;
+    RobotSim *sim;
+    TaskEnv *env;
+    ReplayPeriod *period; /* where the torques go; NULL: nowhere */
+    int step;             /* of the period */
+} Walk;
+
+static void record_torque(void *context, const TaskEnv *env, const RobotSim *sim,
+                          const double *torque) {
+    Walk *walk = context;
+    (void)env;
+    (void)sim;
+    if (walk->period) {
+        memcpy(walk->period->torque[walk->step++], torque, sizeof walk->period->torque[0]);
+    }
+}
+
+static int walk_step(Walk *walk, ReplayPeriod *period) {
+    float action[TASK_ACTIONS];
+    TaskView none = {0};
+    TaskProbe probe = {record_torque, walk};
+    if (period) {
+        MildGround *ground = task_env_ground(walk->env);
+        period->state = walk->env->robot;
+        memcpy(period->ground, ground, mild_ground_size(ground));
+    }
+    walk->period = period;
+    walk->step = 0;
+    walk->controller.act(walk->controller.self, 1, &walk->env, action);
+    TaskStep step =
+        task_env_step(walk->env, &walk->def, walk->robot, walk->sim, action, 0, &none, &probe);
+    eval_command(walk->env, walk_speed);
+    return !step.done;
+}
+
+static MildStatus walk_open(Walk *walk, MildError *error) {
+    char path[PATH_SIZE];
+    walk->pool = pool_create(1);
+    walk->sim = robot_sim_create(walk->robot, walk->def.physics_dt, error);
+    walk->env = aligned_alloc(64, task_env_bytes(&walk->def, walk->robot));
+    if (!walk->pool || !walk->sim || !walk->env) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    }
+    return controller_learned(path_data("policies/mild.safetensors", path), walk->pool, 1,
+                              &walk->controller, error);
+}
+
+static void walk_close(Walk *walk) {
+    controller_destroy(&walk->controller);
+    robot_sim_destroy(walk->sim);
+    free(walk->env);
+    pool_destroy(walk->pool);
+}
+
+static MildStatus walk_record(Walk *walk, const Scene *scene, Replay *replay, MildError *error) {
+    const uint64_t seed = 1;
+    TaskView none = {0};
+    task_env_init(walk->env, &walk->def, walk->robot, seed, 0);
+    eval_command(walk->env, walk_speed);
+    task_env_reset_on(walk->env, &walk->def, walk->robot, walk->sim, &scene->terrain, scene->rigid,
+                      &none);
+    replay->variation = walk->env->variation;
+    replay->terrain = walk->env->terrain;
+    int settle = (int)(walk_settle / TASK_PERIOD), upright = 1;
+    for (int i = -settle; i < replay->periods && upright; i++) {
+        upright = walk_step(walk, i < 0 ? NULL : &replay->period[i]);
+    }
+    return upright ? MILD_OK
+                   : mild_fail(error, MILD_ERROR_RANGE, "bench: the shipped policy fell on %s",
+                               scene->name);
+}
+
+Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
+                          int periods, MildError *error) {
+    Walk walk = {.def = def->task, .robot = robot};
+    Scene scene;
+    task_def_make_nominal(&walk.def);
+    walk.def.episode = walk_settle + (periods + 1) * TASK_PERIOD;
+    int steps = (int)(TASK_PERIOD / walk.def.physics_dt + 0.5);
+    Replay *replay = replay_create(robot, periods, steps, walk.def.physics_dt, error);
+    MildStatus status = replay ? scene_make(&scene, ground, 1.0, error) : error->status;
+    if (status == MILD_OK) {
+        status = walk_open(&walk, error);
+    }
+    if (status == MILD_OK) {
+        status = walk_record(&walk, &scene, replay, error);
+    }
+    walk_close(&walk);
+    if (status == MILD_OK) {
+        return replay;
+    }
+    replay_destroy(replay);
+    return NULL;
+}

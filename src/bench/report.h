@@ -1,0 +1,21 @@
+/* What a bench measured: rows that the command prints and saves. */
+#ifndef BENCH_REPORT_H
+#define BENCH_REPORT_H
+
+enum { BENCH_ROWS_MAX = 128 };
+
+typedef struct {
+    const char *bench, *unit;
+    char name[40]; /* the case */
+    double value;
+} BenchRow;
+
+typedef struct {
+    BenchRow rows[BENCH_ROWS_MAX];
+    int count;
+} BenchReport;
+
+void bench_add(BenchReport *report, const char *bench, const char *name, double value,
+               const char *unit);
+
+#endif

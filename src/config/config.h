@@ -1,0 +1,41 @@
+/* Text becomes structs: ini files and --section.key=value overrides, bound to Def structs through
+ * their field tables. Later sources win: struct defaults < default.ini < overlay file < overrides.
+ * A bad line stops with file, line, the key and the nearest valid name; what earlier lines set
+ * stays set, so callers give up on the first error. */
+#ifndef CONFIG_CONFIG_H
+#define CONFIG_CONFIG_H
+
+#include <stdio.h>
+
+#include "mild/error.h"
+#include "mild/field.h"
+
+/* One section of a config: the keys are the fields of `def`. Names are unique. */
+typedef struct {
+    const char *name;
+    const MildField *fields;
+    int count;
+    void *def;
+} ConfigSection;
+
+/* Whole ini text; `name` stands for the file in messages. complete: every key of every section must
+ * be present. */
+MildStatus config_read_text(const ConfigSection *sections, int count, const char *text,
+                            const char *name, int complete, MildError *error);
+/* As above from a file of at most 1 MiB. */
+MildStatus config_read(const ConfigSection *sections, int count, const char *path, int complete,
+                       MildError *error);
+
+/* One override: "section.key=value" (without the leading dashes). */
+MildStatus config_override(const ConfigSection *sections, int count, const char *text,
+                           MildError *error);
+MildStatus config_overrides(const ConfigSection *sections, int count, const char *const *texts,
+                            int text_count, MildError *error);
+
+/* A complete ini that reads back to the same values; comments: each key's help and range above it.
+ */
+void config_print(const ConfigSection *sections, int count, int comments, FILE *file);
+/* The same as text, to be freed by the caller; NULL when out of memory. */
+char *config_text(const ConfigSection *sections, int count, int comments);
+
+#endif

@@ -1,0 +1,27 @@
+/* The keys of a training run: sections [train] [ppo] [policy] [task] [reward] [randomize]
+ * [terrain]. */
+#ifndef CONFIG_EXPERIMENT_KEYS_H
+#define CONFIG_EXPERIMENT_KEYS_H
+
+#include "config/config.h"
+#include "mild/ground.h"
+#include "train/experiment.h"
+
+enum { EXPERIMENT_SECTIONS = 7 };
+
+/* The config sections of `def`, bound to it. */
+void experiment_sections(ExperimentDef *def, ConfigSection sections[EXPERIMENT_SECTIONS]);
+/* Sections that stand alone: [terrain], and [ground] of one material. */
+ConfigSection terrain_section(TerrainDef *def);
+ConfigSection ground_section(MildMaterial *material);
+
+/* configs/default.ini, then the overlay file (NULL: none), then overrides "section.key=value", then
+ * the check. */
+MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides,
+                           int override_count, MildError *error);
+
+/* The task for evaluation and play: of the config the policy was trained with (NULL: the defaults),
+ * made nominal. */
+MildStatus experiment_nominal_task(TaskDef *task, const char *config, MildError *error);
+
+#endif

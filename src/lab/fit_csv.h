@@ -1,0 +1,20 @@
+/* Force-depth records as CSV: a header line, then numbers. */
+#ifndef LAB_FIT_CSV_H
+#define LAB_FIT_CSV_H
+
+#include <stdio.h>
+
+#include "lab/fit.h"
+
+enum { FIT_CSV_ROWS_MAX = 1000000 };
+
+/* Appends the loading part of one record to *points [*count], which it enlarges; the caller frees
+ * it, also after an error. Columns by name, in any order: depth_m, force_n, and speed_m_s or time_s
+ * (else the speed counts as 0); other columns are not read. The message names file, line, column
+ * and remedy. */
+MildStatus fit_csv_read(const char *path, FitPoint **points, int *count, MildError *error);
+/* The same from an open file, which stays open; `name` stands for it in messages. */
+MildStatus fit_csv_read_file(FILE *file, const char *name, FitPoint **points, int *count,
+                             MildError *error);
+
+#endif

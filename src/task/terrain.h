@@ -1,0 +1,26 @@
+/* Section [terrain] of a config: the shape of the ground, the pattern of its materials, prints. */
+#ifndef TASK_TERRAIN_H
+#define TASK_TERRAIN_H
+
+#include "mild/field.h"
+#include "mild/map.h"
+
+typedef struct {
+    MildMapDef map;
+    char image[200], labels[200]; /* PNG files of kind = image and patches = image */
+    int memory;                   /* bool: prints stay */
+    int tiles;                    /* of prints, see mild_ground_bytes_prints */
+} TerrainDef;
+
+TerrainDef terrain_def_default(void);
+/* The keys of a TerrainDef, [*count]. */
+const MildField *terrain_fields(int *count);
+
+/* The map it describes for `materials` materials (a label image's black is the first of them, its
+ * white the last); *map is NULL for level ground without a pattern. Destroy it with
+ * mild_map_destroy. */
+MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, MildError *error);
+/* Tiles for mild_ground_bytes_prints; 0 without memory. */
+int terrain_print_tiles(const TerrainDef *def);
+
+#endif

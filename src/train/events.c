@@ -1,0 +1,142 @@
+#include "train/events.h"
+
+#include <string.h>
+
+/* Bytes of one event's head (wall time, step, length prefix) and of one scalar, at most. */
+enum { HEAD_BYTES = 40, SCALAR_BYTES = EVENTS_TAG_MAX + 20, PAYLOAD_MAX = 128 * SCALAR_BYTES };
+
+/* CRC-32C (Castagnoli), reflected polynomial 0x82f63b78, bit by bit: a row of the log is a few
+ * kilobytes. */
+uint32_t events_crc32c(const void *data, size_t size) {
+    const unsigned char *bytes = data;
+    uint32_t crc = 0xffffffffu;
+    for (size_t i = 0; i < size; i++) {
+        crc ^= bytes[i];
+        for (int bit = 0; bit < 8; bit++) {
+            crc = (crc >> 1) ^ (0x82f63b78u & (0u - (crc & 1u)));
+        }
+    }
+    return ~crc;
+}
+
+/* TFRecord's masked form, so that a CRC over data that holds CRCs stays a good one. */
+static uint32_t masked_crc(const void *data, size_t size) {
+    uint32_t crc = events_crc32c(data, size);
+    return ((crc >> 15) | (crc << 17)) + 0xa282ead8u;
+}
+
+/* ---- protobuf wire format: key = field number * 8 + type; 0 varint, 1 eight bytes, 2
+ * length-delimited, 5 four bytes ---- */
+enum { WIRE_VARINT = 0, WIRE_64 = 1, WIRE_BYTES = 2, WIRE_32 = 5 };
+
+typedef struct {
+    unsigned char *data;
+    size_t size;
+} Buffer;
+
+static void put_little_endian(Buffer *buffer, uint64_t value, int bytes) {
+    for (int i = 0; i < bytes; i++) {
+        buffer->data[buffer->size++] = (unsigned char)(value >> (8 * i));
+    }
+}
+
+static void put_varint(Buffer *buffer, uint64_t value) {
+    while (value >= 0x80) {
+        buffer->data[buffer->size++] = (unsigned char)(value | 0x80);
+        value >>= 7;
+    }
+    buffer->data[buffer->size++] = (unsigned char)value;
+}
+
+static void put_key(Buffer *buffer, int field, int wire) {
+    put_varint(buffer, (uint64_t)field * 8 + (uint64_t)wire);
+}
+
+static void put_double(Buffer *buffer, int field, double value) {
+    uint64_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    put_key(buffer, field, WIRE_64);
+    put_little_endian(buffer, bits, 8);
+}
+
+static void put_float(Buffer *buffer, int field, float value) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    put_key(buffer, field, WIRE_32);
+    put_little_endian(buffer, bits, 4);
+}
+
+static void put_bytes(Buffer *buffer, int field, const void *data, size_t size) {
+    put_key(buffer, field, WIRE_BYTES);
+    put_varint(buffer, size);
+    memcpy(buffer->data + buffer->size, data, size);
+    buffer->size += size;
+}
+
+static int write_record(FILE *file, const Buffer *record) {
+    unsigned char head[12], tail[4];
+    Buffer head_buffer = {head, 0}, tail_buffer = {tail, 0};
+    put_little_endian(&head_buffer, record->size, 8);
+    put_little_endian(&head_buffer, masked_crc(head, 8), 4);
+    put_little_endian(&tail_buffer, masked_crc(record->data, record->size), 4);
+    return fwrite(head, sizeof head, 1, file) == 1 &&
+                   fwrite(record->data, 1, record->size, file) == record->size &&
+                   fwrite(tail, sizeof tail, 1, file) == 1
+               ? 0
+               : -1;
+}
+
+/* Event: wall_time = 1 double, step = 2 int64, file_version = 3 string, summary = 5, session_log
+ * = 7. */
+static Buffer event_begin(unsigned char *data, double wall_time, int64_t step) {
+    Buffer event = {data, 0};
+    put_double(&event, 1, wall_time);
+    if (step) {
+        put_key(&event, 2, WIRE_VARINT);
+        put_varint(&event, (uint64_t)step);
+    }
+    return event;
+}
+
+int events_write_version(FILE *file, double wall_time) {
+    unsigned char data[HEAD_BYTES + 16];
+    Buffer event = event_begin(data, wall_time, 0);
+    put_bytes(&event, 3, "brain.Event:2", 13);
+    return write_record(file, &event);
+}
+
+int events_write_start(FILE *file, double wall_time, int64_t step) {
+    unsigned char data[HEAD_BYTES + 8];
+    Buffer event = event_begin(data, wall_time, step);
+    static const unsigned char session_start[] = {1 * 8 + WIRE_VARINT,
+                                                  1}; /* SessionLog.status = START */
+    put_bytes(&event, 7, session_start, sizeof session_start);
+    return write_record(file, &event);
+}
+
+int events_write_scalars(FILE *file, double wall_time, int64_t step, const char *const *tags,
+                         const double *values, int count) {
+    static _Thread_local unsigned char summary_data[PAYLOAD_MAX],
+        event_data[PAYLOAD_MAX + HEAD_BYTES];
+    while (count > 0) { /* a wide row becomes several events of the same step */
+        Buffer summary = {summary_data, 0};
+        int taken = 0;
+        for (; taken < count && summary.size + SCALAR_BYTES <= PAYLOAD_MAX; taken++) {
+            unsigned char value_data[SCALAR_BYTES];
+            Buffer value = {value_data,
+                            0}; /* Summary.Value: tag = 1 string, simple_value = 2 float */
+            put_bytes(&value, 1, tags[taken], strnlen(tags[taken], EVENTS_TAG_MAX));
+            put_float(&value, 2, (float)values[taken]);
+            put_bytes(&summary, 1, value.data, value.size);
+        }
+        Buffer event = event_begin(event_data, wall_time, step);
+        put_bytes(&event, 5, summary.data, summary.size);
+        if (write_record(file, &event) != 0) {
+            return -1;
+        }
+        tags += taken;
+        values += taken;
+        count -= taken;
+    }
+    return 0;
+}

@@ -1,0 +1,59 @@
+#include "train/experiment.h"
+
+#include <string.h>
+
+#include "task/task.h"
+
+ExperimentDef experiment_def_default(void) {
+    ExperimentDef def = {
+        .train = train_def_default(),
+        .ppo = ppo_def_default(),
+        .policy = policy_def_default(),
+        .task = task_def_default(),
+        .terrain = terrain_def_default(),
+    };
+    def.policy.observation = TASK_OBSERVATION;
+    def.policy.frames = TASK_FRAMES;
+    def.policy.critic_input = TASK_CRITIC;
+    def.policy.actions = TASK_ACTIONS;
+    def.policy.estimates = TASK_ESTIMATES;
+    return def;
+}
+
+MildStatus experiment_check(const ExperimentDef *def, MildError *error) {
+    MildStatus status =
+        mild_fields_check(train_fields, train_field_count, &def->train, "train", error);
+    if (status == MILD_OK) {
+        status = mild_fields_check(ppo_fields, ppo_field_count, &def->ppo, "ppo", error);
+    }
+    if (status == MILD_OK) {
+        status =
+            mild_fields_check(policy_fields, policy_field_count, &def->policy, "policy", error);
+    }
+    if (status == MILD_OK) {
+        status = task_def_check(&def->task, error);
+    }
+    if (status == MILD_OK) {
+        int count;
+        const MildField *fields = terrain_fields(&count);
+        status = mild_fields_check(fields, count, &def->terrain, "terrain", error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    if (def->ppo.learning_rate_min > def->ppo.learning_rate_max) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "ppo.learning_rate_min %g is above ppo.learning_rate_max %g",
+                         def->ppo.learning_rate_min, def->ppo.learning_rate_max);
+    }
+    if (strcmp(def->train.device, "cpu") != 0 && strcmp(def->train.device, "cuda") != 0) {
+        return mild_fail(error, MILD_ERROR_RANGE, "train.device = %s: neither cpu nor cuda",
+                         def->train.device);
+    }
+    if ((int64_t)def->train.envs * def->ppo.steps < def->ppo.minibatches) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "ppo.minibatches %d: train.envs %d x ppo.steps %d gives fewer samples",
+                         def->ppo.minibatches, def->train.envs, def->ppo.steps);
+    }
+    return MILD_OK;
+}

@@ -1,0 +1,24 @@
+/* Everything that defines a training run. */
+#ifndef TRAIN_EXPERIMENT_H
+#define TRAIN_EXPERIMENT_H
+
+#include "learn/ppo.h"
+#include "task/task_def.h"
+#include "task/terrain.h"
+#include "train/train_def.h"
+
+typedef struct {
+    TrainDef train;
+    PpoDef ppo;
+    PolicyDef policy;
+    TaskDef task;
+    TerrainDef terrain;
+} ExperimentDef;
+
+/* The defaults of every layer; the policy's widths are the task's. */
+ExperimentDef experiment_def_default(void);
+
+/* Every range, and what must fit together across keys. */
+MildStatus experiment_check(const ExperimentDef *def, MildError *error);
+
+#endif

@@ -1,0 +1,299 @@
+#include "train/run.h"
+
+#include <dirent.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/paths.h"
+#include "train/log.h"
+
+enum { COLUMNS_FIXED = 25, COLUMNS = COLUMNS_FIXED + TASK_REWARD_COUNT };
+
+struct TrainRun {
+    TrainRunDef def;
+    TrainWatch watch;
+    Trainer *trainer;
+    Log *log;
+    char column_text[COLUMNS][48];
+    const char *column[COLUMNS];
+    double start;  /* [s] of the loop */
+    int64_t first; /* iteration at its start */
+};
+
+static const char *const fixed_columns[COLUMNS_FIXED] = {
+    "episode/reward",      "episode/length_s",  "episode/speed_error", "episode/falls",
+    "episode/ended",       "episode/diverged",  "loss/surrogate",      "loss/value",
+    "loss/entropy",        "loss/kl",           "loss/clip_share",     "loss/mirror",
+    "loss/reconstruction", "loss/vae_kl",       "loss/base_velocity",  "loss/feet_velocity",
+    "loss/feet_height",    "ppo/learning_rate", "ppo/gradient",        "ppo/action_std",
+    "ppo/explained",       "ppo/skipped",       "rate/steps_per_s",    "rate/steps",
+    "episode/assist"};
+
+static void name_columns(TrainRun *run) {
+    for (int i = 0; i < COLUMNS; i++) {
+        if (i < COLUMNS_FIXED) {
+            snprintf(run->column_text[i], sizeof run->column_text[i], "%s", fixed_columns[i]);
+        } else {
+            snprintf(run->column_text[i], sizeof run->column_text[i], "reward/%s",
+                     task_reward_names[i - COLUMNS_FIXED]);
+        }
+        run->column[i] = run->column_text[i];
+    }
+}
+
+static void fill_row(const TrainRun *run, const TrainReport *r, double row[COLUMNS]) {
+    double per_iteration = (double)run->def.def->train.envs * run->def.def->ppo.steps;
+    const double fixed[COLUMNS_FIXED] = {r->episodes.reward,
+                                         r->episodes.length,
+                                         r->episodes.speed_error,
+                                         r->episodes.falls,
+                                         r->episodes.episodes,
+                                         r->episodes.diverged,
+                                         r->ppo.surrogate,
+                                         r->ppo.value_loss,
+                                         r->ppo.entropy,
+                                         r->ppo.kl,
+                                         r->ppo.clip_share,
+                                         r->ppo.mirror,
+                                         r->ppo.vae_reconstruction,
+                                         r->ppo.vae_kl,
+                                         r->ppo.estimate_loss[0],
+                                         r->ppo.estimate_loss[1],
+                                         r->ppo.estimate_loss[2],
+                                         r->ppo.learning_rate,
+                                         r->ppo.gradient_norm,
+                                         r->ppo.action_std,
+                                         r->ppo.explained_variance,
+                                         r->ppo.skipped,
+                                         r->steps_per_s,
+                                         per_iteration * (double)train_iteration(run->trainer),
+                                         r->episodes.assist};
+    memcpy(row, fixed, sizeof fixed);
+    memcpy(row + COLUMNS_FIXED, r->episodes.terms, sizeof r->episodes.terms);
+}
+
+/* ---- the run folder ---- */
+
+static int64_t checkpoint_number(const char *name) {
+    int64_t number;
+    int end = 0;
+    if (sscanf(name, "checkpoint_%9" SCNd64 ".safetensors%n", &number, &end) != 1 || end == 0 ||
+        name[end]) {
+        return -1;
+    }
+    return number;
+}
+
+static MildStatus checkpoint_path(const TrainRun *run, int64_t number, char path[PATH_SIZE],
+                                  MildError *error) {
+    char name[64];
+    snprintf(name, sizeof name, "checkpoint_%09" PRId64 ".safetensors", number);
+    return path_join(run->def.folder, name, path, error);
+}
+
+/* The newest checkpoint below `limit`, or -1; *count counts them all. */
+static int64_t newest_checkpoint(const char *folder, int64_t limit, int64_t *oldest, int *count) {
+    int64_t newest = -1;
+    *oldest = -1;
+    *count = 0;
+    DIR *dir = opendir(folder);
+    for (struct dirent *entry; dir && (entry = readdir(dir));) {
+        int64_t number = checkpoint_number(entry->d_name);
+        if (number < 0) {
+            continue;
+        }
+        ++*count;
+        newest = number < limit && number > newest ? number : newest;
+        *oldest = *oldest < 0 || number < *oldest ? number : *oldest;
+    }
+    if (dir) {
+        closedir(dir);
+    }
+    return newest;
+}
+
+static MildStatus save_checkpoint(TrainRun *run, MildError *error) {
+    char path[PATH_SIZE];
+    MildStatus status = checkpoint_path(run, train_iteration(run->trainer), path, error);
+    if (status == MILD_OK) {
+        status = train_save(run->trainer, path, run->def.note, error);
+    }
+    if (status == MILD_OK) {
+        status = path_join(run->def.folder, "policy.safetensors", path, error);
+    }
+    if (status == MILD_OK) {
+        status = policy_save(train_policy(run->trainer), path, run->def.note, error);
+    }
+    int64_t oldest;
+    int count;
+    newest_checkpoint(run->def.folder, INT64_MAX, &oldest, &count);
+    for (; status == MILD_OK && count > run->def.def->train.keep_checkpoints; count--) {
+        if (checkpoint_path(run, oldest, path, error) != MILD_OK || remove(path) != 0) {
+            break;
+        }
+        newest_checkpoint(run->def.folder, INT64_MAX, &oldest, &(int){0});
+    }
+    return status;
+}
+
+/* One text into a file of the folder. */
+static MildStatus write_text(const TrainRun *run, const char *name, const char *text,
+                             MildError *error) {
+    char path[PATH_SIZE];
+    MildStatus status = path_join(run->def.folder, name, path, error);
+    return status == MILD_OK ? path_write(path, text, strlen(text), error) : status;
+}
+
+static MildStatus write_config(const TrainRun *run, MildError *error) {
+    char version[1200];
+    snprintf(version, sizeof version, "%s\n%s\n", run->def.version, run->def.note);
+    MildStatus status = write_text(run, "config.ini", run->def.config, error);
+    return status == MILD_OK ? write_text(run, "version.txt", version, error) : status;
+}
+
+/* A checkpoint that does not load (killed machine, broken disk) is passed over for the one before
+ * it; one of another config is not: those before it are no better. */
+static MildStatus resume(TrainRun *run, MildError *error) {
+    const char *folder = run->def.folder;
+    int64_t oldest, number = newest_checkpoint(folder, INT64_MAX, &oldest, &(int){0});
+    for (;;) {
+        char path[PATH_SIZE];
+        MildStatus status = checkpoint_path(run, number, path, error);
+        if (status == MILD_OK) {
+            status = train_load(run->trainer, path, error);
+        }
+        if (status == MILD_OK && run->watch.resumed) {
+            run->watch.resumed(run->watch.self, path);
+        }
+        if (status == MILD_OK || status == MILD_ERROR_ARGUMENT) {
+            return status;
+        }
+        number = newest_checkpoint(folder, number, &oldest, &(int){0});
+        if (number < 0) {
+            return status;
+        }
+        if (run->watch.passed_over) {
+            run->watch.passed_over(run->watch.self, error->text);
+        }
+    }
+}
+
+MildStatus train_run_check_folder(const char *folder, int resume, MildError *error) {
+    int64_t oldest;
+    int count;
+    newest_checkpoint(folder, INT64_MAX, &oldest, &count);
+    if (!resume && count > 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "%s holds %d checkpoints: add --resume to go on, or choose another --out",
+                         folder, count);
+    }
+    if (resume && count == 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "%s: no checkpoint to resume from; drop --resume to start anew", folder);
+    }
+    return MILD_OK;
+}
+
+static MildStatus build(TrainRun *run, MildError *error) {
+    const char *folder = run->def.folder;
+    MildStatus status = train_run_check_folder(folder, run->def.resume, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    run->trainer = train_create(run->def.def, error);
+    if (!run->trainer) {
+        return error->status;
+    }
+    status = path_make_folder(folder, error);
+    if (status == MILD_OK && run->def.resume) {
+        status = resume(run, error);
+    }
+    if (status == MILD_OK) {
+        status = write_config(run, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    name_columns(run);
+    run->log = log_open(folder, run->column, COLUMNS,
+                        run->def.resume ? train_iteration(run->trainer) : -1, error);
+    return run->log ? MILD_OK : error->status;
+}
+
+TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error) {
+    TrainRun *run = calloc(1, sizeof *run);
+    if (!run) {
+        mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+        return NULL;
+    }
+    run->def = *def;
+    run->watch = *watch;
+    if (build(run, error) != MILD_OK) {
+        train_run_close(run);
+        return NULL;
+    }
+    return run;
+}
+
+void train_run_close(TrainRun *run) {
+    if (!run) {
+        return;
+    }
+    log_close(run->log);
+    train_destroy(run->trainer);
+    free(run);
+}
+
+int64_t train_run_iteration(const TrainRun *run) {
+    return train_iteration(run->trainer);
+}
+
+/* ---- the loop ---- */
+
+/* 0 .. 1; negative: the run has no end. */
+static double share_done(const TrainRun *run) {
+    const TrainDef *def = &run->def.def->train;
+    double done = (double)(train_iteration(run->trainer) - run->first);
+    double by_time = def->minutes > 0 ? (clock_seconds() - run->start) / (60 * def->minutes) : -1;
+    double by_count = -1;
+    if (def->iterations > 0) {
+        by_count = def->iterations > run->first ? done / (double)(def->iterations - run->first) : 1;
+    }
+    return by_time > by_count ? by_time : by_count;
+}
+
+static int goes_on(const TrainRun *run) {
+    return !(run->watch.stop && run->watch.stop(run->watch.self)) && share_done(run) < 1;
+}
+
+static MildStatus iterate(TrainRun *run, MildError *error) {
+    TrainReport report;
+    double row[COLUMNS];
+    MildStatus status = train_iterate(run->trainer, &report, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    fill_row(run, &report, row);
+    int64_t iteration = train_iteration(run->trainer);
+    status = log_row(run->log, iteration, row, error);
+    if (run->watch.iterated) {
+        run->watch.iterated(run->watch.self, iteration, &report, share_done(run));
+    }
+    if (status == MILD_OK && iteration % run->def.def->train.checkpoint_every == 0) {
+        status = save_checkpoint(run, error);
+    }
+    return status;
+}
+
+MildStatus train_run_loop(TrainRun *run, MildError *error) {
+    run->start = clock_seconds();
+    run->first = train_iteration(run->trainer);
+    MildStatus status = MILD_OK;
+    while (status == MILD_OK && goes_on(run)) {
+        status = iterate(run, error);
+    }
+    return status == MILD_OK ? save_checkpoint(run, error) : status;
+}

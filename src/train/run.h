@@ -1,0 +1,41 @@
+/* A training run on disk: its folder holds config.ini, version.txt, log.csv and a TensorBoard file,
+ * checkpoints, and policy.safetensors. */
+#ifndef TRAIN_RUN_H
+#define TRAIN_RUN_H
+
+#include "train/trainer.h"
+
+typedef struct {
+    const char *folder;
+    int resume; /* bool: go on from the newest checkpoint that loads */
+    const ExperimentDef *def;
+    const char *config;  /* text of config.ini: reads back to `def` */
+    const char *version; /* of the program */
+    const char *note;    /* what made the policy, one line; goes into the files */
+} TrainRunDef;
+
+/* Who watches a run; any function may be NULL. */
+typedef struct {
+    void *self;
+    void (*resumed)(void *self, const char *checkpoint);
+    void (*passed_over)(void *self, const char *why); /* a checkpoint that does not load */
+    int (*stop)(void *self); /* asked before every iteration; not 0 ends the run and saves it */
+    /* after every iteration. share: how much of the run is done, 0 .. 1; negative: no end */
+    void (*iterated)(void *self, int64_t iteration, const TrainReport *report, double share);
+} TrainWatch;
+
+typedef struct TrainRun TrainRun;
+
+/* A new run takes a folder without checkpoints, a resumed one a folder with some. */
+MildStatus train_run_check_folder(const char *folder, int resume, MildError *error);
+
+/* Makes or continues the folder. What `def` and `watch` point to is borrowed. NULL, with the reason
+ * in *error. */
+TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error);
+void train_run_close(TrainRun *run); /* may be NULL */
+int64_t train_run_iteration(const TrainRun *run);
+
+/* Iterates until train.minutes or train.iterations are over or the watcher stops it, and saves. */
+MildStatus train_run_loop(TrainRun *run, MildError *error);
+
+#endif

@@ -1,0 +1,29 @@
+#include "train/train_def.h"
+
+TrainDef train_def_default(void) {
+    return (TrainDef){.envs = 1024,
+                      .iterations = 0,
+                      .minutes = 60,
+                      .checkpoint_every = 50,
+                      .keep_checkpoints = 3,
+                      .seed = 1,
+                      .threads = 0,
+                      .device = "cpu"};
+}
+
+#define FIELD(member, type, min, max, help) MILD_FIELD(TrainDef, member, type, 1, min, max, help)
+const MildField train_fields[] = {
+    FIELD(envs, MILD_FIELD_INT, 1, 65536, "[-] robots that walk at the same time"),
+    FIELD(iterations, MILD_FIELD_INT, 0, 1e9, "[-] PPO iterations; 0: no limit"),
+    FIELD(minutes, MILD_FIELD_DOUBLE, 0, 1e6, "[min] wall time; 0: no limit"),
+    FIELD(checkpoint_every, MILD_FIELD_INT, 1, 1e9, "[-] iterations between checkpoints"),
+    FIELD(keep_checkpoints, MILD_FIELD_INT, 1, 1000, "[-] the newest so many checkpoints are kept"),
+    FIELD(seed, MILD_FIELD_UINT64, 0, 18446744073709551616.0,
+          "[-] same seed, same config: same numbers"),
+    FIELD(threads, MILD_FIELD_INT, 0, 1024,
+          "[-] threads; 0: one per core; results do not depend on it"),
+    MILD_FIELD(TrainDef, device, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->device, 0, 0,
+               "[-] of the networks: cpu or cuda (docs/gpu.md); robots and ground use every core "
+               "either way"),
+};
+const int train_field_count = sizeof train_fields / sizeof *train_fields;

@@ -1,0 +1,24 @@
+/* How long and how wide a training run is: section [train] of a config. */
+#ifndef TRAIN_TRAIN_DEF_H
+#define TRAIN_TRAIN_DEF_H
+
+#include <stdint.h>
+
+#include "mild/field.h"
+
+typedef struct {
+    int envs;             /* robots that walk at the same time */
+    int iterations;       /* of PPO; 0: no limit */
+    double minutes;       /* [min] wall time of this run; 0: no limit */
+    int checkpoint_every; /* iterations */
+    int keep_checkpoints; /* the newest so many stay */
+    uint64_t seed;
+    int threads;    /* 0: one per core */
+    char device[8]; /* of the networks: cpu, cuda */
+} TrainDef;
+
+TrainDef train_def_default(void);
+extern const MildField train_fields[];
+extern const int train_field_count;
+
+#endif

@@ -1,0 +1,41 @@
+/* A training run in memory: robots, networks, learner, put together from an experiment. Knows no
+ * file but checkpoints. */
+#ifndef TRAIN_TRAINER_H
+#define TRAIN_TRAINER_H
+
+#include "learn/ppo.h"
+#include "task/vec.h"
+#include "train/experiment.h"
+
+typedef struct Trainer Trainer;
+
+/* Wall time of one iteration [s]. */
+typedef struct {
+    double rollout, inference, environments, update;
+    double physics, ground; /* thread time inside environments, summed over the threads; ground is
+                               part of physics */
+} TrainTimes;
+
+typedef struct {
+    PpoReport ppo;
+    VecStats episodes;
+    TrainTimes times;
+    double steps_per_s;
+    double reward_per_step; /* mean over the batch */
+} TrainReport;
+
+Trainer *train_create(const ExperimentDef *def, MildError *error);
+void train_destroy(Trainer *trainer);
+/* One rollout and one update. Fails when train.device does. */
+MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
+int64_t train_iteration(const Trainer *trainer);
+Policy *train_policy(Trainer *trainer); /* what gets saved: the averaged weights with ppo.average */
+size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */
+int train_threads(const Trainer *trainer);
+
+/* All that resuming needs, in one checksummed file; a resumed run equals one that was never
+ * stopped, bit for bit. */
+MildStatus train_save(Trainer *trainer, const char *path, const char *note, MildError *error);
+MildStatus train_load(Trainer *trainer, const char *path, MildError *error);
+
+#endif

@@ -1,0 +1,255 @@
+/* Config files: layering, round trip, and one clear line for every mistake. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "config/experiment_keys.h"
+
+typedef struct {
+    double stiffness, pair[2];
+    int count, on;
+    uint64_t seed;
+    char name[8];
+} Sample;
+
+static const MildField sample_fields[] = {
+    MILD_FIELD(Sample, stiffness, MILD_FIELD_DOUBLE, 1, 0, 100, "[N/m] of a spring"),
+    MILD_FIELD(Sample, pair, MILD_FIELD_DOUBLE, 2, -1, 1, "[m] low and high"),
+    MILD_FIELD(Sample, count, MILD_FIELD_INT, 1, 1, 10, "[-] how many"),
+    MILD_FIELD(Sample, on, MILD_FIELD_BOOL, 1, 0, 1, "[bool] switch"),
+    MILD_FIELD(Sample, seed, MILD_FIELD_UINT64, 1, 0, 18446744073709551616.0, "[-] seed"),
+    MILD_FIELD(Sample, name, MILD_FIELD_TEXT, 8, 0, 0, "[-] name"),
+};
+enum { SAMPLE_FIELDS = sizeof sample_fields / sizeof *sample_fields };
+
+typedef struct {
+    Sample sample;
+    MildMaterial material;
+    ConfigSection sections[2];
+    MildError error;
+} Fixture;
+
+static Fixture fixture(void) {
+    return (Fixture){.sample = {.stiffness = 1, .count = 2, .name = "a"},
+                     .material = mild_material_default()};
+}
+
+static void bind(Fixture *f) {
+    f->sections[0] = (ConfigSection){"sample", sample_fields, SAMPLE_FIELDS, &f->sample};
+    f->sections[1] = ground_section(&f->material);
+}
+
+static void assert_text(const char *text, const char *part) {
+    if (!strstr(text, part)) {
+        fail_msg("'%s' does not hold '%s'", text, part);
+    }
+}
+
+static void test_reads_every_type(void **state) {
+    (void)state;
+    Fixture f = fixture();
+    bind(&f);
+    const char *text =
+        "\xef\xbb\xbf; remark\n# remark, longer than any line inih takes: "
+        "0123456789012345678901234567890123456789012345678901234"
+        "567890123456789012345678901234567890123456789012345678901234567890123456789012345678901234"
+        "56789012345678\n"
+        "[sample]\n  stiffness = 2.5 ; remark\n\tpair: -0.5, 0.5 # remark\r\n"
+        "count=7\n\n  on = true\nseed = 18446744073709551615\nname = sand\n[ground]\nk_pen=500";
+    assert_int_equal(config_read_text(f.sections, 2, text, "x.ini", 0, &f.error), MILD_OK);
+    assert_true(f.sample.stiffness == 2.5 && f.sample.pair[0] == -0.5 && f.sample.pair[1] == 0.5);
+    assert_true(f.sample.count == 7 && f.sample.on == 1 && f.sample.seed == UINT64_MAX);
+    assert_string_equal(f.sample.name, "sand");
+    assert_true(f.material.k_pen == 500);
+}
+
+static void test_mistakes(void **state) {
+    (void)state;
+    const struct {
+        const char *text, *message[3];
+    } cases[] = {
+        {"[sample]\nstifness = 2",
+         {"x.ini:2:", "unknown key 'sample.stifness'", "'sample.stiffness'"}},
+        {"[sample]\nk_pen = 2", {"x.ini:2:", "unknown key 'sample.k_pen'", "'ground.k_pen'"}},
+        {"\n[sampel]\n", {"x.ini:2:", "unknown section 'sampel'", "'sample'"}},
+        {"[sample]\ncount = 11", {"x.ini:2:", "sample.count", "1 .. 10"}},
+        {"[sample]\ncount = 1.5", {"x.ini:2:", "sample.count", "integer"}},
+        {"[sample]\ncount =", {"x.ini:2:", "sample.count", ""}},
+        {"[sample]\nstiffness = nan", {"x.ini:2:", "sample.stiffness", ""}},
+        {"[sample]\nstiffness = 1e999", {"x.ini:2:", "sample.stiffness", ""}},
+        {"[sample]\npair = 1", {"x.ini:2:", "sample.pair", ""}},
+        {"[sample]\nseed = -1", {"x.ini:2:", "sample.seed", ""}},
+        {"[sample]\nname = much too long", {"x.ini:2:", "sample.name", ""}},
+        {"[sample]\ncount\n", {"x.ini:2:", "key = value", ""}},
+        {"[sample]\ncount\ncuont=1\n", {"x.ini:2:", "key = value", ""}},
+        {"[sample\ncount=1\n", {"x.ini:1:", "[section]", ""}},
+        {"count = 1\n", {"x.ini:1:", "before the first [section]", ""}},
+        {"[sample]\ncount = 1\ncount = 1\n", {"x.ini:3:", "already set on line 2", ""}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        Fixture f = fixture();
+        bind(&f);
+        assert_int_not_equal(config_read_text(f.sections, 2, cases[i].text, "x.ini", 0, &f.error),
+                             MILD_OK);
+        for (int m = 0; m < 3; m++) {
+            assert_text(f.error.text, cases[i].message[m]);
+        }
+        assert_null(strchr(f.error.text, '\n'));
+    }
+}
+
+static void test_long_line(void **state) {
+    (void)state;
+    Fixture f = fixture();
+    bind(&f);
+    char text[400] = "[sample]\nname = ";
+    memset(text + strlen(text), 'x', 300);
+    assert_int_not_equal(config_read_text(f.sections, 2, text, "x.ini", 0, &f.error), MILD_OK);
+    assert_text(f.error.text, "x.ini:2: line longer than");
+}
+
+static void test_missing_key_of_complete_file(void **state) {
+    (void)state;
+    Fixture f = fixture();
+    bind(&f);
+    assert_int_not_equal(
+        config_read_text(f.sections, 2, "[sample]\nstiffness=1\npair=0 1\ncount=1\non=0\nseed=1\n",
+                         "x.ini", 1, &f.error),
+        MILD_OK);
+    assert_text(f.error.text, "'sample.name' is missing");
+}
+
+static void test_overrides(void **state) {
+    (void)state;
+    Fixture f = fixture();
+    bind(&f);
+    const char *const good[] = {"sample.count=3", "ground.k_pen=600", "sample.count=4"};
+    assert_int_equal(config_overrides(f.sections, 2, good, 3, &f.error), MILD_OK);
+    assert_true(f.sample.count == 4 && f.material.k_pen == 600);
+    const char *const bad[] = {"sample.count=99", "sample.cuont=1", "smaple.count=1",
+                               "sample.=1",       ".count=1",       "sample.count"};
+    const char *const message[] = {"1 .. 10",     "'sample.count'", "'sample'",
+                                   "section.key", "section.key",    "section.key"};
+    for (int i = 0; i < 6; i++) {
+        assert_int_not_equal(config_override(f.sections, 2, bad[i], &f.error), MILD_OK);
+        assert_text(f.error.text, bad[i]);
+        assert_text(f.error.text, message[i]);
+    }
+    assert_int_equal(f.sample.count, 4);
+}
+
+static void test_round_trip(void **state) {
+    (void)state;
+    Fixture f = fixture(), g = fixture();
+    bind(&f);
+    f.sample = (Sample){.stiffness = 0.1 + 0.2,
+                        .pair = {-1.0 / 3, 1e-17},
+                        .count = 9,
+                        .on = 1,
+                        .seed = UINT64_MAX,
+                        .name = "sand"};
+    f.material.sigma_cone = 123456.789012345678;
+    for (int comments = 0; comments < 2; comments++) {
+        char *text = config_text(f.sections, 2, comments);
+        assert_non_null(text);
+        bind(&g);
+        assert_int_equal(config_read_text(g.sections, 2, text, "x.ini", 1, &g.error), MILD_OK);
+        free(text);
+        assert_memory_equal(&f.sample, &g.sample, sizeof f.sample);
+        assert_memory_equal(&f.material, &g.material, sizeof f.material);
+    }
+}
+
+static void test_missing_file(void **state) {
+    (void)state;
+    Fixture f = fixture();
+    bind(&f);
+    assert_int_equal(config_read(f.sections, 2, "nowhere/x.ini", 0, &f.error), MILD_ERROR_IO);
+    assert_text(f.error.text, "nowhere/x.ini");
+    assert_int_not_equal(config_read(f.sections, 2, "/", 0, &f.error), MILD_OK);
+}
+
+/* The file is what the program prints: a default lives in one place, and a stale file is caught
+ * here. */
+static void test_default_ini(void **state) {
+    (void)state;
+    ExperimentDef def = experiment_def_default(), read = experiment_def_default();
+    ConfigSection sections[EXPERIMENT_SECTIONS], read_sections[EXPERIMENT_SECTIONS];
+    experiment_sections(&def, sections);
+    experiment_sections(&read, read_sections);
+    MildError error = {0};
+    if (config_read(read_sections, EXPERIMENT_SECTIONS, MILD_SOURCE_DIR "/configs/default.ini", 1,
+                    &error) != MILD_OK) {
+        fail_msg("%s; regenerate with: build/mild info config > configs/default.ini", error.text);
+    }
+    char *ours = config_text(sections, EXPERIMENT_SECTIONS, 0),
+         *theirs = config_text(read_sections, EXPERIMENT_SECTIONS, 0);
+    if (strcmp(ours, theirs) != 0) {
+        fail_msg("configs/default.ini differs from the defaults; regenerate with: build/mild info "
+                 "config > "
+                 "configs/default.ini");
+    }
+    free(ours);
+    free(theirs);
+    assert_int_equal(experiment_check(&def, &error), MILD_OK);
+}
+
+static void test_keys_are_unique(void **state) {
+    (void)state;
+    ExperimentDef def = experiment_def_default();
+    ConfigSection sections[EXPERIMENT_SECTIONS];
+    experiment_sections(&def, sections);
+    for (int s = 0; s < EXPERIMENT_SECTIONS; s++) {
+        for (int i = 0; i < sections[s].count; i++) {
+            const MildField *first = mild_field_find(sections[s].fields, sections[s].count,
+                                                     sections[s].fields[i].name, NULL);
+            if (first != &sections[s].fields[i]) {
+                fail_msg("key %s.%s stands twice", sections[s].name, first->name);
+            }
+        }
+    }
+}
+
+static void test_layers(void **state) {
+    (void)state;
+    char path[] = "/tmp/mild_test_XXXXXX";
+    int file = mkstemp(path);
+    assert_true(file >= 0);
+    FILE *stream = fdopen(file, "w");
+    fputs("[train]\nenvs = 8\nseed = 5\n[reward]\nslip = -0.5\n", stream);
+    fclose(stream);
+    ExperimentDef def = experiment_def_default();
+    MildError error = {0};
+    const char *const overrides[] = {"train.seed=6"};
+    assert_int_equal(experiment_read(&def, path, overrides, 1, &error), MILD_OK);
+    assert_true(def.train.envs == 8 && def.train.seed == 6 &&
+                def.task.reward.weight[REWARD_slip] == -0.5);
+    assert_int_equal(def.train.keep_checkpoints, train_def_default().keep_checkpoints);
+    const char *const crossed[] = {"ppo.learning_rate_min=0.1", "ppo.learning_rate_max=0.01"};
+    assert_int_not_equal(experiment_read(&def, path, crossed, 2, &error), MILD_OK);
+    assert_text(error.text, "learning_rate_min");
+    remove(path);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_reads_every_type),
+        cmocka_unit_test(test_mistakes),
+        cmocka_unit_test(test_long_line),
+        cmocka_unit_test(test_missing_key_of_complete_file),
+        cmocka_unit_test(test_overrides),
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_missing_file),
+        cmocka_unit_test(test_default_ini),
+        cmocka_unit_test(test_keys_are_unique),
+        cmocka_unit_test(test_layers),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,218 @@
+/* Memory runs out at the n-th allocation of our own code, for every n, while something is created
+ * or read: an error that says so each time, nothing leaked. The linker wraps the allocator
+ * (tests/CMakeLists.txt), so this runs under the address sanitizer too; what MuJoCo and oneDNN
+ * allocate inside is theirs. */
+#include <math.h>
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "control/controller.h"
+#include "lab/fit_csv.h"
+#include "mild/map.h"
+#include "train/trainer.h"
+
+#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
+
+enum { LIVE_MAX = 4096 };
+
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static void *live[LIVE_MAX];         /* blocks that our code allocated and has not freed */
+static int live_count, fail_at = -1; /* allocations until the one that fails; negative: none */
+
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t count, size_t size);
+void *__real_realloc(void *block, size_t size);
+void *__real_aligned_alloc(size_t alignment, size_t size);
+void __real_free(void *block);
+void *__wrap_malloc(size_t size);
+void *__wrap_calloc(size_t count, size_t size);
+void *__wrap_realloc(void *block, size_t size);
+void *__wrap_aligned_alloc(size_t alignment, size_t size);
+void __wrap_free(void *block);
+
+static int fails(void) {
+    pthread_mutex_lock(&lock);
+    int now = fail_at == 0;
+    fail_at -= fail_at >= 0;
+    pthread_mutex_unlock(&lock);
+    return now;
+}
+
+static void *take(void *block) {
+    pthread_mutex_lock(&lock);
+    if (block && live_count < LIVE_MAX) {
+        live[live_count++] = block;
+    }
+    pthread_mutex_unlock(&lock);
+    return block;
+}
+
+static void give(void *block) {
+    pthread_mutex_lock(&lock);
+    int i = live_count - 1;
+    while (i >= 0 && live[i] != block) {
+        i--;
+    }
+    if (i >= 0) {
+        live[i] = live[--live_count];
+    }
+    pthread_mutex_unlock(&lock);
+}
+
+void *__wrap_malloc(size_t size) {
+    return fails() ? NULL : take(__real_malloc(size));
+}
+
+void *__wrap_calloc(size_t count, size_t size) {
+    return fails() ? NULL : take(__real_calloc(count, size));
+}
+
+void *__wrap_aligned_alloc(size_t alignment, size_t size) {
+    return fails() ? NULL : take(__real_aligned_alloc(alignment, size));
+}
+
+void *__wrap_realloc(void *block, size_t size) {
+    if (fails()) {
+        return NULL;
+    }
+    give(block);
+    return take(__real_realloc(block, size));
+}
+
+void __wrap_free(void *block) {
+    give(block);
+    __real_free(block);
+}
+
+/* What is created: true when it was, and destroyed again; otherwise *error says why. */
+typedef int (*Attempt)(MildError *error);
+
+static MildSoleDef plate_def(void) {
+    static const double box[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1};
+    return (MildSoleDef){box, 4, 0.02, -0.05, 20};
+}
+
+static int attempt_sole(MildError *error) {
+    MildSoleDef def = plate_def();
+    MildSole *sole = mild_sole_create(&def, error),
+             *middle = sole ? mild_sole_concentric(sole, error) : NULL;
+    int made = middle != NULL;
+    mild_sole_destroy(middle);
+    mild_sole_destroy(sole);
+    return made;
+}
+
+static int attempt_scratch(MildError *error) {
+    MildSoleDef def = plate_def();
+    MildSole *sole = mild_sole_create(&def, error);
+    const MildSole *soles[2] = {sole, sole};
+    MildScratch *scratch = sole ? mild_scratch_create(soles, 2, error) : NULL;
+    int made = scratch != NULL;
+    mild_scratch_destroy(scratch);
+    mild_sole_destroy(sole);
+    return made;
+}
+
+static int attempt_map(MildError *error) {
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_ROUGH;
+    def.cell = 0.1;
+    def.patches = MILD_PATTERN_CHECKER;
+    MildMap *map = mild_map_create(&def, error);
+    mild_map_destroy(map);
+    return map != NULL;
+}
+
+static int attempt_robot(MildError *error) {
+    Robot *robot = robot_create(MODEL, error);
+    RobotSim *sim = robot ? robot_sim_create(robot, 0.002, error) : NULL;
+    int made = sim != NULL;
+    robot_sim_destroy(sim);
+    robot_destroy(robot);
+    return made;
+}
+
+static int attempt_controller(MildError *error) {
+    Controller controller = {0};
+    int made = controller_learned(POLICY, NULL, 1, &controller, error) == MILD_OK;
+    controller_destroy(&controller);
+    return made;
+}
+
+static int attempt_record(MildError *error) {
+    char text[2000] = "depth_m,force_n\n";
+    for (int i = 0; i < 40; i++) {
+        snprintf(text + strlen(text), 30, "%g,%g\n", 1e-3 * i, 5.0 * i);
+    }
+    FILE *file = fmemopen(text, strlen(text), "r");
+    assert_non_null(file);
+    FitPoint *points = NULL;
+    int count = 0, made = fit_csv_read_file(file, "record", &points, &count, error) == MILD_OK;
+    fclose(file);
+    free(points);
+    return made;
+}
+
+static int attempt_trainer(MildError *error) {
+    ExperimentDef def = experiment_def_default();
+    def.train.envs = 4;
+    def.train.threads = 2;
+    def.ppo.steps = 4;
+    def.ppo.minibatches = 1;
+    Trainer *trainer = train_create(&def, error);
+    train_destroy(trainer);
+    return trainer != NULL;
+}
+
+/* With the 1st, 2nd, ... allocation failing, until one attempt meets no failure. */
+static void fail_each(const char *name, Attempt attempt) {
+    int met = 1, n = 0;
+    MildError first = {0};
+    assert_true(attempt(&first)); /* what is allocated once and kept, and that it works at all */
+    for (; met; n++) {
+        MildError error = {0};
+        int before = live_count;
+        fail_at = n;
+        int made = attempt(&error);
+        met = fail_at < 0;
+        fail_at = -1;
+        if (live_count != before) {
+            fail_msg("%s: allocation %d failing leaks %d blocks", name, n, live_count - before);
+        }
+        if (made == met) {
+            fail_msg("%s: allocation %d failing: %s", name, n,
+                     made ? "created all the same" : error.text);
+        }
+        if (!made && (error.status != MILD_ERROR_MEMORY || !error.text[0])) {
+            fail_msg("%s: allocation %d failing says: '%s' (%d)", name, n, error.text,
+                     (int)error.status);
+        }
+    }
+    print_message("%-10s %3d allocations, each failed once\n", name, n - 1);
+}
+
+static void test_every_allocation_may_fail(void **state) {
+    (void)state;
+    fail_each("sole", attempt_sole);
+    fail_each("scratch", attempt_scratch);
+    fail_each("map", attempt_map);
+    fail_each("record", attempt_record);
+    fail_each("robot", attempt_robot);
+    fail_each("policy", attempt_controller);
+    fail_each("trainer", attempt_trainer);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_every_allocation_may_fail)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
