@@ -49,6 +49,8 @@ static cJSON *row_json(const EvalRow *row) {
                   {"energy", row->energy},
                   {"velocity_low", row->velocity_low},
                   {"velocity_high", row->velocity_high},
+                  {"sideways", row->sideways},
+                  {"velocity_sideways", row->velocity_sideways},
                   {"base_oscillation", row->base_oscillation},
                   {"seconds", row->seconds}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
@@ -190,6 +192,10 @@ int cmd_eval(int argc, char **argv) {
          grounds_model_help(model_help, sizeof model_help)},
         {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]",
          "[m/s] commanded forward speeds, a row each (0.6)"},
+        {"sideways", CLI_NUMBER, &e->eval.sideways, -1, 1, "V",
+         "[m/s] commanded speed to the left, in every row (0)"},
+        {"stop", CLI_NUMBER, &e->eval.stop, 0, 3600, "T",
+         "[s] let go of the key: from here on the command is 0; 0: never (0)"},
         {"trials", CLI_INT, &e->eval.trials, 1, 10000, "N",
          "trials per row, each with its own start and noise (10)"},
         {"seconds", CLI_NUMBER, &e->eval.seconds, 0.1, 3600, "T", "[s] length of a trial (20)"},

@@ -291,7 +291,8 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
          "film it; without this and --pressure a window opens"},
         {"pressure", CLI_TEXT, &c->pressure, 0, 0, "FILE.png",
          "sole pressure per ground: a picture and its numbers as CSV beside it"},
-        {"speed", CLI_NUMBER, &c->play.speed, -1, 1, "V", "[m/s] commanded forward speed (0.6)"},
+        {"speed", CLI_NUMBER, &c->play.speed, -1.3, 1.3, "V",
+         "[m/s] commanded forward speed (0.6)"},
         {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
          "[s] length of the walk; 0: long enough for the course (0)"},
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S", "start and sensor noise (1)"},
@@ -306,8 +307,8 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
             "--policy FILE --ground NAME[,NAME] [--video FILE.mp4] [--pressure FILE.png] [options]",
         .summary = "Watch a policy walk. Several grounds make a course that is crossed in order. "
                    "In the window: arrow keys "
-                   "change speed and turn, Q and E step sideways, space pauses, - and = change the "
-                   "pace, R starts again, "
+                   "change speed and turn, Q and E step sideways, S stops, space pauses, - and = "
+                   "change the pace, R starts again, "
                    "mouse turns the camera, Esc quits. Afterwards a table: a row for each ground.",
         .options = options,
         .option_count = sizeof options / sizeof *options,

@@ -14,7 +14,9 @@
 #define SPEED_TIME 0.5  /* [s] the shown speed is a running mean over about this long */
 #define OWED_MAX 0.2    /* [s] of walking that a slow machine makes up for at once */
 #define WINDOW_TIME 1e6 /* [s] a window's walk has no end */
-#define SPEED_MAX 1.0   /* [m/s], [rad/s] that the keys can command */
+
+/* [m/s, m/s, rad/s] that the keys can command: what the shipped policy was trained on. */
+static const double command_max[3] = {1.3, 0.3, 0.8};
 
 /* The walk's own state. */
 typedef struct {
@@ -53,7 +55,7 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
 }
 
 static void set_command(Walk *walk) {
-    eval_command(walk->env, walk->command[0]);
+    eval_command(walk->env, walk->command[0], walk->command[1]);
     if (walk->steer) {
         memcpy(walk->env->command, walk->command, sizeof walk->command);
     }
@@ -146,11 +148,15 @@ static MildStatus restart(Walk *walk, MildError *error) {
 }
 
 static void take_keys(Walk *walk, const WindowInput *input) {
+    if (input->halt) {
+        memset(walk->command, 0, sizeof walk->command);
+    }
     for (int c = 0; c < 3; c++) {
         if (c > 0 && input->command[c] != 0) {
             walk->steer = 1;
         }
-        walk->command[c] = fmin(fmax(walk->command[c] + input->command[c], -SPEED_MAX), SPEED_MAX);
+        walk->command[c] =
+            fmin(fmax(walk->command[c] + input->command[c], -command_max[c]), command_max[c]);
     }
 }
 

@@ -51,7 +51,7 @@ static int walk_step(Walk *walk, ReplayPeriod *period) {
     walk->controller.act(walk->controller.self, 1, &walk->env, action);
     TaskStep step =
         task_env_step(walk->env, &walk->def, walk->robot, walk->sim, action, 0, &none, &probe);
-    eval_command(walk->env, walk_speed);
+    eval_command(walk->env, walk_speed, 0);
     return !step.done;
 }
 
@@ -78,7 +78,7 @@ static MildStatus walk_record(Walk *walk, const Scene *scene, Replay *replay, Mi
     const uint64_t seed = 1;
     TaskView none = {0};
     task_env_init(walk->env, &walk->def, walk->robot, seed, 0);
-    eval_command(walk->env, walk_speed);
+    eval_command(walk->env, walk_speed, 0);
     task_env_reset_on(walk->env, &walk->def, walk->robot, walk->sim, &scene->terrain, scene->rigid,
                       &none);
     replay->variation = walk->env->variation;

@@ -11,14 +11,15 @@
 #define HEADING_GAIN 1.0  /* [1/s] */
 #define HEADING_LIMIT 0.5 /* [rad/s] */
 
-void eval_command(TaskEnv *env, double speed) {
+void eval_command(TaskEnv *env, double speed, double sideways) {
     const double *q = env->robot.qpos + 3;
     double yaw = atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
     env->command_frozen = 1;
     env->command[0] = speed;
-    env->command[1] = 0;
-    env->command[2] =
-        speed == 0 ? 0 : fmin(fmax(-HEADING_GAIN * yaw, -HEADING_LIMIT), HEADING_LIMIT);
+    env->command[1] = sideways;
+    env->command[2] = speed == 0 && sideways == 0
+                          ? 0
+                          : fmin(fmax(-HEADING_GAIN * yaw, -HEADING_LIMIT), HEADING_LIMIT);
 }
 
 typedef struct {
@@ -38,10 +39,11 @@ static void start_trial(void *context, int trial, int thread) {
     TaskView none = {0};
     TaskEnv *env = t->env[trial];
     task_env_init(env, t->def, t->robot, t->eval->seed, (uint32_t)trial);
-    eval_command(env, t->eval->speed);
+    eval_command(env, t->eval->speed, t->eval->sideways);
     task_env_reset_on(env, t->def, t->robot, t->sim[thread], &t->scene->terrain, t->scene->rigid,
                       &none);
     measure_start(&t->measure[trial], t->def->physics_dt);
+    t->measure[trial].steady_end = t->eval->stop;
 }
 
 static void step_trial(void *context, int trial, int thread) {
@@ -54,7 +56,9 @@ static void step_trial(void *context, int trial, int thread) {
     TaskStep step = task_env_step(t->env[trial], t->def, t->robot, t->sim[thread],
                                   t->action + (size_t)trial * TASK_ACTIONS, 0, &none, &probe);
     t->over[trial] = step.done && !step.timeout;
-    eval_command(t->env[trial], t->eval->speed);
+    const EvalDef *eval = t->eval;
+    int stopped = eval->stop > 0 && t->measure[trial].time >= eval->stop;
+    eval_command(t->env[trial], stopped ? 0 : eval->speed, stopped ? 0 : eval->sideways);
 }
 
 /* Student's t for 95 %, two sided: table up to 10 trials, then 1.96 + 2.6 / (degrees of freedom),
@@ -75,9 +79,12 @@ static void summarise_motion(const Trials *t, EvalRow *row) {
             continue;
         }
         double distance = m->end_x - m->start_x, v = distance / m->steady_time;
+        double left = m->end_y - m->start_y;
+        double way = t->eval->sideways != 0 ? hypot(distance, left) : fabs(distance);
         v_sum += v;
         v_square += v * v;
-        row->cot += m->work / (weight * fmax(fabs(distance), 1e-3));
+        row->velocity_sideways += left / m->steady_time;
+        row->cot += m->work / (weight * fmax(way, 1e-3));
         row->base_oscillation += m->base_high - m->base_low;
         steady++;
     }
@@ -90,6 +97,7 @@ static void summarise_motion(const Trials *t, EvalRow *row) {
     double half = student_95(steady) * sqrt(variance / steady);
     row->velocity_low = row->velocity - half;
     row->velocity_high = row->velocity + half;
+    row->velocity_sideways /= steady;
     row->cot /= steady;
     row->base_oscillation /= steady;
 }
@@ -97,7 +105,7 @@ static void summarise_motion(const Trials *t, EvalRow *row) {
 static void summarise(const Trials *t, EvalRow *row) {
     int n = t->eval->trials, swings = 0, stances = 0;
     double apex = 0, deepest = 0, drift = 0;
-    *row = (EvalRow){.speed = t->eval->speed, .trials = n};
+    *row = (EvalRow){.speed = t->eval->speed, .sideways = t->eval->sideways, .trials = n};
     snprintf(row->ground, sizeof row->ground, "%s", t->scene->name);
     for (int i = 0; i < n; i++) {
         Measure *m = &t->measure[i];
@@ -181,10 +189,18 @@ void eval_print_header(char *text, int size) {
 }
 
 void eval_print_row(const EvalRow *row, char *text, int size) {
+    char cot[16] = "-", sideways[48] = ""; /* standing has no cost of transport */
+    if (row->speed != 0 || row->sideways != 0) {
+        snprintf(cot, sizeof cot, "%.2f", row->cot);
+    }
+    if (row->sideways != 0) {
+        snprintf(sideways, sizeof sideways, "  sideways %.3f of %.2f m/s", row->velocity_sideways,
+                 row->sideways);
+    }
     snprintf(text, (size_t)size,
-             "%-26s %5.2f %4d/%-2d %6.3f +- %5.3f %5.2f %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f",
+             "%-26s %5.2f %4d/%-2d %6.3f +- %5.3f %5s %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f%s",
              row->ground, row->speed, row->success, row->trials, row->velocity,
-             0.5 * (row->velocity_high - row->velocity_low), row->cot, row->torque_max,
+             0.5 * (row->velocity_high - row->velocity_low), cot, row->torque_max,
              1e3 * row->clearance, 1e3 * row->penetration, 1e3 * row->drift,
-             row->seconds > 0 ? row->energy / row->seconds : 0);
+             row->seconds > 0 ? row->energy / row->seconds : 0, sideways);
 }

@@ -7,10 +7,13 @@
 #include "eval/scene.h"
 
 typedef struct {
-    double speed; /* [m/s] commanded, forward */
+    double speed;    /* [m/s] commanded, forward */
+    double sideways; /* [m/s] commanded, to the left */
     int trials;
     double seconds; /* [s] per trial */
-    uint64_t seed;  /* trial k uses stream k */
+    double
+        stop; /* [s] from here on the command is 0, and speeds are no longer measured; 0: never */
+    uint64_t seed; /* trial k uses stream k */
 } EvalDef;
 
 /* Means over the trials, SI units. */
@@ -21,6 +24,7 @@ typedef struct {
     double velocity; /* [m/s] forward, over the part after the first 2 s; trials that lasted that
                         long */
     double velocity_low, velocity_high; /* [m/s] 95 % interval of the mean over trials */
+    double sideways, velocity_sideways; /* [m/s] commanded and measured, to the left */
     double cot;                         /* [-] sum |tau qd| / (m g v) */
     double torque_max;                  /* [N m] largest over joints and time, mean over trials */
     double clearance;                   /* [m] swing apex of the lowest sole point above h0 */
@@ -37,8 +41,9 @@ typedef struct {
 MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller,
                     const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error);
 
-/* Heading hold used by eval and play: turns back to world x. Writes env->command and freezes it. */
-void eval_command(TaskEnv *env, double speed);
+/* Heading hold used by eval and play: turns back to world x. speed, sideways [m/s]: forward and to
+ * the left; both 0: stand, without holding. Writes env->command and freezes it. */
+void eval_command(TaskEnv *env, double speed, double sideways);
 
 /* Text table. */
 void eval_print_header(char *text, int size);

@@ -61,12 +61,14 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
     }
     m->energy += fabs(power) * m->dt;
     m->time += m->dt;
-    if (m->time >= MEASURE_STEADY) {
+    if (m->time >= MEASURE_STEADY && (m->steady_end == 0 || m->time < m->steady_end)) {
         if (m->steady_time == 0) {
             m->start_x = qpos[0];
+            m->start_y = qpos[1];
         }
         m->steady_time += m->dt;
         m->end_x = qpos[0];
+        m->end_y = qpos[1];
         m->work += power_abs * m->dt;
         double height = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]);
         m->base_low = fmin(m->base_low, height);

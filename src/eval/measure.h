@@ -11,7 +11,9 @@ typedef struct {
     double work;       /* [J] integral sum |tau qd| over the steady part */
     double energy;     /* [J] integral |tau . qd| */
     double torque_max; /* [N m] */
+    double steady_end; /* [s] end of the steady part; 0: the trial's end */
     double start_x, end_x, steady_time;
+    double start_y, end_y;
     double base_low, base_high;
     int in_stance[ROBOT_FEET];
     double touchdown[ROBOT_FEET][2],

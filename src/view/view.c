@@ -578,9 +578,9 @@ static void draw_closeup(View *view, mjrRect viewport, const RobotSim *sim) {
     camera->lookat[2] =
         relief_height_at(view->relief, camera->lookat[0], camera->lookat[1]) + VIEW_CLOSE_HEIGHT;
     camera->azimuth = view->camera.azimuth - VIEW_CLOSE_TURN;
-    mjrRect box = {viewport.width - (viewport.width * 2) / 5 - 10,
-                   viewport.height - viewport.height / 3 - 10, (viewport.width * 2) / 5,
-                   viewport.height / 3};
+    /* a third of the width: the robot stands in the middle, and its head must stay in sight */
+    const int width = viewport.width / 3, height = viewport.height / 3;
+    mjrRect box = {viewport.width - width - 10, viewport.height - height - 10, width, height};
     mjrRect frame = {box.left - 2, box.bottom - 2, box.width + 4, box.height + 4};
     mjr_rectangle(frame, 0.12F, 0.13F, 0.15F, 1);
     mjv_updateCamera(view->model, view->data, camera, &view->scene);

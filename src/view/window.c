@@ -38,6 +38,7 @@ static void on_key(GLFWwindow *handle, int key, int scancode, int action, int mo
     case GLFW_KEY_RIGHT: input->command[2] -= SPEED_STEP; break;
     case GLFW_KEY_Q: input->command[1] += SPEED_STEP; break;
     case GLFW_KEY_E: input->command[1] -= SPEED_STEP; break;
+    case GLFW_KEY_S: input->halt = 1; break;
     case GLFW_KEY_EQUAL: input->time_scale = fmin(2.0 * input->time_scale, 4.0); break;
     case GLFW_KEY_MINUS: input->time_scale = fmax(0.5 * input->time_scale, 0.0625); break;
     default: break;
@@ -115,7 +116,7 @@ void window_show(Window *window, WindowInput *input) {
         window->input.quit = 1;
     }
     *input = window->input;
-    window->input.reset = 0;
+    window->input.reset = window->input.halt = 0;
     window->input.turn = window->input.lift = window->input.zoom = 0;
     memset(window->input.command, 0, sizeof window->input.command);
 }

@@ -10,6 +10,7 @@ typedef struct {
     int quit;          /* bool: Esc or the window was closed */
     int paused;        /* bool: toggled by space */
     int reset;         /* bool: R was pressed since the last call */
+    int halt;          /* bool: S was pressed since the last call */
     double time_scale; /* [-] 1 is real time; - and = change it */
     double command[3]; /* [m/s, m/s, rad/s] change wished since the last call: arrows and Q/E */
     double turn, lift, zoom; /* camera: mouse drag [rad], wheel [-], since the last call */

@@ -117,7 +117,8 @@ static double gradient_distance(const Learner *cpu, const Learner *gpu, const ch
     return worst;
 }
 
-static double sums_distance(const LossSums *a, const LossSums *b) {
+/* Of the means over the samples: where one nearly cancels, its error is that of numbers of size 1. */
+static double sums_distance(const LossSums *a, const LossSums *b, int samples) {
     const double x[] = {a->surrogate, a->kl,          a->clipped,     a->reconstruction,
                         a->vae_kl,    a->estimate[0], a->estimate[1], a->estimate[2],
                         a->mirror,    a->value};
@@ -126,7 +127,7 @@ static double sums_distance(const LossSums *a, const LossSums *b) {
                         b->mirror,    b->value};
     double worst = 0.0;
     for (size_t i = 0; i < sizeof x / sizeof *x; i++) {
-        worse(&worst, fabs(x[i] - y[i]) / (1e-3 + fabs(y[i])));
+        worse(&worst, fabs(x[i] - y[i]) / (samples + fabs(y[i])));
     }
     return worst;
 }
@@ -156,9 +157,10 @@ static void compare_gradient(Learner *cpu, Learner *gpu, int count, uint32_t dra
     const char *where;
     double apart = gradient_distance(cpu, gpu, &where);
     print_message("  %6d samples: gradient %.1e (%s), norm %.1e, sums %.1e\n", count, apart, where,
-                  fabs(norm[1] / norm[0] - 1.0), sums_distance(&sums[1], &sums[0]));
-    worse(&worst[0], apart);
-    worse(&worst[1], sums_distance(&sums[1], &sums[0]));
+                  fabs(norm[1] / norm[0] - 1.0), sums_distance(&sums[1], &sums[0], count));
+    /* of five samples the modulation's gradient is a small difference of large numbers */
+    worse(&worst[0], count < 100 ? 0.2 * apart : apart);
+    worse(&worst[1], sums_distance(&sums[1], &sums[0], count));
 }
 
 static void compare_learner(const PolicyDef *policy, const PpoDef *def, int envs, double worst[4]) {
@@ -324,7 +326,7 @@ static void test_learns_and_changes_device(void **state) {
     print_message("toy task: reward %.2f after 60 iterations on the GPU, %.2f after 60 more on the "
                   "processor\n",
                   reward[0], reward[1]);
-    assert_true(reward[0] > 0.6 && reward[1] > 0.8);
+    assert_true(reward[0] > 0.9 && reward[1] > 0.9);
 }
 
 #endif

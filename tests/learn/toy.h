@@ -12,6 +12,7 @@
 #define TOY_FRAMES 2
 #define TOY_EPISODE 60
 #define TOY_ENVS_MAX 64
+#define TOY_PERIOD 0.1 /* [s] */
 
 typedef struct {
     double x[2], v[2], last[2];
@@ -22,7 +23,7 @@ typedef struct {
 typedef struct {
     int envs;
     ToyEnv env[TOY_ENVS_MAX];
-    double reward; /* mean of the last rollout */
+    double reward; /* [1/s] mean of the last rollout */
 } Toy;
 
 static inline PolicyDef toy_policy_def(void) {
@@ -80,8 +81,8 @@ static inline double toy_step(ToyEnv *env, const float *action) {
     double reward = 0.0;
     for (int i = 0; i < 2; i++) {
         double a = action[i] < -2.0f ? -2.0 : action[i] > 2.0f ? 2.0 : action[i];
-        env->v[i] += 0.1 * (4.0 * a - 0.5 * env->v[i]);
-        env->x[i] += 0.1 * env->v[i];
+        env->v[i] += TOY_PERIOD * (4.0 * a - 0.5 * env->v[i]);
+        env->x[i] += TOY_PERIOD * env->v[i];
         env->last[i] = a;
         reward += 0.5 * exp(-4.0 * env->x[i] * env->x[i]);
     }
@@ -106,11 +107,12 @@ static inline void toy_rollout(Toy *toy, Ppo *ppo) {
         for (int e = 0; e < b->envs; e++) {
             const int64_t i = (int64_t)t * b->envs + e;
             ToyEnv *env = &toy->env[e];
-            b->reward[i] = (float)toy_step(env, b->action + i * 2);
+            const double rate = toy_step(env, b->action + i * 2); /* [1/s] */
+            b->reward[i] = (float)(TOY_PERIOD * rate);
             b->timeout[i] = env->step >= TOY_EPISODE;
             b->done[i] = b->timeout[i] || fabs(env->x[0]) > 3.0 || fabs(env->x[1]) > 3.0;
             b->valid[i] = 1;
-            toy->reward += b->reward[i] / ((double)b->steps * b->envs);
+            toy->reward += rate / ((double)b->steps * b->envs);
             if (b->done[i]) {
                 toy_reset(env, e);
             }
