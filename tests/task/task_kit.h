@@ -1,0 +1,170 @@
+/* What the tests of the task layer share: the robot, one environment with its workspace, states and
+ * terrains made by hand, comparisons that name what differs. */
+#ifndef TASK_KIT_H
+#define TASK_KIT_H
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/random.h"
+#include "robot/robot.h"
+#include "task/task.h"
+
+#define KIT_MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define KIT_PI 3.141592653589793
+
+/* Joints of one leg. */
+enum { HIP_ROLL, HIP_YAW, HIP_PITCH, KNEE, ANKLE_PITCH, ANKLE_ROLL, LEG_JOINTS };
+
+static Robot *robot;
+
+static inline int kit_setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    robot = robot_create(KIT_MODEL, &error);
+    if (!robot) {
+        fprintf(stderr, "%s\n", error.text);
+    }
+    return robot == NULL;
+}
+
+static inline int kit_teardown(void **unused) {
+    (void)unused;
+    robot_destroy(robot);
+    return 0;
+}
+
+/* Fails with the name and both numbers. */
+static inline void expect_near(const char *what, double got, double wanted, double tolerance) {
+    if (!(fabs(got - wanted) <= tolerance)) {
+        fail_msg("%s: %.12g instead of %.12g (tolerance %.1g)", what, got, wanted, tolerance);
+    }
+}
+
+/* The same for entry i of an array. */
+static inline void expect_entry(const char *what, int i, double got, double wanted,
+                                double tolerance) {
+    char name[96];
+    snprintf(name, sizeof name, "%s[%d]", what, i);
+    expect_near(name, got, wanted, tolerance);
+}
+
+/* ---- one environment ---- */
+
+typedef struct {
+    TaskDef def;
+    TaskEnv *env;
+    RobotSim *sim;
+    float history[TASK_HISTORY];
+    float critic[TASK_CRITIC];
+    float estimate[TASK_ESTIMATES];
+    float frame[TASK_OBSERVATION];
+    TaskView view;
+} Rig;
+
+/* Nominal robot, no noise, no latency, no push, no help, starts at rest in the default pose. */
+static inline TaskDef kit_quiet_def(void) {
+    TaskDef def = task_def_default();
+    task_def_make_nominal(&def);
+    def.observe_noise = 0;
+    def.randomize.latency[0] = def.randomize.latency[1] = 0;
+    def.randomize.initial_joint = def.randomize.initial_velocity = 0;
+    return def;
+}
+
+static inline void rig_open(Rig *rig, const TaskDef *def, uint64_t seed, uint32_t index) {
+    MildError error = {0};
+    rig->def = *def;
+    rig->env = aligned_alloc(64, task_env_bytes(def, robot));
+    rig->sim = robot_sim_create(robot, def->physics_dt, &error);
+    assert_non_null(rig->env);
+    assert_non_null(rig->sim);
+    rig->view = (TaskView){rig->history, rig->critic, rig->estimate, rig->frame};
+    task_env_init(rig->env, &rig->def, robot, seed, index);
+}
+
+static inline void rig_close(Rig *rig) {
+    robot_sim_destroy(rig->sim);
+    free(rig->env);
+}
+
+static inline MildTerrain kit_sand(void) {
+    MildMaterial sand = mild_material_default();
+    return mild_terrain_uniform(&sand);
+}
+
+/* An episode on level loose sand under a command that stays. */
+static inline void rig_start(Rig *rig, double vx, double vy, double wz) {
+    MildTerrain terrain = kit_sand();
+    rig->env->command_frozen = 1;
+    rig->env->command[0] = vx;
+    rig->env->command[1] = vy;
+    rig->env->command[2] = wz;
+    task_env_reset_on(rig->env, &rig->def, robot, rig->sim, &terrain, 0, &rig->view);
+}
+
+static inline void rig_open_quiet(Rig *rig, double vx) {
+    TaskDef def = kit_quiet_def();
+    rig_open(rig, &def, 3, 0);
+    rig_start(rig, vx, 0, 0);
+}
+
+/* One policy step that draws no new episode. */
+static inline TaskStep rig_step(Rig *rig, const float *action) {
+    static const float zero[TASK_ACTIONS];
+    return task_env_step(rig->env, &rig->def, robot, rig->sim, action ? action : zero, 0,
+                         &rig->view, NULL);
+}
+
+/* Joints without torque: in the air the robot then falls without turning or bending. */
+static inline void rig_go_limp(Rig *rig) {
+    memset(rig->def.kp, 0, sizeof rig->def.kp);
+    memset(rig->def.kd, 0, sizeof rig->def.kd);
+}
+
+/* ---- states ---- */
+
+/* Quaternion w x y z of yaw, then pitch, then roll. */
+static inline void kit_turn(RobotState *state, double yaw, double pitch, double roll) {
+    double cy = cos(0.5 * yaw), sy = sin(0.5 * yaw);
+    double cp = cos(0.5 * pitch), sp = sin(0.5 * pitch);
+    double cr = cos(0.5 * roll), sr = sin(0.5 * roll);
+    state->qpos[3] = cy * cp * cr + sy * sp * sr;
+    state->qpos[4] = cy * cp * sr - sy * sp * cr;
+    state->qpos[5] = cy * sp * cr + sy * cp * sr;
+    state->qpos[6] = sy * cp * cr - cy * sp * sr;
+}
+
+/* Default pose at rest, base `height` above z = 0. */
+static inline RobotState kit_state(double height) {
+    RobotState state = {.qpos = {0, 0, height, 1, 0, 0, 0}};
+    memcpy(state.qpos + 7, robot_default_pose(robot), sizeof(double) * ROBOT_JOINTS);
+    return state;
+}
+
+/* Turned, bent and in motion; all of it different from draw to draw. Joints inside their ranges. */
+static inline RobotState kit_moving_state(double height, uint32_t draw) {
+    Random r = random_at(77, draw, 0);
+    RobotState state = kit_state(height);
+    state.qpos[0] = random_uniform(&r, -2, 2);
+    state.qpos[1] = random_uniform(&r, -2, 2);
+    kit_turn(&state, random_uniform(&r, -3, 3), random_uniform(&r, -0.3, 0.3),
+             random_uniform(&r, -0.3, 0.3));
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        state.qpos[7 + i] += random_uniform(&r, -0.2, 0.2);
+    }
+    for (int i = 0; i < ROBOT_NV; i++) {
+        state.qvel[i] = random_uniform(&r, -1, 1);
+    }
+    return state;
+}
+
+#endif

@@ -1,0 +1,99 @@
+/* Gait clock, schedule, wanted height and reference motion, by hand (docs/task.md section 7). */
+#include "task_kit.h"
+
+static void standing_commands(void **unused) {
+    (void)unused;
+    const double none[3] = {0}, small[3] = {0.0999, -0.0999, 0.0999};
+    assert_true(task_is_standing(none));
+    assert_true(task_is_standing(small));
+    for (int i = 0; i < 3; i++) {
+        for (int sign = -1; sign <= 1; sign += 2) {
+            double command[3] = {0};
+            command[i] = 0.1001 * sign;
+            assert_false(task_is_standing(command));
+        }
+    }
+}
+
+/* Left stands in the first half of the period, right in the second. */
+static void schedule(void **unused) {
+    (void)unused;
+    const double first[] = {0, 0.01, 0.25, 0.4999}, second[] = {0.5, 0.51, 0.75, 0.9999};
+    for (int i = 0; i < 4; i++) {
+        assert_true(task_gait_stance(first[i], 0, ROBOT_FOOT_LEFT));
+        assert_false(task_gait_stance(first[i], 0, ROBOT_FOOT_RIGHT));
+        assert_false(task_gait_stance(second[i], 0, ROBOT_FOOT_LEFT));
+        assert_true(task_gait_stance(second[i], 0, ROBOT_FOOT_RIGHT));
+        for (int foot = 0; foot < ROBOT_FEET; foot++) {
+            assert_true(task_gait_stance(first[i], 1, foot));
+            assert_true(task_gait_stance(second[i], 1, foot));
+        }
+    }
+}
+
+/* 0.1 sin(pi s): s = 0.1, 0.2, 0.5 of the swing. */
+static void wanted_height(void **unused) {
+    (void)unused;
+    TaskDef def = task_def_default();
+    const double s[] = {0.1, 0.2, 0.5, 0.9}, wanted[] = {0.0309016994, 0.0587785252, 0.1,
+                                                         0.0309016994};
+    for (int i = 0; i < 4; i++) {
+        double phase = 0.5 * s[i];
+        expect_entry("right", i, task_gait_height(&def, phase, 0, ROBOT_FOOT_RIGHT), wanted[i],
+                     1e-9);
+        expect_entry("left", i, task_gait_height(&def, phase + 0.5, 0, ROBOT_FOOT_LEFT), wanted[i],
+                     1e-9);
+        expect_entry("left in stance", i, task_gait_height(&def, phase, 0, ROBOT_FOOT_LEFT), 0, 0);
+        expect_entry("right in stance", i, task_gait_height(&def, phase + 0.5, 0, ROBOT_FOOT_RIGHT),
+                     0, 0);
+        expect_entry("standing", i, task_gait_height(&def, phase, 1, ROBOT_FOOT_RIGHT), 0, 0);
+    }
+    expect_near("lift-off", task_gait_height(&def, 0, 0, ROBOT_FOOT_RIGHT), 0, 0);
+    def.swing_apex = 0.06;
+    expect_near("apex", task_gait_height(&def, 0.25, 0, ROBOT_FOOT_RIGHT), 0.06, 1e-12);
+}
+
+/* Which joints bend, by how much; all others keep the pose. */
+static void expect_reference(const TaskDef *def, double phase, int standing, int leg, double bend) {
+    double pose[ROBOT_JOINTS], q[ROBOT_JOINTS];
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        pose[i] = 0.01 * (i + 1);
+    }
+    task_gait_reference(def, pose, phase, standing, q);
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        int joint = i % LEG_JOINTS;
+        double turn = i / LEG_JOINTS != leg                         ? 0
+                      : joint == KNEE                               ? 2 * bend
+                      : joint == HIP_PITCH || joint == ANKLE_PITCH ? -bend
+                                                                    : 0;
+        expect_entry("reference", i, q[i], pose[i] + turn, 1e-8);
+    }
+}
+
+static void reference(void **unused) {
+    (void)unused;
+    TaskDef def = task_def_default();
+    expect_reference(&def, 0.25, 0, 1, 0.4);
+    expect_reference(&def, 0.75, 0, 0, 0.4);
+    expect_reference(&def, 1.0 / 12, 0, 1, 0.2); /* sin 30 degrees */
+    expect_reference(&def, 7.0 / 12, 0, 0, 0.2);
+    expect_reference(&def, 0.25, 1, 1, 0);
+    expect_reference(&def, 0.0159, 0, 1, 0); /* sin = 0.0997: double support */
+    expect_reference(&def, 0.0161, 0, 1, 0.0403947365);
+    expect_reference(&def, 0.9839, 0, 0, 0.0403947365);
+    expect_reference(&def, 0.9841, 0, 0, 0);
+    def.reward.reference_amplitude = 0.26;
+    expect_reference(&def, 0.25, 0, 1, 0.26);
+    def.double_support = 0.6;
+    expect_reference(&def, 1.0 / 12, 0, 1, 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(standing_commands),
+        cmocka_unit_test(schedule),
+        cmocka_unit_test(wanted_height),
+        cmocka_unit_test(reference),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
+}

@@ -1,0 +1,375 @@
+/* Every reward term against numbers worked out by hand from docs/task.md section 8, weights
+ * included, at a good and at bad motions; their sum and its clip. */
+#include "task_kit.h"
+
+/* Left foot stands, right foot is in the middle of its swing (phase 1/4), default pose, upright, at
+ * rest, nothing commanded, feet and knees and base where they should be. */
+typedef struct {
+    TaskDef def;
+    TaskEnv env;
+    TaskMotion motion;
+} Scene;
+
+static Scene scene;
+
+static TaskMotion *new_scene(void) {
+    memset(&scene, 0, sizeof scene);
+    scene.def = task_def_default();
+    scene.env.phase = 0.25;
+    TaskMotion *m = &scene.motion;
+    m->def = &scene.def;
+    m->env = &scene.env;
+    m->pose = robot_default_pose(robot);
+    memcpy(m->q, m->pose, sizeof m->q);
+    m->gravity[2] = -1;
+    m->base_height = 0.83;
+    m->foot_distance = m->knee_distance = 0.2;
+    m->contact[0] = m->stance[0] = 1;
+    m->wanted_height[1] = 0.08;
+    return m;
+}
+
+static double term(int which) {
+    double terms[TASK_REWARD_COUNT];
+    task_reward(&scene.motion, terms);
+    return terms[which];
+}
+
+/* The weighted term, per second. 1e-7: the hand's numbers have eight digits. */
+static void expect_term(int which, const char *motion, double wanted) {
+    char what[96];
+    snprintf(what, sizeof what, "%s, %s", task_reward_names[which], motion);
+    expect_near(what, term(which), wanted, 1e-7 * fmax(fabs(wanted), 1e-3));
+}
+
+static void set_velocity(double vx, double vy, double wz) {
+    scene.env.smooth_velocity[0] = vx;
+    scene.env.smooth_velocity[1] = vy;
+    scene.env.smooth_velocity[2] = wz;
+}
+
+static void set_command(double vx, double vy, double wz) {
+    scene.env.command[0] = vx;
+    scene.env.command[1] = vy;
+    scene.env.command[2] = wz;
+}
+
+/* f(0.2) = (e^-0.2 + e^-2)/2 = 0.47703302, f(0.1) = (e^-0.05 + e^-1)/2 = 0.65955443. */
+static void linear_velocity(void **unused) {
+    (void)unused;
+    new_scene();
+    set_command(0.6, 0.1, 0);
+    set_velocity(0.6, 0.1, 0);
+    expect_term(REWARD_linear_velocity, "as commanded", 2.0);
+    set_velocity(0.8, 0.1, 0);
+    expect_term(REWARD_linear_velocity, "0.2 m/s too fast", 0.9540660363);
+    set_velocity(0.4, 0.1, 0);
+    expect_term(REWARD_linear_velocity, "0.2 m/s too slow", 0.9540660363);
+    set_velocity(0.8, 0.0, 0);
+    expect_term(REWARD_linear_velocity, "too fast and aside", 0.6292584835);
+    set_velocity(-0.6, -0.1, 0);
+    expect_term(REWARD_linear_velocity, "the opposite way", 0.0003590770736);
+    set_velocity(0.6, 0.1, 3);
+    expect_term(REWARD_linear_velocity, "turning is another term's", 2.0);
+    scene.def.reward.tracking_sharpness = 2;
+    scene.def.reward.tracking_width = 0.3;
+    set_velocity(0.8, 0.0, 0);
+    expect_term(REWARD_linear_velocity, "sharpness 2, width 0.3", 1.2187047018);
+}
+
+/* f(0.4) = (e^-0.8 + e^-4)/2 = 0.23382230. */
+static void yaw_rate(void **unused) {
+    (void)unused;
+    new_scene();
+    set_command(0, 0, -0.3);
+    set_velocity(0, 0, -0.3);
+    expect_term(REWARD_yaw_rate, "as commanded", 1.1);
+    set_velocity(0, 0, 0.1);
+    expect_term(REWARD_yaw_rate, "0.4 rad/s off", 0.2572045317);
+    set_velocity(0, 0, 0.3);
+    expect_term(REWARD_yaw_rate, "the opposite way", 0.0922777022);
+    set_velocity(5, 5, -0.3);
+    expect_term(REWARD_yaw_rate, "walking is another term's", 1.1);
+}
+
+/* (pi/2) 0.08/0.10 = 1.25663706 at the wanted height, times 2.4. */
+static void feet_clearance(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    m->foot_height[0] = 0.3; /* the standing foot's height does not matter */
+    m->foot_height[1] = 0.08;
+    expect_term(REWARD_feet_clearance, "wanted height", 3.0159289474);
+    m->foot_height[1] = 0.05;
+    expect_term(REWARD_feet_clearance, "30 mm too low", 1.8849555922);
+    m->foot_height[1] = 0.10;
+    expect_term(REWARD_feet_clearance, "20 mm too high", 2.6389378290);
+    m->foot_height[1] = 0.50;
+    expect_term(REWARD_feet_clearance, "far too high: 0.3 m counts", -2.6389378290);
+    m->foot_height[1] = -0.02;
+    expect_term(REWARD_feet_clearance, "sunk", 0);
+    m->foot_height[1] = 0.05;
+    scene.def.swing_apex = 0.2;
+    expect_term(REWARD_feet_clearance, "twice the apex", 0.9424777961);
+    scene.def.swing_apex = 0.1;
+    m->stance[0] = 0; /* both swing: the sum, not the mean */
+    m->foot_height[0] = 0.02;
+    m->wanted_height[0] = 0.03;
+    expect_term(REWARD_feet_clearance, "two feet", 2.6389378290);
+    m->stance[0] = m->stance[1] = 1;
+    expect_term(REWARD_feet_clearance, "both stand", 0);
+}
+
+static void gait(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    expect_term(REWARD_gait, "both as scheduled", 1.4);
+    m->contact[1] = 1;
+    expect_term(REWARD_gait, "the right drags", 0.49);
+    m->contact[0] = 0;
+    expect_term(REWARD_gait, "both wrong", -0.42);
+    m->either[0] = 1;
+    expect_term(REWARD_gait, "left in double support", 0.49);
+    m->either[1] = 1;
+    expect_term(REWARD_gait, "double support", 1.4);
+}
+
+static void slip(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    m->foot_speed[1] = 0.7;
+    expect_term(REWARD_slip, "only the foot in the air moves", 0);
+    m->foot_speed[0] = 0.3;
+    expect_term(REWARD_slip, "the left slips", -0.03);
+    m->contact[1] = 1;
+    expect_term(REWARD_slip, "both slip", -0.1);
+}
+
+static void base_acceleration(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    expect_term(REWARD_base_acceleration, "steady", 0.2);
+    m->twist_change = 0.5;
+    expect_term(REWARD_base_acceleration, "a jolt of 0.5", 0.0446260320);
+}
+
+/* joint 0: 0.5^2 + (1 - 1 - 0.25)^2 = 0.3125; joint 11: 0.75^2 + (-0.25 - 1 + 0.125)^2 = 1.828125.
+ */
+static void action_smoothness(void **unused) {
+    (void)unused;
+    new_scene();
+    for (int age = 0; age < 3; age++) {
+        scene.env.action[age][5] = 2;
+    }
+    expect_term(REWARD_action_smoothness, "constant", 0);
+    const float first[3] = {1, 0.5f, -0.25f}, last[3] = {-0.25f, 0.5f, 0.125f};
+    for (int age = 0; age < 3; age++) {
+        scene.env.action[age][0] = first[age];
+    }
+    expect_term(REWARD_action_smoothness, "one joint", -0.0009375);
+    for (int age = 0; age < 3; age++) {
+        scene.env.action[age][TASK_ACTIONS - 1] = last[age];
+    }
+    expect_term(REWARD_action_smoothness, "two joints", -0.006421875);
+}
+
+static void bend(int leg, double angle) {
+    double *q = scene.motion.q + LEG_JOINTS * leg;
+    q[HIP_PITCH] -= angle;
+    q[KNEE] += 2 * angle;
+    q[ANKLE_PITCH] -= angle;
+}
+
+/* In the middle of the swing the leg bends by 0.4 (1, 2, 1) rad: 0.4 sqrt(6) = 0.97979590 apart
+ * from the default pose. */
+static void reference_motion(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    expect_term(REWARD_reference_motion, "stiff leg", 0.0900150501);
+    bend(1, 0.4);
+    expect_term(REWARD_reference_motion, "as the reference", 2.2);
+    m->q[LEG_JOINTS + HIP_YAW] += 0.3;
+    expect_term(REWARD_reference_motion, "0.3 rad off", 1.0753855994);
+    new_scene();
+    bend(0, 0.4);
+    expect_term(REWARD_reference_motion, "the wrong leg", -0.0823201108);
+    scene.env.phase = 0.75;
+    expect_term(REWARD_reference_motion, "half a period later the right leg", 2.2);
+    scene.motion.standing = 1;
+    expect_term(REWARD_reference_motion, "bent while standing", 0.0900150501);
+    new_scene();
+    scene.motion.standing = 1;
+    expect_term(REWARD_reference_motion, "standing", 2.2);
+}
+
+/* y = 0.05 + 0.10: (e^-5 + e^-0.45)/2 - 0.01 sqrt(0.0125). */
+static void default_pose(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    expect_term(REWARD_default_pose, "default pose", 1.2);
+    m->q[HIP_ROLL] += 0.03;
+    m->q[HIP_YAW] -= 0.04;
+    expect_term(REWARD_default_pose, "left hip 0.05 rad off", 1.1158247859);
+    m->q[LEG_JOINTS + HIP_ROLL] -= 0.06;
+    m->q[LEG_JOINTS + HIP_YAW] += 0.08;
+    expect_term(REWARD_default_pose, "both hips", 0.3852780184);
+    m = new_scene();
+    m->q[KNEE] += 0.5;
+    expect_term(REWARD_default_pose, "bent knee", 1.194);
+}
+
+static void base_height(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    expect_term(REWARD_base_height, "nominal", 0.2);
+    m->base_height = 0.84;
+    expect_term(REWARD_base_height, "10 mm too high", 0.0735758882);
+    m->base_height = 0.82;
+    expect_term(REWARD_base_height, "10 mm too low", 0.0735758882);
+    scene.def.reward.nominal_height = 0.82;
+    expect_term(REWARD_base_height, "another nominal height", 0.2);
+}
+
+static void distances(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    expect_term(REWARD_feet_distance, "within", 0.2);
+    expect_term(REWARD_knee_distance, "within", 0.2);
+    m->foot_distance = 0.12;
+    expect_term(REWARD_feet_distance, "10 mm too near", 0.1367879441);
+    m->foot_distance = 0.28;
+    expect_term(REWARD_feet_distance, "20 mm too far", 0.1135335283);
+    m->foot_distance = -0.9;
+    expect_term(REWARD_feet_distance, "crossed", 0.1);
+    expect_term(REWARD_knee_distance, "the feet are another term's", 0.2);
+    m->foot_distance = 0.2;
+    m->knee_distance = 0.11;
+    expect_term(REWARD_knee_distance, "10 mm too near", 0.1367879441);
+    m->knee_distance = 0.28;
+    expect_term(REWARD_knee_distance, "20 mm too far", 0.1135335283);
+    expect_term(REWARD_feet_distance, "the knees are another term's", 0.2);
+}
+
+/* abs sum 0.07, norm 0.05: 1.5 (e^-0.7 + e^-0.2)/2. */
+static void orientation(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    expect_term(REWARD_orientation, "upright", 1.5);
+    m->gravity[0] = 0.03;
+    m->gravity[1] = -0.04;
+    expect_term(REWARD_orientation, "tilted", 0.9864870427);
+    m->gravity[0] = -0.03;
+    m->gravity[1] = 0.04;
+    expect_term(REWARD_orientation, "tilted the other way", 0.9864870427);
+}
+
+static void air_time(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    expect_term(REWARD_air_time, "no touchdown", 0);
+    m->landed_air_time = 0.3;
+    expect_term(REWARD_air_time, "0.3 s in the air, paid in one step of 0.01 s", 30);
+    m->standing = 1;
+    expect_term(REWARD_air_time, "standing", 0);
+}
+
+/* 0.25 (e^(-10 0.04) + e^(-5 0.5)). */
+static void base_motion(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    m->velocity[0] = 2;
+    m->velocity[1] = -2;
+    m->omega[2] = 9;
+    expect_term(REWARD_base_motion, "level, no roll, no pitch", 0.5);
+    m->velocity[2] = -0.2;
+    m->omega[0] = 0.3;
+    m->omega[1] = -0.4;
+    expect_term(REWARD_base_motion, "bobbing and rocking", 0.1881012612);
+}
+
+static void contact_force(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    m->foot_force[0] = 500;
+    m->foot_force[1] = 20;
+    expect_term(REWARD_contact_force, "up to 500 N", 0);
+    m->foot_force[0] = 700;
+    expect_term(REWARD_contact_force, "700 N", -4);
+    m->foot_force[1] = 1000;
+    expect_term(REWARD_contact_force, "700 and 1000 N: 200 and 400 count", -12);
+}
+
+static void efforts(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    m->torque[0] = 30;
+    m->torque[11] = -40;
+    expect_term(REWARD_torque, "30, -40 N m", -2.5e-7);
+    m->qd[0] = 3;
+    m->qd[11] = -4;
+    m->qd_before[0] = 3;
+    m->qd_before[11] = -4;
+    expect_term(REWARD_joint_speed, "3, -4 rad/s", -2.5e-4);
+    expect_term(REWARD_joint_acceleration, "steady", 0);
+    m->qd_before[0] = 2.7;   /* 30 rad/s^2 */
+    m->qd_before[11] = -3.6; /* -40 rad/s^2 */
+    expect_term(REWARD_joint_acceleration, "30, -40 rad/s^2", -1.25e-5);
+}
+
+static void collision(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    expect_term(REWARD_collision, "apart", 0);
+    m->foot_distance = 0.101;
+    m->knee_distance = 0.091;
+    expect_term(REWARD_collision, "just apart", 0);
+    m->foot_distance = 0.099;
+    expect_term(REWARD_collision, "feet", -1);
+    m->knee_distance = 0.089;
+    expect_term(REWARD_collision, "feet and knees", -2);
+    m->foot_distance = 0.2;
+    expect_term(REWARD_collision, "knees", -1);
+}
+
+/* Of the scene: f(0) f(0) 2 + 1.1 + 0 + 1.4 - 0 + 0.2 - 0 + 0.09001505 (stiff leg) + 1.2 + 3 times
+ * 0.2 + 1.5 + 0 + 0.5 = 8.59001505 per second. */
+static void sum_is_clipped(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    double terms[TASK_REWARD_COUNT];
+    expect_near("reward of a step", task_reward(m, terms), 0.0859001505, 1e-10);
+    m->foot_force[0] = m->foot_force[1] = 900; /* -16 */
+    expect_near("below zero", task_reward(m, terms), 0, 0);
+    expect_near("the term itself is not clipped", terms[REWARD_contact_force], -16, 1e-9);
+    scene.def.reward.clip_sum = 0;
+    expect_near("no clip", task_reward(m, terms), -0.0740998495, 1e-10);
+    scene.def.reward.weight[REWARD_contact_force] = 0;
+    expect_near("weight 0", task_reward(m, terms), 0.0859001505, 1e-10);
+    expect_near("weight 0", terms[REWARD_contact_force], 0, 0);
+    scene.def.reward.weight[REWARD_contact_force] = -0.01;
+    expect_near("half the weight", task_reward(m, terms), 0.0059001505, 1e-10);
+}
+
+/* The order of enum, names and functions is one. */
+static void names_follow_the_enum(void **unused) {
+    (void)unused;
+    assert_int_equal(TASK_REWARD_COUNT, 20);
+    assert_string_equal(task_reward_names[REWARD_linear_velocity], "linear_velocity");
+    assert_string_equal(task_reward_names[REWARD_reference_motion], "reference_motion");
+    assert_string_equal(task_reward_names[REWARD_collision], "collision");
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(names_follow_the_enum), cmocka_unit_test(linear_velocity),
+        cmocka_unit_test(yaw_rate),              cmocka_unit_test(feet_clearance),
+        cmocka_unit_test(gait),                  cmocka_unit_test(slip),
+        cmocka_unit_test(base_acceleration),     cmocka_unit_test(action_smoothness),
+        cmocka_unit_test(reference_motion),      cmocka_unit_test(default_pose),
+        cmocka_unit_test(base_height),           cmocka_unit_test(distances),
+        cmocka_unit_test(orientation),           cmocka_unit_test(air_time),
+        cmocka_unit_test(base_motion),           cmocka_unit_test(contact_force),
+        cmocka_unit_test(efforts),               cmocka_unit_test(collision),
+        cmocka_unit_test(sum_is_clipped),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
+}
