@@ -231,8 +231,8 @@ static void feet_motion(TaskEnv *env, const TaskDef *def, const RobotSim *sim, T
     m->base_height = robot_sim_qpos(sim)[2] - stance_height / (stances ? stances : 1);
 }
 
-static TaskMotion describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                  const RobotSim *sim, const double torque[ROBOT_JOINTS]) {
+TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                const RobotSim *sim, const double torque[ROBOT_JOINTS]) {
     TaskMotion m = {.def = def, .env = env, .pose = robot_default_pose(robot)};
     const double *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
     double heading = atan2(rotation[3], rotation[0]), c = cos(heading), s = sin(heading), twist[6],
@@ -301,7 +301,7 @@ static int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
                        const double torque[ROBOT_JOINTS], float *reward) {
     double terms[TASK_REWARD_COUNT];
     robot_sim_store(sim, &env->robot);
-    TaskMotion motion = describe_motion(env, def, robot, sim, torque);
+    TaskMotion motion = task_describe_motion(env, def, robot, sim, torque);
     *reward = (float)task_reward(&motion, terms);
     if (!isfinite(*reward)) {
         return 0;

@@ -81,7 +81,8 @@ typedef struct {
     float *frame;    /* [TASK_OBSERVATION] newest noisy frame: the decoder's target */
 } TaskView;
 
-/* Called after every physics step, before memory moves on: measures and pictures hang here. */
+/* Called after every physics step, when robot and ground memory are those of its end: measures and
+ * pictures hang here. The terrain's map is lent during the call. */
 typedef struct {
     void (*physics_step)(void *context, const TaskEnv *env, const RobotSim *sim,
                          const double *torque);
@@ -120,7 +121,7 @@ void task_read_motors(const RobotSim *sim, TaskReading *reading);
 void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
                   const TaskReading *reading, int first, const TaskView *view);
 
-/* Everything a reward term may look at, computed once per policy step (reward.c). */
+/* Everything a reward term may look at, computed once per policy step (env.c). */
 typedef struct {
     const TaskDef *def;
     const TaskEnv *env;
@@ -139,6 +140,11 @@ typedef struct {
     double foot_distance, knee_distance;
     int standing;
 } TaskMotion;
+/* What the policy step just made was like: the sim is at its end, env still holds base twist, joint
+ * speeds, smoothed velocity and air times of the step before and gets those of this one. torque: of
+ * the last physics step. */
+TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                const RobotSim *sim, const double torque[ROBOT_JOINTS]);
 /* Weighted terms per second into terms; returns the clipped sum times the period. */
 double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
 

@@ -108,8 +108,8 @@ typedef struct {
     RewardDef reward;
     RandomizeDef randomize;
     /* not of the config */
-    const MildMap *
-        map; /* borrowed: shape and pattern of soft ground; NULL: level. Rigid ground stays level */
+    const MildMap *map; /* borrowed: shape of the ground, and the pattern of the soft one; NULL:
+                           level, one material */
     int print_tiles; /* of prints, see mild_ground_bytes_prints */
 } TaskDef;
 

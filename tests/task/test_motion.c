@@ -1,0 +1,197 @@
+/* What the rewards look at: every entry of TaskMotion at states in motion against the engine's own
+ * functions or a hand's. */
+#include "task_oracle.h"
+
+#define TOLERANCE 1e-9
+
+static Rig rig;
+
+/* In the air, turned, bent and moving, above ground at z = 0.05. */
+static Oracle place(uint32_t draw) {
+    RobotState state = kit_moving_state(1.2, draw);
+    rig.env->robot = state;
+    rig.env->terrain.height = 0.05;
+    robot_sim_load(rig.sim, &state, &rig.env->variation);
+    robot_sim_sole_clearance(rig.sim, &rig.env->terrain);
+    return oracle_of(rig.sim);
+}
+
+static TaskMotion describe(void) {
+    static const double torque[ROBOT_JOINTS];
+    return task_describe_motion(rig.env, &rig.def, robot, rig.sim, torque);
+}
+
+static void base_and_joints(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        Oracle o = place(draw);
+        double torque[ROBOT_JOINTS];
+        for (int i = 0; i < ROBOT_JOINTS; i++) {
+            rig.env->joint_speed[i] = 0.1 * i;
+            torque[i] = 3 - i;
+        }
+        TaskMotion m = task_describe_motion(rig.env, &rig.def, robot, rig.sim, torque);
+        for (int i = 0; i < 3; i++) {
+            expect_entry("velocity", i, m.velocity[i], o.heading[i], TOLERANCE);
+            expect_entry("omega", i, m.omega[i], o.omega[i], TOLERANCE);
+            expect_entry("gravity", i, m.gravity[i], o.gravity[i], TOLERANCE);
+        }
+        const double *pose = robot_default_pose(robot);
+        for (int i = 0; i < ROBOT_JOINTS; i++) {
+            expect_entry("q", i, m.q[i], rig.env->robot.qpos[7 + i], 0);
+            expect_entry("qd", i, m.qd[i], rig.env->robot.qvel[6 + i], 0);
+            expect_entry("qd_before", i, m.qd_before[i], 0.1 * i, 0);
+            expect_entry("joint_speed", i, rig.env->joint_speed[i], m.qd[i], 0);
+            expect_entry("torque", i, m.torque[i], torque[i], 0);
+            expect_entry("pose", i, m.pose[i], pose[i], 0);
+        }
+        assert_ptr_equal(m.env, rig.env);
+        assert_ptr_equal(m.def, &rig.def);
+    }
+    rig_close(&rig);
+}
+
+/* Differences of 0.1, 0.2, 0.2 m/s and 0.4 rad/s: norm 0.5; each component counts. */
+static void change_of_twist(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    const double step[6] = {0.1, -0.2, 0.2, 0, -0.4, 0};
+    for (int k = -1; k < 6; k++) {
+        place(3);
+        double wanted = k < 0 ? 0.5 : 0.3;
+        for (int i = 0; i < 6; i++) {
+            double change = k < 0 ? step[i] : i == k ? 0.3 : 0;
+            rig.env->base_twist[i] = rig.env->robot.qvel[i] - change;
+        }
+        expect_entry("twist_change", k, describe().twist_change, wanted, TOLERANCE);
+        for (int i = 0; i < 6; i++) {
+            expect_entry("base_twist", i, rig.env->base_twist[i], rig.env->robot.qvel[i], 0);
+        }
+        expect_near("the next one", describe().twist_change, 0, 0);
+    }
+    rig_close(&rig);
+}
+
+/* One step of 0.01 s moves a mean over 0.4 s by a fortieth of the way. */
+static void smoothed_velocity(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    Oracle o = place(4);
+    const double before[3] = {0.3, -0.2, 0.7}, now[3] = {o.heading[0], o.heading[1], o.omega[2]};
+    memcpy(rig.env->smooth_velocity, before, sizeof before);
+    describe();
+    for (int i = 0; i < 3; i++) {
+        expect_entry("smooth", i, rig.env->smooth_velocity[i],
+                     before[i] + 0.025 * (now[i] - before[i]), TOLERANCE);
+    }
+    rig.def.reward.tracking_time = 0.01;
+    describe();
+    for (int i = 0; i < 3; i++) {
+        expect_entry("not smoothed", i, rig.env->smooth_velocity[i], now[i], TOLERANCE);
+    }
+    rig_close(&rig);
+}
+
+static void feet_and_knees(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        Oracle o = place(draw);
+        oracle_set_force(rig.sim, 0, 3, -4, 12);
+        oracle_set_force(rig.sim, 1, 30, -60, -20);
+        TaskMotion m = describe();
+        for (int f = 0; f < ROBOT_FEET; f++) {
+            expect_entry("foot_height", f, m.foot_height[f], o.sole_lowest[f] - 0.05, TOLERANCE);
+            expect_entry("foot_speed", f, m.foot_speed[f],
+                         hypot(o.sole_velocity[f][0], o.sole_velocity[f][1]), TOLERANCE);
+        }
+        expect_near("foot_force[0]", m.foot_force[0], 13, TOLERANCE);
+        expect_near("foot_force[1]", m.foot_force[1], 70, TOLERANCE);
+        expect_near("foot_distance", m.foot_distance, o.foot_distance, TOLERANCE);
+        expect_near("knee_distance", m.knee_distance, o.knee_distance, TOLERANCE);
+    }
+    rig_close(&rig);
+}
+
+/* Above the soles that stand by the clock: left at phase 1/4, right at 3/4, both when standing. */
+static void schedule(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    Oracle o = place(5);
+    double z = rig.env->robot.qpos[2];
+    rig.env->phase = 0.25;
+    TaskMotion m = describe();
+    assert_false(m.standing);
+    assert_true(m.stance[0] && !m.stance[1]);
+    expect_near("wanted left", m.wanted_height[0], 0, 0);
+    expect_near("wanted right", m.wanted_height[1], 0.1, TOLERANCE);
+    expect_near("base above the left sole", m.base_height, z - o.sole[0][2], TOLERANCE);
+    rig.env->phase = 0.75;
+    m = describe();
+    assert_true(!m.stance[0] && m.stance[1]);
+    expect_near("base above the right sole", m.base_height, z - o.sole[1][2], TOLERANCE);
+    memset(rig.env->command, 0, sizeof rig.env->command);
+    m = describe();
+    assert_true(m.standing && m.stance[0] && m.stance[1]);
+    expect_near("base above both", m.base_height, z - 0.5 * (o.sole[0][2] + o.sole[1][2]),
+                TOLERANCE);
+    expect_near("wanted left", m.wanted_height[0], 0, 0);
+    rig_close(&rig);
+}
+
+/* abs(sin) < 0.1 up to a phase of 0.01594. */
+static void double_support(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    place(6);
+    const double phase[] = {0, 0.0159, 0.0160, 0.4840, 0.4841, 0.5159, 0.5160, 0.9840, 0.9841};
+    const int either[] = {1, 1, 0, 0, 1, 1, 0, 0, 1};
+    for (int i = 0; i < 9; i++) {
+        rig.env->phase = phase[i];
+        TaskMotion m = describe();
+        assert_true(m.either[0] == either[i] && m.either[1] == either[i]);
+    }
+    memset(rig.env->command, 0, sizeof rig.env->command);
+    TaskMotion m = describe();
+    assert_true(!m.either[0] && !m.either[1]); /* standing: both are to be down */
+    rig_close(&rig);
+}
+
+/* Contact is a vertical force above 5 N; sideways forces are none. */
+static void contact_and_air_time(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    place(7);
+    rig.env->air_time[0] = 0.30;
+    rig.env->air_time[1] = 0.10;
+    oracle_set_force(rig.sim, 0, 100, 0, 4.99);
+    oracle_set_force(rig.sim, 1, 0, 0, -100);
+    TaskMotion m = describe();
+    assert_true(!m.contact[0] && !m.contact[1]);
+    expect_near("nobody landed", m.landed_air_time, 0, 0);
+    expect_near("0.01 s longer in the air", rig.env->air_time[0], 0.31, TOLERANCE);
+    expect_near("0.01 s longer in the air", rig.env->air_time[1], 0.11, TOLERANCE);
+    oracle_set_force(rig.sim, 0, 0, 0, 5.01);
+    m = describe();
+    assert_true(m.contact[0] && !m.contact[1]);
+    expect_near("the left landed", m.landed_air_time, 0.31, TOLERANCE);
+    expect_near("it is on the ground", rig.env->air_time[0], 0, 0);
+    expect_near("the right is not", rig.env->air_time[1], 0.12, TOLERANCE);
+    expect_near("paid once", describe().landed_air_time, 0, 0);
+    rig.env->air_time[0] = 0.2;
+    rig.env->air_time[1] = 0.7; /* at most half a gait period, 0.4 s */
+    oracle_set_force(rig.sim, 1, 0, 0, 300);
+    expect_near("both landed", describe().landed_air_time, 0.6, TOLERANCE);
+    rig_close(&rig);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(base_and_joints),   cmocka_unit_test(change_of_twist),
+        cmocka_unit_test(smoothed_velocity), cmocka_unit_test(feet_and_knees),
+        cmocka_unit_test(schedule),          cmocka_unit_test(double_support),
+        cmocka_unit_test(contact_and_air_time),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
+}
