@@ -1,0 +1,554 @@
+/* Every entry of the observation, the estimates and the critic's input at states in motion, one by
+ * one, against the engine's own functions or a hand's; noise; history; mirror. */
+#include "task_oracle.h"
+
+#define TOLERANCE 2e-6 /* [-] of a float of about 10 */
+
+static Rig rig;
+static const double flat_scale[3] = {2, 2, 1}; /* of the command */
+
+/* Readings that differ from the truth, so that one sees who looks at which. */
+static TaskReading other_reading(void) {
+    TaskReading reading;
+    for (int i = 0; i < 3; i++) {
+        reading.omega[i] = 0.5 + i;
+        reading.gravity[i] = 0.1 - 0.3 * i;
+    }
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        reading.q[i] = 0.03 * i - 0.2;
+        reading.qd[i] = 2 - 0.5 * i;
+    }
+    return reading;
+}
+
+/* The numbers of an episode, all of them different. */
+static void fill_env(TaskEnv *env) {
+    const double command[3] = {0.7, -0.2, 0.4}, seen[3] = {0.55, 0.25, -1.1};
+    memcpy(env->command, command, sizeof command);
+    memcpy(env->command_seen, seen, sizeof seen);
+    env->phase = 0.3;
+    for (int i = 0; i < TASK_ACTIONS; i++) {
+        env->action[0][i] = 0.25f * (float)(i - 5);
+        env->action[1][i] = 9;
+    }
+    for (int i = 0; i < 6; i++) {
+        env->push[i] = 0.01 * (i + 1);
+    }
+    env->variation.base_mass_add = 1.5;
+    env->variation.armature_scale = 1.2;
+    env->variation.rigid_friction = 0.45;
+    for (int i = 0; i < 3; i++) {
+        env->variation.com_offset[i] = 0.002 * (i + 1);
+        env->smooth_velocity[i] = 0.4 - 0.3 * i;
+    }
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        env->strength[i] = 0.93;
+    }
+    env->lag_command = 1;
+    env->lag_motor = 2;
+    env->lag_imu = 3;
+    env->assist_level = 0.5;
+    env->assist_draw = 0.8;
+}
+
+/* In the air, above ground at 0.05 m. */
+static Oracle place(uint32_t draw) {
+    RobotState state = kit_moving_state(1.2, draw);
+    rig.env->robot = state;
+    rig.env->terrain.height = 0.05;
+    robot_sim_load(rig.sim, &state, &rig.env->variation);
+    robot_sim_sole_clearance(rig.sim, &rig.env->terrain);
+    return oracle_of(rig.sim);
+}
+
+static void look(const TaskReading *reading) {
+    task_observe(rig.env, &rig.def, robot, rig.sim, reading, 0, &rig.view);
+}
+
+static void expect_frame(const char *what, const float *frame, const double omega[3],
+                         const double gravity[3], const double *q, const double *qd,
+                         const double clock[2]) {
+    const double *pose = robot_default_pose(robot);
+    for (int i = 0; i < 3; i++) {
+        expect_entry(what, i, (double)frame[i], omega[i], TOLERANCE);
+        expect_entry(what, 3 + i, (double)frame[3 + i], flat_scale[i] * rig.env->command_seen[i],
+                     TOLERANCE);
+        expect_entry(what, 6 + i, (double)frame[6 + i], gravity[i], TOLERANCE);
+    }
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        expect_entry(what, 9 + i, (double)frame[9 + i], q[i] - pose[i], TOLERANCE);
+        expect_entry(what, 21 + i, (double)frame[21 + i], qd[i] / 20, TOLERANCE);
+        expect_entry(what, 33 + i, (double)frame[33 + i], 0.25 * (i - 5), 0);
+    }
+    expect_entry(what, 45, (double)frame[45], clock[0], TOLERANCE);
+    expect_entry(what, 46, (double)frame[46], clock[1], TOLERANCE);
+}
+
+/* sin, cos of 108 degrees at phase 0.3. */
+static const double clock_at_03[2] = {0.9510565163, -0.3090169944}, no_clock[2] = {0, 0};
+
+/* The actor sees the readings, the critic the truth. */
+static void frame(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    TaskReading reading = other_reading();
+    for (uint32_t draw = 0; draw < 10; draw++) {
+        Oracle o = place(draw);
+        fill_env(rig.env);
+        look(&reading);
+        expect_frame("frame", rig.frame, reading.omega, reading.gravity, reading.q, reading.qd,
+                     clock_at_03);
+        expect_frame("critic", rig.critic, o.omega, o.gravity, rig.env->robot.qpos + 7,
+                     rig.env->robot.qvel + 6, clock_at_03);
+    }
+    rig_close(&rig);
+}
+
+static void readings(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    Oracle o = place(11);
+    TaskReading reading;
+    task_read_imu(rig.sim, &reading);
+    task_read_motors(rig.sim, &reading);
+    for (int i = 0; i < 3; i++) {
+        expect_entry("omega", i, reading.omega[i], o.omega[i], 1e-9);
+        expect_entry("gravity", i, reading.gravity[i], o.gravity[i], 1e-9);
+    }
+    assert_memory_equal(reading.q, rig.env->robot.qpos + 7, sizeof reading.q);
+    assert_memory_equal(reading.qd, rig.env->robot.qvel + 6, sizeof reading.qd);
+    rig_close(&rig);
+}
+
+/* Off by key, and (0, 0) while the command that the policy sees stands. */
+static void the_clock(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    TaskReading reading = other_reading();
+    Oracle o = place(1);
+    fill_env(rig.env);
+    memset(rig.env->command, 0, sizeof rig.env->command); /* not seen yet */
+    look(&reading);
+    expect_frame("standing unseen", rig.critic, o.omega, o.gravity, rig.env->robot.qpos + 7,
+                 rig.env->robot.qvel + 6, clock_at_03);
+    fill_env(rig.env);
+    memset(rig.env->command_seen, 0, sizeof rig.env->command_seen);
+    look(&reading);
+    expect_frame("standing", rig.frame, reading.omega, reading.gravity, reading.q, reading.qd,
+                 no_clock);
+    fill_env(rig.env);
+    rig.def.clock = 0;
+    look(&reading);
+    expect_frame("no clock", rig.frame, reading.omega, reading.gravity, reading.q, reading.qd,
+                 no_clock);
+    expect_frame("no clock", rig.critic, o.omega, o.gravity, rig.env->robot.qpos + 7,
+                 rig.env->robot.qvel + 6, no_clock);
+    rig_close(&rig);
+}
+
+/* Base velocity times 4, sole velocities, heights above the ground times 10. */
+static void estimates(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    TaskReading reading = other_reading();
+    for (uint32_t draw = 0; draw < 10; draw++) {
+        Oracle o = place(draw);
+        look(&reading);
+        double wanted[TASK_ESTIMATES];
+        for (int i = 0; i < 3; i++) {
+            wanted[i] = 4 * o.velocity[i];
+        }
+        for (int f = 0; f < ROBOT_FEET; f++) {
+            oracle_to_base(&o, o.sole_velocity[f], wanted + 3 + 3 * f);
+            wanted[9 + f] = 10 * (o.sole_lowest[f] - 0.05);
+        }
+        for (int i = 0; i < TASK_ESTIMATES; i++) {
+            expect_entry("estimate", i, (double)rig.estimate[i], wanted[i], 5 * TOLERANCE);
+            expect_entry("critic's estimate", i, (double)rig.critic[47 + i], wanted[i],
+                         5 * TOLERANCE);
+        }
+    }
+    rig_close(&rig);
+}
+
+/* Force in the base frame over 300 N, within +-5; contact; scheduled stance; mean depth times 10.
+ */
+static void feet_of_the_critic(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    TaskReading reading = other_reading();
+    for (uint32_t draw = 0; draw < 10; draw++) {
+        Oracle o = place(draw);
+        fill_env(rig.env);
+        const double force[ROBOT_FEET][3] = {{60, -90, 240}, {30, 15, -60}};
+        for (int f = 0; f < ROBOT_FEET; f++) {
+            RobotFoot *foot = oracle_set_force(rig.sim, f, force[f][0], force[f][1], force[f][2]);
+            foot->result.depth_mean = 0.03 + 0.01 * f;
+        }
+        look(&reading);
+        for (int f = 0; f < ROBOT_FEET; f++) {
+            double base[3];
+            const float *seen = rig.critic + 58 + 6 * f;
+            oracle_to_base(&o, force[f], base);
+            for (int i = 0; i < 3; i++) {
+                expect_entry("force", 3 * f + i, (double)seen[i], base[i] / 300, TOLERANCE);
+            }
+            expect_entry("contact", f, (double)seen[3], f == 0, 0);
+            expect_entry("stance", f, (double)seen[4], f == 0, 0); /* phase 0.3 */
+            expect_entry("depth", f, (double)seen[5], 0.3 + 0.1 * f, TOLERANCE);
+        }
+    }
+    rig_close(&rig);
+}
+
+static void limits_of_the_critic(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    RobotState state = kit_state(1.2);
+    robot_sim_load(rig.sim, &state, &rig.env->variation);
+    TaskReading reading = other_reading();
+    fill_env(rig.env);
+    rig.env->phase = 0.7;
+    oracle_set_force(rig.sim, 0, 1600, -1600, 4.99);
+    oracle_set_force(rig.sim, 1, 1490, -1490, 5.01);
+    look(&reading);
+    const double wanted[2][5] = {{5, -5, 4.99 / 300, 0, 0}, {14.9 / 3, -14.9 / 3, 5.01 / 300, 1, 1}};
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        for (int i = 0; i < 5; i++) {
+            expect_entry("foot", 5 * f + i, (double)rig.critic[58 + 6 * f + i], wanted[f][i],
+                         TOLERANCE);
+        }
+    }
+    memset(rig.env->command, 0, sizeof rig.env->command);
+    look(&reading);
+    assert_true(rig.critic[62] == 1 && rig.critic[68] == 1); /* standing: both scheduled down */
+    rig_close(&rig);
+}
+
+/* Two materials, each of its numbers different; the second lies where the base is. */
+static MildTerrain two_materials(double x, double y) {
+    MildMaterial first = mild_material_default(), second = first;
+    second.k_pen = 700;
+    second.sigma_cone = 0.12e6;
+    second.alpha = 1.0;
+    second.nu = 1.7;
+    second.c_g = 2.4;
+    second.c_d = 10;
+    second.phi = 0.55;
+    second.mu = 0.9;
+    second.k_drift = 1000;
+    second.b_drift = 0.03;
+    second.recovery = 0.25;
+    second.bed_depth = 0.12;
+    MildTerrain terrain = mild_terrain_uniform(&first);
+    terrain.materials[terrain.material_count++] = second;
+    MildPatch patch = {x - 0.05, x + 0.05, y - 0.05, y + 0.05, 1};
+    assert_int_equal(mild_terrain_add_patch(&terrain, &patch, NULL), MILD_OK);
+    terrain.height = 0.05;
+    return terrain;
+}
+
+static void episode_of_the_critic(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    TaskReading reading = other_reading();
+    place(12);
+    fill_env(rig.env);
+    const double *qpos = robot_sim_qpos(rig.sim);
+    rig.env->terrain = two_materials(qpos[0], qpos[1]);
+    rig.def.assist = 1;
+    const double ground[12] = {1.4, 1.2, 1.0, 1.7, 0.6, 0.5, 0.55, 0.9, 2.0, 0.3, 0.25, 1.2};
+    for (int rigid = 0; rigid < 2; rigid++) {
+        rig.env->variation.rigid = rigid;
+        look(&reading);
+        for (int i = 0; i < 6; i++) {
+            expect_entry("push", i, (double)rig.critic[70 + i], 0.01 * (i + 1), TOLERANCE);
+        }
+        expect_near("added mass", (double)rig.critic[76], 0.375, TOLERANCE);
+        for (int i = 0; i < 3; i++) {
+            expect_entry("centre of mass", i, (double)rig.critic[77 + i], 0.2 * (i + 1), TOLERANCE);
+        }
+        for (int i = 0; i < 12; i++) {
+            expect_entry("ground", i, (double)rig.critic[80 + i], rigid ? 0 : ground[i], TOLERANCE);
+        }
+        const double last[12] = {rigid, 1.15, 0.93, 1.2, 0.25, 0.5, 0.75, 0.45, 0.4, 0.4, 0.1, -0.2};
+        for (int i = 0; i < 12; i++) {
+            expect_entry("critic", 92 + i, (double)rig.critic[92 + i], last[i], TOLERANCE);
+        }
+    }
+    rig.def.assist = 0;
+    look(&reading);
+    expect_near("nobody helps", (double)rig.critic[100], 0, 0);
+    rig_close(&rig);
+}
+
+/* The one element of a concentric sole is shown as one of the raster's 77 cells. */
+static void concentric_ground(void **unused) {
+    (void)unused;
+    robot_set_model(robot, MILD_MODEL_CON_CONE);
+    rig_open_quiet(&rig, 0.5);
+    TaskReading reading = other_reading();
+    place(12);
+    const double *qpos = robot_sim_qpos(rig.sim);
+    rig.env->terrain = two_materials(qpos[0], qpos[1]);
+    MildMaterial *m = &rig.env->terrain.materials[1];
+    m->model = MILD_MODEL_CON_CONE;
+    m->k_pen *= 77;
+    m->k_drift *= 77;
+    m->b_drift *= 77;
+    look(&reading);
+    expect_near("k_pen", (double)rig.critic[80], 1.4, TOLERANCE);
+    expect_near("k_drift", (double)rig.critic[88], 2.0, TOLERANCE);
+    expect_near("b_drift", (double)rig.critic[89], 0.3, TOLERANCE);
+    rig_close(&rig);
+    robot_set_model(robot, MILD_MODEL_MILD);
+}
+
+/* After a step on the ground: the forces and the depth are those of the step's contact. */
+static void contact_reaches_the_critic(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    for (int t = 0; t < 20; t++) {
+        rig_step(&rig, NULL);
+    }
+    Oracle o = oracle_of(rig.sim);
+    const MildContactResult *contact = robot_sim_contact(rig.sim);
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        double base[3];
+        oracle_to_base(&o, contact->foot[f].force, base);
+        assert_true(base[2] > 50);
+        for (int i = 0; i < 3; i++) {
+            expect_entry("force", 3 * f + i, (double)rig.critic[58 + 6 * f + i], base[i] / 300,
+                         TOLERANCE);
+        }
+        expect_entry("depth", f, (double)rig.critic[63 + 6 * f], 10 * contact->foot[f].depth_mean,
+                     TOLERANCE);
+        expect_entry("height", f, (double)rig.estimate[9 + f], 10 * o.sole_lowest[f], TOLERANCE);
+        assert_true(rig.estimate[9 + f] < 0);
+    }
+    assert_memory_equal(rig.frame, rig.critic, sizeof rig.frame); /* neither noise nor latency */
+    rig_close(&rig);
+}
+
+/* ---- noise ---- */
+
+static double noise_limit(int i) {
+    return i < 3 ? 0.3 : i < 6 ? 0 : i < 9 ? 0.075 : i < 21 ? 0.03 : i < 33 ? 0.19 : 0;
+}
+
+/* Uniform: both ends nearly reached, mean 0, variance limit^2/3, no entry follows another. */
+static void noise(void **unused) {
+    (void)unused;
+    enum { DRAWS = 20000 };
+    rig_open_quiet(&rig, 0.5);
+    TaskReading reading = other_reading();
+    place(13);
+    fill_env(rig.env);
+    look(&reading);
+    float quiet[TASK_OBSERVATION];
+    memcpy(quiet, rig.frame, sizeof quiet);
+    rig.def.observe_noise = 1;
+    static double low[TASK_OBSERVATION], high[TASK_OBSERVATION], sum[TASK_OBSERVATION],
+        square[TASK_OBSERVATION], product[TASK_OBSERVATION][TASK_OBSERVATION];
+    TaskView view = {.frame = rig.frame};
+    for (int t = 0; t < DRAWS; t++) {
+        rig.env->tick = (uint32_t)t;
+        task_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &view);
+        for (int i = 0; i < TASK_OBSERVATION; i++) {
+            double x = (double)(rig.frame[i] - quiet[i]);
+            low[i] = fmin(low[i], x);
+            high[i] = fmax(high[i], x);
+            sum[i] += x;
+            square[i] += x * x;
+            for (int j = 0; j < i && t % 4 == 0; j++) {
+                product[i][j] += x * (double)(rig.frame[j] - quiet[j]);
+            }
+        }
+    }
+    double worst = 0;
+    for (int i = 0; i < TASK_OBSERVATION; i++) {
+        double a = noise_limit(i), sigma = a / sqrt(3);
+        expect_entry("lowest noise", i, low[i], -a, 0.002 * a + 1e-12);
+        expect_entry("greatest noise", i, high[i], a, 0.002 * a + 1e-12);
+        expect_entry("mean noise", i, sum[i] / DRAWS, 0, 4.5 * sigma / sqrt(DRAWS));
+        expect_entry("variance of the noise", i, square[i] / DRAWS, sigma * sigma,
+                     0.03 * sigma * sigma);
+        for (int j = 0; j < i && a > 0; j++) {
+            double b = noise_limit(j);
+            if (b > 0) {
+                double correlation = product[i][j] / (DRAWS / 4) / (sigma * b / sqrt(3));
+                worst = fmax(worst, fabs(correlation));
+            }
+        }
+    }
+    print_message("noise: largest correlation of two entries %.3f\n", worst);
+    assert_true(worst < 0.07); /* 5 sigma of 5000 draws */
+    look(&reading); /* the critic sees none of it */
+    Oracle o = oracle_of(rig.sim);
+    expect_frame("critic", rig.critic, o.omega, o.gravity, rig.env->robot.qpos + 7,
+                 rig.env->robot.qvel + 6, clock_at_03);
+    rig_close(&rig);
+}
+
+/* Another environment, tick or seed draws other noise. */
+static void noise_is_a_stream(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    TaskReading reading = other_reading();
+    rig.def.observe_noise = 1;
+    look(&reading);
+    float first[TASK_OBSERVATION];
+    memcpy(first, rig.frame, sizeof first);
+    look(&reading);
+    assert_memory_equal(first, rig.frame, sizeof first);
+    rig.env->tick++;
+    look(&reading);
+    assert_memory_not_equal(first, rig.frame, sizeof first);
+    rig.env->tick--;
+    rig.env->index++;
+    look(&reading);
+    assert_memory_not_equal(first, rig.frame, sizeof first);
+    rig.env->index--;
+    rig.env->seed++;
+    look(&reading);
+    assert_memory_not_equal(first, rig.frame, sizeof first);
+    rig_close(&rig);
+}
+
+/* ---- history ---- */
+
+/* Frame t has t in its first entry: the history's means are then means of counts. */
+static void expect_history(int stride, int frames) {
+    for (int i = 0; i < TASK_FRAMES; i++) {
+        double mean = 0;
+        int oldest = (TASK_FRAMES - 1 - i) * stride;
+        for (int k = 0; k < stride && oldest > 0; k++) {
+            mean += fmax(frames - 1 - (oldest - k), 0) / stride;
+        }
+        mean = oldest > 0 ? mean : frames - 1;
+        expect_entry("history", i, (double)rig.history[i * TASK_OBSERVATION], mean, 1e-4);
+        expect_entry("history's last entry", i, (double)rig.history[(i + 1) * TASK_OBSERVATION - 1],
+                     (double)rig.frame[46], 1e-6);
+    }
+}
+
+/* More frames than the ring of 81 holds, twice over. */
+static void history(void **unused) {
+    (void)unused;
+    const int strides[] = {1, 3, 8, 16};
+    for (int s = 0; s < 4; s++) {
+        rig_open_quiet(&rig, 0.5);
+        rig.def.history_stride = strides[s];
+        TaskReading reading = other_reading();
+        for (int t = 0; t < 200; t++) {
+            reading.omega[0] = t;
+            task_observe(rig.env, &rig.def, robot, rig.sim, &reading, t == 0, &rig.view);
+            expect_history(strides[s], t + 1);
+        }
+        assert_memory_equal(rig.history, rig.env->history, sizeof rig.history);
+        reading.omega[0] = -5; /* the next episode knows nothing of this one */
+        task_observe(rig.env, &rig.def, robot, rig.sim, &reading, 1, &rig.view);
+        for (int i = 0; i < TASK_FRAMES; i++) {
+            expect_entry("new history", i, (double)rig.history[i * TASK_OBSERVATION], -5, 1e-5);
+        }
+        rig_close(&rig);
+    }
+}
+
+/* Any pointer of the view may be missing. */
+static void views(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    TaskReading reading = other_reading();
+    const TaskView none = {0};
+    task_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &none);
+    assert_true(rig.env->history[TASK_HISTORY - TASK_OBSERVATION] == 0.5f);
+    rig_close(&rig);
+}
+
+/* ---- mirror ---- */
+
+/* The mirror image of a robot in the plane y = 0. */
+static RobotState mirrored(const RobotState *state) {
+    const int sign[LEG_JOINTS] = {-1, -1, 1, 1, 1, -1};
+    RobotState image = *state;
+    image.qpos[1] *= -1;
+    image.qpos[4] *= -1;
+    image.qpos[6] *= -1;
+    image.qvel[1] *= -1;
+    image.qvel[3] *= -1;
+    image.qvel[5] *= -1;
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        int other = (i + LEG_JOINTS) % ROBOT_JOINTS;
+        image.qpos[7 + i] = sign[i % LEG_JOINTS] * state->qpos[7 + other];
+        image.qvel[6 + i] = sign[i % LEG_JOINTS] * state->qvel[6 + other];
+    }
+    return image;
+}
+
+static void look_at(const RobotState *state, const double command[3], double phase,
+                    const float *action) {
+    TaskReading reading;
+    rig.env->robot = *state;
+    robot_sim_load(rig.sim, state, &rig.env->variation);
+    memcpy(rig.env->command_seen, command, sizeof rig.env->command_seen);
+    memcpy(rig.env->action[0], action, sizeof rig.env->action[0]);
+    rig.env->phase = phase;
+    task_read_imu(rig.sim, &reading);
+    task_read_motors(rig.sim, &reading);
+    look(&reading);
+}
+
+/* The frame of the mirrored robot is the mirrored frame. */
+static void mirror(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    const int sign[LEG_JOINTS] = {-1, -1, 1, 1, 1, -1};
+    double worst = 0;
+    for (uint32_t draw = 0; draw < 10; draw++) {
+        RobotState state = kit_moving_state(1, draw), image = mirrored(&state);
+        float action[TASK_ACTIONS], other[TASK_ACTIONS], first[TASK_OBSERVATION];
+        for (int i = 0; i < TASK_ACTIONS; i++) {
+            action[i] = 0.3f * (float)(i - 4);
+        }
+        for (int i = 0; i < TASK_ACTIONS; i++) {
+            other[i] = (float)sign[i % LEG_JOINTS] * action[(i + LEG_JOINTS) % TASK_ACTIONS];
+        }
+        const double command[3] = {0.6, 0.2, -0.8}, turned[3] = {0.6, -0.2, 0.8};
+        look_at(&state, command, 0.2, action);
+        memcpy(first, rig.frame, sizeof first);
+        look_at(&image, turned, 0.7, other);
+        for (int i = 0; i < TASK_OBSERVATION; i++) {
+            float wanted =
+                task_mirror_observation_sign[i] * first[task_mirror_observation_index[i]];
+            expect_entry("mirrored frame", i, (double)rig.frame[i], (double)wanted, TOLERANCE);
+            worst = fmax(worst, (double)fabsf(rig.frame[i] - wanted));
+        }
+        for (int i = 0; i < TASK_ACTIONS; i++) {
+            float wanted = task_mirror_action_sign[i] * action[task_mirror_action_index[i]];
+            expect_entry("mirrored action", i, (double)other[i], (double)wanted, 0);
+        }
+    }
+    print_message("mirrored frames: worst difference %.1e\n", worst);
+    rig_close(&rig);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(frame),
+        cmocka_unit_test(readings),
+        cmocka_unit_test(the_clock),
+        cmocka_unit_test(estimates),
+        cmocka_unit_test(feet_of_the_critic),
+        cmocka_unit_test(limits_of_the_critic),
+        cmocka_unit_test(episode_of_the_critic),
+        cmocka_unit_test(concentric_ground),
+        cmocka_unit_test(contact_reaches_the_critic),
+        cmocka_unit_test(mirror),
+        cmocka_unit_test(views),
+        cmocka_unit_test(history),
+        cmocka_unit_test(noise_is_a_stream),
+        cmocka_unit_test(noise),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
+}
