@@ -1,0 +1,324 @@
+/* From the policy's action to the joints' torque, and back to what it reads: clip, scale, gains,
+ * strength, offsets, limits, the three latencies, the command's delay, the clock, the helping hand.
+ */
+#include "task_oracle.h"
+
+#define STEPS_MAX 20
+
+static Rig rig;
+
+/* What each physics step of a policy period saw. Entry 0 is the state before the first one. */
+typedef struct {
+    int count;
+    double q[STEPS_MAX + 1][ROBOT_JOINTS], qd[STEPS_MAX + 1][ROBOT_JOINTS];
+    double omega[STEPS_MAX + 1][3], gravity[STEPS_MAX + 1][3];
+    double torque[STEPS_MAX + 1][ROBOT_JOINTS]; /* entry k: applied from k - 1 to k */
+    double velocity[STEPS_MAX + 1][6];
+} Trace;
+
+static Trace trace;
+
+static void note_state(void) {
+    int k = trace.count;
+    Oracle o = oracle_of(rig.sim);
+    memcpy(trace.q[k], robot_sim_qpos(rig.sim) + 7, sizeof trace.q[k]);
+    memcpy(trace.qd[k], robot_sim_qvel(rig.sim) + 6, sizeof trace.qd[k]);
+    memcpy(trace.velocity[k], robot_sim_qvel(rig.sim), sizeof trace.velocity[k]);
+    memcpy(trace.omega[k], o.omega, sizeof o.omega);
+    memcpy(trace.gravity[k], o.gravity, sizeof o.gravity);
+}
+
+static void note_step(void *context, const TaskEnv *env, const RobotSim *sim,
+                      const double *torque) {
+    assert_null(context);
+    assert_ptr_equal(env, rig.env);
+    assert_ptr_equal(sim, rig.sim);
+    trace.count++;
+    note_state();
+    memcpy(trace.torque[trace.count], torque, sizeof trace.torque[0]);
+}
+
+/* One policy step, traced. */
+static TaskStep traced_step(const float *action) {
+    const TaskProbe probe = {note_step, NULL};
+    trace.count = 0;
+    robot_sim_load(rig.sim, &rig.env->robot, &rig.env->variation);
+    note_state();
+    return task_env_step(rig.env, &rig.def, robot, rig.sim, action, 0, &rig.view, &probe);
+}
+
+static void put(const RobotState *state) {
+    rig.env->robot = *state;
+}
+
+static void open_with_dt(double dt) {
+    TaskDef def = kit_quiet_def();
+    def.physics_dt = dt;
+    def.crossing_limit = -1;
+    rig_open(&rig, &def, 3, 0);
+    rig_start(&rig, 0.5, 0, 0);
+}
+
+/* kp (q0 + scale a + offset - q) - kd qd with the gains of docs/task.md section 4, by joint. */
+static double wanted_torque(int i, const double *pose, double action, int k) {
+    const double kp[LEG_JOINTS] = {50, 50, 70, 70, 20, 20}, kd[LEG_JOINTS] = {5, 5, 7, 7, 0.2, 0.2};
+    const double limit[LEG_JOINTS] = {119, 119, 119, 119, 20.4, 20.4};
+    int j = i % LEG_JOINTS;
+    double tau = kp[j] * rig.env->kp_scale[i] *
+                     (pose[i] + 0.5 * action + rig.env->motor_offset[i] - trace.q[k][i]) -
+                 kd[j] * rig.env->kd_scale[i] * trace.qd[k][i];
+    return fmin(fmax(tau * rig.env->strength[i], -limit[j]), limit[j]);
+}
+
+/* Gains, strengths and offsets of every joint apart; some torques at their limits of 119 and 20.4
+ * N m. */
+static void torque(void **unused) {
+    (void)unused;
+    open_with_dt(0.0025);
+    int clipped = 0;
+    for (uint32_t draw = 0; draw < 10; draw++) {
+        RobotState state = kit_moving_state(2, draw);
+        put(&state);
+        float action[TASK_ACTIONS];
+        for (int i = 0; i < TASK_ACTIONS; i++) {
+            rig.env->kp_scale[i] = 0.9 + 0.01 * i;
+            rig.env->kd_scale[i] = 1.1 - 0.01 * i;
+            rig.env->strength[i] = 1 + 0.005 * i;
+            rig.env->motor_offset[i] = 0.005 * (i - 4);
+            action[i] = 0.125f * (float)((int)((5 * draw + 7 * (uint32_t)i) % 60) - 30);
+        }
+        traced_step(action);
+        assert_int_equal(trace.count, 4);
+        for (int k = 1; k <= 4; k++) {
+            for (int i = 0; i < ROBOT_JOINTS; i++) {
+                double wanted =
+                    wanted_torque(i, robot_default_pose(robot), (double)action[i], k - 1);
+                expect_entry("torque", i, trace.torque[k][i], wanted, 1e-9);
+                clipped += fabs(wanted) == (i % LEG_JOINTS < 4 ? 119 : 20.4);
+            }
+        }
+    }
+    assert_true(clipped > 20);
+    rig_close(&rig);
+}
+
+/* +-8; what is no number becomes -8. The two actions before are kept. */
+static void action_is_clipped(void **unused) {
+    (void)unused;
+    open_with_dt(0.0025);
+    float action[TASK_ACTIONS] = {9, -9, NAN, 7.5f, -7.5f, INFINITY};
+    const float wanted[6] = {8, -8, -8, 7.5f, -7.5f, 8};
+    float first[TASK_ACTIONS] = {0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, -0.5f};
+    rig_step(&rig, first);
+    TaskStep step = rig_step(&rig, action);
+    assert_true(step.valid && isfinite(step.reward));
+    for (int i = 0; i < 6; i++) {
+        assert_true(rig.env->action[0][i] == wanted[i]);
+        assert_true(rig.frame[33 + i] == wanted[i]);
+    }
+    assert_memory_equal(rig.env->action[1], first, sizeof first);
+    rig_step(&rig, NULL);
+    assert_memory_equal(rig.env->action[2], first, sizeof first);
+    assert_true(rig.env->action[1][0] == 8 && rig.env->action[0][0] == 0);
+    rig.def.action_clip = 0.5;
+    rig_step(&rig, action);
+    assert_true(rig.env->action[0][0] == 0.5f && rig.env->action[0][1] == -0.5f);
+    rig_close(&rig);
+}
+
+/* The new action acts from physics step `lag` on, before it the previous one. */
+static void command_latency(double dt, int steps) {
+    open_with_dt(dt);
+    float before[TASK_ACTIONS], now[TASK_ACTIONS];
+    for (int i = 0; i < TASK_ACTIONS; i++) {
+        before[i] = 0.5f;
+        now[i] = -0.25f;
+    }
+    for (int lag = 0; lag <= steps; lag++) {
+        RobotState state = kit_moving_state(2, 20);
+        put(&state);
+        rig.env->lag_command = lag;
+        memcpy(rig.env->action[0], before, sizeof before);
+        traced_step(now);
+        assert_int_equal(trace.count, steps);
+        for (int k = 0; k < steps; k++) {
+            double action = k < lag ? 0.5 : -0.25;
+            for (int i = 0; i < ROBOT_JOINTS; i++) {
+                expect_entry("torque under a late action", i, trace.torque[k + 1][i],
+                             wanted_torque(i, robot_default_pose(robot), action, k), 1e-9);
+            }
+        }
+    }
+    rig_close(&rig);
+}
+
+static void expect_imu(const char *what, int k) {
+    for (int i = 0; i < 3; i++) {
+        expect_entry(what, i, (double)rig.frame[i], trace.omega[k][i], 2e-6);
+        expect_entry(what, 6 + i, (double)rig.frame[6 + i], trace.gravity[k][i], 2e-7);
+    }
+}
+
+static void expect_motors(const char *what, int k) {
+    const double *pose = robot_default_pose(robot);
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        expect_entry(what, 9 + i, (double)rig.frame[9 + i], trace.q[k][i] - pose[i], 2e-7);
+        expect_entry(what, 21 + i, (double)rig.frame[21 + i], 0.05 * trace.qd[k][i], 2e-6);
+    }
+}
+
+/* Readings are of so many physics steps before the period's end; each sensor has its own. */
+static void reading_latencies(double dt, int steps) {
+    open_with_dt(dt);
+    const float action[TASK_ACTIONS] = {1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1};
+    for (int imu = 0; imu <= steps; imu++) {
+        int motor = (2 * imu + 1) % (steps + 1);
+        RobotState state = kit_moving_state(2, 21);
+        put(&state);
+        rig.env->lag_imu = imu;
+        rig.env->lag_motor = motor;
+        traced_step(action);
+        for (int k = 0; k < steps; k++) { /* the states can be told from each other */
+            assert_true(fabs(trace.omega[k][0] - trace.omega[k + 1][0]) > 1e-3);
+            assert_true(fabs(trace.qd[k][0] - trace.qd[k + 1][0]) > 1e-3);
+            assert_true(fabs(trace.q[k][1] - trace.q[k + 1][1]) > 1e-5);
+        }
+        expect_imu("late IMU", steps - imu);
+        expect_motors("late motors", steps - motor);
+        /* the critic sees the end */
+        expect_entry("critic", 0, (double)rig.critic[0], trace.omega[steps][0], 2e-6);
+        expect_entry("critic", 21, (double)rig.critic[21], 0.05 * trace.qd[steps][0], 2e-6);
+    }
+    rig_close(&rig);
+}
+
+static void latencies(void **unused) {
+    (void)unused;
+    command_latency(0.0025, 4);
+    command_latency(0.001, 10);
+    command_latency(0.0005, 20);
+    reading_latencies(0.0025, 4);
+    reading_latencies(0.001, 10);
+    reading_latencies(0.005, 2);
+}
+
+/* Redrawn every 8 s; the policy sees it one policy step after it is in force. */
+static void command_is_seen_late(void **unused) {
+    (void)unused;
+    open_with_dt(0.0025);
+    rig.env->command_frozen = 0;
+    rig.def.command_interval = 0.05;
+    rig.def.standing_share = 0;
+    rig.def.vx[0] = 0.2;
+    rig.def.straight_share = 0;
+    double before[3];
+    for (int t = 1; t <= 20; t++) {
+        memcpy(before, rig.env->command, sizeof before);
+        rig_step(&rig, NULL);
+        assert_int_equal(rig.env->step, t);
+        int redrawn = memcmp(before, rig.env->command, sizeof before) != 0;
+        assert_int_equal(redrawn, t % 5 == 0);
+        for (int i = 0; i < 3; i++) {
+            expect_entry("seen", i, (double)rig.frame[3 + i], before[i] * (i < 2 ? 2 : 1), 1e-6);
+        }
+    }
+    rig_close(&rig);
+}
+
+/* A command that eval and play have set stays. */
+static void frozen_command(void **unused) {
+    (void)unused;
+    open_with_dt(0.0025);
+    rig.def.command_interval = 0.02;
+    for (int t = 0; t < 6; t++) {
+        rig_step(&rig, NULL);
+        assert_true(rig.env->command[0] == 0.5 && rig.env->command[1] == 0);
+    }
+    rig_close(&rig);
+}
+
+/* 0.01 s of a period of 0.8 s is 1/80. */
+static void clock_runs(void **unused) {
+    (void)unused;
+    open_with_dt(0.0025);
+    rig.env->phase = 0.503;
+    for (int t = 1; t <= 100; t++) {
+        RobotState state = kit_state(2);
+        put(&state);
+        rig_step(&rig, NULL);
+        double phase = 0.503 + t / 80.0;
+        expect_near("phase", rig.env->phase, phase - floor(phase), 1e-9);
+    }
+    rig.def.gait_period = 0.5;
+    double before = rig.env->phase;
+    rig_step(&rig, NULL);
+    expect_near("a shorter period", rig.env->phase, before + 0.02, 1e-12);
+    rig_close(&rig);
+}
+
+/* A phase and a state of the step's end: the reward's clock is that of the action. */
+static void reward_follows_the_clock_of_the_action(void **unused) {
+    (void)unused;
+    open_with_dt(0.0025);
+    RobotState state = kit_state(2);
+    put(&state); /* in the air: no contact; left scheduled to stand, right to swing */
+    rig.env->phase = 0.499;
+    rig_step(&rig, NULL);
+    /* mean of -0.3 and 1 outside double support; at 0.499 either is right: 1.4 */
+    expect_near("gait", rig.env->term_sum[REWARD_gait], 0.014, 1e-9);
+    rig.env->phase = 0.48;
+    put(&state);
+    rig_step(&rig, NULL);
+    expect_near("gait", rig.env->term_sum[REWARD_gait], 0.014 + 0.0049, 1e-9);
+    rig_close(&rig);
+}
+
+/* The torque of the last physics step is the one that the reward sees. */
+static void reward_sees_the_torque(void **unused) {
+    (void)unused;
+    open_with_dt(0.0025);
+    RobotState state = kit_moving_state(2, 5);
+    put(&state);
+    const float action[TASK_ACTIONS] = {1, 1, 1, 1, 1, 1};
+    traced_step(action);
+    double sum = 0, speed = 0;
+    for (int i = 0; i < ROBOT_JOINTS; i++) {
+        sum += trace.torque[4][i] * trace.torque[4][i];
+        speed += trace.qd[4][i] * trace.qd[4][i];
+    }
+    expect_near("torque", rig.env->term_sum[REWARD_torque], -1e-12 * sum, 1e-15 * sum);
+    expect_near("joint speed", rig.env->term_sum[REWARD_joint_speed], -1e-7 * speed, 1e-10 * speed);
+    rig_close(&rig);
+}
+
+/* The sweeps and the fast solver are the user's choice, with the task's tolerance. */
+static void solver_follows_the_keys(void **unused) {
+    (void)unused;
+    open_with_dt(0.0025);
+    for (int newton = 0; newton < 2; newton++) {
+        rig.def.newton = newton;
+        rig.def.contact_tolerance = newton ? 1e-3 : 1e-5;
+        rig.def.contact_iterations = 30 + newton;
+        rig_step(&rig, NULL);
+        const MildContactInput *input = robot_sim_contact_input(rig.sim);
+        assert_int_equal(input->solver, newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL);
+        expect_near("tolerance", input->tolerance, newton ? 1e-3 : 1e-5, 0);
+        assert_int_equal(input->max_iterations, 30 + newton);
+    }
+    rig_close(&rig);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(torque),
+        cmocka_unit_test(action_is_clipped),
+        cmocka_unit_test(latencies),
+        cmocka_unit_test(command_is_seen_late),
+        cmocka_unit_test(frozen_command),
+        cmocka_unit_test(clock_runs),
+        cmocka_unit_test(reward_follows_the_clock_of_the_action),
+        cmocka_unit_test(reward_sees_the_torque),
+        cmocka_unit_test(solver_follows_the_keys),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
+}

@@ -1,0 +1,303 @@
+/* What ends an episode, each cause alone and from both sides of its limit, and that nothing else
+ * does. The robot falls limp through the air: it then neither turns nor bends. */
+#include "task_oracle.h"
+
+static Rig rig;
+
+static void open_limp(void) {
+    TaskDef def = kit_quiet_def();
+    rig_open(&rig, &def, 3, 0);
+    rig_go_limp(&rig);
+    rig_start(&rig, 0.5, 0, 0);
+}
+
+/* One step from this state at the given step of the episode. */
+static TaskStep step_from(const RobotState *state, uint32_t step) {
+    rig.env->robot = *state;
+    rig.env->step = step;
+    mild_ground_reset(task_env_ground(rig.env));
+    return rig_step(&rig, NULL);
+}
+
+static void expect_end(const char *what, TaskStep step, int done, int timeout) {
+    if (step.done != done || step.timeout != timeout || !step.valid) {
+        fail_msg("%s: done %d timeout %d valid %d", what, step.done, step.timeout, step.valid);
+    }
+}
+
+static void expect_alive(const char *what, TaskStep step) {
+    expect_end(what, step, 0, 0);
+}
+
+static void expect_fall(const char *what, TaskStep step) {
+    expect_end(what, step, 1, 0);
+}
+
+/* Past the limit in every direction it is the end, short of it in none; heading does not matter. */
+static void tilt(void **unused) {
+    (void)unused;
+    open_limp();
+    rig.def.crossing_limit = -1; /* upside down the left foot is on the right */
+    const double limits[] = {1.0, 0.4, 2.0};
+    for (int l = 0; l < 3; l++) {
+        rig.def.tilt_limit = limits[l];
+        for (int k = 0; k < 4; k++) {
+            int sign = k % 2 ? -1 : 1;
+            for (int past = 0; past < 2; past++) {
+                double angle = sign * (limits[l] + (past ? 0.01 : -0.01));
+                RobotState state = kit_state(2);
+                kit_turn(&state, 0.7, k < 2 ? angle : 0, k < 2 ? 0 : angle);
+                expect_end(past ? "past the tilt limit" : "below the tilt limit",
+                           step_from(&state, 10), past, 0);
+            }
+        }
+    }
+    rig_close(&rig);
+}
+
+static void upright_in_the_air(void **unused) {
+    (void)unused;
+    open_limp();
+    for (int k = 0; k < 8; k++) {
+        RobotState state = kit_state(1.5);
+        kit_turn(&state, k - 3.5, 0, 0);
+        state.qvel[0] = k - 4; /* neither speed nor height ends an episode */
+        state.qvel[2] = 0.5 * k;
+        state.qvel[5] = 4 - k;
+        expect_alive("upright in the air", step_from(&state, 10));
+    }
+    rig_close(&rig);
+}
+
+/* [m] lowest point of a box geom above z = 0, from the file's shapes. */
+static double lowest_of_box(const RobotState *state, const char *name) {
+    const mjModel *m = robot_visual_model(robot);
+    mjData *d = mj_makeData(m);
+    memcpy(d->qpos, state->qpos, sizeof state->qpos);
+    mj_kinematics(m, d);
+    int geom = mj_name2id(m, mjOBJ_GEOM, name);
+    assert_true(geom >= 0);
+    double lowest = d->geom_xpos[3 * geom + 2];
+    for (int k = 0; k < 3; k++) {
+        lowest -= fabs(d->geom_xmat[9 * geom + 6 + k]) * m->geom_size[3 * geom + k];
+    }
+    mj_deleteData(d);
+    return lowest;
+}
+
+/* Free fall: 10 ms at 0.1 m/s downward and gravity's share of 4 steps of 2.5 ms. */
+#define FALL (0.01 * 0.1 + 9.81 * 0.0025 * 0.0025 * 10)
+
+/* The box ends the step 1 mm above, or below, the ground at `height`. Legs that would reach the
+ * ground earlier are folded up. */
+static void touch(const RobotState *from, const char *box, double height, const char *what) {
+    for (int past = 0; past < 2; past++) {
+        RobotState state = *from;
+        state.qvel[2] = -0.1;
+        state.qpos[2] += height + FALL + (past ? -1e-3 : 1e-3) - lowest_of_box(&state, box);
+        rig.env->terrain.height = height;
+        expect_end(what, step_from(&state, 10), past, 0);
+    }
+}
+
+/* Hips and knees folded so that both feet are above the base. */
+static RobotState folded(void) {
+    RobotState state = kit_state(0);
+    for (int leg = 0; leg < 2; leg++) {
+        double *q = state.qpos + 7 + LEG_JOINTS * leg;
+        q[HIP_PITCH] = -1.15;
+        q[KNEE] = 0.02;
+        q[ANKLE_PITCH] = 0;
+    }
+    return state;
+}
+
+static void base_touches(void **unused) {
+    (void)unused;
+    open_limp();
+    rig.def.tilt_limit = 3.1;
+    RobotState state = folded();
+    kit_turn(&state, 0.3, -1.0, 0.1); /* on its back, legs up */
+    const char *others[] = {"leg_l4_link_box", "leg_r4_link_box"};
+    for (int i = 0; i < 2; i++) {
+        assert_true(lowest_of_box(&state, others[i]) > lowest_of_box(&state, "base_link_box"));
+    }
+    touch(&state, "base_link_box", 0, "base");
+    touch(&state, "base_link_box", 0.3, "base on higher ground");
+    rig_close(&rig);
+}
+
+/* One knee on the ground, the other leg stretched up and forward. */
+static void shank_touches(int leg, const char *box) {
+    open_limp();
+    rig.def.crossing_limit = -1;
+    RobotState state = kit_state(0);
+    double *down = state.qpos + 7 + LEG_JOINTS * leg;
+    double *up = state.qpos + 7 + LEG_JOINTS * (1 - leg);
+    down[HIP_PITCH] = 0.3;
+    down[KNEE] = 1.9; /* the shank points backward and up */
+    down[ANKLE_PITCH] = 0;
+    up[HIP_PITCH] = -1.15;
+    up[KNEE] = 0.02;
+    up[ANKLE_PITCH] = 0;
+    kit_turn(&state, -0.8, -0.2, 0.05);
+    assert_true(lowest_of_box(&state, "base_link_box") > lowest_of_box(&state, box) + 0.1);
+    touch(&state, box, 0, box);
+    touch(&state, box, -0.2, box);
+    rig_close(&rig);
+}
+
+static void shanks_touch(void **unused) {
+    (void)unused;
+    shank_touches(0, "leg_l4_link_box");
+    shank_touches(1, "leg_r4_link_box");
+}
+
+/* Feet on the wrong side of each other, or nearer than asked; knees do not count. */
+static void crossing(void **unused) {
+    (void)unused;
+    open_limp();
+    RobotState state = kit_state(2);
+    kit_turn(&state, 2.2, 0, 0);
+    expect_alive("feet apart", step_from(&state, 10));
+    robot_sim_load(rig.sim, &state, &rig.env->variation);
+    double apart = oracle_of(rig.sim).foot_distance;
+    expect_near("distance of the feet in the default pose", apart, 0.1613, 1e-3);
+    rig.def.crossing_limit = apart + 1e-3;
+    expect_fall("nearer than the limit", step_from(&state, 10));
+    rig.def.crossing_limit = apart - 1e-3;
+    expect_alive("further than the limit", step_from(&state, 10));
+    rig.def.crossing_limit = 0;
+    state.qpos[7 + HIP_ROLL] = -0.2;
+    state.qpos[7 + LEG_JOINTS + HIP_ROLL] = 0.2;
+    robot_sim_load(rig.sim, &state, &rig.env->variation);
+    assert_true(oracle_of(rig.sim).foot_distance < -0.05);
+    expect_fall("crossed", step_from(&state, 10));
+    rig.def.crossing_limit = -0.9;
+    expect_alive("allowed to cross", step_from(&state, 10));
+    rig_close(&rig);
+}
+
+/* 24 s are 2400 steps. A fall at the last step is a fall. */
+static void timeout(void **unused) {
+    (void)unused;
+    open_limp();
+    RobotState state = kit_state(2);
+    assert_int_equal(rig.env->step_limit, 2400);
+    expect_alive("step 2399", step_from(&state, 2398));
+    expect_end("step 2400", step_from(&state, 2399), 1, 1);
+    kit_turn(&state, 0, 1.2, 0);
+    expect_fall("fallen at the last step", step_from(&state, 2399));
+    rig_close(&rig);
+    TaskDef def = kit_quiet_def();
+    def.episode = 0.5;
+    rig_open(&rig, &def, 3, 0);
+    rig_start(&rig, 0, 0, 0);
+    rig.def.assist = 0;
+    int steps = 0;
+    TaskStep step;
+    do {
+        step = rig_step(&rig, NULL);
+        steps++;
+    } while (!step.done);
+    assert_int_equal(steps, 50);
+    assert_true(step.timeout);
+    assert_int_equal(step.length, 50);
+    rig_close(&rig);
+}
+
+/* What the learner must not learn from: no reward, no weight, not a time-out. The next observation
+ * is that of a new episode. */
+static void bad_numbers(void **unused) {
+    (void)unused;
+    const double bad[] = {NAN, INFINITY, 2000};
+    for (int i = 0; i < 3; i++) {
+        rig_open_quiet(&rig, 0.5);
+        const float action[TASK_ACTIONS] = {0};
+        rig.env->robot.qvel[8] = bad[i];
+        rig.env->step = rig.env->step_limit - 1;
+        TaskStep step = task_env_step(rig.env, &rig.def, robot, rig.sim, action, 1, &rig.view, NULL);
+        assert_true(step.done && !step.valid && !step.timeout && step.reward == 0);
+        assert_int_equal(rig.env->step, 0);
+        for (int k = 0; k < TASK_HISTORY; k++) {
+            assert_true(isfinite(rig.history[k]));
+        }
+        for (int k = 0; k < TASK_CRITIC; k++) {
+            assert_true(isfinite(rig.critic[k]));
+        }
+        step = task_env_step(rig.env, &rig.def, robot, rig.sim, action, 1, &rig.view, NULL);
+        assert_true(step.valid && !step.done);
+        rig_close(&rig);
+    }
+}
+
+/* Numbers that only the reward sees. */
+static void bad_reward(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    rig.env->smooth_velocity[0] = NAN;
+    TaskStep step = rig_step(&rig, NULL);
+    assert_true(step.done && !step.valid && !step.timeout && step.reward == 0);
+    expect_near("sum", rig.env->reward_sum, 0, 0);
+    rig_close(&rig);
+}
+
+/* Sums of the episode that ended, and a new one begun. */
+static void report_of_an_episode(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    rig.env->command_frozen = 0;
+    const float action[TASK_ACTIONS] = {0};
+    double reward = 0, error = 0, terms[TASK_REWARD_COUNT] = {0}, before[TASK_REWARD_COUNT] = {0};
+    rig.env->step_limit = 5;
+    for (int t = 1; t <= 5; t++) {
+        TaskStep step = task_env_step(rig.env, &rig.def, robot, rig.sim, action, t == 5, &rig.view,
+                                      NULL);
+        reward += (double)step.reward;
+        if (t < 5) {
+            error += hypot(rig.env->smooth_velocity[0] - 0.5, rig.env->smooth_velocity[1]);
+            expect_near("running sum", rig.env->reward_sum, reward, 1e-9);
+            expect_near("running error", rig.env->speed_error_sum, error, 1e-9);
+            memcpy(before, terms, sizeof before);
+            memcpy(terms, rig.env->term_sum, sizeof terms);
+            assert_false(step.done);
+            double sum = 0;
+            for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+                sum += terms[i] - before[i];
+            }
+            expect_near("terms of a step", sum, (double)step.reward, 1e-7);
+        } else {
+            assert_true(step.done && step.timeout);
+            assert_int_equal(step.length, 5);
+            expect_near("reward", (double)step.episode_reward, reward, 1e-6);
+            assert_true((double)step.episode_speed_error > 0.8 * error / 4);
+            assert_true((double)step.episode_speed_error < 1.2 * error / 4);
+            double sum = 0;
+            for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+                sum += (double)step.episode_terms[i];
+            }
+            expect_near("terms", sum, reward, 1e-5);
+            assert_int_equal(rig.env->step, 0);
+            expect_near("the next episode's sum", rig.env->reward_sum, 0, 0);
+            expect_near("the next episode's error", rig.env->speed_error_sum, 0, 0);
+            expect_near("the next episode's terms", rig.env->term_sum[REWARD_orientation], 0, 0);
+        }
+    }
+    assert_int_equal(rig.env->tick, 5);
+    rig_close(&rig);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(upright_in_the_air),
+        cmocka_unit_test(tilt),
+        cmocka_unit_test(base_touches),
+        cmocka_unit_test(shanks_touch),
+        cmocka_unit_test(crossing),
+        cmocka_unit_test(timeout),
+        cmocka_unit_test(bad_numbers),
+        cmocka_unit_test(bad_reward),
+        cmocka_unit_test(report_of_an_episode),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
+}
