@@ -15,12 +15,12 @@ static const char *const oracle_knees[ROBOT_FEET] = {"leg_l4_link", "leg_r4_link
 static const char *const oracle_outlines[ROBOT_FEET] = {"sole_outline_left", "sole_outline_right"};
 
 typedef struct {
-    double omega[3];       /* [rad/s] base, base frame */
-    double velocity[3];    /* [m/s] base, base frame */
-    double world[3];       /* [m/s] base, world */
-    double heading[3];     /* [m/s, m/s, m/s] base: forward, left, up */
-    double gravity[3];     /* [-] base frame */
-    double orientation[4]; /* [-] of the base, w x y z */
+    double omega[3];                     /* [rad/s] base, base frame */
+    double velocity[3];                  /* [m/s] base, base frame */
+    double world[3];                     /* [m/s] base, world */
+    double heading[3];                   /* [m/s, m/s, m/s] base: forward, left, up */
+    double gravity[3];                   /* [-] base frame */
+    double orientation[4];               /* [-] of the base, w x y z */
     double sole[ROBOT_FEET][3];          /* [m] centre, world */
     double sole_velocity[ROBOT_FEET][3]; /* [m/s] world */
     double sole_lowest[ROBOT_FEET];      /* [m] above z = 0 */

@@ -35,8 +35,8 @@ static void schedule(void **unused) {
 static void wanted_height(void **unused) {
     (void)unused;
     TaskDef def = task_def_default();
-    const double s[] = {0.1, 0.2, 0.5, 0.9}, wanted[] = {0.0309016994, 0.0587785252, 0.1,
-                                                         0.0309016994};
+    const double s[] = {0.1, 0.2, 0.5, 0.9},
+                 wanted[] = {0.0309016994, 0.0587785252, 0.1, 0.0309016994};
     for (int i = 0; i < 4; i++) {
         double phase = 0.5 * s[i];
         expect_entry("right", i, task_gait_height(&def, phase, 0, ROBOT_FOOT_RIGHT), wanted[i],
@@ -62,10 +62,10 @@ static void expect_reference(const TaskDef *def, double phase, int standing, int
     task_gait_reference(def, pose, phase, standing, q);
     for (int i = 0; i < ROBOT_JOINTS; i++) {
         int joint = i % LEG_JOINTS;
-        double turn = i / LEG_JOINTS != leg                         ? 0
-                      : joint == KNEE                               ? 2 * bend
+        double turn = i / LEG_JOINTS != leg                        ? 0
+                      : joint == KNEE                              ? 2 * bend
                       : joint == HIP_PITCH || joint == ANKLE_PITCH ? -bend
-                                                                    : 0;
+                                                                   : 0;
         expect_entry("reference", i, q[i], pose[i] + turn, 1e-8);
     }
 }

@@ -188,9 +188,12 @@ static void contact_and_air_time(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(base_and_joints),   cmocka_unit_test(change_of_twist),
-        cmocka_unit_test(smoothed_velocity), cmocka_unit_test(feet_and_knees),
-        cmocka_unit_test(schedule),          cmocka_unit_test(double_support),
+        cmocka_unit_test(base_and_joints),
+        cmocka_unit_test(change_of_twist),
+        cmocka_unit_test(smoothed_velocity),
+        cmocka_unit_test(feet_and_knees),
+        cmocka_unit_test(schedule),
+        cmocka_unit_test(double_support),
         cmocka_unit_test(contact_and_air_time),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);

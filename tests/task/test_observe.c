@@ -212,7 +212,8 @@ static void limits_of_the_critic(void **unused) {
     oracle_set_force(rig.sim, 0, 1600, -1600, 4.99);
     oracle_set_force(rig.sim, 1, 1490, -1490, 5.01);
     look(&reading);
-    const double wanted[2][5] = {{5, -5, 4.99 / 300, 0, 0}, {14.9 / 3, -14.9 / 3, 5.01 / 300, 1, 1}};
+    const double wanted[2][5] = {{5, -5, 4.99 / 300, 0, 0},
+                                 {14.9 / 3, -14.9 / 3, 5.01 / 300, 1, 1}};
     for (int f = 0; f < ROBOT_FEET; f++) {
         for (int i = 0; i < 5; i++) {
             expect_entry("foot", 5 * f + i, (double)rig.critic[58 + 6 * f + i], wanted[f][i],
@@ -271,7 +272,8 @@ static void episode_of_the_critic(void **unused) {
         for (int i = 0; i < 12; i++) {
             expect_entry("ground", i, (double)rig.critic[80 + i], rigid ? 0 : ground[i], TOLERANCE);
         }
-        const double last[12] = {rigid, 1.15, 0.93, 1.2, 0.25, 0.5, 0.75, 0.45, 0.4, 0.4, 0.1, -0.2};
+        const double last[12] = {rigid, 1.15, 0.93, 1.2, 0.25, 0.5,
+                                 0.75,  0.45, 0.4,  0.4, 0.1,  -0.2};
         for (int i = 0; i < 12; i++) {
             expect_entry("critic", 92 + i, (double)rig.critic[92 + i], last[i], TOLERANCE);
         }
@@ -383,7 +385,7 @@ static void noise(void **unused) {
     }
     print_message("noise: largest correlation of two entries %.3f\n", worst);
     assert_true(worst < 0.07); /* 5 sigma of 5000 draws */
-    look(&reading); /* the critic sees none of it */
+    look(&reading);            /* the critic sees none of it */
     Oracle o = oracle_of(rig.sim);
     expect_frame("critic", rig.critic, o.omega, o.gravity, rig.env->robot.qpos + 7,
                  rig.env->robot.qvel + 6, clock_at_03);

@@ -360,15 +360,24 @@ static void names_follow_the_enum(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(names_follow_the_enum), cmocka_unit_test(linear_velocity),
-        cmocka_unit_test(yaw_rate),              cmocka_unit_test(feet_clearance),
-        cmocka_unit_test(gait),                  cmocka_unit_test(slip),
-        cmocka_unit_test(base_acceleration),     cmocka_unit_test(action_smoothness),
-        cmocka_unit_test(reference_motion),      cmocka_unit_test(default_pose),
-        cmocka_unit_test(base_height),           cmocka_unit_test(distances),
-        cmocka_unit_test(orientation),           cmocka_unit_test(air_time),
-        cmocka_unit_test(base_motion),           cmocka_unit_test(contact_force),
-        cmocka_unit_test(efforts),               cmocka_unit_test(collision),
+        cmocka_unit_test(names_follow_the_enum),
+        cmocka_unit_test(linear_velocity),
+        cmocka_unit_test(yaw_rate),
+        cmocka_unit_test(feet_clearance),
+        cmocka_unit_test(gait),
+        cmocka_unit_test(slip),
+        cmocka_unit_test(base_acceleration),
+        cmocka_unit_test(action_smoothness),
+        cmocka_unit_test(reference_motion),
+        cmocka_unit_test(default_pose),
+        cmocka_unit_test(base_height),
+        cmocka_unit_test(distances),
+        cmocka_unit_test(orientation),
+        cmocka_unit_test(air_time),
+        cmocka_unit_test(base_motion),
+        cmocka_unit_test(contact_force),
+        cmocka_unit_test(efforts),
+        cmocka_unit_test(collision),
         cmocka_unit_test(sum_is_clipped),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);

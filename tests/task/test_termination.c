@@ -216,7 +216,8 @@ static void bad_numbers(void **unused) {
         const float action[TASK_ACTIONS] = {0};
         rig.env->robot.qvel[8] = bad[i];
         rig.env->step = rig.env->step_limit - 1;
-        TaskStep step = task_env_step(rig.env, &rig.def, robot, rig.sim, action, 1, &rig.view, NULL);
+        TaskStep step =
+            task_env_step(rig.env, &rig.def, robot, rig.sim, action, 1, &rig.view, NULL);
         assert_true(step.done && !step.valid && !step.timeout && step.reward == 0);
         assert_int_equal(rig.env->step, 0);
         for (int k = 0; k < TASK_HISTORY; k++) {
@@ -251,8 +252,8 @@ static void report_of_an_episode(void **unused) {
     double reward = 0, error = 0, terms[TASK_REWARD_COUNT] = {0}, before[TASK_REWARD_COUNT] = {0};
     rig.env->step_limit = 5;
     for (int t = 1; t <= 5; t++) {
-        TaskStep step = task_env_step(rig.env, &rig.def, robot, rig.sim, action, t == 5, &rig.view,
-                                      NULL);
+        TaskStep step =
+            task_env_step(rig.env, &rig.def, robot, rig.sim, action, t == 5, &rig.view, NULL);
         reward += (double)step.reward;
         if (t < 5) {
             error += hypot(rig.env->smooth_velocity[0] - 0.5, rig.env->smooth_velocity[1]);
