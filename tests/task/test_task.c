@@ -1,5 +1,4 @@
-/* The task as a whole: determinism over thread counts, mirrored motion, ground models, configuration.
- */
+/* The task as a whole: determinism over thread counts, mirrored motion, ground models. */
 #include "task_kit.h"
 
 #include "task/vec.h"
@@ -152,25 +151,10 @@ static void mirrored_motion_is_the_mirror_image(void **state) {
     rig_close(&b);
 }
 
-static void ranges_are_checked(void **state) {
-    (void)state;
-    MildError error = {0};
-    TaskDef def = task_def_default();
-    assert_int_equal(task_def_check(&def, &error), MILD_OK);
-    def.physics_dt = 0.003;
-    assert_int_equal(task_def_check(&def, &error), MILD_ERROR_RANGE);
-    assert_non_null(strstr(error.text, "physics_dt"));
-    def = task_def_default();
-    def.vx[0] = 2;
-    assert_int_equal(task_def_check(&def, &error), MILD_ERROR_RANGE);
-    assert_non_null(strstr(error.text, "task.vx"));
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(mirror_is_an_involution),
         cmocka_unit_test(mirrored_motion_is_the_mirror_image),
-        cmocka_unit_test(ranges_are_checked),
         cmocka_unit_test(same_numbers_whatever_the_thread_count),
         cmocka_unit_test(every_ground_model_carries),
     };

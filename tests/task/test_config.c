@@ -1,0 +1,131 @@
+/* Defaults and ranges of the task's keys: configs/default.ini says them once more, in figures. */
+#include "task_kit.h"
+
+static FILE *ini;
+
+static void rewind_to_section(const char *section) {
+    char line[512], wanted[64];
+    snprintf(wanted, sizeof wanted, "[%s]\n", section);
+    rewind(ini);
+    do {
+        assert_non_null(fgets(line, sizeof line, ini));
+    } while (strcmp(line, wanted) != 0);
+}
+
+/* "(-3 .. 3)" at the end of a help line. */
+static int range_of(const char *help, double *low, double *high) {
+    const char *open = strrchr(help, '(');
+    return open && sscanf(open, "(%lf .. %lf)", low, high) == 2;
+}
+
+static void expect_default(const MildField *field, const void *def, const char *value) {
+    const char *at = (const char *)def + field->offset;
+    for (int i = 0; i < field->count; i++) {
+        char *end;
+        double wanted = strncmp(value, "true", 4) == 0 ? 1 : strtod(value, &end), got;
+        if (field->type == MILD_FIELD_DOUBLE) {
+            got = ((const double *)(const void *)at)[i];
+            value = end;
+        } else {
+            got = *(const int *)(const void *)at;
+        }
+        expect_entry(field->name, i, got, wanted, 1e-12 * fabs(wanted));
+    }
+}
+
+/* Every field has its lines in the file's order: help with the range, then name = value. */
+static void check_section(const char *section, const MildField *fields, int count,
+                          const void *def) {
+    rewind_to_section(section);
+    int ranges = 0;
+    for (int i = 0; i < count; i++) {
+        char help[512], line[512];
+        assert_non_null(fgets(help, sizeof help, ini));
+        assert_non_null(fgets(line, sizeof line, ini));
+        size_t name = strlen(fields[i].name);
+        if (strncmp(line, fields[i].name, name) != 0 || strncmp(line + name, " = ", 3) != 0) {
+            fail_msg("%s.%s is not where default.ini has it: %s", section, fields[i].name, line);
+        }
+        if (fields[i].type != MILD_FIELD_NAME) {
+            expect_default(&fields[i], def, line + name + 3);
+        }
+        double low, high;
+        if (range_of(help, &low, &high)) {
+            expect_near(fields[i].name, fields[i].min, low, 1e-12);
+            expect_near(fields[i].name, fields[i].max, high, 1e-12 * fabs(high));
+            ranges++;
+        }
+    }
+    assert_true(ranges >= count / 2);
+}
+
+static void defaults(void **unused) {
+    (void)unused;
+    ini = fopen(MILD_SOURCE_DIR "/configs/default.ini", "r");
+    assert_non_null(ini);
+    TaskDef def = task_def_default();
+    check_section("task", task_fields, task_field_count, &def);
+    check_section("reward", reward_fields, reward_field_count, &def.reward);
+    check_section("randomize", randomize_fields, randomize_field_count, &def.randomize);
+    fclose(ini);
+}
+
+static void expect_refused(const TaskDef *def, const char *key) {
+    MildError error = {0};
+    assert_int_equal(task_def_check(def, &error), MILD_ERROR_RANGE);
+    if (!strstr(error.text, key)) {
+        fail_msg("'%s' does not name %s", error.text, key);
+    }
+}
+
+static void refused(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    TaskDef def = task_def_default();
+    assert_int_equal(task_def_check(&def, &error), MILD_OK);
+    def.physics_dt = 0.003;
+    expect_refused(&def, "physics_dt");
+    def = task_def_default();
+    def.vx[0] = 2;
+    expect_refused(&def, "task.vx");
+    def = task_def_default();
+    def.tilt_limit = 4;
+    expect_refused(&def, "task.tilt_limit");
+    def = task_def_default();
+    def.reward.feet_range[0] = 0.5;
+    expect_refused(&def, "reward.feet_range");
+    def = task_def_default();
+    def.randomize.mu[1] = 0.1;
+    expect_refused(&def, "randomize.mu");
+    def = task_def_default();
+    def.randomize.rigid_share = 0.6;
+    expect_refused(&def, "rigid_share + preset_share");
+    def = task_def_default();
+    def.randomize.rigid_share = 0.5;
+    def.vx[0] = def.vx[1];
+    assert_int_equal(task_def_check(&def, &error), MILD_OK);
+}
+
+/* Half, a quarter, a tenth and a twentieth of the policy step fit; nothing between. */
+static void physics_steps(void **unused) {
+    (void)unused;
+    const double fits[] = {0.005, 0.0025, 0.002, 0.001, 0.0005}, no[] = {0.004, 0.0015, 0.0024};
+    TaskDef def = task_def_default();
+    for (int i = 0; i < 5; i++) {
+        def.physics_dt = fits[i];
+        assert_int_equal(task_def_check(&def, NULL), MILD_OK);
+    }
+    for (int i = 0; i < 3; i++) {
+        def.physics_dt = no[i];
+        assert_int_equal(task_def_check(&def, NULL), MILD_ERROR_RANGE);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(defaults),
+        cmocka_unit_test(refused),
+        cmocka_unit_test(physics_steps),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
