@@ -238,9 +238,13 @@ static void the_shipped_policy_walks(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scenes_by_name),       cmocka_unit_test(courses_have_bounds),
-        cmocka_unit_test(heading_is_held),      cmocka_unit_test(zero_action_falls_and_is_counted),
-        cmocka_unit_test(short_trials_succeed), cmocka_unit_test(the_shipped_policy_walks),
+        cmocka_unit_test(scenes_by_name),
+        cmocka_unit_test(courses_have_bounds),
+        cmocka_unit_test(heading_is_held),
+        cmocka_unit_test(zero_action_falls_and_is_counted),
+        cmocka_unit_test(short_trials_succeed),
+        cmocka_unit_test(stopped_trials_are_told_to_stand),
+        cmocka_unit_test(the_shipped_policy_walks),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
