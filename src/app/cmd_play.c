@@ -126,7 +126,7 @@ static void print_table(const Command *c) {
             continue;
         }
         double distance = leg->end_x - leg->start_x, time = leg->steps * c->task.physics_dt;
-        double steady = fabs(m->end_x - m->start_x);
+        double steady = fabs(m->end[0] - m->start[0]);
         printf("%-12s %7.2f m %5.1f s %5.2f m/s %8s %7.0f mm %6.1f mm ", c->names[i], distance,
                time, distance / time, leg->fell ? "fell" : "yes",
                m->swings ? 1e3 * m->apex_sum / m->swings : 0.0,

@@ -3,9 +3,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-
-#include "eval/measure.h"
 
 #define GRAVITY 9.81
 #define HEADING_GAIN 1.0  /* [1/s] */
@@ -61,71 +58,6 @@ static void step_trial(void *context, int trial, int thread) {
     eval_command(t->env[trial], stopped ? 0 : eval->speed, stopped ? 0 : eval->sideways);
 }
 
-/* Student's t for 95 %, two sided: table up to 10 trials, then 1.96 + 2.6 / (degrees of freedom),
- * within 0.5 %. */
-static double student_95(int samples) {
-    static const double table[] = {0, 0, 12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26};
-    return samples < 2 ? 0 : samples <= 10 ? table[samples] : 1.96 + 2.6 / (samples - 1);
-}
-
-/* Speed, cost of transport and base motion over the steady part of the trials that stayed up; of
- * all when none did: a robot that dives forward and falls is not fast. */
-static void summarise_motion(const Trials *t, EvalRow *row) {
-    double weight = robot_total_mass(t->robot) * GRAVITY, v_sum = 0, v_square = 0;
-    int steady = 0;
-    for (int i = 0; i < t->eval->trials; i++) {
-        const Measure *m = &t->measure[i];
-        if (m->steady_time <= 0.5 || (row->success && t->over[i])) {
-            continue;
-        }
-        double distance = m->end_x - m->start_x, v = distance / m->steady_time;
-        double left = m->end_y - m->start_y;
-        double way = t->eval->sideways != 0 ? hypot(distance, left) : fabs(distance);
-        v_sum += v;
-        v_square += v * v;
-        row->velocity_sideways += left / m->steady_time;
-        row->cot += m->work / (weight * fmax(way, 1e-3));
-        row->base_oscillation += m->base_high - m->base_low;
-        steady++;
-    }
-    if (!steady) {
-        return;
-    }
-    row->velocity = v_sum / steady;
-    double variance =
-        fmax(v_square / steady - row->velocity * row->velocity, 0) * steady / fmax(steady - 1, 1);
-    double half = student_95(steady) * sqrt(variance / steady);
-    row->velocity_low = row->velocity - half;
-    row->velocity_high = row->velocity + half;
-    row->velocity_sideways /= steady;
-    row->cot /= steady;
-    row->base_oscillation /= steady;
-}
-
-static void summarise(const Trials *t, EvalRow *row) {
-    int n = t->eval->trials, swings = 0, stances = 0;
-    double apex = 0, deepest = 0, drift = 0;
-    *row = (EvalRow){.speed = t->eval->speed, .sideways = t->eval->sideways, .trials = n};
-    snprintf(row->ground, sizeof row->ground, "%s", t->scene->name);
-    for (int i = 0; i < n; i++) {
-        Measure *m = &t->measure[i];
-        measure_finish(m);
-        row->success += !t->over[i];
-        row->energy += m->energy / n;
-        row->seconds += m->time / n;
-        row->torque_max += m->torque_max / n;
-        apex += m->apex_sum;
-        swings += m->swings;
-        deepest += m->deepest_sum;
-        drift += m->drift_sum;
-        stances += m->stances;
-    }
-    summarise_motion(t, row);
-    row->clearance = swings ? apex / swings : 0;
-    row->penetration = stances ? deepest / stances : 0;
-    row->drift = stances ? drift / stances : 0;
-}
-
 static void free_trials(Trials *t, int trials, int threads) {
     for (int i = 0; t->env && i < trials; i++) {
         free(t->env[i]);
@@ -177,30 +109,9 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
             controller->act(controller->self, eval->trials, t.env, t.action);
             pool_run(pool, eval->trials, step_trial, &t);
         }
-        summarise(&t, row);
+        eval_summarise(row, scene->name, eval, t.measure, t.over,
+                       robot_total_mass(robot) * GRAVITY);
     }
     free_trials(&t, eval->trials, pool_threads(pool));
     return status;
-}
-
-void eval_print_header(char *text, int size) {
-    snprintf(text, (size_t)size, "%-26s %5s %7s %14s %5s %7s %7s %7s %7s %7s", "ground", "m/s",
-             "upright", "measured m/s", "COT", "Nm max", "clear", "sink", "drift", "J/s");
-}
-
-void eval_print_row(const EvalRow *row, char *text, int size) {
-    char cot[16] = "-", sideways[48] = ""; /* standing has no cost of transport */
-    if (row->speed != 0 || row->sideways != 0) {
-        snprintf(cot, sizeof cot, "%.2f", row->cot);
-    }
-    if (row->sideways != 0) {
-        snprintf(sideways, sizeof sideways, "  sideways %.3f of %.2f m/s", row->velocity_sideways,
-                 row->sideways);
-    }
-    snprintf(text, (size_t)size,
-             "%-26s %5.2f %4d/%-2d %6.3f +- %5.3f %5s %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f%s",
-             row->ground, row->speed, row->success, row->trials, row->velocity,
-             0.5 * (row->velocity_high - row->velocity_low), cot, row->torque_max,
-             1e3 * row->clearance, 1e3 * row->penetration, 1e3 * row->drift,
-             row->seconds > 0 ? row->energy / row->seconds : 0, sideways);
 }

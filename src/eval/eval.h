@@ -4,6 +4,7 @@
 
 #include "base/pool.h"
 #include "control/controller.h"
+#include "eval/measure.h"
 #include "eval/scene.h"
 
 typedef struct {
@@ -40,6 +41,11 @@ typedef struct {
  * seed) only. */
 MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller,
                     const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error);
+
+/* The row of the trials' measures, which it finishes. measures, fallen (bool): [eval->trials]; weight
+ * [N] of the robot. */
+void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
+                    const uint8_t *fallen, double weight);
 
 /* Heading hold used by eval and play: turns back to world x. speed, sideways [m/s]: forward and to
  * the left; both 0: stand, without holding. Writes env->command and freezes it. */

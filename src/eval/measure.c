@@ -32,51 +32,75 @@ static void end_stance(Measure *m, int f) {
     m->stances++;
 }
 
-static void measure_foot(Measure *m, int f, const RobotFoot *foot, int rigid) {
-    if (foot->force[2] > CONTACT_FORCE) {
+static void measure_foot(Measure *m, int f, const MeasureFoot *foot) {
+    if (foot->load > CONTACT_FORCE) {
         if (!m->in_stance[f]) {
-            start_stance(m, f, foot->sole_center);
+            start_stance(m, f, foot->center);
         }
         m->air_time[f] = m->apex[f] = 0;
-        m->last[f][0] = foot->sole_center[0];
-        m->last[f][1] = foot->sole_center[1];
-        m->deepest[f] = fmax(m->deepest[f], rigid ? 0 : foot->result.depth_max);
+        m->last[f][0] = foot->center[0];
+        m->last[f][1] = foot->center[1];
+        m->deepest[f] = fmax(m->deepest[f], foot->depth);
         return;
     }
     m->air_time[f] += m->dt;
-    m->apex[f] = fmax(m->apex[f], foot->sole_height);
+    m->apex[f] = fmax(m->apex[f], foot->height);
     if (m->in_stance[f] && m->air_time[f] > CHATTER_TIME) {
         end_stance(m, f);
     }
 }
 
-void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque) {
-    Measure *m = measure;
-    const double *qd = robot_sim_qvel(sim) + 6, *qpos = robot_sim_qpos(sim);
+/* The part begins where the base was before its first step, so that the distance belongs to the
+ * time. */
+static void measure_steady(Measure *m, const MeasureSample *sample, double power_abs) {
+    if (m->steady_time == 0) {
+        memcpy(m->start, m->base, sizeof m->start);
+    }
+    memcpy(m->end, sample->base, sizeof m->end);
+    m->steady_time += m->dt;
+    m->work += power_abs * m->dt;
+    m->base_low = fmin(m->base_low, sample->base_height);
+    m->base_high = fmax(m->base_high, sample->base_height);
+}
+
+void measure_sample(Measure *m, const MeasureSample *sample) {
     double power = 0, power_abs = 0;
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        power += torque[i] * qd[i];
-        power_abs += fabs(torque[i] * qd[i]);
-        m->torque_max = fmax(m->torque_max, fabs(torque[i]));
+    for (int i = 0; i < sample->joints; i++) {
+        double joint_power = sample->torque[i] * sample->joint_speed[i];
+        power += joint_power;
+        power_abs += fabs(joint_power);
+        m->torque_max = fmax(m->torque_max, fabs(sample->torque[i]));
     }
     m->energy += fabs(power) * m->dt;
-    m->time += m->dt;
     if (m->time >= MEASURE_STEADY && (m->steady_end == 0 || m->time < m->steady_end)) {
-        if (m->steady_time == 0) {
-            m->start_x = qpos[0];
-            m->start_y = qpos[1];
-        }
-        m->steady_time += m->dt;
-        m->end_x = qpos[0];
-        m->end_y = qpos[1];
-        m->work += power_abs * m->dt;
-        double height = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]);
-        m->base_low = fmin(m->base_low, height);
-        m->base_high = fmax(m->base_high, height);
+        measure_steady(m, sample, power_abs);
     }
+    m->time += m->dt;
+    memcpy(m->base, sample->base, sizeof m->base);
     for (int f = 0; f < ROBOT_FEET; f++) {
-        measure_foot(m, f, robot_sim_foot(sim, f), env->variation.rigid);
+        measure_foot(m, f, &sample->foot[f]);
     }
+}
+
+void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque) {
+    const double *qpos = robot_sim_qpos(sim);
+    MeasureSample sample = {
+        .torque = torque,
+        .joint_speed = robot_sim_qvel(sim) + 6,
+        .joints = ROBOT_JOINTS,
+        .base = {qpos[0], qpos[1]},
+        .base_height = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]),
+    };
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        sample.foot[f] = (MeasureFoot){
+            .load = foot->force[2],
+            .center = {foot->sole_center[0], foot->sole_center[1]},
+            .height = foot->sole_height,
+            .depth = env->variation.rigid ? 0 : foot->result.depth_max,
+        };
+    }
+    measure_sample(measure, &sample);
 }
 
 void measure_finish(Measure *m) {

@@ -6,26 +6,57 @@
 
 #define MEASURE_STEADY 2.0 /* [s] start of the steady part */
 
+/* What the measures read of a foot. */
 typedef struct {
-    double time, dt;
-    double work;       /* [J] integral sum |tau qd| over the steady part */
-    double energy;     /* [J] integral |tau . qd| */
+    double load;      /* [N] vertical force of the ground on the foot */
+    double center[2]; /* [m] centre of the sole, world */
+    double height;    /* [m] lowest sole point above the undisturbed ground */
+    double depth;     /* [m] deepest element; 0 on rigid ground */
+} MeasureFoot;
+
+/* One physics step in plain numbers. */
+typedef struct {
+    const double *torque;      /* [N m] [joints] */
+    const double *joint_speed; /* [rad/s] [joints] */
+    int joints;
+    double base[2];     /* [m] world x (along the walk) and y */
+    double base_height; /* [m] above the undisturbed ground */
+    MeasureFoot foot[ROBOT_FEET];
+} MeasureSample;
+
+/* A stance begins when the ground carries the foot and ends with the last contact before a pause of
+ * CHATTER_TIME. */
+typedef struct {
+    double dt;         /* [s] physics step */
+    double time;       /* [s] since the start */
+    double energy;     /* [J] integral |sum tau qd| dt */
     double torque_max; /* [N m] */
-    double steady_end; /* [s] end of the steady part; 0: the trial's end */
-    double start_x, end_x, steady_time;
-    double start_y, end_y;
-    double base_low, base_high;
-    int in_stance[ROBOT_FEET];
-    double touchdown[ROBOT_FEET][2],
-        last[ROBOT_FEET][2]; /* [m] sole centre at the first and the latest contact */
-    double apex[ROBOT_FEET], air_time[ROBOT_FEET], deepest[ROBOT_FEET];
-    double apex_sum, deepest_sum, drift_sum;
+    double base[2];    /* [m] after the latest step */
+
+    /* steady part */
+    double steady_end;          /* [s] where it ends; 0: with the trial */
+    double steady_time;         /* [s] */
+    double start[2], end[2];    /* [m] base where the part began, and at its end */
+    double work;                /* [J] integral sum |tau qd| dt */
+    double base_low, base_high; /* [m] */
+
+    /* the running stance or swing of each foot */
+    int in_stance[ROBOT_FEET];       /* bool */
+    double touchdown[ROBOT_FEET][2]; /* [m] sole centre at the first contact */
+    double last[ROBOT_FEET][2];      /* [m] sole centre at the latest contact */
+    double air_time[ROBOT_FEET];     /* [s] since the latest contact */
+    double apex[ROBOT_FEET];         /* [m] highest of the foot since then */
+    double deepest[ROBOT_FEET];      /* [m] */
+
+    /* finished ones */
     int swings, stances;
+    double apex_sum, deepest_sum, drift_sum; /* [m] */
 } Measure;
 
 void measure_start(Measure *measure, double dt);
-void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim,
-                  const double *torque); /* a TaskProbe */
+void measure_sample(Measure *measure, const MeasureSample *sample);
+/* The same from a robot: a TaskProbe. */
+void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque);
 /* Who never lifted a foot still sank and crept: the open stances count then. */
 void measure_finish(Measure *measure);
 

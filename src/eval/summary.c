@@ -1,0 +1,98 @@
+/* From the trials' measures to a row of the table. */
+#include <math.h>
+#include <stdio.h>
+
+#include "eval/eval.h"
+
+#define STEADY_LEAST 0.5    /* [s] a shorter steady part says nothing about speed */
+#define DISTANCE_LEAST 1e-3 /* [m] cost of transport of a robot that stands stays finite */
+
+/* Student's t for 95 %, two sided: table up to 10 trials, then 1.96 + 2.6 / (degrees of freedom),
+ * within 0.5 %. */
+static double student_95(int samples) {
+    static const double table[] = {0, 0, 12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26};
+    return samples < 2 ? 0 : samples <= 10 ? table[samples] : 1.96 + 2.6 / (samples - 1);
+}
+
+/* Speed, cost of transport and base motion over the steady part of the trials that stayed up; of
+ * all when none did: a robot that dives forward and falls is not fast. */
+static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_t *fallen,
+                             double weight) {
+    double v_sum = 0, v_square = 0;
+    int steady = 0;
+    for (int i = 0; i < row->trials; i++) {
+        const Measure *m = &measures[i];
+        if (m->steady_time <= STEADY_LEAST || (row->success && fallen[i])) {
+            continue;
+        }
+        double distance = m->end[0] - m->start[0], left = m->end[1] - m->start[1];
+        double v = distance / m->steady_time;
+        double way = row->sideways != 0 ? hypot(distance, left) : fabs(distance);
+        v_sum += v;
+        v_square += v * v;
+        row->velocity_sideways += left / m->steady_time;
+        row->cot += m->work / (weight * fmax(way, DISTANCE_LEAST));
+        row->base_oscillation += m->base_high - m->base_low;
+        steady++;
+    }
+    if (!steady) {
+        return;
+    }
+    row->velocity = v_sum / steady;
+    double variance =
+        fmax(v_square / steady - row->velocity * row->velocity, 0) * steady / fmax(steady - 1, 1);
+    double half = student_95(steady) * sqrt(variance / steady);
+    row->velocity_low = row->velocity - half;
+    row->velocity_high = row->velocity + half;
+    row->velocity_sideways /= steady;
+    row->cot /= steady;
+    row->base_oscillation /= steady;
+}
+
+void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
+                    const uint8_t *fallen, double weight) {
+    const int trials = eval->trials;
+    int swings = 0, stances = 0;
+    double apex = 0, deepest = 0, drift = 0;
+    *row = (EvalRow){.speed = eval->speed, .sideways = eval->sideways, .trials = trials};
+    snprintf(row->ground, sizeof row->ground, "%s", ground);
+    for (int i = 0; i < trials; i++) {
+        Measure *m = &measures[i];
+        measure_finish(m);
+        row->success += !fallen[i];
+        row->energy += m->energy / trials;
+        row->seconds += m->time / trials;
+        row->torque_max += m->torque_max / trials;
+        apex += m->apex_sum;
+        swings += m->swings;
+        deepest += m->deepest_sum;
+        drift += m->drift_sum;
+        stances += m->stances;
+    }
+    summarise_motion(row, measures, fallen, weight);
+    row->clearance = swings ? apex / swings : 0;
+    row->penetration = stances ? deepest / stances : 0;
+    row->drift = stances ? drift / stances : 0;
+}
+
+void eval_print_header(char *text, int size) {
+    snprintf(text, (size_t)size, "%-26s %5s %7s %14s %5s %7s %7s %7s %7s %7s", "ground", "m/s",
+             "upright", "measured m/s", "COT", "Nm max", "clear", "sink", "drift", "J/s");
+}
+
+void eval_print_row(const EvalRow *row, char *text, int size) {
+    char cot[16] = "-", sideways[48] = ""; /* standing has no cost of transport */
+    if (row->speed != 0 || row->sideways != 0) {
+        snprintf(cot, sizeof cot, "%.2f", row->cot);
+    }
+    if (row->sideways != 0) {
+        snprintf(sideways, sizeof sideways, "  sideways %.3f of %.2f m/s", row->velocity_sideways,
+                 row->sideways);
+    }
+    snprintf(text, (size_t)size,
+             "%-26s %5.2f %4d/%-2d %6.3f +- %5.3f %5s %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f%s",
+             row->ground, row->speed, row->success, row->trials, row->velocity,
+             0.5 * (row->velocity_high - row->velocity_low), cot, row->torque_max,
+             1e3 * row->clearance, 1e3 * row->penetration, 1e3 * row->drift,
+             row->seconds > 0 ? row->energy / row->seconds : 0, sideways);
+}

@@ -1,0 +1,172 @@
+/* The learned controller: it is the policy's file, acting on what each environment remembers. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "base/random.h"
+#include "control/controller.h"
+#include "learn/policy.h"
+
+#define PATH "build_test_controller.safetensors"
+
+enum { ENVS = 7 };
+
+/* A policy of the task's shape with weights everywhere, its layers small. */
+static PolicyDef task_policy_def(void) {
+    PolicyDef def = policy_def_default();
+    def.observation = TASK_OBSERVATION;
+    def.frames = TASK_FRAMES;
+    def.actions = TASK_ACTIONS;
+    def.estimates = TASK_ESTIMATES;
+    def.critic_input = TASK_CRITIC;
+    for (int i = 0; i < POLICY_LAYERS_MAX; i++) {
+        def.encoder_hidden[i] = def.decoder_hidden[i] = i ? 0 : 16;
+        def.actor_hidden[i] = def.critic_hidden[i] = i ? 0 : 16;
+    }
+    return def;
+}
+
+static Policy *save_policy(const PolicyDef *def) {
+    MildError error = {0};
+    Policy *policy = policy_create(def, 3, &error);
+    assert_non_null(policy);
+    Random random = random_at(1, 2, 3);
+    for (int64_t i = 0; i < policy_parameter_count(policy); i++) {
+        policy_parameters(policy)[i] += (float)(0.05 * random_normal(&random));
+    }
+    assert_int_equal(policy_save(policy, PATH, "test", &error), MILD_OK);
+    return policy;
+}
+
+static void fill_histories(TaskEnv **envs, uint32_t draw) {
+    for (int e = 0; e < ENVS; e++) {
+        Random random = random_at(4, (uint32_t)e, draw);
+        for (int i = 0; i < TASK_HISTORY; i++) {
+            envs[e]->history[i] = (float)random_normal(&random);
+        }
+    }
+}
+
+/* Every environment gets the mean action of its own history, with and without threads, whatever the
+ * controller was asked before: it remembers nothing, so an episode's reset needs no call. */
+static void acts_as_its_policy(void **state) {
+    (void)state;
+    MildError error = {0};
+    PolicyDef def = task_policy_def();
+    Policy *policy = save_policy(&def);
+    static TaskEnv block[ENVS];
+    TaskEnv *envs[ENVS];
+    for (int e = 0; e < ENVS; e++) {
+        envs[e] = &block[ENVS - 1 - e];
+    }
+    for (int threads = 0; threads <= 2; threads += 2) {
+        Pool *pool = threads ? pool_create(threads) : NULL;
+        Controller controller = {0};
+        assert_int_equal(controller_learned(PATH, pool, ENVS, &controller, &error), MILD_OK);
+        assert_string_equal(controller.name, "learned");
+        double worst = 0, least = 1;
+        for (uint32_t draw = 0; draw < 3; draw++) {
+            float actions[ENVS * TASK_ACTIONS + 1], one[TASK_ACTIONS];
+            int rows = draw == 1 ? 2 : ENVS;
+            actions[rows * TASK_ACTIONS] = 42;
+            fill_histories(envs, draw % 2);
+            controller.act(controller.self, rows, envs, actions);
+            assert_true(actions[rows * TASK_ACTIONS] == 42);
+            for (int e = 0; e < rows; e++) {
+                policy_act(policy, NULL, 1, envs[e]->history, one, NULL, NULL);
+                for (int j = 0; j < TASK_ACTIONS; j++) {
+                    double gap = (double)actions[e * TASK_ACTIONS + j] - (double)one[j];
+                    worst = fmax(worst, fabs(gap));
+                    least = fmin(least, fabs((double)one[j]));
+                }
+            }
+        }
+        print_message("%d threads: worst against the policy %.1e\n", threads, worst);
+        assert_true(worst < 1e-5 && least > 0);
+        controller_destroy(&controller);
+        assert_null(controller.self);
+        controller_destroy(&controller); /* nothing the second time */
+        pool_destroy(pool);
+    }
+    policy_destroy(policy);
+    unlink(PATH);
+}
+
+/* The same history gives the same action after anything else: bit for bit. */
+static void remembers_nothing(void **state) {
+    (void)state;
+    MildError error = {0};
+    PolicyDef def = task_policy_def();
+    policy_destroy(save_policy(&def));
+    static TaskEnv block[ENVS];
+    TaskEnv *envs[ENVS];
+    for (int e = 0; e < ENVS; e++) {
+        envs[e] = &block[e];
+    }
+    Controller controller = {0};
+    assert_int_equal(controller_learned(PATH, NULL, ENVS, &controller, &error), MILD_OK);
+    float first[ENVS * TASK_ACTIONS], other[ENVS * TASK_ACTIONS], again[ENVS * TASK_ACTIONS];
+    fill_histories(envs, 0);
+    controller.act(controller.self, ENVS, envs, first);
+    fill_histories(envs, 1);
+    controller.act(controller.self, ENVS, envs, other);
+    fill_histories(envs, 0);
+    controller.act(controller.self, ENVS, envs, again);
+    assert_memory_equal(first, again, sizeof first);
+    assert_memory_not_equal(first, other, sizeof first);
+    controller_destroy(&controller);
+    unlink(PATH);
+}
+
+/* Whose shape is not the task's is refused with both shapes named, and nothing is made. */
+static void another_shape_is_refused(void **state) {
+    (void)state;
+    static const char *const said[3] = {"46 observations x 6", "47 observations x 5",
+                                        "and 11 actions"};
+    for (int wrong = 0; wrong < 3; wrong++) {
+        MildError error = {0};
+        PolicyDef def = task_policy_def();
+        def.observation -= wrong == 0;
+        def.frames -= wrong == 1;
+        def.actions -= wrong == 2;
+        policy_destroy(save_policy(&def));
+        Controller controller = {0};
+        assert_int_equal(controller_learned(PATH, NULL, 1, &controller, &error), MILD_ERROR_FORMAT);
+        assert_int_equal(error.status, MILD_ERROR_FORMAT);
+        assert_null(controller.self);
+        assert_non_null(strstr(error.text, PATH));
+        assert_non_null(strstr(error.text, said[wrong]));
+        assert_non_null(strstr(error.text, "needs 47 x 6 and 12"));
+        unlink(PATH);
+    }
+}
+
+static void a_missing_file_is_named(void **state) {
+    (void)state;
+    MildError error = {0};
+    Controller controller = {0};
+    assert_int_equal(controller_learned("no/policy.safetensors", NULL, 1, &controller, &error),
+                     MILD_ERROR_IO);
+    assert_non_null(strstr(error.text, "no/policy.safetensors"));
+    assert_int_not_equal(controller_learned("no/policy.safetensors", NULL, 1, &controller, NULL),
+                         MILD_OK);
+    assert_null(controller.self);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(acts_as_its_policy),
+        cmocka_unit_test(remembers_nothing),
+        cmocka_unit_test(another_shape_is_refused),
+        cmocka_unit_test(a_missing_file_is_named),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,550 @@
+/* Evaluation's measures on a walk whose numbers are worked out by hand: no simulator, a script of
+ * forces, torques and positions. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "eval/eval.h"
+
+/* A power of two: sums of it are exact, so the script meets every threshold where it should. */
+#define DT (1.0 / 1024)
+#define STEPS(seconds) ((int)((seconds)*1024))
+
+static void assert_close(const char *what, double ours, double expected, double tolerance) {
+    if (!(fabs(ours - expected) <= tolerance)) {
+        fail_msg("%s: %.12g, by hand %.12g", what, ours, expected);
+    }
+}
+
+/* Torques and joint speeds of one step; the feet stand still under 100 N unless set. */
+typedef struct {
+    double torque[ROBOT_JOINTS], speed[ROBOT_JOINTS];
+    MeasureSample sample;
+} Script;
+
+static void script_start(Script *s) {
+    *s = (Script){0};
+    s->sample = (MeasureSample){
+        .torque = s->torque, .joint_speed = s->speed, .joints = ROBOT_JOINTS, .base_height = 0.8};
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        s->sample.foot[f].load = 100;
+    }
+}
+
+/* ---- power, speed, base ---- */
+
+/* 5 s; two joints work at 10 x 2 = 20 W and -4 x 3 = -12 W, in the second half with both signs
+ * turned. Sum 8 W or -8 W, sum of magnitudes 32 W. The base moves at 0.25 m/s for 2 s, then at
+ * 0.5 m/s forward and 0.1 m/s to the left. The steady part may end before the trial. */
+static Measure script_walk(double steady_end) {
+    Script s;
+    Measure m;
+    script_start(&s);
+    measure_start(&m, DT);
+    m.steady_end = steady_end;
+    for (int k = 1; k <= STEPS(5); k++) {
+        double t = k * DT, sign = t <= 2.5 ? 1 : -1;
+        int steady = t > 2;
+        s.torque[0] = sign * 10;
+        s.speed[0] = 2;
+        s.torque[11] = -4;
+        s.speed[11] = sign * 3;
+        s.torque[5] = k == 100 ? -45 : k == 200 ? 30 : 0; /* at rest: no power */
+        s.sample.base[0] = -1 + (steady ? 0.5 + 0.5 * (t - 2) : 0.25 * t);
+        s.sample.base[1] = 3 + (steady ? 0.1 * (t - 2) : 0);
+        s.sample.base_height = !steady ? (k % 2 ? 0.5 : 1.0) : k % 3 ? 0.79 : 0.82;
+        measure_sample(&m, &s.sample);
+    }
+    return m;
+}
+
+static void power_and_speed(void **state) {
+    (void)state;
+    Measure m = script_walk(0);
+    assert_close("time", m.time, 5, 0);
+    assert_close("steady time", m.steady_time, 3, 0);
+    assert_close("energy", m.energy, 8 * 5, 1e-9);
+    assert_close("work", m.work, 32 * 3, 1e-9);
+    assert_close("greatest torque", m.torque_max, 45, 0);
+    assert_close("start of the steady part", m.start[0], -0.5, 1e-12);
+    assert_close("end of the steady part", m.end[0], 1.0, 1e-12);
+    assert_close("start of the steady part, y", m.start[1], 3.0, 1e-12);
+    assert_close("end of the steady part, y", m.end[1], 3.3, 1e-12);
+    assert_close("lowest base", m.base_low, 0.79, 0);
+    assert_close("highest base", m.base_high, 0.82, 0);
+    m = script_walk(4);
+    assert_close("time", m.time, 5, 0);
+    assert_close("steady time", m.steady_time, 2, 0);
+    assert_close("energy", m.energy, 8 * 5, 1e-9);
+    assert_close("work", m.work, 32 * 2, 1e-9);
+    assert_close("end of the steady part", m.end[0], 0.5, 1e-12);
+}
+
+static void nothing_is_steady_before_two_seconds(void **state) {
+    (void)state;
+    Script s;
+    Measure m;
+    script_start(&s);
+    measure_start(&m, DT);
+    s.torque[0] = s.speed[0] = 1;
+    s.sample.base[0] = 3;
+    for (int k = 0; k < STEPS(2); k++) {
+        measure_sample(&m, &s.sample);
+    }
+    assert_true(m.steady_time == 0 && m.work == 0 && m.start[0] == 0 && m.end[0] == 0);
+    assert_true(m.base_low > 1e8 && m.base_high < -1e8);
+    measure_sample(&m, &s.sample);
+    assert_true(m.steady_time == DT && m.work == DT && m.start[0] == 3 && m.end[0] == 3);
+}
+
+/* ---- feet ---- */
+
+/* Holds both feet as they are for some steps. */
+static void hold(Measure *m, Script *s, int steps) {
+    for (int k = 0; k < steps; k++) {
+        measure_sample(m, &s->sample);
+    }
+}
+
+static void set_foot(Script *s, int f, double load, double x, double y, double depth) {
+    s->sample.foot[f] = (MeasureFoot){.load = load, .center = {x, y}, .depth = depth};
+}
+
+static void lift(Script *s, int f, double height) {
+    s->sample.foot[f].load = 0;
+    s->sample.foot[f].height = height;
+}
+
+/* A stance that creeps 3 mm forward and 4 mm aside and is 12 mm deep in its middle, then a swing of
+ * 50 mm: drift 5 mm, penetration 12 mm, clearance 50 mm. The other foot stands all the time. */
+static void one_stance_and_one_swing(void **state) {
+    (void)state;
+    for (int f = 0; f < ROBOT_FEET; f++) {
+        Script s;
+        Measure m;
+        script_start(&s);
+        measure_start(&m, DT);
+        set_foot(&s, f, 100, 0.2, -0.1, 0.004);
+        hold(&m, &s, 100);
+        set_foot(&s, f, 100, 0.21, -0.1, 0.012); /* on the way the sole may be anywhere */
+        hold(&m, &s, 100);
+        set_foot(&s, f, 100, 0.203, -0.096, 0.006);
+        hold(&m, &s, 100);
+        s.sample.foot[f].center[0] = 0.3; /* in the air it moves on */
+        lift(&s, f, 0.02);
+        hold(&m, &s, 100);
+        lift(&s, f, 0.05);
+        hold(&m, &s, 100);
+        lift(&s, f, 0.01);
+        hold(&m, &s, 100);
+        assert_int_equal(m.stances, 1);
+        assert_int_equal(m.swings, 0); /* it has not landed */
+        assert_close("drift", m.drift_sum, 0.005, 1e-15);
+        assert_close("penetration", m.deepest_sum, 0.012, 0);
+        set_foot(&s, f, 100, 0.5, -0.1, 0.001);
+        hold(&m, &s, 100);
+        assert_int_equal(m.swings, 1);
+        assert_close("clearance", m.apex_sum, 0.05, 0);
+        lift(&s, f, 0.03);
+        hold(&m, &s, 100); /* the second stance begins anew: no drift, 1 mm deep */
+        assert_int_equal(m.stances, 2);
+        assert_close("drift of two", m.drift_sum, 0.005, 1e-15);
+        assert_close("penetration of two", m.deepest_sum, 0.013, 1e-15);
+        set_foot(&s, f, 100, 0.6, -0.1, 0);
+        hold(&m, &s, 1);
+        assert_int_equal(m.swings, 2);
+        assert_close("clearance of two", m.apex_sum, 0.08, 1e-15);
+        measure_finish(&m); /* the other foot's open stance does not count */
+        assert_int_equal(m.stances, 2);
+    }
+}
+
+/* Contact is more than 5 N. */
+static void contact_is_a_load_above_five_newton(void **state) {
+    (void)state;
+    for (int loaded = 0; loaded < 2; loaded++) {
+        Script s;
+        Measure m;
+        script_start(&s);
+        measure_start(&m, DT);
+        set_foot(&s, 0, 100, 0, 0, 0.01);
+        hold(&m, &s, 10);
+        s.sample.foot[0].load = loaded ? 5.1 : 5.0;
+        hold(&m, &s, STEPS(0.5));
+        assert_int_equal(m.stances, !loaded);
+    }
+}
+
+/* A loss of contact of less than 30 ms (30 steps here are 29.3 ms) neither ends a stance nor makes
+ * a swing, and what is lost twice is not added up; 31 steps end it. */
+static void chatter_ends_no_stance(void **state) {
+    (void)state;
+    Script s;
+    Measure m;
+    script_start(&s);
+    measure_start(&m, DT);
+    for (int k = 0; k < 5; k++) {
+        set_foot(&s, 1, 100, 0.001 * k, 0, 0.001 * k);
+        hold(&m, &s, 10);
+        lift(&s, 1, 0.02);
+        hold(&m, &s, 30);
+    }
+    assert_true(m.stances == 0 && m.swings == 0);
+    hold(&m, &s, 1);
+    assert_int_equal(m.stances, 1);
+    assert_close("drift over pauses", m.drift_sum, 0.004, 1e-15);
+    assert_close("penetration over pauses", m.deepest_sum, 0.004, 0);
+    lift(&s, 1, 0.001);
+    hold(&m, &s, 100);
+    set_foot(&s, 1, 100, 1, 0, 0);
+    hold(&m, &s, 1);
+    assert_int_equal(m.swings, 1);
+    assert_close("the apex counts from the last contact on", m.apex_sum, 0.02, 0);
+}
+
+/* A lift up to 5 mm is a stance that ends, but no swing. */
+static void low_lifts_are_no_swings(void **state) {
+    (void)state;
+    static const double height[3] = {0.0049, 0.005, 0.0051};
+    for (int i = 0; i < 3; i++) {
+        Script s;
+        Measure m;
+        script_start(&s);
+        measure_start(&m, DT);
+        hold(&m, &s, 10);
+        lift(&s, 0, height[i]);
+        hold(&m, &s, 100);
+        set_foot(&s, 0, 100, 0, 0, 0);
+        hold(&m, &s, 10);
+        assert_int_equal(m.stances, 1);
+        assert_int_equal(m.swings, i == 2);
+    }
+}
+
+/* Who starts in the air has no stance to end; the first landing may end a swing. */
+static void a_foot_that_starts_in_the_air(void **state) {
+    (void)state;
+    Script s;
+    Measure m;
+    script_start(&s);
+    measure_start(&m, DT);
+    lift(&s, 0, 0.03);
+    lift(&s, 1, -0.02); /* sunk and unloaded: no height above the ground */
+    hold(&m, &s, 200);
+    assert_true(m.stances == 0 && m.swings == 0);
+    script_start(&s);
+    hold(&m, &s, 1);
+    assert_true(m.stances == 0 && m.swings == 1 && m.apex_sum == 0.03);
+}
+
+/* Never lifted: both stances count as they are at the end, once. */
+static void open_stances_count_when_no_foot_was_lifted(void **state) {
+    (void)state;
+    Script s;
+    Measure m;
+    script_start(&s);
+    measure_start(&m, DT);
+    set_foot(&s, 0, 100, 0, 0, 0.01);
+    set_foot(&s, 1, 100, 0, 1, 0.02);
+    hold(&m, &s, 10);
+    set_foot(&s, 0, 100, 0.006, 0.008, 0.01);
+    set_foot(&s, 1, 100, 0, 0.98, 0.02);
+    hold(&m, &s, 10);
+    measure_finish(&m);
+    assert_int_equal(m.stances, 2);
+    assert_close("drift", m.drift_sum, 0.03, 1e-15);
+    assert_close("penetration", m.deepest_sum, 0.03, 1e-15);
+    measure_finish(&m);
+    assert_int_equal(m.stances, 2);
+    measure_start(&m, DT); /* and one foot that never touches the ground has none */
+    lift(&s, 1, 0.1);
+    hold(&m, &s, 10);
+    measure_finish(&m);
+    assert_int_equal(m.stances, 1);
+}
+
+/* ---- the row ---- */
+
+/* A trial of `time` seconds, steady from 2 s on, at `speed`. */
+static Measure trial(double time, double speed, double work) {
+    Measure m;
+    measure_start(&m, DT);
+    m.time = time;
+    m.steady_time = fmax(time - 2, 0);
+    m.start[0] = 0.7;
+    m.end[0] = 0.7 + speed * m.steady_time;
+    m.start[1] = m.end[1] = -2;
+    m.work = work;
+    m.base_low = 0.80;
+    m.base_high = 0.81;
+    return m;
+}
+
+static EvalRow summarise(Measure *m, const uint8_t *fallen, int trials) {
+    const EvalDef eval = {.speed = 0.5, .trials = trials};
+    EvalRow row;
+    memset(&row, 0xff, sizeof row);
+    eval_summarise(&row, "foam45", &eval, m, fallen, 400);
+    assert_string_equal(row.ground, "foam45");
+    assert_true(row.speed == 0.5 && row.sideways == 0);
+    return row;
+}
+
+/* Three trials at 0.4, 0.5 and 0.9 m/s over 4 s: mean 0.6, deviations -0.2, -0.1, 0.3, variance
+ * 0.14/2 = 0.07, t = 4.303 at 2 degrees of freedom. Weight 400 N: cost of transport 320/(400 x 1.6)
+ * = 0.5, 400/(400 x 2) = 0.5, 2880/(400 x 3.6) = 2, mean 1. The fourth falls at 3 s and counts
+ * where all trials do: success, energy, torque, seconds, feet. */
+static void a_row_from_four_trials(void **state) {
+    (void)state;
+    Measure m[4] = {trial(6, 0.4, 320), trial(6, 0.5, 400), trial(6, 0.9, 2880), trial(3, 2, 50)};
+    const uint8_t fallen[4] = {0, 0, 0, 1};
+    for (int i = 0; i < 4; i++) {
+        m[i].energy = 100 * (i + 1);
+        m[i].torque_max = 20 + 10 * i;
+        m[i].base_high = 0.81 + 0.01 * i;
+        m[i].swings = i;
+        m[i].apex_sum = 0.04 * i * i;
+        m[i].stances = 2 * i + 1;
+        m[i].deepest_sum = 0.008 * (i + 1);
+        m[i].drift_sum = 0.004 * (i + 2);
+    }
+    EvalRow row = summarise(m, fallen, 4);
+    assert_int_equal(row.trials, 4);
+    assert_int_equal(row.success, 3);
+    assert_close("velocity", row.velocity, 0.6, 1e-12);
+    double half = 4.303 * sqrt(0.07 / 3);
+    assert_close("low", row.velocity_low, 0.6 - half, 2e-3 * half);
+    assert_close("high", row.velocity_high, 0.6 + half, 2e-3 * half);
+    assert_close("cost of transport", row.cot, 1, 1e-12);
+    assert_close("oscillation", row.base_oscillation, 0.02, 1e-12);
+    assert_close("energy", row.energy, 250, 1e-12);
+    assert_close("torque", row.torque_max, 35, 1e-12);
+    assert_close("seconds", row.seconds, 21.0 / 4, 1e-12);
+    assert_close("clearance", row.clearance, 0.04 * 14 / 6, 1e-12);
+    assert_close("penetration", row.penetration, 0.08 / 16, 1e-12);
+    assert_close("drift", row.drift, 0.004 * 14 / 16, 1e-12);
+}
+
+/* When no trial stayed up the fallen ones that walked for more than half a steady second count. */
+static void a_row_of_falls(void **state) {
+    (void)state;
+    Measure m[3] = {trial(3, 0.5, 200), trial(2.5, 5, 1e6), trial(1.5, 7, 1e6)};
+    const uint8_t fallen[3] = {1, 1, 1};
+    EvalRow row = summarise(m, fallen, 3);
+    assert_int_equal(row.success, 0);
+    assert_close("velocity", row.velocity, 0.5, 1e-12);
+    assert_true(row.velocity_low == row.velocity && row.velocity_high == row.velocity);
+    assert_close("cost of transport", row.cot, 1, 1e-12);
+    assert_close("oscillation", row.base_oscillation, 0.01, 1e-12);
+    row = summarise(m + 2, fallen, 1); /* too short for any: zeros */
+    assert_true(row.velocity == 0 && row.cot == 0 && row.velocity_low == 0 &&
+                row.velocity_high == 0 && row.base_oscillation == 0 && row.seconds == 1.5);
+    assert_true(row.clearance == 0 && row.penetration == 0 && row.drift == 0);
+}
+
+/* Backward is a distance too; one that does not move is divided by a millimetre, not by zero. */
+static void cost_of_transport_backward_and_at_rest(void **state) {
+    (void)state;
+    Measure back = trial(4, -0.5, 200), rest = trial(4, 0, 200);
+    const uint8_t fallen = 0;
+    EvalRow row = summarise(&back, &fallen, 1);
+    assert_close("velocity", row.velocity, -0.5, 1e-12);
+    assert_close("cost of transport", row.cot, 0.5, 1e-12);
+    row = summarise(&rest, &fallen, 1);
+    assert_close("at rest", row.cot, 200 / (400 * 1e-3), 1e-9);
+}
+
+/* Aside at 0.3 m/s and forward at 0.4 m/s over 2 s: 0.6 m to the left, 0.5 m/s along the way, which
+ * counts for the cost of transport when it was asked for, else only the way forward. */
+static void sideways(void **state) {
+    (void)state;
+    const uint8_t fallen[2] = {0};
+    for (int asked = 0; asked < 2; asked++) {
+        Measure m[2] = {trial(4, 0.4, 200), trial(4, 0.4, 200)};
+        m[0].end[1] = m[0].start[1] + 0.8;
+        m[1].end[1] = m[1].start[1] + 0.4;
+        const EvalDef eval = {.speed = 0.4, .sideways = asked ? 0.3 : 0, .trials = 2};
+        EvalRow row;
+        eval_summarise(&row, "foam45", &eval, m, fallen, 400);
+        assert_close("asked", row.sideways, asked ? 0.3 : 0, 0);
+        assert_close("velocity", row.velocity, 0.4, 1e-12);
+        assert_close("to the left", row.velocity_sideways, 0.3, 1e-12);
+        double cot = 0.25 * (1 / hypot(0.8, 0.8) + 1 / hypot(0.8, 0.4));
+        assert_close("cost of transport", row.cot, asked ? cot : 0.5 / 0.8, 1e-12);
+    }
+}
+
+/* An open stance of a trial that never lifted a foot is in the row. */
+static void a_row_finishes_its_measures(void **state) {
+    (void)state;
+    Measure m = trial(4, 0, 0);
+    const uint8_t fallen = 0;
+    m.in_stance[0] = 1;
+    m.deepest[0] = 0.015;
+    m.last[0][0] = 0.002;
+    EvalRow row = summarise(&m, &fallen, 1);
+    assert_close("penetration", row.penetration, 0.015, 0);
+    assert_close("drift", row.drift, 0.002, 0);
+}
+
+/* Half width of the interval for n trials, half of them at 0 and half at 1 m/s, against Student's t
+ * as printed in tables (two sided, 95 %). */
+static void interval_of_the_mean(void **state) {
+    (void)state;
+    enum { MOST = 122 };
+    static const struct {
+        int trials;
+        double t;
+    } student[] = {{2, 12.706}, {3, 4.303},  {4, 3.182},  {5, 2.776},  {6, 2.571},
+                   {7, 2.447},  {8, 2.365},  {9, 2.306},  {10, 2.262}, {12, 2.201},
+                   {16, 2.131}, {21, 2.086}, {31, 2.042}, {61, 2.000}, {121, 1.980}};
+    static Measure m[MOST];
+    static uint8_t fallen[MOST];
+    double worst = 0;
+    for (size_t i = 0; i < sizeof student / sizeof *student; i++) {
+        int n = student[i].trials, fast = n / 2;
+        for (int k = 0; k < n; k++) {
+            m[k] = trial(6, k < fast, 1);
+        }
+        double mean = (double)fast / n, deviation = sqrt(n * mean * (1 - mean) / (n - 1));
+        double half = student[i].t * deviation / sqrt(n);
+        EvalRow row = summarise(m, fallen, n);
+        double ours = 0.5 * (row.velocity_high - row.velocity_low);
+        worst = fmax(worst, fabs(ours / half - 1));
+        assert_close("centre", 0.5 * (row.velocity_high + row.velocity_low), mean, 1e-12);
+    }
+    print_message("95 %% interval against printed tables: worst %.2f %%\n", 100 * worst);
+    assert_true(worst < 3e-3);
+}
+
+static void the_printed_row(void **state) {
+    (void)state;
+    EvalRow row = {.ground = "sand_loose",
+                   .speed = 0.5,
+                   .trials = 20,
+                   .success = 19,
+                   .velocity = 0.4567,
+                   .velocity_low = 0.4467,
+                   .velocity_high = 0.4667,
+                   .cot = 1.234,
+                   .torque_max = 98.76,
+                   .clearance = 0.0521,
+                   .penetration = 0.0123,
+                   .drift = 0.0045,
+                   .energy = 1200,
+                   .seconds = 10};
+    char text[256];
+    eval_print_row(&row, text, sizeof text);
+    assert_string_equal(text,
+                        "sand_loose                  0.50   19/20  0.457 +- 0.010  1.23    98.8"
+                        "   52 mm 12.3 mm  4.5 mm     120");
+    row.seconds = 0;
+    eval_print_row(&row, text, sizeof text);
+    assert_non_null(strstr(text, "mm       0"));
+    row.speed = 0; /* standing has no cost of transport */
+    eval_print_row(&row, text, sizeof text);
+    assert_non_null(strstr(text, "0.010     -    98.8"));
+    row.sideways = -0.3;
+    row.velocity_sideways = -0.2468;
+    eval_print_row(&row, text, sizeof text);
+    assert_non_null(strstr(text, "0.010  1.23    98.8"));
+    assert_non_null(strstr(text, "       0  sideways -0.247 of -0.30 m/s"));
+    char header[256];
+    eval_print_header(header, sizeof header);
+    printf("%s\n%s\n", header, text);
+    assert_string_equal(header,
+                        "ground                       m/s upright   measured m/s   COT  Nm max"
+                        "   clear    sink   drift     J/s");
+}
+
+/* ---- from a robot ---- */
+
+/* The same numbers read from a robot: what is put into its state is what the measure must see. */
+static void a_robot_is_read(void **state) {
+    (void)state;
+    MildError error = {0};
+    Robot *robot = robot_create(MILD_SOURCE_DIR "/models/sa01/sa01.xml", &error);
+    assert_non_null(robot);
+    TaskDef def = task_def_default();
+    RobotSim *sim = robot_sim_create(robot, 1e-3, &error);
+    TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
+    assert_true(sim && env);
+    task_env_init(env, &def, robot, 1, 0);
+    MildMaterial sand = mild_material_default();
+    env->terrain = mild_terrain_uniform(&sand);
+    env->terrain.height = 0.3;
+    for (int rigid = 0; rigid < 2; rigid++) {
+        env->variation = robot_variation_nominal();
+        env->variation.rigid = rigid;
+        RobotState start = {.qpos = {1.5, 0.2, 0.3 + robot_stand_height(robot) - 0.01, 1}};
+        memcpy(start.qpos + 7, robot_default_pose(robot), ROBOT_JOINTS * sizeof(double));
+        double none[ROBOT_JOINTS] = {0}, torque[ROBOT_JOINTS] = {[0] = 10, [11] = -4};
+        robot_sim_load(sim, &start, &env->variation);
+        for (int k = 0; k < 20; k++) {
+            assert_int_equal(robot_sim_step(sim, none, NULL, &env->terrain, task_env_ground(env)),
+                             0);
+        }
+        double load = robot_sim_foot(sim, 0)->force[2],
+               depth = robot_sim_foot(sim, 0)->result.depth_max;
+        assert_true(load > 5 && (rigid || depth > 1e-3));
+        Measure m;
+        measure_start(&m, 1e-3);
+        m.time = 3; /* in the steady part */
+        measure_step(&m, env, sim, torque);
+        const double *q = robot_sim_qpos(sim), *qd = robot_sim_qvel(sim);
+        double left = 10 * qd[6], right = -4 * qd[17];
+        assert_close("energy", m.energy, fabs(left + right) * 1e-3, 1e-15);
+        assert_close("work", m.work, (fabs(left) + fabs(right)) * 1e-3, 1e-15);
+        assert_close("torque", m.torque_max, 10, 0);
+        assert_close("x", m.end[0], 1.5, 0.05);
+        assert_close("y", m.end[1], 0.2, 0.05);
+        assert_true(m.end[0] == q[0] && m.end[1] == q[1] && fabs(q[0] - 1.5) > 1e-9);
+        assert_close("height", m.base_high, q[2] - 0.3, 1e-15);
+        for (int f = 0; f < ROBOT_FEET; f++) {
+            assert_true(m.in_stance[f]);
+            const double *center = robot_sim_foot(sim, f)->sole_center;
+            assert_true(m.touchdown[f][0] == center[0] && m.touchdown[f][1] == center[1]);
+            double deepest = robot_sim_foot(sim, f)->result.depth_max;
+            assert_true(m.deepest[f] == (rigid ? 0 : deepest));
+        }
+        start.qpos[2] += 0.11; /* 100 mm above the ground */
+        robot_sim_load(sim, &start, &env->variation);
+        mild_ground_reset(task_env_ground(env));
+        assert_int_equal(robot_sim_step(sim, none, NULL, &env->terrain, task_env_ground(env)), 0);
+        measure_step(&m, env, sim, torque);
+        assert_close("apex", m.apex[0], 0.1, 1e-4);
+        assert_close("apex", m.apex[1], 0.1, 1e-4);
+    }
+    free(env);
+    robot_sim_destroy(sim);
+    robot_destroy(robot);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(power_and_speed),
+        cmocka_unit_test(nothing_is_steady_before_two_seconds),
+        cmocka_unit_test(one_stance_and_one_swing),
+        cmocka_unit_test(contact_is_a_load_above_five_newton),
+        cmocka_unit_test(chatter_ends_no_stance),
+        cmocka_unit_test(low_lifts_are_no_swings),
+        cmocka_unit_test(a_foot_that_starts_in_the_air),
+        cmocka_unit_test(open_stances_count_when_no_foot_was_lifted),
+        cmocka_unit_test(a_row_from_four_trials),
+        cmocka_unit_test(a_row_of_falls),
+        cmocka_unit_test(cost_of_transport_backward_and_at_rest),
+        cmocka_unit_test(sideways),
+        cmocka_unit_test(a_row_finishes_its_measures),
+        cmocka_unit_test(interval_of_the_mean),
+        cmocka_unit_test(the_printed_row),
+        cmocka_unit_test(a_robot_is_read),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,199 @@
+/* A minibatch's gradient: gathering, shards, chunks, images and noise, against the loss of one
+ * sample at a time. */
+#include "check.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "learn/noise.h"
+#include "learn/ppo_private.h"
+#include "learn/product.h"
+
+enum { STEPS = 70, ENVS = 50, SAMPLES = STEPS * ENVS };
+
+static const int mirror_o[] = {0, 2, 1, 4, 3}, mirror_a[] = {1, 0};
+static const float sign_o[] = {-1, 1, 1, -1, -1}, sign_a[] = {-1, -1};
+static const PpoMirror mirror = {mirror_o, sign_o, mirror_a, sign_a};
+
+typedef struct {
+    Policy *policy;
+    Pool *pool;
+    Ppo *ppo;
+    LossContext context;
+    int samples[SAMPLES];
+} Case;
+
+static void case_open(Case *c, double mirror_share) {
+    MildError error = {0};
+    PolicyDef policy_def = small_def();
+    PpoDef def = ppo_def_default();
+    def.steps = STEPS;
+    def.kl_weight = 0.1;
+    def.mirror_share = mirror_share;
+    c->policy = policy_create(&policy_def, 2, &error);
+    c->pool = pool_create(2);
+    c->ppo = ppo_create(&def, c->policy, c->pool, &mirror, ENVS, 5, &error);
+    assert_non_null(c->ppo);
+    Random random = random_at(8, 0, 0);
+    PpoBatch *b = ppo_batch(c->ppo);
+    fill_normal(policy_parameters(c->policy), policy_parameter_count(c->policy), 0.3, &random);
+    fill_normal(b->history, SAMPLES * 15, 1.0, &random);
+    fill_normal(b->critic, SAMPLES * 7, 1.0, &random);
+    fill_normal(b->target, SAMPLES * 6, 1.0, &random);
+    fill_normal(b->frame, SAMPLES * 5, 1.0, &random);
+    fill_normal(b->action, SAMPLES * 2, 1.0, &random);
+    fill_normal(b->mean, SAMPLES * 2, 1.0, &random);
+    fill_normal(b->value, SAMPLES, 1.0, &random);
+    fill_normal(b->returns, SAMPLES, 1.0, &random);
+    fill_normal(b->advantage, SAMPLES, 1.0, &random);
+    fill_normal(b->log_prob, SAMPLES, 0.3, &random);
+    for (int i = 0; i < SAMPLES; i++) {
+        b->log_prob[i] -= 2.5f;
+        c->samples[i] = (int)((int64_t)i * 1201 % SAMPLES); /* any order that is not the batch's */
+    }
+    c->context = (LossContext){.def = &c->ppo->def,
+                               .network = &c->policy->network,
+                               .mirror = &c->ppo->mirror,
+                               .parameters = policy_parameters(c->policy),
+                               .old_std = {0.9f, 1.1f}};
+    memcpy(c->context.std, policy_std(c->policy), 2 * sizeof(float));
+}
+
+static void case_close(Case *c) {
+    ppo_destroy(c->ppo);
+    policy_destroy(c->policy);
+    pool_destroy(c->pool);
+}
+
+/* The loss of sample p of the minibatch alone, added to gradient and sums. */
+static void one_sample(const Case *c, LossChunk *chunk, int p, int image, const int *rows,
+                       uint64_t key, float *gradient, LossSums *sums) {
+    const PpoBatch *b = ppo_batch(c->ppo);
+    const int i = c->samples[p];
+    chunk->rows = 1;
+    chunk->mirrored = image;
+    memcpy(chunk->history, b->history + i * 15, 15 * sizeof(float));
+    memcpy(chunk->estimate, b->target + i * 6, 6 * sizeof(float));
+    memcpy(chunk->decoder_target, b->frame + i * 5, 5 * sizeof(float));
+    memcpy(chunk->action, b->action + i * 2, 2 * sizeof(float));
+    memcpy(chunk->old_mean, b->mean + i * 2, 2 * sizeof(float));
+    memcpy(chunk->critic, b->critic + i * 7, 7 * sizeof(float));
+    chunk->old_log_prob[0] = b->log_prob[i];
+    chunk->advantage[0] = b->advantage[i];
+    chunk->old_value[0] = b->value[i];
+    chunk->returns[0] = b->returns[i];
+    noise_normal(key, (int64_t)rows[p] * 4, 4, chunk->noise); /* four latents */
+    if (image) {
+        loss_mirror_row(&c->context, chunk, 0, 1);
+    }
+    loss_actor(&c->context, chunk, gradient, 1.0f, sums);
+    loss_critic(&c->context, chunk, gradient, 1.0f, sums);
+}
+
+static double apart(double ours, double theirs) {
+    return fabs(ours - theirs) / fmax(1.0, fabs(theirs));
+}
+
+static void check_minibatch(Case *c, int count, uint32_t draw, double share) {
+    const int64_t parameters = policy_parameter_count(c->policy);
+    int *which = malloc(SAMPLES * sizeof *which), *rows = malloc(SAMPLES * sizeof *rows);
+    float *sum = calloc((size_t)parameters, sizeof *sum);
+    LossChunk chunk;
+    size_t floats = loss_carve(&c->policy->network, 1, 1, NULL, &chunk);
+    float *block = aligned_alloc(64, (floats * sizeof(float) + 63) / 64 * 64);
+    assert_true(which && rows && sum && block);
+    loss_carve(&c->policy->network, 1, 1, block, &chunk);
+    const int images = ppo_mirrored(c->ppo, count, which);
+    assert_int_equal(images, ppo_mirrored(c->ppo, count, NULL));
+    assert_true(fabs(images - share * count) <= 8.0 * (1.0 + count / 2048.0));
+    ppo_latent_rows(count, rows);
+    c->context.sample_weight = 1.0f / (float)count;
+    c->context.mirror_weight = images ? 1.0f / (float)images : 0.0f;
+    LossSums sums, expected = {0};
+    double norm, squares = 0.0, worst = 0.0;
+    memset(c->ppo->gradient, 0xff, PPO_SHARDS * c->ppo->stride * sizeof(float)); /* NaN */
+    ppo_gradient(c->ppo, &c->context, c->samples, count, draw, &sums, &norm);
+    int entered = product_enter();
+    for (int p = 0, next = 0; p < count; p++) {
+        int image = next < images && which[next] == p;
+        next += image;
+        one_sample(c, &chunk, p, image, rows, ppo_latent_key(c->ppo, draw), sum, &expected);
+    }
+    product_leave(entered);
+    for (int64_t i = 0; i < parameters; i++) {
+        worst = fmax(worst, apart(c->ppo->gradient[i], sum[i]));
+        squares += (double)sum[i] * (double)sum[i];
+    }
+    const double ours[] = {sums.surrogate, sums.kl,          sums.clipped,     sums.reconstruction,
+                           sums.vae_kl,    sums.estimate[0], sums.estimate[1], sums.estimate[2],
+                           sums.mirror,    sums.value};
+    const double theirs[] = {expected.surrogate,      expected.kl,          expected.clipped,
+                             expected.reconstruction, expected.vae_kl,      expected.estimate[0],
+                             expected.estimate[1],    expected.estimate[2], expected.mirror,
+                             expected.value};
+    double loss = 0.0;
+    for (size_t k = 0; k < sizeof ours / sizeof *ours; k++) {
+        loss = fmax(loss, apart(ours[k], theirs[k]));
+        assert_true(theirs[k] != 0.0 || images == 0);
+    }
+    print_message("%4d samples, %4d images: worst gradient %.1e, norm %.1e, sums %.1e\n", count,
+                  images, worst, apart(norm, sqrt(squares)), loss);
+    assert_true(worst < 2e-5 && apart(norm, sqrt(squares)) < 1e-5 && loss < 1e-5);
+    free(which);
+    free(rows);
+    free(sum);
+    free(block);
+}
+
+/* Several chunks a shard; fewer samples than shards, where an empty shard must leave nothing. */
+static void minibatch_is_the_sum_of_its_samples(void **state) {
+    (void)state;
+    Case c;
+    case_open(&c, 0.5);
+    check_minibatch(&c, SAMPLES, 0, 0.5);
+    check_minibatch(&c, 1001, 1, 0.5);
+    check_minibatch(&c, 5, 2, 0.5);
+    case_close(&c);
+    case_open(&c, 1.0);
+    check_minibatch(&c, 2100, 3, 1.0);
+    case_close(&c);
+    case_open(&c, 0.0);
+    check_minibatch(&c, 300, 4, 0.0);
+    case_close(&c);
+}
+
+/* No two samples of a minibatch share a latent's random numbers, and every other draw, iteration
+ * and seed has its own. */
+static void latents_are_drawn_apart(void **state) {
+    (void)state;
+    static int row[8000], used[16000 + 512];
+    static const int counts[] = {1, 7, 8, 100, 2048, 2049, 8000};
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        memset(used, 0, sizeof used);
+        ppo_latent_rows(counts[i], row);
+        for (int p = 0; p < counts[i]; p++) {
+            assert_true(row[p] >= 0 && row[p] < 2 * counts[i]);
+            assert_int_equal(used[row[p]]++, 0);
+        }
+    }
+    Case c;
+    case_open(&c, 0.5);
+    uint64_t key = ppo_latent_key(c.ppo, 0);
+    assert_true(key == ppo_latent_key(c.ppo, 0));
+    assert_true(key != ppo_latent_key(c.ppo, 1));
+    c.ppo->iteration++;
+    assert_true(key != ppo_latent_key(c.ppo, 0));
+    c.ppo->iteration--;
+    c.ppo->seed++;
+    assert_true(key != ppo_latent_key(c.ppo, 0));
+    case_close(&c);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(minibatch_is_the_sum_of_its_samples),
+        cmocka_unit_test(latents_are_drawn_apart),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
