@@ -6,8 +6,12 @@ TARGETS ?=
 CMAKE_FLAGS ?=
 PREFIX ?= /usr/local
 MARCH ?= native
+LAYER ?= task
+N ?= 200
+SEED ?= 1
+MUTANTS ?=
 
-.PHONY: setup build test run bench install docs fuzz clean help
+.PHONY: setup build test run bench install docs fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -16,6 +20,7 @@ help:
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
+	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -46,6 +51,10 @@ install:
 # Set up as for a build; not `build` itself, for it has a folder and a compiler of its own.
 fuzz: setup
 	@RUNS=$(RUNS) scripts/fuzz.sh $(TARGETS)
+
+# Makes its own builds; MUTANTS: further options (scripts/mutants.py --help).
+mutants: setup
+	@scripts/mutants.py --layer $(LAYER) -n $(N) --seed $(SEED) --jobs $(JOBS) $(MUTANTS)
 
 docs:
 	@mkdir -p build
