@@ -98,10 +98,10 @@ MILD_HD Impulse lag_impulse(const Element *e, Real dt, Real speed) {
     const Real damping = dt * ELEMENT_LAG * e->unload_stiffness;
     const Real rise = speed + e->entry_speed;
     const Real ease = real_min(real_max(rise, -IMPULSE_EASE), 0);
-    const Real eased = real_min(rise + IMPULSE_EASE, 0) - ease * ease * REAL(0.5 / IMPULSE_EASE);
+    const Real eased = real_min(rise + IMPULSE_EASE, 0) - ease * ease * (1 / (2 * IMPULSE_EASE));
     Impulse lag;
     lag.value = damping * eased;
-    lag.slope = damping * ease * REAL(-1.0 / IMPULSE_EASE);
+    lag.slope = damping * ease * (-1 / IMPULSE_EASE);
     return lag;
 }
 
