@@ -1,75 +1,148 @@
-/* The developing cone of one element (paper eqs 1-5, read as in docs: stiffness per element area,
- * added mass positive, flat area frozen at zero once the cone is complete).
+/* The law of virgin ground: what an element feels that goes deeper than any before it.
  *
- * With t = min(u/u_f, 1), u_f = R tan(alpha)/nu and s = pi R^2 the element's area, the flat area is
- * S_flat = s (1 - t)^2 and I_flat = integral S_flat = s P(u),   P = u_f (t - t^2 + t^3/3) = u_f/3
- * (1 - (1 - t)^3) I_cone = (s u - I_flat)/cos(alpha) so that, with kappa = sigma_cone s/cos(alpha),
- *     F_g = (k_pen - kappa) P + kappa u      K = (k_pen - kappa) (1 - t)^2 + kappa
- *     m_a = c_g phi rho nu s P               m_a' = c_g phi rho nu s (1 - t)^2
- * Nothing cancels at small u or small nu/tan(alpha), because u_f is the only length left. F_g is
- * concave when k_pen > kappa, convex otherwise, and straight past u_f.
+ * A law is a sum of curves over the depth u, each scaled by numbers of Law:
  *
- * The rival models are the same law with other numbers: a yielding spring is kappa = k_pen without
- * a flat part, resistive force theory kappa = zeta 1e6 s (its orientation dependence: resist.h);
- * neither has inertia. */
+ *     line    F = kappa u                        springs, resistive force theory
+ *     cone    F = (k_pen - kappa) P(u)           the developing cone (paper eqs 1 to 5)
+ *     bed     F = k_bed max(u - u_bed, 0)        the firm bottom, under every law
+ *
+ * Developing cone, read as in docs/model.md section 3: the stress acts per element area, the added
+ * mass is positive, and the flat area stays 0 once the cone is complete. With R the radius of a disc
+ * of the element's area s, and
+ *
+ *     u_f    = R tan(alpha)/nu                   depth at which the cone is complete
+ *     t      = min(u/u_f, 1)
+ *     S_flat = s (1 - t)^2                       eq 1
+ *     kappa  = sigma_cone s/cos(alpha)
+ *
+ * the integral of the flat area's share is
+ *
+ *     P(u)   = u_f (t - t^2 + t^3/3)             recruited depth [m]
+ *     P'(u)  = (1 - t)^2                         share of the area that is still flat
+ *
+ * and the law is
+ *
+ *     F_g    = (k_pen - kappa) P + kappa u       eq 4
+ *     m_a    = c_g phi rho nu s P                eq 3
+ *
+ * The only length left is u_f, so nothing cancels at small u or small nu/tan(alpha). F_g is concave
+ * when k_pen > kappa, convex otherwise, and straight beyond u_f.
+ *
+ * A new law adds its numbers to Law, a bit to LawCurve, and its term to each function of this file
+ * that takes `curves`; law_of (law.c) fills the numbers. The step calls nothing else. Every number
+ * but the lengths must scale its term, because at a border of two materials the numbers change
+ * linearly from one to the other. `curves` is a constant where elements are stepped in vectors, so a
+ * curve costs nothing on ground that does not have it. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H
 
-#include <math.h>
+#include "ground/real.h"
 
-#include "mild/ground.h"
-
-#define LAW_PI 3.14159265358979323846
-#define LAW_BED_STRESS                                                                             \
-    5e7 /* [N/m^3] stiffness of the firm bed per area: 0.4 mm more for a robot on ten elements */
+/* Which curves a law has besides line and bed. The sum of the bits of a foot's materials serves all
+ * of its elements: a law that lacks a curve has 0 for its numbers. */
+typedef enum {
+    LAW_LINE = 0, /* none */
+    LAW_CONE = 1  /* the developing cone, its added mass and its drag */
+} LawCurve;
 
 typedef struct {
-    double flat;          /* [N/m] k_pen - kappa */
-    double cone;          /* [N/m] kappa, the slope once the cone is complete */
-    double full;          /* [m] u_f */
-    double inverse_full;  /* [1/m] */
-    double mass;          /* [kg/m] c_g phi rho nu s */
-    double drag;          /* [kg/m] c_d c_g phi rho nu s */
-    double bed;           /* [m] */
-    double bed_stiffness; /* [N/m] */
+    Real flat_stiffness;     /* k_pen - kappa [N/m] of the cone, per recruited depth        eq 4 */
+    Real line_stiffness;     /* kappa [N/m] of the line, per depth                          eq 4 */
+    Real cone_depth;         /* u_f [m] depth at which the cone is complete                 eq 1 */
+    Real inverse_cone_depth; /* 1/u_f [1/m] */
+    Real mass_rate;          /* c_g phi rho nu s [kg/m] added mass per recruited depth      eq 3 */
+    Real drag_rate;          /* c_d times that [kg/m]                                       eq 5 */
+    Real bed_depth;          /* u_bed [m] */
+    Real bed_stiffness;      /* k_bed [N/m] */
 } Law;
 
-#define LAW_RESIST_STRESS                                                                          \
-    1e6 /* [N/m^3] of a level plate going straight down at zeta = 1 (Li et al. 2013) */
-
-/* F_g = slope u: the cone is complete at once. */
-static inline Law law_straight(double slope, double area, double bed) {
-    return (Law){.cone = slope,
-                 .full = 1e-9,
-                 .inverse_full = 1e9,
-                 .bed = bed,
-                 .bed_stiffness = LAW_BED_STRESS * area};
+/* t [-]: how complete the cone is. */
+MILD_HD Real law_cone_progress(const Law *law, Real depth) {
+    return real_min(depth * law->inverse_cone_depth, 1);
 }
 
-static inline Law law_of(const MildMaterial *material, double pitch) {
-    double area = pitch * pitch;
-    if (material->model == MILD_MODEL_CON_SPRING || material->model == MILD_MODEL_ECC_SPRING) {
-        return law_straight(material->k_pen, area, material->bed_depth);
+/* P(u) [m], u >= 0. */
+MILD_HD Real law_recruited(const Law *law, Real depth) {
+    const Real t = law_cone_progress(law, depth);
+    return law->cone_depth * t * (1 - t + t * t * REAL(1.0 / 3.0));
+}
+
+/* P'(u) [-], 1 at the surface, 0 once the cone is complete. */
+MILD_HD Real law_flat_share(const Law *law, Real depth) {
+    const Real open = 1 - law_cone_progress(law, depth);
+    return open * open;
+}
+
+/* Force of the firm bed [N]; any depth, and a bed at infinity. */
+MILD_HD Real law_bed_force(const Law *law, Real depth) {
+    return law->bed_stiffness * real_max(depth - law->bed_depth, 0);
+}
+
+/* Its slope [N/m]. */
+MILD_HD Real law_bed_slope(const Law *law, Real depth) {
+    return depth > law->bed_depth ? law->bed_stiffness : 0;
+}
+
+/* F(u) [N] above the bed. */
+MILD_HD Real law_bedless_force(const Law *law, int curves, Real depth) {
+    const Real line = law->line_stiffness * depth;
+    return curves & LAW_CONE ? law->flat_stiffness * law_recruited(law, depth) + line : line;
+}
+
+/* F'(u) [N/m] above the bed. */
+MILD_HD Real law_bedless_slope(const Law *law, int curves, Real depth) {
+    const Real line = law->line_stiffness;
+    return curves & LAW_CONE ? law->flat_stiffness * law_flat_share(law, depth) + line : line;
+}
+
+/* F(u) [N]. */
+MILD_HD Real law_force(const Law *law, int curves, Real depth) {
+    return law_bedless_force(law, curves, depth) + law_bed_force(law, depth);
+}
+
+/* F'(u) [N/m]. */
+MILD_HD Real law_slope(const Law *law, int curves, Real depth) {
+    return law_bedless_slope(law, curves, depth) + law_bed_slope(law, depth);
+}
+
+/* A bound of F' above the bed at any depth down to u [N/m]. */
+MILD_HD Real law_steepest(const Law *law, int curves, Real depth) {
+    (void)depth;
+    const Real line = law->line_stiffness;
+    return curves & LAW_CONE ? real_max(law->flat_stiffness, 0) + line : line;
+}
+
+/* Virgin ground on a way down from a depth to depth + way. */
+typedef struct {
+    Real mean;            /* [N] mean force over the way */
+    Real mean_slope;      /* [N/m] its derivative by the way */
+    Real recruited;       /* [m] P(end) - P(begin) */
+    Real recruited_slope; /* [-] its derivative by the way */
+} LawWay;
+
+/* The mean is Simpson's rule, exact for lines and for cubics such as P. The bed counts with its
+ * force at the end: it is too stiff for a mean to be noticed. A difference that the compiler
+ * contracts to a fused multiply-add is not 0 on no way: so 0 is chosen. */
+MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
+    const Real half = begin + way / 2;
+    const Real end = begin + way;
+    LawWay over;
+    over.mean = law->line_stiffness * half + law_bed_force(law, end);
+    over.mean_slope = law->line_stiffness / 2 + law_bed_slope(law, end);
+    over.recruited = 0;
+    over.recruited_slope = 0;
+    if (curves & LAW_CONE) {
+        const Real p_begin = law_recruited(law, begin);
+        const Real p_half = law_recruited(law, half);
+        const Real p_end = law_recruited(law, end);
+        const Real flat_half = law_flat_share(law, half);
+        const Real flat_end = law_flat_share(law, end);
+        over.mean += law->flat_stiffness * (p_begin + 4 * p_half + p_end) * REAL(1.0 / 6.0);
+        over.mean_slope += law->flat_stiffness * (2 * flat_half + flat_end) * REAL(1.0 / 6.0);
+        over.recruited = way > 0 ? p_end - p_begin : 0;
+        over.recruited_slope = way > 0 ? flat_end : 0;
     }
-    if (material->model == MILD_MODEL_ECC_QUASI || material->model == MILD_MODEL_ECC_QUASI_3D) {
-        return law_straight(material->zeta * LAW_RESIST_STRESS * area, area, material->bed_depth);
-    }
-    double kappa = material->sigma_cone * area / cos(material->alpha);
-    double c_g = material->c_g, c_d = material->c_d;
-    if (material->passive) { /* passive exactly when c_g >= 0 and c_d >= 1/2 */
-        c_g = fmax(c_g, 0.0);
-        c_d = fmax(c_d, 0.5);
-    }
-    Law law;
-    law.flat = material->k_pen - kappa;
-    law.cone = kappa;
-    law.full = pitch / sqrt(LAW_PI) * tan(material->alpha) / material->nu;
-    law.inverse_full = 1.0 / law.full;
-    law.mass = c_g * material->phi * material->rho * material->nu * area;
-    law.drag = c_d * law.mass;
-    law.bed = material->bed_depth;
-    law.bed_stiffness = LAW_BED_STRESS * area;
-    return law;
+    return over;
 }
 
 #endif

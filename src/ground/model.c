@@ -1,6 +1,6 @@
 #include <math.h>
 
-#include "ground/law.h"
+#include "ground/material.h"
 
 /* Choi et al. 2023, the set for a foot of area A: k = 1e6 N/m^3 A, the cone's numbers below. */
 #define CHOI_STRESS 1e6   /* [N/m^3] k/A */

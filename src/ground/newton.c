@@ -1,6 +1,7 @@
 #include <string.h>
 
-#include "ground/contact.h"
+#include "ground/pass.h"
+#include "ground/solver.h"
 
 #define NEWTON_TOLERANCE 1e-9
 #define NEWTON_ITERATIONS 400 /* hard bound of work */

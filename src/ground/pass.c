@@ -1,58 +1,105 @@
+/* The passes over a foot's slots are branch-free, so that they run in vectors. They are two, because
+ * one alone would be a chain of operations too long for the processor to work on several vectors at
+ * once. */
+#include "ground/pass.h"
+
 #include <string.h>
 
 #include "ground/friction.h"
+#include "ground/impulse.h"
 
-/* The passes over a foot's slots are branch-free, so that they run in vectors; and two, since one
- * alone would be a chain of operations too long for the processor to work on several vectors at
- * once. */
+ALWAYS_INLINE void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int uneven,
+                               int curves, int stops) {
+    const Element element = slot_element(s, i);
+    const SlotVelocity v = slot_velocity(s, i, motion, uneven);
+    const Impulse normal = element_impulse(&element, curves, stops, dt, v.descent);
+    s->iz[i] = normal.value;
+    s->hzz[i] = normal.slope;
+}
 
 /* Normal impulses and their derivatives. */
 ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven,
-                               int bent) {
+                               int curves, int stops) {
     const Slots local = *slot, *s = &local;
-    const Motion v = *m;
+    const Motion motion = *m;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        double w = uneven ? slot_descent(s, i, &v)
-                          : -(v.z[0] + v.z[1] * s->x[i] + v.z[2] * s->y[i]),
-               iz, k;
-        step_normal(s, i, dt, bent, w, &iz, &k);
-        s->iz[i] = iz;
-        s->hzz[i] = k;
+        slot_normal(s, i, dt, &motion, uneven, curves, stops);
     }
 }
 
-/* Friction, and all that is summed. Where the ground is not level the normal impulse is I_z g, g =
- * (-slope, 1): the gradient of -u, so that it does work exactly where u changes; its vertical part
- * is the paper's. With f = -d friction/dv, k = -dI_z/dw and c = g + d friction/dI_z h = -dI/dv = f
- * + k c g^T. sums: of I, x I and y I. held: the bounds of friction are. */
+/* The loop of the ground under the foot. */
+static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
+    const Slots *s = &foot->slot;
+    const int end = foot_end(foot);
+    const int cone = foot->curves & LAW_CONE;
+    if (foot->uneven && cone) {
+        foot_normal(s, end, dt, motion, 1, LAW_CONE, 1);
+    } else if (foot->uneven) {
+        foot_normal(s, end, dt, motion, 1, LAW_LINE, 0);
+    } else if (foot->stops) {
+        foot_normal(s, end, dt, motion, 0, LAW_CONE, 1);
+    } else if (cone) {
+        foot_normal(s, end, dt, motion, 0, LAW_CONE, 0);
+    } else {
+        foot_normal(s, end, dt, motion, 0, LAW_LINE, 0);
+    }
+}
+
+/* Friction, and all that is summed. Where the ground is not level the normal impulse is I_z g with
+ * g = (-slope, 1), the gradient of -u: it does work exactly where u changes. Its vertical part is the
+ * paper's. With
+ *
+ *     f = -d friction/dv,   k = -dI_z/dw,   c = g + d friction/dI_z
+ *
+ * the derivative is
+ *
+ *     h = -dI/dv = f + k c g^T
+ *
+ * sums: of I, x I and y I. held: bool, the bounds of friction are slot.bound. */
 ALWAYS_INLINE void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
                                  double sums[9]) {
     const Slots local = *slot, *s = &local;
-    const double x0 = m->x[0], x1 = m->x[1], x2 = m->x[2], y0 = m->y[0], y1 = m->y[1], y2 = m->y[2];
-    double f0 = 0.0, f1 = 0.0, f2 = 0.0, a0 = 0.0, a1 = 0.0, a2 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0;
+    const Motion motion = *m;
+    double f0 = 0.0, f1 = 0.0, f2 = 0.0; /* of I */
+    double a0 = 0.0, a1 = 0.0, a2 = 0.0; /* of x I */
+    double b0 = 0.0, b1 = 0.0, b2 = 0.0; /* of y I */
 #pragma omp simd reduction(+ : f0, f1, f2, a0, a1, a2, b0, b1, b2)
     for (int i = 0; i < end; i++) {
-        double x = s->x[i], y = s->y[i], vx = x0 + x1 * x + x2 * y, vy = y0 + y1 * x + y2 * y,
-               iz = s->iz[i], k = s->hzz[i];
-        double mu = s->mu[i], bound = held ? s->bound[i] : mu * iz + s->drift_radius[i], ix, iy,
-               hxz, hyz;
-        friction_at(s, i, bound, held ? 0.0 : mu, vx, vy, &ix, &iy, &hxz, &hyz);
-        hxz *= k;
-        hyz *= k;
+        const double x = s->x[i];
+        const double y = s->y[i];
+        const double vx = motion_at(motion.x, x, y);
+        const double vy = motion_at(motion.y, x, y);
+        const double iz = s->iz[i];
+        const double k = s->hzz[i];
+        const Element element = slot_element(s, i);
+        const double bound = held ? s->bound[i] : friction_bound(&element, iz);
+        const Friction friction =
+            friction_impulse(&element, bound, held ? 0.0 : element.mu, vx, vy);
+        double ix = friction.x;
+        double iy = friction.y;
+        double hxz = friction.rise_x * k;
+        double hyz = friction.rise_y * k;
+        double hxx = friction.fall_xx;
+        double hxy = friction.fall_xy;
+        double hyy = friction.fall_yy;
         if (uneven) {
-            double gx = -s->slope_x[i], gy = -s->slope_y[i];
+            const double gx = -s->slope_x[i];
+            const double gy = -s->slope_y[i];
             ix += gx * iz;
             iy += gy * iz;
             hxz += k * gx;
             hyz += k * gy;
-            s->hyx[i] = s->hxy[i] + hyz * gx;
-            s->hxx[i] += hxz * gx;
-            s->hxy[i] += hxz * gy;
-            s->hyy[i] += hyz * gy;
+            s->hyx[i] = hxy + hyz * gx;
+            hxx += hxz * gx;
+            hxy += hxz * gy;
+            hyy += hyz * gy;
             s->hzx[i] = k * gx;
             s->hzy[i] = k * gy;
         }
+        s->hxx[i] = hxx;
+        s->hxy[i] = hxy;
+        s->hyy[i] = hyy;
         s->hxz[i] = hxz;
         s->hyz[i] = hyz;
         s->ix[i] = ix;
@@ -84,17 +131,13 @@ ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, in
         if (foot->active == 0) {
             continue;
         }
-        double sums[9] = {0.0}, *wrench = scratch->wrench + 6 * f;
-        Motion motion = foot_motion(foot, twist + (6 * f - first));
+        double sums[9] = {0.0};
+        double *wrench = scratch->wrench + 6 * f;
+        const Motion motion = foot_motion(foot, twist + (6 * f - first));
+        foot_normals(foot, dt, &motion);
         if (foot->uneven) {
-            foot_normal(&foot->slot, foot_end(foot), dt, &motion, 1, 1);
             foot_friction(&foot->slot, foot_end(foot), &motion, 1, held, sums);
         } else {
-            if (foot->bent) {
-                foot_normal(&foot->slot, foot_end(foot), dt, &motion, 0, 1);
-            } else {
-                foot_normal(&foot->slot, foot_end(foot), dt, &motion, 0, 0);
-            }
             foot_friction(&foot->slot, foot_end(foot), &motion, 0, held, sums);
         }
         /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 */
@@ -118,9 +161,13 @@ void contact_bounds(MildScratch *scratch, double share) {
     for (int f = 0; f < scratch->feet; f++) {
         const Slots *s = &scratch->foot[f].slot;
         for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
-            double now = s->mu[i] * s->iz[i] + s->drift_radius[i];
-            s->bound[i] = share < 1.0 ? s->bound[i] + share * (now - s->bound[i])
-                                      : now; /* at first it may be anything */
+            const Element element = slot_element(s, i);
+            const double now = friction_bound(&element, s->iz[i]);
+            if (share < 1.0) {
+                s->bound[i] += share * (now - s->bound[i]);
+            } else {
+                s->bound[i] = now; /* whatever it was before */
+            }
         }
     }
 }

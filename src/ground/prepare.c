@@ -1,8 +1,10 @@
+#include "ground/prepare.h"
+
 #include <string.h>
 
-#include "ground/friction.h"
-#include "ground/prints.h"
+#include "ground/begin.h"
 #include "ground/resist.h"
+#include "ground/terrain.h"
 
 #define PREPARE_MARGIN 1e-3  /* [m] elements this close to the ground are listed */
 #define PREPARE_NEVER (-1e3) /* [m] depth of the padding */
@@ -19,22 +21,8 @@ static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
     }
 }
 
-void foot_points(const FootScratch *foot) {
-    const double *x = foot->x, *y = foot->y, *o = foot->origin, *e = foot->arm[1],
-                 *n = foot->arm[2];
-    const double ox = o[0] + foot->arm[0][0], oy = o[1] + foot->arm[0][1],
-                 oz = o[2] + foot->arm[0][2];
-    const double ex = e[0], ey = e[1], ez = e[2], nx = n[0], ny = n[1], nz = n[2];
-#pragma omp simd
-    for (int i = 0; i < foot->padded; i++) {
-        foot->point_x[i] = ox + ex * x[i] + nx * y[i];
-        foot->point_y[i] = oy + ey * x[i] + ny * y[i];
-        foot->point_z[i] = oz + ez * x[i] + nz * y[i];
-    }
-}
-
 /* How deep every element is; and where it is, if the ground is not the same everywhere. */
-static void foot_place(FootScratch *foot, const MildTerrain *terrain, int prints,
+static void foot_place(FootScratch *foot, const MildTerrain *terrain, int imprints,
                        const double *position, const double *R) {
     for (int k = 0; k < 3; k++) {
         foot->origin[k] = position[k];
@@ -43,7 +31,7 @@ static void foot_place(FootScratch *foot, const MildTerrain *terrain, int prints
         foot->arm[2][k] = R[3 * k + 1];
     }
     foot->uneven = !terrain_is_level(terrain);
-    if (foot->uneven || prints || !terrain_is_uniform(terrain)) {
+    if (foot->uneven || imprints || !terrain_is_uniform(terrain)) {
         foot_points(foot);
     }
     if (foot->uneven) {
@@ -65,14 +53,14 @@ static void foot_place(FootScratch *foot, const MildTerrain *terrain, int prints
 /* Fastest any point of the foot can come down under twist V, or the ground come up to it. */
 static double foot_descent(const FootScratch *foot, const double *V, double steepest) {
     double tilt = V[3] * V[3] + V[4] * V[4], level = sqrt(V[0] * V[0] + V[1] * V[1]);
-    return step_max(-V[2], 0.0) + foot->radius * sqrt(tilt) +
+    return real_max(-V[2], 0.0) + foot->radius * sqrt(tilt) +
            steepest * (level + foot->radius * sqrt(tilt + V[5] * V[5]));
 }
 
 /* Lists the elements that may touch, in order. All or none, the common cases, are found without a
  * branch per element. */
 static void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f) {
-    double descent = step_max(foot_descent(foot, input->velocity[f], steepest),
+    double descent = real_max(foot_descent(foot, input->velocity[f], steepest),
                               foot_descent(foot, input->free_velocity + 6 * f, steepest));
     double least = -PREPARE_MARGIN - input->dt * (descent + PREPARE_EXTRA_SPEED), near = 0.0;
     const double *depth = foot->depth;
@@ -105,71 +93,84 @@ static int mixture_has(int32_t mixture, int m) {
 }
 
 static int law_is_nan(const Law *law, const MildMaterial *m) {
-    double sum = law->flat + law->cone + law->full + law->mass + law->drag + law->bed_stiffness;
-    return isnan(sum + law->inverse_full + m->mu + m->k_drift + m->b_drift + m->recovery) ||
-           isnan(law->bed);
+    double sum = law->flat_stiffness + law->line_stiffness + law->cone_depth + law->mass_rate +
+                 law->drag_rate + law->bed_stiffness + law->inverse_cone_depth;
+    return isnan(sum + m->mu + m->k_drift + m->b_drift + m->recovery) || isnan(law->bed_depth);
 }
 
 /* Derives the laws of the terrain's materials anew where their numbers have changed. */
 static void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
     foot->nan = 0;
+    foot->curves = LAW_LINE;
     for (int m = 0; m < terrain->material_count; m++) {
         DerivedLaw *derived = &foot->derived[m];
         const MildMaterial *wanted = &terrain->materials[m];
-        if (derived->known && memcmp(&derived->material, wanted, sizeof *wanted) == 0) {
-            foot->nan |= derived->nan;
-            continue;
-        }
-        *derived = (DerivedLaw){*wanted, law_of(wanted, foot->pitch), 1, 0};
-        derived->nan = law_is_nan(&derived->law, wanted);
-        foot->nan |= derived->nan;
-        for (int i = 0; i < foot->padded; i++) {
-            if (mixture_has(foot->slot_material[i], m)) {
-                foot->slot_material[i] = MATERIAL_NONE;
+        if (!derived->known || memcmp(&derived->material, wanted, sizeof *wanted) != 0) {
+            const Law law = law_of(wanted, foot->pitch);
+            *derived = (DerivedLaw){.material = *wanted,
+                                    .law = law,
+                                    .curves = law_curves(&law),
+                                    .known = 1,
+                                    .nan = law_is_nan(&law, wanted)};
+            for (int i = 0; i < foot->padded; i++) {
+                if (mixture_has(foot->slot_material[i], m)) {
+                    foot->slot_material[i] = MATERIAL_NONE;
+                }
             }
         }
+        foot->nan |= derived->nan;
+        foot->curves |= derived->curves;
     }
 }
 
 static void slot_set_law(const Slots *s, int i, const Law *law, const MildMaterial *material) {
-    s->flat[i] = law->flat;
-    s->cone[i] = law->cone;
-    s->full[i] = law->full;
-    s->inverse_full[i] = law->inverse_full;
-    s->drag[i] = law->drag;
-    s->mass_rate[i] = law->mass;
-    s->join[i] = 0.5 * (step_max(law->drag, 0.0) + step_max(law->mass, 0.0));
-    s->leave[i] = 0.5 * (step_max(law->drag, 0.0) - step_max(law->mass, 0.0));
-    s->bed[i] = law->bed;
+    const double mass = real_max(law->mass_rate, 0.0);
+    const double drag = real_max(law->drag_rate, 0.0);
+    s->flat_stiffness[i] = law->flat_stiffness;
+    s->line_stiffness[i] = law->line_stiffness;
+    s->cone_depth[i] = law->cone_depth;
+    s->inverse_cone_depth[i] = law->inverse_cone_depth;
+    s->mass_rate[i] = law->mass_rate;
+    s->drag_rate[i] = law->drag_rate;
+    s->bed_depth[i] = law->bed_depth;
     s->bed_stiffness[i] = law->bed_stiffness;
+    s->exit_drag[i] = 0.5 * (drag + mass); /* mass w + (drag - mass) (h + w)/2 */
+    s->entry_drag[i] = 0.5 * (drag - mass);
+    s->strength[i] = law->line_stiffness;
+    s->recovery[i] = material->recovery;
     s->mu[i] = material->mu;
     s->k_drift[i] = material->k_drift;
     s->b_drift[i] = material->b_drift;
-    s->recovery[i] = material->recovery;
-    s->strength[i] = law->cone;
+}
+
+static double between(double a, double b, double share) {
+    return a + share * (b - a);
 }
 
 /* Every number of the law that the steps use, and friction and recovery, change linearly from one
- * material to the other. A mean of two passive laws is one: it has c_d m >= m/2 too. */
+ * material to the other. A mean of two passive laws is passive: it has c_d m >= m/2 too. */
 static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, int32_t mixture) {
-    const DerivedLaw *a = &derived[mixture & 0xff], *b = &derived[mixture >> 8 & 0xff];
+    const DerivedLaw *a = &derived[mixture & 0xff];
+    const DerivedLaw *b = &derived[mixture >> 8 & 0xff];
     const Law *p = &a->law, *q = &b->law;
     const MildMaterial *m = &a->material, *n = &b->material;
-    double t = (mixture >> 16) / 255.0;
-#define MIX(x, y) ((x) + t * ((y) - (x)))
-    Law law = {.flat = MIX(p->flat, q->flat),
-               .cone = MIX(p->cone, q->cone),
-               .full = MIX(p->full, q->full),
-               .mass = MIX(p->mass, q->mass),
-               .drag = MIX(p->drag, q->drag),
-               .bed = MIX(p->bed, q->bed),
-               .bed_stiffness = MIX(p->bed_stiffness, q->bed_stiffness)};
-    MildMaterial material = {.mu = MIX(m->mu, n->mu),
-                             .k_drift = MIX(m->k_drift, n->k_drift),
-                             .b_drift = MIX(m->b_drift, n->b_drift),
-                             .recovery = MIX(m->recovery, n->recovery)};
-#undef MIX
-    law.inverse_full = 1.0 / law.full;
+    const double t = (mixture >> 16) / 255.0;
+    const Law law = {
+        .flat_stiffness = between(p->flat_stiffness, q->flat_stiffness, t),
+        .line_stiffness = between(p->line_stiffness, q->line_stiffness, t),
+        .cone_depth = between(p->cone_depth, q->cone_depth, t),
+        .inverse_cone_depth = 1.0 / between(p->cone_depth, q->cone_depth, t),
+        .mass_rate = between(p->mass_rate, q->mass_rate, t),
+        .drag_rate = between(p->drag_rate, q->drag_rate, t),
+        .bed_depth = between(p->bed_depth, q->bed_depth, t),
+        .bed_stiffness = between(p->bed_stiffness, q->bed_stiffness, t),
+    };
+    const MildMaterial material = {
+        .mu = between(m->mu, n->mu, t),
+        .k_drift = between(m->k_drift, n->k_drift, t),
+        .b_drift = between(m->b_drift, n->b_drift, t),
+        .recovery = between(m->recovery, n->recovery, t),
+    };
     slot_set_law(s, i, &law, &material);
 }
 
@@ -218,7 +219,7 @@ static void slots_materials(const FootScratch *foot, const MildTerrain *terrain,
     }
 }
 
-/* All elements are listed, on ground without prints: their numbers are read where they lie. */
+/* All elements are listed, on ground without imprints: their numbers are read where they lie. */
 static void slots_direct(FootScratch *foot, const Memory *memory) {
     Slots *s = &foot->slot;
     *s = foot->own;
@@ -240,30 +241,13 @@ static void slots_gather(FootScratch *foot, const Memory *memory) {
     from.depth = foot->depth;
     slots_remember(&from, memory);
     *s = foot->own;
-    const double *const all[] = {from.x,
-                                 from.y,
-                                 from.depth,
-                                 from.depth_max,
-                                 from.remembered_middle,
-                                 from.remembered_speed,
-                                 from.drift,
-                                 from.pending_x,
-                                 from.pending_y,
-                                 from.held_x,
-                                 from.held_y,
-                                 from.held_grip};
-    double *const listed[] = {s->x,
-                              s->y,
-                              s->depth,
-                              s->depth_max,
-                              s->remembered_middle,
-                              s->remembered_speed,
-                              s->drift,
-                              s->pending_x,
-                              s->pending_y,
-                              s->held_x,
-                              s->held_y,
-                              s->held_grip};
+    const double *const all[] = {from.x,         from.y,           from.depth,
+                                 from.depth_max, from.last_middle, from.last_speed,
+                                 from.drift,     from.pending_x,   from.pending_y,
+                                 from.held_x,    from.held_y,      from.held_stiffness};
+    double *const listed[] = {s->x,           s->y,          s->depth,  s->depth_max,
+                              s->last_middle, s->last_speed, s->drift,  s->pending_x,
+                              s->pending_y,   s->held_x,     s->held_y, s->held_stiffness};
     int end = foot_end(foot), active = foot->active;
     for (size_t a = 0; a < sizeof all / sizeof *all; a++) {
         for (int i = 0; i < active; i++) {
@@ -296,18 +280,18 @@ static void slots_uneven(const FootScratch *foot, int32_t before, const Memory *
         }
         double plane = height + memory->plane[e] + memory->slope_x[e] * foot->point_x[e] +
                        memory->slope_y[e] * foot->point_y[e] - foot->point_z[e];
-        s->depth[i] = step_min(s->depth[i], plane);
+        s->depth[i] = real_min(s->depth[i], plane);
     }
     for (int i = foot->active; i < foot_end(foot); i++) {
         s->slope_x[i] = s->slope_y[i] = 0.0;
     }
 }
 
-/* An element that carries nothing finds what the ground under it remembers. Below h0, in a print,
+/* An element that carries nothing finds what the ground under it remembers. Below h0, in a imprint,
  * it takes at least the depth whose unloading line ends where it is, so that moving sideways in a
- * print never loads it. */
-static void slots_prints(const FootScratch *foot, const Prints *prints, const Memory *memory,
-                         const double *R) {
+ * imprint never loads it. */
+static void slots_imprints(const FootScratch *foot, const Imprints *imprints, const Memory *memory,
+                           const double *R) {
     const Slots *s = &foot->slot;
     for (int i = 0; i < foot->active; i++) {
         int e = foot->element[i], m = memory->material[e];
@@ -315,11 +299,11 @@ static void slots_prints(const FootScratch *foot, const Prints *prints, const Me
         if (m >= 0 || !(lasting > 0.0)) {
             continue;
         }
-        double found = prints_read(
-            prints, &(PrintElement){foot->point_x[e], foot->point_y[e], foot->pitch, R});
+        double found = imprints_read(
+            imprints, &(ImprintElement){foot->point_x[e], foot->point_y[e], foot->pitch, R});
         double free =
-            m == MATERIAL_FREE && m0 > 0.0 ? step_max(m0 / lasting, m0 + CONTACT_ELASTIC) : 0.0;
-        s->depth_max[i] = step_max(found, free);
+            m == MATERIAL_FREE && m0 > 0.0 ? real_max(m0 / lasting, m0 + ELEMENT_ELASTIC) : 0.0;
+        s->depth_max[i] = real_max(found, free);
     }
 }
 
@@ -330,120 +314,103 @@ static void slots_level(const FootScratch *foot) {
     memset(foot->own.slope_y, 0, bytes);
 }
 
-/* Bool: at its present speed an element on ground with drag goes on into virgin ground, by more
- * than is soon made good. */
+ALWAYS_INLINE void slot_begin(const Slots *s, int i, double dt, double rate, const Motion *motion,
+                              int curves, int uneven) {
+    const SlotVelocity v = slot_velocity(s, i, motion, uneven);
+    const ElementMemory memory = slot_memory(s, i);
+    Element element = slot_element(s, i);
+    element_begin(&element, &memory, curves, dt, rate, v.descent);
+    slot_store(s, i, &element);
+}
+
+/* What element_begin sets, for all slots. */
+ALWAYS_INLINE void slots_begin(const Slots *slot, int end, double dt, const Motion *now, int curves,
+                               int uneven) {
+    const Slots local = *slot, *s = &local;
+    const Motion motion = *now;
+    const double rate = 1.0 / dt;
+#pragma omp simd
+    for (int i = 0; i < end; i++) {
+        slot_begin(s, i, dt, rate, &motion, curves, uneven);
+    }
+}
+
+/* The loop of the ground under the foot. */
+static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
+    const Slots *s = &foot->slot;
+    const int end = foot_end(foot);
+    const int cone = foot->curves & LAW_CONE;
+    if (foot->uneven && cone) {
+        slots_begin(s, end, dt, now, LAW_CONE, 1);
+    } else if (foot->uneven) {
+        slots_begin(s, end, dt, now, LAW_LINE, 1);
+    } else if (cone) {
+        slots_begin(s, end, dt, now, LAW_CONE, 0);
+    } else {
+        slots_begin(s, end, dt, now, LAW_LINE, 0);
+    }
+}
+
+/* Bool: an element on ground with drag will enter virgin ground in this step by more than the
+ * elastic travel. */
 static int slots_sink(const Slots *slot, int end, double dt) {
-    const double *depth = slot->depth, *speed = slot->speed, *front = slot->front,
-                 *leave = slot->leave;
+    const Slots local = *slot, *s = &local;
     double sinking = 0.0;
 #pragma omp simd reduction(+ : sinking)
     for (int i = 0; i < end; i++) {
-        double way = step_virgin_way(depth[i], speed[i], front[i], dt);
-        sinking += leave[i] > 0.0 ? way : 0.0;
+        const Element element = slot_element(s, i);
+        const double way = element_virgin_way(&element, dt, element.entry_speed);
+        sinking += element.entry_drag > 0.0 ? way : 0.0;
     }
     return sinking > 0.0;
 }
 
-/* The drag of elements that sink, and their speed at the front, see step.h. F: about the middle of
- * the step. */
+ALWAYS_INLINE void slot_drag(const Slots *s, int i, double dt, const Motion *now,
+                             const Motion *free) {
+    const double slower = slot_velocity(s, i, now, 1).descent;
+    const double faster = slot_velocity(s, i, free, 1).descent;
+    Element element = slot_element(s, i);
+    element_drag(&element, LAW_CONE, dt, real_max(faster - slower, 0.0));
+    s->entry_speed[i] = element.entry_speed;
+    s->stop_drag[i] = element.stop_drag;
+    s->stop_growth[i] = element.stop_growth;
+}
+
+/* What element_drag sets, for all slots. */
 static void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
                        const Motion *free) {
     const Slots local = *slot, *s = &local;
-    const Motion before = *now, after = *free;
+    const Motion before = *now;
+    const Motion after = *free;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        double u0 = s->depth[i], a = s->front[i], b = step_max(u0, a), speed = s->speed[i],
-               third = s->full[i] * (1.0 / 3.0);
-        double extra = step_max(2.0 * s->leave[i], 0.0),
-               sinks = step_virgin_way(u0, speed, a, dt) > 0.0 ? 1.0 : 0.0;
-        double c0 = step_max(1.0 - a * s->inverse_full[i], 0.0),
-               c1 = step_max(1.0 - b * s->inverse_full[i], 0.0);
-        double square = c0 * c0, cube = square * c0, slope = s->flat[i] * square + s->cone[i];
-        double force = s->flat[i] * third * (1.0 - cube) + s->cone[i] * a + 0.5 * slope * (b - a);
-        double faster = step_max(slot_descent(s, i, &after) - slot_descent(s, i, &before), 0.0);
-        double gain = faster / dt * step_max(a - s->middle[i], 0.0);
-        double drag = extra > 0.0 ? sinks : 0.0, hit = sqrt(speed * speed + 2.0 * drag * gain);
-        double still = step_min(STEP_STILL + sqrt(force / (extra * square * hit * hit + STEP_TINY)),
-                                STEP_STILL_MOST);
-        s->speed[i] = hit;
-        s->bend[i] = drag * extra * (still - 0.5) / (hit + STEP_TINY);
-        s->stopped[i] = drag * third * (cube - c1 * c1 * c1);
+        slot_drag(s, i, dt, &before, &after);
     }
 }
 
-/* Everything of step.h that does not depend on the new velocity. The unloading line runs from (a,
- * F_g(a)) to zero force after recovery * a, but not within CONTACT_ELASTIC. It is never flatter
- * than the loading curve at a, and so never above it: a concave curve lies above its chords, a
- * convex one above its tangent; in the bed the steepest slope is taken. */
-ALWAYS_INLINE void slots_prepare(const Slots *slot, int end, double dt, Motion now, int uneven) {
-    const Slots local = *slot, *s = &local;
-    double rate = 1.0 / dt;
-#pragma omp simd
-    for (int i = 0; i < end; i++) {
-        double x = s->x[i], y = s->y[i], u0 = s->depth[i], used = s->depth_max[i];
-        double w_now = -(now.z[0] + now.z[1] * x + now.z[2] * y);
-        if (uneven) {
-            w_now += s->slope_x[i] * (now.x[0] + now.x[1] * x + now.x[2] * y) +
-                     s->slope_y[i] * (now.y[0] + now.y[1] * x + now.y[2] * y);
-        }
-        double old = s->remembered_middle[i], m0 = old > 0.0 ? old : u0 - 0.5 * dt * w_now,
-               a = step_max(step_max(m0, used), 0.0);
-        double c0 = step_max(1.0 - a * s->inverse_full[i], 0.0),
-               flat_share = s->full[i] * (1.0 / 3.0) * (1.0 - c0 * c0 * c0);
-        double in_bed = a - s->bed[i], bed_stiffness = s->bed_stiffness[i],
-               bed = in_bed > 0.0 ? bed_stiffness : 0.0;
-        double force = s->flat[i] * flat_share + s->cone[i] * a + bed * in_bed;
-        double travel = step_max(s->recovery[i] * a, step_min(CONTACT_ELASTIC, a));
-        double curve = s->flat[i] * c0 * c0, flat = step_max(s->flat[i], 0.0),
-               steepest = in_bed > 0.0 ? flat : curve;
-        double steep = steepest + s->cone[i] + bed,
-               chord = force >= steep * travel ? 1.0 : 0.0; /* one division serves both */
-        double over = force / ((chord > 0.0 ? travel : steep) + STEP_TINY),
-               line = chord > 0.0 ? over : steep;
-        double slack = a - (chord > 0.0 ? travel : over);
-        s->middle[i] = m0;
-        s->front[i] = a;
-        s->deep[i] = a;
-        s->line[i] = line;
-        s->slack[i] = slack;
-        double speed = step_max(w_now, 0.0), reach = step_max(2.0 * (a - u0) * rate, 0.0),
-               added = s->mass_rate[i] * flat_share;
-        s->reach[i] = reach;
-        s->front_speed[i] = step_max(s->remembered_speed[i], reach);
-        s->speed[i] = speed;
-        s->mass[i] = step_max(added, 0.0);
-        s->drift_radius[i] = dt * s->k_drift[i] * s->drift[i] * step_max(u0, 0.0);
-        s->damping[i] = u0 > 0.0 ? dt * s->b_drift[i] : 0.0;
-        slot_grip(s, i, dt, rate, force);
-    }
-}
-
-/* Bool: there are parameters that create energy (passive = false). They cannot be implicit and
- * enter with the free motion. */
+/* Impulses of materials that create energy (passive = false). Returns a bool: there are any. */
 static int slots_explicit(const FootScratch *foot, int materials, double dt, const Motion *free) {
     const Slots *s = &foot->slot;
     int any = 0;
     for (int m = 0; m < materials; m++) {
-        any |= foot->derived[m].law.mass < 0.0 || foot->derived[m].law.drag < 0.0;
+        any |= foot->derived[m].law.mass_rate < 0.0 || foot->derived[m].law.drag_rate < 0.0;
     }
     for (int i = 0; any && i < foot->active; i++) {
-        double a = s->front[i], c0 = step_max(1.0 - a * s->inverse_full[i], 0.0),
-               speed = s->speed[i];
-        double added = s->mass_rate[i] * s->full[i] * (1.0 / 3.0) * (1.0 - c0 * c0 * c0);
         if (!(s->depth[i] > 0.0) || s->middle[i] < s->depth_max[i]) {
-            continue;
+            continue; /* above the ground or on the unloading line */
         }
+        const Element element = slot_element(s, i);
         s->explicit_impulse[i] =
-            step_min(added, 0.0) * (slot_descent(s, i, free) - s->front_speed[i]) +
-            step_min(s->drag[i], 0.0) * c0 * c0 * dt * speed * speed;
+            element_explicit(&element, dt, slot_velocity(s, i, free, 1).descent);
     }
     return any;
 }
 
-static void slots_unbend(const FootScratch *foot) {
-    size_t bytes = (size_t)foot->padded * sizeof(double);
-    memset(foot->own.bend, 0, bytes);
-    memset(foot->own.stopped, 0, bytes);
+/* Sets back what slots_drag and slots_explicit have written in the step before. */
+static void slots_clear(const FootScratch *foot) {
+    const size_t bytes = (size_t)foot->padded * sizeof(double);
+    memset(foot->own.stop_drag, 0, bytes);
+    memset(foot->own.stop_growth, 0, bytes);
     memset(foot->own.explicit_impulse, 0, bytes);
 }
 
@@ -462,23 +429,19 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
         slots_uneven(foot, ground->uneven[f], &memory, terrain->height);
     }
     if (ground->tiles > 0) {
-        Prints prints = ground_prints(ground);
-        slots_prints(foot, &prints, &memory, R);
+        Imprints imprints = ground_imprints(ground);
+        slots_imprints(foot, &imprints, &memory, R);
     }
     Motion now = foot_motion(foot, input->velocity[f]),
            free = foot_motion(foot, input->free_velocity + 6 * f);
-    if (foot->uneven) {
-        slots_prepare(&foot->slot, foot_end(foot), input->dt, now, 1);
-    } else {
-        slots_prepare(&foot->slot, foot_end(foot), input->dt, now, 0);
+    foot_begin(foot, input->dt, &now);
+    if (foot->stops) {
+        slots_clear(foot);
     }
-    if (foot->bent) {
-        slots_unbend(foot);
-    }
-    foot->bent = slots_explicit(foot, terrain->material_count, input->dt, &free);
+    foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
     if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
         slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free);
-        foot->bent = 1;
+        foot->stops = 1;
     }
     slots_resist(foot, terrain, input->dt, R, &now);
 }

@@ -12,7 +12,7 @@
  * defined and an element may give way either way: RESIST_REST blends towards straight down for the
  * one yield and towards level for the other.
  *
- * No energy from a changing direction: the elastic travel (CONTACT_ELASTIC) belongs to the peak
+ * No energy from a changing direction: the elastic travel (ELEMENT_ELASTIC) belongs to the peak
  * whatever the direction, so it stores what a function of depth and front alone says; an element
  * that yields below the peak does so on the way up that line, at `front`, before it gets to the
  * depth `deep` that it remembers: travel (1 - share) deeper. */
@@ -30,16 +30,24 @@
 static const double A00 = 0.206, A10 = 0.169, B11 = 0.212, B01 = 0.358, BM11 = 0.055;
 static const double C11 = -0.124, C01 = 0.253, CM11 = 0.007, D10 = 0.088;
 
-/* c2, s2: cosine and sine of 2 beta; c, s: of gamma. */
-ALWAYS_INLINE void plane_alpha(double c2, double s2, double c, double s, double *ax, double *az) {
-    double sum = s2 * c + c2 * s,
-           difference = c2 * s - s2 * c; /* sin(2 beta + gamma), sin(-2 beta + gamma) */
-    *ax = C11 * (c2 * c - s2 * s) + C01 * c + CM11 * difference + D10 * s2;
-    *az = A00 + A10 * c2 + B11 * sum + B01 * s + BM11 * difference;
+/* Coefficients [-] of the force on a plate. */
+typedef struct {
+    double x; /* against its horizontal motion */
+    double z; /* up */
+} Alpha;
+
+/* 2D. c2, s2: cosine and sine of 2 beta; c, s: of gamma. */
+ALWAYS_INLINE Alpha plane_alpha(double c2, double s2, double c, double s) {
+    const double sum = s2 * c + c2 * s;        /* sin(2 beta + gamma) */
+    const double difference = c2 * s - s2 * c; /* sin(-2 beta + gamma) */
+    return (Alpha){C11 * (c2 * c - s2 * s) + C01 * c + CM11 * difference + D10 * s2,
+                   A00 + A10 * c2 + B11 * sum + B01 * s + BM11 * difference};
 }
 
 void mild_resist_plane(double beta, double gamma, double alpha[2]) {
-    plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma), &alpha[0], &alpha[1]);
+    const Alpha plane = plane_alpha(cos(2.0 * beta), sin(2.0 * beta), cos(gamma), sin(gamma));
+    alpha[0] = plane.x;
+    alpha[1] = plane.z;
 }
 
 /* Powers of x1 = sin(gamma) = -v_z, x2 = cos(beta) = -n_z, x3 = n . v, and the coefficients of f1,
@@ -102,54 +110,88 @@ static Plate plate_of(const double *rotation) {
     double side =
         rotation[8] > 0.0 ? -1.0 : 1.0; /* of the sole's two faces the one that looks down */
     Plate plate = {
-        .normal = {side * rotation[2], side * rotation[5], step_min(side * rotation[8], -1e-6)}};
+        .normal = {side * rotation[2], side * rotation[5], real_min(side * rotation[8], -1e-6)}};
     plate.tilt =
-        sqrt(plate.normal[0] * plate.normal[0] + plate.normal[1] * plate.normal[1]) + STEP_TINY;
+        sqrt(plate.normal[0] * plate.normal[0] + plate.normal[1] * plate.normal[1]) + ELEMENT_TINY;
     for (int k = 0; k < 3; k++) {
         cubic_at(space_coefficients[k], -plate.normal[2], plate.f[k]);
     }
     return plate;
 }
 
-/* alpha_x against the heading at level and downward speeds, and alpha_z; lean: the normal's part
- * along the heading. */
-ALWAYS_INLINE void plate_alpha(const Plate *plate, int model, double lean, double level,
-                               double down, double *ax, double *az) {
-    double scale = 1.0 / sqrt(level * level + down * down), c = level * scale, s = down * scale;
+/* Coefficients against the heading and upward, for motion at a level and a downward speed. lean: part
+ * of the normal along the heading. */
+ALWAYS_INLINE Alpha plate_alpha(const Plate *plate, int model, double lean, double level,
+                                double down) {
+    const double scale = 1.0 / sqrt(level * level + down * down);
+    const double c = level * scale;
+    const double s = down * scale;
     if (model == MILD_MODEL_ECC_QUASI) {
-        double slope = lean * (-1.0 / plate->normal[2]), whole = 1.0 / (1.0 + slope * slope);
-        plane_alpha((1.0 - slope * slope) * whole, 2.0 * slope * whole, c, s, ax, az);
-    } else {
-        double z = lean * c - plate->normal[2] * s, faces = z < 0.0 ? 0.0 : 1.0 / RESIST_LEVEL;
-        double f1 = cubic(plate->f[0], s, z), f2 = cubic(plate->f[1], s, z),
-               f3 = cubic(plate->f[2], s, z);
-        *ax = -faces * (f1 * lean + f2 * c);
-        *az = faces * (f1 * plate->normal[2] - f2 * s - f3);
+        const double slope = lean * (-1.0 / plate->normal[2]);
+        const double whole = 1.0 / (1.0 + slope * slope);
+        return plane_alpha((1.0 - slope * slope) * whole, 2.0 * slope * whole, c, s);
     }
+    const double z = lean * c - plate->normal[2] * s;
+    const double faces = z < 0.0 ? 0.0 : 1.0 / RESIST_LEVEL;
+    const double f1 = cubic(plate->f[0], s, z);
+    const double f2 = cubic(plate->f[1], s, z);
+    const double f3 = cubic(plate->f[2], s, z);
+    return (Alpha){-faces * (f1 * lean + f2 * c), faces * (f1 * plate->normal[2] - f2 * s - f3)};
 }
 
-ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, double sideways,
-                               double downward) {
-    double u0 = s->depth[i], m0 = s->middle[i], level = s->strength[i], peak = RESIST_PEAK * level;
-    double share = step_min(step_max(downward / RESIST_PEAK, 0.0), 1.0),
-           lead = CONTACT_ELASTIC * (1.0 - share);
-    double led = m0 > 0.0 ? step_min(m0 + lead, m0 / (share + STEP_TINY)) : 0.0,
-           deep = step_max(led, s->deep[i]);
-    double in_bed = deep - s->bed[i], stiffness = s->bed_stiffness[i],
-           bed = in_bed > 0.0 ? stiffness : 0.0;
-    double force = peak * deep + bed * in_bed;
-    double line = step_max(force / (step_min(CONTACT_ELASTIC, deep) + STEP_TINY), peak + bed),
-           inverse = 1.0 / line;
-    double slack = deep - force * inverse,
-           front = slack + (share * peak * deep + bed * in_bed) * inverse;
-    s->cone[i] = share * peak;
-    s->deep[i] = deep;
-    s->line[i] = line;
-    s->slack[i] = slack;
-    s->front[i] = front;
-    s->reach[i] = step_max(2.0 * (front - u0) * rate, 0.0);
-    s->drift_radius[i] += dt * level * step_max(sideways, 0.0) * step_max(u0, 0.0);
-    slot_grip(s, i, dt, rate, share * peak * deep + bed * in_bed);
+/* The law of this step, after element_begin. strength: [N/m] of a level plate going straight down;
+ * sideways, downward: coefficients [-] against the heading and up. */
+ALWAYS_INLINE void element_resist(Element *e, const ElementMemory *memory, double dt, double rate,
+                                  double strength, double sideways, double downward) {
+    /* Yield below the peak begins ahead of the remembered depth on the line of the peak. */
+    const double peak = RESIST_PEAK * strength;
+    const double share = real_min(real_max(downward / RESIST_PEAK, 0.0), 1.0);
+    const double lead = ELEMENT_ELASTIC * (1.0 - share);
+    const double led =
+        e->middle > 0.0 ? real_min(e->middle + lead, e->middle / (share + ELEMENT_TINY)) : 0.0;
+    const double b = real_max(led, e->virgin_depth);
+
+    const double bed = law_bed_force(&e->law, b);
+    const double peak_force = peak * b + bed;
+    const double yield_force = share * peak * b + bed;
+    const double travel = real_min(ELEMENT_ELASTIC, b) + ELEMENT_TINY;
+    const double line = real_max(peak_force / travel, peak + law_bed_slope(&e->law, b));
+    const double inverse = 1.0 / line;
+    e->law.line_stiffness = share * peak;
+    e->virgin_depth = b;
+    e->unload_stiffness = line;
+    e->zero_depth = b - peak_force * inverse;
+    e->yield_depth = e->zero_depth + yield_force * inverse;
+    e->yield_speed = real_max(2.0 * (e->yield_depth - e->depth) * rate, 0.0);
+
+    e->drift_bound += dt * strength * real_max(sideways, 0.0) * real_max(e->depth, 0.0);
+    friction_hold(e, memory, dt, rate, yield_force);
+}
+
+/* The law of one slot for its motion at the start of the step. */
+ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, const Plate *plate,
+                               const Motion *motion, int model) {
+    const SlotVelocity v = slot_velocity(s, i, motion, 1);
+    const double down = real_max(v.descent, 0.0);
+
+    /* Heading: of the motion plus RESIST_REST along the tilt. Where there is neither, any will do: a
+     * level plate's are all alike. */
+    const double rest = RESIST_REST / plate->tilt;
+    const double hx = v.x + rest * plate->normal[0];
+    const double hy = v.y + rest * plate->normal[1];
+    const double scale = 1.0 / (sqrt(hx * hx + hy * hy) + ELEMENT_TINY);
+    const double lean = (plate->normal[0] * hx + plate->normal[1] * hy) * scale;
+
+    const double moves = sqrt(v.x * v.x + v.y * v.y);
+    const double level = moves * FRICTION_LAG < 1.0 ? 0.0 : moves; /* friction may hold it yet */
+    const Alpha sinking = plate_alpha(plate, model, lean, level, down + RESIST_REST);
+    const Alpha sliding = plate_alpha(plate, model, lean, level + RESIST_REST, down);
+
+    const ElementMemory memory = slot_memory(s, i);
+    Element element = slot_element(s, i);
+    element_resist(&element, &memory, dt, rate, s->strength[i], sliding.x, sinking.z);
+    s->line_stiffness[i] = element.law.line_stiffness;
+    slot_store(s, i, &element);
 }
 
 /* The slots from `start` on that stand on this model. */
@@ -157,26 +199,11 @@ ALWAYS_INLINE void slots_model(const Slots *slot, int start, int end, double dt,
                                const Motion *now, int model) {
     const Slots local = *slot, *s = &local;
     const Plate plate = *sole;
-    const Motion m = *now;
-    double rate = 1.0 / dt, rest = RESIST_REST / plate.tilt, rest_x = rest * plate.normal[0],
-           rest_y = rest * plate.normal[1];
+    const Motion motion = *now;
+    const double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = start; i < end; i++) {
-        double x = s->x[i], y = s->y[i], vx = m.x[0] + m.x[1] * x + m.x[2] * y,
-               vy = m.y[0] + m.y[1] * x + m.y[2] * y;
-        double w = s->slope_x[i] * vx + s->slope_y[i] * vy - (m.z[0] + m.z[1] * x + m.z[2] * y),
-               down = step_max(w, 0.0);
-        /* heading: of the motion, at rest of the tilt; any where there is neither, as a level
-         * plate's are all alike */
-        double hx = vx + rest_x, hy = vy + rest_y, length = sqrt(hx * hx + hy * hy),
-               scale = 1.0 / (length + STEP_TINY);
-        double lean = (plate.normal[0] * hx + plate.normal[1] * hy) * scale;
-        double moves = sqrt(vx * vx + vy * vy),
-               speed = moves * FRICTION_LAG < 1.0 ? 0.0 : moves; /* friction may hold it yet */
-        double down_x, down_z, level_x, level_z;
-        plate_alpha(&plate, model, lean, speed, down + RESIST_REST, &down_x, &down_z);
-        plate_alpha(&plate, model, lean, speed + RESIST_REST, down, &level_x, &level_z);
-        slot_resist(s, i, dt, rate, level_x, down_z);
+        slot_resist(s, i, dt, rate, &plate, &motion, model);
     }
 }
 
@@ -211,7 +238,7 @@ void slots_resist(const FootScratch *foot, const MildTerrain *terrain, double dt
             if (terrain->materials[foot->slot_material[i] & 0xff].model != model) {
                 continue; /* the nearer one's */
             }
-            if (s->flat[i] != 0.0) {
+            if (s->flat_stiffness[i] != 0.0) {
                 continue; /* blended with a cone: as a level plate */
             }
             slots_model(s, i, i + 1, dt, &plate, now, model);

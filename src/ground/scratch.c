@@ -1,14 +1,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ground/contact.h"
+#include "ground/scratch.h"
 
-#define FOOT_ARRAYS                                                                                \
-    11 /* depth, normal, tangent x y, point x y z, flat, slope x y; state and slip share one */
-
-static int padded(const MildSole *sole) {
-    return (mild_sole_elements(sole) + CONTACT_LANES - 1) / CONTACT_LANES * CONTACT_LANES;
-}
+/* depth, slope x y, point x y z, normal, tangent x y, flat; state and slip share one. */
+#define FOOT_ARRAYS 11
 
 static double *take(double **at, int count) {
     double *taken = *at;
@@ -18,7 +14,7 @@ static double *take(double **at, int count) {
 
 static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     foot->elements = mild_sole_elements(sole);
-    foot->padded = padded(sole);
+    foot->padded = sole_padded(sole);
     foot->z = mild_sole_z(sole);
     foot->pitch = mild_sole_pitch(sole);
     double *x = take(at, foot->padded), *y = take(at, foot->padded);
@@ -52,7 +48,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     }
     int slots = 0;
     for (int f = 0; f < feet; f++) {
-        slots += padded(soles[f]);
+        slots += sole_padded(soles[f]);
     }
     size_t doubles = (size_t)slots * (SLOT_ARRAYS + FOOT_ARRAYS + 2),
            bytes = doubles * sizeof(double);
@@ -94,4 +90,30 @@ void mild_scratch_destroy(MildScratch *scratch) {
     }
     free(scratch->block);
     free(scratch);
+}
+
+void slots_remember(Slots *s, const Memory *memory) {
+    s->depth_max = memory->depth_max;
+    s->last_middle = memory->middle;
+    s->last_speed = memory->front_speed;
+    s->drift = memory->drift;
+    s->pending_x = memory->pending_x;
+    s->pending_y = memory->pending_y;
+    s->held_x = memory->held_x;
+    s->held_y = memory->held_y;
+    s->held_stiffness = memory->held_stiffness;
+}
+
+void foot_points(const FootScratch *foot) {
+    const double *x = foot->x, *y = foot->y, *o = foot->origin, *e = foot->arm[1],
+                 *n = foot->arm[2];
+    const double ox = o[0] + foot->arm[0][0], oy = o[1] + foot->arm[0][1],
+                 oz = o[2] + foot->arm[0][2];
+    const double ex = e[0], ey = e[1], ez = e[2], nx = n[0], ny = n[1], nz = n[2];
+#pragma omp simd
+    for (int i = 0; i < foot->padded; i++) {
+        foot->point_x[i] = ox + ex * x[i] + nx * y[i];
+        foot->point_y[i] = oy + ey * x[i] + ny * y[i];
+        foot->point_z[i] = oz + ez * x[i] + nz * y[i];
+    }
 }

@@ -1,6 +1,8 @@
 #include <string.h>
 
 #include "ground/friction.h"
+#include "ground/impulse.h"
+#include "ground/solver.h"
 
 #define SWEEP_TOLERANCE 1e-10
 #define SWEEP_LIMIT 1000
@@ -59,10 +61,10 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
 
 /* Implicit normal impulse: one Newton step on I - I(w), where a change dI slows the element by G_zz
  * dI. */
-static double element_normal(const Slots *s, int i, double dt, double w, double G) {
-    double target, slope;
-    step_normal(s, i, dt, 1, w, &target, &slope);
-    return fmax(s->iz[i] + (target - s->iz[i]) / (1.0 + G * slope), 0.0);
+static double element_normal(const Slots *s, int i, int curves, double dt, double w, double G) {
+    const Element element = slot_element(s, i);
+    const Impulse target = element_impulse(&element, curves, 1, dt, w);
+    return fmax(s->iz[i] + (target.value - s->iz[i]) / (1.0 + G * target.slope), 0.0);
 }
 
 /* Paper eq 13: predict, correct by the continuity error, project on the friction disc. Where
@@ -70,8 +72,8 @@ static double element_normal(const Slots *s, int i, double dt, double w, double 
  * does not, I has the direction of t at any scale. */
 static void element_friction(const Slots *s, int i, const double *v, const double *delta,
                              double G) {
-    double radius = s->mu[i] * s->iz[i] + s->drift_radius[i],
-           stiff = s->grip[i] + FRICTION_LAG * radius;
+    double radius = s->mu[i] * s->iz[i] + s->drift_bound[i],
+           stiff = s->hold_stiffness[i] + FRICTION_LAG * radius;
     double compliance = stiff > 0.0 ? 1.0 / stiff : 0.0, beta = 0.5 / (G + compliance),
            gamma = 0.1 * beta;
     double x = s->fx[i] - gamma * delta[0] - beta * (v[0] + compliance * (s->fx[i] - s->hold_x[i]));
@@ -102,7 +104,7 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     element_inverse_mass(sweep, f, p, s->slope_x[i], s->slope_y[i], G);
     double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G), old[3] = {s->ix[i], s->iy[i], s->iz[i]},
            fx = s->fx[i], fy = s->fy[i];
-    s->iz[i] = element_normal(s, i, sweep->dt, w, G[2]);
+    s->iz[i] = element_normal(s, i, foot->curves, sweep->dt, w, G[2]);
     element_friction(s, i, v, delta, G_xy);
     double b = s->damping[i],
            relax = 1.0 / (1.0 + b * G_xy); /* implicit drift damping, as for the normal part */
@@ -125,10 +127,12 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
         const Slots *s = &foot->slot;
         const Motion motion = foot_motion(foot, input->velocity[f]);
         for (int i = 0; i < foot_end(foot); i++) { /* so that the padding holds 0 */
-            double slope, p[3];
+            double p[3];
+            const Element element = slot_element(s, i);
+            const SlotVelocity v = slot_velocity(s, i, &motion, 1);
             slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
-            step_normal(s, i, input->dt, 1, slot_descent(s, i, &motion), &s->iz[i], &slope);
+            s->iz[i] = element_impulse(&element, foot->curves, 1, input->dt, v.descent).value;
             s->ix[i] = -s->slope_x[i] * s->iz[i];
             s->iy[i] = -s->slope_y[i] * s->iz[i];
             sweep_apply(sweep, f, p, (const double[3]){s->ix[i], s->iy[i], s->iz[i]});

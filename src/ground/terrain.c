@@ -1,6 +1,7 @@
+#include "ground/terrain.h"
+
 #include <math.h>
 
-#include "ground/contact.h"
 #include "ground/map.h"
 
 MildTerrain mild_terrain_uniform(const MildMaterial *material) {

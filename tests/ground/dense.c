@@ -1,7 +1,9 @@
 #include "dense.h"
 
-#include "ground/contact.h"
-#include "ground/friction.h" /* its constants and STEP_LAG */
+#include "ground/begin.h" /* the constants of these three */
+#include "ground/friction.h"
+#include "ground/impulse.h"
+#include "ground/scratch.h"
 
 #define DENSE_STEPS 200 /* of Newton's method at given bounds */
 #define DENSE_ROUNDS 3000
@@ -52,7 +54,7 @@ static double law_work(const DenseElement *e, double m1) {
 }
 
 /* Impulse of the mass that is recruited in the step, and of drag, by the growth of P. */
-static double law_recruited(const DenseElement *e, double down) {
+static double dense_recruited(const DenseElement *e, double down) {
     double mass = fmax(e->law.mass_rate, 0.0), extra = fmax(e->law.drag_rate, 0.0) - mass,
            lost = fmax(e->hit - down, 0.0);
     if (extra < 0.0) {
@@ -75,11 +77,12 @@ static double law_normal(double dt, const DenseElement *e, double w) {
     double impulse = dt * force + e->mass * (fmax(w, e->reach) - e->w_a);
     if (m1 > e->front) {
         double gained = cone_share(law, e->deep + m1 - e->front) - cone_share(law, e->deep);
-        impulse += fmax(gained, fmin(2.0 * gained, e->stopped)) * law_recruited(e, fmax(w, 0.0));
+        impulse += fmax(gained, fmin(2.0 * gained, e->stopped)) * dense_recruited(e, fmax(w, 0.0));
     }
-    double back = fmin(w + e->hit, 0.0),
-           eased = back < -STEP_EASE ? back + 0.5 * STEP_EASE : -0.5 * back * back / STEP_EASE;
-    return fmax(impulse + dt * STEP_LAG * e->line * eased + e->active, 0.0);
+    double back = fmin(w + e->hit, 0.0), eased = back < -IMPULSE_EASE
+                                                     ? back + 0.5 * IMPULSE_EASE
+                                                     : -0.5 * back * back / IMPULSE_EASE;
+    return fmax(impulse + dt * ELEMENT_LAG * e->line * eased + e->active, 0.0);
 }
 
 /* ---- what the ground is made of ---- */
@@ -184,13 +187,13 @@ static void dense_factor(Dense *d, const double *A) {
     }
 }
 
-/* The line runs from (a, F(a)) to no force after recovery a, not within CONTACT_ELASTIC, and is
+/* The line runs from (a, F(a)) to no force after recovery a, not within ELEMENT_ELASTIC, and is
  * never flatter than F at a; in the bed the steepest slope is taken. */
 static void element_line(DenseElement *e) {
     const DenseLaw *law = &e->law;
     double a = e->deep, in_bed = fmax(a - law->bed, 0.0),
            force = cone_force(law, a) + law->bed_stiffness * in_bed;
-    double travel = fmax(law->recovery * a, fmin(CONTACT_ELASTIC, a));
+    double travel = fmax(law->recovery * a, fmin(ELEMENT_ELASTIC, a));
     double slope =
         in_bed > 0.0 ? fmax(law->k_pen, law->kappa) + law->bed_stiffness : cone_slope(law, a);
     e->line = travel > 0.0 ? fmax(force / travel, slope) : slope;
@@ -226,7 +229,7 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
     for (int k = 0; k < 2 && tilt > 0.0; k++) {
         heading[k] += DENSE_REST * n[k] / tilt;
     }
-    if (level * STEP_LAG < FRICTION_ELASTIC) {
+    if (level * ELEMENT_LAG < FRICTION_ELASTIC) {
         level = 0.0; /* friction may hold it yet */
     }
     double length = hypot(heading[0], heading[1]), strength = law->kappa;
@@ -238,14 +241,14 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
     double share = fmin(fmax(z[1] / DENSE_PEAK, 0.0), 1.0), peak = DENSE_PEAK * strength;
     if (e->m0 > 0.0) {
         double least =
-            e->m0 + CONTACT_ELASTIC * (1.0 - share); /* deeper than the elastic travel; or else */
+            e->m0 + ELEMENT_ELASTIC * (1.0 - share); /* deeper than the elastic travel; or else */
         if (share * least > e->m0) {
             least = e->m0 / share;
         }
         e->deep = fmax(e->deep, least);
     }
     double bed = law->bed_stiffness * fmax(e->deep - law->bed, 0.0);
-    e->line = e->deep > CONTACT_ELASTIC ? (peak * e->deep + bed) / CONTACT_ELASTIC : peak;
+    e->line = e->deep > ELEMENT_ELASTIC ? (peak * e->deep + bed) / ELEMENT_ELASTIC : peak;
     if (bed > 0.0) {
         e->line = fmax(e->line, peak + law->bed_stiffness);
     }
@@ -311,7 +314,7 @@ static double find_deepest(const Find *find, double recovery) {
     }
     deepest = sum / 9.0;
     if (find->memory.material[find->i] == MATERIAL_FREE && m0 > 0.0) {
-        deepest = fmax(deepest, fmax(m0 / (1.0 - recovery), m0 + CONTACT_ELASTIC));
+        deepest = fmax(deepest, fmax(m0 / (1.0 - recovery), m0 + ELEMENT_ELASTIC));
     }
     return deepest;
 }
@@ -342,21 +345,21 @@ static void point_velocity(const Find *find, const double *twist, double v[4]) {
     v[3] = find->slope[0] * v[0] + find->slope[1] * v[1] - v[2];
 }
 
-/* How the drag of an element that goes on into virgin ground counts: see src/ground/step.h. */
-static void element_drag(double dt, DenseElement *e, double gained) {
+/* How the drag of an element that goes on into virgin ground counts: see src/ground/begin.h. */
+static void dense_drag(double dt, DenseElement *e, double gained) {
     const DenseLaw *law = &e->law;
     double a = e->front, extra = fmax(law->drag_rate, 0.0) - fmax(law->mass_rate, 0.0),
            deep = fmax(e->u0, a);
     e->hit = e->w0;
     e->still = 0.5;
-    if (!(extra > 0.0 && e->u0 + 0.5 * dt * e->w0 > a + CONTACT_ELASTIC)) {
+    if (!(extra > 0.0 && e->u0 + 0.5 * dt * e->w0 > a + ELEMENT_ELASTIC)) {
         return;
     }
     double force = cone_force(law, a) + 0.5 * cone_slope(law, a) * (deep - a),
            drag = extra * cone_flat(law, a);
     e->hit = sqrt(e->w0 * e->w0 + 2.0 * fmax(gained, 0.0) / dt * (a - e->m0));
     e->still =
-        fmin(STEP_STILL + sqrt(force / fmax(drag * e->hit * e->hit, 1e-300)), STEP_STILL_MOST);
+        fmin(BEGIN_STOP + sqrt(force / fmax(drag * e->hit * e->hit, 1e-300)), BEGIN_STOP_MOST);
     e->stopped = cone_share(law, deep) - cone_share(law, a);
 }
 
@@ -391,11 +394,11 @@ static void dense_element(Dense *d, const Find *find) {
             fmin(e->law.drag_rate, 0.0) * cone_flat(&e->law, e->deep) * d->dt * e->w0 * e->w0;
     }
     element_line(e);
-    element_drag(d->dt, e, e->free[3] - now[3]);
+    dense_drag(d->dt, e, e->free[3] - now[3]);
     if (model >= 0) {
         element_resist(d->dt, e, model, find->normal, now, now[3]);
     }
-    element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->grip[i]);
+    element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->held_stiffness[i]);
 }
 
 static void dense_foot(Dense *d, const Kit *kit, int f) {
@@ -454,7 +457,7 @@ static void dense_gradient(const Dense *d, const double *y, double *g, double H[
         const DenseElement *e = &d->element[i];
         double v[4];
         element_velocity(d, e, y, v);
-        double r = d->bound[i], along = e->grip + r * STEP_LAG / FRICTION_ELASTIC;
+        double r = d->bound[i], along = e->grip + r * ELEMENT_LAG / FRICTION_ELASTIC;
         double tx = e->hold[0] - along * v[0], ty = e->hold[1] - along * v[1], t = hypot(tx, ty),
                share = t > r ? r / t : 1.0;
         const double I[3] = {share * tx - e->damping * v[0], share * ty - e->damping * v[1],

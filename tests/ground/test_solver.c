@@ -3,7 +3,7 @@
  * FIRST .. FIRST + COUNT - 1 of cones on level ground and of every other kind. */
 #include "dense.h"
 
-#include "ground/contact.h"
+#include "ground/scratch.h"
 
 #define SOLES 8
 

@@ -1,28 +1,32 @@
 #include <string.h>
 
 #include "ground/friction.h"
+#include "ground/prepare.h"
+#include "ground/solver.h"
 
 /* Slots back to elements: forces in N, and what each element did in the step. */
 static void foot_scatter(const MildScratch *scratch, int f) {
     const FootScratch *foot = &scratch->foot[f];
     const Slots *s = &foot->slot;
     const Motion motion = foot_motion(foot, scratch->velocity + 6 * f);
-    const double dt = scratch->dt, rate = 1.0 / dt;
-    for (int k = 0; k < foot->active; k++) {
-        int i = k, e = foot->element[k];
-        double m1 = s->depth[i] + 0.5 * dt * slot_descent(s, i, &motion);
-        int loaded = s->iz[i] > 0.0, deeper = m1 > s->front[i];
-        double open = 1.0 - (s->deep[i] + (deeper ? m1 - s->front[i] : 0.0)) * s->inverse_full[i];
+    const double dt = scratch->dt;
+    const double rate = 1.0 / dt;
+    for (int i = 0; i < foot->active; i++) {
+        const int e = foot->element[i];
+        const Element element = slot_element(s, i);
+        const SlotVelocity v = slot_velocity(s, i, &motion, 1);
+        const double beyond = element.depth + dt / 2 * v.descent - element.yield_depth;
+        const int loaded = s->iz[i] > 0.0;
+        const int deeper = beyond > 0.0;
         foot->normal[e] = s->iz[i] * rate;
         foot->tangent_x[e] = s->ix[i] * rate;
         foot->tangent_y[e] = s->iy[i] * rate;
-        foot->flat[e] = open > 0.0 ? open * open : 0.0;
+        foot->flat[e] =
+            law_flat_share(&element.law, element.virgin_depth + (deeper ? beyond : 0.0));
         foot->state[e] = (uint8_t)(!loaded  ? MILD_ELEMENT_FREE
                                    : deeper ? MILD_ELEMENT_VIRGIN
                                             : MILD_ELEMENT_UNLOADING);
-        double vx = motion_at(motion.x, s->x[i], s->y[i]),
-               vy = motion_at(motion.y, s->x[i], s->y[i]);
-        foot->slip[e] = loaded && friction_slides(s, i, vx, vy);
+        foot->slip[e] = loaded && friction_slides(&element, s->iz[i], v.x, v.y);
     }
 }
 

@@ -1,0 +1,216 @@
+/* Last stage of a contact step: mild_ground_advance moves the memory to the end of the step. */
+#include "ground/remember.h"
+#include "ground/scratch.h"
+
+/* The elements of a foot in one step. */
+typedef struct {
+    const FootScratch *foot;
+    Slots slot;               /* with the memory of the ground that is advanced */
+    const Imprints *imprints; /* NULL: the ground forgets at lift-off */
+    const double *rotation;   /* [9] foot -> world */
+    Motion motion;            /* after the step */
+    double dt;                /* [s] */
+    double height;            /* [m] of the terrain, its map aside */
+} Advance;
+
+ALWAYS_INLINE void memory_store(const Memory *memory, int e, const ElementMemory *after) {
+    memory->depth_max[e] = after->depth_max;
+    memory->middle[e] = after->middle;
+    memory->front_speed[e] = after->front_speed;
+    memory->drift[e] = after->drift;
+    memory->pending_x[e] = after->pending_x;
+    memory->pending_y[e] = after->pending_y;
+    memory->held_x[e] = after->held_x;
+    memory->held_y[e] = after->held_y;
+    memory->held_stiffness[e] = after->held_stiffness;
+}
+
+/* Bool: the element lifts off. Without imprints that is when it leaves the undisturbed surface, with
+ * imprints as soon as its unloading line carries nothing. m1: depth at the middle of the step. */
+static int element_lifted(const Advance *a, int i, double m1) {
+    const Slots *s = &a->slot;
+    if (!(m1 > 0.0)) {
+        return 1;
+    }
+    return a->imprints && s->recovery[i] < 1.0 && m1 <= s->zero_depth[i];
+}
+
+/* An element that carried something leaves its depth in the ground: where it lifts off, and in each
+ * cell that it slides out of. Where it slides into a deeper imprint it takes over that depth. A
+ * greater depth never means more force, so this gives no energy. */
+static void element_imprint(const Advance *a, const Memory *memory, int i, int e, int lifted) {
+    const Slots *s = &a->slot;
+    if (!(s->recovery[i] < 1.0)) {
+        return;
+    }
+    const double x0 = a->foot->point_x[e];
+    const double y0 = a->foot->point_y[e];
+    const double x1 = x0 + a->dt * motion_at(a->motion.x, s->x[i], s->y[i]);
+    const double y1 = y0 + a->dt * motion_at(a->motion.y, s->x[i], s->y[i]);
+    if (!lifted && imprints_same_cell(a->imprints, x0, y0, x1, y1)) {
+        return;
+    }
+    const ImprintElement left = {x0, y0, a->foot->pitch, a->rotation};
+    imprints_press(a->imprints, &left, lifted ? s->virgin_depth[i] : memory->depth_max[e]);
+    if (lifted) {
+        return;
+    }
+    const ImprintElement entered = {x1, y1, a->foot->pitch, a->rotation};
+    const double found = imprints_read(a->imprints, &entered);
+    if (found <= memory->depth_max[e]) {
+        return;
+    }
+    memory->depth_max[e] = found;
+    memory->front_speed[e] = 0.0;
+}
+
+/* Slot i, element e: it turned round within the step and has been deeper than at its ends. */
+static void slot_peak(const Advance *a, const Memory *memory, int i, int e, double speed,
+                      double middle) {
+    const Element element = slot_element(&a->slot, i);
+    const double peak = element_peak(&element, a->foot->curves, a->slot.iz[i], speed, middle);
+    const double depth = element.virgin_depth + peak - element.yield_depth;
+    memory->depth_max[e] = fmax(memory->depth_max[e], depth);
+}
+
+/* The same for all elements of a foot. Apart from the loop in vectors: there the addresses of local
+ * variables must not be taken. */
+static void foot_peaks(const Advance *a, const Memory *memory) {
+    for (int i = 0; i < a->foot->elements; i++) {
+        const SlotVelocity v = slot_velocity(&a->slot, i, &a->motion, 1);
+        const double middle = a->slot.depth[i] + a->dt / 2 * v.descent;
+        if (middle > 0.0) {
+            slot_peak(a, memory, i, i, v.descent, middle);
+        }
+    }
+}
+
+/* The tangent plane that the step took the ground for, through the depth of the element. */
+ALWAYS_INLINE void slot_plane(const FootScratch *foot, double height, const Slots *s,
+                              const Memory *memory, int i, int e) {
+    const double slope_x = s->slope_x[i];
+    const double slope_y = s->slope_y[i];
+    memory->slope_x[e] = slope_x;
+    memory->slope_y[e] = slope_y;
+    memory->plane[e] = s->depth[i] - slope_x * foot->point_x[e] - slope_y * foot->point_y[e] +
+                       foot->point_z[e] - height;
+}
+
+/* All elements are listed, on ground without imprints: a loop in vectors. Returns how many stay in
+ * the ground. */
+ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
+                                   int uneven) {
+    const FootScratch foot = *a->foot;
+    const Slots local = a->slot, *s = &local;
+    const Memory own = *all, *memory = &own;
+    const Motion motion = a->motion;
+    const double dt = a->dt;
+    const double rate = 1.0 / dt;
+    const double height = a->height;
+    const int end = foot.padded;
+    double touched = 0.0;
+    double turned = 0.0;
+#pragma omp simd reduction(+ : touched, turned)
+    for (int i = 0; i < end; i++) {
+        const SlotVelocity v = slot_velocity(s, i, &motion, uneven);
+        const Element element = slot_element(s, i);
+        const ElementMemory before = slot_memory(s, i);
+        const int stays = s->depth[i] + dt / 2 * v.descent > 0.0;
+        const ElementMemory after =
+            element_remember(&element, &before, dt, rate, s->iz[i], v.x, v.y, v.descent, stays);
+        memory_store(memory, i, &after);
+        if (uneven) {
+            slot_plane(&foot, height, s, memory, i, i);
+        }
+        touched += stays ? 1.0 : 0.0;
+        turned += stays && element_turns(element.entry_speed, v.descent) ? 1.0 : 0.0;
+    }
+    if (turned > 0.0) {
+        foot_peaks(a, all);
+    }
+    for (int i = foot.elements; i < end; i++) {
+        memory_forget(memory, i, MATERIAL_NONE); /* the padding */
+    }
+    const double *depth_max = memory->depth_max;
+    int32_t *remembered = memory->material;
+    const int32_t lifted = uneven ? MATERIAL_FREE : MATERIAL_NONE;
+    for (int i = 0; i < end; i++) {
+        remembered[i] = depth_max[i] > 0.0 ? material[i] : lifted;
+    }
+    return uneven ? foot.elements : (int)touched;
+}
+
+/* Some elements are listed, or the ground keeps imprints. Returns how many remember something. */
+static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
+    const FootScratch *foot = a->foot;
+    const Slots *s = &a->slot;
+    const int32_t lifted_material = a->imprints || foot->uneven ? MATERIAL_FREE : MATERIAL_NONE;
+    int next = 0;
+    int touched = 0;
+    for (int i = 0; i < foot->active; i++, next++) {
+        const int e = foot->element[i];
+        for (; next < e; next++) {
+            memory_forget(memory, next, MATERIAL_NONE);
+        }
+        const SlotVelocity v = slot_velocity(s, i, &a->motion, 1);
+        const double middle = s->depth[i] + a->dt / 2 * v.descent;
+        const int lifted = element_lifted(a, i, middle);
+        const int carried = memory->material[e] >= 0;
+        const Element element = slot_element(s, i);
+        const ElementMemory before = slot_memory(s, i);
+        const ElementMemory after = element_remember(&element, &before, a->dt, 1.0 / a->dt,
+                                                     s->iz[i], v.x, v.y, v.descent, !lifted);
+        memory_store(memory, e, &after);
+        if (!lifted) {
+            slot_peak(a, memory, i, e, v.descent, middle);
+        }
+        memory->material[e] = lifted ? lifted_material : material[i];
+        if (a->imprints && (carried || !lifted)) {
+            element_imprint(a, memory, i, e, lifted);
+        }
+        if (foot->uneven) {
+            slot_plane(foot, a->height, s, memory, i, e);
+        }
+        touched += !lifted || lifted_material != MATERIAL_NONE;
+    }
+    for (; next < foot->elements; next++) {
+        memory_forget(memory, next, MATERIAL_NONE);
+    }
+    return touched;
+}
+
+void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
+                         const MildContactInput *input, const MildScratch *scratch,
+                         const MildContactResult *result) {
+    if (ground->tiles > 0 && ++ground->imprint_time == 0) {
+        ground->imprint_time = 1; /* 0 marks an empty tile */
+    }
+    const Imprints imprints = ground_imprints(ground);
+    for (int f = 0; f < ground->feet; f++) {
+        const FootScratch *foot = &scratch->foot[f];
+        ground->uneven[f] = foot->uneven;
+        if (ground->touched[f] == 0 && foot->active == 0) {
+            continue;
+        }
+        const Memory memory = ground_memory(ground, f);
+        Advance advance = {.foot = foot,
+                           .slot = foot->slot,
+                           .imprints = ground->tiles > 0 ? &imprints : NULL,
+                           .rotation = input->rotation[f],
+                           .motion = foot_motion(foot, result->velocity + 6 * f),
+                           .dt = input->dt,
+                           .height = terrain->height};
+        const int all = foot->active == foot->elements && ground->tiles == 0;
+        if (all) {
+            /* Of this ground: the step may have been solved on a copy. */
+            slots_remember(&advance.slot, &memory);
+        }
+        if (all && foot->uneven) {
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 1);
+        } else if (all) {
+            ground->touched[f] = foot_advance_all(&advance, &memory, foot->slot_material, 0);
+        } else {
+            ground->touched[f] = foot_advance(&advance, &memory, foot->slot_material);
+        }
+    }
+}

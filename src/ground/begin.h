@@ -1,0 +1,107 @@
+/* Start of an element's step: everything that does not depend on the new velocity. */
+#ifndef MILD_GROUND_BEGIN_H
+#define MILD_GROUND_BEGIN_H
+
+#include "ground/friction.h"
+
+#define BEGIN_STOP REAL(0.3)       /* [-] fit to the exact impact, see element_drag */
+#define BEGIN_STOP_MOST REAL(0.75) /* [-] up to here the drag's speed V does not fall with w */
+
+/* The unloading line runs from (a, F(a)) down to zero force. Its elastic travel is recovery a, at
+ * least ELEMENT_ELASTIC. It is never flatter than virgin ground at a, and so never above it: a
+ * concave curve lies above its chords, a convex one above its tangents. In the bed it takes the
+ * steepest slope of the law. force: F(a). */
+MILD_HD void element_unloading_line(Element *e, int curves, Real force) {
+    const Real a = e->yield_depth;
+    const Real travel = real_max(e->recovery * a, real_min(ELEMENT_ELASTIC, a));
+    const Real bed = law_bed_slope(&e->law, a);
+    const Real slope =
+        bed > 0 ? law_steepest(&e->law, curves, a) : law_bedless_slope(&e->law, curves, a);
+    const Real steep = slope + bed;
+    const int chord = force >= steep * travel;
+    const Real quotient = force / ((chord ? travel : steep) + ELEMENT_TINY); /* one division */
+    e->unload_stiffness = chord ? quotient : steep;
+    e->zero_depth = a - (chord ? travel : quotient);
+}
+
+/* Sets all but the explicit impulse and the drag of a foot that stops. In: the material, `depth`.
+ * speed: downward, now. rate: 1/dt. */
+MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, Real dt, Real rate,
+                           Real speed) {
+    /* Virgin ground begins where the element has been, or where the way of this step begins. */
+    e->middle = memory->middle > 0 ? memory->middle : e->depth - dt / 2 * speed;
+    e->yield_depth = real_max(real_max(e->middle, memory->depth_max), 0);
+    e->virgin_depth = e->yield_depth;
+    const Real force = law_force(&e->law, curves, e->yield_depth);
+    element_unloading_line(e, curves, force);
+
+    /* The added mass is at the front. It has the speed of the element that leads it, or waits. */
+    e->yield_speed = real_max(2 * (e->yield_depth - e->depth) * rate, 0);
+    e->front_speed = real_max(memory->front_speed, e->yield_speed);
+    e->entry_speed = real_max(speed, 0);
+    e->added_mass = 0;
+    if (curves & LAW_CONE) {
+        e->added_mass = real_max(e->law.mass_rate * law_recruited(&e->law, e->yield_depth), 0);
+    }
+
+    e->drift_bound = dt * e->k_drift * memory->drift * real_max(e->depth, 0);
+    e->damping = e->depth > 0 ? dt * e->b_drift : 0;
+    friction_hold(e, memory, dt, rate, force);
+}
+
+/* How far the element will enter virgin ground at its present downward speed, beyond the elastic
+ * travel [m]; else 0. */
+MILD_HD Real element_virgin_way(const Element *e, Real dt, Real speed) {
+    return real_max(e->depth + dt / 2 * speed - e->yield_depth - ELEMENT_ELASTIC, 0);
+}
+
+/* Drag of an element that will stop in virgin ground, beyond what momentum exchange takes. After
+ * element_begin. gain: [m/s] by how much the free motion of the step speeds the element up.
+ *
+ * The work of the drag over the way is c_d m_a' times the integral of w^2. Of an impulse that acts at
+ * the mean speed, V is the mean of w^2 over the way by (h + w)/2, with h the speed at the front.
+ *
+ *     slow change                V = (h + w)/2
+ *     drag alone stops the foot  the mean of w^2 is logarithmic, (h^2 - w^2)/(2 ln(h/w)), and V
+ *                                goes to 0 with w
+ *     force F stops it           the mean of w^2 is (h^2 + w^2)/2
+ *
+ * The last two are near
+ *
+ *     V    = (h + w)/2 + (stop - 1/2) (h - w)^2/h      for w < h
+ *     stop = V(0)/h = BEGIN_STOP + sqrt(F/(drag h^2))  at most BEGIN_STOP_MOST
+ *
+ * a fit to the exact impact of a body on a force that grows from 0. Where the present speed hardly
+ * leads into virgin ground, stop is 1/2. F is taken about the middle of the step. */
+MILD_HD void element_drag(Element *e, int curves, Real dt, Real gain) {
+    const Real a = e->yield_depth;
+    const Real u0 = real_max(e->depth, a);
+    const Real extra = real_max(2 * e->entry_drag, 0); /* [kg/m] (c_d - 1) m_a' at the surface */
+    const int drags = extra > 0 && element_virgin_way(e, dt, e->entry_speed) > 0;
+
+    /* h^2: what the free motion adds up to the front. */
+    const Real faster = drags ? 2 * (gain / dt * real_max(a - e->middle, 0)) : 0;
+    const Real h = REAL_SQRT(e->entry_speed * e->entry_speed + faster);
+
+    const Real slope = law_bedless_slope(&e->law, curves, a);
+    const Real force = law_bedless_force(&e->law, curves, a) + slope / 2 * (u0 - a);
+    const Real drag = extra * law_flat_share(&e->law, a);
+    const Real stop =
+        real_min(BEGIN_STOP + REAL_SQRT(force / (drag * h * h + ELEMENT_TINY)), BEGIN_STOP_MOST);
+
+    e->entry_speed = h;
+    e->stop_drag = drags ? extra * (stop - REAL(0.5)) / (h + ELEMENT_TINY) : 0;
+    e->stop_growth = drags ? law_recruited(&e->law, u0) - law_recruited(&e->law, a) : 0;
+}
+
+/* Impulse of parameters that create energy (passive = false): negative added mass and drag. It
+ * cannot be implicit and enters with the free motion. After element_begin. free: downward speed of
+ * the free motion [m/s]. */
+MILD_HD Real element_explicit(const Element *e, Real dt, Real free) {
+    const Real mass = e->law.mass_rate * law_recruited(&e->law, e->yield_depth);
+    const Real drag = e->law.drag_rate * law_flat_share(&e->law, e->yield_depth);
+    return real_min(mass, 0) * (free - e->front_speed) +
+           real_min(drag, 0) * dt * e->entry_speed * e->entry_speed;
+}
+
+#endif

@@ -1,0 +1,133 @@
+/* Normal impulse of an element over a step, as a function of its new velocity (docs/model.md
+ * section 6). Both solvers use it.
+ *
+ * A semi-implicit engine moves by its new velocity, u1 = u0 + dt w, so its velocities belong to the
+ * middles of the steps: a body in free fall keeps w^2/2 - g m exactly, where m = u + dt w/2 is the
+ * depth in the middle of the step. The ground keeps to that clock. A step leads from the middle m0 of
+ * the step before to
+ *
+ *     m1 = u0 + dt w/2
+ *
+ * and its impulse is a sum of terms:
+ *
+ *     path    dt (E(m1) - E(m0))/(m1 - m0)            E: integral of the force, mean over the way
+ *     mass    m_a(a) (max(w, w_y) - w_a)              the added mass moves with the front
+ *     growth  (m_a(m1) - m_a(a)) (w + (c_d - 1) V)    mass recruited on the way, and drag
+ *     lag     dt T k e(w + h)                         elastic ground lags behind the foot
+ *
+ * The work at the mean velocity, I (w0 + w)/2, is what E gains, since m1 - m0 = dt (w0 + w)/2: path
+ * creates and loses no energy at any step size, and its error is of second order in dt. The mean of a
+ * rising function rises with m1, so I never falls with w, and the step is the minimum of a convex
+ * function. */
+#ifndef MILD_GROUND_IMPULSE_H
+#define MILD_GROUND_IMPULSE_H
+
+#include "ground/element.h"
+
+#define IMPULSE_EASE REAL(2e-6) /* [m/s] over which the lag begins */
+
+typedef struct {
+    Real value; /* [N s] up, on the foot */
+    Real slope; /* [kg] its derivative by the new downward speed */
+} Impulse;
+
+/* Static force: its mean over the way, which is on the unloading line up to the yield depth a and in
+ * virgin ground beyond. Both parts count with their share of the way. */
+MILD_HD Impulse path_impulse(const Element *e, Real dt, Real middle, Real virgin_way,
+                             const LawWay *virgin) {
+    const Real inverse_way = 1 / (REAL_ABS(middle - e->middle) + ELEMENT_TINY);
+
+    /* Line: force k x, x the stretch from the depth of zero force. */
+    const Real k = e->unload_stiffness;
+    const Real end = real_min(middle, e->yield_depth) - e->zero_depth;
+    const Real x0 = real_max(e->middle - e->zero_depth, 0);
+    const Real x1 = real_max(end, 0);
+    const Real line_mean = k / 2 * (x0 + x1);
+    const Real line_share = (REAL_ABS(x1 - x0) + ELEMENT_TINY) * inverse_way;
+    const Real line_slope = k / 2 * line_share * (end > 0 ? 2 - line_share : line_share);
+
+    const Real virgin_share = virgin_way * inverse_way;
+    const Real lost = (e->yield_depth - e->middle) * virgin->mean - line_mean * (x1 - x0);
+    const Real virgin_slope = virgin_share * virgin->mean_slope + lost * inverse_way * inverse_way;
+
+    Impulse path;
+    path.value = dt * (line_mean * line_share + virgin->mean * virgin_share);
+    path.slope = dt * dt / 2 * (middle > e->yield_depth ? virgin_slope : line_slope);
+    return path;
+}
+
+/* Added mass at the front: it takes part from the speed w_y on with which the way ends there, and
+ * joins without bouncing. */
+MILD_HD Impulse mass_impulse(const Element *e, Real speed) {
+    Impulse mass;
+    mass.value = e->added_mass * (real_max(speed, e->yield_speed) - e->front_speed);
+    mass.slope = speed > e->yield_speed ? e->added_mass : 0;
+    return mass;
+}
+
+/* Mass recruited at rest leaves at w; drag beyond that acts at the speed V (element_drag), which for
+ * c_d < 1 is (w + min(w, h))/2: it never pushes, and gives no energy for c_d >= 1/2. An element that
+ * turns round within the step has been stopped first: growth then counts up to u0, as for w = 0, and
+ * half as much for what it gets beyond. stops: bool, the element may have stop_drag and stop_growth. */
+MILD_HD Impulse growth_impulse(const Element *e, Real dt, Real speed, const LawWay *virgin,
+                               int stops) {
+    const Real down = real_max(speed, 0);
+    const Real entry = e->entry_drag < 0 ? real_min(down, e->entry_speed) : e->entry_speed;
+    Real drag = e->exit_drag * down + e->entry_drag * entry; /* [kg/m m/s] */
+    Real drag_slope = e->exit_drag + (entry < e->entry_speed ? e->entry_drag : 0);
+    Real recruited = virgin->recruited;
+    Real recruited_slope = dt / 2 * virgin->recruited_slope;
+    if (stops) {
+        const Real lost = real_max(e->entry_speed - down, 0);
+        const Real twice = 2 * recruited;
+        drag += e->stop_drag * lost * lost;
+        drag_slope -= 2 * e->stop_drag * lost;
+        recruited_slope *= recruited < e->stop_growth ? (twice < e->stop_growth ? 2 : 0) : 1;
+        recruited = real_max(recruited, real_min(twice, e->stop_growth));
+    }
+    Impulse growth;
+    growth.value = recruited * drag;
+    growth.slope = recruited_slope * drag + (speed > 0 ? recruited * drag_slope : 0);
+    return growth;
+}
+
+/* Unloading ground follows the foot late by T = ELEMENT_LAG. It is the only damping of elastic
+ * ground, and the same at every step size. e(s) is 0 for s > 0, s + E/2 below -E, and -s^2/(2 E)
+ * between, E = IMPULSE_EASE: no kink under a resting foot. */
+MILD_HD Impulse lag_impulse(const Element *e, Real dt, Real speed) {
+    const Real damping = dt * ELEMENT_LAG * e->unload_stiffness;
+    const Real rise = speed + e->entry_speed;
+    const Real ease = real_min(real_max(rise, -IMPULSE_EASE), 0);
+    const Real eased = real_min(rise + IMPULSE_EASE, 0) - ease * ease * (1 / (2 * IMPULSE_EASE));
+    Impulse lag;
+    lag.value = damping * eased;
+    lag.slope = damping * ease * (-1 / IMPULSE_EASE);
+    return lag;
+}
+
+/* The whole impulse at the new downward speed. curves: of the law. stops: bool, stop_drag,
+ * stop_growth and explicit_impulse may not be 0. Constants in a loop over elements. */
+MILD_HD Impulse element_impulse(const Element *e, int curves, int stops, Real dt, Real speed) {
+    const Real middle = e->depth + dt / 2 * speed;
+    const Real virgin_way = real_max(middle - e->yield_depth, 0);
+    const LawWay virgin = law_way(&e->law, curves, e->virgin_depth, virgin_way);
+
+    Impulse sum = path_impulse(e, dt, middle, virgin_way, &virgin);
+    const Impulse lag = lag_impulse(e, dt, speed);
+    if (curves & LAW_CONE) {
+        const Impulse mass = mass_impulse(e, speed);
+        const Impulse growth = growth_impulse(e, dt, speed, &virgin, stops);
+        sum.value += mass.value + growth.value;
+        sum.slope += mass.slope + growth.slope;
+    }
+    sum.value += lag.value + (stops ? e->explicit_impulse : 0);
+    sum.slope += lag.slope;
+
+    /* Soil never pulls. */
+    const Real pushes = sum.value > 0 ? 1 : 0;
+    sum.value *= pushes;
+    sum.slope *= pushes;
+    return sum;
+}
+
+#endif

@@ -1,0 +1,11 @@
+/* First stage of a contact step: lists the elements that may touch and fixes the law of each. */
+#ifndef MILD_GROUND_PREPARE_H
+#define MILD_GROUND_PREPARE_H
+
+#include "ground/scratch.h"
+
+/* Fills the lists and every slot's law of this step. Returns how many elements may touch. */
+int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
+                    const MildContactInput *input, MildScratch *scratch);
+
+#endif

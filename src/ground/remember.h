@@ -1,0 +1,99 @@
+/* End of an element's step: what it remembers. */
+#ifndef MILD_GROUND_REMEMBER_H
+#define MILD_GROUND_REMEMBER_H
+
+#include "ground/friction.h"
+
+#define REMEMBER_BAND REAL(1e-5) /* [m] horizontal motion below this is jitter, not drift */
+#define REMEMBER_DRIFT REAL(0.1) /* [m] longest drift that still hardens the ground */
+#define REMEMBER_TURN                                                                              \
+    REAL(1e-4) /* [m/s] slower than this, turning round adds no depth to speak
+                                      of: 0.25 um in 5 ms */
+
+/* Bool: the element turned round within the step. Speeds: downward. */
+MILD_HD int element_turns(Real before, Real after) {
+    return after < 0 && before > REMEMBER_TURN;
+}
+
+/* How deep the element has been in a step that ends at m1 [m], counted like the yield depth. Memory
+ * of an element that turned round within the step; otherwise it is m1. normal: I_z. speed: w, now.
+ *
+ * A foot that turned round was deepest between its ends. At the deeper one, p, it still went down
+ * with the speed v, and its mass M is that which the impulse slowed from h to w. Of its energy
+ * M v^2/2 the unloading line takes what leads back to the front. From there, or from p beyond it,
+ * the ground's work F x + F' x^2/2 takes the rest; F holds half the drag at p, its mean on the way.
+ *
+ * Elastic ground remembers this depth. From plastic ground the foot springs up with what is left and
+ * pays when it is back, but not with all of it: half the way is remembered. */
+MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed, Real middle) {
+    const Real h = e->entry_speed;
+    if (!element_turns(h, speed)) {
+        return middle;
+    }
+    const Real a = e->yield_depth;
+    const Real p = real_max(e->middle, middle);
+    const Real v = middle > e->middle ? speed : h;
+
+    const Real x0 = real_max(p - e->zero_depth, 0);
+    const Real x1 = real_max(a - e->zero_depth, x0);
+    const Real line_work = p < a ? e->unload_stiffness / 2 * (x1 * x1 - x0 * x0) : 0;
+    const Real energy = normal / 2 * v * v / (h - speed) - line_work;
+    if (energy <= 0) {
+        return middle;
+    }
+
+    const Real at = e->virgin_depth + real_max(p - a, 0);
+    Real force = law_force(&e->law, curves, at);
+    if (curves & LAW_CONE) {
+        force += real_max(e->law.drag_rate, 0) / 2 * law_flat_share(&e->law, at) * v * v;
+    }
+    const Real slope =
+        real_max(law_bedless_slope(&e->law, curves, at), 0) + law_bed_slope(&e->law, at);
+    const Real root = REAL_SQRT(force * force + 2 * slope * energy);
+    const Real way = 2 * energy / (force + root + ELEMENT_TINY);
+    const Real beyond = real_max(real_max(p, a) + way - middle, 0);
+    return middle + (1 + e->recovery) / 2 * beyond;
+}
+
+/* Memory after the step. It is chosen, not multiplied by 0, so that what is not a number is
+ * forgotten. normal: I_z. vx, vy, speed: velocity after the step, speed downward. rate: 1/dt.
+ * stays: bool, still in the ground; otherwise the element forgets all but where its way ended. */
+MILD_HD ElementMemory element_remember(const Element *e, const ElementMemory *memory, Real dt,
+                                       Real rate, Real normal, Real vx, Real vy, Real speed,
+                                       int stays) {
+    const Real middle = e->depth + dt / 2 * speed;
+    const Real deepest = e->virgin_depth + real_max(middle - e->yield_depth, 0);
+    ElementMemory after;
+    after.depth_max = stays ? deepest : 0;
+    after.middle = stays ? real_min(middle, deepest) : middle;
+
+    /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the
+     * next step. */
+    const int leads = middle > e->yield_depth && speed > e->yield_speed;
+    const int led = e->front_speed > e->yield_speed || !(memory->depth_max > 0);
+    after.front_speed = stays && leads ? speed - (led ? 0 : e->yield_speed) : 0;
+
+    /* Motion is collected until it leaves the dead band, so that d_D depends neither on the step
+     * size nor on jitter. It is the length of the path: accumulated, as the paper says. */
+    const Real x = memory->pending_x + dt * vx;
+    const Real y = memory->pending_y + dt * vy;
+    const Real square = x * x + y * y;
+    const int counts = square > REMEMBER_BAND * REMEMBER_BAND;
+    const Real drift = memory->drift + (counts ? REAL_SQRT(square) : 0);
+    after.drift = stays ? real_min(drift, REMEMBER_DRIFT) : 0;
+    after.pending_x = stays && !counts ? x : 0;
+    after.pending_y = stays && !counts ? y : 0;
+
+    /* Friction that stays held when the element rests (friction.h). */
+    const Real held_x = e->hold_x - e->hold_stiffness * vx;
+    const Real held_y = e->hold_y - e->hold_stiffness * vy;
+    const Real held = REAL_SQRT(held_x * held_x + held_y * held_y);
+    const Real bound = friction_bound(e, normal);
+    const Real share = rate * (held > bound ? bound / held : 1);
+    after.held_x = stays ? share * held_x : 0;
+    after.held_y = stays ? share * held_y : 0;
+    after.held_stiffness = stays ? rate * rate * e->hold_stiffness : 0;
+    return after;
+}
+
+#endif

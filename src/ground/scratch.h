@@ -1,0 +1,107 @@
+/* Working arrays of one contact step: what is listed under every foot, and its law. */
+#ifndef MILD_GROUND_SCRATCH_H
+#define MILD_GROUND_SCRATCH_H
+
+#include "ground/material.h"
+#include "ground/slots.h"
+#include "ground/state.h"
+
+#define TWIST_MAX (6 * MILD_FEET_MAX)
+
+/* Law of a material as last derived; valid while the material's bytes stay the same. */
+typedef struct {
+    MildMaterial material;
+    Law law;
+    int curves; /* LawCurve bits of the law */
+    int known;  /* bool */
+    int nan;    /* bool: a number of it is none */
+} DerivedLaw;
+
+typedef struct {
+    /* The sole: mild_scratch_create. */
+    int elements;    /* count */
+    int padded;      /* count rounded up to whole vectors */
+    double *x;       /* [padded] [m] element centres in the foot frame */
+    double *y;       /* [padded] [m] */
+    double z;        /* [m] sole plane in the foot frame */
+    double pitch;    /* [m] edge of an element */
+    double center_x; /* [m] centroid in the foot frame */
+    double center_y; /* [m] */
+    double radius;   /* [m] reach of the sole from the ankle */
+
+    /* Pose: foot_place. p = arm[0] + x arm[1] + y arm[2] leads from the ankle to an element. */
+    double origin[3]; /* [m] the ankle, world */
+    double arm[3][3]; /* [m], [-], [-] the frame's point (0, 0, z), then its x and y axes, world */
+    int uneven;       /* bool: the ground under it is not level; otherwise all its slopes are 0 */
+    double *depth;    /* [padded] [m] */
+    double *slope_x;  /* [padded] [-] gradient of the ground; uneven ground only */
+    double *slope_y;  /* [padded] [-] */
+    double *point_x;  /* [padded] [m] centres in the world: foot_points */
+    double *point_y;  /* [padded] [m] */
+    double *point_z;  /* [padded] [m] */
+
+    /* List of the elements that may touch: foot_list. */
+    int active;       /* slots in use */
+    int whole;        /* bool: element[] lists all */
+    int32_t *element; /* [active] element of each slot, ascending */
+
+    /* Law of each slot: foot_laws, foot_prepare. */
+    int curves;             /* LawCurve bits of the terrain's materials */
+    int nan;                /* bool: a material of the terrain is not a number */
+    int stops;              /* bool: stop_drag, stop_growth, explicit_impulse may not be 0 */
+    int32_t *slot_material; /* [padded] whose law the slot holds, coded as in Memory */
+    DerivedLaw derived[MILD_MATERIALS_MAX];
+    Slots own;  /* arrays that the scratch owns */
+    Slots slot; /* the arrays of this step: own, or, when all elements are listed, x, y, depth and
+                   memory where they lie, to be read only */
+
+    /* Output of mild_scratch_elements [padded], see MildElements. */
+    double *normal;    /* [N] */
+    double *tangent_x; /* [N] */
+    double *tangent_y; /* [N] */
+    double *flat;      /* [-] */
+    uint8_t *state;    /* MildElementState */
+    uint8_t *slip;     /* bool */
+} FootScratch;
+
+struct MildScratch {
+    int feet;
+    FootScratch foot[MILD_FEET_MAX];
+    double wrench[TWIST_MAX]; /* [N s, N m s] sum of B^T I at the last pass */
+    double hessian[MILD_FEET_MAX]
+                  [36];         /* [kg, kg m, kg m^2] -d wrench/d twist of a foot, row major */
+    double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve */
+    double dt;                  /* [s] of the last solve */
+    double *block;              /* the one allocation behind all arrays */
+};
+
+/* The memory's arrays in place of the slots' own copies. */
+void slots_remember(Slots *s, const Memory *memory);
+/* Where every element is: point_x, y, z. */
+void foot_points(const FootScratch *foot);
+
+/* Slots in use, rounded up to whole vectors. */
+static inline int foot_end(const FootScratch *foot) {
+    return (foot->active + VECTOR_LANES - 1) / VECTOR_LANES * VECTOR_LANES;
+}
+
+/* The velocity field of a foot with the twist V. */
+static inline Motion foot_motion(const FootScratch *foot, const double *V) {
+    Motion m;
+    for (int k = 0; k < 3; k++) {
+        const double *q = foot->arm[k];
+        m.x[k] = V[4] * q[2] - V[5] * q[1] + (k ? 0.0 : V[0]);
+        m.y[k] = V[5] * q[0] - V[3] * q[2] + (k ? 0.0 : V[1]);
+        m.z[k] = V[3] * q[1] - V[4] * q[0] + (k ? 0.0 : V[2]);
+    }
+    return m;
+}
+
+/* p: ankle -> element, world axes. */
+static inline void slot_arm(const FootScratch *foot, const Slots *s, int i, double p[3]) {
+    for (int k = 0; k < 3; k++) {
+        p[k] = foot->arm[0][k] + foot->arm[1][k] * s->x[i] + foot->arm[2][k] * s->y[i];
+    }
+}
+
+#endif

@@ -1,0 +1,190 @@
+/* The elements of a foot that a step works on, as a structure of arrays.
+ *
+ * A slot is one listed element. The list is padded to whole vectors; the padding has a law that
+ * makes no force at any depth.
+ *
+ * Loops over slots take a copy of Slots: through a pointer the compiler must assume that a store
+ * changes the arrays' addresses, reloads them, and does not vectorise. */
+#ifndef MILD_GROUND_SLOTS_H
+#define MILD_GROUND_SLOTS_H
+
+#include "ground/element.h"
+#include "ground/motion.h"
+
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
+
+/* Arrays of a foot's slots [padded]. What an array means, with its symbol, is said at the field of
+ * Element or ElementMemory of the same name; here are its unit and the function that writes it. */
+typedef struct {
+    /* Where the element is: slots_direct or slots_gather. */
+    double *x;     /* [m] centre in the foot frame */
+    double *y;     /* [m] */
+    double *depth; /* [m] */
+
+    /* Gradient of the ground under it: slots_uneven; 0 where the foot is not `uneven`. */
+    double *slope_x; /* [-] */
+    double *slope_y; /* [-] */
+
+    /* Memory before the step: slots_direct or slots_gather; `depth_max` also slots_imprints. */
+    double *depth_max;      /* [m] */
+    double *last_middle;    /* [m] ElementMemory.middle */
+    double *last_speed;     /* [m/s] ElementMemory.front_speed */
+    double *drift;          /* [m] */
+    double *pending_x;      /* [m] */
+    double *pending_y;      /* [m] */
+    double *held_x;         /* [N] */
+    double *held_y;         /* [N] */
+    double *held_stiffness; /* [N/m] */
+
+    /* Material: slots_materials, when it changes. */
+    double *flat_stiffness;     /* [N/m] Law, to bed_stiffness */
+    double *line_stiffness;     /* [N/m]; slots_resist changes it in every step */
+    double *cone_depth;         /* [m] */
+    double *inverse_cone_depth; /* [1/m] */
+    double *mass_rate;          /* [kg/m] */
+    double *drag_rate;          /* [kg/m] */
+    double *bed_depth;          /* [m] */
+    double *bed_stiffness;      /* [N/m] */
+    double *exit_drag;          /* [kg/m] */
+    double *entry_drag;         /* [kg/m] */
+    double *strength;           /* [N/m] line_stiffness before the direction of motion counts */
+    double *recovery;           /* [-] */
+    double *mu;                 /* [-] */
+    double *k_drift;            /* [N/m^2] */
+    double *b_drift;            /* [N s/m] */
+
+    /* Law of this step: slots_begin, changed by slots_resist. */
+    double *middle;           /* [m] */
+    double *yield_depth;      /* [m] */
+    double *virgin_depth;     /* [m] */
+    double *unload_stiffness; /* [N/m] */
+    double *zero_depth;       /* [m] */
+    double *added_mass;       /* [kg] */
+    double *front_speed;      /* [m/s] */
+    double *yield_speed;      /* [m/s] */
+    double *entry_speed;      /* [m/s] also slots_drag */
+    double *drift_bound;      /* [N s] */
+    double *damping;          /* [kg] */
+    double *hold_x;           /* [N s] */
+    double *hold_y;           /* [N s] */
+    double *hold_stiffness;   /* [kg] */
+
+    /* Only where the foot `stops`: slots_drag, slots_explicit; otherwise 0. */
+    double *stop_drag;        /* [kg s/m^2] */
+    double *stop_growth;      /* [m] */
+    double *explicit_impulse; /* [N s] */
+
+    /* Impulse at the last trial twist, world: contact_pass, sweep_element. */
+    double *ix; /* [N s] */
+    double *iy; /* [N s] */
+    double *iz; /* [N s] */
+
+    /* Minus its derivative by the element's velocity: contact_pass. On level ground hyx = hxy and
+     * hzx = hzy = 0, and these three are left out. */
+    double *hxx; /* [kg] */
+    double *hxy; /* [kg] */
+    double *hxz; /* [kg] */
+    double *hyx; /* [kg] */
+    double *hyy; /* [kg] */
+    double *hyz; /* [kg] */
+    double *hzx; /* [kg] */
+    double *hzy; /* [kg] */
+    double *hzz; /* [kg] */
+
+    double *bound; /* [N s] of friction, where the solver holds it: contact_bounds */
+    double *fx;    /* [N s] friction without the drift's damping: the sweeps */
+    double *fy;    /* [N s] */
+} Slots;
+#define SLOT_ARRAYS (sizeof(Slots) / sizeof(double *))
+
+/* The element of a slot, by value: what the caller does not use is not loaded. */
+ALWAYS_INLINE Element slot_element(const Slots *s, int i) {
+    return (Element){
+        .law = {.flat_stiffness = s->flat_stiffness[i],
+                .line_stiffness = s->line_stiffness[i],
+                .cone_depth = s->cone_depth[i],
+                .inverse_cone_depth = s->inverse_cone_depth[i],
+                .mass_rate = s->mass_rate[i],
+                .drag_rate = s->drag_rate[i],
+                .bed_depth = s->bed_depth[i],
+                .bed_stiffness = s->bed_stiffness[i]},
+        .recovery = s->recovery[i],
+        .mu = s->mu[i],
+        .k_drift = s->k_drift[i],
+        .b_drift = s->b_drift[i],
+        .depth = s->depth[i],
+        .middle = s->middle[i],
+        .yield_depth = s->yield_depth[i],
+        .virgin_depth = s->virgin_depth[i],
+        .unload_stiffness = s->unload_stiffness[i],
+        .zero_depth = s->zero_depth[i],
+        .added_mass = s->added_mass[i],
+        .front_speed = s->front_speed[i],
+        .yield_speed = s->yield_speed[i],
+        .entry_speed = s->entry_speed[i],
+        .exit_drag = s->exit_drag[i],
+        .entry_drag = s->entry_drag[i],
+        .stop_drag = s->stop_drag[i],
+        .stop_growth = s->stop_growth[i],
+        .explicit_impulse = s->explicit_impulse[i],
+        .drift_bound = s->drift_bound[i],
+        .damping = s->damping[i],
+        .hold_x = s->hold_x[i],
+        .hold_y = s->hold_y[i],
+        .hold_stiffness = s->hold_stiffness[i],
+    };
+}
+
+/* What its element remembers of the step before. */
+ALWAYS_INLINE ElementMemory slot_memory(const Slots *s, int i) {
+    return (ElementMemory){
+        .depth_max = s->depth_max[i],
+        .middle = s->last_middle[i],
+        .front_speed = s->last_speed[i],
+        .drift = s->drift[i],
+        .pending_x = s->pending_x[i],
+        .pending_y = s->pending_y[i],
+        .held_x = s->held_x[i],
+        .held_y = s->held_y[i],
+        .held_stiffness = s->held_stiffness[i],
+    };
+}
+
+/* What element_begin has set. */
+ALWAYS_INLINE void slot_store(const Slots *s, int i, const Element *e) {
+    s->middle[i] = e->middle;
+    s->yield_depth[i] = e->yield_depth;
+    s->virgin_depth[i] = e->virgin_depth;
+    s->unload_stiffness[i] = e->unload_stiffness;
+    s->zero_depth[i] = e->zero_depth;
+    s->added_mass[i] = e->added_mass;
+    s->front_speed[i] = e->front_speed;
+    s->yield_speed[i] = e->yield_speed;
+    s->entry_speed[i] = e->entry_speed;
+    s->drift_bound[i] = e->drift_bound;
+    s->damping[i] = e->damping;
+    s->hold_x[i] = e->hold_x;
+    s->hold_y[i] = e->hold_y;
+    s->hold_stiffness[i] = e->hold_stiffness;
+}
+
+/* Velocity of a slot's element, x and y along the world's axes. `descent` is the speed w at which its
+ * depth u = h0(x, y) - z grows: w = slope . v_xy - v_z. */
+typedef struct {
+    double x, y;    /* [m/s] */
+    double descent; /* [m/s] */
+} SlotVelocity;
+
+/* uneven: bool, the ground slopes. A constant in a loop over slots. */
+ALWAYS_INLINE SlotVelocity slot_velocity(const Slots *s, int i, const Motion *motion, int uneven) {
+    SlotVelocity v;
+    v.x = motion_at(motion->x, s->x[i], s->y[i]);
+    v.y = motion_at(motion->y, s->x[i], s->y[i]);
+    v.descent = -motion_at(motion->z, s->x[i], s->y[i]);
+    if (uneven) {
+        v.descent += s->slope_x[i] * v.x + s->slope_y[i] * v.y;
+    }
+    return v;
+}
+
+#endif

@@ -1,0 +1,14 @@
+/* The two solvers of the step's equations V+ = V^ + A W(V+) (docs/model.md section 7). Both leave the
+ * impulses in the slots and the wrench in the scratch, and fill velocity, residual, iterations and
+ * converged of the result. */
+#ifndef MILD_GROUND_SOLVER_H
+#define MILD_GROUND_SOLVER_H
+
+#include "ground/scratch.h"
+
+/* Newton's method on the feet's twists. */
+void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result);
+/* The paper's Algorithm 1: sweeps over the elements. */
+void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result);
+
+#endif

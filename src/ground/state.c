@@ -1,0 +1,123 @@
+#include "ground/state.h"
+
+#include <string.h>
+
+#define MEMORY_DOUBLES 12
+
+int sole_padded(const MildSole *sole) {
+    return (mild_sole_elements(sole) + VECTOR_LANES - 1) / VECTOR_LANES * VECTOR_LANES;
+}
+
+static size_t foot_bytes(int32_t padded) {
+    return ((size_t)padded * (MEMORY_DOUBLES * sizeof(double) + sizeof(int32_t)) + 63) / 64 * 64;
+}
+
+static size_t feet_bytes(const int32_t *padded, int feet) {
+    size_t bytes = 0;
+    for (int f = 0; f < feet; f++) {
+        bytes += foot_bytes(padded[f]);
+    }
+    return bytes;
+}
+
+size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tiles) {
+    int32_t padded[MILD_FEET_MAX];
+    for (int f = 0; f < feet; f++) {
+        padded[f] = sole_padded(soles[f]);
+    }
+    return sizeof(MildGround) + feet_bytes(padded, feet) +
+           (imprints_bytes(imprints_round(tiles, MILD_PRINT_TILES_MAX)) + 63) / 64 * 64;
+}
+
+size_t mild_ground_bytes(const MildSole *const *soles, int feet) {
+    return mild_ground_bytes_prints(soles, feet, 0);
+}
+
+size_t mild_ground_size(const MildGround *ground) {
+    return sizeof(MildGround) + feet_bytes(ground->padded, ground->feet) +
+           (imprints_bytes(ground->tiles) + 63) / 64 * 64;
+}
+
+Memory ground_memory(const MildGround *ground, int foot) {
+    /* The one place where the block is seen as arrays; callers of a const ground only read through
+     * it. */
+    double *at =
+        (double *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground->padded, foot));
+    Memory memory;
+    double **arrays[] = {&memory.depth_max, &memory.middle,    &memory.front_speed,
+                         &memory.drift,     &memory.pending_x, &memory.pending_y,
+                         &memory.held_x,    &memory.held_y,    &memory.held_stiffness,
+                         &memory.plane,     &memory.slope_x,   &memory.slope_y};
+    for (int k = 0; k < MEMORY_DOUBLES; k++, at += ground->padded[foot]) {
+        *arrays[k] = at;
+    }
+    memory.material = (int32_t *)at;
+    return memory;
+}
+
+Imprints ground_imprints(const MildGround *ground) {
+    ImprintKey *keys = (ImprintKey *)((uintptr_t)ground + sizeof(MildGround) +
+                                      feet_bytes(ground->padded, ground->feet));
+    return (Imprints){keys, (uint16_t *)(keys + ground->tiles), ground->tiles,
+                      1.0 / ground->imprint_cell, ground->imprint_time};
+}
+
+MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, int feet,
+                                    int tiles) {
+    memset(block, 0, mild_ground_bytes_prints(soles, feet, tiles));
+    MildGround *ground = block;
+    ground->feet = feet;
+    for (int f = 0; f < feet; f++) {
+        ground->elements[f] = mild_sole_elements(soles[f]);
+        ground->padded[f] = sole_padded(soles[f]);
+    }
+    ground->tiles = imprints_round(tiles, MILD_PRINT_TILES_MAX);
+    ground->imprint_cell = 0.5 * mild_sole_pitch(soles[0]);
+    mild_ground_reset(ground);
+    return ground;
+}
+
+MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet) {
+    return mild_ground_init_prints(block, soles, feet, 0);
+}
+
+static void foot_forget(MildGround *ground, int foot) {
+    Memory memory = ground_memory(ground, foot);
+    size_t n = (size_t)ground->padded[foot];
+    memset(memory.depth_max, 0, MEMORY_DOUBLES * n * sizeof(double));
+    for (size_t i = 0; i < n; i++) {
+        memory.material[i] = MATERIAL_NONE;
+    }
+    ground->touched[foot] = 0;
+}
+
+void mild_ground_reset(MildGround *ground) {
+    for (int f = 0; f < ground->feet; f++) {
+        foot_forget(ground, f);
+    }
+    Imprints imprints = ground_imprints(ground);
+    imprints_clear(&imprints);
+    ground->imprint_time = 0;
+}
+
+const double *mild_ground_depth_max(const MildGround *ground, int foot) {
+    return ground_memory(ground, foot).depth_max;
+}
+
+void memory_forget(const Memory *memory, int e, int32_t material) {
+    memory->depth_max[e] = 0.0;
+    memory->middle[e] = 0.0;
+    memory->front_speed[e] = 0.0;
+    memory->drift[e] = 0.0;
+    memory->pending_x[e] = 0.0;
+    memory->pending_y[e] = 0.0;
+    memory->held_x[e] = 0.0;
+    memory->held_y[e] = 0.0;
+    memory->held_stiffness[e] = 0.0;
+    memory->material[e] = material;
+}
+
+double mild_ground_print_at(const MildGround *ground, double x, double y) {
+    Imprints imprints = ground_imprints(ground);
+    return imprints_depth(&imprints, x, y);
+}

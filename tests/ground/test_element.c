@@ -1,0 +1,111 @@
+/* The element's step in float, as a GPU runs it, against the same text in double. */
+#include "ground_kit.h"
+
+#define ELEMENT_STEP element_step_double
+#include "element_step.inc"
+#include "ground/material.h"
+
+#define ELEMENTS 500
+#define STEPS 20
+
+/* A float's number, so that both begin with the same. */
+static double rounded(double x) {
+    return (double)(float)x;
+}
+
+static void round_all(double *x, int count) {
+    for (int k = 0; k < count; k++) {
+        x[k] = rounded(x[k]);
+    }
+}
+
+/* A material and a motion of one element on it. */
+static ElementCase random_case(uint64_t *random) {
+    static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
+    MildMaterial m = kit_material(random);
+    Law law = law_of(&m, KIT_PITCH);
+    ElementCase c = {.recovery = rounded(m.recovery),
+                     .mu = rounded(m.mu),
+                     .k_drift = rounded(m.k_drift),
+                     .b_drift = rounded(m.b_drift),
+                     .dt = rounded(steps[kit_index(random, 3)]),
+                     .depth = rounded(kit_uniform(random, -0.001, 0.02)),
+                     .now = rounded(kit_uniform(random, -0.3, 0.7)),
+                     .gain = rounded(0.01)};
+    memcpy(c.law, &law, sizeof c.law);
+    round_all(c.law, ELEMENT_LAW);
+    return c;
+}
+
+/* Steps a random motion: the new velocity is the old one, disturbed or turned round. */
+static void case_push(ElementCase *c, uint64_t *random) {
+    double turn = kit_index(random, 6) == 0 ? -0.5 : 1.0, fast = kit_index(random, 3) ? 0.01 : 0.3;
+    for (int k = 0; k < 2; k++) {
+        c->after[k] = rounded(fast * kit_uniform(random, -1.0, 1.0));
+    }
+    c->after[2] = rounded(turn * c->now + kit_uniform(random, -0.05, 0.05));
+}
+
+static void case_move(ElementCase *c, const ElementResult *result) {
+    memcpy(c->memory, result->memory, sizeof c->memory);
+    round_all(c->memory, ELEMENT_MEMORY);
+    c->now = c->after[2];
+    c->depth = rounded(c->depth + c->dt * c->now);
+}
+
+/* Worst of |a - b| by |b| + scale. */
+static void worst_of(double *worst, double a, double b, double scale) {
+    *worst = fmax(*worst, fabs(a - b) / (fabs(b) + scale + 1e-12));
+}
+
+/* By the value itself and what the element carries at its yield: worst[4] of the normal impulse, the
+ * tangential one, their derivatives, the memory. */
+static void worst_of_step(double *worst, const ElementCase *c, const ElementResult *one,
+                          const ElementResult *two) {
+    const double load = c->dt * one->yield_force;            /* [N s] */
+    const double grip = (double)FRICTION_LAG * c->mu * load; /* [kg] */
+    const double scale[ELEMENT_RESULTS] = {load, load, load, load, grip, grip, grip};
+    static const int kind[ELEMENT_RESULTS] = {0, 2, 1, 1, 2, 2, 2};
+    for (int k = 0; k < ELEMENT_RESULTS; k++) {
+        worst_of(&worst[kind[k]], two->value[k], one->value[k], scale[k]);
+    }
+    for (int k = 0; k < ELEMENT_MEMORY; k++) {
+        const int held = k == 6 || k == 7; /* [N]; the others are lengths, speeds, a stiffness */
+        worst_of(&worst[3], two->memory[k], one->memory[k], held ? one->yield_force : 1e-3);
+    }
+}
+
+static void test_float(void **state) {
+    (void)state;
+    static const char *const names[4] = {"normal", "tangent", "derivatives", "memory"};
+    double worst[4] = {0.0};
+    int loaded = 0, total = 0;
+    for (int n = 0; n < ELEMENTS; n++) {
+        uint64_t random = 31u + (uint64_t)n * 1000003u;
+        ElementCase c = random_case(&random);
+        for (int s = 0; s < STEPS; s++, total++) {
+            ElementResult one, two;
+            case_push(&c, &random);
+            element_step_double(&c, &one);
+            element_step_float(&c, &two);
+            worst_of_step(worst, &c, &one, &two);
+            loaded += one.value[0] > 0.0;
+            case_move(&c, &one);
+        }
+    }
+    print_message("%d steps, %d loaded: float against double, worst relative", total, loaded);
+    for (int k = 0; k < 4; k++) {
+        print_message(", %s %.1e", names[k], worst[k]);
+    }
+    print_message("\n");
+    assert_int_equal(total, 10000);
+    assert_true(loaded > 3000);
+    for (int k = 0; k < 4; k++) {
+        assert_true(worst[k] < 1e-4);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_float)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
