@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/paths.h"
+#include "base/file.h"
 #include "base/text.h"
 
 enum { HELP_COLUMN = 28, HELP_WIDTH = 100 };
@@ -146,7 +146,7 @@ static int set_list(const CliCommand *command, const CliOption *option, const ch
 /* Trials of an hour must not end at a folder that is not there. */
 static int set_output(const CliCommand *command, const CliOption *option, const char *path) {
     MildError error = {0};
-    if (strcmp(path, "-") != 0 && path_check_write(path, &error) != MILD_OK) {
+    if (strcmp(path, "-") != 0 && file_check_write(path, &error) != MILD_OK) {
         return cli_fail_text(command->name, "--%s: %s", option->name, error.text);
     }
     *(const char **)option->target = path;
@@ -156,7 +156,9 @@ static int set_output(const CliCommand *command, const CliOption *option, const 
 static int set_option(const CliCommand *command, const CliOption *option, const char *text) {
     switch (option->type) {
     case CLI_FLAG: *(int *)option->target = 1; return 0;
-    case CLI_TEXT: *(const char **)option->target = text; return 0;
+    case CLI_TEXT:
+    case CLI_INPUT:
+    case CLI_OUTPUT_LATER: *(const char **)option->target = text; return 0;
     case CLI_OUTPUT: return set_output(command, option, text);
     case CLI_INT: return set_int(command, option, text);
     case CLI_UINT64:
@@ -256,6 +258,89 @@ static int take_word(const CliCommand *command, int argc, char **argv, int *inde
     return 0;
 }
 
+/* ---- files ---- */
+
+static const char *option_file(const CliOption *option) {
+    return option->type == CLI_INPUT || option->type == CLI_OUTPUT ||
+                   option->type == CLI_OUTPUT_LATER
+               ? *(const char *const *)option->target
+               : NULL;
+}
+
+static int fail_overwrite(const CliCommand *command, const CliOption *option, const char *output,
+                          const char *input) {
+    return cli_fail_text(command->name,
+                         "--%s: %.150s would be written over, but it is read too (%.80s); name "
+                         "another file",
+                         option->name, output, input);
+}
+
+/* Whether `output`, which the option makes, is a file that the command reads. */
+static int check_output(const CliCommand *command, const CliArgs *args, const CliOption *option,
+                        const char *output) {
+    for (int i = 0; i < command->option_count; i++) {
+        const CliOption *other = &command->options[i];
+        const char *input = other->type == CLI_INPUT ? option_file(other) : NULL;
+        if (input && file_same(output, input)) {
+            char name[64];
+            snprintf(name, sizeof name, "--%s", other->name);
+            return fail_overwrite(command, option, output, name);
+        }
+    }
+    for (int i = 0; command->positional_input && i < args->positional_count; i++) {
+        if (file_same(output, args->positional[i])) {
+            return fail_overwrite(command, option, output, args->positional[i]);
+        }
+    }
+    for (int i = 0; i < args->override_count; i++) { /* the image of a terrain, for one */
+        const char *equals = strchr(args->overrides[i], '=');
+        if (equals && file_same(output, equals + 1)) {
+            return fail_overwrite(command, option, output, args->overrides[i]);
+        }
+    }
+    return 0;
+}
+
+static int check_numbers(const CliCommand *command, const CliArgs *args, const CliOption *option,
+                         const char *picture) {
+    char numbers[PATH_SIZE];
+    MildError error = {0};
+    if (!command->picture || strcmp(command->picture, option->name) != 0) {
+        return 0;
+    }
+    if (path_beside(picture, command->numbers, numbers, &error) != MILD_OK) {
+        return cli_fail(command->name, &error);
+    }
+    return check_output(command, args, option, numbers);
+}
+
+/* Every output against every input and the outputs before it. */
+static int check_files(const CliCommand *command, const CliArgs *args) {
+    for (int i = 0; i < command->option_count; i++) {
+        const CliOption *option = &command->options[i];
+        const char *output = option->type == CLI_INPUT ? NULL : option_file(option);
+        if (!output) {
+            continue;
+        }
+        int bad = check_output(command, args, option, output);
+        if (!bad) {
+            bad = check_numbers(command, args, option, output);
+        }
+        for (int k = 0; k < i && !bad; k++) {
+            const CliOption *other = &command->options[k];
+            if (other->type != CLI_INPUT && option_file(other) &&
+                file_same(output, option_file(other))) {
+                bad = cli_fail_text(command->name, "--%s and --%s name the same file, %.200s",
+                                    other->name, option->name, output);
+            }
+        }
+        if (bad) {
+            return bad;
+        }
+    }
+    return 0;
+}
+
 CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args) {
     args->positional_count = args->override_count = 0;
     for (int i = 1; i < argc; i++) {
@@ -269,5 +354,5 @@ CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *
             return CLI_BAD;
         }
     }
-    return CLI_RUN;
+    return check_files(command, args) ? CLI_BAD : CLI_RUN;
 }

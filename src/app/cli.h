@@ -19,13 +19,17 @@ typedef struct {
     char name[CLI_LIST_MAX][64];
 } CliNames; /* "rubber,foam45" */
 
-/* target: FLAG int *, TEXT const char **, OUTPUT the same (a file to be written, or `-`; refused at
- * once when it cannot be), INT int *, UINT64 uint64_t *, NUMBER double *, NUMBERS CliNumbers *,
- * NAMES CliNames *. What the target holds before parsing is the default. */
+/* target: FLAG int *, TEXT const char **, INT int *, UINT64 uint64_t *, NUMBER double *, NUMBERS
+ * CliNumbers *, NAMES CliNames *. What the target holds before parsing is the default.
+ * Files are const char ** too. INPUT: read. OUTPUT: written, or `-`; refused at once when it cannot
+ * be written. OUTPUT_LATER: written; the command makes its folder and checks it. No output may be
+ * an input, nor another output. */
 typedef enum {
     CLI_FLAG,
     CLI_TEXT,
+    CLI_INPUT,
     CLI_OUTPUT,
+    CLI_OUTPUT_LATER,
     CLI_INT,
     CLI_UINT64,
     CLI_NUMBER,
@@ -37,7 +41,7 @@ typedef struct {
     const char *name; /* without the dashes */
     CliType type;
     void *target;
-    double min, max; /* inclusive, for each number; ignored for FLAG, TEXT, OUTPUT, NAMES, UINT64 */
+    double min, max; /* inclusive, for each number; ignored for FLAG, texts, files, NAMES, UINT64 */
     const char *value; /* what stands for the value in the help: "NAME[,NAME]"; NULL for a flag */
     const char *help;  /* with unit and default */
 } CliOption;
@@ -51,6 +55,9 @@ typedef struct {
     const char *overrides; /* help on --section.key=value; NULL: the command takes none */
     const char *examples;  /* whole lines, or NULL */
     int positional_max;    /* words without dashes */
+    int positional_input;  /* bool: those words are files that are read */
+    const char *picture;   /* option whose file has its numbers beside it; NULL: none */
+    const char *numbers;   /* end of their file's name, in place of the picture's ".png" */
 } CliCommand;
 
 typedef struct {

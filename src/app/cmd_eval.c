@@ -183,8 +183,9 @@ int cmd_eval(int argc, char **argv) {
     strcpy(e->grounds.name[1], "foam45");
     strcpy(e->grounds.name[2], "sand_loose");
     const CliOption options[] = {
-        {"policy", CLI_TEXT, &e->policy, 0, 0, "FILE", "policy to try (policies/mild.safetensors)"},
-        {"config", CLI_TEXT, &e->config, 0, 0, "FILE",
+        {"policy", CLI_INPUT, &e->policy, 0, 0, "FILE",
+         "policy to try (policies/mild.safetensors)"},
+        {"config", CLI_INPUT, &e->config, 0, 0, "FILE",
          "config the policy was trained with, for its [task]"},
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
          "grounds, a row each; rubber+foam45 is a course of both (rigid,foam45,sand_loose)"},

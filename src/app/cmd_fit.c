@@ -9,7 +9,7 @@
 #include "app/figure.h"
 #include "app/grounds.h"
 #include "app/report.h"
-#include "base/paths.h"
+#include "base/file.h"
 #include "base/text.h"
 #include "lab/fit_csv.h"
 #include "lab/press.h"
@@ -28,6 +28,9 @@ typedef struct {
     int first[CLI_LIST_MAX + 1]; /* of each file, in points */
     FitResult result;
 } FitWork;
+
+/* Never the name of a record: grass.png is drawn from grass_fit.csv, not from grass.csv. */
+#define NUMBERS_END "_fit.csv"
 
 static const char *const units[FIT_PARAMETERS] = {"N/m", "N/m^3", "rad", "-", "-", "-"};
 
@@ -72,6 +75,9 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
                     "  mild fit slow.csv fast.csv --plate 0.2,0.1 --fit k_pen,sigma_cone,alpha,c_d "
                     "--json out.json\n",
         .positional_max = CLI_LIST_MAX,
+        .positional_input = 1,
+        .picture = "figure",
+        .numbers = NUMBERS_END,
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     if (outcome == CLI_BAD) {
@@ -126,34 +132,6 @@ static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitDe
     def->elements = mild_sole_elements(plate); /* press's own raster */
     def->pitch = mild_sole_pitch(plate);
     mild_sole_destroy(plate);
-    return MILD_OK;
-}
-
-/* "runs/a.png" -> "runs/a_fit.csv": never the name of a record such as runs/a.csv. */
-static MildStatus figure_data(const char *figure, char data[PATH_SIZE], MildError *error) {
-    const char *dot = strrchr(figure, '.'), *slash = strrchr(figure, '/');
-    int stem = dot && (!slash || dot > slash) ? (int)(dot - figure) : (int)strlen(figure);
-    if (snprintf(data, PATH_SIZE, "%.*s_fit.csv", stem, figure) < PATH_SIZE) {
-        return MILD_OK;
-    }
-    return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", figure);
-}
-
-/* What would be written over what is read. */
-static MildStatus outputs_check(const FitOptions *options, const CliArgs *args, MildError *error) {
-    char data[PATH_SIZE] = "";
-    if (options->figure && figure_data(options->figure, data, error) != MILD_OK) {
-        return error->status;
-    }
-    for (int i = 0; i < args->positional_count; i++) {
-        const char *record = args->positional[i];
-        if (strcmp(record, data) == 0 || (options->json && strcmp(record, options->json) == 0) ||
-            (options->figure && strcmp(record, options->figure) == 0)) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT,
-                             "%.200s is a record and would be written over; name another file",
-                             record);
-        }
-    }
     return MILD_OK;
 }
 
@@ -256,7 +234,7 @@ static MildStatus data_write(const FitWork *work, const CliArgs *args, const cha
     if (fclose(memory) != 0) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
     } else {
-        status = path_write(path, text, size, error);
+        status = file_write(path, text, size, error);
     }
     free(text);
     return status;
@@ -265,7 +243,7 @@ static MildStatus data_write(const FitWork *work, const CliArgs *args, const cha
 static MildStatus figure_save(const FitWork *work, const CliArgs *args, const char *figure,
                               MildError *error) {
     char data[PATH_SIZE];
-    MildStatus status = figure_data(figure, data, error);
+    MildStatus status = path_beside(figure, NUMBERS_END, data, error);
     if (status == MILD_OK) {
         status = data_write(work, args, data, error);
     }
@@ -323,9 +301,6 @@ int cmd_fit(int argc, char **argv) {
     MildError error;
     FitWork work = {0};
     MildStatus status = def_make(&options, &args, &work.def, &error);
-    if (status == MILD_OK) {
-        status = outputs_check(&options, &args, &error);
-    }
     if (status == MILD_OK) {
         status = fit_report(&options, &args, &work, &error);
     }

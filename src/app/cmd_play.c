@@ -11,7 +11,7 @@
 #include "app/grounds.h"
 #include "app/play.h"
 #include "app/progress.h"
-#include "base/paths.h"
+#include "base/file.h"
 #include "config/config.h"
 #include "config/experiment_keys.h"
 
@@ -80,7 +80,7 @@ static MildStatus make_place(const char *path, MildError *error) {
         *slash = '\0';
         status = path_make_folder(folder, error);
     }
-    return status == MILD_OK ? path_check_write(path, error) : status;
+    return status == MILD_OK ? file_check_write(path, error) : status;
 }
 
 static MildStatus make_view(Command *c, const char *xml, MildError *error) {
@@ -142,12 +142,11 @@ static void print_table(const Command *c) {
 /* The CSV beside the picture; a name ending in .csv wants no picture. */
 static MildStatus save_pressure(const Command *c, MildError *error) {
     char data[PATH_SIZE], names[MILD_MATERIALS_MAX][96];
-    const char *labels[MILD_MATERIALS_MAX], *dot = strrchr(c->pressure, '.');
-    const char *slash = strrchr(c->pressure, '/');
-    int any = 0,
-        stem = dot && (!slash || dot > slash) ? (int)(dot - c->pressure) : (int)strlen(c->pressure);
-    if (snprintf(data, sizeof data, "%.*s.csv", stem, c->pressure) >= (int)sizeof data) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", c->pressure);
+    const char *labels[MILD_MATERIALS_MAX];
+    int any = 0;
+    MildStatus status = path_beside(c->pressure, ".csv", data, error);
+    if (status != MILD_OK) {
+        return status;
     }
     for (int i = 0; i < c->grounds.count; i++) {
         int repeat = 1;
@@ -162,7 +161,7 @@ static MildStatus save_pressure(const Command *c, MildError *error) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "%s: the robot took no step, there is nothing to draw", c->pressure);
     }
-    MildStatus status = pressure_write(c->play.pressure, data, labels, error);
+    status = pressure_write(c->play.pressure, data, labels, error);
     if (status == MILD_OK && strcmp(data, c->pressure) != 0) {
         status = figure_draw("scripts/pressure.py", data, c->pressure, error);
     }
@@ -279,7 +278,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     char model_help[200];
     const CliOption options[] = {
-        {"policy", CLI_TEXT, &c->policy, 0, 0, "FILE",
+        {"policy", CLI_INPUT, &c->policy, 0, 0, "FILE",
          "policy to watch (policies/mild.safetensors)"},
         {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]",
          "ground, or several crossed in order (sand_loose)"},
@@ -287,16 +286,16 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
          grounds_model_help(model_help, sizeof model_help)},
         {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L",
          "[m] length of each ground of a course (2)"},
-        {"video", CLI_TEXT, &c->video, 0, 0, "FILE.mp4",
+        {"video", CLI_OUTPUT_LATER, &c->video, 0, 0, "FILE.mp4",
          "film it; without this and --pressure a window opens"},
-        {"pressure", CLI_TEXT, &c->pressure, 0, 0, "FILE.png",
+        {"pressure", CLI_OUTPUT_LATER, &c->pressure, 0, 0, "FILE.png",
          "sole pressure per ground: a picture and its numbers as CSV beside it"},
         {"speed", CLI_NUMBER, &c->play.speed, -1.3, 1.3, "V",
          "[m/s] commanded forward speed (0.6)"},
         {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
          "[s] length of the walk; 0: long enough for the course (0)"},
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S", "start and sensor noise (1)"},
-        {"config", CLI_TEXT, &c->config, 0, 0, "FILE",
+        {"config", CLI_INPUT, &c->config, 0, 0, "FILE",
          "config the policy was trained with, for its [task]"},
         {"width", CLI_INT, &c->width, 64, 7680, "N", "[pixels] (960)"},
         {"height", CLI_INT, &c->height, 64, 4320, "N", "[pixels] (540)"},
@@ -312,6 +311,8 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
                    "mouse turns the camera, Esc quits. Afterwards a table: a row for each ground.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
+        .picture = "pressure",
+        .numbers = ".csv",
         .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "
                      "--terrain.kind=waves --terrain.memory=true",
         .examples = "  mild play --ground rubber,foam45,sand_loose --video out/walk.mp4 --pressure "

@@ -7,7 +7,7 @@
 #include "app/commands.h"
 #include "app/figure.h"
 #include "app/grounds.h"
-#include "base/paths.h"
+#include "base/file.h"
 #include "base/text.h"
 #include "lab/press.h"
 #include "robot/robot.h"
@@ -139,7 +139,7 @@ static MildStatus csv_write(const PressResult *result, int more, const char *pat
     if (!text) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
     } else if (strcmp(path, "-") != 0) {
-        status = path_write(path, text, size, error);
+        status = file_write(path, text, size, error);
     } else if (fwrite(text, 1, size, stdout) != size || fflush(stdout) != 0) {
         status = mild_fail(error, MILD_ERROR_IO, "cannot write to standard output");
     }
@@ -151,16 +151,14 @@ static MildStatus csv_write(const PressResult *result, int more, const char *pat
 static MildStatus figure_save(const PressOptions *options, const PressResult *result, int more,
                               MildError *error) {
     char data[PATH_SIZE];
-    const char *figure = options->figure, *dot = strrchr(figure, '.'),
-               *slash = strrchr(figure, '/');
-    int stem = dot && (!slash || dot > slash) ? (int)(dot - figure) : (int)strlen(figure);
+    const char *figure = options->figure;
     if (options->csv && strcmp(options->csv, "-") != 0) {
         return figure_draw("scripts/press.py", options->csv, figure, error);
     }
-    if (snprintf(data, PATH_SIZE, "%.*s.csv", stem, figure) >= PATH_SIZE) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", figure);
+    MildStatus status = path_beside(figure, ".csv", data, error);
+    if (status == MILD_OK) {
+        status = csv_write(result, more, data, error);
     }
-    MildStatus status = csv_write(result, more, data, error);
     return status == MILD_OK ? figure_draw("scripts/press.py", data, figure, error) : status;
 }
 
@@ -343,6 +341,8 @@ static CliOutcome options_parse(const CliOption *table, int count, int argc, cha
         .overrides = "any key of sections [ground] and [terrain], e.g. --ground.k_pen=500 "
                      "--terrain.kind=waves; `mild info grounds` lists the first",
         .examples = examples,
+        .picture = "figure",
+        .numbers = ".csv",
     };
     return cli_parse(&command, argc, argv, args);
 }

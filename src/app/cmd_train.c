@@ -7,7 +7,7 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/progress.h"
-#include "base/paths.h"
+#include "base/file.h"
 #include "config/experiment_keys.h"
 #include "train/run.h"
 
@@ -35,6 +35,19 @@ static void write_note(Command *run, const CliArgs *args) {
         snprintf(run->note + used, (size_t)(size - used), ", seed %" PRIu64 ", version %s",
                  run->def.train.seed, build_version());
     }
+}
+
+/* A new run writes its whole config into its folder. */
+static MildStatus check_config_kept(const Command *run, MildError *error) {
+    char path[PATH_SIZE];
+    if (run->resume || !run->config || path_join(run->out, "config.ini", path, NULL) != MILD_OK ||
+        !file_same(run->config, path)) {
+        return MILD_OK;
+    }
+    return mild_fail(error, MILD_ERROR_ARGUMENT,
+                     "--config: %.150s would be written over by the new run; copy it out of the "
+                     "run folder, or choose another --out",
+                     run->config);
 }
 
 /* A resumed run keeps the config it began with; --config and overrides still change it. */
@@ -135,6 +148,9 @@ static MildStatus train(const Command *command, MildError *error) {
 static MildStatus prepare_and_train(Command *run, const CliArgs *args, MildError *error) {
     MildStatus status = train_run_check_folder(run->out, run->resume, error);
     if (status == MILD_OK) {
+        status = check_config_kept(run, error);
+    }
+    if (status == MILD_OK) {
         status = read_config(run, args, error);
     }
     if (status == MILD_OK) {
@@ -153,7 +169,7 @@ int cmd_train(int argc, char **argv) {
         return cli_fail_text("train", "out of memory");
     }
     const CliOption options[] = {
-        {"config", CLI_TEXT, &run->config, 0, 0, "FILE.ini",
+        {"config", CLI_INPUT, &run->config, 0, 0, "FILE.ini",
          "what to change of configs/default.ini"},
         {"out", CLI_TEXT, &run->out, 0, 0, "FOLDER",
          "run folder: config, log, checkpoints, policy.safetensors"},

@@ -87,7 +87,8 @@ static atomic_int interrupted;
 
 static void *wait_for_signals(void *signals) {
     for (int signal_number; sigwait(signals, &signal_number) == 0;) {
-        if (atomic_exchange(&interrupted, 1)) {
+        int before = atomic_exchange(&interrupted, 1);
+        if (before && signal_number != SIGHUP) { /* a closing terminal may hang up twice */
             _exit(128 + signal_number);
         }
     }
@@ -97,9 +98,13 @@ static void *wait_for_signals(void *signals) {
 void interrupt_install(void) {
     static sigset_t signals;
     pthread_t thread;
+    struct sigaction hangup;
     sigemptyset(&signals);
     sigaddset(&signals, SIGINT);
     sigaddset(&signals, SIGTERM);
+    if (sigaction(SIGHUP, NULL, &hangup) == 0 && hangup.sa_handler != SIG_IGN) {
+        sigaddset(&signals, SIGHUP); /* the terminal was closed; ignored under nohup */
+    }
     pthread_sigmask(SIG_BLOCK, &signals, NULL);
     if (pthread_create(&thread, NULL, wait_for_signals, &signals) == 0) {
         pthread_detach(thread);

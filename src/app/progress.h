@@ -20,8 +20,8 @@ void progress_show(Progress *progress, double share, const char *format, ...);
 /* Shows the last state however recent the line before it was, and ends the line. */
 void progress_end(Progress *progress, const char *format, ...);
 
-/* From now on the first Ctrl-C (or SIGTERM) only sets the flag, a second one ends the program at
- * once. Call it before any other thread is made. */
+/* From now on the first Ctrl-C (or SIGTERM, or SIGHUP from a terminal that closes) only sets the
+ * flag; a second Ctrl-C or SIGTERM ends the program at once. Call it before any other thread is made. */
 void interrupt_install(void);
 int interrupt_requested(void);
 

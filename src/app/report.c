@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/paths.h"
+#include "base/file.h"
 
 MildStatus report_save(cJSON *root, const char *path, MildError *error) {
     char *text = root ? cJSON_Print(root) : NULL;
@@ -18,7 +18,7 @@ MildStatus report_save(cJSON *root, const char *path, MildError *error) {
     strcpy(line + length, "\n");
     MildStatus status = MILD_OK;
     if (strcmp(path, "-") != 0) {
-        status = path_write(path, line, length + 1, error);
+        status = file_write(path, line, length + 1, error);
     } else if (fputs(line, stdout) < 0) {
         status = mild_fail(error, MILD_ERROR_IO, "cannot write to standard output");
     }

@@ -1,11 +1,11 @@
 #include "config/config.h"
 
 #include <ctype.h>
-#include <errno.h>
 #include <ini.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/file.h"
 #include "base/text.h"
 
 enum { SECTIONS_MAX = 16, FILE_MAX = 1 << 20, VALUE_MAX = 512, WHERE_MAX = 160, TEXT_MAX = 150 };
@@ -244,37 +244,18 @@ MildStatus config_read_text(const ConfigSection *sections, int count, const char
     return reader.status;
 }
 
-/* The file as text, or NULL with *error filled. */
-static char *file_text(const char *path, MildError *error) {
-    FILE *file = fopen(path, "rb");
-    if (!file) {
-        mild_fail(error, MILD_ERROR_IO, "%s: cannot read config: %s", path, strerror(errno));
-        return NULL;
-    }
-    char *text = malloc(FILE_MAX + 1);
-    size_t size = text ? fread(text, 1, FILE_MAX + 1, file) : 0;
-    int failed = ferror(file);
-    fclose(file);
-    const char *reason = !text                      ? "out of memory"
-                         : failed                   ? "cannot read config (is it a folder?)"
-                         : size > FILE_MAX          ? "larger than 1 MiB: this is no config"
-                         : memchr(text, '\0', size) ? "holds binary data: this is no config"
-                                                    : NULL;
-    if (reason) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", path, reason);
-        free(text);
-        return NULL;
-    }
-    text[size] = '\0';
-    return text;
-}
-
 MildStatus config_read(const ConfigSection *sections, int count, const char *path, int complete,
                        MildError *error) {
     MildError cause = {0};
-    char *text = file_text(path, &cause);
+    size_t size;
+    char *text = file_read(path, FILE_MAX, &size, &cause);
     if (!text) {
         return mild_fail(error, cause.status, "%s", cause.text);
+    }
+    if (memchr(text, '\0', size)) {
+        free(text);
+        return mild_fail(error, MILD_ERROR_FORMAT, "%.200s: holds binary data, so it is no config",
+                         path);
     }
     MildStatus status = config_read_text(sections, count, text, path, complete, error);
     free(text);

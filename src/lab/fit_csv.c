@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/file.h"
 #include "base/text.h"
 
 enum { CSV_COLUMNS_MAX = 256, CSV_LINE_MAX = 65536 };
@@ -20,8 +21,7 @@ static const char *const column_units[CSV_COLUMNS] = {"metres, positive down", "
 typedef struct {
     const char *path;
     FILE *file;
-    char *line;
-    size_t size;
+    char *line;              /* [CSV_LINE_MAX + 1] */
     int number;              /* of the line, from 1 */
     int columns;             /* in the header */
     int column[CSV_COLUMNS]; /* place in the line, -1: absent */
@@ -39,24 +39,40 @@ static char *trim(char *text) {
     return text;
 }
 
+/* Reads a line of at most CSV_LINE_MAX characters into csv->line and ends it with '\0': its length
+ * with the newline, 0 at the end of the file, -1 for a line that is longer or holds a '\0'. */
+static int csv_read_line(Csv *csv) {
+    int length = 0, c = 0;
+    while (c != '\n' && (c = getc_unlocked(csv->file)) != EOF) {
+        if (c == '\0' || length == CSV_LINE_MAX) {
+            return -1;
+        }
+        csv->line[length++] = (char)c;
+    }
+    csv->line[length] = '\0';
+    return length;
+}
+
 /* The next line that is neither empty nor a remark (#), trimmed; NULL at the end, with *status
  * telling why. */
 static char *csv_line(Csv *csv, MildStatus *status, MildError *error) {
     *status = MILD_OK;
     for (;;) {
-        ssize_t length = getline(&csv->line, &csv->size, csv->file);
-        if (length < 0 && ferror(csv->file)) {
+        int length = csv_read_line(csv);
+        if (ferror(csv->file)) {
             *status = mild_fail(error, MILD_ERROR_IO, "%.200s: cannot read: %s", csv->path,
                                 strerror(errno));
+            return NULL;
         }
-        if (length < 0) {
+        if (length == 0) {
             return NULL;
         }
         csv->number++;
-        if (length > CSV_LINE_MAX || strlen(csv->line) != (size_t)length) {
+        if (length < 0) {
             *status = mild_fail(error, MILD_ERROR_FORMAT,
-                                "%.200s:%d: not a line of text; a CSV with a header line is needed",
-                                csv->path, csv->number);
+                                "%.200s:%d: not a line of text of at most %d characters; a CSV "
+                                "with a header line is needed",
+                                csv->path, csv->number, CSV_LINE_MAX);
             return NULL;
         }
         char *text =
@@ -237,8 +253,11 @@ static MildStatus csv_loading(const Csv *csv, FitPoint *points, int rows, int *k
 
 MildStatus fit_csv_read_file(FILE *file, const char *name, FitPoint **points, int *count,
                              MildError *error) {
-    Csv csv = {.path = name, .file = file, .time = -INFINITY};
+    Csv csv = {.path = name, .file = file, .line = malloc(CSV_LINE_MAX + 1), .time = -INFINITY};
     int first = *count, rows = 0;
+    if (!csv.line) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", name);
+    }
     MildStatus status = csv_header(&csv, error);
     if (status == MILD_OK) {
         status = csv_rows(&csv, points, count, error);
@@ -252,11 +271,12 @@ MildStatus fit_csv_read_file(FILE *file, const char *name, FitPoint **points, in
 }
 
 MildStatus fit_csv_read(const char *path, FitPoint **points, int *count, MildError *error) {
-    FILE *file = fopen(path, "r");
+    MildError cause = {0};
+    FILE *file = file_open(path, &cause);
     if (!file) {
-        return mild_fail(error, MILD_ERROR_IO,
-                         "%.200s: cannot open: %s; `mild press --csv FILE` writes such a record",
-                         path, strerror(errno));
+        return mild_fail(error, cause.status, "%.300s%s", cause.text,
+                         cause.status == MILD_ERROR_IO ? "; `mild press --csv FILE` writes a record"
+                                                       : "");
     }
     MildStatus status = fit_csv_read_file(file, path, points, count, error);
     fclose(file);

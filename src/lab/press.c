@@ -139,11 +139,13 @@ static PressRow press_row(const Press *press) {
 static MildStatus rows_add(PressResult *result, PressRow row, MildError *error) {
     if (result->count == result->room) {
         int room = 2 * result->room + 2 * WAY_STEPS + 1;
-        PressRow *more =
-            result->count < ROWS_MAX ? realloc(result->rows, sizeof *more * (size_t)room) : NULL;
+        if (result->count >= ROWS_MAX) {
+            return mild_fail(error, MILD_ERROR_RANGE,
+                             "press: more than %d rows; take fewer or longer steps", ROWS_MAX);
+        }
+        PressRow *more = realloc(result->rows, sizeof *more * (size_t)room);
         if (!more) {
-            return mild_fail(error, MILD_ERROR_MEMORY,
-                             "press: too many rows; take fewer or longer steps");
+            return mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory for %d rows", room);
         }
         result->rows = more;
         result->room = room;

@@ -73,18 +73,31 @@ void policy_file_texts(const Network *network, const char *kind, const char *not
     }
 }
 
+static MildStatus missing_key(const char *path, const char *key, MildError *error) {
+    return mild_fail(error, MILD_ERROR_FORMAT,
+                     "%s: its metadata key '%s' is missing; give a policy or checkpoint that "
+                     "`mild train` wrote",
+                     path, key);
+}
+
 MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef *def,
                            MildError *error) {
     const char *kind = safetensors_text(file, "kind"), *version = safetensors_text(file, "version");
-    if (!kind || (strcmp(kind, POLICY_KIND) != 0 && strcmp(kind, POLICY_CHECKPOINT_KIND) != 0)) {
+    if (!kind) {
+        return missing_key(path, "kind", error);
+    }
+    if (!version) {
+        return missing_key(path, "version", error);
+    }
+    if (strcmp(kind, POLICY_KIND) != 0 && strcmp(kind, POLICY_CHECKPOINT_KIND) != 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%s: holds no policy of mild; give a file that `mild train` wrote", path);
     }
-    if (!version || strcmp(version, POLICY_FILE_VERSION) != 0) {
+    if (strcmp(version, POLICY_FILE_VERSION) != 0) {
         return mild_fail(
             error, MILD_ERROR_FORMAT,
             "%s: has file version %.20s, this program reads version " POLICY_FILE_VERSION, path,
-            version ? version : "(none)");
+            version);
     }
     *def = policy_def_default();
     for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
@@ -93,10 +106,12 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
         snprintf(key, sizeof key, "policy.%s", field->name);
         const char *text = safetensors_text(file, key);
         MildError inner = {0};
-        if (!text || mild_field_parse(field, def, text, "policy", &inner)) {
+        if (!text) {
+            return missing_key(path, key, error);
+        }
+        if (mild_field_parse(field, def, text, "policy", &inner)) {
             return mild_fail(error, MILD_ERROR_FORMAT,
-                             "%s: %.200s; the file is of no use to this program", path,
-                             text ? inner.text : key);
+                             "%s: %.200s; this program cannot use the file", path, inner.text);
         }
     }
     return MILD_OK;
@@ -168,8 +183,8 @@ Policy *policy_file_policy(const Safetensors *file, const char *path, MildError 
         return NULL;
     }
     if (network_layout(&network, &def, &inner)) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: %.200s; the file is of no use to this program",
-                  path, inner.text);
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: %.200s; this program cannot use the file", path,
+                  inner.text);
         return NULL;
     }
     size_t bytes = 0;

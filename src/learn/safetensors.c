@@ -2,19 +2,18 @@
 
 #include <cjson/cJSON.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
+
+#include "base/file.h"
 
 #define HEADER_MAX (1u << 20)
 #define TENSORS_MAX 1024
 #define PREFIX 8 /* bytes of the header's length */
 #define CRC_KEY "\"crc32\":\""
 #define CRC_DIGITS 8
-#define DAMAGED "the file is damaged or cut short; take an older checkpoint or copy it again"
+#define DAMAGED "the file is damaged or cut short; use an older checkpoint or copy it again"
 
 struct Safetensors {
     unsigned char *bytes;
@@ -157,71 +156,13 @@ static unsigned char *assemble(const char *header, const Safetensor *tensors, in
     return bytes;
 }
 
-/* 0, or the errno of what failed. */
-static int write_all(const char *path, const unsigned char *bytes, size_t size) {
-    int file = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0666);
-    if (file < 0) {
-        return errno;
-    }
-    int failed = 0;
-    for (size_t done = 0; done < size && !failed;) {
-        ssize_t count = write(file, bytes + done, size - done);
-        failed = count >= 0 || errno == EINTR ? 0 : errno;
-        done += count > 0 ? (size_t)count : 0;
-    }
-    if (!failed && fsync(file)) {
-        failed = errno;
-    }
-    if (close(file) && !failed) {
-        failed = errno;
-    }
-    return failed;
-}
-
-/* A rename is on the disk only once its folder is; a file system that cannot flush folders loses
- * nothing by it. */
-static void flush_folder(const char *path, char *work) {
-    const char *slash = strrchr(path, '/');
-    size_t length = slash ? (size_t)(slash - path) + 1 : 0;
-    memcpy(work, path, length);
-    memcpy(work + length, ".", 2);
-    int folder = open(work, O_RDONLY);
-    if (folder >= 0) {
-        fsync(folder);
-        close(folder);
-    }
-}
-
-static MildStatus replace_file(const char *path, const unsigned char *bytes, size_t size,
-                               MildError *error) {
-    char *temporary = malloc(strlen(path) + 8);
-    if (!temporary) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to write it", path);
-    }
-    sprintf(temporary, "%s.tmp", path);
-    int failed = write_all(temporary, bytes, size);
-    if (!failed && rename(temporary, path)) {
-        failed = errno;
-    }
-    if (failed) {
-        unlink(temporary);
-    } else {
-        flush_folder(path, temporary);
-    }
-    free(temporary);
-    return failed ? mild_fail(error, MILD_ERROR_IO,
-                              "%s: cannot be written (%s); what was there before is unchanged",
-                              path, strerror(failed))
-                  : MILD_OK;
-}
-
 MildStatus safetensors_write(const char *path, const Safetensor *tensors, int tensor_count,
                              const SafetensorsText *texts, int text_count, MildError *error) {
     char *header = make_header(tensors, tensor_count, texts, text_count);
     size_t size = 0;
     unsigned char *bytes = header ? assemble(header, tensors, tensor_count, &size) : NULL;
     MildStatus status =
-        bytes ? replace_file(path, bytes, size, error)
+        bytes ? file_write(path, bytes, size, error)
               : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to write it", path);
     cJSON_free(header);
     free(bytes);
@@ -364,13 +305,15 @@ Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *pa
     }
     size_t length = (size_t)header_length(bytes);
     const char *end = NULL;
+    errno = 0;
     cJSON *header = cJSON_ParseWithLengthOpts((const char *)bytes + PREFIX, length, &end, 0);
+    int no_memory = !header && errno == ENOMEM;
     int count = cJSON_IsObject(header) ? cJSON_GetArraySize(header) : -1;
     int readable = count >= 0 && count <= TENSORS_MAX;
     Safetensors *file =
         readable ? calloc(1, sizeof *file + (size_t)count * sizeof(Safetensor)) : NULL;
     if (!file) {
-        if (readable) {
+        if (readable || no_memory) {
             mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
         } else {
             damaged(path, "its header cannot be read", error);
@@ -392,39 +335,10 @@ Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *pa
     return file;
 }
 
-/* The whole file (from malloc), or NULL. */
-static unsigned char *read_all(const char *path, size_t *size, MildError *error) {
-    struct stat about;
-    int file = open(path, O_RDONLY);
-    if (file < 0 || fstat(file, &about) || !S_ISREG(about.st_mode)) {
-        mild_fail(error, MILD_ERROR_IO, "%s: cannot be opened (%s); check the path", path,
-                  file < 0 ? strerror(errno) : "not a plain file");
-        if (file >= 0) {
-            close(file);
-        }
-        return NULL;
-    }
-    size_t done = 0;
-    *size = (size_t)about.st_size;
-    unsigned char *bytes = malloc(*size + 1);
-    for (ssize_t count = 1; bytes && done < *size && count > 0;
-         done += count > 0 ? (size_t)count : 0) {
-        count = read(file, bytes + done, *size - done);
-    }
-    close(file);
-    if (!bytes || done < *size) {
-        mild_fail(error, bytes ? MILD_ERROR_IO : MILD_ERROR_MEMORY, "%s: %s", path,
-                  bytes ? "cannot be read to its end; check the disk" : "no memory to read it");
-        free(bytes);
-        return NULL;
-    }
-    return bytes;
-}
-
 Safetensors *safetensors_read(const char *path, MildError *error) {
     size_t size;
-    unsigned char *bytes = read_all(path, &size, error);
-    return bytes ? safetensors_parse(bytes, size, path, error) : NULL;
+    char *bytes = file_read(path, SIZE_MAX - 1, &size, error);
+    return bytes ? safetensors_parse((unsigned char *)bytes, size, path, error) : NULL;
 }
 
 void safetensors_destroy(Safetensors *file) {

@@ -27,8 +27,7 @@ typedef struct {
     const char *key, *value;
 } SafetensorsText;
 
-/* Writes PATH.tmp beside `path`, flushes it to the disk and renames it; on failure the old file
- * stays. */
+/* Writes the file whole or not at all (file_write); on failure the old file stays. */
 MildStatus safetensors_write(const char *path, const Safetensor *tensors, int tensor_count,
                              const SafetensorsText *texts, int text_count, MildError *error);
 

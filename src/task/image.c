@@ -1,12 +1,12 @@
 #include "task/image.h"
 
-#include <errno.h>
 #include <png.h>
 #include <setjmp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/file.h"
 #include "mild/map.h"
 
 enum { SIGNATURE = 8 };
@@ -122,9 +122,10 @@ MildStatus image_read_file(FILE *file, const char *name, Image *image, MildError
 
 MildStatus image_read(const char *path, Image *image, MildError *error) {
     memset(image, 0, sizeof *image);
-    FILE *file = fopen(path, "rb");
+    MildError cause = {0};
+    FILE *file = file_open(path, &cause);
     if (!file) {
-        return mild_fail(error, MILD_ERROR_IO, "%.200s: cannot read: %s", path, strerror(errno));
+        return mild_fail(error, cause.status, "%s", cause.text);
     }
     MildStatus status = image_read_file(file, path, image, error);
     fclose(file);

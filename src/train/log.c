@@ -7,7 +7,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "base/paths.h"
+#include "base/file.h"
 #include "train/events.h"
 
 struct Log {
@@ -60,7 +60,13 @@ static MildStatus csv_cut(FILE *csv, const char *path, const char *header, int64
         }
         keep = ftell(csv);
     }
+    int failed = length < 0 && !feof(csv);
     free(line);
+    if (failed) {
+        return mild_fail(error, ferror(csv) ? MILD_ERROR_IO : MILD_ERROR_MEMORY,
+                         "%s: cannot read the log: %s", path,
+                         ferror(csv) ? "the disk fails" : "out of memory");
+    }
     if (!same) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%s: its columns are not this version's; resume into a copy without it",
@@ -77,7 +83,11 @@ static MildStatus csv_open(Log *log, int64_t resume_after, MildError *error) {
     if (!header) {
         return mild_fail(error, MILD_ERROR_MEMORY, "log: out of memory");
     }
-    MildStatus status = MILD_OK;
+    MildStatus status = file_check_regular(log->csv_path, error);
+    if (status != MILD_OK) {
+        free(header);
+        return status;
+    }
     log->csv = resume_after >= 0 ? fopen(log->csv_path, "r+") : NULL;
     if (log->csv) {
         status = csv_cut(log->csv, log->csv_path, header, resume_after, error);

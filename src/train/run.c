@@ -1,13 +1,14 @@
 #include "train/run.h"
 
 #include <dirent.h>
+#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
-#include "base/paths.h"
+#include "base/file.h"
 #include "train/log.h"
 
 enum { COLUMNS_FIXED = 25, COLUMNS = COLUMNS_FIXED + TASK_REWARD_COUNT };
@@ -17,6 +18,7 @@ struct TrainRun {
     TrainWatch watch;
     Trainer *trainer;
     Log *log;
+    FileLock lock; /* on the folder: two processes would mix two runs */
     char column_text[COLUMNS][48];
     const char *column[COLUMNS];
     double start;  /* [s] of the loop */
@@ -94,12 +96,16 @@ static MildStatus checkpoint_path(const TrainRun *run, int64_t number, char path
     return path_join(run->def.folder, name, path, error);
 }
 
-/* The newest checkpoint below `limit`, or -1; *count counts them all. */
+/* The newest checkpoint below `limit`, or -1; *count counts them all, and is -1 when the folder is
+ * there and cannot be read. */
 static int64_t newest_checkpoint(const char *folder, int64_t limit, int64_t *oldest, int *count) {
     int64_t newest = -1;
     *oldest = -1;
     *count = 0;
     DIR *dir = opendir(folder);
+    if (!dir && errno != ENOENT && errno != ENOTDIR) {
+        *count = -1;
+    }
     for (struct dirent *entry; dir && (entry = readdir(dir));) {
         int64_t number = checkpoint_number(entry->d_name);
         if (number < 0) {
@@ -144,7 +150,7 @@ static MildStatus write_text(const TrainRun *run, const char *name, const char *
                              MildError *error) {
     char path[PATH_SIZE];
     MildStatus status = path_join(run->def.folder, name, path, error);
-    return status == MILD_OK ? path_write(path, text, strlen(text), error) : status;
+    return status == MILD_OK ? file_write(path, text, strlen(text), error) : status;
 }
 
 static MildStatus write_config(const TrainRun *run, MildError *error) {
@@ -181,10 +187,58 @@ static MildStatus resume(TrainRun *run, MildError *error) {
     }
 }
 
+/* A run that was killed while it saved leaves its temporary file. */
+static void remove_leftovers(const char *folder) {
+    static const char *const ours[] = {"checkpoint_", "policy.safetensors.", "config.ini.",
+                                       "version.txt."};
+    DIR *dir = opendir(folder);
+    for (struct dirent *entry; dir && (entry = readdir(dir));) {
+        char path[PATH_SIZE];
+        for (size_t i = 0; i < sizeof ours / sizeof *ours; i++) {
+            if (strncmp(entry->d_name, ours[i], strlen(ours[i])) == 0 &&
+                file_is_temporary(entry->d_name) &&
+                path_join(folder, entry->d_name, path, NULL) == MILD_OK) {
+                remove(path);
+            }
+        }
+    }
+    if (dir) {
+        closedir(dir);
+    }
+}
+
+/* From here on the folder is this run's alone. Another may have begun there since it was checked. */
+static MildStatus take_folder(TrainRun *run, MildError *error) {
+    const char *folder = run->def.folder;
+    char path[PATH_SIZE];
+    MildError cause = {0};
+    MildStatus status = path_make_folder(folder, error);
+    if (status == MILD_OK) {
+        status = path_join(folder, "lock", path, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    status = file_lock(&run->lock, path, &cause);
+    if (status == MILD_ERROR_ARGUMENT) {
+        return mild_fail(error, status, "%.250s, which trains in this folder; choose another --out",
+                         cause.text);
+    }
+    if (status != MILD_OK) {
+        return mild_fail(error, status, "%s", cause.text);
+    }
+    remove_leftovers(folder);
+    return train_run_check_folder(folder, run->def.resume, error);
+}
+
 MildStatus train_run_check_folder(const char *folder, int resume, MildError *error) {
     int64_t oldest;
     int count;
     newest_checkpoint(folder, INT64_MAX, &oldest, &count);
+    if (count < 0) {
+        return mild_fail(error, errno == ENOMEM ? MILD_ERROR_MEMORY : MILD_ERROR_IO,
+                         "%s: cannot read the folder: %s", folder, strerror(errno));
+    }
     if (!resume && count > 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "%s holds %d checkpoints: add --resume to go on, or choose another --out",
@@ -207,7 +261,7 @@ static MildStatus build(TrainRun *run, MildError *error) {
     if (!run->trainer) {
         return error->status;
     }
-    status = path_make_folder(folder, error);
+    status = take_folder(run, error);
     if (status == MILD_OK && run->def.resume) {
         status = resume(run, error);
     }
@@ -229,6 +283,7 @@ TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildEr
         mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
         return NULL;
     }
+    run->lock.file = -1;
     run->def = *def;
     run->watch = *watch;
     if (build(run, error) != MILD_OK) {
@@ -243,6 +298,7 @@ void train_run_close(TrainRun *run) {
         return;
     }
     log_close(run->log);
+    file_unlock(&run->lock);
     train_destroy(run->trainer);
     free(run);
 }

@@ -1,10 +1,10 @@
 #include "view/pressure.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
+
+#include "base/file.h"
 
 #define STANCE_FORCE 20.0 /* [N] normal force from which a foot stands */
 #define STANCE_MAX 2.0    /* [s] a longer stance is standing about, no step */
@@ -185,31 +185,23 @@ static void write_foot(const Pressure *pressure, int material, int foot, const c
 
 MildStatus pressure_write(const Pressure *pressure, const char *path, const char *const *names,
                           MildError *error) {
-    char temporary[1024];
-    if (snprintf(temporary, sizeof temporary, "%s.part", path) >= (int)sizeof temporary) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "sole pressure: the path is longer than %d characters",
-                         (int)sizeof temporary - 6);
+    char *text = NULL;
+    size_t size = 0;
+    FILE *memory = open_memstream(&text, &size);
+    if (!memory) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
     }
-    FILE *file = fopen(temporary, "w");
-    if (!file) {
-        return mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", temporary, strerror(errno));
-    }
-    fprintf(file, "ground,foot,what,index,x_m,y_m,mean_kpa,peak_kpa\n");
+    fprintf(memory, "ground,foot,what,index,x_m,y_m,mean_kpa,peak_kpa\n");
     for (int m = 0; m < pressure->materials; m++) {
         for (int f = 0; f < ROBOT_FEET; f++) {
             if (pressure->tally[m][f].stances > 0) {
-                write_foot(pressure, m, f, names[m], file);
+                write_foot(pressure, m, f, names[m], memory);
             }
         }
     }
-    int failed = ferror(file);
-    failed = fclose(file) != 0 || failed;
-    if (failed || rename(temporary, path) != 0) {
-        MildStatus status =
-            mild_fail(error, MILD_ERROR_IO, "%s: cannot write: %s", path, strerror(errno));
-        unlink(temporary);
-        return status;
-    }
-    return MILD_OK;
+    MildStatus status = fclose(memory) == 0
+                            ? file_write(path, text, size, error)
+                            : mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
+    free(text);
+    return status;
 }

@@ -10,12 +10,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/file.h"
+
 extern char **environ;
 
-#define VIDEO_PATH 1024
-
 struct Video {
-    char path[VIDEO_PATH], temporary[VIDEO_PATH + 8];
+    char path[PATH_SIZE];
+    char temporary[PATH_SIZE]; /* what ffmpeg writes; renamed when it is whole */
     int width, height, frames;
     int pipe;   /* our end; -1 when closed */
     int errors; /* file that receives ffmpeg's messages */
@@ -141,19 +142,24 @@ Video *video_open(const char *path, int width, int height, double fps, MildError
     video->width = width, video->height = height, video->pipe = -1;
     if (snprintf(video->path, sizeof video->path, "%s", path) >= (int)sizeof video->path) {
         mild_fail(error, MILD_ERROR_ARGUMENT, "video: the path is longer than %d characters",
-                  VIDEO_PATH - 1);
+                  PATH_SIZE - 1);
         free(video);
         return NULL;
     }
-    snprintf(video->temporary, sizeof video->temporary, "%s.part", path);
+    if (file_temporary(path, video->temporary, error) != MILD_OK) {
+        free(video);
+        return NULL;
+    }
     video->errors = error_file();
     if (video->errors < 0) {
         mild_fail(error, MILD_ERROR_IO, "video %s: no temporary file: %s", path, strerror(errno));
+        unlink(video->temporary);
         free(video);
         return NULL;
     }
     if (spawn_ffmpeg(video, fps, error) != MILD_OK) {
         close(video->errors);
+        unlink(video->temporary);
         free(video);
         return NULL;
     }

@@ -80,7 +80,7 @@ near "another order: k_pen" "$(value fit.json k_pen)" 380 5
 fit=("$mild" fit)
 plate=(--plate 0.2,0.1)
 edit() { awk -F, -v OFS=, "$1" sand_loose.csv >bad.csv; }
-refuse 'missing.csv: cannot open.*mild press' "${fit[@]}" missing.csv "${plate[@]}"
+refuse 'missing.csv: cannot read.*mild press' "${fit[@]}" missing.csv "${plate[@]}"
 refuse 'which record' "${fit[@]}" "${plate[@]}"
 refuse '--plate' "${fit[@]}" sand_loose.csv
 refuse '--plate' "${fit[@]}" sand_loose.csv --plate 0.2

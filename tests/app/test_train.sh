@@ -74,7 +74,7 @@ bad "no checkpoint to resume from" "$mild" train --out nowhere --resume
 [ ! -e nowhere ] || fail "a refused resume left a folder"
 printf 'X' | dd of=torn/policy.safetensors bs=1 seek=20000 conv=notrunc 2>/dev/null
 bad "damaged" "$mild" eval --policy torn/policy.safetensors
-bad "cannot be opened" "$mild" eval --policy nowhere.safetensors
+bad "nowhere.safetensors: cannot read" "$mild" eval --policy nowhere.safetensors
 bad "unknown ground 'foam54'" "$mild" eval --policy whole/policy.safetensors --ground rigid,foam54
 bad "part of a course" "$mild" eval --policy whole/policy.safetensors --ground rubber+rigid
 

@@ -2,6 +2,7 @@
  */
 #include "check.h"
 
+#include <dirent.h>
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
@@ -11,6 +12,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/file.h"
+#include "learn/policy_file.h"
 #include "learn/policy_private.h"
 #include "learn/ppo.h"
 #include "learn/safetensors.h"
@@ -23,6 +26,19 @@ static Policy *small_policy(uint64_t seed) {
     Policy *policy = policy_create(&def, seed, &error);
     assert_non_null(policy);
     return policy;
+}
+
+/* Left behind by a save of PATH. */
+static int temporary_files(void) {
+    int count = 0;
+    DIR *dir = opendir(".");
+    assert_non_null(dir);
+    for (struct dirent *entry; (entry = readdir(dir));) {
+        count +=
+            strncmp(entry->d_name, PATH, strlen(PATH)) == 0 && file_is_temporary(entry->d_name);
+    }
+    closedir(dir);
+    return count;
 }
 
 static size_t parameter_bytes(const Policy *policy) {
@@ -111,7 +127,7 @@ static void test_round_trip(void **state) {
     assert_memory_equal(policy_def(loaded), policy_def(policy), sizeof(PolicyDef));
     assert_memory_equal(policy_parameters(loaded), policy_parameters(policy),
                         parameter_bytes(policy));
-    assert_int_equal(access(PATH ".tmp", F_OK), -1);
+    assert_int_equal(temporary_files(), 0);
     policy_destroy(loaded);
     policy_destroy(policy);
     unlink(PATH);
@@ -238,6 +254,42 @@ static void test_lying_headers(void **state) {
     policy_destroy(policy);
 }
 
+/* Each text of the metadata left out of a file that is right otherwise: named, and called missing. */
+static void test_missing_keys(void **state) {
+    (void)state;
+    static const char *const keys[] = {"kind", "version", "policy.latent", "policy.frames",
+                                       "policy.actor_hidden"};
+    MildError error = {0};
+    Policy *policy = small_policy(4);
+    assert_int_equal(policy_save(policy, PATH, "", &error), MILD_OK);
+    Safetensors *file = safetensors_read(PATH, &error);
+    assert_non_null(file);
+    PolicyTexts all;
+    policy_file_texts(&policy->network, "mild policy", "", &all);
+    for (size_t k = 0; k < sizeof keys / sizeof *keys; k++) {
+        SafetensorsText kept[POLICY_TEXTS_MAX];
+        int count = 0;
+        for (int i = 0; i < all.count; i++) {
+            if (strcmp(all.text[i].key, keys[k]) != 0) {
+                kept[count++] = all.text[i];
+            }
+        }
+        assert_int_equal(count, all.count - 1);
+        assert_int_equal(safetensors_write(PATH, safetensors_at(file, 0), safetensors_count(file),
+                                           kept, count, &error),
+                         MILD_OK);
+        assert_null(policy_load(PATH, NULL, 0, &error));
+        char wanted[80];
+        snprintf(wanted, sizeof wanted, "'%s' is missing", keys[k]);
+        if (!strstr(error.text, wanted)) {
+            fail_msg("without %s: %s", keys[k], error.text);
+        }
+    }
+    safetensors_destroy(file);
+    policy_destroy(policy);
+    unlink(PATH);
+}
+
 /* A disk that fills up half way: the old file stays, no temporary one is left. */
 static void test_full_disk(void **state) {
     (void)state;
@@ -255,7 +307,7 @@ static void test_full_disk(void **state) {
     signal(SIGXFSZ, handler);
     assert_int_equal(status, MILD_ERROR_IO);
     assert_non_null(strstr(error.text, PATH));
-    assert_int_equal(access(PATH ".tmp", F_OK), -1);
+    assert_int_equal(temporary_files(), 0);
     char note[8];
     Policy *kept = policy_load(PATH, note, sizeof note, &error);
     assert_non_null(kept);
@@ -292,8 +344,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_act_and_value), cmocka_unit_test(test_modulation_starts_at_identity),
         cmocka_unit_test(test_round_trip),    cmocka_unit_test(test_damaged_files),
-        cmocka_unit_test(test_lying_headers), cmocka_unit_test(test_full_disk),
-        cmocka_unit_test(test_unusable_defs),
+        cmocka_unit_test(test_lying_headers), cmocka_unit_test(test_missing_keys),
+        cmocka_unit_test(test_full_disk),     cmocka_unit_test(test_unusable_defs),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,4 @@
-/* The run log: CSV that survives a kill, TensorBoard records whose frames check; files written
- * whole or not at all. */
+/* The run log: CSV that survives a kill, TensorBoard records whose frames check. */
 #include <dirent.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,7 +13,6 @@
 #include <cmocka.h>
 
 #include "base/paths.h"
-#include "base/text.h"
 #include "train/events.h"
 #include "train/log.h"
 
@@ -129,44 +127,11 @@ static void test_records(void **state) {
     assert_true(records >= 3);
 }
 
-static void test_write_whole_or_not(void **state) {
-    (void)state;
-    char path[PATH_SIZE], text[64];
-    MildError error = {0};
-    path_join(folder, "file", path, NULL);
-    assert_int_equal(path_write(path, "old", 3, &error), MILD_OK);
-    assert_int_equal(path_write(path, "newer", 5, &error), MILD_OK);
-    assert_int_equal(read_file(path, text, sizeof text), 5);
-    assert_string_equal(text, "newer");
-    assert_int_equal(path_write("/dev/full", "x", 1, &error), MILD_ERROR_IO); /* as a full disk */
-    assert_non_null(strstr(error.text, "No space left"));
-    assert_int_equal(path_write("/dev/null", "x", 1, &error), MILD_OK);
-    assert_int_equal(path_write("/dev/full/x", "x", 1, &error), MILD_ERROR_IO);
-    assert_int_equal(path_make_folder(path, &error), MILD_ERROR_IO);
-    path_join(folder, "file/below", path, NULL);
-    assert_int_equal(path_make_folder(path, &error), MILD_ERROR_IO);
-}
-
-static void test_text(void **state) {
-    (void)state;
-    char text[32];
-    assert_int_equal(text_distance("kitten", "sitting"), 3);
-    assert_int_equal(text_distance("", "abc"), 3);
-    assert_string_equal(text_bytes(1536, text, sizeof text), "1.50 KiB");
-    assert_string_equal(text_duration(3725, text, sizeof text), "1 h 02 min");
-    assert_string_equal(text_duration(65, text, sizeof text), "1 min 05 s");
-    double number;
-    assert_false(text_double("", &number) || text_double("1x", &number) ||
-                 text_double("nan", &number));
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_crc32c),
         cmocka_unit_test_setup_teardown(test_csv_resume, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(test_records, make_folder, remove_folder),
-        cmocka_unit_test_setup_teardown(test_write_whole_or_not, make_folder, remove_folder),
-        cmocka_unit_test(test_text),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

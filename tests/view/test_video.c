@@ -1,5 +1,6 @@
 /* The video file: whole under its name with the right number of frames, or one clear line and no
  * file. */
+#include <dirent.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -57,13 +58,23 @@ static int counted_frames(const char *path) {
     return frames;
 }
 
+static int files_in_folder(void) {
+    int count = 0;
+    DIR *dir = opendir(folder);
+    assert_non_null(dir);
+    for (struct dirent *entry; (entry = readdir(dir));) {
+        count += entry->d_name[0] != '.';
+    }
+    closedir(dir);
+    return count;
+}
+
 static void whole_file_under_its_name(void **state) {
     (void)state;
     MildError error = {0};
     static unsigned char rgb[WIDTH * HEIGHT * 3];
-    char path[96], part[104];
+    char path[96];
     snprintf(path, sizeof path, "%s/walk.mp4", folder);
-    snprintf(part, sizeof part, "%s.part", path);
     Video *video = video_open(path, WIDTH, HEIGHT, 25, &error);
     if (!video) {
         fail_msg("%s", error.text);
@@ -78,7 +89,7 @@ static void whole_file_under_its_name(void **state) {
     assert_int_equal(video_close(video, &error), MILD_OK);
     assert_int_equal(stat(path, &info), 0);
     assert_true(info.st_size > 500);
-    assert_int_not_equal(stat(part, &info), 0);
+    assert_int_equal(files_in_folder(), 1); /* no temporary file is left */
     assert_int_equal(counted_frames(path), FRAMES);
     print_message("%d frames, %ld bytes\n", FRAMES, (long)info.st_size);
     unlink(path);
@@ -97,6 +108,7 @@ static void missing_ffmpeg_is_one_line(void **state) {
     assert_int_equal(error.status, MILD_ERROR_IO);
     assert_non_null(strstr(error.text, "ffmpeg"));
     assert_null(strchr(error.text, '\n'));
+    assert_int_equal(files_in_folder(), 0);
     print_message("%s\n", error.text);
 }
 
@@ -105,18 +117,32 @@ static void failing_ffmpeg_is_one_line(void **state) {
     (void)state;
     MildError error = {0};
     static unsigned char rgb[WIDTH * HEIGHT * 3];
-    char path[96];
-    snprintf(path, sizeof path, "%s/nowhere/walk.mp4", folder);
+    char path[96], program[96], *before = strdup(getenv("PATH"));
+    snprintf(path, sizeof path, "%s/walk.mp4", folder);
+    snprintf(program, sizeof program, "%s/ffmpeg", folder);
+    FILE *script = fopen(program, "w");
+    assert_non_null(script);
+    fputs("#!/bin/sh\necho 'a codec is missing' >&2\nexit 1\n", script);
+    fclose(script);
+    assert_int_equal(chmod(program, 0755), 0);
+    setenv("PATH", folder, 1);
     Video *video = video_open(path, WIDTH, HEIGHT, 25, &error);
+    setenv("PATH", before, 1);
+    free(before);
     assert_non_null(video);
     MildStatus status = MILD_OK;
     for (int i = 0; i < 500 && status == MILD_OK; i++) {
         status = video_frame(video, rgb, &error);
     }
     assert_int_equal(video_close(video, &error), MILD_ERROR_IO);
-    assert_non_null(strstr(error.text, "nowhere"));
+    assert_non_null(strstr(error.text, "a codec is missing"));
     assert_null(strchr(error.text, '\n'));
     print_message("%s\n", error.text);
+    unlink(program);
+    assert_int_equal(files_in_folder(), 0); /* no temporary file is left */
+    snprintf(path, sizeof path, "%s/nowhere/walk.mp4", folder);
+    assert_null(video_open(path, WIDTH, HEIGHT, 25, &error));
+    assert_non_null(strstr(error.text, "nowhere"));
 }
 
 static void odd_size_is_refused(void **state) {

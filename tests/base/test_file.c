@@ -1,0 +1,180 @@
+/* Files and texts of layer base: what is read and what is refused, written whole or not at all,
+ * told apart, locked. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "base/file.h"
+#include "base/text.h"
+
+static char folder[] = "/tmp/mild_test_file_XXXXXX";
+
+static int setup(void **state) {
+    (void)state;
+    return mkdtemp(folder) && chdir(folder) == 0 ? 0 : -1;
+}
+
+static int teardown(void **state) {
+    (void)state;
+    char command[80];
+    snprintf(command, sizeof command, "rm -rf %s", folder);
+    return system(command);
+}
+
+static void assert_holds(const char *path, const char *text) {
+    size_t size;
+    MildError error = {0};
+    char *bytes = file_read(path, 1000, &size, &error);
+    if (!bytes) {
+        fail_msg("%s", error.text);
+    }
+    assert_string_equal(bytes, text);
+    assert_int_equal(size, strlen(text));
+    free(bytes);
+}
+
+static void test_only_regular_files_are_read(void **state) {
+    (void)state;
+    size_t size;
+    assert_int_equal(mkfifo("pipe", 0600), 0);
+    alarm(20); /* a reader that waits at the pipe ends the test */
+    static const char *const refused[] = {"pipe", "/dev/zero", "/dev/null", "/", "missing", ""};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        MildError error = {0};
+        assert_null(file_open(refused[i], &error));
+        assert_int_equal(error.status, MILD_ERROR_IO);
+        assert_non_null(strstr(error.text, "cannot read"));
+        error = (MildError){0};
+        assert_null(file_read(refused[i], 100, &size, &error));
+        assert_int_equal(error.status, MILD_ERROR_IO);
+    }
+    alarm(0);
+    MildError error = {0};
+    assert_int_equal(file_write("ten", "0123456789", 10, &error), MILD_OK);
+    assert_holds("ten", "0123456789");
+    assert_null(file_read("ten", 9, &size, &error));
+    assert_int_equal(error.status, MILD_ERROR_FORMAT);
+}
+
+static void test_write_whole_or_not(void **state) {
+    (void)state;
+    MildError error = {0};
+    assert_int_equal(file_write("file", "old", 3, &error), MILD_OK);
+    assert_int_equal(file_write("file", "newer", 5, &error), MILD_OK);
+    assert_holds("file", "newer");
+    assert_int_equal(file_write("/dev/full", "x", 1, &error), MILD_ERROR_IO); /* as a full disk */
+    assert_non_null(strstr(error.text, "No space left"));
+    assert_int_equal(file_write("/dev/null", "x", 1, &error), MILD_OK);
+    assert_int_equal(file_write("/dev/full/x", "x", 1, &error), MILD_ERROR_IO);
+    assert_int_equal(path_make_folder("file", &error), MILD_ERROR_IO);
+    assert_int_equal(path_make_folder("file/below", &error), MILD_ERROR_IO);
+}
+
+/* Temporary files never take a name that is in use. */
+static void test_temporaries(void **state) {
+    (void)state;
+    MildError error = {0};
+    char first[PATH_SIZE], second[PATH_SIZE];
+    assert_int_equal(file_write("out.tmp", "mine", 4, &error), MILD_OK);
+    assert_int_equal(file_temporary("out", first, &error), MILD_OK);
+    assert_int_equal(file_temporary("out", second, &error), MILD_OK);
+    assert_string_not_equal(first, second);
+    assert_true(file_is_temporary(first) && file_is_temporary(second));
+    assert_false(file_is_temporary("out.tmp") || file_is_temporary("out") ||
+                 file_is_temporary("a-b.tmp") || file_is_temporary("out.12-3.tmp.gz"));
+    assert_int_equal(file_write(first, "taken", 5, &error), MILD_OK);
+    assert_int_equal(file_check_write("out", &error), MILD_OK);
+    assert_int_equal(file_write("out", "text", 4, &error), MILD_OK);
+    assert_holds("out", "text");
+    assert_holds("out.tmp", "mine");
+    assert_holds(first, "taken");
+}
+
+static void test_same_file(void **state) {
+    (void)state;
+    MildError error = {0};
+    assert_int_equal(file_write("one", "1", 1, &error), MILD_OK);
+    assert_int_equal(file_write("two", "1", 1, &error), MILD_OK);
+    assert_int_equal(mkdir("sub", 0777), 0);
+    assert_int_equal(symlink("../one", "sub/soft"), 0);
+    assert_int_equal(link("one", "hard"), 0);
+    assert_true(file_same("one", "one") && file_same("one", "./sub/../one"));
+    assert_true(file_same("one", "sub/soft") && file_same("hard", "one"));
+    assert_true(file_same("new", "./new") && file_same("sub/new", "sub/../sub/new"));
+    assert_false(file_same("one", "two") || file_same("new", "sub/new") || file_same("new", "one"));
+    assert_false(file_same("/dev/null", "/dev/null") || file_same("sub", "sub"));
+}
+
+static void test_beside(void **state) {
+    (void)state;
+    char path[PATH_SIZE];
+    assert_int_equal(path_beside("runs/a.png", "_fit.csv", path, NULL), MILD_OK);
+    assert_string_equal(path, "runs/a_fit.csv");
+    assert_int_equal(path_beside("runs.d/a", ".csv", path, NULL), MILD_OK);
+    assert_string_equal(path, "runs.d/a.csv");
+}
+
+/* Whether another process gets the lock; it ends with the lock held, as if killed. */
+static int other_gets_lock(void) {
+    pid_t child = fork();
+    if (child == 0) {
+        FileLock lock;
+        MildError error = {0};
+        MildStatus status = file_lock(&lock, "lock", &error);
+        _exit(status == MILD_OK ? 0 : strstr(error.text, "in use by process") ? 1 : 2);
+    }
+    int code;
+    assert_int_equal(waitpid(child, &code, 0), child);
+    assert_true(WIFEXITED(code) && WEXITSTATUS(code) < 2);
+    return WEXITSTATUS(code) == 0;
+}
+
+static void test_lock(void **state) {
+    (void)state;
+    FileLock lock;
+    MildError error = {0};
+    assert_true(other_gets_lock());
+    assert_int_equal(access("lock", F_OK), 0); /* left behind, and no obstacle */
+    assert_int_equal(file_lock(&lock, "lock", &error), MILD_OK);
+    assert_false(other_gets_lock());
+    file_unlock(&lock);
+    assert_int_equal(access("lock", F_OK), -1);
+    file_unlock(&lock);
+    assert_true(other_gets_lock());
+    assert_int_equal(file_lock(&lock, "no/folder/lock", &error), MILD_ERROR_IO);
+}
+
+static void test_text(void **state) {
+    (void)state;
+    char text[32];
+    assert_int_equal(text_distance("kitten", "sitting"), 3);
+    assert_int_equal(text_distance("", "abc"), 3);
+    assert_string_equal(text_bytes(1536, text, sizeof text), "1.50 KiB");
+    assert_string_equal(text_duration(3725, text, sizeof text), "1 h 02 min");
+    assert_string_equal(text_duration(65, text, sizeof text), "1 min 05 s");
+    double number;
+    assert_false(text_double("", &number) || text_double("1x", &number) ||
+                 text_double("nan", &number));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_only_regular_files_are_read),
+        cmocka_unit_test(test_write_whole_or_not),
+        cmocka_unit_test(test_temporaries),
+        cmocka_unit_test(test_same_file),
+        cmocka_unit_test(test_beside),
+        cmocka_unit_test(test_lock),
+        cmocka_unit_test(test_text),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
