@@ -1,12 +1,15 @@
 /* The program `mild`: a table of commands. Only in this layer text becomes structs and errors
  * become exits. */
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
 #include "base/text.h"
+#include "robot/engine.h"
 
 #ifndef MILD_VIEW
 int cmd_play(int argc, char **argv) {
@@ -46,7 +49,29 @@ static void print_help(FILE *file) {
             "  mild press --ground foam45 --depth 0.03\n");
 }
 
+/* What was printed must have arrived: a full disk is found out at the last flush. */
+static int finish(int code) {
+    int failed = ferror(stdout);
+    errno = 0;
+    if (fflush(stdout) != 0 || failed) {
+        failed = 1;
+    }
+    if (!failed || code != 0) { /* a command that failed has said its line */
+        return code;
+    }
+    fprintf(stderr, "mild: cannot write to standard output: %s\n",
+            errno ? strerror(errno) : "part of it is lost");
+    return CLI_EXIT_BAD_INPUT;
+}
+
+/* MuJoCo cannot go on. */
+static void end_for_engine(const char *text) {
+    fprintf(stderr, "mild: MuJoCo failed: %s\n", text);
+    _exit(CLI_EXIT_BAD_INPUT);
+}
+
 int main(int argc, char **argv) {
+    engine_on_error(end_for_engine);
     if (argc < 2) {
         print_help(stderr);
         return CLI_EXIT_BAD_INPUT;
@@ -54,16 +79,16 @@ int main(int argc, char **argv) {
     if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0 ||
         strcmp(argv[1], "help") == 0) {
         print_help(stdout);
-        return 0;
+        return finish(0);
     }
     if (strcmp(argv[1], "--version") == 0) {
         printf("mild %s\n", build_version());
-        return 0;
+        return finish(0);
     }
     const char *names[COMMANDS];
     for (int i = 0; i < COMMANDS; i++) {
         if (strcmp(argv[1], commands[i].name) == 0) {
-            return commands[i].run(argc - 1, argv + 1);
+            return finish(commands[i].run(argc - 1, argv + 1));
         }
         names[i] = commands[i].name;
     }

@@ -40,4 +40,8 @@ int stand_prepare(Robot *robot);
 /* Name of joint or link i in joint order ("leg_l1", ...); add "_joint" or "_link". */
 const char *robot_limb_name(int i);
 
+/* Whether the numbers of the compiled model are usable: finite, and masses, inertias, gains and
+ * limits of the right sign. MuJoCo takes what an MJCF states. */
+MildStatus robot_check_model(const Robot *robot, const char *path, MildError *error);
+
 #endif

@@ -4,7 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/file.h"
 #include "robot/description.h"
+#include "robot/engine.h"
 
 static const char *const limb_names[ROBOT_JOINTS] = {"leg_l1", "leg_l2", "leg_l3", "leg_l4",
                                                      "leg_l5", "leg_l6", "leg_r1", "leg_r2",
@@ -245,12 +247,24 @@ static MildStatus read_stand(Robot *robot, const char *path, MildError *error) {
 }
 
 static MildStatus read_robot(Robot *robot, const char *path, MildError *error) {
-    MildStatus status = load_models(robot, path, error);
+    MildStatus status = file_check_regular(path, error);
+    status = status == MILD_OK ? load_models(robot, path, error) : status;
+    status = status == MILD_OK ? robot_check_model(robot, path, error) : status;
     status = status == MILD_OK ? read_bodies(robot, path, error) : status;
     status = status == MILD_OK ? read_joints(robot, path, error) : status;
     status = status == MILD_OK ? read_shells(robot, path, error) : status;
     status = status == MILD_OK ? read_soles(robot, path, error) : status;
     return status == MILD_OK ? read_stand(robot, path, error) : status;
+}
+
+typedef struct {
+    Robot *robot;
+    const char *path;
+} Reading;
+
+static MildStatus read_guarded(void *context, MildError *error) {
+    const Reading *reading = context;
+    return read_robot(reading->robot, reading->path, error);
 }
 
 Robot *robot_create(const char *xml_path, MildError *error) {
@@ -259,7 +273,8 @@ Robot *robot_create(const char *xml_path, MildError *error) {
         mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", xml_path);
         return NULL;
     }
-    if (read_robot(robot, xml_path, error) != MILD_OK) {
+    Reading reading = {robot, xml_path};
+    if (engine_call(read_guarded, &reading, xml_path, error) != MILD_OK) {
         robot_destroy(robot);
         return NULL;
     }
