@@ -172,7 +172,7 @@ int cmd_eval(int argc, char **argv) {
         free(args);
         return cli_fail_text("eval", "out of memory");
     }
-    char shipped[PATH_SIZE], model_help[200];
+    char shipped[PATH_SIZE], model_help[320];
     e->policy = path_data("policies/mild.safetensors", shipped);
     e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
     e->patch = 2.5;

@@ -276,7 +276,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
 }
 
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
-    char model_help[200];
+    char model_help[320];
     const CliOption options[] = {
         {"policy", CLI_INPUT, &c->policy, 0, 0, "FILE",
          "policy to watch (policies/mild.safetensors)"},

@@ -154,7 +154,7 @@ const char *grounds_names(char *text, size_t size) {
 }
 
 const char *grounds_model_help(char *text, size_t size) {
-    char names[120];
+    char names[240];
     list_names(MILD_MODELS, model_name, names, sizeof names);
     snprintf(text, size, "ground model: %s; matched to mild's sinkage (mild)", names);
     return text;

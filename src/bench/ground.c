@@ -159,14 +159,7 @@ static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double 
     return status;
 }
 
-/* Newton on each rival of mild at rest: one element for the concentric ones. */
-static const char *const rival_names[MILD_MODELS] = {[MILD_MODEL_CON_CONE] = "newton_con_cone",
-                                                     [MILD_MODEL_CON_SPRING] = "newton_con_spring",
-                                                     [MILD_MODEL_ECC_SPRING] = "newton_ecc_spring",
-                                                     [MILD_MODEL_ECC_QUASI] = "newton_ecc_quasi",
-                                                     [MILD_MODEL_ECC_QUASI_3D] =
-                                                         "newton_ecc_quasi_3d"};
-
+/* Newton on each model; on rivals of mild at rest: one element for the concentric ones. */
 static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchReport *report,
                                MildError *error) {
     MildMaterial mild, material;
@@ -189,7 +182,9 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
                       mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");
         } else {
             ground_settle(&bench, soles, dt);
-            bench_add(report, "ground", rival_names[model], ground_time(&bench, 0), "ns");
+            char name[sizeof report->rows->name];
+            snprintf(name, sizeof name, "newton_%s", mild_model_names[model]);
+            bench_add(report, "ground", name, ground_time(&bench, 0), "ns");
         }
     } else {
         status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
