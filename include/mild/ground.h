@@ -50,10 +50,13 @@ MILD_API_BEGIN
     ROW(RIGID, rigid)                /* the last: the engine's contact; no material has it */
 /* clang-format on */
 
+/* A row's enumerator: MILD_MODEL_MILD and so on. */
 #define MILD_MODEL_ID(id, name) MILD_MODEL_##id,
-typedef enum { MILD_MODEL_LIST(MILD_MODEL_ID) } MildModel;
-#undef MILD_MODEL_ID
-enum { MILD_MODELS = MILD_MODEL_RIGID + 1 }; /* how many there are */
+/* A model, in the list's order. */
+typedef enum {
+    MILD_MODEL_LIST(MILD_MODEL_ID) /* one of each row */
+} MildModel;
+#define MILD_MODELS (MILD_MODEL_RIGID + 1) /* how many there are */
 
 #define MILD_MODEL_FIELDS 20 /* of the material that a model reads, at most */
 #define MILD_MODEL_SCALED 4  /* of them those by which it is matched, at most */
