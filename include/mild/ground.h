@@ -28,7 +28,7 @@
 
 MILD_API_BEGIN
 
-#define MILD_FEET_MAX 2       /* feet in one contact problem */
+#define MILD_FEET_MAX 4       /* feet in one contact problem */
 #define MILD_MATERIALS_MAX 12 /* in one terrain */
 #define MILD_PATCHES_MAX 16   /* in one terrain */
 

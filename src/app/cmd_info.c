@@ -162,7 +162,7 @@ static int info_models(void) {
            "  newton        the step as one small convex problem; default\n"
            "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n"
            "\nrobots\n"
-           "  sa01    models/sa01/sa01.xml: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
+           "  sa01    robots/sa01: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
     return 0;
 }
 

@@ -61,7 +61,7 @@ MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *mod
 GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain,
                              const CliArgs *args) {
     robot_set_model(robot, model);
-    return (GroundsDef){model,  robot_rasters(robot)[0], robot_half_weight(robot), args, task,
+    return (GroundsDef){model,  robot_rasters(robot)[0], robot_foot_load(robot), args, task,
                         terrain};
 }
 
