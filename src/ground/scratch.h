@@ -7,6 +7,7 @@
 #include "ground/state.h"
 
 #define TWIST_MAX (6 * MILD_FEET_MAX)
+#define PADDING_DEPTH (-1e3) /* [m] depth of the padding: it never touches */
 
 /* Law of a material as last derived; valid while the material's bytes stay the same. */
 typedef struct {
