@@ -7,6 +7,18 @@
 #define BEGIN_STOP REAL(0.3)       /* [-] fit to the exact impact, see element_drag */
 #define BEGIN_STOP_MOST REAL(0.75) /* [-] up to here the drag's speed V does not fall with w */
 
+/* Drag of a material by the speeds at both ends of the way: an impulse of the recruited depth times
+ * exit_drag w + entry_drag h. Without the parts that create energy (element_explicit),
+ *
+ *     mass w + (drag - mass) (h + w)/2 = (drag + mass)/2 w + (drag - mass)/2 h */
+MILD_HD Real law_exit_drag(const Law *law) {
+    return (real_max(law->drag_rate, 0) + real_max(law->mass_rate, 0)) / 2;
+}
+
+MILD_HD Real law_entry_drag(const Law *law) {
+    return (real_max(law->drag_rate, 0) - real_max(law->mass_rate, 0)) / 2;
+}
+
 /* The unloading line runs from (a, F(a)) down to zero force. Its elastic travel is recovery a, at
  * least ELEMENT_ELASTIC. It is never flatter than virgin ground at a, and so never above it: a
  * concave curve lies above its chords, a convex one above its tangents. In the bed it takes the

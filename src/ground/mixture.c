@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "ground/begin.h"
 #include "ground/model.h"
 #include "ground/terrain.h"
 
@@ -44,8 +45,6 @@ void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
 
 /* Sets the law of slot i, and its friction and recovery. */
 static void slot_set_law(const Slots *s, int i, const Law *law, const MildMaterial *material) {
-    const double mass = real_max(law->mass_rate, 0.0);
-    const double drag = real_max(law->drag_rate, 0.0);
     s->flat_stiffness[i] = law->flat_stiffness;
     s->line_stiffness[i] = law->line_stiffness;
     s->cone_depth[i] = law->cone_depth;
@@ -54,8 +53,8 @@ static void slot_set_law(const Slots *s, int i, const Law *law, const MildMateri
     s->drag_rate[i] = law->drag_rate;
     s->bed_depth[i] = law->bed_depth;
     s->bed_stiffness[i] = law->bed_stiffness;
-    s->exit_drag[i] = 0.5 * (drag + mass); /* together mass w + (drag - mass) (h + w)/2 */
-    s->entry_drag[i] = 0.5 * (drag - mass);
+    s->exit_drag[i] = law_exit_drag(law);
+    s->entry_drag[i] = law_entry_drag(law);
     s->strength[i] = law->line_stiffness;
     s->recovery[i] = material->recovery;
     s->mu[i] = material->mu;
