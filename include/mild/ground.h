@@ -75,13 +75,13 @@ typedef struct {
     int concentric; /* bool: one element in the middle of the sole, not the raster */
 } MildModelInfo;
 
-/* Their names as users write them, in the enum's order. */
+/* Names of the models as users write them, in the order of the enum. */
 extern const char *const mild_model_names[MILD_MODELS];
-/* The model of that name into *model; false, and nothing written, when the name is unknown. */
+/* Finds a model by name. Returns false, and leaves *model alone, when the name is unknown. */
 int mild_model_find(const char *name, MildModel *model);
-/* Of any model; constant. */
+/* What a model says of itself. It never changes. */
 const MildModelInfo *mild_model_info(MildModel model);
-/* Its `concentric`. */
+/* Bool: the model has one element in the middle of the sole. */
 int mild_model_is_concentric(MildModel model);
 
 /* ---- materials: parameters of the element law (paper Table III; docs/model.md section 10) ---- */

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "ground/begin.h"
-#include "ground/model.h"
+#include "ground/models.h"
 #include "ground/terrain.h"
 
 /* Bool: material m is part of a mixture, coded as in Memory (state.h). */

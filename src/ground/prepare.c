@@ -5,7 +5,7 @@
 #include "ground/begin.h"
 #include "ground/gather.h"
 #include "ground/mixture.h"
-#include "ground/model.h"
+#include "ground/models.h"
 #include "ground/place.h"
 #include "ground/terrain.h"
 

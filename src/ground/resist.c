@@ -24,11 +24,9 @@
  * where it gives the yield force. */
 #include "ground/resist.h"
 
+#include "ground/element_law.h"
 #include "ground/friction.h"
 
-#define RESIST_REST 1e-3 /* [m/s] speed below which the direction of motion fades out */
-/* Greatest alpha_z of both theories: 1 (2D, level, straight down), 1.076 (3D, 27 degrees). */
-#define RESIST_PEAK 1.08
 #define RESIST_LEVEL                                                                               \
     0.87504 /* alpha_z of the 3D theory for a level plate that goes straight down */
 

@@ -2,7 +2,6 @@
 #ifndef MILD_GROUND_SCRATCH_H
 #define MILD_GROUND_SCRATCH_H
 
-#include "ground/material.h"
 #include "ground/slots.h"
 #include "ground/state.h"
 

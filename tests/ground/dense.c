@@ -1,8 +1,11 @@
 #include "dense.h"
 
-#include "ground/begin.h" /* the constants of these three */
+/* The constants of these five. */
+#include "ground/begin.h"
+#include "ground/element_law.h"
 #include "ground/friction.h"
 #include "ground/impulse.h"
+#include "ground/resist.h"
 #include "ground/scratch.h"
 
 #define DENSE_STEPS 200 /* of Newton's method at given bounds */
@@ -10,9 +13,6 @@
 #define DENSE_SMALL 1e-12 /* relative motion at which a method rests */
 #define DENSE_JACOBI 60
 #define DENSE_SINGULAR 1e-13 /* least eigenvalue by the largest */
-#define DENSE_AT_ONCE 1e-9   /* [m] u_f of a law without a flat part */
-#define DENSE_REST 1e-3      /* [m/s] resistive force theory at rest, docs/model.md section 19 */
-#define DENSE_PEAK 1.08      /* [-] its greatest coefficient there */
 
 /* ---- the element's law ---- */
 
@@ -108,7 +108,7 @@ static DenseLaw law_material(const MildMaterial *m, double pitch) {
                     .b_drift = m->b_drift};
     if (is_straight(m)) {
         law.k_pen = law.kappa = is_resistive(m) ? m->zeta * LAW_RESIST_STRESS * area : m->k_pen;
-        law.full = DENSE_AT_ONCE;
+        law.full = LAW_LINE_DEPTH;
         return law;
     }
     law.k_pen = m->k_pen;
@@ -227,7 +227,7 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
     double tilt = hypot(n[0], n[1]), heading[2] = {v[0], v[1]}, level = hypot(v[0], v[1]),
            down = fmax(w, 0.0), x[2], z[2];
     for (int k = 0; k < 2 && tilt > 0.0; k++) {
-        heading[k] += DENSE_REST * n[k] / tilt;
+        heading[k] += RESIST_REST * n[k] / tilt;
     }
     if (level * ELEMENT_LAG < FRICTION_ELASTIC) {
         level = 0.0; /* friction may hold it yet */
@@ -236,9 +236,9 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
     for (int k = 0; k < 2 && length > 0.0; k++) {
         heading[k] /= length;
     }
-    resist_alpha(model, n, heading, level + DENSE_REST, down, x);
-    resist_alpha(model, n, heading, level, down + DENSE_REST, z);
-    double share = fmin(fmax(z[1] / DENSE_PEAK, 0.0), 1.0), peak = DENSE_PEAK * strength;
+    resist_alpha(model, n, heading, level + RESIST_REST, down, x);
+    resist_alpha(model, n, heading, level, down + RESIST_REST, z);
+    double share = fmin(fmax(z[1] / RESIST_PEAK, 0.0), 1.0), peak = RESIST_PEAK * strength;
     if (e->m0 > 0.0) {
         double least =
             e->m0 + ELEMENT_ELASTIC * (1.0 - share); /* deeper than the elastic travel; or else */

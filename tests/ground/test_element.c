@@ -3,7 +3,7 @@
 
 #define ELEMENT_STEP element_step_double
 #include "element_step.inc"
-#include "ground/model.h"
+#include "ground/models.h"
 
 #define ELEMENTS 500
 #define STEPS 20

@@ -2,6 +2,8 @@
  * matched to mild. */
 #include "ground_kit.h"
 
+#include "ground/resist.h"
+
 #define SOFT_MODELS MILD_MODEL_RIGID
 #define LOAD (20.0 * KIT_GRAVITY) /* [N] half of the paper's robot */
 
@@ -51,9 +53,9 @@ static MildMaterial preset(const char *name) {
 /* ---- matching ---- */
 
 /* [m] by how much resistive force theory yields deeper than the element is, going straight down:
- * the elastic travel belongs to its greatest coefficient, 1.08 (src/ground/resist.c). 7 um: 0.4 %
+ * the elastic travel belongs to its greatest coefficient (src/ground/resist.c). 7 um: 0.4 %
  * of the force at 1.9 mm. */
-#define RESIST_LEAD (1e-4 * (1.0 - 1.0 / 1.08))
+#define RESIST_LEAD (ELEMENT_ELASTIC * (1.0 - 1.0 / RESIST_PEAK))
 
 /* Force of the level sole pushed slowly to `depth` by hand: A = 0. */
 static double pressed_force(int model, const MildMaterial *material, double depth) {

@@ -1,5 +1,5 @@
 /* A model's law in public: one element, a level sole, and the rival that sinks as deep. */
-#include "ground/model.h"
+#include "ground/models.h"
 
 #include <math.h>
 
