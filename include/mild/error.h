@@ -1,5 +1,5 @@
-/* Errors: a status and one line of text. The library never prints, exits or aborts. Thread safety: a
- * MildError belongs to its caller; nothing is shared. */
+/* Errors: a status and one line of text. The library never prints, exits or aborts. Thread safety:
+ * a MildError belongs to its caller; nothing is shared. */
 #ifndef MILD_ERROR_H
 #define MILD_ERROR_H
 

@@ -1,6 +1,6 @@
 /* Tables of fields. Each struct of parameters has one; validation, configuration keys and help text
- * all come from it. Thread safety: tables are constant and may be shared; the functions touch nothing
- * but their arguments. */
+ * all come from it. Thread safety: tables are constant and may be shared; the functions touch
+ * nothing but their arguments. */
 #ifndef MILD_FIELD_H
 #define MILD_FIELD_H
 
@@ -45,14 +45,15 @@ typedef struct {
 MildStatus mild_fields_check(const MildField *fields, int count, const void *def,
                              const char *section, MildError *error);
 
-/* Reads `text` into the field of the struct `def`. The values of an array are separated by spaces or
- * commas. Fails with MILD_ERROR_ARGUMENT when the text is not `count` values of the type, and with
- * MILD_ERROR_RANGE when a value is outside its range; then nothing is written. */
+/* Reads `text` into the field of the struct `def`. The values of an array are separated by spaces
+ * or commas. Fails with MILD_ERROR_ARGUMENT when the text is not `count` values of the type, and
+ * with MILD_ERROR_RANGE when a value is outside its range; then nothing is written. */
 MildStatus mild_field_parse(const MildField *field, void *def, const char *text,
                             const char *section, MildError *error);
 
 /* Writes the value of the field as text that mild_field_parse reads back exactly. text: [size].
- * Returns the length of the whole text as snprintf does: when that is `size` or more, it was cut. */
+ * Returns the length of the whole text as snprintf does: when that is `size` or more, it was
+ * cut. */
 int mild_field_print(const MildField *field, const void *def, char *text, size_t size);
 
 /* Finds a field by name; NULL when there is none. *nearest (may be NULL) receives the name with the

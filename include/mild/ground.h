@@ -41,8 +41,8 @@ MILD_API_BEGIN
  *
  * A model is where the elements are (one in the middle of the sole, mild_sole_concentric, or the
  * raster) and what a material means to an element. Solvers, memory, friction, drift and results are
- * the same for all. A model is a row of this list and a file, src/ground/model_NAME.c; all else that
- * names models derives from the two. */
+ * the same for all. A model is a row of this list and a file, src/ground/model_NAME.c; all else
+ * that names models derives from the two. */
 /* clang-format off */
 #define MILD_MODEL_LIST(ROW)                                                                       \
     ROW(MILD, mild)                  /* a developing cone under every element (the paper) */       \
@@ -137,8 +137,8 @@ typedef struct {
 } MildPatch;
 
 /* A plain struct. It may be copied, and its numbers may change between two steps. A loaded element
- * keeps the index of the material that it touched down on (docs/model.md section 5). The material at
- * a point is that of the first patch that holds it, else that of the map, else material 0. */
+ * keeps the index of the material that it touched down on (docs/model.md section 5). The material
+ * at a point is that of the first patch that holds it, else that of the map, else material 0. */
 typedef struct {
     int material_count;                         /* materials in use */
     int patch_count;                            /* patches in use */
@@ -206,9 +206,9 @@ double mild_sole_pitch(const MildSole *sole);
 const double *mild_sole_x(const MildSole *sole);
 const double *mild_sole_y(const MildSole *sole);
 double mild_sole_z(const MildSole *sole);
-/* Makes a sole of one element for the concentric models: it lies at the centroid of the elements and
- * has their whole area. It carries force, but no moment about its centre. Destroy it like any sole.
- * NULL when out of memory. */
+/* Makes a sole of one element for the concentric models: it lies at the centroid of the elements
+ * and has their whole area. It carries force, but no moment about its centre. Destroy it like any
+ * sole. NULL when out of memory. */
 MildSole *mild_sole_concentric(const MildSole *sole, MildError *error);
 
 /* ---- element law in closed form (eqs 1 to 5, docs/model.md section 3) ---- */
@@ -221,17 +221,19 @@ typedef struct {
     double added_mass;           /* m_a [kg] */
     double added_mass_per_depth; /* dm_a/du [kg/m] */
 } MildElementLaw;
-/* The law of an element of area pitch^2 [m^2] at a depth u >= 0 [m] in virgin ground. The firm bed is
- * part of it. */
+/* The law of an element of area pitch^2 [m^2] at a depth u >= 0 [m] in virgin ground. The firm bed
+ * is part of it. */
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth);
-/* [m] Depth at which a level sole that is pressed down slowly into virgin ground carries `load` [N].
+/* [m] Depth at which a level sole that is pressed down slowly into virgin ground carries
+ * `load` [N].
  */
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load);
 /* Derives the material of another model for a fair comparison with `mild`, a material of
  * MILD_MODEL_MILD: under `load` [N] one level foot sinks to the same depth. Half the weight of the
  * robot is a good load. Friction, drift, recovery and bed are those of `mild` where the model has
- * them. sole: the raster; when the model is concentric the result is for mild_sole_concentric of it.
- * Fails for rigid, when `mild` is a material of another model, and when the load is not positive. */
+ * them. sole: the raster; when the model is concentric the result is for mild_sole_concentric of
+ * it. Fails for rigid, when `mild` is a material of another model, and when the load is not
+ * positive. */
 MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error);
 
@@ -240,7 +242,8 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
  *
  * In a vertical plane (Li et al. 2013). beta [rad]: slope of the plate, positive when its leading
  * face looks forward and down. gamma [rad], 0 .. pi/2: direction of motion below the horizontal.
- * alpha[2]: resistance backward and upward; (0.007, 1) for a level plate that goes straight down. */
+ * alpha[2]: resistance backward and upward; (0.007, 1) for a level plate that goes straight
+ * down. */
 void mild_resist_plane(double beta, double gamma, double alpha[2]);
 /* In space (Agarwal et al. 2023, scaled to 1 for a level plate that goes straight down). normal[3]:
  * unit vector out of the plate into the ground. direction[3]: unit vector of the motion. alpha[3]:
@@ -273,8 +276,8 @@ typedef struct {
     int max_iterations; /* hard bound of the work; 0: 400 Newton steps or 1000 sweeps */
 } MildContactInput;
 
-/* What the ground does to one foot, mean over the step (docs/model.md section 9). All 0 for a foot in
- * the air. */
+/* What the ground does to one foot, mean over the step (docs/model.md section 9). All 0 for a foot
+ * in the air. */
 typedef struct {
     double force[3];  /* [N] on the foot, world */
     double torque[3]; /* [N m] about the ankle, world: p x F */
@@ -299,15 +302,16 @@ typedef struct {
                                            V = V_free + A W, W the wrench impulses */
     double residual;                    /* [-] relative, in the metric of kinetic energy */
     int iterations;                     /* Newton steps or sweeps done */
-    int converged; /* bool; 0 also when a pose or a result is not finite, when a number of a material
-                      is NaN and when dt is not positive */
+    /* Bool. It is 0 also when a pose or a result is not finite, when a number of a material is NaN
+     * and when dt is not positive. */
+    int converged;
 } MildContactResult;
 
 /* ---- memory and working arrays (docs/model.md section 5) ---- */
 
-/* What the ground remembers: greatest depth and drift of every element, and imprints. It is one block
- * of mild_ground_bytes() bytes without pointers. Copy it with memcpy to save, restore, send or branch
- * a simulation. */
+/* What the ground remembers: greatest depth and drift of every element, and imprints. It is one
+ * block of mild_ground_bytes() bytes without pointers. Copy it with memcpy to save, restore, send
+ * or branch a simulation. */
 typedef struct MildGround MildGround;
 /* Working arrays of one thread. It serves any number of grounds with the same soles in turn. */
 typedef struct MildScratch MildScratch;
@@ -320,11 +324,11 @@ MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet
 /* Forgets everything. Call it when the feet were moved to another place. */
 void mild_ground_reset(MildGround *ground);
 
-/* [B] The same for ground that remembers imprints: pressed ground keeps its depth after the foot has
- * lifted off, and an element that comes down there later meets it (docs/model.md section 5).
- * Imprints are kept in the block, in `tiles` squares of 8 x 8 cells with half the pitch of the first
- * sole. When all are in use the oldest are forgotten. The imprint of a foot of 0.27 x 0.10 m takes
- * about ten tiles. tiles: rounded up to a multiple of 8, at most MILD_PRINT_TILES_MAX; 0: no
+/* [B] The same for ground that remembers imprints: pressed ground keeps its depth after the foot
+ * has lifted off, and an element that comes down there later meets it (docs/model.md section 5).
+ * Imprints are kept in the block, in `tiles` squares of 8 x 8 cells with half the pitch of the
+ * first sole. When all are in use the oldest are forgotten. The imprint of a foot of 0.27 x 0.10 m
+ * takes about ten tiles. tiles: rounded up to a multiple of 8, at most MILD_PRINT_TILES_MAX; 0: no
  * imprints. */
 #define MILD_PRINT_TILES_MAX 65536
 size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tiles);
@@ -332,8 +336,8 @@ size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tile
 MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, int feet, int tiles);
 /* [B] Size of the block of an initialised ground. */
 size_t mild_ground_size(const MildGround *ground);
-/* [m] Greatest depth that the imprint at the world point (x, y) remembers; 0 where there is none. The
- * surface there lies (1 - recovery) times that below h0. */
+/* [m] Greatest depth that the imprint at the world point (x, y) remembers; 0 where there is none.
+ * The surface there lies (1 - recovery) times that below h0. */
 double mild_ground_print_at(const MildGround *ground, double x, double y);
 
 /* Makes a scratch. NULL when feet is not 1 .. MILD_FEET_MAX or out of memory. soles: [feet], not
@@ -349,9 +353,9 @@ void mild_scratch_destroy(MildScratch *scratch);
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                        const MildContactInput *input, MildScratch *scratch,
                        MildContactResult *result);
-/* Moves the memory of the ground to the end of the step that was just solved with this scratch, input
- * and result; positions are taken to advance by dt times the new velocity. Call it once for each step
- * that the engine keeps. */
+/* Moves the memory of the ground to the end of the step that was just solved with this scratch,
+ * input and result; positions are taken to advance by dt times the new velocity. Call it once for
+ * each step that the engine keeps. */
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                          const MildContactInput *input, const MildScratch *scratch,
                          const MildContactResult *result);

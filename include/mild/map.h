@@ -1,7 +1,7 @@
-/* A map: the shape of the ground and the pattern of its materials. It never changes, so any number of
- * terrains share it by pointer. Heights are a plane plus bilinear values on a regular grid. Labels
- * are indices into the materials of the terrain that uses the map. Every query takes constant time.
- * SI units. Thread safety: once created a map is only read. */
+/* A map: the shape of the ground and the pattern of its materials. It never changes, so any number
+ * of terrains share it by pointer. Heights are a plane plus bilinear values on a regular grid.
+ * Labels are indices into the materials of the terrain that uses the map. Every query takes
+ * constant time. SI units. Thread safety: once created a map is only read. */
 #ifndef MILD_MAP_H
 #define MILD_MAP_H
 
@@ -66,9 +66,9 @@ extern const int mild_map_field_count;
 typedef struct MildMap MildMap;
 
 #define MILD_MAP_POINTS_MAX (1 << 26) /* largest number of heights, and of labels, of a map */
-/* Makes a map. Returns NULL, with the field's name and the remedy in *error, when a number is out of
- * range or not finite, when an image is missing, too small or has a value that is not finite, when
- * there are more than MILD_MAP_POINTS_MAX points, or when out of memory. */
+/* Makes a map. Returns NULL, with the field's name and the remedy in *error, when a number is out
+ * of range or not finite, when an image is missing, too small or has a value that is not finite,
+ * when there are more than MILD_MAP_POINTS_MAX points, or when out of memory. */
 MildMap *mild_map_create(const MildMapDef *def, MildError *error);
 /* Frees a map; NULL is allowed. No terrain may use it afterwards. */
 void mild_map_destroy(MildMap *map);

@@ -70,8 +70,8 @@ MILD_HD Real element_virgin_way(const Element *e, Real dt, Real speed) {
 /* Drag of an element that will stop in virgin ground, beyond what momentum exchange takes. After
  * element_begin. gain: [m/s] by how much the free motion of the step speeds the element up.
  *
- * The work of the drag over the way is c_d m_a' times the integral of w^2. Of an impulse that acts at
- * the mean speed, V is the mean of w^2 over the way by (h + w)/2, with h the speed at the front.
+ * The work of the drag over the way is c_d m_a' times the integral of w^2. Of an impulse that acts
+ * at the mean speed, V is the mean of w^2 over the way by (h + w)/2, with h the speed at the front.
  *
  *     slow change                V = (h + w)/2
  *     drag alone stops the foot  the mean of w^2 is logarithmic, (h^2 - w^2)/(2 ln(h/w)), and V

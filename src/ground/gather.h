@@ -4,8 +4,8 @@
 
 #include "ground/scratch.h"
 
-/* All elements are listed and the ground keeps no imprints: the slots are the arrays of the elements
- * themselves. */
+/* All elements are listed and the ground keeps no imprints: the slots are the arrays of the
+ * elements themselves. */
 void slots_direct(FootScratch *foot, const Memory *memory);
 /* Copies the listed elements side by side. */
 void slots_gather(FootScratch *foot, const Memory *memory);
@@ -18,12 +18,13 @@ void slots_gather(FootScratch *foot, const Memory *memory);
  * so gain energy. Therefore an element that stays in the ground starts at the depth below the plane
  * of the last step when that is less. */
 void slots_uneven(const FootScratch *foot, int32_t before, const Memory *memory, double height);
-/* Sets the slopes back to 0 when a foot has left uneven ground. On level ground nothing writes them. */
+/* Sets the slopes back to 0 when a foot has left uneven ground. On level ground nothing writes
+ * them. */
 void slots_level(const FootScratch *foot);
 
-/* Greatest depth of the elements that carry nothing: that of the imprint under them. Below h0, within
- * an imprint, it is at least the depth whose unloading line ends where the element is; so moving
- * sideways in an imprint never loads it. R: rotation of the foot. */
+/* Greatest depth of the elements that carry nothing: that of the imprint under them. Below h0,
+ * within an imprint, it is at least the depth whose unloading line ends where the element is; so
+ * moving sideways in an imprint never loads it. R: rotation of the foot. */
 void slots_imprints(const FootScratch *foot, const Imprints *imprints, const Memory *memory,
                     const double *R);
 

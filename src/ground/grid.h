@@ -1,4 +1,5 @@
-/* Inside of a map: two regular grids, one of heights at its points and one of labels in its cells. */
+/* Inside of a map: two regular grids, one of heights at its points and one of labels in its
+ * cells. */
 #ifndef MILD_GROUND_GRID_H
 #define MILD_GROUND_GRID_H
 
@@ -30,8 +31,8 @@ typedef struct {
     double inside; /* 1 within the grid, 0 beyond its border */
 } GridPlace;
 
-/* at: coordinate from the start of the grid, in cells. Any number gives a valid cell: the comparisons
- * are false for NaN. */
+/* at: coordinate from the start of the grid, in cells. Any number gives a valid cell: the
+ * comparisons are false for NaN. */
 static inline GridPlace grid_place(double at, int cells, int repeats) {
     double end = (double)cells;
     if (repeats) {

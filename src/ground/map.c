@@ -42,8 +42,8 @@ MildMapDef mild_map_def_default(void) {
                         .patch_count = 2};
 }
 
-/* Sets the steepest gradient and the lowest and highest height. A bilinear cell is steepest along its
- * edges. */
+/* Sets the steepest gradient and the lowest and highest height. A bilinear cell is steepest along
+ * its edges. */
 static void map_measure(MildMap *map) {
     const Grid *grid = &map->heights;
     size_t stride = (size_t)grid->columns + 1;

@@ -45,7 +45,8 @@ static double *material_number(MildMaterial *m, const char *key) {
 }
 
 /* A law above its bed is proportional to its `scaled` fields, so one factor matches it. pressure:
- * what the ground above the bed carries per area [N/m^2]; area: of one element of the rival [m^2]. */
+ * what the ground above the bed carries per area [N/m^2]; area: of one element of the rival
+ * [m^2]. */
 static void rival_scale(MildMaterial *m, const ModelRow *row, double pressure, double area,
                         double depth) {
     MildMaterial bottomless = *m;

@@ -1,8 +1,8 @@
 /* A ground model: what its file, model_NAME.c, says of it. Its row is in MILD_MODEL_LIST
  * (mild/ground.h).
  *
- * A model made of curves that law.h has is that file and that row. A model with a new curve adds the
- * curve there first. */
+ * A model made of curves that law.h has is that file and that row. A model with a new curve adds
+ * the curve there first. */
 #ifndef MILD_GROUND_MODEL_H
 #define MILD_GROUND_MODEL_H
 

@@ -1,5 +1,6 @@
-/* The pattern consists of fields of one material. Where borders are smooth, fields are cut into small
- * cells; a cell near a border also has the label and the share of the neighbouring material. */
+/* The pattern consists of fields of one material. Where borders are smooth, fields are cut into
+ * small cells; a cell near a border also has the label and the share of the neighbouring
+ * material. */
 #include "ground/pattern.h"
 
 #include <limits.h>
@@ -52,9 +53,9 @@ static int neighbour(int index, int count, int repeats) {
     return index < 0 ? 0 : index >= count ? count - 1 : index;
 }
 
-/* Blends cell (i, j) with the nearest material of another label. At a distance d from it, its share is
- * 1/2 - d/border. Across a straight border the mixture thus changes linearly from one material to the
- * other. */
+/* Blends cell (i, j) with the nearest material of another label. At a distance d from it, its share
+ * is 1/2 - d/border. Across a straight border the mixture thus changes linearly from one material
+ * to the other. */
 static void pattern_blend(MildMap *map, double border, int i, int j) {
     const Grid *grid = &map->labels;
     Label *here = &map->label[(size_t)j * (size_t)grid->columns + (size_t)i];

@@ -48,8 +48,8 @@ void foot_place(FootScratch *foot, const MildTerrain *terrain, int imprints, con
     }
 }
 
-/* A bound of the speed at which any point of the foot gets deeper under the twist V [m/s]. steepest:
- * of the gradient of the ground [-]. */
+/* A bound of the speed at which any point of the foot gets deeper under the twist V [m/s].
+ * steepest: of the gradient of the ground [-]. */
 static double foot_descent(const FootScratch *foot, const double *V, double steepest) {
     const double tilt = V[3] * V[3] + V[4] * V[4];
     const double level = sqrt(V[0] * V[0] + V[1] * V[1]);

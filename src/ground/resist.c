@@ -1,5 +1,5 @@
-/* Resistive force theory: the stress on a plate is zeta 1e6 N/m^3 times its depth times coefficients
- * that depend on how the plate stands and where it moves.
+/* Resistive force theory: the stress on a plate is zeta 1e6 N/m^3 times its depth times
+ * coefficients that depend on how the plate stands and where it moves.
  *
  *     2D   Li, Zhang, Goldman, Science 339 (2013), generic coefficients; here in the vertical plane
  *          of each element's motion
@@ -12,16 +12,17 @@
  *     sideways   the radius of the friction disc grows by dt zeta 1e6 s u alpha_x; friction opposes
  *                the motion and never reverses it, so the step stays convex
  *
- * Left out is the force on a tilted plate across its horizontal motion, and before it moves sideways
- * at all. Such a force does not oppose the new velocity; taken at the old one it could create energy.
+ * Left out is the force on a tilted plate across its horizontal motion, and before it moves
+ * sideways at all. Such a force does not oppose the new velocity; taken at the old one it could
+ * create energy.
  *
  * At rest no direction is defined, and an element may give way to any side. RESIST_REST blends the
  * direction towards straight down for the downward yield and towards level for the sideways one.
  *
  * A changing direction must not create energy. The unloading line is therefore always that of the
- * peak, whatever the direction. Its yield depth b lies ELEMENT_ELASTIC (1 - share) ahead of the depth
- * that an element with a smaller share has reached; the element yields on that line, at the depth
- * where it gives the yield force. */
+ * peak, whatever the direction. Its yield depth b lies ELEMENT_ELASTIC (1 - share) ahead of the
+ * depth that an element with a smaller share has reached; the element yields on that line, at the
+ * depth where it gives the yield force. */
 #include "ground/resist.h"
 
 #include "ground/element_law.h"
@@ -124,8 +125,8 @@ static Plate plate_of(const double *rotation) {
     return plate;
 }
 
-/* Coefficients against the heading and upward, for motion at a level and a downward speed. lean: part
- * of the normal along the heading. in_space: bool, the theory in space. */
+/* Coefficients against the heading and upward, for motion at a level and a downward speed. lean:
+ * part of the normal along the heading. in_space: bool, the theory in space. */
 ALWAYS_INLINE Alpha plate_alpha(const Plate *plate, int in_space, double lean, double level,
                                 double down) {
     const double scale = 1.0 / sqrt(level * level + down * down);
@@ -179,8 +180,8 @@ ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, co
     const SlotVelocity v = slot_velocity(s, i, motion, 1);
     const double down = real_max(v.descent, 0.0);
 
-    /* Heading: of the motion plus RESIST_REST along the tilt. Where there is neither, any will do: a
-     * level plate's are all alike. */
+    /* Heading: of the motion plus RESIST_REST along the tilt. Where there is neither, any will do:
+     * a level plate's are all alike. */
     const double rest = RESIST_REST / plate->tilt;
     const double hx = v.x + rest * plate->normal[0];
     const double hy = v.y + rest * plate->normal[1];

@@ -48,7 +48,8 @@ static Outline outline_measure(const MildSoleDef *def) {
     return outline;
 }
 
-/* Twice the signed area of the triangle a b c: positive when c lies left of the line from a to b. */
+/* Twice the signed area of the triangle a b c: positive when c lies left of the line from a to
+ * b. */
 static double side(const double *a, const double *b, const double *c) {
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
@@ -133,9 +134,9 @@ static int clip_half(const double *in, int count, double *out, int axis, double 
     return kept;
 }
 
-/* Share of a cell that the outline covers, 0 .. 1. Clipping a concave polygon may leave edges that run
- * back and forth along the border of the cell. They enclose nothing, so the area is exact. work: room
- * for 64 numbers for each point of the outline. */
+/* Share of a cell that the outline covers, 0 .. 1. Clipping a concave polygon may leave edges that
+ * run back and forth along the border of the cell. They enclose nothing, so the area is exact.
+ * work: room for 64 numbers for each point of the outline. */
 static double cell_coverage(const MildSoleDef *def, const double *corner, double *work) {
     int count = def->points;
     double *a = work, *b = work + 32 * (size_t)def->points;
@@ -182,8 +183,8 @@ static Raster raster_at(const MildSoleDef *def, const Outline *outline, const do
     return raster;
 }
 
-/* Number of cells whose centre is inside. *off_center receives the distance between the centroids of
- * these cells and of the outline [m]. */
+/* Number of cells whose centre is inside. *off_center receives the distance between the centroids
+ * of these cells and of the outline [m]. */
 static int raster_count(const MildSoleDef *def, const Outline *outline, const Raster *raster,
                         double *off_center) {
     int count = 0;
@@ -206,9 +207,9 @@ static int raster_count(const MildSoleDef *def, const Outline *outline, const Ra
     return count;
 }
 
-/* The raster whose count comes nearest to the target; without a target, to the outline's area by that
- * of a cell. Among equals the one with the nearest centroid. Without a target either a border or a
- * centre of cells lies in the middle of the outline's box. */
+/* The raster whose count comes nearest to the target; without a target, to the outline's area by
+ * that of a cell. Among equals the one with the nearest centroid. Without a target either a border
+ * or a centre of cells lies in the middle of the outline's box. */
 static Raster raster_choose(const MildSoleDef *def, const Outline *outline) {
     int best_miss = INT32_MAX;
     double best_off = INFINITY;
@@ -239,8 +240,8 @@ typedef struct {
     int inside;      /* bool: its centre is inside the outline */
 } Cell;
 
-/* Cells with their centre inside come first, then those with more coverage. The index decides between
- * equals, so that the order does not depend on the sorting algorithm. */
+/* Cells with their centre inside come first, then those with more coverage. The index decides
+ * between equals, so that the order does not depend on the sorting algorithm. */
 static int cell_compare(const void *left, const void *right) {
     const Cell *a = left, *b = right;
     if (a->inside != b->inside) {

@@ -204,8 +204,8 @@ static inline void kit_rotate(double *R, const double *turn) {
     memcpy(R, out, sizeof out);
 }
 
-/* V_free of free bodies under gravity and a force at the centre of mass [N], gyroscopic terms of a ball
- * being zero. */
+/* V_free of free bodies under gravity and a force at the centre of mass [N], gyroscopic terms of a
+ * ball being zero. */
 static inline void kit_free(Kit *kit, const double force[][3]) {
     for (int f = 0; f < kit->feet; f++) {
         const double *V = kit->input.velocity[f];

@@ -21,9 +21,9 @@ static void round_all(double *x, int count) {
     }
 }
 
-/* A material and a motion of one element on it. Of five grounds one has its bed within reach, one an
- * element that has slid nearly as far as counts, one an impulse that creates energy, one an element
- * that is not deeper than the least elastic travel. */
+/* A material and a motion of one element on it. Of five grounds one has its bed within reach, one
+ * an element that has slid nearly as far as counts, one an impulse that creates energy, one an
+ * element that is not deeper than the least elastic travel. */
 static ElementCase random_case(int n, uint64_t *random) {
     static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
     MildMaterial m = kit_material(random);
@@ -55,8 +55,8 @@ static void case_push(ElementCase *c, uint64_t *random) {
     c->after[2] = rounded(turn * c->now + kit_uniform(random, -0.05, 0.05));
 }
 
-/* Goes on from the end of the step. Of eight steps one begins deeper or less deep than the step before
- * ended, as on uneven ground. */
+/* Goes on from the end of the step. Of eight steps one begins deeper or less deep than the step
+ * before ended, as on uneven ground. */
 static void case_move(ElementCase *c, const ElementResult *result, uint64_t *random) {
     const double shift = kit_index(random, 8) == 0 ? kit_uniform(random, -1e-4, 1e-4) : 0.0;
     memcpy(c->memory, result->memory, sizeof c->memory);
@@ -70,8 +70,8 @@ static void worst_of(double *worst, double a, double b, double scale) {
     *worst = fmax(*worst, fabs(a - b) / (fabs(b) + scale + 1e-12));
 }
 
-/* By the value itself and what the element carries at its yield; parts of a vector or a matrix by the
- * whole. worst[4]: of the normal impulse, the tangential one, their derivatives, the memory. */
+/* By the value itself and what the element carries at its yield; parts of a vector or a matrix by
+ * the whole. worst[4]: of the normal impulse, the tangential one, their derivatives, the memory. */
 static void worst_of_step(double *worst, const ElementCase *c, const ElementResult *one,
                           const ElementResult *two) {
     const double *v = one->value;
