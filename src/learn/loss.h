@@ -10,7 +10,7 @@
 #define MILD_LOSS_H
 
 #include "learn/network.h"
-#include "learn/ppo.h"
+#include "learn/ppo_def.h"
 
 #define LOSS_GROUPS                                                                                \
     3 /* estimates before, in and after the feet velocities: base velocity, feet velocities, feet  \
