@@ -12,7 +12,7 @@
 #include "config/experiment_keys.h"
 #include "gpu/learner.h"
 
-/* Where the numbers of a preset come from; docs/ has the details. */
+/* Sources of the presets' numbers; docs/ has the details. */
 static const struct {
     const char *ground, *what, *source;
 } sources[] = {
@@ -151,10 +151,10 @@ static int info_grounds(void) {
 }
 
 static int info_models(void) {
-    printf("ground models: mild info grounds\n"
-           "\nsolvers of the soft ones (--task.newton)\n"
-           "  newton        the step as one small convex problem; default\n"
-           "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n"
+    printf("ground models: see `mild info grounds`\n"
+           "\ncontact solvers of the soft models (--task.newton)\n"
+           "  newton        solves the step as one small convex problem (default)\n"
+           "  gauss_seidel  sweeps over the elements as in the paper; same answer, for comparison\n"
            "\nrobots\n"
            "  sa01    models/sa01/sa01.xml: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
     return 0;
@@ -164,8 +164,9 @@ static int info_config(void) {
     ExperimentDef def = experiment_def_default();
     ConfigSection sections[EXPERIMENT_SECTIONS];
     experiment_sections(&def, sections);
-    printf("# Every key with its default. A config file holds what differs; --section.key=value "
-           "changes one for one run.\n");
+    printf(
+        "# Every key with its default. A config file needs only the keys that differ.\n"
+        "# --section.key=value changes a key for one run. Lines show: [unit] meaning (range).\n");
     config_print(sections, EXPERIMENT_SECTIONS, 1, stdout);
     return 0;
 }
@@ -190,7 +191,7 @@ static const char *instruction_set(void) {
     case dnnl_cpu_isa_avx512_core: return "AVX-512";
     case dnnl_cpu_isa_avx512_core_vnni: return "AVX-512 with VNNI";
     case dnnl_cpu_isa_avx512_core_bf16: return "AVX-512 with BF16";
-    default: return "as oneDNN finds it";
+    default: return "instruction set chosen by oneDNN";
     }
 }
 
@@ -207,21 +208,30 @@ static int info_devices(void) {
 static const struct {
     const char *name;
     int (*print)(void);
+    const char *help;
 } topics[] = {
-    {"grounds", info_grounds}, {"models", info_models},   {"config", info_config},
-    {"build", info_build},     {"devices", info_devices},
+    {"grounds", info_grounds,
+     "ground presets: every parameter with its unit, range and source; ground models"},
+    {"models", info_models, "contact solvers and robots"},
+    {"config", info_config,
+     "every config key with its meaning, range and default, as a complete config file"},
+    {"build", info_build, "version, compiler and libraries"},
+    {"devices", info_devices, "processor, memory and GPU of this machine"},
 };
 enum { TOPICS = sizeof topics / sizeof *topics };
 
 int cmd_info(int argc, char **argv) {
+    CliWord words[TOPICS];
+    for (int i = 0; i < TOPICS; i++) {
+        words[i] = (CliWord){topics[i].name, topics[i].help};
+    }
     const CliCommand command = {
         .name = "info",
         .usage = "grounds | models | config | build | devices",
-        .summary = "grounds: presets with every parameter, its unit, range and source. models: "
-                   "ground models, "
-                   "solvers, robots. config: every key with its default, range and meaning, as a "
-                   "complete config file. "
-                   "build: version, compiler, libraries. devices: what this machine computes with.",
+        .summary = "Prints what the program offers and what it runs on.",
+        .words_title = "topics",
+        .words = words,
+        .word_count = TOPICS,
         .examples = "  mild info grounds\n  mild info config > my.ini\n",
         .positional_max = 1,
     };
@@ -231,7 +241,7 @@ int cmd_info(int argc, char **argv) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
     if (!args.positional_count) {
-        return cli_fail_text("info", "about what? mild info %s", command.usage);
+        return cli_fail_text("info", "no topic given; use mild info %s", command.usage);
     }
     const char *names[TOPICS];
     for (int i = 0; i < TOPICS; i++) {
