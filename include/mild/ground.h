@@ -28,33 +28,56 @@
 
 MILD_API_BEGIN
 
-#define MILD_FEET_MAX 2       /* feet in one contact problem */
+#define MILD_FEET_MAX 4       /* feet in one contact problem */
 #define MILD_MATERIALS_MAX 12 /* in one terrain */
 #define MILD_PATCHES_MAX 16   /* in one terrain */
 
 /* ---- ground models: the paper's and its rivals behind one contract (docs/model.md, "Ground
- * models") ---- A model is where the elements are (con_*: one in the middle of the sole,
- * mild_sole_concentric; the others: the raster) and what a material means to an element. Solvers,
- * memory, friction, drift and results are the same for all. */
-typedef enum {
-    MILD_MODEL_MILD,       /* a developing cone under every element (the paper) */
-    MILD_MODEL_CON_CONE,   /* one developing cone under the whole sole (Choi et al. 2023) */
-    MILD_MODEL_CON_SPRING, /* one yielding spring (Lynch et al. 2020): F = k_pen u going down, up to
-                              that at rest, 0 up */
-    MILD_MODEL_ECC_SPRING, /* the same spring under every element */
-    MILD_MODEL_ECC_QUASI,  /* resistive force theory in the plane of motion of every element (Li et
-                              al. 2013) */
-    MILD_MODEL_ECC_QUASI_3D, /* the same in three dimensions (Agarwal et al. 2023) */
-    MILD_MODEL_RIGID         /* the engine's own contact: a name only, no material has it */
-} MildModel;
-#define MILD_MODELS 7 /* of them */
+ * models") ----
+ *
+ * A model is where the elements are (one in the middle of the sole, mild_sole_concentric, or the
+ * raster) and what a material means to an element. Solvers, memory, friction, drift and results are
+ * the same for all. A model is a row of this list and a file, src/ground/model_NAME.c; all else that
+ * names models derives from the two. */
+/* clang-format off */
+#define MILD_MODEL_LIST(ROW)                                                                       \
+    ROW(MILD, mild)                  /* a developing cone under every element (the paper) */       \
+    ROW(CON_CONE, con_cone)          /* one developing cone under the whole sole */                \
+    ROW(CON_SPRING, con_spring)      /* one yielding spring under the whole sole */                \
+    ROW(ECC_SPRING, ecc_spring)      /* the same spring under every element */                     \
+    ROW(ECC_QUASI, ecc_quasi)        /* resistive force theory in the plane of motion */           \
+    ROW(ECC_QUASI_3D, ecc_quasi_3d)  /* the same in three dimensions */                            \
+    ROW(RIGID, rigid)                /* the last: the engine's contact; no material has it */
+/* clang-format on */
 
-/* Their names as users write them, in the enum's order: mild, con_cone, con_spring, ecc_spring,
- * ecc_quasi, ecc_quasi_3d, rigid. */
+/* A row's enumerator: MILD_MODEL_MILD and so on. */
+#define MILD_MODEL_ID(id, name) MILD_MODEL_##id,
+/* A model, in the list's order. */
+typedef enum {
+    MILD_MODEL_LIST(MILD_MODEL_ID) /* one of each row */
+} MildModel;
+#define MILD_MODELS (MILD_MODEL_RIGID + 1) /* how many there are */
+
+#define MILD_MODEL_FIELDS 20 /* of the material that a model reads, at most */
+#define MILD_MODEL_SCALED 4  /* of them those by which it is matched, at most */
+
+/* What a model says of itself. The lists end at the first NULL, or are full. */
+typedef struct {
+    const char *summary;                   /* what the foot stands on */
+    const char *source;                    /* who published it */
+    const char *fields[MILD_MODEL_FIELDS]; /* of the material that it reads */
+    const char *scaled[MILD_MODEL_SCALED]; /* of them those by which mild_model_match fits it */
+    const char *match_note;                /* what that sets besides; NULL: nothing */
+    int concentric; /* bool: one element in the middle of the sole, not the raster */
+} MildModelInfo;
+
+/* Their names as users write them, in the enum's order. */
 extern const char *const mild_model_names[MILD_MODELS];
 /* The model of that name into *model; false, and nothing written, when the name is unknown. */
 int mild_model_find(const char *name, MildModel *model);
-/* True for con_cone and con_spring. */
+/* Of any model; constant. */
+const MildModelInfo *mild_model_info(MildModel model);
+/* Its `concentric`. */
 int mild_model_is_concentric(MildModel model);
 
 /* ---- material: the element law's parameters (paper Table III; ranges and presets: docs/model.md

@@ -134,7 +134,6 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
 }
 
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
-    char path[PATH_SIZE];
     MildModel model;
     MildStatus status = experiment_nominal_task(&e->task, e->config, error);
     if (status == MILD_OK) {
@@ -144,7 +143,7 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
         return status;
     }
     Pool *pool = pool_create(e->threads);
-    Robot *robot = pool ? robot_create(path_data("models/sa01/sa01.xml", path), error) : NULL;
+    Robot *robot = pool ? robot_open("sa01", error) : NULL;
     Controller controller = {0};
     if (robot) {
         e->finish = grounds_for_robot(model, robot, &e->task, &e->terrain, args);
@@ -153,7 +152,7 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
         status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
     }
     if (status == MILD_OK) {
-        status = controller_learned(e->policy, pool, e->eval.trials, &controller, error);
+        status = controller_learned(e->policy, robot, pool, e->eval.trials, &controller, error);
     }
     if (status == MILD_OK) {
         status = evaluate(e, robot, pool, &controller, error);
@@ -172,7 +171,7 @@ int cmd_eval(int argc, char **argv) {
         free(args);
         return cli_fail_text("eval", "out of memory");
     }
-    char shipped[PATH_SIZE], model_help[200];
+    char shipped[PATH_SIZE], model_help[320];
     e->policy = path_data("policies/mild.safetensors", shipped);
     e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
     e->patch = 2.5;

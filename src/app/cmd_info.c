@@ -72,25 +72,11 @@ static void print_sinkage(const MildSole *sole) {
     }
 }
 
-static const struct {
-    const char *what, *source;
-} models[MILD_MODELS] = {
-    [MILD_MODEL_MILD] = {"a developing cone under every element", "the paper"},
-    [MILD_MODEL_CON_CONE] = {"one developing cone under the whole sole",
-                             "Choi et al. 2023, its numbers scaled"},
-    [MILD_MODEL_CON_SPRING] = {"one yielding spring under the sole's middle", "Lynch et al. 2020"},
-    [MILD_MODEL_ECC_SPRING] = {"a yielding spring under every element", "Lynch et al. 2024"},
-    [MILD_MODEL_ECC_QUASI] = {"resistive force theory under every element",
-                              "Li et al. 2013, Xiong et al. 2017"},
-    [MILD_MODEL_ECC_QUASI_3D] = {"the same in three dimensions", "Agarwal et al. 2023"},
-    [MILD_MODEL_RIGID] = {"the engine's own contact: train, eval, play; no parameters", "MuJoCo"},
-};
-
 /* One number that the model is matched by, on every preset. */
 static void print_matched(const MildSole *sole, MildModel model, const char *key) {
     const MildField *field =
         mild_field_find(mild_material_fields, mild_material_field_count, key, NULL);
-    printf("  %-10s %-10s", mild_model_names[model], key);
+    printf("  %-12s %-10s", mild_model_names[model], key);
     for (int p = 0; p < mild_material_preset_count(); p++) {
         MildMaterial mild, rival;
         mild_material_preset(mild_material_preset_name(p), &mild);
@@ -102,22 +88,32 @@ static void print_matched(const MildSole *sole, MildModel model, const char *key
     printf("\n");
 }
 
-static void print_models(const MildSole *sole) {
-    printf("\nmodels (--model NAME), and where they come from\n");
+static void print_models(void) {
+    printf("ground models (--model NAME) and their sources\n");
     for (int m = 0; m < MILD_MODELS; m++) {
-        printf("  %-12s  %s; %s\n", mild_model_names[m], models[m].what, models[m].source);
+        const MildModelInfo *info = mild_model_info((MildModel)m);
+        printf("  %-12s  %s; %s\n", mild_model_names[m], info->summary, info->source);
     }
-    printf("\nrivals under 20 kg on one foot, matched to sink as deep as mild; k_pen is that of "
-           "one element, for con_* of the\n"
-           "whole sole. con_cone keeps alpha 1.047, nu 2, c_g 2.7, c_d 17.2, phi 0.57, rho 1000; "
-           "springs and ecc_quasi* have\n"
-           "no inertia and no recovery; ecc_quasi* have their friction in zeta. The rest is the "
-           "preset's.\n");
-    print_matched(sole, MILD_MODEL_CON_CONE, "k_pen");
-    print_matched(sole, MILD_MODEL_CON_CONE, "sigma_cone");
-    print_matched(sole, MILD_MODEL_CON_SPRING, "k_pen");
-    print_matched(sole, MILD_MODEL_ECC_SPRING, "k_pen");
-    print_matched(sole, MILD_MODEL_ECC_QUASI, "zeta");
+}
+
+static void print_rivals(const MildSole *sole) {
+    printf(
+        "\nParameters of the other models. Each is matched to sink as deep as mild under 20 kg on one "
+        "foot. The numbers\n"
+        "are for one element, or for the whole sole with con_*. All other parameters are the "
+        "preset's.\n");
+    for (int m = 0; m < MILD_MODELS; m++) {
+        const MildModelInfo *info = mild_model_info((MildModel)m);
+        for (int k = 0; k < MILD_MODEL_SCALED && info->scaled[k]; k++) {
+            print_matched(sole, (MildModel)m, info->scaled[k]);
+        }
+    }
+    for (int m = 0; m < MILD_MODELS; m++) {
+        const char *note = mild_model_info((MildModel)m)->match_note;
+        if (note) {
+            printf("  %-12s %s\n", mild_model_names[m], note);
+        }
+    }
 }
 
 static int info_grounds(void) {
@@ -129,7 +125,9 @@ static int info_grounds(void) {
            "--ground.k_pen=500\n\n");
     print_preset_table();
     print_sinkage(sole);
-    print_models(sole);
+    printf("\n");
+    print_models();
+    print_rivals(sole);
     mild_sole_destroy(sole);
     printf("\nparameters\n");
     for (int f = 0; f < mild_material_field_count; f++) {
@@ -151,12 +149,22 @@ static int info_grounds(void) {
 }
 
 static int info_models(void) {
-    printf("ground models: see `mild info grounds`\n"
-           "\ncontact solvers of the soft models (--task.newton)\n"
+    print_models();
+    printf(
+        "\nparameters of the ground that each model reads (`mild info grounds` explains them)\n");
+    for (int m = 0; m < MILD_MODELS; m++) {
+        const MildModelInfo *info = mild_model_info((MildModel)m);
+        printf("  %-12s ", mild_model_names[m]);
+        for (int k = 0; k < MILD_MODEL_FIELDS && info->fields[k]; k++) {
+            printf(" %s", info->fields[k]);
+        }
+        printf("\n");
+    }
+    printf("\ncontact solvers of the soft models (--task.newton)\n"
            "  newton        solves the step as one small convex problem (default)\n"
            "  gauss_seidel  sweeps over the elements as in the paper; same answer, for comparison\n"
            "\nrobots\n"
-           "  sa01    models/sa01/sa01.xml: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
+           "  sa01    robots/sa01: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
     return 0;
 }
 
@@ -210,9 +218,9 @@ static const struct {
     int (*print)(void);
     const char *help;
 } topics[] = {
-    {"grounds", info_grounds,
-     "ground presets: every parameter with its unit, range and source; ground models"},
-    {"models", info_models, "contact solvers and robots"},
+    {"grounds", info_grounds, "ground presets; every parameter with its unit, range and source"},
+    {"models", info_models,
+     "ground models with their sources and parameters, contact solvers, robots"},
     {"config", info_config,
      "every config key with its meaning, range and default, as a complete config file"},
     {"build", info_build, "version, compiler and libraries"},

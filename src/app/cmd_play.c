@@ -84,11 +84,10 @@ static MildStatus make_place(const char *path, MildError *error) {
     return status == MILD_OK ? file_check_write(path, error) : status;
 }
 
-static MildStatus make_view(Command *c, const char *xml, MildError *error) {
+static MildStatus make_view(Command *c, MildError *error) {
     ViewDef def = view_def_default();
     Play *play = &c->play;
     double reach = play->speed * play->seconds;
-    def.xml = xml;
     def.width = c->width, def.height = c->height;
     def.rigid = c->scene.rigid;
     def.names = c->names;
@@ -206,7 +205,7 @@ static MildStatus walk(Command *c, MildError *error) {
     return status;
 }
 
-static MildStatus prepare(Command *c, const char *xml, MildError *error) {
+static MildStatus prepare(Command *c, MildError *error) {
     Play *play = &c->play;
     MildStatus status = MILD_OK;
     interrupt_install();
@@ -214,7 +213,7 @@ static MildStatus prepare(Command *c, const char *xml, MildError *error) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--pressure: rigid ground has no elements, choose a soft one");
     }
-    status = controller_learned(c->policy, NULL, 1, play->controller, error);
+    status = controller_learned(c->policy, play->robot, NULL, 1, play->controller, error);
     if (status == MILD_OK && c->video) {
         status = make_place(c->video, error);
     }
@@ -229,13 +228,12 @@ static MildStatus prepare(Command *c, const char *xml, MildError *error) {
         }
     }
     if (status == MILD_OK && (c->video || play->window)) {
-        status = make_view(c, xml, error);
+        status = make_view(c, error);
     }
     return status;
 }
 
 static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
-    char xml[PATH_SIZE];
     Play *play = &c->play;
     Controller controller = {0};
     MildModel model;
@@ -250,7 +248,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
         double course = c->grounds.count * c->patch / fmax(fabs(play->speed), 0.1) + COURSE_EXTRA;
         play->seconds = fmax(course, COURSE_LEAST);
     }
-    Robot *robot = robot_create(path_data("models/sa01/sa01.xml", xml), error);
+    Robot *robot = robot_open("sa01", error);
     if (!robot) {
         return error->status;
     }
@@ -260,7 +258,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     play->window = !c->video && !c->pressure;
     status = make_scene(c, error);
     if (status == MILD_OK) {
-        status = prepare(c, xml, error);
+        status = prepare(c, error);
     }
     if (status == MILD_OK) {
         status = walk(c, error);
@@ -277,7 +275,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
 }
 
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
-    char model_help[200];
+    char model_help[320];
     const CliOption options[] = {
         {"policy", CLI_INPUT, &c->policy, 0, 0, "FILE",
          "policy to watch (default policies/mild.safetensors)"},

@@ -35,9 +35,8 @@ static void tool_close(Tool *tool) {
 }
 
 static MildStatus tool_open_robot(Tool *tool, MildError *error) {
-    char path[PATH_SIZE];
     if (!tool->robot) {
-        tool->robot = robot_create(path_data("models/sa01/sa01.xml", path), error);
+        tool->robot = robot_open("sa01", error);
     }
     return tool->robot ? MILD_OK : error->status;
 }
@@ -47,8 +46,9 @@ static MildStatus tool_open_sole(Tool *tool, MildError *error) {
     if (status != MILD_OK) {
         return status;
     }
-    tool->sole = tool->raster = robot_rasters(tool->robot)[ROBOT_FOOT_LEFT];
-    snprintf(tool->name, sizeof tool->name, "the robot's left sole");
+    tool->sole = tool->raster = robot_rasters(tool->robot)[0];
+    snprintf(tool->name, sizeof tool->name, "the robot's %.40s sole",
+             robot_foot_name(tool->robot, 0));
     return MILD_OK;
 }
 
@@ -91,7 +91,7 @@ static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *arg
         .model = model, .sole = tool->raster, .load = 1, .args = args, .terrain = terrain};
     MildStatus status = model == MILD_MODEL_MILD ? MILD_OK : tool_open_robot(tool, error);
     if (status == MILD_OK && tool->robot) {
-        finish.load = robot_half_weight(tool->robot) * sole_area(tool->raster) /
+        finish.load = robot_foot_load(tool->robot) * sole_area(tool->raster) /
                       sole_area(robot_rasters(tool->robot)[0]);
     }
     if (status == MILD_OK) {
@@ -347,7 +347,7 @@ static CliOutcome options_parse(const CliOption *table, int count, int argc, cha
 }
 
 static int options_read(int argc, char **argv, PressOptions *options, CliArgs *args) {
-    char grounds[200], ground_help[320], model_help[200];
+    char grounds[200], ground_help[320], model_help[320];
     snprintf(ground_help, sizeof ground_help, "one of %s", grounds_names(grounds, sizeof grounds));
     const CliOption table[] = {
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},

@@ -62,7 +62,7 @@ MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *mod
 GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain,
                              const CliArgs *args) {
     robot_set_model(robot, model);
-    return (GroundsDef){model,  robot_rasters(robot)[0], robot_half_weight(robot), args, task,
+    return (GroundsDef){model,  robot_rasters(robot)[0], robot_foot_load(robot), args, task,
                         terrain};
 }
 
@@ -155,7 +155,7 @@ const char *grounds_names(char *text, size_t size) {
 }
 
 const char *grounds_model_help(char *text, size_t size) {
-    char names[120];
+    char names[240];
     list_names(MILD_MODELS, model_name, names, sizeof names);
     snprintf(text, size, "ground model, matched to the sinkage of mild (default mild): %s", names);
     return text;

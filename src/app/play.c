@@ -72,7 +72,7 @@ static void start(Walk *walk) {
 
 static void step(Walk *walk) {
     Play *play = walk->play;
-    float action[TASK_ACTIONS];
+    float action[ROBOT_JOINTS_MAX];
     TaskView none = {0};
     TaskProbe probe = {watch, walk};
     play->controller->act(play->controller->self, 1, &walk->env, action);

@@ -8,7 +8,7 @@
 
 enum { PATH_SIZE = 1024 };
 
-/* Full path of a shipped file such as "models/sa01/sa01.xml" or "configs/default.ini": below
+/* Full path of a shipped file such as "robots/sa01/robot.ini" or "configs/default.ini": below
  * $MILD_HOME when set, else beside the folder of the executable (build/..), else in the source tree
  * the program was built from. */
 const char *path_data(const char *relative, char path[PATH_SIZE]);

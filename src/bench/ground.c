@@ -11,7 +11,7 @@ static const char *const bench_preset = "sand_loose";
 
 /* ---- the ground alone ---- */
 
-enum { GROUND_REPEATS = 60, ROWS = 6 * MILD_FEET_MAX };
+enum { GROUND_REPEATS = 60, BENCH_FEET = 2, ROWS = 6 * BENCH_FEET };
 static const double ground_repeat = 0.003; /* [s] */
 
 typedef struct {
@@ -36,8 +36,8 @@ static void sole_center(const MildSole *sole, double center[2]) {
 static void ground_input(MildContactInput *input, const MildSole *const *soles, double dt) {
     const double linear = 1.0 / 20, angular = 1.0 / 0.3, coupling = 0.6, load = 33.0 / 2 * 9.81;
     double wrench[ROWS] = {0};
-    *input = (MildContactInput){.feet = ROBOT_FEET, .dt = dt};
-    for (int foot = 0; foot < ROBOT_FEET; foot++) {
+    *input = (MildContactInput){.feet = BENCH_FEET, .dt = dt};
+    for (int foot = 0; foot < BENCH_FEET; foot++) {
         const MildSole *sole = soles[foot];
         double center[2];
         sole_center(sole, center);
@@ -109,7 +109,7 @@ static void ground_settle(GroundBench *bench, const MildSole *const *soles, doub
 
 static void ground_slip(MildContactInput *input) {
     const double slip = 0.2; /* [m/s] */
-    for (int foot = 0; foot < ROBOT_FEET; foot++) {
+    for (int foot = 0; foot < BENCH_FEET; foot++) {
         input->velocity[foot][0] += slip;
         input->free_velocity[6 * foot] += slip;
     }
@@ -138,7 +138,7 @@ static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double 
     def.kind = MILD_MAP_WAVES;
     MildMap *map = mild_map_create(&def, error);
     void *block =
-        aligned_alloc(64, mild_ground_bytes_prints(robot_soles(robot), ROBOT_FEET, TILES));
+        aligned_alloc(64, mild_ground_bytes_prints(robot_soles(robot), BENCH_FEET, TILES));
     MildStatus status = map ? MILD_OK : error->status;
     if (status == MILD_OK && !block) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
@@ -149,7 +149,7 @@ static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double 
         ground_settle(bench, robot_soles(robot), dt);
         bench_add(report, "ground", "newton_uneven_advance", ground_time(bench, 1), "ns");
         bench->terrain.map = NULL;
-        bench->ground = mild_ground_init_prints(block, robot_soles(robot), ROBOT_FEET, TILES);
+        bench->ground = mild_ground_init_prints(block, robot_soles(robot), BENCH_FEET, TILES);
         ground_settle(bench, robot_soles(robot), dt);
         bench_add(report, "ground", "newton_prints_advance", ground_time(bench, 1), "ns");
         bench->ground = without;
@@ -159,14 +159,7 @@ static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double 
     return status;
 }
 
-/* Newton on each rival of mild at rest: one element for the concentric ones. */
-static const char *const rival_names[MILD_MODELS] = {[MILD_MODEL_CON_CONE] = "newton_con_cone",
-                                                     [MILD_MODEL_CON_SPRING] = "newton_con_spring",
-                                                     [MILD_MODEL_ECC_SPRING] = "newton_ecc_spring",
-                                                     [MILD_MODEL_ECC_QUASI] = "newton_ecc_quasi",
-                                                     [MILD_MODEL_ECC_QUASI_3D] =
-                                                         "newton_ecc_quasi_3d"};
-
+/* Newton on each model; on rivals of mild at rest: one element for the concentric ones. */
 static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchReport *report,
                                MildError *error) {
     MildMaterial mild, material;
@@ -178,10 +171,10 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
     }
     const MildSole *const *soles = robot_soles(robot);
     GroundBench bench = {.terrain = mild_terrain_uniform(&material)};
-    void *block = aligned_alloc(64, mild_ground_bytes(soles, ROBOT_FEET));
-    bench.scratch = mild_scratch_create(soles, ROBOT_FEET, error);
+    void *block = aligned_alloc(64, mild_ground_bytes(soles, BENCH_FEET));
+    bench.scratch = mild_scratch_create(soles, BENCH_FEET, error);
     if (block && bench.scratch) {
-        bench.ground = mild_ground_init(block, soles, ROBOT_FEET);
+        bench.ground = mild_ground_init(block, soles, BENCH_FEET);
         if (model == MILD_MODEL_MILD) {
             ground_cases(&bench, robot, dt, report);
             status = ground_terrain(&bench, robot, dt, report, error);
@@ -189,7 +182,9 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
                       mild_sole_elements(soles[0]) + mild_sole_elements(soles[1]), "-");
         } else {
             ground_settle(&bench, soles, dt);
-            bench_add(report, "ground", rival_names[model], ground_time(&bench, 0), "ns");
+            char name[sizeof report->rows->name];
+            snprintf(name, sizeof name, "newton_%s", mild_model_names[model]);
+            bench_add(report, "ground", name, ground_time(&bench, 0), "ns");
         }
     } else {
         status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
@@ -256,15 +251,15 @@ static MildStatus elements_case(int columns, int rows, double dt, BenchReport *r
     if (!sole) {
         return error->status;
     }
-    const MildSole *const soles[ROBOT_FEET] = {sole, sole};
+    const MildSole *const soles[BENCH_FEET] = {sole, sole};
     GroundBench bench = {.terrain = mild_terrain_uniform(&material)};
-    void *block = aligned_alloc(64, mild_ground_bytes(soles, ROBOT_FEET));
-    bench.scratch = mild_scratch_create(soles, ROBOT_FEET, error);
+    void *block = aligned_alloc(64, mild_ground_bytes(soles, BENCH_FEET));
+    bench.scratch = mild_scratch_create(soles, BENCH_FEET, error);
     MildStatus status = block && bench.scratch
                             ? MILD_OK
                             : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     if (status == MILD_OK) {
-        bench.ground = mild_ground_init(block, soles, ROBOT_FEET);
+        bench.ground = mild_ground_init(block, soles, BENCH_FEET);
         elements_times(&bench, soles, dt, report);
     }
     mild_scratch_destroy(bench.scratch);

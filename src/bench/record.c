@@ -11,8 +11,7 @@ static const double walk_speed = 0.6,
                     walk_settle = 1.0; /* [m/s] commanded, [s] before the record begins */
 
 Robot *bench_robot(MildError *error) {
-    char path[PATH_SIZE];
-    return robot_create(path_data("models/sa01/sa01.xml", path), error);
+    return robot_open("sa01", error);
 }
 
 /* A robot that walks. */
@@ -38,7 +37,7 @@ static void record_torque(void *context, const TaskEnv *env, const RobotSim *sim
 }
 
 static int walk_step(Walk *walk, ReplayPeriod *period) {
-    float action[TASK_ACTIONS];
+    float action[ROBOT_JOINTS_MAX];
     TaskView none = {0};
     TaskProbe probe = {record_torque, walk};
     if (period) {
@@ -63,8 +62,8 @@ static MildStatus walk_open(Walk *walk, MildError *error) {
     if (!walk->pool || !walk->sim || !walk->env) {
         return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     }
-    return controller_learned(path_data("policies/mild.safetensors", path), walk->pool, 1,
-                              &walk->controller, error);
+    return controller_learned(path_data("policies/mild.safetensors", path), walk->robot, walk->pool,
+                              1, &walk->controller, error);
 }
 
 static void walk_close(Walk *walk) {

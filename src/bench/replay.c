@@ -32,8 +32,8 @@ void replay_destroy(Replay *replay) {
 }
 
 static MildGround *new_ground(const Robot *robot) {
-    void *block = aligned_alloc(64, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
-    return block ? mild_ground_init(block, robot_soles(robot), ROBOT_FEET) : NULL;
+    void *block = aligned_alloc(64, mild_ground_bytes(robot_soles(robot), robot_feet(robot)));
+    return block ? mild_ground_init(block, robot_soles(robot), robot_feet(robot)) : NULL;
 }
 
 Replay *replay_create(const Robot *robot, int periods, int steps, double dt, MildError *error) {
@@ -77,7 +77,7 @@ static double play_soft(Player *player, const ReplayPeriod *period, int which) {
 static double sunk_floor(Player *player, const ReplayPeriod *period) {
     double floor = -INFINITY;
     robot_sim_load(player->soft, &period->state, &player->replay->variation);
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < robot_feet(player->robot); f++) {
         double height = robot_sim_foot(player->soft, f)->sole_height;
         if (height < 0.0) {
             floor = fmax(floor, height);
@@ -92,12 +92,19 @@ static double play_engine(Player *player, const ReplayPeriod *period) {
     mjModel *m = robot_sim_model(player->rigid);
     mjData *d = player->engine;
     m->geom_pos[3 * mj_name2id(m, mjOBJ_GEOM, "floor") + 2] = sunk_floor(player, period);
-    memcpy(d->qpos, period->state.qpos, sizeof period->state.qpos);
-    memcpy(d->qvel, period->state.qvel, sizeof period->state.qvel);
-    memcpy(d->qacc_warmstart, period->state.warmstart, sizeof period->state.warmstart);
+    const int *dof = robot_joint_dof(player->robot);
+    int joints = robot_joints(player->robot);
+    robot_engine_qpos(player->robot, period->state.qpos, d->qpos);
+    memcpy(d->qvel, period->state.qvel, 6 * sizeof *d->qvel);
+    for (int i = 0; i < joints; i++) {
+        d->qvel[dof[i]] = period->state.qvel[6 + i];
+    }
+    memcpy(d->qacc_warmstart, period->state.warmstart, (size_t)m->nv * sizeof *d->qacc_warmstart);
     double start = clock_seconds();
     for (int s = 0; s < replay->steps; s++) {
-        memcpy(d->qfrc_applied + 6, period->torque[s], sizeof period->torque[s]);
+        for (int i = 0; i < joints; i++) {
+            d->qfrc_applied[dof[i]] = period->torque[s][i];
+        }
         mj_step(m, d);
     }
     return clock_seconds() - start;

@@ -10,7 +10,7 @@ enum { REPLAY_STEPS_MAX = 100 }; /* physics steps of a period */
 typedef struct {
     RobotState state;
     MildGround *ground;
-    double torque[REPLAY_STEPS_MAX][ROBOT_JOINTS];
+    double torque[REPLAY_STEPS_MAX][ROBOT_JOINTS_MAX];
 } ReplayPeriod;
 
 typedef struct {

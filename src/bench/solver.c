@@ -7,9 +7,9 @@
 #include "base/random.h"
 #include "bench/bench.h"
 #include "bench/record.h"
-#include "robot/stand.h"
+#include "control/stand.h"
 
-enum { SOLVERS = 2, TWIST = 6 * ROBOT_FEET, PROBLEMS_MAX = 400 };
+enum { SOLVERS = 2, TWIST_MAX = 6 * ROBOT_FEET_MAX, PROBLEMS_MAX = 400 };
 static const double solver_error = 1e-6; /* [-] both stop here */
 static const double never = 1e-15;       /* [-] a tolerance that does not stop them earlier */
 static const int solver_limit[SOLVERS] = {100, 2048}; /* most iterations that are tried */
@@ -22,7 +22,7 @@ typedef struct {
     MildContactInput input;
     MildGround *ground;
     MildScratch *scratch;
-    double exact[TWIST]; /* [N s, N m s] the feet's impulses, by Newton to the last digits */
+    double exact[TWIST_MAX]; /* [N s, N m s] the feet's impulses, by Newton to the last digits */
     double times[SOLVERS][PROBLEMS_MAX]; /* [us] */
     int problems,
         without_exact; /* without: Newton did not converge, so there is nothing to compare with */
@@ -30,19 +30,20 @@ typedef struct {
 } SolverBench;
 
 static void impulses(const MildContactInput *input, const MildContactResult *result,
-                     double impulse[TWIST]) {
-    for (int i = 0; i < TWIST; i++) {
+                     double impulse[TWIST_MAX]) {
+    for (int i = 0; i < 6 * input->feet; i++) {
         const MildFootResult *foot = &result->foot[i / 6];
         impulse[i] = input->dt * (i % 6 < 3 ? foot->force[i % 6] : foot->torque[i % 6 - 3]);
     }
 }
 
 /* x^T A x, twice the kinetic energy that the impulses x give. */
-static double energy(const MildContactInput *input, const double x[TWIST]) {
+static double energy(const MildContactInput *input, const double x[TWIST_MAX]) {
     double sum = 0;
-    for (int i = 0; i < TWIST; i++) {
-        for (int j = 0; j < TWIST; j++) {
-            sum += x[i] * input->inverse_inertia[i * TWIST + j] * x[j];
+    int rows = 6 * input->feet;
+    for (int i = 0; i < rows; i++) {
+        for (int j = 0; j < rows; j++) {
+            sum += x[i] * input->inverse_inertia[i * rows + j] * x[j];
         }
     }
     return fmax(sum, 0);
@@ -61,10 +62,10 @@ static void solve(SolverBench *bench, int solver, double tolerance, int iteratio
  */
 static double error_after(SolverBench *bench, int solver, int iterations) {
     MildContactResult result;
-    double difference[TWIST];
+    double difference[TWIST_MAX];
     solve(bench, solver, never, iterations, &result);
     impulses(&bench->input, &result, difference);
-    for (int i = 0; i < TWIST; i++) {
+    for (int i = 0; i < 6 * bench->input.feet; i++) {
         difference[i] -= bench->exact[i];
     }
     return sqrt(energy(&bench->input, difference) / energy(&bench->input, bench->exact));
@@ -161,45 +162,46 @@ static void random_foot(MildContactInput *input, int foot, const MildSole *sole,
 
 /* Free bodies, and on top a random coupling of all twists. */
 static void random_inertia(MildContactInput *input, Random *r) {
-    double G[TWIST][TWIST];
+    double G[TWIST_MAX][TWIST_MAX];
+    int rows = 6 * input->feet;
     memset(input->inverse_inertia, 0, sizeof input->inverse_inertia);
-    for (int foot = 0; foot < ROBOT_FEET; foot++) {
+    for (int foot = 0; foot < input->feet; foot++) {
         double mass = exp(random_uniform(r, log(1), log(40))),
                inertia = mass * random_uniform(r, 0.002, 0.1);
         for (int i = 6 * foot; i < 6 * foot + 6; i++) {
-            input->inverse_inertia[i * TWIST + i] = 1 / (i % 6 < 3 ? mass : inertia);
+            input->inverse_inertia[i * rows + i] = 1 / (i % 6 < 3 ? mass : inertia);
         }
     }
-    for (int i = 0; i < TWIST; i++) {
-        for (int k = 0; k < TWIST; k++) {
+    for (int i = 0; i < rows; i++) {
+        for (int k = 0; k < rows; k++) {
             G[i][k] = random_uniform(r, -0.3, 0.3) * (i % 6 < 3 ? 1 : 3);
         }
     }
-    for (int i = 0; i < TWIST; i++) {
-        for (int j = 0; j < TWIST; j++) {
-            for (int k = 0; k < TWIST; k++) {
-                input->inverse_inertia[i * TWIST + j] += G[i][k] * G[j][k];
+    for (int i = 0; i < rows; i++) {
+        for (int j = 0; j < rows; j++) {
+            for (int k = 0; k < rows; k++) {
+                input->inverse_inertia[i * rows + j] += G[i][k] * G[j][k];
             }
         }
     }
 }
 
 static void free_fall(MildContactInput *input) {
-    for (int i = 0; i < TWIST; i++) {
+    for (int i = 0; i < 6 * input->feet; i++) {
         input->free_velocity[i] =
             input->velocity[i / 6][i % 6] - (i % 6 == 2 ? 9.81 * input->dt : 0);
     }
 }
 
-static void random_problem(SolverBench *bench, const MildSole *const *soles, uint32_t number) {
+static void random_problem(SolverBench *bench, const Robot *robot, uint32_t number) {
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     Random r = random_at(1, number, 0);
     MildContactInput *input = &bench->input;
     MildMaterial material = random_material(&r);
     bench->terrain = mild_terrain_uniform(&material);
-    *input = (MildContactInput){.feet = ROBOT_FEET, .dt = steps[random_index(&r, 3)]};
-    for (int foot = 0; foot < ROBOT_FEET; foot++) {
-        random_foot(input, foot, soles[foot], &r);
+    *input = (MildContactInput){.feet = robot_feet(robot), .dt = steps[random_index(&r, 3)]};
+    for (int foot = 0; foot < input->feet; foot++) {
+        random_foot(input, foot, robot_soles(robot)[foot], &r);
     }
     random_inertia(input, &r);
     mild_ground_reset(bench->ground);
@@ -209,7 +211,7 @@ static void random_problem(SolverBench *bench, const MildSole *const *soles, uin
         free_fall(input);
         mild_ground_solve(bench->ground, &bench->terrain, input, bench->scratch, &result);
         mild_ground_advance(bench->ground, &bench->terrain, input, bench->scratch, &result);
-        for (int i = 0; i < TWIST; i++) {
+        for (int i = 0; i < 6 * input->feet; i++) {
             input->velocity[i / 6][i % 6] = result.velocity[i];
             if (i % 6 < 3) {
                 input->position[i / 6][i % 6] += input->dt * result.velocity[i];
@@ -235,23 +237,27 @@ static void robot_problem(SolverBench *bench, RobotSim *sim, const double *torqu
 /* Sinks in from the surface, balanced by the stand torques, until it rests. */
 static MildStatus standing_problems(SolverBench *bench, const Robot *robot, double dt, int count,
                                     MildError *error) {
+    const int feet = robot_feet(robot);
     RobotSim *sim = robot_sim_create(robot, dt, error);
-    void *block = aligned_alloc(64, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
-    MildStatus status =
-        sim && block ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    Stand *stand = stand_create(robot, error);
+    void *block = aligned_alloc(64, mild_ground_bytes(robot_soles(robot), feet));
+    MildStatus status = sim && stand && block
+                            ? MILD_OK
+                            : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     if (status == MILD_OK) {
-        MildGround *ground = mild_ground_init(block, robot_soles(robot), ROBOT_FEET);
+        MildGround *ground = mild_ground_init(block, robot_soles(robot), feet);
         MildMaterial sand = mild_material_default();
         MildTerrain terrain = mild_terrain_uniform(&sand);
-        RobotState state = robot_stand_state(robot, 1, 0);
+        RobotState state = stand_state(stand, 1, 0);
         RobotVariation nominal = robot_variation_nominal();
         robot_sim_load(sim, &state, &nominal);
         for (int i = 0; i < count; i++) {
-            double torque[ROBOT_JOINTS];
-            robot_stand_torque(robot, sim, 1, torque);
+            double torque[ROBOT_JOINTS_MAX];
+            stand_torque(stand, sim, 1, torque);
             robot_problem(bench, sim, torque, &terrain, ground);
         }
     }
+    stand_destroy(stand);
     robot_sim_destroy(sim);
     free(block);
     return status;
@@ -318,17 +324,18 @@ MildStatus bench_solver(const ExperimentDef *def, BenchReport *report, MildError
         return MILD_ERROR_IO;
     }
     const MildSole *const *soles = robot_soles(robot);
+    const int feet = robot_feet(robot);
     SolverBench *bench = calloc(1, sizeof *bench);
-    void *block = aligned_alloc(64, mild_ground_bytes(soles, ROBOT_FEET));
-    MildScratch *scratch = mild_scratch_create(soles, ROBOT_FEET, error);
+    void *block = aligned_alloc(64, mild_ground_bytes(soles, feet));
+    MildScratch *scratch = mild_scratch_create(soles, feet, error);
     MildStatus status = MILD_OK;
     if (!bench || !block || !scratch) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     } else {
         bench->scratch = scratch;
-        bench->ground = mild_ground_init(block, soles, ROBOT_FEET);
+        bench->ground = mild_ground_init(block, soles, feet);
         for (uint32_t i = 0; i < RANDOM; i++) {
-            random_problem(bench, soles, i);
+            random_problem(bench, robot, i);
         }
         solver_rows(bench, "random", report);
         status = standing_problems(bench, robot, def->task.physics_dt, STANDING, error);

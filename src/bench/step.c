@@ -7,7 +7,7 @@
 #include "base/clock.h"
 #include "bench/bench.h"
 #include "bench/record.h"
-#include "robot/stand.h"
+#include "control/stand.h"
 
 #define REPEATS_MAX 1000
 #define WARM_STEPS 500
@@ -21,6 +21,7 @@ enum { ENGINE_FREE, ENGINE_RIGID, RIGID, NEWTON, GAUSS_SEIDEL, CASES };
 
 typedef struct {
     const Robot *robot;
+    Stand *stand;
     RobotSim *sims[CASES];
     mjData *engine[2]; /* of ENGINE_FREE and ENGINE_RIGID */
     MildGround *grounds[CASES];
@@ -29,12 +30,27 @@ typedef struct {
     long newton_steps;
 } Bench;
 
-/* mj_step under the stand torque of the pose in the engine's own data. */
+/* Torque of the stand for the pose in the engine's own data. */
+static void stand_engine_torque(const Bench *bench, mjData *d) {
+    const int *dof = robot_joint_dof(bench->robot);
+    double q[ROBOT_JOINTS_MAX], qd[ROBOT_JOINTS_MAX], torque[ROBOT_JOINTS_MAX];
+    int joints = robot_joints(bench->robot);
+    for (int i = 0; i < joints; i++) {
+        q[i] = d->qpos[dof[i] + 1];
+        qd[i] = d->qvel[dof[i]];
+    }
+    stand_pd(bench->stand, 1, q, qd, torque);
+    for (int i = 0; i < joints; i++) {
+        d->qfrc_applied[dof[i]] = torque[i];
+    }
+}
+
+/* mj_step under the stand torque. */
 static void engine_steps(Bench *bench, int which, int steps) {
     mjModel *m = robot_sim_model(bench->sims[which]);
     mjData *d = bench->engine[which];
     for (int i = 0; i < steps; i++) {
-        robot_stand_pd(bench->robot, 1, d->qpos + 7, d->qvel + 6, d->qfrc_applied + 6);
+        stand_engine_torque(bench, d);
         mj_step(m, d);
     }
 }
@@ -43,8 +59,8 @@ static int our_steps(Bench *bench, int which, int steps) {
     RobotSim *sim = bench->sims[which];
     int bad = 0;
     for (int i = 0; i < steps && !bad; i++) {
-        double torque[ROBOT_JOINTS];
-        robot_stand_torque(bench->robot, sim, 1, torque);
+        double torque[ROBOT_JOINTS_MAX];
+        stand_torque(bench->stand, sim, 1, torque);
         bad = robot_sim_step(sim, torque, NULL, &bench->terrain, bench->grounds[which]);
         if (which == NEWTON) {
             bench->iterations += robot_sim_contact(sim)->iterations;
@@ -69,18 +85,18 @@ static double time_case(Bench *bench, int which, int steps) {
 static MildStatus open_case(Bench *bench, int which, double dt, MildError *error) {
     const MildSole *const *soles = robot_soles(bench->robot);
     bench->sims[which] = robot_sim_create(bench->robot, dt, error);
-    void *block = calloc(1, mild_ground_bytes(soles, ROBOT_FEET));
+    void *block = calloc(1, mild_ground_bytes(soles, robot_feet(bench->robot)));
     if (!bench->sims[which] || !block) {
         free(block);
         return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     }
-    bench->grounds[which] = mild_ground_init(block, soles, ROBOT_FEET);
+    bench->grounds[which] = mild_ground_init(block, soles, robot_feet(bench->robot));
     RobotVariation variation = robot_variation_nominal();
     variation.rigid = which == ENGINE_RIGID || which == RIGID;
     int soft = which == NEWTON || which == GAUSS_SEIDEL;
     double depth =
-        mild_sole_sinkage(soles[0], &bench->terrain.materials[0], robot_half_weight(bench->robot));
-    RobotState state = robot_stand_state(bench->robot, 1, soft ? depth : 0.0);
+        mild_sole_sinkage(soles[0], &bench->terrain.materials[0], robot_foot_load(bench->robot));
+    RobotState state = stand_state(bench->stand, 1, soft ? depth : 0.0);
     robot_sim_set_solver(bench->sims[which],
                          which == GAUSS_SEIDEL ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON, 0,
                          0);
@@ -91,12 +107,13 @@ static MildStatus open_case(Bench *bench, int which, double dt, MildError *error
             return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
         }
         state.qpos[2] += which == ENGINE_FREE ? HANG_HEIGHT : 0.0;
-        memcpy(bench->engine[which]->qpos, state.qpos, sizeof state.qpos);
+        robot_engine_qpos(bench->robot, state.qpos, bench->engine[which]->qpos);
     }
     return MILD_OK;
 }
 
 static void close_bench(Bench *bench) {
+    stand_destroy(bench->stand);
     for (int c = 0; c < CASES; c++) {
         robot_sim_destroy(bench->sims[c]);
         free(bench->grounds[c]);
@@ -170,7 +187,8 @@ MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, i
         return mild_fail(error, MILD_ERROR_ARGUMENT, "bench: unknown ground '%s'", preset);
     }
     bench.terrain = mild_terrain_uniform(&material);
-    MildStatus status = MILD_OK;
+    bench.stand = stand_create(robot, error);
+    MildStatus status = bench.stand ? MILD_OK : MILD_ERROR_MEMORY;
     for (int c = 0; c < CASES && status == MILD_OK; c++) {
         status = open_case(&bench, c, dt, error);
     }

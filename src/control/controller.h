@@ -9,15 +9,15 @@
 typedef struct {
     void *self;
     const char *name;
-    /* Actions [rows][TASK_ACTIONS] for the environments as they are now. One caller at a time. */
+    /* Actions [rows][robot_joints] for the environments as they are now. One caller at a time. */
     void (*act)(void *self, int rows, TaskEnv *const *envs, float *actions);
     void (*destroy)(void *self);
 } Controller;
 
 /* The paper's controller: a trained policy file, deterministic (z = mu, mean action). pool may be
  * NULL. Fails when the file does not hold a policy of this task's shape. */
-MildStatus controller_learned(const char *path, Pool *pool, int rows_max, Controller *controller,
-                              MildError *error);
+MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
+                              Controller *controller, MildError *error);
 void controller_destroy(Controller *controller);
 
 #endif

@@ -8,14 +8,15 @@ typedef struct {
     Policy *policy;
     Pool *pool;
     int rows_max;
-    float *history; /* [rows_max][TASK_HISTORY] */
+    size_t width;   /* of a history */
+    float *history; /* [rows_max][width] */
 } Learned;
 
 static void learned_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
     Learned *learned = self;
     for (int i = 0; i < rows; i++) {
-        memcpy(learned->history + (size_t)i * TASK_HISTORY, envs[i]->history,
-               sizeof envs[i]->history);
+        memcpy(learned->history + (size_t)i * learned->width, task_env_history(envs[i]),
+               learned->width * sizeof *learned->history);
     }
     policy_act(learned->policy, learned->pool, rows, learned->history, actions, NULL, NULL);
 }
@@ -27,32 +28,33 @@ static void learned_destroy(void *self) {
     free(learned);
 }
 
-MildStatus controller_learned(const char *path, Pool *pool, int rows_max, Controller *controller,
-                              MildError *error) {
+MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
+                              Controller *controller, MildError *error) {
+    TaskShape shape = task_shape(robot);
     Policy *policy = policy_load(path, NULL, 0, error);
     if (!policy) {
         return error ? error->status : MILD_ERROR_FORMAT;
     }
     const PolicyDef *def = policy_def(policy);
-    if (def->observation != TASK_OBSERVATION || def->frames != TASK_FRAMES ||
-        def->actions != TASK_ACTIONS) {
+    if (def->observation != shape.observation || def->frames != TASK_FRAMES ||
+        def->actions != shape.actions) {
         mild_fail(error, MILD_ERROR_FORMAT,
-                  "%s: a policy for %d observations x %d frames and %d actions; this task needs %d "
+                  "%s: a policy for %d observations x %d frames and %d actions; robot %s needs %d "
                   "x %d and %d",
-                  path, def->observation, def->frames, def->actions, TASK_OBSERVATION, TASK_FRAMES,
-                  TASK_ACTIONS);
+                  path, def->observation, def->frames, def->actions, robot_name(robot),
+                  shape.observation, TASK_FRAMES, shape.actions);
         policy_destroy(policy);
         return MILD_ERROR_FORMAT;
     }
     Learned *learned = calloc(1, sizeof *learned);
-    float *history = calloc((size_t)rows_max * TASK_HISTORY, sizeof *history);
+    float *history = calloc((size_t)rows_max * (size_t)shape.history, sizeof *history);
     if (!learned || !history) {
         free(learned);
         free(history);
         policy_destroy(policy);
         return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
     }
-    *learned = (Learned){policy, pool, rows_max, history};
+    *learned = (Learned){policy, pool, rows_max, (size_t)shape.history, history};
     *controller = (Controller){learned, "learned", learned_act, learned_destroy};
     return MILD_OK;
 }

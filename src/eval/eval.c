@@ -27,7 +27,7 @@ typedef struct {
     TaskEnv **env;    /* [trials] */
     RobotSim **sim;   /* [threads] */
     Measure *measure; /* [trials] */
-    float *action;    /* [trials][TASK_ACTIONS] */
+    float *action;    /* [trials][robot_joints] */
     uint8_t *over;    /* [trials] fell or diverged */
 } Trials;
 
@@ -51,7 +51,7 @@ static void step_trial(void *context, int trial, int thread) {
     TaskView none = {0};
     TaskProbe probe = {measure_step, &t->measure[trial]};
     TaskStep step = task_env_step(t->env[trial], t->def, t->robot, t->sim[thread],
-                                  t->action + (size_t)trial * TASK_ACTIONS, 0, &none, &probe);
+                                  t->action + trial * robot_joints(t->robot), 0, &none, &probe);
     t->over[trial] = step.done && !step.timeout;
     const EvalDef *eval = t->eval;
     int stopped = eval->stop > 0 && t->measure[trial].time >= eval->stop;
@@ -76,7 +76,7 @@ static MildStatus make_trials(Trials *t, int trials, int threads, MildError *err
     t->env = calloc((size_t)trials, sizeof *t->env);
     t->sim = calloc((size_t)threads, sizeof *t->sim);
     t->measure = calloc((size_t)trials, sizeof *t->measure);
-    t->action = calloc((size_t)trials * TASK_ACTIONS, sizeof *t->action);
+    t->action = calloc((size_t)(trials * robot_joints(t->robot)), sizeof *t->action);
     t->over = calloc((size_t)trials, 1);
     int good = t->env && t->sim && t->measure && t->action && t->over;
     for (int i = 0; good && i < trials; i++) {

@@ -77,7 +77,7 @@ void measure_sample(Measure *m, const MeasureSample *sample) {
     }
     m->time += m->dt;
     memcpy(m->base, sample->base, sizeof m->base);
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < sample->feet; f++) {
         measure_foot(m, f, &sample->foot[f]);
     }
 }
@@ -87,11 +87,12 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
     MeasureSample sample = {
         .torque = torque,
         .joint_speed = robot_sim_qvel(sim) + 6,
-        .joints = ROBOT_JOINTS,
+        .joints = env->shape.joints,
+        .feet = env->shape.feet,
         .base = {qpos[0], qpos[1]},
         .base_height = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]),
     };
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < sample.feet; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         sample.foot[f] = (MeasureFoot){
             .load = foot->force[2],
@@ -105,7 +106,7 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
 
 void measure_finish(Measure *m) {
     int lifted = m->stances > 0;
-    for (int f = 0; f < ROBOT_FEET && !lifted; f++) {
+    for (int f = 0; f < ROBOT_FEET_MAX && !lifted; f++) {
         if (m->in_stance[f]) {
             end_stance(m, f);
         }

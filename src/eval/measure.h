@@ -21,7 +21,8 @@ typedef struct {
     int joints;
     double base[2];     /* [m] world x (along the walk) and y */
     double base_height; /* [m] above the undisturbed ground */
-    MeasureFoot foot[ROBOT_FEET];
+    int feet;
+    MeasureFoot foot[ROBOT_FEET_MAX]; /* [feet] */
 } MeasureSample;
 
 /* A stance begins when the ground carries the foot and ends with the last contact before a pause of
@@ -41,12 +42,12 @@ typedef struct {
     double base_low, base_high; /* [m] */
 
     /* the running stance or swing of each foot */
-    int in_stance[ROBOT_FEET];       /* bool */
-    double touchdown[ROBOT_FEET][2]; /* [m] sole centre at the first contact */
-    double last[ROBOT_FEET][2];      /* [m] sole centre at the latest contact */
-    double air_time[ROBOT_FEET];     /* [s] since the latest contact */
-    double apex[ROBOT_FEET];         /* [m] highest of the foot since then */
-    double deepest[ROBOT_FEET];      /* [m] */
+    int in_stance[ROBOT_FEET_MAX];       /* bool */
+    double touchdown[ROBOT_FEET_MAX][2]; /* [m] sole centre at the first contact */
+    double last[ROBOT_FEET_MAX][2];      /* [m] sole centre at the latest contact */
+    double air_time[ROBOT_FEET_MAX];     /* [s] since the latest contact */
+    double apex[ROBOT_FEET_MAX];         /* [m] highest of the foot since then */
+    double deepest[ROBOT_FEET_MAX];      /* [m] */
 
     /* finished ones */
     int swings, stances;

@@ -2,12 +2,8 @@
 
 #include "ground/material.h"
 
-int model_is_resistive(int model) {
-    return model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
-}
-
-/* F = slope u. The cone is complete at once; only a blend with a cone reads its depth. */
-static Law law_line(double slope, double area, double bed_depth) {
+/* The cone is complete at once; only a blend with a cone reads its depth. */
+Law law_line(double slope, double area, double bed_depth) {
     return (Law){.line_stiffness = slope,
                  .cone_depth = 1e-9,
                  .inverse_cone_depth = 1e9,
@@ -15,7 +11,17 @@ static Law law_line(double slope, double area, double bed_depth) {
                  .bed_stiffness = LAW_BED_STRESS * area};
 }
 
-static Law law_cone(const MildMaterial *material, double pitch) {
+Law law_spring(const MildMaterial *material, double pitch) {
+    return law_line(material->k_pen, pitch * pitch, material->bed_depth);
+}
+
+void law_spring_material(MildMaterial *material, double area) {
+    (void)area;
+    material->k_pen = 1.0;
+    material->recovery = 0.0;
+}
+
+Law law_cone(const MildMaterial *material, double pitch) {
     double area = pitch * pitch;
     double kappa = material->sigma_cone * area / cos(material->alpha);
     double c_g = material->c_g;
@@ -36,29 +42,7 @@ static Law law_cone(const MildMaterial *material, double pitch) {
     return law;
 }
 
-Law law_of(const MildMaterial *material, double pitch) {
-    double area = pitch * pitch;
-    if (material->model == MILD_MODEL_CON_SPRING || material->model == MILD_MODEL_ECC_SPRING) {
-        return law_line(material->k_pen, area, material->bed_depth);
-    }
-    if (model_is_resistive(material->model)) {
-        return law_line(material->zeta * LAW_RESIST_STRESS * area, area, material->bed_depth);
-    }
-    return law_cone(material, pitch);
-}
-
 int law_curves(const Law *law) {
     int cone = law->flat_stiffness != 0.0 || law->mass_rate != 0.0 || law->drag_rate != 0.0;
     return cone ? LAW_CONE : LAW_LINE;
-}
-
-MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth) {
-    Law law = law_of(material, pitch);
-    int curves = law_curves(&law);
-    return (MildElementLaw){
-        .force = law_force(&law, curves, depth),
-        .stiffness = law_slope(&law, curves, depth),
-        .added_mass = law.mass_rate * law_recruited(&law, depth),
-        .added_mass_per_depth = law.mass_rate * law_flat_share(&law, depth),
-    };
 }

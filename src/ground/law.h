@@ -29,7 +29,7 @@
  * when k_pen > kappa, convex otherwise, and straight beyond u_f.
  *
  * A new law adds its numbers to Law, a bit to LawCurve, and its term to each function of this file
- * that takes `curves`; law_of (law.c) fills the numbers. The step calls nothing else. Every number
+ * that takes `curves`; a model's `law` (model.h) fills the numbers. The step calls nothing else. Every number
  * but the lengths must scale its term, because at a border of two materials the numbers change
  * linearly from one to the other. `curves` is a constant where elements are stepped in vectors, so a
  * curve costs nothing on ground that does not have it. */

@@ -1,9 +1,7 @@
+#include <stdio.h>
 #include <string.h>
 
 #include "mild/ground.h"
-
-const char *const mild_model_names[MILD_MODELS] = {
-    "mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi", "ecc_quasi_3d", "rigid"};
 
 /* The ranges are what the equations bear, wider than the draws of the paper's Table III. */
 #define FIELD(member, low, high, help)                                                             \
@@ -84,23 +82,23 @@ MildMaterial mild_material_default(void) {
     return material;
 }
 
-int mild_model_find(const char *name, MildModel *model) {
-    for (int i = 0; i < MILD_MODELS; i++) {
-        if (strcmp(mild_model_names[i], name) != 0) {
-            continue;
-        }
-        *model = (MildModel)i;
-        return 1;
+/* Names of the models that a material can have, separated by commas. */
+static const char *soft_names(char *text, size_t size) {
+    size_t used = 0;
+    text[0] = '\0';
+    for (int m = 0; m < MILD_MODEL_RIGID && used < size; m++) {
+        used += (size_t)snprintf(text + used, size - used, m ? ", %s" : "%s", mild_model_names[m]);
     }
-    return 0;
+    return text;
 }
 
 MildStatus mild_material_check(const MildMaterial *material, MildError *error) {
     if (material->model == MILD_MODEL_RIGID) {
+        char names[160];
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "ground.model = rigid is the engine's own contact, which has no soft "
-                         "ground: choose mild, con_cone, "
-                         "con_spring, ecc_spring or ecc_quasi");
+                         "ground: choose one of %s",
+                         soft_names(names, sizeof names));
     }
     return mild_fields_check(mild_material_fields, mild_material_field_count, material, "ground",
                              error);

@@ -1,4 +1,4 @@
-/* From a material to the law of an element. */
+/* From numbers of a material to the law of an element: what the models are built from. */
 #ifndef MILD_GROUND_MATERIAL_H
 #define MILD_GROUND_MATERIAL_H
 
@@ -11,11 +11,16 @@
 /* [N/m^3] of a level plate going straight down at zeta = 1 (Li et al. 2013). */
 #define LAW_RESIST_STRESS 1e6
 
-/* Law of one element of area pitch^2. */
-Law law_of(const MildMaterial *material, double pitch);
-/* Its LawCurve bits. */
+/* F = slope u over the bed. area: of the element [m^2]. */
+Law law_line(double slope, double area, double bed_depth);
+/* A yielding spring: F = k_pen u going down; up to that at rest, 0 going up, within the elastic
+ * travel. */
+Law law_spring(const MildMaterial *material, double pitch);
+/* Its ModelRow.reference (model.h). */
+void law_spring_material(MildMaterial *material, double area);
+/* The developing cone of the material under one element of area pitch^2. */
+Law law_cone(const MildMaterial *material, double pitch);
+/* LawCurve bits of a law. */
 int law_curves(const Law *law);
-/* Bool: resistive force theory (resist.h). */
-int model_is_resistive(int model);
 
 #endif

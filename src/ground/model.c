@@ -1,14 +1,17 @@
+/* A model's law in public: one element, a level sole, and the rival that sinks as deep. */
+#include "ground/model.h"
+
 #include <math.h>
 
-#include "ground/material.h"
-
-/* Choi et al. 2023, the set for a foot of area A: k = 1e6 N/m^3 A, the cone's numbers below. */
-#define CHOI_STRESS 1e6   /* [N/m^3] k/A */
-#define CHOI_SIGMA 0.15e6 /* [N/m^3] */
-#define CHOI_ALPHA (LAW_PI / 3.0)
-
-int mild_model_is_concentric(MildModel model) {
-    return model == MILD_MODEL_CON_CONE || model == MILD_MODEL_CON_SPRING;
+MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth) {
+    const Law law = law_of(material, pitch);
+    const int curves = law_curves(&law);
+    return (MildElementLaw){
+        .force = law_force(&law, curves, depth),
+        .stiffness = law_slope(&law, curves, depth),
+        .added_mass = law.mass_rate * law_recruited(&law, depth),
+        .added_mass_per_depth = law.mass_rate * law_flat_share(&law, depth),
+    };
 }
 
 static double sole_force(const MildSole *sole, const MildMaterial *material, double depth) {
@@ -34,38 +37,27 @@ static void material_concentrate(MildMaterial *m, double cells) {
     m->b_drift *= cells;
 }
 
-/* A rival's law is proportional to its strength, so one division matches it. pressure: what the
- * ground above the bed carries per area [N/m^2]; area: of one element of the rival [m^2]. */
-static void rival_cone(MildMaterial *m, double pressure, double area, double depth) {
-    m->alpha = CHOI_ALPHA;
-    m->nu = 2.0;
-    m->c_g = 2.7;
-    m->c_d = 17.2;
-    m->phi = 0.57;
-    m->rho = 1000.0;
-    m->k_pen = CHOI_STRESS * area;
-    m->sigma_cone = CHOI_SIGMA;
+/* A material's number by its key. */
+static double *material_number(MildMaterial *m, const char *key) {
+    const MildField *field =
+        mild_field_find(mild_material_fields, mild_material_field_count, key, NULL);
+    return (double *)((uintptr_t)m + field->offset);
+}
+
+/* A law above its bed is proportional to its `scaled` fields, so one factor matches it. pressure:
+ * what the ground above the bed carries per area [N/m^2]; area: of one element of the rival [m^2]. */
+static void rival_scale(MildMaterial *m, const ModelRow *row, double pressure, double area,
+                        double depth) {
     MildMaterial bottomless = *m;
     bottomless.bed_depth = INFINITY;
-    double scale = pressure * area / mild_element_law(&bottomless, sqrt(area), depth).force;
-    m->k_pen *= scale;
-    m->sigma_cone *= scale;
+    const double scale = pressure * area / mild_element_law(&bottomless, sqrt(area), depth).force;
+    for (int k = 0; k < MILD_MODEL_SCALED && row->info.scaled[k]; k++) {
+        *material_number(m, row->info.scaled[k]) *= scale;
+    }
 }
 
-static void rival_spring(MildMaterial *m, double pressure, double area, double depth) {
-    m->k_pen = pressure * area / depth;
-    m->recovery = 0.0;
-}
-
-/* The plate's friction is part of the measured coefficients. */
-static void rival_quasi(MildMaterial *m, double pressure, double depth) {
-    m->zeta = pressure / (LAW_RESIST_STRESS * depth);
-    m->recovery = 0.0;
-    m->mu = m->k_drift = m->b_drift = 0.0;
-}
-
-MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
-                            double load, MildMaterial *rival, MildError *error) {
+static MildStatus match_check(MildModel model, const MildMaterial *mild, double load,
+                              MildError *error) {
     if (model == MILD_MODEL_RIGID) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "model: rigid is the engine's own contact and has no material");
@@ -78,23 +70,33 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
     if (!(load > 0.0 && load < INFINITY)) {
         return mild_fail(error, MILD_ERROR_RANGE, "model: load = %g N must be positive", load);
     }
-    double cells = mild_sole_elements(sole), cell = mild_sole_pitch(sole) * mild_sole_pitch(sole);
-    double depth = mild_sole_sinkage(sole, mild, load),
-           area = mild_model_is_concentric(model) ? cells * cell : cell;
-    double pressure = load / (cells * cell) - LAW_BED_STRESS * fmax(depth - mild->bed_depth, 0.0);
+    return MILD_OK;
+}
+
+MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
+                            double load, MildMaterial *rival, MildError *error) {
+    const MildStatus status = match_check(model, mild, load, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    const ModelRow *row = model_row((int)model);
+    const double cells = mild_sole_elements(sole);
+    const double cell = mild_sole_pitch(sole) * mild_sole_pitch(sole);
+    const double area = row->info.concentric ? cells * cell : cell;
+    const double depth = mild_sole_sinkage(sole, mild, load);
+    const double pressure =
+        load / (cells * cell) - LAW_BED_STRESS * fmax(depth - mild->bed_depth, 0.0);
+
     *rival = *mild;
     rival->model = (int)model;
-    if (mild_model_is_concentric(model)) {
+    if (row->info.concentric) {
         material_concentrate(rival, cells);
     }
-    if (model == MILD_MODEL_CON_CONE) {
-        rival_cone(rival, pressure, area, depth);
+    if (row->reference) {
+        row->reference(rival, area);
     }
-    if (model == MILD_MODEL_CON_SPRING || model == MILD_MODEL_ECC_SPRING) {
-        rival_spring(rival, pressure, area, depth);
-    }
-    if (model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D) {
-        rival_quasi(rival, pressure, depth);
+    if (row->info.scaled[0]) {
+        rival_scale(rival, row, pressure, area, depth);
     }
     return MILD_OK;
 }

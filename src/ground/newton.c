@@ -13,9 +13,9 @@
 #define NEWTON_GROWTH                                                                              \
     8.0 /* an elimination's factors beyond this are worth a search for a pivot   \
                            */
-/* A row of up to 2 x 6 numbers, in whole vectors. Written with the compiler's vector type: what it
+/* A row of up to 4 x 6 numbers and a right side, in whole vectors. Written with the compiler's vector type: what it
  * makes of plain loops over so short rows takes three times as long. */
-enum { NEWTON_VECTOR = 8, NEWTON_VECTORS = 2, NEWTON_LANES = NEWTON_VECTOR * NEWTON_VECTORS };
+enum { NEWTON_VECTOR = 8, NEWTON_VECTORS = 4, NEWTON_LANES = NEWTON_VECTOR * NEWTON_VECTORS };
 typedef double Vector __attribute__((vector_size(NEWTON_VECTOR * sizeof(double))));
 typedef union {
     double at[NEWTON_LANES];
@@ -58,7 +58,8 @@ static int least(int a, int b) {
     return a < b ? a : b;
 }
 
-/* All that follows is compiled for one and for two loaded feet: n rows in `parts` vectors. */
+/* All that follows is compiled for one and for two loaded feet, and for more: n rows in `parts`
+ * vectors, of which the last holds the right side, too. */
 
 /* y += A x; A is symmetric. */
 ALWAYS_INLINE void system_times(const System *system, const double *x, Row *y, int n, int parts) {
@@ -144,8 +145,11 @@ ALWAYS_INLINE int rows_eliminate(Row *M, double *x, int n, int parts) {
 ALWAYS_INLINE int point_newton(const System *system, MildScratch *scratch, const Point *at,
                                Point *next, int n, int parts) {
     static const Row unit[TWIST_MAX + 1] = {
-        {{1}},       {{0, 1}},    {{[2] = 1}}, {{[3] = 1}},  {{[4] = 1}},  {{[5] = 1}}, {{[6] = 1}},
-        {{[7] = 1}}, {{[8] = 1}}, {{[9] = 1}}, {{[10] = 1}}, {{[11] = 1}}, {{[12] = 1}}};
+        {{1}},        {{0, 1}},     {{[2] = 1}},  {{[3] = 1}},  {{[4] = 1}},
+        {{[5] = 1}},  {{[6] = 1}},  {{[7] = 1}},  {{[8] = 1}},  {{[9] = 1}},
+        {{[10] = 1}}, {{[11] = 1}}, {{[12] = 1}}, {{[13] = 1}}, {{[14] = 1}},
+        {{[15] = 1}}, {{[16] = 1}}, {{[17] = 1}}, {{[18] = 1}}, {{[19] = 1}},
+        {{[20] = 1}}, {{[21] = 1}}, {{[22] = 1}}, {{[23] = 1}}, {{[24] = 1}}};
     Row M[TWIST_MAX];
     double moved[TWIST_MAX];
     contact_hessian(scratch);
@@ -239,11 +243,12 @@ static double step_slope(const System *system, const MildScratch *scratch, const
 
 /* With the bounds of friction held the step is the minimum of a convex function, and a search along
  * each step finds it from anywhere. */
-static int newton_held(const System *system, MildScratch *scratch, Point *at, int limit, int n) {
+static int newton_held(const System *system, MildScratch *scratch, Point *at, int limit, int n,
+                       int parts) {
     int steps = 0, moves = 1;
     Point full, next;
     contact_pass_held(scratch, system->dt, at->twist.at, system->first);
-    while (moves && steps < limit && point_newton(system, scratch, at, &full, n, NEWTON_VECTORS)) {
+    while (moves && steps < limit && point_newton(system, scratch, at, &full, n, parts)) {
         steps++;
         double start = step_slope(system, scratch, at, at, &full, n), end, low = 0.0, high = 1.0,
                t = 1.0;
@@ -257,12 +262,12 @@ static int newton_held(const System *system, MildScratch *scratch, Point *at, in
             *(end < 0.0 ? &low : &high) = t;
             t = 0.5 * (low + high);
         }
-        double moved[TWIST_MAX], scale = system_norm(system, next.impulse.at, n, NEWTON_VECTORS);
+        double moved[TWIST_MAX], scale = system_norm(system, next.impulse.at, n, parts);
         for (int i = 0; i < n; i++) {
             moved[i] = next.impulse.at[i] - at->impulse.at[i];
         }
         *at = next;
-        moves = !(system_norm(system, moved, n, NEWTON_VECTORS) <= 0.1 * system->tolerance * scale);
+        moves = !(system_norm(system, moved, n, parts) <= 0.1 * system->tolerance * scale);
     }
     return steps;
 }
@@ -270,8 +275,8 @@ static int newton_held(const System *system, MildScratch *scratch, Point *at, in
 /* Where the bounds' dependence on I_z leads Newton's method astray, or it runs in circles over
  * kinks: minimum at held bounds and bounds at the minimum follow each other, with shorter steps
  * when they do not come closer. */
-static int newton_patient(const System *system, MildScratch *scratch, Point *best, int limit,
-                          int n) {
+static int newton_patient(const System *system, MildScratch *scratch, Point *best, int limit, int n,
+                          int parts) {
     Point at = *best;
     int steps = 0;
     double share = 1.0, last = INFINITY;
@@ -280,17 +285,16 @@ static int newton_patient(const System *system, MildScratch *scratch, Point *bes
     }
     contact_pass(scratch, system->dt, at.twist.at, system->first);
     contact_bounds(scratch, 1.0);
-    for (int round = 1; steps < limit && !point_solves(system, best, n, NEWTON_VECTORS); round++) {
-        int held = newton_held(system, scratch, &at, least(limit - steps, NEWTON_ROUND), n);
+    for (int round = 1; steps < limit && !point_solves(system, best, n, parts); round++) {
+        int held = newton_held(system, scratch, &at, least(limit - steps, NEWTON_ROUND), n, parts);
         if (held == 0) {
             break; /* the numbers have gone bad */
         }
         steps += held;
-        point_evaluate(system, scratch, &at, n, NEWTON_VECTORS);
+        point_evaluate(system, scratch, &at, n, parts);
         contact_bounds(scratch, share);
         Point tried = at;
-        steps += newton_plain(system, scratch, &tried, least(limit - steps, NEWTON_TRY), n,
-                              NEWTON_VECTORS);
+        steps += newton_plain(system, scratch, &tried, least(limit - steps, NEWTON_TRY), n, parts);
         if (tried.residual < best->residual) {
             *best = tried;
         }
@@ -312,7 +316,7 @@ ALWAYS_INLINE void system_solve(const System *system, MildScratch *scratch, cons
     contact_pass(scratch, system->dt, best.twist.at, system->first);
     int steps = newton_plain(system, scratch, &best, least(system->limit, NEWTON_PLAIN), n, parts);
     if (!point_solves(system, &best, n, parts)) {
-        steps += newton_patient(system, scratch, &best, system->limit - steps, n);
+        steps += newton_patient(system, scratch, &best, system->limit - steps, n, parts);
         contact_pass(scratch, system->dt, best.twist.at, system->first);
     }
     double scale = system_norm(system, best.impulse.at, n, parts);
@@ -333,10 +337,17 @@ void newton_solve(MildScratch *scratch, const MildContactInput *input, MildConta
     System system;
     memset(scratch->wrench, 0, sizeof scratch->wrench);
     system_open(&system, scratch, input, 6 * first, n);
+    for (int f = first; f < end && n > 12; f++) { /* a foot in the air between loaded ones */
+        if (scratch->foot[f].active == 0) {
+            memset(scratch->hessian[f], 0, sizeof scratch->hessian[f]);
+        }
+    }
     if (n == 6) {
         system_solve(&system, scratch, input->velocity[first], result, 6, 1);
+    } else if (n == 12) {
+        system_solve(&system, scratch, input->velocity[first], result, 12, 2);
     } else {
-        system_solve(&system, scratch, input->velocity[first], result, TWIST_MAX, 2);
+        system_solve(&system, scratch, input->velocity[first], result, n, NEWTON_VECTORS);
     }
     for (int i = 0; i < stride; i++) {
         double sum = input->free_velocity[i];

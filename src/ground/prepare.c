@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "ground/begin.h"
-#include "ground/resist.h"
+#include "ground/model.h"
 #include "ground/terrain.h"
 
 #define PREPARE_MARGIN 1e-3  /* [m] elements this close to the ground are listed */
@@ -414,6 +414,21 @@ static void slots_clear(const FootScratch *foot) {
     memset(foot->own.explicit_impulse, 0, bytes);
 }
 
+/* The models whose law depends on the direction of motion. */
+static void foot_direct(const FootScratch *foot, const MildTerrain *terrain, double dt,
+                        const double *rotation, const Motion *now) {
+    unsigned done = 0;
+    for (int m = 0; m < terrain->material_count; m++) {
+        const int model = terrain->materials[m].model;
+        const ModelRow *row = model_row(model);
+        if (!row->direction || done >> model & 1) {
+            continue;
+        }
+        done |= 1u << model;
+        row->direction(foot, terrain, model, dt, rotation, now);
+    }
+}
+
 static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
                          const MildTerrain *terrain, const MildContactInput *input) {
     const Memory memory = ground_memory(ground, f);
@@ -443,7 +458,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
         slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free);
         foot->stops = 1;
     }
-    slots_resist(foot, terrain, input->dt, R, &now);
+    foot_direct(foot, terrain, input->dt, R, &now);
 }
 
 int contact_prepare(const MildGround *ground, const MildTerrain *terrain,

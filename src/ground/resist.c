@@ -120,13 +120,13 @@ static Plate plate_of(const double *rotation) {
 }
 
 /* Coefficients against the heading and upward, for motion at a level and a downward speed. lean: part
- * of the normal along the heading. */
-ALWAYS_INLINE Alpha plate_alpha(const Plate *plate, int model, double lean, double level,
+ * of the normal along the heading. in_space: bool, the theory in space. */
+ALWAYS_INLINE Alpha plate_alpha(const Plate *plate, int in_space, double lean, double level,
                                 double down) {
     const double scale = 1.0 / sqrt(level * level + down * down);
     const double c = level * scale;
     const double s = down * scale;
-    if (model == MILD_MODEL_ECC_QUASI) {
+    if (!in_space) {
         const double slope = lean * (-1.0 / plate->normal[2]);
         const double whole = 1.0 / (1.0 + slope * slope);
         return plane_alpha((1.0 - slope * slope) * whole, 2.0 * slope * whole, c, s);
@@ -170,7 +170,7 @@ ALWAYS_INLINE void element_resist(Element *e, const ElementMemory *memory, doubl
 
 /* The law of one slot for its motion at the start of the step. */
 ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, const Plate *plate,
-                               const Motion *motion, int model) {
+                               const Motion *motion, int in_space) {
     const SlotVelocity v = slot_velocity(s, i, motion, 1);
     const double down = real_max(v.descent, 0.0);
 
@@ -184,8 +184,8 @@ ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, co
 
     const double moves = sqrt(v.x * v.x + v.y * v.y);
     const double level = moves * FRICTION_LAG < 1.0 ? 0.0 : moves; /* friction may hold it yet */
-    const Alpha sinking = plate_alpha(plate, model, lean, level, down + RESIST_REST);
-    const Alpha sliding = plate_alpha(plate, model, lean, level + RESIST_REST, down);
+    const Alpha sinking = plate_alpha(plate, in_space, lean, level, down + RESIST_REST);
+    const Alpha sliding = plate_alpha(plate, in_space, lean, level + RESIST_REST, down);
 
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
@@ -194,54 +194,66 @@ ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, co
     slot_store(s, i, &element);
 }
 
-/* The slots from `start` on that stand on this model. */
-ALWAYS_INLINE void slots_model(const Slots *slot, int start, int end, double dt, const Plate *sole,
-                               const Motion *now, int model) {
+/* The same for slots start .. end - 1. */
+ALWAYS_INLINE void slots_resist(const Slots *slot, int start, int end, double dt, const Plate *sole,
+                                const Motion *now, int in_space) {
     const Slots local = *slot, *s = &local;
     const Plate plate = *sole;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = start; i < end; i++) {
-        slot_resist(s, i, dt, rate, &plate, &motion, model);
+        slot_resist(s, i, dt, rate, &plate, &motion, in_space);
     }
 }
 
-/* Bool: there is such a material; only: there is no other. */
-static int terrain_resists(const MildTerrain *terrain, int model, int *only) {
-    int any = 0;
-    *only = 1;
+/* Bool: the terrain has no other model. */
+static int terrain_only(const MildTerrain *terrain, int model) {
+    int only = 1;
     for (int m = 0; m < terrain->material_count; m++) {
-        any |= terrain->materials[m].model == model;
-        *only &= terrain->materials[m].model == model;
+        only &= terrain->materials[m].model == model;
     }
-    return any;
+    return only;
 }
 
-void slots_resist(const FootScratch *foot, const MildTerrain *terrain, double dt,
-                  const double *rotation, const Motion *now) {
-    static const int models[2] = {MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D};
+/* The foot's slots on `model`. in_space: bool, a constant. */
+ALWAYS_INLINE void foot_resist(const FootScratch *foot, const MildTerrain *terrain, int model,
+                               double dt, const double *rotation, const Motion *now, int in_space) {
     const Slots *s = &foot->slot;
-    for (int k = 0; k < 2; k++) {
-        int only, model = models[k];
-        if (!terrain_resists(terrain, model, &only)) {
-            continue;
-        }
-        Plate plate = plate_of(rotation);
-        if (only && k == 0) {
-            slots_model(s, 0, foot->active, dt, &plate, now, MILD_MODEL_ECC_QUASI);
-        }
-        if (only && k == 1) {
-            slots_model(s, 0, foot->active, dt, &plate, now, MILD_MODEL_ECC_QUASI_3D);
-        }
-        for (int i = 0; !only && i < foot->active; i++) {
-            if (terrain->materials[foot->slot_material[i] & 0xff].model != model) {
-                continue; /* the nearer one's */
-            }
-            if (s->flat_stiffness[i] != 0.0) {
-                continue; /* blended with a cone: as a level plate */
-            }
-            slots_model(s, i, i + 1, dt, &plate, now, model);
-        }
+    const Plate plate = plate_of(rotation);
+    if (terrain_only(terrain, model)) {
+        slots_resist(s, 0, foot->active, dt, &plate, now, in_space);
+        return;
     }
+    for (int i = 0; i < foot->active; i++) {
+        if (terrain->materials[foot->slot_material[i] & 0xff].model != model) {
+            continue; /* the nearer one's */
+        }
+        if (s->flat_stiffness[i] != 0.0) {
+            continue; /* blended with a cone: as a level plate */
+        }
+        slots_resist(s, i, i + 1, dt, &plate, now, in_space);
+    }
+}
+
+void resist_plane(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
+                  const double *rotation, const Motion *now) {
+    foot_resist(foot, terrain, model, dt, rotation, now, 0);
+}
+
+void resist_space(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
+                  const double *rotation, const Motion *now) {
+    foot_resist(foot, terrain, model, dt, rotation, now, 1);
+}
+
+Law resist_law(const MildMaterial *material, double pitch) {
+    const double area = pitch * pitch;
+    return law_line(material->zeta * LAW_RESIST_STRESS * area, area, material->bed_depth);
+}
+
+void resist_material(MildMaterial *material, double area) {
+    (void)area;
+    material->zeta = 1.0;
+    material->recovery = 0.0;
+    material->mu = material->k_drift = material->b_drift = 0.0;
 }

@@ -4,9 +4,15 @@
 
 #include "ground/scratch.h"
 
-/* After foot_begin: the law of the foot's resistive slots for the way they move at the start of
- * the step. rotation: of the foot; now: how it moves. */
-void slots_resist(const FootScratch *foot, const MildTerrain *terrain, double dt,
+/* F = zeta 1e6 N/m^3 u per area under a level plate that goes straight down. */
+Law resist_law(const MildMaterial *material, double pitch);
+/* ModelRow.reference (model.h): the plate's friction is part of the measured coefficients. */
+void resist_material(MildMaterial *material, double area);
+
+/* ModelRow.direction of the theory in the plane of motion and in space. */
+void resist_plane(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
+                  const double *rotation, const Motion *now);
+void resist_space(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
                   const double *rotation, const Motion *now);
 
 #endif

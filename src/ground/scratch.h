@@ -17,7 +17,7 @@ typedef struct {
     int nan;    /* bool: a number of it is none */
 } DerivedLaw;
 
-typedef struct {
+typedef struct FootScratch {
     /* The sole: mild_scratch_create. */
     int elements;    /* count */
     int padded;      /* count rounded up to whole vectors */

@@ -20,7 +20,7 @@ struct MildGround {
     int32_t tiles;                   /* of imprints; 0: the ground forgets at lift-off */
     uint32_t imprint_time;           /* counts the steps that could change an imprint */
     double imprint_cell;             /* [m] edge of a cell */
-    int32_t reserved[2];             /* to 64 bytes, so that the arrays behind are aligned */
+    int32_t reserved[10];            /* to 128 bytes, so that the arrays behind are aligned */
 };
 
 /* What an element stands on: index of a material, or first | second << 8 | share << 16 of two that

@@ -89,8 +89,7 @@ static MildStatus check_limits(const mjModel *m, const char *path, MildError *er
     return MILD_OK;
 }
 
-MildStatus robot_check_model(const Robot *robot, const char *path, MildError *error) {
-    const mjModel *m = robot->model;
+MildStatus robot_check_model(const mjModel *m, const char *path, MildError *error) {
     const int bodies = (int)m->nbody, joints = (int)m->njnt, dofs = (int)m->nv;
     const int keys = (int)m->nkey, geoms = (int)m->ngeom;
     const Numbers checks[] = {

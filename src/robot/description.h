@@ -1,47 +1,78 @@
-/* Private to the robot layer: what a Robot knows of its model file. */
+/* Private to the robot layer: what a Robot knows, from robot.ini and the compiled MJCF. */
 #ifndef ROBOT_DESCRIPTION_H
 #define ROBOT_DESCRIPTION_H
 
 #include <mujoco/mujoco.h>
 
-#include "robot/robot.h"
+#include "robot/def.h"
 
-#define ROBOT_LEG 6           /* joints of one leg */
-#define ROBOT_SHELLS 3        /* boxes that must not touch the ground: base, shanks */
-#define ROBOT_OUTLINE_MAX 128 /* points of a sole outline */
-#define ROBOT_ELEMENTS_MAX 65536
+#define ROBOT_FOOT_DOFS_MAX ROBOT_NV_MAX /* base six, then the hinges between base and foot */
+#define ROBOT_PATH_SIZE 1024
+
+/* A foot in the model. */
+typedef struct {
+    int body;
+    int knee_body;
+    int mirror;                   /* foot on the other side */
+    int ankle;                    /* joint that pitches a flat sole, or -1 */
+    int round;                    /* bool: a sphere that transmits no moment */
+    double sole_center[3];        /* [m] flat: middle of the outline's bounds, body frame */
+    int dofs;                     /* degrees of freedom that move the foot, base six first */
+    int dof[ROBOT_FOOT_DOFS_MAX]; /* [dofs] ascending */
+    int shared[ROBOT_FEET_MAX];   /* of them, how many from the first on move that foot, too */
+} RobotLimb;
+
+/* A body part that must not touch the ground: a box with its faces moved out by a radius. Spheres
+ * and capsules are boxes without width. */
+typedef struct {
+    int body;
+    double center[3];   /* [m] body frame */
+    double rotation[9]; /* [-] box -> body, row major */
+    double half[3];     /* [m] */
+    double radius;      /* [m] */
+} RobotShell;
 
 struct Robot {
-    mjModel *model;  /* bodies, joints, floor and sole corners: what a step needs */
-    mjModel *visual; /* the whole file, for pictures */
-    MildSole *soles[ROBOT_FEET],
-        *concentric[ROBOT_FEET]; /* the rasters, and one element in the middle of each */
-    int is_concentric;           /* bool: which of them the feet have */
-    double outline[ROBOT_FEET][2 * ROBOT_OUTLINE_MAX]; /* [m] x y, foot frame */
-    int outline_points[ROBOT_FEET];
-    double sole_z;                     /* [m] */
-    double sole_center[ROBOT_FEET][3]; /* [m] foot frame, middle of the outline's bounds */
-    int base_body, foot_body[ROBOT_FEET], knee_body[ROBOT_FEET], floor_geom;
-    int shell_body[ROBOT_SHELLS];
-    double shell_center[ROBOT_SHELLS][3], shell_half[ROBOT_SHELLS][3]; /* [m] body frame */
-    double pose[ROBOT_JOINTS], low[ROBOT_JOINTS], high[ROBOT_JOINTS];  /* [rad] */
-    double effort[ROBOT_JOINTS];                                       /* [N m] */
-    double total_mass, stand_height;
-    /* the balanced stand (stand.c): default pose leaning forward until the centre of mass is over
-     * the soles' centre */
-    double lean;         /* [rad] */
-    double lean_base[3]; /* [m] base above a point on the ground midway below the ankles */
-    double lean_torque[ROBOT_JOINTS]; /* [N m] that holds it at rest */
+    RobotDef def;
+    char path[ROBOT_PATH_SIZE];           /* of the MJCF */
+    mjModel *model;                       /* bodies, joints, floor and corners: what a step needs */
+    mjModel *visual;                      /* the whole file, for pictures */
+    MildSole *soles[ROBOT_FEET_MAX];      /* the rasters */
+    MildSole *concentric[ROBOT_FEET_MAX]; /* one element in the middle of each */
+    int is_concentric;                    /* bool: which of them the feet have */
+    int nq;                               /* 7 + joints */
+    int nv;                               /* 6 + joints */
+    int base_body;
+    int floor_geom;
+    RobotLimb limb[ROBOT_FEET_MAX];
+    int pairs;                       /* of mirrored feet */
+    int pair[ROBOT_FEET_MAX / 2][2]; /* left foot, right foot */
+    int dof[ROBOT_JOINTS_MAX];       /* of joint i in the engine: qvel[dof], qpos[dof + 1] */
+    int mirror_joint[ROBOT_JOINTS_MAX];
+    int joint_foot[ROBOT_JOINTS_MAX]; /* foot that alone moves with the joint, or -1 */
+    double low[ROBOT_JOINTS_MAX];     /* [rad] */
+    double high[ROBOT_JOINTS_MAX];    /* [rad] */
+    double effort[ROBOT_JOINTS_MAX];  /* [N m] */
+    int shells;
+    RobotShell shell[ROBOT_SHELLS_MAX];
+    double total_mass;   /* [kg] */
+    double stand_height; /* [m] base above the soles in the default pose */
 };
 
-/* Fills the balanced stand; 0, or 1 when out of memory. */
-int stand_prepare(Robot *robot);
+/* Compiles the MJCF at robot->path into robot->visual, and what a step needs of it, with a floor
+ * and the feet's corners, into robot->model. */
+MildStatus robot_load_models(Robot *robot, MildError *error);
 
-/* Name of joint or link i in joint order ("leg_l1", ...); add "_joint" or "_link". */
-const char *robot_limb_name(int i);
-
-/* Whether the numbers of the compiled model are usable: finite, and masses, inertias, gains and
+/* Whether the numbers of a compiled model are usable: finite, and masses, inertias, gains and
  * limits of the right sign. MuJoCo takes what an MJCF states. */
-MildStatus robot_check_model(const Robot *robot, const char *path, MildError *error);
+MildStatus robot_check_model(const mjModel *model, const char *path, MildError *error);
+
+/* ---- parts of robot_create, in this order; each needs those before it ---- */
+MildStatus robot_read_bodies(Robot *robot, MildError *error);
+MildStatus robot_read_joints(Robot *robot, MildError *error);
+MildStatus robot_read_limbs(Robot *robot, MildError *error);
+MildStatus robot_read_shells(Robot *robot, MildError *error);
+MildStatus robot_read_soles(Robot *robot, MildError *error);
+MildStatus robot_read_stand(Robot *robot, MildError *error);
 
 #endif

@@ -1,14 +1,24 @@
-/* The feet seen from the robot's 18 degrees of freedom. A foot moves with the base's six and its
- * own leg's six only, and the engine's factor M = L^T D L has the same sparsity (a leg's rows hold
- * that leg and the base). So A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T J^T) needs one backward
- * substitution per foot on six right-hand sides at once, which is one vector register per row. */
+/* The feet seen from the robot's degrees of freedom. A foot moves with the base's six and the hinges
+ * between base and foot only, and the engine's factor M = L^T D L has the same sparsity (a row holds
+ * a degree of freedom and its ancestors). So A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T J^T) needs one
+ * backward substitution per foot on six right-hand sides at once, which is one vector register per
+ * row. */
 #include <string.h>
 
 #include "robot/sim.h"
 
-/* Degree of freedom of row k of foot f. */
-static int foot_dof(int foot, int k) {
-    return k < ROBOT_LEG ? k : ROBOT_LEG * (1 + foot) + k - ROBOT_LEG;
+void foot_map_reference(const RobotSim *sim, int foot, double point[3]) {
+    const RobotLimb *limb = &sim->robot->limb[foot];
+    const double *body = sim->data->xpos + 3 * limb->body;
+    memcpy(point, body, 3 * sizeof *point);
+    if (limb->round) {
+        const RobotFootDef *def = &sim->robot->def.foot[foot];
+        const double *turn = sim->data->xmat + 9 * limb->body, *c = def->center;
+        for (int k = 0; k < 3; k++) {
+            point[k] += turn[3 * k] * c[0] + turn[3 * k + 1] * c[1] + turn[3 * k + 2] * c[2];
+        }
+        point[2] -= def->radius;
+    }
 }
 
 /* One column of J: rotation about the unit axis through an anchor `arm` away from the ankle. */
@@ -21,36 +31,46 @@ static void hinge_row(double *row, const double axis[3], const double arm[3]) {
     row[5] = axis[2];
 }
 
-void foot_map_jacobian(RobotSim *sim) {
+static void foot_jacobian(RobotSim *sim, int foot) {
     const mjData *d = sim->data;
+    const RobotLimb *limb = &sim->robot->limb[foot];
     const double *base = d->xpos + 3 * sim->robot->base_body;
     const double *turn = d->xmat + 9 * sim->robot->base_body;
-    for (int f = 0; f < ROBOT_FEET; f++) {
-        const double *ankle = d->xpos + 3 * sim->robot->foot_body[f];
-        double(*rows)[ROBOT_LANES] = sim->map.jacobian[f];
-        double arm[3] = {ankle[0] - base[0], ankle[1] - base[1], ankle[2] - base[2]};
-        for (int k = 0; k < 3; k++) {
-            memset(rows[k], 0, sizeof rows[k]);
-            rows[k][k] = 1.0;                                     /* linear velocity: world axes */
-            double axis[3] = {turn[k], turn[3 + k], turn[6 + k]}; /* angular velocity: base axes */
-            hinge_row(rows[3 + k], axis, arm);
-        }
-        for (int k = 0; k < ROBOT_LEG; k++) {
-            int joint = 1 + ROBOT_LEG * f + k;
-            const double *anchor = d->xanchor + 3 * joint;
-            double reach[3] = {ankle[0] - anchor[0], ankle[1] - anchor[1], ankle[2] - anchor[2]};
-            hinge_row(rows[ROBOT_LEG + k], d->xaxis + 3 * joint, reach);
-        }
+    double(*rows)[ROBOT_LANES] = sim->map[foot].jacobian;
+    double point[3];
+    foot_map_reference(sim, foot, point);
+    double arm[3] = {point[0] - base[0], point[1] - base[1], point[2] - base[2]};
+    for (int k = 0; k < 3; k++) {
+        memset(rows[k], 0, sizeof rows[k]);
+        rows[k][k] = 1.0;                                     /* linear velocity: world axes */
+        double axis[3] = {turn[k], turn[3 + k], turn[6 + k]}; /* angular velocity: base axes */
+        hinge_row(rows[3 + k], axis, arm);
+    }
+    for (int k = 6; k < limb->dofs; k++) {
+        int joint = limb->dof[k] - 5; /* one free joint, then hinges */
+        const double *anchor = d->xanchor + 3 * joint;
+        double reach[3] = {point[0] - anchor[0], point[1] - anchor[1], point[2] - anchor[2]};
+        hinge_row(rows[k], d->xaxis + 3 * joint, reach);
+    }
+    for (int k = 0; k < limb->dofs && limb->round; k++) { /* a sphere transmits no moment */
+        memset(rows[k] + 3, 0, 3 * sizeof(double));
+    }
+}
+
+void foot_map_jacobian(RobotSim *sim) {
+    for (int f = 0; f < sim->robot->def.feet; f++) {
+        foot_jacobian(sim, f);
     }
 }
 
 void foot_map_twist(const RobotSim *sim, int foot, const double *velocity,
                     const double *acceleration, double twist[6]) {
+    const RobotLimb *limb = &sim->robot->limb[foot];
     double sum[ROBOT_LANES] = {0};
-    for (int k = 0; k < ROBOT_FOOT_DOFS; k++) {
-        int dof = foot_dof(foot, k);
+    for (int k = 0; k < limb->dofs; k++) {
+        int dof = limb->dof[k];
         double rate = velocity[dof] + (acceleration ? sim->dt * acceleration[dof] : 0.0);
-        const double *row = sim->map.jacobian[foot][k];
+        const double *row = sim->map[foot].jacobian[k];
         for (int c = 0; c < ROBOT_LANES; c++) {
             sum[c] += rate * row[c];
         }
@@ -59,10 +79,10 @@ void foot_map_twist(const RobotSim *sim, int foot, const double *velocity,
 }
 
 /* rows <- L^-T rows, leaves first: row j of every ancestor j of i loses L_ij times row i. */
-static void backward_substitute(const mjModel *m, const mjData *d, int foot,
-                                double rows[ROBOT_FOOT_DOFS][ROBOT_LANES]) {
-    for (int k = ROBOT_FOOT_DOFS - 1; k > 0; k--) {
-        const double *restrict factor = d->qLD + m->M_rowadr[foot_dof(foot, k)];
+static void backward_substitute(const mjModel *m, const mjData *d, const RobotLimb *limb,
+                                double rows[][ROBOT_LANES]) {
+    for (int k = limb->dofs - 1; k > 0; k--) {
+        const double *restrict factor = d->qLD + m->M_rowadr[limb->dof[k]];
         const double *restrict mine = rows[k];
         for (int j = 0; j < k; j++) {
             double *restrict ancestor = rows[j];
@@ -91,32 +111,38 @@ static void inner_product(const double *inverse_d, const double left[][ROBOT_LAN
     memcpy(block, sum, sizeof sum);
 }
 
-void foot_map_inverse_inertia(RobotSim *sim) {
-    FootMap *map = &sim->map;
+/* Block (f, g) of A and its mirror image. */
+static void store_block(RobotSim *sim, int f, int g, double block[6][ROBOT_LANES]) {
     double *a = sim->input.inverse_inertia;
-    memcpy(map->half, map->jacobian, sizeof map->half);
-    for (int f = 0; f < ROBOT_FEET; f++) {
-        double inverse_d[ROBOT_FOOT_DOFS], block[6][ROBOT_LANES];
-        for (int k = 0; k < ROBOT_FOOT_DOFS; k++) {
-            inverse_d[k] = sim->data->qLDiagInv[foot_dof(f, k)];
+    int stride = 6 * sim->robot->def.feet;
+    for (int r = 0; r < 6; r++) {
+        memcpy(a + (6 * f + r) * stride + 6 * g, block[r], 6 * sizeof *a);
+        for (int c = 0; c < 6 && g < f; c++) {
+            a[(6 * g + c) * stride + 6 * f + r] = block[r][c];
         }
-        backward_substitute(sim->model, sim->data, f, map->half[f]);
-        for (int g = 0; g <= f; g++) { /* feet share the base's rows only */
-            inner_product(inverse_d, map->half[f], map->half[g],
-                          f == g ? ROBOT_FOOT_DOFS : ROBOT_LEG, block);
-            for (int r = 0; r < 6; r++) {
-                memcpy(a + (6 * f + r) * 12 + 6 * g, block[r], 6 * sizeof *a);
-                for (int c = 0; c < 6 && g < f; c++) {
-                    a[(6 * g + c) * 12 + 6 * f + r] = block[r][c];
-                }
-            }
+    }
+}
+
+void foot_map_inverse_inertia(RobotSim *sim) {
+    FootMap *map = sim->map;
+    for (int f = 0; f < sim->robot->def.feet; f++) {
+        const RobotLimb *limb = &sim->robot->limb[f];
+        double inverse_d[ROBOT_FOOT_DOFS_MAX], block[6][ROBOT_LANES];
+        for (int k = 0; k < limb->dofs; k++) {
+            inverse_d[k] = sim->data->qLDiagInv[limb->dof[k]];
+        }
+        memcpy(map[f].half, map[f].jacobian, (size_t)limb->dofs * sizeof *map[f].half);
+        backward_substitute(sim->model, sim->data, limb, map[f].half);
+        for (int g = 0; g <= f; g++) { /* other feet share the first rows only */
+            inner_product(inverse_d, map[f].half, map[g].half, limb->shared[g], block);
+            store_block(sim, f, g, block);
         }
     }
 }
 
 /* x <- L^-1 x, root first. */
 static void forward_substitute(const mjModel *m, const mjData *d, double *x) {
-    for (int i = 1; i < ROBOT_NV; i++) {
+    for (int i = 1; i < m->nv; i++) {
         const double *factor = d->qLD + m->M_rowadr[i];
         const int *column = m->M_colind + m->M_rowadr[i];
         double sum = x[i];
@@ -127,23 +153,25 @@ static void forward_substitute(const mjModel *m, const mjData *d, double *x) {
     }
 }
 
-void foot_map_wrench(const RobotSim *sim, double wrench[ROBOT_FEET][6], double *force,
+void foot_map_wrench(const RobotSim *sim, double (*wrench)[6], double *force,
                      double *acceleration) {
-    memset(force, 0, ROBOT_NV * sizeof *force);
-    memset(acceleration, 0, ROBOT_NV * sizeof *acceleration);
-    for (int f = 0; f < ROBOT_FEET; f++) {
-        for (int k = 0; k < ROBOT_FOOT_DOFS; k++) {
-            const double *row = sim->map.jacobian[f][k], *half = sim->map.half[f][k];
+    int nv = sim->robot->nv;
+    memset(force, 0, (size_t)nv * sizeof *force);
+    memset(acceleration, 0, (size_t)nv * sizeof *acceleration);
+    for (int f = 0; f < sim->robot->def.feet; f++) {
+        const RobotLimb *limb = &sim->robot->limb[f];
+        for (int k = 0; k < limb->dofs; k++) {
+            const double *row = sim->map[f].jacobian[k], *half = sim->map[f].half[k];
             double direct = 0.0, solved = 0.0;
             for (int c = 0; c < 6; c++) {
                 direct += row[c] * wrench[f][c];
                 solved += half[c] * wrench[f][c];
             }
-            force[foot_dof(f, k)] += direct;
-            acceleration[foot_dof(f, k)] += solved;
+            force[limb->dof[k]] += direct;
+            acceleration[limb->dof[k]] += solved;
         }
     }
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < nv; i++) {
         acceleration[i] *= sim->data->qLDiagInv[i];
     }
     forward_substitute(sim->model, sim->data, acceleration);

@@ -1,4 +1,4 @@
-/* The engine's own contact under the eight sole corners: where the ground is not level, and what it
+/* The engine's own contact under the feet's corners: where the ground is not level, and what it
  * did to the feet in the terms of the soft ground. */
 #include <math.h>
 #include <string.h>
@@ -79,12 +79,15 @@ void rigid_collide(RobotSim *sim, const MildTerrain *terrain) {
 
 /* Adds contact c to the foot it belongs to, and the vertical part of its normal force to that
  * foot's load. The contact frame's first axis points from geom 0 to geom 1. */
-static void add_contact(RobotSim *sim, int c, double load[ROBOT_FEET]) {
+static void add_contact(RobotSim *sim, int c, double load[ROBOT_FEET_MAX]) {
     const mjData *d = sim->data;
     const mjContact *contact = d->contact + c;
     int floor_first = contact->geom[0] == sim->robot->floor_geom;
     int body = sim->model->geom_bodyid[contact->geom[floor_first]];
-    int foot = body == sim->robot->foot_body[ROBOT_FOOT_RIGHT];
+    int foot = sim->robot->def.feet - 1;
+    while (foot > 0 && sim->robot->limb[foot].body != body) {
+        foot--;
+    }
     MildFootResult *result = &sim->contact.foot[foot];
     double local[6], force[3], torque[3], arm[3];
     mj_contactForce(sim->model, d, c, local);
@@ -131,19 +134,19 @@ static void finish_foot(RobotSim *sim, int foot, double load) {
     if (force[2] <= 0.0) {
         return;
     }
-    const double *center = sim->robot->sole_center[foot];
+    const double *center = sim->robot->limb[foot].sole_center;
     double sole = turn[6] * center[0] + turn[7] * center[1] + turn[8] * center[2];
     result->zmp_sole[0] = (sole * force[0] - torque[1]) / force[2];
     result->zmp_sole[1] = (torque[0] + sole * force[1]) / force[2];
 }
 
 void rigid_contact_result(RobotSim *sim) {
-    double load[ROBOT_FEET] = {0};
+    double load[ROBOT_FEET_MAX] = {0};
     memset(&sim->contact, 0, sizeof sim->contact);
     for (int c = 0; c < sim->data->ncon; c++) {
         add_contact(sim, c, load);
     }
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < sim->robot->def.feet; f++) {
         finish_foot(sim, f, load[f]);
         foot_map_twist(sim, f, sim->data->qvel, sim->data->qacc, sim->contact.velocity + 6 * f);
     }

@@ -8,273 +8,363 @@
 #include "robot/description.h"
 #include "robot/engine.h"
 
-static const char *const limb_names[ROBOT_JOINTS] = {"leg_l1", "leg_l2", "leg_l3", "leg_l4",
-                                                     "leg_l5", "leg_l6", "leg_r1", "leg_r2",
-                                                     "leg_r3", "leg_r4", "leg_r5", "leg_r6"};
-static const char *const foot_links[ROBOT_FEET] = {"leg_l6_link", "leg_r6_link"};
-static const char *const knee_links[ROBOT_FEET] = {"leg_l4_link", "leg_r4_link"};
-static const char *const shell_links[ROBOT_SHELLS] = {"base_link", "leg_l4_link", "leg_r4_link"};
-static const char *const outline_names[ROBOT_FEET] = {"sole_outline_left", "sole_outline_right"};
-
-const char *robot_limb_name(int i) {
-    return limb_names[i];
-}
+#define LEVEL 0.02 /* [rad] a flat sole of the default pose may be tilted by so much */
 
 RobotVariation robot_variation_nominal(void) {
     RobotVariation variation = {.armature_scale = 1.0, .rigid_friction = 0.8};
-    for (int i = 0; i <= ROBOT_JOINTS; i++) {
+    for (int i = 0; i <= ROBOT_JOINTS_MAX; i++) {
         variation.link_mass_scale[i] = 1.0;
     }
     return variation;
 }
 
-/* Id of a named object, or -1 with a message that names it. */
-static int find(const mjModel *model, int type, const char *kind, const char *name,
-                const char *path, MildError *error) {
+/* Id of a named object, or -1 with a message that says which key asks for it. */
+static int find(const Robot *robot, const mjModel *model, int type, const char *kind,
+                const char *name, const char *key, MildError *error) {
     int id = mj_name2id(model, type, name);
     if (id < 0) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: the robot's %s '%s' is missing", path, kind, name);
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: %s '%s' is missing; robot.ini names it in %s",
+                  robot->path, kind, name, key);
     }
     return id;
 }
 
-/* MuJoCo's messages have several lines; ours have one. */
-static void one_line(char *text) {
-    for (char *c = text; *c; c++) {
-        if (*c == '\n' || *c == '\r') {
-            *c = ' ';
-        }
-    }
-}
-
-/* A step pays for every geom whose pose it computes, so the working model keeps only the geoms that
- * collide. */
-static void strip_for_physics(mjSpec *spec) {
-    static const mjtObj dropped[] = {mjOBJ_CAMERA, mjOBJ_LIGHT, mjOBJ_ACTUATOR, mjOBJ_SITE};
-    for (size_t k = 0; k < sizeof dropped / sizeof dropped[0]; k++) {
-        mjsElement *following = NULL;
-        for (mjsElement *e = mjs_firstElement(spec, dropped[k]); e; e = following) {
-            following = mjs_nextElement(spec, e);
-            mjs_delete(spec, e);
-        }
-    }
-    mjsElement *next = NULL;
-    for (mjsElement *e = mjs_firstElement(spec, mjOBJ_GEOM); e; e = next) {
-        next = mjs_nextElement(spec, e);
-        int group = mjs_asGeom(e)->group;
-        if (group == 1 || group == 3) {
-            mjs_delete(spec, e);
-        }
-    }
-}
-
-static MildStatus load_models(Robot *robot, const char *path, MildError *error) {
-    char text[300] = "";
-    mjSpec *spec = mj_parseXML(path, NULL, text, (int)sizeof text);
-    if (!spec) {
-        one_line(text);
-        return mild_fail(error, MILD_ERROR_IO, "%s: %s", path, text);
-    }
-    robot->visual = mj_compile(spec, NULL);
-    if (robot->visual) {
-        strip_for_physics(spec);
-        robot->model = mj_compile(spec, NULL);
-    }
-    if (!robot->model) {
-        snprintf(text, sizeof text, "%s", mjs_getError(spec));
-        one_line(text);
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", path, text);
-    }
-    mj_deleteSpec(spec);
-    return robot->model ? MILD_OK : MILD_ERROR_FORMAT;
-}
-
-static MildStatus read_bodies(Robot *robot, const char *path, MildError *error) {
+MildStatus robot_read_bodies(Robot *robot, MildError *error) {
     const mjModel *m = robot->model;
-    robot->base_body = find(m, mjOBJ_BODY, "body", "base_link", path, error);
-    robot->floor_geom = find(m, mjOBJ_GEOM, "geom", "floor", path, error);
-    if (robot->base_body < 0 || robot->floor_geom < 0) {
+    const RobotDef *def = &robot->def;
+    robot->floor_geom = mj_name2id(m, mjOBJ_GEOM, "floor");
+    robot->base_body = find(robot, m, mjOBJ_BODY, "body", def->base, "[robot] base", error);
+    if (robot->base_body < 0) {
         return MILD_ERROR_FORMAT;
     }
-    for (int f = 0; f < ROBOT_FEET; f++) {
-        robot->foot_body[f] = find(m, mjOBJ_BODY, "foot", foot_links[f], path, error);
-        if (robot->foot_body[f] < 0) {
+    for (int f = 0; f < def->feet; f++) {
+        const RobotFootDef *foot = &def->foot[f];
+        RobotLimb *limb = &robot->limb[f];
+        char key[ROBOT_NAME_SIZE + 16];
+        snprintf(key, sizeof key, "[foot.%s]", foot->name);
+        limb->round = foot->shape == ROBOT_SOLE_ROUND;
+        limb->body = find(robot, m, mjOBJ_BODY, "body", foot->body, key, error);
+        limb->knee_body = find(robot, m, mjOBJ_BODY, "body", foot->knee, key, error);
+        if (limb->body < 0 || limb->knee_body < 0) {
             return MILD_ERROR_FORMAT;
         }
-        robot->knee_body[f] = find(m, mjOBJ_BODY, "body", knee_links[f], path, error);
-        if (robot->knee_body[f] < 0) {
-            return MILD_ERROR_FORMAT;
+        for (int g = 0; g < def->feet; g++) {
+            if (g < f && robot->limb[g].body == limb->body) {
+                return mild_fail(error, MILD_ERROR_FORMAT,
+                                 "%s: robot.ini: feet '%s' and '%s' are on the same body",
+                                 robot->path, def->foot[g].name, foot->name);
+            }
+            limb->mirror = strcmp(def->foot[g].name, foot->mirror) == 0 ? g : limb->mirror;
         }
     }
     return MILD_OK;
 }
 
-/* The step relies on this order of degrees of freedom: base, left leg, right leg; and on limbs
- * being chains. */
-static MildStatus read_joints(Robot *robot, const char *path, MildError *error) {
+static MildStatus read_joint(Robot *robot, int i, MildError *error) {
     const mjModel *m = robot->model;
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        char name[32];
-        snprintf(name, sizeof name, "%s_joint", limb_names[i]);
-        int id = find(m, mjOBJ_JOINT, "joint", name, path, error);
-        if (id < 0) {
-            return MILD_ERROR_FORMAT;
-        }
-        int parent = i % ROBOT_LEG == 0 ? robot->base_body : m->jnt_bodyid[id - 1];
-        if (id != 1 + i || m->jnt_type[id] != mjJNT_HINGE || m->jnt_type[0] != mjJNT_FREE ||
-            m->body_parentid[m->jnt_bodyid[id]] != parent) {
-            return mild_fail(error, MILD_ERROR_FORMAT,
-                             "%s: joint '%s' must be hinge %d of a free base with two chains of "
-                             "six, left leg first",
-                             path, name, i + 1);
-        }
-        if (!m->jnt_limited[id] || !m->jnt_actfrclimited[id]) {
-            return mild_fail(error, MILD_ERROR_FORMAT,
-                             "%s: joint '%s' needs range and actuatorfrcrange", path, name);
-        }
-        robot->low[i] = m->jnt_range[2 * id];
-        robot->high[i] = m->jnt_range[2 * id + 1];
-        robot->effort[i] = m->jnt_actfrcrange[2 * id + 1];
-    }
-    if (m->nq != ROBOT_NQ || m->nv != ROBOT_NV) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: %d degrees of freedom instead of %d", path,
-                         (int)m->nv, ROBOT_NV);
-    }
-    return MILD_OK;
-}
-
-static MildStatus read_shells(Robot *robot, const char *path, MildError *error) {
-    const mjModel *m = robot->visual;
-    for (int s = 0; s < ROBOT_SHELLS; s++) {
-        char name[48];
-        snprintf(name, sizeof name, "%s_box", shell_links[s]);
-        int id = find(m, mjOBJ_GEOM, "box geom", name, path, error);
-        if (id < 0) {
-            return MILD_ERROR_FORMAT;
-        }
-        robot->shell_body[s] = mj_name2id(robot->model, mjOBJ_BODY, shell_links[s]);
-        memcpy(robot->shell_center[s], m->geom_pos + 3 * id, sizeof robot->shell_center[s]);
-        memcpy(robot->shell_half[s], m->geom_size + 3 * id, sizeof robot->shell_half[s]);
-    }
-    return MILD_OK;
-}
-
-/* Values of <custom><numeric name=...>, or NULL with a message. */
-static const double *read_numeric(const mjModel *m, const char *name, int *count, const char *path,
-                                  MildError *error) {
-    int id = find(m, mjOBJ_NUMERIC, "custom numeric", name, path, error);
+    const char *name = robot->def.joint[i];
+    int id = find(robot, m, mjOBJ_JOINT, "joint", name, "[joints] names", error);
     if (id < 0) {
-        return NULL;
-    }
-    *count = m->numeric_size[id];
-    return m->numeric_data + m->numeric_adr[id];
-}
-
-static MildStatus read_outline(Robot *robot, int foot, const char *path, MildError *error) {
-    int count = 0;
-    const double *data = read_numeric(robot->model, outline_names[foot], &count, path, error);
-    if (!data) {
         return MILD_ERROR_FORMAT;
     }
-    if (count % 2 != 0 || count < 6 || count > 2 * ROBOT_OUTLINE_MAX) {
+    if (m->jnt_type[id] != mjJNT_HINGE) {
+        return mild_fail(error, MILD_ERROR_FORMAT, "%s: joint '%s' must be a hinge", robot->path,
+                         name);
+    }
+    double effort = robot->def.effort[i];
+    if (!m->jnt_limited[id] || !(m->jnt_actfrclimited[id] || effort > 0.0)) {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%s: '%s' needs 3 to %d pairs x y, has %d numbers", path,
-                         outline_names[foot], ROBOT_OUTLINE_MAX, count);
+                         "%s: joint '%s' needs a range, and actuatorfrcrange or [joints] effort in "
+                         "robot.ini",
+                         robot->path, name);
     }
-    memcpy(robot->outline[foot], data, sizeof(double) * (size_t)count);
-    robot->outline_points[foot] = count / 2;
-    double low[2] = {DBL_MAX, DBL_MAX}, high[2] = {-DBL_MAX, -DBL_MAX};
-    for (int i = 0; i < count; i++) {
-        low[i % 2] = fmin(low[i % 2], data[i]);
-        high[i % 2] = fmax(high[i % 2], data[i]);
+    robot->dof[i] = m->jnt_dofadr[id];
+    robot->low[i] = m->jnt_range[2 * id];
+    robot->high[i] = m->jnt_range[2 * id + 1];
+    robot->effort[i] = effort > 0.0 ? effort : m->jnt_actfrcrange[2 * id + 1];
+    for (int j = 0; j < robot->def.joints; j++) {
+        if (strcmp(robot->def.joint[j], robot->def.mirror[i]) == 0) {
+            robot->mirror_joint[i] = j;
+        }
     }
-    robot->sole_center[foot][0] = 0.5 * (low[0] + high[0]);
-    robot->sole_center[foot][1] = 0.5 * (low[1] + high[1]);
-    robot->sole_center[foot][2] = robot->sole_z;
     return MILD_OK;
 }
 
-static MildStatus read_soles(Robot *robot, const char *path, MildError *error) {
-    int one = 0;
-    const double *z = read_numeric(robot->model, "sole_z", &one, path, error);
-    const double *pitch = z ? read_numeric(robot->model, "sole_pitch", &one, path, error) : NULL;
-    const double *elements =
-        pitch ? read_numeric(robot->model, "sole_elements", &one, path, error) : NULL;
-    if (!elements) {
-        return MILD_ERROR_FORMAT;
+/* The step relies on the base's six degrees of freedom being the first, and on hinges alone behind
+ * them, each with one coordinate. */
+MildStatus robot_read_joints(Robot *robot, MildError *error) {
+    const mjModel *m = robot->model;
+    int joints = robot->def.joints;
+    if (m->njnt < 1 || m->jnt_type[0] != mjJNT_FREE || m->jnt_bodyid[0] != robot->base_body) {
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%s: body '%s' must have the free joint, the first in the file",
+                         robot->path, robot->def.base);
     }
-    if (!(*elements >= 0.0 && *elements <= ROBOT_ELEMENTS_MAX)) {
-        return mild_fail(error, MILD_ERROR_RANGE, "%s: 'sole_elements' = %g is outside 0 .. %d",
-                         path, *elements, ROBOT_ELEMENTS_MAX);
-    }
-    robot->sole_z = *z;
-    for (int f = 0; f < ROBOT_FEET; f++) {
-        MildStatus status = read_outline(robot, f, path, error);
+    for (int i = 0; i < joints; i++) {
+        MildStatus status = read_joint(robot, i, error);
         if (status != MILD_OK) {
             return status;
         }
-        MildSoleDef def = {robot->outline[f], robot->outline_points[f], *pitch, *z, (int)*elements};
-        robot->soles[f] = mild_sole_create(&def, error);
-        robot->concentric[f] =
-            robot->soles[f] ? mild_sole_concentric(robot->soles[f], error) : NULL;
-        if (!robot->concentric[f]) {
-            return MILD_ERROR_FORMAT;
+    }
+    for (int id = 1; id < m->njnt; id++) {
+        int i = joints - 1;
+        while (i >= 0 && robot->dof[i] != m->jnt_dofadr[id]) {
+            i--;
+        }
+        if (i < 0) {
+            const char *name = mj_id2name(m, mjOBJ_JOINT, id);
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: joint '%s' is not in [joints] names of robot.ini", robot->path,
+                             name ? name : "without a name");
+        }
+    }
+    robot->nq = 7 + joints;
+    robot->nv = 6 + joints;
+    if (m->nq != robot->nq || m->nv != robot->nv) {
+        return mild_fail(error, MILD_ERROR_FORMAT, "%s: %d degrees of freedom instead of %d",
+                         robot->path, (int)m->nv, robot->nv);
+    }
+    return MILD_OK;
+}
+
+/* Degrees of freedom between the base and the foot, ascending. */
+static int read_chain(const mjModel *m, int body, int dof[ROBOT_FOOT_DOFS_MAX]) {
+    int reversed[ROBOT_FOOT_DOFS_MAX], count = 0;
+    while (body > 0 && m->body_dofnum[body] == 0) { /* welded to its parent */
+        body = m->body_parentid[body];
+    }
+    int last = body > 0 ? m->body_dofadr[body] + m->body_dofnum[body] - 1 : -1;
+    for (int d = last; d >= 0 && count < ROBOT_FOOT_DOFS_MAX; d = m->dof_parentid[d]) {
+        reversed[count++] = d;
+    }
+    for (int k = 0; k < count; k++) {
+        dof[k] = reversed[count - 1 - k];
+    }
+    return count;
+}
+
+MildStatus robot_read_limbs(Robot *robot, MildError *error) {
+    const RobotDef *def = &robot->def;
+    for (int f = 0; f < def->feet; f++) {
+        RobotLimb *limb = &robot->limb[f];
+        limb->dofs = read_chain(robot->model, limb->body, limb->dof);
+        if (limb->dofs <= 6 || limb->dof[5] != 5) {
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: no joint between the base and body '%s' of [foot.%s]",
+                             robot->path, def->foot[f].body, def->foot[f].name);
+        }
+        limb->ankle = -1;
+        for (int i = 0; i < def->joints; i++) {
+            limb->ankle = strcmp(def->joint[i], def->foot[f].ankle) == 0 ? i : limb->ankle;
+        }
+        for (int g = 0; g <= f; g++) {
+            int same = 0,
+                least = limb->dofs < robot->limb[g].dofs ? limb->dofs : robot->limb[g].dofs;
+            while (same < least && limb->dof[same] == robot->limb[g].dof[same]) {
+                same++;
+            }
+            limb->shared[g] = robot->limb[g].shared[f] = same;
+        }
+    }
+    for (int i = 0; i < def->joints; i++) {
+        int moved = 0;
+        robot->joint_foot[i] = -1;
+        for (int f = 0; f < def->feet; f++) {
+            for (int k = 6; k < robot->limb[f].dofs; k++) {
+                if (robot->limb[f].dof[k] == robot->dof[i]) {
+                    robot->joint_foot[i] = moved++ ? -1 : f;
+                }
+            }
         }
     }
     return MILD_OK;
 }
 
-static MildStatus read_stand(Robot *robot, const char *path, MildError *error) {
-    const mjModel *m = robot->model;
-    int key = find(m, mjOBJ_KEY, "key", "stand", path, error);
-    if (key < 0) {
-        return MILD_ERROR_FORMAT;
+MildStatus robot_read_shells(Robot *robot, MildError *error) {
+    const mjModel *m = robot->visual;
+    for (int s = 0; s < robot->def.shells; s++) {
+        const char *name = robot->def.shell[s];
+        RobotShell *shell = &robot->shell[s];
+        int id = find(robot, m, mjOBJ_GEOM, "geom", name, "[robot] shells", error);
+        if (id < 0) {
+            return MILD_ERROR_FORMAT;
+        }
+        const double *size = m->geom_size + 3 * id;
+        switch (m->geom_type[id]) {
+        case mjGEOM_BOX: memcpy(shell->half, size, sizeof shell->half); break;
+        case mjGEOM_SPHERE: shell->radius = size[0]; break;
+        case mjGEOM_CAPSULE:
+            shell->radius = size[0];
+            shell->half[2] = size[1];
+            break;
+        default:
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: geom '%s' of [robot] shells must be a box, a sphere or a capsule",
+                             robot->path, name);
+        }
+        const char *body = mj_id2name(m, mjOBJ_BODY, m->geom_bodyid[id]);
+        shell->body = body ? mj_name2id(robot->model, mjOBJ_BODY, body) : -1;
+        if (shell->body < 0) {
+            return mild_fail(error, MILD_ERROR_FORMAT, "%s: the body of geom '%s' needs a name",
+                             robot->path, name);
+        }
+        memcpy(shell->center, m->geom_pos + 3 * id, sizeof shell->center);
+        mju_quat2Mat(shell->rotation, m->geom_quat + 4 * id);
     }
-    mjData *data = mj_makeData(m);
-    if (!data) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
-    }
-    mj_resetDataKeyframe(m, data, key);
-    mj_kinematics(m, data);
-    memcpy(robot->pose, data->qpos + 7, sizeof robot->pose);
-    /* the pose's soles are level, so the sole plane below the ankle is the lowest point */
-    double ankle = data->xpos[3 * robot->foot_body[0] + 2];
-    robot->stand_height = data->xpos[3 * robot->base_body + 2] - (ankle + robot->sole_z);
-    robot->total_mass = m->body_subtreemass[robot->base_body];
-    mj_deleteData(data);
-    return stand_prepare(robot) ? mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path)
-                                : MILD_OK;
+    robot->shells = robot->def.shells;
+    return MILD_OK;
 }
 
-static MildStatus read_robot(Robot *robot, const char *path, MildError *error) {
-    MildStatus status = file_check_regular(path, error);
-    status = status == MILD_OK ? load_models(robot, path, error) : status;
-    status = status == MILD_OK ? robot_check_model(robot, path, error) : status;
-    status = status == MILD_OK ? read_bodies(robot, path, error) : status;
-    status = status == MILD_OK ? read_joints(robot, path, error) : status;
-    status = status == MILD_OK ? read_shells(robot, path, error) : status;
-    status = status == MILD_OK ? read_soles(robot, path, error) : status;
-    return status == MILD_OK ? read_stand(robot, path, error) : status;
+/* A round foot stands on a disc of its own radius that stays level under its lowest point; here as
+ * a polygon of the same area. */
+static int round_outline(double radius, double outline[2 * ROBOT_OUTLINE_MAX]) {
+    enum { CORNERS = 32 };
+    double reach = radius * sqrt(mjPI / (0.5 * CORNERS * sin(2.0 * mjPI / CORNERS)));
+    for (int i = 0; i < CORNERS; i++) {
+        double angle = 2.0 * mjPI * (i + 0.5) / CORNERS;
+        outline[2 * i] = reach * cos(angle);
+        outline[2 * i + 1] = reach * sin(angle);
+    }
+    return CORNERS;
+}
+
+static void outline_center(const RobotFootDef *foot, double center[3]) {
+    double low[2] = {DBL_MAX, DBL_MAX}, high[2] = {-DBL_MAX, -DBL_MAX};
+    for (int i = 0; i < 2 * foot->outline_points; i++) {
+        low[i % 2] = fmin(low[i % 2], foot->outline[i]);
+        high[i % 2] = fmax(high[i % 2], foot->outline[i]);
+    }
+    center[0] = 0.5 * (low[0] + high[0]);
+    center[1] = 0.5 * (low[1] + high[1]);
+    center[2] = foot->z;
+}
+
+MildStatus robot_read_soles(Robot *robot, MildError *error) {
+    for (int f = 0; f < robot->def.feet; f++) {
+        RobotFootDef *foot = &robot->def.foot[f];
+        RobotLimb *limb = &robot->limb[f];
+        if (limb->round) {
+            foot->outline_points = round_outline(foot->radius, foot->outline);
+        } else {
+            outline_center(foot, limb->sole_center);
+        }
+        MildSoleDef def = {foot->outline, foot->outline_points, foot->pitch, foot->z,
+                           foot->elements};
+        MildError cause = {0};
+        robot->soles[f] = mild_sole_create(&def, &cause);
+        robot->concentric[f] =
+            robot->soles[f] ? mild_sole_concentric(robot->soles[f], &cause) : NULL;
+        if (!robot->concentric[f]) {
+            return mild_fail(error, cause.status, "%s: robot.ini, [foot.%s]: %s", robot->path,
+                             foot->name, cause.text);
+        }
+    }
+    return MILD_OK;
+}
+
+/* [m] Height of the sole in the pose of `data`. */
+static double sole_height(const Robot *robot, int f, const mjData *data) {
+    const RobotFootDef *foot = &robot->def.foot[f];
+    const double *turn = data->xmat + 9 * robot->limb[f].body;
+    double z = data->xpos[3 * robot->limb[f].body + 2];
+    if (!robot->limb[f].round) {
+        return z + foot->z; /* level */
+    }
+    const double *c = foot->center;
+    return z + turn[6] * c[0] + turn[7] * c[1] + turn[8] * c[2] - foot->radius;
+}
+
+static MildStatus measure_stand(Robot *robot, const mjData *data, MildError *error) {
+    double lowest = DBL_MAX, base = data->xpos[3 * robot->base_body + 2];
+    for (int f = 0; f < robot->def.feet; f++) {
+        if (!robot->limb[f].round && data->xmat[9 * robot->limb[f].body + 8] < cos(LEVEL)) {
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: the sole of [foot.%s] is not level in [joints] pose of robot.ini",
+                             robot->path, robot->def.foot[f].name);
+        }
+        lowest = fmin(lowest, sole_height(robot, f, data));
+    }
+    robot->stand_height = base - lowest;
+    robot->total_mass = robot->model->body_subtreemass[robot->base_body];
+    robot->pairs = 0;
+    for (int f = 0; f < robot->def.feet; f++) {
+        int g = robot->limb[f].mirror;
+        if (f < g) {
+            int first_is_left = data->xpos[3 * robot->limb[f].knee_body + 1] >=
+                                data->xpos[3 * robot->limb[g].knee_body + 1];
+            int *pair = robot->pair[robot->pairs++];
+            pair[0] = first_is_left ? f : g;
+            pair[1] = first_is_left ? g : f;
+        }
+    }
+    return MILD_OK;
+}
+
+MildStatus robot_read_stand(Robot *robot, MildError *error) {
+    const mjModel *m = robot->model;
+    mjData *data = mj_makeData(m);
+    if (!data) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", robot->path);
+    }
+    for (int i = 0; i < robot->def.joints; i++) {
+        double pose = robot->def.pose[i];
+        if (pose < robot->low[i] || pose > robot->high[i]) {
+            mj_deleteData(data);
+            return mild_fail(error, MILD_ERROR_RANGE,
+                             "%s: robot.ini, [joints] pose: %g of '%s' is outside its range %g .. "
+                             "%g",
+                             robot->path, pose, robot->def.joint[i], robot->low[i], robot->high[i]);
+        }
+        data->qpos[robot->dof[i] + 1] = pose;
+    }
+    mj_kinematics(m, data);
+    MildStatus status = measure_stand(robot, data, error);
+    mj_deleteData(data);
+    return status;
+}
+
+static MildStatus check_models(Robot *robot, MildError *error) {
+    MildStatus status = robot_check_model(robot->visual, robot->path, error);
+    return status == MILD_OK ? robot_check_model(robot->model, robot->path, error) : status;
+}
+
+static MildStatus read_robot(Robot *robot, const char *folder, MildError *error) {
+    MildStatus status = robot_def_read(folder, &robot->def, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    if (snprintf(robot->path, sizeof robot->path, "%s/%s", folder, robot->def.model) >=
+        (int)sizeof robot->path) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", folder);
+    }
+    status = file_check_regular(robot->path, error);
+    static MildStatus (*const parts[])(Robot *, MildError *) = {
+        robot_load_models, check_models,      robot_read_bodies, robot_read_joints,
+        robot_read_limbs,  robot_read_shells, robot_read_soles,  robot_read_stand};
+    for (size_t i = 0; status == MILD_OK && i < sizeof parts / sizeof *parts; i++) {
+        status = parts[i](robot, error);
+    }
+    return status;
 }
 
 typedef struct {
     Robot *robot;
-    const char *path;
+    const char *folder;
 } Reading;
 
 static MildStatus read_guarded(void *context, MildError *error) {
     const Reading *reading = context;
-    return read_robot(reading->robot, reading->path, error);
+    return read_robot(reading->robot, reading->folder, error);
 }
 
-Robot *robot_create(const char *xml_path, MildError *error) {
+Robot *robot_create(const char *folder, MildError *error) {
     Robot *robot = calloc(1, sizeof *robot);
     if (!robot) {
-        mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", xml_path);
+        mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", folder);
         return NULL;
     }
-    Reading reading = {robot, xml_path};
-    if (engine_call(read_guarded, &reading, xml_path, error) != MILD_OK) {
+    Reading reading = {robot, folder};
+    if (engine_call(read_guarded, &reading, folder, error) != MILD_OK) {
         robot_destroy(robot);
         return NULL;
     }
@@ -285,13 +375,165 @@ void robot_destroy(Robot *robot) {
     if (!robot) {
         return;
     }
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < ROBOT_FEET_MAX; f++) {
         mild_sole_destroy(robot->soles[f]);
         mild_sole_destroy(robot->concentric[f]);
     }
     mj_deleteModel(robot->model);
     mj_deleteModel(robot->visual);
     free(robot);
+}
+
+const char *robot_name(const Robot *robot) {
+    return robot->def.name;
+}
+
+const char *robot_source(const Robot *robot) {
+    return robot->def.source;
+}
+
+const char *robot_model_path(const Robot *robot) {
+    return robot->path;
+}
+
+int robot_joints(const Robot *robot) {
+    return robot->def.joints;
+}
+
+int robot_feet(const Robot *robot) {
+    return robot->def.feet;
+}
+
+const char *robot_joint_name(const Robot *robot, int joint) {
+    return robot->def.joint[joint];
+}
+
+const char *robot_foot_name(const Robot *robot, int foot) {
+    return robot->def.foot[foot].name;
+}
+
+double robot_total_mass(const Robot *robot) {
+    return robot->total_mass;
+}
+
+double robot_foot_load(const Robot *robot) {
+    return -(1.0 / robot->def.feet) * robot->total_mass * robot->model->opt.gravity[2];
+}
+
+double robot_stand_height(const Robot *robot) {
+    return robot->stand_height;
+}
+
+double robot_nominal_height(const Robot *robot) {
+    return robot->def.height;
+}
+
+double robot_action_scale(const Robot *robot) {
+    return robot->def.action_scale;
+}
+
+double robot_foot_force(const Robot *robot) {
+    return robot->def.foot_force;
+}
+
+const double *robot_default_pose(const Robot *robot) {
+    return robot->def.pose;
+}
+
+const double *robot_joint_low(const Robot *robot) {
+    return robot->low;
+}
+
+const double *robot_joint_high(const Robot *robot) {
+    return robot->high;
+}
+
+const double *robot_effort(const Robot *robot) {
+    return robot->effort;
+}
+
+const double *robot_speed(const Robot *robot) {
+    return robot->def.speed;
+}
+
+const double *robot_kp(const Robot *robot) {
+    return robot->def.kp;
+}
+
+const double *robot_kd(const Robot *robot) {
+    return robot->def.kd;
+}
+
+const double *robot_stand_kp(const Robot *robot) {
+    return robot->def.stand_kp;
+}
+
+const double *robot_stand_kd(const Robot *robot) {
+    return robot->def.stand_kd;
+}
+
+const double *robot_swing(const Robot *robot) {
+    return robot->def.swing;
+}
+
+const double *robot_still(const Robot *robot) {
+    return robot->def.still;
+}
+
+const int *robot_joint_foot(const Robot *robot) {
+    return robot->joint_foot;
+}
+
+const int *robot_joint_dof(const Robot *robot) {
+    return robot->dof;
+}
+
+int robot_foot_body(const Robot *robot, int foot) {
+    return robot->limb[foot].body;
+}
+
+int robot_ankle(const Robot *robot, int foot) {
+    return robot->limb[foot].ankle;
+}
+
+const int *robot_mirror_joint(const Robot *robot) {
+    return robot->mirror_joint;
+}
+
+const double *robot_mirror_sign(const Robot *robot) {
+    return robot->def.mirror_sign;
+}
+
+int robot_mirror_foot(const Robot *robot, int foot) {
+    return robot->limb[foot].mirror;
+}
+
+double robot_mirror_shift(const Robot *robot) {
+    return robot->def.mirror_shift;
+}
+
+double robot_gait_offset(const Robot *robot, int foot) {
+    return robot->def.foot[foot].offset;
+}
+
+const double *robot_feet_range(const Robot *robot) {
+    return robot->def.feet_range;
+}
+
+const double *robot_knee_range(const Robot *robot) {
+    return robot->def.knee_range;
+}
+
+double robot_feet_least(const Robot *robot) {
+    return robot->def.feet_least;
+}
+
+double robot_knee_least(const Robot *robot) {
+    return robot->def.knee_least;
+}
+
+const double *robot_assist(const Robot *robot) {
+    return robot->def.assist;
 }
 
 const MildSole *const *robot_soles(const Robot *robot) {
@@ -308,37 +550,16 @@ void robot_set_model(Robot *robot, MildModel model) {
 
 MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMaterial *mild,
                              MildMaterial *rival, MildError *error) {
-    return mild_model_match(model, mild, robot->soles[0], robot_half_weight(robot), rival, error);
-}
-
-double robot_total_mass(const Robot *robot) {
-    return robot->total_mass;
-}
-
-double robot_half_weight(const Robot *robot) {
-    return -0.5 * robot->total_mass * robot->model->opt.gravity[2];
-}
-
-double robot_stand_height(const Robot *robot) {
-    return robot->stand_height;
-}
-
-const double *robot_default_pose(const Robot *robot) {
-    return robot->pose;
-}
-
-const double *robot_joint_low(const Robot *robot) {
-    return robot->low;
-}
-
-const double *robot_joint_high(const Robot *robot) {
-    return robot->high;
-}
-
-const double *robot_effort(const Robot *robot) {
-    return robot->effort;
+    return mild_model_match(model, mild, robot->soles[0], robot_foot_load(robot), rival, error);
 }
 
 const void *robot_visual_model(const Robot *robot) {
     return robot->visual;
+}
+
+void robot_engine_qpos(const Robot *robot, const double *qpos, double *engine) {
+    memcpy(engine, qpos, 7 * sizeof *engine);
+    for (int i = 0; i < robot->def.joints; i++) {
+        engine[robot->dof[i] + 1] = qpos[7 + i];
+    }
 }

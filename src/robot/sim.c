@@ -38,16 +38,16 @@ RobotSim *robot_sim_create(const Robot *robot, double dt, MildError *error) {
     sim->model = model;
     sim->data = data;
     sim->dt = dt;
-    sim->scratch = mild_scratch_create(robot_soles(robot), ROBOT_FEET, error);
+    sim->scratch = mild_scratch_create(robot_soles(robot), robot->def.feet, error);
     if (!sim->scratch) {
         robot_sim_destroy(sim);
         return NULL;
     }
     model->opt.timestep = dt;
-    sim->input.feet = ROBOT_FEET;
+    sim->input.feet = robot->def.feet;
     sim->input.dt = dt;
     RobotState stand = {.qpos = {0, 0, robot->stand_height, 1, 0, 0, 0}};
-    memcpy(stand.qpos + 7, robot->pose, sizeof robot->pose);
+    memcpy(stand.qpos + 7, robot->def.pose, sizeof robot->def.pose);
     RobotVariation nominal = robot_variation_nominal();
     robot_sim_load(sim, &stand, &nominal);
     return sim;
@@ -73,24 +73,23 @@ double robot_sim_dt(const RobotSim *sim) {
     return sim->dt;
 }
 
-/* Lowest point of the sole's outline above z = 0 [m]. */
-static double lowest_sole_point(const Robot *robot, int foot, const double position[3],
+/* Lowest point of a flat sole's outline above z = 0 [m]. */
+static double lowest_sole_point(const RobotFootDef *def, const double position[3],
                                 const double turn[9]) {
     double least = 1e9;
-    for (int i = 0; i < robot->outline_points[foot]; i++) {
-        double z =
-            turn[6] * robot->outline[foot][2 * i] + turn[7] * robot->outline[foot][2 * i + 1];
+    for (int i = 0; i < def->outline_points; i++) {
+        double z = turn[6] * def->outline[2 * i] + turn[7] * def->outline[2 * i + 1];
         least = z < least ? z : least;
     }
-    return position[2] + turn[8] * robot->sole_z + least;
+    return position[2] + turn[8] * def->z + least;
 }
 
 /* The same above the ground under each point. */
-static double lowest_above_map(const Robot *robot, int foot, const double position[3],
+static double lowest_above_map(const RobotFootDef *def, const double position[3],
                                const double turn[9], const MildTerrain *terrain) {
-    double least = 1e9, c = robot->sole_z;
-    for (int i = 0; i < robot->outline_points[foot]; i++) {
-        double a = robot->outline[foot][2 * i], b = robot->outline[foot][2 * i + 1];
+    double least = 1e9, c = def->z;
+    for (int i = 0; i < def->outline_points; i++) {
+        double a = def->outline[2 * i], b = def->outline[2 * i + 1];
         double x = position[0] + turn[0] * a + turn[1] * b + turn[2] * c,
                y = position[1] + turn[3] * a + turn[4] * b + turn[5] * c;
         double z = position[2] + turn[6] * a + turn[7] * b + turn[8] * c;
@@ -101,22 +100,28 @@ static double lowest_above_map(const Robot *robot, int foot, const double positi
 
 static double sole_height(const Robot *robot, int f, const RobotFoot *foot,
                           const MildTerrain *terrain) {
-    if (terrain && terrain->map) {
-        return lowest_above_map(robot, f, foot->position, foot->rotation, terrain);
+    const RobotFootDef *def = &robot->def.foot[f];
+    if (robot->limb[f].round) {
+        const double *p = foot->position;
+        return p[2] - (terrain ? mild_terrain_height_at(terrain, p[0], p[1]) : 0.0);
     }
-    return lowest_sole_point(robot, f, foot->position, foot->rotation) -
+    if (terrain && terrain->map) {
+        return lowest_above_map(def, foot->position, foot->rotation, terrain);
+    }
+    return lowest_sole_point(def, foot->position, foot->rotation) -
            (terrain ? terrain->height : 0.0);
 }
 
 /* Pose, twist and sole of a foot from the current kinematics. terrain: NULL for z = 0. */
 static void observe_foot(RobotSim *sim, int f, const MildTerrain *terrain) {
+    static const double level[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     const mjData *d = sim->data;
+    const RobotLimb *limb = &sim->robot->limb[f];
     RobotFoot *foot = &sim->feet[f];
-    int body = sim->robot->foot_body[f];
-    memcpy(foot->position, d->xpos + 3 * body, sizeof foot->position);
-    memcpy(foot->rotation, d->xmat + 9 * body, sizeof foot->rotation);
+    foot_map_reference(sim, f, foot->position);
+    memcpy(foot->rotation, limb->round ? level : d->xmat + 9 * limb->body, sizeof foot->rotation);
     foot_map_twist(sim, f, d->qvel, NULL, foot->velocity);
-    const double *c = sim->robot->sole_center[f], *turn = foot->rotation, *w = foot->velocity + 3;
+    const double *c = limb->sole_center, *turn = foot->rotation, *w = foot->velocity + 3;
     double arm[3];
     for (int k = 0; k < 3; k++) {
         arm[k] = turn[3 * k] * c[0] + turn[3 * k + 1] * c[1] + turn[3 * k + 2] * c[2];
@@ -128,22 +133,38 @@ static void observe_foot(RobotSim *sim, int f, const MildTerrain *terrain) {
     foot->sole_height = sole_height(sim->robot, f, foot, terrain);
 }
 
+/* The engine's state in the robot's order. */
+static void gather_state(const Robot *robot, const mjData *d, double *qpos, double *qvel) {
+    memcpy(qpos, d->qpos, 7 * sizeof *qpos);
+    memcpy(qvel, d->qvel, 6 * sizeof *qvel);
+    for (int i = 0; i < robot->def.joints; i++) {
+        int dof = robot->dof[i];
+        qpos[7 + i] = d->qpos[dof + 1];
+        qvel[6 + i] = d->qvel[dof];
+    }
+}
+
 /* Everything that depends on qpos and qvel only. */
 static void update_pose(RobotSim *sim, const MildTerrain *terrain) {
     mj_kinematics(sim->model, sim->data);
     mj_comPos(sim->model, sim->data);
+    gather_state(sim->robot, sim->data, sim->qpos, sim->qvel);
     foot_map_jacobian(sim);
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < sim->robot->def.feet; f++) {
         observe_foot(sim, f, terrain);
     }
 }
 
 void robot_sim_load(RobotSim *sim, const RobotState *state, const RobotVariation *variation) {
+    const Robot *robot = sim->robot;
     mjData *d = sim->data;
     variation_apply(sim, variation);
-    memcpy(d->qpos, state->qpos, sizeof state->qpos);
-    memcpy(d->qvel, state->qvel, sizeof state->qvel);
-    memcpy(d->qacc_warmstart, state->warmstart, sizeof state->warmstart);
+    robot_engine_qpos(robot, state->qpos, d->qpos);
+    memcpy(d->qvel, state->qvel, 6 * sizeof *d->qvel);
+    for (int i = 0; i < robot->def.joints; i++) {
+        d->qvel[robot->dof[i]] = state->qvel[6 + i];
+    }
+    memcpy(d->qacc_warmstart, state->warmstart, (size_t)robot->nv * sizeof *d->qacc_warmstart);
     d->time = 0.0;
     memset(sim->feet, 0, sizeof sim->feet);
     memset(&sim->contact, 0, sizeof sim->contact);
@@ -152,7 +173,7 @@ void robot_sim_load(RobotSim *sim, const RobotState *state, const RobotVariation
 
 double robot_sim_sole_clearance(RobotSim *sim, const MildTerrain *terrain) {
     double least = 1e9;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < sim->robot->def.feet; f++) {
         sim->feet[f].sole_height = sole_height(sim->robot, f, &sim->feet[f], terrain);
         least = fmin(least, sim->feet[f].sole_height);
     }
@@ -160,9 +181,10 @@ double robot_sim_sole_clearance(RobotSim *sim, const MildTerrain *terrain) {
 }
 
 void robot_sim_store(const RobotSim *sim, RobotState *state) {
-    memcpy(state->qpos, sim->data->qpos, sizeof state->qpos);
-    memcpy(state->qvel, sim->data->qvel, sizeof state->qvel);
-    memcpy(state->warmstart, sim->data->qacc_warmstart, sizeof state->warmstart);
+    memset(state, 0, sizeof *state);
+    gather_state(sim->robot, sim->data, state->qpos, state->qvel);
+    memcpy(state->warmstart, sim->data->qacc_warmstart,
+           (size_t)sim->robot->nv * sizeof *state->warmstart);
 }
 
 /* Generalised force of a push (force, torque, world) at the base's centre of mass. */
@@ -192,8 +214,12 @@ static void smooth_dynamics(RobotSim *sim, const double *torque, const double *p
     mj_factorM(m, d);
     mj_comVel(m, d);
     mj_rne(m, d, 0, d->qfrc_bias);
-    for (int i = 0; i < ROBOT_NV; i++) {
-        d->qfrc_smooth[i] = (i < ROBOT_LEG ? 0.0 : torque[i - ROBOT_LEG]) - d->qfrc_bias[i];
+    for (int i = 0; i < 6; i++) {
+        d->qfrc_smooth[i] = 0.0 - d->qfrc_bias[i];
+    }
+    for (int i = 0; i < sim->robot->def.joints; i++) {
+        int dof = sim->robot->dof[i];
+        d->qfrc_smooth[dof] = torque[i] - d->qfrc_bias[dof];
     }
     if (push) {
         add_push(sim, push);
@@ -205,7 +231,7 @@ static void smooth_dynamics(RobotSim *sim, const double *torque, const double *p
  * in. */
 static void place_feet(RobotSim *sim) {
     MildContactInput *input = &sim->input;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < sim->robot->def.feet; f++) {
         memcpy(input->position[f], sim->feet[f].position, sizeof input->position[f]);
         memcpy(input->rotation[f], sim->feet[f].rotation, sizeof input->rotation[f]);
         memcpy(input->velocity[f], sim->feet[f].velocity, sizeof input->velocity[f]);
@@ -215,7 +241,7 @@ static void place_feet(RobotSim *sim) {
 /* What the feet would do without ground: A = J M^-1 J^T and V^ = J (nu + dt a). */
 static void free_feet(RobotSim *sim) {
     foot_map_inverse_inertia(sim);
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < sim->robot->def.feet; f++) {
         foot_map_twist(sim, f, sim->data->qvel, sim->data->qacc_smooth,
                        sim->input.free_velocity + 6 * f);
     }
@@ -223,22 +249,22 @@ static void free_feet(RobotSim *sim) {
 
 static void add_ground_wrench(RobotSim *sim) {
     mjData *d = sim->data;
-    double wrench[ROBOT_FEET][6], force[ROBOT_NV], acceleration[ROBOT_NV];
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    double wrench[ROBOT_FEET_MAX][6], force[ROBOT_NV_MAX], acceleration[ROBOT_NV_MAX];
+    for (int f = 0; f < sim->robot->def.feet; f++) {
         memcpy(wrench[f], sim->contact.foot[f].force, 3 * sizeof(double));
         memcpy(wrench[f] + 3, sim->contact.foot[f].torque, 3 * sizeof(double));
     }
     foot_map_wrench(sim, wrench, force, acceleration);
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < sim->robot->nv; i++) {
         d->qfrc_smooth[i] += force[i];
         d->qacc_smooth[i] += acceleration[i];
     }
 }
 
 static int any_joint_beyond_limit(const RobotSim *sim) {
-    const double *q = sim->data->qpos + 7;
+    const double *q = sim->qpos + 7;
     int beyond = 0;
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < sim->robot->def.joints; i++) {
         beyond |= q[i] <= sim->robot->low[i] || q[i] >= sim->robot->high[i];
     }
     return beyond;
@@ -250,7 +276,7 @@ static void constrain(RobotSim *sim) {
     mjModel *m = sim->model;
     mjData *d = sim->data;
     if (d->ncon == 0 && !any_joint_beyond_limit(sim)) {
-        memcpy(d->qacc, d->qacc_smooth, ROBOT_NV * sizeof(double));
+        memcpy(d->qacc, d->qacc_smooth, (size_t)sim->robot->nv * sizeof(double));
         return;
     }
     mj_makeConstraint(m, d);
@@ -264,29 +290,31 @@ static void constrain(RobotSim *sim) {
 static int integrate(RobotSim *sim) {
     mjData *d = sim->data;
     int bad = 0;
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < sim->robot->nv; i++) {
         d->qvel[i] += sim->dt * d->qacc[i];
         bad |= !(fabs(d->qvel[i]) < QVEL_MAX); /* NaN included */
     }
     if (bad) {
         return 1;
     }
-    memcpy(d->qacc_warmstart, d->qacc, ROBOT_NV * sizeof(double));
+    memcpy(d->qacc_warmstart, d->qacc, (size_t)sim->robot->nv * sizeof(double));
     mj_integratePos(sim->model, d->qpos, d->qvel, sim->dt);
     d->time += sim->dt;
     return 0;
 }
 
 static void report_forces(RobotSim *sim) {
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < sim->robot->def.feet; f++) {
         RobotFoot *foot = &sim->feet[f];
         foot->result = sim->contact.foot[f];
         memcpy(foot->force, foot->result.force, sizeof foot->force);
-        memcpy(foot->torque, foot->result.torque, sizeof foot->torque);
+        if (!sim->robot->limb[f].round) {
+            memcpy(foot->torque, foot->result.torque, sizeof foot->torque);
+        }
     }
 }
 
-/* docs/task.md section 2, with the feet's 12 rows; mild/ground.h shows the same step for any
+/* docs/task.md section 2, with six rows per foot; mild/ground.h shows the same step for any
  * engine. */
 int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                    const MildTerrain *terrain, MildGround *ground) {
@@ -327,11 +355,11 @@ void robot_sim_time_phases(RobotSim *sim, RobotPhases *phases) {
 }
 
 const double *robot_sim_qpos(const RobotSim *sim) {
-    return sim->data->qpos;
+    return sim->qpos;
 }
 
 const double *robot_sim_qvel(const RobotSim *sim) {
-    return sim->data->qvel;
+    return sim->qvel;
 }
 
 const double *robot_sim_base_rotation(const RobotSim *sim) {
@@ -342,20 +370,27 @@ const RobotFoot *robot_sim_foot(const RobotSim *sim, int foot) {
     return &sim->feet[foot];
 }
 
+/* Lowest point of a shell above z = 0, and the point on the ground under its centre [m]. */
+static double shell_lowest(const RobotSim *sim, const RobotShell *shell, double under[2]) {
+    const double *p = sim->data->xpos + 3 * shell->body, *turn = sim->data->xmat + 9 * shell->body;
+    const double *c = shell->center, *box = shell->rotation;
+    double low = p[2] - shell->radius;
+    under[0] = p[0];
+    under[1] = p[1];
+    for (int k = 0; k < 3; k++) {
+        double up = turn[6] * box[k] + turn[7] * box[3 + k] + turn[8] * box[6 + k];
+        low += turn[6 + k] * c[k] - fabs(up) * shell->half[k];
+        under[0] += turn[k] * c[k];
+        under[1] += turn[3 + k] * c[k];
+    }
+    return low;
+}
+
 double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain) {
-    const Robot *robot = sim->robot;
     double least = 1e9;
-    for (int s = 0; s < ROBOT_SHELLS; s++) {
-        const double *p = sim->data->xpos + 3 * robot->shell_body[s];
-        const double *turn = sim->data->xmat + 9 * robot->shell_body[s];
-        const double *c = robot->shell_center[s], *half = robot->shell_half[s];
-        double low = p[2], at[2] = {p[0], p[1]};
-        for (int k = 0; k < 3; k++) {
-            low += turn[6 + k] * c[k] - fabs(turn[6 + k]) * half[k];
-            at[0] += turn[k] * c[k];
-            at[1] += turn[3 + k] * c[k];
-        }
-        least = fmin(least, low - mild_terrain_height_at(terrain, at[0], at[1]));
+    for (int s = 0; s < sim->robot->shells; s++) {
+        double under[2], low = shell_lowest(sim, &sim->robot->shell[s], under);
+        least = fmin(least, low - mild_terrain_height_at(terrain, under[0], under[1]));
     }
     return least;
 }
@@ -373,12 +408,26 @@ static double lateral_distance(const RobotSim *sim, const double *a, const doubl
 }
 
 double robot_sim_knee_distance(const RobotSim *sim) {
-    const int *knee = sim->robot->knee_body;
-    return lateral_distance(sim, sim->data->xpos + 3 * knee[1], sim->data->xpos + 3 * knee[0]);
+    const Robot *robot = sim->robot;
+    double least = 1e9;
+    for (int p = 0; p < robot->pairs; p++) {
+        int left = robot->limb[robot->pair[p][0]].knee_body;
+        int right = robot->limb[robot->pair[p][1]].knee_body;
+        least = fmin(
+            least, lateral_distance(sim, sim->data->xpos + 3 * right, sim->data->xpos + 3 * left));
+    }
+    return least;
 }
 
 double robot_sim_foot_distance(const RobotSim *sim) {
-    return lateral_distance(sim, sim->feet[1].sole_center, sim->feet[0].sole_center);
+    const Robot *robot = sim->robot;
+    double least = 1e9;
+    for (int p = 0; p < robot->pairs; p++) {
+        const RobotFoot *left = &sim->feet[robot->pair[p][0]];
+        const RobotFoot *right = &sim->feet[robot->pair[p][1]];
+        least = fmin(least, lateral_distance(sim, right->sole_center, left->sole_center));
+    }
+    return least;
 }
 
 const MildScratch *robot_sim_scratch(const RobotSim *sim) {

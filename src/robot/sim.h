@@ -5,14 +5,13 @@
 #include "robot/description.h"
 #include "robot/phases.h"
 
-#define ROBOT_LANES 8      /* six twist components, padded to one vector register */
-#define ROBOT_FOOT_DOFS 12 /* base six, then the leg's six: the only ones that move a foot */
+#define ROBOT_LANES 8 /* six twist components, padded to one vector register */
 
-/* The feet's Jacobian and its half-solved form, transposed: row = degree of freedom, column = twist
- * component. */
+/* One foot's Jacobian, transposed, and its half-solved form: row = degree of freedom of the limb,
+ * column = twist component. */
 typedef struct {
-    double jacobian[ROBOT_FEET][ROBOT_FOOT_DOFS][ROBOT_LANES]; /* J^T */
-    double half[ROBOT_FEET][ROBOT_FOOT_DOFS][ROBOT_LANES];     /* L^-T J^T with M = L^T D L */
+    double jacobian[ROBOT_FOOT_DOFS_MAX][ROBOT_LANES]; /* J^T */
+    double half[ROBOT_FOOT_DOFS_MAX][ROBOT_LANES];     /* L^-T J^T with M = L^T D L */
 } FootMap;
 
 struct RobotSim {
@@ -20,31 +19,35 @@ struct RobotSim {
     mjModel *model; /* own copy, patched by the variation */
     mjData *data;
     double dt;
-    RobotVariation variation; /* the one the model is patched with */
-    FootMap map;
+    RobotVariation variation;  /* the one the model is patched with */
+    double qpos[ROBOT_NQ_MAX]; /* as in RobotState */
+    double qvel[ROBOT_NV_MAX];
+    FootMap map[ROBOT_FEET_MAX];
     MildContactInput input;
     MildScratch *scratch;
     MildContactResult contact;
-    RobotFoot feet[ROBOT_FEET];
+    RobotFoot feet[ROBOT_FEET_MAX];
     RobotPhases *phases; /* NULL: no timing */
 };
 
 /* Patches the workspace's model; nothing when the variation is the one it has. */
 void variation_apply(RobotSim *sim, const RobotVariation *variation);
 
-/* J of both feet at the current pose. */
+/* [m] World position of the point that a foot's twist and wrench refer to: the origin of a flat
+ * foot's body, the lowest point of a round foot. */
+void foot_map_reference(const RobotSim *sim, int foot, double point[3]);
+/* J of all feet at the current pose. */
 void foot_map_jacobian(RobotSim *sim);
 /* Twist of foot f, J nu + dt J a; acceleration may be NULL. */
 void foot_map_twist(const RobotSim *sim, int foot, const double *velocity,
                     const double *acceleration, double twist[6]);
 /* A = J M^-1 J^T into the contact input; needs the factorised mass matrix. */
 void foot_map_inverse_inertia(RobotSim *sim);
-/* generalised force J^T w [NV] and its acceleration M^-1 J^T w [NV] of one wrench (force, torque)
- * per foot. */
-void foot_map_wrench(const RobotSim *sim, double wrench[ROBOT_FEET][6], double *force,
-                     double *acceleration);
+/* Generalised force J^T w and its acceleration M^-1 J^T w, both [nv] in the engine's order, of one
+ * wrench (force, torque) per foot. */
+void foot_map_wrench(const RobotSim *sim, double (*wrench)[6], double *force, double *acceleration);
 
-/* The engine's own contact: finds the contacts of the sole corners with the ground. */
+/* The engine's own contact: finds the contacts of the feet's corners with the ground. */
 void rigid_collide(RobotSim *sim, const MildTerrain *terrain);
 /* And, once they are solved, the wrench on each foot, mean over the step, into sim->contact. */
 void rigid_contact_result(RobotSim *sim);

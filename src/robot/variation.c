@@ -35,8 +35,8 @@ void variation_apply(RobotSim *sim, const RobotVariation *variation) {
     for (int k = 0; k < 3; k++) {
         m->body_ipos[3 * base + k] = nominal->body_ipos[3 * base + k] + variation->com_offset[k];
     }
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        int body = m->jnt_bodyid[1 + i], dof = ROBOT_LEG + i;
+    for (int i = 0; i < sim->robot->def.joints; i++) {
+        int dof = sim->robot->dof[i], body = m->dof_bodyid[dof];
         scale_body(m, nominal, body, nominal->body_mass[body] * variation->link_mass_scale[1 + i]);
         m->dof_armature[dof] = variation->armature_scale * nominal->dof_armature[dof];
     }

@@ -10,11 +10,10 @@
 
 #include "task/task.h"
 
-#define ASSIST_TILT 300.0        /* [N m/rad] */
-#define ASSIST_TILT_DAMPING 30.0 /* [N m s/rad] */
-#define ASSIST_DRAW 100.0        /* [N s/m] towards the commanded velocity */
-#define ASSIST_DRAW_LIMIT 30.0   /* [N] more, and it leans into the hand */
-#define ASSIST_WEIGHT 0.5        /* [-] share of the weight carried */
+/* The hand's stiffness and damping against tilt, its pull towards the commanded velocity and the
+ * limit of that, beyond which a robot leans into the hand: key assist of robot.ini. */
+enum { HAND_TILT, HAND_DAMPING, HAND_DRAW, HAND_LIMIT };
+#define ASSIST_WEIGHT 0.5 /* [-] share of the weight carried */
 #define ASSIST_LEAD 1.3   /* [-] of the reference gait: the joints lag behind their targets */
 #define ASSIST_GRACE 2.0  /* [s] on its feet before the level decays */
 #define ASSIST_DECAY 8.0  /* [s] */
@@ -35,12 +34,11 @@ void task_assist_adapt(TaskEnv *env, int fallen) {
     }
 }
 
-void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                      double pose[ROBOT_JOINTS]) {
-    double share = task_assist_share(env, def), reference[ROBOT_JOINTS];
+void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double *pose) {
+    double share = task_assist_share(env, def), reference[ROBOT_JOINTS_MAX];
     const double *rest = robot_default_pose(robot);
-    task_gait_reference(def, rest, env->phase, task_is_standing(env->command), reference);
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    task_gait_reference(def, robot, env->phase, task_is_standing(env->command), reference);
+    for (int i = 0; i < env->shape.joints; i++) {
         pose[i] = rest[i] + share * ASSIST_LEAD * (reference[i] - rest[i]);
     }
 }
@@ -53,11 +51,12 @@ int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, cons
     }
     const double *turn = robot_sim_base_rotation(sim), *v = robot_sim_qvel(sim);
     double heading = atan2(turn[3], turn[0]), c = cos(heading), s = sin(heading);
+    const double *hand = robot_assist(robot);
     double wanted[2] = {c * env->command[0] - s * env->command[1],
                         s * env->command[0] + c * env->command[1]};
     for (int i = 0; i < 2; i++) {
-        double pull = ASSIST_DRAW * (wanted[i] - v[i]);
-        wrench[i] = share * fmin(fmax(pull, -ASSIST_DRAW_LIMIT), ASSIST_DRAW_LIMIT);
+        double pull = hand[HAND_DRAW] * (wanted[i] - v[i]);
+        wrench[i] = share * fmin(fmax(pull, -hand[HAND_LIMIT]), hand[HAND_LIMIT]);
     }
     wrench[2] = share * ASSIST_WEIGHT * GRAVITY * robot_total_mass(robot);
     /* The base's z axis in the world is u = (turn[2], turn[5], turn[8]); u x e_z turns it upright.
@@ -66,8 +65,8 @@ int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, cons
     for (int i = 0; i < 3; i++) {
         omega[i] = turn[3 * i] * v[3] + turn[3 * i + 1] * v[4] + turn[3 * i + 2] * v[5];
     }
-    wrench[3] = share * (ASSIST_TILT * turn[5] - ASSIST_TILT_DAMPING * omega[0]);
-    wrench[4] = share * (-ASSIST_TILT * turn[2] - ASSIST_TILT_DAMPING * omega[1]);
+    wrench[3] = share * (hand[HAND_TILT] * turn[5] - hand[HAND_DAMPING] * omega[0]);
+    wrench[4] = share * (-hand[HAND_TILT] * turn[2] - hand[HAND_DAMPING] * omega[1]);
     wrench[5] = 0;
     return 1;
 }

@@ -1,4 +1,5 @@
 /* The policy step, read top to bottom. */
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -9,23 +10,49 @@
 #define RANDOM_USE_PUSH 0x50555348u
 #define CONTACT_FORCE 5.0 /* [N] */
 
-static size_t env_header_bytes(void) {
-    return (sizeof(TaskEnv) + 63) / 64 * 64;
+/* ---- the block: TaskEnv, history, ring of frames, ground memory ---- */
+
+static size_t whole_lines(size_t bytes) {
+    return (bytes + 63) / 64 * 64;
+}
+
+static size_t frames_at(void) {
+    return whole_lines(sizeof(TaskEnv));
+}
+
+static size_t ground_at(const TaskShape *shape) {
+    int floats = shape->history + TASK_FRAMES_HELD * shape->observation;
+    return frames_at() + whole_lines((size_t)floats * sizeof(float));
 }
 
 size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
-    return env_header_bytes() +
-           mild_ground_bytes_prints(robot_soles(robot), ROBOT_FEET, def->print_tiles);
+    TaskShape shape = task_shape(robot);
+    return ground_at(&shape) +
+           mild_ground_bytes_prints(robot_soles(robot), shape.feet, def->print_tiles);
 }
 
 MildGround *task_env_ground(TaskEnv *env) {
-    return (MildGround *)(void *)((char *)env + env_header_bytes());
+    return (MildGround *)(void *)((char *)env + ground_at(&env->shape));
+}
+
+float *task_env_history(TaskEnv *env) {
+    return (float *)(void *)((char *)env + frames_at());
+}
+
+float *task_env_frame(TaskEnv *env, int age) {
+    uint32_t place = (env->newest + TASK_FRAMES_HELD - (uint32_t)age) % TASK_FRAMES_HELD;
+    return task_env_history(env) + env->shape.history + place * (uint32_t)env->shape.observation;
 }
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index) {
     memset(env, 0, task_env_bytes(def, robot));
-    mild_ground_init_prints(task_env_ground(env), robot_soles(robot), ROBOT_FEET, def->print_tiles);
+    env->shape = task_shape(robot);
+    mild_ground_init_prints(task_env_ground(env), robot_soles(robot), env->shape.feet,
+                            def->print_tiles);
+    MildStatus status = task_gains(def, robot, env->kp, env->kd, NULL);
+    assert(status == MILD_OK); /* task_def_check_robot has seen them */
+    (void)status;
     env->seed = seed;
     env->index = index;
     env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
@@ -44,7 +71,7 @@ static void return_map(TaskEnv *env) {
 
 /* So that episodes start neither in the air nor buried. */
 static double standing_depth(const Robot *robot, const MildMaterial *material) {
-    return mild_sole_sinkage(robot_soles(robot)[0], material, robot_half_weight(robot));
+    return mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot));
 }
 
 static void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot) {
@@ -59,7 +86,7 @@ static void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot) {
     env->robot.qpos[2] = env->terrain.height + robot_stand_height(robot) - depth + 0.002;
     env->robot.qpos[3] = cos(0.5 * yaw);
     env->robot.qpos[6] = sin(0.5 * yaw);
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < env->shape.joints; i++) {
         double q = pose[i] + z->initial_joint * (2 * random_unit(&r) - 1);
         env->robot.qpos[7 + i] =
             fmin(fmax(q, robot_joint_low(robot)[i]), robot_joint_high(robot)[i]);
@@ -137,7 +164,7 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 static void accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
     memmove(env->action[1], env->action[0], 2 * sizeof env->action[0]);
     float limit = (float)def->action_clip;
-    for (int i = 0; i < TASK_ACTIONS; i++) {
+    for (int i = 0; i < env->shape.actions; i++) {
         float a = action[i];
         env->action[0][i] = !(a > -limit) ? -limit : a > limit ? limit : a;
     }
@@ -160,26 +187,32 @@ static void push_base(TaskEnv *env, const TaskDef *def) {
     }
 }
 
+/* A motor at its speed limit drives no further. */
+static double limit_speed(double torque, double speed, double limit) {
+    return limit > 0 && fabs(speed) >= limit && torque * speed > 0 ? 0 : torque;
+}
+
 /* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). */
 static void pd_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                      const RobotSim *sim, const float *action, double torque[ROBOT_JOINTS]) {
+                      const RobotSim *sim, const float *action, double *torque) {
     const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim) + 6;
-    const double *effort = robot_effort(robot);
-    double pose[ROBOT_JOINTS];
+    const double *effort = robot_effort(robot), *fastest = robot_speed(robot);
+    double pose[ROBOT_JOINTS_MAX], scale = task_action_scale(def, robot);
     task_assist_pose(env, def, robot, pose);
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        double target = pose[i] + def->action_scale * (double)action[i] + env->motor_offset[i];
-        double tau = def->kp[i % 6] * env->kp_scale[i] * (target - q[i]) -
-                     def->kd[i % 6] * env->kd_scale[i] * qd[i];
+    for (int i = 0; i < env->shape.joints; i++) {
+        double target = pose[i] + scale * (double)action[i] + env->motor_offset[i];
+        double tau =
+            env->kp[i] * env->kp_scale[i] * (target - q[i]) - env->kd[i] * env->kd_scale[i] * qd[i];
         double limit = def->torque_share * effort[i];
         tau *= env->strength[i];
-        torque[i] = tau > limit ? limit : tau < -limit ? -limit : tau;
+        tau = tau > limit ? limit : tau < -limit ? -limit : tau;
+        torque[i] = limit_speed(tau, qd[i], fastest[i]);
     }
 }
 
 /* Physics steps of one policy period with the three latencies. Returns 1 when a number went bad. */
 static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       TaskReading *reading, double torque[ROBOT_JOINTS], const TaskProbe *probe) {
+                       TaskReading *reading, double *torque, const TaskProbe *probe) {
     int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
     for (int k = 0; k <= steps; k++) {
         if (k == steps - env->lag_imu) {
@@ -203,20 +236,20 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     return 0;
 }
 
-static void feet_motion(TaskEnv *env, const TaskDef *def, const RobotSim *sim, TaskMotion *m) {
+static void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                        TaskMotion *m) {
     double stance_height = 0;
     int stances = 0;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < env->shape.feet; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         const double *v = foot->sole_center_velocity, *force = foot->force;
         m->foot_height[f] = foot->sole_height;
         m->foot_speed[f] = sqrt(v[0] * v[0] + v[1] * v[1]);
         m->foot_force[f] = sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
         m->contact[f] = force[2] > CONTACT_FORCE;
-        m->stance[f] = task_gait_stance(env->phase, m->standing, f);
-        m->either[f] =
-            !m->standing && fabs(sin(6.283185307179586 * env->phase)) < def->double_support;
-        m->wanted_height[f] = task_gait_height(def, env->phase, m->standing, f);
+        m->stance[f] = task_gait_stance(robot, env->phase, m->standing, f);
+        m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
+        m->wanted_height[f] = task_gait_height(def, robot, env->phase, m->standing, f);
         if (m->contact[f]) {
             m->landed_air_time += fmin(env->air_time[f], 0.5 * def->gait_period);
             env->air_time[f] = 0;
@@ -232,8 +265,8 @@ static void feet_motion(TaskEnv *env, const TaskDef *def, const RobotSim *sim, T
 }
 
 TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                const RobotSim *sim, const double torque[ROBOT_JOINTS]) {
-    TaskMotion m = {.def = def, .env = env, .pose = robot_default_pose(robot)};
+                                const RobotSim *sim, const double *torque) {
+    TaskMotion m = {.def = def, .robot = robot, .env = env};
     const double *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
     double heading = atan2(rotation[3], rotation[0]), c = cos(heading), s = sin(heading), twist[6],
            change = 0;
@@ -263,7 +296,7 @@ TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *r
     memcpy(m.torque, torque, sizeof m.torque);
     m.foot_distance = robot_sim_foot_distance(sim);
     m.knee_distance = robot_sim_knee_distance(sim);
-    feet_motion(env, def, sim, &m);
+    feet_motion(env, def, robot, sim, &m);
     return m;
 }
 
@@ -298,7 +331,7 @@ static void report_episode(const TaskEnv *env, TaskStep *out) {
 
 /* The reward of the step just made; 0 when a number went bad. */
 static int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       const double torque[ROBOT_JOINTS], float *reward) {
+                       const double *torque, float *reward) {
     double terms[TASK_REWARD_COUNT];
     robot_sim_store(sim, &env->robot);
     TaskMotion motion = task_describe_motion(env, def, robot, sim, torque);
@@ -320,7 +353,7 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
                        const TaskProbe *probe) {
     TaskStep out = {.valid = 1};
     TaskReading reading;
-    double torque[ROBOT_JOINTS];
+    double torque[ROBOT_JOINTS_MAX];
     accept_action(env, def, action);
     push_base(env, def);
     lend_map(env, def);

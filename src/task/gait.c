@@ -8,35 +8,44 @@ int task_is_standing(const double command[3]) {
     return fabs(command[0]) < 0.1 && fabs(command[1]) < 0.1 && fabs(command[2]) < 0.1;
 }
 
-/* Left stands in the first half of the period, right in the second. */
-static double swing_progress(double phase, int foot) {
-    double p = foot == ROBOT_FOOT_LEFT ? phase - 0.5 : phase;
-    return p < 0 || p >= 0.5 ? -1 : 2 * p;
+/* [-] Progress of the foot's swing, the half of the period before its stance; -1 in stance. */
+static double swing_progress(const Robot *robot, double phase, int foot) {
+    double offset = robot_gait_offset(robot, foot);
+    double p = phase - (offset < 0.5 ? offset + 0.5 : offset - 0.5);
+    p += p < 0 ? 1 : 0;
+    return p >= 0.5 ? -1 : 2 * p;
 }
 
-int task_gait_stance(double phase, int standing, int foot) {
-    return standing || swing_progress(phase, foot) < 0;
+/* The foot's clock: above 0 in its stance, below in its swing. */
+static double wave(const Robot *robot, double phase, int foot) {
+    double offset = robot_gait_offset(robot, foot);
+    return offset < 0.5 ? sin(TWO_PI * (phase - offset)) : -sin(TWO_PI * (phase - (offset - 0.5)));
+}
+
+int task_gait_stance(const Robot *robot, double phase, int standing, int foot) {
+    return standing || swing_progress(robot, phase, foot) < 0;
+}
+
+int task_gait_either(const TaskDef *def, const Robot *robot, double phase, int standing, int foot) {
+    return !standing && fabs(wave(robot, phase, foot)) < def->double_support;
 }
 
 /* h_des = apex sin(pi s), s the progress of the swing: the foot leaves and meets h0 on time. */
-double task_gait_height(const TaskDef *def, double phase, int standing, int foot) {
-    double s = swing_progress(phase, foot);
+double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
+                        int foot) {
+    double s = swing_progress(robot, phase, foot);
     return standing || s < 0 ? 0 : def->swing_apex * sin(0.5 * TWO_PI * s);
 }
 
-/* Vendor's reference: the swing leg bends by (-A, 2A, -A) |sin| in hip pitch, knee, ankle pitch. */
-void task_gait_reference(const TaskDef *def, const double *pose, double phase, int standing,
-                         double q[ROBOT_JOINTS]) {
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        q[i] = pose[i];
+/* Vendor's reference: the swing leg bends by A |sin| times `swing` of robot.ini, for SA01 (-1, 2,
+ * -1) in hip pitch, knee, ankle pitch. */
+void task_gait_reference(const TaskDef *def, const Robot *robot, double phase, int standing,
+                         double *q) {
+    const double *pose = robot_default_pose(robot), *swing = robot_swing(robot);
+    for (int i = 0; i < robot_joints(robot); i++) {
+        int foot = robot_joint_foot(robot)[i];
+        double now = foot < 0 || standing ? 0 : wave(robot, phase, foot);
+        double bend = -now < def->double_support ? 0 : def->reward.reference_amplitude * -now;
+        q[i] = pose[i] + swing[i] * bend;
     }
-    double wave = standing ? 0 : sin(TWO_PI * phase);
-    if (fabs(wave) < def->double_support) {
-        return;
-    }
-    int first = wave < 0 ? 0 : 6;
-    double bend = def->reward.reference_amplitude * fabs(wave);
-    q[first + 2] -= bend;
-    q[first + 3] += 2 * bend;
-    q[first + 4] -= bend;
 }

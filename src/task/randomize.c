@@ -32,13 +32,14 @@ static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
 }
 
 /* The quasistatic force is linear in (k_pen, sigma_cone): one factor makes a too soft draw carry
- * the robot on one foot at sinkage_max. Without it a fifth of the paper's draws swallows the foot
+ * the robot on half of its feet at sinkage_max. Without it a fifth of the paper's draws swallows the foot
  * (docs/task.md section 11). */
 static void limit_sinkage(MildMaterial *m, const Robot *robot, double sinkage) {
     const MildSole *sole = robot_rasters(robot)[0];
     MildMaterial bottomless = *m;
     bottomless.bed_depth = 1e3;
-    double wanted = robot_total_mass(robot) * 9.81 / mild_sole_elements(sole);
+    double feet = 0.5 * robot_feet(robot); /* half of them stand */
+    double wanted = robot_total_mass(robot) * 9.81 / feet / mild_sole_elements(sole);
     double force = mild_element_law(&bottomless, mild_sole_pitch(sole), sinkage).force;
     if (force < wanted && force > 0) {
         m->k_pen *= wanted / force;
@@ -131,11 +132,11 @@ void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot) {
     for (int i = 0; i < 3; i++) {
         env->variation.com_offset[i] = spread(&r, z->com_offset);
     }
-    for (int i = 0; i <= ROBOT_JOINTS; i++) {
+    for (int i = 0; i <= env->shape.joints; i++) {
         env->variation.link_mass_scale[i] = draw(&r, z->link_mass);
     }
     double strength = draw(&r, z->strength);
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < env->shape.joints; i++) {
         env->kp_scale[i] = draw(&r, z->gain);
         env->kd_scale[i] = draw(&r, z->gain);
         env->strength[i] = strength;

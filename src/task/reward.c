@@ -13,6 +13,11 @@ static double clamp(double x, double low, double high) {
     return x < low ? low : x > high ? high : x;
 }
 
+/* A sum over feet, as large as for two. */
+static double per_pair(const TaskMotion *m, double sum) {
+    return sum * (2.0 / m->env->shape.feet);
+}
+
 /* exp(-k e^2) of the paper reaches out to a beginner, but is flat at its top: 0.05 m/s too slow
  * costs 1 % of it. Beside it exp(-|e|/width) keeps its slope down to no error at all. Both on the
  * velocity smoothed over half a gait period: the sway of every step is no error, and hid it. */
@@ -39,30 +44,30 @@ static double reward_yaw_rate(const TaskMotion *m) {
  * swing. */
 static double reward_feet_clearance(const TaskMotion *m) {
     double sum = 0;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < m->env->shape.feet; f++) {
         if (!m->stance[f]) {
             double h = m->foot_height[f], wanted = m->wanted_height[f];
             sum += 1.5707963 * (clamp(h, 0, wanted) - 0.5 * clamp(h - wanted, 0, 0.3)) /
                    m->def->swing_apex;
         }
     }
-    return sum;
+    return per_pair(m, sum);
 }
 
 static double reward_gait(const TaskMotion *m) {
     double sum = 0;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < m->env->shape.feet; f++) {
         sum += m->either[f] || m->contact[f] == m->stance[f] ? 1 : -0.3;
     }
-    return sum / ROBOT_FEET;
+    return sum / m->env->shape.feet;
 }
 
 static double reward_slip(const TaskMotion *m) {
     double sum = 0;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < m->env->shape.feet; f++) {
         sum += m->contact[f] ? m->foot_speed[f] : 0;
     }
-    return sum;
+    return per_pair(m, sum);
 }
 
 static double reward_base_acceleration(const TaskMotion *m) {
@@ -71,7 +76,7 @@ static double reward_base_acceleration(const TaskMotion *m) {
 
 static double reward_action_smoothness(const TaskMotion *m) {
     double sum = 0;
-    for (int i = 0; i < TASK_ACTIONS; i++) {
+    for (int i = 0; i < m->env->shape.actions; i++) {
         double a = m->env->action[0][i], a1 = m->env->action[1][i], a2 = m->env->action[2][i];
         sum += square(a - a1) + square(a - 2 * a1 + a2);
     }
@@ -79,9 +84,9 @@ static double reward_action_smoothness(const TaskMotion *m) {
 }
 
 static double reward_reference_motion(const TaskMotion *m) {
-    double reference[ROBOT_JOINTS], sum = 0;
-    task_gait_reference(m->def, m->pose, m->env->phase, m->standing, reference);
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    double reference[ROBOT_JOINTS_MAX], sum = 0;
+    task_gait_reference(m->def, m->robot, m->env->phase, m->standing, reference);
+    for (int i = 0; i < m->env->shape.joints; i++) {
         sum += square(m->q[i] - reference[i]);
     }
     double d = sqrt(sum);
@@ -90,33 +95,38 @@ static double reward_reference_motion(const TaskMotion *m) {
 
 /* The vendor's exp(-100 x) alone is flat, and so teaches nothing, from a fifth of a radian on. */
 static double reward_default_pose(const TaskMotion *m) {
-    double roll_yaw = 0, all = 0;
-    for (int leg = 0; leg < 2; leg++) {
-        double roll = m->q[6 * leg] - m->pose[6 * leg],
-               yaw = m->q[6 * leg + 1] - m->pose[6 * leg + 1];
-        roll_yaw += sqrt(square(roll) + square(yaw));
+    const double *pose = robot_default_pose(m->robot), *still = robot_still(m->robot);
+    double away = 0, all = 0;
+    for (int f = -1; f < m->env->shape.feet; f++) { /* -1: the trunk's joints */
+        double leg = 0;
+        for (int i = 0; i < m->env->shape.joints; i++) {
+            int same = robot_joint_foot(m->robot)[i] == f;
+            leg += same ? square(still[i] * (m->q[i] - pose[i])) : 0;
+        }
+        away += sqrt(leg);
     }
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        all += square(m->q[i] - m->pose[i]);
+    for (int i = 0; i < m->env->shape.joints; i++) {
+        all += square(m->q[i] - pose[i]);
     }
-    return 0.5 * (exp(-100 * clamp(roll_yaw - 0.1, 0, 50)) + exp(-3 * roll_yaw)) - 0.01 * sqrt(all);
+    return 0.5 * (exp(-100 * clamp(away - 0.1, 0, 50)) + exp(-3 * away)) - 0.01 * sqrt(all);
 }
 
 static double reward_base_height(const TaskMotion *m) {
-    return exp(-100 * fabs(m->base_height - m->def->reward.nominal_height));
+    return exp(-100 * fabs(m->base_height - task_nominal_height(m->def, m->robot)));
 }
 
-static double within(double distance, const double limits[2]) {
+static double within(double distance, const double wanted[2], const double own[2]) {
+    const double *limits = wanted[1] > 0 ? wanted : own;
     double below = clamp(limits[0] - distance, 0, 0.5), above = clamp(distance - limits[1], 0, 0.5);
     return 0.5 * (exp(-100 * below) + exp(-100 * above));
 }
 
 static double reward_feet_distance(const TaskMotion *m) {
-    return within(m->foot_distance, m->def->reward.feet_range);
+    return within(m->foot_distance, m->def->reward.feet_range, robot_feet_range(m->robot));
 }
 
 static double reward_knee_distance(const TaskMotion *m) {
-    return within(m->knee_distance, m->def->reward.knee_range);
+    return within(m->knee_distance, m->def->reward.knee_range, robot_knee_range(m->robot));
 }
 
 static double reward_orientation(const TaskMotion *m) {
@@ -127,7 +137,7 @@ static double reward_orientation(const TaskMotion *m) {
 /* A lump at touchdown: divided by the period, so that it is not spread over one step like a rate
  * (the vendor's product with dt leaves a hundredth of it, which no learner notices). */
 static double reward_air_time(const TaskMotion *m) {
-    return m->standing ? 0 : m->landed_air_time / TASK_PERIOD;
+    return m->standing ? 0 : per_pair(m, m->landed_air_time) / TASK_PERIOD;
 }
 
 static double reward_base_motion(const TaskMotion *m) {
@@ -136,16 +146,16 @@ static double reward_base_motion(const TaskMotion *m) {
 }
 
 static double reward_contact_force(const TaskMotion *m) {
-    double sum = 0;
-    for (int f = 0; f < ROBOT_FEET; f++) {
-        sum += clamp(m->foot_force[f] - 500, 0, 400);
+    double sum = 0, hard = robot_foot_force(m->robot);
+    for (int f = 0; f < m->env->shape.feet; f++) {
+        sum += clamp(m->foot_force[f] - hard, 0, 0.8 * hard);
     }
-    return sum;
+    return per_pair(m, sum);
 }
 
 static double reward_torque(const TaskMotion *m) {
     double sum = 0;
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < m->env->shape.joints; i++) {
         sum += square(m->torque[i]);
     }
     return sum;
@@ -153,7 +163,7 @@ static double reward_torque(const TaskMotion *m) {
 
 static double reward_joint_speed(const TaskMotion *m) {
     double sum = 0;
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < m->env->shape.joints; i++) {
         sum += square(m->qd[i]);
     }
     return sum;
@@ -161,15 +171,16 @@ static double reward_joint_speed(const TaskMotion *m) {
 
 static double reward_joint_acceleration(const TaskMotion *m) {
     double sum = 0;
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < m->env->shape.joints; i++) {
         sum += square((m->qd[i] - m->qd_before[i]) / TASK_PERIOD);
     }
     return sum;
 }
 
-/* The legs are about 0.10 m wide; the engine computes no contact between them. */
+/* The engine computes no contact between the legs. */
 static double reward_collision(const TaskMotion *m) {
-    return (m->foot_distance < 0.10) + (m->knee_distance < 0.09);
+    return (m->foot_distance < robot_feet_least(m->robot)) +
+           (m->knee_distance < robot_knee_least(m->robot));
 }
 
 typedef double (*RewardFunction)(const TaskMotion *);

@@ -11,14 +11,9 @@
 #include "robot/robot.h"
 #include "task/task_def.h"
 
-#define TASK_OBSERVATION 47 /* one frame: see observe.c */
-#define TASK_FRAMES 6       /* H + 1, newest last (paper, H = 5) */
-#define TASK_HISTORY (TASK_FRAMES * TASK_OBSERVATION)
+#define TASK_FRAMES 6      /* H + 1, newest last (paper, H = 5) */
 #define TASK_STRIDE_MAX 16 /* greatest task.history_stride */
 #define TASK_FRAMES_HELD ((TASK_FRAMES - 1) * TASK_STRIDE_MAX + 1)
-#define TASK_ACTIONS ROBOT_JOINTS
-#define TASK_ESTIMATES 11 /* base velocity 3, feet velocities 6, feet heights 2 */
-#define TASK_CRITIC 104
 #define TASK_PERIOD 0.01 /* [s] policy step: 100 Hz (paper) */
 
 /* Scale of the feet heights among the estimates, so that centimetres weigh in the regression like
@@ -28,7 +23,27 @@
  * and by the actor. */
 #define TASK_VELOCITY_SCALE 4.0
 
+/* Numbers per environment; they follow from the robot's joints and feet. */
 typedef struct {
+    int joints;
+    int feet;
+    int observation; /* one frame: angular velocity 3, command 3, gravity 3, joints' angles, speeds
+                        and last actions, clock 2 (observe.c) */
+    int history;     /* TASK_FRAMES frames */
+    int actions;     /* one per joint */
+    int estimates;   /* base velocity 3, feet velocities 3 each, feet heights */
+    int critic;      /* frame, estimates, 6 of each foot, 34 of the episode (observe.c) */
+} TaskShape;
+enum { /* of a robot with ROBOT_JOINTS_MAX joints and ROBOT_FEET_MAX feet */
+       TASK_OBSERVATION_MAX = 9 + 3 * ROBOT_JOINTS_MAX + 2,
+       TASK_HISTORY_MAX = TASK_FRAMES * TASK_OBSERVATION_MAX,
+       TASK_ESTIMATES_MAX = 3 + 4 * ROBOT_FEET_MAX,
+       TASK_CRITIC_MAX = TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34
+};
+TaskShape task_shape(const Robot *robot);
+
+typedef struct {
+    TaskShape shape;
     uint64_t seed;
     uint32_t index; /* environment number: its stream of random numbers */
     uint32_t tick;  /* policy steps since creation, never reset */
@@ -42,24 +57,26 @@ typedef struct {
     RobotVariation variation;
     MildTerrain terrain; /* its map is lent by TaskDef during a call and NULL between calls: the
                             block holds no pointer */
-    double kp_scale[ROBOT_JOINTS], kd_scale[ROBOT_JOINTS], strength[ROBOT_JOINTS],
-        motor_offset[ROBOT_JOINTS];
-    int lag_command, lag_motor, lag_imu; /* [physics steps] */
+    double kp_scale[ROBOT_JOINTS_MAX];     /* [-] */
+    double kd_scale[ROBOT_JOINTS_MAX];     /* [-] */
+    double strength[ROBOT_JOINTS_MAX];     /* [-] of the torque */
+    double motor_offset[ROBOT_JOINTS_MAX]; /* [rad] */
+    int lag_command, lag_motor, lag_imu;   /* [physics steps] */
     double assist_level; /* [-] helping hand: falls with time on its feet, rises with falls; lives
                             across episodes */
     double assist_draw;  /* [-] this episode's share of the level, in [0.5, 1) */
     double push[6];      /* [m/s, rad/s] last push, for the critic; fades */
     /* state */
     RobotState robot;
-    float action[3][TASK_ACTIONS];                    /* now, one and two steps ago */
-    float frames[TASK_FRAMES_HELD][TASK_OBSERVATION]; /* ring of every policy step's */
-    uint32_t newest;                                  /* frame in the ring */
-    float history[TASK_HISTORY]; /* what the policy sees of them: the newest, and five means */
+    double kp[ROBOT_JOINTS_MAX];       /* [N m/rad] task.kp or the robot's */
+    double kd[ROBOT_JOINTS_MAX];       /* [N m s/rad] task.kd or the robot's */
+    float action[3][ROBOT_JOINTS_MAX]; /* now, one and two steps ago */
+    uint32_t newest;                   /* frame in the ring, see task_env_frame */
     double base_twist[6]; /* one policy step ago: linear in the world, angular in the base frame */
-    double smooth_velocity[3];        /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over
+    double smooth_velocity[3]; /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over
                                          reward.tracking_time */
-    double joint_speed[ROBOT_JOINTS]; /* one policy step ago */
-    double air_time[ROBOT_FEET];
+    double joint_speed[ROBOT_JOINTS_MAX]; /* one policy step ago */
+    double air_time[ROBOT_FEET_MAX];
     /* sums over the running episode, for the log */
     double reward_sum, term_sum[TASK_REWARD_COUNT], speed_error_sum;
 } TaskEnv;
@@ -73,12 +90,12 @@ typedef struct {
     float episode_reward, episode_terms[TASK_REWARD_COUNT], episode_speed_error;
 } TaskStep;
 
-/* Where the next observation goes; any pointer may be NULL. */
+/* Where the next observation goes, widths as in TaskShape; any pointer may be NULL. */
 typedef struct {
-    float *history;  /* [TASK_HISTORY] noisy, newest frame last */
-    float *critic;   /* [TASK_CRITIC] */
-    float *estimate; /* [TASK_ESTIMATES] the truth the heads regress to */
-    float *frame;    /* [TASK_OBSERVATION] newest noisy frame: the decoder's target */
+    float *history;  /* [history] noisy, newest frame last */
+    float *critic;   /* [critic] */
+    float *estimate; /* [estimates] the truth the heads regress to */
+    float *frame;    /* [observation] newest noisy frame: the decoder's target */
 } TaskView;
 
 /* Called after every physics step, when robot and ground memory are those of its end: measures and
@@ -89,9 +106,13 @@ typedef struct {
     void *context;
 } TaskProbe;
 
-size_t task_env_bytes(const TaskDef *def,
-                      const Robot *robot); /* TaskEnv and its ground memory, a multiple of 64 */
+/* One block: TaskEnv, its frames, its ground memory; a multiple of 64. */
+size_t task_env_bytes(const TaskDef *def, const Robot *robot);
 MildGround *task_env_ground(TaskEnv *env);
+/* [shape.history] what the policy sees: five means of older frames, then the newest. */
+float *task_env_history(TaskEnv *env);
+/* [shape.observation] the frame of `age` policy steps ago, 0 .. TASK_FRAMES_HELD - 1. */
+float *task_env_frame(TaskEnv *env, int age);
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index);
@@ -113,7 +134,7 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 /* Readings of one instant (observe.c). */
 typedef struct {
     double omega[3], gravity[3]; /* base frame */
-    double q[ROBOT_JOINTS], qd[ROBOT_JOINTS];
+    double q[ROBOT_JOINTS_MAX], qd[ROBOT_JOINTS_MAX];
 } TaskReading;
 void task_read_imu(const RobotSim *sim, TaskReading *reading);
 void task_read_motors(const RobotSim *sim, TaskReading *reading);
@@ -124,27 +145,34 @@ void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const Ro
 /* Everything a reward term may look at, computed once per policy step (env.c). */
 typedef struct {
     const TaskDef *def;
+    const Robot *robot;
     const TaskEnv *env;
-    const double *pose;  /* default pose */
-    double velocity[3];  /* base, heading frame [m/s] */
-    double omega[3];     /* base, base frame [rad/s] */
-    double gravity[3];   /* unit gravity in the base frame */
-    double twist_change; /* norm of the change of base twist in this step */
-    double q[ROBOT_JOINTS], qd[ROBOT_JOINTS], qd_before[ROBOT_JOINTS], torque[ROBOT_JOINTS];
-    double base_height; /* above the stance soles [m] */
-    double foot_height[ROBOT_FEET], foot_force[ROBOT_FEET], foot_speed[ROBOT_FEET];
+    double velocity[3];                 /* base, heading frame [m/s] */
+    double omega[3];                    /* base, base frame [rad/s] */
+    double gravity[3];                  /* unit gravity in the base frame */
+    double twist_change;                /* norm of the change of base twist in this step */
+    double q[ROBOT_JOINTS_MAX];         /* [rad] */
+    double qd[ROBOT_JOINTS_MAX];        /* [rad/s] */
+    double qd_before[ROBOT_JOINTS_MAX]; /* [rad/s] one policy step ago */
+    double torque[ROBOT_JOINTS_MAX];    /* [N m] */
+    double base_height;                 /* [m] above the stance soles */
+    double foot_height[ROBOT_FEET_MAX];
+    double foot_force[ROBOT_FEET_MAX];
+    double foot_speed[ROBOT_FEET_MAX];
     double landed_air_time; /* sum over feet that touched down in this step */
-    int contact[ROBOT_FEET], stance[ROBOT_FEET],
-        either[ROBOT_FEET]; /* either: both states are right */
-    double wanted_height[ROBOT_FEET];
-    double foot_distance, knee_distance;
+    int contact[ROBOT_FEET_MAX];
+    int stance[ROBOT_FEET_MAX];
+    int either[ROBOT_FEET_MAX]; /* bool: both states are right */
+    double wanted_height[ROBOT_FEET_MAX];
+    double foot_distance; /* [m] see robot_sim_foot_distance */
+    double knee_distance; /* [m] */
     int standing;
 } TaskMotion;
 /* What the policy step just made was like: the sim is at its end, env still holds base twist, joint
  * speeds, smoothed velocity and air times of the step before and gets those of this one. torque: of
  * the last physics step. */
 TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                const RobotSim *sim, const double torque[ROBOT_JOINTS]);
+                                const RobotSim *sim, const double *torque);
 /* Weighted terms per second into terms; returns the clipped sum times the period. */
 double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
 
@@ -159,20 +187,25 @@ double task_assist_share(const TaskEnv *env, const TaskDef *def);
 void task_assist_adapt(TaskEnv *env, int fallen);
 int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
                 double wrench[6]);
-void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                      double pose[ROBOT_JOINTS]);
+void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double *pose);
 
-/* Gait clock (gait.c): foot 0 stands while sin(2 pi phase) >= 0, foot 1 while < 0. */
+/* Gait clock (gait.c): a foot stands in the half of the period that begins at its offset. */
 int task_is_standing(const double command[3]);
-int task_gait_stance(double phase, int standing, int foot);
-double task_gait_height(const TaskDef *def, double phase, int standing, int foot);
-void task_gait_reference(const TaskDef *def, const double *pose, double phase, int standing,
-                         double q[ROBOT_JOINTS]);
+int task_gait_stance(const Robot *robot, double phase, int standing, int foot);
+double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
+                        int foot);
+/* True near touchdown and lift-off, where standing and swinging are both right. */
+int task_gait_either(const TaskDef *def, const Robot *robot, double phase, int standing, int foot);
+void task_gait_reference(const TaskDef *def, const Robot *robot, double phase, int standing,
+                         double *q);
 
-/* Mirror symmetry left <-> right: o'_i = sign_i o_index_i. */
-extern const int task_mirror_observation_index[TASK_OBSERVATION];
-extern const float task_mirror_observation_sign[TASK_OBSERVATION];
-extern const int task_mirror_action_index[TASK_ACTIONS];
-extern const float task_mirror_action_sign[TASK_ACTIONS];
+/* Mirror symmetry left <-> right: o'_i = sign_i o_index_i, and actions alike. */
+typedef struct {
+    int observation_index[TASK_OBSERVATION_MAX];
+    float observation_sign[TASK_OBSERVATION_MAX];
+    int action_index[ROBOT_JOINTS_MAX];
+    float action_sign[ROBOT_JOINTS_MAX];
+} TaskMirror;
+TaskMirror task_mirror(const Robot *robot);
 
 #endif

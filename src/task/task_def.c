@@ -1,6 +1,11 @@
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include "task/task.h"
+
+#define KP_MAX 500.0 /* [N m/rad] */
+#define KD_MAX 50.0  /* [N m s/rad] */
 
 #define TASK_REWARD_NAME(name, weight, help) #name,
 const char *const task_reward_names[] = {TASK_REWARD_LIST(TASK_REWARD_NAME)};
@@ -8,11 +13,10 @@ const char *const task_reward_names[] = {TASK_REWARD_LIST(TASK_REWARD_NAME)};
 TaskDef task_def_default(void) {
     TaskDef def = {
         .physics_dt = 0.0025,
-        .action_scale = 0.5,
         .action_clip = 8.0,
         .torque_share = 0.85,
-        .kp = {50, 50, 70, 70, 20, 20},
-        .kd = {5, 5, 7, 7, 0.2, 0.2},
+        .kp = "robot",
+        .kd = "robot",
         .episode = 24,
         .command_interval = 8,
         .vx = {0, 1.2},
@@ -39,12 +43,9 @@ TaskDef task_def_default(void) {
         .contact_tolerance = 1e-4,
         .contact_iterations = 20,
         .reward = {.clip_sum = 1,
-                   .nominal_height = 0.83,
                    .tracking_sharpness = 5,
                    .tracking_width = 0.1,
                    .tracking_time = 0.4,
-                   .feet_range = {0.13, 0.26},
-                   .knee_range = {0.12, 0.26},
                    .reference_amplitude = 0.40},
         .randomize = {.rigid_share = 0.1,
                       .preset_share = 0.5,
@@ -104,11 +105,12 @@ void task_def_make_nominal(TaskDef *def) {
     MILD_FIELD(TaskDef, member, type, count, min, max, help)
 const MildField task_fields[] = {
     T(physics_dt, D, 1, 0.0005, 0.005, "[s] physics step; 0.01 must be a whole multiple of it"),
-    T(action_scale, D, 1, 0.01, 2, "[rad] joint offset per unit of action"),
+    T(action_scale, D, 1, 0, 2, "[rad] joint offset per unit of action; 0: the robot's"),
     T(action_clip, D, 1, 0.1, 100, "[-] actions are clipped to +- this"),
     T(torque_share, D, 1, 0.1, 1, "[-] torque limit as a share of the joint's effort"),
-    T(kp, D, 6, 0, 500, "[N m/rad] hip roll, yaw, pitch, knee, ankle pitch, roll"),
-    T(kd, D, 6, 0, 50, "[N m s/rad] as kp"),
+    T(kp, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0,
+      "[N m/rad] robot: the robot's; or a number per joint, or per joint of a leg, or one"),
+    T(kd, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0, "[N m s/rad] as kp"),
     T(episode, D, 1, 0.1, 1000, "[s] time-out"),
     T(command_interval, D, 1, 0.1, 1000, "[s] between redraws of the command"),
     T(vx, D, 2, -3, 3, "[m/s] forward command, low and high"),
@@ -157,12 +159,12 @@ const int task_field_count = sizeof task_fields / sizeof *task_fields;
 const MildField reward_fields[] = {
     TASK_REWARD_LIST(TASK_REWARD_FIELD)
         R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
-    R(nominal_height, D, 1, 0.1, 2, "[m] nominal base height above the stance soles"),
+    R(nominal_height, D, 1, 0, 2, "[m] base height above the stance soles; 0: the robot's"),
     R(tracking_time, D, 1, 0.01, 10, "[s] over which the tracked velocity is smoothed"),
     R(tracking_sharpness, D, 1, 0, 100, "[s^2/m^2] k of linear_velocity and yaw_rate"),
     R(tracking_width, D, 1, 0.001, 10, "[m/s, rad/s] width of linear_velocity and yaw_rate"),
-    R(feet_range, D, 2, 0, 1, "[m] limits of the lateral distance of the feet"),
-    R(knee_range, D, 2, 0, 1, "[m] limits of the lateral distance of the knees"),
+    R(feet_range, D, 2, 0, 1, "[m] limits of the lateral distance of the feet; 0 0: the robot's"),
+    R(knee_range, D, 2, 0, 1, "[m] limits of the lateral distance of the knees; 0 0: the robot's"),
     R(reference_amplitude, D, 1, 0, 1, "[rad] of reference_motion"),
 };
 const int reward_field_count = sizeof reward_fields / sizeof *reward_fields;
@@ -219,6 +221,72 @@ static MildStatus check_section(const MildField *fields, int count, const void *
     return status;
 }
 
+/* Numbers of a list of gains into `list`; -1 with a message when it is none. */
+static int read_gains(const char *key, const char *text, double most, double *list,
+                      MildError *error) {
+    int count = 0;
+    for (const char *at = text + strspn(text, " ,\t"); *at; at += strspn(at, " ,\t")) {
+        char *end = NULL;
+        double value = strtod(at, &end);
+        if (end == at || !(value >= 0.0 && value <= most) || count == ROBOT_JOINTS_MAX) {
+            mild_fail(error, MILD_ERROR_RANGE,
+                      "task.%s = %.60s: neither robot nor up to %d numbers from 0 to %g", key, text,
+                      ROBOT_JOINTS_MAX, most);
+            return -1;
+        }
+        list[count++] = value;
+        at = end;
+    }
+    return count;
+}
+
+/* joints 0: of any robot. */
+static MildStatus take_gains(const char *key, const char *text, double most, int joints,
+                             const double *own, double *gains, MildError *error) {
+    double list[ROBOT_JOINTS_MAX];
+    if (strcmp(text, "robot") == 0) {
+        memcpy(gains, own, (size_t)joints * sizeof *gains);
+        return MILD_OK;
+    }
+    int count = read_gains(key, text, most, list, error);
+    if (count < 0) {
+        return MILD_ERROR_RANGE;
+    }
+    if (count == 0 || joints % count != 0) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "task.%s = %.60s: %d numbers do not fit %d joints; robot takes the "
+                         "robot's own",
+                         key, text, count, joints);
+    }
+    for (int i = 0; i < joints; i++) {
+        gains[i] = list[i % count];
+    }
+    return MILD_OK;
+}
+
+MildStatus task_gains(const TaskDef *def, const Robot *robot, double *kp, double *kd,
+                      MildError *error) {
+    int joints = robot_joints(robot);
+    MildStatus status = take_gains("kp", def->kp, KP_MAX, joints, robot_kp(robot), kp, error);
+    return status == MILD_OK ? take_gains("kd", def->kd, KD_MAX, joints, robot_kd(robot), kd, error)
+                             : status;
+}
+
+double task_action_scale(const TaskDef *def, const Robot *robot) {
+    return def->action_scale > 0 ? def->action_scale : robot_action_scale(robot);
+}
+
+double task_nominal_height(const TaskDef *def, const Robot *robot) {
+    return def->reward.nominal_height > 0 ? def->reward.nominal_height
+                                          : robot_nominal_height(robot);
+}
+
+MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error) {
+    double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
+    MildStatus status = task_def_check(def, error);
+    return status == MILD_OK ? task_gains(def, robot, kp, kd, error) : status;
+}
+
 MildStatus task_def_check(const TaskDef *def, MildError *error) {
     MildStatus status = check_section(task_fields, task_field_count, def, "task", error);
     if (status == MILD_OK) {
@@ -228,6 +296,9 @@ MildStatus task_def_check(const TaskDef *def, MildError *error) {
         status = check_section(randomize_fields, randomize_field_count, &def->randomize,
                                "randomize", error);
     }
+    double any[ROBOT_JOINTS_MAX];
+    status = status == MILD_OK ? take_gains("kp", def->kp, KP_MAX, 0, any, any, error) : status;
+    status = status == MILD_OK ? take_gains("kd", def->kd, KD_MAX, 0, any, any, error) : status;
     double steps = TASK_PERIOD / def->physics_dt;
     if (status == MILD_OK && !(fabs(steps - floor(steps + 0.5)) < 1e-9)) {
         return mild_fail(error, MILD_ERROR_RANGE,

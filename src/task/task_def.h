@@ -6,6 +6,7 @@
 #include "mild/error.h"
 #include "mild/field.h"
 #include "mild/map.h"
+#include "robot/robot.h"
 
 /* Every reward term once: name, default weight, help. The struct, the config keys and the table of
  * functions (reward.c) are all made from this list. Weights are per second; source: paper Table II
@@ -23,7 +24,7 @@
     X(base_acceleration, 0.2, "exp(-3 |change of base twist in one step|) (paper)")                \
     X(action_smoothness, -0.003, "|a - a1|^2 + |a - 2 a1 + a2|^2 (paper)")                         \
     X(reference_motion, 2.2, "exp(-2 d) - 0.2 min(d, 0.5), d = |q - q_ref(phase)| (vendor)")       \
-    X(default_pose, 1.2, "hip roll and yaw near the default pose (vendor)")                        \
+    X(default_pose, 1.2, "joints marked still in robot.ini near the default pose (vendor)")        \
     X(base_height, 0.2, "exp(-100 |height above the stance soles - nominal|) (vendor)")            \
     X(feet_distance, 0.2, "lateral distance of the feet within limits (vendor)")                   \
     X(knee_distance, 0.2, "lateral distance of the knees within limits (vendor)")                  \
@@ -31,24 +32,25 @@
     X(air_time, 1.0,                                                                               \
       "[s] time in the air, paid at touchdown, at most half a gait period (vendor)")               \
     X(base_motion, 0.5, "small vertical and roll-pitch speed of the base (vendor)")                \
-    X(contact_force, -0.02, "[N] foot force above 500 N, at most 400 (vendor)")                    \
+    X(contact_force, -0.02,                                                                        \
+      "[N] foot force above foot_force of robot.ini, at most 0.8 of it (vendor)")                  \
     X(torque, -1e-10, "[N^2 m^2] sum of squared torques (vendor)")                                 \
     X(joint_speed, -1e-5, "[rad^2/s^2] sum of squared joint speeds (vendor)")                      \
     X(joint_acceleration, -5e-9, "[rad^2/s^4] sum of squared joint accelerations (vendor)")        \
-    X(collision, -1.0, "feet or knees closer than the legs are wide (vendor)")
+    X(collision, -1.0, "feet or knees closer than feet_least, knee_least of robot.ini (vendor)")
 
 #define TASK_REWARD_ENUM(name, weight, help) REWARD_##name,
 enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };
 #undef TASK_REWARD_ENUM
 
 typedef struct {
-    double weight[TASK_REWARD_COUNT];    /* [1/s] */
-    int clip_sum;                        /* bool: the sum of a step is never below 0 (vendor) */
-    double nominal_height;               /* [m] nominal base height above the stance soles */
-    double tracking_sharpness;           /* [s^2/m^2] k = 5 in the velocity terms */
-    double tracking_width;               /* [m/s] of the sharp part of the velocity terms */
-    double tracking_time;                /* [s] over which the tracked velocity is smoothed */
-    double feet_range[2], knee_range[2]; /* [m] limits */
+    double weight[TASK_REWARD_COUNT]; /* [1/s] */
+    int clip_sum;                     /* bool: the sum of a step is never below 0 (vendor) */
+    double nominal_height;            /* [m] of the base above the stance soles; 0: the robot's */
+    double tracking_sharpness;        /* [s^2/m^2] k = 5 in the velocity terms */
+    double tracking_width;            /* [m/s] of the sharp part of the velocity terms */
+    double tracking_time;             /* [s] over which the tracked velocity is smoothed */
+    double feet_range[2], knee_range[2]; /* [m] limits; 0 0: the robot's */
     double reference_amplitude;          /* [rad] */
 } RewardDef;
 
@@ -82,14 +84,17 @@ typedef struct {
     double initial_velocity;          /* [m/s] +- of the base */
 } RandomizeDef;
 
+enum { TASK_GAINS_SIZE = 152 }; /* characters of a list of gains, as long as a config's text */
+
 typedef struct {
-    double physics_dt;       /* [s] */
-    double action_scale;     /* [rad] per unit action */
-    double action_clip;      /* [-] */
-    double torque_share;     /* [-] of the joint's effort */
-    double kp[6], kd[6];     /* per leg */
-    double episode;          /* [s] */
-    double command_interval; /* [s] */
+    double physics_dt;        /* [s] */
+    double action_scale;      /* [rad] per unit action; 0: the robot's */
+    double action_clip;       /* [-] */
+    double torque_share;      /* [-] of the joint's effort */
+    char kp[TASK_GAINS_SIZE]; /* [N m/rad] "robot": the robot's; or numbers, see task_gains */
+    char kd[TASK_GAINS_SIZE]; /* [N m s/rad] */
+    double episode;           /* [s] */
+    double command_interval;  /* [s] */
     double vx[2], vy[2], wz[2];
     double backward_share, backward_vx[2], standing_share, straight_share;
     double gait_period;    /* [s] */
@@ -110,7 +115,7 @@ typedef struct {
     /* not of the config */
     const MildMap *map; /* borrowed: shape of the ground, and the pattern of the soft one; NULL:
                            level, one material */
-    int print_tiles; /* of prints, see mild_ground_bytes_prints */
+    int print_tiles;    /* of prints, see mild_ground_bytes_prints */
 } TaskDef;
 
 TaskDef task_def_default(void);
@@ -118,6 +123,15 @@ TaskDef task_def_default(void);
  * are still drawn. */
 void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);
+/* The same, and that the lists of gains fit the robot. */
+MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error);
+/* Gains of each joint [robot_joints]: the robot's, or the list of the def: one number, one per
+ * joint, or one per joint of a leg, which every leg repeats. */
+MildStatus task_gains(const TaskDef *def, const Robot *robot, double *kp, double *kd,
+                      MildError *error);
+/* What the def or, where it has 0, the robot says. */
+double task_action_scale(const TaskDef *def, const Robot *robot);   /* [rad] */
+double task_nominal_height(const TaskDef *def, const Robot *robot); /* [m] */
 
 extern const MildField task_fields[];
 extern const int task_field_count;

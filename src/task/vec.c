@@ -7,6 +7,7 @@
 
 struct Vec {
     TaskDef def;
+    TaskShape shape;
     const Robot *robot;
     Pool *pool;
     int envs;
@@ -25,19 +26,24 @@ static TaskEnv *env_at(const Vec *vec, int i) {
     return (TaskEnv *)(void *)(vec->state + (size_t)i * vec->stride);
 }
 
-static TaskView view_at(const VecView *view, int i) {
-    size_t row = (size_t)i;
+static float *row_at(float *rows, int i, int width) {
+    return rows ? rows + (size_t)i * (size_t)width : NULL;
+}
+
+static TaskView view_at(const Vec *vec, int i) {
+    const VecView *view = vec->view;
+    const TaskShape *shape = &vec->shape;
     return (TaskView){
-        .history = view->history ? view->history + row * TASK_HISTORY : NULL,
-        .critic = view->critic ? view->critic + row * TASK_CRITIC : NULL,
-        .estimate = view->estimate ? view->estimate + row * TASK_ESTIMATES : NULL,
-        .frame = view->frame ? view->frame + row * TASK_OBSERVATION : NULL,
+        .history = row_at(view->history, i, shape->history),
+        .critic = row_at(view->critic, i, shape->critic),
+        .estimate = row_at(view->estimate, i, shape->estimates),
+        .frame = row_at(view->frame, i, shape->observation),
     };
 }
 
 Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, uint64_t seed,
                 MildError *error) {
-    if (task_def_check(def, error) != MILD_OK) {
+    if (task_def_check_robot(def, robot, error) != MILD_OK) {
         return NULL;
     }
     Vec *vec = calloc(1, sizeof *vec);
@@ -46,6 +52,7 @@ Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, ui
         return NULL;
     }
     *vec = (Vec){.def = *def,
+                 .shape = task_shape(robot),
                  .robot = robot,
                  .pool = pool,
                  .envs = envs,
@@ -89,7 +96,7 @@ void vec_destroy(Vec *vec) {
 
 static void reset_piece(void *context, int piece, int thread) {
     Vec *vec = context;
-    TaskView view = view_at(vec->view, piece);
+    TaskView view = view_at(vec, piece);
     task_env_reset(env_at(vec, piece), &vec->def, vec->robot, vec->sim[thread], &view);
 }
 
@@ -100,9 +107,10 @@ void vec_reset(Vec *vec, const VecView *first) {
 
 static void step_piece(void *context, int piece, int thread) {
     Vec *vec = context;
-    TaskView view = view_at(vec->view, piece);
-    vec->step[piece] = task_env_step(env_at(vec, piece), &vec->def, vec->robot, vec->sim[thread],
-                                     vec->action + (size_t)piece * TASK_ACTIONS, 1, &view, NULL);
+    TaskView view = view_at(vec, piece);
+    vec->step[piece] =
+        task_env_step(env_at(vec, piece), &vec->def, vec->robot, vec->sim[thread],
+                      vec->action + (size_t)piece * (size_t)vec->shape.actions, 1, &view, NULL);
 }
 
 static void count_episode(Vec *vec, const TaskStep *step) {
@@ -181,13 +189,17 @@ static uint64_t hash_bytes(uint64_t hash, const void *data, size_t size) {
     return hash;
 }
 
-/* Member by member: the padding between members is not part of the state. */
+/* Member by member: neither the padding between members nor what lies beyond the robot's joints is
+ * part of the state. */
 uint64_t vec_hash(const Vec *vec) {
     uint64_t hash = 0xcbf29ce484222325u;
     for (int i = 0; i < vec->envs; i++) {
         TaskEnv *env = env_at(vec, i);
-        hash = hash_bytes(hash, &env->robot, sizeof env->robot);
-        hash = hash_bytes(hash, env->history, sizeof env->history);
+        size_t joints = (size_t)vec->shape.joints, speeds = (6 + joints) * sizeof(double);
+        hash = hash_bytes(hash, env->robot.qpos, (7 + joints) * sizeof(double));
+        hash = hash_bytes(hash, env->robot.qvel, speeds);
+        hash = hash_bytes(hash, env->robot.warmstart, speeds);
+        hash = hash_bytes(hash, task_env_history(env), (size_t)vec->shape.history * sizeof(float));
         hash = hash_bytes(hash, env->command, sizeof env->command);
         hash = hash_bytes(hash, &env->reward_sum, sizeof env->reward_sum);
         hash = hash_bytes(hash, task_env_ground(env), mild_ground_size(task_env_ground(env)));

@@ -30,7 +30,7 @@ Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, ui
                 MildError *error);
 void vec_destroy(Vec *vec);
 void vec_reset(Vec *vec, const VecView *first);
-/* One policy step of all. action [envs][TASK_ACTIONS]; reward, done, timeout, valid [envs]; next:
+/* One policy step of all. action [envs][robot_joints]; reward, done, timeout, valid [envs]; next:
  * the observation after. */
 void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout,
               uint8_t *valid, const VecView *next);

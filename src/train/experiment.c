@@ -12,12 +12,16 @@ ExperimentDef experiment_def_default(void) {
         .task = task_def_default(),
         .terrain = terrain_def_default(),
     };
-    def.policy.observation = TASK_OBSERVATION;
-    def.policy.frames = TASK_FRAMES;
-    def.policy.critic_input = TASK_CRITIC;
-    def.policy.actions = TASK_ACTIONS;
-    def.policy.estimates = TASK_ESTIMATES;
     return def;
+}
+
+void experiment_fit_robot(ExperimentDef *def, const Robot *robot) {
+    TaskShape shape = task_shape(robot);
+    def->policy.observation = shape.observation;
+    def->policy.frames = TASK_FRAMES;
+    def->policy.critic_input = shape.critic;
+    def->policy.actions = shape.actions;
+    def->policy.estimates = shape.estimates;
 }
 
 MildStatus experiment_check(const ExperimentDef *def, MildError *error) {

@@ -15,8 +15,10 @@ typedef struct {
     TerrainDef terrain;
 } ExperimentDef;
 
-/* The defaults of every layer; the policy's widths are the task's. */
+/* The defaults of every layer. */
 ExperimentDef experiment_def_default(void);
+/* Makes the policy as wide as the robot's observations and actions. */
+void experiment_fit_robot(ExperimentDef *def, const Robot *robot);
 
 /* Every range, and what must fit together across keys. */
 MildStatus experiment_check(const ExperimentDef *def, MildError *error);

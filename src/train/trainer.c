@@ -43,14 +43,15 @@ static VecView view_of(const PpoBatch *batch, int t, const ExperimentDef *def) {
 }
 
 static int build(Trainer *trainer, MildError *error) {
-    static const PpoMirror mirror = {task_mirror_observation_index, task_mirror_observation_sign,
-                                     task_mirror_action_index, task_mirror_action_sign};
     const ExperimentDef *def = &trainer->def;
-    char path[PATH_SIZE];
-    trainer->robot = robot_create(path_data("models/sa01/sa01.xml", path), error);
+    trainer->robot = robot_open("sa01", error);
     if (!trainer->robot) {
         return 0;
     }
+    experiment_fit_robot(&trainer->def, trainer->robot);
+    const TaskMirror sides = task_mirror(trainer->robot);
+    const PpoMirror mirror = {sides.observation_index, sides.observation_sign, sides.action_index,
+                              sides.action_sign};
     robot_set_model(trainer->robot, (MildModel)def->task.randomize.model);
     trainer->pool = pool_create(def->train.threads);
     if (!trainer->pool) {

@@ -28,11 +28,12 @@ typedef struct {
 } Stance;
 
 struct Pressure {
+    const Robot *robot;
     const MildSole *const *soles;
     int materials;
     int min_samples, max_samples;
-    Tally tally[MILD_MATERIALS_MAX][ROBOT_FEET];
-    Stance stance[ROBOT_FEET];
+    Tally tally[MILD_MATERIALS_MAX][ROBOT_FEET_MAX];
+    Stance stance[ROBOT_FEET_MAX];
     double *block; /* everything the pointers above point into */
 };
 
@@ -43,8 +44,9 @@ Pressure *pressure_create(const Robot *robot, int materials, double dt, MildErro
         return NULL;
     }
     const MildSole *const *soles = robot_soles(robot);
+    const int feet = robot_feet(robot);
     size_t elements = 0;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < feet; f++) {
         elements += (size_t)mild_sole_elements(soles[f]);
     }
     Pressure *pressure = calloc(1, sizeof *pressure);
@@ -55,13 +57,14 @@ Pressure *pressure_create(const Robot *robot, int materials, double dt, MildErro
         mild_fail(error, MILD_ERROR_MEMORY, "sole pressure: out of memory");
         return NULL;
     }
+    pressure->robot = robot;
     pressure->soles = soles;
     pressure->materials = materials;
     pressure->block = block;
     double most = STANCE_MAX / dt;
     pressure->max_samples = most < STANCE_SAMPLES ? (int)most : STANCE_SAMPLES;
     pressure->min_samples = (int)(STANCE_MIN / dt) + 2;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < feet; f++) {
         size_t n = (size_t)mild_sole_elements(soles[f]);
         pressure->stance[f].material = -1;
         pressure->stance[f].sum = block, block += n;
@@ -121,7 +124,7 @@ static void start_stance(Pressure *pressure, int foot, int material) {
 }
 
 void pressure_observe(Pressure *pressure, const RobotSim *sim, const MildTerrain *terrain) {
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < robot_feet(pressure->robot); f++) {
         const MildSole *sole = pressure->soles[f];
         const double *normal = mild_scratch_elements(robot_sim_scratch(sim), f).normal;
         const double *x = mild_sole_x(sole), *y = mild_sole_y(sole);
@@ -159,7 +162,7 @@ void pressure_observe(Pressure *pressure, const RobotSim *sim, const MildTerrain
 
 int pressure_stances(const Pressure *pressure, int material) {
     int stances = 0;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < robot_feet(pressure->robot); f++) {
         stances += pressure->tally[material][f].stances;
     }
     return stances;
@@ -167,19 +170,18 @@ int pressure_stances(const Pressure *pressure, int material) {
 
 static void write_foot(const Pressure *pressure, int material, int foot, const char *name,
                        FILE *file) {
-    static const char *const feet[ROBOT_FEET] = {"left", "right"};
+    const char *foot_name = robot_foot_name(pressure->robot, foot);
     const MildSole *sole = pressure->soles[foot];
     const Tally *tally = &pressure->tally[material][foot];
     double kilopascal = 1e-3 / (mild_sole_pitch(sole) * mild_sole_pitch(sole));
     for (int i = 0; i < mild_sole_elements(sole); i++) {
-        fprintf(file, "%s,%s,element,%d,%.5f,%.5f,%.4f,%.4f\n", name, feet[foot], i,
+        fprintf(file, "%s,%s,element,%d,%.5f,%.5f,%.4f,%.4f\n", name, foot_name, i,
                 mild_sole_x(sole)[i], mild_sole_y(sole)[i],
                 kilopascal * tally->sum[i] / (double)tally->samples, kilopascal * tally->peak[i]);
     }
     for (int k = 0; k < PRESSURE_PATH; k++) {
-        fprintf(file, "%s,%s,path,%d,%.5f,%.5f,,\n", name, feet[foot],
-                100 * k / (PRESSURE_PATH - 1), tally->path[k][0] / tally->stances,
-                tally->path[k][1] / tally->stances);
+        fprintf(file, "%s,%s,path,%d,%.5f,%.5f,,\n", name, foot_name, 100 * k / (PRESSURE_PATH - 1),
+                tally->path[k][0] / tally->stances, tally->path[k][1] / tally->stances);
     }
 }
 
@@ -193,7 +195,7 @@ MildStatus pressure_write(const Pressure *pressure, const char *path, const char
     }
     fprintf(memory, "ground,foot,what,index,x_m,y_m,mean_kpa,peak_kpa\n");
     for (int m = 0; m < pressure->materials; m++) {
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        for (int f = 0; f < robot_feet(pressure->robot); f++) {
             if (pressure->tally[m][f].stances > 0) {
                 write_foot(pressure, m, f, names[m], memory);
             }

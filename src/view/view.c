@@ -23,7 +23,7 @@
 #define VIEW_FLOOR 40.0        /* [m] half size of the floor beyond */
 #define VIEW_GEOMS 4000
 #define VIEW_CAMERA_TIME 0.35      /* [s] the camera's lag */
-#define VIEW_LOOK_HEIGHT 0.50      /* [m] the camera looks at this height */
+#define VIEW_LOOK_HEIGHT 0.6       /* [-] the camera looks at this share of the robot's height */
 #define VIEW_CLOSE_TIME 0.20       /* [s] the same of the camera on the feet */
 #define VIEW_CLOSE_HEIGHT 0.04     /* [m] */
 #define VIEW_CLOSE_TURN 22.0       /* [deg] it looks more from the side */
@@ -41,6 +41,8 @@ typedef struct {
 
 struct View {
     ViewDef def;
+    const Robot *robot;
+    int feet;
     const MildSole *const *soles,
         *const *rasters; /* what the feet have; their shape, for the prints */
     MildTerrain terrain;
@@ -65,8 +67,7 @@ struct View {
 };
 
 ViewDef view_def_default(void) {
-    return (ViewDef){.xml = "models/sa01/sa01.xml",
-                     .width = 960,
+    return (ViewDef){.width = 960,
                      .height = 540,
                      .rate = 25,
                      .x_min = -2,
@@ -120,11 +121,12 @@ static void add_ground(mjSpec *spec, const Relief *relief, int slots) {
     add_material(spec, "view_floor", share / edge, 1);
 }
 
-static mjModel *make_model(const ViewDef *def, const Relief *relief, int slots, MildError *error) {
+static mjModel *make_model(const ViewDef *def, const char *xml, const Relief *relief, int slots,
+                           MildError *error) {
     char text[300] = "";
-    mjSpec *spec = mj_parseXML(def->xml, NULL, text, sizeof text);
+    mjSpec *spec = mj_parseXML(xml, NULL, text, sizeof text);
     if (!spec) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", def->xml, text);
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", xml, text);
         return NULL;
     }
     spec->visual.global.offwidth = def->width;
@@ -134,17 +136,10 @@ static mjModel *make_model(const ViewDef *def, const Relief *relief, int slots, 
     add_ground(spec, relief, slots);
     mjModel *model = mj_compile(spec, NULL);
     if (!model) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: cannot add the visible ground: %s", def->xml,
+        mild_fail(error, MILD_ERROR_FORMAT, "%s: cannot add the visible ground: %s", xml,
                   mjs_getError(spec));
     }
     mj_deleteSpec(spec);
-    if (model && (model->nq != ROBOT_NQ || model->nv != ROBOT_NV)) {
-        mild_fail(error, MILD_ERROR_FORMAT,
-                  "%s: has %d coordinates and %d speeds, the robot %d and %d", def->xml,
-                  (int)model->nq, (int)model->nv, ROBOT_NQ, ROBOT_NV);
-        mj_deleteModel(model);
-        return NULL;
-    }
     return model;
 }
 
@@ -195,13 +190,13 @@ static Relief *make_relief(const View *view, MildError *error) {
     const ViewDef *def = &view->def;
     ReliefDef relief = {def->x_min, def->x_max, def->y_min, def->y_max,
                         VIEW_CELL,  def->rigid, def->names};
-    return relief_create(&relief, &view->terrain, view->rasters, ROBOT_FEET, error);
+    return relief_create(&relief, &view->terrain, view->rasters, view->feet, error);
 }
 
 static int make_buffers(View *view) {
     int tiles = relief_tile_columns(view->relief) * relief_tile_rows(view->relief);
     view->slot_of = malloc((size_t)tiles * sizeof *view->slot_of);
-    view->layout = inset_layout(view->soles, ROBOT_FEET, view->def.height / 72);
+    view->layout = inset_layout(view->soles, view->feet, view->def.height / 72);
     size_t frame = (size_t)view->def.width * (size_t)view->def.height * 3;
     view->inset = malloc((size_t)view->layout.width * (size_t)view->layout.height * 3);
     view->pixels = malloc(frame);
@@ -251,13 +246,17 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
         return NULL;
     }
     view->def = *def;
+    view->robot = robot;
+    view->feet = robot_feet(robot);
     view->soles = robot_soles(robot);
     view->rasters = robot_rasters(robot);
     view->terrain = *terrain;
     view->relief = make_relief(view, error);
     view->slot_count =
         view->relief && relief_is_uneven(view->relief) ? VIEW_SLOTS_UNEVEN : VIEW_SLOTS;
-    view->model = view->relief ? make_model(def, view->relief, view->slot_count, error) : NULL;
+    view->model = view->relief ? make_model(def, robot_model_path(robot), view->relief,
+                                            view->slot_count, error)
+                               : NULL;
     if (!view->model || !open_context(view, error)) {
         view_destroy(view);
         return NULL;
@@ -323,8 +322,8 @@ const char *view_backend(const View *view) {
 /* ---- ground ---- */
 
 void view_observe(View *view, const RobotSim *sim) {
-    double position[ROBOT_FEET][3], rotation[ROBOT_FEET][9];
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    double position[ROBOT_FEET_MAX][3], rotation[ROBOT_FEET_MAX][9];
+    for (int f = 0; f < view->feet; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         memcpy(position[f], foot->position, sizeof position[f]);
         memcpy(rotation[f], foot->rotation, sizeof rotation[f]);
@@ -477,14 +476,15 @@ static double camera_share(const View *view, double lag) {
 static void follow(View *view, const double *base) {
     double share = view->jumped ? 1.0 : camera_share(view, VIEW_CAMERA_TIME);
     double target[3] = {base[0], base[1],
-                        relief_height_at(view->relief, base[0], base[1]) + VIEW_LOOK_HEIGHT};
+                        relief_height_at(view->relief, base[0], base[1]) +
+                            VIEW_LOOK_HEIGHT * robot_nominal_height(view->robot)};
     for (int k = 0; k < 3; k++) {
         view->camera.lookat[k] += share * (target[k] - view->camera.lookat[k]);
     }
 }
 
 static void draw_arrows(View *view, const RobotSim *sim) {
-    for (int f = 0; f < ROBOT_FEET && view->def.force_arrow > 0; f++) {
+    for (int f = 0; f < view->feet && view->def.force_arrow > 0; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         double size = mju_norm3(foot->force);
         if (size < VIEW_FORCE_SEEN || view->scene.ngeom >= view->scene.maxgeom) {
@@ -506,38 +506,48 @@ static void draw_arrows(View *view, const RobotSim *sim) {
     }
 }
 
+/* [m] Horizontal middle of the soles. */
+static void feet_middle(const View *view, const RobotSim *sim, double middle[2]) {
+    middle[0] = middle[1] = 0;
+    for (int f = 0; f < view->feet; f++) {
+        middle[0] += robot_sim_foot(sim, f)->sole_center[0] / view->feet;
+        middle[1] += robot_sim_foot(sim, f)->sole_center[1] / view->feet;
+    }
+}
+
 static const char *ground_name(const View *view, const RobotSim *sim) {
     if (view->def.rigid) {
         return "rigid";
     }
-    const double *left = robot_sim_foot(sim, 0)->sole_center,
-                 *right = robot_sim_foot(sim, 1)->sole_center;
-    int m = mild_terrain_material_at(&view->terrain, 0.5 * (left[0] + right[0]),
-                                     0.5 * (left[1] + right[1]));
+    double middle[2];
+    feet_middle(view, sim, middle);
+    int m = mild_terrain_material_at(&view->terrain, middle[0], middle[1]);
     return view->def.names && view->def.names[m] ? view->def.names[m] : "ground";
 }
 
 static void draw_text(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
-    const char *keys = info->fell ? "ground\ncommand\nspeed\nsinkage L R\ntime\n"
-                                  : "ground\ncommand\nspeed\nsinkage L R\ntime";
+    const char *keys = info->fell ? "ground\ncommand\nspeed\nsinkage\ntime\n"
+                                  : "ground\ncommand\nspeed\nsinkage\ntime";
     char values[240];
-    double depth[ROBOT_FEET];
-    for (int f = 0; f < ROBOT_FEET; f++) {
-        depth[f] = 1e3 * fmax(0.0, -robot_sim_foot(sim, f)->sole_height);
+    char depths[80] = "";
+    for (int f = 0; f < view->feet; f++) {
+        size_t used = strlen(depths);
+        snprintf(depths + used, sizeof depths - used, "%s%.0f", f ? "  " : "",
+                 1e3 * fmax(0.0, -robot_sim_foot(sim, f)->sole_height));
     }
-    snprintf(values, sizeof values, "%s\n%.2f m/s\n%.2f m/s\n%.0f  %.0f mm\n%.1f s%s",
-             ground_name(view, sim), info->command[0], info->speed, depth[0], depth[1], info->time,
+    snprintf(values, sizeof values, "%s\n%.2f m/s\n%.2f m/s\n%s mm\n%.1f s%s",
+             ground_name(view, sim), info->command[0], info->speed, depths, info->time,
              info->fell ? "\nfell" : "");
     mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, viewport, keys, values, &view->context);
 }
 
 static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
-    const double *normal[ROBOT_FEET];
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    const double *normal[ROBOT_FEET_MAX];
+    for (int f = 0; f < view->feet; f++) {
         normal[f] = mild_scratch_elements(robot_sim_scratch(sim), f).normal;
     }
     const InsetLayout *layout = &view->layout;
-    inset_draw(layout, view->soles, ROBOT_FEET, normal, view->def.pressure_max, view->inset);
+    inset_draw(layout, view->soles, view->feet, normal, view->def.pressure_max, view->inset);
     mjrRect box = {viewport.width - layout->width - 10, 10, layout->width, layout->height};
     mjr_drawPixels(view->inset, NULL, box, &view->context);
     char text[32];
@@ -567,13 +577,13 @@ static void move_lights(View *view) {
 /* The feet once more from near the ground, in the upper right corner: there one sees them sink. No
  * shadows: a second shadow pass costs more than the rest of this small picture. */
 static void draw_closeup(View *view, mjrRect viewport, const RobotSim *sim) {
-    const double *left = robot_sim_foot(sim, 0)->sole_center,
-                 *right = robot_sim_foot(sim, 1)->sole_center;
+    double middle[2];
+    feet_middle(view, sim, middle);
     double share = view->jumped ? 1.0 : camera_share(view, VIEW_CLOSE_TIME);
     view->jumped = 0;
     mjvCamera *camera = &view->close;
     for (int k = 0; k < 2; k++) {
-        camera->lookat[k] += share * (0.5 * (left[k] + right[k]) - camera->lookat[k]);
+        camera->lookat[k] += share * (middle[k] - camera->lookat[k]);
     }
     camera->lookat[2] =
         relief_height_at(view->relief, camera->lookat[0], camera->lookat[1]) + VIEW_CLOSE_HEIGHT;
@@ -591,7 +601,7 @@ static void draw_closeup(View *view, mjrRect viewport, const RobotSim *sim) {
 
 void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     const double *qpos = robot_sim_qpos(sim);
-    memcpy(view->data->qpos, qpos, ROBOT_NQ * sizeof *qpos);
+    robot_engine_qpos(view->robot, qpos, view->data->qpos);
     mj_kinematics(view->model, view->data);
     mj_comPos(view->model, view->data);
     mj_camlight(view->model, view->data);

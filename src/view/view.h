@@ -8,7 +8,6 @@
 #include "view/window.h"
 
 typedef struct {
-    const char *xml;                   /* the robot's MJCF, as given to robot_create */
     int width, height;                 /* [pixels] */
     double rate;                       /* [1/s] frames */
     int window;                        /* bool: show in a window; otherwise view_pixels */

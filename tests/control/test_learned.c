@@ -14,19 +14,48 @@
 #include "base/random.h"
 #include "control/controller.h"
 #include "learn/policy.h"
+#include "sa01.h"
 
 #define PATH "build_test_controller.safetensors"
 
 enum { ENVS = 7 };
 
+static Robot *robot;
+static TaskEnv *made[ENVS];
+
+static int setup(void **state) {
+    (void)state;
+    MildError error = {0};
+    TaskDef def = task_def_default();
+    robot = robot_create(SA01, &error);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
+    for (int e = 0; e < ENVS; e++) {
+        made[e] = aligned_alloc(64, task_env_bytes(&def, robot));
+        assert_non_null(made[e]);
+        task_env_init(made[e], &def, robot, 1, (uint32_t)e);
+    }
+    return 0;
+}
+
+static int teardown(void **state) {
+    (void)state;
+    for (int e = 0; e < ENVS; e++) {
+        free(made[e]);
+    }
+    robot_destroy(robot);
+    return 0;
+}
+
 /* A policy of the task's shape with weights everywhere, its layers small. */
 static PolicyDef task_policy_def(void) {
     PolicyDef def = policy_def_default();
-    def.observation = TASK_OBSERVATION;
+    def.observation = SA01_OBSERVATION;
     def.frames = TASK_FRAMES;
-    def.actions = TASK_ACTIONS;
-    def.estimates = TASK_ESTIMATES;
-    def.critic_input = TASK_CRITIC;
+    def.actions = SA01_JOINTS;
+    def.estimates = SA01_ESTIMATES;
+    def.critic_input = SA01_CRITIC;
     for (int i = 0; i < POLICY_LAYERS_MAX; i++) {
         def.encoder_hidden[i] = def.decoder_hidden[i] = i ? 0 : 16;
         def.actor_hidden[i] = def.critic_hidden[i] = i ? 0 : 16;
@@ -49,8 +78,8 @@ static Policy *save_policy(const PolicyDef *def) {
 static void fill_histories(TaskEnv **envs, uint32_t draw) {
     for (int e = 0; e < ENVS; e++) {
         Random random = random_at(4, (uint32_t)e, draw);
-        for (int i = 0; i < TASK_HISTORY; i++) {
-            envs[e]->history[i] = (float)random_normal(&random);
+        for (int i = 0; i < SA01_HISTORY; i++) {
+            task_env_history(envs[e])[i] = (float)random_normal(&random);
         }
     }
 }
@@ -62,28 +91,27 @@ static void acts_as_its_policy(void **state) {
     MildError error = {0};
     PolicyDef def = task_policy_def();
     Policy *policy = save_policy(&def);
-    static TaskEnv block[ENVS];
     TaskEnv *envs[ENVS];
     for (int e = 0; e < ENVS; e++) {
-        envs[e] = &block[ENVS - 1 - e];
+        envs[e] = made[ENVS - 1 - e];
     }
     for (int threads = 0; threads <= 2; threads += 2) {
         Pool *pool = threads ? pool_create(threads) : NULL;
         Controller controller = {0};
-        assert_int_equal(controller_learned(PATH, pool, ENVS, &controller, &error), MILD_OK);
+        assert_int_equal(controller_learned(PATH, robot, pool, ENVS, &controller, &error), MILD_OK);
         assert_string_equal(controller.name, "learned");
         double worst = 0, least = 1;
         for (uint32_t draw = 0; draw < 3; draw++) {
-            float actions[ENVS * TASK_ACTIONS + 1], one[TASK_ACTIONS];
+            float actions[ENVS * SA01_JOINTS + 1], one[SA01_JOINTS];
             int rows = draw == 1 ? 2 : ENVS;
-            actions[rows * TASK_ACTIONS] = 42;
+            actions[rows * SA01_JOINTS] = 42;
             fill_histories(envs, draw % 2);
             controller.act(controller.self, rows, envs, actions);
-            assert_true(actions[rows * TASK_ACTIONS] == 42);
+            assert_true(actions[rows * SA01_JOINTS] == 42);
             for (int e = 0; e < rows; e++) {
-                policy_act(policy, NULL, 1, envs[e]->history, one, NULL, NULL);
-                for (int j = 0; j < TASK_ACTIONS; j++) {
-                    double gap = (double)actions[e * TASK_ACTIONS + j] - (double)one[j];
+                policy_act(policy, NULL, 1, task_env_history(envs[e]), one, NULL, NULL);
+                for (int j = 0; j < SA01_JOINTS; j++) {
+                    double gap = (double)actions[e * SA01_JOINTS + j] - (double)one[j];
                     worst = fmax(worst, fabs(gap));
                     least = fmin(least, fabs((double)one[j]));
                 }
@@ -106,14 +134,13 @@ static void remembers_nothing(void **state) {
     MildError error = {0};
     PolicyDef def = task_policy_def();
     policy_destroy(save_policy(&def));
-    static TaskEnv block[ENVS];
     TaskEnv *envs[ENVS];
     for (int e = 0; e < ENVS; e++) {
-        envs[e] = &block[e];
+        envs[e] = made[e];
     }
     Controller controller = {0};
-    assert_int_equal(controller_learned(PATH, NULL, ENVS, &controller, &error), MILD_OK);
-    float first[ENVS * TASK_ACTIONS], other[ENVS * TASK_ACTIONS], again[ENVS * TASK_ACTIONS];
+    assert_int_equal(controller_learned(PATH, robot, NULL, ENVS, &controller, &error), MILD_OK);
+    float first[ENVS * SA01_JOINTS], other[ENVS * SA01_JOINTS], again[ENVS * SA01_JOINTS];
     fill_histories(envs, 0);
     controller.act(controller.self, ENVS, envs, first);
     fill_histories(envs, 1);
@@ -139,7 +166,8 @@ static void another_shape_is_refused(void **state) {
         def.actions -= wrong == 2;
         policy_destroy(save_policy(&def));
         Controller controller = {0};
-        assert_int_equal(controller_learned(PATH, NULL, 1, &controller, &error), MILD_ERROR_FORMAT);
+        assert_int_equal(controller_learned(PATH, robot, NULL, 1, &controller, &error),
+                         MILD_ERROR_FORMAT);
         assert_int_equal(error.status, MILD_ERROR_FORMAT);
         assert_null(controller.self);
         assert_non_null(strstr(error.text, PATH));
@@ -153,11 +181,12 @@ static void a_missing_file_is_named(void **state) {
     (void)state;
     MildError error = {0};
     Controller controller = {0};
-    assert_int_equal(controller_learned("no/policy.safetensors", NULL, 1, &controller, &error),
-                     MILD_ERROR_IO);
+    assert_int_equal(
+        controller_learned("no/policy.safetensors", robot, NULL, 1, &controller, &error),
+        MILD_ERROR_IO);
     assert_non_null(strstr(error.text, "no/policy.safetensors"));
-    assert_int_not_equal(controller_learned("no/policy.safetensors", NULL, 1, &controller, NULL),
-                         MILD_OK);
+    assert_int_not_equal(
+        controller_learned("no/policy.safetensors", robot, NULL, 1, &controller, NULL), MILD_OK);
     assert_null(controller.self);
 }
 
@@ -168,5 +197,5 @@ int main(void) {
         cmocka_unit_test(another_shape_is_refused),
         cmocka_unit_test(a_missing_file_is_named),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, setup, teardown);
 }

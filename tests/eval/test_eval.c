@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "eval/eval.h"
+#include "sa01.h"
 
 static void scenes_by_name(void **state) {
     (void)state;
@@ -99,7 +100,7 @@ static Robot *robot;
 static int setup(void **state) {
     (void)state;
     MildError error = {0};
-    robot = robot_create(MILD_SOURCE_DIR "/models/sa01/sa01.xml", &error);
+    robot = robot_create(SA01, &error);
     if (!robot) {
         fprintf(stderr, "%s\n", error.text);
     }
@@ -129,7 +130,7 @@ static void zero_act(void *self, int rows, TaskEnv *const *envs, float *actions)
     for (int i = 0; i < rows; i++) {
         zero->most_turn = fmax(zero->most_turn, fabs(envs[i]->command[2]));
     }
-    memset(actions, 0, sizeof *actions * (size_t)rows * TASK_ACTIONS);
+    memset(actions, 0, sizeof *actions * (size_t)rows * SA01_JOINTS);
 }
 
 static void zero_destroy(void *self) {
@@ -217,8 +218,8 @@ static void the_shipped_policy_walks(void **state) {
     Scene scene;
     EvalRow row;
     assert_int_equal(scene_make(&scene, "foam60", 2, &error), MILD_OK);
-    assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", NULL, 2,
-                                        &controller, &error),
+    assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, NULL,
+                                        2, &controller, &error),
                      MILD_OK);
     Pool *pool = pool_create(1);
     assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),

@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "eval/eval.h"
+#include "sa01.h"
 
 /* A power of two: sums of it are exact, so the script meets every threshold where it should. */
 #define DT (1.0 / 1024)
@@ -25,15 +26,18 @@ static void assert_close(const char *what, double ours, double expected, double 
 
 /* Torques and joint speeds of one step; the feet stand still under 100 N unless set. */
 typedef struct {
-    double torque[ROBOT_JOINTS], speed[ROBOT_JOINTS];
+    double torque[SA01_JOINTS], speed[SA01_JOINTS];
     MeasureSample sample;
 } Script;
 
 static void script_start(Script *s) {
     *s = (Script){0};
-    s->sample = (MeasureSample){
-        .torque = s->torque, .joint_speed = s->speed, .joints = ROBOT_JOINTS, .base_height = 0.8};
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    s->sample = (MeasureSample){.feet = SA01_FEET,
+                                .torque = s->torque,
+                                .joint_speed = s->speed,
+                                .joints = SA01_JOINTS,
+                                .base_height = 0.8};
+    for (int f = 0; f < SA01_FEET; f++) {
         s->sample.foot[f].load = 100;
     }
 }
@@ -126,7 +130,7 @@ static void lift(Script *s, int f, double height) {
  * 50 mm: drift 5 mm, penetration 12 mm, clearance 50 mm. The other foot stands all the time. */
 static void one_stance_and_one_swing(void **state) {
     (void)state;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < SA01_FEET; f++) {
         Script s;
         Measure m;
         script_start(&s);
@@ -470,7 +474,7 @@ static void the_printed_row(void **state) {
 static void a_robot_is_read(void **state) {
     (void)state;
     MildError error = {0};
-    Robot *robot = robot_create(MILD_SOURCE_DIR "/models/sa01/sa01.xml", &error);
+    Robot *robot = robot_create(SA01, &error);
     assert_non_null(robot);
     TaskDef def = task_def_default();
     RobotSim *sim = robot_sim_create(robot, 1e-3, &error);
@@ -484,8 +488,8 @@ static void a_robot_is_read(void **state) {
         env->variation = robot_variation_nominal();
         env->variation.rigid = rigid;
         RobotState start = {.qpos = {1.5, 0.2, 0.3 + robot_stand_height(robot) - 0.01, 1}};
-        memcpy(start.qpos + 7, robot_default_pose(robot), ROBOT_JOINTS * sizeof(double));
-        double none[ROBOT_JOINTS] = {0}, torque[ROBOT_JOINTS] = {[0] = 10, [11] = -4};
+        memcpy(start.qpos + 7, robot_default_pose(robot), SA01_JOINTS * sizeof(double));
+        double none[SA01_JOINTS] = {0}, torque[SA01_JOINTS] = {[0] = 10, [11] = -4};
         robot_sim_load(sim, &start, &env->variation);
         for (int k = 0; k < 20; k++) {
             assert_int_equal(robot_sim_step(sim, none, NULL, &env->terrain, task_env_ground(env)),
@@ -507,7 +511,7 @@ static void a_robot_is_read(void **state) {
         assert_close("y", m.end[1], 0.2, 0.05);
         assert_true(m.end[0] == q[0] && m.end[1] == q[1] && fabs(q[0] - 1.5) > 1e-9);
         assert_close("height", m.base_high, q[2] - 0.3, 1e-15);
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        for (int f = 0; f < SA01_FEET; f++) {
             assert_true(m.in_stance[f]);
             const double *center = robot_sim_foot(sim, f)->sole_center;
             assert_true(m.touchdown[f][0] == center[0] && m.touchdown[f][1] == center[1]);

@@ -1,35 +1,26 @@
-/* What a model file may hold once MuJoCo has compiled it: names missing, other joints, any numbers
- * in the soles' entries. Our reader refuses it with a message or makes soles of it. The file format
- * itself is MuJoCo's. */
+/* What a robot's model may hold once MuJoCo has compiled it: names missing, other joints, other
+ * ranges; and any numbers in the soles of its robot.ini. Our reader refuses it with a message or
+ * makes soles of it. The format of model files itself is MuJoCo's. */
 #include "fuzz.h"
-#include "robot/robot.c" /* its checks are static */
+#include "robot/description.h"
 
-#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
-
-enum { LONGEST = 8 }; /* [numbers] of an outline that is written anew */
-
-static Robot loaded;    /* the models as they are */
-static mjModel *edited; /* a copy */
+static Robot loaded;    /* the robot as it is, with coarse soles for speed */
+static mjModel *edited; /* a copy of its model */
 
 static void load(void) {
-    fuzz_check(load_models(&loaded, MODEL, NULL) == MILD_OK);
-    mjModel *m = loaded.model;
-    static const char *const names[] = {"sole_outline_left", "sole_outline_right", "sole_pitch",
-                                        "sole_elements"};
-    for (int i = 0; i < 4; i++) { /* coarse plates, for speed */
-        int id = mj_name2id(m, mjOBJ_NUMERIC, names[i]), corner = i < 2 ? 8 : 0;
-        static const double outline[8] = {-0.1, -0.05, 0.1, -0.05, 0.1, 0.05, -0.1, 0.05};
-        if (corner) {
-            m->numeric_size[id] = corner;
-        }
-        for (int k = 0; k < corner; k++) {
-            m->numeric_data[m->numeric_adr[id] + k] = outline[k];
-        }
-        if (!corner) {
-            m->numeric_data[m->numeric_adr[id]] = i == 2 ? 0.05 : 0.0;
-        }
+    static const double outline[8] = {-0.1, -0.05, 0.1, -0.05, 0.1, 0.05, -0.1, 0.05};
+    const char *folder = MILD_SOURCE_DIR "/robots/sa01";
+    fuzz_check(robot_def_read(folder, &loaded.def, NULL) == MILD_OK);
+    strcpy(loaded.path, MILD_SOURCE_DIR "/robots/sa01/sa01.xml");
+    fuzz_check(robot_load_models(&loaded, NULL) == MILD_OK);
+    for (int f = 0; f < loaded.def.feet; f++) {
+        RobotFootDef *foot = &loaded.def.foot[f];
+        memcpy(foot->outline, outline, sizeof outline);
+        foot->outline_points = 4;
+        foot->pitch = 0.05;
+        foot->elements = 0;
     }
-    edited = mj_copyModel(NULL, m);
+    edited = mj_copyModel(NULL, loaded.model);
     fuzz_check(edited != NULL);
 }
 
@@ -43,18 +34,23 @@ static void restore(void) {
            (size_t)from->njnt * sizeof *from->jnt_actfrclimited);
     memcpy(edited->jnt_range, from->jnt_range, 2 * (size_t)from->njnt * sizeof *from->jnt_range);
     memcpy(edited->jnt_bodyid, from->jnt_bodyid, (size_t)from->njnt * sizeof *from->jnt_bodyid);
-    memcpy(edited->numeric_size, from->numeric_size,
-           (size_t)from->nnumeric * sizeof *from->numeric_size);
-    memcpy(edited->numeric_data, from->numeric_data,
-           (size_t)from->nnumericdata * sizeof *from->numeric_data);
     memcpy(edited->body_parentid, from->body_parentid,
            (size_t)from->nbody * sizeof *from->body_parentid);
 }
 
-static void edit(Bytes *bytes, mjModel *m) {
-    int joint = take_below(bytes, (int)m->njnt), number = take_below(bytes, (int)m->nnumeric);
-    int adr = m->numeric_adr[number], room = (int)m->nnumericdata - adr;
-    switch (take_below(bytes, 9)) {
+static void edit_sole(Bytes *bytes, RobotFootDef *foot) {
+    switch (take_below(bytes, 5)) {
+    case 0: foot->outline_points = take_below(bytes, 6); break;
+    case 1: foot->pitch = take_number(bytes, 0.1); break;
+    case 2: foot->elements = take_below(bytes, 1000); break;
+    case 3: foot->z = take_number(bytes, 0.1); break;
+    default: foot->outline[take_below(bytes, 8)] = take_number(bytes, 0.1); break;
+    }
+}
+
+static void edit(Bytes *bytes, mjModel *m, RobotDef *def) {
+    int joint = take_below(bytes, (int)m->njnt), foot = take_below(bytes, def->feet);
+    switch (take_below(bytes, 8)) {
     case 0:
         m->names[((unsigned)take_byte(bytes) << 8 | take_byte(bytes)) % (unsigned)m->nnames] = 0;
         break;
@@ -63,10 +59,7 @@ static void edit(Bytes *bytes, mjModel *m) {
     case 3: m->jnt_actfrclimited[joint] = 0; break;
     case 4: m->jnt_range[2 * joint + take_below(bytes, 2)] = take_number(bytes, 1.0); break;
     case 5: m->jnt_bodyid[joint] = take_below(bytes, (int)m->nbody); break;
-    case 6: m->numeric_size[number] = 1 + take_below(bytes, room < LONGEST ? room : LONGEST); break;
-    case 7:
-        m->numeric_data[adr + take_below(bytes, m->numeric_size[number])] = take_number(bytes, 0.1);
-        break;
+    case 6: edit_sole(bytes, &def->foot[foot]); break;
     default: m->body_parentid[take_below(bytes, (int)m->nbody)] = 0; break;
     }
 }
@@ -80,15 +73,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     MildError error = {0};
     Robot *robot = calloc(1, sizeof *robot);
     fuzz_check(robot != NULL);
-    robot->visual = loaded.visual;
+    *robot = loaded;
     robot->model = edited;
     while (bytes.at < bytes.end) {
-        edit(&bytes, edited);
+        edit(&bytes, edited, &robot->def);
     }
-    MildStatus status = read_bodies(robot, "fuzz", &error);
-    status = status == MILD_OK ? read_joints(robot, "fuzz", &error) : status;
-    status = status == MILD_OK ? read_shells(robot, "fuzz", &error) : status;
-    status = status == MILD_OK ? read_soles(robot, "fuzz", &error) : status;
+    MildStatus status = robot_read_bodies(robot, &error);
+    status = status == MILD_OK ? robot_read_joints(robot, &error) : status;
+    status = status == MILD_OK ? robot_read_limbs(robot, &error) : status;
+    status = status == MILD_OK ? robot_read_shells(robot, &error) : status;
+    status = status == MILD_OK ? robot_read_soles(robot, &error) : status;
     fuzz_check(status == MILD_OK || (error.status != MILD_OK && error.text[0]));
     fuzz_check(status != MILD_OK || (robot->soles[0] && robot->soles[1]));
     robot->visual = robot->model = NULL;

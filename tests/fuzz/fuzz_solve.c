@@ -9,7 +9,7 @@ enum { STEPS = 2, NEWTON_WORK = 16, SWEEPS = 6, PRINT_TILES = 8 };
 /* What a model stands on: the raster, or one element in its middle. */
 typedef struct {
     MildSole *soles[MILD_FEET_MAX];
-    MildScratch *scratch[MILD_FEET_MAX];  /* for one foot, for two */
+    MildScratch *scratch[MILD_FEET_MAX];  /* for one foot, for two, .. */
     MildGround *ground[2][MILD_FEET_MAX]; /* without prints, with */
 } Feet;
 
@@ -34,7 +34,8 @@ static void make_feet(void) {
     static const double outline[2][8] = {{-0.02, -0.01, 0.02, -0.01, 0.02, 0.01, -0.02, 0.01},
                                          {-0.02, -0.02, 0.02, -0.02, 0.02, 0.02, -0.02, 0.02}};
     for (int f = 0; f < MILD_FEET_MAX; f++) {
-        MildSoleDef def = {.outline = outline[f], .points = 4, .pitch = 0.0195, .sole_z = -0.05};
+        MildSoleDef def = {
+            .outline = outline[f % 2], .points = 4, .pitch = 0.0195, .sole_z = -0.05};
         raster.soles[f] = mild_sole_create(&def, NULL);
         fuzz_check(raster.soles[f] != NULL);
         concentric.soles[f] = mild_sole_concentric(raster.soles[f], NULL);

@@ -3,7 +3,7 @@
 
 #define ELEMENT_STEP element_step_double
 #include "element_step.inc"
-#include "ground/material.h"
+#include "ground/model.h"
 
 #define ELEMENTS 500
 #define STEPS 20

@@ -11,11 +11,14 @@
 #include <cmocka.h>
 
 #include "base/random.h"
+#include "control/stand.h"
 #include "robot/robot.h"
+#include "sa01.h"
 
-#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define MODEL SA01
 
 static Robot *robot;
+static Stand *stand;
 
 static inline int setup(void **unused) {
     (void)unused;
@@ -24,11 +27,14 @@ static inline int setup(void **unused) {
     if (!robot) {
         fail_msg("%s", error.text);
     }
+    stand = stand_create(robot, &error);
+    assert_non_null(stand);
     return 0;
 }
 
 static inline int teardown(void **unused) {
     (void)unused;
+    stand_destroy(stand);
     robot_destroy(robot);
     return 0;
 }
@@ -42,9 +48,9 @@ static inline RobotSim *new_sim(double dt) {
 
 /* To be freed by the caller. */
 static inline MildGround *new_ground(void) {
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
+    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), SA01_FEET));
     assert_non_null(block);
-    return mild_ground_init(block, robot_soles(robot), ROBOT_FEET);
+    return mild_ground_init(block, robot_soles(robot), SA01_FEET);
 }
 
 static inline MildMaterial preset(const char *name) {
@@ -60,10 +66,10 @@ static inline MildTerrain preset_terrain(const char *name) {
 
 /* Joints a little off their places, all of it in motion. */
 static inline void kit_disturb(RobotState *state, Random *random) {
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         state->qpos[7 + i] += random_uniform(random, -0.1, 0.1);
     }
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < SA01_NV; i++) {
         state->qvel[i] = random_uniform(random, -0.5, 0.5);
     }
 }

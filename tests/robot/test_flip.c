@@ -10,7 +10,7 @@
 
 #include <mujoco/mujoco.h>
 
-#include "robot/stand.h"
+#include "sa01.h"
 
 #define SECONDS 20.0
 #define DT 0.005        /* [s] */
@@ -22,7 +22,7 @@ typedef struct {
     int stands;
     double seconds; /* [s] until it fell, or all */
     double shake;   /* [rad/s] fastest joint in the last second that it stood upright */
-} Stand;
+} Standing;
 
 typedef struct {
     MildMaterial material;
@@ -80,12 +80,12 @@ static void apply_wrench(const mjModel *m, mjData *d, const char *body_name,
 
 /* mj_step with the soil's force as an outside force, as a user writes it. */
 static void explicit_step(const Case *one, const double *torque) {
-    static const char *const feet[ROBOT_FEET] = {"leg_l6_link", "leg_r6_link"};
+    static const char *const feet[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
     mjModel *m = robot_sim_model(one->sim);
     mjData *d = robot_sim_data(one->sim);
     m->opt.disableflags |= mjDSBL_CONTACT;
-    memcpy(d->qfrc_applied + 6, torque, ROBOT_JOINTS * sizeof *torque);
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    memcpy(d->qfrc_applied + 6, torque, SA01_JOINTS * sizeof *torque);
+    for (int f = 0; f < SA01_FEET; f++) {
         double wrench[6];
         soil_wrench(&one->material, robot_soles(robot)[f], robot_sim_foot(one->sim, f), wrench);
         apply_wrench(m, d, feet[f], wrench);
@@ -101,21 +101,21 @@ static void case_open(Case *one, const char *name, double dt, int explicit_soil)
     const MildSole *const *soles = robot_soles(robot);
     *one = (Case){preset(name), preset_terrain(name), explicit_soil ? NULL : new_ground(),
                   new_sim(dt)};
-    double sinkage = mild_sole_sinkage(soles[0], &one->material, robot_half_weight(robot));
-    RobotState state = robot_stand_state(robot, 1, sinkage);
+    double sinkage = mild_sole_sinkage(soles[0], &one->material, robot_foot_load(robot));
+    RobotState state = stand_state(stand, 1, sinkage);
     RobotVariation nominal = robot_variation_nominal();
     robot_sim_load(one->sim, &state, &nominal);
 }
 
-static Stand stand(const char *name, double dt, int explicit_soil) {
+static Standing stand_still(const char *name, double dt, int explicit_soil) {
     Case one;
     case_open(&one, name, dt, explicit_soil);
-    Stand result = {.stands = 1};
+    Standing result = {.stands = 1};
     int window = 0;
     double fastest[2] = {0}; /* in the present second and in the one before */
     for (int i = 0; i < (int)(SECONDS / dt + 0.5) && result.stands; i++) {
-        double torque[ROBOT_JOINTS];
-        robot_stand_torque(robot, one.sim, 1, torque);
+        double torque[SA01_JOINTS];
+        stand_torque(stand, one.sim, 1, torque);
         int bad = one.ground ? robot_sim_step(one.sim, torque, NULL, &one.terrain, one.ground) : 0;
         if (!one.ground) {
             explicit_step(&one, torque);
@@ -126,7 +126,7 @@ static Stand stand(const char *name, double dt, int explicit_soil) {
             fastest[1] = fastest[0];
             fastest[0] = 0.0;
         }
-        for (int k = 0; k < ROBOT_NV; k++) {
+        for (int k = 0; k < SA01_NV; k++) {
             double speed = fabs(robot_sim_qvel(one.sim)[k]);
             bad |= !(speed < SPEED_LIMIT);
             fastest[0] = k >= 6 ? fmax(fastest[0], speed) : fastest[0];
@@ -143,7 +143,7 @@ static Stand stand(const char *name, double dt, int explicit_soil) {
 static double largest_step(const char *name) {
     static const double steps[] = {0.005, 0.004, 0.003, 0.0025, 0.002, 0.0015, 0.001, 0.0005};
     for (size_t s = 0; s < sizeof steps / sizeof *steps; s++) {
-        if (stand(name, steps[s], 1).stands) {
+        if (stand_still(name, steps[s], 1).stands) {
             return steps[s];
         }
     }
@@ -155,7 +155,7 @@ static void test_explicit_soil_flips(void **unused) {
     int fallen = 0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
         const char *name = mild_material_preset_name(p);
-        Stand outside = stand(name, DT, 1), ours = stand(name, DT, 0);
+        Standing outside = stand_still(name, DT, 1), ours = stand_still(name, DT, 0);
         print_message("%-11s %g ms: explicit %s %5.2f s, joints at %7.3f rad/s, stands up to %g "
                       "ms; ours %s %g s, %.0e rad/s\n",
                       name, 1e3 * DT, outside.stands ? "stands" : "falls after", outside.seconds,

@@ -1,4 +1,4 @@
-/* The model file against the published numbers: models/sa01/sa01.json, read here independently of
+/* The model file against the published numbers: robots/sa01/sa01.json, read here independently of
  * MuJoCo. */
 #include <math.h>
 #include <setjmp.h>
@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -16,10 +17,11 @@
 
 #include "base/random.h"
 #include "robot/robot.h"
+#include "sa01.h"
 
-#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
-#define NUMBERS MILD_SOURCE_DIR "/models/sa01/sa01.json"
-#define LINKS (ROBOT_JOINTS + 1)
+#define MODEL SA01
+#define NUMBERS MILD_SOURCE_DIR "/robots/sa01/sa01.json"
+#define LINKS (SA01_JOINTS + 1)
 
 typedef struct {
     char name[LINKS][32];
@@ -84,7 +86,7 @@ static void read_tree(void) {
         double full[9] = {xx, xy, xz, xy, yy, yz, xz, yz, zz};
         memcpy(tree.inertia[i], full, sizeof full);
     }
-    for (int j = 0; j < ROBOT_JOINTS; j++) {
+    for (int j = 0; j < SA01_JOINTS; j++) {
         const cJSON *joint = cJSON_GetArrayItem(joints, j);
         int child = link_index(cJSON_GetObjectItem(joint, "child")->valuestring);
         assert_int_equal(child, j + 1);
@@ -155,9 +157,9 @@ static void link_poses(const double *qpos, double position[LINKS][3], double tur
 static void mass_matrix(const double *qpos, double *mass) {
     double position[LINKS][3], turn[LINKS][9];
     link_poses(qpos, position, turn);
-    memset(mass, 0, ROBOT_NV * ROBOT_NV * sizeof *mass);
+    memset(mass, 0, SA01_NV * SA01_NV * sizeof *mass);
     for (int i = 0; i < LINKS; i++) {
-        double jv[ROBOT_NV][3] = {{0}}, jw[ROBOT_NV][3] = {{0}}, com[3], arm[3], turned[9],
+        double jv[SA01_NV][3] = {{0}}, jw[SA01_NV][3] = {{0}}, com[3], arm[3], turned[9],
                transposed[9], world[9];
         rotate(turn[i], tree.com[i], com);
         for (int k = 0; k < 3; k++) {
@@ -184,19 +186,19 @@ static void mass_matrix(const double *qpos, double *mass) {
             transposed[k] = turn[i][3 * (k % 3) + k / 3];
         }
         multiply(turned, transposed, world);
-        for (int r = 0; r < ROBOT_NV; r++) {
+        for (int r = 0; r < SA01_NV; r++) {
             double spun[3];
             rotate(world, jw[r], spun);
-            for (int c = 0; c < ROBOT_NV; c++) {
+            for (int c = 0; c < SA01_NV; c++) {
                 for (int k = 0; k < 3; k++) {
-                    mass[r * ROBOT_NV + c] +=
+                    mass[r * SA01_NV + c] +=
                         tree.mass[i] * jv[r][k] * jv[c][k] + spun[k] * jw[c][k];
                 }
             }
         }
     }
     for (int i = 1; i < LINKS; i++) {
-        mass[(5 + i) * (ROBOT_NV + 1)] += tree.armature[i];
+        mass[(5 + i) * (SA01_NV + 1)] += tree.armature[i];
     }
 }
 
@@ -214,7 +216,7 @@ static RobotState random_state(uint32_t index) {
     for (int i = 3; i < 7; i++) {
         state.qpos[i] /= sqrt(norm);
     }
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         state.qpos[7 + i] =
             random_uniform(&random, robot_joint_low(robot)[i], robot_joint_high(robot)[i]);
     }
@@ -223,7 +225,7 @@ static RobotState random_state(uint32_t index) {
 
 static RobotState stand_state(void) {
     RobotState state = {.qpos = {0, 0, robot_stand_height(robot), 1, 0, 0, 0}};
-    memcpy(state.qpos + 7, robot_default_pose(robot), ROBOT_JOINTS * sizeof(double));
+    memcpy(state.qpos + 7, robot_default_pose(robot), SA01_JOINTS * sizeof(double));
     return state;
 }
 
@@ -264,7 +266,7 @@ static void test_limits_and_masses(void **unused) {
     near(robot_total_mass(robot), number(numbers, "total_mass_kg"), 1e-9, "total mass");
     const mjModel *m = robot_sim_model(sim);
     const cJSON *joints = cJSON_GetObjectItem(numbers, "joints");
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         const cJSON *joint = cJSON_GetArrayItem(joints, i),
                     *range = cJSON_GetObjectItem(joint, "mjcf_range");
         near(robot_joint_low(robot)[i], cJSON_GetArrayItem(range, 0)->valuedouble, 1e-12, "low");
@@ -332,13 +334,13 @@ static void test_mass_matrix(void **unused) {
         RobotState state = random_state(draw);
         RobotVariation nominal = robot_variation_nominal();
         robot_sim_load(sim, &state, &nominal);
-        double expected[ROBOT_NV * ROBOT_NV], engine[ROBOT_NV * ROBOT_NV];
+        double expected[SA01_NV * SA01_NV], engine[SA01_NV * SA01_NV];
         mass_matrix(state.qpos, expected);
         const mjModel *m = robot_sim_model(sim);
         mjData *d = robot_sim_data(sim);
         mj_makeM(m, d);
         mj_fullM(m, d, engine);
-        for (int i = 0; i < ROBOT_NV * ROBOT_NV; i++) {
+        for (int i = 0; i < SA01_NV * SA01_NV; i++) {
             worst = fmax(worst, fabs(engine[i] - expected[i]));
         }
     }
@@ -367,38 +369,81 @@ static void test_variation(void **unused) {
     near(m->pair_friction[0], 0.8, 1e-12, "friction back");
 }
 
-/* The model with `from` written as `to`, of the same length, must be refused with one line that
- * names `what`. */
-static void refuse(const char *from, const char *to, const char *what, const char *path) {
-    char *text = read_file(MODEL);
-    for (char *at = strstr(text, from); at; at = strstr(at, from)) {
-        memcpy(at, to, strlen(to));
-    }
+/* Writes `text` with `from` as `to` into a file. */
+static void write_changed(const char *path, const char *text, const char *from, const char *to) {
     FILE *file = fopen(path, "wb");
     assert_non_null(file);
+    const char *at = from ? strstr(text, from) : NULL;
+    assert_true(!from || at);
+    for (; at; text = at + strlen(from), at = strstr(text, from)) {
+        fprintf(file, "%.*s%s", (int)(at - text), text, to);
+    }
     fputs(text, file);
     fclose(file);
-    free(text);
+}
+
+/* The robot with `from` written as `to` in one of its files must be refused with one line that names
+ * `what`. */
+static void refuse(const char *name, const char *from, const char *to, const char *what) {
+    static const char *const names[] = {"sa01.xml", "robot.ini"};
+    char folder[] = "robot_refused_XXXXXX", path[2][64];
+    assert_non_null(mkdtemp(folder));
+    for (int k = 0; k < 2; k++) {
+        char source[256];
+        snprintf(source, sizeof source, "%s/%s", SA01, names[k]);
+        snprintf(path[k], sizeof path[k], "%s/%s", folder, names[k]);
+        char *text = read_file(source);
+        write_changed(path[k], text, strcmp(name, names[k]) == 0 ? from : NULL, to);
+        free(text);
+    }
     MildError error = {0};
-    assert_null(robot_create(path, &error));
+    Robot *accepted = robot_create(folder, &error);
     print_message("%s\n", error.text);
+    for (int k = 0; k < 2; k++) {
+        remove(path[k]);
+    }
+    rmdir(folder);
+    assert_null(accepted);
     assert_non_null(strstr(error.text, what));
     assert_null(strchr(error.text, '\n'));
-    remove(path);
 }
 
 static void test_refusals(void **unused) {
     (void)unused;
-    refuse("leg_r6_link", "xeg_r6_link", "leg_r6_link", "robot_missing_foot.xml");
-    refuse("leg_l4_joint", "xeg_l4_joint", "leg_l4_joint", "robot_missing_joint.xml");
-    refuse("sole_outline_right", "xole_outline_right", "sole_outline_right",
-           "robot_missing_sole.xml");
-    refuse("base_link_box", "xase_link_box", "base_link_box", "robot_missing_box.xml");
-    refuse("data=\"77\"", "data=\"-7\"", "sole_elements", "robot_elements.xml");
+    refuse("sa01.xml", "leg_r6_link", "xeg_r6_link", "'leg_r6_link' of [foot.right]");
+    refuse("sa01.xml", "leg_l4_joint", "xeg_l4_joint", "'leg_l4_joint'");
+    refuse("sa01.xml", "base_link_box", "xase_link_box", "[robot] shells");
+    refuse("sa01.xml", "class=\"ankle\" axis=\"0 1 0\"", "damping=\"1\" axis=\"0 1 0\"", "damping");
+    refuse("sa01.xml", "<joint name=\"leg_l1_joint\"",
+           "<joint name=\"leg_l1_joint\" type=\"slide\"", "hinge");
+    refuse("sa01.xml", "range=\"-0.15 2.268\"", "range=\"0.5 2.268\"", "pose");
+    refuse("robot.ini", "elements = 77", "elements = -7", "foot.left.elements");
+    refuse("robot.ini", "elements = 77", "elements = 5000", "[foot.left]");
+    refuse("robot.ini", "sa01.xml", "none.xml", "none.xml");
+    refuse("robot.ini", "base = base_link", "base = torso", "[robot] base");
+    refuse("robot.ini", "height =", "heigth =", "nearest is 'height'");
+    refuse("robot.ini", "[joints]", "[joint]", "[joints]");
+    refuse("robot.ini", "kp          =  50", "kp          = ", "[joints] kp: 11 numbers for 12");
+    refuse("robot.ini", "kp          =  50", "kp          = x", "'x'");
+    refuse("robot.ini", "kp          =  50", "kp          = -1", "'leg_l1_joint'");
+    refuse("robot.ini", "mirror_sign =  -1", "mirror_sign =  1", "[joints] mirror_sign");
+    refuse("robot.ini", "mirror = leg_r1_joint leg_r2_joint", "mirror = leg_r2_joint leg_r1_joint",
+           "[joints] mirror");
+    refuse("robot.ini", "mirror = right", "mirror = both", "[foot.left] mirror");
+    refuse("robot.ini", "offset = 0.5", "offset = 0.25", "[foot.left] offset");
+    refuse("robot.ini", "shape = outline", "shape = round", "[foot.left] ankle: only a flat sole");
+    refuse("robot.ini", "z = -0.055\n", "", "[foot.left] z: a flat sole needs it");
+    refuse("robot.ini", "\n[foot.right]", "\n[foot.a]\n[foot.b]\n[foot.c]\n[foot.right]",
+           "more than 4 feet");
+    refuse("robot.ini", "pitch = 0.0195", "pitch = 0.0195\npitch = 0.02", "already set");
+    refuse("robot.ini", "feet_least = 0.10        ; [m]", "feet_least = 0.10\n  1 2", "no list");
     MildError error = {0};
-    assert_null(robot_create("no_such_file.xml", &error));
+    assert_null(robot_create("no_such_robot", &error));
     print_message("%s\n", error.text);
-    assert_non_null(strstr(error.text, "no_such_file.xml"));
+    assert_non_null(strstr(error.text, "no_such_robot/robot.ini"));
+    assert_null(robot_open("sa02", &error));
+    print_message("%s\n", error.text);
+    assert_non_null(strstr(error.text, "nearest is 'sa01'"));
 }
 
 int main(void) {

@@ -8,11 +8,11 @@
 
 #include <mujoco/mujoco.h>
 
-#include "robot/stand.h"
+#include "sa01.h"
 
 static RobotState moving_state(uint32_t draw) {
     Random random = random_at(17, draw, 0);
-    RobotState state = robot_stand_state(robot, 0, -1.0); /* 1 m above the ground */
+    RobotState state = stand_state(stand, 0, -1.0); /* 1 m above the ground */
     double norm = 0;
     for (int i = 3; i < 7; i++) {
         state.qpos[i] += random_uniform(&random, -0.5, 0.5);
@@ -33,7 +33,7 @@ static void engine_step(RobotSim *sim, const RobotState *state, const double *to
     int base = mj_name2id(m, mjOBJ_BODY, "base_link");
     memcpy(d->qpos, state->qpos, sizeof state->qpos);
     memcpy(d->qvel, state->qvel, sizeof state->qvel);
-    memcpy(d->qfrc_applied + 6, torque, sizeof(double) * ROBOT_JOINTS);
+    memcpy(d->qfrc_applied + 6, torque, sizeof(double) * SA01_JOINTS);
     if (push) {
         memcpy(d->xfrc_applied + 6 * base, push, 6 * sizeof *push);
     }
@@ -45,10 +45,10 @@ static void engine_step(RobotSim *sim, const RobotState *state, const double *to
 
 static double worst_difference(RobotSim *sim, const RobotState *after) {
     double worst = 0;
-    for (int i = 0; i < ROBOT_NQ; i++) {
+    for (int i = 0; i < SA01_NQ; i++) {
         worst = fmax(worst, fabs(robot_sim_qpos(sim)[i] - after->qpos[i]));
     }
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < SA01_NV; i++) {
         worst = fmax(worst, fabs(robot_sim_qvel(sim)[i] - after->qvel[i]));
     }
     return worst;
@@ -57,7 +57,7 @@ static double worst_difference(RobotSim *sim, const RobotState *after) {
 /* [m/s, rad/s] how much the push alone changes the speeds. */
 static double effect(const RobotState *pushed, const RobotState *left_alone) {
     double largest = 0;
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < SA01_NV; i++) {
         largest = fmax(largest, fabs(pushed->qvel[i] - left_alone->qvel[i]));
     }
     return largest;
@@ -76,8 +76,8 @@ static void push_is_the_engines(int rigid) {
     double worst = 0, weakest = 1e9;
     for (uint32_t draw = 0; draw < 6; draw++) {
         RobotState state = moving_state(draw), pushed, alone;
-        double torque[ROBOT_JOINTS];
-        for (int i = 0; i < ROBOT_JOINTS; i++) {
+        double torque[SA01_JOINTS];
+        for (int i = 0; i < SA01_JOINTS; i++) {
             torque[i] = 2.0 * (i % 5) - 4;
         }
         for (int axis = -1; axis <= 6; axis++) { /* -1: none, 6: all */

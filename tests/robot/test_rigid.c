@@ -7,7 +7,7 @@
 
 #include "robot_kit.h"
 
-#include "robot/stand.h"
+#include "sa01.h"
 
 static MildMap *make_map(const MildMapDef *def) {
     MildError error = {0};
@@ -34,7 +34,7 @@ static RobotVariation rigid_variation(double friction) {
 
 /* Standing, a little off and in motion. */
 static RobotState random_state(uint32_t draw) {
-    RobotState state = robot_stand_state(robot, 0, 0.0);
+    RobotState state = stand_state(stand, 0, 0.0);
     Random random = random_at(6, draw, 0);
     kit_disturb(&state, &random);
     return state;
@@ -63,8 +63,8 @@ static void test_level(void **unused) {
         robot_sim_load(sim, &state, &rigid);
         robot_sim_load(other, &state, &rigid);
         for (int i = 0; i < 300; i++) {
-            double torque[ROBOT_JOINTS];
-            robot_stand_torque(robot, sim, 0, torque);
+            double torque[SA01_JOINTS];
+            stand_torque(stand, sim, 0, torque);
             assert_int_equal(robot_sim_step(sim, torque, NULL, &flat, NULL), 0);
             assert_int_equal(robot_sim_step(other, torque, NULL, &mapped, NULL), 0);
             contacts += robot_sim_foot(sim, 0)->result.contacts;
@@ -102,13 +102,13 @@ static void test_slope_is_the_engine(void **unused) {
         memcpy(engine->qpos, state.qpos, sizeof state.qpos);
         memcpy(engine->qvel, state.qvel, sizeof state.qvel);
         for (int i = 0; i < 300; i++) {
-            double torque[ROBOT_JOINTS];
-            robot_stand_torque(robot, sim, 0, torque);
+            double torque[SA01_JOINTS];
+            stand_torque(stand, sim, 0, torque);
             memcpy(engine->qfrc_applied + 6, torque, sizeof torque);
             mj_step(m, engine);
             assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
         }
-        for (int i = 0; i < ROBOT_NQ; i++) {
+        for (int i = 0; i < SA01_NQ; i++) {
             worst = fmax(worst, fabs(engine->qpos[i] - robot_sim_qpos(sim)[i]));
         }
         mj_deleteData(engine);
@@ -127,7 +127,7 @@ static void slide(double slope, double friction, double *fallen, double *crept) 
     terrain.map = map;
     RobotSim *sim = new_sim(0.001);
     RobotVariation rigid = rigid_variation(friction);
-    RobotState state = robot_stand_state(robot, 0, 0.0);
+    RobotState state = stand_state(stand, 0, 0.0);
     const mjData *d = robot_sim_data(sim);
     double tilt = atan(slope), height = state.qpos[2], start, half = 0.0;
     state.qpos[0] = height * sin(tilt);
@@ -137,8 +137,8 @@ static void slide(double slope, double friction, double *fallen, double *crept) 
     robot_sim_load(sim, &state, &rigid);
     start = d->subtree_com[3];
     for (int i = 0; i < 2000; i++) {
-        double torque[ROBOT_JOINTS];
-        robot_stand_torque(robot, sim, 0, torque);
+        double torque[SA01_JOINTS];
+        stand_torque(stand, sim, 0, torque);
         assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
         half = i == 1000 ? robot_sim_foot(sim, 0)->sole_center[0] : half;
     }
@@ -183,15 +183,15 @@ static void test_waves(void **unused) {
         terrain.map = map;
         terrain.map_x = random_uniform(&random, -1.0, 1.0);
         terrain.map_y = random_uniform(&random, -1.0, 1.0);
-        RobotState state = robot_stand_state(robot, 1, 0.0);
+        RobotState state = stand_state(stand, 1, 0.0);
         robot_sim_load(sim, &state, &rigid);
         state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain);
         robot_sim_load(sim, &state, &rigid);
         for (int i = 0; i < 800; i++) {
-            double torque[ROBOT_JOINTS];
-            robot_stand_torque(robot, sim, 1, torque);
+            double torque[SA01_JOINTS];
+            stand_torque(stand, sim, 1, torque);
             assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
-            for (int f = 0; i >= 400 && f < ROBOT_FEET; f++) {
+            for (int f = 0; i >= 400 && f < SA01_FEET; f++) {
                 double least = 1.0;
                 for (int p = 4 * f; p < 4 * f + 4; p++) {
                     const double *c = d->geom_xpos + 3 * m->pair_geom2[p];

@@ -5,7 +5,7 @@
 
 #include "robot_kit.h"
 
-#include "robot/stand.h"
+#include "sa01.h"
 
 #define SECONDS 10.0
 #define FALLEN 0.7 /* [m] base height */
@@ -19,16 +19,16 @@ typedef struct {
     double tilt;    /* [rad] of the soles at the end, the larger */
     double height;  /* [m] of the base at the end */
     double torque;  /* [N m] largest in the last two seconds */
-} Stand;
+} Standing;
 
 static double mean_depth(const RobotSim *sim) {
     return 0.5 *
            (robot_sim_foot(sim, 0)->result.depth_mean + robot_sim_foot(sim, 1)->result.depth_mean);
 }
 
-static double sole_drift(const RobotSim *sim, double start[ROBOT_FEET][3]) {
+static double sole_drift(const RobotSim *sim, double start[SA01_FEET][3]) {
     double worst = 0.0;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < SA01_FEET; f++) {
         const double *now = robot_sim_foot(sim, f)->sole_center;
         worst = fmax(worst, hypot(now[0] - start[f][0], now[1] - start[f][1]));
     }
@@ -36,12 +36,12 @@ static double sole_drift(const RobotSim *sim, double start[ROBOT_FEET][3]) {
 }
 
 static double static_sinkage(const MildMaterial *material) {
-    return mild_sole_sinkage(robot_soles(robot)[0], material, robot_half_weight(robot));
+    return mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot));
 }
 
 /* material: NULL for rigid ground. */
-static Stand stand(const MildMaterial *material, double dt, double seconds, int balance,
-                   MildSolver solver) {
+static Standing stand_still(const MildMaterial *material, double dt, double seconds, int balance,
+                            MildSolver solver) {
     RobotSim *sim = new_sim(dt);
     robot_sim_set_solver(sim, solver, 0, 0);
     MildGround *ground = new_ground();
@@ -49,24 +49,24 @@ static Stand stand(const MildMaterial *material, double dt, double seconds, int 
     MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
     RobotVariation variation = robot_variation_nominal();
     variation.rigid = material == NULL;
-    RobotState state = robot_stand_state(robot, balance, material ? static_sinkage(material) : 0.0);
+    RobotState state = stand_state(stand, balance, material ? static_sinkage(material) : 0.0);
     robot_sim_load(sim, &state, &variation);
-    double start[ROBOT_FEET][3], late = 0.0;
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    double start[SA01_FEET][3], late = 0.0;
+    for (int f = 0; f < SA01_FEET; f++) {
         memcpy(start[f], robot_sim_foot(sim, f)->sole_center, sizeof start[f]);
     }
-    Stand result = {.stands = 1};
+    Standing result = {.stands = 1};
     int steps = (int)(seconds / dt + 0.5), tail = (int)(0.2 * seconds / dt + 0.5);
     for (int i = 0; i < steps && result.stands; i++) {
-        double torque[ROBOT_JOINTS];
-        robot_stand_torque(robot, sim, balance, torque);
+        double torque[SA01_JOINTS];
+        stand_torque(stand, sim, balance, torque);
         int bad = robot_sim_step(sim, torque, NULL, &terrain, ground);
         result.stands = !bad && robot_sim_qpos(sim)[2] > FALLEN;
         result.seconds = (i + 1) * dt;
         late = i == steps - tail ? mean_depth(sim) : late;
         if (i >= steps - tail) {
             result.depth += mean_depth(sim) / tail;
-            for (int k = 0; k < ROBOT_JOINTS; k++) {
+            for (int k = 0; k < SA01_JOINTS; k++) {
                 result.torque = fmax(result.torque, fabs(torque[k]));
             }
         }
@@ -74,7 +74,7 @@ static Stand stand(const MildMaterial *material, double dt, double seconds, int 
     result.height = robot_sim_qpos(sim)[2];
     result.creep = mean_depth(sim) - late;
     result.drift = sole_drift(sim, start);
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < SA01_FEET; f++) {
         result.tilt = fmax(result.tilt, acos(fmin(1.0, robot_sim_foot(sim, f)->rotation[8])));
     }
     free(ground);
@@ -83,7 +83,7 @@ static Stand stand(const MildMaterial *material, double dt, double seconds, int 
 }
 
 static void check_balanced(const char *name, const MildMaterial *material, double dt) {
-    Stand result = stand(material, dt, SECONDS, 1, MILD_SOLVER_NEWTON);
+    Standing result = stand_still(material, dt, SECONDS, 1, MILD_SOLVER_NEWTON);
     double expected = material ? static_sinkage(material) : 0.0;
     print_message("%-11s %.1f ms %s %5.2f s depth %6.3f of %6.3f mm, creep %8.5f, drift %.4f mm, "
                   "tilt %.4f rad, %.1f N m\n",
@@ -117,8 +117,8 @@ static void test_papers_solver(void **unused) {
         MildMaterial material = preset(mild_material_preset_name(p));
         double height[2];
         for (int s = 0; s < 2; s++) {
-            Stand result = stand(&material, 0.0025, 0.0075, 1,
-                                 s ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON);
+            Standing result = stand_still(&material, 0.0025, 0.0075, 1,
+                                          s ? MILD_SOLVER_GAUSS_SEIDEL : MILD_SOLVER_NEWTON);
             assert_true(result.stands);
             height[s] = result.height;
         }
@@ -132,11 +132,11 @@ static void test_papers_solver(void **unused) {
  * stand.c). */
 static void test_plain_gains(void **unused) {
     (void)unused;
-    Stand rigid = stand(NULL, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
+    Standing rigid = stand_still(NULL, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
     assert_true(rigid.stands);
     for (int p = 0; p < mild_material_preset_count(); p++) {
         MildMaterial material = preset(mild_material_preset_name(p));
-        Stand result = stand(&material, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
+        Standing result = stand_still(&material, 0.001, SECONDS, 0, MILD_SOLVER_NEWTON);
         print_message("plain gains on %-11s %s after %.2f s\n", mild_material_preset_name(p),
                       result.stands ? "stand" : "fall", result.seconds);
         if (strcmp(mild_material_preset_name(p), "foam25") == 0) {

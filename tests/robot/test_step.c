@@ -7,14 +7,14 @@
 #include <mujoco/mujoco.h>
 
 #include "robot/sim.h"
-#include "robot/stand.h"
+#include "sa01.h"
 
 #define ROWS 12
 
 /* A state near the ground with all joints inside their ranges. */
 static RobotState random_state(uint32_t index) {
     Random random = random_at(11, index, 0);
-    RobotState state = robot_stand_state(robot, 0, 0.005);
+    RobotState state = stand_state(stand, 0, 0.005);
     for (int i = 0; i < 4; i++) {
         state.qpos[3 + i] += random_uniform(&random, -0.1, 0.1);
     }
@@ -47,15 +47,15 @@ static void test_rigid_is_the_engine(void **unused) {
         memcpy(engine->qvel, state.qvel, sizeof state.qvel);
         for (int i = 0; i < 300;
              i++) { /* with no torque the robot collapses into its joint limits */
-            double torque[ROBOT_JOINTS] = {0};
+            double torque[SA01_JOINTS] = {0};
             if (draw % 2 == 0) {
-                robot_stand_torque(robot, sim, 0, torque);
+                stand_torque(stand, sim, 0, torque);
             }
             memcpy(engine->qfrc_applied + 6, torque, sizeof torque);
             mj_step(m, engine);
             assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
         }
-        for (int i = 0; i < ROBOT_NQ; i++) {
+        for (int i = 0; i < SA01_NQ; i++) {
             worst = fmax(worst, fabs(engine->qpos[i] - robot_sim_qpos(sim)[i]));
         }
     }
@@ -66,34 +66,34 @@ static void test_rigid_is_the_engine(void **unused) {
 }
 
 /* Dense J of both feet from the engine. */
-static void dense_jacobian(RobotSim *sim, double j[ROWS * ROBOT_NV]) {
-    static const char *const names[ROBOT_FEET] = {"leg_l6_link", "leg_r6_link"};
-    for (int f = 0; f < ROBOT_FEET; f++) {
+static void dense_jacobian(RobotSim *sim, double j[ROWS * SA01_NV]) {
+    static const char *const names[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
+    for (int f = 0; f < SA01_FEET; f++) {
         const mjModel *m = robot_sim_model(sim);
-        double *rows = j + 6 * f * ROBOT_NV;
-        mj_jacBody(m, robot_sim_data(sim), rows, rows + 3 * ROBOT_NV,
+        double *rows = j + 6 * f * SA01_NV;
+        mj_jacBody(m, robot_sim_data(sim), rows, rows + 3 * SA01_NV,
                    mj_name2id(m, mjOBJ_BODY, names[f]));
     }
 }
 
 /* x <- M^-1 x by Gaussian elimination on the full matrix. */
 static void dense_solve(const double *mass, double *x) {
-    double a[ROBOT_NV][ROBOT_NV + 1];
-    for (int i = 0; i < ROBOT_NV; i++) {
-        memcpy(a[i], mass + i * ROBOT_NV, ROBOT_NV * sizeof(double));
-        a[i][ROBOT_NV] = x[i];
+    double a[SA01_NV][SA01_NV + 1];
+    for (int i = 0; i < SA01_NV; i++) {
+        memcpy(a[i], mass + i * SA01_NV, SA01_NV * sizeof(double));
+        a[i][SA01_NV] = x[i];
     }
-    for (int p = 0; p < ROBOT_NV; p++) {
-        for (int i = p + 1; i < ROBOT_NV; i++) {
+    for (int p = 0; p < SA01_NV; p++) {
+        for (int i = p + 1; i < SA01_NV; i++) {
             double factor = a[i][p] / a[p][p];
-            for (int k = p; k <= ROBOT_NV; k++) {
+            for (int k = p; k <= SA01_NV; k++) {
                 a[i][k] -= factor * a[p][k];
             }
         }
     }
-    for (int i = ROBOT_NV - 1; i >= 0; i--) {
-        double sum = a[i][ROBOT_NV];
-        for (int k = i + 1; k < ROBOT_NV; k++) {
+    for (int i = SA01_NV - 1; i >= 0; i--) {
+        double sum = a[i][SA01_NV];
+        for (int k = i + 1; k < SA01_NV; k++) {
             sum -= a[i][k] * x[k];
         }
         x[i] = sum / a[i][i];
@@ -113,15 +113,15 @@ static void test_map_against_dense(void **unused) {
         mj_makeM(m, d);
         mj_factorM(m, d);
         foot_map_inverse_inertia(sim);
-        double mass[ROBOT_NV * ROBOT_NV], j[ROWS * ROBOT_NV], solved[ROWS * ROBOT_NV];
+        double mass[SA01_NV * SA01_NV], j[ROWS * SA01_NV], solved[ROWS * SA01_NV];
         mj_fullM(m, d, mass);
         dense_jacobian(sim, j);
         memcpy(solved, j, sizeof solved);
         for (int r = 0; r < ROWS; r++) {
-            dense_solve(mass, solved + r * ROBOT_NV);
+            dense_solve(mass, solved + r * SA01_NV);
             double twist = 0.0;
-            for (int k = 0; k < ROBOT_NV; k++) {
-                twist += j[r * ROBOT_NV + k] * state.qvel[k];
+            for (int k = 0; k < SA01_NV; k++) {
+                twist += j[r * SA01_NV + k] * state.qvel[k];
             }
             worst_twist =
                 fmax(worst_twist, fabs(twist - robot_sim_foot(sim, r / 6)->velocity[r % 6]));
@@ -129,23 +129,23 @@ static void test_map_against_dense(void **unused) {
         for (int r = 0; r < ROWS; r++) {
             for (int c = 0; c < ROWS; c++) {
                 double sum = 0.0;
-                for (int k = 0; k < ROBOT_NV; k++) {
-                    sum += j[r * ROBOT_NV + k] * solved[c * ROBOT_NV + k];
+                for (int k = 0; k < SA01_NV; k++) {
+                    sum += j[r * SA01_NV + k] * solved[c * SA01_NV + k];
                 }
                 worst_a = fmax(worst_a, fabs(sum - sim->input.inverse_inertia[r * ROWS + c]) /
                                             (1.0 + fabs(sum)));
             }
         }
-        double wrench[ROBOT_FEET][6], force[ROBOT_NV], acceleration[ROBOT_NV];
+        double wrench[SA01_FEET][6], force[SA01_NV], acceleration[SA01_NV];
         for (int r = 0; r < ROWS; r++) {
             wrench[r / 6][r % 6] = sin(1.0 + r);
         }
         foot_map_wrench(sim, wrench, force, acceleration);
-        for (int k = 0; k < ROBOT_NV; k++) {
+        for (int k = 0; k < SA01_NV; k++) {
             double f = 0.0, a = 0.0;
             for (int r = 0; r < ROWS; r++) {
-                f += j[r * ROBOT_NV + k] * wrench[r / 6][r % 6];
-                a += solved[r * ROBOT_NV + k] * wrench[r / 6][r % 6];
+                f += j[r * SA01_NV + k] * wrench[r / 6][r % 6];
+                a += solved[r * SA01_NV + k] * wrench[r / 6][r % 6];
             }
             worst_wrench = fmax(worst_wrench, fabs(f - force[k]));
             worst_wrench = fmax(worst_wrench, fabs(a - acceleration[k]) / (1.0 + fabs(a)));
@@ -170,14 +170,14 @@ static void test_twist_is_the_solvers(void **unused) {
         RobotState state = random_state(draw);
         robot_sim_load(sim, &state, &nominal);
         mild_ground_reset(ground);
-        double torque[ROBOT_JOINTS], j[ROWS * ROBOT_NV];
-        robot_stand_torque(robot, sim, 0, torque);
+        double torque[SA01_JOINTS], j[ROWS * SA01_NV];
+        stand_torque(stand, sim, 0, torque);
         dense_jacobian(sim, j);
         assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
         for (int r = 0; r < ROWS; r++) {
             double twist = 0.0;
-            for (int k = 0; k < ROBOT_NV; k++) {
-                twist += j[r * ROBOT_NV + k] * robot_sim_qvel(sim)[k];
+            for (int k = 0; k < SA01_NV; k++) {
+                twist += j[r * SA01_NV + k] * robot_sim_qvel(sim)[k];
             }
             worst = fmax(worst, fabs(twist - robot_sim_contact(sim)->velocity[r]));
         }
@@ -193,8 +193,8 @@ static void momentum(RobotSim *sim, const double *qpos, const double *qvel, doub
                      double center[3]) {
     const mjModel *m = robot_sim_model(sim);
     mjData *d = mj_makeData(m);
-    memcpy(d->qpos, qpos, ROBOT_NQ * sizeof *qpos);
-    memcpy(d->qvel, qvel, ROBOT_NV * sizeof *qvel);
+    memcpy(d->qpos, qpos, SA01_NQ * sizeof *qpos);
+    memcpy(d->qvel, qvel, SA01_NV * sizeof *qvel);
     mj_fwdPosition(m, d);
     mj_fwdVelocity(m, d);
     mj_subtreeVel(m, d);
@@ -226,7 +226,7 @@ static void test_momentum(void **unused) {
     MildTerrain terrain = preset_terrain("foam60");
     MildGround *ground = new_ground();
     RobotVariation nominal = robot_variation_nominal();
-    const double push[6] = {30, -20, 10, 4, -5, 6}, at_rest[ROBOT_NV] = {0};
+    const double push[6] = {30, -20, 10, 4, -5, 6}, at_rest[SA01_NV] = {0};
     double worst[6] = {0}, largest[6] = {0};
     int loaded = 0;
     for (uint32_t draw = 0; draw < 20; draw++) {
@@ -235,18 +235,18 @@ static void test_momentum(void **unused) {
         memset(state.qvel, 0, sizeof state.qvel);
         robot_sim_load(sim, &state, &nominal);
         mild_ground_reset(ground);
-        double torque[ROBOT_JOINTS], before[6], after[6], center[3], wrench[6] = {0}, base[3];
-        robot_stand_torque(robot, sim, 0, torque);
+        double torque[SA01_JOINTS], before[6], after[6], center[3], wrench[6] = {0}, base[3];
+        stand_torque(stand, sim, 0, torque);
         memcpy(base, ((const mjData *)robot_sim_data(sim))->xipos + 3, sizeof base);
         momentum(sim, state.qpos, at_rest, before, center);
         add_wrench(wrench, push, push + 3, base, center);
         wrench[2] -= 9.81 * robot_total_mass(robot);
-        double ankle[ROBOT_FEET][3];
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        double ankle[SA01_FEET][3];
+        for (int f = 0; f < SA01_FEET; f++) {
             memcpy(ankle[f], robot_sim_foot(sim, f)->position, sizeof ankle[f]);
         }
         assert_int_equal(robot_sim_step(sim, torque, push, &terrain, ground), 0);
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        for (int f = 0; f < SA01_FEET; f++) {
             const RobotFoot *foot = robot_sim_foot(sim, f);
             loaded += foot->force[2] > 1;
             add_wrench(wrench, foot->force, foot->torque, ankle[f], center);
@@ -276,9 +276,9 @@ typedef struct {
 } Case;
 
 static void advance_case(RobotSim *sim, Case *one) {
-    double torque[ROBOT_JOINTS];
+    double torque[SA01_JOINTS];
     robot_sim_load(sim, &one->state, &one->variation);
-    robot_stand_torque(robot, sim, 0, torque);
+    stand_torque(stand, sim, 0, torque);
     assert_int_equal(robot_sim_step(sim, torque, NULL, &one->terrain, one->ground), 0);
     robot_sim_store(sim, &one->state);
 }
@@ -308,15 +308,15 @@ static void test_determinism(void **unused) {
         robot_sim_load(own, &alone[i].state, &alone[i].variation);
         for (int step = 0; step < 300;
              step++) { /* without a load in between: storing and loading changes nothing */
-            double torque[ROBOT_JOINTS];
-            robot_stand_torque(robot, own, 0, torque);
+            double torque[SA01_JOINTS];
+            stand_torque(stand, own, 0, torque);
             assert_int_equal(robot_sim_step(own, torque, NULL, &alone[i].terrain, alone[i].ground),
                              0);
         }
         robot_sim_store(own, &alone[i].state);
         assert_memory_equal(&alone[i].state, &shared[i].state, sizeof shared[i].state);
         assert_memory_equal(alone[i].ground, shared[i].ground,
-                            mild_ground_bytes(robot_soles(robot), ROBOT_FEET));
+                            mild_ground_bytes(robot_soles(robot), SA01_FEET));
         robot_sim_destroy(own);
         free(alone[i].ground);
         free(shared[i].ground);
@@ -330,8 +330,8 @@ static void test_bad_numbers(void **unused) {
     MildTerrain terrain = preset_terrain("sand_loose");
     MildGround *ground = new_ground();
     RobotVariation nominal = robot_variation_nominal();
-    RobotState state = robot_stand_state(robot, 0, 0.0);
-    double torque[ROBOT_JOINTS] = {0};
+    RobotState state = stand_state(stand, 0, 0.0);
+    double torque[SA01_JOINTS] = {0};
     torque[3] = NAN;
     robot_sim_load(sim, &state, &nominal);
     assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 1);
@@ -352,7 +352,7 @@ static void test_clearance_and_distances(void **unused) {
     RobotSim *sim = new_sim(0.001);
     MildTerrain terrain = preset_terrain("sand_loose");
     RobotVariation nominal = robot_variation_nominal();
-    RobotState state = robot_stand_state(robot, 0, 0.0);
+    RobotState state = stand_state(stand, 0, 0.0);
     robot_sim_load(sim, &state, &nominal);
     /* shank box: 0.32 below the knee axis of a shank leaning 0.24 rad, plus its corner */
     double ankle = 0.055,

@@ -16,15 +16,17 @@
 
 #include "base/random.h"
 #include "robot/robot.h"
+#include "sa01.h"
 #include "task/task.h"
 
-#define KIT_MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define KIT_MODEL SA01
 #define KIT_PI 3.141592653589793
 
 /* Joints of one leg. */
 enum { HIP_ROLL, HIP_YAW, HIP_PITCH, KNEE, ANKLE_PITCH, ANKLE_ROLL, LEG_JOINTS };
 
 static Robot *robot;
+static TaskMirror mirror;
 
 static inline int kit_setup(void **unused) {
     (void)unused;
@@ -32,8 +34,10 @@ static inline int kit_setup(void **unused) {
     robot = robot_create(KIT_MODEL, &error);
     if (!robot) {
         fprintf(stderr, "%s\n", error.text);
+        return 1;
     }
-    return robot == NULL;
+    mirror = task_mirror(robot);
+    return 0;
 }
 
 static inline int kit_teardown(void **unused) {
@@ -63,10 +67,10 @@ typedef struct {
     TaskDef def;
     TaskEnv *env;
     RobotSim *sim;
-    float history[TASK_HISTORY];
-    float critic[TASK_CRITIC];
-    float estimate[TASK_ESTIMATES];
-    float frame[TASK_OBSERVATION];
+    float history[SA01_HISTORY];
+    float critic[SA01_CRITIC];
+    float estimate[SA01_ESTIMATES];
+    float frame[SA01_OBSERVATION];
     TaskView view;
 } Rig;
 
@@ -119,15 +123,15 @@ static inline void rig_open_quiet(Rig *rig, double vx) {
 
 /* One policy step that draws no new episode. */
 static inline TaskStep rig_step(Rig *rig, const float *action) {
-    static const float zero[TASK_ACTIONS];
+    static const float zero[SA01_JOINTS];
     return task_env_step(rig->env, &rig->def, robot, rig->sim, action ? action : zero, 0,
                          &rig->view, NULL);
 }
 
 /* Joints without torque: in the air the robot then falls without turning or bending. */
 static inline void rig_go_limp(Rig *rig) {
-    memset(rig->def.kp, 0, sizeof rig->def.kp);
-    memset(rig->def.kd, 0, sizeof rig->def.kd);
+    memset(rig->env->kp, 0, sizeof rig->env->kp);
+    memset(rig->env->kd, 0, sizeof rig->env->kd);
 }
 
 /* ---- states ---- */
@@ -146,7 +150,7 @@ static inline void kit_turn(RobotState *state, double yaw, double pitch, double 
 /* Default pose at rest, base `height` above z = 0. */
 static inline RobotState kit_state(double height) {
     RobotState state = {.qpos = {0, 0, height, 1, 0, 0, 0}};
-    memcpy(state.qpos + 7, robot_default_pose(robot), sizeof(double) * ROBOT_JOINTS);
+    memcpy(state.qpos + 7, robot_default_pose(robot), sizeof(double) * SA01_JOINTS);
     return state;
 }
 
@@ -158,10 +162,10 @@ static inline RobotState kit_moving_state(double height, uint32_t draw) {
     state.qpos[1] = random_uniform(&r, -2, 2);
     kit_turn(&state, random_uniform(&r, -3, 3), random_uniform(&r, -0.3, 0.3),
              random_uniform(&r, -0.3, 0.3));
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         state.qpos[7 + i] += random_uniform(&r, -0.2, 0.2);
     }
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < SA01_NV; i++) {
         state.qvel[i] = random_uniform(&r, -1, 1);
     }
     return state;

@@ -5,14 +5,26 @@
 
 #include <mujoco/mujoco.h>
 
+#include "sa01.h"
 #include "task_kit.h"
 
 /* Middle of a sole's bounds in the foot frame (docs of the robot: 5.5 mm outward, 55 mm below the
  * ankle). */
-static const double oracle_sole[ROBOT_FEET][3] = {{0.06, 0.0055, -0.055}, {0.06, -0.0055, -0.055}};
-static const char *const oracle_feet[ROBOT_FEET] = {"leg_l6_link", "leg_r6_link"};
-static const char *const oracle_knees[ROBOT_FEET] = {"leg_l4_link", "leg_r4_link"};
-static const char *const oracle_outlines[ROBOT_FEET] = {"sole_outline_left", "sole_outline_right"};
+static const double oracle_sole[SA01_FEET][3] = {{0.06, 0.0055, -0.055}, {0.06, -0.0055, -0.055}};
+static const char *const oracle_feet[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
+static const char *const oracle_knees[SA01_FEET] = {"leg_l4_link", "leg_r4_link"};
+
+/* Outline of the left sole, robots/sa01/sa01.json: x, lowest y, highest y [m]; the right sole is its
+ * mirror image. */
+enum { ORACLE_ROWS = 19 };
+static const double oracle_outline[ORACLE_ROWS][3] = {
+    {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044},  {-0.045, -0.045, 0.047},
+    {-0.03, -0.046, 0.049},  {-0.015, -0.046, 0.051}, {0.0, -0.041, 0.041},
+    {0.015, -0.041, 0.041},  {0.03, -0.041, 0.041},   {0.045, -0.041, 0.041},
+    {0.06, -0.046, 0.057},   {0.075, -0.046, 0.057},  {0.09, -0.046, 0.057},
+    {0.105, -0.046, 0.057},  {0.12, -0.046, 0.057},   {0.135, -0.046, 0.057},
+    {0.15, -0.046, 0.057},   {0.165, -0.045, 0.049},  {0.18, -0.038, 0.039},
+    {0.195, -0.016, 0.015}};
 
 typedef struct {
     double omega[3];                     /* [rad/s] base, base frame */
@@ -21,9 +33,9 @@ typedef struct {
     double heading[3];                   /* [m/s, m/s, m/s] base: forward, left, up */
     double gravity[3];                   /* [-] base frame */
     double orientation[4];               /* [-] of the base, w x y z */
-    double sole[ROBOT_FEET][3];          /* [m] centre, world */
-    double sole_velocity[ROBOT_FEET][3]; /* [m/s] world */
-    double sole_lowest[ROBOT_FEET];      /* [m] above z = 0 */
+    double sole[SA01_FEET][3];           /* [m] centre, world */
+    double sole_velocity[SA01_FEET][3];  /* [m/s] world */
+    double sole_lowest[SA01_FEET];       /* [m] above z = 0 */
     double foot_distance, knee_distance; /* [m] left less right, to the left of the heading */
 } Oracle;
 
@@ -42,16 +54,16 @@ static inline void oracle_to_base(const Oracle *o, const double v[3], double out
 
 static inline void oracle_foot(Oracle *o, const mjModel *m, const mjData *d, int f) {
     int body = oracle_body(m, oracle_feet[f]);
-    double arm[3], jacobian[3 * ROBOT_NV];
+    double arm[3], jacobian[3 * SA01_NV];
     mju_mulMatVec3(arm, d->xmat + 9 * body, oracle_sole[f]);
     mju_add3(o->sole[f], d->xpos + 3 * body, arm);
     mj_jac(m, d, jacobian, NULL, o->sole[f], body);
-    mju_mulMatVec(o->sole_velocity[f], jacobian, d->qvel, 3, ROBOT_NV);
-    int outline = mj_name2id(m, mjOBJ_NUMERIC, oracle_outlines[f]);
-    const double *xy = m->numeric_data + m->numeric_adr[outline];
+    mju_mulMatVec(o->sole_velocity[f], jacobian, d->qvel, 3, SA01_NV);
     o->sole_lowest[f] = 1e9;
-    for (int i = 0; i < m->numeric_size[outline] / 2; i++) {
-        const double local[3] = {xy[2 * i], xy[2 * i + 1], -0.055};
+    for (int i = 0; i < 2 * ORACLE_ROWS; i++) {
+        const double *row = oracle_outline[i / 2];
+        const double side = f == SA01_LEFT ? 1 : -1;
+        const double local[3] = {row[0], side * row[1 + i % 2], -0.055};
         mju_mulMatVec3(arm, d->xmat + 9 * body, local);
         o->sole_lowest[f] = fmin(o->sole_lowest[f], d->xpos[3 * body + 2] + arm[2]);
     }
@@ -61,8 +73,8 @@ static inline Oracle oracle_of(RobotSim *sim) {
     Oracle o = {0};
     const mjModel *m = robot_sim_model(sim);
     mjData *d = mj_makeData(m);
-    memcpy(d->qpos, robot_sim_qpos(sim), sizeof(double) * ROBOT_NQ);
-    memcpy(d->qvel, robot_sim_qvel(sim), sizeof(double) * ROBOT_NV);
+    memcpy(d->qpos, robot_sim_qpos(sim), sizeof(double) * SA01_NQ);
+    memcpy(d->qvel, robot_sim_qvel(sim), sizeof(double) * SA01_NV);
     mj_fwdPosition(m, d);
     mj_fwdVelocity(m, d);
     int base = oracle_body(m, "base_link");
@@ -82,7 +94,7 @@ static inline Oracle oracle_of(RobotSim *sim) {
     o.heading[1] = mju_dot3(o.world, left);
     o.heading[2] = o.world[2];
     oracle_to_base(&o, down, o.gravity);
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < SA01_FEET; f++) {
         oracle_foot(&o, m, d, f);
     }
     mju_sub3(between, o.sole[0], o.sole[1]);

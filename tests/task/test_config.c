@@ -20,6 +20,10 @@ static int range_of(const char *help, double *low, double *high) {
 
 static void expect_default(const MildField *field, const void *def, const char *value) {
     const char *at = (const char *)def + field->offset;
+    if (field->type == MILD_FIELD_TEXT) {
+        assert_true(strncmp(at, value, strlen(at)) == 0 && value[strlen(at)] == '\n');
+        return;
+    }
     for (int i = 0; i < field->count; i++) {
         char *end;
         double wanted = strncmp(value, "true", 4) == 0 ? 1 : strtod(value, &end), got;
@@ -106,6 +110,54 @@ static void refused(void **unused) {
     assert_int_equal(task_def_check(&def, &error), MILD_OK);
 }
 
+/* The robot's gains; one for all; one leg's for both; a joint's each. */
+static void gains(void **unused) {
+    (void)unused;
+    static const struct {
+        const char *text;
+        double first, knee, right_knee, last;
+    } cases[] = {{"robot", 50, 70, 70, 20},
+                 {"30", 30, 30, 30, 30},
+                 {"1 2 3 4 5 6", 1, 4, 4, 6},
+                 {"1,2,3, 4 5 6 7 8 9 10 11 12.5", 1, 4, 10, 12.5}};
+    for (int i = 0; i < 4; i++) {
+        TaskDef def = task_def_default();
+        double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
+        strcpy(def.kp, cases[i].text);
+        assert_int_equal(task_def_check_robot(&def, robot, NULL), MILD_OK);
+        assert_int_equal(task_gains(&def, robot, kp, kd, NULL), MILD_OK);
+        expect_entry("first", i, kp[0], cases[i].first, 0);
+        expect_entry("knee", i, kp[KNEE], cases[i].knee, 0);
+        expect_entry("right knee", i, kp[LEG_JOINTS + KNEE], cases[i].right_knee, 0);
+        expect_entry("last", i, kp[11], cases[i].last, 0);
+        expect_entry("kd", i, kd[ANKLE_PITCH], 0.2, 0);
+    }
+    static const char *const wrong[] = {"", "robots", "1 2 3 4 5", "501", "-1", "1 2 x"};
+    for (int i = 0; i < 6; i++) {
+        TaskDef def = task_def_default();
+        MildError error = {0};
+        strcpy(def.kp, wrong[i]);
+        assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE);
+        assert_non_null(strstr(error.text, "task.kp"));
+        def = task_def_default();
+        strcpy(def.kd, wrong[i]);
+        assert_int_equal(task_def_check_robot(&def, robot, &error), MILD_ERROR_RANGE);
+        assert_non_null(strstr(error.text, "task.kd"));
+    }
+}
+
+/* 0 takes the robot's; another number is the task's. */
+static void robot_or_task(void **unused) {
+    (void)unused;
+    TaskDef def = task_def_default();
+    expect_near("action scale", task_action_scale(&def, robot), 0.5, 0);
+    expect_near("height", task_nominal_height(&def, robot), 0.83, 0);
+    def.action_scale = 0.25;
+    def.reward.nominal_height = 0.7;
+    expect_near("action scale", task_action_scale(&def, robot), 0.25, 0);
+    expect_near("height", task_nominal_height(&def, robot), 0.7, 0);
+}
+
 /* Half, a quarter, a tenth and a twentieth of the policy step fit; nothing between. */
 static void physics_steps(void **unused) {
     (void)unused;
@@ -123,9 +175,9 @@ static void physics_steps(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(defaults),
-        cmocka_unit_test(refused),
-        cmocka_unit_test(physics_steps),
+        cmocka_unit_test(defaults),      cmocka_unit_test(refused),
+        cmocka_unit_test(physics_steps), cmocka_unit_test(gains),
+        cmocka_unit_test(robot_or_task),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

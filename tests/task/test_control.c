@@ -1,6 +1,7 @@
 /* From the policy's action to the joints' torque, and back to what it reads: clip, scale, gains,
  * strength, offsets, limits, the three latencies, the command's delay, the clock, the helping hand.
  */
+#include "sa01.h"
 #include "task_oracle.h"
 
 #define STEPS_MAX 20
@@ -10,9 +11,9 @@ static Rig rig;
 /* What each physics step of a policy period saw. Entry 0 is the state before the first one. */
 typedef struct {
     int count;
-    double q[STEPS_MAX + 1][ROBOT_JOINTS], qd[STEPS_MAX + 1][ROBOT_JOINTS];
+    double q[STEPS_MAX + 1][SA01_JOINTS], qd[STEPS_MAX + 1][SA01_JOINTS];
     double omega[STEPS_MAX + 1][3], gravity[STEPS_MAX + 1][3];
-    double torque[STEPS_MAX + 1][ROBOT_JOINTS]; /* entry k: applied from k - 1 to k */
+    double torque[STEPS_MAX + 1][SA01_JOINTS]; /* entry k: applied from k - 1 to k */
     double velocity[STEPS_MAX + 1][6];
 } Trace;
 
@@ -79,8 +80,8 @@ static void torque(void **unused) {
     for (uint32_t draw = 0; draw < 10; draw++) {
         RobotState state = kit_moving_state(2, draw);
         put(&state);
-        float action[TASK_ACTIONS];
-        for (int i = 0; i < TASK_ACTIONS; i++) {
+        float action[SA01_JOINTS];
+        for (int i = 0; i < SA01_JOINTS; i++) {
             rig.env->kp_scale[i] = 0.9 + 0.01 * i;
             rig.env->kd_scale[i] = 1.1 - 0.01 * i;
             rig.env->strength[i] = 1 + 0.005 * i;
@@ -90,7 +91,7 @@ static void torque(void **unused) {
         traced_step(action);
         assert_int_equal(trace.count, 4);
         for (int k = 1; k <= 4; k++) {
-            for (int i = 0; i < ROBOT_JOINTS; i++) {
+            for (int i = 0; i < SA01_JOINTS; i++) {
                 double wanted =
                     wanted_torque(i, robot_default_pose(robot), (double)action[i], k - 1);
                 expect_entry("torque", i, trace.torque[k][i], wanted, 1e-9);
@@ -106,9 +107,9 @@ static void torque(void **unused) {
 static void action_is_clipped(void **unused) {
     (void)unused;
     open_with_dt(0.0025);
-    float action[TASK_ACTIONS] = {9, -9, NAN, 7.5f, -7.5f, INFINITY};
+    float action[SA01_JOINTS] = {9, -9, NAN, 7.5f, -7.5f, INFINITY};
     const float wanted[6] = {8, -8, -8, 7.5f, -7.5f, 8};
-    float first[TASK_ACTIONS] = {0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, -0.5f};
+    float first[SA01_JOINTS] = {0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, -0.5f};
     rig_step(&rig, first);
     TaskStep step = rig_step(&rig, action);
     assert_true(step.valid && isfinite(step.reward));
@@ -129,8 +130,8 @@ static void action_is_clipped(void **unused) {
 /* The new action acts from physics step `lag` on, before it the previous one. */
 static void command_latency(double dt, int steps) {
     open_with_dt(dt);
-    float before[TASK_ACTIONS], now[TASK_ACTIONS];
-    for (int i = 0; i < TASK_ACTIONS; i++) {
+    float before[SA01_JOINTS], now[SA01_JOINTS];
+    for (int i = 0; i < SA01_JOINTS; i++) {
         before[i] = 0.5f;
         now[i] = -0.25f;
     }
@@ -143,7 +144,7 @@ static void command_latency(double dt, int steps) {
         assert_int_equal(trace.count, steps);
         for (int k = 0; k < steps; k++) {
             double action = k < lag ? 0.5 : -0.25;
-            for (int i = 0; i < ROBOT_JOINTS; i++) {
+            for (int i = 0; i < SA01_JOINTS; i++) {
                 expect_entry("torque under a late action", i, trace.torque[k + 1][i],
                              wanted_torque(i, robot_default_pose(robot), action, k), 1e-9);
             }
@@ -161,7 +162,7 @@ static void expect_imu(const char *what, int k) {
 
 static void expect_motors(const char *what, int k) {
     const double *pose = robot_default_pose(robot);
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         expect_entry(what, 9 + i, (double)rig.frame[9 + i], trace.q[k][i] - pose[i], 2e-7);
         expect_entry(what, 21 + i, (double)rig.frame[21 + i], 0.05 * trace.qd[k][i], 2e-6);
     }
@@ -170,7 +171,7 @@ static void expect_motors(const char *what, int k) {
 /* Readings are of so many physics steps before the period's end; each sensor has its own. */
 static void reading_latencies(double dt, int steps) {
     open_with_dt(dt);
-    const float action[TASK_ACTIONS] = {1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1};
+    const float action[SA01_JOINTS] = {1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1};
     for (int imu = 0; imu <= steps; imu++) {
         int motor = (2 * imu + 1) % (steps + 1);
         RobotState state = kit_moving_state(2, 21);
@@ -279,10 +280,10 @@ static void reward_sees_the_torque(void **unused) {
     open_with_dt(0.0025);
     RobotState state = kit_moving_state(2, 5);
     put(&state);
-    const float action[TASK_ACTIONS] = {1, 1, 1, 1, 1, 1};
+    const float action[SA01_JOINTS] = {1, 1, 1, 1, 1, 1};
     traced_step(action);
     double sum = 0, speed = 0;
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         sum += trace.torque[4][i] * trace.torque[4][i];
         speed += trace.qd[4][i] * trace.qd[4][i];
     }

@@ -1,4 +1,5 @@
 /* Gait clock, schedule, wanted height and reference motion, by hand (docs/task.md section 7). */
+#include "sa01.h"
 #include "task_kit.h"
 
 static void standing_commands(void **unused) {
@@ -20,13 +21,13 @@ static void schedule(void **unused) {
     (void)unused;
     const double first[] = {0, 0.01, 0.25, 0.4999}, second[] = {0.5, 0.51, 0.75, 0.9999};
     for (int i = 0; i < 4; i++) {
-        assert_true(task_gait_stance(first[i], 0, ROBOT_FOOT_LEFT));
-        assert_false(task_gait_stance(first[i], 0, ROBOT_FOOT_RIGHT));
-        assert_false(task_gait_stance(second[i], 0, ROBOT_FOOT_LEFT));
-        assert_true(task_gait_stance(second[i], 0, ROBOT_FOOT_RIGHT));
-        for (int foot = 0; foot < ROBOT_FEET; foot++) {
-            assert_true(task_gait_stance(first[i], 1, foot));
-            assert_true(task_gait_stance(second[i], 1, foot));
+        assert_true(task_gait_stance(robot, first[i], 0, SA01_LEFT));
+        assert_false(task_gait_stance(robot, first[i], 0, SA01_RIGHT));
+        assert_false(task_gait_stance(robot, second[i], 0, SA01_LEFT));
+        assert_true(task_gait_stance(robot, second[i], 0, SA01_RIGHT));
+        for (int foot = 0; foot < SA01_FEET; foot++) {
+            assert_true(task_gait_stance(robot, first[i], 1, foot));
+            assert_true(task_gait_stance(robot, second[i], 1, foot));
         }
     }
 }
@@ -39,28 +40,26 @@ static void wanted_height(void **unused) {
                  wanted[] = {0.0309016994, 0.0587785252, 0.1, 0.0309016994};
     for (int i = 0; i < 4; i++) {
         double phase = 0.5 * s[i];
-        expect_entry("right", i, task_gait_height(&def, phase, 0, ROBOT_FOOT_RIGHT), wanted[i],
+        expect_entry("right", i, task_gait_height(&def, robot, phase, 0, SA01_RIGHT), wanted[i],
                      1e-9);
-        expect_entry("left", i, task_gait_height(&def, phase + 0.5, 0, ROBOT_FOOT_LEFT), wanted[i],
+        expect_entry("left", i, task_gait_height(&def, robot, phase + 0.5, 0, SA01_LEFT), wanted[i],
                      1e-9);
-        expect_entry("left in stance", i, task_gait_height(&def, phase, 0, ROBOT_FOOT_LEFT), 0, 0);
-        expect_entry("right in stance", i, task_gait_height(&def, phase + 0.5, 0, ROBOT_FOOT_RIGHT),
-                     0, 0);
-        expect_entry("standing", i, task_gait_height(&def, phase, 1, ROBOT_FOOT_RIGHT), 0, 0);
+        expect_entry("left in stance", i, task_gait_height(&def, robot, phase, 0, SA01_LEFT), 0, 0);
+        expect_entry("right in stance", i,
+                     task_gait_height(&def, robot, phase + 0.5, 0, SA01_RIGHT), 0, 0);
+        expect_entry("standing", i, task_gait_height(&def, robot, phase, 1, SA01_RIGHT), 0, 0);
     }
-    expect_near("lift-off", task_gait_height(&def, 0, 0, ROBOT_FOOT_RIGHT), 0, 0);
+    expect_near("lift-off", task_gait_height(&def, robot, 0, 0, SA01_RIGHT), 0, 0);
     def.swing_apex = 0.06;
-    expect_near("apex", task_gait_height(&def, 0.25, 0, ROBOT_FOOT_RIGHT), 0.06, 1e-12);
+    expect_near("apex", task_gait_height(&def, robot, 0.25, 0, SA01_RIGHT), 0.06, 1e-12);
 }
 
 /* Which joints bend, by how much; all others keep the pose. */
 static void expect_reference(const TaskDef *def, double phase, int standing, int leg, double bend) {
-    double pose[ROBOT_JOINTS], q[ROBOT_JOINTS];
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        pose[i] = 0.01 * (i + 1);
-    }
-    task_gait_reference(def, pose, phase, standing, q);
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    const double *pose = robot_default_pose(robot);
+    double q[SA01_JOINTS];
+    task_gait_reference(def, robot, phase, standing, q);
+    for (int i = 0; i < SA01_JOINTS; i++) {
         int joint = i % LEG_JOINTS;
         double turn = i / LEG_JOINTS != leg                        ? 0
                       : joint == KNEE                              ? 2 * bend

@@ -1,5 +1,6 @@
 /* What acts on the base from outside: pushes (schedule, size, fading) and the helping hand (wrench,
  * led pose, level). */
+#include "sa01.h"
 #include "task_oracle.h"
 
 static Rig rig;
@@ -238,8 +239,8 @@ static void hand_acts_in_the_step(void **unused) {
         rig_step(&rig, NULL);
         const mjModel *m = robot_sim_model(rig.sim);
         mjData *d = mj_makeData(m);
-        memcpy(d->qpos, robot_sim_qpos(rig.sim), sizeof(double) * ROBOT_NQ);
-        memcpy(d->qvel, robot_sim_qvel(rig.sim), sizeof(double) * ROBOT_NV);
+        memcpy(d->qpos, robot_sim_qpos(rig.sim), sizeof(double) * SA01_NQ);
+        memcpy(d->qvel, robot_sim_qvel(rig.sim), sizeof(double) * SA01_NV);
         mj_fwdPosition(m, d);
         mj_fwdVelocity(m, d);
         mj_subtreeVel(m, d);
@@ -254,11 +255,11 @@ static void led_pose(void **unused) {
     (void)unused;
     open_in_the_air(0);
     const double *rest = robot_default_pose(robot);
-    double pose[ROBOT_JOINTS];
+    double pose[SA01_JOINTS];
     help(0.5, 0.8);
     rig.env->phase = 0.25; /* right leg bent by 0.4, 0.8, 0.4 */
     task_assist_pose(rig.env, &rig.def, robot, pose);
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         double turn = i == 8 || i == 10 ? -0.208 : i == 9 ? 0.416 : 0;
         expect_entry("led pose", i, pose[i], rest[i] + turn, 1e-12);
     }
@@ -276,7 +277,7 @@ static void led_pose(void **unused) {
 static void torque_follows_the_led_pose(void **unused) {
     (void)unused;
     open_in_the_air(0);
-    rig.def.kp[KNEE] = 10;
+    rig.env->kp[KNEE] = rig.env->kp[LEG_JOINTS + KNEE] = 10;
     rig.env->phase = 0.25;
     help(1, 0.5);
     RobotState before = rig.env->robot;

@@ -1,5 +1,6 @@
 /* Every entry of the observation, the estimates and the critic's input at states in motion, one by
  * one, against the engine's own functions or a hand's; noise; history; mirror. */
+#include "sa01.h"
 #include "task_oracle.h"
 
 #define TOLERANCE 2e-6 /* [-] of a float of about 10 */
@@ -14,7 +15,7 @@ static TaskReading other_reading(void) {
         reading.omega[i] = 0.5 + i;
         reading.gravity[i] = 0.1 - 0.3 * i;
     }
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         reading.q[i] = 0.03 * i - 0.2;
         reading.qd[i] = 2 - 0.5 * i;
     }
@@ -27,7 +28,7 @@ static void fill_env(TaskEnv *env) {
     memcpy(env->command, command, sizeof command);
     memcpy(env->command_seen, seen, sizeof seen);
     env->phase = 0.3;
-    for (int i = 0; i < TASK_ACTIONS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         env->action[0][i] = 0.25f * (float)(i - 5);
         env->action[1][i] = 9;
     }
@@ -41,7 +42,7 @@ static void fill_env(TaskEnv *env) {
         env->variation.com_offset[i] = 0.002 * (i + 1);
         env->smooth_velocity[i] = 0.4 - 0.3 * i;
     }
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         env->strength[i] = 0.93;
     }
     env->lag_command = 1;
@@ -75,7 +76,7 @@ static void expect_frame(const char *what, const float *frame, const double omeg
                      TOLERANCE);
         expect_entry(what, 6 + i, (double)frame[6 + i], gravity[i], TOLERANCE);
     }
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         expect_entry(what, 9 + i, (double)frame[9 + i], q[i] - pose[i], TOLERANCE);
         expect_entry(what, 21 + i, (double)frame[21 + i], qd[i] / 20, TOLERANCE);
         expect_entry(what, 33 + i, (double)frame[33 + i], 0.25 * (i - 5), 0);
@@ -154,15 +155,15 @@ static void estimates(void **unused) {
     for (uint32_t draw = 0; draw < 10; draw++) {
         Oracle o = place(draw);
         look(&reading);
-        double wanted[TASK_ESTIMATES];
+        double wanted[SA01_ESTIMATES];
         for (int i = 0; i < 3; i++) {
             wanted[i] = 4 * o.velocity[i];
         }
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        for (int f = 0; f < SA01_FEET; f++) {
             oracle_to_base(&o, o.sole_velocity[f], wanted + 3 + 3 * f);
             wanted[9 + f] = 10 * (o.sole_lowest[f] - 0.05);
         }
-        for (int i = 0; i < TASK_ESTIMATES; i++) {
+        for (int i = 0; i < SA01_ESTIMATES; i++) {
             expect_entry("estimate", i, (double)rig.estimate[i], wanted[i], 5 * TOLERANCE);
             expect_entry("critic's estimate", i, (double)rig.critic[47 + i], wanted[i],
                          5 * TOLERANCE);
@@ -180,13 +181,13 @@ static void feet_of_the_critic(void **unused) {
     for (uint32_t draw = 0; draw < 10; draw++) {
         Oracle o = place(draw);
         fill_env(rig.env);
-        const double force[ROBOT_FEET][3] = {{60, -90, 240}, {30, 15, -60}};
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        const double force[SA01_FEET][3] = {{60, -90, 240}, {30, 15, -60}};
+        for (int f = 0; f < SA01_FEET; f++) {
             RobotFoot *foot = oracle_set_force(rig.sim, f, force[f][0], force[f][1], force[f][2]);
             foot->result.depth_mean = 0.03 + 0.01 * f;
         }
         look(&reading);
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        for (int f = 0; f < SA01_FEET; f++) {
             double base[3];
             const float *seen = rig.critic + 58 + 6 * f;
             oracle_to_base(&o, force[f], base);
@@ -214,7 +215,7 @@ static void limits_of_the_critic(void **unused) {
     look(&reading);
     const double wanted[2][5] = {{5, -5, 4.99 / 300, 0, 0},
                                  {14.9 / 3, -14.9 / 3, 5.01 / 300, 1, 1}};
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < SA01_FEET; f++) {
         for (int i = 0; i < 5; i++) {
             expect_entry("foot", 5 * f + i, (double)rig.critic[58 + 6 * f + i], wanted[f][i],
                          TOLERANCE);
@@ -315,7 +316,7 @@ static void contact_reaches_the_critic(void **unused) {
     }
     Oracle o = oracle_of(rig.sim);
     const MildContactResult *contact = robot_sim_contact(rig.sim);
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < SA01_FEET; f++) {
         double base[3];
         oracle_to_base(&o, contact->foot[f].force, base);
         assert_true(base[2] > 50);
@@ -347,16 +348,16 @@ static void noise(void **unused) {
     place(13);
     fill_env(rig.env);
     look(&reading);
-    float quiet[TASK_OBSERVATION];
+    float quiet[SA01_OBSERVATION];
     memcpy(quiet, rig.frame, sizeof quiet);
     rig.def.observe_noise = 1;
-    static double low[TASK_OBSERVATION], high[TASK_OBSERVATION], sum[TASK_OBSERVATION],
-        square[TASK_OBSERVATION], product[TASK_OBSERVATION][TASK_OBSERVATION];
+    static double low[SA01_OBSERVATION], high[SA01_OBSERVATION], sum[SA01_OBSERVATION],
+        square[SA01_OBSERVATION], product[SA01_OBSERVATION][SA01_OBSERVATION];
     TaskView view = {.frame = rig.frame};
     for (int t = 0; t < DRAWS; t++) {
         rig.env->tick = (uint32_t)t;
         task_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &view);
-        for (int i = 0; i < TASK_OBSERVATION; i++) {
+        for (int i = 0; i < SA01_OBSERVATION; i++) {
             double x = (double)(rig.frame[i] - quiet[i]);
             low[i] = fmin(low[i], x);
             high[i] = fmax(high[i], x);
@@ -368,7 +369,7 @@ static void noise(void **unused) {
         }
     }
     double worst = 0;
-    for (int i = 0; i < TASK_OBSERVATION; i++) {
+    for (int i = 0; i < SA01_OBSERVATION; i++) {
         double a = noise_limit(i), sigma = a / sqrt(3);
         expect_entry("lowest noise", i, low[i], -a, 0.002 * a + 1e-12);
         expect_entry("greatest noise", i, high[i], a, 0.002 * a + 1e-12);
@@ -399,7 +400,7 @@ static void noise_is_a_stream(void **unused) {
     TaskReading reading = other_reading();
     rig.def.observe_noise = 1;
     look(&reading);
-    float first[TASK_OBSERVATION];
+    float first[SA01_OBSERVATION];
     memcpy(first, rig.frame, sizeof first);
     look(&reading);
     assert_memory_equal(first, rig.frame, sizeof first);
@@ -428,8 +429,8 @@ static void expect_history(int stride, int frames) {
             mean += fmax(frames - 1 - (oldest - k), 0) / stride;
         }
         mean = oldest > 0 ? mean : frames - 1;
-        expect_entry("history", i, (double)rig.history[i * TASK_OBSERVATION], mean, 1e-4);
-        expect_entry("history's last entry", i, (double)rig.history[(i + 1) * TASK_OBSERVATION - 1],
+        expect_entry("history", i, (double)rig.history[i * SA01_OBSERVATION], mean, 1e-4);
+        expect_entry("history's last entry", i, (double)rig.history[(i + 1) * SA01_OBSERVATION - 1],
                      (double)rig.frame[46], 1e-6);
     }
 }
@@ -447,11 +448,11 @@ static void history(void **unused) {
             task_observe(rig.env, &rig.def, robot, rig.sim, &reading, t == 0, &rig.view);
             expect_history(strides[s], t + 1);
         }
-        assert_memory_equal(rig.history, rig.env->history, sizeof rig.history);
+        assert_memory_equal(rig.history, task_env_history(rig.env), sizeof rig.history);
         reading.omega[0] = -5; /* the next episode knows nothing of this one */
         task_observe(rig.env, &rig.def, robot, rig.sim, &reading, 1, &rig.view);
         for (int i = 0; i < TASK_FRAMES; i++) {
-            expect_entry("new history", i, (double)rig.history[i * TASK_OBSERVATION], -5, 1e-5);
+            expect_entry("new history", i, (double)rig.history[i * SA01_OBSERVATION], -5, 1e-5);
         }
         rig_close(&rig);
     }
@@ -464,7 +465,7 @@ static void views(void **unused) {
     TaskReading reading = other_reading();
     const TaskView none = {0};
     task_observe(rig.env, &rig.def, robot, rig.sim, &reading, 0, &none);
-    assert_true(rig.env->history[TASK_HISTORY - TASK_OBSERVATION] == 0.5f);
+    assert_true(task_env_history(rig.env)[SA01_HISTORY - SA01_OBSERVATION] == 0.5f);
     rig_close(&rig);
 }
 
@@ -480,8 +481,8 @@ static RobotState mirrored(const RobotState *state) {
     image.qvel[1] *= -1;
     image.qvel[3] *= -1;
     image.qvel[5] *= -1;
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
-        int other = (i + LEG_JOINTS) % ROBOT_JOINTS;
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        int other = (i + LEG_JOINTS) % SA01_JOINTS;
         image.qpos[7 + i] = sign[i % LEG_JOINTS] * state->qpos[7 + other];
         image.qvel[6 + i] = sign[i % LEG_JOINTS] * state->qvel[6 + other];
     }
@@ -502,32 +503,31 @@ static void look_at(const RobotState *state, const double command[3], double pha
 }
 
 /* The frame of the mirrored robot is the mirrored frame. */
-static void mirror(void **unused) {
+static void mirror_image(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
     const int sign[LEG_JOINTS] = {-1, -1, 1, 1, 1, -1};
     double worst = 0;
     for (uint32_t draw = 0; draw < 10; draw++) {
         RobotState state = kit_moving_state(1, draw), image = mirrored(&state);
-        float action[TASK_ACTIONS], other[TASK_ACTIONS], first[TASK_OBSERVATION];
-        for (int i = 0; i < TASK_ACTIONS; i++) {
+        float action[SA01_JOINTS], other[SA01_JOINTS], first[SA01_OBSERVATION];
+        for (int i = 0; i < SA01_JOINTS; i++) {
             action[i] = 0.3f * (float)(i - 4);
         }
-        for (int i = 0; i < TASK_ACTIONS; i++) {
-            other[i] = (float)sign[i % LEG_JOINTS] * action[(i + LEG_JOINTS) % TASK_ACTIONS];
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            other[i] = (float)sign[i % LEG_JOINTS] * action[(i + LEG_JOINTS) % SA01_JOINTS];
         }
         const double command[3] = {0.6, 0.2, -0.8}, turned[3] = {0.6, -0.2, 0.8};
         look_at(&state, command, 0.2, action);
         memcpy(first, rig.frame, sizeof first);
         look_at(&image, turned, 0.7, other);
-        for (int i = 0; i < TASK_OBSERVATION; i++) {
-            float wanted =
-                task_mirror_observation_sign[i] * first[task_mirror_observation_index[i]];
+        for (int i = 0; i < SA01_OBSERVATION; i++) {
+            float wanted = mirror.observation_sign[i] * first[mirror.observation_index[i]];
             expect_entry("mirrored frame", i, (double)rig.frame[i], (double)wanted, TOLERANCE);
             worst = fmax(worst, (double)fabsf(rig.frame[i] - wanted));
         }
-        for (int i = 0; i < TASK_ACTIONS; i++) {
-            float wanted = task_mirror_action_sign[i] * action[task_mirror_action_index[i]];
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            float wanted = mirror.action_sign[i] * action[mirror.action_index[i]];
             expect_entry("mirrored action", i, (double)other[i], (double)wanted, 0);
         }
     }
@@ -546,7 +546,7 @@ int main(void) {
         cmocka_unit_test(episode_of_the_critic),
         cmocka_unit_test(concentric_ground),
         cmocka_unit_test(contact_reaches_the_critic),
-        cmocka_unit_test(mirror),
+        cmocka_unit_test(mirror_image),
         cmocka_unit_test(views),
         cmocka_unit_test(history),
         cmocka_unit_test(noise_is_a_stream),

@@ -1,6 +1,7 @@
 /* What is drawn per episode: every quantity's range, mean, variance and independence of the others
  * over 10^4 episodes, shares within their binomial bounds; the sinkage limit; model matching; the
  * start; commands. */
+#include "sa01.h"
 #include "task_oracle.h"
 
 enum { DRAWS = 10000, COLUMNS_MAX = 160 };
@@ -132,10 +133,10 @@ static void robot_and_sensors(void **unused) {
         for (int i = 0; i < 3; i++) {
             note("com_offset", i, -0.006, 0.006, v->com_offset[i]);
         }
-        for (int i = 0; i <= ROBOT_JOINTS; i++) {
+        for (int i = 0; i <= SA01_JOINTS; i++) {
             note("link_mass", i, 0.9, 1.1, v->link_mass_scale[i]);
         }
-        for (int i = 0; i < ROBOT_JOINTS; i++) {
+        for (int i = 0; i < SA01_JOINTS; i++) {
             note("kp_scale", i, 0.9, 1.1, env->kp_scale[i]);
             note("kd_scale", i, 0.9, 1.1, env->kd_scale[i]);
             note("motor_offset", i, -0.035, 0.035, env->motor_offset[i]);
@@ -193,7 +194,7 @@ static void nominal(void **unused) {
         }
         assert_memory_equal(v->link_mass_scale, still.link_mass_scale,
                             sizeof still.link_mass_scale);
-        for (int i = 0; i < ROBOT_JOINTS; i++) {
+        for (int i = 0; i < SA01_JOINTS; i++) {
             assert_true(env->kp_scale[i] == 1 && env->kd_scale[i] == 1 && env->strength[i] == 1);
             assert_true(env->motor_offset[i] == 0);
         }
@@ -347,7 +348,7 @@ static void limit_of_sinkage(void **unused) {
     open_env();
     def.randomize.rigid_share = def.randomize.preset_share = def.randomize.patch_share = 0;
     const MildSole *sole = robot_rasters(robot)[0];
-    double weight = 2 * robot_half_weight(robot), deepest = 0;
+    double weight = 2 * robot_foot_load(robot), deepest = 0;
     int stiffened = 0, draws = 1000;
     for (int t = 0; t < draws; t++) {
         def.randomize.sinkage_max = 1;
@@ -414,7 +415,7 @@ static void models_are_matched(void **unused) {
     (void)unused;
     open_env();
     def.randomize.rigid_share = def.randomize.patch_share = 0;
-    double load = robot_half_weight(robot), worst = 0;
+    double load = robot_foot_load(robot), worst = 0;
     for (int model = 0; model < MILD_MODELS; model++) {
         for (int t = 0; t < 20; t++) {
             env->tick = (uint32_t)(1000 + t);
@@ -531,7 +532,7 @@ static void start(void **unused) {
         const RobotState *s = &rig.env->robot;
         note("yaw", -1, -KIT_PI, KIT_PI, 2 * atan2(s->qpos[6], s->qpos[3]));
         assert_true(s->qpos[0] == 0 && s->qpos[1] == 0 && s->qpos[4] == 0 && s->qpos[5] == 0);
-        for (int i = 0; i < ROBOT_JOINTS; i++) {
+        for (int i = 0; i < SA01_JOINTS; i++) {
             note("joint", i, -0.05, 0.05, s->qpos[7 + i] - pose[i]);
             assert_true(s->qvel[6 + i] == 0);
         }
@@ -542,7 +543,7 @@ static void start(void **unused) {
         const MildMaterial *m = &rig.env->terrain.materials[0];
         double depth = rig.env->variation.rigid
                            ? 0
-                           : mild_sole_sinkage(robot_soles(robot)[0], m, robot_half_weight(robot));
+                           : mild_sole_sinkage(robot_soles(robot)[0], m, robot_foot_load(robot));
         expect_near("height", s->qpos[2], 0.8369 - depth + 0.002, 1e-4);
         assert_true(rig.env->phase == 0 || rig.env->phase == 0.5);
         half += rig.env->phase == 0.5;
@@ -567,7 +568,7 @@ static void nothing_is_left(void **unused) {
     TaskDef start_def = task_def_default();
     rig_open(&rig, &start_def, 11, 0);
     task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
-    const float action[TASK_ACTIONS] = {1, 2, 3};
+    const float action[SA01_JOINTS] = {1, 2, 3};
     for (int t = 0; t < 5; t++) {
         rig_step(&rig, action);
         rig.env->push[t] = rig.env->air_time[0] = rig.env->air_time[1] = 0.3;
@@ -580,11 +581,11 @@ static void nothing_is_left(void **unused) {
     for (int i = 0; i < 3; i++) {
         expect_entry("smooth", i, rig.env->smooth_velocity[i], 0, 0);
         expect_entry("command_seen", i, rig.env->command_seen[i], rig.env->command[i], 0);
-        for (int k = 0; k < TASK_ACTIONS; k++) {
+        for (int k = 0; k < SA01_JOINTS; k++) {
             expect_entry("action", k, (double)rig.env->action[i][k], 0, 0);
         }
     }
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         expect_entry("joint_speed", i, rig.env->joint_speed[i], 0, 0);
     }
     for (int i = 0; i < TASK_REWARD_COUNT; i++) {
@@ -595,7 +596,7 @@ static void nothing_is_left(void **unused) {
     expect_near("speed_error_sum", rig.env->speed_error_sum, 0, 0);
     expect_near("the level of help lives on", rig.env->assist_level, 0.7, 0);
     MildGround *fresh = aligned_alloc(64, mild_ground_size(task_env_ground(rig.env)));
-    mild_ground_init_prints(fresh, robot_soles(robot), ROBOT_FEET, 0);
+    mild_ground_init_prints(fresh, robot_soles(robot), SA01_FEET, 0);
     assert_memory_equal(fresh, task_env_ground(rig.env), mild_ground_size(fresh));
     free(fresh);
     rig_close(&rig);

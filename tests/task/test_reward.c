@@ -1,5 +1,6 @@
 /* Every reward term against numbers worked out by hand from docs/task.md section 8, weights
  * included, at a good and at bad motions; their sum and its clip. */
+#include "sa01.h"
 #include "task_kit.h"
 
 /* Left foot stands, right foot is in the middle of its swing (phase 1/4), default pose, upright, at
@@ -19,8 +20,9 @@ static TaskMotion *new_scene(void) {
     TaskMotion *m = &scene.motion;
     m->def = &scene.def;
     m->env = &scene.env;
-    m->pose = robot_default_pose(robot);
-    memcpy(m->q, m->pose, sizeof m->q);
+    m->robot = robot;
+    memcpy(m->q, robot_default_pose(robot), SA01_JOINTS * sizeof *m->q);
+    scene.env.shape = task_shape(robot);
     m->gravity[2] = -1;
     m->base_height = 0.83;
     m->foot_distance = m->knee_distance = 0.2;
@@ -167,7 +169,7 @@ static void action_smoothness(void **unused) {
     }
     expect_term(REWARD_action_smoothness, "one joint", -0.0009375);
     for (int age = 0; age < 3; age++) {
-        scene.env.action[age][TASK_ACTIONS - 1] = last[age];
+        scene.env.action[age][SA01_JOINTS - 1] = last[age];
     }
     expect_term(REWARD_action_smoothness, "two joints", -0.006421875);
 }

@@ -1,6 +1,7 @@
 /* The task as a whole: determinism over thread counts, mirrored motion, ground models. */
 #include "task_kit.h"
 
+#include "sa01.h"
 #include "task/vec.h"
 
 enum { ENVS = 24, STEPS = 200 };
@@ -8,8 +9,8 @@ enum { ENVS = 24, STEPS = 200 };
 static void random_actions(float *action, int envs, int t, double size) {
     for (int e = 0; e < envs; e++) {
         Random r = random_at(99, (uint32_t)e, (uint32_t)t);
-        for (int i = 0; i < TASK_ACTIONS; i++) {
-            action[e * TASK_ACTIONS + i] = (float)(size * random_normal(&r));
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            action[e * SA01_JOINTS + i] = (float)(size * random_normal(&r));
         }
     }
 }
@@ -22,9 +23,9 @@ static uint64_t rollout(int threads, int envs, int steps, MildModel model, VecSt
     MildError error = {0};
     Vec *vec = vec_create(&def, robot, pool, envs, 7, &error);
     assert_non_null(vec);
-    float *history = calloc((size_t)envs * TASK_HISTORY, sizeof *history);
-    float *critic = calloc((size_t)envs * TASK_CRITIC, sizeof *critic);
-    float *action = calloc((size_t)envs * TASK_ACTIONS, sizeof *action),
+    float *history = calloc((size_t)envs * SA01_HISTORY, sizeof *history);
+    float *critic = calloc((size_t)envs * SA01_CRITIC, sizeof *critic);
+    float *action = calloc((size_t)envs * SA01_JOINTS, sizeof *action),
           *reward = calloc((size_t)envs, sizeof *reward);
     uint8_t *flags = calloc((size_t)envs, 3);
     VecView view = {history, critic, NULL, NULL};
@@ -34,10 +35,10 @@ static uint64_t rollout(int threads, int envs, int steps, MildModel model, VecSt
         vec_step(vec, action, reward, flags, flags + envs, flags + 2 * envs, &view);
     }
     uint64_t hash = vec_hash(vec);
-    for (size_t i = 0; i < (size_t)envs * TASK_HISTORY; i++) {
+    for (size_t i = 0; i < (size_t)envs * SA01_HISTORY; i++) {
         assert_true(isfinite(history[i]));
     }
-    for (size_t i = 0; i < (size_t)envs * TASK_CRITIC; i++) {
+    for (size_t i = 0; i < (size_t)envs * SA01_CRITIC; i++) {
         assert_true(isfinite(critic[i]) && fabsf(critic[i]) < 100);
     }
     *stats = vec_take_stats(vec);
@@ -73,9 +74,8 @@ static void every_ground_model_carries(void **state) {
     for (int model = 0; model < MILD_MODELS; model++) {
         int rigid = model == MILD_MODEL_RIGID;
         TaskDef def = kit_quiet_def();
-        const double kp[6] = {240, 240, 240, 240, 200, 200}, kd[6] = {6, 6, 6, 6, 1, 1};
-        memcpy(def.kp, kp, sizeof kp);
-        memcpy(def.kd, kd, sizeof kd);
+        strcpy(def.kp, "240 240 240 240 200 200");
+        strcpy(def.kd, "6 6 6 6 1 1");
         def.torque_share = 1;
         def.randomize.model = model;
         robot_set_model(robot, (MildModel)model);
@@ -90,17 +90,17 @@ static void every_ground_model_carries(void **state) {
         for (int t = 0; t < 30; t++) {
             TaskStep step = rig_step(&rig, NULL);
             assert_true(step.valid && !step.done);
-            for (int f = 0; f < ROBOT_FEET && t >= 20; f++) {
+            for (int f = 0; f < SA01_FEET && t >= 20; f++) {
                 load += robot_sim_foot(rig.sim, f)->force[2] / 10;
-                depth -= robot_sim_foot(rig.sim, f)->sole_center[2] / (10 * ROBOT_FEET);
+                depth -= robot_sim_foot(rig.sim, f)->sole_center[2] / (10 * SA01_FEET);
             }
         }
         double rest =
-            rigid ? 0 : mild_sole_sinkage(robot_soles(robot)[0], m, robot_half_weight(robot));
+            rigid ? 0 : mild_sole_sinkage(robot_soles(robot)[0], m, robot_foot_load(robot));
         printf("%-12s load %.2f of the weight, soles %.1f mm deep, at rest %.1f mm\n",
-               mild_model_names[model], load / (2 * robot_half_weight(robot)), 1e3 * depth,
+               mild_model_names[model], load / (2 * robot_foot_load(robot)), 1e3 * depth,
                1e3 * rest);
-        expect_near("load", load / (2 * robot_half_weight(robot)), 1, 0.2);
+        expect_near("load", load / (2 * robot_foot_load(robot)), 1, 0.2);
         expect_near("depth", depth, rest, 0.010); /* landing leaves the plastic ones deeper */
         rig_close(&rig);
     }
@@ -109,15 +109,15 @@ static void every_ground_model_carries(void **state) {
 
 static void mirror_is_an_involution(void **state) {
     (void)state;
-    for (int i = 0; i < TASK_OBSERVATION; i++) {
-        int j = task_mirror_observation_index[i];
-        assert_int_equal(task_mirror_observation_index[j], i);
-        assert_true(task_mirror_observation_sign[i] * task_mirror_observation_sign[j] == 1);
+    for (int i = 0; i < SA01_OBSERVATION; i++) {
+        int j = mirror.observation_index[i];
+        assert_int_equal(mirror.observation_index[j], i);
+        assert_true(mirror.observation_sign[i] * mirror.observation_sign[j] == 1);
     }
-    for (int i = 0; i < TASK_ACTIONS; i++) {
-        int j = task_mirror_action_index[i];
-        assert_int_equal(task_mirror_action_index[j], i);
-        assert_true(task_mirror_action_sign[i] * task_mirror_action_sign[j] == 1);
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        int j = mirror.action_index[i];
+        assert_int_equal(mirror.action_index[j], i);
+        assert_true(mirror.action_sign[i] * mirror.action_sign[j] == 1);
     }
 }
 
@@ -132,16 +132,15 @@ static void mirrored_motion_is_the_mirror_image(void **state) {
     b.env->phase = 0.6;
     double worst = 0;
     for (int t = 0; t < 12; t++) {
-        float action[TASK_ACTIONS], mirrored[TASK_ACTIONS];
+        float action[SA01_JOINTS], mirrored[SA01_JOINTS];
         random_actions(action, 1, t, 0.3);
-        for (int i = 0; i < TASK_ACTIONS; i++) {
-            mirrored[i] = task_mirror_action_sign[i] * action[task_mirror_action_index[i]];
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            mirrored[i] = mirror.action_sign[i] * action[mirror.action_index[i]];
         }
         rig_step(&a, action);
         rig_step(&b, mirrored);
-        for (int i = 0; i < TASK_OBSERVATION; i++) {
-            float image =
-                task_mirror_observation_sign[i] * a.frame[task_mirror_observation_index[i]];
+        for (int i = 0; i < SA01_OBSERVATION; i++) {
+            float image = mirror.observation_sign[i] * a.frame[mirror.observation_index[i]];
             worst = fmax(worst, (double)fabsf(image - b.frame[i]));
         }
     }

@@ -1,5 +1,6 @@
 /* What ends an episode, each cause alone and from both sides of its limit, and that nothing else
  * does. The robot falls limp through the air: it then neither turns nor bends. */
+#include "sa01.h"
 #include "task_oracle.h"
 
 static Rig rig;
@@ -213,17 +214,17 @@ static void bad_numbers(void **unused) {
     const double bad[] = {NAN, INFINITY, 2000};
     for (int i = 0; i < 3; i++) {
         rig_open_quiet(&rig, 0.5);
-        const float action[TASK_ACTIONS] = {0};
+        const float action[SA01_JOINTS] = {0};
         rig.env->robot.qvel[8] = bad[i];
         rig.env->step = rig.env->step_limit - 1;
         TaskStep step =
             task_env_step(rig.env, &rig.def, robot, rig.sim, action, 1, &rig.view, NULL);
         assert_true(step.done && !step.valid && !step.timeout && step.reward == 0);
         assert_int_equal(rig.env->step, 0);
-        for (int k = 0; k < TASK_HISTORY; k++) {
+        for (int k = 0; k < SA01_HISTORY; k++) {
             assert_true(isfinite(rig.history[k]));
         }
-        for (int k = 0; k < TASK_CRITIC; k++) {
+        for (int k = 0; k < SA01_CRITIC; k++) {
             assert_true(isfinite(rig.critic[k]));
         }
         step = task_env_step(rig.env, &rig.def, robot, rig.sim, action, 1, &rig.view, NULL);
@@ -248,7 +249,7 @@ static void report_of_an_episode(void **unused) {
     (void)unused;
     rig_open_quiet(&rig, 0.5);
     rig.env->command_frozen = 0;
-    const float action[TASK_ACTIONS] = {0};
+    const float action[SA01_JOINTS] = {0};
     double reward = 0, error = 0, terms[TASK_REWARD_COUNT] = {0}, before[TASK_REWARD_COUNT] = {0};
     rig.env->step_limit = 5;
     for (int t = 1; t <= 5; t++) {

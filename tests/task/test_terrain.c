@@ -12,6 +12,7 @@
 #include <cmocka.h>
 
 #include "base/random.h"
+#include "sa01.h"
 #include "task/vec.h"
 
 enum { ENVS = 12, STEPS = 120, TILES = 64 };
@@ -28,7 +29,7 @@ static int setup(void **state) {
     def.patches = MILD_PATTERN_CHECKER;
     def.border = 0.1;
     map = mild_map_create(&def, &error);
-    robot = map ? robot_create(MILD_SOURCE_DIR "/models/sa01/sa01.xml", &error) : NULL;
+    robot = map ? robot_create(SA01, &error) : NULL;
     if (!robot) {
         fprintf(stderr, "%s\n", error.text);
     }
@@ -63,7 +64,7 @@ static void run_open(Run *run, int threads) {
     *run = (Run){.pool = pool_create(threads)};
     run->vec = vec_create(&def, robot, run->pool, ENVS, 7, &error);
     assert_non_null(run->vec);
-    run->action = calloc(ENVS * TASK_ACTIONS, sizeof *run->action);
+    run->action = calloc(ENVS * SA01_JOINTS, sizeof *run->action);
     run->reward = calloc(ENVS, sizeof *run->reward);
     run->flags = calloc(ENVS, 3);
     VecView none = {0};
@@ -73,7 +74,7 @@ static void run_open(Run *run, int threads) {
 static void run_steps(Run *run, int steps) {
     VecView none = {0};
     for (int t = 0; t < steps; t++, run->step++) {
-        for (int i = 0; i < ENVS * TASK_ACTIONS; i++) {
+        for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
             Random r = random_at(5, (uint32_t)i, (uint32_t)run->step);
             run->action[i] = (float)(0.5 * random_normal(&r));
         }
@@ -182,7 +183,7 @@ static void test_rigid(void **state) {
         terrain.map = map;
         off = fmax(off, fabs(robot_sim_sole_clearance(sim, &terrain) - 0.002));
         for (int s = 0; s < 200; s++) {
-            double torque[ROBOT_JOINTS] = {0};
+            double torque[SA01_JOINTS] = {0};
             assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, task_env_ground(env)), 0);
         }
         double clearance = robot_sim_sole_clearance(sim, &terrain);

@@ -18,9 +18,10 @@
 #include "control/controller.h"
 #include "lab/fit_csv.h"
 #include "mild/map.h"
+#include "sa01.h"
 #include "train/trainer.h"
 
-#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define MODEL SA01
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
 
 enum { LIVE_MAX = 4096 };
@@ -142,9 +143,23 @@ static int attempt_robot(MildError *error) {
     return made;
 }
 
+static Robot *walker;
+
+static int make_walker(void **state) {
+    (void)state;
+    walker = robot_create(MODEL, NULL);
+    return walker == NULL;
+}
+
+static int drop_walker(void **state) {
+    (void)state;
+    robot_destroy(walker);
+    return 0;
+}
+
 static int attempt_controller(MildError *error) {
     Controller controller = {0};
-    int made = controller_learned(POLICY, NULL, 1, &controller, error) == MILD_OK;
+    int made = controller_learned(POLICY, walker, NULL, 1, &controller, error) == MILD_OK;
     controller_destroy(&controller);
     return made;
 }
@@ -214,5 +229,5 @@ static void test_every_allocation_may_fail(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_every_allocation_may_fail)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, make_walker, drop_walker);
 }

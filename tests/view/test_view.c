@@ -11,15 +11,17 @@
 
 #include <cmocka.h>
 
-#include "robot/stand.h"
+#include "control/stand.h"
+#include "sa01.h"
 #include "view/pressure.h"
 #include "view/view.h"
 
-#define MODEL MILD_SOURCE_DIR "/models/sa01/sa01.xml"
+#define MODEL SA01
 #define DT 0.002
 
 static const char *names[] = {"sand_loose"};
 static Robot *robot;
+static Stand *stand;
 static RobotSim *sim;
 static MildTerrain terrain;
 static MildGround *ground;
@@ -34,10 +36,11 @@ static int setup(void **state) {
     if (!robot) {
         fail_msg("%s", error.text);
     }
+    stand = stand_create(robot, &error);
     sim = robot_sim_create(robot, DT, &error);
     assert_non_null(sim);
-    ground = mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), ROBOT_FEET)),
-                              robot_soles(robot), ROBOT_FEET);
+    ground = mild_ground_init(aligned_alloc(64, mild_ground_bytes(robot_soles(robot), SA01_FEET)),
+                              robot_soles(robot), SA01_FEET);
     return 0;
 }
 
@@ -45,27 +48,27 @@ static int teardown(void **state) {
     (void)state;
     free(ground);
     robot_sim_destroy(sim);
+    stand_destroy(stand);
     robot_destroy(robot);
     return 0;
 }
 
 static void load_at(double height) {
     RobotVariation nominal = robot_variation_nominal();
-    RobotState start = robot_stand_state(robot, 1, 0.0);
+    RobotState start = stand_state(stand, 1, 0.0);
     start.qpos[2] += height;
     mild_ground_reset(ground);
     robot_sim_load(sim, &start, &nominal);
 }
 
 static void step(void) {
-    double torque[ROBOT_JOINTS];
-    robot_stand_torque(robot, sim, 1, torque);
+    double torque[SA01_JOINTS];
+    stand_torque(stand, sim, 1, torque);
     assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
 }
 
 static View *small_view(MildError *error) {
     ViewDef def = view_def_default();
-    def.xml = MODEL;
     def.width = 240, def.height = 136;
     def.x_min = -1, def.x_max = 1, def.y_min = -1, def.y_max = 1;
     def.names = names;
@@ -123,14 +126,10 @@ static void robot_and_prints_are_seen(void **state) {
     view_destroy(view);
 }
 
-static void bad_model_and_size_are_one_line(void **state) {
+static void bad_size_is_one_line(void **state) {
     (void)state;
     MildError error = {0};
     ViewDef def = view_def_default();
-    def.xml = "/nowhere/robot.xml";
-    assert_null(view_create(&def, robot, &terrain, &error));
-    assert_non_null(strstr(error.text, "/nowhere/robot.xml"));
-    def = view_def_default();
     def.width = 8;
     assert_null(view_create(&def, robot, &terrain, &error));
     assert_int_equal(error.status, MILD_ERROR_RANGE);
@@ -161,7 +160,7 @@ static void pressure_carries_the_weight(void **state) {
     load_at(0.3);
     step();
     pressure_observe(pressure, sim, &terrain);
-    assert_int_equal(pressure_stances(pressure, 0), ROBOT_FEET);
+    assert_int_equal(pressure_stances(pressure, 0), SA01_FEET);
 
     char path[] = "/tmp/mild_pressure_XXXXXX", line[200];
     close(mkstemp(path));
@@ -195,7 +194,7 @@ static void pressure_carries_the_weight(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(robot_and_prints_are_seen),
-        cmocka_unit_test(bad_model_and_size_are_one_line),
+        cmocka_unit_test(bad_size_is_one_line),
         cmocka_unit_test(pressure_carries_the_weight),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -1,0 +1,13 @@
+#include "ground/model.h"
+#include "ground/resist.h"
+
+const ModelRow model_ecc_quasi_3d = {
+    .info = {.summary = "the same in three dimensions",
+             .source = "Agarwal et al. 2023",
+             .fields = {"zeta", "mu", "k_drift", "b_drift", "bed_depth"},
+             .scaled = {"zeta"},
+             .match_note = "recovery 0; mu, k_drift, b_drift 0: friction is part of zeta"},
+    .law = resist_law,
+    .reference = resist_material,
+    .direction = resist_space,
+};

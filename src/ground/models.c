@@ -1,0 +1,40 @@
+/* The table of ground models: rows of MILD_MODEL_LIST, each filled in by its file. */
+#include <string.h>
+
+#include "ground/model.h"
+
+#define MODEL_DECLARE(id, name) extern const ModelRow model_##name;
+MILD_MODEL_LIST(MODEL_DECLARE)
+
+#define MODEL_ROW(id, name) &model_##name,
+static const ModelRow *const rows[MILD_MODELS] = {MILD_MODEL_LIST(MODEL_ROW)};
+
+#define MODEL_NAME(id, name) #name,
+const char *const mild_model_names[MILD_MODELS] = {MILD_MODEL_LIST(MODEL_NAME)};
+
+int mild_model_find(const char *name, MildModel *model) {
+    for (int i = 0; i < MILD_MODELS; i++) {
+        if (strcmp(mild_model_names[i], name) == 0) {
+            *model = (MildModel)i;
+            return 1;
+        }
+    }
+    return 0;
+}
+
+const MildModelInfo *mild_model_info(MildModel model) {
+    return &rows[model]->info;
+}
+
+int mild_model_is_concentric(MildModel model) {
+    return mild_model_info(model)->concentric;
+}
+
+const ModelRow *model_row(int model) {
+    const int known = model >= 0 && model < MILD_MODELS && rows[model]->law;
+    return rows[known ? model : MILD_MODEL_MILD];
+}
+
+Law law_of(const MildMaterial *material, double pitch) {
+    return model_row(material->model)->law(material, pitch);
+}

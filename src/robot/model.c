@@ -1,0 +1,144 @@
+/* From the MJCF of a robot folder to the engine's models. */
+#include <stdio.h>
+#include <string.h>
+
+#include "robot/description.h"
+
+/* MuJoCo's messages have several lines; ours have one. */
+static void one_line(char *text) {
+    for (char *c = text; *c; c++) {
+        if (*c == '\n' || *c == '\r') {
+            *c = ' ';
+        }
+    }
+}
+
+/* What our step does not compute must not be in the file: left out in silence it would make another
+ * robot. */
+static MildStatus check_supported(const mjModel *m, const char *path, MildError *error) {
+    if (m->neq > 0 || m->ntendon > 0) {
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%s: has %s, which the step does not compute; remove them", path,
+                         m->neq > 0 ? "equality constraints" : "tendons");
+    }
+    for (int d = 0; d < m->nv; d++) {
+        const char *joint = mj_id2name(m, mjOBJ_JOINT, m->dof_jntid[d]);
+        double friction = m->dof_frictionloss[d], damping = m->dof_damping[d];
+        double stiffness = m->jnt_stiffness[m->dof_jntid[d]];
+        if (friction != 0.0 || damping != 0.0 || stiffness != 0.0) {
+            return mild_fail(error, MILD_ERROR_FORMAT,
+                             "%s: joint '%s' has %s, which the step does not compute; remove it",
+                             path, joint ? joint : "",
+                             friction != 0.0  ? "frictionloss"
+                             : damping != 0.0 ? "damping"
+                                              : "stiffness");
+        }
+    }
+    return MILD_OK;
+}
+
+/* Bodies keep the inertia that the compiler found from their geoms, for these go. */
+static void fix_inertia(mjSpec *spec, const mjModel *m) {
+    for (mjsElement *e = mjs_firstElement(spec, mjOBJ_BODY); e; e = mjs_nextElement(spec, e)) {
+        mjsBody *body = mjs_asBody(e);
+        int id = mjs_getId(e);
+        if (body->explicitinertial || id <= 0) {
+            continue;
+        }
+        body->explicitinertial = 1;
+        body->mass = m->body_mass[id];
+        memcpy(body->ipos, m->body_ipos + 3 * id, sizeof body->ipos);
+        memcpy(body->iquat, m->body_iquat + 4 * id, sizeof body->iquat);
+        memcpy(body->inertia, m->body_inertia + 3 * id, sizeof body->inertia);
+    }
+}
+
+/* A step pays for every geom whose pose it computes, and every workspace copies the model: only
+ * bodies and joints stay. */
+static void strip(mjSpec *spec) {
+    static const mjtObj dropped[] = {mjOBJ_SENSOR,   mjOBJ_ACTUATOR, mjOBJ_KEY,    mjOBJ_PAIR,
+                                     mjOBJ_EXCLUDE,  mjOBJ_SITE,     mjOBJ_CAMERA, mjOBJ_LIGHT,
+                                     mjOBJ_GEOM,     mjOBJ_SKIN,     mjOBJ_MESH,   mjOBJ_HFIELD,
+                                     mjOBJ_MATERIAL, mjOBJ_TEXTURE};
+    for (size_t k = 0; k < sizeof dropped / sizeof dropped[0]; k++) {
+        mjsElement *next = NULL;
+        for (mjsElement *e = mjs_firstElement(spec, dropped[k]); e; e = next) {
+            next = mjs_nextElement(spec, e);
+            mjs_delete(spec, e);
+        }
+    }
+}
+
+static mjsGeom *add_geom(mjsBody *body, const char *name, mjtGeom type) {
+    mjsGeom *geom = mjs_addGeom(body, NULL);
+    mjs_setName(geom->element, name);
+    geom->type = type;
+    geom->contype = geom->conaffinity = 0; /* only the pairs touch */
+    geom->mass = 0.0;
+    return geom;
+}
+
+/* The engine's rigid ground: a floor, and under each foot the spheres that it stands on. */
+static MildStatus add_rigid_ground(const RobotDef *def, const char *path, mjSpec *spec,
+                                   MildError *error) {
+    mjsGeom *floor = add_geom(mjs_findBody(spec, "world"), "floor", mjGEOM_PLANE);
+    floor->size[2] = 0.05; /* [m] distance of the grid's lines, for pictures only */
+    for (int f = 0; f < def->feet; f++) {
+        const RobotFootDef *foot = &def->foot[f];
+        mjsBody *body = mjs_findBody(spec, foot->body);
+        if (!body) {
+            return mild_fail(error, MILD_ERROR_FORMAT, "%s: body '%s' of [foot.%s] is missing",
+                             path, foot->body, foot->name);
+        }
+        for (int c = 0; c < foot->corner_count; c++) {
+            char name[32];
+            snprintf(name, sizeof name, "corner_%d_%d", f, c);
+            mjsGeom *corner = add_geom(body, name, mjGEOM_SPHERE);
+            corner->size[0] = foot->corner_radius;
+            memcpy(corner->pos, foot->corners + 3 * c, sizeof corner->pos);
+            mjsPair *pair = mjs_addPair(spec, NULL);
+            static const double friction[5] = {0.8, 0.8, 0.005, 0.0001, 0.0001};
+            mjs_setString(pair->geomname1, "floor");
+            mjs_setString(pair->geomname2, name);
+            pair->condim = 3;
+            memcpy(pair->friction, friction, sizeof friction);
+        }
+    }
+    return MILD_OK;
+}
+
+static MildStatus compile(Robot *robot, mjSpec *spec, MildError *error) {
+    robot->visual = mj_compile(spec, NULL);
+    if (robot->visual) {
+        MildStatus status = check_supported(robot->visual, robot->path, error);
+        if (status != MILD_OK) {
+            return status;
+        }
+        fix_inertia(spec, robot->visual);
+        strip(spec);
+        status = add_rigid_ground(&robot->def, robot->path, spec, error);
+        if (status != MILD_OK) {
+            return status;
+        }
+        robot->model = mj_compile(spec, NULL);
+    }
+    if (!robot->model) {
+        char text[300];
+        snprintf(text, sizeof text, "%s", mjs_getError(spec));
+        one_line(text);
+        return mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", robot->path, text);
+    }
+    return MILD_OK;
+}
+
+MildStatus robot_load_models(Robot *robot, MildError *error) {
+    char text[300] = "";
+    mjSpec *spec = mj_parseXML(robot->path, NULL, text, (int)sizeof text);
+    if (!spec) {
+        one_line(text);
+        return mild_fail(error, MILD_ERROR_IO, "%s: %s", robot->path, text);
+    }
+    MildStatus status = compile(robot, spec, error);
+    mj_deleteSpec(spec);
+    return status;
+}
