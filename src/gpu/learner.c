@@ -6,7 +6,7 @@
 
 #include "gpu/kernels.h"
 #include "gpu/mlp.h"
-#include "learn/ppo_private.h"
+#include "learn/ppo_gradient.h"
 
 /* Rows go through the networks in chunks of at most this many: enough to fill a large GPU, and a
  * bound on its memory. */

@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/student.h"
+
 #define FIT_DIFFERENCE                                                                             \
     1e-5 /* relative step of the central differences; exact where F is linear   \
                              */
@@ -350,15 +352,6 @@ static double own_correlation(const Fit *fit, int p, int q) {
     return dot(a, b, fit->count) / sqrt(dot(a, a, fit->count) * dot(b, b, fit->count));
 }
 
-/* 97.5 % point of Student's t with `n` degrees of freedom (Abramowitz and Stegun 26.7.5; 1 % at n =
- * 3). */
-static double student(double n) {
-    const double z = 1.959963984540054, z2 = z * z;
-    double g1 = z * (z2 + 1) / 4, g2 = z * ((5 * z2 + 16) * z2 + 3) / 96;
-    double g3 = z * (((3 * z2 + 19) * z2 + 17) * z2 - 15) / 384;
-    return z + ((g3 / n + g2) / n + g1) / n;
-}
-
 /* Half of the 95 % interval. Rows need not be equally noisy: variance = sum (g r/(1 - h))^2 with g
  * = own/|own|^2 and the leverage h of each row, "HC3" of MacKinnon and White 1985. */
 static double half_width(const Fit *fit, int p, int free) {
@@ -368,7 +361,7 @@ static double half_width(const Fit *fit, int p, int free) {
         double share = own[i] * fit->miss[i] / fmax(1 - fit->leverage[i], 1e-3);
         sum += share * share;
     }
-    return student(fit->count - free) * sqrt(sum) / dot(own, own, fit->count);
+    return student_95(fit->count - free) * sqrt(sum) / dot(own, own, fit->count);
 }
 
 /* What a half width is compared with: the value; for sigma_cone, which may be 0, at least that of a

@@ -9,7 +9,7 @@
 
 /* `self` is the first argument of every function. A function that fails says why and may leave its
  * results unwritten. */
-typedef struct {
+typedef struct PpoBackend {
     void *self;
     /* batch->mean at time t from batch->history at time t. */
     MildStatus (*act)(void *self, int t, MildError *error);

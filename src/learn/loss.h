@@ -10,15 +10,11 @@
 #define MILD_LOSS_H
 
 #include "learn/network.h"
-#include "learn/ppo.h"
+#include "learn/ppo_def.h"
 
 #define LOSS_GROUPS                                                                                \
     3 /* estimates before, in and after the feet velocities: base velocity, feet velocities, feet  \
          heights */
-
-/* The log-variance is used within these bounds, so that no early step can overflow e^logvar. */
-#define LOSS_LOGVAR_MIN (-12.0f)
-#define LOSS_LOGVAR_MAX 6.0f
 
 /* Constants of one minibatch. */
 typedef struct {

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "learn/policy.h"
+#include "learn/policy_def.h"
 
 #define MLP_LAYERS_MAX (POLICY_LAYERS_MAX + 1)
 

@@ -14,7 +14,8 @@
 #include <stdint.h>
 
 #include "learn/mlp.h"
-#include "learn/policy.h"
+#include "learn/policy_def.h"
+#include "mild/error.h"
 
 #define NETWORK_ACTIONS_MAX 64
 #define NETWORK_MLPS 5

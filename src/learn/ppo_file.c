@@ -1,3 +1,5 @@
+#include "learn/ppo_file.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

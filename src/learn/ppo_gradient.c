@@ -1,10 +1,11 @@
+#include "learn/ppo_gradient.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/random.h"
 #include "learn/adam.h"
 #include "learn/noise.h"
-#include "learn/ppo_private.h"
 #include "learn/product.h"
 
 typedef struct {

@@ -81,7 +81,7 @@ fit=("$mild" fit)
 plate=(--plate 0.2,0.1)
 edit() { awk -F, -v OFS=, "$1" sand_loose.csv >bad.csv; }
 refuse 'missing.csv: cannot read.*mild press' "${fit[@]}" missing.csv "${plate[@]}"
-refuse 'which record' "${fit[@]}" "${plate[@]}"
+refuse 'no record given' "${fit[@]}" "${plate[@]}"
 refuse '--plate' "${fit[@]}" sand_loose.csv
 refuse '--plate' "${fit[@]}" sand_loose.csv --plate 0.2
 refuse "unknown parameter 'k_pem'; nearest is 'k_pen'" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pem

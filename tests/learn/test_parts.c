@@ -7,7 +7,9 @@
 
 #include "learn/adam.h"
 #include "learn/noise.h"
-#include "learn/ppo_private.h"
+#include "learn/ppo.h"
+#include "learn/ppo_gradient.h"
+#include "learn/ppo_returns.h"
 #include "learn/vector.h"
 
 static void test_elementwise_functions(void **state) {
