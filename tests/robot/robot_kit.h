@@ -10,8 +10,6 @@
 
 #include <cmocka.h>
 
-#include <mujoco/mujoco.h>
-
 #include "base/random.h"
 #include "control/stand.h"
 #include "robot/robot.h"
@@ -64,14 +62,6 @@ static inline MildMaterial preset(const char *name) {
 static inline MildTerrain preset_terrain(const char *name) {
     MildMaterial material = preset(name);
     return mild_terrain_uniform(&material);
-}
-
-/* [points][2] [m] outline of foot f's sole as the file gives it. */
-static inline const double *kit_outline(const mjModel *m, int f, int *points) {
-    int id = mj_name2id(m, mjOBJ_NUMERIC, f ? "sole_outline_right" : "sole_outline_left");
-    assert_true(id >= 0);
-    *points = m->numeric_size[id] / 2;
-    return m->numeric_data + m->numeric_adr[id];
 }
 
 /* Joints a little off their places, all of it in motion. */

@@ -164,13 +164,13 @@ static void test_any_plane_is_the_engine(void **unused) {
         memcpy(engine->qpos, state.qpos, sizeof state.qpos);
         memcpy(engine->qvel, state.qvel, sizeof state.qvel);
         for (int i = 0; i < 150; i++) {
-            double torque[ROBOT_JOINTS] = {0};
+            double torque[SA01_JOINTS] = {0};
             mj_step(m, engine);
             assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
             contacts += robot_sim_contact(sim)->foot[0].contacts;
             contacts += robot_sim_contact(sim)->foot[1].contacts;
         }
-        for (int i = 0; i < ROBOT_NQ; i++) {
+        for (int i = 0; i < SA01_NQ; i++) {
             worst = fmax(worst, fabs(engine->qpos[i] - robot_sim_qpos(sim)[i]));
         }
         mj_deleteData(engine);

@@ -9,12 +9,13 @@
 #include <mujoco/mujoco.h>
 
 #include "robot/phases.h"
+#include "sa01_sole.h"
 
-static const char *const feet[ROBOT_FEET] = {"leg_l6_link", "leg_r6_link"};
-static const char *const knees[ROBOT_FEET] = {"leg_l4_link", "leg_r4_link"};
+static const char *const feet[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
+static const char *const knees[SA01_FEET] = {"leg_l4_link", "leg_r4_link"};
 static const char *const shells[3] = {"base_link", "leg_l4_link", "leg_r4_link"};
 /* Middle of each sole's bounds in its foot's frame: 60 mm ahead, 5.5 mm outward, 55 mm below. */
-static const double middle[ROBOT_FEET][3] = {{0.06, 0.0055, -0.055}, {0.06, -0.0055, -0.055}};
+static const double middle[SA01_FEET][3] = {{0.06, 0.0055, -0.055}, {0.06, -0.0055, -0.055}};
 
 static void near(const char *what, int i, double got, double wanted, double tolerance) {
     if (!(fabs(got - wanted) <= tolerance)) {
@@ -29,12 +30,12 @@ static RobotState draw_state(uint32_t draw, double height, double tilt) {
     double angle[3] = {random_uniform(&r, -tilt, tilt), random_uniform(&r, -tilt, tilt),
                        random_uniform(&r, -3.1, 3.1)};
     mju_euler2Quat(state.qpos + 3, angle, "XYZ");
-    for (int i = 0; i < ROBOT_JOINTS; i++) {
+    for (int i = 0; i < SA01_JOINTS; i++) {
         double low = robot_joint_low(robot)[i], high = robot_joint_high(robot)[i];
         double q = robot_default_pose(robot)[i] + random_uniform(&r, -0.15, 0.15);
         state.qpos[7 + i] = fmin(fmax(q, low + 0.01), high - 0.01);
     }
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < SA01_NV; i++) {
         state.qvel[i] = random_uniform(&r, -1, 1);
     }
     return state;
@@ -43,8 +44,8 @@ static RobotState draw_state(uint32_t draw, double height, double tilt) {
 /* Data of their own at a pose of the sim's model, or of the whole file's. */
 static mjData *engine_at(const mjModel *m, const double *qpos, const double *qvel) {
     mjData *d = mj_makeData(m);
-    memcpy(d->qpos, qpos, sizeof(double) * ROBOT_NQ);
-    memcpy(d->qvel, qvel, sizeof(double) * ROBOT_NV);
+    memcpy(d->qpos, qpos, sizeof(double) * SA01_NQ);
+    memcpy(d->qvel, qvel, sizeof(double) * SA01_NV);
     mj_fwdPosition(m, d);
     mj_fwdVelocity(m, d);
     return d;
@@ -65,20 +66,19 @@ static MildMap *waves(void) {
 /* Velocity of a point that moves with a body. */
 static void point_velocity(const mjModel *m, const mjData *d, int body, const double point[3],
                            double linear[3], double angular[3]) {
-    double jp[3 * ROBOT_NV], jr[3 * ROBOT_NV];
+    double jp[3 * SA01_NV], jr[3 * SA01_NV];
     mj_jac(m, d, jp, jr, point, body);
-    mju_mulMatVec(linear, jp, d->qvel, 3, ROBOT_NV);
-    mju_mulMatVec(angular, jr, d->qvel, 3, ROBOT_NV);
+    mju_mulMatVec(linear, jp, d->qvel, 3, SA01_NV);
+    mju_mulMatVec(angular, jr, d->qvel, 3, SA01_NV);
 }
 
 /* [m] Lowest point of foot f's outline above the ground. */
 static double lowest_point(const mjModel *m, const mjData *d, int f, const MildTerrain *terrain) {
     int body = mj_name2id(m, mjOBJ_BODY, feet[f]);
-    int points;
-    const double *outline = kit_outline(robot_visual_model(robot), f, &points);
     double least = 1e9;
-    for (int i = 0; i < points; i++) {
-        const double local[3] = {outline[2 * i], outline[2 * i + 1], -0.055};
+    for (int i = 0; i < 2 * SA01_OUTLINE_ROWS; i++) {
+        const double *row = sa01_outline[i / 2], side = f == SA01_LEFT ? 1 : -1;
+        const double local[3] = {row[0], side * row[1 + i % 2], -0.055};
         double at[3];
         mju_mulMatVec3(at, d->xmat + 9 * body, local);
         mju_addTo3(at, d->xpos + 3 * body);
@@ -130,7 +130,7 @@ static void test_feet(void **unused) {
             if (grounds[g]) {
                 least = robot_sim_sole_clearance(sim, grounds[g]);
             }
-            for (int f = 0; f < ROBOT_FEET; f++) {
+            for (int f = 0; f < SA01_FEET; f++) {
                 double low = lowest_point(m, d, f, grounds[g]);
                 wanted = fmin(wanted, low);
                 near("height of a sole", f, robot_sim_foot(sim, f)->sole_height, low, 1e-12);
@@ -157,11 +157,11 @@ static void test_feet_after_a_step(void **unused) {
     const mjModel *m = robot_sim_model(sim);
     for (uint32_t draw = 0; draw < 5; draw++) {
         RobotState state = draw_state(draw, 1.5, 0.2);
-        double torque[ROBOT_JOINTS] = {0};
+        double torque[SA01_JOINTS] = {0};
         robot_sim_load(sim, &state, &nominal);
         assert_int_equal(robot_sim_step(sim, torque, NULL, &wavy, ground), 0);
         mjData *d = engine_at(m, robot_sim_qpos(sim), robot_sim_qvel(sim));
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        for (int f = 0; f < SA01_FEET; f++) {
             check_foot(sim, m, d, f);
             near("height", f, robot_sim_foot(sim, f)->sole_height, lowest_point(m, d, f, &wavy),
                  1e-12);
@@ -246,7 +246,7 @@ static void test_lateral_distances(void **unused) {
         mju_sub3(between, d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, knees[0]),
                  d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, knees[1]));
         near("knees", (int)draw, robot_sim_knee_distance(sim), mju_dot3(between, left), 1e-12);
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        for (int f = 0; f < SA01_FEET; f++) {
             int body = mj_name2id(m, mjOBJ_BODY, feet[f]);
             mju_mulMatVec3(sole[f], d->xmat + 9 * body, middle[f]);
             mju_addTo3(sole[f], d->xpos + 3 * body);
@@ -274,15 +274,15 @@ static void test_soft_step_in_the_air(void **unused) {
     MildGround *ground = new_ground();
     mjModel *m = robot_sim_model(sim);
     double worst = 0;
-    for (int joint = -1; joint < 2 * ROBOT_JOINTS; joint++) {
+    for (int joint = -1; joint < 2 * SA01_JOINTS; joint++) {
         RobotState state = draw_state(7, 3, 0.5);
         int j = joint / 2;
         if (joint >= 0) {
             state.qpos[7 + j] =
                 joint % 2 ? robot_joint_low(robot)[j] - 0.01 : robot_joint_high(robot)[j] + 0.01;
         }
-        double torque[ROBOT_JOINTS];
-        for (int i = 0; i < ROBOT_JOINTS; i++) {
+        double torque[SA01_JOINTS];
+        for (int i = 0; i < SA01_JOINTS; i++) {
             torque[i] = 3.0 - i;
         }
         mj_resetData(m, robot_sim_data(sim));
@@ -295,7 +295,7 @@ static void test_soft_step_in_the_air(void **unused) {
             mj_step(m, d);
             assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
         }
-        for (int i = 0; i < ROBOT_NV; i++) {
+        for (int i = 0; i < SA01_NV; i++) {
             worst = fmax(worst, fabs(d->qvel[i] - robot_sim_qvel(sim)[i]));
             near("position", i, robot_sim_qpos(sim)[i], d->qpos[i], 1e-10);
         }
@@ -318,7 +318,7 @@ static void test_fastest(void **unused) {
     const double speeds[4] = {999, -999, 1001, -1001};
     for (int i = 0; i < 4; i++) {
         RobotState state = draw_state(3, 50, 0);
-        double torque[ROBOT_JOINTS] = {0};
+        double torque[SA01_JOINTS] = {0};
         memset(state.qvel, 0, sizeof state.qvel);
         state.qvel[i / 2 ? 1 : 0] = speeds[i];
         robot_sim_load(sim, &state, &nominal);
@@ -336,11 +336,11 @@ static void test_load_and_store(void **unused) {
     MildTerrain terrain = preset_terrain("sand_loose");
     MildGround *ground = new_ground();
     RobotState state = draw_state(2, 1, 0.1), back;
-    double torque[ROBOT_JOINTS] = {0};
+    double torque[SA01_JOINTS] = {0};
     robot_sim_load(sim, &state, &nominal);
     state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) + 0.01; /* a foot 10 mm deep */
     state.qvel[2] = -0.5;
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < SA01_NV; i++) {
         state.warmstart[i] = 0.5 * i;
     }
     robot_sim_load(sim, &state, &nominal);
@@ -351,7 +351,7 @@ static void test_load_and_store(void **unused) {
     robot_sim_load(sim, &state, &nominal);
     const MildContactResult none = {0};
     assert_memory_equal(robot_sim_contact(sim), &none, sizeof none);
-    for (int f = 0; f < ROBOT_FEET; f++) {
+    for (int f = 0; f < SA01_FEET; f++) {
         for (int k = 0; k < 3; k++) {
             near("force", k, robot_sim_foot(sim, f)->force[k], 0, 0);
         }
@@ -370,13 +370,13 @@ static void test_new_workspace(void **unused) {
     const double *q = robot_sim_qpos(sim);
     const double base[7] = {0, 0, robot_stand_height(robot), 1, 0, 0, 0};
     assert_memory_equal(q, base, sizeof base);
-    assert_memory_equal(q + 7, robot_default_pose(robot), sizeof(double) * ROBOT_JOINTS);
+    assert_memory_equal(q + 7, robot_default_pose(robot), sizeof(double) * SA01_JOINTS);
     near("sole", 0, robot_sim_foot(sim, 0)->sole_height, 0, 1e-9);
-    for (int i = 0; i < ROBOT_NV; i++) {
+    for (int i = 0; i < SA01_NV; i++) {
         assert_true(robot_sim_qvel(sim)[i] == 0);
     }
     const MildContactInput *input = robot_sim_contact_input(sim);
-    assert_int_equal(input->feet, ROBOT_FEET);
+    assert_int_equal(input->feet, SA01_FEET);
     assert_true(input->dt == 0.002);
     robot_sim_set_solver(sim, MILD_SOLVER_GAUSS_SEIDEL, 1e-3, 77);
     assert_true(input->solver == MILD_SOLVER_GAUSS_SEIDEL && input->tolerance == 1e-3);
@@ -408,7 +408,7 @@ static void test_phases(void **unused) {
     for (int rigid = 0; rigid < 2; rigid++) {
         RobotSim *sim = new_sim(0.001);
         RobotPhases phases = {0};
-        double torque[ROBOT_JOINTS] = {0};
+        double torque[SA01_JOINTS] = {0};
         RobotState state = draw_state(2, 0.8, 0.1);
         variation.rigid = rigid;
         robot_sim_load(sim, &state, &variation);
@@ -440,8 +440,8 @@ typedef struct {
 
 /* Contact by contact from the engine's data: a contact's force is on its second geom; ours acts on
  * the foot. The model's pairs name the floor first. */
-static void add_up(const mjModel *m, const mjData *d, double ankle[ROBOT_FEET][3],
-                   Sum sum[ROBOT_FEET]) {
+static void add_up(const mjModel *m, const mjData *d, double ankle[SA01_FEET][3],
+                   Sum sum[SA01_FEET]) {
     int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
     for (int c = 0; c < d->ncon; c++) {
         const mjContact *contact = d->contact + c;
@@ -524,7 +524,7 @@ static void test_rigid_contact(void **unused) {
     wavy.map = map;
     const mjModel *m = robot_sim_model(sim);
     const mjData *d = robot_sim_data(sim);
-    int loaded[ROBOT_FEET] = {0}, partly = 0;
+    int loaded[SA01_FEET] = {0}, partly = 0;
     for (uint32_t draw = 0; draw < 12; draw++) {
         const MildTerrain *terrain = draw % 2 ? &level : &wavy;
         RobotState state = draw_state(draw, 1, 0.1);
@@ -532,22 +532,22 @@ static void test_rigid_contact(void **unused) {
         state.qpos[2] -= robot_sim_sole_clearance(sim, terrain) + 0.003;
         robot_sim_load(sim, &state, &rigid);
         for (int i = 0; i < 25; i++) {
-            double torque[ROBOT_JOINTS], ankle[ROBOT_FEET][3], rotation[ROBOT_FEET][9];
+            double torque[SA01_JOINTS], ankle[SA01_FEET][3], rotation[SA01_FEET][9];
             const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim) + 6;
-            for (int j = 0; j < ROBOT_JOINTS; j++) {
+            for (int j = 0; j < SA01_JOINTS; j++) {
                 torque[j] = 100 * (robot_default_pose(robot)[j] - q[j]) - 3 * qd[j];
             }
-            double twist[ROBOT_FEET][6];
+            double twist[SA01_FEET][6];
             mjData *start = engine_at(m, robot_sim_qpos(sim), robot_sim_qvel(sim));
-            for (int f = 0; f < ROBOT_FEET; f++) {
+            for (int f = 0; f < SA01_FEET; f++) {
                 memcpy(ankle[f], robot_sim_foot(sim, f)->position, sizeof ankle[f]);
                 memcpy(rotation[f], robot_sim_foot(sim, f)->rotation, sizeof rotation[f]);
             }
             assert_int_equal(robot_sim_step(sim, torque, NULL, terrain, NULL), 0);
-            Sum sum[ROBOT_FEET] = {{0}};
+            Sum sum[SA01_FEET] = {{0}};
             add_up(m, d, ankle, sum);
-            memcpy(start->qvel, robot_sim_qvel(sim), sizeof(double) * ROBOT_NV);
-            for (int f = 0; f < ROBOT_FEET; f++) {
+            memcpy(start->qvel, robot_sim_qvel(sim), sizeof(double) * SA01_NV);
+            for (int f = 0; f < SA01_FEET; f++) {
                 check_rigid(sim, &sum[f], f, rotation[f]);
                 point_velocity(m, start, mj_name2id(m, mjOBJ_BODY, feet[f]), ankle[f], twist[f],
                                twist[f] + 3);

@@ -8,7 +8,7 @@
 
 #include <mujoco/mujoco.h>
 
-static const char *const links[1 + ROBOT_JOINTS] = {
+static const char *const links[1 + SA01_JOINTS] = {
     "base_link",   "leg_l1_link", "leg_l2_link", "leg_l3_link", "leg_l4_link",
     "leg_l5_link", "leg_l6_link", "leg_r1_link", "leg_r2_link", "leg_r3_link",
     "leg_r4_link", "leg_r5_link", "leg_r6_link"};
@@ -32,7 +32,7 @@ static RobotVariation draw_variation(uint32_t draw) {
     for (int k = 0; k < 3; k++) {
         v.com_offset[k] = random_uniform(&r, -0.05, 0.05);
     }
-    for (int i = 0; i <= ROBOT_JOINTS; i++) {
+    for (int i = 0; i <= SA01_JOINTS; i++) {
         v.link_mass_scale[i] = random_uniform(&r, 0.7, 1.4);
     }
     return v;
@@ -80,13 +80,13 @@ static void test_numbers(void **unused) {
     static const uint32_t order[] = {1, 2, 0, 3, 3, 4, 0};
     for (size_t k = 0; k < sizeof order / sizeof *order; k++) {
         RobotVariation v = draw_variation(order[k]);
-        double mass[1 + ROBOT_JOINTS];
+        double mass[1 + SA01_JOINTS];
         robot_sim_load(sim, &state, &v);
-        for (int i = 0; i <= ROBOT_JOINTS; i++) {
+        for (int i = 0; i <= SA01_JOINTS; i++) {
             mass[i] = check_link(m, plain, i, &v);
         }
         check_subtrees(m, mass);
-        for (int i = 0; i < ROBOT_NV; i++) {
+        for (int i = 0; i < SA01_NV; i++) {
             double scale = i < 6 ? 1 : v.armature_scale;
             near("armature", i, m->dof_armature[i], scale * plain->dof_armature[i], 1e-15);
         }
@@ -111,7 +111,7 @@ static void test_nominal(void **unused) {
     for (int k = 0; k < 3; k++) {
         assert_true(v.com_offset[k] == 0);
     }
-    for (int i = 0; i <= ROBOT_JOINTS; i++) {
+    for (int i = 0; i <= SA01_JOINTS; i++) {
         assert_true(v.link_mass_scale[i] == 1);
     }
 }

@@ -286,11 +286,10 @@ static void physics_steps(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(defaults),      cmocka_unit_test(refused),
-        cmocka_unit_test(physics_steps), cmocka_unit_test(gains),
+        cmocka_unit_test(defaults),      cmocka_unit_test(paths_of_pictures),
+        cmocka_unit_test(nominal),       cmocka_unit_test(refused),
+        cmocka_unit_test(gains),         cmocka_unit_test(physics_steps),
         cmocka_unit_test(robot_or_task),
-        cmocka_unit_test(defaults), cmocka_unit_test(paths_of_pictures), cmocka_unit_test(nominal),
-        cmocka_unit_test(refused),  cmocka_unit_test(physics_steps),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

@@ -4,7 +4,7 @@
 #include "sa01.h"
 #include "task/vec.h"
 
-enum { ENVS = 24, STEPS = 200 };
+enum { ENVS = 12, STEPS = 100 };
 
 static void random_actions(float *action, int envs, int t, double size) {
     for (int e = 0; e < envs; e++) {

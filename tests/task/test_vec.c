@@ -9,11 +9,11 @@ enum { ENVS = 6 };
 typedef struct {
     Pool *pool;
     Vec *vec;
-    float history[ENVS][TASK_HISTORY];
-    float critic[ENVS][TASK_CRITIC];
-    float estimate[ENVS][TASK_ESTIMATES];
-    float frame[ENVS][TASK_OBSERVATION];
-    float action[ENVS][TASK_ACTIONS];
+    float history[ENVS][SA01_HISTORY];
+    float critic[ENVS][SA01_CRITIC];
+    float estimate[ENVS][SA01_ESTIMATES];
+    float frame[ENVS][SA01_OBSERVATION];
+    float action[ENVS][SA01_JOINTS];
     float reward[ENVS];
     uint8_t done[ENVS];
     uint8_t timeout[ENVS];
@@ -51,7 +51,7 @@ static TaskEnv *env_of(int e) {
 static void draw_actions(int step) {
     for (int e = 0; e < ENVS; e++) {
         Random r = random_at(99, (uint32_t)e, (uint32_t)step);
-        for (int i = 0; i < TASK_ACTIONS; i++) {
+        for (int i = 0; i < SA01_JOINTS; i++) {
             many.action[e][i] = (float)random_normal(&r);
         }
     }
@@ -295,8 +295,10 @@ static void hash(void **unused) {
     uint64_t wanted = 14695981039346656037u;
     for (int e = 0; e < ENVS; e++) {
         TaskEnv *env = env_of(e);
-        wanted = fnv(wanted, &env->robot, sizeof env->robot);
-        wanted = fnv(wanted, env->history, sizeof env->history);
+        wanted = fnv(wanted, env->robot.qpos, SA01_NQ * sizeof(double));
+        wanted = fnv(wanted, env->robot.qvel, SA01_NV * sizeof(double));
+        wanted = fnv(wanted, env->robot.warmstart, SA01_NV * sizeof(double));
+        wanted = fnv(wanted, task_env_history(env), SA01_HISTORY * sizeof(float));
         wanted = fnv(wanted, env->command, sizeof env->command);
         wanted = fnv(wanted, &env->reward_sum, sizeof env->reward_sum);
         wanted = fnv(wanted, task_env_ground(env), mild_ground_size(task_env_ground(env)));
