@@ -6,6 +6,8 @@
 
 enum { LEGS = ROBOT_FEET_MAX, HINGES = ROBOT_JOINTS_MAX / ROBOT_FEET_MAX };
 
+static const double offset_of[LEGS] = {0, 0.5, 0.25, 0.75}; /* [-] of the gait cycle */
+
 static char folder[] = "/tmp/mild_widest_XXXXXX";
 static char paths[2][64];
 
@@ -65,13 +67,14 @@ static void write_ini(const char *path) {
     write_names(file, "mirror", 1);
     write_list(file, "mirror_sign", "-1", "1");
     write_list(file, "pose", "0", "0");
+    write_list(file, "swing", "-1", "0.5");
     write_list(file, "kp", "60", "60");
     write_list(file, "kd", "2", "2");
     for (int leg = 0; leg < LEGS; leg++) {
         fprintf(file,
                 "[foot.f%d]\nbody = b%d9\nknee = b%d5\nmirror = f%d\noffset = %g\nshape = round\n"
                 "center = 0 0 -0.06\nradius = 0.03\npitch = 0.01\n",
-                leg, leg, leg, leg ^ 1, leg % 2 ? 0.5 : 0.0);
+                leg, leg, leg, leg ^ 1, offset_of[leg]);
     }
     assert_int_equal(fclose(file), 0);
 }
@@ -128,6 +131,38 @@ static void mirror_twice(void **unused) {
     }
 }
 
+/* Stance in the half of the cycle after the foot's offset, swing in the other: h = apex sin(pi s);
+ * all joints of a swinging leg bend by amplitude |sin| times `swing`. */
+static void gait_of_any_offset(void **unused) {
+    (void)unused;
+    TaskDef def = task_def_default();
+    int swings = 0;
+    for (double phase = 0.003; phase < 1; phase += 0.0137) {
+        double q[ROBOT_JOINTS_MAX];
+        task_gait_reference(&def, robot, phase, 0, q);
+        for (int f = 0; f < LEGS; f++) {
+            double since =
+                phase - offset_of[f] + (phase < offset_of[f]); /* cycles since touchdown */
+            int swing = since >= 0.5;
+            double wave = sin(2 * KIT_PI * since);
+            double height = swing ? def.swing_apex * sin(KIT_PI * (since - 0.5) / 0.5) : 0;
+            double bend = -wave >= def.double_support ? -wave * def.reward.reference_amplitude : 0;
+            swings += swing;
+            assert_int_equal(task_gait_stance(robot, phase, 0, f), !swing);
+            expect_near("height", task_gait_height(&def, robot, phase, 0, f), height, 1e-12);
+            assert_int_equal(task_gait_either(&def, robot, phase, 0, f),
+                             fabs(wave) < def.double_support);
+            assert_false(task_gait_either(&def, robot, phase, 1, f));
+            assert_true(task_gait_stance(robot, phase, 1, f));
+            for (int i = 0; i < HINGES; i++) {
+                expect_entry("reference", f * HINGES + i, q[f * HINGES + i], (i ? 0.5 : -1) * bend,
+                             1e-12);
+            }
+        }
+    }
+    assert_true(swings > 100);
+}
+
 /* Rows written end where they should: what lies behind them stays. */
 static void steps(void **unused) {
     (void)unused;
@@ -173,6 +208,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(widths),
         cmocka_unit_test(mirror_twice),
+        cmocka_unit_test(gait_of_any_offset),
         cmocka_unit_test(steps),
     };
     return cmocka_run_group_tests(tests, widest_setup, widest_teardown);
