@@ -470,13 +470,13 @@ static void test_files(void **state) {
     memset(large, '\n', size);
     memcpy(large, plain, sizeof plain - 1);
     write_file(path, large, size);
-    refuse_folder(folder, MILD_ERROR_FORMAT, "larger than 1 MiB");
+    refuse_folder(folder, MILD_ERROR_FORMAT, "larger than 1.00 MiB");
     write_file(path, large, size - 1);
     assert_int_equal(robot_def_read(folder, &def, NULL), MILD_OK);
     free(large);
     unlink(path);
     assert_int_equal(mkdir(path, 0700), 0);
-    refuse_folder(folder, MILD_ERROR_FORMAT, "robot.ini: is no file");
+    refuse_folder(folder, MILD_ERROR_IO, "robot.ini: cannot read: it is a folder");
     rmdir(path);
     rmdir(folder);
     char deep[1100];

@@ -661,6 +661,10 @@ static void test_refused(void **unused) {
     try_robot("name='neck'", "name='neck' frictionloss='0.1'", "joint 'neck' has frictionloss");
     try_robot("name='neck'", "name='neck' damping='0.1'", "joint 'neck' has damping");
     try_robot("name='neck'", "name='neck' stiffness='0.1'", "joint 'neck' has stiffness");
+    try_robot("<light", "<body name='post'><geom size='0.1'/></body><light", NULL);
+    try_robot(
+        "<body name='toe_r' pos='0 0 -0.3'><geom type='sphere' size='0.03' mass='0.2'/></body>",
+        "<body name='toe_r' pos='0 0 -0.3'/>", NULL); /* its parent has the mass */
     try_robot("model = walker.xml", "model = none.xml", "none.xml: ");
     try_robot("</worldbody>", "", "walker.xml: ");
     try_robot("axis='1 0 0'", "axis='0 0 0'", "walker.xml: ");

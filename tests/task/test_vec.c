@@ -2,6 +2,8 @@
  * add up what the episodes report, the hash is FNV-1a of what moves. */
 #include "task_kit.h"
 
+#include <malloc.h>
+
 #include "task/vec.h"
 
 enum { ENVS = 6 };
@@ -307,6 +309,22 @@ static void hash(void **unused) {
     close_many();
 }
 
+/* What is opened and closed again leaves the heap as it was. */
+static void nothing_is_lost(void **unused) {
+    (void)unused;
+    TaskDef def = kit_quiet_def();
+    size_t used[4];
+    for (int i = 0; i < 4; i++) {
+        open_many(&def, 2);
+        step_many();
+        close_many();
+        struct mallinfo2 heap = mallinfo2();
+        used[i] = heap.uordblks + heap.hblkhd;
+    }
+    print_message("heap after the second and the last: %zu and %zu bytes\n", used[1], used[3]);
+    assert_true(used[3] < used[1] + 8192); /* a thread keeps a little; a workspace is larger */
+}
+
 /* ---- refusals ---- */
 
 static void refused(void **unused) {
@@ -324,10 +342,15 @@ static void refused(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(refused),    cmocka_unit_test(bytes),
-        cmocka_unit_test(hash),       cmocka_unit_test(an_episode_of_one_step),
-        cmocka_unit_test(times),      cmocka_unit_test(views_may_be_missing),
-        cmocka_unit_test(statistics), cmocka_unit_test(each_is_as_alone),
+        cmocka_unit_test(refused),
+        cmocka_unit_test(bytes),
+        cmocka_unit_test(hash),
+        cmocka_unit_test(an_episode_of_one_step),
+        cmocka_unit_test(times),
+        cmocka_unit_test(nothing_is_lost),
+        cmocka_unit_test(views_may_be_missing),
+        cmocka_unit_test(statistics),
+        cmocka_unit_test(each_is_as_alone),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }
