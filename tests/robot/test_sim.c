@@ -511,8 +511,45 @@ static void check_rigid(const RobotSim *sim, const Sum *sum, int f, const double
     check_zmp(r, rotation, middle[f]);
 }
 
-/* Standing shakily on slopes, contacts coming and going. The engine's data hold the contacts that
- * the step's forces belong to until the next. */
+/* A step with the joints held stiff; the engine's data keep the contacts of the step's forces until
+ * the next. Counts the loaded feet; returns how many of them stand on some corners only. */
+static int check_rigid_step(RobotSim *sim, const MildTerrain *terrain, int loaded[SA01_FEET]) {
+    const mjModel *m = robot_sim_model(sim);
+    const mjData *d = robot_sim_data(sim);
+    int partly = 0;
+    double torque[SA01_JOINTS], ankle[SA01_FEET][3], rotation[SA01_FEET][9];
+    const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim) + 6;
+    for (int j = 0; j < SA01_JOINTS; j++) {
+        torque[j] = 100 * (robot_default_pose(robot)[j] - q[j]) - 3 * qd[j];
+    }
+    double twist[SA01_FEET][6];
+    mjData *start = engine_at(m, robot_sim_qpos(sim), robot_sim_qvel(sim));
+    for (int f = 0; f < SA01_FEET; f++) {
+        memcpy(ankle[f], robot_sim_foot(sim, f)->position, sizeof ankle[f]);
+        memcpy(rotation[f], robot_sim_foot(sim, f)->rotation, sizeof rotation[f]);
+    }
+    assert_int_equal(robot_sim_step(sim, torque, NULL, terrain, NULL), 0);
+    Sum sum[SA01_FEET] = {{0}};
+    add_up(m, d, ankle, sum);
+    memcpy(start->qvel, robot_sim_qvel(sim), sizeof(double) * SA01_NV);
+    for (int f = 0; f < SA01_FEET; f++) {
+        check_rigid(sim, &sum[f], f, rotation[f]);
+        point_velocity(m, start, mj_name2id(m, mjOBJ_BODY, feet[f]), ankle[f], twist[f],
+                       twist[f] + 3);
+        for (int k = 0; k < 6; k++) {
+            near("twist at the end", k, robot_sim_contact(sim)->velocity[6 * f + k], twist[f][k],
+                 1e-9);
+        }
+        loaded[f] += sum[f].contacts > 0;
+        partly += sum[f].contacts > 0 && sum[f].contacts < 4;
+    }
+    mj_deleteData(start);
+    assert_true(robot_sim_contact(sim)->converged);
+    assert_int_equal(robot_sim_contact(sim)->iterations, d->solver_niter[0]);
+    return partly;
+}
+
+/* Standing shakily on slopes, contacts coming and going. */
 static void test_rigid_contact(void **unused) {
     (void)unused;
     RobotSim *sim = new_sim(0.0025);
@@ -522,8 +559,6 @@ static void test_rigid_contact(void **unused) {
     MildTerrain level = preset_terrain("grass"), wavy = level;
     level.height = -0.1;
     wavy.map = map;
-    const mjModel *m = robot_sim_model(sim);
-    const mjData *d = robot_sim_data(sim);
     int loaded[SA01_FEET] = {0}, partly = 0;
     for (uint32_t draw = 0; draw < 12; draw++) {
         const MildTerrain *terrain = draw % 2 ? &level : &wavy;
@@ -532,35 +567,7 @@ static void test_rigid_contact(void **unused) {
         state.qpos[2] -= robot_sim_sole_clearance(sim, terrain) + 0.003;
         robot_sim_load(sim, &state, &rigid);
         for (int i = 0; i < 25; i++) {
-            double torque[SA01_JOINTS], ankle[SA01_FEET][3], rotation[SA01_FEET][9];
-            const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim) + 6;
-            for (int j = 0; j < SA01_JOINTS; j++) {
-                torque[j] = 100 * (robot_default_pose(robot)[j] - q[j]) - 3 * qd[j];
-            }
-            double twist[SA01_FEET][6];
-            mjData *start = engine_at(m, robot_sim_qpos(sim), robot_sim_qvel(sim));
-            for (int f = 0; f < SA01_FEET; f++) {
-                memcpy(ankle[f], robot_sim_foot(sim, f)->position, sizeof ankle[f]);
-                memcpy(rotation[f], robot_sim_foot(sim, f)->rotation, sizeof rotation[f]);
-            }
-            assert_int_equal(robot_sim_step(sim, torque, NULL, terrain, NULL), 0);
-            Sum sum[SA01_FEET] = {{0}};
-            add_up(m, d, ankle, sum);
-            memcpy(start->qvel, robot_sim_qvel(sim), sizeof(double) * SA01_NV);
-            for (int f = 0; f < SA01_FEET; f++) {
-                check_rigid(sim, &sum[f], f, rotation[f]);
-                point_velocity(m, start, mj_name2id(m, mjOBJ_BODY, feet[f]), ankle[f], twist[f],
-                               twist[f] + 3);
-                for (int k = 0; k < 6; k++) {
-                    near("twist at the end", k, robot_sim_contact(sim)->velocity[6 * f + k],
-                         twist[f][k], 1e-9);
-                }
-                loaded[f] += sum[f].contacts > 0;
-                partly += sum[f].contacts > 0 && sum[f].contacts < 4;
-            }
-            mj_deleteData(start);
-            assert_true(robot_sim_contact(sim)->converged);
-            assert_int_equal(robot_sim_contact(sim)->iterations, d->solver_niter[0]);
+            partly += check_rigid_step(sim, terrain, loaded);
         }
     }
     print_message(

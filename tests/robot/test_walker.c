@@ -108,7 +108,7 @@ static void near(const char *what, int i, double got, double wanted, double tole
 
 /* ---- what is known of it ---- */
 
-static void test_description(void **unused) {
+static void test_names(void **unused) {
     (void)unused;
     assert_string_equal(robot_name(robot), "walker");
     assert_string_equal(robot_source(robot), "");
@@ -117,6 +117,10 @@ static void test_description(void **unused) {
     assert_int_equal(robot_feet(robot), FEET);
     assert_string_equal(robot_joint_name(robot, 1), "knee_r");
     assert_string_equal(robot_foot_name(robot, ROUND), "ball");
+}
+
+static void test_joints(void **unused) {
+    (void)unused;
     const int foot[JOINTS] = {-1, ROUND, ROUND, FLAT, FLAT, FLAT, -1};
     const int image[JOINTS] = {0, 4, 5, 3, 1, 2, 6};
     const double sign[JOINTS] = {-1, 1, 1, 1, 1, 1, -1};
@@ -140,6 +144,10 @@ static void test_description(void **unused) {
         near("swing", i, robot_swing(robot)[i], swing[i], 0);
         near("still", i, robot_still(robot)[i], still[i], 0);
     }
+}
+
+static void test_feet_and_body(void **unused) {
+    (void)unused;
     for (int f = 0; f < FEET; f++) {
         assert_int_equal(robot_mirror_foot(robot, f), 1 - f);
         near("offset", f, robot_gait_offset(robot, f), f ? 0.6 : 0.1, 0);
@@ -202,6 +210,31 @@ static void test_soles(void **unused) {
     assert_ptr_equal(robot_soles(robot)[0], rasters[0]);
 }
 
+static void check_rigid_ground(const mjModel *m) {
+    const double corner[4][4] = {{-0.07, -0.03, -0.045, 0.005},
+                                 {0.11, -0.05, -0.045, 0.005},
+                                 {0.11, 0.03, -0.045, 0.005},
+                                 {0.01, 0.02, -0.03, 0.04}};
+    const double friction[5] = {0.8, 0.8, 0.005, 0.0001, 0.0001};
+    int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
+    assert_int_equal(m->geom_type[floor], mjGEOM_PLANE);
+    for (int p = 0; p < 4; p++) {
+        int geom = m->pair_geom2[p];
+        assert_int_equal(m->pair_geom1[p], floor);
+        assert_int_equal(m->pair_dim[p], 3);
+        assert_int_equal(m->geom_bodyid[geom], robot_foot_body(robot, p == 3));
+        assert_int_equal(m->geom_contype[geom] + m->geom_conaffinity[geom], 0);
+        assert_int_equal(m->geom_type[geom], mjGEOM_SPHERE);
+        near("radius", p, m->geom_size[3 * geom], corner[p][3], 0);
+        for (int k = 0; k < 3; k++) {
+            near("corner", p, m->geom_pos[3 * geom + k], corner[p][k], 1e-12);
+        }
+        for (int k = 0; k < 5; k++) {
+            near("friction", k, m->pair_friction[5 * p + k], friction[k], 1e-15);
+        }
+    }
+}
+
 /* What a step does not need is not in its model: one plane and the feet's corners remain. */
 static void test_models(void **unused) {
     (void)unused;
@@ -226,28 +259,7 @@ static void test_models(void **unused) {
             near("axes", b, m->body_iquat[4 * b + k], whole->body_iquat[4 * b + k], 1e-12);
         }
     }
-    const double corner[4][4] = {{-0.07, -0.03, -0.045, 0.005},
-                                 {0.11, -0.05, -0.045, 0.005},
-                                 {0.11, 0.03, -0.045, 0.005},
-                                 {0.01, 0.02, -0.03, 0.04}};
-    const double friction[5] = {0.8, 0.8, 0.005, 0.0001, 0.0001};
-    int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
-    assert_int_equal(m->geom_type[floor], mjGEOM_PLANE);
-    for (int p = 0; p < 4; p++) {
-        int geom = m->pair_geom2[p];
-        assert_int_equal(m->pair_geom1[p], floor);
-        assert_int_equal(m->pair_dim[p], 3);
-        assert_int_equal(m->geom_bodyid[geom], robot_foot_body(robot, p == 3));
-        assert_int_equal(m->geom_contype[geom] + m->geom_conaffinity[geom], 0);
-        assert_int_equal(m->geom_type[geom], mjGEOM_SPHERE);
-        near("radius", p, m->geom_size[3 * geom], corner[p][3], 0);
-        for (int k = 0; k < 3; k++) {
-            near("corner", p, m->geom_pos[3 * geom + k], corner[p][k], 1e-12);
-        }
-        for (int k = 0; k < 5; k++) {
-            near("friction", k, m->pair_friction[5 * p + k], friction[k], 1e-15);
-        }
-    }
+    check_rigid_ground(m);
     robot_sim_destroy(sim);
 }
 
@@ -307,6 +319,22 @@ static void dense_jacobian(const mjModel *m, const mjData *d, double j[ROWS * NV
     }
 }
 
+/* Moves `middle` from the ankle to the middle of the flat sole; returns its lowest point [m]. */
+static double measure_flat(const mjData *d, const double point[3], double middle[3]) {
+    static const double outline[4][3] = {
+        {-0.08, -0.04, -0.05}, {0.12, -0.06, -0.05}, {0.12, 0.04, -0.05}, {-0.08, 0.04, -0.05}};
+    static const double center[3] = {0.02, -0.01, -0.05};
+    const double *turn = d->xmat + 9 * robot_foot_body(robot, FLAT);
+    double arm[3], lowest = 1e9;
+    mju_mulMatVec3(arm, turn, center);
+    mju_addTo3(middle, arm);
+    for (int c = 0; c < 4; c++) {
+        mju_mulMatVec3(arm, turn, outline[c]);
+        lowest = fmin(lowest, point[2] + arm[2]);
+    }
+    return lowest;
+}
+
 static void test_feet(void **unused) {
     (void)unused;
     MildError error = {0};
@@ -332,20 +360,7 @@ static void test_feet(void **unused) {
             memcpy(middle, point, sizeof middle);
             lowest[f] = point[2];
             if (f == FLAT) {
-                static const double outline[4][3] = {{-0.08, -0.04, -0.05},
-                                                     {0.12, -0.06, -0.05},
-                                                     {0.12, 0.04, -0.05},
-                                                     {-0.08, 0.04, -0.05}};
-                static const double center[3] = {0.02, -0.01, -0.05};
-                const double *turn = d->xmat + 9 * robot_foot_body(robot, f);
-                double arm[3];
-                mju_mulMatVec3(arm, turn, center);
-                mju_addTo3(middle, arm);
-                lowest[f] = 1e9;
-                for (int c = 0; c < 4; c++) {
-                    mju_mulMatVec3(arm, turn, outline[c]);
-                    lowest[f] = fmin(lowest[f], point[2] + arm[2]);
-                }
+                lowest[f] = measure_flat(d, point, middle);
             }
             near("height", f, foot->sole_height, lowest[f], 1e-12);
             const double *turn = f == ROUND ? identity : d->xmat + 9 * robot_foot_body(robot, f);
@@ -365,6 +380,34 @@ static void test_feet(void **unused) {
         mj_deleteData(d);
     }
     robot_sim_destroy(sim);
+}
+
+/* j: J of both feet, solved: its rows times M^-1. */
+static void check_wrench(const RobotSim *sim, const mjData *d, const double *j,
+                         const double *solved) {
+    double wrench[ROBOT_FEET_MAX][6], force[ROBOT_NV_MAX], change[ROBOT_NV_MAX];
+    double column[ROWS], by_force[NV], by_change[NV];
+    for (int r = 0; r < ROWS; r++) {
+        column[r] = wrench[r / 6][r % 6] = sin(1.0 + r);
+    }
+    foot_map_wrench(sim, wrench, force, change);
+    mju_mulMatTVec(by_force, j, column, ROWS, NV);
+    mju_mulMatTVec(by_change, solved, column, ROWS, NV);
+    for (int i = 0; i < NV; i++) {
+        near("force", i, force[i], by_force[i], 1e-11);
+        near("acceleration", i, change[i], by_change[i], 1e-9 * (1 + fabs(by_change[i])));
+    }
+    double twist[6], sum[ROWS], rate[NV];
+    for (int i = 0; i < NV; i++) {
+        rate[i] = d->qvel[i] + 0.001 * change[i];
+    }
+    mju_mulMatVec(sum, j, rate, ROWS, NV);
+    for (int f = 0; f < FEET; f++) {
+        foot_map_twist(sim, f, d->qvel, change, twist);
+        for (int k = 0; k < 6; k++) {
+            near("twist to come", k, twist[k], sum[6 * f + k], 1e-11);
+        }
+    }
 }
 
 static void test_map(void **unused) {
@@ -388,29 +431,7 @@ static void test_map(void **unused) {
             near("inverse inertia", i, sim->input.inverse_inertia[i], wanted[i],
                  1e-10 * (1 + fabs(wanted[i])));
         }
-        double wrench[ROBOT_FEET_MAX][6], force[ROBOT_NV_MAX], change[ROBOT_NV_MAX];
-        double column[ROWS], by_force[NV], by_change[NV];
-        for (int r = 0; r < ROWS; r++) {
-            column[r] = wrench[r / 6][r % 6] = sin(1.0 + r);
-        }
-        foot_map_wrench(sim, wrench, force, change);
-        mju_mulMatTVec(by_force, j, column, ROWS, NV);
-        mju_mulMatTVec(by_change, solved, column, ROWS, NV);
-        for (int i = 0; i < NV; i++) {
-            near("force", i, force[i], by_force[i], 1e-11);
-            near("acceleration", i, change[i], by_change[i], 1e-9 * (1 + fabs(by_change[i])));
-        }
-        double twist[6], sum[ROWS], rate[NV];
-        for (int i = 0; i < NV; i++) {
-            rate[i] = d->qvel[i] + 0.001 * change[i];
-        }
-        mju_mulMatVec(sum, j, rate, ROWS, NV);
-        for (int f = 0; f < FEET; f++) {
-            foot_map_twist(sim, f, d->qvel, change, twist);
-            for (int k = 0; k < 6; k++) {
-                near("twist to come", k, twist[k], sum[6 * f + k], 1e-11);
-            }
-        }
+        check_wrench(sim, d, j, solved);
         mj_deleteData(d);
     }
     robot_sim_destroy(sim);
@@ -637,6 +658,10 @@ static void test_refused(void **unused) {
               "mirror_sign = 1 1 1 1 1 -1\npose = 0.5 -0.25 -0.2 0.4 -0.2 0\n"
               "kp = 2 3 4 5 6 7\nkd = 0.2 0.3 0.4 0.5 0.6 0.7\n",
               "joint 'neck' is not in [joints] names of robot.ini");
+}
+
+static void test_numbers_refused(void **unused) {
+    (void)unused;
     try_robot("range='-2 2' ", "", "needs a range, and actuatorfrcrange or [joints] effort");
     try_robot("<default><joint actuatorfrcrange='-50 50'", "<default><joint",
               "needs a range, and actuatorfrcrange or [joints] effort");
@@ -652,6 +677,10 @@ static void test_refused(void **unused) {
     try_robot("-0.2 0.4 -0.2", "-0.181 0.4 -0.2", NULL); /* 0.019 rad off level */
     try_robot("-0.2 0.4 -0.2", "-0.179 0.4 -0.2", "the sole of [foot.flat] is not level");
     try_robot("pitch = 0.02", "pitch = 0.5", "robot.ini, [foot.flat]: ");
+}
+
+static void test_unsupported(void **unused) {
+    (void)unused;
     try_robot("</worldbody>",
               "</worldbody><equality><joint joint1='hip_l' joint2='hip_r'/></equality>",
               "has equality constraints, which the step does not compute");
@@ -672,11 +701,20 @@ static void test_refused(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_description), cmocka_unit_test(test_stand_height),
-        cmocka_unit_test(test_soles),       cmocka_unit_test(test_models),
-        cmocka_unit_test(test_feet),        cmocka_unit_test(test_map),
-        cmocka_unit_test(test_steps),       cmocka_unit_test(test_soft_landing),
-        cmocka_unit_test(test_shells),      cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_names),
+        cmocka_unit_test(test_joints),
+        cmocka_unit_test(test_feet_and_body),
+        cmocka_unit_test(test_stand_height),
+        cmocka_unit_test(test_soles),
+        cmocka_unit_test(test_models),
+        cmocka_unit_test(test_feet),
+        cmocka_unit_test(test_map),
+        cmocka_unit_test(test_steps),
+        cmocka_unit_test(test_soft_landing),
+        cmocka_unit_test(test_shells),
+        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_numbers_refused),
+        cmocka_unit_test(test_unsupported),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
