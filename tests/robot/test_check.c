@@ -130,6 +130,7 @@ static void test_limits(void **state) {
         assert_refused(m->body_inertia + 3 * body + k, 0, "moves, so its mass");
     }
     assert_refused(m->body_mass + robot->base_body, 0, "body 'base_link' moves, so its mass");
+    assert_refused(m->body_mass + body, 0, "body 'leg_l6_link' moves, so its mass");
     assert_refused(m->jnt_range + 2 * joint, m->jnt_range[2 * joint + 1], "the first must be the");
     assert_refused(m->jnt_actfrcrange + 2 * joint, m->jnt_actfrcrange[2 * joint + 1],
                    "leg_l4_joint': actuatorfrcrange");

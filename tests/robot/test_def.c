@@ -224,6 +224,52 @@ static void test_reading(void **state) {
     refuse_text("", "[robot] name: is missing");
 }
 
+/* A key's least and greatest number are accepted, a little less and a little more are refused. */
+static void expect_range(const char *from, const char *key, double least, double greatest) {
+    char line[128];
+    for (int k = 0; k < 4; k++) {
+        const double beyond = 1e-6 * fmax(fabs(least), 1e-3);
+        const double numbers[] = {least, greatest, least - beyond, greatest * (1 + 1e-6)};
+        snprintf(line, sizeof line, "%s = %.9g\n", key, numbers[k]);
+        if (k < 2) {
+            accept(edit(from, line));
+        } else {
+            refuse(from, line, " is outside ");
+        }
+    }
+}
+
+static void test_ranges(void **state) {
+    (void)state;
+    expect_range("height = 0.7 ; [m]\n", "height", 0.01, 5);
+    expect_range("action_scale = 0.25\n", "action_scale", 0.01, 2);
+    expect_range("feet_least = 0.09\n", "feet_least", 0, 5);
+    expect_range("knee_least = 0.08\n", "knee_least", 0, 5);
+    expect_range("foot_force = 450\n", "foot_force", 0.1, 1e6);
+    expect_range("z = -0.05\n", "z", -5, 5);
+    expect_range("radius = 0.02\n", "radius", 1e-4, 1);
+    expect_range("z = -0.05\n", "z = -0.05\npitch", 1e-4, 1);
+    expect_range("z = -0.05\n", "z = -0.05\ncorner_radius", 1e-5, 1);
+    accept(edit("feet_range = 0.11 0.31", "feet_range = 0 5"));
+    refuse("feet_range = 0.11 0.31", "feet_range = -0.001 5", " is outside ");
+    refuse("feet_range = 0.11 0.31", "feet_range = 0 5.001", " is outside ");
+    accept(edit("knee_range = 0.12 0.32", "knee_range = 0 5"));
+    refuse("knee_range = 0.12 0.32", "knee_range = -0.001 5", " is outside ");
+    refuse("knee_range = 0.12 0.32", "knee_range = 0 5.001", " is outside ");
+    accept(edit("assist = 301 31 101 32", "assist = 0 0 1e6 1e6"));
+    refuse("assist = 301 31 101 32", "assist = -0.001 0 0 0", " is outside ");
+    refuse("assist = 301 31 101 32", "assist = 0 0 0 1000001", " is outside ");
+    refuse("assist = 301 31 101 32", "assist = 1 2 3", ":15: robot.assist: 3 of 4 values");
+    accept(edit("center = 0.7 0.8 0.9", "center = -5 0 5"));
+    refuse("center = 0.7 0.8 0.9", "center = -5.001 0 5", " is outside ");
+    refuse("center = 0.7 0.8 0.9", "center = 0 0 5.001", " is outside ");
+    refuse("offset = 0.25", "offset = -0.001", " is outside ");
+    refuse("offset = 0.25", "offset = 1.001", " is outside ");
+    accept(edit("z = -0.05", "z = -0.05\nelements = 65536"));
+    refuse("z = -0.05", "z = -0.05\nelements = 65537", " is outside ");
+    refuse("z = -0.05", "z = -0.05\nelements = -1", " is outside ");
+}
+
 /* Each key of [robot] but `source` is needed. */
 static void test_missing(void **state) {
     (void)state;
@@ -490,17 +536,12 @@ static void test_files(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_robot_keys),
-        cmocka_unit_test(test_joint_keys),
-        cmocka_unit_test(test_foot_keys),
-        cmocka_unit_test(test_one_foot),
-        cmocka_unit_test(test_reading),
-        cmocka_unit_test(test_missing),
-        cmocka_unit_test(test_joints_refused),
-        cmocka_unit_test(test_feet_refused),
-        cmocka_unit_test(test_gaits_that_disagree),
-        cmocka_unit_test(test_joints_that_fit),
-        cmocka_unit_test(test_lists_that_fit),
+        cmocka_unit_test(test_robot_keys),      cmocka_unit_test(test_joint_keys),
+        cmocka_unit_test(test_foot_keys),       cmocka_unit_test(test_one_foot),
+        cmocka_unit_test(test_reading),         cmocka_unit_test(test_ranges),
+        cmocka_unit_test(test_missing),         cmocka_unit_test(test_joints_refused),
+        cmocka_unit_test(test_feet_refused),    cmocka_unit_test(test_gaits_that_disagree),
+        cmocka_unit_test(test_joints_that_fit), cmocka_unit_test(test_lists_that_fit),
         cmocka_unit_test(test_files),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,95 +1,14 @@
 /* The widest robot that fits, four legs of ten hinges: every width is the greatest that the task
  * has room for, and it takes steps. */
-#include <unistd.h>
-
 #include "task_kit.h"
+#include "widest.h"
 
-enum { LEGS = ROBOT_FEET_MAX, HINGES = ROBOT_JOINTS_MAX / ROBOT_FEET_MAX };
-
-static const double offset_of[LEGS] = {0, 0.5, 0.25, 0.75}; /* [-] of the gait cycle */
-
-static char folder[] = "/tmp/mild_widest_XXXXXX";
-static char paths[2][64];
-
-static void write_leg(FILE *file, int leg) {
-    for (int i = 0; i < HINGES; i++) {
-        fprintf(file,
-                "<body name='b%d%d' pos='%g %g %g'><joint name='j%d%d' axis='%d %d 0'/>"
-                "<geom type='capsule' size='0.02 0.02' mass='0.3' pos='0 0 -0.03'/>\n",
-                leg, i, i ? 0.0 : leg / 2 - 0.5, i ? 0.0 : 0.2 - 0.4 * (leg % 2), i ? -0.06 : 0.0,
-                leg, i, i == 0, i != 0);
-    }
-    for (int i = 0; i < HINGES; i++) {
-        fputs("</body>", file);
-    }
-}
-
-static void write_mjcf(const char *path) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs("<mujoco><default><joint range='-1 1' actuatorfrcrange='-40 40' armature='0.02'/>"
-          "</default><worldbody><body name='torso' pos='0 0 1'><freejoint/>"
-          "<geom name='trunk' type='box' size='0.5 0.2 0.1' mass='12'/>\n",
-          file);
-    for (int leg = 0; leg < LEGS; leg++) {
-        write_leg(file, leg);
-    }
-    fputs("</body></worldbody></mujoco>\n", file);
-    assert_int_equal(fclose(file), 0);
-}
-
-/* One value per joint, a leg a line. */
-static void write_list(FILE *file, const char *key, const char *first, const char *others) {
-    fprintf(file, "%s =", key);
-    for (int i = 0; i < LEGS * HINGES; i++) {
-        fprintf(file, "%s %s", i && i % HINGES == 0 ? "\n " : "", i % HINGES ? others : first);
-    }
-    fputc('\n', file);
-}
-
-static void write_names(FILE *file, const char *key, int other_side) {
-    fprintf(file, "%s =", key);
-    for (int i = 0; i < LEGS * HINGES; i++) {
-        fprintf(file, "%s j%d%d", i && i % HINGES == 0 ? "\n " : "", (i / HINGES) ^ other_side,
-                i % HINGES);
-    }
-    fputc('\n', file);
-}
-
-static void write_ini(const char *path) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs("[robot]\nname = widest\nmodel = widest.xml\nbase = torso\nshells = trunk\n"
-          "height = 0.6\naction_scale = 0.1\nfeet_range = 0.2 0.5\nknee_range = 0.2 0.5\n"
-          "feet_least = 0.1\nknee_least = 0.1\nfoot_force = 200\nassist = 100 10 50 20\n[joints]\n",
-          file);
-    write_names(file, "names", 0);
-    write_names(file, "mirror", 1);
-    write_list(file, "mirror_sign", "-1", "1");
-    write_list(file, "pose", "0", "0");
-    write_list(file, "swing", "-1", "0.5");
-    write_list(file, "kp", "60", "60");
-    write_list(file, "kd", "2", "2");
-    for (int leg = 0; leg < LEGS; leg++) {
-        fprintf(file,
-                "[foot.f%d]\nbody = b%d9\nknee = b%d5\nmirror = f%d\noffset = %g\nshape = round\n"
-                "center = 0 0 -0.06\nradius = 0.03\npitch = 0.01\n",
-                leg, leg, leg, leg ^ 1, offset_of[leg]);
-    }
-    assert_int_equal(fclose(file), 0);
-}
+enum { LEGS = WIDEST_LEGS, HINGES = WIDEST_HINGES };
 
 static int widest_setup(void **unused) {
     (void)unused;
     MildError error = {0};
-    if (!mkdtemp(folder)) {
-        return 1;
-    }
-    snprintf(paths[0], sizeof paths[0], "%s/widest.xml", folder);
-    snprintf(paths[1], sizeof paths[1], "%s/robot.ini", folder);
-    write_mjcf(paths[0]);
-    write_ini(paths[1]);
-    robot = robot_create(folder, &error);
+    robot = widest_open(&error);
     if (!robot) {
         fail_msg("%s", error.text);
     }
@@ -98,11 +17,8 @@ static int widest_setup(void **unused) {
 }
 
 static int widest_teardown(void **unused) {
-    robot_destroy(robot);
     (void)unused;
-    unlink(paths[0]);
-    unlink(paths[1]);
-    return rmdir(folder);
+    return widest_close(robot);
 }
 
 static void widths(void **unused) {
@@ -142,7 +58,7 @@ static void gait_of_any_offset(void **unused) {
         task_gait_reference(&def, robot, phase, 0, q);
         for (int f = 0; f < LEGS; f++) {
             double since =
-                phase - offset_of[f] + (phase < offset_of[f]); /* cycles since touchdown */
+                phase - widest_offset[f] + (phase < widest_offset[f]); /* cycles since touchdown */
             int swing = since >= 0.5;
             double wave = sin(2 * KIT_PI * since);
             double height = swing ? def.swing_apex * sin(KIT_PI * (since - 0.5) / 0.5) : 0;
