@@ -157,21 +157,6 @@ void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int
     pass(scratch, dt, twist, first, 1);
 }
 
-void contact_bounds(MildScratch *scratch, double share) {
-    for (int f = 0; f < scratch->feet; f++) {
-        const Slots *s = &scratch->foot[f].slot;
-        for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
-            const Element element = slot_element(s, i);
-            const double now = friction_bound(&element, s->iz[i]);
-            if (share < 1.0) {
-                s->bound[i] += share * (now - s->bound[i]);
-            } else {
-                s->bound[i] = now; /* whatever it was before */
-            }
-        }
-    }
-}
-
 /* Sums of each entry of h times 1, x, y, x^2, xy, y^2. They hold the whole foot, since p is linear
  * in x and y. */
 typedef double Moments[3][3][6];

@@ -91,9 +91,10 @@ typedef struct {
     double *hzy; /* [kg] */
     double *hzz; /* [kg] */
 
-    double *bound; /* [N s] of friction, where the solver holds it: contact_bounds */
-    double *fx;    /* [N s] friction without the drift's damping: the sweeps */
-    double *fy;    /* [N s] */
+    double *bound;       /* [N s] of friction, where the solver holds it: bounds_move */
+    double *bound_moved; /* [N s] its last move */
+    double *fx;          /* [N s] friction without the drift's damping: the sweeps */
+    double *fy;          /* [N s] */
 } Slots;
 #define SLOT_ARRAYS (sizeof(Slots) / sizeof(double *))
 
