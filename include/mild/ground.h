@@ -220,8 +220,9 @@ double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, dou
 /* The material of a rival model that compares fairly with `mild`, a material of MILD_MODEL_MILD:
  * under `load` [N] (half the robot's weight) one level foot sinks as deep. Friction, drift,
  * recovery and bed are mild's where the rival has them. sole: the raster; the result is for that
- * raster, or for mild_sole_concentric of it when the model is concentric. Fails for rigid, for a
- * material of another model, and without a load. */
+ * raster, or for mild_sole_concentric of it when the model is concentric. Fails, with *rival as it
+ * was, for rigid, for a material that mild_material_check refuses or of another model, without a
+ * load, and when the rival would need a number that mild_material_check refuses. */
 MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error);
 
@@ -259,7 +260,9 @@ typedef struct {
                                                 without ground */
     MildSolver solver;                       /* which of the two */
     double tolerance;   /* [-] of the residual; 0 = default, 1e-9 (sweeps 1e-10) */
-    int max_iterations; /* 0 = default; the hard bound of work */
+    int max_iterations; /* 0 = default: 400, sweeps 1000; the bound of Newton steps or sweeps. A step
+                           that Newton's method leaves unsolved takes up to 40 more; one in which
+                           friction would create energy is solved up to twice again */
 } MildContactInput;
 
 /* The ground on one foot, mean over the step (docs/model.md section 9). Zero for a foot in the air.
@@ -268,7 +271,7 @@ typedef struct {
     double force[3];    /* [N] on the foot, world */
     double torque[3];   /* [N m] about the ankle, world, p x F */
     double zmp_axis[3]; /* [m] from the ankle: point of the central axis nearest the ankle, F x
-                           tau/|F|^2 */
+                           tau/|F|^2; 0 where that is beyond all numbers */
     double zmp_sole[2]; /* [m] from the ankle, world axes, on the plane through the sole centre */
     double
         pressure_center[3]; /* [m] world: sum of p f over sum of f, f the elements' normal forces; 0
@@ -283,7 +286,8 @@ typedef struct {
     MildFootResult foot[MILD_FEET_MAX]; /* [feet] */
     double velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] twists at the ankles after the step, V+ = V^
                                            + A W */
-    double residual;                    /* [-] relative, in the metric of kinetic energy, at exit */
+    double residual;                    /* [-] relative, in the metric of kinetic energy, at exit;
+                                           converged above the tolerance: all of it is rounding */
     int iterations;                     /* Newton steps or sweeps done */
     int converged; /* bool; 0 whenever a pose or a result is not finite, a material's number NaN, or
                       dt not positive */
@@ -327,8 +331,10 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
 void mild_scratch_destroy(MildScratch *scratch);
 
 /* Pure: reads ground, writes only scratch and result; may be called any number of times before
- * mild_ground_advance. The soles of ground and scratch are the same. It always comes back, within
- * max_iterations: look at result->converged. Impulses by eqs 4, 5, 13 and 14, twists by eq 9. */
+ * mild_ground_advance. The soles of ground and scratch are the same. It always comes back: look at
+ * result->converged. Where that is 0 the impulses are the ground's at twists near those returned, or
+ * all but the bound of friction is (docs/model.md section 7). Impulses by eqs 4, 5, 13 and 14, twists
+ * by eq 9. */
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                        const MildContactInput *input, MildScratch *scratch,
                        MildContactResult *result);
