@@ -232,8 +232,9 @@ double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, dou
  * MILD_MODEL_MILD: under `load` [N] one level foot sinks to the same depth. Half the weight of the
  * robot is a good load. Friction, drift, recovery and bed are those of `mild` where the model has
  * them. sole: the raster; when the model is concentric the result is for mild_sole_concentric of
- * it. Fails for rigid, when `mild` is a material of another model, and when the load is not
- * positive. */
+ * it. Fails, with *rival unchanged, for rigid, when `mild` is a material of another model or one
+ * that mild_material_check refuses, when the load is not positive, and when the rival would need a
+ * number that mild_material_check refuses. */
 MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error);
 
@@ -271,9 +272,12 @@ typedef struct {
     double inverse_inertia[6 * MILD_FEET_MAX * 6 * MILD_FEET_MAX];
     /* [m/s, rad/s] Twists after a step without ground, V_free = J (qvel + dt M^-1 (tau - b)). */
     double free_velocity[6 * MILD_FEET_MAX];
-    MildSolver solver;  /* which of the two */
-    double tolerance;   /* [-] of the residual; 0: 1e-9 (sweeps 1e-10) */
-    int max_iterations; /* hard bound of the work; 0: 400 Newton steps or 1000 sweeps */
+    MildSolver solver; /* which of the two */
+    double tolerance;  /* [-] of the residual; 0: 1e-9 (sweeps 1e-10) */
+    /* Bound of Newton steps or sweeps; 0: 400 steps or 1000 sweeps. A step that Newton's method
+     * leaves unsolved takes up to 40 more. One in which friction would create energy is solved up to
+     * twice again. */
+    int max_iterations;
 } MildContactInput;
 
 /* What the ground does to one foot, mean over the step (docs/model.md section 9). All 0 for a foot
@@ -281,7 +285,8 @@ typedef struct {
 typedef struct {
     double force[3];  /* [N] on the foot, world */
     double torque[3]; /* [N m] about the ankle, world: p x F */
-    /* [m] From the ankle: point of the wrench's central axis nearest the ankle, F x tau/|F|^2. */
+    /* [m] From the ankle: point of the wrench's central axis nearest the ankle, F x tau/|F|^2. 0
+     * where that overflows. */
     double zmp_axis[3];
     /* [m] From the ankle, world axes: zero moment point on the level plane through the centroid of
      * the elements. */
@@ -300,8 +305,10 @@ typedef struct {
     MildFootResult foot[MILD_FEET_MAX]; /* [feet] */
     double velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] twists at the ankles after the step,
                                            V = V_free + A W, W the wrench impulses */
-    double residual;                    /* [-] relative, in the metric of kinetic energy */
-    int iterations;                     /* Newton steps or sweeps done */
+    /* [-] Relative, in the metric of kinetic energy. Converged above the tolerance: all of it is
+     * rounding. */
+    double residual;
+    int iterations; /* Newton steps or sweeps done */
     /* Bool. It is 0 also when a pose or a result is not finite, when a number of a material is NaN
      * and when dt is not positive. */
     int converged;
@@ -348,8 +355,9 @@ void mild_scratch_destroy(MildScratch *scratch);
 
 /* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground and
  * writes scratch and result only, so it may be called any number of times before
- * mild_ground_advance. Scratch and ground must have the same soles. It always returns within
- * max_iterations; result->converged says whether the tolerance was reached. */
+ * mild_ground_advance. Scratch and ground must have the same soles. It always returns:
+ * look at result->converged. Where that is 0, either the impulses are those of the ground at twists
+ * near the returned ones, or everything but the friction bound is (docs/model.md section 7). */
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                        const MildContactInput *input, MildScratch *scratch,
                        MildContactResult *result);

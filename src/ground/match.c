@@ -71,12 +71,12 @@ static MildStatus match_check(MildModel model, const MildMaterial *mild, double 
     if (!(load > 0.0 && load < INFINITY)) {
         return mild_fail(error, MILD_ERROR_RANGE, "model: load = %g N must be positive", load);
     }
-    return MILD_OK;
+    return mild_material_check(mild, error);
 }
 
 MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error) {
-    const MildStatus status = match_check(model, mild, load, error);
+    MildStatus status = match_check(model, mild, load, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -88,16 +88,23 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
     const double pressure =
         load / (cells * cell) - LAW_BED_STRESS * fmax(depth - mild->bed_depth, 0.0);
 
-    *rival = *mild;
-    rival->model = (int)model;
+    MildMaterial matched = *mild;
+    matched.model = (int)model;
     if (row->info.concentric) {
-        material_concentrate(rival, cells);
+        material_concentrate(&matched, cells);
     }
     if (row->reference) {
-        row->reference(rival, area);
+        row->reference(&matched, area);
     }
     if (row->info.scaled[0]) {
-        rival_scale(rival, row, pressure, area, depth);
+        rival_scale(&matched, row, pressure, area, depth);
     }
+    MildError why;
+    status = mild_material_check(&matched, &why);
+    if (status != MILD_OK) {
+        return mild_fail(error, status, "model: %s cannot match this material under %g N: %s",
+                         mild_model_names[model], load, why.text);
+    }
+    *rival = matched;
     return MILD_OK;
 }

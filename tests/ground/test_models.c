@@ -102,6 +102,38 @@ static void test_matched(void **state) {
     assert_true(worst_force < 2e-3); /* con_cone's drag at 1 cm/s */
 }
 
+/* Materials from all of the accepted ranges: what a match returns can be used, or it fails, says why
+ * and returns nothing. */
+static void test_match_is_accepted(void **state) {
+    (void)state;
+    uint64_t random = 41;
+    int matched = 0, refused = 0;
+    for (int draw = 0; draw < 20000; draw++) {
+        MildMaterial mild = mild_material_default();
+        for (int f = 0; f < mild_material_field_count; f++) {
+            const MildField *field = &mild_material_fields[f];
+            double *value = (double *)((char *)&mild + field->offset);
+            if (field->type == MILD_FIELD_DOUBLE && kit_index(&random, 2)) {
+                *value = kit_uniform(&random, field->min, field->max);
+            }
+        }
+        const MildModel model = (MildModel)kit_index(&random, MILD_MODEL_RIGID);
+        const double load = pow(10.0, kit_uniform(&random, -3.0, 7.0));
+        MildMaterial rival = {.k_pen = -1.0};
+        MildError error = {0};
+        if (mild_model_match(model, &mild, raster[0], load, &rival, &error) == MILD_OK) {
+            matched++;
+            assert_int_equal(mild_material_check(&rival, &error), MILD_OK);
+            continue;
+        }
+        refused++;
+        assert_true(rival.k_pen == -1.0);
+        assert_non_null(strstr(error.text, "ground."));
+    }
+    print_message("materials from the accepted ranges: %d matched, %d refused\n", matched, refused);
+    assert_true(matched > 1000 && refused > 100);
+}
+
 static void test_refusals(void **state) {
     (void)state;
     MildMaterial mild = mild_material_default(), rival = mild,
@@ -562,10 +594,11 @@ static void test_moment(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_matched),        cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_equilibrium),    cmocka_unit_test(test_no_creep),
-        cmocka_unit_test(test_impact),         cmocka_unit_test(test_passive),
-        cmocka_unit_test(test_symmetry),       cmocka_unit_test(test_solvers_agree),
-        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_moment)};
+        cmocka_unit_test(test_matched),       cmocka_unit_test(test_match_is_accepted),
+        cmocka_unit_test(test_refusals),      cmocka_unit_test(test_equilibrium),
+        cmocka_unit_test(test_no_creep),      cmocka_unit_test(test_impact),
+        cmocka_unit_test(test_passive),       cmocka_unit_test(test_symmetry),
+        cmocka_unit_test(test_solvers_agree), cmocka_unit_test(test_copy_continues),
+        cmocka_unit_test(test_moment)};
     return cmocka_run_group_tests(tests, make_soles, drop_soles);
 }
