@@ -31,6 +31,9 @@ TREE = WORK / "tree"
 BUILD = WORK / "build"
 NAMED = ROOT / "tests" / "mutants.txt"
 
+# Share of their draws that the ground's random tests make (tests/ground/ground_kit.h).
+DRAWS = "0.1"
+
 # A layer without a folder of tests is tested by the layer above it.
 TESTED_BY = {"control": ("control", "eval")}
 
@@ -599,7 +602,8 @@ class Worker:
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 30, 1 << 30))
 
-        environment = dict(os.environ, CMOCKA_TEST_ABORT="1", TMPDIR=str(self.folder))
+        environment = dict(os.environ, CMOCKA_TEST_ABORT="1", TMPDIR=str(self.folder),
+                           MILD_TEST_DRAWS=DRAWS)
         log = self.folder / "log"
         with open(log, "wb") as out:
             child = subprocess.Popen(command, cwd=self.run_folder, stdout=out, stderr=out,
