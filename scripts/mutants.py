@@ -67,6 +67,8 @@ KIND = {"+": "arithmetic", "-": "arithmetic", "*": "arithmetic", "/": "arithmeti
         "^": "bits", "<<": "bits", ">>": "bits"}
 FUNCTIONS = {"fmin": "fmax", "fmax": "fmin", "sin": "cos", "cos": "sin", "floor": "ceil",
              "ceil": "floor", "fabs": "", "fabsf": "", "sqrt": "", "abs": "", "isfinite": "!isfinite"}
+# The first two arguments exchanged: the same memory, the same verdict on equality, the same number.
+SYMMETRIC = set("calloc strcmp strncmp memcmp fmin fmax hypot".split())
 # Not mutated inside: messages and assertions. Not removed: what frees (the sanitizers watch leaks).
 QUIET_CALL = re.compile(r"(static_)?assert|_Static_assert|\w*printf|fputs|puts|perror|\w*_fail|"
                         r"\w*_message|usage")
@@ -321,7 +323,8 @@ class File:
         declaration = self.source[:token.begin].endswith("\n") or is_type(self.tokens[i - 1]) or (
             self.tokens[i - 1].text == "*" and is_type(self.tokens[i - 2]))
         if not declaration:
-            for (a, b), (c, d) in zip(arguments, arguments[1:]):
+            pairs = list(zip(arguments, arguments[1:]))
+            for (a, b), (c, d) in pairs[1:] if token.text in SYMMETRIC else pairs:
                 first, second = self.source[a:b].strip(), self.source[c:d].strip()
                 if first != second:
                     a += len(self.source[a:b]) - len(self.source[a:b].lstrip())

@@ -196,6 +196,7 @@ static void test_advantages(void **state) {
     int valid = 0;
     for (int i = 0; i < STEPS * ENVS; i++) {
         valid += b->valid[i];
+        assert_true(b->valid[i] || (b->advantage[i] == 0.0f && b->returns[i] == 0.0f));
     }
     for (int k = 0; k < ppo->samples; k++) {
         gap = fmax(gap,
