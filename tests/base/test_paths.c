@@ -12,6 +12,7 @@
 
 #include <cmocka.h>
 
+#include "base/file.h"
 #include "base/paths.h"
 
 static char folder[64];
@@ -97,7 +98,7 @@ static void test_make_folder(void **state) {
     assert_int_equal(path_make_folder(name, &error), MILD_ERROR_ARGUMENT);
     assert_non_null(strstr(error.text, "too long"));
     const char *file = in_folder("a/file");
-    assert_int_equal(path_write(file, "x", 1, &error), MILD_OK);
+    assert_int_equal(file_write(file, "x", 1, &error), MILD_OK);
     assert_int_equal(path_make_folder(file, &error), MILD_ERROR_IO);
     assert_non_null(strstr(error.text, "not a folder"));
     assert_int_equal(path_make_folder(in_folder("a/file/below"), &error), MILD_ERROR_IO);
@@ -112,20 +113,20 @@ static void test_write(void **state) {
     (void)state;
     MildError error = {0};
     const char *path = in_folder("file");
-    assert_int_equal(path_write(path, "first", 5, &error), MILD_OK);
+    assert_int_equal(file_write(path, "first", 5, &error), MILD_OK);
     expect_file(path, "first");
-    assert_int_equal(path_write(path, "2nd", 3, &error), MILD_OK); /* shorter: nothing remains */
+    assert_int_equal(file_write(path, "2nd", 3, &error), MILD_OK); /* shorter: nothing remains */
     expect_file(path, "2nd");
-    assert_int_equal(path_write(path, "", 0, &error), MILD_OK);
+    assert_int_equal(file_write(path, "", 0, &error), MILD_OK);
     expect_file(path, "");
     remove(path);
-    assert_int_equal(path_write("", "x", 1, &error), MILD_ERROR_ARGUMENT);
-    assert_int_equal(path_write(in_folder("no/file"), "x", 1, &error), MILD_ERROR_IO);
+    assert_int_equal(file_write("", "x", 1, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_write(in_folder("no/file"), "x", 1, &error), MILD_ERROR_IO);
     assert_non_null(strstr(error.text, "No such file"));
-    assert_int_equal(path_write("/dev/full", "x", 1, &error), MILD_ERROR_IO);
+    assert_int_equal(file_write("/dev/full", "x", 1, &error), MILD_ERROR_IO);
     assert_non_null(strstr(error.text, "No space left"));
-    assert_int_equal(path_write("/dev/null", "x", 1, &error), MILD_OK);
-    assert_int_equal(path_write(folder, "x", 1, &error), MILD_ERROR_IO);
+    assert_int_equal(file_write("/dev/null", "x", 1, &error), MILD_OK);
+    assert_int_equal(file_write(folder, "x", 1, &error), MILD_ERROR_IO);
     assert_non_null(strstr(error.text, "directory"));
 }
 
@@ -139,8 +140,8 @@ static void test_pipe(void **state) {
     assert_int_equal(mkfifo(path, 0600), 0);
     int reader = open(path, O_RDONLY | O_NONBLOCK);
     assert_true(reader >= 0);
-    assert_int_equal(path_check_write(path, &error), MILD_OK);
-    assert_int_equal(path_write(path, "hello", 5, &error), MILD_OK);
+    assert_int_equal(file_check_write(path, &error), MILD_OK);
+    assert_int_equal(file_write(path, "hello", 5, &error), MILD_OK);
     assert_int_equal(read(reader, read_back, sizeof read_back), 5);
     assert_string_equal(read_back, "hello");
     assert_true(stat(path, &info) == 0 && S_ISFIFO(info.st_mode));
@@ -152,23 +153,23 @@ static void test_check_write(void **state) {
     (void)state;
     MildError error = {0};
     const char *path = in_folder("file");
-    assert_int_equal(path_check_write(path, &error), MILD_OK);
+    assert_int_equal(file_check_write(path, &error), MILD_OK);
     assert_int_not_equal(access(path, F_OK), 0); /* nothing is left behind */
-    assert_int_equal(path_write(path, "kept", 4, &error), MILD_OK);
-    assert_int_equal(path_check_write(path, &error), MILD_OK);
+    assert_int_equal(file_write(path, "kept", 4, &error), MILD_OK);
+    assert_int_equal(file_check_write(path, &error), MILD_OK);
     expect_file(path, "kept");
     remove(path);
-    assert_int_equal(path_check_write("", &error), MILD_ERROR_ARGUMENT);
-    assert_int_equal(path_check_write(in_folder("no/file"), &error), MILD_ERROR_IO);
-    assert_int_equal(path_check_write(folder, &error), MILD_ERROR_IO);
+    assert_int_equal(file_check_write("", &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_check_write(in_folder("no/file"), &error), MILD_ERROR_IO);
+    assert_int_equal(file_check_write(folder, &error), MILD_ERROR_IO);
     assert_non_null(strstr(error.text, "directory"));
-    assert_int_equal(path_check_write("/dev/null", &error), MILD_OK);
-    assert_int_not_equal(path_check_write("/proc/self/maps", &error), MILD_OK);
+    assert_int_equal(file_check_write("/dev/null", &error), MILD_OK);
+    assert_int_not_equal(file_check_write("/proc/self/maps", &error), MILD_OK);
     char name[PATH_SIZE];
     memset(name, 'n', sizeof name);
     name[PATH_SIZE - 1] = '\0';
-    assert_int_equal(path_check_write(name, &error), MILD_ERROR_ARGUMENT);
-    assert_int_equal(path_write(name, "x", 1, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_check_write(name, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_write(name, "x", 1, &error), MILD_ERROR_ARGUMENT);
 }
 
 int main(void) {
