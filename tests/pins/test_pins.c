@@ -63,8 +63,8 @@ enum { ENVS = 6, STEPS = 100 };
 
 /* What the learner sees of every step: histories, critic inputs, rewards, ends of episodes. */
 static uint64_t hash_rollout(const TaskDef *def) {
-    static float history[ENVS * TASK_HISTORY], critic[ENVS * TASK_CRITIC], reward[ENVS];
-    static float action[ENVS * TASK_ACTIONS];
+    static float history[ENVS * SA01_HISTORY], critic[ENVS * SA01_CRITIC], reward[ENVS];
+    static float action[ENVS * SA01_JOINTS];
     static uint8_t done[ENVS], timeout[ENVS], valid[ENVS];
     MildError error = {0};
     Pool *pool = pool_create(1);
@@ -74,7 +74,7 @@ static uint64_t hash_rollout(const TaskDef *def) {
     assert_non_null(vec);
     vec_reset(vec, &view);
     for (int t = 0; t < STEPS; t++) {
-        for (int i = 0; i < ENVS * TASK_ACTIONS; i++) {
+        for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
             Random random = random_at(99, (uint32_t)i, (uint32_t)t);
             action[i] = (float)(1.2 * random_normal(&random));
         }
@@ -107,14 +107,14 @@ static void pin_short_walk(const char *ground, const TaskDef *like) {
     rig.env->command[0] = 0.5;
     task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
     for (int t = 0; t < 40; t++) {
-        float action[TASK_ACTIONS];
-        for (int i = 0; i < TASK_ACTIONS; i++) {
+        float action[SA01_JOINTS];
+        for (int i = 0; i < SA01_JOINTS; i++) {
             action[i] = (float)(0.4 * sin(0.15 * t + 0.7 * i));
         }
         TaskStep step = rig_step(&rig, action);
         assert_true(step.valid);
         reward += (double)step.reward / 40;
-        for (int f = 0; f < ROBOT_FEET; f++) {
+        for (int f = 0; f < SA01_FEET; f++) {
             load += robot_sim_foot(rig.sim, f)->force[2] / 40;
         }
     }
