@@ -69,7 +69,7 @@ FUNCTIONS = {"fmin": "fmax", "fmax": "fmin", "sin": "cos", "cos": "sin", "floor"
              "ceil": "floor", "fabs": "", "fabsf": "", "sqrt": "", "abs": "", "isfinite": "!isfinite"}
 # The first two arguments exchanged: the same memory, the same verdict on equality, the same number.
 SYMMETRIC = set("calloc strcmp strncmp memcmp fmin fmax hypot".split())
-# Not mutated inside: messages and assertions. Not removed: what frees (the sanitizers watch leaks).
+# Not mutated inside: messages, assertions, and what frees (the sanitizers watch leaks). Nor removed.
 QUIET_CALL = re.compile(r"(static_)?assert|_Static_assert|\w*printf|fputs|puts|perror|\w*_fail|"
                         r"\w*_message|usage")
 FREEING_CALL = re.compile(r"free|fclose|close|unlink|remove|\w*_(free|destroy|close)")
@@ -172,7 +172,8 @@ class File:
     def quiet_places(self):
         quiet = set()
         for i, token in enumerate(self.tokens[:-1]):
-            if token.kind == "name" and QUIET_CALL.fullmatch(token.text) and i + 1 in self.pair:
+            silent = QUIET_CALL.fullmatch(token.text) or FREEING_CALL.fullmatch(token.text)
+            if token.kind == "name" and silent and i + 1 in self.pair:
                 quiet.update(range(i, self.pair[i + 1] + 1))
         return quiet
 
