@@ -494,6 +494,38 @@ static void test_hard_problems(void **state) {
 
 /* ---- invariances ---- */
 
+/* How hard the solvers work: a wrong diagonal, derivative or start finds the same answer later. The
+ * numbers are what the solvers needed when they were last right, and a fiftieth. */
+static void test_effort(void **state) {
+    (void)state;
+    enum { PROBLEMS = 150, SWEEPS_MAX = 500 };
+    static const double newton_most[2] = {4.333, 4.519}, sweeps_most[2] = {102.3, 93.4};
+    for (int uneven = 0; uneven < 2; uneven++) {
+        double newton = 0.0, sweeps = 0.0;
+        int problems = 0;
+        for (int number = 0; number < PROBLEMS; number++) {
+            Kit kit;
+            MildMap *map = NULL;
+            if (uneven ? kind_problem(&kit, &map, UNEVEN, number)
+                       : numbered_problem(&kit, number)) {
+                problems++;
+                newton += kit.result.iterations;
+                kit.input.solver = MILD_SOLVER_GAUSS_SEIDEL;
+                kit.input.max_iterations = SWEEPS_MAX;
+                kit_solve(&kit);
+                sweeps += kit.result.iterations;
+            }
+            kit_close(&kit);
+            mild_map_destroy(map);
+        }
+        newton /= problems;
+        sweeps /= problems;
+        print_message("effort on %s ground: %.3f Newton steps, %.2f sweeps in the mean of %d\n",
+                      uneven ? "uneven" : "level", newton, sweeps, problems);
+        assert_true(newton < 1.02 * newton_most[uneven] && sweeps < 1.02 * sweeps_most[uneven]);
+    }
+}
+
 static void turn_vector(double *v, double c, double s) {
     double x = c * v[0] - s * v[1], y = s * v[0] + c * v[1];
     v[0] = x;
@@ -750,12 +782,16 @@ static void test_outputs(void **state) {
 }
 
 int main(int count, char **arguments) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_dense_reference), cmocka_unit_test(test_dense_kinds),
-        cmocka_unit_test(test_hard_problems),   cmocka_unit_test(test_newton_converges),
-        cmocka_unit_test(test_solvers_agree),   cmocka_unit_test(test_symmetry),
-        cmocka_unit_test(test_element_order),   cmocka_unit_test(test_pure),
-        cmocka_unit_test(test_outputs)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_dense_reference),
+                                       cmocka_unit_test(test_dense_kinds),
+                                       cmocka_unit_test(test_hard_problems),
+                                       cmocka_unit_test(test_effort),
+                                       cmocka_unit_test(test_newton_converges),
+                                       cmocka_unit_test(test_solvers_agree),
+                                       cmocka_unit_test(test_symmetry),
+                                       cmocka_unit_test(test_element_order),
+                                       cmocka_unit_test(test_pure),
+                                       cmocka_unit_test(test_outputs)};
     const struct CMUnitTest reference[] = {cmocka_unit_test(test_dense_reference),
                                            cmocka_unit_test(test_dense_kinds)};
     if (count < 2) {
