@@ -119,8 +119,9 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
                             const MildMaterial *material, double dt) {
     memset(kit, 0, sizeof *kit);
     kit->feet = feet;
-    kit->soles[0] = left;
-    kit->soles[1] = right;
+    for (int f = 0; f < feet; f++) {
+        kit->soles[f] = f % 2 ? right : left;
+    }
     MildError error = {0};
     kit->scratch = mild_scratch_create(kit->soles, feet, &error);
     if (!kit->scratch) {
