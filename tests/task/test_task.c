@@ -54,6 +54,7 @@ static uint64_t rollout(int threads, int envs, int steps, MildModel model, VecSt
     return hash;
 }
 
+/* What the numbers are is pinned by tests/pins. */
 static void same_numbers_whatever_the_thread_count(void **state) {
     (void)state;
     VecStats stats;
