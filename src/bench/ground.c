@@ -31,8 +31,9 @@ static void sole_center(const MildSole *sole, double center[2]) {
     }
 }
 
-/* Two level feet that stand at rest on the surface. A couples them as a trunk would. The smooth forces
- * press each with half of 33 kg at the centre of its sole, V^ = V + dt A w. */
+/* Two level feet that stand: A couples them as a trunk would, and the smooth forces press each with
+ * half of 33 kg at the centre of its sole, V_free = V + dt A w. The feet touch the surface
+ * and rest. */
 static void ground_input(MildContactInput *input, const MildSole *const *soles, double dt) {
     const double linear = 1.0 / 20, angular = 1.0 / 0.3, coupling = 0.6, load = 33.0 / 2 * 9.81;
     double wrench[ROWS] = {0};

@@ -207,7 +207,8 @@ static void remove_leftovers(const char *folder) {
     }
 }
 
-/* Locks the folder, then checks it again: another run may have begun there since the first check. */
+/* From here on the folder is this run's alone. Another may have begun there since it was
+ * checked. */
 static MildStatus take_folder(TrainRun *run, MildError *error) {
     const char *folder = run->def.folder;
     char path[PATH_SIZE];
