@@ -156,7 +156,7 @@ void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y,
     LAUNCH(add_slices, blocks_of(width), line, stream, width, partial, beta, d_bias);
 }
 
-/* ---- joints of the networks ---- */
+/* ---- rows between the networks ---- */
 
 /* One thread a number of the input [newest frame | estimates | theta1 mu + theta2]. */
 static __global__ void actor_input(GpuWidths w, int rows, const float *history, const float *heads,

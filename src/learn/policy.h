@@ -28,8 +28,8 @@ void policy_value(Policy *policy, Pool *pool, int rows, const float *critic, flo
 const float *policy_std(const Policy *policy); /* [actions] current standard deviation */
 
 /* Safetensors with metadata: the def, a version line, a free text `note`, CRC32 of the data.
- * Temporary name, fsync, rename. load builds a policy from the file alone (missing, truncated,
- * bit-flipped: one clear line). */
+ * Written completely or not at all. load builds a policy from the file alone; a
+ * missing or damaged file gives one clear line. */
 MildStatus policy_save(const Policy *policy, const char *path, const char *note, MildError *error);
 Policy *policy_load(const char *path, char *note, int note_size, MildError *error);
 

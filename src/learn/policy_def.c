@@ -21,19 +21,19 @@ PolicyDef policy_def_default(void) {
 }
 
 const MildField policy_fields[] = {
-    MILD_FIELD(PolicyDef, latent, MILD_FIELD_INT, 1, 1, 1024, "[-] width of the latent z"),
+    MILD_FIELD(PolicyDef, latent, MILD_FIELD_INT, 1, 1, 1024, "[-] width of the latent vector z"),
     MILD_FIELD(PolicyDef, encoder_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
-               "[-] widths of the encoder's hidden layers, 0 ends the list"),
+               "[-] widths of the encoder's hidden layers; 0 ends the list"),
     MILD_FIELD(PolicyDef, decoder_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
-               "[-] widths of the decoder's hidden layers, 0 ends the list"),
+               "[-] widths of the decoder's hidden layers; 0 ends the list"),
     MILD_FIELD(PolicyDef, modulation_hidden, MILD_FIELD_INT, 1, 1, 8192,
                "[-] width of the modulation's hidden layer"),
     MILD_FIELD(PolicyDef, modulation_per_dimension, MILD_FIELD_BOOL, 1, 0, 1,
-               "[-] theta1, theta2 per latent dimension instead of scalars"),
+               "[bool] one theta1 and one theta2 per latent dimension, not one for all"),
     MILD_FIELD(PolicyDef, actor_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
-               "[-] widths of the actor's hidden layers, 0 ends the list"),
+               "[-] widths of the actor's hidden layers; 0 ends the list"),
     MILD_FIELD(PolicyDef, critic_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
-               "[-] widths of the critic's hidden layers, 0 ends the list"),
+               "[-] widths of the critic's hidden layers; 0 ends the list"),
     MILD_FIELD(PolicyDef, init_std, MILD_FIELD_DOUBLE, 1, 1e-3, 10.0,
                "[-] initial standard deviation of the action noise"),
 };

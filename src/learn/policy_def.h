@@ -8,19 +8,19 @@
 
 typedef struct {
     /* shape of the problem: set by the task, not by the config */
-    int observation;  /* width of one frame, 47 */
-    int frames;       /* frames in the history, newest last: H + 1 = 6 */
-    int critic_input; /* width of the critic's input */
-    int actions;      /* 12 */
-    int estimates;    /* 11: base velocity 3, feet velocities 6, feet heights 2 */
-    int feet_velocity_offset,
-        feet_velocity_count; /* the estimates that drive the modulation: 3, 6 */
+    int observation;          /* width of one frame, 47 */
+    int frames;               /* frames in the history, newest last: H + 1 = 6 */
+    int critic_input;         /* width of the critic's input */
+    int actions;              /* 12 */
+    int estimates;            /* 11: base velocity 3, feet velocities 6, feet heights 2 */
+    int feet_velocity_offset; /* 3: first of the estimates that drive the modulation */
+    int feet_velocity_count;  /* 6: how many do */
     /* config, section [policy] */
     int latent;                            /* 16 */
     int encoder_hidden[POLICY_LAYERS_MAX]; /* zero-terminated or full: 256 128 */
     int decoder_hidden[POLICY_LAYERS_MAX]; /* 64 128 */
     int modulation_hidden;                 /* 32 */
-    int modulation_per_dimension; /* bool: theta1, theta2 per latent dimension instead of scalars */
+    int modulation_per_dimension; /* bool: theta1 and theta2 for each latent dimension, not one for all */
     int actor_hidden[POLICY_LAYERS_MAX];  /* 512 256 128 */
     int critic_hidden[POLICY_LAYERS_MAX]; /* 768 256 128 */
     double init_std;                      /* initial standard deviation of the action noise */

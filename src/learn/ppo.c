@@ -215,8 +215,8 @@ typedef struct {
     const float *std;
 } ActJob;
 
-/* Actions around the means of the piece's environments, two at a time so that the noise begins at
- * an even number. */
+/* Samples actions around the means for the piece's environments. A piece begins at an even environment,
+ * so that its noise begins at an even number. */
 static void act_piece(void *context, int piece, int thread) {
     (void)thread;
     const ActJob *job = context;
@@ -278,8 +278,8 @@ static void shuffle(Ppo *ppo, int epoch) {
     }
 }
 
-/* 0 before the anneal, 1 after it: a function of the iteration alone, so that a resumed run goes on
- * alike. */
+/* 0 before the annealing, 1 after it. A function of the iteration alone, so a resumed run continues in
+ * the same way. */
 static double anneal_share(const Ppo *ppo) {
     const int first = ppo->def.anneal[0], last = ppo->def.anneal[1];
     return first < last ? fmin(fmax((double)(ppo->iteration - first) / (last - first), 0.0), 1.0)
@@ -301,7 +301,8 @@ static void adapt_learning_rate(Ppo *ppo, double kl) {
     ppo->learning_rate = fmin(fmax(ppo->learning_rate, def->learning_rate_min), most);
 }
 
-/* Between the updates, so that what the rollout samples from is what the update compares with. */
+/* Applied between updates, so that the rollout samples from the distribution that the update compares
+ * with. */
 static void bound_noise(Ppo *ppo) {
     const double *std_max = ppo->def.std_max;
     const float ceiling =
@@ -312,7 +313,7 @@ static void bound_noise(Ppo *ppo) {
     }
 }
 
-/* Young averages forget faster, or the first weights would stay in them for long. */
+/* A young average forgets faster, because otherwise it would keep the first weights for long. */
 static void average_weights(Ppo *ppo) {
     const double young = (1.0 + (double)ppo->iteration) / (10.0 + (double)ppo->iteration);
     const float step = (float)(1.0 - fmin(ppo->def.average, young));
@@ -396,7 +397,7 @@ static void finish_report(const Ppo *ppo, PpoReport *report, int minibatches) {
     report->learning_rate = ppo->learning_rate;
 }
 
-/* What the last step saw is what the next rollout starts from. */
+/* The rows after the last step are the first rows of the next rollout. */
 static void carry_over(Ppo *ppo) {
     const Network *n = &ppo->policy->network;
     PpoBatch *b = &ppo->batch;
@@ -413,8 +414,8 @@ static void carry_over(Ppo *ppo) {
     }
 }
 
-/* Makes each frame of the piece's environments the one that follows it; the last of an episode, and
- * one whose successor is not valid, stays. */
+/* Replaces each frame of the piece's environments by its successor. The last frame of an episode and a
+ * frame before one that is not valid stay. */
 static void shift_piece(void *context, int piece, int thread) {
     (void)thread;
     const Ppo *ppo = context;

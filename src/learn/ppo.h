@@ -9,7 +9,7 @@
 #include "learn/ppo_def.h"
 
 typedef struct Ppo Ppo;
-/* Borrows policy and pool. estimate groups: widths 3, 6, 2 for the report. */
+/* Borrows policy and pool. mirror: NULL for none; it is copied. */
 Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror, int envs,
                 uint64_t seed, MildError *error);
 void ppo_destroy(Ppo *ppo);
@@ -22,20 +22,19 @@ size_t ppo_bytes(const Ppo *ppo); /* memory held */
 /* Fills batch->action/mean/log_prob at time t from batch->history[t]; noise is a function of (seed,
  * iteration, t, env). */
 void ppo_act(Ppo *ppo, int t);
-/* Values, GAE, epochs of minibatches; moves history[steps] etc. to index 0 for the next rollout;
- * iteration += 1. */
+/* Computes values and advantages, runs the epochs of minibatches, moves the rows at time `steps` to
+ * time 0 for the next rollout, and counts the iteration. */
 void ppo_update(Ppo *ppo, PpoReport *report);
 int64_t ppo_iteration(const Ppo *ppo);
 /* The running mean of the weights (Polyak and Juditsky 1992), or the policy itself with def.average
  * = 0. Owned by ppo. */
 Policy *ppo_average(Ppo *ppo);
-/* What stopped the compute backend, if anything did; the parameters are still those of the last
- * good step. */
+/* The error that stopped the compute backend, if any. The parameters are those of the last good step. */
 MildStatus ppo_status(const Ppo *ppo, MildError *error);
 
-/* Everything that resuming needs: parameters, moments, rate, counters, plus an opaque block of the
- * caller (the environments' state). One safetensors file with CRC32, temporary name then rename. On
- * load nothing is changed unless the whole file is good. extra_size must match on load. */
+/* Saves all that resuming needs: parameters, moments, rate, counters, and a block of the caller's (the
+ * environments' state). One safetensors file with a CRC32, written completely or not at all. Loading
+ * changes nothing unless the whole file is good. extra_size must match on load. */
 MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size,
                     const char *note, MildError *error);
 MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error);

@@ -1,10 +1,10 @@
-/* What goes into an update of the learner, and what it says afterwards. */
+/* Input and report of an update of the learner. */
 #ifndef MILD_PPO_BATCH_H
 #define MILD_PPO_BATCH_H
 
 #include <stdint.h>
 
-/* The rollout: the environments write straight into these arrays, time-major [t][env][...]. */
+/* The rollout. The environments write directly into these arrays, [time][environment][...]. */
 typedef struct {
     int steps, envs;
     float *history;   /* [steps+1][envs][frames*observation] */
@@ -18,8 +18,11 @@ typedef struct {
     float *reward;    /* [steps][envs] */
     uint8_t *done;    /* [steps][envs] episode ended at this step (failure or time-out) */
     uint8_t *timeout; /* [steps][envs] ended by time: bootstrap with gamma * V(s_t) */
-    uint8_t *valid;   /* [steps][envs] 0: numbers went bad here; the sample gets no weight */
-    float *value, *advantage, *returns; /* [steps+1 or steps][envs], filled by the learner */
+    uint8_t *valid;   /* [steps][envs] 0: a number was not finite here; the sample gets no weight */
+    /* filled by the learner */
+    float *value;     /* [steps+1][envs] */
+    float *advantage; /* [steps][envs] */
+    float *returns;   /* [steps][envs] */
 } PpoBatch;
 
 typedef struct {

@@ -5,34 +5,37 @@
 
 #include "mild/field.h"
 
-/* Frame that the decoder rebuilds from z and the estimates: the newest one of the history, which
- * the actor has anyway, or the one that follows it, which makes z predict how the ground answers.
- * An episode's last frame has no successor and rebuilds itself. */
+/* Frame that the decoder reconstructs from z and the estimates: the newest frame of the history, or the
+ * next frame. The next frame makes z predict how the ground answers, while the actor sees the newest
+ * one anyway. The last frame of an episode has no successor and is its own target. */
 typedef enum { PPO_TARGET_NEWEST, PPO_TARGET_NEXT, PPO_TARGETS } PpoTarget;
 
 typedef struct {
     int steps;       /* rollout length per environment, 24 */
     int epochs;      /* 4 */
     int minibatches; /* 4 */
-    double gamma, lambda;
-    double clip;
-    double entropy; /* weight */
+    double gamma;    /* [-] discount per policy step */
+    double lambda;   /* [-] decay of generalised advantage estimation */
+    double clip;     /* [-] of the probability ratio and of the change of the value */
+    double entropy;  /* weight */
     double value_weight;
-    int clip_value; /* bool */
-    double learning_rate, learning_rate_min, learning_rate_max;
-    double kl_target; /* 0: fixed learning rate */
+    int clip_value;       /* bool */
+    double learning_rate; /* at the start */
+    double learning_rate_min;
+    double learning_rate_max;
+    double kl_target; /* [nat] 0: fixed learning rate */
     double max_gradient_norm;
     double epsilon;     /* 0.3: share of loss_reg in the joint loss (eq 16) */
     int decoder_target; /* a PpoTarget */
     double kl_weight;   /* phi of the VAE's KL term */
     double mirror_weight;
     double mirror_share;  /* share of each minibatch on which the mirror loss is evaluated */
-    double std_min;       /* floor of the action noise */
-    int anneal[2];        /* first and last iteration of the end game; equal: none */
-    double anneal_factor; /* what KL target and greatest rate are multiplied by at its end */
-    double std_max[2];    /* ceiling of the action noise before and after it */
-    double average; /* decay per iteration of the weights' running mean, which is what gets saved as
-                       the policy; 0: none */
+    double std_min;       /* lower bound of the action noise */
+    int anneal[2];        /* first and last iteration of the annealing; equal: none */
+    double anneal_factor; /* factor on KL target and greatest rate at its end */
+    double std_max[2];    /* upper bound of the action noise before and after it */
+    double average; /* decay per iteration of the running mean of the weights, which is saved as the
+                       policy; 0: none */
 } PpoDef;
 PpoDef ppo_def_default(void);
 extern const MildField ppo_fields[];

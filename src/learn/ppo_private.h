@@ -1,4 +1,4 @@
-/* What a learner holds, for its files, their tests and the compute backends. */
+/* The state of a learner, for its files, its tests and the compute backends. */
 #ifndef MILD_PPO_PRIVATE_H
 #define MILD_PPO_PRIVATE_H
 
@@ -10,7 +10,8 @@
 #include "learn/ppo_def.h"
 
 /* A minibatch is cut into PPO_SHARDS equal runs of samples, each with its own gradient, and a shard
- * into chunks; sums go in the order of shards. None of this depends on the number of threads. */
+ * into chunks. Sums are taken in the order of the shards. So no result depends on the number of
+ * threads. */
 #define PPO_SHARDS 8
 #define PPO_CHUNK 256
 #define PPO_RANGES 64 /* pieces of the parameter arrays in reduction and optimiser */
@@ -21,28 +22,29 @@ typedef struct Ppo {
     Policy *policy;
     Pool *pool;
     PpoBackend backend; /* act NULL: the processor */
-    MildError error;    /* of the backend; once set nothing more is learnt */
-    PpoMirror
-        mirror; /* its arrays are mirror_index and mirror_sign; observation_index NULL: none */
-    int *mirror_index;
-    float *mirror_sign;
+    MildError error;    /* of the backend, which drops its minibatches */
+    PpoMirror mirror;   /* observation_index NULL: none */
+    int *mirror_index;  /* [observation + actions] the arrays that `mirror` points to */
+    float *mirror_sign; /* [observation + actions] */
     uint64_t seed;
     PpoBatch batch;
-    int64_t iteration, adam_steps;
+    int64_t iteration;
+    int64_t adam_steps;
     double learning_rate;
-    Policy *average; /* NULL: none */
-    void *batch_block;
+    Policy *average;   /* NULL: none */
+    void *batch_block; /* memory of the batch's arrays */
     size_t batch_bytes;
     float *gradient; /* [PPO_SHARDS][stride]; the sum ends in shard 0 */
-    size_t stride;
-    float *first, *second; /* Adam's moments */
-    float *scratch;        /* [threads][scratch_floats] */
+    size_t stride;   /* [floats] of a shard's gradient */
+    float *first;    /* [parameters] Adam's first moments */
+    float *second;   /* [parameters] Adam's second moments */
+    float *scratch;  /* [threads][scratch_floats] */
     size_t scratch_floats;
     int mirror_rows; /* images per full chunk */
     int *order;      /* [steps * envs] the valid samples, shuffled every epoch */
-    int *draw;       /* [steps * envs] what the shuffle drew */
-    int samples;     /* how many of them */
-    size_t bytes;
+    int *draw;       /* [steps * envs] random numbers of the shuffle */
+    int samples;     /* number of valid samples */
+    size_t bytes;    /* held in all */
 } Ppo;
 
 /* Piece i of so many environments or samples begins here. */

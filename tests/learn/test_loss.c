@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "learn/loss.h"
+#include "learn/loss_sample.h"
 #include "learn/policy_file.h"
 #include "learn/product.h"
 
@@ -415,12 +416,38 @@ static void test_logvar_is_held(void **state) {
     case_close(&c);
 }
 
+/* The log-variance at -20, -12, 0, 6 and 20, with the gradient pushing down and up: used within its
+ * bounds, and no gradient that would push it further out. */
+static void test_logvar_bounds(void **state) {
+    (void)state;
+    static const struct {
+        float logvar, used;
+        int feels_down, feels_up; /* bool: descent may lower it, raise it */
+    } cases[] = {{-20, -12, 0, 1}, {-12, -12, 1, 1}, {0, 0, 1, 1}, {6, 6, 1, 1}, {20, 6, 1, 0}};
+    double worst = 0.0;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        const float logvar = cases[i].logvar, spread = loss_spread(logvar);
+        const double used = (double)cases[i].used;
+        assert_near("spread", (double)spread, exp(0.5 * used), 1e-6 * exp(0.5 * used), &worst);
+        assert_near("KL", (double)loss_latent_twice(0.5f, logvar, spread),
+                    0.25 + exp(used) - 1.0 - used, 1e-4 * exp(fabs(used) / 2), &worst);
+        /* no KL term: the gradient is d_z spread noise / 2, and descent goes against it */
+        const float down = loss_logvar_gradient(0.0f, logvar, spread, 1.0f, 3.0f);
+        const float up = loss_logvar_gradient(0.0f, logvar, spread, 1.0f, -3.0f);
+        const double slope = 1.5 * (double)spread;
+        assert_near("down", (double)down, cases[i].feels_down ? slope : 0.0, 1e-6 * slope, &worst);
+        assert_near("up", (double)up, cases[i].feels_up ? -slope : 0.0, 1e-6 * slope, &worst);
+    }
+    print_message("log-variance bounds: worst %.1e\n", worst);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_logvar_is_held),
         cmocka_unit_test(test_matches_pytorch),
         cmocka_unit_test(test_matches_differences),
         cmocka_unit_test(test_chunks_add),
+        cmocka_unit_test(test_logvar_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
