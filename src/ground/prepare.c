@@ -92,10 +92,8 @@ static int mixture_has(int32_t mixture, int m) {
            ((mixture & 0xff) == m || (mixture >> 16 > 0 && (mixture >> 8 & 0xff) == m));
 }
 
-static int law_is_nan(const Law *law, const MildMaterial *m) {
-    double sum = law->flat_stiffness + law->line_stiffness + law->cone_depth + law->mass_rate +
-                 law->drag_rate + law->bed_stiffness + law->inverse_cone_depth;
-    return isnan(sum + m->mu + m->k_drift + m->b_drift + m->recovery) || isnan(law->bed_depth);
+static int material_is_nan(const MildMaterial *m) {
+    return isnan(m->mu + m->k_drift + m->b_drift + m->recovery + m->cohesion + m->shear_length);
 }
 
 /* Derives the laws of the terrain's materials anew where their numbers have changed. */
@@ -111,7 +109,7 @@ static void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
                                     .law = law,
                                     .curves = law_curves(&law),
                                     .known = 1,
-                                    .nan = law_is_nan(&law, wanted)};
+                                    .nan = law_is_nan(&law) || material_is_nan(wanted)};
             for (int i = 0; i < foot->padded; i++) {
                 if (mixture_has(foot->slot_material[i], m)) {
                     foot->slot_material[i] = MATERIAL_NONE;
@@ -123,21 +121,15 @@ static void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
     }
 }
 
+#define SLOT_LAW_STORE(name) s->name[i] = law->name;
 static void slot_set_law(const Slots *s, int i, const Law *law, const MildMaterial *material) {
     const double mass = real_max(law->mass_rate, 0.0);
     const double drag = real_max(law->drag_rate, 0.0);
-    s->flat_stiffness[i] = law->flat_stiffness;
-    s->line_stiffness[i] = law->line_stiffness;
-    s->cone_depth[i] = law->cone_depth;
-    s->inverse_cone_depth[i] = law->inverse_cone_depth;
-    s->mass_rate[i] = law->mass_rate;
-    s->drag_rate[i] = law->drag_rate;
-    s->bed_depth[i] = law->bed_depth;
-    s->bed_stiffness[i] = law->bed_stiffness;
+    LAW_NUMBERS(SLOT_LAW_STORE)
     s->exit_drag[i] = 0.5 * (drag + mass); /* mass w + (drag - mass) (h + w)/2 */
     s->entry_drag[i] = 0.5 * (drag - mass);
     s->strength[i] = law->line_stiffness;
-    s->recovery[i] = material->recovery;
+    s->recovery[i] = law_recovery(law, material->recovery);
     s->mu[i] = material->mu;
     s->k_drift[i] = material->k_drift;
     s->b_drift[i] = material->b_drift;
@@ -147,29 +139,19 @@ static double between(double a, double b, double share) {
     return a + share * (b - a);
 }
 
-/* Every number of the law that the steps use, and friction and recovery, change linearly from one
- * material to the other. A mean of two passive laws is passive: it has c_d m >= m/2 too. */
+/* Law, friction and recovery change linearly from one material to the other. */
 static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, int32_t mixture) {
     const DerivedLaw *a = &derived[mixture & 0xff];
     const DerivedLaw *b = &derived[mixture >> 8 & 0xff];
-    const Law *p = &a->law, *q = &b->law;
     const MildMaterial *m = &a->material, *n = &b->material;
     const double t = (mixture >> 16) / 255.0;
-    const Law law = {
-        .flat_stiffness = between(p->flat_stiffness, q->flat_stiffness, t),
-        .line_stiffness = between(p->line_stiffness, q->line_stiffness, t),
-        .cone_depth = between(p->cone_depth, q->cone_depth, t),
-        .inverse_cone_depth = 1.0 / between(p->cone_depth, q->cone_depth, t),
-        .mass_rate = between(p->mass_rate, q->mass_rate, t),
-        .drag_rate = between(p->drag_rate, q->drag_rate, t),
-        .bed_depth = between(p->bed_depth, q->bed_depth, t),
-        .bed_stiffness = between(p->bed_stiffness, q->bed_stiffness, t),
-    };
+    const Law law = law_between(&a->law, &b->law, t);
     const MildMaterial material = {
         .mu = between(m->mu, n->mu, t),
         .k_drift = between(m->k_drift, n->k_drift, t),
         .b_drift = between(m->b_drift, n->b_drift, t),
-        .recovery = between(m->recovery, n->recovery, t),
+        .recovery =
+            between(law_recovery(&a->law, m->recovery), law_recovery(&b->law, n->recovery), t),
     };
     slot_set_law(s, i, &law, &material);
 }
@@ -339,15 +321,19 @@ ALWAYS_INLINE void slots_begin(const Slots *slot, int end, double dt, const Moti
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
-    const int cone = foot->curves & LAW_CONE;
-    if (foot->uneven && cone) {
-        slots_begin(s, end, dt, now, LAW_CONE, 1);
-    } else if (foot->uneven) {
-        slots_begin(s, end, dt, now, LAW_LINE, 1);
-    } else if (cone) {
-        slots_begin(s, end, dt, now, LAW_CONE, 0);
-    } else {
-        slots_begin(s, end, dt, now, LAW_LINE, 0);
+    if (foot->uneven) {
+        switch (law_variant(foot->curves)) {
+        case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE, 1); return;
+        case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 1); return;
+        default: slots_begin(s, end, dt, now, LAW_ALL, 1); return;
+        }
+    }
+    switch (law_variant(foot->curves)) {
+    case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE, 0); return;
+    case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
+    case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
+    case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;
+    default: slots_begin(s, end, dt, now, LAW_ALL, 0); return;
     }
 }
 

@@ -3,13 +3,14 @@
 #ifndef ELEMENT_STEP_H
 #define ELEMENT_STEP_H
 
-#define ELEMENT_LAW 8     /* numbers of Law */
+#define ELEMENT_LAW 13    /* numbers of Law */
 #define ELEMENT_MEMORY 9  /* of ElementMemory */
 #define ELEMENT_RESULTS 7 /* normal, its slope, tangent x y, its derivatives xx xy yy */
 
 /* What a step of one element depends on. */
 typedef struct {
     double law[ELEMENT_LAW];
+    int curves;                            /* LawCurve bits of the loop: those of the law or more */
     double recovery, mu, k_drift, b_drift; /* of the material */
     double memory[ELEMENT_MEMORY];         /* before the step */
     double dt;                             /* [s] */
