@@ -51,6 +51,8 @@ MILD_API_BEGIN
     ROW(ECC_SPRING, ecc_spring)      /* the same spring under every element */                     \
     ROW(ECC_QUASI, ecc_quasi)        /* resistive force theory in the plane of motion */           \
     ROW(ECC_QUASI_3D, ecc_quasi_3d)  /* the same in three dimensions */                            \
+    ROW(BEKKER, bekker)              /* pressure by a power of the sinkage, shear by the path */   \
+    ROW(HUNT_CROSSLEY, hunt_crossley) /* damped and elastic: what most simulators offer */         \
     ROW(RIGID, rigid)                /* the last: the engine's contact; no material has it */
 /* clang-format on */
 
@@ -63,15 +65,17 @@ typedef enum {
 #define MILD_MODELS (MILD_MODEL_RIGID + 1) /* how many there are */
 
 #define MILD_MODEL_FIELDS 20 /* of the material that a model reads, at most */
+#define MILD_MODEL_PRESETS 8 /* materials of its own, at most */
 #define MILD_MODEL_SCALED 4  /* of them those by which it is matched, at most */
 
 /* What a model says of itself. The lists end at the first NULL, or are full. */
 typedef struct {
-    const char *summary;                   /* what the foot stands on */
-    const char *source;                    /* who published it */
-    const char *fields[MILD_MODEL_FIELDS]; /* of the material that it reads */
-    const char *scaled[MILD_MODEL_SCALED]; /* of them those by which mild_model_match fits it */
-    const char *match_note;                /* what that sets besides; NULL: nothing */
+    const char *summary;                     /* what the foot stands on */
+    const char *source;                      /* who published it */
+    const char *fields[MILD_MODEL_FIELDS];   /* of the material that it reads */
+    const char *scaled[MILD_MODEL_SCALED];   /* of them those by which mild_model_match fits it */
+    const char *presets[MILD_MODEL_PRESETS]; /* names of its materials: mild_material_preset */
+    const char *match_note;                  /* what that sets besides; NULL: nothing */
     int concentric; /* bool: one element in the middle of the sole, not the raster */
 } MildModelInfo;
 
@@ -89,22 +93,30 @@ int mild_model_is_concentric(MildModel model);
 /* A plain struct. Start from mild_material_default or a preset, change what differs, and check it
  * with mild_material_check. */
 typedef struct {
-    double k_pen;      /* [N/m] penetration stiffness of one element at the surface */
-    double sigma_cone; /* [N/m^3] depth-dependent conical stress */
-    double alpha;      /* [rad] shear band angle */
-    double nu;         /* [-] recruitment rate */
-    double c_g;        /* [-] surrounding mass scale */
-    double c_d;        /* [-] inertial drag scale */
-    double phi;        /* [-] volume fraction */
-    double rho;        /* [kg/m^3] grain density */
-    double mu;         /* [-] friction coefficient */
-    double k_drift;    /* [N/m^2] drift stiffness k_D per element */
-    double b_drift;    /* [N s/m] drift damping b_D per element */
-    double recovery;   /* [-] share of the depth that springs back: 1 elastic, 0 plastic */
-    double bed_depth;  /* [m] firm bottom below the surface */
-    double zeta;       /* [-] ecc_quasi*: 1 is 1e6 N/m^3 under a level plate going straight down */
-    int passive;       /* bool: clamp c_g >= 0 and c_d >= 1/2 so that no energy is created */
-    int model;         /* MildModel, not MILD_MODEL_RIGID */
+    double k_pen;       /* [N/m] penetration stiffness of one element at the surface; of
+                           hunt_crossley its force by its depth at 10 mm */
+    double sigma_cone;  /* [N/m^3] depth-dependent conical stress */
+    double alpha;       /* [rad] shear band angle */
+    double nu;          /* [-] recruitment rate */
+    double c_g;         /* [-] surrounding mass scale */
+    double c_d;         /* [-] inertial drag scale */
+    double phi;         /* [-] volume fraction */
+    double rho;         /* [kg/m^3] grain density */
+    double mu;          /* [-] friction coefficient */
+    double k_drift;     /* [N/m^2] drift stiffness k_D per element */
+    double b_drift;     /* [N s/m] drift damping b_D per element */
+    double recovery;    /* [-] share of the depth that springs back: 1 elastic, 0 plastic */
+    double bed_depth;   /* [m] firm bottom below the surface */
+    double zeta;        /* [-] ecc_quasi*: 1 is 1e6 N/m^3 under a level plate going straight down */
+    int passive;        /* bool: clamp c_g >= 0 and c_d >= 1/2 so that no energy is created */
+    int model;          /* MildModel, not MILD_MODEL_RIGID */
+    double exponent;    /* [-] bekker, hunt_crossley: power n of the depth */
+    double dissipation; /* [s/m] hunt_crossley: restitution is 1 - dissipation v, v small */
+    double k_c;         /* [N/m^(n+1)] bekker: modulus of deformation, by the plate's width */
+    double k_phi;       /* [N/m^(n+2)] bekker: the same, whatever the width */
+    double plate_width; /* [m] bekker: b, smaller side of the loaded plate */
+    double cohesion;    /* [N/m^2] bekker: c, shear strength without load */
+    double shear_length; /* [m] bekker: K, over which the shear strength builds up */
 } MildMaterial;
 
 /* Fields of MildMaterial with unit, range and meaning, for configuration files, sliders and random
@@ -114,10 +126,11 @@ extern const int mild_material_field_count;
 
 /* The preset sand_loose. */
 MildMaterial mild_material_default(void);
-/* Writes a preset to *material: rubber foam60 foam45 foam28 foam25 grass sand_loose sand_dense.
- * Returns false, and leaves *material alone, when the name is unknown. */
+/* Writes a preset to *material. Of mild: rubber foam60 foam45 foam28 foam25 grass sand_loose
+ * sand_dense. Of bekker: dry_sand sandy_loam clay snow lunar_soil. Returns false, and leaves
+ * *material alone, when the name is unknown. (`rigid` is no material: it is the engine's contact.) */
 int mild_material_preset(const char *name, MildMaterial *material);
-/* Number of presets. */
+/* Number of presets of mild. */
 int mild_material_preset_count(void);
 /* Name of a preset; NULL when index is not 0 .. count - 1. */
 const char *mild_material_preset_name(int index);
@@ -214,10 +227,11 @@ MildSole *mild_sole_concentric(const MildSole *sole, MildError *error);
 /* ---- element law in closed form (eqs 1 to 5, docs/model.md section 3) ---- */
 
 /* Force of virgin ground on an element that goes down with the speed w > 0:
- *     F = force + c_d added_mass_per_depth w^2 + added_mass dw/dt */
+ *     F = force + damping w + c_d added_mass_per_depth w^2 + added_mass dw/dt */
 typedef struct {
     double force;                /* F_g [N] quasistatic */
     double stiffness;            /* dF_g/du [N/m] */
+    double damping;              /* [N s/m] hunt_crossley; 0 of all others */
     double added_mass;           /* m_a [kg] */
     double added_mass_per_depth; /* dm_a/du [kg/m] */
 } MildElementLaw;

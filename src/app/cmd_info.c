@@ -92,7 +92,19 @@ static void print_models(void) {
     printf("ground models (--model NAME) and their sources\n");
     for (int m = 0; m < MILD_MODELS; m++) {
         const MildModelInfo *info = mild_model_info((MildModel)m);
-        printf("  %-12s  %s; %s\n", mild_model_names[m], info->summary, info->source);
+        printf("  %-13s  %s; %s\n", mild_model_names[m], info->summary, info->source);
+    }
+    for (int m = 0; m < MILD_MODELS; m++) {
+        const MildModelInfo *info = mild_model_info((MildModel)m);
+        if (info->presets[0]) {
+            printf("grounds of %s's own (--ground NAME):", mild_model_names[m]);
+        }
+        for (int k = 0; k < MILD_MODEL_PRESETS && info->presets[k]; k++) {
+            printf(" %s", info->presets[k]);
+        }
+        if (info->presets[0]) {
+            printf("\n");
+        }
     }
 }
 
@@ -111,7 +123,7 @@ static void print_rivals(const MildSole *sole) {
     for (int m = 0; m < MILD_MODELS; m++) {
         const char *note = mild_model_info((MildModel)m)->match_note;
         if (note) {
-            printf("  %-12s %s\n", mild_model_names[m], note);
+            printf("  %-13s %s\n", mild_model_names[m], note);
         }
     }
 }
@@ -139,7 +151,7 @@ static int info_grounds(void) {
         if (field->type == MILD_FIELD_DOUBLE) {
             snprintf(range, sizeof range, "%g .. %g", field->min, field->max);
         }
-        printf("  %-10s  %-16s %s\n", field->name, range, field->help);
+        printf("  %-12s  %-16s %s\n", field->name, range, field->help);
     }
     printf("\nsources\n");
     for (int i = 0; i < SOURCES; i++) {
@@ -154,7 +166,7 @@ static int info_models(void) {
         "\nparameters of the ground that each model reads (`mild info grounds` explains them)\n");
     for (int m = 0; m < MILD_MODELS; m++) {
         const MildModelInfo *info = mild_model_info((MildModel)m);
-        printf("  %-12s ", mild_model_names[m]);
+        printf("  %-13s ", mild_model_names[m]);
         for (int k = 0; k < MILD_MODEL_FIELDS && info->fields[k]; k++) {
             printf(" %s", info->fields[k]);
         }

@@ -80,10 +80,16 @@ static MildStatus overlay(const GroundsDef *def, MildMaterial *material, MildErr
 }
 
 MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildError *error) {
-    MildMaterial mild = *material;
-    material->model = (int)def->model;
+    const MildMaterial mild = *material;
+    const int own = mild.model != MILD_MODEL_MILD; /* the preset of another model */
+    if (own && def->model != MILD_MODEL_MILD && (int)def->model != mild.model) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "this ground is one of %s, which has no match in %s: leave out --model",
+                         mild_model_names[mild.model], mild_model_names[def->model]);
+    }
+    material->model = own ? mild.model : (int)def->model;
     MildStatus status = mild_material_check(material, error);
-    if (status == MILD_OK) {
+    if (status == MILD_OK && !own) {
         status = mild_model_match(def->model, &mild, def->sole, def->load, material, error);
     }
     if (status == MILD_OK) {

@@ -58,7 +58,7 @@ MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, 
 
     e->drift_bound = dt * e->k_drift * memory->drift * real_max(e->depth, 0);
     e->damping = e->depth > 0 ? dt * e->b_drift : 0;
-    friction_hold(e, memory, dt, rate, force);
+    friction_hold(e, memory, dt, rate, force + law_elastic_force(&e->law, curves, e->middle));
 }
 
 /* How far the element will enter virgin ground at its present downward speed, beyond the elastic

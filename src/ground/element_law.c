@@ -40,6 +40,44 @@ Law law_cone(const MildMaterial *material, double pitch) {
 }
 
 int law_curves(const Law *law) {
-    int cone = law->flat_stiffness != 0.0 || law->mass_rate != 0.0 || law->drag_rate != 0.0;
-    return cone ? LAW_CONE : LAW_LINE;
+    const int cone = law->flat_stiffness != 0.0 || law->mass_rate != 0.0 || law->drag_rate != 0.0;
+    return (cone ? LAW_CONE : 0) | (law->power_force != 0.0 ? LAW_POWER : 0) |
+           (law->elastic_force != 0.0 ? LAW_ELASTIC : 0);
+}
+
+#define LAW_NUMBER(name) +1
+_Static_assert(sizeof(Law) == (0 LAW_NUMBERS(LAW_NUMBER)) * sizeof(Real), "the list is whole");
+
+#define LAW_ADD(name) +law->name
+int law_is_nan(const Law *law) {
+    return isnan(0.0 LAW_NUMBERS(LAW_ADD)); /* the bed may be at infinity */
+}
+
+double law_recovery(const Law *law, double recovery) {
+    return law->elastic_force != 0.0 ? 1.0 : recovery;
+}
+
+static double between(double a, double b, double share) {
+    return a + share * (b - a);
+}
+
+/* Where only one of two laws has a curve, its force fades out and all else of it stays. */
+static double between_curves(double force_a, double a, double force_b, double b, double share) {
+    if (force_a == 0.0) {
+        return b;
+    }
+    return force_b == 0.0 ? a : between(a, b, share);
+}
+
+#define LAW_BETWEEN(name) .name = between(a->name, b->name, share),
+Law law_between(const Law *a, const Law *b, double share) {
+    Law law = {LAW_NUMBERS(LAW_BETWEEN)};
+    law.inverse_cone_depth = 1.0 / law.cone_depth;
+    law.power_exponent =
+        between_curves(a->power_force, a->power_exponent, b->power_force, b->power_exponent, share);
+    law.elastic_exponent = between_curves(a->elastic_force, a->elastic_exponent, b->elastic_force,
+                                          b->elastic_exponent, share);
+    law.elastic_damping = between_curves(a->elastic_force, a->elastic_damping, b->elastic_force,
+                                         b->elastic_damping, share);
+    return law;
 }

@@ -26,5 +26,13 @@ void law_spring_material(MildMaterial *material, double area);
 Law law_cone(const MildMaterial *material, double pitch);
 /* LawCurve bits of a law. */
 int law_curves(const Law *law);
+/* Bool: a number of it is none. */
+int law_is_nan(const Law *law);
+/* [-] Share of the depth that springs back: all of it where the law has no memory, else the
+ * material's. */
+double law_recovery(const Law *law, double recovery);
+/* Every number of the law changes linearly from a to b. A mean of two passive laws is passive,
+ * because c_d m >= m/2 holds for it too. */
+Law law_between(const Law *a, const Law *b, double share);
 
 #endif

@@ -14,6 +14,7 @@
  *     mass    m_a(a) (max(w, w_y) - w_a)              the added mass moves with the front
  *     growth  (m_a(m1) - m_a(a)) (w + (c_d - 1) V)    mass recruited on the way, and drag
  *     lag     dt T k e(w + h)                         elastic ground lags behind the foot
+ *     elastic (dt/(m1 - m0) + d) (E(m1) - E(m0))      ground without memory, d: its damping
  *
  * The work at the mean velocity, I (w0 + w)/2, is what E gains, since m1 - m0 = dt (w0 + w)/2: path
  * creates and loses no energy at any step size, and its error is of second order in dt. The mean of
@@ -106,6 +107,34 @@ MILD_HD Impulse lag_impulse(const Element *e, Real dt, Real speed) {
     return lag;
 }
 
+/* Ground without memory. The integral of its force F(u) (1 + d w) over the way is
+ *
+ *     dt mean F + d (E(m1) - E(m0))
+ *
+ * What leads through the air carries nothing. Both parts rise with m1, so the step stays convex. The
+ * damping's has the sign of the motion: it takes energy. */
+MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
+    const Real x0 = real_max(e->middle, 0);
+    const Real x1 = real_max(middle, 0);
+    const PowerWay over = power_way(e->law.elastic_force, e->law.elastic_exponent, x0, x1 - x0);
+    const Real whole = REAL_ABS(middle - e->middle);
+    const Real inside = REAL_ABS(x1 - x0);
+    const Real inverse_way = 1 / (whole + ELEMENT_TINY);
+    const Real share = (inside + ELEMENT_TINY) * inverse_way;
+    const Real damping = e->law.elastic_damping;
+
+    /* By m1: into the ground the share of the way grows, out of it it falls. */
+    const Real entered = over.mean * ((whole - inside) * inverse_way) * inverse_way;
+    const Real left = over.mean * share * inverse_way;
+    const Real static_slope = middle > 0 ? share * over.slope + entered : left;
+    const Real end_force = middle > 0 ? over.mean + (x1 - x0) * over.slope : 0;
+
+    Impulse elastic;
+    elastic.value = over.mean * (dt * share + damping * (x1 - x0));
+    elastic.slope = dt / 2 * (dt * static_slope + damping * end_force);
+    return elastic;
+}
+
 /* The whole impulse at the new downward speed. curves: of the law. stops: bool, stop_drag,
  * stop_growth and explicit_impulse may not be 0. Constants in a loop over elements. */
 MILD_HD Impulse element_impulse(const Element *e, int curves, int stops, Real dt, Real speed) {
@@ -120,6 +149,11 @@ MILD_HD Impulse element_impulse(const Element *e, int curves, int stops, Real dt
         const Impulse growth = growth_impulse(e, dt, speed, &virgin, stops);
         sum.value += mass.value + growth.value;
         sum.slope += mass.slope + growth.slope;
+    }
+    if (curves & LAW_ELASTIC) {
+        const Impulse elastic = elastic_impulse(e, dt, middle);
+        sum.value += elastic.value;
+        sum.slope += elastic.slope;
     }
     sum.value += lag.value + (stops ? e->explicit_impulse : 0);
     sum.slope += lag.slope;

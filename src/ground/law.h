@@ -4,6 +4,8 @@
  *
  *     line    F = kappa u                        springs, resistive force theory
  *     cone    F = (k_pen - kappa) P(u)           the developing cone (paper eqs 1 to 5)
+ *     power   F = S (u/z0)^n                     pressure and sinkage (power.h)
+ *     elastic F = S (u/z0)^n (1 + d w)           the same without memory, damped by the speed w
  *     bed     F = k_bed max(u - u_bed, 0)        the firm bottom, under every law
  *
  * Developing cone, read as in docs/model.md section 3: the stress acts per element area, the added
@@ -28,21 +30,27 @@
  * The only length left is u_f, so nothing cancels at small u or small nu/tan(alpha). F_g is concave
  * when k_pen > kappa, convex otherwise, and straight beyond u_f.
  *
- * A new law adds its numbers to Law, a bit to LawCurve, and its term to each function of this file
- * that takes `curves`; a model's `law` (model.h) fills the numbers. The step calls nothing else.
- * Every number but the lengths must scale its term, because at a border of two materials the
- * numbers change linearly from one to the other. `curves` is a constant where elements are stepped
- * in vectors, so a curve costs nothing on ground that does not have it. */
+ * The elastic curve is the only one that is not virgin ground: it acts at every depth, going down
+ * and up, in a term of its own (impulse.h).
+ *
+ * A new curve adds its numbers to Law and LAW_NUMBERS, a bit to LawCurve, and its term to each
+ * function of this file that takes `curves`, to law_between and to law_curves (law.c); a model's
+ * `law` (model.h) fills the numbers. The step calls nothing else. `curves` is a constant where
+ * elements are stepped in vectors, so a curve costs nothing on ground that does not have it:
+ * law_variant says which loop serves a foot. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H
 
-#include "ground/real.h"
+#include "ground/power.h"
 
 /* Which curves a law has besides line and bed. The sum of the bits of a foot's materials serves all
  * of its elements: a law that lacks a curve has 0 for its numbers. */
 typedef enum {
-    LAW_LINE = 0, /* none */
-    LAW_CONE = 1  /* the developing cone, its added mass and its drag */
+    LAW_LINE = 0,    /* none */
+    LAW_CONE = 1,    /* the developing cone, its added mass and its drag */
+    LAW_POWER = 2,   /* pressure and sinkage */
+    LAW_ELASTIC = 4, /* without memory */
+    LAW_ALL = 7
 } LawCurve;
 
 typedef struct {
@@ -54,7 +62,35 @@ typedef struct {
     Real drag_rate;          /* c_d times that [kg/m]                                       eq 5 */
     Real bed_depth;          /* u_bed [m] */
     Real bed_stiffness;      /* k_bed [N/m] */
+    Real power_force;        /* S [N] of the power at POWER_DEPTH */
+    Real power_exponent;     /* n [-] */
+    Real elastic_force;      /* S [N] of the elastic curve */
+    Real elastic_exponent;   /* n [-] */
+    Real elastic_damping;    /* d [s/m] by which its force grows with the downward speed */
 } Law;
+
+/* The numbers of Law, in its order: slots, loads, stores and checks go over this list. */
+#define LAW_NUMBERS(NUMBER)                                                                        \
+    NUMBER(flat_stiffness)                                                                         \
+    NUMBER(line_stiffness)                                                                         \
+    NUMBER(cone_depth)                                                                             \
+    NUMBER(inverse_cone_depth)                                                                     \
+    NUMBER(mass_rate)                                                                              \
+    NUMBER(drag_rate)                                                                              \
+    NUMBER(bed_depth)                                                                              \
+    NUMBER(bed_stiffness)                                                                          \
+    NUMBER(power_force)                                                                            \
+    NUMBER(power_exponent)                                                                         \
+    NUMBER(elastic_force)                                                                          \
+    NUMBER(elastic_exponent)                                                                       \
+    NUMBER(elastic_damping)
+
+/* The compiled loop with the fewest curves among which are those of a foot. */
+MILD_HD int law_variant(int curves) {
+    const int one =
+        curves == LAW_LINE || curves == LAW_CONE || curves == LAW_POWER || curves == LAW_ELASTIC;
+    return one ? curves : LAW_ALL;
+}
 
 /* t [-]: how complete the cone is. */
 MILD_HD Real law_cone_progress(const Law *law, Real depth) {
@@ -85,14 +121,26 @@ MILD_HD Real law_bed_slope(const Law *law, Real depth) {
 
 /* F(u) [N] above the bed. */
 MILD_HD Real law_bedless_force(const Law *law, int curves, Real depth) {
-    const Real line = law->line_stiffness * depth;
-    return curves & LAW_CONE ? law->flat_stiffness * law_recruited(law, depth) + line : line;
+    Real force = law->line_stiffness * depth;
+    if (curves & LAW_CONE) {
+        force = law->flat_stiffness * law_recruited(law, depth) + force;
+    }
+    if (curves & LAW_POWER) {
+        force += power_force(law->power_force, law->power_exponent, depth);
+    }
+    return force;
 }
 
 /* F'(u) [N/m] above the bed. */
 MILD_HD Real law_bedless_slope(const Law *law, int curves, Real depth) {
-    const Real line = law->line_stiffness;
-    return curves & LAW_CONE ? law->flat_stiffness * law_flat_share(law, depth) + line : line;
+    Real slope = law->line_stiffness;
+    if (curves & LAW_CONE) {
+        slope = law->flat_stiffness * law_flat_share(law, depth) + slope;
+    }
+    if (curves & LAW_POWER) {
+        slope += power_slope(law->power_force, law->power_exponent, depth);
+    }
+    return slope;
 }
 
 /* F(u) [N]. */
@@ -107,9 +155,25 @@ MILD_HD Real law_slope(const Law *law, int curves, Real depth) {
 
 /* A bound of F' above the bed at any depth down to u [N/m]. */
 MILD_HD Real law_steepest(const Law *law, int curves, Real depth) {
-    (void)depth;
-    const Real line = law->line_stiffness;
-    return curves & LAW_CONE ? real_max(law->flat_stiffness, 0) + line : line;
+    Real slope = law->line_stiffness;
+    if (curves & LAW_CONE) {
+        slope = real_max(law->flat_stiffness, 0) + slope;
+    }
+    if (curves & LAW_POWER) {
+        slope += power_steepest(law->power_force, law->power_exponent, depth);
+    }
+    return slope;
+}
+
+/* Force of the elastic curve [N] at any depth, at rest. */
+MILD_HD Real law_elastic_force(const Law *law, int curves, Real depth) {
+    const Real u = real_max(depth, 0);
+    return curves & LAW_ELASTIC ? power_force(law->elastic_force, law->elastic_exponent, u) : 0;
+}
+
+/* Its slope [N/m], depth >= 0. */
+MILD_HD Real law_elastic_slope(const Law *law, int curves, Real depth) {
+    return curves & LAW_ELASTIC ? power_slope(law->elastic_force, law->elastic_exponent, depth) : 0;
 }
 
 /* Virgin ground on a way down from a depth to depth + way. */
@@ -141,6 +205,11 @@ MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
         over.mean_slope += law->flat_stiffness * (2 * flat_half + flat_end) * REAL(1.0 / 6.0);
         over.recruited = way > 0 ? p_end - p_begin : 0;
         over.recruited_slope = way > 0 ? flat_end : 0;
+    }
+    if (curves & LAW_POWER) {
+        const PowerWay power = power_way(law->power_force, law->power_exponent, begin, way);
+        over.mean += power.mean;
+        over.mean_slope += power.slope;
     }
     return over;
 }

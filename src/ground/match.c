@@ -6,9 +6,11 @@
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth) {
     const Law law = law_of(material, pitch);
     const int curves = law_curves(&law);
+    const double elastic = law_elastic_force(&law, curves, depth);
     return (MildElementLaw){
-        .force = law_force(&law, curves, depth),
-        .stiffness = law_slope(&law, curves, depth),
+        .force = law_force(&law, curves, depth) + elastic,
+        .stiffness = law_slope(&law, curves, depth) + law_elastic_slope(&law, curves, depth),
+        .damping = law.elastic_damping * elastic,
         .added_mass = law.mass_rate * law_recruited(&law, depth),
         .added_mass_per_depth = law.mass_rate * law_flat_share(&law, depth),
     };

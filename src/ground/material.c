@@ -1,7 +1,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "mild/ground.h"
+#include "ground/models.h"
 
 /* The ranges are what the equations bear, wider than the draws of the paper's Table III. */
 #define FIELD(member, low, high, help)                                                             \
@@ -25,6 +25,13 @@ const MildField mild_material_fields[] = {
     MILD_FIELD(MildMaterial, passive, MILD_FIELD_BOOL, 1, 0, 1,
                "[-] clamp c_g >= 0 and c_d >= 1/2: no energy is created"),
     MILD_FIELD_CHOICE(MildMaterial, model, mild_model_names, MILD_MODELS, "[-] ground model"),
+    FIELD(exponent, 0.1, 2.0, "[-] bekker, hunt_crossley: power n of the depth"),
+    FIELD(dissipation, 0.0, 50.0, "[s/m] hunt_crossley: damping; restitution is 1 - this times v"),
+    FIELD(k_c, 0.0, 1e10, "[N/m^(n+1)] bekker: modulus by the plate's width"),
+    FIELD(k_phi, 0.0, 1e12, "[N/m^(n+2)] bekker: modulus whatever the width"),
+    FIELD(plate_width, 0.005, 1.0, "[m] bekker: smaller side of the loaded plate"),
+    FIELD(cohesion, 0.0, 1e6, "[N/m^2] bekker: shear strength without load"),
+    FIELD(shear_length, 0.001, 0.1, "[m] bekker: over which shear strength builds up"),
 };
 const int mild_material_field_count =
     (int)(sizeof mild_material_fields / sizeof *mild_material_fields);
@@ -35,25 +42,36 @@ typedef struct {
     const char *name;
     MildMaterial material;
 } Preset;
+/* What only bekker and hunt_crossley read, the same in all: the dry sand of Wong 2008, table 2.3,
+ * under a foot 0.1 m wide, and some damping: exponent dissipation k_c k_phi plate_width cohesion shear_length. */
+#define RIVALS 1.1, 0.3, 990.0, 1528430.0, 0.1, 1040.0, 0.01
 /*              k_pen sigma_cone alpha  nu   c_g  c_d   phi   rho     mu   k_drift b_drift recovery
  * bed zeta passive model */
 static const Preset presets[] = {
     {"rubber",
-     {1400.0, 0.24e6, 1.310, 0.8, 0.0, 1.0, 0.57, 1000.0, 1.0, 100.0, 0.02, 1.0, 0.10, 1.0, 1, 0}},
+     {1400.0, 0.24e6, 1.310, 0.8, 0.0, 1.0, 0.57, 1000.0, 1.0, 100.0, 0.02, 1.0, 0.10, 1.0, 1, 0,
+      RIVALS}},
     {"foam60",
-     {850.0, 0.20e6, 1.20, 1.2, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1.0, 1, 0}},
+     {850.0, 0.20e6, 1.20, 1.2, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1.0, 1, 0,
+      RIVALS}},
     {"foam45",
-     {480.0, 0.17e6, 1.10, 1.6, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1.0, 1, 0}},
+     {480.0, 0.17e6, 1.10, 1.6, 0.0, 1.0, 0.57, 1000.0, 0.9, 200.0, 0.05, 1.0, 0.10, 1.0, 1, 0,
+      RIVALS}},
     {"foam28",
-     {190.0, 0.13e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1.0, 1, 0}},
+     {190.0, 0.13e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1.0, 1, 0,
+      RIVALS}},
     {"foam25",
-     {150.0, 0.11e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1.0, 1, 0}},
+     {150.0, 0.11e6, 1.047, 2.0, 0.0, 1.0, 0.57, 1000.0, 0.8, 200.0, 0.05, 1.0, 0.12, 1.0, 1, 0,
+      RIVALS}},
     {"grass",
-     {550.0, 0.24e6, 1.10, 1.6, 0.5, 1.0, 0.50, 1000.0, 0.7, 300.0, 0.05, 0.5, 0.10, 1.0, 1, 0}},
+     {550.0, 0.24e6, 1.10, 1.6, 0.5, 1.0, 0.50, 1000.0, 0.7, 300.0, 0.05, 0.5, 0.10, 1.0, 1, 0,
+      RIVALS}},
     {"sand_loose",
-     {380.0, 0.15e6, 1.047, 2.0, 2.7, 17.2, 0.57, 1000.0, 0.6, 400.0, 0.10, 0.0, 0.15, 1.0, 1, 0}},
+     {380.0, 0.15e6, 1.047, 2.0, 2.7, 17.2, 0.57, 1000.0, 0.6, 400.0, 0.10, 0.0, 0.15, 1.0, 1, 0,
+      RIVALS}},
     {"sand_dense",
-     {700.0, 0.24e6, 1.047, 1.6, 2.7, 17.2, 0.62, 1000.0, 0.7, 800.0, 0.10, 0.0, 0.15, 1.0, 1, 0}},
+     {700.0, 0.24e6, 1.047, 1.6, 2.7, 17.2, 0.62, 1000.0, 0.7, 800.0, 0.10, 0.0, 0.15, 1.0, 1, 0,
+      RIVALS}},
 };
 #define PRESETS ((int)(sizeof presets / sizeof *presets))
 
@@ -66,6 +84,12 @@ const char *mild_material_preset_name(int index) {
 }
 
 int mild_material_preset(const char *name, MildMaterial *material) {
+    for (int m = 0; m < MILD_MODEL_RIGID; m++) {
+        const ModelRow *row = model_row(m);
+        if (row->preset && row->preset(name, material)) {
+            return 1;
+        }
+    }
     for (int i = 0; i < PRESETS; i++) {
         if (strcmp(presets[i].name, name) != 0) {
             continue;

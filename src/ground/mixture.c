@@ -12,11 +12,9 @@ static int mixture_has(int32_t mixture, int m) {
            ((mixture & 0xff) == m || (mixture >> 16 > 0 && (mixture >> 8 & 0xff) == m));
 }
 
-/* Bool: one of the numbers that a step uses is NaN. */
-static int law_is_nan(const Law *law, const MildMaterial *m) {
-    double sum = law->flat_stiffness + law->line_stiffness + law->cone_depth + law->mass_rate +
-                 law->drag_rate + law->bed_stiffness + law->inverse_cone_depth;
-    return isnan(sum + m->mu + m->k_drift + m->b_drift + m->recovery) || isnan(law->bed_depth);
+/* Bool: one of the material's numbers that a step uses is NaN. */
+static int material_is_nan(const MildMaterial *m) {
+    return isnan(m->mu + m->k_drift + m->b_drift + m->recovery + m->cohesion + m->shear_length);
 }
 
 void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
@@ -31,7 +29,7 @@ void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
                                     .law = law,
                                     .curves = law_curves(&law),
                                     .known = 1,
-                                    .nan = law_is_nan(&law, wanted)};
+                                    .nan = law_is_nan(&law) || material_is_nan(wanted)};
             for (int i = 0; i < foot->padded; i++) {
                 if (mixture_has(foot->slot_material[i], m)) {
                     foot->slot_material[i] = MATERIAL_NONE;
@@ -43,20 +41,14 @@ void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
     }
 }
 
+#define SLOT_LAW_STORE(name) s->name[i] = law->name;
 /* Sets the law of slot i, and its friction and recovery. */
 static void slot_set_law(const Slots *s, int i, const Law *law, const MildMaterial *material) {
-    s->flat_stiffness[i] = law->flat_stiffness;
-    s->line_stiffness[i] = law->line_stiffness;
-    s->cone_depth[i] = law->cone_depth;
-    s->inverse_cone_depth[i] = law->inverse_cone_depth;
-    s->mass_rate[i] = law->mass_rate;
-    s->drag_rate[i] = law->drag_rate;
-    s->bed_depth[i] = law->bed_depth;
-    s->bed_stiffness[i] = law->bed_stiffness;
+    LAW_NUMBERS(SLOT_LAW_STORE)
     s->exit_drag[i] = law_exit_drag(law);
     s->entry_drag[i] = law_entry_drag(law);
     s->strength[i] = law->line_stiffness;
-    s->recovery[i] = material->recovery;
+    s->recovery[i] = law_recovery(law, material->recovery);
     s->mu[i] = material->mu;
     s->k_drift[i] = material->k_drift;
     s->b_drift[i] = material->b_drift;
@@ -66,31 +58,20 @@ static double between(double a, double b, double share) {
     return a + share * (b - a);
 }
 
-/* All numbers of the law, friction and recovery change linearly from one material to the other. A
- * mean of two passive laws is passive, because c_d m >= m/2 holds for it too. */
+/* Law, friction and recovery change linearly from one material to the other. */
 static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, int32_t mixture) {
     const DerivedLaw *a = &derived[mixture & 0xff];
     const DerivedLaw *b = &derived[mixture >> 8 & 0xff];
-    const Law *p = &a->law;
-    const Law *q = &b->law;
     const MildMaterial *m = &a->material;
     const MildMaterial *n = &b->material;
     const double t = (mixture >> 16) / 255.0;
-    const Law law = {
-        .flat_stiffness = between(p->flat_stiffness, q->flat_stiffness, t),
-        .line_stiffness = between(p->line_stiffness, q->line_stiffness, t),
-        .cone_depth = between(p->cone_depth, q->cone_depth, t),
-        .inverse_cone_depth = 1.0 / between(p->cone_depth, q->cone_depth, t),
-        .mass_rate = between(p->mass_rate, q->mass_rate, t),
-        .drag_rate = between(p->drag_rate, q->drag_rate, t),
-        .bed_depth = between(p->bed_depth, q->bed_depth, t),
-        .bed_stiffness = between(p->bed_stiffness, q->bed_stiffness, t),
-    };
+    const Law law = law_between(&a->law, &b->law, t);
     const MildMaterial material = {
         .mu = between(m->mu, n->mu, t),
         .k_drift = between(m->k_drift, n->k_drift, t),
         .b_drift = between(m->b_drift, n->b_drift, t),
-        .recovery = between(m->recovery, n->recovery, t),
+        .recovery =
+            between(law_recovery(&a->law, m->recovery), law_recovery(&b->law, n->recovery), t),
     };
     slot_set_law(s, i, &law, &material);
 }

@@ -22,11 +22,15 @@ typedef struct {
      * model's element [m^2]. NULL: nothing differs. */
     void (*reference)(MildMaterial *material, double area);
 
-    /* Once per step, after element_begin: changes the law of the foot's slots that stand on `model`
-     * for the way they move at the start of the step. rotation: of the foot. NULL: the law knows no
-     * direction. */
+    /* Once per step, after element_begin: changes law or friction of the foot's slots that stand on
+     * `model` for the way they move at the start of the step, or have moved. rotation: of the foot.
+     * NULL: they do not depend on it. */
     void (*direction)(const struct FootScratch *foot, const MildTerrain *terrain, int model,
                       double dt, const double *rotation, const Motion *now);
+
+    /* The material of that name, one of info.presets, into *material; false when the name is
+     * unknown. NULL: the model has no materials of its own. */
+    int (*preset)(const char *name, MildMaterial *material);
 } ModelRow;
 
 #endif

@@ -32,17 +32,25 @@ ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Moti
 static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
-    const int cone = foot->curves & LAW_CONE;
-    if (foot->uneven && cone) {
-        foot_normal(s, end, dt, motion, 1, LAW_CONE, 1);
-    } else if (foot->uneven) {
-        foot_normal(s, end, dt, motion, 1, LAW_LINE, 0);
-    } else if (foot->stops) {
-        foot_normal(s, end, dt, motion, 0, LAW_CONE, 1);
-    } else if (cone) {
-        foot_normal(s, end, dt, motion, 0, LAW_CONE, 0);
-    } else {
-        foot_normal(s, end, dt, motion, 0, LAW_LINE, 0);
+    if (foot->uneven) {
+        switch (law_variant(foot->curves)) {
+        case LAW_LINE: foot_normal(s, end, dt, motion, 1, LAW_LINE, 0); return;
+        case LAW_CONE: foot_normal(s, end, dt, motion, 1, LAW_CONE, 1); return;
+        default: foot_normal(s, end, dt, motion, 1, LAW_ALL, 1); return;
+        }
+    }
+    switch (law_variant(foot->curves)) {
+    case LAW_LINE: foot_normal(s, end, dt, motion, 0, LAW_LINE, 0); return;
+    case LAW_CONE:
+        if (foot->stops) {
+            foot_normal(s, end, dt, motion, 0, LAW_CONE, 1);
+        } else {
+            foot_normal(s, end, dt, motion, 0, LAW_CONE, 0);
+        }
+        return;
+    case LAW_POWER: foot_normal(s, end, dt, motion, 0, LAW_POWER, 0); return;
+    case LAW_ELASTIC: foot_normal(s, end, dt, motion, 0, LAW_ELASTIC, 0); return;
+    default: foot_normal(s, end, dt, motion, 0, LAW_ALL, 1); return;
     }
 }
 

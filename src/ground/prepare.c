@@ -34,15 +34,19 @@ ALWAYS_INLINE void slots_begin(const Slots *slot, int end, double dt, const Moti
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
-    const int cone = foot->curves & LAW_CONE;
-    if (foot->uneven && cone) {
-        slots_begin(s, end, dt, now, LAW_CONE, 1);
-    } else if (foot->uneven) {
-        slots_begin(s, end, dt, now, LAW_LINE, 1);
-    } else if (cone) {
-        slots_begin(s, end, dt, now, LAW_CONE, 0);
-    } else {
-        slots_begin(s, end, dt, now, LAW_LINE, 0);
+    if (foot->uneven) {
+        switch (law_variant(foot->curves)) {
+        case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE, 1); return;
+        case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 1); return;
+        default: slots_begin(s, end, dt, now, LAW_ALL, 1); return;
+        }
+    }
+    switch (law_variant(foot->curves)) {
+    case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE, 0); return;
+    case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
+    case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
+    case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;
+    default: slots_begin(s, end, dt, now, LAW_ALL, 0); return;
     }
 }
 

@@ -43,12 +43,12 @@ MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed,
     }
 
     const Real at = e->virgin_depth + real_max(p - a, 0);
-    Real force = law_force(&e->law, curves, at);
+    Real force = law_force(&e->law, curves, at) + law_elastic_force(&e->law, curves, at);
     if (curves & LAW_CONE) {
         force += real_max(e->law.drag_rate, 0) / 2 * law_flat_share(&e->law, at) * v * v;
     }
-    const Real slope =
-        real_max(law_bedless_slope(&e->law, curves, at), 0) + law_bed_slope(&e->law, at);
+    const Real slope = real_max(law_bedless_slope(&e->law, curves, at), 0) +
+                       law_bed_slope(&e->law, at) + law_elastic_slope(&e->law, curves, at);
     const Real root = REAL_SQRT(force * force + 2 * slope * energy);
     const Real way = 2 * energy / (force + root + ELEMENT_TINY);
     const Real beyond = real_max(real_max(p, a) + way - middle, 0);

@@ -235,8 +235,8 @@ ALWAYS_INLINE void foot_resist(const FootScratch *foot, const MildTerrain *terra
         if (terrain->materials[foot->slot_material[i] & 0xff].model != model) {
             continue; /* the nearer one's */
         }
-        if (s->flat_stiffness[i] != 0.0) {
-            continue; /* blended with a cone: as a level plate */
+        if (s->flat_stiffness[i] != 0.0 || s->power_force[i] != 0.0) {
+            continue; /* blended with another curve: as a level plate */
         }
         slots_resist(s, i, i + 1, dt, &plate, now, in_space);
     }

@@ -37,21 +37,15 @@ typedef struct {
     double *held_stiffness; /* [N/m] */
 
     /* Material: slots_materials, when it changes. */
-    double *flat_stiffness;     /* [N/m] Law, to bed_stiffness */
-    double *line_stiffness;     /* [N/m]; slots_resist changes it in every step */
-    double *cone_depth;         /* [m] */
-    double *inverse_cone_depth; /* [1/m] */
-    double *mass_rate;          /* [kg/m] */
-    double *drag_rate;          /* [kg/m] */
-    double *bed_depth;          /* [m] */
-    double *bed_stiffness;      /* [N/m] */
-    double *exit_drag;          /* [kg/m] */
-    double *entry_drag;         /* [kg/m] */
-    double *strength;           /* [N/m] line_stiffness before the direction of motion counts */
-    double *recovery;           /* [-] */
-    double *mu;                 /* [-] */
-    double *k_drift;            /* [N/m^2] */
-    double *b_drift;            /* [N s/m] */
+#define SLOT_LAW_ARRAY(name) double *name; /* of Law; slots_resist changes line_stiffness */
+    LAW_NUMBERS(SLOT_LAW_ARRAY)
+    double *exit_drag;  /* [kg/m] */
+    double *entry_drag; /* [kg/m] */
+    double *strength;   /* [N/m] line_stiffness before the direction of motion counts */
+    double *recovery;   /* [-] */
+    double *mu;         /* [-] */
+    double *k_drift;    /* [N/m^2] */
+    double *b_drift;    /* [N s/m] */
 
     /* Law of this step: slots_begin, changed by slots_resist. */
     double *middle;           /* [m] */
@@ -102,17 +96,11 @@ typedef struct {
 } Slots;
 #define SLOT_ARRAYS (sizeof(Slots) / sizeof(double *))
 
+#define SLOT_LAW_LOAD(name) .name = s->name[i],
 /* The element of a slot, by value: what the caller does not use is not loaded. */
 ALWAYS_INLINE Element slot_element(const Slots *s, int i) {
     return (Element){
-        .law = {.flat_stiffness = s->flat_stiffness[i],
-                .line_stiffness = s->line_stiffness[i],
-                .cone_depth = s->cone_depth[i],
-                .inverse_cone_depth = s->inverse_cone_depth[i],
-                .mass_rate = s->mass_rate[i],
-                .drag_rate = s->drag_rate[i],
-                .bed_depth = s->bed_depth[i],
-                .bed_stiffness = s->bed_stiffness[i]},
+        .law = {LAW_NUMBERS(SLOT_LAW_LOAD)},
         .recovery = s->recovery[i],
         .mu = s->mu[i],
         .k_drift = s->k_drift[i],

@@ -65,8 +65,14 @@ awk "BEGIN { exit !($(peak --ground.k_pen=500) > $(peak) && $(peak --ground.k_pe
 awk "BEGIN { exit !($(peak --model ecc_spring --ground.k_pen=500) > $(peak --model ecc_spring)) }" || fail "matched k_pen kept"
 expect 0 'ground model con_spring' "$mild" eval --model con_spring --ground sand_loose --trials 1 --seconds 0.2 --json rival.json
 grep -q '"model":.*"con_spring"' rival.json || fail "rival.json"
-for model in con_cone con_spring ecc_spring ecc_quasi; do
-    expect 0 "iteration" "$mild" train --out "run_$model" --train.envs=2 --train.iterations=1 --ppo.steps=4 --ppo.minibatches=2 \
+bad "leave out --model" "$mild" press --ground snow --model ecc_spring
+expect 0 'snow' "$mild" press --ground snow --depth 0.1
+expect 0 'print left 0.0 mm' "$mild" press --ground sand_loose --model hunt_crossley
+expect 0 'clay .*1/1 ' "$mild" eval --ground clay --speed 0.3 --trials 1 --seconds 0.2
+expect 0 'hunt_crossley' "$mild" eval --model hunt_crossley --ground sand_loose --trials 1 --seconds 0.2
+expect 0 'bekker' "$mild" eval --model bekker --ground sand_loose --trials 1 --seconds 0.2
+for model in con_cone con_spring ecc_spring ecc_quasi ecc_quasi_3d bekker hunt_crossley; do
+    expect 0 "iteration" "$mild" train --out "run_$model" --train.envs=2 --train.iterations=2 --ppo.steps=4 --ppo.minibatches=2 \
         "--randomize.model=$model"
 done
 

@@ -3,7 +3,7 @@
 #ifndef ELEMENT_STEP_H
 #define ELEMENT_STEP_H
 
-#define ELEMENT_LAW 8    /* numbers of Law */
+#define ELEMENT_LAW 13   /* numbers of Law */
 #define ELEMENT_MEMORY 9 /* of ElementMemory */
 /* Normal impulse, its slope; tangential impulse x y, its derivatives by the velocity xx xy yy, by the
  * normal impulse x y. */
@@ -12,6 +12,7 @@
 /* What a step of one element depends on. */
 typedef struct {
     double law[ELEMENT_LAW];
+    int curves;                    /* LawCurve bits of the loop: those of the law or more */
     double recovery;               /* [-] */
     double mu;                     /* [-] */
     double k_drift;                /* [N/m^2] */

@@ -6,15 +6,17 @@
 #define LENGTH 11 /* elements along x, across the tilt axis */
 #define WIDTH 7
 
-/* f(u) = flat (u_f/3)(1 - c^3) + cone u, c = max(1 - u/u_f, 0): force of one cell, without inertia;
+/* f(u) = flat (u_f/3)(1 - c^3) + cone u + power u^n, c = max(1 - u/u_f, 0): force of one cell, without inertia;
  * and its first two integrals from 0, needed for a moment because x = (u - d)/sin(tilt). */
 typedef struct {
-    double flat, cone, full;
+    double flat, cone, full, power, n;
 } Cell;
 
 static double force_of(const Cell *l, double u) {
     double c = fmax(1.0 - u / l->full, 0.0);
-    return u <= 0.0 ? 0.0 : l->flat * l->full / 3.0 * (1.0 - c * c * c) + l->cone * u;
+    return u <= 0.0 ? 0.0
+                    : l->flat * l->full / 3.0 * (1.0 - c * c * c) + l->cone * u +
+                          l->power * pow(u, l->n);
 }
 
 static double first_integral(const Cell *l, double u) {
@@ -23,7 +25,7 @@ static double first_integral(const Cell *l, double u) {
         return 0.0;
     }
     return l->flat * l->full / 3.0 * (u + l->full / 4.0 * (pow(c, 4) - 1.0)) +
-           l->cone * u * u / 2.0;
+           l->cone * u * u / 2.0 + l->power * pow(u, l->n + 1.0) / (l->n + 1.0);
 }
 
 static double second_integral(const Cell *l, double u) {
@@ -32,7 +34,8 @@ static double second_integral(const Cell *l, double u) {
         return 0.0;
     }
     return l->flat * f / 3.0 * (u * u / 2.0 - f * u / 4.0 + f * f / 20.0 * (1.0 - pow(c, 5))) +
-           l->cone * u * u * u / 6.0;
+           l->cone * u * u * u / 6.0 +
+           l->power * pow(u, l->n + 2.0) / ((l->n + 1.0) * (l->n + 2.0));
 }
 
 static Cell cell_of(const MildMaterial *m, double tilt, double area) {
@@ -40,7 +43,7 @@ static Cell cell_of(const MildMaterial *m, double tilt, double area) {
     const double normal[3] = {-sin(tilt), 0.0, -cos(tilt)}, down[3] = {0.0, 0.0, -1.0};
     if (m->model == MILD_MODEL_MILD || m->model == MILD_MODEL_CON_CONE) {
         return (Cell){m->k_pen - kappa, kappa,
-                      sqrt(area / 3.14159265358979) * tan(m->alpha) / m->nu};
+                      sqrt(area / 3.14159265358979) * tan(m->alpha) / m->nu, 0.0, 1.0};
     }
     if (m->model == MILD_MODEL_ECC_QUASI) {
         mild_resist_plane(tilt, 1.5707963267948966, alpha);
@@ -49,12 +52,18 @@ static Cell cell_of(const MildMaterial *m, double tilt, double area) {
         mild_resist_space(normal, down, alpha);
     }
     if (m->model == MILD_MODEL_ECC_QUASI) {
-        return (Cell){0.0, alpha[1] * m->zeta * 1e6 * area, 1.0};
+        return (Cell){0.0, alpha[1] * m->zeta * 1e6 * area, 1.0, 0.0, 1.0};
     }
     if (m->model == MILD_MODEL_ECC_QUASI_3D) {
-        return (Cell){0.0, alpha[2] * m->zeta * 1e6 * area, 1.0};
+        return (Cell){0.0, alpha[2] * m->zeta * 1e6 * area, 1.0, 0.0, 1.0};
     }
-    return (Cell){0.0, m->k_pen, 1.0};
+    if (m->model == MILD_MODEL_BEKKER) {
+        return (Cell){0.0, 0.0, 1.0, (m->k_c / m->plate_width + m->k_phi) * area, m->exponent};
+    }
+    if (m->model == MILD_MODEL_HUNT_CROSSLEY) {
+        return (Cell){0.0, 0.0, 1.0, m->k_pen * pow(0.01, 1.0 - m->exponent), m->exponent};
+    }
+    return (Cell){0.0, m->k_pen, 1.0, 0.0, 1.0};
 }
 
 /* Force and moment about the axis through the plate's middle, front edge down by `tilt`. */

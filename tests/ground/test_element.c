@@ -26,10 +26,15 @@ static void round_all(double *x, int count) {
  * element that is not deeper than the least elastic travel. */
 static ElementCase random_case(int n, uint64_t *random) {
     static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
+    static const MildModel models[4] = {MILD_MODEL_MILD, MILD_MODEL_MILD, MILD_MODEL_BEKKER,
+                                        MILD_MODEL_HUNT_CROSSLEY};
     MildMaterial m = kit_material(random);
+    m.model = (int)models[kit_index(random, 4)];
+    m.exponent = kit_uniform(random, 0.1, 2.0);
     Law law = law_of(&m, KIT_PITCH);
     law.bed_depth = n % 5 == 0 ? 0.01 : law.bed_depth;
-    ElementCase c = {.recovery = rounded(m.recovery),
+    ElementCase c = {.curves = kit_index(random, 2) ? law_curves(&law) : LAW_ALL,
+                     .recovery = rounded(m.recovery),
                      .mu = rounded(m.mu),
                      .k_drift = rounded(m.k_drift),
                      .b_drift = rounded(m.b_drift),

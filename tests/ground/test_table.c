@@ -35,6 +35,13 @@ static void test_rows(void **state) {
             assert_true(listed(info->fields, MILD_MODEL_FIELDS, info->scaled[k]));
             assert_int_equal(field_of(info->scaled[k])->type, MILD_FIELD_DOUBLE);
         }
+        for (int k = 0; k < MILD_MODEL_PRESETS && info->presets[k]; k++) {
+            MildMaterial material;
+            MildError error = {0};
+            assert_true(mild_material_preset(info->presets[k], &material));
+            assert_int_equal(material.model, m);
+            assert_int_equal(mild_material_check(&material, &error), MILD_OK);
+        }
         assert_true(m == MILD_MODEL_RIGID || info->fields[0]);
         assert_true(m == MILD_MODEL_MILD || m == MILD_MODEL_RIGID || info->scaled[0]);
     }

@@ -1,0 +1,120 @@
+/* Bekker's pressure and sinkage, and the shear of Janosi and Hanamoto (J. Y. Wong, Theory of Ground
+ * Vehicles, 4th edition, 2008, chapter 2):
+ *
+ *     p = (k_c/b + k_phi) z^n
+ *     s = (c + p mu) (1 - exp(-j/K))
+ *
+ * j is the length of the path that the element has slid since it touched down, which the drift
+ * remembers anyway (element.h). */
+#include "ground/friction.h"
+#include "ground/model.h"
+#include "ground/scratch.h"
+
+/* Wong 2008, table 2.3: dry sand (Land Locomotion Laboratory), sandy loam (the same, 15 % of
+ * water), clayey soil (Thailand, 38 %), snow (Harrison). Its K are ranges; these lie within those of firm
+ * sand, loose sand, clay and fresh snow. Lunar soil, K too: Heiken, Vaniman, French, Lunar
+ * Sourcebook, 1991, section 9.1. */
+typedef struct {
+    const char *name;
+    double exponent;     /* n [-] */
+    double k_c;          /* [N/m^(n+1)] */
+    double k_phi;        /* [N/m^(n+2)] */
+    double cohesion;     /* c [N/m^2] */
+    double angle;        /* [degrees] of friction */
+    double shear_length; /* K [m] */
+    double density;      /* [kg/m^3] */
+} Soil;
+static const Soil soils[] = {
+    {"dry_sand", 1.1, 990.0, 1528430.0, 1040.0, 28.0, 0.010, 1600.0},
+    {"sandy_loam", 0.7, 5270.0, 1515040.0, 1720.0, 29.0, 0.025, 1500.0},
+    {"clay", 0.5, 13190.0, 692150.0, 4140.0, 13.0, 0.006, 1700.0},
+    {"snow", 1.6, 4370.0, 196720.0, 1030.0, 19.7, 0.025, 300.0},
+    {"lunar_soil", 1.0, 1400.0, 820000.0, 170.0, 35.0, 0.0178, 1660.0},
+};
+
+static int bekker_preset(const char *name, MildMaterial *material) {
+    for (size_t i = 0; i < sizeof soils / sizeof *soils; i++) {
+        const Soil *soil = &soils[i];
+        if (strcmp(soil->name, name) != 0) {
+            continue;
+        }
+        *material = mild_material_default();
+        material->model = MILD_MODEL_BEKKER;
+        material->exponent = soil->exponent;
+        material->k_c = soil->k_c;
+        material->k_phi = soil->k_phi;
+        material->cohesion = soil->cohesion;
+        material->mu = tan(soil->angle * LAW_PI / 180.0);
+        material->shear_length = soil->shear_length;
+        material->k_drift = material->b_drift = 0.0;
+        material->rho = soil->density;
+        material->bed_depth = 1.0;
+        return 1;
+    }
+    return 0;
+}
+
+static Law bekker_law(const MildMaterial *material, double pitch) {
+    const double area = pitch * pitch;
+    const double modulus = material->k_c / material->plate_width + material->k_phi;
+    Law law = law_line(0.0, area, material->bed_depth);
+    law.power_force = modulus * pow(POWER_DEPTH, material->exponent) * area;
+    law.power_exponent = material->exponent;
+    return law;
+}
+
+/* Dry sand without cohesion: friction stays that of mild. */
+static void bekker_material(MildMaterial *material, double area) {
+    (void)area;
+    material->exponent = soils[0].exponent;
+    material->k_c = soils[0].k_c;
+    material->k_phi = soils[0].k_phi;
+    material->cohesion = 0.0;
+}
+
+/* mu [-] of a slot's material, or of the two that blend in it. */
+static double slot_mu(const MildTerrain *terrain, int32_t mixture) {
+    const double near = terrain->materials[mixture & 0xff].mu;
+    const double far = terrain->materials[mixture >> 8 & 0xff].mu;
+    return mixture >> 16 ? near + (mixture >> 16) / 255.0 * (far - near) : near;
+}
+
+/* Friction of the slots whose nearer material is of this model. */
+static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
+                         const double *rotation, const Motion *now) {
+    (void)rotation;
+    (void)now;
+    const Slots *s = &foot->slot;
+    const double area = foot->pitch * foot->pitch;
+    for (int i = 0; i < foot->active; i++) {
+        const MildMaterial *material = &terrain->materials[foot->slot_material[i] & 0xff];
+        if (material->model != model) {
+            continue;
+        }
+        const double slid = s->drift[i] / material->shear_length;             /* j/K [-] */
+        const double share = 1.0 - real_exp2(-1.4426950408889634074 * slid);  /* 1/ln 2 */
+        const double cohesion = s->depth[i] > 0.0 ? material->cohesion : 0.0; /* [N/m^2] */
+        const ElementMemory memory = slot_memory(s, i);
+        Element element = slot_element(s, i);
+        element.mu = share * slot_mu(terrain, foot->slot_material[i]);
+        element.drift_bound += dt * share * cohesion * area;
+        friction_hold(&element, &memory, dt, 1.0 / dt,
+                      law_force(&element.law, foot->curves, element.yield_depth));
+        s->mu[i] = element.mu;
+        slot_store(s, i, &element);
+    }
+}
+
+const ModelRow model_bekker = {
+    .info = {.summary = "pressure by a power of the sinkage, shear strength that builds up",
+             .source = "Bekker 1969, Janosi and Hanamoto 1961",
+             .fields = {"k_c", "k_phi", "exponent", "plate_width", "cohesion", "mu", "shear_length",
+                        "k_drift", "b_drift", "recovery", "bed_depth"},
+             .scaled = {"k_c", "k_phi"},
+             .presets = {"dry_sand", "sandy_loam", "clay", "snow", "lunar_soil"},
+             .match_note = "exponent 1.1, k_c : k_phi of dry sand, cohesion 0"},
+    .law = bekker_law,
+    .reference = bekker_material,
+    .direction = bekker_shear,
+    .preset = bekker_preset,
+};

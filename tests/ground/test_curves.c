@@ -1,0 +1,301 @@
+/* The laws of bekker and hunt_crossley: the curve against libm and quadrature, published numbers,
+ * and what the contact step makes of them. */
+#include "ground_kit.h"
+
+#include "ground/models.h"
+
+static double uniform(uint64_t *random, double low, double high) {
+    return kit_uniform(random, low, high);
+}
+
+static void test_pow(void **state) {
+    (void)state;
+    uint64_t random = 3;
+    double worst = 0.0;
+    for (int i = 0; i < 200000; i++) {
+        const double x = exp(uniform(&random, -9.3, 25.0));
+        const double y = uniform(&random, -0.5, 0.5);
+        worst = fmax(worst, fabs(real_pow(x, y) / pow(x, y) - 1.0));
+        const double z = uniform(&random, -200.0, 1.0);
+        worst = fmax(worst, fabs(real_exp2(z) / exp2(z) - 1.0));
+    }
+    print_message("x^y and 2^x against libm: within %.1e\n", worst);
+    assert_true(worst < 1e-14);
+}
+
+/* Mean of F by Simpson's rule in many parts. */
+static double quadrature(double n, double begin, double way) {
+    enum { PARTS = 4000 };
+    double sum = 0.0;
+    for (int k = 0; k <= PARTS; k++) {
+        const double weight = k == 0 || k == PARTS ? 1.0 : (k % 2 ? 4.0 : 2.0);
+        sum += weight * power_force(2.0, n, begin + way * k / PARTS);
+    }
+    return sum / (3.0 * PARTS);
+}
+
+static void test_way(void **state) {
+    (void)state;
+    uint64_t random = 5;
+    double worst[3] = {0.0, 0.0, 0.0};
+    for (int i = 0; i < 3000; i++) {
+        const double n = uniform(&random, 0.1, 2.0);
+        const double begin = exp(uniform(&random, log(1e-5), log(0.1)));
+        const double end = kit_index(&random, 2) ? exp(uniform(&random, log(1e-5), log(0.1)))
+                                                 : begin * uniform(&random, 0.8, 1.2);
+        const double way = end - begin;
+        const double step = 1e-5 * end;
+        const PowerWay over = power_way(2.0, n, begin, way);
+        const double rise =
+            power_way(2.0, n, begin, way + step).mean - power_way(2.0, n, begin, way - step).mean;
+        const double slope =
+            (power_force(2.0, n, end + step) - power_force(2.0, n, end - step)) / (2.0 * step);
+        worst[0] = fmax(worst[0], fabs(over.mean / quadrature(n, begin, way) - 1.0));
+        worst[1] = fmax(worst[1], fabs(over.slope / (rise / (2.0 * step)) - 1.0));
+        worst[2] = fmax(worst[2], fabs(power_slope(2.0, n, end) / slope - 1.0));
+    }
+    print_message(
+        "mean over a way against quadrature %.1e; its slope %.1e, the curve's %.1e against "
+        "differences\n",
+        worst[0], worst[1], worst[2]);
+    assert_true(worst[0] < 1e-8 && worst[1] < 1e-5 && worst[2] < 1e-7);
+    /* the series and the closed form meet */
+    double apart = 0.0;
+    for (int i = 0; i < 3000; i++) {
+        const double n = uniform(&random, 0.1, 2.0);
+        double low = 0.01, high = 0.02;
+        for (int k = 0; k < 200; k++) { /* where rho is POWER_SERIES, from 10 mm on */
+            const double u = (low + high) / 2;
+            const double q0 = 1.0 + POWER_ROUND, q1 = u * u * 1e4 + POWER_ROUND;
+            *((q1 - q0) / (q1 + q0) < POWER_SERIES ? &low : &high) = u;
+        }
+        const double a = power_way(2.0, n, 0.01, low - 0.01 - 1e-12).mean;
+        const double b = power_way(2.0, n, 0.01, low - 0.01 + 1e-12).mean;
+        apart = fmax(apart, fabs(b / a - 1.0));
+    }
+    print_message("series and closed form differ by %.1e where they meet\n", apart);
+    assert_true(apart < 1e-9);
+}
+
+/* ---- bekker ---- */
+
+/* Pressure [kPa] of one element at a depth. */
+static double pressure(const MildMaterial *m, double depth) {
+    return 1e-3 * mild_element_law(m, KIT_PITCH, depth).force / (KIT_PITCH * KIT_PITCH);
+}
+
+/* (k_c/b + k_phi) z^n with a calculator, b = 0.1 m. */
+static void test_published(void **state) {
+    (void)state;
+    static const struct {
+        const char *name;
+        double depth;    /* [m] */
+        double pressure; /* [kPa] */
+    } table[] = {
+        {"dry_sand", 0.01, 9.7061},   /* (9.9 + 1528.43) 0.01^1.1 = 1538.33 x 0.0063096 */
+        {"dry_sand", 0.05, 57.007},   /* 1538.33 x 0.05 x 0.74113 */
+        {"sandy_loam", 0.02, 101.39}, /* (52.7 + 1515.04) x 0.0646745 */
+        {"clay", 0.01, 82.405},       /* (131.9 + 692.15) x 0.1 */
+        {"snow", 0.1, 6.0389},        /* (43.7 + 196.72) x 0.0251189 */
+        {"lunar_soil", 0.02, 16.68},  /* (14 + 820) x 0.02 */
+    };
+    double worst = 0.0;
+    for (size_t i = 0; i < sizeof table / sizeof *table; i++) {
+        MildMaterial m;
+        MildError error = {0};
+        assert_true(mild_material_preset(table[i].name, &m));
+        assert_int_equal(mild_material_check(&m, &error), MILD_OK);
+        assert_int_equal(m.model, MILD_MODEL_BEKKER);
+        const double got = pressure(&m, table[i].depth);
+        print_message("%-10s %.0f mm: %.3f kPa, published %.3f\n", table[i].name,
+                      1e3 * table[i].depth, got, table[i].pressure);
+        worst = fmax(worst, fabs(got / table[i].pressure - 1.0));
+    }
+    assert_true(worst < 2e-4);
+}
+
+/* A level plate 20 mm deep, dragged along x at a constant speed: friction by load against
+ * (c A + mu N)(1 - exp(-j/K)). */
+static void test_shear(void **state) {
+    (void)state;
+    static const char *const names[3] = {"dry_sand", "snow", "lunar_soil"};
+    const double speed = 0.05, dt = 1e-3;
+    MildSole *plate = kit_plate(4, 3);
+    const double area = 12.0 * KIT_PITCH * KIT_PITCH;
+    double worst = 0.0;
+    for (int g = 0; g < 3; g++) {
+        MildMaterial m;
+        assert_true(mild_material_preset(names[g], &m));
+        Kit kit;
+        kit_open(&kit, 1, plate, NULL, &m, dt);
+        kit.input.velocity[0][2] = kit.input.free_velocity[2] = -0.02;
+        for (int s = 0; s < 1000; s++) {
+            kit_solve(&kit);
+            kit_advance(&kit);
+        }
+        kit.input.velocity[0][2] = kit.input.free_velocity[2] = 0.0;
+        kit.input.velocity[0][0] = kit.input.free_velocity[0] = speed;
+        for (int s = 0; s < 1500; s++) {
+            kit_solve(&kit);
+            const MildFootResult *foot = &kit.result.foot[0];
+            const double slid = s * speed * dt;
+            const double full = m.cohesion * area + m.mu * foot->force[2];
+            const double wanted = full * (1.0 - exp(-slid / m.shear_length));
+            worst = fmax(worst, fabs(-foot->force[0] - wanted) / full);
+            kit_advance(&kit);
+        }
+        const MildFootResult *foot = &kit.result.foot[0];
+        print_message("%-10s load %.1f N, dragged 75 mm: %.2f N\n", names[g], foot->force[2],
+                      -foot->force[0]);
+        assert_true(foot->force[2] > 2.0 && -foot->force[0] > 1.0);
+        kit_close(&kit);
+    }
+    mild_sole_destroy(plate);
+    print_message("shear strength within %.1e of the closed form\n", worst);
+    assert_true(worst < 2e-3);
+}
+
+/* ---- hunt_crossley ---- */
+
+/* e of w dw/du = -(F/m)(1 + a w), a = 3/2 d: G(w) = w/a - ln(1 + a w)/a^2 is the same before and
+ * after, whatever force and mass. */
+static double restitution(double d, double speed) {
+    const double a = 1.5 * d;
+    const double wanted = speed / a - log(1.0 + a * speed) / (a * a);
+    double low = 0.0, high = speed;
+    for (int k = 0; k < 100; k++) {
+        const double w = (low + high) / 2;
+        const double got = -w / a - log(1.0 - a * w) / (a * a);
+        *(a * w >= 1.0 || got > wanted ? &high : &low) = w;
+    }
+    return low / speed;
+}
+
+static void test_restitution(void **state) {
+    (void)state;
+    static const double speeds[3] = {0.02, 0.1, 0.5};
+    MildSole *plate = kit_plate(4, 3);
+    MildMaterial m = mild_material_default();
+    m.model = MILD_MODEL_HUNT_CROSSLEY;
+    double worst = 0.0, first = 0.0;
+    for (int i = 0; i < 27; i++) {
+        m.exponent = 0.5 + 0.5 * (i % 3);
+        m.dissipation = 0.1 + 0.5 * (i / 3 % 3);
+        const double speed = speeds[i / 9];
+        Kit kit;
+        kit_open(&kit, 1, plate, NULL, &m, 2e-5);
+        kit.inertia[0] = 1e12;
+        kit.input.velocity[0][2] = -speed;
+        kit.input.position[0][2] += 1e-6;
+        const double float_up[1][3] = {{0.0, 0.0, kit.mass[0] * KIT_GRAVITY}};
+        int touched = 0;
+        for (int s = 0; s < 100000 && !(touched && kit.result.foot[0].force[2] == 0.0); s++) {
+            kit_step(&kit, float_up);
+            touched |= kit.result.foot[0].force[2] > 0.0;
+        }
+        assert_true(touched);
+        const double e = kit.input.velocity[0][2] / speed;
+        worst = fmax(worst, fabs(e - restitution(m.dissipation, speed)));
+        if (speed < 0.05) {
+            first = fmax(first, fabs(e - (1.0 - m.dissipation * speed)));
+        }
+        kit_close(&kit);
+    }
+    mild_sole_destroy(plate);
+    print_message("restitution within %.1e of the closed form; at 20 mm/s within %.1e of 1 - d v\n",
+                  worst, first);
+    assert_true(worst < 2e-3 && first < 2e-3);
+}
+
+/* The same force at the same depth and speed, whatever happened before; and none that pulls. */
+static void test_no_memory(void **state) {
+    (void)state;
+    MildSole *plate = kit_plate(4, 3);
+    MildMaterial m = mild_material_default(); /* whose sand is plastic */
+    m.model = MILD_MODEL_HUNT_CROSSLEY;
+    m.exponent = 1.5;
+    m.dissipation = 5.0; /* no force below -0.13 m/s */
+    Kit kit;
+    kit_open(&kit, 1, plate, NULL, &m, 1e-3);
+    const double one = m.k_pen * 0.01;
+    double worst = 0.0;
+    double before = 0.0; /* [m/s] */
+    int up = 0, free = 0;
+    for (int s = 0; s < 4000; s++) {
+        const double t = s * 1e-3;
+        const double w = (0.015 + 0.001 * t) * 12.0 * cos(12.0 * t);
+        kit.input.velocity[0][2] = kit.input.free_velocity[2] = -w;
+        const double u0 = -KIT_SOLE_Z - kit.input.position[0][2];
+        kit_solve(&kit);
+        /* the way leads from middle to middle: mean depth u0, mean speed that of both steps */
+        const double mean = (before + w) / 2;
+        const double wanted =
+            u0 > 0.0 ? 12.0 * one * pow(u0 / 0.01, 1.5) * (1.0 + 1.5 * m.dissipation * mean) : 0.0;
+        before = w;
+        const double got = kit.result.foot[0].force[2];
+        assert_true(got >= 0.0);
+        free += got == 0.0 && u0 > 1e-3;
+        up += w < 0.0 && got > 0.0;
+        if (u0 > 1e-3) {
+            worst = fmax(worst, fabs(got - fmax(wanted, 0.0)) / (12.0 * one));
+        }
+        kit_advance(&kit);
+    }
+    kit_close(&kit);
+    mild_sole_destroy(plate);
+    print_message(
+        "no memory: within %.1e of the law, %d steps going up, %d in the ground without force\n",
+        worst, up, free);
+    assert_true(worst < 1e-3 && up > 300 && free > 20);
+}
+
+/* ---- several models under one foot ---- */
+
+/* A foot on a patch of one model, on terrain of all three, moves as on that model alone: the loop
+ * that has every curve against the one that has only its own. */
+static void test_together(void **state) {
+    (void)state;
+    static const MildModel models[3] = {MILD_MODEL_MILD, MILD_MODEL_BEKKER,
+                                        MILD_MODEL_HUNT_CROSSLEY};
+    MildSole *plate = kit_plate(4, 3);
+    double worst = 0.0;
+    for (int k = 0; k < 3; k++) {
+        MildMaterial own = mild_material_default();
+        own.model = (int)models[k];
+        Kit alone, among;
+        int loaded = 0;
+        kit_open(&alone, 1, plate, NULL, &own, 1e-3);
+        kit_open(&among, 1, plate, NULL, &own, 1e-3);
+        for (int other = 0; other < 3; other++) {
+            among.terrain.materials[other] = mild_material_default();
+            among.terrain.materials[other].model = (int)models[other];
+        }
+        among.terrain.material_count = 3;
+        MildPatch patch = {.x_min = -1.0, .x_max = 1.0, .y_min = -1.0, .y_max = 1.0, .material = k};
+        assert_int_equal(mild_terrain_add_patch(&among.terrain, &patch, NULL), MILD_OK);
+        for (int s = 0; s < 300; s++) {
+            const double force[1][3] = {{2.0 * sin(0.05 * s), 0.0, 15.0 * sin(0.08 * s)}};
+            kit_step(&alone, force);
+            kit_step(&among, force);
+            loaded += among.result.foot[0].force[2] > 0.0;
+            for (int c = 0; c < 3; c++) {
+                worst = fmax(worst, fabs(alone.input.position[0][c] - among.input.position[0][c]));
+            }
+        }
+        assert_true(loaded > 50);
+        kit_close(&alone);
+        kit_close(&among);
+    }
+    mild_sole_destroy(plate);
+    print_message("on a patch among other models: within %.1e m after 300 steps\n", worst);
+    assert_true(worst < 1e-9);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_pow),         cmocka_unit_test(test_way),
+        cmocka_unit_test(test_published),   cmocka_unit_test(test_shear),
+        cmocka_unit_test(test_restitution), cmocka_unit_test(test_no_memory),
+        cmocka_unit_test(test_together)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
