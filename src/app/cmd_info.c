@@ -8,6 +8,7 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/grounds.h"
+#include "app/robots.h"
 #include "base/text.h"
 #include "config/experiment_keys.h"
 #include "gpu/learner.h"
@@ -160,9 +161,7 @@ static int info_models(void) {
     }
     printf("\nsolvers of the soft ones (--task.newton)\n"
            "  newton        the step as one small convex problem; default\n"
-           "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n"
-           "\nrobots\n"
-           "  sa01    robots/sa01: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
+           "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n");
     return 0;
 }
 
@@ -214,20 +213,21 @@ static const struct {
     const char *name;
     int (*print)(void);
 } topics[] = {
-    {"grounds", info_grounds}, {"models", info_models},   {"config", info_config},
-    {"build", info_build},     {"devices", info_devices},
+    {"grounds", info_grounds}, {"models", info_models}, {"robots", robots_print},
+    {"config", info_config},   {"build", info_build},   {"devices", info_devices},
 };
 enum { TOPICS = sizeof topics / sizeof *topics };
 
 int cmd_info(int argc, char **argv) {
     const CliCommand command = {
         .name = "info",
-        .usage = "grounds | models | config | build | devices",
-        .summary = "grounds: presets with every parameter, its unit, range and source. models: "
-                   "ground models, "
-                   "solvers, robots. config: every key with its default, range and meaning, as a "
-                   "complete config file. "
-                   "build: version, compiler, libraries. devices: what this machine computes with.",
+        .usage = "grounds | models | robots | config | build | devices",
+        .summary =
+            "grounds: presets with every parameter, its unit, range and source. models: "
+            "ground models, "
+            "solvers. robots: joints, feet, mass, height and source of each. config: every key with its default, range and meaning, as a "
+            "complete config file. "
+            "build: version, compiler, libraries. devices: what this machine computes with.",
         .examples = "  mild info grounds\n  mild info config > my.ini\n",
         .positional_max = 1,
     };
