@@ -5,8 +5,10 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -14,6 +16,7 @@
 
 #include "base/random.h"
 #include "control/stand.h"
+#include "mild/map.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 #define HIP_OFFSET 0.04675                           /* [m] hip roll axis from the middle plane */
@@ -91,6 +94,11 @@ static void the_pose_by_hand(void **unused) {
         expect_near("foot's z", foot->position[2], 0, 1e-9);
     }
     expect_near("feet apart", robot_sim_foot_distance(sim), 2 * y, 1e-9);
+    /* the knees' spheres are the lowest shells */
+    const double knee = LEG * cos(0.9) * cos(a) + ROLL_OFFSET * sin(a) + 0.02;
+    MildMaterial any = mild_material_default();
+    MildTerrain level = mild_terrain_uniform(&any);
+    expect_near("clearance", robot_sim_body_clearance(sim, &level), height - knee, 1e-9);
     robot_sim_destroy(sim);
 }
 
@@ -108,6 +116,58 @@ static void efforts_speeds_and_gait(void **unused) {
     expect_near("shift", fabs(robot_gait_offset(robot, FL) - robot_gait_offset(robot, FR)), 0.5, 0);
     assert_int_equal(robot_mirror_foot(robot, FL), FR);
     assert_int_equal(robot_mirror_foot(robot, RR), RL);
+}
+
+/* A folder with `from` written as `to` in robot.ini. */
+static Robot *changed_robot(const char *from, const char *to, MildError *error) {
+    static char text[16384];
+    char folder[] = "robot_changed_XXXXXX", ini[64], model[64];
+    FILE *file = fopen(GO1 "/robot.ini", "rb");
+    assert_non_null(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    fclose(file);
+    const char *at = strstr(text, from);
+    assert_non_null(at);
+    assert_non_null(mkdtemp(folder));
+    snprintf(ini, sizeof ini, "%s/robot.ini", folder);
+    snprintf(model, sizeof model, "%s/go1.xml", folder);
+    file = fopen(ini, "wb");
+    assert_non_null(file);
+    fprintf(file, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
+    fclose(file);
+    assert_int_equal(symlink(GO1 "/go1.xml", model), 0);
+    Robot *made = robot_create(folder, error);
+    remove(ini);
+    remove(model);
+    rmdir(folder);
+    return made;
+}
+
+static void what_may_be_left_out(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    Robot *changed = changed_robot("stand_kp    =", "# a remark\n; stand_kp    =", &error);
+    if (!changed) {
+        fail_msg("%s", error.text);
+    }
+    for (int i = 0; i < JOINTS; i++) {
+        expect_near("stand_kp without a list", robot_stand_kp(changed)[i], robot_kp(robot)[i], 0);
+        expect_near("stand_kd", robot_stand_kd(changed)[i], robot_stand_kd(robot)[i], 0);
+    }
+    robot_destroy(changed);
+    static const struct {
+        const char *from, *to, *said;
+    } refused[] = {{"center = 0 0 -0.213", "", "[foot.FL] center: a round foot needs it"},
+                   {"radius = 0.023", "", "[foot.FL] radius: a round foot needs it"},
+                   {"shape = round", "shape = round\nz = -0.2", "[foot.FL] z: only a flat sole"},
+                   {"shape = round", "shape = ball", "foot.FL"},
+                   {"body = FR_calf", "body = FL_calf", "are on the same body"},
+                   {"offset = 0\n", "", "[foot.FL] offset: is missing"}};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        assert_null(changed_robot(refused[i].from, refused[i].to, &error));
+        print_message("%s\n", error.text);
+        assert_non_null(strstr(error.text, refused[i].said));
+    }
 }
 
 /* ---- round feet ---- */
@@ -151,6 +211,12 @@ static void a_round_foot_is_a_point(void **unused) {
     MildGround *ground = new_ground();
     MildMaterial sand = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(&sand);
+    MildMapDef rough = mild_map_def_default(); /* the disc is not loaded evenly */
+    MildError error = {0};
+    rough.kind = MILD_MAP_ROUGH;
+    MildMap *map = mild_map_create(&rough, &error);
+    assert_non_null(map);
+    assert_int_equal(mild_terrain_set_map(&terrain, map, &error), MILD_OK);
     RobotVariation nominal = robot_variation_nominal();
     double worst_place = 0, worst_speed = 0, worst_step = 0, largest = 0;
     for (uint32_t draw = 0; draw < 20; draw++) {
@@ -201,6 +267,7 @@ static void a_round_foot_is_a_point(void **unused) {
                   worst_place, worst_speed, worst_step, largest);
     assert_true(worst_place < 1e-12 && worst_speed < 1e-12 && worst_step < 1e-8);
     assert_true(largest > 5);
+    mild_map_destroy(map);
     free(ground);
     robot_sim_destroy(sim);
 }
@@ -209,13 +276,14 @@ static void a_round_foot_is_a_point(void **unused) {
 
 typedef struct {
     int stands;
-    double load;  /* [-] of the weight, mean over the last second */
-    double share; /* [-] least load of a foot over a quarter of the weight, then too */
-    double depth; /* [m] mean of the feet, then too */
-    double rest;  /* [m] mean over the feet of a disc's sinkage under the foot's load */
-    double moved; /* [m] the base during the push */
-    double tilt;  /* [rad] at the end */
-    double speed; /* [m/s, rad/s] of the base at the end, the largest component */
+    double height; /* [m] of the base at the end, above z = 0 */
+    double load;   /* [-] of the weight, mean over the last second */
+    double share;  /* [-] least load of a foot over a quarter of the weight, then too */
+    double depth;  /* [m] mean of the feet, then too */
+    double rest;   /* [m] mean over the feet of a disc's sinkage under the foot's load */
+    double moved;  /* [m] the base during the push */
+    double tilt;   /* [rad] at the end */
+    double speed;  /* [m/s, rad/s] of the base at the end, the largest component */
 } Standing;
 
 static double tilt_of(const RobotSim *sim) {
@@ -272,6 +340,7 @@ static Standing stand_and_push(const MildMaterial *material, double dt, const do
         result.speed = fmax(result.speed, fabs(robot_sim_qvel(sim)[k]));
     }
     result.tilt = tilt_of(sim);
+    result.height = robot_sim_qpos(sim)[2];
     free(ground);
     robot_sim_destroy(sim);
     return result;
@@ -288,6 +357,7 @@ static void check(const char *name, const MildMaterial *material, double dt, con
     assert_true(r.share > 0.5);
     assert_true(r.tilt < 0.1);
     assert_true(r.speed < 0.3); /* still swaying after the push */
+    expect_near("height", r.height + r.depth, robot_stand_height(robot), 0.01);
     if (push[0] != 0 || push[1] != 0) {
         assert_true(r.moved > 2e-3);
     } else if (material) {
@@ -312,6 +382,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_pose_by_hand),
         cmocka_unit_test(efforts_speeds_and_gait),
+        cmocka_unit_test(what_may_be_left_out),
         cmocka_unit_test(a_round_foot_is_a_point),
         cmocka_unit_test(stands_and_is_pushed_everywhere),
     };
