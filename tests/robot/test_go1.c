@@ -155,6 +155,12 @@ static void what_may_be_left_out(void **unused) {
         expect_near("stand_kd", robot_stand_kd(changed)[i], robot_stand_kd(robot)[i], 0);
     }
     robot_destroy(changed);
+    changed = changed_robot("height = 0.28            ;", "height = 0.28            #", &error);
+    if (!changed) {
+        fail_msg("%s", error.text);
+    }
+    expect_near("height", robot_nominal_height(changed), 0.28, 0);
+    robot_destroy(changed);
     static const struct {
         const char *from, *to, *said;
     } refused[] = {{"center = 0 0 -0.213", "", "[foot.FL] center: a round foot needs it"},
