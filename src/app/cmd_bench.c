@@ -85,7 +85,7 @@ static MildStatus run_benches(const CliArgs *args, const char *robot, FILE *file
     ExperimentDef def = experiment_def_default();
     MildStatus status = experiment_read(&def, NULL, args->overrides, args->override_count, error);
     if (status == MILD_OK && robot) {
-        status = robots_set(&def.train, robot, error);
+        status = robots_set(&def, robot, error);
     }
     char machine[256];
     if (status == MILD_OK) {

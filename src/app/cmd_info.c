@@ -223,11 +223,10 @@ int cmd_info(int argc, char **argv) {
         .name = "info",
         .usage = "grounds | models | robots | config | build | devices",
         .summary =
-            "grounds: presets with every parameter, its unit, range and source. models: "
-            "ground models, "
-            "solvers. robots: joints, feet, mass, height and source of each. config: every key with its default, range and meaning, as a "
-            "complete config file. "
-            "build: version, compiler, libraries. devices: what this machine computes with.",
+            "grounds: presets with every parameter, its unit, range and source. models: ground "
+            "models, solvers. robots: joints, feet, mass, height and source of each. config: every "
+            "key with its default, range and meaning, as a complete config file. build: version, compiler, "
+            "libraries. devices: what this machine computes with.",
         .examples = "  mild info grounds\n  mild info config > my.ini\n",
         .positional_max = 1,
     };

@@ -68,8 +68,7 @@ static MildStatus read_config(Command *run, const CliArgs *args, MildError *erro
     run->def = experiment_def_default();
     MildStatus status =
         experiment_read(&run->def, config, args->overrides, args->override_count, error);
-    return status == MILD_OK && run->robot ? robots_set(&run->def.train, run->robot, error)
-                                           : status;
+    return status == MILD_OK && run->robot ? robots_set(&run->def, run->robot, error) : status;
 }
 
 static MildStatus make_config_text(Command *run, MildError *error) {

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "app/cli.h"
+#include "config/experiment_keys.h"
 #include "control/controller.h"
 
 enum { LINE = 100 }; /* characters */
@@ -12,13 +13,15 @@ Robot *robots_open(const char *option, const char *otherwise, MildError *error) 
     return robot_open(option ? option : otherwise, error);
 }
 
-MildStatus robots_set(TrainDef *train, const char *option, MildError *error) {
-    if (strlen(option) >= sizeof train->robot) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--robot: '%.40s...' is longer than %d",
-                         option, TRAIN_ROBOT_SIZE - 1);
+MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error) {
+    char text[512];
+    const char *override = text;
+    ConfigSection sections[EXPERIMENT_SECTIONS];
+    if (snprintf(text, sizeof text, "train.robot=%s", option) >= (int)sizeof text) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--robot: '%.40s...' is too long", option);
     }
-    strcpy(train->robot, option);
-    return MILD_OK;
+    experiment_sections(def, sections);
+    return config_overrides(sections, EXPERIMENT_SECTIONS, &override, 1, error);
 }
 
 const char *robots_controller_help(char *text, size_t size) {

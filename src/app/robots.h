@@ -5,12 +5,13 @@
 #include <stddef.h>
 
 #include "robot/robot.h"
-#include "train/train_def.h"
+#include "train/experiment.h"
 
 /* `option` of --robot, or `otherwise` where it is NULL. */
 Robot *robots_open(const char *option, const char *otherwise, MildError *error);
-/* The robot of --robot into train.robot. */
-MildStatus robots_set(TrainDef *train, const char *option, MildError *error);
+/* The robot of --robot into train.robot; what a config file cannot hold is refused, as in an
+ * override. */
+MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error);
 /* Help on --controller; returns `text`. */
 const char *robots_controller_help(char *text, size_t size);
 /* The robots that ship: joints, feet, mass, height, source. Returns the exit code. */

@@ -1,5 +1,4 @@
-/* No action at all: the joints hold the default pose with the task's gains. What a policy must beat.
- */
+/* No action at all: the joints hold the default pose with the task's gains. */
 #include <stdlib.h>
 
 #include "control/controller.h"

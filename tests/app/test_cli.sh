@@ -95,6 +95,8 @@ bad "unknown robot 'go2'; nearest is 'go1'" "$mild" play --robot go2
 bad "unknown robot 'go2'; nearest is 'go1'" "$mild" press --ground sand_loose --robot go2
 bad "unknown robot 'go2'; nearest is 'go1'" "$mild" bench step --robot go2
 bad "unknown robot 'go2'; nearest is 'go1'" "$mild" train --robot go2 --out run
+bad "no blanks around it" "$mild" train --robot ' ./x' --out run
+bad "too long" "$mild" train --robot "./$(printf '%600s' | tr ' ' x)" --out run
 [ ! -e run ] || fail "a refused robot left a folder"
 bad "./nowhere/robot.ini" "$mild" eval --robot ./nowhere
 bad "robot go1 needs 47 x 6 and 12, 19" "$mild" eval --robot go1
