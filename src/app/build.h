@@ -1,4 +1,4 @@
-/* What this program is and where it runs, for --version, info and the headers of result files. */
+/* Version of this program and the machine it runs on, for --version, info and result files. */
 #ifndef MILD_BUILD_H
 #define MILD_BUILD_H
 

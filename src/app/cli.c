@@ -26,8 +26,8 @@ int cli_fail_text(const char *command, const char *format, ...) {
 
 /* ---- help ---- */
 
-/* Words of `text`, line ends counting as blanks, broken at HELP_WIDTH, continued at `indent`; the
- * cursor stands at `column` already. */
+/* Prints the words of `text` in lines of HELP_WIDTH characters. A line end counts as a blank. The
+ * cursor is at `column` now; further lines start at `indent`. */
 static void print_wrapped(const char *text, int column, int indent) {
     while (*text) {
         text += strspn(text, " \n");
@@ -45,9 +45,8 @@ static void print_wrapped(const char *text, int column, int indent) {
     printf("\n");
 }
 
-static void print_option(const char *name, const char *value, const char *help) {
-    char left[80];
-    snprintf(left, sizeof left, "  --%s%s%s", name, value ? " " : "", value ? value : "");
+/* Help of an option or a word, in the right column. */
+static void print_entry(const char *left, const char *help) {
     if ((int)strlen(left) < HELP_COLUMN) {
         printf("%-*s", HELP_COLUMN, left);
     } else {
@@ -56,14 +55,32 @@ static void print_option(const char *name, const char *value, const char *help) 
     print_wrapped(help, HELP_COLUMN, HELP_COLUMN);
 }
 
+static void print_option(const char *name, const char *value, const char *help) {
+    char left[80];
+    snprintf(left, sizeof left, "  --%s%s%s", name, value ? " " : "", value ? value : "");
+    print_entry(left, help);
+}
+
+static void print_words(const CliCommand *command) {
+    printf("\n%s:\n", command->words_title);
+    for (int i = 0; i < command->word_count; i++) {
+        char left[80];
+        snprintf(left, sizeof left, "  %s", command->words[i].name);
+        print_entry(left, command->words[i].help);
+    }
+}
+
 static void print_command_help(const CliCommand *command) {
     printf("usage: mild %s %s\n\n", command->name, command->usage);
     print_wrapped(command->summary, 0, 0);
+    if (command->words_title) {
+        print_words(command);
+    }
     printf("\noptions:\n");
     for (int i = 0; i < command->option_count; i++) {
         print_option(command->options[i].name, command->options[i].value, command->options[i].help);
     }
-    print_option("help", NULL, "this text");
+    print_option("help", NULL, "print this help");
     if (command->overrides) {
         printf("\noverrides:\n");
         print_option("SECTION.KEY=VALUE", NULL, command->overrides);
@@ -105,7 +122,7 @@ static int set_int(const CliCommand *command, const CliOption *option, const cha
     return 0;
 }
 
-/* One piece of a comma list into slot `index`. */
+/* Stores one value of a comma list in slot `index`. */
 static int set_piece(const CliCommand *command, const CliOption *option, const char *piece,
                      int index) {
     if (index >= CLI_LIST_MAX) {
@@ -143,7 +160,7 @@ static int set_list(const CliCommand *command, const CliOption *option, const ch
     return 0;
 }
 
-/* Trials of an hour must not end at a folder that is not there. */
+/* Checked before the command runs: a missing folder must not cost an hour of trials. */
 static int set_output(const CliCommand *command, const CliOption *option, const char *path) {
     MildError error = {0};
     if (strcmp(path, "-") != 0 && file_check_write(path, &error) != MILD_OK) {
@@ -270,12 +287,12 @@ static const char *option_file(const CliOption *option) {
 static int fail_overwrite(const CliCommand *command, const CliOption *option, const char *output,
                           const char *input) {
     return cli_fail_text(command->name,
-                         "--%s: %.150s would be written over, but it is read too (%.80s); name "
+                         "--%s: %.150s is also an input (%.80s) and would be overwritten; name "
                          "another file",
                          option->name, output, input);
 }
 
-/* Whether `output`, which the option makes, is a file that the command reads. */
+/* Fails when `output`, the file of the option, is a file that the command reads. */
 static int check_output(const CliCommand *command, const CliArgs *args, const CliOption *option,
                         const char *output) {
     for (int i = 0; i < command->option_count; i++) {
@@ -292,7 +309,7 @@ static int check_output(const CliCommand *command, const CliArgs *args, const Cl
             return fail_overwrite(command, option, output, args->positional[i]);
         }
     }
-    for (int i = 0; i < args->override_count; i++) { /* the image of a terrain, for one */
+    for (int i = 0; i < args->override_count; i++) { /* a terrain's image, for example */
         const char *equals = strchr(args->overrides[i], '=');
         if (equals && file_same(output, equals + 1)) {
             return fail_overwrite(command, option, output, args->overrides[i]);
@@ -314,7 +331,7 @@ static int check_numbers(const CliCommand *command, const CliArgs *args, const C
     return check_output(command, args, option, numbers);
 }
 
-/* Every output against every input and the outputs before it. */
+/* Compares every output with every input and with the outputs before it. */
 static int check_files(const CliCommand *command, const CliArgs *args) {
     for (int i = 0; i < command->option_count; i++) {
         const CliOption *option = &command->options[i];

@@ -1,5 +1,4 @@
-/* Command lines: named options bound to variables, config overrides, positional words, and help a
- * stranger can read. */
+/* Command lines: named options bound to variables, config overrides, positional words, and help. */
 #ifndef MILD_CLI_H
 #define MILD_CLI_H
 
@@ -19,11 +18,12 @@ typedef struct {
     char name[CLI_LIST_MAX][64];
 } CliNames; /* "rubber,foam45" */
 
-/* target: FLAG int *, TEXT const char **, INT int *, UINT64 uint64_t *, NUMBER double *, NUMBERS
- * CliNumbers *, NAMES CliNames *. What the target holds before parsing is the default.
- * Files are const char ** too. INPUT: read. OUTPUT: written, or `-`; refused at once when it cannot
- * be written. OUTPUT_LATER: written; the command makes its folder and checks it. No output may be
- * an input, nor another output. */
+/* Type of the target: FLAG int *, TEXT const char **, INT int *, UINT64 uint64_t *, NUMBER double *,
+ * NUMBERS CliNumbers *, NAMES CliNames *. The value that it holds before parsing is the default.
+ * Files are const char ** too. INPUT is read. OUTPUT is written and may be `-`; an output that
+ * cannot be written is refused before the command runs. OUTPUT_LATER is written to a folder that
+ * the command makes, so the command checks it. An output may be neither an input nor another
+ * output. */
 typedef enum {
     CLI_FLAG,
     CLI_TEXT,
@@ -42,9 +42,15 @@ typedef struct {
     CliType type;
     void *target;
     double min, max; /* inclusive, for each number; ignored for FLAG, texts, files, NAMES, UINT64 */
-    const char *value; /* what stands for the value in the help: "NAME[,NAME]"; NULL for a flag */
+    const char *value; /* how the help shows the value: "NAME[,NAME]"; NULL for a flag */
     const char *help;  /* with unit and default */
 } CliOption;
+
+/* A word that a command takes, for the list in its help. */
+typedef struct {
+    const char *name;
+    const char *help;
+} CliWord;
 
 typedef struct {
     const char *name;    /* "press" */
@@ -52,12 +58,15 @@ typedef struct {
     const char *summary; /* sentences that say what the command does */
     const CliOption *options;
     int option_count;
+    const char *words_title; /* heading of `words`; NULL: none */
+    const CliWord *words;
+    int word_count;
     const char *overrides; /* help on --section.key=value; NULL: the command takes none */
     const char *examples;  /* whole lines, or NULL */
-    int positional_max;    /* words without dashes */
-    int positional_input;  /* bool: those words are files that are read */
-    const char *picture;   /* option whose file has its numbers beside it; NULL: none */
-    const char *numbers;   /* end of their file's name, in place of the picture's ".png" */
+    int positional_max;    /* most words without dashes */
+    int positional_input;  /* bool: these words are files that the command reads */
+    const char *picture;   /* option whose picture gets a file of its numbers; NULL: none */
+    const char *numbers;   /* that file's name ends in this instead of the picture's ".png" */
 } CliCommand;
 
 typedef struct {
@@ -70,12 +79,12 @@ typedef struct {
 
 typedef enum { CLI_RUN, CLI_DONE, CLI_BAD } CliOutcome;
 
-/* Parses argv[1..]. CLI_DONE: the help was asked for and printed, exit 0. CLI_BAD: one line went to
- * stderr, exit CLI_EXIT_BAD_INPUT. */
+/* Parses argv[1..]. CLI_DONE: the help was printed, exit with 0. CLI_BAD: an error was printed to
+ * stderr, exit with CLI_EXIT_BAD_INPUT. */
 CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args);
 
-/* "mild COMMAND: text" on stderr; returns CLI_EXIT_BAD_INPUT so that `return cli_fail(...)` ends a
- * command. */
+/* Prints "mild COMMAND: text" to stderr. Returns CLI_EXIT_BAD_INPUT, so that `return cli_fail(...)`
+ * ends a command. */
 int cli_fail(const char *command, const MildError *error);
 int cli_fail_text(const char *command, const char *format, ...);
 

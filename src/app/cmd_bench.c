@@ -11,14 +11,21 @@
 #include "bench/bench.h"
 #include "config/experiment_keys.h"
 
-/* memory comes first: its peak is that of the whole process so far. */
+/* memory comes first, because its peak is that of the whole process so far. */
 static const struct {
     const char *name;
     MildStatus (*run)(const ExperimentDef *def, BenchReport *report, MildError *error);
+    const char *help;
 } benches[] = {
-    {"memory", bench_memory},     {"step", bench_step},     {"ground", bench_ground},
-    {"elements", bench_elements}, {"solver", bench_solver}, {"walk", bench_walk},
-    {"train", bench_train},
+    {"memory", bench_memory, "memory that training needs"},
+    {"step", bench_step,
+     "one physics step of the robot on soft ground and with the engine's own contact, in the same "
+     "pose and in turns; ratio_to_rigid is newton over engine_rigid"},
+    {"ground", bench_ground, "the contact solver alone"},
+    {"elements", bench_elements, "the contact solver with 20 to 2000 elements"},
+    {"solver", bench_solver, "newton against the paper's gauss_seidel sweeps, to the same error"},
+    {"walk", bench_walk, "as step, along a walk of the shipped policy"},
+    {"train", bench_train, "policy steps per second in training, and how the time is spent"},
 };
 enum { BENCHES = sizeof benches / sizeof *benches };
 
@@ -55,7 +62,7 @@ static void print_rows(const BenchReport *report, int first, FILE *file) {
     fflush(file);
 }
 
-/* All names are checked before anything runs. */
+/* Checks all names before the first bench runs. */
 static int check_names(const CliArgs *args) {
     const char *names[BENCHES];
     for (int i = 0; i < BENCHES; i++) {
@@ -109,24 +116,23 @@ int cmd_bench(int argc, char **argv) {
     const char *json = NULL, *robot = NULL;
     const CliOption options[] = {
         {"json", CLI_OUTPUT, &json, 0, 0, "FILE",
-         "write {machine, version, rows: [{bench, case, value, unit}]}; - for standard output"},
+         "write {machine, version, rows: [{bench, case, value, unit}]} to FILE; - for standard "
+         "output"},
         {"robot", CLI_TEXT, &robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP "; the shipped policy of walk and solver is sa01's (train.robot, sa01)"},
+         ROBOTS_HELP "; walk and solver need sa01, the shipped policy's (default sa01)"},
     };
+    CliWord words[BENCHES];
+    for (int i = 0; i < BENCHES; i++) {
+        words[i] = (CliWord){benches[i].name, benches[i].help};
+    }
     const CliCommand command = {
         .name = "bench",
         .usage = "[NAME ...] [--json FILE]",
-        .summary = "Measures speed and memory on this machine; without a name, everything (a few "
-                   "minutes). step: one physics "
-                   "step on soft ground beside the engine's own contact, same robot, same pose, "
-                   "same run; ratio_to_rigid is "
-                   "newton over engine_rigid. ground: the contact solver alone. elements: its cost "
-                   "per element, "
-                   "20 to 2000 of them. solver: newton against the paper's gauss_seidel sweeps on "
-                   "the same problems, both to the "
-                   "same error. walk: as step, on the states and torques of the shipped policy's "
-                   "walk. train: policy steps per second, rollout and "
-                   "update, and where the time of a step goes. memory: what training holds.",
+        .summary = "Measures speed and memory on this machine. Without a name it runs every bench, "
+                   "which takes a few minutes.",
+        .words_title = "benches",
+        .words = words,
+        .word_count = BENCHES,
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .overrides = "any key of configs/default.ini, e.g. --train.envs=256 --train.threads=1 "

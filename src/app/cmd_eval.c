@@ -1,4 +1,4 @@
-/* mild eval: trials of a policy on grounds and speeds; a table and a JSON file. */
+/* mild eval: measures a policy on grounds and at speeds; prints a table, writes JSON. */
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -125,7 +125,7 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
     return e->json ? write_json(e, robot, error) : MILD_OK;
 }
 
-/* All grounds are checked before the first trial: a typing error in the last one should not cost an
+/* Checks all grounds before the first trial: a typing error in the last one should not cost an
  * hour. */
 static MildStatus check_grounds(Eval *e, MildError *error) {
     MildStatus status = MILD_OK;
@@ -193,43 +193,46 @@ int cmd_eval(int argc, char **argv) {
     strcpy(e->grounds.name[2], "sand_loose");
     const CliOption options[] = {
         {"policy", CLI_INPUT, &e->policy, 0, 0, "FILE",
-         "policy to try (policies/mild.safetensors)"},
-        {"robot", CLI_TEXT, &e->robot, 0, 0, "NAME|DIR", ROBOTS_HELP " (the config's, or sa01)"},
+         "policy to measure (default policies/mild.safetensors)"},
+        {"robot", CLI_TEXT, &e->robot, 0, 0, "NAME|DIR",
+         ROBOTS_HELP " (default: the config's, or sa01)"},
         {"controller", CLI_TEXT, &e->controller, 0, 0, "NAME",
          robots_controller_help(controller_help, sizeof controller_help)},
         {"config", CLI_INPUT, &e->config, 0, 0, "FILE",
-         "config the policy was trained with, for its [task]"},
+         "config that the policy was trained with, for its section [task]"},
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
-         "grounds, a row each; rubber+foam45 is a course of both (rigid,foam45,sand_loose)"},
+         "grounds, one row each; rubber+foam45 is a course of both (default "
+         "rigid,foam45,sand_loose)"},
         {"model", CLI_TEXT, &e->model, 0, 0, "NAME",
          grounds_model_help(model_help, sizeof model_help)},
         {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]",
-         "[m/s] commanded forward speeds, a row each (0.6)"},
+         "[m/s] commanded forward speeds, one row each (default 0.6)"},
         {"sideways", CLI_NUMBER, &e->eval.sideways, -1, 1, "V",
-         "[m/s] commanded speed to the left, in every row (0)"},
+         "[m/s] commanded speed to the left (default 0)"},
         {"stop", CLI_NUMBER, &e->eval.stop, 0, 3600, "T",
-         "[s] let go of the key: from here on the command is 0; 0: never (0)"},
+         "[s] time at which the command becomes 0; 0: never (default 0)"},
         {"trials", CLI_INT, &e->eval.trials, 1, 10000, "N",
-         "trials per row, each with its own start and noise (10)"},
-        {"seconds", CLI_NUMBER, &e->eval.seconds, 0.1, 3600, "T", "[s] length of a trial (20)"},
+         "trials per row, each with its own start and noise (default 10)"},
+        {"seconds", CLI_NUMBER, &e->eval.seconds, 0.1, 3600, "T",
+         "[s] length of a trial (default 20)"},
         {"patch", CLI_NUMBER, &e->patch, 0.1, 1000, "L",
-         "[m] length of each ground of a course (2.5)"},
-        {"seed", CLI_UINT64, &e->eval.seed, 0, 0, "S", "same seed, same trials (1)"},
+         "[m] length of each ground of a course (default 2.5)"},
+        {"seed", CLI_UINT64, &e->eval.seed, 0, 0, "S",
+         "the same seed gives the same trials (default 1)"},
         {"threads", CLI_INT, &e->threads, 0, 1024, "N",
-         "0: one per core; the table does not depend on it (0)"},
+         "threads; 0: one per core; the results do not depend on it (default 0)"},
         {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
-         "write the table as JSON as well; - for standard output"},
+         "also write the table as JSON to FILE; - for standard output"},
     };
     const CliCommand command = {
         .name = "eval",
         .usage = "--policy FILE --ground NAME[,NAME] --speed V[,V] [options]",
-        .summary = "Walks a policy over grounds and speeds and prints one row for each: trials "
-                   "without a fall, measured\n"
-                   "speed with its 95 % interval, cost of transport, largest torque, foot "
-                   "clearance above the\n"
-                   "undisturbed ground, sinkage and slip of each stance, energy. Sensors are noisy "
-                   "and late as in\n"
-                   "training; the robot itself is nominal and nobody pushes it.",
+        .summary = "Lets a policy walk on every ground at every speed and prints one row for "
+                   "each: trials without a fall, measured speed with its 95 % interval, cost of "
+                   "transport, largest torque, foot clearance above the undisturbed ground, "
+                   "sinkage and slip of a stance, and energy. The sensors have the noise and "
+                   "delay of training. The robot has its nominal parameters, and nobody pushes "
+                   "it.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "

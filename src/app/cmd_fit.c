@@ -1,4 +1,4 @@
-/* mild fit: parameters of a ground from recorded presses, with intervals; table, JSON, picture. */
+/* mild fit: finds parameters of a ground from recorded presses; prints a table, writes JSON, draws. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,7 +18,7 @@ typedef struct {
     const char *ground, *json, *figure;
     CliNumbers plate;
     CliNames fit;
-    double alpha, nu; /* NaN: those of the ground */
+    double alpha, nu; /* NaN: as the ground's */
 } FitOptions;
 
 typedef struct {
@@ -29,7 +29,7 @@ typedef struct {
     FitResult result;
 } FitWork;
 
-/* Never the name of a record: grass.png is drawn from grass_fit.csv, not from grass.csv. */
+/* grass.png is drawn from grass_fit.csv, because grass.csv may be the record. */
 #define NUMBERS_END "_fit.csv"
 
 static const char *const units[FIT_PARAMETERS] = {"N/m", "N/m^3", "rad", "-", "-", "-"};
@@ -37,35 +37,33 @@ static const char *const units[FIT_PARAMETERS] = {"N/m", "N/m^3", "rad", "-", "-
 static int options_read(int argc, char **argv, FitOptions *options, CliArgs *args) {
     char grounds[200], ground_help[400];
     snprintf(ground_help, sizeof ground_help,
-             "what is not fitted is held at this ground's value (default sand_loose); one of %s",
+             "preset that gives the parameters that are not fitted (default sand_loose); one of %s",
              grounds_names(grounds, sizeof grounds));
     const CliOption table[] = {
         {"plate", CLI_NUMBERS, &options->plate, 0.0195, 1, "L,W",
-         "[m] length and width of the plate that was pressed"},
+         "[m] length and width of the plate"},
         {"fit", CLI_NAMES, &options->fit, 0, 0, "NAME[,NAME]",
-         "what to fit, of k_pen, sigma_cone, alpha, nu, c_g, c_d (default k_pen,sigma_cone)"},
+         "parameters to fit, of k_pen, sigma_cone, alpha, nu, c_g, c_d (default k_pen,sigma_cone)"},
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
         {"alpha", CLI_NUMBER, &options->alpha, 0.1, 1.5, "A",
-         "[rad] shear band angle, held or start of its fit"},
+         "[rad] shear band angle: its value, or the start of its fit"},
         {"nu", CLI_NUMBER, &options->nu, 0.1, 10, "N",
-         "[-] recruitment rate, held or start of its fit"},
+         "[-] recruitment rate: its value, or the start of its fit"},
         {"json", CLI_OUTPUT, &options->json, 0, 0, "FILE",
-         "write values and intervals; - for standard output"},
+         "write values and intervals to FILE; - for standard output"},
         {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
-         "picture of data and fit, and its numbers beside it as FILE_fit.csv"},
+         "draw data and fit; the numbers go to FILE_fit.csv beside it"},
     };
     const CliCommand command = {
         .name = "fit",
         .usage = "DATA.csv [DATA2.csv ...] --plate L,W [options]",
-        .summary = "Find the parameters of a ground from presses of a level plate: values with 95 "
-                   "% intervals, and which of "
-                   "them the data cannot tell. A CSV has a header line with depth_m and force_n, "
-                   "and time_s or speed_m_s "
-                   "where speed matters; several files may have several speeds, which c_d needs, "
-                   "or a drop, which c_g needs too. "
-                   "Rows that are not deeper than all before (unloading) are left out. The "
-                   "intervals take the errors of the "
-                   "rows as independent.",
+        .summary = "Finds the parameters of a ground from presses of a level plate. It prints "
+                   "each value with its 95 % interval and says which parameters the data cannot "
+                   "determine. A CSV file has a header line with the columns depth_m and "
+                   "force_n, and time_s or speed_m_s where speed matters. Several files may "
+                   "differ in speed, which c_d needs; c_g also needs a record that brakes, such "
+                   "as a drop. Rows that are not deeper than all before them (unloading) are "
+                   "ignored. The intervals assume that the errors of the rows are independent.",
         .options = table,
         .option_count = sizeof table / sizeof *table,
         .overrides = "any parameter of the ground, e.g. --ground.bed_depth=0.05; `mild info "
@@ -129,7 +127,7 @@ static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitDe
     if (!plate) {
         return error->status;
     }
-    def->elements = mild_sole_elements(plate); /* press's own raster */
+    def->elements = mild_sole_elements(plate); /* as press lays it out */
     def->pitch = mild_sole_pitch(plate);
     mild_sole_destroy(plate);
     return MILD_OK;
@@ -145,12 +143,13 @@ static void say_held(const FitResult *result, FitName name) {
     case FIT_HELD:
     case FIT_FITTED: break;
     case FIT_NO_SPEEDS:
-        printf("%s: the rows do not differ in speed, the data cannot tell it; %s (add a press at "
-               "another speed)\n",
-               fit_names[name], held);
+        printf(
+            "%s: the data cannot determine it, because all rows have about the same speed; %s (add a "
+            "press at another speed)\n",
+            fit_names[name], held);
         break;
     case FIT_NO_MASS:
-        printf("c_d: this ground has no added mass (c_g = 0), c_d has no effect; %s\n", held);
+        printf("c_d: has no effect, because this ground has no added mass (c_g = 0); %s\n", held);
         break;
     case FIT_NO_EFFECT:
         printf("%s: has no effect on these forces; %s\n", fit_names[name], held);
@@ -160,9 +159,7 @@ static void say_held(const FitResult *result, FitName name) {
             "%s and %s: the data cannot tell them apart (correlation %.3f); %s is held at %.4g\n",
             fit_names[name], fit_names[p->partner], p->correlation, fit_names[name], p->value);
         break;
-    case FIT_WIDE:
-        printf("%s: the data do not tell it, any value fits; %s\n", fit_names[name], held);
-        break;
+    case FIT_WIDE: printf("%s: the data cannot determine it; %s\n", fit_names[name], held); break;
     }
 }
 
@@ -292,11 +289,11 @@ int cmd_fit(int argc, char **argv) {
     }
     if (!args.positional_count) {
         return cli_fail_text(
-            "fit", "which record? mild fit DATA.csv --plate L,W (mild press --csv writes one)");
+            "fit", "no record given: mild fit DATA.csv --plate L,W (mild press --csv writes one)");
     }
     if (options.plate.count != 2) {
-        return cli_fail_text(
-            "fit", "--plate: LENGTH,WIDTH in metres of the plate that was pressed are needed");
+        return cli_fail_text("fit",
+                             "--plate LENGTH,WIDTH is missing: the size of the plate in metres");
     }
     MildError error;
     FitWork work = {0};

@@ -13,7 +13,7 @@
 #include "config/experiment_keys.h"
 #include "gpu/learner.h"
 
-/* Where the numbers of a preset come from; docs/ has the details. */
+/* Sources of the presets' numbers; docs/ has the details. */
 static const struct {
     const char *ground, *what, *source;
 } sources[] = {
@@ -90,7 +90,7 @@ static void print_matched(const MildSole *sole, MildModel model, const char *key
 }
 
 static void print_models(void) {
-    printf("models (--model NAME), and where they come from\n");
+    printf("ground models (--model NAME) and their sources\n");
     for (int m = 0; m < MILD_MODELS; m++) {
         const MildModelInfo *info = mild_model_info((MildModel)m);
         printf("  %-12s  %s; %s\n", mild_model_names[m], info->summary, info->source);
@@ -99,9 +99,10 @@ static void print_models(void) {
 
 static void print_rivals(const MildSole *sole) {
     printf(
-        "\nrivals under 20 kg on one foot, matched to sink as deep as mild. Numbers are those of "
-        "one element, for con_* of\n"
-        "the whole sole. What is not said is the preset's.\n");
+        "\nParameters of the other models. Each is matched to sink as deep as mild under 20 kg on one "
+        "foot. The numbers\n"
+        "are for one element, or for the whole sole with con_*. All other parameters are the "
+        "preset's.\n");
     for (int m = 0; m < MILD_MODELS; m++) {
         const MildModelInfo *info = mild_model_info((MildModel)m);
         for (int k = 0; k < MILD_MODEL_SCALED && info->scaled[k]; k++) {
@@ -150,7 +151,8 @@ static int info_grounds(void) {
 
 static int info_models(void) {
     print_models();
-    printf("\nparameters of the ground that each reads (mild info grounds says what they are)\n");
+    printf(
+        "\nparameters of the ground that each model reads (`mild info grounds` explains them)\n");
     for (int m = 0; m < MILD_MODELS; m++) {
         const MildModelInfo *info = mild_model_info((MildModel)m);
         printf("  %-12s ", mild_model_names[m]);
@@ -159,9 +161,10 @@ static int info_models(void) {
         }
         printf("\n");
     }
-    printf("\nsolvers of the soft ones (--task.newton)\n"
-           "  newton        the step as one small convex problem; default\n"
-           "  gauss_seidel  the paper's sweeps over the elements; same answer, for comparison\n");
+    printf(
+        "\ncontact solvers of the soft models (--task.newton)\n"
+        "  newton        solves the step as one small convex problem (default)\n"
+        "  gauss_seidel  sweeps over the elements as in the paper; same answer, for comparison\n");
     return 0;
 }
 
@@ -169,8 +172,9 @@ static int info_config(void) {
     ExperimentDef def = experiment_def_default();
     ConfigSection sections[EXPERIMENT_SECTIONS];
     experiment_sections(&def, sections);
-    printf("# Every key with its default. A config file holds what differs; --section.key=value "
-           "changes one for one run.\n");
+    printf(
+        "# Every key with its default. A config file needs only the keys that differ.\n"
+        "# --section.key=value changes a key for one run. Lines show: [unit] meaning (range).\n");
     config_print(sections, EXPERIMENT_SECTIONS, 1, stdout);
     return 0;
 }
@@ -195,7 +199,7 @@ static const char *instruction_set(void) {
     case dnnl_cpu_isa_avx512_core: return "AVX-512";
     case dnnl_cpu_isa_avx512_core_vnni: return "AVX-512 with VNNI";
     case dnnl_cpu_isa_avx512_core_bf16: return "AVX-512 with BF16";
-    default: return "as oneDNN finds it";
+    default: return "instruction set chosen by oneDNN";
     }
 }
 
@@ -212,21 +216,30 @@ static int info_devices(void) {
 static const struct {
     const char *name;
     int (*print)(void);
+    const char *help;
 } topics[] = {
-    {"grounds", info_grounds}, {"models", info_models}, {"robots", robots_print},
-    {"config", info_config},   {"build", info_build},   {"devices", info_devices},
+    {"grounds", info_grounds, "ground presets; every parameter with its unit, range and source"},
+    {"models", info_models, "ground models with their sources and parameters, contact solvers"},
+    {"robots", robots_print, "joints, feet, mass, height and source of each robot"},
+    {"config", info_config,
+     "every config key with its meaning, range and default, as a complete config file"},
+    {"build", info_build, "version, compiler and libraries"},
+    {"devices", info_devices, "processor, memory and GPU of this machine"},
 };
 enum { TOPICS = sizeof topics / sizeof *topics };
 
 int cmd_info(int argc, char **argv) {
+    CliWord words[TOPICS];
+    for (int i = 0; i < TOPICS; i++) {
+        words[i] = (CliWord){topics[i].name, topics[i].help};
+    }
     const CliCommand command = {
         .name = "info",
         .usage = "grounds | models | robots | config | build | devices",
-        .summary =
-            "grounds: presets with every parameter, its unit, range and source. models: ground "
-            "models, solvers. robots: joints, feet, mass, height and source of each. config: every "
-            "key with its default, range and meaning, as a complete config file. build: version, compiler, "
-            "libraries. devices: what this machine computes with.",
+        .summary = "Prints what the program offers and what it runs on.",
+        .words_title = "topics",
+        .words = words,
+        .word_count = TOPICS,
         .examples = "  mild info grounds\n  mild info config > my.ini\n",
         .positional_max = 1,
     };
@@ -236,7 +249,7 @@ int cmd_info(int argc, char **argv) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
     if (!args.positional_count) {
-        return cli_fail_text("info", "about what? mild info %s", command.usage);
+        return cli_fail_text("info", "no topic given; use mild info %s", command.usage);
     }
     const char *names[TOPICS];
     for (int i = 0; i < TOPICS; i++) {

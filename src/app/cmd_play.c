@@ -1,5 +1,5 @@
-/* mild play: watch a policy walk a course; video or window, a table per ground, a picture of sole
- * pressure. */
+/* mild play: shows a policy walking a course, in a window or as a video; prints a table with a row
+ * per ground, draws the sole pressure. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,8 +50,9 @@ static MildStatus make_scene(Command *c, MildError *error) {
             return status;
         }
         if (rigid && c->grounds.count > 1) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT,
-                             "--ground: rigid is the engine's own contact and stands alone");
+            return mild_fail(
+                error, MILD_ERROR_ARGUMENT,
+                "--ground: rigid is the engine's own contact and cannot be part of a course");
         }
         size_t used = strlen(name);
         if (used + strlen(c->grounds.name[g]) + 2 > sizeof name) {
@@ -70,7 +71,7 @@ static MildStatus make_scene(Command *c, MildError *error) {
     return status == MILD_OK ? task_def_check(&c->task, error) : status;
 }
 
-/* Makes the file's folder, and finds out whether the file can be written before anybody walks. */
+/* Makes the file's folder. Fails before the walk when the file cannot be written. */
 static MildStatus make_place(const char *path, MildError *error) {
     char folder[PATH_SIZE];
     if (snprintf(folder, sizeof folder, "%s", path) >= (int)sizeof folder) {
@@ -140,7 +141,7 @@ static void print_table(const Command *c) {
     }
 }
 
-/* The CSV beside the picture; a name ending in .csv wants no picture. */
+/* Writes the CSV and draws the picture from it; for a name that ends in .csv only the CSV. */
 static MildStatus save_pressure(const Command *c, MildError *error) {
     char data[PATH_SIZE], names[MILD_MATERIALS_MAX][96];
     const char *labels[MILD_MATERIALS_MAX];
@@ -160,7 +161,7 @@ static MildStatus save_pressure(const Command *c, MildError *error) {
     }
     if (any == 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "%s: the robot took no step, there is nothing to draw", c->pressure);
+                         "%s: the robot took no step, so there is nothing to draw", c->pressure);
     }
     status = pressure_write(c->play.pressure, data, labels, error);
     if (status == MILD_OK && strcmp(data, c->pressure) != 0) {
@@ -283,39 +284,42 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     char model_help[320], controller_help[320];
     const CliOption options[] = {
         {"policy", CLI_INPUT, &c->policy, 0, 0, "FILE",
-         "policy to watch (policies/mild.safetensors)"},
-        {"robot", CLI_TEXT, &c->robot, 0, 0, "NAME|DIR", ROBOTS_HELP " (the config's, or sa01)"},
+         "policy to watch (default policies/mild.safetensors)"},
+        {"robot", CLI_TEXT, &c->robot, 0, 0, "NAME|DIR",
+         ROBOTS_HELP " (default: the config's, or sa01)"},
         {"controller", CLI_TEXT, &c->controller, 0, 0, "NAME",
          robots_controller_help(controller_help, sizeof controller_help)},
         {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]",
-         "ground, or several crossed in order (sand_loose)"},
+         "ground, or several that are crossed in order (default sand_loose)"},
         {"model", CLI_TEXT, &c->model, 0, 0, "NAME",
          grounds_model_help(model_help, sizeof model_help)},
         {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L",
-         "[m] length of each ground of a course (2)"},
+         "[m] length of each ground of a course (default 2)"},
         {"video", CLI_OUTPUT_LATER, &c->video, 0, 0, "FILE.mp4",
-         "film it; without this and --pressure a window opens"},
+         "write a video; without this and --pressure a window opens"},
         {"pressure", CLI_OUTPUT_LATER, &c->pressure, 0, 0, "FILE.png",
-         "sole pressure per ground: a picture and its numbers as CSV beside it"},
+         "draw the sole pressure on each ground; the numbers go to FILE.csv beside it"},
         {"speed", CLI_NUMBER, &c->play.speed, -1.3, 1.3, "V",
-         "[m/s] commanded forward speed (0.6)"},
+         "[m/s] commanded forward speed (default 0.6)"},
         {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
-         "[s] length of the walk; 0: long enough for the course (0)"},
-        {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S", "start and sensor noise (1)"},
+         "[s] length of the walk; 0: long enough for the course (default 0)"},
+        {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S",
+         "seed of start and sensor noise (default 1)"},
         {"config", CLI_INPUT, &c->config, 0, 0, "FILE",
-         "config the policy was trained with, for its [task]"},
-        {"width", CLI_INT, &c->width, 64, 7680, "N", "[pixels] (960)"},
-        {"height", CLI_INT, &c->height, 64, 4320, "N", "[pixels] (540)"},
+         "config that the policy was trained with, for its section [task]"},
+        {"width", CLI_INT, &c->width, 64, 7680, "N", "[pixels] width of the picture (default 960)"},
+        {"height", CLI_INT, &c->height, 64, 4320, "N",
+         "[pixels] height of the picture (default 540)"},
     };
     const CliCommand command = {
         .name = "play",
         .usage =
             "--policy FILE --ground NAME[,NAME] [--video FILE.mp4] [--pressure FILE.png] [options]",
-        .summary = "Watch a policy walk. Several grounds make a course that is crossed in order. "
-                   "In the window: arrow keys "
-                   "change speed and turn, Q and E step sideways, S stops, space pauses, - and = "
-                   "change the pace, R starts again, "
-                   "mouse turns the camera, Esc quits. Afterwards a table: a row for each ground.",
+        .summary = "Shows a policy walking. Several grounds make a course, which it crosses in "
+                   "order. Keys in the window: the arrows change speed and turn, Q and E step "
+                   "sideways, S stops, space pauses, - and = change how fast time passes, R "
+                   "restarts, Esc quits; the mouse turns the camera. At the end a table has a "
+                   "row for each ground.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .picture = "pressure",

@@ -13,7 +13,7 @@
 #include "lab/press.h"
 #include "robot/robot.h"
 
-/* NaN: not given. */
+/* NaN: the option was not given. */
 typedef struct {
     const char *robot, *ground, *model, *plate, *csv, *figure;
     CliNumbers depth, force; /* the turns */
@@ -21,7 +21,7 @@ typedef struct {
     int cycles;
 } PressOptions;
 
-/* The sole to press with, and the robot that owns it when it is the robot's. */
+/* The sole to press with. `robot` owns it when it is the robot's. */
 typedef struct {
     const char *robot_name; /* of --robot, or NULL */
     Robot *robot;
@@ -85,8 +85,8 @@ static double sole_area(const MildSole *sole) {
     return mild_sole_elements(sole) * mild_sole_pitch(sole) * mild_sole_pitch(sole);
 }
 
-/* The material of the model, matched on this tool under the pressure of half the robot on its own
- * sole; and the sole that the model presses with. */
+/* Sets the material of the model and the sole that the model presses with. The material is matched
+ * on this tool, under the pressure of half the robot's weight on its own sole. */
 static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *args,
                                  MildMaterial *material, TerrainDef *terrain, MildError *error) {
     GroundsDef finish = {
@@ -108,7 +108,7 @@ static MildStatus tool_set_model(Tool *tool, MildModel model, const CliArgs *arg
     return status;
 }
 
-/* The contract's seven columns; motion other than straight down and up needs four more. */
+/* Seven columns; four more where the motion is not straight down and up. */
 static char *csv_text(const PressResult *result, int more, size_t *size) {
     char *text = NULL;
     FILE *memory = open_memstream(&text, size);
@@ -149,7 +149,7 @@ static MildStatus csv_write(const PressResult *result, int more, const char *pat
     return status;
 }
 
-/* The picture's numbers: the CSV asked for, else FILE.csv beside FILE.png. */
+/* The picture is drawn from the file of --csv, or else from FILE.csv beside FILE.png. */
 static MildStatus figure_save(const PressOptions *options, const PressResult *result, int more,
                               MildError *error) {
     char data[PATH_SIZE];
@@ -172,7 +172,7 @@ static int is_dropped(const PressOptions *options) {
     return isfinite(options->drop) || isfinite(options->impact);
 }
 
-/* First row of a way and the one behind its last. */
+/* First row of a way, and the row after its last. */
 static void way_find(const PressResult *result, int way, int *first, int *end) {
     for (*first = 0; *first < result->count && result->rows[*first].way < way; ++*first) {
         continue;
@@ -182,7 +182,7 @@ static void way_find(const PressResult *result, int way, int *first, int *end) {
     }
 }
 
-/* Row of a way whose depth is nearest. */
+/* Row of a way with the nearest depth. */
 static const PressRow *way_at(const PressResult *result, int way, double depth) {
     int first, end;
     way_find(result, way, &first, &end);
@@ -195,7 +195,7 @@ static const PressRow *way_at(const PressResult *result, int way, double depth) 
     return best;
 }
 
-/* Eleven depths, the force on the first way down and on the last way up beside each other. */
+/* Eleven depths with the forces on the first way down and on the last way up. */
 static void table_depths(const PressResult *result) {
     int first, end, last = result->rows[result->count - 1].way;
     way_find(result, 0, &first, &end);
@@ -234,7 +234,7 @@ static void table_drag(const PressResult *result) {
     }
 }
 
-/* From the touch to twice the time of the first stop. */
+/* Rows from the first contact to twice the time of the first stop. */
 static void table_drop(const PressResult *result) {
     int touch = 0, last;
     while (touch < result->count - 1 && result->rows[touch].contacts == 0) {
@@ -316,13 +316,12 @@ static void summary_print(const PressOptions *options, const Tool *tool, const c
 /* ---- the command ---- */
 
 static const char summary[] =
-    "Move a plate or the robot's sole through a ground and record what the ground answers. By hand "
-    "it goes down at "
-    "constant speed and up again, over several turns or cycles, or sideways while it is down "
-    "(--drag); with --drop or --impact "
-    "it is a free body that falls. Depth, moments and zero moment point are those of the plate's "
-    "centre (for the sole: "
-    "the point under the ankle). Once out of the ground, its print is forgotten.";
+    "Moves a plate or the robot's sole through a ground and records the force. It goes down at "
+    "constant speed and comes up again. It can also make several turns or cycles, or move "
+    "forward at constant depth (--drag). With --drop or --impact it is a free body that falls. "
+    "Depth, moments and zero moment point refer to the centre of the plate, or to the point of "
+    "the sole below the ankle. The ground forgets an imprint once the plate has left it, unless "
+    "--terrain.memory=true is given.";
 
 static const char examples[] =
     "  mild press --ground sand_loose\n"
@@ -357,39 +356,42 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
         {"model", CLI_TEXT, &options->model, 0, 0, "NAME",
          grounds_model_help(model_help, sizeof model_help)},
         {"plate", CLI_TEXT, &options->plate, 0, 0, "L,W|sole",
-         "[m] length and width of a plate, or the robot's sole (default 0.2,0.1)"},
+         "[m] length and width of a plate, or `sole` for the robot's sole (default 0.2,0.1)"},
         {"robot", CLI_TEXT, &options->robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP "; its sole, and the weight that models are matched under (default sa01)"},
         {"tilt", CLI_NUMBER, &options->tilt_deg, -45, 45, "DEG",
-         "[deg] front edge down (default 0)"},
+         "[deg] tilt, positive when the front edge is lower (default 0)"},
         {"depth", CLI_NUMBERS, &options->depth, 0, 1, "D[,BACK,...]",
-         "[m] how deep it goes (default 0.03), how far it comes back, and so on, at last out of "
-         "the ground"},
+         "[m] depths at which it turns: down to the first (default 0.03), up to the second, and "
+         "so on; at the end it leaves the ground"},
         {"force", CLI_NUMBERS, &options->force, 0, 1e6, "F[,BACK,...]",
-         "[N] instead of --depth: turn where the ground pushes this hard"},
-        {"speed", CLI_NUMBER, &options->speed, 1e-5, 10, "V", "[m/s] down and up (default 0.01)"},
-        {"cycles", CLI_INT, &options->cycles, 1, 1000, "N", "times through all turns (default 1)"},
+         "[N] as --depth, but it turns where the ground pushes with these forces"},
+        {"speed", CLI_NUMBER, &options->speed, 1e-5, 10, "V",
+         "[m/s] speed down and up (default 0.01)"},
+        {"cycles", CLI_INT, &options->cycles, 1, 1000, "N",
+         "how often to repeat all turns (default 1)"},
         {"drag", CLI_NUMBER, &options->drag, 1e-4, 10, "X",
-         "[m] once down, this far sideways (forward, along the plate's length) at the same depth"},
+         "[m] after the way down, move this far forward, along the plate's length, at constant "
+         "depth"},
         {"drag-speed", CLI_NUMBER, &options->drag_speed, 1e-5, 10, "V",
-         "[m/s] sideways (default that of --speed)"},
+         "[m/s] speed of --drag (default: that of --speed)"},
         {"drop", CLI_NUMBER, &options->drop, 0, 10, "H",
-         "[m] let it fall from this height above the ground"},
+         "[m] drop it from this height above the ground"},
         {"impact", CLI_NUMBER, &options->impact, 0, 20, "V",
-         "[m/s] downward speed at which the fall begins"},
+         "[m/s] drop it with this downward speed"},
         {"mass", CLI_NUMBER, &options->mass, 1e-3, 1e4, "M",
-         "[kg] of what falls, spread evenly over the plate (default 20, half the robot)"},
+         "[kg] mass of the dropped body, spread evenly over the plate (default 20)"},
         {"seconds", CLI_NUMBER, &options->seconds, 1e-3, 100, "T",
-         "[s] of the fall that are recorded (default 1)"},
+         "[s] how long to record a drop (default 1)"},
         {"step", CLI_NUMBER, &options->step, 1e-7, 1, "DT",
-         "[s] between rows (default: a thousandth of the way down, with --force 0.02 mm of it; "
-         "0.0001 falling)"},
+         "[s] time between rows (default: a thousandth of the way down; with --force the time for "
+         "0.02 mm; 0.0001 for a drop)"},
         {"csv", CLI_OUTPUT, &options->csv, 0, 0, "FILE",
-         "write time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m, and "
-         "force_x_n,force_y_n,x_m,tilt_rad "
-         "when dragged or dropped; - for standard output"},
+         "write the rows to FILE, or - for standard output. Columns: time_s, depth_m, force_n, "
+         "moment_x_nm, moment_y_nm, zmp_x_m, zmp_y_m; with --drag, --drop or --impact also "
+         "force_x_n, force_y_n, x_m, tilt_rad"},
         {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
-         "draw it; its numbers stand in the CSV, else beside it as FILE.csv"},
+         "draw the press; without --csv its numbers go to FILE.csv beside it"},
     };
     CliOutcome outcome = options_parse(table, sizeof table / sizeof *table, argc, argv, args);
     if (outcome == CLI_BAD) {
@@ -398,47 +400,49 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
     return outcome == CLI_DONE ? -1 : 0;
 }
 
-/* Down and back must take turns. */
+/* Turns must alternate between down and up. */
 static MildStatus turns_check(const char *name, const CliNumbers *turns, MildError *error) {
     const double *at = turns->value;
     if (turns->count > 0 && !(at[0] > 0)) {
-        return mild_fail(error, MILD_ERROR_RANGE, "--%s: the turn must lie above 0", name);
+        return mild_fail(error, MILD_ERROR_RANGE, "--%s: the first turn must be above 0", name);
     }
     for (int i = 1; i < turns->count; i++) {
         if (i % 2 ? at[i] < at[i - 1] : at[i] > at[i - 1]) {
             continue;
         }
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "--%s: from %g to %g is no way %s; ways down and back alternate", name,
-                         at[i - 1], at[i], i % 2 ? "back" : "down");
+                         "--%s: %g after %g is not %s; turns alternate between down and up", name,
+                         at[i], at[i - 1], i % 2 ? "up" : "down");
     }
     return MILD_OK;
 }
 
-/* What does not go together. */
+/* Refuses options that contradict each other. */
 static MildStatus options_check(const PressOptions *o, MildError *error) {
     const CliNumbers *turns = o->force.count ? &o->force : &o->depth;
     if (is_dropped(o) && (turns->count || isfinite(o->speed) || o->cycles || isfinite(o->drag))) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--%s: what falls goes where it goes; leave out --depth, --force, "
-                         "--speed, --cycles, --drag",
-                         isfinite(o->drop) ? "drop" : "impact");
+        return mild_fail(
+            error, MILD_ERROR_ARGUMENT,
+            "--%s: the path of a dropped body cannot be prescribed; leave out --depth, "
+            "--force, --speed, --cycles and --drag",
+            isfinite(o->drop) ? "drop" : "impact");
     }
     if (!is_dropped(o) && (isfinite(o->mass) || isfinite(o->seconds))) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--%s: only what falls needs it; add --drop H or --impact V",
+                         "--%s: applies only to a dropped body; add --drop H or --impact V",
                          isfinite(o->mass) ? "mass" : "seconds");
     }
     if (o->depth.count && o->force.count) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--force: turns where the ground pushes so hard; leave out --depth");
+                         "--force: cannot be used with --depth; leave out one of them");
     }
     if (isfinite(o->drag) && (o->cycles > 1 || turns->count > 1)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--drag: goes sideways once; leave out --cycles and further turns");
+                         "--drag: works with one turn; leave out --cycles and further turns");
     }
     if (isfinite(o->drag_speed) && !isfinite(o->drag)) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "--drag-speed: how far? --drag X");
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--drag-speed: the distance is missing; add --drag X");
     }
     return turns_check(o->force.count ? "force" : "depth", turns, error);
 }
@@ -511,7 +515,7 @@ int cmd_press(int argc, char **argv) {
         return code < 0 ? 0 : code;
     }
     if (!options.ground) {
-        return cli_fail_text("press", "which ground? --ground NAME (mild info grounds lists all)");
+        return cli_fail_text("press", "--ground NAME is missing (mild info grounds lists all)");
     }
     MildError error;
     MildModel model;

@@ -20,7 +20,7 @@ typedef struct {
     char note[1024];
 } Command;
 
-/* What made the policy, as far as it fits; the run folder's config.ini has every key. */
+/* The command that made the policy, as far as it fits; the run folder's config.ini has every key. */
 static void write_note(Command *run, const CliArgs *args) {
     const char *folder = run->resume ? run->out : "configs",
                *name = run->resume ? "config" : "default";
@@ -49,12 +49,12 @@ static MildStatus check_config_kept(const Command *run, MildError *error) {
         return MILD_OK;
     }
     return mild_fail(error, MILD_ERROR_ARGUMENT,
-                     "--config: %.150s would be written over by the new run; copy it out of the "
-                     "run folder, or choose another --out",
+                     "--config: the new run would overwrite %.150s; copy it out of the run folder, "
+                     "or choose another --out",
                      run->config);
 }
 
-/* A resumed run keeps the config it began with; --config and overrides still change it. */
+/* A resumed run keeps the config that it began with, unless --config or overrides change it. */
 static MildStatus read_config(Command *run, const CliArgs *args, MildError *error) {
     char path[PATH_SIZE];
     const char *config = run->config;
@@ -176,22 +176,21 @@ int cmd_train(int argc, char **argv) {
     }
     const CliOption options[] = {
         {"config", CLI_INPUT, &run->config, 0, 0, "FILE.ini",
-         "what to change of configs/default.ini"},
+         "config file; it needs only the keys that differ from configs/default.ini"},
         {"out", CLI_TEXT, &run->out, 0, 0, "FOLDER",
-         "run folder: config, log, checkpoints, policy.safetensors"},
+         "run folder, for config, log, checkpoints and policy.safetensors"},
         {"robot", CLI_TEXT, &run->robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP "; also train.robot (the config's, or sa01)"},
+         ROBOTS_HELP "; sets train.robot (default: the config's, or sa01)"},
         {"resume", CLI_FLAG, &run->resume, 0, 0, NULL,
-         "go on from the newest checkpoint in the run folder, with its config.ini unless --config "
-         "is given"},
+         "continue from the newest checkpoint of the run folder, with its config.ini unless "
+         "--config is given"},
     };
     const CliCommand command = {
         .name = "train",
         .usage = "--config FILE.ini --out FOLDER [--resume] [--section.key=value]",
-        .summary = "Trains a walking policy from scratch by PPO. Ctrl-C saves and ends; --resume "
-                   "goes on as if the run\n"
-                   "had never stopped, bit for bit. The log is log.csv and a TensorBoard file in "
-                   "the run folder.",
+        .summary = "Trains a walking policy from scratch by PPO. Ctrl-C saves the run and ends "
+                   "it. --resume continues it as if it had never stopped, bit for bit. The run "
+                   "folder gets the log as log.csv and as a TensorBoard file.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .overrides = "any key of configs/default.ini, e.g. --train.minutes=5 --task.vx=0,0.8",

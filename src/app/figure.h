@@ -1,11 +1,11 @@
-/* Figures are drawn by Python scripts from a CSV that the program wrote. */
+/* Python scripts draw the figures from CSV files that the program writes. */
 #ifndef MILD_FIGURE_H
 #define MILD_FIGURE_H
 
 #include "mild/error.h"
 
-/* Runs a shipped script ("scripts/fit.py") with `data` and `picture` as arguments, in the private
- * environment, else with the system's Python. */
+/* Runs a shipped script ("scripts/fit.py") with the arguments `data` and `picture`. Uses the Python
+ * of .venv, or else the system's. */
 MildStatus figure_draw(const char *script, const char *data, const char *picture, MildError *error);
 
 #endif

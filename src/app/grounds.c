@@ -44,7 +44,8 @@ MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *mod
         }
         const char *other = args->overrides[i] + sizeof key - 1;
         if (option && strcmp(option, other) != 0) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT, "--model %.40s and --%.60s: which one?",
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "--model %.40s and --%.60s contradict each other; leave out one",
                              option, args->overrides[i]);
         }
         name = other;
@@ -156,6 +157,6 @@ const char *grounds_names(char *text, size_t size) {
 const char *grounds_model_help(char *text, size_t size) {
     char names[240];
     list_names(MILD_MODELS, model_name, names, sizeof names);
-    snprintf(text, size, "ground model: %s; matched to mild's sinkage (mild)", names);
+    snprintf(text, size, "ground model, matched to the sinkage of mild (default mild): %s", names);
     return text;
 }

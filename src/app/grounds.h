@@ -1,4 +1,4 @@
-/* Grounds by name, as the command line says them. */
+/* Grounds that the command line names. */
 #ifndef MILD_GROUNDS_H
 #define MILD_GROUNDS_H
 
@@ -9,19 +9,18 @@
 #include "task/task_def.h"
 #include "task/terrain.h"
 
-/* The preset's material; an unknown name fails with the nearest known one. `rigid` is no material:
- * it fails unless *rigid is given, which it sets. */
+/* The material of a preset. For an unknown name the message tells the nearest known one. `rigid` has
+ * no material: it sets *rigid, and fails where that is NULL. */
 MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, MildError *error);
 
-/* The model that --model NAME (NULL: not given) or --ground.model=NAME asks for; mild without
- * either. */
+/* The model of --model NAME (NULL: not given) or --ground.model=NAME; mild when neither is given. */
 MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model,
                          MildError *error);
 
-/* What a command does to the grounds it was told by name. */
+/* How a command turns the names of grounds into materials. */
 typedef struct {
     MildModel model;
-    const MildSole *sole; /* the raster a rival of mild is matched on */
+    const MildSole *sole; /* raster on which other models are matched to mild */
     double load;          /* [N] under it */
     const CliArgs
         *args;     /* --ground.KEY=VALUE, laid over the matched material; and --task.KEY=VALUE */
@@ -29,17 +28,17 @@ typedef struct {
     TerrainDef *terrain; /* NULL: no --terrain either */
 } GroundsDef;
 
-/* For the robot: matched under half its weight, overrides from `args`, and the robot gets the soles
- * of the model. */
+/* For the robot: models are matched under half its weight, overrides come from `args`, and the robot
+ * gets the soles of the model. */
 GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain,
                              const CliArgs *args);
-/* A preset becomes the material of the model, with the overrides laid over it. */
+/* Turns a preset into the material of the model, then applies the overrides. */
 MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildError *error);
-/* The same for every ground of a scene; the model rigid puts it on the engine's own contact. */
+/* The same for every ground of a scene. The model rigid selects the engine's own contact. */
 MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *error);
-/* The map that --terrain.KEY=VALUE asks for, under a finished scene and the task: *map (NULL:
- * level) is the caller's to destroy after both. With a pattern the scene's grounds are its labels,
- * in order, instead of a course. */
+/* Puts the map of --terrain.KEY=VALUE under a finished scene and the task. The caller destroys *map
+ * (NULL: level ground) after both. With a pattern of materials the scene's grounds are the pattern's
+ * labels, in order, and not a course. */
 MildStatus grounds_lay_map(const GroundsDef *def, Scene *scene, MildMap **map, MildError *error);
 
 /* Help on --model; returns `text`. */

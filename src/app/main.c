@@ -1,5 +1,5 @@
-/* The program `mild`: a table of commands. Only in this layer text becomes structs and errors
- * become exits. */
+/* The program `mild`: a table of commands. Only this layer turns text into structs and errors into
+ * exit codes. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -25,12 +25,12 @@ static const struct {
     const char *help;
 } commands[] = {
     {"train", cmd_train, "train a walking policy on soft ground"},
-    {"eval", cmd_eval, "walk a policy over grounds and speeds, and print what came out"},
-    {"play", cmd_play, "watch a policy: video, window, picture of sole pressure"},
+    {"eval", cmd_eval, "measure how a policy walks on several grounds and at several speeds"},
+    {"play", cmd_play, "watch a policy walk, in a window or as a video"},
     {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
-    {"fit", cmd_fit, "find a ground's parameters from recorded presses"},
+    {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
     {"bench", cmd_bench, "measure speed and memory on this machine"},
-    {"info", cmd_info, "grounds, models, config keys, build, devices"},
+    {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
 };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
@@ -42,21 +42,23 @@ static void print_help(FILE *file) {
     for (int i = 0; i < COMMANDS; i++) {
         fprintf(file, "  %-8s%s\n", commands[i].name, commands[i].help);
     }
-    fprintf(file,
-            "\n`mild COMMAND --help` tells the rest. Exit code: 0 fine, 2 bad input.\n\n"
-            "a first look:\n"
-            "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
-            "  mild press --ground foam45 --depth 0.03\n");
+    fprintf(
+        file,
+        "\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 after success "
+        "and 2 after\nan error, which is one line on standard error.\n\n"
+        "try first:\n"
+        "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
+        "  mild press --ground foam45 --depth 0.03\n");
 }
 
-/* What was printed must have arrived: a full disk is found out at the last flush. */
+/* Only the last flush shows whether standard output took everything, for example on a full disk. */
 static int finish(int code) {
     int failed = ferror(stdout);
     errno = 0;
     if (fflush(stdout) != 0 || failed) {
         failed = 1;
     }
-    if (!failed || code != 0) { /* a command that failed has said its line */
+    if (!failed || code != 0) { /* a failed command has printed its error already */
         return code;
     }
     fprintf(stderr, "mild: cannot write to standard output: %s\n",
@@ -64,7 +66,7 @@ static int finish(int code) {
     return CLI_EXIT_BAD_INPUT;
 }
 
-/* MuJoCo cannot go on. */
+/* MuJoCo calls this when it cannot go on. */
 static void end_for_engine(const char *text) {
     fprintf(stderr, "mild: MuJoCo failed: %s\n", text);
     _exit(CLI_EXIT_BAD_INPUT);

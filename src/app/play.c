@@ -10,21 +10,21 @@
 #include "eval/eval.h"
 
 #define START_TIME 1.0  /* [s] standing up and starting, not counted in speeds and pressures */
-#define FALL_TIME 1.0   /* [s] the last picture stays after a fall */
+#define FALL_TIME 1.0   /* [s] how long the picture stays after a fall */
 #define SPEED_TIME 0.5  /* [s] the shown speed is a running mean over about this long */
-#define OWED_MAX 0.2    /* [s] of walking that a slow machine makes up for at once */
+#define OWED_MAX 0.2    /* [s] delay behind real time that is caught up with at once */
 #define WINDOW_TIME 1e6 /* [s] a window's walk has no end */
 
 /* [m/s, m/s, rad/s] that the keys can command: what the shipped policy was trained on. */
 static const double command_max[3] = {1.3, 0.3, 0.8};
 
-/* The walk's own state. */
+/* State of the walk. */
 typedef struct {
     Play *play;
-    TaskDef task; /* the caller's, with an episode as long as the walk */
+    TaskDef task; /* the caller's task with an episode as long as the walk */
     TaskEnv *env;
     RobotSim *sim;
-    double command[3]; /* [m/s, m/s, rad/s] wished by keys */
+    double command[3]; /* [m/s, m/s, rad/s] given by the keys */
     int steer;         /* bool: keys were used; until then the heading is held */
     double speed;      /* [m/s] shown */
     double end;        /* [s] */
@@ -91,7 +91,8 @@ static void step(Walk *walk) {
     }
     play->fell = 1;
     play->leg[walk->ground].fell = 1;
-    walk->end = play->time; /* only soles meet the ground: there is nothing to see below a fall */
+    walk->end =
+        play->time; /* end here: only soles touch the ground, so a fall would go through it */
     walk->lost = !out.valid;
 }
 

@@ -1,5 +1,4 @@
-/* One robot walking a course while it is watched: measured per ground, filmed, shown in a window.
- */
+/* One robot walking a course: measured on each ground, filmed or shown in a window. */
 #ifndef MILD_PLAY_H
 #define MILD_PLAY_H
 
@@ -13,9 +12,9 @@
 /* What happened on one ground of the course. */
 typedef struct {
     Measure measure;
-    int steps;             /* physics steps counted, after the start */
+    int steps;             /* physics steps that count, those after the start */
     double start_x, end_x; /* [m] */
-    int fell;              /* bool: here */
+    int fell;              /* bool: it fell on this ground */
 } PlayLeg;
 
 typedef struct {
@@ -37,7 +36,7 @@ typedef struct {
     int frames;
 } Play;
 
-/* Walks until the time is over, the robot fell, the window was closed or Ctrl-C. */
+/* Walks until the time is over, the robot falls, the window is closed or Ctrl-C is pressed. */
 MildStatus play_run(Play *play, MildError *error);
 
 #endif

@@ -22,7 +22,7 @@ Progress progress_begin(const char *what) {
                       .terminal = isatty(STDERR_FILENO)};
 }
 
-/* A line wider than the terminal would wrap, and its first half could no longer be overwritten. */
+/* A line wider than the terminal would wrap, and could then not be updated in place. */
 static void cut_to_terminal(char *line) {
     struct winsize window;
     if (ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1 &&
@@ -79,10 +79,10 @@ void progress_end(Progress *progress, const char *format, ...) {
     }
 }
 
-/* oneDNN 2.6's generated kernels keep data below the stack pointer, where the kernel puts the frame
- * of a signal handler: a Ctrl-C in the middle of a product corrupted the heap. So no thread that
- * computes ever runs a handler: the signals are blocked (threads made later inherit that) and a
- * thread of their own waits for them. */
+/* No thread that computes may run a signal handler: the generated code of oneDNN 2.6 keeps data
+ * below the stack pointer, where the system puts a handler's frame, so a Ctrl-C during a product
+ * corrupted the heap. The signals are blocked, later threads inherit that, and one thread waits for
+ * them. */
 static atomic_int interrupted;
 
 static void *wait_for_signals(void *signals) {

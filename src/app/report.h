@@ -1,4 +1,4 @@
-/* Result files: JSON made with cJSON, written whole or not at all. */
+/* Writes a JSON result completely or not at all. */
 #ifndef MILD_REPORT_H
 #define MILD_REPORT_H
 
@@ -6,7 +6,7 @@
 
 #include "mild/error.h"
 
-/* Takes ownership of `root` (NULL: out of memory while it was built). path "-": to stdout. */
+/* Takes ownership of `root`; NULL means that memory ran out while it was built. path "-": stdout. */
 MildStatus report_save(cJSON *root, const char *path, MildError *error);
 
 #endif

@@ -3,7 +3,6 @@
 #define MILD_CLOCK_H
 /* Monotonic wall clock. */
 double clock_seconds(void);
-/* This thread's processor time: the slices that other programs take do not count. Reading it is a
- * system call. */
+/* Processor time of this thread, without the time that other programs take. Costs a system call. */
 double clock_thread_seconds(void);
 #endif

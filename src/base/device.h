@@ -1,4 +1,4 @@
-/* Functions that the processor and the GPU both compile: one text, one result. */
+/* MILD_HD marks functions that are compiled for the processor and for the GPU. */
 #ifndef MILD_DEVICE_H
 #define MILD_DEVICE_H
 

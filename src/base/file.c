@@ -29,7 +29,7 @@ MildStatus file_check_regular(const char *path, MildError *error) {
     return reason ? cannot_read(path, reason, error) : MILD_OK;
 }
 
-/* A descriptor, or -1. O_NONBLOCK: opening a pipe that nobody writes to would wait. */
+/* A descriptor, or -1. O_NONBLOCK: otherwise opening a pipe without a writer would wait. */
 static int open_regular(const char *path, struct stat *info, MildError *error) {
     int file = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     const char *reason = file < 0 || fstat(file, info) != 0 ? strerror(errno) : not_regular(info);
@@ -88,7 +88,7 @@ char *file_read(const char *path, size_t limit, size_t *size, MildError *error) 
     if (failed) {
         cannot_read(path, strerror(failed), error);
     } else if (*size > limit) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%.200s: larger than %s, no such file is", path,
+        mild_fail(error, MILD_ERROR_FORMAT, "%.200s: larger than %s; no file of this kind is", path,
                   text_bytes((double)limit, most, sizeof most));
     } else {
         mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", path);
@@ -155,7 +155,8 @@ int file_is_temporary(const char *name) {
 
 MildStatus file_check_write(const char *path, MildError *error) {
     struct stat info;
-    if (is_device(path)) { /* not opened: the reader of a pipe would see its end */
+    if (is_device(
+            path)) { /* not opened, because closing it again would end the pipe for its reader */
         int failed = stat(path, &info) == 0 && S_ISDIR(info.st_mode) ? EISDIR
                      : access(path, W_OK) != 0                       ? errno
                                                                      : 0;
@@ -194,8 +195,8 @@ static const char *folder_of(const char *path, char folder[PATH_SIZE]) {
     return folder;
 }
 
-/* A rename is on the disk only once its folder is; a file system that cannot sync folders loses
- * nothing by it. */
+/* A rename is safe on disk only when its folder is synced. Where folders cannot be synced, the error
+ * does not matter. */
 static void sync_folder(const char *path) {
     char name[PATH_SIZE];
     int folder = open(folder_of(path, name), O_RDONLY | O_CLOEXEC);
@@ -272,8 +273,8 @@ static MildStatus lock_refused(int file, const char *path, MildError *error) {
     return mild_fail(error, MILD_ERROR_ARGUMENT, "%.200s: in use by another process", path);
 }
 
-/* The holder removes the file before it drops the lock, so a lock is good only when the file that
- * was locked is still the one that has the name. */
+/* The holder removes the file before it releases the lock. So a lock counts only when the locked file
+ * still has its name. */
 MildStatus file_lock(FileLock *lock, const char *path, MildError *error) {
     lock->file = -1;
     if (snprintf(lock->path, sizeof lock->path, "%s", path) >= (int)sizeof lock->path) {

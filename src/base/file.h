@@ -1,4 +1,4 @@
-/* Files: read when they are regular, written whole or not at all, told apart, locked. */
+/* Files: reads regular files, writes a file completely or not at all, compares and locks files. */
 #ifndef BASE_FILE_H
 #define BASE_FILE_H
 
@@ -18,7 +18,7 @@ char *file_read(const char *path, size_t limit, size_t *size, MildError *error);
 /* Fails when `path` exists and is not a regular file. */
 MildStatus file_check_regular(const char *path, MildError *error);
 
-/* Whether file_write could begin. It is asked before long work, so that a wrong path does not cost
+/* Fails when file_write could not begin. Called before long work, so that a wrong path does not cost
  * the result. Leaves nothing behind. */
 MildStatus file_check_write(const char *path, MildError *error);
 
@@ -26,19 +26,19 @@ MildStatus file_check_write(const char *path, MildError *error);
  * or on a full disk the old file is still whole. Devices and pipes are written to directly. */
 MildStatus file_write(const char *path, const void *data, size_t size, MildError *error);
 
-/* Creates an empty file PATH.PID-N.tmp with a name that nothing had before, for a writer that
- * cannot use file_write; the caller renames or removes it. */
+/* Creates an empty file PATH.PID-N.tmp with a name that is not in use, for a writer that cannot use
+ * file_write. The caller renames or removes it. */
 MildStatus file_temporary(const char *path, char temporary[PATH_SIZE], MildError *error);
-/* Whether `name` is PREFIX.PID-N.tmp with any prefix: a temporary file that a killed process left
- * behind has such a name. */
+/* Whether `name` is PREFIX.PID-N.tmp with any prefix, as a temporary file that a killed process left
+ * behind. */
 int file_is_temporary(const char *name);
 
-/* Whether two paths name the same file: one file on disk (symbolic and hard links followed), or,
- * where none exists yet, one name in one folder. Never true of devices and pipes. */
+/* Whether two paths name the same file: the same file on disk (links are followed), or, where none
+ * exists yet, the same name in the same folder. Never true for devices and pipes. */
 int file_same(const char *a, const char *b);
 
-/* A lock that a process holds on a file made for the purpose. The kernel drops it when the process
- * ends, however it ends; another process then gets it although the file is still there. */
+/* A lock of a process, on a file made for it. The system releases it when the process ends, however
+ * it ends. Another process can then take it although the file still exists. */
 typedef struct {
     int file;             /* descriptor; -1: not held */
     char path[PATH_SIZE]; /* of the file */
@@ -46,7 +46,7 @@ typedef struct {
 
 /* Fails with MILD_ERROR_ARGUMENT when another process holds the lock; says which. */
 MildStatus file_lock(FileLock *lock, const char *path, MildError *error);
-/* Removes the file and drops the lock; nothing happens when it is not held. */
+/* Removes the file and releases the lock. Does nothing when it is not held. */
 void file_unlock(FileLock *lock);
 
 #endif

@@ -1,4 +1,4 @@
-/* Paths: where the program's data lies, names joined, folders made. */
+/* Paths: finds the program's data, joins names, makes folders. */
 #ifndef BASE_PATHS_H
 #define BASE_PATHS_H
 
@@ -16,11 +16,11 @@ const char *path_data(const char *relative, char path[PATH_SIZE]);
 /* folder + "/" + name; fails when longer than PATH_SIZE. */
 MildStatus path_join(const char *folder, const char *name, char path[PATH_SIZE], MildError *error);
 
-/* The name of a file that belongs to another: "runs/a.png" with "_fit.csv" is "runs/a_fit.csv". */
+/* Name of a file that belongs to another: "runs/a.png" with "_fit.csv" gives "runs/a_fit.csv". */
 MildStatus path_beside(const char *file, const char *ending, char path[PATH_SIZE],
                        MildError *error);
 
-/* Makes the folder and its parents; fine when it is there. */
+/* Makes the folder and its parents, unless they exist. */
 MildStatus path_make_folder(const char *folder, MildError *error);
 
 #endif

@@ -20,7 +20,7 @@ struct Pool {
     pthread_mutex_t mutex;
     pthread_cond_t start, done;
     unsigned run; /* number of the run now open; under mutex */
-    int open;     /* bool: late sleepers may still join this run; under mutex */
+    int open;     /* bool: workers may still join this run; under mutex */
     int active;   /* workers inside the run; under mutex */
     int stop;     /* bool; under mutex */
     int pieces;
@@ -40,8 +40,8 @@ static void pool_drain(Pool *pool, int thread) {
     }
 }
 
-/* A worker that wakes after the run has closed goes back to sleep, so a run waits only for those
- * who took part. */
+/* A worker that wakes after the run has closed goes back to sleep. So a run waits only for the workers
+ * that took part. */
 static void *pool_worker(void *argument) {
     PoolWorker *worker = argument;
     Pool *pool = worker->pool;
@@ -68,7 +68,7 @@ static void *pool_worker(void *argument) {
     return NULL;
 }
 
-/* Signals are the caller's business: workers start with all of them blocked. */
+/* Workers start with all signals blocked, so the caller's threads handle them. */
 static int pool_start(Pool *pool, int threads) {
     sigset_t all, old;
     sigfillset(&all);

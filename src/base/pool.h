@@ -1,12 +1,12 @@
-/* A fixed team of threads that runs numbered pieces of work. Which thread runs a piece never
- * changes a result: pieces are fixed by the caller, not by the thread count. */
+/* A fixed team of threads that runs numbered pieces of work. The caller fixes the pieces, so neither
+ * the number of threads nor which thread runs a piece changes a result. */
 #ifndef MILD_POOL_H
 #define MILD_POOL_H
 
 typedef struct Pool Pool;
 
-/* `threads` >= 1 including the caller; 0 means one per online core. NULL when out of memory or
- * threads. */
+/* threads: at least 1, including the caller's; 0: one per online core. NULL when memory or threads run
+ * out. */
 Pool *pool_create(int threads);
 void pool_destroy(Pool *pool);
 int pool_threads(const Pool *pool);

@@ -1,5 +1,5 @@
-/* Counter-based random numbers (Philox 2x32-10, Salmon et al. 2011): a value is a pure function of
- * (seed, stream, step, use), so a run depends neither on thread nor on device counts. */
+/* Counter-based random numbers (Philox 2x32-10, Salmon et al. 2011). A value is a pure function of
+ * (seed, stream, step, use), so a run does not depend on the number of threads or devices. */
 #ifndef MILD_RANDOM_H
 #define MILD_RANDOM_H
 

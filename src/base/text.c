@@ -71,7 +71,7 @@ int text_uint64(const char *text, uint64_t *value) {
     char *end;
     errno = 0;
     if (text[0] < '0' || text[0] > '9') {
-        return 0; /* strtoull would take a minus sign */
+        return 0; /* strtoull would accept a minus sign */
     }
     unsigned long long number = strtoull(text, &end, 10);
     if (*end || errno) {

@@ -5,13 +5,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Levenshtein distance between two names; names beyond 63 characters count as cut there. */
+/* Levenshtein distance between two names; only the first 63 characters count. */
 int text_distance(const char *a, const char *b);
 
 /* The name among names[0..count) with the smallest distance to `name`; NULL when count is 0. */
 const char *text_nearest(const char *name, const char *const *names, int count);
 
-/* The whole of `text` as a finite number or an integer; returns 0 when it is not one. */
+/* Reads all of `text` as a finite number or an integer. Returns 0 when it is not one. */
 int text_double(const char *text, double *value);
 int text_int(const char *text, int *value);
 int text_uint64(const char *text, uint64_t *value);

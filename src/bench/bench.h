@@ -1,12 +1,12 @@
-/* Measurements of this machine, one function each. */
+/* Measurements of speed and memory on this machine, one function each. */
 #ifndef BENCH_BENCH_H
 #define BENCH_BENCH_H
 
 #include "bench/report.h"
 #include "train/experiment.h"
 
-/* One physics step of the robot standing on sand: ours beside the engine's own contact, in turns,
- * medians. */
+/* One physics step of the robot standing on sand, with our contact and with the engine's own. The cases
+ * take turns; medians. */
 MildStatus bench_step(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The ground alone: solve and advance of two soles, 154 elements in contact. */
 MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError *error);
@@ -14,9 +14,9 @@ MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError
 MildStatus bench_elements(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Newton against the paper's sweeps on the same problems, both stopped at the same error. */
 MildStatus bench_solver(const ExperimentDef *def, BenchReport *report, MildError *error);
-/* The physics steps of the shipped policy's walk: ours beside the engine's own contact. */
+/* The physics steps of a walk of the shipped policy, with our contact and with the engine's own. */
 MildStatus bench_walk(const ExperimentDef *def, BenchReport *report, MildError *error);
-/* Training end to end, with where the time goes. */
+/* Training as a whole, and how its time is spent. */
 MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Bytes held by a training run of train.envs robots. */
 MildStatus bench_memory(const ExperimentDef *def, BenchReport *report, MildError *error);

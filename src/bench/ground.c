@@ -32,7 +32,8 @@ static void sole_center(const MildSole *sole, double center[2]) {
 }
 
 /* Two level feet that stand: A couples them as a trunk would, and the smooth forces press each with
- * half of 33 kg at the centre of its sole, V^ = V + dt A w. The feet touch the surface and rest. */
+ * half of 33 kg at the centre of its sole, V_free = V + dt A w. The feet touch the surface
+ * and rest. */
 static void ground_input(MildContactInput *input, const MildSole *const *soles, double dt) {
     const double linear = 1.0 / 20, angular = 1.0 / 0.3, coupling = 0.6, load = 33.0 / 2 * 9.81;
     double wrench[ROWS] = {0};
@@ -73,7 +74,7 @@ static double ground_run(GroundBench *bench, int steps, int advance) {
     return clock_thread_seconds() - start;
 }
 
-/* [ns] per step: the least of many short repeats, which other programs disturb least. */
+/* [ns] per step: the least of many short repeats, because other programs only add time. */
 static double ground_time(GroundBench *bench, int advance) {
     double least = INFINITY;
     int steps = 1;
@@ -86,7 +87,7 @@ static double ground_time(GroundBench *bench, int advance) {
     return least / steps * 1e9;
 }
 
-/* Lets the feet sink to rest, so that input and memory are those of standing. */
+/* Lets the feet sink until they rest. */
 static void ground_settle(GroundBench *bench, const MildSole *const *soles, double dt) {
     enum { SETTLE_STEPS = 2000 };
     double push[ROWS];
@@ -209,8 +210,8 @@ MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError
 
 /* ---- how the cost grows with the number of elements ---- */
 
-/* Plates of the same size, weight and ground, in ever finer elements: what a material says of one
- * element of the paper's raster is shared out by area. */
+/* A plate of fixed size, weight and ground with finer elements. The material's numbers for one element
+ * of the paper's raster are scaled by area. */
 static MildSole *elements_plate(int columns, int rows, MildMaterial *material, MildError *error) {
     const double paper_pitch = 0.0195, paper_elements = 77;
     double share = paper_elements / (columns * rows), pitch = paper_pitch * sqrt(share);

@@ -1,4 +1,4 @@
-/* A recorded walk, one policy period after the other, to be stepped again from the same states. */
+/* A recorded walk. Each policy period can be stepped again from the same state. */
 #ifndef BENCH_REPLAY_H
 #define BENCH_REPLAY_H
 
@@ -41,7 +41,7 @@ typedef struct {
     double loose_unconverged;                  /* [-] share of the steps */
 } ReplayTimes;
 
-/* The cases take turns at every period. */
+/* Times the recorded walk. The cases take turns at every period. */
 MildStatus replay_time(const Replay *replay, const Robot *robot, ReplayStop loose, int repeats,
                        ReplayTimes *times, MildError *error);
 

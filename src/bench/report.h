@@ -1,4 +1,4 @@
-/* What a bench measured: rows that the command prints and saves. */
+/* The rows that a bench measured; the command prints and saves them. */
 #ifndef BENCH_REPORT_H
 #define BENCH_REPORT_H
 

@@ -10,13 +10,13 @@
 #include "control/stand.h"
 
 enum { SOLVERS = 2, TWIST_MAX = 6 * ROBOT_FEET_MAX, PROBLEMS_MAX = 400 };
-static const double solver_error = 1e-6; /* [-] both stop here */
+static const double solver_error = 1e-6; /* [-] error at which both stop */
 static const double never = 1e-15;       /* [-] a tolerance that does not stop them earlier */
 static const int solver_limit[SOLVERS] = {100, 2048}; /* most iterations that are tried */
 static const int solver_repeats[SOLVERS] = {20, 3};   /* the least time counts */
 static const char *const solver_names[SOLVERS] = {"newton", "gauss_seidel"};
 
-/* One contact problem, and what both solvers took for it. */
+/* One contact problem and the times of both solvers. */
 typedef struct {
     MildTerrain terrain;
     MildContactInput input;
@@ -71,8 +71,7 @@ static double error_after(SolverBench *bench, int solver, int iterations) {
     return sqrt(energy(&bench->input, difference) / energy(&bench->input, bench->exact));
 }
 
-/* The fewest iterations with that error: doubling, then bisection. The limit when there are none.
- */
+/* The fewest iterations that reach solver_error, by doubling and bisection; the limit when none do. */
 static int fewest_iterations(SolverBench *bench, int solver) {
     int low = 0, high = 1, limit = solver_limit[solver];
     while (!(error_after(bench, solver, high) <= solver_error)) {
@@ -90,7 +89,7 @@ static int fewest_iterations(SolverBench *bench, int solver) {
     return high;
 }
 
-/* The problem as it stands in bench, ground and input: nothing when the feet are in the air. */
+/* Times the present problem. Does nothing when the feet are in the air. */
 static void solver_problem(SolverBench *bench) {
     MildContactResult result;
     solve(bench, 0, 1e-11, 0, &result);
@@ -234,7 +233,7 @@ static void robot_problem(SolverBench *bench, RobotSim *sim, const double *torqu
     solver_problem(bench);
 }
 
-/* Sinks in from the surface, balanced by the stand torques, until it rests. */
+/* The robot sinks in from the surface under its stand torques until it rests. */
 static MildStatus standing_problems(SolverBench *bench, const Robot *robot, double dt, int count,
                                     MildError *error) {
     const int feet = robot_feet(robot);

@@ -11,11 +11,11 @@
 
 #define REPEATS_MAX 1000
 #define WARM_STEPS 500
-/* The paper's sweeps are slower by orders of magnitude: few steps, after the others. */
+/* The paper's sweeps are slower by orders of magnitude, so they take few steps, after the others. */
 #define SWEEP_REPEATS 3
 #define SWEEP_STEPS 2
 #define PHASE_WINDOWS 10
-#define HANG_HEIGHT 1000.0 /* [m] above the floor: a whole bench of falling does not reach it */
+#define HANG_HEIGHT 1000.0 /* [m] above the floor, so that it is not reached during the bench */
 
 enum { ENGINE_FREE, ENGINE_RIGID, RIGID, NEWTON, GAUSS_SEIDEL, CASES };
 
@@ -156,8 +156,8 @@ static MildStatus measure(Bench *bench, int first, int last, int repeats, int st
     return MILD_OK;
 }
 
-/* Runs of their own, because reading the clock in every phase costs time; the quietest window
- * counts. [us] */
+/* [us] Time of each phase of a step. Measured in separate runs, because reading the clock in every
+ * phase costs time. The fastest run counts. */
 static void measure_phases(Bench *bench, int steps, RobotPhases *phases) {
     double least = 1e300;
     for (int w = 0; w < PHASE_WINDOWS; w++) {

@@ -6,7 +6,7 @@
 #include "bench/bench.h"
 #include "train/trainer.h"
 
-/* Thread time inside the environments becomes wall time by the number of threads. */
+/* Time inside the environments is summed over the threads, so it is divided by their number. */
 static void train_rows(const TrainTimes *sum, double steps, double wall, int threads,
                        BenchReport *report) {
     double ground = sum->ground / threads, physics = sum->physics / threads - ground;
@@ -30,8 +30,8 @@ MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError 
     }
     TrainReport iteration;
     TrainTimes sum = {0};
-    MildStatus status =
-        train_iterate(trainer, &iteration, error); /* caches, kernels compiled by oneDNN */
+    MildStatus status = train_iterate(trainer, &iteration,
+                                      error); /* fills caches, lets oneDNN compile its kernels */
     double start = clock_seconds(), wall = 0, steps = 0;
     while (status == MILD_OK && wall < seconds) {
         status = train_iterate(trainer, &iteration, error);

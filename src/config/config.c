@@ -30,8 +30,8 @@ static MildStatus section_fail(const char *where, const char *name, const char *
                      where, name, nearest ? nearest : "none");
 }
 
-/* A key met outside its section often exists elsewhere: name that one, for it beats a similar
- * spelling here. */
+/* A key that is unknown here may exist in another section: that one is a better hint than a similar
+ * name in this section. */
 static MildStatus key_fail(const ConfigSection *sections, int count, const ConfigSection *section,
                            const char *key, const char *nearest, const char *where,
                            MildError *error) {
@@ -46,7 +46,8 @@ static MildStatus key_fail(const ConfigSection *sections, int count, const Confi
                      where, section->name, key, home, nearest ? nearest : "");
 }
 
-/* Characters of the line before its comment: "; ..." or "# ..." at its start or after a blank. */
+/* Length of the line without its comment, which is "; ..." or "# ..." at its start or after a
+ * blank. */
 static size_t code_length(const char *line) {
     size_t length = 0;
     for (; line[length] && line[length] != '\n'; length++) {
@@ -58,8 +59,7 @@ static size_t code_length(const char *line) {
     return length;
 }
 
-/* Whether a line of a config file could hold the text: it must come back from there when a run is
- * resumed. */
+/* Whether a line of a config file can hold the text. A resumed run reads it back from there. */
 static int text_fits_line(const char *text) {
     size_t length = strlen(text);
     int blanks =
@@ -94,8 +94,8 @@ static MildStatus key_set(const ConfigSection *sections, int count, const char *
     return MILD_OK;
 }
 
-/* ---- ini text: inih splits lines into section, key and value; this reader feeds it and knows the
- * line ---- */
+/* ---- ini text: this reader counts the lines and gives them to inih, which splits them into section,
+ * key and value ---- */
 typedef struct {
     const ConfigSection *sections;
     int count;
@@ -113,8 +113,8 @@ static const char *reader_where(const Reader *reader, char *where) {
     return where;
 }
 
-/* inih passes over empty sections and reads on behind a syntax error: look at the line itself, so
- * that the first mistake is the one reported. line: without its comment, ended by a newline. */
+/* Checks the line itself, so that the first mistake is reported: inih accepts empty sections and
+ * continues after a syntax error. line: without its comment, ends with a newline. */
 static void reader_check_line(Reader *reader, const char *line) {
     char name[64], where[WHERE_MAX];
     reader_where(reader, where);
@@ -131,8 +131,8 @@ static void reader_check_line(Reader *reader, const char *line) {
     }
 }
 
-/* fgets over the text. Indentation is dropped, for inih would take an indented line as more of the
- * value before. */
+/* fgets over the text. Drops indentation, because inih would add an indented line to the value before
+ * it. */
 static char *reader_line(char *buffer, int size, void *stream) {
     Reader *reader = stream;
     if (reader->status != MILD_OK || !*reader->rest) {

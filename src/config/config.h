@@ -1,7 +1,7 @@
-/* Text becomes structs: ini files and --section.key=value overrides, bound to Def structs through
- * their field tables. Later sources win: struct defaults < default.ini < overlay file < overrides.
- * A bad line stops with file, line, the key and the nearest valid name; what earlier lines set
- * stays set, so callers give up on the first error. */
+/* Reads ini files and --section.key=value overrides into Def structs through their field tables.
+ * Later sources win: struct defaults < default.ini < overlay file < overrides. The first bad line
+ * stops the reading; the message tells file, line, key and the nearest valid name. What earlier
+ * lines set stays set, so callers give up on the first error. */
 #ifndef CONFIG_CONFIG_H
 #define CONFIG_CONFIG_H
 
@@ -18,11 +18,11 @@ typedef struct {
     void *def;
 } ConfigSection;
 
-/* Whole ini text; `name` stands for the file in messages. complete: every key of every section must
- * be present. */
+/* Reads a whole ini text. `name` is the file's name in messages. complete: every key of every section
+ * must be present. */
 MildStatus config_read_text(const ConfigSection *sections, int count, const char *text,
                             const char *name, int complete, MildError *error);
-/* As above from a file of at most 1 MiB. */
+/* The same from a file of at most 1 MiB. */
 MildStatus config_read(const ConfigSection *sections, int count, const char *path, int complete,
                        MildError *error);
 
@@ -32,8 +32,8 @@ MildStatus config_override(const ConfigSection *sections, int count, const char 
 MildStatus config_overrides(const ConfigSection *sections, int count, const char *const *texts,
                             int text_count, MildError *error);
 
-/* A complete ini that reads back to the same values; comments: each key's help and range above it.
- */
+/* Prints a complete ini that reads back to the same values. comments: with each key's help and range
+ * above it. */
 void config_print(const ConfigSection *sections, int count, int comments, FILE *file);
 /* The same as text, to be freed by the caller; NULL when out of memory. */
 char *config_text(const ConfigSection *sections, int count, int comments);

@@ -11,16 +11,16 @@ enum { EXPERIMENT_SECTIONS = 7 };
 
 /* The config sections of `def`, bound to it. */
 void experiment_sections(ExperimentDef *def, ConfigSection sections[EXPERIMENT_SECTIONS]);
-/* Sections that stand alone: [terrain], and [ground] of one material. */
+/* Single sections: [terrain], and [ground] for one material. */
 ConfigSection terrain_section(TerrainDef *def);
 ConfigSection ground_section(MildMaterial *material);
 
-/* configs/default.ini, then the overlay file (NULL: none), then overrides "section.key=value", then
- * the check. */
+/* Reads configs/default.ini, then the overlay file (NULL: none), then overrides "section.key=value",
+ * and checks the result. */
 MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides,
                            int override_count, MildError *error);
 
-/* The task for evaluation and play, made nominal, and the robot: of the config the policy was
+/* The nominal task for evaluation and play and the robot, from the config that the policy was
  * trained with (NULL: the defaults). */
 MildStatus experiment_nominal_task(TaskDef *task, char robot[TRAIN_ROBOT_SIZE], const char *config,
                                    MildError *error);

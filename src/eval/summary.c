@@ -2,17 +2,11 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "base/student.h"
 #include "eval/eval.h"
 
 #define STEADY_LEAST 0.5    /* [s] a shorter steady part says nothing about speed */
 #define DISTANCE_LEAST 1e-3 /* [m] cost of transport of a robot that stands stays finite */
-
-/* Student's t for 95 %, two sided: table up to 10 trials, then 1.96 + 2.6 / (degrees of freedom),
- * within 0.5 %. */
-static double student_95(int samples) {
-    static const double table[] = {0, 0, 12.71, 4.30, 3.18, 2.78, 2.57, 2.45, 2.36, 2.31, 2.26};
-    return samples < 2 ? 0 : samples <= 10 ? table[samples] : 1.96 + 2.6 / (samples - 1);
-}
 
 /* Speed, cost of transport and base motion over the steady part of the trials that stayed up; of
  * all when none did: a robot that dives forward and falls is not fast. */
@@ -41,7 +35,7 @@ static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_
     row->velocity = v_sum / steady;
     double variance =
         fmax(v_square / steady - row->velocity * row->velocity, 0) * steady / fmax(steady - 1, 1);
-    double half = student_95(steady) * sqrt(variance / steady);
+    double half = steady > 1 ? student_95(steady - 1) * sqrt(variance / steady) : 0;
     row->velocity_low = row->velocity - half;
     row->velocity_high = row->velocity + half;
     row->velocity_sideways /= steady;

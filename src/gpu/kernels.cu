@@ -1,13 +1,11 @@
 #include "gpu/kernels.h"
 
+#include "learn/loss_sample.h"
 #include "learn/noise.h"
 
 #define THREADS 256
 #define COLUMNS 32 /* of a block in the column sums */
 #define LANES (THREADS / COLUMNS)
-/* as LOSS_LOGVAR_MIN and LOSS_LOGVAR_MAX */
-#define LOGVAR_MIN (-12.0f)
-#define LOGVAR_MAX 6.0f
 
 #ifndef LAUNCH /* the tests run the kernels on the processor */
 #define LAUNCH(kernel, grid, block, stream, ...) kernel<<<grid, block, 0, stream>>>(__VA_ARGS__)
@@ -158,7 +156,7 @@ void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y,
     LAUNCH(add_slices, blocks_of(width), line, stream, width, partial, beta, d_bias);
 }
 
-/* ---- joints of the networks ---- */
+/* ---- rows between the networks ---- */
 
 /* One thread a number of the input [newest frame | estimates | theta1 mu + theta2]. */
 static __global__ void actor_input(GpuWidths w, int rows, const float *history, const float *heads,
@@ -187,10 +185,6 @@ void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, const float *hi
            stream, w, rows, history, heads, theta, input);
 }
 
-static __device__ float held_logvar(float logvar) {
-    return logvar < LOGVAR_MIN ? LOGVAR_MIN : logvar > LOGVAR_MAX ? LOGVAR_MAX : logvar;
-}
-
 /* One thread a number of the decoder's input [z | estimates]. */
 static __global__ void sample_latent(GpuWidths w, int rows, const float *heads, const float *noise,
                                      float *spread, float *input) {
@@ -207,7 +201,7 @@ static __global__ void sample_latent(GpuWidths w, int rows, const float *heads, 
         return;
     }
     const float *mu = h + w.estimates;
-    float s = vector_exp(0.5f * held_logvar(mu[w.latent + j]));
+    float s = loss_spread(mu[w.latent + j]);
     spread[r * w.latent + j] = s;
     input[i] = mu[j] + s * noise[r * w.latent + j];
 }
@@ -225,27 +219,19 @@ static __global__ void surrogate(GpuSurrogate s, int rows, double *sums) {
     double loss = 0.0, divergence = 0.0, clipped = 0.0;
     if (r < rows) {
         const int actions = s.actions;
-        const float *action = s.action + r * actions, *old_mean = s.old_mean + r * actions,
-                    *mean = s.mean + r * actions;
-        float log_prob = s.constant[actions], kl = s.constant[actions + 1];
+        const float *action = s.action + r * actions, *mean = s.mean + r * actions;
+        const LossSurrogate sample =
+            loss_surrogate(actions, s.constant, s.clip, action, mean, s.old_mean + r * actions,
+                           s.old_log_prob[r], s.advantage[r]);
+        const float d_log_prob = sample.d_log_prob * s.weight;
         for (int j = 0; j < actions; j++) {
-            float t = (action[j] - mean[j]) * s.constant[j],
-                  shift = (old_mean[j] - mean[j]) * s.constant[j];
-            log_prob -= 0.5f * t * t;
-            kl += 0.5f * shift * shift;
+            const float t = loss_standard(action[j], mean[j], s.constant[j]);
+            s.d_mean[r * actions + j] = loss_mean_gradient(d_log_prob, t, s.constant[j]);
+            s.d_log_std[r * actions + j] = loss_log_std_gradient(d_log_prob, t) - s.entropy;
         }
-        float ratio = expf(log_prob - s.old_log_prob[r]);
-        float held = fminf(fmaxf(ratio, 1.0f - s.clip), 1.0f + s.clip);
-        float free_term = ratio * s.advantage[r], held_term = held * s.advantage[r];
-        float d_log_prob = free_term <= held_term ? -free_term * s.weight : 0.0f;
-        for (int j = 0; j < actions; j++) {
-            float t = (action[j] - mean[j]) * s.constant[j];
-            s.d_mean[r * actions + j] = d_log_prob * t * s.constant[j];
-            s.d_log_std[r * actions + j] = d_log_prob * (t * t - 1.0f) - s.entropy;
-        }
-        loss = -(double)(free_term <= held_term || isnan(free_term) ? free_term : held_term);
-        clipped = ratio != held;
-        divergence = kl;
+        loss = sample.loss;
+        clipped = sample.clipped;
+        divergence = sample.kl;
     }
     double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
     add_block_sum(loss, own + GPU_SUM_SURROGATE);
@@ -263,18 +249,9 @@ static __global__ void mirror_loss(GpuMirror m, int images, double *sums) {
     float sum = 0.0f;
     if (r < images) {
         const int64_t sample = m.which[r] - m.first;
-        const float *mean = m.mean + sample * m.actions, *image = m.image + r * m.actions;
-        float *d_mean = m.d_mean + sample * m.actions, *d_image = m.d_image + r * m.actions;
-        for (int j = 0; j < m.actions; j++) {
-            d_image[j] = 0.0f;
-        }
-        for (int j = 0; j < m.actions; j++) {
-            int k = m.index[j];
-            float gap = mean[j] - m.sign[j] * image[k];
-            sum += gap * gap;
-            d_mean[j] += m.weight * gap;
-            d_image[k] -= m.weight * m.sign[j] * gap;
-        }
+        sum = loss_mirror(m.actions, m.index, m.sign, m.weight, m.mean + sample * m.actions,
+                          m.image + r * m.actions, m.d_mean + sample * m.actions,
+                          m.d_image + r * m.actions);
     }
     add_block_sum((double)sum / m.actions, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_MIRROR);
 }
@@ -309,28 +286,10 @@ static __global__ void modulation_backward(GpuWidths w, int rows, const float *h
     if (r >= rows) {
         return;
     }
-    const int width = w.per_dimension ? 2 * w.latent : 2;
-    heads += r * (w.estimates + 2 * w.latent), d_heads += r * (w.estimates + 2 * w.latent);
-    theta += r * width, d_theta += r * width, d_input += r * (w.estimates + w.latent);
-    float scale = 0.0f, shift = 0.0f;
-    for (int j = 0; j < w.estimates; j++) {
-        d_heads[j] = d_input[j];
-    }
-    for (int j = 0; j < w.latent; j++) {
-        float d = d_input[w.estimates + j], d_scale = d * heads[w.estimates + j];
-        d_heads[w.estimates + j] = d * theta[w.per_dimension ? j : 0];
-        d_heads[w.estimates + w.latent + j] = 0.0f;
-        if (w.per_dimension) {
-            d_theta[j] = d_scale;
-            d_theta[w.latent + j] = d;
-        }
-        scale += d_scale;
-        shift += d;
-    }
-    if (!w.per_dimension) {
-        d_theta[0] = scale;
-        d_theta[1] = shift;
-    }
+    const int width = w.estimates + 2 * w.latent, theta_width = w.per_dimension ? 2 * w.latent : 2;
+    loss_modulation(w.estimates, w.latent, w.per_dimension, heads + r * width,
+                    theta + r * theta_width, d_input + r * (w.estimates + w.latent),
+                    d_heads + r * width, d_theta + r * theta_width);
 }
 
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
@@ -340,34 +299,16 @@ void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const f
            d_heads, d_theta);
 }
 
-/* Mean of squares of the estimates [begin, end) of one sample; adds to d. */
-static __device__ double estimate_group(int begin, int end, float sample_weight,
-                                        const float *estimate, const float *target, float *d) {
-    if (begin == end) {
-        return 0.0;
-    }
-    float sum = 0.0f, weight = sample_weight / (float)(end - begin);
-    for (int j = begin; j < end; j++) {
-        float gap = estimate[j] - target[j];
-        sum += gap * gap;
-        d[j] += weight * gap;
-    }
-    return (double)sum / (end - begin);
-}
-
 static __device__ double latent_row(int latent, float weight, const float *mu, const float *spread,
                                     const float *noise, const float *d_z, float *d_mu) {
     const float *logvar = mu + latent;
-    float *d_logvar = d_mu + latent, sum = 0.0f;
+    float *d_logvar = d_mu + latent, twice = 0.0f;
     for (int j = 0; j < latent; j++) {
-        float held = held_logvar(logvar[j]), variance = spread[j] * spread[j];
-        sum += mu[j] * mu[j] + variance - 1.0f - held;
-        d_mu[j] += d_z[j] + weight * mu[j];
-        float d = 0.5f * (d_z[j] * spread[j] * noise[j] + weight * (variance - 1.0f));
-        float outward = (logvar[j] - held) * d;
-        d_logvar[j] = outward < 0.0f ? 0.0f : d;
+        twice += loss_latent_twice(mu[j], logvar[j], spread[j]);
+        d_mu[j] += loss_mu_gradient(weight, mu[j], d_z[j]);
+        d_logvar[j] = loss_logvar_gradient(weight, logvar[j], spread[j], noise[j], d_z[j]);
     }
-    return 0.5 * (double)sum;
+    return 0.5 * (double)twice;
 }
 
 static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
@@ -384,9 +325,9 @@ static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all
         for (int j = 0; j < w.estimates; j++) {
             d[j] += d_input[w.latent + j];
         }
-        group[0] = estimate_group(0, w.feet_offset, h.estimate_weight, heads, target, d);
-        group[1] = estimate_group(w.feet_offset, feet_end, h.estimate_weight, heads, target, d);
-        group[2] = estimate_group(feet_end, w.estimates, h.estimate_weight, heads, target, d);
+        group[0] = loss_estimates(0, w.feet_offset, h.estimate_weight, heads, target, d);
+        group[1] = loss_estimates(w.feet_offset, feet_end, h.estimate_weight, heads, target, d);
+        group[2] = loss_estimates(feet_end, w.estimates, h.estimate_weight, heads, target, d);
         divergence =
             latent_row(w.latent, h.latent_weight, heads + w.estimates, h.spread + r * w.latent,
                        h.noise + r * w.latent, d_input, d + w.estimates);
@@ -409,13 +350,10 @@ static __global__ void value_loss(int rows, int clip_value, float clip, float we
     const int64_t r = item();
     double loss = 0.0;
     if (r < rows) {
-        float gap = value[r] - returns[r], move = value[r] - old_value[r];
-        float held_move = move < -clip ? -clip : move > clip ? clip : move;
-        float held_gap = old_value[r] + held_move - returns[r];
-        int held = clip_value && held_gap * held_gap > gap * gap;
-        float used = held ? held_gap : gap;
-        loss = (double)used * used;
-        d[r] = held && held_move != move ? 0.0f : weight * used;
+        float half;
+        const float gap = loss_value(clip_value, clip, value[r], old_value[r], returns[r], &half);
+        loss = (double)gap * gap;
+        d[r] = weight * half;
     }
     add_block_sum(loss, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_VALUE);
 }

@@ -1,7 +1,7 @@
-/* The learner's elementwise passes on the GPU; products are cuBLAS'. Each is the loop of the same
- * name in src/learn (mlp.c, network.c, loss.c) over device arrays, row-major [rows][width], and
- * only enqueues work on the stream: errors show at the next call of the runtime. No result depends
- * on the order in which blocks run: every sum has one fixed tree. */
+/* The learner's elementwise passes on the GPU; cuBLAS computes the products. Each pass is the loop of
+ * the same name in src/learn (mlp.c, network.c, loss.c) over device arrays, row-major [rows][width].
+ * It only enqueues work on the stream, so errors show at the next call of the runtime. Every sum has
+ * one fixed tree, so no result depends on the order in which blocks run. */
 #ifndef MILD_GPU_KERNELS_H
 #define MILD_GPU_KERNELS_H
 
@@ -11,7 +11,7 @@
 #define GPU_ACTIONS_MAX 64
 #define GPU_SUM_SLICES 128 /* a column sum adds up this many partial sums */
 
-/* Sums over samples as LossSums has them; every block of a pass adds to its own row of sums
+/* Sums over samples, as in LossSums. Every block of a pass adds to its own row of sums
  * [blocks][GPU_SUMS]. */
 enum {
     GPU_SUM_SURROGATE,
@@ -29,7 +29,7 @@ enum {
 extern "C" {
 #endif
 
-int gpu_blocks(int rows); /* of sums, for passes over so many rows */
+int gpu_blocks(int rows); /* rows of sums that passes over so many rows need */
 
 /* to[r] = from[index[r]], rows of `width`. */
 void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, const float *from,
@@ -51,7 +51,7 @@ void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float
 void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d,
                        float *partial, float beta, float *d_bias);
 
-/* Widths of the networks' joints. */
+/* Widths of the rows between the networks. */
 typedef struct {
     int history, observation, estimates, latent, per_dimension, feet_offset, feet_count, actions;
 } GpuWidths;
@@ -87,8 +87,8 @@ void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const f
                              const float *theta, const float *d_input, float *d_heads,
                              float *d_theta);
 
-/* The regression's part for the first `rows` of `all`, the modulation's through the feet velocities
- * for all. */
+/* Adds the gradient of the regression for the first `rows` of `all`, and that of the modulation through
+ * the feet velocities for all. */
 typedef struct {
     float estimate_weight, latent_weight; /* of a sample */
     const float *heads, *estimate, *spread, *noise, *d_feet, *d_decoder_input;

@@ -6,10 +6,10 @@
 
 #include "gpu/kernels.h"
 #include "gpu/mlp.h"
-#include "learn/ppo_private.h"
+#include "learn/ppo_gradient.h"
 
-/* Rows go through the networks in chunks of at most this many: enough to fill a large GPU, and a
- * bound on its memory. */
+/* Rows go through the networks in chunks of at most this many. That fills a large GPU and bounds the
+ * memory. */
 #ifndef GPU_ROWS
 #define GPU_ROWS 32768
 #endif
@@ -20,7 +20,7 @@ typedef struct {
     Ppo *ppo;
     GpuQueue queue;
     GpuWidths widths;
-    int rows, minibatch; /* capacities: rows of a chunk, samples of a minibatch */
+    int rows, minibatch; /* most rows of a chunk, most samples of a minibatch */
     void *block;         /* all device memory */
     float *parameters, *gradient;
     PpoBatch batch; /* the rollout on the device; flags and reward stay with the processor */
@@ -55,7 +55,7 @@ static int widest_layer(const Network *network) {
     return widest;
 }
 
-/* Lays everything into the device's block; NULL only counts bytes. */
+/* Places all arrays in the device's block and returns its bytes. NULL: only counts them. */
 static size_t layout(GpuLearner *g, char *block) {
     const Network *n = &g->ppo->policy->network;
     const PpoBatch *host = &g->ppo->batch;
@@ -97,8 +97,8 @@ static size_t layout(GpuLearner *g, char *block) {
     return used;
 }
 
-/* Locks what travels often into memory, where copies are several times as fast. Where that fails
- * they are only slower. */
+/* Pins an array that is copied often, which makes the copies several times as fast. A failure only
+ * costs speed. */
 static void pin(GpuLearner *g, int slot, void *memory, size_t bytes) {
     if (cudaHostRegister(memory, bytes, cudaHostRegisterDefault) == cudaSuccess) {
         g->pinned[slot] = memory;
@@ -150,7 +150,7 @@ static void upload_parameters(GpuLearner *g) {
     upload(g, g->parameters, policy->parameters, (size_t)policy->network.count * sizeof(float));
 }
 
-/* Waits for everything enqueued: the first failure among it. */
+/* Waits for all enqueued work and returns its first failure. */
 static MildStatus finish(GpuLearner *g, const char *what, MildError *error) {
     cudaError_t launched = cudaGetLastError(), ran = cudaStreamSynchronize(g->queue.stream);
     MildStatus status = check(launched ? launched : ran, what, error);
@@ -163,7 +163,7 @@ static MildStatus finish(GpuLearner *g, const char *what, MildError *error) {
 
 /* ---- forward ---- */
 
-/* network_forward. */
+/* As network_forward. */
 static float *forward(GpuLearner *g, int rows, const float *history) {
     const Network *n = &g->ppo->policy->network;
     const NetworkOutputs *out = &g->chunk.outputs;
@@ -195,7 +195,7 @@ static MildStatus learner_act(void *self, int t, MildError *error) {
     return finish(g, "act", error);
 }
 
-/* The rollout travels here, once. */
+/* Copies the rollout to the device, once per update. */
 static void upload_batch(GpuLearner *g) {
     const PolicyDef *def = policy_def(g->ppo->policy);
     const PpoBatch *host = &g->ppo->batch, *b = &g->batch;
@@ -242,7 +242,7 @@ static MildStatus learner_values(void *self, MildError *error) {
 
 /* ---- gradient ---- */
 
-/* What a chunk [at, at + rows) of the minibatch needs beside g->chunk. */
+/* What a chunk [at, at + rows) of the minibatch needs besides g->chunk. */
 typedef struct {
     const LossContext *loss;
     uint64_t latent_key;
@@ -284,8 +284,8 @@ static void gather(GpuLearner *g, const ChunkJob *job) {
     gpu_latent_noise(stream, c->rows, def->latent, job->latent_key, job->latent_row, c->noise);
 }
 
-/* policy_loss and mirror_loss. The samples' gradients of log std lie in a work area until their sum
- * is taken. */
+/* As policy_loss and mirror_loss. The samples' gradients of log std are kept in a work area until they
+ * are summed. */
 static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean) {
     const LossContext *loss = job->loss;
     const PolicyDef *def = policy_def(g->ppo->policy);
@@ -324,7 +324,7 @@ static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean)
     }
 }
 
-/* loss_actor. */
+/* As loss_actor. */
 static void actor_half(GpuLearner *g, const ChunkJob *job) {
     const LossContext *loss = job->loss;
     const Network *n = &g->ppo->policy->network;
@@ -366,7 +366,7 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
                      c->d_heads, c->work, g->gradient, beta, (MlpInputGradient){0});
 }
 
-/* loss_critic. */
+/* As loss_critic. */
 static void critic_half(GpuLearner *g, const ChunkJob *job) {
     const LossContext *loss = job->loss;
     const PpoDef *def = loss->def;
@@ -382,7 +382,7 @@ static void critic_half(GpuLearner *g, const ChunkJob *job) {
                      &c->value, c->d_value, c->work, g->gradient, job->beta, (MlpInputGradient){0});
 }
 
-/* Everything of a minibatch that the chunks read. */
+/* Uploads all that the chunks of a minibatch read. */
 static void upload_minibatch(GpuLearner *g, const int *samples, int count) {
     const PpoBatch *host = &g->ppo->batch;
     const size_t all = (size_t)host->steps * (size_t)host->envs * sizeof(float),
@@ -402,7 +402,7 @@ static void upload_minibatch(GpuLearner *g, const int *samples, int count) {
                     g->queue.stream);
 }
 
-/* Images whose sample comes before `end`; `which` ascends. */
+/* Number of images whose sample comes before `end`; `which` ascends. */
 static int images_before(const GpuLearner *g, int from, int end) {
     while (from < g->images && g->host_rows[g->minibatch + from] < end) {
         from++;

@@ -5,21 +5,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FIT_DIFFERENCE                                                                             \
-    1e-5 /* relative step of the central differences; exact where F is linear   \
-                             */
-#define FIT_DEPENDENT                                                                              \
-    1e-5 /* a column whose part of its own is smaller than this is a mixture of the others */
+#include "base/student.h"
+
+/* Relative step of the central differences; exact where F is linear. */
+#define FIT_DIFFERENCE 1e-5
+/* Below this share of its own part a column is a combination of the others. */
+#define FIT_DEPENDENT 1e-5
 #define FIT_CORRELATION 0.95
-#define FIT_LOOSE                                                                                  \
-    0.25 /* relative half width from which a correlated parameter counts as not told */
-#define FIT_SPEEDS 1.3 /* least ratio of speeds that tells drag */
+/* Relative half width above which a correlated parameter counts as undetermined. */
+#define FIT_LOOSE 0.25
+/* Least ratio of the speeds that determines drag. */
+#define FIT_SPEEDS 1.3
 
 enum { P = FIT_PARAMETERS, FIT_ITERATIONS = 100, FIT_STARTS = 5, LOCAL_ROWS = 200 };
 
 const char *const fit_names[FIT_PARAMETERS] = {"k_pen", "sigma_cone", "alpha", "nu", "c_g", "c_d"};
 
-/* What is given up first when several parameters have one effect. */
+/* The order in which parameters are given up when several have the same effect. */
 static const FitName give_up[FIT_PARAMETERS] = {FIT_NU,  FIT_ALPHA,      FIT_C_G,
                                                 FIT_C_D, FIT_SIGMA_CONE, FIT_K_PEN};
 
@@ -28,10 +30,10 @@ typedef struct {
     FitDef def; /* its material is the present estimate */
     const FitPoint *points;
     int count;
-    double *miss;        /* [count] measured minus computed force */
-    double *column;      /* [P][count] dF/dparameter; those of held ones unused */
-    double *own;         /* [P][count] what a column has that no mixture of the others has */
-    double *leverage;    /* [count] how far a row pulls the fit to itself, 0 .. 1 */
+    double *miss;   /* [count] [N] measured minus computed force */
+    double *column; /* [P][count] dF/dparameter; those of held ones unused */
+    double *own; /* [P][count] the part of a column that is orthogonal to the other free columns */
+    double *leverage;    /* [count] influence of a row on its own fitted value, 0 .. 1 */
     double *basis;       /* [P][count] for orthogonalisation */
     double own_share[P]; /* |own| over |column| */
 } Fit;
@@ -306,8 +308,8 @@ static void project_out(const Fit *fit, int n, double *vector) {
     }
 }
 
-/* The own part of column p: orthogonal to all other free columns. own/|own|^2 is p's row of the
- * pseudoinverse of J, so the covariance of the estimates follows without inverting J'J. */
+/* The own part of column p is orthogonal to all other free columns. own/|own|^2 is p's row of the
+ * pseudoinverse of J, which gives the covariance of the estimates without inverting J'J. */
 static void own_part(Fit *fit, int p) {
     int n = 0, count = fit->count;
     size_t bytes = sizeof(double) * (size_t)count;
@@ -350,17 +352,8 @@ static double own_correlation(const Fit *fit, int p, int q) {
     return dot(a, b, fit->count) / sqrt(dot(a, a, fit->count) * dot(b, b, fit->count));
 }
 
-/* 97.5 % point of Student's t with `n` degrees of freedom (Abramowitz and Stegun 26.7.5; 1 % at n =
- * 3). */
-static double student(double n) {
-    const double z = 1.959963984540054, z2 = z * z;
-    double g1 = z * (z2 + 1) / 4, g2 = z * ((5 * z2 + 16) * z2 + 3) / 96;
-    double g3 = z * (((3 * z2 + 19) * z2 + 17) * z2 - 15) / 384;
-    return z + ((g3 / n + g2) / n + g1) / n;
-}
-
-/* Half of the 95 % interval. Rows need not be equally noisy: variance = sum (g r/(1 - h))^2 with g
- * = own/|own|^2 and the leverage h of each row, "HC3" of MacKinnon and White 1985. */
+/* Half of the 95 % interval. Rows may differ in noise: variance = sum (g r/(1 - h))^2 with
+ * g = own/|own|^2 and the leverage h of each row, "HC3" of MacKinnon and White 1985. */
 static double half_width(const Fit *fit, int p, int free) {
     const double *own = fit->own + p * fit->count;
     double sum = 0;
@@ -368,11 +361,11 @@ static double half_width(const Fit *fit, int p, int free) {
         double share = own[i] * fit->miss[i] / fmax(1 - fit->leverage[i], 1e-3);
         sum += share * share;
     }
-    return student(fit->count - free) * sqrt(sum) / dot(own, own, fit->count);
+    return student_95(fit->count - free) * sqrt(sum) / dot(own, own, fit->count);
 }
 
-/* What a half width is compared with: the value; for sigma_cone, which may be 0, at least that of a
- * straight law. */
+/* Scale that a half width is compared with: the value. For sigma_cone, which may be 0, at least the
+ * sigma_cone of a straight law. */
 static double typical(const Fit *fit, int p) {
     MildMaterial material = fit->def.material;
     double value = fabs(*fit_value(&material, (FitName)p));
@@ -380,7 +373,7 @@ static double typical(const Fit *fit, int p) {
     return p == FIT_SIGMA_CONE ? fmax(value, straight) : value;
 }
 
-/* The state of parameter p among the free ones, FIT_FITTED when the data tell it. */
+/* The state of the free parameter p: FIT_FITTED when the data determine it. */
 static FitParameter judge(const Fit *fit, int p, int free) {
     FitParameter verdict = {.state = FIT_FITTED, .low = NAN, .high = NAN};
     const double *column = fit->column + p * fit->count;
@@ -447,9 +440,9 @@ static void hold(Fit *fit, const FitDef *def, FitName name, FitParameter *parame
     *fit_value(&fit->def.material, name) = *fit_value(&given, name);
 }
 
-/* Fits, gives up the parameter the data tell least, and fits again until all that are left are
- * told. nu goes first: the one exact tie of the law (sigma_cone, alpha, nu, and c_d with drag) ends
- * with it. */
+/* Fits, gives up the parameter that the data determine least, and fits again, until the data determine
+ * all that are left. nu goes first, because fixing it resolves the one exact tie of the law
+ * (sigma_cone, alpha, nu, and c_d with drag). */
 static double fit_reduce(Fit *fit, const FitDef *def, FitResult *result) {
     static const FitState order[] = {FIT_NO_EFFECT, FIT_TIED, FIT_WIDE};
     double sum = fit_miss(fit);
@@ -483,7 +476,7 @@ static double fit_reduce(Fit *fit, const FitDef *def, FitResult *result) {
     return fit_miss(fit);
 }
 
-/* Rows of different speed on a ground that has added mass tell c_d, or c_g with it. */
+/* c_d, and c_g with it, need rows of different speed and a ground with added mass. */
 static void hold_drag(Fit *fit, const FitDef *def, FitResult *result) {
     static const FitName rate[] = {FIT_C_D, FIT_C_G};
     const MildMaterial *m = &def->material;
@@ -544,7 +537,7 @@ MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResu
     for (int p = 0; p < P; p++) {
         result->parameter[p] = (FitParameter){.low = NAN, .high = NAN};
     }
-    for (int p = 0; p < P; p++) { /* a start inside the bounds: passive grounds clamp c_d */
+    for (int p = 0; p < P; p++) { /* start inside the bounds: passive grounds clamp c_d */
         double low, high, *value = fit_value(&fit.def.material, (FitName)p);
         fit_range(&fit.def.material, (FitName)p, &low, &high);
         if (def->free[p]) {

@@ -1,12 +1,12 @@
 /* Parameters of a ground from measured forces: bounded least squares on the element law, with
- * confidence intervals, and the honest answer which parameters the data cannot tell.
+ * confidence intervals, and a verdict on the parameters that the data cannot determine.
  *
  * A level plate of n elements that goes down at speed w meets (eqs 4 and 5)
  *     F(u, w) = n (F_g(u) + c_d m_a'(u) w^2 + m_a(u) dw/dt).
  * F is linear in k_pen and sigma_cone. alpha and nu act through u_f = R tan(alpha)/nu and
- * sigma_cone/cos(alpha) alone as long as the drag is small: slow data tell three numbers, never all
- * four. At constant speed only the product c_g c_d shows; c_g by itself needs a record that brakes,
- * such as a drop. Pure functions: thread safe, no text but errors. */
+ * sigma_cone/cos(alpha) alone as long as the drag is small, so slow data determine three numbers and
+ * never all four. At constant speed the force depends only on the product c_g c_d. To determine c_g
+ * alone takes a record that brakes, such as a drop. Pure functions: thread safe, print nothing. */
 #ifndef LAB_FIT_H
 #define LAB_FIT_H
 
@@ -38,25 +38,25 @@ typedef struct {
     MildMaterial material; /* start of what is fitted, value of what is held */
     int elements;
     double pitch;             /* [m] */
-    int free[FIT_PARAMETERS]; /* bool: fit it, if the data tell it */
+    int free[FIT_PARAMETERS]; /* bool: fit it, if the data can determine it */
 } FitDef;
 
 /* Why a parameter has the value it has. */
 typedef enum {
-    FIT_HELD,      /* not asked for */
-    FIT_FITTED,    /* from the data, with interval */
-    FIT_NO_SPEEDS, /* c_g, c_d: the rows do not differ in speed */
-    FIT_NO_MASS,   /* c_d: the ground has no added mass, c_d does nothing */
-    FIT_NO_EFFECT, /* the forces do not depend on it here */
-    FIT_TIED,      /* cannot be told from `partner`: `correlation` of the two estimates */
-    FIT_WIDE,      /* its interval is wider than half of its range */
+    FIT_HELD,      /* not to be fitted */
+    FIT_FITTED,    /* determined by the data, with an interval */
+    FIT_NO_SPEEDS, /* c_g, c_d: all rows have about the same speed */
+    FIT_NO_MASS,   /* c_d: no effect, because the ground has no added mass */
+    FIT_NO_EFFECT, /* the forces do not depend on it in these data */
+    FIT_TIED,      /* has the same effect as `partner`, see `correlation` */
+    FIT_WIDE,      /* its interval is wider than half its range */
 } FitState;
 
 typedef struct {
     double value, low, high; /* 95 %; low and high are NaN unless FIT_FITTED */
     FitState state;
     FitName partner;    /* FIT_TIED */
-    double correlation; /* FIT_TIED; +-1: exactly the same effect */
+    double correlation; /* FIT_TIED: of the two estimates; +-1: exactly the same effect */
 } FitParameter;
 
 typedef struct {
@@ -69,22 +69,21 @@ typedef struct {
 
 extern const char *const fit_names[FIT_PARAMETERS];
 double *fit_value(MildMaterial *material, FitName name);
-/* Bounds of a parameter: those of the material; where it is passive c_d from 1/2 and c_g from 0 on.
- */
+/* Bounds of a parameter: those of the material. A passive material has c_d >= 1/2 and c_g >= 0. */
 void fit_range(const MildMaterial *material, FitName name, double *low, double *high);
 
 /* [N] the force on the plate. */
 double fit_force(const FitDef *def, const FitPoint *point);
 
-/* Keeps the loading part, in place: rows below the surface whose depth is at or above all before.
- * Returns their count. */
+/* Keeps the loading part, in place: rows below the surface that are at least as deep as all rows
+ * before them. Returns their count. */
 int fit_loading(FitPoint *points, int count);
-/* Fills unknown speeds, and the accelerations, from the times of one record's loading part: a
- * polynomial through a twentieth of the rows around each. Without times both are 0. */
+/* Fills unknown speeds and all accelerations from the times of one record's loading part. Each comes
+ * from a polynomial through the nearest twentieth of the rows. Without times both are 0. */
 void fit_speeds(FitPoint *points, int count);
 
-/* Fits all records' loading rows together. Fails on fewer than FIT_POINTS_MIN points, nothing to
- * fit, or a material out of range. */
+/* Fits the loading rows of all records together. Fails on fewer than FIT_POINTS_MIN points, on nothing
+ * to fit, and on a material out of range. */
 MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,
                    MildError *error);
 

@@ -13,7 +13,7 @@ enum { CSV_COLUMNS_MAX = 256, CSV_LINE_MAX = 65536 };
 typedef enum { CSV_DEPTH, CSV_FORCE, CSV_TIME, CSV_SPEED, CSV_COLUMNS } CsvColumn;
 
 static const char *const column_names[CSV_COLUMNS] = {"depth_m", "force_n", "time_s", "speed_m_s"};
-/* What a number of the column may be; beyond it the unit or the sign is wrong. */
+/* Largest size of a number in each column; beyond it the unit is probably wrong. */
 static const double column_limits[CSV_COLUMNS] = {2, 1e7, 1e9, 100};
 static const char *const column_units[CSV_COLUMNS] = {"metres, positive down", "newtons", "seconds",
                                                       "metres per second, positive down"};
@@ -39,8 +39,8 @@ static char *trim(char *text) {
     return text;
 }
 
-/* Reads a line of at most CSV_LINE_MAX characters into csv->line and ends it with '\0': its length
- * with the newline, 0 at the end of the file, -1 for a line that is longer or holds a '\0'. */
+/* Reads a line of at most CSV_LINE_MAX characters into csv->line and ends it with '\0'. Returns its
+ * length with the newline, 0 at the end of the file, -1 for a line that is longer or contains '\0'. */
 static int csv_read_line(Csv *csv) {
     int length = 0, c = 0;
     while (c != '\n' && (c = getc_unlocked(csv->file)) != EOF) {
@@ -53,8 +53,8 @@ static int csv_read_line(Csv *csv) {
     return length;
 }
 
-/* The next line that is neither empty nor a remark (#), trimmed; NULL at the end, with *status
- * telling why. */
+/* The next line that is neither empty nor a remark (#), trimmed. NULL at the end or after an error,
+ * which *status tells. */
 static char *csv_line(Csv *csv, MildStatus *status, MildError *error) {
     *status = MILD_OK;
     for (;;) {
@@ -221,7 +221,7 @@ static MildStatus csv_rows(Csv *csv, FitPoint **points, int *count, MildError *e
     return status;
 }
 
-/* The loading rows must be a press: enough of them, and a force that pushes back. */
+/* Checks that the loading rows are a press: enough rows, and a force that pushes back. */
 static MildStatus csv_loading(const Csv *csv, FitPoint *points, int rows, int *kept,
                               MildError *error) {
     double push = 0;

@@ -8,10 +8,10 @@
 
 enum { FIT_CSV_ROWS_MAX = 1000000 };
 
-/* Appends the loading part of one record to *points [*count], which it enlarges; the caller frees
- * it, also after an error. Columns by name, in any order: depth_m, force_n, and speed_m_s or time_s
- * (else the speed counts as 0); other columns are not read. The message names file, line, column
- * and remedy. */
+/* Appends the loading part of one record to *points [*count] and enlarges it. The caller frees it,
+ * also after an error. Columns are found by name, in any order: depth_m, force_n, and speed_m_s or
+ * time_s (without them the speed is 0). Other columns are ignored. The message names file, line,
+ * column and remedy. */
 MildStatus fit_csv_read(const char *path, FitPoint **points, int *count, MildError *error);
 /* The same from an open file, which stays open; `name` stands for it in messages. */
 MildStatus fit_csv_read_file(FILE *file, const char *name, FitPoint **points, int *count,

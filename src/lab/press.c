@@ -158,7 +158,7 @@ static MildStatus rows_add(PressResult *result, PressRow row, MildError *error) 
     return MILD_OK;
 }
 
-/* Force of the step just solved times its way. */
+/* Adds the work of the step just solved. */
 static void work_add(Press *press, const PressRow *step, double down, double forward) {
     PressResult *result = press->result;
     *(down > 0 ? &result->work_in : &result->work_out) += step->force * fabs(down);
@@ -168,8 +168,8 @@ static void work_add(Press *press, const PressRow *step, double down, double for
     }
 }
 
-/* ---- moved by hand: A = 0, an infinitely heavy foot whose twist after each step is the prescribed
- * one ---- */
+/* ---- prescribed path: A = 0, an infinitely heavy foot that has the prescribed twist after each
+ * step ---- */
 
 /* A step of `dt` from here at the given speeds; changes nothing. */
 static PressRow hand_solve(Press *press, double dt, double forward, double down) {
@@ -181,7 +181,7 @@ static PressRow hand_solve(Press *press, double dt, double forward, double down)
     return press_row(press);
 }
 
-/* Takes the step just solved, which ends at depth `to` as `row` says. */
+/* Accepts the step just solved, which ends at depth `to`. */
 static MildStatus hand_take(Press *press, const PressRow *step, double forward, double to,
                             PressRow row, MildError *error) {
     double dt = press->input.dt;
@@ -192,8 +192,8 @@ static MildStatus hand_take(Press *press, const PressRow *step, double forward, 
     return rows_add(press->result, row, error);
 }
 
-/* Takes a step at constant depth. A step's force is the mean about the place it starts from, so the
- * force at its end is that of the step which would follow. */
+/* Accepts a step at constant depth. The force of a step is the mean about its start, so the force at
+ * its end is that of the step that would follow. */
 static MildStatus hand_accept(Press *press, const PressRow *step, double forward,
                               MildError *error) {
     double dt = press->input.dt;
@@ -203,9 +203,9 @@ static MildStatus hand_accept(Press *press, const PressRow *step, double forward
     return hand_take(press, step, forward, step->depth, hand_solve(press, dt, forward, 0), error);
 }
 
-/* The row at the end of the step just solved, which stays the last solved: the force at the depth
- * `to` itself, over a tiny step that follows a tiny step. The mean over a whole one would blunt the
- * kink where the ground yields. */
+/* The row at the end of the step just solved: the force at the depth `to` itself, from a tiny step
+ * after a tiny step. The mean over a whole step would blunt the kink where the ground yields. The
+ * state stays as after the step just solved. */
 static PressRow hand_end(Press *press, const PressRow *step, double to) {
     double dt = press->input.dt, down = (to - step->depth) / dt, tiny = HAND_TINY * dt;
     size_t bytes = mild_ground_size(press->ground);
@@ -224,7 +224,7 @@ static PressRow hand_end(Press *press, const PressRow *step, double to) {
     return row;
 }
 
-/* Cuts a step that would pass `force` to where it gets there. */
+/* Shortens a step that would pass `force`, so that it ends there. */
 static PressRow hand_cut(Press *press, double dt, double down, double force) {
     double low = 0, high = dt, from = press_depth(press);
     PressRow step = {0};
@@ -237,8 +237,8 @@ static PressRow hand_cut(Press *press, double dt, double down, double force) {
     return step;
 }
 
-/* Down or up to a depth, or to where the force gets to `force` (NaN: never) if that comes first;
- * *reached says so. */
+/* Goes down or up to a depth, or stops earlier where the force reaches `force` (NaN: never). Then
+ * *reached is true. */
 static MildStatus hand_vertical(Press *press, double to, double force, int *reached,
                                 MildError *error) {
     double from = press_depth(press), way = to - from, speed = press->def->speed,
@@ -284,7 +284,7 @@ static MildStatus hand_out(Press *press, MildError *error) {
                : MILD_OK;
 }
 
-/* Even turns end ways down, odd ones ways up. */
+/* Even turns end a way down, odd turns a way up. */
 static MildStatus hand_turn(Press *press, int index, MildError *error) {
     const PressDef *def = press->def;
     int reached, ends_down = index % 2 == 0;
@@ -331,8 +331,8 @@ static int untouched(const Press *press) {
     return 1;
 }
 
-/* Semi-implicit, as engines do; the row stands at the start of the step, about which its force is
- * the mean. */
+/* One semi-implicit step, as engines take it. The row belongs to the start of the step, because the
+ * force is the mean about it. */
 static MildStatus drop_step(Press *press, const PressBody *body, MildError *error) {
     PressResult *result = press->result;
     MildContactInput *input = &press->input;

@@ -1,5 +1,5 @@
-/* The laboratory's press: a plate or the robot's sole moved through a ground by hand (down and up,
- * in cycles, sideways), or dropped as a free body, and what the ground answers. */
+/* A press: a plate or a sole is moved through a ground along a prescribed path (down and up, in cycles,
+ * forward), or dropped as a free body. The result is the force of the ground. */
 #ifndef LAB_PRESS_H
 #define LAB_PRESS_H
 
@@ -7,25 +7,26 @@
 
 enum { PRESS_TURNS_MAX = 16 };
 
-/* All zero but material, speed and one turn: once down and up. A body is dropped when `mass` is
- * above 0. */
+/* With material, speed and one turn, and all else 0, it goes down and up once. With mass > 0 a free
+ * body is dropped. */
 typedef struct {
     MildMaterial material;
     const MildMap *map; /* borrowed; NULL: level. Its height at the start is depth 0 */
     int print_tiles;    /* see mild_ground_bytes_prints */
     MildSolver solver;
     double tilt; /* [rad] about y, front edge down positive */
-    double step; /* [s] 0: a thousandth of the first way by hand (0.02 mm with by_force), 1e-4
-                    dropped */
+    double step; /* [s] time step; 0: a thousandth of the first way (0.02 mm with by_force), 1e-4
+                    for a drop */
 
     double speed; /* [m/s] down and up */
-    int turns; /* down to the first, up to the second, down to the third ...; after the last above
-                  the ground */
+    int turns;    /* down to the first, up to the second, and so on; after the last it leaves the
+                  ground */
     double turn[PRESS_TURNS_MAX]; /* [m] depth of the reference point; with by_force [N] how hard
                                      the ground pushes */
     int by_force;                 /* bool */
-    int cycles;                   /* how often through all turns; 0 counts as 1 */
-    double drag;       /* [m] > 0: after the first way down along +x at constant depth, then up */
+    int cycles;                   /* how often all turns are made; 0 counts as 1 */
+    double
+        drag; /* [m] > 0: after the first way down it moves along +x at constant depth, then up */
     double drag_speed; /* [m/s] */
 
     double mass;    /* [kg] spread evenly over the sole */
@@ -41,15 +42,15 @@ typedef struct {
     double time, depth, force, moment_x, moment_y, zmp_x, zmp_y; /* zmp NaN without force */
     double force_x, force_y, x, tilt;                            /* tilt [rad] */
     int contacts;
-    int way; /* by hand: 0 is the first way down, each turn begins the next */
+    int way; /* on a prescribed path: 0 is the first way down, each turn begins the next */
 } PressRow;
 
 typedef struct {
     PressRow *rows; /* [count], owned */
     int count, ways, room;
     double peak_force;        /* [N] */
-    double work_in, work_out; /* [J] vertical force times way, down and up */
-    double work_drag;         /* [J] taken by the ground from the motion sideways */
+    double work_in, work_out; /* [J] integral of the vertical force on the ways down and up */
+    double work_drag;         /* [J] work of the motion along +x on the ground */
     double
         print_depth; /* [m] depth at which the force last vanished on a way up; 0 when it did not */
     double stop_depth, stop_time,

@@ -23,7 +23,8 @@ static void tensor_apply(const double *R, const double *m, const double *v, doub
     }
 }
 
-/* Flat: every element a square of mass/count, so that I_zz = I_xx + I_yy and z does not couple. */
+/* The body is flat. Every element is a square of mass/count, so I_zz = I_xx + I_yy and z does not
+ * couple. */
 PressBody press_body(const MildSole *sole, double mass) {
     const double *x = mild_sole_x(sole), *y = mild_sole_y(sole), pitch = mild_sole_pitch(sole);
     int count = mild_sole_elements(sole);

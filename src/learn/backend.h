@@ -1,7 +1,7 @@
-/* A compute backend: another device than the processor that runs the learner's networks. It
- * computes the functions that policy_act, policy_value and ppo_gradient compute, from the same
- * random numbers, equal up to rounding. Optimiser, advantages, order of the samples and checkpoints
- * stay with the learner, so a run may change its device on resuming. */
+/* A compute backend runs the learner's networks on another device than the processor. It computes the
+ * same functions as policy_act, policy_value and ppo_gradient, from the same random numbers and equal
+ * up to rounding. Optimiser, advantages, order of the samples and checkpoints stay with the learner,
+ * so a resumed run may change its device. */
 #ifndef MILD_BACKEND_H
 #define MILD_BACKEND_H
 
@@ -9,12 +9,12 @@
 
 /* `self` is the first argument of every function. A function that fails says why and may leave its
  * results unwritten. */
-typedef struct {
+typedef struct PpoBackend {
     void *self;
     /* batch->mean at time t from batch->history at time t. */
     MildStatus (*act)(void *self, int t, MildError *error);
-    /* batch->value from batch->critic. The rollout is complete: until the next act() the learner
-     * only changes the parameters and the batch's advantage and returns. */
+    /* batch->value from batch->critic. The rollout is complete. Until the next act() the learner
+     * changes only the parameters and the batch's advantage and returns. */
     MildStatus (*values)(void *self, MildError *error);
     /* Gradient of the loss over `count` samples of the batch into gradient [parameters], and the
      * sums. latent_key: the random numbers of the sampled z, see ppo_latent_key. */

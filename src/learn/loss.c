@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "learn/vector.h"
+#include "learn/loss_sample.h"
 
 #define HALF_LOG_2PI 0.91893853320467274
 
@@ -75,38 +75,24 @@ float loss_log_prob(int actions, const float *action, const float *mean, const f
     return (float)sum;
 }
 
-/* Clipped surrogate of one sample, -min(r A, clip(r) A), r = exp(log_prob - old_log_prob).
- * Gradient: d/dlog_prob = -A r where the first branch is the smaller one, else 0; dlog_prob/dmean =
- * (a - mean)/std^2,  dlog_prob/dlog_std = ((a - mean)/std)^2 - 1. */
+/* Clipped surrogate of sample r. */
 static void surrogate_row(const LossContext *c, const LossChunk *chunk, int r,
                           const float *constant, const float *mean, float *d_mean, float *d_log_std,
                           LossSums *sums) {
     const int actions = c->network->def.actions;
-    const float *action = chunk->action + (int64_t)r * actions,
-                *old_mean = chunk->old_mean + (int64_t)r * actions;
-    const float *inverse = constant;
-    float log_prob = constant[actions], kl = constant[actions + 1];
-    float t[NETWORK_ACTIONS_MAX];
+    const float *action = chunk->action + (int64_t)r * actions;
+    const float *old_mean = chunk->old_mean + (int64_t)r * actions;
+    const LossSurrogate s = loss_surrogate(actions, constant, (float)c->def->clip, action, mean,
+                                           old_mean, chunk->old_log_prob[r], chunk->advantage[r]);
+    const float d_log_prob = s.d_log_prob * c->sample_weight * (float)(1.0 - c->def->epsilon);
     for (int j = 0; j < actions; j++) {
-        t[j] = (action[j] - mean[j]) * inverse[j];
-        log_prob -= 0.5f * t[j] * t[j];
-        float shift = (old_mean[j] - mean[j]) * inverse[j];
-        kl += 0.5f * shift * shift;
+        const float t = loss_standard(action[j], mean[j], constant[j]);
+        d_mean[j] = loss_mean_gradient(d_log_prob, t, constant[j]);
+        d_log_std[j] += loss_log_std_gradient(d_log_prob, t);
     }
-    const float clip = (float)c->def->clip, advantage = chunk->advantage[r];
-    float ratio = expf(log_prob - chunk->old_log_prob[r]);
-    float held = fminf(fmaxf(ratio, 1.0f - clip), 1.0f + clip);
-    float free_term = ratio * advantage, held_term = held * advantage;
-    float d_log_prob = free_term <= held_term
-                           ? -free_term * c->sample_weight * (float)(1.0 - c->def->epsilon)
-                           : 0.0f;
-    for (int j = 0; j < actions; j++) {
-        d_mean[j] = d_log_prob * t[j] * inverse[j];
-        d_log_std[j] += d_log_prob * (t[j] * t[j] - 1.0f);
-    }
-    sums->surrogate -= free_term <= held_term || isnan(free_term) ? free_term : held_term;
-    sums->clipped += ratio != held;
-    sums->kl += kl;
+    sums->surrogate += s.loss;
+    sums->clipped += s.clipped;
+    sums->kl += s.kl;
 }
 
 void loss_surrogate_constants(const LossContext *c, float *constant) {
@@ -140,32 +126,19 @@ static void policy_loss(const LossContext *c, LossChunk *chunk, const float *mea
     }
 }
 
-/* mean over samples and actions of (mean(o) - M_a mean(M_o o))^2, gradient through both: either
- * side may be the better one. */
+/* Mean over samples and actions of (mean(o) - M_a mean(M_o o))^2. */
 static void mirror_loss(const LossContext *c, LossChunk *chunk, const float *mean, LossSums *sums) {
     const int actions = c->network->def.actions;
     const float weight = 2.0f * (float)c->def->mirror_weight * c->mirror_weight / (float)actions;
     const float *image = mean + (int64_t)chunk->rows * actions;
-    float *d_mean = chunk->d_mean, *d_image = chunk->d_mean + (int64_t)chunk->rows * actions;
-    memset(d_image, 0, (size_t)chunk->mirrored * (size_t)actions * sizeof *d_image);
+    float *d_mean = chunk->d_mean;
+    float *d_image = d_mean + (int64_t)chunk->rows * actions;
     for (int r = 0; r < chunk->mirrored; r++) {
-        float sum = 0.0f;
-        for (int j = 0; j < actions; j++) {
-            int k = c->mirror->action_index[j];
-            float sign = c->mirror->action_sign[j], gap = mean[j] - sign * image[k];
-            sum += gap * gap;
-            d_mean[j] += weight * gap;
-            d_image[k] -= weight * sign * gap;
-        }
+        const int64_t at = (int64_t)r * actions;
+        const float sum = loss_mirror(actions, c->mirror->action_index, c->mirror->action_sign,
+                                      weight, mean + at, image + at, d_mean + at, d_image + at);
         sums->mirror += (double)sum / actions;
-        mean += actions, image += actions, d_mean += actions, d_image += actions;
     }
-}
-
-static float held_logvar(float logvar) {
-    return logvar < LOSS_LOGVAR_MIN   ? LOSS_LOGVAR_MIN
-           : logvar > LOSS_LOGVAR_MAX ? LOSS_LOGVAR_MAX
-                                      : logvar;
 }
 
 /* z = mu + exp(logvar/2) noise; decoder input [z | estimates]. */
@@ -177,7 +150,7 @@ static void sample_latent(const LossContext *c, LossChunk *chunk, const float *h
         const float *mu = heads + estimates, *logvar = mu + latent;
 #pragma omp simd
         for (int j = 0; j < latent; j++) {
-            spread[j] = vector_exp(0.5f * held_logvar(logvar[j]));
+            spread[j] = loss_spread(logvar[j]);
             input[j] = mu[j] + spread[j] * noise[j];
         }
         memcpy(input + latent, heads, (size_t)estimates * sizeof *input);
@@ -212,62 +185,38 @@ static void estimate_row(const LossContext *c, const float *estimate, const floa
     const int ends[LOSS_GROUPS + 1] = {0, def->feet_velocity_offset,
                                        def->feet_velocity_offset + def->feet_velocity_count,
                                        def->estimates};
+    const float weight = 2.0f * (float)c->def->epsilon * c->sample_weight;
     for (int g = 0; g < LOSS_GROUPS; g++) {
-        int width = ends[g + 1] - ends[g];
-        if (width == 0) {
-            continue;
-        }
-        float sum = 0.0f, weight = 2.0f * (float)c->def->epsilon * c->sample_weight / (float)width;
-        for (int j = ends[g]; j < ends[g + 1]; j++) {
-            float gap = estimate[j] - target[j];
-            sum += gap * gap;
-            d[j] += weight * gap;
-        }
-        sums->estimate[g] += (double)sum / width;
+        sums->estimate[g] += loss_estimates(ends[g], ends[g + 1], weight, estimate, target, d);
     }
 }
 
-/* KL(N(mu, e^lv) || N(0, I)) = -1/2 sum (1 + lv - mu^2 - e^lv), and the decoder's gradient through
- * the sampled z. Outside its bounds the log-variance feels only a gradient that leads back inside.
- */
+/* KL(N(mu, e^logvar) || N(0, I)), and the decoder's gradient through the sampled z. */
 static void latent_row(const LossContext *c, const float *mu, const float *logvar,
                        const float *spread, const float *noise, const float *d_z, float *d_mu,
                        float *d_logvar, LossSums *sums) {
     const int latent = c->network->def.latent;
     const float weight = (float)(c->def->epsilon * c->def->kl_weight) * c->sample_weight;
-    float sum = 0.0f;
-#pragma omp simd reduction(+ : sum)
+    float twice = 0.0f;
+#pragma omp simd reduction(+ : twice)
     for (int j = 0; j < latent; j++) {
-        float held = held_logvar(logvar[j]), variance = spread[j] * spread[j];
-        sum += mu[j] * mu[j] + variance - 1.0f - held;
-        d_mu[j] += d_z[j] + weight * mu[j];
-        float d = 0.5f * (d_z[j] * spread[j] * noise[j] + weight * (variance - 1.0f));
-        float outward = (logvar[j] - held) * d;
-        d_logvar[j] = outward < 0.0f ? 0.0f : d;
+        twice += loss_latent_twice(mu[j], logvar[j], spread[j]);
+        d_mu[j] += loss_mu_gradient(weight, mu[j], d_z[j]);
+        d_logvar[j] = loss_logvar_gradient(weight, logvar[j], spread[j], noise[j], d_z[j]);
     }
-    sums->vae_kl += 0.5 * (double)sum;
+    sums->vae_kl += 0.5 * (double)twice;
 }
 
 /* Back through z~ = theta1 mu + theta2: d_heads (estimates and mu; logvar 0) and d_theta. */
 static void modulation_backward(const LossContext *c, LossChunk *chunk, int all,
                                 const float *heads) {
     const Network *n = c->network;
-    const int estimates = n->def.estimates, latent = n->def.latent,
-              per_dimension = n->def.modulation_per_dimension;
-    const float *theta = network_theta(n, &chunk->outputs), *d_input = chunk->d_actor_input;
-    float *d_heads = chunk->d_heads, *d_theta = chunk->d_theta;
-    memset(d_theta, 0, (size_t)all * (size_t)n->theta * sizeof *d_theta);
-    for (int r = 0; r < all; r++) {
-        const float *mu = heads + estimates, *d_latent = d_input + estimates;
-        memcpy(d_heads, d_input, (size_t)estimates * sizeof *d_heads);
-        for (int j = 0; j < latent; j++) {
-            d_heads[estimates + j] = d_latent[j] * theta[per_dimension ? j : 0];
-            d_heads[estimates + latent + j] = 0.0f;
-            d_theta[per_dimension ? j : 0] += d_latent[j] * mu[j];
-            d_theta[per_dimension ? latent + j : 1] += d_latent[j];
-        }
-        heads += n->heads, d_heads += n->heads, theta += n->theta, d_theta += n->theta,
-            d_input += estimates + latent;
+    const float *theta = network_theta(n, &chunk->outputs);
+    for (int64_t r = 0; r < all; r++) {
+        loss_modulation(n->def.estimates, n->def.latent, n->def.modulation_per_dimension,
+                        heads + r * n->heads, theta + r * n->theta,
+                        chunk->d_actor_input + r * (n->def.estimates + n->def.latent),
+                        chunk->d_heads + r * n->heads, chunk->d_theta + r * n->theta);
     }
 }
 
@@ -331,8 +280,6 @@ void loss_actor(const LossContext *c, LossChunk *chunk, float *gradient, float b
                  chunk->d_heads, chunk->work, gradient, beta, (MlpInputGradient){0});
 }
 
-/* Value loss max((V - R)^2, (V_old + clip(V - V_old) - R)^2); where the clipped branch is the
- * larger one, its gradient is that of V inside the clip range and 0 outside. */
 void loss_critic(const LossContext *c, LossChunk *chunk, float *gradient, float beta,
                  LossSums *sums) {
     const Network *n = c->network;
@@ -342,13 +289,11 @@ void loss_critic(const LossContext *c, LossChunk *chunk, float *gradient, float 
     const float weight =
         2.0f * (float)((1.0 - c->def->epsilon) * c->def->value_weight) * c->sample_weight;
     for (int r = 0; r < chunk->rows; r++) {
-        float gap = value[r] - chunk->returns[r], move = value[r] - chunk->old_value[r];
-        float held_move = move < -clip ? -clip : move > clip ? clip : move;
-        float held_gap = chunk->old_value[r] + held_move - chunk->returns[r];
-        int held = c->def->clip_value && held_gap * held_gap > gap * gap;
-        float used = held ? held_gap : gap;
-        sums->value += (double)used * used;
-        chunk->d_value[r] = held && held_move != move ? 0.0f : weight * used;
+        float half;
+        const float gap = loss_value(c->def->clip_value, clip, value[r], chunk->old_value[r],
+                                     chunk->returns[r], &half);
+        sums->value += (double)gap * gap;
+        chunk->d_value[r] = weight * half;
     }
     mlp_backward(&n->critic, c->parameters, chunk->rows, chunk->critic, n->def.critic_input,
                  &chunk->value, chunk->d_value, chunk->work, gradient, beta, (MlpInputGradient){0});

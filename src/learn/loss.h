@@ -4,21 +4,17 @@
  *   L = (1-eps) (surrogate - w_H entropy + w_V value) + eps (recon + phi KL + sum over groups MSE)
  * + w_M mirror   (eq 16)
  *
- * Means are over the minibatch: the caller gives 1 / (its samples), so that chunks and shards
- * simply add up. */
+ * Means are over the minibatch. The caller gives 1 / (its samples), so the results of chunks and
+ * shards add up. */
 #ifndef MILD_LOSS_H
 #define MILD_LOSS_H
 
 #include "learn/network.h"
-#include "learn/ppo.h"
+#include "learn/ppo_def.h"
 
-#define LOSS_GROUPS                                                                                \
-    3 /* estimates before, in and after the feet velocities: base velocity, feet velocities, feet  \
-         heights */
-
-/* The log-variance is used within these bounds, so that no early step can overflow e^logvar. */
-#define LOSS_LOGVAR_MIN (-12.0f)
-#define LOSS_LOGVAR_MAX 6.0f
+/* Groups of estimates: before, in and after the feet velocities. These are base velocity, feet
+ * velocities and feet heights. */
+#define LOSS_GROUPS 3
 
 /* Constants of one minibatch. */
 typedef struct {
@@ -26,35 +22,62 @@ typedef struct {
     const Network *network;
     const PpoMirror *mirror; /* NULL: none */
     const float *parameters;
-    float sample_weight; /* 1 / samples in the minibatch */
-    float mirror_weight; /* 1 / samples of the minibatch that the mirror loss sees */
-    float std[NETWORK_ACTIONS_MAX], old_std[NETWORK_ACTIONS_MAX];
+    float sample_weight;                /* 1 / samples in the minibatch */
+    float mirror_weight;                /* 1 / samples of the minibatch that the mirror loss sees */
+    float std[NETWORK_ACTIONS_MAX];     /* [-] of the action noise now */
+    float old_std[NETWORK_ACTIONS_MAX]; /* [-] in the rollout */
 } LossContext;
 
-/* Sums over samples (not yet divided); the entropy has no sum, it does not depend on the sample. */
+/* Sums over samples, not yet divided. The entropy is missing, because it does not depend on the
+ * sample. */
 typedef struct {
-    double surrogate, kl, clipped, reconstruction, vae_kl, estimate[LOSS_GROUPS], mirror, value;
+    double surrogate;
+    double kl;      /* [nat] KL(old || new) of the action */
+    double clipped; /* samples whose ratio is outside the clip range */
+    double reconstruction;
+    double vae_kl; /* [nat] of the latent */
+    double estimate[LOSS_GROUPS];
+    double mirror;
+    double value;
 } LossSums;
 
-/* One chunk, `rows` samples; history holds `mirrored` more rows behind them, the mirror images of
- * the first ones. */
+/* One chunk of `rows` samples. After them history holds `mirrored` more rows: the mirror images of the
+ * first samples. */
 typedef struct {
-    int rows, mirrored;
-    float *history;                   /* [rows + mirrored][history] */
-    float *estimate, *decoder_target; /* targets [rows][estimates], [rows][observation] */
-    float *noise;                     /* [rows][latent] standard normal, for the sampled z */
-    float *action, *old_mean, *old_log_prob, *advantage; /* [rows][actions] twice, [rows] twice */
-    float *critic, *old_value, *returns;                 /* [rows][critic_input], [rows] twice */
+    int rows;
+    int mirrored;
+    /* input */
+    float *history;        /* [rows + mirrored][history] */
+    float *estimate;       /* [rows][estimates] target */
+    float *decoder_target; /* [rows][observation] */
+    float *noise;          /* [rows][latent] standard normal, for the sampled z */
+    float *action;         /* [rows][actions] */
+    float *old_mean;       /* [rows][actions] */
+    float *old_log_prob;   /* [rows] */
+    float *advantage;      /* [rows] */
+    float *critic;         /* [rows][critic_input] */
+    float *old_value;      /* [rows] */
+    float *returns;        /* [rows] */
+    /* forward */
     NetworkOutputs outputs;
-    MlpOutputs decoder, value;
-    float *decoder_input, *spread; /* [rows][decoder_input]; exp(logvar / 2) [rows][latent] */
-    float *d_mean, *d_heads, *d_theta, *d_actor_input, *d_feet; /* [rows + mirrored][...] */
-    float *d_decoded, *d_decoder_input, *d_value;               /* [rows][...] */
-    float *work[2];
+    MlpOutputs decoder;
+    MlpOutputs value;
+    float *decoder_input; /* [rows][decoder_input] */
+    float *spread;        /* [rows][latent] exp(logvar / 2) */
+    /* gradients with respect to what d_ names */
+    float *d_mean;          /* [rows + mirrored][actions] */
+    float *d_heads;         /* [rows + mirrored][heads] */
+    float *d_theta;         /* [rows + mirrored][theta] */
+    float *d_actor_input;   /* [rows + mirrored][estimates + latent] the part behind the frame */
+    float *d_feet;          /* [rows + mirrored][feet velocities] */
+    float *d_decoded;       /* [rows][observation] */
+    float *d_decoder_input; /* [rows][decoder_input] */
+    float *d_value;         /* [rows] */
+    float *work[2];         /* [rows + mirrored][widest layer] each */
 } LossChunk;
 
-/* Lays a chunk for at most `rows` samples and `mirrored` images into the block (NULL: only counts
- * floats). */
+/* Places a chunk for at most `rows` samples and `mirrored` images in the block and returns its floats.
+ * NULL: only counts them. */
 size_t loss_carve(const Network *network, int rows, int mirrored, float *block, LossChunk *chunk);
 /* Copies row `from` of the chunk's history, mirrored, to row `to`. */
 void loss_mirror_row(const LossContext *context, LossChunk *chunk, int from, int to);
@@ -65,8 +88,9 @@ void loss_actor(const LossContext *context, LossChunk *chunk, float *gradient, f
 void loss_critic(const LossContext *context, LossChunk *chunk, float *gradient, float beta,
                  LossSums *sums);
 
-/* What no sample changes in the surrogate: 1/std [actions], then the constants of log_prob and of
- * KL(old || new) = sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
+/* The part of the surrogate that is the same for all samples: 1/std [actions], then the constants
+ * of log_prob and of KL(old || new), which is
+ *     sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
 void loss_surrogate_constants(const LossContext *context, float *constant);
 
 /* log of the normal density of `action`, independent dimensions. */

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "learn/policy.h"
+#include "learn/policy_def.h"
 
 #define MLP_LAYERS_MAX (POLICY_LAYERS_MAX + 1)
 
@@ -26,8 +26,8 @@ typedef struct {
     float *y[MLP_LAYERS_MAX];
 } MlpOutputs;
 
-/* Where the gradient with respect to the input goes: columns first .. first+count-1, into x
- * [rows][count] (overwritten). count 0: not wanted. */
+/* Gradient with respect to the input's columns first .. first+count-1, written to x [rows][count].
+ * count 0: not computed. */
 typedef struct {
     float *x;
     int first, count;
@@ -42,7 +42,7 @@ int mlp_widest(const Mlp *mlp); /* the widest layer output */
 void mlp_initialise(const Mlp *mlp, float *parameters, uint64_t seed, uint32_t stream,
                     double last_scale);
 
-/* Takes `count` floats from a block, aligned to 64 bytes; with a NULL block it only counts. */
+/* Takes `count` floats, aligned to 64 bytes, from a block. With a NULL block it only counts. */
 float *mlp_carve(float *block, size_t *used, size_t count);
 void mlp_carve_outputs(const Mlp *mlp, int rows, float *block, size_t *used, MlpOutputs *outputs);
 

@@ -6,8 +6,7 @@
 
 #include "learn/policy_private.h"
 
-/* The def's shape fields: the task sets them, so they are no config keys, but a file must state
- * them. */
+/* Shape fields of the def. The task sets them, so they are no config keys, but a file must have them. */
 static const MildField shape_fields[] = {
     MILD_FIELD(PolicyDef, observation, MILD_FIELD_INT, 1, 1, 16384, "[-] width of one frame"),
     MILD_FIELD(PolicyDef, frames, MILD_FIELD_INT, 1, 1, 16384, "[-] frames in the history"),
@@ -99,7 +98,7 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
     }
     if (strcmp(kind, POLICY_KIND) != 0 && strcmp(kind, POLICY_CHECKPOINT_KIND) != 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%s: holds no policy of mild; give a file that `mild train` wrote", path);
+                         "%s: is no policy of mild; give a file that `mild train` wrote", path);
     }
     if (strcmp(version, POLICY_FILE_VERSION) != 0) {
         return mild_fail(
@@ -137,7 +136,7 @@ static MildStatus wrong_tensor(const char *path, const char *name, const char *w
                      what);
 }
 
-/* Nothing but the policy's tensors and a checkpoint's may be there. */
+/* Refuses tensors that belong neither to a policy nor to a checkpoint. */
 static MildStatus check_strangers(const Safetensors *file, const char *path,
                                   const PolicyTensors *wanted, MildError *error) {
     for (int i = 0; i < safetensors_count(file); i++) {
@@ -186,8 +185,7 @@ MildStatus policy_save(const Policy *policy, const char *path, const char *note,
     return safetensors_write(path, tensors.tensor, tensors.count, texts.text, texts.count, error);
 }
 
-/* The size that the def asks for is compared with the file before anything of that size is
- * allocated. */
+/* Compares the size that the def asks for with the file before it allocates that much. */
 Policy *policy_file_policy(const Safetensors *file, const char *path, MildError *error) {
     PolicyDef def;
     Network network;

@@ -5,6 +5,7 @@
 #define MILD_POLICY_FILE_H
 
 #include "learn/network.h"
+#include "learn/policy.h"
 #include "learn/safetensors.h"
 
 #define POLICY_TENSORS_MAX (NETWORK_MLPS * MLP_LAYERS_MAX * 2 + 1)

@@ -1,4 +1,4 @@
-/* What the learner may see of a policy and its users may not. */
+/* The state of a policy, for the learner. */
 #ifndef MILD_POLICY_PRIVATE_H
 #define MILD_POLICY_PRIVATE_H
 

@@ -6,83 +6,8 @@
 
 #include "base/random.h"
 #include "learn/noise.h"
-#include "learn/ppo_private.h"
-
-PpoDef ppo_def_default(void) {
-    return (PpoDef){
-        .steps = 24,
-        .epochs = 4,
-        .minibatches = 4,
-        .gamma = 0.994,
-        .lambda = 0.9,
-        .clip = 0.2,
-        .entropy = 0.001,
-        .value_weight = 1.0,
-        .clip_value = 1,
-        .learning_rate = 1e-3,
-        .learning_rate_min = 1e-5,
-        .learning_rate_max = 2e-3,
-        .kl_target = 0.01,
-        .max_gradient_norm = 1.0,
-        .epsilon = 0.3,
-        .decoder_target = PPO_TARGET_NEXT,
-        .kl_weight = 0.001,
-        .mirror_weight = 1.0,
-        .mirror_share = 0.5,
-        .std_min = 0.05,
-        .anneal_factor = 0.1,
-        .std_max = {10.0, 10.0},
-    };
-}
-
-static const char *const target_names[PPO_TARGETS] = {"newest", "next"};
-
-const MildField ppo_fields[] = {
-    MILD_FIELD(PpoDef, steps, MILD_FIELD_INT, 1, 1, 1024, "[-] rollout length per environment"),
-    MILD_FIELD(PpoDef, epochs, MILD_FIELD_INT, 1, 1, 64, "[-] passes over each rollout"),
-    MILD_FIELD(PpoDef, minibatches, MILD_FIELD_INT, 1, 1, 1024, "[-] optimiser steps per pass"),
-    MILD_FIELD(PpoDef, gamma, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] discount per policy step"),
-    MILD_FIELD(PpoDef, lambda, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
-               "[-] decay of generalised advantage estimation"),
-    MILD_FIELD(PpoDef, clip, MILD_FIELD_DOUBLE, 1, 0.01, 10.0,
-               "[-] clip range of the probability ratio, and of the value's move"),
-    MILD_FIELD(PpoDef, entropy, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] weight of the entropy bonus"),
-    MILD_FIELD(PpoDef, value_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
-               "[-] weight of the value loss"),
-    MILD_FIELD(PpoDef, clip_value, MILD_FIELD_BOOL, 1, 0, 1, "[-] clip the value loss"),
-    MILD_FIELD(PpoDef, learning_rate, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] first learning rate"),
-    MILD_FIELD(PpoDef, learning_rate_min, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
-               "[-] least adapted learning rate"),
-    MILD_FIELD(PpoDef, learning_rate_max, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
-               "[-] greatest adapted learning rate"),
-    MILD_FIELD(PpoDef, kl_target, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
-               "[nat] divergence the learning rate aims at; 0 keeps the rate fixed"),
-    MILD_FIELD(PpoDef, max_gradient_norm, MILD_FIELD_DOUBLE, 1, 1e-6, 1e6,
-               "[-] the gradient is shortened to this norm"),
-    MILD_FIELD(PpoDef, epsilon, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
-               "[-] share of the regression loss in the joint loss"),
-    MILD_FIELD_CHOICE(PpoDef, decoder_target, target_names, PPO_TARGETS,
-                      "[-] frame that the decoder rebuilds: the newest or the next"),
-    MILD_FIELD(PpoDef, kl_weight, MILD_FIELD_DOUBLE, 1, 0.0, 10.0,
-               "[-] weight of the latent's divergence from N(0, I)"),
-    MILD_FIELD(PpoDef, mirror_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
-               "[-] weight of the mirror symmetry loss"),
-    MILD_FIELD(PpoDef, mirror_share, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
-               "[-] share of each minibatch that the mirror loss sees"),
-    MILD_FIELD(PpoDef, std_min, MILD_FIELD_DOUBLE, 1, 1e-4, 1.0,
-               "[-] floor of the action noise's standard deviation"),
-    MILD_FIELD(PpoDef, anneal, MILD_FIELD_INT, 2, 0, 1e9,
-               "[-] first and last iteration of the anneal that ends a run; equal: none"),
-    MILD_FIELD(
-        PpoDef, anneal_factor, MILD_FIELD_DOUBLE, 1, 1e-6, 1.0,
-        "[-] kl_target and learning_rate_max are multiplied by this by the end of the anneal"),
-    MILD_FIELD(PpoDef, std_max, MILD_FIELD_DOUBLE, 2, 1e-4, 10.0,
-               "[-] ceiling of the action noise's standard deviation, before and after the anneal"),
-    MILD_FIELD(PpoDef, average, MILD_FIELD_DOUBLE, 1, 0.0, 0.9999,
-               "[-] decay per iteration of the running mean of the weights that is saved as the "
-               "policy; 0: none"),
-};
-const int ppo_field_count = (int)(sizeof ppo_fields / sizeof *ppo_fields);
+#include "learn/ppo_gradient.h"
+#include "learn/ppo_returns.h"
 
 /* Lays the batch into the block; NULL only counts bytes. */
 static size_t batch_layout(PpoBatch *b, const Network *n, char *block) {
@@ -290,8 +215,8 @@ typedef struct {
     const float *std;
 } ActJob;
 
-/* Actions around the means of the piece's environments, two at a time so that the noise begins at
- * an even number. */
+/* Samples actions around the means for the piece's environments. A piece begins at an even environment,
+ * so that its noise begins at an even number. */
 static void act_piece(void *context, int piece, int thread) {
     (void)thread;
     const ActJob *job = context;
@@ -353,8 +278,8 @@ static void shuffle(Ppo *ppo, int epoch) {
     }
 }
 
-/* 0 before the anneal, 1 after it: a function of the iteration alone, so that a resumed run goes on
- * alike. */
+/* 0 before the annealing, 1 after it. A function of the iteration alone, so a resumed run continues in
+ * the same way. */
 static double anneal_share(const Ppo *ppo) {
     const int first = ppo->def.anneal[0], last = ppo->def.anneal[1];
     return first < last ? fmin(fmax((double)(ppo->iteration - first) / (last - first), 0.0), 1.0)
@@ -376,7 +301,8 @@ static void adapt_learning_rate(Ppo *ppo, double kl) {
     ppo->learning_rate = fmin(fmax(ppo->learning_rate, def->learning_rate_min), most);
 }
 
-/* Between the updates, so that what the rollout samples from is what the update compares with. */
+/* Applied between updates, so that the rollout samples from the distribution that the update compares
+ * with. */
 static void bound_noise(Ppo *ppo) {
     const double *std_max = ppo->def.std_max;
     const float ceiling =
@@ -387,7 +313,7 @@ static void bound_noise(Ppo *ppo) {
     }
 }
 
-/* Young averages forget faster, or the first weights would stay in them for long. */
+/* A young average forgets faster, because otherwise it would keep the first weights for long. */
 static void average_weights(Ppo *ppo) {
     const double young = (1.0 + (double)ppo->iteration) / (10.0 + (double)ppo->iteration);
     const float step = (float)(1.0 - fmin(ppo->def.average, young));
@@ -471,7 +397,7 @@ static void finish_report(const Ppo *ppo, PpoReport *report, int minibatches) {
     report->learning_rate = ppo->learning_rate;
 }
 
-/* What the last step saw is what the next rollout starts from. */
+/* The rows after the last step are the first rows of the next rollout. */
 static void carry_over(Ppo *ppo) {
     const Network *n = &ppo->policy->network;
     PpoBatch *b = &ppo->batch;
@@ -488,8 +414,8 @@ static void carry_over(Ppo *ppo) {
     }
 }
 
-/* Makes each frame of the piece's environments the one that follows it; the last of an episode, and
- * one whose successor is not valid, stays. */
+/* Replaces each frame of the piece's environments by its successor. The last frame of an episode and a
+ * frame before one that is not valid stay. */
 static void shift_piece(void *context, int piece, int thread) {
     (void)thread;
     const Ppo *ppo = context;

@@ -1,3 +1,5 @@
+#include "learn/ppo_file.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,8 +22,7 @@ static Safetensor tensor_of(const char *name, SafetensorsType type, const void *
                         .bytes = sizes[type] * (size_t)count};
 }
 
-/* What resuming needs beside the policy; the batch's rows of time 0 are what the next rollout
- * starts from. */
+/* What resuming needs besides the policy. The next rollout starts from the batch's rows of time 0. */
 static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const void *extra,
                          size_t extra_size, Safetensor tensors[TRAIN_TENSORS]) {
     const Network *n = &ppo->policy->network;
@@ -90,8 +91,8 @@ static MildStatus check_same_network(const Safetensors *file, const char *path,
     return MILD_OK;
 }
 
-/* A weight's number: bad ones would spoil all weights at the first update. (A bad observation costs
- * its minibatch.) */
+/* Tensors whose bad numbers would spoil all weights at the first update. A bad observation costs only
+ * its minibatch. */
 static int is_weights(const char *name) {
     return strcmp(name, "train.average") == 0 || strcmp(name, "train.first_moment") == 0 ||
            strcmp(name, "train.second_moment") == 0;
@@ -129,7 +130,7 @@ static MildStatus check_train(const Safetensors *file, const char *path, const S
     }
     if (!safetensors_find(file, "train.extra") != !has_extra) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "%s: holds an environment state that this run does not expect", path);
+                         "%s: contains an environment state that this run does not expect", path);
     }
     return MILD_OK;
 }
@@ -161,8 +162,7 @@ static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters
     ppo->learning_rate = learning_rate;
 }
 
-/* Everything is checked, the parameters into a spare array first, before anything of `ppo` changes.
- */
+/* Checks everything, and reads the parameters into a spare array, before it changes `ppo`. */
 static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra,
                             size_t extra_size, float *spare, MildError *error) {
     const Network *n = &ppo->policy->network;

@@ -1,10 +1,11 @@
+#include "learn/ppo_gradient.h"
+
 #include <math.h>
 #include <string.h>
 
 #include "base/random.h"
 #include "learn/adam.h"
 #include "learn/noise.h"
-#include "learn/ppo_private.h"
 #include "learn/product.h"
 
 typedef struct {
@@ -91,8 +92,7 @@ static void gather_critic(const GradientJob *job, int at, LossChunk *chunk) {
     }
 }
 
-/* An empty shard's half of the gradient: nothing will overwrite what the last minibatch left there.
- */
+/* Clears an empty shard's half of the gradient, which still holds that of the last minibatch. */
 static void clear_half(const Network *n, int critic, float *gradient) {
     if (critic) {
         memset(gradient + n->critic_first, 0,
@@ -161,7 +161,7 @@ static void reduce_piece(void *context, int range, int thread) {
     job->squares[range] = squares;
 }
 
-/* A backend leaves the sum in shard 0 itself. */
+/* Squared norm of a range; a backend has written the sum to shard 0 itself. */
 static void square_piece(void *context, int range, int thread) {
     (void)thread;
     GradientJob *job = context;

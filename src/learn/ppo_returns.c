@@ -1,6 +1,6 @@
-#include <math.h>
+#include "learn/ppo_returns.h"
 
-#include "learn/ppo_private.h"
+#include <math.h>
 
 static int sample_usable(const PpoBatch *b, int64_t i) {
     return b->valid[i] && isfinite(b->value[i]) && isfinite(b->reward[i]);

@@ -1,6 +1,5 @@
-/* Matrix products, row major, through oneDNN. Every product runs on the calling thread alone: the
- * learner splits its work into fixed pieces itself, so that no result depends on the number of
- * threads. */
+/* Matrix products, row major, by oneDNN. Every product runs on the calling thread alone. The learner
+ * splits its work into fixed pieces itself, so no result depends on the number of threads. */
 #ifndef MILD_PRODUCT_H
 #define MILD_PRODUCT_H
 
@@ -10,8 +9,8 @@ int product_enter(void);
 void product_leave(int entered);
 
 /* c[m][n] = op(a) op(b) + beta c; op transposes where the flag is 'T'. ld*: floats between rows as
- * stored. Should oneDNN fail (out of memory), c is filled with NaN, which the learner drops and
- * counts. */
+ * stored. When oneDNN fails (out of memory), c is filled with NaN, and the learner drops and counts
+ * the minibatch. */
 void product(char transpose_a, char transpose_b, int m, int n, int k, const float *a, int lda,
              const float *b, int ldb, float beta, float *c, int ldc);
 

@@ -1,5 +1,4 @@
-/* Elementwise functions without branches or calls, so that compilers turn the loops into vector
- * code. */
+/* Elementwise functions without branches or calls, so that compilers vectorise their loops. */
 #ifndef MILD_VECTOR_H
 #define MILD_VECTOR_H
 
@@ -8,7 +7,7 @@
 
 #include "base/device.h"
 
-/* e^x to 3e-7 relative for x in [-87, 88]; the ends are held outside, NaN stays NaN.
+/* e^x to 3e-7 relative for x in [-87, 88]; clamped outside; NaN stays NaN.
  * e^x = 2^n e^r, n = round(x / ln 2), |r| <= ln(2)/2, e^r by its Taylor series to r^6/720
  * (error 1.2e-7 relative). */
 static inline MILD_HD float vector_exp(float x) {

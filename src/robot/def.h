@@ -2,7 +2,7 @@
 #ifndef ROBOT_DEF_H
 #define ROBOT_DEF_H
 
-#include "robot/robot.h"
+#include "robot/limits.h"
 
 #define ROBOT_NAME_SIZE 64
 #define ROBOT_SHELLS_MAX 32   /* geoms that must not touch the ground */

@@ -32,7 +32,7 @@ typedef struct {
     double radius;      /* [m] */
 } RobotShell;
 
-struct Robot {
+typedef struct Robot {
     RobotDef def;
     char path[ROBOT_PATH_SIZE];           /* of the MJCF */
     mjModel *model;                       /* bodies, joints, floor and corners: what a step needs */
@@ -57,7 +57,7 @@ struct Robot {
     RobotShell shell[ROBOT_SHELLS_MAX];
     double total_mass;   /* [kg] */
     double stand_height; /* [m] base above the soles in the default pose */
-};
+} Robot;
 
 /* Compiles the MJCF at robot->path into robot->visual, and what a step needs of it, with a floor
  * and the feet's corners, into robot->model. */

@@ -7,6 +7,7 @@
 #include "base/file.h"
 #include "robot/description.h"
 #include "robot/engine.h"
+#include "robot/robot.h"
 
 #define LEVEL 0.02 /* [rad] a flat sole of the default pose may be tilted by so much */
 

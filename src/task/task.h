@@ -11,10 +11,8 @@
 #include "robot/robot.h"
 #include "task/task_def.h"
 
-#define TASK_FRAMES 6      /* H + 1, newest last (paper, H = 5) */
-#define TASK_STRIDE_MAX 16 /* greatest task.history_stride */
+#define TASK_FRAMES 6 /* H + 1, newest last (paper, H = 5) */
 #define TASK_FRAMES_HELD ((TASK_FRAMES - 1) * TASK_STRIDE_MAX + 1)
-#define TASK_PERIOD 0.01 /* [s] policy step: 100 Hz (paper) */
 
 /* Scale of the feet heights among the estimates, so that centimetres weigh in the regression like
  * m/s. */

@@ -8,36 +8,41 @@
 #include "mild/map.h"
 #include "robot/robot.h"
 
+#define TASK_PERIOD 0.01   /* [s] policy step: 100 Hz (paper) */
+#define TASK_STRIDE_MAX 16 /* greatest task.history_stride */
+
 /* Every reward term once: name, default weight, help. The struct, the config keys and the table of
  * functions (reward.c) are all made from this list. Weights are per second; source: paper Table II
  * and docs/task.md section 8. */
 #define TASK_REWARD_LIST(X)                                                                        \
     X(linear_velocity, 2.0,                                                                        \
-      "f(v_x - command) f(v_y - command), f(e) = (exp(-k e^2) + exp(-|e|/width))/2, smoothed, "    \
-      "heading frame (paper)")                                                                     \
+      "f(v_x - command) f(v_y - command), f(e) = (exp(-k e^2) + exp(-|e|/width))/2, v smoothed, "  \
+      "in the heading frame (paper)")                                                              \
     X(yaw_rate, 1.1, "f(w_z - command) (paper)")                                                   \
     X(feet_clearance, 2.4,                                                                         \
-      "swing feet: clip(h, 0, h_des) less half of what is above h_des, h of the lowest sole "      \
-      "point above h0 (paper)")                                                                    \
-    X(gait, 1.4, "mean over feet: 1 when contact matches the clock, else -0.3 (paper)")            \
-    X(slip, -0.1, "[m/s] horizontal speed of feet in contact (paper)")                             \
+      "clip(h, 0, h_des) of swing feet minus half of the excess over h_des; h: lowest sole "       \
+      "point above the undisturbed surface (paper)")                                               \
+    X(gait, 1.4, "the mean over feet: 1 where contact matches the clock, else -0.3 (paper)")       \
+    X(slip, -0.1, "the horizontal speed [m/s] of feet in contact (paper)")                         \
     X(base_acceleration, 0.2, "exp(-3 |change of base twist in one step|) (paper)")                \
     X(action_smoothness, -0.003, "|a - a1|^2 + |a - 2 a1 + a2|^2 (paper)")                         \
     X(reference_motion, 2.2, "exp(-2 d) - 0.2 min(d, 0.5), d = |q - q_ref(phase)| (vendor)")       \
-    X(default_pose, 1.2, "joints marked still in robot.ini near the default pose (vendor)")        \
+    X(default_pose, 1.2,                                                                           \
+      "keeping joints marked still in robot.ini near the default pose (vendor)")                   \
     X(base_height, 0.2, "exp(-100 |height above the stance soles - nominal|) (vendor)")            \
-    X(feet_distance, 0.2, "lateral distance of the feet within limits (vendor)")                   \
-    X(knee_distance, 0.2, "lateral distance of the knees within limits (vendor)")                  \
-    X(orientation, 1.5, "upright base (vendor)")                                                   \
+    X(feet_distance, 0.2, "keeping the lateral distance of the feet in feet_range (vendor)")       \
+    X(knee_distance, 0.2, "keeping the lateral distance of the knees in knee_range (vendor)")      \
+    X(orientation, 1.5, "an upright base (vendor)")                                                \
     X(air_time, 1.0,                                                                               \
-      "[s] time in the air, paid at touchdown, at most half a gait period (vendor)")               \
-    X(base_motion, 0.5, "small vertical and roll-pitch speed of the base (vendor)")                \
+      "the time in the air [s], paid at touchdown, at most half a gait period (vendor)")           \
+    X(base_motion, 0.5, "little vertical, roll and pitch motion of the base (vendor)")             \
     X(contact_force, -0.02,                                                                        \
-      "[N] foot force above foot_force of robot.ini, at most 0.8 of it (vendor)")                  \
-    X(torque, -1e-10, "[N^2 m^2] sum of squared torques (vendor)")                                 \
-    X(joint_speed, -1e-5, "[rad^2/s^2] sum of squared joint speeds (vendor)")                      \
-    X(joint_acceleration, -5e-9, "[rad^2/s^4] sum of squared joint accelerations (vendor)")        \
-    X(collision, -1.0, "feet or knees closer than feet_least, knee_least of robot.ini (vendor)")
+      "the foot force [N] above foot_force of robot.ini, at most 0.8 of it (vendor)")              \
+    X(torque, -1e-10, "the sum of squared torques [N^2 m^2] (vendor)")                             \
+    X(joint_speed, -1e-5, "the sum of squared joint speeds [rad^2/s^2] (vendor)")                  \
+    X(joint_acceleration, -5e-9, "the sum of squared joint accelerations [rad^2/s^4] (vendor)")    \
+    X(collision, -1.0,                                                                             \
+      "feet or knees being closer than feet_least, knee_least of robot.ini (vendor)")
 
 #define TASK_REWARD_ENUM(name, weight, help) REWARD_##name,
 enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };

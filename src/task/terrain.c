@@ -9,16 +9,17 @@
 #include "task/image.h"
 
 static const MildField own_fields[] = {
-    MILD_FIELD(TerrainDef, image, MILD_FIELD_TEXT, sizeof((TerrainDef *)0)->image, 0, 0,
-               "[-] PNG of kind = image: black is 0, white is amplitude; a pixel is `cell` wide"),
     MILD_FIELD(
-        TerrainDef, labels, MILD_FIELD_TEXT, sizeof((TerrainDef *)0)->labels, 0, 0,
-        "[-] PNG of patches = image: black is the first material, white the last, greys between"),
+        TerrainDef, image, MILD_FIELD_TEXT, sizeof((TerrainDef *)0)->image, 0, 0,
+        "[-] PNG file for kind = image: black is 0, white is amplitude; a pixel is `cell` wide"),
+    MILD_FIELD(TerrainDef, labels, MILD_FIELD_TEXT, sizeof((TerrainDef *)0)->labels, 0, 0,
+               "[-] PNG file for patches = image: black is the first material, white the last"),
     MILD_FIELD(TerrainDef, memory, MILD_FIELD_BOOL, 1, 0, 1,
-               "[bool] prints stay and later steps find them"),
-    MILD_FIELD(TerrainDef, tiles, MILD_FIELD_INT, 1, 8, MILD_PRINT_TILES_MAX,
-               "[-] memory for prints, 136 bytes each, about ten for a foot's; when used up the "
-               "oldest print goes"),
+               "[bool] imprints stay, and later steps meet them"),
+    MILD_FIELD(
+        TerrainDef, tiles, MILD_FIELD_INT, 1, 8, MILD_PRINT_TILES_MAX,
+        "[-] memory for imprints: tiles of 136 bytes, about ten for an imprint of a foot; when "
+        "it is full the oldest imprint is forgotten"),
 };
 enum { OWN_FIELDS = sizeof own_fields / sizeof *own_fields, FIELDS_MAX = 32 };
 

@@ -5,8 +5,8 @@
 /* Bytes of one event's head (wall time, step, length prefix) and of one scalar, at most. */
 enum { HEAD_BYTES = 40, SCALAR_BYTES = EVENTS_TAG_MAX + 20, PAYLOAD_MAX = 128 * SCALAR_BYTES };
 
-/* CRC-32C (Castagnoli), reflected polynomial 0x82f63b78, bit by bit: a row of the log is a few
- * kilobytes. */
+/* CRC-32C (Castagnoli), reflected polynomial 0x82f63b78. Bit by bit is fast enough, because a row of
+ * the log has a few kilobytes. */
 uint32_t events_crc32c(const void *data, size_t size) {
     const unsigned char *bytes = data;
     uint32_t crc = 0xffffffffu;
@@ -19,7 +19,7 @@ uint32_t events_crc32c(const void *data, size_t size) {
     return ~crc;
 }
 
-/* TFRecord's masked form, so that a CRC over data that holds CRCs stays a good one. */
+/* TFRecord's masked form: a plain CRC is weak over data that contains CRCs. */
 static uint32_t masked_crc(const void *data, size_t size) {
     uint32_t crc = events_crc32c(data, size);
     return ((crc >> 15) | (crc << 17)) + 0xa282ead8u;

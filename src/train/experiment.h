@@ -20,7 +20,7 @@ ExperimentDef experiment_def_default(void);
 /* Makes the policy as wide as the robot's observations and actions. */
 void experiment_fit_robot(ExperimentDef *def, const Robot *robot);
 
-/* Every range, and what must fit together across keys. */
+/* Checks every range, and keys that must fit together. */
 MildStatus experiment_check(const ExperimentDef *def, MildError *error);
 
 #endif

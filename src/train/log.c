@@ -45,8 +45,8 @@ static char *header_line(const char *const *columns, int count) {
     return line;
 }
 
-/* Cuts log.csv behind the last whole row that is not after `last`. The first line must be `header`.
- */
+/* Cuts log.csv after the last complete row of an iteration up to `last`. The first line must be
+ * `header`. */
 static MildStatus csv_cut(FILE *csv, const char *path, const char *header, int64_t last,
                           MildError *error) {
     char *line = NULL;

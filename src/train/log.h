@@ -1,4 +1,4 @@
-/* The log of a run folder: one row of named numbers per iteration, as log.csv and as a TensorBoard
+/* The log of a run folder: a row of named numbers for each iteration, in log.csv and in a TensorBoard
  * event file. */
 #ifndef TRAIN_LOG_H
 #define TRAIN_LOG_H
@@ -9,11 +9,11 @@
 
 typedef struct Log Log;
 
-/* columns: [count] names such as "reward/gait"; the part before a slash groups them in TensorBoard.
- * They are not copied and must outlive the log. The CSV has "iteration" in front. resume_after < 0:
- * a new log. Otherwise rows of log.csv after that iteration, written by a run that was killed later
- * than its last checkpoint, are dropped, and TensorBoard is told to drop its own; the columns must
- * be the same. */
+/* columns: [count] names such as "reward/gait"; TensorBoard groups them by the part before the slash.
+ * They are not copied and must outlive the log. The first column of the CSV is "iteration".
+ * resume_after < 0: a new log. Otherwise the log is continued with the same columns. Rows after that
+ * iteration come from a run that was killed after its last checkpoint. They are dropped from log.csv,
+ * and TensorBoard is told to drop its own. */
 Log *log_open(const char *folder, const char *const *columns, int count, int64_t resume_after,
               MildError *error);
 

@@ -18,7 +18,7 @@ struct TrainRun {
     TrainWatch watch;
     Trainer *trainer;
     Log *log;
-    FileLock lock; /* on the folder: two processes would mix two runs */
+    FileLock lock; /* on the folder, so that two processes do not mix two runs */
     char column_text[COLUMNS][48];
     const char *column[COLUMNS];
     double start;  /* [s] of the loop */
@@ -96,8 +96,8 @@ static MildStatus checkpoint_path(const TrainRun *run, int64_t number, char path
     return path_join(run->def.folder, name, path, error);
 }
 
-/* The newest checkpoint below `limit`, or -1; *count counts them all, and is -1 when the folder is
- * there and cannot be read. */
+/* Newest checkpoint below `limit`, or -1. *count is the number of all checkpoints, or -1 when the
+ * folder exists and cannot be read. */
 static int64_t newest_checkpoint(const char *folder, int64_t limit, int64_t *oldest, int *count) {
     int64_t newest = -1;
     *oldest = -1;
@@ -160,8 +160,8 @@ static MildStatus write_config(const TrainRun *run, MildError *error) {
     return status == MILD_OK ? write_text(run, "version.txt", version, error) : status;
 }
 
-/* A checkpoint that does not load (killed machine, broken disk) is passed over for the one before
- * it; one of another config is not: those before it are no better. */
+/* A checkpoint that is damaged (killed machine, broken disk) is passed over for the one before it. One
+ * of another config is an error, because the earlier ones have that config too. */
 static MildStatus resume(TrainRun *run, MildError *error) {
     const char *folder = run->def.folder;
     int64_t oldest, number = newest_checkpoint(folder, INT64_MAX, &oldest, &(int){0});
@@ -187,7 +187,7 @@ static MildStatus resume(TrainRun *run, MildError *error) {
     }
 }
 
-/* A run that was killed while it saved leaves its temporary file. */
+/* A run that was killed while it saved has left a temporary file. */
 static void remove_leftovers(const char *folder) {
     static const char *const ours[] = {"checkpoint_", "policy.safetensors.", "config.ini.",
                                        "version.txt."};
@@ -207,7 +207,8 @@ static void remove_leftovers(const char *folder) {
     }
 }
 
-/* From here on the folder is this run's alone. Another may have begun there since it was checked. */
+/* From here on the folder is this run's alone. Another may have begun there since it was
+ * checked. */
 static MildStatus take_folder(TrainRun *run, MildError *error) {
     const char *folder = run->def.folder;
     char path[PATH_SIZE];

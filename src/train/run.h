@@ -7,14 +7,14 @@
 
 typedef struct {
     const char *folder;
-    int resume; /* bool: go on from the newest checkpoint that loads */
+    int resume; /* bool: continue from the newest checkpoint that loads */
     const ExperimentDef *def;
-    const char *config;  /* text of config.ini: reads back to `def` */
+    const char *config;  /* text of config.ini, which reads back to `def` */
     const char *version; /* of the program */
-    const char *note;    /* what made the policy, one line; goes into the files */
+    const char *note;    /* one line on how the policy was made, saved with it */
 } TrainRunDef;
 
-/* Who watches a run; any function may be NULL. */
+/* Observer of a run. Any function may be NULL. */
 typedef struct {
     void *self;
     void (*resumed)(void *self, const char *checkpoint);
@@ -26,16 +26,16 @@ typedef struct {
 
 typedef struct TrainRun TrainRun;
 
-/* A new run takes a folder without checkpoints, a resumed one a folder with some. */
+/* A new run needs a folder without checkpoints, a resumed one a folder with some. */
 MildStatus train_run_check_folder(const char *folder, int resume, MildError *error);
 
-/* Makes or continues the folder. What `def` and `watch` point to is borrowed. NULL, with the reason
+/* Makes the folder or continues in it. Borrows what `def` and `watch` point to. NULL, with the reason
  * in *error. */
 TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error);
 void train_run_close(TrainRun *run); /* may be NULL */
 int64_t train_run_iteration(const TrainRun *run);
 
-/* Iterates until train.minutes or train.iterations are over or the watcher stops it, and saves. */
+/* Iterates until train.minutes or train.iterations are over or `watch` stops it, then saves. */
 MildStatus train_run_loop(TrainRun *run, MildError *error);
 
 #endif

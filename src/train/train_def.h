@@ -1,4 +1,4 @@
-/* How long and how wide a training run is: section [train] of a config. */
+/* Length and size of a training run: section [train] of a config. */
 #ifndef TRAIN_TRAIN_DEF_H
 #define TRAIN_TRAIN_DEF_H
 
@@ -10,14 +10,14 @@ enum { TRAIN_ROBOT_SIZE = 128 };
 
 typedef struct {
     char robot[TRAIN_ROBOT_SIZE]; /* folder of robots/ by its name, or any folder with a slash */
-    int envs;                     /* robots that walk at the same time */
+    int envs;                     /* robots simulated at the same time */
     int iterations;               /* of PPO; 0: no limit */
     double minutes;               /* [min] wall time of this run; 0: no limit */
     int checkpoint_every;         /* iterations */
-    int keep_checkpoints;         /* the newest so many stay */
+    int keep_checkpoints;         /* how many to keep, the newest ones */
     uint64_t seed;
     int threads;    /* 0: one per core */
-    char device[8]; /* of the networks: cpu, cuda */
+    char device[8]; /* where the networks run: cpu, cuda */
 } TrainDef;
 
 TrainDef train_def_default(void);

@@ -1,5 +1,5 @@
-/* A training run in memory: robots, networks, learner, put together from an experiment. Knows no
- * file but checkpoints. */
+/* A training run in memory: robots, networks and learner of an experiment. The only files that it
+ * knows are checkpoints. */
 #ifndef TRAIN_TRAINER_H
 #define TRAIN_TRAINER_H
 
@@ -33,7 +33,7 @@ Policy *train_policy(Trainer *trainer); /* what gets saved: the averaged weights
 size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */
 int train_threads(const Trainer *trainer);
 
-/* All that resuming needs, in one checksummed file; a resumed run equals one that was never
+/* Saves all that resuming needs in one file with a checksum. A resumed run equals one that was never
  * stopped, bit for bit. */
 MildStatus train_save(Trainer *trainer, const char *path, const char *note, MildError *error);
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error);

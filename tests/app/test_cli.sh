@@ -24,7 +24,7 @@ bad "outside" "$mild" train --out run --ppo.gamma=1.5
 
 # press
 bad "nearest is 'sand_loose'" "$mild" press --ground sand_lose
-bad "which ground" "$mild" press
+bad "--ground NAME is missing" "$mild" press
 bad "rigid" "$mild" press --ground rigid
 bad "nearest is 'ground.k_pen'" "$mild" press --ground sand_loose --ground.k_pem=500
 bad "outside" "$mild" press --ground sand_loose --ground.k_pen=-5
@@ -33,12 +33,12 @@ bad "not a number" "$mild" press --ground sand_loose --speed fast
 bad "neither LENGTH,WIDTH" "$mild" press --ground sand_loose --plate 0.1
 bad "engine's own contact" "$mild" press --ground sand_loose --model rigid
 bad "nearest is 'con_cone'" "$mild" press --ground sand_loose --model con_cnoe
-bad "which one" "$mild" press --ground sand_loose --model con_cone --ground.model=mild
+bad "contradict each other" "$mild" press --ground sand_loose --model con_cone --ground.model=mild
 bad "nearest is 'ecc_spring'" "$mild" eval --ground sand_loose --ground.model=ecc_sprin
-bad "only what falls" "$mild" press --ground sand_loose --mass 5
+bad "applies only to a dropped body" "$mild" press --ground sand_loose --mass 5
 bad "leave out --depth" "$mild" press --ground sand_loose --drop 0.1 --depth 0.02
-bad "no way back" "$mild" press --ground sand_loose --depth 0.02,0.03
-bad "no way down" "$mild" press --ground sand_loose --force 200,100,50
+bad "0.03 after 0.02 is not up" "$mild" press --ground sand_loose --depth 0.02,0.03
+bad "50 after 100 is not down" "$mild" press --ground sand_loose --force 200,100,50
 bad "above 0" "$mild" press --ground sand_loose --depth 0
 bad "leave out --cycles" "$mild" press --ground sand_loose --drag 0.1 --cycles 2
 bad "pushes with" "$mild" press --ground sand_loose --force 1e6
@@ -114,7 +114,7 @@ expect 0 'MuJoCo' "$mild" info build
 expect 0 'processor' "$mild" info devices
 bad "nearest is 'grounds'" "$mild" info ground
 "$mild" info config >complete.ini
-bad "which ground\|unknown\|--out" "$mild" train --config complete.ini # the printed config is read back without complaint
+bad "--out FOLDER is missing" "$mild" train --config complete.ini # the printed config is read back without complaint
 
 # bench
 bad "nearest is 'step'" "$mild" bench stepp

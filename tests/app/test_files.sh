@@ -10,7 +10,7 @@ kept() {
     local file=$1 sum
     shift
     sum=$(cksum <"$file")
-    bad 'written over\|name the same file' timeout 60 "$@"
+    bad 'overwrit\|name the same file' timeout 60 "$@"
     [ "$(cksum <"$file")" = "$sum" ] || fail "$file was written over: $*"
 }
 

@@ -54,7 +54,7 @@ grep -q 'residual .* N, .* % of the force' table.txt || fail "no residual in the
 near "two speeds: c_d" "$(value fit.json c_d)" 17.2 5
 near "two speeds: alpha" "$(value fit.json alpha)" 1.047 5
 grep -q '^nu and alpha: .*cannot tell them apart' table.txt || fail "alpha and nu are not said to be one"
-"$mild" fit sand_loose.csv --plate 0.2,0.1 --fit k_pen,c_d | grep -q '^c_d: .*do not differ in speed' || fail "c_d at one speed"
+"$mild" fit sand_loose.csv --plate 0.2,0.1 --fit k_pen,c_d | grep -q '^c_d: .*all rows have about the same speed' || fail "c_d at one speed"
 
 # presses at constant speed tell c_g c_d only; bodies that brake tell c_g too, if loosely
 for speed in 1 2; do
@@ -81,7 +81,7 @@ fit=("$mild" fit)
 plate=(--plate 0.2,0.1)
 edit() { awk -F, -v OFS=, "$1" sand_loose.csv >bad.csv; }
 refuse 'missing.csv: cannot read.*mild press' "${fit[@]}" missing.csv "${plate[@]}"
-refuse 'which record' "${fit[@]}" "${plate[@]}"
+refuse 'no record given' "${fit[@]}" "${plate[@]}"
 refuse '--plate' "${fit[@]}" sand_loose.csv
 refuse '--plate' "${fit[@]}" sand_loose.csv --plate 0.2
 refuse "unknown parameter 'k_pem'; nearest is 'k_pen'" "${fit[@]}" sand_loose.csv "${plate[@]}" --fit k_pem

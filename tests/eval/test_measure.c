@@ -425,7 +425,7 @@ static void interval_of_the_mean(void **state) {
         assert_close("centre", 0.5 * (row.velocity_high + row.velocity_low), mean, 1e-12);
     }
     print_message("95 %% interval against printed tables: worst %.2f %%\n", 100 * worst);
-    assert_true(worst < 3e-3);
+    assert_true(worst < 3e-4); /* three decimals of the table */
 }
 
 static void the_printed_row(void **state) {

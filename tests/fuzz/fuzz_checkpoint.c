@@ -1,6 +1,8 @@
 /* Any bytes as a checkpoint to resume a tiny training from, with the checksum put right. Refused
  * with a message and nothing changed, or loaded whole and finite. */
 #include "fuzz.h"
+#include "learn/ppo.h"
+#include "learn/ppo_file.h"
 #include "learn/ppo_private.h"
 
 enum { EXTRA = 4, ENVS = 1 };

@@ -3,6 +3,7 @@
  * makes soles of it. The format of model files itself is MuJoCo's. */
 #include "fuzz.h"
 #include "robot/description.h"
+#include "robot/robot.h"
 
 static Robot loaded;    /* the robot as it is, with coarse soles for speed */
 static mjModel *edited; /* a copy of its model */

@@ -9,7 +9,8 @@
 #include <unistd.h>
 
 #include "gpu/learner.h"
-#include "learn/ppo_private.h"
+#include "learn/ppo_gradient.h"
+#include "learn/ppo_returns.h"
 
 #ifdef EMULATED
 extern int emulated_failure;

@@ -7,7 +7,8 @@
 #include <string.h>
 
 #include "learn/noise.h"
-#include "learn/ppo_private.h"
+#include "learn/ppo.h"
+#include "learn/ppo_gradient.h"
 #include "learn/product.h"
 
 enum { STEPS = 70, ENVS = 50, SAMPLES = STEPS * ENVS };

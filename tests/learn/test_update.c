@@ -8,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "learn/ppo_private.h"
+#include "learn/ppo.h"
+#include "learn/ppo_gradient.h"
 
 enum { STEPS = 6, ENVS = 5, SAMPLES = STEPS * ENVS, CALLS = 64 };
 

@@ -1,0 +1,182 @@
+/* The losses of one sample and their gradients, for the processor (loss.c) and the GPU
+ * (kernels.cu). The caller holds the loop over samples, the sums and the weights: a weight is what
+ * a loss counts for in the minibatch, 1 / samples included. Common subset of C17 and CUDA C++. */
+#ifndef MILD_LOSS_SAMPLE_H
+#define MILD_LOSS_SAMPLE_H
+
+#include <math.h>
+
+#include "base/device.h"
+#include "learn/vector.h"
+
+/* The log-variance is used within these bounds, so that no early step can overflow e^logvar. */
+#define LOSS_LOGVAR_MIN (-12.0f)
+#define LOSS_LOGVAR_MAX 6.0f
+
+/* ---- clipped surrogate: -min(r A, clip(r) A), r = exp(log_prob - old_log_prob) ---- */
+
+typedef struct {
+    float loss;
+    float kl;         /* KL(old || new) */
+    float d_log_prob; /* of the loss: -r A where r A is the smaller one, else 0 */
+    int clipped;      /* bool: r is outside its clip range */
+} LossSurrogate;
+
+/* Distance of an action from the mean, in standard deviations. inverse: 1 / std. */
+static inline MILD_HD float loss_standard(float action, float mean, float inverse) {
+    return (action - mean) * inverse;
+}
+
+/* constant [actions + 2]: see loss_surrogate_constants. */
+static inline MILD_HD LossSurrogate loss_surrogate(int actions, const float *constant, float clip,
+                                                   const float *action, const float *mean,
+                                                   const float *old_mean, float old_log_prob,
+                                                   float advantage) {
+    LossSurrogate s;
+    float log_prob = constant[actions];
+    s.kl = constant[actions + 1];
+    for (int j = 0; j < actions; j++) {
+        const float t = loss_standard(action[j], mean[j], constant[j]);
+        const float shift = (old_mean[j] - mean[j]) * constant[j];
+        log_prob -= 0.5f * t * t;
+        s.kl += 0.5f * shift * shift;
+    }
+    const float ratio = expf(log_prob - old_log_prob);
+    const float held = fminf(fmaxf(ratio, 1.0f - clip), 1.0f + clip);
+    const float free_term = ratio * advantage;
+    const float held_term = held * advantage;
+    const int is_free = free_term <= held_term;
+    s.loss = -(is_free || isnan(free_term) ? free_term : held_term); /* NaN must show */
+    s.d_log_prob = is_free ? -free_term : 0.0f;
+    s.clipped = ratio != held;
+    return s;
+}
+
+/* From the gradient by log_prob to those by an action's mean and log std; t = loss_standard. */
+static inline MILD_HD float loss_mean_gradient(float d_log_prob, float t, float inverse) {
+    return d_log_prob * t * inverse;
+}
+
+static inline MILD_HD float loss_log_std_gradient(float d_log_prob, float t) {
+    return d_log_prob * (t * t - 1.0f);
+}
+
+/* ---- mirror: sum over actions of (mean(o) - M_a mean(M_o o))^2 ---- */
+
+/* Returns the sum. The gradient goes through both means, because either may be the better one: adds
+ * to d_mean, overwrites d_image. weight: of the sum's gradient, twice that of the sum. */
+static inline MILD_HD float loss_mirror(int actions, const int *index, const float *sign,
+                                        float weight, const float *mean, const float *image,
+                                        float *d_mean, float *d_image) {
+    float sum = 0.0f;
+    for (int j = 0; j < actions; j++) {
+        d_image[j] = 0.0f;
+    }
+    for (int j = 0; j < actions; j++) {
+        const int k = index[j];
+        const float gap = mean[j] - sign[j] * image[k];
+        sum += gap * gap;
+        d_mean[j] += weight * gap;
+        d_image[k] -= weight * sign[j] * gap;
+    }
+    return sum;
+}
+
+/* ---- regression of the estimates ---- */
+
+/* Mean square of the estimates begin .. end-1; adds to d. weight: twice that of the mean. An empty
+ * group costs nothing. */
+static inline MILD_HD double loss_estimates(int begin, int end, float weight, const float *estimate,
+                                            const float *target, float *d) {
+    if (begin == end) {
+        return 0.0;
+    }
+    const float weight_each = weight / (float)(end - begin);
+    float sum = 0.0f;
+    for (int j = begin; j < end; j++) {
+        const float gap = estimate[j] - target[j];
+        sum += gap * gap;
+        d[j] += weight_each * gap;
+    }
+    return (double)sum / (end - begin);
+}
+
+/* ---- latent: z = mu + spread noise, KL(N(mu, e^logvar) || N(0, 1)) ---- */
+
+static inline MILD_HD float loss_held_logvar(float logvar) {
+    const float held = logvar < LOSS_LOGVAR_MIN ? LOSS_LOGVAR_MIN : logvar;
+    return held > LOSS_LOGVAR_MAX ? LOSS_LOGVAR_MAX : held;
+}
+
+/* Standard deviation of the latent. */
+static inline MILD_HD float loss_spread(float logvar) {
+    return vector_exp(0.5f * loss_held_logvar(logvar));
+}
+
+/* Twice the KL term of one dimension: mu^2 + e^logvar - 1 - logvar. */
+static inline MILD_HD float loss_latent_twice(float mu, float logvar, float spread) {
+    return mu * mu + spread * spread - 1.0f - loss_held_logvar(logvar);
+}
+
+/* d loss / d mu: the decoder's through z, and the KL term's. */
+static inline MILD_HD float loss_mu_gradient(float weight, float mu, float d_z) {
+    return d_z + weight * mu;
+}
+
+/* d loss / d logvar. Outside its bounds the log-variance feels only a gradient that leads back
+ * inside. */
+static inline MILD_HD float loss_logvar_gradient(float weight, float logvar, float spread,
+                                                 float noise, float d_z) {
+    const float d = 0.5f * (d_z * spread * noise + weight * (spread * spread - 1.0f));
+    const float outward = (logvar - loss_held_logvar(logvar)) * d;
+    return outward < 0.0f ? 0.0f : d;
+}
+
+/* ---- modulation ---- */
+
+/* Back through z~ = theta1 mu + theta2. heads and d_heads are [estimates | mu | logvar], d_input is
+ * [estimates | z~]; theta has two numbers, or two for each latent dimension. Overwrites d_heads
+ * (logvar: 0) and d_theta. */
+static inline MILD_HD void loss_modulation(int estimates, int latent, int per_dimension,
+                                           const float *heads, const float *theta,
+                                           const float *d_input, float *d_heads, float *d_theta) {
+    float d_scale = 0.0f;
+    float d_shift = 0.0f;
+    for (int j = 0; j < estimates; j++) {
+        d_heads[j] = d_input[j];
+    }
+    for (int j = 0; j < latent; j++) {
+        const float d = d_input[estimates + j];
+        const float d_times_mu = d * heads[estimates + j];
+        d_heads[estimates + j] = d * theta[per_dimension ? j : 0];
+        d_heads[estimates + latent + j] = 0.0f;
+        if (per_dimension) {
+            d_theta[j] = d_times_mu;
+            d_theta[latent + j] = d;
+        }
+        d_scale += d_times_mu;
+        d_shift += d;
+    }
+    if (!per_dimension) {
+        d_theta[0] = d_scale;
+        d_theta[1] = d_shift;
+    }
+}
+
+/* ---- value: max((V - R)^2, (V_old + clip(V - V_old) - R)^2) ---- */
+
+/* Returns the gap whose square is the loss, and writes half of the gradient. Where the clipped
+ * branch is the larger one, its gradient is that of V inside the clip range and 0 outside. */
+static inline MILD_HD float loss_value(int clip_value, float clip, float value, float old_value,
+                                       float returns, float *half_gradient) {
+    const float gap = value - returns;
+    const float move = value - old_value;
+    const float held_move = move < -clip ? -clip : move > clip ? clip : move;
+    const float held_gap = old_value + held_move - returns;
+    const int held = clip_value && held_gap * held_gap > gap * gap;
+    const float used = held ? held_gap : gap;
+    *half_gradient = held && held_move != move ? 0.0f : used;
+    return used;
+}
+
+#endif

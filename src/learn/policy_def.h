@@ -1,0 +1,33 @@
+/* What a policy is made of: the widths that the task sets, and section [policy] of a config file. */
+#ifndef MILD_POLICY_DEF_H
+#define MILD_POLICY_DEF_H
+
+#include "mild/field.h"
+
+#define POLICY_LAYERS_MAX 4
+
+typedef struct {
+    /* shape of the problem: set by the task, not by the config */
+    char robot[64];           /* name of the robot that it was trained for; empty: not known */
+    int observation;          /* width of one frame, 47 */
+    int frames;               /* frames in the history, newest last: H + 1 = 6 */
+    int critic_input;         /* width of the critic's input */
+    int actions;              /* 12 */
+    int estimates;            /* 11: base velocity 3, feet velocities 6, feet heights 2 */
+    int feet_velocity_offset; /* 3: first of the estimates that drive the modulation */
+    int feet_velocity_count;  /* 6: how many do */
+    /* config, section [policy] */
+    int latent;                            /* 16 */
+    int encoder_hidden[POLICY_LAYERS_MAX]; /* zero-terminated or full: 256 128 */
+    int decoder_hidden[POLICY_LAYERS_MAX]; /* 64 128 */
+    int modulation_hidden;                 /* 32 */
+    int modulation_per_dimension; /* bool: theta1 and theta2 for each latent dimension, not one for all */
+    int actor_hidden[POLICY_LAYERS_MAX];  /* 512 256 128 */
+    int critic_hidden[POLICY_LAYERS_MAX]; /* 768 256 128 */
+    double init_std;                      /* initial standard deviation of the action noise */
+} PolicyDef;
+PolicyDef policy_def_default(void);
+extern const MildField policy_fields[];
+extern const int policy_field_count;
+
+#endif

@@ -1,0 +1,82 @@
+#include "learn/ppo_def.h"
+
+PpoDef ppo_def_default(void) {
+    return (PpoDef){
+        .steps = 24,
+        .epochs = 4,
+        .minibatches = 4,
+        .gamma = 0.994,
+        .lambda = 0.9,
+        .clip = 0.2,
+        .entropy = 0.001,
+        .value_weight = 1.0,
+        .clip_value = 1,
+        .learning_rate = 1e-3,
+        .learning_rate_min = 1e-5,
+        .learning_rate_max = 2e-3,
+        .kl_target = 0.01,
+        .max_gradient_norm = 1.0,
+        .epsilon = 0.3,
+        .decoder_target = PPO_TARGET_NEXT,
+        .kl_weight = 0.001,
+        .mirror_weight = 1.0,
+        .mirror_share = 0.5,
+        .std_min = 0.05,
+        .anneal_factor = 0.1,
+        .std_max = {10.0, 10.0},
+    };
+}
+
+static const char *const target_names[PPO_TARGETS] = {"newest", "next"};
+
+const MildField ppo_fields[] = {
+    MILD_FIELD(PpoDef, steps, MILD_FIELD_INT, 1, 1, 1024, "[-] rollout length per environment"),
+    MILD_FIELD(PpoDef, epochs, MILD_FIELD_INT, 1, 1, 64, "[-] passes over a rollout per update"),
+    MILD_FIELD(PpoDef, minibatches, MILD_FIELD_INT, 1, 1, 1024,
+               "[-] minibatches, and so optimiser steps, per pass"),
+    MILD_FIELD(PpoDef, gamma, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] discount per policy step"),
+    MILD_FIELD(PpoDef, lambda, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] decay of generalised advantage estimation"),
+    MILD_FIELD(PpoDef, clip, MILD_FIELD_DOUBLE, 1, 0.01, 10.0,
+               "[-] clip range of the probability ratio and of the change of the value"),
+    MILD_FIELD(PpoDef, entropy, MILD_FIELD_DOUBLE, 1, 0.0, 1.0, "[-] weight of the entropy bonus"),
+    MILD_FIELD(PpoDef, value_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
+               "[-] weight of the value loss"),
+    MILD_FIELD(PpoDef, clip_value, MILD_FIELD_BOOL, 1, 0, 1, "[-] clip the value loss"),
+    MILD_FIELD(PpoDef, learning_rate, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] learning rate at the start"),
+    MILD_FIELD(PpoDef, learning_rate_min, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] lower bound of the adapted learning rate"),
+    MILD_FIELD(PpoDef, learning_rate_max, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] upper bound of the adapted learning rate"),
+    MILD_FIELD(
+        PpoDef, kl_target, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+        "[nat] KL divergence per update that the learning rate is adapted to; 0: fixed rate"),
+    MILD_FIELD(PpoDef, max_gradient_norm, MILD_FIELD_DOUBLE, 1, 1e-6, 1e6,
+               "[-] a gradient with a larger norm is scaled down to this norm"),
+    MILD_FIELD(PpoDef, epsilon, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] share of the regression losses in the joint loss; the rest is PPO's"),
+    MILD_FIELD_CHOICE(PpoDef, decoder_target, target_names, PPO_TARGETS,
+                      "[-] frame that the decoder reconstructs: the newest or the next one"),
+    MILD_FIELD(PpoDef, kl_weight, MILD_FIELD_DOUBLE, 1, 0.0, 10.0,
+               "[-] weight of the KL divergence between the latent and N(0, I)"),
+    MILD_FIELD(PpoDef, mirror_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
+               "[-] weight of the mirror symmetry loss"),
+    MILD_FIELD(PpoDef, mirror_share, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
+               "[-] share of each minibatch on which the mirror loss is computed"),
+    MILD_FIELD(PpoDef, std_min, MILD_FIELD_DOUBLE, 1, 1e-4, 1.0,
+               "[-] lower bound of the standard deviation of the action noise"),
+    MILD_FIELD(PpoDef, anneal, MILD_FIELD_INT, 2, 0, 1e9,
+               "[-] first and last iteration of the annealing; equal: no annealing"),
+    MILD_FIELD(PpoDef, anneal_factor, MILD_FIELD_DOUBLE, 1, 1e-6, 1.0,
+               "[-] factor on kl_target and learning_rate_max at the end of the annealing"),
+    MILD_FIELD(
+        PpoDef, std_max, MILD_FIELD_DOUBLE, 2, 1e-4, 10.0,
+        "[-] upper bound of the standard deviation of the action noise, before and after the "
+        "annealing"),
+    MILD_FIELD(
+        PpoDef, average, MILD_FIELD_DOUBLE, 1, 0.0, 0.9999,
+        "[-] decay per iteration of the running mean of the weights; the mean is saved as the "
+        "policy; 0: no mean"),
+};
+const int ppo_field_count = (int)(sizeof ppo_fields / sizeof *ppo_fields);

@@ -1,0 +1,53 @@
+/* What a learner is made of: section [ppo] of a config file, and the mirror symmetry of the problem.
+ */
+#ifndef MILD_PPO_DEF_H
+#define MILD_PPO_DEF_H
+
+#include "mild/field.h"
+
+/* Frame that the decoder reconstructs from z and the estimates: the newest frame of the history, or the
+ * next frame. The next frame makes z predict how the ground answers, while the actor sees the newest
+ * one anyway. The last frame of an episode has no successor and is its own target. */
+typedef enum { PPO_TARGET_NEWEST, PPO_TARGET_NEXT, PPO_TARGETS } PpoTarget;
+
+typedef struct {
+    int steps;       /* rollout length per environment, 24 */
+    int epochs;      /* 4 */
+    int minibatches; /* 4 */
+    double gamma;    /* [-] discount per policy step */
+    double lambda;   /* [-] decay of generalised advantage estimation */
+    double clip;     /* [-] of the probability ratio and of the change of the value */
+    double entropy;  /* weight */
+    double value_weight;
+    int clip_value;       /* bool */
+    double learning_rate; /* at the start */
+    double learning_rate_min;
+    double learning_rate_max;
+    double kl_target; /* [nat] 0: fixed learning rate */
+    double max_gradient_norm;
+    double epsilon;     /* 0.3: share of loss_reg in the joint loss (eq 16) */
+    int decoder_target; /* a PpoTarget */
+    double kl_weight;   /* phi of the VAE's KL term */
+    double mirror_weight;
+    double mirror_share;  /* share of each minibatch on which the mirror loss is evaluated */
+    double std_min;       /* lower bound of the action noise */
+    int anneal[2];        /* first and last iteration of the annealing; equal: none */
+    double anneal_factor; /* factor on KL target and greatest rate at its end */
+    double std_max[2];    /* upper bound of the action noise before and after it */
+    double average; /* decay per iteration of the running mean of the weights, which is saved as the
+                       policy; 0: none */
+} PpoDef;
+PpoDef ppo_def_default(void);
+extern const MildField ppo_fields[];
+extern const int ppo_field_count;
+
+/* Mirror symmetry of the problem: o'_i = sign_i * o_perm_i for one frame and for the action. NULL
+ * perm: no mirror loss. */
+typedef struct {
+    const int *observation_index;  /* [observation] */
+    const float *observation_sign; /* [observation] */
+    const int *action_index;       /* [actions] */
+    const float *action_sign;      /* [actions] */
+} PpoMirror;
+
+#endif

@@ -1,0 +1,22 @@
+/* A minibatch's step: gradient of the loss, then the optimiser. */
+#ifndef MILD_PPO_GRADIENT_H
+#define MILD_PPO_GRADIENT_H
+
+#include "learn/ppo_private.h"
+
+/* Gradient of the loss over `count` samples into ppo->gradient (shard 0), its norm, and the sums.
+ * draw: number of the minibatch in this update, which picks the random numbers. */
+void ppo_gradient(Ppo *ppo, const LossContext *context, const int *samples, int count,
+                  uint32_t draw, LossSums *sums, double *norm);
+/* Samples of the minibatch that get a mirror image: how many, and with `which` not NULL their
+ * places in the minibatch. */
+int ppo_mirrored(const Ppo *ppo, int count, int *which);
+/* The sampled z of the minibatch's sample p takes the numbers row[p] * latent .. of this stream:
+ * [count] rows. */
+uint64_t ppo_latent_key(const Ppo *ppo, uint32_t draw);
+void ppo_latent_rows(int count, int *row);
+/* One step of Adam along the gradient times gradient_scale; keeps the action noise above its floor.
+ */
+void ppo_optimise(Ppo *ppo, double gradient_scale);
+
+#endif
