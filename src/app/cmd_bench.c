@@ -6,6 +6,7 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/report.h"
+#include "app/robots.h"
 #include "base/text.h"
 #include "bench/bench.h"
 #include "config/experiment_keys.h"
@@ -86,10 +87,13 @@ static int wanted(const CliArgs *args, const char *name) {
     return args->positional_count == 0;
 }
 
-static MildStatus run_benches(const CliArgs *args, FILE *file, BenchReport *report,
-                              MildError *error) {
+static MildStatus run_benches(const CliArgs *args, const char *robot, FILE *file,
+                              BenchReport *report, MildError *error) {
     ExperimentDef def = experiment_def_default();
     MildStatus status = experiment_read(&def, NULL, args->overrides, args->override_count, error);
+    if (status == MILD_OK && robot) {
+        status = robots_set(&def, robot, error);
+    }
     char machine[256];
     if (status == MILD_OK) {
         fprintf(file, "%s, mild %s\n", build_machine(machine, sizeof machine), build_version());
@@ -109,11 +113,13 @@ static MildStatus run_benches(const CliArgs *args, FILE *file, BenchReport *repo
 }
 
 int cmd_bench(int argc, char **argv) {
-    const char *json = NULL;
+    const char *json = NULL, *robot = NULL;
     const CliOption options[] = {
         {"json", CLI_OUTPUT, &json, 0, 0, "FILE",
          "write {machine, version, rows: [{bench, case, value, unit}]} to FILE; - for standard "
          "output"},
+        {"robot", CLI_TEXT, &robot, 0, 0, "NAME|DIR",
+         ROBOTS_HELP "; walk and solver need sa01, the shipped policy's (default sa01)"},
     };
     CliWord words[BENCHES];
     for (int i = 0; i < BENCHES; i++) {
@@ -128,7 +134,7 @@ int cmd_bench(int argc, char **argv) {
         .words = words,
         .word_count = BENCHES,
         .options = options,
-        .option_count = 1,
+        .option_count = sizeof options / sizeof *options,
         .overrides = "any key of configs/default.ini, e.g. --train.envs=256 --train.threads=1 "
                      "--task.physics_dt=0.001",
         .examples = "  mild bench step\n  mild bench train memory --json bench.json\n",
@@ -146,7 +152,7 @@ int cmd_bench(int argc, char **argv) {
     BenchReport report = {.count = 0};
     MildError error = {0};
     FILE *table = json && strcmp(json, "-") == 0 ? stderr : stdout;
-    MildStatus status = run_benches(&args, table, &report, &error);
+    MildStatus status = run_benches(&args, robot, table, &report, &error);
     if (status == MILD_OK && json) {
         status = save_json(&report, json, &error);
     }

@@ -9,6 +9,7 @@
 #include "app/commands.h"
 #include "app/grounds.h"
 #include "app/report.h"
+#include "app/robots.h"
 #include "base/paths.h"
 #include "config/config.h"
 #include "config/experiment_keys.h"
@@ -18,7 +19,8 @@
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
 
 typedef struct {
-    const char *policy, *config, *model, *json;
+    const char *policy, *config, *model, *json, *robot, *controller;
+    char config_robot[TRAIN_ROBOT_SIZE];
     CliNames grounds;
     CliNumbers speeds;
     double patch;
@@ -59,10 +61,13 @@ static cJSON *row_json(const EvalRow *row) {
     return o;
 }
 
-static MildStatus write_json(const Eval *e, MildError *error) {
+/* Who walked: a policy's file, or a controller that needs none. */
+static MildStatus write_json(const Eval *e, const Robot *robot, MildError *error) {
     cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "policy", e->policy);
-    cJSON_AddStringToObject(root, "robot", "sa01");
+    int learned = strcmp(e->controller, "learned") == 0;
+    cJSON_AddStringToObject(root, learned ? "policy" : "controller",
+                            learned ? e->policy : e->controller);
+    cJSON_AddStringToObject(root, "robot", robot_name(robot));
     cJSON_AddStringToObject(root, "model", mild_model_names[e->finish.model]);
     cJSON_AddStringToObject(root, "version", build_version());
     cJSON *rows = cJSON_AddArrayToObject(root, "rows");
@@ -117,7 +122,7 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
             return status;
         }
     }
-    return e->json ? write_json(e, error) : MILD_OK;
+    return e->json ? write_json(e, robot, error) : MILD_OK;
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an
@@ -135,7 +140,10 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
 
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     MildModel model;
-    MildStatus status = experiment_nominal_task(&e->task, e->config, error);
+    MildStatus status = experiment_nominal_task(&e->task, e->config_robot, e->config, error);
+    if (status == MILD_OK) {
+        status = controller_check(e->controller, error);
+    }
     if (status == MILD_OK) {
         status = grounds_model(e->model, args, &model, error);
     }
@@ -143,7 +151,7 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
         return status;
     }
     Pool *pool = pool_create(e->threads);
-    Robot *robot = pool ? robot_open("sa01", error) : NULL;
+    Robot *robot = pool ? robots_open(e->robot, e->config_robot, error) : NULL;
     Controller controller = {0};
     if (robot) {
         e->finish = grounds_for_robot(model, robot, &e->task, &e->terrain, args);
@@ -152,7 +160,8 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
         status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
     }
     if (status == MILD_OK) {
-        status = controller_learned(e->policy, robot, pool, e->eval.trials, &controller, error);
+        const ControllerDef def = {e->policy, &e->task, robot, pool, e->eval.trials};
+        status = controller_make(e->controller, &def, &controller, error);
     }
     if (status == MILD_OK) {
         status = evaluate(e, robot, pool, &controller, error);
@@ -171,8 +180,9 @@ int cmd_eval(int argc, char **argv) {
         free(args);
         return cli_fail_text("eval", "out of memory");
     }
-    char shipped[PATH_SIZE], model_help[320];
+    char shipped[PATH_SIZE], model_help[320], controller_help[320];
     e->policy = path_data("policies/mild.safetensors", shipped);
+    e->controller = "learned";
     e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
     e->patch = 2.5;
     e->terrain = terrain_def_default();
@@ -184,6 +194,10 @@ int cmd_eval(int argc, char **argv) {
     const CliOption options[] = {
         {"policy", CLI_INPUT, &e->policy, 0, 0, "FILE",
          "policy to measure (default policies/mild.safetensors)"},
+        {"robot", CLI_TEXT, &e->robot, 0, 0, "NAME|DIR",
+         ROBOTS_HELP " (default: the config's, or sa01)"},
+        {"controller", CLI_TEXT, &e->controller, 0, 0, "NAME",
+         robots_controller_help(controller_help, sizeof controller_help)},
         {"config", CLI_INPUT, &e->config, 0, 0, "FILE",
          "config that the policy was trained with, for its section [task]"},
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
@@ -225,7 +239,8 @@ int cmd_eval(int argc, char **argv) {
                      "--terrain.kind=waves --terrain.memory=true",
         .examples =
             "  mild eval --ground rigid,foam45,sand_loose --speed 0.3,0.6\n"
-            "  mild eval --ground sand_loose --terrain.kind=rough --terrain.amplitude=0.02\n",
+            "  mild eval --ground sand_loose --terrain.kind=rough --terrain.amplitude=0.02\n"
+            "  mild eval --robot go1 --controller stand --speed 0\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     int code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;

@@ -8,6 +8,7 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/grounds.h"
+#include "app/robots.h"
 #include "base/text.h"
 #include "config/experiment_keys.h"
 #include "gpu/learner.h"
@@ -172,11 +173,10 @@ static int info_models(void) {
         }
         printf("\n");
     }
-    printf("\ncontact solvers of the soft models (--task.newton)\n"
-           "  newton        solves the step as one small convex problem (default)\n"
-           "  gauss_seidel  sweeps over the elements as in the paper; same answer, for comparison\n"
-           "\nrobots\n"
-           "  sa01    robots/sa01: biped with 12 joints, 33.1 kg (EngineAI SA01)\n");
+    printf(
+        "\ncontact solvers of the soft models (--task.newton)\n"
+        "  newton        solves the step as one small convex problem (default)\n"
+        "  gauss_seidel  sweeps over the elements as in the paper; same answer, for comparison\n");
     return 0;
 }
 
@@ -231,8 +231,8 @@ static const struct {
     const char *help;
 } topics[] = {
     {"grounds", info_grounds, "ground presets; every parameter with its unit, range and source"},
-    {"models", info_models,
-     "ground models with their sources and parameters, contact solvers, robots"},
+    {"models", info_models, "ground models with their sources and parameters, contact solvers"},
+    {"robots", robots_print, "joints, feet, mass, height and source of each robot"},
     {"config", info_config,
      "every config key with its meaning, range and default, as a complete config file"},
     {"build", info_build, "version, compiler and libraries"},
@@ -247,7 +247,7 @@ int cmd_info(int argc, char **argv) {
     }
     const CliCommand command = {
         .name = "info",
-        .usage = "grounds | models | config | build | devices",
+        .usage = "grounds | models | robots | config | build | devices",
         .summary = "Prints what the program offers and what it runs on.",
         .words_title = "topics",
         .words = words,

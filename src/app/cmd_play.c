@@ -11,6 +11,7 @@
 #include "app/grounds.h"
 #include "app/play.h"
 #include "app/progress.h"
+#include "app/robots.h"
 #include "base/file.h"
 #include "config/config.h"
 #include "config/experiment_keys.h"
@@ -22,7 +23,8 @@
 #define COURSE_LEAST 12.0 /* [s] */
 
 typedef struct {
-    const char *policy, *config, *model, *video, *pressure;
+    const char *policy, *config, *model, *video, *pressure, *robot, *controller;
+    char config_robot[TRAIN_ROBOT_SIZE];
     CliNames grounds;
     double patch;
     int width, height;
@@ -213,7 +215,8 @@ static MildStatus prepare(Command *c, MildError *error) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--pressure: rigid ground has no elements, choose a soft one");
     }
-    status = controller_learned(c->policy, play->robot, NULL, 1, play->controller, error);
+    const ControllerDef def = {c->policy, &c->task, play->robot, NULL, 1};
+    status = controller_make(c->controller, &def, play->controller, error);
     if (status == MILD_OK && c->video) {
         status = make_place(c->video, error);
     }
@@ -237,7 +240,10 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     Play *play = &c->play;
     Controller controller = {0};
     MildModel model;
-    MildStatus status = experiment_nominal_task(&c->task, c->config, error);
+    MildStatus status = experiment_nominal_task(&c->task, c->config_robot, c->config, error);
+    if (status == MILD_OK) {
+        status = controller_check(c->controller, error);
+    }
     if (status == MILD_OK) {
         status = grounds_model(c->model, args, &model, error);
     }
@@ -248,7 +254,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
         double course = c->grounds.count * c->patch / fmax(fabs(play->speed), 0.1) + COURSE_EXTRA;
         play->seconds = fmax(course, COURSE_LEAST);
     }
-    Robot *robot = robot_open("sa01", error);
+    Robot *robot = robots_open(c->robot, c->config_robot, error);
     if (!robot) {
         return error->status;
     }
@@ -275,10 +281,14 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
 }
 
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
-    char model_help[320];
+    char model_help[320], controller_help[320];
     const CliOption options[] = {
         {"policy", CLI_INPUT, &c->policy, 0, 0, "FILE",
          "policy to watch (default policies/mild.safetensors)"},
+        {"robot", CLI_TEXT, &c->robot, 0, 0, "NAME|DIR",
+         ROBOTS_HELP " (default: the config's, or sa01)"},
+        {"controller", CLI_TEXT, &c->controller, 0, 0, "NAME",
+         robots_controller_help(controller_help, sizeof controller_help)},
         {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]",
          "ground, or several that are crossed in order (default sand_loose)"},
         {"model", CLI_TEXT, &c->model, 0, 0, "NAME",
@@ -337,6 +347,7 @@ int cmd_play(int argc, char **argv) {
     if (c && args) {
         char shipped[PATH_SIZE];
         c->policy = path_data("policies/mild.safetensors", shipped);
+        c->controller = "learned";
         c->patch = 2;
         c->terrain = terrain_def_default();
         c->width = 960, c->height = 540;

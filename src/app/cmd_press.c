@@ -7,6 +7,7 @@
 #include "app/commands.h"
 #include "app/figure.h"
 #include "app/grounds.h"
+#include "app/robots.h"
 #include "base/file.h"
 #include "base/text.h"
 #include "lab/press.h"
@@ -14,7 +15,7 @@
 
 /* NaN: the option was not given. */
 typedef struct {
-    const char *ground, *model, *plate, *csv, *figure;
+    const char *robot, *ground, *model, *plate, *csv, *figure;
     CliNumbers depth, force; /* the turns */
     double speed, tilt_deg, drag, drag_speed, drop, impact, mass, seconds, step;
     int cycles;
@@ -22,6 +23,7 @@ typedef struct {
 
 /* The sole to press with. `robot` owns it when it is the robot's. */
 typedef struct {
+    const char *robot_name; /* of --robot, or NULL */
     Robot *robot;
     MildSole *plate, *concentric;
     const MildSole *raster, *sole; /* sole: what the model presses with */
@@ -36,7 +38,7 @@ static void tool_close(Tool *tool) {
 
 static MildStatus tool_open_robot(Tool *tool, MildError *error) {
     if (!tool->robot) {
-        tool->robot = robot_open("sa01", error);
+        tool->robot = robots_open(tool->robot_name, "sa01", error);
     }
     return tool->robot ? MILD_OK : error->status;
 }
@@ -355,6 +357,8 @@ static int options_read(int argc, char **argv, PressOptions *options, CliArgs *a
          grounds_model_help(model_help, sizeof model_help)},
         {"plate", CLI_TEXT, &options->plate, 0, 0, "L,W|sole",
          "[m] length and width of a plate, or `sole` for the robot's sole (default 0.2,0.1)"},
+        {"robot", CLI_TEXT, &options->robot, 0, 0, "NAME|DIR",
+         ROBOTS_HELP "; its sole, and the weight that models are matched under (default sa01)"},
         {"tilt", CLI_NUMBER, &options->tilt_deg, -45, 45, "DEG",
          "[deg] tilt, positive when the front edge is lower (default 0)"},
         {"depth", CLI_NUMBERS, &options->depth, 0, 1, "D[,BACK,...]",
@@ -515,7 +519,7 @@ int cmd_press(int argc, char **argv) {
     }
     MildError error;
     MildModel model;
-    Tool tool = {0};
+    Tool tool = {.robot_name = options.robot};
     MildStatus status = options_check(&options, &error);
     if (status != MILD_OK) {
         return cli_fail("press", &error);
@@ -526,6 +530,9 @@ int cmd_press(int argc, char **argv) {
     status = grounds_find(options.ground, &def.material, NULL, &error);
     if (status == MILD_OK) {
         status = grounds_model(options.model, &args, &model, &error);
+    }
+    if (status == MILD_OK) {
+        status = options.robot ? tool_open_robot(&tool, &error) : MILD_OK;
     }
     if (status == MILD_OK) {
         status = tool_open(&tool, options.plate, &error);

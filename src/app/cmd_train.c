@@ -7,12 +7,13 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/progress.h"
+#include "app/robots.h"
 #include "base/file.h"
 #include "config/experiment_keys.h"
 #include "train/run.h"
 
 typedef struct {
-    const char *config, *out;
+    const char *config, *out, *robot;
     int resume;
     ExperimentDef def;
     char *config_text;
@@ -28,6 +29,9 @@ static void write_note(Command *run, const CliArgs *args) {
         run->config
             ? snprintf(run->note, sizeof run->note, "mild train --config %s", run->config)
             : snprintf(run->note, sizeof run->note, "mild train --config %s/%s.ini", folder, name);
+    if (run->robot && used < size) {
+        used += snprintf(run->note + used, (size_t)(size - used), " --robot %s", run->robot);
+    }
     for (int i = 0; i < args->override_count && used < size; i++) {
         used += snprintf(run->note + used, (size_t)(size - used), " --%s", args->overrides[i]);
     }
@@ -62,7 +66,9 @@ static MildStatus read_config(Command *run, const CliArgs *args, MildError *erro
         config = path;
     }
     run->def = experiment_def_default();
-    return experiment_read(&run->def, config, args->overrides, args->override_count, error);
+    MildStatus status =
+        experiment_read(&run->def, config, args->overrides, args->override_count, error);
+    return status == MILD_OK && run->robot ? robots_set(&run->def, run->robot, error) : status;
 }
 
 static MildStatus make_config_text(Command *run, MildError *error) {
@@ -173,6 +179,8 @@ int cmd_train(int argc, char **argv) {
          "config file; it needs only the keys that differ from configs/default.ini"},
         {"out", CLI_TEXT, &run->out, 0, 0, "FOLDER",
          "run folder, for config, log, checkpoints and policy.safetensors"},
+        {"robot", CLI_TEXT, &run->robot, 0, 0, "NAME|DIR",
+         ROBOTS_HELP "; sets train.robot (default: the config's, or sa01)"},
         {"resume", CLI_FLAG, &run->resume, 0, 0, NULL,
          "continue from the newest checkpoint of the run folder, with its config.ini unless "
          "--config is given"},
@@ -186,7 +194,8 @@ int cmd_train(int argc, char **argv) {
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .overrides = "any key of configs/default.ini, e.g. --train.minutes=5 --task.vx=0,0.8",
-        .examples = "  mild train --config configs/quick.ini --out runs/quick --train.minutes=5\n",
+        .examples = "  mild train --config configs/quick.ini --out runs/quick --train.minutes=5\n"
+                    "  mild train --robot go1 --out runs/go1\n",
     };
     MildError error = {0};
     int code = 0;

@@ -196,7 +196,7 @@ static MildStatus ground_model(MildModel model, Robot *robot, double dt, BenchRe
 }
 
 MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError *error) {
-    Robot *robot = bench_robot(error);
+    Robot *robot = bench_robot(def, error);
     if (!robot) {
         return MILD_ERROR_IO;
     }

@@ -10,8 +10,8 @@
 static const double walk_speed = 0.6,
                     walk_settle = 1.0; /* [m/s] commanded, [s] before the record begins */
 
-Robot *bench_robot(MildError *error) {
-    return robot_open("sa01", error);
+Robot *bench_robot(const ExperimentDef *def, MildError *error) {
+    return robot_open(def->train.robot, error);
 }
 
 /* A robot that walks. */

@@ -1,14 +1,14 @@
-/* The shipped robot, and a record of it walking under the shipped policy. */
+/* The robot of train.robot, and a record of it walking under the shipped policy. */
 #ifndef BENCH_RECORD_H
 #define BENCH_RECORD_H
 
 #include "bench/replay.h"
 #include "train/experiment.h"
 
-/* The shipped robot; NULL, with the reason in *error. */
-Robot *bench_robot(MildError *error);
+/* NULL, with the reason in *error. */
+Robot *bench_robot(const ExperimentDef *def, MildError *error);
 /* Records the shipped policy at 0.6 m/s on a ground (scene.h); replay_destroy it. NULL when it
- * falls, too. */
+ * falls or is a policy of another robot. */
 Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
                           int periods, MildError *error);
 

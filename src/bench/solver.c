@@ -318,7 +318,7 @@ static void solver_rows(SolverBench *bench, const char *set, BenchReport *report
 
 MildStatus bench_solver(const ExperimentDef *def, BenchReport *report, MildError *error) {
     enum { RANDOM = 250, STANDING = 50, WALKING = 100 };
-    Robot *robot = bench_robot(error);
+    Robot *robot = bench_robot(def, error);
     if (!robot) {
         return MILD_ERROR_IO;
     }

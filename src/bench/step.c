@@ -215,7 +215,7 @@ MildStatus robot_bench_step(const Robot *robot, const char *preset, double dt, i
 
 MildStatus bench_step(const ExperimentDef *def, BenchReport *report, MildError *error) {
     enum { REPEATS = 15, STEPS = 1000 };
-    Robot *robot = bench_robot(error);
+    Robot *robot = bench_robot(def, error);
     if (!robot) {
         return MILD_ERROR_IO;
     }

@@ -26,7 +26,7 @@ MildStatus bench_walk(const ExperimentDef *def, BenchReport *report, MildError *
     enum { PERIODS = 300, REPEATS = 15 };
     static const char *const grounds[] = {"sand_loose", "foam45", "grass", "rigid"};
     const ReplayStop loose = {def->task.contact_tolerance, def->task.contact_iterations};
-    Robot *robot = bench_robot(error);
+    Robot *robot = bench_robot(def, error);
     MildStatus status = robot ? MILD_OK : MILD_ERROR_IO;
     for (size_t g = 0; g < sizeof grounds / sizeof *grounds && status == MILD_OK; g++) {
         ReplayTimes times;

@@ -1,5 +1,7 @@
 #include "config/experiment_keys.h"
 
+#include <string.h>
+
 #include "base/paths.h"
 
 ConfigSection terrain_section(TerrainDef *def) {
@@ -42,10 +44,12 @@ MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *
     return status;
 }
 
-MildStatus experiment_nominal_task(TaskDef *task, const char *config, MildError *error) {
+MildStatus experiment_nominal_task(TaskDef *task, char robot[TRAIN_ROBOT_SIZE], const char *config,
+                                   MildError *error) {
     ExperimentDef def = experiment_def_default();
     MildStatus status = config ? experiment_read(&def, config, NULL, 0, error) : MILD_OK;
     *task = def.task;
+    memcpy(robot, def.train.robot, sizeof def.train.robot);
     task_def_make_nominal(task);
     return status;
 }

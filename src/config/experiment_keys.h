@@ -20,8 +20,9 @@ ConfigSection ground_section(MildMaterial *material);
 MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides,
                            int override_count, MildError *error);
 
-/* The nominal task for evaluation and play, from the config that the policy was trained with (NULL:
- * the defaults). */
-MildStatus experiment_nominal_task(TaskDef *task, const char *config, MildError *error);
+/* The nominal task for evaluation and play and the robot, from the config that the policy was
+ * trained with (NULL: the defaults). */
+MildStatus experiment_nominal_task(TaskDef *task, char robot[TRAIN_ROBOT_SIZE], const char *config,
+                                   MildError *error);
 
 #endif

@@ -1,5 +1,5 @@
-/* Who moves the robots. A controller is one file that fills this contract; evaluation and play know
- * nothing else. */
+/* Who moves the robots. A controller is one row of CONTROLLER_LIST and one file that fills this
+ * contract; evaluation and play know nothing else. */
 #ifndef MILD_CONTROLLER_H
 #define MILD_CONTROLLER_H
 
@@ -14,8 +14,38 @@ typedef struct {
     void (*destroy)(void *self);
 } Controller;
 
+/* Name and summary; the file defines controller_make_NAME. */
+#define CONTROLLER_LIST(X)                                                                         \
+    X(learned, "the policy of --policy")                                                           \
+    X(stand, "stands still and balances, whatever the command; gains stand_kp of robot.ini")       \
+    X(zero, "no action: the joints hold the default pose")
+
+/* What a controller may need; borrowed, and must outlive it. */
+typedef struct {
+    const char *policy; /* file, for `learned` */
+    const TaskDef *task;
+    const Robot *robot;
+    Pool *pool;   /* may be NULL */
+    int rows_max; /* environments of one call, at most */
+} ControllerDef;
+
+#define CONTROLLER_MAKE(name, summary)                                                             \
+    MildStatus controller_make_##name(const ControllerDef *def, Controller *controller,            \
+                                      MildError *error);
+CONTROLLER_LIST(CONTROLLER_MAKE)
+#undef CONTROLLER_MAKE
+
+int controller_count(void);
+const char *controller_name(int index); /* index < controller_count() */
+const char *controller_summary(int index);
+/* Fails with the nearest name when there is none of this name. */
+MildStatus controller_check(const char *name, MildError *error);
+/* *controller is the caller's to destroy. */
+MildStatus controller_make(const char *name, const ControllerDef *def, Controller *controller,
+                           MildError *error);
+
 /* The paper's controller: a trained policy file, deterministic (z = mu, mean action). pool may be
- * NULL. Fails when the file does not hold a policy of this task's shape. */
+ * NULL. Fails when the file holds a policy of another robot or of another shape. */
 MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
                               Controller *controller, MildError *error);
 void controller_destroy(Controller *controller);

@@ -36,13 +36,21 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
         return error ? error->status : MILD_ERROR_FORMAT;
     }
     const PolicyDef *def = policy_def(policy);
-    if (def->observation != shape.observation || def->frames != TASK_FRAMES ||
-        def->actions != shape.actions) {
+    if (def->robot[0] && strcmp(def->robot, robot_name(robot)) != 0) {
         mild_fail(error, MILD_ERROR_FORMAT,
-                  "%s: a policy for %d observations x %d frames and %d actions; robot %s needs %d "
-                  "x %d and %d",
-                  path, def->observation, def->frames, def->actions, robot_name(robot),
-                  shape.observation, TASK_FRAMES, shape.actions);
+                  "%s: a policy of robot %s, not of %s; give --robot %s or another --policy", path,
+                  def->robot, robot_name(robot), def->robot);
+        policy_destroy(policy);
+        return MILD_ERROR_FORMAT;
+    }
+    if (def->observation != shape.observation || def->frames != TASK_FRAMES ||
+        def->actions != shape.actions || def->estimates != shape.estimates) {
+        mild_fail(
+            error, MILD_ERROR_FORMAT,
+            "%s: a policy for %d observations x %d frames and %d actions, %d estimates; robot "
+            "%s needs %d x %d and %d, %d",
+            path, def->observation, def->frames, def->actions, def->estimates, robot_name(robot),
+            shape.observation, TASK_FRAMES, shape.actions, shape.estimates);
         policy_destroy(policy);
         return MILD_ERROR_FORMAT;
     }
@@ -59,9 +67,7 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
     return MILD_OK;
 }
 
-void controller_destroy(Controller *controller) {
-    if (controller->self) {
-        controller->destroy(controller->self);
-        controller->self = NULL;
-    }
+MildStatus controller_make_learned(const ControllerDef *def, Controller *controller,
+                                   MildError *error) {
+    return controller_learned(def->policy, def->robot, def->pool, def->rows_max, controller, error);
 }

@@ -141,6 +141,16 @@ void stand_torque(const Stand *stand, const RobotSim *sim, int balance, double *
     pd(stand->robot, q, qd, offset, stand->torque, torque);
 }
 
+void stand_target(const Stand *stand, const RobotSim *sim, double *target) {
+    const double *pose = robot_default_pose(stand->robot), *kp = robot_stand_kp(stand->robot);
+    double offset[ROBOT_JOINTS_MAX] = {0};
+    lean_ankles(stand, offset);
+    answer_tilt(stand, sim, offset);
+    for (int i = 0; i < robot_joints(stand->robot); i++) {
+        target[i] = pose[i] + offset[i] + (kp[i] > 0.0 ? stand->torque[i] / kp[i] : 0.0);
+    }
+}
+
 RobotState stand_state(const Stand *stand, int balance, double sinkage) {
     const Robot *robot = stand->robot;
     RobotState state = {.qpos = {0, 0, robot_stand_height(robot) - sinkage, 1, 0, 0, 0}};

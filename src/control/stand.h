@@ -21,6 +21,10 @@ void stand_torque(const Stand *stand, const RobotSim *sim, int balance, double *
 /* The same without the answer to the tilt, from the joints' positions and velocities alone. */
 void stand_pd(const Stand *stand, int balance, const double *q, const double *qd, double *torque);
 
+/* [rad] Joint targets [robot_joints] whose PD with these gains is the balanced torque, efforts
+ * aside. */
+void stand_target(const Stand *stand, const RobotSim *sim, double *target);
+
 /* The robot at rest in that pose, soles `sinkage` [m] below z = 0. */
 RobotState stand_state(const Stand *stand, int balance, double sinkage);
 

@@ -83,27 +83,35 @@ const char *mild_material_preset_name(int index) {
     return index >= 0 && index < PRESETS ? presets[index].name : NULL;
 }
 
-int mild_material_preset(const char *name, MildMaterial *material) {
-    for (int m = 0; m < MILD_MODEL_RIGID; m++) {
-        const ModelRow *row = model_row(m);
-        if (row->preset && row->preset(name, material)) {
-            return 1;
-        }
-    }
+/* Preset of mild by name, or NULL. */
+static const MildMaterial *find_preset(const char *name) {
     for (int i = 0; i < PRESETS; i++) {
-        if (strcmp(presets[i].name, name) != 0) {
-            continue;
+        if (strcmp(presets[i].name, name) == 0) {
+            return &presets[i].material;
         }
-        *material = presets[i].material;
-        return 1;
     }
-    return 0;
+    return NULL;
 }
 
 MildMaterial mild_material_default(void) {
-    MildMaterial material = {0};
-    mild_material_preset("sand_loose", &material);
-    return material;
+    return *find_preset("sand_loose");
+}
+
+int mild_material_preset(const char *name, MildMaterial *material) {
+    const MildMaterial *preset = find_preset(name);
+    if (preset) {
+        *material = *preset;
+        return 1;
+    }
+    for (int m = 0; m < MILD_MODEL_RIGID; m++) {
+        const ModelRow *row = model_row(m);
+        MildMaterial found = mild_material_default();
+        if (row->preset && row->preset(name, &found)) {
+            *material = found;
+            return 1;
+        }
+    }
+    return 0;
 }
 
 /* Names of the models that a material can have, separated by commas. */

@@ -38,7 +38,6 @@ static int bekker_preset(const char *name, MildMaterial *material) {
         if (strcmp(soil->name, name) != 0) {
             continue;
         }
-        *material = mild_material_default();
         material->model = MILD_MODEL_BEKKER;
         material->exponent = soil->exponent;
         material->k_c = soil->k_c;

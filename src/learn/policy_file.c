@@ -54,6 +54,11 @@ void policy_file_tensors(const Network *network, const float *parameters, Policy
     strcpy(tensors->name[tensors->count - 1], "log_std");
 }
 
+/* Optional: files from before it was written have none. */
+static const MildField robot_field =
+    MILD_FIELD(PolicyDef, robot, MILD_FIELD_TEXT, (int)sizeof((PolicyDef *)NULL)->robot, 0, 0,
+               "[text] robot that the policy was trained for");
+
 static void add_text(PolicyTexts *texts, const char *key, const char *value) {
     texts->text[texts->count++] = (SafetensorsText){key, value};
 }
@@ -64,6 +69,9 @@ void policy_file_texts(const Network *network, const char *kind, const char *not
     add_text(texts, "kind", kind);
     add_text(texts, "version", POLICY_FILE_VERSION);
     add_text(texts, "note", note ? note : "");
+    if (network->def.robot[0]) {
+        add_text(texts, "robot", network->def.robot);
+    }
     for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
         const int at = texts->count;
         snprintf(texts->key[at], sizeof texts->key[at], "policy.%s", file_field(f)->name);
@@ -99,6 +107,11 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
             version);
     }
     *def = policy_def_default();
+    const char *robot = safetensors_text(file, "robot");
+    if (robot && mild_field_parse(&robot_field, def, robot, "policy", error) != MILD_OK) {
+        return mild_fail(error, MILD_ERROR_FORMAT, "%s: its metadata key 'robot' is too long",
+                         path);
+    }
     for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
         const MildField *field = file_field(f);
         char key[48];

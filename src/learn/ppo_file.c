@@ -80,7 +80,7 @@ static MildStatus check_same_network(const Safetensors *file, const char *path,
     policy_file_texts(network, POLICY_CHECKPOINT_KIND, "", &ours);
     for (int i = 0; i < ours.count; i++) {
         const char *key = ours.text[i].key, *theirs = safetensors_text(file, key);
-        if (strcmp(key, "note") != 0 && strcmp(key, "policy.init_std") != 0 &&
+        if (theirs && strcmp(key, "note") != 0 && strcmp(key, "policy.init_std") != 0 &&
             strcmp(ours.text[i].value, theirs) != 0) {
             return mild_fail(
                 error, MILD_ERROR_ARGUMENT,

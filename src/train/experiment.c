@@ -1,5 +1,6 @@
 #include "train/experiment.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "task/task.h"
@@ -17,11 +18,14 @@ ExperimentDef experiment_def_default(void) {
 
 void experiment_fit_robot(ExperimentDef *def, const Robot *robot) {
     TaskShape shape = task_shape(robot);
+    snprintf(def->policy.robot, sizeof def->policy.robot, "%s", robot_name(robot));
     def->policy.observation = shape.observation;
     def->policy.frames = TASK_FRAMES;
     def->policy.critic_input = shape.critic;
     def->policy.actions = shape.actions;
     def->policy.estimates = shape.estimates;
+    def->policy.feet_velocity_offset = 3; /* behind the base's velocity */
+    def->policy.feet_velocity_count = 3 * shape.feet;
 }
 
 MildStatus experiment_check(const ExperimentDef *def, MildError *error) {

@@ -1,7 +1,8 @@
 #include "train/train_def.h"
 
 TrainDef train_def_default(void) {
-    return (TrainDef){.envs = 1024,
+    return (TrainDef){.robot = "sa01",
+                      .envs = 1024,
                       .iterations = 0,
                       .minutes = 60,
                       .checkpoint_every = 50,
@@ -13,6 +14,8 @@ TrainDef train_def_default(void) {
 
 #define FIELD(member, type, min, max, help) MILD_FIELD(TrainDef, member, type, 1, min, max, help)
 const MildField train_fields[] = {
+    MILD_FIELD(TrainDef, robot, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->robot, 0, 0,
+               "[-] name of a folder under robots/, or a folder of your own, with a slash"),
     FIELD(envs, MILD_FIELD_INT, 1, 65536, "[-] robots that are simulated at the same time"),
     FIELD(iterations, MILD_FIELD_INT, 0, 1e9, "[-] iterations of PPO; 0: no limit"),
     FIELD(minutes, MILD_FIELD_DOUBLE, 0, 1e6, "[min] wall time of the run; 0: no limit"),

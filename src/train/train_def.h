@@ -6,12 +6,15 @@
 
 #include "mild/field.h"
 
+enum { TRAIN_ROBOT_SIZE = 128 };
+
 typedef struct {
-    int envs;             /* robots simulated at the same time */
-    int iterations;       /* of PPO; 0: no limit */
-    double minutes;       /* [min] wall time of this run; 0: no limit */
-    int checkpoint_every; /* iterations */
-    int keep_checkpoints; /* how many to keep, the newest ones */
+    char robot[TRAIN_ROBOT_SIZE]; /* folder of robots/ by its name, or any folder with a slash */
+    int envs;                     /* robots simulated at the same time */
+    int iterations;               /* of PPO; 0: no limit */
+    double minutes;               /* [min] wall time of this run; 0: no limit */
+    int checkpoint_every;         /* iterations */
+    int keep_checkpoints;         /* how many to keep, the newest ones */
     uint64_t seed;
     int threads;    /* 0: one per core */
     char device[8]; /* where the networks run: cpu, cuda */

@@ -44,8 +44,10 @@ static VecView view_of(const PpoBatch *batch, int t, const ExperimentDef *def) {
 
 static int build(Trainer *trainer, MildError *error) {
     const ExperimentDef *def = &trainer->def;
-    trainer->robot = robot_open("sa01", error);
+    MildError cause = {0};
+    trainer->robot = robot_open(def->train.robot, &cause);
     if (!trainer->robot) {
+        mild_fail(error, cause.status, "train.robot: %s", cause.text);
         return 0;
     }
     experiment_fit_robot(&trainer->def, trainer->robot);

@@ -92,6 +92,30 @@ awk "BEGIN { exit !($(peak --depth 0.005 --terrain.kind=slope --terrain.slope=0.
 expect 0 'sand_dense' "$mild" info grounds
 expect 0 'k_pen .*\[N/m\]' "$mild" info grounds
 expect 0 'newton' "$mild" info models
+
+# robots and controllers
+expect 0 'go1: 12 joints, 4 feet, 12.7 kg' "$mild" info robots
+expect 0 'sa01: 12 joints, 2 feet, 33.1 kg' "$mild" info robots
+bad "unknown robot 'go2'; nearest is 'go1'" "$mild" eval --robot go2
+bad "unknown robot 'go2'; nearest is 'go1'" "$mild" play --robot go2
+bad "unknown robot 'go2'; nearest is 'go1'" "$mild" press --ground sand_loose --robot go2
+bad "unknown robot 'go2'; nearest is 'go1'" "$mild" bench step --robot go2
+bad "unknown robot 'go2'; nearest is 'go1'" "$mild" train --robot go2 --out run
+bad "no blanks around it" "$mild" train --robot ' ./x' --out run
+bad "too long" "$mild" train --robot "./$(printf '%600s' | tr ' ' x)" --out run
+[ ! -e run ] || fail "a refused robot left a folder"
+bad "./nowhere/robot.ini" "$mild" eval --robot ./nowhere
+bad "robot go1 needs 47 x 6 and 12, 19" "$mild" eval --robot go1
+bad "unknown controller 'stnad'; nearest is 'stand'" "$mild" eval --controller stnad
+bad "unknown controller 'stnad'; nearest is 'stand'" "$mild" play --controller stnad
+expect 0 'foam45 .* 2/2' "$mild" eval --robot go1 --controller stand --ground foam45 --speed 0 --trials 2 --seconds 3 \
+    --json go1.json
+grep -q '"controller":.*"stand"' go1.json && grep -q '"robot":.*"go1"' go1.json || fail "go1.json: $(cat go1.json)"
+expect 0 '' "$mild" train --robot go1 --out go1 --train.envs=4 --train.iterations=1 --ppo.steps=4 --ppo.minibatches=1
+grep -qx 'robot = go1' go1/config.ini || fail "config.ini does not keep the robot"
+bad "of robot go1, not of sa01" "$mild" eval --policy go1/policy.safetensors --trials 1 --seconds 0.1
+expect 0 '' "$mild" eval --config go1/config.ini --policy go1/policy.safetensors --trials 1 --seconds 0.1 --ground foam45
+bad "its robot is 'go1', this run's is 'sa01'" "$mild" train --resume --robot sa01 --out go1 --train.iterations=2
 expect 0 'MuJoCo' "$mild" info build
 expect 0 'processor' "$mild" info devices
 bad "nearest is 'grounds'" "$mild" info ground

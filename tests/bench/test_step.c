@@ -15,7 +15,8 @@ static void test_bench(void **unused) {
     (void)unused;
     RobotBench bench = {0};
     MildError error = {0};
-    Robot *robot = bench_robot(&error);
+    const ExperimentDef def = experiment_def_default();
+    Robot *robot = bench_robot(&def, &error);
     assert_non_null(robot);
     assert_int_equal(robot_bench_step(robot, "foam60", 0.0025, 3, 20, &bench, &error), MILD_OK);
     assert_true(bench.engine_free > 0 && bench.engine_rigid > 0 && bench.rigid > 0 &&

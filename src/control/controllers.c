@@ -1,0 +1,54 @@
+/* The controllers by name. */
+#include <string.h>
+
+#include "base/text.h"
+#include "control/controller.h"
+
+#define ROW(name, summary) {#name, summary, controller_make_##name},
+static const struct {
+    const char *name, *summary;
+    MildStatus (*make)(const ControllerDef *def, Controller *controller, MildError *error);
+} controllers[] = {CONTROLLER_LIST(ROW)};
+#undef ROW
+enum { CONTROLLERS = sizeof controllers / sizeof *controllers };
+
+int controller_count(void) {
+    return CONTROLLERS;
+}
+
+const char *controller_name(int index) {
+    return controllers[index].name;
+}
+
+const char *controller_summary(int index) {
+    return controllers[index].summary;
+}
+
+MildStatus controller_check(const char *name, MildError *error) {
+    const char *names[CONTROLLERS];
+    for (int i = 0; i < CONTROLLERS; i++) {
+        names[i] = controllers[i].name;
+        if (strcmp(name, names[i]) == 0) {
+            return MILD_OK;
+        }
+    }
+    return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown controller '%.60s'; nearest is '%s'",
+                     name, text_nearest(name, names, CONTROLLERS));
+}
+
+MildStatus controller_make(const char *name, const ControllerDef *def, Controller *controller,
+                           MildError *error) {
+    for (int i = 0; i < CONTROLLERS; i++) {
+        if (strcmp(name, controllers[i].name) == 0) {
+            return controllers[i].make(def, controller, error);
+        }
+    }
+    return controller_check(name, error);
+}
+
+void controller_destroy(Controller *controller) {
+    if (controller->self) {
+        controller->destroy(controller->self);
+        controller->self = NULL;
+    }
+}

@@ -1,0 +1,173 @@
+/* The table of controllers, and those that need no policy, on the biped and on the quadruped. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "control/controller.h"
+#include "control/stand.h"
+
+/* A robot in an environment of its own, on loose sand. */
+typedef struct {
+    Robot *robot;
+    TaskDef def;
+    TaskEnv *env;
+    RobotSim *sim;
+    Controller controller;
+} Scene;
+
+static void scene_open(Scene *scene, const char *robot, const char *controller) {
+    MildError error = {0};
+    memset(scene, 0, sizeof *scene);
+    scene->robot = robot_open(robot, &error);
+    if (!scene->robot) {
+        fail_msg("%s", error.text);
+    }
+    scene->def = task_def_default();
+    task_def_make_nominal(&scene->def);
+    scene->def.randomize.latency[0] = scene->def.randomize.latency[1] = 0;
+    scene->def.randomize.initial_joint = scene->def.randomize.initial_velocity = 0;
+    scene->sim = robot_sim_create(scene->robot, scene->def.physics_dt, &error);
+    scene->env = aligned_alloc(64, task_env_bytes(&scene->def, scene->robot));
+    assert_non_null(scene->sim);
+    assert_non_null(scene->env);
+    const ControllerDef def = {NULL, &scene->def, scene->robot, NULL, 1};
+    assert_int_equal(controller_make(controller, &def, &scene->controller, &error), MILD_OK);
+    assert_string_equal(scene->controller.name, controller);
+    MildMaterial sand = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&sand);
+    TaskView none = {0};
+    task_env_init(scene->env, &scene->def, scene->robot, 1, 0);
+    scene->env->command_frozen = 1;
+    memset(scene->env->command, 0, sizeof scene->env->command);
+    task_env_reset_on(scene->env, &scene->def, scene->robot, scene->sim, &terrain, 0, &none);
+}
+
+static void scene_close(Scene *scene) {
+    controller_destroy(&scene->controller);
+    assert_null(scene->controller.self);
+    robot_sim_destroy(scene->sim);
+    free(scene->env);
+    robot_destroy(scene->robot);
+}
+
+static void names(void **unused) {
+    (void)unused;
+    static const char *const wanted[] = {"learned", "stand", "zero"};
+    assert_int_equal(controller_count(), 3);
+    for (int i = 0; i < 3; i++) {
+        MildError error = {0};
+        assert_string_equal(controller_name(i), wanted[i]);
+        assert_true(strlen(controller_summary(i)) > 5);
+        assert_int_equal(controller_check(wanted[i], &error), MILD_OK);
+    }
+    MildError error = {0};
+    const ControllerDef def = {0};
+    Controller controller = {0};
+    assert_int_equal(controller_check("stnad", &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "unknown controller 'stnad'; nearest is 'stand'"));
+    assert_int_equal(controller_make("zeros", &def, &controller, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "nearest is 'zero'"));
+    assert_null(controller.self);
+}
+
+/* No action, for every row and no further. */
+static void zero_does_nothing(void **unused) {
+    (void)unused;
+    Scene scene;
+    scene_open(&scene, "go1", "zero");
+    float actions[2 * 12 + 1];
+    for (int i = 0; i < 25; i++) {
+        actions[i] = 7;
+    }
+    TaskEnv *envs[2] = {scene.env, scene.env};
+    scene.controller.act(scene.controller.self, 2, envs, actions);
+    for (int i = 0; i < 24; i++) {
+        assert_true(actions[i] == 0);
+    }
+    assert_true(actions[24] == 7);
+    scene_close(&scene);
+}
+
+/* The joints' PD on the actions of `stand` is the balanced stand's torque. */
+static void stand_acts_as_the_stand(void **unused) {
+    (void)unused;
+    static const char *const robots[] = {"sa01", "go1"};
+    for (int r = 0; r < 2; r++) {
+        Scene scene;
+        MildError error = {0};
+        float action[ROBOT_JOINTS_MAX];
+        double wanted[ROBOT_JOINTS_MAX], worst = 0, largest = 0;
+        scene_open(&scene, robots[r], "stand");
+        int joints = robot_joints(scene.robot);
+        for (int i = 0; i < joints; i++) {
+            scene.env->robot.qpos[7 + i] += 0.01 * (i - 5);
+            scene.env->robot.qvel[6 + i] = 0.05 * (i - 3);
+        }
+        scene.env->robot.qvel[0] = 0.1;
+        scene.env->robot.qvel[1] = -0.1;
+        Stand *stand = stand_create(scene.robot, &error);
+        robot_sim_load(scene.sim, &scene.env->robot, &scene.env->variation);
+        stand_torque(stand, scene.sim, 1, wanted);
+        scene.controller.act(scene.controller.self, 1, &scene.env, action);
+        for (int i = 0; i < joints; i++) {
+            double target = robot_default_pose(scene.robot)[i] +
+                            robot_action_scale(scene.robot) * (double)action[i];
+            double torque = scene.env->kp[i] * (target - scene.env->robot.qpos[7 + i]) -
+                            scene.env->kd[i] * scene.env->robot.qvel[6 + i];
+            double effort = robot_effort(scene.robot)[i];
+            torque = fmax(-effort, fmin(effort, torque));
+            worst = fmax(worst, fabs(torque - wanted[i]));
+            largest = fmax(largest, fabs(wanted[i]));
+        }
+        print_message("%s: torques off by %.1e of %.1f N m\n", robots[r], worst, largest);
+        assert_true(worst < 1e-4 && largest > 1); /* actions are floats */
+        stand_destroy(stand);
+        scene_close(&scene);
+    }
+}
+
+/* Five seconds through the whole environment. */
+static void stand_stands(void **unused) {
+    (void)unused;
+    static const char *const robots[] = {"sa01", "go1"};
+    for (int r = 0; r < 2; r++) {
+        Scene scene;
+        TaskView none = {0};
+        float action[ROBOT_JOINTS_MAX];
+        scene_open(&scene, robots[r], "stand");
+        for (int t = 0; t < 500; t++) {
+            scene.controller.act(scene.controller.self, 1, &scene.env, action);
+            TaskStep step = task_env_step(scene.env, &scene.def, scene.robot, scene.sim, action, 0,
+                                          &none, NULL);
+            if (step.done) {
+                fail_msg("%s fell after %.2f s", robots[r], TASK_PERIOD * t);
+            }
+        }
+        double load = 0;
+        for (int f = 0; f < robot_feet(scene.robot); f++) {
+            load += robot_sim_foot(scene.sim, f)->force[2] /
+                    (robot_feet(scene.robot) * robot_foot_load(scene.robot));
+        }
+        print_message("%s: load %.4f of the weight, upright %.6f\n", robots[r], load,
+                      robot_sim_base_rotation(scene.sim)[8]);
+        assert_true(fabs(load - 1) < 0.02);
+        assert_true(robot_sim_base_rotation(scene.sim)[8] > 0.99);
+        scene_close(&scene);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(names),
+        cmocka_unit_test(zero_does_nothing),
+        cmocka_unit_test(stand_acts_as_the_stand),
+        cmocka_unit_test(stand_stands),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,396 @@
+/* The quadruped robots/go1: its geometry by hand, four round feet, and the stand controller on every
+ * ground. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <mujoco/mujoco.h>
+
+#include "base/random.h"
+#include "control/stand.h"
+#include "mild/map.h"
+
+#define GO1 MILD_SOURCE_DIR "/robots/go1"
+#define HIP_OFFSET 0.04675                           /* [m] hip roll axis from the middle plane */
+#define ROLL_OFFSET 0.08                             /* [m] thigh from the hip roll axis */
+#define LEG 0.213                                    /* [m] thigh, and knee to the foot's centre */
+#define FOOT_RADIUS 0.023                            /* [m] */
+#define MASS (5.204 + 4 * (0.68 + 1.009 + 0.195862)) /* [kg] trunk, four hips, thighs, calves */
+#define WEIGHT (9.81 * MASS)                         /* [N] */
+
+enum { FEET = 4, JOINTS = 12, NV = 18, FL = 0, FR = 1, RL = 2, RR = 3 };
+
+static Robot *robot;
+static Stand *stand;
+
+static int setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    robot = robot_create(GO1, &error);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
+    stand = stand_create(robot, &error);
+    assert_non_null(stand);
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    stand_destroy(stand);
+    robot_destroy(robot);
+    return 0;
+}
+
+static RobotSim *new_sim(double dt) {
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, dt, &error);
+    assert_non_null(sim);
+    return sim;
+}
+
+static MildGround *new_ground(void) {
+    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
+    assert_non_null(block);
+    return mild_ground_init(block, robot_soles(robot), FEET);
+}
+
+static void expect_near(const char *what, double got, double wanted, double tolerance) {
+    if (!(fabs(got - wanted) <= tolerance)) {
+        fail_msg("%s: %.10g, not %.10g +- %.1e", what, got, wanted, tolerance);
+    }
+}
+
+/* ---- the folder ---- */
+
+/* Where the feet are in the default pose: hip roll a = -0.1 (left), thigh 0.9, knee -1.8. */
+static void the_pose_by_hand(void **unused) {
+    (void)unused;
+    const double a = 0.1, length = 2 * LEG * cos(0.9);
+    const double height = length * cos(a) + ROLL_OFFSET * sin(a) + FOOT_RADIUS;
+    const double y = HIP_OFFSET + ROLL_OFFSET * cos(a) - length * sin(a), x = 0.1881;
+    const double side[FEET] = {1, -1, 1, -1}, front[FEET] = {1, 1, -1, -1};
+    assert_int_equal(robot_joints(robot), JOINTS);
+    assert_int_equal(robot_feet(robot), FEET);
+    expect_near("mass", robot_total_mass(robot), MASS, 1e-9);
+    expect_near("load of a foot", robot_foot_load(robot), WEIGHT / FEET, 1e-6);
+    expect_near("height", robot_stand_height(robot), height, 1e-9);
+    RobotSim *sim = new_sim(0.001);
+    RobotState state = stand_state(stand, 0, 0.0);
+    RobotVariation nominal = robot_variation_nominal();
+    robot_sim_load(sim, &state, &nominal);
+    for (int f = 0; f < FEET; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        expect_near("foot's x", foot->position[0], front[f] * x, 1e-9);
+        expect_near("foot's y", foot->position[1], side[f] * y, 1e-9);
+        expect_near("foot's z", foot->position[2], 0, 1e-9);
+    }
+    expect_near("feet apart", robot_sim_foot_distance(sim), 2 * y, 1e-9);
+    /* the knees' spheres are the lowest shells */
+    const double knee = LEG * cos(0.9) * cos(a) + ROLL_OFFSET * sin(a) + 0.02;
+    MildMaterial any = mild_material_default();
+    MildTerrain level = mild_terrain_uniform(&any);
+    expect_near("clearance", robot_sim_body_clearance(sim, &level), height - knee, 1e-9);
+    robot_sim_destroy(sim);
+}
+
+static void efforts_speeds_and_gait(void **unused) {
+    (void)unused;
+    for (int i = 0; i < JOINTS; i++) {
+        int knee = i % 3 == 2;
+        expect_near("effort", robot_effort(robot)[i], knee ? 35.55 : 23.7, 1e-9);
+        expect_near("speed", robot_speed(robot)[i], knee ? 20.06 : 30.1, 1e-9);
+        assert_int_equal(robot_joint_foot(robot)[i], i / 3);
+    }
+    /* a trot: diagonal feet together, mirrored feet alternate */
+    assert_true(robot_gait_offset(robot, FL) == robot_gait_offset(robot, RR));
+    assert_true(robot_gait_offset(robot, FR) == robot_gait_offset(robot, RL));
+    expect_near("shift", fabs(robot_gait_offset(robot, FL) - robot_gait_offset(robot, FR)), 0.5, 0);
+    assert_int_equal(robot_mirror_foot(robot, FL), FR);
+    assert_int_equal(robot_mirror_foot(robot, RR), RL);
+}
+
+/* A folder with `from` written as `to` in robot.ini. */
+static Robot *changed_robot(const char *from, const char *to, MildError *error) {
+    static char text[16384];
+    char folder[] = "robot_changed_XXXXXX", ini[64], model[64];
+    FILE *file = fopen(GO1 "/robot.ini", "rb");
+    assert_non_null(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    fclose(file);
+    const char *at = strstr(text, from);
+    assert_non_null(at);
+    assert_non_null(mkdtemp(folder));
+    snprintf(ini, sizeof ini, "%s/robot.ini", folder);
+    snprintf(model, sizeof model, "%s/go1.xml", folder);
+    file = fopen(ini, "wb");
+    assert_non_null(file);
+    fprintf(file, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
+    fclose(file);
+    assert_int_equal(symlink(GO1 "/go1.xml", model), 0);
+    Robot *made = robot_create(folder, error);
+    remove(ini);
+    remove(model);
+    rmdir(folder);
+    return made;
+}
+
+static void what_may_be_left_out(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    Robot *changed = changed_robot("stand_kp    =", "# a remark\n; stand_kp    =", &error);
+    if (!changed) {
+        fail_msg("%s", error.text);
+    }
+    for (int i = 0; i < JOINTS; i++) {
+        expect_near("stand_kp without a list", robot_stand_kp(changed)[i], robot_kp(robot)[i], 0);
+        expect_near("stand_kd", robot_stand_kd(changed)[i], robot_stand_kd(robot)[i], 0);
+    }
+    robot_destroy(changed);
+    changed = changed_robot("height = 0.28            ;", "height = 0.28            #", &error);
+    if (!changed) {
+        fail_msg("%s", error.text);
+    }
+    expect_near("height", robot_nominal_height(changed), 0.28, 0);
+    robot_destroy(changed);
+    static const struct {
+        const char *from, *to, *said;
+    } refused[] = {{"center = 0 0 -0.213", "", "[foot.FL] center: a round foot needs it"},
+                   {"radius = 0.023", "", "[foot.FL] radius: a round foot needs it"},
+                   {"shape = round", "shape = round\nz = -0.2", "[foot.FL] z: only a flat sole"},
+                   {"shape = round", "shape = ball", "foot.FL"},
+                   {"body = FR_calf", "body = FL_calf", "are on the same body"},
+                   {"offset = 0\n", "", "[foot.FL] offset: is missing"}};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        assert_null(changed_robot(refused[i].from, refused[i].to, &error));
+        print_message("%s\n", error.text);
+        assert_non_null(strstr(error.text, refused[i].said));
+    }
+}
+
+/* ---- round feet ---- */
+
+/* Turned, bent and in motion. */
+static RobotState moving_state(uint32_t draw) {
+    Random r = random_at(5, draw, 0);
+    RobotState state = stand_state(stand, 0, 0.0);
+    double turn[4] = {1, random_uniform(&r, -0.15, 0.15), random_uniform(&r, -0.15, 0.15),
+                      random_uniform(&r, -1, 1)};
+    mju_normalize4(turn);
+    memcpy(state.qpos + 3, turn, sizeof turn);
+    for (int i = 0; i < JOINTS; i++) {
+        state.qpos[7 + i] += random_uniform(&r, -0.2, 0.2);
+    }
+    for (int i = 0; i < NV; i++) {
+        state.qvel[i] = random_uniform(&r, -0.5, 0.5);
+    }
+    return state;
+}
+
+/* The lowest point of the sphere, and its Jacobian as a point of the calf: the engine's own. */
+static void lowest_point(RobotSim *sim, int foot, double point[3], double jacobian[3 * NV]) {
+    const mjModel *m = robot_sim_model(sim);
+    const mjData *d = robot_sim_data(sim);
+    static const char *const calves[FEET] = {"FL_calf", "FR_calf", "RL_calf", "RR_calf"};
+    int body = mj_name2id(m, mjOBJ_BODY, calves[foot]);
+    const double *turn = d->xmat + 9 * body;
+    for (int k = 0; k < 3; k++) {
+        point[k] = d->xpos[3 * body + k] - LEG * turn[3 * k + 2];
+    }
+    point[2] -= FOOT_RADIUS;
+    mj_jac(m, d, jacobian, NULL, point, body);
+}
+
+/* Place and speed of the foot, and after a step: acceleration = M^-1 (tau - b + J^T F), with no
+ * moment. */
+static void a_round_foot_is_a_point(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.0005);
+    MildGround *ground = new_ground();
+    MildMaterial sand = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&sand);
+    MildMapDef rough = mild_map_def_default(); /* the disc is not loaded evenly */
+    MildError error = {0};
+    rough.kind = MILD_MAP_ROUGH;
+    MildMap *map = mild_map_create(&rough, &error);
+    assert_non_null(map);
+    assert_int_equal(mild_terrain_set_map(&terrain, map, &error), MILD_OK);
+    RobotVariation nominal = robot_variation_nominal();
+    double worst_place = 0, worst_speed = 0, worst_step = 0, largest = 0;
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        RobotState state = moving_state(draw);
+        double torque[JOINTS], jacobian[FEET][3 * NV], force[NV] = {0}, rate[NV];
+        robot_sim_load(sim, &state, &nominal);
+        for (int f = 0; f < FEET; f++) {
+            const RobotFoot *foot = robot_sim_foot(sim, f);
+            double point[3], speed[3];
+            lowest_point(sim, f, point, jacobian[f]);
+            mju_mulMatVec(speed, jacobian[f], state.qvel, 3, NV);
+            for (int k = 0; k < 3; k++) {
+                worst_place = fmax(worst_place, fabs(point[k] - foot->position[k]));
+                worst_speed = fmax(worst_speed, fabs(speed[k] - foot->velocity[k]));
+                worst_speed = fmax(worst_speed, fabs(foot->velocity[3 + k]));
+            }
+        }
+        const mjModel *m = robot_sim_model(sim);
+        mjData *d = mj_makeData(m);
+        robot_engine_qpos(robot, state.qpos, d->qpos);
+        memcpy(d->qvel, state.qvel, sizeof state.qvel[0] * NV);
+        mj_fwdPosition(m, d);
+        mj_fwdVelocity(m, d);
+        stand_torque(stand, sim, 0, torque);
+        mild_ground_reset(ground);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        for (int k = 0; k < NV; k++) {
+            force[k] = (k >= 6 ? torque[k - 6] : 0) - d->qfrc_bias[k];
+        }
+        for (int f = 0; f < FEET; f++) {
+            const RobotFoot *foot = robot_sim_foot(sim, f);
+            double pulled[NV];
+            mju_mulMatTVec(pulled, jacobian[f], foot->force, 3, NV);
+            mju_addTo(force, pulled, NV);
+            largest = fmax(largest, foot->force[2]);
+            for (int k = 0; k < 3; k++) {
+                assert_true(foot->torque[k] == 0);
+            }
+        }
+        mj_solveM(m, d, rate, force, 1);
+        for (int k = 0; k < NV; k++) {
+            double change = (robot_sim_qvel(sim)[k] - state.qvel[k]) / robot_sim_dt(sim);
+            worst_step = fmax(worst_step, fabs(change - rate[k]));
+        }
+        mj_deleteData(d);
+    }
+    print_message("lowest points off by %.1e m, %.1e m/s; accelerations by %.1e under %.0f N\n",
+                  worst_place, worst_speed, worst_step, largest);
+    assert_true(worst_place < 1e-12 && worst_speed < 1e-12 && worst_step < 1e-8);
+    assert_true(largest > 5);
+    mild_map_destroy(map);
+    free(ground);
+    robot_sim_destroy(sim);
+}
+
+/* ---- standing ---- */
+
+typedef struct {
+    int stands;
+    double height; /* [m] of the base at the end, above z = 0 */
+    double load;   /* [-] of the weight, mean over the last second */
+    double share;  /* [-] least load of a foot over a quarter of the weight, then too */
+    double depth;  /* [m] mean of the feet, then too */
+    double rest;   /* [m] mean over the feet of a disc's sinkage under the foot's load */
+    double moved;  /* [m] the base during the push */
+    double tilt;   /* [rad] at the end */
+    double speed;  /* [m/s, rad/s] of the base at the end, the largest component */
+} Standing;
+
+static double tilt_of(const RobotSim *sim) {
+    return acos(fmin(1.0, robot_sim_base_rotation(sim)[8]));
+}
+
+static void weigh(const RobotSim *sim, const MildMaterial *material, int steps, Standing *result,
+                  double loads[FEET]) {
+    for (int f = 0; f < FEET; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        result->load += foot->force[2] / WEIGHT / steps;
+        result->depth += material ? foot->result.depth_mean / FEET / steps : 0;
+        loads[f] += foot->force[2] / steps;
+    }
+}
+
+/* Four seconds; a push [N] for 0.1 s after the first. material: NULL for rigid ground. */
+static Standing stand_and_push(const MildMaterial *material, double dt, const double push[6]) {
+    RobotSim *sim = new_sim(dt);
+    MildGround *ground = new_ground();
+    MildMaterial any = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
+    RobotVariation variation = robot_variation_nominal();
+    variation.rigid = material == NULL;
+    double depth = material ? mild_sole_sinkage(robot_soles(robot)[0], material, WEIGHT / FEET) : 0;
+    RobotState state = stand_state(stand, 1, depth);
+    robot_sim_load(sim, &state, &variation);
+    Standing result = {.stands = 1, .share = 1e9};
+    double loads[FEET] = {0}, start[2] = {0};
+    int second = (int)(1.0 / dt + 0.5);
+    for (int i = 0; i < 4 * second && result.stands; i++) {
+        double torque[JOINTS];
+        const double *at = robot_sim_qpos(sim);
+        stand_torque(stand, sim, 1, torque);
+        int pushed = i >= second && i < second + second / 10;
+        if (i == second) {
+            memcpy(start, at, sizeof start);
+        }
+        if (pushed) {
+            result.moved = hypot(at[0] - start[0], at[1] - start[1]);
+        }
+        int bad = robot_sim_step(sim, torque, pushed ? push : NULL, &terrain, ground);
+        result.stands = !bad && tilt_of(sim) < 0.5 && robot_sim_body_clearance(sim, &terrain) > 0;
+        if (i >= 3 * second) {
+            weigh(sim, material, second, &result, loads);
+        }
+    }
+    for (int f = 0; f < FEET; f++) {
+        result.share = fmin(result.share, loads[f] / (WEIGHT / FEET));
+        result.rest +=
+            material ? mild_sole_sinkage(robot_soles(robot)[f], material, loads[f]) / FEET : 0;
+    }
+    for (int k = 0; k < 6; k++) {
+        result.speed = fmax(result.speed, fabs(robot_sim_qvel(sim)[k]));
+    }
+    result.tilt = tilt_of(sim);
+    result.height = robot_sim_qpos(sim)[2];
+    free(ground);
+    robot_sim_destroy(sim);
+    return result;
+}
+
+static void check(const char *name, const MildMaterial *material, double dt, const double push[6]) {
+    Standing r = stand_and_push(material, dt, push);
+    print_message("%-11s %.1f ms push %3.0f %3.0f N %s load %.5f, least foot %.2f, depth %5.1f of "
+                  "%5.1f mm, moved %4.1f mm, tilt %.4f rad, still %.4f\n",
+                  name, 1e3 * dt, push[0], push[1], r.stands ? "stands" : "FELL  ", r.load, r.share,
+                  1e3 * r.depth, 1e3 * r.rest, 1e3 * r.moved, r.tilt, r.speed);
+    assert_true(r.stands);
+    expect_near("load", r.load, 1, 0.01);
+    assert_true(r.share > 0.5);
+    assert_true(r.tilt < 0.1);
+    assert_true(r.speed < 0.3); /* still swaying after the push */
+    expect_near("height", r.height + r.depth, robot_stand_height(robot), 0.01);
+    if (push[0] != 0 || push[1] != 0) {
+        assert_true(r.moved > 2e-3);
+    } else if (material) {
+        assert_true(fabs(r.depth - r.rest) < 0.15 * r.rest);
+    }
+}
+
+static void stands_and_is_pushed_everywhere(void **unused) {
+    (void)unused;
+    static const double pushes[3][6] = {{0}, {40, 0}, {0, 25}};
+    for (int p = 0; p < 3; p++) {
+        check("rigid", NULL, 0.001, pushes[p]);
+        for (int g = 0; g < mild_material_preset_count(); g++) {
+            MildMaterial material;
+            assert_true(mild_material_preset(mild_material_preset_name(g), &material));
+            check(mild_material_preset_name(g), &material, p == 0 ? 0.0025 : 0.001, pushes[p]);
+        }
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_pose_by_hand),
+        cmocka_unit_test(efforts_speeds_and_gait),
+        cmocka_unit_test(what_may_be_left_out),
+        cmocka_unit_test(a_round_foot_is_a_point),
+        cmocka_unit_test(stands_and_is_pushed_everywhere),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,134 @@
+/* Training robots other than the default: train.robot chooses, the policy remembers. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "control/controller.h"
+#include "train/trainer.h"
+
+#define POLICY "build_test_robot.safetensors"
+#define CHECKPOINT "build_test_robot_checkpoint.safetensors"
+
+static ExperimentDef small_def(const char *robot) {
+    ExperimentDef def = experiment_def_default();
+    strcpy(def.train.robot, robot);
+    def.train.envs = 8;
+    def.train.threads = 2;
+    def.ppo.steps = 8;
+    return def;
+}
+
+static Trainer *trainer_of(const char *robot) {
+    MildError error = {0};
+    const ExperimentDef def = small_def(robot);
+    Trainer *trainer = train_create(&def, &error);
+    if (!trainer) {
+        fail_msg("%s", error.text);
+    }
+    return trainer;
+}
+
+/* Two iterations of the quadruped: every loss finite, the weights moved. */
+static void a_quadruped_trains(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    Trainer *trainer = trainer_of("go1");
+    assert_string_equal(policy_def(train_policy(trainer))->robot, "go1");
+    assert_int_equal(policy_def(train_policy(trainer))->feet_velocity_count, 3 * 4);
+    assert_int_equal(policy_def(train_policy(trainer))->estimates, 3 + 4 * 4);
+    const float before = policy_parameters(train_policy(trainer))[0];
+    for (int i = 0; i < 2; i++) {
+        TrainReport report;
+        assert_int_equal(train_iterate(trainer, &report, &error), MILD_OK);
+        const double losses[] = {
+            report.ppo.surrogate,        report.ppo.value_loss,         report.ppo.entropy,
+            report.ppo.mirror,           report.ppo.vae_reconstruction, report.ppo.vae_kl,
+            report.ppo.estimate_loss[0], report.ppo.estimate_loss[1],   report.ppo.estimate_loss[2],
+            report.reward_per_step};
+        for (size_t k = 0; k < sizeof losses / sizeof *losses; k++) {
+            print_message("%s%.3g", k ? " " : "losses ", losses[k]);
+            assert_true(isfinite(losses[k]));
+        }
+        print_message("\n");
+        assert_true(report.ppo.value_loss > 0 && report.ppo.vae_reconstruction > 0);
+        assert_true(report.ppo.skipped == 0 && report.episodes.diverged == 0);
+    }
+    assert_true(policy_parameters(train_policy(trainer))[0] != before);
+    train_destroy(trainer);
+}
+
+/* A policy and a checkpoint of one robot are refused on another, in one line with both names. */
+static void another_robots_policy_is_refused(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    Trainer *go1 = trainer_of("go1"), *sa01 = trainer_of("sa01");
+    Robot *robot[2] = {robot_open("go1", &error), robot_open("sa01", &error)};
+    Controller controller = {0};
+    assert_int_equal(policy_save(train_policy(go1), POLICY, "test", &error), MILD_OK);
+    assert_int_equal(controller_learned(POLICY, robot[0], NULL, 1, &controller, &error), MILD_OK);
+    controller_destroy(&controller);
+    assert_int_equal(controller_learned(POLICY, robot[1], NULL, 1, &controller, &error),
+                     MILD_ERROR_FORMAT);
+    print_message("%s\n", error.text);
+    assert_non_null(strstr(error.text, "of robot go1, not of sa01"));
+    assert_null(strchr(error.text, '\n'));
+    assert_null(controller.self);
+    assert_int_equal(train_save(go1, CHECKPOINT, "test", &error), MILD_OK);
+    assert_int_equal(train_load(go1, CHECKPOINT, &error), MILD_OK);
+    assert_int_equal(train_load(sa01, CHECKPOINT, &error), MILD_ERROR_ARGUMENT);
+    print_message("%s\n", error.text);
+    assert_non_null(strstr(error.text, "its robot is 'go1', this run's is 'sa01'"));
+    unlink(POLICY);
+    unlink(CHECKPOINT);
+    robot_destroy(robot[0]);
+    robot_destroy(robot[1]);
+    train_destroy(go1);
+    train_destroy(sa01);
+}
+
+/* Files from before policies named their robot are those of any robot of their shape. */
+static void a_policy_without_a_name_loads(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    Robot *go1 = robot_open("go1", &error), *sa01 = robot_open("sa01", &error);
+    ExperimentDef def = small_def("sa01");
+    experiment_fit_robot(&def, sa01);
+    def.policy.robot[0] = '\0';
+    Policy *policy = policy_create(&def.policy, 1, &error);
+    assert_int_equal(policy_save(policy, POLICY, "old", &error), MILD_OK);
+    Controller controller = {0};
+    assert_int_equal(controller_learned(POLICY, sa01, NULL, 1, &controller, &error), MILD_OK);
+    controller_destroy(&controller);
+    assert_int_equal(controller_learned(POLICY, go1, NULL, 1, &controller, &error),
+                     MILD_ERROR_FORMAT);
+    assert_non_null(strstr(error.text, "11 estimates; robot go1 needs"));
+    unlink(POLICY);
+    policy_destroy(policy);
+    robot_destroy(go1);
+    robot_destroy(sa01);
+}
+
+static void an_unknown_robot_is_named(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    const ExperimentDef def = small_def("sa02");
+    assert_null(train_create(&def, &error));
+    assert_non_null(strstr(error.text, "train.robot: unknown robot 'sa02'; nearest is 'sa01'"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_quadruped_trains),
+        cmocka_unit_test(another_robots_policy_is_refused),
+        cmocka_unit_test(a_policy_without_a_name_loads),
+        cmocka_unit_test(an_unknown_robot_is_named),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
