@@ -28,8 +28,8 @@ typedef struct {
     void (*direction)(const struct FootScratch *foot, const MildTerrain *terrain, int model,
                       double dt, const double *rotation, const Motion *now);
 
-    /* The material of that name, one of info.presets, into *material; false when the name is
-     * unknown. NULL: the model has no materials of its own. */
+    /* Turns *material, the default on entry, into the preset of that name, one of info.presets;
+     * false when the name is unknown. NULL: the model has none. */
     int (*preset)(const char *name, MildMaterial *material);
 } ModelRow;
 
