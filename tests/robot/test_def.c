@@ -358,6 +358,8 @@ static void test_feet_refused(void **state) {
     refuse("outline = 0 0 1 0 1 2", "outline = 0 0 1 0 1 y",
            "[foot.l] outline: 'y' is not a number");
     refuse("corners = 1 2 3 4 5 6", "corners = 1 2 3 4 5", "[foot.l] corners: needs x y z of at");
+    refuse("corners = 1 2 3 4 5 6", "corners = ,", "[foot.l] corners: needs x y z of at least");
+    refuse("outline = 0 0 1 0 1 2", "outline = ,", "[foot.l] outline: needs x y of at least");
     refuse("corners = 1 2 3 4 5 6", "corners = 1 2", "[foot.l] corners: needs x y z of at least");
     refuse("corners = 1 2 3 4 5 6", "corners = 1 2 z", "[foot.l] corners: 'z' is not a number");
     accept(edit("corners = 1 2 3 4 5 6", "corners = 1 2 3"));

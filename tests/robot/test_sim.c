@@ -308,6 +308,38 @@ static void test_soft_step_in_the_air(void **unused) {
     robot_sim_destroy(sim);
 }
 
+/* A step moves the ground's memory on, once, with its own input and result: so a second foot fall
+ * finds the imprint of the first. */
+static void test_step_moves_the_ground(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.0025);
+    RobotVariation nominal = robot_variation_nominal();
+    MildTerrain terrain = preset_terrain("sand_loose");
+    MildGround *ground = new_ground(), *other = new_ground(), *virgin = new_ground();
+    size_t bytes = mild_ground_size(ground);
+    RobotState state = draw_state(2, 1, 0.05);
+    double torque[SA01_JOINTS] = {0};
+    robot_sim_load(sim, &state, &nominal);
+    state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) + 0.005;
+    memset(state.qvel, 0, sizeof state.qvel);
+    state.qvel[2] = -0.3;
+    robot_sim_load(sim, &state, &nominal);
+    for (int i = 0; i < 10; i++) {
+        memcpy(other, ground, bytes);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        mild_ground_advance(other, &terrain, robot_sim_contact_input(sim), robot_sim_scratch(sim),
+                            robot_sim_contact(sim));
+        assert_memory_equal(other, ground, bytes);
+        assert_memory_not_equal(virgin, ground, bytes);
+    }
+    assert_true(robot_sim_contact(sim)->foot[0].force[2] > 1 ||
+                robot_sim_contact(sim)->foot[1].force[2] > 1);
+    free(ground);
+    free(other);
+    free(virgin);
+    robot_sim_destroy(sim);
+}
+
 /* Speeds up to 1000 are numbers, beyond they went bad. */
 static void test_fastest(void **unused) {
     (void)unused;
@@ -584,6 +616,7 @@ int main(void) {
         cmocka_unit_test(test_time_steps),
         cmocka_unit_test(test_load_and_store),
         cmocka_unit_test(test_fastest),
+        cmocka_unit_test(test_step_moves_the_ground),
         cmocka_unit_test(test_phases),
         cmocka_unit_test(test_feet),
         cmocka_unit_test(test_feet_after_a_step),

@@ -44,7 +44,9 @@ static const char mjcf[] =
     "</body></body></body>\n"
     "<body name='head' pos='0 0 0.5'><joint name='neck' axis='1 0 0'/>\n"
     "<geom type='sphere' size='0.1' mass='2'/></body></body></worldbody>\n"
-    "<actuator><motor joint='waist'/></actuator></mujoco>\n";
+    "<actuator><motor joint='waist'/></actuator>\n"
+    "<custom><numeric name='one' data='1 2'/><numeric name='two' data='3'/></custom>\n"
+    "<keyframe><key name='up'/><key name='down'/></keyframe></mujoco>\n";
 
 static const char ini[] =
     "[robot]\nname = walker\nmodel = walker.xml\nbase = torso\nshells = chest belt bone\n"
@@ -53,7 +55,7 @@ static const char ini[] =
     "[joints]\nnames = neck knee_r hip_r ankle_l knee_l hip_l waist\n"
     "mirror = neck knee_l hip_l ankle_l knee_r hip_r waist\n"
     "mirror_sign = -1 1 1 1 1 1 -1\npose = 0 0.5 -0.25 -0.2 0.4 -0.2 0\n"
-    "kp = 1 2 3 4 5 6 7\nkd = 0.1 0.2 0.3 0.4 0.5 0.6 0.7\neffort = 0 0 33 0 0 0 0\n"
+    "kp = 1 2 3 4 5 6 7\nkd = 0.1 0.2 0.3 0.4 0.5 0.6 0.7\neffort = 0 0 33 0 0 0.5 0\n"
     "speed = 1 2 3 4 5 6 7\nswing = 0 2 -1 -1 2 -1 0\nstill = 1 0 0 0 0 0 1\n"
     "[foot.flat]\nbody = foot_l\nknee = shank_l\nmirror = ball\nankle = ankle_l\noffset = 0.1\n"
     "shape = outline\noutline = -0.08 -0.04 0.12 -0.06 0.12 0.04 -0.08 0.04\nz = -0.05\n"
@@ -86,7 +88,7 @@ static int setup(void **unused) {
     write_text(xml_path, mjcf);
     write_text(ini_path, ini);
     robot = robot_create(folder, &error);
-    if (!robot) {
+    if (!robot || error.text[0]) {
         fail_msg("%s", error.text);
     }
     return 0;
@@ -125,7 +127,7 @@ static void test_joints(void **unused) {
     const int image[JOINTS] = {0, 4, 5, 3, 1, 2, 6};
     const double sign[JOINTS] = {-1, 1, 1, 1, 1, 1, -1};
     const double pose[JOINTS] = {0, 0.5, -0.25, -0.2, 0.4, -0.2, 0};
-    const double effort[JOINTS] = {50, 60, 33, 50, 50, 50, 50};
+    const double effort[JOINTS] = {50, 60, 33, 50, 50, 0.5, 50};
     const double swing[JOINTS] = {0, 2, -1, -1, 2, -1, 0}, still[JOINTS] = {1, 0, 0, 0, 0, 0, 1};
     for (int i = 0; i < JOINTS; i++) {
         assert_int_equal(robot_joint_dof(robot)[i], dof_of[i]);
@@ -603,6 +605,32 @@ static void test_shells(void **unused) {
 
 /* ---- refusals ---- */
 
+static void expect_spoilt(double *number, const char *message) {
+    MildError error = {0};
+    double kept = *number;
+    *number = INFINITY;
+    assert_int_equal(robot_check_model(robot->visual, "x.xml", &error), MILD_ERROR_RANGE);
+    *number = kept;
+    if (!strstr(error.text, message)) {
+        fail_msg("'%s' instead of '%s'", error.text, message);
+    }
+}
+
+/* Numbers of the file that no body or joint has. */
+static void test_other_numbers(void **unused) {
+    (void)unused;
+    mjModel *m = robot->visual;
+    assert_true(m->nnumeric == 2 && m->nkey == 2);
+    assert_int_equal(robot_check_model(m, "x.xml", NULL), MILD_OK);
+    expect_spoilt(m->numeric_data, "numeric 'one': data is inf");
+    expect_spoilt(m->numeric_data + 1, "numeric 'one': data is inf");
+    expect_spoilt(m->numeric_data + 2, "numeric 'two': data is inf");
+    expect_spoilt(m->key_qpos, "key 'up': qpos is inf");
+    expect_spoilt(m->key_qpos + NQ - 1, "key 'up': qpos is inf");
+    expect_spoilt(m->key_qpos + NQ, "key 'down': qpos is inf");
+    expect_spoilt(m->key_qpos + 2 * NQ - 1, "key 'down': qpos is inf");
+}
+
 static void write_edited(const char *path, const char *text, const char *from, const char *to) {
     char edited[8192];
     const char *at = from ? strstr(text, from) : NULL;
@@ -621,7 +649,7 @@ static void try_robot(const char *from, const char *to, const char *message) {
     write_edited(xml_path, mjcf, from, to);
     write_edited(ini_path, ini, from, to);
     Robot *made = robot_create(folder, &error);
-    if (!message && !made) {
+    if (!message && (!made || error.text[0])) {
         fail_msg("refused: %s", error.text);
     }
     if (message && (made || !strstr(error.text, message))) {
@@ -642,6 +670,7 @@ static void test_refused(void **unused) {
               "body 'none' is missing; robot.ini names it in [foot.");
     try_robot("body = toe_r", "body = foot_l", "feet 'flat' and 'ball' are on the same body");
     try_robot("body = toe_r", "body = torso", "no joint between the base and body 'torso'");
+    try_robot("body = toe_r", "body = world", "no joint between the base and body 'world'");
     try_robot("body = toe_r", "body = pelvis", NULL); /* one joint is enough */
     try_robot("name='neck' axis='1 0 0'", "name='neck' type='slide' axis='1 0 0'",
               "joint 'neck' must be a hinge");
@@ -651,7 +680,7 @@ static void test_refused(void **unused) {
     try_robot("names = neck knee_r hip_r ankle_l knee_l hip_l waist\n"
               "mirror = neck knee_l hip_l ankle_l knee_r hip_r waist\n"
               "mirror_sign = -1 1 1 1 1 1 -1\npose = 0 0.5 -0.25 -0.2 0.4 -0.2 0\n"
-              "kp = 1 2 3 4 5 6 7\nkd = 0.1 0.2 0.3 0.4 0.5 0.6 0.7\neffort = 0 0 33 0 0 0 0\n"
+              "kp = 1 2 3 4 5 6 7\nkd = 0.1 0.2 0.3 0.4 0.5 0.6 0.7\neffort = 0 0 33 0 0 0.5 0\n"
               "speed = 1 2 3 4 5 6 7\nswing = 0 2 -1 -1 2 -1 0\nstill = 1 0 0 0 0 0 1\n",
               "names = knee_r hip_r ankle_l knee_l hip_l waist\n"
               "mirror = knee_l hip_l ankle_l knee_r hip_r waist\n"
@@ -665,7 +694,7 @@ static void test_numbers_refused(void **unused) {
     try_robot("range='-2 2' ", "", "needs a range, and actuatorfrcrange or [joints] effort");
     try_robot("<default><joint actuatorfrcrange='-50 50'", "<default><joint",
               "needs a range, and actuatorfrcrange or [joints] effort");
-    try_robot("effort = 0 0 33 0 0 0 0", "effort = 1 1 1 1 1 1 1", NULL);
+    try_robot("effort = 0 0 33 0 0 0.5 0", "effort = 1 1 1 1 1 1 1", NULL);
     try_robot("shells = chest belt bone", "shells = chest belts bone", "geom 'belts' is missing");
     try_robot("type='capsule' size='0.04 0.15' mass='2' ",
               "type='cylinder' size='0.04 0.15' mass='2' ",
@@ -695,25 +724,19 @@ static void test_unsupported(void **unused) {
         "<body name='toe_r' pos='0 0 -0.3'><geom type='sphere' size='0.03' mass='0.2'/></body>",
         "<body name='toe_r' pos='0 0 -0.3'/>", NULL); /* its parent has the mass */
     try_robot("model = walker.xml", "model = none.xml", "none.xml: ");
-    try_robot("</worldbody>", "", "walker.xml: ");
-    try_robot("axis='1 0 0'", "axis='0 0 0'", "walker.xml: ");
+    try_robot("</worldbody>", "", "walker.xml: XML parse error 14: Error=");
+    try_robot("axis='1 0 0'", "axis='0 0 0'", "walker.xml: Error: axis too small in joint Element");
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_names),
-        cmocka_unit_test(test_joints),
-        cmocka_unit_test(test_feet_and_body),
-        cmocka_unit_test(test_stand_height),
-        cmocka_unit_test(test_soles),
-        cmocka_unit_test(test_models),
-        cmocka_unit_test(test_feet),
-        cmocka_unit_test(test_map),
-        cmocka_unit_test(test_steps),
-        cmocka_unit_test(test_soft_landing),
-        cmocka_unit_test(test_shells),
-        cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_numbers_refused),
+        cmocka_unit_test(test_names),         cmocka_unit_test(test_joints),
+        cmocka_unit_test(test_feet_and_body), cmocka_unit_test(test_stand_height),
+        cmocka_unit_test(test_soles),         cmocka_unit_test(test_models),
+        cmocka_unit_test(test_feet),          cmocka_unit_test(test_map),
+        cmocka_unit_test(test_steps),         cmocka_unit_test(test_soft_landing),
+        cmocka_unit_test(test_shells),        cmocka_unit_test(test_other_numbers),
+        cmocka_unit_test(test_refused),       cmocka_unit_test(test_numbers_refused),
         cmocka_unit_test(test_unsupported),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
