@@ -1,23 +1,29 @@
-# libmild for other programs: the ground layer's objects as a shared and a static library, and their installation.
+# libmild for other programs: a shared and a static library, and their installation. It carries the layer ground and,
+# of the layer base, what the public headers and the ground call. It depends on libc and libm only.
 # MILD_MARCH decides where the installed library runs: `native` is this machine only, x86-64-v3 any of the last decade.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set_target_properties(layer_ground PROPERTIES C_VISIBILITY_PRESET hidden) # but for what MILD_API_BEGIN makes visible
-add_library(mild_shared SHARED $<TARGET_OBJECTS:layer_ground>)
+set_target_properties(layer_base layer_ground PROPERTIES C_VISIBILITY_PRESET hidden) # MILD_API_BEGIN makes visible
+set(mild_objects $<TARGET_OBJECTS:layer_ground>
+  $<FILTER:$<TARGET_OBJECTS:layer_base>,INCLUDE,/\(error|field|text\)\\.c\\.o$>)
+add_library(mild_shared SHARED ${mild_objects})
+if(NOT MILD_SANITIZE AND NOT MILD_FUZZ) # a call of anything else in base does not link
+  target_link_options(mild_shared PRIVATE -Wl,--no-undefined)
+endif()
 
 # A static library is an archive of objects, and what they call each other is global in each: one object of all, in which
 # hidden symbols become local, exports what the shared library does. Needs GNU's or LLVM's objcopy.
 if(CMAKE_OBJCOPY)
   set(mild_object ${CMAKE_BINARY_DIR}/generated/mild.o)
   add_custom_command(OUTPUT ${mild_object}
-    COMMAND ${CMAKE_C_COMPILER} -r -nostdlib -o ${mild_object}.all $<TARGET_OBJECTS:layer_ground>
+    COMMAND ${CMAKE_C_COMPILER} -r -nostdlib -o ${mild_object}.all ${mild_objects}
     COMMAND ${CMAKE_OBJCOPY} --localize-hidden ${mild_object}.all ${mild_object}
-    DEPENDS layer_ground $<TARGET_OBJECTS:layer_ground> COMMAND_EXPAND_LISTS VERBATIM)
+    DEPENDS layer_base layer_ground ${mild_objects} COMMAND_EXPAND_LISTS VERBATIM)
   set_source_files_properties(${mild_object} PROPERTIES EXTERNAL_OBJECT TRUE GENERATED TRUE)
   add_library(mild_static STATIC ${mild_object})
 else()
-  add_library(mild_static STATIC $<TARGET_OBJECTS:layer_ground>)
+  add_library(mild_static STATIC ${mild_objects})
 endif()
 # while the version begins with 0, a new minor version may change the interface
 set_target_properties(mild_shared PROPERTIES EXPORT_NAME mild VERSION ${PROJECT_VERSION}

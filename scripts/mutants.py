@@ -31,6 +31,9 @@ TREE = WORK / "tree"
 BUILD = WORK / "build"
 NAMED = ROOT / "tests" / "mutants.txt"
 
+# Share of their draws that the ground's random tests make (tests/ground/ground_kit.h).
+DRAWS = "0.1"
+
 # A layer without a folder of tests is tested by the layer above it.
 TESTED_BY = {"control": ("control", "eval")}
 
@@ -64,7 +67,9 @@ KIND = {"+": "arithmetic", "-": "arithmetic", "*": "arithmetic", "/": "arithmeti
         "^": "bits", "<<": "bits", ">>": "bits"}
 FUNCTIONS = {"fmin": "fmax", "fmax": "fmin", "sin": "cos", "cos": "sin", "floor": "ceil",
              "ceil": "floor", "fabs": "", "fabsf": "", "sqrt": "", "abs": "", "isfinite": "!isfinite"}
-# Not mutated inside: messages and assertions. Not removed: what frees (the sanitizers watch leaks).
+# The first two arguments exchanged: the same memory, the same verdict on equality, the same number.
+SYMMETRIC = set("calloc strcmp strncmp memcmp fmin fmax hypot".split())
+# Not mutated inside: messages, assertions, and what frees (the sanitizers watch leaks). Nor removed.
 QUIET_CALL = re.compile(r"(static_)?assert|_Static_assert|\w*printf|fputs|puts|perror|\w*_fail|"
                         r"\w*_message|usage")
 FREEING_CALL = re.compile(r"free|fclose|close|unlink|remove|\w*_(free|destroy|close)")
@@ -167,7 +172,8 @@ class File:
     def quiet_places(self):
         quiet = set()
         for i, token in enumerate(self.tokens[:-1]):
-            if token.kind == "name" and QUIET_CALL.fullmatch(token.text) and i + 1 in self.pair:
+            silent = QUIET_CALL.fullmatch(token.text) or FREEING_CALL.fullmatch(token.text)
+            if token.kind == "name" and silent and i + 1 in self.pair:
                 quiet.update(range(i, self.pair[i + 1] + 1))
         return quiet
 
@@ -318,7 +324,8 @@ class File:
         declaration = self.source[:token.begin].endswith("\n") or is_type(self.tokens[i - 1]) or (
             self.tokens[i - 1].text == "*" and is_type(self.tokens[i - 2]))
         if not declaration:
-            for (a, b), (c, d) in zip(arguments, arguments[1:]):
+            pairs = list(zip(arguments, arguments[1:]))
+            for (a, b), (c, d) in pairs[1:] if token.text in SYMMETRIC else pairs:
                 first, second = self.source[a:b].strip(), self.source[c:d].strip()
                 if first != second:
                     a += len(self.source[a:b]) - len(self.source[a:b].lstrip())
@@ -599,7 +606,8 @@ class Worker:
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 30, 1 << 30))
 
-        environment = dict(os.environ, CMOCKA_TEST_ABORT="1", TMPDIR=str(self.folder))
+        environment = dict(os.environ, CMOCKA_TEST_ABORT="1", TMPDIR=str(self.folder),
+                           MILD_TEST_DRAWS=DRAWS)
         log = self.folder / "log"
         with open(log, "wb") as out:
             child = subprocess.Popen(command, cwd=self.run_folder, stdout=out, stderr=out,

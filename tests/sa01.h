@@ -15,7 +15,8 @@ enum {
     SA01_OBSERVATION = 47,
     SA01_HISTORY = 6 * 47,
     SA01_ESTIMATES = 11,
-    SA01_CRITIC = 104
+    SA01_CRITIC = 104,
+    SA01_OUTLINE_ROWS = 19
 };
 
 #endif

@@ -1,5 +1,6 @@
-/* Around the declarations of every public header: C names for C++, and the only symbols that
- * libmild exports. Nothing here runs, so threads do not matter. */
+/* MILD_API_BEGIN and MILD_API_END enclose the declarations of every public header. They give them C
+ * names in C++ and make them visible outside libmild, which hides all others. Thread safety:
+ * nothing here runs. */
 #ifndef MILD_API_H
 #define MILD_API_H
 

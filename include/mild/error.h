@@ -1,5 +1,5 @@
-/* One error type for every layer: a status and one clear line. Libraries never print, exit or
- * abort. Thread safety: a MildError belongs to its caller; nothing is shared. */
+/* Errors: a status and one line of text. The library never prints, exits or aborts. Thread safety:
+ * a MildError belongs to its caller; nothing is shared. */
 #ifndef MILD_ERROR_H
 #define MILD_ERROR_H
 
@@ -7,26 +7,25 @@
 
 MILD_API_BEGIN
 
-/* What a function that can fail returns: 0 on success. A function that returns a pointer returns
- * NULL instead and leaves the status in its *error. */
+/* Result of a function that can fail. A function that returns a pointer returns NULL instead and
+ * writes the status to *error. */
 typedef enum {
-    MILD_OK = 0,         /* done */
-    MILD_ERROR_ARGUMENT, /* a value the caller gave is not usable */
+    MILD_OK = 0,         /* success */
+    MILD_ERROR_ARGUMENT, /* an argument is not usable */
     MILD_ERROR_RANGE,    /* a number is outside its documented range */
     MILD_ERROR_FORMAT,   /* a file is not what its name says */
     MILD_ERROR_IO,       /* reading or writing failed */
     MILD_ERROR_MEMORY,   /* allocation failed */
 } MildStatus;
 
-/* Every `MildError *error` may be NULL. It is written on failure only: one that starts as {0} tells
- * afterwards. */
+/* Every `MildError *error` may be NULL. It is written on failure only, so start it as {0}. */
 typedef struct {
     MildStatus status; /* MILD_OK until something fails */
-    char text[400];    /* one line, no newline: what, where, remedy */
+    char text[400];    /* one line without a newline: what is wrong, where, and the remedy */
 } MildError;
 
-/* Fill *error (may be NULL) printf-style; returns status so that `return mild_fail(...)` reads
- * well. Thread safe. */
+/* Fills *error (may be NULL) like printf. Returns `status`, so that a function can end with
+ * `return mild_fail(...)`. */
 MildStatus mild_fail(MildError *error, MildStatus status, const char *format, ...);
 
 MILD_API_END

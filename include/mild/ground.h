@@ -1,21 +1,25 @@
-/* libmild: soft ground for legged robots. Two-way, per-element forces between rigid feet and foam,
- * rubber, grass, sand.
+/* libmild: soft ground for legged robots. Forces between rigid feet and foam, rubber, grass or
+ * sand, computed for each element of the soles, in both directions: the ground carries the robot
+ * and the robot deforms the ground.
  *
- * A step of an engine that owns M, J and the smooth forces:
- *     A = J M^-1 J^T,  v_free = J (nu + dt M^-1 (tau - b))          (6 rows per foot, twist at the
- * ankle, world axes) mild_ground_solve(...)    pure: wrench impulses and everything per element,
- * into the scratch tau += J^T wrench/dt, integrate mild_ground_advance(...)  moves the memory
- * (depth maxima, drift length), once per accepted step
+ * The engine owns the mass matrix M, the foot Jacobian J (6 rows a foot, twist at the ankle, world
+ * axes), the generalised velocity qvel, the applied forces tau and the bias forces b. Its step is
  *
- * SI units, radians, z up. A foot's reference point is its ankle. Penetration u = h0 - z is
- * positive down; forces on the foot are positive up. Equations are the paper's, read as
- * docs/model.md says.
+ *     A      = J M^-1 J^T
+ *     V_free = J (qvel + dt M^-1 (tau - b))
+ *     mild_ground_solve(...)       impulses on the feet; the ground is not changed
+ *     tau   += J^T force           the wrench of each foot, then integrate
+ *     mild_ground_advance(...)     the ground remembers the step; once for each accepted step
  *
- * Thread safety: constant objects (sole, terrain while nobody writes it) may be shared; a
- * MildGround and a MildScratch belong to one thread at a time; there is no global state. No
- * function prints, exits or allocates, but for those that say they return NULL when out of memory.
- * Pointers must not be NULL, but for `error` and where it is said; a number that is wrong in
- * another way is refused where a function can fail, and otherwise computed with. */
+ * SI units, radians, z up. The reference point of a foot is its ankle. Penetration u = h0 - z is
+ * positive below the surface h0. Forces on the foot are positive upward. Equation numbers are those
+ * of the paper, read as docs/model.md says.
+ *
+ * Thread safety: a sole or a map never changes and may be shared, and so may a terrain that nobody
+ * writes to. A MildGround and a MildScratch belong to one thread at a time. There is no global
+ * state. No function prints or exits. Only functions that say that they return NULL when out of
+ * memory allocate. Pointers must not be NULL, except `error` and where it is said. A function that
+ * can fail refuses bad numbers; the others compute with them. */
 #ifndef MILD_GROUND_H
 #define MILD_GROUND_H
 
@@ -37,8 +41,8 @@ MILD_API_BEGIN
  *
  * A model is where the elements are (one in the middle of the sole, mild_sole_concentric, or the
  * raster) and what a material means to an element. Solvers, memory, friction, drift and results are
- * the same for all. A model is a row of this list and a file, src/ground/model_NAME.c; all else that
- * names models derives from the two. */
+ * the same for all. A model is a row of this list and a file, src/ground/model_NAME.c; all else
+ * that names models derives from the two. */
 /* clang-format off */
 #define MILD_MODEL_LIST(ROW)                                                                       \
     ROW(MILD, mild)                  /* a developing cone under every element (the paper) */       \
@@ -71,20 +75,19 @@ typedef struct {
     int concentric; /* bool: one element in the middle of the sole, not the raster */
 } MildModelInfo;
 
-/* Their names as users write them, in the enum's order. */
+/* Names of the models as users write them, in the order of the enum. */
 extern const char *const mild_model_names[MILD_MODELS];
-/* The model of that name into *model; false, and nothing written, when the name is unknown. */
+/* Finds a model by name. Returns false, and leaves *model alone, when the name is unknown. */
 int mild_model_find(const char *name, MildModel *model);
-/* Of any model; constant. */
+/* What a model says of itself. It never changes. */
 const MildModelInfo *mild_model_info(MildModel model);
-/* Its `concentric`. */
+/* Bool: the model has one element in the middle of the sole. */
 int mild_model_is_concentric(MildModel model);
 
-/* ---- material: the element law's parameters (paper Table III; ranges and presets: docs/model.md
- * section 10) ---- */
+/* ---- materials: parameters of the element law (paper Table III; docs/model.md section 10) ---- */
 
-/* A plain struct: start from mild_material_default or a preset, change what differs,
- * mild_material_check it. */
+/* A plain struct. Start from mild_material_default or a preset, change what differs, and check it
+ * with mild_material_check. */
 typedef struct {
     double k_pen;      /* [N/m] penetration stiffness of one element at the surface */
     double sigma_cone; /* [N/m^3] depth-dependent conical stress */
@@ -104,236 +107,263 @@ typedef struct {
     int model;         /* MildModel, not MILD_MODEL_RIGID */
 } MildMaterial;
 
-/* Its fields with unit, range and meaning: [mild_material_field_count]. For config files, sliders,
- * random draws. */
+/* Fields of MildMaterial with unit, range and meaning, for configuration files, sliders and random
+ * draws: [mild_material_field_count]. */
 extern const MildField mild_material_fields[];
 extern const int mild_material_field_count;
 
-/* sand_loose's numbers: a complete, valid default. */
+/* The preset sand_loose. */
 MildMaterial mild_material_default(void);
-/* rubber foam60 foam45 foam28 foam25 grass sand_loose sand_dense into *material; false, and nothing
- * written, when the name is unknown. (`rigid` is no material: it is the engine's own contact.) */
+/* Writes a preset to *material: rubber foam60 foam45 foam28 foam25 grass sand_loose sand_dense.
+ * Returns false, and leaves *material alone, when the name is unknown. */
 int mild_material_preset(const char *name, MildMaterial *material);
-/* How many presets there are. */
+/* Number of presets. */
 int mild_material_preset_count(void);
-/* Name of the preset with that index, 0 .. count - 1. */
+/* Name of a preset; NULL when index is not 0 .. count - 1. */
 const char *mild_material_preset_name(int index);
-/* Every range, and that the model is one with a material (not rigid). Fails with MILD_ERROR_RANGE,
- * naming the field. Nothing else checks materials: what is not checked is computed with. */
+/* Checks every field against its range, and that the model has a material (rigid has none). Fails
+ * with the name of the first bad field. No other function checks a material. */
 MildStatus mild_material_check(const MildMaterial *material, MildError *error);
 
-/* ---- terrain: height and material under a point; small, copyable, may change between steps ----
- */
-/* A rectangle of another material. */
+/* ---- terrain: height and material under a point ---- */
+
+/* A rectangle of another material: x_min <= x < x_max, y_min <= y < y_max. */
 typedef struct {
-    double x_min, x_max, y_min, y_max; /* [m] world rectangle, half-open */
-    int material;                      /* index into materials */
+    double x_min; /* [m] world */
+    double x_max; /* [m] world */
+    double y_min; /* [m] world */
+    double y_max; /* [m] world */
+    int material; /* index into materials */
 } MildPatch;
 
-/* A plain struct: copy it, compare it, change its numbers between two steps. Elements on the ground
- * keep the index of the material that they touched down on (docs/model.md section 5). */
+/* A plain struct. It may be copied, and its numbers may change between two steps. A loaded element
+ * keeps the index of the material that it touched down on (docs/model.md section 5). The material
+ * at a point is that of the first patch that holds it, else that of the map, else material 0. */
 typedef struct {
-    int material_count, patch_count;            /* in use of the arrays below */
-    double height;                              /* [m] undisturbed surface h0; added to the map's */
-    MildMaterial materials[MILD_MATERIALS_MAX]; /* [material_count], checked */
-    MildPatch patches[MILD_PATCHES_MAX]; /* the first patch that holds the point wins, else the map,
-                                            else material 0 */
-    double map_x, map_y;                 /* [m] world point that lies on the map's origin */
-    const MildMap *map; /* borrowed, shared; NULL: a level surface without a pattern */
+    int material_count;                         /* materials in use */
+    int patch_count;                            /* patches in use */
+    double height;                              /* [m] of the surface, added to the map's */
+    MildMaterial materials[MILD_MATERIALS_MAX]; /* [material_count], checked by the caller */
+    MildPatch patches[MILD_PATCHES_MAX];        /* [patch_count] */
+    double map_x;                               /* [m] world position of the map's origin */
+    double map_y;                               /* [m] the same */
+    const MildMap *map; /* not owned; NULL: a level surface without a pattern */
 } MildTerrain;
 
-/* Two materials that blend near a border. */
+/* The mixture of two materials near a border. */
 typedef struct {
-    int first, second; /* indices into materials; first: the nearer */
-    double share;      /* [-] of the second, at most 1/2; 0 away from a border */
+    int first;    /* index of the nearer material */
+    int second;   /* index of the other one */
+    double share; /* [-] of the second, at most 1/2; 0 away from a border */
 } MildBlend;
 
 /* One material everywhere, surface at z = 0. */
 MildTerrain mild_terrain_uniform(const MildMaterial *material);
-/* Appends a patch; infinite edges make strips and half planes. Fails, with the terrain unchanged,
- * when it is full, the patch empty, NaN, overlapping an earlier one, or of an unknown material. */
+/* Adds a patch. Infinite edges make strips and half planes. Fails, and leaves the terrain alone,
+ * when the terrain is full, when the patch is empty, NaN or overlaps an earlier one, and when its
+ * material does not exist. */
 MildStatus mild_terrain_add_patch(MildTerrain *terrain, const MildPatch *patch, MildError *error);
-/* Lays the terrain on a map (NULL: none). Fails, and changes nothing, when the map has a label
+/* Sets the map; NULL removes it. Fails, and leaves the terrain alone, when the map has a label
  * without a material. */
 MildStatus mild_terrain_set_map(MildTerrain *terrain, const MildMap *map, MildError *error);
-/* Index of the material at the world's (x, y) [m]; at a border the nearer one. */
+/* Index of the material at the world point (x, y) [m]; near a border that of the nearer one. */
 int mild_terrain_material_at(const MildTerrain *terrain, double x, double y);
-/* Both materials there. */
+/* Both materials at the world point (x, y) [m]. */
 MildBlend mild_terrain_blend_at(const MildTerrain *terrain, double x, double y);
-/* [m] Undisturbed surface h0 at (x, y); O(1), any finite point. */
+/* [m] Undisturbed surface h0 at the world point (x, y) [m], in constant time. */
 double mild_terrain_height_at(const MildTerrain *terrain, double x, double y);
-/* [-] gradient of h0 at (x, y). */
+/* [-] Gradient of h0 at the world point (x, y) [m]: slope[2] along x and y. */
 void mild_terrain_slope_at(const MildTerrain *terrain, double x, double y, double slope[2]);
 
-/* ---- sole: the footprint of one foot, rasterised from its outline (docs/model.md section 4) ----
- */
+/* ---- soles: the footprint of a foot as square elements (docs/model.md section 4) ---- */
 
 /* What a sole is made from. */
 typedef struct {
-    const double *outline; /* [points][2] [m] polygon in the foot frame, either orientation, no
-                              self-crossing */
+    const double *outline; /* [points][2] [m] polygon in the foot frame, clockwise or not, that does
+                              not cross itself */
     int points;            /* of the outline, 3 .. 4096 */
-    double pitch;          /* [m] element edge a; 0.0195 in the paper */
-    double sole_z;         /* [m] sole plane in the foot frame (negative: below the ankle) */
-    int target_elements;   /* 0, or the count wanted (77): the raster's offset is chosen to come
-                              nearest, then exact by   dropping or adding the least covered border cells
-                            */
+    double pitch;          /* [m] edge of an element; 0.0195 in the paper */
+    double sole_z;         /* [m] sole plane in the foot frame, negative below the ankle */
+    /* Number of elements wanted (77 for the SA01), or 0 for the natural one. The raster is shifted
+       until the count comes nearest; then the least covered border cells are dropped or added. */
+    int target_elements;
 } MildSoleDef;
 
-/* A rasterised sole: constant once made, shared by any number of threads, scratches and grounds. */
+/* A rasterised sole. It never changes, so any number of threads, scratches and grounds share it. */
 typedef struct MildSole MildSole;
-/* Copies what it needs of `def`. NULL, with the field's name in *error, when the outline has no
- * area, crosses itself or is not finite, when pitch or target are out of range or make more than
- * 65536 cells, or when out of memory. */
+/* Makes a sole. Returns NULL, with the field's name in *error, when the outline encloses no area,
+ * crosses itself or is not finite, when pitch or target_elements are out of range or make more than
+ * 65536 cells, or when out of memory. `def` is not kept. */
 MildSole *mild_sole_create(const MildSoleDef *def, MildError *error);
-/* May be NULL. Scratches and grounds made from it do not need it any more. */
+/* Frees a sole; NULL is allowed. Scratches and grounds made from it stay valid. */
 void mild_sole_destroy(MildSole *sole);
-/* Count of elements, at least 1. */
+/* Number of elements, at least 1. */
 int mild_sole_elements(const MildSole *sole);
-/* [m] Edge of an element; its area is the square. */
+/* [m] Edge of an element. Its area is the square of that. */
 double mild_sole_pitch(const MildSole *sole);
-/* x, y, z of element centres in the foot frame; arrays of mild_sole_elements() [m], owned by the
- * sole. */
+/* Centres of the elements in the foot frame [m]: arrays of mild_sole_elements() for x and y, owned
+ * by the sole, and the height z of all. */
 const double *mild_sole_x(const MildSole *sole);
 const double *mild_sole_y(const MildSole *sole);
 double mild_sole_z(const MildSole *sole);
-/* One element at the sole's centroid with the area of all its elements, for the concentric models:
- * it carries force, but no moment about its centre. A sole of its own, to be destroyed. NULL when
- * out of memory. */
+/* Makes a sole of one element for the concentric models: it lies at the centroid of the elements
+ * and has their whole area. It carries force, but no moment about its centre. Destroy it like any
+ * sole. NULL when out of memory. */
 MildSole *mild_sole_concentric(const MildSole *sole, MildError *error);
 
-/* ---- element law, closed forms (eqs 1-5 of the paper as read in docs/model.md section 3) ---- */
+/* ---- element law in closed form (eqs 1 to 5, docs/model.md section 3) ---- */
 
-/* What one element feels on virgin ground: F = force + c_d added_mass_per_depth w^2 + added_mass
- * dw/dt, w > 0 downward. */
+/* Force of virgin ground on an element that goes down with the speed w > 0:
+ *     F = force + c_d added_mass_per_depth w^2 + added_mass dw/dt */
 typedef struct {
     double force;                /* F_g [N] quasistatic */
     double stiffness;            /* dF_g/du [N/m] */
     double added_mass;           /* m_a [kg] */
     double added_mass_per_depth; /* dm_a/du [kg/m] */
 } MildElementLaw;
-/* The law of one element of area pitch^2 at depth u >= 0 (virgin loading), firm bed included. */
+/* The law of an element of area pitch^2 [m^2] at a depth u >= 0 [m] in virgin ground. The firm bed
+ * is part of it. */
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth);
-/* [m] Depth at which the level sole carries `load` [N] at rest, going down slowly on virgin ground.
+/* [m] Depth at which a level sole that is pressed down slowly into virgin ground carries
+ * `load` [N].
  */
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load);
-/* The material of a rival model that compares fairly with `mild`, a material of MILD_MODEL_MILD:
- * under `load` [N] (half the robot's weight) one level foot sinks as deep. Friction, drift,
- * recovery and bed are mild's where the rival has them. sole: the raster; the result is for that
- * raster, or for mild_sole_concentric of it when the model is concentric. Fails for rigid, for a
- * material of another model, and without a load. */
+/* Derives the material of another model for a fair comparison with `mild`, a material of
+ * MILD_MODEL_MILD: under `load` [N] one level foot sinks to the same depth. Half the weight of the
+ * robot is a good load. Friction, drift, recovery and bed are those of `mild` where the model has
+ * them. sole: the raster; when the model is concentric the result is for mild_sole_concentric of
+ * it. Fails, with *rival unchanged, for rigid, when `mild` is a material of another model or one
+ * that mild_material_check refuses, when the load is not positive, and when the rival would need a
+ * number that mild_material_check refuses. */
 MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error);
 
-/* Resistive force theory: coefficients [-] that zeta 1e6 N/m^3 times depth times area turn into
- * force [N]. In the plane (Li et al. 2013): beta [rad] slope of the plate, positive when its
- * leading face looks forward and down; gamma [rad] direction of motion below the horizontal, 0 ..
- * pi/2. alpha: resistance backward, upward; (0.007, 1) for a level plate straight down. */
+/* Resistive force theory. Coefficients alpha [-] of the stress on a plate: force [N] = alpha zeta
+ * 1e6 N/m^3 times depth times area.
+ *
+ * In a vertical plane (Li et al. 2013). beta [rad]: slope of the plate, positive when its leading
+ * face looks forward and down. gamma [rad], 0 .. pi/2: direction of motion below the horizontal.
+ * alpha[2]: resistance backward and upward; (0.007, 1) for a level plate that goes straight
+ * down. */
 void mild_resist_plane(double beta, double gamma, double alpha[2]);
-/* The same in space (Agarwal et al. 2023, a level plate straight down scaled to 1): unit normal [3]
- * out of the plate into the ground, unit direction of motion, world; alpha [-]: force of the ground
- * on the plate. 0 for a face that trails. */
+/* In space (Agarwal et al. 2023, scaled to 1 for a level plate that goes straight down). normal[3]:
+ * unit vector out of the plate into the ground. direction[3]: unit vector of the motion. alpha[3]:
+ * of the force on the plate, world axes; 0 for a face that trails. */
 void mild_resist_space(const double normal[3], const double direction[3], double alpha[3]);
 
 /* ---- one contact step (docs/model.md sections 6, 7) ---- */
 
-/* Both give the same answer. */
+/* Both solvers give the same answer. */
 typedef enum {
-    MILD_SOLVER_NEWTON = 0,      /* convex minimisation in the feet's twists: the fast one */
+    MILD_SOLVER_NEWTON = 0,      /* Newton's method on the twists of the feet: the fast one */
     MILD_SOLVER_GAUSS_SEIDEL = 1 /* the paper's sweeps over the elements (Algorithm 1) */
 } MildSolver;
 
 /* What the engine knows before the step. Fixed size, no pointers. */
 typedef struct {
-    int feet;                          /* that of the scratch and the ground */
+    int feet;                          /* as in scratch and ground */
     double dt;                         /* [s] above 0 */
     double position[MILD_FEET_MAX][3]; /* [m] ankle, world */
-    double rotation[MILD_FEET_MAX][9]; /* [-] foot -> world, row major, orthonormal */
-    double velocity[MILD_FEET_MAX]
-                   [6]; /* [m/s, rad/s] twist at the ankle (linear, angular), world axes, now */
-    double
-        inverse_inertia[6 * MILD_FEET_MAX * 6 * MILD_FEET_MAX]; /* [1/kg, ...] A = J M^-1 J^T, row
-                                                                   major with stride 6*feet,
-                                                                   symmetric PSD, may be singular */
-    double free_velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] V^ = J (nu + dt M^-1 (tau - b)): twists
-                                                without ground */
-    MildSolver solver;                       /* which of the two */
-    double tolerance;   /* [-] of the residual; 0 = default, 1e-9 (sweeps 1e-10) */
-    int max_iterations; /* 0 = default; the hard bound of work */
+    double rotation[MILD_FEET_MAX][9]; /* [-] foot to world, row major, orthonormal */
+    /* [m/s, rad/s] Present twist at the ankle: linear, then angular, world axes. */
+    double velocity[MILD_FEET_MAX][6];
+    /* A = J M^-1 J^T [1/kg, 1/(kg m), 1/(kg m^2)], row major with stride 6 feet. Symmetric and
+     * positive semidefinite; it may be singular. */
+    double inverse_inertia[6 * MILD_FEET_MAX * 6 * MILD_FEET_MAX];
+    /* [m/s, rad/s] Twists after a step without ground, V_free = J (qvel + dt M^-1 (tau - b)). */
+    double free_velocity[6 * MILD_FEET_MAX];
+    MildSolver solver; /* which of the two */
+    double tolerance;  /* [-] of the residual; 0: 1e-9 (sweeps 1e-10) */
+    /* Bound of Newton steps or sweeps; 0: 400 steps or 1000 sweeps. A step that Newton's method
+     * leaves unsolved takes up to 40 more. One in which friction would create energy is solved up to
+     * twice again. */
+    int max_iterations;
 } MildContactInput;
 
-/* The ground on one foot, mean over the step (docs/model.md section 9). Zero for a foot in the air.
- */
+/* What the ground does to one foot, mean over the step (docs/model.md section 9). All 0 for a foot
+ * in the air. */
 typedef struct {
-    double force[3];    /* [N] on the foot, world */
-    double torque[3];   /* [N m] about the ankle, world, p x F */
-    double zmp_axis[3]; /* [m] from the ankle: point of the central axis nearest the ankle, F x
-                           tau/|F|^2 */
-    double zmp_sole[2]; /* [m] from the ankle, world axes, on the plane through the sole centre */
-    double
-        pressure_center[3]; /* [m] world: sum of p f over sum of f, f the elements' normal forces; 0
-                               without load. For a level sole it is the ankle plus zmp_sole */
-    double area;            /* [m^2] sum of loaded elements */
-    double depth_max, depth_mean; /* [m] over the loaded elements */
-    int contacts;                 /* loaded elements */
+    double force[3];  /* [N] on the foot, world */
+    double torque[3]; /* [N m] about the ankle, world: p x F */
+    /* [m] From the ankle: point of the wrench's central axis nearest the ankle, F x tau/|F|^2. 0
+     * where that overflows. */
+    double zmp_axis[3];
+    /* [m] From the ankle, world axes: zero moment point on the level plane through the centroid of
+     * the elements. */
+    double zmp_sole[2];
+    /* [m] World: sum of p f over sum of f, with f the normal forces of the elements. For a level
+     * sole it is the ankle plus zmp_sole. 0 without load. */
+    double pressure_center[3];
+    double area;       /* [m^2] of the loaded elements */
+    double depth_max;  /* [m] over the loaded elements */
+    double depth_mean; /* [m] over the loaded elements */
+    int contacts;      /* number of loaded elements */
 } MildFootResult;
 
-/* What a step does to the feet. Fixed size, no pointers. */
+/* Result of a step. Fixed size, no pointers. */
 typedef struct {
     MildFootResult foot[MILD_FEET_MAX]; /* [feet] */
-    double velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] twists at the ankles after the step, V+ = V^
-                                           + A W */
-    double residual;                    /* [-] relative, in the metric of kinetic energy, at exit */
-    int iterations;                     /* Newton steps or sweeps done */
-    int converged; /* bool; 0 whenever a pose or a result is not finite, a material's number NaN, or
-                      dt not positive */
+    double velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] twists at the ankles after the step,
+                                           V = V_free + A W, W the wrench impulses */
+    /* [-] Relative, in the metric of kinetic energy. Converged above the tolerance: all of it is
+     * rounding. */
+    double residual;
+    int iterations; /* Newton steps or sweeps done */
+    /* Bool. It is 0 also when a pose or a result is not finite, when a number of a material is NaN
+     * and when dt is not positive. */
+    int converged;
 } MildContactResult;
 
 /* ---- memory and working arrays (docs/model.md section 5) ---- */
 
-/* What the feet's elements remember (greatest depth, drift): one pointer-free block of
- * mild_ground_bytes() bytes. Copy it with memcpy to save, restore, send or branch a simulation. */
+/* What the ground remembers: greatest depth and drift of every element, and imprints. It is one
+ * block of mild_ground_bytes() bytes without pointers. Copy it with memcpy to save, restore, send
+ * or branch a simulation. */
 typedef struct MildGround MildGround;
-/* Working arrays of one thread: serves any number of grounds with the same soles, one after the
- * other. */
+/* Working arrays of one thread. It serves any number of grounds with the same soles in turn. */
 typedef struct MildScratch MildScratch;
 
-/* Bytes of the state block, a multiple of 64. soles: [feet], feet 1 .. MILD_FEET_MAX. */
+/* [B] Size of the block, a multiple of 64. soles: [feet], feet 1 .. MILD_FEET_MAX. */
 size_t mild_ground_bytes(const MildSole *const *soles, int feet);
-/* Initialise a block of that size that the caller owns (aligned to 8); returns it as a MildGround,
- * nothing touched yet. */
+/* Initialises a block of that size, aligned to 8 and owned by the caller. Returns the block as a
+ * MildGround on which nothing has stepped yet. */
 MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet);
-/* Forget everything: the feet were moved. */
+/* Forgets everything. Call it when the feet were moved to another place. */
 void mild_ground_reset(MildGround *ground);
 
-/* The same for ground that remembers prints: pressed ground keeps its depth after lift-off, and a
- * later element finds it (docs/model.md section 5). Prints live in the block, in `tiles` squares of
- * 8 x 8 cells of half the first sole's pitch; when they are used up the oldest are forgotten. A
- * print of a foot of 0.27 x 0.10 m takes about ten tiles. tiles: rounded up to a multiple of 8, at
- * most MILD_PRINT_TILES_MAX; 0: no prints, as above. */
+/* [B] The same for ground that remembers imprints: pressed ground keeps its depth after the foot
+ * has lifted off, and an element that comes down there later meets it (docs/model.md section 5).
+ * Imprints are kept in the block, in `tiles` squares of 8 x 8 cells with half the pitch of the
+ * first sole. When all are in use the oldest are forgotten. The imprint of a foot of 0.27 x 0.10 m
+ * takes about ten tiles. tiles: rounded up to a multiple of 8, at most MILD_PRINT_TILES_MAX; 0: no
+ * imprints. */
 #define MILD_PRINT_TILES_MAX 65536
 size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tiles);
-/* Initialise a block of that size, as mild_ground_init does. */
+/* Initialises a block of that size as mild_ground_init does. */
 MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, int feet, int tiles);
-/* [B] of the block of an initialised ground. */
+/* [B] Size of the block of an initialised ground. */
 size_t mild_ground_size(const MildGround *ground);
-/* [m] greatest depth the ground at (x, y) remembers, 0 where there is no print. Its surface is (1 -
- * recovery) of it below h0. */
+/* [m] Greatest depth that the imprint at the world point (x, y) remembers; 0 where there is none.
+ * The surface there lies (1 - recovery) times that below h0. */
 double mild_ground_print_at(const MildGround *ground, double x, double y);
 
-/* NULL when feet is not 1 .. MILD_FEET_MAX or out of memory. soles: [feet], copied. */
+/* Makes a scratch. NULL when feet is not 1 .. MILD_FEET_MAX or out of memory. soles: [feet], not
+ * kept. */
 MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildError *error);
-/* May be NULL. */
+/* Frees a scratch; NULL is allowed. */
 void mild_scratch_destroy(MildScratch *scratch);
 
-/* Pure: reads ground, writes only scratch and result; may be called any number of times before
- * mild_ground_advance. The soles of ground and scratch are the same. It always comes back, within
- * max_iterations: look at result->converged. Impulses by eqs 4, 5, 13 and 14, twists by eq 9. */
+/* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground and
+ * writes scratch and result only, so it may be called any number of times before
+ * mild_ground_advance. Scratch and ground must have the same soles. It always returns:
+ * look at result->converged. Where that is 0, either the impulses are those of the ground at twists
+ * near the returned ones, or everything but the friction bound is (docs/model.md section 7). */
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                        const MildContactInput *input, MildScratch *scratch,
                        MildContactResult *result);
-/* Moves the memory to the end of the step just solved with this scratch, input and result:
- * positions advanced by dt * V+. Once per step that the engine keeps. */
+/* Moves the memory of the ground to the end of the step that was just solved with this scratch,
+ * input and result; positions are taken to advance by dt times the new velocity. Call it once for
+ * each step that the engine keeps. */
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                          const MildContactInput *input, const MildScratch *scratch,
                          const MildContactResult *result);
@@ -341,29 +371,30 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
 /* What an element did in the last step. */
 typedef enum {
     MILD_ELEMENT_FREE = 0,      /* carries no normal force */
-    MILD_ELEMENT_UNLOADING = 1, /* loaded on the unloading line: not deeper than it has been */
-    MILD_ELEMENT_VIRGIN =
-        2 /* loaded and deeper at the end of the step than ever since it touched */
+    MILD_ELEMENT_UNLOADING = 1, /* loaded, on the unloading line: not deeper than before */
+    MILD_ELEMENT_VIRGIN = 2 /* loaded, at the end of the step deeper than ever since touchdown */
 } MildElementState;
 
-/* Per-element output of the last solve for one foot; arrays of mild_sole_elements(). */
+/* What the elements of one foot did in the last solve: arrays of mild_sole_elements(). */
 typedef struct {
-    const double *depth;  /* [m] u at the start of the step, negative above the ground */
-    const double *normal; /* [N] vertical part of the element's force, mean over the step */
-    const double *tangent_x, *tangent_y;       /* [N] horizontal part, world */
-    const double *point_x, *point_y, *point_z; /* [m] world */
-    const double *flat;   /* [-] share of the element's area still flat after the step (eq 1): 1
-                             untouched, 0 cone complete */
+    const double *depth;     /* [m] u at the start of the step, negative above the ground */
+    const double *normal;    /* [N] vertical part of the force, mean over the step */
+    const double *tangent_x; /* [N] horizontal part, world, mean over the step */
+    const double *tangent_y; /* [N] the same */
+    const double *point_x;   /* [m] centre, world */
+    const double *point_y;   /* [m] the same */
+    const double *point_z;   /* [m] the same */
+    const double *flat;   /* [-] share of the area that is still flat after the step (eq 1): 1 when
+                                untouched, 0 when the cone is complete */
     const uint8_t *state; /* MildElementState */
-    const uint8_t
-        *slip; /* bool: loaded and sliding, friction at its bound; 0 sticks or carries nothing */
+    const uint8_t *slip;  /* bool: loaded and friction at its bound */
 } MildElements;
-/* Made on demand inside the scratch, for foot 0 .. feet - 1: ask after each solve; the arrays hold
- * until the next one. Cost: one pass over the foot's elements. */
+/* Computes that for foot 0 .. feet - 1 after a solve. The arrays lie in the scratch and are valid
+ * until the next solve. Cost: one pass over the elements of the foot. */
 MildElements mild_scratch_elements(const MildScratch *scratch, int foot);
 
-/* [m] Greatest depth that each element has reached since it touched, 0 untouched; array of
- * mild_sole_elements(), inside the ground's block. */
+/* [m] Greatest depth that each element has reached since touchdown, 0 in the air: array of
+ * mild_sole_elements() inside the block of the ground. */
 const double *mild_ground_depth_max(const MildGround *ground, int foot);
 
 MILD_API_END

@@ -25,8 +25,9 @@ ALWAYS_INLINE void memory_store(const Memory *memory, int e, const ElementMemory
     memory->held_stiffness[e] = after->held_stiffness;
 }
 
-/* Bool: the element lifts off. Without imprints that is when it leaves the undisturbed surface, with
- * imprints as soon as its unloading line carries nothing. m1: depth at the middle of the step. */
+/* Bool: the element lifts off. Without imprints that is when it leaves the undisturbed surface,
+ * with imprints as soon as its unloading line carries nothing. m1: depth at the middle of the
+ * step. */
 static int element_lifted(const Advance *a, int i, double m1) {
     const Slots *s = &a->slot;
     if (!(m1 > 0.0)) {

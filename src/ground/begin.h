@@ -7,6 +7,18 @@
 #define BEGIN_STOP REAL(0.3)       /* [-] fit to the exact impact, see element_drag */
 #define BEGIN_STOP_MOST REAL(0.75) /* [-] up to here the drag's speed V does not fall with w */
 
+/* Drag of a material by the speeds at both ends of the way: an impulse of the recruited depth times
+ * exit_drag w + entry_drag h. Without the parts that create energy (element_explicit),
+ *
+ *     mass w + (drag - mass) (h + w)/2 = (drag + mass)/2 w + (drag - mass)/2 h */
+MILD_HD Real law_exit_drag(const Law *law) {
+    return (real_max(law->drag_rate, 0) + real_max(law->mass_rate, 0)) / 2;
+}
+
+MILD_HD Real law_entry_drag(const Law *law) {
+    return (real_max(law->drag_rate, 0) - real_max(law->mass_rate, 0)) / 2;
+}
+
 /* The unloading line runs from (a, F(a)) down to zero force. Its elastic travel is recovery a, at
  * least ELEMENT_ELASTIC. It is never flatter than virgin ground at a, and so never above it: a
  * concave curve lies above its chords, a convex one above its tangents. In the bed it takes the
@@ -58,8 +70,8 @@ MILD_HD Real element_virgin_way(const Element *e, Real dt, Real speed) {
 /* Drag of an element that will stop in virgin ground, beyond what momentum exchange takes. After
  * element_begin. gain: [m/s] by how much the free motion of the step speeds the element up.
  *
- * The work of the drag over the way is c_d m_a' times the integral of w^2. Of an impulse that acts at
- * the mean speed, V is the mean of w^2 over the way by (h + w)/2, with h the speed at the front.
+ * The work of the drag over the way is c_d m_a' times the integral of w^2. Of an impulse that acts
+ * at the mean speed, V is the mean of w^2 over the way by (h + w)/2, with h the speed at the front.
  *
  *     slow change                V = (h + w)/2
  *     drag alone stops the foot  the mean of w^2 is logarithmic, (h^2 - w^2)/(2 ln(h/w)), and V

@@ -68,6 +68,8 @@ typedef struct {
     Real hold_x;         /* dt f [N s] held at the start of the step */
     Real hold_y;         /* [N s] */
     Real hold_stiffness; /* dt^2 k [kg] */
+    Real turn_x; /* [m/s] friction begins at minus this velocity, see energy.c; 0: at rest */
+    Real turn_y; /* [m/s] */
 } Element;
 
 #endif

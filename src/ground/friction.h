@@ -86,8 +86,35 @@ MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, Real vx, Re
     return result;
 }
 
+/* What friction opposes in the place of the velocity: that velocity less the point nearest to it on
+ * the way from 0 to -turn (energy.c). */
+MILD_HD void friction_turn(const Element *e, Real *vx, Real *vy) {
+    const Real square = e->turn_x * e->turn_x + e->turn_y * e->turn_y;
+    const Real along = *vx * e->turn_x + *vy * e->turn_y;
+    const Real share = real_min(real_max(along / (square + REAL_LEAST), -1), 0);
+    *vx -= share * e->turn_x;
+    *vy -= share * e->turn_y;
+}
+
+/* friction_impulse with that. Where the nearest point is within the way, what the velocity changes by
+ * along the way changes nothing. */
+MILD_HD Friction friction_turned(const Element *e, Real r, Real mu, Real vx, Real vy) {
+    const Real square = e->turn_x * e->turn_x + e->turn_y * e->turn_y;
+    const Real along = vx * e->turn_x + vy * e->turn_y;
+    const Real within = along < 0 && along > -square ? 1 / (square + REAL_LEAST) : 0;
+    friction_turn(e, &vx, &vy);
+    Friction result = friction_impulse(e, r, mu, vx, vy);
+    const Real x = within * (result.fall_xx * e->turn_x + result.fall_xy * e->turn_y);
+    const Real y = within * (result.fall_xy * e->turn_x + result.fall_yy * e->turn_y);
+    result.fall_xx -= x * e->turn_x;
+    result.fall_xy -= (x * e->turn_y + y * e->turn_x) / 2;
+    result.fall_yy -= y * e->turn_y;
+    return result;
+}
+
 /* Bool: friction is at its bound. */
 MILD_HD int friction_slides(const Element *e, Real normal, Real vx, Real vy) {
+    friction_turn(e, &vx, &vy);
     const Real r = friction_bound(e, normal);
     const Real stiffness = e->hold_stiffness + FRICTION_LAG * r;
     const Real tx = e->hold_x - stiffness * vx;

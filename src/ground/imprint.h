@@ -1,8 +1,8 @@
 /* What pressed ground remembers: the greatest depth of each cell of a grid that is fixed in the
  * world, in a cache of tiles of bounded size.
  *
- * Like a processor's cache it has sets of IMPRINT_WAYS tiles, chosen by a hash of the tile's place. A
- * new tile replaces the oldest of its set. Every access is O(1) and allocates nothing. */
+ * Like a processor's cache it has sets of IMPRINT_WAYS tiles, chosen by a hash of the tile's place.
+ * A new tile replaces the oldest of its set. Every access is O(1) and allocates nothing. */
 #ifndef MILD_GROUND_IMPRINT_H
 #define MILD_GROUND_IMPRINT_H
 

@@ -3,8 +3,8 @@
  *
  * A semi-implicit engine moves by its new velocity, u1 = u0 + dt w, so its velocities belong to the
  * middles of the steps: a body in free fall keeps w^2/2 - g m exactly, where m = u + dt w/2 is the
- * depth in the middle of the step. The ground keeps to that clock. A step leads from the middle m0 of
- * the step before to
+ * depth in the middle of the step. The ground keeps to that clock. A step leads from the middle m0
+ * of the step before to
  *
  *     m1 = u0 + dt w/2
  *
@@ -16,8 +16,8 @@
  *     lag     dt T k e(w + h)                         elastic ground lags behind the foot
  *
  * The work at the mean velocity, I (w0 + w)/2, is what E gains, since m1 - m0 = dt (w0 + w)/2: path
- * creates and loses no energy at any step size, and its error is of second order in dt. The mean of a
- * rising function rises with m1, so I never falls with w, and the step is the minimum of a convex
+ * creates and loses no energy at any step size, and its error is of second order in dt. The mean of
+ * a rising function rises with m1, so I never falls with w, and the step is the minimum of a convex
  * function. */
 #ifndef MILD_GROUND_IMPULSE_H
 #define MILD_GROUND_IMPULSE_H
@@ -31,8 +31,8 @@ typedef struct {
     Real slope; /* [kg] its derivative by the new downward speed */
 } Impulse;
 
-/* Static force: its mean over the way, which is on the unloading line up to the yield depth a and in
- * virgin ground beyond. Both parts count with their share of the way. */
+/* Static force: its mean over the way, which is on the unloading line up to the yield depth a and
+ * in virgin ground beyond. Both parts count with their share of the way. */
 MILD_HD Impulse path_impulse(const Element *e, Real dt, Real middle, Real virgin_way,
                              const LawWay *virgin) {
     const Real inverse_way = 1 / (REAL_ABS(middle - e->middle) + ELEMENT_TINY);
@@ -65,10 +65,11 @@ MILD_HD Impulse mass_impulse(const Element *e, Real speed) {
     return mass;
 }
 
-/* Mass recruited at rest leaves at w; drag beyond that acts at the speed V (element_drag), which for
- * c_d < 1 is (w + min(w, h))/2: it never pushes, and gives no energy for c_d >= 1/2. An element that
- * turns round within the step has been stopped first: growth then counts up to u0, as for w = 0, and
- * half as much for what it gets beyond. stops: bool, the element may have stop_drag and stop_growth. */
+/* Mass recruited at rest leaves at w; drag beyond that acts at the speed V (element_drag), which
+ * for c_d < 1 is (w + min(w, h))/2: it never pushes, and gives no energy for c_d >= 1/2. An element
+ * that turns round within the step has been stopped first: growth then counts up to u0, as for w =
+ * 0, and half as much for what it gets beyond. stops: bool, the element may have stop_drag and
+ * stop_growth. */
 MILD_HD Impulse growth_impulse(const Element *e, Real dt, Real speed, const LawWay *virgin,
                                int stops) {
     const Real down = real_max(speed, 0);

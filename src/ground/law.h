@@ -7,8 +7,8 @@
  *     bed     F = k_bed max(u - u_bed, 0)        the firm bottom, under every law
  *
  * Developing cone, read as in docs/model.md section 3: the stress acts per element area, the added
- * mass is positive, and the flat area stays 0 once the cone is complete. With R the radius of a disc
- * of the element's area s, and
+ * mass is positive, and the flat area stays 0 once the cone is complete. With R the radius of a
+ * disc of the element's area s, and
  *
  *     u_f    = R tan(alpha)/nu                   depth at which the cone is complete
  *     t      = min(u/u_f, 1)
@@ -29,10 +29,10 @@
  * when k_pen > kappa, convex otherwise, and straight beyond u_f.
  *
  * A new law adds its numbers to Law, a bit to LawCurve, and its term to each function of this file
- * that takes `curves`; a model's `law` (model.h) fills the numbers. The step calls nothing else. Every number
- * but the lengths must scale its term, because at a border of two materials the numbers change
- * linearly from one to the other. `curves` is a constant where elements are stepped in vectors, so a
- * curve costs nothing on ground that does not have it. */
+ * that takes `curves`; a model's `law` (model.h) fills the numbers. The step calls nothing else.
+ * Every number but the lengths must scale its term, because at a border of two materials the
+ * numbers change linearly from one to the other. `curves` is a constant where elements are stepped
+ * in vectors, so a curve costs nothing on ground that does not have it. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H
 

@@ -2,6 +2,9 @@
 
 #include <stdlib.h>
 
+#include "ground/pattern.h"
+#include "ground/shape.h"
+
 #define FIELD(member, low, high, help)                                                             \
     MILD_FIELD(MildMapDef, member, MILD_FIELD_DOUBLE, 1, low, high, help)
 #define COUNT(names) ((int)(sizeof(names) / sizeof *(names)))
@@ -39,7 +42,8 @@ MildMapDef mild_map_def_default(void) {
                         .patch_count = 2};
 }
 
-/* Steepest cell, lowest and highest point; a bilinear cell is steepest along its edges. */
+/* Sets the steepest gradient and the lowest and highest height. A bilinear cell is steepest along
+ * its edges. */
 static void map_measure(MildMap *map) {
     const Grid *grid = &map->heights;
     size_t stride = (size_t)grid->columns + 1;
@@ -81,7 +85,8 @@ MildMap *mild_map_create(const MildMapDef *def, MildError *error) {
         map_measure(map);
     }
     map->steepest += fabs(map->slope);
-    const Grid *h = &map->heights, *l = &map->labels;
+    const Grid *h = &map->heights;
+    const Grid *l = &map->labels;
     map->bytes = sizeof *map;
     if (map->height) {
         map->bytes += ((size_t)h->columns + 1) * ((size_t)h->rows + 1) * sizeof *map->height;
@@ -114,7 +119,8 @@ int mild_map_is_level(const MildMap *map) {
 }
 
 void mild_map_extent(const MildMap *map, double *x, double *y) {
-    const Grid *h = &map->heights, *l = &map->labels; /* all 0 when there is none */
+    const Grid *h = &map->heights; /* all 0 when there are no heights */
+    const Grid *l = &map->labels;  /* the same */
     *x = fmax(h->columns * h->cell_x, l->columns * l->cell_x);
     *y = fmax(h->rows * h->cell_y, l->rows * l->cell_y);
 }
@@ -124,7 +130,9 @@ void mild_map_range(const MildMap *map, double *low, double *high) {
     *high = map->slope == 0.0 ? map->high : INFINITY;
 }
 
-/* h = (1 - t)((1 - s) h00 + s h10) + t ((1 - s) h01 + s h11) and its gradient. */
+/* With s and t the shares of the way through the cell along x and y:
+ *
+ *     h = (1 - t) ((1 - s) h00 + s h10) + t ((1 - s) h01 + s h11) */
 double map_surface(const MildMap *map, double x, double y, double slope[2]) {
     const Grid *grid = &map->heights;
     double height = map->slope * x;
@@ -137,9 +145,12 @@ double map_surface(const MildMap *map, double x, double y, double slope[2]) {
     GridPlace b = grid_place((y - grid->y0) * grid->inverse_y, grid->rows, grid->repeats);
     size_t stride = (size_t)grid->columns + 1;
     const float *at = map->height + (size_t)b.cell * stride + (size_t)a.cell;
-    double h00 = (double)at[0], h10 = (double)at[1], h01 = (double)at[stride],
-           h11 = (double)at[stride + 1];
-    double low = h00 + a.share * (h10 - h00), high = h01 + a.share * (h11 - h01);
+    double h00 = (double)at[0];
+    double h10 = (double)at[1];
+    double h01 = (double)at[stride];
+    double h11 = (double)at[stride + 1];
+    double low = h00 + a.share * (h10 - h00);
+    double high = h01 + a.share * (h11 - h01);
     slope[0] += a.inside * grid->inverse_x * ((h10 - h00) + b.share * ((h11 - h01) - (h10 - h00)));
     slope[1] += b.inside * grid->inverse_y * (high - low);
     return height + low + b.share * (high - low);

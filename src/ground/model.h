@@ -1,12 +1,12 @@
 /* A ground model: what its file, model_NAME.c, says of it. Its row is in MILD_MODEL_LIST
  * (mild/ground.h).
  *
- * A model made of curves that law.h has is that file and that row. A model with a new curve adds the
- * curve there first. */
+ * A model made of curves that law.h has is that file and that row. A model with a new curve adds
+ * the curve there first. */
 #ifndef MILD_GROUND_MODEL_H
 #define MILD_GROUND_MODEL_H
 
-#include "ground/material.h"
+#include "ground/element_law.h"
 #include "ground/motion.h"
 
 struct FootScratch;
@@ -28,11 +28,5 @@ typedef struct {
     void (*direction)(const struct FootScratch *foot, const MildTerrain *terrain, int model,
                       double dt, const double *rotation, const Motion *now);
 } ModelRow;
-
-/* The row of a material's model. That of mild where there is none with a law, since materials that
- * nobody has checked are computed with. */
-const ModelRow *model_row(int model);
-/* Law of one element of area pitch^2. */
-Law law_of(const MildMaterial *material, double pitch);
 
 #endif

@@ -1,7 +1,7 @@
-/* The table of ground models: rows of MILD_MODEL_LIST, each filled in by its file. */
-#include <string.h>
+/* The rows of MILD_MODEL_LIST, each filled in by its file. */
+#include "ground/models.h"
 
-#include "ground/model.h"
+#include <string.h>
 
 #define MODEL_DECLARE(id, name) extern const ModelRow model_##name;
 MILD_MODEL_LIST(MODEL_DECLARE)

@@ -1,18 +1,26 @@
 #include <string.h>
 
+#include "ground/friction.h"
 #include "ground/pass.h"
 #include "ground/solver.h"
 
 #define NEWTON_TOLERANCE 1e-9
-#define NEWTON_ITERATIONS 400 /* hard bound of work */
+#define NEWTON_ITERATIONS 400 /* bound of the search */
 #define NEWTON_PLAIN 20       /* of them without held bounds */
 #define NEWTON_ROUND 20       /* with the bounds held once */
 #define NEWTON_TRY 6          /* plain ones after each round */
 #define NEWTON_HALVINGS 6
 #define NEWTON_SEARCH 30 /* bisections along a step */
-#define NEWTON_GROWTH                                                                              \
-    8.0 /* an elimination's factors beyond this are worth a search for a pivot   \
-                           */
+/* An elimination's factors beyond this are worth a search for a pivot. */
+#define NEWTON_GROWTH 8.0
+/* A residual below this share of the impulse may be all rounding. */
+#define NEWTON_NEAR 1e-5
+#define NEWTON_ROUNDING 6e-14 /* of the terms of V^ + A P: 256 units in the last place */
+#define NEWTON_LENGTH 4e-16   /* [m] what the elements' depths are rounded to */
+#define BOUNDS_LEAST 0.02     /* [-] shortest and longest move of the bounds of friction */
+#define BOUNDS_MOST 1e4
+#define BOUNDS_SLOW 0.5    /* [-] a move not this much shorter than the last one is slow */
+#define BOUNDS_PATIENCE 10 /* rounds before the bounds start again from somewhere else */
 /* A row of up to 4 x 6 numbers and a right side, in whole vectors. Written with the compiler's vector type: what it
  * makes of plain loops over so short rows takes three times as long. */
 enum { NEWTON_VECTOR = 8, NEWTON_VECTORS = 4, NEWTON_LANES = NEWTON_VECTOR * NEWTON_VECTORS };
@@ -36,6 +44,7 @@ typedef struct {
 typedef struct {
     Row impulse, twist;
     double residual;
+    int rests; /* bool: Newton's step from here is no longer than rounding */
 } Point;
 
 static void system_open(System *system, const MildScratch *scratch, const MildContactInput *input,
@@ -140,10 +149,13 @@ ALWAYS_INLINE int rows_eliminate(Row *M, double *x, int n, int parts) {
     return 1;
 }
 
-/* The law of the last pass, at V, linearised with H = -dW/dV: W + H (V - V^ - A P) = P, that is (1
- * + H A) P = W + H (V - V^). */
-ALWAYS_INLINE int point_newton(const System *system, MildScratch *scratch, const Point *at,
-                               Point *next, int n, int parts) {
+/* The law of the last pass, at V, linearised with H = -dW/dV: W + H (V - V^ - A P) = P, that is
+ *     (1 + H A) P = W + H (V - V^).
+ * With `correct` the unknown is the change of P instead,
+ *     (1 + H A) dP = W - P,
+ * and V moves by A dP. Rounding is then in proportion to dP, not to P. */
+ALWAYS_INLINE int point_step(const System *system, MildScratch *scratch, const Point *at,
+                             Point *next, int correct, int n, int parts) {
     static const Row unit[TWIST_MAX + 1] = {
         {{1}},        {{0, 1}},     {{[2] = 1}},  {{[3] = 1}},  {{[4] = 1}},
         {{[5] = 1}},  {{[6] = 1}},  {{[7] = 1}},  {{[8] = 1}},  {{[9] = 1}},
@@ -154,12 +166,12 @@ ALWAYS_INLINE int point_newton(const System *system, MildScratch *scratch, const
     double moved[TWIST_MAX];
     contact_hessian(scratch);
     for (int k = 0; k < n; k++) {
-        moved[k] = at->twist.at[k] - system->free.at[k];
+        moved[k] = correct ? 0.0 : at->twist.at[k] - system->free.at[k];
     }
     for (int i = 0; i < n; i++) {
         int foot = i / 6 * 6;
         const double *H = scratch->hessian[(system->first + foot) / 6] + 6 * (i - foot);
-        double right = scratch->wrench[system->first + i];
+        double right = scratch->wrench[system->first + i] - (correct ? at->impulse.at[i] : 0.0);
         Row row = unit[i];
         for (int k = 0; k < 6; k++) {
             right += H[k] * moved[foot + k];
@@ -175,8 +187,11 @@ ALWAYS_INLINE int point_newton(const System *system, MildScratch *scratch, const
     if (!rows_eliminate(M, next->impulse.at, n, parts)) {
         return 0;
     }
-    next->twist = system->free;
+    next->twist = correct ? at->twist : system->free;
     system_times(system, next->impulse.at, &next->twist, n, parts);
+    for (int i = 0; correct && i < n; i++) {
+        next->impulse.at[i] += at->impulse.at[i];
+    }
     return 1;
 }
 
@@ -205,7 +220,49 @@ ALWAYS_INLINE void point_halve(const System *system, MildScratch *scratch, const
 }
 
 ALWAYS_INLINE int point_solves(const System *system, const Point *point, int n, int parts) {
-    return point->residual <= system->tolerance * system_norm(system, point->impulse.at, n, parts);
+    return point->rests ||
+           point->residual <= system->tolerance * system_norm(system, point->impulse.at, n, parts);
+}
+
+/* Bool: the step between two points is no longer than what rounding makes of V^ + A P, and of the
+ * depths that dt V is added to. */
+static int step_is_rounding(const System *system, const Point *from, const Point *to, int n) {
+    double size = 0.0;
+    for (int i = 0; i < n; i++) {
+        double sum = fabs(system->free.at[i]);
+        for (int j = 0; j < n; j++) {
+            sum += fabs(system->A[i].at[j] * from->impulse.at[j]);
+        }
+        size = fmax(size, sum);
+    }
+    double rounding = NEWTON_ROUNDING * size + NEWTON_LENGTH / system->dt;
+    for (int i = 0; i < n; i++) {
+        if (!(fabs(to->twist.at[i] - from->twist.at[i]) <= rounding)) { /* or not a number */
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* A step from `at` to `next` did not lower the residual. Near the solution rounding may be the
+ * reason: then the step is done again as a correction. If even that is no longer than rounding, the
+ * search rests at `at`. */
+static void point_correct(const System *system, MildScratch *scratch, Point *at, Point *next, int n,
+                          int parts) {
+    double scale = system_norm(system, at->impulse.at, n, parts);
+    if (!(at->residual <= NEWTON_NEAR * scale + NEWTON_LENGTH)) {
+        return;
+    }
+    Point corrected;
+    contact_pass(scratch, system->dt, at->twist.at, system->first);
+    if (!point_step(system, scratch, at, &corrected, 1, n, parts)) {
+        return;
+    }
+    at->rests = step_is_rounding(system, at, &corrected, n);
+    if (!at->rests) {
+        point_evaluate(system, scratch, &corrected, n, parts);
+        *next = corrected;
+    }
 }
 
 /* Newton's method from the best point so far, whose pass has been made; leaves there the best that
@@ -214,9 +271,16 @@ ALWAYS_INLINE int newton_plain(const System *system, MildScratch *scratch, Point
                                int n, int parts) {
     Point at = *best, next;
     int steps = 0, solved = 0;
-    while (!solved && steps < limit && point_newton(system, scratch, &at, &next, n, parts)) {
+    while (!solved && steps < limit && point_step(system, scratch, &at, &next, 0, n, parts)) {
         steps++;
         point_evaluate(system, scratch, &next, n, parts);
+        if (!(next.residual < at.residual)) {
+            point_correct(system, scratch, &at, &next, n, parts);
+        }
+        if (at.rests) {
+            *best = at;
+            break;
+        }
         if (!(next.residual < at.residual)) {
             point_halve(system, scratch, &at, &next, n, parts);
         }
@@ -246,9 +310,9 @@ static double step_slope(const System *system, const MildScratch *scratch, const
 static int newton_held(const System *system, MildScratch *scratch, Point *at, int limit, int n,
                        int parts) {
     int steps = 0, moves = 1;
-    Point full, next;
+    Point full, next = *at;
     contact_pass_held(scratch, system->dt, at->twist.at, system->first);
-    while (moves && steps < limit && point_newton(system, scratch, at, &full, n, parts)) {
+    while (moves && steps < limit && point_step(system, scratch, at, &full, 0, n, parts)) {
         steps++;
         double start = step_slope(system, scratch, at, at, &full, n), end, low = 0.0, high = 1.0,
                t = 1.0;
@@ -272,19 +336,81 @@ static int newton_held(const System *system, MildScratch *scratch, Point *at, in
     return steps;
 }
 
-/* Where the bounds' dependence on I_z leads Newton's method astray, or it runs in circles over
- * kinks: minimum at held bounds and bounds at the minimum follow each other, with shorter steps
- * when they do not come closer. */
+/* [N s] The bound of friction that the normal impulse of the last pass asks for. */
+static inline double bound_wanted(const Slots *s, int i) {
+    const Element element = slot_element(s, i);
+    return friction_bound(&element, s->iz[i]);
+}
+
+/* Sets the bounds of friction to a multiple of what the last pass asks for. */
+static void bounds_begin(MildScratch *scratch, double times) {
+    for (int f = 0; f < scratch->feet; f++) {
+        const Slots *s = &scratch->foot[f].slot;
+        for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
+            s->bound[i] = times * bound_wanted(s, i);
+            s->bound_moved[i] = 0.0;
+        }
+    }
+}
+
+/* How the bounds of friction follow the normal impulses. */
+typedef struct {
+    double share; /* [-] of the way to what they ask for, in the last move */
+    int turned;   /* bool: that move turned round */
+} Pace;
+
+/* The share of the next move. It doubles while the moves keep their direction and do not get much
+ * shorter: where friction presses the foot into the ground each bound is a little more than the one
+ * before, over many orders of magnitude. Where they turn round it is the whole way back, but no
+ * further than to the middle of the last move. */
+static void bounds_pace(const MildScratch *scratch, Pace *pace) {
+    double along = 0.0, now = 0.0, before = 0.0, share = pace->share;
+    for (int f = 0; f < scratch->feet; f++) {
+        const Slots *s = &scratch->foot[f].slot;
+        for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
+            double way = bound_wanted(s, i) - s->bound[i], last = s->bound_moved[i];
+            along += way * last;
+            now += way * way;
+            before += last * last;
+        }
+    }
+    int turned = along < 0.0;
+    if (turned) {
+        share = fmin(1.0, 0.5 * before / -along);
+    } else if (!pace->turned && now * share * share > BOUNDS_SLOW * BOUNDS_SLOW * before) {
+        share = fmin(2.0 * share, BOUNDS_MOST);
+    }
+    *pace = (Pace){fmax(share, BOUNDS_LEAST), turned};
+}
+
+/* Moves the bounds of friction towards what the last pass asks for. */
+static void bounds_move(MildScratch *scratch, Pace *pace) {
+    bounds_pace(scratch, pace);
+    for (int f = 0; f < scratch->feet; f++) {
+        const Slots *s = &scratch->foot[f].slot;
+        for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
+            double way = pace->share * (bound_wanted(s, i) - s->bound[i]);
+            s->bound_moved[i] = fmax(way, -s->bound[i]);
+            s->bound[i] += s->bound_moved[i];
+        }
+    }
+}
+
+/* Where Newton's method goes astray because the bounds depend on I_z, or runs in circles over kinks
+ * of the law. Alternate: minimise with the bounds held, then move the bounds towards what the
+ * minimum asks for, and try plain steps from there. When that takes long, start again from bounds
+ * several times as wide. */
 static int newton_patient(const System *system, MildScratch *scratch, Point *best, int limit, int n,
                           int parts) {
+    static const double wider[] = {3.0, 100.0, 10.0, 1e4};
     Point at = *best;
+    Pace pace = {0.5, 0}; /* the first move doubles it */
     int steps = 0;
-    double share = 1.0, last = INFINITY;
     if (isinf(at.residual)) {
         at.twist = system->free; /* without an impulse */
     }
     contact_pass(scratch, system->dt, at.twist.at, system->first);
-    contact_bounds(scratch, 1.0);
+    bounds_begin(scratch, 1.0);
     for (int round = 1; steps < limit && !point_solves(system, best, n, parts); round++) {
         int held = newton_held(system, scratch, &at, least(limit - steps, NEWTON_ROUND), n, parts);
         if (held == 0) {
@@ -292,20 +418,59 @@ static int newton_patient(const System *system, MildScratch *scratch, Point *bes
         }
         steps += held;
         point_evaluate(system, scratch, &at, n, parts);
-        contact_bounds(scratch, share);
+        if (round % BOUNDS_PATIENCE == 0) {
+            bounds_begin(scratch, wider[(round / BOUNDS_PATIENCE - 1) % 4]);
+            pace = (Pace){1.0, 1};
+        } else {
+            bounds_move(scratch, &pace);
+        }
         Point tried = at;
         steps += newton_plain(system, scratch, &tried, least(limit - steps, NEWTON_TRY), n, parts);
-        if (tried.residual < best->residual) {
+        if (tried.rests || tried.residual < best->residual) {
             *best = tried;
         }
-        if (round % 4 > 0) {
-            continue;
-        }
-        if (at.residual > 0.5 * last) {
-            share = fmax(0.5 * share, 0.02);
-        }
-        last = at.residual;
     }
+    return steps;
+}
+
+/* What is returned in the place of a point: W of the last pass, and V^ + A W. Sets the point to it;
+ * its residual is relative, infinite where W = 0 and the law there is not. */
+static void point_return(const System *system, MildScratch *scratch, Point *point, int n,
+                         int parts) {
+    point->impulse = (Row){{0.0}};
+    memcpy(point->impulse.at, scratch->wrench + system->first, (size_t)n * sizeof(double));
+    point->twist = system->free;
+    system_times(system, point->impulse.at, &point->twist, n, parts);
+    point_evaluate(system, scratch, point, n, parts);
+    if (point->residual > 0.0) {
+        point->residual /= system_norm(system, point->impulse.at, n, parts);
+    }
+}
+
+/* A step that the search has left unsolved. Its best point may be far from a solution however small
+ * its residual, and its impulses zero in the middle of the ground. The other candidate is a minimum
+ * at held bounds, those that the normal impulses without any friction ask for: every element's
+ * normal impulse is then that of the new velocity, only friction's bound is not. Returned is the one
+ * that is closer to the law. Returns the steps done. */
+static int newton_unsolved(const System *system, MildScratch *scratch, const Point *best,
+                           MildContactResult *result, int n, int parts) {
+    Point safe = {.residual = INFINITY}, found = *best;
+    safe.twist = system->free;
+    bounds_begin(scratch, 0.0);
+    int steps = newton_held(system, scratch, &safe, NEWTON_ROUND, n, parts);
+    contact_pass(scratch, system->dt, safe.twist.at, system->first);
+    bounds_begin(scratch, 1.0);
+    steps += newton_held(system, scratch, &safe, NEWTON_ROUND, n, parts);
+    const Row safe_twist = safe.twist;
+    point_return(system, scratch, &safe, n, parts);
+    contact_pass(scratch, system->dt, best->twist.at, system->first);
+    point_return(system, scratch, &found, n, parts);
+    if (found.residual <= safe.residual) {
+        contact_pass(scratch, system->dt, best->twist.at, system->first);
+    } else {
+        contact_pass_held(scratch, system->dt, safe_twist.at, system->first);
+    }
+    result->residual = fmin(found.residual, safe.residual);
     return steps;
 }
 
@@ -315,14 +480,18 @@ ALWAYS_INLINE void system_solve(const System *system, MildScratch *scratch, cons
     memcpy(best.twist.at, start, (size_t)n * sizeof(double));
     contact_pass(scratch, system->dt, best.twist.at, system->first);
     int steps = newton_plain(system, scratch, &best, least(system->limit, NEWTON_PLAIN), n, parts);
-    if (!point_solves(system, &best, n, parts)) {
+    result->converged = point_solves(system, &best, n, parts);
+    if (!result->converged) {
         steps += newton_patient(system, scratch, &best, system->limit - steps, n, parts);
         contact_pass(scratch, system->dt, best.twist.at, system->first);
+        result->converged = point_solves(system, &best, n, parts);
     }
     double scale = system_norm(system, best.impulse.at, n, parts);
-    result->iterations = steps;
     result->residual = scale > 0.0 ? best.residual / scale : best.residual;
-    result->converged = best.residual <= system->tolerance * scale;
+    if (!result->converged) {
+        steps += newton_unsolved(system, scratch, &best, result, n, parts);
+    }
+    result->iterations = steps;
 }
 
 void newton_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {

@@ -56,9 +56,10 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  *
  *     h = -dI/dv = f + k c g^T
  *
- * sums: of I, x I and y I. held: bool, the bounds of friction are slot.bound. */
+ * sums: of I, x I and y I. held: bool, the bounds of friction are slot.bound. turned: bool, that of
+ * some elements begins at slot.turn. */
 ALWAYS_INLINE void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
-                                 double sums[9]) {
+                                 int turned, double sums[9]) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *m;
     double f0 = 0.0, f1 = 0.0, f2 = 0.0; /* of I */
@@ -74,8 +75,9 @@ ALWAYS_INLINE void foot_friction(const Slots *slot, int end, const Motion *m, in
         const double k = s->hzz[i];
         const Element element = slot_element(s, i);
         const double bound = held ? s->bound[i] : friction_bound(&element, iz);
-        const Friction friction =
-            friction_impulse(&element, bound, held ? 0.0 : element.mu, vx, vy);
+        const double mu = held ? 0.0 : element.mu;
+        const Friction friction = turned ? friction_turned(&element, bound, mu, vx, vy)
+                                         : friction_impulse(&element, bound, mu, vx, vy);
         double ix = friction.x;
         double iy = friction.y;
         double hxz = friction.rise_x * k;
@@ -131,14 +133,16 @@ ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, in
         if (foot->active == 0) {
             continue;
         }
-        double sums[9] = {0.0};
+        double *sums = scratch->sums[f];
         double *wrench = scratch->wrench + 6 * f;
         const Motion motion = foot_motion(foot, twist + (6 * f - first));
         foot_normals(foot, dt, &motion);
-        if (foot->uneven) {
-            foot_friction(&foot->slot, foot_end(foot), &motion, 1, held, sums);
+        if (foot->turned) {
+            foot_friction(&foot->slot, foot_end(foot), &motion, 1, held, 1, sums);
+        } else if (foot->uneven) {
+            foot_friction(&foot->slot, foot_end(foot), &motion, 1, held, 0, sums);
         } else {
-            foot_friction(&foot->slot, foot_end(foot), &motion, 0, held, sums);
+            foot_friction(&foot->slot, foot_end(foot), &motion, 0, held, 0, sums);
         }
         /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 */
         memcpy(wrench, sums, 3 * sizeof *sums);
@@ -155,21 +159,6 @@ void contact_pass(MildScratch *scratch, double dt, const double *twist, int firs
 
 void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int first) {
     pass(scratch, dt, twist, first, 1);
-}
-
-void contact_bounds(MildScratch *scratch, double share) {
-    for (int f = 0; f < scratch->feet; f++) {
-        const Slots *s = &scratch->foot[f].slot;
-        for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
-            const Element element = slot_element(s, i);
-            const double now = friction_bound(&element, s->iz[i]);
-            if (share < 1.0) {
-                s->bound[i] += share * (now - s->bound[i]);
-            } else {
-                s->bound[i] = now; /* whatever it was before */
-            }
-        }
-    }
 }
 
 /* Sums of each entry of h times 1, x, y, x^2, xy, y^2. They hold the whole foot, since p is linear

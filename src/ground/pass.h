@@ -10,9 +10,6 @@ void contact_pass(MildScratch *scratch, double dt, const double *twist, int firs
 /* The same with the bounds of friction held at slot.bound. The impulses are then minus the gradient
  * of a convex function. */
 void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int first);
-/* Moves the held bounds by a share of the way to those of the last pass's normal impulses; share = 1
- * sets them. */
-void contact_bounds(MildScratch *scratch, double share);
 /* The feet's hessians from the derivatives of the last pass. */
 void contact_hessian(MildScratch *scratch);
 

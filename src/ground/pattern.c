@@ -1,13 +1,14 @@
-/* The labels of a map: which material each cell has, and near a border how much of the neighbour's.
- */
+/* The pattern consists of fields of one material. Where borders are smooth, fields are cut into
+ * small cells; a cell near a border also has the label and the share of the neighbouring
+ * material. */
+#include "ground/pattern.h"
+
 #include <limits.h>
 #include <stdlib.h>
 
-#include "ground/map.h"
+#define PATTERN_WORK 4e9 /* largest number of cells to look at while borders are blended */
 
-#define PATTERN_WORK 4e9 /* cells looked at while a pattern's borders are made */
-
-/* Label of the field (i, j) before borders. */
+/* Label of the field (i, j). */
 typedef int (*PatternLabel)(const MildMapDef *def, int i, int j);
 
 static int label_stripes(const MildMapDef *def, int i, int j) {
@@ -23,14 +24,15 @@ static int label_image(const MildMapDef *def, int i, int j) {
     return def->labels[(size_t)(def->label_rows - 1 - j) * (size_t)def->label_columns + (size_t)i];
 }
 
-/* Cells of a field: one where borders are sharp, else small ones that follow the blend. */
+/* A field is one cell where borders are sharp, else cells of about def->cell. */
 static MildStatus pattern_allocate(MildMap *map, const MildMapDef *def, int columns, int rows,
                                    int repeats, MildError *error) {
-    double fine = def->border > 0.0 ? ceil(def->patch_size / def->cell - 1e-9) : 1.0,
-           cell = def->patch_size / fine;
-    double fine_y = rows > 1 ? fine : 1.0, cells = columns * fine * (rows * fine_y);
-    double reach = 2.0 * ceil(0.5 * def->border / cell) + 1.0,
-           window = rows > 1 ? reach * reach : reach;
+    double fine = def->border > 0.0 ? ceil(def->patch_size / def->cell - 1e-9) : 1.0;
+    double fine_y = rows > 1 ? fine : 1.0;
+    double cell = def->patch_size / fine;
+    double cells = columns * fine * (rows * fine_y);
+    double edge = 2.0 * ceil(0.5 * def->border / cell) + 1.0; /* of the window that is searched */
+    double window = rows > 1 ? edge * edge : edge;
     if (cells > MILD_MAP_POINTS_MAX || cells * window > PATTERN_WORK) {
         return mild_fail(error, MILD_ERROR_RANGE,
                          "terrain.patches: %g cells with a border of %g m are too many: larger "
@@ -43,6 +45,7 @@ static MildStatus pattern_allocate(MildMap *map, const MildMapDef *def, int colu
     return map->label ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "terrain: out of memory");
 }
 
+/* Index of a cell beyond the border: of the repeated grid, or the cell at the border. */
 static int neighbour(int index, int count, int repeats) {
     if (repeats) {
         return (index % count + count) % count;
@@ -50,30 +53,33 @@ static int neighbour(int index, int count, int repeats) {
     return index < 0 ? 0 : index >= count ? count - 1 : index;
 }
 
-/* At distance d from the nearest cell of another label the neighbour's share is 1/2 - d/border:
- * across a straight border of width b the mixture changes linearly from one material to the other.
- */
+/* Blends cell (i, j) with the nearest material of another label. At a distance d from it, its share
+ * is 1/2 - d/border. Across a straight border the mixture thus changes linearly from one material
+ * to the other. */
 static void pattern_blend(MildMap *map, double border, int i, int j) {
     const Grid *grid = &map->labels;
     Label *here = &map->label[(size_t)j * (size_t)grid->columns + (size_t)i];
-    double cell = grid->cell_x, nearest = 0.5 * border;
-    int reach = (int)ceil(nearest / cell), reach_y = grid->rows > 1 ? reach : 0;
-    for (int dj = -reach_y; dj <= reach_y; dj++) {
-        for (int di = -reach; di <= reach; di++) {
-            int column = neighbour(i + di, grid->columns, grid->repeats),
-                row = neighbour(j + dj, grid->rows, grid->repeats);
+    double cell = grid->cell_x;
+    double nearest = 0.5 * border;
+    int cells = (int)ceil(nearest / cell); /* to look at on either side */
+    int cells_y = grid->rows > 1 ? cells : 0;
+    for (int dj = -cells_y; dj <= cells_y; dj++) {
+        for (int di = -cells; di <= cells; di++) {
+            int column = neighbour(i + di, grid->columns, grid->repeats);
+            int row = neighbour(j + dj, grid->rows, grid->repeats);
             int other = map->label[(size_t)row * (size_t)grid->columns + (size_t)column].first;
-            double x = cell * fmax(abs(di) - 0.5, 0.0), y = cell * fmax(abs(dj) - 0.5, 0.0),
-                   way = sqrt(x * x + y * y);
-            if (other == here->first || way >= nearest) {
+            double x = cell * fmax(abs(di) - 0.5, 0.0);
+            double y = cell * fmax(abs(dj) - 0.5, 0.0);
+            double distance = sqrt(x * x + y * y);
+            if (other == here->first || distance >= nearest) {
                 continue;
             }
-            nearest = way;
+            nearest = distance;
             here->second = (unsigned char)other;
         }
     }
-    here->share = (unsigned char)lround(
-        255.0 * fmax(0.5 - nearest / border, 0.0)); /* a subnormal border has no half */
+    /* A share below 0 would come from a subnormal border, half of which may be rounded. */
+    here->share = (unsigned char)lround(255.0 * fmax(0.5 - nearest / border, 0.0));
 }
 
 static MildStatus pattern_make(MildMap *map, const MildMapDef *def, int columns, int rows,

@@ -23,8 +23,8 @@ MILD_HD int element_turns(Real before, Real after) {
  * M v^2/2 the unloading line takes what leads back to the front. From there, or from p beyond it,
  * the ground's work F x + F' x^2/2 takes the rest; F holds half the drag at p, its mean on the way.
  *
- * Elastic ground remembers this depth. From plastic ground the foot springs up with what is left and
- * pays when it is back, but not with all of it: half the way is remembered. */
+ * Elastic ground remembers this depth. From plastic ground the foot springs up with what is left
+ * and pays when it is back, but not with all of it: half the way is remembered. */
 MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed, Real middle) {
     const Real h = e->entry_speed;
     if (!element_turns(h, speed)) {

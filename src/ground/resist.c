@@ -1,32 +1,37 @@
 /* Resistive force theory: the stress on a plate is zeta 1e6 N/m^3 times its depth times
- * coefficients that depend on how the plate stands and where it moves. 2D: Li, Zhang, Goldman,
- * Science 339 (2013), generic coefficients; here in the vertical plane of each element's motion.
- * 3D: Agarwal, Goldman, Kamrin, PNAS 120 (2023).
+ * coefficients that depend on how the plate stands and where it moves.
  *
- * In the implicit step the direction of motion is that at the start of the step. Each element then
- * has a yield stress downward and one sideways: down      the slope of virgin ground becomes share
- * * peak, share = alpha_z/RESIST_PEAK sideways  the radius of the friction disc, dt zeta 1e6 s u
- * alpha_x: opposes the motion, never reverses it so the step stays convex. What a tilted plate
- * would feel across its horizontal motion, or before it moves sideways at all, is left out: taken
- * at the old speed and not opposed to the new one, it could create energy. At rest no direction is
- * defined and an element may give way either way: RESIST_REST blends towards straight down for the
- * one yield and towards level for the other.
+ *     2D   Li, Zhang, Goldman, Science 339 (2013), generic coefficients; here in the vertical plane
+ *          of each element's motion
+ *     3D   Agarwal, Goldman, Kamrin, PNAS 120 (2023)
  *
- * No energy from a changing direction: the elastic travel (ELEMENT_ELASTIC) belongs to the peak
- * whatever the direction, so it stores what a function of depth and front alone says; an element
- * that yields below the peak does so on the way up that line, at `front`, before it gets to the
- * depth `deep` that it remembers: travel (1 - share) deeper. */
+ * The implicit step takes the direction of motion at the start of the step. An element then has two
+ * yield stresses:
+ *
+ *     downward   the slope of virgin ground becomes share peak, share = alpha_z/RESIST_PEAK
+ *     sideways   the radius of the friction disc grows by dt zeta 1e6 s u alpha_x; friction opposes
+ *                the motion and never reverses it, so the step stays convex
+ *
+ * Left out is the force on a tilted plate across its horizontal motion, and before it moves
+ * sideways at all. Such a force does not oppose the new velocity; taken at the old one it could
+ * create energy.
+ *
+ * At rest no direction is defined, and an element may give way to any side. RESIST_REST blends the
+ * direction towards straight down for the downward yield and towards level for the sideways one.
+ *
+ * A changing direction must not create energy. The unloading line is therefore always that of the
+ * peak, whatever the direction. Its yield depth b lies ELEMENT_ELASTIC (1 - share) ahead of the
+ * depth that an element with a smaller share has reached; the element yields on that line, at the
+ * depth where it gives the yield force. */
 #include "ground/resist.h"
 
+#include "ground/element_law.h"
 #include "ground/friction.h"
 
-#define RESIST_REST 1e-3 /* [m/s] */
-#define RESIST_PEAK                                                                                \
-    1.08 /* greatest alpha_z of both theories: 1 (2D, level, straight down), 1.076 (3D, 27         \
-            degrees) */
-#define RESIST_LEVEL 0.87504 /* alpha_z of the 3D theory for a level plate going straight down */
+#define RESIST_LEVEL                                                                               \
+    0.87504 /* alpha_z of the 3D theory for a level plate that goes straight down */
 
-/* N/cm^3, Li et al. 2013, table S3, generic. */
+/* [N/cm^3] Li et al. 2013, table S3, generic coefficients. */
 static const double A00 = 0.206, A10 = 0.169, B11 = 0.212, B01 = 0.358, BM11 = 0.055;
 static const double C11 = -0.124, C01 = 0.253, CM11 = 0.007, D10 = 0.088;
 
@@ -63,8 +68,8 @@ static const double space_coefficients[3][20] = {
      0.06790,  -0.16404, 0.02287, 0.02927,  0.95406, -0.00131, -0.11028,
      0.01487,  -0.02730, 0.10911, -0.04097, 0.07881, -0.27519}};
 
-/* Those polynomials for one plate, x2 held: of 1, x1, x3, x1^2, x1 x3, x3^2, x1^3, x1^2 x3, x1
- * x3^2, x3^3. */
+/* The polynomials of one plate, whose x2 is constant: coefficients of 1, x1, x3, x1^2, x1 x3, x3^2,
+ * x1^3, x1^2 x3, x1 x3^2, x3^3. */
 typedef double Cubic[10];
 
 static void cubic_at(const double *c, double y, Cubic a) {
@@ -87,8 +92,9 @@ ALWAYS_INLINE double cubic(const double *a, double x, double z) {
 }
 
 void mild_resist_space(const double normal[3], const double direction[3], double alpha[3]) {
-    double x = -direction[2],
-           z = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2], f[3];
+    double x = -direction[2];
+    double z = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
+    double f[3];
     for (int k = 0; k < 3; k++) {
         Cubic a;
         cubic_at(space_coefficients[k], -normal[2], a);
@@ -100,15 +106,15 @@ void mild_resist_space(const double normal[3], const double direction[3], double
     }
 }
 
-/* The sole as a plate: its normal into the ground, and the polynomials at that normal. */
+/* The sole as a plate. */
 typedef struct {
-    double normal[3], tilt;
-    Cubic f[3];
+    double normal[3]; /* [-] unit vector into the ground, world */
+    double tilt;      /* [-] length of its horizontal part */
+    Cubic f[3];       /* the polynomials at that normal */
 } Plate;
 
 static Plate plate_of(const double *rotation) {
-    double side =
-        rotation[8] > 0.0 ? -1.0 : 1.0; /* of the sole's two faces the one that looks down */
+    double side = rotation[8] > 0.0 ? -1.0 : 1.0; /* the face of the sole that looks down */
     Plate plate = {
         .normal = {side * rotation[2], side * rotation[5], real_min(side * rotation[8], -1e-6)}};
     plate.tilt =
@@ -119,8 +125,8 @@ static Plate plate_of(const double *rotation) {
     return plate;
 }
 
-/* Coefficients against the heading and upward, for motion at a level and a downward speed. lean: part
- * of the normal along the heading. in_space: bool, the theory in space. */
+/* Coefficients against the heading and upward, for motion at a level and a downward speed. lean:
+ * part of the normal along the heading. in_space: bool, the theory in space. */
 ALWAYS_INLINE Alpha plate_alpha(const Plate *plate, int in_space, double lean, double level,
                                 double down) {
     const double scale = 1.0 / sqrt(level * level + down * down);
@@ -143,7 +149,7 @@ ALWAYS_INLINE Alpha plate_alpha(const Plate *plate, int in_space, double lean, d
  * sideways, downward: coefficients [-] against the heading and up. */
 ALWAYS_INLINE void element_resist(Element *e, const ElementMemory *memory, double dt, double rate,
                                   double strength, double sideways, double downward) {
-    /* Yield below the peak begins ahead of the remembered depth on the line of the peak. */
+    /* The yield depth of the peak lies ahead of the depth that the element has reached. */
     const double peak = RESIST_PEAK * strength;
     const double share = real_min(real_max(downward / RESIST_PEAK, 0.0), 1.0);
     const double lead = ELEMENT_ELASTIC * (1.0 - share);
@@ -174,8 +180,8 @@ ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, co
     const SlotVelocity v = slot_velocity(s, i, motion, 1);
     const double down = real_max(v.descent, 0.0);
 
-    /* Heading: of the motion plus RESIST_REST along the tilt. Where there is neither, any will do: a
-     * level plate's are all alike. */
+    /* Heading: of the motion plus RESIST_REST along the tilt. Where there is neither, any will do:
+     * a level plate's are all alike. */
     const double rest = RESIST_REST / plate->tilt;
     const double hx = v.x + rest * plate->normal[0];
     const double hy = v.y + rest * plate->normal[1];

@@ -4,6 +4,10 @@
 
 #include "ground/scratch.h"
 
+#define RESIST_REST 1e-3 /* [m/s] speed below which the direction of motion fades out */
+/* Greatest alpha_z of both theories: 1 (2D, level, straight down), 1.076 (3D, 27 degrees). */
+#define RESIST_PEAK 1.08
+
 /* F = zeta 1e6 N/m^3 u per area under a level plate that goes straight down. */
 Law resist_law(const MildMaterial *material, double pitch);
 /* ModelRow.reference (model.h): the plate's friction is part of the measured coefficients. */

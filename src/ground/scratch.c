@@ -3,21 +3,25 @@
 
 #include "ground/scratch.h"
 
-/* depth, slope x y, point x y z, normal, tangent x y, flat; state and slip share one. */
-#define FOOT_ARRAYS 11
+/* Arrays of FootScratch beside the slots: x, y, depth, slope x y, point x y z, normal, tangent x y,
+ * flat; state and slip share one. */
+#define FOOT_ARRAYS 13
 
+/* The next `count` numbers of the block. */
 static double *take(double **at, int count) {
     double *taken = *at;
     *at += count;
     return taken;
 }
 
+/* Takes the sole's numbers and the arrays beside the slots. */
 static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     foot->elements = mild_sole_elements(sole);
     foot->padded = sole_padded(sole);
     foot->z = mild_sole_z(sole);
     foot->pitch = mild_sole_pitch(sole);
-    double *x = take(at, foot->padded), *y = take(at, foot->padded);
+    double *x = take(at, foot->padded);
+    double *y = take(at, foot->padded);
     memcpy(x, mild_sole_x(sole), (size_t)foot->elements * sizeof *x);
     memcpy(y, mild_sole_y(sole), (size_t)foot->elements * sizeof *y);
     for (int i = 0; i < foot->elements; i++) {
@@ -41,6 +45,20 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     foot->slip = foot->state + foot->padded;
 }
 
+/* Takes the arrays of the slots; no slot has a law yet. */
+static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
+    double **arrays = (double **)&foot->own;
+    for (size_t k = 0; k < SLOT_ARRAYS; k++) {
+        arrays[k] = take(at, foot->padded);
+    }
+    foot->slot = foot->own;
+    foot->element = integers;
+    foot->slot_material = integers + foot->padded;
+    for (int i = 0; i < foot->padded; i++) {
+        foot->slot_material[i] = MATERIAL_NONE;
+    }
+}
+
 MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildError *error) {
     if (feet < 1 || feet > MILD_FEET_MAX) {
         mild_fail(error, MILD_ERROR_RANGE, "feet = %d is outside 1 .. %d", feet, MILD_FEET_MAX);
@@ -50,9 +68,9 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     for (int f = 0; f < feet; f++) {
         slots += sole_padded(soles[f]);
     }
-    size_t doubles = (size_t)slots * (SLOT_ARRAYS + FOOT_ARRAYS + 2),
-           bytes = doubles * sizeof(double);
-    bytes = (bytes + 2 * (size_t)slots * sizeof(int32_t) + 63) / 64 * 64;
+    const size_t doubles = (size_t)slots * (SLOT_ARRAYS + FOOT_ARRAYS);
+    const size_t used = doubles * sizeof(double) + 2 * (size_t)slots * sizeof(int32_t);
+    const size_t bytes = (used + 63) / 64 * 64;
     MildScratch *scratch = calloc(1, sizeof *scratch);
     double *block = aligned_alloc(64, bytes);
     if (!scratch || !block) {
@@ -69,16 +87,7 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
     for (int f = 0; f < feet; f++) {
         FootScratch *foot = &scratch->foot[f];
         foot_set(foot, soles[f], &at);
-        double **arrays = (double **)&foot->own;
-        for (size_t k = 0; k < SLOT_ARRAYS; k++) {
-            arrays[k] = take(&at, foot->padded);
-        }
-        foot->slot = foot->own;
-        foot->element = integers;
-        foot->slot_material = integers + foot->padded;
-        for (int i = 0; i < foot->padded; i++) {
-            foot->slot_material[i] = MATERIAL_NONE;
-        }
+        foot_set_slots(foot, &at, integers);
         integers += 2 * foot->padded;
     }
     return scratch;
@@ -105,11 +114,18 @@ void slots_remember(Slots *s, const Memory *memory) {
 }
 
 void foot_points(const FootScratch *foot) {
-    const double *x = foot->x, *y = foot->y, *o = foot->origin, *e = foot->arm[1],
-                 *n = foot->arm[2];
-    const double ox = o[0] + foot->arm[0][0], oy = o[1] + foot->arm[0][1],
-                 oz = o[2] + foot->arm[0][2];
-    const double ex = e[0], ey = e[1], ez = e[2], nx = n[0], ny = n[1], nz = n[2];
+    const double *x = foot->x;
+    const double *y = foot->y;
+    const double *o = foot->origin;
+    const double ox = o[0] + foot->arm[0][0];
+    const double oy = o[1] + foot->arm[0][1];
+    const double oz = o[2] + foot->arm[0][2];
+    const double ex = foot->arm[1][0];
+    const double ey = foot->arm[1][1];
+    const double ez = foot->arm[1][2];
+    const double nx = foot->arm[2][0];
+    const double ny = foot->arm[2][1];
+    const double nz = foot->arm[2][2];
 #pragma omp simd
     for (int i = 0; i < foot->padded; i++) {
         foot->point_x[i] = ox + ex * x[i] + nx * y[i];

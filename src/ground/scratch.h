@@ -2,11 +2,11 @@
 #ifndef MILD_GROUND_SCRATCH_H
 #define MILD_GROUND_SCRATCH_H
 
-#include "ground/material.h"
 #include "ground/slots.h"
 #include "ground/state.h"
 
 #define TWIST_MAX (6 * MILD_FEET_MAX)
+#define PADDING_DEPTH (-1e3) /* [m] depth of the padding: it never touches */
 
 /* Law of a material as last derived; valid while the material's bytes stay the same. */
 typedef struct {
@@ -48,6 +48,7 @@ typedef struct FootScratch {
     /* Law of each slot: foot_laws, foot_prepare. */
     int curves;             /* LawCurve bits of the terrain's materials */
     int nan;                /* bool: a material of the terrain is not a number */
+    int turned;             /* bool: turn_x and turn_y may not be 0 */
     int stops;              /* bool: stop_drag, stop_growth, explicit_impulse may not be 0 */
     int32_t *slot_material; /* [padded] whose law the slot holds, coded as in Memory */
     DerivedLaw derived[MILD_MATERIALS_MAX];
@@ -67,7 +68,8 @@ typedef struct FootScratch {
 struct MildScratch {
     int feet;
     FootScratch foot[MILD_FEET_MAX];
-    double wrench[TWIST_MAX]; /* [N s, N m s] sum of B^T I at the last pass */
+    double sums[MILD_FEET_MAX][9]; /* [N s, N s m] of I, x I and y I at the last pass */
+    double wrench[TWIST_MAX];      /* [N s, N m s] sum of B^T I at the last pass */
     double hessian[MILD_FEET_MAX]
                   [36];         /* [kg, kg m, kg m^2] -d wrench/d twist of a foot, row major */
     double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve */

@@ -1,7 +1,8 @@
-/* The heights of a map: formulas of mild/map.h at the grid's points, one period of what repeats. */
-#include <stdlib.h>
+/* Heights are the formulas of MildMapKind (mild/map.h) at the points of the grid. Of a shape that
+ * repeats the grid holds one period. */
+#include "ground/shape.h"
 
-#include "ground/map.h"
+#include <stdlib.h>
 
 #define TWO_PI 6.283185307179586
 
@@ -18,7 +19,7 @@ static double height_waves(const MildMapDef *def, double x, double y) {
     return 0.5 * def->amplitude * (sin(k * x) + sin(k * y));
 }
 
-/* Random height in [-1, 1] of a lattice point (SplitMix64 of seed and point). */
+/* Random height in [-1, 1) of a lattice point: SplitMix64 of the seed and the point. */
 static double lattice_height(uint64_t seed, int i, int j) {
     uint64_t x = seed + 0x9e3779b97f4a7c15u * (((uint64_t)(uint32_t)i << 32) + (uint32_t)j + 1u);
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -27,16 +28,19 @@ static double lattice_height(uint64_t seed, int i, int j) {
     return 2.0 * ((double)(x >> 11) * 0x1.0p-53) - 1.0;
 }
 
+/* Smooth step from 0 to 1, level at both ends. */
 static double smooth(double t) {
     return t * t * (3.0 - 2.0 * t);
 }
 
 static double height_rough(const MildMapDef *def, double x, double y) {
     int points = (int)fmax(1.0, round(def->size / def->wavelength));
-    GridPlace a = grid_place(x / def->size * points, points, 1),
-              b = grid_place(y / def->size * points, points, 1);
-    int i1 = (a.cell + 1) % points, j1 = (b.cell + 1) % points;
-    double s = smooth(a.share), t = smooth(b.share);
+    GridPlace a = grid_place(x / def->size * points, points, 1);
+    GridPlace b = grid_place(y / def->size * points, points, 1);
+    int i1 = (a.cell + 1) % points;
+    int j1 = (b.cell + 1) % points;
+    double s = smooth(a.share);
+    double t = smooth(b.share);
     double low = (1.0 - s) * lattice_height(def->seed, a.cell, b.cell) +
                  s * lattice_height(def->seed, i1, b.cell);
     double high =
@@ -56,12 +60,12 @@ static MildStatus shape_allocate(MildMap *map, double columns, double rows, doub
     return map->height ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "terrain: out of memory");
 }
 
-/* One period of a formula; a whole number of cells fills it. The last points are the first ones
- * again. */
+/* One period of a formula, filled by a whole number of cells. The last points repeat the first. */
 static MildStatus shape_formula(MildMap *map, const MildMapDef *def, double period, int along_y,
                                 ShapeHeight height, MildError *error) {
-    double columns = ceil(period / def->cell - 1e-9), rows = along_y ? columns : 1.0,
-           cell = period / columns;
+    double columns = ceil(period / def->cell - 1e-9);
+    double rows = along_y ? columns : 1.0;
+    double cell = period / columns;
     MildStatus status = shape_allocate(map, columns, rows, cell, cell, 1, error);
     if (status != MILD_OK) {
         return status;

@@ -69,6 +69,10 @@ typedef struct {
     double *hold_y;           /* [N s] */
     double *hold_stiffness;   /* [kg] */
 
+    /* Only where the foot is `turned`: energy_created; otherwise 0. */
+    double *turn_x; /* [m/s] */
+    double *turn_y; /* [m/s] */
+
     /* Only where the foot `stops`: slots_drag, slots_explicit; otherwise 0. */
     double *stop_drag;        /* [kg s/m^2] */
     double *stop_growth;      /* [m] */
@@ -91,9 +95,10 @@ typedef struct {
     double *hzy; /* [kg] */
     double *hzz; /* [kg] */
 
-    double *bound; /* [N s] of friction, where the solver holds it: contact_bounds */
-    double *fx;    /* [N s] friction without the drift's damping: the sweeps */
-    double *fy;    /* [N s] */
+    double *bound;       /* [N s] of friction, where the solver holds it: bounds_move */
+    double *bound_moved; /* [N s] its last move */
+    double *fx;          /* [N s] friction without the drift's damping: the sweeps */
+    double *fy;          /* [N s] */
 } Slots;
 #define SLOT_ARRAYS (sizeof(Slots) / sizeof(double *))
 
@@ -132,6 +137,8 @@ ALWAYS_INLINE Element slot_element(const Slots *s, int i) {
         .hold_x = s->hold_x[i],
         .hold_y = s->hold_y[i],
         .hold_stiffness = s->hold_stiffness[i],
+        .turn_x = s->turn_x[i],
+        .turn_y = s->turn_y[i],
     };
 }
 

@@ -6,23 +6,28 @@
 #include "mild/ground.h"
 
 #define SOLE_ELEMENTS_MAX 65536
-#define SOLE_POINTS_MAX 4096 /* the search for crossing edges takes their square */
+#define SOLE_POINTS_MAX 4096 /* the search for crossing edges takes the square of it */
 #define RASTER_PHASES 16     /* raster offsets tried along each axis */
 
 struct MildSole {
     int elements;
-    double pitch, z;
-    double values[]; /* x[elements], then y[elements] */
+    double pitch;    /* [m] */
+    double z;        /* [m] */
+    double values[]; /* [m] x[elements], then y[elements] */
 };
 
-/* One raster: cells of `pitch` whose corner lies at origin, columns x rows of them. */
+/* A raster of square cells with edge `pitch` that covers the outline. */
 typedef struct {
-    double origin[2];
-    int columns, rows;
+    double origin[2]; /* [m] corner of the first cell */
+    int columns;      /* along x */
+    int rows;         /* along y */
 } Raster;
 
 typedef struct {
-    double low[2], high[2], area, center[2];
+    double low[2];    /* [m] corners of the box around it */
+    double high[2];   /* [m] */
+    double area;      /* [m^2] */
+    double center[2]; /* [m] centroid */
 } Outline;
 
 static Outline outline_measure(const MildSoleDef *def) {
@@ -43,6 +48,8 @@ static Outline outline_measure(const MildSoleDef *def) {
     return outline;
 }
 
+/* Twice the signed area of the triangle a b c: positive when c lies left of the line from a to
+ * b. */
 static double side(const double *a, const double *b, const double *c) {
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
@@ -51,7 +58,8 @@ static int edges_cross(const double *a, const double *b, const double *c, const 
     return side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0;
 }
 
-static MildStatus def_check(const MildSoleDef *def, MildError *error) {
+/* Every number alone. */
+static MildStatus numbers_check(const MildSoleDef *def, MildError *error) {
     if (!def->outline || def->points < 3) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "sole.points = %d: an outline needs at least 3", def->points);
@@ -77,6 +85,11 @@ static MildStatus def_check(const MildSoleDef *def, MildError *error) {
         return mild_fail(error, MILD_ERROR_RANGE, "sole.target_elements = %d is outside 0 .. %d",
                          def->target_elements, SOLE_ELEMENTS_MAX);
     }
+    return MILD_OK;
+}
+
+/* The outline as a whole, once its numbers are good. */
+static MildStatus outline_check(const MildSoleDef *def, MildError *error) {
     for (int i = 0; i < def->points; i++) {
         for (int j = i + 1; j < def->points; j++) {
             if (edges_cross(&def->outline[2 * i], &def->outline[2 * ((i + 1) % def->points)],
@@ -99,8 +112,8 @@ static MildStatus def_check(const MildSoleDef *def, MildError *error) {
     return MILD_OK;
 }
 
-/* The part of a convex strip: keep the points where sign * (p[axis] - bound) >= 0
- * (Sutherland-Hodgman). `out` has room for twice `count` points. */
+/* Clips a polygon by a half plane: keeps the part where sign * (p[axis] - bound) >= 0
+ * (Sutherland-Hodgman). `out` has room for twice `count` points. Returns the number of points. */
 static int clip_half(const double *in, int count, double *out, int axis, double bound,
                      double sign) {
     int kept = 0;
@@ -121,9 +134,9 @@ static int clip_half(const double *in, int count, double *out, int axis, double 
     return kept;
 }
 
-/* Share of a cell that the outline covers, 0 .. 1. Clipping a polygon by a rectangle may leave
- * edges that run back and forth along the border; they enclose nothing, so the area is exact for
- * concave outlines too. */
+/* Share of a cell that the outline covers, 0 .. 1. Clipping a concave polygon may leave edges that
+ * run back and forth along the border of the cell. They enclose nothing, so the area is exact.
+ * work: room for 64 numbers for each point of the outline. */
 static double cell_coverage(const MildSoleDef *def, const double *corner, double *work) {
     int count = def->points;
     double *a = work, *b = work + 32 * (size_t)def->points;
@@ -154,7 +167,7 @@ static int point_inside(const MildSoleDef *def, double x, double y) {
     return inside;
 }
 
-/* The raster whose cell borders run at phase[k] * pitch beside the middle of the outline's box:
+/* The raster with a cell border at phase[k] * pitch from the middle of the outline's box. It is
  * measured from the middle, so that mirrored outlines get mirrored rasters. */
 static Raster raster_at(const MildSoleDef *def, const Outline *outline, const double *phase) {
     Raster raster;
@@ -170,16 +183,16 @@ static Raster raster_at(const MildSoleDef *def, const Outline *outline, const do
     return raster;
 }
 
-/* Cells whose centre is inside; *off_center: distance between the centroids of these cells and of
- * the outline. */
+/* Number of cells whose centre is inside. *off_center receives the distance between the centroids
+ * of these cells and of the outline [m]. */
 static int raster_count(const MildSoleDef *def, const Outline *outline, const Raster *raster,
                         double *off_center) {
     int count = 0;
     double sum[2] = {0.0, 0.0};
     for (int i = 0; i < raster->columns; i++) {
         for (int j = 0; j < raster->rows; j++) {
-            double x = raster->origin[0] + (i + 0.5) * def->pitch,
-                   y = raster->origin[1] + (j + 0.5) * def->pitch;
+            double x = raster->origin[0] + (i + 0.5) * def->pitch;
+            double y = raster->origin[1] + (j + 0.5) * def->pitch;
             if (!point_inside(def, x, y)) {
                 continue;
             }
@@ -194,15 +207,14 @@ static int raster_count(const MildSoleDef *def, const Outline *outline, const Ra
     return count;
 }
 
-/* The offset whose count comes nearest to the target (none given: to the outline's area); among
- * equals the one with the nearest centroid. */
+/* The raster whose count comes nearest to the target; without a target, to the outline's area by
+ * that of a cell. Among equals the one with the nearest centroid. Without a target either a border
+ * or a centre of cells lies in the middle of the outline's box. */
 static Raster raster_choose(const MildSoleDef *def, const Outline *outline) {
     int best_miss = INT32_MAX;
     double best_off = INFINITY;
     Raster best = {{0.0, 0.0}, 0, 0};
-    int phases = def->target_elements
-                     ? RASTER_PHASES
-                     : 2; /* without a target: a border or a centre in the middle */
+    int phases = def->target_elements ? RASTER_PHASES : 2;
     int target = def->target_elements ? def->target_elements
                                       : (int)lround(outline->area / (def->pitch * def->pitch));
     for (int i = 0; i < phases; i++) {
@@ -223,11 +235,13 @@ static Raster raster_choose(const MildSoleDef *def, const Outline *outline) {
 }
 
 typedef struct {
-    double coverage;
-    int cell, inside; /* inside: the cell's centre is inside the outline */
+    double coverage; /* [-] share of its area inside the outline */
+    int cell;        /* column times rows plus row */
+    int inside;      /* bool: its centre is inside the outline */
 } Cell;
 
-/* Centres inside first, then by coverage; the cell number makes the order total. */
+/* Cells with their centre inside come first, then those with more coverage. The index decides
+ * between equals, so that the order does not depend on the sorting algorithm. */
 static int cell_compare(const void *left, const void *right) {
     const Cell *a = left, *b = right;
     if (a->inside != b->inside) {
@@ -243,11 +257,12 @@ static int cell_compare_place(const void *left, const void *right) {
     return ((const Cell *)left)->cell - ((const Cell *)right)->cell;
 }
 
-/* Fills `cells` sorted so that the first *chosen make the sole. Returns false when the target is
- * out of reach. */
+/* Fills `cells` so that the first *chosen of them make the sole, in the order of their indices.
+ * Returns false when fewer cells than the target touch the outline. */
 static int cells_choose(const MildSoleDef *def, const Raster *raster, Cell *cells, double *work,
                         int *chosen) {
-    int total = raster->columns * raster->rows, inside = 0;
+    int total = raster->columns * raster->rows;
+    int inside = 0;
     for (int cell = 0; cell < total; cell++) {
         double corner[2] = {raster->origin[0] + cell / raster->rows * def->pitch,
                             raster->origin[1] + cell % raster->rows * def->pitch};
@@ -283,14 +298,15 @@ static MildSole *sole_from_cells(const MildSoleDef *def, const Raster *raster, c
 }
 
 MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
-    if (def_check(def, error) != MILD_OK) {
+    if (numbers_check(def, error) != MILD_OK || outline_check(def, error) != MILD_OK) {
         return NULL;
     }
     Outline outline = outline_measure(def);
     Raster raster = raster_choose(def, &outline);
     MildSole *sole = NULL;
-    int chosen = 0, reached = 1;
-    /* Each of four clips at most doubles the points. */
+    int chosen = 0;
+    int reached = 1;
+    /* Each of four clips at most doubles the points, of two numbers each, in two buffers. */
     double *work = malloc(64 * (size_t)def->points * sizeof *work);
     Cell *cells = malloc(((size_t)raster.columns * (size_t)raster.rows + 1) * sizeof *cells);
     if (work && cells) {

@@ -1,5 +1,6 @@
 #include <string.h>
 
+#include "ground/energy.h"
 #include "ground/friction.h"
 #include "ground/prepare.h"
 #include "ground/solver.h"
@@ -77,9 +78,29 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
     }
 }
 
-/* Wrench and zero moment point. Paper eq 15: r = [F]x^+ tau, which for the true torque tau = p x F
- * is F x tau/|F|^2, the point of the wrench's central axis nearest the ankle. On the sole: the
- * point where the horizontal torque vanishes. */
+/* Paper eq 15: r = [F]x^+ tau, which for the true torque tau = p x F is F x tau/|F|^2, the point of
+ * the wrench's central axis nearest the ankle. F is divided by its largest component first: the square
+ * of a small force may be 0, of a large one infinite. Where the axis lies beyond all numbers, because
+ * hardly any force is left beside a torque, the point is 0 as without a force. */
+static void foot_axis(const double *F, const double *tau, double *point) {
+    const double most = fmax(fmax(fabs(F[0]), fabs(F[1])), fabs(F[2]));
+    if (!(most > 0.0)) {
+        return;
+    }
+    const double n[3] = {F[0] / most, F[1] / most, F[2] / most};
+    const double square = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) * most;
+    double finite = 0.0;
+    for (int k = 0; k < 3; k++) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        point[k] = (n[i] * tau[j] - n[j] * tau[i]) / square;
+        finite += 0.0 * point[k];
+    }
+    if (finite != 0.0) {
+        memset(point, 0, 3 * sizeof *point);
+    }
+}
+
+/* Wrench and zero moment point. On the sole: the point where the horizontal torque vanishes. */
 static void foot_result(const MildScratch *scratch, const MildContactInput *input, int f,
                         MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
@@ -89,17 +110,13 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
         F[k] = scratch->wrench[6 * f + k] / input->dt;
         tau[k] = scratch->wrench[6 * f + 3 + k] / input->dt;
     }
-    double square = F[0] * F[0] + F[1] * F[1] + F[2] * F[2];
-    if (square > 0.0) {
-        for (int k = 0; k < 3; k++) {
-            int i = (k + 1) % 3, j = (k + 2) % 3;
-            result->zmp_axis[k] = (F[i] * tau[j] - F[j] * tau[i]) / square;
-        }
-    }
+    foot_axis(F, tau, result->zmp_axis);
     double z = R[6] * foot->center_x + R[7] * foot->center_y + R[8] * foot->z;
     if (F[2] > 0.0) {
-        result->zmp_sole[0] = (z * F[0] - tau[1]) / F[2];
-        result->zmp_sole[1] = (tau[0] + z * F[1]) / F[2];
+        const double x = (z * F[0] - tau[1]) / F[2];
+        const double y = (tau[0] + z * F[1]) / F[2];
+        result->zmp_sole[0] = isfinite(x + y) ? x : 0.0;
+        result->zmp_sole[1] = isfinite(x + y) ? y : 0.0;
     }
     foot_loaded(scratch, input->position[f], f, result);
 }
@@ -119,9 +136,20 @@ static int all_finite(const MildContactInput *input, const MildContactResult *re
     double sum = finite_sum(result->velocity, 6 * feet), rate = 1.0 / input->dt;
     for (int f = 0; f < feet; f++) {
         sum += finite_sum(input->position[f], 3) + finite_sum(input->rotation[f], 9) +
-               finite_sum(result->foot[f].force, 3) + finite_sum(result->foot[f].torque, 3);
+               finite_sum(result->foot[f].force, 3) + finite_sum(result->foot[f].torque, 3) +
+               finite_sum(result->foot[f].zmp_axis, 3) + finite_sum(result->foot[f].zmp_sole, 2) +
+               finite_sum(result->foot[f].pressure_center, 3);
     }
     return sum == 0.0 && rate > 0.0 && isfinite(rate);
+}
+
+static void step_solve(MildScratch *scratch, const MildContactInput *input,
+                       MildContactResult *result) {
+    if (input->solver == MILD_SOLVER_GAUSS_SEIDEL) {
+        sweep_solve(scratch, input, result);
+    } else {
+        newton_solve(scratch, input, result);
+    }
 }
 
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
@@ -133,10 +161,18 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
     if (contact_prepare(ground, terrain, input, scratch) == 0) {
         memcpy(result->velocity, input->free_velocity, bytes);
         result->converged = 1;
-    } else if (input->solver == MILD_SOLVER_GAUSS_SEIDEL) {
-        sweep_solve(scratch, input, result);
     } else {
-        newton_solve(scratch, input, result);
+        energy_begin(scratch);
+        step_solve(scratch, input, result);
+        int iterations = result->iterations;
+        for (int round = 1; round <= ENERGY_ROUNDS; round++) {
+            if (!energy_created(scratch, input, result, round == ENERGY_ROUNDS)) {
+                break;
+            }
+            step_solve(scratch, input, result);
+            iterations += result->iterations;
+        }
+        result->iterations = iterations;
     }
     memcpy(scratch->velocity, result->velocity, bytes);
     int nan = 0;

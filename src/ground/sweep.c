@@ -105,14 +105,17 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G), old[3] = {s->ix[i], s->iy[i], s->iz[i]},
            fx = s->fx[i], fy = s->fy[i];
     s->iz[i] = element_normal(s, i, foot->curves, sweep->dt, w, G[2]);
-    element_friction(s, i, v, delta, G_xy);
+    const Element element = slot_element(s, i);
+    double d[2] = {v[0], v[1]}; /* what friction opposes */
+    friction_turn(&element, &d[0], &d[1]);
+    element_friction(s, i, d, delta, G_xy);
     double b = s->damping[i],
            relax = 1.0 / (1.0 + b * G_xy); /* implicit drift damping, as for the normal part */
     double nx = s->slope_x[i] * s->iz[i],
            ny = s->slope_y[i] * s->iz[i]; /* the normal impulse leans downhill */
     double bx = old[0] + s->slope_x[i] * old[2] - fx, by = old[1] + s->slope_y[i] * old[2] - fy;
-    s->ix[i] = s->fx[i] + bx - relax * (b * v[0] + bx) - nx;
-    s->iy[i] = s->fy[i] + by - relax * (b * v[1] + by) - ny;
+    s->ix[i] = s->fx[i] + bx - relax * (b * d[0] + bx) - nx;
+    s->iy[i] = s->fy[i] + by - relax * (b * d[1] + by) - ny;
     const double change[3] = {s->ix[i] - old[0], s->iy[i] - old[1], s->iz[i] - old[2]};
     sweep->changed += fabs(change[0]) + fabs(change[1]) + fabs(change[2]);
     sweep->total += fabs(s->ix[i]) + fabs(s->iy[i]) + fabs(s->iz[i]);

@@ -238,7 +238,7 @@ static void place_feet(RobotSim *sim) {
     }
 }
 
-/* What the feet would do without ground: A = J M^-1 J^T and V^ = J (nu + dt a). */
+/* What the feet would do without ground: A = J M^-1 J^T and V_free = J (qvel + dt a). */
 static void free_feet(RobotSim *sim) {
     foot_map_inverse_inertia(sim);
     for (int f = 0; f < sim->robot->def.feet; f++) {

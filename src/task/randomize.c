@@ -5,6 +5,7 @@
 #include "base/random.h"
 #include "task/task.h"
 
+#define DRAW_TRIES 100 /* of a material that the model can match */
 #define RANDOM_USE_EPISODE 0x45504953u
 #define RANDOM_USE_MAP 0x4d415050u
 #define RANDOM_USE_COMMAND 0x434f4d4du
@@ -64,13 +65,20 @@ static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot 
     return m;
 }
 
+/* A match may need a number that no material may have (mild_model_match): then another is drawn. */
 static MildMaterial draw_material(Random *r, const RandomizeDef *def, const Robot *robot) {
     double preset = def->rigid_share < 1 ? def->preset_share / (1 - def->rigid_share) : 0;
-    MildMaterial m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot),
-                 rival;
-    if (def->model == MILD_MODEL_RIGID) {
-        return m; /* the engine's contact reads none of it */
+    MildMaterial m, rival;
+    for (int tries = 0; tries < DRAW_TRIES; tries++) {
+        m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot);
+        if (def->model == MILD_MODEL_RIGID) {
+            return m; /* the engine's contact reads none of it */
+        }
+        if (robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL) == MILD_OK) {
+            return rival;
+        }
     }
+    m = mild_material_default();
     MildStatus status = robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL);
     assert(status == MILD_OK);
     (void)status;

@@ -1,9 +1,16 @@
 /* Every piece is run exactly once, by a thread of the team, whatever the number of threads. */
+#include <pthread.h>
+#include <sched.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <stdlib.h>
+#include <time.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -58,6 +65,68 @@ static void test_every_piece_once(void **state) {
     }
 }
 
+/* Pieces that wait for each other: they end only when the whole team works at the same time. */
+typedef struct {
+    atomic_int arrived, blocked;
+    int threads;
+    pthread_t caller;
+} Meeting;
+
+static void meet(void *context, int piece, int thread) {
+    (void)piece;
+    Meeting *meeting = context;
+    sigset_t mask;
+    pthread_sigmask(SIG_SETMASK, NULL, &mask);
+    if (pthread_equal(pthread_self(), meeting->caller)) {
+        atomic_fetch_add(&meeting->blocked, thread == 0 && !sigismember(&mask, SIGINT) ? 0 : 100);
+    } else {
+        atomic_fetch_add(&meeting->blocked, thread > 0 && sigismember(&mask, SIGINT));
+    }
+    atomic_fetch_add(&meeting->arrived, 1);
+    const double begin = clock_seconds();
+    while (atomic_load(&meeting->arrived) < meeting->threads && clock_seconds() < begin + 20) {
+        sched_yield();
+    }
+}
+
+/* All threads at once; signals are the caller's alone. */
+static void test_whole_team(void **state) {
+    (void)state;
+    for (int threads = 2; threads <= 4; threads++) {
+        Pool *pool = pool_create(threads);
+        assert_non_null(pool);
+        for (int run = 0; run < 20; run++) {
+            Meeting meeting = {.threads = threads, .caller = pthread_self()};
+            pool_run(pool, threads, meet, &meeting);
+            assert_int_equal(atomic_load(&meeting.arrived), threads);
+            assert_int_equal(atomic_load(&meeting.blocked), threads - 1);
+        }
+        pool_destroy(pool);
+    }
+}
+
+/* The caller's piece is quick, the others are slow: when pool_run returns all are done. */
+static void slow_piece(void *context, int piece, int thread) {
+    int *done = context;
+    const struct timespec pause = {.tv_nsec = thread > 0 ? 2000000 : 100000};
+    nanosleep(&pause, NULL);
+    done[piece] = 1;
+}
+
+static void test_waits_for_all(void **state) {
+    (void)state;
+    Pool *pool = pool_create(4);
+    assert_non_null(pool);
+    for (int run = 0; run < 20; run++) {
+        int done[6] = {0};
+        pool_run(pool, 6, slow_piece, done);
+        for (int i = 0; i < 6; i++) {
+            assert_true(done[i]);
+        }
+    }
+    pool_destroy(pool);
+}
+
 static void test_create_and_destroy(void **state) {
     (void)state;
     for (int i = 0; i < 100; i++) {
@@ -68,8 +137,26 @@ static void test_create_and_destroy(void **state) {
     pool_destroy(NULL);
     Pool *pool = pool_create(0);
     assert_non_null(pool);
-    assert_true(pool_threads(pool) >= 1);
+    assert_int_equal(pool_threads(pool), sysconf(_SC_NPROCESSORS_ONLN));
     pool_destroy(pool);
+}
+
+/* The wall clock counts a pause in seconds, a thread's processor time does not. */
+static void test_clocks(void **state) {
+    (void)state;
+    const struct timespec pause = {.tv_nsec = 50000000};
+    const double wall = clock_seconds(), busy = clock_thread_seconds();
+    nanosleep(&pause, NULL);
+    const double wall_taken = clock_seconds() - wall, busy_taken = clock_thread_seconds() - busy;
+    printf("pause of 50 ms: %.1f ms of wall time, %.2f ms of processor time\n", 1e3 * wall_taken,
+           1e3 * busy_taken);
+    assert_true(wall_taken >= 0.05 && wall_taken < 20);
+    assert_true(busy_taken >= 0 && busy_taken < 0.04);
+    volatile double sum = 0;
+    for (int i = 0; i < 2000000; i++) {
+        sum = sum + i;
+    }
+    assert_true(clock_thread_seconds() - busy > 1e-4);
 }
 
 static void test_clock_moves_forward(void **state) {
@@ -84,9 +171,9 @@ static void test_clock_moves_forward(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_every_piece_once),
-        cmocka_unit_test(test_create_and_destroy),
-        cmocka_unit_test(test_clock_moves_forward),
+        cmocka_unit_test(test_every_piece_once), cmocka_unit_test(test_whole_team),
+        cmocka_unit_test(test_waits_for_all),    cmocka_unit_test(test_create_and_destroy),
+        cmocka_unit_test(test_clocks),           cmocka_unit_test(test_clock_moves_forward),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -102,8 +102,9 @@ static void check_finite(const double *values, int count) {
 
 static void check_result(const MildContactInput *input, const MildContactResult *result,
                          const Feet *feet) {
-    fuzz_check(result->iterations >= 0 &&
-               result->iterations <= (input->max_iterations ? input->max_iterations : 400));
+    /* Solved up to three times, and what is left unsolved takes up to 40 more (mild/ground.h). */
+    int most = 3 * ((input->max_iterations ? input->max_iterations : 400) + 40);
+    fuzz_check(result->iterations >= 0 && result->iterations <= most);
     if (!result->converged) {
         return;
     }
@@ -112,6 +113,9 @@ static void check_result(const MildContactInput *input, const MildContactResult 
         const MildFootResult *foot = &result->foot[f];
         check_finite(foot->force, 3);
         check_finite(foot->torque, 3);
+        check_finite(foot->zmp_axis, 3);
+        check_finite(foot->zmp_sole, 2);
+        check_finite(foot->pressure_center, 3);
         check_finite(mild_scratch_elements(feet->scratch[input->feet - 1], f).normal,
                      mild_sole_elements(feet->soles[f]));
         fuzz_check(foot->contacts >= 0 && foot->contacts <= mild_sole_elements(feet->soles[f]));

@@ -1,8 +1,11 @@
 #include "dense.h"
 
-#include "ground/begin.h" /* the constants of these three */
+/* The constants of these five. */
+#include "ground/begin.h"
+#include "ground/element_law.h"
 #include "ground/friction.h"
 #include "ground/impulse.h"
+#include "ground/resist.h"
 #include "ground/scratch.h"
 
 #define DENSE_STEPS 200 /* of Newton's method at given bounds */
@@ -10,9 +13,6 @@
 #define DENSE_SMALL 1e-12 /* relative motion at which a method rests */
 #define DENSE_JACOBI 60
 #define DENSE_SINGULAR 1e-13 /* least eigenvalue by the largest */
-#define DENSE_AT_ONCE 1e-9   /* [m] u_f of a law without a flat part */
-#define DENSE_REST 1e-3      /* [m/s] resistive force theory at rest, docs/model.md section 19 */
-#define DENSE_PEAK 1.08      /* [-] its greatest coefficient there */
 
 /* ---- the element's law ---- */
 
@@ -108,7 +108,7 @@ static DenseLaw law_material(const MildMaterial *m, double pitch) {
                     .b_drift = m->b_drift};
     if (is_straight(m)) {
         law.k_pen = law.kappa = is_resistive(m) ? m->zeta * LAW_RESIST_STRESS * area : m->k_pen;
-        law.full = DENSE_AT_ONCE;
+        law.full = LAW_LINE_DEPTH;
         return law;
     }
     law.k_pen = m->k_pen;
@@ -227,7 +227,7 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
     double tilt = hypot(n[0], n[1]), heading[2] = {v[0], v[1]}, level = hypot(v[0], v[1]),
            down = fmax(w, 0.0), x[2], z[2];
     for (int k = 0; k < 2 && tilt > 0.0; k++) {
-        heading[k] += DENSE_REST * n[k] / tilt;
+        heading[k] += RESIST_REST * n[k] / tilt;
     }
     if (level * ELEMENT_LAG < FRICTION_ELASTIC) {
         level = 0.0; /* friction may hold it yet */
@@ -236,9 +236,9 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
     for (int k = 0; k < 2 && length > 0.0; k++) {
         heading[k] /= length;
     }
-    resist_alpha(model, n, heading, level + DENSE_REST, down, x);
-    resist_alpha(model, n, heading, level, down + DENSE_REST, z);
-    double share = fmin(fmax(z[1] / DENSE_PEAK, 0.0), 1.0), peak = DENSE_PEAK * strength;
+    resist_alpha(model, n, heading, level + RESIST_REST, down, x);
+    resist_alpha(model, n, heading, level, down + RESIST_REST, z);
+    double share = fmin(fmax(z[1] / RESIST_PEAK, 0.0), 1.0), peak = RESIST_PEAK * strength;
     if (e->m0 > 0.0) {
         double least =
             e->m0 + ELEMENT_ELASTIC * (1.0 - share); /* deeper than the elastic travel; or else */
@@ -380,6 +380,7 @@ static void dense_element(Dense *d, const Find *find) {
         }
     }
     e->u0 = find_depth(find);
+    memcpy(e->before, now, sizeof e->before);
     e->w0 = fmax(now[3], 0.0);
     e->m0 = memory->middle[i] > 0.0 ? memory->middle[i] : e->u0 - 0.5 * d->dt * now[3];
     e->front = e->deep = fmax(fmax(e->m0, deepest), 0.0);
@@ -442,6 +443,33 @@ static void element_velocity(const Dense *d, const DenseElement *e, const double
     }
 }
 
+/* d: the velocity v less the nearest point of the way from 0 to -turn. Returns whether that point is
+ * within the way, along = the way's direction. */
+static int element_opposed(const DenseElement *e, const double *v, double *d, double *along) {
+    double length = hypot(e->turn[0], e->turn[1]);
+    d[0] = v[0];
+    d[1] = v[1];
+    if (length == 0.0) {
+        return 0;
+    }
+    along[0] = -e->turn[0] / length;
+    along[1] = -e->turn[1] / length;
+    double at = v[0] * along[0] + v[1] * along[1], to = fmin(fmax(at, 0.0), length);
+    d[0] -= to * along[0];
+    d[1] -= to * along[1];
+    return at > 0.0 && at < length;
+}
+
+/* Friction under the bound r. */
+static void element_friction(const DenseElement *e, double r, const double *v, double *I) {
+    double d[2], along[2], k = e->grip + r * ELEMENT_LAG / FRICTION_ELASTIC;
+    element_opposed(e, v, d, along);
+    double tx = e->hold[0] - k * d[0], ty = e->hold[1] - k * d[1], t = hypot(tx, ty);
+    double share = t > r ? r / t : 1.0;
+    I[0] = share * tx - e->damping * d[0];
+    I[1] = share * ty - e->damping * d[1];
+}
+
 /* Gradient y - sum C^T I and, if wanted, the Hessian 1 + sum C^T K C; the normal law's slope by
  * difference. The normal impulse acts along -grad u: its power is -I_z du/dt, so its row of C is
  * minus that of du/dt. */
@@ -457,11 +485,8 @@ static void dense_gradient(const Dense *d, const double *y, double *g, double H[
         const DenseElement *e = &d->element[i];
         double v[4];
         element_velocity(d, e, y, v);
-        double r = d->bound[i], along = e->grip + r * ELEMENT_LAG / FRICTION_ELASTIC;
-        double tx = e->hold[0] - along * v[0], ty = e->hold[1] - along * v[1], t = hypot(tx, ty),
-               share = t > r ? r / t : 1.0;
-        const double I[3] = {share * tx - e->damping * v[0], share * ty - e->damping * v[1],
-                             law_normal(d->dt, e, v[3])};
+        double I[3] = {0.0, 0.0, law_normal(d->dt, e, v[3])};
+        element_friction(e, d->bound[i], v, I);
         for (int c = 0; c < n; c++) {
             g[c] -= e->C[0][c] * I[0] + e->C[1][c] * I[1] - e->C[3][c] * I[2];
         }
@@ -470,9 +495,20 @@ static void dense_gradient(const Dense *d, const double *y, double *g, double H[
         }
         double h = 1e-7, stiff = (law_normal(d->dt, e, v[3] + h) - law_normal(d->dt, e, v[3] - h)) /
                                  (2.0 * h);
+        double o[2], way[2], r = d->bound[i], along = e->grip + r * ELEMENT_LAG / FRICTION_ELASTIC;
+        int within = element_opposed(e, v, o, way);
+        double tx = e->hold[0] - along * o[0], ty = e->hold[1] - along * o[1], t = hypot(tx, ty),
+               share = t > r ? r / t : 1.0;
         double nx = t > r ? tx / t : 0.0, ny = t > r ? ty / t : 0.0, pull = share * along;
         double xx = e->damping + pull * (1.0 - nx * nx), xy = -pull * nx * ny,
                yy = e->damping + pull * (1.0 - ny * ny);
+        if (within) { /* along the way nothing changes; across it d does, at a right angle to it */
+            double across =
+                way[1] * way[1] * xx - 2.0 * way[0] * way[1] * xy + way[0] * way[0] * yy;
+            xx = across * way[1] * way[1];
+            xy = -across * way[0] * way[1];
+            yy = across * way[0] * way[0];
+        }
         if (xx + yy == 0.0 && stiff == 0.0) {
             continue;
         }
@@ -580,7 +616,7 @@ static void dense_bounds(Dense *d, double share) {
     }
 }
 
-int dense_solve(Dense *d) {
+static int dense_settle(Dense *d) {
     double share = 1.0, last = INFINITY;
     int settled = 0;
     for (int round = 0; round < DENSE_ROUNDS && !settled; round++) {
@@ -603,6 +639,48 @@ int dense_solve(Dense *d) {
     }
     for (int i = 0; i < d->n; i++) {
         d->twist[i] = d->free[i] + dot(d->rank, d->L[i], d->y);
+    }
+    return settled;
+}
+
+/* Section 17: turns the elements whose friction gave energy at the mean speed beyond what it had
+ * stored, or all; false where that is no matter. */
+static int dense_turn(Dense *d, int all) {
+    double caused = 0.0, gift = 0.0, gifts[DENSE_ELEMENTS],
+           least = 0.08 * 0.5 * dot(d->rank, d->y, d->y);
+    for (int i = 0; i < d->elements; i++) {
+        const DenseElement *e = &d->element[i];
+        double v[4], I[2], held[2], work = 0.0;
+        element_velocity(d, e, d->y, v);
+        element_friction(e, d->bound[i], v, I);
+        for (int k = 0; k < 2; k++) {
+            caused -= 0.5 * I[k] * (v[k] - e->free[k]);
+            work += 0.5 * I[k] * (v[k] + e->before[k]);
+            held[k] = e->hold[k] - e->grip * v[k];
+        }
+        double left = fmin(hypot(held[0], held[1]), d->bound[i]),
+               had = hypot(e->hold[0], e->hold[1]);
+        double stored = e->grip > 0.0 ? fmax(had * had - left * left, 0.0) / (2.0 * e->grip) : 0.0;
+        gifts[i] = fmax(work - stored, 0.0);
+        gift += gifts[i];
+    }
+    if (caused <= least || gift <= least) {
+        return 0;
+    }
+    for (int i = 0; i < d->elements; i++) {
+        DenseElement *e = &d->element[i];
+        if (all || gifts[i] > 0.0) {
+            memcpy(e->turn, e->before, sizeof e->turn);
+            e->hold[0] = e->hold[1] = e->grip = 0.0;
+        }
+    }
+    return 1;
+}
+
+int dense_solve(Dense *d) {
+    int settled = dense_settle(d);
+    for (int round = 0; settled && round < 2 && dense_turn(d, round == 1); round++) {
+        settled = dense_settle(d);
     }
     return settled;
 }

@@ -3,25 +3,33 @@
 #ifndef ELEMENT_STEP_H
 #define ELEMENT_STEP_H
 
-#define ELEMENT_LAW 8     /* numbers of Law */
-#define ELEMENT_MEMORY 9  /* of ElementMemory */
-#define ELEMENT_RESULTS 7 /* normal, its slope, tangent x y, its derivatives xx xy yy */
+#define ELEMENT_LAW 8    /* numbers of Law */
+#define ELEMENT_MEMORY 9 /* of ElementMemory */
+/* Normal impulse, its slope; tangential impulse x y, its derivatives by the velocity xx xy yy, by the
+ * normal impulse x y. */
+#define ELEMENT_RESULTS 9
 
 /* What a step of one element depends on. */
 typedef struct {
     double law[ELEMENT_LAW];
-    double recovery, mu, k_drift, b_drift; /* of the material */
-    double memory[ELEMENT_MEMORY];         /* before the step */
-    double dt;                             /* [s] */
-    double depth;                          /* [m] */
-    double now, gain;                      /* [m/s] downward speed, what the free motion adds */
-    double after[3];                       /* [m/s] new velocity: x, y, down */
+    double recovery;               /* [-] */
+    double mu;                     /* [-] */
+    double k_drift;                /* [N/m^2] */
+    double b_drift;                /* [N s/m] */
+    double explicit_impulse;       /* [N s] */
+    double memory[ELEMENT_MEMORY]; /* before the step */
+    double dt;                     /* [s] */
+    double depth;                  /* [m] */
+    double now;                    /* [m/s] downward speed */
+    double gain;                   /* [m/s] what the free motion adds to it */
+    double after[3];               /* [m/s] new velocity: x, y, down */
 } ElementCase;
 
 typedef struct {
     double value[ELEMENT_RESULTS];
     double memory[ELEMENT_MEMORY]; /* after the step */
     double yield_force;            /* [N] at the start */
+    double unload_stiffness;       /* [N/m] at the start */
 } ElementResult;
 
 void element_step_double(const ElementCase *in, ElementResult *out);

@@ -33,6 +33,14 @@ static inline int kit_index(uint64_t *state, int count) {
     return (int)kit_uniform(state, 0.0, (double)count);
 }
 
+/* Draws of a random test: `count`, or the share of it in MILD_TEST_DRAWS, which scripts/mutants.py
+ * sets: a fault that random states show at all, few of them show. */
+static inline int kit_draws(int count) {
+    const char *share = getenv("MILD_TEST_DRAWS");
+    double some = share ? count * atof(share) : count;
+    return some < 1.0 ? 1 : (int)some;
+}
+
 /* Left sole of the reference robot, y range at x [m]; the right one is its mirror image. */
 static const double kit_outline[19][3] = {
     {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044},  {-0.045, -0.045, 0.047},
@@ -111,8 +119,9 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
                             const MildMaterial *material, double dt) {
     memset(kit, 0, sizeof *kit);
     kit->feet = feet;
-    kit->soles[0] = left;
-    kit->soles[1] = right;
+    for (int f = 0; f < feet; f++) {
+        kit->soles[f] = f % 2 ? right : left;
+    }
     MildError error = {0};
     kit->scratch = mild_scratch_create(kit->soles, feet, &error);
     if (!kit->scratch) {
@@ -204,8 +213,8 @@ static inline void kit_rotate(double *R, const double *turn) {
     memcpy(R, out, sizeof out);
 }
 
-/* V^ of free bodies under gravity and a force at the centre of mass [N], gyroscopic terms of a ball
- * being zero. */
+/* V_free of free bodies under gravity and a force at the centre of mass [N], gyroscopic terms of a
+ * ball being zero. */
 static inline void kit_free(Kit *kit, const double force[][3]) {
     for (int f = 0; f < kit->feet; f++) {
         const double *V = kit->input.velocity[f];

@@ -3,10 +3,12 @@
 
 #define ELEMENT_STEP element_step_double
 #include "element_step.inc"
-#include "ground/model.h"
+#include "ground/models.h"
 
 #define ELEMENTS 500
 #define STEPS 20
+#define MEMORY(field)                                                                              \
+    (offsetof(ElementMemory, field) / sizeof(double)) /* index in a case's memory */
 
 /* A float's number, so that both begin with the same. */
 static double rounded(double x) {
@@ -19,19 +21,26 @@ static void round_all(double *x, int count) {
     }
 }
 
-/* A material and a motion of one element on it. */
-static ElementCase random_case(uint64_t *random) {
+/* A material and a motion of one element on it. Of five grounds one has its bed within reach, one
+ * an element that has slid nearly as far as counts, one an impulse that creates energy, one an
+ * element that is not deeper than the least elastic travel. */
+static ElementCase random_case(int n, uint64_t *random) {
     static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
     MildMaterial m = kit_material(random);
     Law law = law_of(&m, KIT_PITCH);
+    law.bed_depth = n % 5 == 0 ? 0.01 : law.bed_depth;
     ElementCase c = {.recovery = rounded(m.recovery),
                      .mu = rounded(m.mu),
                      .k_drift = rounded(m.k_drift),
                      .b_drift = rounded(m.b_drift),
                      .dt = rounded(steps[kit_index(random, 3)]),
-                     .depth = rounded(kit_uniform(random, -0.001, 0.02)),
-                     .now = rounded(kit_uniform(random, -0.3, 0.7)),
-                     .gain = rounded(0.01)};
+                     .depth = rounded(n % 5 == 3 ? kit_uniform(random, 0.0, 1e-4)
+                                                 : kit_uniform(random, -0.001, 0.02)),
+                     .now = rounded(n % 5 == 3 ? kit_uniform(random, -0.02, 0.02)
+                                               : kit_uniform(random, -0.3, 0.7)),
+                     .gain = rounded(0.01),
+                     .explicit_impulse = n % 5 == 1 ? rounded(-1e-3) : 0.0};
+    c.memory[MEMORY(drift)] = n % 5 == 2 ? rounded((double)REMEMBER_DRIFT - 1e-3) : 0.0;
     memcpy(c.law, &law, sizeof c.law);
     round_all(c.law, ELEMENT_LAW);
     return c;
@@ -46,11 +55,14 @@ static void case_push(ElementCase *c, uint64_t *random) {
     c->after[2] = rounded(turn * c->now + kit_uniform(random, -0.05, 0.05));
 }
 
-static void case_move(ElementCase *c, const ElementResult *result) {
+/* Goes on from the end of the step. Of eight steps one begins deeper or less deep than the step
+ * before ended, as on uneven ground. */
+static void case_move(ElementCase *c, const ElementResult *result, uint64_t *random) {
+    const double shift = kit_index(random, 8) == 0 ? kit_uniform(random, -1e-4, 1e-4) : 0.0;
     memcpy(c->memory, result->memory, sizeof c->memory);
     round_all(c->memory, ELEMENT_MEMORY);
     c->now = c->after[2];
-    c->depth = rounded(c->depth + c->dt * c->now);
+    c->depth = rounded(c->depth + c->dt * c->now + shift);
 }
 
 /* Worst of |a - b| by |b| + scale. */
@@ -58,19 +70,23 @@ static void worst_of(double *worst, double a, double b, double scale) {
     *worst = fmax(*worst, fabs(a - b) / (fabs(b) + scale + 1e-12));
 }
 
-/* By the value itself and what the element carries at its yield: worst[4] of the normal impulse, the
- * tangential one, their derivatives, the memory. */
+/* By the value itself and what the element carries at its yield; parts of a vector or a matrix by
+ * the whole. worst[4]: of the normal impulse, the tangential one, their derivatives, the memory. */
 static void worst_of_step(double *worst, const ElementCase *c, const ElementResult *one,
                           const ElementResult *two) {
-    const double load = c->dt * one->yield_force;            /* [N s] */
-    const double grip = (double)FRICTION_LAG * c->mu * load; /* [kg] */
-    const double scale[ELEMENT_RESULTS] = {load, load, load, load, grip, grip, grip};
-    static const int kind[ELEMENT_RESULTS] = {0, 2, 1, 1, 2, 2, 2};
+    const double *v = one->value;
+    const double load = c->dt * one->yield_force;                               /* [N s] */
+    const double slope = c->dt * c->dt / 2 * one->unload_stiffness;             /* [kg] */
+    const double tangent = load + hypot(v[2], v[3]);                            /* [N s] */
+    const double fall = (double)FRICTION_LAG * c->mu * load + fmax(v[4], v[6]); /* [kg] */
+    const double scale[ELEMENT_RESULTS] = {load, slope, tangent, tangent, fall, fall, fall, 1, 1};
+    static const int kind[ELEMENT_RESULTS] = {0, 2, 1, 1, 2, 2, 2, 2, 2};
     for (int k = 0; k < ELEMENT_RESULTS; k++) {
-        worst_of(&worst[kind[k]], two->value[k], one->value[k], scale[k]);
+        worst_of(&worst[kind[k]], two->value[k], v[k], scale[k]);
     }
     for (int k = 0; k < ELEMENT_MEMORY; k++) {
-        const int held = k == 6 || k == 7; /* [N]; the others are lengths, speeds, a stiffness */
+        /* [N]; the others are lengths, a speed, a stiffness. */
+        const int held = k == MEMORY(held_x) || k == MEMORY(held_y);
         worst_of(&worst[3], two->memory[k], one->memory[k], held ? one->yield_force : 1e-3);
     }
 }
@@ -82,7 +98,7 @@ static void test_float(void **state) {
     int loaded = 0, total = 0;
     for (int n = 0; n < ELEMENTS; n++) {
         uint64_t random = 31u + (uint64_t)n * 1000003u;
-        ElementCase c = random_case(&random);
+        ElementCase c = random_case(n, &random);
         for (int s = 0; s < STEPS; s++, total++) {
             ElementResult one, two;
             case_push(&c, &random);
@@ -90,7 +106,7 @@ static void test_float(void **state) {
             element_step_float(&c, &two);
             worst_of_step(worst, &c, &one, &two);
             loaded += one.value[0] > 0.0;
-            case_move(&c, &one);
+            case_move(&c, &one, &random);
         }
     }
     print_message("%d steps, %d loaded: float against double, worst relative", total, loaded);

@@ -2,6 +2,8 @@
  * matched to mild. */
 #include "ground_kit.h"
 
+#include "ground/resist.h"
+
 #define SOFT_MODELS MILD_MODEL_RIGID
 #define LOAD (20.0 * KIT_GRAVITY) /* [N] half of the paper's robot */
 
@@ -51,9 +53,9 @@ static MildMaterial preset(const char *name) {
 /* ---- matching ---- */
 
 /* [m] by how much resistive force theory yields deeper than the element is, going straight down:
- * the elastic travel belongs to its greatest coefficient, 1.08 (src/ground/resist.c). 7 um: 0.4 %
+ * the elastic travel belongs to its greatest coefficient (src/ground/resist.c). 7 um: 0.4 %
  * of the force at 1.9 mm. */
-#define RESIST_LEAD (1e-4 * (1.0 - 1.0 / 1.08))
+#define RESIST_LEAD (ELEMENT_ELASTIC * (1.0 - 1.0 / RESIST_PEAK))
 
 /* Force of the level sole pushed slowly to `depth` by hand: A = 0. */
 static double pressed_force(int model, const MildMaterial *material, double depth) {
@@ -98,6 +100,38 @@ static void test_matched(void **state) {
                   1e3 * worst_depth, worst_force);
     assert_true(worst_depth < 1e-7); /* the bar is 0.1 mm */
     assert_true(worst_force < 2e-3); /* con_cone's drag at 1 cm/s */
+}
+
+/* Materials from all of the accepted ranges: what a match returns can be used, or it fails, says why
+ * and returns nothing. */
+static void test_match_is_accepted(void **state) {
+    (void)state;
+    uint64_t random = 41;
+    int matched = 0, refused = 0;
+    for (int draw = 0; draw < 20000; draw++) {
+        MildMaterial mild = mild_material_default();
+        for (int f = 0; f < mild_material_field_count; f++) {
+            const MildField *field = &mild_material_fields[f];
+            double *value = (double *)((char *)&mild + field->offset);
+            if (field->type == MILD_FIELD_DOUBLE && kit_index(&random, 2)) {
+                *value = kit_uniform(&random, field->min, field->max);
+            }
+        }
+        const MildModel model = (MildModel)kit_index(&random, MILD_MODEL_RIGID);
+        const double load = pow(10.0, kit_uniform(&random, -3.0, 7.0));
+        MildMaterial rival = {.k_pen = -1.0};
+        MildError error = {0};
+        if (mild_model_match(model, &mild, raster[0], load, &rival, &error) == MILD_OK) {
+            matched++;
+            assert_int_equal(mild_material_check(&rival, &error), MILD_OK);
+            continue;
+        }
+        refused++;
+        assert_true(rival.k_pen == -1.0);
+        assert_non_null(strstr(error.text, "ground."));
+    }
+    print_message("materials from the accepted ranges: %d matched, %d refused\n", matched, refused);
+    assert_true(matched > 1000 && refused > 100);
 }
 
 static void test_refusals(void **state) {
@@ -368,12 +402,12 @@ static void test_passive(void **state) {
         uint64_t random = 11;
         double worst = -INFINITY;
         int cycles = 0;
-        for (int draw = 0; draw < 250; draw++) {
+        for (int draw = 0; draw < kit_draws(250); draw++) {
             cycles += thrown(model, &random, &worst);
         }
         print_message("passivity of %-12s: %4d closed cycles, most energy gained %.2e J\n",
                       mild_model_names[model], cycles, worst);
-        assert_true(cycles > 10);
+        assert_true(cycles > kit_draws(10));
         assert_true(worst < 1e-9);
     }
 }
@@ -406,7 +440,7 @@ static void test_symmetry(void **state) {
     (void)state;
     double worst = 0.0;
     uint64_t random = 5;
-    for (int draw = 0; draw < 400; draw++) {
+    for (int draw = 0; draw < kit_draws(400); draw++) {
         int model = draw % SOFT_MODELS, mirror = draw % 2;
         MildMaterial mild = kit_material(&random), rival = rival_of(model, &mild);
         Kit one, other, back;
@@ -560,10 +594,11 @@ static void test_moment(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_matched),        cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_equilibrium),    cmocka_unit_test(test_no_creep),
-        cmocka_unit_test(test_impact),         cmocka_unit_test(test_passive),
-        cmocka_unit_test(test_symmetry),       cmocka_unit_test(test_solvers_agree),
-        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_moment)};
+        cmocka_unit_test(test_matched),       cmocka_unit_test(test_match_is_accepted),
+        cmocka_unit_test(test_refusals),      cmocka_unit_test(test_equilibrium),
+        cmocka_unit_test(test_no_creep),      cmocka_unit_test(test_impact),
+        cmocka_unit_test(test_passive),       cmocka_unit_test(test_symmetry),
+        cmocka_unit_test(test_solvers_agree), cmocka_unit_test(test_copy_continues),
+        cmocka_unit_test(test_moment)};
     return cmocka_run_group_tests(tests, make_soles, drop_soles);
 }

@@ -231,9 +231,7 @@ static void test_loops(void **state) {
 }
 
 int main(int argc, char **argv) {
-    if (argc > 1) {
-        draws = atoi(argv[1]);
-    }
+    draws = argc > 1 ? atoi(argv[1]) : kit_draws(draws);
     if (argc > 2) {
         first = atoi(argv[2]);
     }

@@ -194,10 +194,44 @@ static void test_prints_keep_what_they_were_given(void **state) {
     mild_sole_destroy(sole);
 }
 
+/* Forces whose square is 0 or infinite, and torques beside next to no force, have a finite axis. */
+static void test_axis_is_finite(void **state) {
+    (void)state;
+    MildSole *sole = kit_sole(0, 77);
+    uint64_t random = 3;
+    int loaded = 0, tiny = 0;
+    for (int draw = 0; draw < 3000; draw++) {
+        MildMaterial m = kit_material(&random);
+        Kit kit;
+        kit_open(&kit, 1, sole, NULL, &m, 1e-3);
+        kit.input.position[0][2] -= pow(10.0, kit_uniform(&random, -320.0, -2.0));
+        double *V = kit.input.free_velocity; /* led by hand */
+        for (int k = 0; k < 6; k++) {
+            V[k] = kit_uniform(&random, -1.0, 1.0) * pow(10.0, kit_uniform(&random, -320.0, 200.0));
+        }
+        kit_solve(&kit);
+        const MildFootResult *r = &kit.result.foot[0];
+        double sum = 0.0 * (r->zmp_sole[0] + r->zmp_sole[1]);
+        for (int k = 0; k < 3; k++) {
+            sum += 0.0 * r->zmp_axis[k] + 0.0 * r->pressure_center[k] + 0.0 * r->force[k];
+        }
+        assert_true(!kit.result.converged || sum == 0.0);
+        const double *F = r->force, size = fabs(F[0]) + fabs(F[1]) + fabs(F[2]);
+        loaded += kit.result.converged && r->contacts > 0;
+        tiny += kit.result.converged && size > 0.0 && size < 1e-160;
+        kit_close(&kit);
+    }
+    print_message("%d loaded soles, %d with a force whose square is 0: every point finite\n",
+                  loaded, tiny);
+    mild_sole_destroy(sole);
+    assert_true(loaded > 300);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_one_element_carries_all),
         cmocka_unit_test(test_zmp_takes_the_horizontal_torque),
+        cmocka_unit_test(test_axis_is_finite),
         cmocka_unit_test(test_depths_of_the_loaded_elements),
         cmocka_unit_test(test_prints_keep_what_they_were_given),
     };

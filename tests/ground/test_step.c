@@ -152,7 +152,7 @@ static void test_rises(void **state) {
     MildSole *sole = kit_plate(1, 1);
     uint64_t random = 29;
     double worst = 0.0;
-    for (int draw = 0; draw < DRAWS; draw++) {
+    for (int draw = 0; draw < kit_draws(DRAWS); draw++) {
         MildMaterial m = kit_material(&random);
         Kit kit;
         kit_open(&kit, 1, sole, NULL, &m, steps[draw % 3]);

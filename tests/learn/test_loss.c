@@ -365,6 +365,57 @@ static void test_chunks_add(void **state) {
     case_close(&c);
 }
 
+/* Every latent gets the log-variance b: it counts as held within -12 and 6. Without noise only the
+ * KL term e^b - 1 - b pulls, back inside from anywhere; without the KL term what would lead farther
+ * out is dropped. */
+static void test_logvar_is_held(void **state) {
+    (void)state;
+    static const double logvar[] = {-40, -12.5, -11.5, 0.3, 5.5, 6.5, 50};
+    enum { COUNT = sizeof logvar / sizeof *logvar };
+    Case c;
+    Random random = random_at(6, 0, 0);
+    case_open(&c, small_def());
+    fill_inputs(&c, &random);
+    const PolicyDef *d = &c.network.def;
+    const MlpLayer *heads = &c.network.encoder.layer[c.network.encoder.layers - 1];
+    const int first = d->estimates + d->latent; /* mu stands before them */
+    double worst = 0.0, dropped = 0.0;
+    for (int j = first; j < first + d->latent; j++) {
+        memset(c.parameters + heads->weight + (int64_t)j * heads->in, 0,
+               (size_t)heads->in * sizeof *c.parameters);
+    }
+    for (int k = 0; k < COUNT; k++) {
+        const double held = fmin(fmax(logvar[k], -12), 6), kl_weight = c.def.kl_weight;
+        for (int j = first; j < first + d->latent; j++) {
+            c.parameters[heads->bias + j] = (float)logvar[k];
+        }
+        case_run(&c);
+        for (int i = 0; i < ROWS * d->latent; i++) {
+            assert_near("spread", c.chunk.spread[i] / exp(0.5 * held), 1.0, 1e-5, &worst);
+        }
+        c.def.kl_weight = 0;
+        case_run(&c);
+        for (int j = first; j < first + d->latent; j++) {
+            double g = (double)c.gradient[heads->bias + j];
+            assert_true(held == logvar[k] || g * (logvar[k] - held) >= 0.0);
+            dropped += held != logvar[k] && g != 0.0;
+        }
+        c.def.kl_weight = kl_weight;
+        float noise[ROWS * 8];
+        memcpy(noise, c.chunk.noise, sizeof(float) * ROWS * (size_t)d->latent);
+        memset(c.chunk.noise, 0, sizeof(float) * ROWS * (size_t)d->latent);
+        case_run(&c);
+        const double wanted = c.def.epsilon * kl_weight * 0.5 * expm1(held);
+        for (int j = first; j < first + d->latent; j++) {
+            assert_near("pull", c.gradient[heads->bias + j] / wanted, 1.0, 1e-4, &worst);
+        }
+        memcpy(c.chunk.noise, noise, sizeof(float) * ROWS * (size_t)d->latent);
+    }
+    print_message("held log-variances: worst %.1e\n", worst);
+    assert_true(dropped > 0); /* some gradients do lead inside */
+    case_close(&c);
+}
+
 /* The log-variance at -20, -12, 0, 6 and 20, with the gradient pushing down and up: used within its
  * bounds, and no gradient that would push it further out. */
 static void test_logvar_bounds(void **state) {
@@ -392,6 +443,7 @@ static void test_logvar_bounds(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_logvar_is_held),
         cmocka_unit_test(test_matches_pytorch),
         cmocka_unit_test(test_matches_differences),
         cmocka_unit_test(test_chunks_add),

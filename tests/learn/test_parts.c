@@ -10,7 +10,10 @@
 #include "learn/ppo.h"
 #include "learn/ppo_gradient.h"
 #include "learn/ppo_returns.h"
+#include "learn/product.h"
 #include "learn/vector.h"
+
+extern int omp_get_max_threads(void); /* clang comes without omp.h */
 
 static void test_elementwise_functions(void **state) {
     (void)state;
@@ -33,6 +36,43 @@ static void test_elementwise_functions(void **state) {
     assert_true(vector_elu(0.0f) == 0.0f && vector_log(1.0f) == 0.0f && vector_exp(0.0f) == 1.0f);
     assert_true(isnan(vector_elu(NAN)) && isnan(vector_exp(NAN)));
     assert_true(vector_elu(-INFINITY) == -1.0f && vector_elu(1e30f) == 1e30f);
+}
+
+/* The noise's angle: sine and cosine of pi a over its whole range. */
+static void test_half_turn(void **state) {
+    (void)state;
+    double worst = 0.0;
+    for (int i = -5000; i < 5000; i++) {
+        float a = (float)i / 10000.0f;
+        double angle = 3.14159265358979323846 * (double)a;
+        worst = fmax(worst, fabs((double)noise_sin(a) - sin(angle)));
+        worst = fmax(worst, fabs((double)noise_cos(a) - cos(angle)));
+    }
+    print_message("sine and cosine of half a turn: worst %.1e\n", worst);
+    assert_true(worst < 3e-7);
+}
+
+/* A product that the library refuses is not a number everywhere, so that the update is dropped; and
+ * within a product every thread works alone. */
+static void test_refused_product(void **state) {
+    (void)state;
+    float a[6] = {1, 2, 3, 4, 5, 6}, b[6] = {1, 0, 0, 1, 1, 1}, c[8];
+    for (int i = 0; i < 8; i++) {
+        c[i] = 7.0f;
+    }
+    product('N', 'N', 2, 2, 3, a, 3, b, 2, 0.0f, c, 3);
+    static const float wanted[8] = {4, 5, 7, 10, 11, 7, 7, 7}; /* rows of 3, two of them used */
+    assert_memory_equal(c, wanted, sizeof c);
+    product('?', 'N', 2, 2, 3, a, 3, b, 2, 0.0f, c, 3);
+    for (int i = 0; i < 8; i++) {
+        assert_true(i < 5 && i != 2 ? isnan(c[i]) : c[i] == 7.0f);
+    }
+    const int before = omp_get_max_threads(), entered = product_enter();
+    assert_int_equal(entered, before);
+    assert_int_equal(omp_get_max_threads(), 1);
+    product_leave(3);
+    assert_int_equal(omp_get_max_threads(), 3);
+    product_leave(before);
 }
 
 static void test_noise_is_normal(void **state) {
@@ -158,6 +198,7 @@ static void test_advantages(void **state) {
     int valid = 0;
     for (int i = 0; i < STEPS * ENVS; i++) {
         valid += b->valid[i];
+        assert_true(b->valid[i] || (b->advantage[i] == 0.0f && b->returns[i] == 0.0f));
     }
     for (int k = 0; k < ppo->samples; k++) {
         gap = fmax(gap,
@@ -175,6 +216,8 @@ static void test_advantages(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_elementwise_functions),
+        cmocka_unit_test(test_half_turn),
+        cmocka_unit_test(test_refused_product),
         cmocka_unit_test(test_noise_is_normal),
         cmocka_unit_test(test_noise_depends_on_key_and_place_only),
         cmocka_unit_test(test_adam),

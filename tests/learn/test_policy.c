@@ -87,6 +87,72 @@ static void test_act_and_value(void **state) {
     pool_destroy(pool);
 }
 
+/* One network forward in double: rows of weights times inputs plus bias, ELU between layers. */
+static void forward(const Mlp *mlp, const float *parameters, const double *x, double *y) {
+    double in[64];
+    memcpy(in, x, (size_t)mlp->layer[0].in * sizeof *x);
+    for (int l = 0; l < mlp->layers; l++) {
+        const MlpLayer *layer = &mlp->layer[l];
+        for (int i = 0; i < layer->out; i++) {
+            y[i] = (double)parameters[layer->bias + i];
+            for (int j = 0; j < layer->in; j++) {
+                y[i] += (double)parameters[layer->weight + i * layer->in + j] * in[j];
+            }
+            y[i] = l + 1 < mlp->layers && y[i] < 0.0 ? expm1(y[i]) : y[i];
+        }
+        memcpy(in, y, (size_t)layer->out * sizeof *y);
+    }
+}
+
+/* What the policy answers, from its equations: the encoder's first heads are the estimates, the
+ * next mu; latent = theta1 mu + theta2 with theta from the feet velocities; the actor reads the
+ * newest frame, the estimates, the latent. Three chunks of rows, the last not full. */
+static void test_answers(void **state) {
+    (void)state;
+    enum { ROWS = 300 };
+    static float history[ROWS * 15], actions[ROWS * 2], estimates[ROWS * 6], latent[ROWS * 4],
+        critic[ROWS * 7], values[ROWS];
+    double worst = 0.0;
+    Policy *policy = small_policy(9);
+    const Network *n = &policy->network;
+    Random random = random_at(12, 0, 0);
+    fill_normal(policy->parameters, n->count, 0.4, &random);
+    fill_normal(history, ROWS * 15, 1.0, &random);
+    fill_normal(critic, ROWS * 7, 1.0, &random);
+    policy_act(policy, NULL, ROWS, history, actions, estimates, latent);
+    policy_value(policy, NULL, ROWS, critic, values);
+    for (int r = 0; r < ROWS; r++) {
+        double x[64], heads[64], theta[64], input[64], mean[64], value[64];
+        for (int i = 0; i < 15; i++) {
+            x[i] = (double)history[r * 15 + i];
+        }
+        forward(&n->encoder, policy->parameters, x, heads);
+        forward(&n->modulation, policy->parameters, heads + n->def.feet_velocity_offset, theta);
+        memcpy(input, x + 10, 5 * sizeof *x);
+        for (int i = 0; i < 6; i++) {
+            input[5 + i] = heads[i];
+            worst = fmax(worst, fabs((double)estimates[r * 6 + i] - heads[i]));
+        }
+        for (int i = 0; i < 4; i++) {
+            int each = n->def.modulation_per_dimension;
+            input[11 + i] = theta[each ? i : 0] * heads[6 + i] + theta[each ? 4 + i : 1];
+            worst = fmax(worst, fabs((double)latent[r * 4 + i] - input[11 + i]));
+        }
+        forward(&n->actor, policy->parameters, input, mean);
+        for (int i = 0; i < 2; i++) {
+            worst = fmax(worst, fabs((double)actions[r * 2 + i] - mean[i]));
+        }
+        for (int i = 0; i < 7; i++) {
+            x[i] = (double)critic[r * 7 + i];
+        }
+        forward(&n->critic, policy->parameters, x, value);
+        worst = fmax(worst, fabs((double)values[r] - value[0]));
+    }
+    print_message("answers of %d rows against their equations: worst %.1e\n", ROWS, worst);
+    assert_true(worst < 3e-5);
+    policy_destroy(policy);
+}
+
 /* theta1 = 1, theta2 = 0 at the start: the modulated latent is the encoder's mu. */
 static void test_modulation_starts_at_identity(void **state) {
     (void)state;
@@ -314,10 +380,14 @@ static void test_full_disk(void **state) {
     assert_string_equal(note, "old");
     assert_int_equal(policy_save(fresh, "no/such/folder/policy.safetensors", "", &error),
                      MILD_ERROR_IO);
+    unlink(PATH);
+    assert_int_equal(mkdir(PATH, 0700), 0); /* a folder of that name is not replaced either */
+    assert_int_equal(policy_save(fresh, PATH, "new", &error), MILD_ERROR_IO);
+    assert_int_equal(access(PATH ".tmp", F_OK), -1);
+    assert_int_equal(rmdir(PATH), 0);
     policy_destroy(kept);
     policy_destroy(old);
     policy_destroy(fresh);
-    unlink(PATH);
 }
 
 static void test_unusable_defs(void **state) {
@@ -338,14 +408,36 @@ static void test_unusable_defs(void **state) {
     def = small_def();
     def.frames = 16384;
     assert_null(policy_create(&def, 1, &error));
+    static const struct {
+        size_t offset;
+        const char *name;
+    } widths[] = {{offsetof(PolicyDef, observation), "observation"},
+                  {offsetof(PolicyDef, frames), "frames"},
+                  {offsetof(PolicyDef, critic_input), "critic_input"},
+                  {offsetof(PolicyDef, estimates), "estimates"},
+                  {offsetof(PolicyDef, actions), "actions"}};
+    for (size_t i = 0; i < sizeof widths / sizeof *widths; i++) {
+        static const int bad[] = {0, -1, 16385};
+        for (int k = 0; k < 3; k++) {
+            def = small_def();
+            memcpy((char *)&def + widths[i].offset, &bad[k], sizeof bad[k]);
+            assert_null(policy_create(&def, 1, &error));
+            assert_non_null(strstr(error.text, widths[i].name));
+        }
+    }
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_act_and_value), cmocka_unit_test(test_modulation_starts_at_identity),
-        cmocka_unit_test(test_round_trip),    cmocka_unit_test(test_damaged_files),
-        cmocka_unit_test(test_lying_headers), cmocka_unit_test(test_missing_keys),
-        cmocka_unit_test(test_full_disk),     cmocka_unit_test(test_unusable_defs),
+        cmocka_unit_test(test_answers),
+        cmocka_unit_test(test_act_and_value),
+        cmocka_unit_test(test_modulation_starts_at_identity),
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_damaged_files),
+        cmocka_unit_test(test_lying_headers),
+        cmocka_unit_test(test_missing_keys),
+        cmocka_unit_test(test_full_disk),
+        cmocka_unit_test(test_unusable_defs),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

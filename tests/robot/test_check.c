@@ -62,6 +62,86 @@ static void test_every_number(void **state) {
     print_message("%d kinds of numbers, each spoilt three or four ways\n", count);
 }
 
+/* Each element of each array: refused, with the name of its joint, body or geom where it has one. */
+static void test_every_element(void **state) {
+    (void)state;
+    mjModel *m = robot->model;
+    const int bodies = (int)m->nbody, joints = (int)m->njnt, geoms = (int)m->ngeom;
+    const struct {
+        const char *what;
+        double *array;
+        int rows, width, object, is_dof;
+    } arrays[] = {
+        {": pos is", m->body_pos, bodies, 3, mjOBJ_BODY, 0},
+        {": quat is", m->body_quat, bodies, 4, mjOBJ_BODY, 0},
+        {": mass is", m->body_mass, bodies, 1, mjOBJ_BODY, 0},
+        {": inertia is", m->body_inertia, bodies, 3, mjOBJ_BODY, 0},
+        {": inertial pos is", m->body_ipos, bodies, 3, mjOBJ_BODY, 0},
+        {": inertial quat is", m->body_iquat, bodies, 4, mjOBJ_BODY, 0},
+        {": pos is", m->jnt_pos, joints, 3, mjOBJ_JOINT, 0},
+        {": axis is", m->jnt_axis, joints, 3, mjOBJ_JOINT, 0},
+        {": range is", m->jnt_range, joints, 2, mjOBJ_JOINT, 0},
+        {": actuatorfrcrange is", m->jnt_actfrcrange, joints, 2, mjOBJ_JOINT, 0},
+        {": stiffness is", m->jnt_stiffness, joints, 1, mjOBJ_JOINT, 0},
+        {"joint coordinate", m->qpos_spring, (int)m->nq, 1, mjOBJ_UNKNOWN, 0},
+        {": armature is", m->dof_armature, (int)m->nv, 1, mjOBJ_JOINT, 1},
+        {": damping is", m->dof_damping, (int)m->nv, 1, mjOBJ_JOINT, 1},
+        {": frictionloss is", m->dof_frictionloss, (int)m->nv, 1, mjOBJ_JOINT, 1},
+        {": pos is", m->geom_pos, geoms, 3, mjOBJ_GEOM, 0},
+        {": quat is", m->geom_quat, geoms, 4, mjOBJ_GEOM, 0},
+        {": size is", m->geom_size, geoms, 3, mjOBJ_GEOM, 0},
+        {": friction is", m->geom_friction, geoms, 3, mjOBJ_GEOM, 0},
+    };
+    int spoilt = 0;
+    for (size_t a = 0; a < sizeof arrays / sizeof *arrays; a++) {
+        for (int i = 0; i < arrays[a].rows * arrays[a].width; i++) {
+            int row = i / arrays[a].width, id = arrays[a].is_dof ? m->dof_jntid[row] : row;
+            const char *name = mj_id2name(m, arrays[a].object, id);
+            char number[16];
+            snprintf(number, sizeof number, " %d: ", id);
+            MildError error = {0};
+            double kept = arrays[a].array[i];
+            arrays[a].array[i] = NAN;
+            MildStatus status = robot_check_model(m, "robot.xml", &error);
+            arrays[a].array[i] = kept;
+            if (status != MILD_ERROR_RANGE || !strstr(error.text, arrays[a].what) ||
+                !strstr(error.text, name ? name : number)) {
+                fail_msg("element %d of '%s': %d, '%s'", i, arrays[a].what, (int)status,
+                         error.text);
+            }
+            spoilt++;
+        }
+    }
+    print_message("%d elements of %zu arrays spoilt\n", spoilt, sizeof arrays / sizeof *arrays);
+    assert_int_equal(robot_check_model(m, "robot.xml", NULL), MILD_OK);
+}
+
+/* The limits themselves: 0 is fine where a negative number is not, an empty range is none. */
+static void test_limits(void **state) {
+    (void)state;
+    mjModel *m = robot->model;
+    const int joint = 1 + 3, dof = 6 + 3, body = robot_foot_body(robot, 0);
+    double armature = m->dof_armature[dof], low = m->jnt_range[2 * joint];
+    double force = m->jnt_actfrcrange[2 * joint];
+    m->dof_armature[dof] = 0;
+    assert_int_equal(robot_check_model(m, "robot.xml", NULL), MILD_OK);
+    m->dof_armature[dof] = armature;
+    for (int k = 0; k < 3; k++) {
+        assert_refused(m->body_inertia + 3 * body + k, 0, "moves, so its mass");
+    }
+    assert_refused(m->body_mass + robot->base_body, 0, "body 'base_link' moves, so its mass");
+    assert_refused(m->body_mass + body, 0, "body 'leg_l6_link' moves, so its mass");
+    assert_refused(m->jnt_range + 2 * joint, m->jnt_range[2 * joint + 1], "the first must be the");
+    assert_refused(m->jnt_actfrcrange + 2 * joint, m->jnt_actfrcrange[2 * joint + 1],
+                   "leg_l4_joint': actuatorfrcrange");
+    m->jnt_limited[joint] = m->jnt_actfrclimited[joint] = 0; /* then nobody reads the numbers */
+    m->jnt_range[2 * joint] = m->jnt_actfrcrange[2 * joint] = 1e3;
+    assert_int_equal(robot_check_model(m, "robot.xml", NULL), MILD_OK);
+    m->jnt_range[2 * joint] = low;
+    m->jnt_actfrcrange[2 * joint] = force;
+    m->jnt_limited[joint] = m->jnt_actfrclimited[joint] = 1;
+}
+
 /* The same from a file; and a file that would never end. */
 static void test_files(void **state) {
     (void)state;
@@ -104,6 +184,8 @@ static void test_files(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_every_number),
+        cmocka_unit_test(test_every_element),
+        cmocka_unit_test(test_limits),
         cmocka_unit_test(test_files),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -119,6 +119,68 @@ static void test_slope_is_the_engine(void **unused) {
     assert_true(worst < 1e-9);
 }
 
+/* A plane of these rises per metre, whose heights a float holds exactly. */
+static MildMap *plane_map(double along_x, double along_y) {
+    enum { EDGE = 9 };
+    double heights[EDGE * EDGE];
+    for (int r = 0; r < EDGE; r++) {
+        for (int c = 0; c < EDGE; c++) {
+            heights[EDGE * r + c] = along_x * (c - EDGE / 2) + along_y * (EDGE / 2 - r);
+        }
+    }
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_IMAGE;
+    def.amplitude = def.cell = 1;
+    def.heights = heights;
+    def.height_columns = def.height_rows = EDGE;
+    return make_map(&def);
+}
+
+/* The same for slopes along y, and so steep that the engine takes other tangents: robots dropped
+ * onto the plane, limp. */
+static void test_any_plane_is_the_engine(void **unused) {
+    (void)unused;
+    static const double planes[][2] = {{0, 0.25}, {0.25, -0.5}, {0, 0.75}, {-0.25, -1}, {0, 1.5}};
+    double worst = 0.0;
+    int contacts = 0;
+    for (uint32_t draw = 0; draw < 10; draw++) {
+        const double *rise = planes[draw % 5];
+        double length = sqrt(1 + rise[0] * rise[0] + rise[1] * rise[1]);
+        const double normal[3] = {-rise[0] / length, -rise[1] / length, 1 / length};
+        MildMap *map = plane_map(rise[0], rise[1]);
+        MildTerrain terrain = preset_terrain("sand_loose");
+        terrain.map = map;
+        RobotSim *sim = new_sim(0.001);
+        mjModel *m = robot_sim_model(sim);
+        mjData *engine = mj_makeData(m);
+        RobotState state = random_state(draw);
+        RobotVariation rigid = rigid_variation(0.6);
+        int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
+        mju_quatZ2Vec(m->geom_quat + 4 * floor, normal);
+        m->geom_sameframe[floor] = mjSAMEFRAME_NONE;
+        robot_sim_load(sim, &state, &rigid);
+        state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) - 0.001;
+        robot_sim_load(sim, &state, &rigid);
+        memcpy(engine->qpos, state.qpos, sizeof state.qpos);
+        memcpy(engine->qvel, state.qvel, sizeof state.qvel);
+        for (int i = 0; i < 150; i++) {
+            double torque[SA01_JOINTS] = {0};
+            mj_step(m, engine);
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, NULL), 0);
+            contacts += robot_sim_contact(sim)->foot[0].contacts;
+            contacts += robot_sim_contact(sim)->foot[1].contacts;
+        }
+        for (int i = 0; i < SA01_NQ; i++) {
+            worst = fmax(worst, fabs(engine->qpos[i] - robot_sim_qpos(sim)[i]));
+        }
+        mj_deleteData(engine);
+        robot_sim_destroy(sim);
+        mild_map_destroy(map);
+    }
+    print_message("planes any way against mj_step: worst %.2e, %d contacts\n", worst, contacts);
+    assert_true(worst < 1e-9 && contacts > 1000);
+}
+
 /* A robot with held joints is put on a slope with its soles flat, for two seconds. [m] down the
  * slope: how far its centre of mass has come, and how far a foot has gone in the second second. */
 static void slide(double slope, double friction, double *fallen, double *crept) {
@@ -215,7 +277,11 @@ static void test_waves(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_level), cmocka_unit_test(test_slope_is_the_engine),
-        cmocka_unit_test(test_friction), cmocka_unit_test(test_waves)};
+        cmocka_unit_test(test_level),
+        cmocka_unit_test(test_slope_is_the_engine),
+        cmocka_unit_test(test_any_plane_is_the_engine),
+        cmocka_unit_test(test_friction),
+        cmocka_unit_test(test_waves),
+    };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -158,7 +158,7 @@ static void test_map_against_dense(void **unused) {
 }
 
 /* Foot twist after a soft step = what the contact solver promised: the robot and the solver see the
- * same A and V^. */
+ * same A and V_free. */
 static void test_twist_is_the_solvers(void **unused) {
     (void)unused;
     RobotSim *sim = new_sim(0.001);

@@ -5,7 +5,7 @@
 
 #include <mujoco/mujoco.h>
 
-#include "sa01.h"
+#include "sa01_sole.h"
 #include "task_kit.h"
 
 /* Middle of a sole's bounds in the foot frame (docs of the robot: 5.5 mm outward, 55 mm below the
@@ -13,18 +13,6 @@
 static const double oracle_sole[SA01_FEET][3] = {{0.06, 0.0055, -0.055}, {0.06, -0.0055, -0.055}};
 static const char *const oracle_feet[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
 static const char *const oracle_knees[SA01_FEET] = {"leg_l4_link", "leg_r4_link"};
-
-/* Outline of the left sole, robots/sa01/sa01.json: x, lowest y, highest y [m]; the right sole is its
- * mirror image. */
-enum { ORACLE_ROWS = 19 };
-static const double oracle_outline[ORACLE_ROWS][3] = {
-    {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044},  {-0.045, -0.045, 0.047},
-    {-0.03, -0.046, 0.049},  {-0.015, -0.046, 0.051}, {0.0, -0.041, 0.041},
-    {0.015, -0.041, 0.041},  {0.03, -0.041, 0.041},   {0.045, -0.041, 0.041},
-    {0.06, -0.046, 0.057},   {0.075, -0.046, 0.057},  {0.09, -0.046, 0.057},
-    {0.105, -0.046, 0.057},  {0.12, -0.046, 0.057},   {0.135, -0.046, 0.057},
-    {0.15, -0.046, 0.057},   {0.165, -0.045, 0.049},  {0.18, -0.038, 0.039},
-    {0.195, -0.016, 0.015}};
 
 typedef struct {
     double omega[3];                     /* [rad/s] base, base frame */
@@ -60,8 +48,8 @@ static inline void oracle_foot(Oracle *o, const mjModel *m, const mjData *d, int
     mj_jac(m, d, jacobian, NULL, o->sole[f], body);
     mju_mulMatVec(o->sole_velocity[f], jacobian, d->qvel, 3, SA01_NV);
     o->sole_lowest[f] = 1e9;
-    for (int i = 0; i < 2 * ORACLE_ROWS; i++) {
-        const double *row = oracle_outline[i / 2];
+    for (int i = 0; i < 2 * SA01_OUTLINE_ROWS; i++) {
+        const double *row = sa01_outline[i / 2];
         const double side = f == SA01_LEFT ? 1 : -1;
         const double local[3] = {row[0], side * row[1 + i % 2], -0.055};
         mju_mulMatVec3(arm, d->xmat + 9 * body, local);

@@ -1,6 +1,8 @@
 /* Defaults and ranges of the task's keys: configs/default.ini says them once more, in figures. */
 #include "task_kit.h"
 
+#include "task/terrain.h"
+
 static FILE *ini;
 
 static void rewind_to_section(const char *section) {
@@ -18,23 +20,54 @@ static int range_of(const char *help, double *low, double *high) {
     return open && sscanf(open, "(%lf .. %lf)", low, high) == 2;
 }
 
+/* "(first, second, ...)" at the end of a help line: the field's names in order. */
+static void expect_names(const MildField *field, const char *help, const void *def,
+                         const char *value) {
+    const char *at = strrchr(help, '(');
+    assert_non_null(at);
+    for (int i = 0; i <= (int)field->max; i++) {
+        size_t length = strlen(field->names[i]);
+        assert_memory_equal(at + 1, field->names[i], length);
+        at += 1 + length;
+        assert_true(*at == (i == (int)field->max ? ')' : ','));
+        at += *at == ',';
+    }
+    const int chosen = *(const int *)(const void *)((const char *)def + field->offset);
+    size_t length = strlen(field->names[chosen]);
+    assert_memory_equal(value, field->names[chosen], length);
+    assert_true(value[length] == '\n' && field->min == 0);
+}
+
+/* The line's values are the defaults, all of them and no more. */
 static void expect_default(const MildField *field, const void *def, const char *value) {
     const char *at = (const char *)def + field->offset;
-    if (field->type == MILD_FIELD_TEXT) {
-        assert_true(strncmp(at, value, strlen(at)) == 0 && value[strlen(at)] == '\n');
-        return;
-    }
     for (int i = 0; i < field->count; i++) {
         char *end;
-        double wanted = strncmp(value, "true", 4) == 0 ? 1 : strtod(value, &end), got;
+        double got;
+        double wanted = strtod(value, &end);
         if (field->type == MILD_FIELD_DOUBLE) {
             got = ((const double *)(const void *)at)[i];
-            value = end;
+        } else if (field->type == MILD_FIELD_UINT64) {
+            got = (double)((const uint64_t *)(const void *)at)[i];
         } else {
-            got = *(const int *)(const void *)at;
+            got = ((const int *)(const void *)at)[i];
+        }
+        if (field->type == MILD_FIELD_BOOL) {
+            assert_true(field->min == 0 && field->max == 1);
+            wanted = strncmp(value, "true", 4) == 0;
+            end += wanted > 0 ? 4 : 5;
         }
         expect_entry(field->name, i, got, wanted, 1e-12 * fabs(wanted));
+        assert_true(end > value);
+        value = end;
     }
+    assert_true(*value == '\n');
+}
+
+static void expect_text(const MildField *field, const void *def, const char *value) {
+    const char *text = (const char *)def + field->offset;
+    assert_memory_equal(value, text, strlen(text));
+    assert_true(value[strlen(text)] == '\n');
 }
 
 /* Every field has its lines in the file's order: help with the range, then name = value. */
@@ -50,8 +83,13 @@ static void check_section(const char *section, const MildField *fields, int coun
         if (strncmp(line, fields[i].name, name) != 0 || strncmp(line + name, " = ", 3) != 0) {
             fail_msg("%s.%s is not where default.ini has it: %s", section, fields[i].name, line);
         }
-        if (fields[i].type != MILD_FIELD_NAME) {
-            expect_default(&fields[i], def, line + name + 3);
+        const char *value = line + name + 3;
+        if (fields[i].type == MILD_FIELD_NAME) {
+            expect_names(&fields[i], help, def, value);
+        } else if (fields[i].type == MILD_FIELD_TEXT) {
+            expect_text(&fields[i], def, value);
+        } else {
+            expect_default(&fields[i], def, value);
         }
         double low, high;
         if (range_of(help, &low, &high)) {
@@ -71,7 +109,80 @@ static void defaults(void **unused) {
     check_section("task", task_fields, task_field_count, &def);
     check_section("reward", reward_fields, reward_field_count, &def.reward);
     check_section("randomize", randomize_fields, randomize_field_count, &def.randomize);
+    TerrainDef terrain = terrain_def_default();
+    int count;
+    const MildField *fields = terrain_fields(&count);
+    check_section("terrain", fields, count, &terrain);
     fclose(ini);
+}
+
+/* A path fits as long as the struct has room; a longer one is refused. */
+static void paths_of_pictures(void **unused) {
+    (void)unused;
+    int count;
+    const MildField *fields = terrain_fields(&count);
+    TerrainDef def = terrain_def_default();
+    char text[256];
+    memset(text, 'x', sizeof text);
+    text[199] = '\0';
+    const char *const keys[] = {"image", "labels"};
+    for (int i = 0; i < 2; i++) {
+        const MildField *field = mild_field_find(fields, count, keys[i], NULL);
+        assert_non_null(field);
+        assert_int_equal(mild_field_parse(field, &def, text, "terrain", NULL), MILD_OK);
+        assert_string_equal(i ? def.labels : def.image, text);
+    }
+    assert_int_equal(def.memory, 0);
+    text[199] = 'x';
+    text[200] = '\0';
+    for (int i = 0; i < 2; i++) {
+        const MildField *field = mild_field_find(fields, count, keys[i], NULL);
+        assert_true(mild_field_parse(field, &def, text, "terrain", NULL) != MILD_OK);
+    }
+}
+
+/* ---- the nominal task ---- */
+
+/* What task_def_make_nominal leaves of a random key: [0] and, of a range, [1]. */
+static const struct {
+    const char *name;
+    double value;
+} still[] = {{"rigid_share", 0},  {"preset_share", 1}, {"preset_jitter", 0}, {"patch_share", 0},
+             {"base_mass", 0},    {"com_offset", 0},   {"link_mass", 1},     {"armature", 1},
+             {"motor_offset", 0}, {"gain", 1},         {"strength", 1},      {"push_interval", 0}};
+
+/* Those keys have no effect, all others their defaults: noise, latencies and the start are drawn. */
+static void nominal(void **unused) {
+    (void)unused;
+    TaskDef plain = task_def_default();
+    TaskDef def = plain;
+    task_def_make_nominal(&def);
+    int changed = 0;
+    for (int i = 0; i < randomize_field_count; i++) {
+        const MildField *field = &randomize_fields[i];
+        const char *at = (const char *)&def.randomize + field->offset;
+        const double *values = (const double *)(const void *)at;
+        size_t k = 0;
+        while (k < sizeof still / sizeof *still && strcmp(still[k].name, field->name) != 0) {
+            k++;
+        }
+        if (k == sizeof still / sizeof *still) {
+            size_t bytes = field->type == MILD_FIELD_DOUBLE ? sizeof(double) : sizeof(int);
+            assert_memory_equal(at, (const char *)&plain.randomize + field->offset,
+                                bytes * (size_t)field->count);
+            continue;
+        }
+        changed++;
+        for (int n = 0; n < field->count; n++) {
+            expect_entry(field->name, n, values[n], still[k].value, 0);
+        }
+    }
+    assert_int_equal(changed, sizeof still / sizeof *still);
+    assert_memory_equal(&def.reward, &plain.reward, sizeof def.reward);
+    assert_int_equal(def.assist, 0);
+    def.assist = plain.assist;
+    def.randomize = plain.randomize;
+    assert_memory_equal(&def, &plain, sizeof def);
 }
 
 static void expect_refused(const TaskDef *def, const char *key) {
@@ -175,8 +286,9 @@ static void physics_steps(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(defaults),      cmocka_unit_test(refused),
-        cmocka_unit_test(physics_steps), cmocka_unit_test(gains),
+        cmocka_unit_test(defaults),      cmocka_unit_test(paths_of_pictures),
+        cmocka_unit_test(nominal),       cmocka_unit_test(refused),
+        cmocka_unit_test(gains),         cmocka_unit_test(physics_steps),
         cmocka_unit_test(robot_or_task),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);

@@ -226,6 +226,32 @@ static void command_is_seen_late(void **unused) {
     rig_close(&rig);
 }
 
+/* 0.125 s are 12.5 policy steps: 13, for the command, the push and the end of an episode. */
+static void intervals_are_rounded(void **unused) {
+    (void)unused;
+    TaskDef def = kit_quiet_def();
+    def.episode = 0.125;
+    rig_open(&rig, &def, 3, 0);
+    assert_int_equal(rig.env->step_limit, 13);
+    rig_close(&rig);
+    open_with_dt(0.0025);
+    rig.env->command_frozen = 0;
+    rig.def.standing_share = 0;
+    rig.def.vx[0] = 0.2;
+    rig.def.command_interval = rig.def.randomize.push_interval = 0.125;
+    for (int t = 1; t <= 27; t++) {
+        RobotState state = kit_state(2);
+        double command = rig.env->command[0], push = rig.env->push[0];
+        uint32_t step = rig.env->step;
+        put(&state);
+        rig_step(&rig, NULL);
+        assert_int_equal(rig.env->command[0] != command, t % 13 == 0);
+        int pushed = fabs(rig.env->push[0] - 0.95 * push) > 1e-12;
+        assert_int_equal(pushed, step > 0 && step % 13 == 0);
+    }
+    rig_close(&rig);
+}
+
 /* A command that eval and play have set stays. */
 static void frozen_command(void **unused) {
     (void)unused;
@@ -315,6 +341,7 @@ int main(void) {
         cmocka_unit_test(action_is_clipped),
         cmocka_unit_test(latencies),
         cmocka_unit_test(command_is_seen_late),
+        cmocka_unit_test(intervals_are_rounded),
         cmocka_unit_test(frozen_command),
         cmocka_unit_test(clock_runs),
         cmocka_unit_test(reward_follows_the_clock_of_the_action),

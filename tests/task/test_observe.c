@@ -458,6 +458,23 @@ static void history(void **unused) {
     }
 }
 
+/* Step by step the newest frame is added to those before it. */
+static void history_of_steps(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    rig.def.history_stride = 1;
+    float seen[9][SA01_OBSERVATION];
+    for (int t = 0; t < 9; t++) {
+        rig_step(&rig, NULL);
+        memcpy(seen[t], rig.frame, sizeof seen[t]);
+    }
+    for (int i = 0; i < TASK_FRAMES; i++) {
+        assert_memory_equal(rig.history + i * SA01_OBSERVATION, seen[3 + i], sizeof seen[0]);
+    }
+    assert_memory_not_equal(seen[8], seen[7], sizeof seen[0]);
+    rig_close(&rig);
+}
+
 /* Any pointer of the view may be missing. */
 static void views(void **unused) {
     (void)unused;
@@ -549,6 +566,7 @@ int main(void) {
         cmocka_unit_test(mirror_image),
         cmocka_unit_test(views),
         cmocka_unit_test(history),
+        cmocka_unit_test(history_of_steps),
         cmocka_unit_test(noise_is_a_stream),
         cmocka_unit_test(noise),
     };

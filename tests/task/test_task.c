@@ -4,7 +4,7 @@
 #include "sa01.h"
 #include "task/vec.h"
 
-enum { ENVS = 24, STEPS = 200 };
+enum { ENVS = 12, STEPS = 100 };
 
 static void random_actions(float *action, int envs, int t, double size) {
     for (int e = 0; e < envs; e++) {
@@ -18,6 +18,7 @@ static void random_actions(float *action, int envs, int t, double size) {
 static uint64_t rollout(int threads, int envs, int steps, MildModel model, VecStats *stats) {
     TaskDef def = task_def_default();
     def.randomize.model = (int)model;
+    def.episode = 0.5; /* every robot begins a second episode */
     robot_set_model(robot, model);
     Pool *pool = pool_create(threads);
     MildError error = {0};
@@ -53,13 +54,14 @@ static uint64_t rollout(int threads, int envs, int steps, MildModel model, VecSt
     return hash;
 }
 
+/* What the numbers are is pinned by tests/pins. */
 static void same_numbers_whatever_the_thread_count(void **state) {
     (void)state;
     VecStats stats;
     uint64_t one = rollout(1, ENVS, STEPS, MILD_MODEL_MILD, &stats);
     printf("hash of %d robots x %d steps: %016llx; %d episodes, %d falls, %d diverged\n", ENVS,
            STEPS, (unsigned long long)one, stats.episodes, stats.falls, stats.diverged);
-    assert_true(stats.falls > 0);
+    assert_true(stats.episodes >= ENVS);
     assert_int_equal(stats.diverged, 0);
     for (int threads = 2; threads <= 3; threads++) {
         assert_true(one == rollout(threads, ENVS, STEPS, MILD_MODEL_MILD, &stats));

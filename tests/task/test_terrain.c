@@ -15,7 +15,7 @@
 #include "sa01.h"
 #include "task/vec.h"
 
-enum { ENVS = 12, STEPS = 120, TILES = 64 };
+enum { ENVS = 6, STEPS = 60, TILES = 64 };
 
 static Robot *robot;
 static MildMap *map;

@@ -1,5 +1,5 @@
 /* A model's law in public: one element, a level sole, and the rival that sinks as deep. */
-#include "ground/model.h"
+#include "ground/models.h"
 
 #include <math.h>
 
@@ -45,7 +45,8 @@ static double *material_number(MildMaterial *m, const char *key) {
 }
 
 /* A law above its bed is proportional to its `scaled` fields, so one factor matches it. pressure:
- * what the ground above the bed carries per area [N/m^2]; area: of one element of the rival [m^2]. */
+ * what the ground above the bed carries per area [N/m^2]; area: of one element of the rival
+ * [m^2]. */
 static void rival_scale(MildMaterial *m, const ModelRow *row, double pressure, double area,
                         double depth) {
     MildMaterial bottomless = *m;
@@ -70,12 +71,12 @@ static MildStatus match_check(MildModel model, const MildMaterial *mild, double 
     if (!(load > 0.0 && load < INFINITY)) {
         return mild_fail(error, MILD_ERROR_RANGE, "model: load = %g N must be positive", load);
     }
-    return MILD_OK;
+    return mild_material_check(mild, error);
 }
 
 MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error) {
-    const MildStatus status = match_check(model, mild, load, error);
+    MildStatus status = match_check(model, mild, load, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -87,16 +88,23 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
     const double pressure =
         load / (cells * cell) - LAW_BED_STRESS * fmax(depth - mild->bed_depth, 0.0);
 
-    *rival = *mild;
-    rival->model = (int)model;
+    MildMaterial matched = *mild;
+    matched.model = (int)model;
     if (row->info.concentric) {
-        material_concentrate(rival, cells);
+        material_concentrate(&matched, cells);
     }
     if (row->reference) {
-        row->reference(rival, area);
+        row->reference(&matched, area);
     }
     if (row->info.scaled[0]) {
-        rival_scale(rival, row, pressure, area, depth);
+        rival_scale(&matched, row, pressure, area, depth);
     }
+    MildError why;
+    status = mild_material_check(&matched, &why);
+    if (status != MILD_OK) {
+        return mild_fail(error, status, "model: %s cannot match this material under %g N: %s",
+                         mild_model_names[model], load, why.text);
+    }
+    *rival = matched;
     return MILD_OK;
 }

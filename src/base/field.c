@@ -9,9 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define FIELD_VALUES_MAX                                                                           \
-    64 /* longest array a text may fill: nothing is written before all of it parsed */
-#define FIELD_NAME_MAX 63 /* longer names are cut in the edit distance */
+#include "base/text.h"
+
+/* Longest array that a text can fill. All values are parsed before the first one is written. */
+enum { FIELD_VALUES_MAX = 64 };
 
 typedef union {
     double number;
@@ -149,46 +150,19 @@ static MildStatus parse_text(const MildField *field, void *def, const char *text
     return MILD_OK;
 }
 
-/* Levenshtein distance, two rows. */
-static int edit_distance(const char *a, const char *b) {
-    int rows[2][FIELD_NAME_MAX + 1], *above = rows[0], *row = rows[1];
-    int a_length = (int)strnlen(a, FIELD_NAME_MAX), b_length = (int)strnlen(b, FIELD_NAME_MAX);
-    for (int j = 0; j <= b_length; j++) {
-        above[j] = j;
-    }
-    for (int i = 1; i <= a_length; i++) {
-        row[0] = i;
-        for (int j = 1; j <= b_length; j++) {
-            int replace = above[j - 1] + (a[i - 1] != b[j - 1]), drop = above[j] + 1,
-                add = row[j - 1] + 1;
-            int least = drop < add ? drop : add;
-            row[j] = replace < least ? replace : least;
-        }
-        int *swap = above;
-        above = row;
-        row = swap;
-    }
-    return above[b_length];
-}
-
 static MildStatus parse_name(const MildField *field, void *def, const char *text,
                              const char *section, MildError *error) {
-    int index = 0, count = (int)field->max + 1, nearest = 0, least = INT_MAX;
+    int count = (int)field->max + 1;
+    int index = 0;
     while (index < count && strcmp(field->names[index], text) != 0) {
         index++;
     }
-    if (index < count) {
-        memcpy((char *)def + field->offset, &index, sizeof index);
-        return MILD_OK;
+    if (index == count) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: unknown name '%.60s'; nearest is '%s'",
+                         section, field->name, text, text_nearest(text, field->names, count));
     }
-    for (int i = 0; i < count; i++) {
-        int distance = edit_distance(field->names[i], text);
-        if (distance < least) {
-            least = distance, nearest = i;
-        }
-    }
-    return mild_fail(error, MILD_ERROR_ARGUMENT, "%s.%s: unknown name '%.60s'; nearest is '%s'",
-                     section, field->name, text, field->names[nearest]);
+    memcpy((char *)def + field->offset, &index, sizeof index);
+    return MILD_OK;
 }
 
 MildStatus mild_field_parse(const MildField *field, void *def, const char *text,
@@ -271,26 +245,19 @@ int mild_field_print(const MildField *field, const void *def, char *text, size_t
 
 const MildField *mild_field_find(const MildField *fields, int count, const char *name,
                                  const char **nearest) {
-    int least = FIELD_NAME_MAX + 1;
+    const MildField *found = NULL;
+    const char *closest = NULL;
+    int least = INT_MAX;
+    for (int f = 0; f < count && !found; f++) {
+        int distance = text_distance(fields[f].name, name);
+        found = strcmp(fields[f].name, name) == 0 ? &fields[f] : NULL;
+        if (found || distance < least) {
+            least = distance;
+            closest = fields[f].name;
+        }
+    }
     if (nearest) {
-        *nearest = NULL;
+        *nearest = closest;
     }
-    for (int f = 0; f < count; f++) {
-        if (strcmp(fields[f].name, name) != 0) {
-            continue;
-        }
-        if (nearest) {
-            *nearest = fields[f].name;
-        }
-        return &fields[f];
-    }
-    for (int f = 0; nearest && f < count; f++) {
-        int distance = edit_distance(fields[f].name, name);
-        if (distance >= least) {
-            continue;
-        }
-        least = distance;
-        *nearest = fields[f].name;
-    }
-    return NULL;
+    return found;
 }

@@ -1,12 +1,9 @@
-#include "ground/law.h"
+#include "ground/element_law.h"
 
-#include "ground/material.h"
-
-/* The cone is complete at once; only a blend with a cone reads its depth. */
 Law law_line(double slope, double area, double bed_depth) {
     return (Law){.line_stiffness = slope,
-                 .cone_depth = 1e-9,
-                 .inverse_cone_depth = 1e9,
+                 .cone_depth = LAW_LINE_DEPTH,
+                 .inverse_cone_depth = 1.0 / LAW_LINE_DEPTH,
                  .bed_depth = bed_depth,
                  .bed_stiffness = LAW_BED_STRESS * area};
 }

@@ -1,0 +1,165 @@
+/* An engine's kinetic energy changes by the impulse times the mean of the speeds before and after the
+ * step. The normal impulse keeps its account at that mean speed. Friction opposes the speed after the
+ * step, because only so can it stop a foot. As long as the motion keeps its direction, friction takes
+ * energy at the mean speed, too. But the normal impulse of a foot on a long lever can turn a sliding
+ * element round within the step. Friction then opposes the new motion with the strength of a whole
+ * step, and does work on the old one.
+ *
+ * A step where that matters is solved again. Friction of the elements concerned then begins only where
+ * the element is as fast backward as it was forward: with u and v the horizontal velocities before and
+ * after, it opposes
+ *
+ *     d = v - p,   p the point nearest to v on the way from 0 to -u
+ *
+ * in the place of v. The nearest point of a convex set has all of the set behind it, d . (q - p) <= 0
+ * for each q on the way. With q = 0 this is d . v >= |d|^2, with q = -u it is d . (u + v) >= |d|^2. So
+ * an impulse along -d takes energy at the new speed and at the mean speed. It is minus the gradient of
+ * a convex function of v, like friction without the turn, and the solvers need nothing new. What such
+ * an element held is let go. */
+#include "ground/energy.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "ground/friction.h"
+
+/* [-] of the energy of the step's impulses. A step of a walk does not come to this. */
+#define ENERGY_SHARE 0.08
+
+void energy_begin(MildScratch *scratch) {
+    for (int f = 0; f < scratch->feet; f++) {
+        FootScratch *foot = &scratch->foot[f];
+        if (foot->turned) {
+            memset(foot->own.turn_x, 0, (size_t)foot->padded * sizeof(double));
+            memset(foot->own.turn_y, 0, (size_t)foot->padded * sizeof(double));
+            foot->turned = 0;
+        }
+    }
+}
+
+/* [J] W A W/2: what the impulses alone would give to a foot at rest. */
+static double impulse_energy(const MildScratch *scratch, const MildContactInput *input,
+                             const MildContactResult *result) {
+    double sum = 0.0;
+    for (int k = 0; k < 6 * scratch->feet; k++) {
+        sum += scratch->wrench[k] * (result->velocity[k] - input->free_velocity[k]);
+    }
+    return 0.5 * sum;
+}
+
+/* [J] What a foot's friction gives at the mean speed, beyond its work at the new speed, because the
+ * ground has changed the speed: -I . dv/2 with dv = A W. change: dv. */
+static double foot_caused(const FootScratch *foot, const Motion *change) {
+    const Slots local = foot->slot, *s = &local;
+    const Motion v = *change;
+    const int end = foot_end(foot);
+    double sum = 0.0;
+#pragma omp simd reduction(+ : sum)
+    for (int i = 0; i < end; i++) {
+        const double iz = s->iz[i];
+        const double ix = s->ix[i] + s->slope_x[i] * iz;
+        const double iy = s->iy[i] + s->slope_y[i] * iz;
+        sum += ix * motion_at(v.x, s->x[i], s->y[i]) + iy * motion_at(v.y, s->x[i], s->y[i]);
+    }
+    return -0.5 * sum;
+}
+
+/* The same on level ground from the sums of the last pass. */
+static double level_caused(const double sums[9], const Motion *change) {
+    double sum = 0.0;
+    for (int k = 0; k < 3; k++) {
+        sum += sums[3 * k] * change->x[k] + sums[3 * k + 1] * change->y[k];
+    }
+    return -0.5 * sum;
+}
+
+/* The sum over all feet. */
+static double friction_caused(const MildScratch *scratch, const MildContactInput *input,
+                              const MildContactResult *result) {
+    double sum = 0.0;
+    for (int f = 0; f < scratch->feet; f++) {
+        const FootScratch *foot = &scratch->foot[f];
+        if (foot->active == 0) {
+            continue;
+        }
+        double twist[6];
+        for (int k = 0; k < 6; k++) {
+            twist[k] = result->velocity[6 * f + k] - input->free_velocity[6 * f + k];
+        }
+        const Motion change = foot_motion(foot, twist);
+        const int sums = !foot->uneven && input->solver == MILD_SOLVER_NEWTON;
+        sum += sums ? level_caused(scratch->sums[f], &change) : foot_caused(foot, &change);
+    }
+    return sum;
+}
+
+/* [J] What a slot's friction gave at the mean speed, beyond what it had stored. */
+static double slot_gift(const Slots *s, int i, const SlotVelocity *u, const SlotVelocity *v) {
+    const Element e = slot_element(s, i);
+    const double ix = s->ix[i] + s->slope_x[i] * s->iz[i];
+    const double iy = s->iy[i] + s->slope_y[i] * s->iz[i];
+    const double work = 0.5 * (ix * (u->x + v->x) + iy * (u->y + v->y));
+    if (!(e.hold_stiffness > 0.0)) {
+        return work;
+    }
+    const double hx = e.hold_x - e.hold_stiffness * v->x;
+    const double hy = e.hold_y - e.hold_stiffness * v->y;
+    const double bound = friction_bound(&e, s->iz[i]);
+    const double left = fmin(hx * hx + hy * hy, bound * bound);
+    const double held = e.hold_x * e.hold_x + e.hold_y * e.hold_y;
+    return work - 0.5 * fmax(held - left, 0.0) / e.hold_stiffness;
+}
+
+/* [J] The sum of what the slots gave, without what others took. */
+static double foot_gift(const FootScratch *foot, const Motion *before, const Motion *after) {
+    double sum = 0.0;
+    for (int i = 0; i < foot->active; i++) {
+        const SlotVelocity u = slot_velocity(&foot->slot, i, before, 0);
+        const SlotVelocity v = slot_velocity(&foot->slot, i, after, 0);
+        sum += fmax(slot_gift(&foot->slot, i, &u, &v), 0.0);
+    }
+    return sum;
+}
+
+static void foot_turn(FootScratch *foot, const Motion *before, const Motion *after, int all) {
+    const Slots *s = &foot->slot;
+    foot->turned = 1;
+    for (int i = 0; i < foot->active; i++) {
+        const SlotVelocity u = slot_velocity(s, i, before, 0);
+        const SlotVelocity v = slot_velocity(s, i, after, 0);
+        if (!all && !(slot_gift(s, i, &u, &v) > 0.0)) {
+            continue;
+        }
+        s->turn_x[i] = u.x;
+        s->turn_y[i] = u.y;
+        s->hold_x[i] = 0.0;
+        s->hold_y[i] = 0.0;
+        s->hold_stiffness[i] = 0.0;
+    }
+}
+
+int energy_created(MildScratch *scratch, const MildContactInput *input,
+                   const MildContactResult *result, int all) {
+    const double least = ENERGY_SHARE * impulse_energy(scratch, input, result);
+    if (!(friction_caused(scratch, input, result) > least)) {
+        return 0;
+    }
+    Motion before[MILD_FEET_MAX], after[MILD_FEET_MAX];
+    double gift = 0.0;
+    for (int f = 0; f < scratch->feet; f++) {
+        const FootScratch *foot = &scratch->foot[f];
+        before[f] = foot_motion(foot, input->velocity[f]);
+        after[f] = foot_motion(foot, result->velocity + 6 * f);
+        gift += foot->active > 0 ? foot_gift(foot, &before[f], &after[f]) : 0.0;
+    }
+    if (!(gift > least)) {
+        return 0;
+    }
+    for (int f = 0; f < scratch->feet; f++) {
+        if (scratch->foot[f].active > 0) {
+            foot_turn(&scratch->foot[f], &before[f], &after[f], all);
+        }
+    }
+    return 1;
+}

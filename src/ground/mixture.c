@@ -1,0 +1,142 @@
+#include "ground/mixture.h"
+
+#include <string.h>
+
+#include "ground/begin.h"
+#include "ground/models.h"
+#include "ground/terrain.h"
+
+/* Bool: material m is part of a mixture, coded as in Memory (state.h). */
+static int mixture_has(int32_t mixture, int m) {
+    return mixture >= 0 &&
+           ((mixture & 0xff) == m || (mixture >> 16 > 0 && (mixture >> 8 & 0xff) == m));
+}
+
+/* Bool: one of the numbers that a step uses is NaN. */
+static int law_is_nan(const Law *law, const MildMaterial *m) {
+    double sum = law->flat_stiffness + law->line_stiffness + law->cone_depth + law->mass_rate +
+                 law->drag_rate + law->bed_stiffness + law->inverse_cone_depth;
+    return isnan(sum + m->mu + m->k_drift + m->b_drift + m->recovery) || isnan(law->bed_depth);
+}
+
+void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
+    foot->nan = 0;
+    foot->curves = LAW_LINE;
+    for (int m = 0; m < terrain->material_count; m++) {
+        DerivedLaw *derived = &foot->derived[m];
+        const MildMaterial *wanted = &terrain->materials[m];
+        if (!derived->known || memcmp(&derived->material, wanted, sizeof *wanted) != 0) {
+            const Law law = law_of(wanted, foot->pitch);
+            *derived = (DerivedLaw){.material = *wanted,
+                                    .law = law,
+                                    .curves = law_curves(&law),
+                                    .known = 1,
+                                    .nan = law_is_nan(&law, wanted)};
+            for (int i = 0; i < foot->padded; i++) {
+                if (mixture_has(foot->slot_material[i], m)) {
+                    foot->slot_material[i] = MATERIAL_NONE;
+                }
+            }
+        }
+        foot->nan |= derived->nan;
+        foot->curves |= derived->curves;
+    }
+}
+
+/* Sets the law of slot i, and its friction and recovery. */
+static void slot_set_law(const Slots *s, int i, const Law *law, const MildMaterial *material) {
+    s->flat_stiffness[i] = law->flat_stiffness;
+    s->line_stiffness[i] = law->line_stiffness;
+    s->cone_depth[i] = law->cone_depth;
+    s->inverse_cone_depth[i] = law->inverse_cone_depth;
+    s->mass_rate[i] = law->mass_rate;
+    s->drag_rate[i] = law->drag_rate;
+    s->bed_depth[i] = law->bed_depth;
+    s->bed_stiffness[i] = law->bed_stiffness;
+    s->exit_drag[i] = law_exit_drag(law);
+    s->entry_drag[i] = law_entry_drag(law);
+    s->strength[i] = law->line_stiffness;
+    s->recovery[i] = material->recovery;
+    s->mu[i] = material->mu;
+    s->k_drift[i] = material->k_drift;
+    s->b_drift[i] = material->b_drift;
+}
+
+static double between(double a, double b, double share) {
+    return a + share * (b - a);
+}
+
+/* All numbers of the law, friction and recovery change linearly from one material to the other. A
+ * mean of two passive laws is passive, because c_d m >= m/2 holds for it too. */
+static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, int32_t mixture) {
+    const DerivedLaw *a = &derived[mixture & 0xff];
+    const DerivedLaw *b = &derived[mixture >> 8 & 0xff];
+    const Law *p = &a->law;
+    const Law *q = &b->law;
+    const MildMaterial *m = &a->material;
+    const MildMaterial *n = &b->material;
+    const double t = (mixture >> 16) / 255.0;
+    const Law law = {
+        .flat_stiffness = between(p->flat_stiffness, q->flat_stiffness, t),
+        .line_stiffness = between(p->line_stiffness, q->line_stiffness, t),
+        .cone_depth = between(p->cone_depth, q->cone_depth, t),
+        .inverse_cone_depth = 1.0 / between(p->cone_depth, q->cone_depth, t),
+        .mass_rate = between(p->mass_rate, q->mass_rate, t),
+        .drag_rate = between(p->drag_rate, q->drag_rate, t),
+        .bed_depth = between(p->bed_depth, q->bed_depth, t),
+        .bed_stiffness = between(p->bed_stiffness, q->bed_stiffness, t),
+    };
+    const MildMaterial material = {
+        .mu = between(m->mu, n->mu, t),
+        .k_drift = between(m->k_drift, n->k_drift, t),
+        .b_drift = between(m->b_drift, n->b_drift, t),
+        .recovery = between(m->recovery, n->recovery, t),
+    };
+    slot_set_law(s, i, &law, &material);
+}
+
+void slots_pad(const FootScratch *foot) {
+    static const Law none;
+    static const MildMaterial nothing;
+    for (int i = foot->active; i < foot_end(foot); i++) {
+        foot->slot_material[i] = MATERIAL_NONE;
+        slot_set_law(&foot->slot, i, &none, &nothing);
+    }
+}
+
+/* Bool: no element remembers another material than 0, and every slot already holds the law of
+ * material 0. Without a branch per element. */
+static int slots_are_uniform(const FootScratch *foot, const Memory *memory) {
+    const int32_t *remembered = memory->material;
+    const int32_t *set = foot->slot_material;
+    int32_t differs = 0;
+    for (int e = 0; e < foot->elements; e++) {
+        differs |= remembered[e] > 0;
+    }
+    for (int i = 0; i < foot->active; i++) {
+        differs |= set[i];
+    }
+    return !differs;
+}
+
+void slots_materials(const FootScratch *foot, const MildTerrain *terrain, const Memory *memory) {
+    const int count = terrain->material_count;
+    if (terrain_is_uniform(terrain) && slots_are_uniform(foot, memory)) {
+        return;
+    }
+    for (int i = 0; i < foot->active; i++) {
+        int e = foot->element[i], m = memory->material[e];
+        if (m < 0 || (m & 0xff) >= count || (m >> 8 & 0xff) >= count) {
+            m = terrain_mixture(terrain, foot->point_x[e], foot->point_y[e]);
+        }
+        if (foot->slot_material[i] == m) {
+            continue;
+        }
+        foot->slot_material[i] = m;
+        if (m <= 0xff) {
+            slot_set_law(&foot->slot, i, &foot->derived[m].law, &terrain->materials[m]);
+        } else {
+            slot_set_mixture(&foot->slot, i, foot->derived, m);
+        }
+    }
+}

@@ -1,0 +1,83 @@
+#include "ground/place.h"
+
+#include "ground/terrain.h"
+
+#define PLACE_MARGIN 1e-3 /* [m] elements this close to the ground are listed */
+/* [m/s] An impact at the heel may swing the toe down faster than its free motion. */
+#define PLACE_EXTRA_SPEED 2.0
+
+/* Depth of every element, and the gradient of the ground under it. */
+static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
+    for (int i = 0; i < foot->padded; i++) {
+        double slope[2];
+        foot->depth[i] =
+            terrain_surface(terrain, foot->point_x[i], foot->point_y[i], slope) - foot->point_z[i];
+        foot->slope_x[i] = slope[0];
+        foot->slope_y[i] = slope[1];
+    }
+}
+
+void foot_place(FootScratch *foot, const MildTerrain *terrain, int imprints, const double *position,
+                const double *R) {
+    for (int k = 0; k < 3; k++) {
+        foot->origin[k] = position[k];
+        foot->arm[0][k] = R[3 * k + 2] * foot->z;
+        foot->arm[1][k] = R[3 * k];
+        foot->arm[2][k] = R[3 * k + 1];
+    }
+    foot->uneven = !terrain_is_level(terrain);
+    if (foot->uneven || imprints || !terrain_is_uniform(terrain)) {
+        foot_points(foot);
+    }
+    if (foot->uneven) {
+        foot_surface(foot, terrain);
+    } else {
+        const double *x = foot->x;
+        const double *y = foot->y;
+        const double ez = foot->arm[1][2];
+        const double nz = foot->arm[2][2];
+        const double above = terrain->height - position[2] - foot->arm[0][2];
+        double *depth = foot->depth;
+#pragma omp simd
+        for (int i = 0; i < foot->padded; i++) {
+            depth[i] = above - ez * x[i] - nz * y[i];
+        }
+    }
+    for (int i = foot->elements; i < foot->padded; i++) {
+        foot->depth[i] = PADDING_DEPTH;
+    }
+}
+
+/* A bound of the speed at which any point of the foot gets deeper under the twist V [m/s].
+ * steepest: of the gradient of the ground [-]. */
+static double foot_descent(const FootScratch *foot, const double *V, double steepest) {
+    const double tilt = V[3] * V[3] + V[4] * V[4];
+    const double level = sqrt(V[0] * V[0] + V[1] * V[1]);
+    return real_max(-V[2], 0.0) + foot->radius * sqrt(tilt) +
+           steepest * (level + foot->radius * sqrt(tilt + V[5] * V[5]));
+}
+
+void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f) {
+    const double descent = real_max(foot_descent(foot, input->velocity[f], steepest),
+                                    foot_descent(foot, input->free_velocity + 6 * f, steepest));
+    const double least = -PLACE_MARGIN - input->dt * (descent + PLACE_EXTRA_SPEED);
+    const double *depth = foot->depth;
+    double near = 0.0;
+    /* Whole vectors, unless that would list the padding. */
+    const int end = least < PADDING_DEPTH ? foot->elements : foot->padded;
+#pragma omp simd reduction(+ : near)
+    for (int i = 0; i < end; i++) {
+        near += depth[i] > least ? 1.0 : 0.0;
+    }
+    foot->active = (int)near;
+    const int all = foot->active == foot->elements;
+    if (foot->active == 0 || (all && foot->whole)) {
+        return;
+    }
+    int active = 0;
+    for (int i = 0; i < foot->elements; i++) {
+        foot->element[active] = i;
+        active += all | (foot->depth[i] > least);
+    }
+    foot->whole = all;
+}

@@ -1,0 +1,16 @@
+/* Where the elements of a foot are, and which of them may touch the ground in a step. */
+#ifndef MILD_GROUND_PLACE_H
+#define MILD_GROUND_PLACE_H
+
+#include "ground/scratch.h"
+
+/* Depth of every element; where the ground differs from place to place also its position, and on
+ * uneven ground the gradient under it. imprints: bool. position, R: pose of the foot. */
+void foot_place(FootScratch *foot, const MildTerrain *terrain, int imprints, const double *position,
+                const double *R);
+/* Lists the elements that may touch in this step, in ascending order. That all do or none does, the
+ * common cases, is found without a branch per element. steepest: a bound of the gradient of the
+ * ground [-]. f: index of the foot in `input`. */
+void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f);
+
+#endif

@@ -1,0 +1,243 @@
+/* Tables of fields: what is parsed, refused and printed, every message, every type. */
+#include <limits.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "mild/field.h"
+
+typedef struct {
+    double before;
+    double mass;
+    int count[3];
+    int flag;
+    uint64_t seed;
+    char note[6];
+    int kind;
+    double after;
+} Def;
+
+enum { MASS, COUNT, FLAG, SEED, NOTE, KIND, FIELDS };
+static const char *const kinds[] = {"sand", "foam45", "foam60"};
+static const MildField fields[FIELDS] = {
+    MILD_FIELD(Def, mass, MILD_FIELD_DOUBLE, 1, -2, 5, "[kg] of the body"),
+    MILD_FIELD(Def, count, MILD_FIELD_INT, 3, 0, 9, "[-] of each"),
+    MILD_FIELD(Def, flag, MILD_FIELD_BOOL, 1, 0, 1, "[-] on or off"),
+    MILD_FIELD(Def, seed, MILD_FIELD_UINT64, 1, 0, 1.8e19, "[-] of the noise"),
+    MILD_FIELD(Def, note, MILD_FIELD_TEXT, 6, 0, 0, "[-] a few letters"),
+    MILD_FIELD_CHOICE(Def, kind, kinds, 3, "[-] of ground"),
+};
+
+static const Def start = {1, 2, {3, 4, 5}, 1, 6, "seven", 2, 8};
+
+/* Parsing `text` into a copy of `start`. */
+static MildStatus parse(int field, const char *text, Def *def, MildError *error) {
+    memcpy(def, &start, sizeof *def); /* with its padding */
+    *error = (MildError){0};
+    return mild_field_parse(&fields[field], def, text, "robot", error);
+}
+
+static void refused(int field, const char *text, MildStatus status, const char *message) {
+    Def def;
+    MildError error;
+    assert_int_equal(parse(field, text, &def, &error), status);
+    assert_int_equal(error.status, status);
+    assert_string_equal(error.text, message);
+    assert_memory_equal(&def, &start, sizeof def); /* nothing was written */
+    assert_int_equal(mild_field_parse(&fields[field], &def, text, "robot", NULL), status);
+}
+
+/* Parsed, and printed as `printed`; the fields beside it stay. */
+static Def taken(int field, const char *text, const char *printed) {
+    Def def;
+    MildError error;
+    char out[64];
+    if (parse(field, text, &def, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
+    assert_int_equal(mild_field_print(&fields[field], &def, out, sizeof out), strlen(printed));
+    assert_string_equal(out, printed);
+    assert_true(def.before == start.before && def.after == start.after);
+    return def;
+}
+
+static void test_numbers(void **state) {
+    (void)state;
+    assert_true(taken(MASS, "-1.5e-1", "-0.15").mass == -0.15);
+    assert_true(taken(MASS, " 5 ", "5").mass == 5); /* the bounds belong to the range */
+    assert_true(taken(MASS, "-2", "-2").mass == -2);
+    assert_true(taken(MASS, "0.1", "0.1").mass == 0.1);
+    taken(MASS, "0.30000000000000004", "0.30000000000000004"); /* 17 digits, and it needs them */
+    taken(MASS, "3.1415926535897931", "3.141592653589793");
+    taken(MASS, "1.2345678", "1.2345678");
+    refused(MASS, "5.0000001", MILD_ERROR_RANGE,
+            "robot.mass = 5.0000001 is outside -2 .. 5: [kg] of the body");
+    refused(MASS, "-2.1", MILD_ERROR_RANGE,
+            "robot.mass = -2.1 is outside -2 .. 5: [kg] of the body");
+    refused(MASS, "inf", MILD_ERROR_RANGE, "robot.mass = inf is outside -2 .. 5: [kg] of the body");
+    refused(MASS, "nan", MILD_ERROR_ARGUMENT,
+            "robot.mass: 'nan' is not a number: [kg] of the body");
+    refused(MASS, "1x", MILD_ERROR_ARGUMENT, "robot.mass: '1x' is not a number: [kg] of the body");
+    refused(MASS, "", MILD_ERROR_ARGUMENT, "robot.mass: 0 of 1 values in ''");
+    refused(MASS, "1 2", MILD_ERROR_ARGUMENT, "robot.mass: more than 1 values in '1 2'");
+    char word[100], message[200];
+    memset(word, '1', sizeof word);
+    word[63] = '\0'; /* 63 digits are read, 64 are not */
+    refused(MASS, word, MILD_ERROR_RANGE,
+            "robot.mass = 1.11111111e+62 is outside -2 .. 5: [kg] of the body");
+    word[63] = '1';
+    word[64] = '\0';
+    snprintf(message, sizeof message, "robot.mass: '%s' is not a number: [kg] of the body", word);
+    refused(MASS, word, MILD_ERROR_ARGUMENT, message);
+}
+
+static void test_integers(void **state) {
+    (void)state;
+    static const int wanted[3] = {9, 0, 7};
+    Def def = taken(COUNT, "9,0 \t7\n", "9 0 7");
+    assert_memory_equal(def.count, wanted, sizeof wanted);
+    assert_int_equal(def.flag, start.flag);
+    refused(COUNT, "1 2", MILD_ERROR_ARGUMENT, "robot.count: 2 of 3 values in '1 2'");
+    refused(COUNT, "1 2 3 4", MILD_ERROR_ARGUMENT, "robot.count: more than 3 values in '1 2 3 4'");
+    refused(COUNT, "1 2 10", MILD_ERROR_RANGE, "robot.count = 10 is outside 0 .. 9: [-] of each");
+    refused(COUNT, "1 -1 3", MILD_ERROR_RANGE, "robot.count = -1 is outside 0 .. 9: [-] of each");
+    refused(COUNT, "1 2.5 3", MILD_ERROR_ARGUMENT,
+            "robot.count: '2.5' is not an integer: [-] of each");
+    refused(COUNT, "4294967297 2 3", MILD_ERROR_ARGUMENT,
+            "robot.count: '4294967297' is not an integer: [-] of each");
+    refused(COUNT, "99999999999999999999 2 3", MILD_ERROR_ARGUMENT,
+            "robot.count: '99999999999999999999' is not an integer: [-] of each");
+    Def seeded = taken(SEED, "10000000000000000001", "10000000000000000001");
+    assert_true(seeded.seed == 10000000000000000001u);
+    assert_true(taken(SEED, "0x10", "16").seed == 16);
+    refused(SEED, "-1", MILD_ERROR_ARGUMENT,
+            "robot.seed: '-1' is not an unsigned integer: [-] of the noise");
+    refused(SEED, "18446744073709551615", MILD_ERROR_RANGE,
+            "robot.seed = 1.84467441e+19 is outside 0 .. 1.8e+19: [-] of the noise");
+    refused(SEED, "18446744073709551616", MILD_ERROR_ARGUMENT,
+            "robot.seed: '18446744073709551616' is not an unsigned integer: [-] of the noise");
+}
+
+static void test_switches(void **state) {
+    (void)state;
+    static const char *const yes[] = {"1", "true", "YES", "On"}, *const no[] = {"0", "False", "no",
+                                                                                "OFF"};
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(taken(FLAG, yes[i], "true").flag, 1);
+        assert_int_equal(taken(FLAG, no[i], "false").flag, 0);
+    }
+    static const char *const neither[] = {"2", "truth", "tru", "o", "offf", "yes!"};
+    for (int i = 0; i < 6; i++) {
+        char message[100];
+        snprintf(message, sizeof message, "robot.flag: '%s' is not true or false: [-] on or off",
+                 neither[i]);
+        refused(FLAG, neither[i], MILD_ERROR_ARGUMENT, message);
+    }
+}
+
+static void test_texts(void **state) {
+    (void)state;
+    assert_string_equal(taken(NOTE, "a b,c", "a b,c").note, "a b,c");
+    assert_string_equal(taken(NOTE, "", "").note, "");
+    refused(NOTE, "abcdef", MILD_ERROR_RANGE, "robot.note: text of 6 characters, at most 5 fit");
+}
+
+static void test_names(void **state) {
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(taken(KIND, kinds[i], kinds[i]).kind, i);
+    }
+    refused(KIND, "foam54", MILD_ERROR_ARGUMENT,
+            "robot.kind: unknown name 'foam54'; nearest is 'foam45'");
+    refused(KIND, "foam6", MILD_ERROR_ARGUMENT,
+            "robot.kind: unknown name 'foam6'; nearest is 'foam60'");
+    refused(KIND, "send", MILD_ERROR_ARGUMENT,
+            "robot.kind: unknown name 'send'; nearest is 'sand'");
+    refused(KIND, "", MILD_ERROR_ARGUMENT, "robot.kind: unknown name ''; nearest is 'sand'");
+}
+
+/* What does not fit is cut, and the whole length told, as snprintf does. */
+static void test_cut(void **state) {
+    (void)state;
+    char text[16];
+    for (size_t size = 0; size <= 8; size++) {
+        memset(text, '?', sizeof text);
+        assert_int_equal(mild_field_print(&fields[COUNT], &start, text, size), 5);
+        char wanted[16] = "3 4 5";
+        wanted[size > 0 && size <= 5 ? size - 1 : 5] = '\0';
+        assert_true(size == 0 ? text[0] == '?' : strcmp(text, wanted) == 0);
+        assert_true(text[size] == '?');
+    }
+}
+
+static void test_check(void **state) {
+    (void)state;
+    MildError error = {0};
+    assert_int_equal(mild_fields_check(fields, FIELDS, &start, "robot", &error), MILD_OK);
+    Def def = start;
+    def.mass = NAN;
+    assert_int_equal(mild_fields_check(fields, FIELDS, &def, "robot", &error), MILD_ERROR_RANGE);
+    assert_string_equal(error.text, "robot.mass = nan is outside -2 .. 5: [kg] of the body");
+    def = start;
+    for (int i = 0; i < 3; i++) {
+        def = start;
+        def.count[i] = 10 + i;
+        def.kind = 3; /* the first in the table's order is told */
+        assert_int_equal(mild_fields_check(fields, FIELDS, &def, "x", &error), MILD_ERROR_RANGE);
+        char message[100];
+        snprintf(message, sizeof message, "x.count = %d is outside 0 .. 9: [-] of each", 10 + i);
+        assert_string_equal(error.text, message);
+    }
+    def = start;
+    def.kind = 3;
+    assert_int_equal(mild_fields_check(fields, FIELDS, &def, "x", &error), MILD_ERROR_RANGE);
+    assert_string_equal(error.text, "x.kind = 3 is outside 0 .. 2: [-] of ground");
+    def.kind = -1;
+    assert_int_equal(mild_fields_check(fields, FIELDS, &def, "x", &error), MILD_ERROR_RANGE);
+    assert_int_equal(mild_fields_check(fields, KIND, &def, "x", &error), MILD_OK);
+    def = start;
+    memset(def.note, 'n', sizeof def.note);
+    def.kind = 0;
+    assert_int_equal(mild_fields_check(fields, FIELDS, &def, "x", &error), MILD_ERROR_RANGE);
+    assert_string_equal(error.text, "x.note has no end within 6 characters");
+}
+
+static void test_find(void **state) {
+    (void)state;
+    const char *nearest = "?";
+    assert_ptr_equal(mild_field_find(fields, FIELDS, "seed", &nearest), &fields[SEED]);
+    assert_string_equal(nearest, "seed");
+    assert_ptr_equal(mild_field_find(fields, FIELDS, "mass", NULL), &fields[MASS]);
+    assert_null(mild_field_find(fields, FIELDS, "sed", &nearest));
+    assert_string_equal(nearest, "seed");
+    assert_null(mild_field_find(fields, FIELDS, "cuont", &nearest));
+    assert_string_equal(nearest, "count");
+    assert_null(mild_field_find(fields, FIELDS, "masses", &nearest));
+    assert_string_equal(nearest, "mass");
+    assert_null(mild_field_find(fields, FIELDS, "kinds", NULL));
+    assert_null(mild_field_find(fields, SEED, "seed", &nearest)); /* not among the first ones */
+    assert_null(mild_field_find(fields, 0, "seed", &nearest));
+    assert_null(nearest);
+    char longer[80];
+    memset(longer, 'z', sizeof longer);
+    longer[79] = '\0'; /* as far from every name as can be: one is told all the same */
+    assert_null(mild_field_find(fields, FIELDS, longer, &nearest));
+    assert_string_equal(nearest, "mass");
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_numbers),  cmocka_unit_test(test_integers),
+        cmocka_unit_test(test_switches), cmocka_unit_test(test_texts),
+        cmocka_unit_test(test_names),    cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_check),    cmocka_unit_test(test_find),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,182 @@
+/* Paths and files written whole or not at all. */
+#include <fcntl.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "base/file.h"
+#include "base/paths.h"
+
+static char folder[64];
+
+static int make_folder(void **state) {
+    (void)state;
+    strcpy(folder, "/tmp/mild_paths_XXXXXX");
+    return mkdtemp(folder) ? 0 : -1;
+}
+
+static int remove_folder(void **state) {
+    (void)state;
+    return rmdir(folder); /* every test removes what it made */
+}
+
+static const char *in_folder(const char *name) {
+    static char path[2][PATH_SIZE];
+    static int turn;
+    turn = !turn;
+    assert_int_equal(path_join(folder, name, path[turn], NULL), MILD_OK);
+    return path[turn];
+}
+
+static void expect_file(const char *path, const char *content) {
+    char read[64] = "";
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    size_t size = fread(read, 1, sizeof read - 1, file);
+    fclose(file);
+    assert_int_equal(size, strlen(content));
+    assert_string_equal(read, content);
+}
+
+static void test_join(void **state) {
+    (void)state;
+    char path[PATH_SIZE], name[PATH_SIZE];
+    MildError error = {0};
+    assert_int_equal(path_join("a", "b.csv", path, &error), MILD_OK);
+    assert_string_equal(path, "a/b.csv");
+    memset(name, 'n', sizeof name);
+    name[PATH_SIZE - 3] = '\0'; /* "a/" and it and the end just fit */
+    assert_int_equal(path_join("a", name, path, &error), MILD_OK);
+    assert_int_equal(strlen(path), PATH_SIZE - 1);
+    name[PATH_SIZE - 3] = 'n';
+    name[PATH_SIZE - 2] = '\0';
+    assert_int_equal(path_join("a", name, path, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "too long"));
+}
+
+/* $MILD_HOME decides; without it what lies beside the executable's folder, else the source tree. */
+static void test_data(void **state) {
+    (void)state;
+    char path[PATH_SIZE];
+    setenv("MILD_HOME", "/somewhere", 1);
+    assert_string_equal(path_data("models/x.xml", path), "/somewhere/models/x.xml");
+    setenv("MILD_HOME", "", 1);
+    assert_string_equal(path_data("configs/default.ini", path),
+                        MILD_SOURCE_DIR "/configs/default.ini");
+    unsetenv("MILD_HOME");
+    assert_string_equal(path_data("no/such.file", path), MILD_SOURCE_DIR "/no/such.file");
+    char itself[PATH_SIZE] = "";
+    assert_true(readlink("/proc/self/exe", itself, PATH_SIZE - 1) > 0);
+    char *name = strrchr(itself, '/');
+    *name = '\0';
+    char *parent = strrchr(itself, '/');
+    *name = '/';
+    const char *relative = parent + 1; /* tests/base_test_paths: only beside the executable */
+    assert_string_equal(path_data(relative, path), itself);
+}
+
+static void test_make_folder(void **state) {
+    (void)state;
+    MildError error = {0};
+    const char *deep = in_folder("a/b/c");
+    struct stat info;
+    assert_int_equal(path_make_folder(deep, &error), MILD_OK);
+    assert_true(stat(deep, &info) == 0 && S_ISDIR(info.st_mode));
+    assert_int_equal(path_make_folder(deep, &error), MILD_OK); /* it is there */
+    assert_int_equal(path_make_folder("", &error), MILD_ERROR_ARGUMENT);
+    char name[PATH_SIZE + 1];
+    memset(name, 'n', sizeof name);
+    name[PATH_SIZE] = '\0';
+    assert_int_equal(path_make_folder(name, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "too long"));
+    const char *file = in_folder("a/file");
+    assert_int_equal(file_write(file, "x", 1, &error), MILD_OK);
+    assert_int_equal(path_make_folder(file, &error), MILD_ERROR_IO);
+    assert_non_null(strstr(error.text, "not a folder"));
+    assert_int_equal(path_make_folder(in_folder("a/file/below"), &error), MILD_ERROR_IO);
+    assert_non_null(strstr(error.text, "cannot make folder"));
+    remove(in_folder("a/file"));
+    rmdir(in_folder("a/b/c"));
+    rmdir(in_folder("a/b"));
+    rmdir(in_folder("a"));
+}
+
+static void test_write(void **state) {
+    (void)state;
+    MildError error = {0};
+    const char *path = in_folder("file");
+    assert_int_equal(file_write(path, "first", 5, &error), MILD_OK);
+    expect_file(path, "first");
+    assert_int_equal(file_write(path, "2nd", 3, &error), MILD_OK); /* shorter: nothing remains */
+    expect_file(path, "2nd");
+    assert_int_equal(file_write(path, "", 0, &error), MILD_OK);
+    expect_file(path, "");
+    remove(path);
+    assert_int_equal(file_write("", "x", 1, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_write(in_folder("no/file"), "x", 1, &error), MILD_ERROR_IO);
+    assert_non_null(strstr(error.text, "No such file"));
+    assert_int_equal(file_write("/dev/full", "x", 1, &error), MILD_ERROR_IO);
+    assert_non_null(strstr(error.text, "No space left"));
+    assert_int_equal(file_write("/dev/null", "x", 1, &error), MILD_OK);
+    assert_int_equal(file_write(folder, "x", 1, &error), MILD_ERROR_IO);
+    assert_non_null(strstr(error.text, "directory"));
+}
+
+/* A pipe is written to and stays one. */
+static void test_pipe(void **state) {
+    (void)state;
+    MildError error = {0};
+    const char *path = in_folder("pipe");
+    char read_back[8] = "";
+    struct stat info;
+    assert_int_equal(mkfifo(path, 0600), 0);
+    int reader = open(path, O_RDONLY | O_NONBLOCK);
+    assert_true(reader >= 0);
+    assert_int_equal(file_check_write(path, &error), MILD_OK);
+    assert_int_equal(file_write(path, "hello", 5, &error), MILD_OK);
+    assert_int_equal(read(reader, read_back, sizeof read_back), 5);
+    assert_string_equal(read_back, "hello");
+    assert_true(stat(path, &info) == 0 && S_ISFIFO(info.st_mode));
+    close(reader);
+    remove(path);
+}
+
+static void test_check_write(void **state) {
+    (void)state;
+    MildError error = {0};
+    const char *path = in_folder("file");
+    assert_int_equal(file_check_write(path, &error), MILD_OK);
+    assert_int_not_equal(access(path, F_OK), 0); /* nothing is left behind */
+    assert_int_equal(file_write(path, "kept", 4, &error), MILD_OK);
+    assert_int_equal(file_check_write(path, &error), MILD_OK);
+    expect_file(path, "kept");
+    remove(path);
+    assert_int_equal(file_check_write("", &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_check_write(in_folder("no/file"), &error), MILD_ERROR_IO);
+    assert_int_equal(file_check_write(folder, &error), MILD_ERROR_IO);
+    assert_non_null(strstr(error.text, "directory"));
+    assert_int_equal(file_check_write("/dev/null", &error), MILD_OK);
+    assert_int_not_equal(file_check_write("/proc/self/maps", &error), MILD_OK);
+    char name[PATH_SIZE];
+    memset(name, 'n', sizeof name);
+    name[PATH_SIZE - 1] = '\0';
+    assert_int_equal(file_check_write(name, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_write(name, "x", 1, &error), MILD_ERROR_ARGUMENT);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_join),  cmocka_unit_test(test_data),
+        cmocka_unit_test(test_write), cmocka_unit_test(test_make_folder),
+        cmocka_unit_test(test_pipe),  cmocka_unit_test(test_check_write),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

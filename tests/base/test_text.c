@@ -1,0 +1,138 @@
+/* Names, numbers and durations as text. */
+#include <limits.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/text.h"
+
+static void test_distance(void **state) {
+    (void)state;
+    static const struct {
+        const char *a, *b;
+        int distance;
+    } pairs[] = {
+        {"", "", 0},
+        {"", "abc", 3},
+        {"abc", "", 3},
+        {"sand", "sand", 0},
+        {"kitten", "sitting", 3},
+        {"sunday", "saturday", 3},
+        {"flaw", "lawn", 2},
+        {"a", "b", 1},
+        {"ab", "ba", 2},
+        {"foam", "foam4", 1},
+        {"envs", "env", 1},
+        {"intention", "execution", 5},
+    };
+    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+        assert_int_equal(text_distance(pairs[i].a, pairs[i].b), pairs[i].distance);
+        assert_int_equal(text_distance(pairs[i].b, pairs[i].a), pairs[i].distance);
+    }
+    char longer[80], other[80]; /* names count as cut at 63 characters */
+    memset(longer, 'a', sizeof longer - 1);
+    longer[sizeof longer - 1] = '\0';
+    memcpy(other, longer, sizeof other);
+    other[62] = 'b';
+    assert_int_equal(text_distance(longer, other), 1);
+    other[62] = 'a';
+    other[63] = 'b';
+    assert_int_equal(text_distance(longer, other), 0);
+    assert_int_equal(text_distance("", longer), 63);
+    assert_int_equal(text_distance(longer, ""), 63);
+}
+
+static void test_nearest(void **state) {
+    (void)state;
+    static const char *const names[] = {"rubber", "foam60", "foam45", "sand_loose"};
+    assert_string_equal(text_nearest("foam44", names, 4), "foam45");
+    assert_string_equal(text_nearest("foam", names, 4), "foam60"); /* the first of two alike */
+    assert_string_equal(text_nearest("sand", names, 4), "foam60"); /* 5; sand_loose is 6 away */
+    assert_string_equal(text_nearest("sand_loos", names, 4), "sand_loose");
+    assert_string_equal(text_nearest("foam45", names, 2), "foam60");
+    assert_null(text_nearest("foam", names, 0));
+}
+
+static void test_numbers(void **state) {
+    (void)state;
+    double number = 7;
+    assert_true(text_double("-1.5e-3", &number) && number == -1.5e-3);
+    assert_true(text_double("0", &number) && number == 0);
+    number = 7;
+    static const char *const no_numbers[] = {"", "x", "1x", "1 ", "nan", "inf", "-inf", "1e999"};
+    for (size_t i = 0; i < sizeof no_numbers / sizeof *no_numbers; i++) {
+        assert_false(text_double(no_numbers[i], &number));
+    }
+    assert_true(number == 7);
+    int whole = 7;
+    assert_true(text_int("-2147483648", &whole) && whole == INT_MIN);
+    assert_true(text_int("2147483647", &whole) && whole == INT_MAX);
+    assert_true(text_int("010", &whole) && whole == 10); /* decimal, not octal */
+    static const char *const no_ints[] = {
+        "", "x", "1.5", "1 ", "2147483648", "-2147483649", "99999999999999999999",
+    };
+    for (size_t i = 0; i < sizeof no_ints / sizeof *no_ints; i++) {
+        assert_false(text_int(no_ints[i], &whole));
+    }
+    assert_int_equal(whole, 10);
+    uint64_t large = 7;
+    assert_true(text_uint64("18446744073709551615", &large) && large == UINT64_MAX);
+    assert_true(text_uint64("0", &large) && large == 0);
+    assert_true(text_uint64("9", &large) && large == 9);
+    static const char *const no_large[] = {"", "-1", "+1", " 1", "1x", "18446744073709551616", ":"};
+    for (size_t i = 0; i < sizeof no_large / sizeof *no_large; i++) {
+        assert_false(text_uint64(no_large[i], &large));
+    }
+    assert_true(large == 9);
+}
+
+static void test_bytes(void **state) {
+    (void)state;
+    char text[32];
+    assert_string_equal(text_bytes(0, text, sizeof text), "0 B");
+    assert_string_equal(text_bytes(1023, text, sizeof text), "1023 B");
+    assert_string_equal(text_bytes(1024, text, sizeof text), "1.00 KiB");
+    assert_string_equal(text_bytes(1.5 * 1048576, text, sizeof text), "1.50 MiB");
+    assert_string_equal(text_bytes(1.25 * 1073741824, text, sizeof text), "1.25 GiB");
+    assert_string_equal(text_bytes(1099511627776, text, sizeof text), "1.00 TiB");
+    assert_string_equal(text_bytes(2048 * 1099511627776.0, text, sizeof text), "2048.00 TiB");
+}
+
+static void test_duration(void **state) {
+    (void)state;
+    static const struct {
+        double seconds;
+        const char *text;
+    } rows[] = {
+        {0, "0 s"},
+        {-5, "0 s"},
+        {0.4, "0 s"},
+        {0.6, "1 s"},
+        {59.4, "59 s"},
+        {59.6, "1 min 00 s"},
+        {245, "4 min 05 s"},
+        {3599, "59 min 59 s"},
+        {3600, "1 h 00 min"},
+        {3720, "1 h 02 min"},
+        {100 * 3600 + 59 * 60, "100 h 59 min"},
+        {1e12, "0 s"},
+    };
+    char text[32];
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        assert_string_equal(text_duration(rows[i].seconds, text, sizeof text), rows[i].text);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_distance), cmocka_unit_test(test_nearest),
+        cmocka_unit_test(test_numbers),  cmocka_unit_test(test_bytes),
+        cmocka_unit_test(test_duration),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# Includes and calls go one way: between layers, between the headers of a layer, and between the files of the layers
+# base and ground, where NAME.c and NAME.h are one file. Usage: test_layers.sh SOURCE_FOLDER ARCHIVE_OF_BASE ARCHIVE_OF_GROUND
+set -eu
+source=$(realpath "$1")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+fail() {
+    echo "FAIL: $*" >&2
+    exit 1
+}
+
+# includes FOLDER PATTERN: lines "layer/file layer/included" of the files in FOLDER that PATTERN names, without endings.
+includes() {
+    (cd "$1" && grep -HoE --include="$2" -r '^#include "[a-z]+/[a-z_0-9]+\.h"' . || true) |
+        sed -nE 's|^\./([^:]*)\.[a-z]+:#include "([^"]*)\.h"|\1 \2|p' | grep -v ' mild/' || true
+}
+
+# calls LAYER ARCHIVE: the same of the functions that an object uses and another object of the archive defines.
+calls() {
+    nm "$2" | awk -v layer="$1" '
+        /\.o:$/ { split($1, name, "."); file = layer "/" name[1] }
+        NF == 3 && $2 ~ /[TDBR]/ { owner[$3] = file }
+        NF == 2 && $1 == "U" { uses[++n] = $2; user[n] = file }
+        END { for (i = 1; i <= n; i++) if (uses[i] in owner) print user[i], owner[uses[i]] }'
+}
+
+# one_way WHAT: fails when the lines of standard input have a circle.
+one_way() {
+    sort -u >"$work/lines"
+    tsort "$work/lines" >/dev/null 2>"$work/circle" || {
+        echo "$1 need each other: $(sed 's/^tsort: //' "$work/circle" | grep -v loop | tr '\n' ' ')"
+        return 1
+    }
+}
+
+# check FOLDER: of the sources in it, with the calls in $work/calls
+check() {
+    includes "$1" '*.[chi]*' | sed -E 's|/[^ ]*||g' | one_way layers || return 1
+    includes "$1" '*.h' | awk '{ split($1, a, "/"); split($2, b, "/") } a[1] == b[1]' | one_way headers || return 1
+    { includes "$1" '*.[ch]' | grep -E '^(base|ground)/' | grep -E ' (base|ground)/' || true; cat "$work/calls"; } |
+        one_way files || return 1
+}
+
+{ calls base "$2"; calls ground "$3"; } >"$work/calls"
+[ "$(grep -c ground/ "$work/calls")" -gt 20 ] || fail "no calls found in $3"
+[ "$(includes "$source/src" '*.[ch]' | wc -l)" -gt 200 ] || fail "no includes found in $source/src"
+check "$source/src" || fail "see above"
+
+# The check sees what it is for.
+mkdir -p "$work/wrong/base" "$work/wrong/ground" "$work/wrong/robot"
+sees() {
+    ! check "$work/wrong" >"$work/said" || fail "the check does not see: $1"
+    grep -q "^$1 need" "$work/said" || fail "the check says $(cat "$work/said") of: $1"
+    rm -f "$work"/wrong/*/*
+}
+echo '#include "ground/a.h"' >"$work/wrong/base/up.c"
+echo '#include "base/up.h"' >"$work/wrong/ground/a.h"
+sees layers
+echo '#include "robot/b.h"' >"$work/wrong/robot/a.h"
+echo '#include "robot/a.h"' >"$work/wrong/robot/b.h"
+sees headers
+echo '#include "ground/b.h"' >"$work/wrong/ground/a.h"
+echo '#include "ground/a.h"' >"$work/wrong/ground/b.c"
+sees files
+echo 'ground/b ground/a' >>"$work/calls"
+echo '#include "ground/b.h"' >"$work/wrong/ground/a.h"
+sees files
+echo "$(includes "$source/src" '*.[ch]' | sort -u | wc -l) includes, $(sort -u "$work/calls" | wc -l) calls: all one way"

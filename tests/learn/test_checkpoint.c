@@ -1,0 +1,294 @@
+/* Checkpoints and policies that were changed by hand, each with a good checksum: what does not fit
+ * or makes no sense is refused, named, and changes nothing. And what an update leaves behind in
+ * memory is of no effect on the next. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "learn/ppo_private.h"
+#include "learn/safetensors.h"
+#include "toy.h"
+
+#define PATH "build_test_checkpoint.safetensors"
+
+typedef struct {
+    Policy *policy;
+    Pool *pool;
+    Ppo *ppo;
+    Toy toy;
+} Run;
+
+static PpoDef ppo_def(void) {
+    PpoDef def = ppo_def_default();
+    def.steps = 40;
+    def.minibatches = 2;
+    return def;
+}
+
+static void run_open(Run *run, const PolicyDef *policy_def, const PpoDef *def) {
+    MildError error = {0};
+    PpoMirror mirror = toy_mirror();
+    run->policy = policy_create(policy_def, 5, &error);
+    run->pool = pool_create(1);
+    assert_non_null(run->policy);
+    run->ppo = ppo_create(def, run->policy, run->pool, &mirror, 4, 11, &error);
+    assert_non_null(run->ppo);
+    toy_start(&run->toy, run->ppo);
+}
+
+static void run_open_toy(Run *run) {
+    PolicyDef policy_def = toy_policy_def();
+    PpoDef def = ppo_def();
+    run_open(run, &policy_def, &def);
+}
+
+static void run_close(Run *run) {
+    ppo_destroy(run->ppo);
+    policy_destroy(run->policy);
+    pool_destroy(run->pool);
+}
+
+static void run_iterate(Run *run) {
+    PpoReport report;
+    toy_rollout(&run->toy, run->ppo);
+    ppo_update(run->ppo, &report);
+}
+
+static void save(const Run *run) {
+    MildError error = {0};
+    assert_int_equal(ppo_save(run->ppo, PATH, NULL, 0, "toy", &error), MILD_OK);
+}
+
+static void refused(Run *run, MildStatus status, const char *why) {
+    MildError error = {0};
+    const size_t bytes = (size_t)policy_parameter_count(run->policy) * sizeof(float);
+    float *before = malloc(bytes);
+    assert_non_null(before);
+    memcpy(before, policy_parameters(run->policy), bytes);
+    const int64_t iteration = ppo_iteration(run->ppo);
+    assert_int_equal(ppo_load(run->ppo, PATH, NULL, 0, &error), status);
+    assert_int_equal(error.status, status);
+    if (!strstr(error.text, why) || !strstr(error.text, PATH)) {
+        fail_msg("'%s' does not say '%s'", error.text, why);
+    }
+    assert_memory_equal(before, policy_parameters(run->policy), bytes);
+    assert_int_equal(ppo_iteration(run->ppo), iteration);
+    free(before);
+}
+
+/* Puts `to` in place of `from` in the file's header and the right checksum into it. Not longer. */
+static void swap_text(const char *from, const char *to) {
+    static unsigned char bytes[1 << 20];
+    FILE *file = fopen(PATH, "r+b");
+    assert_non_null(file);
+    const size_t size = fread(bytes, 1, sizeof bytes, file), length = strlen(from);
+    size_t at = 8;
+    while (at + length < size && memcmp(bytes + at, from, length) != 0) {
+        at++;
+    }
+    assert_true(at + length < size && strlen(to) <= length);
+    memset(bytes + at, ' ', length);
+    memcpy(bytes + at, to, strlen(to));
+    assert_true(safetensors_seal(bytes, size));
+    rewind(file);
+    assert_int_equal(fwrite(bytes, 1, size, file), size);
+    assert_int_equal(fclose(file), 0);
+}
+
+/* Numbers that would spoil the run at its first update. */
+static void bad_numbers_are_refused(void **state) {
+    (void)state;
+    PolicyDef policy_def = toy_policy_def();
+    PpoDef def = ppo_def();
+    def.average = 0.9;
+    Run run, other;
+    run_open(&run, &policy_def, &def);
+    run_open(&other, &policy_def, &def);
+    run_iterate(&run);
+    float *const weights[] = {run.ppo->first + 3, run.ppo->second + 4,
+                              policy_parameters(run.ppo->average) + 5,
+                              policy_parameters(run.policy) + 6};
+    static const char *const names[] = {"train.first_moment", "train.second_moment",
+                                        "train.average", "weights that are not finite"};
+    for (int k = 0; k < 4; k++) {
+        const float good = *weights[k];
+        *weights[k] = k % 2 ? NAN : INFINITY;
+        save(&run);
+        refused(&other, MILD_ERROR_FORMAT, names[k]);
+        *weights[k] = good;
+    }
+    const char *const senseless = "counters make no sense";
+    static const double rates[] = {-1e-9, 1.0001, NAN};
+    const double rate = run.ppo->learning_rate;
+    for (int k = 0; k < 3; k++) {
+        run.ppo->learning_rate = rates[k];
+        save(&run);
+        refused(&other, MILD_ERROR_FORMAT, senseless);
+    }
+    run.ppo->learning_rate = rate;
+    int64_t *const counters[] = {&run.ppo->iteration, &run.ppo->adam_steps};
+    for (int k = 0; k < 2; k++) {
+        const int64_t good = *counters[k];
+        *counters[k] = -1;
+        save(&run);
+        refused(&other, MILD_ERROR_FORMAT, senseless);
+        *counters[k] = good;
+    }
+    MildError error = {0};
+    save(&run);
+    assert_int_equal(ppo_load(other.ppo, PATH, NULL, 0, &error), MILD_OK);
+    unlink(PATH);
+    run_close(&run);
+    run_close(&other);
+}
+
+/* A network of another shape is refused with both shapes; another note or first noise is none. */
+static void another_network_is_refused(void **state) {
+    (void)state;
+    MildError error = {0};
+    PolicyDef wider = toy_policy_def(), louder = toy_policy_def();
+    PpoDef def = ppo_def();
+    wider.actor_hidden[1] = 33;
+    louder.init_std *= 0.5;
+    Run run, other, same;
+    run_open_toy(&run);
+    run_open(&other, &wider, &def);
+    run_open(&same, &louder, &def);
+    save(&run);
+    refused(&other, MILD_ERROR_ARGUMENT,
+            "policy.actor_hidden is '32 32 0 0', this run's is '32 33");
+    assert_int_equal(ppo_load(same.ppo, PATH, NULL, 0, &error), MILD_OK);
+    assert_memory_equal(policy_parameters(run.policy), policy_parameters(same.policy),
+                        (size_t)policy_parameter_count(run.policy) * sizeof(float));
+    unlink(PATH);
+    run_close(&run);
+    run_close(&other);
+    run_close(&same);
+}
+
+/* What resuming needs must be there, of its size, under its name. */
+static void missing_parts_are_refused(void **state) {
+    (void)state;
+    static const char *const parts[] = {
+        "train.counters", "train.learning_rate", "train.first_moment", "train.second_moment",
+        "train.history",  "train.critic",        "train.target",       "train.frame",
+    };
+    Run run;
+    run_open_toy(&run);
+    for (size_t k = 0; k < sizeof parts / sizeof *parts; k++) {
+        char from[64], to[64];
+        snprintf(from, sizeof from, "\"%s\"", parts[k]);
+        snprintf(to, sizeof to, "\"train.X%s", from + 8);
+        save(&run);
+        swap_text(from, to);
+        refused(&run, MILD_ERROR_ARGUMENT, parts[k]);
+    }
+    save(&run);
+    swap_text("\"log_std\"", "\"log_sdt\"");
+    refused(&run, MILD_ERROR_FORMAT, "log_std is missing");
+    save(&run);
+    swap_text("\"kind\":\"mild checkpoint\"", "\"kind\":\"wild checkpoint\"");
+    refused(&run, MILD_ERROR_FORMAT, "holds no policy of mild");
+    save(&run);
+    swap_text("\"version\":\"1\"", "\"version\":\"2\"");
+    refused(&run, MILD_ERROR_FORMAT, "has file version 2");
+    save(&run);
+    swap_text("\"policy.actions\":\"2\"", "\"policy.actions\":\"0\"");
+    refused(&run, MILD_ERROR_FORMAT, "policy.actions = 0");
+    unlink(PATH);
+    run_close(&run);
+}
+
+/* A run without averages goes on as one with averages, which start from its weights, and back. */
+static void averages_come_and_go(void **state) {
+    (void)state;
+    MildError error = {0};
+    PolicyDef policy_def = toy_policy_def();
+    PpoDef def = ppo_def();
+    Run plain, averaged, again;
+    run_open(&plain, &policy_def, &def);
+    def.average = 0.9;
+    run_open(&averaged, &policy_def, &def);
+    run_open(&again, &policy_def, &def);
+    const size_t bytes = (size_t)policy_parameter_count(plain.policy) * sizeof(float);
+    assert_int_equal(ppo_bytes(averaged.ppo) - ppo_bytes(plain.ppo), bytes);
+    assert_true(ppo_bytes(plain.ppo) > (PPO_SHARDS + 2) * bytes); /* gradients and two moments */
+    run_iterate(&plain);
+    run_iterate(&averaged);
+    save(&plain);
+    assert_int_equal(ppo_load(averaged.ppo, PATH, NULL, 0, &error), MILD_OK);
+    assert_memory_equal(policy_parameters(plain.policy),
+                        policy_parameters(ppo_average(averaged.ppo)), bytes);
+    run_iterate(&averaged);
+    save(&averaged);
+    assert_int_equal(ppo_load(again.ppo, PATH, NULL, 0, &error), MILD_OK);
+    assert_memory_equal(policy_parameters(ppo_average(averaged.ppo)),
+                        policy_parameters(ppo_average(again.ppo)), bytes);
+    assert_memory_not_equal(policy_parameters(again.policy),
+                            policy_parameters(ppo_average(again.ppo)), bytes);
+    assert_int_equal(ppo_load(plain.ppo, PATH, NULL, 0, &error), MILD_OK);
+    assert_memory_equal(policy_parameters(averaged.policy), policy_parameters(plain.policy), bytes);
+    unlink(PATH);
+    run_close(&plain);
+    run_close(&averaged);
+    run_close(&again);
+}
+
+/* Three samples leave most shards empty: what the update before left in them must not count. A run
+ * that resumed here has nothing left there. */
+static void empty_shards_are_empty(void **state) {
+    (void)state;
+    MildError error = {0};
+    Run run, fresh;
+    run_open_toy(&run);
+    run_open_toy(&fresh);
+    run_iterate(&run);
+    save(&run);
+    assert_int_equal(ppo_load(fresh.ppo, PATH, NULL, 0, &error), MILD_OK);
+    fresh.toy = run.toy;
+    Run *const runs[2] = {&run, &fresh};
+    for (int k = 0; k < 2; k++) {
+        PpoReport report;
+        PpoBatch *b = ppo_batch(runs[k]->ppo);
+        toy_rollout(&runs[k]->toy, runs[k]->ppo);
+        for (int i = 0; i < b->steps * b->envs; i++) {
+            b->valid[i] = i == 5 || i == 77 || i == 140;
+        }
+        ppo_update(runs[k]->ppo, &report);
+        assert_int_equal(report.skipped, 0);
+    }
+    assert_memory_equal(policy_parameters(run.policy), policy_parameters(fresh.policy),
+                        (size_t)policy_parameter_count(run.policy) * sizeof(float));
+    unlink(PATH);
+    run_close(&run);
+    run_close(&fresh);
+}
+
+/* A note that has no room is cut, not left out; with no room at all nothing is written. */
+static void notes_are_cut(void **state) {
+    (void)state;
+    MildError error = {0};
+    Run run;
+    run_open_toy(&run);
+    save(&run);
+    for (int size = 0; size <= 5; size++) {
+        char note[8] = "????";
+        Policy *policy = policy_load(PATH, note, size, &error);
+        assert_non_null(policy);
+        policy_destroy(policy);
+        char wanted[8] = "toy";
+        wanted[size > 0 ? size - 1 : 0] = '\0';
+        assert_string_equal(note, size > 0 ? wanted : "????");
+    }
+    unlink(PATH);
+    run_close(&run);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(bad_numbers_are_refused),   cmocka_unit_test(another_network_is_refused),
+        cmocka_unit_test(missing_parts_are_refused), cmocka_unit_test(averages_come_and_go),
+        cmocka_unit_test(empty_shards_are_empty),    cmocka_unit_test(notes_are_cut),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,238 @@
+/* Every number of a press, of rollouts and of two small trainings against what tests/pins.txt says
+ * they were. Whoever changes a result on purpose renews that file: scripts/pin.sh "reason". */
+#include <string.h>
+
+#include "lab/press.h"
+#include "learn/toy.h"
+#include "pins.h"
+#include "task/task_kit.h"
+#include "task/vec.h"
+#include "train/trainer.h"
+
+/* ---- press ---- */
+
+static uint64_t hash_press(const PressResult *result) {
+    uint64_t hash = PIN_HASH_START;
+    for (int i = 0; i < result->count; i++) {
+        const PressRow *row = &result->rows[i];
+        const double numbers[] = {row->time,     row->depth,   row->force,   row->moment_x,
+                                  row->moment_y, row->force_x, row->force_y, row->x,
+                                  row->tilt,     row->contacts};
+        hash = pin_hash(hash, numbers, sizeof numbers);
+    }
+    return hash;
+}
+
+static void pin_press(const char *kind, const char *ground, const PressDef *def) {
+    MildError error = {0};
+    MildSole *plate = press_plate_create(0.2, 0.1, &error);
+    PressResult result = {0};
+    char name[96];
+    assert_non_null(plate);
+    assert_int_equal(press_run(def, plate, &result, &error), MILD_OK);
+    snprintf(name, sizeof name, "press.%s.%s", ground, kind);
+    pin_exact(name, 0, hash_press(&result));
+    snprintf(name, sizeof name, "press.%s.%s.peak_force", ground, kind);
+    pin_near(name, result.peak_force, 1e-6);
+    snprintf(name, sizeof name, "press.%s.%s.work_in", ground, kind);
+    pin_near(name, result.work_in, 1e-6);
+    press_result_close(&result);
+    mild_sole_destroy(plate);
+}
+
+/* Down twice with the front edge lower, dragged, out; and dropped. */
+static void presses(void **unused) {
+    (void)unused;
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        const char *ground = mild_material_preset_name(p);
+        PressDef def = {.turns = 3, .turn = {0.01, 0.004, 0.02}, .speed = 0.05, .tilt = 0.05};
+        mild_material_preset(ground, &def.material);
+        pin_press("cycle", ground, &def);
+        def.turns = 1;
+        def.drag = 0.03;
+        def.drag_speed = 0.1;
+        pin_press("drag", ground, &def);
+        def = (PressDef){.mass = 5, .height = 0.05, .seconds = 0.3, .material = def.material};
+        pin_press("drop", ground, &def);
+    }
+}
+
+/* ---- rollouts ---- */
+
+enum { ENVS = 6, STEPS = 100 };
+
+/* What the learner sees of every step: histories, critic inputs, rewards, ends of episodes. */
+static uint64_t hash_rollout(const TaskDef *def) {
+    static float history[ENVS * SA01_HISTORY], critic[ENVS * SA01_CRITIC], reward[ENVS];
+    static float action[ENVS * SA01_JOINTS];
+    static uint8_t done[ENVS], timeout[ENVS], valid[ENVS];
+    MildError error = {0};
+    Pool *pool = pool_create(1);
+    Vec *vec = vec_create(def, robot, pool, ENVS, 7, &error);
+    const VecView view = {history, critic, NULL, NULL};
+    uint64_t hash = PIN_HASH_START;
+    assert_non_null(vec);
+    vec_reset(vec, &view);
+    for (int t = 0; t < STEPS; t++) {
+        for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
+            Random random = random_at(99, (uint32_t)i, (uint32_t)t);
+            action[i] = (float)(1.2 * random_normal(&random));
+        }
+        vec_step(vec, action, reward, done, timeout, valid, &view);
+        hash = pin_hash(hash, history, sizeof history);
+        hash = pin_hash(hash, critic, sizeof critic);
+        hash = pin_hash(hash, reward, sizeof reward);
+        hash = pin_hash(hash, done, sizeof done);
+    }
+    const VecStats stats = vec_take_stats(vec);
+    printf("%d falls in %d robots x %d steps\n", stats.falls, ENVS, STEPS);
+    assert_true(stats.falls > 0 && stats.diverged == 0); /* new episodes are part of it */
+    vec_destroy(vec);
+    pool_destroy(pool);
+    return hash;
+}
+
+/* The nominal robot stepping in place by hand-made joint angles: 0.4 s are too short for rounding
+ * to grow into another motion. */
+static void pin_short_walk(const char *ground, const TaskDef *like) {
+    TaskDef def = kit_quiet_def();
+    def.randomize.model = like->randomize.model;
+    def.map = like->map;
+    def.print_tiles = like->print_tiles;
+    Rig rig;
+    double reward = 0, load = 0;
+    char name[96];
+    rig_open(&rig, &def, 3, 0);
+    rig.env->command_frozen = 1;
+    rig.env->command[0] = 0.5;
+    task_env_reset(rig.env, &rig.def, robot, rig.sim, &rig.view);
+    for (int t = 0; t < 40; t++) {
+        float action[SA01_JOINTS];
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            action[i] = (float)(0.4 * sin(0.15 * t + 0.7 * i));
+        }
+        TaskStep step = rig_step(&rig, action);
+        assert_true(step.valid);
+        reward += (double)step.reward / 40;
+        for (int f = 0; f < SA01_FEET; f++) {
+            load += robot_sim_foot(rig.sim, f)->force[2] / 40;
+        }
+    }
+    snprintf(name, sizeof name, "walk.%s.reward", ground);
+    pin_near(name, reward, 1e-5);
+    snprintf(name, sizeof name, "walk.%s.load", ground);
+    pin_near(name, load, 1e-5);
+    snprintf(name, sizeof name, "walk.%s.height", ground);
+    pin_near(name, robot_sim_qpos(rig.sim)[2], 1e-5);
+    rig_close(&rig);
+}
+
+static void rollouts_on_every_model(void **unused) {
+    (void)unused;
+    for (int model = 0; model < MILD_MODELS; model++) {
+        TaskDef def = task_def_default();
+        char name[96];
+        def.randomize.model = model;
+        robot_set_model(robot, (MildModel)model);
+        snprintf(name, sizeof name, "rollout.%s", mild_model_names[model]);
+        pin_exact(name, PIN_ON_MUJOCO, hash_rollout(&def));
+        pin_short_walk(mild_model_names[model], &def);
+    }
+    robot_set_model(robot, MILD_MODEL_MILD);
+}
+
+/* Uneven, of several materials, with prints that stay. */
+static void rollout_on_a_map(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    MildMapDef map_def = mild_map_def_default();
+    map_def.kind = MILD_MAP_ROUGH;
+    map_def.amplitude = 0.03;
+    map_def.patches = MILD_PATTERN_CHECKER;
+    map_def.border = 0.1;
+    MildMap *map = mild_map_create(&map_def, &error);
+    assert_non_null(map);
+    TaskDef def = task_def_default();
+    def.map = map;
+    def.print_tiles = 64;
+    pin_exact("rollout.map", PIN_ON_MUJOCO, hash_rollout(&def));
+    pin_short_walk("map", &def);
+    mild_map_destroy(map);
+}
+
+/* ---- trainings: hash of all parameters after two iterations ---- */
+
+static void pin_policy(const char *what, unsigned depends_on, Policy *policy, double tolerance) {
+    const float *parameters = policy_parameters(policy);
+    const size_t count = (size_t)policy_parameter_count(policy);
+    char name[96];
+    double squares = 0;
+    for (size_t i = 0; i < count; i++) {
+        squares += (double)parameters[i] * (double)parameters[i];
+    }
+    snprintf(name, sizeof name, "training.%s", what);
+    pin_exact(name, depends_on, pin_hash(PIN_HASH_START, parameters, count * sizeof *parameters));
+    snprintf(name, sizeof name, "training.%s.norm", what);
+    pin_near(name, sqrt(squares), tolerance);
+}
+
+static void training_of_the_toy(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    Toy toy;
+    PolicyDef policy_def = toy_policy_def();
+    PpoDef def = ppo_def_default();
+    PpoMirror mirror = toy_mirror();
+    PpoReport report = {0};
+    def.steps = 40;
+    def.minibatches = 2;
+    Policy *policy = policy_create(&policy_def, 5, &error);
+    Pool *pool = pool_create(1);
+    Ppo *ppo = ppo_create(&def, policy, pool, &mirror, 16, 11, &error);
+    assert_non_null(ppo);
+    toy_start(&toy, ppo);
+    for (int i = 0; i < 2; i++) {
+        toy_rollout(&toy, ppo);
+        ppo_update(ppo, &report);
+    }
+    pin_policy("toy", PIN_ON_ONEDNN, policy, 1e-6);
+    pin_near("training.toy.reward", toy.reward, 1e-5);
+    pin_near("training.toy.value_loss", report.value_loss, 1e-5);
+    pin_near("training.toy.reconstruction", report.vae_reconstruction, 1e-5);
+    ppo_destroy(ppo);
+    policy_destroy(policy);
+    pool_destroy(pool);
+}
+
+static void training_of_the_robot(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    ExperimentDef def = experiment_def_default();
+    def.train.envs = 4;
+    def.train.threads = 1;
+    Trainer *trainer = train_create(&def, &error);
+    TrainReport report = {0};
+    assert_non_null(trainer);
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(train_iterate(trainer, &report, &error), MILD_OK);
+    }
+    pin_policy("robot", PIN_ON_MUJOCO | PIN_ON_ONEDNN, train_policy(trainer), 1e-6);
+    train_destroy(trainer);
+}
+
+static void all_pins_hold(void **unused) {
+    (void)unused;
+    assert_int_equal(pin_finish(), 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(presses),
+        cmocka_unit_test(rollouts_on_every_model),
+        cmocka_unit_test(rollout_on_a_map),
+        cmocka_unit_test(training_of_the_toy),
+        cmocka_unit_test(training_of_the_robot),
+        cmocka_unit_test(all_pins_hold),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
+}

@@ -1,0 +1,548 @@
+/* robot.ini as text: every key of a made-up robot comes back, defaults included; what is missing,
+ * twice, too much or inconsistent is refused with the line or the key in the message. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "robot/def.h"
+
+/* Two flat feet that alternate; numbers all different. Keys with defaults are left out of it. */
+static const char plain[] = "; a comment\n"
+                            "# another\n"
+                            "[robot]\n"
+                            "name = walker\n"
+                            "model = walker.xml\n"
+                            "base = torso\n"
+                            "shells = chest, hip_box\n"
+                            "height = 0.7 ; [m]\n"
+                            "action_scale = 0.25\n"
+                            "feet_range = 0.11 0.31\n"
+                            "knee_range = 0.12 0.32\n"
+                            "feet_least = 0.09\n"
+                            "knee_least = 0.08\n"
+                            "foot_force = 450\n"
+                            "assist = 301 31 101 32\n"
+                            "[joints]\n"
+                            "names = a\n"
+                            "  b\tc, d\n"
+                            "mirror = b a\n"
+                            "\td c\n"
+                            "mirror_sign = -1 -1 1 1\n"
+                            "pose = 0.1 0.2 -0.3 0.4\n"
+                            "kp = 11 12 13 14\n"
+                            "kd = 1.1 1.2 1.3 1.4\n"
+                            "[foot.l]\n"
+                            "body = lf\n"
+                            "knee = lk\n"
+                            "mirror = r\n"
+                            "offset = 0.25\n"
+                            "shape = outline\n"
+                            "outline = 0 0 1 0 1 2\n"
+                            "z = -0.05\n"
+                            "corners = 1 2 3 4 5 6\n"
+                            "[foot.r]\n"
+                            "body = rf\n"
+                            "knee = rk\n"
+                            "mirror = l\n"
+                            "offset = 0.75\n"
+                            "shape = round\n"
+                            "center = 0.7 0.8 0.9\n"
+                            "radius = 0.02\n";
+
+static char edited[1 << 16];
+
+/* `plain` with the first `from` written as `to`. */
+static const char *edit(const char *from, const char *to) {
+    const char *at = strstr(plain, from);
+    assert_non_null(at);
+    snprintf(edited, sizeof edited, "%.*s%s%s", (int)(at - plain), plain, to, at + strlen(from));
+    return edited;
+}
+
+static RobotDef accept(const char *text) {
+    static RobotDef def;
+    MildError error = {0};
+    memset(&def, 0x55, sizeof def); /* nothing may be left of it */
+    if (robot_def_parse(text, "dir/robot.ini", &def, &error) != MILD_OK) {
+        fail_msg("refused: %s", error.text);
+    }
+    return def;
+}
+
+static void refuse_text(const char *text, const char *message) {
+    static RobotDef def;
+    MildError error = {0};
+    MildStatus status = robot_def_parse(text, "dir/robot.ini", &def, &error);
+    if (status == MILD_OK || !strstr(error.text, message)) {
+        fail_msg("'%s' instead of '%s'", status == MILD_OK ? "accepted" : error.text, message);
+    }
+    assert_int_equal(error.status, status);
+    assert_memory_equal(error.text, "dir/robot.ini:", 14);
+    assert_null(strchr(error.text, '\n'));
+}
+
+static void refuse(const char *from, const char *to, const char *message) {
+    refuse_text(edit(from, to), message);
+}
+
+static void expect_numbers(const char *what, const double *got, int count, const double *wanted) {
+    for (int i = 0; i < count; i++) {
+        if (got[i] != wanted[i]) {
+            fail_msg("%s[%d]: %g instead of %g", what, i, got[i], wanted[i]);
+        }
+    }
+}
+
+static void test_robot_keys(void **state) {
+    (void)state;
+    RobotDef def = accept(plain);
+    assert_string_equal(def.name, "walker");
+    assert_string_equal(def.model, "walker.xml");
+    assert_string_equal(def.base, "torso");
+    assert_string_equal(def.source, "");
+    assert_int_equal(def.shells, 2);
+    assert_string_equal(def.shell[0], "chest");
+    assert_string_equal(def.shell[1], "hip_box");
+    const double numbers[] = {0.7, 0.25, 0.11, 0.31, 0.12, 0.32, 0.09, 0.08, 450, 301, 31, 101, 32};
+    const double got[] = {def.height,        def.action_scale,  def.feet_range[0],
+                          def.feet_range[1], def.knee_range[0], def.knee_range[1],
+                          def.feet_least,    def.knee_least,    def.foot_force,
+                          def.assist[0],     def.assist[1],     def.assist[2],
+                          def.assist[3]};
+    expect_numbers("[robot]", got, 13, numbers);
+    assert_true(def.mirror_shift == 0.5);
+    assert_int_equal(def.feet, 2);
+    def = accept(edit("base =", "source = somebody, CC0\nbase ="));
+    assert_string_equal(def.source, "somebody, CC0");
+}
+
+static void test_joint_keys(void **state) {
+    (void)state;
+    RobotDef def = accept(plain);
+    const char *const names[] = {"a", "b", "c", "d"}, *const mirrors[] = {"b", "a", "d", "c"};
+    const double sign[] = {-1, -1, 1, 1}, pose[] = {0.1, 0.2, -0.3, 0.4}, zero[4] = {0};
+    const double kp[] = {11, 12, 13, 14}, kd[] = {1.1, 1.2, 1.3, 1.4};
+    assert_int_equal(def.joints, 4);
+    for (int i = 0; i < 4; i++) {
+        assert_string_equal(def.joint[i], names[i]);
+        assert_string_equal(def.mirror[i], mirrors[i]);
+    }
+    expect_numbers("mirror_sign", def.mirror_sign, 4, sign);
+    expect_numbers("pose", def.pose, 4, pose);
+    expect_numbers("kp", def.kp, 4, kp);
+    expect_numbers("kd", def.kd, 4, kd);
+    expect_numbers("stand_kp", def.stand_kp, 4, kp); /* defaults */
+    expect_numbers("stand_kd", def.stand_kd, 4, kd);
+    expect_numbers("effort", def.effort, 4, zero);
+    expect_numbers("speed", def.speed, 4, zero);
+    expect_numbers("swing", def.swing, 4, zero);
+    expect_numbers("still", def.still, 4, zero);
+    def = accept(edit("kd =", "stand_kp = 21 22 23 24\nstand_kd = 0.1 0.2 0.3 0.4\n"
+                              "effort = 31 32 33 34\nspeed = 1 2 3 4\nswing = -1 2 -1 0\n"
+                              "still = 1 0 1 0\nkd ="));
+    const double columns[6][4] = {{21, 22, 23, 24}, {0.1, 0.2, 0.3, 0.4}, {31, 32, 33, 34},
+                                  {1, 2, 3, 4},     {-1, 2, -1, 0},       {1, 0, 1, 0}};
+    const double *got[6] = {def.stand_kp, def.stand_kd, def.effort,
+                            def.speed,    def.swing,    def.still};
+    for (int k = 0; k < 6; k++) {
+        expect_numbers("column", got[k], 4, columns[k]);
+    }
+    expect_numbers("kd", def.kd, 4, kd);
+}
+
+static void test_foot_keys(void **state) {
+    (void)state;
+    RobotDef def = accept(plain);
+    const RobotFootDef *l = &def.foot[0], *r = &def.foot[1];
+    assert_string_equal(l->name, "l");
+    assert_string_equal(l->body, "lf");
+    assert_string_equal(l->knee, "lk");
+    assert_string_equal(l->mirror, "r");
+    assert_string_equal(l->ankle, "");
+    assert_int_equal(l->shape, ROBOT_SOLE_OUTLINE);
+    assert_true(l->offset == 0.25 && l->z == -0.05);
+    const double outline[] = {0, 0, 1, 0, 1, 2}, corners[] = {1, 2, 3, 4, 5, 6};
+    const double center[] = {0.7, 0.8, 0.9};
+    assert_int_equal(l->outline_points, 3);
+    expect_numbers("outline", l->outline, 6, outline);
+    assert_int_equal(l->corner_count, 2);
+    expect_numbers("corners", l->corners, 6, corners);
+    assert_true(l->pitch == 0.0195 && l->corner_radius == 0.005 && l->elements == 0);
+    assert_string_equal(r->name, "r");
+    assert_string_equal(r->body, "rf");
+    assert_int_equal(r->shape, ROBOT_SOLE_ROUND);
+    assert_true(r->offset == 0.75 && r->radius == 0.02 && r->pitch == 0.0195);
+    expect_numbers("center", r->center, 3, center);
+    assert_int_equal(r->corner_count, 1); /* its own sphere */
+    expect_numbers("corner", r->corners, 3, center);
+    assert_true(r->corner_radius == 0.02);
+    def = accept(edit("z =", "ankle = c\npitch = 0.03\nelements = 12\ncorner_radius = 0.007\nz ="));
+    assert_string_equal(l->ankle, "c");
+    assert_true(l->pitch == 0.03 && l->elements == 12 && l->corner_radius == 0.007);
+    def = accept(edit("offset = 0.25", "offset = 0.75"));
+    assert_true(def.mirror_shift == 0);
+}
+
+/* A foot may be its own mirror image: a hopper. */
+static void test_one_foot(void **state) {
+    (void)state;
+    const char *at = strstr(plain, "[foot.r]");
+    snprintf(edited, sizeof edited, "%.*s", (int)(at - plain), plain);
+    char *mirror = strstr(edited, "mirror = r\n");
+    mirror[9] = 'l';
+    RobotDef def = accept(edited);
+    assert_int_equal(def.feet, 1);
+    assert_true(def.mirror_shift == 0);
+}
+
+static void test_reading(void **state) {
+    (void)state;
+    accept(edit("height = 0.7 ; [m]\n", "height = 0.7\t# [m]\r\n\n   \n"));
+    accept(edit("[joints]\n", "[joints] ; of all\n"));
+    refuse("[robot]", "[robots]", ":3: unknown section [robots]; known: [robot], [joints]");
+    refuse("[foot.r]", "[feet.r]", ":34: unknown section [feet.r]");
+    refuse("[foot.r]", "[foot.]", ":34: unknown section [foot.]");
+    refuse("[foot.r]", "[foot.r", ":34: neither `key = value` nor `[section]`");
+    refuse("height", "heihgt", ":8: [robot] has no key 'heihgt'; nearest is 'height'");
+    refuse("height = 0.7", "height", ":8: neither `key = value` nor `[section]`");
+    refuse("height = 0.7", "height = tall", ":8: ");
+    refuse("height = 0.7", "height = 6", ":8: ");
+    refuse("height = 0.7", "height = 0.001", ":8: ");
+    refuse("[joints]\n", "height = 0.8\n[joints]\n",
+           ":16: [robot] height was already set on line 8");
+    refuse("height = 0.7 ; [m]\n", "height = 0.7\n  0.8\n", ":9: an indented line goes on with");
+    refuse("[robot]\n", "key = 1\n[robot]\n", ":3: ");
+    refuse_text("", "[robot] name: is missing");
+}
+
+/* A key's least and greatest number are accepted, a little less and a little more are refused. */
+static void expect_range(const char *from, const char *key, double least, double greatest) {
+    char line[128];
+    for (int k = 0; k < 4; k++) {
+        const double beyond = 1e-6 * fmax(fabs(least), 1e-3);
+        const double numbers[] = {least, greatest, least - beyond, greatest * (1 + 1e-6)};
+        snprintf(line, sizeof line, "%s = %.9g\n", key, numbers[k]);
+        if (k < 2) {
+            accept(edit(from, line));
+        } else {
+            refuse(from, line, " is outside ");
+        }
+    }
+}
+
+static void test_ranges(void **state) {
+    (void)state;
+    expect_range("height = 0.7 ; [m]\n", "height", 0.01, 5);
+    expect_range("action_scale = 0.25\n", "action_scale", 0.01, 2);
+    expect_range("feet_least = 0.09\n", "feet_least", 0, 5);
+    expect_range("knee_least = 0.08\n", "knee_least", 0, 5);
+    expect_range("foot_force = 450\n", "foot_force", 0.1, 1e6);
+    expect_range("z = -0.05\n", "z", -5, 5);
+    expect_range("radius = 0.02\n", "radius", 1e-4, 1);
+    expect_range("z = -0.05\n", "z = -0.05\npitch", 1e-4, 1);
+    expect_range("z = -0.05\n", "z = -0.05\ncorner_radius", 1e-5, 1);
+    accept(edit("feet_range = 0.11 0.31", "feet_range = 0 5"));
+    refuse("feet_range = 0.11 0.31", "feet_range = -0.001 5", " is outside ");
+    refuse("feet_range = 0.11 0.31", "feet_range = 0 5.001", " is outside ");
+    accept(edit("knee_range = 0.12 0.32", "knee_range = 0 5"));
+    refuse("knee_range = 0.12 0.32", "knee_range = -0.001 5", " is outside ");
+    refuse("knee_range = 0.12 0.32", "knee_range = 0 5.001", " is outside ");
+    accept(edit("assist = 301 31 101 32", "assist = 0 0 1e6 1e6"));
+    refuse("assist = 301 31 101 32", "assist = -0.001 0 0 0", " is outside ");
+    refuse("assist = 301 31 101 32", "assist = 0 0 0 1000001", " is outside ");
+    refuse("assist = 301 31 101 32", "assist = 1 2 3", ":15: robot.assist: 3 of 4 values");
+    accept(edit("center = 0.7 0.8 0.9", "center = -5 0 5"));
+    refuse("center = 0.7 0.8 0.9", "center = -5.001 0 5", " is outside ");
+    refuse("center = 0.7 0.8 0.9", "center = 0 0 5.001", " is outside ");
+    refuse("offset = 0.25", "offset = -0.001", " is outside ");
+    refuse("offset = 0.25", "offset = 1.001", " is outside ");
+    accept(edit("z = -0.05", "z = -0.05\nelements = 65536"));
+    refuse("z = -0.05", "z = -0.05\nelements = 65537", " is outside ");
+    refuse("z = -0.05", "z = -0.05\nelements = -1", " is outside ");
+}
+
+/* Each key of [robot] but `source` is needed. */
+static void test_missing(void **state) {
+    (void)state;
+    static const char *const robot[] = {"name",       "model",        "base",       "shells",
+                                        "height",     "action_scale", "feet_range", "knee_range",
+                                        "feet_least", "knee_least",   "foot_force", "assist"};
+    for (size_t i = 0; i < sizeof robot / sizeof *robot; i++) {
+        char line[64], wanted[64];
+        snprintf(line, sizeof line, "\n%s = ", robot[i]);
+        snprintf(wanted, sizeof wanted, "dir/robot.ini: [robot] %s: is missing", robot[i]);
+        refuse(line, "\n; = ", wanted);
+    }
+    static const char *const foot[] = {"body", "knee", "mirror", "offset", "shape"};
+    for (int i = 0; i < 5; i++) {
+        char line[64], wanted[64];
+        snprintf(line, sizeof line, "\n%s = ", foot[i]);
+        const char *at = strstr(strstr(plain, "[foot.r]"), line);
+        snprintf(edited, sizeof edited, "%.*s\n; = %s", (int)(at - plain), plain,
+                 at + strlen(line));
+        snprintf(wanted, sizeof wanted, "[foot.r] %s: is missing", foot[i]);
+        refuse_text(edited, wanted);
+    }
+    const char *feet = strstr(plain, "[foot.l]");
+    snprintf(edited, sizeof edited, "%.*s", (int)(feet - plain), plain);
+    refuse_text(edited, "no foot; add a section [foot.NAME]");
+}
+
+static void test_joints_refused(void **state) {
+    (void)state;
+    refuse("names = a\n  b\tc, d\n", "", "[joints] names: at least one is needed");
+    refuse("  b\tc, d\n", "  b c a\n", "[joints] names: 'a' stands there twice");
+    refuse("\td c\n", "\td\n", "[joints] mirror: not one name for each joint");
+    refuse("\td c\n", "\te c\n", "[joints] mirror: 'e' is not among the names");
+    RobotDef def = accept(edit("\td c\n", "\tc d\n")); /* in the middle plane: their own images */
+    assert_string_equal(def.mirror[2], "c");
+    refuse("mirror = b a\n\td c\n", "mirror = b c d a\n",
+           "[joints] mirror: 'a' has 'b' there, but 'b' has 'c'");
+    refuse("-1 -1 1 1", "-1 1 1 1",
+           "[joints] mirror_sign: must be 1 or -1, and the same for 'a' and 'b'");
+    refuse("-1 -1 1 1", "-1 -1 0.5 0.5", "[joints] mirror_sign: must be 1 or -1");
+    refuse("mirror_sign = -1 -1 1 1\n", "", "[joints] mirror_sign: 0 numbers for 4 joints");
+    refuse("pose = 0.1 0.2 -0.3 0.4\n", "", "[joints] pose: 0 numbers for 4 joints");
+    refuse("kp = 11 12 13 14\n", "", "[joints] kp: 0 numbers for 4 joints");
+    refuse("kd = 1.1 1.2 1.3 1.4\n", "", "[joints] kd: 0 numbers for 4 joints");
+    refuse("kp = 11", "kp = 10 11", "[joints] kp: 5 numbers for 4 joints");
+    refuse("kp = 11", "kp = -0.1", "[joints] kp: -0.1 of 'a' is below 0");
+    refuse("kd = 1.1 1.2 1.3 1.4", "kd = 0 0 0 -1", "[joints] kd: -1 of 'd' is below 0");
+    refuse("kp =", "stand_kp = 1 1 1 -1\nkp =", "[joints] stand_kp: -1 of 'd' is below 0");
+    refuse("kp =", "stand_kd = 1 1 1 -1\nkp =", "[joints] stand_kd: -1 of 'd' is below 0");
+    refuse("kp =", "effort = 1 1 1 -1\nkp =", "[joints] effort: -1 of 'd' is below 0");
+    refuse("kp =", "speed = 1 1 1 -1\nkp =", "[joints] speed: -1 of 'd' is below 0");
+    refuse("kp =", "still = 1 1 1 -1\nkp =", "[joints] still: -1 of 'd' is below 0");
+    refuse("kp = 11", "kp = 11x", "[joints] kp: '11x' is not a number");
+    refuse("kp = 11", "kp = nan", "[joints] kp: 'nan' is not a number");
+    refuse("kp = 11", "kp = 1000001", "[joints] kp: '1000001' is not a number");
+    accept(edit("kp = 11", "kp = 1e6"));
+    refuse("feet_range = 0.11 0.31", "feet_range = 0.32 0.31", "low is above high");
+    refuse("knee_range = 0.12 0.32", "knee_range = 0.33 0.32", "low is above high");
+    accept(edit("feet_range = 0.11 0.31", "feet_range = 0.31 0.31"));
+}
+
+static void test_feet_refused(void **state) {
+    (void)state;
+    refuse("offset = 0.75", "offset = 1", "[foot.r] offset: must be below 1");
+    refuse("offset = 0.75", "offset = 0.7", "[foot.l] offset: must differ");
+    refuse("z = -0.05", "z = -0.05\nankle = e", "[foot.l] ankle: is not among the names");
+    accept(edit("z = -0.05", "z = -0.05\nankle = a"));
+    refuse("z = -0.05\n", "", "[foot.l] z: a flat sole needs it");
+    refuse("outline = 0 0 1 0 1 2\n", "", "[foot.l] outline: a flat sole needs it");
+    refuse("corners = 1 2 3 4 5 6\n", "", "[foot.l] corners: a flat sole needs it");
+    refuse("z = -0.05", "z = -0.05\nradius = 0.1", "[foot.l] radius: only a round foot has it");
+    refuse("z = -0.05", "z = -0.05\ncenter = 0 0 0", "[foot.l] center: only a round foot has it");
+    refuse("radius = 0.02\n", "", "[foot.r] radius: a round foot needs it");
+    refuse("center = 0.7 0.8 0.9\n", "", "[foot.r] center: a round foot needs it");
+    static const char *const flat[] = {"outline = 0 0 1 0 1 1", "z = 0", "corners = 0 0 0",
+                                       "corner_radius = 0.01", "ankle = a"};
+    for (int i = 0; i < 5; i++) {
+        char text[64], wanted[64];
+        snprintf(text, sizeof text, "radius = 0.02\n%s", flat[i]);
+        snprintf(wanted, sizeof wanted, "[foot.r] %.*s: only a flat sole has it",
+                 (int)strcspn(flat[i], " "), flat[i]);
+        refuse("radius = 0.02", text, wanted);
+    }
+    refuse("outline = 0 0 1 0 1 2", "outline = 0 0 1 0", "[foot.l] outline: needs x y of at least");
+    refuse("outline = 0 0 1 0 1 2", "outline = 0 0 1 0 1 2 3", "[foot.l] outline: needs x y");
+    refuse("outline = 0 0 1 0 1 2", "outline = 0 0 1 0 1 y",
+           "[foot.l] outline: 'y' is not a number");
+    refuse("corners = 1 2 3 4 5 6", "corners = 1 2 3 4 5", "[foot.l] corners: needs x y z of at");
+    refuse("corners = 1 2 3 4 5 6", "corners = 1 2", "[foot.l] corners: needs x y z of at least");
+    refuse("corners = 1 2 3 4 5 6", "corners = 1 2 z", "[foot.l] corners: 'z' is not a number");
+    accept(edit("corners = 1 2 3 4 5 6", "corners = 1 2 3"));
+    refuse("mirror = r", "mirror = x",
+           "[foot.l] mirror: must name a foot whose mirror is this one");
+    refuse("mirror = r", "mirror = l", "[foot.r] mirror: must name a foot whose mirror is this");
+    refuse("shape = round", "shape = square", ":39: ");
+}
+
+/* All feet must agree whether the mirror image of the gait is half a cycle later. */
+static void test_gaits_that_disagree(void **state) {
+    (void)state;
+    const char *one = strstr(plain, "[foot.l]");
+    char head[4096];
+    snprintf(head, sizeof head, "%.*s", (int)(one - plain), plain);
+    for (int agree = 0; agree < 2; agree++) {
+        int length = snprintf(edited, sizeof edited, "%s", head);
+        const char *const names[] = {"a", "b", "c", "d"}, *const mirrors[] = {"b", "a", "d", "c"};
+        const double offsets[2][4] = {{0, 0.5, 0.25, 0.25}, {0, 0.5, 0.5, 0}};
+        for (int f = 0; f < 4; f++) {
+            length += snprintf(edited + length, sizeof edited - (size_t)length,
+                               "[foot.%s]\nbody = b\nknee = k\nmirror = %s\noffset = %g\n"
+                               "shape = round\ncenter = 0 0 0\nradius = 0.1\n",
+                               names[f], mirrors[f], offsets[agree][f]);
+        }
+        if (agree) {
+            RobotDef def = accept(edited);
+            assert_int_equal(def.feet, 4);
+            assert_true(def.mirror_shift == 0.5);
+            strcat(edited, "[foot.e]\n");
+            refuse_text(edited, "[foot.e]: more than 4 feet");
+        } else {
+            refuse_text(edited, "[foot.c] offset: must differ");
+        }
+    }
+}
+
+/* ---- sizes ---- */
+
+/* "n0 n1 ..." */
+static void list_names(char *text, size_t size, int count, int width) {
+    size_t used = 0;
+    for (int i = 0; i < count; i++) {
+        used += (size_t)snprintf(text + used, size - used, "%*sn%0*d%s", 0, "", width, i,
+                                 i % 10 == 9 ? "\n  " : " ");
+    }
+}
+
+static void list_numbers(char *text, size_t size, int count, const char *number) {
+    size_t used = 0;
+    for (int i = 0; i < count; i++) {
+        used +=
+            (size_t)snprintf(text + used, size - used, "%s%s", number, i % 10 == 9 ? "\n  " : " ");
+    }
+}
+
+/* A robot of `joints` joints, each its own mirror image. */
+static void test_joints_that_fit(void **state) {
+    (void)state;
+    const char *from = strstr(plain, "[joints]"), *to = strstr(plain, "[foot.l]");
+    char names[4000], ones[1000];
+    for (int joints = 40; joints <= 41; joints++) {
+        list_names(names, sizeof names, joints, 3);
+        list_numbers(ones, sizeof ones, joints, "1");
+        snprintf(edited, sizeof edited,
+                 "%.*s[joints]\nnames = %s\nmirror = %s\nmirror_sign = %s\npose = %s\nkp = %s\n"
+                 "kd = %s\n%s",
+                 (int)(from - plain), plain, names, names, ones, ones, ones, ones, to);
+        if (joints == 40) {
+            RobotDef def = accept(edited);
+            assert_int_equal(def.joints, 40);
+            assert_string_equal(def.joint[39], "n039");
+            assert_true(def.stand_kd[39] == 1);
+        } else {
+            refuse_text(edited, "[joints] names: at most 40 names of 63 characters fit");
+        }
+    }
+    list_numbers(ones, sizeof ones, 41, "1");
+    char line[1100];
+    snprintf(line, sizeof line, "kp = %s\n", ones);
+    refuse("kp = 11 12 13 14\n", line, "[joints] kp: more than 40 numbers");
+}
+
+static void test_lists_that_fit(void **state) {
+    (void)state;
+    char text[8000], list[7000];
+    list_names(list, sizeof list, 32, 3);
+    snprintf(text, sizeof text, "shells = %s\n", list);
+    assert_int_equal(accept(edit("shells = chest, hip_box\n", text)).shells, 32);
+    list_names(list, sizeof list, 33, 3);
+    snprintf(text, sizeof text, "shells = %s\n", list);
+    refuse("shells = chest, hip_box\n", text, "[robot] shells: at most 32 names");
+    list_names(list, sizeof list, 1, 62); /* n and 62 digits */
+    snprintf(text, sizeof text, "shells = %s\n", list);
+    assert_int_equal(strlen(accept(edit("shells = chest, hip_box\n", text)).shell[0]), 63);
+    list_names(list, sizeof list, 1, 63);
+    snprintf(text, sizeof text, "shells = %s\n", list);
+    refuse("shells = chest, hip_box\n", text, "[robot] shells: at most 32 names of 63");
+    list_numbers(list, sizeof list, 256, "1");
+    snprintf(text, sizeof text, "outline = %s\n", list);
+    assert_int_equal(accept(edit("outline = 0 0 1 0 1 2\n", text)).foot[0].outline_points, 128);
+    list_numbers(list, sizeof list, 258, "1");
+    snprintf(text, sizeof text, "outline = %s\n", list);
+    refuse("outline = 0 0 1 0 1 2\n", text, "[foot.l] outline: more than 256 numbers");
+    list_numbers(list, sizeof list, 48, "1");
+    snprintf(text, sizeof text, "corners = %s\n", list);
+    assert_int_equal(accept(edit("corners = 1 2 3 4 5 6\n", text)).foot[0].corner_count, 16);
+    list_numbers(list, sizeof list, 51, "1");
+    snprintf(text, sizeof text, "corners = %s\n", list);
+    refuse("corners = 1 2 3 4 5 6\n", text, "[foot.l] corners: more than 48 numbers");
+    list_numbers(list, sizeof list, 300, "0.12345678901234");
+    snprintf(text, sizeof text, "outline = %s\n", list);
+    refuse("outline = 0 0 1 0 1 2\n", text, "the list is too long");
+    memset(list, '1', sizeof list);
+    snprintf(text, sizeof text, "height = %.4000s\n", list);
+    refuse("height = 0.7 ; [m]\n", text, ":8: the line is too long");
+    snprintf(text, sizeof text, "[foot.%.64s]\n", list);
+    refuse("[foot.r]\n", text, ":34: ");
+    snprintf(text, sizeof text, "kp = %.63s", list);
+    refuse("kp = 11", text, "is not a number"); /* 1e62 */
+}
+
+/* ---- files ---- */
+
+static void write_file(const char *path, const char *text, size_t size) {
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(text, 1, size, file), size);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void refuse_folder(const char *folder, MildStatus wanted, const char *message) {
+    static RobotDef def;
+    MildError error = {0};
+    MildStatus status = robot_def_read(folder, &def, &error);
+    if (status != wanted || !strstr(error.text, message)) {
+        fail_msg("%d '%s' instead of '%s'", (int)status, error.text, message);
+    }
+}
+
+static void test_files(void **state) {
+    (void)state;
+    char folder[] = "/tmp/mild_robot_XXXXXX", path[64];
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/robot.ini", folder);
+    refuse_folder(folder, MILD_ERROR_IO, "cannot read");
+    write_file(path, plain, sizeof plain - 1);
+    static RobotDef def;
+    assert_int_equal(robot_def_read(folder, &def, NULL), MILD_OK);
+    assert_string_equal(def.name, "walker");
+    write_file(path, plain, sizeof plain); /* with its final zero byte */
+    refuse_folder(folder, MILD_ERROR_FORMAT, "holds binary data");
+    size_t size = (1 << 20) + 1;
+    char *large = malloc(size);
+    assert_non_null(large);
+    memset(large, '\n', size);
+    memcpy(large, plain, sizeof plain - 1);
+    write_file(path, large, size);
+    refuse_folder(folder, MILD_ERROR_FORMAT, "larger than 1.00 MiB");
+    write_file(path, large, size - 1);
+    assert_int_equal(robot_def_read(folder, &def, NULL), MILD_OK);
+    free(large);
+    unlink(path);
+    assert_int_equal(mkdir(path, 0700), 0);
+    refuse_folder(folder, MILD_ERROR_IO, "robot.ini: cannot read: it is a folder");
+    rmdir(path);
+    rmdir(folder);
+    char deep[1100];
+    memset(deep, 'x', sizeof deep);
+    deep[1013] = '\0'; /* with /robot.ini 1023 characters */
+    refuse_folder(deep, MILD_ERROR_IO, "xxx");
+    deep[1013] = 'x';
+    deep[1014] = '\0';
+    refuse_folder(deep, MILD_ERROR_ARGUMENT, "path too long");
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_robot_keys),      cmocka_unit_test(test_joint_keys),
+        cmocka_unit_test(test_foot_keys),       cmocka_unit_test(test_one_foot),
+        cmocka_unit_test(test_reading),         cmocka_unit_test(test_ranges),
+        cmocka_unit_test(test_missing),         cmocka_unit_test(test_joints_refused),
+        cmocka_unit_test(test_feet_refused),    cmocka_unit_test(test_gaits_that_disagree),
+        cmocka_unit_test(test_joints_that_fit), cmocka_unit_test(test_lists_that_fit),
+        cmocka_unit_test(test_files),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,62 @@
+/* Robots by name: what is listed, what a name opens, what it says of a name that nobody has. */
+#include "robot_kit.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static void test_list(void **unused) {
+    (void)unused;
+    char names[ROBOT_LISTED_MAX][ROBOT_LISTED_SIZE];
+    int count = robot_list(names, ROBOT_LISTED_MAX), found = 0;
+    assert_true(count >= 1 && count < ROBOT_LISTED_MAX);
+    for (int i = 0; i < count; i++) {
+        char ini[5000];
+        snprintf(ini, sizeof ini, "%s/robots/%s/robot.ini", MILD_SOURCE_DIR, names[i]);
+        assert_int_equal(access(ini, R_OK), 0);
+        assert_true(i == 0 || strcmp(names[i - 1], names[i]) < 0);
+        found += strcmp(names[i], "sa01") == 0;
+    }
+    assert_int_equal(found, 1);
+    assert_int_equal(robot_list(names, 0), 0);
+    assert_int_equal(robot_list(names, 1), 1);
+}
+
+static void test_open(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    Robot *by_name = robot_open("sa01", &error), *by_folder = robot_open(SA01, &error);
+    assert_non_null(by_name);
+    assert_non_null(by_folder);
+    assert_string_equal(robot_name(by_name), "sa01");
+    assert_string_equal(robot_name(by_folder), "sa01");
+    robot_destroy(by_name);
+    robot_destroy(by_folder);
+}
+
+static void refuse(const char *name, const char *message) {
+    MildError error = {0};
+    assert_null(robot_open(name, &error));
+    if (!strstr(error.text, message)) {
+        fail_msg("'%s' instead of '%s'", error.text, message);
+    }
+}
+
+static void test_refused(void **unused) {
+    (void)unused;
+    refuse("sa02", "unknown robot 'sa02'; nearest is 'sa01'");
+    refuse("sa0", "nearest is 'sa01'");
+    refuse("", "unknown robot ''");
+    refuse("./no/such", "./no/such/robot.ini: ");
+    refuse(".", "./robot.ini: ");
+    robot_destroy(NULL);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_list),
+        cmocka_unit_test(test_open),
+        cmocka_unit_test(test_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,596 @@
+/* What a workspace reports of a pose and of a step, against the engine's own functions on data of
+ * their own: feet, clearances, distances, forces of rigid contact; its limits and its clock. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "robot_kit.h"
+
+#include <mujoco/mujoco.h>
+
+#include "robot/phases.h"
+#include "sa01_sole.h"
+
+static const char *const feet[SA01_FEET] = {"leg_l6_link", "leg_r6_link"};
+static const char *const knees[SA01_FEET] = {"leg_l4_link", "leg_r4_link"};
+static const char *const shells[3] = {"base_link", "leg_l4_link", "leg_r4_link"};
+/* Middle of each sole's bounds in its foot's frame: 60 mm ahead, 5.5 mm outward, 55 mm below. */
+static const double middle[SA01_FEET][3] = {{0.06, 0.0055, -0.055}, {0.06, -0.0055, -0.055}};
+
+static void near(const char *what, int i, double got, double wanted, double tolerance) {
+    if (!(fabs(got - wanted) <= tolerance)) {
+        fail_msg("%s %d: %.12g instead of %.12g", what, i, got, wanted);
+    }
+}
+
+/* Anywhere, turned any way about z and up to `tilt` otherwise, bent within the joints' ranges. */
+static RobotState draw_state(uint32_t draw, double height, double tilt) {
+    Random r = random_at(41, draw, 0);
+    RobotState state = {.qpos = {random_uniform(&r, -1, 1), random_uniform(&r, -1, 1), height}};
+    double angle[3] = {random_uniform(&r, -tilt, tilt), random_uniform(&r, -tilt, tilt),
+                       random_uniform(&r, -3.1, 3.1)};
+    mju_euler2Quat(state.qpos + 3, angle, "XYZ");
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        double low = robot_joint_low(robot)[i], high = robot_joint_high(robot)[i];
+        double q = robot_default_pose(robot)[i] + random_uniform(&r, -0.15, 0.15);
+        state.qpos[7 + i] = fmin(fmax(q, low + 0.01), high - 0.01);
+    }
+    for (int i = 0; i < SA01_NV; i++) {
+        state.qvel[i] = random_uniform(&r, -1, 1);
+    }
+    return state;
+}
+
+/* Data of their own at a pose of the sim's model, or of the whole file's. */
+static mjData *engine_at(const mjModel *m, const double *qpos, const double *qvel) {
+    mjData *d = mj_makeData(m);
+    memcpy(d->qpos, qpos, sizeof(double) * SA01_NQ);
+    memcpy(d->qvel, qvel, sizeof(double) * SA01_NV);
+    mj_fwdPosition(m, d);
+    mj_fwdVelocity(m, d);
+    return d;
+}
+
+static MildMap *waves(void) {
+    MildMapDef def = mild_map_def_default();
+    MildError error = {0};
+    def.kind = MILD_MAP_WAVES;
+    def.amplitude = 0.1;
+    MildMap *map = mild_map_create(&def, &error);
+    assert_non_null(map);
+    return map;
+}
+
+/* ---- feet ---- */
+
+/* Velocity of a point that moves with a body. */
+static void point_velocity(const mjModel *m, const mjData *d, int body, const double point[3],
+                           double linear[3], double angular[3]) {
+    double jp[3 * SA01_NV], jr[3 * SA01_NV];
+    mj_jac(m, d, jp, jr, point, body);
+    mju_mulMatVec(linear, jp, d->qvel, 3, SA01_NV);
+    mju_mulMatVec(angular, jr, d->qvel, 3, SA01_NV);
+}
+
+/* [m] Lowest point of foot f's outline above the ground. */
+static double lowest_point(const mjModel *m, const mjData *d, int f, const MildTerrain *terrain) {
+    int body = mj_name2id(m, mjOBJ_BODY, feet[f]);
+    double least = 1e9;
+    for (int i = 0; i < 2 * SA01_OUTLINE_ROWS; i++) {
+        const double *row = sa01_outline[i / 2], side = f == SA01_LEFT ? 1 : -1;
+        const double local[3] = {row[0], side * row[1 + i % 2], -0.055};
+        double at[3];
+        mju_mulMatVec3(at, d->xmat + 9 * body, local);
+        mju_addTo3(at, d->xpos + 3 * body);
+        double ground = terrain ? mild_terrain_height_at(terrain, at[0], at[1]) : 0;
+        least = fmin(least, at[2] - ground);
+    }
+    return least;
+}
+
+static void check_foot(const RobotSim *sim, const mjModel *m, const mjData *d, int f) {
+    const RobotFoot *foot = robot_sim_foot(sim, f);
+    int body = mj_name2id(m, mjOBJ_BODY, feet[f]);
+    double center[3], twist[6], at_center[3], turning[3];
+    const double *ankle = d->xpos + 3 * body;
+    mju_mulMatVec3(center, d->xmat + 9 * body, middle[f]);
+    mju_addTo3(center, ankle);
+    point_velocity(m, d, body, ankle, twist, twist + 3);
+    point_velocity(m, d, body, center, at_center, turning);
+    for (int k = 0; k < 3; k++) {
+        near("ankle", k, foot->position[k], ankle[k], 1e-12);
+        near("sole's centre", k, foot->sole_center[k], center[k], 1e-4);
+        near("its velocity", k, foot->sole_center_velocity[k], at_center[k], 1e-3);
+        near("force before a step", k, foot->force[k], 0, 0);
+    }
+    for (int k = 0; k < 9; k++) {
+        near("foot's rotation", k, foot->rotation[k], d->xmat[9 * body + k], 1e-12);
+    }
+    for (int k = 0; k < 6; k++) {
+        near("twist", k, foot->velocity[k], twist[k], 1e-12);
+    }
+}
+
+static void test_feet(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation nominal = robot_variation_nominal();
+    MildMap *map = waves();
+    MildTerrain level = preset_terrain("grass"), wavy = level;
+    level.height = -0.3;
+    wavy.map = map;
+    for (uint32_t draw = 0; draw < 30; draw++) {
+        RobotState state = draw_state(draw, 1, 0.8);
+        robot_sim_load(sim, &state, &nominal);
+        const mjModel *m = robot_sim_model(sim);
+        mjData *d = engine_at(m, state.qpos, state.qvel);
+        const MildTerrain *grounds[] = {NULL, &level, &wavy};
+        for (int g = 0; g < 3; g++) {
+            double least = 1e9, wanted = 1e9;
+            if (grounds[g]) {
+                least = robot_sim_sole_clearance(sim, grounds[g]);
+            }
+            for (int f = 0; f < SA01_FEET; f++) {
+                double low = lowest_point(m, d, f, grounds[g]);
+                wanted = fmin(wanted, low);
+                near("height of a sole", f, robot_sim_foot(sim, f)->sole_height, low, 1e-12);
+            }
+            near("clearance", g, grounds[g] ? least : wanted, wanted, 1e-12);
+        }
+        check_foot(sim, m, d, 0);
+        check_foot(sim, m, d, 1);
+        mj_deleteData(d);
+    }
+    mild_map_destroy(map);
+    robot_sim_destroy(sim);
+}
+
+/* After a step: the pose's quantities are those of its end, heights those above its ground. */
+static void test_feet_after_a_step(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.0025);
+    RobotVariation nominal = robot_variation_nominal();
+    MildMap *map = waves();
+    MildTerrain wavy = preset_terrain("grass");
+    wavy.map = map;
+    MildGround *ground = new_ground();
+    const mjModel *m = robot_sim_model(sim);
+    for (uint32_t draw = 0; draw < 5; draw++) {
+        RobotState state = draw_state(draw, 1.5, 0.2);
+        double torque[SA01_JOINTS] = {0};
+        robot_sim_load(sim, &state, &nominal);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &wavy, ground), 0);
+        mjData *d = engine_at(m, robot_sim_qpos(sim), robot_sim_qvel(sim));
+        for (int f = 0; f < SA01_FEET; f++) {
+            check_foot(sim, m, d, f);
+            near("height", f, robot_sim_foot(sim, f)->sole_height, lowest_point(m, d, f, &wavy),
+                 1e-12);
+        }
+        mj_deleteData(d);
+    }
+    free(ground);
+    mild_map_destroy(map);
+    robot_sim_destroy(sim);
+}
+
+/* ---- clearances and distances ---- */
+
+/* [m] Lowest corner of a shell's box above the ground under the box's middle. */
+static double box_clearance(const mjModel *m, const mjData *d, int s, const MildTerrain *terrain) {
+    char name[32];
+    snprintf(name, sizeof name, "%s_box", shells[s]);
+    int geom = mj_name2id(m, mjOBJ_GEOM, name);
+    assert_true(geom >= 0);
+    const double *at = d->geom_xpos + 3 * geom, *half = m->geom_size + 3 * geom;
+    double low = 1e9;
+    for (int corner = 0; corner < 8; corner++) {
+        const double local[3] = {corner & 1 ? half[0] : -half[0], corner & 2 ? half[1] : -half[1],
+                                 corner & 4 ? half[2] : -half[2]};
+        double world[3];
+        mju_mulMatVec3(world, d->geom_xmat + 9 * geom, local);
+        low = fmin(low, at[2] + world[2]);
+    }
+    return low - mild_terrain_height_at(terrain, at[0], at[1]);
+}
+
+static void test_clearance_of_the_shells(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation nominal = robot_variation_nominal();
+    MildMap *map = waves();
+    MildTerrain level = preset_terrain("grass"), wavy = level;
+    level.height = 0.2;
+    wavy.map = map;
+    const mjModel *m = robot_visual_model(robot);
+    int lowest[3] = {0};
+    for (uint32_t draw = 0; draw < 60; draw++) {
+        RobotState state = draw_state(draw, 1, 3);
+        robot_sim_load(sim, &state, &nominal);
+        mjData *d = engine_at(m, state.qpos, state.qvel);
+        for (int g = 0; g < 2; g++) {
+            const MildTerrain *terrain = g ? &wavy : &level;
+            double least = 1e9;
+            int which = 0;
+            for (int s = 0; s < 3; s++) {
+                double clearance = box_clearance(m, d, s, terrain);
+                which = clearance < least ? s : which;
+                least = fmin(least, clearance);
+            }
+            lowest[which]++;
+            near("clearance", (int)draw, robot_sim_body_clearance(sim, terrain), least, 1e-9);
+        }
+        mj_deleteData(d);
+    }
+    print_message("lowest: base %d times, shanks %d and %d\n", lowest[0], lowest[1], lowest[2]);
+    assert_true(lowest[0] > 5 && lowest[1] > 5 && lowest[2] > 5);
+    robot_sim_destroy(sim);
+    mild_map_destroy(map);
+}
+
+/* Left less right along the base's left, laid level; 0 when the base points straight up. */
+static void test_lateral_distances(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation nominal = robot_variation_nominal();
+    for (uint32_t draw = 0; draw < 30; draw++) {
+        RobotState state = draw_state(draw, 1, 0.6);
+        robot_sim_load(sim, &state, &nominal);
+        const mjModel *m = robot_sim_model(sim);
+        mjData *d = engine_at(m, state.qpos, state.qvel);
+        const double x[3] = {1, 0, 0}, z[3] = {0, 0, 1};
+        double ahead[3], left[3], between[3], sole[2][3];
+        mju_rotVecQuat(ahead, x, state.qpos + 3);
+        ahead[2] = 0;
+        mju_normalize3(ahead);
+        mju_cross(left, z, ahead);
+        mju_sub3(between, d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, knees[0]),
+                 d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, knees[1]));
+        near("knees", (int)draw, robot_sim_knee_distance(sim), mju_dot3(between, left), 1e-12);
+        for (int f = 0; f < SA01_FEET; f++) {
+            int body = mj_name2id(m, mjOBJ_BODY, feet[f]);
+            mju_mulMatVec3(sole[f], d->xmat + 9 * body, middle[f]);
+            mju_addTo3(sole[f], d->xpos + 3 * body);
+        }
+        mju_sub3(between, sole[0], sole[1]);
+        near("feet", (int)draw, robot_sim_foot_distance(sim), mju_dot3(between, left), 2e-4);
+        mj_deleteData(d);
+    }
+    RobotState up = draw_state(1, 1, 0);
+    const double nose_up[4] = {sqrt(0.5), 0, -sqrt(0.5), 0};
+    memcpy(up.qpos + 3, nose_up, sizeof nose_up);
+    robot_sim_load(sim, &up, &nominal);
+    assert_true(robot_sim_knee_distance(sim) == 0 && robot_sim_foot_distance(sim) == 0);
+    robot_sim_destroy(sim);
+}
+
+/* ---- steps ---- */
+
+/* In the air our soft step is the engine's, joints beyond their limits included. */
+static void test_soft_step_in_the_air(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation nominal = robot_variation_nominal();
+    MildTerrain terrain = preset_terrain("sand_loose");
+    MildGround *ground = new_ground();
+    mjModel *m = robot_sim_model(sim);
+    double worst = 0;
+    for (int joint = -1; joint < 2 * SA01_JOINTS; joint++) {
+        RobotState state = draw_state(7, 3, 0.5);
+        int j = joint / 2;
+        if (joint >= 0) {
+            state.qpos[7 + j] =
+                joint % 2 ? robot_joint_low(robot)[j] - 0.01 : robot_joint_high(robot)[j] + 0.01;
+        }
+        double torque[SA01_JOINTS];
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            torque[i] = 3.0 - i;
+        }
+        mj_resetData(m, robot_sim_data(sim));
+        robot_sim_load(sim, &state, &nominal);
+        mjData *d = mj_makeData(m);
+        memcpy(d->qpos, state.qpos, sizeof state.qpos);
+        memcpy(d->qvel, state.qvel, sizeof state.qvel);
+        for (int i = 0; i < 4; i++) {
+            memcpy(d->qfrc_applied + 6, torque, sizeof torque);
+            mj_step(m, d);
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        }
+        for (int i = 0; i < SA01_NV; i++) {
+            worst = fmax(worst, fabs(d->qvel[i] - robot_sim_qvel(sim)[i]));
+            near("position", i, robot_sim_qpos(sim)[i], d->qpos[i], 1e-10);
+        }
+        near("time", joint, ((const mjData *)robot_sim_data(sim))->time, 0.004, 1e-12);
+        mj_deleteData(d);
+    }
+    print_message("soft step in the air against mj_step: worst %.1e\n", worst);
+    assert_true(worst < 1e-9);
+    free(ground);
+    robot_sim_destroy(sim);
+}
+
+/* Speeds up to 1000 are numbers, beyond they went bad. */
+static void test_fastest(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation nominal = robot_variation_nominal();
+    MildTerrain terrain = preset_terrain("sand_loose");
+    MildGround *ground = new_ground();
+    const double speeds[4] = {999, -999, 1001, -1001};
+    for (int i = 0; i < 4; i++) {
+        RobotState state = draw_state(3, 50, 0);
+        double torque[SA01_JOINTS] = {0};
+        memset(state.qvel, 0, sizeof state.qvel);
+        state.qvel[i / 2 ? 1 : 0] = speeds[i];
+        robot_sim_load(sim, &state, &nominal);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), i >= 2);
+    }
+    free(ground);
+    robot_sim_destroy(sim);
+}
+
+/* Loaded and stored is the same; a load leaves nothing of the last step. */
+static void test_load_and_store(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation nominal = robot_variation_nominal();
+    MildTerrain terrain = preset_terrain("sand_loose");
+    MildGround *ground = new_ground();
+    RobotState state = draw_state(2, 1, 0.1), back;
+    double torque[SA01_JOINTS] = {0};
+    robot_sim_load(sim, &state, &nominal);
+    state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) + 0.01; /* a foot 10 mm deep */
+    state.qvel[2] = -0.5;
+    for (int i = 0; i < SA01_NV; i++) {
+        state.warmstart[i] = 0.5 * i;
+    }
+    robot_sim_load(sim, &state, &nominal);
+    robot_sim_store(sim, &back);
+    assert_memory_equal(&state, &back, sizeof state);
+    assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+    assert_true(robot_sim_foot(sim, 0)->force[2] > 1 || robot_sim_foot(sim, 1)->force[2] > 1);
+    robot_sim_load(sim, &state, &nominal);
+    const MildContactResult none = {0};
+    assert_memory_equal(robot_sim_contact(sim), &none, sizeof none);
+    for (int f = 0; f < SA01_FEET; f++) {
+        for (int k = 0; k < 3; k++) {
+            near("force", k, robot_sim_foot(sim, f)->force[k], 0, 0);
+        }
+        assert_int_equal(robot_sim_foot(sim, f)->result.contacts, 0);
+    }
+    assert_true(((const mjData *)robot_sim_data(sim))->time == 0);
+    free(ground);
+    robot_sim_destroy(sim);
+}
+
+/* A new workspace stands in the default pose. */
+static void test_new_workspace(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.002);
+    assert_true(robot_sim_dt(sim) == 0.002);
+    const double *q = robot_sim_qpos(sim);
+    const double base[7] = {0, 0, robot_stand_height(robot), 1, 0, 0, 0};
+    assert_memory_equal(q, base, sizeof base);
+    assert_memory_equal(q + 7, robot_default_pose(robot), sizeof(double) * SA01_JOINTS);
+    near("sole", 0, robot_sim_foot(sim, 0)->sole_height, 0, 1e-9);
+    for (int i = 0; i < SA01_NV; i++) {
+        assert_true(robot_sim_qvel(sim)[i] == 0);
+    }
+    const MildContactInput *input = robot_sim_contact_input(sim);
+    assert_int_equal(input->feet, SA01_FEET);
+    assert_true(input->dt == 0.002);
+    robot_sim_set_solver(sim, MILD_SOLVER_GAUSS_SEIDEL, 1e-3, 77);
+    assert_true(input->solver == MILD_SOLVER_GAUSS_SEIDEL && input->tolerance == 1e-3);
+    assert_int_equal(input->max_iterations, 77);
+    robot_sim_destroy(sim);
+}
+
+static void test_time_steps(void **unused) {
+    (void)unused;
+    const double good[] = {0.0001, 0.01}, bad[] = {0.000099, 0.0101, 0, -0.001, NAN};
+    for (int i = 0; i < 2; i++) {
+        robot_sim_destroy(new_sim(good[i]));
+    }
+    for (int i = 0; i < 5; i++) {
+        MildError error = {0};
+        assert_null(robot_sim_create(robot, bad[i], &error));
+        assert_int_equal(error.status, MILD_ERROR_RANGE);
+        assert_non_null(strstr(error.text, "0.0001 .. 0.01"));
+    }
+    robot_sim_destroy(NULL);
+}
+
+/* Every part takes some time, steps are counted, NULL stops it. */
+static void test_phases(void **unused) {
+    (void)unused;
+    RobotVariation variation = robot_variation_nominal();
+    MildTerrain terrain = preset_terrain("sand_loose");
+    MildGround *ground = new_ground();
+    for (int rigid = 0; rigid < 2; rigid++) {
+        RobotSim *sim = new_sim(0.001);
+        RobotPhases phases = {0};
+        double torque[SA01_JOINTS] = {0};
+        RobotState state = draw_state(2, 0.8, 0.1);
+        variation.rigid = rigid;
+        robot_sim_load(sim, &state, &variation);
+        robot_sim_time_phases(sim, &phases);
+        for (int i = 0; i < 20; i++) {
+            RobotPhases before = phases;
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+            assert_true(phases.smooth > before.smooth && phases.finish > before.finish);
+            assert_true(phases.ground > before.ground && phases.map >= before.map);
+        }
+        assert_int_equal(phases.steps, 20);
+        assert_true(rigid ? phases.map == 0 : phases.map > 0);
+        assert_true(phases.smooth + phases.map + phases.ground + phases.finish < 10);
+        RobotPhases last = phases;
+        robot_sim_time_phases(sim, NULL);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        assert_memory_equal(&phases, &last, sizeof last);
+        robot_sim_destroy(sim);
+    }
+    free(ground);
+}
+
+/* ---- rigid contact ---- */
+
+typedef struct {
+    int contacts;
+    double depth_max, depth_sum, load, pressure[3], force[3], torque[3];
+} Sum;
+
+/* Contact by contact from the engine's data: a contact's force is on its second geom; ours acts on
+ * the foot. The model's pairs name the floor first. */
+static void add_up(const mjModel *m, const mjData *d, double ankle[SA01_FEET][3],
+                   Sum sum[SA01_FEET]) {
+    int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
+    for (int c = 0; c < d->ncon; c++) {
+        const mjContact *contact = d->contact + c;
+        double local[6], force[3], arm[3], moment[3];
+        mj_contactForce(m, d, c, local);
+        if (local[0] <= 0) {
+            continue;
+        }
+        mju_mulMatTVec3(force, contact->frame, local);
+        assert_int_equal(contact->geom[0], floor);
+        int body = m->geom_bodyid[contact->geom[1]];
+        int f = body == mj_name2id(m, mjOBJ_BODY, feet[1]);
+        mju_sub3(arm, contact->pos, ankle[f]);
+        mju_cross(moment, arm, force);
+        double normal = contact->frame[2] * local[0];
+        for (int k = 0; k < 3; k++) {
+            sum[f].force[k] += force[k];
+            sum[f].torque[k] += moment[k];
+            sum[f].pressure[k] += normal * contact->pos[k];
+        }
+        sum[f].load += normal;
+        sum[f].contacts++;
+        sum[f].depth_sum -= contact->dist;
+        sum[f].depth_max = fmax(sum[f].depth_max, -contact->dist);
+    }
+}
+
+/* On the sole plane under the ankle the moment about the zero-moment point has no level part; about
+ * the axis it is along the force. */
+static void check_zmp(const MildFootResult *r, const double rotation[9], const double center[3]) {
+    double square = mju_dot3(r->force, r->force), moment[3], rest[3], along[3];
+    double down[3];
+    mju_mulMatVec3(down, rotation, center);
+    const double point[3] = {r->zmp_sole[0], r->zmp_sole[1], down[2]};
+    mju_cross(moment, point, r->force);
+    near("level moment", 0, r->torque[0] - moment[0], 0, 1e-9 * (1 + fabs(r->torque[0])));
+    near("level moment", 1, r->torque[1] - moment[1], 0, 1e-9 * (1 + fabs(r->torque[1])));
+    near("axis across the force", 0, mju_dot3(r->zmp_axis, r->force), 0, 1e-9);
+    mju_cross(moment, r->zmp_axis, r->force);
+    mju_sub3(rest, r->torque, moment);
+    mju_scl3(along, r->force, mju_dot3(r->force, r->torque) / square);
+    for (int k = 0; k < 3; k++) {
+        near("moment along the force", k, rest[k], along[k], 1e-8);
+    }
+}
+
+static void check_rigid(const RobotSim *sim, const Sum *sum, int f, const double rotation[9]) {
+    const MildFootResult *r = &robot_sim_contact(sim)->foot[f];
+    const RobotFoot *foot = robot_sim_foot(sim, f);
+    assert_int_equal(r->contacts, sum->contacts);
+    for (int k = 0; k < 3; k++) {
+        near("force", k, r->force[k], sum->force[k], 1e-9);
+        near("torque", k, r->torque[k], sum->torque[k], 1e-9);
+        near("force of the foot", k, foot->force[k], r->force[k], 0);
+        near("torque of the foot", k, foot->torque[k], r->torque[k], 0);
+    }
+    assert_memory_equal(&foot->result, r, sizeof *r);
+    near("greatest depth", f, r->depth_max, sum->depth_max, 1e-12);
+    if (sum->contacts == 0) {
+        near("mean depth", f, r->depth_mean, 0, 0);
+        return;
+    }
+    near("mean depth", f, r->depth_mean, sum->depth_sum / sum->contacts, 1e-12);
+    for (int k = 0; k < 3; k++) {
+        near("centre of pressure", k, r->pressure_center[k], sum->pressure[k] / sum->load, 1e-12);
+    }
+    check_zmp(r, rotation, middle[f]);
+}
+
+/* A step with the joints held stiff; the engine's data keep the contacts of the step's forces until
+ * the next. Counts the loaded feet; returns how many of them stand on some corners only. */
+static int check_rigid_step(RobotSim *sim, const MildTerrain *terrain, int loaded[SA01_FEET]) {
+    const mjModel *m = robot_sim_model(sim);
+    const mjData *d = robot_sim_data(sim);
+    int partly = 0;
+    double torque[SA01_JOINTS], ankle[SA01_FEET][3], rotation[SA01_FEET][9];
+    const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim) + 6;
+    for (int j = 0; j < SA01_JOINTS; j++) {
+        torque[j] = 100 * (robot_default_pose(robot)[j] - q[j]) - 3 * qd[j];
+    }
+    double twist[SA01_FEET][6];
+    mjData *start = engine_at(m, robot_sim_qpos(sim), robot_sim_qvel(sim));
+    for (int f = 0; f < SA01_FEET; f++) {
+        memcpy(ankle[f], robot_sim_foot(sim, f)->position, sizeof ankle[f]);
+        memcpy(rotation[f], robot_sim_foot(sim, f)->rotation, sizeof rotation[f]);
+    }
+    assert_int_equal(robot_sim_step(sim, torque, NULL, terrain, NULL), 0);
+    Sum sum[SA01_FEET] = {{0}};
+    add_up(m, d, ankle, sum);
+    memcpy(start->qvel, robot_sim_qvel(sim), sizeof(double) * SA01_NV);
+    for (int f = 0; f < SA01_FEET; f++) {
+        check_rigid(sim, &sum[f], f, rotation[f]);
+        point_velocity(m, start, mj_name2id(m, mjOBJ_BODY, feet[f]), ankle[f], twist[f],
+                       twist[f] + 3);
+        for (int k = 0; k < 6; k++) {
+            near("twist at the end", k, robot_sim_contact(sim)->velocity[6 * f + k], twist[f][k],
+                 1e-9);
+        }
+        loaded[f] += sum[f].contacts > 0;
+        partly += sum[f].contacts > 0 && sum[f].contacts < 4;
+    }
+    mj_deleteData(start);
+    assert_true(robot_sim_contact(sim)->converged);
+    assert_int_equal(robot_sim_contact(sim)->iterations, d->solver_niter[0]);
+    return partly;
+}
+
+/* Standing shakily on slopes, contacts coming and going. */
+static void test_rigid_contact(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.0025);
+    RobotVariation rigid = robot_variation_nominal();
+    rigid.rigid = 1;
+    MildMap *map = waves();
+    MildTerrain level = preset_terrain("grass"), wavy = level;
+    level.height = -0.1;
+    wavy.map = map;
+    int loaded[SA01_FEET] = {0}, partly = 0;
+    for (uint32_t draw = 0; draw < 12; draw++) {
+        const MildTerrain *terrain = draw % 2 ? &level : &wavy;
+        RobotState state = draw_state(draw, 1, 0.1);
+        robot_sim_load(sim, &state, &rigid);
+        state.qpos[2] -= robot_sim_sole_clearance(sim, terrain) + 0.003;
+        robot_sim_load(sim, &state, &rigid);
+        for (int i = 0; i < 25; i++) {
+            partly += check_rigid_step(sim, terrain, loaded);
+        }
+    }
+    print_message(
+        "rigid contact: feet loaded in %d and %d of 300 steps, %d times on some corners\n",
+        loaded[0], loaded[1], partly);
+    assert_true(loaded[0] > 50 && loaded[1] > 50 && partly > 50);
+    mild_map_destroy(map);
+    robot_sim_destroy(sim);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_new_workspace),
+        cmocka_unit_test(test_time_steps),
+        cmocka_unit_test(test_load_and_store),
+        cmocka_unit_test(test_fastest),
+        cmocka_unit_test(test_phases),
+        cmocka_unit_test(test_feet),
+        cmocka_unit_test(test_feet_after_a_step),
+        cmocka_unit_test(test_clearance_of_the_shells),
+        cmocka_unit_test(test_lateral_distances),
+        cmocka_unit_test(test_soft_step_in_the_air),
+        cmocka_unit_test(test_rigid_contact),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

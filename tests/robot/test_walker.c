@@ -1,0 +1,720 @@
+/* A made-up robot whose joints stand in another order in robot.ini than in the MJCF, with a waist
+ * that moves both legs, a neck that moves none, one flat and one round foot, shells of every kind:
+ * what the code finds out about it, its feet against the engine's Jacobians, its step against the
+ * engine's. And what makes it refused. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+#include <mujoco/mujoco.h>
+
+#include "base/random.h"
+#include "robot/sim.h"
+
+enum { JOINTS = 7, NQ = 14, NV = 13, FEET = 2, FLAT = 0, ROUND = 1, ROWS = 12 };
+
+/* Engine's order: waist, hip_l, knee_l, ankle_l, hip_r, knee_r, neck. */
+static const char mjcf[] =
+    "<mujoco><compiler angle='radian' autolimits='true'/><option gravity='0 0 -10'/>\n"
+    "<default><joint actuatorfrcrange='-50 50' range='-2 2' armature='0.02'/></default>\n"
+    "<worldbody><light pos='0 0 3'/><body name='torso' pos='0 0 1'><freejoint/>\n"
+    "<geom name='chest' type='box' size='0.1 0.15 0.2' mass='10' pos='0.01 0 0.2'\n"
+    " euler='0.2 0.3 0.4'/>\n"
+    "<body name='pelvis' pos='0 0 -0.1'><joint name='waist' axis='0 0 1'/>\n"
+    "<geom name='belt' type='sphere' size='0.08' mass='3' pos='0 0.02 0'/>\n"
+    "<body name='thigh_l' pos='0.02 0.1 0'><joint name='hip_l' axis='0 1 0'/>\n"
+    "<geom name='bone' type='capsule' size='0.04 0.15' mass='2' pos='0 0 -0.15'/>\n"
+    "<body name='shank_l' pos='0 0 -0.3'><joint name='knee_l' axis='0 1 0'/>\n"
+    "<geom type='box' size='0.03 0.03 0.15' mass='1.5' pos='0 0 -0.15'/>\n"
+    "<body name='foot_l' pos='0 0 -0.3'><joint name='ankle_l' axis='0 1 0'/>\n"
+    "<geom type='box' size='0.1 0.05 0.02' mass='0.5' pos='0.02 0 -0.03'/></body></body></body>\n"
+    "<body name='thigh_r' pos='0.02 -0.1 0'><joint name='hip_r' axis='0 1 0' range='-1.5 1.4'/>\n"
+    "<geom type='capsule' size='0.04 0.15' mass='2.1' pos='0 0 -0.15'/>\n"
+    "<body name='shank_r' pos='0 0 -0.3'><joint name='knee_r' axis='0 1 0'\n"
+    " actuatorfrcrange='-60 60'/>\n"
+    "<geom type='box' size='0.03 0.03 0.15' mass='1.6' pos='0 0 -0.15'/>\n"
+    "<body name='toe_r' pos='0 0 -0.3'><geom type='sphere' size='0.03' mass='0.2'/></body>\n"
+    "</body></body></body>\n"
+    "<body name='head' pos='0 0 0.5'><joint name='neck' axis='1 0 0'/>\n"
+    "<geom type='sphere' size='0.1' mass='2'/></body></body></worldbody>\n"
+    "<actuator><motor joint='waist'/></actuator></mujoco>\n";
+
+static const char ini[] =
+    "[robot]\nname = walker\nmodel = walker.xml\nbase = torso\nshells = chest belt bone\n"
+    "height = 0.6\naction_scale = 0.3\nfeet_range = 0.1 0.3\nknee_range = 0.15 0.35\n"
+    "feet_least = 0.07\nknee_least = 0.08\nfoot_force = 300\nassist = 100 10 50 20\n"
+    "[joints]\nnames = neck knee_r hip_r ankle_l knee_l hip_l waist\n"
+    "mirror = neck knee_l hip_l ankle_l knee_r hip_r waist\n"
+    "mirror_sign = -1 1 1 1 1 1 -1\npose = 0 0.5 -0.25 -0.2 0.4 -0.2 0\n"
+    "kp = 1 2 3 4 5 6 7\nkd = 0.1 0.2 0.3 0.4 0.5 0.6 0.7\neffort = 0 0 33 0 0 0 0\n"
+    "speed = 1 2 3 4 5 6 7\nswing = 0 2 -1 -1 2 -1 0\nstill = 1 0 0 0 0 0 1\n"
+    "[foot.flat]\nbody = foot_l\nknee = shank_l\nmirror = ball\nankle = ankle_l\noffset = 0.1\n"
+    "shape = outline\noutline = -0.08 -0.04 0.12 -0.06 0.12 0.04 -0.08 0.04\nz = -0.05\n"
+    "pitch = 0.02\ncorners = -0.07 -0.03 -0.045 0.11 -0.05 -0.045 0.11 0.03 -0.045\n"
+    "[foot.ball]\nbody = toe_r\nknee = shank_r\nmirror = flat\noffset = 0.6\nshape = round\n"
+    "center = 0.01 0.02 -0.03\nradius = 0.04\npitch = 0.01\n";
+
+/* robot.ini's joint i in the engine. */
+static const int dof_of[JOINTS] = {12, 11, 10, 9, 8, 7, 6};
+
+static char folder[] = "/tmp/mild_walker_XXXXXX";
+static char xml_path[64], ini_path[64];
+static Robot *robot;
+
+static void write_text(const char *path, const char *text) {
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    fputs(text, file);
+    assert_int_equal(fclose(file), 0);
+}
+
+static int setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    if (!mkdtemp(folder)) {
+        return 1;
+    }
+    snprintf(xml_path, sizeof xml_path, "%s/walker.xml", folder);
+    snprintf(ini_path, sizeof ini_path, "%s/robot.ini", folder);
+    write_text(xml_path, mjcf);
+    write_text(ini_path, ini);
+    robot = robot_create(folder, &error);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    robot_destroy(robot);
+    unlink(xml_path);
+    unlink(ini_path);
+    return rmdir(folder);
+}
+
+static void near(const char *what, int i, double got, double wanted, double tolerance) {
+    if (!(fabs(got - wanted) <= tolerance)) {
+        fail_msg("%s %d: %.12g instead of %.12g", what, i, got, wanted);
+    }
+}
+
+/* ---- what is known of it ---- */
+
+static void test_names(void **unused) {
+    (void)unused;
+    assert_string_equal(robot_name(robot), "walker");
+    assert_string_equal(robot_source(robot), "");
+    assert_string_equal(robot_model_path(robot), xml_path);
+    assert_int_equal(robot_joints(robot), JOINTS);
+    assert_int_equal(robot_feet(robot), FEET);
+    assert_string_equal(robot_joint_name(robot, 1), "knee_r");
+    assert_string_equal(robot_foot_name(robot, ROUND), "ball");
+}
+
+static void test_joints(void **unused) {
+    (void)unused;
+    const int foot[JOINTS] = {-1, ROUND, ROUND, FLAT, FLAT, FLAT, -1};
+    const int image[JOINTS] = {0, 4, 5, 3, 1, 2, 6};
+    const double sign[JOINTS] = {-1, 1, 1, 1, 1, 1, -1};
+    const double pose[JOINTS] = {0, 0.5, -0.25, -0.2, 0.4, -0.2, 0};
+    const double effort[JOINTS] = {50, 60, 33, 50, 50, 50, 50};
+    const double swing[JOINTS] = {0, 2, -1, -1, 2, -1, 0}, still[JOINTS] = {1, 0, 0, 0, 0, 0, 1};
+    for (int i = 0; i < JOINTS; i++) {
+        assert_int_equal(robot_joint_dof(robot)[i], dof_of[i]);
+        assert_int_equal(robot_joint_foot(robot)[i], foot[i]);
+        assert_int_equal(robot_mirror_joint(robot)[i], image[i]);
+        near("mirror_sign", i, robot_mirror_sign(robot)[i], sign[i], 0);
+        near("pose", i, robot_default_pose(robot)[i], pose[i], 0);
+        near("low", i, robot_joint_low(robot)[i], i == 2 ? -1.5 : -2, 0);
+        near("high", i, robot_joint_high(robot)[i], i == 2 ? 1.4 : 2, 0);
+        near("effort", i, robot_effort(robot)[i], effort[i], 0);
+        near("speed", i, robot_speed(robot)[i], i + 1, 0);
+        near("kp", i, robot_kp(robot)[i], i + 1, 0);
+        near("kd", i, robot_kd(robot)[i], 0.1 * (i + 1), 1e-12);
+        near("stand_kp", i, robot_stand_kp(robot)[i], i + 1, 0);
+        near("stand_kd", i, robot_stand_kd(robot)[i], 0.1 * (i + 1), 1e-12);
+        near("swing", i, robot_swing(robot)[i], swing[i], 0);
+        near("still", i, robot_still(robot)[i], still[i], 0);
+    }
+}
+
+static void test_feet_and_body(void **unused) {
+    (void)unused;
+    for (int f = 0; f < FEET; f++) {
+        assert_int_equal(robot_mirror_foot(robot, f), 1 - f);
+        near("offset", f, robot_gait_offset(robot, f), f ? 0.6 : 0.1, 0);
+        near("feet_range", f, robot_feet_range(robot)[f], f ? 0.3 : 0.1, 0);
+        near("knee_range", f, robot_knee_range(robot)[f], f ? 0.35 : 0.15, 0);
+    }
+    assert_int_equal(robot_ankle(robot, FLAT), 3);
+    assert_int_equal(robot_ankle(robot, ROUND), -1);
+    near("shift", 0, robot_mirror_shift(robot), 0.5, 1e-15);
+    near("mass", 0, robot_total_mass(robot), 22.9, 1e-9);
+    near("load of a foot", 0, robot_foot_load(robot), 22.9 * 10 / 2, 1e-9);
+    near("height", 0, robot_nominal_height(robot), 0.6, 0);
+    near("action_scale", 0, robot_action_scale(robot), 0.3, 0);
+    near("foot_force", 0, robot_foot_force(robot), 300, 0);
+    near("least", 0, robot_feet_least(robot), 0.07, 0);
+    near("least", 1, robot_knee_least(robot), 0.08, 0);
+    near("assist", 3, robot_assist(robot)[3], 20, 0);
+    near("assist", 0, robot_assist(robot)[0], 100, 0);
+}
+
+/* Base above the lower of the soles in the default pose: the flat one hangs 0.1 + 0.3 cos 0.2 twice
+ * + 0.05 below; the ball's leg is bent by 0.25 each way, its centre off the shank's line. */
+static void test_stand_height(void **unused) {
+    (void)unused;
+    double flat = 0.1 + 0.6 * cos(0.2) + 0.05;
+    double ball = 0.1 + 0.6 * cos(0.25) + 0.03 * cos(0.25) + 0.01 * sin(0.25) + 0.04;
+    near("stand height", 0, robot_stand_height(robot), fmax(flat, ball), 1e-12);
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
+    assert_non_null(sim);
+    near("lowest sole", 0,
+         fmin(robot_sim_foot(sim, 0)->sole_height, robot_sim_foot(sim, 1)->sole_height), 0, 1e-12);
+    near("flat", 0, robot_sim_foot(sim, FLAT)->sole_height, robot_stand_height(robot) - flat,
+         1e-12);
+    near("ball", 0, robot_sim_foot(sim, ROUND)->sole_height, robot_stand_height(robot) - ball,
+         1e-12);
+    robot_sim_destroy(sim);
+}
+
+/* A round foot is a disc of the sphere's cross section; rasters whatever the model. */
+static void test_soles(void **unused) {
+    (void)unused;
+    const MildSole *const *soles = robot_soles(robot), *const *rasters = robot_rasters(robot);
+    assert_ptr_equal(soles[0], rasters[0]);
+    assert_true(mild_sole_elements(soles[FLAT]) > 30);
+    double area = mild_sole_elements(soles[ROUND]) * mild_sole_pitch(soles[ROUND]) *
+                  mild_sole_pitch(soles[ROUND]);
+    near("area of the disc", 0, area, 3.14159 * 0.04 * 0.04, 0.0007);
+    for (int i = 0; i < mild_sole_elements(soles[ROUND]); i++) {
+        double x = mild_sole_x(soles[ROUND])[i], y = mild_sole_y(soles[ROUND])[i];
+        assert_true(hypot(x, y) < 0.041);
+    }
+    near("the disc's plane", 0, mild_sole_z(soles[ROUND]), 0, 0);
+    near("the sole's plane", 0, mild_sole_z(soles[FLAT]), -0.05, 0);
+    robot_set_model(robot, MILD_MODEL_CON_CONE);
+    assert_int_equal(mild_sole_elements(robot_soles(robot)[FLAT]), 1);
+    assert_int_equal(mild_sole_elements(robot_soles(robot)[ROUND]), 1);
+    assert_ptr_equal(robot_rasters(robot)[0], rasters[0]);
+    robot_set_model(robot, MILD_MODEL_MILD);
+    assert_ptr_equal(robot_soles(robot)[0], rasters[0]);
+}
+
+static void check_rigid_ground(const mjModel *m) {
+    const double corner[4][4] = {{-0.07, -0.03, -0.045, 0.005},
+                                 {0.11, -0.05, -0.045, 0.005},
+                                 {0.11, 0.03, -0.045, 0.005},
+                                 {0.01, 0.02, -0.03, 0.04}};
+    const double friction[5] = {0.8, 0.8, 0.005, 0.0001, 0.0001};
+    int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
+    assert_int_equal(m->geom_type[floor], mjGEOM_PLANE);
+    for (int p = 0; p < 4; p++) {
+        int geom = m->pair_geom2[p];
+        assert_int_equal(m->pair_geom1[p], floor);
+        assert_int_equal(m->pair_dim[p], 3);
+        assert_int_equal(m->geom_bodyid[geom], robot_foot_body(robot, p == 3));
+        assert_int_equal(m->geom_contype[geom] + m->geom_conaffinity[geom], 0);
+        assert_int_equal(m->geom_type[geom], mjGEOM_SPHERE);
+        near("radius", p, m->geom_size[3 * geom], corner[p][3], 0);
+        for (int k = 0; k < 3; k++) {
+            near("corner", p, m->geom_pos[3 * geom + k], corner[p][k], 1e-12);
+        }
+        for (int k = 0; k < 5; k++) {
+            near("friction", k, m->pair_friction[5 * p + k], friction[k], 1e-15);
+        }
+    }
+}
+
+/* What a step does not need is not in its model: one plane and the feet's corners remain. */
+static void test_models(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
+    const mjModel *m = robot_sim_model(sim), *whole = robot_visual_model(robot);
+    assert_int_equal(whole->ngeom, 9);
+    assert_int_equal(whole->nu, 1);
+    assert_int_equal(m->ngeom, 5);
+    assert_int_equal(m->npair, 4);
+    assert_int_equal(m->nu, 0);
+    assert_int_equal(m->nlight, 0);
+    assert_int_equal(m->nv, NV);
+    assert_int_equal(m->nbody, whole->nbody);
+    for (int b = 0; b < m->nbody; b++) { /* inertia of the geoms that went */
+        near("mass", b, m->body_mass[b], whole->body_mass[b], 1e-12);
+        for (int k = 0; k < 3; k++) {
+            near("inertia", b, m->body_inertia[3 * b + k], whole->body_inertia[3 * b + k], 1e-12);
+            near("centre", b, m->body_ipos[3 * b + k], whole->body_ipos[3 * b + k], 1e-12);
+        }
+        for (int k = 0; k < 4; k++) {
+            near("axes", b, m->body_iquat[4 * b + k], whole->body_iquat[4 * b + k], 1e-12);
+        }
+    }
+    check_rigid_ground(m);
+    robot_sim_destroy(sim);
+}
+
+/* ---- against the engine ---- */
+
+static RobotState draw_state(uint32_t draw, double height) {
+    Random r = random_at(51, draw, 0);
+    RobotState state = {.qpos = {random_uniform(&r, -1, 1), random_uniform(&r, -1, 1), height}};
+    double angle[3] = {random_uniform(&r, -0.5, 0.5), random_uniform(&r, -0.5, 0.5),
+                       random_uniform(&r, -3, 3)};
+    mju_euler2Quat(state.qpos + 3, angle, "XYZ");
+    for (int i = 0; i < JOINTS; i++) {
+        state.qpos[7 + i] = random_uniform(&r, -1, 1);
+    }
+    for (int i = 0; i < NV; i++) {
+        state.qvel[i] = random_uniform(&r, -1, 1);
+    }
+    return state;
+}
+
+/* The engine's data at a state, joints put where they belong by name. */
+static mjData *engine_at(const mjModel *m, const RobotState *state) {
+    mjData *d = mj_makeData(m);
+    memcpy(d->qpos, state->qpos, 7 * sizeof(double));
+    memcpy(d->qvel, state->qvel, 6 * sizeof(double));
+    for (int i = 0; i < JOINTS; i++) {
+        int id = mj_name2id(m, mjOBJ_JOINT, robot_joint_name(robot, i));
+        d->qpos[m->jnt_qposadr[id]] = state->qpos[7 + i];
+        d->qvel[m->jnt_dofadr[id]] = state->qvel[6 + i];
+    }
+    mj_fwdPosition(m, d);
+    mj_fwdVelocity(m, d);
+    return d;
+}
+
+/* [m] Ankle of the flat foot, lowest point of the round one. */
+static void reference_point(const mjModel *m, const mjData *d, int f, double point[3]) {
+    static const double center[3] = {0.01, 0.02, -0.03};
+    int body = mj_name2id(m, mjOBJ_BODY, f == ROUND ? "toe_r" : "foot_l");
+    memcpy(point, d->xpos + 3 * body, 3 * sizeof *point);
+    if (f == ROUND) {
+        double arm[3];
+        mju_mulMatVec3(arm, d->xmat + 9 * body, center);
+        mju_addTo3(point, arm);
+        point[2] -= 0.04;
+    }
+}
+
+/* Twist of both feet by velocity; a round foot has no angular part. */
+static void dense_jacobian(const mjModel *m, const mjData *d, double j[ROWS * NV]) {
+    memset(j, 0, sizeof(double) * ROWS * NV);
+    for (int f = 0; f < FEET; f++) {
+        double point[3], *rows = j + 6 * f * NV;
+        int body = mj_name2id(m, mjOBJ_BODY, f == ROUND ? "toe_r" : "foot_l");
+        reference_point(m, d, f, point);
+        mj_jac(m, d, rows, f == ROUND ? NULL : rows + 3 * NV, point, body);
+    }
+}
+
+/* Moves `middle` from the ankle to the middle of the flat sole; returns its lowest point [m]. */
+static double measure_flat(const mjData *d, const double point[3], double middle[3]) {
+    static const double outline[4][3] = {
+        {-0.08, -0.04, -0.05}, {0.12, -0.06, -0.05}, {0.12, 0.04, -0.05}, {-0.08, 0.04, -0.05}};
+    static const double center[3] = {0.02, -0.01, -0.05};
+    const double *turn = d->xmat + 9 * robot_foot_body(robot, FLAT);
+    double arm[3], lowest = 1e9;
+    mju_mulMatVec3(arm, turn, center);
+    mju_addTo3(middle, arm);
+    for (int c = 0; c < 4; c++) {
+        mju_mulMatVec3(arm, turn, outline[c]);
+        lowest = fmin(lowest, point[2] + arm[2]);
+    }
+    return lowest;
+}
+
+static void test_feet(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
+    RobotVariation nominal = robot_variation_nominal();
+    MildMaterial sand = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&sand);
+    terrain.height = 0.3;
+    const mjModel *m = robot_sim_model(sim);
+    const double identity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        RobotState state = draw_state(draw, 1);
+        robot_sim_load(sim, &state, &nominal);
+        mjData *d = engine_at(m, &state);
+        double j[ROWS * NV], twist[ROWS];
+        dense_jacobian(m, d, j);
+        mju_mulMatVec(twist, j, d->qvel, ROWS, NV);
+        double lowest[FEET];
+        for (int f = 0; f < FEET; f++) {
+            const RobotFoot *foot = robot_sim_foot(sim, f);
+            double point[3], middle[3];
+            reference_point(m, d, f, point);
+            memcpy(middle, point, sizeof middle);
+            lowest[f] = point[2];
+            if (f == FLAT) {
+                lowest[f] = measure_flat(d, point, middle);
+            }
+            near("height", f, foot->sole_height, lowest[f], 1e-12);
+            const double *turn = f == ROUND ? identity : d->xmat + 9 * robot_foot_body(robot, f);
+            for (int k = 0; k < 9; k++) {
+                near("rotation", k, foot->rotation[k], turn[k], 1e-12);
+            }
+            for (int k = 0; k < 3; k++) {
+                near("reference", k, foot->position[k], point[k], 1e-12);
+                near("middle", k, foot->sole_center[k], middle[k], 1e-12);
+            }
+            for (int k = 0; k < 6; k++) {
+                near("twist", k, foot->velocity[k], twist[6 * f + k], 1e-12);
+            }
+        }
+        near("clearance", 0, robot_sim_sole_clearance(sim, &terrain),
+             fmin(lowest[0], lowest[1]) - 0.3, 1e-12);
+        mj_deleteData(d);
+    }
+    robot_sim_destroy(sim);
+}
+
+/* j: J of both feet, solved: its rows times M^-1. */
+static void check_wrench(const RobotSim *sim, const mjData *d, const double *j,
+                         const double *solved) {
+    double wrench[ROBOT_FEET_MAX][6], force[ROBOT_NV_MAX], change[ROBOT_NV_MAX];
+    double column[ROWS], by_force[NV], by_change[NV];
+    for (int r = 0; r < ROWS; r++) {
+        column[r] = wrench[r / 6][r % 6] = sin(1.0 + r);
+    }
+    foot_map_wrench(sim, wrench, force, change);
+    mju_mulMatTVec(by_force, j, column, ROWS, NV);
+    mju_mulMatTVec(by_change, solved, column, ROWS, NV);
+    for (int i = 0; i < NV; i++) {
+        near("force", i, force[i], by_force[i], 1e-11);
+        near("acceleration", i, change[i], by_change[i], 1e-9 * (1 + fabs(by_change[i])));
+    }
+    double twist[6], sum[ROWS], rate[NV];
+    for (int i = 0; i < NV; i++) {
+        rate[i] = d->qvel[i] + 0.001 * change[i];
+    }
+    mju_mulMatVec(sum, j, rate, ROWS, NV);
+    for (int f = 0; f < FEET; f++) {
+        foot_map_twist(sim, f, d->qvel, change, twist);
+        for (int k = 0; k < 6; k++) {
+            near("twist to come", k, twist[k], sum[6 * f + k], 1e-11);
+        }
+    }
+}
+
+static void test_map(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
+    RobotVariation nominal = robot_variation_nominal();
+    const mjModel *m = robot_sim_model(sim);
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        RobotState state = draw_state(draw, 1);
+        robot_sim_load(sim, &state, &nominal);
+        mjData *d = engine_at(m, &state);
+        mj_makeM(m, robot_sim_data(sim));
+        mj_factorM(m, robot_sim_data(sim));
+        foot_map_inverse_inertia(sim);
+        double j[ROWS * NV], solved[ROWS * NV], wanted[ROWS * ROWS];
+        dense_jacobian(m, d, j);
+        mj_solveM(m, d, solved, j, ROWS);
+        mju_mulMatMatT(wanted, j, solved, ROWS, NV, ROWS);
+        for (int i = 0; i < ROWS * ROWS; i++) {
+            near("inverse inertia", i, sim->input.inverse_inertia[i], wanted[i],
+                 1e-10 * (1 + fabs(wanted[i])));
+        }
+        check_wrench(sim, d, j, solved);
+        mj_deleteData(d);
+    }
+    robot_sim_destroy(sim);
+}
+
+/* In the air on soft ground, and falling onto rigid ground: the engine's own step. */
+static void step_is_the_engines(int rigid, double height, int steps) {
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
+    RobotVariation variation = robot_variation_nominal();
+    variation.rigid = rigid;
+    MildMaterial sand = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&sand);
+    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
+    MildGround *ground = mild_ground_init(block, robot_soles(robot), FEET);
+    const mjModel *m = robot_sim_model(sim);
+    double worst = 0;
+    int contacts[FEET] = {0};
+    for (uint32_t draw = 0; draw < 8; draw++) {
+        RobotState state = draw_state(draw, 1), after;
+        double torque[JOINTS];
+        robot_sim_load(sim, &state, &variation);
+        state.qpos[2] += height - robot_sim_sole_clearance(sim, &terrain);
+        robot_sim_load(sim, &state, &variation);
+        mjData *d = engine_at(m, &state);
+        for (int i = 0; i < JOINTS; i++) {
+            torque[i] = 2 * (i - 3);
+            d->qfrc_applied[dof_of[i]] = torque[i];
+        }
+        for (int t = 0; t < steps; t++) {
+            mj_step(m, d);
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+            contacts[0] += robot_sim_contact(sim)->foot[0].contacts > 0;
+            contacts[1] += robot_sim_contact(sim)->foot[1].contacts > 0;
+        }
+        robot_sim_store(sim, &after);
+        for (int i = 0; i < JOINTS; i++) {
+            worst = fmax(worst, fabs(after.qpos[7 + i] - d->qpos[dof_of[i] + 1]));
+            worst = fmax(worst, fabs(after.qvel[6 + i] - d->qvel[dof_of[i]]));
+        }
+        for (int i = 0; i < 7; i++) {
+            worst = fmax(worst, fabs(after.qpos[i] - d->qpos[i]));
+        }
+        mj_deleteData(d);
+    }
+    print_message("%s: off the engine by %.1e, feet on the ground in %d and %d steps\n",
+                  rigid ? "rigid" : "soft, in the air", worst, contacts[0], contacts[1]);
+    assert_true(worst < 1e-9);
+    assert_true(rigid ? contacts[0] > 20 && contacts[1] > 20 : contacts[0] + contacts[1] == 0);
+    free(block);
+    robot_sim_destroy(sim);
+}
+
+static void test_steps(void **unused) {
+    (void)unused;
+    step_is_the_engines(0, 0.5, 100);
+    step_is_the_engines(1, 0.01, 300);
+}
+
+/* From rest on soft ground: the joints take what the feet report, dt M^-1 (J^T w - b). */
+static void test_soft_landing(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, 0.0005, &error);
+    RobotVariation nominal = robot_variation_nominal();
+    MildMaterial sand = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&sand);
+    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
+    MildGround *ground = mild_ground_init(block, robot_soles(robot), FEET);
+    const mjModel *m = robot_sim_model(sim);
+    int loaded[FEET] = {0};
+    for (uint32_t draw = 0; draw < 12; draw++) {
+        RobotState state = draw_state(draw, 1), after;
+        double torque[JOINTS] = {0}, j[ROWS * NV], wrench[ROWS], force[NV], free_rate[NV];
+        state.qpos[3] = 1;
+        state.qpos[4] = state.qpos[5] = state.qpos[6] = 0;
+        memset(state.qvel, 0, sizeof state.qvel);
+        robot_sim_load(sim, &state, &nominal);
+        state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) + 0.02;
+        robot_sim_load(sim, &state, &nominal);
+        mild_ground_reset(ground);
+        mjData *d = engine_at(m, &state);
+        dense_jacobian(m, d, j);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        for (int f = 0; f < FEET; f++) {
+            const RobotFoot *foot = robot_sim_foot(sim, f);
+            memcpy(wrench + 6 * f, foot->force, sizeof foot->force);
+            memcpy(wrench + 6 * f + 3, foot->torque, sizeof foot->torque);
+            loaded[f] += foot->force[2] > 1;
+        }
+        mju_mulMatTVec(force, j, wrench, ROWS, NV);
+        for (int i = 0; i < NV; i++) {
+            force[i] -= d->qfrc_bias[i];
+        }
+        mj_solveM(m, d, free_rate, force, 1);
+        robot_sim_store(sim, &after);
+        for (int i = 0; i < JOINTS; i++) { /* from rest: velocity = dt M^-1 (J^T w - b) */
+            near("joint's velocity", i, after.qvel[6 + i], 0.0005 * free_rate[dof_of[i]], 1e-10);
+        }
+        for (int i = 0; i < 6; i++) {
+            near("base's velocity", i, after.qvel[i], 0.0005 * free_rate[i], 1e-10);
+        }
+        mj_deleteData(d);
+    }
+    print_message("soft: feet loaded in %d and %d of 12 landings\n", loaded[0], loaded[1]);
+    assert_true(loaded[0] > 2 && loaded[1] > 2);
+    free(block);
+    robot_sim_destroy(sim);
+}
+
+/* ---- shells ---- */
+
+/* [m] Lowest point of a geom. */
+static double lowest_of(const mjModel *m, const mjData *d, const char *name, double at[3]) {
+    int geom = mj_name2id(m, mjOBJ_GEOM, name);
+    const double *size = m->geom_size + 3 * geom, *turn = d->geom_xmat + 9 * geom;
+    memcpy(at, d->geom_xpos + 3 * geom, 3 * sizeof *at);
+    if (m->geom_type[geom] == mjGEOM_SPHERE) {
+        return at[2] - size[0];
+    }
+    if (m->geom_type[geom] == mjGEOM_CAPSULE) {
+        return at[2] - size[0] - fabs(turn[8]) * size[1];
+    }
+    return at[2] - fabs(turn[6]) * size[0] - fabs(turn[7]) * size[1] - fabs(turn[8]) * size[2];
+}
+
+static void test_shells(void **unused) {
+    (void)unused;
+    static const char *const names[3] = {"chest", "belt", "bone"};
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
+    RobotVariation nominal = robot_variation_nominal();
+    MildMapDef def = mild_map_def_default();
+    def.kind = MILD_MAP_WAVES;
+    def.amplitude = 0.2;
+    MildMap *map = mild_map_create(&def, &error);
+    MildMaterial sand = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&sand);
+    terrain.map = map;
+    const mjModel *m = robot_visual_model(robot);
+    int least_of[3] = {0};
+    for (uint32_t draw = 0; draw < 100; draw++) {
+        RobotState state = draw_state(draw, 1);
+        Random r = random_at(52, draw, 0);
+        for (int i = 3; i < 7; i++) {
+            state.qpos[i] = random_normal(&r);
+        }
+        mju_normalize4(state.qpos + 3);
+        robot_sim_load(sim, &state, &nominal);
+        mjData *d = engine_at(m, &state);
+        double least = 1e9;
+        int which = 0;
+        for (int s = 0; s < 3; s++) {
+            double at[3], low = lowest_of(m, d, names[s], at);
+            low -= mild_terrain_height_at(&terrain, at[0], at[1]);
+            which = low < least ? s : which;
+            least = fmin(least, low);
+        }
+        least_of[which]++;
+        near("clearance", (int)draw, robot_sim_body_clearance(sim, &terrain), least, 1e-9);
+        mj_deleteData(d);
+    }
+    print_message("lowest shell: box %d, sphere %d, capsule %d times\n", least_of[0], least_of[1],
+                  least_of[2]);
+    assert_true(least_of[0] > 5 && least_of[1] > 5 && least_of[2] > 5);
+    mild_map_destroy(map);
+    robot_sim_destroy(sim);
+}
+
+/* ---- refusals ---- */
+
+static void write_edited(const char *path, const char *text, const char *from, const char *to) {
+    char edited[8192];
+    const char *at = from ? strstr(text, from) : NULL;
+    if (!at) {
+        write_text(path, text);
+        return;
+    }
+    snprintf(edited, sizeof edited, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
+    write_text(path, edited);
+}
+
+/* With `from` written as `to` in one of the two texts: one line that has `message`; NULL: accepted. */
+static void try_robot(const char *from, const char *to, const char *message) {
+    MildError error = {0};
+    assert_true((strstr(mjcf, from) != NULL) != (strstr(ini, from) != NULL));
+    write_edited(xml_path, mjcf, from, to);
+    write_edited(ini_path, ini, from, to);
+    Robot *made = robot_create(folder, &error);
+    if (!message && !made) {
+        fail_msg("refused: %s", error.text);
+    }
+    if (message && (made || !strstr(error.text, message))) {
+        fail_msg("'%s' instead of '%s'", made ? "accepted" : error.text, message);
+    }
+    assert_null(strchr(error.text, '\n'));
+    robot_destroy(made);
+}
+
+static void test_refused(void **unused) {
+    (void)unused;
+    try_robot("<freejoint/>", "<joint axis='0 0 1'/>", "body 'torso' must have the free joint");
+    try_robot("base = torso", "base = pelvis", "body 'pelvis' must have the free joint");
+    try_robot("base = torso", "base = chest",
+              "body 'chest' is missing; robot.ini names it in [robot]");
+    try_robot("body = foot_l", "body = foot", "body 'foot' of [foot.flat] is missing");
+    try_robot("knee = shank_l", "knee = none",
+              "body 'none' is missing; robot.ini names it in [foot.");
+    try_robot("body = toe_r", "body = foot_l", "feet 'flat' and 'ball' are on the same body");
+    try_robot("body = toe_r", "body = torso", "no joint between the base and body 'torso'");
+    try_robot("body = toe_r", "body = pelvis", NULL); /* one joint is enough */
+    try_robot("name='neck' axis='1 0 0'", "name='neck' type='slide' axis='1 0 0'",
+              "joint 'neck' must be a hinge");
+    try_robot("joint name='neck'", "joint name='nek'",
+              "joint 'neck' is missing; robot.ini names it");
+    try_robot("<motor joint='waist'/>", "", NULL);
+    try_robot("names = neck knee_r hip_r ankle_l knee_l hip_l waist\n"
+              "mirror = neck knee_l hip_l ankle_l knee_r hip_r waist\n"
+              "mirror_sign = -1 1 1 1 1 1 -1\npose = 0 0.5 -0.25 -0.2 0.4 -0.2 0\n"
+              "kp = 1 2 3 4 5 6 7\nkd = 0.1 0.2 0.3 0.4 0.5 0.6 0.7\neffort = 0 0 33 0 0 0 0\n"
+              "speed = 1 2 3 4 5 6 7\nswing = 0 2 -1 -1 2 -1 0\nstill = 1 0 0 0 0 0 1\n",
+              "names = knee_r hip_r ankle_l knee_l hip_l waist\n"
+              "mirror = knee_l hip_l ankle_l knee_r hip_r waist\n"
+              "mirror_sign = 1 1 1 1 1 -1\npose = 0.5 -0.25 -0.2 0.4 -0.2 0\n"
+              "kp = 2 3 4 5 6 7\nkd = 0.2 0.3 0.4 0.5 0.6 0.7\n",
+              "joint 'neck' is not in [joints] names of robot.ini");
+}
+
+static void test_numbers_refused(void **unused) {
+    (void)unused;
+    try_robot("range='-2 2' ", "", "needs a range, and actuatorfrcrange or [joints] effort");
+    try_robot("<default><joint actuatorfrcrange='-50 50'", "<default><joint",
+              "needs a range, and actuatorfrcrange or [joints] effort");
+    try_robot("effort = 0 0 33 0 0 0 0", "effort = 1 1 1 1 1 1 1", NULL);
+    try_robot("shells = chest belt bone", "shells = chest belts bone", "geom 'belts' is missing");
+    try_robot("type='capsule' size='0.04 0.15' mass='2' ",
+              "type='cylinder' size='0.04 0.15' mass='2' ",
+              "geom 'bone' of [robot] shells must be a box, a sphere or a capsule");
+    try_robot("<body name='thigh_l'", "<body", "the body of geom 'bone' needs a name");
+    try_robot("pose = 0 0.5", "pose = 2.1 0.5", "2.1 of 'neck' is outside its range -2 .. 2");
+    try_robot("pose = 0 0.5", "pose = -2.1 0.5", "-2.1 of 'neck' is outside its range");
+    try_robot("pose = 0 0.5", "pose = 2 0.5", NULL);
+    try_robot("-0.2 0.4 -0.2", "-0.181 0.4 -0.2", NULL); /* 0.019 rad off level */
+    try_robot("-0.2 0.4 -0.2", "-0.179 0.4 -0.2", "the sole of [foot.flat] is not level");
+    try_robot("pitch = 0.02", "pitch = 0.5", "robot.ini, [foot.flat]: ");
+}
+
+static void test_unsupported(void **unused) {
+    (void)unused;
+    try_robot("</worldbody>",
+              "</worldbody><equality><joint joint1='hip_l' joint2='hip_r'/></equality>",
+              "has equality constraints, which the step does not compute");
+    try_robot("</worldbody>",
+              "</worldbody><tendon><fixed><joint joint='hip_l' coef='1'/></fixed></tendon>",
+              "has tendons, which the step does not compute");
+    try_robot("name='neck'", "name='neck' frictionloss='0.1'", "joint 'neck' has frictionloss");
+    try_robot("name='neck'", "name='neck' damping='0.1'", "joint 'neck' has damping");
+    try_robot("name='neck'", "name='neck' stiffness='0.1'", "joint 'neck' has stiffness");
+    try_robot("<light", "<body name='post'><geom size='0.1'/></body><light", NULL);
+    try_robot(
+        "<body name='toe_r' pos='0 0 -0.3'><geom type='sphere' size='0.03' mass='0.2'/></body>",
+        "<body name='toe_r' pos='0 0 -0.3'/>", NULL); /* its parent has the mass */
+    try_robot("model = walker.xml", "model = none.xml", "none.xml: ");
+    try_robot("</worldbody>", "", "walker.xml: ");
+    try_robot("axis='1 0 0'", "axis='0 0 0'", "walker.xml: ");
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_names),
+        cmocka_unit_test(test_joints),
+        cmocka_unit_test(test_feet_and_body),
+        cmocka_unit_test(test_stand_height),
+        cmocka_unit_test(test_soles),
+        cmocka_unit_test(test_models),
+        cmocka_unit_test(test_feet),
+        cmocka_unit_test(test_map),
+        cmocka_unit_test(test_steps),
+        cmocka_unit_test(test_soft_landing),
+        cmocka_unit_test(test_shells),
+        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_numbers_refused),
+        cmocka_unit_test(test_unsupported),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,180 @@
+/* The widest robot that fits: forty joints, four feet, read from its folder, its feet against the
+ * engine's Jacobians, its step against the engine's. */
+#include <math.h>
+#include <string.h>
+
+#include "robot_kit.h"
+
+#include <mujoco/mujoco.h>
+
+#include "robot/sim.h"
+#include "widest.h"
+
+enum { LEGS = WIDEST_LEGS, JOINTS = ROBOT_JOINTS_MAX, NV = ROBOT_NV_MAX, ROWS = 6 * LEGS };
+
+static RobotSim *sim;
+
+static int open_widest(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    robot = widest_open(&error);
+    sim = robot ? robot_sim_create(robot, 0.001, &error) : NULL;
+    if (!sim) {
+        fail_msg("%s", error.text);
+    }
+    return 0;
+}
+
+static int close_widest(void **unused) {
+    (void)unused;
+    robot_sim_destroy(sim);
+    return widest_close(robot);
+}
+
+static RobotState draw_state(uint32_t draw) {
+    Random r = random_at(61, draw, 0);
+    RobotState state = {.qpos = {0.1, -0.2, 3}};
+    double angle[3] = {random_uniform(&r, -1, 1), random_uniform(&r, -1, 1),
+                       random_uniform(&r, -3, 3)};
+    mju_euler2Quat(state.qpos + 3, angle, "XYZ");
+    for (int i = 0; i < JOINTS; i++) {
+        state.qpos[7 + i] = random_uniform(&r, -0.9, 0.9);
+    }
+    for (int i = 0; i < NV; i++) {
+        state.qvel[i] = random_uniform(&r, -1, 1);
+    }
+    return state;
+}
+
+static void test_numbers(void **unused) {
+    (void)unused;
+    assert_int_equal(robot_joints(robot), JOINTS);
+    assert_int_equal(robot_feet(robot), LEGS);
+    for (int i = 0; i < JOINTS; i++) {
+        int leg = i / WIDEST_HINGES, hinge = i % WIDEST_HINGES;
+        assert_int_equal(robot_joint_dof(robot)[i], 6 + i);
+        assert_int_equal(robot_joint_foot(robot)[i], leg);
+        assert_int_equal(robot_mirror_joint(robot)[i], (leg ^ 1) * WIDEST_HINGES + hinge);
+        assert_true(robot_joint_low(robot)[i] == -1 && robot_joint_high(robot)[i] == 1);
+        assert_true(robot_effort(robot)[i] == 40);
+        assert_true(robot_default_pose(robot)[i] == 0 && robot_kp(robot)[i] == 60);
+    }
+    for (int f = 0; f < LEGS; f++) {
+        assert_int_equal(robot_mirror_foot(robot, f), f ^ 1);
+        assert_true(robot_gait_offset(robot, f) == widest_offset[f]);
+        assert_int_equal(robot_ankle(robot, f), -1);
+    }
+    /* hinges 0.06 apart, the ball's centre 0.06 below the last one, its radius 0.03 */
+    assert_true(fabs(robot_stand_height(robot) - (9 * 0.06 + 0.06 + 0.03)) < 1e-9);
+    assert_true(fabs(robot_total_mass(robot) - (12 + 40 * 0.3)) < 1e-9);
+    assert_true(fabs(robot_foot_load(robot) - 24 * 9.81 / 4) < 1e-9);
+}
+
+/* Least of both mirrored pairs: feet, then knees, left less right along the base's left. */
+static void test_distances(void **unused) {
+    (void)unused;
+    RobotVariation nominal = robot_variation_nominal();
+    const mjData *d = robot_sim_data(sim);
+    const mjModel *m = robot_sim_model(sim);
+    int which[2] = {0};
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        RobotState state = draw_state(draw);
+        robot_sim_load(sim, &state, &nominal);
+        const double x[3] = {1, 0, 0}, z[3] = {0, 0, 1};
+        double ahead[3], left[3], feet[2], knees[2];
+        mju_rotVecQuat(ahead, x, state.qpos + 3);
+        ahead[2] = 0;
+        mju_normalize3(ahead);
+        mju_cross(left, z, ahead);
+        for (int pair = 0; pair < 2; pair++) {
+            double between[3];
+            char name[2][8];
+            mju_sub3(between, robot_sim_foot(sim, 2 * pair)->sole_center,
+                     robot_sim_foot(sim, 2 * pair + 1)->sole_center);
+            feet[pair] = mju_dot3(between, left);
+            for (int side = 0; side < 2; side++) {
+                snprintf(name[side], sizeof name[side], "b%d5", 2 * pair + side);
+            }
+            mju_sub3(between, d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, name[0]),
+                     d->xpos + 3 * mj_name2id(m, mjOBJ_BODY, name[1]));
+            knees[pair] = mju_dot3(between, left);
+        }
+        which[feet[0] < feet[1]]++;
+        assert_true(fabs(robot_sim_foot_distance(sim) - fmin(feet[0], feet[1])) < 1e-12);
+        assert_true(fabs(robot_sim_knee_distance(sim) - fmin(knees[0], knees[1])) < 1e-12);
+    }
+    assert_true(which[0] > 2 && which[1] > 2);
+}
+
+/* A = J M^-1 J^T of four balls on four chains, and the chains' common base. */
+static void test_map(void **unused) {
+    (void)unused;
+    RobotVariation nominal = robot_variation_nominal();
+    const mjModel *m = robot_sim_model(sim);
+    mjData *d = robot_sim_data(sim);
+    double worst = 0;
+    for (uint32_t draw = 0; draw < 5; draw++) {
+        static double j[ROWS * NV], solved[ROWS * NV], wanted[ROWS * ROWS];
+        RobotState state = draw_state(draw);
+        robot_sim_load(sim, &state, &nominal);
+        mj_makeM(m, d);
+        mj_factorM(m, d);
+        foot_map_inverse_inertia(sim);
+        memset(j, 0, sizeof j);
+        for (int f = 0; f < LEGS; f++) {
+            mj_jac(m, d, j + 6 * f * NV, NULL, robot_sim_foot(sim, f)->position,
+                   robot_foot_body(robot, f));
+        }
+        mj_solveM(m, d, solved, j, ROWS);
+        mju_mulMatMatT(wanted, j, solved, ROWS, NV, ROWS);
+        for (int i = 0; i < ROWS * ROWS; i++) {
+            worst = fmax(worst,
+                         fabs(sim->input.inverse_inertia[i] - wanted[i]) / (1 + fabs(wanted[i])));
+        }
+    }
+    print_message("inverse inertia of four feet: worst %.1e\n", worst);
+    assert_true(worst < 1e-10);
+}
+
+static void test_step(void **unused) {
+    (void)unused;
+    RobotVariation nominal = robot_variation_nominal();
+    MildTerrain terrain = preset_terrain("grass");
+    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), LEGS));
+    MildGround *ground = mild_ground_init(block, robot_soles(robot), LEGS);
+    const mjModel *m = robot_sim_model(sim);
+    double worst = 0;
+    for (uint32_t draw = 0; draw < 5; draw++) {
+        RobotState state = draw_state(draw);
+        double torque[JOINTS];
+        mjData *d = mj_makeData(m);
+        robot_sim_load(sim, &state, &nominal);
+        memcpy(d->qpos, state.qpos, sizeof(double) * (NV + 1));
+        memcpy(d->qvel, state.qvel, sizeof(double) * NV);
+        for (int i = 0; i < JOINTS; i++) {
+            torque[i] = d->qfrc_applied[6 + i] = 0.2 * (i % 7) - 0.6;
+        }
+        for (int t = 0; t < 20; t++) {
+            mj_step(m, d);
+            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        }
+        for (int i = 0; i < NV; i++) {
+            worst = fmax(worst, fabs(d->qvel[i] - robot_sim_qvel(sim)[i]));
+            worst = fmax(worst, fabs(d->qpos[i + 1] - robot_sim_qpos(sim)[i + 1]));
+        }
+        mj_deleteData(d);
+    }
+    print_message("twenty steps in the air against mj_step: worst %.1e\n", worst);
+    assert_true(worst < 1e-9);
+    free(block);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_numbers),
+        cmocka_unit_test(test_distances),
+        cmocka_unit_test(test_map),
+        cmocka_unit_test(test_step),
+    };
+    return cmocka_run_group_tests(tests, open_widest, close_widest);
+}

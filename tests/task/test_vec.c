@@ -1,0 +1,356 @@
+/* Many environments at once: each does what it does alone, rows of the batch are theirs, statistics
+ * add up what the episodes report, the hash is FNV-1a of what moves. */
+#include "task_kit.h"
+
+#include <malloc.h>
+
+#include "task/vec.h"
+
+enum { ENVS = 6 };
+
+typedef struct {
+    Pool *pool;
+    Vec *vec;
+    float history[ENVS][SA01_HISTORY];
+    float critic[ENVS][SA01_CRITIC];
+    float estimate[ENVS][SA01_ESTIMATES];
+    float frame[ENVS][SA01_OBSERVATION];
+    float action[ENVS][SA01_JOINTS];
+    float reward[ENVS];
+    uint8_t done[ENVS];
+    uint8_t timeout[ENVS];
+    uint8_t valid[ENVS];
+} Many;
+
+static Many many;
+
+static VecView all_views(void) {
+    return (VecView){many.history[0], many.critic[0], many.estimate[0], many.frame[0]};
+}
+
+static void open_many(const TaskDef *def, int threads) {
+    MildError error = {0};
+    memset(&many, 0, sizeof many);
+    many.pool = pool_create(threads);
+    many.vec = vec_create(def, robot, many.pool, ENVS, 21, &error);
+    assert_non_null(many.vec);
+    VecView view = all_views();
+    vec_reset(many.vec, &view);
+}
+
+static void close_many(void) {
+    vec_destroy(many.vec);
+    pool_destroy(many.pool);
+}
+
+/* Environment e of the block. */
+static TaskEnv *env_of(int e) {
+    size_t bytes;
+    char *state = vec_state(many.vec, &bytes);
+    return (TaskEnv *)(void *)(state + (size_t)e * (bytes / ENVS));
+}
+
+static void draw_actions(int step) {
+    for (int e = 0; e < ENVS; e++) {
+        Random r = random_at(99, (uint32_t)e, (uint32_t)step);
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            many.action[e][i] = (float)random_normal(&r);
+        }
+    }
+}
+
+static void step_many(void) {
+    VecView view = all_views();
+    vec_step(many.vec, many.action[0], many.reward, many.done, many.timeout, many.valid, &view);
+}
+
+/* ---- each as alone ---- */
+
+static void expect_row(int e, const Rig *alone) {
+    if (memcmp(many.history[e], alone->history, sizeof alone->history) != 0 ||
+        memcmp(many.critic[e], alone->critic, sizeof alone->critic) != 0 ||
+        memcmp(many.estimate[e], alone->estimate, sizeof alone->estimate) != 0 ||
+        memcmp(many.frame[e], alone->frame, sizeof alone->frame) != 0) {
+        fail_msg("row %d is not environment %d's", e, e);
+    }
+}
+
+static void each_is_as_alone(void **unused) {
+    (void)unused;
+    TaskDef def = task_def_default();
+    def.episode = 0.1; /* ends while we look: the next episode begins by itself */
+    open_many(&def, 2);
+    for (int e = 0; e < ENVS; e++) {
+        Rig alone;
+        rig_open(&alone, &def, 21, (uint32_t)e);
+        task_env_reset(alone.env, &def, robot, alone.sim, &alone.view);
+        expect_row(e, &alone);
+        rig_close(&alone);
+    }
+    close_many();
+    int ends = 0;
+    for (int e = 0; e < ENVS; e++) {
+        Rig alone;
+        open_many(&def, 2);
+        rig_open(&alone, &def, 21, (uint32_t)e);
+        task_env_reset(alone.env, &def, robot, alone.sim, &alone.view);
+        for (int t = 0; t < 14; t++) {
+            draw_actions(t);
+            step_many();
+            TaskStep step = task_env_step(alone.env, &def, robot, alone.sim, many.action[e], 1,
+                                          &alone.view, NULL);
+            assert_true(many.reward[e] == step.reward && many.done[e] == step.done);
+            assert_true(many.timeout[e] == step.timeout && many.valid[e] == step.valid);
+            expect_row(e, &alone);
+            ends += step.done;
+        }
+        rig_close(&alone);
+        close_many();
+    }
+    print_message("%d environments alone and together: the same, %d episodes ended\n", ENVS, ends);
+    assert_true(ends >= ENVS);
+}
+
+/* Any pointer of the view may be missing. */
+static void views_may_be_missing(void **unused) {
+    (void)unused;
+    TaskDef def = task_def_default();
+    for (int missing = 0; missing <= 4; missing++) {
+        open_many(&def, 1);
+        VecView view = all_views();
+        float **member[4] = {&view.history, &view.critic, &view.estimate, &view.frame};
+        float *kept[4];
+        for (int i = 0; i < 4; i++) {
+            kept[i] = *member[i];
+            if (i == missing || missing == 4) {
+                *member[i] = NULL;
+                kept[i][0] = -77;
+            }
+        }
+        draw_actions(0);
+        vec_step(many.vec, many.action[0], many.reward, many.done, many.timeout, many.valid, &view);
+        for (int i = 0; i < 4; i++) {
+            assert_int_equal(kept[i][0] == -77, i == missing || missing == 4);
+        }
+        close_many();
+    }
+}
+
+/* ---- statistics ---- */
+
+/* What one environment reported at the end of its episodes. */
+typedef struct {
+    int episodes, falls, diverged;
+    double length, reward, error, terms[TASK_REWARD_COUNT];
+} Account;
+
+/* A fall in environment 1, bad numbers in 2, time-outs in all others: each at a step of its own. */
+static void disturb(TaskEnv *env, int e, int step) {
+    if (e == 1 && step == 3) {
+        kit_turn(&env->robot, 0, 1.5, 0);
+    }
+    if (e == 2 && step == 5) {
+        env->robot.qvel[8] = NAN;
+    }
+}
+
+static void account_alone(const TaskDef *def, int e, int steps, Account *sum) {
+    Rig alone;
+    rig_open(&alone, def, 21, (uint32_t)e);
+    task_env_reset(alone.env, def, robot, alone.sim, &alone.view);
+    for (int t = 0; t < steps; t++) {
+        draw_actions(t);
+        disturb(alone.env, e, t);
+        TaskStep step =
+            task_env_step(alone.env, def, robot, alone.sim, many.action[e], 1, &alone.view, NULL);
+        sum->diverged += !step.valid;
+        if (step.done) {
+            sum->episodes++;
+            sum->falls += !step.timeout;
+            sum->length += 0.01 * step.length;
+            sum->reward += (double)step.episode_reward;
+            sum->error += (double)step.episode_speed_error;
+            for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+                sum->terms[i] += (double)step.episode_terms[i];
+            }
+        }
+    }
+    rig_close(&alone);
+}
+
+static void statistics(void **unused) {
+    (void)unused;
+    enum { STEPS = 25 };
+    TaskDef def = task_def_default();
+    def.episode = 0.1;
+    Account sum = {0};
+    for (int e = 0; e < ENVS; e++) {
+        account_alone(&def, e, STEPS, &sum);
+    }
+    open_many(&def, 2);
+    double level = 0;
+    for (int t = 0; t < STEPS; t++) {
+        draw_actions(t);
+        for (int e = 0; e < ENVS; e++) {
+            disturb(env_of(e), e, t);
+        }
+        step_many();
+    }
+    for (int e = 0; e < ENVS; e++) {
+        TaskEnv *env = env_of(e);
+        env->assist_level = 0.1 * (e + 1);
+        level += env->assist_level * env->assist_draw / ENVS;
+    }
+    VecStats stats = vec_take_stats(many.vec);
+    print_message("%d episodes, %d falls, %d diverged\n", stats.episodes, stats.falls,
+                  stats.diverged);
+    assert_true(sum.falls >= 2 && sum.diverged >= 1 && sum.episodes > sum.falls);
+    assert_int_equal(stats.episodes, sum.episodes);
+    assert_int_equal(stats.falls, sum.falls);
+    assert_int_equal(stats.diverged, sum.diverged);
+    expect_near("steps", stats.steps, ENVS * STEPS, 0);
+    expect_near("length", stats.length, sum.length / sum.episodes, 1e-12);
+    expect_near("reward", stats.reward, sum.reward / sum.episodes, 1e-12);
+    expect_near("speed error", stats.speed_error, sum.error / sum.episodes, 1e-12);
+    expect_near("help", stats.assist, level, 1e-12);
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        expect_near(task_reward_names[i], stats.terms[i], sum.terms[i] / sum.length, 1e-12);
+    }
+    stats = vec_take_stats(many.vec); /* all taken; help is of now */
+    assert_true(stats.episodes == 0 && stats.falls == 0 && stats.diverged == 0);
+    assert_true(stats.steps == 0 && stats.length == 0 && stats.reward == 0);
+    assert_true(stats.speed_error == 0 && stats.terms[0] == 0);
+    expect_near("help again", stats.assist, level, 1e-12);
+    close_many();
+}
+
+/* An episode that ends at its first step of all lives 10 ms, one that never lived divides nothing. */
+static void an_episode_of_one_step(void **unused) {
+    (void)unused;
+    TaskDef def = kit_quiet_def();
+    open_many(&def, 1);
+    TaskEnv *env = env_of(4);
+    env->step = env->step_first = env->step_limit - 1;
+    step_many();
+    assert_true(many.done[4] && many.timeout[4] && !many.done[3] && !many.timeout[3]);
+    VecStats stats = vec_take_stats(many.vec);
+    assert_int_equal(stats.episodes, 1);
+    assert_int_equal(stats.falls, 0);
+    expect_near("length", stats.length, 0.01, 1e-15);
+    double sum = 0;
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        sum += stats.terms[i];
+    }
+    expect_near("terms per second", 0.01 * sum, (double)many.reward[4], 1e-7);
+    expect_near("reward", stats.reward, (double)many.reward[4], 1e-7);
+    close_many();
+}
+
+/* ---- times, bytes, hash ---- */
+
+/* The ground is a part of physics, physics a part of what two threads worked; taken once. */
+static void times(void **unused) {
+    (void)unused;
+    TaskDef def = kit_quiet_def();
+    open_many(&def, 2);
+    double physics, ground;
+    vec_take_times(many.vec, &physics, &ground);
+    assert_true(physics == 0 && ground == 0); /* a start takes no physics step */
+    for (int t = 0; t < 5; t++) {
+        step_many();
+    }
+    vec_take_times(many.vec, &physics, &ground);
+    print_message("physics %.2g s, ground %.2g s of it\n", physics, ground);
+    assert_true(ground > 1e-6 && physics > ground && physics < 60);
+    vec_take_times(many.vec, &physics, &ground);
+    assert_true(physics == 0 && ground == 0);
+    close_many();
+}
+
+static void bytes(void **unused) {
+    (void)unused;
+    TaskDef def = kit_quiet_def();
+    open_many(&def, 1);
+    size_t size;
+    assert_non_null(vec_state(many.vec, &size));
+    assert_int_equal(size, ENVS * task_env_bytes(&def, robot));
+    assert_int_equal(vec_bytes(many.vec), size + ENVS * sizeof(TaskStep));
+    assert_int_equal((uintptr_t)vec_state(many.vec, &size) % 64, 0);
+    close_many();
+}
+
+static uint64_t fnv(uint64_t hash, const void *data, size_t size) {
+    for (size_t i = 0; i < size; i++) {
+        hash ^= ((const uint8_t *)data)[i];
+        hash *= 1099511628211u;
+    }
+    return hash;
+}
+
+static void hash(void **unused) {
+    (void)unused;
+    assert_true(fnv(14695981039346656037u, "foobar", 6) == 0x85944171f73967e8u); /* its authors' */
+    TaskDef def = kit_quiet_def();
+    open_many(&def, 1);
+    draw_actions(0);
+    step_many();
+    uint64_t wanted = 14695981039346656037u;
+    for (int e = 0; e < ENVS; e++) {
+        TaskEnv *env = env_of(e);
+        wanted = fnv(wanted, env->robot.qpos, SA01_NQ * sizeof(double));
+        wanted = fnv(wanted, env->robot.qvel, SA01_NV * sizeof(double));
+        wanted = fnv(wanted, env->robot.warmstart, SA01_NV * sizeof(double));
+        wanted = fnv(wanted, task_env_history(env), SA01_HISTORY * sizeof(float));
+        wanted = fnv(wanted, env->command, sizeof env->command);
+        wanted = fnv(wanted, &env->reward_sum, sizeof env->reward_sum);
+        wanted = fnv(wanted, task_env_ground(env), mild_ground_size(task_env_ground(env)));
+    }
+    assert_true(vec_hash(many.vec) == wanted);
+    close_many();
+}
+
+/* What is opened and closed again leaves the heap as it was. */
+static void nothing_is_lost(void **unused) {
+    (void)unused;
+    TaskDef def = kit_quiet_def();
+    size_t used[4];
+    for (int i = 0; i < 4; i++) {
+        open_many(&def, 2);
+        step_many();
+        close_many();
+        struct mallinfo2 heap = mallinfo2();
+        used[i] = heap.uordblks + heap.hblkhd;
+    }
+    print_message("heap after the second and the last: %zu and %zu bytes\n", used[1], used[3]);
+    assert_true(used[3] < used[1] + 8192); /* a thread keeps a little; a workspace is larger */
+}
+
+/* ---- refusals ---- */
+
+static void refused(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    Pool *pool = pool_create(1);
+    TaskDef def = task_def_default();
+    def.physics_dt = 0.003;
+    assert_null(vec_create(&def, robot, pool, 1, 0, &error));
+    assert_int_equal(error.status, MILD_ERROR_RANGE);
+    assert_non_null(strstr(error.text, "physics_dt"));
+    vec_destroy(NULL);
+    pool_destroy(pool);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(refused),
+        cmocka_unit_test(bytes),
+        cmocka_unit_test(hash),
+        cmocka_unit_test(an_episode_of_one_step),
+        cmocka_unit_test(times),
+        cmocka_unit_test(nothing_is_lost),
+        cmocka_unit_test(views_may_be_missing),
+        cmocka_unit_test(statistics),
+        cmocka_unit_test(each_is_as_alone),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
+}

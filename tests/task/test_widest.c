@@ -1,0 +1,131 @@
+/* The widest robot that fits, four legs of ten hinges: every width is the greatest that the task
+ * has room for, and it takes steps. */
+#include "task_kit.h"
+#include "widest.h"
+
+enum { LEGS = WIDEST_LEGS, HINGES = WIDEST_HINGES };
+
+static int widest_setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    robot = widest_open(&error);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
+    mirror = task_mirror(robot);
+    return 0;
+}
+
+static int widest_teardown(void **unused) {
+    (void)unused;
+    return widest_close(robot);
+}
+
+static void widths(void **unused) {
+    (void)unused;
+    TaskShape shape = task_shape(robot);
+    assert_int_equal(shape.joints, ROBOT_JOINTS_MAX);
+    assert_int_equal(shape.feet, ROBOT_FEET_MAX);
+    assert_int_equal(shape.actions, ROBOT_JOINTS_MAX);
+    assert_int_equal(shape.observation, TASK_OBSERVATION_MAX);
+    assert_int_equal(shape.history, TASK_HISTORY_MAX);
+    assert_int_equal(shape.estimates, TASK_ESTIMATES_MAX);
+    assert_int_equal(shape.critic, TASK_CRITIC_MAX);
+}
+
+/* Twice mirrored is the same, in every entry. */
+static void mirror_twice(void **unused) {
+    (void)unused;
+    for (int i = 0; i < TASK_OBSERVATION_MAX; i++) {
+        int j = mirror.observation_index[i];
+        assert_int_equal(mirror.observation_index[j], i);
+        assert_true(mirror.observation_sign[i] * mirror.observation_sign[j] == 1);
+    }
+    for (int i = 0; i < ROBOT_JOINTS_MAX; i++) {
+        assert_int_equal(mirror.action_index[i], (i / HINGES ^ 1) * HINGES + i % HINGES);
+        assert_true(mirror.action_sign[i] == (i % HINGES ? 1 : -1));
+    }
+}
+
+/* Stance in the half of the cycle after the foot's offset, swing in the other: h = apex sin(pi s);
+ * all joints of a swinging leg bend by amplitude |sin| times `swing`. */
+static void gait_of_any_offset(void **unused) {
+    (void)unused;
+    TaskDef def = task_def_default();
+    int swings = 0;
+    for (double phase = 0.003; phase < 1; phase += 0.0137) {
+        double q[ROBOT_JOINTS_MAX];
+        task_gait_reference(&def, robot, phase, 0, q);
+        for (int f = 0; f < LEGS; f++) {
+            double since =
+                phase - widest_offset[f] + (phase < widest_offset[f]); /* cycles since touchdown */
+            int swing = since >= 0.5;
+            double wave = sin(2 * KIT_PI * since);
+            double height = swing ? def.swing_apex * sin(KIT_PI * (since - 0.5) / 0.5) : 0;
+            double bend = -wave >= def.double_support ? -wave * def.reward.reference_amplitude : 0;
+            swings += swing;
+            assert_int_equal(task_gait_stance(robot, phase, 0, f), !swing);
+            expect_near("height", task_gait_height(&def, robot, phase, 0, f), height, 1e-12);
+            assert_int_equal(task_gait_either(&def, robot, phase, 0, f),
+                             fabs(wave) < def.double_support);
+            assert_false(task_gait_either(&def, robot, phase, 1, f));
+            assert_true(task_gait_stance(robot, phase, 1, f));
+            for (int i = 0; i < HINGES; i++) {
+                expect_entry("reference", f * HINGES + i, q[f * HINGES + i], (i ? 0.5 : -1) * bend,
+                             1e-12);
+            }
+        }
+    }
+    assert_true(swings > 100);
+}
+
+/* Rows written end where they should: what lies behind them stays. */
+static void steps(void **unused) {
+    (void)unused;
+    TaskDef def = kit_quiet_def();
+    MildError error = {0};
+    TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
+    RobotSim *sim = robot_sim_create(robot, def.physics_dt, &error);
+    assert_non_null(env);
+    assert_non_null(sim);
+    static float rows[4][TASK_HISTORY_MAX + 1];
+    const int width[4] = {TASK_HISTORY_MAX, TASK_CRITIC_MAX, TASK_ESTIMATES_MAX,
+                          TASK_OBSERVATION_MAX};
+    for (int k = 0; k < 4; k++) {
+        for (int i = 0; i <= TASK_HISTORY_MAX; i++) {
+            rows[k][i] = NAN;
+        }
+    }
+    TaskView view = {rows[0], rows[1], rows[2], rows[3]};
+    task_env_init(env, &def, robot, 1, 0);
+    task_env_reset(env, &def, robot, sim, &view);
+    double load = 0;
+    for (int t = 0; t < 40; t++) {
+        const float action[ROBOT_JOINTS_MAX] = {0};
+        TaskStep step = task_env_step(env, &def, robot, sim, action, 0, &view, NULL);
+        assert_true(step.valid);
+        for (int f = 0; f < LEGS && t >= 30; f++) {
+            load += robot_sim_foot(sim, f)->force[2] / 10 / (4 * robot_foot_load(robot));
+        }
+    }
+    for (int k = 0; k < 4; k++) {
+        for (int i = 0; i < width[k]; i++) {
+            assert_true(isfinite(rows[k][i]));
+        }
+        assert_true(isnan(rows[k][width[k]]));
+    }
+    print_message("four feet carry %.2f of the weight\n", load);
+    expect_near("load", load, 1, 0.3);
+    robot_sim_destroy(sim);
+    free(env);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(widths),
+        cmocka_unit_test(mirror_twice),
+        cmocka_unit_test(gait_of_any_offset),
+        cmocka_unit_test(steps),
+    };
+    return cmocka_run_group_tests(tests, widest_setup, widest_teardown);
+}
