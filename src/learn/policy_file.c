@@ -91,7 +91,7 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
     }
     if (strcmp(kind, POLICY_KIND) != 0 && strcmp(kind, POLICY_CHECKPOINT_KIND) != 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%s: is no policy of mild; give a file that `mild train` wrote", path);
+                         "%s: holds no policy of mild; give a file that `mild train` wrote", path);
     }
     if (strcmp(version, POLICY_FILE_VERSION) != 0) {
         return mild_fail(
