@@ -44,7 +44,7 @@ static void print_help(FILE *file) {
     }
     fprintf(
         file,
-        "\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 after success "
+        "\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 on success "
         "and 2 after\nan error, which is one line on standard error.\n\n"
         "try first:\n"
         "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"

@@ -6,7 +6,8 @@
 
 #include "learn/policy_private.h"
 
-/* Shape fields of the def. The task sets them, so they are no config keys, but a file must have them. */
+/* Shape fields of the def. The task sets them, so they are no config keys, but a file must have
+ * them. */
 static const MildField shape_fields[] = {
     MILD_FIELD(PolicyDef, observation, MILD_FIELD_INT, 1, 1, 16384, "[-] width of one frame"),
     MILD_FIELD(PolicyDef, frames, MILD_FIELD_INT, 1, 1, 16384, "[-] frames in the history"),
@@ -98,7 +99,7 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
     }
     if (strcmp(kind, POLICY_KIND) != 0 && strcmp(kind, POLICY_CHECKPOINT_KIND) != 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
-                         "%s: is no policy of mild; give a file that `mild train` wrote", path);
+                         "%s: holds no policy of mild; give a file that `mild train` wrote", path);
     }
     if (strcmp(version, POLICY_FILE_VERSION) != 0) {
         return mild_fail(
