@@ -80,12 +80,10 @@ static void worst_of(double *worst, double a, double b, double scale) {
 static void worst_of_step(double *worst, const ElementCase *c, const ElementResult *one,
                           const ElementResult *two) {
     const double *v = one->value;
-    const double load = c->dt * one->yield_force; /* [N s] */
-    /* [N/m] of the unloading line, and where the step has none of the secant to the yield. */
-    const double secant = one->yield_force / fmax(c->depth, 1e-3);
-    const double slope = c->dt * c->dt / 2 * fmax(one->unload_stiffness, secant); /* [kg] */
-    const double tangent = load + hypot(v[2], v[3]);                              /* [N s] */
-    const double fall = (double)FRICTION_LAG * c->mu * load + fmax(v[4], v[6]);   /* [kg] */
+    const double load = c->dt * one->yield_force;                               /* [N s] */
+    const double slope = c->dt * c->dt / 2 * one->unload_stiffness;             /* [kg] */
+    const double tangent = load + hypot(v[2], v[3]);                            /* [N s] */
+    const double fall = (double)FRICTION_LAG * c->mu * load + fmax(v[4], v[6]); /* [kg] */
     const double scale[ELEMENT_RESULTS] = {load, slope, tangent, tangent, fall, fall, fall, 1, 1};
     static const int kind[ELEMENT_RESULTS] = {0, 2, 1, 1, 2, 2, 2, 2, 2};
     for (int k = 0; k < ELEMENT_RESULTS; k++) {
