@@ -10,6 +10,7 @@ LAYER ?= task
 N ?= 200
 SEED ?= 1
 MUTANTS ?=
+FAULTS ?=
 
 .PHONY: setup build test run bench install docs fuzz mutants clean help
 
@@ -21,6 +22,7 @@ help:
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
+	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -54,7 +56,7 @@ fuzz: setup
 
 # Makes its own builds; MUTANTS: further options (scripts/mutants.py --help).
 mutants: setup
-	@scripts/mutants.py --layer $(LAYER) -n $(N) --seed $(SEED) --jobs $(JOBS) $(MUTANTS)
+	@scripts/mutants.py --layer $(LAYER) -n $(N) --seed $(SEED) --jobs $(JOBS) $(if $(FAULTS),--faults) $(MUTANTS)
 
 docs:
 	@mkdir -p build
