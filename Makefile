@@ -11,12 +11,14 @@ N ?= 200
 SEED ?= 1
 MUTANTS ?=
 FAULTS ?=
+STAGES ?=
 
-.PHONY: setup build test run bench install docs fuzz mutants clean help
+.PHONY: setup build test run bench install docs check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
 	@echo "make test    set up, build, run every test"
+	@echo "make check   format, clang-tidy, sanitizers, gcc and clang with -Werror, aarch64 (STAGES=format: that one)"
 	@echo "make build   set up, build build/mild"
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
@@ -36,6 +38,11 @@ build: setup
 
 test: build
 	@ctest --test-dir build --output-on-failure --parallel $(JOBS) --timeout 280
+
+# Own builds, under build/check. Installs the tools it needs, which `make test` does without.
+check:
+	@scripts/setup.sh check
+	@JOBS=$(JOBS) scripts/check.sh $(STAGES)
 
 run: build
 	@MINUTES=$(MINUTES) scripts/run.sh
