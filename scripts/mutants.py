@@ -447,17 +447,16 @@ def judge_all(options, files, order, workers):
     return kept
 
 
-def judge_faults(entries, files, tests, workers):
+def judge_faults(faults, files, tests, workers):
     """Every fault of tests/faults.txt against its layer's tests; returns how many survive."""
-    mutants = [fault_of(entry, files[entry["at"].partition(" ")[0]]) for entry in entries]
-    lock, verdicts, begin = threading.Lock(), {}, time.time()
+    lock, verdicts, waiting, begin = threading.Lock(), {}, list(faults), time.time()
 
     def work(worker):
         while True:
             with lock:
-                if not mutants:
+                if not waiting:
                     return
-                mutant = mutants.pop(0)
+                mutant = waiting.pop(0)
             layer = pathlib.Path(mutant.path).parts[1]
             worker.tests = tests_of(layer, tests)
             verdict, detail = worker.judge(mutant, files[mutant.path].source)
@@ -470,8 +469,8 @@ def judge_faults(entries, files, tests, workers):
         for future in [pool.submit(work, w) for w in workers]:
             future.result()
     caught = sum(v == "caught" for v in verdicts.values())
-    print(f"{caught} of {len(entries)} named faults caught; {time.time() - begin:.0f} s")
-    return len(entries) - caught
+    print(f"{caught} of {len(faults)} named faults caught; {time.time() - begin:.0f} s")
+    return len(faults) - caught
 
 
 def tests_of(layer, tests):
@@ -525,9 +524,13 @@ def main():
     if options.faults:
         entries = read_entries(FAULTS)
         files = {p: source_file(p) for p in sorted({e["at"].partition(" ")[0] for e in entries})}
+        faults = [fault_of(entry, files[entry["at"].partition(" ")[0]]) for entry in entries]
+        if options.list:
+            print("\n".join(f"{m.path}:{m.line}: {m.name}" for m in faults))
+            return
         layers = sorted({pathlib.Path(p).parts[1] for p in files})
         tests, workers = prepare(layers, options.jobs)
-        survivors = judge_faults(entries, files, tests, workers)
+        survivors = judge_faults(faults, files, tests, workers)
         discard(workers)
         sys.exit(1 if survivors else 0)
     files, order = choose(options)
