@@ -70,6 +70,7 @@ static void feet_plane(const Robot *robot, const RobotSim *sim, const double ahe
 static double slope_along(const double *along, const double *z, int feet, double speed) {
     double rise = 0.0, spread = 0.0;
     for (int f = 0; f < feet; f++) {
+        // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): feet_plane filled them
         rise += along[f] * z[f];
         spread += along[f] * along[f];
     }

@@ -461,7 +461,7 @@ int gpu_device(char *text, size_t size) {
     if (code == cudaSuccess && count > 0) {
         code = cudaGetDeviceProperties(&properties, 0);
     }
-    if (code != cudaSuccess || count == 0) {
+    if (code != cudaSuccess || count <= 0) {
         snprintf(text, size, "no CUDA device: %s",
                  code ? cudaGetErrorString(code) : "none is installed");
         return 0;

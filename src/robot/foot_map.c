@@ -101,6 +101,7 @@ static void inner_product(const double *inverse_d, const double left[][ROBOT_LAN
     double sum[6][ROBOT_LANES] = {{0}}; /* stays in registers */
     for (int k = 0; k < rows; k++) {
         for (int r = 0; r < 6; r++) {
+            // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): all are filled
             double scaled = inverse_d[k] * left[k][r];
 #pragma omp simd
             for (int c = 0; c < ROBOT_LANES; c++) {

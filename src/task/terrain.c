@@ -61,7 +61,6 @@ static MildStatus read_image(const char *key, const char *path, Image *image, Mi
 
 static unsigned char *make_labels(const Image *image, int materials) {
     size_t pixels = (size_t)image->columns * (size_t)image->rows;
-    // NOLINTNEXTLINE(clang-analyzer-optin.portability.UnixAPI): an image has pixels
     unsigned char *labels = malloc(pixels);
     for (size_t i = 0; labels && i < pixels; i++) {
         labels[i] = (unsigned char)lround(image->grey[i] * (materials - 1));
