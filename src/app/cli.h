@@ -18,8 +18,8 @@ typedef struct {
     char name[CLI_LIST_MAX][64];
 } CliNames; /* "rubber,foam45" */
 
-/* Type of the target: FLAG int *, TEXT const char **, INT int *, UINT64 uint64_t *, NUMBER double *,
- * NUMBERS CliNumbers *, NAMES CliNames *. The value that it holds before parsing is the default.
+/* Type of the target: FLAG int *, TEXT const char **, INT int *, UINT64 uint64_t *, NUMBER double
+ * *, NUMBERS CliNumbers *, NAMES CliNames *. The value that it holds before parsing is the default.
  * Files are const char ** too. INPUT is read. OUTPUT is written and may be `-`; an output that
  * cannot be written is refused before the command runs. OUTPUT_LATER is written to a folder that
  * the command makes, so the command checks it. An output may be neither an input nor another

@@ -1,4 +1,5 @@
-/* mild fit: finds parameters of a ground from recorded presses; prints a table, writes JSON, draws. */
+/* mild fit: finds parameters of a ground from recorded presses; prints a table, writes JSON,
+ * draws. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -144,8 +145,8 @@ static void say_held(const FitResult *result, FitName name) {
     case FIT_FITTED: break;
     case FIT_NO_SPEEDS:
         printf(
-            "%s: the data cannot determine it, because all rows have about the same speed; %s (add a "
-            "press at another speed)\n",
+            "%s: the data cannot determine it, because all rows have about the same speed; %s (add "
+            "a press at another speed)\n",
             fit_names[name], held);
         break;
     case FIT_NO_MASS:

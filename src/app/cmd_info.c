@@ -98,8 +98,8 @@ static void print_models(void) {
 
 static void print_rivals(const MildSole *sole) {
     printf(
-        "\nParameters of the other models. Each is matched to sink as deep as mild under 20 kg on one "
-        "foot. The numbers\n"
+        "\nParameters of the other models. Each is matched to sink as deep as mild under 20 kg on "
+        "one foot. The numbers\n"
         "are for one element, or for the whole sole with con_*. All other parameters are the "
         "preset's.\n");
     for (int m = 0; m < MILD_MODELS; m++) {

@@ -9,11 +9,12 @@
 #include "task/task_def.h"
 #include "task/terrain.h"
 
-/* The material of a preset. For an unknown name the message tells the nearest known one. `rigid` has
- * no material: it sets *rigid, and fails where that is NULL. */
+/* The material of a preset. For an unknown name the message tells the nearest known one. `rigid`
+ * has no material: it sets *rigid, and fails where that is NULL. */
 MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, MildError *error);
 
-/* The model of --model NAME (NULL: not given) or --ground.model=NAME; mild when neither is given. */
+/* The model of --model NAME (NULL: not given) or --ground.model=NAME; mild when neither is
+ * given. */
 MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model,
                          MildError *error);
 
@@ -28,8 +29,8 @@ typedef struct {
     TerrainDef *terrain; /* NULL: no --terrain either */
 } GroundsDef;
 
-/* For the robot: models are matched under half its weight, overrides come from `args`, and the robot
- * gets the soles of the model. */
+/* For the robot: models are matched under half its weight, overrides come from `args`, and the
+ * robot gets the soles of the model. */
 GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain,
                              const CliArgs *args);
 /* Turns a preset into the material of the model, then applies the overrides. */
@@ -37,8 +38,8 @@ MildStatus grounds_finish(const GroundsDef *def, MildMaterial *material, MildErr
 /* The same for every ground of a scene. The model rigid selects the engine's own contact. */
 MildStatus grounds_finish_scene(const GroundsDef *def, Scene *scene, MildError *error);
 /* Puts the map of --terrain.KEY=VALUE under a finished scene and the task. The caller destroys *map
- * (NULL: level ground) after both. With a pattern of materials the scene's grounds are the pattern's
- * labels, in order, and not a course. */
+ * (NULL: level ground) after both. With a pattern of materials the scene's grounds are the
+ * pattern's labels, in order, and not a course. */
 MildStatus grounds_lay_map(const GroundsDef *def, Scene *scene, MildMap **map, MildError *error);
 
 /* Help on --model; returns `text`. */

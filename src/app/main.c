@@ -42,13 +42,12 @@ static void print_help(FILE *file) {
     for (int i = 0; i < COMMANDS; i++) {
         fprintf(file, "  %-8s%s\n", commands[i].name, commands[i].help);
     }
-    fprintf(
-        file,
-        "\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 after success "
-        "and 2 after\nan error, which is one line on standard error.\n\n"
-        "try first:\n"
-        "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
-        "  mild press --ground foam45 --depth 0.03\n");
+    fprintf(file,
+            "\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 after "
+            "success and 2 after\nan error, which is one line on standard error.\n\n"
+            "try first:\n"
+            "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
+            "  mild press --ground foam45 --depth 0.03\n");
 }
 
 /* Only the last flush shows whether standard output took everything, for example on a full disk. */

@@ -6,7 +6,8 @@
 
 #include "mild/error.h"
 
-/* Takes ownership of `root`; NULL means that memory ran out while it was built. path "-": stdout. */
+/* Takes ownership of `root`; NULL means that memory ran out while it was built. path "-":
+ * stdout. */
 MildStatus report_save(cJSON *root, const char *path, MildError *error);
 
 #endif

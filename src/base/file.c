@@ -195,8 +195,8 @@ static const char *folder_of(const char *path, char folder[PATH_SIZE]) {
     return folder;
 }
 
-/* A rename is safe on disk only when its folder is synced. Where folders cannot be synced, the error
- * does not matter. */
+/* A rename is safe on disk only when its folder is synced. Where folders cannot be synced, the
+ * error does not matter. */
 static void sync_folder(const char *path) {
     char name[PATH_SIZE];
     int folder = open(folder_of(path, name), O_RDONLY | O_CLOEXEC);
@@ -273,8 +273,8 @@ static MildStatus lock_refused(int file, const char *path, MildError *error) {
     return mild_fail(error, MILD_ERROR_ARGUMENT, "%.200s: in use by another process", path);
 }
 
-/* The holder removes the file before it releases the lock. So a lock counts only when the locked file
- * still has its name. */
+/* The holder removes the file before it releases the lock. So a lock counts only when the locked
+ * file still has its name. */
 MildStatus file_lock(FileLock *lock, const char *path, MildError *error) {
     lock->file = -1;
     if (snprintf(lock->path, sizeof lock->path, "%s", path) >= (int)sizeof lock->path) {

@@ -18,8 +18,8 @@ char *file_read(const char *path, size_t limit, size_t *size, MildError *error);
 /* Fails when `path` exists and is not a regular file. */
 MildStatus file_check_regular(const char *path, MildError *error);
 
-/* Fails when file_write could not begin. Called before long work, so that a wrong path does not cost
- * the result. Leaves nothing behind. */
+/* Fails when file_write could not begin. Called before long work, so that a wrong path does not
+ * cost the result. Leaves nothing behind. */
 MildStatus file_check_write(const char *path, MildError *error);
 
 /* Writes a temporary file beside `path`, syncs it, renames it and syncs the folder. After a crash
@@ -29,8 +29,8 @@ MildStatus file_write(const char *path, const void *data, size_t size, MildError
 /* Creates an empty file PATH.PID-N.tmp with a name that is not in use, for a writer that cannot use
  * file_write. The caller renames or removes it. */
 MildStatus file_temporary(const char *path, char temporary[PATH_SIZE], MildError *error);
-/* Whether `name` is PREFIX.PID-N.tmp with any prefix, as a temporary file that a killed process left
- * behind. */
+/* Whether `name` is PREFIX.PID-N.tmp with any prefix, as a temporary file that a killed process
+ * left behind. */
 int file_is_temporary(const char *name);
 
 /* Whether two paths name the same file: the same file on disk (links are followed), or, where none

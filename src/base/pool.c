@@ -40,8 +40,8 @@ static void pool_drain(Pool *pool, int thread) {
     }
 }
 
-/* A worker that wakes after the run has closed goes back to sleep. So a run waits only for the workers
- * that took part. */
+/* A worker that wakes after the run has closed goes back to sleep. So a run waits only for the
+ * workers that took part. */
 static void *pool_worker(void *argument) {
     PoolWorker *worker = argument;
     Pool *pool = worker->pool;

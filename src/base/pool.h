@@ -1,12 +1,12 @@
-/* A fixed team of threads that runs numbered pieces of work. The caller fixes the pieces, so neither
- * the number of threads nor which thread runs a piece changes a result. */
+/* A fixed team of threads that runs numbered pieces of work. The caller fixes the pieces, so
+ * neither the number of threads nor which thread runs a piece changes a result. */
 #ifndef MILD_POOL_H
 #define MILD_POOL_H
 
 typedef struct Pool Pool;
 
-/* threads: at least 1, including the caller's; 0: one per online core. NULL when memory or threads run
- * out. */
+/* threads: at least 1, including the caller's; 0: one per online core. NULL when memory or threads
+ * run out. */
 Pool *pool_create(int threads);
 void pool_destroy(Pool *pool);
 int pool_threads(const Pool *pool);

@@ -5,8 +5,8 @@
 #include "bench/report.h"
 #include "train/experiment.h"
 
-/* One physics step of the robot standing on sand, with our contact and with the engine's own. The cases
- * take turns; medians. */
+/* One physics step of the robot standing on sand, with our contact and with the engine's own. The
+ * cases take turns; medians. */
 MildStatus bench_step(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The ground alone: solve and advance of two soles, 154 elements in contact. */
 MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError *error);

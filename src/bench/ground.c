@@ -210,8 +210,8 @@ MildStatus bench_ground(const ExperimentDef *def, BenchReport *report, MildError
 
 /* ---- how the cost grows with the number of elements ---- */
 
-/* A plate of fixed size, weight and ground with finer elements. The material's numbers for one element
- * of the paper's raster are scaled by area. */
+/* A plate of fixed size, weight and ground with finer elements. The material's numbers for one
+ * element of the paper's raster are scaled by area. */
 static MildSole *elements_plate(int columns, int rows, MildMaterial *material, MildError *error) {
     const double paper_pitch = 0.0195, paper_elements = 77;
     double share = paper_elements / (columns * rows), pitch = paper_pitch * sqrt(share);

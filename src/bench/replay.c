@@ -72,8 +72,8 @@ static double play_soft(Player *player, const ReplayPeriod *period, int which) {
     return clock_seconds() - start;
 }
 
-/* [m] Height for the rigid floor: the higher of the soles that sank into soft ground, else 0. At that
- * height the floor carries both soles and throws neither out. */
+/* [m] Height for the rigid floor: the higher of the soles that sank into soft ground, else 0. At
+ * that height the floor carries both soles and throws neither out. */
 static double sunk_floor(Player *player, const ReplayPeriod *period) {
     double floor = -INFINITY;
     robot_sim_load(player->soft, &period->state, &player->replay->variation);

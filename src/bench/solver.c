@@ -71,7 +71,8 @@ static double error_after(SolverBench *bench, int solver, int iterations) {
     return sqrt(energy(&bench->input, difference) / energy(&bench->input, bench->exact));
 }
 
-/* The fewest iterations that reach solver_error, by doubling and bisection; the limit when none do. */
+/* The fewest iterations that reach solver_error, by doubling and bisection; the limit when none
+ * do. */
 static int fewest_iterations(SolverBench *bench, int solver) {
     int low = 0, high = 1, limit = solver_limit[solver];
     while (!(error_after(bench, solver, high) <= solver_error)) {

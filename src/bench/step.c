@@ -11,7 +11,8 @@
 
 #define REPEATS_MAX 1000
 #define WARM_STEPS 500
-/* The paper's sweeps are slower by orders of magnitude, so they take few steps, after the others. */
+/* The paper's sweeps are slower by orders of magnitude, so they take few steps, after the
+ * others. */
 #define SWEEP_REPEATS 3
 #define SWEEP_STEPS 2
 #define PHASE_WINDOWS 10

@@ -94,8 +94,8 @@ static MildStatus key_set(const ConfigSection *sections, int count, const char *
     return MILD_OK;
 }
 
-/* ---- ini text: this reader counts the lines and gives them to inih, which splits them into section,
- * key and value ---- */
+/* ---- ini text: this reader counts the lines and gives them to inih, which splits them into
+ * section, key and value ---- */
 typedef struct {
     const ConfigSection *sections;
     int count;
@@ -131,8 +131,8 @@ static void reader_check_line(Reader *reader, const char *line) {
     }
 }
 
-/* fgets over the text. Drops indentation, because inih would add an indented line to the value before
- * it. */
+/* fgets over the text. Drops indentation, because inih would add an indented line to the value
+ * before it. */
 static char *reader_line(char *buffer, int size, void *stream) {
     Reader *reader = stream;
     if (reader->status != MILD_OK || !*reader->rest) {

@@ -18,8 +18,8 @@ typedef struct {
     void *def;
 } ConfigSection;
 
-/* Reads a whole ini text. `name` is the file's name in messages. complete: every key of every section
- * must be present. */
+/* Reads a whole ini text. `name` is the file's name in messages. complete: every key of every
+ * section must be present. */
 MildStatus config_read_text(const ConfigSection *sections, int count, const char *text,
                             const char *name, int complete, MildError *error);
 /* The same from a file of at most 1 MiB. */
@@ -32,8 +32,8 @@ MildStatus config_override(const ConfigSection *sections, int count, const char 
 MildStatus config_overrides(const ConfigSection *sections, int count, const char *const *texts,
                             int text_count, MildError *error);
 
-/* Prints a complete ini that reads back to the same values. comments: with each key's help and range
- * above it. */
+/* Prints a complete ini that reads back to the same values. comments: with each key's help and
+ * range above it. */
 void config_print(const ConfigSection *sections, int count, int comments, FILE *file);
 /* The same as text, to be freed by the caller; NULL when out of memory. */
 char *config_text(const ConfigSection *sections, int count, int comments);

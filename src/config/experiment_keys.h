@@ -15,8 +15,8 @@ void experiment_sections(ExperimentDef *def, ConfigSection sections[EXPERIMENT_S
 ConfigSection terrain_section(TerrainDef *def);
 ConfigSection ground_section(MildMaterial *material);
 
-/* Reads configs/default.ini, then the overlay file (NULL: none), then overrides "section.key=value",
- * and checks the result. */
+/* Reads configs/default.ini, then the overlay file (NULL: none), then overrides
+ * "section.key=value", and checks the result. */
 MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides,
                            int override_count, MildError *error);
 

@@ -1,7 +1,7 @@
-/* The learner's elementwise passes on the GPU; cuBLAS computes the products. Each pass is the loop of
- * the same name in src/learn (mlp.c, network.c, loss.c) over device arrays, row-major [rows][width].
- * It only enqueues work on the stream, so errors show at the next call of the runtime. Every sum has
- * one fixed tree, so no result depends on the order in which blocks run. */
+/* The learner's elementwise passes on the GPU; cuBLAS computes the products. Each pass is the loop
+ * of the same name in src/learn (mlp.c, network.c, loss.c) over device arrays, row-major
+ * [rows][width]. It only enqueues work on the stream, so errors show at the next call of the
+ * runtime. Every sum has one fixed tree, so no result depends on the order in which blocks run. */
 #ifndef MILD_GPU_KERNELS_H
 #define MILD_GPU_KERNELS_H
 
@@ -87,8 +87,8 @@ void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const f
                              const float *theta, const float *d_input, float *d_heads,
                              float *d_theta);
 
-/* Adds the gradient of the regression for the first `rows` of `all`, and that of the modulation through
- * the feet velocities for all. */
+/* Adds the gradient of the regression for the first `rows` of `all`, and that of the modulation
+ * through the feet velocities for all. */
 typedef struct {
     float estimate_weight, latent_weight; /* of a sample */
     const float *heads, *estimate, *spread, *noise, *d_feet, *d_decoder_input;

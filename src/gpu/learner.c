@@ -8,8 +8,8 @@
 #include "gpu/mlp.h"
 #include "learn/ppo_gradient.h"
 
-/* Rows go through the networks in chunks of at most this many. That fills a large GPU and bounds the
- * memory. */
+/* Rows go through the networks in chunks of at most this many. That fills a large GPU and bounds
+ * the memory. */
 #ifndef GPU_ROWS
 #define GPU_ROWS 32768
 #endif
@@ -284,8 +284,8 @@ static void gather(GpuLearner *g, const ChunkJob *job) {
     gpu_latent_noise(stream, c->rows, def->latent, job->latent_key, job->latent_row, c->noise);
 }
 
-/* As policy_loss and mirror_loss. The samples' gradients of log std are kept in a work area until they
- * are summed. */
+/* As policy_loss and mirror_loss. The samples' gradients of log std are kept in a work area until
+ * they are summed. */
 static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean) {
     const LossContext *loss = job->loss;
     const PolicyDef *def = policy_def(g->ppo->policy);

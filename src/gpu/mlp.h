@@ -13,8 +13,8 @@ typedef struct {
     float *partial;        /* [GPU_SUM_SLICES][widest layer] of the column sums */
 } GpuQueue;
 
-/* As mlp_forward and mlp_backward. They only enqueue. Failures show in status and when the stream is
- * waited for. */
+/* As mlp_forward and mlp_backward. They only enqueue. Failures show in status and when the stream
+ * is waited for. */
 float *gpu_mlp_forward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,
                        const float *x, int ldx, const MlpOutputs *outputs);
 void gpu_mlp_backward(GpuQueue *queue, const Mlp *mlp, const float *parameters, int rows,

@@ -440,9 +440,9 @@ static void hold(Fit *fit, const FitDef *def, FitName name, FitParameter *parame
     *fit_value(&fit->def.material, name) = *fit_value(&given, name);
 }
 
-/* Fits, gives up the parameter that the data determine least, and fits again, until the data determine
- * all that are left. nu goes first, because fixing it resolves the one exact tie of the law
- * (sigma_cone, alpha, nu, and c_d with drag). */
+/* Fits, gives up the parameter that the data determine least, and fits again, until the data
+ * determine all that are left. nu goes first, because fixing it resolves the one exact tie of the
+ * law (sigma_cone, alpha, nu, and c_d with drag). */
 static double fit_reduce(Fit *fit, const FitDef *def, FitResult *result) {
     static const FitState order[] = {FIT_NO_EFFECT, FIT_TIED, FIT_WIDE};
     for (int free = free_count(fit); free > 0; free = free_count(fit)) {

@@ -4,9 +4,10 @@
  * A level plate of n elements that goes down at speed w meets (eqs 4 and 5)
  *     F(u, w) = n (F_g(u) + c_d m_a'(u) w^2 + m_a(u) dw/dt).
  * F is linear in k_pen and sigma_cone. alpha and nu act through u_f = R tan(alpha)/nu and
- * sigma_cone/cos(alpha) alone as long as the drag is small, so slow data determine three numbers and
- * never all four. At constant speed the force depends only on the product c_g c_d. To determine c_g
- * alone takes a record that brakes, such as a drop. Pure functions: thread safe, print nothing. */
+ * sigma_cone/cos(alpha) alone as long as the drag is small, so slow data determine three numbers
+ * and never all four. At constant speed the force depends only on the product c_g c_d. To determine
+ * c_g alone takes a record that brakes, such as a drop. Pure functions: thread safe, print
+ * nothing. */
 #ifndef LAB_FIT_H
 #define LAB_FIT_H
 
@@ -78,12 +79,12 @@ double fit_force(const FitDef *def, const FitPoint *point);
 /* Keeps the loading part, in place: rows below the surface that are at least as deep as all rows
  * before them. Returns their count. */
 int fit_loading(FitPoint *points, int count);
-/* Fills unknown speeds and all accelerations from the times of one record's loading part. Each comes
- * from a polynomial through the nearest twentieth of the rows. Without times both are 0. */
+/* Fills unknown speeds and all accelerations from the times of one record's loading part. Each
+ * comes from a polynomial through the nearest twentieth of the rows. Without times both are 0. */
 void fit_speeds(FitPoint *points, int count);
 
-/* Fits the loading rows of all records together. Fails on fewer than FIT_POINTS_MIN points, on nothing
- * to fit, and on a material out of range. */
+/* Fits the loading rows of all records together. Fails on fewer than FIT_POINTS_MIN points, on
+ * nothing to fit, and on a material out of range. */
 MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,
                    MildError *error);
 

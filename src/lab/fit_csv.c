@@ -40,7 +40,8 @@ static char *trim(char *text) {
 }
 
 /* Reads a line of at most CSV_LINE_MAX characters into csv->line and ends it with '\0'. Returns its
- * length with the newline, 0 at the end of the file, -1 for a line that is longer or contains '\0'. */
+ * length with the newline, 0 at the end of the file, -1 for a line that is longer or contains
+ * '\0'. */
 static int csv_read_line(Csv *csv) {
     int length = 0, c = 0;
     while (c != '\n' && (c = getc_unlocked(csv->file)) != EOF) {

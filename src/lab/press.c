@@ -192,8 +192,8 @@ static MildStatus hand_take(Press *press, const PressRow *step, double forward, 
     return rows_add(press->result, row, error);
 }
 
-/* Accepts a step at constant depth. The force of a step is the mean about its start, so the force at
- * its end is that of the step that would follow. */
+/* Accepts a step at constant depth. The force of a step is the mean about its start, so the force
+ * at its end is that of the step that would follow. */
 static MildStatus hand_accept(Press *press, const PressRow *step, double forward,
                               MildError *error) {
     double dt = press->input.dt;

@@ -1,5 +1,5 @@
-/* A press: a plate or a sole is moved through a ground along a prescribed path (down and up, in cycles,
- * forward), or dropped as a free body. The result is the force of the ground. */
+/* A press: a plate or a sole is moved through a ground along a prescribed path (down and up, in
+ * cycles, forward), or dropped as a free body. The result is the force of the ground. */
 #ifndef LAB_PRESS_H
 #define LAB_PRESS_H
 

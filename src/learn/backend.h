@@ -1,7 +1,7 @@
-/* A compute backend runs the learner's networks on another device than the processor. It computes the
- * same functions as policy_act, policy_value and ppo_gradient, from the same random numbers and equal
- * up to rounding. Optimiser, advantages, order of the samples and checkpoints stay with the learner,
- * so a resumed run may change its device. */
+/* A compute backend runs the learner's networks on another device than the processor. It computes
+ * the same functions as policy_act, policy_value and ppo_gradient, from the same random numbers and
+ * equal up to rounding. Optimiser, advantages, order of the samples and checkpoints stay with the
+ * learner, so a resumed run may change its device. */
 #ifndef MILD_BACKEND_H
 #define MILD_BACKEND_H
 

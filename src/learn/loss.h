@@ -41,8 +41,8 @@ typedef struct {
     double value;
 } LossSums;
 
-/* One chunk of `rows` samples. After them history holds `mirrored` more rows: the mirror images of the
- * first samples. */
+/* One chunk of `rows` samples. After them history holds `mirrored` more rows: the mirror images of
+ * the first samples. */
 typedef struct {
     int rows;
     int mirrored;
@@ -76,8 +76,8 @@ typedef struct {
     float *work[2];         /* [rows + mirrored][widest layer] each */
 } LossChunk;
 
-/* Places a chunk for at most `rows` samples and `mirrored` images in the block and returns its floats.
- * NULL: only counts them. */
+/* Places a chunk for at most `rows` samples and `mirrored` images in the block and returns its
+ * floats. NULL: only counts them. */
 size_t loss_carve(const Network *network, int rows, int mirrored, float *block, LossChunk *chunk);
 /* Copies row `from` of the chunk's history, mirrored, to row `to`. */
 void loss_mirror_row(const LossContext *context, LossChunk *chunk, int from, int to);

@@ -1,4 +1,5 @@
-/* What a policy is made of: the widths that the task sets, and section [policy] of a config file. */
+/* What a policy is made of: the widths that the task sets, and section [policy] of a config
+ * file. */
 #ifndef MILD_POLICY_DEF_H
 #define MILD_POLICY_DEF_H
 
@@ -20,7 +21,8 @@ typedef struct {
     int encoder_hidden[POLICY_LAYERS_MAX]; /* zero-terminated or full: 256 128 */
     int decoder_hidden[POLICY_LAYERS_MAX]; /* 64 128 */
     int modulation_hidden;                 /* 32 */
-    int modulation_per_dimension; /* bool: theta1 and theta2 for each latent dimension, not one for all */
+    int modulation_per_dimension; /* bool: theta1 and theta2 for each latent dimension, not one for
+                                     all */
     int actor_hidden[POLICY_LAYERS_MAX];  /* 512 256 128 */
     int critic_hidden[POLICY_LAYERS_MAX]; /* 768 256 128 */
     double init_std;                      /* initial standard deviation of the action noise */

@@ -6,7 +6,8 @@
 
 #include "learn/policy_private.h"
 
-/* Shape fields of the def. The task sets them, so they are no config keys, but a file must have them. */
+/* Shape fields of the def. The task sets them, so they are no config keys, but a file must have
+ * them. */
 static const MildField shape_fields[] = {
     MILD_FIELD(PolicyDef, observation, MILD_FIELD_INT, 1, 1, 16384, "[-] width of one frame"),
     MILD_FIELD(PolicyDef, frames, MILD_FIELD_INT, 1, 1, 16384, "[-] frames in the history"),

@@ -215,8 +215,8 @@ typedef struct {
     const float *std;
 } ActJob;
 
-/* Samples actions around the means for the piece's environments. A piece begins at an even environment,
- * so that its noise begins at an even number. */
+/* Samples actions around the means for the piece's environments. A piece begins at an even
+ * environment, so that its noise begins at an even number. */
 static void act_piece(void *context, int piece, int thread) {
     (void)thread;
     const ActJob *job = context;
@@ -278,8 +278,8 @@ static void shuffle(Ppo *ppo, int epoch) {
     }
 }
 
-/* 0 before the annealing, 1 after it. A function of the iteration alone, so a resumed run continues in
- * the same way. */
+/* 0 before the annealing, 1 after it. A function of the iteration alone, so a resumed run continues
+ * in the same way. */
 static double anneal_share(const Ppo *ppo) {
     const int first = ppo->def.anneal[0], last = ppo->def.anneal[1];
     return first < last ? fmin(fmax((double)(ppo->iteration - first) / (last - first), 0.0), 1.0)
@@ -301,8 +301,8 @@ static void adapt_learning_rate(Ppo *ppo, double kl) {
     ppo->learning_rate = fmin(fmax(ppo->learning_rate, def->learning_rate_min), most);
 }
 
-/* Applied between updates, so that the rollout samples from the distribution that the update compares
- * with. */
+/* Applied between updates, so that the rollout samples from the distribution that the update
+ * compares with. */
 static void bound_noise(Ppo *ppo) {
     const double *std_max = ppo->def.std_max;
     const float ceiling =
@@ -414,8 +414,8 @@ static void carry_over(Ppo *ppo) {
     }
 }
 
-/* Replaces each frame of the piece's environments by its successor. The last frame of an episode and a
- * frame before one that is not valid stay. */
+/* Replaces each frame of the piece's environments by its successor. The last frame of an episode
+ * and a frame before one that is not valid stay. */
 static void shift_piece(void *context, int piece, int thread) {
     (void)thread;
     const Ppo *ppo = context;

@@ -29,12 +29,13 @@ int64_t ppo_iteration(const Ppo *ppo);
 /* The running mean of the weights (Polyak and Juditsky 1992), or the policy itself with def.average
  * = 0. Owned by ppo. */
 Policy *ppo_average(Ppo *ppo);
-/* The error that stopped the compute backend, if any. The parameters are those of the last good step. */
+/* The error that stopped the compute backend, if any. The parameters are those of the last good
+ * step. */
 MildStatus ppo_status(const Ppo *ppo, MildError *error);
 
-/* Saves all that resuming needs: parameters, moments, rate, counters, and a block of the caller's (the
- * environments' state). One safetensors file with a CRC32, written completely or not at all. Loading
- * changes nothing unless the whole file is good. extra_size must match on load. */
+/* Saves all that resuming needs: parameters, moments, rate, counters, and a block of the caller's
+ * (the environments' state). One safetensors file with a CRC32, written completely or not at all.
+ * Loading changes nothing unless the whole file is good. extra_size must match on load. */
 MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size,
                     const char *note, MildError *error);
 MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error);

@@ -1,13 +1,14 @@
-/* What a learner is made of: section [ppo] of a config file, and the mirror symmetry of the problem.
+/* What a learner is made of: section [ppo] of a config file, and the mirror symmetry of the
+ * problem.
  */
 #ifndef MILD_PPO_DEF_H
 #define MILD_PPO_DEF_H
 
 #include "mild/field.h"
 
-/* Frame that the decoder reconstructs from z and the estimates: the newest frame of the history, or the
- * next frame. The next frame makes z predict how the ground answers, while the actor sees the newest
- * one anyway. The last frame of an episode has no successor and is its own target. */
+/* Frame that the decoder reconstructs from z and the estimates: the newest frame of the history, or
+ * the next frame. The next frame makes z predict how the ground answers, while the actor sees the
+ * newest one anyway. The last frame of an episode has no successor and is its own target. */
 typedef enum { PPO_TARGET_NEWEST, PPO_TARGET_NEXT, PPO_TARGETS } PpoTarget;
 
 typedef struct {

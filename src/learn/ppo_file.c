@@ -22,7 +22,8 @@ static Safetensor tensor_of(const char *name, SafetensorsType type, const void *
                         .bytes = sizes[type] * (size_t)count};
 }
 
-/* What resuming needs besides the policy. The next rollout starts from the batch's rows of time 0. */
+/* What resuming needs besides the policy. The next rollout starts from the batch's rows of time
+ * 0. */
 static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const void *extra,
                          size_t extra_size, Safetensor tensors[TRAIN_TENSORS]) {
     const Network *n = &ppo->policy->network;
@@ -91,8 +92,8 @@ static MildStatus check_same_network(const Safetensors *file, const char *path,
     return MILD_OK;
 }
 
-/* Tensors whose bad numbers would spoil all weights at the first update. A bad observation costs only
- * its minibatch. */
+/* Tensors whose bad numbers would spoil all weights at the first update. A bad observation costs
+ * only its minibatch. */
 static int is_weights(const char *name) {
     return strcmp(name, "train.average") == 0 || strcmp(name, "train.first_moment") == 0 ||
            strcmp(name, "train.second_moment") == 0;

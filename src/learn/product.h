@@ -1,5 +1,6 @@
-/* Matrix products, row major, by oneDNN. Every product runs on the calling thread alone. The learner
- * splits its work into fixed pieces itself, so no result depends on the number of threads. */
+/* Matrix products, row major, by oneDNN. Every product runs on the calling thread alone. The
+ * learner splits its work into fixed pieces itself, so no result depends on the number of
+ * threads. */
 #ifndef MILD_PRODUCT_H
 #define MILD_PRODUCT_H
 

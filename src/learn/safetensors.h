@@ -1,7 +1,7 @@
 /* Safetensors files: 8 bytes of header length (little endian), a JSON header {name: {dtype, shape,
  * data_offsets}} with texts under __metadata__, then the data. The text "crc32"
- * of our files is a CRC-32 of the whole file, computed with its own eight digits as zeros. It detects
- * a flipped bit anywhere. */
+ * of our files is a CRC-32 of the whole file, computed with its own eight digits as zeros. It
+ * detects a flipped bit anywhere. */
 #ifndef MILD_SAFETENSORS_H
 #define MILD_SAFETENSORS_H
 
@@ -27,15 +27,16 @@ typedef struct {
     const char *key, *value;
 } SafetensorsText;
 
-/* Writes the file completely or not at all (file_write). After a failure the old file is unchanged. */
+/* Writes the file completely or not at all (file_write). After a failure the old file is
+ * unchanged. */
 MildStatus safetensors_write(const char *path, const Safetensor *tensors, int tensor_count,
                              const SafetensorsText *texts, int text_count, MildError *error);
 
 typedef struct Safetensors Safetensors;
 /* Read and check everything: sizes, offsets (the tensors tile the data), types, checksum. */
 Safetensors *safetensors_read(const char *path, MildError *error);
-/* The same from memory. Takes ownership of `bytes` (from malloc), also on failure. `path` names it in
- * messages. */
+/* The same from memory. Takes ownership of `bytes` (from malloc), also on failure. `path` names it
+ * in messages. */
 Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *path,
                                MildError *error);
 void safetensors_destroy(Safetensors *file);

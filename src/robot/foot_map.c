@@ -1,8 +1,8 @@
-/* The feet seen from the robot's degrees of freedom. A foot moves with the base's six and the hinges
- * between base and foot only, and the engine's factor M = L^T D L has the same sparsity (a row holds
- * a degree of freedom and its ancestors). So A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T J^T) needs one
- * backward substitution per foot on six right-hand sides at once, which is one vector register per
- * row. */
+/* The feet seen from the robot's degrees of freedom. A foot moves with the base's six and the
+ * hinges between base and foot only, and the engine's factor M = L^T D L has the same sparsity (a
+ * row holds a degree of freedom and its ancestors). So A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T
+ * J^T) needs one backward substitution per foot on six right-hand sides at once, which is one
+ * vector register per row. */
 #include <string.h>
 
 #include "robot/sim.h"

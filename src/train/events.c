@@ -5,8 +5,8 @@
 /* Bytes of one event's head (wall time, step, length prefix) and of one scalar, at most. */
 enum { HEAD_BYTES = 40, SCALAR_BYTES = EVENTS_TAG_MAX + 20, PAYLOAD_MAX = 128 * SCALAR_BYTES };
 
-/* CRC-32C (Castagnoli), reflected polynomial 0x82f63b78. Bit by bit is fast enough, because a row of
- * the log has a few kilobytes. */
+/* CRC-32C (Castagnoli), reflected polynomial 0x82f63b78. Bit by bit is fast enough, because a row
+ * of the log has a few kilobytes. */
 uint32_t events_crc32c(const void *data, size_t size) {
     const unsigned char *bytes = data;
     uint32_t crc = 0xffffffffu;

@@ -1,5 +1,5 @@
-/* The log of a run folder: a row of named numbers for each iteration, in log.csv and in a TensorBoard
- * event file. */
+/* The log of a run folder: a row of named numbers for each iteration, in log.csv and in a
+ * TensorBoard event file. */
 #ifndef TRAIN_LOG_H
 #define TRAIN_LOG_H
 
@@ -9,11 +9,11 @@
 
 typedef struct Log Log;
 
-/* columns: [count] names such as "reward/gait"; TensorBoard groups them by the part before the slash.
- * They are not copied and must outlive the log. The first column of the CSV is "iteration".
- * resume_after < 0: a new log. Otherwise the log is continued with the same columns. Rows after that
- * iteration come from a run that was killed after its last checkpoint. They are dropped from log.csv,
- * and TensorBoard is told to drop its own. */
+/* columns: [count] names such as "reward/gait"; TensorBoard groups them by the part before the
+ * slash. They are not copied and must outlive the log. The first column of the CSV is "iteration".
+ * resume_after < 0: a new log. Otherwise the log is continued with the same columns. Rows after
+ * that iteration come from a run that was killed after its last checkpoint. They are dropped from
+ * log.csv, and TensorBoard is told to drop its own. */
 Log *log_open(const char *folder, const char *const *columns, int count, int64_t resume_after,
               MildError *error);
 

@@ -160,8 +160,8 @@ static MildStatus write_config(const TrainRun *run, MildError *error) {
     return status == MILD_OK ? write_text(run, "version.txt", version, error) : status;
 }
 
-/* A checkpoint that is damaged (killed machine, broken disk) is passed over for the one before it. One
- * of another config is an error, because the earlier ones have that config too. */
+/* A checkpoint that is damaged (killed machine, broken disk) is passed over for the one before it.
+ * One of another config is an error, because the earlier ones have that config too. */
 static MildStatus resume(TrainRun *run, MildError *error) {
     const char *folder = run->def.folder;
     int64_t oldest, number = newest_checkpoint(folder, INT64_MAX, &oldest, &(int){0});

@@ -29,8 +29,8 @@ typedef struct TrainRun TrainRun;
 /* A new run needs a folder without checkpoints, a resumed one a folder with some. */
 MildStatus train_run_check_folder(const char *folder, int resume, MildError *error);
 
-/* Makes the folder or continues in it. Borrows what `def` and `watch` point to. NULL, with the reason
- * in *error. */
+/* Makes the folder or continues in it. Borrows what `def` and `watch` point to. NULL, with the
+ * reason in *error. */
 TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error);
 void train_run_close(TrainRun *run); /* may be NULL */
 int64_t train_run_iteration(const TrainRun *run);

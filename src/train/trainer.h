@@ -33,8 +33,8 @@ Policy *train_policy(Trainer *trainer); /* what gets saved: the averaged weights
 size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */
 int train_threads(const Trainer *trainer);
 
-/* Saves all that resuming needs in one file with a checksum. A resumed run equals one that was never
- * stopped, bit for bit. */
+/* Saves all that resuming needs in one file with a checksum. A resumed run equals one that was
+ * never stopped, bit for bit. */
 MildStatus train_save(Trainer *trainer, const char *path, const char *note, MildError *error);
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error);
 
