@@ -10,17 +10,21 @@ LAYER ?= task
 N ?= 200
 SEED ?= 1
 MUTANTS ?=
+FAULTS ?=
+STAGES ?=
 
-.PHONY: setup build test run bench install docs fuzz mutants clean help
+.PHONY: setup build test run bench install docs check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
 	@echo "make test    set up, build, run every test"
+	@echo "make check   format, clang-tidy, sanitizers, gcc and clang with -Werror, aarch64 (STAGES=format: that one)"
 	@echo "make build   set up, build build/mild"
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
+	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -34,6 +38,11 @@ build: setup
 
 test: build
 	@ctest --test-dir build --output-on-failure --parallel $(JOBS) --timeout 280
+
+# Own builds, under build/check. Installs the tools it needs, which `make test` does without.
+check:
+	@scripts/setup.sh check
+	@JOBS=$(JOBS) scripts/check.sh $(STAGES)
 
 run: build
 	@MINUTES=$(MINUTES) scripts/run.sh
@@ -54,7 +63,7 @@ fuzz: setup
 
 # Makes its own builds; MUTANTS: further options (scripts/mutants.py --help).
 mutants: setup
-	@scripts/mutants.py --layer $(LAYER) -n $(N) --seed $(SEED) --jobs $(JOBS) $(MUTANTS)
+	@scripts/mutants.py --layer $(LAYER) -n $(N) --seed $(SEED) --jobs $(JOBS) $(if $(FAULTS),--faults) $(MUTANTS)
 
 docs:
 	@mkdir -p build

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Installs what building, running and testing need, and nothing that is already there. Safe to repeat.
+# Usage: scripts/setup.sh [check]; with `check` also what `make check` needs.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -11,6 +12,12 @@ packages=(
     ffmpeg
     python3-venv
 )
+if [ "${1:-}" = check ]; then
+    packages+=(
+        clang-14 clang-format-14 clang-tidy-14 libclang-rt-14-dev llvm-14
+        gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user
+    )
+fi
 
 if ! command -v dpkg-query >/dev/null; then
     echo "setup: this script installs Debian packages, and dpkg-query is not here." >&2

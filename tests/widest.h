@@ -1,5 +1,5 @@
-/* The widest robot that fits, made for tests: a trunk on four legs of ten hinges with round feet, that
- * stand a quarter of the gait cycle apart. */
+/* The widest robot that fits, made for tests: a trunk on four legs of ten hinges with round feet,
+ * that stand a quarter of the gait cycle apart. */
 #ifndef TESTS_WIDEST_H
 #define TESTS_WIDEST_H
 
@@ -31,11 +31,11 @@ static inline void widest_write_leg(FILE *file, int leg) {
 
 static inline void widest_write_mjcf(const char *path) {
     FILE *file = fopen(path, "wb");
-    fputs(
-        "<mujoco><compiler angle='radian' autolimits='true'/><default><joint range='-1 1' actuatorfrcrange='-40 40' armature='0.02'/>"
-        "</default><worldbody><body name='torso' pos='0 0 1'><freejoint/>"
-        "<geom name='trunk' type='box' size='0.5 0.2 0.1' mass='12'/>\n",
-        file);
+    fputs("<mujoco><compiler angle='radian' autolimits='true'/><default>"
+          "<joint range='-1 1' actuatorfrcrange='-40 40' armature='0.02'/>"
+          "</default><worldbody><body name='torso' pos='0 0 1'><freejoint/>"
+          "<geom name='trunk' type='box' size='0.5 0.2 0.1' mass='12'/>\n",
+          file);
     for (int leg = 0; leg < WIDEST_LEGS; leg++) {
         widest_write_leg(file, leg);
     }

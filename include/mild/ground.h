@@ -289,8 +289,8 @@ typedef struct {
     MildSolver solver; /* which of the two */
     double tolerance;  /* [-] of the residual; 0: 1e-9 (sweeps 1e-10) */
     /* Bound of Newton steps or sweeps; 0: 400 steps or 1000 sweeps. A step that Newton's method
-     * leaves unsolved takes up to 40 more. One in which friction would create energy is solved up to
-     * twice again. */
+     * leaves unsolved takes up to 40 more. One in which friction would create energy is solved up
+     * to twice again. */
     int max_iterations;
 } MildContactInput;
 

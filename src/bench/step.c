@@ -145,6 +145,7 @@ static MildStatus measure(Bench *bench, int first, int last, int repeats, int st
         for (int c = first; c <= last; c++) {
             double seconds = time_case(bench, c, r < 0 && c != GAUSS_SEIDEL ? WARM_STEPS : steps);
             if (seconds < 0.0) {
+                // NOLINTNEXTLINE(clang-analyzer-core.CallAndMessage): last < CASES
                 return mild_fail(error, MILD_ERROR_RANGE, "bench: the case '%s' diverged",
                                  names[c]);
             }

@@ -8,12 +8,12 @@
 
 /* Soft ground is a spring under the feet. Its stiffness against pitching is the sum over elements
  * of K x^2 [N m/rad], for both feet of SA01 level at rest: rubber 1250, foam60 660, sand_dense 390,
- * grass 320, foam45 230, sand_loose 110, foam28 90, foam25 80. Gravity topples with m g h = 205; the
- * joints are in series with the ground and with each other, and the potential of the whole (sole
- * tilt, ankle, knee, hip) has a minimum only above 460. Besides, the default pose has its centre of
- * mass 40 mm behind the middle of the soles, so the heels sink first: released there with joints
- * held still the robot falls backwards on every soft ground in 1 to 2 s, on rubber and foam60 by
- * overshoot. The balanced stand therefore
+ * grass 320, foam45 230, sand_loose 110, foam28 90, foam25 80. Gravity topples with m g h = 205;
+ * the joints are in series with the ground and with each other, and the potential of the whole
+ * (sole tilt, ankle, knee, hip) has a minimum only above 460. Besides, the default pose has its
+ * centre of mass 40 mm behind the middle of the soles, so the heels sink first: released there with
+ * joints held still the robot falls backwards on every soft ground in 1 to 2 s, on rubber and
+ * foam60 by overshoot. The balanced stand therefore
  * - puts the centre of mass over the middle of the soles, so that the feet sink level,
  * - feeds the weight forward, so that the joints need no error to carry it,
  * - servoes the legs in the world instead of on the tilting soles: an ankle's error is the shank's
@@ -70,6 +70,7 @@ static void feet_plane(const Robot *robot, const RobotSim *sim, const double ahe
 static double slope_along(const double *along, const double *z, int feet, double speed) {
     double rise = 0.0, spread = 0.0;
     for (int f = 0; f < feet; f++) {
+        // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): feet_plane filled them
         rise += along[f] * z[f];
         spread += along[f] * along[f];
     }

@@ -13,9 +13,9 @@ Stand *stand_create(const Robot *robot, MildError *error);
 void stand_destroy(Stand *stand); /* may be NULL */
 
 /* tau = Kp (q0 - q) - Kd qd with stand_kp and stand_kd of robot.ini, within the efforts. balance 0:
- * q0 is the default pose. balance 1: what soft ground needs (see stand.c): q0 leans until the centre
- * of mass is over the middle of the soles, the weight is fed forward, and q0 answers the base's
- * tilt. torque: [robot_joints]. */
+ * q0 is the default pose. balance 1: what soft ground needs (see stand.c): q0 leans until the
+ * centre of mass is over the middle of the soles, the weight is fed forward, and q0 answers the
+ * base's tilt. torque: [robot_joints]. */
 void stand_torque(const Stand *stand, const RobotSim *sim, int balance, double *torque);
 
 /* The same without the answer to the tilt, from the joints' positions and velocities alone. */

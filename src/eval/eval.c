@@ -76,7 +76,7 @@ static MildStatus make_trials(Trials *t, int trials, int threads, MildError *err
     t->env = calloc((size_t)trials, sizeof *t->env);
     t->sim = calloc((size_t)threads, sizeof *t->sim);
     t->measure = calloc((size_t)trials, sizeof *t->measure);
-    t->action = calloc((size_t)(trials * robot_joints(t->robot)), sizeof *t->action);
+    t->action = calloc((size_t)trials * (size_t)robot_joints(t->robot), sizeof *t->action);
     t->over = calloc((size_t)trials, 1);
     int good = t->env && t->sim && t->measure && t->action && t->over;
     for (int i = 0; good && i < trials; i++) {

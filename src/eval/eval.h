@@ -42,8 +42,8 @@ typedef struct {
 MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller,
                     const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error);
 
-/* The row of the trials' measures, which it finishes. measures, fallen (bool): [eval->trials]; weight
- * [N] of the robot. */
+/* The row of the trials' measures, which it finishes. measures, fallen (bool): [eval->trials];
+ * weight [N] of the robot. */
 void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
                     const uint8_t *fallen, double weight);
 

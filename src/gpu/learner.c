@@ -61,7 +61,7 @@ static size_t layout(GpuLearner *g, char *block) {
     const PpoBatch *host = &g->ppo->batch;
     const size_t samples = (size_t)host->steps * (size_t)host->envs,
                  more = samples + (size_t)host->envs;
-    const size_t mirror = (size_t)(n->def.observation + n->def.actions),
+    const size_t mirror = (size_t)n->def.observation + (size_t)n->def.actions,
                  minibatch = (size_t)g->minibatch;
     const struct {
         float **at;
@@ -461,7 +461,7 @@ int gpu_device(char *text, size_t size) {
     if (code == cudaSuccess && count > 0) {
         code = cudaGetDeviceProperties(&properties, 0);
     }
-    if (code != cudaSuccess || count == 0) {
+    if (code != cudaSuccess || count <= 0) {
         snprintf(text, size, "no CUDA device: %s",
                  code ? cudaGetErrorString(code) : "none is installed");
         return 0;
@@ -527,7 +527,7 @@ static MildStatus open_learner(GpuLearner *g, MildError *error) {
     pin(g, 1, ppo->policy->parameters, (size_t)n->count * sizeof(float));
     pin(g, 2, ppo->gradient, (size_t)n->count * sizeof(float));
     if (ppo->mirror.observation_index) {
-        const size_t count = (size_t)(n->def.observation + n->def.actions);
+        const size_t count = (size_t)n->def.observation + (size_t)n->def.actions;
         upload(g, g->mirror_index, ppo->mirror_index, count * sizeof(int));
         upload(g, g->mirror_sign, ppo->mirror_sign, count * sizeof(float));
     }

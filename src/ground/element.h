@@ -3,7 +3,7 @@
  * A step of an element is three pure functions, in this order:
  *
  *     element_begin      begin.h      what does not depend on the new velocity
- *     element_impulse    impulse.h    normal impulse at a trial velocity      as often as the solver asks
+ *     element_impulse    impulse.h    normal impulse at a trial velocity, as often as asked
  *     friction_impulse   friction.h   tangential impulse there
  *     element_remember   remember.h   memory at the end of the step
  *

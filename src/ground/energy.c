@@ -1,21 +1,21 @@
-/* An engine's kinetic energy changes by the impulse times the mean of the speeds before and after the
- * step. The normal impulse keeps its account at that mean speed. Friction opposes the speed after the
- * step, because only so can it stop a foot. As long as the motion keeps its direction, friction takes
- * energy at the mean speed, too. But the normal impulse of a foot on a long lever can turn a sliding
- * element round within the step. Friction then opposes the new motion with the strength of a whole
- * step, and does work on the old one.
+/* An engine's kinetic energy changes by the impulse times the mean of the speeds before and after
+ * the step. The normal impulse keeps its account at that mean speed. Friction opposes the speed
+ * after the step, because only so can it stop a foot. As long as the motion keeps its direction,
+ * friction takes energy at the mean speed, too. But the normal impulse of a foot on a long lever
+ * can turn a sliding element round within the step. Friction then opposes the new motion with the
+ * strength of a whole step, and does work on the old one.
  *
- * A step where that matters is solved again. Friction of the elements concerned then begins only where
- * the element is as fast backward as it was forward: with u and v the horizontal velocities before and
- * after, it opposes
+ * A step where that matters is solved again. Friction of the elements concerned then begins only
+ * where the element is as fast backward as it was forward: with u and v the horizontal velocities
+ * before and after, it opposes
  *
  *     d = v - p,   p the point nearest to v on the way from 0 to -u
  *
- * in the place of v. The nearest point of a convex set has all of the set behind it, d . (q - p) <= 0
- * for each q on the way. With q = 0 this is d . v >= |d|^2, with q = -u it is d . (u + v) >= |d|^2. So
- * an impulse along -d takes energy at the new speed and at the mean speed. It is minus the gradient of
- * a convex function of v, like friction without the turn, and the solvers need nothing new. What such
- * an element held is let go. */
+ * in the place of v. The nearest point of a convex set has all of the set behind it, d . (q - p) <=
+ * 0 for each q on the way. With q = 0 this is d . v >= |d|^2, with q = -u it is d . (u + v) >=
+ * |d|^2. So an impulse along -d takes energy at the new speed and at the mean speed. It is minus
+ * the gradient of a convex function of v, like friction without the turn, and the solvers need
+ * nothing new. What such an element held is let go. */
 #include "ground/energy.h"
 
 #include <stdio.h>

@@ -8,8 +8,8 @@
 
 /* At the start of a step: no element's friction is turned. */
 void energy_begin(MildScratch *scratch);
-/* Bool: friction gave energy in the step just solved, which must be solved again. The elements whose
- * friction gave some are marked for it (Element.turn); with `all`, every element. */
+/* Bool: friction gave energy in the step just solved, which must be solved again. The elements
+ * whose friction gave some are marked for it (Element.turn); with `all`, every element. */
 int energy_created(MildScratch *scratch, const MildContactInput *input,
                    const MildContactResult *result, int all);
 

@@ -5,17 +5,17 @@
  *     r = mu I_z + dt k_D d_D u
  *
  * Below the bound friction is elastic over FRICTION_ELASTIC, with damping (Mindlin's contact as
- * Cundall and Strack 1979 compute it). With v the element's velocity after the step, f the force held
- * before it and k its stiffness:
+ * Cundall and Strack 1979 compute it). With v the element's velocity after the step, f the force
+ * held before it and k its stiffness:
  *
  *     c = r ELEMENT_LAG/FRICTION_ELASTIC
  *     t = dt f - (dt^2 k + c) v
  *     I = t min(1, r/|t|) - dt b_D v
  *
- * A resting foot is held without creep. Friction only takes energy. It stores f^2/(2 k), which falls
- * where k grows at the same f; where k falls, f falls with it. With k and f of the start of the step,
- * the projection onto the disc gives |f_new|^2 - |f|^2 <= 2 k I . v. For a given r, I is minus the
- * gradient of a convex function of v with slopes of at most dt^2 k + c. */
+ * A resting foot is held without creep. Friction only takes energy. It stores f^2/(2 k), which
+ * falls where k grows at the same f; where k falls, f falls with it. With k and f of the start of
+ * the step, the projection onto the disc gives |f_new|^2 - |f|^2 <= 2 k I . v. For a given r, I is
+ * minus the gradient of a convex function of v with slopes of at most dt^2 k + c. */
 #ifndef MILD_GROUND_FRICTION_H
 #define MILD_GROUND_FRICTION_H
 
@@ -96,8 +96,8 @@ MILD_HD void friction_turn(const Element *e, Real *vx, Real *vy) {
     *vy -= share * e->turn_y;
 }
 
-/* friction_impulse with that. Where the nearest point is within the way, what the velocity changes by
- * along the way changes nothing. */
+/* friction_impulse with that. Where the nearest point is within the way, what the velocity changes
+ * by along the way changes nothing. */
 MILD_HD Friction friction_turned(const Element *e, Real r, Real mu, Real vx, Real vy) {
     const Real square = e->turn_x * e->turn_x + e->turn_y * e->turn_y;
     const Real along = vx * e->turn_x + vy * e->turn_y;

@@ -42,6 +42,15 @@ MildMapDef mild_map_def_default(void) {
                         .patch_count = 2};
 }
 
+/* Not fmin and fmax: gcc 12 for aarch64 fails on their reductions over floats (internal error). */
+static double smaller(double a, double b) {
+    return a < b ? a : b;
+}
+
+static double larger(double a, double b) {
+    return a > b ? a : b;
+}
+
 /* Sets the steepest gradient and the lowest and highest height. A bilinear cell is steepest along
  * its edges. */
 static void map_measure(MildMap *map) {
@@ -53,13 +62,13 @@ static void map_measure(MildMap *map) {
     for (int j = 0; j <= grid->rows; j++) {
         for (int i = 0; i <= grid->columns; i++) {
             const float *at = map->height + (size_t)j * stride + (size_t)i;
-            map->low = fmin(map->low, (double)*at);
-            map->high = fmax(map->high, (double)*at);
+            map->low = smaller(map->low, (double)*at);
+            map->high = larger(map->high, (double)*at);
             if (i < grid->columns) {
-                along_x = fmax(along_x, fabs((double)at[1] - (double)*at) * grid->inverse_x);
+                along_x = larger(along_x, fabs((double)at[1] - (double)*at) * grid->inverse_x);
             }
             if (j < grid->rows) {
-                along_y = fmax(along_y, fabs((double)at[stride] - (double)*at) * grid->inverse_y);
+                along_y = larger(along_y, fabs((double)at[stride] - (double)*at) * grid->inverse_y);
             }
         }
     }

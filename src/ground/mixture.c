@@ -23,6 +23,7 @@ void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
     for (int m = 0; m < terrain->material_count; m++) {
         DerivedLaw *derived = &foot->derived[m];
         const MildMaterial *wanted = &terrain->materials[m];
+        // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): a difference costs time only
         if (!derived->known || memcmp(&derived->material, wanted, sizeof *wanted) != 0) {
             const Law law = law_of(wanted, foot->pitch);
             *derived = (DerivedLaw){.material = *wanted,

@@ -21,8 +21,8 @@
 #define BOUNDS_MOST 1e4
 #define BOUNDS_SLOW 0.5    /* [-] a move not this much shorter than the last one is slow */
 #define BOUNDS_PATIENCE 10 /* rounds before the bounds start again from somewhere else */
-/* A row of up to 4 x 6 numbers and a right side, in whole vectors. Written with the compiler's vector type: what it
- * makes of plain loops over so short rows takes three times as long. */
+/* A row of up to 4 x 6 numbers and a right side, in whole vectors. Written with the compiler's
+ * vector type: what it makes of plain loops over so short rows takes three times as long. */
 enum { NEWTON_VECTOR = 8, NEWTON_VECTORS = 4, NEWTON_LANES = NEWTON_VECTOR * NEWTON_VECTORS };
 typedef double Vector __attribute__((vector_size(NEWTON_VECTOR * sizeof(double))));
 typedef union {
@@ -450,8 +450,8 @@ static void point_return(const System *system, MildScratch *scratch, Point *poin
 /* A step that the search has left unsolved. Its best point may be far from a solution however small
  * its residual, and its impulses zero in the middle of the ground. The other candidate is a minimum
  * at held bounds, those that the normal impulses without any friction ask for: every element's
- * normal impulse is then that of the new velocity, only friction's bound is not. Returned is the one
- * that is closer to the law. Returns the steps done. */
+ * normal impulse is then that of the new velocity, only friction's bound is not. Returned is the
+ * one that is closer to the law. Returns the steps done. */
 static int newton_unsolved(const System *system, MildScratch *scratch, const Point *best,
                            MildContactResult *result, int n, int parts) {
     Point safe = {.residual = INFINITY}, found = *best;

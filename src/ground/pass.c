@@ -1,6 +1,6 @@
-/* The passes over a foot's slots are branch-free, so that they run in vectors. They are two, because
- * one alone would be a chain of operations too long for the processor to work on several vectors at
- * once. */
+/* The passes over a foot's slots are branch-free, so that they run in vectors. They are two,
+ * because one alone would be a chain of operations too long for the processor to work on several
+ * vectors at once. */
 #include "ground/pass.h"
 
 #include <string.h>
@@ -55,8 +55,8 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
 }
 
 /* Friction, and all that is summed. Where the ground is not level the normal impulse is I_z g with
- * g = (-slope, 1), the gradient of -u: it does work exactly where u changes. Its vertical part is the
- * paper's. With
+ * g = (-slope, 1), the gradient of -u: it does work exactly where u changes. Its vertical part is
+ * the paper's. With
  *
  *     f = -d friction/dv,   k = -dI_z/dw,   c = g + d friction/dI_z
  *

@@ -163,8 +163,8 @@ ALWAYS_INLINE void slot_store(const Slots *s, int i, const Element *e) {
     s->hold_stiffness[i] = e->hold_stiffness;
 }
 
-/* Velocity of a slot's element, x and y along the world's axes. `descent` is the speed w at which its
- * depth u = h0(x, y) - z grows: w = slope . v_xy - v_z. */
+/* Velocity of a slot's element, x and y along the world's axes. `descent` is the speed w at which
+ * its depth u = h0(x, y) - z grows: w = slope . v_xy - v_z. */
 typedef struct {
     double x, y;    /* [m/s] */
     double descent; /* [m/s] */

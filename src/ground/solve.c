@@ -79,9 +79,9 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
 }
 
 /* Paper eq 15: r = [F]x^+ tau, which for the true torque tau = p x F is F x tau/|F|^2, the point of
- * the wrench's central axis nearest the ankle. F is divided by its largest component first: the square
- * of a small force may be 0, of a large one infinite. Where the axis lies beyond all numbers, because
- * hardly any force is left beside a torque, the point is 0 as without a force. */
+ * the wrench's central axis nearest the ankle. F is divided by its largest component first: the
+ * square of a small force may be 0, of a large one infinite. Where the axis lies beyond all
+ * numbers, because hardly any force is left beside a torque, the point is 0 as without a force. */
 static void foot_axis(const double *F, const double *tau, double *point) {
     const double most = fmax(fmax(fabs(F[0]), fabs(F[1])), fabs(F[2]));
     if (!(most > 0.0)) {

@@ -445,10 +445,9 @@ static void hold(Fit *fit, const FitDef *def, FitName name, FitParameter *parame
  * the law (sigma_cone, alpha, nu, and c_d with drag). */
 static double fit_reduce(Fit *fit, const FitDef *def, FitResult *result) {
     static const FitState order[] = {FIT_NO_EFFECT, FIT_TIED, FIT_WIDE};
-    double sum = fit_miss(fit);
     for (int free = free_count(fit); free > 0; free = free_count(fit)) {
         int given_up = 0;
-        sum = fit_solve(fit);
+        double sum = fit_solve(fit);
         for (int p = 0; p < P; p++) {
             if (fit->def.free[p]) {
                 own_part(fit, p);

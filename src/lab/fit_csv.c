@@ -174,6 +174,7 @@ static MildStatus csv_row(Csv *csv, char *line, FitPoint *point, MildError *erro
                          "%.200s:%d: more than %d columns; keep those needed", csv->path,
                          csv->number, CSV_COLUMNS_MAX);
     }
+    // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): csv_split wrote `count` cells
     while (count > csv->columns && !*cells[count - 1]) {
         count--; /* commas at the end */
     }
@@ -234,6 +235,7 @@ static MildStatus csv_loading(const Csv *csv, FitPoint *points, int rows, int *k
                          "positive down from the surface",
                          csv->path, csv->number, loading, rows, FIT_POINTS_MIN);
     }
+    // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): fewer are refused above
     if (points[0].depth == points[loading - 1].depth) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "%.200s:%d: depth_m is %g in every row; a press to some depth is needed",

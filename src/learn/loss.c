@@ -11,7 +11,7 @@ size_t loss_carve(const Network *network, int rows, int mirrored, float *block, 
     const PolicyDef *def = &network->def;
     const Mlp *const mlps[] = {&network->encoder, &network->decoder, &network->modulation,
                                &network->actor, &network->critic};
-    size_t used = 0, n = (size_t)rows, all = (size_t)(rows + mirrored), widest = 0;
+    size_t used = 0, n = (size_t)rows, all = n + (size_t)mirrored, widest = 0;
     for (int i = 0; i < NETWORK_MLPS; i++) {
         size_t width = (size_t)mlp_widest(mlps[i]);
         widest = width > widest ? width : widest;

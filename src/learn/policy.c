@@ -91,6 +91,7 @@ static void act_chunk(const PolicyJob *job, int first, int rows, const NetworkOu
     const PolicyDef *def = &network->def;
     const float *mean = network_forward(network, job->policy->parameters, rows,
                                         job->input + (int64_t)first * network->history, outputs);
+    // NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): one without values wants actions
     memcpy(job->actions + (int64_t)first * def->actions, mean,
            (size_t)rows * (size_t)def->actions * sizeof *mean);
     const float *input = outputs->actor_input + def->observation;

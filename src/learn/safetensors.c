@@ -146,7 +146,7 @@ static unsigned char *assemble(const char *header, const Safetensor *tensors, in
     for (int i = 0; i < PREFIX; i++) {
         bytes[i] = (unsigned char)(padded >> (8 * i));
     }
-    memcpy(bytes + PREFIX, header, length);
+    memcpy(bytes + PREFIX, header, length); // NOLINT(bugprone-not-null-terminated-result)
     memset(bytes + PREFIX + length, ' ', padded - length);
     for (int i = 0; i < tensor_count; i++) {
         memcpy(bytes + at, tensors[i].data, tensor_bytes(&tensors[i]));

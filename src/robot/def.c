@@ -187,7 +187,8 @@ static int check_header(Reader *reader, const char *line, size_t length) {
     return find_section(reader, name, &section);
 }
 
-/* Like fgets over the text. Comments start at ';' or '#', at the start of a line or after a blank. */
+/* Like fgets over the text. Comments start at ';' or '#', at the start of a line or after a
+ * blank. */
 static char *next_line(char *buffer, int size, void *stream) {
     Reader *reader = stream;
     if (reader->status != MILD_OK || !*reader->rest) {

@@ -70,8 +70,7 @@ typedef struct {
     double still[ROBOT_JOINTS_MAX];       /* [-] 1: should stay near the pose, 0: may move */
     /* sections [foot.NAME] */
     int feet;
-    double
-        mirror_shift; /* [-] 0 or 0.5: share of the gait cycle between a gait and its mirror image */
+    double mirror_shift; /* [-] 0 or 0.5: share of the gait cycle from a gait to its mirror image */
     RobotFootDef foot[ROBOT_FEET_MAX];
 } RobotDef;
 

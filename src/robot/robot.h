@@ -1,6 +1,6 @@
 /* A legged robot in MuJoCo whose feet stand on our ground. Robot: constant description, read from a
- * folder (docs/robots.md). RobotSim: one thread's workspace. RobotState: what persists of one robot,
- * a pointer-free block. Joints and feet are counted in the order of robot.ini. */
+ * folder (docs/robots.md). RobotSim: one thread's workspace. RobotState: what persists of one
+ * robot, a pointer-free block. Joints and feet are counted in the order of robot.ini. */
 #ifndef MILD_ROBOT_H
 #define MILD_ROBOT_H
 
@@ -148,8 +148,8 @@ double robot_sim_sole_clearance(RobotSim *sim, const MildTerrain *terrain);
 /* Kinematic contact test against the undisturbed ground: lowest point of the shells [m]; < 0
  * touches. */
 double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain);
-/* [m] Least distance between mirrored knees and between mirrored sole centres, lateral in the base's
- * heading frame, negative when the legs are crossed; 1e9 without such a pair. */
+/* [m] Least distance between mirrored knees and between mirrored sole centres, lateral in the
+ * base's heading frame, negative when the legs are crossed; 1e9 without such a pair. */
 double robot_sim_knee_distance(const RobotSim *sim);
 double robot_sim_foot_distance(const RobotSim *sim);
 const MildScratch *robot_sim_scratch(const RobotSim *sim);

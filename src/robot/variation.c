@@ -23,6 +23,7 @@ static void sum_subtrees(mjModel *m) {
 /* The engine's reference constants of the nominal robot (body_invweight0, dof_M0, stat) stay: they
  * only set how soft joint limits and rigid contacts are regularised. */
 void variation_apply(RobotSim *sim, const RobotVariation *variation) {
+    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): a difference costs time only
     if (memcmp(variation, &sim->variation, sizeof *variation) == 0) {
         return;
     }

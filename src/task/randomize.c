@@ -33,8 +33,8 @@ static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
 }
 
 /* The quasistatic force is linear in (k_pen, sigma_cone): one factor makes a too soft draw carry
- * the robot on half of its feet at sinkage_max. Without it a fifth of the paper's draws swallows the foot
- * (docs/task.md section 11). */
+ * the robot on half of its feet at sinkage_max. Without it a fifth of the paper's draws swallows
+ * the foot (docs/task.md section 11). */
 static void limit_sinkage(MildMaterial *m, const Robot *robot, double sinkage) {
     const MildSole *sole = robot_rasters(robot)[0];
     MildMaterial bottomless = *m;

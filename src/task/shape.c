@@ -14,8 +14,8 @@ TaskShape task_shape(const Robot *robot) {
 }
 
 /* Mirror in the x-z plane: y components, roll, yaw and their rates change sign, the joints change
- * places. Where left and right legs alternate the clock turns by half a period, (sin, cos) -> (-sin,
- * -cos); where they move together it stays. */
+ * places. Where left and right legs alternate the clock turns by half a period, (sin, cos) ->
+ * (-sin, -cos); where they move together it stays. */
 TaskMirror task_mirror(const Robot *robot) {
     static const float head[9] = {-1, 1, -1, 1, -1, -1, 1, -1, 1};
     TaskMirror mirror = {.observation_index = {0}};

@@ -171,8 +171,9 @@ static int finish_ffmpeg(Video *video) {
     close(video->pipe);
     video->pipe = -1;
     int code = 0;
-    while (waitpid(video->child, &code, 0) < 0 && errno == EINTR)
-        ;
+    while (waitpid(video->child, &code, 0) < 0 && errno == EINTR) {
+        continue;
+    }
     if (WIFEXITED(code) && WEXITSTATUS(code) == 0) {
         return 1;
     }

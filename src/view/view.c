@@ -22,14 +22,14 @@
 #define VIEW_RADIUS_UNEVEN 4.0 /* [m] */
 #define VIEW_FLOOR 40.0        /* [m] half size of the floor beyond */
 #define VIEW_GEOMS 4000
-#define VIEW_CAMERA_TIME 0.35      /* [s] the camera's lag */
-#define VIEW_LOOK_HEIGHT 0.6       /* [-] the camera looks at this share of the robot's height */
-#define VIEW_CLOSE_TIME 0.20       /* [s] the same of the camera on the feet */
-#define VIEW_CLOSE_HEIGHT 0.04     /* [m] */
-#define VIEW_CLOSE_TURN 22.0       /* [deg] it looks more from the side */
-#define VIEW_CLOSE_ELEVATION -22.0 /* [deg] */
-#define VIEW_CLOSE_DISTANCE 0.80   /* [m] */
-#define VIEW_LABEL 24              /* [pixels] height of a label */
+#define VIEW_CAMERA_TIME 0.35        /* [s] the camera's lag */
+#define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
+#define VIEW_CLOSE_TIME 0.20         /* [s] the same of the camera on the feet */
+#define VIEW_CLOSE_HEIGHT 0.04       /* [m] */
+#define VIEW_CLOSE_TURN 22.0         /* [deg] it looks more from the side */
+#define VIEW_CLOSE_ELEVATION (-22.0) /* [deg] */
+#define VIEW_CLOSE_DISTANCE 0.80     /* [m] */
+#define VIEW_LABEL 24                /* [pixels] height of a label */
 #define VIEW_HIDDEN_GROUP 5
 #define VIEW_FORCE_SEEN 15.0 /* [N] smaller contact forces get no arrow */
 

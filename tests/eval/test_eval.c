@@ -242,8 +242,8 @@ static void the_shipped_policy_walks(void **state) {
     assert_true(row.base_oscillation > 1e-3 && row.base_oscillation < 0.1);
 }
 
-/* Told to stop after 3 s and watched for one more second: speed and cost are those of the first 3 s,
- * but for a physics step at the end; the rest goes on. */
+/* Told to stop after 3 s and watched for one more second: speed and cost are those of the first 3
+ * s, but for a physics step at the end; the rest goes on. */
 static void speed_is_measured_until_the_stop(void **state) {
     (void)state;
     EvalRow before = walk(3, 0), stopped = walk(4, 3);

@@ -118,7 +118,8 @@ static double gradient_distance(const Learner *cpu, const Learner *gpu, const ch
     return worst;
 }
 
-/* Of the means over the samples: where one nearly cancels, its error is that of numbers of size 1. */
+/* Of the means over the samples: where one nearly cancels, its error is that of numbers of size
+ * 1. */
 static double sums_distance(const LossSums *a, const LossSums *b, int samples) {
     const double x[] = {a->surrogate, a->kl,          a->clipped,     a->reconstruction,
                         a->vae_kl,    a->estimate[0], a->estimate[1], a->estimate[2],

@@ -443,8 +443,8 @@ static void element_velocity(const Dense *d, const DenseElement *e, const double
     }
 }
 
-/* d: the velocity v less the nearest point of the way from 0 to -turn. Returns whether that point is
- * within the way, along = the way's direction. */
+/* d: the velocity v less the nearest point of the way from 0 to -turn. Returns whether that point
+ * is within the way, along = the way's direction. */
 static int element_opposed(const DenseElement *e, const double *v, double *d, double *along) {
     double length = hypot(e->turn[0], e->turn[1]);
     d[0] = v[0];

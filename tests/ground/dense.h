@@ -4,7 +4,7 @@
  * A = L L^T makes V = V^ + L y of every twist that impulses can reach, whatever the rank of A. With
  * the bounds r of friction held, the step is the minimum over y of a convex function, 1/2 |y|^2 +
  * sum over elements of  integral of -I_z dw  + (|t|^2 - max(|t| - r, 0)^2)/(2 k) + dt b_D |v|^2/2
- * with t = hold - k v, k = grip + r ELEMENT_LAG/FRICTION_ELASTIC,  |y - y*| <= |gradient|: a minimum
+ * with t = hold - k v, k = grip + r ELEMENT_LAG/FRICTION_ELASTIC, |y - y*| <= |gradient|: a minimum
  * found is the minimum. The bounds r = mu I_z + dt k_D d_D u then follow the normal impulses, again
  * and again, until nothing moves.
  *

@@ -1,12 +1,12 @@
-/* One step of one element in the scalar type of src/ground/real.h, with doubles outside. Included by
- * two files: once with Real = double, once with Real = float. */
+/* One step of one element in the scalar type of src/ground/real.h, with doubles outside. Included
+ * by two files: once with Real = double, once with Real = float. */
 #ifndef ELEMENT_STEP_H
 #define ELEMENT_STEP_H
 
 #define ELEMENT_LAW 13   /* numbers of Law */
 #define ELEMENT_MEMORY 9 /* of ElementMemory */
-/* Normal impulse, its slope; tangential impulse x y, its derivatives by the velocity xx xy yy, by the
- * normal impulse x y. */
+/* Normal impulse, its slope; tangential impulse x y, its derivatives by the velocity xx xy yy, by
+ * the normal impulse x y. */
 #define ELEMENT_RESULTS 9
 
 /* What a step of one element depends on. */

@@ -77,7 +77,8 @@ static void test_labels(void **state) {
     }
 }
 
-/* Stripes look along x only, so they may blend over a border that is too much work for a checker. */
+/* Stripes look along x only, so they may blend over a border that is too much work for a
+ * checker. */
 static void test_work_of_borders(void **state) {
     (void)state;
     for (int checker = 0; checker < 2; checker++) {

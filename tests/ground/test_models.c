@@ -107,8 +107,8 @@ static void test_matched(void **state) {
     assert_true(worst_force < 2e-3); /* con_cone's drag at 1 cm/s */
 }
 
-/* Materials from all of the accepted ranges: what a match returns can be used, or it fails, says why
- * and returns nothing. */
+/* Materials from all of the accepted ranges: what a match returns can be used, or it fails, says
+ * why and returns nothing. */
 static void test_match_is_accepted(void **state) {
     (void)state;
     uint64_t random = 41;

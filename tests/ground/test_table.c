@@ -48,8 +48,8 @@ static void test_rows(void **state) {
     assert_false(mild_model_find("ecc_sprin", &(MildModel){0}));
 }
 
-/* Sum of the wrench's numbers, each with a weight of its own, over a foot led by hand: down to 16 mm
- * and sideways, up, down again to where the bed is, and out. */
+/* Sum of the wrench's numbers, each with a weight of its own, over a foot led by hand: down to 16
+ * mm and sideways, up, down again to where the bed is, and out. */
 static double led(const MildMaterial *m, const MildSole *plate, const MildSole *one) {
     const MildSole *sole = mild_model_is_concentric((MildModel)m->model) ? one : plate;
     static const double depths[5] = {-0.002, 0.016, 0.013, 0.019, -0.005};

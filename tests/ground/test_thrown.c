@@ -1,6 +1,7 @@
-/* Bodies thrown at and into the ground, far from any robot: free bodies of 1 to 60 kg with any inertia
- * and lever, some deep in the firm bed, and point masses on sticks. `ground_test_thrown COUNT [FIRST]`
- * runs other draws than `make test`; docs/model.md sections 7 and 17 report 20 000. */
+/* Bodies thrown at and into the ground, far from any robot: free bodies of 1 to 60 kg with any
+ * inertia and lever, some deep in the firm bed, and point masses on sticks. `ground_test_thrown
+ * COUNT [FIRST]` runs other draws than `make test`; docs/model.md sections 7 and 17 report 20
+ * 000. */
 #include "ground_kit.h"
 
 #include "ground/friction.h"
@@ -225,8 +226,8 @@ static void test_little_work(void **state) {
     }
 }
 
-/* A level sole whose depth is exactly 0, with a twist that is next to nothing: the impulses are below
- * the rounding of anything that acts. */
+/* A level sole whose depth is exactly 0, with a twist that is next to nothing: the impulses are
+ * below the rounding of anything that acts. */
 static void test_surface(void **state) {
     (void)state;
     uint64_t random = 5;
@@ -262,8 +263,8 @@ static void test_surface(void **state) {
     assert_true(most <= 40);
 }
 
-/* What friction opposes instead of v takes energy at v and at the mean of it and the velocity before,
- * and friction_turned's derivatives are those of its impulse. */
+/* What friction opposes instead of v takes energy at v and at the mean of it and the velocity
+ * before, and friction_turned's derivatives are those of its impulse. */
 static void test_turned(void **state) {
     (void)state;
     uint64_t random = 9;

@@ -443,10 +443,8 @@ static void test_logvar_bounds(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_logvar_is_held),
-        cmocka_unit_test(test_matches_pytorch),
-        cmocka_unit_test(test_matches_differences),
-        cmocka_unit_test(test_chunks_add),
+        cmocka_unit_test(test_logvar_is_held),      cmocka_unit_test(test_matches_pytorch),
+        cmocka_unit_test(test_matches_differences), cmocka_unit_test(test_chunks_add),
         cmocka_unit_test(test_logvar_bounds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

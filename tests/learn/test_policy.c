@@ -320,7 +320,8 @@ static void test_lying_headers(void **state) {
     policy_destroy(policy);
 }
 
-/* Each text of the metadata left out of a file that is right otherwise: named, and called missing. */
+/* Each text of the metadata left out of a file that is right otherwise: named, and called
+ * missing. */
 static void test_missing_keys(void **state) {
     (void)state;
     static const char *const keys[] = {"kind", "version", "policy.latent", "policy.frames",

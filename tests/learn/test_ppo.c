@@ -224,8 +224,8 @@ static void test_nothing_valid_changes_nothing(void **state) {
 }
 
 /* Resting anywhere in [-1, 1] earns 0.44 /s on average; the goal, reached at once, about 0.93. What
- * was learned must stay: with returns ten times as large the critic could not follow, and the policy
- * fell back to 0.2 by iteration 60. */
+ * was learned must stay: with returns ten times as large the critic could not follow, and the
+ * policy fell back to 0.2 by iteration 60. */
 static void test_learns_the_toy_task(void **state) {
     (void)state;
     Run run;

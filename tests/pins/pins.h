@@ -1,5 +1,6 @@
-/* Pinned numbers: tests/pins.txt holds what this tree computed when it was last right, and this reads it. A hash holds on
- * one platform, to the last bit; a plain number holds on every platform, within a tolerance. */
+/* Pinned numbers: tests/pins.txt holds what this tree computed when it was last right, and this
+ * reads it. A hash holds on one platform, to the last bit; a plain number holds on every platform,
+ * within a tolerance. */
 #ifndef TEST_PINS_H
 #define TEST_PINS_H
 

@@ -1,4 +1,5 @@
-/* The numbers of a model: each one spoilt is refused with its name, before anything is simulated. */
+/* The numbers of a model: each one spoilt is refused with its name, before anything is
+ * simulated. */
 #include "robot_kit.h"
 
 #include <math.h>
@@ -62,7 +63,8 @@ static void test_every_number(void **state) {
     print_message("%d kinds of numbers, each spoilt three or four ways\n", count);
 }
 
-/* Each element of each array: refused, with the name of its joint, body or geom where it has one. */
+/* Each element of each array: refused, with the name of its joint, body or geom where it has
+ * one. */
 static void test_every_element(void **state) {
     (void)state;
     mjModel *m = robot->model;

@@ -382,8 +382,8 @@ static void write_changed(const char *path, const char *text, const char *from, 
     fclose(file);
 }
 
-/* The robot with `from` written as `to` in one of its files must be refused with one line that names
- * `what`. */
+/* The robot with `from` written as `to` in one of its files must be refused with one line that
+ * names `what`. */
 static void refuse(const char *name, const char *from, const char *to, const char *what) {
     static const char *const names[] = {"sa01.xml", "robot.ini"};
     char folder[] = "robot_refused_XXXXXX", path[2][64];

@@ -642,7 +642,8 @@ static void write_edited(const char *path, const char *text, const char *from, c
     write_text(path, edited);
 }
 
-/* With `from` written as `to` in one of the two texts: one line that has `message`; NULL: accepted. */
+/* With `from` written as `to` in one of the two texts: one line that has `message`; NULL:
+ * accepted. */
 static void try_robot(const char *from, const char *to, const char *message) {
     MildError error = {0};
     assert_true((strstr(mjcf, from) != NULL) != (strstr(ini, from) != NULL));

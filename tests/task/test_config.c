@@ -151,7 +151,8 @@ static const struct {
              {"base_mass", 0},    {"com_offset", 0},   {"link_mass", 1},     {"armature", 1},
              {"motor_offset", 0}, {"gain", 1},         {"strength", 1},      {"push_interval", 0}};
 
-/* Those keys have no effect, all others their defaults: noise, latencies and the start are drawn. */
+/* Those keys have no effect, all others their defaults: noise, latencies and the start are
+ * drawn. */
 static void nominal(void **unused) {
     (void)unused;
     TaskDef plain = task_def_default();

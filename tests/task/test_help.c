@@ -101,7 +101,8 @@ static void size_and_independence(void **unused) {
     rig_close(&rig);
 }
 
-/* The push is added to the base's velocity before the step, then fades in the critic's view only. */
+/* The push is added to the base's velocity before the step, then fades in the critic's view
+ * only. */
 static void push_is_a_velocity_jump(void **unused) {
     (void)unused;
     open_in_the_air(0);
@@ -152,7 +153,8 @@ static void expect_wrench(const char *what, const double *got, double fx, double
     }
 }
 
-/* With a share of 0.4: half of 33.113 kg is 64.97 N; 100 N s/m up to 30 N; 300 N m/rad, 30 N m s/rad.
+/* With a share of 0.4: half of 33.113 kg is 64.97 N; 100 N s/m up to 30 N; 300 N m/rad, 30 N m
+ * s/rad.
  */
 static void wrench_by_hand(void **unused) {
     (void)unused;

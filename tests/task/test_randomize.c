@@ -263,7 +263,8 @@ static int preset_of(const MildMaterial *m, double factor[7]) {
     return -1;
 }
 
-/* 10 % rigid, 50 % presets, stripes on 30 %. At a jitter of 2 % no preset can be taken for another. */
+/* 10 % rigid, 50 % presets, stripes on 30 %. At a jitter of 2 % no preset can be taken for
+ * another. */
 static void shares_of_grounds(void **unused) {
     (void)unused;
     open_env();

@@ -224,7 +224,8 @@ static void statistics(void **unused) {
     close_many();
 }
 
-/* An episode that ends at its first step of all lives 10 ms, one that never lived divides nothing. */
+/* An episode that ends at its first step of all lives 10 ms, one that never lived divides
+ * nothing. */
 static void an_episode_of_one_step(void **unused) {
     (void)unused;
     TaskDef def = kit_quiet_def();

@@ -1,0 +1,117 @@
+#!/usr/bin/env bash
+# What `make check` does, stage by stage (docs/testing.md). Each stage has a folder of its own under build/check.
+# Usage: scripts/check.sh [STAGE ...]; without one, all of them:
+#   format    clang-format 14 has nothing to change, 100 columns, braces
+#   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: every test
+#   tidy      clang-tidy 14 over src/, only what changed since it was last content
+#   thread    gcc, warnings as errors, thread sanitizer: pool, task, evaluation, training
+#   aarch64   the library for another processor, run under qemu
+set -euo pipefail
+cd "$(dirname "$0")/.."
+jobs=${JOBS:-$(nproc)} root=$PWD/build/check
+
+sources() {
+    if git rev-parse --is-inside-work-tree >/dev/null 2>&1; then
+        git ls-files -co --exclude-standard '*.c' '*.h' '*.cu' '*.cpp'
+    else # an archive without git
+        find include src tests examples -name '*.[ch]' -o -name '*.cu' -o -name '*.cpp'
+    fi
+}
+
+# configure FOLDER OPTION...: with ccache where there is one.
+configure() {
+    local folder=$root/$1 launcher=()
+    shift
+    ! command -v ccache >/dev/null || launcher=(-DCMAKE_C_COMPILER_LAUNCHER=ccache)
+    cmake -S . -B "$folder" -DMILD_WERROR=ON --log-level=WARNING "${launcher[@]}" "$@" >/dev/null
+}
+
+# build FOLDER [TARGET ...]: quiet unless it fails.
+build() {
+    local folder=$root/$1
+    shift
+    cmake --build "$folder" --parallel "$jobs" ${*:+--target "$@"} >"$folder/build.log" 2>&1 ||
+        { grep -E -A5 '(error|warning):' "$folder/build.log" | head -60 >&2; return 1; }
+}
+
+stage_format() {
+    mapfile -t files < <(sources)
+    clang-format-14 --dry-run -Werror "${files[@]}"
+    scripts/house.py "${files[@]}"
+}
+
+# -O1: -O2 compiles longer, and what the sanitizers insert is no faster for it.
+configure_sanitize() {
+    configure sanitize -DCMAKE_C_COMPILER=clang-14 -DMILD_SANITIZE=ON -DCMAKE_C_FLAGS_RELEASE="-O1 -g" \
+        -DCMAKE_BUILD_TYPE=Release -DCMAKE_EXPORT_COMPILE_COMMANDS=ON
+}
+
+stage_sanitize() {
+    configure_sanitize
+    build sanitize
+    MILD_TEST_DRAWS=0.1 UBSAN_OPTIONS=print_stacktrace=1 ASAN_OPTIONS=detect_stack_use_after_return=1 \
+        ctest --test-dir "$root/sanitize" --output-on-failure --parallel "$jobs" --timeout 900
+}
+
+# Files whose text or headers are newer than their stamp, by the compiler's list of what each reads.
+changed() {
+    local file stamp list dependency
+    for file in $(sources | grep '^src/.*\.c$'); do
+        stamp=$root/tidy/${file//\//_}
+        list=$(find "$root/sanitize/src" -path "*/${file#src/}.o.d" | head -1)
+        [ -n "$list" ] || continue # not part of this build, such as the learner on a GPU
+        for dependency in $(sed 's/^[^:]*://; s/\\$//' "$list") .clang-tidy; do
+            case $dependency in /usr/*) continue ;; esac
+            if ! [ "$stamp" -nt "$dependency" ]; then
+                echo "$file"
+                break
+            fi
+        done
+    done
+}
+
+# analyzer.h would redefine what error.c defines
+tidy_file() {
+    local first=(--extra-arg=-include --extra-arg="$PWD/scripts/analyzer.h")
+    [[ $1 != */error.c ]] || first=()
+    clang-tidy-14 -p build/check/sanitize --quiet "${first[@]}" "$1" 2>/dev/null || return 1
+    touch "build/check/tidy/${1//\//_}"
+}
+export -f tidy_file
+
+stage_tidy() {
+    configure_sanitize
+    build sanitize # the generated header, and what each file reads
+    mkdir -p "$root/tidy"
+    changed | xargs -r -P "$jobs" -I{} bash -c 'tidy_file {}'
+}
+
+# The layers' programs that start threads. Warnings of gcc come from all of the text.
+stage_thread() {
+    configure thread -DCMAKE_C_COMPILER=gcc -DMILD_SANITIZE=thread -DCMAKE_C_FLAGS_RELEASE="-O1 -g" \
+        -DCMAKE_BUILD_TYPE=Release
+    build thread
+    # this runtime knows only the usual places of memory; where the container allows it, fix them
+    local fixed=()
+    ! setarch -R true 2>/dev/null || fixed=(setarch -R)
+    TSAN_OPTIONS=halt_on_error=1 "${fixed[@]}" ctest --test-dir "$root/thread" --output-on-failure \
+        --parallel "$jobs" --timeout 900 -R '^(base/test_pool|task/|eval/|app/train)'
+}
+
+# Needs nothing for that processor but its C library: the fuzzers' kept inputs, with their checks.
+stage_aarch64() {
+    local target
+    configure aarch64 -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 -DMILD_APP=OFF \
+        -DCMAKE_C_COMPILER=aarch64-linux-gnu-gcc -DMILD_MARCH=armv8-a -DCMAKE_BUILD_TYPE=Release
+    build aarch64 mild_shared mild_static fuzz_field fuzz_sole fuzz_map fuzz_solve
+    for target in field sole map solve; do
+        qemu-aarch64 -L /usr/aarch64-linux-gnu "$root/aarch64/tests/fuzz_$target" tests/fuzz/corpus/$target
+    done
+}
+
+for stage in ${*:-format sanitize tidy thread aarch64}; do
+    begin=$SECONDS
+    echo "check: $stage"
+    "stage_$stage"
+    echo "check: $stage passed ($((SECONDS - begin)) s)"
+done
