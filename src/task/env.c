@@ -293,7 +293,7 @@ TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *r
     memcpy(m.qd, qvel + 6, sizeof m.qd);
     memcpy(m.qd_before, env->joint_speed, sizeof m.qd_before);
     memcpy(env->joint_speed, m.qd, sizeof m.qd);
-    memcpy(m.torque, torque, sizeof m.torque);
+    memcpy(m.torque, torque, (size_t)env->shape.joints * sizeof *torque);
     m.foot_distance = robot_sim_foot_distance(sim);
     m.knee_distance = robot_sim_knee_distance(sim);
     feet_motion(env, def, robot, sim, &m);

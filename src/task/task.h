@@ -167,7 +167,7 @@ typedef struct {
     int standing;
 } TaskMotion;
 /* What the policy step just made was like: the sim is at its end, env still holds base twist, joint
- * speeds, smoothed velocity and air times of the step before and gets those of this one. torque: of
+ * speeds, smoothed velocity and air times of the step before and gets those of this one. torque: [robot_joints], of
  * the last physics step. */
 TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                 const RobotSim *sim, const double *torque);

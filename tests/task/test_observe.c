@@ -512,7 +512,7 @@ static void look_at(const RobotState *state, const double command[3], double pha
     rig.env->robot = *state;
     robot_sim_load(rig.sim, state, &rig.env->variation);
     memcpy(rig.env->command_seen, command, sizeof rig.env->command_seen);
-    memcpy(rig.env->action[0], action, sizeof rig.env->action[0]);
+    memcpy(rig.env->action[0], action, SA01_JOINTS * sizeof *action);
     rig.env->phase = phase;
     task_read_imu(rig.sim, &reading);
     task_read_motors(rig.sim, &reading);
