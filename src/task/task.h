@@ -167,8 +167,8 @@ typedef struct {
     int standing;
 } TaskMotion;
 /* What the policy step just made was like: the sim is at its end, env still holds base twist, joint
- * speeds, smoothed velocity and air times of the step before and gets those of this one. torque: [robot_joints], of
- * the last physics step. */
+ * speeds, smoothed velocity and air times of the step before and gets those of this one. torque:
+ * [robot_joints], of the last physics step. */
 TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                 const RobotSim *sim, const double *torque);
 /* Weighted terms per second into terms; returns the clipped sum times the period. */
