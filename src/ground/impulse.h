@@ -111,8 +111,8 @@ MILD_HD Impulse lag_impulse(const Element *e, Real dt, Real speed) {
  *
  *     dt mean F + d (E(m1) - E(m0))
  *
- * What leads through the air carries nothing. Both parts rise with m1, so the step stays convex. The
- * damping's has the sign of the motion: it takes energy. */
+ * What leads through the air carries nothing. Both parts rise with m1, so the step stays convex.
+ * The damping's has the sign of the motion: it takes energy. */
 MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
     const Real x0 = real_max(e->middle, 0);
     const Real x1 = real_max(middle, 0);

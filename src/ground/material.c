@@ -43,7 +43,8 @@ typedef struct {
     MildMaterial material;
 } Preset;
 /* What only bekker and hunt_crossley read, the same in all: the dry sand of Wong 2008, table 2.3,
- * under a foot 0.1 m wide, and some damping: exponent dissipation k_c k_phi plate_width cohesion shear_length. */
+ * under a foot 0.1 m wide, and some damping: exponent dissipation k_c k_phi plate_width cohesion
+ * shear_length. */
 #define RIVALS 1.1, 0.3, 990.0, 1528430.0, 0.1, 1040.0, 0.01
 /*              k_pen sigma_cone alpha  nu   c_g  c_d   phi   rho     mu   k_drift b_drift recovery
  * bed zeta passive model */

@@ -11,8 +11,8 @@
 #include "ground/scratch.h"
 
 /* Wong 2008, table 2.3: dry sand (Land Locomotion Laboratory), sandy loam (the same, 15 % of
- * water), clayey soil (Thailand, 38 %), snow (Harrison). Its K are ranges; these lie within those of firm
- * sand, loose sand, clay and fresh snow. Lunar soil, K too: Heiken, Vaniman, French, Lunar
+ * water), clayey soil (Thailand, 38 %), snow (Harrison). Its K are ranges; these lie within those
+ * of firm sand, loose sand, clay and fresh snow. Lunar soil, K too: Heiken, Vaniman, French, Lunar
  * Sourcebook, 1991, section 9.1. */
 typedef struct {
     const char *name;

@@ -1,10 +1,10 @@
 /* Scalar type and qualifier of the element's law and step.
  *
- * power.h, law.h, element.h, begin.h, impulse.h, friction.h and remember.h are written in the common
- * subset of C17 and CUDA C++: pure functions of small structs, no libm beyond a square root (in float,
- * powf too), no allocation. The CPU runs them in double, an element in each lane of a vector. A GPU
- * runs them in float, an element in each thread: define MILD_REAL_FLOAT before the first of these
- * headers. */
+ * power.h, law.h, element.h, begin.h, impulse.h, friction.h and remember.h are written in the
+ * common subset of C17 and CUDA C++: pure functions of small structs, no libm beyond a square root
+ * (in float, powf too), no allocation. The CPU runs them in double, an element in each lane of a
+ * vector. A GPU runs them in float, an element in each thread: define MILD_REAL_FLOAT before the
+ * first of these headers. */
 #ifndef MILD_GROUND_REAL_H
 #define MILD_GROUND_REAL_H
 

@@ -6,8 +6,9 @@
 #define LENGTH 11 /* elements along x, across the tilt axis */
 #define WIDTH 7
 
-/* f(u) = flat (u_f/3)(1 - c^3) + cone u + power u^n, c = max(1 - u/u_f, 0): force of one cell, without inertia;
- * and its first two integrals from 0, needed for a moment because x = (u - d)/sin(tilt). */
+/* f(u) = flat (u_f/3)(1 - c^3) + cone u + power u^n, c = max(1 - u/u_f, 0): force of one cell,
+ * without inertia; and its first two integrals from 0, needed for a moment because x = (u -
+ * d)/sin(tilt). */
 typedef struct {
     double flat, cone, full, power, n;
 } Cell;

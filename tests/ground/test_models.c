@@ -270,8 +270,8 @@ static MildMaterial choi(void) {
     return m;
 }
 
-/* First stop [m] from dK/du = (M g - F_g - d w - 2 c_d m_a' K)/(M + m_a), the exact impact equation, by
- * small steps. */
+/* First stop [m] from dK/du = (M g - F_g - d w - 2 c_d m_a' K)/(M + m_a), the exact impact
+ * equation, by small steps. */
 static double exact_stop(const MildMaterial *m, double pitch, int elements, double mass,
                          double speed) {
     const double step = 1e-6;

@@ -1,5 +1,5 @@
-/* The quadruped robots/go1: its geometry by hand, four round feet, and the stand controller on every
- * ground. */
+/* The quadruped robots/go1: its geometry by hand, four round feet, and the stand controller on
+ * every ground. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -84,8 +84,8 @@ static void joints_and_feet(void **unused) {
     }
 }
 
-/* The feet's velocities after a step are those that the solver promised, at the pose before it: both
- * chains hold the waist. */
+/* The feet's velocities after a step are those that the solver promised, at the pose before it:
+ * both chains hold the waist. */
 static void twist_is_the_solvers(void **unused) {
     (void)unused;
     MildError error = {0};
