@@ -128,8 +128,8 @@ extern const int mild_material_field_count;
 MildMaterial mild_material_default(void);
 /* Writes a preset to *material. Of mild: rubber foam60 foam45 foam28 foam25 grass sand_loose
  * sand_dense. Of bekker: dry_sand sandy_loam clay snow lunar_soil. Returns false, and leaves
- * *material alone, when the name is unknown. (`rigid` is no material: it is the engine's
- * contact.) */
+ * *material alone, when the name is unknown. (`rigid` is no material: it is the engine's contact.)
+ */
 int mild_material_preset(const char *name, MildMaterial *material);
 /* Number of presets of mild. */
 int mild_material_preset_count(void);

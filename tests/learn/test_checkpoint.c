@@ -188,7 +188,7 @@ static void missing_parts_are_refused(void **state) {
     refused(&run, MILD_ERROR_FORMAT, "log_std is missing");
     save(&run);
     swap_text("\"kind\":\"mild checkpoint\"", "\"kind\":\"wild checkpoint\"");
-    refused(&run, MILD_ERROR_FORMAT, "is no policy of mild");
+    refused(&run, MILD_ERROR_FORMAT, "holds no policy of mild");
     save(&run);
     swap_text("\"version\":\"1\"", "\"version\":\"2\"");
     refused(&run, MILD_ERROR_FORMAT, "has file version 2");
