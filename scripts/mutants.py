@@ -541,6 +541,11 @@ def main():
         order = [m for m in order if entry_of(m) + "\n" in last + "\n"]
         report = WORK / f"{options.layer}.again.txt"
     reasons = read_named()
+    present = {m.name for m in order}
+    for name in reasons:
+        if name.startswith(f"src/{options.layer}/") and not (options.file or options.again or
+                                                             name in present):
+            print(f"mutants: {NAMED.name} names what is no longer there: {name}", flush=True)
     named = [(m, reasons[m.name]) for m in order if m.name in reasons]
     order = [m for m in order if m.name not in reasons]
     if options.list:

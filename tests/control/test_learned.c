@@ -177,6 +177,21 @@ static void another_shape_is_refused(void **state) {
     }
 }
 
+/* Any controller's own destroy is called, once, with what is its own. */
+static void count(void *self) {
+    ++*(int *)self;
+}
+
+static void destroy_is_called_once(void **state) {
+    (void)state;
+    int calls = 0;
+    Controller controller = {.self = &calls, .destroy = count};
+    controller_destroy(&controller);
+    assert_int_equal(calls, 1);
+    controller_destroy(&controller);
+    assert_int_equal(calls, 1);
+}
+
 static void a_missing_file_is_named(void **state) {
     (void)state;
     MildError error = {0};
@@ -192,9 +207,8 @@ static void a_missing_file_is_named(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(acts_as_its_policy),
-        cmocka_unit_test(remembers_nothing),
-        cmocka_unit_test(another_shape_is_refused),
+        cmocka_unit_test(acts_as_its_policy),       cmocka_unit_test(remembers_nothing),
+        cmocka_unit_test(another_shape_is_refused), cmocka_unit_test(destroy_is_called_once),
         cmocka_unit_test(a_missing_file_is_named),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
