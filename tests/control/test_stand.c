@@ -236,7 +236,7 @@ static void answer(int r, const RobotState *at, double *offset) {
     robot_sim_destroy(sim);
 }
 
-/* How much higher each foot stands under the upright base with these offsets [m], about the mean. */
+/* [m] How much higher than the mean each foot stands under the upright base with these offsets. */
 static void rises(int r, const double *offset, double *rise) {
     const Robot *robot = robots[r];
     RobotState at = stand_state(stands[r], 1, 0);
