@@ -235,6 +235,37 @@ static void draws_are_a_function(void **unused) {
     free(env);
 }
 
+/* Each bit of the seed counts: for the episode, the command, the place on a map. */
+static void every_bit_of_the_seed(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    MildMapDef shape = mild_map_def_default();
+    shape.kind = MILD_MAP_ROUGH;
+    MildMap *map = mild_map_create(&shape, &error);
+    assert_non_null(map);
+    open_env();
+    def.map = map;
+    def.standing_share = 0;
+    double offset = 0, command = 0, place = 0;
+    for (int bit = -1; bit < 64; bit++) {
+        uint64_t seed = env->seed;
+        env->seed ^= bit < 0 ? 0 : (uint64_t)1 << bit;
+        task_randomize(env, &def, robot);
+        task_draw_command(env, &def);
+        assert_true(env->motor_offset[3] != offset);
+        assert_true(env->command[0] != command);
+        assert_true(env->terrain.map_x != place);
+        if (bit < 0) {
+            offset = env->motor_offset[3];
+            command = env->command[0];
+            place = env->terrain.map_x;
+        }
+        env->seed = seed;
+    }
+    mild_map_destroy(map);
+    free(env);
+}
+
 /* ---- ground ---- */
 
 /* Which preset it was, and by what factors its 7 numbers were off; -1 when it is none. */
@@ -628,6 +659,7 @@ static void start_of_a_trial(void **unused) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(draws_are_a_function),
+        cmocka_unit_test(every_bit_of_the_seed),
         cmocka_unit_test(nominal),
         cmocka_unit_test(start_of_a_trial),
         cmocka_unit_test(nothing_is_left),

@@ -249,6 +249,15 @@ static void distances(void **unused) {
     m->knee_distance = 0.28;
     expect_term(REWARD_knee_distance, "20 mm too far", 0.1135335283);
     expect_term(REWARD_feet_distance, "the knees are another term's", 0.2);
+    const double feet[2] = {0, 0.19}, knees[2] = {0.05, 0.27}; /* keys go before the robot's */
+    memcpy(scene.def.reward.feet_range, feet, sizeof feet);
+    memcpy(scene.def.reward.knee_range, knees, sizeof knees);
+    expect_term(REWARD_feet_distance, "10 mm beyond the key's", 0.1367879441);
+    expect_term(REWARD_knee_distance, "10 mm beyond the key's", 0.1367879441);
+    m->foot_distance = 0.01;
+    m->knee_distance = 0.06;
+    expect_term(REWARD_feet_distance, "within the key's", 0.2);
+    expect_term(REWARD_knee_distance, "within the key's", 0.2);
 }
 
 /* abs sum 0.07, norm 0.05: 1.5 (e^-0.7 + e^-0.2)/2. */
