@@ -466,7 +466,9 @@ static void test_lists_that_fit(void **state) {
     refuse("outline = 0 0 1 0 1 2\n", text, "[foot.l] outline: more than 256 numbers");
     list_numbers(list, sizeof list, 48, "1");
     snprintf(text, sizeof text, "corners = %s\n", list);
-    assert_int_equal(accept(edit("corners = 1 2 3 4 5 6\n", text)).foot[0].corner_count, 16);
+    RobotDef many = accept(edit("corners = 1 2 3 4 5 6\n", text));
+    assert_int_equal(many.foot[0].corner_count, 16);
+    assert_true(many.foot[0].corners[47] == 1 && many.foot[0].corner_radius == 0.005);
     list_numbers(list, sizeof list, 51, "1");
     snprintf(text, sizeof text, "corners = %s\n", list);
     refuse("corners = 1 2 3 4 5 6\n", text, "[foot.l] corners: more than 48 numbers");

@@ -470,10 +470,20 @@ typedef struct {
     double depth_max, depth_sum, load, pressure[3], force[3], torque[3];
 } Sum;
 
+/* The contact's plane is the ground's under the corner's centre. */
+static void expect_normal(const mjModel *m, const mjContact *contact, const MildTerrain *terrain) {
+    const double *normal = contact->frame;
+    double reach = 0.5 * contact->dist + m->geom_size[3 * contact->geom[1]], slope[2];
+    mild_terrain_slope_at(terrain, contact->pos[0] + reach * normal[0],
+                          contact->pos[1] + reach * normal[1], slope);
+    near("slope along x", 0, -normal[0] / normal[2], slope[0], 1e-9);
+    near("slope along y", 1, -normal[1] / normal[2], slope[1], 1e-9);
+}
+
 /* Contact by contact from the engine's data: a contact's force is on its second geom; ours acts on
  * the foot. The model's pairs name the floor first. */
-static void add_up(const mjModel *m, const mjData *d, double ankle[SA01_FEET][3],
-                   Sum sum[SA01_FEET]) {
+static void add_up(const mjModel *m, const mjData *d, const MildTerrain *terrain,
+                   double ankle[SA01_FEET][3], Sum sum[SA01_FEET]) {
     int floor = mj_name2id(m, mjOBJ_GEOM, "floor");
     for (int c = 0; c < d->ncon; c++) {
         const mjContact *contact = d->contact + c;
@@ -484,6 +494,7 @@ static void add_up(const mjModel *m, const mjData *d, double ankle[SA01_FEET][3]
         }
         mju_mulMatTVec3(force, contact->frame, local);
         assert_int_equal(contact->geom[0], floor);
+        expect_normal(m, contact, terrain);
         int body = m->geom_bodyid[contact->geom[1]];
         int f = body == mj_name2id(m, mjOBJ_BODY, feet[1]);
         mju_sub3(arm, contact->pos, ankle[f]);
@@ -562,7 +573,7 @@ static int check_rigid_step(RobotSim *sim, const MildTerrain *terrain, int loade
     }
     assert_int_equal(robot_sim_step(sim, torque, NULL, terrain, NULL), 0);
     Sum sum[SA01_FEET] = {{0}};
-    add_up(m, d, ankle, sum);
+    add_up(m, d, terrain, ankle, sum);
     memcpy(start->qvel, robot_sim_qvel(sim), sizeof(double) * SA01_NV);
     for (int f = 0; f < SA01_FEET; f++) {
         check_rigid(sim, &sum[f], f, rotation[f]);
