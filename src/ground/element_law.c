@@ -27,7 +27,7 @@ Law law_cone(const MildMaterial *material, double pitch) {
         c_g = fmax(c_g, 0.0);
         c_d = fmax(c_d, 0.5);
     }
-    Law law;
+    Law law = {0}; /* no other curve */
     law.flat_stiffness = material->k_pen - kappa;
     law.line_stiffness = kappa;
     law.cone_depth = pitch / sqrt(LAW_PI) * tan(material->alpha) / material->nu;
