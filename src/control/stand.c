@@ -81,8 +81,11 @@ static double slope_along(const double *along, const double *z, int feet, double
 static void answer_tilt(const Stand *stand, const RobotSim *sim, double *offset) {
     const Robot *robot = stand->robot;
     const double *turn = robot_sim_base_rotation(sim), *speed = robot_sim_qvel(sim);
-    int feet = robot_feet(robot);
-    double length = hypot(turn[0], turn[3]), height = robot_stand_height(robot);
+    const double *swing = robot_swing(robot);
+    const int *joint_foot = robot_joint_foot(robot);
+    const int feet = robot_feet(robot), joints = robot_joints(robot);
+    double length = sqrt(turn[0] * turn[0] + turn[3] * turn[3]);
+    double height = robot_stand_height(robot);
     double ahead[2] = {turn[0] / length, turn[3] / length};                /* heading */
     double forward = (ahead[0] * speed[0] + ahead[1] * speed[1]) / height; /* [rad/s] */
     double left = (ahead[0] * speed[1] - ahead[1] * speed[0]) / height;    /* [rad/s] */
@@ -93,12 +96,12 @@ static void answer_tilt(const Stand *stand, const RobotSim *sim, double *offset)
     for (int f = 0; f < feet; f++) {
         double rise = plane.y[f] * roll + plane.x[f] * pitch;
         double bend = stand->lift[f] > LIFT_LEAST ? rise / stand->lift[f] : 0.0;
-        for (int i = 0; i < robot_joints(robot); i++) {
-            offset[i] += robot_joint_foot(robot)[i] == f ? bend * robot_swing(robot)[i] : 0.0;
+        for (int i = 0; i < joints; i++) {
+            offset[i] += joint_foot[i] == f ? bend * swing[i] : 0.0;
         }
         if (stand->ankles) {
             const double *sole = robot_sim_foot(sim, f)->rotation;
-            double tilt = atan2(-sole[6], hypot(sole[7], sole[8]));
+            double tilt = asin(clamp(-sole[6], 1.0)); /* the row is a unit vector */
             offset[robot_ankle(robot, f)] += clamp(tilt + SWAY_RATE * forward, OFFSET_MAX);
         }
     }
@@ -108,7 +111,8 @@ static void pd(const Robot *robot, const double *q, const double *qd, const doub
                const double *forward, double *torque) {
     const double *pose = robot_default_pose(robot), *effort = robot_effort(robot);
     const double *kp = robot_stand_kp(robot), *kd = robot_stand_kd(robot);
-    for (int i = 0; i < robot_joints(robot); i++) {
+    const int joints = robot_joints(robot);
+    for (int i = 0; i < joints; i++) {
         double wanted = kp[i] * (pose[i] + offset[i] - q[i]) - kd[i] * qd[i];
         torque[i] = clamp(wanted + forward[i], effort[i]);
     }

@@ -80,7 +80,7 @@ static void foot_peaks(const Advance *a, const Memory *memory) {
     for (int i = 0; i < a->foot->elements; i++) {
         const SlotVelocity v = slot_velocity(&a->slot, i, &a->motion, 1);
         const double middle = a->slot.depth[i] + a->dt / 2 * v.descent;
-        if (middle > 0.0) {
+        if (middle > 0.0 && element_turns(a->slot.entry_speed[i], v.descent)) {
             slot_peak(a, memory, i, i, v.descent, middle);
         }
     }

@@ -97,10 +97,15 @@ MILD_HD Real law_cone_progress(const Law *law, Real depth) {
     return real_min(depth * law->inverse_cone_depth, 1);
 }
 
+/* 1 - (1 - t)^3 [-]: how much of its ground the cone has recruited. */
+MILD_HD Real law_cone_share(const Law *law, Real depth) {
+    const Real t = law_cone_progress(law, depth);
+    return t * (3 - t * (3 - t));
+}
+
 /* P(u) [m], u >= 0. */
 MILD_HD Real law_recruited(const Law *law, Real depth) {
-    const Real t = law_cone_progress(law, depth);
-    return law->cone_depth * t * (1 - t + t * t * REAL(1.0 / 3.0));
+    return law->cone_depth * REAL(1.0 / 3.0) * law_cone_share(law, depth);
 }
 
 /* P'(u) [-], 1 at the surface, 0 once the cone is complete. */
@@ -196,14 +201,16 @@ MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
     over.recruited = 0;
     over.recruited_slope = 0;
     if (curves & LAW_CONE) {
-        const Real p_begin = law_recruited(law, begin);
-        const Real p_half = law_recruited(law, half);
-        const Real p_end = law_recruited(law, end);
+        const Real whole = law->cone_depth * REAL(1.0 / 3.0);
+        const Real share_begin = law_cone_share(law, begin);
+        const Real share_half = law_cone_share(law, half);
+        const Real share_end = law_cone_share(law, end);
+        const Real share_mean = (share_begin + 4 * share_half + share_end) * REAL(1.0 / 6.0);
         const Real flat_half = law_flat_share(law, half);
         const Real flat_end = law_flat_share(law, end);
-        over.mean += law->flat_stiffness * (p_begin + 4 * p_half + p_end) * REAL(1.0 / 6.0);
+        over.mean += law->flat_stiffness * whole * share_mean;
         over.mean_slope += law->flat_stiffness * (2 * flat_half + flat_end) * REAL(1.0 / 6.0);
-        over.recruited = way > 0 ? p_end - p_begin : 0;
+        over.recruited = way > 0 ? whole * (share_end - share_begin) : 0;
         over.recruited_slope = way > 0 ? flat_end : 0;
     }
     if (curves & LAW_POWER) {

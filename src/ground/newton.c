@@ -47,28 +47,51 @@ typedef struct {
     int rests; /* bool: Newton's step from here is no longer than rounding */
 } Point;
 
-static void system_open(System *system, const MildScratch *scratch, const MildContactInput *input,
-                        int first, int n) {
-    int stride = 6 * scratch->feet;
-    system->first = first;
-    system->free = (Row){{0.0}};
-    for (int i = 0; i < n; i++) {
-        system->A[i] = (Row){{0.0}};
-        memcpy(system->A[i].at, input->inverse_inertia + (first + i) * stride + first,
-               (size_t)n * sizeof(double));
-    }
-    memcpy(system->free.at, input->free_velocity + first, (size_t)n * sizeof(double));
-    system->tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
-    system->limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
-    system->dt = input->dt;
-}
-
 static int least(int a, int b) {
     return a < b ? a : b;
 }
 
 /* All that follows is compiled for one and for two loaded feet, and for more: n rows in `parts`
- * vectors, of which the last holds the right side, too. */
+ * vectors, of which the last holds the right side, too. Vectors beyond are neither read nor
+ * written. */
+
+ALWAYS_INLINE void row_clear(Row *row, int parts) {
+    for (int p = 0; p < parts; p++) {
+        row->part[p] = (Vector){0.0};
+    }
+}
+
+/* The first n numbers of a row; zeros behind them. */
+ALWAYS_INLINE void row_load(Row *row, const double *values, int n, int parts) {
+    row_clear(row, parts);
+    memcpy(row->at, values, (size_t)n * sizeof *values);
+}
+
+ALWAYS_INLINE void row_copy(Row *to, const Row *from, int parts) {
+    for (int p = 0; p < parts; p++) {
+        to->part[p] = from->part[p];
+    }
+}
+
+ALWAYS_INLINE void point_copy(Point *to, const Point *from, int parts) {
+    row_copy(&to->impulse, &from->impulse, parts);
+    row_copy(&to->twist, &from->twist, parts);
+    to->residual = from->residual;
+    to->rests = from->rests;
+}
+
+ALWAYS_INLINE void system_open(System *system, const MildScratch *scratch,
+                               const MildContactInput *input, int first, int n, int parts) {
+    int stride = 6 * scratch->feet;
+    system->first = first;
+    for (int i = 0; i < n; i++) {
+        row_load(&system->A[i], input->inverse_inertia + (first + i) * stride + first, n, parts);
+    }
+    row_load(&system->free, input->free_velocity + first, n, parts);
+    system->tolerance = input->tolerance > 0.0 ? input->tolerance : NEWTON_TOLERANCE;
+    system->limit = input->max_iterations > 0 ? input->max_iterations : NEWTON_ITERATIONS;
+    system->dt = input->dt;
+}
 
 /* y += A x; A is symmetric. */
 ALWAYS_INLINE void system_times(const System *system, const double *x, Row *y, int n, int parts) {
@@ -81,8 +104,9 @@ ALWAYS_INLINE void system_times(const System *system, const double *x, Row *y, i
 
 /* sqrt(x^T A x): in the metric of kinetic energy. */
 ALWAYS_INLINE double system_norm(const System *system, const double *x, int n, int parts) {
-    Row y = {{0.0}};
+    Row y;
     double sum = 0.0;
+    row_clear(&y, parts);
     system_times(system, x, &y, n, parts);
     for (int i = 0; i < n; i++) {
         sum += x[i] * y.at[i];
@@ -183,11 +207,12 @@ ALWAYS_INLINE int point_step(const System *system, MildScratch *scratch, const P
             M[i].part[p] = row.part[p] + right * unit[n].part[p];
         }
     }
-    memset(next, 0, sizeof *next);
+    next->rests = 0;
+    row_clear(&next->impulse, parts);
     if (!rows_eliminate(M, next->impulse.at, n, parts)) {
         return 0;
     }
-    next->twist = correct ? at->twist : system->free;
+    row_copy(&next->twist, correct ? &at->twist : &system->free, parts);
     system_times(system, next->impulse.at, &next->twist, n, parts);
     for (int i = 0; correct && i < n; i++) {
         next->impulse.at[i] += at->impulse.at[i];
@@ -269,8 +294,9 @@ static void point_correct(const System *system, MildScratch *scratch, Point *at,
  * it has seen. Returns the steps done. */
 ALWAYS_INLINE int newton_plain(const System *system, MildScratch *scratch, Point *best, int limit,
                                int n, int parts) {
-    Point at = *best, next;
+    Point at, next;
     int steps = 0, solved = 0;
+    point_copy(&at, best, parts);
     while (!solved && steps < limit && point_step(system, scratch, &at, &next, 0, n, parts)) {
         steps++;
         point_evaluate(system, scratch, &next, n, parts);
@@ -278,16 +304,16 @@ ALWAYS_INLINE int newton_plain(const System *system, MildScratch *scratch, Point
             point_correct(system, scratch, &at, &next, n, parts);
         }
         if (at.rests) {
-            *best = at;
+            point_copy(best, &at, parts);
             break;
         }
         if (!(next.residual < at.residual)) {
             point_halve(system, scratch, &at, &next, n, parts);
         }
-        at = next;
+        point_copy(&at, &next, parts);
         solved = point_solves(system, &at, n, parts);
         if (solved || at.residual < best->residual) {
-            *best = at;
+            point_copy(best, &at, parts);
         }
     }
     return steps;
@@ -474,10 +500,13 @@ static int newton_unsolved(const System *system, MildScratch *scratch, const Poi
     return steps;
 }
 
-ALWAYS_INLINE void system_solve(const System *system, MildScratch *scratch, const double *start,
+/* The feet from the row `first` on. */
+ALWAYS_INLINE void system_solve(MildScratch *scratch, const MildContactInput *input, int first,
                                 MildContactResult *result, int n, int parts) {
+    System opened, *system = &opened;
     Point best = {.residual = INFINITY};
-    memcpy(best.twist.at, start, (size_t)n * sizeof(double));
+    system_open(system, scratch, input, first, n, parts);
+    row_load(&best.twist, input->velocity[first / 6], n, parts);
     contact_pass(scratch, system->dt, best.twist.at, system->first);
     int steps = newton_plain(system, scratch, &best, least(system->limit, NEWTON_PLAIN), n, parts);
     result->converged = point_solves(system, &best, n, parts);
@@ -503,20 +532,18 @@ void newton_solve(MildScratch *scratch, const MildContactInput *input, MildConta
         end--;
     }
     int n = 6 * (end - first);
-    System system;
     memset(scratch->wrench, 0, sizeof scratch->wrench);
-    system_open(&system, scratch, input, 6 * first, n);
     for (int f = first; f < end && n > 12; f++) { /* a foot in the air between loaded ones */
         if (scratch->foot[f].active == 0) {
             memset(scratch->hessian[f], 0, sizeof scratch->hessian[f]);
         }
     }
     if (n == 6) {
-        system_solve(&system, scratch, input->velocity[first], result, 6, 1);
+        system_solve(scratch, input, 6 * first, result, 6, 1);
     } else if (n == 12) {
-        system_solve(&system, scratch, input->velocity[first], result, 12, 2);
+        system_solve(scratch, input, 6 * first, result, 12, 2);
     } else {
-        system_solve(&system, scratch, input->velocity[first], result, n, NEWTON_VECTORS);
+        system_solve(scratch, input, 6 * first, result, n, NEWTON_VECTORS);
     }
     for (int i = 0; i < stride; i++) {
         double sum = input->free_velocity[i];

@@ -1,3 +1,5 @@
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 #include "ground/energy.h"
@@ -121,26 +123,27 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
     foot_loaded(scratch, input->position[f], f, result);
 }
 
-/* 0 when every value is finite, else NaN: 0 x is 0 for finite x only. */
-static double finite_sum(const double *values, int count) {
-    double sum = 0.0;
+/* Bool. Without a branch or a sum: each value is tested on its own. */
+static int finite(const double *values, int count) {
+    int bad = 0;
     for (int i = 0; i < count; i++) {
-        sum += 0.0 * values[i];
+        bad |= !(fabs(values[i]) <= DBL_MAX);
     }
-    return sum;
+    return !bad;
 }
 
 /* A foot at NaN touches nothing and so meets no equation that fails: look at where the feet are and
  * how they move. A step of no length has no forces. */
 static int all_finite(const MildContactInput *input, const MildContactResult *result, int feet) {
-    double sum = finite_sum(result->velocity, 6 * feet), rate = 1.0 / input->dt;
+    const double rate = 1.0 / input->dt;
+    int all = finite(result->velocity, 6 * feet) & (rate > 0.0) & finite(&rate, 1);
     for (int f = 0; f < feet; f++) {
-        sum += finite_sum(input->position[f], 3) + finite_sum(input->rotation[f], 9) +
-               finite_sum(result->foot[f].force, 3) + finite_sum(result->foot[f].torque, 3) +
-               finite_sum(result->foot[f].zmp_axis, 3) + finite_sum(result->foot[f].zmp_sole, 2) +
-               finite_sum(result->foot[f].pressure_center, 3);
+        const MildFootResult *foot = &result->foot[f];
+        all &= finite(input->position[f], 3) & finite(input->rotation[f], 9) &
+               finite(foot->force, 3) & finite(foot->torque, 3) & finite(foot->zmp_axis, 3) &
+               finite(foot->zmp_sole, 2) & finite(foot->pressure_center, 3);
     }
-    return sum == 0.0 && rate > 0.0 && isfinite(rate);
+    return all;
 }
 
 static void step_solve(MildScratch *scratch, const MildContactInput *input,

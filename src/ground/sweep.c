@@ -6,11 +6,10 @@
 
 #define SWEEP_TOLERANCE 1e-10
 #define SWEEP_LIMIT 1000
-#define SWEEP_REST                                                                                 \
-    1e-6 /* of the impulses themselves: where a guide holds the feet, friction may still turn that \
-            moves nothing */
-#define SWEEP_LEAST_G                                                                              \
-    1e-9 /* [1/kg] a foot that cannot move sideways needs no friction; keeps beta finite */
+/* Of the impulses. Where a guide holds the feet, friction may still change that moves nothing. */
+#define SWEEP_REST 1e-6
+/* [1/kg] A foot that cannot move sideways needs no friction. This keeps beta finite. */
+#define SWEEP_LEAST_G 1e-9
 
 /* Algorithm 1 of the paper. The foot twists are kept up to date, so a velocity prediction costs
  * O(1) and a sweep O(N); the mean over the preceding elements in delta_rb is a running mean. */
@@ -19,11 +18,12 @@ typedef struct {
     double dt;
     const double *A;
     double twist[TWIST_MAX];
-    double before[MILD_FEET_MAX]
-                 [2]; /* sums of the preceding elements' (v_j - omega x p_j), horizontal */
-    int preceding[MILD_FEET_MAX];
-    double changed, total; /* [N s] sums over the elements of a sweep: of the impulses' changes (e
-                              of Algorithm 1), and of them */
+    /* Over the elements of a foot that this sweep has passed: */
+    int preceding[MILD_FEET_MAX];    /* how many */
+    double before[MILD_FEET_MAX][2]; /* [m/s] sum of v_j - omega x p_j, horizontal */
+    /* Over all elements that this sweep has passed: */
+    double changed; /* [N s] sum of the changes of the impulses, e of Algorithm 1 */
+    double total;   /* [N s] sum of the impulses */
 } Sweep;
 
 /* V += A B^T dI */
@@ -105,9 +105,11 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G), old[3] = {s->ix[i], s->iy[i], s->iz[i]},
            fx = s->fx[i], fy = s->fy[i];
     s->iz[i] = element_normal(s, i, foot->curves, sweep->dt, w, G[2]);
-    const Element element = slot_element(s, i);
     double d[2] = {v[0], v[1]}; /* what friction opposes */
-    friction_turn(&element, &d[0], &d[1]);
+    if (foot->turned) {
+        const Element element = slot_element(s, i);
+        friction_turn(&element, &d[0], &d[1]);
+    }
     element_friction(s, i, d, delta, G_xy);
     double b = s->damping[i],
            relax = 1.0 / (1.0 + b * G_xy); /* implicit drift damping, as for the normal part */
