@@ -1,26 +1,25 @@
-/* Bekker's pressure and sinkage, and the shear of Janosi and Hanamoto (J. Y. Wong, Theory of Ground
- * Vehicles, 4th edition, 2008, chapter 2):
+/* Bekker's pressure-sinkage law and the shear law of Janosi and Hanamoto (J. Y. Wong, Theory of
+ * Ground Vehicles, 4th edition, 2008, chapter 2):
  *
  *     p = (k_c/b + k_phi) z^n
  *     s = (c + p mu) (1 - exp(-j/K))
- *
- * j is the length of the path that the element has slid since it touched down, which the drift
- * remembers anyway (element.h). */
+ * j is the distance that the element has slid since it touched down, which is its drift
+ * (ElementMemory in element.h). */
 #include "ground/friction.h"
 #include "ground/model.h"
 #include "ground/scratch.h"
 
-/* Wong 2008, table 2.3: dry sand (Land Locomotion Laboratory), sandy loam (the same, 15 % of
- * water), clayey soil (Thailand, 38 %), snow (Harrison). Its K are ranges; these lie within those
- * of firm sand, loose sand, clay and fresh snow. Lunar soil, K too: Heiken, Vaniman, French, Lunar
- * Sourcebook, 1991, section 9.1. */
+/* Wong 2008, table 2.3: dry sand (Land Locomotion Laboratory), sandy loam (Land Locomotion
+ * Laboratory, 15 % water), clayey soil (Thailand, 38 % water), snow (Harrison). The book gives
+ * ranges of K. The values here lie within those of firm sand, loose sand, clay and fresh snow.
+ * Lunar soil, including K: Heiken, Vaniman, French, Lunar Sourcebook, 1991, section 9.1. */
 typedef struct {
     const char *name;
     double exponent;     /* n [-] */
     double k_c;          /* [N/m^(n+1)] */
     double k_phi;        /* [N/m^(n+2)] */
     double cohesion;     /* c [N/m^2] */
-    double angle;        /* [degrees] of friction */
+    double angle;        /* [degrees] friction angle, mu = tan(angle) */
     double shear_length; /* K [m] */
     double density;      /* [kg/m^3] */
 } Soil;
@@ -62,7 +61,7 @@ static Law bekker_law(const MildMaterial *material, double pitch) {
     return law;
 }
 
-/* Dry sand without cohesion: friction stays that of mild. */
+/* Dry sand without cohesion, with the friction of the material of mild. */
 static void bekker_material(MildMaterial *material, double area) {
     (void)area;
     material->exponent = soils[0].exponent;
@@ -71,14 +70,14 @@ static void bekker_material(MildMaterial *material, double area) {
     material->cohesion = 0.0;
 }
 
-/* mu [-] of a slot's material, or of the two that blend in it. */
+/* mu [-] of a slot's material, or of its mixture of two. */
 static double slot_mu(const MildTerrain *terrain, int32_t mixture) {
     const double near = terrain->materials[mixture & 0xff].mu;
     const double far = terrain->materials[mixture >> 8 & 0xff].mu;
     return mixture >> 16 ? near + (mixture >> 16) / 255.0 * (far - near) : near;
 }
 
-/* Friction of the slots whose nearer material is of this model. */
+/* Sets friction by the shear law in the slots whose nearer material is of this model. */
 static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
                          const double *rotation, const Motion *now) {
     (void)rotation;
@@ -105,7 +104,7 @@ static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, in
 }
 
 const ModelRow model_bekker = {
-    .info = {.summary = "pressure by a power of the sinkage, shear strength that builds up",
+    .info = {.summary = "pressure a power of the sinkage; shear strength grows with slip",
              .source = "Bekker 1969, Janosi and Hanamoto 1961",
              .fields = {"k_c", "k_phi", "exponent", "plate_width", "cohesion", "mu", "shear_length",
                         "k_drift", "b_drift", "recovery", "bed_depth"},
