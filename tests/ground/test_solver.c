@@ -109,13 +109,16 @@ typedef enum {
     BLEND,
     PRINTS,
     ACTIVE,
+    BEKKER,
+    HUNT_CROSSLEY,
     EVERYTHING,
     KINDS
 } Kind;
 static const char *const kind_names[KINDS] = {
-    "springs",      "con_cone and con_spring", "ecc_quasi",
-    "ecc_quasi_3d", "uneven ground",           "materials that blend",
-    "prints",       "passive = false",         "everything at once"};
+    "springs",       "con_cone and con_spring", "ecc_quasi",
+    "ecc_quasi_3d",  "uneven ground",           "materials that blend",
+    "prints",        "passive = false",         "bekker",
+    "hunt_crossley", "everything at once"};
 
 /* One of the models of the raster, with numbers for it. */
 static MildMaterial material_of(uint64_t *random, MildModel model) {
@@ -125,6 +128,15 @@ static MildMaterial material_of(uint64_t *random, MildModel model) {
         return m;
     }
     m.zeta = kit_uniform(random, 0.05, 1.5);
+    if (model == MILD_MODEL_BEKKER || model == MILD_MODEL_HUNT_CROSSLEY) {
+        m.exponent = kit_uniform(random, 0.4, 2.0);
+        m.k_c = kit_uniform(random, 0.0, 50e3);
+        m.k_phi = pow(10.0, kit_uniform(random, 4.5, 6.0));
+        m.plate_width = kit_uniform(random, 0.05, 0.2);
+        m.cohesion = kit_uniform(random, 0.0, 10e3);
+        m.shear_length = kit_uniform(random, 0.001, 0.05);
+        m.dissipation = kit_uniform(random, 0.0, 5.0);
+    }
     if (kit_index(random, 2)) {
         m.mu = 0.0; /* as matched, and with friction on top */
     }
@@ -135,13 +147,15 @@ static MildMaterial material_of(uint64_t *random, MildModel model) {
 }
 
 static MildMaterial kind_material(Kind kind, uint64_t *random) {
-    static const MildModel models[4] = {MILD_MODEL_MILD, MILD_MODEL_ECC_SPRING,
-                                        MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D};
-    MildModel model = kind == EVERYTHING ? models[kit_index(random, 4)]
-                      : kind == SPRING   ? MILD_MODEL_ECC_SPRING
-                      : kind == QUASI    ? MILD_MODEL_ECC_QUASI
-                      : kind == QUASI_3D ? MILD_MODEL_ECC_QUASI_3D
-                                         : MILD_MODEL_MILD;
+    static const MildModel models[6] = {MILD_MODEL_MILD,      MILD_MODEL_ECC_SPRING,
+                                        MILD_MODEL_ECC_QUASI, MILD_MODEL_ECC_QUASI_3D,
+                                        MILD_MODEL_BEKKER,    MILD_MODEL_HUNT_CROSSLEY};
+    static const MildModel own[KINDS] = {[SPRING] = MILD_MODEL_ECC_SPRING,
+                                         [QUASI] = MILD_MODEL_ECC_QUASI,
+                                         [QUASI_3D] = MILD_MODEL_ECC_QUASI_3D,
+                                         [BEKKER] = MILD_MODEL_BEKKER,
+                                         [HUNT_CROSSLEY] = MILD_MODEL_HUNT_CROSSLEY};
+    MildModel model = kind == EVERYTHING ? models[kit_index(random, 6)] : own[kind];
     MildMaterial m = material_of(random, model);
     if (kit_index(random, 5) == 0) {
         m.bed_depth = kit_uniform(random, 0.001, 0.02);
