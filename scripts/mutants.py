@@ -37,6 +37,12 @@ FAULTS = ROOT / "tests" / "faults.txt"
 # Share of their draws that the ground's random tests make (tests/ground/ground_kit.h).
 DRAWS = "0.1"
 
+# glibc fills new memory with a pattern, so that what nobody set is no lucky 0, and its checking
+# malloc aborts when a block is freed whose end was written over.
+MEMORY = {"MALLOC_PERTURB_": "165"}
+if pathlib.Path("/lib/x86_64-linux-gnu/libc_malloc_debug.so.0").exists():
+    MEMORY |= {"MALLOC_CHECK_": "3", "LD_PRELOAD": "libc_malloc_debug.so.0"}
+
 # A layer without a folder of tests is tested by the layer above it.
 TESTED_BY = {"control": ("control", "eval")}
 
@@ -169,8 +175,9 @@ def find_tests(layers):
 
 
 def build_tests(layers, jobs):
-    flags = ["-DCMAKE_BUILD_TYPE=None", "-DCMAKE_C_FLAGS=-O3", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
-             "-DMILD_WERROR=ON", "--log-level=ERROR"]
+    # an array on the stack that overflows stops the program, as under the sanitizers
+    flags = ["-DCMAKE_BUILD_TYPE=None", "-DCMAKE_C_FLAGS=-O3 -fstack-protector-strong",
+             "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", "-DMILD_WERROR=ON", "--log-level=ERROR"]
     if shutil.which("ccache"):
         flags.append("-DCMAKE_C_COMPILER_LAUNCHER=ccache")
     run_quiet(["cmake", "-S", TREE, "-B", BUILD, "-G", "Unix Makefiles", "-Wno-dev", *flags])
@@ -308,7 +315,7 @@ class Worker:
             resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 30, 1 << 30))
 
         environment = dict(os.environ, CMOCKA_TEST_ABORT="1", TMPDIR=str(self.folder),
-                           MILD_TEST_DRAWS=DRAWS)
+                           MILD_TEST_DRAWS=DRAWS, **MEMORY)
         log = self.folder / "log"
         with open(log, "wb") as out:
             child = subprocess.Popen(command, cwd=self.run_folder, stdout=out, stderr=out,
