@@ -236,7 +236,7 @@ def linked_objects(test, objects):
 
 
 class Worker:
-    def __init__(self, number, objects, tests, originals):
+    def __init__(self, number, objects, tests):
         self.folder = WORK / f"worker{number}"
         shutil.rmtree(self.folder, ignore_errors=True)
         self.overlay = self.folder / "overlay"
@@ -244,11 +244,11 @@ class Worker:
         self.run_folder.mkdir(parents=True)
         for entry in TREE.iterdir():  # tests read and write relative to the root of the tree
             (self.run_folder / entry.name).symlink_to(entry)
-        self.objects, self.tests, self.originals = objects, tests, originals
+        self.objects, self.tests = objects, tests
 
     def compile(self, path, source):
-        """Objects that depend on path, made with source in its place: {object: bytes}, or the
-        compiler's message."""
+        """Objects that depend on path, made with source in its place: {object: the new one}, or
+        the compiler's message. What did not change gives the same bytes."""
         original = TREE / path
         shutil.rmtree(self.overlay, ignore_errors=True)
         layer_path = pathlib.Path(path).relative_to("src")
@@ -267,20 +267,14 @@ class Worker:
                                   errors="replace", check=False)
             if done.returncode:
                 return done.stderr
-            made[name] = (output, output.read_bytes())
+            made[name] = output
         return made
 
     def affected(self, original):
+        """The small ones first, which tell soonest that the compiler refuses a mutant."""
         real = os.path.realpath(original)
-        return sorted((n, o) for n, o in self.objects.items() if real in o.depends)
-
-    def original_bytes(self, path, source):
-        if path not in self.originals:
-            made = self.compile(path, source)
-            if isinstance(made, str):
-                sys.exit(f"mutants: {path} does not compile unchanged:\n{made}")
-            self.originals[path] = {name: data for name, (_, data) in made.items()}
-        return self.originals[path]
+        return sorted(((n, o) for n, o in self.objects.items() if real in o.depends),
+                      key=lambda entry: entry[0].stat().st_size)
 
     def link(self, test, changed):
         """The test's command with executables that hold the changed objects."""
@@ -330,12 +324,12 @@ class Worker:
 
     def judge(self, mutant, source):
         """(verdict, detail): refused, same, caught or survived."""
-        original = self.original_bytes(mutant.path, source)
         text = source[:mutant.begin] + mutant.text + source[mutant.end:]
         made = self.compile(mutant.path, text)
         if isinstance(made, str):
             return "refused", made.strip().splitlines()[0] if made.strip() else "compiler"
-        changed = {name: path for name, (path, data) in made.items() if data != original[name]}
+        changed = {name: path for name, path in made.items()
+                   if path.read_bytes() != name.read_bytes()}
         if not changed:
             return "same", ""
         reached = False
@@ -492,8 +486,7 @@ def prepare(layers, jobs):
         test.members = linked_objects(test, objects)
     used = set().union(*(t.members for t in tests))
     objects = {name: item for name, item in objects.items() if name in used}
-    originals = {}
-    workers = [Worker(k, objects, tests, originals) for k in range(max(1, jobs))]
+    workers = [Worker(k, objects, tests) for k in range(max(1, jobs))]
     measure(tests, workers[0], jobs)
     return tests, workers
 

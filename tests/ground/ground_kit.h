@@ -47,6 +47,12 @@ static inline double kit_seconds(double time) {
     return share ? time * atof(share) : time;
 }
 
+/* First of the time steps, from fine to coarse, that a test takes: the finest costs most, and is
+ * left out where MILD_TEST_DRAWS is set. */
+static inline int kit_finest(void) {
+    return getenv("MILD_TEST_DRAWS") != NULL;
+}
+
 /* Left sole of the reference robot, y range at x [m]; the right one is its mirror image. */
 static const double kit_outline[19][3] = {
     {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044},  {-0.045, -0.045, 0.047},
