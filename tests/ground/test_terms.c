@@ -202,6 +202,64 @@ static void test_way(void **state) {
     assert_true(line.recruited == 0.0 && line.recruited_slope == 0.0);
 }
 
+/* A quarter of the way from one law to another; a curve that only one has keeps its shape and fades
+ * out. */
+static void test_law_between(void **state) {
+    (void)state;
+    const Law a = {.flat_stiffness = 100,
+                   .line_stiffness = 200,
+                   .cone_depth = 0.02,
+                   .mass_rate = 4,
+                   .drag_rate = 8,
+                   .bed_depth = 0.1,
+                   .bed_stiffness = 1e4,
+                   .power_force = 10,
+                   .power_exponent = 1.2,
+                   .elastic_force = 2,
+                   .elastic_exponent = 1.5,
+                   .elastic_damping = 0.4};
+    const Law b = {.flat_stiffness = 500,
+                   .line_stiffness = 0,
+                   .cone_depth = 0.04,
+                   .mass_rate = 8,
+                   .drag_rate = 0,
+                   .bed_depth = 0.2,
+                   .bed_stiffness = 2e4,
+                   .power_force = 30,
+                   .power_exponent = 0.8,
+                   .elastic_force = 6,
+                   .elastic_exponent = 1.1,
+                   .elastic_damping = 0.8};
+    const Law wanted = {.flat_stiffness = 200,
+                        .line_stiffness = 150,
+                        .cone_depth = 0.025,
+                        .inverse_cone_depth = 40,
+                        .mass_rate = 5,
+                        .drag_rate = 6,
+                        .bed_depth = 0.125,
+                        .bed_stiffness = 12500,
+                        .power_force = 15,
+                        .power_exponent = 1.1,
+                        .elastic_force = 3,
+                        .elastic_exponent = 1.4,
+                        .elastic_damping = 0.5};
+    const Law law = law_between(&a, &b, 0.25);
+#define SAME(name) assert_close(#name, law.name, wanted.name, 1e-9);
+    LAW_NUMBERS(SAME)
+#undef SAME
+    const Law none = {.cone_depth = 0.02};
+    for (int first = 0; first < 2; first++) {
+        const Law faded = first ? law_between(&a, &none, 0.25) : law_between(&none, &a, 0.75);
+        assert_close("power", faded.power_force, 7.5, 1e-12);
+        assert_close("exponent", faded.power_exponent, 1.2, 0.0);
+        assert_close("elastic", faded.elastic_force, 1.5, 1e-12);
+        assert_close("exponent", faded.elastic_exponent, 1.5, 0.0);
+        assert_close("damping", faded.elastic_damping, 0.4, 0.0);
+        assert_int_equal(law_curves(&faded), LAW_ALL);
+    }
+    assert_int_equal(law_curves(&none), LAW_LINE);
+}
+
 /* ---- terms ---- */
 
 /* What the path's impulse does at the mean speed is what the static force does on the way. */
@@ -560,6 +618,7 @@ int main(void) {
                                        cmocka_unit_test(test_slopes_of_friction),
                                        cmocka_unit_test(test_way),
                                        cmocka_unit_test(test_path_keeps_the_work),
+                                       cmocka_unit_test(test_law_between),
                                        cmocka_unit_test(test_added_mass),
                                        cmocka_unit_test(test_growth),
                                        cmocka_unit_test(test_lag),
