@@ -191,6 +191,22 @@ static void test_sole_places(void **state) {
     }
 }
 
+/* The raster may have 65536 cells, a border of one around the outline's box included. */
+static void test_sole_sizes(void **state) {
+    (void)state;
+    for (int more = 0; more < 2; more++) {
+        const double edge = 0.254 + 0.0001 * more;
+        double box[8] = {0, 0, edge, 0, edge, 0.25399, 0, 0.25399};
+        MildSoleDef def = {box, 4, 1e-3, KIT_SOLE_Z, 0};
+        MildError error = {0};
+        MildSole *sole = mild_sole_create(&def, &error);
+        assert_true((sole == NULL) == more);
+        assert_true(more ? strstr(error.text, "at most 65536") != NULL
+                         : mild_sole_elements(sole) == 254 * 254);
+        mild_sole_destroy(sole);
+    }
+}
+
 static void test_sole_refused(void **state) {
     (void)state;
     double square[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1}, bow[8] = {0, 0, 0.1, 0.1, 0.1, 0, 0, 0.12};
@@ -299,7 +315,8 @@ int main(void) {
         cmocka_unit_test(test_field_parse),     cmocka_unit_test(test_field_print),
         cmocka_unit_test(test_field_find),      cmocka_unit_test(test_material_refused),
         cmocka_unit_test(test_terrain),         cmocka_unit_test(test_sole_counts),
-        cmocka_unit_test(test_sole_places),     cmocka_unit_test(test_sole_refused),
-        cmocka_unit_test(test_hostile_numbers), cmocka_unit_test(test_hostile_material)};
+        cmocka_unit_test(test_sole_places),     cmocka_unit_test(test_sole_sizes),
+        cmocka_unit_test(test_sole_refused),    cmocka_unit_test(test_hostile_numbers),
+        cmocka_unit_test(test_hostile_material)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

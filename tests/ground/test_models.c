@@ -139,6 +139,31 @@ static void test_match_is_accepted(void **state) {
     assert_true(matched > 1000 && refused > 100);
 }
 
+/* A concentric model has the sole in one element: the area of all in its middle, and drift as stiff
+ * and damped as that of all. */
+static void test_concentration(void **state) {
+    (void)state;
+    const int cells = mild_sole_elements(raster[0]);
+    double x = 0.0, y = 0.0;
+    for (int e = 0; e < cells; e++) {
+        x += mild_sole_x(raster[0])[e] / cells;
+        y += mild_sole_y(raster[0])[e] / cells;
+    }
+    assert_int_equal(mild_sole_elements(center[0]), 1);
+    assert_true(fabs(pow(mild_sole_pitch(center[0]), 2) - cells * KIT_PITCH * KIT_PITCH) < 1e-15);
+    assert_true(fabs(mild_sole_x(center[0])[0] - x) < 1e-15);
+    assert_true(fabs(mild_sole_y(center[0])[0] - y) < 1e-15);
+    assert_true(mild_sole_z(center[0]) == KIT_SOLE_Z);
+    for (int model = 0; model < SOFT_MODELS; model++) {
+        const MildMaterial mild = preset("sand_loose"), rival = rival_of(model, &mild);
+        const double all = mild_model_is_concentric((MildModel)model) ? cells : 1;
+        const double share = rival.mu / mild.mu; /* 0: friction is part of resistive force theory */
+        assert_true(share == 0.0 || share == 1.0);
+        assert_true(rival.k_drift == share * all * mild.k_drift);
+        assert_true(rival.b_drift == share * all * mild.b_drift);
+    }
+}
+
 static void test_refusals(void **state) {
     (void)state;
     MildMaterial mild = mild_material_default(), rival = mild,
@@ -600,11 +625,11 @@ static void test_moment(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_matched),       cmocka_unit_test(test_match_is_accepted),
-        cmocka_unit_test(test_refusals),      cmocka_unit_test(test_equilibrium),
-        cmocka_unit_test(test_no_creep),      cmocka_unit_test(test_impact),
-        cmocka_unit_test(test_passive),       cmocka_unit_test(test_symmetry),
-        cmocka_unit_test(test_solvers_agree), cmocka_unit_test(test_copy_continues),
-        cmocka_unit_test(test_moment)};
+        cmocka_unit_test(test_matched),        cmocka_unit_test(test_match_is_accepted),
+        cmocka_unit_test(test_refusals),       cmocka_unit_test(test_concentration),
+        cmocka_unit_test(test_equilibrium),    cmocka_unit_test(test_no_creep),
+        cmocka_unit_test(test_impact),         cmocka_unit_test(test_passive),
+        cmocka_unit_test(test_symmetry),       cmocka_unit_test(test_solvers_agree),
+        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_moment)};
     return cmocka_run_group_tests(tests, make_soles, drop_soles);
 }
