@@ -162,6 +162,9 @@ static void test_concentration(void **state) {
         assert_true(rival.k_drift == share * all * mild.k_drift);
         assert_true(rival.b_drift == share * all * mild.b_drift);
     }
+    const MildMaterial foam = preset("foam45"); /* springs yield, on foam too */
+    assert_true(foam.recovery == 1.0 && rival_of(MILD_MODEL_ECC_SPRING, &foam).recovery == 0.0 &&
+                rival_of(MILD_MODEL_CON_SPRING, &foam).recovery == 0.0);
 }
 
 static void test_refusals(void **state) {

@@ -534,6 +534,7 @@ static void test_peak(void **state) {
                  1e-12);
     e.recovery = 1.0;
     assert_true(element_peak(&e, LAW_LINE, 0.05, 0.1, middle) == middle); /* does not turn */
+    assert_true(element_peak(&e, LAW_LINE, 0.0, -0.1, middle) == middle); /* nothing turned it */
     /* it still has to go down the unloading line from 0.6 to 1 mm: (0.4^2 - 0) mm^2 500 N/m */
     e.middle = 0.0006, e.zero_depth = 0.0006;
     const double left = 8e-3 - 500.0 * 0.16e-6;
