@@ -113,6 +113,106 @@ static void test_rough(void **state) {
     mild_map_destroy(other);
 }
 
+/* Rough ground is random at points a wavelength apart, and between them follows 3 t^2 - 2 t^3:
+ * 5/32 a quarter on, 1/2 in the middle, along both axes. */
+static void test_rough_between(void **state) {
+    (void)state;
+    static const double share[4] = {0.0, 5.0 / 32.0, 0.5, 27.0 / 32.0};
+    MildMapDef def = shape(MILD_MAP_ROUGH, 0.04, 0.25);
+    def.size = 2.0;
+    def.cell = 0.25 / 4;
+    MildMap *map = make_map(&def);
+    MildTerrain terrain = terrain_on(map, 0.0);
+    double worst = 0.0, alike = 1.0;
+    for (int n = 0; n < 64 * 16; n++) {
+        const int i = n % 4, j = n / 4 % 4;
+        const double x = n / 16 % 8 * 0.25, y = n / 128 * 0.25;
+        double corner[4];
+        for (int k = 0; k < 4; k++) {
+            corner[k] = mild_terrain_height_at(&terrain, x + k % 2 * 0.25, y + k / 2 * 0.25);
+        }
+        const double low = (1 - share[i]) * corner[0] + share[i] * corner[1];
+        const double high = (1 - share[i]) * corner[2] + share[i] * corner[3];
+        const double height = mild_terrain_height_at(&terrain, x + i * def.cell, y + j * def.cell);
+        worst = fmax(worst, fabs(height - (1 - share[j]) * low - share[j] * high));
+        alike = fmin(alike, fabs(corner[0] - corner[1]));
+    }
+    print_message("rough between its points: off by %.1e m, neighbours differ by %.1e m\n", worst,
+                  alike);
+    assert_true(worst < 1e-8 && alike > 1e-5);
+    mild_map_destroy(map);
+}
+
+static void assert_range(const MildMap *map, double low, double high) {
+    double range[2];
+    mild_map_range(map, &range[0], &range[1]);
+    assert_true(range[0] == low || fabs(range[0] - low) < 1e-8);
+    assert_true(range[1] == high || fabs(range[1] - high) < 1e-8);
+}
+
+/* Lowest and highest point, the length after which it repeats, and the number of labels. */
+static void test_measures(void **state) {
+    (void)state;
+    MildMapDef def = shape(MILD_MAP_WAVES, 0.03, 0.8); /* 40 cells: the crests are grid points */
+    double x, y;
+    MildMap *map = make_map(&def);
+    assert_range(map, -0.03, 0.03);
+    mild_map_extent(map, &x, &y);
+    assert_true(fabs(x - 0.8) < 1e-12 && fabs(y - 0.8) < 1e-12);
+    assert_int_equal(mild_map_label_count(map), 1);
+    mild_map_destroy(map);
+
+    def = shape(MILD_MAP_STEPS, 0.05, 0.8);
+    def.patches = MILD_PATTERN_STRIPES, def.patch_count = 5;
+    map = make_map(&def);
+    assert_range(map, 0.0, 0.05);
+    mild_map_extent(map, &x, &y);
+    assert_true(fabs(x - 2.5) < 1e-12); /* five stripes of 0.5 m */
+    assert_int_equal(mild_map_label_count(map), 5);
+    mild_map_destroy(map);
+
+    double heights[12] = {-0.5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.25}; /* in opposite corners */
+    def = shape(MILD_MAP_IMAGE, 2.0, 1.0);
+    def.heights = heights, def.height_columns = 4, def.height_rows = 3, def.cell = 0.1;
+    map = make_map(&def);
+    assert_range(map, -1.0, 0.5);
+    mild_map_extent(map, &x, &y);
+    assert_true(fabs(x - 0.3) < 1e-12 && fabs(y - 0.2) < 1e-12);
+    mild_map_destroy(map);
+
+    def = mild_map_def_default();
+    map = make_map(&def);
+    assert_true(mild_map_is_level(map) && mild_map_label_count(map) == 1);
+    assert_range(map, 0.0, 0.0);
+    mild_map_destroy(map);
+    def.kind = MILD_MAP_SLOPE;
+    map = make_map(&def);
+    assert_range(map, -INFINITY, INFINITY);
+    mild_map_destroy(map);
+}
+
+/* What only becomes visible with a kind is usable as it is: uneven by some mm to some dm. */
+static void test_defaults(void **state) {
+    (void)state;
+    for (int kind = MILD_MAP_SLOPE; kind <= MILD_MAP_ROUGH; kind++) {
+        for (int patches = MILD_PATTERN_NONE; patches <= MILD_PATTERN_CHECKER; patches++) {
+            MildMapDef def = mild_map_def_default();
+            assert_true(def.kind == MILD_MAP_FLAT && def.patches == MILD_PATTERN_NONE);
+            def.kind = kind, def.patches = patches;
+            MildMap *map = make_map(&def);
+            MildTerrain terrain = terrain_on(map, 0.0);
+            double low = INFINITY, high = -INFINITY;
+            for (int n = 0; n < 100 * 100; n++) {
+                const double h = mild_terrain_height_at(&terrain, n % 100 * 0.02, n / 100 * 0.02);
+                low = fmin(low, h), high = fmax(high, h);
+            }
+            assert_true(high - low > 5e-3 && high - low < 0.3);
+            assert_int_equal(mild_map_label_count(map), patches == MILD_PATTERN_NONE ? 1 : 2);
+            mild_map_destroy(map);
+        }
+    }
+}
+
 /* A tilted plane as an image: bilinear interpolation gives it exactly (float heights: a relative
  * 6e-8), slopes too; beyond the border its last height goes on. */
 static void test_plane(void **state) {
@@ -625,11 +725,13 @@ static void test_smooth_border(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_shapes),          cmocka_unit_test(test_rough),
-        cmocka_unit_test(test_plane),           cmocka_unit_test(test_patterns),
-        cmocka_unit_test(test_refused),         cmocka_unit_test(test_bytes),
-        cmocka_unit_test(test_translation),     cmocka_unit_test(test_smooth_border),
-        cmocka_unit_test(test_slope_friction),  cmocka_unit_test(test_solvers),
-        cmocka_unit_test(test_passive_by_hand), cmocka_unit_test(test_passive)};
+        cmocka_unit_test(test_shapes),        cmocka_unit_test(test_rough),
+        cmocka_unit_test(test_rough_between), cmocka_unit_test(test_measures),
+        cmocka_unit_test(test_defaults),      cmocka_unit_test(test_plane),
+        cmocka_unit_test(test_patterns),      cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_bytes),         cmocka_unit_test(test_translation),
+        cmocka_unit_test(test_smooth_border), cmocka_unit_test(test_slope_friction),
+        cmocka_unit_test(test_solvers),       cmocka_unit_test(test_passive_by_hand),
+        cmocka_unit_test(test_passive)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
