@@ -1,10 +1,10 @@
-/* From the MJCF of a robot folder to the engine's models. */
+/* Turns the MJCF of a robot folder into the engine's models. */
 #include <stdio.h>
 #include <string.h>
 
 #include "robot/description.h"
 
-/* MuJoCo's messages have several lines; ours have one. */
+/* Joins the lines of MuJoCo's messages, because ours have a single line. */
 static void one_line(char *text) {
     for (char *c = text; *c; c++) {
         if (*c == '\n' || *c == '\r') {
@@ -13,8 +13,8 @@ static void one_line(char *text) {
     }
 }
 
-/* What our step does not compute must not be in the file: left out in silence it would make another
- * robot. */
+/* Refuses features that our step does not compute. Ignoring them silently would simulate a
+ * different robot. */
 static MildStatus check_supported(const mjModel *m, const char *path, MildError *error) {
     if (m->neq > 0 || m->ntendon > 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
@@ -37,7 +37,8 @@ static MildStatus check_supported(const mjModel *m, const char *path, MildError 
     return MILD_OK;
 }
 
-/* Bodies keep the inertia that the compiler found from their geoms, for these go. */
+/* Gives the bodies the inertia that the compiler derived from their geoms, because the geoms are
+ * about to be removed. */
 static void fix_inertia(mjSpec *spec, const mjModel *m) {
     for (mjsElement *e = mjs_firstElement(spec, mjOBJ_BODY); e; e = mjs_nextElement(spec, e)) {
         mjsBody *body = mjs_asBody(e);
@@ -53,8 +54,8 @@ static void fix_inertia(mjSpec *spec, const mjModel *m) {
     }
 }
 
-/* A step pays for every geom whose pose it computes, and every workspace copies the model: only
- * bodies and joints stay. */
+/* Removes everything but bodies and joints. A step computes the pose of every geom, and every
+ * workspace copies the model. */
 static void strip(mjSpec *spec) {
     static const mjtObj dropped[] = {mjOBJ_SENSOR,   mjOBJ_ACTUATOR, mjOBJ_KEY,    mjOBJ_PAIR,
                                      mjOBJ_EXCLUDE,  mjOBJ_SITE,     mjOBJ_CAMERA, mjOBJ_LIGHT,
@@ -78,7 +79,7 @@ static mjsGeom *add_geom(mjsBody *body, const char *name, mjtGeom type) {
     return geom;
 }
 
-/* The engine's rigid ground: a floor, and under each foot the spheres that it stands on. */
+/* Adds the engine's rigid ground: a floor, and the spheres that each foot stands on. */
 static MildStatus add_rigid_ground(const RobotDef *def, const char *path, mjSpec *spec,
                                    MildError *error) {
     mjsGeom *floor = add_geom(mjs_findBody(spec, "world"), "floor", mjGEOM_PLANE);
