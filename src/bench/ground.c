@@ -74,7 +74,8 @@ static double ground_run(GroundBench *bench, int steps, int advance) {
     return clock_thread_seconds() - start;
 }
 
-/* [ns] per step: the least of many short repeats, because other programs only add time. */
+/* [ns] Time per step: the minimum of many short repeats, because other programs can only add
+ * time. */
 static double ground_time(GroundBench *bench, int advance) {
     double least = INFINITY;
     int steps = 1;

@@ -46,7 +46,7 @@ static inline MILD_HD LossSurrogate loss_surrogate(int actions, const float *con
     const float free_term = ratio * advantage;
     const float held_term = held * advantage;
     const int is_free = free_term <= held_term;
-    s.loss = -(is_free || isnan(free_term) ? free_term : held_term); /* NaN must show */
+    s.loss = -(is_free || isnan(free_term) ? free_term : held_term); /* NaN must propagate */
     s.d_log_prob = is_free ? -free_term : 0.0f;
     s.clipped = ratio != held;
     return s;

@@ -13,8 +13,8 @@ typedef struct Ppo Ppo;
 Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror, int envs,
                 uint64_t seed, MildError *error);
 void ppo_destroy(Ppo *ppo);
-/* Computes on another device from now on (learn/backend.h). Takes the backend over: ppo_destroy
- * destroys it. */
+/* Computes on another device from now on (learn/backend.h). Takes ownership of the backend, which
+ * ppo_destroy destroys. */
 struct PpoBackend;
 void ppo_use(Ppo *ppo, const struct PpoBackend *backend);
 PpoBatch *ppo_batch(Ppo *ppo);
@@ -29,8 +29,8 @@ int64_t ppo_iteration(const Ppo *ppo);
 /* The running mean of the weights (Polyak and Juditsky 1992), or the policy itself with def.average
  * = 0. Owned by ppo. */
 Policy *ppo_average(Ppo *ppo);
-/* The error that stopped the compute backend, if any. The parameters are those of the last good
- * step. */
+/* The error that stopped the compute backend, if any. The parameters are those of the last step
+ * that succeeded. */
 MildStatus ppo_status(const Ppo *ppo, MildError *error);
 
 /* Saves all that resuming needs: parameters, moments, rate, counters, and a block of the
