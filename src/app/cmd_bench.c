@@ -23,8 +23,9 @@ static const struct {
      "pose and in turns; ratio_to_rigid is newton over engine_rigid"},
     {"ground", bench_ground, "the contact solver alone"},
     {"elements", bench_elements, "the contact solver with 20 to 2000 elements"},
-    {"solver", bench_solver, "newton against the paper's gauss_seidel sweeps, to the same error"},
-    {"walk", bench_walk, "as step, along a walk of the shipped policy"},
+    {"solver", bench_solver,
+     "newton compared with the paper's gauss_seidel sweeps, at the same error"},
+    {"walk", bench_walk, "the same as step, along a walk of the shipped policy"},
     {"train", bench_train, "policy steps per second in training, and how the time is spent"},
 };
 enum { BENCHES = sizeof benches / sizeof *benches };
