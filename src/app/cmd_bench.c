@@ -11,7 +11,7 @@
 #include "bench/bench.h"
 #include "config/experiment_keys.h"
 
-/* memory comes first, because its peak is that of the whole process so far. */
+/* memory comes first, because it reports the peak of the whole process so far. */
 static const struct {
     const char *name;
     MildStatus (*run)(const ExperimentDef *def, BenchReport *report, MildError *error);

@@ -149,7 +149,7 @@ static MildStatus csv_write(const PressResult *result, int more, const char *pat
     return status;
 }
 
-/* The picture is drawn from the file of --csv, or else from FILE.csv beside FILE.png. */
+/* Draws the picture from the file of --csv, or otherwise from FILE.csv beside FILE.png. */
 static MildStatus figure_save(const PressOptions *options, const PressResult *result, int more,
                               MildError *error) {
     char data[PATH_SIZE];

@@ -83,7 +83,7 @@ static MildStatus make_config_text(Command *run, MildError *error) {
 
 typedef struct {
     Progress bar;
-    double steps_per_s, reward, length, falls; /* smoothed, but for falls */
+    double steps_per_s, reward, length, falls; /* smoothed, except falls */
     int64_t iteration, iterations;             /* of the whole run, of this session */
     int64_t bad;                               /* diverged environments and skipped minibatches */
 } Display;

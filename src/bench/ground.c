@@ -132,7 +132,8 @@ static void ground_cases(GroundBench *bench, const Robot *robot, double dt, Benc
     }
 }
 
-/* The standing step on waves, and on ground that remembers prints; beside newton_stick_advance. */
+/* The standing step on waves, and on ground that remembers imprints, to compare with
+ * newton_stick_advance. */
 static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double dt,
                                  BenchReport *report, MildError *error) {
     enum { TILES = 128 };
