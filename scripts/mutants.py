@@ -37,6 +37,12 @@ FAULTS = ROOT / "tests" / "faults.txt"
 # Share of their draws that the ground's random tests make (tests/ground/ground_kit.h).
 DRAWS = "0.1"
 
+# glibc fills new memory with a pattern, so that what nobody set is no lucky 0, and its checking
+# malloc aborts when a block is freed whose end was written over.
+MEMORY = {"MALLOC_PERTURB_": "165"}
+if pathlib.Path("/lib/x86_64-linux-gnu/libc_malloc_debug.so.0").exists():
+    MEMORY |= {"MALLOC_CHECK_": "3", "LD_PRELOAD": "libc_malloc_debug.so.0"}
+
 # A layer without a folder of tests is tested by the layer above it.
 TESTED_BY = {"control": ("control", "eval")}
 
@@ -169,8 +175,9 @@ def find_tests(layers):
 
 
 def build_tests(layers, jobs):
-    flags = ["-DCMAKE_BUILD_TYPE=None", "-DCMAKE_C_FLAGS=-O3", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON",
-             "-DMILD_WERROR=ON", "--log-level=ERROR"]
+    # an array on the stack that overflows stops the program, as under the sanitizers
+    flags = ["-DCMAKE_BUILD_TYPE=None", "-DCMAKE_C_FLAGS=-O3 -fstack-protector-strong",
+             "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", "-DMILD_WERROR=ON", "--log-level=ERROR"]
     if shutil.which("ccache"):
         flags.append("-DCMAKE_C_COMPILER_LAUNCHER=ccache")
     run_quiet(["cmake", "-S", TREE, "-B", BUILD, "-G", "Unix Makefiles", "-Wno-dev", *flags])
@@ -229,7 +236,7 @@ def linked_objects(test, objects):
 
 
 class Worker:
-    def __init__(self, number, objects, tests, originals):
+    def __init__(self, number, objects, tests):
         self.folder = WORK / f"worker{number}"
         shutil.rmtree(self.folder, ignore_errors=True)
         self.overlay = self.folder / "overlay"
@@ -237,11 +244,11 @@ class Worker:
         self.run_folder.mkdir(parents=True)
         for entry in TREE.iterdir():  # tests read and write relative to the root of the tree
             (self.run_folder / entry.name).symlink_to(entry)
-        self.objects, self.tests, self.originals = objects, tests, originals
+        self.objects, self.tests = objects, tests
 
     def compile(self, path, source):
-        """Objects that depend on path, made with source in its place: {object: bytes}, or the
-        compiler's message."""
+        """Objects that depend on path, made with source in its place: {object: the new one}, or
+        the compiler's message. What did not change gives the same bytes."""
         original = TREE / path
         shutil.rmtree(self.overlay, ignore_errors=True)
         layer_path = pathlib.Path(path).relative_to("src")
@@ -260,20 +267,14 @@ class Worker:
                                   errors="replace", check=False)
             if done.returncode:
                 return done.stderr
-            made[name] = (output, output.read_bytes())
+            made[name] = output
         return made
 
     def affected(self, original):
+        """The small ones first, which tell soonest that the compiler refuses a mutant."""
         real = os.path.realpath(original)
-        return sorted((n, o) for n, o in self.objects.items() if real in o.depends)
-
-    def original_bytes(self, path, source):
-        if path not in self.originals:
-            made = self.compile(path, source)
-            if isinstance(made, str):
-                sys.exit(f"mutants: {path} does not compile unchanged:\n{made}")
-            self.originals[path] = {name: data for name, (_, data) in made.items()}
-        return self.originals[path]
+        return sorted(((n, o) for n, o in self.objects.items() if real in o.depends),
+                      key=lambda entry: entry[0].stat().st_size)
 
     def link(self, test, changed):
         """The test's command with executables that hold the changed objects."""
@@ -308,7 +309,7 @@ class Worker:
             resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 30, 1 << 30))
 
         environment = dict(os.environ, CMOCKA_TEST_ABORT="1", TMPDIR=str(self.folder),
-                           MILD_TEST_DRAWS=DRAWS)
+                           MILD_TEST_DRAWS=DRAWS, **MEMORY)
         log = self.folder / "log"
         with open(log, "wb") as out:
             child = subprocess.Popen(command, cwd=self.run_folder, stdout=out, stderr=out,
@@ -323,12 +324,12 @@ class Worker:
 
     def judge(self, mutant, source):
         """(verdict, detail): refused, same, caught or survived."""
-        original = self.original_bytes(mutant.path, source)
         text = source[:mutant.begin] + mutant.text + source[mutant.end:]
         made = self.compile(mutant.path, text)
         if isinstance(made, str):
             return "refused", made.strip().splitlines()[0] if made.strip() else "compiler"
-        changed = {name: path for name, (path, data) in made.items() if data != original[name]}
+        changed = {name: path for name, path in made.items()
+                   if path.read_bytes() != name.read_bytes()}
         if not changed:
             return "same", ""
         reached = False
@@ -485,8 +486,7 @@ def prepare(layers, jobs):
         test.members = linked_objects(test, objects)
     used = set().union(*(t.members for t in tests))
     objects = {name: item for name, item in objects.items() if name in used}
-    originals = {}
-    workers = [Worker(k, objects, tests, originals) for k in range(max(1, jobs))]
+    workers = [Worker(k, objects, tests) for k in range(max(1, jobs))]
     measure(tests, workers[0], jobs)
     return tests, workers
 

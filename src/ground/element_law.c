@@ -45,13 +45,15 @@ int law_curves(const Law *law) {
            (law->elastic_force != 0.0 ? LAW_ELASTIC : 0);
 }
 
-#define LAW_NUMBER(name) +1
-_Static_assert(sizeof(Law) == (0 LAW_NUMBERS(LAW_NUMBER)) * sizeof(Real),
-               "LAW_NUMBERS lists every field of Law");
+#define LAW_INDEX(name) LAW_INDEX_##name,
+enum { LAW_NUMBERS(LAW_INDEX) LAW_COUNT };
+_Static_assert(sizeof(Law) == LAW_COUNT * sizeof(Real), "LAW_NUMBERS lists every field of Law");
 
-#define LAW_ADD(name) +law->name
+#define LAW_ADD(name) sum += law->name;
 int law_is_nan(const Law *law) {
-    return isnan(0.0 LAW_NUMBERS(LAW_ADD)); /* the bed may be at infinity */
+    double sum = 0.0;
+    LAW_NUMBERS(LAW_ADD)
+    return isnan(sum); /* not isfinite: the bed may be at infinity */
 }
 
 double law_recovery(const Law *law, double recovery) {

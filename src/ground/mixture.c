@@ -72,8 +72,7 @@ static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, i
         .mu = between(m->mu, n->mu, t),
         .k_drift = between(m->k_drift, n->k_drift, t),
         .b_drift = between(m->b_drift, n->b_drift, t),
-        .recovery =
-            between(law_recovery(&a->law, m->recovery), law_recovery(&b->law, n->recovery), t),
+        .recovery = between(m->recovery, n->recovery, t),
     };
     slot_set_law(s, i, &law, &material);
 }

@@ -65,25 +65,25 @@ static int slots_sink(const Slots *slot, int end, double dt) {
 }
 
 ALWAYS_INLINE void slot_drag(const Slots *s, int i, double dt, const Motion *now,
-                             const Motion *free) {
+                             const Motion *free, int curves) {
     const double slower = slot_velocity(s, i, now, 1).descent;
     const double faster = slot_velocity(s, i, free, 1).descent;
     Element element = slot_element(s, i);
-    element_drag(&element, LAW_CONE, dt, real_max(faster - slower, 0.0));
+    element_drag(&element, curves, dt, real_max(faster - slower, 0.0));
     s->entry_speed[i] = element.entry_speed;
     s->stop_drag[i] = element.stop_drag;
     s->stop_growth[i] = element.stop_growth;
 }
 
 /* Calls element_drag for all slots. */
-static void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
-                       const Motion *free) {
+ALWAYS_INLINE void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
+                              const Motion *free, int curves) {
     const Slots local = *slot, *s = &local;
     const Motion before = *now;
     const Motion after = *free;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        slot_drag(s, i, dt, &before, &after);
+        slot_drag(s, i, dt, &before, &after, curves);
     }
 }
 
@@ -155,7 +155,11 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     }
     foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
     if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
-        slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free);
+        if (foot->curves & LAW_POWER) {
+            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL);
+        } else {
+            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_CONE);
+        }
         foot->stops = 1;
     }
     foot_direct(foot, terrain, input->dt, R, &now);

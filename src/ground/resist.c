@@ -151,7 +151,7 @@ ALWAYS_INLINE Alpha plate_alpha(const Plate *plate, int in_space, double lean, d
  * slope for a level plate moving straight down. sideways, downward: coefficients [-] against the
  * heading and up. */
 ALWAYS_INLINE void element_resist(Element *e, const ElementMemory *memory, double dt, double rate,
-                                  double strength, double sideways, double downward) {
+                                  double strength, double sideways, double downward, int curves) {
     /* The line of the peak starts deeper than the element has been. */
     const double peak = RESIST_PEAK * strength;
     const double share = real_min(real_max(downward / RESIST_PEAK, 0.0), 1.0);
@@ -174,12 +174,13 @@ ALWAYS_INLINE void element_resist(Element *e, const ElementMemory *memory, doubl
     e->yield_speed = real_max(2.0 * (e->yield_depth - e->depth) * rate, 0.0);
 
     e->drift_bound += dt * strength * real_max(sideways, 0.0) * real_max(e->depth, 0.0);
-    friction_hold(e, memory, dt, rate, yield_force);
+    const double held = yield_force + law_elastic_force(&e->law, curves, e->middle);
+    friction_hold(e, memory, dt, rate, held);
 }
 
 /* Adapts the law of one slot to its motion at the start of the step. */
 ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, const Plate *plate,
-                               const Motion *motion, int in_space) {
+                               const Motion *motion, int in_space, int curves) {
     const SlotVelocity v = slot_velocity(s, i, motion, 1);
     const double down = real_max(v.descent, 0.0);
 
@@ -198,21 +199,21 @@ ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, co
 
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
-    element_resist(&element, &memory, dt, rate, s->strength[i], sliding.x, sinking.z);
+    element_resist(&element, &memory, dt, rate, s->strength[i], sliding.x, sinking.z, curves);
     s->line_stiffness[i] = element.law.line_stiffness;
     slot_store(s, i, &element);
 }
 
 /* The same for slots start .. end - 1. */
 ALWAYS_INLINE void slots_resist(const Slots *slot, int start, int end, double dt, const Plate *sole,
-                                const Motion *now, int in_space) {
+                                const Motion *now, int in_space, int curves) {
     const Slots local = *slot, *s = &local;
     const Plate plate = *sole;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = start; i < end; i++) {
-        slot_resist(s, i, dt, rate, &plate, &motion, in_space);
+        slot_resist(s, i, dt, rate, &plate, &motion, in_space, curves);
     }
 }
 
@@ -231,7 +232,7 @@ ALWAYS_INLINE void foot_resist(const FootScratch *foot, const MildTerrain *terra
     const Slots *s = &foot->slot;
     const Plate plate = plate_of(rotation);
     if (terrain_only(terrain, model)) {
-        slots_resist(s, 0, foot->active, dt, &plate, now, in_space);
+        slots_resist(s, 0, foot->active, dt, &plate, now, in_space, LAW_LINE);
         return;
     }
     for (int i = 0; i < foot->active; i++) {
@@ -241,7 +242,7 @@ ALWAYS_INLINE void foot_resist(const FootScratch *foot, const MildTerrain *terra
         if (s->flat_stiffness[i] != 0.0 || s->power_force[i] != 0.0) {
             continue; /* blended with another curve: stays a level plate */
         }
-        slots_resist(s, i, i + 1, dt, &plate, now, in_space);
+        slots_resist(s, i, i + 1, dt, &plate, now, in_space, foot->curves);
     }
 }
 

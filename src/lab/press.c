@@ -168,7 +168,7 @@ static void work_add(Press *press, const PressRow *step, double down, double for
     }
 }
 
-/* ---- prescribed path: A = 0, as for an infinitely heavy foot, which has the prescribed twist after each step ---- */
+/* ---- prescribed path: A = 0, so the foot has the prescribed twist after each step ---- */
 
 /* A step of `dt` from here at the given speeds; changes nothing. */
 static PressRow hand_solve(Press *press, double dt, double forward, double down) {

@@ -24,7 +24,8 @@ static void assert_close(const char *what, double ours, double expected, double 
     }
 }
 
-/* Torques and joint speeds of one step; the feet stand still under 100 N unless set. */
+/* Torques and joint speeds of one step; the feet stand still under 100 N unless set. Behind the
+ * robot's feet stands what must not count. */
 typedef struct {
     double torque[SA01_JOINTS], speed[SA01_JOINTS];
     MeasureSample sample;
@@ -39,6 +40,9 @@ static void script_start(Script *s) {
                                 .base_height = 0.8};
     for (int f = 0; f < SA01_FEET; f++) {
         s->sample.foot[f].load = 100;
+    }
+    for (int f = SA01_FEET; f < ROBOT_FEET_MAX; f++) {
+        s->sample.foot[f] = (MeasureFoot){.load = 100, .depth = 9};
     }
 }
 

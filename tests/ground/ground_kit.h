@@ -41,6 +41,18 @@ static inline int kit_draws(int count) {
     return some < 1.0 ? 1 : (int)some;
 }
 
+/* Time that a test waits for a drift [s]: all of it, or the share in MILD_TEST_DRAWS. */
+static inline double kit_seconds(double time) {
+    const char *share = getenv("MILD_TEST_DRAWS");
+    return share ? time * atof(share) : time;
+}
+
+/* First of the time steps, from fine to coarse, that a test takes: the finest costs most, and is
+ * left out where MILD_TEST_DRAWS is set. */
+static inline int kit_finest(void) {
+    return getenv("MILD_TEST_DRAWS") != NULL;
+}
+
 /* Left sole of the reference robot, y range at x [m]; the right one is its mirror image. */
 static const double kit_outline[19][3] = {
     {-0.075, -0.013, 0.013}, {-0.06, -0.044, 0.044},  {-0.045, -0.045, 0.047},

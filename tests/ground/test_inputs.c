@@ -168,6 +168,45 @@ static void test_sole_counts(void **state) {
     }
 }
 
+/* An L of four whole cells, wherever it lies: each is one element, column by column. */
+static void test_sole_places(void **state) {
+    (void)state;
+    static const double corner[12] = {0, 0, 3, 0, 3, 1, 1, 1, 1, 2, 0, 2};
+    static const double place[4][2] = {{0.5, 0.5}, {0.5, 1.5}, {1.5, 0.5}, {2.5, 0.5}};
+    for (int target = 0; target <= 4; target += 4) {
+        double outline[12];
+        for (int k = 0; k < 12; k++) {
+            outline[k] = KIT_PITCH * corner[k] + (k % 2 ? -0.03 : 0.11);
+        }
+        MildSoleDef def = {outline, 6, KIT_PITCH, KIT_SOLE_Z, target};
+        MildError error = {0};
+        MildSole *sole = mild_sole_create(&def, &error);
+        assert_non_null(sole);
+        assert_int_equal(mild_sole_elements(sole), 4);
+        for (int i = 0; i < 4; i++) {
+            assert_true(fabs(mild_sole_x(sole)[i] - KIT_PITCH * place[i][0] - 0.11) < 1e-12);
+            assert_true(fabs(mild_sole_y(sole)[i] - KIT_PITCH * place[i][1] + 0.03) < 1e-12);
+        }
+        mild_sole_destroy(sole);
+    }
+}
+
+/* The raster may have 65536 cells, a border of one around the outline's box included. */
+static void test_sole_sizes(void **state) {
+    (void)state;
+    for (int more = 0; more < 2; more++) {
+        const double edge = 0.254 + 0.0001 * more;
+        double box[8] = {0, 0, edge, 0, edge, 0.25399, 0, 0.25399};
+        MildSoleDef def = {box, 4, 1e-3, KIT_SOLE_Z, 0};
+        MildError error = {0};
+        MildSole *sole = mild_sole_create(&def, &error);
+        assert_true((sole == NULL) == more);
+        assert_true(more ? strstr(error.text, "at most 65536") != NULL
+                         : mild_sole_elements(sole) == 254 * 254);
+        mild_sole_destroy(sole);
+    }
+}
+
 static void test_sole_refused(void **state) {
     (void)state;
     double square[8] = {0, 0, 0.1, 0, 0.1, 0.1, 0, 0.1}, bow[8] = {0, 0, 0.1, 0.1, 0.1, 0, 0, 0.12};
@@ -276,6 +315,7 @@ int main(void) {
         cmocka_unit_test(test_field_parse),     cmocka_unit_test(test_field_print),
         cmocka_unit_test(test_field_find),      cmocka_unit_test(test_material_refused),
         cmocka_unit_test(test_terrain),         cmocka_unit_test(test_sole_counts),
+        cmocka_unit_test(test_sole_places),     cmocka_unit_test(test_sole_sizes),
         cmocka_unit_test(test_sole_refused),    cmocka_unit_test(test_hostile_numbers),
         cmocka_unit_test(test_hostile_material)};
     return cmocka_run_group_tests(tests, NULL, NULL);

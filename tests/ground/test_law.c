@@ -93,6 +93,32 @@ static double sinkage(const MildMaterial *m, double load) {
     return 1e3 * low;
 }
 
+/* The numbers of the presets as the specification and docs/model.md section 10 give them; foams and
+ * rubber weigh grams and have no added mass. */
+static void test_preset_numbers(void **state) {
+    (void)state;
+    static const struct {
+        const char *name;
+        double k_pen, sigma_cone, alpha, nu, c_g, c_d, phi, recovery;
+    } table[] = {{"rubber", 1400, 0.24e6, 1.310, 0.8, 0, 1, 0.57, 1},
+                 {"foam60", 850, 0.20e6, 1.20, 1.2, 0, 1, 0.57, 1},
+                 {"foam45", 480, 0.17e6, 1.10, 1.6, 0, 1, 0.57, 1},
+                 {"foam28", 190, 0.13e6, 1.047, 2.0, 0, 1, 0.57, 1},
+                 {"foam25", 150, 0.11e6, 1.047, 2.0, 0, 1, 0.57, 1},
+                 {"grass", 550, 0.24e6, 1.10, 1.6, 0.5, 1, 0.50, 0.5},
+                 {"sand_loose", 380, 0.15e6, 1.047, 2.0, 2.7, 17.2, 0.57, 0},
+                 {"sand_dense", 700, 0.24e6, 1.047, 1.6, 2.7, 17.2, 0.62, 0}};
+    for (int i = 0; i < 8; i++) {
+        MildMaterial m;
+        assert_true(mild_material_preset(table[i].name, &m));
+        assert_true(m.k_pen == table[i].k_pen && m.sigma_cone == table[i].sigma_cone);
+        assert_true(m.alpha == table[i].alpha && m.nu == table[i].nu);
+        assert_true(m.c_g == table[i].c_g && m.c_d == table[i].c_d && m.phi == table[i].phi);
+        assert_true(m.recovery == table[i].recovery && m.rho == 1000 && m.passive == 1);
+        assert_true(m.mu >= 0.2 && m.mu <= 1.3); /* the paper's range */
+    }
+}
+
 static void test_presets(void **state) {
     (void)state;
     static const struct {
@@ -123,6 +149,7 @@ static void test_presets(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_quadrature), cmocka_unit_test(test_vector),
-        cmocka_unit_test(test_firm_bed), cmocka_unit_test(test_presets)};
+        cmocka_unit_test(test_firm_bed), cmocka_unit_test(test_presets),
+        cmocka_unit_test(test_preset_numbers)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -188,9 +188,10 @@ static void test_no_creep(void **state) {
     (void)state;
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     MildSole *sole = kit_sole(0, 77);
+    const double wait = kit_seconds(10.0);
     double worst_down = 0.0, worst_side = 0.0;
     for (int p = 0; p < mild_material_preset_count(); p++) {
-        for (int d = 0; d < 3; d++) {
+        for (int d = kit_finest(); d < 3; d++) {
             for (int side = 0; side < 2; side++) {
                 MildMaterial m;
                 mild_material_preset(mild_material_preset_name(p), &m);
@@ -202,7 +203,7 @@ static void test_no_creep(void **state) {
                     KIT_SOLE_Z - 0.005; /* a low weight: a lateral load tilts it little */
                 double start[3],
                     force[1][3] = {{side ? 0.4 * m.mu * 20.0 * KIT_GRAVITY : 0.0, 0.0, 0.0}};
-                int settle = (int)(2.0 / steps[d]), run = (int)(10.0 / steps[d]);
+                int settle = (int)(2.0 / steps[d]), run = (int)(wait / steps[d]);
                 for (int s = 0; s < settle; s++) { /* brought to rest by hand: foam and rubber have
                                                       no damping of their own */
                     kit_step(&kit, (const double(*)[3])force);
@@ -228,7 +229,7 @@ static void test_no_creep(void **state) {
             }
         }
     }
-    print_message("creep in 10 s: worst %.5f mm down, %.5f mm sideways\n", 1e3 * worst_down,
+    print_message("creep in %g s: worst %.5f mm down, %.5f mm sideways\n", wait, 1e3 * worst_down,
                   1e3 * worst_side);
     mild_sole_destroy(sole);
     assert_true(worst_down < 1e-4 && worst_side < 1e-4);

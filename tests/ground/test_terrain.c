@@ -113,6 +113,106 @@ static void test_rough(void **state) {
     mild_map_destroy(other);
 }
 
+/* Rough ground is random at points a wavelength apart, and between them follows 3 t^2 - 2 t^3:
+ * 5/32 a quarter on, 1/2 in the middle, along both axes. */
+static void test_rough_between(void **state) {
+    (void)state;
+    static const double share[4] = {0.0, 5.0 / 32.0, 0.5, 27.0 / 32.0};
+    MildMapDef def = shape(MILD_MAP_ROUGH, 0.04, 0.25);
+    def.size = 2.0;
+    def.cell = 0.25 / 4;
+    MildMap *map = make_map(&def);
+    MildTerrain terrain = terrain_on(map, 0.0);
+    double worst = 0.0, alike = 1.0;
+    for (int n = 0; n < 64 * 16; n++) {
+        const int i = n % 4, j = n / 4 % 4;
+        const double x = n / 16 % 8 * 0.25, y = n / 128 * 0.25;
+        double corner[4];
+        for (int k = 0; k < 4; k++) {
+            corner[k] = mild_terrain_height_at(&terrain, x + k % 2 * 0.25, y + k / 2 * 0.25);
+        }
+        const double low = (1 - share[i]) * corner[0] + share[i] * corner[1];
+        const double high = (1 - share[i]) * corner[2] + share[i] * corner[3];
+        const double height = mild_terrain_height_at(&terrain, x + i * def.cell, y + j * def.cell);
+        worst = fmax(worst, fabs(height - (1 - share[j]) * low - share[j] * high));
+        alike = fmin(alike, fabs(corner[0] - corner[1]));
+    }
+    print_message("rough between its points: off by %.1e m, neighbours differ by %.1e m\n", worst,
+                  alike);
+    assert_true(worst < 1e-8 && alike > 1e-5);
+    mild_map_destroy(map);
+}
+
+static void assert_range(const MildMap *map, double low, double high) {
+    double range[2];
+    mild_map_range(map, &range[0], &range[1]);
+    assert_true(range[0] == low || fabs(range[0] - low) < 1e-8);
+    assert_true(range[1] == high || fabs(range[1] - high) < 1e-8);
+}
+
+/* Lowest and highest point, the length after which it repeats, and the number of labels. */
+static void test_measures(void **state) {
+    (void)state;
+    MildMapDef def = shape(MILD_MAP_WAVES, 0.03, 0.8); /* 40 cells: the crests are grid points */
+    double x, y;
+    MildMap *map = make_map(&def);
+    assert_range(map, -0.03, 0.03);
+    mild_map_extent(map, &x, &y);
+    assert_true(fabs(x - 0.8) < 1e-12 && fabs(y - 0.8) < 1e-12);
+    assert_int_equal(mild_map_label_count(map), 1);
+    mild_map_destroy(map);
+
+    def = shape(MILD_MAP_STEPS, 0.05, 0.8);
+    def.patches = MILD_PATTERN_STRIPES, def.patch_count = 5;
+    map = make_map(&def);
+    assert_range(map, 0.0, 0.05);
+    mild_map_extent(map, &x, &y);
+    assert_true(fabs(x - 2.5) < 1e-12); /* five stripes of 0.5 m */
+    assert_int_equal(mild_map_label_count(map), 5);
+    mild_map_destroy(map);
+
+    double heights[12] = {-0.5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.25}; /* in opposite corners */
+    def = shape(MILD_MAP_IMAGE, 2.0, 1.0);
+    def.heights = heights, def.height_columns = 4, def.height_rows = 3, def.cell = 0.1;
+    map = make_map(&def);
+    assert_range(map, -1.0, 0.5);
+    mild_map_extent(map, &x, &y);
+    assert_true(fabs(x - 0.3) < 1e-12 && fabs(y - 0.2) < 1e-12);
+    mild_map_destroy(map);
+
+    def = mild_map_def_default();
+    map = make_map(&def);
+    assert_true(mild_map_is_level(map) && mild_map_label_count(map) == 1);
+    assert_range(map, 0.0, 0.0);
+    mild_map_destroy(map);
+    def.kind = MILD_MAP_SLOPE;
+    map = make_map(&def);
+    assert_range(map, -INFINITY, INFINITY);
+    mild_map_destroy(map);
+}
+
+/* What only becomes visible with a kind is usable as it is: uneven by some mm to some dm. */
+static void test_defaults(void **state) {
+    (void)state;
+    for (int kind = MILD_MAP_SLOPE; kind <= MILD_MAP_ROUGH; kind++) {
+        for (int patches = MILD_PATTERN_NONE; patches <= MILD_PATTERN_CHECKER; patches++) {
+            MildMapDef def = mild_map_def_default();
+            assert_true(def.kind == MILD_MAP_FLAT && def.patches == MILD_PATTERN_NONE);
+            def.kind = kind, def.patches = patches;
+            MildMap *map = make_map(&def);
+            MildTerrain terrain = terrain_on(map, 0.0);
+            double low = INFINITY, high = -INFINITY;
+            for (int n = 0; n < 100 * 100; n++) {
+                const double h = mild_terrain_height_at(&terrain, n % 100 * 0.02, n / 100 * 0.02);
+                low = fmin(low, h), high = fmax(high, h);
+            }
+            assert_true(high - low > 5e-3 && high - low < 0.3);
+            assert_int_equal(mild_map_label_count(map), patches == MILD_PATTERN_NONE ? 1 : 2);
+            mild_map_destroy(map);
+        }
+    }
+}
+
 /* A tilted plane as an image: bilinear interpolation gives it exactly (float heights: a relative
  * 6e-8), slopes too; beyond the border its last height goes on. */
 static void test_plane(void **state) {
@@ -312,7 +412,14 @@ static void test_slope_friction(void **state) {
     mild_sole_destroy(sole);
 }
 
-static MildMap *random_map(uint64_t *random, double steepest) {
+/* What a shape is called, for messages. */
+static const char *kind_name(int kind) {
+    const MildField *field = mild_field_find(mild_map_fields, mild_map_field_count, "kind", NULL);
+    return field->names[kind];
+}
+
+/* *kind: of the map. */
+static MildMap *random_map(uint64_t *random, double steepest, int *kind) {
     static const MildMapKind kinds[4] = {MILD_MAP_WAVES, MILD_MAP_ROUGH, MILD_MAP_STEPS,
                                          MILD_MAP_SLOPE};
     MildMapDef def = shape(kinds[kit_index(random, 4)], 0.0, kit_uniform(random, 0.15, 1.0));
@@ -320,6 +427,7 @@ static MildMap *random_map(uint64_t *random, double steepest) {
     def.size = 4.0;
     def.amplitude = kit_uniform(random, 0.0, 0.05) * fmin(1.0, steepest * def.wavelength / 0.2);
     def.slope = kit_uniform(random, -0.5, 0.5);
+    *kind = def.kind;
     return make_map(&def);
 }
 
@@ -332,9 +440,12 @@ static void test_passive(void **state) {
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     double worst = -INFINITY, worst_share = -INFINITY;
     int cycles = 0;
+    int worst_draw = -1;
+    int worst_kind = MILD_MAP_FLAT;
     for (int draw = 0; draw < kit_draws(600); draw++) {
         MildMaterial m = kit_material(&random);
-        MildMap *map = random_map(&random, 1.0);
+        int kind;
+        MildMap *map = random_map(&random, 1.0, &kind);
         Kit kit;
         double dt = steps[kit_index(&random, 3)];
         kit_open(&kit, 1, sole, NULL, &m, dt);
@@ -372,7 +483,11 @@ static void test_passive(void **state) {
             }
             if (touched == 0 && taken > 0.0) { /* a closed cycle */
                 cycles++;
-                worst = fmax(worst, work);
+                if (work > worst) {
+                    worst = work;
+                    worst_draw = draw;
+                    worst_kind = kind;
+                }
                 if (taken > 1e-6) {
                     worst_share = fmax(worst_share, work / taken);
                 }
@@ -383,8 +498,9 @@ static void test_passive(void **state) {
         mild_map_destroy(map);
     }
     print_message(
-        "passivity on uneven ground: %d closed cycles, most energy gained %.2e J, share %.2e\n",
-        cycles, worst, worst_share);
+        "passivity on uneven ground: %d closed cycles, most energy gained %.2e J (draw %d, %s), "
+        "share %.2e\n",
+        cycles, worst, worst_draw, kind_name(worst_kind), worst_share);
     mild_sole_destroy(sole);
     assert_true(cycles > kit_draws(300));
     assert_true(worst < 1e-9);
@@ -398,6 +514,7 @@ static void test_passive_by_hand(void **state) {
     uint64_t random = 47;
     MildSole *sole = kit_plate(1, 1);
     double worst = -INFINITY;
+    int worst_draw = -1;
     for (int draw = 0; draw < kit_draws(400); draw++) {
         MildMaterial m = kit_material(&random);
         m.c_g = 0.0, m.recovery = draw % 2 ? 1.0 : m.recovery, m.mu = 0.0,
@@ -431,12 +548,14 @@ static void test_passive_by_hand(void **state) {
             work += w;
             taken += fabs(w);
         }
+        worst_draw = work / taken > worst ? draw : worst_draw;
         worst = fmax(worst, work / taken);
         kit_close(&kit);
         mild_map_destroy(map);
     }
     print_message(
-        "led through waves by hand: largest share of the work given back in excess %.2e\n", worst);
+        "led through waves by hand: largest share of the work given back in excess %.2e (draw %d)\n",
+        worst, worst_draw);
     assert_true(worst < 0.0);
     mild_sole_destroy(sole);
 }
@@ -448,9 +567,12 @@ static void test_solvers(void **state) {
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     int problems = 0, failed = 0, compared = 0, most = 0;
     double worst = 0.0, iterations = 0.0;
+    int worst_draw = -1;
+    int worst_kind = MILD_MAP_FLAT;
     for (int t = 0; t < kit_draws(600); t++) {
         MildMaterial m = kit_material(&random);
-        MildMap *map = random_map(&random, 1.0);
+        int kind;
+        MildMap *map = random_map(&random, 1.0, &kind);
         Kit kit;
         kit_open(&kit, 1 + t % 2, left, right, &m, t % 3 ? 1e-3 : 5e-3);
         kit.terrain.map = map;
@@ -483,16 +605,19 @@ static void test_solvers(void **state) {
                 difference = fmax(difference, fabs(newton.velocity[i] - kit.result.velocity[i]));
             }
             compared += kit.result.converged;
-            if (kit.result.converged) {
-                worst = fmax(worst, difference / size);
+            if (kit.result.converged && difference / size > worst) {
+                worst = difference / size;
+                worst_draw = t;
+                worst_kind = kind;
             }
         }
         kit_close(&kit);
         mild_map_destroy(map);
     }
     print_message("uneven ground: %d problems, %d not converged, %.1f iterations in the mean, %d "
-                  "at most; sweeps differ by %.1e in %d\n",
-                  problems, failed, iterations / problems, most, worst, compared);
+                  "at most; sweeps differ by %.1e in %d (draw %d, %s)\n",
+                  problems, failed, iterations / problems, most, worst, compared, worst_draw,
+                  kind_name(worst_kind));
     assert_true(problems > kit_draws(300) && failed * 100 < problems);
     assert_true(compared > kit_draws(60) && worst < 1e-6);
     mild_sole_destroy(left);
@@ -600,11 +725,13 @@ static void test_smooth_border(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_shapes),          cmocka_unit_test(test_rough),
-        cmocka_unit_test(test_plane),           cmocka_unit_test(test_patterns),
-        cmocka_unit_test(test_refused),         cmocka_unit_test(test_bytes),
-        cmocka_unit_test(test_translation),     cmocka_unit_test(test_smooth_border),
-        cmocka_unit_test(test_slope_friction),  cmocka_unit_test(test_solvers),
-        cmocka_unit_test(test_passive_by_hand), cmocka_unit_test(test_passive)};
+        cmocka_unit_test(test_shapes),        cmocka_unit_test(test_rough),
+        cmocka_unit_test(test_rough_between), cmocka_unit_test(test_measures),
+        cmocka_unit_test(test_defaults),      cmocka_unit_test(test_plane),
+        cmocka_unit_test(test_patterns),      cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_bytes),         cmocka_unit_test(test_translation),
+        cmocka_unit_test(test_smooth_border), cmocka_unit_test(test_slope_friction),
+        cmocka_unit_test(test_solvers),       cmocka_unit_test(test_passive_by_hand),
+        cmocka_unit_test(test_passive)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

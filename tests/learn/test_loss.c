@@ -365,6 +365,77 @@ static void test_chunks_add(void **state) {
     case_close(&c);
 }
 
+/* Takes an area of the block for itself. */
+static void claim(const float *block, size_t floats, char *taken, const float *area, int rows,
+                  int width) {
+    assert_true(area >= block);
+    const size_t first = (size_t)(area - block), count = (size_t)rows * (size_t)width;
+    assert_true(first + count <= floats);
+    for (size_t i = first; i < first + count; i++) {
+        assert_int_equal(taken[i], 0);
+        taken[i] = 1;
+    }
+}
+
+/* Every array of a chunk has the rows and columns that loss.h gives it, for itself alone. */
+static void test_areas_are_apart(void **state) {
+    (void)state;
+    Case c;
+    case_open(&c, small_def());
+    const Network *n = &c.network;
+    const PolicyDef *d = &n->def;
+    const LossChunk *k = &c.chunk;
+    const Mlp *const mlps[] = {&n->encoder, &n->modulation, &n->actor, &n->decoder, &n->critic};
+    const MlpOutputs *const outputs[] = {&k->outputs.encoder, &k->outputs.modulation,
+                                         &k->outputs.actor, &k->decoder, &k->value};
+    LossChunk again;
+    const size_t floats = loss_carve(n, ROWS, MIRRORED, NULL, &again);
+    char *taken = calloc(floats, 1);
+    assert_non_null(taken);
+    const int all = ROWS + MIRRORED;
+    int widest = 0;
+    for (int i = 0; i < NETWORK_MLPS; i++) {
+        for (int l = 0; l < mlps[i]->layers; l++) {
+            const MlpLayer *layer = &mlps[i]->layer[l];
+            claim(c.block, floats, taken, outputs[i]->y[l], i < 3 ? all : ROWS, layer->out);
+            widest = layer->out > widest ? layer->out : widest;
+            widest = layer->in > widest ? layer->in : widest;
+        }
+    }
+    const struct {
+        const float *at;
+        int rows, width;
+    } areas[] = {{k->history, all, n->history},
+                 {k->estimate, ROWS, d->estimates},
+                 {k->decoder_target, ROWS, d->observation},
+                 {k->noise, ROWS, d->latent},
+                 {k->action, ROWS, d->actions},
+                 {k->old_mean, ROWS, d->actions},
+                 {k->old_log_prob, ROWS, 1},
+                 {k->advantage, ROWS, 1},
+                 {k->critic, ROWS, d->critic_input},
+                 {k->old_value, ROWS, 1},
+                 {k->returns, ROWS, 1},
+                 {k->outputs.actor_input, all, n->actor_input},
+                 {k->decoder_input, ROWS, n->decoder_input},
+                 {k->spread, ROWS, d->latent},
+                 {k->d_mean, all, d->actions},
+                 {k->d_heads, all, n->heads},
+                 {k->d_theta, all, n->theta},
+                 {k->d_actor_input, all, d->estimates + d->latent},
+                 {k->d_feet, all, d->feet_velocity_count},
+                 {k->d_decoded, ROWS, d->observation},
+                 {k->d_decoder_input, ROWS, n->decoder_input},
+                 {k->d_value, ROWS, 1},
+                 {k->work[0], all, widest},
+                 {k->work[1], all, widest}};
+    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
+        claim(c.block, floats, taken, areas[i].at, areas[i].rows, areas[i].width);
+    }
+    free(taken);
+    case_close(&c);
+}
+
 /* Every latent gets the log-variance b: it counts as held within -12 and 6. Without noise only the
  * KL term e^b - 1 - b pulls, back inside from anywhere; without the KL term what would lead farther
  * out is dropped. */
@@ -445,7 +516,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_logvar_is_held),      cmocka_unit_test(test_matches_pytorch),
         cmocka_unit_test(test_matches_differences), cmocka_unit_test(test_chunks_add),
-        cmocka_unit_test(test_logvar_bounds),
+        cmocka_unit_test(test_logvar_bounds),       cmocka_unit_test(test_areas_are_apart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -199,6 +199,30 @@ static void test_round_trip(void **state) {
     unlink(PATH);
 }
 
+/* The robot's name, of any length that fits, is kept; without one there is no key. */
+static void test_name_of_the_robot(void **state) {
+    (void)state;
+    const char *const names[] = {"", "r", "quadruped"};
+    for (int i = 0; i < 3; i++) {
+        MildError error = {0};
+        PolicyDef def = small_def();
+        strcpy(def.robot, names[i]);
+        Policy *policy = policy_create(&def, 4, &error);
+        assert_non_null(policy);
+        assert_int_equal(policy_save(policy, PATH, NULL, &error), MILD_OK);
+        policy_destroy(policy);
+        Safetensors *file = safetensors_read(PATH, &error);
+        assert_non_null(file);
+        assert_true((safetensors_text(file, "robot") == NULL) == (i == 0));
+        safetensors_destroy(file);
+        policy = policy_load(PATH, NULL, 0, &error);
+        assert_non_null(policy);
+        assert_string_equal(policy_def(policy)->robot, names[i]);
+        policy_destroy(policy);
+        unlink(PATH);
+    }
+}
+
 static unsigned char *read_bytes(const char *path, size_t *size) {
     FILE *file = fopen(path, "rb");
     assert_non_null(file);
@@ -434,6 +458,7 @@ int main(void) {
         cmocka_unit_test(test_act_and_value),
         cmocka_unit_test(test_modulation_starts_at_identity),
         cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_name_of_the_robot),
         cmocka_unit_test(test_damaged_files),
         cmocka_unit_test(test_lying_headers),
         cmocka_unit_test(test_missing_keys),

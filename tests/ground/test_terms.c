@@ -1,0 +1,638 @@
+/* The functions of an element's step, one at a time: hand-worked numbers, quadrature, differences. */
+#include "ground_kit.h"
+
+#include "ground/begin.h"
+#include "ground/impulse.h"
+#include "ground/models.h"
+#include "ground/remember.h"
+
+static void assert_close(const char *what, double ours, double expected, double tolerance) {
+    if (!(fabs(ours - expected) <= tolerance)) {
+        fail_msg("%s: %.15g, expected %.15g", what, ours, expected);
+    }
+}
+
+/* 2 (2 u - u^2/u_f ...): a cone of 20 mm, added mass and drag. At 10 mm a quarter of the flat area
+ * is left, and 7/8 of 20/3 mm = 5.8333 mm are recruited. */
+static Law cone(void) {
+    return (Law){.cone_depth = 0.02, .inverse_cone_depth = 50.0, .bed_depth = INFINITY};
+}
+
+#define HALF_RECRUITED (0.02 / 3.0 * 7.0 / 8.0) /* [m] P(u_f/2) */
+
+/* ---- random elements ---- */
+
+static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
+
+/* An element at the start of a step, of any model, that moved before. */
+static Element random_element(uint64_t *random, int *curves, double *dt) {
+    static const MildModel models[4] = {MILD_MODEL_MILD, MILD_MODEL_MILD, MILD_MODEL_BEKKER,
+                                        MILD_MODEL_HUNT_CROSSLEY};
+    MildMaterial m = kit_material(random);
+    m.model = (int)models[kit_index(random, 4)];
+    m.exponent = kit_uniform(random, 0.5, 2.0);
+    m.bed_depth = kit_index(random, 5) ? 1.0 : 0.012;
+    Element e = {.law = law_of(&m, KIT_PITCH),
+                 .recovery = m.recovery,
+                 .mu = m.mu,
+                 .k_drift = m.k_drift,
+                 .b_drift = m.b_drift,
+                 .depth = kit_uniform(random, -0.001, 0.02)};
+    *curves = law_curves(&e.law);
+    *dt = steps[kit_index(random, 3)];
+    const double now = kit_uniform(random, -0.5, 0.7);
+    const double middle = e.depth - *dt / 2 * now;
+    ElementMemory memory = {.middle = kit_index(random, 2) ? fmax(middle, 0.0) : 0.0,
+                            .drift = kit_uniform(random, 0.0, 0.1),
+                            .held_x = kit_uniform(random, -0.2, 0.2),
+                            .held_y = kit_uniform(random, -0.2, 0.2),
+                            .held_stiffness = kit_uniform(random, 0.0, 3e4)};
+    memory.depth_max = kit_index(random, 2) ? fmax(middle, 0.0) + kit_uniform(random, 0.0, 0.005)
+                                            : fmax(middle, 0.0);
+    memory.front_speed = kit_index(random, 2) ? fmax(now, 0.0) : 0.0;
+    e.exit_drag = law_exit_drag(&e.law);
+    e.entry_drag = law_entry_drag(&e.law);
+    element_begin(&e, &memory, *curves, *dt, 1 / *dt, now);
+    element_drag(&e, *curves, *dt, *dt * KIT_GRAVITY);
+    return e;
+}
+
+/* Bool: the slope is that of the function, whose values at -h, 0, h these are. At a kink it lies
+ * between those of both sides. worst: relative to `scale`, away from kinks. */
+static int slope_fits(double slope, double before, double here, double after, double h,
+                      double scale, double *worst) {
+    const double left = (here - before) / h, right = (after - here) / h;
+    const double miss = fabs(slope - (after - before) / (2 * h));
+    if (fabs(left - right) > 1e-3 * scale) {
+        return slope > fmin(left, right) - 1e-3 * scale && slope < fmax(left, right) + 1e-3 * scale;
+    }
+    *worst = fmax(*worst, miss / scale);
+    return miss < 1e-3 * scale;
+}
+
+static void test_slope_of_the_impulse(void **state) {
+    (void)state;
+    uint64_t random = 1;
+    double worst = 0.0;
+    int loaded = 0;
+    for (int n = 0; n < 20000; n++) {
+        int curves;
+        double dt, value[3], slope = 0.0;
+        const Element e = random_element(&random, &curves, &dt);
+        const double w = kit_uniform(&random, -0.7, 0.7), h = 1e-7;
+        for (int k = 0; k < 3; k++) {
+            const Impulse i = element_impulse(&e, curves, 1, dt, w + (k - 1) * h);
+            value[k] = i.value;
+            slope = k == 1 ? i.slope : slope;
+        }
+        assert_true(value[0] >= 0.0 && value[1] >= value[0] * (1 - 1e-12) &&
+                    value[2] >= value[1] * (1 - 1e-12));
+        loaded += value[1] > 0.0;
+        const double scale =
+            1e-6 + slope + dt * dt / 2 * (e.unload_stiffness + law_slope(&e.law, curves, 0.0));
+        if (!slope_fits(slope, value[0], value[1], value[2], h, scale, &worst)) {
+            fail_msg("element %d at %.3f m/s: slope %g, differences %g and %g", n, w, slope,
+                     (value[1] - value[0]) / h, (value[2] - value[1]) / h);
+        }
+    }
+    print_message("impulse's slope against differences: %d loaded, worst %.1e\n", loaded, worst);
+    assert_true(loaded > 8000);
+}
+
+/* Friction's derivatives by the velocity and, through the bound, by the normal impulse. */
+static void test_slopes_of_friction(void **state) {
+    (void)state;
+    uint64_t random = 2;
+    double worst = 0.0;
+    int slides = 0;
+    for (int n = 0; n < 20000; n++) {
+        int curves;
+        double dt;
+        const Element e = random_element(&random, &curves, &dt);
+        const double fast = kit_index(&random, 2) ? 1e-3 : 0.1, h = 1e-7 * fast;
+        const double normal = kit_uniform(&random, 1e-4, 5e-3);
+        const double v[2] = {kit_uniform(&random, -fast, fast), kit_uniform(&random, -fast, fast)};
+        const Friction here = friction_impulse(&e, friction_bound(&e, normal), e.mu, v[0], v[1]);
+        slides += friction_slides(&e, normal, v[0], v[1]);
+        Friction next[3][2];
+        for (int s = 0; s < 2; s++) {
+            const double d = s ? h : -h, more = s ? 1e-4 * normal : -1e-4 * normal;
+            next[0][s] = friction_impulse(&e, friction_bound(&e, normal), e.mu, v[0] + d, v[1]);
+            next[1][s] = friction_impulse(&e, friction_bound(&e, normal), e.mu, v[0], v[1] + d);
+            next[2][s] = friction_impulse(&e, friction_bound(&e, normal + more), e.mu, v[0], v[1]);
+        }
+        const double whole = here.fall_xx + here.fall_yy, grip = e.mu * (1 + FRICTION_LAG * fast);
+        const double step = 1e-4 * normal;
+        assert_true(
+            slope_fits(-here.fall_xx, next[0][0].x, here.x, next[0][1].x, h, whole, &worst));
+        assert_true(
+            slope_fits(-here.fall_xy, next[0][0].y, here.y, next[0][1].y, h, whole, &worst));
+        assert_true(
+            slope_fits(-here.fall_xy, next[1][0].x, here.x, next[1][1].x, h, whole, &worst));
+        assert_true(
+            slope_fits(-here.fall_yy, next[1][0].y, here.y, next[1][1].y, h, whole, &worst));
+        assert_true(
+            slope_fits(here.rise_x, next[2][0].x, here.x, next[2][1].x, step, grip, &worst));
+        assert_true(
+            slope_fits(here.rise_y, next[2][0].y, here.y, next[2][1].y, step, grip, &worst));
+    }
+    print_message("friction's slopes against differences: %d slide, worst %.1e\n", slides, worst);
+    assert_true(slides > 2000 && slides < 18000);
+}
+
+/* ---- law ---- */
+
+/* Simpson's rule in many panels. */
+static double mean_force(const Law *law, int curves, double begin, double way) {
+    enum { PANELS = 2000 };
+    double sum = 0.0;
+    for (int i = 0; i <= PANELS; i++) {
+        const double weight = i == 0 || i == PANELS ? 1.0 : i % 2 ? 4.0 : 2.0;
+        sum += weight * law_bedless_force(law, curves, begin + way * i / PANELS);
+    }
+    return sum / (3 * PANELS);
+}
+
+/* The means over a way against quadrature, their slopes against differences; bed: the force at the
+ * end. No way: the force there, and nothing is recruited. */
+static void test_way(void **state) {
+    (void)state;
+    uint64_t random = 3;
+    double worst[2] = {0.0, 0.0}, slope = 0.0;
+    for (int n = 0; n < 500; n++) {
+        int curves;
+        double dt;
+        Element e = random_element(&random, &curves, &dt);
+        e.law.bed_depth = 0.02;
+        e.law.bed_stiffness = 2e4;
+        const double begin = kit_uniform(&random, 0.0, 0.015);
+        const double way = kit_uniform(&random, 1e-4, 0.012), h = 1e-6;
+        const double bed = 2e4 * fmax(begin + way - 0.02, 0.0);
+        const LawWay over = law_way(&e.law, curves, begin, way);
+        const LawWay less = law_way(&e.law, curves, begin, way - h);
+        const LawWay more = law_way(&e.law, curves, begin, way + h);
+        const double force = mean_force(&e.law, curves, begin, way);
+        const double scale = law_bedless_force(&e.law, curves, begin + way) + 1e-6;
+        const int ends = curves & LAW_CONE && begin < e.law.cone_depth &&
+                         begin + way > e.law.cone_depth; /* Simpson's rule over a kink */
+        worst[ends] = fmax(worst[ends], fabs(over.mean - bed - force) / scale);
+        assert_true(slope_fits(over.mean_slope, less.mean, over.mean, more.mean, h,
+                               scale / way + 1.0, &slope));
+        assert_true(slope_fits(over.recruited_slope, less.recruited, over.recruited, more.recruited,
+                               h, 1.0, &slope));
+        const LawWay none = law_way(&e.law, curves, begin, 0.0);
+        assert_true(none.recruited == 0.0 && none.recruited_slope == 0.0);
+        worst[0] = fmax(worst[0], fabs(none.mean - law_force(&e.law, curves, begin)) / scale);
+        const double rise = (law_force(&e.law, curves, begin + h) - none.mean) / h;
+        slope = fmax(slope, fabs(2 * none.mean_slope - rise) / (rise + 1.0) - 0.02);
+    }
+    print_message(
+        "means over ways against quadrature: worst %.1e, where the cone ends %.1e, slopes "
+        "%.1e\n",
+        worst[0], worst[1], slope);
+    assert_true(worst[0] < 1e-6 && worst[1] < 0.05 && slope < 1e-3);
+
+    const Law law = cone();
+    const LawWay half = law_way(&law, LAW_CONE, 0.0, 0.01);
+    assert_close("recruited", half.recruited, HALF_RECRUITED, 1e-17);
+    assert_close("flat share", half.recruited_slope, 0.25, 1e-15);
+    assert_close("beyond the cone", law_way(&law, LAW_CONE, 0.01, 0.03).recruited,
+                 0.02 / 3.0 - HALF_RECRUITED, 1e-17);
+    const LawWay line = law_way(&law, LAW_LINE, 0.0, 0.01); /* a line has no mass to recruit */
+    assert_true(line.recruited == 0.0 && line.recruited_slope == 0.0);
+}
+
+/* A quarter of the way from one law to another; a curve that only one has keeps its shape and fades
+ * out. */
+static void test_law_between(void **state) {
+    (void)state;
+    const Law a = {.flat_stiffness = 100,
+                   .line_stiffness = 200,
+                   .cone_depth = 0.02,
+                   .mass_rate = 4,
+                   .drag_rate = 8,
+                   .bed_depth = 0.1,
+                   .bed_stiffness = 1e4,
+                   .power_force = 10,
+                   .power_exponent = 1.2,
+                   .elastic_force = 2,
+                   .elastic_exponent = 1.5,
+                   .elastic_damping = 0.4};
+    const Law b = {.flat_stiffness = 500,
+                   .line_stiffness = 0,
+                   .cone_depth = 0.04,
+                   .mass_rate = 8,
+                   .drag_rate = 0,
+                   .bed_depth = 0.2,
+                   .bed_stiffness = 2e4,
+                   .power_force = 30,
+                   .power_exponent = 0.8,
+                   .elastic_force = 6,
+                   .elastic_exponent = 1.1,
+                   .elastic_damping = 0.8};
+    const Law wanted = {.flat_stiffness = 200,
+                        .line_stiffness = 150,
+                        .cone_depth = 0.025,
+                        .inverse_cone_depth = 40,
+                        .mass_rate = 5,
+                        .drag_rate = 6,
+                        .bed_depth = 0.125,
+                        .bed_stiffness = 12500,
+                        .power_force = 15,
+                        .power_exponent = 1.1,
+                        .elastic_force = 3,
+                        .elastic_exponent = 1.4,
+                        .elastic_damping = 0.5};
+    const Law law = law_between(&a, &b, 0.25);
+#define SAME(name) assert_close(#name, law.name, wanted.name, 1e-9);
+    LAW_NUMBERS(SAME)
+#undef SAME
+    const Law none = {.cone_depth = 0.02};
+    for (int first = 0; first < 2; first++) {
+        const Law faded = first ? law_between(&a, &none, 0.25) : law_between(&none, &a, 0.75);
+        assert_close("power", faded.power_force, 7.5, 1e-12);
+        assert_close("exponent", faded.power_exponent, 1.2, 0.0);
+        assert_close("elastic", faded.elastic_force, 1.5, 1e-12);
+        assert_close("exponent", faded.elastic_exponent, 1.5, 0.0);
+        assert_close("damping", faded.elastic_damping, 0.4, 0.0);
+        assert_int_equal(law_curves(&faded), LAW_ALL);
+    }
+    assert_int_equal(law_curves(&none), LAW_LINE);
+}
+
+/* ---- terms ---- */
+
+/* What the path's impulse does at the mean speed is what the static force does on the way. */
+static void test_path_keeps_the_work(void **state) {
+    (void)state;
+    uint64_t random = 4;
+    double worst = 0.0;
+    for (int n = 0; n < 300; n++) {
+        int curves;
+        double dt;
+        Element e = random_element(&random, &curves, &dt);
+        e.law.bed_depth = 1.0;
+        const double middle = e.depth + dt / 2 * kit_uniform(&random, -1.0, 1.0);
+        const double virgin_way = fmax(middle - e.yield_depth, 0.0);
+        const LawWay virgin = law_way(&e.law, curves, e.virgin_depth, virgin_way);
+        const Impulse path = path_impulse(&e, dt, middle, virgin_way, &virgin);
+        enum { PANELS = 4000 };
+        double work = 0.0, most = 0.0;
+        for (int i = 0; i < PANELS; i++) { /* midpoints: the force has kinks */
+            const double u = e.middle + (middle - e.middle) * (i + 0.5) / PANELS;
+            const double line = e.unload_stiffness * fmax(u - e.zero_depth, 0.0);
+            const double force = u < e.yield_depth ? line : law_bedless_force(&e.law, curves, u);
+            work += force * (middle - e.middle) / PANELS;
+            most = fmax(most, force);
+        }
+        const double way = middle - e.middle;
+        worst = fmax(worst, fabs(path.value * way / dt - work) / (most * fabs(way) + 1e-12));
+    }
+    print_message("work of the path's impulse against quadrature: worst %.1e\n", worst);
+    assert_true(worst < 1e-3);
+}
+
+static void test_added_mass(void **state) {
+    (void)state;
+    const Element e = {.added_mass = 2.0, .front_speed = 0.05, .yield_speed = 0.1};
+    const Impulse joins = mass_impulse(&e, 0.3), waits = mass_impulse(&e, 0.02);
+    assert_close("joins", joins.value, 2.0 * 0.25, 1e-15);
+    assert_close("its mass", joins.slope, 2.0, 0.0);
+    assert_close("waits", waits.value, 2.0 * 0.05, 1e-15);
+    assert_close("no mass", waits.slope, 0.0, 0.0);
+}
+
+/* 1 mm recruited, half a mm of it per mm of depth; 3 kg/m by the new speed, 2 kg/m by that of
+ * entry. */
+static void test_growth(void **state) {
+    (void)state;
+    const LawWay way = {.recruited = 1e-3, .recruited_slope = 0.5};
+    Element e = {.exit_drag = 3.0, .entry_drag = 2.0, .entry_speed = 0.4};
+    const double dt = 1e-3;
+    Impulse growth = growth_impulse(&e, dt, 0.1, &way, 0);
+    assert_close("drag", growth.value, 1e-3 * (3.0 * 0.1 + 2.0 * 0.4), 1e-17);
+    assert_close("slope", growth.slope, 0.5 * dt / 2 * 1.1 + 1e-3 * 3.0, 1e-17);
+    growth = growth_impulse(&e, dt, -0.1, &way, 0); /* up: only what it brought in */
+    assert_close("up", growth.value, 1e-3 * 0.8, 1e-17);
+    assert_close("slope up", growth.slope, 0.5 * dt / 2 * 0.8, 1e-17);
+    e.entry_drag = -2.0; /* drag below the mass: at the slower of both speeds */
+    growth = growth_impulse(&e, dt, 0.1, &way, 0);
+    assert_close("less than mass", growth.value, 1e-3 * (0.3 - 0.2), 1e-17);
+    assert_close("its slope", growth.slope, 0.5 * dt / 2 * 0.1 + 1e-3 * 1.0, 1e-17);
+    growth = growth_impulse(&e, dt, 0.5, &way, 0);
+    assert_close("faster than before", growth.value, 1e-3 * (1.5 - 0.8), 1e-17);
+    assert_close("its slope", growth.slope, 0.5 * dt / 2 * 0.7 + 1e-3 * 3.0, 1e-17);
+    /* a foot that stops: (0.4 - 0.1)^2 = 0.09 times stop_drag more; half of what it gets counts up
+     * to stop_growth, as if it had been there before */
+    e = (Element){.exit_drag = 3.0, .entry_drag = 2.0, .entry_speed = 0.4, .stop_drag = 10.0};
+    growth = growth_impulse(&e, dt, 0.1, &way, 1);
+    assert_close("stops", growth.value, 1e-3 * (1.1 + 0.9), 1e-17);
+    assert_close("its slope", growth.slope, 0.5 * dt / 2 * 2.0 + 1e-3 * (3.0 - 6.0), 1e-17);
+    e.stop_growth = 1.6e-3; /* twice 1 mm is more: 1.6 mm, whatever the way */
+    growth = growth_impulse(&e, dt, 0.1, &way, 1);
+    assert_close("turns", growth.value, 1.6e-3 * 2.0, 1e-17);
+    assert_close("its slope", growth.slope, 1.6e-3 * -3.0, 1e-17);
+    e.stop_growth = 5e-3; /* not twice as far: twice 1 mm */
+    growth = growth_impulse(&e, dt, 0.1, &way, 1);
+    assert_close("begins", growth.value, 2e-3 * 2.0, 1e-17);
+    assert_close("its slope", growth.slope, 2 * 0.5 * dt / 2 * 2.0 + 2e-3 * -3.0, 1e-17);
+}
+
+/* dt T k = 1e-3 x 5e-3 x 4e4 = 0.2 kg, by the speed at which the ground is left. */
+static void test_lag(void **state) {
+    (void)state;
+    const Element e = {.unload_stiffness = 4e4, .entry_speed = 0.1};
+    const double dt = 1e-3, mass = 0.2;
+    assert_true(lag_impulse(&e, dt, -0.09).value == 0.0 && lag_impulse(&e, dt, 0.3).slope == 0.0);
+    const Impulse far = lag_impulse(&e, dt, -0.2), near = lag_impulse(&e, dt, -0.1 - 1e-6);
+    assert_close("far", far.value, mass * (-0.1 + 1e-6), 1e-15);
+    assert_close("slope", far.slope, mass, 1e-15);
+    assert_close("near", near.value, -mass * 1e-12 / (2 * 2e-6), 1e-15);
+    assert_close("slope", near.slope, mass / 2, 1e-6);
+}
+
+/* Down by 2 mm in 2 ms on F = 500 N/m u: mean 3 N and 1 N damping more at 0.25 s/m and 1 m/s; the
+ * way through the air carries nothing. */
+static void test_elastic(void **state) {
+    (void)state;
+    const double dt = 2e-3;
+    Element e = {
+        .middle = 0.005,
+        .law = {.elastic_force = 500.0 * 0.01, .elastic_exponent = 1.0, .elastic_damping = 0.25}};
+    assert_close("inside", elastic_impulse(&e, dt, 0.007).value, dt * 3.0 + 0.25 * 3.0 * 0.002,
+                 1e-12);
+    e.middle = -0.002; /* half of the way is in the ground: mean 0.5 N there */
+    assert_close("entering", elastic_impulse(&e, dt, 0.002).value,
+                 dt * 0.5 * 0.5 + 0.25 * 0.5 * 0.002, 1e-12);
+    e.middle = 0.002;
+    assert_close("leaving", elastic_impulse(&e, dt, -0.006).value,
+                 dt * 0.5 * 0.25 - 0.25 * 0.5 * 0.002, 1e-12);
+    e.middle = -0.002;
+    assert_close("in the air", elastic_impulse(&e, dt, -0.001).value, 0.0, 1e-12);
+}
+
+/* ---- begin ---- */
+
+/* Springs of 1000 N/m: 10 mm deep 10 N. recovery 0.5 springs back over 5 mm, so at 2000 N/m; 0 over
+ * the least elastic travel of 0.1 mm; 1 along the law itself. */
+static void test_unloading_line(void **state) {
+    (void)state;
+    static const double recovery[3] = {0.5, 0.0, 1.0}, stiffness[3] = {2e3, 1e5, 1e3},
+                        zero[3] = {0.005, 0.0099, 0.0};
+    for (int i = 0; i < 3; i++) {
+        Element e = {.recovery = recovery[i],
+                     .yield_depth = 0.01,
+                     .law = {.line_stiffness = 1e3, .bed_depth = INFINITY}};
+        element_unloading_line(&e, LAW_LINE, 10.0);
+        assert_close("stiffness", e.unload_stiffness, stiffness[i], 1e-6);
+        assert_close("zero", e.zero_depth, zero[i], 1e-12);
+    }
+    /* 1 mm in a bed of 20000 N/m at 9 mm: 30 N, and never flatter than bed and springs */
+    Element e = {.recovery = 1.0,
+                 .yield_depth = 0.01,
+                 .law = {.line_stiffness = 1e3, .bed_depth = 0.009, .bed_stiffness = 2e4}};
+    element_unloading_line(&e, LAW_LINE, 30.0);
+    assert_close("bed", e.unload_stiffness, 2.1e4, 1e-6);
+    assert_close("zero", e.zero_depth, 0.01 - 30.0 / 2.1e4, 1e-12);
+}
+
+static Element begun(const ElementMemory *memory, double depth, double speed) {
+    Element e = {.law = cone(), .mu = 0.5, .k_drift = 200.0, .b_drift = 3.0, .depth = depth};
+    e.law.mass_rate = 60.0;
+    e.law.line_stiffness = 1e3;
+    element_begin(&e, memory, LAW_CONE, 1e-3, 1e3, speed);
+    return e;
+}
+
+/* 10 mm deep at 0.2 m/s after steps of 1 ms. */
+static void test_begin(void **state) {
+    (void)state;
+    ElementMemory memory = {0};
+    Element e = begun(&memory, 0.01, 0.2); /* touched down on its way: 9.9 mm by the speed */
+    assert_close("middle", e.middle, 0.0099, 1e-17);
+    assert_close("yield", e.yield_depth, 0.0099, 1e-17);
+    assert_close("yield speed", e.yield_speed, 0.0, 0.0);
+    assert_close("entry", e.entry_speed, 0.2, 0.0);
+    memory = (ElementMemory){.depth_max = 0.01 + 5e-5, .middle = 0.0098, .drift = 0.04};
+    e = begun(&memory, 0.01, -0.3);
+    assert_close("middle", e.middle, 0.0098, 0.0);
+    assert_close("yield", e.yield_depth, 0.01005, 0.0);
+    assert_close("virgin", e.virgin_depth, 0.01005, 0.0);
+    assert_close("yield speed", e.yield_speed, 0.1, 1e-12); /* 0.05 mm in half a step */
+    assert_close("front", e.front_speed, 0.1, 1e-12);       /* waits at the yield */
+    assert_close("entry", e.entry_speed, 0.0, 0.0);
+    assert_close("drift", e.drift_bound, 1e-3 * 200.0 * 0.04 * 0.01, 1e-18);
+    assert_close("damping", e.damping, 3e-3, 1e-18);
+    memory.depth_max = 0.01, memory.front_speed = 0.7;
+    e = begun(&memory, 0.01, 0.2);
+    assert_close("front", e.front_speed, 0.7, 0.0);
+    assert_close("mass", e.added_mass, 60.0 * HALF_RECRUITED, 1e-15);
+    /* friction holds with mu F(a) + k_D d_D u = 5 + 0.08 N over 20 um */
+    assert_close("held", e.hold_stiffness, 1e-6 * 5.08 / 2e-5, 1e-12);
+    e = begun(&memory, -0.001, 0.2);
+    assert_true(e.damping == 0.0 && e.drift_bound == 0.0);
+}
+
+/* Where k falls to a half, the force held falls with it; where it grows, it stays. */
+static void test_hold(void **state) {
+    (void)state;
+    ElementMemory memory = {.held_x = 0.3, .held_y = -0.4, .held_stiffness = 1e5};
+    Element e = {.mu = 0.5};
+    friction_hold(&e, &memory, 1e-3, 1e3, 2.0); /* 1 N over 20 um: 5e4 N/m */
+    assert_close("stiffness", e.hold_stiffness, 0.05, 1e-15);
+    assert_close("x", e.hold_x, 0.15e-3, 1e-18);
+    assert_close("y", e.hold_y, -0.2e-3, 1e-18);
+    friction_hold(&e, &memory, 1e-3, 1e3, 8.0);
+    assert_close("x", e.hold_x, 0.3e-3, 1e-18);
+    assert_close("y", e.hold_y, -0.4e-3, 1e-18);
+}
+
+/* r = 0.01 N s, 0.02 kg of damping, nothing held: c = r 250 = 2.5 kg. At 2 mm/s along (0.6, 0.8)
+ * 0.005 N s, half of the bound; at 40 mm/s it slides. */
+static void test_friction(void **state) {
+    (void)state;
+    const Element e = {.damping = 0.02};
+    const Friction slow = friction_impulse(&e, 0.01, 0.5, 0.0012, 0.0016);
+    assert_close("x", slow.x, -0.0012 * 2.52, 1e-15);
+    assert_close("y", slow.y, -0.0016 * 2.52, 1e-15);
+    const Friction fast = friction_impulse(&e, 0.01, 0.5, 0.024, 0.032);
+    assert_close("x", fast.x, -0.006 - 0.024 * 0.02, 1e-15);
+    assert_close("y", fast.y, -0.008 - 0.032 * 0.02, 1e-15);
+    const Element held = {.hold_x = 0.004, .hold_stiffness = 1.0};
+    const Friction rest = friction_impulse(&held, 0.01, 0.5, 0.0, 0.0);
+    assert_close("x", rest.x, 0.004, 0.0);
+    assert_close("y", rest.y, 0.0, 0.0);
+    assert_close("stiffness", rest.fall_xx, 3.5, 1e-12);
+}
+
+/* Weak ground, drag alone: V goes to 0.3 h where the foot stops; F = 0.01 of the drag at h: to 0.4
+ * h; much F: to 0.75 h, a uniform stop. V(w) is (h + w)/2 + (stop - 1/2) (h - w)^2/h. */
+static void test_drag(void **state) {
+    (void)state;
+    static const double force[3] = {0.0, 0.01, 5.0}, stop[3] = {0.3, 0.4, 0.75};
+    for (int i = 0; i < 3; i++) {
+        const double rate = 40.0, h = 0.5; /* (c_d - 1) m_a' 40 kg/m: 10 N at 0.5 m/s */
+        Element e = {.law = cone(), .depth = 0.002, .middle = 0.0, .entry_speed = h};
+        e.law.line_stiffness = 0.0;
+        e.law.flat_stiffness = 2 * force[i] * rate * h * h / 0.002; /* F half way to u0 */
+        e.entry_drag = rate / 2;
+        element_drag(&e, LAW_CONE, 1e-3, 0.0);
+        assert_close("stop", 0.5 + e.stop_drag * h / rate, stop[i], 1e-9);
+        assert_close("speed", e.entry_speed, h, 1e-15);
+        assert_close("growth", e.stop_growth, law_recruited(&e.law, 0.002), 1e-18);
+    }
+    /* free fall over 3 mm of way to the front adds 2 g 3 mm to h^2 */
+    Element e = {.law = cone(),
+                 .depth = 0.005,
+                 .middle = 0.001,
+                 .yield_depth = 0.004,
+                 .entry_speed = 0.6,
+                 .entry_drag = 20.0};
+    element_drag(&e, LAW_CONE, 1e-3, 1e-3 * KIT_GRAVITY);
+    assert_close("faster", e.entry_speed, sqrt(0.36 + 2 * KIT_GRAVITY * 0.003), 1e-12);
+    assert_close("growth", e.stop_growth,
+                 law_recruited(&e.law, 0.005) - law_recruited(&e.law, 0.004), 1e-18);
+    e.entry_speed = 0.6, e.depth = 0.0037; /* 0.4 mm to the front; half a step leads 0.3 mm on */
+    element_drag(&e, LAW_CONE, 1e-3, 1e-3 * KIT_GRAVITY);
+    assert_true(e.entry_speed == 0.6 && e.stop_drag == 0.0 && e.stop_growth == 0.0);
+}
+
+/* Negative added mass and drag, half open cone at 10 mm: what joins at 0.3 m/s beyond the front,
+ * and drag at 0.2 m/s over the step. */
+static void test_explicit(void **state) {
+    (void)state;
+    Element e = {.law = cone(), .yield_depth = 0.01, .front_speed = 0.1, .entry_speed = 0.2};
+    e.law.mass_rate = -60.0;
+    assert_close("mass", element_explicit(&e, 1e-3, 0.4), -60.0 * HALF_RECRUITED * 0.3, 1e-15);
+    e.law.mass_rate = 60.0;
+    e.law.drag_rate = -80.0;
+    assert_close("drag", element_explicit(&e, 1e-3, 0.4), -80.0 * 0.25 * 1e-3 * 0.04, 1e-18);
+    e.law.drag_rate = 80.0;
+    assert_true(element_explicit(&e, 1e-3, 0.4) == 0.0);
+}
+
+/* ---- the end of a step ---- */
+
+/* An element goes down at 0.4 m/s and up at 0.1 m/s after: the impulse 0.05 N s moves the mass 0.1
+ * kg, 8 mJ at the entry. On 1000 N/m springs, 1 mm deep, the rest of the way x is that of 8 mJ =
+ * 1 N x + 500 N/m x^2. */
+static void test_peak(void **state) {
+    (void)state;
+    Element e = {.law = {.line_stiffness = 1e3, .bed_depth = INFINITY},
+                 .recovery = 1.0,
+                 .middle = 0.001,
+                 .yield_depth = 0.001,
+                 .virgin_depth = 0.001,
+                 .zero_depth = 0.001,
+                 .unload_stiffness = 1e3,
+                 .entry_speed = 0.4};
+    const double way = (sqrt(1.0 + 2 * 1e3 * 8e-3) - 1.0) / 1e3, deepest = 0.001 + way;
+    const double middle = 0.0005; /* already on its way up */
+    assert_close("peak", element_peak(&e, LAW_LINE, 0.05, -0.1, middle), deepest, 1e-12);
+    e.recovery = 0.0; /* half of the way beyond */
+    assert_close("plastic", element_peak(&e, LAW_LINE, 0.05, -0.1, middle), (deepest + middle) / 2,
+                 1e-12);
+    e.recovery = 1.0;
+    assert_true(element_peak(&e, LAW_LINE, 0.05, 0.1, middle) == middle); /* does not turn */
+    assert_true(element_peak(&e, LAW_LINE, 0.0, -0.1, middle) == middle); /* nothing turned it */
+    /* it still has to go down the unloading line from 0.6 to 1 mm: (0.4^2 - 0) mm^2 500 N/m */
+    e.middle = 0.0006, e.zero_depth = 0.0006;
+    const double left = 8e-3 - 500.0 * 0.16e-6;
+    assert_close("line", element_peak(&e, LAW_LINE, 0.05, -0.1, middle),
+                 0.001 + (sqrt(1.0 + 2 * 1e3 * left) - 1.0) / 1e3, 1e-12);
+    /* the deeper end is the new one: the little energy at 0.1 m/s, 0.5 mJ, counts from there */
+    e.middle = 0.001, e.zero_depth = 0.001;
+    const double force = 2.0;
+    assert_close("after", element_peak(&e, LAW_LINE, 0.05, -0.1, 0.002),
+                 0.002 + (sqrt(force * force + 2 * 1e3 * 0.5e-3) - force) / 1e3, 1e-12);
+    /* the bed's stiffness counts: 1 N + 20 N beyond 1 mm */
+    e.law.bed_depth = 0.0, e.law.bed_stiffness = 2e4;
+    assert_close("bed", element_peak(&e, LAW_LINE, 0.05, -0.1, middle),
+                 0.001 + (sqrt(21.0 * 21.0 + 2 * 2.1e4 * 8e-3) - 21.0) / 2.1e4, 1e-12);
+}
+
+/* Nothing but drag, at its mean on the way, half of c v^2 with a quarter of the area still flat:
+ * M v^2/2 = c/4 v^2/2 x, so x = 4 M/c = 4 x 0.1/80. */
+static void test_peak_of_drag(void **state) {
+    (void)state;
+    Element e = {.law = cone(),
+                 .recovery = 1.0,
+                 .middle = 0.01,
+                 .yield_depth = 0.01,
+                 .virgin_depth = 0.01,
+                 .zero_depth = 0.01,
+                 .entry_speed = 0.4};
+    e.law.drag_rate = 80.0;
+    assert_close("drag", element_peak(&e, LAW_CONE, 0.05, -0.1, 0.0), 0.01 + 0.005, 1e-12);
+    /* elastic ground: F = 500 N/m u, exponent 1 */
+    e.law = (Law){.elastic_force = 5.0, .elastic_exponent = 1.0, .bed_depth = INFINITY};
+    assert_close("elastic", element_peak(&e, LAW_ELASTIC, 0.05, -0.1, 0.0),
+                 0.01 + (sqrt(25.0 + 2 * 500.0 * 8e-3) - 5.0) / 500.0, 1e-9);
+}
+
+static ElementMemory remembered(const Element *e, const ElementMemory *memory, double normal,
+                                double vx, double speed, int stays) {
+    return element_remember(e, memory, 1e-3, 1e3, normal, vx, 0.0, speed, stays);
+}
+
+static void test_remember(void **state) {
+    (void)state;
+    Element e = {.depth = 0.01, .yield_depth = 0.0105, .virgin_depth = 0.0105, .yield_speed = 1.0};
+    ElementMemory memory = {.depth_max = 0.0105, .drift = 0.02, .pending_x = 6e-6};
+    ElementMemory after =
+        remembered(&e, &memory, 0.0, 0.1, 0.4, 1); /* 0.2 mm on: not at the yield */
+    assert_close("deepest", after.depth_max, 0.0105, 0.0);
+    assert_close("middle", after.middle, 0.0102, 1e-17);
+    assert_close("drift", after.drift, 0.02 + 106e-6, 1e-15);
+    assert_true(after.pending_x == 0.0 && after.front_speed == 0.0);
+    after = remembered(&e, &memory, 0.0, 0.003, 1.6, 1); /* 0.8 mm on */
+    assert_close("deepest", after.depth_max, 0.0108, 1e-17);
+    assert_close("middle", after.middle, 0.0108, 1e-17);
+    assert_close("waits", after.drift, 0.02, 0.0); /* 9 um is jitter */
+    assert_close("pending", after.pending_x, 9e-6, 1e-18);
+    assert_close("joins", after.front_speed, 0.6, 1e-15); /* the front was led by nobody */
+    e.front_speed = 1.1;
+    assert_close("leads", remembered(&e, &memory, 0.0, 0.0, 1.6, 1).front_speed, 1.6, 0.0);
+    memory.drift = 0.0999, e.front_speed = 1.0;
+    assert_close("most", remembered(&e, &memory, 0.0, 0.5, 0.0, 1).drift, 0.1, 0.0);
+    after = remembered(&e, &memory, 0.0, 0.5, 1.6, 0); /* lifted: all but the way is forgotten */
+    assert_true(after.depth_max == 0.0 && after.drift == 0.0 && after.front_speed == 0.0 &&
+                after.pending_x == 0.0 && after.held_x == 0.0 && after.held_stiffness == 0.0);
+    assert_close("middle", after.middle, 0.0108, 1e-17);
+}
+
+/* 2 mN s held less 1 kg x 0.5 mm/s: 1.5 N, within 0.5 x 4 mN s; a bound of 1 mN s leaves 1 N. */
+static void test_remember_friction(void **state) {
+    (void)state;
+    const Element e = {.depth = 0.01, .mu = 0.5, .hold_x = 2e-3, .hold_stiffness = 1.0};
+    const ElementMemory memory = {0};
+    ElementMemory after = remembered(&e, &memory, 4e-3, 0.5e-3, 0.0, 1);
+    assert_close("held", after.held_x, 1.5, 1e-12);
+    assert_close("stiffness", after.held_stiffness, 1e6, 1e-6);
+    after = remembered(&e, &memory, 2e-3, 0.5e-3, 0.0, 1);
+    assert_close("bound", after.held_x, 1.0, 1e-12);
+    assert_true(after.held_y == 0.0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_slope_of_the_impulse),
+                                       cmocka_unit_test(test_slopes_of_friction),
+                                       cmocka_unit_test(test_way),
+                                       cmocka_unit_test(test_path_keeps_the_work),
+                                       cmocka_unit_test(test_law_between),
+                                       cmocka_unit_test(test_added_mass),
+                                       cmocka_unit_test(test_growth),
+                                       cmocka_unit_test(test_lag),
+                                       cmocka_unit_test(test_elastic),
+                                       cmocka_unit_test(test_unloading_line),
+                                       cmocka_unit_test(test_begin),
+                                       cmocka_unit_test(test_hold),
+                                       cmocka_unit_test(test_friction),
+                                       cmocka_unit_test(test_drag),
+                                       cmocka_unit_test(test_explicit),
+                                       cmocka_unit_test(test_peak),
+                                       cmocka_unit_test(test_peak_of_drag),
+                                       cmocka_unit_test(test_remember),
+                                       cmocka_unit_test(test_remember_friction)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
