@@ -1,6 +1,6 @@
 /* MILD_API_BEGIN and MILD_API_END enclose the declarations of every public header. They give them C
- * names in C++ and make them visible outside libmild, which hides all others. Thread safety:
- * nothing here runs. */
+ * linkage in C++ and make them visible outside libmild, which hides all other symbols. Thread
+ * safety: this header contains no code. */
 #ifndef MILD_API_H
 #define MILD_API_H
 

@@ -11,20 +11,21 @@ MILD_API_BEGIN
  * writes the status to *error. */
 typedef enum {
     MILD_OK = 0,         /* success */
-    MILD_ERROR_ARGUMENT, /* an argument is not usable */
+    MILD_ERROR_ARGUMENT, /* an argument is invalid */
     MILD_ERROR_RANGE,    /* a number is outside its documented range */
-    MILD_ERROR_FORMAT,   /* a file is not what its name says */
+    MILD_ERROR_FORMAT,   /* a file has the wrong format */
     MILD_ERROR_IO,       /* reading or writing failed */
     MILD_ERROR_MEMORY,   /* allocation failed */
 } MildStatus;
 
-/* Every `MildError *error` may be NULL. It is written on failure only, so start it as {0}. */
+/* Every `MildError *error` may be NULL. It is written only on failure, so initialise it with
+ * {0}. */
 typedef struct {
     MildStatus status; /* MILD_OK until something fails */
     char text[400];    /* one line without a newline: what is wrong, where, and the remedy */
 } MildError;
 
-/* Fills *error (may be NULL) like printf. Returns `status`, so that a function can end with
+/* Formats *error (may be NULL) like printf. Returns `status`, so that a function can end with
  * `return mild_fail(...)`. */
 MildStatus mild_fail(MildError *error, MildStatus status, const char *format, ...);
 

@@ -1,6 +1,6 @@
-/* Tables of fields. Each struct of parameters has one; validation, configuration keys and help text
- * all come from it. Thread safety: tables are constant and may be shared; the functions touch
- * nothing but their arguments. */
+/* Tables of fields. Each struct of parameters has one. Validation, configuration keys and help text
+ * are all derived from it. Thread safety: tables are constant and may be shared. The functions
+ * access only their arguments. */
 #ifndef MILD_FIELD_H
 #define MILD_FIELD_H
 
@@ -26,7 +26,7 @@ typedef struct {
     MildFieldType type;       /* how it is stored */
     size_t offset;            /* [bytes] from the start of the struct */
     int count;                /* values, 1 for a scalar; TEXT: bytes, with the terminating 0 */
-    double min, max;          /* [the field's unit] inclusive; ignored for TEXT */
+    double min, max;          /* [the field's unit] inclusive limits; ignored for TEXT */
     const char *help;         /* starts with the unit in brackets: "[N/m^3] ..." */
     const char *const *names; /* NAME: [max + 1]; otherwise NULL */
 } MildField;
@@ -39,25 +39,25 @@ typedef struct {
 #define MILD_FIELD_CHOICE(Struct, member, names, count, help)                                      \
     { #member, MILD_FIELD_NAME, offsetof(Struct, member), 1, 0, (count)-1, help, names }
 
-/* Checks every field of the struct `def` against its range; NaN is outside. fields: [count]. Fails
- * with MILD_ERROR_RANGE at the first bad one: "section.name = value is outside min .. max: help". A
- * TEXT field fails when it has no terminating 0. */
+/* Checks that every field of the struct `def` is in its range; NaN is not. fields: [count]. Fails
+ * with MILD_ERROR_RANGE at the first bad field: "section.name = value is outside min .. max: help".
+ * A TEXT field fails when it has no terminating 0. */
 MildStatus mild_fields_check(const MildField *fields, int count, const void *def,
                              const char *section, MildError *error);
 
-/* Reads `text` into the field of the struct `def`. The values of an array are separated by spaces
- * or commas. Fails with MILD_ERROR_ARGUMENT when the text is not `count` values of the type, and
- * with MILD_ERROR_RANGE when a value is outside its range; then nothing is written. */
+/* Parses `text` into the field of the struct `def`. Array values are separated by spaces or commas.
+ * Fails with MILD_ERROR_ARGUMENT when the text does not consist of `count` values of the type, and
+ * with MILD_ERROR_RANGE when a value is out of range. On failure nothing is written. */
 MildStatus mild_field_parse(const MildField *field, void *def, const char *text,
                             const char *section, MildError *error);
 
 /* Writes the value of the field as text that mild_field_parse reads back exactly. text: [size].
- * Returns the length of the whole text as snprintf does: when that is `size` or more, it was
- * cut. */
+ * Returns the length of the whole text, as snprintf does; if that is `size` or more, the text was
+ * truncated. */
 int mild_field_print(const MildField *field, const void *def, char *text, size_t size);
 
-/* Finds a field by name; NULL when there is none. *nearest (may be NULL) receives the name with the
- * smallest edit distance. fields: [count]. */
+/* Finds a field by name. Returns NULL when there is none. *nearest (may be NULL) receives the name
+ * with the smallest edit distance. fields: [count]. */
 const MildField *mild_field_find(const MildField *fields, int count, const char *name,
                                  const char **nearest);
 

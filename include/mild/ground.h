@@ -1,25 +1,28 @@
-/* libmild: soft ground for legged robots. Forces between rigid feet and foam, rubber, grass or
- * sand, computed for each element of the soles, in both directions: the ground carries the robot
- * and the robot deforms the ground.
+/* libmild: soft ground for legged robots. It computes the forces between rigid feet and foam,
+ * rubber, grass or sand for each element of the soles. The coupling is two-way: the ground carries
+ * the robot, and the robot deforms the ground.
  *
- * The engine owns the mass matrix M, the foot Jacobian J (6 rows a foot, twist at the ankle, world
- * axes), the generalised velocity qvel, the applied forces tau and the bias forces b. Its step is
+ * The engine owns the mass matrix M, the foot Jacobian J (6 rows per foot: twist at the ankle,
+ * world axes), the generalised velocity qvel, the applied forces tau and the bias forces b. Its
+ * step is
  *
  *     A      = J M^-1 J^T
  *     V_free = J (qvel + dt M^-1 (tau - b))
- *     mild_ground_solve(...)       impulses on the feet; the ground is not changed
- *     tau   += J^T force           the wrench of each foot, then integrate
- *     mild_ground_advance(...)     the ground remembers the step; once for each accepted step
+ *     mild_ground_solve(...)       impulses on the feet; does not change the ground
+ *     tau   += J^T force           add the wrench of each foot, then integrate
+ *     mild_ground_advance(...)     update the ground; once for each accepted step
  *
- * SI units, radians, z up. The reference point of a foot is its ankle. Penetration u = h0 - z is
- * positive below the surface h0. Forces on the foot are positive upward. Equation numbers are those
- * of the paper, read as docs/model.md says.
+ * Units are SI and radians, and z points up. The reference point of a foot is its ankle.
+ * Penetration u = h0 - z is positive below the surface h0. Forces on the foot are positive upward.
+ * Equation numbers are those of the paper, as interpreted in docs/model.md.
  *
- * Thread safety: a sole or a map never changes and may be shared, and so may a terrain that nobody
+ * Thread safety: soles and maps never change and may be shared, and so may a terrain that nobody
  * writes to. A MildGround and a MildScratch belong to one thread at a time. There is no global
- * state. No function prints or exits. Only functions that say that they return NULL when out of
- * memory allocate. Pointers must not be NULL, except `error` and where it is said. A function that
- * can fail refuses bad numbers; the others compute with them. */
+ * state.
+ *
+ * No function prints or exits. Functions allocate only if their description says that they return
+ * NULL when out of memory. Pointers must not be NULL, except `error` and where stated. Functions
+ * that can fail reject bad numbers; the others compute with them. */
 #ifndef MILD_GROUND_H
 #define MILD_GROUND_H
 
@@ -33,57 +36,56 @@
 MILD_API_BEGIN
 
 #define MILD_FEET_MAX 4       /* feet in one contact problem */
-#define MILD_MATERIALS_MAX 12 /* in one terrain */
-#define MILD_PATCHES_MAX 16   /* in one terrain */
+#define MILD_MATERIALS_MAX 12 /* materials in one terrain */
+#define MILD_PATCHES_MAX 16   /* patches in one terrain */
 
 /* ---- ground models: the paper's and its rivals behind one contract (docs/model.md, "Ground
  * models") ----
- *
- * A model is where the elements are (one in the middle of the sole, mild_sole_concentric, or the
- * raster) and what a material means to an element. Solvers, memory, friction, drift and results are
- * the same for all. A model is a row of this list and a file, src/ground/model_NAME.c; all else
- * that names models derives from the two. */
+ * A model defines where the elements are (the raster of the sole, or one element in its middle, see
+ * mild_sole_concentric) and what force a material gives on an element. Solvers, memory, friction,
+ * drift and results are the same for all models. A model consists of a row of this list and a file,
+ * src/ground/model_NAME.c. Everything else that names models is derived from these two. */
 /* clang-format off */
 #define MILD_MODEL_LIST(ROW)                                                                       \
     ROW(MILD, mild)                  /* a developing cone under every element (the paper) */       \
     ROW(CON_CONE, con_cone)          /* one developing cone under the whole sole */                \
     ROW(CON_SPRING, con_spring)      /* one yielding spring under the whole sole */                \
-    ROW(ECC_SPRING, ecc_spring)      /* the same spring under every element */                     \
+    ROW(ECC_SPRING, ecc_spring)      /* one yielding spring under every element */                 \
     ROW(ECC_QUASI, ecc_quasi)        /* resistive force theory in the plane of motion */           \
-    ROW(ECC_QUASI_3D, ecc_quasi_3d)  /* the same in three dimensions */                            \
-    ROW(BEKKER, bekker)              /* pressure by a power of the sinkage, shear by the path */   \
-    ROW(HUNT_CROSSLEY, hunt_crossley) /* damped and elastic: what most simulators offer */         \
-    ROW(RIGID, rigid)                /* the last: the engine's contact; no material has it */
+    ROW(ECC_QUASI_3D, ecc_quasi_3d)  /* resistive force theory in three dimensions */              \
+    ROW(BEKKER, bekker)              /* pressure a power of the sinkage, shear grows with slip */  \
+    ROW(HUNT_CROSSLEY, hunt_crossley) /* damped elastic contact, as most simulators have it */     \
+    ROW(RIGID, rigid)                /* must be last: the engine's own contact, has no material */
 /* clang-format on */
 
 /* A row's enumerator: MILD_MODEL_MILD and so on. */
 #define MILD_MODEL_ID(id, name) MILD_MODEL_##id,
 /* A model, in the list's order. */
 typedef enum {
-    MILD_MODEL_LIST(MILD_MODEL_ID) /* one of each row */
+    MILD_MODEL_LIST(MILD_MODEL_ID) /* one for each row */
 } MildModel;
-#define MILD_MODELS (MILD_MODEL_RIGID + 1) /* how many there are */
+#define MILD_MODELS (MILD_MODEL_RIGID + 1) /* number of models */
 
-#define MILD_MODEL_FIELDS 20 /* of the material that a model reads, at most */
-#define MILD_MODEL_PRESETS 8 /* materials of its own, at most */
-#define MILD_MODEL_SCALED 4  /* of them those by which it is matched, at most */
+#define MILD_MODEL_FIELDS 20 /* most fields of the material that a model may read */
+#define MILD_MODEL_PRESETS 8 /* most presets that a model may have */
+#define MILD_MODEL_SCALED 4  /* most fields that mild_model_match may scale */
 
-/* What a model says of itself. The lists end at the first NULL, or are full. */
+/* Description of a model. The lists end at the first NULL, or are full. */
 typedef struct {
     const char *summary;                     /* what the foot stands on */
     const char *source;                      /* who published it */
-    const char *fields[MILD_MODEL_FIELDS];   /* of the material that it reads */
-    const char *scaled[MILD_MODEL_SCALED];   /* of them those by which mild_model_match fits it */
-    const char *presets[MILD_MODEL_PRESETS]; /* names of its materials: mild_material_preset */
-    const char *match_note;                  /* what that sets besides; NULL: nothing */
-    int concentric; /* bool: one element in the middle of the sole, not the raster */
+    const char *fields[MILD_MODEL_FIELDS];   /* names of the material's fields that it reads */
+    const char *scaled[MILD_MODEL_SCALED];   /* those of them that mild_model_match scales */
+    const char *presets[MILD_MODEL_PRESETS]; /* names of its presets, see mild_material_preset */
+    const char *match_note;                  /* what else mild_model_match sets; NULL: nothing */
+    int concentric;                          /* bool: one element in the middle of the sole */
 } MildModelInfo;
 
 /* Names of the models as users write them, in the order of the enum. */
 extern const char *const mild_model_names[MILD_MODELS];
 /* Finds a model by name. Returns false, and leaves *model alone, when the name is unknown. */
 int mild_model_find(const char *name, MildModel *model);
-/* What a model says of itself. It never changes. */
+/* The description of a model. It never changes. */
 const MildModelInfo *mild_model_info(MildModel model);
 /* Bool: the model has one element in the middle of the sole. */
 int mild_model_is_concentric(MildModel model);
@@ -93,30 +95,32 @@ int mild_model_is_concentric(MildModel model);
 /* A plain struct. Start from mild_material_default or a preset, change what differs, and check it
  * with mild_material_check. */
 typedef struct {
-    double k_pen;       /* [N/m] penetration stiffness of one element at the surface; of
-                           hunt_crossley its force by its depth at 10 mm */
-    double sigma_cone;  /* [N/m^3] depth-dependent conical stress */
-    double alpha;       /* [rad] shear band angle */
-    double nu;          /* [-] recruitment rate */
-    double c_g;         /* [-] surrounding mass scale */
-    double c_d;         /* [-] inertial drag scale */
-    double phi;         /* [-] volume fraction */
-    double rho;         /* [kg/m^3] grain density */
-    double mu;          /* [-] friction coefficient */
-    double k_drift;     /* [N/m^2] drift stiffness k_D per element */
-    double b_drift;     /* [N s/m] drift damping b_D per element */
-    double recovery;    /* [-] share of the depth that springs back: 1 elastic, 0 plastic */
-    double bed_depth;   /* [m] firm bottom below the surface */
-    double zeta;        /* [-] ecc_quasi*: 1 is 1e6 N/m^3 under a level plate going straight down */
-    int passive;        /* bool: clamp c_g >= 0 and c_d >= 1/2 so that no energy is created */
-    int model;          /* MildModel, not MILD_MODEL_RIGID */
-    double exponent;    /* [-] bekker, hunt_crossley: power n of the depth */
-    double dissipation; /* [s/m] hunt_crossley: restitution is 1 - dissipation v, v small */
-    double k_c;         /* [N/m^(n+1)] bekker: modulus of deformation, by the plate's width */
-    double k_phi;       /* [N/m^(n+2)] bekker: the same, whatever the width */
-    double plate_width; /* [m] bekker: b, smaller side of the loaded plate */
-    double cohesion;    /* [N/m^2] bekker: c, shear strength without load */
-    double shear_length; /* [m] bekker: K, over which the shear strength builds up */
+    double k_pen;        /* [N/m] penetration stiffness of one element at the surface; for
+                           hunt_crossley force divided by depth at a depth of 10 mm */
+    double sigma_cone;   /* [N/m^3] depth-dependent conical stress */
+    double alpha;        /* [rad] shear band angle */
+    double nu;           /* [-] recruitment rate */
+    double c_g;          /* [-] surrounding mass scale */
+    double c_d;          /* [-] inertial drag scale */
+    double phi;          /* [-] volume fraction */
+    double rho;          /* [kg/m^3] grain density */
+    double mu;           /* [-] friction coefficient */
+    double k_drift;      /* [N/m^2] drift stiffness k_D per element */
+    double b_drift;      /* [N s/m] drift damping b_D per element */
+    double recovery;     /* [-] share of the depth that springs back: 1 elastic, 0 plastic */
+    double bed_depth;    /* [m] depth of the firm bed below the surface */
+    double zeta;         /* [-] ecc_quasi*: stress per depth under a level plate moving straight
+                           down, in 1e6 N/m^3 */
+    int passive;         /* bool: clamp c_g >= 0 and c_d >= 1/2, so that no energy is created */
+    int model;           /* MildModel, not MILD_MODEL_RIGID */
+    double exponent;     /* [-] bekker, hunt_crossley: exponent n of the depth */
+    double dissipation;  /* [s/m] hunt_crossley: the coefficient of restitution is 1 - dissipation v
+                           at a small impact speed v */
+    double k_c;          /* [N/m^(n+1)] bekker: cohesive modulus, divided by plate_width */
+    double k_phi;        /* [N/m^(n+2)] bekker: frictional modulus */
+    double plate_width;  /* [m] bekker: b, smaller side of the loaded plate */
+    double cohesion;     /* [N/m^2] bekker: c, shear strength without load */
+    double shear_length; /* [m] bekker: K, slip over which the shear strength builds up */
 } MildMaterial;
 
 /* Fields of MildMaterial with unit, range and meaning, for configuration files, sliders and random
@@ -126,17 +130,18 @@ extern const int mild_material_field_count;
 
 /* The preset sand_loose. */
 MildMaterial mild_material_default(void);
-/* Writes a preset to *material. Of mild: rubber foam60 foam45 foam28 foam25 grass sand_loose
- * sand_dense. Of bekker: dry_sand sandy_loam clay snow lunar_soil. Returns false, and leaves
- * *material alone, when the name is unknown. (`rigid` is no material: it is the engine's contact.)
- */
+/* Writes a preset to *material. Presets of mild: rubber foam60 foam45 foam28 foam25 grass
+ * sand_loose sand_dense. Presets of bekker: dry_sand sandy_loam clay snow lunar_soil. Returns
+ * false, and leaves *material alone, when the name is unknown. (`rigid` is not a material but the
+ * engine's own contact.) */
 int mild_material_preset(const char *name, MildMaterial *material);
 /* Number of presets of mild. */
 int mild_material_preset_count(void);
 /* Name of a preset; NULL when index is not 0 .. count - 1. */
 const char *mild_material_preset_name(int index);
-/* Checks every field against its range, and that the model has a material (rigid has none). Fails
- * with the name of the first bad field. No other function checks a material. */
+/* Checks that every field is in its range and that the model has a material (rigid has none). Fails
+ * with the name of the first bad field. Besides mild_model_match, no other function checks a
+ * material. */
 MildStatus mild_material_check(const MildMaterial *material, MildError *error);
 
 /* ---- terrain: height and material under a point ---- */
@@ -152,35 +157,37 @@ typedef struct {
 
 /* A plain struct. It may be copied, and its numbers may change between two steps. A loaded element
  * keeps the index of the material that it touched down on (docs/model.md section 5). The material
- * at a point is that of the first patch that holds it, else that of the map, else material 0. */
+ * at a point is that of the first patch that contains the point, otherwise that of the map,
+ * otherwise material 0. */
 typedef struct {
     int material_count;                         /* materials in use */
     int patch_count;                            /* patches in use */
-    double height;                              /* [m] of the surface, added to the map's */
+    double height;                              /* [m] of the surface, added to the map's height */
     MildMaterial materials[MILD_MATERIALS_MAX]; /* [material_count], checked by the caller */
     MildPatch patches[MILD_PATCHES_MAX];        /* [patch_count] */
     double map_x;                               /* [m] world position of the map's origin */
     double map_y;                               /* [m] the same */
-    const MildMap *map; /* not owned; NULL: a level surface without a pattern */
+    const MildMap *map; /* not owned; NULL: level ground without a pattern */
 } MildTerrain;
 
 /* The mixture of two materials near a border. */
 typedef struct {
     int first;    /* index of the nearer material */
-    int second;   /* index of the other one */
-    double share; /* [-] of the second, at most 1/2; 0 away from a border */
+    int second;   /* index of the other material */
+    double share; /* [-] of the second material, at most 1/2; 0 away from a border */
 } MildBlend;
 
 /* One material everywhere, surface at z = 0. */
 MildTerrain mild_terrain_uniform(const MildMaterial *material);
 /* Adds a patch. Infinite edges make strips and half planes. Fails, and leaves the terrain alone,
- * when the terrain is full, when the patch is empty, NaN or overlaps an earlier one, and when its
- * material does not exist. */
+ * when the terrain is full, when the patch is empty, contains NaN or overlaps an earlier one, or
+ * when its material does not exist. */
 MildStatus mild_terrain_add_patch(MildTerrain *terrain, const MildPatch *patch, MildError *error);
 /* Sets the map; NULL removes it. Fails, and leaves the terrain alone, when the map has a label
  * without a material. */
 MildStatus mild_terrain_set_map(MildTerrain *terrain, const MildMap *map, MildError *error);
-/* Index of the material at the world point (x, y) [m]; near a border that of the nearer one. */
+/* Index of the material at the world point (x, y) [m]; near a border, that of the nearer
+ * material. */
 int mild_terrain_material_at(const MildTerrain *terrain, double x, double y);
 /* Both materials at the world point (x, y) [m]. */
 MildBlend mild_terrain_blend_at(const MildTerrain *terrain, double x, double y);
@@ -193,77 +200,77 @@ void mild_terrain_slope_at(const MildTerrain *terrain, double x, double y, doubl
 
 /* What a sole is made from. */
 typedef struct {
-    const double *outline; /* [points][2] [m] polygon in the foot frame, clockwise or not, that does
-                              not cross itself */
-    int points;            /* of the outline, 3 .. 4096 */
+    const double *outline; /* [points][2] [m] polygon in the foot frame, in either orientation; it
+                              must not cross itself */
+    int points;            /* points of the outline, 3 .. 4096 */
     double pitch;          /* [m] edge of an element; 0.0195 in the paper */
     double sole_z;         /* [m] sole plane in the foot frame, negative below the ankle */
-    /* Number of elements wanted (77 for the SA01), or 0 for the natural one. The raster is shifted
-       until the count comes nearest; then the least covered border cells are dropped or added. */
+    /* Number of elements wanted (77 for the SA01), or 0 for outline area divided by element area.
+     * The raster is shifted until the count is nearest to this. Then border cells are dropped, or
+     * added, in the order of their coverage by the outline. */
     int target_elements;
 } MildSoleDef;
 
-/* A rasterised sole. It never changes, so any number of threads, scratches and grounds share it. */
+/* A rasterised sole. It never changes, so any number of threads, scratches and grounds may share
+ * it. */
 typedef struct MildSole MildSole;
-/* Makes a sole. Returns NULL, with the field's name in *error, when the outline encloses no area,
- * crosses itself or is not finite, when pitch or target_elements are out of range or make more than
- * 65536 cells, or when out of memory. `def` is not kept. */
+/* Makes a sole. Returns NULL, with the name of the field in *error, when the outline encloses no
+ * area, crosses itself or is not finite, when pitch or target_elements is out of range or needs
+ * more than 65536 cells, or when out of memory. `def` is not kept. */
 MildSole *mild_sole_create(const MildSoleDef *def, MildError *error);
 /* Frees a sole; NULL is allowed. Scratches and grounds made from it stay valid. */
 void mild_sole_destroy(MildSole *sole);
 /* Number of elements, at least 1. */
 int mild_sole_elements(const MildSole *sole);
-/* [m] Edge of an element. Its area is the square of that. */
+/* [m] Edge of an element. The area of an element is its square. */
 double mild_sole_pitch(const MildSole *sole);
-/* Centres of the elements in the foot frame [m]: arrays of mild_sole_elements() for x and y, owned
- * by the sole, and the height z of all. */
+/* Centres of the elements in the foot frame [m]: arrays of mild_sole_elements() numbers for x and
+ * y, owned by the sole, and the common height z. */
 const double *mild_sole_x(const MildSole *sole);
 const double *mild_sole_y(const MildSole *sole);
 double mild_sole_z(const MildSole *sole);
-/* Makes a sole of one element for the concentric models: it lies at the centroid of the elements
- * and has their whole area. It carries force, but no moment about its centre. Destroy it like any
- * sole. NULL when out of memory. */
+/* Makes a sole of one element for the concentric models. The element lies at the centroid of the
+ * elements of `sole` and has their total area. It transmits a force but no moment about its centre.
+ * Destroy it like any other sole. Returns NULL when out of memory. */
 MildSole *mild_sole_concentric(const MildSole *sole, MildError *error);
 
 /* ---- element law in closed form (eqs 1 to 5, docs/model.md section 3) ---- */
 
-/* Force of virgin ground on an element that goes down with the speed w > 0:
+/* Force of virgin ground on an element that moves down at the speed w > 0:
+ *
  *     F = force + damping w + c_d added_mass_per_depth w^2 + added_mass dw/dt */
 typedef struct {
     double force;                /* F_g [N] quasistatic */
     double stiffness;            /* dF_g/du [N/m] */
-    double damping;              /* [N s/m] hunt_crossley; 0 of all others */
+    double damping;              /* [N s/m] hunt_crossley; 0 for all other models */
     double added_mass;           /* m_a [kg] */
     double added_mass_per_depth; /* dm_a/du [kg/m] */
 } MildElementLaw;
 /* The law of an element of area pitch^2 [m^2] at a depth u >= 0 [m] in virgin ground. The firm bed
  * is part of it. */
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth);
-/* [m] Depth at which a level sole that is pressed down slowly into virgin ground carries
- * `load` [N].
- */
+/* [m] Depth at which a level sole that is pressed slowly into virgin ground carries `load` [N]. */
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load);
 /* Derives the material of another model for a fair comparison with `mild`, a material of
- * MILD_MODEL_MILD: under `load` [N] one level foot sinks to the same depth. Half the weight of the
- * robot is a good load. Friction, drift, recovery and bed are those of `mild` where the model has
- * them. sole: the raster; when the model is concentric the result is for mild_sole_concentric of
- * it. Fails, with *rival unchanged, for rigid, when `mild` is a material of another model or one
- * that mild_material_check refuses, when the load is not positive, and when the rival would need a
- * number that mild_material_check refuses. */
+ * MILD_MODEL_MILD: under `load` [N] a level foot sinks to the same depth. Half the weight of a
+ * biped is a good load. Friction, drift, recovery and bed are those of `mild`, apart from what
+ * MildModelInfo.match_note names. sole: the raster. For a concentric model the result belongs to
+ * mild_sole_concentric of that raster. Fails, with *rival unchanged, for rigid, when `mild` is a
+ * material of another model or fails mild_material_check, when the load is not positive, or when
+ * the result fails mild_material_check. */
 MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error);
 
-/* Resistive force theory. Coefficients alpha [-] of the stress on a plate: force [N] = alpha zeta
- * 1e6 N/m^3 times depth times area.
+/* Resistive force theory. alpha [-] are the coefficients of the stress on a plate: force [N] =
+ * alpha zeta 1e6 N/m^3 times depth times area.
  *
  * In a vertical plane (Li et al. 2013). beta [rad]: slope of the plate, positive when its leading
- * face looks forward and down. gamma [rad], 0 .. pi/2: direction of motion below the horizontal.
- * alpha[2]: resistance backward and upward; (0.007, 1) for a level plate that goes straight
- * down. */
+ * face points forward and down. gamma [rad], 0 .. pi/2: direction of motion below the horizontal.
+ * alpha[2]: resistance backward and upward, (0.007, 1) for a level plate moving straight down. */
 void mild_resist_plane(double beta, double gamma, double alpha[2]);
-/* In space (Agarwal et al. 2023, scaled to 1 for a level plate that goes straight down). normal[3]:
- * unit vector out of the plate into the ground. direction[3]: unit vector of the motion. alpha[3]:
- * of the force on the plate, world axes; 0 for a face that trails. */
+/* In three dimensions (Agarwal et al. 2023, scaled to 1 for a level plate moving straight down).
+ * normal[3]: unit vector out of the plate into the ground. direction[3]: unit vector of the motion.
+ * alpha[3]: coefficients of the force on the plate, world axes; 0 for a trailing face. */
 void mild_resist_space(const double normal[3], const double direction[3], double alpha[3]);
 
 /* ---- one contact step (docs/model.md sections 6, 7) ---- */
@@ -276,42 +283,42 @@ typedef enum {
 
 /* What the engine knows before the step. Fixed size, no pointers. */
 typedef struct {
-    int feet;                          /* as in scratch and ground */
-    double dt;                         /* [s] above 0 */
+    int feet;                          /* the same as in scratch and ground */
+    double dt;                         /* [s] step size, above 0 */
     double position[MILD_FEET_MAX][3]; /* [m] ankle, world */
     double rotation[MILD_FEET_MAX][9]; /* [-] foot to world, row major, orthonormal */
-    /* [m/s, rad/s] Present twist at the ankle: linear, then angular, world axes. */
+    /* [m/s, rad/s] Present twist at the ankle: linear, then angular; world axes. */
     double velocity[MILD_FEET_MAX][6];
     /* A = J M^-1 J^T [1/kg, 1/(kg m), 1/(kg m^2)], row major with stride 6 feet. Symmetric and
      * positive semidefinite; it may be singular. */
     double inverse_inertia[6 * MILD_FEET_MAX * 6 * MILD_FEET_MAX];
     /* [m/s, rad/s] Twists after a step without ground, V_free = J (qvel + dt M^-1 (tau - b)). */
     double free_velocity[6 * MILD_FEET_MAX];
-    MildSolver solver; /* which of the two */
-    double tolerance;  /* [-] of the residual; 0: 1e-9 (sweeps 1e-10) */
-    /* Bound of Newton steps or sweeps; 0: 400 steps or 1000 sweeps. A step that Newton's method
-     * leaves unsolved takes up to 40 more. One in which friction would create energy is solved up
-     * to twice again. */
+    MildSolver solver; /* the solver to use */
+    double tolerance;  /* [-] of the residual; 0: 1e-9 for Newton, 1e-10 for sweeps */
+    /* Limit on Newton steps or sweeps; 0: 400 steps or 1000 sweeps. If Newton's method does not
+     * converge, up to 40 more steps follow. If friction would create energy, the contact step is
+     * solved again, at most twice. */
     int max_iterations;
 } MildContactInput;
 
-/* What the ground does to one foot, mean over the step (docs/model.md section 9). All 0 for a foot
- * in the air. */
+/* What the ground does to one foot, as means over the step (docs/model.md section 9). All 0 for a
+ * foot in the air. */
 typedef struct {
     double force[3];  /* [N] on the foot, world */
     double torque[3]; /* [N m] about the ankle, world: p x F */
-    /* [m] From the ankle: point of the wrench's central axis nearest the ankle, F x tau/|F|^2. 0
+    /* [m] Vector from the ankle to the nearest point of the wrench's central axis, F x tau/|F|^2. 0
      * where that overflows. */
     double zmp_axis[3];
-    /* [m] From the ankle, world axes: zero moment point on the level plane through the centroid of
-     * the elements. */
+    /* [m] Vector from the ankle, world axes, to the zero moment point on the horizontal plane
+     * through the centroid of the elements. */
     double zmp_sole[2];
-    /* [m] World: sum of p f over sum of f, with f the normal forces of the elements. For a level
-     * sole it is the ankle plus zmp_sole. 0 without load. */
+    /* [m] Centre of pressure, world: sum of p f divided by sum of f, with f the normal forces of
+     * the elements. For a level sole it is the ankle plus zmp_sole. 0 without load. */
     double pressure_center[3];
     double area;       /* [m^2] of the loaded elements */
-    double depth_max;  /* [m] over the loaded elements */
-    double depth_mean; /* [m] over the loaded elements */
+    double depth_max;  /* [m] largest depth of a loaded element */
+    double depth_mean; /* [m] mean depth of the loaded elements */
     int contacts;      /* number of loaded elements */
 } MildFootResult;
 
@@ -319,13 +326,13 @@ typedef struct {
 typedef struct {
     MildFootResult foot[MILD_FEET_MAX]; /* [feet] */
     double velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] twists at the ankles after the step,
-                                           V = V_free + A W, W the wrench impulses */
-    /* [-] Relative, in the metric of kinetic energy. Converged above the tolerance: all of it is
-     * rounding. */
+                                           V = V_free + A W with W the wrench impulses */
+    /* [-] Relative residual in the metric of kinetic energy. A converged step may exceed the
+     * tolerance if rounding permits no smaller residual. */
     double residual;
     int iterations; /* Newton steps or sweeps done */
-    /* Bool. It is 0 also when a pose or a result is not finite, when a number of a material is NaN
-     * and when dt is not positive. */
+    /* Bool. Also 0 when a pose or a result is not finite, when a number of a material is NaN, or
+     * when dt is not positive. */
     int converged;
 } MildContactResult;
 
@@ -335,23 +342,24 @@ typedef struct {
  * block of mild_ground_bytes() bytes without pointers. Copy it with memcpy to save, restore, send
  * or branch a simulation. */
 typedef struct MildGround MildGround;
-/* Working arrays of one thread. It serves any number of grounds with the same soles in turn. */
+/* Working arrays of one thread. A scratch can serve any number of grounds with the same soles, one
+ * after the other. */
 typedef struct MildScratch MildScratch;
 
 /* [B] Size of the block, a multiple of 64. soles: [feet], feet 1 .. MILD_FEET_MAX. */
 size_t mild_ground_bytes(const MildSole *const *soles, int feet);
-/* Initialises a block of that size, aligned to 8 and owned by the caller. Returns the block as a
- * MildGround on which nothing has stepped yet. */
+/* Initialises a block of that size, which is aligned to 8 bytes and owned by the caller. Returns
+ * the block as a MildGround that remembers nothing. */
 MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet);
-/* Forgets everything. Call it when the feet were moved to another place. */
+/* Forgets everything. Call it after moving the feet to another place. */
 void mild_ground_reset(MildGround *ground);
 
 /* [B] The same for ground that remembers imprints: pressed ground keeps its depth after the foot
- * has lifted off, and an element that comes down there later meets it (docs/model.md section 5).
- * Imprints are kept in the block, in `tiles` squares of 8 x 8 cells with half the pitch of the
- * first sole. When all are in use the oldest are forgotten. The imprint of a foot of 0.27 x 0.10 m
- * takes about ten tiles. tiles: rounded up to a multiple of 8, at most MILD_PRINT_TILES_MAX; 0: no
- * imprints. */
+ * has lifted off, and an element that comes down there later finds it (docs/model.md section 5).
+ * Imprints are stored in the block, in `tiles` squares of 8 x 8 cells, whose edge is half the pitch
+ * of the first sole. When all tiles are in use the oldest are forgotten. The imprint of a foot of
+ * 0.27 x 0.10 m takes about ten tiles. tiles: rounded up to a multiple of 8, at most
+ * MILD_PRINT_TILES_MAX; 0: no imprints. */
 #define MILD_PRINT_TILES_MAX 65536
 size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tiles);
 /* Initialises a block of that size as mild_ground_init does. */
@@ -362,23 +370,24 @@ size_t mild_ground_size(const MildGround *ground);
  * The surface there lies (1 - recovery) times that below h0. */
 double mild_ground_print_at(const MildGround *ground, double x, double y);
 
-/* Makes a scratch. NULL when feet is not 1 .. MILD_FEET_MAX or out of memory. soles: [feet], not
- * kept. */
+/* Makes a scratch. Returns NULL when feet is not 1 .. MILD_FEET_MAX, or when out of memory. soles:
+ * [feet], not kept. */
 MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildError *error);
 /* Frees a scratch; NULL is allowed. */
 void mild_scratch_destroy(MildScratch *scratch);
 
 /* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground and
- * writes scratch and result only, so it may be called any number of times before
- * mild_ground_advance. Scratch and ground must have the same soles. It always returns:
- * look at result->converged. Where that is 0, either the impulses are those of the ground at twists
- * near the returned ones, or everything but the friction bound is (docs/model.md section 7). */
+ * writes only scratch and result, so it may be called any number of times before
+ * mild_ground_advance. Scratch and ground must have the same soles. It always returns; check
+ * result->converged. If that is 0, the result is approximate: either the impulses are those of the
+ * ground at twists near the returned ones, or they are exact except for the friction bound
+ * (docs/model.md section 7). */
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                        const MildContactInput *input, MildScratch *scratch,
                        MildContactResult *result);
-/* Moves the memory of the ground to the end of the step that was just solved with this scratch,
- * input and result; positions are taken to advance by dt times the new velocity. Call it once for
- * each step that the engine keeps. */
+/* Updates the memory of the ground for the step that was just solved with this scratch, input and
+ * result. It assumes that positions advance by dt times the new velocity. Call it once for each
+ * step that the engine keeps. */
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                          const MildContactInput *input, const MildScratch *scratch,
                          const MildContactResult *result);
@@ -386,11 +395,11 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
 /* What an element did in the last step. */
 typedef enum {
     MILD_ELEMENT_FREE = 0,      /* carries no normal force */
-    MILD_ELEMENT_UNLOADING = 1, /* loaded, on the unloading line: not deeper than before */
-    MILD_ELEMENT_VIRGIN = 2 /* loaded, at the end of the step deeper than ever since touchdown */
+    MILD_ELEMENT_UNLOADING = 1, /* loaded, on the unloading line: has been deeper before */
+    MILD_ELEMENT_VIRGIN = 2     /* loaded, at its greatest depth since touchdown */
 } MildElementState;
 
-/* What the elements of one foot did in the last solve: arrays of mild_sole_elements(). */
+/* What the elements of one foot did in the last solve: arrays of mild_sole_elements() numbers. */
 typedef struct {
     const double *depth;     /* [m] u at the start of the step, negative above the ground */
     const double *normal;    /* [N] vertical part of the force, mean over the step */
@@ -399,17 +408,17 @@ typedef struct {
     const double *point_x;   /* [m] centre, world */
     const double *point_y;   /* [m] the same */
     const double *point_z;   /* [m] the same */
-    const double *flat;   /* [-] share of the area that is still flat after the step (eq 1): 1 when
+    const double *flat;      /* [-] share of the area still flat after the step (eq 1): 1 when
                                 untouched, 0 when the cone is complete */
-    const uint8_t *state; /* MildElementState */
-    const uint8_t *slip;  /* bool: loaded and friction at its bound */
+    const uint8_t *state;    /* MildElementState */
+    const uint8_t *slip;     /* bool: loaded, and friction is at its bound */
 } MildElements;
-/* Computes that for foot 0 .. feet - 1 after a solve. The arrays lie in the scratch and are valid
+/* Computes them for foot 0 .. feet - 1 after a solve. The arrays lie in the scratch and are valid
  * until the next solve. Cost: one pass over the elements of the foot. */
 MildElements mild_scratch_elements(const MildScratch *scratch, int foot);
 
 /* [m] Greatest depth that each element has reached since touchdown, 0 in the air: array of
- * mild_sole_elements() inside the block of the ground. */
+ * mild_sole_elements() numbers inside the block of the ground. */
 const double *mild_ground_depth_max(const MildGround *ground, int foot);
 
 MILD_API_END

@@ -1,7 +1,7 @@
 /* A map: the shape of the ground and the pattern of its materials. It never changes, so any number
- * of terrains share it by pointer. Heights are a plane plus bilinear values on a regular grid.
- * Labels are indices into the materials of the terrain that uses the map. Every query takes
- * constant time. SI units. Thread safety: once created a map is only read. */
+ * of terrains may share it by pointer. Heights are a plane plus bilinear interpolation on a regular
+ * grid. Labels are indices into the materials of the terrain that uses the map. Every query takes
+ * constant time. Units are SI. Thread safety: a map is only read once it has been created. */
 #ifndef MILD_MAP_H
 #define MILD_MAP_H
 
@@ -21,11 +21,11 @@ typedef enum {
     MILD_MAP_WAVES, /* amplitude (sin(2 pi x/wavelength) + sin(2 pi y/wavelength))/2 */
     MILD_MAP_ROUGH, /* random heights in [-amplitude, amplitude] about one wavelength apart,
                        interpolated smoothly; repeats after `size` */
-    MILD_MAP_IMAGE  /* amplitude heights[row][column]; row 0 has the largest y, the image's middle
-                       lies at the origin, and beyond its border the border's height goes on */
+    MILD_MAP_IMAGE  /* amplitude heights[row][column]; row 0 has the largest y, the middle of the
+                       image lies at the origin, and its border heights extend outward */
 } MildMapKind;
 
-/* Label of the material at (x, y), counted from 0. */
+/* Label of the material at (x, y). Labels count from 0. */
 typedef enum {
     MILD_PATTERN_NONE,    /* 0 */
     MILD_PATTERN_STRIPES, /* floor(x/patch_size) modulo patch_count */
@@ -37,15 +37,15 @@ typedef enum {
 typedef struct {
     int kind;    /* MildMapKind */
     double cell; /* [m] edge of the cells of the height grid, and of the labels near a border */
-    double size; /* [m] rough: the heights repeat after this length */
+    double size; /* [m] rough: period after which the heights repeat */
     double amplitude;            /* [m] see MildMapKind */
     double wavelength;           /* [m] see MildMapKind */
     double slope;                /* [-] rise per metre along x */
-    uint64_t seed;               /* rough: which random heights */
+    uint64_t seed;               /* rough: seed of the random heights */
     int patches;                 /* MildPattern */
     double patch_size;           /* [m] */
-    int patch_count;             /* materials that stripes and checker take in turn, 1 .. 255 */
-    double border;               /* [m] width over which two materials blend; 0: a sharp border */
+    int patch_count;             /* materials that stripes and checker use in turn, 1 .. 255 */
+    double border;               /* [m] width over which two materials blend; 0: sharp borders */
     const double *heights;       /* [height_rows][height_columns] [-] kind image; not kept */
     int height_columns;          /* at least 2 */
     int height_rows;             /* at least 2 */
@@ -54,7 +54,7 @@ typedef struct {
     int label_rows;              /* at least 1 */
 } MildMapDef;
 
-/* Level ground of one material. The other fields describe a moderate terrain; they count as soon as
+/* Level ground of one material. The other fields describe a moderate terrain and take effect when
  * `kind` or `patches` is set. */
 MildMapDef mild_map_def_default(void);
 /* Fields of MildMapDef with unit, range and meaning, except patch_count and the images:
@@ -67,19 +67,19 @@ typedef struct MildMap MildMap;
 
 #define MILD_MAP_POINTS_MAX (1 << 26) /* largest number of heights, and of labels, of a map */
 /* Makes a map. Returns NULL, with the field's name and the remedy in *error, when a number is out
- * of range or not finite, when an image is missing, too small or has a value that is not finite,
- * when there are more than MILD_MAP_POINTS_MAX points, or when out of memory. */
+ * of range or not finite, when an image is missing, too small or contains a value that is not
+ * finite, when there are more than MILD_MAP_POINTS_MAX points, or when out of memory. */
 MildMap *mild_map_create(const MildMapDef *def, MildError *error);
 /* Frees a map; NULL is allowed. No terrain may use it afterwards. */
 void mild_map_destroy(MildMap *map);
-/* [B] Memory of the map: 4 per height, 3 per label, however many robots share it. */
+/* [B] Memory of the map: 4 bytes per height and 3 per label, no matter how many robots share it. */
 size_t mild_map_bytes(const MildMap *map);
-/* Number of labels: those in use are 0 .. count - 1. */
+/* Number of labels. The labels in use are 0 .. count - 1. */
 int mild_map_label_count(const MildMap *map);
 /* Bool: the height is the same everywhere. */
 int mild_map_is_level(const MildMap *map);
-/* [m] Edges of the rectangle after which the map repeats, or which an image covers; of heights and
- * labels the larger. 0 for a plane without a pattern. */
+/* [m] Edges of the rectangle after which the map repeats, or that an image covers; the larger of
+ * heights and labels. 0 for a plane without a pattern. */
 void mild_map_extent(const MildMap *map, double *x, double *y);
 /* [m] Lowest and highest point of the surface; infinite on a slope. */
 void mild_map_range(const MildMap *map, double *low, double *high);

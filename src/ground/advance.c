@@ -1,16 +1,16 @@
-/* Last stage of a contact step: mild_ground_advance moves the memory to the end of the step. */
+/* Last stage of a contact step: mild_ground_advance updates what the ground remembers. */
 #include "ground/remember.h"
 #include "ground/scratch.h"
 
 /* The elements of a foot in one step. */
 typedef struct {
     const FootScratch *foot;
-    Slots slot;               /* with the memory of the ground that is advanced */
+    Slots slot;               /* its memory arrays are those of the ground to advance */
     const Imprints *imprints; /* NULL: the ground forgets at lift-off */
-    const double *rotation;   /* [9] foot -> world */
-    Motion motion;            /* after the step */
+    const double *rotation;   /* [9] foot to world */
+    Motion motion;            /* of the foot after the step */
     double dt;                /* [s] */
-    double height;            /* [m] of the terrain, its map aside */
+    double height;            /* [m] of the terrain, without its map */
 } Advance;
 
 ALWAYS_INLINE void memory_store(const Memory *memory, int e, const ElementMemory *after) {
@@ -25,9 +25,9 @@ ALWAYS_INLINE void memory_store(const Memory *memory, int e, const ElementMemory
     memory->held_stiffness[e] = after->held_stiffness;
 }
 
-/* Bool: the element lifts off. Without imprints that is when it leaves the undisturbed surface,
- * with imprints as soon as its unloading line carries nothing. m1: depth at the middle of the
- * step. */
+/* Bool: the element lifts off. Without imprints it does so when it rises above the undisturbed
+ * surface, with imprints as soon as its unloading line carries no force. m1: depth in the middle of
+ * the step. */
 static int element_lifted(const Advance *a, int i, double m1) {
     const Slots *s = &a->slot;
     if (!(m1 > 0.0)) {
@@ -36,9 +36,9 @@ static int element_lifted(const Advance *a, int i, double m1) {
     return a->imprints && s->recovery[i] < 1.0 && m1 <= s->zero_depth[i];
 }
 
-/* An element that carried something leaves its depth in the ground: where it lifts off, and in each
- * cell that it slides out of. Where it slides into a deeper imprint it takes over that depth. A
- * greater depth never means more force, so this gives no energy. */
+/* A loaded element writes its depth into the ground where it lifts off and in every cell that it
+ * slides out of. When it slides into a deeper imprint it takes over that depth. A greater depth
+ * never means more force, so this adds no energy. */
 static void element_imprint(const Advance *a, const Memory *memory, int i, int e, int lifted) {
     const Slots *s = &a->slot;
     if (!(s->recovery[i] < 1.0)) {
@@ -65,7 +65,8 @@ static void element_imprint(const Advance *a, const Memory *memory, int i, int e
     memory->front_speed[e] = 0.0;
 }
 
-/* Slot i, element e: it turned round within the step and has been deeper than at its ends. */
+/* Raises the greatest depth of slot i, element e, if the element reversed within the step: it was
+ * then deeper than at either end. */
 static void slot_peak(const Advance *a, const Memory *memory, int i, int e, double speed,
                       double middle) {
     const Element element = slot_element(&a->slot, i);
@@ -74,8 +75,8 @@ static void slot_peak(const Advance *a, const Memory *memory, int i, int e, doub
     memory->depth_max[e] = fmax(memory->depth_max[e], depth);
 }
 
-/* The same for all elements of a foot. Apart from the loop in vectors: there the addresses of local
- * variables must not be taken. */
+/* The same for all elements of a foot. It is not part of the vector loop, where taking the address
+ * of a local variable would prevent vectorisation. */
 static void foot_peaks(const Advance *a, const Memory *memory) {
     for (int i = 0; i < a->foot->elements; i++) {
         const SlotVelocity v = slot_velocity(&a->slot, i, &a->motion, 1);
@@ -86,7 +87,7 @@ static void foot_peaks(const Advance *a, const Memory *memory) {
     }
 }
 
-/* The tangent plane that the step took the ground for, through the depth of the element. */
+/* Stores the plane that the step assumed for the ground under the element. */
 ALWAYS_INLINE void slot_plane(const FootScratch *foot, double height, const Slots *s,
                               const Memory *memory, int i, int e) {
     const double slope_x = s->slope_x[i];
@@ -97,8 +98,8 @@ ALWAYS_INLINE void slot_plane(const FootScratch *foot, double height, const Slot
                        foot->point_z[e] - height;
 }
 
-/* All elements are listed, on ground without imprints: a loop in vectors. Returns how many stay in
- * the ground. */
+/* Vector loop for a foot with all elements listed, on ground without imprints. Returns how many
+ * elements remember something. */
 ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
                                    int uneven) {
     const FootScratch foot = *a->foot;
@@ -141,7 +142,8 @@ ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const in
     return uneven ? foot.elements : (int)touched;
 }
 
-/* Some elements are listed, or the ground keeps imprints. Returns how many remember something. */
+/* The general case: some elements are listed, or the ground keeps imprints. Returns how many
+ * elements remember something. */
 static int foot_advance(const Advance *a, const Memory *memory, const int32_t *material) {
     const FootScratch *foot = a->foot;
     const Slots *s = &a->slot;
@@ -203,7 +205,8 @@ void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                            .height = terrain->height};
         const int all = foot->active == foot->elements && ground->tiles == 0;
         if (all) {
-            /* Of this ground: the step may have been solved on a copy. */
+            /* The step may have been solved on a copy of this ground, whose memory the slots
+             * hold. */
             slots_remember(&advance.slot, &memory);
         }
         if (all && foot->uneven) {

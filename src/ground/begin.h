@@ -5,10 +5,11 @@
 #include "ground/friction.h"
 
 #define BEGIN_STOP REAL(0.3)       /* [-] fit to the exact impact, see element_drag */
-#define BEGIN_STOP_MOST REAL(0.75) /* [-] up to here the drag's speed V does not fall with w */
+#define BEGIN_STOP_MOST REAL(0.75) /* [-] up to this value V never decreases with w */
 
-/* Drag of a material by the speeds at both ends of the way: an impulse of the recruited depth times
- * exit_drag w + entry_drag h. Without the parts that create energy (element_explicit),
+/* Coefficients of drag: the impulse is the recruited depth times (exit_drag w + entry_drag h), with
+ * h and w the speeds at the two ends of the way. Without the parts that create energy
+ * (element_explicit), they follow from
  *
  *     mass w + (drag - mass) (h + w)/2 = (drag + mass)/2 w + (drag - mass)/2 h */
 MILD_HD Real law_exit_drag(const Law *law) {
@@ -19,10 +20,10 @@ MILD_HD Real law_entry_drag(const Law *law) {
     return (real_max(law->drag_rate, 0) - real_max(law->mass_rate, 0)) / 2;
 }
 
-/* The unloading line runs from (a, F(a)) down to zero force. Its elastic travel is recovery a, at
- * least ELEMENT_ELASTIC. It is never flatter than virgin ground at a, and so never above it: a
- * concave curve lies above its chords, a convex one above its tangents. In the bed it takes the
- * steepest slope of the law. force: F(a). */
+/* The unloading line runs from (a, F(a)) down to zero force. Its elastic travel is recovery a, but
+ * at least ELEMENT_ELASTIC. It is never flatter than virgin ground at a, and therefore never above
+ * it, because a concave curve lies above its chords and a convex curve above its tangents. Within
+ * the bed it takes the steepest slope of the law. force: F(a). */
 MILD_HD void element_unloading_line(Element *e, int curves, Real force) {
     const Real a = e->yield_depth;
     const Real travel = real_max(e->recovery * a, real_min(ELEMENT_ELASTIC, a));
@@ -36,18 +37,20 @@ MILD_HD void element_unloading_line(Element *e, int curves, Real force) {
     e->zero_depth = a - (chord ? travel : quotient);
 }
 
-/* Sets all but the explicit impulse and the drag of a foot that stops. In: the material, `depth`.
- * speed: downward, now. rate: 1/dt. */
+/* Sets the fields that hold for a step from the material and `depth`, except explicit_impulse,
+ * stop_drag, stop_growth and turn. speed: present downward speed. rate: 1/dt. */
 MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, Real dt, Real rate,
                            Real speed) {
-    /* Virgin ground begins where the element has been, or where the way of this step begins. */
+    /* Virgin ground begins at the greatest depth so far, which is at least where this step
+     * starts. */
     e->middle = memory->middle > 0 ? memory->middle : e->depth - dt / 2 * speed;
     e->yield_depth = real_max(real_max(e->middle, memory->depth_max), 0);
     e->virgin_depth = e->yield_depth;
     const Real force = law_force(&e->law, curves, e->yield_depth);
     element_unloading_line(e, curves, force);
 
-    /* The added mass is at the front. It has the speed of the element that leads it, or waits. */
+    /* The added mass is at the front. It has the speed that the element gave it, or rests until the
+     * element arrives. */
     e->yield_speed = real_max(2 * (e->yield_depth - e->depth) * rate, 0);
     e->front_speed = real_max(memory->front_speed, e->yield_speed);
     e->entry_speed = real_max(speed, 0);
@@ -61,37 +64,37 @@ MILD_HD void element_begin(Element *e, const ElementMemory *memory, int curves, 
     friction_hold(e, memory, dt, rate, force + law_elastic_force(&e->law, curves, e->middle));
 }
 
-/* How far the element will enter virgin ground at its present downward speed, beyond the elastic
- * travel [m]; else 0. */
+/* [m] How far the element will go into virgin ground, beyond the elastic travel, at the downward
+ * speed `speed`; 0 if it will not. */
 MILD_HD Real element_virgin_way(const Element *e, Real dt, Real speed) {
     return real_max(e->depth + dt / 2 * speed - e->yield_depth - ELEMENT_ELASTIC, 0);
 }
 
-/* Drag of an element that will stop in virgin ground, beyond what momentum exchange takes. After
- * element_begin. gain: [m/s] by how much the free motion of the step speeds the element up.
+/* Drag of an element that will stop in virgin ground, beyond the exchange of momentum with the
+ * recruited mass. Called after element_begin. gain: [m/s] by how much the free motion of the step
+ * speeds the element up.
  *
- * The work of the drag over the way is c_d m_a' times the integral of w^2. Of an impulse that acts
- * at the mean speed, V is the mean of w^2 over the way by (h + w)/2, with h the speed at the front.
+ * The work of drag over the way is c_d m_a' times the integral of w^2. For an impulse that acts at
+ * the mean speed (h + w)/2, V must be the mean of w^2 over the way divided by (h + w)/2, with h the
+ * speed at the front.
  *
  *     slow change                V = (h + w)/2
  *     drag alone stops the foot  the mean of w^2 is logarithmic, (h^2 - w^2)/(2 ln(h/w)), and V
  *                                goes to 0 with w
  *     force F stops it           the mean of w^2 is (h^2 + w^2)/2
- *
- * The last two are near
+ * The last two cases are approximated by
  *
  *     V    = (h + w)/2 + (stop - 1/2) (h - w)^2/h      for w < h
  *     stop = V(0)/h = BEGIN_STOP + sqrt(F/(drag h^2))  at most BEGIN_STOP_MOST
- *
- * a fit to the exact impact of a body on a force that grows from 0. Where the present speed hardly
- * leads into virgin ground, stop is 1/2. F is taken about the middle of the step. */
+ * fitted to the exact impact of a body on a force that grows from 0. When the present speed barely
+ * reaches virgin ground, stop is 1/2. F is the force near the middle of the step. */
 MILD_HD void element_drag(Element *e, int curves, Real dt, Real gain) {
     const Real a = e->yield_depth;
     const Real u0 = real_max(e->depth, a);
     const Real extra = real_max(2 * e->entry_drag, 0); /* [kg/m] (c_d - 1) m_a' at the surface */
     const int drags = extra > 0 && element_virgin_way(e, dt, e->entry_speed) > 0;
 
-    /* h^2: what the free motion adds up to the front. */
+    /* What the free motion adds to h^2 on the way to the front. */
     const Real faster = drags ? 2 * (gain / dt * real_max(a - e->middle, 0)) : 0;
     const Real h = REAL_SQRT(e->entry_speed * e->entry_speed + faster);
 
@@ -106,9 +109,9 @@ MILD_HD void element_drag(Element *e, int curves, Real dt, Real gain) {
     e->stop_growth = drags ? law_recruited(&e->law, u0) - law_recruited(&e->law, a) : 0;
 }
 
-/* Impulse of parameters that create energy (passive = false): negative added mass and drag. It
- * cannot be implicit and enters with the free motion. After element_begin. free: downward speed of
- * the free motion [m/s]. */
+/* Impulse of parameters that create energy (passive = false), which are negative added mass and
+ * negative drag. It cannot be implicit, so it is computed from the free motion. Called after
+ * element_begin. free: downward speed of the free motion [m/s]. */
 MILD_HD Real element_explicit(const Element *e, Real dt, Real free) {
     const Real mass = e->law.mass_rate * law_recruited(&e->law, e->yield_depth);
     const Real drag = e->law.drag_rate * law_flat_share(&e->law, e->yield_depth);

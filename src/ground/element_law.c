@@ -23,11 +23,11 @@ Law law_cone(const MildMaterial *material, double pitch) {
     double kappa = material->sigma_cone * area / cos(material->alpha);
     double c_g = material->c_g;
     double c_d = material->c_d;
-    if (material->passive) { /* passive exactly when c_g >= 0 and c_d >= 1/2 */
+    if (material->passive) { /* the law is passive if and only if c_g >= 0 and c_d >= 1/2 */
         c_g = fmax(c_g, 0.0);
         c_d = fmax(c_d, 0.5);
     }
-    Law law = {0}; /* no other curve */
+    Law law = {0}; /* the other curves are absent */
     law.flat_stiffness = material->k_pen - kappa;
     law.line_stiffness = kappa;
     law.cone_depth = pitch / sqrt(LAW_PI) * tan(material->alpha) / material->nu;
@@ -45,12 +45,15 @@ int law_curves(const Law *law) {
            (law->elastic_force != 0.0 ? LAW_ELASTIC : 0);
 }
 
-#define LAW_NUMBER(name) +1
-_Static_assert(sizeof(Law) == (0 LAW_NUMBERS(LAW_NUMBER)) * sizeof(Real), "the list is whole");
+#define LAW_INDEX(name) LAW_INDEX_##name,
+enum { LAW_NUMBERS(LAW_INDEX) LAW_COUNT };
+_Static_assert(sizeof(Law) == LAW_COUNT * sizeof(Real), "LAW_NUMBERS lists every field of Law");
 
-#define LAW_ADD(name) +law->name
+#define LAW_ADD(name) sum += law->name;
 int law_is_nan(const Law *law) {
-    return isnan(0.0 LAW_NUMBERS(LAW_ADD)); /* the bed may be at infinity */
+    double sum = 0.0;
+    LAW_NUMBERS(LAW_ADD)
+    return isnan(sum); /* not isfinite: the bed may be at infinity */
 }
 
 double law_recovery(const Law *law, double recovery) {
@@ -61,7 +64,8 @@ static double between(double a, double b, double share) {
     return a + share * (b - a);
 }
 
-/* Where only one of two laws has a curve, its force fades out and all else of it stays. */
+/* Interpolates a number of a curve. If only one of the laws has the curve, its number is kept and
+ * only its force fades out. */
 static double between_curves(double force_a, double a, double force_b, double b, double share) {
     if (force_a == 0.0) {
         return b;

@@ -1,21 +1,23 @@
-/* An engine's kinetic energy changes by the impulse times the mean of the speeds before and after
- * the step. The normal impulse keeps its account at that mean speed. Friction opposes the speed
- * after the step, because only so can it stop a foot. As long as the motion keeps its direction,
- * friction takes energy at the mean speed, too. But the normal impulse of a foot on a long lever
- * can turn a sliding element round within the step. Friction then opposes the new motion with the
- * strength of a whole step, and does work on the old one.
+/* Why friction can create energy, and how a step is corrected.
  *
- * A step where that matters is solved again. Friction of the elements concerned then begins only
- * where the element is as fast backward as it was forward: with u and v the horizontal velocities
- * before and after, it opposes
+ * A step changes the kinetic energy by the impulse times the mean of the speeds before and after
+ * it. The normal impulse is chosen so that its energy balances at this mean speed. Friction opposes
+ * the speed after the step, because otherwise it could not stop a foot. While an element keeps its
+ * direction, friction takes energy at the mean speed as well. But the normal impulse of a foot on a
+ * long lever can reverse a sliding element within the step. Friction then opposes the new motion
+ * with the impulse of a whole step, and so does positive work on the old motion.
  *
- *     d = v - p,   p the point nearest to v on the way from 0 to -u
+ * A step where this matters is solved again. For the elements concerned, friction now starts only
+ * once the element is as fast backward as it was forward. With u and v the horizontal velocities
+ * before and after the step, friction opposes
  *
- * in the place of v. The nearest point of a convex set has all of the set behind it, d . (q - p) <=
- * 0 for each q on the way. With q = 0 this is d . v >= |d|^2, with q = -u it is d . (u + v) >=
- * |d|^2. So an impulse along -d takes energy at the new speed and at the mean speed. It is minus
- * the gradient of a convex function of v, like friction without the turn, and the solvers need
- * nothing new. What such an element held is let go. */
+ *     d = v - p,   p the point nearest to v on the segment from 0 to -u
+ *
+ * instead of v. By the nearest-point property, d . (q - p) <= 0 for every q of the segment. For q =
+ * 0 this gives d . v >= |d|^2, and for q = -u it gives d . (u + v) >= |d|^2. An impulse along -d
+ * therefore takes energy both at the new speed and at the mean speed. It is still minus the
+ * gradient of a convex function of v, so the solvers need no change. The elastic friction force
+ * that such an element held is dropped. */
 #include "ground/energy.h"
 
 #include <stdio.h>
@@ -24,7 +26,8 @@
 
 #include "ground/friction.h"
 
-/* [-] of the energy of the step's impulses. A step of a walk does not come to this. */
+/* [-] Share of the impulses' energy above which a step is solved again. Steps in walking stay below
+ * it. */
 #define ENERGY_SHARE 0.08
 
 void energy_begin(MildScratch *scratch) {
@@ -38,7 +41,7 @@ void energy_begin(MildScratch *scratch) {
     }
 }
 
-/* [J] W A W/2: what the impulses alone would give to a foot at rest. */
+/* [J] W A W/2, the energy that the impulses alone would give to feet at rest. */
 static double impulse_energy(const MildScratch *scratch, const MildContactInput *input,
                              const MildContactResult *result) {
     double sum = 0.0;
@@ -48,8 +51,8 @@ static double impulse_energy(const MildScratch *scratch, const MildContactInput 
     return 0.5 * sum;
 }
 
-/* [J] What a foot's friction gives at the mean speed, beyond its work at the new speed, because the
- * ground has changed the speed: -I . dv/2 with dv = A W. change: dv. */
+/* [J] Work of a foot's friction at the mean speed less its work at the new speed: -I . dv/2, where
+ * dv = A W is the velocity change that the ground causes. change: dv. */
 static double foot_caused(const FootScratch *foot, const Motion *change) {
     const Slots local = foot->slot, *s = &local;
     const Motion v = *change;
@@ -65,7 +68,7 @@ static double foot_caused(const FootScratch *foot, const Motion *change) {
     return -0.5 * sum;
 }
 
-/* The same on level ground from the sums of the last pass. */
+/* The same on level ground, from the sums of the last pass. */
 static double level_caused(const double sums[9], const Motion *change) {
     double sum = 0.0;
     for (int k = 0; k < 3; k++) {
@@ -74,7 +77,7 @@ static double level_caused(const double sums[9], const Motion *change) {
     return -0.5 * sum;
 }
 
-/* The sum over all feet. */
+/* The same, summed over all feet. */
 static double friction_caused(const MildScratch *scratch, const MildContactInput *input,
                               const MildContactResult *result) {
     double sum = 0.0;
@@ -94,7 +97,7 @@ static double friction_caused(const MildScratch *scratch, const MildContactInput
     return sum;
 }
 
-/* [J] What a slot's friction gave at the mean speed, beyond what it had stored. */
+/* [J] Work of a slot's friction at the mean speed, less the elastic energy that it released. */
 static double slot_gift(const Slots *s, int i, const SlotVelocity *u, const SlotVelocity *v) {
     const Element e = slot_element(s, i);
     const double ix = s->ix[i] + s->slope_x[i] * s->iz[i];
@@ -111,7 +114,7 @@ static double slot_gift(const Slots *s, int i, const SlotVelocity *u, const Slot
     return work - 0.5 * fmax(held - left, 0.0) / e.hold_stiffness;
 }
 
-/* [J] The sum of what the slots gave, without what others took. */
+/* [J] Sum over the slots whose friction gave energy. Slots that took energy do not count. */
 static double foot_gift(const FootScratch *foot, const Motion *before, const Motion *after) {
     double sum = 0.0;
     for (int i = 0; i < foot->active; i++) {

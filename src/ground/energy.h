@@ -4,12 +4,12 @@
 
 #include "ground/scratch.h"
 
-#define ENERGY_ROUNDS 2 /* a step is solved again at most so often */
+#define ENERGY_ROUNDS 2 /* a step is solved again at most this often */
 
-/* At the start of a step: no element's friction is turned. */
+/* At the start of a step: clears the reversal velocities (Element.turn_x, turn_y). */
 void energy_begin(MildScratch *scratch);
-/* Bool: friction gave energy in the step just solved, which must be solved again. The elements
- * whose friction gave some are marked for it (Element.turn); with `all`, every element. */
+/* Bool: friction created energy in the step just solved, and the step must be solved again. Sets
+ * the reversal velocity of the elements whose friction did so, or with `all` of every element. */
 int energy_created(MildScratch *scratch, const MildContactInput *input,
                    const MildContactResult *result, int all);
 

@@ -3,29 +3,29 @@
  * Coulomb's law bounds the horizontal impulse:
  *
  *     r = mu I_z + dt k_D d_D u
- *
- * Below the bound friction is elastic over FRICTION_ELASTIC, with damping (Mindlin's contact as
- * Cundall and Strack 1979 compute it). With v the element's velocity after the step, f the force
- * held before it and k its stiffness:
+ * Below the bound, friction is a damped spring with the travel FRICTION_ELASTIC (tangential springs
+ * of Cundall and Strack 1979). With v the velocity of the element after the step, f the spring
+ * force before it and k the stiffness:
  *
  *     c = r ELEMENT_LAG/FRICTION_ELASTIC
  *     t = dt f - (dt^2 k + c) v
  *     I = t min(1, r/|t|) - dt b_D v
- *
- * A resting foot is held without creep. Friction only takes energy. It stores f^2/(2 k), which
- * falls where k grows at the same f; where k falls, f falls with it. With k and f of the start of
- * the step, the projection onto the disc gives |f_new|^2 - |f|^2 <= 2 k I . v. For a given r, I is
- * minus the gradient of a convex function of v with slopes of at most dt^2 k + c. */
+ * A resting foot does not creep. Friction never creates energy. The spring stores f^2/(2 k). When k
+ * grows, f is kept, so the stored energy falls. When k falls, f falls in proportion. Within a step,
+ * the projection onto the disc gives |f_new|^2 - |f|^2 <= 2 k I . v, with k and f of the start of
+ * the step. For a given r, I is minus the gradient of a convex function of v whose slopes are at
+ * most dt^2 k + c. */
 #ifndef MILD_GROUND_FRICTION_H
 #define MILD_GROUND_FRICTION_H
 
 #include "ground/element.h"
 
 #define FRICTION_ELASTIC REAL(2e-5) /* [m] elastic travel of friction */
-/* [s/m] c/r: where no force is held, friction reaches its bound at 4 mm/s. */
+/* [s/m] c/r. Without a spring force, damping alone reaches the bound at 4 mm/s. */
 #define FRICTION_LAG (ELEMENT_LAG / FRICTION_ELASTIC)
 
-/* Sets what holds the element at rest: k from the bound at the yield force [N]. rate: 1/dt. */
+/* Sets the spring of friction. Its stiffness follows from the bound at the yield force [N]. rate:
+ * 1/dt. */
 MILD_HD void friction_hold(Element *e, const ElementMemory *memory, Real dt, Real rate,
                            Real yield_force) {
     const Real bound = e->mu * yield_force + e->drift_bound * rate;
@@ -48,18 +48,19 @@ typedef struct {
     Real fall_xx; /* [kg] -dI/dv */
     Real fall_xy; /* [kg] */
     Real fall_yy; /* [kg] */
-    Real rise_x;  /* [-] dI/dI_z through the bound */
+    Real rise_x;  /* [-] dI/dI_z, through the bound */
     Real rise_y;  /* [-] */
 } Friction;
 
-/* Friction at the velocity (vx, vy) under the bound r, which grows by `mu` with I_z: 0 where the
- * solver holds the bound. */
+/* Friction at the velocity (vx, vy) with the bound r. mu: derivative of r with respect to I_z, 0
+ * when the solver holds the bound fixed. */
 MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, Real vx, Real vy) {
     const Real stiffness = e->hold_stiffness + FRICTION_LAG * r;
     const Real tx = e->hold_x - stiffness * vx;
     const Real ty = e->hold_y - stiffness * vy;
 
-    /* Projection onto the disc of radius r; n is the unit vector of t where it slides, else 0. */
+    /* Projection onto the disc of radius r. n is the unit vector of t if the element slides, else
+     * 0. */
     const Real length = REAL_SQRT(tx * tx + ty * ty);
     const Real inverse = 1 / (length + REAL_LEAST);
     const int slides = length > r;
@@ -86,8 +87,8 @@ MILD_HD Friction friction_impulse(const Element *e, Real r, Real mu, Real vx, Re
     return result;
 }
 
-/* What friction opposes in the place of the velocity: that velocity less the point nearest to it on
- * the way from 0 to -turn (energy.c). */
+/* Replaces the velocity by the one that friction opposes: the velocity minus its nearest point on
+ * the segment from 0 to -turn (energy.c). */
 MILD_HD void friction_turn(const Element *e, Real *vx, Real *vy) {
     const Real square = e->turn_x * e->turn_x + e->turn_y * e->turn_y;
     const Real along = *vx * e->turn_x + *vy * e->turn_y;
@@ -96,8 +97,8 @@ MILD_HD void friction_turn(const Element *e, Real *vx, Real *vy) {
     *vy -= share * e->turn_y;
 }
 
-/* friction_impulse with that. Where the nearest point is within the way, what the velocity changes
- * by along the way changes nothing. */
+/* friction_impulse at that velocity. While the nearest point is inside the segment, a change of
+ * velocity along the segment has no effect. */
 MILD_HD Friction friction_turned(const Element *e, Real r, Real mu, Real vx, Real vy) {
     const Real square = e->turn_x * e->turn_x + e->turn_y * e->turn_y;
     const Real along = vx * e->turn_x + vy * e->turn_y;

@@ -1,5 +1,5 @@
-/* Inside of a map: two regular grids, one of heights at its points and one of labels in its
- * cells. */
+/* The inside of a map: two regular grids. One has heights at its points, the other has labels in
+ * its cells. */
 #ifndef MILD_GROUND_GRID_H
 #define MILD_GROUND_GRID_H
 
@@ -11,7 +11,7 @@
 typedef struct {
     int columns;      /* cells along x */
     int rows;         /* cells along y */
-    int repeats;      /* bool: the first cell follows the last; otherwise the border goes on */
+    int repeats;      /* bool: the grid is periodic; otherwise its border values extend outward */
     double x0;        /* [m] */
     double y0;        /* [m] */
     double cell_x;    /* [m] edges of a cell */
@@ -24,14 +24,14 @@ static inline Grid grid_make(int columns, int rows, double cell_x, double cell_y
     return (Grid){columns, rows, repeats, 0.0, 0.0, cell_x, cell_y, 1.0 / cell_x, 1.0 / cell_y};
 }
 
-/* Where one coordinate lies on a grid. */
+/* Position on a grid along one axis. */
 typedef struct {
     int cell;      /* index of the cell */
-    double share;  /* [-] of the way through the cell */
+    double share;  /* [-] position in the cell, 0 .. 1 */
     double inside; /* 1 within the grid, 0 beyond its border */
 } GridPlace;
 
-/* at: coordinate from the start of the grid, in cells. Any number gives a valid cell: the
+/* at: coordinate from the start of the grid, in cells. Any number gives a valid cell, because the
  * comparisons are false for NaN. */
 static inline GridPlace grid_place(double at, int cells, int repeats) {
     double end = (double)cells;
@@ -46,24 +46,24 @@ static inline GridPlace grid_place(double at, int cells, int repeats) {
     return (GridPlace){cell, clamped - (double)cell, repeats || (at > 0.0 && at < end) ? 1.0 : 0.0};
 }
 
-/* Material of a cell: near a smooth border a mixture of two. */
+/* Material of a cell, which is a mixture of two near a smooth border. */
 typedef struct {
     unsigned char first;  /* label of the nearer material */
-    unsigned char second; /* label of the other one */
-    unsigned char share;  /* of the second; 255 is all of it */
+    unsigned char second; /* label of the other material */
+    unsigned char share;  /* of the second material, in 1/255 */
 } Label;
 
 struct MildMap {
-    Grid heights;    /* of the points' heights */
-    Grid labels;     /* of the cells' labels */
-    double slope;    /* [-] rise per metre along x, added to the grid */
-    double steepest; /* [-] a bound of the gradient's length */
+    Grid heights;    /* grid of `height` */
+    Grid labels;     /* grid of `label` */
+    double slope;    /* [-] rise per metre along x, added to the heights of the grid */
+    double steepest; /* [-] upper bound on the length of the gradient */
     double low;      /* [m] lowest height of the grid */
-    double high;     /* [m] highest */
+    double high;     /* [m] highest height of the grid */
     float *height;   /* [rows + 1][columns + 1] [m]; NULL: 0 everywhere */
     Label *label;    /* [rows][columns]; NULL: 0 everywhere */
     int label_count; /* labels are 0 .. label_count - 1 */
-    size_t bytes;    /* of the map */
+    size_t bytes;    /* memory of the map */
 };
 
 #endif

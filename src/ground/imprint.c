@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define TILE_CELLS (IMPRINT_EDGE * IMPRINT_EDGE)
-#define IMPRINT_FAR 1e8 /* [tiles] farther from the origin nothing is remembered; NaN neither */
+#define IMPRINT_FAR 1e8 /* [tiles] beyond this distance from the origin nothing is remembered */
 
 int imprints_round(int tiles, int most) {
     if (tiles <= 0) {
@@ -24,10 +24,10 @@ void imprints_clear(const Imprints *imprints) {
     memset(imprints->keys, 0, imprints_bytes(imprints->tiles));
 }
 
-/* A cell: its tile's place and its number in the tile. */
+/* A cell in the world. */
 typedef struct {
-    uint32_t place;
-    int cell; /* -1: too far away */
+    uint32_t place; /* of its tile, as in ImprintKey */
+    int cell;       /* index within the tile; -1: too far away, or NaN */
 } Spot;
 
 static Spot spot_at(const Imprints *imprints, double x, double y) {
@@ -60,7 +60,7 @@ static int tile_find(const Imprints *imprints, uint32_t place) {
     return -1;
 }
 
-/* The same; a place that has none takes the empty or oldest tile of its set. */
+/* Tile at a place. A place without one takes an empty tile of its set, or else the oldest. */
 static int tile_take(const Imprints *imprints, uint32_t place) {
     int tile = tile_find(imprints, place), set = set_of(imprints, place);
     if (tile < 0) {
@@ -78,20 +78,20 @@ static int tile_take(const Imprints *imprints, uint32_t place) {
     return tile;
 }
 
-/* An element touches the cells at 3 x 3 points, a third of the pitch apart. The cells' edge is half
- * the pitch, more than sqrt(2) of that distance, so that under neighbouring elements no cell is
- * missed, however they are turned. */
+/* Sample point k of an element. The 3 x 3 sample points are a third of the pitch apart. The edge of
+ * a cell is half the pitch, which is more than sqrt(2) times that distance, so neighbouring
+ * elements miss no cell between them at any orientation. */
 static void element_sample(const ImprintElement *element, int k, double *x, double *y) {
     double step = element->pitch / IMPRINT_SAMPLES;
-    double a = step * (k % IMPRINT_SAMPLES - IMPRINT_SAMPLES / 2),
-           b = step * (k / IMPRINT_SAMPLES - IMPRINT_SAMPLES / 2);
+    double a = step * (k % IMPRINT_SAMPLES - IMPRINT_SAMPLES / 2);
+    double b = step * (k / IMPRINT_SAMPLES - IMPRINT_SAMPLES / 2);
     *x = element->x + element->rotation[0] * a + element->rotation[1] * b;
     *y = element->y + element->rotation[3] * a + element->rotation[4] * b;
 }
 
 double imprints_read(const Imprints *imprints, const ImprintElement *element) {
     uint32_t place = 0;
-    int tile = -2; /* not looked for yet */
+    int tile = -2; /* no lookup yet */
     double sum = 0.0;
     for (int k = 0; k < IMPRINT_SAMPLES * IMPRINT_SAMPLES; k++) {
         double x, y;

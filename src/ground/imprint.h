@@ -1,8 +1,9 @@
-/* What pressed ground remembers: the greatest depth of each cell of a grid that is fixed in the
- * world, in a cache of tiles of bounded size.
+/* Imprints: the greatest depth of each cell of a grid fixed in the world, kept in a cache of tiles
+ * of bounded size.
  *
- * Like a processor's cache it has sets of IMPRINT_WAYS tiles, chosen by a hash of the tile's place.
- * A new tile replaces the oldest of its set. Every access is O(1) and allocates nothing. */
+ * The cache is set-associative like a processor's. A hash of the tile's place chooses a set of
+ * IMPRINT_WAYS tiles, and a new tile replaces the oldest of its set. Every access is O(1) and
+ * allocates nothing. */
 #ifndef MILD_GROUND_IMPRINT_H
 #define MILD_GROUND_IMPRINT_H
 
@@ -11,12 +12,12 @@
 
 #define IMPRINT_EDGE 8    /* cells along a tile's edge */
 #define IMPRINT_WAYS 8    /* tiles in a set */
-#define IMPRINT_UNIT 1e-5 /* [m] depths are stored as whole multiples, up to 0.65 m */
-#define IMPRINT_SAMPLES 3 /* points along an element's edge at which it touches the cells */
+#define IMPRINT_UNIT 1e-5 /* [m] unit of the stored depths, which reach 0.65 m */
+#define IMPRINT_SAMPLES 3 /* sample points along an element's edge */
 
 typedef struct {
-    uint32_t place; /* column | row << 16 of the tile: the world repeats after 65536 tiles */
-    uint32_t time;  /* of the last change; 0: empty */
+    uint32_t place; /* column | row << 16 of the tile, so the world repeats after 65536 tiles */
+    uint32_t time;  /* step of the last change; 0: empty */
 } ImprintKey;
 
 typedef struct {
@@ -24,7 +25,7 @@ typedef struct {
     uint16_t *depths;    /* [tiles][IMPRINT_EDGE][IMPRINT_EDGE] in IMPRINT_UNIT */
     int tiles;           /* sets times ways */
     double inverse_cell; /* [1/m] */
-    uint32_t time;       /* of this step, above 0 */
+    uint32_t time;       /* number of this step, above 0 */
 } Imprints;
 
 /* Where an element lies. */
@@ -43,7 +44,7 @@ void imprints_clear(const Imprints *imprints);
 
 /* Mean depth of the cells under an element [m]. */
 double imprints_read(const Imprints *imprints, const ImprintElement *element);
-/* The cells under an element have been pressed down to `depth`. */
+/* Records that the cells under an element have been pressed down to `depth` [m]. */
 void imprints_press(const Imprints *imprints, const ImprintElement *element, double depth);
 /* Depth of the cell that holds a point [m]; 0 where nothing is remembered. */
 double imprints_depth(const Imprints *imprints, double x, double y);

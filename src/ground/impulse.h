@@ -1,44 +1,43 @@
 /* Normal impulse of an element over a step, as a function of its new velocity (docs/model.md
  * section 6). Both solvers use it.
- *
  * A semi-implicit engine moves by its new velocity, u1 = u0 + dt w, so its velocities belong to the
- * middles of the steps: a body in free fall keeps w^2/2 - g m exactly, where m = u + dt w/2 is the
- * depth in the middle of the step. The ground keeps to that clock. A step leads from the middle m0
- * of the step before to
+ * middles of the steps: a body in free fall conserves w^2/2 - g m exactly, where m = u + dt w/2 is
+ * the depth in the middle of the step. The ground uses the same instants. A step goes from the
+ * middle m0 of the step before to
  *
  *     m1 = u0 + dt w/2
  *
  * and its impulse is a sum of terms:
  *
- *     path    dt (E(m1) - E(m0))/(m1 - m0)            E: integral of the force, mean over the way
+ *     path    dt (E(m1) - E(m0))/(m1 - m0)            mean static force; E: its integral over depth
  *     mass    m_a(a) (max(w, w_y) - w_a)              the added mass moves with the front
  *     growth  (m_a(m1) - m_a(a)) (w + (c_d - 1) V)    mass recruited on the way, and drag
  *     lag     dt T k e(w + h)                         elastic ground lags behind the foot
- *     elastic (dt/(m1 - m0) + d) (E(m1) - E(m0))      ground without memory, d: its damping
+ *     elastic (dt/(m1 - m0) + d) (E(m1) - E(m0))      ground without memory; d: its damping
  *
- * The work at the mean velocity, I (w0 + w)/2, is what E gains, since m1 - m0 = dt (w0 + w)/2: path
- * creates and loses no energy at any step size, and its error is of second order in dt. The mean of
- * a rising function rises with m1, so I never falls with w, and the step is the minimum of a convex
- * function. */
+ * Since m1 - m0 = dt (w0 + w)/2, the work of path at the mean velocity (w0 + w)/2 equals the gain
+ * of E. So path neither creates nor loses energy at any step size, and its error is of second order
+ * in dt. The mean of an increasing function increases with m1, so I never decreases with w, and the
+ * step minimises a convex function. */
 #ifndef MILD_GROUND_IMPULSE_H
 #define MILD_GROUND_IMPULSE_H
 
 #include "ground/element.h"
 
-#define IMPULSE_EASE REAL(2e-6) /* [m/s] over which the lag begins */
+#define IMPULSE_EASE REAL(2e-6) /* [m/s] speed range over which the lag sets in */
 
 typedef struct {
     Real value; /* [N s] up, on the foot */
-    Real slope; /* [kg] its derivative by the new downward speed */
+    Real slope; /* [kg] its derivative with respect to the new downward speed */
 } Impulse;
 
-/* Static force: its mean over the way, which is on the unloading line up to the yield depth a and
- * in virgin ground beyond. Both parts count with their share of the way. */
+/* Static force, as its mean over the way from m0 to m1. The way follows the unloading line up to
+ * the yield depth a and virgin ground beyond it. Each part is weighted by its share of the way. */
 MILD_HD Impulse path_impulse(const Element *e, Real dt, Real middle, Real virgin_way,
                              const LawWay *virgin) {
     const Real inverse_way = 1 / (REAL_ABS(middle - e->middle) + ELEMENT_TINY);
 
-    /* Line: force k x, x the stretch from the depth of zero force. */
+    /* On the line the force is k x, with x the depth below the depth of zero force. */
     const Real k = e->unload_stiffness;
     const Real end = real_min(middle, e->yield_depth) - e->zero_depth;
     const Real x0 = real_max(e->middle - e->zero_depth, 0);
@@ -57,8 +56,8 @@ MILD_HD Impulse path_impulse(const Element *e, Real dt, Real middle, Real virgin
     return path;
 }
 
-/* Added mass at the front: it takes part from the speed w_y on with which the way ends there, and
- * joins without bouncing. */
+/* Added mass at the front. It takes part once the speed exceeds w_y, at which the way ends at the
+ * front. The collision is inelastic. */
 MILD_HD Impulse mass_impulse(const Element *e, Real speed) {
     Impulse mass;
     mass.value = e->added_mass * (real_max(speed, e->yield_speed) - e->front_speed);
@@ -66,11 +65,11 @@ MILD_HD Impulse mass_impulse(const Element *e, Real speed) {
     return mass;
 }
 
-/* Mass recruited at rest leaves at w; drag beyond that acts at the speed V (element_drag), which
- * for c_d < 1 is (w + min(w, h))/2: it never pushes, and gives no energy for c_d >= 1/2. An element
- * that turns round within the step has been stopped first: growth then counts up to u0, as for w =
- * 0, and half as much for what it gets beyond. stops: bool, the element may have stop_drag and
- * stop_growth. */
+/* Mass is recruited at rest and leaves at the speed w. The rest of the drag acts at the speed V
+ * (element_drag). For c_d < 1, V is (w + min(w, h))/2, so that drag never drives the foot down, and
+ * creates no energy for c_d >= 1/2. An element that reverses within the step was stopped first: its
+ * growth counts in full up to u0, as for w = 0, and half beyond. stops: bool, the element may have
+ * stop_drag and stop_growth. */
 MILD_HD Impulse growth_impulse(const Element *e, Real dt, Real speed, const LawWay *virgin,
                                int stops) {
     const Real down = real_max(speed, 0);
@@ -93,9 +92,9 @@ MILD_HD Impulse growth_impulse(const Element *e, Real dt, Real speed, const LawW
     return growth;
 }
 
-/* Unloading ground follows the foot late by T = ELEMENT_LAG. It is the only damping of elastic
- * ground, and the same at every step size. e(s) is 0 for s > 0, s + E/2 below -E, and -s^2/(2 E)
- * between, E = IMPULSE_EASE: no kink under a resting foot. */
+/* Unloading ground follows the foot with the delay T = ELEMENT_LAG. This is the only damping of
+ * elastic ground, and it does not depend on the step size. With E = IMPULSE_EASE, e(s) is 0 for s >
+ * 0, s + E/2 for s < -E, and -s^2/(2 E) between, so there is no kink under a resting foot. */
 MILD_HD Impulse lag_impulse(const Element *e, Real dt, Real speed) {
     const Real damping = dt * ELEMENT_LAG * e->unload_stiffness;
     const Real rise = speed + e->entry_speed;
@@ -110,9 +109,8 @@ MILD_HD Impulse lag_impulse(const Element *e, Real dt, Real speed) {
 /* Ground without memory. The integral of its force F(u) (1 + d w) over the way is
  *
  *     dt mean F + d (E(m1) - E(m0))
- *
- * What leads through the air carries nothing. Both parts rise with m1, so the step stays convex.
- * The damping's has the sign of the motion: it takes energy. */
+ * The part of the way through the air has no force. Both terms increase with m1, so the step stays
+ * convex. The damping term has the sign of the motion, so it takes energy. */
 MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
     const Real x0 = real_max(e->middle, 0);
     const Real x1 = real_max(middle, 0);
@@ -123,7 +121,8 @@ MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
     const Real share = (inside + ELEMENT_TINY) * inverse_way;
     const Real damping = e->law.elastic_damping;
 
-    /* By m1: into the ground the share of the way grows, out of it it falls. */
+    /* Derivatives with respect to m1. The share of the way in the ground grows on the way in and
+     * shrinks on the way out. */
     const Real entered = over.mean * ((whole - inside) * inverse_way) * inverse_way;
     const Real left = over.mean * share * inverse_way;
     const Real static_slope = middle > 0 ? share * over.slope + entered : left;
@@ -135,8 +134,9 @@ MILD_HD Impulse elastic_impulse(const Element *e, Real dt, Real middle) {
     return elastic;
 }
 
-/* The whole impulse at the new downward speed. curves: of the law. stops: bool, stop_drag,
- * stop_growth and explicit_impulse may not be 0. Constants in a loop over elements. */
+/* The whole impulse at the new downward speed. curves: LawCurve bits of the law. stops: bool,
+ * stop_drag, stop_growth or explicit_impulse may be nonzero. Both are constants in a loop over
+ * elements. */
 MILD_HD Impulse element_impulse(const Element *e, int curves, int stops, Real dt, Real speed) {
     const Real middle = e->depth + dt / 2 * speed;
     const Real virgin_way = real_max(middle - e->yield_depth, 0);

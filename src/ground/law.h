@@ -1,12 +1,12 @@
-/* The law of virgin ground: what an element feels that goes deeper than any before it.
+/* The law of virgin ground: the force on an element that goes deeper than it has been before.
  *
  * A law is a sum of curves over the depth u, each scaled by numbers of Law:
  *
  *     line    F = kappa u                        springs, resistive force theory
  *     cone    F = (k_pen - kappa) P(u)           the developing cone (paper eqs 1 to 5)
  *     power   F = S (u/z0)^n                     pressure and sinkage (power.h)
- *     elastic F = S (u/z0)^n (1 + d w)           the same without memory, damped by the speed w
- *     bed     F = k_bed max(u - u_bed, 0)        the firm bottom, under every law
+ *     elastic F = S (u/z0)^n (1 + d w)           the same without memory, damped; w: downward speed
+ *     bed     F = k_bed max(u - u_bed, 0)        the firm bed, part of every law
  *
  * Developing cone, read as in docs/model.md section 3: the stress acts per element area, the added
  * mass is positive, and the flat area stays 0 once the cone is complete. With R the radius of a
@@ -26,30 +26,29 @@
  *
  *     F_g    = (k_pen - kappa) P + kappa u       eq 4
  *     m_a    = c_g phi rho nu s P                eq 3
+ * Nothing cancels at small u or small nu/tan(alpha), because u_f is the only length left. F_g is
+ * concave when k_pen > kappa, convex otherwise, and straight beyond u_f.
  *
- * The only length left is u_f, so nothing cancels at small u or small nu/tan(alpha). F_g is concave
- * when k_pen > kappa, convex otherwise, and straight beyond u_f.
+ * The elastic curve is the only one that is not about virgin ground. It acts at every depth, on the
+ * way down and up, in a term of its own (impulse.h).
  *
- * The elastic curve is the only one that is not virgin ground: it acts at every depth, going down
- * and up, in a term of its own (impulse.h).
- *
- * A new curve adds its numbers to Law and LAW_NUMBERS, a bit to LawCurve, and its term to each
- * function of this file that takes `curves`, to law_between and to law_curves (law.c); a model's
- * `law` (model.h) fills the numbers. The step calls nothing else. `curves` is a constant where
- * elements are stepped in vectors, so a curve costs nothing on ground that does not have it:
- * law_variant says which loop serves a foot. */
+ * To add a curve, add its numbers to Law and LAW_NUMBERS, a bit to LawCurve, and its term to each
+ * function of this file that takes `curves`, to law_curves and to law_between (element_law.c). A
+ * model's `law` (model.h) fills in the numbers. The step needs nothing else. `curves` is a constant
+ * in the vector loops, so a curve costs nothing on ground that does not have it. law_variant says
+ * which loop serves a foot. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H
 
 #include "ground/power.h"
 
-/* Which curves a law has besides line and bed. The sum of the bits of a foot's materials serves all
- * of its elements: a law that lacks a curve has 0 for its numbers. */
+/* The curves that a law has besides line and bed. All elements of a foot use the union of its
+ * materials' bits, because a law without a curve has 0 for that curve's numbers. */
 typedef enum {
     LAW_LINE = 0,    /* none */
     LAW_CONE = 1,    /* the developing cone, its added mass and its drag */
-    LAW_POWER = 2,   /* pressure and sinkage */
-    LAW_ELASTIC = 4, /* without memory */
+    LAW_POWER = 2,   /* the power of the depth */
+    LAW_ELASTIC = 4, /* the elastic curve without memory */
     LAW_ALL = 7
 } LawCurve;
 
@@ -66,10 +65,10 @@ typedef struct {
     Real power_exponent;     /* n [-] */
     Real elastic_force;      /* S [N] of the elastic curve */
     Real elastic_exponent;   /* n [-] */
-    Real elastic_damping;    /* d [s/m] by which its force grows with the downward speed */
+    Real elastic_damping;    /* d [s/m] relative growth of its force with the downward speed */
 } Law;
 
-/* The numbers of Law, in its order: slots, loads, stores and checks go over this list. */
+/* The numbers of Law in order. Slots, loads, stores and checks are generated from this list. */
 #define LAW_NUMBERS(NUMBER)                                                                        \
     NUMBER(flat_stiffness)                                                                         \
     NUMBER(line_stiffness)                                                                         \
@@ -85,19 +84,19 @@ typedef struct {
     NUMBER(elastic_exponent)                                                                       \
     NUMBER(elastic_damping)
 
-/* The compiled loop with the fewest curves among which are those of a foot. */
+/* The bits of the compiled loop that serves these curves: the loop of a single curve, or of all. */
 MILD_HD int law_variant(int curves) {
     const int one =
         curves == LAW_LINE || curves == LAW_CONE || curves == LAW_POWER || curves == LAW_ELASTIC;
     return one ? curves : LAW_ALL;
 }
 
-/* t [-]: how complete the cone is. */
+/* t [-], 1 when the cone is complete. */
 MILD_HD Real law_cone_progress(const Law *law, Real depth) {
     return real_min(depth * law->inverse_cone_depth, 1);
 }
 
-/* 1 - (1 - t)^3 [-]: how much of its ground the cone has recruited. */
+/* 1 - (1 - t)^3 [-], the recruited share of what the complete cone recruits. */
 MILD_HD Real law_cone_share(const Law *law, Real depth) {
     const Real t = law_cone_progress(law, depth);
     return t * (3 - t * (3 - t));
@@ -114,7 +113,7 @@ MILD_HD Real law_flat_share(const Law *law, Real depth) {
     return open * open;
 }
 
-/* Force of the firm bed [N]; any depth, and a bed at infinity. */
+/* Force of the firm bed [N]. Any depth is allowed, and so is a bed at infinity. */
 MILD_HD Real law_bed_force(const Law *law, Real depth) {
     return law->bed_stiffness * real_max(depth - law->bed_depth, 0);
 }
@@ -158,7 +157,7 @@ MILD_HD Real law_slope(const Law *law, int curves, Real depth) {
     return law_bedless_slope(law, curves, depth) + law_bed_slope(law, depth);
 }
 
-/* A bound of F' above the bed at any depth down to u [N/m]. */
+/* [N/m] Upper bound on F' above the bed, at any depth down to u. */
 MILD_HD Real law_steepest(const Law *law, int curves, Real depth) {
     Real slope = law->line_stiffness;
     if (curves & LAW_CONE) {
@@ -170,7 +169,7 @@ MILD_HD Real law_steepest(const Law *law, int curves, Real depth) {
     return slope;
 }
 
-/* Force of the elastic curve [N] at any depth, at rest. */
+/* [N] Force of the elastic curve at rest. Any depth is allowed. */
 MILD_HD Real law_elastic_force(const Law *law, int curves, Real depth) {
     const Real u = real_max(depth, 0);
     return curves & LAW_ELASTIC ? power_force(law->elastic_force, law->elastic_exponent, u) : 0;
@@ -184,14 +183,15 @@ MILD_HD Real law_elastic_slope(const Law *law, int curves, Real depth) {
 /* Virgin ground on a way down from a depth to depth + way. */
 typedef struct {
     Real mean;            /* [N] mean force over the way */
-    Real mean_slope;      /* [N/m] its derivative by the way */
+    Real mean_slope;      /* [N/m] its derivative with respect to the way */
     Real recruited;       /* [m] P(end) - P(begin) */
-    Real recruited_slope; /* [-] its derivative by the way */
+    Real recruited_slope; /* [-] its derivative with respect to the way */
 } LawWay;
 
-/* The mean is Simpson's rule, exact for lines and for cubics such as P. The bed counts with its
- * force at the end: it is too stiff for a mean to be noticed. A difference that the compiler
- * contracts to a fused multiply-add is not 0 on no way: so 0 is chosen. */
+/* The mean uses Simpson's rule, which is exact for lines and for cubics such as P. The bed enters
+ * with its force at the end of the way, because it is so stiff that a mean would make no
+ * difference. On a way of length 0 the recruited depth is set to 0, because a fused multiply-add
+ * may leave a rounding error in the difference. */
 MILD_HD LawWay law_way(const Law *law, int curves, Real begin, Real way) {
     const Real half = begin + way / 2;
     const Real end = begin + way;

@@ -12,22 +12,22 @@ static const char *const kinds[] = {"flat", "slope", "steps", "waves", "rough", 
 static const char *const patterns[] = {"none", "stripes", "checker", "image"};
 const MildField mild_map_fields[] = {
     MILD_FIELD_CHOICE(MildMapDef, kind, kinds, COUNT(kinds), "[-] shape of the surface"),
-    FIELD(cell, 0.001, 1.0,
-          "[m] distance of the heights' grid points (of an image: of its pixels)"),
-    FIELD(size, 0.1, 1000.0, "[m] rough: the pattern repeats after this length"),
+    FIELD(cell, 0.001, 1.0, "[m] spacing of the height grid; with kind = image, of the pixels"),
+    FIELD(size, 0.1, 1000.0, "[m] rough: period after which the heights repeat"),
     FIELD(amplitude, 0.0, 5.0,
-          "[m] waves, rough: greatest height above and below the mean; steps, image: height"),
+          "[m] waves, rough: largest height above and below the mean; steps, image: total height"),
     FIELD(wavelength, 0.02, 100.0,
-          "[m] waves: of the wave; steps: one up and one down; rough: between random heights"),
+          "[m] waves: wavelength; steps: length of one step up and one down; rough: spacing of the "
+          "random heights"),
     FIELD(slope, -1.0, 1.0, "[-] slope: rise per metre along x"),
     MILD_FIELD(MildMapDef, seed, MILD_FIELD_UINT64, 1, 0, 1.8446744073709552e19,
-               "[-] rough: which random heights"),
+               "[-] rough: seed of the random heights"),
     MILD_FIELD_CHOICE(MildMapDef, patches, patterns, COUNT(patterns),
-                      "[-] pattern of the materials"),
+                      "[-] pattern in which the materials are laid out"),
     FIELD(patch_size, 0.01, 1000.0,
-          "[m] width of a stripe, edge of a field, edge of a label image's pixel"),
+          "[m] stripes: width; checker: edge of a square; image: edge of a pixel"),
     FIELD(border, 0.0, 100.0,
-          "[m] width over which neighbouring materials blend; 0: a sharp border"),
+          "[m] width over which neighbouring materials blend; 0 for a sharp border"),
 };
 const int mild_map_field_count = COUNT(mild_map_fields);
 
@@ -139,7 +139,7 @@ void mild_map_range(const MildMap *map, double *low, double *high) {
     *high = map->slope == 0.0 ? map->high : INFINITY;
 }
 
-/* With s and t the shares of the way through the cell along x and y:
+/* Bilinear interpolation. With s and t the position in the cell along x and y, from 0 to 1:
  *
  *     h = (1 - t) ((1 - s) h00 + s h10) + t ((1 - s) h01 + s h11) */
 double map_surface(const MildMap *map, double x, double y, double slope[2]) {

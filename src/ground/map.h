@@ -1,4 +1,4 @@
-/* What the terrain asks of a map. */
+/* Queries that a terrain makes of its map. */
 #ifndef MILD_GROUND_MAP_H
 #define MILD_GROUND_MAP_H
 

@@ -1,4 +1,5 @@
-/* A model's law in public: one element, a level sole, and the rival that sinks as deep. */
+/* Public functions on the law of a model: one element, a level sole, and the material of another
+ * model that sinks equally deep. */
 #include "ground/models.h"
 
 #include <math.h>
@@ -26,29 +27,29 @@ double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, dou
     while (sole_force(sole, material, high) < load) {
         high *= 2.0;
     }
-    for (int i = 0; i < 60; i++) { /* the law rises with depth: bisection */
+    for (int i = 0; i < 60; i++) { /* bisection, because the force increases with depth */
         double middle = 0.5 * (low + high);
         *(sole_force(sole, material, middle) < load ? &low : &high) = middle;
     }
     return 0.5 * (low + high);
 }
 
-/* Per-element numbers of the raster's `cells`, gathered in one element. */
+/* Gives a single element the drift numbers of all `cells` of the raster together. */
 static void material_concentrate(MildMaterial *m, double cells) {
     m->k_drift *= cells;
     m->b_drift *= cells;
 }
 
-/* A material's number by its key. */
+/* The number of a material that has this key. */
 static double *material_number(MildMaterial *m, const char *key) {
     const MildField *field =
         mild_field_find(mild_material_fields, mild_material_field_count, key, NULL);
     return (double *)((uintptr_t)m + field->offset);
 }
 
-/* A law above its bed is proportional to its `scaled` fields, so one factor matches it. pressure:
- * what the ground above the bed carries per area [N/m^2]; area: of one element of the rival
- * [m^2]. */
+/* Above the bed, a law is proportional to its `scaled` fields, so a single factor matches it.
+ * pressure: [N/m^2] that the ground above the bed carries. area: [m^2] of one element of the
+ * rival. */
 static void rival_scale(MildMaterial *m, const ModelRow *row, double pressure, double area,
                         double depth) {
     MildMaterial bottomless = *m;
@@ -67,7 +68,7 @@ static MildStatus match_check(MildModel model, const MildMaterial *mild, double 
     }
     if (mild->model != MILD_MODEL_MILD) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "model: only a material of mild can be matched, this one is of %s",
+                         "model: only a material of mild can be matched, and this is one of %s",
                          mild_model_names[mild->model]);
     }
     if (!(load > 0.0 && load < INFINITY)) {

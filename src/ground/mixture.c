@@ -6,13 +6,13 @@
 #include "ground/models.h"
 #include "ground/terrain.h"
 
-/* Bool: material m is part of a mixture, coded as in Memory (state.h). */
+/* Bool: material m is part of a mixture, encoded as in Memory (state.h). */
 static int mixture_has(int32_t mixture, int m) {
     return mixture >= 0 &&
            ((mixture & 0xff) == m || (mixture >> 16 > 0 && (mixture >> 8 & 0xff) == m));
 }
 
-/* Bool: one of the material's numbers that a step uses is NaN. */
+/* Bool: one of the numbers that a step uses directly from the material is NaN. */
 static int material_is_nan(const MildMaterial *m) {
     return isnan(m->mu + m->k_drift + m->b_drift + m->recovery + m->cohesion + m->shear_length);
 }
@@ -59,7 +59,8 @@ static double between(double a, double b, double share) {
     return a + share * (b - a);
 }
 
-/* Law, friction and recovery change linearly from one material to the other. */
+/* Sets a slot to a mixture of two materials. Law, friction and recovery are interpolated
+ * linearly. */
 static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, int32_t mixture) {
     const DerivedLaw *a = &derived[mixture & 0xff];
     const DerivedLaw *b = &derived[mixture >> 8 & 0xff];
@@ -71,8 +72,7 @@ static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, i
         .mu = between(m->mu, n->mu, t),
         .k_drift = between(m->k_drift, n->k_drift, t),
         .b_drift = between(m->b_drift, n->b_drift, t),
-        .recovery =
-            between(law_recovery(&a->law, m->recovery), law_recovery(&b->law, n->recovery), t),
+        .recovery = between(m->recovery, n->recovery, t),
     };
     slot_set_law(s, i, &law, &material);
 }
@@ -86,8 +86,8 @@ void slots_pad(const FootScratch *foot) {
     }
 }
 
-/* Bool: no element remembers another material than 0, and every slot already holds the law of
- * material 0. Without a branch per element. */
+/* Bool: no element remembers a material other than 0, and every slot already holds the law of
+ * material 0. The loops have no branches. */
 static int slots_are_uniform(const FootScratch *foot, const Memory *memory) {
     const int32_t *remembered = memory->material;
     const int32_t *set = foot->slot_material;

@@ -1,8 +1,8 @@
-/* A ground model: what its file, model_NAME.c, says of it. Its row is in MILD_MODEL_LIST
- * (mild/ground.h).
+/* What a ground model's file, model_NAME.c, must provide. The model also has a row in
+ * MILD_MODEL_LIST (mild/ground.h).
  *
- * A model made of curves that law.h has is that file and that row. A model with a new curve adds
- * the curve there first. */
+ * A model made of the curves of law.h needs nothing but that file and that row. A model with a new
+ * curve adds the curve to law.h first. */
 #ifndef MILD_GROUND_MODEL_H
 #define MILD_GROUND_MODEL_H
 
@@ -17,19 +17,20 @@ typedef struct {
     /* Law of one element of area pitch^2. NULL: the model has no soft ground. */
     Law (*law)(const MildMaterial *material, double pitch);
 
-    /* Turns a material of mild into one of this model, as far as it differs, before its `scaled`
-     * fields are multiplied so that it sinks as deep. Of these only the ratios matter. area: of the
-     * model's element [m^2]. NULL: nothing differs. */
+    /* Used by mild_model_match: changes a material of mild into one of this model, where the two
+     * differ. The `scaled` fields are then multiplied by a factor that gives the same sinkage, so
+     * only their ratios matter here. area: [m^2] of an element of the model. NULL: nothing
+     * differs. */
     void (*reference)(MildMaterial *material, double area);
 
-    /* Once per step, after element_begin: changes law or friction of the foot's slots that stand on
-     * `model` for the way they move at the start of the step, or have moved. rotation: of the foot.
-     * NULL: they do not depend on it. */
+    /* Called once per step after element_begin. Adapts the law or the friction of the foot's slots
+     * that stand on `model` to their motion, at the start of the step or so far. rotation: of the
+     * foot. NULL: neither depends on the motion. */
     void (*direction)(const struct FootScratch *foot, const MildTerrain *terrain, int model,
                       double dt, const double *rotation, const Motion *now);
 
-    /* Turns *material, the default on entry, into the preset of that name, one of info.presets;
-     * false when the name is unknown. NULL: the model has none. */
+    /* Changes *material, which is the default on entry, into the preset `name`, one of
+     * info.presets. Returns false when the name is unknown. NULL: the model has no presets. */
     int (*preset)(const char *name, MildMaterial *material);
 } ModelRow;
 

@@ -1,35 +1,41 @@
-/* Bekker's pressure and sinkage, and the shear of Janosi and Hanamoto (J. Y. Wong, Theory of Ground
- * Vehicles, 4th edition, 2008, chapter 2):
+/* Bekker's pressure-sinkage law and the shear law of Janosi and Hanamoto (J. Y. Wong, Theory of
+ * Ground Vehicles, 4th edition, 2008, chapter 2):
  *
  *     p = (k_c/b + k_phi) z^n
  *     s = (c + p mu) (1 - exp(-j/K))
- *
- * j is the length of the path that the element has slid since it touched down, which the drift
- * remembers anyway (element.h). */
+ * j is the distance that the element has slid since it touched down, which is its drift
+ * (ElementMemory in element.h). */
 #include "ground/friction.h"
 #include "ground/model.h"
 #include "ground/scratch.h"
 
-/* Wong 2008, table 2.3: dry sand (Land Locomotion Laboratory), sandy loam (the same, 15 % of
- * water), clayey soil (Thailand, 38 %), snow (Harrison). Its K are ranges; these lie within those
- * of firm sand, loose sand, clay and fresh snow. Lunar soil, K too: Heiken, Vaniman, French, Lunar
- * Sourcebook, 1991, section 9.1. */
+/* Wong 2008, table 2.3, gives n, k_c, k_phi, c and the angle of the first four, each row by its
+ * name there. Its values of K go by the kind of ground: 10 mm for firm and 25 mm for loose sand,
+ * 6 mm for clay, 25 to 50 mm for fresh snow; Ding et al., J. Field Robotics 32 (2015), table I,
+ * print 10 to 25 mm beside the dry sand and 6 mm beside the clay. Of a range we take one end.
+ *
+ *     dry_sand     "Dry sand", Land Locomotion Laboratory; K of firm sand
+ *     sandy_loam   "Sandy loam", 15 % moisture, Land Locomotion Laboratory; K of loose sand
+ *     clay         "Clayey soil", 38 % moisture, Thailand
+ *     snow         "Snow (U.S.)"; K the lower end
+ *     lunar_soil   Carrier, Olhoeft, Mendell in Heiken, Vaniman, French, Lunar Sourcebook, 1991,
+ *                  section 9.1. The same n, k_c, k_phi, c and angle in Li et al., NASA NTRS
+ *                  20220010732 (2022); Ding's table I has 18 mm for K. */
 typedef struct {
     const char *name;
     double exponent;     /* n [-] */
     double k_c;          /* [N/m^(n+1)] */
     double k_phi;        /* [N/m^(n+2)] */
     double cohesion;     /* c [N/m^2] */
-    double angle;        /* [degrees] of friction */
+    double angle;        /* [degrees] friction angle, mu = tan(angle) */
     double shear_length; /* K [m] */
-    double density;      /* [kg/m^3] */
 } Soil;
 static const Soil soils[] = {
-    {"dry_sand", 1.1, 990.0, 1528430.0, 1040.0, 28.0, 0.010, 1600.0},
-    {"sandy_loam", 0.7, 5270.0, 1515040.0, 1720.0, 29.0, 0.025, 1500.0},
-    {"clay", 0.5, 13190.0, 692150.0, 4140.0, 13.0, 0.006, 1700.0},
-    {"snow", 1.6, 4370.0, 196720.0, 1030.0, 19.7, 0.025, 300.0},
-    {"lunar_soil", 1.0, 1400.0, 820000.0, 170.0, 35.0, 0.0178, 1660.0},
+    {"dry_sand", 1.1, 990.0, 1528430.0, 1040.0, 28.0, 0.010},
+    {"sandy_loam", 0.7, 5270.0, 1515040.0, 1720.0, 29.0, 0.025},
+    {"clay", 0.5, 13190.0, 692150.0, 4140.0, 13.0, 0.006},
+    {"snow", 1.6, 4370.0, 196720.0, 1030.0, 19.7, 0.025},
+    {"lunar_soil", 1.0, 1400.0, 820000.0, 170.0, 35.0, 0.0178},
 };
 
 static int bekker_preset(const char *name, MildMaterial *material) {
@@ -46,7 +52,6 @@ static int bekker_preset(const char *name, MildMaterial *material) {
         material->mu = tan(soil->angle * LAW_PI / 180.0);
         material->shear_length = soil->shear_length;
         material->k_drift = material->b_drift = 0.0;
-        material->rho = soil->density;
         material->bed_depth = 1.0;
         return 1;
     }
@@ -62,7 +67,7 @@ static Law bekker_law(const MildMaterial *material, double pitch) {
     return law;
 }
 
-/* Dry sand without cohesion: friction stays that of mild. */
+/* Dry sand without cohesion, with the friction of the material of mild. */
 static void bekker_material(MildMaterial *material, double area) {
     (void)area;
     material->exponent = soils[0].exponent;
@@ -71,14 +76,14 @@ static void bekker_material(MildMaterial *material, double area) {
     material->cohesion = 0.0;
 }
 
-/* mu [-] of a slot's material, or of the two that blend in it. */
+/* mu [-] of a slot's material, or of its mixture of two. */
 static double slot_mu(const MildTerrain *terrain, int32_t mixture) {
     const double near = terrain->materials[mixture & 0xff].mu;
     const double far = terrain->materials[mixture >> 8 & 0xff].mu;
     return mixture >> 16 ? near + (mixture >> 16) / 255.0 * (far - near) : near;
 }
 
-/* Friction of the slots whose nearer material is of this model. */
+/* Sets friction by the shear law in the slots whose nearer material is of this model. */
 static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, int model, double dt,
                          const double *rotation, const Motion *now) {
     (void)rotation;
@@ -97,15 +102,16 @@ static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, in
         Element element = slot_element(s, i);
         element.mu = share * slot_mu(terrain, foot->slot_material[i]);
         element.drift_bound += dt * share * cohesion * area;
-        friction_hold(&element, &memory, dt, 1.0 / dt,
-                      law_force(&element.law, foot->curves, element.yield_depth));
+        const double force = law_force(&element.law, foot->curves, element.yield_depth) +
+                             law_elastic_force(&element.law, foot->curves, element.middle);
+        friction_hold(&element, &memory, dt, 1.0 / dt, force);
         s->mu[i] = element.mu;
         slot_store(s, i, &element);
     }
 }
 
 const ModelRow model_bekker = {
-    .info = {.summary = "pressure by a power of the sinkage, shear strength that builds up",
+    .info = {.summary = "pressure a power of the sinkage; shear strength grows with slip",
              .source = "Bekker 1969, Janosi and Hanamoto 1961",
              .fields = {"k_c", "k_phi", "exponent", "plate_width", "cohesion", "mu", "shear_length",
                         "k_drift", "b_drift", "recovery", "bed_depth"},

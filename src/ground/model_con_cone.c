@@ -1,6 +1,6 @@
 #include "ground/model.h"
 
-/* Choi et al. 2023, the set for a foot of area A: k = 1e6 N/m^3 A, the cone's numbers below. */
+/* Parameters of Choi et al. 2023 for a foot of area A, with k = 1e6 N/m^3 A. */
 #define CHOI_STRESS 1e6   /* [N/m^3] k/A */
 #define CHOI_SIGMA 0.15e6 /* [N/m^3] */
 #define CHOI_ALPHA (LAW_PI / 3.0)
@@ -18,7 +18,7 @@ static void choi_material(MildMaterial *m, double area) {
 
 const ModelRow model_con_cone = {
     .info = {.summary = "one developing cone under the whole sole",
-             .source = "Choi et al. 2023, its numbers scaled",
+             .source = "Choi et al. 2023, scaled",
              .fields = {"k_pen", "sigma_cone", "alpha", "nu", "c_g", "c_d", "phi", "rho", "mu",
                         "k_drift", "b_drift", "recovery", "bed_depth", "passive"},
              .scaled = {"k_pen", "sigma_cone"},

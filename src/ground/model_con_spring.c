@@ -1,7 +1,7 @@
 #include "ground/model.h"
 
 const ModelRow model_con_spring = {
-    .info = {.summary = "one yielding spring under the sole's middle",
+    .info = {.summary = "one yielding spring under the middle of the sole",
              .source = "Lynch et al. 2020",
              .fields = {"k_pen", "mu", "k_drift", "b_drift", "recovery", "bed_depth"},
              .scaled = {"k_pen"},

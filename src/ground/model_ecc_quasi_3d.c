@@ -2,7 +2,7 @@
 #include "ground/resist.h"
 
 const ModelRow model_ecc_quasi_3d = {
-    .info = {.summary = "the same in three dimensions",
+    .info = {.summary = "three-dimensional resistive force theory under every element",
              .source = "Agarwal et al. 2023",
              .fields = {"zeta", "mu", "k_drift", "b_drift", "bed_depth"},
              .scaled = {"zeta"},

@@ -1,8 +1,8 @@
 #include "ground/model.h"
 
 /* K. H. Hunt, F. R. E. Crossley, "Coefficient of restitution interpreted as damping in
- * vibroimpact", J. Appl. Mech. 42 (1975): F = k u^n (1 + 3/2 d w), of which a body of any mass
- * springs back with 1 - d v of its speed, to first order in its speed v. */
+ * vibroimpact", J. Appl. Mech. 42 (1975): F = k u^n (1 + 3/2 d w). To first order in the impact
+ * speed v, the coefficient of restitution is 1 - d v for a body of any mass. */
 static Law hunt_crossley_law(const MildMaterial *material, double pitch) {
     Law law = law_line(0.0, pitch * pitch, material->bed_depth);
     law.elastic_force = material->k_pen * POWER_DEPTH;

@@ -1,6 +1,6 @@
 #include "ground/model.h"
 
 const ModelRow model_rigid = {
-    .info = {.summary = "the engine's own contact: train, eval, play; no parameters",
+    .info = {.summary = "the engine's own contact, in train, eval and play; no parameters",
              .source = "MuJoCo"},
 };

@@ -1,4 +1,4 @@
-/* The rows of MILD_MODEL_LIST, each filled in by its file. */
+/* The table of MILD_MODEL_LIST. Each model's file defines its row. */
 #include "ground/models.h"
 
 #include <string.h>

@@ -4,8 +4,8 @@
 
 #include "ground/model.h"
 
-/* The row of a material's model. A model without a law, or an unknown one, gets the row of mild,
- * because the ground computes with materials that nobody has checked. */
+/* The row of a material's model. Returns the row of mild for an unknown model and for one without a
+ * law, because the ground must survive unchecked materials. */
 const ModelRow *model_row(int model);
 /* Law of one element of area pitch^2. */
 Law law_of(const MildMaterial *material, double pitch);

@@ -1,6 +1,8 @@
-/* A foot's velocity field: the element at (x, y) in the foot frame has the velocity
+/* Velocity field of a foot. The element at (x, y) in the foot frame has the velocity
  *
- *     v_x = x[0] + x[1] x + x[2] y        along the world's x axis, and so on */
+ *     v_x = x[0] + x[1] x + x[2] y
+ *
+ * along the x axis of the world, and likewise along y and z. */
 #ifndef MILD_GROUND_MOTION_H
 #define MILD_GROUND_MOTION_H
 

@@ -4,25 +4,25 @@
 #include "ground/pass.h"
 #include "ground/solver.h"
 
-#define NEWTON_TOLERANCE 1e-9
-#define NEWTON_ITERATIONS 400 /* bound of the search */
-#define NEWTON_PLAIN 20       /* of them without held bounds */
-#define NEWTON_ROUND 20       /* with the bounds held once */
-#define NEWTON_TRY 6          /* plain ones after each round */
-#define NEWTON_HALVINGS 6
-#define NEWTON_SEARCH 30 /* bisections along a step */
-/* An elimination's factors beyond this are worth a search for a pivot. */
-#define NEWTON_GROWTH 8.0
-/* A residual below this share of the impulse may be all rounding. */
-#define NEWTON_NEAR 1e-5
-#define NEWTON_ROUNDING 6e-14 /* of the terms of V^ + A P: 256 units in the last place */
-#define NEWTON_LENGTH 4e-16   /* [m] what the elements' depths are rounded to */
-#define BOUNDS_LEAST 0.02     /* [-] shortest and longest move of the bounds of friction */
-#define BOUNDS_MOST 1e4
-#define BOUNDS_SLOW 0.5    /* [-] a move not this much shorter than the last one is slow */
-#define BOUNDS_PATIENCE 10 /* rounds before the bounds start again from somewhere else */
-/* A row of up to 4 x 6 numbers and a right side, in whole vectors. Written with the compiler's
- * vector type: what it makes of plain loops over so short rows takes three times as long. */
+#define NEWTON_TOLERANCE 1e-9 /* [-] of the residual, unless the caller sets one */
+#define NEWTON_ITERATIONS 400 /* Newton steps in all, unless the caller sets a limit */
+#define NEWTON_PLAIN 20       /* plain steps before the friction bounds are held fixed */
+#define NEWTON_ROUND 20       /* steps of one minimisation at fixed bounds */
+#define NEWTON_TRY 6          /* plain steps tried after each minimisation */
+#define NEWTON_HALVINGS 6     /* of a step that does not lower the residual */
+#define NEWTON_SEARCH 30      /* bisections of a line search */
+#define NEWTON_GROWTH 8.0     /* [-] a larger elimination factor calls for a row exchange */
+#define NEWTON_NEAR 1e-5      /* [-] a residual below this share of the impulse may be rounding */
+#define NEWTON_ROUNDING 6e-14 /* [-] rounding of V^ + A P: 256 units in the last place */
+#define NEWTON_LENGTH 4e-16   /* [m] rounding of the elements' depths */
+#define BOUNDS_LEAST 0.02     /* [-] smallest step length of the friction bounds */
+#define BOUNDS_MOST 1e4       /* [-] largest */
+#define BOUNDS_SLOW 0.5       /* [-] a move that shrank by less than this factor is slow */
+#define BOUNDS_PATIENCE 10    /* rounds before the bounds restart from wider ones */
+
+/* A row of up to 4 x 6 numbers and its right-hand side, padded to whole vectors. It uses the
+ * compiler's vector type because loops over rows this short take three times as long when the
+ * compiler vectorises them itself. */
 enum { NEWTON_VECTOR = 8, NEWTON_VECTORS = 4, NEWTON_LANES = NEWTON_VECTOR * NEWTON_VECTORS };
 typedef double Vector __attribute__((vector_size(NEWTON_VECTOR * sizeof(double))));
 typedef union {
@@ -30,30 +30,33 @@ typedef union {
     Vector part[NEWTON_VECTORS];
 } Row;
 
-_Static_assert(TWIST_MAX < NEWTON_LANES, "a row holds all feet and a right side");
+_Static_assert(TWIST_MAX < NEWTON_LANES, "a row holds all feet and a right-hand side");
 
-/* The loaded feet's rows of the problem: `first` is the row of the first one; what lies beyond the
- * last is zero. */
+/* The equations of the loaded feet. The lanes of a row beyond the last foot are zero. */
 typedef struct {
-    Row A[TWIST_MAX], free;
-    double tolerance, dt;
-    int limit, first;
+    Row A[TWIST_MAX]; /* [1/kg, 1/(kg m), 1/(kg m^2)] inverse inertia, symmetric */
+    Row free;         /* V^ [m/s, rad/s] twists of the free motion */
+    double tolerance; /* [-] of the residual */
+    double dt;        /* [s] */
+    int limit;        /* Newton steps in all */
+    int first;        /* row of the first loaded foot in the step's arrays */
 } System;
 
 /* One point of the search: impulse P, foot twists V = V^ + A P. */
 typedef struct {
-    Row impulse, twist;
-    double residual;
-    int rests; /* bool: Newton's step from here is no longer than rounding */
+    Row impulse;     /* P [N s, N m s] */
+    Row twist;       /* V [m/s, rad/s] */
+    double residual; /* norm of P - W(V) in the metric of kinetic energy */
+    int rests;       /* bool: Newton's step from here is no longer than rounding */
 } Point;
 
 static int least(int a, int b) {
     return a < b ? a : b;
 }
 
-/* All that follows is compiled for one and for two loaded feet, and for more: n rows in `parts`
- * vectors, of which the last holds the right side, too. Vectors beyond are neither read nor
- * written. */
+/* The functions below are compiled three times: for one loaded foot, for two, and for more. There
+ * are n rows. Each uses `parts` vectors, the last of which also holds the right-hand side. The
+ * other vectors of a row are neither read nor written. */
 
 ALWAYS_INLINE void row_clear(Row *row, int parts) {
     for (int p = 0; p < parts; p++) {
@@ -61,7 +64,7 @@ ALWAYS_INLINE void row_clear(Row *row, int parts) {
     }
 }
 
-/* The first n numbers of a row; zeros behind them. */
+/* Sets the first n numbers of a row and clears the rest. */
 ALWAYS_INLINE void row_load(Row *row, const double *values, int n, int parts) {
     row_clear(row, parts);
     memcpy(row->at, values, (size_t)n * sizeof *values);
@@ -102,7 +105,7 @@ ALWAYS_INLINE void system_times(const System *system, const double *x, Row *y, i
     }
 }
 
-/* sqrt(x^T A x): in the metric of kinetic energy. */
+/* sqrt(x^T A x), the norm of an impulse in the metric of kinetic energy. */
 ALWAYS_INLINE double system_norm(const System *system, const double *x, int n, int parts) {
     Row y;
     double sum = 0.0;
@@ -124,7 +127,8 @@ ALWAYS_INLINE void point_evaluate(const System *system, MildScratch *scratch, Po
     point->residual = system_norm(system, apart, n, parts);
 }
 
-/* The row at or below k with the largest number in column k; 0 when there is none. */
+/* Swaps row k with the row at or below it that has the largest number in column k. Returns false
+ * when that number is zero. */
 static int rows_pivot(Row *M, int k, int n) {
     int pivot = k;
     for (int i = k + 1; i < n; i++) {
@@ -138,8 +142,8 @@ static int rows_pivot(Row *M, int k, int n) {
     return fabs(M[k].at[k]) > 0.0;
 }
 
-/* Gaussian elimination of the rows [M | right side], the right side in column n; x = M^-1 right.
- * The diagonal is the pivot unless a factor grows. */
+/* Solves M x = right by Gaussian elimination. The right-hand side is column n of the rows. The
+ * diagonal serves as the pivot unless a factor exceeds NEWTON_GROWTH. */
 ALWAYS_INLINE int rows_eliminate(Row *M, double *x, int n, int parts) {
     double inverse[TWIST_MAX];
     for (int k = 0; k < n; k++) {
@@ -173,11 +177,17 @@ ALWAYS_INLINE int rows_eliminate(Row *M, double *x, int n, int parts) {
     return 1;
 }
 
-/* The law of the last pass, at V, linearised with H = -dW/dV: W + H (V - V^ - A P) = P, that is
- *     (1 + H A) P = W + H (V - V^).
- * With `correct` the unknown is the change of P instead,
- *     (1 + H A) dP = W - P,
- * and V moves by A dP. Rounding is then in proportion to dP, not to P. */
+/* One Newton step. With H = -dW/dV, the linearised law of the last pass at V is W + H (V - V^ - A
+ * P) = P, so
+ *
+ *     (1 + H A) P = W + H (V - V^)
+ *
+ * With `correct`, solve for the change of P instead:
+ *
+ *     (1 + H A) dP = W - P
+ *
+ * V then moves by A dP, and the rounding error is proportional to dP rather than to P. Returns
+ * false when the matrix is singular. */
 ALWAYS_INLINE int point_step(const System *system, MildScratch *scratch, const Point *at,
                              Point *next, int correct, int n, int parts) {
     static const Row unit[TWIST_MAX + 1] = {
@@ -228,8 +238,8 @@ ALWAYS_INLINE void point_between(const Point *from, const Point *to, double t, P
     }
 }
 
-/* Halves the step until the residual falls. In vain, the shortest stands: it may lead over a kink
- * of the law. */
+/* Halves the step until the residual falls. If it never does, keeps the shortest step, which may
+ * lead across a kink of the law. */
 ALWAYS_INLINE void point_halve(const System *system, MildScratch *scratch, const Point *at,
                                Point *next, int n, int parts) {
     const Point full = *next;
@@ -249,8 +259,8 @@ ALWAYS_INLINE int point_solves(const System *system, const Point *point, int n, 
            point->residual <= system->tolerance * system_norm(system, point->impulse.at, n, parts);
 }
 
-/* Bool: the step between two points is no longer than what rounding makes of V^ + A P, and of the
- * depths that dt V is added to. */
+/* Bool: the step between two points is within the rounding error of V^ + A P and of the depths to
+ * which dt V is added. */
 static int step_is_rounding(const System *system, const Point *from, const Point *to, int n) {
     double size = 0.0;
     for (int i = 0; i < n; i++) {
@@ -269,9 +279,9 @@ static int step_is_rounding(const System *system, const Point *from, const Point
     return 1;
 }
 
-/* A step from `at` to `next` did not lower the residual. Near the solution rounding may be the
- * reason: then the step is done again as a correction. If even that is no longer than rounding, the
- * search rests at `at`. */
+/* The step from `at` to `next` did not lower the residual. Near the solution the reason may be
+ * rounding, so repeat the step as a correction. If the correction is itself within rounding, `at`
+ * is the solution. */
 static void point_correct(const System *system, MildScratch *scratch, Point *at, Point *next, int n,
                           int parts) {
     double scale = system_norm(system, at->impulse.at, n, parts);
@@ -290,8 +300,8 @@ static void point_correct(const System *system, MildScratch *scratch, Point *at,
     }
 }
 
-/* Newton's method from the best point so far, whose pass has been made; leaves there the best that
- * it has seen. Returns the steps done. */
+/* Plain Newton steps from `best`, at which the last pass was made. Leaves the best point seen in
+ * `best`. Returns the number of steps. */
 ALWAYS_INLINE int newton_plain(const System *system, MildScratch *scratch, Point *best, int limit,
                                int n, int parts) {
     Point at, next;
@@ -319,8 +329,8 @@ ALWAYS_INLINE int newton_plain(const System *system, MildScratch *scratch, Point
     return steps;
 }
 
-/* Slope along the step between two points of the function that held bounds make, at a point whose
- * pass was the last: (P - W)^T A dP. */
+/* With the friction bounds held fixed, the step minimises a convex function. This is its slope
+ * along the step between two points, (P - W)^T A dP, at the point of the last pass. */
 static double step_slope(const System *system, const MildScratch *scratch, const Point *at,
                          const Point *from, const Point *to, int n) {
     double slope = 0.0;
@@ -331,8 +341,8 @@ static double step_slope(const System *system, const MildScratch *scratch, const
     return slope;
 }
 
-/* With the bounds of friction held the step is the minimum of a convex function, and a search along
- * each step finds it from anywhere. */
+/* Minimises the convex function that the step has at fixed friction bounds. Newton's method with a
+ * line search converges from any start. Returns the number of steps. */
 static int newton_held(const System *system, MildScratch *scratch, Point *at, int limit, int n,
                        int parts) {
     int steps = 0, moves = 1;
@@ -340,8 +350,11 @@ static int newton_held(const System *system, MildScratch *scratch, Point *at, in
     contact_pass_held(scratch, system->dt, at->twist.at, system->first);
     while (moves && steps < limit && point_step(system, scratch, at, &full, 0, n, parts)) {
         steps++;
-        double start = step_slope(system, scratch, at, at, &full, n), end, low = 0.0, high = 1.0,
-               t = 1.0;
+        double start = step_slope(system, scratch, at, at, &full, n);
+        double end;
+        double low = 0.0;
+        double high = 1.0;
+        double t = 1.0;
         for (int k = 0; k <= NEWTON_SEARCH; k++) {
             point_between(at, &full, t, &next, n);
             contact_pass_held(scratch, system->dt, next.twist.at, system->first);
@@ -352,7 +365,8 @@ static int newton_held(const System *system, MildScratch *scratch, Point *at, in
             *(end < 0.0 ? &low : &high) = t;
             t = 0.5 * (low + high);
         }
-        double moved[TWIST_MAX], scale = system_norm(system, next.impulse.at, n, parts);
+        double moved[TWIST_MAX];
+        double scale = system_norm(system, next.impulse.at, n, parts);
         for (int i = 0; i < n; i++) {
             moved[i] = next.impulse.at[i] - at->impulse.at[i];
         }
@@ -362,13 +376,13 @@ static int newton_held(const System *system, MildScratch *scratch, Point *at, in
     return steps;
 }
 
-/* [N s] The bound of friction that the normal impulse of the last pass asks for. */
+/* [N s] Friction bound for the normal impulse of the last pass. */
 static inline double bound_wanted(const Slots *s, int i) {
     const Element element = slot_element(s, i);
     return friction_bound(&element, s->iz[i]);
 }
 
-/* Sets the bounds of friction to a multiple of what the last pass asks for. */
+/* Sets the friction bounds to a multiple of those for the last pass. */
 static void bounds_begin(MildScratch *scratch, double times) {
     for (int f = 0; f < scratch->feet; f++) {
         const Slots *s = &scratch->foot[f].slot;
@@ -379,18 +393,21 @@ static void bounds_begin(MildScratch *scratch, double times) {
     }
 }
 
-/* How the bounds of friction follow the normal impulses. */
+/* Step length of the friction bounds. */
 typedef struct {
-    double share; /* [-] of the way to what they ask for, in the last move */
-    int turned;   /* bool: that move turned round */
+    double share; /* [-] of the distance to the wanted bounds, in the last move */
+    int turned;   /* bool: that move reversed direction */
 } Pace;
 
-/* The share of the next move. It doubles while the moves keep their direction and do not get much
- * shorter: where friction presses the foot into the ground each bound is a little more than the one
- * before, over many orders of magnitude. Where they turn round it is the whole way back, but no
- * further than to the middle of the last move. */
+/* Chooses the next step length. It doubles while the moves keep their direction and hardly shorten,
+ * because where friction presses the foot into the ground the bounds grow slowly over many orders
+ * of magnitude. When the moves reverse, it goes the whole way back, but at most to the middle of
+ * the last move. */
 static void bounds_pace(const MildScratch *scratch, Pace *pace) {
-    double along = 0.0, now = 0.0, before = 0.0, share = pace->share;
+    double along = 0.0;  /* [N^2 s^2] wanted move times last move */
+    double now = 0.0;    /* [N^2 s^2] square of the wanted move */
+    double before = 0.0; /* [N^2 s^2] square of the last move */
+    double share = pace->share;
     for (int f = 0; f < scratch->feet; f++) {
         const Slots *s = &scratch->foot[f].slot;
         for (int i = 0; i < foot_end(&scratch->foot[f]); i++) {
@@ -409,7 +426,7 @@ static void bounds_pace(const MildScratch *scratch, Pace *pace) {
     *pace = (Pace){fmax(share, BOUNDS_LEAST), turned};
 }
 
-/* Moves the bounds of friction towards what the last pass asks for. */
+/* Moves the friction bounds towards those for the last pass. */
 static void bounds_move(MildScratch *scratch, Pace *pace) {
     bounds_pace(scratch, pace);
     for (int f = 0; f < scratch->feet; f++) {
@@ -422,10 +439,10 @@ static void bounds_move(MildScratch *scratch, Pace *pace) {
     }
 }
 
-/* Where Newton's method goes astray because the bounds depend on I_z, or runs in circles over kinks
- * of the law. Alternate: minimise with the bounds held, then move the bounds towards what the
- * minimum asks for, and try plain steps from there. When that takes long, start again from bounds
- * several times as wide. */
+/* For steps on which plain Newton diverges because the bounds depend on I_z, or cycles over kinks
+ * of the law. Alternate: minimise with the friction bounds fixed, move the bounds towards those at
+ * the minimum, and try plain steps from there. Every BOUNDS_PATIENCE rounds, restart from bounds
+ * several times as wide. Returns the number of steps. */
 static int newton_patient(const System *system, MildScratch *scratch, Point *best, int limit, int n,
                           int parts) {
     static const double wider[] = {3.0, 100.0, 10.0, 1e4};
@@ -433,14 +450,14 @@ static int newton_patient(const System *system, MildScratch *scratch, Point *bes
     Pace pace = {0.5, 0}; /* the first move doubles it */
     int steps = 0;
     if (isinf(at.residual)) {
-        at.twist = system->free; /* without an impulse */
+        at.twist = system->free; /* the point with zero impulse */
     }
     contact_pass(scratch, system->dt, at.twist.at, system->first);
     bounds_begin(scratch, 1.0);
     for (int round = 1; steps < limit && !point_solves(system, best, n, parts); round++) {
         int held = newton_held(system, scratch, &at, least(limit - steps, NEWTON_ROUND), n, parts);
         if (held == 0) {
-            break; /* the numbers have gone bad */
+            break; /* singular or not a number */
         }
         steps += held;
         point_evaluate(system, scratch, &at, n, parts);
@@ -459,8 +476,8 @@ static int newton_patient(const System *system, MildScratch *scratch, Point *bes
     return steps;
 }
 
-/* What is returned in the place of a point: W of the last pass, and V^ + A W. Sets the point to it;
- * its residual is relative, infinite where W = 0 and the law there is not. */
+/* Sets a point to what would be returned for it: P = W of the last pass and V = V^ + A W. Its
+ * residual becomes relative. It is infinite where W = 0 but the law at V is not. */
 static void point_return(const System *system, MildScratch *scratch, Point *point, int n,
                          int parts) {
     point->impulse = (Row){{0.0}};
@@ -473,11 +490,12 @@ static void point_return(const System *system, MildScratch *scratch, Point *poin
     }
 }
 
-/* A step that the search has left unsolved. Its best point may be far from a solution however small
- * its residual, and its impulses zero in the middle of the ground. The other candidate is a minimum
- * at held bounds, those that the normal impulses without any friction ask for: every element's
- * normal impulse is then that of the new velocity, only friction's bound is not. Returned is the
- * one that is closer to the law. Returns the steps done. */
+/* Chooses what to return for a step that the search has left unsolved. Its best point may be far
+ * from a solution even with a small residual: its impulses may be zero deep in the ground. The
+ * alternative is a minimum at fixed friction bounds, taken from the normal impulses without
+ * friction. There every normal impulse obeys the law at the new velocity, and only the friction
+ * bound does not. Returns the candidate closer to the law in `scratch` and `result`, and the number
+ * of steps as the value. */
 static int newton_unsolved(const System *system, MildScratch *scratch, const Point *best,
                            MildContactResult *result, int n, int parts) {
     Point safe = {.residual = INFINITY}, found = *best;
@@ -500,7 +518,7 @@ static int newton_unsolved(const System *system, MildScratch *scratch, const Poi
     return steps;
 }
 
-/* The feet from the row `first` on. */
+/* Solves for the n rows from `first` on. */
 ALWAYS_INLINE void system_solve(MildScratch *scratch, const MildContactInput *input, int first,
                                 MildContactResult *result, int n, int parts) {
     System opened, *system = &opened;
@@ -533,7 +551,7 @@ void newton_solve(MildScratch *scratch, const MildContactInput *input, MildConta
     }
     int n = 6 * (end - first);
     memset(scratch->wrench, 0, sizeof scratch->wrench);
-    for (int f = first; f < end && n > 12; f++) { /* a foot in the air between loaded ones */
+    for (int f = first; f < end && n > 12; f++) { /* clear feet in the air between loaded ones */
         if (scratch->foot[f].active == 0) {
             memset(scratch->hessian[f], 0, sizeof scratch->hessian[f]);
         }

@@ -1,6 +1,6 @@
-/* The passes over a foot's slots are branch-free, so that they run in vectors. They are two,
- * because one alone would be a chain of operations too long for the processor to work on several
- * vectors at once. */
+/* The loops over a foot's slots have no branches, so that they vectorise. Normal impulses and
+ * friction have a loop each. A single loop would be one dependency chain, too long for the
+ * processor to overlap several vectors. */
 #include "ground/pass.h"
 
 #include <string.h>
@@ -28,7 +28,7 @@ ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Moti
     }
 }
 
-/* The loop of the ground under the foot. */
+/* Picks the loop compiled for the curves and the slope of the ground under the foot. */
 static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
@@ -54,9 +54,9 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
     }
 }
 
-/* Friction, and all that is summed. Where the ground is not level the normal impulse is I_z g with
- * g = (-slope, 1), the gradient of -u: it does work exactly where u changes. Its vertical part is
- * the paper's. With
+/* Adds friction to the impulses and sums them over the foot. Where the ground is not level the
+ * normal impulse is I_z g with g = (-slope, 1) = -grad u, so it does work exactly when u changes.
+ * Its vertical part is the paper's. With
  *
  *     f = -d friction/dv,   k = -dI_z/dw,   c = g + d friction/dI_z
  *
@@ -64,8 +64,8 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  *
  *     h = -dI/dv = f + k c g^T
  *
- * sums: of I, x I and y I. held: bool, the bounds of friction are slot.bound. turned: bool, that of
- * some elements begins at slot.turn. */
+ * sums: of I, x I and y I. held: bool, the friction bounds are slot.bound. turned: bool, some
+ * elements have a reversal velocity in slot.turn (energy.c). */
 ALWAYS_INLINE void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
                                  int turned, double sums[9]) {
     const Slots local = *slot, *s = &local;
@@ -128,7 +128,7 @@ ALWAYS_INLINE void foot_friction(const Slots *slot, int end, const Motion *m, in
     memcpy(sums, all, sizeof all);
 }
 
-/* p x I */
+/* torque += p x I */
 static inline void cross_add(const double *p, const double *I, double *torque) {
     torque[0] += p[1] * I[2] - p[2] * I[1];
     torque[1] += p[2] * I[0] - p[0] * I[2];
@@ -169,16 +169,16 @@ void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int
     pass(scratch, dt, twist, first, 1);
 }
 
-/* Sums of each entry of h times 1, x, y, x^2, xy, y^2. They hold the whole foot, since p is linear
- * in x and y. */
+/* Sums over the foot of each entry of h times 1, x, y, x^2, xy, y^2. They determine the foot's
+ * hessian, because p is linear in x and y. */
 typedef double Moments[3][3][6];
 
-/* Of three entries at a time: as many sums as the registers hold. */
+/* Moments of three entries at a time, which are as many sums as the registers hold. */
 static void moments(const Slots *s, int end, const double *a, const double *b, const double *c,
                     double sums[3][6]) {
     const double *xs = s->x, *ys = s->y;
-    double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0, b0 = 0.0, b1 = 0.0, b2 = 0.0,
-           b3 = 0.0, b4 = 0.0, b5 = 0.0;
+    double a0 = 0.0, a1 = 0.0, a2 = 0.0, a3 = 0.0, a4 = 0.0, a5 = 0.0;
+    double b0 = 0.0, b1 = 0.0, b2 = 0.0, b3 = 0.0, b4 = 0.0, b5 = 0.0;
     double c0 = 0.0, c1 = 0.0, c2 = 0.0, c3 = 0.0, c4 = 0.0, c5 = 0.0;
 #pragma omp simd reduction(+ : a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5, c0, c1, c2, c3, c4, \
                                c5)
@@ -225,9 +225,11 @@ static void foot_moments(const FootScratch *foot, Moments M) {
     memcpy(M[2][2], rest[2], sizeof *rest);
 }
 
-/* H = sum of B^T h B, B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the moments
- * of h by their products, force rows   [M_00, N_0],   N_k = -sum over l of M_kl [arm_l]x torque
- * rows  sum over k of [arm_k]x [M_k0, N_k] */
+/* H = sum of B^T h B, with B = [1, -[p]x] and p = sum over k of (1, x, y)_k arm_k. With M_kl the
+ * moment of h by the product of factors k and l, and N_k = -sum over l of M_kl [arm_l]x,
+ *
+ *     force rows     [M_00, N_0]
+ *     torque rows    sum over k of [arm_k]x [M_k0, N_k] */
 static void foot_hessian(const FootScratch *foot, const Moments M, double *H) {
     static const int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     memset(H, 0, 36 * sizeof *H);

@@ -4,13 +4,13 @@
 
 #include "ground/scratch.h"
 
-/* Impulses of every slot at the twists V, their derivatives and the feet's wrenches. twist: of the
- * loaded feet, from row `first` on. */
+/* Computes the impulse of every slot at the twists V, its derivatives, and the wrenches of the
+ * feet. twist: of the loaded feet; its first number belongs to row `first`. */
 void contact_pass(MildScratch *scratch, double dt, const double *twist, int first);
-/* The same with the bounds of friction held at slot.bound. The impulses are then minus the gradient
- * of a convex function. */
+/* The same with the friction bounds fixed at slot.bound. The impulses are then minus the gradient
+ * of a convex function of V. */
 void contact_pass_held(MildScratch *scratch, double dt, const double *twist, int first);
-/* The feet's hessians from the derivatives of the last pass. */
+/* Computes the hessians of the feet from the derivatives of the last pass. */
 void contact_hessian(MildScratch *scratch);
 
 #endif

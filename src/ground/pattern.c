@@ -1,12 +1,12 @@
-/* The pattern consists of fields of one material. Where borders are smooth, fields are cut into
- * small cells; a cell near a border also has the label and the share of the neighbouring
+/* A pattern consists of fields, each of one material. With smooth borders the fields are divided
+ * into small cells, and a cell near a border also has the label and the share of the neighbouring
  * material. */
 #include "ground/pattern.h"
 
 #include <limits.h>
 #include <stdlib.h>
 
-#define PATTERN_WORK 4e9 /* largest number of cells to look at while borders are blended */
+#define PATTERN_WORK 4e9 /* limit on the cells visited while borders are blended */
 
 /* Label of the field (i, j). */
 typedef int (*PatternLabel)(const MildMapDef *def, int i, int j);
@@ -24,19 +24,20 @@ static int label_image(const MildMapDef *def, int i, int j) {
     return def->labels[(size_t)(def->label_rows - 1 - j) * (size_t)def->label_columns + (size_t)i];
 }
 
-/* A field is one cell where borders are sharp, else cells of about def->cell. */
+/* Allocates the labels. With sharp borders a field is one cell; otherwise it is divided into cells
+ * of about def->cell. */
 static MildStatus pattern_allocate(MildMap *map, const MildMapDef *def, int columns, int rows,
                                    int repeats, MildError *error) {
     double fine = def->border > 0.0 ? ceil(def->patch_size / def->cell - 1e-9) : 1.0;
     double fine_y = rows > 1 ? fine : 1.0;
     double cell = def->patch_size / fine;
     double cells = columns * fine * (rows * fine_y);
-    double edge = 2.0 * ceil(0.5 * def->border / cell) + 1.0; /* of the window that is searched */
+    double edge = 2.0 * ceil(0.5 * def->border / cell) + 1.0; /* of the search window */
     double window = rows > 1 ? edge * edge : edge;
     if (cells > MILD_MAP_POINTS_MAX || cells * window > PATTERN_WORK) {
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "terrain.patches: %g cells with a border of %g m are too many: larger "
-                         "terrain.cell or smaller border",
+                         "terrain.patches: %g cells with a border of %g m are too many: use a "
+                         "larger terrain.cell or a smaller terrain.border",
                          cells, def->border);
     }
     map->labels =
@@ -45,7 +46,8 @@ static MildStatus pattern_allocate(MildMap *map, const MildMapDef *def, int colu
     return map->label ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "terrain: out of memory");
 }
 
-/* Index of a cell beyond the border: of the repeated grid, or the cell at the border. */
+/* Index of a cell that may lie beyond the grid: wrapped around if the grid repeats, else
+ * clamped. */
 static int neighbour(int index, int count, int repeats) {
     if (repeats) {
         return (index % count + count) % count;
@@ -53,15 +55,15 @@ static int neighbour(int index, int count, int repeats) {
     return index < 0 ? 0 : index >= count ? count - 1 : index;
 }
 
-/* Blends cell (i, j) with the nearest material of another label. At a distance d from it, its share
- * is 1/2 - d/border. Across a straight border the mixture thus changes linearly from one material
- * to the other. */
+/* Blends cell (i, j) with the nearest other material. At the distance d from that material, its
+ * share is 1/2 - d/border. Across a straight border the mixture thus changes linearly from one
+ * material to the other. */
 static void pattern_blend(MildMap *map, double border, int i, int j) {
     const Grid *grid = &map->labels;
     Label *here = &map->label[(size_t)j * (size_t)grid->columns + (size_t)i];
     double cell = grid->cell_x;
     double nearest = 0.5 * border;
-    int cells = (int)ceil(nearest / cell); /* to look at on either side */
+    int cells = (int)ceil(nearest / cell); /* to search on either side */
     int cells_y = grid->rows > 1 ? cells : 0;
     for (int dj = -cells_y; dj <= cells_y; dj++) {
         for (int di = -cells; di <= cells; di++) {
@@ -78,7 +80,7 @@ static void pattern_blend(MildMap *map, double border, int i, int j) {
             here->second = (unsigned char)other;
         }
     }
-    /* A share below 0 would come from a subnormal border, half of which may be rounded. */
+    /* With a subnormal border, rounding half of it could make the share negative. */
     here->share = (unsigned char)lround(255.0 * fmax(0.5 - nearest / border, 0.0));
 }
 

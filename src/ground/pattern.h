@@ -4,8 +4,8 @@
 
 #include "ground/grid.h"
 
-/* Fills labels, label and label_count of the map as `def` says. Fails when an image is missing,
- * when a number does not fit the others, when there are too many cells, and when out of memory. */
+/* Fills the map's labels, label and label_count from `def`. Fails when an image is missing, when
+ * numbers contradict each other, when there are too many cells, or when out of memory. */
 MildStatus pattern_fill(MildMap *map, const MildMapDef *def, MildError *error);
 
 #endif

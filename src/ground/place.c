@@ -3,7 +3,8 @@
 #include "ground/terrain.h"
 
 #define PLACE_MARGIN 1e-3 /* [m] elements this close to the ground are listed */
-/* [m/s] An impact at the heel may swing the toe down faster than its free motion. */
+/* [m/s] Allowance for an impact at the heel, which may swing the toe down faster than its free
+ * motion. */
 #define PLACE_EXTRA_SPEED 2.0
 
 /* Depth of every element, and the gradient of the ground under it. */
@@ -48,8 +49,8 @@ void foot_place(FootScratch *foot, const MildTerrain *terrain, int imprints, con
     }
 }
 
-/* A bound of the speed at which any point of the foot gets deeper under the twist V [m/s].
- * steepest: of the gradient of the ground [-]. */
+/* Upper bound [m/s] on the speed at which any point of the foot gets deeper under the twist V.
+ * steepest: upper bound [-] on the gradient of the ground. */
 static double foot_descent(const FootScratch *foot, const double *V, double steepest) {
     const double tilt = V[3] * V[3] + V[4] * V[4];
     const double level = sqrt(V[0] * V[0] + V[1] * V[1]);
@@ -63,7 +64,7 @@ void foot_list(FootScratch *foot, const MildContactInput *input, double steepest
     const double least = -PLACE_MARGIN - input->dt * (descent + PLACE_EXTRA_SPEED);
     const double *depth = foot->depth;
     double near = 0.0;
-    /* Whole vectors, unless that would list the padding. */
+    /* Count whole vectors, unless that would count the padding. */
     const int end = least < PADDING_DEPTH ? foot->elements : foot->padded;
 #pragma omp simd reduction(+ : near)
     for (int i = 0; i < end; i++) {

@@ -4,13 +4,14 @@
 
 #include "ground/scratch.h"
 
-/* Depth of every element; where the ground differs from place to place also its position, and on
- * uneven ground the gradient under it. imprints: bool. position, R: pose of the foot. */
+/* Computes the depth of every element. Where the ground differs from place to place, also its world
+ * position, and on uneven ground the gradient under it. imprints: bool, the ground keeps imprints.
+ * position, R: pose of the foot. */
 void foot_place(FootScratch *foot, const MildTerrain *terrain, int imprints, const double *position,
                 const double *R);
-/* Lists the elements that may touch in this step, in ascending order. That all do or none does, the
- * common cases, is found without a branch per element. steepest: a bound of the gradient of the
- * ground [-]. f: index of the foot in `input`. */
+/* Lists the elements that may touch in this step, in ascending order. The common cases, all
+ * elements or none, are found without a branch per element. steepest: upper bound [-] on the
+ * gradient of the ground. f: index of the foot in `input`. */
 void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f);
 
 #endif

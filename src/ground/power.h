@@ -1,10 +1,9 @@
-/* A curve that grows with a power n of the depth u, and x^y without libm.
+/* A force that grows with the power n of the depth u, and x^y without libm.
  *
  *     F(u) = S x q^m,   x = u/z0,   q = x^2 + e^2,   m = (n - 1)/2
- *
- * is S x^n but within z0 e = 0.1 mm of the surface, where it is straight: x^n alone is infinitely
- * stiff there for n < 1. At 10 mm the two differ by |n - 1|/2 1e-4. It is convex for n > 1, concave
- * for n < 1, and its integral is S z0 q^(m + 1)/(2 m + 2). */
+ * is S x^n except within z0 e = 0.1 mm of the surface, where it is straight, because for n < 1 the
+ * power alone is infinitely stiff there. At 10 mm the two differ by |n - 1|/2 1e-4. F is convex for
+ * n > 1 and concave for n < 1. Its integral is S z0 q^(m + 1)/(2 m + 2). */
 #ifndef MILD_GROUND_POWER_H
 #define MILD_GROUND_POWER_H
 
@@ -15,7 +14,7 @@
 
 #define POWER_DEPTH REAL(0.01)  /* z0 [m] */
 #define POWER_ROUND REAL(1e-4)  /* e^2 [-] */
-#define POWER_SERIES REAL(0.15) /* |rho| below which a mean is a series, see power_way */
+#define POWER_SERIES REAL(0.15) /* |rho| below which power_way uses a series */
 
 #ifdef MILD_REAL_FLOAT
 
@@ -42,10 +41,10 @@ MILD_HD double real_from_bits(uint64_t bits) {
     return x;
 }
 
-#define POWER_MAGIC 0x1.8p52 /* plus an integer: its low bits hold the integer */
+#define POWER_MAGIC 0x1.8p52 /* the low bits of this plus an integer are the integer */
 
-/* 2^x, |x| < 1000, within 4e-16: 2^k exp(f ln 2) with |f| <= 1/2, the exponential's series up to
- * (ln 2/2)^13/13!. Without a branch, for loops in vectors. */
+/* 2^x for |x| < 1000, within 4e-16: 2^k exp(f ln 2) with |f| <= 1/2, using the series of exp up to
+ * (ln 2/2)^13/13!. It has no branch, so that loops vectorise. */
 MILD_HD Real real_exp2(Real x) {
     const double shifted = x + POWER_MAGIC;
     const double f = (x - (shifted - POWER_MAGIC)) * 0.69314718055994530942;
@@ -66,8 +65,8 @@ MILD_HD Real real_exp2(Real x) {
     return sum * real_from_bits((real_bits(shifted) << 52) + real_bits(1.0));
 }
 
-/* log2(x) of a normal x > 0: x = 2^k z with z about 1, and ln z = 2 artanh((z - 1)/(z + 1)), whose
- * series goes up to 0.172^19/19. */
+/* log2(x) for a normal x > 0: x = 2^k z with z near 1, and ln z = 2 artanh((z - 1)/(z + 1)), using
+ * the series up to 0.172^19/19. */
 MILD_HD Real real_log2(Real x) {
     const uint64_t half = 0x3fe6a09e667f3bcd; /* bits of sqrt(1/2) */
     const int64_t k = (int64_t)(real_bits(x) - half) >> 52;
@@ -88,14 +87,14 @@ MILD_HD Real real_log2(Real x) {
     return whole + s * sum * 2.8853900817779268147; /* 2/ln 2 */
 }
 
-/* x^y of a normal x > 0. */
+/* x^y for a normal x > 0. */
 MILD_HD Real real_pow(Real x, Real y) {
     return real_exp2(y * real_log2(x));
 }
 
 #endif
 
-/* F(u) [N]. force: S [N], at z0. exponent: n [-]. */
+/* F(u) [N]. force: S [N], the force at z0. exponent: n [-]. */
 MILD_HD Real power_force(Real force, Real exponent, Real depth) {
     const Real x = depth / POWER_DEPTH;
     return force * x * real_pow(x * x + POWER_ROUND, (exponent - 1) / 2);
@@ -109,7 +108,7 @@ MILD_HD Real power_slope(Real force, Real exponent, Real depth) {
     return force / POWER_DEPTH * grown * (exponent * x * x + POWER_ROUND);
 }
 
-/* The greatest F' down to a depth [N/m]. */
+/* [N/m] The largest F' at any depth down to u. */
 MILD_HD Real power_steepest(Real force, Real exponent, Real depth) {
     return real_max(power_slope(force, exponent, 0), power_slope(force, exponent, depth));
 }
@@ -117,15 +116,14 @@ MILD_HD Real power_steepest(Real force, Real exponent, Real depth) {
 /* The mean of F over a way, up or down. */
 typedef struct {
     Real mean;  /* [N] */
-    Real slope; /* [N/m] its derivative by the way */
+    Real slope; /* [N/m] its derivative with respect to the way */
 } PowerWay;
 
 /* From x0 to x1 the mean is S (q1^(m+1) - q0^(m+1))/((2 m + 2) (x1 - x0)). Where that cancels, it
  * is expanded about the mean Q of q0 and q1, with h the mean of x0 and x1:
  *
  *     mean = S h Q^m g(rho),  rho = (q1 - q0)/(q1 + q0),  g = sum of C(m, 2 k) rho^2k/(2 k + 1)
- *
- * to rho^10; what follows is below 1e-13 of it. */
+ * up to rho^10. The remainder is below 1e-13 of the mean. */
 MILD_HD PowerWay power_way(Real force, Real exponent, Real begin, Real way) {
     const Real m = (exponent - 1) / 2;
     const Real x0 = begin / POWER_DEPTH;

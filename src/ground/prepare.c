@@ -18,7 +18,7 @@ ALWAYS_INLINE void slot_begin(const Slots *s, int i, double dt, double rate, con
     slot_store(s, i, &element);
 }
 
-/* What element_begin sets, for all slots. */
+/* Calls element_begin for all slots. */
 ALWAYS_INLINE void slots_begin(const Slots *slot, int end, double dt, const Motion *now, int curves,
                                int uneven) {
     const Slots local = *slot, *s = &local;
@@ -30,7 +30,7 @@ ALWAYS_INLINE void slots_begin(const Slots *slot, int end, double dt, const Moti
     }
 }
 
-/* The loop of the ground under the foot. */
+/* Picks the loop compiled for the curves and the slope of the ground under the foot. */
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
@@ -65,29 +65,30 @@ static int slots_sink(const Slots *slot, int end, double dt) {
 }
 
 ALWAYS_INLINE void slot_drag(const Slots *s, int i, double dt, const Motion *now,
-                             const Motion *free) {
+                             const Motion *free, int curves) {
     const double slower = slot_velocity(s, i, now, 1).descent;
     const double faster = slot_velocity(s, i, free, 1).descent;
     Element element = slot_element(s, i);
-    element_drag(&element, LAW_CONE, dt, real_max(faster - slower, 0.0));
+    element_drag(&element, curves, dt, real_max(faster - slower, 0.0));
     s->entry_speed[i] = element.entry_speed;
     s->stop_drag[i] = element.stop_drag;
     s->stop_growth[i] = element.stop_growth;
 }
 
-/* What element_drag sets, for all slots. */
-static void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
-                       const Motion *free) {
+/* Calls element_drag for all slots. */
+ALWAYS_INLINE void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
+                              const Motion *free, int curves) {
     const Slots local = *slot, *s = &local;
     const Motion before = *now;
     const Motion after = *free;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        slot_drag(s, i, dt, &before, &after);
+        slot_drag(s, i, dt, &before, &after, curves);
     }
 }
 
-/* Impulses of materials that create energy (passive = false). Returns a bool: there are any. */
+/* Sets the explicit impulse of materials that create energy (passive = false). Returns true when
+ * the terrain has such a material. */
 static int slots_explicit(const FootScratch *foot, int materials, double dt, const Motion *free) {
     const Slots *s = &foot->slot;
     int any = 0;
@@ -105,7 +106,7 @@ static int slots_explicit(const FootScratch *foot, int materials, double dt, con
     return any;
 }
 
-/* Sets back what slots_drag and slots_explicit have written in the step before. */
+/* Clears what slots_drag and slots_explicit wrote in the step before. */
 static void slots_clear(const FootScratch *foot) {
     const size_t bytes = (size_t)foot->padded * sizeof(double);
     memset(foot->own.stop_drag, 0, bytes);
@@ -113,7 +114,7 @@ static void slots_clear(const FootScratch *foot) {
     memset(foot->own.explicit_impulse, 0, bytes);
 }
 
-/* The models whose law depends on the direction of motion. */
+/* Applies the models whose law depends on the motion. */
 static void foot_direct(const FootScratch *foot, const MildTerrain *terrain, double dt,
                         const double *rotation, const Motion *now) {
     unsigned done = 0;
@@ -146,15 +147,19 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
         Imprints imprints = ground_imprints(ground);
         slots_imprints(foot, &imprints, &memory, R);
     }
-    Motion now = foot_motion(foot, input->velocity[f]),
-           free = foot_motion(foot, input->free_velocity + 6 * f);
+    Motion now = foot_motion(foot, input->velocity[f]);
+    Motion free = foot_motion(foot, input->free_velocity + 6 * f);
     foot_begin(foot, input->dt, &now);
     if (foot->stops) {
         slots_clear(foot);
     }
     foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
     if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
-        slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free);
+        if (foot->curves & LAW_POWER) {
+            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL);
+        } else {
+            slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_CONE);
+        }
         foot->stops = 1;
     }
     foot_direct(foot, terrain, input->dt, R, &now);

@@ -4,7 +4,8 @@
 
 #include "ground/scratch.h"
 
-/* Fills the lists and every slot's law of this step. Returns how many elements may touch. */
+/* Lists the elements and sets the law of every slot for this step. Returns how many elements may
+ * touch. */
 int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
                     const MildContactInput *input, MildScratch *scratch);
 

@@ -1,10 +1,9 @@
 /* Scalar type and qualifier of the element's law and step.
- *
  * power.h, law.h, element.h, begin.h, impulse.h, friction.h and remember.h are written in the
- * common subset of C17 and CUDA C++: pure functions of small structs, no libm beyond a square root
- * (in float, powf too), no allocation. The CPU runs them in double, an element in each lane of a
- * vector. A GPU runs them in float, an element in each thread: define MILD_REAL_FLOAT before the
- * first of these headers. */
+ * common subset of C17 and CUDA C++. They are pure functions of small structs. They allocate
+ * nothing and need only a square root from libm (in float also powf and exp2f). The CPU runs them
+ * in double, one element per vector lane. A GPU runs them in float, one element per thread: define
+ * MILD_REAL_FLOAT before including the first of these headers. */
 #ifndef MILD_GROUND_REAL_H
 #define MILD_GROUND_REAL_H
 
@@ -14,7 +13,7 @@
 typedef float Real;
 #define REAL_SQRT sqrtf
 #define REAL_ABS fabsf
-#define REAL_LEAST 1e-30f /* keeps a quotient finite where both of its parts are 0 */
+#define REAL_LEAST 1e-30f /* added to a divisor so that 0/0 becomes 0 */
 #else
 typedef double Real;
 #define REAL_SQRT sqrt
@@ -22,7 +21,7 @@ typedef double Real;
 #define REAL_LEAST 1e-300
 #endif
 
-/* A constant in the scalar type. Integers need no conversion: write x / 2, 2 * x. */
+/* A constant in the scalar type. Integers need no conversion: write x / 2 or 2 * x. */
 #define REAL(number) ((Real)(number))
 
 #ifdef __CUDACC__

@@ -5,26 +5,27 @@
 #include "ground/friction.h"
 
 #define REMEMBER_BAND REAL(1e-5) /* [m] horizontal motion below this is jitter, not drift */
-#define REMEMBER_DRIFT REAL(0.1) /* [m] longest drift that still hardens the ground */
-#define REMEMBER_TURN                                                                              \
-    REAL(1e-4) /* [m/s] slower than this, turning round adds no depth to speak
-                                      of: 0.25 um in 5 ms */
+#define REMEMBER_DRIFT REAL(0.1) /* [m] beyond this path length, drift adds no more resistance */
+/* [m/s] A reversal from a lower speed adds less than 0.25 um of depth in 5 ms and is ignored. */
+#define REMEMBER_TURN REAL(1e-4)
 
-/* Bool: the element turned round within the step. Speeds: downward. */
+/* Bool: the element reversed within the step. before, after: downward speeds [m/s]. */
 MILD_HD int element_turns(Real before, Real after) {
     return after < 0 && before > REMEMBER_TURN;
 }
 
-/* How deep the element has been in a step that ends at m1 [m], counted like the yield depth. Memory
- * of an element that turned round within the step; otherwise it is m1. normal: I_z. speed: w, now.
+/* Greatest depth of the element in a step that ends at m1 [m], counted like the yield depth. It is
+ * m1 unless the element reversed within the step. normal: I_z. speed: w after the step.
  *
- * A foot that turned round was deepest between its ends. At the deeper one, p, it still went down
- * with the speed v, and its mass M is that which the impulse slowed from h to w. Of its energy
- * M v^2/2 the unloading line takes what leads back to the front. From there, or from p beyond it,
- * the ground's work F x + F' x^2/2 takes the rest; F holds half the drag at p, its mean on the way.
+ * An element that reversed was deepest between the two ends of the step. At the deeper end, p, it
+ * was still moving down at the speed v. Its mass M is the mass that the impulse slowed from h to w.
+ * Part of its energy M v^2/2 is spent on the unloading line up to the front. From the front, or
+ * from p if that is deeper, the work F x + F' x^2/2 of the ground takes the rest. F includes half
+ * the drag at p, which is its mean over the way.
  *
- * Elastic ground remembers this depth. From plastic ground the foot springs up with what is left
- * and pays when it is back, but not with all of it: half the way is remembered. */
+ * Elastic ground remembers this depth. Plastic ground gives back more speed than it should, and
+ * takes that energy only when the foot returns, and then not all of it. So only half of the extra
+ * depth is remembered. */
 MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed, Real middle) {
     const Real h = e->entry_speed;
     if (!element_turns(h, speed)) {
@@ -55,9 +56,10 @@ MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed,
     return middle + (1 + e->recovery) / 2 * beyond;
 }
 
-/* Memory after the step. It is chosen, not multiplied by 0, so that what is not a number is
- * forgotten. normal: I_z. vx, vy, speed: velocity after the step, speed downward. rate: 1/dt.
- * stays: bool, still in the ground; otherwise the element forgets all but where its way ended. */
+/* Memory after the step. Values are selected with ?:, never multiplied by 0, so that NaN is
+ * forgotten too. normal: I_z. vx, vy, speed: velocity after the step, with `speed` downward. rate:
+ * 1/dt. stays: bool, the element is still in the ground. Otherwise it forgets everything except
+ * `middle`. */
 MILD_HD ElementMemory element_remember(const Element *e, const ElementMemory *memory, Real dt,
                                        Real rate, Real normal, Real vx, Real vy, Real speed,
                                        int stays) {
@@ -67,14 +69,14 @@ MILD_HD ElementMemory element_remember(const Element *e, const ElementMemory *me
     after.depth_max = stays ? deepest : 0;
     after.middle = stays ? real_min(middle, deepest) : middle;
 
-    /* The added mass joins with the speed gained beyond the old front; the rest is an impact in the
-     * next step. */
+    /* The added mass takes on the speed that the element gained beyond the old front. The remaining
+     * difference acts as an impact in the next step. */
     const int leads = middle > e->yield_depth && speed > e->yield_speed;
     const int led = e->front_speed > e->yield_speed || !(memory->depth_max > 0);
     after.front_speed = stays && leads ? speed - (led ? 0 : e->yield_speed) : 0;
 
     /* Motion is collected until it leaves the dead band, so that d_D depends neither on the step
-     * size nor on jitter. It is the length of the path: accumulated, as the paper says. */
+     * size nor on jitter. d_D is the accumulated path length, as in the paper. */
     const Real x = memory->pending_x + dt * vx;
     const Real y = memory->pending_y + dt * vy;
     const Real square = x * x + y * y;
@@ -84,7 +86,7 @@ MILD_HD ElementMemory element_remember(const Element *e, const ElementMemory *me
     after.pending_x = stays && !counts ? x : 0;
     after.pending_y = stays && !counts ? y : 0;
 
-    /* Friction that stays held when the element rests (friction.h). */
+    /* Spring force of friction (friction.h). */
     const Real held_x = e->hold_x - e->hold_stiffness * vx;
     const Real held_y = e->hold_y - e->hold_stiffness * vy;
     const Real held = REAL_SQRT(held_x * held_x + held_y * held_y);

@@ -3,18 +3,18 @@
 
 #include "ground/scratch.h"
 
-/* Arrays of FootScratch beside the slots: x, y, depth, slope x y, point x y z, normal, tangent x y,
- * flat; state and slip share one. */
+/* Number of arrays of FootScratch outside the slots: x, y, depth, slope_x, slope_y, point_x,
+ * point_y, point_z, normal, tangent_x, tangent_y and flat; state and slip share the last one. */
 #define FOOT_ARRAYS 13
 
-/* The next `count` numbers of the block. */
+/* Takes the next `count` numbers of the block. */
 static double *take(double **at, int count) {
     double *taken = *at;
     *at += count;
     return taken;
 }
 
-/* Takes the sole's numbers and the arrays beside the slots. */
+/* Sets the numbers of the sole and takes the arrays outside the slots. */
 static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     foot->elements = mild_sole_elements(sole);
     foot->padded = sole_padded(sole);
@@ -45,7 +45,7 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     foot->slip = foot->state + foot->padded;
 }
 
-/* Takes the arrays of the slots; no slot has a law yet. */
+/* Takes the arrays of the slots. No slot has a law yet. */
 static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
     double **arrays = (double **)&foot->own;
     for (size_t k = 0; k < SLOT_ARRAYS; k++) {

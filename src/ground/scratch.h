@@ -1,4 +1,4 @@
-/* Working arrays of one contact step: what is listed under every foot, and its law. */
+/* Working arrays of a contact step: the listed elements of every foot and their law. */
 #ifndef MILD_GROUND_SCRATCH_H
 #define MILD_GROUND_SCRATCH_H
 
@@ -6,33 +6,34 @@
 #include "ground/state.h"
 
 #define TWIST_MAX (6 * MILD_FEET_MAX)
-#define PADDING_DEPTH (-1e3) /* [m] depth of the padding: it never touches */
+#define PADDING_DEPTH (-1e3) /* [m] depth of the padding, which never touches the ground */
 
-/* Law of a material as last derived; valid while the material's bytes stay the same. */
+/* Law of a material as last derived. It is valid while the material's bytes stay the same. */
 typedef struct {
     MildMaterial material;
     Law law;
     int curves; /* LawCurve bits of the law */
-    int known;  /* bool */
-    int nan;    /* bool: a number of it is none */
+    int known;  /* bool: the law has been derived */
+    int nan;    /* bool: a number of the law or the material is NaN */
 } DerivedLaw;
 
 typedef struct FootScratch {
     /* The sole: mild_scratch_create. */
-    int elements;    /* count */
-    int padded;      /* count rounded up to whole vectors */
+    int elements;    /* number of elements */
+    int padded;      /* the same, rounded up to whole vectors */
     double *x;       /* [padded] [m] element centres in the foot frame */
     double *y;       /* [padded] [m] */
     double z;        /* [m] sole plane in the foot frame */
     double pitch;    /* [m] edge of an element */
     double center_x; /* [m] centroid in the foot frame */
     double center_y; /* [m] */
-    double radius;   /* [m] reach of the sole from the ankle */
+    double radius;   /* [m] distance from the ankle to the farthest element */
 
-    /* Pose: foot_place. p = arm[0] + x arm[1] + y arm[2] leads from the ankle to an element. */
+    /* Pose: foot_place. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
+     * arm[2]. */
     double origin[3]; /* [m] the ankle, world */
-    double arm[3][3]; /* [m], [-], [-] the frame's point (0, 0, z), then its x and y axes, world */
-    int uneven;       /* bool: the ground under it is not level; otherwise all its slopes are 0 */
+    double arm[3][3]; /* world: the frame's point (0, 0, z) [m], its x axis [-], its y axis [-] */
+    int uneven;       /* bool: the terrain is not level; otherwise all slopes are 0 */
     double *depth;    /* [padded] [m] */
     double *slope_x;  /* [padded] [-] gradient of the ground; uneven ground only */
     double *slope_y;  /* [padded] [-] */
@@ -40,23 +41,23 @@ typedef struct FootScratch {
     double *point_y;  /* [padded] [m] */
     double *point_z;  /* [padded] [m] */
 
-    /* List of the elements that may touch: foot_list. */
+    /* List of the elements that may touch the ground: foot_list. */
     int active;       /* slots in use */
-    int whole;        /* bool: element[] lists all */
+    int whole;        /* bool: element[] lists all elements */
     int32_t *element; /* [active] element of each slot, ascending */
 
     /* Law of each slot: foot_laws, foot_prepare. */
     int curves;             /* LawCurve bits of the terrain's materials */
-    int nan;                /* bool: a material of the terrain is not a number */
-    int turned;             /* bool: turn_x and turn_y may not be 0 */
-    int stops;              /* bool: stop_drag, stop_growth, explicit_impulse may not be 0 */
-    int32_t *slot_material; /* [padded] whose law the slot holds, coded as in Memory */
+    int nan;                /* bool: a material of the terrain contains NaN */
+    int turned;             /* bool: turn_x or turn_y may be nonzero */
+    int stops;              /* bool: stop_drag, stop_growth or explicit_impulse may be nonzero */
+    int32_t *slot_material; /* [padded] material whose law the slot has, encoded as in Memory */
     DerivedLaw derived[MILD_MATERIALS_MAX];
     Slots own;  /* arrays that the scratch owns */
-    Slots slot; /* the arrays of this step: own, or, when all elements are listed, x, y, depth and
-                   memory where they lie, to be read only */
+    Slots slot; /* arrays of this step: `own`, except that when all elements are listed x, y, depth
+                   and memory are read where they lie */
 
-    /* Output of mild_scratch_elements [padded], see MildElements. */
+    /* Output of mild_scratch_elements, arrays [padded], see MildElements. */
     double *normal;    /* [N] */
     double *tangent_x; /* [N] */
     double *tangent_y; /* [N] */
@@ -70,16 +71,16 @@ struct MildScratch {
     FootScratch foot[MILD_FEET_MAX];
     double sums[MILD_FEET_MAX][9]; /* [N s, N s m] of I, x I and y I at the last pass */
     double wrench[TWIST_MAX];      /* [N s, N m s] sum of B^T I at the last pass */
-    double hessian[MILD_FEET_MAX]
-                  [36];         /* [kg, kg m, kg m^2] -d wrench/d twist of a foot, row major */
+    /* [kg, kg m, kg m^2] -d wrench/d twist of each foot, 6 x 6, row major. */
+    double hessian[MILD_FEET_MAX][36];
     double velocity[TWIST_MAX]; /* [m/s, rad/s] V+ of the last solve */
     double dt;                  /* [s] of the last solve */
     double *block;              /* the one allocation behind all arrays */
 };
 
-/* The memory's arrays in place of the slots' own copies. */
+/* Points the slots at the arrays of the memory instead of their own copies. */
 void slots_remember(Slots *s, const Memory *memory);
-/* Where every element is: point_x, y, z. */
+/* Computes the world position of every element: point_x, point_y, point_z. */
 void foot_points(const FootScratch *foot);
 
 /* Slots in use, rounded up to whole vectors. */
@@ -99,7 +100,7 @@ static inline Motion foot_motion(const FootScratch *foot, const double *V) {
     return m;
 }
 
-/* p: ankle -> element, world axes. */
+/* p: vector from the ankle to the element of a slot, world axes. */
 static inline void slot_arm(const FootScratch *foot, const Slots *s, int i, double p[3]) {
     for (int k = 0; k < 3; k++) {
         p[k] = foot->arm[0][k] + foot->arm[1][k] * s->x[i] + foot->arm[2][k] * s->y[i];

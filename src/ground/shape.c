@@ -1,5 +1,5 @@
-/* Heights are the formulas of MildMapKind (mild/map.h) at the points of the grid. Of a shape that
- * repeats the grid holds one period. */
+/* The heights at the grid points follow the formulas of MildMapKind (mild/map.h). For a shape that
+ * repeats, the grid holds one period. */
 #include "ground/shape.h"
 
 #include <stdlib.h>
@@ -52,7 +52,7 @@ static MildStatus shape_allocate(MildMap *map, double columns, double rows, doub
                                  double cell_y, int repeats, MildError *error) {
     if ((columns + 1.0) * (rows + 1.0) > MILD_MAP_POINTS_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "terrain.cell = %g makes %g x %g points, at most %d fit: larger cells",
+                         "terrain.cell = %g makes %g x %g points, more than %d: use larger cells",
                          cell_x, columns + 1.0, rows + 1.0, MILD_MAP_POINTS_MAX);
     }
     map->heights = grid_make((int)columns, (int)rows, cell_x, cell_y, repeats);
@@ -60,7 +60,8 @@ static MildStatus shape_allocate(MildMap *map, double columns, double rows, doub
     return map->height ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "terrain: out of memory");
 }
 
-/* One period of a formula, filled by a whole number of cells. The last points repeat the first. */
+/* Fills the grid with one period of a formula. The cells are adjusted so that a whole number of
+ * them fits. The last points repeat the first. */
 static MildStatus shape_formula(MildMap *map, const MildMapDef *def, double period, int along_y,
                                 ShapeHeight height, MildError *error) {
     double columns = ceil(period / def->cell - 1e-9);

@@ -4,8 +4,8 @@
 
 #include "ground/grid.h"
 
-/* Fills heights, height and slope of the map as `def` says. Fails when an image is missing or has a
- * value that is not usable, when there are too many points, and when out of memory. */
+/* Fills the map's heights, height and slope from `def`. Fails when an image is missing or contains
+ * an unusable value, when there are too many points, or when out of memory. */
 MildStatus shape_fill(MildMap *map, const MildMapDef *def, MildError *error);
 
 #endif

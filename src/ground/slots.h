@@ -1,10 +1,10 @@
-/* The elements of a foot that a step works on, as a structure of arrays.
+/* The elements of a foot that take part in a step, as a structure of arrays.
  *
- * A slot is one listed element. The list is padded to whole vectors; the padding has a law that
- * makes no force at any depth.
+ * A slot is one listed element. The list is padded to whole vectors. The law of the padding has no
+ * force at any depth.
  *
- * Loops over slots take a copy of Slots: through a pointer the compiler must assume that a store
- * changes the arrays' addresses, reloads them, and does not vectorise. */
+ * Loops over slots use a local copy of Slots. Through a pointer the compiler would have to assume
+ * that a store changes the addresses of the arrays; it would reload them and not vectorise. */
 #ifndef MILD_GROUND_SLOTS_H
 #define MILD_GROUND_SLOTS_H
 
@@ -13,8 +13,8 @@
 
 #define ALWAYS_INLINE static inline __attribute__((always_inline))
 
-/* Arrays of a foot's slots [padded]. What an array means, with its symbol, is said at the field of
- * Element or ElementMemory of the same name; here are its unit and the function that writes it. */
+/* Arrays of a foot's slots [padded]. Meaning and symbol are at the field of the same name of
+ * Element or ElementMemory. Given here are the unit and the function that writes the array. */
 typedef struct {
     /* Where the element is: slots_direct or slots_gather. */
     double *x;     /* [m] centre in the foot frame */
@@ -25,7 +25,8 @@ typedef struct {
     double *slope_x; /* [-] */
     double *slope_y; /* [-] */
 
-    /* Memory before the step: slots_direct or slots_gather; `depth_max` also slots_imprints. */
+    /* Memory before the step: slots_direct or slots_gather; slots_imprints also writes
+     * depth_max. */
     double *depth_max;      /* [m] */
     double *last_middle;    /* [m] ElementMemory.middle */
     double *last_speed;     /* [m/s] ElementMemory.front_speed */
@@ -41,7 +42,7 @@ typedef struct {
     LAW_NUMBERS(SLOT_LAW_ARRAY)
     double *exit_drag;  /* [kg/m] */
     double *entry_drag; /* [kg/m] */
-    double *strength;   /* [N/m] line_stiffness before the direction of motion counts */
+    double *strength;   /* [N/m] line_stiffness before slots_resist changes it */
     double *recovery;   /* [-] */
     double *mu;         /* [-] */
     double *k_drift;    /* [N/m^2] */
@@ -77,8 +78,8 @@ typedef struct {
     double *iy; /* [N s] */
     double *iz; /* [N s] */
 
-    /* Minus its derivative by the element's velocity: contact_pass. On level ground hyx = hxy and
-     * hzx = hzy = 0, and these three are left out. */
+    /* Minus its derivative with respect to the velocity of the element: contact_pass. On level
+     * ground hyx = hxy and hzx = hzy = 0, and these three are not written. */
     double *hxx; /* [kg] */
     double *hxy; /* [kg] */
     double *hxz; /* [kg] */
@@ -89,15 +90,17 @@ typedef struct {
     double *hzy; /* [kg] */
     double *hzz; /* [kg] */
 
-    double *bound;       /* [N s] of friction, where the solver holds it: bounds_move */
-    double *bound_moved; /* [N s] its last move */
-    double *fx;          /* [N s] friction without the drift's damping: the sweeps */
+    /* Working arrays of the solvers. */
+    double *bound;       /* [N s] friction bound held by Newton's method: bounds_move */
+    double *bound_moved; /* [N s] its last change */
+    double *fx;          /* [N s] friction without drift damping: sweep_element */
     double *fy;          /* [N s] */
 } Slots;
 #define SLOT_ARRAYS (sizeof(Slots) / sizeof(double *))
 
 #define SLOT_LAW_LOAD(name) .name = s->name[i],
-/* The element of a slot, by value: what the caller does not use is not loaded. */
+/* The element of a slot, by value. The compiler does not load fields that the caller does not
+ * use. */
 ALWAYS_INLINE Element slot_element(const Slots *s, int i) {
     return (Element){
         .law = {LAW_NUMBERS(SLOT_LAW_LOAD)},
@@ -130,7 +133,7 @@ ALWAYS_INLINE Element slot_element(const Slots *s, int i) {
     };
 }
 
-/* What its element remembers of the step before. */
+/* What the element of a slot remembers. */
 ALWAYS_INLINE ElementMemory slot_memory(const Slots *s, int i) {
     return (ElementMemory){
         .depth_max = s->depth_max[i],
@@ -145,7 +148,7 @@ ALWAYS_INLINE ElementMemory slot_memory(const Slots *s, int i) {
     };
 }
 
-/* What element_begin has set. */
+/* Stores the fields that element_begin sets. */
 ALWAYS_INLINE void slot_store(const Slots *s, int i, const Element *e) {
     s->middle[i] = e->middle;
     s->yield_depth[i] = e->yield_depth;
@@ -170,7 +173,7 @@ typedef struct {
     double descent; /* [m/s] */
 } SlotVelocity;
 
-/* uneven: bool, the ground slopes. A constant in a loop over slots. */
+/* uneven: bool, the ground slopes. It must be a constant in a loop over slots. */
 ALWAYS_INLINE SlotVelocity slot_velocity(const Slots *s, int i, const Motion *motion, int uneven) {
     SlotVelocity v;
     v.x = motion_at(motion->x, s->x[i], s->y[i]);

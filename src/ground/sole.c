@@ -6,7 +6,7 @@
 #include "mild/ground.h"
 
 #define SOLE_ELEMENTS_MAX 65536
-#define SOLE_POINTS_MAX 4096 /* the search for crossing edges takes the square of it */
+#define SOLE_POINTS_MAX 4096 /* limited because the search for crossing edges is quadratic in it */
 #define RASTER_PHASES 16     /* raster offsets tried along each axis */
 
 struct MildSole {
@@ -24,8 +24,8 @@ typedef struct {
 } Raster;
 
 typedef struct {
-    double low[2];    /* [m] corners of the box around it */
-    double high[2];   /* [m] */
+    double low[2];    /* [m] lower corner of the bounding box */
+    double high[2];   /* [m] upper corner */
     double area;      /* [m^2] */
     double center[2]; /* [m] centroid */
 } Outline;
@@ -58,11 +58,11 @@ static int edges_cross(const double *a, const double *b, const double *c, const 
     return side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0;
 }
 
-/* Every number alone. */
+/* Checks each number on its own. */
 static MildStatus numbers_check(const MildSoleDef *def, MildError *error) {
     if (!def->outline || def->points < 3) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "sole.points = %d: an outline needs at least 3", def->points);
+                         "sole.points = %d: an outline needs at least 3 points", def->points);
     }
     if (def->points > SOLE_POINTS_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE, "sole.points = %d: at most %d", def->points,
@@ -70,13 +70,15 @@ static MildStatus numbers_check(const MildSoleDef *def, MildError *error) {
     }
     for (int i = 0; i < 2 * def->points; i++) {
         if (!isfinite(def->outline[i]) || fabs(def->outline[i]) > 10.0) {
-            return mild_fail(error, MILD_ERROR_RANGE, "sole.outline[%d] = %g is not within 10 m",
-                             i / 2, def->outline[i]);
+            return mild_fail(error, MILD_ERROR_RANGE,
+                             "sole.outline[%d] = %g is not within 10 m of the ankle", i / 2,
+                             def->outline[i]);
         }
     }
     if (!(def->pitch >= 1e-3 && def->pitch <= 1.0)) {
         return mild_fail(error, MILD_ERROR_RANGE,
-                         "sole.pitch = %g is outside 0.001 .. 1: [m] element edge", def->pitch);
+                         "sole.pitch = %g is outside 0.001 .. 1: [m] edge of an element",
+                         def->pitch);
     }
     if (!isfinite(def->sole_z)) {
         return mild_fail(error, MILD_ERROR_RANGE, "sole.sole_z = %g is not finite", def->sole_z);
@@ -88,7 +90,7 @@ static MildStatus numbers_check(const MildSoleDef *def, MildError *error) {
     return MILD_OK;
 }
 
-/* The outline as a whole, once its numbers are good. */
+/* Checks the outline as a whole. Its numbers have passed numbers_check. */
 static MildStatus outline_check(const MildSoleDef *def, MildError *error) {
     for (int i = 0; i < def->points; i++) {
         for (int j = i + 1; j < def->points; j++) {
@@ -112,8 +114,8 @@ static MildStatus outline_check(const MildSoleDef *def, MildError *error) {
     return MILD_OK;
 }
 
-/* Clips a polygon by a half plane: keeps the part where sign * (p[axis] - bound) >= 0
- * (Sutherland-Hodgman). `out` has room for twice `count` points. Returns the number of points. */
+/* Clips a polygon against a half plane (Sutherland-Hodgman): keeps the part where sign * (p[axis] -
+ * bound) >= 0. `out` must have room for twice `count` points. Returns the number of points kept. */
 static int clip_half(const double *in, int count, double *out, int axis, double bound,
                      double sign) {
     int kept = 0;
@@ -135,8 +137,8 @@ static int clip_half(const double *in, int count, double *out, int axis, double 
 }
 
 /* Share of a cell that the outline covers, 0 .. 1. Clipping a concave polygon may leave edges that
- * run back and forth along the border of the cell. They enclose nothing, so the area is exact.
- * work: room for 64 numbers for each point of the outline. */
+ * run back and forth along the border of the cell. They enclose no area, so the result is exact.
+ * work: [64 points] scratch space. */
 static double cell_coverage(const MildSoleDef *def, const double *corner, double *work) {
     int count = def->points;
     double *a = work, *b = work + 32 * (size_t)def->points;
@@ -167,8 +169,8 @@ static int point_inside(const MildSoleDef *def, double x, double y) {
     return inside;
 }
 
-/* The raster with a cell border at phase[k] * pitch from the middle of the outline's box. It is
- * measured from the middle, so that mirrored outlines get mirrored rasters. */
+/* The raster with a cell border at phase[k] * pitch from the middle of the outline's bounding box.
+ * It is measured from the middle so that mirrored outlines get mirrored rasters. */
 static Raster raster_at(const MildSoleDef *def, const Outline *outline, const double *phase) {
     Raster raster;
     int cells[2];
@@ -183,8 +185,8 @@ static Raster raster_at(const MildSoleDef *def, const Outline *outline, const do
     return raster;
 }
 
-/* Number of cells whose centre is inside. *off_center receives the distance between the centroids
- * of these cells and of the outline [m]. */
+/* Number of cells whose centre is inside the outline. *off_center receives the distance [m] between
+ * the centroid of these cells and that of the outline. */
 static int raster_count(const MildSoleDef *def, const Outline *outline, const Raster *raster,
                         double *off_center) {
     int count = 0;
@@ -207,9 +209,9 @@ static int raster_count(const MildSoleDef *def, const Outline *outline, const Ra
     return count;
 }
 
-/* The raster whose count comes nearest to the target; without a target, to the outline's area by
- * that of a cell. Among equals the one with the nearest centroid. Without a target either a border
- * or a centre of cells lies in the middle of the outline's box. */
+/* The raster whose cell count is nearest to the target or, without a target, to the outline's area
+ * divided by that of a cell. Ties go to the raster with the nearest centroid. Without a target,
+ * only rasters with a cell border or a cell centre in the middle of the bounding box are tried. */
 static Raster raster_choose(const MildSoleDef *def, const Outline *outline) {
     int best_miss = INT32_MAX;
     double best_off = INFINITY;
@@ -240,8 +242,8 @@ typedef struct {
     int inside;      /* bool: its centre is inside the outline */
 } Cell;
 
-/* Cells with their centre inside come first, then those with more coverage. The index decides
- * between equals, so that the order does not depend on the sorting algorithm. */
+/* Cells whose centre is inside come first, then those with more coverage. Ties are broken by index,
+ * so that the order does not depend on the sorting algorithm. */
 static int cell_compare(const void *left, const void *right) {
     const Cell *a = left, *b = right;
     if (a->inside != b->inside) {
@@ -306,7 +308,8 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
     MildSole *sole = NULL;
     int chosen = 0;
     int reached = 1;
-    /* Each of four clips at most doubles the points, of two numbers each, in two buffers. */
+    /* Each of the four clips at most doubles the number of points. Two buffers of 16 times as many
+     * points, two numbers each, make 64. */
     double *work = malloc(64 * (size_t)def->points * sizeof *work);
     Cell *cells = malloc(((size_t)raster.columns * (size_t)raster.rows + 1) * sizeof *cells);
     if (work && cells) {
@@ -320,7 +323,8 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
     if (!reached) {
         mild_fail(
             error, MILD_ERROR_RANGE,
-            "sole.target_elements = %d: cells of pitch %g that touch the outline do not suffice",
+            "sole.target_elements = %d: fewer cells of pitch %g touch the outline; use a smaller "
+            "sole.pitch",
             def->target_elements, def->pitch);
     } else if (!sole) {
         mild_fail(error, MILD_ERROR_MEMORY, "sole: out of memory for %d elements", chosen);

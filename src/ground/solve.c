@@ -7,7 +7,7 @@
 #include "ground/prepare.h"
 #include "ground/solver.h"
 
-/* Slots back to elements: forces in N, and what each element did in the step. */
+/* Copies the slots back to the elements: forces in N, and what each element did in the step. */
 static void foot_scatter(const MildScratch *scratch, int f) {
     const FootScratch *foot = &scratch->foot[f];
     const Slots *s = &foot->slot;
@@ -39,7 +39,7 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
     memset(foot->normal, 0, bytes);
     memset(foot->tangent_x, 0, bytes);
     memset(foot->tangent_y, 0, bytes);
-    memset(foot->state, 0, 2 * (size_t)foot->padded); /* and slip behind it */
+    memset(foot->state, 0, 2 * (size_t)foot->padded); /* clears slip too, which follows it */
     for (int e = 0; e < foot->padded; e++) {
         foot->flat[e] = 1.0;
     }
@@ -50,16 +50,22 @@ MildElements mild_scratch_elements(const MildScratch *scratch, int f) {
                           foot->state,   foot->slip};
 }
 
-/* What is summed over the loaded elements. */
+/* Sums over the loaded elements: contact count, area, depths, centre of pressure. */
 static void foot_loaded(const MildScratch *scratch, const double *position, int f,
                         MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
     const Slots local = foot->slot, *s = &local;
-    double sum = 0.0, deepest = 0.0, loaded = 0.0, force = 0.0, x = 0.0, y = 0.0;
+    double sum = 0.0;     /* [m] of the depths */
+    double deepest = 0.0; /* [m] */
+    double loaded = 0.0;  /* number of loaded elements */
+    double force = 0.0;   /* [N s] of the normal impulses */
+    double x = 0.0;       /* [N s m] of x times the normal impulse */
+    double y = 0.0;       /* [N s m] */
     int end = foot_end(foot);
 #pragma omp simd reduction(+ : sum, loaded, force, x, y) reduction(max : deepest)
     for (int i = 0; i < end; i++) {
-        double on = s->iz[i] > 0.0 ? 1.0 : 0.0, depth = on * s->depth[i];
+        double on = s->iz[i] > 0.0 ? 1.0 : 0.0;
+        double depth = on * s->depth[i];
         loaded += on;
         sum += depth;
         deepest = depth > deepest ? depth : deepest;
@@ -80,10 +86,11 @@ static void foot_loaded(const MildScratch *scratch, const double *position, int 
     }
 }
 
-/* Paper eq 15: r = [F]x^+ tau, which for the true torque tau = p x F is F x tau/|F|^2, the point of
- * the wrench's central axis nearest the ankle. F is divided by its largest component first: the
- * square of a small force may be 0, of a large one infinite. Where the axis lies beyond all
- * numbers, because hardly any force is left beside a torque, the point is 0 as without a force. */
+/* Paper eq 15: r = [F]x^+ tau. For the true torque tau = p x F this is F x tau/|F|^2, the point of
+ * the wrench's central axis nearest to the ankle. F is first divided by its largest component,
+ * because the square of a small force may underflow and that of a large one overflow. When almost
+ * no force is left beside a torque, the axis lies out of range; the point is then 0, as without a
+ * force. */
 static void foot_axis(const double *F, const double *tau, double *point) {
     const double most = fmax(fmax(fabs(F[0]), fabs(F[1])), fabs(F[2]));
     if (!(most > 0.0)) {
@@ -102,7 +109,8 @@ static void foot_axis(const double *F, const double *tau, double *point) {
     }
 }
 
-/* Wrench and zero moment point. On the sole: the point where the horizontal torque vanishes. */
+/* Wrench and zero moment points. zmp_sole is the point of the sole plane where the horizontal
+ * torque vanishes. */
 static void foot_result(const MildScratch *scratch, const MildContactInput *input, int f,
                         MildFootResult *result) {
     const FootScratch *foot = &scratch->foot[f];
@@ -123,7 +131,8 @@ static void foot_result(const MildScratch *scratch, const MildContactInput *inpu
     foot_loaded(scratch, input->position[f], f, result);
 }
 
-/* Bool. Without a branch or a sum: each value is tested on its own. */
+/* Bool: all values are finite. Each is tested on its own, without a branch or a sum, so that the
+ * tests do not wait for each other. */
 static int finite(const double *values, int count) {
     int bad = 0;
     for (int i = 0; i < count; i++) {
@@ -132,8 +141,8 @@ static int finite(const double *values, int count) {
     return !bad;
 }
 
-/* A foot at NaN touches nothing and so meets no equation that fails: look at where the feet are and
- * how they move. A step of no length has no forces. */
+/* Bool: pose, motion and result are finite, and dt is positive. The pose must be checked on its
+ * own, because a foot at NaN touches nothing and no equation fails. */
 static int all_finite(const MildContactInput *input, const MildContactResult *result, int feet) {
     const double rate = 1.0 / input->dt;
     int all = finite(result->velocity, 6 * feet) & (rate > 0.0) & finite(&rate, 1);

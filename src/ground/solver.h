@@ -1,5 +1,5 @@
-/* The two solvers of the step's equations V+ = V_free + A W(V+) (docs/model.md section 7). Both
- * leave the impulses in the slots and the wrench in the scratch, and fill velocity, residual,
+/* The two solvers of the equations of a step, V+ = V_free + A W(V+) (docs/model.md section 7). Both
+ * leave the impulses in the slots and the wrenches in the scratch, and set velocity, residual,
  * iterations and converged of the result. */
 #ifndef MILD_GROUND_SOLVER_H
 #define MILD_GROUND_SOLVER_H

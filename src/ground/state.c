@@ -39,8 +39,8 @@ size_t mild_ground_size(const MildGround *ground) {
 }
 
 Memory ground_memory(const MildGround *ground, int foot) {
-    /* The one place where the block is seen as arrays; callers of a const ground only read through
-     * it. */
+    /* The only place that divides the block into arrays. Callers with a const ground must only read
+     * through them. */
     double *at =
         (double *)((uintptr_t)ground + sizeof(MildGround) + feet_bytes(ground->padded, foot));
     Memory memory;

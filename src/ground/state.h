@@ -13,23 +13,23 @@
 
 struct MildGround {
     int32_t feet;                    /* 1 .. MILD_FEET_MAX */
-    int32_t elements[MILD_FEET_MAX]; /* of each foot */
+    int32_t elements[MILD_FEET_MAX]; /* number for each foot */
     int32_t padded[MILD_FEET_MAX];   /* elements rounded up to whole vectors */
-    int32_t touched[MILD_FEET_MAX];  /* elements that remember something */
-    int32_t uneven[MILD_FEET_MAX];   /* bool: the planes below are those of the step before */
+    int32_t touched[MILD_FEET_MAX];  /* number of elements that remember something */
+    int32_t uneven[MILD_FEET_MAX];   /* bool: Memory.plane and slopes are those of the last step */
     int32_t tiles;                   /* of imprints; 0: the ground forgets at lift-off */
     uint32_t imprint_time;           /* counts the steps that could change an imprint */
     double imprint_cell;             /* [m] edge of a cell */
-    int32_t reserved[10];            /* to 128 bytes, so that the arrays behind are aligned */
+    int32_t reserved[10];            /* pads to 128 bytes, so that the arrays behind are aligned */
 };
 
-/* What an element stands on: index of a material, or first | second << 8 | share << 16 of two that
- * blend (share 255: all of the second). Negative: it carries nothing. */
-#define MATERIAL_NONE (-1) /* and nothing is known of the step before */
-#define MATERIAL_FREE (-2) /* but it was near the ground in the step before */
+/* What an element stands on: the index of a material, or first | second << 8 | share << 16 for a
+ * mixture of two (share 255: all of the second). Negative: the element carries no load. */
+#define MATERIAL_NONE (-1) /* no load, and nothing is remembered of the last step */
+#define MATERIAL_FREE (-2) /* no load, but it was near the ground in the last step */
 
-/* Memory of one foot: arrays [padded] inside the state block. ElementMemory in element.h says what
- * the first nine mean. */
+/* Memory of one foot: arrays [padded] inside the state block. The first nine are explained at
+ * ElementMemory in element.h. */
 typedef struct {
     double *depth_max;      /* [m] */
     double *middle;         /* [m] */
@@ -40,17 +40,17 @@ typedef struct {
     double *held_x;         /* [N] */
     double *held_y;         /* [N] */
     double *held_stiffness; /* [N/m] */
-    double *plane; /* [m] uneven ground: u = plane + slope . (x, y) - z in the step before, world */
-    double *slope_x;   /* [-] */
+    double *plane;     /* [m] uneven ground: the last step had u = plane + slope . (x, y) - z */
+    double *slope_x;   /* [-] gradient of that plane, world axes */
     double *slope_y;   /* [-] */
-    int32_t *material; /* the material it touched down on, coded as above */
+    int32_t *material; /* the material it touched down on, encoded as above */
 } Memory;
 
-/* Callers of a const ground only read through it. */
+/* The memory of a foot. Callers with a const ground must only read through it. */
 Memory ground_memory(const MildGround *ground, int foot);
-/* The element forgets everything; its material becomes `material`. */
+/* Clears the memory of an element and sets its material. */
 void memory_forget(const Memory *memory, int e, int32_t material);
-/* The imprints, read as ground_memory is. */
+/* The imprints, under the same condition as ground_memory. */
 Imprints ground_imprints(const MildGround *ground);
 /* Elements of a sole, rounded up to whole vectors. */
 int sole_padded(const MildSole *sole);

@@ -4,26 +4,29 @@
 #include "ground/impulse.h"
 #include "ground/solver.h"
 
-#define SWEEP_TOLERANCE 1e-10
-#define SWEEP_LIMIT 1000
-/* Of the impulses. Where a guide holds the feet, friction may still change that moves nothing. */
+#define SWEEP_TOLERANCE 1e-10 /* [-] of the wrench's change, unless the caller sets one */
+#define SWEEP_LIMIT 1000      /* sweeps, unless the caller sets a limit */
+/* [-] Sweeps go on until the elements' impulses change by less than this share. The wrench alone
+ * may settle earlier: where a joint holds the feet, friction can change without moving them. */
 #define SWEEP_REST 1e-6
-/* [1/kg] A foot that cannot move sideways needs no friction. This keeps beta finite. */
+/* [1/kg] Lower bound of G. A foot that cannot move sideways has G = 0, and beta would be
+ * infinite. */
 #define SWEEP_LEAST_G 1e-9
 
-/* Algorithm 1 of the paper. The foot twists are kept up to date, so a velocity prediction costs
- * O(1) and a sweep O(N); the mean over the preceding elements in delta_rb is a running mean. */
+/* Algorithm 1 of the paper. The foot twists are kept up to date, so predicting a velocity costs
+ * O(1) and a sweep costs O(N). The mean over the preceding elements in delta_rb is a running
+ * mean. */
 typedef struct {
-    int n;
-    double dt;
-    const double *A;
-    double twist[TWIST_MAX];
-    /* Over the elements of a foot that this sweep has passed: */
-    int preceding[MILD_FEET_MAX];    /* how many */
+    int n;                   /* rows: 6 for each foot */
+    double dt;               /* [s] */
+    const double *A;         /* [n][n] inverse inertia */
+    double twist[TWIST_MAX]; /* [m/s, rad/s] V^ + A W for the present impulses */
+    /* Elements that this sweep has visited, foot by foot: */
+    int preceding[MILD_FEET_MAX];    /* number of them */
     double before[MILD_FEET_MAX][2]; /* [m/s] sum of v_j - omega x p_j, horizontal */
-    /* Over all elements that this sweep has passed: */
-    double changed; /* [N s] sum of the changes of the impulses, e of Algorithm 1 */
-    double total;   /* [N s] sum of the impulses */
+    /* Elements that this sweep has visited, over all feet: */
+    double changed; /* [N s] sum of the absolute changes of the impulses: e of Algorithm 1 */
+    double total;   /* [N s] sum of the absolute impulses */
 } Sweep;
 
 /* V += A B^T dI */
@@ -59,7 +62,7 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
     }
 }
 
-/* Implicit normal impulse: one Newton step on I - I(w), where a change dI slows the element by G_zz
+/* Implicit normal impulse: one Newton step on I - I(w). An impulse dI slows the element by G_zz
  * dI. */
 static double element_normal(const Slots *s, int i, int curves, double dt, double w, double G) {
     const Element element = slot_element(s, i);
@@ -67,33 +70,37 @@ static double element_normal(const Slots *s, int i, int curves, double dt, doubl
     return fmax(s->iz[i] + (target.value - s->iz[i]) / (1.0 + G * target.slope), 0.0);
 }
 
-/* Paper eq 13: predict, correct by the continuity error, project on the friction disc. Where
- * friction.h's t holds, the law is v = (dt f - I)/(dt^2 k + c), a compliance beside G; where it
- * does not, I has the direction of t at any scale. */
+/* Paper eq 13: predict, correct by the continuity error, project onto the friction disc. Within the
+ * disc the law is I = t of friction.h, so v = (dt f - I)/(dt^2 k + c), which is a compliance in
+ * series with G. On the rim I has the direction of t, which any scale of t gives. */
 static void element_friction(const Slots *s, int i, const double *v, const double *delta,
                              double G) {
-    double radius = s->mu[i] * s->iz[i] + s->drift_bound[i],
-           stiff = s->hold_stiffness[i] + FRICTION_LAG * radius;
-    double compliance = stiff > 0.0 ? 1.0 / stiff : 0.0, beta = 0.5 / (G + compliance),
-           gamma = 0.1 * beta;
+    double radius = s->mu[i] * s->iz[i] + s->drift_bound[i];     /* r [N s] */
+    double stiff = s->hold_stiffness[i] + FRICTION_LAG * radius; /* dt^2 k + c [kg] */
+    double compliance = stiff > 0.0 ? 1.0 / stiff : 0.0;         /* [1/kg] */
+    double beta = 0.5 / (G + compliance);                        /* [kg] eq 13 */
+    double gamma = 0.1 * beta;                                   /* [kg] eq 13 */
     double x = s->fx[i] - gamma * delta[0] - beta * (v[0] + compliance * (s->fx[i] - s->hold_x[i]));
     double y = s->fy[i] - gamma * delta[1] - beta * (v[1] + compliance * (s->fy[i] - s->hold_y[i]));
-    double length = sqrt(x * x + y * y), scale = length > radius ? radius / length : 1.0;
+    double length = sqrt(x * x + y * y);
+    double scale = length > radius ? radius / length : 1.0;
     s->fx[i] = x * scale;
     s->fy[i] = y * scale;
 }
 
-/* One line of the inner loop of Algorithm 1; the change of impulse acts at once. */
+/* One iteration of the inner loop of Algorithm 1. The change of impulse moves the feet at once. */
 static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     const Slots *s = &foot->slot;
     const double *V = sweep->twist + 6 * f;
     double p[3];
     slot_arm(foot, s, i, p);
-    double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]},
-           v[2] = {V[0] + turn[0], V[1] + turn[1]};
-    double w = s->slope_x[i] * v[0] + s->slope_y[i] * v[1] - (V[2] + V[3] * p[1] - V[4] * p[0]),
-           delta[2] = {0.0, 0.0}, G[3];
-    /* Paper eqs 11, 12 with v_i - v_j - omega x (p_i - p_j) as a vector. */
+    double turn[2] = {V[4] * p[2] - V[5] * p[1], V[5] * p[0] - V[3] * p[2]}; /* omega x p */
+    double v[2] = {V[0] + turn[0], V[1] + turn[1]};                          /* [m/s] */
+    double w = s->slope_x[i] * v[0] + s->slope_y[i] * v[1] - (V[2] + V[3] * p[1] - V[4] * p[0]);
+    double delta[2] = {0.0, 0.0}; /* [m/s] continuity error */
+    double G[3];                  /* [1/kg] diagonal of B A B^T */
+
+    /* Paper eqs 11 and 12, with v_i - v_j - omega x (p_i - p_j) as a vector. */
     for (int k = 0; k < 2; k++) {
         if (sweep->preceding[f] > 0) {
             delta[k] = v[k] - turn[k] - sweep->before[f][k] / sweep->preceding[f];
@@ -102,8 +109,10 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
     }
     sweep->preceding[f]++;
     element_inverse_mass(sweep, f, p, s->slope_x[i], s->slope_y[i], G);
-    double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G), old[3] = {s->ix[i], s->iy[i], s->iz[i]},
-           fx = s->fx[i], fy = s->fy[i];
+    double G_xy = fmax(fmax(G[0], G[1]), SWEEP_LEAST_G);
+    double old[3] = {s->ix[i], s->iy[i], s->iz[i]};
+    double fx = s->fx[i];
+    double fy = s->fy[i];
     s->iz[i] = element_normal(s, i, foot->curves, sweep->dt, w, G[2]);
     double d[2] = {v[0], v[1]}; /* what friction opposes */
     if (foot->turned) {
@@ -111,11 +120,17 @@ static void sweep_element(Sweep *sweep, const FootScratch *foot, int f, int i) {
         friction_turn(&element, &d[0], &d[1]);
     }
     element_friction(s, i, d, delta, G_xy);
-    double b = s->damping[i],
-           relax = 1.0 / (1.0 + b * G_xy); /* implicit drift damping, as for the normal part */
-    double nx = s->slope_x[i] * s->iz[i],
-           ny = s->slope_y[i] * s->iz[i]; /* the normal impulse leans downhill */
-    double bx = old[0] + s->slope_x[i] * old[2] - fx, by = old[1] + s->slope_y[i] * old[2] - fy;
+    /* Drift damping is implicit, like the normal impulse. */
+    double b = s->damping[i];
+    double relax = 1.0 / (1.0 + b * G_xy);
+
+    /* On a slope the normal impulse has a horizontal part, downhill. */
+    double nx = s->slope_x[i] * s->iz[i];
+    double ny = s->slope_y[i] * s->iz[i];
+
+    /* Damping part of the horizontal impulse before this sweep. */
+    double bx = old[0] + s->slope_x[i] * old[2] - fx;
+    double by = old[1] + s->slope_y[i] * old[2] - fy;
     s->ix[i] = s->fx[i] + bx - relax * (b * d[0] + bx) - nx;
     s->iy[i] = s->fy[i] + by - relax * (b * d[1] + by) - ny;
     const double change[3] = {s->ix[i] - old[0], s->iy[i] - old[1], s->iz[i] - old[2]};
@@ -131,7 +146,7 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
         const FootScratch *foot = &scratch->foot[f];
         const Slots *s = &foot->slot;
         const Motion motion = foot_motion(foot, input->velocity[f]);
-        for (int i = 0; i < foot_end(foot); i++) { /* so that the padding holds 0 */
+        for (int i = 0; i < foot_end(foot); i++) { /* clears the padding too */
             double p[3];
             const Element element = slot_element(s, i);
             const SlotVelocity v = slot_velocity(s, i, &motion, 1);
@@ -164,7 +179,7 @@ static void sweep_wrench(const MildScratch *scratch, double *wrench) {
     }
 }
 
-/* sqrt(x^T A x), x = a - b: in the metric of kinetic energy. */
+/* sqrt(x^T A x) with x = a - b, the distance in the metric of kinetic energy. */
 static double sweep_distance(const Sweep *sweep, const double *a, const double *b) {
     double sum = 0.0;
     for (int i = 0; i < sweep->n; i++) {
@@ -180,10 +195,13 @@ static double sweep_distance(const Sweep *sweep, const double *a, const double *
 void sweep_solve(MildScratch *scratch, const MildContactInput *input, MildContactResult *result) {
     Sweep sweep = {.n = 6 * scratch->feet, .dt = input->dt, .A = input->inverse_inertia};
     static const double zero[TWIST_MAX];
-    int limit = input->max_iterations > 0 ? input->max_iterations : SWEEP_LIMIT, iterations = 0;
-    double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE,
-           change = INFINITY, scale = 0.0;
-    double *wrench = scratch->wrench, before[TWIST_MAX];
+    int limit = input->max_iterations > 0 ? input->max_iterations : SWEEP_LIMIT;
+    int iterations = 0;
+    double tolerance = input->tolerance > 0.0 ? input->tolerance : SWEEP_TOLERANCE;
+    double change = INFINITY; /* of the wrench in the last sweep */
+    double scale = 0.0;       /* size of the wrench */
+    double *wrench = scratch->wrench;
+    double before[TWIST_MAX]; /* the wrench before the sweep */
     sweep_start(&sweep, scratch, input);
     sweep_wrench(scratch, wrench);
     int rests = 0;

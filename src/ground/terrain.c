@@ -17,13 +17,13 @@ static int patches_overlap(const MildPatch *a, const MildPatch *b) {
 MildStatus mild_terrain_add_patch(MildTerrain *terrain, const MildPatch *patch, MildError *error) {
     if (terrain->patch_count >= MILD_PATCHES_MAX) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "terrain: patch_count is full, at most %d patches", MILD_PATCHES_MAX);
+                         "terrain.patch_count: at most %d patches are allowed", MILD_PATCHES_MAX);
     }
     if (patch->material < 0 || patch->material >= terrain->material_count) {
         return mild_fail(error, MILD_ERROR_RANGE, "patch.material = %d is not one of %d materials",
                          patch->material, terrain->material_count);
     }
-    /* Written so that NaN fails; infinite edges make half planes and strips. */
+    /* The comparisons are written so that NaN fails. Infinite edges make half planes and strips. */
     if (!(patch->x_min < patch->x_max)) {
         return mild_fail(error, MILD_ERROR_RANGE, "patch.x_min = %g must be below patch.x_max = %g",
                          patch->x_min, patch->x_max);
@@ -35,7 +35,7 @@ MildStatus mild_terrain_add_patch(MildTerrain *terrain, const MildPatch *patch, 
     for (int i = 0; i < terrain->patch_count; i++) {
         if (patches_overlap(&terrain->patches[i], patch)) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
-                             "patch.x_min .. y_max: the rectangle overlaps patch %d", i);
+                             "patch.x_min .. patch.y_max: the rectangle overlaps patch %d", i);
         }
     }
     terrain->patches[terrain->patch_count++] = *patch;
@@ -45,14 +45,14 @@ MildStatus mild_terrain_add_patch(MildTerrain *terrain, const MildPatch *patch, 
 MildStatus mild_terrain_set_map(MildTerrain *terrain, const MildMap *map, MildError *error) {
     if (map && map->label_count > terrain->material_count) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "terrain.patches: label %d has no material, the terrain has %d",
+                         "terrain.patches: label %d has no material, the terrain has only %d",
                          map->label_count - 1, terrain->material_count);
     }
     terrain->map = map;
     return MILD_OK;
 }
 
-/* A patch wins over the map. */
+/* A patch takes precedence over the map. */
 static Label terrain_label(const MildTerrain *terrain, double x, double y) {
     for (int i = 0; i < terrain->patch_count; i++) {
         const MildPatch *patch = &terrain->patches[i];

@@ -9,6 +9,7 @@
 #include "base/file.h"
 
 enum { FILE_SIZE_MAX = 1 << 20, LIST_SIZE = 4096 };
+enum { SECTION_MAX = 49 }; /* characters of a section's name; inih drops the rest */
 
 /* Lists stay text until all sections are read, because most need the number of joints. */
 typedef struct {
@@ -177,10 +178,18 @@ static int find_section(Reader *reader, const char *name, Section *section) {
 
 /* inih passes over sections without keys: look at the header itself. */
 static int check_header(Reader *reader, const char *line, size_t length) {
-    char name[ROBOT_NAME_SIZE + 8];
+    char name[SECTION_MAX + 1];
     Section section;
-    if (length > sizeof name || line[length - 1] != ']') {
+    if (length < 2 || line[length - 1] != ']') {
         fail_line(reader, "neither `key = value` nor `[section]`");
+        return 0;
+    }
+    if (length - 2 > SECTION_MAX) {
+        reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT,
+                                   "%s:%d: [%.20s...] has %zu characters; a section's name has at "
+                                   "most %d, and so the NAME of [foot.NAME] %d",
+                                   reader->path, reader->line, line + 1, length - 2, SECTION_MAX,
+                                   SECTION_MAX - (int)strlen("foot."));
         return 0;
     }
     snprintf(name, sizeof name, "%.*s", (int)length - 2, line + 1);

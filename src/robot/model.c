@@ -1,8 +1,13 @@
 /* From the MJCF of a robot folder to the engine's models. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "robot/description.h"
+
+/* Hinge ranges up to this many radians are usual, and nobody builds a robot of which no hinge turns
+ * further than so many degrees. */
+#define FULL_TURN 6.3
 
 /* MuJoCo's messages have several lines; ours have one. */
 static void one_line(char *text) {
@@ -33,6 +38,42 @@ static MildStatus check_supported(const mjModel *m, const char *path, MildError 
                              : damping != 0.0 ? "damping"
                                               : "stiffness");
         }
+    }
+    return MILD_OK;
+}
+
+/* MuJoCo takes angles for degrees unless the file says angle="radian". Where every hinge's numbers
+ * are those of the other unit the file is refused: read as it stands, its legs would be stiff, or
+ * free. */
+static MildStatus check_angles(const mjSpec *spec, const mjModel *m, const char *path,
+                               MildError *error) {
+    const double unit = spec->compiler.degree ? 180.0 / mjPI : 1.0; /* as written, by radian */
+    double least = INFINITY; /* of all hinges, the greater limit as written */
+    double most = 0.0;
+    int named = -1;
+    for (int j = 0; j < m->njnt; j++) {
+        const double *range = m->jnt_range + 2 * j;
+        const double limit = unit * fmax(fabs(range[0]), fabs(range[1]));
+        if (m->jnt_type[j] != mjJNT_HINGE || !m->jnt_limited[j]) {
+            continue;
+        }
+        least = fmin(least, limit);
+        named = limit > most ? j : named;
+        most = fmax(most, limit);
+    }
+    const char *joint = named >= 0 ? mj_id2name(m, mjOBJ_JOINT, named) : NULL;
+    if (named >= 0 && spec->compiler.degree && most <= FULL_TURN) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "%.150s: angles are in degrees, and no hinge turns further than '%.60s' "
+                         "(%.3g degrees); if they are radians, write <compiler angle=\"radian\"/>",
+                         path, joint ? joint : "", most);
+    }
+    if (named >= 0 && !spec->compiler.degree && least > 2 * FULL_TURN) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "%.150s: angles are in radians, and every hinge turns by more than two "
+                         "turns ('%.60s': %.3g rad); if they are degrees, write <compiler "
+                         "angle=\"degree\"/>",
+                         path, joint ? joint : "", most);
     }
     return MILD_OK;
 }
@@ -111,6 +152,9 @@ static MildStatus compile(Robot *robot, mjSpec *spec, MildError *error) {
     robot->visual = mj_compile(spec, NULL);
     if (robot->visual) {
         MildStatus status = check_supported(robot->visual, robot->path, error);
+        if (status == MILD_OK) {
+            status = check_angles(spec, robot->visual, robot->path, error);
+        }
         if (status != MILD_OK) {
             return status;
         }

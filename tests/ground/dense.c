@@ -1,5 +1,7 @@
 #include "dense.h"
 
+#include "dense_power.h"
+
 /* The constants of these five. */
 #include "ground/begin.h"
 #include "ground/element_law.h"
@@ -29,16 +31,29 @@ static double cone_flat(const DenseLaw *law, double u) {
     return left * left;
 }
 
-static double cone_force(const DenseLaw *law, double u) {
-    return (law->k_pen - law->kappa) * cone_share(law, u) + law->kappa * u;
+/* Virgin ground above the bed. */
+static double virgin_force(const DenseLaw *law, double u) {
+    double force = (law->k_pen - law->kappa) * cone_share(law, u) + law->kappa * u;
+    return law->sinkage > 0.0 ? force + power_at(law->sinkage, law->sinkage_power, u) : force;
 }
 
-static double cone_slope(const DenseLaw *law, double u) {
-    return (law->k_pen - law->kappa) * cone_flat(law, u) + law->kappa;
+static double virgin_slope(const DenseLaw *law, double u) {
+    double slope = (law->k_pen - law->kappa) * cone_flat(law, u) + law->kappa;
+    return law->sinkage > 0.0 ? slope + power_rise(law->sinkage, law->sinkage_power, u) : slope;
+}
+
+/* Its mean over a way down, the power's apart: Simpson's rule, exact on a cubic. */
+static double virgin_mean(const DenseLaw *law, double u, double way) {
+    DenseLaw cone = *law;
+    cone.sinkage = 0.0;
+    double simpson = (virgin_force(&cone, u) + 4.0 * virgin_force(&cone, u + 0.5 * way) +
+                      virgin_force(&cone, u + way)) /
+                     6.0;
+    return simpson + power_mean(law->sinkage, law->sinkage_power, u, way);
 }
 
 /* Integral of the ground's force from m0 to m1: the unloading line up to the front, virgin ground
- * by Simpson's rule beyond, the bed with its force at m1. */
+ * beyond, the bed with its force at m1. */
 static double law_work(const DenseElement *e, double m1) {
     const DenseLaw *law = &e->law;
     double from = fmax(e->m0 - e->slack, 0.0), to = fmax(fmin(m1, e->front) - e->slack, 0.0),
@@ -47,10 +62,21 @@ static double law_work(const DenseElement *e, double m1) {
     if (way <= 0.0) {
         return work;
     }
-    double simpson =
-        (cone_force(law, u) + 4.0 * cone_force(law, u + 0.5 * way) + cone_force(law, u + way)) /
-        6.0;
-    return work + way * (simpson + law->bed_stiffness * fmax(u + way - law->bed, 0.0));
+    return work +
+           way * (virgin_mean(law, u, way) + law->bed_stiffness * fmax(u + way - law->bed, 0.0));
+}
+
+/* Impulse of ground without memory: its force's mean over the way, in the air 0, and the damping's
+ * integral, which is loss times what the static force does. */
+static double dense_elastic(double dt, const DenseElement *e, double m1) {
+    const DenseLaw *law = &e->law;
+    if (law->elastic == 0.0) {
+        return 0.0;
+    }
+    double low = fmax(fmin(e->m0, m1), 0.0), deep = fmax(fmax(e->m0, m1), 0.0),
+           mean = power_mean(law->elastic, law->elastic_power, low, deep - low),
+           whole = fabs(m1 - e->m0), share = whole > 1e-16 ? (deep - low) / whole : low > 0.0;
+    return mean * (dt * share + law->loss * copysign(deep - low, m1 - e->m0));
 }
 
 /* Impulse of the mass that is recruited in the step, and of drag, by the growth of P. */
@@ -82,7 +108,8 @@ static double law_normal(double dt, const DenseElement *e, double w) {
     double back = fmin(w + e->hit, 0.0), eased = back < -IMPULSE_EASE
                                                      ? back + 0.5 * IMPULSE_EASE
                                                      : -0.5 * back * back / IMPULSE_EASE;
-    return fmax(impulse + dt * ELEMENT_LAG * e->line * eased + e->active, 0.0);
+    impulse += dt * ELEMENT_LAG * e->line * eased + dense_elastic(dt, e, m1);
+    return fmax(impulse + e->active, 0.0);
 }
 
 /* ---- what the ground is made of ---- */
@@ -91,10 +118,26 @@ static int is_resistive(const MildMaterial *m) {
     return m->model == MILD_MODEL_ECC_QUASI || m->model == MILD_MODEL_ECC_QUASI_3D;
 }
 
-/* A cone that is complete at once: yielding springs and resistive force theory. */
+/* A cone that is complete at once: yielding springs, resistive force theory, and ground that is
+ * nothing but a bed below its other curve. */
 static int is_straight(const MildMaterial *m) {
     return is_resistive(m) || m->model == MILD_MODEL_CON_SPRING ||
-           m->model == MILD_MODEL_ECC_SPRING;
+           m->model == MILD_MODEL_ECC_SPRING || m->model == MILD_MODEL_BEKKER ||
+           m->model == MILD_MODEL_HUNT_CROSSLEY;
+}
+
+/* Bekker: (k_c/b + k_phi) z^n on the element's area. Hunt and Crossley: k_pen u at 10 mm, damped by
+ * 3/2 d; it springs back whole. */
+static void law_curve(const MildMaterial *m, double area, DenseLaw *law) {
+    if (m->model == MILD_MODEL_BEKKER) {
+        law->sinkage = (m->k_c / m->plate_width + m->k_phi) * pow(DENSE_DEPTH, m->exponent) * area;
+        law->sinkage_power = m->exponent;
+    } else if (m->model == MILD_MODEL_HUNT_CROSSLEY) {
+        law->elastic = m->k_pen * DENSE_DEPTH;
+        law->elastic_power = m->exponent;
+        law->loss = 1.5 * m->dissipation;
+        law->recovery = 1.0;
+    }
 }
 
 static DenseLaw law_material(const MildMaterial *m, double pitch) {
@@ -107,8 +150,12 @@ static DenseLaw law_material(const MildMaterial *m, double pitch) {
                     .k_drift = m->k_drift,
                     .b_drift = m->b_drift};
     if (is_straight(m)) {
-        law.k_pen = law.kappa = is_resistive(m) ? m->zeta * LAW_RESIST_STRESS * area : m->k_pen;
+        int spring = m->model == MILD_MODEL_CON_SPRING || m->model == MILD_MODEL_ECC_SPRING;
+        law.k_pen = law.kappa = is_resistive(m) ? m->zeta * LAW_RESIST_STRESS * area
+                                : spring        ? m->k_pen
+                                                : 0.0;
         law.full = LAW_LINE_DEPTH;
+        law_curve(m, area, &law);
         return law;
     }
     law.k_pen = m->k_pen;
@@ -119,17 +166,30 @@ static DenseLaw law_material(const MildMaterial *m, double pitch) {
     return law;
 }
 
+/* The power of a curve that only one of two laws has, and its damping, stay as they are. */
+static void law_alone(double one, double other, double *a, double *b) {
+    if (one == 0.0) {
+        *a = *b;
+    } else if (other == 0.0) {
+        *b = *a;
+    }
+}
+
 /* All numbers of one law change linearly into the other's. */
 static DenseLaw law_blend(const DenseLaw *one, const DenseLaw *other, double share) {
     enum { NUMBERS = sizeof(DenseLaw) / sizeof(double) };
     double a[NUMBERS], b[NUMBERS];
-    DenseLaw law;
-    memcpy(a, one, sizeof a);
-    memcpy(b, other, sizeof b);
+    DenseLaw law, from = *one, to = *other;
+    law_alone(one->sinkage, other->sinkage, &from.sinkage_power, &to.sinkage_power);
+    law_alone(one->elastic, other->elastic, &from.elastic_power, &to.elastic_power);
+    law_alone(one->elastic, other->elastic, &from.loss, &to.loss);
+    memcpy(a, &from, sizeof a);
+    memcpy(b, &to, sizeof b);
     for (int k = 0; k < NUMBERS; k++) {
         a[k] = (1.0 - share) * a[k] + share * b[k];
     }
     memcpy(&law, a, sizeof a);
+    law.recovery = law.elastic > 0.0 ? 1.0 : law.recovery; /* part of it has no memory */
     return law;
 }
 
@@ -192,12 +252,16 @@ static void dense_factor(Dense *d, const double *A) {
 static void element_line(DenseElement *e) {
     const DenseLaw *law = &e->law;
     double a = e->deep, in_bed = fmax(a - law->bed, 0.0),
-           force = cone_force(law, a) + law->bed_stiffness * in_bed;
-    double travel = fmax(law->recovery * a, fmin(ELEMENT_ELASTIC, a));
-    double slope =
-        in_bed > 0.0 ? fmax(law->k_pen, law->kappa) + law->bed_stiffness : cone_slope(law, a);
+           force = virgin_force(law, a) + law->bed_stiffness * in_bed;
+    double travel = fmax(law->recovery * a, fmin(ELEMENT_ELASTIC, a)), slope = virgin_slope(law, a);
+    if (in_bed > 0.0) {
+        double power = law->sinkage > 0.0 ? fmax(power_rise(law->sinkage, law->sinkage_power, 0.0),
+                                                 power_rise(law->sinkage, law->sinkage_power, a))
+                                          : 0.0;
+        slope = fmax(law->k_pen, law->kappa) + power + law->bed_stiffness;
+    }
     e->line = travel > 0.0 ? fmax(force / travel, slope) : slope;
-    e->slack = a - force / e->line;
+    e->slack = e->line > 0.0 ? a - force / e->line : a;
 }
 
 /* ---- resistive force theory ---- */
@@ -260,10 +324,15 @@ static void element_resist(double dt, DenseElement *e, int model, const double *
 
 /* ---- what an element finds and remembers ---- */
 
-/* What friction holds: k from the bound at the front's yield force; the force held falls where k
- * has fallen. */
+/* What friction holds: k from the bound at the front's yield force, and at the force of ground
+ * without memory where the way begins; the force held falls where k has fallen. */
 static void element_hold(double dt, DenseElement *e, double x, double y, double old) {
-    double k = (e->law.mu * e->line * (e->front - e->slack) + e->radius / dt) / FRICTION_ELASTIC,
+    const DenseLaw *law = &e->law;
+    double force = e->line * (e->front - e->slack);
+    if (law->elastic > 0.0) {
+        force += power_at(law->elastic, law->elastic_power, fmax(e->m0, 0.0));
+    }
+    double k = (law->mu * force + e->radius / dt) / FRICTION_ELASTIC,
            keeps = k < old ? k / old : 1.0;
     e->grip = dt * dt * k;
     e->hold[0] = dt * keeps * x;
@@ -319,10 +388,10 @@ static double find_deepest(const Find *find, double recovery) {
     return deepest;
 }
 
-/* Law of the material, or the two that blend, that it touched down on or finds; returns the model
- * whose resistance has a direction, or -1. Blended with a cone there is none: both are as under a
- * level plate. */
-static int find_law(const Find *find, DenseLaw *law) {
+/* Law of the material, or the two that blend, that it touched down on or finds; returns the nearer
+ * one. *directed: its resistance has a direction. Blended with a cone or with pressure and sinkage
+ * it has none: both are as under a level plate. */
+static const MildMaterial *find_law(const Find *find, DenseLaw *law, int *directed) {
     const MildTerrain *terrain = &find->kit->terrain;
     int code = find->memory.material[find->i];
     MildBlend blend = {code & 0xff, code >> 8 & 0xff, (code >> 16) / 255.0};
@@ -333,7 +402,18 @@ static int find_law(const Find *find, DenseLaw *law) {
                        *second = &terrain->materials[blend.second];
     DenseLaw one = law_material(first, find->pitch), other = law_material(second, find->pitch);
     *law = blend.share > 0.0 ? law_blend(&one, &other, blend.share) : one;
-    return is_resistive(first) && (blend.share == 0.0 || is_straight(second)) ? first->model : -1;
+    *directed = is_resistive(first) &&
+                (blend.share == 0.0 || (is_straight(second) && second->model != MILD_MODEL_BEKKER));
+    return first;
+}
+
+/* Janosi and Hanamoto: with the path j that the element has slid, the nearer material's strength
+ * c s + mu N has grown to the share 1 - exp(-j/K). */
+static void element_shear(double dt, DenseElement *e, const MildMaterial *m, double area,
+                          double slid) {
+    double share = -expm1(-slid / m->shear_length);
+    e->law.mu *= share;
+    e->radius += e->u0 > 0.0 ? dt * share * m->cohesion * area : 0.0;
 }
 
 /* Velocity of a point at p, and the speed at which its depth grows, of a foot's twist. */
@@ -355,7 +435,7 @@ static void dense_drag(double dt, DenseElement *e, double gained) {
     if (!(extra > 0.0 && e->u0 + 0.5 * dt * e->w0 > a + ELEMENT_ELASTIC)) {
         return;
     }
-    double force = cone_force(law, a) + 0.5 * cone_slope(law, a) * (deep - a),
+    double force = virgin_force(law, a) + 0.5 * virgin_slope(law, a) * (deep - a),
            drag = extra * cone_flat(law, a);
     e->hit = sqrt(e->w0 * e->w0 + 2.0 * fmax(gained, 0.0) / dt * (a - e->m0));
     e->still =
@@ -366,7 +446,8 @@ static void dense_drag(double dt, DenseElement *e, double gained) {
 static void dense_element(Dense *d, const Find *find) {
     DenseElement *e = &d->element[d->elements++];
     const Memory *memory = &find->memory;
-    int i = find->i, model = find_law(find, &e->law);
+    int i = find->i, directed;
+    const MildMaterial *nearer = find_law(find, &e->law, &directed);
     double now[4], deepest = find_deepest(find, e->law.recovery);
     point_velocity(find, find->kit->input.velocity[find->f], now);
     for (int c = -1; c < d->rank; c++) { /* -1: the free twist */
@@ -396,8 +477,11 @@ static void dense_element(Dense *d, const Find *find) {
     }
     element_line(e);
     dense_drag(d->dt, e, e->free[3] - now[3]);
-    if (model >= 0) {
-        element_resist(d->dt, e, model, find->normal, now, now[3]);
+    if (directed) {
+        element_resist(d->dt, e, nearer->model, find->normal, now, now[3]);
+    }
+    if (nearer->model == MILD_MODEL_BEKKER) {
+        element_shear(d->dt, e, nearer, find->pitch * find->pitch, memory->drift[i]);
     }
     element_hold(d->dt, e, memory->held_x[i], memory->held_y[i], memory->held_stiffness[i]);
 }

@@ -16,12 +16,15 @@
 
 #define DENSE_ELEMENTS 192
 
-/* What the ground under one element is made of; of two materials that blend, the mean. */
+/* What the ground under one element is made of; of two materials that blend, the mean. The forces
+ * of the two curves are those at 10 mm; 0: the ground has no such curve. */
 typedef struct {
     double k_pen, kappa, full;   /* [N/m], [N/m], [m]: F_g = (k_pen - kappa) P(u) + kappa u */
     double mass_rate, drag_rate; /* [kg/m] m_a = mass_rate P; drag_rate is c_d times that */
     double bed, bed_stiffness;   /* [m], [N/m] */
     double recovery, mu, k_drift, b_drift; /* of the material */
+    double sinkage, sinkage_power;         /* [N], [-] pressure and sinkage under the element */
+    double elastic, elastic_power, loss;   /* [N], [-], [s/m] without memory: F (1 + loss w) */
 } DenseLaw;
 
 /* One element: what it remembers, its unloading line, the drift's friction and how it moves with y.

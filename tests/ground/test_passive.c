@@ -135,6 +135,8 @@ static void test_passive_by_hand(void **state) {
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     double worst = -INFINITY, worst_way = -INFINITY;
     int gains = 0;
+    int worst_draw = -1;
+    int worst_way_draw = -1;
     for (int draw = first; draw < first + draws; draw++) {
         uint64_t random = draw_seed(13, draw, 16);
         MildMaterial m = kit_material(&random);
@@ -161,14 +163,15 @@ static void test_passive_by_hand(void **state) {
         if (taken == 0.0) {
             continue;
         }
+        worst_draw = work / taken > worst ? draw : worst_draw;
         worst = fmax(worst, work / taken);
+        worst_way_draw = way / taken > worst_way ? draw : worst_way_draw;
         worst_way = fmax(worst_way, way / taken);
         gains += way > 0.0;
     }
     print_message("down and up by hand: %d draws, most work given back in excess, as a share: %.2e "
-                  "at the mean speed, %.2e along "
-                  "the way (%d draws above 0)\n",
-                  draws, worst, worst_way, gains);
+                  "at the mean speed (draw %d), %.2e along the way (draw %d; %d draws above 0)\n",
+                  draws, worst, worst_draw, worst_way, worst_way_draw, gains);
     mild_sole_destroy(sole);
     assert_true(worst < 0.0 && worst_way < 0.0);
 }
@@ -196,6 +199,7 @@ static void test_loops(void **state) {
     MildSole *sole = kit_sole(0, 77);
     static const double steps[3] = {0.25e-3, 1e-3, 5e-3};
     double worst = -INFINITY, worst_share = -INFINITY;
+    int worst_draw = -1;
     for (int draw = first; draw < first + draws; draw++) {
         uint64_t random = draw_seed(17, draw, 24);
         MildMaterial m = kit_material(&random);
@@ -218,14 +222,16 @@ static void test_loops(void **state) {
             if (r == 0 || taken == 0.0) {
                 continue;
             }
+            worst_draw = work > worst ? draw : worst_draw;
             worst = fmax(worst, work);
             worst_share = fmax(worst_share, work / taken);
         }
         kit_close(&kit);
     }
     print_message(
-        "closed loops by hand: %d draws, most energy gained in a round %.2e J, share %.2e\n", draws,
-        worst, worst_share);
+        "closed loops by hand: %d draws, most energy gained in a round %.2e J (draw %d), share "
+        "%.2e\n",
+        draws, worst, worst_draw, worst_share);
     mild_sole_destroy(sole);
     assert_true(worst < 1e-9);
 }

@@ -369,6 +369,24 @@ static void test_feet_refused(void **state) {
     refuse("shape = round", "shape = square", ":39: ");
 }
 
+/* The longest name of a foot comes back whole; one more character is refused, not cut: two feet
+ * that differ at its end would be one. */
+static void test_long_names(void **state) {
+    (void)state;
+    const char *const name = "a23456789_123456789_123456789_123456789_1234";
+    char section[64];
+    snprintf(section, sizeof section, "[foot.%s]\n", name);
+    const char *text =
+        edit("mirror = r\n", "mirror = a23456789_123456789_123456789_123456789_1234\n");
+    static char whole[sizeof edited];
+    const char *at = strstr(text, "[foot.r]\n");
+    snprintf(whole, sizeof whole, "%.*s%s%s", (int)(at - text), text, section, at + 9);
+    const RobotDef def = accept(whole);
+    assert_string_equal(def.foot[1].name, name);
+    refuse("[foot.r]", "[foot.a23456789_123456789_123456789_123456789_12345]",
+           ":34: [foot.a23456789_12345...] has 50 characters; a section's name has at most 49");
+}
+
 /* All feet must agree whether the mirror image of the gait is half a cycle later. */
 static void test_gaits_that_disagree(void **state) {
     (void)state;
@@ -548,7 +566,7 @@ int main(void) {
         cmocka_unit_test(test_missing),         cmocka_unit_test(test_joints_refused),
         cmocka_unit_test(test_feet_refused),    cmocka_unit_test(test_gaits_that_disagree),
         cmocka_unit_test(test_joints_that_fit), cmocka_unit_test(test_lists_that_fit),
-        cmocka_unit_test(test_files),
+        cmocka_unit_test(test_files),           cmocka_unit_test(test_long_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

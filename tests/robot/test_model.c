@@ -417,6 +417,7 @@ static void test_refusals(void **unused) {
     refuse("sa01.xml", "<joint name=\"leg_l1_joint\"",
            "<joint name=\"leg_l1_joint\" type=\"slide\"", "hinge");
     refuse("sa01.xml", "range=\"-0.15 2.268\"", "range=\"0.5 2.268\"", "pose");
+    refuse("sa01.xml", "angle=\"radian\" ", "", "write <compiler angle=\"radian\"/>");
     refuse("robot.ini", "elements = 77", "elements = -7", "foot.left.elements");
     refuse("robot.ini", "elements = 77", "elements = 5000", "[foot.left]");
     refuse("robot.ini", "sa01.xml", "none.xml", "none.xml");
@@ -449,11 +450,65 @@ static void test_refusals(void **unused) {
     assert_non_null(strstr(error.text, "nearest is 'sa01'"));
 }
 
+/* A hinge's numbers tell the unit only together: one that turns by 5 degrees is no mistake where
+ * another turns by 130, nor one without an end among radians. */
+static void test_angles(void **unused) {
+    (void)unused;
+    static const struct {
+        const char *unit, *one, *other, *message; /* message: NULL where the file is taken */
+    } cases[] = {
+        {"degree", "-1.5 1.5", "0 6.2", "if they are radians"},
+        {"degree", "-5 5", "0 6.4", NULL},
+        {"degree", "-5 5", "-130 0", NULL},
+        {"radian", "-130 0", "-20 20", "if they are degrees"},
+        {"radian", "-130 0", "-12.5 12.5", NULL},
+        {"radian", "-1.5 1.5", "-100 100", NULL},
+        {"radian", "-0.1 0.1", "0 0.1", NULL},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char folder[] = "robot_angles_XXXXXX", path[64], ini[64];
+        MildError error = {0};
+        assert_non_null(mkdtemp(folder));
+        snprintf(path, sizeof path, "%s/two.xml", folder);
+        snprintf(ini, sizeof ini, "%s/robot.ini", folder);
+        FILE *file = fopen(path, "w");
+        assert_non_null(file);
+        fprintf(file,
+                "<mujoco><compiler angle='%s' autolimits='true'/><worldbody><body name='base'>"
+                "<freejoint/><geom size='0.1'/><body name='leg' pos='0 0 -0.3'><joint name='hip' "
+                "axis='0 1 0' range='%s' armature='0.01'/><geom size='0.05'/><body name='foot' "
+                "pos='0 0 -0.3'><joint name='knee' axis='0 1 0' range='%s' armature='0.01'/>"
+                "<geom size='0.05'/></body></body></body></worldbody></mujoco>",
+                cases[i].unit, cases[i].one, cases[i].other);
+        fclose(file);
+        file = fopen(ini, "w");
+        assert_non_null(file);
+        fputs(
+            "[robot]\nname = two\nmodel = two.xml\nbase = base\nheight = 0.6\naction_scale = 0.2\n"
+            "feet_range = 0 1\nknee_range = 0 1\nfeet_least = 0\nknee_least = 0\nfoot_force = 50\n"
+            "assist = 10 1 1 1\nshells =\n[joints]\nnames = hip knee\nmirror = hip knee\n"
+            "mirror_sign = 1 1\npose = 0 0\nkp = 10 10\nkd = 1 1\neffort = 5 5\n[foot.one]\n"
+            "body = foot\nknee = leg\nmirror = one\noffset = 0\nshape = round\n"
+            "center = 0 0 -0.05\nradius = 0.02\n",
+            file);
+        fclose(file);
+        Robot *two = robot_create(folder, &error);
+        remove(path);
+        remove(ini);
+        rmdir(folder);
+        print_message("%s, %s and %s: %s\n", cases[i].unit, cases[i].one, cases[i].other,
+                      two ? "taken" : error.text);
+        assert_int_equal(!two, cases[i].message != NULL);
+        assert_true(two || strstr(error.text, cases[i].message));
+        robot_destroy(two);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_limits_and_masses), cmocka_unit_test(test_standing),
         cmocka_unit_test(test_mass_matrix),       cmocka_unit_test(test_variation),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_refusals),          cmocka_unit_test(test_angles),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
