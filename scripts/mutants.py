@@ -25,7 +25,7 @@ import sys
 import threading
 import time
 
-from mutate import File, Mutant, draw
+from mutate import File, Mutant, draw, plain
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 WORK = ROOT / "build" / "mutants"
@@ -74,7 +74,7 @@ def read_entries(path):
 
 
 def read_named():
-    joined = lambda lines: " ".join(lines).strip()
+    joined = lambda lines: plain(" ".join(lines))
     return {f"{e['at']}: {joined(e['-'])} -> {joined(e['+'])}": e["="]
             for e in read_entries(NAMED)}
 

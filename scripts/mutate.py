@@ -100,6 +100,11 @@ def partners(tokens):
     return pair
 
 
+def plain(line):
+    """A line of code without its remark, so that a remark's words change no mutant's name."""
+    return " ".join(re.sub(r"/\*.*?(\*/|$)", " ", line, flags=re.S).split())
+
+
 def is_type(token):
     return token.kind == "name" and (token.text in TYPES or token.text.endswith("_t") or
                                      re.fullmatch(r"(mj)?[A-Z][a-z]\w*|FILE|Real", token.text) is not None)
@@ -179,7 +184,7 @@ class File:
         stop = self.source.find("\n", max(begin, end - 1))
         tail = self.source[end:stop if stop >= 0 else None]
         text += "\n" * (self.source[begin:end].count("\n") - text.count("\n"))
-        squeeze = lambda s: " ".join(s.replace("\\\n", " ").rstrip("\\").split())
+        squeeze = lambda s: plain(s.replace("\\\n", " ").rstrip("\\"))
         before, after = squeeze(head + self.source[begin:end] + tail), squeeze(head + text + tail)
         return Mutant(self.path, first + 1, self.functions[first], kind, begin, end, text, before,
                       after, f"{self.path} {self.functions[first]}: {before} -> {after}")

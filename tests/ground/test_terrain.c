@@ -250,6 +250,85 @@ static void test_plane(void **state) {
     mild_map_destroy(map);
 }
 
+/* 6 mm above the ground an element that gets there within the step is found, however it does: by
+ * falling, by sliding uphill along either axis, by tilting, by turning uphill. 16 m/s are 8 mm in
+ * half a step of 1 ms. */
+static void test_fast_elements_are_found(void **state) {
+    (void)state;
+    enum { EDGE = 5 };
+    const double fast = 16.0, x = 2.0 * KIT_PITCH;
+    const double motion[5][6] = {
+        {0, 0, -fast}, {fast}, {0, fast}, {0, 0, 0, 0, fast / x}, {0, 0, 0, 0, 0, fast / x}};
+    static const int uphill[5] = {-1, 0, 1, -1, 1}; /* axis, along which the ground rises by 1 */
+    MildSole *plate = kit_plate(5, 1);
+    for (int k = 0; k < 5; k++) {
+        double heights[EDGE * EDGE];
+        for (int i = 0; i < EDGE * EDGE; i++) { /* the first row is that of the greatest y */
+            heights[i] = uphill[k] == 0 ? i % EDGE - 2 : uphill[k] == 1 ? 2 - i / EDGE : 0;
+        }
+        MildMapDef def = shape(MILD_MAP_IMAGE, 0.1, 1.0);
+        def.heights = heights, def.height_columns = def.height_rows = EDGE, def.cell = 0.1;
+        MildMap *map = make_map(&def);
+        const MildMaterial m = mild_material_default();
+        for (int moving = 0; moving < 2; moving++) {
+            Kit kit;
+            kit_open(&kit, 1, plate, NULL, &m, 1e-3);
+            kit.terrain = terrain_on(map, 0.0);
+            /* uphill along x the element in front is the lowest */
+            kit.input.position[0][1] = 0.0;
+            kit.input.position[0][2] += 0.006 + (uphill[k] == 0 ? x : 0.0);
+            for (int i = 0; i < 6 && moving; i++) {
+                kit.input.velocity[0][i] = kit.input.free_velocity[i] = motion[k][i];
+            }
+            kit_solve(&kit);
+            assert_true((kit.result.foot[0].force[2] > 0.0) == moving);
+            kit_close(&kit);
+        }
+        mild_map_destroy(map);
+    }
+    mild_sole_destroy(plate);
+}
+
+/* Depths of the elements are those below the terrain's surface, whatever the elements remember: a
+ * foot that slides over waves, whole and in part in the ground. */
+static void test_depths(void **state) {
+    (void)state;
+    MildMapDef def = shape(MILD_MAP_WAVES, 0.03, 0.5);
+    MildMap *map = make_map(&def);
+    MildSole *sole = kit_sole(0, 77);
+    const MildMaterial m = mild_material_default();
+    double worst = 0.0;
+    int whole = 0, part = 0;
+    for (int deep = 0; deep < 2; deep++) {
+        Kit kit;
+        kit_open(&kit, 1, sole, NULL, &m, 5e-3);
+        kit.terrain = terrain_on(map, 0.0);
+        kit.input.position[0][2] += deep ? -0.03 : 0.015;
+        kit.input.velocity[0][0] = kit.input.free_velocity[0] = 0.6;
+        for (int s = 0; s < 300; s++) {
+            kit_solve(&kit);
+            const MildElements elements = mild_scratch_elements(kit.scratch, 0);
+            int under = 0;
+            for (int e = 0; e < 77; e++) {
+                const double surface =
+                    mild_terrain_height_at(&kit.terrain, elements.point_x[e], elements.point_y[e]);
+                const double z = kit.input.position[0][2] + KIT_SOLE_Z;
+                worst = fmax(worst, fabs(elements.depth[e] - (surface - z)));
+                under += surface > z;
+            }
+            whole += under == 77;
+            part += under > 0 && under < 77;
+            kit_advance(&kit);
+        }
+        kit_close(&kit);
+    }
+    print_message("depths on waves: off by %.1e m; %d steps with all elements, %d with some\n",
+                  worst, whole, part);
+    assert_true(worst < 1e-12 && whole > 50 && part > 50);
+    mild_sole_destroy(sole);
+    mild_map_destroy(map);
+}
+
 static void test_patterns(void **state) {
     (void)state;
     MildMapDef def = mild_map_def_default();
@@ -728,7 +807,8 @@ int main(void) {
         cmocka_unit_test(test_shapes),        cmocka_unit_test(test_rough),
         cmocka_unit_test(test_rough_between), cmocka_unit_test(test_measures),
         cmocka_unit_test(test_defaults),      cmocka_unit_test(test_plane),
-        cmocka_unit_test(test_patterns),      cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_patterns),      cmocka_unit_test(test_fast_elements_are_found),
+        cmocka_unit_test(test_depths),        cmocka_unit_test(test_refused),
         cmocka_unit_test(test_bytes),         cmocka_unit_test(test_translation),
         cmocka_unit_test(test_smooth_border), cmocka_unit_test(test_slope_friction),
         cmocka_unit_test(test_solvers),       cmocka_unit_test(test_passive_by_hand),

@@ -344,6 +344,72 @@ static void test_lying_headers(void **state) {
     policy_destroy(policy);
 }
 
+/* Behind the header's last brace there are blanks only. */
+static void test_padding_is_blank(void **state) {
+    (void)state;
+    int padded = 0;
+    for (int n = 1; n <= 8; n++) { /* notes of any length modulo 8: some leave padding */
+        MildError error = {0};
+        Policy *policy = small_policy(4);
+        assert_int_equal(policy_save(policy, PATH, &"12345678"[8 - n], &error), MILD_OK);
+        policy_destroy(policy);
+        size_t size;
+        unsigned char *bytes = read_bytes(PATH, &size);
+        const size_t end = 8 + bytes[0] + 256u * bytes[1] + 65536u * bytes[2];
+        if (bytes[end - 1] == ' ') {
+            padded++;
+            bytes[end - 1] = '}';
+            assert_true(safetensors_seal(bytes, size));
+            write_bytes(PATH, bytes, size);
+            assert_refused(PATH);
+        }
+        free(bytes);
+        unlink(PATH);
+    }
+    assert_true(padded > 0);
+}
+
+/* A header that is no JSON is called unreadable; memory is another matter. */
+static void test_unreadable_header(void **state) {
+    (void)state;
+    MildError error = {0};
+    Policy *policy = small_policy(4);
+    assert_int_equal(policy_save(policy, PATH, NULL, &error), MILD_OK);
+    policy_destroy(policy);
+    size_t size;
+    unsigned char *bytes = read_bytes(PATH, &size);
+    bytes[9] = 'x'; /* in the place of a quote */
+    assert_true(safetensors_seal(bytes, size));
+    write_bytes(PATH, bytes, size);
+    assert_null(policy_load(PATH, NULL, 0, &error));
+    assert_non_null(strstr(error.text, "header cannot be read"));
+    free(bytes);
+    unlink(PATH);
+}
+
+/* The smallest network, and one with as many actions as there may be: made, saved, loaded. */
+static void test_extreme_shapes(void **state) {
+    (void)state;
+    PolicyDef def[2] = {small_def(), small_def()};
+    def[0].observation = def[0].frames = def[0].critic_input = def[0].actions = 1;
+    def[0].estimates = def[0].feet_velocity_count = 1;
+    def[0].feet_velocity_offset = 0;
+    def[1].actions = NETWORK_ACTIONS_MAX;
+    for (int i = 0; i < 2; i++) {
+        MildError error = {0};
+        Policy *policy = policy_create(&def[i], 4, &error);
+        assert_non_null(policy);
+        assert_int_equal(policy_save(policy, PATH, NULL, &error), MILD_OK);
+        Policy *loaded = policy_load(PATH, NULL, 0, &error);
+        assert_non_null(loaded);
+        assert_memory_equal(policy_parameters(loaded), policy_parameters(policy),
+                            parameter_bytes(policy));
+        policy_destroy(loaded);
+        policy_destroy(policy);
+        unlink(PATH);
+    }
+}
+
 /* Each text of the metadata left out of a file that is right otherwise: named, and called
  * missing. */
 static void test_missing_keys(void **state) {
@@ -462,6 +528,9 @@ int main(void) {
         cmocka_unit_test(test_damaged_files),
         cmocka_unit_test(test_lying_headers),
         cmocka_unit_test(test_missing_keys),
+        cmocka_unit_test(test_padding_is_blank),
+        cmocka_unit_test(test_unreadable_header),
+        cmocka_unit_test(test_extreme_shapes),
         cmocka_unit_test(test_full_disk),
         cmocka_unit_test(test_unusable_defs),
     };
