@@ -25,6 +25,7 @@ static const struct {
     {"elements", bench_elements, "the contact solver with 20 to 2000 elements"},
     {"solver", bench_solver, "newton against the paper's gauss_seidel sweeps, to the same error"},
     {"walk", bench_walk, "as step, along a walk of the shipped policy"},
+    {"batch", bench_batch, "the contact solver in batches, on train.device, along the same walk"},
     {"train", bench_train, "policy steps per second in training, and how the time is spent"},
 };
 enum { BENCHES = sizeof benches / sizeof *benches };
