@@ -197,12 +197,14 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
     const size_t bytes = (size_t)(count * feet) * sizeof(MaterialNumbers);
     MaterialNumbers *numbers = malloc(bytes);
     MildStatus status = MILD_OK;
+    int curves = 0;
     if (!numbers) {
         return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
     }
     for (int i = 0; i < count * feet && status == MILD_OK; i++) {
         status = material_numbers(&materials[i / feet], batch->pitch[i % feet], i / feet,
                                   &numbers[i], error);
+        curves |= status == MILD_OK ? numbers[i].curves : 0;
     }
     void *table = status == MILD_OK ? memory_alloc(batch->device, bytes, error) : NULL;
     if (status == MILD_OK && !table) {
@@ -219,6 +221,7 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
     memory_free(batch->device, batch->arrays.materials); /* waits until no step reads it */
     batch->arrays.materials = table;
     batch->material_count = count;
+    batch->curves = curves;
     return MILD_OK;
 }
 

@@ -31,6 +31,7 @@ struct MildBatch {
     BatchArrays arrays;
     int device;
     int material_count;
+    int curves;                  /* LawCurve bits of all materials */
     double pitch[MILD_FEET_MAX]; /* [m] */
 };
 

@@ -19,12 +19,12 @@ extern "C" size_t batch_memory_numbers(const BatchShape *shape);
 
 /* ---- the step ---- */
 
-#define DEVICE_KIND(groups, per)                                                                   \
-    __global__ void __launch_bounds__(THREADS, 2) device_robots_##groups##_##per(                  \
+#define DEVICE_ROBOTS(kind)                                                                        \
+    __global__ void __launch_bounds__(THREADS, 2) device_robots_##kind(                            \
         const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,      \
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
         const __grid_constant__ MildBatchOutput output, int advance) {                             \
-        __shared__ contact_Shared_##groups##_##per shared[WARPS];                                  \
+        __shared__ contact_Shared_##kind shared[WARPS];                                            \
         const int warp = (int)(threadIdx.x / LANES);                                               \
         const long robot = (long)blockIdx.x * WARPS + warp;                                        \
         if (robot >= shape.robots) {                                                               \
@@ -34,19 +34,27 @@ extern "C" size_t batch_memory_numbers(const BatchShape *shape);
         ContactResult result;                                                                      \
         batch_problem(&shape, &arrays, &input, robot, &problem);                                   \
         batch_result(&shape, &output, robot, &result);                                             \
-        contact_robot_##groups##_##per(&setup, &problem, &shared[warp],                            \
-                                       batch_memory(&shape, &arrays, robot), advance, &result);    \
+        contact_robot_##kind(&setup, &problem, &shared[warp],                                      \
+                             batch_memory(&shape, &arrays, robot), advance, &result);              \
     }
+#define DEVICE_KIND(groups, per) DEVICE_ROBOTS(groups##_##per)
+#define DEVICE_CONE_KIND(groups, per) DEVICE_ROBOTS(groups##_##per##_cone)
 CONTACT_KINDS(DEVICE_KIND)
+CONTACT_CONE_KINDS(DEVICE_CONE_KIND)
 
 typedef void (*DeviceRobots)(ContactSetup setup, BatchShape shape, BatchArrays arrays,
                              MildBatchInput input, MildBatchOutput output, int advance);
 
-static DeviceRobots device_robots(const BatchShape *shape) {
+static DeviceRobots device_robots(const BatchShape *shape, int curves) {
 #define DEVICE_CHOICE(g, p)                                                                        \
     if (shape->groups == g && shape->per == p) {                                                   \
         return device_robots_##g##_##p;                                                            \
     }
+#define DEVICE_CONE_CHOICE(g, p)                                                                   \
+    if (shape->groups == g && shape->per == p && !(curves & ~LAW_CONE)) {                          \
+        return device_robots_##g##_##p##_cone;                                                     \
+    }
+    CONTACT_CONE_KINDS(DEVICE_CONE_CHOICE)
     CONTACT_KINDS(DEVICE_CHOICE)
     return NULL;
 }
@@ -64,8 +72,8 @@ extern "C" MildStatus device_step(const MildBatch *batch, const MildBatchInput *
     const int blocks = (shape->robots + WARPS - 1) / WARPS;
     ContactSetup setup;
     batch_setup(shape, &batch->arrays, &setup);
-    device_robots(shape)<<<blocks, THREADS, 0, (cudaStream_t)stream>>>(setup, *shape, batch->arrays,
-                                                                       *input, *output, advance);
+    device_robots(shape, batch->curves)<<<blocks, THREADS, 0, (cudaStream_t)stream>>>(
+        setup, *shape, batch->arrays, *input, *output, advance);
     return checked(cudaGetLastError(), "step", error);
 }
 
