@@ -2,6 +2,7 @@
  * device is asked for. */
 #include "batch/batch.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +12,7 @@
 #include "bench/bench.h"
 #include "bench/record.h"
 
-enum { PERIODS = 300, GROUNDS = 2, PROBLEMS_MAX = 4000, REPEATS = 20 };
+enum { PERIODS = 300, GROUNDS = 2, PROBLEMS_MAX = 4000, REPEATS = 20, ARRAYS_MAX = 12 };
 static const char *const grounds[GROUNDS] = {"sand_loose", "grass"};
 
 /* One step of the walk: the problem, its solution in double, and the memory before it. */
@@ -35,7 +36,7 @@ typedef struct {
 typedef struct {
     MildBatch *batch;
     float *memory; /* as loaded */
-    void *array[9];
+    void *array[ARRAYS_MAX];
     int arrays;
     MildBatchInput input;
     MildBatchOutput output;
@@ -110,6 +111,7 @@ static void *device_array(BatchCase *c, int device, const void *from, size_t byt
                   bytes >> 20);
         return NULL;
     }
+    assert(c->arrays < ARRAYS_MAX);
     c->array[c->arrays++] = array;
     if (poison) {
         memset(poison, 0xff, bytes); /* NaN */
