@@ -1,17 +1,21 @@
-/* Many robots of one kind on a GPU, each stepped by a warp: the engine without soft ground, for
- * comparison with the CPU and for timing. In float; define MILD_REAL_FLOAT before the inclusion. */
+/* Many robots of one kind on a GPU, each stepped by a warp: in the air, on rigid ground or on soft
+ * ground. In float; define MILD_REAL_FLOAT before the inclusion. */
 #ifndef MILD_ENGINE_ROBOTS_H
 #define MILD_ENGINE_ROBOTS_H
 
 #include <cuda_runtime.h>
 
+#include "batch/batch.h"
 #include "engine/model.h"
 
 /* Arrays of all robots lie behind each other in the memory of the device. Joints are in the order
  * of robot.ini. */
 typedef struct {
     int count;
-    int rigid;                        /* bool: on a level rigid ground at height 0; else none */
+    int rigid;                        /* bool: on a level rigid ground at height 0 */
+    const MildBatch *ground;          /* soft ground under these robots at height 0, on the device,
+                                         of cones and lines only; NULL: none */
+    const int32_t *material;          /* [count] of the ground's table; NULL: 0 */
     Real *qpos;                       /* [count][7 + joints] as in RobotState */
     Real *qvel;                       /* [count][6 + joints] */
     const Real *torque;               /* [count][joints] [N m] held over the steps */
@@ -30,7 +34,8 @@ cudaError_t engine_step_robots(const EngineModel *model, const EngineRobots *rob
                                cudaStream_t stream);
 /* [B] of shared memory that a robot takes. */
 size_t engine_shared_bytes(void);
-/* Registers, stack and static shared memory of the kernel, and robots that a multiprocessor holds. */
-cudaError_t engine_kernel_facts(cudaFuncAttributes *facts, int *robots_at_once);
+/* Registers, stack and static shared memory of the kernel with or without soft ground, and robots
+ * that a multiprocessor holds. */
+cudaError_t engine_kernel_facts(int soft, cudaFuncAttributes *facts, int *robots_at_once);
 
 #endif

@@ -198,25 +198,107 @@ static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid
     return worst[0].qacc < (rigid ? 1e-3 : 1e-4) && bad == 0;
 }
 
-/* ---- speed ---- */
+/* ---- soft ground ---- */
 
-/* Fastest and slowest of a few runs. */
-static void time_robots(const DeviceRobot &robot, const EngineModel *model, int rigid, int count,
-                        int steps) {
-    enum { RUNS = 5, LAUNCHES = 20 };
+static MildBatch *ground_of(int robots) {
+    MildError error = {MILD_OK, {0}};
+    MildBatchDef def = {robots, ROBOT_FEET_MAX, device_soles(), dt, 0, 0, 0};
+    def.feet = ENGINE_FIXED ? ENGINE_FEET : 2;
+    MildBatch *ground = mild_batch_create(&def, &error);
+    if (!ground) {
+        fprintf(stderr, "%s\n", error.text);
+        exit(2);
+    }
+    return ground;
+}
+
+/* Robots that come down on sand with different legs and speeds, their motors holding a pose. */
+static std::vector<EngineCase> landings(const DeviceRobot &robot, int count) {
     std::vector<EngineCase> cases((size_t)count, robot.stand);
     for (int i = 0; i < count; i++) {
-        for (int j = 0; j < robot.tree.joints; j++) { /* not all alike */
+        cases[i].qpos[2] += 0.01;
+        cases[i].qvel[0] = 0.3 * sin(1.7 * i);
+        cases[i].qvel[1] = 0.1 * sin(2.3 * i);
+        for (int j = 0; j < robot.tree.joints; j++) {
             cases[i].qpos[7 + j] += 0.05 * sin(i + 3 * j);
         }
+        for (double &x : cases[i].qpos) {
+            x = (float)x;
+        }
+        for (double &x : cases[i].qvel) {
+            x = (float)x;
+        }
     }
-    EngineRobots robots = robots_of(robot, cases, rigid, 1);
+    return cases;
+}
+
+/* A while on sand, against MuJoCo with mild/ground.h. */
+static int compare_soft(const DeviceRobot &robot, const EngineModel *model, int count, int steps) {
+    const std::vector<EngineCase> cases = landings(robot, count);
+    MildBatch *ground = ground_of(count);
+    EngineRobots robots = robots_of(robot, cases, 0, 1);
+    robots.ground = ground;
+    robots.push = nullptr;
+    check(engine_step_robots(model, &robots, steps, 0), "step");
+    check(cudaDeviceSynchronize(), "step");
+    const Answers got = answers_of(robot, robots);
+    double height = 0, joint = 0, speed = 0;
+    int bad = 0;
+    for (int i = 0; i < count; i++) {
+        double qpos[ROBOT_NQ_MAX], qvel[ROBOT_NV_MAX];
+        bad += !device_soft_reference(&robot, &cases[i], steps, qpos, qvel) || got.bad[i];
+        const size_t q = (size_t)i * (7 + robot.tree.joints),
+                     v = (size_t)i * (6 + robot.tree.joints);
+        for (int k = 0; k < 3; k++) {
+            note(&height, fabs(got.qpos[q + k] - qpos[k]));
+            note(&speed, fabs(got.qvel[v + k] - qvel[k]));
+        }
+        for (int j = 0; j < robot.tree.joints; j++) {
+            note(&joint, fabs(got.qpos[q + 7 + j] - qpos[7 + j]));
+        }
+    }
+    printf("on sand,      %d robots, %d steps, device against MuJoCo and mild/ground.h in double: "
+           "base %.1e m, its speed %.1e m/s, joints %.1e rad, %d bad\n",
+           count, steps, height, speed, joint, bad);
+    free_robots(&robots);
+    mild_batch_destroy(ground);
+    return height < 1e-3 && joint < 1e-2 && bad == 0;
+}
+
+/* ---- speed ---- */
+
+enum Kind { AIR, RIGID, SAND, KINDS };
+static const char *const names[KINDS] = {"in the air,", "rigid ground,", "on sand,"};
+
+/* Fastest and slowest of a few runs. */
+static void time_robots(const DeviceRobot &robot, const EngineModel *model, Kind kind, int count,
+                        int steps) {
+    enum { RUNS = 5, LAUNCHES = 20 };
+    const std::vector<EngineCase> cases = landings(robot, count);
+    EngineRobots robots = robots_of(robot, cases, kind == RIGID, 1);
+    const std::vector<float> qpos =
+        from_device(robots.qpos, (size_t)count * (7 + robot.tree.joints));
+    const std::vector<float> qvel =
+        from_device(robots.qvel, (size_t)count * (6 + robot.tree.joints));
+    MildBatch *ground = kind == SAND ? ground_of(count) : nullptr;
+    MildError error = {MILD_OK, {0}};
+    robots.ground = ground;
+    robots.push = nullptr;
     cudaEvent_t begin, end;
     check(cudaEventCreate(&begin), "event");
     check(cudaEventCreate(&end), "event");
     float best = 1e30f, worst = 0;
     for (int run = 0; run < RUNS; run++) {
         float ms = 0;
+        if (ground) { /* every run is the same landing */
+            check(cudaMemcpy(robots.qpos, qpos.data(), qpos.size() * sizeof(float),
+                             cudaMemcpyHostToDevice),
+                  "copy");
+            check(cudaMemcpy(robots.qvel, qvel.data(), qvel.size() * sizeof(float),
+                             cudaMemcpyHostToDevice),
+                  "copy");
+            mild_batch_reset(ground, nullptr, nullptr, &error);
+        }
         check(cudaEventRecord(begin), "event");
         for (int launch = 0; launch < LAUNCHES; launch++) {
             check(engine_step_robots(model, &robots, steps, 0), "step");
@@ -229,10 +311,11 @@ static void time_robots(const DeviceRobot &robot, const EngineModel *model, int 
     }
     const double total = 1e-3 * (double)count * steps * LAUNCHES; /* [1000 steps] */
     printf("%-13s %6d robots, %2d steps a launch: %7.1f M steps/s (slowest run %.1f)\n",
-           rigid ? "rigid ground," : "in the air,", count, steps, total / best, total / worst);
+           names[kind], count, steps, total / best, total / worst);
     cudaEventDestroy(begin);
     cudaEventDestroy(end);
     free_robots(&robots);
+    mild_batch_destroy(ground);
 }
 
 int main(int argc, char **argv) {
@@ -255,16 +338,20 @@ int main(int argc, char **argv) {
     const EngineModel *there = on_device(std::vector<EngineModel>(1, model));
     cudaFuncAttributes facts;
     int at_once = 0;
-    check(engine_kernel_facts(&facts, &at_once), "kernel");
-    printf("%d registers, %zu bytes of local memory, %zu bytes of shared memory a robot, %d robots "
-           "a multiprocessor\n",
-           facts.numRegs, facts.localSizeBytes, engine_shared_bytes(), at_once);
-    const int good = compare(robot, there, 0, states) & compare(robot, there, 1, states);
+    for (int soft = 0; soft < 2; soft++) {
+        check(engine_kernel_facts(soft, &facts, &at_once), "kernel");
+        printf("%s: %d registers, %zu bytes of local memory, %zu bytes of shared memory a robot, "
+               "%d robots a multiprocessor\n",
+               soft ? "soft ground" : "without", facts.numRegs, facts.localSizeBytes,
+               engine_shared_bytes(), at_once);
+    }
+    const int good = compare(robot, there, 0, states) & compare(robot, there, 1, states) &
+                     compare_soft(robot, there, 64, 1) & compare_soft(robot, there, 64, 100);
     static const int counts[] = {4096, 16384, 65536};
-    for (int rigid = 0; rigid < 2; rigid++) {
+    for (int kind = 0; kind < KINDS; kind++) {
         for (int count : counts) {
-            time_robots(robot, there, rigid, count, 1);
-            time_robots(robot, there, rigid, count, 4);
+            time_robots(robot, there, (Kind)kind, count, 1);
+            time_robots(robot, there, (Kind)kind, count, 4);
         }
     }
     printf("%s\n", good ? "ok" : "FAILED");
