@@ -1,4 +1,4 @@
-/* Private to the robot layer: what a Robot knows, from robot.ini and the compiled MJCF. */
+/* Private to the layers robot and engine: what a Robot knows, from robot.ini and the compiled MJCF. */
 #ifndef ROBOT_DESCRIPTION_H
 #define ROBOT_DESCRIPTION_H
 

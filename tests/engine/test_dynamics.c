@@ -1,0 +1,359 @@
+/* The batch engine against MuJoCo: every phase of a step on random states of four robots of
+ * different shape, in double and in float.
+ *
+ * Errors are relative to what a component could be at the same energy: with the inertia M an
+ * acceleration a has |a_i| <= sqrt((M^-1)_ii a^T M a), and so on for velocities, forces f with
+ * sqrt(M_ii f^T M^-1 f) and twists with sqrt(A_rr v^T M v); entries of M and A relate to the
+ * diagonal, M_ij to sqrt(M_ii M_jj). So a light ankle is not hidden behind a heavy trunk. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "oracle.h"
+
+#include "base/random.h"
+#include "control/stand.h"
+
+#include "../sa01.h"
+#include "../widest.h"
+
+#define DT 0.0025
+#define LIMIT_DOUBLE 1e-9
+#define LIMIT_FLOAT 1e-4
+
+/* ---- robots ---- */
+
+typedef struct {
+    Robot *robot;
+    RobotSim *sim;
+    EngineTree tree;
+    double number[ENGINE_NUMBERS];
+} Kit;
+
+enum { SA01_KIT, GO1_KIT, LOPSIDED_KIT, WIDEST_KIT, KITS };
+static const char *const kit_name[KITS] = {"sa01", "go1", "lopsided", "widest"};
+static Kit kits[KITS];
+static Oracle oracle;
+static EngineResult result;
+
+static Robot *open_robot(int k, MildError *error) {
+    switch (k) {
+    case SA01_KIT: return robot_create(MILD_SOURCE_DIR "/robots/sa01", error);
+    case GO1_KIT: return robot_create(MILD_SOURCE_DIR "/robots/go1", error);
+    case LOPSIDED_KIT: return robot_create(MILD_SOURCE_DIR "/tests/engine/lopsided", error);
+    default: return widest_open(error);
+    }
+}
+
+static int setup(void **unused) {
+    (void)unused;
+    for (int k = 0; k < KITS; k++) {
+        MildError error = {0};
+        Kit *kit = &kits[k];
+        kit->robot = open_robot(k, &error);
+        if (!kit->robot) {
+            fail_msg("%s", error.text);
+        }
+        if (k == LOPSIDED_KIT) { /* robot files may not have it; the engine knows what it is */
+            for (int d = 6; d < kit->robot->nv; d++) {
+                kit->robot->model->dof_damping[d] = 0.2 * (d % 4);
+            }
+        }
+        kit->sim = robot_sim_create(kit->robot, DT, &error);
+        assert_non_null(kit->sim);
+        assert_int_equal(engine_model_read(kit->robot, DT, &kit->tree, kit->number, &error),
+                         MILD_OK);
+    }
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    for (int k = 0; k < KITS; k++) {
+        robot_sim_destroy(kits[k].sim);
+        if (k != WIDEST_KIT) {
+            robot_destroy(kits[k].robot);
+        }
+    }
+    return widest_close(kits[WIDEST_KIT].robot);
+}
+
+/* ---- errors ---- */
+
+enum {
+    MASS,
+    FORCE,
+    SMOOTH,
+    FOOT_POSE,
+    FOOT_TWIST,
+    FOOT_INERTIA,
+    FREE_VELOCITY,
+    WRENCHED,
+    LIMITED,
+    GROUND_WRENCH,
+    NEXT_POSE,
+    NEXT_RATE,
+    ERRORS
+};
+static const char *const error_name[ERRORS] = {"M",
+                                               "torque and push less bias",
+                                               "qacc without ground",
+                                               "pose of feet [m, -]",
+                                               "J qvel",
+                                               "A",
+                                               "V_free",
+                                               "qacc with wrenches",
+                                               "with rows",
+                                               "wrench of the ground",
+                                               "qpos after [m, rad]",
+                                               "qvel after"};
+
+typedef double Worst[ERRORS];
+
+static void note(Worst worst, int kind, double error) {
+    worst[kind] = error <= worst[kind] ? worst[kind] : error; /* NaN included */
+}
+
+/* Quadratic form x^T S x. */
+static double energy(const double *S, const double *x, int n) {
+    double sum = 0;
+    for (int i = 0; i < n; i++) {
+        sum += x[i] * oracle_dot(S + i * n, x, n);
+    }
+    return sum;
+}
+
+/* Components of `got` against those of `want` at the same energy x^T S x, where `natural` has on its
+ * diagonal the square of a component at energy 1. */
+static void note_vector(Worst worst, int kind, const double *got, const double *want, int count,
+                        const double *natural, double energy_of) {
+    for (int i = 0; i < count; i++) {
+        double scale = sqrt(natural[i * count + i] * energy_of);
+        if (scale > 0 || got[i] != want[i]) {
+            note(worst, kind, fabs(got[i] - want[i]) / scale);
+        }
+    }
+}
+
+static void note_matrices(const Kit *kit, Worst worst) {
+    const EngineTree *tree = &kit->tree;
+    const int nv = kit->robot->nv;
+    const int rows = 6 * tree->feet;
+    const double *M = oracle.mass;
+    for (int e = 0; e < tree->entries; e++) {
+        const int d = tree->entry_dof[e];
+        const int place = tree->entry_place[e];
+        const int j = place < 6 ? place : 5 + tree->ancestor[d - 5][place - 5];
+        note(worst, MASS,
+             fabs(result.mass[e] - M[d * nv + j]) / sqrt(M[d * nv + d] * M[j * nv + j]));
+    }
+    const double *A = oracle.inverse_inertia;
+    const double *got = result.inverse_inertia;
+    for (int r = 0; r < rows; r++) {
+        for (int c = 0; c < rows; c++) {
+            double scale = sqrt(A[r * rows + r] * A[c * rows + c]);
+            if (scale > 0 || got[r * rows + c] != 0) {
+                note(worst, FOOT_INERTIA, fabs(got[r * rows + c] - A[r * rows + c]) / scale);
+            }
+        }
+    }
+}
+
+static void note_feet(const Kit *kit, const double *free, Worst worst) {
+    const int nv = kit->robot->nv;
+    const int rows = 6 * kit->tree.feet;
+    for (int f = 0; f < kit->tree.feet; f++) {
+        for (int k = 0; k < 9; k++) {
+            note(worst, FOOT_POSE, fabs(result.rotation[f][k] - oracle.rotation[f][k]));
+        }
+        for (int k = 0; k < 3; k++) {
+            note(worst, FOOT_POSE, fabs(result.position[f][k] - oracle.position[f][k]));
+        }
+    }
+    note_vector(worst, FOOT_TWIST, result.velocity[0], oracle.velocity, rows,
+                oracle.inverse_inertia, energy(oracle.mass, kit->sim->data->qvel, nv));
+    note_vector(worst, FREE_VELOCITY, result.free_velocity[0], oracle.free_velocity, rows,
+                oracle.inverse_inertia, energy(oracle.mass, free, nv));
+}
+
+static void note_wrench(const Kit *kit, Worst worst) {
+    double most = 0;
+    for (int f = 0; f < kit->tree.feet; f++) {
+        most = fmax(most, mju_norm3(oracle.wrench[f]));
+    }
+    for (int n = 0; n < 6 * kit->tree.feet; n++) {
+        double arm = n % 6 < 3 ? 1 : 0.1; /* [m] */
+        double error = fabs(result.wrench[n / 6][n % 6] - oracle.wrench[n / 6][n % 6]);
+        note(worst, GROUND_WRENCH, error == 0 ? 0 : error / (most * arm));
+    }
+}
+
+static void note_step(const Kit *kit, Worst worst) {
+    const int nv = kit->robot->nv;
+    double engine[ROBOT_NV_MAX]; /* in the engine's order */
+    double want[ROBOT_NV_MAX];
+    memcpy(engine, result.qvel, sizeof engine);
+    memcpy(want, oracle.qvel, sizeof want);
+    for (int j = 0; j < kit->tree.joints; j++) {
+        engine[kit->robot->dof[j]] = result.qvel[6 + j];
+        want[kit->robot->dof[j]] = oracle.qvel[6 + j];
+    }
+    note_vector(worst, NEXT_RATE, engine, want, nv, oracle.inverse, energy(oracle.mass, want, nv));
+    double sign = oracle_dot(result.qpos + 3, oracle.qpos + 3, 4) < 0 ? -1 : 1;
+    for (int i = 0; i < kit->robot->nq; i++) {
+        double got = i >= 3 && i < 7 ? sign * result.qpos[i] : result.qpos[i];
+        note(worst, NEXT_POSE, fabs(got - oracle.qpos[i]));
+    }
+    assert_int_equal(result.bad, 0);
+}
+
+/* Of the case that oracle and result are of. before: the velocities before the step. */
+static void note_case(const Kit *kit, const EngineCase *in, const double *before, Worst worst) {
+    const int nv = kit->robot->nv;
+    const double *M = oracle.mass;
+    const double *inverse = oracle.inverse;
+    double free[ROBOT_NV_MAX];
+    for (int i = 0; i < nv; i++) {
+        free[i] = before[i] + DT * oracle.smooth[i];
+    }
+    memcpy(kit->sim->data->qvel, before, (size_t)nv * sizeof(double));
+    note_vector(worst, FORCE, result.force, oracle.force, nv, M, energy(inverse, oracle.force, nv));
+    note_vector(worst, SMOOTH, result.smooth, oracle.smooth, nv, inverse,
+                energy(M, oracle.smooth, nv));
+    if (in->variation.rigid) {
+        note_wrench(kit, worst);
+    } else {
+        note_matrices(kit, worst);
+        note_feet(kit, free, worst);
+        note_vector(worst, WRENCHED, result.wrenched, oracle.wrenched, nv, inverse,
+                    energy(M, oracle.wrenched, nv));
+    }
+    note_vector(worst, LIMITED, result.acceleration, oracle.acceleration, nv, inverse,
+                energy(M, oracle.acceleration, nv));
+    note_step(kit, worst);
+}
+
+/* ---- cases ---- */
+
+static void spread(Random *random, double *x, int count, double size) {
+    for (int i = 0; i < count; i++) {
+        x[i] = random_uniform(random, -size, size);
+    }
+}
+
+static RobotVariation random_variation(const Robot *robot, Random *random) {
+    RobotVariation variation = robot_variation_nominal();
+    variation.base_mass_add = random_uniform(random, -0.15, 0.3) * robot->total_mass / 2;
+    spread(random, variation.com_offset, 3, 0.05);
+    for (int i = 0; i <= robot->def.joints; i++) {
+        variation.link_mass_scale[i] = random_uniform(random, 0.7, 1.3);
+    }
+    variation.armature_scale = random_uniform(random, 0.7, 1.3);
+    variation.rigid_friction = random_uniform(random, 0.2, 1.2);
+    return variation;
+}
+
+/* Any pose, in violent motion; in every third case some joints are beyond a limit. */
+static EngineCase random_case(const Robot *robot, uint32_t draw) {
+    EngineCase in = {.variation = {.rigid = 0}};
+    Random random = random_at(41, draw, 0);
+    double norm = 0;
+    in.variation = random_variation(robot, &random);
+    spread(&random, in.qpos, 3, 3);
+    for (int k = 3; k < 7; k++) {
+        in.qpos[k] = random_normal(&random);
+        norm += in.qpos[k] * in.qpos[k];
+    }
+    for (int k = 3; k < 7; k++) {
+        in.qpos[k] /= sqrt(norm);
+    }
+    for (int j = 0; j < robot->def.joints; j++) {
+        double low = robot->low[j], high = robot->high[j];
+        double margin = 0.03 * (high - low);
+        in.qpos[7 + j] = random_uniform(&random, low + margin, high - margin);
+        if (draw % 3 == 0 && random_unit(&random) < 0.25) {
+            double beyond = random_uniform(&random, 0, 0.1);
+            in.qpos[7 + j] = random_unit(&random) < 0.5 ? low - beyond : high + beyond;
+        }
+        in.torque[j] = random_uniform(&random, -1, 1) * robot->effort[j];
+    }
+    spread(&random, in.qvel, 6, 4);
+    spread(&random, in.qvel + 6, robot->def.joints, 8);
+    spread(&random, in.push, 3, 150);
+    spread(&random, in.push + 3, 3, 30);
+    for (int f = 0; f < robot->def.feet; f++) {
+        spread(&random, in.wrench[f], 3, 500);
+        spread(&random, in.wrench[f] + 3, 3, 40);
+    }
+    return in;
+}
+
+/* Float takes these numbers as they are, so that its error is that of its arithmetic. */
+static void round_case(EngineCase *in) {
+    double *number = (double *)in;
+    size_t count = offsetof(EngineCase, variation) / sizeof(double);
+    for (size_t i = 0; i < count; i++) {
+        number[i] = (double)(float)number[i];
+    }
+}
+
+static void print_worst(const char *name, int cases, const Worst at_double, const Worst at_float) {
+    print_message("%s, %d cases                    double    float\n", name, cases);
+    for (int k = 0; k < ERRORS; k++) {
+        print_message("    %-28s %8.1e %8.1e\n", error_name[k], at_double[k], at_float[k]);
+    }
+}
+
+static void check_worst(const Worst at_double, const Worst at_float) {
+    for (int k = 0; k < ERRORS; k++) {
+        assert_true(at_double[k] < LIMIT_DOUBLE);
+        assert_true(at_float[k] < LIMIT_FLOAT);
+    }
+}
+
+/* A case by MuJoCo and by both texts. */
+static void run_case(const Kit *kit, const EngineCase *in, Worst at_double, Worst at_float,
+                     int *newton) {
+    double before[ROBOT_NV_MAX];
+    memcpy(before, in->qvel, sizeof before);
+    for (int j = 0; j < kit->tree.joints; j++) {
+        before[kit->robot->dof[j]] = in->qvel[6 + j];
+    }
+    oracle_step(kit->sim, in, &oracle);
+    engine_text_double(&kit->tree, kit->number, in, &result);
+    note_case(kit, in, before, at_double);
+    *newton = result.newton > *newton ? result.newton : *newton;
+    engine_text_float(&kit->tree, kit->number, in, &result);
+    note_case(kit, in, before, at_float);
+    *newton = result.newton > *newton ? result.newton : *newton;
+}
+
+static void test_random_states(void **unused) {
+    (void)unused;
+    static const int cases[KITS] = {10000, 10000, 10000, 600};
+    for (int k = 0; k < KITS; k++) {
+        Worst at_double = {0}, at_float = {0};
+        int limited = 0, newton = 0;
+        for (uint32_t draw = 0; draw < (uint32_t)cases[k]; draw++) {
+            EngineCase in = random_case(kits[k].robot, draw);
+            round_case(&in);
+            run_case(&kits[k], &in, at_double, at_float, &newton);
+            limited += oracle.rows > 0;
+        }
+        print_worst(kit_name[k], cases[k], at_double, at_float);
+        print_message("    beyond limits: %d; at most %d Newton steps\n", limited, newton);
+        check_worst(at_double, at_float);
+        assert_true(limited > cases[k] / 5);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_random_states),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
