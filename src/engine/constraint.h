@@ -180,9 +180,8 @@ LANE_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
     lanes_meet();
 }
 
-/* For each foot, sums over its pushing edges: the stiffness, and the wrench [feet][6] of `weight`
- * times the reference (where forces are asked for: times minus x). */
-LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, int forces) {
+/* For each foot, sums over its pushing edges: the stiffness, and the wrench of their forces. */
+LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work) {
     EngineContact *contact = &work->now.support.ground.contact;
     EACH_LANE(l) {
         for (int n = LANE(l); n < 42 * engine_feet(tree); n += LANES) {
@@ -193,8 +192,7 @@ LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, int 
             for (int row = 4 * tree->corner_begin[f]; row < 4 * tree->corner_begin[f + 1]; row++) {
                 const Real x = contact->residual[row];
                 const Real *edge = contact->edge[row];
-                const Real value =
-                    c < 6 ? edge[c < 6 ? c : 0] : (forces ? -x : contact->reference[row]);
+                const Real value = c < 6 ? edge[c < 6 ? c : 0] : -x;
                 sum += x < 0 ? contact->weight[row] * edge[r] * value : 0;
             }
             if (c < 6) {
@@ -263,11 +261,12 @@ MILD_HD int limit_pushes(const EngineWork *work, int i) {
     return work->limit_side[i] != 0 && limit_residual(work, i) < 0;
 }
 
-/* factor <- L of M + J^T weight J, change <- force + J^T weight reference, over the pushing rows. */
+/* factor <- L of M + J^T weight J over the pushing rows; change <- what is left of the forces, of
+ * the rows and of M a, which is the descent of the cost; residue <- the part of it without rows. */
 LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int edges) {
     EngineSupport *support = &work->now.support;
     if (edges) {
-        engine_push_of_edges(tree, work, 0);
+        engine_push_of_edges(tree, work);
         engine_stiffen_rows(tree, support);
     }
     EACH_LANE(l) {
@@ -285,14 +284,17 @@ LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
             work->factor[e] = sum;
         }
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-            Real sum = work->force[d];
+            const Real residue =
+                work->force[d] - mass_times(tree, work->mass, work->acceleration, d);
+            Real sum = residue;
             if (edges) {
                 sum += pushes_along(tree, work, d);
             }
             if (d >= 6 && limit_pushes(work, d - 5)) {
-                sum += work->limit_side[d - 5] * work->limit_weight[d - 5] *
-                       work->limit_reference[d - 5];
+                sum -= work->limit_side[d - 5] * work->limit_weight[d - 5] *
+                       limit_residual(work, d - 5);
             }
+            support->residue[d] = residue;
             support->change[d] = sum;
         }
     }
@@ -357,7 +359,7 @@ LANE_FN LinePoint engine_line_smooth(const EngineTree *tree, EngineWork *work) {
         slope[l] = curvature[l] = 0;
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             const Real product = mass_times(tree, work->mass, support->change, d);
-            slope[l] += work->acceleration[d] * product - work->force[d] * support->change[d];
+            slope[l] -= support->residue[d] * support->change[d];
             curvature[l] += support->change[d] * product;
         }
     }
@@ -421,12 +423,6 @@ LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges
         engine_newton_system(tree, work, edges);
         engine_solve_transposed(tree, work->factor, support->change);
         engine_solve(tree, work->factor, support->change);
-        EACH_LANE(l) {
-            for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-                support->change[d] -= work->acceleration[d];
-            }
-        }
-        lanes_meet();
         if (edges) {
             engine_twists(tree, support, support->change, contact->twist_change);
         }
@@ -439,7 +435,7 @@ LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges
     }
     if (edges) {
         engine_residuals(tree, work);
-        engine_push_of_edges(tree, work, 1);
+        engine_push_of_edges(tree, work);
     }
     return step;
 }

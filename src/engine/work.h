@@ -44,7 +44,7 @@ typedef struct {
         EngineContact contact;                                   /* rigid ground */
     } ground;
     Real change[ENGINE_DOFS];  /* of the acceleration in a Newton step */
-    Real product[ENGINE_DOFS]; /* M times it */
+    Real residue[ENGINE_DOFS]; /* force less M qacc there */
 } EngineSupport;
 
 typedef struct {

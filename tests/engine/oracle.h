@@ -146,7 +146,7 @@ static inline void oracle_wrench(RobotSim *sim, Oracle *o) {
     }
 }
 
-/* Limits and contacts, to the last bit of MuJoCo's solver, then the step. */
+/* Limits and contacts, solved as far as MuJoCo can, then the step. */
 static inline void oracle_finish(RobotSim *sim, Oracle *o) {
     mjModel *m = sim->model;
     mjData *d = sim->data;
@@ -154,9 +154,9 @@ static inline void oracle_finish(RobotSim *sim, Oracle *o) {
     memcpy(d->qacc_smooth, o->wrenched, (size_t)nv * sizeof(double));
     memcpy(d->qacc_warmstart, o->wrenched, (size_t)nv * sizeof(double));
     mj_mulM(m, d, d->qfrc_smooth, o->wrenched);
-    m->opt.tolerance = 0;
+    m->opt.tolerance = 1e-15;
     m->opt.ls_tolerance = 1e-12;
-    m->opt.iterations = 1000;
+    m->opt.iterations = 100;
     mj_makeConstraint(m, d);
     mj_projectConstraint(m, d);
     mj_referenceConstraint(m, d);
