@@ -123,8 +123,9 @@ MILD_HD void engine_unit_force(const EngineWork *work, int d, Real *out) {
     const Real *moment = inertia + INERTIA_MOMENT;
     const Real *R = work->rotation[0];
     if (d < 3) {
-        const Real unit[3] = {d == 0, d == 1, d == 2};
+        Real unit[3];
         for (int k = 0; k < 3; k++) {
+            unit[k] = k == d ? REAL(1) : REAL(0);
             out[k] = inertia[INERTIA_MASS] * unit[k];
         }
         cross3(moment, unit, out + 3);

@@ -13,9 +13,9 @@
 
 #include <cmocka.h>
 
+#include "cases.h"
 #include "oracle.h"
 
-#include "base/random.h"
 #include "control/stand.h"
 
 #include "../sa01.h"
@@ -241,71 +241,6 @@ static void note_case(const Kit *kit, const EngineCase *in, const double *before
 
 /* ---- cases ---- */
 
-static void spread(Random *random, double *x, int count, double size) {
-    for (int i = 0; i < count; i++) {
-        x[i] = random_uniform(random, -size, size);
-    }
-}
-
-static RobotVariation random_variation(const Robot *robot, Random *random) {
-    RobotVariation variation = robot_variation_nominal();
-    variation.base_mass_add = random_uniform(random, -0.15, 0.3) * robot->total_mass / 2;
-    spread(random, variation.com_offset, 3, 0.05);
-    for (int i = 0; i <= robot->def.joints; i++) {
-        variation.link_mass_scale[i] = random_uniform(random, 0.7, 1.3);
-    }
-    variation.armature_scale = random_uniform(random, 0.7, 1.3);
-    variation.rigid_friction = random_uniform(random, 0.2, 1.2);
-    return variation;
-}
-
-/* Any pose, in violent motion; in every third case some joints are beyond a limit. */
-static EngineCase random_case(const Robot *robot, uint32_t draw) {
-    EngineCase in = {.variation = {.rigid = 0}};
-    Random random = random_at(41, draw, 0);
-    double norm = 0;
-    in.variation = random_variation(robot, &random);
-    spread(&random, in.qpos, 3, 3);
-    for (int k = 3; k < 7; k++) {
-        in.qpos[k] = random_normal(&random);
-        norm += in.qpos[k] * in.qpos[k];
-    }
-    for (int k = 3; k < 7; k++) {
-        in.qpos[k] /= sqrt(norm);
-    }
-    for (int j = 0; j < robot->def.joints; j++) {
-        double low = robot->low[j], high = robot->high[j];
-        double margin = 0.03 * (high - low);
-        in.qpos[7 + j] = random_uniform(&random, low + margin, high - margin);
-        if (draw % 3 == 0 && random_unit(&random) < 0.25) {
-            double beyond = random_uniform(&random, 1e-4, 0.1);
-            in.qpos[7 + j] = random_unit(&random) < 0.5 ? low - beyond : high + beyond;
-        }
-        in.torque[j] = random_uniform(&random, -1, 1) * robot->effort[j];
-    }
-    spread(&random, in.qvel, 6, 4);
-    spread(&random, in.qvel + 6, robot->def.joints, 8);
-    spread(&random, in.push, 3, 150);
-    spread(&random, in.push + 3, 3, 30);
-    for (int f = 0; f < robot->def.feet; f++) {
-        spread(&random, in.wrench[f], 3, 500);
-        spread(&random, in.wrench[f] + 3, 3, 40);
-    }
-    return in;
-}
-
-/* Float takes these numbers as they are, so that its error is that of its arithmetic. */
-static void round_case(EngineCase *in) {
-    double *number = (double *)in;
-    size_t count = offsetof(EngineCase, variation) / sizeof(double);
-    for (size_t i = 0; i < count; i++) {
-        number[i] = (double)(float)number[i];
-    }
-    in->height = (double)(float)in->height;
-    in->slope[0] = (double)(float)in->slope[0];
-    in->slope[1] = (double)(float)in->slope[1];
-}
-
 static void print_worst(const char *name, int cases, const Worst at_double, const Worst at_float) {
     print_message("%s, %d cases                    double    float\n", name, cases);
     for (int k = 0; k < ERRORS; k++) {
@@ -345,7 +280,6 @@ static void test_random_states(void **unused) {
         int limited = 0, newton = 0;
         for (uint32_t draw = 0; draw < (uint32_t)cases[k]; draw++) {
             EngineCase in = random_case(kits[k].robot, draw);
-            round_case(&in);
             run_case(&kits[k], &in, at_double, at_float, &newton);
             limited += oracle.rows > 0;
         }
@@ -358,59 +292,6 @@ static void test_random_states(void **unused) {
 
 /* ---- rigid ground ---- */
 
-/* [m] By how much the robot of the case may sink before a corner touches the plane. */
-static double clearance(const Kit *kit, const EngineCase *in) {
-    const mjModel *m = kit->sim->model;
-    const double steep = sqrt(1 + in->slope[0] * in->slope[0] + in->slope[1] * in->slope[1]);
-    RobotState state = {.qpos = {0}};
-    double least = 1e9;
-    memcpy(state.qpos, in->qpos, sizeof state.qpos);
-    robot_sim_load(kit->sim, &state, &in->variation);
-    for (int g = 0; g < m->ngeom; g++) {
-        const double *c = kit->sim->data->geom_xpos + 3 * g;
-        double height = in->height + in->slope[0] * c[0] + in->slope[1] * c[1];
-        if (g != kit->robot->floor_geom) {
-            least = fmin(least, c[2] - height - steep * m->geom_size[3 * g]);
-        }
-    }
-    return least;
-}
-
-/* Near the default pose, the lowest corner of the feet up to 4 mm in the ground, or above it. Half
- * of the cases move as a stand does, half as a walk, some with joints beyond their limits. */
-static EngineCase rigid_case(const Kit *kit, uint32_t draw) {
-    const Robot *robot = kit->robot;
-    EngineCase in = {.qpos = {0}};
-    Random random = random_at(43, draw, 0);
-    double motion = draw % 2 ? 1 : 0.05;
-    in.variation = random_variation(robot, &random);
-    in.variation.rigid = 1;
-    spread(&random, in.qpos, 2, 3);
-    in.qpos[3] = 1;
-    spread(&random, in.qpos + 4, 2, 0.02 + 0.1 * motion);
-    in.qpos[6] = random_uniform(&random, -1, 1);
-    mju_normalize4(in.qpos + 3);
-    for (int j = 0; j < robot->def.joints; j++) {
-        double off = random_uniform(&random, -0.05, 0.05) * (1 + 5 * motion);
-        in.qpos[7 + j] =
-            fmin(fmax(robot->def.pose[j] + off, robot->low[j] + 0.03), robot->high[j] - 0.03);
-        if (draw % 5 == 0 && random_unit(&random) < 0.15) {
-            in.qpos[7 + j] = robot->high[j] + random_uniform(&random, 1e-4, 0.02);
-        }
-        in.torque[j] = random_uniform(&random, -0.5, 0.5) * robot->effort[j];
-    }
-    spread(&random, in.qvel, 3, 1.5 * motion);
-    spread(&random, in.qvel + 3, 3, 2 * motion);
-    spread(&random, in.qvel + 6, robot->def.joints, 4 * motion);
-    spread(&random, in.push, 3, 50);
-    in.height = random_uniform(&random, -0.2, 0.2);
-    if (draw % 4 >= 2) {
-        spread(&random, in.slope, 2, draw % 8 == 7 ? 1 : 0.2);
-    }
-    in.qpos[2] -= clearance(kit, &in) + random_uniform(&random, -0.001, 0.004);
-    return in;
-}
-
 static void test_rigid_ground(void **unused) {
     (void)unused;
     static const int cases[KITS] = {10000, 10000, 10000, 600};
@@ -418,8 +299,7 @@ static void test_rigid_ground(void **unused) {
         Worst at_double = {0}, at_float = {0};
         int touching = 0, newton = 0;
         for (uint32_t draw = 0; draw < (uint32_t)cases[k]; draw++) {
-            EngineCase in = rigid_case(&kits[k], draw);
-            round_case(&in);
+            EngineCase in = rigid_case(kits[k].sim, draw);
             run_case(&kits[k], &in, at_double, at_float, &newton);
             touching += oracle.rows > 0;
         }
@@ -427,6 +307,22 @@ static void test_rigid_ground(void **unused) {
         print_message("    with rows: %d; at most %d Newton steps\n", touching, newton);
         check_worst(at_double, at_float);
         assert_true(touching > cases[k] / 2);
+    }
+}
+
+/* No lane of a block needs what another one does there: on a GPU they run at once. */
+static void test_order_of_lanes(void **unused) {
+    (void)unused;
+    static EngineResult reverse;
+    for (int k = 0; k < KITS; k++) {
+        for (uint32_t draw = 0; draw < 200; draw++) {
+            EngineCase in =
+                draw % 2 ? rigid_case(kits[k].sim, draw) : random_case(kits[k].robot, draw);
+            engine_text_double(&kits[k].tree, kits[k].number, &in, &result);
+            engine_text_reverse(&kits[k].tree, kits[k].number, &in, &reverse);
+            assert_memory_equal(result.qpos, reverse.qpos, sizeof result.qpos);
+            assert_memory_equal(result.qvel, reverse.qvel, sizeof result.qvel);
+        }
     }
 }
 
@@ -575,9 +471,10 @@ static void test_bad_numbers(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_states), cmocka_unit_test(test_rigid_ground),
-        cmocka_unit_test(test_march),         cmocka_unit_test(test_sizes),
-        cmocka_unit_test(test_refusals),      cmocka_unit_test(test_bad_numbers),
+        cmocka_unit_test(test_random_states),  cmocka_unit_test(test_rigid_ground),
+        cmocka_unit_test(test_order_of_lanes), cmocka_unit_test(test_march),
+        cmocka_unit_test(test_sizes),          cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_bad_numbers),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
