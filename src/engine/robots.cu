@@ -104,10 +104,11 @@ size_t engine_shared_bytes(void) {
 cudaError_t engine_kernel_facts(cudaFuncAttributes *facts, int *robots_at_once) {
     const size_t bytes = ENGINE_WARPS * sizeof(Workplace);
     int blocks = 0;
-    cudaError_t status = cudaFuncSetAttribute(
-        step_robots, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)bytes);
+    cudaError_t status =
+        cudaFuncSetAttribute(step_robots, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)bytes);
     if (status == cudaSuccess) {
-        status = cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, step_robots, THREADS, bytes);
+        status =
+            cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, step_robots, THREADS, bytes);
     }
     *robots_at_once = blocks * ENGINE_WARPS;
     return status == cudaSuccess ? cudaFuncGetAttributes(facts, step_robots) : status;
@@ -117,8 +118,8 @@ cudaError_t engine_step_robots(const EngineModel *model, const EngineRobots *rob
                                cudaStream_t stream) {
     const size_t bytes = ENGINE_WARPS * sizeof(Workplace);
     const int blocks = (robots->count + ENGINE_WARPS - 1) / ENGINE_WARPS;
-    cudaError_t status = cudaFuncSetAttribute(
-        step_robots, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)bytes);
+    cudaError_t status =
+        cudaFuncSetAttribute(step_robots, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)bytes);
     if (status != cudaSuccess) {
         return status;
     }

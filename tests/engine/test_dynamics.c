@@ -460,12 +460,13 @@ static void test_bad_numbers(void **unused) {
     const Kit *kit = &kits[SA01_KIT];
     EngineCase in = random_case(kit->robot, 1);
     static const double torques[] = {NAN, 1e9, 1};
-    for (int n = 0; n < 3; n++) {
-        in.torque[4] = torques[n];
+    for (int n = 0; n < 6; n++) {
+        in.variation.rigid = n >= 3;
+        in.torque[4] = torques[n % 3];
         engine_text_double(&kit->tree, kit->number, &in, &result);
-        assert_int_equal(result.bad, n < 2);
+        assert_int_equal(result.bad, n % 3 < 2);
         engine_text_float(&kit->tree, kit->number, &in, &result);
-        assert_int_equal(result.bad, n < 2);
+        assert_int_equal(result.bad, n % 3 < 2);
     }
 }
 

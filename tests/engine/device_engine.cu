@@ -1,0 +1,252 @@
+/* The batch engine on a GPU: one step of random states against the text in double and in float on
+ * the processor, then its speed. Usage: engine_device_engine FOLDER_OF_ROBOT [STATES]
+ *
+ * Compiled for one robot (the definitions of engine_model_sizes) or for any. Errors of qacc are
+ * relative to the largest acceleration of their kind (base, joints) of that state. Exit 1 when one
+ * is above 1e-4 in the air or 1e-3 on rigid ground, where a state may lie on the edge of a contact.
+ */
+#define MILD_REAL_FLOAT
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+extern "C" {
+#include "device_cases.h"
+}
+
+#include "engine/robots.h"
+
+static const double dt = 0.0025; /* [s] */
+
+static void check(cudaError_t status, const char *what) {
+    if (status != cudaSuccess) {
+        fprintf(stderr, "%s: %s\n", what, cudaGetErrorString(status));
+        exit(2);
+    }
+}
+
+/* An array on the device, filled from doubles or with bytes. */
+template <typename T> static T *on_device(const std::vector<T> &from) {
+    T *to = nullptr;
+    check(cudaMalloc(&to, from.size() * sizeof(T)), "memory");
+    check(cudaMemcpy(to, from.data(), from.size() * sizeof(T), cudaMemcpyHostToDevice), "copy");
+    return to;
+}
+
+template <typename T> static std::vector<T> from_device(const T *from, size_t count) {
+    std::vector<T> to(count);
+    check(cudaMemcpy(to.data(), from, count * sizeof(T), cudaMemcpyDeviceToHost), "copy");
+    return to;
+}
+
+static EngineVariation variation_of(const RobotVariation *from) {
+    EngineVariation to = {};
+    to.base_mass_add = (float)from->base_mass_add;
+    to.armature_scale = (float)from->armature_scale;
+    to.friction = (float)from->rigid_friction;
+    for (int k = 0; k < 3; k++) {
+        to.center_offset[k] = (float)from->com_offset[k];
+    }
+    for (int i = 0; i < ENGINE_LINKS_MAX; i++) {
+        to.link_mass_scale[i] = (float)from->link_mass_scale[i];
+    }
+    return to;
+}
+
+/* Robots on the device in the states of these cases. `pd`: the torques are angles that a PD holds.
+ */
+static EngineRobots robots_of(const DeviceRobot &robot, const std::vector<EngineCase> &cases,
+                              int rigid, int pd) {
+    const int joints = robot.tree.joints;
+    const int rows = 6 * robot.tree.feet;
+    const size_t count = cases.size();
+    std::vector<float> qpos, qvel, torque, target, push, kp(joints), kd(joints);
+    std::vector<EngineVariation> variation;
+    for (const EngineCase &in : cases) {
+        qpos.insert(qpos.end(), in.qpos, in.qpos + 7 + joints);
+        qvel.insert(qvel.end(), in.qvel, in.qvel + 6 + joints);
+        push.insert(push.end(), in.push, in.push + 6);
+        variation.push_back(variation_of(&in.variation));
+        for (int j = 0; j < joints; j++) {
+            torque.push_back(pd ? 0 : (float)in.torque[j]);
+            target.push_back(pd ? (float)in.torque[j] : 0);
+            kp[j] = pd ? (float)robot.kp[j] : 0;
+            kd[j] = pd ? (float)robot.kd[j] : 0;
+        }
+    }
+    EngineRobots robots = {};
+    robots.count = (int)count;
+    robots.rigid = rigid;
+    robots.qpos = on_device(qpos);
+    robots.qvel = on_device(qvel);
+    robots.torque = on_device(torque);
+    robots.target = on_device(target);
+    robots.kp = on_device(kp);
+    robots.kd = on_device(kd);
+    robots.push = on_device(push);
+    robots.variation = on_device(variation);
+    robots.acceleration = on_device(std::vector<float>(count * (6 + joints), NAN));
+    robots.inverse_inertia =
+        rigid ? nullptr : on_device(std::vector<float>(count * rows * rows, NAN));
+    robots.bad = on_device(std::vector<int>(count, 0));
+    return robots;
+}
+
+static void free_robots(EngineRobots *robots) {
+    const void *arrays[] = {robots->qpos,         robots->qvel,
+                            robots->torque,       robots->target,
+                            robots->kp,           robots->kd,
+                            robots->push,         robots->variation,
+                            robots->acceleration, robots->inverse_inertia,
+                            robots->bad};
+    for (const void *array : arrays) {
+        cudaFree((void *)array);
+    }
+}
+
+/* ---- device against host ---- */
+
+/* Worst of |got - want| against the largest of `want`, from `begin` to `end`. */
+static double relative(const float *got, const double *want, int begin, int end) {
+    double most = 1e-30, worst = 0;
+    for (int i = begin; i < end; i++) {
+        most = fmax(most, fabs(want[i]));
+    }
+    for (int i = begin; i < end; i++) {
+        const double error = fabs((double)got[i] - want[i]) / most;
+        worst = error <= worst ? worst : error; /* NaN included */
+    }
+    return worst;
+}
+
+typedef struct {
+    double qacc, A, qvel, qpos;
+} Errors;
+
+static void note(double *worst, double error) {
+    *worst = error <= *worst ? *worst : error;
+}
+
+static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid, int count) {
+    const int joints = robot.tree.joints, dofs = 6 + joints,
+              rows = 36 * robot.tree.feet * robot.tree.feet;
+    std::vector<EngineCase> cases;
+    for (int i = 0; i < count; i++) {
+        cases.push_back(device_case(rigid, (uint32_t)i));
+    }
+    EngineRobots robots = robots_of(robot, cases, rigid, 0);
+    check(engine_step_robots(model, &robots, 1, 0), "step");
+    check(cudaDeviceSynchronize(), "step");
+    const std::vector<float> qacc = from_device(robots.acceleration, (size_t)count * dofs);
+    const std::vector<float> qpos = from_device(robots.qpos, (size_t)count * (7 + joints));
+    const std::vector<float> qvel = from_device(robots.qvel, (size_t)count * dofs);
+    const std::vector<int> bad = from_device(robots.bad, (size_t)count);
+    const std::vector<float> A =
+        rigid ? std::vector<float>() : from_device(robots.inverse_inertia, (size_t)count * rows);
+    Errors worst[2] = {};
+    int went_bad = 0, off = 0;
+    for (int i = 0; i < count; i++) {
+        static EngineResult want[2];
+        engine_text_double(&robot.tree, robot.number, &cases[i], &want[0]);
+        engine_text_float(&robot.tree, robot.number, &cases[i], &want[1]);
+        went_bad += bad[i];
+        for (int k = 0; k < 2; k++) {
+            const float *a = &qacc[(size_t)i * dofs];
+            const double base = fmax(relative(a, want[k].acceleration, 0, 3),
+                                     relative(a, want[k].acceleration, 3, 6));
+            const double error = fmax(base, relative(a, want[k].acceleration, 6, dofs));
+            note(&worst[k].qacc, error);
+            off += k == 0 && !(error < 1e-4);
+            note(&worst[k].qvel, relative(&qvel[(size_t)i * dofs], want[k].qvel, 0, dofs));
+            note(&worst[k].qpos,
+                 relative(&qpos[(size_t)i * (7 + joints)], want[k].qpos, 0, 7 + joints));
+            if (!rigid) {
+                note(&worst[k].A, relative(&A[(size_t)i * rows], want[k].inverse_inertia, 0, rows));
+            }
+        }
+    }
+    for (int k = 0; k < 2; k++) {
+        printf("%-13s %d states, device against %s: worst qacc %.1e  A %.1e  qvel after %.1e  qpos "
+               "after %.1e\n",
+               rigid ? "rigid ground," : "in the air,", count, k ? "float " : "double",
+               worst[k].qacc, worst[k].A, worst[k].qvel, worst[k].qpos);
+    }
+    printf("              %d beyond 1e-4 of double, %d bad\n", off, went_bad);
+    free_robots(&robots);
+    return worst[0].qacc < (rigid ? 1e-3 : 1e-4) && went_bad == 0;
+}
+
+/* ---- speed ---- */
+
+/* Fastest and slowest of a few runs. */
+static void time_robots(const DeviceRobot &robot, const EngineModel *model, int rigid, int count,
+                        int steps) {
+    enum { RUNS = 5, LAUNCHES = 20 };
+    std::vector<EngineCase> cases((size_t)count, robot.stand);
+    for (int i = 0; i < count; i++) {
+        for (int j = 0; j < robot.tree.joints; j++) { /* not all alike */
+            cases[i].qpos[7 + j] += 0.05 * sin(i + 3 * j);
+        }
+    }
+    EngineRobots robots = robots_of(robot, cases, rigid, 1);
+    cudaEvent_t begin, end;
+    check(cudaEventCreate(&begin), "event");
+    check(cudaEventCreate(&end), "event");
+    float best = 1e30f, worst = 0;
+    for (int run = 0; run < RUNS; run++) {
+        float ms = 0;
+        check(cudaEventRecord(begin), "event");
+        for (int launch = 0; launch < LAUNCHES; launch++) {
+            check(engine_step_robots(model, &robots, steps, 0), "step");
+        }
+        check(cudaEventRecord(end), "event");
+        check(cudaEventSynchronize(end), "step");
+        check(cudaEventElapsedTime(&ms, begin, end), "event");
+        best = ms < best ? ms : best;
+        worst = ms > worst && run > 0 ? ms : worst; /* the first run warms up */
+    }
+    const double total = 1e-3 * (double)count * steps * LAUNCHES; /* [1000 steps] */
+    printf("%-13s %6d robots, %2d steps a launch: %7.1f M steps/s (slowest run %.1f)\n",
+           rigid ? "rigid ground," : "in the air,", count, steps, total / best, total / worst);
+    cudaEventDestroy(begin);
+    cudaEventDestroy(end);
+    free_robots(&robots);
+}
+
+int main(int argc, char **argv) {
+    static DeviceRobot robot;
+    static EngineModel model;
+    const int states = argc > 2 ? atoi(argv[2]) : 10000;
+    if (argc < 2 || !device_robot_open(argv[1], dt, &robot)) {
+        fprintf(stderr, "usage: %s FOLDER_OF_ROBOT [STATES]\n", argv[0]);
+        return 2;
+    }
+    if (ENGINE_FIXED &&
+        (robot.tree.joints != ENGINE_JOINTS || robot.tree.entries != ENGINE_ENTRIES)) {
+        fprintf(stderr, "compiled for another robot\n");
+        return 2;
+    }
+    model.tree = robot.tree;
+    for (size_t i = 0; i < ENGINE_NUMBERS; i++) {
+        ((float *)&model.number)[i] = (float)robot.number[i];
+    }
+    const EngineModel *there = on_device(std::vector<EngineModel>(1, model));
+    cudaFuncAttributes facts;
+    int at_once = 0;
+    check(engine_kernel_facts(&facts, &at_once), "kernel");
+    printf("%d registers, %zu bytes of local memory, %zu bytes of shared memory a robot, %d robots "
+           "a multiprocessor\n",
+           facts.numRegs, facts.localSizeBytes, engine_shared_bytes(), at_once);
+    const int good = compare(robot, there, 0, states) & compare(robot, there, 1, states);
+    static const int counts[] = {4096, 16384, 65536};
+    for (int rigid = 0; rigid < 2; rigid++) {
+        for (int count : counts) {
+            time_robots(robot, there, rigid, count, 1);
+            time_robots(robot, there, rigid, count, 4);
+        }
+    }
+    printf("%s\n", good ? "ok" : "FAILED");
+    return !good;
+}
