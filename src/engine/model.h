@@ -49,7 +49,18 @@ typedef struct {
     Real turn[9];         /* [-] foot's body -> link */
     Real corner_radius;   /* [m] */
     Real inverse_inertia; /* [1/kg] of a contact: body_invweight0 */
+    Real knee[3];         /* [m] origin of the knee's body, in its link's frame */
+    Real center[3];       /* [m] of the sole, foot's body frame; round: 0 */
+    Real outline[2 * ROBOT_OUTLINE_MAX]; /* [points][2] [m] of a flat sole, foot's body frame */
 } EngineFoot;
+
+/* A body part that must not touch the ground; see RobotShell. */
+typedef struct {
+    Real center[3];   /* [m] link's frame */
+    Real rotation[9]; /* [-] box -> link */
+    Real half[3];     /* [m] */
+    Real radius;      /* [m] */
+} EngineShell;
 
 /* Real numbers only, so that it may be filled from doubles number by number. */
 typedef struct {
@@ -62,6 +73,7 @@ typedef struct {
     EngineLink link[ENGINE_LINKS_MAX]; /* of link 0 `welded` only */
     EngineFoot foot[ROBOT_FEET_MAX];
     Real corner[ENGINE_CORNERS_MAX][3]; /* [m] centres, frame of the foot's link */
+    EngineShell shell[ROBOT_SHELLS_MAX];
 } EngineNumbers;
 
 typedef struct {

@@ -266,6 +266,12 @@ static void read_foot(Reading *r, int f) {
     memcpy(foot->turn, at.rotation, sizeof foot->turn);
     foot->corner_radius = def->corner_radius;
     foot->inverse_inertia = r->model->body_invweight0[2 * limb->body];
+    const Mount *knee = &r->mount[limb->knee_body];
+    tree->knee_link[f] = (EngineIndex)knee->link;
+    mju_copy3(foot->knee, knee->position);
+    mju_copy3(foot->center, limb->sole_center);
+    tree->outline_points[f] = (short)(limb->round ? 0 : def->outline_points);
+    memcpy(foot->outline, def->outline, 2 * sizeof(double) * (size_t)tree->outline_points[f]);
     for (int g = 0; g < r->robot->def.feet; g++) {
         tree->shared[f][g] = (EngineIndex)(f == g ? limb->dofs : limb->shared[g]);
     }
@@ -276,6 +282,24 @@ static void read_foot(Reading *r, int f) {
         mju_copy3(r->number->corner[tree->corners++], corner.position);
     }
     tree->corner_begin[f + 1] = (EngineIndex)tree->corners;
+}
+
+static MildStatus read_shell(Reading *r, int s) {
+    const RobotShell *shell = &r->robot->shell[s];
+    const Mount *mount = &r->mount[shell->body];
+    EngineShell *to = &r->number->shell[s];
+    if (mount->link < 0) {
+        return mild_fail(r->error, MILD_ERROR_FORMAT,
+                         "%.150s: geom '%.60s' of [robot] shells does not move with the robot",
+                         r->robot->path, r->robot->def.shell[s]);
+    }
+    r->tree->shell_link[s] = (EngineIndex)mount->link;
+    mju_mulMatVec3(to->center, mount->rotation, shell->center);
+    mju_addTo3(to->center, mount->position);
+    mju_mulMatMat(to->rotation, mount->rotation, shell->rotation, 3, 3, 3);
+    mju_copy3(to->half, shell->half);
+    to->radius = shell->radius;
+    return MILD_OK;
 }
 
 static MildStatus read_robot(Reading *r) {
@@ -290,6 +314,14 @@ static MildStatus read_robot(Reading *r) {
     MildStatus status = read_bodies(r);
     for (int f = 0; status == MILD_OK && f < tree->feet; f++) {
         read_foot(r, f);
+    }
+    tree->shells = r->robot->shells;
+    for (int s = 0; status == MILD_OK && s < tree->shells; s++) {
+        status = read_shell(r, s);
+    }
+    tree->pairs = r->robot->pairs;
+    for (int n = 0; n < 2 * tree->pairs; n++) {
+        tree->pair[n / 2][n % 2] = (EngineIndex)r->robot->pair[n / 2][n % 2];
     }
     return status;
 }

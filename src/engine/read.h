@@ -6,7 +6,11 @@
 #include "robot/robot.h"
 
 /* Numbers of EngineNumbers. */
-enum { ENGINE_NUMBERS = 21 + 68 * ENGINE_LINKS_MAX + 15 * ROBOT_FEET_MAX + 3 * ENGINE_CORNERS_MAX };
+enum {
+    ENGINE_FOOT_NUMBERS = 21 + 2 * ROBOT_OUTLINE_MAX,
+    ENGINE_NUMBERS = 21 + 68 * ENGINE_LINKS_MAX + ENGINE_FOOT_NUMBERS * ROBOT_FEET_MAX +
+                     3 * ENGINE_CORNERS_MAX + 16 * ROBOT_SHELLS_MAX
+};
 
 #ifdef __cplusplus
 extern "C" {

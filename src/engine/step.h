@@ -15,7 +15,9 @@
  *
  * The ground reads work->foot_position, foot_rotation, foot_velocity, now.support.free_velocity and
  * now.support.ground.inverse_inertia, in the layout of ContactProblem, and writes work->wrench, all
- * of it, zeros for feet in the air. Nothing else passes between the two. */
+ * of it, zeros for feet in the air, and, if it likes, work->next_velocity. Nothing else passes between
+ * the two. After a step the state is new and poses are those of its beginning; engine_pose brings
+ * them up to date for an observer (measure.h). */
 #ifndef MILD_ENGINE_STEP_H
 #define MILD_ENGINE_STEP_H
 
@@ -113,6 +115,12 @@ LANE_FN void engine_begin_rigid(const EngineModel *model, const EngineVariation 
     engine_feet_pose(model, work);
 }
 
+/* Poses and twists at the present state: of links and feet. */
+LANE_FN void engine_pose(const EngineModel *model, EngineWork *work) {
+    engine_kinematics(model, work);
+    engine_feet_pose(model, work);
+}
+
 /* The base's quaternion after turning by the vector `turn` [rad] in base axes. */
 MILD_HD void turn_quaternion(Real *q, const Real *turn) {
     const Real square = dot3(turn, turn);
@@ -162,15 +170,26 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
 
 LANE_FN int engine_end(const EngineModel *model, EngineWork *work) {
     engine_add_wrench(&model->tree, work);
-    if (engine_limits(model, work)) {
-        engine_constrain(&model->tree, work, 0);
-    }
+    const int newton = engine_limits(model, work) ? engine_constrain(&model->tree, work, 0) : 0;
+    work->newton = newton;
     return engine_integrate(model, work);
 }
 
 LANE_FN int engine_end_rigid(const EngineModel *model, EngineWork *work) {
     engine_limits(model, work);
-    engine_constrain(&model->tree, work, 1);
+    const int newton = engine_constrain(&model->tree, work, 1);
+    work->newton = newton;
+    EACH_LANE(l) {
+        for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
+            const int f = n / 6;
+            const int c = n % 6;
+            const Real gain = work->now.support.ground.contact.twist[f][c];
+            work->next_velocity[f][c] = c < foot_parts(&model->tree, f)
+                                            ? work->foot_velocity[f][c] + model->number.dt * gain
+                                            : 0;
+        }
+    }
+    lanes_meet();
     return engine_integrate(model, work);
 }
 

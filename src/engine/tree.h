@@ -13,7 +13,7 @@
 #ifndef MILD_ENGINE_TREE_H
 #define MILD_ENGINE_TREE_H
 
-#include "robot/limits.h"
+#include "robot/def.h"
 
 #define ENGINE_LINKS_MAX (1 + ROBOT_JOINTS_MAX)
 #define ENGINE_DOFS_MAX ROBOT_NV_MAX
@@ -49,8 +49,15 @@ typedef struct {
     EngineIndex foot_link[ROBOT_FEET_MAX];              /* link that carries the sole */
     EngineIndex foot_round[ROBOT_FEET_MAX];             /* bool: transmits no moment */
     EngineIndex shared[ROBOT_FEET_MAX][ROBOT_FEET_MAX]; /* degrees of freedom that move both */
+    EngineIndex knee_link[ROBOT_FEET_MAX];
+    short outline_points[ROBOT_FEET_MAX];    /* of a flat sole; round: 0 */
+    int pairs;                               /* of mirrored feet */
+    EngineIndex pair[ROBOT_FEET_MAX / 2][2]; /* left foot, right foot */
     EngineIndex corner_foot[ENGINE_CORNERS_MAX];
     EngineIndex corner_begin[ROBOT_FEET_MAX + 1]; /* corners of a foot: from its own to the next */
+    /* ---- parts that must not touch the ground ---- */
+    int shells;
+    EngineIndex shell_link[ROBOT_SHELLS_MAX];
 } EngineTree;
 
 #endif

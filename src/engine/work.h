@@ -61,12 +61,14 @@ typedef struct {
     Real foot_position[ENGINE_FEET][3]; /* [m] reference point, world */
     Real foot_rotation[ENGINE_FEET][9]; /* [-] foot -> world, row major; round feet: identity */
     Real foot_velocity[ENGINE_FEET][6]; /* [m/s, rad/s] twist there */
+    Real next_velocity[ENGINE_FEET][6]; /* [m/s, rad/s] twist after the step, by the ground */
     Real wrench[ENGINE_FEET][6]; /* [N, N m] of the ground on the foot, at the reference point */
     /* ---- dynamics ---- */
     Real mass[ENGINE_ENTRIES];      /* M, packed; see tree.h */
     Real factor[ENGINE_ENTRIES];    /* L with M = L^T L, each diagonal entry inverted */
     Real force[ENGINE_DOFS];        /* torques and pushes less the bias */
     Real acceleration[ENGINE_DOFS]; /* qacc [m/s^2, rad/s^2] */
+    int newton;                     /* steps of the constraints' solver in the last step */
     /* ---- joint limits; by link, [0] unused ---- */
     Real limit_side[ENGINE_LINKS];      /* [-] 1 at the lower limit, -1 at the upper, 0 inside */
     Real limit_reference[ENGINE_LINKS]; /* [rad/s^2] reference acceleration, away from the limit */

@@ -14,7 +14,7 @@ typedef struct {
 } DeviceRobot;
 
 /* folder: of the robot. Returns 0 with a line on stderr when it fails. */
-int device_robot_open(const char *folder, double dt, DeviceRobot *robot);
+int device_robot_open(const char *folder, double dt, DeviceRobot *device);
 /* Random step number `draw`: thrown into the air, or near level rigid ground at height 0. */
 EngineCase device_case(int rigid, uint32_t draw);
 

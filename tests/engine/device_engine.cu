@@ -121,17 +121,54 @@ static double relative(const float *got, const double *want, int begin, int end)
     return worst;
 }
 
-typedef struct {
+struct Errors {
     double qacc, A, qvel, qpos;
-} Errors;
+};
 
 static void note(double *worst, double error) {
     *worst = error <= *worst ? *worst : error;
 }
 
+/* What the device says of all robots. */
+struct Answers {
+    std::vector<float> qacc, qpos, qvel, A;
+    std::vector<int> bad;
+};
+
+static Answers answers_of(const DeviceRobot &robot, const EngineRobots &robots) {
+    const size_t count = (size_t)robots.count, joints = (size_t)robot.tree.joints;
+    const size_t rows = 36 * (size_t)(robot.tree.feet * robot.tree.feet);
+    Answers all;
+    all.qacc = from_device(robots.acceleration, count * (6 + joints));
+    all.qpos = from_device(robots.qpos, count * (7 + joints));
+    all.qvel = from_device(robots.qvel, count * (6 + joints));
+    all.bad = from_device(robots.bad, count);
+    if (robots.inverse_inertia) {
+        all.A = from_device(robots.inverse_inertia, count * rows);
+    }
+    return all;
+}
+
+/* Robot i against the host. Returns the error of qacc. */
+static double note_robot(const DeviceRobot &robot, const Answers &got, const EngineResult &want,
+                         int i, Errors *worst) {
+    const int dofs = 6 + robot.tree.joints, rows = 36 * robot.tree.feet * robot.tree.feet;
+    const float *a = &got.qacc[(size_t)i * dofs];
+    const double base =
+        fmax(relative(a, want.acceleration, 0, 3), relative(a, want.acceleration, 3, 6));
+    const double error = fmax(base, relative(a, want.acceleration, 6, dofs));
+    note(&worst->qacc, error);
+    note(&worst->qvel, relative(&got.qvel[(size_t)i * dofs], want.qvel, 0, dofs));
+    note(&worst->qpos, relative(&got.qpos[(size_t)i * (1 + dofs)], want.qpos, 0, 1 + dofs));
+    if (!got.A.empty()) {
+        note(&worst->A, relative(&got.A[(size_t)i * rows], want.inverse_inertia, 0, rows));
+    }
+    return error;
+}
+
 static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid, int count) {
-    const int joints = robot.tree.joints, dofs = 6 + joints,
-              rows = 36 * robot.tree.feet * robot.tree.feet;
+    static const char *const name[2] = {"double", "float"};
+    static EngineText *const text[2] = {engine_text_double, engine_text_float};
     std::vector<EngineCase> cases;
     for (int i = 0; i < count; i++) {
         cases.push_back(device_case(rigid, (uint32_t)i));
@@ -139,43 +176,26 @@ static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid
     EngineRobots robots = robots_of(robot, cases, rigid, 0);
     check(engine_step_robots(model, &robots, 1, 0), "step");
     check(cudaDeviceSynchronize(), "step");
-    const std::vector<float> qacc = from_device(robots.acceleration, (size_t)count * dofs);
-    const std::vector<float> qpos = from_device(robots.qpos, (size_t)count * (7 + joints));
-    const std::vector<float> qvel = from_device(robots.qvel, (size_t)count * dofs);
-    const std::vector<int> bad = from_device(robots.bad, (size_t)count);
-    const std::vector<float> A =
-        rigid ? std::vector<float>() : from_device(robots.inverse_inertia, (size_t)count * rows);
+    const Answers got = answers_of(robot, robots);
     Errors worst[2] = {};
-    int went_bad = 0, off = 0;
+    int bad = 0, off = 0;
     for (int i = 0; i < count; i++) {
-        static EngineResult want[2];
-        engine_text_double(&robot.tree, robot.number, &cases[i], &want[0]);
-        engine_text_float(&robot.tree, robot.number, &cases[i], &want[1]);
-        went_bad += bad[i];
+        bad += got.bad[i];
         for (int k = 0; k < 2; k++) {
-            const float *a = &qacc[(size_t)i * dofs];
-            const double base = fmax(relative(a, want[k].acceleration, 0, 3),
-                                     relative(a, want[k].acceleration, 3, 6));
-            const double error = fmax(base, relative(a, want[k].acceleration, 6, dofs));
-            note(&worst[k].qacc, error);
-            off += k == 0 && !(error < 1e-4);
-            note(&worst[k].qvel, relative(&qvel[(size_t)i * dofs], want[k].qvel, 0, dofs));
-            note(&worst[k].qpos,
-                 relative(&qpos[(size_t)i * (7 + joints)], want[k].qpos, 0, 7 + joints));
-            if (!rigid) {
-                note(&worst[k].A, relative(&A[(size_t)i * rows], want[k].inverse_inertia, 0, rows));
-            }
+            static EngineResult want;
+            text[k](&robot.tree, robot.number, &cases[i], &want);
+            off += !(note_robot(robot, got, want, i, &worst[k]) < 1e-4) && k == 0;
         }
     }
     for (int k = 0; k < 2; k++) {
-        printf("%-13s %d states, device against %s: worst qacc %.1e  A %.1e  qvel after %.1e  qpos "
-               "after %.1e\n",
-               rigid ? "rigid ground," : "in the air,", count, k ? "float " : "double",
-               worst[k].qacc, worst[k].A, worst[k].qvel, worst[k].qpos);
+        printf("%-13s %d states, device against %-6s: worst qacc %.1e  A %.1e  qvel after %.1e  "
+               "qpos after %.1e\n",
+               rigid ? "rigid ground," : "in the air,", count, name[k], worst[k].qacc, worst[k].A,
+               worst[k].qvel, worst[k].qpos);
     }
-    printf("              %d beyond 1e-4 of double, %d bad\n", off, went_bad);
+    printf("              %d beyond 1e-4 of double, %d bad\n", off, bad);
     free_robots(&robots);
-    return worst[0].qacc < (rigid ? 1e-3 : 1e-4) && went_bad == 0;
+    return worst[0].qacc < (rigid ? 1e-3 : 1e-4) && bad == 0;
 }
 
 /* ---- speed ---- */

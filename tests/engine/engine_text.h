@@ -32,7 +32,15 @@ typedef struct {
     double wrench[ROBOT_FEET_MAX][6];  /* of rigid ground */
     double qpos[ROBOT_NQ_MAX];         /* after the step */
     double qvel[ROBOT_NV_MAX];
-    int newton; /* steps of the constraints' solver */
+    double body_clearance;                   /* [m] above the height of the case */
+    double knee_distance;                    /* [m] */
+    double foot_distance;                    /* [m] */
+    double sole_height[ROBOT_FEET_MAX];      /* [m] */
+    double sole_center[ROBOT_FEET_MAX][3];   /* [m] */
+    double sole_velocity[ROBOT_FEET_MAX][3]; /* [m/s] */
+    double next_velocity[ROBOT_FEET_MAX][6]; /* twists after a step on rigid ground */
+    double next_position[ROBOT_FEET_MAX][3]; /* [m] of the feet after the step */
+    int newton;                              /* steps of the constraints' solver */
     int bad;
 } EngineResult;
 

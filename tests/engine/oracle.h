@@ -29,6 +29,14 @@ typedef struct {
     double wrench[ROBOT_FEET_MAX][6]; /* of rigid ground */
     double qpos[ROBOT_NQ_MAX];
     double qvel[ROBOT_NV_MAX];
+    double body_clearance;
+    double knee_distance;
+    double foot_distance;
+    double sole_height[ROBOT_FEET_MAX];
+    double sole_center[ROBOT_FEET_MAX][3];
+    double sole_velocity[ROBOT_FEET_MAX][3];
+    double next_velocity[ROWS_MAX];
+    double next_position[ROBOT_FEET_MAX][3];
     int rows; /* joints beyond a limit, or edges of contacts */
 } Oracle;
 
@@ -167,12 +175,36 @@ static inline void oracle_finish(RobotSim *sim, Oracle *o) {
     for (int i = 0; i < nv; i++) {
         d->qvel[i] += sim->dt * d->qacc[i];
     }
+    for (int r = 0; r < 6 * sim->robot->def.feet; r++) {
+        o->next_velocity[r] = oracle_dot(o->jacobian[r], d->qvel, nv);
+    }
     mj_integratePos(m, d->qpos, d->qvel, sim->dt);
+    mj_kinematics(m, d);
+    for (int f = 0; f < sim->robot->def.feet; f++) {
+        foot_map_reference(sim, f, o->next_position[f]);
+    }
     memcpy(o->qpos, d->qpos, 7 * sizeof(double));
     memcpy(o->qvel, d->qvel, 6 * sizeof(double));
     for (int j = 0; j < sim->robot->def.joints; j++) {
         o->qpos[7 + j] = d->qpos[sim->robot->dof[j] + 1];
         o->qvel[6 + j] = d->qvel[sim->robot->dof[j]];
+    }
+}
+
+/* What RobotSim tells a task of the pose. */
+static inline void oracle_measure(RobotSim *sim, const EngineCase *in, Oracle *o) {
+    const MildMaterial any = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&any);
+    terrain.height = in->height;
+    o->body_clearance = robot_sim_body_clearance(sim, &terrain);
+    o->knee_distance = robot_sim_knee_distance(sim);
+    o->foot_distance = robot_sim_foot_distance(sim);
+    robot_sim_sole_clearance(sim, &terrain);
+    for (int f = 0; f < sim->robot->def.feet; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        o->sole_height[f] = foot->sole_height;
+        memcpy(o->sole_center[f], foot->sole_center, sizeof foot->sole_center);
+        memcpy(o->sole_velocity[f], foot->sole_center_velocity, sizeof foot->sole_center_velocity);
     }
 }
 
@@ -182,6 +214,7 @@ static inline void oracle_step(RobotSim *sim, const EngineCase *in, Oracle *o) {
     memcpy(state.qpos, in->qpos, sizeof state.qpos);
     memcpy(state.qvel, in->qvel, sizeof state.qvel);
     robot_sim_load(sim, &state, &in->variation);
+    oracle_measure(sim, in, o);
     oracle_matrices(sim, o);
     oracle_forces(sim, in, o);
     oracle_feet(sim, o);
