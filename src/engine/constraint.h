@@ -24,6 +24,11 @@ typedef struct {
     Real slope[2]; /* [-] along world x and y */
 } EngineSurface;
 
+/* x^power; 2 is MuJoCo's default. */
+MILD_HD Real soft_power(Real x, Real power) {
+    return power == 2 ? x * x : REAL_POW(x, power);
+}
+
 /* d(r) of a violation r < 0. */
 MILD_HD Real soft_impedance(const EngineSoft *soft, Real violation) {
     const Real x = soft->width > 0 ? -violation / soft->width : 0;
@@ -36,14 +41,23 @@ MILD_HD Real soft_impedance(const EngineSoft *soft, Real violation) {
     } else if (soft->power <= 1) {
         rise = x;
     } else if (x <= middle) {
-        rise = REAL_POW(x / middle, soft->power) * middle;
+        rise = soft_power(x / middle, soft->power) * middle;
     } else {
-        rise = 1 - REAL_POW((1 - x) / (1 - middle), soft->power) * (1 - middle);
+        rise = 1 - soft_power((1 - x) / (1 - middle), soft->power) * (1 - middle);
     }
     return soft->nearest + rise * (soft->farthest - soft->nearest);
 }
 
 /* ---- the rows ---- */
+
+/* The limit of link i, which is beyond it by `violation` < 0 on a side. */
+MILD_HD void limit_row(const EngineLink *link, EngineWork *work, int i, Real side, Real violation) {
+    const Real d = soft_impedance(&link->limit, violation);
+    const Real regularizer = (1 - d) / d * link->inverse_inertia;
+    work->limit_reference[i] =
+        -link->limit.damping * side * work->rate[5 + i] - link->limit.stiffness * d * violation;
+    work->limit_weight[i] = 1 / real_max(regularizer, REGULARIZER_LEAST);
+}
 
 /* Limits that are reached. Returns whether there are any. */
 LANE_FN int engine_limits(const EngineModel *model, EngineWork *work) {
@@ -54,15 +68,12 @@ LANE_FN int engine_limits(const EngineModel *model, EngineWork *work) {
             const EngineLink *link = &model->number.link[i];
             const Real below = work->angle[i] - link->low - link->margin;
             const Real above = link->high - work->angle[i] - link->margin;
-            const Real violation = real_min(below, above);
-            const Real side = violation < 0 ? (below < 0 ? REAL(1) : REAL(-1)) : 0;
-            const Real d = soft_impedance(&link->limit, violation);
-            const Real regularizer = (1 - d) / d * link->inverse_inertia;
+            const Real side = below < 0 ? REAL(1) : above < 0 ? REAL(-1) : 0;
             work->limit_side[i] = side;
-            work->limit_reference[i] = -link->limit.damping * side * work->rate[5 + i] -
-                                       link->limit.stiffness * d * violation;
-            work->limit_weight[i] = 1 / real_max(regularizer, REGULARIZER_LEAST);
-            any[l] = side != 0 ? 1 : any[l];
+            if (side != 0) {
+                limit_row(link, work, i, side, real_min(below, above));
+                any[l] = 1;
+            }
         }
     }
     lanes_meet();
@@ -81,7 +92,7 @@ MILD_HD void corner_center(const EngineModel *model, const EngineWork *work, int
 
 /* Unit normal of the surface, and the tangents that MuJoCo's mju_makeFrame takes. */
 MILD_HD void surface_frame(const Real *slope, Real frame[3][3]) {
-    const Real scale = 1 / REAL_SQRT(1 + slope[0] * slope[0] + slope[1] * slope[1]);
+    const Real scale = REAL_INVERSE_SQRT(1 + slope[0] * slope[0] + slope[1] * slope[1]);
     frame[0][0] = -slope[0] * scale;
     frame[0][1] = -slope[1] * scale;
     frame[0][2] = scale;

@@ -30,7 +30,7 @@ MILD_HD void factor_base(Real *factor) {
     }
     LANE_UNROLL
     for (int k = 5; k >= 0; k--) {
-        const Real inverse = 1 / REAL_SQRT(m[k][k]);
+        const Real inverse = REAL_INVERSE_SQRT(m[k][k]);
         LANE_UNROLL
         for (int c = 0; c < k; c++) {
             m[k][c] *= inverse;
@@ -73,7 +73,7 @@ LANE_FN void engine_factorise(const EngineTree *tree, Real *factor) {
                  n += LANES) {
                 const int i = tree->level_link[n];
                 Real *diagonal = factor + tree->row[5 + i] + engine_row_length(tree, i) - 1;
-                *diagonal = 1 / REAL_SQRT(*diagonal);
+                *diagonal = REAL_INVERSE_SQRT(*diagonal);
             }
         }
         lanes_meet();

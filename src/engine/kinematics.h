@@ -29,8 +29,7 @@ LANE_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
     EACH_LANE(l) {
         for (int i = 1 + LANE(l); i < links; i += LANES) {
             const Real angle = work->angle[i] - model->number.link[i].reference;
-            now->wave[i][0] = REAL_COS(angle);
-            now->wave[i][1] = REAL_SIN(angle);
+            real_sine_cosine(angle, &now->wave[i][1], &now->wave[i][0]);
         }
     }
     lanes_meet();

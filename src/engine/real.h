@@ -5,16 +5,32 @@
 #include "batch/lanes.h"
 
 #ifdef MILD_REAL_FLOAT
-#define REAL_SIN sinf
-#define REAL_COS cosf
 #define REAL_POW powf
 #define REAL_ROUNDING REAL(1e-6) /* a relative change that is rounding */
 #else
-#define REAL_SIN sin
-#define REAL_COS cos
 #define REAL_POW pow
 #define REAL_ROUNDING REAL(1e-13)
 #endif
+
+#if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
+#define REAL_INVERSE_SQRT rsqrtf /* one instruction, right to 2 units in the last place */
+#else
+#define REAL_INVERSE_SQRT(x) (1 / REAL_SQRT(x))
+#endif
+
+/* [-] Sine and cosine of x [rad], a few turns at most. */
+MILD_HD void real_sine_cosine(Real x, Real *sine, Real *cosine) {
+#if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
+    /* sincosf has a path for large x that keeps its work in local memory */
+    sincospif(x * REAL(0.31830988618379067), sine, cosine);
+#elif defined(MILD_REAL_FLOAT)
+    *sine = sinf(x);
+    *cosine = cosf(x);
+#else
+    *sine = sin(x);
+    *cosine = cos(x);
+#endif
+}
 
 MILD_HD Real dot3(const Real *a, const Real *b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -125,8 +125,10 @@ LANE_FN void engine_pose(const EngineModel *model, EngineWork *work) {
 MILD_HD void turn_quaternion(Real *q, const Real *turn) {
     const Real square = dot3(turn, turn);
     const Real angle = REAL_SQRT(square);
-    const Real scale = angle > 0 ? REAL_SIN(angle / 2) / angle : REAL(0.5);
-    const Real w = REAL_COS(angle / 2);
+    Real sine;
+    Real w;
+    real_sine_cosine(angle / 2, &sine, &w);
+    const Real scale = angle > 0 ? sine / angle : REAL(0.5);
     const Real v[3] = {scale * turn[0], scale * turn[1], scale * turn[2]};
     const Real next[4] = {q[0] * w - q[1] * v[0] - q[2] * v[1] - q[3] * v[2],
                           q[0] * v[0] + q[1] * w + q[2] * v[2] - q[3] * v[1],
@@ -171,15 +173,22 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
 LANE_FN int engine_end(const EngineModel *model, EngineWork *work) {
     engine_add_wrench(&model->tree, work);
     const int newton = engine_limits(model, work) ? engine_constrain(&model->tree, work, 0) : 0;
-    work->newton = newton;
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            work->newton = newton;
+        }
+    }
+    lanes_meet();
     return engine_integrate(model, work);
 }
 
 LANE_FN int engine_end_rigid(const EngineModel *model, EngineWork *work) {
     engine_limits(model, work);
     const int newton = engine_constrain(&model->tree, work, 1);
-    work->newton = newton;
     EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            work->newton = newton;
+        }
         for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
             const int f = n / 6;
             const int c = n % 6;
