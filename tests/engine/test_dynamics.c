@@ -370,16 +370,60 @@ static void march_torque(const Robot *robot, const double *qpos, const double *q
     }
 }
 
-/* Follows the sim in open loop: torques from its own state, the wrenches of the sim's ground. */
+typedef enum { RECORDED, RIGID, SOFT, MARCHES } March;
+static const char *const march_name[MARCHES] = {"recorded wrenches of sand",
+                                                "rigid ground of its own", "sand of its own"};
+
+/* Follows a sim with torques from its own state, under the wrenches of the sim's ground or on ground
+ * of its own. */
 typedef struct {
     EngineText *text;
     EngineCase state;
+    MildGround *ground; /* of its own, or NULL */
+    MildScratch *scratch;
     double drift[3]; /* [m, -, rad] worst: base, its quaternion, joints */
 } Follower;
 
-static void follow(const Kit *kit, Follower *follower, const RobotSim *sim, int step) {
+static MildGround *new_ground(const Kit *kit) {
+    const MildSole *const *soles = robot_soles(kit->robot);
+    void *block = calloc(1, mild_ground_bytes(soles, kit->tree.feet));
+    assert_non_null(block);
+    return mild_ground_init(block, soles, kit->tree.feet);
+}
+
+/* What passes between engine and ground: poses, twists, A and V_free one way, wrenches the other. */
+static void stand_on(const Kit *kit, Follower *follower, const MildTerrain *terrain) {
+    static MildContactInput input;
+    static MildContactResult contact;
+    EngineCase *in = &follower->state;
+    follower->text(&kit->tree, kit->number, in, &result);
+    input.feet = kit->tree.feet;
+    input.dt = DT;
+    memcpy(input.position, result.position, sizeof input.position);
+    memcpy(input.rotation, result.rotation, sizeof input.rotation);
+    memcpy(input.velocity, result.velocity, sizeof input.velocity);
+    memcpy(input.free_velocity, result.free_velocity, sizeof input.free_velocity);
+    memcpy(input.inverse_inertia, result.inverse_inertia, sizeof input.inverse_inertia);
+    mild_ground_solve(follower->ground, terrain, &input, follower->scratch, &contact);
+    mild_ground_advance(follower->ground, terrain, &input, follower->scratch, &contact);
+    for (int f = 0; f < kit->tree.feet; f++) {
+        memcpy(in->wrench[f], contact.foot[f].force, sizeof contact.foot[f].force);
+        memcpy(in->wrench[f] + 3, contact.foot[f].torque, sizeof contact.foot[f].torque);
+    }
+}
+
+static void follow(const Kit *kit, Follower *follower, const RobotSim *sim,
+                   const MildTerrain *terrain, int step) {
     EngineCase *in = &follower->state;
     march_torque(kit->robot, in->qpos, in->qvel, step, in->torque);
+    for (int f = 0; f < kit->tree.feet; f++) {
+        const MildFootResult *foot = &robot_sim_contact(sim)->foot[f];
+        memcpy(in->wrench[f], foot->force, sizeof foot->force);
+        memcpy(in->wrench[f] + 3, foot->torque, sizeof foot->torque);
+    }
+    if (follower->ground) {
+        stand_on(kit, follower, terrain);
+    }
     follower->text(&kit->tree, kit->number, in, &result);
     memcpy(in->qpos, result.qpos, sizeof in->qpos);
     memcpy(in->qvel, result.qvel, sizeof in->qvel);
@@ -390,58 +434,63 @@ static void follow(const Kit *kit, Follower *follower, const RobotSim *sim, int 
     }
 }
 
-/* By RobotSim on loose sand, or on rigid ground, whose contacts the followers solve themselves. */
-static void march(int rigid, Follower followers[2]) {
+/* SA01 for a second by RobotSim, followed by the texts. Returns the mean load of a foot [N]. */
+static double march(March kind, const EngineCase *start, Follower followers[2]) {
     const Kit *kit = &kits[SA01_KIT];
     RobotSim *sim = kit->sim;
-    const MildSole *const *soles = robot_soles(kit->robot);
-    MildGround *ground = mild_ground_init(calloc(1, mild_ground_bytes(soles, 2)), soles, 2);
+    MildGround *ground = new_ground(kit);
     MildMaterial sand;
     assert_true(mild_material_preset("sand_loose", &sand));
     MildTerrain terrain = mild_terrain_uniform(&sand);
-    EngineCase start = {.variation = robot_variation_nominal()};
-    RobotState state = {.qpos = {0, 0, kit->robot->stand_height + 0.002, 1}};
+    RobotState state = {.qpos = {0}};
     double load = 0;
-    start.variation.rigid = rigid;
-    memcpy(state.qpos + 7, kit->robot->def.pose, sizeof kit->robot->def.pose);
-    memcpy(start.qpos, state.qpos, sizeof start.qpos);
-    robot_sim_load(sim, &state, &start.variation);
+    memcpy(state.qpos, start->qpos, sizeof state.qpos);
+    robot_sim_load(sim, &state, &start->variation);
     sim->model->opt.tolerance = 1e-15;
     for (int f = 0; f < 2; f++) {
-        followers[f].state = start;
+        MildError error = {0};
+        followers[f].state = *start;
+        followers[f].ground = kind == SOFT ? new_ground(kit) : NULL;
+        followers[f].scratch = mild_scratch_create(robot_soles(kit->robot), 2, &error);
     }
     for (int step = 0; step < SECOND; step++) {
         double torque[ROBOT_JOINTS_MAX];
         march_torque(kit->robot, robot_sim_qpos(sim), robot_sim_qvel(sim), step, torque);
         assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
-        for (int n = 0; n < 2; n++) {
-            for (int f = 0; f < 2; f++) {
-                const MildFootResult *foot = &robot_sim_contact(sim)->foot[f];
-                memcpy(followers[n].state.wrench[f], foot->force, sizeof foot->force);
-                memcpy(followers[n].state.wrench[f] + 3, foot->torque, sizeof foot->torque);
-                load += foot->force[2] / SECOND / 2;
-            }
-            follow(kit, &followers[n], sim, step);
+        for (int f = 0; f < 2; f++) {
+            load += robot_sim_contact(sim)->foot[f].force[2] / (2 * SECOND);
+            follow(kit, &followers[f], sim, &terrain, step);
         }
     }
-    print_message(
-        "a second of march on %s, mean load %.0f N, base then at %.2f m; drift of base, "
-        "quaternion, joints in double %.1e m %.1e %.1e rad, in float %.1e m %.1e %.1e rad\n",
-        rigid ? "rigid ground" : "sand", load, robot_sim_qpos(sim)[2], followers[0].drift[0],
-        followers[0].drift[1], followers[0].drift[2], followers[1].drift[0], followers[1].drift[1],
-        followers[1].drift[2]);
-    assert_true(load > 100);
+    for (int f = 0; f < 2; f++) {
+        free(followers[f].ground);
+        mild_scratch_destroy(followers[f].scratch);
+    }
     free(ground);
+    return load;
 }
 
 static void test_march(void **unused) {
     (void)unused;
-    for (int rigid = 0; rigid < 2; rigid++) {
+    const Robot *robot = kits[SA01_KIT].robot;
+    EngineCase start = {.qpos = {0, 0, robot->stand_height + 0.002, 1}};
+    memcpy(start.qpos + 7, robot->def.pose, sizeof robot->def.pose);
+    start.variation = robot_variation_nominal();
+    for (int kind = 0; kind < MARCHES; kind++) {
         Follower followers[2] = {{.text = engine_text_double}, {.text = engine_text_float}};
-        march(rigid, followers);
+        start.variation.rigid = kind == RIGID;
+        const double load = march((March)kind, &start, followers);
+        const double *at_double = followers[0].drift;
+        const double *at_float = followers[1].drift;
+        print_message(
+            "a second of march on %s, %.0f N a foot; drift of base, quaternion and joints "
+            "in double %.1e m %.1e %.1e rad, in float %.1e m %.1e %.1e rad\n",
+            march_name[kind], load, at_double[0], at_double[1], at_double[2], at_float[0],
+            at_float[1], at_float[2]);
+        assert_true(load > 100);
         for (int k = 0; k < 3; k++) {
-            assert_true(followers[0].drift[k] < 1e-9);
-            assert_true(followers[1].drift[k] < 1e-3);
+            assert_true(at_double[k] < 1e-9);
+            assert_true(at_float[k] < 1e-3);
         }
     }
 }
