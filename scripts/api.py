@@ -6,7 +6,7 @@
 
 A remark stands directly above a declaration, or behind a field. What it must say: a double's unit in brackets; an array's shape
 in brackets (or "array of ..."); what happens on failure where there is a MildError; and, once at a header's top, thread safety.
-Declarations without a blank line between share the remark above the first, which then names each."""
+Declarations without a blank line between them share the remark above the first one, which must name them all."""
 import re
 import sys
 
@@ -20,7 +20,7 @@ class Item:
 
 
 def clean(comment):
-    """The text of /* ... */ without its frame."""
+    """The text of a comment without /*, */ and leading stars."""
     text = comment.strip()[2:-2]
     return "\n".join(re.sub(r"^\s*\*? ?", "", line, count=1) if i else line.strip() for i, line in enumerate(text.split("\n"))).strip()
 
@@ -52,7 +52,7 @@ def tokens(text):
 
 
 def read_fields(item, body, line):
-    """Members of a struct or an enum with the remark behind (or above) each."""
+    """Members of a struct or an enum, each with the remark behind or above it."""
     separator = "," if item.kind == "enum" else ";"
     doc, pending = "", None
     for match in re.finditer(r"/\*.*?\*/|[^%s/]+%s?|/" % (separator, separator), body, re.S):
@@ -122,7 +122,7 @@ def read(path):
 
 
 def gaps(path):
-    """What is missing, one line each."""
+    """One line for each gap in the documentation."""
     top, items = read(path)
     if "thread" not in top.lower():
         yield 1, "the top of the header says nothing of thread safety"

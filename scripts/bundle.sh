@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes build/bundle: the program without drawing, with CUDA, and every library it needs but libc and CUDA's, to be copied
-# as one folder to a machine that has an NVIDIA driver and cuBLAS 13 and nothing else. docs/gpu.md says how to use it.
+# Makes build/bundle: the program without drawing, with CUDA, and all libraries that it needs except libc and CUDA's. Copy
+# the folder to a machine with only an NVIDIA driver and cuBLAS 13. docs/gpu.md says how to use it.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bundle=build/bundle
@@ -17,14 +17,14 @@ for march in x86-64-v3 x86-64-v4; do
 done
 strip -o "$bundle/bin/test_gpu" build/x86-64-v3/tests/gpu_test_gpu
 
-# what ldd names, less libc, the loader and CUDA
+# the libraries that ldd lists, without libc, the loader and CUDA
 ldd build/x86-64-v3/mild build/x86-64-v3/tests/gpu_test_gpu | awk '$2 == "=>" { print $3 }' | sort -u |
     grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
-cp -r models configs "$bundle/"
+cp -r robots configs "$bundle/"
 
 cat >"$bundle/run" <<'RUN'
 #!/bin/sh
-# run PROGRAM ARGUMENTS: starts mild or test_gpu of this folder with the cuBLAS that this machine has.
+# run PROGRAM ARGUMENTS: starts this folder's mild or test_gpu with the cuBLAS of this machine.
 here=$(dirname "$(readlink -f "$0")")
 program=$1
 shift

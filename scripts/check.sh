@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# What `make check` does, stage by stage (docs/testing.md). Each stage has a folder of its own under build/check.
-# Usage: scripts/check.sh [STAGE ...]; without one, all of them:
+# Runs the stages of `make check` (docs/testing.md). Each stage has its own folder under build/check.
+# Usage: scripts/check.sh [STAGE ...]; without a STAGE it runs all of them:
 #   format    clang-format 14 has nothing to change, 100 columns, braces
 #   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: every test
-#   tidy      clang-tidy 14 over src/, only what changed since it was last content
+#   tidy      clang-tidy 14 over src/, only files that changed since they last passed
 #   thread    gcc, warnings as errors, thread sanitizer: pool, task, evaluation, training
 #   aarch64   the library for another processor, run under qemu
 set -euo pipefail
@@ -18,7 +18,7 @@ sources() {
     fi
 }
 
-# configure FOLDER OPTION...: with ccache where there is one.
+# configure FOLDER OPTION...: uses ccache if it is installed.
 configure() {
     local folder=$root/$1 launcher=()
     shift
@@ -40,7 +40,7 @@ stage_format() {
     scripts/house.py "${files[@]}"
 }
 
-# -O1: -O2 compiles longer, and what the sanitizers insert is no faster for it.
+# -O1, because -O2 takes longer to compile and does not speed up the sanitizers' checks.
 configure_sanitize() {
     configure sanitize -DCMAKE_C_COMPILER=clang-14 -DMILD_SANITIZE=ON -DCMAKE_C_FLAGS_RELEASE="-O1 -g" \
         -DCMAKE_BUILD_TYPE=Release -DCMAKE_EXPORT_COMPILE_COMMANDS=ON
@@ -53,7 +53,7 @@ stage_sanitize() {
         ctest --test-dir "$root/sanitize" --output-on-failure --parallel "$jobs" --timeout 900
 }
 
-# Files whose text or headers are newer than their stamp, by the compiler's list of what each reads.
+# Files that are newer than their stamp, or include a header that is, by the compiler's dependency lists.
 changed() {
     local file stamp list dependency
     for file in $(sources | grep '^src/.*\.c$'); do
@@ -86,19 +86,19 @@ stage_tidy() {
     changed | xargs -r -P "$jobs" -I{} bash -c 'tidy_file {}'
 }
 
-# The layers' programs that start threads. Warnings of gcc come from all of the text.
+# Tests of the layers that start threads. gcc compiles everything, so that its warnings are seen too.
 stage_thread() {
     configure thread -DCMAKE_C_COMPILER=gcc -DMILD_SANITIZE=thread -DCMAKE_C_FLAGS_RELEASE="-O1 -g" \
         -DCMAKE_BUILD_TYPE=Release
     build thread
-    # this runtime knows only the usual places of memory; where the container allows it, fix them
+    # this runtime fails on unusual memory layouts; disable address randomisation if the container allows it
     local fixed=()
     ! setarch -R true 2>/dev/null || fixed=(setarch -R)
     TSAN_OPTIONS=halt_on_error=1 "${fixed[@]}" ctest --test-dir "$root/thread" --output-on-failure \
         --parallel "$jobs" --timeout 900 -R '^(base/test_pool|task/|eval/|app/train)'
 }
 
-# Needs nothing for that processor but its C library: the fuzzers' kept inputs, with their checks.
+# Replays the fuzzers' corpus, because those programs need only a C library for that processor.
 stage_aarch64() {
     local target
     configure aarch64 -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 -DMILD_APP=OFF \

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Two or more `mild eval --json` files as one table: compare.py NAME=FILE NAME=FILE ..."""
+"""Prints two or more `mild eval --json` files as one table: compare.py NAME=FILE NAME=FILE ..."""
 import json
 import sys
 

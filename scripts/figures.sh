@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the curves of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain]; all of them without a name.
+# Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain]; without a name all of them.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -8,7 +8,7 @@ python=.venv/bin/python
 [ -x "$python" ] || python=python3
 mkdir -p "$work"
 
-# record NAME OPTIONS...: one press as $work/NAME.csv
+# record NAME OPTIONS...: records a press to $work/NAME.csv
 record() {
     local name=$1
     shift
@@ -55,7 +55,7 @@ eccentric() {
     done
 }
 
-# A robot between the prints it has left on waves of two materials: the picture after five seconds.
+# A robot among its imprints on waves of two materials, after five seconds.
 terrain() {
     "$mild" play --ground sand_dense,sand_loose --speed 0.5 --seconds 5.2 --video "$work/terrain.mp4" \
         --terrain.kind=waves --terrain.amplitude=0.04 --terrain.wavelength=1.6 --terrain.memory=true \
@@ -69,6 +69,6 @@ for name in "${@:-all}"; do
     terrain) terrain ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
     all) for each in presets recovery impact sinkage eccentric terrain; do "$0" "$each"; done ;;
-    *) echo "figures: no figure '$name'; there are presets recovery impact sinkage eccentric terrain" >&2 && exit 2 ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain" >&2 && exit 2 ;;
     esac
 done

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Draws what `mild fit --figure` found: fit.py DATA_fit.csv PICTURE.png
+"""Draws the result of `mild fit --figure`: fit.py DATA_fit.csv PICTURE.png
 
-Above the measured forces and the fitted law over depth, below what is left between them."""
+Top: measured forces and the fitted law over depth. Bottom: the residuals."""
 import csv
 import sys
 from collections import OrderedDict

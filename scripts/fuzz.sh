@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Runs the fuzz targets of tests/fuzz one after the other, with clang's address and undefined-behaviour sanitizers. What they
-# learn stays in build/fuzz/learned; an input that fails is left in build/fuzz and printed.
-# Usage: scripts/fuzz.sh [TARGET ...]; RUNS executions each (10 million), at most MINUTES each (no limit). `merge` as first word
-# instead rewrites tests/fuzz/corpus with the smallest inputs that reach everything found so far.
+# learn is kept in build/fuzz/learned. An input that fails is printed and kept in build/fuzz.
+# Usage: scripts/fuzz.sh [TARGET ...]; RUNS executions each (default 10 million), at most MINUTES each (default no limit).
+# With `merge` as the first word it rewrites tests/fuzz/corpus with the smallest inputs that cover everything found so far.
 set -eu
 cd "$(dirname "$0")/.."
 runs=${RUNS:-10000000} minutes=${MINUTES:-0} build=build/fuzz
@@ -16,10 +16,10 @@ all=$(grep -o '^ *mild_fuzz([a-z]*' tests/CMakeLists.txt | sed 's/.*(//')
 targets=${*:-$all}
 cmake -S . -B $build -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_COMPILER=clang -DMILD_SANITIZE=ON -DMILD_FUZZ=ON --log-level=WARNING
 cmake --build $build --parallel "${JOBS:-$(nproc)}" --target $(printf 'fuzz_%s ' $targets) >/dev/null
-# a stack trace for every allocation costs a third of the speed
+# without stack traces for allocations, which cost a third of the speed
 export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=4:max_malloc_fill_size=0
 
-# Longest input worth trying: of a policy the header alone has 2 kB.
+# Longest input worth trying. The header of a policy alone has 2 kB.
 length() {
     case $1 in
     policy | checkpoint) echo 3500 ;;
@@ -45,7 +45,7 @@ fuzz() {
     echo "$target: $(sed -n 's/^stat::number_of_executed_units: *//p' $build/"$target".log) executions, no finding"
 }
 
-# Files named found_* are findings of the past and stay.
+# Files named found_* are past findings and are kept.
 minimise() {
     local target=$1 kept=tests/fuzz/corpus/$1 fresh=$build/merge/$1
     rm -rf "$fresh"

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What clang-format 14 does not check: no line of C is wider than 100 columns, and every body of an
-if, else, for, while and do stands in braces. Usage: scripts/house.py FILE..."""
+"""Checks what clang-format 14 does not: no line of C is wider than 100 columns, and every body of an
+if, else, for, while and do has braces. Usage: scripts/house.py FILE..."""
 
 import pathlib
 import sys
@@ -17,7 +17,7 @@ def wide_lines(source):
 
 
 def bare_bodies(source):
-    """Lines where a body without braces begins."""
+    """Lines where a body without braces starts."""
     tokens = tokens_of(source)
     pair = partners(tokens)
     for i, token in enumerate(tokens[:-1]):

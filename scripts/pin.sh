@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# scripts/pin.sh "reason": pins the numbers that tests/pins compares to what this tree computes now. It rewrites the rows
-# of this platform and those that hold anywhere in tests/pins.txt, and appends date, platform and reason to that file.
-# BUILD=FOLDER: a configured build other than build/, for another compiler's rows. After a conflict in a merge take
-# either side of tests/pins.txt and run it again.
+# scripts/pin.sh "reason": sets the numbers that tests/pins compares to those that this tree computes now. It rewrites the
+# rows of this platform and those of all platforms in tests/pins.txt, and appends date, platform and reason to that file.
+# BUILD=FOLDER: a configured build other than build/, for the rows of another compiler. After a merge conflict, take
+# either side of tests/pins.txt and run this again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 reason=${1-}
@@ -25,7 +25,7 @@ if ! PIN_ROWS="$work/new" "$build/tests/pins_test_pins" >"$work/log" 2>&1; then
 fi
 platform=$(awk '$1 != "any" { print $1; exit }' "$work/new")
 
-# A number that changed here has changed on other platforms too: their rows of it go, until somebody renews them there.
+# A number that changed here has changed on other platforms too. Their rows for it are removed, until someone renews them there.
 awk -v new="$work/new" -v count="$work/count" '
     BEGIN {
         while ((getline line < new) > 0) {

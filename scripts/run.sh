@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The tour behind `make run`: watch the shipped policy walk, train one from scratch, compare the two on one course.
+# The tour of `make run`: watch the shipped policy walk, train one from scratch, compare both on one course.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 minutes=${MINUTES:-5}

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what building, running and testing need, and nothing that is already there. Safe to repeat.
+# Installs what building, running and testing need, except what is already installed. Safe to repeat.
 # Usage: scripts/setup.sh [check]; with `check` also what `make check` needs.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -47,7 +47,7 @@ if ((${#missing[@]})); then
 fi
 
 # The private environment holds the MuJoCo wheel (library and headers) and matplotlib (figures). The copy of the
-# requirements inside it is written last, so that an interrupted installation is taken up again.
+# requirements inside it is written last, so that an interrupted installation is repeated.
 if ! cmp -s scripts/requirements.txt .venv/requirements.installed; then
     echo "setup: preparing .venv ($(paste -sd' ' scripts/requirements.txt))"
     python=/usr/bin/python3

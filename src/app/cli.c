@@ -160,7 +160,8 @@ static int set_list(const CliCommand *command, const CliOption *option, const ch
     return 0;
 }
 
-/* Checked before the command runs: a missing folder must not cost an hour of trials. */
+/* Checks an output before the command runs, because a missing folder must not cost an hour of
+ * trials. */
 static int set_output(const CliCommand *command, const CliOption *option, const char *path) {
     MildError error = {0};
     if (strcmp(path, "-") != 0 && file_check_write(path, &error) != MILD_OK) {

@@ -63,7 +63,7 @@ typedef struct {
     int word_count;
     const char *overrides; /* help on --section.key=value; NULL: the command takes none */
     const char *examples;  /* whole lines, or NULL */
-    int positional_max;    /* most words without dashes */
+    int positional_max;    /* largest number of words without dashes */
     int positional_input;  /* bool: these words are files that the command reads */
     const char *picture;   /* option whose picture gets a file of its numbers; NULL: none */
     const char *numbers;   /* that file's name ends in this instead of the picture's ".png" */

@@ -11,7 +11,7 @@
 #include "bench/bench.h"
 #include "config/experiment_keys.h"
 
-/* memory comes first, because its peak is that of the whole process so far. */
+/* memory comes first, because it reports the peak of the whole process so far. */
 static const struct {
     const char *name;
     MildStatus (*run)(const ExperimentDef *def, BenchReport *report, MildError *error);
@@ -23,8 +23,9 @@ static const struct {
      "pose and in turns; ratio_to_rigid is newton over engine_rigid"},
     {"ground", bench_ground, "the contact solver alone"},
     {"elements", bench_elements, "the contact solver with 20 to 2000 elements"},
-    {"solver", bench_solver, "newton against the paper's gauss_seidel sweeps, to the same error"},
-    {"walk", bench_walk, "as step, along a walk of the shipped policy"},
+    {"solver", bench_solver,
+     "newton compared with the paper's gauss_seidel sweeps, at the same error"},
+    {"walk", bench_walk, "the same as step, along a walk of the shipped policy"},
     {"train", bench_train, "policy steps per second in training, and how the time is spent"},
 };
 enum { BENCHES = sizeof benches / sizeof *benches };

@@ -61,7 +61,7 @@ static cJSON *row_json(const EvalRow *row) {
     return o;
 }
 
-/* Who walked: a policy's file, or a controller that needs none. */
+/* Writes the JSON. It names the file of the policy, or a controller that needs none. */
 static MildStatus write_json(const Eval *e, const Robot *robot, MildError *error) {
     cJSON *root = cJSON_CreateObject();
     int learned = strcmp(e->controller, "learned") == 0;

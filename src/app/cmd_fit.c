@@ -134,7 +134,7 @@ static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitDe
     return MILD_OK;
 }
 
-/* ---- what is said ---- */
+/* ---- the printed result ---- */
 
 static void say_held(const FitResult *result, FitName name) {
     const FitParameter *p = &result->parameter[name];

@@ -73,7 +73,7 @@ static void print_sinkage(const MildSole *sole) {
     }
 }
 
-/* One number that the model is matched by, on every preset. */
+/* Prints a number by which the model is matched, for every preset. */
 static void print_matched(const MildSole *sole, MildModel model, const char *key) {
     const MildField *field =
         mild_field_find(mild_material_fields, mild_material_field_count, key, NULL);

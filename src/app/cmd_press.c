@@ -149,7 +149,7 @@ static MildStatus csv_write(const PressResult *result, int more, const char *pat
     return status;
 }
 
-/* The picture is drawn from the file of --csv, or else from FILE.csv beside FILE.png. */
+/* Draws the picture from the file of --csv, or otherwise from FILE.csv beside FILE.png. */
 static MildStatus figure_save(const PressOptions *options, const PressResult *result, int more,
                               MildError *error) {
     char data[PATH_SIZE];
@@ -164,7 +164,7 @@ static MildStatus figure_save(const PressOptions *options, const PressResult *re
     return status == MILD_OK ? figure_draw("scripts/press.py", data, figure, error) : status;
 }
 
-/* ---- what is said ---- */
+/* ---- the printed result ---- */
 
 enum { TABLE_LINES = 10 };
 
@@ -305,7 +305,7 @@ static void summary_print(const PressOptions *options, const Tool *tool, const c
         fprintf(file, ", dragged %g mm at %g m/s", 1e3 * options->drag, options->drag_speed);
     }
     fprintf(file,
-            "\npeak %.1f N (%.2f kPa), work in %.3f J, given back %.3f J, print left %.1f mm\n",
+            "\npeak %.1f N (%.2f kPa), work in %.3f J, work returned %.3f J, imprint %.1f mm\n",
             result->peak_force, 1e-3 * result->peak_force / result->area, result->work_in,
             result->work_out, 1e3 * fmax(result->print_depth, 0));
     if (isfinite(options->drag)) {
@@ -451,7 +451,7 @@ static double or_else(double value, double otherwise) {
     return isfinite(value) ? value : otherwise;
 }
 
-/* Defaults of what was not given. */
+/* Fills in the defaults of options that were not given. */
 static PressDef options_def(PressOptions *o) {
     o->speed = or_else(o->speed, 0.01);
     o->mass = or_else(o->mass, 20);

@@ -20,8 +20,8 @@ typedef struct {
     char note[1024];
 } Command;
 
-/* The command that made the policy, as far as it fits; the run folder's config.ini has every
- * key. */
+/* Notes the command that made the policy, truncated if necessary. config.ini in the run folder has
+ * every key. */
 static void write_note(Command *run, const CliArgs *args) {
     const char *folder = run->resume ? run->out : "configs",
                *name = run->resume ? "config" : "default";
@@ -83,7 +83,7 @@ static MildStatus make_config_text(Command *run, MildError *error) {
 
 typedef struct {
     Progress bar;
-    double steps_per_s, reward, length, falls; /* smoothed, but for falls */
+    double steps_per_s, reward, length, falls; /* smoothed, except falls */
     int64_t iteration, iterations;             /* of the whole run, of this session */
     int64_t bad;                               /* diverged environments and skipped minibatches */
 } Display;

@@ -9,8 +9,8 @@
 #include "task/task_def.h"
 #include "task/terrain.h"
 
-/* The material of a preset. For an unknown name the message tells the nearest known one. `rigid`
- * has no material: it sets *rigid, and fails where that is NULL. */
+/* The material of a preset. For an unknown name the message names the nearest preset. `rigid` has
+ * no material: it sets *rigid, or fails when that is NULL. */
 MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, MildError *error);
 
 /* The model of --model NAME (NULL: not given) or --ground.model=NAME; mild when neither is
@@ -18,19 +18,18 @@ MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, Mi
 MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *model,
                          MildError *error);
 
-/* How a command turns the names of grounds into materials. */
+/* What a command needs to turn names of grounds into materials. */
 typedef struct {
     MildModel model;
     const MildSole *sole; /* raster on which other models are matched to mild */
-    double load;          /* [N] under it */
-    const CliArgs
-        *args;     /* --ground.KEY=VALUE, laid over the matched material; and --task.KEY=VALUE */
-    TaskDef *task; /* NULL: the command takes no --task */
-    TerrainDef *terrain; /* NULL: no --terrain either */
+    double load;          /* [N] on that sole */
+    const CliArgs *args; /* --ground.KEY=VALUE, applied to the matched material; --task.KEY=VALUE */
+    TaskDef *task;       /* NULL: the command takes no --task */
+    TerrainDef *terrain; /* NULL: the command takes no --terrain */
 } GroundsDef;
 
-/* For the robot: models are matched under half its weight, overrides come from `args`, and the
- * robot gets the soles of the model. */
+/* The GroundsDef for a robot: models are matched under half its weight, and overrides come from
+ * `args`. Gives the robot the soles of the model. */
 GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain,
                              const CliArgs *args);
 /* Turns a preset into the material of the model, then applies the overrides. */

@@ -9,13 +9,14 @@
 #include "base/clock.h"
 #include "eval/eval.h"
 
-#define START_TIME 1.0  /* [s] standing up and starting, not counted in speeds and pressures */
+#define START_TIME 1.0  /* [s] time for starting, not counted in speeds and pressures */
 #define FALL_TIME 1.0   /* [s] how long the picture stays after a fall */
 #define SPEED_TIME 0.5  /* [s] the shown speed is a running mean over about this long */
 #define OWED_MAX 0.2    /* [s] delay behind real time that is caught up with at once */
 #define WINDOW_TIME 1e6 /* [s] a window's walk has no end */
 
-/* [m/s, m/s, rad/s] that the keys can command: what the shipped policy was trained on. */
+/* [m/s, m/s, rad/s] Largest command of the keys, which is the range that the shipped policy was
+ * trained on. */
 static const double command_max[3] = {1.3, 0.3, 0.8};
 
 /* State of the walk. */
@@ -29,7 +30,7 @@ typedef struct {
     double speed;      /* [m/s] shown */
     double end;        /* [s] */
     int ground;        /* material under the base */
-    int lost;          /* bool: numbers went bad, the state must not be drawn */
+    int lost;          /* bool: the simulation diverged, so the state must not be drawn */
 } Walk;
 
 /* TaskProbe: every physics step. */
@@ -91,8 +92,8 @@ static void step(Walk *walk) {
     }
     play->fell = 1;
     play->leg[walk->ground].fell = 1;
-    walk->end =
-        play->time; /* end here: only soles touch the ground, so a fall would go through it */
+    /* Stop here: only soles touch the ground, and a falling robot would sink through it. */
+    walk->end = play->time;
     walk->lost = !out.valid;
 }
 

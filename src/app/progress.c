@@ -109,7 +109,7 @@ void interrupt_install(void) {
     if (pthread_create(&thread, NULL, wait_for_signals, &signals) == 0) {
         pthread_detach(thread);
     } else {
-        pthread_sigmask(SIG_UNBLOCK, &signals, NULL); /* better an abrupt end than none */
+        pthread_sigmask(SIG_UNBLOCK, &signals, NULL); /* an abrupt end is better than none */
     }
 }
 

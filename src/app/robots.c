@@ -65,7 +65,7 @@ int robots_print(void) {
     if (count == 0) {
         return cli_fail_text("info", "no robots: the folder robots/ is missing or empty");
     }
-    printf("robots (--robot NAME); a folder of your own is given with a slash, as ./walker "
+    printf("robots (--robot NAME); write a folder of your own with a slash, as ./walker "
            "(docs/robots.md)\n\n");
     for (int i = 0; i < count; i++) {
         MildError error = {0};

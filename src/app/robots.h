@@ -1,4 +1,4 @@
-/* Robots by name, as the command line says them. */
+/* Robots named on the command line. */
 #ifndef APP_ROBOTS_H
 #define APP_ROBOTS_H
 
@@ -9,14 +9,13 @@
 
 /* `option` of --robot, or `otherwise` where it is NULL. */
 Robot *robots_open(const char *option, const char *otherwise, MildError *error);
-/* The robot of --robot into train.robot; what a config file cannot hold is refused, as in an
- * override. */
+/* Sets train.robot from --robot. Refuses names that a config file cannot hold, like an override. */
 MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error);
 /* Help on --controller; returns `text`. */
 const char *robots_controller_help(char *text, size_t size);
 /* The robots that ship: joints, feet, mass, height, source. Returns the exit code. */
 int robots_print(void);
 
-#define ROBOTS_HELP "robot: a name of `mild info robots`, or a folder, with a slash"
+#define ROBOTS_HELP "robot: a name listed by `mild info robots`, or a folder, written with a slash"
 
 #endif

@@ -65,8 +65,9 @@ MildStatus mild_fields_check(const MildField *fields, int count, const void *def
         const MildField *field = &fields[f];
         if (field->type == MILD_FIELD_TEXT) {
             if (!memchr((const char *)def + field->offset, 0, (size_t)field->count)) {
-                return mild_fail(error, MILD_ERROR_RANGE, "%s.%s has no end within %d characters",
-                                 section, field->name, field->count);
+                return mild_fail(error, MILD_ERROR_RANGE,
+                                 "%s.%s is not terminated within %d characters", section,
+                                 field->name, field->count);
             }
             continue;
         }
@@ -104,8 +105,8 @@ static int parse_bool(const char *text, size_t length, Value *value) {
     return 0;
 }
 
-/* One value of `length` characters at `text`; false when it is not exactly one value of that type.
- */
+/* Parses one value from `length` characters at `text`. Returns false unless they are exactly one
+ * value of that type. */
 static int parse_value(MildFieldType type, const char *text, size_t length, Value *value) {
     char word[64], *end = word;
     if (length == 0 || length >= sizeof word) {
@@ -143,8 +144,9 @@ static MildStatus parse_text(const MildField *field, void *def, const char *text
                              const char *section, MildError *error) {
     size_t length = strlen(text);
     if (length >= (size_t)field->count) {
-        return mild_fail(error, MILD_ERROR_RANGE, "%s.%s: text of %zu characters, at most %d fit",
-                         section, field->name, length, field->count - 1);
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "%s.%s: the text has %zu characters, but at most %d fit", section,
+                         field->name, length, field->count - 1);
     }
     memcpy((char *)def + field->offset, text, length + 1);
     return MILD_OK;

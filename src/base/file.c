@@ -29,7 +29,7 @@ MildStatus file_check_regular(const char *path, MildError *error) {
     return reason ? cannot_read(path, reason, error) : MILD_OK;
 }
 
-/* A descriptor, or -1. O_NONBLOCK: otherwise opening a pipe without a writer would wait. */
+/* Returns a descriptor, or -1. Without O_NONBLOCK, opening a pipe that has no writer would wait. */
 static int open_regular(const char *path, struct stat *info, MildError *error) {
     int file = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     const char *reason = file < 0 || fstat(file, info) != 0 ? strerror(errno) : not_regular(info);
@@ -54,7 +54,7 @@ FILE *file_open(const char *path, MildError *error) {
     return stream;
 }
 
-/* Reads `size` bytes; returns 0 or the error number, EIO when the file ends before. */
+/* Reads `size` bytes. Returns 0 or an error number, which is EIO when the file is shorter. */
 static int read_whole(int file, char *bytes, size_t size) {
     while (size > 0) {
         ssize_t count = read(file, bytes, size);
@@ -88,7 +88,8 @@ char *file_read(const char *path, size_t limit, size_t *size, MildError *error) 
     if (failed) {
         cannot_read(path, strerror(failed), error);
     } else if (*size > limit) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%.200s: larger than %s; no file of this kind is", path,
+        mild_fail(error, MILD_ERROR_FORMAT,
+                  "%.200s: larger than %s, the limit for files of this kind", path,
                   text_bytes((double)limit, most, sizeof most));
     } else {
         mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", path);
@@ -104,13 +105,13 @@ static MildStatus cannot_write(const char *path, int failure, MildError *error) 
                      strerror(failure));
 }
 
-/* Devices and pipes are written to, not replaced. */
+/* Bool: the path is a device or a pipe, which is written to instead of replaced. */
 static int is_device(const char *path) {
     struct stat info;
     return stat(path, &info) == 0 && !S_ISREG(info.st_mode);
 }
 
-/* Makes the file PATH.PID-N.tmp, with the first N that is free: a descriptor, or -1. */
+/* Creates the file PATH.PID-N.tmp with the first free N. Returns a descriptor, or -1. */
 static int open_temporary(const char *path, char temporary[PATH_SIZE], MildError *error) {
     if (!*path) {
         mild_fail(error, MILD_ERROR_ARGUMENT, "the name of the file is empty");
@@ -155,8 +156,7 @@ int file_is_temporary(const char *name) {
 
 MildStatus file_check_write(const char *path, MildError *error) {
     struct stat info;
-    if (is_device(
-            path)) { /* not opened, because closing it again would end the pipe for its reader */
+    if (is_device(path)) { /* opening and closing a pipe would end it for its reader */
         int failed = stat(path, &info) == 0 && S_ISDIR(info.st_mode) ? EISDIR
                      : access(path, W_OK) != 0                       ? errno
                                                                      : 0;
@@ -195,8 +195,8 @@ static const char *folder_of(const char *path, char folder[PATH_SIZE]) {
     return folder;
 }
 
-/* A rename is safe on disk only when its folder is synced. Where folders cannot be synced, the
- * error does not matter. */
+/* A rename is safe on disk only after its folder has been synced. Errors are ignored, because some
+ * file systems cannot sync folders. */
 static void sync_folder(const char *path) {
     char name[PATH_SIZE];
     int folder = open(folder_of(path, name), O_RDONLY | O_CLOEXEC);
@@ -273,7 +273,7 @@ static MildStatus lock_refused(int file, const char *path, MildError *error) {
     return mild_fail(error, MILD_ERROR_ARGUMENT, "%.200s: in use by another process", path);
 }
 
-/* The holder removes the file before it releases the lock. So a lock counts only when the locked
+/* The holder removes the file before it releases the lock. So a lock is valid only if the locked
  * file still has its name. */
 MildStatus file_lock(FileLock *lock, const char *path, MildError *error) {
     lock->file = -1;

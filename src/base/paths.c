@@ -79,7 +79,7 @@ MildStatus path_make_folder(const char *folder, MildError *error) {
     }
     struct stat info;
     if (stat(path, &info) != 0 || !S_ISDIR(info.st_mode)) {
-        return mild_fail(error, MILD_ERROR_IO, "%s: exists and is not a folder", path);
+        return mild_fail(error, MILD_ERROR_IO, "%s: exists but is not a folder", path);
     }
     return MILD_OK;
 }

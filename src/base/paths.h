@@ -8,15 +8,16 @@
 
 enum { PATH_SIZE = 1024 };
 
-/* Full path of a shipped file such as "robots/sa01/robot.ini" or "configs/default.ini": below
- * $MILD_HOME when set, else beside the folder of the executable (build/..), else in the source tree
- * the program was built from. */
+/* Full path of a shipped file such as "robots/sa01/robot.ini" or "configs/default.ini". It is
+ * looked for under $MILD_HOME if that is set, otherwise beside the folder of the executable
+ * (build/..), otherwise in the source tree that the program was built from. */
 const char *path_data(const char *relative, char path[PATH_SIZE]);
 
 /* folder + "/" + name; fails when longer than PATH_SIZE. */
 MildStatus path_join(const char *folder, const char *name, char path[PATH_SIZE], MildError *error);
 
-/* Name of a file that belongs to another: "runs/a.png" with "_fit.csv" gives "runs/a_fit.csv". */
+/* Replaces the extension of `file` by `ending`: "runs/a.png" with "_fit.csv" gives
+ * "runs/a_fit.csv". */
 MildStatus path_beside(const char *file, const char *ending, char path[PATH_SIZE],
                        MildError *error);
 

@@ -5,14 +5,14 @@
 
 typedef struct Pool Pool;
 
-/* threads: at least 1, including the caller's; 0: one per online core. NULL when memory or
- * threads run out. */
+/* threads: number of threads including the caller's, or 0 for one per online core. Returns NULL
+ * when memory or threads run out. */
 Pool *pool_create(int threads);
 void pool_destroy(Pool *pool);
 int pool_threads(const Pool *pool);
 
-/* Calls work(context, piece, thread) for piece = 0 .. pieces-1, thread in [0, threads); returns
- * when all are done. Not reentrant; one caller at a time. */
+/* Calls work(context, piece, thread) for piece = 0 .. pieces - 1, with thread in [0, threads).
+ * Returns when all pieces are done. Not reentrant; one caller at a time. */
 void pool_run(Pool *pool, int pieces, void (*work)(void *context, int piece, int thread),
               void *context);
 

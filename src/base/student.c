@@ -3,10 +3,11 @@
 #include <math.h>
 
 #define WANTED 0.95
-#define NORMAL_95 1.959963984540054 /* the point of the normal distribution, below every t */
+#define NORMAL_95 1.959963984540054 /* the normal distribution's value, smaller than every t */
 
-/* Probability of angles -angle .. angle, where t = sqrt(freedom) tan(angle), and its slope by the
- * angle. For whole degrees of freedom it is a finite sum (Abramowitz and Stegun 26.7.3, 26.7.4). */
+/* Probability that |t| <= sqrt(freedom) tan(angle), and its derivative with respect to the angle.
+ * For an integer number of degrees of freedom it is a finite sum (Abramowitz and Stegun 26.7.3,
+ * 26.7.4). */
 static double probability_within(int freedom, double angle, double *slope) {
     const double c = cos(angle);
     const int odd = freedom % 2;
@@ -27,8 +28,8 @@ double student_95(int freedom) {
     }
     const double root = sqrt(freedom);
     double angle = atan(NORMAL_95 / root);
-    /* The probability is concave in the angle, so Newton's method climbs from below the solution
-     * and never passes it, until rounding stops it. */
+    /* The probability is concave in the angle. So Newton's method approaches the solution from
+     * below and never overshoots, until rounding stops it. */
     for (double rise = angle; rise > 1e-14 * angle; angle += fmax(rise, 0)) {
         double slope;
         const double within = probability_within(freedom, angle, &slope);

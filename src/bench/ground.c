@@ -74,7 +74,8 @@ static double ground_run(GroundBench *bench, int steps, int advance) {
     return clock_thread_seconds() - start;
 }
 
-/* [ns] per step: the least of many short repeats, because other programs only add time. */
+/* [ns] Time per step: the minimum of many short repeats, because other programs can only add
+ * time. */
 static double ground_time(GroundBench *bench, int advance) {
     double least = INFINITY;
     int steps = 1;
@@ -131,7 +132,8 @@ static void ground_cases(GroundBench *bench, const Robot *robot, double dt, Benc
     }
 }
 
-/* The standing step on waves, and on ground that remembers prints; beside newton_stick_advance. */
+/* The standing step on waves, and on ground that remembers imprints, to compare with
+ * newton_stick_advance. */
 static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double dt,
                                  BenchReport *report, MildError *error) {
     enum { TILES = 128 };

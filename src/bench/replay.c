@@ -72,8 +72,8 @@ static double play_soft(Player *player, const ReplayPeriod *period, int which) {
     return clock_seconds() - start;
 }
 
-/* [m] Height for the rigid floor: the higher of the soles that sank into soft ground, else 0. At
- * that height the floor carries both soles and throws neither out. */
+/* [m] Height of the rigid floor: that of the higher sole which sank into soft ground, otherwise 0.
+ * At this height the floor carries the soles without throwing one out. */
 static double sunk_floor(Player *player, const ReplayPeriod *period) {
     double floor = -INFINITY;
     robot_sim_load(player->soft, &period->state, &player->replay->variation);
@@ -86,7 +86,7 @@ static double sunk_floor(Player *player, const ReplayPeriod *period) {
     return floor > -INFINITY && !player->replay->variation.rigid ? floor : 0.0;
 }
 
-/* The same in the engine alone. */
+/* Seconds of one period with the engine's own contact. */
 static double play_engine(Player *player, const ReplayPeriod *period) {
     const Replay *replay = player->replay;
     mjModel *m = robot_sim_model(player->rigid);

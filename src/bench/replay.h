@@ -33,12 +33,13 @@ typedef struct {
 
 /* Means over all steps, from the least of the repeats of each period [us per physics step]. */
 typedef struct {
-    double tight,
-        loose;     /* robot_sim_step on the ground, Newton with its default stop and with `loose` */
-    double engine; /* mj_step from the same states; the floor lies under the soles that sank into
-                      soft ground */
-    double tight_iterations, loose_iterations; /* per step */
-    double loose_unconverged;                  /* [-] share of the steps */
+    double tight;             /* robot_sim_step on the ground, Newton with its default tolerance */
+    double loose;             /* the same with the tolerance `loose` */
+    double engine;            /* mj_step from the same states; the floor is lowered to the soles
+                                 that sank into soft ground */
+    double tight_iterations;  /* per step */
+    double loose_iterations;  /* per step */
+    double loose_unconverged; /* [-] share of the steps */
 } ReplayTimes;
 
 /* Times the recorded walk. The cases take turns at every period. */

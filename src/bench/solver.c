@@ -10,10 +10,10 @@
 #include "control/stand.h"
 
 enum { SOLVERS = 2, TWIST_MAX = 6 * ROBOT_FEET_MAX, PROBLEMS_MAX = 400 };
-static const double solver_error = 1e-6; /* [-] error at which both stop */
-static const double never = 1e-15;       /* [-] a tolerance that does not stop them earlier */
+static const double solver_error = 1e-6;              /* [-] error at which both stop */
+static const double never = 1e-15;                    /* [-] a tolerance too small to stop them */
 static const int solver_limit[SOLVERS] = {100, 2048}; /* most iterations that are tried */
-static const int solver_repeats[SOLVERS] = {20, 3};   /* the least time counts */
+static const int solver_repeats[SOLVERS] = {20, 3};   /* repeats; the shortest time counts */
 static const char *const solver_names[SOLVERS] = {"newton", "gauss_seidel"};
 
 /* One contact problem and the times of both solvers. */
@@ -24,9 +24,9 @@ typedef struct {
     MildScratch *scratch;
     double exact[TWIST_MAX]; /* [N s, N m s] the feet's impulses, by Newton to the last digits */
     double times[SOLVERS][PROBLEMS_MAX]; /* [us] */
-    int problems,
-        without_exact; /* without: Newton did not converge, so there is nothing to compare with */
-    int short_of[SOLVERS]; /* problems not at solver_error within the limit, timed at the limit */
+    int problems;                        /* number of problems */
+    int without_exact;                   /* problems left out because Newton did not converge */
+    int short_of[SOLVERS]; /* problems that missed solver_error within the limit, timed there */
 } SolverBench;
 
 static void impulses(const MildContactInput *input, const MildContactResult *result,
@@ -71,8 +71,8 @@ static double error_after(SolverBench *bench, int solver, int iterations) {
     return sqrt(energy(&bench->input, difference) / energy(&bench->input, bench->exact));
 }
 
-/* The fewest iterations that reach solver_error, by doubling and bisection; the limit when none
- * do. */
+/* The fewest iterations that reach solver_error, found by doubling and bisection. Returns the limit
+ * when none do. */
 static int fewest_iterations(SolverBench *bench, int solver) {
     int low = 0, high = 1, limit = solver_limit[solver];
     while (!(error_after(bench, solver, high) <= solver_error)) {

@@ -11,12 +11,12 @@
 
 #define REPEATS_MAX 1000
 #define WARM_STEPS 500
-/* The paper's sweeps are slower by orders of magnitude, so they take few steps, after the
- * others. */
+/* The paper's sweeps are slower by orders of magnitude, so they run fewer steps, after the other
+ * cases. */
 #define SWEEP_REPEATS 3
 #define SWEEP_STEPS 2
 #define PHASE_WINDOWS 10
-#define HANG_HEIGHT 1000.0 /* [m] above the floor, so that it is not reached during the bench */
+#define HANG_HEIGHT 1000.0 /* [m] above the floor, too high to reach it during the bench */
 
 enum { ENGINE_FREE, ENGINE_RIGID, RIGID, NEWTON, GAUSS_SEIDEL, CASES };
 
@@ -71,7 +71,7 @@ static int our_steps(Bench *bench, int which, int steps) {
     return bad;
 }
 
-/* Seconds per step of one case; negative when the robot's numbers went bad. */
+/* Seconds per step of one case. Negative when the simulation diverged. */
 static double time_case(Bench *bench, int which, int steps) {
     double start = clock_thread_seconds();
     int bad = 0;
@@ -134,8 +134,8 @@ static double median(double *values, int count) {
     return values[count / 2];
 }
 
-/* Median time of the cases first .. last in us per step. They take turns, so a slow moment of the
- * machine hits all of them. */
+/* [us] Median time per step of the cases first .. last. They take turns, so that a slow moment of
+ * the machine affects all of them. */
 static MildStatus measure(Bench *bench, int first, int last, int repeats, int steps,
                           double medians[CASES], MildError *error) {
     static const char *const names[CASES] = {"engine free", "engine rigid", "rigid", "newton",

@@ -1,4 +1,4 @@
-/* What a physics step of the robot costs, beside the engine's own contact. */
+/* Cost of a physics step of the robot, compared with the engine's own contact. */
 #ifndef BENCH_STEP_H
 #define BENCH_STEP_H
 

@@ -6,7 +6,7 @@
 #include "bench/bench.h"
 #include "train/trainer.h"
 
-/* Time inside the environments is summed over the threads, so it is divided by their number. */
+/* Time inside the environments is summed over the threads, and so divided by their number. */
 static void train_rows(const TrainTimes *sum, double steps, double wall, int threads,
                        BenchReport *report) {
     double ground = sum->ground / threads, physics = sum->physics / threads - ground;

@@ -30,8 +30,7 @@ static MildStatus section_fail(const char *where, const char *name, const char *
                      where, name, nearest ? nearest : "none");
 }
 
-/* A key that is unknown here may exist in another section: that one is a better hint than a similar
- * name in this section. */
+/* If the key exists in another section, that is a better hint than a similar name in this one. */
 static MildStatus key_fail(const ConfigSection *sections, int count, const ConfigSection *section,
                            const char *key, const char *nearest, const char *where,
                            MildError *error) {
@@ -46,8 +45,8 @@ static MildStatus key_fail(const ConfigSection *sections, int count, const Confi
                      where, section->name, key, home, nearest ? nearest : "");
 }
 
-/* Length of the line without its comment, which is "; ..." or "# ..." at its start or after a
- * blank. */
+/* Length of the line without its comment. A comment starts with ; or # at the start of the line or
+ * after a blank. */
 static size_t code_length(const char *line) {
     size_t length = 0;
     for (; line[length] && line[length] != '\n'; length++) {
@@ -59,7 +58,8 @@ static size_t code_length(const char *line) {
     return length;
 }
 
-/* Whether a line of a config file can hold the text. A resumed run reads it back from there. */
+/* Whether a line of a config file can hold the text. A resumed run reads the text back from such a
+ * line. */
 static int text_fits_line(const char *text) {
     size_t length = strlen(text);
     int blanks =
@@ -81,8 +81,8 @@ static MildStatus key_set(const ConfigSection *sections, int count, const char *
     }
     if (field->type == MILD_FIELD_TEXT && !text_fits_line(value)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "%s: %s.%s: a text has at most %d characters, no blanks around it, and no "
-                         "; or # behind a blank",
+                         "%s: %s.%s: a text may have at most %d characters, no blanks around it, "
+                         "and no ; or # after a blank",
                          where, section->name, key, TEXT_MAX);
     }
     MildError cause = {0};
@@ -179,7 +179,7 @@ static int reader_key(void *user, const char *section, const char *key, const ch
     reader_where(reader, where);
     if (!*section) {
         reader->status = mild_fail(reader->error, MILD_ERROR_FORMAT,
-                                   "%s: key '%.60s' stands before the first [section]", where, key);
+                                   "%s: key '%.60s' comes before the first [section]", where, key);
         return 0;
     }
     const MildField *field = NULL;
@@ -254,8 +254,8 @@ MildStatus config_read(const ConfigSection *sections, int count, const char *pat
     }
     if (memchr(text, '\0', size)) {
         free(text);
-        return mild_fail(error, MILD_ERROR_FORMAT, "%.200s: holds binary data, so it is no config",
-                         path);
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%.200s: is not a config, because it contains binary data", path);
     }
     MildStatus status = config_read_text(sections, count, text, path, complete, error);
     free(text);
@@ -266,15 +266,15 @@ MildStatus config_override(const ConfigSection *sections, int count, const char 
                            MildError *error) {
     char section[64], key[64], where[WHERE_MAX];
     if (strpbrk(text, "\r\n")) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "--%.*s: an override is one line",
+        return mild_fail(error, MILD_ERROR_FORMAT, "--%.*s: an override must be a single line",
                          (int)strcspn(text, "\r\n"), text);
     }
     snprintf(where, sizeof where, "--%.120s", text);
     const char *dot = strchr(text, '.'), *equals = strchr(text, '=');
     if (!dot || !equals || dot > equals || dot == text || dot + 1 == equals ||
         dot - text >= (int)sizeof section || equals - dot > (int)sizeof key) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: an override reads --section.key=value",
-                         where);
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "%s: an override has the form --section.key=value", where);
     }
     snprintf(section, sizeof section, "%.*s", (int)(dot - text), text);
     snprintf(key, sizeof key, "%.*s", (int)(equals - dot - 1), dot + 1);

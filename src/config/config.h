@@ -1,7 +1,7 @@
 /* Reads ini files and --section.key=value overrides into Def structs through their field tables.
- * Later sources win: struct defaults < default.ini < overlay file < overrides. The first bad line
- * stops the reading; the message tells file, line, key and the nearest valid name. What earlier
- * lines set stays set, so callers give up on the first error. */
+ * Later sources win: struct defaults < default.ini < overlay file < overrides. Reading stops at the
+ * first bad line. The message gives file, line, key and the nearest valid name. Values from earlier
+ * lines remain set, so callers must give up after an error. */
 #ifndef CONFIG_CONFIG_H
 #define CONFIG_CONFIG_H
 
@@ -32,8 +32,8 @@ MildStatus config_override(const ConfigSection *sections, int count, const char 
 MildStatus config_overrides(const ConfigSection *sections, int count, const char *const *texts,
                             int text_count, MildError *error);
 
-/* Prints a complete ini that reads back to the same values. comments: with each key's help and
- * range above it. */
+/* Prints a complete ini that reads back to the same values. comments: bool, print the help and
+ * range of each key above it. */
 void config_print(const ConfigSection *sections, int count, int comments, FILE *file);
 /* The same as text, to be freed by the caller; NULL when out of memory. */
 char *config_text(const ConfigSection *sections, int count, int comments);

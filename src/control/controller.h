@@ -1,5 +1,5 @@
-/* Who moves the robots. A controller is one row of CONTROLLER_LIST and one file that fills this
- * contract; evaluation and play know nothing else. */
+/* What moves the robots. A controller is one row of CONTROLLER_LIST and one file that implements
+ * this interface. Evaluation and play know nothing else about it. */
 #ifndef MILD_CONTROLLER_H
 #define MILD_CONTROLLER_H
 
@@ -9,7 +9,8 @@
 typedef struct {
     void *self;
     const char *name;
-    /* Actions [rows][robot_joints] for the environments as they are now. One caller at a time. */
+    /* Writes actions [rows][robot_joints] for the present state of the environments. One caller at
+     * a time. */
     void (*act)(void *self, int rows, TaskEnv *const *envs, float *actions);
     void (*destroy)(void *self);
 } Controller;
@@ -17,16 +18,17 @@ typedef struct {
 /* Name and summary; the file defines controller_make_NAME. */
 #define CONTROLLER_LIST(X)                                                                         \
     X(learned, "the policy of --policy")                                                           \
-    X(stand, "stands still and balances, whatever the command; gains stand_kp of robot.ini")       \
-    X(zero, "no action: the joints hold the default pose")
+    X(stand,                                                                                       \
+      "stands still and balances, ignores the command; gains stand_kp, stand_kd of robot.ini")     \
+    X(zero, "takes no action, so the joints hold the default pose")
 
-/* What a controller may need; borrowed, and must outlive it. */
+/* What a controller may need. It is borrowed and must outlive the controller. */
 typedef struct {
     const char *policy; /* file, for `learned` */
     const TaskDef *task;
     const Robot *robot;
     Pool *pool;   /* may be NULL */
-    int rows_max; /* environments of one call, at most */
+    int rows_max; /* most environments in one call */
 } ControllerDef;
 
 #define CONTROLLER_MAKE(name, summary)                                                             \
@@ -38,9 +40,9 @@ CONTROLLER_LIST(CONTROLLER_MAKE)
 int controller_count(void);
 const char *controller_name(int index); /* index < controller_count() */
 const char *controller_summary(int index);
-/* Fails with the nearest name when there is none of this name. */
+/* Fails when there is no controller of this name. The message contains the nearest name. */
 MildStatus controller_check(const char *name, MildError *error);
-/* *controller is the caller's to destroy. */
+/* The caller must destroy *controller. */
 MildStatus controller_make(const char *name, const ControllerDef *def, Controller *controller,
                            MildError *error);
 

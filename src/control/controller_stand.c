@@ -1,5 +1,5 @@
-/* The balanced stand as a controller: it ignores the command. The balance is computed once per
- * policy step from the true state; between, the joints' own PD holds it. */
+/* The balanced stand as a controller, which ignores the command. The balance is computed once per
+ * policy step from the true state. Between policy steps the joints' own PD holds it. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,11 +9,11 @@
 typedef struct {
     const Robot *robot;
     Stand *stand;
-    RobotSim *sim;       /* where the feet of a state are looked up */
+    RobotSim *sim;       /* to compute the feet of a state */
     double action_scale; /* [rad] per unit of action */
 } Standing;
 
-/* The gains are part of what a motor is told, so the environments get the stand's. */
+/* Gains are part of a motor command, so the environments get the gains of the stand. */
 static void standing_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
     Standing *standing = self;
     int joints = robot_joints(standing->robot);

@@ -1,4 +1,4 @@
-/* No action at all: the joints hold the default pose with the task's gains. */
+/* Takes no action. The joints hold the default pose with the task's gains. */
 #include <stdlib.h>
 
 #include "control/controller.h"

@@ -37,9 +37,10 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
     }
     const PolicyDef *def = policy_def(policy);
     if (def->robot[0] && strcmp(def->robot, robot_name(robot)) != 0) {
-        mild_fail(error, MILD_ERROR_FORMAT,
-                  "%s: a policy of robot %s, not of %s; give --robot %s or another --policy", path,
-                  def->robot, robot_name(robot), def->robot);
+        mild_fail(
+            error, MILD_ERROR_FORMAT,
+            "%s: this policy is for robot %s, not for %s; give --robot %s or another --policy",
+            path, def->robot, robot_name(robot), def->robot);
         policy_destroy(policy);
         return MILD_ERROR_FORMAT;
     }

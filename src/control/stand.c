@@ -8,32 +8,34 @@
 
 /* Soft ground is a spring under the feet. Its stiffness against pitching is the sum over elements
  * of K x^2 [N m/rad], for both feet of SA01 level at rest: rubber 1250, foam60 660, sand_dense 390,
- * grass 320, foam45 230, sand_loose 110, foam28 90, foam25 80. Gravity topples with m g h = 205;
- * the joints are in series with the ground and with each other, and the potential of the whole
- * (sole tilt, ankle, knee, hip) has a minimum only above 460. Besides, the default pose has its
- * centre of mass 40 mm behind the middle of the soles, so the heels sink first: released there with
- * joints held still the robot falls backwards on every soft ground in 1 to 2 s, on rubber and
- * foam60 by overshoot. The balanced stand therefore
- * - puts the centre of mass over the middle of the soles, so that the feet sink level,
- * - feeds the weight forward, so that the joints need no error to carry it,
- * - servoes the legs in the world instead of on the tilting soles: an ankle's error is the shank's
- *   tilt, not the joint's, and the legs' lengths follow the plane through the soles. The ground's
- *   stiffness then drops out of the balance: 2 x 200 N m/rad at the ankles hold 205 on any ground
- *   that carries the ankles' torque,
- * - damps the sway, which Kd = 1 N m s/rad at the ankles hardly does.
- * A robot without ankles has feet before and behind its centre of mass: it does not lean, and its
- * legs' lengths answer the pitch as they do the roll. */
-#define SWAY_RATE 0.15    /* [s] slope answered per angular speed of the base about the feet */
+ * grass 320, foam45 230, sand_loose 110, foam28 90, foam25 80. Gravity topples the robot with m g h
+ * = 205. The joints are in series with the ground and with each other, so the potential of the
+ * whole (sole tilt, ankle, knee, hip) has a minimum only above 460. Besides, in the default pose
+ * the centre of mass is 40 mm behind the middle of the soles, so the heels sink first. Released in
+ * that pose with fixed joints, the robot falls backwards on every soft ground within 1 to 2 s, on
+ * rubber and foam60 because it overshoots. The balanced stand therefore
+ *
+ *   - puts the centre of mass over the middle of the soles, so that the feet sink evenly,
+ *   - feeds the weight forward, so that the joints carry it without a position error,
+ *   - controls the legs relative to the world instead of the tilting soles: the error of an ankle
+ *     is the tilt of the shank, not of the joint, and the leg lengths follow the plane through the
+ *     soles. The stiffness of the ground then drops out of the balance, and 2 x 200 N m/rad at the
+ *     ankles hold 205 on any ground that carries the ankle torque,
+ *   - damps the sway, which Kd = 1 N m s/rad at the ankles barely does.
+ *
+ * A robot without ankles has feet in front of and behind its centre of mass. It does not lean, and
+ * its leg lengths respond to pitch as they do to roll. */
+#define SWAY_RATE 0.15    /* [s] slope correction per angular speed of the base about the feet */
 #define OFFSET_MAX 0.3    /* [rad] */
-#define LIFT_LEAST 0.01   /* [m/rad] a leg that bends less than that does not change its length */
-#define SPREAD_LEAST 1e-4 /* [m^2] feet closer together show no slope */
+#define LIFT_LEAST 0.01   /* [m/rad] a leg with a smaller lift cannot adjust its length */
+#define SPREAD_LEAST 1e-4 /* [m^2] with a smaller spread the feet define no slope */
 
 struct Stand {
     const Robot *robot;
-    int ankles;                      /* bool: every foot has one */
+    int ankles;                      /* bool: every foot has an ankle */
     double lean;                     /* [rad] of the base, forward */
     double base[3];                  /* [m] base above the ground midway below the feet */
-    double lift[ROBOT_FEET_MAX];     /* [m/rad] that a foot rises per unit of its leg's bend */
+    double lift[ROBOT_FEET_MAX];     /* [m/rad] rise of a foot per unit of leg bend */
     double torque[ROBOT_JOINTS_MAX]; /* [N m] that holds the pose at rest */
 };
 
@@ -43,7 +45,7 @@ static double clamp(double value, double bound) {
 
 /* ---- torques ---- */
 
-/* Feet in the heading frame about their mean [m]. */
+/* Positions of the feet relative to their mean, in the heading frame [m]. */
 typedef struct {
     double x[ROBOT_FEET_MAX], y[ROBOT_FEET_MAX], z[ROBOT_FEET_MAX];
 } FeetPlane;
@@ -66,7 +68,8 @@ static void feet_plane(const Robot *robot, const RobotSim *sim, const double ahe
     }
 }
 
-/* [rad] Slope of the feet along one direction, less the answer to the base's speed [rad/s]. */
+/* [rad] Slope of the feet along one direction, minus the correction for the base's speed
+ * [rad/s]. */
 static double slope_along(const double *along, const double *z, int feet, double speed) {
     double rise = 0.0, spread = 0.0;
     for (int f = 0; f < feet; f++) {
@@ -179,7 +182,8 @@ static void load_pose(const Stand *stand, RobotSim *sim) {
     robot_sim_load(sim, &state, &nominal);
 }
 
-/* Leans until the centre of mass is over the middle of the soles: converges like a fixed point. */
+/* Finds the lean at which the centre of mass is over the middle of the soles, by fixed-point
+ * iteration. */
 static void find_lean(Stand *stand, RobotSim *sim) {
     const mjData *d = robot_sim_data(sim);
     int feet = robot_feet(stand->robot);
@@ -200,8 +204,8 @@ static void find_lean(Stand *stand, RobotSim *sim) {
     }
 }
 
-/* Loads [N] of the feet that carry the weight without a moment about the centre of mass:
- * F = a + b x + c y with the least sum of squares. */
+/* Loads [N] of the feet that carry the weight without a moment about the centre of mass. Of all
+ * such loads, F = a + b x + c y has the smallest sum of squares. */
 static void share_weight(const Stand *stand, const RobotSim *sim, double load[ROBOT_FEET_MAX]) {
     const mjData *d = robot_sim_data((RobotSim *)sim);
     const double *com = d->subtree_com + 3;
@@ -216,7 +220,7 @@ static void share_weight(const Stand *stand, const RobotSim *sim, double load[RO
             }
         }
     }
-    m[1][1] += SPREAD_LEAST; /* feet in a row share alike */
+    m[1][1] += SPREAD_LEAST; /* feet in a row get equal shares */
     m[2][2] += SPREAD_LEAST;
     for (int p = 0; p < 3; p++) { /* Gauss; positive definite */
         for (int r = 0; r < 3; r++) {
@@ -233,7 +237,8 @@ static void share_weight(const Stand *stand, const RobotSim *sim, double load[RO
     }
 }
 
-/* Joint torques at rest: gravity's b less what the soles carry, each at its middle. */
+/* Joint torques at rest: the bias force b of gravity minus the load of each sole, applied at its
+ * middle. */
 static void hold_torque(Stand *stand, RobotSim *sim, double *jacobian) {
     const Robot *robot = stand->robot;
     const mjModel *m = robot_sim_model(sim);

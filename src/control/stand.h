@@ -5,7 +5,7 @@
 
 #include "robot/robot.h"
 
-/* What the balanced stand of a robot needs to know; constant once made, so it may be shared. */
+/* Constants of a robot's balanced stand. They never change once made, so they may be shared. */
 typedef struct Stand Stand;
 
 /* Borrows the robot. NULL when out of memory. */
@@ -18,11 +18,11 @@ void stand_destroy(Stand *stand); /* may be NULL */
  * base's tilt. torque: [robot_joints]. */
 void stand_torque(const Stand *stand, const RobotSim *sim, int balance, double *torque);
 
-/* The same without the answer to the tilt, from the joints' positions and velocities alone. */
+/* The same without the response to tilt, from joint positions and velocities alone. */
 void stand_pd(const Stand *stand, int balance, const double *q, const double *qd, double *torque);
 
-/* [rad] Joint targets [robot_joints] whose PD with these gains is the balanced torque, efforts
- * aside. */
+/* [rad] Joint targets [robot_joints] for which a PD with these gains gives the balanced torque,
+ * apart from the effort limits. */
 void stand_target(const Stand *stand, const RobotSim *sim, double *target);
 
 /* The robot at rest in that pose, soles `sinkage` [m] below z = 0. */

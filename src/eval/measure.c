@@ -4,7 +4,7 @@
 #include <string.h>
 
 #define CONTACT_FORCE 5.0  /* [N] */
-#define SWING_HEIGHT 0.005 /* [m] a lift lower than this is no swing */
+#define SWING_HEIGHT 0.005 /* [m] a lower lift does not count as a swing */
 #define CHATTER_TIME 0.03  /* [s] a shorter loss of contact does not end a stance */
 
 void measure_start(Measure *measure, double dt) {
@@ -50,8 +50,8 @@ static void measure_foot(Measure *m, int f, const MeasureFoot *foot) {
     }
 }
 
-/* The part begins where the base was before its first step, so that the distance belongs to the
- * time. */
+/* The steady part starts at the position of the base before its first step, so that distance and
+ * time match. */
 static void measure_steady(Measure *m, const MeasureSample *sample, double power_abs) {
     if (m->steady_time == 0) {
         memcpy(m->start, m->base, sizeof m->start);

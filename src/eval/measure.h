@@ -1,4 +1,4 @@
-/* What one trial does, watched at every physics step. */
+/* Measures of one trial, updated at every physics step. */
 #ifndef MILD_MEASURE_H
 #define MILD_MEASURE_H
 
@@ -37,7 +37,8 @@ typedef struct {
     /* steady part */
     double steady_end;          /* [s] where it ends; 0: with the trial */
     double steady_time;         /* [s] */
-    double start[2], end[2];    /* [m] base where the part began, and at its end */
+    double start[2];            /* [m] base at the start of the steady part */
+    double end[2];              /* [m] base at its end */
     double work;                /* [J] integral sum |tau qd| dt */
     double base_low, base_high; /* [m] */
 
@@ -58,7 +59,8 @@ void measure_start(Measure *measure, double dt);
 void measure_sample(Measure *measure, const MeasureSample *sample);
 /* The same from a robot: a TaskProbe. */
 void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque);
-/* Who never lifted a foot still sank and crept: the open stances count then. */
+/* Ends the trial. If no foot was ever lifted, the open stances count, so that sinkage and drift are
+ * still measured. */
 void measure_finish(Measure *measure);
 
 #endif

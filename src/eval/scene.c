@@ -11,7 +11,7 @@ static MildStatus find_preset(const char *name, MildMaterial *material, MildErro
     }
     if (strcmp(name, "rigid") == 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "rigid is the engine's own floor: it cannot be a part of a course");
+                         "rigid is the engine's own floor and cannot be part of a course");
     }
     char known[256] = "rigid";
     for (int i = 0; i < mild_material_preset_count(); i++) {

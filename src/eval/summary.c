@@ -1,15 +1,15 @@
-/* From the trials' measures to a row of the table. */
+/* Turns the measures of the trials into a row of the table. */
 #include <math.h>
 #include <stdio.h>
 
 #include "base/student.h"
 #include "eval/eval.h"
 
-#define STEADY_LEAST 0.5    /* [s] a shorter steady part says nothing about speed */
-#define DISTANCE_LEAST 1e-3 /* [m] cost of transport of a robot that stands stays finite */
+#define STEADY_LEAST 0.5    /* [s] a shorter steady part is too short to measure speed */
+#define DISTANCE_LEAST 1e-3 /* [m] keeps the cost of transport of a standing robot finite */
 
-/* Speed, cost of transport and base motion over the steady part of the trials that stayed up; of
- * all when none did: a robot that dives forward and falls is not fast. */
+/* Speed, cost of transport and base motion over the steady part of the trials without a fall,
+ * because a robot that dives forward and falls is not fast. If all trials fell, of all trials. */
 static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_t *fallen,
                              double weight) {
     double v_sum = 0, v_square = 0;

@@ -29,7 +29,7 @@ enum {
 extern "C" {
 #endif
 
-int gpu_blocks(int rows); /* rows of sums that passes over so many rows need */
+int gpu_blocks(int rows); /* rows of `sums` that passes over this many rows need */
 
 /* to[r] = from[index[r]], rows of `width`. */
 void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, const float *from,

@@ -12,7 +12,8 @@
  * device, and in a build without CUDA. */
 MildStatus gpu_learner_attach(Ppo *ppo, MildError *error);
 
-/* Writes the device's name, or why there is none, as one line. Returns whether there is one. */
+/* Writes the name of the device as one line, or the reason why there is none. Returns whether there
+ * is a device. */
 int gpu_device(char *text, size_t size);
 
 #endif

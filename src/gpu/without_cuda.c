@@ -1,4 +1,4 @@
-/* The layer in a build without CUDA. */
+/* Replaces the layer in a build without CUDA. */
 #include "gpu/learner.h"
 
 #include <stdio.h>

@@ -9,10 +9,10 @@
 #include "ground/model.h"
 #include "ground/scratch.h"
 
-/* Wong 2008, table 2.3, gives n, k_c, k_phi, c and the angle of the first four, each row by its
- * name there. Its values of K go by the kind of ground: 10 mm for firm and 25 mm for loose sand,
- * 6 mm for clay, 25 to 50 mm for fresh snow; Ding et al., J. Field Robotics 32 (2015), table I,
- * print 10 to 25 mm beside the dry sand and 6 mm beside the clay. Of a range we take one end.
+/* Wong 2008, table 2.3, gives n, k_c, k_phi, c and the angle of the first four soils, in the rows
+ * named below. It gives K by the kind of ground: 10 mm for firm sand, 25 mm for loose sand, 6 mm
+ * for clay, 25 to 50 mm for fresh snow. Ding et al., J. Field Robotics 32 (2015), table I, give 10
+ * to 25 mm for the dry sand and 6 mm for the clay. Of a range we use one end.
  *
  *     dry_sand     "Dry sand", Land Locomotion Laboratory; K of firm sand
  *     sandy_loam   "Sandy loam", 15 % moisture, Land Locomotion Laboratory; K of loose sand

@@ -7,14 +7,14 @@
 
 #include "base/student.h"
 
-/* Relative step of the central differences; exact where F is linear. */
+/* [-] Relative step of the central differences, which are exact where F is linear. */
 #define FIT_DIFFERENCE 1e-5
-/* Below this share of its own part a column is a combination of the others. */
+/* [-] A column whose own part is below this share of it is a combination of the others. */
 #define FIT_DEPENDENT 1e-5
 #define FIT_CORRELATION 0.95
-/* Relative half width above which a correlated parameter counts as undetermined. */
+/* [-] A correlated parameter with a larger relative half width counts as undetermined. */
 #define FIT_LOOSE 0.25
-/* Least ratio of the speeds that determines drag. */
+/* [-] Smallest ratio of speeds that determines drag. */
 #define FIT_SPEEDS 1.3
 
 enum { P = FIT_PARAMETERS, FIT_ITERATIONS = 100, FIT_STARTS = 5, LOCAL_ROWS = 200 };
@@ -70,7 +70,7 @@ double fit_force(const FitDef *def, const FitPoint *point) {
 
 int fit_loading(FitPoint *points, int count) {
     int kept = 0;
-    double deepest = DBL_MIN; /* at 0 the law says nothing */
+    double deepest = DBL_MIN; /* at depth 0 the law gives no information */
     for (int i = 0; i < count; i++) {
         if (!(points[i].depth >= deepest)) {
             continue;
@@ -149,10 +149,11 @@ static int invert(double a[P][P], int n, double inverse[P][P]) {
     return 1;
 }
 
-/* Speed and acceleration of row `i` from a least squares polynomial of the depths around it: a
- * quartic, whose bias a braking plate needs, through a twentieth of the rows; a parabola where they
- * are few. 0 where the times do not tell. At most LOCAL_ROWS of the window are looked at, so that a
- * long record costs no more than its length. */
+/* Speed and acceleration of row `i` from a least-squares polynomial through the depths around it.
+ * It is a quartic through a twentieth of the rows, because a decelerating plate needs its small
+ * bias, or a parabola when there are few rows. Both are 0 when the times are missing. At most
+ * LOCAL_ROWS rows of the window are used, so that the cost grows only with the length of the
+ * record. */
 static void local_motion(const FitPoint *points, int count, int i, double *speed,
                          double *acceleration) {
     int half = count / 40 > 4 ? count / 40 : 4, rows = 2 * half + 1 < count ? 2 * half + 1 : count;
@@ -197,7 +198,8 @@ void fit_speeds(FitPoint *points, int count) {
     }
 }
 
-/* The free parameters that may move: not those at a bound that the gradient pushes against. */
+/* The free parameters that may move, which excludes those that the gradient pushes against a
+ * bound. */
 static int movable(const Fit *fit, int names[P]) {
     MildMaterial material = fit->def.material;
     int n = 0;
@@ -216,7 +218,8 @@ static int movable(const Fit *fit, int names[P]) {
     return n;
 }
 
-/* One damped step (J'J + lambda diag) x = J'r in columns scaled to length 1, cut at the bounds. */
+/* One damped step, (J'J + lambda diag) x = J'r with columns scaled to length 1, clipped to the
+ * bounds. */
 static void fit_step(Fit *fit, const int names[P], int n, double lambda) {
     double normal[P][P], inverse[P][P], length[P];
     const double *column[P];
@@ -271,7 +274,8 @@ static double fit_descend(Fit *fit) {
     return best;
 }
 
-/* Least squares from several starts: the shape (u_f) can have more than one valley. */
+/* Least squares from several starts, because the sum of squares may have several minima in the
+ * shape u_f. */
 static double fit_solve(Fit *fit) {
     static const double alphas[FIT_STARTS] = {0, 0.5, 0.9, 1.25, 1.45},
                         nus[FIT_STARTS] = {0, 0.4, 1, 2.5, 6};
@@ -297,7 +301,7 @@ static double fit_solve(Fit *fit) {
     return fit_miss(fit);
 }
 
-/* Takes the directions of basis[0..n) out of `vector`, twice for rounding. */
+/* Projects the directions of basis[0..n) out of `vector`, twice to remove rounding errors. */
 static void project_out(const Fit *fit, int n, double *vector) {
     for (int k = 0; k < 2 * n; k++) {
         const double *direction = fit->basis + k % n * fit->count;
@@ -337,8 +341,7 @@ static void own_part(Fit *fit, int p) {
         project_out(fit, n, own);
     }
     double square = dot(own, own, count) + DBL_MIN;
-    for (int i = 0; i < count;
-         i++) { /* the basis and own together span all columns, whichever p it is */
+    for (int i = 0; i < count; i++) { /* basis and own part together span all columns, for any p */
         fit->leverage[i] = own[i] * own[i] / square;
         for (int k = 0; k < n; k++) {
             fit->leverage[i] += fit->basis[k * count + i] * fit->basis[k * count + i];
@@ -364,8 +367,8 @@ static double half_width(const Fit *fit, int p, int free) {
     return student_95(fit->count - free) * sqrt(sum) / dot(own, own, fit->count);
 }
 
-/* Scale that a half width is compared with: the value. For sigma_cone, which may be 0, at least the
- * sigma_cone of a straight law. */
+/* The scale that a half width is compared with, which is the value itself. For sigma_cone, which
+ * may be 0, it is at least the sigma_cone of a straight law. */
 static double typical(const Fit *fit, int p) {
     MildMaterial material = fit->def.material;
     double value = fabs(*fit_value(&material, (FitName)p));
@@ -440,9 +443,9 @@ static void hold(Fit *fit, const FitDef *def, FitName name, FitParameter *parame
     *fit_value(&fit->def.material, name) = *fit_value(&given, name);
 }
 
-/* Fits, gives up the parameter that the data determine least, and fits again, until the data
- * determine all that are left. nu goes first, because fixing it resolves the one exact tie of
- * the law (sigma_cone, alpha, nu, and c_d with drag). */
+/* Fits, holds the parameter that the data determine least, and fits again, until the data determine
+ * all that are left. nu is held first, because that resolves the only exact degeneracy of the law
+ * (sigma_cone, alpha, nu, and c_d with drag). */
 static double fit_reduce(Fit *fit, const FitDef *def, FitResult *result) {
     static const FitState order[] = {FIT_NO_EFFECT, FIT_TIED, FIT_WIDE};
     for (int free = free_count(fit); free > 0; free = free_count(fit)) {
@@ -536,7 +539,7 @@ MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResu
     for (int p = 0; p < P; p++) {
         result->parameter[p] = (FitParameter){.low = NAN, .high = NAN};
     }
-    for (int p = 0; p < P; p++) { /* start inside the bounds: passive grounds clamp c_d */
+    for (int p = 0; p < P; p++) { /* start within the bounds, because passive grounds clamp c_d */
         double low, high, *value = fit_value(&fit.def.material, (FitName)p);
         fit_range(&fit.def.material, (FitName)p, &low, &high);
         if (def->free[p]) {

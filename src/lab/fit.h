@@ -36,15 +36,15 @@ typedef struct {
 } FitPoint;
 
 typedef struct {
-    MildMaterial material; /* start of what is fitted, value of what is held */
+    MildMaterial material; /* starting values of fitted parameters, values of held ones */
     int elements;
     double pitch;             /* [m] */
     int free[FIT_PARAMETERS]; /* bool: fit it, if the data can determine it */
 } FitDef;
 
-/* Why a parameter has the value it has. */
+/* Why a parameter has its value. */
 typedef enum {
-    FIT_HELD,      /* not to be fitted */
+    FIT_HELD,      /* the caller did not ask to fit it */
     FIT_FITTED,    /* determined by the data, with an interval */
     FIT_NO_SPEEDS, /* c_g, c_d: all rows have about the same speed */
     FIT_NO_MASS,   /* c_d: no effect, because the ground has no added mass */
@@ -73,7 +73,7 @@ double *fit_value(MildMaterial *material, FitName name);
 /* Bounds of a parameter: those of the material. A passive material has c_d >= 1/2 and c_g >= 0. */
 void fit_range(const MildMaterial *material, FitName name, double *low, double *high);
 
-/* [N] the force on the plate. */
+/* [N] The force on the plate. */
 double fit_force(const FitDef *def, const FitPoint *point);
 
 /* Keeps the loading part, in place: rows below the surface that are at least as deep as all rows

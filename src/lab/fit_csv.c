@@ -25,10 +25,10 @@ typedef struct {
     int number;              /* of the line, from 1 */
     int columns;             /* in the header */
     int column[CSV_COLUMNS]; /* place in the line, -1: absent */
-    double time;             /* of the row before */
+    double time;             /* [s] of the previous row */
 } Csv;
 
-/* Cuts white space on both sides, in place. */
+/* Trims white space on both sides, in place. */
 static char *trim(char *text) {
     text += strspn(text, " \t\r\n");
     size_t length = strlen(text);

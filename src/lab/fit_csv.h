@@ -13,7 +13,7 @@ enum { FIT_CSV_ROWS_MAX = 1000000 };
  * time_s (without them the speed is 0). Other columns are ignored. The message names file, line,
  * column and remedy. */
 MildStatus fit_csv_read(const char *path, FitPoint **points, int *count, MildError *error);
-/* The same from an open file, which stays open; `name` stands for it in messages. */
+/* The same from an open file, which stays open;  `name` is used for it in messages. */
 MildStatus fit_csv_read_file(FILE *file, const char *name, FitPoint **points, int *count,
                              MildError *error);
 

@@ -21,7 +21,7 @@ typedef struct {
     MildContactResult contact;
     MildGround *ground;
     MildScratch *scratch;
-    void *block; /* the ground, and behind it room for a copy */
+    void *block; /* the ground, followed by space for a copy */
     void *spare;
     double offset[3]; /* [m] ankle -> reference point, world */
     double start;     /* [m] depth at which the lowest element touches */
@@ -53,7 +53,7 @@ static void press_pose(Press *press) {
     }
 }
 
-/* Height of the lowest element above the reference point [m], at most 0. */
+/* [m] Height of the lowest element relative to the reference point, at most 0. */
 static double lowest_element(const Press *press) {
     const double *down = &press->input.rotation[0][6]; /* third row: world z of a foot vector */
     double lowest = 0;
@@ -141,7 +141,7 @@ static MildStatus rows_add(PressResult *result, PressRow row, MildError *error) 
         int room = 2 * result->room + 2 * WAY_STEPS + 1;
         if (result->count >= ROWS_MAX) {
             return mild_fail(error, MILD_ERROR_RANGE,
-                             "press: more than %d rows; take fewer or longer steps", ROWS_MAX);
+                             "press: more than %d rows; use fewer or longer steps", ROWS_MAX);
         }
         PressRow *more = realloc(result->rows, sizeof *more * (size_t)room);
         if (!more) {
@@ -168,8 +168,7 @@ static void work_add(Press *press, const PressRow *step, double down, double for
     }
 }
 
-/* ---- prescribed path: A = 0, an infinitely heavy foot that has the prescribed twist after each
- * step ---- */
+/* ---- prescribed path: A = 0, so the foot has the prescribed twist after each step ---- */
 
 /* A step of `dt` from here at the given speeds; changes nothing. */
 static PressRow hand_solve(Press *press, double dt, double forward, double down) {
@@ -203,9 +202,9 @@ static MildStatus hand_accept(Press *press, const PressRow *step, double forward
     return hand_take(press, step, forward, step->depth, hand_solve(press, dt, forward, 0), error);
 }
 
-/* The row at the end of the step just solved: the force at the depth `to` itself, from a tiny step
- * after a tiny step. The mean over a whole step would blunt the kink where the ground yields. The
- * state stays as after the step just solved. */
+/* The row at the end of the step just solved. Its force is that at the depth `to` itself, computed
+ * by a tiny step after a tiny step. The mean over a whole step would smooth the kink where the
+ * ground yields. Does not change the state. */
 static PressRow hand_end(Press *press, const PressRow *step, double to) {
     double dt = press->input.dt, down = (to - step->depth) / dt, tiny = HAND_TINY * dt;
     size_t bytes = mild_ground_size(press->ground);
@@ -296,7 +295,7 @@ static MildStatus hand_turn(Press *press, int index, MildError *error) {
         return status;
     }
     return mild_fail(error, MILD_ERROR_RANGE,
-                     "--force: the ground pushes with %g N at most, %g m deep",
+                     "--force: the ground pushes with at most %g N, at a depth of %g m",
                      press->result->peak_force, PRESS_DEEPEST);
 }
 
@@ -331,8 +330,8 @@ static int untouched(const Press *press) {
     return 1;
 }
 
-/* One semi-implicit step, as engines take it. The row belongs to the start of the step, because the
- * force is the mean about it. */
+/* One semi-implicit step, as in an engine. The row gets the time and depth at the start of the
+ * step, because the force is a mean centred there. */
 static MildStatus drop_step(Press *press, const PressBody *body, MildError *error) {
     PressResult *result = press->result;
     MildContactInput *input = &press->input;

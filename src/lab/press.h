@@ -7,11 +7,11 @@
 
 enum { PRESS_TURNS_MAX = 16 };
 
-/* With material, speed and one turn, and all else 0, it goes down and up once. With mass > 0 a free
- * body is dropped. */
+/* What to press. With material, speed and one turn, and everything else 0, the sole goes down and
+ * up once. With mass > 0 a free body is dropped. */
 typedef struct {
     MildMaterial material;
-    const MildMap *map; /* borrowed; NULL: level. Its height at the start is depth 0 */
+    const MildMap *map; /* borrowed; NULL: level. Its height at the start has depth 0 */
     int print_tiles;    /* see mild_ground_bytes_prints */
     MildSolver solver;
     double tilt; /* [rad] about y, front edge down positive */
@@ -19,15 +19,15 @@ typedef struct {
                     for a drop */
 
     double speed; /* [m/s] down and up */
-    int turns;    /* down to the first, up to the second, and so on; after the last it leaves the
-                  ground */
-    double turn[PRESS_TURNS_MAX]; /* [m] depth of the reference point; with by_force [N] how hard
-                                     the ground pushes */
-    int by_force;                 /* bool */
+    int turns;    /* number of turning points: down to the first, up to the second, and so on; after
+                     the last the sole leaves the ground */
+    double turn[PRESS_TURNS_MAX]; /* [m] depth of the reference point, or with by_force [N] force of
+                                     the ground */
+    int by_force;                 /* bool: turn at forces instead of depths */
     int cycles;                   /* how often all turns are made; 0 counts as 1 */
-    double
-        drag; /* [m] > 0: after the first way down it moves along +x at constant depth, then up */
-    double drag_speed; /* [m/s] */
+    double drag;                  /* [m] if > 0: move this far along +x after the first way down, at
+                                     constant depth, then up */
+    double drag_speed;            /* [m/s] */
 
     double mass;    /* [kg] spread evenly over the sole */
     double height;  /* [m] of the lowest element above the ground at the start */
@@ -35,35 +35,46 @@ typedef struct {
     double seconds; /* [s] recorded from the start */
 } PressDef;
 
-/* The reference point lies in the sole plane under the ankle; a plate's centre. Moments and the
- * zero moment point are about it, world axes. Depth is negative while it is still above the ground
- * (a tilted plate touches earlier). */
+/* One row of a record. The reference point lies in the sole plane under the ankle; for a plate it
+ * is the centre. Moments and the zero moment point refer to it, in world axes. Depth is negative
+ * while the point is above the ground, which a tilted plate may touch earlier. */
 typedef struct {
-    double time, depth, force, moment_x, moment_y, zmp_x, zmp_y; /* zmp NaN without force */
-    double force_x, force_y, x, tilt;                            /* tilt [rad] */
-    int contacts;
-    int way; /* on a prescribed path: 0 is the first way down, each turn begins the next */
+    double time;     /* [s] */
+    double depth;    /* [m] of the reference point */
+    double force;    /* [N] up, on the sole */
+    double moment_x; /* [N m] */
+    double moment_y; /* [N m] */
+    double zmp_x;    /* [m] NaN without force */
+    double zmp_y;    /* [m] NaN without force */
+    double force_x;  /* [N] */
+    double force_y;  /* [N] */
+    double x;        /* [m] of the reference point */
+    double tilt;     /* [rad] */
+    int contacts;    /* number of loaded elements */
+    int way;         /* on a prescribed path: 0 is the first way down, each turn begins the next */
 } PressRow;
 
 typedef struct {
-    PressRow *rows; /* [count], owned */
-    int count, ways, room;
-    double peak_force;        /* [N] */
-    double work_in, work_out; /* [J] integral of the vertical force on the ways down and up */
-    double work_drag;         /* [J] work of the motion along +x on the ground */
-    double
-        print_depth; /* [m] depth at which the force last vanished on a way up; 0 when it did not */
-    double stop_depth, stop_time,
-        rest_speed; /* [m, s, m/s] of a dropped body: first stop; speed at the end */
-    int elements;
-    double area; /* [m^2] of all elements */
+    PressRow *rows;     /* [count], owned */
+    int count;          /* number of rows */
+    int ways;           /* ways of a prescribed path */
+    int room;           /* rows that fit before `rows` must grow */
+    double peak_force;  /* [N] */
+    double work_in;     /* [J] integral of the vertical force on the ways down */
+    double work_out;    /* [J] the same on the ways up */
+    double work_drag;   /* [J] work of the motion along +x on the ground */
+    double print_depth; /* [m] where the force last vanished on a way up; 0 if it never did */
+    double stop_depth;  /* [m] dropped body: depth of the first stop */
+    double stop_time;   /* [s] dropped body: time of the first stop */
+    double rest_speed;  /* [m/s] dropped body: speed at the end */
+    int elements;       /* number of elements */
+    double area;        /* [m^2] of all elements */
 } PressResult;
 
-/* Force and depth of a row belong together: by hand the force at the row's depth (on virgin ground
- * the mean of the steps before and after, exact to second order; on the unloading line the step's
- * own, which is taken at its end); dropped the mean force of a step beside the depth and time of
- * its middle. Fails on a material out of range or a force that is not reached within PRESS_DEEPEST.
- * Close the result also after a failure. */
+/* Runs a press. Each row gives the force at its own depth. On a prescribed path this is the force
+ * at the end of the step. For a dropped body it is the mean force of a step, with the time and
+ * depth of the middle of that mean. Fails when a material is out of range or a force is not reached
+ * within PRESS_DEEPEST. Close the result even after a failure. */
 MildStatus press_run(const PressDef *def, const MildSole *sole, PressResult *result,
                      MildError *error);
 void press_result_close(PressResult *result);

@@ -46,7 +46,7 @@ PressBody press_body(const MildSole *sole, double mass) {
                        .inverse = {yy / det, -xy / det, 0, -xy / det, xx / det, 0, 0, 0, 1 / zz}};
 }
 
-/* World vector ankle -> centre of mass. */
+/* Vector from the ankle to the centre of mass, world. */
 static void body_center(const PressBody *body, const double *R, double *r) {
     const double *c = body->center;
     for (int k = 0; k < 3; k++) {

@@ -14,8 +14,8 @@ AdamStep adam_step(double learning_rate, int64_t t, double gradient_scale) {
     };
 }
 
-/* m = b1 m + (1-b1) g,  v = b2 v + (1-b2) g^2,  p -= lr m^ / (sqrt(v^) + eps), m^ and v^ without
- * their start's bias. */
+/* m = b1 m + (1-b1) g, v = b2 v + (1-b2) g^2, p -= lr m^ / (sqrt(v^) + eps), with m^ and v^
+ * corrected for their bias towards 0. */
 void adam_apply(AdamStep step, int64_t count, const float *restrict gradient,
                 float *restrict parameters, float *restrict first, float *restrict second) {
 #pragma omp simd

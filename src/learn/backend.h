@@ -1,14 +1,14 @@
-/* A compute backend runs the learner's networks on another device than the processor. It
- * computes the same functions as policy_act, policy_value and ppo_gradient, from the same random
- * numbers and equal up to rounding. Optimiser, advantages, order of the samples and checkpoints
+/* A compute backend runs the learner's networks on a device other than the CPU. It computes the
+ * same functions as policy_act, policy_value and ppo_gradient, from the same random numbers and
+ * equal up to rounding. Optimiser, advantages, order of the samples and checkpoints
  * stay with the learner, so a resumed run may change its device. */
 #ifndef MILD_BACKEND_H
 #define MILD_BACKEND_H
 
 #include "learn/loss.h"
 
-/* `self` is the first argument of every function. A function that fails says why and may leave its
- * results unwritten. */
+/* `self` is the first argument of every function. A function that fails gives the reason and may
+ * leave its results unwritten. */
 typedef struct PpoBackend {
     void *self;
     /* batch->mean at time t from batch->history at time t. */

@@ -64,11 +64,11 @@ typedef struct {
     MlpOutputs value;
     float *decoder_input; /* [rows][decoder_input] */
     float *spread;        /* [rows][latent] exp(logvar / 2) */
-    /* gradients with respect to what d_ names */
+    /* gradients with respect to the array named after d_ */
     float *d_mean;          /* [rows + mirrored][actions] */
     float *d_heads;         /* [rows + mirrored][heads] */
     float *d_theta;         /* [rows + mirrored][theta] */
-    float *d_actor_input;   /* [rows + mirrored][estimates + latent] the part behind the frame */
+    float *d_actor_input;   /* [rows + mirrored][estimates + latent] the part after the frame */
     float *d_feet;          /* [rows + mirrored][feet velocities] */
     float *d_decoded;       /* [rows][observation] */
     float *d_decoder_input; /* [rows][decoder_input] */

@@ -1,6 +1,7 @@
-/* The losses of one sample and their gradients, for the processor (loss.c) and the GPU
- * (kernels.cu). The caller holds the loop over samples, the sums and the weights: a weight is what
- * a loss counts for in the minibatch, 1 / samples included. Common subset of C17 and CUDA C++. */
+/* The losses of one sample and their gradients, for the CPU (loss.c) and the GPU (kernels.cu). The
+ * caller provides the loop over samples, the sums and the weights. A weight is the weight of a loss
+ * in the minibatch, including the factor 1 / samples. Written in the common subset of C17 and CUDA
+ * C++. */
 #ifndef MILD_LOSS_SAMPLE_H
 #define MILD_LOSS_SAMPLE_H
 
@@ -9,7 +10,8 @@
 #include "base/device.h"
 #include "learn/vector.h"
 
-/* The log-variance is used within these bounds, so that no early step can overflow e^logvar. */
+/* The log-variance is clamped to these bounds, so that e^logvar cannot overflow early in
+ * training. */
 #define LOSS_LOGVAR_MIN (-12.0f)
 #define LOSS_LOGVAR_MAX 6.0f
 
@@ -18,7 +20,7 @@
 typedef struct {
     float loss;
     float kl;         /* KL(old || new) */
-    float d_log_prob; /* of the loss: -r A where r A is the smaller one, else 0 */
+    float d_log_prob; /* derivative of the loss: -r A if r A is the smaller term, else 0 */
     int clipped;      /* bool: r is outside its clip range */
 } LossSurrogate;
 
@@ -46,13 +48,14 @@ static inline MILD_HD LossSurrogate loss_surrogate(int actions, const float *con
     const float free_term = ratio * advantage;
     const float held_term = held * advantage;
     const int is_free = free_term <= held_term;
-    s.loss = -(is_free || isnan(free_term) ? free_term : held_term); /* NaN must show */
+    s.loss = -(is_free || isnan(free_term) ? free_term : held_term); /* NaN must propagate */
     s.d_log_prob = is_free ? -free_term : 0.0f;
     s.clipped = ratio != held;
     return s;
 }
 
-/* From the gradient by log_prob to those by an action's mean and log std; t = loss_standard. */
+/* Converts the gradient with respect to log_prob to those with respect to the mean and the log std
+ * of an action. t: loss_standard. */
 static inline MILD_HD float loss_mean_gradient(float d_log_prob, float t, float inverse) {
     return d_log_prob * t * inverse;
 }
@@ -63,8 +66,9 @@ static inline MILD_HD float loss_log_std_gradient(float d_log_prob, float t) {
 
 /* ---- mirror: sum over actions of (mean(o) - M_a mean(M_o o))^2 ---- */
 
-/* Returns the sum. The gradient goes through both means, because either may be the better one: adds
- * to d_mean, overwrites d_image. weight: of the sum's gradient, twice that of the sum. */
+/* Returns the sum. The gradient flows through both means, because either may be the better one.
+ * Adds to d_mean and overwrites d_image. weight: of the gradient, which is twice the weight of the
+ * sum. */
 static inline MILD_HD float loss_mirror(int actions, const int *index, const float *sign,
                                         float weight, const float *mean, const float *image,
                                         float *d_mean, float *d_image) {
@@ -118,12 +122,12 @@ static inline MILD_HD float loss_latent_twice(float mu, float logvar, float spre
     return mu * mu + spread * spread - 1.0f - loss_held_logvar(logvar);
 }
 
-/* d loss / d mu: the decoder's through z, and the KL term's. */
+/* d loss / d mu: from the decoder through z, and from the KL term. */
 static inline MILD_HD float loss_mu_gradient(float weight, float mu, float d_z) {
     return d_z + weight * mu;
 }
 
-/* d loss / d logvar. Outside its bounds the log-variance feels only a gradient that leads back
+/* d loss / d logvar. Outside its bounds the log-variance receives only gradients that lead back
  * inside. */
 static inline MILD_HD float loss_logvar_gradient(float weight, float logvar, float spread,
                                                  float noise, float d_z) {

@@ -27,9 +27,9 @@ void policy_act(Policy *policy, Pool *pool, int rows, const float *history, floa
 void policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values);
 const float *policy_std(const Policy *policy); /* [actions] current standard deviation */
 
-/* Safetensors with metadata: the def, a version line, a free text `note`, CRC32 of the data.
- * Written completely or not at all. load builds a policy from the file alone; a
- * missing or damaged file gives one clear line. */
+/* A safetensors file with metadata: the def, a version line, a free text `note`, and a CRC-32 of
+ * the whole file. policy_save writes it completely or not at all. policy_load builds a policy from
+ * the file alone. A missing or damaged file gives one clear line. */
 MildStatus policy_save(const Policy *policy, const char *path, const char *note, MildError *error);
 Policy *policy_load(const char *path, char *note, int note_size, MildError *error);
 

@@ -29,7 +29,7 @@ const MildField policy_fields[] = {
     MILD_FIELD(PolicyDef, modulation_hidden, MILD_FIELD_INT, 1, 1, 8192,
                "[-] width of the modulation's hidden layer"),
     MILD_FIELD(PolicyDef, modulation_per_dimension, MILD_FIELD_BOOL, 1, 0, 1,
-               "[bool] one theta1 and one theta2 per latent dimension, not one for all"),
+               "[bool] one theta1 and theta2 per latent dimension, instead of one for all"),
     MILD_FIELD(PolicyDef, actor_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,
                "[-] widths of the actor's hidden layers; 0 ends the list"),
     MILD_FIELD(PolicyDef, critic_hidden, MILD_FIELD_INT, POLICY_LAYERS_MAX, 0, 8192,

@@ -13,7 +13,7 @@
 
 typedef struct {
     int count;
-    Safetensor tensor[POLICY_TENSORS_MAX]; /* data points into the parameters given */
+    Safetensor tensor[POLICY_TENSORS_MAX]; /* `data` points into the given parameters */
     char name[POLICY_TENSORS_MAX][32];
 } PolicyTensors;
 
@@ -24,14 +24,14 @@ typedef struct {
 } PolicyTexts;
 
 #define POLICY_KIND "mild policy"
-#define POLICY_CHECKPOINT_KIND "mild checkpoint" /* a policy, and tensors "train.*" beside it */
+#define POLICY_CHECKPOINT_KIND "mild checkpoint" /* a policy and additional tensors "train.*" */
 #define POLICY_FILE_VERSION "1"
 
 void policy_file_tensors(const Network *network, const float *parameters, PolicyTensors *tensors);
 void policy_file_texts(const Network *network, const char *kind, const char *note,
                        PolicyTexts *texts);
 
-/* The def that a file states; refused unless it is complete and valid. */
+/* Reads the def from a file. Fails unless it is complete and valid. */
 MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef *def,
                            MildError *error);
 /* The parameters of a network from the file: every tensor there, with its shape, finite. */

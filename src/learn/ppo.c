@@ -9,7 +9,7 @@
 #include "learn/ppo_gradient.h"
 #include "learn/ppo_returns.h"
 
-/* Lays the batch into the block; NULL only counts bytes. */
+/* Places the arrays of the batch in the block. With NULL it only counts bytes. */
 static size_t batch_layout(PpoBatch *b, const Network *n, char *block) {
     const size_t samples = (size_t)b->steps * (size_t)b->envs, more = samples + (size_t)b->envs;
     struct {
@@ -40,7 +40,7 @@ static size_t batch_layout(PpoBatch *b, const Network *n, char *block) {
     return used;
 }
 
-/* Allocates and counts; NULL when out of memory. */
+/* Allocates memory and counts it. Returns NULL when out of memory. */
 static void *take(Ppo *ppo, size_t bytes) {
     bytes = (bytes + 63) / 64 * 64;
     ppo->bytes += bytes;
@@ -313,7 +313,7 @@ static void bound_noise(Ppo *ppo) {
     }
 }
 
-/* A young average forgets faster, because otherwise it would keep the first weights for long. */
+/* A young average decays faster, because otherwise it would retain the initial weights for long. */
 static void average_weights(Ppo *ppo) {
     const double young = (1.0 + (double)ppo->iteration) / (10.0 + (double)ppo->iteration);
     const float step = (float)(1.0 - fmin(ppo->def.average, young));
@@ -332,7 +332,7 @@ static double entropy_of(const LossContext *context) {
     return entropy;
 }
 
-/* Adds a minibatch's means to the report; 0 when one of them is not finite. */
+/* Adds the means of a minibatch to the report. Returns 0 when one of them is not finite. */
 static int report_minibatch(PpoReport *report, const LossContext *context, const LossSums *s,
                             double norm) {
     const double w = context->sample_weight;

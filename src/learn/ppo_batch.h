@@ -7,11 +7,12 @@
 /* The rollout. The environments write directly into these arrays, [time][environment][...]. */
 typedef struct {
     int steps, envs;
-    float *history;   /* [steps+1][envs][frames*observation] */
-    float *critic;    /* [steps+1][envs][critic_input] */
-    float *target;    /* [steps+1][envs][estimates] true estimates for the regression heads */
-    float *frame;     /* [steps+1][envs][observation] newest frame, as the policy saw it; the update
-                      turns rows 0 .. steps-1 into what the decoder is to rebuild */
+    float *history; /* [steps+1][envs][frames*observation] */
+    float *critic;  /* [steps+1][envs][critic_input] */
+    float *target;  /* [steps+1][envs][estimates] true estimates for the regression heads */
+    /* [steps+1][envs][observation] Newest frame, as the policy saw it. The update replaces rows
+     * 0 .. steps - 1 by the decoder's targets. */
+    float *frame;
     float *action;    /* [steps][envs][actions] sampled */
     float *mean;      /* [steps][envs][actions] */
     float *log_prob;  /* [steps][envs] */

@@ -92,8 +92,8 @@ static MildStatus check_same_network(const Safetensors *file, const char *path,
     return MILD_OK;
 }
 
-/* Tensors whose bad numbers would spoil all weights at the first update. A bad observation costs
- * only its minibatch. */
+/* Bool: a NaN in this tensor would spoil all weights at the first update. A NaN in an observation
+ * costs only its minibatch. */
 static int is_weights(const char *name) {
     return strcmp(name, "train.average") == 0 || strcmp(name, "train.first_moment") == 0 ||
            strcmp(name, "train.second_moment") == 0;

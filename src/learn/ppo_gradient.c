@@ -103,8 +103,8 @@ static void clear_half(const Network *n, int critic, float *gradient) {
     }
 }
 
-/* Pieces 0 .. PPO_SHARDS-1: the actor's half of a shard (the longer one, so it starts first); the
- * rest: the critic's. */
+/* Pieces 0 .. PPO_SHARDS - 1 compute the actor's half of a shard, which takes longer and so starts
+ * first. The other pieces compute the critic's half. */
 static void gradient_piece(void *context, int piece, int thread) {
     GradientJob *job = context;
     Ppo *ppo = job->ppo;
@@ -161,7 +161,7 @@ static void reduce_piece(void *context, int range, int thread) {
     job->squares[range] = squares;
 }
 
-/* Squared norm of a range; a backend has written the sum to shard 0 itself. */
+/* Squared norm of a range, after a backend has written the sum to shard 0. */
 static void square_piece(void *context, int range, int thread) {
     (void)thread;
     GradientJob *job = context;

@@ -11,8 +11,8 @@ void ppo_gradient(Ppo *ppo, const LossContext *context, const int *samples, int 
 /* Samples of the minibatch that get a mirror image: how many, and with `which` not NULL their
  * places in the minibatch. */
 int ppo_mirrored(const Ppo *ppo, int count, int *which);
-/* The sampled z of the minibatch's sample p takes the numbers row[p] * latent .. of this stream:
- * [count] rows. */
+/* Random numbers for the sampled z: sample p of the minibatch uses the numbers from row[p] * latent
+ * onward of this stream. row: [count]. */
 uint64_t ppo_latent_key(const Ppo *ppo, uint32_t draw);
 void ppo_latent_rows(int count, int *row);
 /* One step of Adam along the gradient times gradient_scale; keeps the action noise above its floor.

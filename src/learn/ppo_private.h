@@ -47,7 +47,7 @@ typedef struct Ppo {
     size_t bytes;    /* held in all */
 } Ppo;
 
-/* Piece i of so many environments or samples begins here. */
+/* First environment or sample of piece i. */
 static inline int ppo_piece_begin(int count, int piece) {
     return (int)((int64_t)count * piece / PPO_PIECES);
 }

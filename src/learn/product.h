@@ -4,8 +4,8 @@
 #ifndef MILD_PRODUCT_H
 #define MILD_PRODUCT_H
 
-/* Keep oneDNN's own team at one thread for this thread; returns what product_leave takes to restore
- * the caller's setting. */
+/* Limits oneDNN to one thread when called from this thread. Returns the previous setting, which
+ * product_leave restores. */
 int product_enter(void);
 void product_leave(int entered);
 

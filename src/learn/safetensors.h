@@ -46,7 +46,8 @@ const Safetensor *safetensors_at(const Safetensors *file, int index);
 const Safetensor *safetensors_find(const Safetensors *file, const char *name); /* or NULL */
 const char *safetensors_text(const Safetensors *file, const char *key);        /* or NULL */
 
-/* Puts the right checksum into a complete file; 0 when its header has no place for one. */
+/* Writes the correct checksum into a complete file. Returns 0 when its header has no place for
+ * one. */
 int safetensors_seal(unsigned char *bytes, size_t size);
 
 #endif

@@ -27,7 +27,7 @@ static inline MILD_HD float vector_exp(float x) {
     p = p * r + 1.0f;
     uint32_t bits;
     memcpy(&bits, &rounded, sizeof bits);
-    bits = (bits + 127u) << 23; /* 2^n: the shift's own bits fall off the top */
+    bits = (bits + 127u) << 23; /* 2^n; the upper bits are shifted out */
     float scale;
     memcpy(&scale, &bits, sizeof scale);
     return p * scale;

@@ -9,7 +9,7 @@ typedef struct {
     const double *value; /* [count][width] */
     int count;
     int width;
-    double least; /* smallest number allowed; -INFINITY: any that is finite */
+    double least; /* smallest allowed number; -INFINITY: any finite number */
     int object;   /* mjtObj whose names the rows have; mjOBJ_UNKNOWN: a joint's coordinate */
     int first;    /* index of the first row's object */
     int dof;      /* bool: a row is a degree of freedom, named after its joint */
@@ -48,13 +48,13 @@ static MildStatus check_numbers(const mjModel *m, const Numbers *numbers, const 
     return MILD_OK;
 }
 
-/* A body that moves needs mass and inertia: the step divides by them. */
+/* A moving body needs mass and inertia, because the step divides by them. */
 static MildStatus check_masses(const mjModel *m, const char *path, MildError *error) {
     for (int b = 1; b < m->nbody; b++) {
         const char *name = mj_id2name(m, mjOBJ_BODY, b);
         const double *inertia = m->body_inertia + 3 * b;
         if (m->body_weldid[b] == 0 || m->body_jntnum[b] == 0) {
-            continue; /* fixed to the world or to its parent, which has the mass of both */
+            continue; /* fixed to the world, or to its parent, which then has the mass of both */
         }
         if (!(m->body_mass[b] > 0) || !(inertia[0] > 0 && inertia[1] > 0 && inertia[2] > 0)) {
             return mild_fail(error, MILD_ERROR_RANGE,

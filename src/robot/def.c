@@ -11,7 +11,8 @@
 enum { FILE_SIZE_MAX = 1 << 20, LIST_SIZE = 4096 };
 enum { SECTION_MAX = 49 }; /* characters of a section's name; inih drops the rest */
 
-/* Lists stay text until all sections are read, because most need the number of joints. */
+/* Lists are kept as text until all sections have been read, because most need the number of
+ * joints. */
 typedef struct {
     char names[LIST_SIZE];
     char mirror[LIST_SIZE];
@@ -34,7 +35,7 @@ typedef struct {
 } FootText;
 
 typedef struct {
-    RobotDef def; /* of [robot] the scalars */
+    RobotDef def; /* only the scalars of [robot] */
     char shells[LIST_SIZE];
 } RobotText;
 
@@ -49,9 +50,9 @@ typedef struct {
     NAMED(RobotText, #key, def.key, MILD_FIELD_TEXT, (int)sizeof(((RobotDef *)NULL)->key), 0, 0,   \
           help)
 static const MildField robot_fields[] = {
-    RT(name, "[text] what the robot is called"),
+    RT(name, "[text] name of the robot"),
     RT(model, "[text] MJCF file in the folder"),
-    RT(source, "[text] whose numbers these are, and their licence"),
+    RT(source, "[text] source of the numbers, and their licence"),
     RT(base, "[text] body with the free joint"),
     TEXT(RobotText, shells, "[text] geoms of the MJCF that must not touch the ground"),
     R(height, 1, 0.01, 5, "[m] wanted height of the base above the stance soles"),
@@ -69,7 +70,7 @@ static const MildField robot_fields[] = {
 #define J(member, help) TEXT(JointsText, member, help)
 static const MildField joint_fields[] = {
     J(names, "[text] hinges of the MJCF, in the order of observations and actions"),
-    J(mirror, "[text] for each joint the one on the other side"),
+    J(mirror, "[text] for each joint, the joint on the other side"),
     J(mirror_sign, "[-] 1 or -1: mirrored angle = sign times angle of the other side"),
     J(pose, "[rad] default pose"),
     J(kp, "[N m/rad] position gain"),
@@ -78,7 +79,7 @@ static const MildField joint_fields[] = {
     J(stand_kd, "[N m s/rad] velocity gain of the controller `stand`; default kd"),
     J(effort, "[N m] torque limit; 0, the default: actuatorfrcrange of the MJCF"),
     J(speed, "[rad/s] speed limit of the motor; 0, the default: none"),
-    J(swing, "[-] bend of the swing leg's reference motion, times reward.reference_amplitude"),
+    J(swing, "[-] amplitude in the reference swing motion, times reward.reference_amplitude"),
     J(still, "[-] 1 for joints that reward.default_pose keeps near the pose; default 0"),
 };
 
@@ -91,7 +92,7 @@ static const MildField foot_fields[] = {
     FT(knee, "[text] body whose origin is the knee"),
     FT(mirror, "[text] foot on the other side"),
     FT(ankle, "[text] joint that pitches a flat sole; none by default"),
-    F(offset, MILD_FIELD_DOUBLE, 1, 0, 1, "[-] share of the gait cycle where the stance begins"),
+    F(offset, MILD_FIELD_DOUBLE, 1, 0, 1, "[-] phase of the gait cycle at which the stance begins"),
     {"shape", MILD_FIELD_NAME, offsetof(FootText, def.shape), 1, 0, 1,
      "[text] outline (a flat sole) or round (a sphere)", shape_names},
     TEXT(FootText, outline, "[m] x y of each point of a flat sole's outline"),
@@ -115,8 +116,8 @@ enum {
 typedef struct {
     const char *path; /* for messages */
     const char *rest; /* text that is still to be read */
-    int line;         /* handed to inih last, from 1 */
-    int continues;    /* bool: that line is indented, so it goes on with the value before */
+    int line;         /* number of the line last passed to inih, from 1 */
+    int continues;    /* bool: that line is indented, so it continues the value before it */
     RobotText robot;
     JointsText joints;
     FootText foot[ROBOT_FEET_MAX];
@@ -176,7 +177,7 @@ static int find_section(Reader *reader, const char *name, Section *section) {
     return 1;
 }
 
-/* inih passes over sections without keys: look at the header itself. */
+/* Checks the header itself, because inih ignores sections without keys. */
 static int check_header(Reader *reader, const char *line, size_t length) {
     char name[SECTION_MAX + 1];
     Section section;
@@ -216,7 +217,7 @@ static char *next_line(char *buffer, int size, void *stream) {
         length--;
     }
     if ((int)length > size - 2) {
-        fail_line(reader, "the line is too long; go on with the value on an indented line");
+        fail_line(reader, "the line is too long; continue the value on an indented line");
         return NULL;
     }
     if (*line == '[' && !check_header(reader, line, length)) {
@@ -234,8 +235,8 @@ static MildStatus continue_value(Reader *reader, const Section *section, const M
                                  const char *value) {
     char *text = (char *)section->values + field->offset;
     if (field->type != MILD_FIELD_TEXT) {
-        return fail_line(reader,
-                         "an indented line goes on with the list above it; this is no list");
+        return fail_line(
+            reader, "an indented line continues the list above it, but this value is not a list");
     }
     size_t used = strlen(text);
     if (used + strlen(value) + 2 > (size_t)field->count) {
@@ -290,7 +291,7 @@ static MildStatus fail_key(Reader *reader, const char *section, const char *key,
                                       reader->path, section, key, what);
 }
 
-/* Next word of a list, its length into *length; NULL at the end. */
+/* Next word of a list, with its length in *length; NULL at the end. */
 static const char *next_word(const char *text, size_t *length) {
     static const char separators[] = " \t\r\n,";
     text += strspn(text, separators);
@@ -298,7 +299,7 @@ static const char *next_word(const char *text, size_t *length) {
     return *length ? text : NULL;
 }
 
-/* Names into `names`; returns how many, or -1 after an error. */
+/* Reads names into `names`. Returns their number, or -1 after an error. */
 static int take_names(Reader *reader, const char *section, const char *key, const char *text,
                       RobotName *names, int most) {
     char what[160];
@@ -316,7 +317,7 @@ static int take_names(Reader *reader, const char *section, const char *key, cons
     return count;
 }
 
-/* Finite numbers into `numbers`; returns how many, or -1 after an error. */
+/* Reads finite numbers into `numbers`. Returns their number, or -1 after an error. */
 static int take_numbers(Reader *reader, const char *section, const char *key, const char *text,
                         double *numbers, int most) {
     char what[160], word[64];
@@ -341,7 +342,8 @@ static int take_numbers(Reader *reader, const char *section, const char *key, co
     return count;
 }
 
-/* A number for each joint, at least `least`; without any, `fallback` or zeros. */
+/* Reads a number for each joint, none below `least`. If the list is empty, uses `fallback`, or
+ * zeros. */
 static MildStatus take_column(Reader *reader, const char *key, const char *text, double *column,
                               const double *fallback, double least) {
     char what[160];
@@ -537,8 +539,8 @@ static int find_foot(const RobotDef *def, const char *name) {
     return f;
 }
 
-/* The mirror image of a gait is that gait half a cycle later, or the gait itself: all feet must
- * agree on which. */
+/* The mirror image of a gait is either the same gait half a cycle later or the gait itself. All
+ * feet must agree on which. */
 static MildStatus check_gait(Reader *reader) {
     RobotDef *def = reader->def;
     for (int f = 0; f < def->feet; f++) {

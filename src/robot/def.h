@@ -53,7 +53,7 @@ typedef struct {
     double feet_least;    /* [m] lateral distance below which mirrored feet collide */
     double knee_least;    /* [m] and knees */
     double foot_force;    /* [N] force on a foot above which a landing is hard */
-    double assist[4];     /* [N m/rad, N m s/rad, N s/m, N] helping hand, see robot_assist */
+    double assist[4];     /* [N m/rad, N m s/rad, N s/m, N] assistance, see robot_assist */
     /* section [joints], in the order of observations and actions */
     int joints;
     RobotName joint[ROBOT_JOINTS_MAX];
@@ -66,11 +66,11 @@ typedef struct {
     double stand_kd[ROBOT_JOINTS_MAX];    /* [N m s/rad] */
     double effort[ROBOT_JOINTS_MAX];      /* [N m] 0: actuatorfrcrange of the MJCF */
     double speed[ROBOT_JOINTS_MAX];       /* [rad/s] 0: no limit */
-    double swing[ROBOT_JOINTS_MAX];       /* [-] bend of the swing leg's reference motion */
+    double swing[ROBOT_JOINTS_MAX];       /* [-] amplitude in the reference swing motion */
     double still[ROBOT_JOINTS_MAX];       /* [-] 1: should stay near the pose, 0: may move */
     /* sections [foot.NAME] */
     int feet;
-    double mirror_shift; /* [-] 0 or 0.5: share of the gait cycle from a gait to its mirror image */
+    double mirror_shift; /* [-] 0 or 0.5 gait cycles between a gait and its mirror image */
     RobotFootDef foot[ROBOT_FEET_MAX];
 } RobotDef;
 

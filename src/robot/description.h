@@ -1,4 +1,4 @@
-/* Private to the robot layer: what a Robot knows, from robot.ini and the compiled MJCF. */
+/* Private to the robot layer: the contents of a Robot, from robot.ini and the compiled MJCF. */
 #ifndef ROBOT_DESCRIPTION_H
 #define ROBOT_DESCRIPTION_H
 
@@ -19,11 +19,11 @@ typedef struct {
     double sole_center[3];        /* [m] flat: middle of the outline's bounds, body frame */
     int dofs;                     /* degrees of freedom that move the foot, base six first */
     int dof[ROBOT_FOOT_DOFS_MAX]; /* [dofs] ascending */
-    int shared[ROBOT_FEET_MAX];   /* of them, how many from the first on move that foot, too */
+    int shared[ROBOT_FEET_MAX];   /* how many of the leading ones also move the other foot */
 } RobotLimb;
 
-/* A body part that must not touch the ground: a box with its faces moved out by a radius. Spheres
- * and capsules are boxes without width. */
+/* A part of a body that must not touch the ground: a box inflated by a radius. Spheres and capsules
+ * are inflated boxes of zero width. */
 typedef struct {
     int body;
     double center[3];   /* [m] body frame */
@@ -39,7 +39,7 @@ typedef struct Robot {
     mjModel *visual;                      /* the whole file, for pictures */
     MildSole *soles[ROBOT_FEET_MAX];      /* the rasters */
     MildSole *concentric[ROBOT_FEET_MAX]; /* one element in the middle of each */
-    int is_concentric;                    /* bool: which of them the feet have */
+    int is_concentric;                    /* bool: the feet use `concentric`, not `soles` */
     int nq;                               /* 7 + joints */
     int nv;                               /* 6 + joints */
     int base_body;
@@ -49,7 +49,7 @@ typedef struct Robot {
     int pair[ROBOT_FEET_MAX / 2][2]; /* left foot, right foot */
     int dof[ROBOT_JOINTS_MAX];       /* of joint i in the engine: qvel[dof], qpos[dof + 1] */
     int mirror_joint[ROBOT_JOINTS_MAX];
-    int joint_foot[ROBOT_JOINTS_MAX]; /* foot that alone moves with the joint, or -1 */
+    int joint_foot[ROBOT_JOINTS_MAX]; /* the only foot that the joint moves, or -1 */
     double low[ROBOT_JOINTS_MAX];     /* [rad] */
     double high[ROBOT_JOINTS_MAX];    /* [rad] */
     double effort[ROBOT_JOINTS_MAX];  /* [N m] */
@@ -59,15 +59,15 @@ typedef struct Robot {
     double stand_height; /* [m] base above the soles in the default pose */
 } Robot;
 
-/* Compiles the MJCF at robot->path into robot->visual, and what a step needs of it, with a floor
- * and the feet's corners, into robot->model. */
+/* Compiles the MJCF at robot->path into robot->visual. Compiles the part that a step needs, with a
+ * floor and the feet's corners, into robot->model. */
 MildStatus robot_load_models(Robot *robot, MildError *error);
 
-/* Whether the numbers of a compiled model are usable: finite, and masses, inertias, gains and
- * limits of the right sign. MuJoCo takes what an MJCF states. */
+/* Checks the numbers of a compiled model, which MuJoCo takes from the MJCF without question: they
+ * must be finite, and masses, inertias, gains and limits must have the right sign. */
 MildStatus robot_check_model(const mjModel *model, const char *path, MildError *error);
 
-/* ---- parts of robot_create, in this order; each needs those before it ---- */
+/* ---- parts of robot_create, in the order of their calls; each needs the ones before it ---- */
 MildStatus robot_read_bodies(Robot *robot, MildError *error);
 MildStatus robot_read_joints(Robot *robot, MildError *error);
 MildStatus robot_read_limbs(Robot *robot, MildError *error);

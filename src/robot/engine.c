@@ -9,12 +9,13 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Where this thread's engine_call goes on when MuJoCo gives up; NULL outside of one. */
+/* Where engine_call continues on this thread when MuJoCo gives up; NULL outside of engine_call. */
 static _Thread_local sigjmp_buf *rescue;
-static _Thread_local char reason[200]; /* empty: an exception, which is always memory */
+static _Thread_local char
+    reason[200]; /* empty after an exception, which always means out of memory */
 static void (*on_error)(const char *text);
 
-/* Warnings and less go nowhere. */
+/* Ignores everything below an error. */
 static void take_message(const mjLogMessage *message) {
     if (message->level < mjLOG_ERROR) {
         return;
@@ -36,7 +37,7 @@ void engine_on_error(void (*fatal)(const char *text)) {
     mju_setLogHandler(take_message);
 }
 
-/* std::bad_alloc that nobody catches ends in abort(), on the thread that threw it. */
+/* An uncaught std::bad_alloc ends in abort() on the thread that threw it. */
 static void take_abort(int number) {
     if (rescue) {
         siglongjmp(*rescue, 1);
@@ -45,8 +46,9 @@ static void take_abort(int number) {
     raise(number);
 }
 
-/* The C++ library announces the abort on standard error: not while we report it ourselves. Returns
- * a copy of the descriptor to be restored, -1 when it could not be made. */
+/* Redirects standard error, because the C++ library announces the abort there and we report it
+ * ourselves. Returns a copy of the descriptor, to be restored later, or -1 if it could not be
+ * made. */
 static int silence(void) {
     fflush(stderr);
     int kept = fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
@@ -68,7 +70,7 @@ static void restore(int kept) {
     }
 }
 
-/* Runs the work with the way back open; 1 when it ended there. */
+/* Runs the work with the jump target set. Returns 1 when MuJoCo gave up. */
 static int attempt(MildStatus (*work)(void *context, MildError *error), void *context,
                    MildStatus *status, MildError *error) {
     sigjmp_buf here;
@@ -100,7 +102,7 @@ MildStatus engine_call(MildStatus (*work)(void *context, MildError *error), void
     if (gave_up && reason[0]) {
         return mild_fail(error, MILD_ERROR_MEMORY, "%.150s: MuJoCo failed: %s", what, reason);
     }
-    /* MuJoCo's parser takes a failed allocation for a mistake in the file */
+    /* MuJoCo's parser reports a failed allocation as an error in the file */
     if (gave_up || (status != MILD_OK && no_memory)) {
         return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", what);
     }

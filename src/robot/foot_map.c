@@ -1,8 +1,8 @@
-/* The feet seen from the robot's degrees of freedom. A foot moves with the base's six and the
- * hinges between base and foot only, and the engine's factor M = L^T D L has the same sparsity (a
- * row holds a degree of freedom and its ancestors). So A = J M^-1 J^T = (L^-T J^T)^T D^-1 (L^-T
- * J^T) needs one backward substitution per foot on six right-hand sides at once, which is one
- * vector register per row. */
+/* Jacobians of the feet and A = J M^-1 J^T. A foot moves only with the base's six degrees of
+ * freedom and the hinges between base and foot. The engine's factor M = L^T D L has the same
+ * sparsity: a row contains a degree of freedom and its ancestors. So A = (L^-T J^T)^T D^-1 (L^-T
+ * J^T) needs one backward substitution per foot. It runs on six right-hand sides at once, which is
+ * one vector register per row. */
 #include <string.h>
 
 #include "robot/sim.h"
@@ -21,7 +21,8 @@ void foot_map_reference(const RobotSim *sim, int foot, double point[3]) {
     }
 }
 
-/* One column of J: rotation about the unit axis through an anchor `arm` away from the ankle. */
+/* One column of J: rotation about a unit axis through an anchor. arm: vector between the anchor and
+ * the ankle. */
 static void hinge_row(double *row, const double axis[3], const double arm[3]) {
     row[0] = axis[1] * arm[2] - axis[2] * arm[1];
     row[1] = axis[2] * arm[0] - axis[0] * arm[2];
@@ -78,7 +79,8 @@ void foot_map_twist(const RobotSim *sim, int foot, const double *velocity,
     memcpy(twist, sum, 6 * sizeof *twist);
 }
 
-/* rows <- L^-T rows, leaves first: row j of every ancestor j of i loses L_ij times row i. */
+/* rows <- L^-T rows, leaves first: subtracts L_ij times row i from row j of every ancestor j of
+ * i. */
 static void backward_substitute(const mjModel *m, const mjData *d, const RobotLimb *limb,
                                 double rows[][ROBOT_LANES]) {
     for (int k = limb->dofs - 1; k > 0; k--) {
@@ -98,7 +100,7 @@ static void backward_substitute(const mjModel *m, const mjData *d, const RobotLi
 static void inner_product(const double *inverse_d, const double left[][ROBOT_LANES],
                           const double right[][ROBOT_LANES], int rows,
                           double block[6][ROBOT_LANES]) {
-    double sum[6][ROBOT_LANES] = {{0}}; /* stays in registers */
+    double sum[6][ROBOT_LANES] = {{0}}; /* kept in registers */
     for (int k = 0; k < rows; k++) {
         for (int r = 0; r < 6; r++) {
             // NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): all are filled
@@ -134,7 +136,7 @@ void foot_map_inverse_inertia(RobotSim *sim) {
         }
         memcpy(map[f].half, map[f].jacobian, (size_t)limb->dofs * sizeof *map[f].half);
         backward_substitute(sim->model, sim->data, limb, map[f].half);
-        for (int g = 0; g <= f; g++) { /* other feet share the first rows only */
+        for (int g = 0; g <= f; g++) { /* two feet share only the leading rows */
             inner_product(inverse_d, map[f].half, map[g].half, limb->shared[g], block);
             store_block(sim, f, g, block);
         }

@@ -1,4 +1,4 @@
-/* How large a robot may be. */
+/* Limits on the size of a robot. */
 #ifndef ROBOT_LIMITS_H
 #define ROBOT_LIMITS_H
 

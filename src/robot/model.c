@@ -1,15 +1,15 @@
-/* From the MJCF of a robot folder to the engine's models. */
+/* Turns the MJCF of a robot folder into the engine's models. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "robot/description.h"
 
-/* Hinge ranges up to this many radians are usual, and nobody builds a robot of which no hinge turns
- * further than so many degrees. */
+/* Largest hinge range [rad] that is usual in radians. A robot whose hinges all turn less than this
+ * many degrees is not plausible. */
 #define FULL_TURN 6.3
 
-/* MuJoCo's messages have several lines; ours have one. */
+/* Joins the lines of MuJoCo's messages, because ours have a single line. */
 static void one_line(char *text) {
     for (char *c = text; *c; c++) {
         if (*c == '\n' || *c == '\r') {
@@ -18,8 +18,8 @@ static void one_line(char *text) {
     }
 }
 
-/* What our step does not compute must not be in the file: left out in silence it would make another
- * robot. */
+/* Refuses features that our step does not compute. Ignoring them silently would simulate a
+ * different robot. */
 static MildStatus check_supported(const mjModel *m, const char *path, MildError *error) {
     if (m->neq > 0 || m->ntendon > 0) {
         return mild_fail(error, MILD_ERROR_FORMAT,
@@ -42,13 +42,12 @@ static MildStatus check_supported(const mjModel *m, const char *path, MildError 
     return MILD_OK;
 }
 
-/* MuJoCo takes angles for degrees unless the file says angle="radian". Where every hinge's numbers
- * are those of the other unit the file is refused: read as it stands, its legs would be stiff, or
- * free. */
+/* MuJoCo reads angles as degrees unless the file says angle="radian". Refuses a file whose hinge
+ * ranges all look like numbers in the other unit, because its legs would be stiff, or free. */
 static MildStatus check_angles(const mjSpec *spec, const mjModel *m, const char *path,
                                MildError *error) {
-    const double unit = spec->compiler.degree ? 180.0 / mjPI : 1.0; /* as written, by radian */
-    double least = INFINITY; /* of all hinges, the greater limit as written */
+    const double unit = spec->compiler.degree ? 180.0 / mjPI : 1.0; /* per radian */
+    double least = INFINITY; /* smallest of the hinges' larger limits, as written */
     double most = 0.0;
     int named = -1;
     for (int j = 0; j < m->njnt; j++) {
@@ -78,7 +77,8 @@ static MildStatus check_angles(const mjSpec *spec, const mjModel *m, const char 
     return MILD_OK;
 }
 
-/* Bodies keep the inertia that the compiler found from their geoms, for these go. */
+/* Gives the bodies the inertia that the compiler derived from their geoms, because the geoms are
+ * about to be removed. */
 static void fix_inertia(mjSpec *spec, const mjModel *m) {
     for (mjsElement *e = mjs_firstElement(spec, mjOBJ_BODY); e; e = mjs_nextElement(spec, e)) {
         mjsBody *body = mjs_asBody(e);
@@ -94,8 +94,8 @@ static void fix_inertia(mjSpec *spec, const mjModel *m) {
     }
 }
 
-/* A step pays for every geom whose pose it computes, and every workspace copies the model: only
- * bodies and joints stay. */
+/* Removes everything but bodies and joints. A step computes the pose of every geom, and every
+ * workspace copies the model. */
 static void strip(mjSpec *spec) {
     static const mjtObj dropped[] = {mjOBJ_SENSOR,   mjOBJ_ACTUATOR, mjOBJ_KEY,    mjOBJ_PAIR,
                                      mjOBJ_EXCLUDE,  mjOBJ_SITE,     mjOBJ_CAMERA, mjOBJ_LIGHT,
@@ -119,7 +119,7 @@ static mjsGeom *add_geom(mjsBody *body, const char *name, mjtGeom type) {
     return geom;
 }
 
-/* The engine's rigid ground: a floor, and under each foot the spheres that it stands on. */
+/* Adds the engine's rigid ground: a floor, and the spheres that each foot stands on. */
 static MildStatus add_rigid_ground(const RobotDef *def, const char *path, mjSpec *spec,
                                    MildError *error) {
     mjsGeom *floor = add_geom(mjs_findBody(spec, "world"), "floor", mjGEOM_PLANE);

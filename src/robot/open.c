@@ -54,8 +54,8 @@ Robot *robot_open(const char *name, MildError *error) {
     }
     mild_fail(
         error, MILD_ERROR_ARGUMENT,
-        "unknown robot '%.60s'; nearest is '%s' (mild info robots lists all; a folder of your "
-        "own is given with a slash, as ./%.60s)",
+        "unknown robot '%.60s'; nearest is '%s' (mild info robots lists all; write a folder of "
+        "your own with a slash, as ./%.60s)",
         name, count ? text_nearest(name, known, count) : "none", name);
     return NULL;
 }

@@ -1,4 +1,4 @@
-/* Where the time of a physics step goes. */
+/* Time spent in each phase of a physics step. */
 #ifndef ROBOT_PHASES_H
 #define ROBOT_PHASES_H
 

@@ -1,5 +1,5 @@
-/* The engine's own contact under the feet's corners: where the ground is not level, and what it
- * did to the feet in the terms of the soft ground. */
+/* The engine's own contact under the feet's corners: collision with uneven ground, and results in
+ * the same terms as those of the soft ground. */
 #include <math.h>
 #include <string.h>
 
@@ -13,7 +13,7 @@ static void cross(const double a[3], const double b[3], double out[3]) {
 
 /* ---- uneven ground ---- */
 
-/* Rows: the unit normal, and the tangents that the engine takes. */
+/* Contact frame. Rows: the unit normal, then the tangents that the engine would choose. */
 static void tangent_frame(const double slope[2], double frame[9]) {
     double scale = 1.0 / sqrt(1.0 + slope[0] * slope[0] + slope[1] * slope[1]);
     const double normal[3] = {-slope[0] * scale, -slope[1] * scale, scale};
@@ -26,14 +26,16 @@ static void tangent_frame(const double slope[2], double frame[9]) {
     cross(frame, frame + 3, frame + 6);
 }
 
-/* The engine's contact of a plane and a sphere, the plane being the tangent plane under the
- * sphere's centre: exact on a slope, off by the ground's curvature times radius^2/2 elsewhere. */
+/* Plane-sphere contact as the engine computes it, with the tangent plane under the centre of the
+ * sphere. It is exact on a slope. Elsewhere the error is the curvature of the ground times
+ * radius^2/2. */
 static void collide_corner(RobotSim *sim, const MildTerrain *terrain, int pair) {
     const mjModel *m = sim->model;
-    int floor = sim->robot->floor_geom,
-        corner = m->pair_geom1[pair] == floor ? m->pair_geom2[pair] : m->pair_geom1[pair];
+    int floor = sim->robot->floor_geom;
+    int corner = m->pair_geom1[pair] == floor ? m->pair_geom2[pair] : m->pair_geom1[pair];
     const double *center = sim->data->geom_xpos + 3 * corner;
-    double radius = m->geom_size[3 * corner], slope[2];
+    double radius = m->geom_size[3 * corner];
+    double slope[2];
     mjContact contact = {.includemargin = m->pair_margin[pair] - m->pair_gap[pair],
                          .dim = m->pair_dim[pair],
                          .geom1 = floor,
@@ -77,8 +79,8 @@ void rigid_collide(RobotSim *sim, const MildTerrain *terrain) {
 
 /* ---- results ---- */
 
-/* Adds contact c to the foot it belongs to, and the vertical part of its normal force to that
- * foot's load. The contact frame's first axis points from geom 0 to geom 1. */
+/* Adds contact c to its foot, and the vertical part of its normal force to the load of that foot.
+ * The first axis of the contact frame points from geom 0 to geom 1. */
 static void add_contact(RobotSim *sim, int c, double load[ROBOT_FEET_MAX]) {
     const mjData *d = sim->data;
     const mjContact *contact = d->contact + c;

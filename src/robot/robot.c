@@ -9,7 +9,7 @@
 #include "robot/engine.h"
 #include "robot/robot.h"
 
-#define LEVEL 0.02 /* [rad] a flat sole of the default pose may be tilted by so much */
+#define LEVEL 0.02 /* [rad] largest tilt of a flat sole in the default pose */
 
 RobotVariation robot_variation_nominal(void) {
     RobotVariation variation = {.armature_scale = 1.0, .rigid_friction = 0.8};
@@ -19,7 +19,7 @@ RobotVariation robot_variation_nominal(void) {
     return variation;
 }
 
-/* Id of a named object, or -1 with a message that says which key asks for it. */
+/* Id of a named object, or -1 with a message that names the key that refers to it. */
 static int find(const Robot *robot, const mjModel *model, int type, const char *kind,
                 const char *name, const char *key, MildError *error) {
     int id = mj_name2id(model, type, name);
@@ -91,8 +91,8 @@ static MildStatus read_joint(Robot *robot, int i, MildError *error) {
     return MILD_OK;
 }
 
-/* The step relies on the base's six degrees of freedom being the first, and on hinges alone behind
- * them, each with one coordinate. */
+/* The step requires that the base's six degrees of freedom come first and that all others are
+ * hinges with one coordinate each. */
 MildStatus robot_read_joints(Robot *robot, MildError *error) {
     const mjModel *m = robot->model;
     int joints = robot->def.joints;
@@ -216,8 +216,8 @@ MildStatus robot_read_shells(Robot *robot, MildError *error) {
     return MILD_OK;
 }
 
-/* A round foot stands on a disc of its own radius that stays level under its lowest point; here as
- * a polygon of the same area. */
+/* A round foot stands on a disc of its own radius, which stays level under its lowest point. This
+ * is a polygon of the same area. */
 static int round_outline(double radius, double outline[2 * ROBOT_OUTLINE_MAX]) {
     enum { CORNERS = 32 };
     double reach = radius * sqrt(mjPI / (0.5 * CORNERS * sin(2.0 * mjPI / CORNERS)));

@@ -1,6 +1,6 @@
-/* One physics step of a robot whose feet stand on our ground. Between steps the pose-dependent
- * quantities (kinematics, feet's Jacobian and twist) are those of the current state, so a step
- * begins with the dynamics and ends with the next pose. */
+/* One physics step of a robot whose feet stand on our ground. Between steps, everything that
+ * depends on the pose (kinematics, Jacobians and twists of the feet) is up to date. So a step
+ * starts with the dynamics and ends with the next pose. */
 #include "robot/sim.h"
 
 #include <math.h>
@@ -9,7 +9,7 @@
 
 #include "base/clock.h"
 
-#define QVEL_MAX 1e3 /* [m/s, rad/s] beyond: the numbers went bad */
+#define QVEL_MAX 1e3 /* [m/s, rad/s] a larger velocity means divergence */
 
 static double split(RobotSim *sim, double *phase, double since) {
     if (!sim->phases) {
@@ -84,7 +84,7 @@ static double lowest_sole_point(const RobotFootDef *def, const double position[3
     return position[2] + turn[8] * def->z + least;
 }
 
-/* The same above the ground under each point. */
+/* [m] Smallest height of an outline point above the ground under it. */
 static double lowest_above_map(const RobotFootDef *def, const double position[3],
                                const double turn[9], const MildTerrain *terrain) {
     double least = 1e9, c = def->z;
@@ -144,7 +144,7 @@ static void gather_state(const Robot *robot, const mjData *d, double *qpos, doub
     }
 }
 
-/* Everything that depends on qpos and qvel only. */
+/* Updates everything that depends only on qpos and qvel. */
 static void update_pose(RobotSim *sim, const MildTerrain *terrain) {
     mj_kinematics(sim->model, sim->data);
     mj_comPos(sim->model, sim->data);
@@ -227,8 +227,8 @@ static void smooth_dynamics(RobotSim *sim, const double *torque, const double *p
     mj_solveM(m, d, d->qacc_smooth, d->qfrc_smooth, 1);
 }
 
-/* Where the feet are: fixed before the step, because forces refer to the pose they were computed
- * in. */
+/* Fixes the pose of the feet before the step, because forces refer to the pose in which they were
+ * computed. */
 static void place_feet(RobotSim *sim) {
     MildContactInput *input = &sim->input;
     for (int f = 0; f < sim->robot->def.feet; f++) {
@@ -238,7 +238,7 @@ static void place_feet(RobotSim *sim) {
     }
 }
 
-/* What the feet would do without ground: A = J M^-1 J^T and V_free = J (qvel + dt a). */
+/* Inverse inertia and free motion of the feet: A = J M^-1 J^T and V_free = J (qvel + dt a). */
 static void free_feet(RobotSim *sim) {
     foot_map_inverse_inertia(sim);
     for (int f = 0; f < sim->robot->def.feet; f++) {
@@ -270,8 +270,8 @@ static int any_joint_beyond_limit(const RobotSim *sim) {
     return beyond;
 }
 
-/* Joint limits (and the engine's contacts when there are any); without rows the smooth acceleration
- * stands. */
+/* Solves the joint limits, and the engine's contacts if there are any. Without constraints the
+ * smooth acceleration is final. */
 static void constrain(RobotSim *sim) {
     mjModel *m = sim->model;
     mjData *d = sim->data;
@@ -285,8 +285,8 @@ static void constrain(RobotSim *sim) {
     mj_fwdConstraint(m, d);
 }
 
-/* Semi-implicit Euler, the engine's own default: velocity first, then the pose with the new
- * velocity. */
+/* Semi-implicit Euler, as the engine does by default: first the velocity, then the pose with the
+ * new velocity. */
 static int integrate(RobotSim *sim) {
     mjData *d = sim->data;
     int bad = 0;
@@ -314,8 +314,8 @@ static void report_forces(RobotSim *sim) {
     }
 }
 
-/* docs/task.md section 2, with six rows per foot; mild/ground.h shows the same step for any
- * engine. */
+/* The step of docs/task.md section 2, with six rows per foot. mild/ground.h shows the same step for
+ * any engine. */
 int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
                    const MildTerrain *terrain, MildGround *ground) {
     RobotPhases none = {0}, *phases = sim->phases ? sim->phases : &none;
@@ -395,8 +395,8 @@ double robot_sim_body_clearance(const RobotSim *sim, const MildTerrain *terrain)
     return least;
 }
 
-/* Component of b - a along the base's lateral axis (to the left) laid level [m]; negative when the
- * legs are crossed. */
+/* [m] Component of b - a along the base's lateral axis (to the left), projected onto the horizontal
+ * plane. Negative when the legs are crossed. */
 static double lateral_distance(const RobotSim *sim, const double *a, const double *b) {
     const double *turn = robot_sim_base_rotation(sim);
     double x = turn[0], y = turn[3],

@@ -30,7 +30,7 @@ struct RobotSim {
     RobotPhases *phases; /* NULL: no timing */
 };
 
-/* Patches the workspace's model; nothing when the variation is the one it has. */
+/* Patches the workspace's model. Does nothing when the model already has this variation. */
 void variation_apply(RobotSim *sim, const RobotVariation *variation);
 
 /* [m] World position of the point that a foot's twist and wrench refer to: the origin of a flat
@@ -49,7 +49,7 @@ void foot_map_wrench(const RobotSim *sim, double (*wrench)[6], double *force, do
 
 /* The engine's own contact: finds the contacts of the feet's corners with the ground. */
 void rigid_collide(RobotSim *sim, const MildTerrain *terrain);
-/* And, once they are solved, the wrench on each foot, mean over the step, into sim->contact. */
+/* Once they are solved: writes the mean wrench on each foot over the step to sim->contact. */
 void rigid_contact_result(RobotSim *sim);
 
 #endif

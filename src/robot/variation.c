@@ -1,10 +1,11 @@
-/* Domain randomisation: one workspace's model brought from the nominal robot to a varied one. */
+/* Domain randomisation: changes the model of one workspace from the nominal robot to a varied
+ * one. */
 #include <string.h>
 
 #include "robot/sim.h"
 
-/* Mass and inertia of one body; the shape of the mass distribution stays, so the inertia scales
- * with the mass. */
+/* Sets mass and inertia of one body. The shape of the mass distribution does not change, so the
+ * inertia scales with the mass. */
 static void scale_body(mjModel *m, const mjModel *nominal, int body, double mass) {
     double scale = mass / nominal->body_mass[body];
     m->body_mass[body] = mass;
@@ -20,8 +21,8 @@ static void sum_subtrees(mjModel *m) {
     }
 }
 
-/* The engine's reference constants of the nominal robot (body_invweight0, dof_M0, stat) stay: they
- * only set how soft joint limits and rigid contacts are regularised. */
+/* The engine's reference constants (body_invweight0, dof_M0, stat) keep their nominal values. They
+ * only affect how joint limits and rigid contacts are regularised. */
 void variation_apply(RobotSim *sim, const RobotVariation *variation) {
     // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): a difference costs time only
     if (memcmp(variation, &sim->variation, sizeof *variation) == 0) {

@@ -1,21 +1,22 @@
-/* Help for beginners, after the assistance curriculum of Yu, Turk and Liu 2018 ("Learning symmetric
- * and low-energy locomotion"). Balance is so hard with the paper's soft ankles that a beginner
- * learns to stand stiff and never finds out that stepping pays. While a hand holds the trunk
- * upright and draws it along, and the legs are led through the reference gait, stepping comes by
- * itself and is rewarded from the start. Each robot's level of help decays while it stays on its
- * feet and rises when it falls: it settles where episodes last about four seconds, and goes to
- * nothing as they last longer. Never present in evaluation (task_def_make_nominal): there actions
- * are deviations from the time-invariant pose. */
+/* Assistance early in training, after the curriculum of Yu, Turk and Liu 2018 ("Learning symmetric
+ * and low-energy locomotion"). With the paper's soft ankles balance is so hard that an untrained
+ * policy learns to stand stiffly and never discovers that stepping pays. With assistance, an
+ * external force holds the trunk upright and pulls it along, and the legs follow the reference
+ * gait. So the robot steps, and is rewarded for it, from the start. The level of assistance of each
+ * robot decays while it stays on its feet and rises when it falls. It settles where episodes last
+ * about four seconds, and goes to 0 as they last longer. There is no assistance in evaluation
+ * (task_def_make_nominal), where actions are deviations from the constant default pose. */
 #include <math.h>
 
 #include "task/task.h"
 
-/* The hand's stiffness and damping against tilt, its pull towards the commanded velocity and the
- * limit of that, beyond which a robot leans into the hand: key assist of robot.ini. */
+/* Key assist of robot.ini: stiffness and damping against tilt, gain towards the commanded velocity,
+ * and the limit of that force. With a larger force a robot would learn to lean on it. */
 enum { HAND_TILT, HAND_DAMPING, HAND_DRAW, HAND_LIMIT };
-#define ASSIST_WEIGHT 0.5 /* [-] share of the weight carried */
-#define ASSIST_LEAD 1.3   /* [-] of the reference gait: the joints lag behind their targets */
-#define ASSIST_GRACE 2.0  /* [s] on its feet before the level decays */
+#define ASSIST_WEIGHT 0.5 /* [-] share of the weight that full assistance carries */
+#define ASSIST_LEAD                                                                                \
+    1.3 /* [-] scale of the reference gait, because the joints lag behind their targets */
+#define ASSIST_GRACE 2.0  /* [s] time on its feet before the level decays */
 #define ASSIST_DECAY 8.0  /* [s] */
 #define ASSIST_RISE 1.3   /* [-] at a fall */
 #define ASSIST_LEAST 0.01 /* [-] added at a fall */
@@ -25,7 +26,8 @@ double task_assist_share(const TaskEnv *env, const TaskDef *def) {
     return def->assist ? env->assist_level * env->assist_draw : 0;
 }
 
-/* One policy step; level stays where falls every 2 s + decay ln(ASSIST_RISE) balance. */
+/* Updates the level after a policy step. The level is steady when the robot falls every
+ * ASSIST_GRACE + ASSIST_DECAY ln(ASSIST_RISE) seconds. */
 void task_assist_adapt(TaskEnv *env, int fallen) {
     if (fallen) {
         env->assist_level = fmin(1, ASSIST_RISE * env->assist_level + ASSIST_LEAST);

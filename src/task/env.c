@@ -69,7 +69,7 @@ static void return_map(TaskEnv *env) {
 
 /* ---- start of an episode ---- */
 
-/* So that episodes start neither in the air nor buried. */
+/* [m] Sinkage while standing, so that episodes start neither in the air nor buried. */
 static double standing_depth(const Robot *robot, const MildMaterial *material) {
     return mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot));
 }
@@ -95,8 +95,8 @@ static void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot) {
         env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&r) - 1);
     }
     env->phase = random_unit(&r) < 0.5 ? 0 : 0.5;
-    /* The very first episodes end at different times, so that the environments never march in step.
-     */
+    /* The first episodes end at different times, so that the environments do not reset in
+     * lockstep. */
     env->step = env->tick == 0 && !env->command_frozen
                     ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit)
                     : 0;
@@ -108,7 +108,8 @@ static void base_twist(const RobotSim *sim, double twist[6]) {
     memcpy(twist, qvel, 6 * sizeof *twist);
 }
 
-/* On uneven ground the lowest sole point starts as deep as both soles do on level ground. */
+/* On uneven ground the lowest sole point starts at the depth that both soles have on level
+ * ground. */
 static void start_on_map(TaskEnv *env, const Robot *robot, RobotSim *sim) {
     double level = env->robot.qpos[2] - env->terrain.height - robot_stand_height(robot);
     robot_sim_load(sim, &env->robot, &env->variation);
@@ -187,7 +188,7 @@ static void push_base(TaskEnv *env, const TaskDef *def) {
     }
 }
 
-/* A motor at its speed limit drives no further. */
+/* A motor at its speed limit gives no torque in the direction of motion. */
 static double limit_speed(double torque, double speed, double limit) {
     return limit > 0 && fabs(speed) >= limit && torque * speed > 0 ? 0 : torque;
 }
@@ -210,7 +211,8 @@ static void pd_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot
     }
 }
 
-/* Physics steps of one policy period with the three latencies. Returns 1 when a number went bad. */
+/* Physics steps of one policy period, with the three latencies. Returns 1 when the simulation
+ * diverged. */
 static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        TaskReading *reading, double *torque, const TaskProbe *probe) {
     int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
@@ -300,8 +302,8 @@ TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *r
     return m;
 }
 
-/* Also when a foot has passed through the other leg: the engine computes no contact between them.
- */
+/* Bool: the base tilts too much, a shell touches the ground, or a foot has passed through the other
+ * leg, because the engine computes no contact between the legs. */
 static int has_fallen(const TaskEnv *env, const TaskDef *def, const RobotSim *sim) {
     return robot_sim_foot_distance(sim) < def->crossing_limit ||
            robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) ||
@@ -329,7 +331,7 @@ static void report_episode(const TaskEnv *env, TaskStep *out) {
     }
 }
 
-/* The reward of the step just made; 0 when a number went bad. */
+/* Computes the reward of the step just made. Returns 0 when it is not finite. */
 static int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        const double *torque, float *reward) {
     double terms[TASK_REWARD_COUNT];

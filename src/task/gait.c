@@ -16,7 +16,7 @@ static double swing_progress(const Robot *robot, double phase, int foot) {
     return p >= 0.5 ? -1 : 2 * p;
 }
 
-/* The foot's clock: above 0 in its stance, below in its swing. */
+/* The foot's clock: positive in stance, negative in swing. */
 static double wave(const Robot *robot, double phase, int foot) {
     double offset = robot_gait_offset(robot, foot);
     return offset < 0.5 ? sin(TWO_PI * (phase - offset)) : -sin(TWO_PI * (phase - (offset - 0.5)));
@@ -30,15 +30,16 @@ int task_gait_either(const TaskDef *def, const Robot *robot, double phase, int s
     return !standing && fabs(wave(robot, phase, foot)) < def->double_support;
 }
 
-/* h_des = apex sin(pi s), s the progress of the swing: the foot leaves and meets h0 on time. */
+/* h_des = apex sin(pi s), with s the progress of the swing, so that the foot leaves and meets h0 on
+ * time. */
 double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
                         int foot) {
     double s = swing_progress(robot, phase, foot);
     return standing || s < 0 ? 0 : def->swing_apex * sin(0.5 * TWO_PI * s);
 }
 
-/* Vendor's reference: the swing leg bends by A |sin| times `swing` of robot.ini, for SA01 (-1, 2,
- * -1) in hip pitch, knee, ankle pitch. */
+/* The vendor's reference motion: the swing leg bends by A |sin| times `swing` of robot.ini. For
+ * SA01 that is (-1, 2, -1) in hip pitch, knee and ankle pitch. */
 void task_gait_reference(const TaskDef *def, const Robot *robot, double phase, int standing,
                          double *q) {
     const double *pose = robot_default_pose(robot), *swing = robot_swing(robot);

@@ -11,7 +11,7 @@
 
 enum { SIGNATURE = 8 };
 
-/* One file while it is read; libpng comes back here by a jump when it finds something wrong. */
+/* A file while it is read. libpng jumps back here on an error. */
 typedef struct {
     const char *path;
     FILE *file;
@@ -34,7 +34,7 @@ static void on_warning(png_structp png, png_const_charp message) {
     (void)message;
 }
 
-/* Everything becomes one grey channel of 8 or 16 bits. */
+/* Converts any image to one grey channel of 8 or 16 bits. */
 static void make_grey(Reader *reader, Image *image) {
     png_structp png = reader->png;
     png_set_expand(png);

@@ -12,10 +12,10 @@ typedef struct {
                      row at the top */
 } Image;
 
-/* Any PNG: colours become their luminance, transparency is left out. Fails with the file's name and
- * what is wrong. */
+/* Reads any PNG. Colours become luminance and transparency is ignored. Fails with the name of the
+ * file and the reason. */
 MildStatus image_read(const char *path, Image *image, MildError *error);
-/* The same from an open file, which `name` stands for in messages. */
+/* The same from an open file. `name` is used for it in messages. */
 MildStatus image_read_file(FILE *file, const char *name, Image *image, MildError *error);
 void image_close(Image *image);
 

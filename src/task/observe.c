@@ -63,7 +63,7 @@ static void add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
     }
 }
 
-/* World vector into the base frame. */
+/* Rotates a world vector into the base frame. */
 static void to_base(const double *rotation, const double *v, float *out) {
     for (int i = 0; i < 3; i++) {
         out[i] = (float)(rotation[i] * v[0] + rotation[3 + i] * v[1] + rotation[6 + i] * v[2]);
@@ -84,8 +84,8 @@ static void write_estimates(const TaskEnv *env, const RobotSim *sim, float *esti
     }
 }
 
-/* Ground under the base, each parameter scaled to about one; an element that stands for a whole
- * sole as one of its cells. */
+/* Material under the base, with each parameter scaled to about one. Parameters of an element that
+ * represents a whole sole are converted to those of one of its cells. */
 static float *write_ground(const TaskEnv *env, const Robot *robot, const RobotSim *sim,
                            float *out) {
     const double *qpos = robot_sim_qpos(sim);
@@ -160,7 +160,7 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *ro
     }
 }
 
-/* An episode's first frame stands for those before it. */
+/* Stores a frame. At the start of an episode the first frame also fills the older ones. */
 static void remember(TaskEnv *env, const TaskDef *def, const float *frame, int first) {
     int width = env->shape.observation;
     size_t bytes = (size_t)width * sizeof *frame;

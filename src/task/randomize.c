@@ -1,4 +1,5 @@
-/* What is drawn once per episode (docs/task.md section 11) and the commands (section 10). */
+/* Everything that is drawn once per episode (docs/task.md section 11), and the commands (section
+ * 10). */
 #include <assert.h>
 #include <string.h>
 
@@ -18,7 +19,7 @@ static double spread(Random *r, double half_width) {
     return half_width * (2 * random_unit(r) - 1);
 }
 
-/* A named ground with each of its numbers a little off. */
+/* A preset with each of its numbers changed a little. */
 static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
     MildMaterial m = mild_material_default();
     mild_material_preset(
@@ -32,14 +33,14 @@ static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
     return m;
 }
 
-/* The quasistatic force is linear in (k_pen, sigma_cone): one factor makes a too soft draw carry
- * the robot on half of its feet at sinkage_max. Without it a fifth of the paper's draws swallows
- * the foot (docs/task.md section 11). */
+/* Makes a ground that is too soft stiffer, so that half of the robot's feet carry it at
+ * sinkage_max. One factor suffices, because the quasistatic force is linear in (k_pen, sigma_cone).
+ * Without this, a fifth of the paper's draws would swallow the foot (docs/task.md section 11). */
 static void limit_sinkage(MildMaterial *m, const Robot *robot, double sinkage) {
     const MildSole *sole = robot_rasters(robot)[0];
     MildMaterial bottomless = *m;
     bottomless.bed_depth = 1e3;
-    double feet = 0.5 * robot_feet(robot); /* half of them stand */
+    double feet = 0.5 * robot_feet(robot); /* half of them are in stance */
     double wanted = robot_total_mass(robot) * 9.81 / feet / mild_sole_elements(sole);
     double force = mild_element_law(&bottomless, mild_sole_pitch(sole), sinkage).force;
     if (force < wanted && force > 0) {
@@ -65,14 +66,15 @@ static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot 
     return m;
 }
 
-/* A match may need a number that no material may have (mild_model_match): then another is drawn. */
+/* Draws a material for the model. If its match would be out of range (mild_model_match), another
+ * one is drawn. */
 static MildMaterial draw_material(Random *r, const RandomizeDef *def, const Robot *robot) {
     double preset = def->rigid_share < 1 ? def->preset_share / (1 - def->rigid_share) : 0;
     MildMaterial m, rival;
     for (int tries = 0; tries < DRAW_TRIES; tries++) {
         m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot);
         if (def->model == MILD_MODEL_RIGID) {
-            return m; /* the engine's contact reads none of it */
+            return m; /* the engine's contact does not use it */
         }
         if (robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL) == MILD_OK) {
             return rival;
@@ -95,9 +97,8 @@ static void draw_stripes(Random *r, const RandomizeDef *def, const Robot *robot,
     for (int i = 0; i < MILD_PATCHES_MAX; i++) {
         double length = draw(r, def->patch_length);
         MildPatch patch;
-        memset(
-            &patch, 0,
-            sizeof patch); /* its padding too: environments are saved and compared byte by byte */
+        /* Clears the padding too, because environments are saved and compared byte by byte. */
+        memset(&patch, 0, sizeof patch);
         patch.x_min = x;
         patch.x_max = x + length;
         patch.y_min = -1e3;
@@ -108,7 +109,7 @@ static void draw_stripes(Random *r, const RandomizeDef *def, const Robot *robot,
     }
 }
 
-/* Somewhere on the map, a material for each of its labels. */
+/* Starts somewhere on the map and draws a material for each of its labels. */
 static void draw_on_map(Random *r, const TaskDef *def, const Robot *robot, MildTerrain *terrain) {
     double x, y;
     mild_map_extent(def->map, &x, &y);

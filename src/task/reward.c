@@ -13,21 +13,23 @@ static double clamp(double x, double low, double high) {
     return x < low ? low : x > high ? high : x;
 }
 
-/* A sum over feet, as large as for two. */
+/* Scales a sum over feet to two feet. */
 static double per_pair(const TaskMotion *m, double sum) {
     return sum * (2.0 / m->env->shape.feet);
 }
 
-/* exp(-k e^2) of the paper reaches out to a beginner, but is flat at its top: 0.05 m/s too slow
- * costs 1 % of it. Beside it exp(-|e|/width) keeps its slope down to no error at all. Both on the
- * velocity smoothed over half a gait period: the sway of every step is no error, and hid it. */
+/* The paper's exp(-k e^2) gives a signal even at large errors, but is flat near 0: being 0.05 m/s
+ * too slow costs only 1 %. exp(-|e|/width) keeps its slope down to zero error. Both use the
+ * velocity smoothed over half a gait period, because the sway within a step is not an error and
+ * would hide one. */
 static double tracking(const TaskMotion *m, double error) {
     const RewardDef *def = &m->def->reward;
     return 0.5 * (exp(-def->tracking_sharpness * square(error)) +
                   exp(-fabs(error) / def->tracking_width));
 }
 
-/* The parts apart: in the norm of both a little sway would hide what is missing forward. */
+/* Forward and sideways errors count separately. In the norm of both, a little sway would hide a
+ * forward error. */
 static double reward_linear_velocity(const TaskMotion *m) {
     const double *v = m->env->smooth_velocity, *command = m->env->command;
     return tracking(m, v[0] - command[0]) * tracking(m, v[1] - command[1]);
@@ -37,11 +39,11 @@ static double reward_yaw_rate(const TaskMotion *m) {
     return tracking(m, m->env->smooth_velocity[2] - m->env->command[2]);
 }
 
-/* The paper prints a positive weight on an error; of the readings in docs/task.md section 8 this is
- * the one that pays nothing to a foot that stays down (exp(-k error) pays it a third of a perfect
- * swing) and has a slope from the first millimetre. Lifting higher than wanted costs half as fast
- * as lifting pays. Scaled so that following h_des = apex sin(pi s) gives 1 on average over the
- * swing. */
+/* The paper prints a positive weight on an error. Of the interpretations in docs/task.md section 8,
+ * this one gives nothing to a foot that stays down (exp(-k error) would give it a third of a
+ * perfect swing) and has a slope from the first millimetre. Lifting too high costs half as much per
+ * metre as lifting gains. The scale is such that following h_des = apex sin(pi s) gives 1 on
+ * average over the swing. */
 static double reward_feet_clearance(const TaskMotion *m) {
     double sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
@@ -93,7 +95,8 @@ static double reward_reference_motion(const TaskMotion *m) {
     return exp(-2 * d) - 0.2 * clamp(d, 0, 0.5);
 }
 
-/* The vendor's exp(-100 x) alone is flat, and so teaches nothing, from a fifth of a radian on. */
+/* The vendor's exp(-100 x) alone is flat beyond a fifth of a radian, and so gives no signal
+ * there. */
 static double reward_default_pose(const TaskMotion *m) {
     const double *pose = robot_default_pose(m->robot), *still = robot_still(m->robot);
     double away = 0, all = 0;
@@ -134,8 +137,9 @@ static double reward_orientation(const TaskMotion *m) {
     return 0.5 * (exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + exp(-4 * tilt));
 }
 
-/* A lump at touchdown: divided by the period, so that it is not spread over one step like a rate
- * (the vendor's product with dt leaves a hundredth of it, which no learner notices). */
+/* Paid once, at touchdown. It is divided by the period, because rewards are rates that are
+ * multiplied by the period. The vendor's version lacks this, so only a hundredth of it remains,
+ * which a learner does not notice. */
 static double reward_air_time(const TaskMotion *m) {
     return m->standing ? 0 : per_pair(m, m->landed_air_time) / TASK_PERIOD;
 }
@@ -177,7 +181,7 @@ static double reward_joint_acceleration(const TaskMotion *m) {
     return sum;
 }
 
-/* The engine computes no contact between the legs. */
+/* Penalises legs that are too close, because the engine computes no contact between them. */
 static double reward_collision(const TaskMotion *m) {
     return (m->foot_distance < robot_feet_least(m->robot)) +
            (m->knee_distance < robot_knee_least(m->robot));

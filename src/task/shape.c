@@ -1,4 +1,4 @@
-/* How wide observations are for a robot, and what its mirror image does to them. */
+/* Widths of a robot's observations, and their mirror image. */
 #include "task/task.h"
 
 TaskShape task_shape(const Robot *robot) {
@@ -13,9 +13,9 @@ TaskShape task_shape(const Robot *robot) {
     return shape;
 }
 
-/* Mirror in the x-z plane: y components, roll, yaw and their rates change sign, the joints change
- * places. Where left and right legs alternate the clock turns by half a period, (sin, cos) ->
- * (-sin, -cos); where they move together it stays. */
+/* Mirror image in the x-z plane. y components, roll, yaw and their rates change sign, and the
+ * joints swap sides. If left and right legs alternate, the clock shifts by half a period, (sin,
+ * cos) -> (-sin, -cos). If they move together, it does not change. */
 TaskMirror task_mirror(const Robot *robot) {
     static const float head[9] = {-1, 1, -1, 1, -1, -1, 1, -1, 1};
     TaskMirror mirror = {.observation_index = {0}};

@@ -14,11 +14,11 @@
 #define TASK_FRAMES 6 /* H + 1, newest last (paper, H = 5) */
 #define TASK_FRAMES_HELD ((TASK_FRAMES - 1) * TASK_STRIDE_MAX + 1)
 
-/* Scale of the feet heights among the estimates, so that centimetres weigh in the regression like
- * m/s. */
+/* Scale of the feet heights among the estimates, so that centimetres count as much in the
+ * regression as velocities in m/s. */
 #define TASK_HEIGHT_SCALE 10.0
-/* Scale of the base velocity: 0.05 m/s are a tenth of a walk, and must be seen, by the regression
- * and by the actor. */
+/* Scale of the base velocity. 0.05 m/s is a tenth of a slow walk, so it must matter to the
+ * regression and to the actor. */
 #define TASK_VELOCITY_SCALE 4.0
 
 /* Numbers per environment; they follow from the robot's joints and feet. */
@@ -43,27 +43,29 @@ TaskShape task_shape(const Robot *robot);
 typedef struct {
     TaskShape shape;
     uint64_t seed;
-    uint32_t index; /* environment number: its stream of random numbers */
+    uint32_t index; /* number of the environment, which selects its stream of random numbers */
     uint32_t tick;  /* policy steps since creation, never reset */
     /* episode */
-    uint32_t step, step_limit, step_first; /* step_first: where the clock of this episode began */
-    double phase;                          /* [-] gait clock in [0, 1) */
-    double command[3];                     /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
-    double command_seen[3];                /* what the policy sees: one policy step late */
-    int command_frozen;                    /* bool: eval and play set the command themselves */
+    uint32_t step;          /* policy steps on the clock of this episode */
+    uint32_t step_limit;    /* step at which the episode times out */
+    uint32_t step_first;    /* step at which the episode began */
+    double phase;           /* [-] gait clock in [0, 1) */
+    double command[3];      /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
+    double command_seen[3]; /* what the policy sees, one policy step late */
+    int command_frozen;     /* bool: eval and play set the command themselves */
     /* what was drawn for this episode */
     RobotVariation variation;
-    MildTerrain terrain; /* its map is lent by TaskDef during a call and NULL between calls: the
-                            block holds no pointer */
+    MildTerrain terrain; /* its map is that of TaskDef during a call and NULL between calls, so
+                            that the block contains no pointer */
     double kp_scale[ROBOT_JOINTS_MAX];     /* [-] */
     double kd_scale[ROBOT_JOINTS_MAX];     /* [-] */
     double strength[ROBOT_JOINTS_MAX];     /* [-] of the torque */
     double motor_offset[ROBOT_JOINTS_MAX]; /* [rad] */
     int lag_command, lag_motor, lag_imu;   /* [physics steps] */
-    double assist_level; /* [-] helping hand: falls with time on its feet, rises with falls; lives
-                            across episodes */
-    double assist_draw;  /* [-] this episode's share of the level, in [0.5, 1) */
-    double push[6];      /* [m/s, rad/s] last push, for the critic; fades */
+    double assist_level; /* [-] level of assistance: decays while on its feet, rises with falls;
+                            persists across episodes */
+    double assist_draw;  /* [-] share of the level used in this episode, in [0.5, 1) */
+    double push[6];      /* [m/s, rad/s] last push, for the critic; decays */
     /* state */
     RobotState robot;
     double kp[ROBOT_JOINTS_MAX];       /* [N m/rad] task.kp or the robot's */
@@ -79,25 +81,26 @@ typedef struct {
     double reward_sum, term_sum[TASK_REWARD_COUNT], speed_error_sum;
 } TaskEnv;
 
-/* What one policy step gave. */
+/* Result of one policy step. */
 typedef struct {
     float reward;
-    uint8_t done, timeout, valid; /* valid 0: a number went bad; the sample must get no weight */
+    uint8_t done, timeout,
+        valid; /* valid 0: the simulation diverged, and the sample must get no weight */
     /* of the episode that just ended (done) */
     uint32_t length;
     float episode_reward, episode_terms[TASK_REWARD_COUNT], episode_speed_error;
 } TaskStep;
 
-/* Where the next observation goes, widths as in TaskShape; any pointer may be NULL. */
+/* Where to write the next observation, with the widths of TaskShape. Any pointer may be NULL. */
 typedef struct {
     float *history;  /* [history] noisy, newest frame last */
     float *critic;   /* [critic] */
-    float *estimate; /* [estimates] the truth the heads regress to */
+    float *estimate; /* [estimates] true values, the regression targets */
     float *frame;    /* [observation] newest noisy frame: the decoder's target */
 } TaskView;
 
-/* Called after every physics step, when robot and ground memory are those of its end: measures and
- * pictures hang here. The terrain's map is lent during the call. */
+/* Observer for measures and pictures. It is called at the end of every physics step. The terrain's
+ * map is set during the call. */
 typedef struct {
     void (*physics_step)(void *context, const TaskEnv *env, const RobotSim *sim,
                          const double *torque);
@@ -107,9 +110,9 @@ typedef struct {
 /* One block: TaskEnv, its frames, its ground memory; a multiple of 64. */
 size_t task_env_bytes(const TaskDef *def, const Robot *robot);
 MildGround *task_env_ground(TaskEnv *env);
-/* [shape.history] what the policy sees: five means of older frames, then the newest. */
+/* [shape.history] What the policy sees: five means of older frames, then the newest frame. */
 float *task_env_history(TaskEnv *env);
-/* [shape.observation] the frame of `age` policy steps ago, 0 .. TASK_FRAMES_HELD - 1. */
+/* [shape.observation] The frame of `age` policy steps ago, 0 .. TASK_FRAMES_HELD - 1. */
 float *task_env_frame(TaskEnv *env, int age);
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
@@ -117,17 +120,17 @@ void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_
 /* Draws a new episode and writes its first observation. */
 void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                     const TaskView *view);
-/* As reset, but the caller has chosen the terrain (its map aside, which is the TaskDef's) and
- * whether the engine's rigid ground is used. */
+/* The same, but the caller has chosen the terrain, except for its map, and whether to use the
+ * engine's rigid ground. The map is that of the TaskDef. */
 void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        const MildTerrain *terrain, int rigid, const TaskView *view);
-/* One policy step. When the episode ends a new one is drawn (auto_reset) and its first observation
- * written. */
+/* One policy step. When the episode ends, with auto_reset a new one is drawn and its first
+ * observation is written. */
 TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        const float *action, int auto_reset, const TaskView *view,
                        const TaskProbe *probe);
 
-/* ---- parts, each in a file of its own ---- */
+/* ---- parts of the step, each in its own file ---- */
 
 /* Readings of one instant (observe.c). */
 typedef struct {
@@ -136,63 +139,64 @@ typedef struct {
 } TaskReading;
 void task_read_imu(const RobotSim *sim, TaskReading *reading);
 void task_read_motors(const RobotSim *sim, TaskReading *reading);
-/* Pushes the frame made from the readings into the history and writes the view. */
+/* Appends the frame made from the readings to the history and writes the view. */
 void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
                   const TaskReading *reading, int first, const TaskView *view);
 
-/* Everything a reward term may look at, computed once per policy step (env.c). */
+/* Everything that reward terms may use, computed once per policy step (env.c). */
 typedef struct {
     const TaskDef *def;
     const Robot *robot;
     const TaskEnv *env;
-    double velocity[3];                 /* base, heading frame [m/s] */
-    double omega[3];                    /* base, base frame [rad/s] */
-    double gravity[3];                  /* unit gravity in the base frame */
-    double twist_change;                /* norm of the change of base twist in this step */
-    double q[ROBOT_JOINTS_MAX];         /* [rad] */
-    double qd[ROBOT_JOINTS_MAX];        /* [rad/s] */
-    double qd_before[ROBOT_JOINTS_MAX]; /* [rad/s] one policy step ago */
-    double torque[ROBOT_JOINTS_MAX];    /* [N m] */
-    double base_height;                 /* [m] above the stance soles */
-    double foot_height[ROBOT_FEET_MAX];
-    double foot_force[ROBOT_FEET_MAX];
-    double foot_speed[ROBOT_FEET_MAX];
-    double landed_air_time; /* sum over feet that touched down in this step */
-    int contact[ROBOT_FEET_MAX];
-    int stance[ROBOT_FEET_MAX];
-    int either[ROBOT_FEET_MAX]; /* bool: both states are right */
-    double wanted_height[ROBOT_FEET_MAX];
-    double foot_distance; /* [m] see robot_sim_foot_distance */
-    double knee_distance; /* [m] */
-    int standing;
+    double velocity[3];                   /* [m/s] of the base, heading frame */
+    double omega[3];                      /* [rad/s] of the base, base frame */
+    double gravity[3];                    /* [-] unit vector along gravity, base frame */
+    double twist_change;                  /* norm of the change of the base twist in this step */
+    double q[ROBOT_JOINTS_MAX];           /* [rad] */
+    double qd[ROBOT_JOINTS_MAX];          /* [rad/s] */
+    double qd_before[ROBOT_JOINTS_MAX];   /* [rad/s] one policy step ago */
+    double torque[ROBOT_JOINTS_MAX];      /* [N m] */
+    double base_height;                   /* [m] above the stance soles */
+    double foot_height[ROBOT_FEET_MAX];   /* [m] lowest sole point above the undisturbed surface */
+    double foot_force[ROBOT_FEET_MAX];    /* [N] of the ground on the foot */
+    double foot_speed[ROBOT_FEET_MAX];    /* [m/s] horizontal, of the sole */
+    double landed_air_time;               /* [s] summed over the feet that touched down */
+    int contact[ROBOT_FEET_MAX];          /* bool: the ground carries the foot */
+    int stance[ROBOT_FEET_MAX];           /* bool: the clock wants the foot in stance */
+    int either[ROBOT_FEET_MAX];           /* bool: stance and swing are both right */
+    double wanted_height[ROBOT_FEET_MAX]; /* [m] h_des of the clock */
+    double foot_distance;                 /* [m] see robot_sim_foot_distance */
+    double knee_distance;                 /* [m] see robot_sim_knee_distance */
+    int standing;                         /* bool: the command is to stand */
 } TaskMotion;
-/* What the policy step just made was like: the sim is at its end, env still holds base twist, joint
- * speeds, smoothed velocity and air times of the step before and gets those of this one. torque:
- * [robot_joints], of the last physics step. */
+/* Describes the policy step just made. The sim is at the end of the step. env still has the base
+ * twist, joint speeds, smoothed velocity and air times of the previous step, which are updated.
+ * torque: [robot_joints] of the last physics step. */
 TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                 const RobotSim *sim, const double *torque);
-/* Weighted terms per second into terms; returns the clipped sum times the period. */
+/* Writes the weighted terms per second to `terms`. Returns their clipped sum times the period. */
 double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
 
 /* Draws ground, robot and sensors of an episode (randomize.c). */
 void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);
 void task_draw_command(TaskEnv *env, const TaskDef *def);
 
-/* Help while learning starts (assist.c). The hand on the base: force, torque, world; returns 0 when
- * there is none. The pose that actions are added to: the default pose, led along the reference gait
- * while help lasts. */
+/* Assistance early in training (assist.c). task_assist writes force and torque on the base, world,
+ * and returns 0 when there is none. task_assist_pose gives the pose that actions are added to: the
+ * default pose, moved along the reference gait while there is assistance. */
 double task_assist_share(const TaskEnv *env, const TaskDef *def);
 void task_assist_adapt(TaskEnv *env, int fallen);
 int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
                 double wrench[6]);
 void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double *pose);
 
-/* Gait clock (gait.c): a foot stands in the half of the period that begins at its offset. */
+/* Gait clock (gait.c): a foot is in stance during the half of the period that starts at its
+ * offset. */
 int task_is_standing(const double command[3]);
 int task_gait_stance(const Robot *robot, double phase, int standing, int foot);
 double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
                         int foot);
-/* True near touchdown and lift-off, where standing and swinging are both right. */
+/* Bool: near touchdown and lift-off, where stance and swing are both right. */
 int task_gait_either(const TaskDef *def, const Robot *robot, double phase, int standing, int foot);
 void task_gait_reference(const TaskDef *def, const Robot *robot, double phase, int standing,
                          double *q);

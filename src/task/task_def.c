@@ -106,10 +106,10 @@ void task_def_make_nominal(TaskDef *def) {
 const MildField task_fields[] = {
     T(physics_dt, D, 1, 0.0005, 0.005, "[s] physics step; must divide 0.01, the policy step"),
     T(action_scale, D, 1, 0, 2, "[rad] joint offset per unit of action; 0: the robot's"),
-    T(action_clip, D, 1, 0.1, 100, "[-] actions are clipped to this range on both sides of 0"),
+    T(action_clip, D, 1, 0.1, 100, "[-] actions are clipped to plus or minus this"),
     T(torque_share, D, 1, 0.1, 1, "[-] torque limit as a share of the joint's effort"),
     T(kp, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0,
-      "[N m/rad] robot: the robot's; or a number per joint, or per joint of a leg, or one"),
+      "[N m/rad] position gain: robot, one number, one per joint, or one per joint of a leg"),
     T(kd, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0, "[N m s/rad] as kp"),
     T(episode, D, 1, 0.1, 1000, "[s] longest episode"),
     T(command_interval, D, 1, 0.1, 1000, "[s] time after which a new command is drawn"),
@@ -123,11 +123,11 @@ const MildField task_fields[] = {
       "[-] share of walking commands without sideways and turning motion"),
     T(gait_period, D, 1, 0.2, 3, "[s] period of the gait clock"),
     T(swing_apex, D, 1, 0.01, 0.4,
-      "[m] highest point of the swing foot above the undisturbed surface, as the clock wants it"),
+      "[m] height of the swing foot above the undisturbed surface that the clock asks for"),
     T(double_support, D, 1, 0, 1,
-      "[-] where |sin| of the clock is below this, a foot may stand or swing"),
+      "[-] while |sin| of the clock is below this, stance and swing are both right"),
     T(history_stride, MILD_FIELD_INT, 1, 1, TASK_STRIDE_MAX,
-      "[-] each of the five older frames of the history is the mean of so many policy steps"),
+      "[-] number of policy steps averaged in each of the five older frames of the history"),
     T(clock, B, 1, 0, 1, "[bool] the observation contains the gait clock"),
     T(observe_noise, B, 1, 0, 1, "[bool] the observation contains sensor noise"),
     T(noise_q, D, 1, 0, 1, "[rad] bound of the uniform noise of joint angles"),
@@ -139,7 +139,7 @@ const MildField task_fields[] = {
       "[m] the episode ends when the feet are laterally closer than this, because the simulated "
       "legs cannot touch each other"),
     T(assist, B, 1, 0, 1,
-      "[bool] an external force supports beginners; it fades while a robot stays on its feet"),
+      "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     T(newton, B, 1, 0, 1,
       "[bool] contact solver: true for Newton (fast), false for the paper's Gauss-Seidel sweeps"),
     T(contact_tolerance, D, 1, 1e-12, 0.1,
@@ -195,9 +195,9 @@ const MildField randomize_fields[] = {
     Z(mu, 2, 0.01, 3, "[-] friction coefficient, low and high (paper)"),
     Z(rho, 2, 1, 5000, "[kg/m^3] grain density, low and high"),
     Z(recovery, 2, 0, 1, "[-] share of the depth that springs back, low and high"),
-    Z(bed_depth, 2, 0.001, 10, "[m] firm bottom below the surface, low and high"),
+    Z(bed_depth, 2, 0.001, 10, "[m] depth of the firm bed below the surface, low and high"),
     Z(sinkage_max, 1, 0.005, 1,
-      "[m] a softer ground is made stiffer until one foot sinks at most this deep"),
+      "[m] softer grounds are made stiffer, so that one foot sinks at most this deep"),
     Z(base_mass, 2, -8, 20, "[kg] mass added to the base, low and high (paper)"),
     Z(com_offset, 1, 0, 0.2,
       "[m] bound of the shift of the base's centre of mass (paper 0.006, vendor 0.06)"),
@@ -217,7 +217,7 @@ const MildField randomize_fields[] = {
 };
 const int randomize_field_count = sizeof randomize_fields / sizeof *randomize_fields;
 
-/* Every pair of numbers in these tables is a range. */
+/* Checks every pair of numbers in these tables, which are ranges. */
 static MildStatus check_section(const MildField *fields, int count, const void *def,
                                 const char *section, MildError *error) {
     MildStatus status = mild_fields_check(fields, count, def, section, error);
@@ -231,7 +231,7 @@ static MildStatus check_section(const MildField *fields, int count, const void *
     return status;
 }
 
-/* Numbers of a list of gains into `list`; -1 with a message when it is none. */
+/* Reads the numbers of a list of gains. Returns their number, or -1 with a message. */
 static int read_gains(const char *key, const char *text, double most, double *list,
                       MildError *error) {
     int count = 0;

@@ -15,11 +15,11 @@ static const MildField own_fields[] = {
     MILD_FIELD(TerrainDef, labels, MILD_FIELD_TEXT, sizeof((TerrainDef *)0)->labels, 0, 0,
                "[-] PNG file for patches = image: black is the first material, white the last"),
     MILD_FIELD(TerrainDef, memory, MILD_FIELD_BOOL, 1, 0, 1,
-               "[bool] imprints stay, and later steps meet them"),
+               "[bool] the ground keeps imprints, which later steps run into"),
     MILD_FIELD(
         TerrainDef, tiles, MILD_FIELD_INT, 1, 8, MILD_PRINT_TILES_MAX,
-        "[-] memory for imprints: tiles of 136 bytes, about ten for an imprint of a foot; when "
-        "it is full the oldest imprint is forgotten"),
+        "[-] memory for imprints: tiles of 136 bytes, about ten per imprint of a foot; when all "
+        "are in use the oldest are forgotten"),
 };
 enum { OWN_FIELDS = sizeof own_fields / sizeof *own_fields, FIELDS_MAX = 32 };
 
@@ -40,7 +40,7 @@ const MildField *terrain_fields(int *count) {
     return fields;
 }
 
-/* Whether it is anything but level ground without a pattern. */
+/* Bool: the terrain needs a map, because it is not level or has a pattern. */
 static int terrain_has_map(const TerrainDef *def) {
     return def->map.kind != MILD_MAP_FLAT || def->map.patches != MILD_PATTERN_NONE;
 }
@@ -68,7 +68,7 @@ static unsigned char *make_labels(const Image *image, int materials) {
     return labels;
 }
 
-/* A picture that nothing would read is a mistake. */
+/* Refuses an image that would not be used. */
 static MildStatus check_used(const char *key, const char *path, int used, const char *switched,
                              MildError *error) {
     if (!*path || used) {

@@ -1,4 +1,5 @@
-/* Section [terrain] of a config: the shape of the ground, the pattern of its materials, prints. */
+/* Section [terrain] of a config: the shape of the ground, the pattern of its materials, and
+ * imprints. */
 #ifndef TASK_TERRAIN_H
 #define TASK_TERRAIN_H
 
@@ -16,8 +17,8 @@ TerrainDef terrain_def_default(void);
 /* The keys of a TerrainDef, [*count]. */
 const MildField *terrain_fields(int *count);
 
-/* The map it describes for `materials` materials (a label image's black is the first of them, its
- * white the last); *map is NULL for level ground without a pattern. Destroy it with
+/* Makes the map that `def` describes, for `materials` materials. Black in a label image is the
+ * first material, white the last. *map is NULL for level ground without a pattern. Destroy it with
  * mild_map_destroy. */
 MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, MildError *error);
 /* Tiles for mild_ground_bytes_prints; 0 without memory. */

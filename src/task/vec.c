@@ -189,8 +189,8 @@ static uint64_t hash_bytes(uint64_t hash, const void *data, size_t size) {
     return hash;
 }
 
-/* Member by member: neither the padding between members nor what lies beyond the robot's joints is
- * part of the state. */
+/* Hashes member by member, because padding and entries beyond the robot's joints are not part of
+ * the state. */
 uint64_t vec_hash(const Vec *vec) {
     uint64_t hash = 0xcbf29ce484222325u;
     for (int i = 0; i < vec->envs; i++) {

@@ -1,4 +1,5 @@
-/* Many environments over all cores, writing straight into the learner's batch. */
+/* The vectorised environment: many environments on all cores, which write directly into the
+ * learner's batch. */
 #ifndef MILD_VEC_H
 #define MILD_VEC_H
 
@@ -14,7 +15,7 @@ typedef struct {
     float *history, *critic, *estimate, *frame;
 } VecView;
 
-/* Of the episodes that ended since the last vec_take_stats. */
+/* Statistics of the episodes that ended since the last vec_take_stats. */
 typedef struct {
     int episodes, falls, diverged;
     double steps;                    /* policy steps */
@@ -35,9 +36,10 @@ void vec_reset(Vec *vec, const VecView *first);
 void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout,
               uint8_t *valid, const VecView *next);
 VecStats vec_take_stats(Vec *vec);
-/* Thread time [s] spent in physics, and in the ground as part of it, since the last call. */
+/* [s] Thread time spent in physics since the last call, and the part of it spent in the ground. */
 void vec_take_times(Vec *vec, double *physics, double *ground);
-/* Everything that persists, one pointer-free block: save and load are a copy. */
+/* Everything that persists, as one block without pointers, so that saving and loading are
+ * copies. */
 void *vec_state(Vec *vec, size_t *bytes);
 size_t vec_bytes(const Vec *vec);
 /* FNV-1a of everything that moves: robots, histories, commands, reward sums, ground memory. */

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-/* Bytes of one event's head (wall time, step, length prefix) and of one scalar, at most. */
+/* Most bytes of an event's head (wall time, step, length prefix), and of a scalar. */
 enum { HEAD_BYTES = 40, SCALAR_BYTES = EVENTS_TAG_MAX + 20, PAYLOAD_MAX = 128 * SCALAR_BYTES };
 
 /* CRC-32C (Castagnoli), reflected polynomial 0x82f63b78. Bit by bit is fast enough, because a

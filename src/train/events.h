@@ -12,8 +12,8 @@ enum { EVENTS_TAG_MAX = 100 };
 /* First record of every file. */
 int events_write_version(FILE *file, double wall_time);
 
-/* A session starts at `step`: readers drop what earlier files of the folder hold from that step
- * on. */
+/* Marks the start of a session at `step`. Readers ignore what earlier files of the folder contain
+ * from that step on. */
 int events_write_start(FILE *file, double wall_time, int64_t step);
 
 /* One event with a scalar per tag (tags are cut at EVENTS_TAG_MAX characters). Each returns 0 when

@@ -145,7 +145,7 @@ static MildStatus save_checkpoint(TrainRun *run, MildError *error) {
     return status;
 }
 
-/* One text into a file of the folder. */
+/* Writes a text to a file of the folder. */
 static MildStatus write_text(const TrainRun *run, const char *name, const char *text,
                              MildError *error) {
     char path[PATH_SIZE];
@@ -160,8 +160,8 @@ static MildStatus write_config(const TrainRun *run, MildError *error) {
     return status == MILD_OK ? write_text(run, "version.txt", version, error) : status;
 }
 
-/* A checkpoint that is damaged (killed machine, broken disk) is passed over for the one before
- * it. One of another config is an error, because the earlier ones have that config too. */
+/* Loads the newest checkpoint that is not damaged (by a power loss or a broken disk). A checkpoint
+ * of another config is an error, because the earlier ones have that config too. */
 static MildStatus resume(TrainRun *run, MildError *error) {
     const char *folder = run->def.folder;
     int64_t oldest, number = newest_checkpoint(folder, INT64_MAX, &oldest, &(int){0});
@@ -187,7 +187,7 @@ static MildStatus resume(TrainRun *run, MildError *error) {
     }
 }
 
-/* A run that was killed while it saved has left a temporary file. */
+/* Removes temporary files of runs that were killed while saving. */
 static void remove_leftovers(const char *folder) {
     static const char *const ours[] = {"checkpoint_", "policy.safetensors.", "config.ini.",
                                        "version.txt."};
@@ -207,8 +207,8 @@ static void remove_leftovers(const char *folder) {
     }
 }
 
-/* From here on the folder is this run's alone. Another may have begun there since it was
- * checked. */
+/* Locks the folder for this run. Checks it again, because another run may have started there
+ * since. */
 static MildStatus take_folder(TrainRun *run, MildError *error) {
     const char *folder = run->def.folder;
     char path[PATH_SIZE];
@@ -310,7 +310,7 @@ int64_t train_run_iteration(const TrainRun *run) {
 
 /* ---- the loop ---- */
 
-/* 0 .. 1; negative: the run has no end. */
+/* Share of the run that is done, 0 .. 1; negative when the run has no end. */
 static double share_done(const TrainRun *run) {
     const TrainDef *def = &run->def.def->train;
     double done = (double)(train_iteration(run->trainer) - run->first);

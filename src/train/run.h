@@ -19,18 +19,18 @@ typedef struct {
     void *self;
     void (*resumed)(void *self, const char *checkpoint);
     void (*passed_over)(void *self, const char *why); /* a checkpoint that does not load */
-    int (*stop)(void *self); /* asked before every iteration; not 0 ends the run and saves it */
+    int (*stop)(void *self); /* called before every iteration; nonzero saves and ends the run */
     /* after every iteration. share: how much of the run is done, 0 .. 1; negative: no end */
     void (*iterated)(void *self, int64_t iteration, const TrainReport *report, double share);
 } TrainWatch;
 
 typedef struct TrainRun TrainRun;
 
-/* A new run needs a folder without checkpoints, a resumed one a folder with some. */
+/* Fails unless a new run finds no checkpoints in the folder, and a resumed run finds some. */
 MildStatus train_run_check_folder(const char *folder, int resume, MildError *error);
 
-/* Makes the folder or continues in it. Borrows what `def` and `watch` point to. NULL, with the
- * reason in *error. */
+/* Makes the folder or continues in it. Borrows what `def` and `watch` point to. Returns NULL on
+ * failure, with the reason in *error. */
 TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error);
 void train_run_close(TrainRun *run); /* may be NULL */
 int64_t train_run_iteration(const TrainRun *run);

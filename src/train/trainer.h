@@ -29,7 +29,7 @@ void train_destroy(Trainer *trainer);
 /* One rollout and one update. Fails when train.device does. */
 MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
 int64_t train_iteration(const Trainer *trainer);
-Policy *train_policy(Trainer *trainer); /* what gets saved: the averaged weights with ppo.average */
+Policy *train_policy(Trainer *trainer); /* the policy to save; with ppo.average the mean weights */
 size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */
 int train_threads(const Trainer *trainer);
 

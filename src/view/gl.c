@@ -16,8 +16,9 @@ struct GlContext {
     EGLDisplay display;
     EGLContext egl;
     void *osmesa;
-    unsigned char osmesa_buffer[64 * 64 * 4]; /* OSMesa wants a default buffer; we draw into
-                                                 framebuffer objects */
+    unsigned char osmesa_buffer
+        [64 * 64 *
+         4]; /* OSMesa requires a default buffer, although we draw into framebuffer objects */
 };
 
 /* Object pointers and function pointers convert through memory: POSIX guarantees the
@@ -156,7 +157,7 @@ GlContext *gl_create(MildError *error) {
     }
     free(context);
     mild_fail(error, MILD_ERROR_IO,
-              "rendering: neither EGL nor OSMesa gives an OpenGL context; install one: "
+              "rendering: neither EGL nor OSMesa provides an OpenGL context; install one: "
               "apt-get install libegl1 libgl1-mesa-dri (or libosmesa6)");
     return NULL;
 }

@@ -1,6 +1,6 @@
-/* An OpenGL context that needs no display: EGL (GPU or Mesa software), else OSMesa. Both are found
- * at run time, so the program starts on machines that have neither and says so only when a picture
- * is wanted. */
+/* An OpenGL context without a display, from EGL (GPU or Mesa software) or else from OSMesa. Both
+ * are loaded at run time, so the program also starts on machines that have neither, and fails only
+ * when a picture is requested. */
 #ifndef VIEW_GL_H
 #define VIEW_GL_H
 

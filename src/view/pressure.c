@@ -6,9 +6,9 @@
 
 #include "base/file.h"
 
-#define STANCE_FORCE 20.0 /* [N] normal force from which a foot stands */
-#define STANCE_MAX 2.0    /* [s] a longer stance is standing about, no step */
-#define STANCE_MIN 0.05   /* [s] a shorter one is a scuff */
+#define STANCE_FORCE 20.0 /* [N] normal force above which a foot is in stance */
+#define STANCE_MAX 2.0    /* [s] a longer stance is standing still, not a step */
+#define STANCE_MIN 0.05   /* [s] a shorter stance is a scuff */
 #define STANCE_SAMPLES 4096
 
 /* Sums over the finished stances of one foot on one material. */
@@ -19,7 +19,7 @@ typedef struct {
     int stances;
 } Tally;
 
-/* The stance a foot is in. */
+/* The present stance of a foot. */
 typedef struct {
     int material; /* -1: in the air, -2: began on another material */
     int samples;

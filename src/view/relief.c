@@ -6,14 +6,14 @@
 
 #define MASK_PER_PITCH 4
 #define SOLE_MARGIN                                                                                \
-    0.005 /* [m] the surface gives way this far beside the sole, so that its edge stays visible */
-#define UNDER_SOLE 0.0015  /* [m] drawn gap below the sole against flicker */
-#define CHANGE_SEEN 0.0003 /* [m] smaller changes are not worth an upload */
-#define SHADE_DEPTH 0.030  /* [m] depth at which pressed ground is about as dark as it gets */
+    0.005 /* [m] width of the gap drawn around a sole, which keeps its edge visible */
+#define UNDER_SOLE 0.0015  /* [m] gap drawn below a sole, which prevents flicker */
+#define CHANGE_SEEN 0.0003 /* [m] smaller changes are not uploaded */
+#define SHADE_DEPTH 0.030  /* [m] depth at which pressed ground is almost as dark as it gets */
 #define TILE_INNER (RELIEF_TILE_PIXELS - 2 * RELIEF_TILE_MARGIN)
 #define NO_DEPTH (-1e9f)
 
-/* Where a sole is, on a raster finer than its elements. */
+/* The shape of a sole, on a raster finer than its elements. */
 typedef struct {
     double x_min, y_min, step, z;
     int columns, rows;
@@ -72,7 +72,7 @@ static Look look_of(const char *name, const MildMaterial *material) {
             return looks[i].look;
         }
     }
-    /* A ground of the user's own: elastic ones look like foam, plastic ones like sand. */
+    /* The user's own materials: elastic ones look like foam, plastic ones like sand. */
     return material->recovery > 0.5 ? looks[2].look : looks[6].look;
 }
 
@@ -159,7 +159,7 @@ static float sole_depth(const Relief *relief, int foot, double x, double y, doub
     const SoleMask *mask = &relief->mask[foot];
     const double *p = relief->position[foot], *r = relief->rotation[foot];
     double dx = x - p[0], dy = y - p[1];
-    if (r[8] < 0.2) { /* foot on its side */
+    if (r[8] < 0.2) { /* the foot lies on its side */
         return NO_DEPTH;
     }
     double dz = (mask->z - r[2] * dx - r[5] * dy) / r[8];
@@ -240,7 +240,7 @@ void relief_press(Relief *relief, const double (*position)[3], const double (*ro
     memcpy(relief->position, position, (size_t)relief->feet * sizeof *position);
     memcpy(relief->rotation, rotation, (size_t)relief->feet * sizeof *rotation);
     for (int f = 0; f < relief->feet; f++) {
-        update_box(relief, relief->last[f]); /* where the foot was: springs back */
+        update_box(relief, relief->last[f]); /* the ground springs back where the foot was */
         relief->last[f] = foot_box(relief, f);
         update_box(relief, relief->last[f]);
     }
@@ -421,7 +421,7 @@ static const Look *look_at(const Relief *relief, int material) {
     return &relief->look[material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material];
 }
 
-/* Tile coordinate in [0, 1) of a pixel's centre; the margin shows what lies on the edge. */
+/* Tile coordinate in [0, 1) of a pixel's centre. Pixels of the margin repeat the edge. */
 static double inner(int pixel) {
     return fmin(fmax((pixel - RELIEF_TILE_MARGIN + 0.5) / TILE_INNER, 0.0), 1.0 - 1e-9);
 }
@@ -430,7 +430,7 @@ void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb) {
     double center[2], edge = relief_tile_edge(relief);
     relief_tile_center(relief, tile, center);
     for (int py = 0; py < RELIEF_TILE_PIXELS; py++) {
-        double v = inner(RELIEF_TILE_PIXELS - 1 - py); /* pictures run down, y runs up */
+        double v = inner(RELIEF_TILE_PIXELS - 1 - py); /* picture rows go down, y goes up */
         const float *low = tile_row(relief, tile, (int)(v * RELIEF_TILE_CELLS)),
                     *high = low + relief->nx;
         for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3) {

@@ -1,6 +1,6 @@
-/* The ground one can see: a height map under the walk that the soles press in and that springs back
- * by its material's `recovery`. Drawing only: physics never reads it. The map is cut into square
- * tiles so that a renderer refreshes only those that changed. Knows no renderer. */
+/* The visible ground: a height map that the soles press in and that springs back by its material's
+ * `recovery`. It is only for drawing; physics never reads it. The map is divided into square tiles,
+ * so that a renderer need refresh only those that changed. It does not depend on a renderer. */
 #ifndef VIEW_RELIEF_H
 #define VIEW_RELIEF_H
 
@@ -9,10 +9,8 @@
 #define RELIEF_TILE_CELLS 64
 #define RELIEF_TILE_VERTICES (RELIEF_TILE_CELLS + 1)
 #define RELIEF_TILE_PIXELS 128
-#define RELIEF_TILE_MARGIN                                                                         \
-    4 /* [pixels] of a tile's picture beyond its edges, so that filtering takes nothing from afar  \
-       */
-#define RELIEF_RIGID (-1) /* material index of ground that never yields */
+#define RELIEF_TILE_MARGIN 4 /* [pixels] border around a tile's picture for texture filtering */
+#define RELIEF_RIGID (-1)    /* material index of ground that never yields */
 
 typedef struct {
     double x_min, x_max, y_min, y_max; /* [m] area drawn; rounded up to whole tiles */
@@ -27,8 +25,8 @@ typedef struct Relief Relief;
 Relief *relief_create(const ReliefDef *def, const MildTerrain *terrain,
                       const MildSole *const *soles, int feet, MildError *error);
 void relief_destroy(Relief *relief);
-/* Move the surface to the soles' present pose: position [feet][3] and rotation [feet][9] of the
- * ankles. */
+/* Presses the surface to the present pose of the soles. position [feet][3], rotation [feet][9]: of
+ * the ankles. */
 void relief_press(Relief *relief, const double (*position)[3], const double (*rotation)[9]);
 
 int relief_tile_columns(const Relief *relief); /* along x */
@@ -44,7 +42,7 @@ double relief_height_at(const Relief *relief, double x, double y);
  */
 int relief_tile_material(const Relief *relief, int tile);
 int relief_tile_touched(const Relief *relief, int tile);
-/* Whether the tile changed since this was last asked. */
+/* Whether the tile changed since the last call. */
 int relief_tile_take_dirty(Relief *relief, int tile);
 /* Every step-th vertex (a divisor of RELIEF_TILE_CELLS), rows along y: 1 at relief_high, 0 at
  * `depth` below relief_low. */

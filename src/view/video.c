@@ -195,7 +195,7 @@ MildStatus video_frame(Video *video, const unsigned char *rgb, MildError *error)
             continue;
         }
         if (sent <= 0) {
-            if (finish_ffmpeg(video)) { /* it left early and called that success */
+            if (finish_ffmpeg(video)) { /* ffmpeg exited early with success */
                 video->status = MILD_ERROR_IO;
                 snprintf(video->text, sizeof video->text, "ffmpeg stopped reading after %d frames",
                          video->frames);

@@ -10,23 +10,21 @@
 #include "view/inset.h"
 #include "view/relief.h"
 
-#define VIEW_CELL 0.01 /* [m] vertices of the visible ground */
-#define VIEW_OVERLAP                                                                               \
-    1.0015 /* [-] tiles are drawn this much larger, so that no crack opens between them */
-#define VIEW_SLOTS 96         /* tiles that can be deformed or of mixed material at once */
-#define VIEW_SLOTS_UNEVEN 192 /* the same where every tile has a shape */
-#define VIEW_COARSE                                                                                \
-    4 /* vertices along an edge of a tile without prints are drawn this much farther apart */
-#define VIEW_DEPTH 0.20        /* [m] deepest print that can be drawn */
+#define VIEW_CELL 0.01         /* [m] vertices of the visible ground */
+#define VIEW_OVERLAP 1.0015    /* [-] scale of a tile, which prevents gaps between tiles */
+#define VIEW_SLOTS 96          /* most tiles that are deformed or of mixed material at once */
+#define VIEW_SLOTS_UNEVEN 192  /* the same on uneven ground, where every tile has a shape */
+#define VIEW_COARSE 4          /* [vertices] spacing of drawn vertices on a tile without imprints */
+#define VIEW_DEPTH 0.20        /* [m] deepest imprint that can be drawn */
 #define VIEW_RADIUS 9.0        /* [m] tiles farther from the robot are drawn as plain floor */
-#define VIEW_RADIUS_UNEVEN 4.0 /* [m] */
-#define VIEW_FLOOR 40.0        /* [m] half size of the floor beyond */
+#define VIEW_RADIUS_UNEVEN 4.0 /* [m] the same on uneven ground */
+#define VIEW_FLOOR 40.0        /* [m] half the size of the surrounding floor */
 #define VIEW_GEOMS 4000
-#define VIEW_CAMERA_TIME 0.35        /* [s] the camera's lag */
+#define VIEW_CAMERA_TIME 0.35        /* [s] time constant of the camera */
 #define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
-#define VIEW_CLOSE_TIME 0.20         /* [s] the same of the camera on the feet */
+#define VIEW_CLOSE_TIME 0.20         /* [s] the same for the close-up of the feet */
 #define VIEW_CLOSE_HEIGHT 0.04       /* [m] */
-#define VIEW_CLOSE_TURN 22.0         /* [deg] it looks more from the side */
+#define VIEW_CLOSE_TURN 22.0         /* [deg] azimuth relative to the main camera */
 #define VIEW_CLOSE_ELEVATION (-22.0) /* [deg] */
 #define VIEW_CLOSE_DISTANCE 0.80     /* [m] */
 #define VIEW_LABEL 24                /* [pixels] height of a label */
@@ -55,7 +53,7 @@ struct View {
     mjvOption option;
     mjvCamera camera, close; /* close: on the feet */
     int scene_made, context_made;
-    int jumped; /* bool: the cameras start anew */
+    int jumped; /* bool: the cameras jump to the robot in the next frame */
     Relief *relief;
     Slot slots[VIEW_SLOTS_UNEVEN];
     int slot_count;
@@ -337,8 +335,8 @@ static double tile_distance(const View *view, int tile) {
     return hypot(center[0] - view->camera.lookat[0], center[1] - view->camera.lookat[1]);
 }
 
-/* A slot for the tile: a free one, else that of the tile farthest away (its heights stay in the
- * relief). */
+/* A slot for the tile: a free one, otherwise that of the tile farthest away, whose heights remain
+ * in the relief. */
 static Slot *slot_take(View *view, int tile) {
     Slot *best = NULL;
     double farthest = tile_distance(view, tile);
@@ -428,7 +426,8 @@ static void draw_tile(View *view, int tile) {
              slot ? slot->material : view->flat_material[look]);
 }
 
-/* Four plates around the tiles: the floor must not lie under them, prints would show through. */
+/* Draws the floor as four plates around the tiles. It must not lie under them, because it would
+ * cover the imprints. */
 static void draw_floor(View *view, double x0, double x1, double y0, double y1) {
     double z = relief_low(view->relief), far = VIEW_FLOOR, cx = 0.5 * (x0 + x1),
            cy = 0.5 * (y0 + y1);
@@ -468,7 +467,7 @@ static void draw_ground(View *view) {
 
 /* ---- frame ---- */
 
-/* Share of the way to its target that a camera with this lag goes in one frame. */
+/* Share of the distance to its target that a camera with this time constant moves in one frame. */
 static double camera_share(const View *view, double lag) {
     return 1.0 - exp(-1.0 / (view->def.rate * lag));
 }
@@ -562,7 +561,8 @@ static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     mjr_label(label, mjFONT_NORMAL, "0", 0.12F, 0.13F, 0.15F, 1, 0.9F, 0.9F, 0.9F, &view->context);
 }
 
-/* Directional lights throw shadows only near their own position: they walk with the camera. */
+/* Moves the lights with the camera, because directional lights cast shadows only near their
+ * position. */
 static void move_lights(View *view) {
     for (int i = 0; i < view->scene.nlight; i++) {
         mjvLight *light = &view->scene.lights[i];
@@ -574,8 +574,8 @@ static void move_lights(View *view) {
     }
 }
 
-/* The feet once more from near the ground, in the upper right corner: there one sees them sink. No
- * shadows: a second shadow pass costs more than the rest of this small picture. */
+/* A close-up of the feet in the upper right corner, which shows how they sink. It has no shadows,
+ * because a second shadow pass costs more than the rest of this small picture. */
 static void draw_closeup(View *view, mjrRect viewport, const RobotSim *sim) {
     double middle[2];
     feet_middle(view, sim, middle);
@@ -588,7 +588,7 @@ static void draw_closeup(View *view, mjrRect viewport, const RobotSim *sim) {
     camera->lookat[2] =
         relief_height_at(view->relief, camera->lookat[0], camera->lookat[1]) + VIEW_CLOSE_HEIGHT;
     camera->azimuth = view->camera.azimuth - VIEW_CLOSE_TURN;
-    /* a third of the width: the robot stands in the middle, and its head must stay in sight */
+    /* a third of the width, so that the robot in the middle is not covered */
     const int width = viewport.width / 3, height = viewport.height / 3;
     mjrRect box = {viewport.width - width - 10, viewport.height - height - 10, width, height};
     mjrRect frame = {box.left - 2, box.bottom - 2, box.width + 4, box.height + 4};

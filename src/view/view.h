@@ -35,8 +35,8 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
 void view_destroy(View *view);
 const char *view_backend(const View *view); /* "EGL", "OSMesa" or "GLFW" */
 
-/* Moves the visible ground to the feet. Call it every policy step or so: a print made between two
- * frames must stay. */
+/* Presses the feet into the visible ground. Call it about once per policy step, so that imprints
+ * made between two frames appear. */
 void view_observe(View *view, const RobotSim *sim);
 /* Draws one frame. */
 void view_frame(View *view, const RobotSim *sim, const ViewInfo *info);

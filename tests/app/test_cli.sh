@@ -67,7 +67,7 @@ expect 0 'ground model con_spring' "$mild" eval --model con_spring --ground sand
 grep -q '"model":.*"con_spring"' rival.json || fail "rival.json"
 bad "leave out --model" "$mild" press --ground snow --model ecc_spring
 expect 0 'snow' "$mild" press --ground snow --depth 0.1
-expect 0 'print left 0.0 mm' "$mild" press --ground sand_loose --model hunt_crossley
+expect 0 'imprint 0.0 mm' "$mild" press --ground sand_loose --model hunt_crossley
 expect 0 'clay .*1/1 ' "$mild" eval --ground clay --speed 0.3 --trials 1 --seconds 0.2
 expect 0 'hunt_crossley' "$mild" eval --model hunt_crossley --ground sand_loose --trials 1 --seconds 0.2
 expect 0 'bekker' "$mild" eval --model bekker --ground sand_loose --trials 1 --seconds 0.2
@@ -116,7 +116,7 @@ expect 0 'foam45 .* 2/2' "$mild" eval --robot go1 --controller stand --ground fo
 grep -q '"controller":.*"stand"' go1.json && grep -q '"robot":.*"go1"' go1.json || fail "go1.json: $(cat go1.json)"
 expect 0 '' "$mild" train --robot go1 --out go1 --train.envs=4 --train.iterations=1 --ppo.steps=4 --ppo.minibatches=1
 grep -qx 'robot = go1' go1/config.ini || fail "config.ini does not keep the robot"
-bad "of robot go1, not of sa01" "$mild" eval --policy go1/policy.safetensors --trials 1 --seconds 0.1
+bad "for robot go1, not for sa01" "$mild" eval --policy go1/policy.safetensors --trials 1 --seconds 0.1
 expect 0 '' "$mild" eval --config go1/config.ini --policy go1/policy.safetensors --trials 1 --seconds 0.1 --ground foam45
 bad "its robot is 'go1', this run's is 'sa01'" "$mild" train --resume --robot sa01 --out go1 --train.iterations=2
 expect 0 'MuJoCo' "$mild" info build

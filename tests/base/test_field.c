@@ -146,7 +146,8 @@ static void test_texts(void **state) {
     (void)state;
     assert_string_equal(taken(NOTE, "a b,c", "a b,c").note, "a b,c");
     assert_string_equal(taken(NOTE, "", "").note, "");
-    refused(NOTE, "abcdef", MILD_ERROR_RANGE, "robot.note: text of 6 characters, at most 5 fit");
+    refused(NOTE, "abcdef", MILD_ERROR_RANGE,
+            "robot.note: the text has 6 characters, but at most 5 fit");
 }
 
 static void test_names(void **state) {
@@ -206,7 +207,7 @@ static void test_check(void **state) {
     memset(def.note, 'n', sizeof def.note);
     def.kind = 0;
     assert_int_equal(mild_fields_check(fields, FIELDS, &def, "x", &error), MILD_ERROR_RANGE);
-    assert_string_equal(error.text, "x.note has no end within 6 characters");
+    assert_string_equal(error.text, "x.note is not terminated within 6 characters");
 }
 
 static void test_find(void **state) {

@@ -84,8 +84,8 @@ static double pressure(const MildMaterial *m, double depth) {
     return 1e-3 * mild_element_law(m, KIT_PITCH, depth).force / (KIT_PITCH * KIT_PITCH);
 }
 
-/* Wong 2008, table 2.3, and the Lunar Sourcebook: angle of friction, cohesion. Friction is
- * held by shear alone, over a bed that is out of reach. */
+/* Wong 2008, table 2.3, and the Lunar Sourcebook: friction angle and cohesion. Friction is held by
+ * shear alone, over a bed that is out of reach. */
 static void test_soils(void **state) {
     (void)state;
     static const struct {

@@ -219,7 +219,8 @@ static void test_reading(void **state) {
     refuse("height = 0.7", "height = 0.001", ":8: ");
     refuse("[joints]\n", "height = 0.8\n[joints]\n",
            ":16: [robot] height was already set on line 8");
-    refuse("height = 0.7 ; [m]\n", "height = 0.7\n  0.8\n", ":9: an indented line goes on with");
+    refuse("height = 0.7 ; [m]\n", "height = 0.7\n  0.8\n",
+           ":9: an indented line continues the list");
     refuse("[robot]\n", "key = 1\n[robot]\n", ":3: ");
     refuse_text("", "[robot] name: is missing");
 }

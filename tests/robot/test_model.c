@@ -437,7 +437,7 @@ static void test_refusals(void **unused) {
     refuse("robot.ini", "\n[foot.right]", "\n[foot.a]\n[foot.b]\n[foot.c]\n[foot.right]",
            "more than 4 feet");
     refuse("robot.ini", "pitch = 0.0195", "pitch = 0.0195\npitch = 0.02", "already set");
-    refuse("robot.ini", "feet_least = 0.10        ; [m]", "feet_least = 0.10\n  1 2", "no list");
+    refuse("robot.ini", "feet_least = 0.10        ; [m]", "feet_least = 0.10\n  1 2", "not a list");
     refuse("robot.ini", "kp          =  50", "kp          =  50 50", "kp: 13 numbers for 12");
     refuse("robot.ini", "offset = 0.5", "offset = 1", "[foot.right] offset: must be below 1");
     refuse("robot.ini", "mirror = right", "mirror = left", "[foot.right] mirror");

@@ -77,7 +77,7 @@ static void another_robots_policy_is_refused(void **unused) {
     assert_int_equal(controller_learned(POLICY, robot[1], NULL, 1, &controller, &error),
                      MILD_ERROR_FORMAT);
     print_message("%s\n", error.text);
-    assert_non_null(strstr(error.text, "of robot go1, not of sa01"));
+    assert_non_null(strstr(error.text, "for robot go1, not for sa01"));
     assert_null(strchr(error.text, '\n'));
     assert_null(controller.self);
     assert_int_equal(train_save(go1, CHECKPOINT, "test", &error), MILD_OK);
