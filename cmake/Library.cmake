@@ -1,12 +1,16 @@
-# libmild for other programs: a shared and a static library, and their installation. It carries the layer ground and,
-# of the layer base, what the public headers and the ground call. It depends on libc and libm only.
+# libmild for other programs: a shared and a static library, and their installation. It carries the layers ground and
+# batch and, of the layer base, what the public headers and the ground call. It depends on libc and libm only; with
+# MILD_CUDA, whose kernels it then carries too, on what the CUDA runtime needs.
 # MILD_MARCH decides where the installed library runs: `native` is this machine only, x86-64-v3 any of the last decade.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-set_target_properties(layer_base layer_ground PROPERTIES C_VISIBILITY_PRESET hidden) # MILD_API_BEGIN makes visible
-set(mild_objects $<TARGET_OBJECTS:layer_ground>
+set_target_properties(layer_base layer_ground layer_batch PROPERTIES C_VISIBILITY_PRESET hidden) # MILD_API_BEGIN makes visible
+set(mild_objects $<TARGET_OBJECTS:layer_ground> $<TARGET_OBJECTS:layer_batch>
   $<FILTER:$<TARGET_OBJECTS:layer_base>,INCLUDE,/\(error|field|text\)\\.c\\.o$>)
+if(MILD_CUDA)
+  list(APPEND mild_objects $<TARGET_OBJECTS:batch_device>)
+endif()
 add_library(mild_shared SHARED ${mild_objects})
 if(NOT MILD_SANITIZE AND NOT MILD_FUZZ) # a call of anything else in base does not link
   target_link_options(mild_shared PRIVATE -Wl,--no-undefined)
@@ -19,7 +23,7 @@ if(CMAKE_OBJCOPY)
   add_custom_command(OUTPUT ${mild_object}
     COMMAND ${CMAKE_C_COMPILER} -r -nostdlib -o ${mild_object}.all ${mild_objects}
     COMMAND ${CMAKE_OBJCOPY} --localize-hidden ${mild_object}.all ${mild_object}
-    DEPENDS layer_base layer_ground ${mild_objects} COMMAND_EXPAND_LISTS VERBATIM)
+    DEPENDS layer_base layer_ground layer_batch ${mild_objects} COMMAND_EXPAND_LISTS VERBATIM)
   set_source_files_properties(${mild_object} PROPERTIES EXTERNAL_OBJECT TRUE GENERATED TRUE)
   add_library(mild_static STATIC ${mild_object})
 else()
@@ -31,7 +35,7 @@ set_target_properties(mild_shared PROPERTIES EXPORT_NAME mild VERSION ${PROJECT_
 foreach(library mild_shared mild_static)
   set_target_properties(${library} PROPERTIES OUTPUT_NAME mild LINKER_LANGUAGE C)
   target_include_directories(${library} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  target_link_libraries(${library} PUBLIC m)
+  target_link_libraries(${library} PUBLIC m $<$<BOOL:${MILD_CUDA}>:CUDA::cudart_static> $<$<BOOL:${MILD_CUDA}>:stdc++>)
 endforeach()
 
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/mild)

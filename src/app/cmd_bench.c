@@ -26,6 +26,7 @@ static const struct {
     {"solver", bench_solver,
      "newton compared with the paper's gauss_seidel sweeps, at the same error"},
     {"walk", bench_walk, "the same as step, along a walk of the shipped policy"},
+    {"batch", bench_batch, "the contact solver in batches, on train.device, along that walk"},
     {"train", bench_train, "policy steps per second in training, and how the time is spent"},
 };
 enum { BENCHES = sizeof benches / sizeof *benches };

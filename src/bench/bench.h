@@ -16,6 +16,8 @@ MildStatus bench_elements(const ExperimentDef *def, BenchReport *report, MildErr
 MildStatus bench_solver(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The physics steps of a walk of the shipped policy, with our contact and with the engine's own. */
 MildStatus bench_walk(const ExperimentDef *def, BenchReport *report, MildError *error);
+/* The ground in batches on train.device: steps per second along a walk, and how near in float. */
+MildStatus bench_batch(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Training as a whole, and how its time is spent. */
 MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Bytes held by a training run of train.envs robots. */

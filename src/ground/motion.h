@@ -6,14 +6,29 @@
 #ifndef MILD_GROUND_MOTION_H
 #define MILD_GROUND_MOTION_H
 
+#include "ground/real.h"
+
 typedef struct {
-    double x[3]; /* [m/s], [1/s], [1/s] */
-    double y[3]; /* the same */
-    double z[3]; /* the same */
+    Real x[3]; /* [m/s], [1/s], [1/s] */
+    Real y[3]; /* the same */
+    Real z[3]; /* the same */
 } Motion;
 
+/* The field of a foot with the twist V (linear, angular). arm: the point (0, 0, z) of the frame's
+ * sole plane, then its x and y axes, world. */
+MILD_HD Motion motion_of(const Real arm[3][3], const Real *V) {
+    Motion m;
+    for (int k = 0; k < 3; k++) {
+        const Real *q = arm[k];
+        m.x[k] = V[4] * q[2] - V[5] * q[1] + (k ? 0 : V[0]);
+        m.y[k] = V[5] * q[0] - V[3] * q[2] + (k ? 0 : V[1]);
+        m.z[k] = V[3] * q[1] - V[4] * q[0] + (k ? 0 : V[2]);
+    }
+    return m;
+}
+
 /* One component at a point. */
-static inline double motion_at(const double m[3], double x, double y) {
+MILD_HD Real motion_at(const Real m[3], Real x, Real y) {
     return m[0] + m[1] * x + m[2] * y;
 }
 

@@ -90,14 +90,7 @@ static inline int foot_end(const FootScratch *foot) {
 
 /* The velocity field of a foot with the twist V. */
 static inline Motion foot_motion(const FootScratch *foot, const double *V) {
-    Motion m;
-    for (int k = 0; k < 3; k++) {
-        const double *q = foot->arm[k];
-        m.x[k] = V[4] * q[2] - V[5] * q[1] + (k ? 0.0 : V[0]);
-        m.y[k] = V[5] * q[0] - V[3] * q[2] + (k ? 0.0 : V[1]);
-        m.z[k] = V[3] * q[1] - V[4] * q[0] + (k ? 0.0 : V[2]);
-    }
-    return m;
+    return motion_of(foot->arm, V);
 }
 
 /* p: vector from the ankle to the element of a slot, world axes. */

@@ -1,0 +1,111 @@
+/* Soft ground under many robots at once: the contact step of mild/ground.h, in float, on a GPU or
+ * on the CPU, from one text.
+ *
+ * Arrays of all robots lie behind each other, in the memory of the batch's device: a simulator on
+ * the GPU hands over its own. A step is
+ *
+ *     A, V_free                    of all robots, by the engine (mild/ground.h)
+ *     mild_batch_step(...)         wrenches on the feet and twists after the step
+ *     tau += J^T wrench            then integrate
+ *
+ * Values are those of mild_ground_solve and mild_ground_advance within the rounding of float: where
+ * those solve a step to 1e-9, forces differ by some 1e-5 of their size. Steps so violent that plain
+ * Newton steps do not solve them are left at the best point seen, with its residual.
+ *
+ * One robot stands on one material and level ground. Not there yet: maps, patches and mixtures of
+ * materials, imprints, and the models whose law depends on the direction of motion (ecc_quasi,
+ * ecc_quasi_3d, bekker); they are refused by name.
+ *
+ * Thread safety: a batch belongs to one thread at a time, and on a GPU to one stream. SI units. */
+#ifndef MILD_BATCH_H
+#define MILD_BATCH_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "mild/ground.h"
+
+MILD_API_BEGIN
+
+#define MILD_BATCH_HOST (-1) /* the CPU in the place of a device */
+
+/* Ground under `robots` robots; see mild_batch_create. */
+typedef struct MildBatch MildBatch;
+
+/* What a batch is made from. */
+typedef struct {
+    int robots;                   /* at least 1 */
+    int feet;                     /* of each, 1 .. MILD_FEET_MAX */
+    const MildSole *const *soles; /* [feet], not kept */
+    double dt;                    /* [s] above 0 */
+    double tolerance;             /* [-] of the residual; 0: 1e-4 */
+    int max_iterations;           /* bound of Newton steps; 0: 20 */
+    int device;                   /* a CUDA device, from 0, or MILD_BATCH_HOST */
+} MildBatchDef;
+
+/* What the engine knows before the step. Arrays in the memory of the device. */
+typedef struct {
+    const float *position;        /* [robots][feet][3] [m] reference point, world */
+    const float *rotation;        /* [robots][feet][9] [-] foot to world, row major */
+    const float *velocity;        /* [robots][feet][6] [m/s, rad/s] twist: linear, angular */
+    const float *inverse_inertia; /* [robots][6 feet][6 feet] A; see MildContactInput */
+    const float *free_velocity;   /* [robots][6 feet] [m/s, rad/s] V_free */
+    const int32_t *material;      /* [robots] index of mild_batch_set_materials; NULL: 0 */
+    const float *height;          /* [robots] [m] of the surface; NULL: 0 */
+} MildBatchInput;
+
+/* Sums over the loaded elements of a foot, as in MildFootResult. */
+typedef struct {
+    float pressure_center[3]; /* [m] world; 0 without load */
+    float depth_max;          /* [m] */
+    float depth_mean;         /* [m] */
+    float area;               /* [m^2] */
+} MildBatchFoot;
+
+/* Where the results go. Arrays in the memory of the device; those from `foot` on may be NULL. */
+typedef struct {
+    float *wrench;       /* [robots][feet][6] [N, N m] force, torque at the reference point */
+    float *velocity;     /* [robots][feet][6] [m/s, rad/s] twists after the step */
+    MildBatchFoot *foot; /* [robots][feet] */
+    float *elements;     /* [robots][4][feet][stride] depth [m], normal, tangent_x, tangent_y [N] of
+                            the elements, in their order; stride: mild_batch_stride */
+    float *residual;     /* [robots] [-] relative, in the metric of kinetic energy; 0 in the air */
+    int32_t *iterations; /* [robots] Newton steps; 0 in the air */
+} MildBatchOutput;
+
+/* Makes a batch on which nothing has stepped yet, with the material sand_loose. NULL, with the
+ * field's name and the remedy in *error, when a number is out of range, when a sole has more
+ * elements than a warp takes (256, 128 or 64 with one, two or more feet), without the device or
+ * memory. This build may be without CUDA: then only MILD_BATCH_HOST is there. */
+MildBatch *mild_batch_create(const MildBatchDef *def, MildError *error);
+/* Frees a batch; NULL is allowed. Waits for the device. */
+void mild_batch_destroy(MildBatch *batch);
+/* [B] Memory of one robot on the device. */
+size_t mild_batch_robot_bytes(const MildBatch *batch);
+/* Elements of a foot, rounded up to whole lanes: distance of feet in MildBatchOutput.elements. */
+int mild_batch_stride(const MildBatch *batch);
+
+/* Replaces the table of materials that MildBatchInput.material points into. materials: [count], of
+ * any model that is said to be there above, checked by mild_material_check. Waits for the device.
+ * Fails with the table unchanged. */
+MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
+                                    MildError *error);
+
+/* Solves a contact step of every robot and, with `advance`, moves the memory of the ground to its
+ * end: do that once for each step that the engine keeps. On a GPU it only puts the work into
+ * `stream` (a cudaStream_t; NULL: the default one), allocates nothing and waits for nothing, so it
+ * may be captured in a graph. Fails when the device does. */
+MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
+                           const MildBatchOutput *output, int advance, void *stream,
+                           MildError *error);
+/* Sets what the ground under robot 0 .. robots - 1 remembers to what `ground`, of the same soles,
+ * remembers, to go on with a simulation that began on the CPU. Waits for the device. Fails, with
+ * the memory unchanged, when the ground has other soles, imprints or several materials. */
+MildStatus mild_batch_load(MildBatch *batch, int robot, const MildGround *ground, MildError *error);
+/* Robots whose flag is not 0 forget everything, as after they were moved to another place. which:
+ * [robots] in the memory of the device; NULL: all. In `stream`, as mild_batch_step. */
+MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, void *stream, MildError *error);
+
+MILD_API_END
+
+#endif

@@ -1,0 +1,63 @@
+/* Private to the layer batch: a batch, and what a device does for it. */
+#ifndef MILD_BATCH_PRIVATE_H
+#define MILD_BATCH_PRIVATE_H
+
+#include "batch/material.h"
+#include "mild/batch.h"
+
+/* The same for all robots; in float whatever Real is. */
+typedef struct {
+    int robots;
+    int feet;
+    int groups; /* of lanes in a warp: feet rounded up to a power of two */
+    int per;    /* elements of a lane */
+    int stride; /* elements of a foot in memory */
+    float dt, tolerance;
+    int limit;
+    int elements[MILD_FEET_MAX]; /* of a sole */
+    float z[MILD_FEET_MAX];      /* [m] of its plane */
+    float area[MILD_FEET_MAX];   /* [m^2] of an element */
+} BatchShape;
+
+/* Where a batch keeps what; on its device. */
+typedef struct {
+    float *centers;             /* [2][feet][stride] [m] x and y of the elements */
+    MaterialNumbers *materials; /* [count][feet] */
+    float *memory;              /* [robots][CONTACT_MEMORY][groups][stride] */
+} BatchArrays;
+
+struct MildBatch {
+    BatchShape shape;
+    BatchArrays arrays;
+    int device;
+    int material_count;
+    int curves;                  /* LawCurve bits of all materials */
+    double pitch[MILD_FEET_MAX]; /* [m] */
+};
+
+/* The memory of a ground as that of one robot, [batch_memory_numbers]. */
+void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory);
+
+/* [numbers] of a robot's memory. */
+size_t batch_memory_numbers(const BatchShape *shape);
+
+/* ---- the CPU: host.c ---- */
+void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
+               const MildBatchOutput *output, int advance);
+
+/* ---- a GPU: device.cu, or without_cuda.c ---- */
+/* Opens the device. */
+MildStatus device_open(int device, MildError *error);
+/* Device memory, all 0; NULL with a message that says how much was asked for. */
+void *device_alloc(int device, size_t bytes, MildError *error);
+void device_free(int device, void *memory);
+/* Copies to, from or within the device and waits. */
+MildStatus device_copy(int device, void *to, const void *from, size_t bytes, MildError *error);
+/* Until all that was asked of the device is done. */
+MildStatus device_wait(int device, MildError *error);
+MildStatus device_step(const MildBatch *batch, const MildBatchInput *input,
+                       const MildBatchOutput *output, int advance, void *stream, MildError *error);
+MildStatus device_reset(const MildBatch *batch, const uint8_t *which, void *stream,
+                        MildError *error);
+
+#endif

@@ -1,0 +1,128 @@
+/* One text for a warp of a GPU and for the CPU.
+ *
+ * LANES lanes work together on one robot. On a GPU they are the threads of a warp; on the CPU one
+ * thread does the work of all. A function of this kind is marked LANE_FN and is a sequence of
+ * blocks:
+ *
+ *     EACH_LANE(l) {
+ *         x[l] = f(LANE(l), ...);      runs in every lane: at once on a GPU, in turn on the CPU
+ *     }
+ *     sum = lane_sum(x);               between blocks: what passes from lane to lane
+ *
+ * A value that differs between lanes is an array x[LANE_COPIES], used as x[l] in blocks. A GPU
+ * keeps one copy, in the registers of the thread, and l is 0. The CPU keeps LANES copies. Any other
+ * variable has the same value in all lanes. Branches and loops outside of blocks may depend on such
+ * values only.
+ *
+ * Groups: the lanes are divided into groups of `size`, a power of two, such as the lanes that work
+ * on one foot. Sums are taken in the same order on both sides, so that they differ only as the
+ * arithmetic does. */
+#ifndef MILD_BATCH_LANES_H
+#define MILD_BATCH_LANES_H
+
+#include "ground/real.h"
+
+enum { LANES = 32 };
+
+#ifdef __CUDACC__
+
+#define LANE_FN static __device__ __forceinline__
+#define LANE_COPIES 1
+#define EACH_LANE(l) for (int l = 0; l < 1; l++)
+#define LANE(l) ((int)(threadIdx.x % LANES))
+#define LANE_UNROLL _Pragma("unroll")
+
+/* Makes what each lane wrote to memory visible to the others. */
+LANE_FN void lanes_meet(void) {
+    __syncwarp();
+}
+
+/* x of lane `from`. */
+LANE_FN Real lane_read(const Real *x, int from) {
+    return __shfl_sync(0xffffffffu, x[0], from);
+}
+
+/* To each lane, x of lane `at` of its group. y may be x. */
+LANE_FN void group_read(const Real *x, int at, int size, Real *y) {
+    y[0] = __shfl_sync(0xffffffffu, x[0], at, size);
+}
+
+/* To each lane, the sum over its group. */
+LANE_FN void group_sum(Real *x, int size) {
+    LANE_UNROLL
+    for (int step = size / 2; step > 0; step /= 2) {
+        x[0] += __shfl_xor_sync(0xffffffffu, x[0], step);
+    }
+}
+
+/* To each lane, the largest of its group. */
+LANE_FN void group_max(Real *x, int size) {
+    LANE_UNROLL
+    for (int step = size / 2; step > 0; step /= 2) {
+        x[0] = real_max(x[0], __shfl_xor_sync(0xffffffffu, x[0], step));
+    }
+}
+
+#else
+
+#define LANE_FN static inline
+#define LANE_COPIES LANES
+#define EACH_LANE(l) for (int l = 0; l < LANES; l++)
+#define LANE(l) (l)
+#define LANE_UNROLL
+
+LANE_FN void lanes_meet(void) {
+}
+
+LANE_FN Real lane_read(const Real *x, int from) {
+    return x[from];
+}
+
+LANE_FN void group_read(const Real *x, int at, int size, Real *y) {
+    for (int begin = 0; begin < LANES; begin += size) {
+        const Real value = x[begin + at];
+        for (int l = begin; l < begin + size; l++) {
+            y[l] = value;
+        }
+    }
+}
+
+LANE_FN void group_sum(Real *x, int size) {
+    for (int step = size / 2; step > 0; step /= 2) {
+        Real sum[LANES];
+        for (int l = 0; l < LANES; l++) {
+            sum[l] = x[l] + x[l ^ step];
+        }
+        for (int l = 0; l < LANES; l++) {
+            x[l] = sum[l];
+        }
+    }
+}
+
+LANE_FN void group_max(Real *x, int size) {
+    for (int step = size / 2; step > 0; step /= 2) {
+        Real most[LANES];
+        for (int l = 0; l < LANES; l++) {
+            most[l] = real_max(x[l], x[l ^ step]);
+        }
+        for (int l = 0; l < LANES; l++) {
+            x[l] = most[l];
+        }
+    }
+}
+
+#endif
+
+/* The sum over all lanes. x is overwritten. */
+LANE_FN Real lane_sum(Real *x) {
+    group_sum(x, LANES);
+    return x[0];
+}
+
+/* The largest of all lanes. x is overwritten. */
+LANE_FN Real lane_max(Real *x) {
+    group_max(x, LANES);
+    return x[0];
+}
+
+#endif

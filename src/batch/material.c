@@ -1,0 +1,34 @@
+#include "batch/material.h"
+
+#include "ground/begin.h"
+#include "ground/models.h"
+
+#define MATERIAL_LAW_INDEX(name) MATERIAL_LAW_##name,
+enum { LAW_NUMBERS(MATERIAL_LAW_INDEX) MATERIAL_LAW_COUNT };
+_Static_assert(MATERIAL_LAW_COUNT == MATERIAL_LAW_NUMBERS, "all numbers");
+
+MildStatus material_numbers(const MildMaterial *material, double pitch, int index,
+                            MaterialNumbers *numbers, MildError *error) {
+    MildError cause = {0};
+    if (mild_material_check(material, &cause) != MILD_OK) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: material %d: %s", index, cause.text);
+    }
+    if (model_row(material->model)->direction) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "batch: material %d: the model %s is not there in batches yet; use "
+                         "mild/ground.h, or another model",
+                         index, mild_model_names[material->model]);
+    }
+    const Law law = law_of(material, pitch);
+    int n = 0;
+#define MATERIAL_LAW_STORE(name) numbers->law[n++] = (float)law.name;
+    LAW_NUMBERS(MATERIAL_LAW_STORE)
+    numbers->recovery = (float)law_recovery(&law, material->recovery);
+    numbers->mu = (float)material->mu;
+    numbers->k_drift = (float)material->k_drift;
+    numbers->b_drift = (float)material->b_drift;
+    numbers->exit_drag = (float)law_exit_drag(&law);
+    numbers->entry_drag = (float)law_entry_drag(&law);
+    numbers->curves = law_curves(&law);
+    return MILD_OK;
+}

@@ -1,0 +1,21 @@
+/* A material as a batch keeps it: the numbers of ContactMaterial, in float whatever Real is. The
+ * laws are derived in double. */
+#ifndef MILD_BATCH_MATERIAL_H
+#define MILD_BATCH_MATERIAL_H
+
+#include "mild/ground.h"
+
+#define MATERIAL_LAW_NUMBERS 13
+
+typedef struct {
+    float law[MATERIAL_LAW_NUMBERS];                             /* in the order of LAW_NUMBERS */
+    float recovery, mu, k_drift, b_drift, exit_drag, entry_drag; /* as in ContactMaterial */
+    int curves;
+} MaterialNumbers;
+
+/* Under an element of area pitch^2. Fails for a material that a batch does not know yet, and for
+ * one that mild_material_check refuses. index: of the material, for the message. */
+MildStatus material_numbers(const MildMaterial *material, double pitch, int index,
+                            MaterialNumbers *numbers, MildError *error);
+
+#endif

@@ -1,0 +1,28 @@
+/* A contact step of one robot in double, whatever Real the text under test is compiled for. */
+#ifndef CONTACT_CASE_H
+#define CONTACT_CASE_H
+
+enum { CASE_FEET = 4, CASE_ELEMENTS = 256, CASE_MEMORY = 9, CASE_LAW = 13 };
+
+typedef struct {
+    int feet, groups, per;
+    int elements[CASE_FEET];
+    double x[CASE_FEET][CASE_ELEMENTS], y[CASE_FEET][CASE_ELEMENTS], z[CASE_FEET];
+    double dt, tolerance, height;
+    int limit, curves;
+    double law[CASE_LAW], recovery, mu, k_drift, b_drift, exit_drag, entry_drag;
+    double position[3 * CASE_FEET], rotation[9 * CASE_FEET], velocity[6 * CASE_FEET];
+    double inverse_inertia[36 * CASE_FEET * CASE_FEET], free_velocity[6 * CASE_FEET];
+    double memory[CASE_MEMORY][CASE_FEET][CASE_ELEMENTS]; /* in and out */
+    /* out */
+    double wrench[6 * CASE_FEET], after[6 * CASE_FEET], residual;
+    double foot[CASE_FEET][6];                   /* ContactFoot */
+    double element[4][CASE_FEET][CASE_ELEMENTS]; /* as ContactResult.elements */
+    int iterations;
+} ContactCase;
+
+/* Solves and advances. */
+void contact_case_double(ContactCase *c);
+void contact_case_float(ContactCase *c);
+
+#endif

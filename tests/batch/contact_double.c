@@ -1,0 +1,2 @@
+#define CONTACT_CASE contact_case_double
+#include "contact_case.inc"

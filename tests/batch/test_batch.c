@@ -1,0 +1,454 @@
+/* mild/batch.h on the CPU and, where there is one, on a GPU: against mild/ground.h, against each
+ * other, and what it refuses. */
+#include "batch/batch.h"
+#include "ground/ground_kit.h"
+
+enum { ROBOTS = 96, STEPS = 30, MATERIALS = 12, ROWS = 6 * MILD_FEET_MAX };
+
+static MildSole *left, *right, *center, *plate;
+
+static int open_soles(void **state) {
+    (void)state;
+    left = kit_sole(0, 77);
+    right = kit_sole(1, 77);
+    center = mild_sole_concentric(left, NULL);
+    plate = kit_plate(4, 5);
+    return 0;
+}
+
+static int close_soles(void **state) {
+    (void)state;
+    MildSole *const all[] = {left, right, center, plate};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        mild_sole_destroy(all[i]);
+    }
+    return 0;
+}
+
+static int has_device(void) {
+    MildError error = {0};
+    const int there = device_open(0, &error) == MILD_OK;
+    if (!there) {
+        print_message("no device: %s\n", error.text);
+    }
+    return there;
+}
+
+/* ---- robots that walk at random, by mild/ground.h ---- */
+
+typedef struct {
+    const char *name;
+    int feet;
+    MildModel model;
+} Shape;
+
+static const Shape shapes[] = {
+    {"two feet", 2, MILD_MODEL_MILD},
+    {"one foot", 1, MILD_MODEL_MILD},
+    {"four feet", 4, MILD_MODEL_MILD},
+    {"three feet", 3, MILD_MODEL_MILD},
+    {"con_cone", 2, MILD_MODEL_CON_CONE},
+    {"ecc_spring", 2, MILD_MODEL_ECC_SPRING},
+    {"hunt_crossley", 2, MILD_MODEL_HUNT_CROSSLEY},
+};
+enum { SHAPES = sizeof shapes / sizeof *shapes };
+
+typedef struct {
+    int feet;
+    const MildSole *soles[MILD_FEET_MAX];
+    MildMaterial material[MATERIALS];
+    Kit kit[ROBOTS];
+    uint64_t random;
+} Crowd;
+
+/* What goes to a batch and what comes back, of all robots. */
+typedef struct {
+    float position[ROBOTS * 3 * MILD_FEET_MAX], rotation[ROBOTS * 9 * MILD_FEET_MAX];
+    float velocity[ROBOTS * ROWS], inverse_inertia[ROBOTS * ROWS * ROWS];
+    float free_velocity[ROBOTS * ROWS], height[ROBOTS];
+    int32_t material[ROBOTS];
+    float wrench[ROBOTS * ROWS], after[ROBOTS * ROWS], residual[ROBOTS];
+    int32_t iterations[ROBOTS];
+    MildBatchFoot foot[ROBOTS * MILD_FEET_MAX];
+    float elements[ROBOTS * 4 * MILD_FEET_MAX * 256];
+    uint8_t which[ROBOTS];
+} Arrays;
+
+static void crowd_open(Crowd *crowd, const Shape *shape) {
+    static const double heights[3] = {0.0, 0.3, -0.2};
+    const int concentric = mild_model_is_concentric(shape->model);
+    crowd->feet = shape->feet;
+    crowd->random = 5;
+    for (int f = 0; f < shape->feet; f++) {
+        crowd->soles[f] = concentric ? center : shape->feet > 2 ? plate : f ? right : left;
+    }
+    for (int m = 0; m < MATERIALS; m++) {
+        crowd->material[m] = kit_material(&crowd->random);
+        if (shape->model != MILD_MODEL_MILD) {
+            MildMaterial sand;
+            mild_material_preset(mild_material_preset_name(m % mild_material_preset_count()),
+                                 &sand);
+            assert_int_equal(
+                mild_model_match(shape->model, &sand, left, 150.0, &crowd->material[m], NULL),
+                MILD_OK);
+        }
+    }
+    for (int r = 0; r < ROBOTS; r++) {
+        Kit *kit = &crowd->kit[r];
+        kit_open(kit, shape->feet, (MildSole *)crowd->soles[0],
+                 (MildSole *)crowd->soles[shape->feet > 1], &crowd->material[r % MATERIALS], 5e-3);
+        kit_random_state(kit, &crowd->random);
+        kit->terrain.height = heights[r % 3];
+        for (int f = 0; f < kit->feet; f++) {
+            kit->input.position[f][2] += heights[r % 3] + 0.01;
+            kit->mass[f] = kit_uniform(&crowd->random, 3.0, 40.0);
+            kit->inertia[f] = kit->mass[f] * kit_uniform(&crowd->random, 0.02, 0.1);
+        }
+    }
+}
+
+static void crowd_close(Crowd *crowd) {
+    for (int r = 0; r < ROBOTS; r++) {
+        kit_close(&crowd->kit[r]);
+    }
+}
+
+static void to_float(float *to, const double *from, int count) {
+    for (int i = 0; i < count; i++) {
+        to[i] = (float)from[i];
+    }
+}
+
+/* Solves the next step of all robots by mild/ground.h, and hands the problem over. */
+static void crowd_solve(Crowd *crowd, Arrays *a) {
+    const int feet = crowd->feet, rows = 6 * feet;
+    for (int r = 0; r < ROBOTS; r++) {
+        Kit *kit = &crowd->kit[r];
+        double force[MILD_FEET_MAX][3];
+        for (int f = 0; f < feet; f++) {
+            for (int k = 0; k < 3; k++) {
+                force[f][k] = kit->mass[f] * kit_uniform(&crowd->random, -4, k == 2 ? 8 : 4);
+            }
+        }
+        kit_inverse_inertia(kit);
+        kit_free(kit, (const double(*)[3])force);
+        kit_solve(kit);
+        to_float(a->position + r * 3 * feet, kit->input.position[0], 3 * feet);
+        to_float(a->rotation + r * 9 * feet, kit->input.rotation[0], 9 * feet);
+        to_float(a->velocity + r * rows, kit->input.velocity[0], rows);
+        to_float(a->inverse_inertia + r * rows * rows, kit->input.inverse_inertia, rows * rows);
+        to_float(a->free_velocity + r * rows, kit->input.free_velocity, rows);
+        a->height[r] = (float)kit->terrain.height;
+        a->material[r] = r % MATERIALS;
+    }
+}
+
+static void crowd_advance(Crowd *crowd) {
+    for (int r = 0; r < ROBOTS; r++) {
+        kit_advance(&crowd->kit[r]);
+    }
+}
+
+/* ---- a batch whose arrays lie on its device ---- */
+
+typedef struct {
+    MildBatch *batch;
+    Arrays *arrays; /* on the device */
+} Side;
+
+static void side_open(Side *side, const Crowd *crowd, int device) {
+    MildError error = {0};
+    const MildBatchDef def = {
+        .robots = ROBOTS, .feet = crowd->feet, .soles = crowd->soles, .dt = 5e-3, .device = device};
+    side->batch = mild_batch_create(&def, &error);
+    if (!side->batch || mild_batch_set_materials(side->batch, crowd->material, MATERIALS, &error)) {
+        fail_msg("%s", error.text);
+    }
+    side->arrays = device == MILD_BATCH_HOST ? calloc(1, sizeof(Arrays))
+                                             : device_alloc(device, sizeof(Arrays), &error);
+    assert_non_null(side->arrays);
+}
+
+static void side_copy(const Side *side, void *to, const void *from, size_t bytes) {
+    MildError error = {0};
+    if (side->batch->device == MILD_BATCH_HOST) {
+        memcpy(to, from, bytes);
+    } else if (device_copy(side->batch->device, to, from, bytes, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
+}
+
+static void side_close(Side *side) {
+    if (side->batch->device == MILD_BATCH_HOST) {
+        free(side->arrays);
+    } else {
+        device_free(side->batch->device, side->arrays);
+    }
+    mild_batch_destroy(side->batch);
+}
+
+/* Poisons the results, steps, and fetches all. */
+static void side_step(Side *side, Arrays *a, int advance) {
+    MildError error = {0};
+    memset(a->wrench, 0xff, sizeof *a - offsetof(Arrays, wrench));
+    side_copy(side, side->arrays, a, sizeof *a);
+    Arrays *d = side->arrays;
+    const MildBatchInput input = {d->position,      d->rotation, d->velocity, d->inverse_inertia,
+                                  d->free_velocity, d->material, d->height};
+    const MildBatchOutput output = {d->wrench,   d->after,    d->foot,
+                                    d->elements, d->residual, d->iterations};
+    if (mild_batch_step(side->batch, &input, &output, advance, NULL, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
+    side_copy(side, a, side->arrays, sizeof *a);
+}
+
+/* ---- errors ---- */
+
+typedef struct {
+    int count;
+    double error[ROBOTS * STEPS * SHAPES];
+} Errors;
+
+static int ascending(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void add_error(Errors *errors, const double *found, const double *wanted, int count) {
+    double apart = 0.0, size = 0.0;
+    for (int i = 0; i < count; i++) {
+        apart += (found[i] - wanted[i]) * (found[i] - wanted[i]);
+        size += wanted[i] * wanted[i];
+    }
+    errors->error[errors->count++] = sqrt(apart) / (sqrt(size) + 1.0);
+}
+
+static void check_errors(const char *name, Errors *errors, double median, double most) {
+    qsort(errors->error, (size_t)errors->count, sizeof *errors->error, ascending);
+    const double middle = errors->error[errors->count / 2];
+    const double high = errors->error[errors->count * 99 / 100];
+    print_message("%-36s %d steps: median %.1e, 99 %% %.1e, worst %.1e\n", name, errors->count,
+                  middle, high, errors->error[errors->count - 1]);
+    assert_true(middle < median && high < most); /* or not a number */
+}
+
+/* Forces of a step against the kits'. */
+static void against_ground(Errors *errors, const Crowd *crowd, const Arrays *a) {
+    for (int r = 0; r < ROBOTS; r++) {
+        double found[3 * MILD_FEET_MAX], wanted[3 * MILD_FEET_MAX];
+        if (!crowd->kit[r].result.converged || crowd->kit[r].result.iterations > 15) {
+            continue;
+        }
+        for (int i = 0; i < 3 * crowd->feet; i++) {
+            found[i] = a->wrench[6 * crowd->feet * r + i / 3 * 6 + i % 3];
+            wanted[i] = crowd->kit[r].result.foot[i / 3].force[i % 3];
+        }
+        add_error(errors, found, wanted, 3 * crowd->feet);
+    }
+}
+
+static void against_other(Errors *errors, int feet, const Arrays *a, const Arrays *b) {
+    for (int r = 0; r < ROBOTS; r++) {
+        double found[ROWS], wanted[ROWS];
+        for (int i = 0; i < 6 * feet; i++) {
+            found[i] = a->wrench[6 * feet * r + i];
+            wanted[i] = b->wrench[6 * feet * r + i];
+        }
+        add_error(errors, found, wanted, 6 * feet);
+        assert_true(a->iterations[r] >= 0 && a->iterations[r] <= 20);
+        assert_true(a->residual[r] >= 0.0f);
+    }
+}
+
+/* ---- tests ---- */
+
+static Crowd crowd;
+static Arrays arrays, other;
+
+static void steps_are_those_of_the_ground(void **state) {
+    (void)state;
+    for (int device = MILD_BATCH_HOST; device <= 0; device++) {
+        if (device >= 0 && !has_device()) {
+            continue;
+        }
+        for (int i = 0; i < SHAPES; i++) {
+            static Errors errors;
+            Side side;
+            errors.count = 0;
+            crowd_open(&crowd, &shapes[i]);
+            side_open(&side, &crowd, device);
+            for (int s = 0; s < STEPS; s++) {
+                crowd_solve(&crowd, &arrays);
+                side_step(&side, &arrays, 0);
+                const float once = arrays.wrench[2];
+                side_step(&side, &arrays, 1); /* a step without `advance` leaves no trace */
+                assert_memory_equal(&once, &arrays.wrench[2], sizeof once);
+                against_ground(&errors, &crowd, &arrays);
+                crowd_advance(&crowd);
+            }
+            check_errors(shapes[i].name, &errors, 2e-5, 3e-2);
+            side_close(&side);
+            crowd_close(&crowd);
+        }
+    }
+}
+
+static void device_and_host_agree(void **state) {
+    (void)state;
+    if (!has_device()) {
+        skip();
+    }
+    for (int i = 0; i < SHAPES; i++) {
+        static Errors errors;
+        Side host, device, again;
+        errors.count = 0;
+        crowd_open(&crowd, &shapes[i]);
+        side_open(&host, &crowd, MILD_BATCH_HOST);
+        side_open(&device, &crowd, 0);
+        side_open(&again, &crowd, 0);
+        for (int s = 0; s < STEPS; s++) {
+            crowd_solve(&crowd, &arrays);
+            side_step(&again, &arrays, 1);
+            other = arrays;
+            side_step(&device, &arrays, 1);
+            assert_memory_equal(arrays.wrench, other.wrench, sizeof arrays.wrench);
+            assert_memory_equal(arrays.after, other.after, sizeof arrays.after);
+            side_step(&host, &other, 1);
+            against_other(&errors, crowd.feet, &arrays, &other);
+            crowd_advance(&crowd);
+        }
+        check_errors(shapes[i].name, &errors, 1e-5, 3e-2);
+        side_close(&host);
+        side_close(&device);
+        side_close(&again);
+        crowd_close(&crowd);
+    }
+}
+
+/* After a reset of some they step as on untouched ground, the others as without it. */
+static void reset_and_load(void **state) {
+    (void)state;
+    for (int device = MILD_BATCH_HOST; device <= 0; device++) {
+        if (device >= 0 && !has_device()) {
+            continue;
+        }
+        MildError error = {0};
+        Side walked, fresh;
+        crowd_open(&crowd, &shapes[0]);
+        side_open(&walked, &crowd, device);
+        side_open(&fresh, &crowd, device);
+        for (int s = 0; s < 20; s++) {
+            crowd_solve(&crowd, &arrays);
+            side_step(&walked, &arrays, 1);
+            crowd_advance(&crowd);
+        }
+        crowd_solve(&crowd, &arrays);
+        side_step(&walked, &arrays, 0);
+        static Arrays before;
+        before = arrays;
+        side_step(&fresh, &arrays, 0);
+        other = arrays;
+        for (int r = 0; r < ROBOTS; r++) {
+            arrays.which[r] = r % 3 == 0;
+        }
+        side_copy(&walked, walked.arrays->which, arrays.which, sizeof arrays.which);
+        assert_int_equal(mild_batch_reset(walked.batch, walked.arrays->which, NULL, &error),
+                         MILD_OK);
+        side_step(&walked, &arrays, 0);
+        for (int r = 0; r < ROBOTS; r++) {
+            const Arrays *wanted = r % 3 == 0 ? &other : &before;
+            assert_memory_equal(arrays.wrench + 12 * r, wanted->wrench + 12 * r,
+                                12 * sizeof(float));
+        }
+        /* and the memory of a ground is that of a batch that walked with it */
+        static Errors errors;
+        errors.count = 0;
+        for (int r = 0; r < ROBOTS; r++) {
+            assert_int_equal(mild_batch_load(fresh.batch, r, crowd.kit[r].ground, &error), MILD_OK);
+        }
+        side_step(&fresh, &arrays, 0);
+        against_ground(&errors, &crowd, &arrays);
+        check_errors("loaded", &errors, 2e-5, 3e-2);
+        side_close(&walked);
+        side_close(&fresh);
+        crowd_close(&crowd);
+    }
+}
+
+/* What is wrong, and a word of the message. */
+static void refuse(const MildBatchDef *def, const char *word) {
+    MildError error = {0};
+    assert_null(mild_batch_create(def, &error));
+    if (!strstr(error.text, word)) {
+        fail_msg("'%s' is not in: %s", word, error.text);
+    }
+}
+
+static void bad_input_is_refused(void **state) {
+    (void)state;
+    const MildSole *soles[2] = {left, right};
+    const MildBatchDef good = {
+        .robots = 3, .feet = 2, .soles = soles, .dt = 5e-3, .device = MILD_BATCH_HOST};
+    MildBatchDef def = good;
+    def.robots = 0;
+    refuse(&def, "robots = 0");
+    def = good;
+    def.feet = 5;
+    refuse(&def, "feet = 5");
+    def = good;
+    def.dt = NAN;
+    refuse(&def, "dt");
+    def = good;
+    def.tolerance = -1.0;
+    refuse(&def, "tolerance");
+    def = good;
+    def.max_iterations = -1;
+    refuse(&def, "max_iterations");
+    def = good;
+    def.device = -2;
+    refuse(&def, "device");
+    def.device = 1000;
+    refuse(&def, "device 1000");
+    MildSole *large = kit_plate(13, 10);
+    soles[1] = large;
+    refuse(&good, "130 elements");
+    mild_sole_destroy(large);
+    soles[1] = right;
+
+    MildError error = {0};
+    MildBatch *batch = mild_batch_create(&good, &error);
+    assert_non_null(batch);
+    MildMaterial materials[2] = {mild_material_default(), mild_material_default()};
+    materials[1].mu = -1.0;
+    assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_ERROR_RANGE);
+    assert_non_null(strstr(error.text, "material 1"));
+    assert_true(mild_material_preset("snow", &materials[1]));
+    assert_int_equal(mild_batch_set_materials(batch, materials, 2, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "bekker"));
+    assert_int_equal(mild_batch_set_materials(batch, materials, 0, &error), MILD_ERROR_RANGE);
+
+    Kit kit, prints;
+    kit_open(&kit, 1, left, NULL, &materials[0], 5e-3);
+    kit_open(&prints, 2, left, right, &materials[0], 5e-3);
+    kit_prints(&prints, 8);
+    assert_int_equal(mild_batch_load(batch, 0, kit.ground, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(mild_batch_load(batch, 0, prints.ground, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(mild_batch_load(batch, 3, kit.ground, &error), MILD_ERROR_RANGE);
+    kit_close(&kit);
+    kit_close(&prints);
+    assert_int_equal(mild_batch_robot_bytes(batch), 9 * 160 * sizeof(float));
+    assert_int_equal(mild_batch_stride(batch), 80);
+    mild_batch_destroy(batch);
+    mild_batch_destroy(NULL);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(steps_are_those_of_the_ground),
+        cmocka_unit_test(device_and_host_agree),
+        cmocka_unit_test(reset_and_load),
+        cmocka_unit_test(bad_input_is_refused),
+    };
+    return cmocka_run_group_tests(tests, open_soles, close_soles);
+}

@@ -1,0 +1,284 @@
+/* The contact step as a warp does it against mild_ground_solve and mild_ground_advance: the same
+ * text in double and in float, of one, two and four feet. */
+#include "contact_case.h"
+#include "ground/begin.h"
+#include "ground/ground_kit.h"
+#include "ground/models.h"
+#include "ground/state.h"
+
+static MildSole *left, *right, *centers[2], *plate;
+
+static int open_soles(void **state) {
+    (void)state;
+    left = kit_sole(0, 77);
+    right = kit_sole(1, 77);
+    centers[0] = mild_sole_concentric(left, NULL);
+    centers[1] = mild_sole_concentric(right, NULL);
+    plate = kit_plate(4, 5);
+    return 0;
+}
+
+static int close_soles(void **state) {
+    (void)state;
+    MildSole *const all[] = {left, right, centers[0], centers[1], plate};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        mild_sole_destroy(all[i]);
+    }
+    return 0;
+}
+
+static void case_law(ContactCase *c, const MildMaterial *m, double pitch) {
+    const Law law = law_of(m, pitch);
+    memcpy(c->law, &law, sizeof c->law);
+    c->curves = law_curves(&law);
+    c->recovery = law_recovery(&law, m->recovery);
+    c->mu = m->mu;
+    c->k_drift = m->k_drift;
+    c->b_drift = m->b_drift;
+    c->exit_drag = law_exit_drag(&law);
+    c->entry_drag = law_entry_drag(&law);
+}
+
+static void case_memory(ContactCase *c, const MildGround *ground, int into) {
+    for (int f = 0; f < c->feet; f++) {
+        const Memory memory = ground_memory(ground, f);
+        const double *const all[CASE_MEMORY] = {
+            memory.depth_max, memory.middle,    memory.front_speed,
+            memory.drift,     memory.pending_x, memory.pending_y,
+            memory.held_x,    memory.held_y,    memory.held_stiffness};
+        for (int n = 0; n < CASE_MEMORY && into; n++) {
+            memcpy(c->memory[n][f], all[n], (size_t)c->elements[f] * sizeof(double));
+        }
+    }
+}
+
+/* The problem of a kit before its step. */
+static void case_of(ContactCase *c, const Kit *kit, int groups, int per, double tolerance) {
+    const int n = 6 * kit->feet;
+    memset(c, 0, sizeof *c);
+    c->feet = kit->feet;
+    c->groups = groups;
+    c->per = per;
+    c->dt = kit->input.dt;
+    c->tolerance = tolerance;
+    c->limit = 60;
+    c->height = kit->terrain.height;
+    for (int f = 0; f < kit->feet; f++) {
+        const MildSole *sole = kit->soles[f];
+        c->elements[f] = mild_sole_elements(sole);
+        memcpy(c->x[f], mild_sole_x(sole), (size_t)c->elements[f] * sizeof(double));
+        memcpy(c->y[f], mild_sole_y(sole), (size_t)c->elements[f] * sizeof(double));
+        c->z[f] = mild_sole_z(sole);
+        memcpy(c->position + 3 * f, kit->input.position[f], 3 * sizeof(double));
+        memcpy(c->rotation + 9 * f, kit->input.rotation[f], 9 * sizeof(double));
+        memcpy(c->velocity + 6 * f, kit->input.velocity[f], 6 * sizeof(double));
+    }
+    memcpy(c->inverse_inertia, kit->input.inverse_inertia, (size_t)(n * n) * sizeof(double));
+    memcpy(c->free_velocity, kit->input.free_velocity, (size_t)n * sizeof(double));
+    case_law(c, &kit->terrain.materials[0], mild_sole_pitch(kit->soles[0]));
+    case_memory(c, kit->ground, 1);
+}
+
+enum { STEPS_MAX = 100000 };
+
+/* Worst values over many steps, and the errors of all their forces. */
+typedef struct {
+    double wrench, twist, memory, foot, element;
+    int steps, unsolved, iterations, iterations_ground;
+    double force[STEPS_MAX];
+} Worst;
+
+static int ascending(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Of the forces' errors, the one that a share of them does not exceed. */
+static double quantile(Worst *w, double share) {
+    qsort(w->force, (size_t)w->steps, sizeof *w->force, ascending);
+    return w->force[(int)(share * (w->steps - 1))];
+}
+
+static double distance(const double *a, const double *b, int count, double scale) {
+    double apart = 0.0, size = 0.0;
+    for (int i = 0; i < count; i++) {
+        apart += (a[i] - b[i]) * (a[i] - b[i]);
+        size += b[i] * b[i];
+    }
+    return sqrt(apart) / (sqrt(size) + scale);
+}
+
+/* The step of a kit, after mild_ground_solve and mild_ground_advance of it, and the same of c. */
+static void compare(Worst *worst, const ContactCase *c, Kit *kit) {
+    double force[3 * CASE_FEET], wanted[3 * CASE_FEET];
+    for (int f = 0; f < c->feet; f++) {
+        const MildFootResult *foot = &kit->result.foot[f];
+        memcpy(force + 3 * f, c->wrench + 6 * f, 3 * sizeof(double));
+        memcpy(wanted + 3 * f, foot->force, 3 * sizeof(double));
+        worst->wrench = fmax(worst->wrench, distance(c->wrench + 6 * f + 3, foot->torque, 3, 1.0));
+        if (foot->contacts > 0 && foot->force[2] > 1.0) {
+            const double depths[2] = {foot->depth_max, foot->depth_mean};
+            worst->foot = fmax(worst->foot, distance(c->foot[f], foot->pressure_center, 3, 0.1));
+            worst->foot = fmax(worst->foot, distance(c->foot[f] + 3, depths, 2, 1e-3));
+        }
+        const MildElements elements = mild_scratch_elements(kit->scratch, f);
+        const double *const all[4] = {elements.depth, elements.normal, elements.tangent_x,
+                                      elements.tangent_y};
+        for (int n = 0; n < 4; n++) {
+            worst->element = fmax(
+                worst->element, distance(c->element[n][f], all[n], c->elements[f], n ? 1.0 : 1e-3));
+        }
+    }
+    const double apart = distance(force, wanted, 3 * c->feet, 1.0);
+    worst->wrench = fmax(worst->wrench, apart);
+    assert_true(worst->steps < STEPS_MAX);
+    worst->force[worst->steps] = apart;
+    worst->twist = fmax(worst->twist, distance(c->after, kit->result.velocity, 6 * c->feet, 0.01));
+    worst->steps++;
+    worst->iterations += c->iterations;
+    worst->iterations_ground += kit->result.iterations;
+}
+
+static void compare_memory(Worst *worst, const ContactCase *c, const Kit *kit) {
+    static const double scale[CASE_MEMORY] = {1e-3, 1e-3, 0.1, 1e-3, 1e-5, 1e-5, 1.0, 1.0, 1e4};
+    for (int f = 0; f < c->feet; f++) {
+        const Memory memory = ground_memory(kit->ground, f);
+        const double *const all[CASE_MEMORY] = {
+            memory.depth_max, memory.middle,    memory.front_speed,
+            memory.drift,     memory.pending_x, memory.pending_y,
+            memory.held_x,    memory.held_y,    memory.held_stiffness};
+        for (int n = 0; n < CASE_MEMORY; n++) {
+            for (int e = 0; e < c->elements[f]; e++) {
+                const int lifted = !(memory.depth_max[e] > 0.0);
+                const double a = c->memory[n][f][e], b = lifted && n == 1 ? a : all[n][e];
+                worst->memory = fmax(worst->memory, fabs(a - b) / (fabs(b) + scale[n]));
+            }
+        }
+    }
+}
+
+static void worst_print(const char *name, Worst *w) {
+    print_message(
+        "%-26s %5d steps, %d left out: force median %.1e, 99 %% %.1e; worst: wrench %.1e, "
+        "twist %.1e, foot %.1e, elements %.1e, memory %.1e; Newton steps %.2f (%.2f)\n",
+        name, w->steps, w->unsolved, quantile(w, 0.5), quantile(w, 0.99), w->wrench, w->twist,
+        w->foot, w->element, w->memory, (double)w->iterations / w->steps,
+        (double)w->iterations_ground / w->steps);
+}
+
+/* A foot that is pressed, slides and turns on random material for a while. */
+static void walk(Kit *kit, uint64_t *random, int steps, double tolerance, int groups, int per,
+                 void (*run)(ContactCase *), Worst *worst) {
+    static ContactCase c;
+    for (int s = 0; s < steps; s++) {
+        double force[CASE_FEET][3];
+        for (int f = 0; f < kit->feet; f++) {
+            for (int k = 0; k < 3; k++) {
+                force[f][k] = kit->mass[f] * kit_uniform(random, -4.0, k == 2 ? 8.0 : 4.0);
+            }
+        }
+        kit_inverse_inertia(kit);
+        kit_free(kit, (const double(*)[3])force);
+        case_of(&c, kit, groups, per, tolerance);
+        kit_solve(kit);
+        run(&c);
+        if (!kit->result.converged || kit->result.iterations > 15) {
+            worst->unsolved++; /* so violent that mild/ground.h needed more than plain steps */
+        } else {
+            compare(worst, &c, kit);
+        }
+        kit_advance(kit);
+        if (kit->result.converged && kit->result.iterations <= 15) {
+            compare_memory(worst, &c, kit);
+        }
+    }
+}
+
+typedef struct {
+    const char *name;
+    int feet, groups, per;
+    MildModel model;
+} Shape;
+
+static const Shape shapes[] = {
+    {"two feet of 77", 2, 2, 5, MILD_MODEL_MILD},
+    {"one foot of 77", 1, 1, 3, MILD_MODEL_MILD},
+    {"one foot of 77, few lanes", 1, 2, 5, MILD_MODEL_MILD},
+    {"four plates of 20", 4, 4, 4, MILD_MODEL_MILD},
+    {"three plates of 20", 3, 4, 4, MILD_MODEL_MILD},
+    {"two feet, spare lanes", 2, 2, 8, MILD_MODEL_MILD},
+    {"con_cone", 2, 2, 1, MILD_MODEL_CON_CONE},
+    {"con_spring", 2, 2, 1, MILD_MODEL_CON_SPRING},
+    {"ecc_spring", 2, 2, 5, MILD_MODEL_ECC_SPRING},
+    {"hunt_crossley", 2, 2, 5, MILD_MODEL_HUNT_CROSSLEY},
+};
+enum { SHAPES = sizeof shapes / sizeof *shapes };
+
+static MildSole *shape_sole(const Shape *shape, int side) {
+    if (mild_model_is_concentric(shape->model)) {
+        return centers[side];
+    }
+    return shape->feet > 2 ? plate : side ? right : left;
+}
+
+static void run_shape(const Shape *shape, int walks, double tolerance, void (*run)(ContactCase *),
+                      Worst *worst) {
+    static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
+    uint64_t random = 11;
+    for (int w = 0; w < walks; w++) {
+        Kit kit;
+        MildMaterial m = kit_material(&random), rival;
+        m.passive = w % 4 > 0;
+        if (shape->model != MILD_MODEL_MILD) {
+            m = mild_material_default();
+            assert_int_equal(mild_model_match(shape->model, &m, left, 150.0, &rival, NULL),
+                             MILD_OK);
+            m = rival;
+        }
+        kit_open(&kit, shape->feet, shape_sole(shape, 0), shape_sole(shape, 1), &m,
+                 steps[kit_index(&random, 3)]);
+        kit_random_state(&kit, &random);
+        for (int f = 0; f < kit.feet; f++) {
+            kit.input.position[f][2] += 0.01; /* begins by touching down */
+            kit.mass[f] = kit_uniform(&random, 3.0, 40.0);
+            kit.inertia[f] = kit.mass[f] * kit_uniform(&random, 0.02, 0.1);
+        }
+        kit.input.tolerance = 1e-11;
+        kit.terrain.height = kit_uniform(&random, -0.002, 0.002);
+        walk(&kit, &random, 40, tolerance, shape->groups, shape->per, run, worst);
+        kit_close(&kit);
+    }
+}
+
+static void double_text_is_the_ground(void **state) {
+    (void)state;
+    for (int i = 0; i < SHAPES; i++) {
+        static Worst worst;
+        worst = (Worst){0};
+        run_shape(&shapes[i], kit_draws(20), 1e-11, contact_case_double, &worst);
+        worst_print(shapes[i].name, &worst);
+        assert_true(worst.wrench < 1e-9 && worst.twist < 1e-9 && worst.foot < 1e-9);
+        assert_true(worst.element < 1e-6 && worst.memory < 1e-7);
+        assert_true(worst.unsolved < worst.steps / 20);
+    }
+}
+
+static void float_text_is_near_it(void **state) {
+    (void)state;
+    for (int i = 0; i < SHAPES; i++) {
+        static Worst worst;
+        worst = (Worst){0};
+        run_shape(&shapes[i], kit_draws(20), 1e-4, contact_case_float, &worst);
+        worst_print(shapes[i].name, &worst);
+        assert_true(quantile(&worst, 0.5) < 1e-5 && quantile(&worst, 0.99) < 2e-2);
+        assert_true(worst.twist < 5e-3 && worst.unsolved < worst.steps / 20);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(double_text_is_the_ground),
+        cmocka_unit_test(float_text_is_near_it),
+    };
+    return cmocka_run_group_tests(tests, open_soles, close_soles);
+}
