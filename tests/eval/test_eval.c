@@ -5,6 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -207,6 +208,19 @@ static void stopped_trials_are_told_to_stand(void **state) {
     assert_int_equal(zero.moving, 20);
 }
 
+/* As many steps as come nearest to the time. */
+static void time_is_rounded_to_steps(void **state) {
+    (void)state;
+    static const double seconds[4] = {0.29, 0.2949, 0.2955, 0.3}; /* 0.29/0.01 is below 29 */
+    static const int steps[4] = {29, 29, 30, 30};
+    for (int i = 0; i < 4; i++) {
+        Zero zero;
+        EvalDef eval = {.trials = 1, .seconds = seconds[i], .seed = 1};
+        run(&zero, "rubber", eval, 1);
+        assert_int_equal(zero.calls, steps[i]);
+    }
+}
+
 static EvalRow walk(double seconds, double stop) {
     MildError error = {0};
     TaskDef def = task_def_default();
@@ -242,6 +256,61 @@ static void the_shipped_policy_walks(void **state) {
     assert_true(row.base_oscillation > 1e-3 && row.base_oscillation < 0.1);
 }
 
+/* A trial stepped here, with every number of the row: the second one, its command from the first
+ * step on, in one episode however short the task's is, weighed at 9.81 m/s^2. */
+static void a_row_is_what_its_trials_did(void **state) {
+    (void)state;
+    MildError error = {0};
+    TaskDef def = task_def_default(), longer;
+    task_def_make_nominal(&def);
+    longer = def;
+    longer.episode = 3;
+    def.episode = 1;
+    const EvalDef eval = {.speed = 0.5, .sideways = 0.05, .trials = 2, .seconds = 3, .seed = 7};
+    Controller controller;
+    assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, NULL,
+                                        2, &controller, &error),
+                     MILD_OK);
+    Scene scene;
+    assert_int_equal(scene_make(&scene, "foam60", 2, &error), MILD_OK);
+    Pool *pool = pool_create(1);
+    EvalRow row, own;
+    assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
+                     MILD_OK);
+    pool_destroy(pool);
+
+    Measure measure[2];
+    uint8_t over[2] = {0};
+    RobotSim *sim = robot_sim_create(robot, def.physics_dt, &error);
+    assert_non_null(sim);
+    for (uint32_t i = 0; i < 2; i++) {
+        const TaskView none = {0};
+        TaskEnv *env = aligned_alloc(64, task_env_bytes(&longer, robot));
+        assert_non_null(env);
+        task_env_init(env, &longer, robot, 7, i);
+        eval_command(env, 0.5, 0.05);
+        task_env_reset_on(env, &longer, robot, sim, &scene.terrain, 0, &none);
+        measure_start(&measure[i], longer.physics_dt);
+        for (int k = 0; k < 300; k++) {
+            float action[SA01_JOINTS];
+            const TaskProbe probe = {measure_step, &measure[i]};
+            controller.act(controller.self, 1, &env, action);
+            const TaskStep step = task_env_step(env, &longer, robot, sim, action, 0, &none, &probe);
+            assert_false(step.done && !step.timeout);
+            eval_command(env, 0.5, 0.05);
+        }
+        free(env);
+    }
+    robot_sim_destroy(sim);
+    controller_destroy(&controller);
+    eval_summarise(&own, "foam60", &eval, measure, over, robot_total_mass(robot) * 9.81);
+    assert_true(row.success == 2 && row.velocity > 0.3 && row.cot > 0.1);
+    assert_true(fabs(row.velocity / own.velocity - 1) < 1e-5);
+    assert_true(fabs(row.velocity_sideways - own.velocity_sideways) < 1e-5);
+    assert_true(fabs(row.cot / own.cot - 1) < 1e-5);
+    assert_true(fabs(row.energy / own.energy - 1) < 1e-5 && row.seconds == own.seconds);
+}
+
 /* Told to stop after 3 s and watched for one more second: speed and cost are those of the first 3
  * s, but for a physics step at the end; the rest goes on. */
 static void speed_is_measured_until_the_stop(void **state) {
@@ -261,6 +330,8 @@ int main(void) {
         cmocka_unit_test(zero_action_falls_and_is_counted),
         cmocka_unit_test(short_trials_succeed),
         cmocka_unit_test(stopped_trials_are_told_to_stand),
+        cmocka_unit_test(time_is_rounded_to_steps),
+        cmocka_unit_test(a_row_is_what_its_trials_did),
         cmocka_unit_test(the_shipped_policy_walks),
         cmocka_unit_test(speed_is_measured_until_the_stop),
     };

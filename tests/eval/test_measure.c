@@ -278,6 +278,21 @@ static void open_stances_count_when_no_foot_was_lifted(void **state) {
     assert_int_equal(m.stances, 1);
 }
 
+/* One stance that ended, however many are open, and none of those counts. */
+static void one_lift_is_enough(void **state) {
+    (void)state;
+    Script s;
+    Measure m;
+    script_start(&s);
+    measure_start(&m, DT);
+    hold(&m, &s, 10);
+    lift(&s, 0, 0.1);
+    hold(&m, &s, 100);
+    assert_int_equal(m.stances, 1);
+    measure_finish(&m);
+    assert_int_equal(m.stances, 1);
+}
+
 /* ---- the row ---- */
 
 /* A trial of `time` seconds, steady from 2 s on, at `speed`. */
@@ -530,6 +545,19 @@ static void a_robot_is_read(void **state) {
         assert_close("apex", m.apex[0], 0.1, 1e-4);
         assert_close("apex", m.apex[1], 0.1, 1e-4);
     }
+    MildMapDef slope = mild_map_def_default(); /* the base is above the ground under it */
+    slope.kind = MILD_MAP_SLOPE;
+    slope.slope = 0.1;
+    MildMap *map = mild_map_create(&slope, &error);
+    assert_non_null(map);
+    env->terrain.map = map;
+    Measure m;
+    const double none[SA01_JOINTS] = {0}, *q = robot_sim_qpos(sim);
+    measure_start(&m, 1e-3);
+    m.time = 3;
+    measure_step(&m, env, sim, none);
+    assert_close("height on a slope", m.base_high, q[2] - 0.3 - 0.1 * q[0], 1e-12);
+    mild_map_destroy(map);
     free(env);
     robot_sim_destroy(sim);
     robot_destroy(robot);
@@ -545,6 +573,7 @@ int main(void) {
         cmocka_unit_test(low_lifts_are_no_swings),
         cmocka_unit_test(a_foot_that_starts_in_the_air),
         cmocka_unit_test(open_stances_count_when_no_foot_was_lifted),
+        cmocka_unit_test(one_lift_is_enough),
         cmocka_unit_test(a_row_from_four_trials),
         cmocka_unit_test(a_row_of_falls),
         cmocka_unit_test(cost_of_transport_backward_and_at_rest),

@@ -273,26 +273,27 @@ static void test_no_memory(void **state) {
 
 /* ---- several models under one foot ---- */
 
-/* A foot on a patch of one model, on terrain of all three, moves as on that model alone: the loop
+/* A foot on a patch of one model, on terrain of all five, moves as on that model alone: the loop
  * that has every curve against the one that has only its own. */
 static void test_together(void **state) {
     (void)state;
-    static const MildModel models[3] = {MILD_MODEL_MILD, MILD_MODEL_BEKKER,
-                                        MILD_MODEL_HUNT_CROSSLEY};
+    static const MildModel models[5] = {MILD_MODEL_MILD, MILD_MODEL_BEKKER,
+                                        MILD_MODEL_HUNT_CROSSLEY, MILD_MODEL_ECC_QUASI,
+                                        MILD_MODEL_ECC_QUASI_3D};
     MildSole *plate = kit_plate(4, 3);
     double worst = 0.0;
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 5; k++) {
         MildMaterial own = mild_material_default();
         own.model = (int)models[k];
         Kit alone, among;
         int loaded = 0;
         kit_open(&alone, 1, plate, NULL, &own, 1e-3);
         kit_open(&among, 1, plate, NULL, &own, 1e-3);
-        for (int other = 0; other < 3; other++) {
+        for (int other = 0; other < 5; other++) {
             among.terrain.materials[other] = mild_material_default();
             among.terrain.materials[other].model = (int)models[other];
         }
-        among.terrain.material_count = 3;
+        among.terrain.material_count = 5;
         MildPatch patch = {.x_min = -1.0, .x_max = 1.0, .y_min = -1.0, .y_max = 1.0, .material = k};
         assert_int_equal(mild_terrain_add_patch(&among.terrain, &patch, NULL), MILD_OK);
         for (int s = 0; s < 300; s++) {

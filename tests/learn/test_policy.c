@@ -382,7 +382,15 @@ static void test_unreadable_header(void **state) {
     assert_true(safetensors_seal(bytes, size));
     write_bytes(PATH, bytes, size);
     assert_null(policy_load(PATH, NULL, 0, &error));
+    assert_non_null(strstr(error.text, PATH ": "));
     assert_non_null(strstr(error.text, "header cannot be read"));
+    write_bytes(PATH, bytes, size / 2); /* in the middle of the data, or of the header */
+    assert_null(policy_load(PATH, NULL, 0, &error));
+    assert_non_null(strstr(error.text, PATH ": "));
+    write_bytes(PATH, bytes, 100);
+    assert_null(policy_load(PATH, NULL, 0, &error));
+    assert_non_null(strstr(error.text, PATH ": "));
+    assert_non_null(strstr(error.text, "past the end"));
     free(bytes);
     unlink(PATH);
 }

@@ -1,0 +1,342 @@
+/* Height maps and patterns against their formulas. */
+#include "map_kit.h"
+
+/* Waves and steps at random points: at grid points the formula, between them within the error of
+ * bilinear interpolation, (2 pi/wavelength)^2 amplitude cell^2/8. */
+static void test_shapes(void **state) {
+    (void)state;
+    uint64_t random = 41;
+    const double k = 2.0 * acos(-1.0) / 0.7, amplitude = 0.03;
+    MildMapDef def = shape(MILD_MAP_WAVES, amplitude, 0.7);
+    MildMap *map = make_map(&def);
+    MildTerrain terrain = terrain_on(map, 0.2);
+    double cell = 0.7 / 35.0, at_points = 0.0, between = 0.0, slopes = 0.0;
+    for (int t = 0; t < 20000; t++) {
+        double x = kit_uniform(&random, -20.0, 20.0), y = kit_uniform(&random, -20.0, 20.0),
+               slope[2];
+        between = fmax(between, fabs(mild_terrain_height_at(&terrain, x, y) - 0.2 -
+                                     0.5 * amplitude * (sin(k * x) + sin(k * y))));
+        mild_terrain_slope_at(&terrain, x, y, slope);
+        slopes = fmax(slopes, fabs(slope[0] - 0.5 * amplitude * k * cos(k * x)));
+        x = cell * round(x / cell), y = cell * round(y / cell);
+        at_points = fmax(at_points, fabs(mild_terrain_height_at(&terrain, x, y) - 0.2 -
+                                         0.5 * amplitude * (sin(k * x) + sin(k * y))));
+    }
+    double bound = k * k * amplitude * cell * cell / 8.0;
+    print_message("waves: off by %.1e m at grid points, %.1e between (bound %.1e), slope by %.1e\n",
+                  at_points, between, bound, slopes);
+    assert_true(at_points < 1e-8 && between < bound + 1e-8);
+    mild_map_destroy(map);
+
+    def = shape(MILD_MAP_STEPS, 0.05, 0.8);
+    map = make_map(&def);
+    terrain = terrain_on(map, 0.0);
+    for (int t = -8; t < 8; t++) {
+        for (double phase = -0.2; phase < 0.2;
+             phase += 0.05) { /* clear of the risers at odd quarters */
+            assert_true(fabs(mild_terrain_height_at(&terrain, 0.8 * (t + phase), 3.0 * t)) < 1e-8);
+            assert_true(fabs(mild_terrain_height_at(&terrain, 0.8 * (t + phase + 0.5), 3.0 * t) -
+                             0.05) < 1e-8);
+        }
+    }
+    mild_map_destroy(map);
+
+    def = shape(MILD_MAP_SLOPE, 0.0, 1.0);
+    def.slope = -0.3;
+    map = make_map(&def);
+    terrain = terrain_on(map, 0.1);
+    assert_true(mild_terrain_height_at(&terrain, 50.0, 3.0) == 0.1 + -0.3 * 50.0);
+    assert_false(mild_map_is_level(map));
+    mild_map_destroy(map);
+
+    def = shape(MILD_MAP_FLAT, 0.1, 1.0);
+    map = make_map(&def);
+    assert_true(mild_map_is_level(map));
+    mild_map_destroy(map);
+}
+
+static void test_rough(void **state) {
+    (void)state;
+    uint64_t random = 42;
+    MildMapDef def = shape(MILD_MAP_ROUGH, 0.04, 0.25);
+    def.size = 4.0;
+    MildMap *map = make_map(&def);
+    def.seed = 2;
+    MildMap *other = make_map(&def);
+    MildTerrain terrain = terrain_on(map, 0.0), second = terrain_on(other, 0.0);
+    double least = 1.0, most = -1.0, sum = 0.0, repeat = 0.0, differ = 0.0;
+    enum { POINTS = 20000 };
+    for (int t = 0; t < POINTS; t++) {
+        double x = kit_uniform(&random, -4.0, 4.0), y = kit_uniform(&random, -4.0, 4.0),
+               h = mild_terrain_height_at(&terrain, x, y);
+        least = fmin(least, h), most = fmax(most, h), sum += h / POINTS;
+        repeat = fmax(repeat, fabs(h - mild_terrain_height_at(&terrain, x + 4.0, y - 8.0)));
+        differ = fmax(differ, fabs(h - mild_terrain_height_at(&second, x, y)));
+    }
+    print_message("rough: %.1f .. %.1f mm, mean %.1f mm, repeats within %.0e m\n", 1e3 * least,
+                  1e3 * most, 1e3 * sum, repeat);
+    assert_true(least >= -0.04 && most <= 0.04 && most - least > 0.06 && fabs(sum) < 0.005);
+    assert_true(repeat < 1e-9 && differ > 0.01);
+    mild_map_destroy(map);
+    mild_map_destroy(other);
+}
+
+/* Rough ground is random at points a wavelength apart, and between them follows 3 t^2 - 2 t^3:
+ * 5/32 a quarter on, 1/2 in the middle, along both axes. */
+static void test_rough_between(void **state) {
+    (void)state;
+    static const double share[4] = {0.0, 5.0 / 32.0, 0.5, 27.0 / 32.0};
+    MildMapDef def = shape(MILD_MAP_ROUGH, 0.04, 0.25);
+    def.size = 2.0;
+    def.cell = 0.25 / 4;
+    MildMap *map = make_map(&def);
+    MildTerrain terrain = terrain_on(map, 0.0);
+    double worst = 0.0, alike = 1.0;
+    for (int n = 0; n < 64 * 16; n++) {
+        const int i = n % 4, j = n / 4 % 4;
+        const double x = n / 16 % 8 * 0.25, y = n / 128 * 0.25;
+        double corner[4];
+        for (int k = 0; k < 4; k++) {
+            corner[k] = mild_terrain_height_at(&terrain, x + k % 2 * 0.25, y + k / 2 * 0.25);
+        }
+        const double low = (1 - share[i]) * corner[0] + share[i] * corner[1];
+        const double high = (1 - share[i]) * corner[2] + share[i] * corner[3];
+        const double height = mild_terrain_height_at(&terrain, x + i * def.cell, y + j * def.cell);
+        worst = fmax(worst, fabs(height - (1 - share[j]) * low - share[j] * high));
+        alike = fmin(alike, fabs(corner[0] - corner[1]));
+    }
+    print_message("rough between its points: off by %.1e m, neighbours differ by %.1e m\n", worst,
+                  alike);
+    assert_true(worst < 1e-8 && alike > 1e-5);
+    mild_map_destroy(map);
+}
+
+static void assert_range(const MildMap *map, double low, double high) {
+    double range[2];
+    mild_map_range(map, &range[0], &range[1]);
+    assert_true(range[0] == low || fabs(range[0] - low) < 1e-8);
+    assert_true(range[1] == high || fabs(range[1] - high) < 1e-8);
+}
+
+/* Lowest and highest point, the length after which it repeats, and the number of labels. */
+static void test_measures(void **state) {
+    (void)state;
+    MildMapDef def = shape(MILD_MAP_WAVES, 0.03, 0.8); /* 40 cells: the crests are grid points */
+    double x, y;
+    MildMap *map = make_map(&def);
+    assert_range(map, -0.03, 0.03);
+    mild_map_extent(map, &x, &y);
+    assert_true(fabs(x - 0.8) < 1e-12 && fabs(y - 0.8) < 1e-12);
+    assert_int_equal(mild_map_label_count(map), 1);
+    mild_map_destroy(map);
+
+    def = shape(MILD_MAP_STEPS, 0.05, 0.8);
+    def.patches = MILD_PATTERN_STRIPES, def.patch_count = 5;
+    map = make_map(&def);
+    assert_range(map, 0.0, 0.05);
+    mild_map_extent(map, &x, &y);
+    assert_true(fabs(x - 2.5) < 1e-12); /* five stripes of 0.5 m */
+    assert_int_equal(mild_map_label_count(map), 5);
+    mild_map_destroy(map);
+
+    double heights[12] = {-0.5, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.25}; /* in opposite corners */
+    def = shape(MILD_MAP_IMAGE, 2.0, 1.0);
+    def.heights = heights, def.height_columns = 4, def.height_rows = 3, def.cell = 0.1;
+    map = make_map(&def);
+    assert_range(map, -1.0, 0.5);
+    mild_map_extent(map, &x, &y);
+    assert_true(fabs(x - 0.3) < 1e-12 && fabs(y - 0.2) < 1e-12);
+    mild_map_destroy(map);
+
+    def = mild_map_def_default();
+    map = make_map(&def);
+    assert_true(mild_map_is_level(map) && mild_map_label_count(map) == 1);
+    assert_range(map, 0.0, 0.0);
+    mild_map_destroy(map);
+    def.kind = MILD_MAP_SLOPE;
+    map = make_map(&def);
+    assert_range(map, -INFINITY, INFINITY);
+    mild_map_destroy(map);
+}
+
+/* What only becomes visible with a kind is usable as it is: uneven by some mm to some dm. */
+static void test_defaults(void **state) {
+    (void)state;
+    for (int kind = MILD_MAP_SLOPE; kind <= MILD_MAP_ROUGH; kind++) {
+        for (int patches = MILD_PATTERN_NONE; patches <= MILD_PATTERN_CHECKER; patches++) {
+            MildMapDef def = mild_map_def_default();
+            assert_true(def.kind == MILD_MAP_FLAT && def.patches == MILD_PATTERN_NONE);
+            def.kind = kind, def.patches = patches;
+            MildMap *map = make_map(&def);
+            MildTerrain terrain = terrain_on(map, 0.0);
+            double low = INFINITY, high = -INFINITY;
+            for (int n = 0; n < 100 * 100; n++) {
+                const double h = mild_terrain_height_at(&terrain, n % 100 * 0.02, n / 100 * 0.02);
+                low = fmin(low, h), high = fmax(high, h);
+            }
+            assert_true(high - low > 5e-3 && high - low < 0.3);
+            assert_int_equal(mild_map_label_count(map), patches == MILD_PATTERN_NONE ? 1 : 2);
+            mild_map_destroy(map);
+        }
+    }
+}
+
+/* A tilted plane as an image: bilinear interpolation gives it exactly (float heights: a relative
+ * 6e-8), slopes too; beyond the border its last height goes on. */
+static void test_plane(void **state) {
+    (void)state;
+    enum { COLUMNS = 33, ROWS = 17 };
+    uint64_t random = 43;
+    static double heights[ROWS * COLUMNS];
+    for (int r = 0; r < ROWS; r++) {
+        for (int c = 0; c < COLUMNS; c++) {
+            heights[r * COLUMNS + c] = 0.01 * c - 0.03 * (ROWS - 1 - r);
+        }
+    }
+    MildMapDef def = shape(MILD_MAP_IMAGE, 2.0, 1.0);
+    def.cell = 0.05;
+    def.heights = heights;
+    def.height_columns = COLUMNS, def.height_rows = ROWS;
+    MildMap *map = make_map(&def);
+    MildTerrain terrain = terrain_on(map, 0.0);
+    terrain.map_x = 3.0, terrain.map_y = -1.0;
+    double x0 = 3.0 - 0.8, y0 = -1.0 - 0.4, worst = 0.0, slopes = 0.0;
+    for (int t = 0; t < 20000; t++) {
+        double x = kit_uniform(&random, x0 - 0.5, x0 + 2.1),
+               y = kit_uniform(&random, y0 - 0.5, y0 + 1.3), slope[2];
+        double u = fmin(fmax(x - x0, 0.0), 1.6), v = fmin(fmax(y - y0, 0.0), 0.8);
+        worst = fmax(worst, fabs(mild_terrain_height_at(&terrain, x, y) - (0.4 * u - 1.2 * v)));
+        mild_terrain_slope_at(&terrain, x, y, slope);
+        slopes = fmax(slopes, fabs(slope[0] - (x > x0 && x < x0 + 1.6 ? 0.4 : 0.0)));
+        slopes = fmax(slopes, fabs(slope[1] + (y > y0 && y < y0 + 0.8 ? 1.2 : 0.0)));
+    }
+    print_message("plane: off by %.1e m, slopes by %.1e\n", worst, slopes);
+    assert_true(worst < 1e-7 && slopes < 3e-6);
+    assert_true(isfinite(mild_terrain_height_at(&terrain, 1e300, -1e300)));
+    mild_terrain_height_at(&terrain, NAN,
+                           INFINITY); /* reads nothing outside the map: the sanitizer watches */
+    mild_map_destroy(map);
+}
+
+static void test_patterns(void **state) {
+    (void)state;
+    MildMapDef def = mild_map_def_default();
+    def.patches = MILD_PATTERN_STRIPES;
+    def.patch_count = 3;
+    MildMap *map = make_map(&def);
+    MildTerrain terrain = terrain_on(map, 0.0);
+    for (int t = -7; t < 8; t++) {
+        assert_int_equal(mild_terrain_material_at(&terrain, 0.5 * t + 0.25, 0.3 * t),
+                         ((t % 3) + 3) % 3);
+        assert_true(mild_terrain_blend_at(&terrain, 0.5 * t + 0.01, 0.0).share == 0.0); /* sharp */
+    }
+    assert_int_equal(mild_map_label_count(map), 3);
+    MildError error;
+    assert_int_equal(mild_terrain_add_patch(&terrain, &(MildPatch){0.0, 0.2, -1.0, 1.0, 5}, &error),
+                     MILD_OK);
+    assert_int_equal(mild_terrain_material_at(&terrain, 0.1, 0.0),
+                     5); /* a patch wins over the map */
+    terrain.material_count = 2;
+    assert_int_equal(mild_terrain_set_map(&terrain, map, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "label 2"));
+    mild_map_destroy(map);
+
+    def.patches = MILD_PATTERN_CHECKER;
+    def.border = 0.2;
+    map = make_map(&def);
+    terrain = terrain_on(map, 0.0);
+    double worst = 0.0; /* along a line through the middle of fields: the mixture is linear across
+                           each border */
+    for (double x = -0.249; x < 0.25; x += 0.001) {
+        MildBlend blend = mild_terrain_blend_at(&terrain, x, 0.25);
+        double right =
+            blend.first == 0 ? 1.0 - blend.share : blend.share; /* of material 0, right of x = 0 */
+        worst = fmax(worst, fabs(right - fmin(fmax(0.5 + x / 0.2, 0.0), 1.0)));
+        assert_int_equal(blend.first, x < 0.0 ? 2 : 0);
+    }
+    print_message("border of 0.2 m in cells of 0.02 m: share off by %.3f\n", worst);
+    assert_true(worst < 0.055);
+    mild_map_destroy(map);
+
+    const unsigned char labels[6] = {0, 1, 2, 3, 4, 5}; /* two rows, the first at larger y */
+    def.border = 0.0;
+    def.patches = MILD_PATTERN_IMAGE;
+    def.labels = labels, def.label_columns = 3, def.label_rows = 2;
+    map = make_map(&def);
+    terrain = terrain_on(map, 0.0);
+    for (int i = 0; i < 6; i++) {
+        assert_int_equal(
+            mild_terrain_material_at(&terrain, 0.5 * (i % 3) - 0.5, i < 3 ? 0.25 : -0.25), i);
+    }
+    assert_int_equal(mild_terrain_material_at(&terrain, 99.0, 99.0), 2);
+    mild_map_destroy(map);
+}
+
+static void test_refused(void **state) {
+    (void)state;
+    static const double bad_heights[4] = {0, 0, NAN, 0};
+    static const unsigned char labels[1] = {1};
+    struct {
+        MildMapDef def;
+        const char *names;
+    } bad[12];
+    int count = 0;
+#define BAD(member, value, name)                                                                   \
+    bad[count].def = mild_map_def_default(), bad[count].def.member = (value),                      \
+    bad[count++].names = name
+    BAD(cell, 0.0, "terrain.cell");
+    BAD(cell, NAN, "terrain.cell");
+    BAD(amplitude, -1.0, "terrain.amplitude");
+    BAD(wavelength, INFINITY, "terrain.wavelength");
+    BAD(slope, 2.0, "terrain.slope");
+    BAD(border, 1.0, "terrain.border");
+    bad[count - 1].def.patches = MILD_PATTERN_STRIPES;
+    BAD(kind, 9, "terrain.kind");
+    BAD(patches, -1, "terrain.patches");
+    BAD(size, 1000.0, "terrain.cell");
+    bad[count - 1].def.kind = MILD_MAP_ROUGH;
+    bad[count - 1].def.cell = 0.001;
+    BAD(heights, NULL, "terrain.image");
+    bad[count - 1].def.kind = MILD_MAP_IMAGE;
+    BAD(heights, bad_heights, "terrain.image");
+    bad[count - 1].def.kind = MILD_MAP_IMAGE;
+    bad[count - 1].def.height_columns = bad[count - 1].def.height_rows = 2;
+    BAD(labels, labels, "terrain.labels");
+    bad[count - 1].def.patches = MILD_PATTERN_IMAGE;
+#undef BAD
+    for (int i = 0; i < count; i++) {
+        MildError error = {0};
+        MildMap *map = mild_map_create(&bad[i].def, &error);
+        if (map || !strstr(error.text, bad[i].names)) {
+            print_message("case %d: %s\n", i, error.text);
+        }
+        assert_null(map);
+        assert_non_null(strstr(error.text, bad[i].names));
+        assert_null(strchr(error.text, '\n'));
+    }
+}
+
+static void test_bytes(void **state) {
+    (void)state;
+    MildMapDef waves = shape(MILD_MAP_WAVES, 0.03, 0.8), rough = shape(MILD_MAP_ROUGH, 0.03, 0.4);
+    rough.patches = MILD_PATTERN_CHECKER;
+    rough.border = 0.1;
+    MildMap *small = make_map(&waves), *large = make_map(&rough);
+    print_message("map of waves: %zu bytes, of 8 x 8 m rough ground with a pattern: %zu bytes, "
+                  "shared by every robot; a terrain: %zu\n",
+                  mild_map_bytes(small), mild_map_bytes(large), sizeof(MildTerrain));
+    assert_true(mild_map_bytes(small) < 8000 && mild_map_bytes(large) < 800000 &&
+                sizeof(MildTerrain) < 3200);
+    mild_map_destroy(small);
+    mild_map_destroy(large);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_shapes),        cmocka_unit_test(test_rough),
+        cmocka_unit_test(test_rough_between), cmocka_unit_test(test_measures),
+        cmocka_unit_test(test_defaults),      cmocka_unit_test(test_plane),
+        cmocka_unit_test(test_patterns),      cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_bytes)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
