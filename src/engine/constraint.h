@@ -1,5 +1,5 @@
-/* Joint limits and rigid ground as MuJoCo computes them (its manual, Computation, Constraint model):
- * soft constraints of a convex problem with one answer,
+/* Joint limits and rigid ground as MuJoCo computes them (its manual, Computation, Constraint
+ * model): soft constraints of a convex problem with one answer,
  *
  *     minimise over a   (a - a0)^T M (a - a0)/2 + sum over the rows of weight min(0, x)^2/2,
  *     x = J a - a_reference

@@ -1,7 +1,7 @@
 /* The feet seen from the robot's degrees of freedom: poses, J, A = J M^-1 J^T and V_free, and back
  * from wrenches to accelerations. The wrench and twist of a foot refer to the origin of a flat
- * foot's body, the lowest point of a round foot. On soft ground a round foot transmits no moment, so
- * that the angular rows of A, V_free and its twist are 0, and its rotation is the identity. */
+ * foot's body, the lowest point of a round foot. On soft ground a round foot transmits no moment,
+ * so that the angular rows of A, V_free and its twist are 0, and its rotation is the identity. */
 #ifndef MILD_ENGINE_FEET_H
 #define MILD_ENGINE_FEET_H
 

@@ -21,8 +21,8 @@ MILD_HD void quaternion_matrix(const Real *q, Real *R) {
     R[8] = w * w - x * x - y * y + z * z;
 }
 
-/* Rotation of each link in its parent's frame. A turn about a fixed axis is 1, cosine and sine times
- * three constant matrices, so a lane computes an entry without knowing the axis. */
+/* Rotation of each link in its parent's frame. A turn about a fixed axis is 1, cosine and sine
+ * times three constant matrices, so a lane computes an entry without knowing the axis. */
 LANE_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
     EngineDynamics *now = &work->now.dynamics;
     const int links = engine_links(&model->tree);

@@ -1,5 +1,5 @@
-/* What a task asks of a robot's pose, as RobotSim answers it: valid after engine_pose, and until the
- * step's end after engine_begin. Points are in world axes and count from the world's origin. */
+/* What a task asks of a robot's pose, as RobotSim answers it: valid after engine_pose, and until
+ * the step's end after engine_begin. Points are in world axes and count from the world's origin. */
 #ifndef MILD_ENGINE_MEASURE_H
 #define MILD_ENGINE_MEASURE_H
 
@@ -72,7 +72,8 @@ LANE_FN Real engine_body_clearance(const EngineModel *model, const EngineWork *w
     return -lane_max(most);
 }
 
-/* [m] Lowest point of a sole above level ground at `height`; of a round foot its reference point. */
+/* [m] Lowest point of a sole above level ground at `height`; of a round foot its reference
+ * point. */
 LANE_FN Real engine_sole_height(const EngineModel *model, const EngineWork *work, int foot,
                                 Real height) {
     Real most[LANE_COPIES];

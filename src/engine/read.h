@@ -17,9 +17,9 @@ extern "C" {
 #endif
 
 /* Fills the tree, and `number` [ENGINE_NUMBERS] in the order of EngineNumbers, which a program
- * converts to its scalar type one by one. dt: physics step [s]. Fails, with one line that names file
- * and joint, when a joint is not behind the base or the margin of its limit is wider than half its
- * range. */
+ * converts to its scalar type one by one. dt: physics step [s]. Fails, with one line that names
+ * file and joint, when a joint is not behind the base or the margin of its limit is wider than half
+ * its range. */
 MildStatus engine_model_read(const Robot *robot, double dt, EngineTree *tree, double *number,
                              MildError *error);
 

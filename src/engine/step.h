@@ -15,9 +15,9 @@
  *
  * The ground reads work->foot_position, foot_rotation, foot_velocity, now.support.free_velocity and
  * now.support.ground.inverse_inertia, in the layout of ContactProblem, and writes work->wrench, all
- * of it, zeros for feet in the air, and, if it likes, work->next_velocity. Nothing else passes between
- * the two. After a step the state is new and poses are those of its beginning; engine_pose brings
- * them up to date for an observer (measure.h). */
+ * of it, zeros for feet in the air, and, if it likes, work->next_velocity. Nothing else passes
+ * between the two. After a step the state is new and poses are those of its beginning; engine_pose
+ * brings them up to date for an observer (measure.h). */
 #ifndef MILD_ENGINE_STEP_H
 #define MILD_ENGINE_STEP_H
 

@@ -1,6 +1,6 @@
 /* Working data of one robot: in shared memory on a GPU. For SA01 in float 5.4 kB (a test prints
- * it). Poses are in world axes; positions of links and corners count from the base's origin, so that
- * float loses nothing far from the world's. */
+ * it). Poses are in world axes; positions of links and corners count from the base's origin, so
+ * that float loses nothing far from the world's. */
 #ifndef MILD_ENGINE_WORK_H
 #define MILD_ENGINE_WORK_H
 

@@ -1,5 +1,5 @@
-/* What device_engine.cu needs of the processor's side: a robot, random steps, and what the texts say
- * of them. */
+/* What device_engine.cu needs of the processor's side: a robot, random steps, and what the texts
+ * say of them. */
 #ifndef TESTS_ENGINE_DEVICE_CASES_H
 #define TESTS_ENGINE_DEVICE_CASES_H
 

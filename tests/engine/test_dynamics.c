@@ -131,8 +131,8 @@ static double energy(const double *S, const double *x, int n) {
     return sum;
 }
 
-/* Components of `got` against those of `want` at the same energy x^T S x, where `natural` has on its
- * diagonal the square of a component at energy 1. */
+/* Components of `got` against those of `want` at the same energy x^T S x, where `natural` has on
+ * its diagonal the square of a component at energy 1. */
 static void note_vector(Worst worst, int kind, const double *got, const double *want, int count,
                         const double *natural, double energy_of) {
     for (int i = 0; i < count; i++) {
@@ -374,8 +374,8 @@ typedef enum { RECORDED, RIGID, SOFT, MARCHES } March;
 static const char *const march_name[MARCHES] = {"recorded wrenches of sand",
                                                 "rigid ground of its own", "sand of its own"};
 
-/* Follows a sim with torques from its own state, under the wrenches of the sim's ground or on ground
- * of its own. */
+/* Follows a sim with torques from its own state, under the wrenches of the sim's ground or on
+ * ground of its own. */
 typedef struct {
     EngineText *text;
     EngineCase state;
@@ -391,7 +391,8 @@ static MildGround *new_ground(const Kit *kit) {
     return mild_ground_init(block, soles, kit->tree.feet);
 }
 
-/* What passes between engine and ground: poses, twists, A and V_free one way, wrenches the other. */
+/* What passes between engine and ground: poses, twists, A and V_free one way, wrenches the
+ * other. */
 static void stand_on(const Kit *kit, Follower *follower, const MildTerrain *terrain) {
     static MildContactInput input;
     static MildContactResult contact;

@@ -1,4 +1,5 @@
-/* The functions of an element's step, one at a time: hand-worked numbers, quadrature, differences. */
+/* The functions of an element's step, one at a time: hand-worked numbers, quadrature,
+ * differences. */
 #include "ground_kit.h"
 
 #include "ground/begin.h"

@@ -273,7 +273,7 @@ static void test_passive_by_hand(void **state) {
         mild_map_destroy(map);
     }
     print_message(
-        "led through waves by hand: largest share of the work given back in excess %.2e (draw %d)\n",
+        "led through waves by hand: largest share of the work given back in excess %.2e (%d)\n",
         worst, worst_draw);
     assert_true(worst < 0.0);
     mild_sole_destroy(sole);
