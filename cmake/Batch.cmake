@@ -1,9 +1,4 @@
 # The layer batch, with its steps on a GPU when MILD_CUDA is on.
-if(MILD_CUDA)
-  set(CMAKE_CUDA_ARCHITECTURES 90 CACHE STRING "CUDA architectures; each also as PTX for newer ones")
-  enable_language(CUDA)
-  find_package(CUDAToolkit REQUIRED)
-endif()
 mild_layer(batch layer_ground)
 if(MILD_CUDA)
   add_library(batch_device STATIC ${CMAKE_SOURCE_DIR}/src/batch/device.cu)

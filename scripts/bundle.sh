@@ -12,11 +12,13 @@ for march in x86-64-v3 x86-64-v4; do
     cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_CUDA=ON -DMILD_VIEW=OFF \
         -DMILD_MARCH=$march -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
         -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' >/dev/null
-    cmake --build "build/$march" --parallel "$jobs" --target mild gpu_test_gpu batch_test_batch >/dev/null
+    cmake --build "build/$march" --parallel "$jobs" --target mild gpu_test_gpu batch_test_batch \
+        engine_device_engine >/dev/null
     strip -o "$bundle/bin/mild-$march" "build/$march/mild"
 done
 strip -o "$bundle/bin/test_gpu" build/x86-64-v3/tests/gpu_test_gpu
 strip -o "$bundle/bin/test_batch" build/x86-64-v3/tests/batch_test_batch
+strip -o "$bundle/bin/device_engine" build/x86-64-v3/tests/engine_device_engine
 
 # the libraries that ldd lists, without libc, the loader and CUDA
 ldd build/x86-64-v3/mild build/x86-64-v3/tests/gpu_test_gpu | awk '$2 == "=>" { print $3 }' | sort -u |

@@ -1,4 +1,5 @@
-/* Private to the robot layer: the contents of a Robot, from robot.ini and the compiled MJCF. */
+/* Private to the layers robot and engine: the contents of a Robot, from robot.ini and the compiled
+ * MJCF. */
 #ifndef ROBOT_DESCRIPTION_H
 #define ROBOT_DESCRIPTION_H
 

@@ -34,6 +34,9 @@ void variation_apply(RobotSim *sim, const RobotVariation *variation) {
     sim->variation = *variation;
     scale_body(m, nominal, base,
                nominal->body_mass[base] * variation->link_mass_scale[0] + variation->base_mass_add);
+    if (m->body_sameframe[base] == mjSAMEFRAME_BODY) {
+        m->body_sameframe[base] = mjSAMEFRAME_BODYROT; /* else the engine would not look at ipos */
+    }
     for (int k = 0; k < 3; k++) {
         m->body_ipos[3 * base + k] = nominal->body_ipos[3 * base + k] + variation->com_offset[k];
     }

@@ -1,0 +1,454 @@
+/* Joint limits and rigid ground as MuJoCo computes them (its manual, Computation, Constraint model):
+ * soft constraints of a convex problem with one answer,
+ *
+ *     minimise over a   (a - a0)^T M (a - a0)/2 + sum over the rows of weight min(0, x)^2/2,
+ *     x = J a - a_reference
+ *
+ * where a0 is the acceleration without them. A row is a joint beyond its limit, or one of the four
+ * edges of the friction pyramid of a corner that touches. A row with x < 0 pushes. While the same
+ * rows push the problem is quadratic, so Newton's method with an exact line search ends at the
+ * answer after finitely many steps. Its matrix M + J^T weight J is as sparse as M, because all rows
+ * of a foot go through the foot's twist. */
+#ifndef MILD_ENGINE_CONSTRAINT_H
+#define MILD_ENGINE_CONSTRAINT_H
+
+#include "engine/feet.h"
+
+#define CONSTRAINT_STEPS 30      /* of Newton's method; walks take 1 to 5 */
+#define CONSTRAINT_LINE_STEPS 10 /* of the line search */
+#define REGULARIZER_LEAST REAL(1e-15)
+
+/* What rigid ground is like under a corner. */
+typedef struct {
+    Real height;   /* [m] of the surface under the corner's centre, world */
+    Real slope[2]; /* [-] along world x and y */
+} EngineSurface;
+
+/* x^power; 2 is MuJoCo's default. */
+MILD_HD Real soft_power(Real x, Real power) {
+    return power == 2 ? x * x : REAL_POW(x, power);
+}
+
+/* d(r) of a violation r < 0. */
+MILD_HD Real soft_impedance(const EngineSoft *soft, Real violation) {
+    const Real x = soft->width > 0 ? -violation / soft->width : 0;
+    const Real middle = soft->midpoint;
+    Real rise;
+    if (!(soft->width > 0)) {
+        rise = REAL(0.5);
+    } else if (x >= 1) {
+        rise = 1;
+    } else if (soft->power <= 1) {
+        rise = x;
+    } else if (x <= middle) {
+        rise = soft_power(x / middle, soft->power) * middle;
+    } else {
+        rise = 1 - soft_power((1 - x) / (1 - middle), soft->power) * (1 - middle);
+    }
+    return soft->nearest + rise * (soft->farthest - soft->nearest);
+}
+
+/* ---- the rows ---- */
+
+/* The limit of link i, which is beyond it by `violation` < 0 on a side. */
+MILD_HD void limit_row(const EngineLink *link, EngineWork *work, int i, Real side, Real violation) {
+    const Real d = soft_impedance(&link->limit, violation);
+    const Real regularizer = (1 - d) / d * link->inverse_inertia;
+    work->limit_reference[i] =
+        -link->limit.damping * side * work->rate[5 + i] - link->limit.stiffness * d * violation;
+    work->limit_weight[i] = 1 / real_max(regularizer, REGULARIZER_LEAST);
+}
+
+/* Limits that are reached. Returns whether there are any. */
+LANE_FN int engine_limits(const EngineModel *model, EngineWork *work) {
+    Real any[LANE_COPIES];
+    EACH_LANE(l) {
+        any[l] = 0;
+        for (int i = 1 + LANE(l); i < engine_links(&model->tree); i += LANES) {
+            const EngineLink *link = &model->number.link[i];
+            const Real below = work->angle[i] - link->low - link->margin;
+            const Real above = link->high - work->angle[i] - link->margin;
+            const Real side = below < 0 ? REAL(1) : above < 0 ? REAL(-1) : 0;
+            work->limit_side[i] = side;
+            if (side != 0) {
+                limit_row(link, work, i, side, real_min(below, above));
+                any[l] = 1;
+            }
+        }
+    }
+    lanes_meet();
+    return lane_max(any) > 0;
+}
+
+/* [m] Centre of a corner from the base's origin, world axes. */
+MILD_HD void corner_center(const EngineModel *model, const EngineWork *work, int corner,
+                           Real *center) {
+    const int link = model->tree.foot_link[model->tree.corner_foot[corner]];
+    turn3(work->rotation[link], model->number.corner[corner], center);
+    for (int k = 0; k < 3; k++) {
+        center[k] += work->position[link][k];
+    }
+}
+
+/* Unit normal of the surface, and the tangents that MuJoCo's mju_makeFrame takes. */
+MILD_HD void surface_frame(const Real *slope, Real frame[3][3]) {
+    const Real scale = REAL_INVERSE_SQRT(1 + slope[0] * slope[0] + slope[1] * slope[1]);
+    frame[0][0] = -slope[0] * scale;
+    frame[0][1] = -slope[1] * scale;
+    frame[0][2] = scale;
+    const int steep = !(REAL_ABS(frame[0][1]) < REAL(0.5));
+    const Real along = steep ? frame[0][2] : frame[0][1];
+    const Real length = REAL_SQRT(1 - along * along);
+    for (int k = 0; k < 3; k++) {
+        const Real unit = k == (steep ? 2 : 1);
+        frame[1][k] = (unit - along * frame[0][k]) / length;
+    }
+    cross3(frame[0], frame[1], frame[2]);
+}
+
+/* The four edges of a corner's pyramid: normal plus and minus friction times each tangent. */
+MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineSurface *surface,
+                          EngineWork *work, int corner) {
+    EngineSupport *support = &work->now.support;
+    EngineContact *contact = &support->ground.contact;
+    const EngineTree *tree = &model->tree;
+    const EngineSoft *soft = &model->number.contact;
+    const int f = tree->corner_foot[corner];
+    const EngineFoot *foot = &model->number.foot[f];
+    const int link = tree->foot_link[f];
+    Real frame[3][3];
+    Real arm[3];
+    Real point[3];
+    corner_center(model, work, corner, arm);
+    foot_point(model, work, f, point);
+    surface_frame(surface->slope, frame);
+    const Real distance =
+        (arm[2] + work->base[2] - surface->height) * frame[0][2] - foot->corner_radius;
+    const Real d = soft_impedance(soft, distance);
+    const Real regularizer =
+        2 * friction * friction * (1 - d) / d * (1 + friction * friction) * foot->inverse_inertia;
+    for (int k = 0; k < 3; k++) { /* halfway between the surfaces */
+        arm[k] -= (distance / 2 + foot->corner_radius) * frame[0][k] + point[k];
+    }
+    for (int e = 0; e < 4; e++) {
+        const int row = 4 * corner + e;
+        const Real lean = e % 2 ? -friction : friction;
+        Real *edge = contact->edge[row];
+        Real speed = 0;
+        for (int k = 0; k < 3; k++) {
+            edge[k] = frame[0][k] + lean * frame[1 + e / 2][k];
+        }
+        cross3(arm, edge, edge + 3);
+        for (int place = 0; place < engine_row_length(tree, link); place++) {
+            const Real *column = support->jacobian[f][place];
+            speed += (dot3(edge, column) + dot3(edge + 3, column + 3)) *
+                     work->rate[engine_row_dof(tree, link, place)];
+        }
+        contact->reference[row] = -soft->damping * speed - soft->stiffness * d * distance;
+        contact->weight[row] =
+            distance < 0 ? 1 / real_max(regularizer, REGULARIZER_LEAST) : REAL(0);
+    }
+}
+
+/* surface: [corners], or one for all of them when `level`. */
+LANE_FN void engine_collide(const EngineModel *model, Real friction, const EngineSurface *surface,
+                            int level, EngineWork *work) {
+    EACH_LANE(l) {
+        for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
+            corner_edges(model, friction, surface + (level ? 0 : c), work, c);
+        }
+    }
+    lanes_meet();
+}
+
+/* ---- one Newton step ---- */
+
+/* J x of all feet. */
+LANE_FN void engine_twists(const EngineTree *tree, EngineSupport *support, const Real *x,
+                           Real (*twist)[6]) {
+    EACH_LANE(l) {
+        for (int n = LANE(l); n < 6 * engine_feet(tree); n += LANES) {
+            twist[n / 6][n % 6] = foot_twist(tree, support, x, n / 6, n % 6);
+        }
+    }
+    lanes_meet();
+}
+
+MILD_HD Real edge_along(const EngineContact *contact, int row, const Real *twist) {
+    return dot3(contact->edge[row], twist) + dot3(contact->edge[row] + 3, twist + 3);
+}
+
+/* x of all edges at the acceleration. */
+LANE_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
+    EngineContact *contact = &work->now.support.ground.contact;
+    engine_twists(tree, &work->now.support, work->acceleration, contact->twist);
+    EACH_LANE(l) {
+        for (int row = LANE(l); row < 4 * engine_corners(tree); row += LANES) {
+            const Real *twist = contact->twist[tree->corner_foot[row / 4]];
+            contact->residual[row] = edge_along(contact, row, twist) - contact->reference[row];
+        }
+    }
+    lanes_meet();
+}
+
+/* For each foot, sums over its pushing edges: the stiffness, and the wrench of their forces. */
+LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work) {
+    EngineContact *contact = &work->now.support.ground.contact;
+    EACH_LANE(l) {
+        for (int n = LANE(l); n < 42 * engine_feet(tree); n += LANES) {
+            const int f = n / 42;
+            const int r = n % 42 / 7;
+            const int c = n % 7; /* 6: the wrench */
+            Real sum = 0;
+            for (int row = 4 * tree->corner_begin[f]; row < 4 * tree->corner_begin[f + 1]; row++) {
+                const Real x = contact->residual[row];
+                const Real *edge = contact->edge[row];
+                const Real value = c < 6 ? edge[c < 6 ? c : 0] : -x;
+                sum += x < 0 ? contact->weight[row] * edge[r] * value : 0;
+            }
+            if (c < 6) {
+                contact->stiffness[f][r][c] = sum;
+            } else {
+                work->wrench[f][r] = sum;
+            }
+        }
+    }
+    lanes_meet();
+}
+
+/* half <- stiffness J^T of the feet. */
+LANE_FN void engine_stiffen_rows(const EngineTree *tree, EngineSupport *support) {
+    EACH_LANE(l) {
+        for (int f = 0; f < engine_feet(tree); f++) {
+            const int length = engine_row_length(tree, tree->foot_link[f]);
+            for (int n = LANE(l); n < 6 * length; n += LANES) {
+                const Real *stiffness = support->ground.contact.stiffness[f][n % 6];
+                const Real *column = support->jacobian[f][n / 6];
+                support->half[f][n / 6][n % 6] =
+                    dot3(stiffness, column) + dot3(stiffness + 3, column + 3);
+            }
+        }
+    }
+    lanes_meet();
+}
+
+/* Entry of J^T stiffness J of the feet that move with degree of freedom d. */
+MILD_HD Real stiffened_entry(const EngineTree *tree, const EngineSupport *support, int d,
+                             int place) {
+    const int i = d < 6 ? 0 : d - 5;
+    const int own = d < 6 ? d : engine_row_length(tree, i) - 1;
+    Real sum = 0;
+    for (int f = 0; f < engine_feet(tree); f++) {
+        if (tree->foot_link[f] >= i && tree->foot_link[f] < tree->end[i]) {
+            const Real *row = support->half[f][own];
+            const Real *column = support->jacobian[f][place];
+            sum += dot3(row, column) + dot3(row + 3, column + 3);
+        }
+    }
+    return sum;
+}
+
+/* Degree of freedom d of J^T times the sums of engine_push_of_edges: a round foot, too, takes the
+ * moment of a contact at its surface. */
+MILD_HD Real pushes_along(const EngineTree *tree, const EngineWork *work, int d) {
+    const int i = d < 6 ? 0 : d - 5;
+    const int place = d < 6 ? d : engine_row_length(tree, i) - 1;
+    Real sum = 0;
+    for (int f = 0; f < engine_feet(tree); f++) {
+        if (tree->foot_link[f] >= i && tree->foot_link[f] < tree->end[i]) {
+            const Real *column = work->now.support.jacobian[f][place];
+            sum += dot3(column, work->wrench[f]) + dot3(column + 3, work->wrench[f] + 3);
+        }
+    }
+    return sum;
+}
+
+/* x of the limit of link i. */
+MILD_HD Real limit_residual(const EngineWork *work, int i) {
+    return work->limit_side[i] * work->acceleration[5 + i] - work->limit_reference[i];
+}
+
+MILD_HD int limit_pushes(const EngineWork *work, int i) {
+    return work->limit_side[i] != 0 && limit_residual(work, i) < 0;
+}
+
+/* factor <- L of M + J^T weight J over the pushing rows; change <- what is left of the forces, of
+ * the rows and of M a, which is the descent of the cost; residue <- the part of it without rows. */
+LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int edges) {
+    EngineSupport *support = &work->now.support;
+    if (edges) {
+        engine_push_of_edges(tree, work);
+        engine_stiffen_rows(tree, support);
+    }
+    EACH_LANE(l) {
+        for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
+            const int d = tree->entry_dof[e];
+            const int place = tree->entry_place[e];
+            Real sum = work->mass[e];
+            if (edges) {
+                sum += stiffened_entry(tree, support, d, place);
+            }
+            if (d >= 6 && place == engine_row_length(tree, d - 5) - 1 &&
+                limit_pushes(work, d - 5)) {
+                sum += work->limit_weight[d - 5];
+            }
+            work->factor[e] = sum;
+        }
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            const Real residue =
+                work->force[d] - mass_times(tree, work->mass, work->acceleration, d);
+            Real sum = residue;
+            if (edges) {
+                sum += pushes_along(tree, work, d);
+            }
+            if (d >= 6 && limit_pushes(work, d - 5)) {
+                sum -= work->limit_side[d - 5] * work->limit_weight[d - 5] *
+                       limit_residual(work, d - 5);
+            }
+            support->residue[d] = residue;
+            support->change[d] = sum;
+        }
+    }
+    lanes_meet();
+    engine_factorise(tree, work->factor);
+}
+
+/* ---- the line search ---- */
+
+/* Slope and curvature along the step at the length t, and how many rows begin or cease to push
+ * between 0 and t. */
+typedef struct {
+    Real slope;
+    Real curvature;
+    Real changed;
+} LinePoint;
+
+/* Adds a row of residual x that changes by `change` over the whole step. */
+MILD_HD void line_row(LinePoint *point, Real weight, Real x, Real change, Real t) {
+    const Real now = x + t * change;
+    point->slope += now < 0 ? weight * now * change : 0;
+    point->curvature += now < 0 ? weight * change * change : 0;
+    point->changed += (x < 0) != (now < 0);
+}
+
+/* The rows' part of a point of the line. */
+LANE_FN LinePoint engine_line_rows(const EngineTree *tree, EngineWork *work, int edges, Real t) {
+    EngineSupport *support = &work->now.support;
+    EngineContact *contact = &support->ground.contact;
+    Real slope[LANE_COPIES];
+    Real curvature[LANE_COPIES];
+    Real changed[LANE_COPIES];
+    EACH_LANE(l) {
+        LinePoint sum = {0, 0, 0};
+        for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
+            if (work->limit_side[i] != 0) {
+                line_row(&sum, work->limit_weight[i], limit_residual(work, i),
+                         work->limit_side[i] * support->change[5 + i], t);
+            }
+        }
+        for (int row = LANE(l); edges && row < 4 * engine_corners(tree); row += LANES) {
+            if (contact->weight[row] > 0) {
+                const Real *change = contact->twist_change[tree->corner_foot[row / 4]];
+                line_row(&sum, contact->weight[row], contact->residual[row],
+                         edge_along(contact, row, change), t);
+            }
+        }
+        slope[l] = sum.slope;
+        curvature[l] = sum.curvature;
+        changed[l] = sum.changed;
+    }
+    const LinePoint point = {lane_sum(slope), lane_sum(curvature), lane_sum(changed)};
+    return point;
+}
+
+/* The smooth part at t = 0: slope (a - a0)^T M change, and curvature change^T M change. */
+LANE_FN LinePoint engine_line_smooth(const EngineTree *tree, EngineWork *work) {
+    EngineSupport *support = &work->now.support;
+    Real slope[LANE_COPIES];
+    Real curvature[LANE_COPIES];
+    EACH_LANE(l) {
+        slope[l] = curvature[l] = 0;
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            const Real product = mass_times(tree, work->mass, support->change, d);
+            slope[l] -= support->residue[d] * support->change[d];
+            curvature[l] += support->change[d] * product;
+        }
+    }
+    const LinePoint point = {lane_sum(slope), lane_sum(curvature), 0};
+    return point;
+}
+
+/* Length of the step at which the cost is least: the zero of an increasing, piecewise linear slope,
+ * by Newton's method between bounds. */
+LANE_FN Real engine_line_search(const EngineTree *tree, EngineWork *work, int edges) {
+    const LinePoint smooth = engine_line_smooth(tree, work);
+    Real low = 0;
+    Real high = REAL(1e30);
+    Real t = 1;
+    for (int i = 0; i < CONSTRAINT_LINE_STEPS; i++) {
+        const LinePoint rows = engine_line_rows(tree, work, edges, t);
+        const Real slope = smooth.slope + t * smooth.curvature + rows.slope;
+        const Real next = t - slope / (smooth.curvature + rows.curvature + REAL_LEAST);
+        low = slope < 0 ? t : low;
+        high = slope > 0 ? t : high;
+        const Real step = next > low && next < high ? next : (low + real_min(high, 2 * t)) / 2;
+        if (slope == 0 || REAL_ABS(step - t) <= REAL_ROUNDING * t) {
+            return t;
+        }
+        t = step;
+    }
+    return t;
+}
+
+/* acceleration <- acceleration + t change. Returns whether it moved by more than rounding. */
+LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t) {
+    Real moved[LANE_COPIES];
+    Real size[LANE_COPIES];
+    EACH_LANE(l) {
+        moved[l] = size[l] = 0;
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            const Real change = t * work->now.support.change[d];
+            work->acceleration[d] += change;
+            moved[l] = real_max(moved[l], REAL_ABS(change));
+            size[l] = real_max(size[l], REAL_ABS(work->acceleration[d]));
+        }
+    }
+    lanes_meet();
+    const Real most = lane_max(moved);
+    return most > REAL_ROUNDING * lane_max(size);
+}
+
+/* From the acceleration without the rows to that with them; `edges`: engine_collide was called.
+ * Needs mass, force, limits and J; overwrites factor, half and, with edges, the wrench. Returns
+ * Newton steps. */
+LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges) {
+    EngineSupport *support = &work->now.support;
+    EngineContact *contact = &support->ground.contact;
+    int step = 0;
+    int going = 1;
+    while (going && step < CONSTRAINT_STEPS) {
+        step++;
+        if (edges) {
+            engine_residuals(tree, work);
+        }
+        engine_newton_system(tree, work, edges);
+        engine_solve_transposed(tree, work->factor, support->change);
+        engine_solve(tree, work->factor, support->change);
+        if (edges) {
+            engine_twists(tree, support, support->change, contact->twist_change);
+        }
+        if (engine_line_rows(tree, work, edges, 1).changed > 0) {
+            going = engine_move(tree, work, engine_line_search(tree, work, edges));
+        } else {
+            engine_move(tree, work, 1);
+            going = 0;
+        }
+    }
+    if (edges) {
+        engine_residuals(tree, work);
+        engine_push_of_edges(tree, work);
+    }
+    return step;
+}
+
+#endif

@@ -1,0 +1,216 @@
+#define MILD_REAL_FLOAT
+#include "engine/robots.h"
+
+#include "batch/contact.h"
+#include "engine/step.h"
+
+/* The ground's step for this number of feet; see contact.inc. */
+#ifndef ENGINE_PER
+#define ENGINE_PER 5 /* elements of a lane */
+#endif
+#define CONTACT_FEET (ENGINE_FEET == 3 ? 4 : ENGINE_FEET)
+#define CONTACT_PER ENGINE_PER
+#define CONTACT_CURVES LAW_CONE
+#define CONTACT(name) ground_##name
+#include "batch/contact.inc"
+#include "batch/robot.inc"
+
+#ifndef ENGINE_WARPS
+#define ENGINE_WARPS (ENGINE_FIXED ? 4 : 1) /* robots of a block */
+#endif
+#ifndef ENGINE_BLOCKS
+#define ENGINE_BLOCKS (ENGINE_FIXED ? 4 : 1) /* blocks of a multiprocessor, at least */
+#endif
+#ifndef SOFT_BLOCKS
+#define SOFT_BLOCKS (ENGINE_FIXED ? 2 : 1) /* the same with soft ground */
+#endif
+enum { THREADS = LANES * ENGINE_WARPS };
+
+/* What a warp has in shared memory. */
+typedef struct {
+    EngineWork work;
+    Real torque[ENGINE_JOINTS]; /* [N m] in the order of robot.ini */
+} Workplace;
+
+/* The torques of a step within the joints' efforts. */
+LANE_FN void motors(const EngineModel *model, const EngineRobots *robots, long robot,
+                    Workplace *place) {
+    const EngineTree *tree = &model->tree;
+    EACH_LANE(l) {
+        for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
+            const int j = tree->joint[i];
+            const long at = robot * tree->joints + j;
+            const Real effort = model->number.link[i].effort;
+            const Real wanted = robots->torque[at] +
+                                robots->kp[j] * (robots->target[at] - place->work.angle[i]) -
+                                robots->kd[j] * place->work.rate[5 + i];
+            place->torque[j] = real_max(-effort, real_min(effort, wanted));
+        }
+    }
+    lanes_meet();
+}
+
+LANE_FN int step(const EngineModel *model, const EngineRobots *robots, long robot,
+                 Workplace *place) {
+    EngineWork *work = &place->work;
+    const EngineVariation *variation = &robots->variation[robot];
+    const Real *push = robots->push ? robots->push + 6 * robot : NULL;
+    motors(model, robots, robot, place);
+    if (robots->rigid) {
+        const EngineSurface level = {0, {0, 0}};
+        engine_begin_rigid(model, variation, place->torque, push, work);
+        engine_collide(model, variation->friction, &level, 1, work);
+        return engine_end_rigid(model, work);
+    }
+    engine_begin(model, variation, place->torque, push, work);
+    EACH_LANE(l) {
+        for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
+            work->wrench[n / 6][n % 6] = 0;
+        }
+    }
+    lanes_meet();
+    return engine_end(model, work);
+}
+
+/* On soft ground: from the feet's pose, A and V_free to the wrenches. */
+LANE_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
+                      const ContactSetup *setup, const ContactMaterial *material, long robot,
+                      Real *memory, ground_Shared *shared, Workplace *place) {
+    EngineWork *work = &place->work;
+    motors(model, robots, robot, place);
+    engine_begin(model, &robots->variation[robot], place->torque,
+                 robots->push ? robots->push + 6 * robot : NULL, work);
+    const ContactProblem problem = {work->foot_position[0],
+                                    work->foot_rotation[0],
+                                    work->foot_velocity[0],
+                                    work->now.support.ground.inverse_inertia,
+                                    work->now.support.free_velocity[0],
+                                    material,
+                                    0};
+    const ContactResult result = {work->wrench[0], work->next_velocity[0], NULL, NULL, NULL, NULL};
+    ground_robot(setup, &problem, shared, memory, 1, &result);
+    lanes_meet();
+    return engine_end(model, work);
+}
+
+/* What a comparison wants of the last step. */
+LANE_FN void report(const EngineModel *model, const EngineRobots *robots, long robot,
+                    const EngineWork *work) {
+    const int dofs = engine_dofs(&model->tree);
+    const int rows = 6 * engine_feet(&model->tree);
+    EACH_LANE(l) {
+        for (int d = LANE(l); d < dofs; d += LANES) {
+            robots->acceleration[robot * dofs + d] = work->acceleration[d];
+        }
+        for (int n = LANE(l); robots->inverse_inertia && n < rows * rows; n += LANES) {
+            robots->inverse_inertia[robot * rows * rows + n] =
+                work->now.support.ground.inverse_inertia[n];
+        }
+    }
+}
+
+static __global__ void __launch_bounds__(THREADS, ENGINE_BLOCKS)
+    step_robots(const EngineModel *__restrict__ model, const __grid_constant__ EngineRobots robots,
+                int steps) {
+    extern __shared__ Real shared[];
+    Workplace *place = (Workplace *)shared + threadIdx.x / LANES;
+    const long robot = (long)blockIdx.x * ENGINE_WARPS + threadIdx.x / LANES;
+    const EngineTree *tree = &model->tree;
+    if (robot >= robots.count) {
+        return;
+    }
+    Real *qpos = robots.qpos + robot * (7 + tree->joints);
+    Real *qvel = robots.qvel + robot * (6 + tree->joints);
+    int bad = 0;
+    engine_load(model, qpos, qvel, &place->work);
+    for (int k = 0; k < steps && !bad; k++) {
+        bad = step(model, &robots, robot, place);
+    }
+    engine_store(model, &place->work, qpos, qvel);
+    report(model, &robots, robot, &place->work);
+    if (bad && threadIdx.x % LANES == 0) {
+        robots.bad[robot] = 1;
+    }
+}
+
+static __global__ void __launch_bounds__(THREADS, SOFT_BLOCKS)
+    step_soft_robots(const EngineModel *__restrict__ model,
+                     const __grid_constant__ EngineRobots robots,
+                     const __grid_constant__ ContactSetup setup,
+                     const __grid_constant__ BatchShape shape,
+                     const __grid_constant__ BatchArrays arrays, int steps) {
+    extern __shared__ Real shared[];
+    __shared__ ground_Shared contact[ENGINE_WARPS];
+    Workplace *place = (Workplace *)shared + threadIdx.x / LANES;
+    const long robot = (long)blockIdx.x * ENGINE_WARPS + threadIdx.x / LANES;
+    const EngineTree *tree = &model->tree;
+    if (robot >= robots.count) {
+        return;
+    }
+    Real *qpos = robots.qpos + robot * (7 + tree->joints);
+    Real *qvel = robots.qvel + robot * (6 + tree->joints);
+    const int material = robots.material ? robots.material[robot] : 0;
+    int bad = 0;
+    engine_load(model, qpos, qvel, &place->work);
+    for (int k = 0; k < steps && !bad; k++) {
+        bad = step_soft(model, &robots, &setup,
+                        (const ContactMaterial *)(arrays.materials + material * shape.feet), robot,
+                        batch_memory(&shape, &arrays, robot), &contact[threadIdx.x / LANES], place);
+    }
+    engine_store(model, &place->work, qpos, qvel);
+    report(model, &robots, robot, &place->work);
+    if (bad && threadIdx.x % LANES == 0) {
+        robots.bad[robot] = 1;
+    }
+}
+
+size_t engine_shared_bytes(void) {
+    return sizeof(Workplace);
+}
+
+static const size_t block_bytes = ENGINE_WARPS * sizeof(Workplace);
+
+/* Both kernels may take the shared memory that they need. */
+static cudaError_t allow_shared(void) {
+    const cudaError_t status = cudaFuncSetAttribute(
+        step_robots, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)block_bytes);
+    return status == cudaSuccess
+               ? cudaFuncSetAttribute(step_soft_robots, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                      (int)block_bytes)
+               : status;
+}
+
+cudaError_t engine_kernel_facts(int soft, cudaFuncAttributes *facts, int *robots_at_once) {
+    const void *kernel = soft ? (const void *)step_soft_robots : (const void *)step_robots;
+    int blocks = 0;
+    cudaError_t status = allow_shared();
+    if (status == cudaSuccess) {
+        status =
+            cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, THREADS, block_bytes);
+    }
+    *robots_at_once = blocks * ENGINE_WARPS;
+    return status == cudaSuccess ? cudaFuncGetAttributes(facts, kernel) : status;
+}
+
+cudaError_t engine_step_robots(const EngineModel *model, const EngineRobots *robots, int steps,
+                               cudaStream_t stream) {
+    const int blocks = (robots->count + ENGINE_WARPS - 1) / ENGINE_WARPS;
+    const cudaError_t status = allow_shared();
+    if (status != cudaSuccess) {
+        return status;
+    }
+    if (robots->ground) {
+        const BatchShape *shape = &robots->ground->shape;
+        const BatchArrays *arrays = &robots->ground->arrays;
+        ContactSetup setup;
+        if (shape->per != ENGINE_PER || (robots->ground->curves & ~LAW_CONE)) {
+            return cudaErrorInvalidValue;
+        }
+        batch_setup(shape, arrays, &setup);
+        step_soft_robots<<<blocks, THREADS, block_bytes, stream>>>(model, *robots, setup, *shape,
+                                                                   *arrays, steps);
+    } else {
+        step_robots<<<blocks, THREADS, block_bytes, stream>>>(model, *robots, steps);
+    }
+    return cudaGetLastError();
+}

@@ -1,0 +1,205 @@
+/* One physics step of a robot, as a warp takes it:
+ *
+ *     engine_load(model, qpos, qvel, work);                        once
+ *     for each step:
+ *         engine_begin(model, variation, torque, push, work);      up to A and V_free
+ *         soft ground: from the feet's pose, A and V_free to work->wrench
+ *         bad |= engine_end(model, work);                          limits, then the next state
+ *     engine_store(model, work, qpos, qvel);                       once
+ *
+ * and on rigid ground
+ *
+ *         engine_begin_rigid(model, variation, torque, push, work);
+ *         engine_collide(model, friction, surface, level, work);   the corners
+ *         bad |= engine_end_rigid(model, work);
+ *
+ * The ground reads work->foot_position, foot_rotation, foot_velocity, now.support.free_velocity and
+ * now.support.ground.inverse_inertia, in the layout of ContactProblem, and writes work->wrench, all
+ * of it, zeros for feet in the air, and, if it likes, work->next_velocity. Nothing else passes between
+ * the two. After a step the state is new and poses are those of its beginning; engine_pose brings
+ * them up to date for an observer (measure.h). */
+#ifndef MILD_ENGINE_STEP_H
+#define MILD_ENGINE_STEP_H
+
+#include "engine/bias.h"
+#include "engine/constraint.h"
+#include "engine/kinematics.h"
+
+#define ENGINE_RATE_MAX 1000 /* [m/s, rad/s] beyond: the numbers went bad */
+
+MILD_HD void unit_quaternion(const Real *q, Real *unit) {
+    const Real norm = REAL_SQRT(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (int k = 0; k < 4; k++) {
+        unit[k] = q[k] / norm;
+    }
+}
+
+/* From the order of RobotState, qpos [7 + joints] and qvel [6 + joints], to the tree's. */
+LANE_FN void engine_load(const EngineModel *model, const Real *qpos, const Real *qvel,
+                         EngineWork *work) {
+    const EngineTree *tree = &model->tree;
+    EACH_LANE(l) {
+        for (int i = LANE(l); i < engine_links(tree); i += LANES) {
+            work->angle[i] = i ? qpos[7 + tree->joint[i]] : 0;
+            work->limit_side[i] = 0;
+        }
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            work->rate[d] = qvel[d < 6 ? d : 6 + tree->joint[d - 5]];
+        }
+        for (int k = LANE(l); k < 3; k += LANES) {
+            work->base[k] = qpos[k];
+        }
+        if (LANE(l) == 0) {
+            unit_quaternion(qpos + 3, work->quaternion);
+        }
+    }
+    lanes_meet();
+}
+
+LANE_FN void engine_store(const EngineModel *model, const EngineWork *work, Real *qpos,
+                          Real *qvel) {
+    const EngineTree *tree = &model->tree;
+    EACH_LANE(l) {
+        for (int i = LANE(l); i < engine_links(tree); i += LANES) {
+            if (i) {
+                qpos[7 + tree->joint[i]] = work->angle[i];
+            }
+        }
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            qvel[d < 6 ? d : 6 + tree->joint[d - 5]] = work->rate[d];
+        }
+        for (int k = LANE(l); k < 4; k += LANES) {
+            qpos[3 + k] = work->quaternion[k];
+            if (k < 3) {
+                qpos[k] = work->base[k];
+            }
+        }
+    }
+    lanes_meet();
+}
+
+/* Pose, M and its factor, and the acceleration without ground and limits. torque: [joints] [N m] in
+ * the order of robot.ini; push: [6] [N, N m] at the base's centre of mass, world axes, or NULL. */
+LANE_FN void engine_smooth(const EngineModel *model, const EngineVariation *variation,
+                           const Real *torque, const Real *push, EngineWork *work) {
+    const EngineTree *tree = &model->tree;
+    engine_kinematics(model, work);
+    engine_link_inertia(model, variation, work);
+    engine_smooth_force(model, variation, torque, push, work);
+    engine_mass_matrix(model, variation, work);
+    EACH_LANE(l) {
+        for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
+            work->factor[e] = work->mass[e];
+        }
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            work->acceleration[d] = work->force[d];
+        }
+    }
+    lanes_meet();
+    engine_factorise(tree, work->factor);
+    engine_solve_transposed(tree, work->factor, work->acceleration);
+    engine_solve(tree, work->factor, work->acceleration);
+}
+
+LANE_FN void engine_begin(const EngineModel *model, const EngineVariation *variation,
+                          const Real *torque, const Real *push, EngineWork *work) {
+    engine_smooth(model, variation, torque, push, work);
+    engine_feet_pose(model, work);
+    engine_foot_inertia(&model->tree, work);
+    engine_free_velocity(model, work);
+}
+
+LANE_FN void engine_begin_rigid(const EngineModel *model, const EngineVariation *variation,
+                                const Real *torque, const Real *push, EngineWork *work) {
+    engine_smooth(model, variation, torque, push, work);
+    engine_feet_pose(model, work);
+}
+
+/* Poses and twists at the present state: of links and feet. */
+LANE_FN void engine_pose(const EngineModel *model, EngineWork *work) {
+    engine_kinematics(model, work);
+    engine_feet_pose(model, work);
+}
+
+/* The base's quaternion after turning by the vector `turn` [rad] in base axes. */
+MILD_HD void turn_quaternion(Real *q, const Real *turn) {
+    const Real square = dot3(turn, turn);
+    const Real angle = REAL_SQRT(square);
+    Real sine;
+    Real w;
+    real_sine_cosine(angle / 2, &sine, &w);
+    const Real scale = angle > 0 ? sine / angle : REAL(0.5);
+    const Real v[3] = {scale * turn[0], scale * turn[1], scale * turn[2]};
+    const Real next[4] = {q[0] * w - q[1] * v[0] - q[2] * v[1] - q[3] * v[2],
+                          q[0] * v[0] + q[1] * w + q[2] * v[2] - q[3] * v[1],
+                          q[0] * v[1] + q[2] * w + q[3] * v[0] - q[1] * v[2],
+                          q[0] * v[2] + q[3] * w + q[1] * v[1] - q[2] * v[0]};
+    unit_quaternion(next, q);
+}
+
+/* Semi-implicit Euler: velocity first, then the pose with the new velocity. Returns 1, and leaves
+ * the pose, when a velocity went bad. */
+LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
+    const EngineTree *tree = &model->tree;
+    const Real dt = model->number.dt;
+    Real bad[LANE_COPIES];
+    EACH_LANE(l) {
+        bad[l] = 0;
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            work->rate[d] += dt * work->acceleration[d];
+            bad[l] = REAL_ABS(work->rate[d]) < ENGINE_RATE_MAX ? bad[l] : 1; /* NaN included */
+        }
+    }
+    lanes_meet();
+    if (lane_max(bad) > 0) {
+        return 1;
+    }
+    EACH_LANE(l) {
+        for (int i = LANE(l); i < engine_links(tree); i += LANES) {
+            work->angle[i] += i ? dt * work->rate[5 + i] : 0;
+        }
+        for (int k = LANE(l); k < 3; k += LANES) {
+            work->base[k] += dt * work->rate[k];
+        }
+        if (LANE(l) == 0) {
+            const Real turn[3] = {dt * work->rate[3], dt * work->rate[4], dt * work->rate[5]};
+            turn_quaternion(work->quaternion, turn);
+        }
+    }
+    lanes_meet();
+    return 0;
+}
+
+LANE_FN int engine_end(const EngineModel *model, EngineWork *work) {
+    engine_add_wrench(&model->tree, work);
+    const int newton = engine_limits(model, work) ? engine_constrain(&model->tree, work, 0) : 0;
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            work->newton = newton;
+        }
+    }
+    lanes_meet();
+    return engine_integrate(model, work);
+}
+
+LANE_FN int engine_end_rigid(const EngineModel *model, EngineWork *work) {
+    engine_limits(model, work);
+    const int newton = engine_constrain(&model->tree, work, 1);
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            work->newton = newton;
+        }
+        for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
+            const int f = n / 6;
+            const int c = n % 6;
+            const Real gain = work->now.support.ground.contact.twist[f][c];
+            work->next_velocity[f][c] = c < foot_parts(&model->tree, f)
+                                            ? work->foot_velocity[f][c] + model->number.dt * gain
+                                            : 0;
+        }
+    }
+    lanes_meet();
+    return engine_integrate(model, work);
+}
+
+#endif

@@ -1,0 +1,63 @@
+/* How the links of a robot hang together: whole numbers that are the same in any scalar type.
+ *
+ * Link 0 is the base with its six degrees of freedom (linear velocity in world axes, angular
+ * velocity in base axes); every hinge has a link behind it, and link i moves with the degree of
+ * freedom 5 + i. The order is that of the mjModel: a link comes after its parent, and the links
+ * that hang on link i are i + 1 .. end[i] - 1. A body with several hinges is several links, all but
+ * the last without mass. Bodies without a joint are part of the link that carries them.
+ *
+ * M and its factor are stored by rows. The row of a degree of freedom has one entry for each of its
+ * ancestors, root first, and one for itself; no other entry of that row is ever other than zero. So
+ * the place of an ancestor in a row is the number of degrees of freedom above it, the same in all
+ * rows. Rows are packed level by level, the base's first. */
+#ifndef MILD_ENGINE_TREE_H
+#define MILD_ENGINE_TREE_H
+
+#include "robot/def.h"
+
+#define ENGINE_LINKS_MAX (1 + ROBOT_JOINTS_MAX)
+#define ENGINE_DOFS_MAX ROBOT_NV_MAX
+#define ENGINE_ENTRIES_MAX (ENGINE_DOFS_MAX * (ENGINE_DOFS_MAX + 1) / 2) /* of a single chain */
+#define ENGINE_CORNERS_MAX 64 /* spheres under the feet on rigid ground */
+#define ENGINE_BASE_ENTRIES 21
+
+typedef unsigned char EngineIndex;
+
+typedef struct {
+    int joints;
+    int feet;
+    int corners; /* of all feet */
+    int levels;  /* of the tree; the base is level 0 */
+    int entries; /* of M */
+    int chain;   /* most degrees of freedom that move one foot */
+    /* ---- links ---- */
+    EngineIndex parent[ENGINE_LINKS_MAX];
+    EngineIndex level[ENGINE_LINKS_MAX]; /* number of hinges between the link and the base */
+    EngineIndex end[ENGINE_LINKS_MAX];   /* behind the last link that hangs on it */
+    EngineIndex joint[ENGINE_LINKS_MAX]; /* the link's hinge in the order of robot.ini */
+    EngineIndex scale[ENGINE_LINKS_MAX]; /* its body's place in RobotVariation.link_mass_scale */
+    /* The ancestor of a link on each level up to its own, which holds the link itself. */
+    EngineIndex ancestor[ENGINE_LINKS_MAX][ENGINE_LINKS_MAX];
+    EngineIndex level_begin[ENGINE_LINKS_MAX + 1]; /* [levels + 1] into level_link */
+    EngineIndex level_link[ENGINE_LINKS_MAX];      /* links, level by level */
+    /* ---- M ---- */
+    short row[ENGINE_DOFS_MAX];                  /* where the row of a degree of freedom begins */
+    short level_entry[ENGINE_LINKS_MAX + 1];     /* [levels + 1] where the rows of a level begin */
+    EngineIndex entry_dof[ENGINE_ENTRIES_MAX];   /* whose row */
+    EngineIndex entry_place[ENGINE_ENTRIES_MAX]; /* where in it */
+    /* ---- feet ---- */
+    EngineIndex foot_link[ROBOT_FEET_MAX];              /* link that carries the sole */
+    EngineIndex foot_round[ROBOT_FEET_MAX];             /* bool: transmits no moment */
+    EngineIndex shared[ROBOT_FEET_MAX][ROBOT_FEET_MAX]; /* degrees of freedom that move both */
+    EngineIndex knee_link[ROBOT_FEET_MAX];
+    short outline_points[ROBOT_FEET_MAX];    /* of a flat sole; round: 0 */
+    int pairs;                               /* of mirrored feet */
+    EngineIndex pair[ROBOT_FEET_MAX / 2][2]; /* left foot, right foot */
+    EngineIndex corner_foot[ENGINE_CORNERS_MAX];
+    EngineIndex corner_begin[ROBOT_FEET_MAX + 1]; /* corners of a foot: from its own to the next */
+    /* ---- parts that must not touch the ground ---- */
+    int shells;
+    EngineIndex shell_link[ROBOT_SHELLS_MAX];
+} EngineTree;
+
+#endif

@@ -1,0 +1,2 @@
+#define ENGINE_TEXT engine_text_double
+#include "engine_text.inc"

@@ -1,0 +1,558 @@
+/* The batch engine against MuJoCo: every phase of a step on random states of four robots of
+ * different shape, in double and in float.
+ *
+ * Errors are relative to what a component could be at the same energy: with the inertia M an
+ * acceleration a has |a_i| <= sqrt((M^-1)_ii a^T M a), and so on for velocities, forces f with
+ * sqrt(M_ii f^T M^-1 f) and twists with sqrt(A_rr v^T M v); entries of M and A relate to the
+ * diagonal, M_ij to sqrt(M_ii M_jj). So a light ankle is not hidden behind a heavy trunk. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#include "cases.h"
+#include "oracle.h"
+
+#include "control/stand.h"
+
+#include "../sa01.h"
+#include "../widest.h"
+
+#define DT 0.0025
+#define LIMIT_DOUBLE 1e-9
+#define LIMIT_FLOAT 1e-4
+#define LIMIT_WRENCH 1e-3 /* of rigid ground in float: small differences of stiff rows */
+
+/* ---- robots ---- */
+
+typedef struct {
+    Robot *robot;
+    RobotSim *sim;
+    EngineTree tree;
+    double number[ENGINE_NUMBERS];
+} Kit;
+
+enum { SA01_KIT, GO1_KIT, LOPSIDED_KIT, WIDEST_KIT, KITS };
+static const char *const kit_name[KITS] = {"sa01", "go1", "lopsided", "widest"};
+static Kit kits[KITS];
+static Oracle oracle;
+static EngineResult result;
+
+static Robot *open_robot(int k, MildError *error) {
+    switch (k) {
+    case SA01_KIT: return robot_create(MILD_SOURCE_DIR "/robots/sa01", error);
+    case GO1_KIT: return robot_create(MILD_SOURCE_DIR "/robots/go1", error);
+    case LOPSIDED_KIT: return robot_create(MILD_SOURCE_DIR "/tests/engine/lopsided", error);
+    default: return widest_open(error);
+    }
+}
+
+static int setup(void **unused) {
+    (void)unused;
+    for (int k = 0; k < KITS; k++) {
+        MildError error = {0};
+        Kit *kit = &kits[k];
+        kit->robot = open_robot(k, &error);
+        print_message("%s", error.text);
+        assert_non_null(kit->robot);
+        if (k == LOPSIDED_KIT) { /* robot files may not have it; the engine knows what it is */
+            for (int d = 6; d < kit->robot->nv; d++) {
+                kit->robot->model->dof_damping[d] = 0.2 * (d % 4);
+            }
+        }
+        kit->sim = robot_sim_create(kit->robot, DT, &error);
+        assert_non_null(kit->sim);
+        assert_int_equal(engine_model_read(kit->robot, DT, &kit->tree, kit->number, &error),
+                         MILD_OK);
+    }
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    for (int k = 0; k < KITS; k++) {
+        robot_sim_destroy(kits[k].sim);
+        if (k != WIDEST_KIT) {
+            robot_destroy(kits[k].robot);
+        }
+    }
+    return widest_close(kits[WIDEST_KIT].robot);
+}
+
+/* ---- errors ---- */
+
+enum {
+    MASS,
+    FORCE,
+    SMOOTH,
+    FOOT_POSE,
+    FOOT_TWIST,
+    FOOT_INERTIA,
+    FREE_VELOCITY,
+    WRENCHED,
+    LIMITED,
+    GROUND_WRENCH,
+    NEXT_POSE,
+    NEXT_RATE,
+    NEXT_FEET,
+    MEASURES,
+    ERRORS
+};
+static const char *const error_name[ERRORS] = {"M",
+                                               "torque and push less bias",
+                                               "qacc without ground",
+                                               "pose of feet [m, -]",
+                                               "J qvel",
+                                               "A",
+                                               "V_free",
+                                               "qacc with wrenches",
+                                               "with rows",
+                                               "wrench of the ground",
+                                               "qpos after [m, rad]",
+                                               "qvel after",
+                                               "feet after [m]",
+                                               "measures [m, m/s]"};
+
+typedef double Worst[ERRORS];
+
+static void note(Worst worst, int kind, double error) {
+    worst[kind] = error <= worst[kind] ? worst[kind] : error; /* NaN included */
+}
+
+/* Quadratic form x^T S x. */
+static double energy(const double *S, const double *x, int n) {
+    double sum = 0;
+    for (int i = 0; i < n; i++) {
+        sum += x[i] * oracle_dot(S + i * n, x, n);
+    }
+    return sum;
+}
+
+/* Components of `got` against those of `want` at the same energy x^T S x, where `natural` has on its
+ * diagonal the square of a component at energy 1. */
+static void note_vector(Worst worst, int kind, const double *got, const double *want, int count,
+                        const double *natural, double energy_of) {
+    for (int i = 0; i < count; i++) {
+        double scale = sqrt(natural[i * count + i] * energy_of);
+        if (scale > 0 || got[i] != want[i]) {
+            note(worst, kind, fabs(got[i] - want[i]) / scale);
+        }
+    }
+}
+
+static void note_matrices(const Kit *kit, Worst worst) {
+    const EngineTree *tree = &kit->tree;
+    const int nv = kit->robot->nv;
+    const int rows = 6 * tree->feet;
+    const double *M = oracle.mass;
+    for (int e = 0; e < tree->entries; e++) {
+        const int d = tree->entry_dof[e];
+        const int place = tree->entry_place[e];
+        const int j = place < 6 ? place : 5 + tree->ancestor[d - 5][place - 5];
+        note(worst, MASS,
+             fabs(result.mass[e] - M[d * nv + j]) / sqrt(M[d * nv + d] * M[j * nv + j]));
+    }
+    const double *A = oracle.inverse_inertia;
+    const double *got = result.inverse_inertia;
+    for (int r = 0; r < rows; r++) {
+        for (int c = 0; c < rows; c++) {
+            double scale = sqrt(A[r * rows + r] * A[c * rows + c]);
+            if (scale > 0 || got[r * rows + c] != 0) {
+                note(worst, FOOT_INERTIA, fabs(got[r * rows + c] - A[r * rows + c]) / scale);
+            }
+        }
+    }
+}
+
+static void note_feet(const Kit *kit, const double *free, Worst worst) {
+    const int nv = kit->robot->nv;
+    const int rows = 6 * kit->tree.feet;
+    for (int f = 0; f < kit->tree.feet; f++) {
+        for (int k = 0; k < 9; k++) {
+            note(worst, FOOT_POSE, fabs(result.rotation[f][k] - oracle.rotation[f][k]));
+        }
+        for (int k = 0; k < 3; k++) {
+            note(worst, FOOT_POSE, fabs(result.position[f][k] - oracle.position[f][k]));
+        }
+    }
+    note_vector(worst, FOOT_TWIST, result.velocity[0], oracle.velocity, rows,
+                oracle.inverse_inertia, energy(oracle.mass, kit->sim->data->qvel, nv));
+    note_vector(worst, FREE_VELOCITY, result.free_velocity[0], oracle.free_velocity, rows,
+                oracle.inverse_inertia, energy(oracle.mass, free, nv));
+}
+
+/* Against the largest force, but at least the robot's weight, and that at 0.1 m. */
+static void note_wrench(const Kit *kit, Worst worst) {
+    double most = 9.81 * kit->robot->total_mass;
+    for (int f = 0; f < kit->tree.feet; f++) {
+        most = fmax(most, mju_norm3(oracle.wrench[f]));
+    }
+    for (int n = 0; n < 6 * kit->tree.feet; n++) {
+        double arm = n % 6 < 3 ? 1 : 0.1; /* [m] */
+        double error = fabs(result.wrench[n / 6][n % 6] - oracle.wrench[n / 6][n % 6]);
+        note(worst, GROUND_WRENCH, error / (most * arm));
+    }
+}
+
+static void note_step(const Kit *kit, Worst worst) {
+    const int nv = kit->robot->nv;
+    double engine[ROBOT_NV_MAX]; /* in the engine's order */
+    double want[ROBOT_NV_MAX];
+    memcpy(engine, result.qvel, sizeof engine);
+    memcpy(want, oracle.qvel, sizeof want);
+    for (int j = 0; j < kit->tree.joints; j++) {
+        engine[kit->robot->dof[j]] = result.qvel[6 + j];
+        want[kit->robot->dof[j]] = oracle.qvel[6 + j];
+    }
+    note_vector(worst, NEXT_RATE, engine, want, nv, oracle.inverse, energy(oracle.mass, want, nv));
+    double sign = oracle_dot(result.qpos + 3, oracle.qpos + 3, 4) < 0 ? -1 : 1;
+    for (int i = 0; i < kit->robot->nq; i++) {
+        double got = i >= 3 && i < 7 ? sign * result.qpos[i] : result.qpos[i];
+        note(worst, NEXT_POSE, fabs(got - oracle.qpos[i]));
+    }
+    assert_int_equal(result.bad, 0);
+    for (int n = 0; n < 3 * kit->tree.feet; n++) {
+        note(worst, NEXT_FEET,
+             fabs(result.next_position[n / 3][n % 3] - oracle.next_position[n / 3][n % 3]));
+    }
+}
+
+static void note_measures(const Kit *kit, Worst worst) {
+    note(worst, MEASURES, fabs(result.body_clearance - oracle.body_clearance));
+    note(worst, MEASURES, fabs(result.knee_distance - oracle.knee_distance));
+    note(worst, MEASURES, fabs(result.foot_distance - oracle.foot_distance));
+    for (int f = 0; f < kit->tree.feet; f++) {
+        note(worst, MEASURES, fabs(result.sole_height[f] - oracle.sole_height[f]));
+        for (int k = 0; k < 3; k++) {
+            note(worst, MEASURES, fabs(result.sole_center[f][k] - oracle.sole_center[f][k]));
+            note(worst, MEASURES, fabs(result.sole_velocity[f][k] - oracle.sole_velocity[f][k]));
+        }
+    }
+}
+
+/* Of the case that oracle and result are of. before: the velocities before the step. */
+static void note_case(const Kit *kit, const EngineCase *in, const double *before, Worst worst) {
+    const int nv = kit->robot->nv;
+    const double *M = oracle.mass;
+    const double *inverse = oracle.inverse;
+    double free[ROBOT_NV_MAX];
+    for (int i = 0; i < nv; i++) {
+        free[i] = before[i] + DT * oracle.smooth[i];
+    }
+    memcpy(kit->sim->data->qvel, before, (size_t)nv * sizeof(double));
+    note_vector(worst, FORCE, result.force, oracle.force, nv, M, energy(inverse, oracle.force, nv));
+    note_vector(worst, SMOOTH, result.smooth, oracle.smooth, nv, inverse,
+                energy(M, oracle.smooth, nv));
+    if (in->variation.rigid) {
+        note_wrench(kit, worst);
+    } else {
+        note_matrices(kit, worst);
+        note_feet(kit, free, worst);
+        note_vector(worst, WRENCHED, result.wrenched, oracle.wrenched, nv, inverse,
+                    energy(M, oracle.wrenched, nv));
+    }
+    note_vector(worst, LIMITED, result.acceleration, oracle.acceleration, nv, inverse,
+                energy(M, oracle.acceleration, nv));
+    if (in->variation.rigid) {
+        note_vector(worst, FOOT_TWIST, result.next_velocity[0], oracle.next_velocity,
+                    6 * kit->tree.feet, oracle.inverse_inertia,
+                    energy(M, kit->sim->data->qvel, nv));
+    }
+    note_step(kit, worst);
+    note_measures(kit, worst);
+}
+
+/* ---- cases ---- */
+
+static void print_worst(const char *name, int cases, const Worst at_double, const Worst at_float) {
+    print_message("%s, %d cases                    double    float\n", name, cases);
+    for (int k = 0; k < ERRORS; k++) {
+        if (at_float[k] > 0) { /* a phase that these cases have */
+            print_message("    %-28s %8.1e %8.1e\n", error_name[k], at_double[k], at_float[k]);
+        }
+    }
+}
+
+static void check_worst(const Worst at_double, const Worst at_float) {
+    for (int k = 0; k < ERRORS; k++) {
+        assert_true(at_double[k] < LIMIT_DOUBLE);
+        assert_true(at_float[k] < (k == GROUND_WRENCH ? LIMIT_WRENCH : LIMIT_FLOAT));
+    }
+}
+
+/* A case by MuJoCo and by both texts. */
+static void run_case(const Kit *kit, const EngineCase *in, Worst at_double, Worst at_float,
+                     int *newton) {
+    double before[ROBOT_NV_MAX];
+    memcpy(before, in->qvel, sizeof before);
+    for (int j = 0; j < kit->tree.joints; j++) {
+        before[kit->robot->dof[j]] = in->qvel[6 + j];
+    }
+    oracle_step(kit->sim, in, &oracle);
+    engine_text_double(&kit->tree, kit->number, in, &result);
+    note_case(kit, in, before, at_double);
+    *newton = result.newton > *newton ? result.newton : *newton;
+    engine_text_float(&kit->tree, kit->number, in, &result);
+    note_case(kit, in, before, at_float);
+    *newton = result.newton > *newton ? result.newton : *newton;
+}
+
+static void test_random_states(void **unused) {
+    (void)unused;
+    static const int cases[KITS] = {10000, 10000, 10000, 600};
+    for (int k = 0; k < KITS; k++) {
+        Worst at_double = {0}, at_float = {0};
+        int limited = 0, newton = 0;
+        for (uint32_t draw = 0; draw < (uint32_t)cases[k]; draw++) {
+            EngineCase in = random_case(kits[k].robot, draw);
+            run_case(&kits[k], &in, at_double, at_float, &newton);
+            limited += oracle.rows > 0;
+        }
+        print_worst(kit_name[k], cases[k], at_double, at_float);
+        print_message("    beyond limits: %d; at most %d Newton steps\n", limited, newton);
+        check_worst(at_double, at_float);
+        assert_true(limited > cases[k] / 5);
+    }
+}
+
+/* ---- rigid ground ---- */
+
+static void test_rigid_ground(void **unused) {
+    (void)unused;
+    static const int cases[KITS] = {10000, 10000, 10000, 600};
+    for (int k = 0; k < KITS; k++) {
+        Worst at_double = {0}, at_float = {0};
+        int touching = 0, newton = 0;
+        for (uint32_t draw = 0; draw < (uint32_t)cases[k]; draw++) {
+            EngineCase in = rigid_case(kits[k].sim, draw);
+            run_case(&kits[k], &in, at_double, at_float, &newton);
+            touching += oracle.rows > 0;
+        }
+        print_worst(kit_name[k], cases[k], at_double, at_float);
+        print_message("    with rows: %d; at most %d Newton steps\n", touching, newton);
+        check_worst(at_double, at_float);
+        assert_true(touching > cases[k] / 2);
+    }
+}
+
+/* No lane of a block needs what another one does there: on a GPU they run at once. */
+static void test_order_of_lanes(void **unused) {
+    (void)unused;
+    static EngineResult reverse;
+    for (int k = 0; k < KITS; k++) {
+        for (uint32_t draw = 0; draw < 200; draw++) {
+            EngineCase in =
+                draw % 2 ? rigid_case(kits[k].sim, draw) : random_case(kits[k].robot, draw);
+            engine_text_double(&kits[k].tree, kits[k].number, &in, &result);
+            engine_text_reverse(&kits[k].tree, kits[k].number, &in, &reverse);
+            assert_memory_equal(result.qpos, reverse.qpos, sizeof result.qpos);
+            assert_memory_equal(result.qvel, reverse.qvel, sizeof result.qvel);
+        }
+    }
+}
+
+/* ---- a second of SA01 ---- */
+
+enum { SECOND = (int)(1 / DT) };
+
+/* PD on a march on the spot: legs bend in turn. */
+static void march_torque(const Robot *robot, const double *qpos, const double *qvel, int step,
+                         double *torque) {
+    const RobotDef *def = &robot->def;
+    for (int j = 0; j < def->joints; j++) {
+        double phase = 2 * mjPI * (2 * DT * step + def->foot[robot->joint_foot[j]].offset);
+        double target = def->pose[j] + 0.35 * fmax(0, sin(phase)) * def->swing[j];
+        double wanted = 2 * def->kp[j] * (target - qpos[7 + j]) - def->kd[j] * qvel[6 + j];
+        torque[j] = fmin(fmax(wanted, -robot->effort[j]), robot->effort[j]);
+    }
+}
+
+typedef enum { RECORDED, RIGID, SOFT, MARCHES } March;
+static const char *const march_name[MARCHES] = {"recorded wrenches of sand",
+                                                "rigid ground of its own", "sand of its own"};
+
+/* Follows a sim with torques from its own state, under the wrenches of the sim's ground or on ground
+ * of its own. */
+typedef struct {
+    EngineText *text;
+    EngineCase state;
+    MildGround *ground; /* of its own, or NULL */
+    MildScratch *scratch;
+    double drift[3]; /* [m, -, rad] worst: base, its quaternion, joints */
+} Follower;
+
+static MildGround *new_ground(const Kit *kit) {
+    const MildSole *const *soles = robot_soles(kit->robot);
+    void *block = calloc(1, mild_ground_bytes(soles, kit->tree.feet));
+    assert_non_null(block);
+    return mild_ground_init(block, soles, kit->tree.feet);
+}
+
+/* What passes between engine and ground: poses, twists, A and V_free one way, wrenches the other. */
+static void stand_on(const Kit *kit, Follower *follower, const MildTerrain *terrain) {
+    static MildContactInput input;
+    static MildContactResult contact;
+    EngineCase *in = &follower->state;
+    follower->text(&kit->tree, kit->number, in, &result);
+    input.feet = kit->tree.feet;
+    input.dt = DT;
+    memcpy(input.position, result.position, sizeof input.position);
+    memcpy(input.rotation, result.rotation, sizeof input.rotation);
+    memcpy(input.velocity, result.velocity, sizeof input.velocity);
+    memcpy(input.free_velocity, result.free_velocity, sizeof input.free_velocity);
+    memcpy(input.inverse_inertia, result.inverse_inertia, sizeof input.inverse_inertia);
+    mild_ground_solve(follower->ground, terrain, &input, follower->scratch, &contact);
+    mild_ground_advance(follower->ground, terrain, &input, follower->scratch, &contact);
+    for (int f = 0; f < kit->tree.feet; f++) {
+        memcpy(in->wrench[f], contact.foot[f].force, sizeof contact.foot[f].force);
+        memcpy(in->wrench[f] + 3, contact.foot[f].torque, sizeof contact.foot[f].torque);
+    }
+}
+
+static void follow(const Kit *kit, Follower *follower, const RobotSim *sim,
+                   const MildTerrain *terrain, int step) {
+    EngineCase *in = &follower->state;
+    march_torque(kit->robot, in->qpos, in->qvel, step, in->torque);
+    for (int f = 0; f < kit->tree.feet; f++) {
+        const MildFootResult *foot = &robot_sim_contact(sim)->foot[f];
+        memcpy(in->wrench[f], foot->force, sizeof foot->force);
+        memcpy(in->wrench[f] + 3, foot->torque, sizeof foot->torque);
+    }
+    if (follower->ground) {
+        stand_on(kit, follower, terrain);
+    }
+    follower->text(&kit->tree, kit->number, in, &result);
+    memcpy(in->qpos, result.qpos, sizeof in->qpos);
+    memcpy(in->qvel, result.qvel, sizeof in->qvel);
+    for (int i = 0; i < kit->robot->nq; i++) {
+        int kind = i < 3 ? 0 : i < 7 ? 1 : 2;
+        double off = fabs(in->qpos[i] - robot_sim_qpos(sim)[i]);
+        follower->drift[kind] = fmax(follower->drift[kind], off);
+    }
+}
+
+/* SA01 for a second by RobotSim, followed by the texts. Returns the mean load of a foot [N]. */
+static double march(March kind, const EngineCase *start, Follower followers[2]) {
+    const Kit *kit = &kits[SA01_KIT];
+    RobotSim *sim = kit->sim;
+    MildGround *ground = new_ground(kit);
+    MildMaterial sand;
+    assert_true(mild_material_preset("sand_loose", &sand));
+    MildTerrain terrain = mild_terrain_uniform(&sand);
+    RobotState state = {.qpos = {0}};
+    double load = 0;
+    memcpy(state.qpos, start->qpos, sizeof state.qpos);
+    robot_sim_load(sim, &state, &start->variation);
+    sim->model->opt.tolerance = 1e-15;
+    for (int f = 0; f < 2; f++) {
+        MildError error = {0};
+        followers[f].state = *start;
+        followers[f].ground = kind == SOFT ? new_ground(kit) : NULL;
+        followers[f].scratch = mild_scratch_create(robot_soles(kit->robot), 2, &error);
+    }
+    for (int step = 0; step < SECOND; step++) {
+        double torque[ROBOT_JOINTS_MAX];
+        march_torque(kit->robot, robot_sim_qpos(sim), robot_sim_qvel(sim), step, torque);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        for (int f = 0; f < 2; f++) {
+            load += robot_sim_contact(sim)->foot[f].force[2] / (2 * SECOND);
+            follow(kit, &followers[f], sim, &terrain, step);
+        }
+    }
+    for (int f = 0; f < 2; f++) {
+        free(followers[f].ground);
+        mild_scratch_destroy(followers[f].scratch);
+    }
+    free(ground);
+    return load;
+}
+
+static void test_march(void **unused) {
+    (void)unused;
+    const Robot *robot = kits[SA01_KIT].robot;
+    EngineCase start = {.qpos = {0, 0, robot->stand_height + 0.002, 1}};
+    memcpy(start.qpos + 7, robot->def.pose, sizeof robot->def.pose);
+    start.variation = robot_variation_nominal();
+    for (int kind = 0; kind < MARCHES; kind++) {
+        Follower followers[2] = {{.text = engine_text_double}, {.text = engine_text_float}};
+        start.variation.rigid = kind == RIGID;
+        const double load = march((March)kind, &start, followers);
+        const double *at_double = followers[0].drift;
+        const double *at_float = followers[1].drift;
+        print_message(
+            "a second of march on %s, %.0f N a foot; drift of base, quaternion and joints "
+            "in double %.1e m %.1e %.1e rad, in float %.1e m %.1e %.1e rad\n",
+            march_name[kind], load, at_double[0], at_double[1], at_double[2], at_float[0],
+            at_float[1], at_float[2]);
+        assert_true(load > 100);
+        for (int k = 0; k < 3; k++) {
+            assert_true(at_double[k] < 1e-9);
+            assert_true(at_float[k] < 1e-3);
+        }
+    }
+}
+
+/* ---- the model ---- */
+
+static void test_sizes(void **unused) {
+    (void)unused;
+    char text[200];
+    engine_model_sizes(&kits[SA01_KIT].tree, text, sizeof text);
+    print_message("sa01: %s\n", text);
+    print_message("working data in float: SA01 %zu bytes, any robot %zu\n",
+                  engine_work_bytes_sa01(), engine_work_bytes());
+    assert_string_equal(text, "-DENGINE_JOINTS=12 -DENGINE_FEET=2 -DENGINE_CORNERS=8 "
+                              "-DENGINE_ENTRIES=135 -DENGINE_CHAIN=12");
+    assert_true(engine_work_bytes_sa01() <= 6 * 1024);
+}
+
+/* What the engine does not compute is refused by name. */
+static void test_refusals(void **unused) {
+    (void)unused;
+    Kit *kit = &kits[GO1_KIT];
+    mjModel *m = kit->robot->model;
+    EngineTree tree;
+    MildError error = {0};
+    double number[ENGINE_NUMBERS];
+    const double margin = m->jnt_margin[3];
+    m->jnt_margin[3] = 3;
+    assert_int_equal(engine_model_read(kit->robot, DT, &tree, number, &error), MILD_ERROR_RANGE);
+    print_message("%s\n", error.text);
+    assert_non_null(strstr(error.text, "FL_calf_joint"));
+    m->jnt_margin[3] = margin;
+    const int parent = m->body_parentid[kit->robot->limb[0].body];
+    m->body_parentid[kit->robot->limb[0].body] = 0;
+    assert_int_equal(engine_model_read(kit->robot, DT, &tree, number, &error), MILD_ERROR_FORMAT);
+    print_message("%s\n", error.text);
+    m->body_parentid[kit->robot->limb[0].body] = parent;
+    assert_int_equal(engine_model_read(kit->robot, DT, &tree, number, &error), MILD_OK);
+}
+
+/* A velocity that is not a number, or beyond any robot's, is said. */
+static void test_bad_numbers(void **unused) {
+    (void)unused;
+    const Kit *kit = &kits[SA01_KIT];
+    EngineCase in = random_case(kit->robot, 1);
+    static const double torques[] = {NAN, 1e9, 1};
+    for (int n = 0; n < 6; n++) {
+        in.variation.rigid = n >= 3;
+        in.torque[4] = torques[n % 3];
+        engine_text_double(&kit->tree, kit->number, &in, &result);
+        assert_int_equal(result.bad, n % 3 < 2);
+        engine_text_float(&kit->tree, kit->number, &in, &result);
+        assert_int_equal(result.bad, n % 3 < 2);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_random_states),  cmocka_unit_test(test_rigid_ground),
+        cmocka_unit_test(test_order_of_lanes), cmocka_unit_test(test_march),
+        cmocka_unit_test(test_sizes),          cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_bad_numbers),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
