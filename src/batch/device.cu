@@ -13,6 +13,8 @@ extern "C" {
 static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
 
+/* Robots of a block. Two blocks fit a multiprocessor; three would be 1 % faster at 65 536 robots,
+ * and 12 % slower at 4096, for they spill registers. */
 enum { WARPS = 4, THREADS = WARPS * LANES };
 
 extern "C" size_t batch_memory_numbers(const BatchShape *shape);
