@@ -145,6 +145,39 @@ static void test_state_bytes(void **state) {
     mild_sole_destroy(right);
 }
 
+/* A foot that is taken away in the middle of an impact leaves a ground as it was before, byte for
+ * byte. */
+static void test_taken_away(void **state) {
+    (void)state;
+    MildSole *sole = kit_plate(3, 3);
+    MildMaterial m;
+    assert_true(mild_material_preset("sand_loose", &m));
+    Kit kit, fresh;
+    kit_open(&kit, 1, sole, NULL, &m, 1e-3);
+    kit_open(&fresh, 1, sole, NULL, &m, 1e-3);
+    const double twist[6] = {0.3, 0.2, -1.0, 0.0, 0.0, 0.0};
+    for (int s = 0; s < 8; s++) {
+        memcpy(kit.input.velocity[0], twist, sizeof twist);
+        memcpy(kit.input.free_velocity, twist, sizeof twist);
+        kit_solve(&kit);
+        kit_advance(&kit);
+    }
+    assert_memory_not_equal(kit.ground, fresh.ground, kit.bytes);
+    kit.input.position[0][2] = 1.0;
+    for (int s = 0; s < 2; s++) {
+        kit_solve(&kit);
+        mild_ground_advance(kit.ground, &kit.terrain, &kit.input, kit.scratch, &kit.result);
+    }
+    const double *deepest = mild_ground_depth_max(kit.ground, 0);
+    for (int e = 0; e < 9; e++) {
+        assert_true(deepest[e] == 0.0);
+    }
+    assert_memory_equal(kit.ground, fresh.ground, kit.bytes);
+    kit_close(&kit);
+    kit_close(&fresh);
+    mild_sole_destroy(sole);
+}
+
 static void test_copy_continues(void **state) {
     (void)state;
     uint64_t random = 33;
@@ -177,8 +210,8 @@ static void test_copy_continues(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_no_allocation), cmocka_unit_test(test_failing_allocation),
-        cmocka_unit_test(test_bad_numbers), cmocka_unit_test(test_copy_continues),
-        cmocka_unit_test(test_state_bytes)};
+        cmocka_unit_test(test_no_allocation),  cmocka_unit_test(test_failing_allocation),
+        cmocka_unit_test(test_bad_numbers),    cmocka_unit_test(test_taken_away),
+        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_state_bytes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

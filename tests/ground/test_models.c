@@ -162,7 +162,7 @@ static void test_concentration(void **state) {
         assert_true(rival.k_drift == share * all * mild.k_drift);
         assert_true(rival.b_drift == share * all * mild.b_drift);
     }
-    const MildMaterial sand = preset("sand_dense"), cone = rival_of(MILD_MODEL_CON_CONE, &sand);
+    const MildMaterial grass = preset("grass"), cone = rival_of(MILD_MODEL_CON_CONE, &grass);
     assert_true(cone.nu == 2.0 && fabs(cone.alpha - acos(0.5)) < 1e-12); /* Choi's set */
     assert_true(cone.c_g == 2.7 && cone.c_d == 17.2 && cone.phi == 0.57 && cone.rho == 1000.0);
     const MildMaterial foam = preset("foam45"); /* springs yield, on foam too */
