@@ -12,7 +12,7 @@
 /* The shapes of contact_kinds.h. */
 static const int batch_pers[][3] = {{1, 3, 8}, {1, 5, 8}, {1, 4, 8}}; /* of 1, 2, 4 groups */
 
-static void *memory_alloc(int device, size_t bytes, MildError *error) {
+void *batch_alloc(int device, size_t bytes, MildError *error) {
     if (device != MILD_BATCH_HOST) {
         return device_alloc(device, bytes, error);
     }
@@ -23,7 +23,7 @@ static void *memory_alloc(int device, size_t bytes, MildError *error) {
     return memory;
 }
 
-static void memory_free(int device, void *memory) {
+void batch_free(int device, void *memory) {
     if (device != MILD_BATCH_HOST) {
         device_free(device, memory);
     } else {
@@ -31,8 +31,7 @@ static void memory_free(int device, void *memory) {
     }
 }
 
-static MildStatus memory_copy(int device, void *to, const void *from, size_t bytes,
-                              MildError *error) {
+MildStatus batch_copy(int device, void *to, const void *from, size_t bytes, MildError *error) {
     if (device != MILD_BATCH_HOST) {
         return device_copy(device, to, from, bytes, error);
     }
@@ -123,7 +122,7 @@ static MildStatus store_centers(MildBatch *batch, const MildSole *const *soles, 
             centers[(feet + f) * stride + (size_t)i] = (float)mild_sole_y(soles[f])[i];
         }
     }
-    MildStatus status = memory_copy(batch->device, batch->arrays.centers, centers, bytes, error);
+    MildStatus status = batch_copy(batch->device, batch->arrays.centers, centers, bytes, error);
     free(centers);
     return status;
 }
@@ -136,10 +135,10 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     BatchArrays *arrays = &batch->arrays;
     const size_t feet = (size_t)shape->feet, robots = (size_t)shape->robots;
     arrays->centers =
-        memory_alloc(batch->device, 2 * feet * (size_t)shape->stride * sizeof(float), error);
+        batch_alloc(batch->device, 2 * feet * (size_t)shape->stride * sizeof(float), error);
     arrays->memory = arrays->centers
-                         ? memory_alloc(batch->device,
-                                        robots * batch_memory_numbers(shape) * sizeof(float), error)
+                         ? batch_alloc(batch->device,
+                                       robots * batch_memory_numbers(shape) * sizeof(float), error)
                          : NULL;
     if (!arrays->memory) {
         return MILD_ERROR_MEMORY;
@@ -173,9 +172,9 @@ void mild_batch_destroy(MildBatch *batch) {
     if (!batch) {
         return;
     }
-    memory_free(batch->device, batch->arrays.centers);
-    memory_free(batch->device, batch->arrays.materials);
-    memory_free(batch->device, batch->arrays.memory);
+    batch_free(batch->device, batch->arrays.centers);
+    batch_free(batch->device, batch->arrays.materials);
+    batch_free(batch->device, batch->arrays.memory);
     free(batch);
 }
 
@@ -206,19 +205,19 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
                                   &numbers[i], error);
         curves |= status == MILD_OK ? numbers[i].curves : 0;
     }
-    void *table = status == MILD_OK ? memory_alloc(batch->device, bytes, error) : NULL;
+    void *table = status == MILD_OK ? batch_alloc(batch->device, bytes, error) : NULL;
     if (status == MILD_OK && !table) {
         status = MILD_ERROR_MEMORY;
     }
     if (status == MILD_OK) {
-        status = memory_copy(batch->device, table, numbers, bytes, error);
+        status = batch_copy(batch->device, table, numbers, bytes, error);
     }
     free(numbers);
     if (status != MILD_OK) {
-        memory_free(batch->device, table);
+        batch_free(batch->device, table);
         return status;
     }
-    memory_free(batch->device, batch->arrays.materials); /* waits until no step reads it */
+    batch_free(batch->device, batch->arrays.materials); /* waits until no step reads it */
     batch->arrays.materials = table;
     batch->material_count = count;
     batch->curves = curves;
@@ -281,8 +280,8 @@ MildStatus mild_batch_load(MildBatch *batch, int robot, const MildGround *ground
         return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
     }
     batch_memory_of(shape, ground, memory);
-    MildStatus status = memory_copy(batch->device, batch->arrays.memory + (size_t)robot * numbers,
-                                    memory, numbers * sizeof *memory, error);
+    MildStatus status = batch_copy(batch->device, batch->arrays.memory + (size_t)robot * numbers,
+                                   memory, numbers * sizeof *memory, error);
     free(memory);
     return status;
 }

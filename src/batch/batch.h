@@ -41,6 +41,13 @@ void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *m
 /* [numbers] of a robot's memory. */
 size_t batch_memory_numbers(const BatchShape *shape);
 
+/* ---- memory of a device or of MILD_BATCH_HOST ---- */
+/* All 0. NULL with a message that says how much was asked for. */
+void *batch_alloc(int device, size_t bytes, MildError *error);
+void batch_free(int device, void *memory); /* may be NULL */
+/* Copies to, from or within the device and waits. */
+MildStatus batch_copy(int device, void *to, const void *from, size_t bytes, MildError *error);
+
 /* ---- the CPU: host.c ---- */
 void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
                const MildBatchOutput *output, int advance);

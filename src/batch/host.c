@@ -27,7 +27,7 @@ typedef void (*HostRobot)(const ContactSetup *setup, const ContactProblem *probl
 
 static HostRobot host_robot(const BatchShape *shape) {
 #define HOST_CHOICE(g, p)                                                                          \
-    if (shape->groups == g && shape->per == p) {                                                   \
+    if (shape->groups == (g) && shape->per == (p)) {                                               \
         return host_robot_##g##_##p;                                                               \
     }
     CONTACT_KINDS(HOST_CHOICE)
@@ -37,7 +37,7 @@ static HostRobot host_robot(const BatchShape *shape) {
 void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
                const MildBatchOutput *output, int advance) {
     const HostRobot step = host_robot(shape);
-    ContactSetup setup;
+    ContactSetup setup = {.feet = 0};
     batch_setup(shape, arrays, &setup);
     for (long robot = 0; robot < shape->robots; robot++) {
         ContactProblem problem;

@@ -95,44 +95,32 @@ static MildStatus record(BatchBench *bench, const ExperimentDef *def, MildError 
         replay_destroy(replay);
     }
     mild_batch_destroy(shape);
+    if (status == MILD_OK && bench->problems == 0) {
+        return mild_fail(error, MILD_ERROR_RANGE, "bench: the walk has no steps");
+    }
     return status;
 }
 
 /* ---- arrays on the device ---- */
 
-/* An array of the device; from: on the host, or NULL for poison. */
+/* An array of the device; from: on the host, or NULL. */
 static void *device_array(BatchCase *c, int device, const void *from, size_t bytes,
                           MildError *error) {
-    void *array = device == MILD_BATCH_HOST ? malloc(bytes) : device_alloc(device, bytes, error);
-    char *poison = from ? NULL : malloc(bytes);
-    if (!array || (!from && !poison)) {
-        free(poison);
-        mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory: %zu MiB for an array",
-                  bytes >> 20);
+    void *array = batch_alloc(device, bytes, error);
+    if (!array) {
         return NULL;
     }
     assert(c->arrays < ARRAYS_MAX);
     c->array[c->arrays++] = array;
-    if (poison) {
-        memset(poison, 0xff, bytes); /* NaN */
-        from = poison;
+    if (from && batch_copy(device, array, from, bytes, error) != MILD_OK) {
+        return NULL; /* freed with the case */
     }
-    if (device == MILD_BATCH_HOST) {
-        memcpy(array, from, bytes);
-    } else if (device_copy(device, array, from, bytes, error) != MILD_OK) {
-        array = NULL;
-    }
-    free(poison);
     return array;
 }
 
 static void close_case(BatchCase *c) {
     for (int i = 0; i < c->arrays; i++) {
-        if (!c->batch || c->batch->device == MILD_BATCH_HOST) {
-            free(c->array[i]);
-        } else {
-            device_free(c->batch->device, c->array[i]);
-        }
+        batch_free(c->batch->device, c->array[i]);
     }
     mild_batch_destroy(c->batch);
 }
@@ -140,6 +128,7 @@ static void close_case(BatchCase *c) {
 /* count numbers of every robot, taken from its problem by their place in it. */
 static float *numbers_of(const BatchBench *bench, int robots, size_t offset, int count) {
     float *all = malloc((size_t)robots * (size_t)count * sizeof *all);
+    assert(bench->problems > 0);
     for (int r = 0; all && r < robots; r++) {
         const char *problem = (const char *)&bench->problem[r % bench->problems];
         const double *from = (const double *)(problem + offset);
@@ -166,6 +155,7 @@ static MildStatus load_case(BatchCase *c, const BatchBench *bench, MildError *er
     const size_t numbers = batch_memory_numbers(&c->batch->shape), bytes = numbers * sizeof(float);
     float *memory = malloc((size_t)robots * bytes);
     int32_t *material = malloc((size_t)robots * sizeof *material);
+    assert(bench->problems > 0);
     for (int r = 0; memory && material && r < robots; r++) {
         const Problem *problem = &bench->problem[r % bench->problems];
         memcpy(memory + (size_t)r * numbers, problem->memory, bytes);
@@ -208,14 +198,6 @@ static MildStatus open_case(BatchCase *c, const BatchBench *bench, int robots, M
     return whole ? load_case(c, bench, error) : MILD_ERROR_MEMORY;
 }
 
-static MildStatus copy(int device, void *to, const void *from, size_t bytes, MildError *error) {
-    if (device != MILD_BATCH_HOST) {
-        return device_copy(device, to, from, bytes, error);
-    }
-    memcpy(to, from, bytes);
-    return MILD_OK;
-}
-
 /* ---- measurements ---- */
 
 static int ascending(const void *a, const void *b) {
@@ -229,7 +211,7 @@ static double time_step(BatchCase *c, int advance, MildError *error) {
     const size_t bytes = (size_t)c->batch->shape.robots * mild_batch_robot_bytes(c->batch);
     double least = INFINITY;
     for (int r = 0; r < REPEATS; r++) {
-        if (copy(device, c->batch->arrays.memory, c->memory, bytes, error) != MILD_OK ||
+        if (batch_copy(device, c->batch->arrays.memory, c->memory, bytes, error) != MILD_OK ||
             (device != MILD_BATCH_HOST && device_wait(device, error) != MILD_OK)) {
             return -1.0;
         }
@@ -252,11 +234,12 @@ static MildStatus force_errors(const BatchCase *c, const BatchBench *bench, size
     int32_t *steps = malloc(count * sizeof *steps);
     MildStatus status = wrench && steps ? MILD_OK : MILD_ERROR_MEMORY;
     if (status == MILD_OK) {
-        status = copy(bench->device, wrench, c->output.wrench,
-                      count * 6 * (size_t)feet * sizeof *wrench, error);
+        status = batch_copy(bench->device, wrench, c->output.wrench,
+                            count * 6 * (size_t)feet * sizeof *wrench, error);
     }
     if (status == MILD_OK) {
-        status = copy(bench->device, steps, c->output.iterations, count * sizeof *steps, error);
+        status =
+            batch_copy(bench->device, steps, c->output.iterations, count * sizeof *steps, error);
     }
     *iterations = 0.0;
     for (size_t p = 0; status == MILD_OK && p < count; p++) {
