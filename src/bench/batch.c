@@ -12,7 +12,8 @@
 #include "bench/bench.h"
 #include "bench/record.h"
 
-enum { PERIODS = 300, GROUNDS = 2, PROBLEMS_MAX = 4000, REPEATS = 20, ARRAYS_MAX = 12 };
+enum { PERIODS = 300, GROUNDS = 2, PROBLEMS_MAX = 4000, ARRAYS_MAX = 12 };
+enum { HOST_REPEATS = 3, REPEATS = 20 };
 static const char *const grounds[GROUNDS] = {"sand_loose", "grass"};
 
 /* One step of the walk: the problem, its solution in double, and the memory before it. */
@@ -210,7 +211,8 @@ static double time_step(BatchCase *c, int advance, MildError *error) {
     const int device = c->batch->device;
     const size_t bytes = (size_t)c->batch->shape.robots * mild_batch_robot_bytes(c->batch);
     double least = INFINITY;
-    for (int r = 0; r < REPEATS; r++) {
+    const int repeats = device == MILD_BATCH_HOST ? HOST_REPEATS : REPEATS;
+    for (int r = 0; r < repeats; r++) {
         if (batch_copy(device, c->batch->arrays.memory, c->memory, bytes, error) != MILD_OK ||
             (device != MILD_BATCH_HOST && device_wait(device, error) != MILD_OK)) {
             return -1.0;
@@ -300,7 +302,7 @@ static MildStatus measure(const BatchBench *bench, int robots, int errors, Bench
 }
 
 MildStatus bench_batch(const ExperimentDef *def, BenchReport *report, MildError *error) {
-    static const int sizes[2][4] = {{2048, 0}, {4096, 16384, 65536, 0}};
+    static const int sizes[2][4] = {{1024, 0}, {4096, 16384, 65536, 0}};
     const int device = strncmp(def->train.device, "cuda", 4) == 0 ? 0 : MILD_BATCH_HOST;
     BatchBench bench = {.robot = bench_robot(def, error),
                         .problem = calloc(PROBLEMS_MAX, sizeof(Problem)),

@@ -129,6 +129,8 @@ bad "--out FOLDER is missing" "$mild" train --config complete.ini # the printed 
 bad "nearest is 'step'" "$mild" bench stepp
 expect 0 'newton_stick' "$mild" bench ground --json bench.json
 grep -q '"case":.*"newton_stick"' bench.json || fail "bench.json"
+# in float, along a walk, forces are those of the step in double
+expect 0 'force_worst *\(0\.000\|[0-9.]*e-0[4-9]\)' "$mild" bench batch
 for key in machine version rows bench case value unit; do
     grep -q "\"$key\":" bench.json || fail "bench.json lacks $key"
 done
