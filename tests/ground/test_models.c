@@ -629,6 +629,52 @@ static void test_moment(void **state) {
     }
 }
 
+/* A material that the foot does not stand on takes other loops and must change nothing: slopes and
+ * level ground, every model alone and beside all others. */
+static void test_bystanders(void **state) {
+    (void)state;
+    MildMapDef def = mild_map_def_default();
+    MildError error = {0};
+    def.kind = MILD_MAP_WAVES;
+    def.amplitude = 0.03;
+    def.wavelength = 0.5;
+    MildMap *map = mild_map_create(&def, &error);
+    assert_non_null(map);
+    double worst = 0.0;
+    for (int model = 0; model < MILD_MODEL_RIGID; model++) {
+        for (int uneven = 0; uneven < 2; uneven++) {
+            Kit kit[2];
+            const MildMaterial sand = mild_material_default();
+            const MildMaterial material = model == MILD_MODEL_MILD ? sand : rival_of(model, &sand);
+            for (int beside = 0; beside < 2; beside++) {
+                uint64_t random = 9;
+                Kit *k = &kit[beside];
+                kit_open(k, 1, sole_of(model, 0), NULL, &material, 2.5e-3);
+                kit_random_state(k, &random);
+                k->terrain.map = uneven ? map : NULL;
+                k->input.position[0][2] += mild_terrain_height_at(&k->terrain, 0.0, 0.1);
+                for (int m = 0; m < MILD_MODEL_RIGID && beside; m++) {
+                    k->terrain.materials[k->terrain.material_count] =
+                        m == MILD_MODEL_MILD ? sand : rival_of(m, &sand);
+                    k->terrain.material_count++;
+                }
+                for (int s = 0; s < 60; s++) {
+                    kit_step(k, NULL);
+                }
+            }
+            for (int i = 0; i < 3; i++) {
+                worst =
+                    fmax(worst, fabs(kit[0].input.position[0][i] - kit[1].input.position[0][i]));
+            }
+            kit_close(&kit[0]);
+            kit_close(&kit[1]);
+        }
+    }
+    print_message("materials beside the foot move it by %.1e m\n", worst);
+    assert_true(worst < 1e-9);
+    mild_map_destroy(map);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_matched),        cmocka_unit_test(test_match_is_accepted),
@@ -636,6 +682,7 @@ int main(void) {
         cmocka_unit_test(test_equilibrium),    cmocka_unit_test(test_no_creep),
         cmocka_unit_test(test_impact),         cmocka_unit_test(test_passive),
         cmocka_unit_test(test_symmetry),       cmocka_unit_test(test_solvers_agree),
-        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_moment)};
+        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_moment),
+        cmocka_unit_test(test_bystanders)};
     return cmocka_run_group_tests(tests, make_soles, drop_soles);
 }
