@@ -4,7 +4,7 @@
 #ifndef MILD_ENGINE_FACTOR_H
 #define MILD_ENGINE_FACTOR_H
 
-#include "engine/work.h"
+#include "engine/data.h"
 
 /* Sum over the links that hang on link i (all for the base) of the products of two places of their
  * rows. */

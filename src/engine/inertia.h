@@ -6,7 +6,7 @@
 #ifndef MILD_ENGINE_INERTIA_H
 #define MILD_ENGINE_INERTIA_H
 
-#include "engine/work.h"
+#include "engine/data.h"
 
 /* Adds to `sum`, about its own point, an inertia whose point lies `arm` away from that. */
 MILD_HD void inertia_add(Real *sum, const Real *inertia, const Real *arm) {

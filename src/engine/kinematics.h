@@ -2,7 +2,7 @@
 #ifndef MILD_ENGINE_KINEMATICS_H
 #define MILD_ENGINE_KINEMATICS_H
 
-#include "engine/work.h"
+#include "engine/data.h"
 
 /* Rotation matrix of a unit quaternion. */
 MILD_HD void quaternion_matrix(const Real *q, Real *R) {

@@ -3,7 +3,7 @@
 #ifndef MILD_ENGINE_MEASURE_H
 #define MILD_ENGINE_MEASURE_H
 
-#include "engine/work.h"
+#include "engine/data.h"
 
 #define MEASURE_NONE REAL(1e9) /* [m] where there is nothing to measure */
 

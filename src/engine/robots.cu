@@ -19,12 +19,9 @@
 #define ENGINE_WARPS (ENGINE_FIXED ? 4 : 1) /* robots of a block */
 #endif
 #ifndef ENGINE_BLOCKS
-#define ENGINE_BLOCKS (ENGINE_FIXED ? 4 : 1) /* blocks of a multiprocessor, at least */
-#endif
-#ifndef SOFT_BLOCKS
-/* The same with soft ground. Spilled registers cost less than idle lanes: 2, 3 and 4 make 13.7,
- * 16.6 and 18.0 M steps/s. */
-#define SOFT_BLOCKS (ENGINE_FIXED ? 4 : 1)
+/* Blocks of a multiprocessor, at least. On soft ground spilled registers cost less than idle lanes:
+ * 2, 3 and 4 make 13.7, 16.6 and 18.0 M steps/s. */
+#define ENGINE_BLOCKS (ENGINE_FIXED ? 4 : 1)
 #endif
 enum { THREADS = LANES * ENGINE_WARPS };
 
@@ -111,53 +108,35 @@ LANE_FN void report(const EngineModel *model, const EngineRobots *robots, long r
     }
 }
 
+/* SOFT: bool, on the ground of setup, shape and arrays. */
+template <int SOFT>
 static __global__ void __launch_bounds__(THREADS, ENGINE_BLOCKS)
     step_robots(const EngineModel *__restrict__ model, const __grid_constant__ EngineRobots robots,
-                int steps) {
+                const __grid_constant__ ContactSetup setup,
+                const __grid_constant__ BatchShape shape,
+                const __grid_constant__ BatchArrays arrays, int steps) {
     extern __shared__ Real shared[];
-    Workplace *place = (Workplace *)shared + threadIdx.x / LANES;
-    const long robot = (long)blockIdx.x * ENGINE_WARPS + threadIdx.x / LANES;
+    __shared__ ground_Shared contact[SOFT ? ENGINE_WARPS : 1];
+    const int warp = threadIdx.x / LANES;
+    Workplace *place = (Workplace *)shared + warp;
+    const long robot = (long)blockIdx.x * ENGINE_WARPS + warp;
     const EngineTree *tree = &model->tree;
     if (robot >= robots.count) {
         return;
     }
     Real *qpos = robots.qpos + robot * (7 + tree->joints);
     Real *qvel = robots.qvel + robot * (6 + tree->joints);
+    const int material = SOFT && robots.material ? robots.material[robot] : 0;
     int bad = 0;
     engine_load(model, qpos, qvel, &place->work);
     for (int k = 0; k < steps && !bad; k++) {
-        bad = step(model, &robots, robot, place);
-    }
-    engine_store(model, &place->work, qpos, qvel);
-    report(model, &robots, robot, &place->work);
-    if (bad && threadIdx.x % LANES == 0) {
-        robots.bad[robot] = 1;
-    }
-}
-
-static __global__ void __launch_bounds__(THREADS, SOFT_BLOCKS)
-    step_soft_robots(const EngineModel *__restrict__ model,
-                     const __grid_constant__ EngineRobots robots,
-                     const __grid_constant__ ContactSetup setup,
-                     const __grid_constant__ BatchShape shape,
-                     const __grid_constant__ BatchArrays arrays, int steps) {
-    extern __shared__ Real shared[];
-    __shared__ ground_Shared contact[ENGINE_WARPS];
-    Workplace *place = (Workplace *)shared + threadIdx.x / LANES;
-    const long robot = (long)blockIdx.x * ENGINE_WARPS + threadIdx.x / LANES;
-    const EngineTree *tree = &model->tree;
-    if (robot >= robots.count) {
-        return;
-    }
-    Real *qpos = robots.qpos + robot * (7 + tree->joints);
-    Real *qvel = robots.qvel + robot * (6 + tree->joints);
-    const int material = robots.material ? robots.material[robot] : 0;
-    int bad = 0;
-    engine_load(model, qpos, qvel, &place->work);
-    for (int k = 0; k < steps && !bad; k++) {
-        bad = step_soft(model, &robots, &setup,
-                        (const ContactMaterial *)(arrays.materials + material * shape.feet), robot,
-                        batch_memory(&shape, &arrays, robot), &contact[threadIdx.x / LANES], place);
+        if (SOFT) {
+            bad = step_soft(model, &robots, &setup,
+                            (const ContactMaterial *)(arrays.materials + material * shape.feet),
+                            robot, batch_memory(&shape, &arrays, robot), &contact[warp], place);
+        } else {
+            bad = step(model, &robots, robot, place);
+        }
     }
     engine_store(model, &place->work, qpos, qvel);
     report(model, &robots, robot, &place->work);
@@ -175,15 +154,15 @@ static const size_t block_bytes = ENGINE_WARPS * sizeof(Workplace);
 /* Both kernels may take the shared memory that they need. */
 static cudaError_t allow_shared(void) {
     const cudaError_t status = cudaFuncSetAttribute(
-        step_robots, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)block_bytes);
+        step_robots<0>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)block_bytes);
     return status == cudaSuccess
-               ? cudaFuncSetAttribute(step_soft_robots, cudaFuncAttributeMaxDynamicSharedMemorySize,
+               ? cudaFuncSetAttribute(step_robots<1>, cudaFuncAttributeMaxDynamicSharedMemorySize,
                                       (int)block_bytes)
                : status;
 }
 
 cudaError_t engine_kernel_facts(int soft, cudaFuncAttributes *facts, int *robots_at_once) {
-    const void *kernel = soft ? (const void *)step_soft_robots : (const void *)step_robots;
+    const void *kernel = soft ? (const void *)step_robots<1> : (const void *)step_robots<0>;
     int blocks = 0;
     cudaError_t status = allow_shared();
     if (status == cudaSuccess) {
@@ -209,10 +188,11 @@ cudaError_t engine_step_robots(const EngineModel *model, const EngineRobots *rob
             return cudaErrorInvalidValue;
         }
         batch_setup(shape, arrays, &setup);
-        step_soft_robots<<<blocks, THREADS, block_bytes, stream>>>(model, *robots, setup, *shape,
-                                                                   *arrays, steps);
+        step_robots<1><<<blocks, THREADS, block_bytes, stream>>>(model, *robots, setup, *shape,
+                                                                 *arrays, steps);
     } else {
-        step_robots<<<blocks, THREADS, block_bytes, stream>>>(model, *robots, steps);
+        step_robots<0><<<blocks, THREADS, block_bytes, stream>>>(
+            model, *robots, ContactSetup{}, BatchShape{}, BatchArrays{}, steps);
     }
     return cudaGetLastError();
 }
