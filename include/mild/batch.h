@@ -8,13 +8,14 @@
  *     mild_batch_step(...)         wrenches on the feet and twists after the step
  *     tau += J^T wrench            then integrate
  *
- * Values are those of mild_ground_solve and mild_ground_advance within the rounding of float: where
- * those solve a step to 1e-9, forces differ by some 1e-5 of their size. Steps so violent that plain
- * Newton steps do not solve them are left at the best point seen, with its residual.
+ * Values are those of mild_ground_solve and mild_ground_advance within the rounding of float. Along
+ * a walk, forces differ by less than 1e-4 of their size in 99 of 100 steps. A step that plain
+ * Newton steps do not solve keeps the best point seen, with its residual, and one in which friction
+ * would create energy is not solved again; mild_ground_solve does more in both cases.
  *
- * One robot stands on one material and level ground. Not there yet: maps, patches and mixtures of
- * materials, imprints, and the models whose law depends on the direction of motion (ecc_quasi,
- * ecc_quasi_3d, bekker); they are refused by name.
+ * Each robot stands on one material and on level ground. There are no maps, patches, mixtures of
+ * materials or imprints yet. The models whose law depends on the direction of motion (ecc_quasi,
+ * ecc_quasi_3d, bekker) are refused by name.
  *
  * Thread safety: a batch belongs to one thread at a time, and on a GPU to one stream. SI units. */
 #ifndef MILD_BATCH_H
@@ -50,8 +51,10 @@ typedef struct {
     const float *velocity;        /* [robots][feet][6] [m/s, rad/s] twist: linear, angular */
     const float *inverse_inertia; /* [robots][6 feet][6 feet] A; see MildContactInput */
     const float *free_velocity;   /* [robots][6 feet] [m/s, rad/s] V_free */
-    const int32_t *material;      /* [robots] index of mild_batch_set_materials; NULL: 0 */
-    const float *height;          /* [robots] [m] of the surface; NULL: 0 */
+    /* [robots] Index of mild_batch_set_materials; NULL: 0. A robot whose index is none gets results
+     * that are not numbers where it touches the ground. */
+    const int32_t *material;
+    const float *height; /* [robots] [m] of the surface; NULL: 0 */
 } MildBatchInput;
 
 /* Sums over the loaded elements of a foot, as in MildFootResult. */
@@ -87,7 +90,7 @@ int mild_batch_stride(const MildBatch *batch);
 
 /* Replaces the table of materials that MildBatchInput.material points into. materials: [count], of
  * any model that is said to be there above, checked by mild_material_check. Waits for the device.
- * Fails with the table unchanged. */
+ * A graph captured before holds the old table: capture it again. Fails with the table unchanged. */
 MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                     MildError *error);
 

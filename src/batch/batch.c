@@ -193,7 +193,7 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
                          count, BATCH_MATERIALS_MAX);
     }
     const int feet = batch->shape.feet;
-    const size_t bytes = (size_t)(count * feet) * sizeof(MaterialNumbers);
+    const size_t bytes = (size_t)((count + 1) * feet) * sizeof(MaterialNumbers);
     MaterialNumbers *numbers = malloc(bytes);
     MildStatus status = MILD_OK;
     int curves = 0;
@@ -205,6 +205,7 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
                                   &numbers[i], error);
         curves |= status == MILD_OK ? numbers[i].curves : 0;
     }
+    memset(numbers + count * feet, 0xff, (size_t)feet * sizeof *numbers); /* not a number */
     void *table = status == MILD_OK ? batch_alloc(batch->device, bytes, error) : NULL;
     if (status == MILD_OK && !table) {
         status = MILD_ERROR_MEMORY;
@@ -219,7 +220,7 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
     }
     batch_free(batch->device, batch->arrays.materials); /* waits until no step reads it */
     batch->arrays.materials = table;
-    batch->material_count = count;
+    batch->shape.materials = count;
     batch->curves = curves;
     return MILD_OK;
 }

@@ -14,6 +14,7 @@ typedef struct {
     int stride; /* elements of a foot in memory */
     float dt, tolerance;
     int limit;
+    int materials;               /* in the table; behind them one that is not a number */
     int elements[MILD_FEET_MAX]; /* of a sole */
     float z[MILD_FEET_MAX];      /* [m] of its plane */
     float area[MILD_FEET_MAX];   /* [m^2] of an element */
@@ -22,7 +23,7 @@ typedef struct {
 /* Where a batch keeps what; on its device. */
 typedef struct {
     float *centers;             /* [2][feet][stride] [m] x and y of the elements */
-    MaterialNumbers *materials; /* [count][feet] */
+    MaterialNumbers *materials; /* [materials + 1][feet] */
     float *memory;              /* [robots][CONTACT_MEMORY][groups][stride] */
 } BatchArrays;
 
@@ -30,7 +31,6 @@ struct MildBatch {
     BatchShape shape;
     BatchArrays arrays;
     int device;
-    int material_count;
     int curves;                  /* LawCurve bits of all materials */
     double pitch[MILD_FEET_MAX]; /* [m] */
 };

@@ -61,6 +61,19 @@ static DeviceRobots device_robots(const BatchShape *shape, int curves) {
     return NULL;
 }
 
+/* Makes a device the current one, and the caller's again at the end of the scope. */
+struct OnDevice {
+    int before = 0;
+    cudaError_t status;
+    explicit OnDevice(int device) {
+        cudaGetDevice(&before);
+        status = cudaSetDevice(device);
+    }
+    ~OnDevice() {
+        cudaSetDevice(before);
+    }
+};
+
 static MildStatus checked(cudaError_t status, const char *what, MildError *error) {
     return status == cudaSuccess
                ? MILD_OK
@@ -73,6 +86,7 @@ extern "C" MildStatus device_step(const MildBatch *batch, const MildBatchInput *
     const BatchShape *shape = &batch->shape;
     const int blocks = (shape->robots + WARPS - 1) / WARPS;
     ContactSetup setup;
+    OnDevice on(batch->device);
     batch_setup(shape, &batch->arrays, &setup);
     device_robots(shape, batch->curves)<<<blocks, THREADS, 0, (cudaStream_t)stream>>>(
         setup, *shape, batch->arrays, *input, *output, advance);
@@ -82,8 +96,8 @@ extern "C" MildStatus device_step(const MildBatch *batch, const MildBatchInput *
 /* ---- memory ---- */
 
 extern "C" MildStatus device_wait(int device, MildError *error) {
-    MildStatus status = checked(cudaSetDevice(device), "device", error);
-    return status == MILD_OK ? checked(cudaDeviceSynchronize(), "step", error) : status;
+    OnDevice on(device);
+    return checked(cudaDeviceSynchronize(), "step", error);
 }
 
 __global__ void device_forget(BatchShape shape, BatchArrays arrays, const uint8_t *which) {
@@ -100,6 +114,7 @@ __global__ void device_forget(BatchShape shape, BatchArrays arrays, const uint8_
 
 extern "C" MildStatus device_reset(const MildBatch *batch, const uint8_t *which, void *stream,
                                    MildError *error) {
+    OnDevice on(batch->device);
     device_forget<<<batch->shape.robots, 256, 0, (cudaStream_t)stream>>>(batch->shape,
                                                                          batch->arrays, which);
     return checked(cudaGetLastError(), "reset", error);
@@ -114,15 +129,14 @@ extern "C" MildStatus device_open(int device, MildError *error) {
                          "the CPU",
                          device, count, cudaGetErrorString(status));
     }
-    return checked(cudaSetDevice(device), "device", error);
+    OnDevice on(device);
+    return checked(on.status, "device", error);
 }
 
 extern "C" void *device_alloc(int device, size_t bytes, MildError *error) {
     void *memory = NULL;
     size_t free_bytes = 0, all = 0;
-    if (checked(cudaSetDevice(device), "device", error) != MILD_OK) {
-        return NULL;
-    }
+    OnDevice on(device);
     cudaMemGetInfo(&free_bytes, &all);
     if (cudaMalloc(&memory, bytes) != cudaSuccess) {
         cudaGetLastError(); /* it is told here */
@@ -141,15 +155,13 @@ extern "C" void *device_alloc(int device, size_t bytes, MildError *error) {
 
 extern "C" void device_free(int device, void *memory) {
     if (memory) {
-        cudaSetDevice(device);
+        OnDevice on(device);
         cudaFree(memory);
     }
 }
 
 extern "C" MildStatus device_copy(int device, void *to, const void *from, size_t bytes,
                                   MildError *error) {
-    MildStatus status = checked(cudaSetDevice(device), "device", error);
-    return status == MILD_OK
-               ? checked(cudaMemcpy(to, from, bytes, cudaMemcpyDefault), "copy", error)
-               : status;
+    OnDevice on(device);
+    return checked(cudaMemcpy(to, from, bytes, cudaMemcpyDefault), "copy", error);
 }

@@ -3,6 +3,10 @@
 #include "batch/batch.h"
 #include "ground/ground_kit.h"
 
+#ifdef MILD_CUDA
+#include <cuda_runtime_api.h>
+#endif
+
 enum { ROBOTS = 96, STEPS = 30, MATERIALS = 12, ROWS = 6 * MILD_FEET_MAX };
 
 static MildSole *left, *right, *center, *plate;
@@ -376,6 +380,81 @@ static void reset_and_load(void **state) {
     }
 }
 
+/* A robot whose material is not in the table gets no numbers; the others are left alone. */
+static void unknown_material(void **state) {
+    (void)state;
+    for (int device = MILD_BATCH_HOST; device <= 0; device++) {
+        if (device >= 0 && !has_device()) {
+            continue;
+        }
+        Side side;
+        crowd_open(&crowd, &shapes[0]);
+        for (int r = 0; r < ROBOTS; r++) {
+            crowd.kit[r].input.position[0][2] -= 0.02; /* in the ground */
+        }
+        side_open(&side, &crowd, device);
+        crowd_solve(&crowd, &arrays);
+        side_step(&side, &arrays, 0);
+        other = arrays;
+        arrays.material[3] = MATERIALS;
+        arrays.material[4] = -1;
+        side_step(&side, &arrays, 0);
+        for (int r = 0; r < ROBOTS; r++) {
+            const float *wrench = arrays.wrench + 12 * r;
+            if (r == 3 || r == 4) {
+                assert_true(isnan(wrench[2]) && !isnan(other.wrench[12 * r + 2]));
+            } else {
+                assert_memory_equal(wrench, other.wrench + 12 * r, 12 * sizeof(float));
+            }
+        }
+        side_close(&side);
+        crowd_close(&crowd);
+    }
+}
+
+#ifdef MILD_CUDA
+/* A step neither allocates nor waits, so a graph captures it, and gives the same bits. */
+static void step_is_captured(void **state) {
+    (void)state;
+    if (!has_device()) {
+        skip();
+    }
+    MildError error = {0};
+    Side side;
+    cudaStream_t stream;
+    cudaGraph_t graph;
+    cudaGraphExec_t ready;
+    crowd_open(&crowd, &shapes[0]);
+    side_open(&side, &crowd, 0);
+    crowd_solve(&crowd, &arrays);
+    side_step(&side, &arrays, 0);
+    other = arrays;
+    memset(arrays.wrench, 0xff, sizeof arrays.wrench);
+    side_copy(&side, side.arrays, &arrays, sizeof arrays);
+    Arrays *d = side.arrays;
+    const MildBatchInput input = {d->position,      d->rotation, d->velocity, d->inverse_inertia,
+                                  d->free_velocity, d->material, d->height};
+    const MildBatchOutput output = {d->wrench, d->after, NULL, NULL, NULL, NULL};
+    assert_int_equal(cudaStreamCreate(&stream), cudaSuccess);
+    assert_int_equal(cudaStreamBeginCapture(stream, cudaStreamCaptureModeGlobal), cudaSuccess);
+    assert_int_equal(mild_batch_reset(side.batch, NULL, stream, &error), MILD_OK);
+    assert_int_equal(mild_batch_step(side.batch, &input, &output, 1, stream, &error), MILD_OK);
+    assert_int_equal(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+    assert_int_equal(cudaGraphInstantiate(&ready, graph, 0), cudaSuccess);
+    for (int i = 0; i < 2; i++) { /* reset and step: the second is the first */
+        assert_int_equal(cudaGraphLaunch(ready, stream), cudaSuccess);
+    }
+    assert_int_equal(cudaStreamSynchronize(stream), cudaSuccess);
+    side_copy(&side, &arrays, side.arrays, sizeof arrays);
+    assert_memory_equal(arrays.wrench, other.wrench, sizeof(float) * ROBOTS * 12);
+    cudaGraphExecDestroy(ready);
+    cudaGraphDestroy(graph);
+    cudaStreamDestroy(stream);
+    side_close(&side);
+    crowd_close(&crowd);
+}
+#endif
+
 /* What is wrong, and a word of the message. */
 static void refuse(const MildBatchDef *def, const char *word) {
     MildError error = {0};
@@ -448,6 +527,10 @@ int main(void) {
         cmocka_unit_test(steps_are_those_of_the_ground),
         cmocka_unit_test(device_and_host_agree),
         cmocka_unit_test(reset_and_load),
+        cmocka_unit_test(unknown_material),
+#ifdef MILD_CUDA
+        cmocka_unit_test(step_is_captured),
+#endif
         cmocka_unit_test(bad_input_is_refused),
     };
     return cmocka_run_group_tests(tests, open_soles, close_soles);
