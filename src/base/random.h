@@ -6,6 +6,8 @@
 #include <math.h>
 #include <stdint.h>
 
+#include "base/both.h"
+
 typedef struct {
     uint64_t seed;
     uint32_t stream; /* environment, layer, ... */
@@ -13,7 +15,7 @@ typedef struct {
     uint32_t use;    /* running counter inside (stream, step) */
 } Random;
 
-static inline uint64_t random_mix(uint64_t x) {
+static inline MILD_BOTH uint64_t random_mix(uint64_t x) {
     x ^= x >> 30;
     x *= 0xbf58476d1ce4e5b9u;
     x ^= x >> 27;
@@ -21,12 +23,12 @@ static inline uint64_t random_mix(uint64_t x) {
     return x ^ (x >> 31);
 }
 
-static inline Random random_at(uint64_t seed, uint32_t stream, uint32_t step) {
+static inline MILD_BOTH Random random_at(uint64_t seed, uint32_t stream, uint32_t step) {
     return (Random){seed, stream, step, 0};
 }
 
 /* 64 random bits. The key is derived from (seed, stream); the counter is (step, use). */
-static inline uint64_t random_bits(Random *r) {
+static inline MILD_BOTH uint64_t random_bits(Random *r) {
     uint32_t x0 = r->step, x1 = r->use++;
     uint64_t k64 = random_mix(r->seed + 0x9e3779b97f4a7c15u * ((uint64_t)r->stream + 1u));
     uint32_t key = (uint32_t)(k64 ^ (k64 >> 32));
@@ -41,21 +43,21 @@ static inline uint64_t random_bits(Random *r) {
 }
 
 /* Uniform in [0, 1). */
-static inline double random_unit(Random *r) {
+static inline MILD_BOTH double random_unit(Random *r) {
     return (double)(random_bits(r) >> 11) * 0x1.0p-53;
 }
 
-static inline double random_uniform(Random *r, double low, double high) {
+static inline MILD_BOTH double random_uniform(Random *r, double low, double high) {
     return low + (high - low) * random_unit(r);
 }
 
 /* Integer in [0, count). */
-static inline uint32_t random_index(Random *r, uint32_t count) {
+static inline MILD_BOTH uint32_t random_index(Random *r, uint32_t count) {
     return (uint32_t)(((random_bits(r) >> 32) * (uint64_t)count) >> 32);
 }
 
 /* Standard normal (Box-Muller, one of the pair). */
-static inline double random_normal(Random *r) {
+static inline MILD_BOTH double random_normal(Random *r) {
     double u = 1.0 - random_unit(r), v = random_unit(r);
     return sqrt(-2.0 * log(u)) * cos(6.283185307179586 * v);
 }

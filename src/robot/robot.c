@@ -537,6 +537,37 @@ const double *robot_assist(const Robot *robot) {
     return robot->def.assist;
 }
 
+void robot_fill_table(const Robot *robot, RobotTable *table) {
+    const RobotDef *def = &robot->def;
+    memset(table, 0, sizeof *table);
+    table->joints = def->joints;
+    table->feet = def->feet;
+    for (int i = 0; i < def->joints; i++) {
+        table->joint_foot[i] = robot->joint_foot[i];
+        table->default_pose[i] = def->pose[i];
+        table->joint_low[i] = robot->low[i];
+        table->joint_high[i] = robot->high[i];
+        table->effort[i] = robot->effort[i];
+        table->speed[i] = def->speed[i];
+        table->swing[i] = def->swing[i];
+        table->still[i] = def->still[i];
+    }
+    for (int f = 0; f < def->feet; f++) {
+        table->gait_offset[f] = def->foot[f].offset;
+    }
+    memcpy(table->feet_range, def->feet_range, sizeof table->feet_range);
+    memcpy(table->knee_range, def->knee_range, sizeof table->knee_range);
+    table->feet_least = def->feet_least;
+    table->knee_least = def->knee_least;
+    memcpy(table->assist, def->assist, sizeof table->assist);
+    table->total_mass = robot->total_mass;
+    table->stand_height = robot->stand_height;
+    table->nominal_height = robot_nominal_height(robot);
+    table->action_scale = robot_action_scale(robot);
+    table->foot_force = robot_foot_force(robot);
+    table->cells = robot->is_concentric ? mild_sole_elements(robot->soles[0]) : 1;
+}
+
 const MildSole *const *robot_soles(const Robot *robot) {
     return (const MildSole *const *)(robot->is_concentric ? robot->concentric : robot->soles);
 }

@@ -22,13 +22,13 @@ enum { HAND_TILT, HAND_DAMPING, HAND_DRAW, HAND_LIMIT };
 #define ASSIST_LEAST 0.01 /* [-] added at a fall */
 #define GRAVITY 9.81
 
-double task_assist_share(const TaskEnv *env, const TaskDef *def) {
+TASK_FN double task_assist_share(const TaskEnv *env, const TaskDef *def) {
     return def->assist ? env->assist_level * env->assist_draw : 0;
 }
 
 /* Updates the level after a policy step. The level is steady when the robot falls every
  * ASSIST_GRACE + ASSIST_DECAY ln(ASSIST_RISE) seconds. */
-void task_assist_adapt(TaskEnv *env, int fallen) {
+TASK_FN void task_assist_adapt(TaskEnv *env, int fallen) {
     if (fallen) {
         env->assist_level = fmin(1, ASSIST_RISE * env->assist_level + ASSIST_LEAST);
     } else if ((env->step - env->step_first) * TASK_PERIOD > ASSIST_GRACE) {
@@ -36,22 +36,23 @@ void task_assist_adapt(TaskEnv *env, int fallen) {
     }
 }
 
-void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double *pose) {
-    double share = task_assist_share(env, def), reference[ROBOT_JOINTS_MAX];
-    const double *rest = robot_default_pose(robot);
-    task_gait_reference(def, robot, env->phase, task_is_standing(env->command), reference);
-    for (int i = 0; i < env->shape.joints; i++) {
-        pose[i] = rest[i] + share * ASSIST_LEAD * (reference[i] - rest[i]);
+TASK_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i) {
+    double share = task_assist_share(env, def), rest = robot_default_pose(robot)[i];
+    if (share == 0) {
+        return rest;
     }
+    int standing = task_is_standing(env->command);
+    double reference = task_gait_reference(def, robot, env->phase, standing, i);
+    return rest + share * ASSIST_LEAD * (reference - rest);
 }
 
-int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
-                double wrench[6]) {
+TASK_FN int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                        const double *rotation, const double *qvel, double wrench[6]) {
     double share = task_assist_share(env, def);
     if (share == 0) {
         return 0;
     }
-    const double *turn = robot_sim_base_rotation(sim), *v = robot_sim_qvel(sim);
+    const double *turn = rotation, *v = qvel;
     double heading = atan2(turn[3], turn[0]), c = cos(heading), s = sin(heading);
     const double *hand = robot_assist(robot);
     double wanted[2] = {c * env->command[0] - s * env->command[1],

@@ -4,12 +4,12 @@
 
 #define TWO_PI 6.283185307179586
 
-int task_is_standing(const double command[3]) {
+TASK_FN int task_is_standing(const double command[3]) {
     return fabs(command[0]) < 0.1 && fabs(command[1]) < 0.1 && fabs(command[2]) < 0.1;
 }
 
 /* [-] Progress of the foot's swing, the half of the period before its stance; -1 in stance. */
-static double swing_progress(const Robot *robot, double phase, int foot) {
+static inline MILD_BOTH double swing_progress(const Robot *robot, double phase, int foot) {
     double offset = robot_gait_offset(robot, foot);
     double p = phase - (offset < 0.5 ? offset + 0.5 : offset - 0.5);
     p += p < 0 ? 1 : 0;
@@ -17,36 +17,34 @@ static double swing_progress(const Robot *robot, double phase, int foot) {
 }
 
 /* The foot's clock: positive in stance, negative in swing. */
-static double wave(const Robot *robot, double phase, int foot) {
+static inline MILD_BOTH double wave(const Robot *robot, double phase, int foot) {
     double offset = robot_gait_offset(robot, foot);
     return offset < 0.5 ? sin(TWO_PI * (phase - offset)) : -sin(TWO_PI * (phase - (offset - 0.5)));
 }
 
-int task_gait_stance(const Robot *robot, double phase, int standing, int foot) {
+TASK_FN int task_gait_stance(const Robot *robot, double phase, int standing, int foot) {
     return standing || swing_progress(robot, phase, foot) < 0;
 }
 
-int task_gait_either(const TaskDef *def, const Robot *robot, double phase, int standing, int foot) {
+TASK_FN int task_gait_either(const TaskDef *def, const Robot *robot, double phase, int standing,
+                             int foot) {
     return !standing && fabs(wave(robot, phase, foot)) < def->double_support;
 }
 
 /* h_des = apex sin(pi s), with s the progress of the swing, so that the foot leaves and meets h0 on
  * time. */
-double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
-                        int foot) {
+TASK_FN double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
+                                int foot) {
     double s = swing_progress(robot, phase, foot);
     return standing || s < 0 ? 0 : def->swing_apex * sin(0.5 * TWO_PI * s);
 }
 
 /* The vendor's reference motion: the swing leg bends by A |sin| times `swing` of robot.ini. For
  * SA01 that is (-1, 2, -1) in hip pitch, knee and ankle pitch. */
-void task_gait_reference(const TaskDef *def, const Robot *robot, double phase, int standing,
-                         double *q) {
-    const double *pose = robot_default_pose(robot), *swing = robot_swing(robot);
-    for (int i = 0; i < robot_joints(robot); i++) {
-        int foot = robot_joint_foot(robot)[i];
-        double now = foot < 0 || standing ? 0 : wave(robot, phase, foot);
-        double bend = -now < def->double_support ? 0 : def->reward.reference_amplitude * -now;
-        q[i] = pose[i] + swing[i] * bend;
-    }
+TASK_FN double task_gait_reference(const TaskDef *def, const Robot *robot, double phase,
+                                   int standing, int i) {
+    int foot = robot_joint_foot(robot)[i];
+    double now = foot < 0 || standing ? 0 : wave(robot, phase, foot);
+    double bend = -now < def->double_support ? 0 : def->reward.reference_amplitude * -now;
+    return robot_default_pose(robot)[i] + robot_swing(robot)[i] * bend;
 }

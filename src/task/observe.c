@@ -17,7 +17,7 @@
 #define TWO_PI 6.283185307179586
 #define RANDOM_USE_NOISE 0x4e4f4953u
 
-void task_read_imu(const RobotSim *sim, TaskReading *reading) {
+TASK_FN void task_read_imu(const RobotSim *sim, TaskReading *reading) {
     const double *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
     for (int i = 0; i < 3; i++) {
         reading->omega[i] = qvel[3 + i];
@@ -25,7 +25,7 @@ void task_read_imu(const RobotSim *sim, TaskReading *reading) {
     }
 }
 
-void task_read_motors(const RobotSim *sim, TaskReading *reading) {
+TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading) {
     memcpy(reading->q, robot_sim_qpos(sim) + 7, sizeof reading->q);
     memcpy(reading->qd, robot_sim_qvel(sim) + 6, sizeof reading->qd);
 }
@@ -86,14 +86,11 @@ static void write_estimates(const TaskEnv *env, const RobotSim *sim, float *esti
 
 /* Material under the base, with each parameter scaled to about one. Parameters of an element that
  * represents a whole sole are converted to those of one of its cells. */
-static float *write_ground(const TaskEnv *env, const Robot *robot, const RobotSim *sim,
-                           float *out) {
+static inline MILD_BOTH float *write_ground(const TaskEnv *env, const Robot *robot,
+                                            const RobotSim *sim, float *out) {
     const double *qpos = robot_sim_qpos(sim);
-    const MildMaterial *m =
-        &env->terrain.materials[mild_terrain_material_at(&env->terrain, qpos[0], qpos[1])];
-    double cells = mild_model_is_concentric((MildModel)m->model)
-                       ? mild_sole_elements(robot_rasters(robot)[0])
-                       : 1;
+    const MildMaterial *m = place_material(&env->terrain, qpos[0], qpos[1]);
+    double cells = place_cells(robot, m->model);
     const double values[] = {m->k_pen / 500 / cells,
                              m->sigma_cone / 1e5,
                              m->alpha,
@@ -144,9 +141,8 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *ro
         *out++ = (float)(env->variation.com_offset[i] * 100);
     }
     out = write_ground(env, robot, sim, out);
-    *out++ = (float)(robot_sim_qpos(sim)[2] - mild_terrain_height_at(&env->terrain,
-                                                                     robot_sim_qpos(sim)[0],
-                                                                     robot_sim_qpos(sim)[1]));
+    *out++ = (float)(robot_sim_qpos(sim)[2] -
+                     place_height(&env->terrain, robot_sim_qpos(sim)[0], robot_sim_qpos(sim)[1]));
     *out++ = (float)env->strength[0];
     *out++ = (float)env->variation.armature_scale;
     double step = def->physics_dt / TASK_PERIOD;
@@ -165,8 +161,8 @@ static void remember(TaskEnv *env, const TaskDef *def, const float *frame, int f
     int width = env->shape.observation;
     size_t bytes = (size_t)width * sizeof *frame;
     float *history = task_env_history(env);
-    env->newest = (env->newest + 1) % TASK_FRAMES_HELD;
-    for (int age = 0; age < (first ? TASK_FRAMES_HELD : 1); age++) {
+    env->newest = (env->newest + 1) % env->held;
+    for (int age = 0; age < (first ? (int)env->held : 1); age++) {
         memcpy(task_env_frame(env, age), frame, bytes);
     }
     memcpy(history + env->shape.history - width, frame, bytes);
@@ -186,8 +182,8 @@ static void remember(TaskEnv *env, const TaskDef *def, const float *frame, int f
     }
 }
 
-void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
-                  const TaskReading *reading, int first, const TaskView *view) {
+TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                          const TaskReading *reading, int first, const TaskView *view) {
     const double *pose = robot_default_pose(robot);
     float frame[TASK_OBSERVATION_MAX];
     make_frame(env, def, pose, reading, frame);

@@ -5,16 +5,16 @@
 
 #include "task/task.h"
 
-static double square(double x) {
+static inline MILD_BOTH double square(double x) {
     return x * x;
 }
 
-static double clamp(double x, double low, double high) {
+static inline MILD_BOTH double clamp(double x, double low, double high) {
     return x < low ? low : x > high ? high : x;
 }
 
 /* Scales a sum over feet to two feet. */
-static double per_pair(const TaskMotion *m, double sum) {
+static inline MILD_BOTH double per_pair(const TaskMotion *m, double sum) {
     return sum * (2.0 / m->env->shape.feet);
 }
 
@@ -22,7 +22,7 @@ static double per_pair(const TaskMotion *m, double sum) {
  * too slow costs only 1 %. exp(-|e|/width) keeps its slope down to zero error. Both use the
  * velocity smoothed over half a gait period, because the sway within a step is not an error and
  * would hide one. */
-static double tracking(const TaskMotion *m, double error) {
+static inline MILD_BOTH double tracking(const TaskMotion *m, double error) {
     const RewardDef *def = &m->def->reward;
     return 0.5 * (exp(-def->tracking_sharpness * square(error)) +
                   exp(-fabs(error) / def->tracking_width));
@@ -30,12 +30,12 @@ static double tracking(const TaskMotion *m, double error) {
 
 /* Forward and sideways errors count separately. In the norm of both, a little sway would hide a
  * forward error. */
-static double reward_linear_velocity(const TaskMotion *m) {
+static inline MILD_BOTH double reward_linear_velocity(const TaskMotion *m) {
     const double *v = m->env->smooth_velocity, *command = m->env->command;
     return tracking(m, v[0] - command[0]) * tracking(m, v[1] - command[1]);
 }
 
-static double reward_yaw_rate(const TaskMotion *m) {
+static inline MILD_BOTH double reward_yaw_rate(const TaskMotion *m) {
     return tracking(m, m->env->smooth_velocity[2] - m->env->command[2]);
 }
 
@@ -44,7 +44,7 @@ static double reward_yaw_rate(const TaskMotion *m) {
  * perfect swing) and has a slope from the first millimetre. Lifting too high costs half as much per
  * metre as lifting gains. The scale is such that following h_des = apex sin(pi s) gives 1 on
  * average over the swing. */
-static double reward_feet_clearance(const TaskMotion *m) {
+static inline MILD_BOTH double reward_feet_clearance(const TaskMotion *m) {
     double sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
         if (!m->stance[f]) {
@@ -56,7 +56,7 @@ static double reward_feet_clearance(const TaskMotion *m) {
     return per_pair(m, sum);
 }
 
-static double reward_gait(const TaskMotion *m) {
+static inline MILD_BOTH double reward_gait(const TaskMotion *m) {
     double sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
         sum += m->either[f] || m->contact[f] == m->stance[f] ? 1 : -0.3;
@@ -64,7 +64,7 @@ static double reward_gait(const TaskMotion *m) {
     return sum / m->env->shape.feet;
 }
 
-static double reward_slip(const TaskMotion *m) {
+static inline MILD_BOTH double reward_slip(const TaskMotion *m) {
     double sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
         sum += m->contact[f] ? m->foot_speed[f] : 0;
@@ -72,11 +72,11 @@ static double reward_slip(const TaskMotion *m) {
     return per_pair(m, sum);
 }
 
-static double reward_base_acceleration(const TaskMotion *m) {
+static inline MILD_BOTH double reward_base_acceleration(const TaskMotion *m) {
     return exp(-3 * m->twist_change);
 }
 
-static double reward_action_smoothness(const TaskMotion *m) {
+static inline MILD_BOTH double reward_action_smoothness(const TaskMotion *m) {
     double sum = 0;
     for (int i = 0; i < m->env->shape.actions; i++) {
         double a = m->env->action[0][i], a1 = m->env->action[1][i], a2 = m->env->action[2][i];
@@ -85,11 +85,11 @@ static double reward_action_smoothness(const TaskMotion *m) {
     return sum;
 }
 
-static double reward_reference_motion(const TaskMotion *m) {
-    double reference[ROBOT_JOINTS_MAX], sum = 0;
-    task_gait_reference(m->def, m->robot, m->env->phase, m->standing, reference);
+static inline MILD_BOTH double reward_reference_motion(const TaskMotion *m) {
+    double sum = 0;
     for (int i = 0; i < m->env->shape.joints; i++) {
-        sum += square(m->q[i] - reference[i]);
+        sum +=
+            square(m->q[i] - task_gait_reference(m->def, m->robot, m->env->phase, m->standing, i));
     }
     double d = sqrt(sum);
     return exp(-2 * d) - 0.2 * clamp(d, 0, 0.5);
@@ -97,7 +97,7 @@ static double reward_reference_motion(const TaskMotion *m) {
 
 /* The vendor's exp(-100 x) alone is flat beyond a fifth of a radian, and so gives no signal
  * there. */
-static double reward_default_pose(const TaskMotion *m) {
+static inline MILD_BOTH double reward_default_pose(const TaskMotion *m) {
     const double *pose = robot_default_pose(m->robot), *still = robot_still(m->robot);
     double away = 0, all = 0;
     for (int f = -1; f < m->env->shape.feet; f++) { /* -1: the trunk's joints */
@@ -114,25 +114,26 @@ static double reward_default_pose(const TaskMotion *m) {
     return 0.5 * (exp(-100 * clamp(away - 0.1, 0, 50)) + exp(-3 * away)) - 0.01 * sqrt(all);
 }
 
-static double reward_base_height(const TaskMotion *m) {
+static inline MILD_BOTH double reward_base_height(const TaskMotion *m) {
     return exp(-100 * fabs(m->base_height - task_nominal_height(m->def, m->robot)));
 }
 
-static double within(double distance, const double wanted[2], const double own[2]) {
+static inline MILD_BOTH double within(double distance, const double wanted[2],
+                                      const double own[2]) {
     const double *limits = wanted[1] > 0 ? wanted : own;
     double below = clamp(limits[0] - distance, 0, 0.5), above = clamp(distance - limits[1], 0, 0.5);
     return 0.5 * (exp(-100 * below) + exp(-100 * above));
 }
 
-static double reward_feet_distance(const TaskMotion *m) {
+static inline MILD_BOTH double reward_feet_distance(const TaskMotion *m) {
     return within(m->foot_distance, m->def->reward.feet_range, robot_feet_range(m->robot));
 }
 
-static double reward_knee_distance(const TaskMotion *m) {
+static inline MILD_BOTH double reward_knee_distance(const TaskMotion *m) {
     return within(m->knee_distance, m->def->reward.knee_range, robot_knee_range(m->robot));
 }
 
-static double reward_orientation(const TaskMotion *m) {
+static inline MILD_BOTH double reward_orientation(const TaskMotion *m) {
     double tilt = sqrt(square(m->gravity[0]) + square(m->gravity[1]));
     return 0.5 * (exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + exp(-4 * tilt));
 }
@@ -140,16 +141,16 @@ static double reward_orientation(const TaskMotion *m) {
 /* Paid once, at touchdown. It is divided by the period, because rewards are rates that are
  * multiplied by the period. The vendor's version lacks this, so only a hundredth of it remains,
  * which a learner does not notice. */
-static double reward_air_time(const TaskMotion *m) {
+static inline MILD_BOTH double reward_air_time(const TaskMotion *m) {
     return m->standing ? 0 : per_pair(m, m->landed_air_time) / TASK_PERIOD;
 }
 
-static double reward_base_motion(const TaskMotion *m) {
+static inline MILD_BOTH double reward_base_motion(const TaskMotion *m) {
     return 0.5 * (exp(-10 * square(m->velocity[2])) +
                   exp(-5 * sqrt(square(m->omega[0]) + square(m->omega[1]))));
 }
 
-static double reward_contact_force(const TaskMotion *m) {
+static inline MILD_BOTH double reward_contact_force(const TaskMotion *m) {
     double sum = 0, hard = robot_foot_force(m->robot);
     for (int f = 0; f < m->env->shape.feet; f++) {
         sum += clamp(m->foot_force[f] - hard, 0, 0.8 * hard);
@@ -157,7 +158,7 @@ static double reward_contact_force(const TaskMotion *m) {
     return per_pair(m, sum);
 }
 
-static double reward_torque(const TaskMotion *m) {
+static inline MILD_BOTH double reward_torque(const TaskMotion *m) {
     double sum = 0;
     for (int i = 0; i < m->env->shape.joints; i++) {
         sum += square(m->torque[i]);
@@ -165,7 +166,7 @@ static double reward_torque(const TaskMotion *m) {
     return sum;
 }
 
-static double reward_joint_speed(const TaskMotion *m) {
+static inline MILD_BOTH double reward_joint_speed(const TaskMotion *m) {
     double sum = 0;
     for (int i = 0; i < m->env->shape.joints; i++) {
         sum += square(m->qd[i]);
@@ -173,7 +174,7 @@ static double reward_joint_speed(const TaskMotion *m) {
     return sum;
 }
 
-static double reward_joint_acceleration(const TaskMotion *m) {
+static inline MILD_BOTH double reward_joint_acceleration(const TaskMotion *m) {
     double sum = 0;
     for (int i = 0; i < m->env->shape.joints; i++) {
         sum += square((m->qd[i] - m->qd_before[i]) / TASK_PERIOD);
@@ -182,23 +183,19 @@ static double reward_joint_acceleration(const TaskMotion *m) {
 }
 
 /* Penalises legs that are too close, because the engine computes no contact between them. */
-static double reward_collision(const TaskMotion *m) {
+static inline MILD_BOTH double reward_collision(const TaskMotion *m) {
     return (m->foot_distance < robot_feet_least(m->robot)) +
            (m->knee_distance < robot_knee_least(m->robot));
 }
 
-typedef double (*RewardFunction)(const TaskMotion *);
-#define TASK_REWARD_FUNCTION(name, weight, help) reward_##name,
-static const RewardFunction reward_functions[TASK_REWARD_COUNT] = {
-    TASK_REWARD_LIST(TASK_REWARD_FUNCTION)};
-
-double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]) {
+TASK_FN double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]) {
+    const double *weight = motion->def->reward.weight;
     double sum = 0;
-    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-        double weight = motion->def->reward.weight[i];
-        terms[i] = weight == 0 ? 0 : weight * reward_functions[i](motion);
-        sum += terms[i];
-    }
+#define TASK_REWARD_TERM(name, weight_, help)                                                      \
+    terms[REWARD_##name] =                                                                         \
+        weight[REWARD_##name] == 0 ? 0 : weight[REWARD_##name] * reward_##name(motion);            \
+    sum += terms[REWARD_##name];
+    TASK_REWARD_LIST(TASK_REWARD_TERM)
     if (motion->def->reward.clip_sum && sum < 0) {
         sum = 0;
     }

@@ -7,12 +7,11 @@
 
 #include <stdint.h>
 
+#include "base/random.h"
 #include "mild/error.h"
-#include "robot/robot.h"
 #include "task/task_def.h"
 
 #define TASK_FRAMES 6 /* H + 1, newest last (paper, H = 5) */
-#define TASK_FRAMES_HELD ((TASK_FRAMES - 1) * TASK_STRIDE_MAX + 1)
 
 /* Scale of the feet heights among the estimates, so that centimetres count as much in the
  * regression as velocities in m/s. */
@@ -72,6 +71,7 @@ typedef struct {
     double kd[ROBOT_JOINTS_MAX];       /* [N m s/rad] task.kd or the robot's */
     float action[3][ROBOT_JOINTS_MAX]; /* now, one and two steps ago */
     uint32_t newest;                   /* frame in the ring, see task_env_frame */
+    uint32_t held;                     /* frames of the ring */
     double base_twist[6]; /* one policy step ago: linear in the world, angular in the base frame */
     double smooth_velocity[3]; /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over
                                          reward.tracking_time */
@@ -109,12 +109,19 @@ typedef struct {
 
 /* One block: TaskEnv, its frames, its ground memory; a multiple of 64. */
 size_t task_env_bytes(const TaskDef *def, const Robot *robot);
+/* Of the block without ground memory. */
+size_t task_env_head_bytes(const TaskDef *def, const TaskShape *shape);
 MildGround *task_env_ground(TaskEnv *env);
+/* Where the block's frames begin. */
+TASK_FN size_t task_env_frames_at(void);
 /* [shape.history] What the policy sees: five means of older frames, then the newest frame. */
-float *task_env_history(TaskEnv *env);
-/* [shape.observation] The frame of `age` policy steps ago, 0 .. TASK_FRAMES_HELD - 1. */
-float *task_env_frame(TaskEnv *env, int age);
+TASK_FN float *task_env_history(TaskEnv *env);
+/* [shape.observation] The frame of `age` policy steps ago, 0 .. held - 1. */
+TASK_FN float *task_env_frame(TaskEnv *env, int age);
 
+/* The same for a block without ground memory. */
+void task_env_init_head(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
+                        uint32_t index);
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index);
 /* Draws a new episode and writes its first observation. */
@@ -137,11 +144,11 @@ typedef struct {
     double omega[3], gravity[3]; /* base frame */
     double q[ROBOT_JOINTS_MAX], qd[ROBOT_JOINTS_MAX];
 } TaskReading;
-void task_read_imu(const RobotSim *sim, TaskReading *reading);
-void task_read_motors(const RobotSim *sim, TaskReading *reading);
+TASK_FN void task_read_imu(const RobotSim *sim, TaskReading *reading);
+TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading);
 /* Appends the frame made from the readings to the history and writes the view. */
-void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
-                  const TaskReading *reading, int first, const TaskView *view);
+TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                          const TaskReading *reading, int first, const TaskView *view);
 
 /* Everything that reward terms may use, computed once per policy step (env.c). */
 typedef struct {
@@ -172,34 +179,57 @@ typedef struct {
 /* Describes the policy step just made. The sim is at the end of the step. env still has the base
  * twist, joint speeds, smoothed velocity and air times of the previous step, which are updated.
  * torque: [robot_joints] of the last physics step. */
-TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                const RobotSim *sim, const double *torque);
+TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                        const RobotSim *sim, const double *torque);
 /* Writes the weighted terms per second to `terms`. Returns their clipped sum times the period. */
-double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
+TASK_FN double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
 
 /* Draws ground, robot and sensors of an episode (randomize.c). */
-void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);
-void task_draw_command(TaskEnv *env, const TaskDef *def);
+TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);
+TASK_FN void task_draw_command(TaskEnv *env, const TaskDef *def);
+/* Draws the ground of an episode: one material, or stripes of three (ground.c, crowd.inc). */
+TASK_FN void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);
+/* Draws where on the map it begins, and a material for each of its labels. */
+TASK_FN void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);
+/* [m] Depth of the soles of a robot that stands on a material. */
+double task_standing_depth(const Robot *robot, const MildMaterial *material);
+
+/* A policy step (step.c): what comes before its physics steps, the torque of joint i in physics
+ * step `step` at angle q and speed qd, and what comes after them. torque: [joints] of the last one.
+ * diverged: bool, they broke off. */
+TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *action);
+TASK_FN double task_joint_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                 int step, int i, double q, double qd);
+TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                               const RobotSim *sim, const double *torque, int diverged);
+/* An episode on what task_randomize drew (step.c). depth: [m] how deep the feet stand in its
+ * ground. The first observation is taken from the sim of its first pose. */
+TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, double depth);
+TASK_FN void task_first_observation(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                    const RobotSim *sim, const TaskView *view);
 
 /* Assistance early in training (assist.c). task_assist writes force and torque on the base, world,
- * and returns 0 when there is none. task_assist_pose gives the pose that actions are added to: the
- * default pose, moved along the reference gait while there is assistance. */
-double task_assist_share(const TaskEnv *env, const TaskDef *def);
-void task_assist_adapt(TaskEnv *env, int fallen);
-int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
-                double wrench[6]);
-void task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, double *pose);
+ * and returns 0 when there is none. rotation: [9] of the base; qvel: [6] its twist.
+ * task_assist_pose is the angle that the action of joint i is added to: that of the default pose,
+ * moved along the reference gait while there is assistance. */
+TASK_FN double task_assist_share(const TaskEnv *env, const TaskDef *def);
+TASK_FN void task_assist_adapt(TaskEnv *env, int fallen);
+TASK_FN int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                        const double *rotation, const double *qvel, double wrench[6]);
+TASK_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i);
 
 /* Gait clock (gait.c): a foot is in stance during the half of the period that starts at its
  * offset. */
-int task_is_standing(const double command[3]);
-int task_gait_stance(const Robot *robot, double phase, int standing, int foot);
-double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
-                        int foot);
+TASK_FN int task_is_standing(const double command[3]);
+TASK_FN int task_gait_stance(const Robot *robot, double phase, int standing, int foot);
+TASK_FN double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
+                                int foot);
 /* Bool: near touchdown and lift-off, where stance and swing are both right. */
-int task_gait_either(const TaskDef *def, const Robot *robot, double phase, int standing, int foot);
-void task_gait_reference(const TaskDef *def, const Robot *robot, double phase, int standing,
-                         double *q);
+TASK_FN int task_gait_either(const TaskDef *def, const Robot *robot, double phase, int standing,
+                             int foot);
+/* [rad] Angle of joint i in the reference motion. */
+TASK_FN double task_gait_reference(const TaskDef *def, const Robot *robot, double phase,
+                                   int standing, int i);
 
 /* Mirror symmetry left <-> right: o'_i = sign_i o_index_i, and actions alike. */
 typedef struct {

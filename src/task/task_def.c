@@ -282,15 +282,6 @@ MildStatus task_gains(const TaskDef *def, const Robot *robot, double *kp, double
                              : status;
 }
 
-double task_action_scale(const TaskDef *def, const Robot *robot) {
-    return def->action_scale > 0 ? def->action_scale : robot_action_scale(robot);
-}
-
-double task_nominal_height(const TaskDef *def, const Robot *robot) {
-    return def->reward.nominal_height > 0 ? def->reward.nominal_height
-                                          : robot_nominal_height(robot);
-}
-
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error) {
     double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
     MildStatus status = task_def_check(def, error);

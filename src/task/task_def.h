@@ -6,7 +6,7 @@
 #include "mild/error.h"
 #include "mild/field.h"
 #include "mild/map.h"
-#include "robot/robot.h"
+#include "task/place.h"
 
 #define TASK_PERIOD 0.01   /* [s] policy step: 100 Hz (paper) */
 #define TASK_STRIDE_MAX 16 /* greatest task.history_stride */
@@ -121,7 +121,10 @@ typedef struct {
     const MildMap *map; /* borrowed: shape of the ground, and the pattern of the soft one; NULL:
                            level, one material */
     int print_tiles;    /* of prints, see mild_ground_bytes_prints */
+    const struct TaskGrounds *grounds; /* borrowed: what episodes draw their ground from; NULL: from
+                                          the ranges */
 } TaskDef;
+typedef struct TaskGrounds TaskGrounds;
 
 TaskDef task_def_default(void);
 /* The nominal robot, undisturbed, for evaluation and play; sensor noise, latencies and the start
@@ -134,9 +137,16 @@ MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildErro
  * joint, or one per joint of a leg, which every leg repeats. */
 MildStatus task_gains(const TaskDef *def, const Robot *robot, double *kp, double *kd,
                       MildError *error);
-/* What the def or, where it has 0, the robot says. */
-double task_action_scale(const TaskDef *def, const Robot *robot);   /* [rad] */
-double task_nominal_height(const TaskDef *def, const Robot *robot); /* [m] */
+/* [rad] What the def or, where it has 0, the robot says. */
+static inline MILD_BOTH double task_action_scale(const TaskDef *def, const Robot *robot) {
+    return def->action_scale > 0 ? def->action_scale : robot_action_scale(robot);
+}
+
+/* [m] The same. */
+static inline MILD_BOTH double task_nominal_height(const TaskDef *def, const Robot *robot) {
+    return def->reward.nominal_height > 0 ? def->reward.nominal_height
+                                          : robot_nominal_height(robot);
+}
 
 extern const MildField task_fields[];
 extern const int task_field_count;

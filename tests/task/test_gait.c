@@ -58,7 +58,9 @@ static void wanted_height(void **unused) {
 static void expect_reference(const TaskDef *def, double phase, int standing, int leg, double bend) {
     const double *pose = robot_default_pose(robot);
     double q[SA01_JOINTS];
-    task_gait_reference(def, robot, phase, standing, q);
+    for (int i = 0; i < robot_joints(robot); i++) {
+        q[i] = task_gait_reference(def, robot, phase, standing, i);
+    }
     for (int i = 0; i < SA01_JOINTS; i++) {
         int joint = i % LEG_JOINTS;
         double turn = i / LEG_JOINTS != leg                        ? 0

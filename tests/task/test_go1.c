@@ -183,7 +183,9 @@ static void diagonals_stand_together(void **unused) {
 static void the_swing_lifts(void **unused) {
     (void)unused;
     RobotState state = {.qpos = {0, 0, 1, 1, 0, 0, 0}};
-    task_gait_reference(&def, robot, 0.25, 0, state.qpos + 7);
+    for (int i = 0; i < robot_joints(robot); i++) {
+        state.qpos[7 + i] = task_gait_reference(&def, robot, 0.25, 0, i);
+    }
     robot_sim_load(sim, &state, &env->variation);
     for (int f = 0; f < FEET; f++) {
         double below = 1 - robot_sim_foot(sim, f)->position[2];

@@ -142,7 +142,8 @@ static int hand(double yaw, double pitch, double roll, double wrench[6]) {
     kit_turn(&state, yaw, pitch, roll);
     memcpy(state.qvel, rig.env->robot.qvel, sizeof state.qvel);
     robot_sim_load(rig.sim, &state, &rig.env->variation);
-    return task_assist(rig.env, &rig.def, robot, rig.sim, wrench);
+    return task_assist(rig.env, &rig.def, robot, robot_sim_base_rotation(rig.sim),
+                       robot_sim_qvel(rig.sim), wrench);
 }
 
 static void expect_wrench(const char *what, const double *got, double fx, double fy, double fz,
@@ -218,7 +219,8 @@ static void wrench_in_space(void **unused) {
         Oracle o = oracle_of(rig.sim);
         const double z[3] = {0, 0, 1};
         double wrench[6], up[3], restoring[3], omega[3];
-        task_assist(rig.env, &rig.def, robot, rig.sim, wrench);
+        task_assist(rig.env, &rig.def, robot, robot_sim_base_rotation(rig.sim),
+                    robot_sim_qvel(rig.sim), wrench);
         mju_rotVecQuat(up, z, o.orientation);
         mju_cross(restoring, up, z);
         mju_rotVecQuat(omega, o.omega, o.orientation);
@@ -260,17 +262,23 @@ static void led_pose(void **unused) {
     double pose[SA01_JOINTS];
     help(0.5, 0.8);
     rig.env->phase = 0.25; /* right leg bent by 0.4, 0.8, 0.4 */
-    task_assist_pose(rig.env, &rig.def, robot, pose);
+    for (int i = 0; i < robot_joints(robot); i++) {
+        pose[i] = task_assist_pose(rig.env, &rig.def, robot, i);
+    }
     for (int i = 0; i < SA01_JOINTS; i++) {
         double turn = i == 8 || i == 10 ? -0.208 : i == 9 ? 0.416 : 0;
         expect_entry("led pose", i, pose[i], rest[i] + turn, 1e-12);
     }
     rig.env->command[0] = 0;
-    task_assist_pose(rig.env, &rig.def, robot, pose);
+    for (int i = 0; i < robot_joints(robot); i++) {
+        pose[i] = task_assist_pose(rig.env, &rig.def, robot, i);
+    }
     assert_memory_equal(pose, rest, sizeof pose);
     rig.env->command[0] = 0.5;
     rig.def.assist = 0;
-    task_assist_pose(rig.env, &rig.def, robot, pose);
+    for (int i = 0; i < robot_joints(robot); i++) {
+        pose[i] = task_assist_pose(rig.env, &rig.def, robot, i);
+    }
     assert_memory_equal(pose, rest, sizeof pose);
     rig_close(&rig);
 }

@@ -435,13 +435,15 @@ static void expect_history(int stride, int frames) {
     }
 }
 
-/* More frames than the ring of 81 holds, twice over. */
+/* More frames than the largest ring of 81 holds, twice over. */
 static void history(void **unused) {
     (void)unused;
     const int strides[] = {1, 3, 8, 16};
     for (int s = 0; s < 4; s++) {
-        rig_open_quiet(&rig, 0.5);
-        rig.def.history_stride = strides[s];
+        TaskDef def = kit_quiet_def();
+        def.history_stride = strides[s];
+        rig_open(&rig, &def, 3, 0);
+        rig_start(&rig, 0.5, 0, 0);
         TaskReading reading = other_reading();
         for (int t = 0; t < 200; t++) {
             reading.omega[0] = t;
@@ -461,8 +463,10 @@ static void history(void **unused) {
 /* Step by step the newest frame is added to those before it. */
 static void history_of_steps(void **unused) {
     (void)unused;
-    rig_open_quiet(&rig, 0.5);
-    rig.def.history_stride = 1;
+    TaskDef def = kit_quiet_def();
+    def.history_stride = 1;
+    rig_open(&rig, &def, 3, 0);
+    rig_start(&rig, 0.5, 0, 0);
     float seen[9][SA01_OBSERVATION];
     for (int t = 0; t < 9; t++) {
         rig_step(&rig, NULL);

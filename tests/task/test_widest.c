@@ -55,7 +55,9 @@ static void gait_of_any_offset(void **unused) {
     int swings = 0;
     for (double phase = 0.003; phase < 1; phase += 0.0137) {
         double q[ROBOT_JOINTS_MAX];
-        task_gait_reference(&def, robot, phase, 0, q);
+        for (int i = 0; i < robot_joints(robot); i++) {
+            q[i] = task_gait_reference(&def, robot, phase, 0, i);
+        }
         for (int f = 0; f < LEGS; f++) {
             double since =
                 phase - widest_offset[f] + (phase < widest_offset[f]); /* cycles since touchdown */

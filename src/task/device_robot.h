@@ -1,0 +1,90 @@
+/* Robot and RobotSim of a device: the numbers that the functions of robot.h return for the task's
+ * text (place.h), as functions of the same names. Never together with robot.h. */
+#ifndef TASK_DEVICE_ROBOT_H
+#define TASK_DEVICE_ROBOT_H
+
+#include "base/both.h"
+#include "robot/table.h"
+
+typedef RobotTable Robot;
+
+/* What the last physics step left behind, as RobotSim answers. */
+typedef struct {
+    const RobotState *state;
+    double rotation[9];
+    RobotFoot foot[ROBOT_FEET_MAX]; /* sole_height, sole_center, sole_center_velocity, force and
+                                       result.depth_mean */
+    double body_clearance;
+    double knee_distance;
+    double foot_distance;
+} RobotSim;
+
+#define DEVICE_ROBOT_LIST(name)                                                                    \
+    static inline MILD_BOTH const double *robot_##name(const Robot *robot) {                       \
+        return robot->name;                                                                        \
+    }
+#define DEVICE_ROBOT_NUMBER(name)                                                                  \
+    static inline MILD_BOTH double robot_##name(const Robot *robot) {                              \
+        return robot->name;                                                                        \
+    }
+DEVICE_ROBOT_LIST(default_pose)
+DEVICE_ROBOT_LIST(joint_low)
+DEVICE_ROBOT_LIST(joint_high)
+DEVICE_ROBOT_LIST(effort)
+DEVICE_ROBOT_LIST(speed)
+DEVICE_ROBOT_LIST(swing)
+DEVICE_ROBOT_LIST(still)
+DEVICE_ROBOT_LIST(feet_range)
+DEVICE_ROBOT_LIST(knee_range)
+DEVICE_ROBOT_LIST(assist)
+DEVICE_ROBOT_NUMBER(feet_least)
+DEVICE_ROBOT_NUMBER(knee_least)
+DEVICE_ROBOT_NUMBER(total_mass)
+DEVICE_ROBOT_NUMBER(stand_height)
+DEVICE_ROBOT_NUMBER(nominal_height)
+DEVICE_ROBOT_NUMBER(action_scale)
+DEVICE_ROBOT_NUMBER(foot_force)
+
+static inline MILD_BOTH int robot_joints(const Robot *robot) {
+    return robot->joints;
+}
+
+static inline MILD_BOTH const int *robot_joint_foot(const Robot *robot) {
+    return robot->joint_foot;
+}
+
+static inline MILD_BOTH double robot_gait_offset(const Robot *robot, int foot) {
+    return robot->gait_offset[foot];
+}
+
+static inline MILD_BOTH const double *robot_sim_qpos(const RobotSim *sim) {
+    return sim->state->qpos;
+}
+
+static inline MILD_BOTH const double *robot_sim_qvel(const RobotSim *sim) {
+    return sim->state->qvel;
+}
+
+static inline MILD_BOTH const double *robot_sim_base_rotation(const RobotSim *sim) {
+    return sim->rotation;
+}
+
+static inline MILD_BOTH const RobotFoot *robot_sim_foot(const RobotSim *sim, int foot) {
+    return &sim->foot[foot];
+}
+
+static inline MILD_BOTH double robot_sim_body_clearance(const RobotSim *sim,
+                                                        const MildTerrain *terrain) {
+    (void)terrain;
+    return sim->body_clearance;
+}
+
+static inline MILD_BOTH double robot_sim_knee_distance(const RobotSim *sim) {
+    return sim->knee_distance;
+}
+
+static inline MILD_BOTH double robot_sim_foot_distance(const RobotSim *sim) {
+    return sim->foot_distance;
+}
+
+#endif

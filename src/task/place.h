@@ -1,0 +1,51 @@
+/* What the task's text asks of robot and ground. The files of one policy step (step.c, gait.c,
+ * assist.c, observe.c, reward.c, draw.c) are compiled twice: as they are for the CPU, where robots
+ * are stepped by RobotSim, and with TASK_ON_DEVICE by crowd.inc, where Robot and RobotSim are plain
+ * numbers on a device. TASK_FN marks the functions that one file of them calls in another. */
+#ifndef TASK_PLACE_H
+#define TASK_PLACE_H
+
+#include "base/both.h"
+
+#ifdef TASK_ON_DEVICE
+#define TASK_FN static inline MILD_BOTH
+#include "task/device_robot.h"
+#else
+#define TASK_FN
+#include "robot/robot.h"
+#endif
+
+/* [m] Height of the undisturbed surface. */
+static inline MILD_BOTH double place_height(const MildTerrain *terrain, double x, double y) {
+#ifdef TASK_ON_DEVICE
+    (void)x;
+    (void)y;
+    return terrain->height;
+#else
+    return mild_terrain_height_at(terrain, x, y);
+#endif
+}
+
+static inline MILD_BOTH const MildMaterial *place_material(const MildTerrain *terrain, double x,
+                                                           double y) {
+#ifdef TASK_ON_DEVICE
+    (void)x;
+    (void)y;
+    return &terrain->materials[0];
+#else
+    return &terrain->materials[mild_terrain_material_at(terrain, x, y)];
+#endif
+}
+
+/* [-] Elements of the raster of a sole that one element of the model in use stands for. */
+static inline MILD_BOTH double place_cells(const Robot *robot, int model) {
+#ifdef TASK_ON_DEVICE
+    (void)model;
+    return robot->cells;
+#else
+    return mild_model_is_concentric((MildModel)model) ? mild_sole_elements(robot_rasters(robot)[0])
+                                                      : 1;
+#endif
+}
+
+#endif

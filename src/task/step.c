@@ -1,0 +1,273 @@
+/* The policy step but for its physics, read top to bottom: the text for the CPU and for a device
+ * (place.h). */
+#include <math.h>
+#include <string.h>
+
+#include "base/random.h"
+#include "task/task.h"
+
+#define RANDOM_USE_START 0x53544152u
+#define RANDOM_USE_PUSH 0x50555348u
+#define CONTACT_FORCE 5.0 /* [N] */
+#define PI 3.141592653589793
+
+/* ---- the block: TaskEnv, history, ring of frames ---- */
+
+TASK_FN size_t task_env_frames_at(void) {
+    return (sizeof(TaskEnv) + 63) / 64 * 64;
+}
+
+TASK_FN float *task_env_history(TaskEnv *env) {
+    return (float *)(void *)((char *)env + task_env_frames_at());
+}
+
+TASK_FN float *task_env_frame(TaskEnv *env, int age) {
+    uint32_t place = (env->newest + env->held - (uint32_t)age) % env->held;
+    return task_env_history(env) + env->shape.history + place * (uint32_t)env->shape.observation;
+}
+
+/* ---- start of an episode ---- */
+
+/* depth: [m] how deep the feet stand in this ground, so that episodes start neither in the air nor
+ * buried. */
+static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                        double depth) {
+    const RandomizeDef *z = &def->randomize;
+    Random r = random_at(env->seed ^ RANDOM_USE_START, env->index, env->tick);
+    const double *pose = robot_default_pose(robot);
+    memset(&env->robot, 0, sizeof env->robot);
+    double yaw = env->command_frozen ? 0 : PI * (2 * random_unit(&r) - 1);
+    env->robot.qpos[2] = env->terrain.height + robot_stand_height(robot) - depth + 0.002;
+    env->robot.qpos[3] = cos(0.5 * yaw);
+    env->robot.qpos[6] = sin(0.5 * yaw);
+    for (int i = 0; i < env->shape.joints; i++) {
+        double q = pose[i] + z->initial_joint * (2 * random_unit(&r) - 1);
+        env->robot.qpos[7 + i] =
+            fmin(fmax(q, robot_joint_low(robot)[i]), robot_joint_high(robot)[i]);
+    }
+    for (int i = 0; i < 6; i++) {
+        env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&r) - 1);
+    }
+    env->phase = random_unit(&r) < 0.5 ? 0 : 0.5;
+    /* The first episodes end at different times, so that the environments do not reset in
+     * lockstep. */
+    env->step = env->tick == 0 && !env->command_frozen
+                    ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit)
+                    : 0;
+    env->step_first = env->step;
+}
+
+TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                double depth) {
+    draw_start(env, def, robot, depth);
+    if (!env->command_frozen) {
+        task_draw_command(env, def);
+    }
+    memcpy(env->command_seen, env->command, sizeof env->command);
+    memset(env->action, 0, sizeof env->action);
+    memset(env->air_time, 0, sizeof env->air_time);
+    memset(env->joint_speed, 0, sizeof env->joint_speed);
+    memset(env->smooth_velocity, 0, sizeof env->smooth_velocity);
+    memset(env->push, 0, sizeof env->push);
+    memset(env->term_sum, 0, sizeof env->term_sum);
+    env->reward_sum = env->speed_error_sum = 0;
+}
+
+TASK_FN void task_first_observation(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                    const RobotSim *sim, const TaskView *view) {
+    TaskReading reading;
+    memcpy(env->base_twist, robot_sim_qvel(sim), sizeof env->base_twist);
+    task_read_imu(sim, &reading);
+    task_read_motors(sim, &reading);
+    task_observe(env, def, robot, sim, &reading, 1, view);
+}
+
+/* ---- before the physics ---- */
+
+static inline MILD_BOTH void accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
+    memcpy(env->action[2], env->action[1], sizeof env->action[0]);
+    memcpy(env->action[1], env->action[0], sizeof env->action[0]);
+    float limit = (float)def->action_clip;
+    for (int i = 0; i < env->shape.actions; i++) {
+        float a = action[i];
+        env->action[0][i] = !(a > -limit) ? -limit : a > limit ? limit : a;
+    }
+}
+
+static inline MILD_BOTH void push_base(TaskEnv *env, const TaskDef *def) {
+    const RandomizeDef *z = &def->randomize;
+    for (int i = 0; i < 6; i++) {
+        env->push[i] *= 0.95;
+    }
+    uint32_t interval = (uint32_t)(z->push_interval / TASK_PERIOD + 0.5);
+    if (interval == 0 || env->step == 0 || (env->step + env->index * 97u) % interval != 0) {
+        return;
+    }
+    Random r = random_at(env->seed ^ RANDOM_USE_PUSH, env->index, env->tick);
+    for (int i = 0; i < 6; i++) {
+        double size = i == 2 ? 0 : i < 3 ? z->push_linear : z->push_angular;
+        env->push[i] = size * (2 * random_unit(&r) - 1);
+        env->robot.qvel[i] += env->push[i];
+    }
+}
+
+TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *action) {
+    accept_action(env, def, action);
+    push_base(env, def);
+}
+
+/* ---- torque ---- */
+
+/* A motor at its speed limit gives no torque in the direction of motion. */
+static inline MILD_BOTH double limit_speed(double torque, double speed, double limit) {
+    return limit > 0 && fabs(speed) >= limit && torque * speed > 0 ? 0 : torque;
+}
+
+/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). */
+TASK_FN double task_joint_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                 int step, int i, double q, double qd) {
+    const float *action = env->action[step >= env->lag_command ? 0 : 1];
+    double target = task_assist_pose(env, def, robot, i) +
+                    task_action_scale(def, robot) * (double)action[i] + env->motor_offset[i];
+    double tau = env->kp[i] * env->kp_scale[i] * (target - q) - env->kd[i] * env->kd_scale[i] * qd;
+    double limit = def->torque_share * robot_effort(robot)[i];
+    tau *= env->strength[i];
+    tau = tau > limit ? limit : tau < -limit ? -limit : tau;
+    return limit_speed(tau, qd, robot_speed(robot)[i]);
+}
+
+/* ---- after the physics ---- */
+
+static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                         const RobotSim *sim, TaskMotion *m) {
+    double stance_height = 0;
+    int stances = 0;
+    for (int f = 0; f < env->shape.feet; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        const double *v = foot->sole_center_velocity, *force = foot->force;
+        m->foot_height[f] = foot->sole_height;
+        m->foot_speed[f] = sqrt(v[0] * v[0] + v[1] * v[1]);
+        m->foot_force[f] = sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
+        m->contact[f] = force[2] > CONTACT_FORCE;
+        m->stance[f] = task_gait_stance(robot, env->phase, m->standing, f);
+        m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
+        m->wanted_height[f] = task_gait_height(def, robot, env->phase, m->standing, f);
+        if (m->contact[f]) {
+            m->landed_air_time += fmin(env->air_time[f], 0.5 * def->gait_period);
+            env->air_time[f] = 0;
+        } else {
+            env->air_time[f] += TASK_PERIOD;
+        }
+        if (m->stance[f]) {
+            stance_height += foot->sole_center[2];
+            stances++;
+        }
+    }
+    m->base_height = robot_sim_qpos(sim)[2] - stance_height / (stances ? stances : 1);
+}
+
+TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                        const RobotSim *sim, const double *torque) {
+    TaskMotion m;
+    memset(&m, 0, sizeof m);
+    m.def = def, m.robot = robot, m.env = env;
+    const double *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
+    double heading = atan2(rotation[3], rotation[0]), c = cos(heading), s = sin(heading), twist[6],
+           change = 0;
+    m.standing = task_is_standing(env->command);
+    m.velocity[0] = c * qvel[0] + s * qvel[1];
+    m.velocity[1] = -s * qvel[0] + c * qvel[1];
+    m.velocity[2] = qvel[2];
+    memcpy(twist, qvel, sizeof twist);
+    for (int i = 0; i < 3; i++) {
+        m.omega[i] = qvel[3 + i];
+        m.gravity[i] = -rotation[6 + i];
+    }
+    for (int i = 0; i < 6; i++) {
+        change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
+    }
+    m.twist_change = sqrt(change);
+    const double now[3] = {m.velocity[0], m.velocity[1], m.omega[2]};
+    for (int i = 0; i < 3; i++) {
+        env->smooth_velocity[i] +=
+            TASK_PERIOD / def->reward.tracking_time * (now[i] - env->smooth_velocity[i]);
+    }
+    memcpy(env->base_twist, twist, sizeof twist);
+    memcpy(m.q, robot_sim_qpos(sim) + 7, sizeof m.q);
+    memcpy(m.qd, qvel + 6, sizeof m.qd);
+    memcpy(m.qd_before, env->joint_speed, sizeof m.qd_before);
+    memcpy(env->joint_speed, m.qd, sizeof m.qd);
+    memcpy(m.torque, torque, (size_t)env->shape.joints * sizeof *torque);
+    m.foot_distance = robot_sim_foot_distance(sim);
+    m.knee_distance = robot_sim_knee_distance(sim);
+    feet_motion(env, def, robot, sim, &m);
+    return m;
+}
+
+/* Bool: the base tilts too much, a shell touches the ground, or a foot has passed through the other
+ * leg, because the engine computes no contact between the legs. */
+static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
+                                       const RobotSim *sim) {
+    return robot_sim_foot_distance(sim) < def->crossing_limit ||
+           robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) ||
+           robot_sim_body_clearance(sim, &env->terrain) < 0;
+}
+
+static inline MILD_BOTH void advance_clock(TaskEnv *env, const TaskDef *def) {
+    env->tick++;
+    env->step++;
+    memcpy(env->command_seen, env->command, sizeof env->command);
+    env->phase += TASK_PERIOD / def->gait_period;
+    env->phase -= floor(env->phase);
+    uint32_t interval = (uint32_t)(def->command_interval / TASK_PERIOD + 0.5);
+    if (!env->command_frozen && interval && env->step % interval == 0) {
+        task_draw_command(env, def);
+    }
+}
+
+static inline MILD_BOTH void report_episode(const TaskEnv *env, TaskStep *out) {
+    out->length = env->step - env->step_first;
+    out->episode_reward = (float)env->reward_sum;
+    out->episode_speed_error = (float)(env->speed_error_sum / (out->length ? out->length : 1));
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        out->episode_terms[i] = (float)env->term_sum[i];
+    }
+}
+
+/* Computes the reward of the step just made. Returns 0 when it is not finite. */
+static inline MILD_BOTH int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                        const RobotSim *sim, const double *torque, float *reward) {
+    double terms[TASK_REWARD_COUNT];
+    TaskMotion motion = task_describe_motion(env, def, robot, sim, torque);
+    *reward = (float)task_reward(&motion, terms);
+    if (!isfinite(*reward)) {
+        return 0;
+    }
+    env->speed_error_sum +=
+        hypot(env->smooth_velocity[0] - env->command[0], env->smooth_velocity[1] - env->command[1]);
+    env->reward_sum += (double)*reward;
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        env->term_sum[i] += terms[i] * TASK_PERIOD;
+    }
+    return 1;
+}
+
+TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                               const RobotSim *sim, const double *torque, int diverged) {
+    TaskStep out;
+    memset(&out, 0, sizeof out);
+    int bad = diverged || !take_reward(env, def, robot, sim, torque, &out.reward);
+    if (bad) {
+        out.reward = 0;
+    }
+    out.valid = !bad;
+    advance_clock(env, def);
+    int fallen = bad || has_fallen(env, def, sim);
+    out.timeout = !fallen && env->step >= env->step_limit;
+    out.done = fallen || out.timeout;
+    task_assist_adapt(env, fallen);
+    if (out.done) {
+        report_episode(env, &out);
+    }
+    return out;
+}
