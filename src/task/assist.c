@@ -30,7 +30,7 @@ TASK_FN double task_assist_share(const TaskEnv *env, const TaskDef *def) {
  * ASSIST_GRACE + ASSIST_DECAY ln(ASSIST_RISE) seconds. */
 TASK_FN void task_assist_adapt(TaskEnv *env, int fallen) {
     if (fallen) {
-        env->assist_level = fmin(1, ASSIST_RISE * env->assist_level + ASSIST_LEAST);
+        env->assist_level = fmin(1.0, ASSIST_RISE * env->assist_level + ASSIST_LEAST);
     } else if ((env->step - env->step_first) * TASK_PERIOD > ASSIST_GRACE) {
         env->assist_level *= 1 - TASK_PERIOD / ASSIST_DECAY;
     }

@@ -86,17 +86,24 @@ static MildMaterial draw_new(Random *r, const RandomizeDef *def, const Robot *ro
     return rival;
 }
 
-static MildMaterial draw_material(Random *r, const TaskDef *def, const Robot *robot) {
+/* index: among the grounds that were drawn beforehand, or NULL. */
+static MildMaterial draw_material(Random *r, const TaskDef *def, const Robot *robot, int *index) {
     const TaskGrounds *from = def->grounds;
-    return from ? from->ground[random_index(r, (uint32_t)from->count)].material
-                : draw_new(r, &def->randomize, robot);
+    if (!from) {
+        return draw_new(r, &def->randomize, robot);
+    }
+    int at = (int)random_index(r, (uint32_t)from->count);
+    if (index) {
+        *index = at;
+    }
+    return from->ground[at].material;
 }
 
 /* Stripes across x around the start, three materials in random order. */
 static void draw_stripes(Random *r, const TaskDef *task, const Robot *robot, MildTerrain *terrain) {
     const RandomizeDef *def = &task->randomize;
     while (terrain->material_count < 3) {
-        terrain->materials[terrain->material_count++] = draw_material(r, task, robot);
+        terrain->materials[terrain->material_count++] = draw_material(r, task, robot, NULL);
     }
     double x = -0.5 * MILD_PATCHES_MAX * 0.5 * (def->patch_length[0] + def->patch_length[1]);
     for (int i = 0; i < MILD_PATCHES_MAX; i++) {
@@ -122,12 +129,12 @@ void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Rand
     terrain->map_x = spread(r, 0.5 * x);
     terrain->map_y = spread(r, 0.5 * y);
     while (terrain->material_count < mild_map_label_count(def->map)) {
-        terrain->materials[terrain->material_count++] = draw_material(r, def, robot);
+        terrain->materials[terrain->material_count++] = draw_material(r, def, robot, NULL);
     }
 }
 
 void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r) {
-    MildMaterial material = draw_material(r, def, robot);
+    MildMaterial material = draw_material(r, def, robot, &env->ground);
     env->terrain = mild_terrain_uniform(&material);
     int striped = random_unit(r) < def->randomize.patch_share;
     if (striped && !(def->map && mild_map_label_count(def->map) > 1)) {

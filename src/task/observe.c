@@ -30,8 +30,8 @@ TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading) {
     memcpy(reading->qd, robot_sim_qvel(sim) + 6, sizeof reading->qd);
 }
 
-static void make_frame(const TaskEnv *env, const TaskDef *def, const double *pose,
-                       const TaskReading *reading, float *frame) {
+static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, const double *pose,
+                                        const TaskReading *reading, float *frame) {
     const double command_scale[3] = {2, 2, 1};
     int joints = env->shape.joints;
     for (int i = 0; i < 3; i++) {
@@ -50,7 +50,7 @@ static void make_frame(const TaskEnv *env, const TaskDef *def, const double *pos
     clock[1] = def->clock ? (float)(standing ? 0 : cos(TWO_PI * env->phase)) : 0;
 }
 
-static void add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
+static inline MILD_BOTH void add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
     Random r = random_at(env->seed ^ RANDOM_USE_NOISE, env->index, env->tick);
     float *q = frame + 9, *qd = q + env->shape.joints;
     for (int i = 0; i < 3; i++) {
@@ -64,13 +64,14 @@ static void add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
 }
 
 /* Rotates a world vector into the base frame. */
-static void to_base(const double *rotation, const double *v, float *out) {
+static inline MILD_BOTH void to_base(const double *rotation, const double *v, float *out) {
     for (int i = 0; i < 3; i++) {
         out[i] = (float)(rotation[i] * v[0] + rotation[3 + i] * v[1] + rotation[6 + i] * v[2]);
     }
 }
 
-static void write_estimates(const TaskEnv *env, const RobotSim *sim, float *estimate) {
+static inline MILD_BOTH void write_estimates(const TaskEnv *env, const RobotSim *sim,
+                                             float *estimate) {
     const double *rotation = robot_sim_base_rotation(sim);
     int feet = env->shape.feet;
     to_base(rotation, robot_sim_qvel(sim), estimate);
@@ -111,8 +112,9 @@ static inline MILD_BOTH float *write_ground(const TaskEnv *env, const Robot *rob
     return out;
 }
 
-static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                         const RobotSim *sim, const float *clean, float *critic) {
+static inline MILD_BOTH void write_critic(const TaskEnv *env, const TaskDef *def,
+                                          const Robot *robot, const RobotSim *sim,
+                                          const float *clean, float *critic) {
     float *out = critic;
     memcpy(out, clean, (size_t)env->shape.observation * sizeof *out);
     out += env->shape.observation;
@@ -157,7 +159,8 @@ static void write_critic(const TaskEnv *env, const TaskDef *def, const Robot *ro
 }
 
 /* Stores a frame. At the start of an episode the first frame also fills the older ones. */
-static void remember(TaskEnv *env, const TaskDef *def, const float *frame, int first) {
+static inline MILD_BOTH void remember(TaskEnv *env, const TaskDef *def, const float *frame,
+                                      int first) {
     int width = env->shape.observation;
     size_t bytes = (size_t)width * sizeof *frame;
     float *history = task_env_history(env);

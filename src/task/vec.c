@@ -144,20 +144,24 @@ void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8
     vec->stats.steps += vec->envs;
 }
 
+void vec_stats_means(VecStats *stats) {
+    if (stats->episodes) {
+        double lived = stats->length > 0 ? stats->length : 1;
+        for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+            stats->terms[i] /= lived;
+        }
+        stats->length /= stats->episodes;
+        stats->reward /= stats->episodes;
+        stats->speed_error /= stats->episodes;
+    }
+}
+
 VecStats vec_take_stats(Vec *vec) {
     VecStats stats = vec->stats;
     for (int i = 0; i < vec->envs; i++) {
         stats.assist += task_assist_share(env_at(vec, i), &vec->def) / vec->envs;
     }
-    if (stats.episodes) {
-        double lived = stats.length > 0 ? stats.length : 1;
-        for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-            stats.terms[i] /= lived;
-        }
-        stats.length /= stats.episodes;
-        stats.reward /= stats.episodes;
-        stats.speed_error /= stats.episodes;
-    }
+    vec_stats_means(&stats);
     memset(&vec->stats, 0, sizeof vec->stats);
     return stats;
 }

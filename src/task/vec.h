@@ -36,6 +36,8 @@ void vec_reset(Vec *vec, const VecView *first);
 void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout,
               uint8_t *valid, const VecView *next);
 VecStats vec_take_stats(Vec *vec);
+/* From sums over episodes to means. */
+void vec_stats_means(VecStats *stats);
 /* [s] Thread time spent in physics since the last call, and the part of it spent in the ground. */
 void vec_take_times(Vec *vec, double *physics, double *ground);
 /* Everything that persists, as one block without pointers, so that saving and loading are

@@ -1,0 +1,62 @@
+/* What a crowd keeps on its device. Include it after task.h. */
+#ifndef CROWD_ARRAYS_H
+#define CROWD_ARRAYS_H
+
+#include "batch/batch.h"
+#include "engine/model.h"
+#include "task/ground.h"
+
+/* Sums over the episodes of an environment that ended since the last crowd_take_stats; see
+ * VecStats. */
+enum {
+    TALLY_EPISODES,
+    TALLY_FALLS,
+    TALLY_DIVERGED,
+    TALLY_STEPS,
+    TALLY_LENGTH,
+    TALLY_REWARD,
+    TALLY_SPEED_ERROR,
+    TALLY_TERMS,
+    TALLY_KEPT = TALLY_TERMS + TASK_REWARD_COUNT,
+    TALLY_ASSIST = TALLY_KEPT, /* not kept: the level of assistance now */
+    TALLY_NUMBERS
+};
+
+/* The same for all environments. task.grounds points to `grounds` of the same block. */
+typedef struct {
+    TaskDef task;
+    RobotTable robot;
+    TaskGrounds grounds;
+} CrowdTask;
+
+/* Of one environment besides its TaskEnv. */
+typedef struct {
+    EngineVariation variation;
+    double tally[TALLY_KEPT];
+    double torque[ROBOT_JOINTS_MAX]; /* [N m] of the last physics step */
+    int diverged;                    /* bool: in this policy step */
+} CrowdRobot;
+
+typedef struct {
+    int envs;
+    size_t stride;     /* [B] of a TaskEnv and its frames */
+    char *env;         /* [envs][stride] */
+    CrowdRobot *robot; /* [envs] */
+    void *sim;         /* [envs] RobotSim of device_robot.h */
+    void *reading;     /* [envs] TaskReading */
+    int32_t *material; /* [envs] of the ground's table */
+    uint8_t *fresh;    /* [envs] bool: an episode began */
+    double *tally;     /* [TALLY_NUMBERS] sums over the environments */
+    const CrowdTask *task;
+    const EngineModel *model;
+} CrowdArrays;
+
+/* Arguments of a policy step. */
+typedef struct {
+    const float *action;
+    float *reward;
+    uint8_t *done, *timeout, *valid;
+    float *history, *critic, *estimate, *frame; /* of VecView */
+} CrowdStep;
+
+#endif

@@ -1,0 +1,310 @@
+#define MILD_REAL_FLOAT
+#include "crowd/crowd.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "crowd/text.h"
+#include "engine/read.h"
+
+_Static_assert(CROWD_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fills");
+
+struct Crowd {
+    CrowdArrays arrays; /* their memory is the device's */
+    MildBatch *ground;
+    Pool *pool; /* of the host */
+    int device;
+    size_t bytes; /* of the device, without the ground */
+};
+
+/* ---- creation ---- */
+
+static MildStatus check_def(const CrowdDef *def, MildError *error) {
+    const TaskDef *task = def->task;
+    MildStatus status = task_def_check_robot(task, def->robot, error);
+    const char *missing = task->map                         ? "terrain: a map"
+                          : task->randomize.patch_share > 0 ? "randomize.patch_share above 0"
+                          : task->print_tiles               ? "terrain.memory"
+                          : !task->newton                   ? "task.newton = 0"
+                                                            : NULL;
+    return status == MILD_OK && missing
+               ? mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "%s is not there on a device yet; train.robots = cpu has it", missing)
+               : status;
+}
+
+static MildStatus open_ground(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
+                              MildError *error) {
+    const MildBatchDef batch = {.robots = def->envs,
+                                .feet = robot_feet(def->robot),
+                                .soles = robot_soles(def->robot),
+                                .dt = def->task->physics_dt,
+                                .tolerance = def->task->contact_tolerance,
+                                .max_iterations = def->task->contact_iterations,
+                                .device = def->device};
+    MildMaterial *materials = malloc((size_t)grounds->count * sizeof *materials);
+    if (!materials) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d grounds", grounds->count);
+    }
+    for (int i = 0; i < grounds->count; i++) {
+        materials[i] = grounds->ground[i].material;
+    }
+    crowd->ground = mild_batch_create(&batch, error);
+    MildStatus status =
+        crowd->ground ? mild_batch_set_materials(crowd->ground, materials, grounds->count, error)
+                      : MILD_ERROR_ARGUMENT;
+    free(materials);
+    return status;
+}
+
+/* Memory of the device, counted. */
+static void *take(Crowd *crowd, size_t bytes, MildError *error) {
+    crowd->bytes += bytes;
+    return batch_alloc(crowd->device, bytes, error);
+}
+
+static MildStatus take_arrays(Crowd *crowd, MildError *error) {
+    CrowdArrays *all = &crowd->arrays;
+    const size_t envs = (size_t)all->envs;
+    all->env = take(crowd, envs * all->stride, error);
+    all->robot = all->env ? take(crowd, envs * sizeof *all->robot, error) : NULL;
+    all->sim = all->robot ? take(crowd, envs * crowd_sim_bytes(), error) : NULL;
+    all->reading = all->sim ? take(crowd, envs * crowd_reading_bytes(), error) : NULL;
+    all->material = all->reading ? take(crowd, envs * sizeof *all->material, error) : NULL;
+    all->fresh = all->material ? take(crowd, envs, error) : NULL;
+    all->tally = all->fresh ? take(crowd, TALLY_NUMBERS * sizeof *all->tally, error) : NULL;
+    return all->tally ? MILD_OK : MILD_ERROR_MEMORY;
+}
+
+static MildStatus copy_envs(Crowd *crowd, const CrowdDef *def, MildError *error) {
+    CrowdArrays *all = &crowd->arrays;
+    char *envs = aligned_alloc(64, (size_t)all->envs * all->stride);
+    if (!envs) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d environments", all->envs);
+    }
+    for (int i = 0; i < all->envs; i++) {
+        task_env_init_head((TaskEnv *)(void *)(envs + (size_t)i * all->stride), def->task,
+                           def->robot, def->seed, def->first + (uint32_t)i);
+    }
+    MildStatus status =
+        batch_copy(crowd->device, all->env, envs, (size_t)all->envs * all->stride, error);
+    free(envs);
+    return status;
+}
+
+/* Task, robot and grounds in one block of the device: its pointers are the device's. */
+static MildStatus copy_task(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
+                            MildError *error) {
+    const size_t bytes = (size_t)grounds->count * sizeof *grounds->ground;
+    CrowdTask *at = take(crowd, sizeof *at, error);
+    crowd->arrays.task = at;
+    TaskGround *ground = at ? take(crowd, bytes, error) : NULL;
+    if (!ground) {
+        return MILD_ERROR_MEMORY;
+    }
+    CrowdTask task = {.task = *def->task, .grounds = {grounds->count, ground}};
+    task.task.grounds = &at->grounds;
+    robot_fill_table(def->robot, &task.robot);
+    MildStatus status = batch_copy(crowd->device, ground, grounds->ground, bytes, error);
+    if (status != MILD_OK) {
+        batch_free(crowd->device, ground);
+        return status;
+    }
+    return batch_copy(crowd->device, at, &task, sizeof task, error);
+}
+
+static MildStatus copy_model(Crowd *crowd, const CrowdDef *def, MildError *error) {
+    EngineModel *model = calloc(1, sizeof *model);
+    double *number = calloc(ENGINE_NUMBERS, sizeof *number);
+    EngineTree tree = {0};
+    MildStatus status = MILD_ERROR_MEMORY;
+    if (!model || !number) {
+        mild_fail(error, status, "no memory for the model of the robot");
+    } else {
+        status = engine_model_read(def->robot, def->task->physics_dt, &tree, number, error);
+    }
+    if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
+        const char *why = crowd_device_fits(&tree, crowd->ground);
+        status = why ? mild_fail(error, MILD_ERROR_ARGUMENT, "%s: %s", robot_name(def->robot), why)
+                     : MILD_OK;
+    }
+    EngineModel *at = status == MILD_OK ? take(crowd, sizeof *at, error) : NULL;
+    crowd->arrays.model = at;
+    if (at) {
+        crowd_model_fill(&tree, number, model);
+        status = batch_copy(crowd->device, at, model, sizeof *model, error);
+    } else if (status == MILD_OK) {
+        status = MILD_ERROR_MEMORY;
+    }
+    free(model);
+    free(number);
+    return status;
+}
+
+static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
+                             MildError *error) {
+    const TaskShape shape = task_shape(def->robot);
+    crowd->device = def->device;
+    crowd->pool = def->pool;
+    crowd->arrays.envs = def->envs;
+    crowd->arrays.stride = task_env_head_bytes(def->task, &shape);
+    MildStatus status = open_ground(crowd, def, grounds, error);
+    status = status == MILD_OK ? take_arrays(crowd, error) : status;
+    status = status == MILD_OK ? copy_envs(crowd, def, error) : status;
+    status = status == MILD_OK ? copy_task(crowd, def, grounds, error) : status;
+    return status == MILD_OK ? copy_model(crowd, def, error) : status;
+}
+
+Crowd *crowd_create(const CrowdDef *def, MildError *error) {
+    if (check_def(def, error) != MILD_OK) {
+        return NULL;
+    }
+    TaskGrounds *grounds =
+        task_grounds_create(def->task, def->robot, def->grounds, def->seed, def->pool, error);
+    Crowd *crowd = grounds ? calloc(1, sizeof *crowd) : NULL;
+    if (grounds && !crowd) {
+        mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
+    }
+    if (crowd && open_crowd(crowd, def, grounds, error) != MILD_OK) {
+        crowd_destroy(crowd);
+        crowd = NULL;
+    }
+    task_grounds_destroy(grounds);
+    return crowd;
+}
+
+void crowd_destroy(Crowd *crowd) {
+    if (!crowd) {
+        return;
+    }
+    const CrowdArrays *all = &crowd->arrays;
+    if (all->task) {
+        CrowdTask task = {.grounds = {0, NULL}};
+        if (batch_copy(crowd->device, &task, all->task, sizeof task, NULL) == MILD_OK) {
+            batch_free(crowd->device, task.grounds.ground);
+        }
+    }
+    void *const memory[] = {all->env,      all->robot, all->sim,          all->reading,
+                            all->material, all->fresh, (void *)all->task, (void *)all->model};
+    for (size_t i = 0; i < sizeof memory / sizeof *memory; i++) {
+        batch_free(crowd->device, memory[i]);
+    }
+    mild_batch_destroy(crowd->ground);
+    free(crowd);
+}
+
+size_t crowd_robot_bytes(const Crowd *crowd) {
+    return crowd->bytes / (size_t)crowd->arrays.envs + mild_batch_robot_bytes(crowd->ground);
+}
+
+/* ---- steps ---- */
+
+/* One call, for the threads of the host. */
+typedef struct {
+    const Crowd *crowd;
+    CrowdStep step;
+} Call;
+
+static CrowdStep step_into(const VecView *view) {
+    return (CrowdStep){.history = view->history,
+                       .critic = view->critic,
+                       .estimate = view->estimate,
+                       .frame = view->frame};
+}
+
+static void begin_piece(void *context, int piece, int thread) {
+    (void)thread;
+    crowd_host_begin(&((const Call *)context)->crowd->arrays, piece);
+}
+
+static void physics_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    crowd_host_physics(&call->crowd->arrays, &call->step, call->crowd->ground, piece);
+}
+
+static void first_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    crowd_host_first(&call->crowd->arrays, &call->step, piece);
+}
+
+static MildStatus checked(const char *why, MildError *error) {
+    return why ? mild_fail(error, MILD_ERROR_IO, "GPU: robots: %s", why) : MILD_OK;
+}
+
+/* New episodes forget their ground, and all are seen. */
+static MildStatus finish(const Crowd *crowd, Call *call, void *stream, MildError *error) {
+    const CrowdArrays *all = &crowd->arrays;
+    MildStatus status = mild_batch_reset(crowd->ground, all->fresh, stream, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    if (crowd->device != MILD_BATCH_HOST) {
+        return checked(crowd_device_first(all, &call->step, stream), error);
+    }
+    pool_run(crowd->pool, all->envs, first_piece, call);
+    return MILD_OK;
+}
+
+MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildError *error) {
+    Call call = {crowd, step_into(first)};
+    if (crowd->device != MILD_BATCH_HOST) {
+        MildStatus status = checked(crowd_device_begin(&crowd->arrays, stream), error);
+        return status == MILD_OK ? finish(crowd, &call, stream, error) : status;
+    }
+    pool_run(crowd->pool, crowd->arrays.envs, begin_piece, &call);
+    return finish(crowd, &call, stream, error);
+}
+
+MildStatus crowd_step(Crowd *crowd, const float *action, float *reward, uint8_t *done,
+                      uint8_t *timeout, uint8_t *valid, const VecView *next, void *stream,
+                      MildError *error) {
+    const CrowdArrays *all = &crowd->arrays;
+    Call call = {crowd, step_into(next)};
+    call.step.action = action;
+    call.step.reward = reward;
+    call.step.done = done;
+    call.step.timeout = timeout;
+    call.step.valid = valid;
+    if (crowd->device != MILD_BATCH_HOST) {
+        MildStatus status =
+            checked(crowd_device_physics(all, &call.step, crowd->ground, stream), error);
+        return status == MILD_OK ? finish(crowd, &call, stream, error) : status;
+    }
+    pool_run(crowd->pool, all->envs, physics_piece, &call);
+    return finish(crowd, &call, stream, error);
+}
+
+MildStatus crowd_take_stats(Crowd *crowd, VecStats *stats, void *stream, MildError *error) {
+    const CrowdArrays *all = &crowd->arrays;
+    double sum[TALLY_NUMBERS];
+    if (crowd->device != MILD_BATCH_HOST) {
+        MildStatus status = checked(crowd_device_tally(all, stream), error);
+        status = status == MILD_OK ? device_wait(crowd->device, error) : status;
+        if (status != MILD_OK) {
+            return status;
+        }
+    } else {
+        crowd_host_tally(all);
+    }
+    MildStatus status = batch_copy(crowd->device, sum, all->tally, sizeof sum, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    *stats = (VecStats){.episodes = (int)sum[TALLY_EPISODES],
+                        .falls = (int)sum[TALLY_FALLS],
+                        .diverged = (int)sum[TALLY_DIVERGED],
+                        .steps = sum[TALLY_STEPS],
+                        .length = sum[TALLY_LENGTH],
+                        .reward = sum[TALLY_REWARD],
+                        .speed_error = sum[TALLY_SPEED_ERROR],
+                        .assist = sum[TALLY_ASSIST] / all->envs};
+    memcpy(stats->terms, sum + TALLY_TERMS, sizeof stats->terms);
+    vec_stats_means(stats);
+    return MILD_OK;
+}
+
+const TaskEnv *crowd_env(const Crowd *crowd, int i) {
+    return (const TaskEnv *)(void *)(crowd->arrays.env + (size_t)i * crowd->arrays.stride);
+}

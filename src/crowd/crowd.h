@@ -1,0 +1,45 @@
+/* Environments of the task on a GPU, or on the CPU by the same text: robots stepped by the batch
+ * engine (docs/engine.md) on the batch ground (mild/batch.h), the task by its own files (src/task).
+ * The same observations, rewards and random numbers as those of Vec, within the rounding of float.
+ *
+ * One thread and one stream at a time. On a GPU, crowd_reset and crowd_step only put work into the
+ * stream, so that a graph may capture them. */
+#ifndef MILD_CROWD_H
+#define MILD_CROWD_H
+
+#include <stdint.h>
+
+#include "base/pool.h"
+#include "task/vec.h"
+
+typedef struct Crowd Crowd;
+
+typedef struct {
+    const TaskDef *task; /* copied */
+    const Robot *robot;  /* read during the call */
+    Pool *pool;          /* draws the grounds */
+    int device;          /* a CUDA device, or MILD_BATCH_HOST */
+    int envs;            /* environments */
+    uint32_t first;      /* number of the first one, which selects its random numbers */
+    int grounds;         /* drawn beforehand; episodes choose among them */
+    uint64_t seed;
+} CrowdDef;
+
+/* NULL, with one line in *error, for what the device does not have yet (maps, patches, imprints),
+ * and when device or memory is missing. */
+Crowd *crowd_create(const CrowdDef *def, MildError *error);
+void crowd_destroy(Crowd *crowd); /* may be NULL */
+
+/* As vec_reset and vec_step; arrays in the memory of the device. stream: a cudaStream_t. */
+MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildError *error);
+MildStatus crowd_step(Crowd *crowd, const float *action, float *reward, uint8_t *done,
+                      uint8_t *timeout, uint8_t *valid, const VecView *next, void *stream,
+                      MildError *error);
+/* Statistics of the episodes that ended since the last call. Waits for the stream. */
+MildStatus crowd_take_stats(Crowd *crowd, VecStats *stats, void *stream, MildError *error);
+/* [B] Of the device for one robot. */
+size_t crowd_robot_bytes(const Crowd *crowd);
+/* State of an environment, on the host only. */
+const TaskEnv *crowd_env(const Crowd *crowd, int i);
+
+#endif

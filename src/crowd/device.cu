@@ -1,0 +1,182 @@
+/* A crowd on a GPU. The text is compiled for robots of one size (ENGINE_JOINTS ... of model.h), or
+ * without these definitions for any. */
+#define MILD_REAL_FLOAT
+#include <cuda_runtime.h>
+
+#include "batch/batch.h"
+#include "batch/contact.h"
+#include "engine/model.h"
+
+#ifndef CROWD_PER
+#define CROWD_PER 5 /* elements of a lane */
+#endif
+enum { GROUND_GROUPS = ENGINE_FEET == 3 ? 4 : ENGINE_FEET };
+#define CONTACT_FEET GROUND_GROUPS
+#define CONTACT_PER CROWD_PER
+#define CONTACT_CURVES LAW_CONE
+#define CONTACT(name) crowd_##name
+#include "batch/contact.inc"
+#include "batch/robot.inc"
+
+/* The ground under a warp's robot. */
+typedef struct {
+    const ContactSetup *setup;
+    const ContactMaterial *material;
+    const BatchShape *shape;
+    const BatchArrays *arrays;
+    crowd_Shared *shared;
+} CrowdGround;
+
+LANE_FN void crowd_ground(const CrowdGround *ground, long robot, const ContactProblem *problem,
+                          const ContactResult *result) {
+    crowd_robot(ground->setup, problem, ground->shared,
+                batch_memory(ground->shape, ground->arrays, robot), 1, result);
+}
+
+#include "crowd/crowd.inc"
+#include "crowd/text.h"
+
+#ifndef CROWD_WARPS
+#define CROWD_WARPS (ENGINE_FIXED ? 4 : 1) /* robots of a block */
+#endif
+#ifndef CROWD_BLOCKS
+#define CROWD_BLOCKS (ENGINE_FIXED ? 4 : 1) /* blocks of a multiprocessor, at least */
+#endif
+enum { WARP_THREADS = LANES * CROWD_WARPS, TASK_THREADS = 32, TALLY_THREADS = 256 };
+
+static const size_t place_bytes = CROWD_WARPS * sizeof(CrowdPlace);
+
+static __device__ long warp_robot(void) {
+    return (long)blockIdx.x * CROWD_WARPS + threadIdx.x / LANES;
+}
+
+static __device__ long thread_robot(void) {
+    return (long)blockIdx.x * TASK_THREADS + threadIdx.x;
+}
+
+static int warp_blocks(int envs) {
+    return (envs + CROWD_WARPS - 1) / CROWD_WARPS;
+}
+
+static int thread_blocks(int envs) {
+    return (envs + TASK_THREADS - 1) / TASK_THREADS;
+}
+
+static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
+    physics(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call,
+            const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,
+            const __grid_constant__ BatchArrays arrays) {
+    extern __shared__ Real shared[];
+    __shared__ crowd_Shared contact[CROWD_WARPS];
+    const int warp = threadIdx.x / LANES;
+    const long robot = warp_robot();
+    if (robot >= all.envs) {
+        return;
+    }
+    const CrowdGround ground = {&setup, (const ContactMaterial *)arrays.materials, &shape, &arrays,
+                                &contact[warp]};
+    crowd_physics(&all, &call, &ground, robot, (CrowdPlace *)shared + warp);
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    end(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call) {
+    const long robot = thread_robot();
+    if (robot < all.envs) {
+        crowd_end(&all, &call, robot);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    begin(const __grid_constant__ CrowdArrays all) {
+    const long robot = thread_robot();
+    if (robot < all.envs) {
+        crowd_begin(&all, robot);
+    }
+}
+
+static __global__ void __launch_bounds__(WARP_THREADS)
+    pose(const __grid_constant__ CrowdArrays all) {
+    extern __shared__ Real shared[];
+    const long robot = warp_robot();
+    if (robot < all.envs) {
+        crowd_pose(&all, robot, (CrowdPlace *)shared + threadIdx.x / LANES);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    observe(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call) {
+    const long robot = thread_robot();
+    if (robot < all.envs) {
+        crowd_observe(&all, &call, robot);
+    }
+}
+
+/* Block n sums number n of all tallies, in a fixed order. */
+static __global__ void __launch_bounds__(TALLY_THREADS)
+    tally(const __grid_constant__ CrowdArrays all) {
+    __shared__ double part[TALLY_THREADS];
+    double sum = 0;
+    for (long robot = threadIdx.x; robot < all.envs; robot += TALLY_THREADS) {
+        sum += crowd_take(&all, robot, (int)blockIdx.x);
+    }
+    part[threadIdx.x] = sum;
+    for (int half = TALLY_THREADS / 2; half > 0; half /= 2) {
+        __syncthreads();
+        if ((int)threadIdx.x < half) {
+            part[threadIdx.x] += part[threadIdx.x + half];
+        }
+    }
+    if (threadIdx.x == 0) {
+        all.tally[blockIdx.x] = part[0];
+    }
+}
+
+/* NULL, or the last error. */
+static const char *launched(void) {
+    const cudaError_t status = cudaGetLastError();
+    return status == cudaSuccess ? NULL : cudaGetErrorString(status);
+}
+
+extern "C" const char *crowd_device_fits(const EngineTree *tree, const MildBatch *batch) {
+    if (ENGINE_FIXED && (tree->joints != ENGINE_JOINTS || tree->feet != ENGINE_FEET ||
+                         tree->corners != ENGINE_CORNERS || tree->entries != ENGINE_ENTRIES ||
+                         tree->chain != ENGINE_CHAIN)) {
+        return "this build steps robots of another size on a GPU";
+    }
+    if (batch->shape.per != CROWD_PER || batch->shape.groups != GROUND_GROUPS) {
+        return "this build has soles of other sizes on a GPU";
+    }
+    if (batch->curves & ~LAW_CONE) {
+        return "this build has grounds of cones and lines only on a GPU";
+    }
+    cudaFuncSetAttribute(physics, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
+    cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
+    return launched();
+}
+
+extern "C" const char *crowd_device_begin(const CrowdArrays *all, void *stream) {
+    begin<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    return launched();
+}
+
+extern "C" const char *crowd_device_physics(const CrowdArrays *all, const CrowdStep *call,
+                                            const MildBatch *batch, void *stream) {
+    ContactSetup setup;
+    batch_setup(&batch->shape, &batch->arrays, &setup);
+    physics<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(
+        *all, *call, setup, batch->shape, batch->arrays);
+    end<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
+    return launched();
+}
+
+extern "C" const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call,
+                                          void *stream) {
+    pose<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all);
+    observe<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
+    return launched();
+}
+
+extern "C" const char *crowd_device_tally(const CrowdArrays *all, void *stream) {
+    tally<<<TALLY_NUMBERS, TALLY_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    return launched();
+}

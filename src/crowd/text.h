@@ -1,0 +1,43 @@
+/* What the text of a crowd gives to crowd.c: on the CPU (host.c), and on a GPU (device.cu, or
+ * without_cuda.c). */
+#ifndef CROWD_TEXT_H
+#define CROWD_TEXT_H
+
+#include "crowd/arrays.h"
+
+#define CROWD_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
+
+/* [B] of RobotSim and TaskReading in CrowdArrays. */
+size_t crowd_sim_bytes(void);
+size_t crowd_reading_bytes(void);
+/* From what engine_model_read fills. */
+void crowd_model_fill(const EngineTree *tree, const double *number, EngineModel *model);
+
+/* ---- the CPU, environment by environment ---- */
+/* Draws the first episode. */
+void crowd_host_begin(const CrowdArrays *all, long robot);
+/* A policy step up to the next episode, if this one ends. */
+void crowd_host_physics(const CrowdArrays *all, const CrowdStep *call, const MildBatch *batch,
+                        long robot);
+/* Pose of a new episode, and the observation. */
+void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot);
+/* Fills arrays.tally. */
+void crowd_host_tally(const CrowdArrays *all);
+
+/* ---- a GPU ---- */
+#ifdef __cplusplus
+extern "C" {
+#endif
+/* The same on a device, in the stream. They return NULL or what went wrong. */
+const char *crowd_device_begin(const CrowdArrays *all, void *stream);
+const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call, void *stream);
+const char *crowd_device_physics(const CrowdArrays *all, const CrowdStep *call,
+                                 const MildBatch *batch, void *stream);
+const char *crowd_device_tally(const CrowdArrays *all, void *stream);
+/* Whether the kernels are compiled for such a robot and ground; else the reason. */
+const char *crowd_device_fits(const EngineTree *tree, const MildBatch *batch);
+#ifdef __cplusplus
+}
+#endif
+
+#endif
