@@ -27,10 +27,12 @@ enum { LANES = 32 };
 #ifdef __CUDACC__
 
 #define LANE_FN static __device__ __forceinline__
+#define LANE_CALL static __device__ __noinline__ /* once in the text, for several callers */
 #define LANE_COPIES 1
 #define EACH_LANE(l) for (int l = 0; l < 1; l++)
 #define LANE(l) ((int)(threadIdx.x % LANES))
 #define LANE_UNROLL _Pragma("unroll")
+#define LANE_ROLLED _Pragma("unroll 1")
 
 /* Makes what each lane wrote to memory visible to the others. */
 LANE_FN void lanes_meet(void) {
@@ -66,10 +68,12 @@ LANE_FN void group_max(Real *x, int size) {
 #else
 
 #define LANE_FN static inline
+#define LANE_CALL static inline
 #define LANE_COPIES LANES
 #define EACH_LANE(l) for (int l = 0; l < LANES; l++)
 #define LANE(l) (l)
 #define LANE_UNROLL
+#define LANE_ROLLED
 
 LANE_FN void lanes_meet(void) {
 }

@@ -18,6 +18,9 @@ MildStatus bench_solver(const ExperimentDef *def, BenchReport *report, MildError
 MildStatus bench_walk(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The ground in batches on train.device: steps per second along a walk, and how near in float. */
 MildStatus bench_batch(const ExperimentDef *def, BenchReport *report, MildError *error);
+/* The environments alone on train.device: batch engine, ground and task under no action but the
+ * assistance. */
+MildStatus bench_robots(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Training as a whole, and how its time is spent. */
 MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Bytes held by a training run of train.envs robots. */

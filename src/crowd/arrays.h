@@ -46,6 +46,8 @@ typedef struct {
     void *reading;     /* [envs] TaskReading */
     int32_t *material; /* [envs] of the ground's table */
     uint8_t *fresh;    /* [envs] bool: an episode began */
+    uint8_t *rigid;    /* [envs] bool: of the episode */
+    int32_t *order;    /* [envs] in which a GPU steps them: those on rigid ground first */
     double *tally;     /* [TALLY_NUMBERS] sums over the environments */
     const CrowdTask *task;
     const EngineModel *model;

@@ -72,7 +72,9 @@ static MildStatus take_arrays(Crowd *crowd, MildError *error) {
     all->reading = all->sim ? take(crowd, envs * crowd_reading_bytes(), error) : NULL;
     all->material = all->reading ? take(crowd, envs * sizeof *all->material, error) : NULL;
     all->fresh = all->material ? take(crowd, envs, error) : NULL;
-    all->tally = all->fresh ? take(crowd, TALLY_NUMBERS * sizeof *all->tally, error) : NULL;
+    all->rigid = all->fresh ? take(crowd, envs, error) : NULL;
+    all->order = all->rigid ? take(crowd, envs * sizeof *all->order, error) : NULL;
+    all->tally = all->order ? take(crowd, TALLY_NUMBERS * sizeof *all->tally, error) : NULL;
     return all->tally ? MILD_OK : MILD_ERROR_MEMORY;
 }
 

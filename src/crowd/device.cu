@@ -33,6 +33,12 @@ LANE_FN void crowd_ground(const CrowdGround *ground, long robot, const ContactPr
                 batch_memory(ground->shape, ground->arrays, robot), 1, result);
 }
 
+#ifdef CROWD_LOCKSTEP
+#define CROWD_ALIGN() __syncthreads()
+#else
+#define CROWD_ALIGN()
+#endif
+
 #include "crowd/crowd.inc"
 #include "crowd/text.h"
 
@@ -42,7 +48,7 @@ LANE_FN void crowd_ground(const CrowdGround *ground, long robot, const ContactPr
 #ifndef CROWD_BLOCKS
 #define CROWD_BLOCKS (ENGINE_FIXED ? 4 : 1) /* blocks of a multiprocessor, at least */
 #endif
-enum { WARP_THREADS = LANES * CROWD_WARPS, TASK_THREADS = 32, TALLY_THREADS = 256 };
+enum { WARP_THREADS = LANES * CROWD_WARPS, TASK_THREADS = 32, TALLY_THREADS = 256, ORDER_THREADS = 1024 };
 
 static const size_t place_bytes = CROWD_WARPS * sizeof(CrowdPlace);
 
@@ -69,10 +75,11 @@ static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
     extern __shared__ Real shared[];
     __shared__ crowd_Shared contact[CROWD_WARPS];
     const int warp = threadIdx.x / LANES;
-    const long robot = warp_robot();
-    if (robot >= all.envs) {
+    const long place = warp_robot();
+    if (place >= all.envs) {
         return;
     }
+    const long robot = all.order[place];
     const CrowdGround ground = {&setup, (const ContactMaterial *)arrays.materials, &shape, &arrays,
                                 &contact[warp]};
     crowd_physics(&all, &call, &ground, robot, (CrowdPlace *)shared + warp);
@@ -103,11 +110,40 @@ static __global__ void __launch_bounds__(WARP_THREADS)
     }
 }
 
-static __global__ void __launch_bounds__(TASK_THREADS)
+static __global__ void __launch_bounds__(WARP_THREADS)
     observe(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call) {
-    const long robot = thread_robot();
+    const long robot = warp_robot();
     if (robot < all.envs) {
-        crowd_observe(&all, &call, robot);
+        const TaskLane at = {(int)threadIdx.x % LANES, LANES};
+        crowd_observe(&all, &call, robot, at);
+    }
+}
+
+/* The order in which the robots are stepped, by one block: a warp on rigid ground takes other paths
+ * than one on soft ground, so that a block has but one kind. */
+static __global__ void __launch_bounds__(ORDER_THREADS)
+    arrange(const __grid_constant__ CrowdArrays all) {
+    __shared__ int rigid[ORDER_THREADS + 1];
+    const int t = (int)threadIdx.x;
+    const int begin = (int)((long)all.envs * t / ORDER_THREADS);
+    const int end = (int)((long)all.envs * (t + 1) / ORDER_THREADS);
+    int count = 0;
+    for (int i = begin; i < end; i++) {
+        count += all.rigid[i];
+    }
+    rigid[t + 1] = count;
+    rigid[0] = 0;
+    for (int step = 1; step < ORDER_THREADS; step *= 2) { /* sums up to each thread */
+        __syncthreads();
+        const int before = t + 1 > step ? rigid[t + 1 - step] : 0;
+        __syncthreads();
+        rigid[t + 1] += before;
+    }
+    __syncthreads();
+    int first = rigid[t];
+    int rest = rigid[ORDER_THREADS] + begin - first;
+    for (int i = begin; i < end; i++) {
+        all.order[all.rigid[i] ? first++ : rest++] = i;
     }
 }
 
@@ -172,7 +208,8 @@ extern "C" const char *crowd_device_physics(const CrowdArrays *all, const CrowdS
 extern "C" const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call,
                                           void *stream) {
     pose<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all);
-    observe<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
+    observe<<<warp_blocks(all->envs), WARP_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
+    arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 

@@ -17,6 +17,8 @@ static void crowd_ground(const CrowdGround *ground, long robot, const ContactPro
                  result);
 }
 
+#define CROWD_ALIGN()
+
 #include "crowd/crowd.inc"
 #include "crowd/text.h"
 
@@ -33,9 +35,10 @@ void crowd_host_begin(const CrowdArrays *all, long robot) {
 }
 
 void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot) {
+    const TaskLane alone = {0, 1};
     CrowdPlace place;
     crowd_pose(all, robot, &place);
-    crowd_observe(all, call, robot);
+    crowd_observe(all, call, robot, alone);
 }
 
 void crowd_host_physics(const CrowdArrays *all, const CrowdStep *call, const MildBatch *batch,

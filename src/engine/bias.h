@@ -53,6 +53,7 @@ MILD_HD void engine_link_force(EngineWork *work, int i) {
 MILD_HD void engine_gather_force(const EngineTree *tree, EngineWork *work, int parent, int begin,
                                  int end) {
     EngineDynamics *now = &work->now.dynamics;
+    LANE_ROLLED
     for (int c = begin; c < end; c++) {
         const int child = tree->level_link[c];
         if (tree->parent[child] != parent) {
@@ -79,8 +80,10 @@ LANE_FN void engine_link_forces(const EngineModel *model, EngineWork *work) {
         }
     }
     lanes_meet();
+    LANE_ROLLED
     for (int level = 1; level < tree->levels; level++) {
         EACH_LANE(l) {
+            LANE_ROLLED
             for (int n = tree->level_begin[level] + LANE(l); n < tree->level_begin[level + 1];
                  n += LANES) {
                 engine_link_motion(model, work, tree->level_link[n]);
@@ -89,13 +92,16 @@ LANE_FN void engine_link_forces(const EngineModel *model, EngineWork *work) {
         lanes_meet();
     }
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int i = LANE(l); i < engine_links(tree); i += LANES) {
             engine_link_force(work, i);
         }
     }
     lanes_meet();
+    LANE_ROLLED
     for (int level = tree->levels - 1; level > 0; level--) {
         EACH_LANE(l) {
+            LANE_ROLLED
             for (int n = tree->level_begin[level - 1] + LANE(l); n < tree->level_begin[level];
                  n += LANES) {
                 engine_gather_force(tree, work, tree->level_link[n], tree->level_begin[level],
@@ -132,6 +138,7 @@ LANE_FN void engine_smooth_force(const EngineModel *model, const EngineVariation
     const Real *R = work->rotation[0];
     engine_link_forces(model, work);
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             Real sum = 0;
             if (d < 3) {

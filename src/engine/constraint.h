@@ -64,6 +64,7 @@ LANE_FN int engine_limits(const EngineModel *model, EngineWork *work) {
     Real any[LANE_COPIES];
     EACH_LANE(l) {
         any[l] = 0;
+        LANE_ROLLED
         for (int i = 1 + LANE(l); i < engine_links(&model->tree); i += LANES) {
             const EngineLink *link = &model->number.link[i];
             const Real below = work->angle[i] - link->low - link->margin;
@@ -139,6 +140,7 @@ MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineS
             edge[k] = frame[0][k] + lean * frame[1 + e / 2][k];
         }
         cross3(arm, edge, edge + 3);
+        LANE_ROLLED
         for (int place = 0; place < engine_row_length(tree, link); place++) {
             const Real *column = support->jacobian[f][place];
             speed += (dot3(edge, column) + dot3(edge + 3, column + 3)) *
@@ -154,6 +156,7 @@ MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineS
 LANE_FN void engine_collide(const EngineModel *model, Real friction, const EngineSurface *surface,
                             int level, EngineWork *work) {
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
             corner_edges(model, friction, surface + (level ? 0 : c), work, c);
         }
@@ -167,6 +170,7 @@ LANE_FN void engine_collide(const EngineModel *model, Real friction, const Engin
 LANE_FN void engine_twists(const EngineTree *tree, EngineSupport *support, const Real *x,
                            Real (*twist)[6]) {
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int n = LANE(l); n < 6 * engine_feet(tree); n += LANES) {
             twist[n / 6][n % 6] = foot_twist(tree, support, x, n / 6, n % 6);
         }
@@ -183,6 +187,7 @@ LANE_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
     EngineContact *contact = &work->now.support.ground.contact;
     engine_twists(tree, &work->now.support, work->acceleration, contact->twist);
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int row = LANE(l); row < 4 * engine_corners(tree); row += LANES) {
             const Real *twist = contact->twist[tree->corner_foot[row / 4]];
             contact->residual[row] = edge_along(contact, row, twist) - contact->reference[row];
@@ -195,11 +200,13 @@ LANE_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
 LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work) {
     EngineContact *contact = &work->now.support.ground.contact;
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int n = LANE(l); n < 42 * engine_feet(tree); n += LANES) {
             const int f = n / 42;
             const int r = n % 42 / 7;
             const int c = n % 7; /* 6: the wrench */
             Real sum = 0;
+            LANE_ROLLED
             for (int row = 4 * tree->corner_begin[f]; row < 4 * tree->corner_begin[f + 1]; row++) {
                 const Real x = contact->residual[row];
                 const Real *edge = contact->edge[row];
@@ -219,8 +226,10 @@ LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work) {
 /* half <- stiffness J^T of the feet. */
 LANE_FN void engine_stiffen_rows(const EngineTree *tree, EngineSupport *support) {
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int f = 0; f < engine_feet(tree); f++) {
             const int length = engine_row_length(tree, tree->foot_link[f]);
+            LANE_ROLLED
             for (int n = LANE(l); n < 6 * length; n += LANES) {
                 const Real *stiffness = support->ground.contact.stiffness[f][n % 6];
                 const Real *column = support->jacobian[f][n / 6];
@@ -238,6 +247,7 @@ MILD_HD Real stiffened_entry(const EngineTree *tree, const EngineSupport *suppor
     const int i = d < 6 ? 0 : d - 5;
     const int own = d < 6 ? d : engine_row_length(tree, i) - 1;
     Real sum = 0;
+    LANE_ROLLED
     for (int f = 0; f < engine_feet(tree); f++) {
         if (tree->foot_link[f] >= i && tree->foot_link[f] < tree->end[i]) {
             const Real *row = support->half[f][own];
@@ -254,6 +264,7 @@ MILD_HD Real pushes_along(const EngineTree *tree, const EngineWork *work, int d)
     const int i = d < 6 ? 0 : d - 5;
     const int place = d < 6 ? d : engine_row_length(tree, i) - 1;
     Real sum = 0;
+    LANE_ROLLED
     for (int f = 0; f < engine_feet(tree); f++) {
         if (tree->foot_link[f] >= i && tree->foot_link[f] < tree->end[i]) {
             const Real *column = work->now.support.jacobian[f][place];
@@ -281,6 +292,7 @@ LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
         engine_stiffen_rows(tree, support);
     }
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
             const int d = tree->entry_dof[e];
             const int place = tree->entry_place[e];
@@ -294,6 +306,7 @@ LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
             }
             work->factor[e] = sum;
         }
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             const Real residue =
                 work->force[d] - mass_times(tree, work->mass, work->acceleration, d);
@@ -340,12 +353,14 @@ LANE_FN LinePoint engine_line_rows(const EngineTree *tree, EngineWork *work, int
     Real changed[LANE_COPIES];
     EACH_LANE(l) {
         LinePoint sum = {0, 0, 0};
+        LANE_ROLLED
         for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
             if (work->limit_side[i] != 0) {
                 line_row(&sum, work->limit_weight[i], limit_residual(work, i),
                          work->limit_side[i] * support->change[5 + i], t);
             }
         }
+        LANE_ROLLED
         for (int row = LANE(l); edges && row < 4 * engine_corners(tree); row += LANES) {
             if (contact->weight[row] > 0) {
                 const Real *change = contact->twist_change[tree->corner_foot[row / 4]];
@@ -368,6 +383,7 @@ LANE_FN LinePoint engine_line_smooth(const EngineTree *tree, EngineWork *work) {
     Real curvature[LANE_COPIES];
     EACH_LANE(l) {
         slope[l] = curvature[l] = 0;
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             const Real product = mass_times(tree, work->mass, support->change, d);
             slope[l] -= support->residue[d] * support->change[d];
@@ -385,6 +401,7 @@ LANE_FN Real engine_line_search(const EngineTree *tree, EngineWork *work, int ed
     Real low = 0;
     Real high = REAL(1e30);
     Real t = 1;
+    LANE_ROLLED
     for (int i = 0; i < CONSTRAINT_LINE_STEPS; i++) {
         const LinePoint rows = engine_line_rows(tree, work, edges, t);
         const Real slope = smooth.slope + t * smooth.curvature + rows.slope;
@@ -406,6 +423,7 @@ LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t) {
     Real size[LANE_COPIES];
     EACH_LANE(l) {
         moved[l] = size[l] = 0;
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             const Real change = t * work->now.support.change[d];
             work->acceleration[d] += change;

@@ -6,97 +6,129 @@
 
 #include "engine/data.h"
 
-/* Sum over the links that hang on link i (all for the base) of the products of two places of their
- * rows. */
-MILD_HD Real row_products(const EngineTree *tree, const Real *factor, int i, int first,
-                          int second) {
-    Real sum = 0;
-    for (int k = i + 1; k < tree->end[i]; k++) {
-        const Real *row = factor + tree->row[5 + k];
-        sum += row[first] * row[second];
-    }
-    return sum;
+/* Degrees of freedom of a lane: LANE, and LANE + LANES with more of them than lanes. */
+#define DOF_SLOTS ((ENGINE_DOFS + LANES - 1) / LANES)
+#define DOF_SLOT(d) (DOF_SLOTS == 1 ? 0 : (d) / LANES)
+
+/* Row and column of the entry e of a packed lower triangle. */
+MILD_HD void triangle_place(int e, int *row, int *column) {
+    int r = (int)((REAL_SQRT(8 * REAL(e) + 1) - 1) / 2);
+    r -= r * (r + 1) / 2 > e;
+    r += (r + 1) * (r + 2) / 2 <= e;
+    *row = r;
+    *column = e - r * (r + 1) / 2;
 }
 
-/* The base's six rows, dense; few and one behind the other, so they are the work of one lane. */
-MILD_HD void factor_base(Real *factor) {
-    Real m[6][6];
-    LANE_UNROLL
-    for (int r = 0; r < 6; r++) {
+/* factor: a symmetric matrix with the sparsity of M, replaced by L. Degree of freedom k takes its
+ * row's part from the rows of its ancestors, last one first:
+ *
+ *     L_kk = sqrt(M_kk),   L_ki = M_ki/L_kk,   M_ij -= L_ki L_kj   for the ancestors i, j of k */
+LANE_CALL void engine_factorise(const EngineTree *tree, Real *factor) {
+    LANE_ROLLED
+    for (int k = engine_dofs(tree) - 1; k >= 0; k--) {
+        const int link = k < 6 ? 0 : k - 5;
+        const int above = k < 6 ? k : engine_row_length(tree, link) - 1;
+        Real *row = factor + tree->row[k];
+        const Real inverse = REAL_INVERSE_SQRT(row[above]);
+        lanes_meet();
+        EACH_LANE(l) {
+            LANE_ROLLED
+            for (int place = LANE(l); place <= above; place += LANES) {
+                row[place] = place < above ? row[place] * inverse : inverse;
+            }
+        }
+        lanes_meet();
+        EACH_LANE(l) {
+            LANE_ROLLED
+            for (int e = LANE(l); e < above * (above + 1) / 2; e += LANES) {
+                int i, j;
+                triangle_place(e, &i, &j);
+                factor[tree->row[engine_row_dof(tree, link, i)] + j] -= row[i] * row[j];
+            }
+        }
+        lanes_meet();
+    }
+}
+
+/* x <- L^-T x, leaves first. A lane has x of its degrees of freedom in registers. */
+LANE_CALL void engine_solve_transposed(const EngineTree *tree, const Real *factor, Real *x) {
+    Real own[DOF_SLOTS][LANE_COPIES], inverse[DOF_SLOTS][LANE_COPIES];
+    EACH_LANE(l) {
         LANE_UNROLL
-        for (int c = 0; c <= r; c++) {
-            m[r][c] = factor[r * (r + 1) / 2 + c];
+        for (int s = 0; s < DOF_SLOTS; s++) {
+            const int d = LANE(l) + s * LANES;
+            const int in = d < engine_dofs(tree);
+            own[s][l] = in ? x[d] : 0;
+            inverse[s][l] = in ? factor[tree->row[d] + engine_dofs_above(tree, d)] : 0;
         }
     }
-    LANE_UNROLL
-    for (int k = 5; k >= 0; k--) {
-        const Real inverse = REAL_INVERSE_SQRT(m[k][k]);
-        LANE_UNROLL
-        for (int c = 0; c < k; c++) {
-            m[k][c] *= inverse;
+    LANE_ROLLED
+    for (int k = engine_dofs(tree) - 1; k >= 0; k--) {
+        Real scaled[LANE_COPIES];
+        const Real *row = factor + tree->row[k];
+        const EnginePath path = tree->path[k];
+        EACH_LANE(l) {
+            scaled[l] = own[DOF_SLOT(k)][l] * inverse[DOF_SLOT(k)][l];
         }
-        LANE_UNROLL
-        for (int r = 0; r < k; r++) {
+        const Real solved = lane_read(scaled, k % LANES);
+        EACH_LANE(l) {
             LANE_UNROLL
-            for (int c = 0; c <= r; c++) {
-                m[r][c] -= m[k][r] * m[k][c];
-            }
-        }
-        m[k][k] = inverse;
-    }
-    LANE_UNROLL
-    for (int r = 0; r < 6; r++) {
-        LANE_UNROLL
-        for (int c = 0; c <= r; c++) {
-            factor[r * (r + 1) / 2 + c] = m[r][c];
-        }
-    }
-}
-
-/* factor: a symmetric matrix with the sparsity of M, replaced by L. A lane owns an entry and
- * gathers from the rows behind it, which are ready: no two lanes write to one entry, and the sums
- * do not wait for each other. */
-LANE_FN void engine_factorise(const EngineTree *tree, Real *factor) {
-    for (int level = tree->levels - 1; level > 0; level--) {
-        const int begin = tree->level_entry[level];
-        const int end = tree->level_entry[level + 1];
-        EACH_LANE(l) {
-            for (int e = begin + LANE(l); e < end; e += LANES) {
-                const int i = tree->entry_dof[e] - 5;
-                factor[e] -= row_products(tree, factor, i, engine_row_length(tree, i) - 1,
-                                          tree->entry_place[e]);
-            }
-        }
-        lanes_meet();
-        EACH_LANE(l) {
-            for (int n = tree->level_begin[level] + LANE(l); n < tree->level_begin[level + 1];
-                 n += LANES) {
-                const int i = tree->level_link[n];
-                Real *diagonal = factor + tree->row[5 + i] + engine_row_length(tree, i) - 1;
-                *diagonal = REAL_INVERSE_SQRT(*diagonal);
-            }
-        }
-        lanes_meet();
-        EACH_LANE(l) {
-            for (int e = begin + LANE(l); e < end; e += LANES) {
-                const int i = tree->entry_dof[e] - 5;
-                const int last = engine_row_length(tree, i) - 1;
-                if (tree->entry_place[e] < last) {
-                    factor[e] *= factor[tree->row[5 + i] + last];
+            for (int s = 0; s < DOF_SLOTS; s++) {
+                const int d = LANE(l) + s * LANES;
+                if (path >> d & 1) {
+                    own[s][l] =
+                        d == k ? solved : own[s][l] - row[engine_dofs_above(tree, d)] * solved;
                 }
             }
         }
-        lanes_meet();
     }
     EACH_LANE(l) {
-        for (int e = LANE(l); e < ENGINE_BASE_ENTRIES; e += LANES) {
-            factor[e] -= row_products(tree, factor, 0, tree->entry_dof[e], tree->entry_place[e]);
+        LANE_UNROLL
+        for (int s = 0; s < DOF_SLOTS; s++) {
+            if (LANE(l) + s * LANES < engine_dofs(tree)) {
+                x[LANE(l) + s * LANES] = own[s][l];
+            }
         }
     }
     lanes_meet();
+}
+
+/* x <- L^-1 x, root first. */
+LANE_CALL void engine_solve(const EngineTree *tree, const Real *factor, Real *x) {
+    Real own[DOF_SLOTS][LANE_COPIES], inverse[DOF_SLOTS][LANE_COPIES];
     EACH_LANE(l) {
-        if (LANE(l) == 0) {
-            factor_base(factor);
+        LANE_UNROLL
+        for (int s = 0; s < DOF_SLOTS; s++) {
+            const int d = LANE(l) + s * LANES;
+            const int in = d < engine_dofs(tree);
+            own[s][l] = in ? x[d] : 0;
+            inverse[s][l] = in ? factor[tree->row[d] + engine_dofs_above(tree, d)] : 0;
+        }
+    }
+    LANE_ROLLED
+    for (int k = 0; k < engine_dofs(tree); k++) {
+        Real scaled[LANE_COPIES];
+        const int above = engine_dofs_above(tree, k);
+        EACH_LANE(l) {
+            scaled[l] = own[DOF_SLOT(k)][l] * inverse[DOF_SLOT(k)][l];
+        }
+        const Real solved = lane_read(scaled, k % LANES);
+        EACH_LANE(l) {
+            LANE_UNROLL
+            for (int s = 0; s < DOF_SLOTS; s++) {
+                const int d = LANE(l) + s * LANES;
+                if (d < engine_dofs(tree) && (tree->path[d] >> k & 1)) {
+                    own[s][l] = d == k ? solved : own[s][l] - factor[tree->row[d] + above] * solved;
+                }
+            }
+        }
+    }
+    EACH_LANE(l) {
+        LANE_UNROLL
+        for (int s = 0; s < DOF_SLOTS; s++) {
+            if (LANE(l) + s * LANES < engine_dofs(tree)) {
+                x[LANE(l) + s * LANES] = own[s][l];
+            }
         }
     }
     lanes_meet();
@@ -105,70 +137,11 @@ LANE_FN void engine_factorise(const EngineTree *tree, Real *factor) {
 /* x of degree of freedom d, at `place` in the rows behind its link i, less what those take. */
 MILD_HD Real gathered(const EngineTree *tree, const Real *factor, const Real *x, int i, int place) {
     Real sum = 0;
+    LANE_ROLLED
     for (int k = i + 1; k < tree->end[i]; k++) {
         sum += factor[tree->row[5 + k] + place] * x[5 + k];
     }
     return sum;
-}
-
-/* x <- L^-T x: leaves first. */
-LANE_FN void engine_solve_transposed(const EngineTree *tree, const Real *factor, Real *x) {
-    for (int level = tree->levels - 1; level > 0; level--) {
-        EACH_LANE(l) {
-            for (int n = tree->level_begin[level] + LANE(l); n < tree->level_begin[level + 1];
-                 n += LANES) {
-                const int i = tree->level_link[n];
-                const int place = engine_row_length(tree, i) - 1;
-                x[5 + i] = (x[5 + i] - gathered(tree, factor, x, i, place)) *
-                           factor[tree->row[5 + i] + place];
-            }
-        }
-        lanes_meet();
-    }
-    EACH_LANE(l) {
-        for (int d = LANE(l); d < 6; d += LANES) {
-            x[d] -= gathered(tree, factor, x, 0, d);
-        }
-    }
-    lanes_meet();
-    EACH_LANE(l) {
-        for (int d = LANE(l) == 0 ? 5 : -1; d >= 0; d--) {
-            for (int k = d + 1; k < 6; k++) {
-                x[d] -= factor[k * (k + 1) / 2 + d] * x[k];
-            }
-            x[d] *= factor[d * (d + 1) / 2 + d];
-        }
-    }
-    lanes_meet();
-}
-
-/* x <- L^-1 x: root first. */
-LANE_FN void engine_solve(const EngineTree *tree, const Real *factor, Real *x) {
-    EACH_LANE(l) {
-        for (int d = LANE(l); d < 6 && LANE(l) == 0; d++) {
-            for (int k = 0; k < d; k++) {
-                x[d] -= factor[d * (d + 1) / 2 + k] * x[k];
-            }
-            x[d] *= factor[d * (d + 1) / 2 + d];
-        }
-    }
-    lanes_meet();
-    for (int level = 1; level < tree->levels; level++) {
-        EACH_LANE(l) {
-            for (int n = tree->level_begin[level] + LANE(l); n < tree->level_begin[level + 1];
-                 n += LANES) {
-                const int i = tree->level_link[n];
-                const Real *row = factor + tree->row[5 + i];
-                const int last = engine_row_length(tree, i) - 1;
-                Real sum = x[5 + i];
-                for (int place = 0; place < last; place++) {
-                    sum -= row[place] * x[engine_row_dof(tree, i, place)];
-                }
-                x[5 + i] = sum * row[last];
-            }
-        }
-        lanes_meet();
-    }
 }
 
 /* Row d of M x. */
@@ -177,6 +150,7 @@ MILD_HD Real mass_times(const EngineTree *tree, const Real *mass, const Real *x,
     const int last = d < 6 ? d : engine_row_length(tree, i) - 1;
     const Real *row = mass + tree->row[d];
     Real sum = gathered(tree, mass, x, i, last);
+    LANE_ROLLED
     for (int place = 0; place <= last; place++) {
         sum += row[place] * x[d < 6 ? place : engine_row_dof(tree, i, place)];
     }

@@ -48,6 +48,7 @@ MILD_HD Real foot_twist(const EngineTree *tree, const EngineSupport *support, co
     const int link = tree->foot_link[foot];
     const int length = engine_row_length(tree, link);
     Real sum = 0;
+    LANE_ROLLED
     for (int place = 0; place < length; place++) {
         sum += support->jacobian[foot][place][c] * x[engine_row_dof(tree, link, place)];
     }
@@ -60,8 +61,10 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
     EngineSupport *support = &work->now.support;
     const int feet = engine_feet(tree);
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int f = 0; f < feet; f++) {
             const int length = engine_row_length(tree, tree->foot_link[f]);
+            LANE_ROLLED
             for (int place = LANE(l); place < length; place += LANES) {
                 foot_column(model, work, f, place, support->jacobian[f][place]);
             }
@@ -69,12 +72,14 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
     }
     lanes_meet();
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int n = LANE(l); n < 6 * feet; n += LANES) {
             const int f = n / 6;
             const int c = n % 6;
             work->foot_velocity[f][c] =
                 c < foot_parts(tree, f) ? foot_twist(tree, support, work->rate, f, c) : 0;
         }
+        LANE_ROLLED
         for (int f = LANE(l); f < feet; f += LANES) {
             const Real *R = work->rotation[tree->foot_link[f]];
             const Real *turn = model->number.foot[f].turn;
@@ -92,24 +97,41 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
     lanes_meet();
 }
 
-/* L^-T J^T: a lane has a column of a foot, whose chain is a path, so it needs no other lane. */
+/* In registers where the length of a chain is known to the compiler. */
+#if ENGINE_FIXED
+#define CHAIN_LOOP LANE_UNROLL
+#else
+#define CHAIN_LOOP LANE_ROLLED
+#endif
+
+/* L^-T J^T: a lane has a column of a foot, whose chain is a path, so it needs no other lane. As in
+ * engine_solve_transposed, a solved entry is taken from those above it. */
 LANE_FN void engine_half_solve(const EngineTree *tree, EngineWork *work) {
     EngineSupport *support = &work->now.support;
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int n = LANE(l); n < 6 * engine_feet(tree); n += LANES) {
             const int f = n / 6;
             const int c = n % 6;
             const int link = tree->foot_link[f];
             const int length = engine_row_length(tree, link);
             const int part = c < foot_parts(tree, f);
-            for (int place = length - 1; place >= 0; place--) {
-                Real sum = part ? support->jacobian[f][place][c] : 0;
-                for (int k = place + 1; k < length; k++) {
-                    sum -= work->factor[tree->row[engine_row_dof(tree, link, k)] + place] *
-                           support->half[f][k][c];
+            Real x[ENGINE_CHAIN];
+            CHAIN_LOOP
+            for (int place = 0; place < ENGINE_CHAIN; place++) {
+                x[place] = part && place < length ? support->jacobian[f][place][c] : 0;
+            }
+            CHAIN_LOOP
+            for (int k = ENGINE_CHAIN - 1; k >= 0; k--) {
+                if (k < length) {
+                    const Real *row = work->factor + tree->row[engine_row_dof(tree, link, k)];
+                    x[k] *= row[k];
+                    support->half[f][k][c] = x[k];
+                    CHAIN_LOOP
+                    for (int place = 0; place < k; place++) {
+                        x[place] -= row[place] * x[k];
+                    }
                 }
-                support->half[f][place][c] =
-                    sum * work->factor[tree->row[engine_row_dof(tree, link, place)] + place];
             }
         }
     }
@@ -122,12 +144,14 @@ LANE_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
     const int rows = 6 * engine_feet(tree);
     engine_half_solve(tree, work);
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int n = LANE(l); n < rows * rows; n += LANES) {
             const int f = n / rows / 6;
             const int g = n % rows / 6;
             const int r = n / rows % 6;
             const int c = n % rows % 6;
             Real sum = 0;
+            LANE_ROLLED
             for (int place = 0; place < tree->shared[f][g]; place++) {
                 sum += support->half[f][place][r] * support->half[g][place][c];
             }
@@ -141,6 +165,7 @@ LANE_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
 LANE_FN void engine_free_velocity(const EngineModel *model, EngineWork *work) {
     EngineSupport *support = &work->now.support;
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
             const int f = n / 6;
             const int c = n % 6;
@@ -161,10 +186,12 @@ MILD_HD Real wrench_along(const EngineTree *tree, const EngineWork *work, const 
     const int i = d < 6 ? 0 : d - 5;
     const int place = d < 6 ? d : engine_row_length(tree, i) - 1;
     Real sum = 0;
+    LANE_ROLLED
     for (int f = 0; f < engine_feet(tree); f++) {
         if (tree->foot_link[f] < i || tree->foot_link[f] >= tree->end[i]) {
             continue; /* moves without the foot */
         }
+        LANE_ROLLED
         for (int c = 0; c < foot_parts(tree, f); c++) {
             sum += rows[6 * (ENGINE_CHAIN * f + place) + c] * work->wrench[f][c];
         }
@@ -177,6 +204,7 @@ MILD_HD Real wrench_along(const EngineTree *tree, const EngineWork *work, const 
 LANE_FN void engine_add_wrench(const EngineTree *tree, EngineWork *work) {
     EngineSupport *support = &work->now.support;
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             work->force[d] += wrench_along(tree, work, support->jacobian[0][0], d);
             support->change[d] = wrench_along(tree, work, support->half[0][0], d);
@@ -185,6 +213,7 @@ LANE_FN void engine_add_wrench(const EngineTree *tree, EngineWork *work) {
     lanes_meet();
     engine_solve(tree, work->factor, support->change);
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             work->acceleration[d] += support->change[d];
         }

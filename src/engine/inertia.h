@@ -70,6 +70,7 @@ MILD_HD void inertia_turn(const Real *R, const Real *own, Real *world) {
 LANE_FN void engine_link_inertia(const EngineModel *model, const EngineVariation *variation,
                                  EngineWork *work) {
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int i = LANE(l); i < engine_links(&model->tree); i += LANES) {
             const EngineLink *link = &model->number.link[i];
             const Real scale = variation->link_mass_scale[model->tree.scale[i]];
@@ -90,13 +91,16 @@ LANE_FN void engine_link_inertia(const EngineModel *model, const EngineVariation
  * so that no two add to one sum. */
 LANE_FN void engine_composite_inertia(const EngineModel *model, EngineWork *work) {
     const EngineTree *tree = &model->tree;
+    LANE_ROLLED
     for (int level = tree->levels - 1; level > 0; level--) {
         const int begin = tree->level_begin[level - 1];
         const int middle = tree->level_begin[level];
         const int end = tree->level_begin[level + 1];
         EACH_LANE(l) {
+            LANE_ROLLED
             for (int n = begin + LANE(l); n < middle; n += LANES) {
                 const int parent = tree->level_link[n];
+                LANE_ROLLED
                 for (int c = middle; c < end; c++) {
                     const int child = tree->level_link[c];
                     if (tree->parent[child] != parent) {
@@ -172,12 +176,14 @@ LANE_FN void engine_mass_matrix(const EngineModel *model, const EngineVariation 
     const EngineTree *tree = &model->tree;
     engine_composite_inertia(model, work);
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             engine_unit_force(work, d, work->now.dynamics.unit[d]);
         }
     }
     lanes_meet();
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
             work->mass[e] =
                 engine_mass_entry(model, variation, work, tree->entry_dof[e], tree->entry_place[e]);

@@ -27,6 +27,7 @@ LANE_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
     EngineDynamics *now = &work->now.dynamics;
     const int links = engine_links(&model->tree);
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int i = 1 + LANE(l); i < links; i += LANES) {
             const Real angle = work->angle[i] - model->number.link[i].reference;
             real_sine_cosine(angle, &now->wave[i][1], &now->wave[i][0]);
@@ -34,6 +35,7 @@ LANE_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
     }
     lanes_meet();
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int n = 9 + LANE(l); n < 9 * links; n += LANES) {
             const int i = n / 9;
             const int e = n % 9;
@@ -73,10 +75,12 @@ MILD_HD void engine_pose_number(const EngineModel *model, EngineWork *work, int 
 LANE_FN void engine_kinematics(const EngineModel *model, EngineWork *work) {
     const EngineTree *tree = &model->tree;
     engine_hinges(model, work);
+    LANE_ROLLED
     for (int level = 1; level < tree->levels; level++) {
         const int begin = tree->level_begin[level];
         const int numbers = 12 * (tree->level_begin[level + 1] - begin);
         EACH_LANE(l) {
+            LANE_ROLLED
             for (int n = LANE(l); n < numbers; n += LANES) {
                 engine_pose_number(model, work, tree->level_link[begin + n / 12], n % 12);
             }
@@ -84,6 +88,7 @@ LANE_FN void engine_kinematics(const EngineModel *model, EngineWork *work) {
         lanes_meet();
     }
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int n = 3 + LANE(l); n < 3 * engine_links(tree); n += LANES) {
             const int i = n / 3;
             work->axis[i][n % 3] =

@@ -1,5 +1,5 @@
-/* What a task asks of a robot's pose, as RobotSim answers it: valid after engine_pose, and until
- * the step's end after engine_begin. Points are in world axes and count from the world's origin. */
+/* What a task asks of a robot's pose, as RobotSim answers it: valid after engine_begin, until
+ * engine_end. Points are in world axes and count from the world's origin. */
 #ifndef MILD_ENGINE_MEASURE_H
 #define MILD_ENGINE_MEASURE_H
 
@@ -64,6 +64,7 @@ LANE_FN Real engine_body_clearance(const EngineModel *model, const EngineWork *w
     Real most[LANE_COPIES];
     EACH_LANE(l) {
         most[l] = -MEASURE_NONE;
+        LANE_ROLLED
         for (int s = LANE(l); s < model->tree.shells; s += LANES) {
             Real under[2];
             most[l] = real_max(most[l], height - shell_lowest(model, work, s, under));
@@ -80,6 +81,7 @@ LANE_FN Real engine_sole_height(const EngineModel *model, const EngineWork *work
     EACH_LANE(l) {
         most[l] = model->tree.outline_points[foot] ? -MEASURE_NONE
                                                    : height - work->foot_position[foot][2];
+        LANE_ROLLED
         for (int i = LANE(l); i < model->tree.outline_points[foot]; i += LANES) {
             Real point[3];
             sole_point(model, work, foot, i, point);
@@ -100,6 +102,7 @@ MILD_HD Real lateral_distance(const EngineWork *work, const Real *a, const Real 
 /* [m] Least lateral distance between mirrored knees, negative when the legs are crossed. */
 MILD_HD Real knee_distance(const EngineModel *model, const EngineWork *work) {
     Real least = MEASURE_NONE;
+    LANE_ROLLED
     for (int p = 0; p < model->tree.pairs; p++) {
         Real knee[2][3];
         for (int n = 0; n < 2; n++) {
@@ -118,6 +121,7 @@ MILD_HD Real knee_distance(const EngineModel *model, const EngineWork *work) {
 /* [m] The same between the centres of mirrored soles. */
 MILD_HD Real foot_distance(const EngineModel *model, const EngineWork *work) {
     Real least = MEASURE_NONE;
+    LANE_ROLLED
     for (int p = 0; p < model->tree.pairs; p++) {
         Real center[2][3];
         Real velocity[3];

@@ -132,6 +132,11 @@ MILD_HD int engine_row_length(const EngineTree *tree, int link) {
     return 6 + tree->level[link];
 }
 
+/* Degrees of freedom above d, which is its place in the rows behind it. */
+MILD_HD int engine_dofs_above(const EngineTree *tree, int d) {
+    return d < 6 ? d : 5 + tree->level[d - 5];
+}
+
 /* Degree of freedom at a place of the row of a link. */
 MILD_HD int engine_row_dof(const EngineTree *tree, int link, int place) {
     return place < 6 ? place : 5 + tree->ancestor[link][place - 5];

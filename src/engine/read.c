@@ -100,6 +100,12 @@ static void pack_rows(EngineTree *tree) {
             }
         }
     }
+    for (int d = 0; d < 6 + tree->joints; d++) {
+        tree->path[d] = d < 6 ? (2ull << d) - 1 : 63;
+        for (int level = 1; d >= 6 && level <= tree->level[d - 5]; level++) {
+            tree->path[d] |= 1ull << (5 + tree->ancestor[d - 5][level]);
+        }
+    }
     tree->level_begin[tree->levels] = (EngineIndex)listed;
     tree->level_entry[tree->levels] = (short)tree->entries;
 }

@@ -49,26 +49,26 @@ LANE_FN void motors(const EngineModel *model, const EngineRobots *robots, long r
     lanes_meet();
 }
 
+/* In the air or on rigid ground. */
 LANE_FN int step(const EngineModel *model, const EngineRobots *robots, long robot,
                  Workplace *place) {
     EngineWork *work = &place->work;
-    const EngineVariation *variation = &robots->variation[robot];
-    const Real *push = robots->push ? robots->push + 6 * robot : NULL;
+    const EngineAction action = {&robots->variation[robot], place->torque,
+                                 robots->push ? robots->push + 6 * robot : NULL, robots->rigid};
     motors(model, robots, robot, place);
+    engine_begin(model, &action, work);
     if (robots->rigid) {
         const EngineSurface level = {0, {0, 0}};
-        engine_begin_rigid(model, variation, place->torque, push, work);
-        engine_collide(model, variation->friction, &level, 1, work);
-        return engine_end_rigid(model, work);
-    }
-    engine_begin(model, variation, place->torque, push, work);
-    EACH_LANE(l) {
-        for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
-            work->wrench[n / 6][n % 6] = 0;
+        engine_collide(model, action.variation->friction, &level, 1, work);
+    } else {
+        EACH_LANE(l) {
+            for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
+                work->wrench[n / 6][n % 6] = 0;
+            }
         }
+        lanes_meet();
     }
-    lanes_meet();
-    return engine_end(model, work);
+    return engine_end(model, robots->rigid, work);
 }
 
 /* On soft ground: from the feet's pose, A and V_free to the wrenches. */
@@ -76,9 +76,10 @@ LANE_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
                       const ContactSetup *setup, const ContactMaterial *material, long robot,
                       Real *memory, ground_Shared *shared, Workplace *place) {
     EngineWork *work = &place->work;
+    const EngineAction action = {&robots->variation[robot], place->torque,
+                                 robots->push ? robots->push + 6 * robot : NULL, 0};
     motors(model, robots, robot, place);
-    engine_begin(model, &robots->variation[robot], place->torque,
-                 robots->push ? robots->push + 6 * robot : NULL, work);
+    engine_begin(model, &action, work);
     const ContactProblem problem = {work->foot_position[0],
                                     work->foot_rotation[0],
                                     work->foot_velocity[0],
@@ -89,7 +90,7 @@ LANE_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
     const ContactResult result = {work->wrench[0], work->next_velocity[0], NULL, NULL, NULL, NULL};
     ground_robot(setup, &problem, shared, memory, 1, &result);
     lanes_meet();
-    return engine_end(model, work);
+    return engine_end(model, 0, work);
 }
 
 /* What a comparison wants of the last step. */

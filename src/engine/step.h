@@ -1,23 +1,21 @@
 /* One physics step of a robot, as a warp takes it:
  *
- *     engine_load(model, qpos, qvel, work);                        once
+ *     engine_load(model, qpos, qvel, work);        once
  *     for each step:
- *         engine_begin(model, variation, torque, push, work);      up to A and V_free
+ *         engine_begin(model, &action, work);      up to A and V_free
  *         soft ground: from the feet's pose, A and V_free to work->wrench
- *         bad |= engine_end(model, work);                          limits, then the next state
- *     engine_store(model, work, qpos, qvel);                       once
- *
- * and on rigid ground
- *
- *         engine_begin_rigid(model, variation, torque, push, work);
- *         engine_collide(model, friction, surface, level, work);   the corners
- *         bad |= engine_end_rigid(model, work);
+ *         rigid ground: engine_collide(model, friction, surface, level, work), the corners
+ *         bad |= engine_end(model, rigid, work);   limits and corners, then the next state
+ *     engine_store(model, work, qpos, qvel);       once
  *
  * The ground reads work->foot_position, foot_rotation, foot_velocity, now.support.free_velocity and
  * now.support.ground.inverse_inertia, in the layout of ContactProblem, and writes work->wrench, all
  * of it, zeros for feet in the air, and, if it likes, work->next_velocity. Nothing else passes
- * between the two. After a step the state is new and poses are those of its beginning; engine_pose
- * brings them up to date for an observer (measure.h). */
+ * between the two. After a step the state is new and poses are those of its beginning;
+ * engine_begin without an action brings them up to date for an observer (measure.h).
+ *
+ * Every function has one call in this text, and loops are rolled: a GPU reads its instructions from
+ * a small cache, and a step executes most of them once. */
 #ifndef MILD_ENGINE_STEP_H
 #define MILD_ENGINE_STEP_H
 
@@ -39,10 +37,12 @@ LANE_FN void engine_load(const EngineModel *model, const Real *qpos, const Real 
                          EngineWork *work) {
     const EngineTree *tree = &model->tree;
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int i = LANE(l); i < engine_links(tree); i += LANES) {
             work->angle[i] = i ? qpos[7 + tree->joint[i]] : 0;
             work->limit_side[i] = 0;
         }
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             work->rate[d] = qvel[d < 6 ? d : 6 + tree->joint[d - 5]];
         }
@@ -60,11 +60,13 @@ LANE_FN void engine_store(const EngineModel *model, const EngineWork *work, Real
                           Real *qvel) {
     const EngineTree *tree = &model->tree;
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int i = LANE(l); i < engine_links(tree); i += LANES) {
             if (i) {
                 qpos[7 + tree->joint[i]] = work->angle[i];
             }
         }
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             qvel[d < 6 ? d : 6 + tree->joint[d - 5]] = work->rate[d];
         }
@@ -78,19 +80,26 @@ LANE_FN void engine_store(const EngineModel *model, const EngineWork *work, Real
     lanes_meet();
 }
 
-/* Pose, M and its factor, and the acceleration without ground and limits. torque: [joints] [N m] in
- * the order of robot.ini; push: [6] [N, N m] at the base's centre of mass, world axes, or NULL. */
-LANE_FN void engine_smooth(const EngineModel *model, const EngineVariation *variation,
-                           const Real *torque, const Real *push, EngineWork *work) {
+/* What acts on a robot in a step. */
+typedef struct {
+    const EngineVariation *variation;
+    const Real *torque; /* [joints] [N m] in the order of robot.ini */
+    const Real *push;   /* [6] [N, N m] at the base's centre of mass, world axes, or NULL */
+    int rigid;          /* bool: on rigid ground */
+} EngineAction;
+
+/* M and its factor, and the acceleration without ground and limits. After engine_kinematics. */
+LANE_FN void engine_smooth(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     const EngineTree *tree = &model->tree;
-    engine_kinematics(model, work);
-    engine_link_inertia(model, variation, work);
-    engine_smooth_force(model, variation, torque, push, work);
-    engine_mass_matrix(model, variation, work);
+    engine_link_inertia(model, action->variation, work);
+    engine_smooth_force(model, action->variation, action->torque, action->push, work);
+    engine_mass_matrix(model, action->variation, work);
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
             work->factor[e] = work->mass[e];
         }
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             work->acceleration[d] = work->force[d];
         }
@@ -101,24 +110,18 @@ LANE_FN void engine_smooth(const EngineModel *model, const EngineVariation *vari
     engine_solve(tree, work->factor, work->acceleration);
 }
 
-LANE_FN void engine_begin(const EngineModel *model, const EngineVariation *variation,
-                          const Real *torque, const Real *push, EngineWork *work) {
-    engine_smooth(model, variation, torque, push, work);
-    engine_feet_pose(model, work);
-    engine_foot_inertia(&model->tree, work);
-    engine_free_velocity(model, work);
-}
-
-LANE_FN void engine_begin_rigid(const EngineModel *model, const EngineVariation *variation,
-                                const Real *torque, const Real *push, EngineWork *work) {
-    engine_smooth(model, variation, torque, push, work);
-    engine_feet_pose(model, work);
-}
-
-/* Poses and twists at the present state: of links and feet. */
-LANE_FN void engine_pose(const EngineModel *model, EngineWork *work) {
+/* Poses and twists of links and feet; with an action also the acceleration without ground, and what
+ * soft ground asks for. */
+LANE_FN void engine_begin(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     engine_kinematics(model, work);
+    if (action) {
+        engine_smooth(model, action, work);
+    }
     engine_feet_pose(model, work);
+    if (action && !action->rigid) {
+        engine_foot_inertia(&model->tree, work);
+        engine_free_velocity(model, work);
+    }
 }
 
 /* The base's quaternion after turning by the vector `turn` [rad] in base axes. */
@@ -145,6 +148,7 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
     Real bad[LANE_COPIES];
     EACH_LANE(l) {
         bad[l] = 0;
+        LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             work->rate[d] += dt * work->acceleration[d];
             bad[l] = REAL_ABS(work->rate[d]) < ENGINE_RATE_MAX ? bad[l] : 1; /* NaN included */
@@ -155,6 +159,7 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
         return 1;
     }
     EACH_LANE(l) {
+        LANE_ROLLED
         for (int i = LANE(l); i < engine_links(tree); i += LANES) {
             work->angle[i] += i ? dt * work->rate[5 + i] : 0;
         }
@@ -170,25 +175,10 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
     return 0;
 }
 
-LANE_FN int engine_end(const EngineModel *model, EngineWork *work) {
-    engine_add_wrench(&model->tree, work);
-    const int newton = engine_limits(model, work) ? engine_constrain(&model->tree, work, 0) : 0;
+/* Twists of the feet after a step on rigid ground. */
+LANE_FN void engine_next_twists(const EngineModel *model, EngineWork *work) {
     EACH_LANE(l) {
-        if (LANE(l) == 0) {
-            work->newton = newton;
-        }
-    }
-    lanes_meet();
-    return engine_integrate(model, work);
-}
-
-LANE_FN int engine_end_rigid(const EngineModel *model, EngineWork *work) {
-    engine_limits(model, work);
-    const int newton = engine_constrain(&model->tree, work, 1);
-    EACH_LANE(l) {
-        if (LANE(l) == 0) {
-            work->newton = newton;
-        }
+        LANE_ROLLED
         for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
             const int f = n / 6;
             const int c = n % 6;
@@ -196,6 +186,25 @@ LANE_FN int engine_end_rigid(const EngineModel *model, EngineWork *work) {
             work->next_velocity[f][c] = c < foot_parts(&model->tree, f)
                                             ? work->foot_velocity[f][c] + model->number.dt * gain
                                             : 0;
+        }
+    }
+    lanes_meet();
+}
+
+/* The wrenches of soft ground, or rigid ground where engine_collide was called; limits; the next
+ * state. Returns 1 when a velocity went bad. */
+LANE_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
+    if (!rigid) {
+        engine_add_wrench(&model->tree, work);
+    }
+    const int beyond = engine_limits(model, work);
+    const int newton = rigid || beyond ? engine_constrain(&model->tree, work, rigid) : 0;
+    if (rigid) {
+        engine_next_twists(model, work);
+    }
+    EACH_LANE(l) {
+        if (LANE(l) == 0) {
+            work->newton = newton;
         }
     }
     lanes_meet();

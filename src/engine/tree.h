@@ -22,6 +22,7 @@
 #define ENGINE_BASE_ENTRIES 21
 
 typedef unsigned char EngineIndex;
+typedef unsigned long long EnginePath; /* a bit for each degree of freedom */
 
 typedef struct {
     int joints;
@@ -41,8 +42,9 @@ typedef struct {
     EngineIndex level_begin[ENGINE_LINKS_MAX + 1]; /* [levels + 1] into level_link */
     EngineIndex level_link[ENGINE_LINKS_MAX];      /* links, level by level */
     /* ---- M ---- */
-    short row[ENGINE_DOFS_MAX];                  /* where the row of a degree of freedom begins */
-    short level_entry[ENGINE_LINKS_MAX + 1];     /* [levels + 1] where the rows of a level begin */
+    EnginePath path[ENGINE_DOFS_MAX];        /* of a degree of freedom: its ancestors and itself */
+    short row[ENGINE_DOFS_MAX];              /* where the row of a degree of freedom begins */
+    short level_entry[ENGINE_LINKS_MAX + 1]; /* [levels + 1] where the rows of a level begin */
     EngineIndex entry_dof[ENGINE_ENTRIES_MAX];   /* whose row */
     EngineIndex entry_place[ENGINE_ENTRIES_MAX]; /* where in it */
     /* ---- feet ---- */

@@ -82,7 +82,9 @@ static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, 
     }
     robot_sim_load(sim, &env->robot, &env->variation);
     robot_sim_sole_clearance(sim, &env->terrain);
-    task_first_observation(env, def, robot, sim, view);
+    TaskReading reading;
+    task_first_reading(env, sim, &reading);
+    task_observe(env, def, robot, sim, &reading, 1, view);
     return_map(env);
 }
 
@@ -106,6 +108,10 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        TaskReading *reading, double *torque, const TaskProbe *probe) {
     int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
+    TaskMotor motor[ROBOT_JOINTS_MAX];
+    for (int i = 0; i < env->shape.joints; i++) {
+        motor[i] = task_motor(env, def, robot, i);
+    }
     for (int k = 0; k <= steps; k++) {
         if (k == steps - env->lag_imu) {
             task_read_imu(sim, reading);
@@ -118,7 +124,7 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
         }
         const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim);
         for (int i = 0; i < env->shape.joints; i++) {
-            torque[i] = task_joint_torque(env, def, robot, k, i, q[i], qd[6 + i]);
+            torque[i] = task_torque(&motor[i], k < env->lag_command, q[i], qd[6 + i]);
         }
         double wrench[6];
         int helped = task_assist(env, def, robot, robot_sim_base_rotation(sim), qd, wrench);

@@ -30,36 +30,52 @@ TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading) {
     memcpy(reading->qd, robot_sim_qvel(sim) + 6, sizeof reading->qd);
 }
 
+/* Entries of a frame that lane `lane` of `lanes` writes, without noise. q, qd: [joints]. */
 static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, const double *pose,
-                                        const TaskReading *reading, float *frame) {
-    const double command_scale[3] = {2, 2, 1};
+                                        const double *omega, const double *gravity,
+                                        const double *joint, const double *speed, TaskLane at,
+                                        float *frame) {
     int joints = env->shape.joints;
-    for (int i = 0; i < 3; i++) {
-        frame[i] = (float)reading->omega[i];
-        frame[3 + i] = (float)(env->command_seen[i] * command_scale[i]);
-        frame[6 + i] = (float)reading->gravity[i];
+    for (int i = at.lane; i < 3; i += at.lanes) {
+        frame[i] = (float)omega[i];
+        frame[3 + i] = (float)(env->command_seen[i] * (i < 2 ? 2 : 1));
+        frame[6 + i] = (float)gravity[i];
     }
     float *q = frame + 9, *qd = q + joints, *action = qd + joints, *clock = action + joints;
-    for (int i = 0; i < joints; i++) {
-        q[i] = (float)(reading->q[i] - pose[i]);
-        qd[i] = (float)(0.05 * reading->qd[i]);
+    for (int i = at.lane; i < joints; i += at.lanes) {
+        q[i] = (float)(joint[i] - pose[i]);
+        qd[i] = (float)(0.05 * speed[i]);
         action[i] = env->action[0][i];
     }
-    int standing = task_is_standing(env->command_seen);
-    clock[0] = def->clock ? (float)(standing ? 0 : sin(TWO_PI * env->phase)) : 0;
-    clock[1] = def->clock ? (float)(standing ? 0 : cos(TWO_PI * env->phase)) : 0;
+    if (at.lane == 0) {
+        int still = !def->clock || task_is_standing(env->command_seen);
+        clock[0] = still ? 0 : (float)sin(TWO_PI * env->phase);
+        clock[1] = still ? 0 : (float)cos(TWO_PI * env->phase);
+    }
 }
 
-static inline MILD_BOTH void add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
+/* Two of the numbers of this policy step, uniform in [-1, 1). */
+static inline MILD_BOTH void draw_noise(const TaskEnv *env, int pair, double noise[2]) {
     Random r = random_at(env->seed ^ RANDOM_USE_NOISE, env->index, env->tick);
+    r.use = (uint32_t)(2 * pair);
+    noise[0] = 2 * random_unit(&r) - 1;
+    noise[1] = 2 * random_unit(&r) - 1;
+}
+
+/* To the entries that this lane has written. */
+static inline MILD_BOTH void add_noise(const TaskEnv *env, const TaskDef *def, TaskLane at,
+                                       float *frame) {
     float *q = frame + 9, *qd = q + env->shape.joints;
-    for (int i = 0; i < 3; i++) {
-        frame[i] += (float)(def->noise_omega * (2 * random_unit(&r) - 1));
-        frame[6 + i] += (float)(def->noise_gravity * (2 * random_unit(&r) - 1));
+    double noise[2];
+    for (int i = at.lane; i < 3; i += at.lanes) {
+        draw_noise(env, i, noise);
+        frame[i] += (float)(def->noise_omega * noise[0]);
+        frame[6 + i] += (float)(def->noise_gravity * noise[1]);
     }
-    for (int i = 0; i < env->shape.joints; i++) {
-        q[i] += (float)(def->noise_q * (2 * random_unit(&r) - 1));
-        qd[i] += (float)(def->noise_qd * (2 * random_unit(&r) - 1));
+    for (int i = at.lane; i < env->shape.joints; i += at.lanes) {
+        draw_noise(env, 3 + i, noise);
+        q[i] += (float)(def->noise_q * noise[0]);
+        qd[i] += (float)(def->noise_qd * noise[1]);
     }
 }
 
@@ -112,12 +128,9 @@ static inline MILD_BOTH float *write_ground(const TaskEnv *env, const Robot *rob
     return out;
 }
 
+/* What follows the frame in the critic's row. */
 static inline MILD_BOTH void write_critic(const TaskEnv *env, const TaskDef *def,
-                                          const Robot *robot, const RobotSim *sim,
-                                          const float *clean, float *critic) {
-    float *out = critic;
-    memcpy(out, clean, (size_t)env->shape.observation * sizeof *out);
-    out += env->shape.observation;
+                                          const Robot *robot, const RobotSim *sim, float *out) {
     write_estimates(env, sim, out);
     out += env->shape.estimates;
     const double *rotation = robot_sim_base_rotation(sim);
@@ -158,57 +171,78 @@ static inline MILD_BOTH void write_critic(const TaskEnv *env, const TaskDef *def
     }
 }
 
-/* Stores a frame. At the start of an episode the first frame also fills the older ones. */
-static inline MILD_BOTH void remember(TaskEnv *env, const TaskDef *def, const float *frame,
-                                      int first) {
-    int width = env->shape.observation;
-    size_t bytes = (size_t)width * sizeof *frame;
-    float *history = task_env_history(env);
-    env->newest = (env->newest + 1) % env->held;
-    for (int age = 0; age < (first ? (int)env->held : 1); age++) {
-        memcpy(task_env_frame(env, age), frame, bytes);
+static inline MILD_BOTH void copy_row(const float *from, int width, TaskLane at, float *to) {
+    for (int j = at.lane; j < width; j += at.lanes) {
+        to[j] = from[j];
     }
-    memcpy(history + env->shape.history - width, frame, bytes);
-    for (int i = 0; i < TASK_FRAMES - 1; i++) {
-        float *mean = history + i * width;
-        int oldest = (TASK_FRAMES - 1 - i) * def->history_stride;
-        memcpy(mean, task_env_frame(env, oldest), bytes);
-        for (int k = 1; k < def->history_stride; k++) {
-            const float *next = task_env_frame(env, oldest - k);
-            for (int j = 0; j < width; j++) {
-                mean[j] += next[j];
+}
+
+/* At the start of an episode the first frame also fills the older ones. */
+static inline MILD_BOTH void fill_frames(TaskEnv *env, TaskLane at) {
+    for (int age = 1; age < (int)env->held; age++) {
+        copy_row(task_env_frame(env, 0), env->shape.observation, at, task_env_frame(env, age));
+    }
+}
+
+/* Five means of older frames, then the newest frame. */
+static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, TaskLane at,
+                                           float *history) {
+    int width = env->shape.observation;
+    for (int j = at.lane; j < width; j += at.lanes) {
+        for (int i = 0; i < TASK_FRAMES - 1; i++) {
+            int oldest = (TASK_FRAMES - 1 - i) * def->history_stride;
+            float sum = task_env_frame(env, oldest)[j];
+            for (int k = 1; k < def->history_stride; k++) {
+                sum += task_env_frame(env, oldest - k)[j];
             }
+            history[i * width + j] = sum / (float)def->history_stride;
         }
-        for (int j = 0; j < width; j++) {
-            mean[j] /= (float)def->history_stride;
+        history[(TASK_FRAMES - 1) * width + j] = task_env_frame(env, 0)[j];
+    }
+}
+
+TASK_FN void task_observe_lane(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                               const RobotSim *sim, const TaskReading *reading, int first,
+                               const TaskView *view, TaskLane at) {
+    const double *pose = robot_default_pose(robot);
+    uint32_t newest = (env->newest + 1) % env->held;
+    place_meet();
+    env->newest = newest; /* every lane writes the same */
+    float *frame = task_env_frame(env, 0);
+    make_frame(env, def, pose, reading->omega, reading->gravity, reading->q, reading->qd, at,
+               frame);
+    if (def->observe_noise) {
+        add_noise(env, def, at, frame);
+    }
+    place_meet();
+    if (first) {
+        fill_frames(env, at);
+        place_meet();
+    }
+    float *history = place_history(task_env_history(env), view->history);
+    write_history(env, def, at, history);
+    if (view->history && view->history != history) {
+        copy_row(history, env->shape.history, at, view->history);
+    }
+    if (view->frame) {
+        copy_row(frame, env->shape.observation, at, view->frame);
+    }
+    if (view->estimate && at.lane == 0) {
+        write_estimates(env, sim, view->estimate);
+    }
+    if (view->critic) {
+        const double *qpos = robot_sim_qpos(sim), *qvel = robot_sim_qvel(sim);
+        const double *rotation = robot_sim_base_rotation(sim);
+        const double gravity[3] = {-rotation[6], -rotation[7], -rotation[8]};
+        make_frame(env, def, pose, qvel + 3, gravity, qpos + 7, qvel + 6, at, view->critic);
+        if (at.lane == at.lanes - 1) {
+            write_critic(env, def, robot, sim, view->critic + env->shape.observation);
         }
     }
 }
 
 TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
                           const TaskReading *reading, int first, const TaskView *view) {
-    const double *pose = robot_default_pose(robot);
-    float frame[TASK_OBSERVATION_MAX];
-    make_frame(env, def, pose, reading, frame);
-    if (def->observe_noise) {
-        add_noise(env, def, frame);
-    }
-    remember(env, def, frame, first);
-    if (view->history) {
-        memcpy(view->history, task_env_history(env), (size_t)env->shape.history * sizeof(float));
-    }
-    if (view->frame) {
-        memcpy(view->frame, frame, (size_t)env->shape.observation * sizeof *frame);
-    }
-    if (view->estimate) {
-        write_estimates(env, sim, view->estimate);
-    }
-    if (view->critic) {
-        TaskReading now;
-        float clean[TASK_OBSERVATION_MAX];
-        task_read_imu(sim, &now);
-        task_read_motors(sim, &now);
-        make_frame(env, def, pose, &now, clean);
-        write_critic(env, def, robot, sim, clean, view->critic);
-    }
+    const TaskLane alone = {0, 1};
+    task_observe_lane(env, def, robot, sim, reading, first, view, alone);
 }

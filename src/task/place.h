@@ -37,6 +37,24 @@ static inline MILD_BOTH const MildMaterial *place_material(const MildTerrain *te
 #endif
 }
 
+/* Where the history is made: on the CPU the environment keeps it for controllers. */
+static inline MILD_BOTH float *place_history(float *own, float *view) {
+#ifdef TASK_ON_DEVICE
+    (void)own;
+    return view;
+#else
+    (void)view;
+    return own;
+#endif
+}
+
+/* Makes what each lane of an environment wrote visible to the others. */
+static inline MILD_BOTH void place_meet(void) {
+#ifdef __CUDA_ARCH__
+    __syncwarp();
+#endif
+}
+
 /* [-] Elements of the raster of a sole that one element of the model in use stands for. */
 static inline MILD_BOTH double place_cells(const Robot *robot, int model) {
 #ifdef TASK_ON_DEVICE

@@ -73,13 +73,10 @@ TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *r
     env->reward_sum = env->speed_error_sum = 0;
 }
 
-TASK_FN void task_first_observation(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                    const RobotSim *sim, const TaskView *view) {
-    TaskReading reading;
+TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *reading) {
     memcpy(env->base_twist, robot_sim_qvel(sim), sizeof env->base_twist);
-    task_read_imu(sim, &reading);
-    task_read_motors(sim, &reading);
-    task_observe(env, def, robot, sim, &reading, 1, view);
+    task_read_imu(sim, reading);
+    task_read_motors(sim, reading);
 }
 
 /* ---- before the physics ---- */
@@ -116,24 +113,28 @@ TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *acti
     push_base(env, def);
 }
 
-/* ---- torque ---- */
+/* ---- motors ---- */
 
-/* A motor at its speed limit gives no torque in the direction of motion. */
-static inline MILD_BOTH double limit_speed(double torque, double speed, double limit) {
-    return limit > 0 && fabs(speed) >= limit && torque * speed > 0 ? 0 : torque;
+TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i) {
+    TaskMotor motor;
+    double rest = task_assist_pose(env, def, robot, i), scale = task_action_scale(def, robot);
+    for (int late = 0; late < 2; late++) {
+        motor.target[late] = rest + scale * (double)env->action[late][i] + env->motor_offset[i];
+    }
+    motor.kp = env->strength[i] * env->kp[i] * env->kp_scale[i];
+    motor.kd = env->strength[i] * env->kd[i] * env->kd_scale[i];
+    motor.limit = def->torque_share * robot_effort(robot)[i];
+    motor.fastest = robot_speed(robot)[i];
+    return motor;
 }
 
-/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). */
-TASK_FN double task_joint_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                 int step, int i, double q, double qd) {
-    const float *action = env->action[step >= env->lag_command ? 0 : 1];
-    double target = task_assist_pose(env, def, robot, i) +
-                    task_action_scale(def, robot) * (double)action[i] + env->motor_offset[i];
-    double tau = env->kp[i] * env->kp_scale[i] * (target - q) - env->kd[i] * env->kd_scale[i] * qd;
-    double limit = def->torque_share * robot_effort(robot)[i];
-    tau *= env->strength[i];
-    tau = tau > limit ? limit : tau < -limit ? -limit : tau;
-    return limit_speed(tau, qd, robot_speed(robot)[i]);
+/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). A motor at its speed limit gives no
+ * torque in the direction of motion. */
+TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd) {
+    double tau = motor->kp * (motor->target[late] - q) - motor->kd * qd;
+    tau = tau > motor->limit ? motor->limit : tau < -motor->limit ? -motor->limit : tau;
+    int over = motor->fastest > 0 && fabs(qd) >= motor->fastest && tau * qd > 0;
+    return over ? 0 : tau;
 }
 
 /* ---- after the physics ---- */

@@ -147,7 +147,15 @@ typedef struct {
 } TaskReading;
 TASK_FN void task_read_imu(const RobotSim *sim, TaskReading *reading);
 TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading);
-/* Appends the frame made from the readings to the history and writes the view. */
+/* Which of the lanes that work on one environment; alone 0 of 1. */
+typedef struct {
+    int lane, lanes;
+} TaskLane;
+/* Appends the frame made from the readings to the history and writes the view. All lanes call. */
+TASK_FN void task_observe_lane(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                               const RobotSim *sim, const TaskReading *reading, int first,
+                               const TaskView *view, TaskLane at);
+/* The same by one. */
 TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
                           const TaskReading *reading, int first, const TaskView *view);
 
@@ -195,19 +203,27 @@ TASK_FN void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *rob
 /* [m] Depth of the soles of a robot that stands on a material. */
 double task_standing_depth(const Robot *robot, const MildMaterial *material);
 
-/* A policy step (step.c): what comes before its physics steps, the torque of joint i in physics
- * step `step` at angle q and speed qd, and what comes after them. torque: [joints] of the last one.
- * diverged: bool, they broke off. */
+/* A motor during a policy step. */
+typedef struct {
+    double target[2]; /* [rad] of the action now and of the one before */
+    double kp;        /* [N m/rad] */
+    double kd;        /* [N m s/rad] */
+    double limit;     /* [N m] */
+    double fastest;   /* [rad/s] 0: no limit */
+} TaskMotor;
+
+/* A policy step (step.c): what comes before its physics steps, the motor of joint i, its torque at
+ * angle q and speed qd, and what comes after them. late: bool, the last action still counts.
+ * torque: [joints] of the last physics step. diverged: bool, they broke off. */
 TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *action);
-TASK_FN double task_joint_torque(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                 int step, int i, double q, double qd);
+TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i);
+TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd);
 TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                const RobotSim *sim, const double *torque, int diverged);
 /* An episode on what task_randomize drew (step.c). depth: [m] how deep the feet stand in its
- * ground. The first observation is taken from the sim of its first pose. */
+ * ground. The first reading is taken from the sim of its first pose. */
 TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, double depth);
-TASK_FN void task_first_observation(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                    const RobotSim *sim, const TaskView *view);
+TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *reading);
 
 /* Assistance early in training (assist.c). task_assist writes force and torque on the base, world,
  * and returns 0 when there is none. rotation: [9] of the base; qvel: [6] its twist.

@@ -147,7 +147,14 @@ static void compare_rows(const char *what, int when, int env, const float *a, co
 static void compare(int when, int env, double tolerance) {
     const Rows *a = &pair.a, *b = &pair.b;
     compare_rows("history", when, env, a->history[env], b->history[env], SA01_HISTORY, tolerance);
-    compare_rows("critic", when, env, a->critic[env], b->critic[env], SA01_CRITIC, tolerance);
+    float critic[SA01_CRITIC];
+    memcpy(critic, b->critic[env], sizeof critic);
+    for (int f = 0; f < SA01_FEET; f++) { /* of the corners that push: it jumps with them */
+        const int depth = SA01_OBSERVATION + SA01_ESTIMATES + 6 * f + 5;
+        compare_rows("depth", when, env, a->critic[env] + depth, critic + depth, 1, 20 * tolerance);
+        critic[depth] = a->critic[env][depth];
+    }
+    compare_rows("critic", when, env, a->critic[env], critic, SA01_CRITIC, tolerance);
     compare_rows("estimate", when, env, a->estimate[env], b->estimate[env], SA01_ESTIMATES,
                  tolerance);
     compare_rows("frame", when, env, a->frame[env], b->frame[env], SA01_OBSERVATION, tolerance);
