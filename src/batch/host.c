@@ -1,12 +1,13 @@
 /* The batch on the CPU: the text of the GPU, robot after robot. */
 #define MILD_REAL_FLOAT
 
-#include "batch/host.h"
-
+#include "batch/batch.h"
 #include "batch/contact_kinds.h"
 
 _Static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
 _Static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
+
+#include "batch/robot.inc"
 
 size_t batch_memory_numbers(const BatchShape *shape) {
     return (size_t)CONTACT_MEMORY * (size_t)shape->groups * (size_t)shape->stride;
@@ -21,7 +22,10 @@ size_t batch_memory_numbers(const BatchShape *shape) {
     }
 CONTACT_KINDS(HOST_KIND)
 
-HostRobot host_robot(const BatchShape *shape) {
+typedef void (*HostRobot)(const ContactSetup *setup, const ContactProblem *problem, Real *memory,
+                          int advance, const ContactResult *result);
+
+static HostRobot host_robot(const BatchShape *shape) {
 #define HOST_CHOICE(g, p)                                                                          \
     if (shape->groups == (g) && shape->per == (p)) {                                               \
         return host_robot_##g##_##p;                                                               \

@@ -3,7 +3,7 @@
 #define CROWD_ARRAYS_H
 
 #include "batch/batch.h"
-#include "engine/model.h"
+#include "engine/data.h"
 #include "task/ground.h"
 
 /* Sums over the episodes of an environment that ended since the last crowd_take_stats; see
@@ -37,6 +37,14 @@ typedef struct {
     int diverged;                    /* bool: in this policy step */
 } CrowdRobot;
 
+/* What passes between engine and ground; see MildBatchInput and MildBatchOutput. */
+typedef struct {
+    float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
+    float *wrench, *twist;
+    MildBatchFoot *foot;
+} CrowdContact;
+#define CROWD_FAR 1000 /* [m] below a robot on rigid ground: the soft one does not touch it */
+
 typedef struct {
     int envs;
     size_t stride;     /* [B] of a TaskEnv and its frames */
@@ -49,6 +57,9 @@ typedef struct {
     uint8_t *rigid;    /* [envs] bool: of the episode */
     int32_t *order;    /* [envs] in which a GPU steps them: those on rigid ground first */
     double *tally;     /* [TALLY_NUMBERS] sums over the environments */
+    EngineWork *work;  /* [envs] between the parts of a step */
+    CrowdContact contact;
+    float *depth; /* [envs][feet] [m] mean depth of the last step */
     const CrowdTask *task;
     const EngineModel *model;
 } CrowdArrays;

@@ -12,7 +12,9 @@ _Static_assert(CROWD_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fi
 struct Crowd {
     CrowdArrays arrays; /* their memory is the device's */
     MildBatch *ground;
-    Pool *pool; /* of the host */
+    void *block; /* where the arrays are, but for task and model */
+    Pool *pool;  /* of the host */
+    int steps;   /* of physics in a policy step */
     int device;
     size_t bytes; /* of the device, without the ground */
 };
@@ -63,19 +65,44 @@ static void *take(Crowd *crowd, size_t bytes, MildError *error) {
     return batch_alloc(crowd->device, bytes, error);
 }
 
-static MildStatus take_arrays(Crowd *crowd, MildError *error) {
+static MildStatus take_arrays(Crowd *crowd, int feet, MildError *error) {
     CrowdArrays *all = &crowd->arrays;
-    const size_t envs = (size_t)all->envs;
-    all->env = take(crowd, envs * all->stride, error);
-    all->robot = all->env ? take(crowd, envs * sizeof *all->robot, error) : NULL;
-    all->sim = all->robot ? take(crowd, envs * crowd_sim_bytes(), error) : NULL;
-    all->reading = all->sim ? take(crowd, envs * crowd_reading_bytes(), error) : NULL;
-    all->material = all->reading ? take(crowd, envs * sizeof *all->material, error) : NULL;
-    all->fresh = all->material ? take(crowd, envs, error) : NULL;
-    all->rigid = all->fresh ? take(crowd, envs, error) : NULL;
-    all->order = all->rigid ? take(crowd, envs * sizeof *all->order, error) : NULL;
-    all->tally = all->order ? take(crowd, TALLY_NUMBERS * sizeof *all->tally, error) : NULL;
-    return all->tally ? MILD_OK : MILD_ERROR_MEMORY;
+    CrowdContact *contact = &all->contact;
+    const size_t envs = (size_t)all->envs, rows = envs * (size_t)feet;
+    const struct {
+        void *at; /* pointer to the array's pointer */
+        size_t bytes;
+    } arrays[] = {{&all->env, envs * all->stride},
+                  {&all->robot, envs * sizeof *all->robot},
+                  {&all->sim, envs * crowd_sim_bytes()},
+                  {&all->reading, envs * crowd_reading_bytes()},
+                  {&all->material, envs * sizeof *all->material},
+                  {&all->fresh, envs},
+                  {&all->rigid, envs},
+                  {&all->order, envs * sizeof *all->order},
+                  {&all->work, envs * sizeof *all->work},
+                  {&all->depth, rows * sizeof(float)},
+                  {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
+                  {&contact->position, 3 * rows * sizeof(float)},
+                  {&contact->rotation, 9 * rows * sizeof(float)},
+                  {&contact->velocity, 6 * rows * sizeof(float)},
+                  {&contact->inverse_inertia, 36 * rows * (size_t)feet * sizeof(float)},
+                  {&contact->free_velocity, 6 * rows * sizeof(float)},
+                  {&contact->height, envs * sizeof(float)},
+                  {&contact->wrench, 6 * rows * sizeof(float)},
+                  {&contact->twist, 6 * rows * sizeof(float)},
+                  {&contact->foot, rows * sizeof *contact->foot}};
+    size_t bytes = 0;
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        bytes += (arrays[i].bytes + 255) / 256 * 256;
+    }
+    crowd->block = take(crowd, bytes, error);
+    char *at = crowd->block;
+    for (size_t i = 0; at && i < sizeof arrays / sizeof *arrays; i++) {
+        memcpy(arrays[i].at, &at, sizeof at);
+        at += (arrays[i].bytes + 255) / 256 * 256;
+    }
+    return crowd->block ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
 static MildStatus copy_envs(Crowd *crowd, const CrowdDef *def, MildError *error) {
@@ -126,7 +153,7 @@ static MildStatus copy_model(Crowd *crowd, const CrowdDef *def, MildError *error
         status = engine_model_read(def->robot, def->task->physics_dt, &tree, number, error);
     }
     if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
-        const char *why = crowd_device_fits(&tree, crowd->ground);
+        const char *why = crowd_device_fits(&tree);
         status = why ? mild_fail(error, MILD_ERROR_ARGUMENT, "%s: %s", robot_name(def->robot), why)
                      : MILD_OK;
     }
@@ -148,10 +175,11 @@ static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGround
     const TaskShape shape = task_shape(def->robot);
     crowd->device = def->device;
     crowd->pool = def->pool;
+    crowd->steps = (int)(TASK_PERIOD / def->task->physics_dt + 0.5);
     crowd->arrays.envs = def->envs;
     crowd->arrays.stride = task_env_head_bytes(def->task, &shape);
     MildStatus status = open_ground(crowd, def, grounds, error);
-    status = status == MILD_OK ? take_arrays(crowd, error) : status;
+    status = status == MILD_OK ? take_arrays(crowd, shape.feet, error) : status;
     status = status == MILD_OK ? copy_envs(crowd, def, error) : status;
     status = status == MILD_OK ? copy_task(crowd, def, grounds, error) : status;
     return status == MILD_OK ? copy_model(crowd, def, error) : status;
@@ -186,11 +214,9 @@ void crowd_destroy(Crowd *crowd) {
             batch_free(crowd->device, task.grounds.ground);
         }
     }
-    void *const memory[] = {all->env,      all->robot, all->sim,          all->reading,
-                            all->material, all->fresh, (void *)all->task, (void *)all->model};
-    for (size_t i = 0; i < sizeof memory / sizeof *memory; i++) {
-        batch_free(crowd->device, memory[i]);
-    }
+    batch_free(crowd->device, crowd->block);
+    batch_free(crowd->device, (void *)all->task);
+    batch_free(crowd->device, (void *)all->model);
     mild_batch_destroy(crowd->ground);
     free(crowd);
 }
@@ -205,6 +231,7 @@ size_t crowd_robot_bytes(const Crowd *crowd) {
 typedef struct {
     const Crowd *crowd;
     CrowdStep step;
+    int part;
 } Call;
 
 static CrowdStep step_into(const VecView *view) {
@@ -219,10 +246,16 @@ static void begin_piece(void *context, int piece, int thread) {
     crowd_host_begin(&((const Call *)context)->crowd->arrays, piece);
 }
 
-static void physics_piece(void *context, int piece, int thread) {
+static void part_piece(void *context, int piece, int thread) {
     const Call *call = context;
     (void)thread;
-    crowd_host_physics(&call->crowd->arrays, &call->step, call->crowd->ground, piece);
+    crowd_host_part(&call->crowd->arrays, &call->step, call->part, piece);
+}
+
+static void end_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    crowd_host_end(&call->crowd->arrays, &call->step, piece);
 }
 
 static void first_piece(void *context, int piece, int thread) {
@@ -250,7 +283,7 @@ static MildStatus finish(const Crowd *crowd, Call *call, void *stream, MildError
 }
 
 MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildError *error) {
-    Call call = {crowd, step_into(first)};
+    Call call = {crowd, step_into(first), 0};
     if (crowd->device != MILD_BATCH_HOST) {
         MildStatus status = checked(crowd_device_begin(&crowd->arrays, stream), error);
         return status == MILD_OK ? finish(crowd, &call, stream, error) : status;
@@ -259,23 +292,44 @@ MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildErr
     return finish(crowd, &call, stream, error);
 }
 
+/* The physics steps of a policy step: parts with the ground between them. */
+static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, MildError *error) {
+    const CrowdArrays *all = &crowd->arrays;
+    const CrowdContact *c = &all->contact;
+    const MildBatchInput input = {c->position,      c->rotation,   c->velocity, c->inverse_inertia,
+                                  c->free_velocity, all->material, c->height};
+    const MildBatchOutput output = {c->wrench, c->twist, c->foot, NULL, NULL, NULL};
+    MildStatus status = MILD_OK;
+    for (call->part = 0; status == MILD_OK && call->part <= crowd->steps; call->part++) {
+        if (call->part > 0) {
+            status = mild_batch_step(crowd->ground, &input, &output, 1, stream, error);
+        }
+        if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
+            status = checked(crowd_device_part(all, &call->step, call->part, stream), error);
+        } else if (status == MILD_OK) {
+            pool_run(crowd->pool, all->envs, part_piece, call);
+        }
+    }
+    return status;
+}
+
 MildStatus crowd_step(Crowd *crowd, const float *action, float *reward, uint8_t *done,
                       uint8_t *timeout, uint8_t *valid, const VecView *next, void *stream,
                       MildError *error) {
     const CrowdArrays *all = &crowd->arrays;
-    Call call = {crowd, step_into(next)};
+    Call call = {crowd, step_into(next), 0};
     call.step.action = action;
     call.step.reward = reward;
     call.step.done = done;
     call.step.timeout = timeout;
     call.step.valid = valid;
-    if (crowd->device != MILD_BATCH_HOST) {
-        MildStatus status =
-            checked(crowd_device_physics(all, &call.step, crowd->ground, stream), error);
-        return status == MILD_OK ? finish(crowd, &call, stream, error) : status;
+    MildStatus status = step_physics(crowd, &call, stream, error);
+    if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
+        status = checked(crowd_device_end(all, &call.step, stream), error);
+    } else if (status == MILD_OK) {
+        pool_run(crowd->pool, all->envs, end_piece, &call);
     }
-    pool_run(crowd->pool, all->envs, physics_piece, &call);
-    return finish(crowd, &call, stream, error);
+    return status == MILD_OK ? finish(crowd, &call, stream, error) : status;
 }
 
 MildStatus crowd_take_stats(Crowd *crowd, VecStats *stats, void *stream, MildError *error) {

@@ -3,42 +3,6 @@
 #define MILD_REAL_FLOAT
 #include <cuda_runtime.h>
 
-#include "batch/batch.h"
-#include "batch/contact.h"
-#include "engine/model.h"
-
-#ifndef CROWD_PER
-#define CROWD_PER 5 /* elements of a lane */
-#endif
-enum { GROUND_GROUPS = ENGINE_FEET == 3 ? 4 : ENGINE_FEET };
-#define CONTACT_FEET GROUND_GROUPS
-#define CONTACT_PER CROWD_PER
-#define CONTACT_CURVES LAW_CONE
-#define CONTACT(name) crowd_##name
-#include "batch/contact.inc"
-#include "batch/robot.inc"
-
-/* The ground under a warp's robot. */
-typedef struct {
-    const ContactSetup *setup;
-    const ContactMaterial *material;
-    const BatchShape *shape;
-    const BatchArrays *arrays;
-    crowd_Shared *shared;
-} CrowdGround;
-
-LANE_FN void crowd_ground(const CrowdGround *ground, long robot, const ContactProblem *problem,
-                          const ContactResult *result) {
-    crowd_robot(ground->setup, problem, ground->shared,
-                batch_memory(ground->shape, ground->arrays, robot), 1, result);
-}
-
-#ifdef CROWD_LOCKSTEP
-#define CROWD_ALIGN() __syncthreads()
-#else
-#define CROWD_ALIGN()
-#endif
-
 #include "crowd/crowd.inc"
 #include "crowd/text.h"
 
@@ -46,7 +10,7 @@ LANE_FN void crowd_ground(const CrowdGround *ground, long robot, const ContactPr
 #define CROWD_WARPS (ENGINE_FIXED ? 4 : 1) /* robots of a block */
 #endif
 #ifndef CROWD_BLOCKS
-#define CROWD_BLOCKS (ENGINE_FIXED ? 4 : 1) /* blocks of a multiprocessor, at least */
+#define CROWD_BLOCKS (ENGINE_FIXED ? 6 : 1) /* blocks of a multiprocessor, at least */
 #endif
 enum { WARP_THREADS = LANES * CROWD_WARPS, TASK_THREADS = 32, TALLY_THREADS = 256, ORDER_THREADS = 1024 };
 
@@ -69,20 +33,13 @@ static int thread_blocks(int envs) {
 }
 
 static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
-    physics(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call,
-            const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,
-            const __grid_constant__ BatchArrays arrays) {
+    part(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call, int k) {
     extern __shared__ Real shared[];
-    __shared__ crowd_Shared contact[CROWD_WARPS];
-    const int warp = threadIdx.x / LANES;
     const long place = warp_robot();
-    if (place >= all.envs) {
-        return;
+    if (place < all.envs) {
+        crowd_part(&all, &call, all.order[place], k,
+                   (CrowdPlace *)shared + threadIdx.x / LANES);
     }
-    const long robot = all.order[place];
-    const CrowdGround ground = {&setup, (const ContactMaterial *)arrays.materials, &shape, &arrays,
-                                &contact[warp]};
-    crowd_physics(&all, &call, &ground, robot, (CrowdPlace *)shared + warp);
 }
 
 static __global__ void __launch_bounds__(TASK_THREADS)
@@ -173,19 +130,13 @@ static const char *launched(void) {
     return status == cudaSuccess ? NULL : cudaGetErrorString(status);
 }
 
-extern "C" const char *crowd_device_fits(const EngineTree *tree, const MildBatch *batch) {
+extern "C" const char *crowd_device_fits(const EngineTree *tree) {
     if (ENGINE_FIXED && (tree->joints != ENGINE_JOINTS || tree->feet != ENGINE_FEET ||
                          tree->corners != ENGINE_CORNERS || tree->entries != ENGINE_ENTRIES ||
                          tree->chain != ENGINE_CHAIN)) {
         return "this build steps robots of another size on a GPU";
     }
-    if (batch->shape.per != CROWD_PER || batch->shape.groups != GROUND_GROUPS) {
-        return "this build has soles of other sizes on a GPU";
-    }
-    if (batch->curves & ~LAW_CONE) {
-        return "this build has grounds of cones and lines only on a GPU";
-    }
-    cudaFuncSetAttribute(physics, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
+    cudaFuncSetAttribute(part, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     return launched();
 }
@@ -195,12 +146,15 @@ extern "C" const char *crowd_device_begin(const CrowdArrays *all, void *stream) 
     return launched();
 }
 
-extern "C" const char *crowd_device_physics(const CrowdArrays *all, const CrowdStep *call,
-                                            const MildBatch *batch, void *stream) {
-    ContactSetup setup;
-    batch_setup(&batch->shape, &batch->arrays, &setup);
-    physics<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(
-        *all, *call, setup, batch->shape, batch->arrays);
+extern "C" const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k,
+                                         void *stream) {
+    part<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all, *call,
+                                                                                     k);
+    return launched();
+}
+
+extern "C" const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call,
+                                        void *stream) {
     end<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     return launched();
 }

@@ -1,24 +1,6 @@
 /* A crowd on the CPU: the text of the GPU, environment after environment. */
 #define MILD_REAL_FLOAT
 
-#include "batch/host.h"
-
-typedef struct {
-    ContactSetup setup;
-    const ContactMaterial *material;
-    const BatchShape *shape;
-    const BatchArrays *arrays;
-    HostRobot step;
-} CrowdGround;
-
-static void crowd_ground(const CrowdGround *ground, long robot, const ContactProblem *problem,
-                         const ContactResult *result) {
-    ground->step(&ground->setup, problem, batch_memory(ground->shape, ground->arrays, robot), 1,
-                 result);
-}
-
-#define CROWD_ALIGN()
-
 #include "crowd/crowd.inc"
 #include "crowd/text.h"
 
@@ -41,15 +23,12 @@ void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot)
     crowd_observe(all, call, robot, alone);
 }
 
-void crowd_host_physics(const CrowdArrays *all, const CrowdStep *call, const MildBatch *batch,
-                        long robot) {
+void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long robot) {
     CrowdPlace place;
-    CrowdGround ground = {.material = (const ContactMaterial *)(void *)batch->arrays.materials,
-                          .shape = &batch->shape,
-                          .arrays = &batch->arrays,
-                          .step = host_robot(&batch->shape)};
-    batch_setup(&batch->shape, &batch->arrays, &ground.setup);
-    crowd_physics(all, call, &ground, robot, &place);
+    crowd_part(all, call, robot, k, &place);
+}
+
+void crowd_host_end(const CrowdArrays *all, const CrowdStep *call, long robot) {
     crowd_end(all, call, robot);
 }
 

@@ -16,9 +16,9 @@ void crowd_model_fill(const EngineTree *tree, const double *number, EngineModel 
 /* ---- the CPU, environment by environment ---- */
 /* Draws the first episode. */
 void crowd_host_begin(const CrowdArrays *all, long robot);
-/* A policy step up to the next episode, if this one ends. */
-void crowd_host_physics(const CrowdArrays *all, const CrowdStep *call, const MildBatch *batch,
-                        long robot);
+/* Part k of a policy step, and what follows the last one up to the next episode. */
+void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long robot);
+void crowd_host_end(const CrowdArrays *all, const CrowdStep *call, long robot);
 /* Pose of a new episode, and the observation. */
 void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot);
 /* Fills arrays.tally. */
@@ -31,11 +31,11 @@ extern "C" {
 /* The same on a device, in the stream. They return NULL or what went wrong. */
 const char *crowd_device_begin(const CrowdArrays *all, void *stream);
 const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call, void *stream);
-const char *crowd_device_physics(const CrowdArrays *all, const CrowdStep *call,
-                                 const MildBatch *batch, void *stream);
+const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k, void *stream);
+const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call, void *stream);
 const char *crowd_device_tally(const CrowdArrays *all, void *stream);
-/* Whether the kernels are compiled for such a robot and ground; else the reason. */
-const char *crowd_device_fits(const EngineTree *tree, const MildBatch *batch);
+/* NULL if the kernels are compiled for such a robot, else the reason. */
+const char *crowd_device_fits(const EngineTree *tree);
 #ifdef __cplusplus
 }
 #endif

@@ -17,11 +17,17 @@ const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call, vo
     return none;
 }
 
-const char *crowd_device_physics(const CrowdArrays *all, const CrowdStep *call,
-                                 const MildBatch *batch, void *stream) {
+const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k, void *stream) {
     (void)all;
     (void)call;
-    (void)batch;
+    (void)k;
+    (void)stream;
+    return none;
+}
+
+const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call, void *stream) {
+    (void)all;
+    (void)call;
     (void)stream;
     return none;
 }
@@ -32,8 +38,7 @@ const char *crowd_device_tally(const CrowdArrays *all, void *stream) {
     return none;
 }
 
-const char *crowd_device_fits(const EngineTree *tree, const MildBatch *batch) {
+const char *crowd_device_fits(const EngineTree *tree) {
     (void)tree;
-    (void)batch;
     return none;
 }
