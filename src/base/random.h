@@ -6,6 +6,8 @@
 #include <math.h>
 #include <stdint.h>
 
+#include "base/device.h"
+
 typedef struct {
     uint64_t seed;
     uint32_t stream; /* environment, layer, ... */
@@ -13,7 +15,7 @@ typedef struct {
     uint32_t use;    /* running counter inside (stream, step) */
 } Random;
 
-static inline uint64_t random_mix(uint64_t x) {
+static inline MILD_HD uint64_t random_mix(uint64_t x) {
     x ^= x >> 30;
     x *= 0xbf58476d1ce4e5b9u;
     x ^= x >> 27;
@@ -21,12 +23,13 @@ static inline uint64_t random_mix(uint64_t x) {
     return x ^ (x >> 31);
 }
 
-static inline Random random_at(uint64_t seed, uint32_t stream, uint32_t step) {
-    return (Random){seed, stream, step, 0};
+static inline MILD_HD Random random_at(uint64_t seed, uint32_t stream, uint32_t step) {
+    const Random random = {seed, stream, step, 0};
+    return random;
 }
 
 /* 64 random bits. The key is derived from (seed, stream); the counter is (step, use). */
-static inline uint64_t random_bits(Random *r) {
+static inline MILD_HD uint64_t random_bits(Random *r) {
     uint32_t x0 = r->step, x1 = r->use++;
     uint64_t k64 = random_mix(r->seed + 0x9e3779b97f4a7c15u * ((uint64_t)r->stream + 1u));
     uint32_t key = (uint32_t)(k64 ^ (k64 >> 32));

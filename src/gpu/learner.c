@@ -32,7 +32,8 @@ typedef struct {
     int sum_blocks;
     /* on the processor */
     int *host_rows; /* [2][minibatch]: latent_row, which, of the last size of minibatch */
-    int known_count, images;
+    int known[PPO_SHARDS + 1]; /* cuts of that minibatch */
+    int images;
     double *host_sums;
     void *pinned[3];
 } GpuLearner;
@@ -383,21 +384,21 @@ static void critic_half(GpuLearner *g, const ChunkJob *job) {
 }
 
 /* Uploads all that the chunks of a minibatch read. */
-static void upload_minibatch(GpuLearner *g, const int *samples, int count) {
+static void upload_minibatch(GpuLearner *g, const PpoMinibatch *minibatch) {
     const PpoBatch *host = &g->ppo->batch;
     const size_t all = (size_t)host->steps * (size_t)host->envs * sizeof(float),
-                 indices = (size_t)count * sizeof(int);
-    if (count != g->known_count) {
-        ppo_latent_rows(count, g->host_rows);
-        g->images = ppo_mirrored(g->ppo, count, g->host_rows + g->minibatch);
-        g->known_count = count;
+                 indices = (size_t)minibatch->cut[PPO_SHARDS] * sizeof(int);
+    if (memcmp(minibatch->cut, g->known, sizeof g->known) != 0) {
+        ppo_latent_rows(minibatch->cut, g->host_rows);
+        g->images = ppo_mirrored(g->ppo, minibatch->cut, g->host_rows + g->minibatch);
+        memcpy(g->known, minibatch->cut, sizeof g->known);
         upload(g, g->latent_row, g->host_rows, indices);
         upload(g, g->which, g->host_rows + g->minibatch, (size_t)g->images * sizeof(int));
     }
     upload_parameters(g);
     upload(g, g->batch.advantage, host->advantage, all);
     upload(g, g->batch.returns, host->returns, all);
-    upload(g, g->order, samples, indices);
+    upload(g, g->order, minibatch->samples, indices);
     cudaMemsetAsync(g->sums, 0, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums,
                     g->queue.stream);
 }
@@ -428,11 +429,13 @@ static void add_sums(const GpuLearner *g, LossSums *sums) {
     };
 }
 
-static MildStatus learner_gradient(void *self, const LossContext *context, const int *samples,
-                                   int count, uint64_t latent_key, float *gradient, LossSums *sums,
+static MildStatus learner_gradient(void *self, const LossContext *context,
+                                   const PpoMinibatch *minibatch, float *gradient, LossSums *sums,
                                    MildError *error) {
     GpuLearner *g = self;
-    upload_minibatch(g, samples, count);
+    const int count = minibatch->cut[PPO_SHARDS];
+    const uint64_t latent_key = ppo_latent_key(g->ppo, minibatch->draw);
+    upload_minibatch(g, minibatch);
     for (int at = 0, image = 0; at < count; at += g->rows) {
         g->chunk.rows = count - at < g->rows ? count - at : g->rows;
         const int next = images_before(g, image, at + g->chunk.rows);
@@ -477,7 +480,7 @@ static void set_sizes(GpuLearner *g) {
     const int64_t samples = (int64_t)ppo->batch.steps * ppo->batch.envs,
                   all = samples + ppo->batch.envs;
     g->rows = all < GPU_ROWS ? (int)all : GPU_ROWS;
-    g->minibatch = (int)((samples + ppo->def.minibatches - 1) / ppo->def.minibatches);
+    g->minibatch = ppo_largest_minibatch(ppo);
     g->sum_blocks = gpu_blocks(2 * g->rows);
     g->widths = (GpuWidths){ppo->policy->network.history,
                             def->observation,

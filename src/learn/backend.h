@@ -6,6 +6,14 @@
 #define MILD_BACKEND_H
 
 #include "learn/loss.h"
+#include "learn/order.h"
+
+/* Samples of the rollout in runs, one for each shard (learn/order.h). Shards may be empty. */
+typedef struct {
+    const int *samples;      /* [cut[PPO_SHARDS]] places in the rollout */
+    int cut[PPO_SHARDS + 1]; /* shard s is samples[cut[s]] .. samples[cut[s + 1] - 1]; cut[0] = 0 */
+    uint32_t draw;           /* number in this update, which picks the random numbers */
+} PpoMinibatch;
 
 /* `self` is the first argument of every function. A function that fails gives the reason and may
  * leave its results unwritten. */
@@ -16,10 +24,9 @@ typedef struct PpoBackend {
     /* batch->value from batch->critic. The rollout is complete. Until the next act() the learner
      * changes only the parameters and the batch's advantage and returns. */
     MildStatus (*values)(void *self, MildError *error);
-    /* Gradient of the loss over `count` samples of the batch into gradient [parameters], and the
-     * sums. latent_key: the random numbers of the sampled z, see ppo_latent_key. */
-    MildStatus (*gradient)(void *self, const LossContext *context, const int *samples, int count,
-                           uint64_t latent_key, float *gradient, LossSums *sums, MildError *error);
+    /* Gradient of the loss over the minibatch into gradient [parameters], and the sums. */
+    MildStatus (*gradient)(void *self, const LossContext *context, const PpoMinibatch *minibatch,
+                           float *gradient, LossSums *sums, MildError *error);
     void (*destroy)(void *self);
 } PpoBackend;
 

@@ -84,8 +84,8 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     ppo->first = take(ppo, count * sizeof(float));
     ppo->second = take(ppo, count * sizeof(float));
     ppo->scratch = take(ppo, (size_t)pool_threads(ppo->pool) * ppo->scratch_floats * sizeof(float));
-    ppo->order = take(ppo, samples * sizeof *ppo->order);
-    ppo->draw = take(ppo, samples * sizeof *ppo->draw);
+    ppo->order = take(ppo, (size_t)ppo_largest_minibatch(ppo) * sizeof *ppo->order);
+    ppo->substitute = take(ppo, samples * sizeof *ppo->substitute);
     if (ppo->def.average > 0.0) {
         ppo->average = policy_create(policy_def(ppo->policy), ppo->seed, NULL);
         ppo->bytes += count * sizeof(float);
@@ -95,7 +95,7 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
         memcpy(policy_parameters(ppo->average), ppo->policy->parameters, count * sizeof(float));
     }
     if (!ppo->batch_block || !ppo->gradient || !ppo->first || !ppo->second || !ppo->scratch ||
-        !ppo->order || !ppo->draw) {
+        !ppo->order || !ppo->substitute) {
         return 0;
     }
     memset(ppo->batch_block, 0, ppo->batch_bytes);
@@ -179,7 +179,7 @@ void ppo_destroy(Ppo *ppo) {
         free(ppo->second);
         free(ppo->scratch);
         free(ppo->order);
-        free(ppo->draw);
+        free(ppo->substitute);
         free(ppo);
     }
 }
@@ -252,30 +252,32 @@ void ppo_act(Ppo *ppo, int t) {
 
 typedef struct {
     Ppo *ppo;
-    Random random;
-} ShuffleJob;
+    int epoch, m;
+    const int *cut;
+} OrderJob;
 
-static void draw_piece(void *context, int piece, int thread) {
+static void order_shard(void *context, int shard, int thread) {
     (void)thread;
-    const ShuffleJob *job = context;
-    const int end = ppo_piece_begin(job->ppo->samples, piece + 1);
-    for (int k = ppo_piece_begin(job->ppo->samples, piece); k < end; k++) {
-        Random random = job->random;
-        random.use = (uint32_t)k;
-        job->ppo->draw[k] = (int)random_index(&random, (uint32_t)(job->ppo->samples - k));
+    const OrderJob *job = context;
+    Ppo *ppo = job->ppo;
+    const PpoBatch *b = &ppo->batch;
+    const OrderStratum stratum = order_stratum(b->steps, b->envs, shard);
+    const Order order = order_make(stratum.count, ppo->seed, ppo->iteration, job->epoch, shard);
+    const int first = order_begin(stratum.count, job->m, ppo->def.minibatches);
+    for (int p = job->cut[shard]; p < job->cut[shard + 1]; p++) {
+        const int k = order_at(&order, first + p - job->cut[shard]);
+        ppo->order[p] = ppo->substitute[order_sample(stratum, b->envs, k)];
     }
 }
 
-/* Fisher-Yates: a pure function of (seed, iteration, epoch). */
-static void shuffle(Ppo *ppo, int epoch) {
-    ShuffleJob job = {
-        ppo, random_at(ppo->seed ^ 0x6f72646572u, (uint32_t)ppo->iteration, (uint32_t)epoch)};
-    pool_run(ppo->pool, PPO_PIECES, draw_piece, &job);
-    for (int i = ppo->samples - 1; i > 0; i--) {
-        int j = ppo->draw[ppo->samples - 1 - i], held = ppo->order[i];
-        ppo->order[i] = ppo->order[j];
-        ppo->order[j] = held;
-    }
+/* Samples of minibatch m of the epoch. */
+static PpoMinibatch draw_minibatch(Ppo *ppo, int epoch, int m) {
+    const int minibatches = ppo->def.minibatches;
+    PpoMinibatch minibatch = {.samples = ppo->order, .draw = (uint32_t)(epoch * minibatches + m)};
+    order_cuts(ppo->batch.steps, ppo->batch.envs, m, minibatches, minibatch.cut);
+    OrderJob job = {ppo, epoch, m, minibatch.cut};
+    pool_run(ppo->pool, PPO_SHARDS, order_shard, &job);
+    return minibatch;
 }
 
 /* 0 before the annealing, 1 after it. A function of the iteration alone, so a resumed run
@@ -356,16 +358,22 @@ static int report_minibatch(PpoReport *report, const LossContext *context, const
     return 1;
 }
 
-static int update_minibatch(Ppo *ppo, LossContext *context, const int *samples, int count,
-                            uint32_t draw, PpoReport *report) {
-    const int mirrored = ppo_mirrored(ppo, count, NULL);
+/* Returns whether a step was taken. */
+static int update_minibatch(Ppo *ppo, LossContext *context, const PpoMinibatch *minibatch,
+                            PpoReport *report) {
+    const int count = minibatch->cut[PPO_SHARDS],
+              mirrored = ppo_mirrored(ppo, minibatch->cut, NULL);
+    if (count == 0 || ppo->starved) {
+        report->skipped += count > 0;
+        return 0;
+    }
     context->sample_weight = 1.0f / (float)count;
     context->mirror_weight = mirrored > 0 ? 1.0f / (float)mirrored : 0.0f;
     memcpy(context->std, policy_std(ppo->policy),
            (size_t)context->network->def.actions * sizeof *context->std);
     LossSums sums;
     double norm;
-    ppo_gradient(ppo, context, samples, count, draw, &sums, &norm);
+    ppo_gradient(ppo, context, minibatch, &sums, &norm);
     if (!report_minibatch(report, context, &sums, norm)) {
         report->skipped++;
         return 0;
@@ -453,14 +461,9 @@ void ppo_update(Ppo *ppo, PpoReport *report) {
            (size_t)n->def.actions * sizeof *context.old_std);
     int done = 0;
     for (int epoch = 0; epoch < ppo->def.epochs; epoch++) {
-        shuffle(ppo, epoch);
         for (int m = 0; m < ppo->def.minibatches; m++) {
-            int begin = (int)((int64_t)ppo->samples * m / ppo->def.minibatches),
-                end = (int)((int64_t)ppo->samples * (m + 1) / ppo->def.minibatches);
-            if (begin < end) {
-                done += update_minibatch(ppo, &context, ppo->order + begin, end - begin,
-                                         (uint32_t)(epoch * ppo->def.minibatches + m), report);
-            }
+            const PpoMinibatch minibatch = draw_minibatch(ppo, epoch, m);
+            done += update_minibatch(ppo, &context, &minibatch, report);
         }
     }
     bound_noise(ppo);

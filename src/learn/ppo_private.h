@@ -9,10 +9,9 @@
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
 
-/* A minibatch is cut into PPO_SHARDS equal runs of samples, each with its own gradient, and a shard
+/* A minibatch consists of PPO_SHARDS runs of samples, each with its own gradient, and a shard is cut
  * into chunks. Sums are taken in the order of the shards. So no result depends on the number of
  * threads. */
-#define PPO_SHARDS 8
 #define PPO_CHUNK 256
 #define PPO_RANGES 64 /* pieces of the parameter arrays in reduction and optimiser */
 #define PPO_PIECES 64 /* pieces of the environments and samples in everything else */
@@ -41,10 +40,11 @@ typedef struct Ppo {
     float *scratch;  /* [threads][scratch_floats] */
     size_t scratch_floats;
     int mirror_rows; /* images per full chunk */
-    int *order;      /* [steps * envs] the valid samples, shuffled every epoch */
-    int *draw;       /* [steps * envs] random numbers of the shuffle */
-    int samples;     /* number of valid samples */
-    size_t bytes;    /* held in all */
+    int *order;      /* [largest minibatch] samples of the present minibatch */
+    /* [steps * envs] The sample itself if it is usable, else the next usable one of its stratum. */
+    int *substitute;
+    int starved;  /* bool: a stratum has no usable sample, so this update takes no step */
+    size_t bytes; /* held in all */
 } Ppo;
 
 /* First environment or sample of piece i. */

@@ -31,22 +31,6 @@ static void environment_returns(const PpoDef *def, PpoBatch *b, int env) {
     }
 }
 
-typedef struct {
-    double mean, std;
-} Moments;
-
-static Moments moments_of(const Ppo *ppo, const float *x) {
-    double sum = 0.0, squares = 0.0, n = ppo->samples > 0 ? (double)ppo->samples : 1.0;
-    for (int k = 0; k < ppo->samples; k++) {
-        sum += x[ppo->order[k]];
-    }
-    for (int k = 0; k < ppo->samples; k++) {
-        double gap = x[ppo->order[k]] - sum / n;
-        squares += gap * gap;
-    }
-    return (Moments){sum / n, sqrt(squares / n)};
-}
-
 static void returns_piece(void *context, int piece, int thread) {
     (void)thread;
     Ppo *ppo = context;
@@ -56,23 +40,106 @@ static void returns_piece(void *context, int piece, int thread) {
     }
 }
 
-void ppo_returns(Ppo *ppo, PpoReport *report) {
-    PpoBatch *b = &ppo->batch;
-    pool_run(ppo->pool, PPO_PIECES, returns_piece, ppo);
-    ppo->samples = 0;
-    for (int i = 0; i < b->steps * b->envs; i++) {
+/* Each sample's next usable one, cyclic within the stratum. */
+static void substitute_stratum(void *context, int index, int thread) {
+    (void)thread;
+    Ppo *ppo = context;
+    const PpoBatch *b = &ppo->batch;
+    const OrderStratum stratum = order_stratum(b->steps, b->envs, index);
+    int next = -1;
+    for (int k = 2 * stratum.count - 1; k >= 0; k--) {
+        const int i = order_sample(stratum, b->envs, k % stratum.count);
+        next = sample_usable(b, i) ? i : next;
+        ppo->substitute[i] = next < 0 ? i : next;
+    }
+}
+
+/* ---- moments over the usable samples ---- */
+
+enum { ADVANTAGE, RETURNS, VALUE, NUMBERS };
+
+typedef struct {
+    Ppo *ppo;
+    double about[NUMBERS]; /* gaps are the distances from these */
+    double count[PPO_SHARDS];
+    double gaps[NUMBERS][PPO_SHARDS];
+    double squares[NUMBERS][PPO_SHARDS]; /* of the gaps */
+    double mean[NUMBERS], std[NUMBERS];
+} MomentsJob;
+
+static void add_stratum(void *context, int index, int thread) {
+    (void)thread;
+    MomentsJob *job = context;
+    const PpoBatch *b = &job->ppo->batch;
+    const float *const numbers[NUMBERS] = {b->advantage, b->returns, b->value};
+    const OrderStratum stratum = order_stratum(b->steps, b->envs, index);
+    double count = 0.0, gaps[NUMBERS] = {0.0}, squares[NUMBERS] = {0.0};
+    for (int k = 0; k < stratum.count; k++) {
+        const int i = order_sample(stratum, b->envs, k);
         if (sample_usable(b, i)) {
-            ppo->order[ppo->samples++] = i;
+            count += 1.0;
+            for (int n = 0; n < NUMBERS; n++) {
+                const double gap = numbers[n][i] - job->about[n];
+                gaps[n] += gap;
+                squares[n] += gap * gap;
+            }
         }
     }
-    Moments advantage = moments_of(ppo, b->advantage), returns = moments_of(ppo, b->returns);
-    report->value_mean = moments_of(ppo, b->value).mean;
-    report->advantage_std = advantage.std;
+    job->count[index] = count;
+    for (int n = 0; n < NUMBERS; n++) {
+        job->gaps[n][index] = gaps[n];
+        job->squares[n][index] = squares[n];
+    }
+}
+
+static double total(const double x[PPO_SHARDS]) {
+    double sum = 0.0;
+    for (int s = 0; s < PPO_SHARDS; s++) {
+        sum += x[s];
+    }
+    return sum;
+}
+
+/* The means first, then the squares of the distances from them. */
+static void find_moments(MomentsJob *job) {
+    pool_run(job->ppo->pool, PPO_SHARDS, add_stratum, job);
+    const double count = fmax(total(job->count), 1.0);
+    for (int n = 0; n < NUMBERS; n++) {
+        job->about[n] = job->mean[n] = total(job->gaps[n]) / count;
+    }
+    pool_run(job->ppo->pool, PPO_SHARDS, add_stratum, job);
+    for (int n = 0; n < NUMBERS; n++) {
+        job->std[n] = sqrt(total(job->squares[n]) / count);
+    }
+}
+
+static void normalise_piece(void *context, int piece, int thread) {
+    (void)thread;
+    const MomentsJob *job = context;
+    const PpoBatch *b = &job->ppo->batch;
+    const int samples = b->steps * b->envs, end = ppo_piece_begin(samples, piece + 1);
+    for (int i = ppo_piece_begin(samples, piece); i < end; i++) {
+        if (sample_usable(b, i)) {
+            float *a = &b->advantage[i];
+            *a = (float)((*a - job->mean[ADVANTAGE]) / (job->std[ADVANTAGE] + 1e-8));
+        }
+    }
+}
+
+void ppo_returns(Ppo *ppo, PpoReport *report) {
+    pool_run(ppo->pool, PPO_PIECES, returns_piece, ppo);
+    pool_run(ppo->pool, PPO_SHARDS, substitute_stratum, ppo);
+    MomentsJob job = {.ppo = ppo};
+    find_moments(&job);
+    ppo->starved = 0;
+    for (int s = 0; s < PPO_SHARDS; s++) {
+        const OrderStratum stratum = order_stratum(ppo->batch.steps, ppo->batch.envs, s);
+        ppo->starved |= stratum.count > 0 && job.count[s] == 0.0;
+    }
+    pool_run(ppo->pool, PPO_PIECES, normalise_piece, &job);
+    report->value_mean = job.mean[VALUE];
+    report->advantage_std = job.std[ADVANTAGE];
     /* returns - value is the advantage before it is normalised */
     report->explained_variance =
-        returns.std > 0.0 ? 1.0 - pow(advantage.std / returns.std, 2) : 0.0;
-    for (int k = 0; k < ppo->samples; k++) {
-        float *a = &b->advantage[ppo->order[k]];
-        *a = (float)((*a - advantage.mean) / (advantage.std + 1e-8));
-    }
+        job.std[RETURNS] > 0.0 ? 1.0 - pow(job.std[ADVANTAGE] / job.std[RETURNS], 2) : 0.0;
 }

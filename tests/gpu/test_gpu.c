@@ -135,14 +135,18 @@ static double sums_distance(const LossSums *a, const LossSums *b, int samples) {
 }
 
 /* One gradient of the first `count` samples of an order, on both. */
-static void compare_gradient(Learner *cpu, Learner *gpu, int count, uint32_t draw,
+static void compare_gradient(Learner *cpu, Learner *gpu, const int *order, int count, uint32_t draw,
                              double worst[2]) {
+    PpoMinibatch minibatch = {.samples = order, .draw = draw};
+    for (int s = 0; s <= PPO_SHARDS; s++) {
+        minibatch.cut[s] = order_begin(count, s, PPO_SHARDS);
+    }
     Learner *both[] = {cpu, gpu};
     LossSums sums[2];
     double norm[2];
     for (int k = 0; k < 2; k++) {
         Ppo *ppo = both[k]->ppo;
-        const int images = ppo_mirrored(ppo, count, NULL);
+        const int images = ppo_mirrored(ppo, minibatch.cut, NULL);
         LossContext context = {.def = &ppo->def,
                                .network = &ppo->policy->network,
                                .mirror = &ppo->mirror,
@@ -154,7 +158,7 @@ static void compare_gradient(Learner *cpu, Learner *gpu, int count, uint32_t dra
             context.std[j] = std[j];
             context.old_std[j] = 1.1f * std[j];
         }
-        ppo_gradient(ppo, &context, cpu->ppo->order, count, draw, &sums[k], &norm[k]);
+        ppo_gradient(ppo, &context, &minibatch, &sums[k], &norm[k]);
     }
     const char *where;
     double apart = gradient_distance(cpu, gpu, &where);
@@ -193,16 +197,20 @@ static void compare_learner(const PolicyDef *policy, const PpoDef *def, int envs
     ppo_returns(cpu.ppo, &report);
     memcpy(b->advantage, a->advantage, (size_t)samples * sizeof(float));
     memcpy(b->returns, a->returns, (size_t)samples * sizeof(float));
-    for (int i = samples - 1; i > 0; i--) {
-        int j = (int)random_index(&random, (uint32_t)i + 1u), held = cpu.ppo->order[i];
-        cpu.ppo->order[i] = cpu.ppo->order[j], cpu.ppo->order[j] = held;
+    int *order = malloc((size_t)samples * sizeof *order);
+    assert_non_null(order);
+    for (int i = 0; i < samples; i++) {
+        int j = (int)random_index(&random, (uint32_t)i + 1u);
+        order[i] = order[j];
+        order[j] = i;
     }
-    const int minibatch = (samples + def->minibatches - 1) / def->minibatches,
+    const int minibatch = ppo_largest_minibatch(cpu.ppo),
               counts[] = {minibatch, minibatch - 1, 300, 5};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-        compare_gradient(&cpu, &gpu, counts[i] < minibatch ? counts[i] : minibatch, (uint32_t)i,
-                         worst);
+        compare_gradient(&cpu, &gpu, order, counts[i] < minibatch ? counts[i] : minibatch,
+                         (uint32_t)i, worst);
     }
+    free(order);
     learner_close(&cpu);
     learner_close(&gpu);
 }

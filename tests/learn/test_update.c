@@ -37,15 +37,15 @@ static MildStatus script_values(void *self, MildError *error) {
     return MILD_OK;
 }
 
-static MildStatus script_gradient(void *self, const LossContext *context, const int *samples,
-                                  int count, uint64_t latent_key, float *gradient, LossSums *sums,
+static MildStatus script_gradient(void *self, const LossContext *context,
+                                  const PpoMinibatch *minibatch, float *gradient, LossSums *sums,
                                   MildError *error) {
     Script *s = self;
-    const int call = s->calls++;
+    const int call = s->calls++, count = minibatch->cut[PPO_SHARDS];
     if (call < CALLS) {
         s->count[call] = count;
-        s->key[call] = latent_key;
-        memcpy(s->samples[call], samples, (size_t)count * sizeof *samples);
+        s->key[call] = ppo_latent_key(s->ppo, minibatch->draw);
+        memcpy(s->samples[call], minibatch->samples, (size_t)count * sizeof *minibatch->samples);
     }
     s->context = *context;
     if (call == s->fail_at) {
@@ -307,8 +307,7 @@ static const int mirror_o[] = {0, 2, 1, 4, 3}, mirror_a[] = {1, 0};
 static const float sign_o[] = {-1, 1, 1, -1, -1}, sign_a[] = {-1, -1};
 static const PpoMirror mirror = {mirror_o, sign_o, mirror_a, sign_a};
 
-/* Half of each shard's samples have an image: 30 samples in 8 shards of 3 or 4, each with 2 images.
- */
+/* Half of each shard's samples have an image: five shards of 6 samples, three without any. */
 static void mirror_is_averaged_over_the_images(void **state) {
     (void)state;
     Run run;
@@ -317,13 +316,15 @@ static void mirror_is_averaged_over_the_images(void **state) {
     run.script.sums.mirror = 0.8; /* times 30 samples: a sum of 24 */
     PpoReport report = update(&run);
     int which[SAMPLES];
-    const int images = ppo_mirrored(run.ppo, SAMPLES, which);
-    assert_int_equal(images, 16);
+    int cut[PPO_SHARDS + 1];
+    assert_int_equal(order_cuts(STEPS, ENVS, 0, 1, cut), SAMPLES);
+    const int images = ppo_mirrored(run.ppo, cut, which);
+    assert_int_equal(images, 15);
     for (int r = 1; r < images; r++) {
         assert_true(which[r] > which[r - 1] && which[r] < SAMPLES);
     }
-    assert_close("mirror", report.mirror, 24.0 / 16, 1e-6);
-    assert_close("weight", (double)run.script.context.mirror_weight, 1.0 / 16, 1e-6);
+    assert_close("mirror", report.mirror, 24.0 / 15, 1e-6);
+    assert_close("weight", (double)run.script.context.mirror_weight, 1.0 / 15, 1e-6);
     assert_close("sample weight", (double)run.script.context.sample_weight, 1.0 / SAMPLES, 1e-6);
     run_close(&run);
     def.mirror_weight = 0.0;
@@ -392,6 +393,8 @@ static void explained_variance_of_half(void **state) {
 
 /* ---- order of the samples ---- */
 
+/* Each of 30 samples once an epoch, and the two that are not valid replaced by the next step of their
+ * environment, which is a stratum of its own here. */
 static void every_sample_once_an_epoch(void **state) {
     (void)state;
     Run run;
@@ -400,10 +403,10 @@ static void every_sample_once_an_epoch(void **state) {
     def.minibatches = 4;
     run_open(&run, def, NULL);
     PpoBatch *b = ppo_batch(run.ppo);
-    b->valid[3] = b->valid[17] = 0;
+    b->valid[3] = b->valid[SAMPLES - 1] = 0;
     update(&run);
     assert_int_equal(run.script.calls, 12);
-    static const int sizes[4] = {7, 7, 7, 7}; /* 28 valid samples */
+    static const int sizes[4] = {5, 10, 5, 10}; /* of 6 samples a stratum: 1, 2, 1, 2 */
     int epochs[3][SAMPLES], same = 0;
     for (int epoch = 0; epoch < 3; epoch++) {
         int seen[SAMPLES] = {0}, k = 0;
@@ -415,14 +418,15 @@ static void every_sample_once_an_epoch(void **state) {
                 epochs[epoch][k++] = run.script.samples[call][i];
             }
         }
-        for (int i = 0; i < SAMPLES; i++) {
-            assert_int_equal(seen[i], i != 3 && i != 17);
+        for (int i = 0; i < SAMPLES; i++) { /* the last one's next is the first, at place 4 */
+            const int bad = i == 3 || i == SAMPLES - 1, next = i == 3 + ENVS || i == 4;
+            assert_int_equal(seen[i], bad ? 0 : next ? 2 : 1);
         }
     }
-    for (int k = 0; k < 28; k++) {
+    for (int k = 0; k < SAMPLES; k++) {
         same += epochs[0][k] == epochs[1][k];
     }
-    assert_true(same < 8);
+    assert_true(same < 15);        /* 30 / 6 of them by chance */
     for (int a = 0; a < 12; a++) { /* each minibatch draws its own latents */
         for (int c = 0; c < a; c++) {
             assert_true(run.script.key[a] != run.script.key[c]);
@@ -431,40 +435,20 @@ static void every_sample_once_an_epoch(void **state) {
     run_close(&run);
 }
 
-/* Where sample 0 ends up after a shuffle is uniform, and so is what ends up first: chi-square with
- * 5 degrees of freedom, 1 in 100 000 lies above 30.9. The order goes on from epoch to epoch. */
-static void shuffles_are_uniform(void **state) {
+/* A stratum without any usable sample stops the steps of its update. */
+static void nothing_usable_takes_no_step(void **state) {
     (void)state;
-    enum { FEW = 6, ROUNDS = 200, EPOCHS = 16 };
     Run run;
-    PpoDef def = plain_def();
-    def.epochs = EPOCHS;
-    run_open(&run, def, NULL);
+    run_open(&run, plain_def(), NULL);
     PpoBatch *b = ppo_batch(run.ppo);
-    memset(b->valid, 0, SAMPLES);
-    memset(b->valid, 1, FEW);
-    double where[FEW] = {0}, first[FEW] = {0}, last[FEW] = {0};
-    for (int round = 0; round < ROUNDS; round++) {
-        run.script.calls = 0;
-        update(&run);
-        for (int epoch = 0; epoch < EPOCHS; epoch++) {
-            const int *order = run.script.samples[epoch];
-            for (int k = 0; k < FEW; k++) {
-                where[k] += order[k] == 0;
-            }
-            first[order[0]]++;
-            last[order[FEW - 1]]++;
-        }
+    for (int t = 0; t < STEPS; t++) {
+        b->valid[t * ENVS + 2] = 0;
     }
-    double chi[3] = {0}, expected = (double)ROUNDS * EPOCHS / FEW;
-    for (int k = 0; k < FEW; k++) {
-        chi[0] += pow(where[k] - expected, 2) / expected;
-        chi[1] += pow(first[k] - expected, 2) / expected;
-        chi[2] += pow(last[k] - expected, 2) / expected;
-    }
-    print_message("chi-square of a shuffle's places: %.1f, first %.1f, last %.1f (5 degrees)\n",
-                  chi[0], chi[1], chi[2]);
-    assert_true(chi[0] < 30.9 && chi[1] < 30.9 && chi[2] < 30.9);
+    assert_int_equal(update(&run).skipped, 1);
+    assert_int_equal(run.script.calls, 0);
+    b->valid[2] = 1;
+    assert_int_equal(update(&run).skipped, 0);
+    assert_int_equal(run.script.calls, 1);
     run_close(&run);
 }
 
@@ -636,7 +620,7 @@ int main(void) {
         cmocka_unit_test(values_and_explained_variance),
         cmocka_unit_test(explained_variance_of_half),
         cmocka_unit_test(every_sample_once_an_epoch),
-        cmocka_unit_test(shuffles_are_uniform),
+        cmocka_unit_test(nothing_usable_takes_no_step),
         cmocka_unit_test(noise_stays_within_its_bounds),
         cmocka_unit_test(average_of_the_weights),
         cmocka_unit_test(the_last_observation_is_carried_over),
