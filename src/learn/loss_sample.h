@@ -15,6 +15,25 @@
 #define LOSS_LOGVAR_MIN (-12.0f)
 #define LOSS_LOGVAR_MAX 6.0f
 
+#define LOSS_HALF_LOG_2PI 0.91893853320467274
+
+/* Groups of estimates: before, in and after the feet velocities. These are base velocity, feet
+ * velocities and feet heights. */
+#define LOSS_GROUPS 3
+
+/* Sums over samples, not yet divided. The entropy is missing, because it does not depend on the
+ * sample. */
+typedef struct {
+    double surrogate;
+    double kl;      /* [nat] KL(old || new) of the action */
+    double clipped; /* samples whose ratio is outside the clip range */
+    double reconstruction;
+    double vae_kl; /* [nat] of the latent */
+    double estimate[LOSS_GROUPS];
+    double mirror;
+    double value;
+} LossSums;
+
 /* ---- clipped surrogate: -min(r A, clip(r) A), r = exp(log_prob - old_log_prob) ---- */
 
 typedef struct {
@@ -27,6 +46,33 @@ typedef struct {
 /* Distance of an action from the mean, in standard deviations. inverse: 1 / std. */
 static inline MILD_HD float loss_standard(float action, float mean, float inverse) {
     return (action - mean) * inverse;
+}
+
+/* The part of the surrogate that is the same for all samples: 1/std [actions], then the constants
+ * of log_prob and of KL(old || new), which is
+ *     sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
+static inline MILD_HD void loss_surrogate_constants(int actions, const float *std,
+                                                    const float *old_std, float *constant) {
+    double log_prob = 0.0, kl = 0.0;
+    for (int j = 0; j < actions; j++) {
+        const double ratio = (double)old_std[j] / (double)std[j];
+        constant[j] = 1.0f / std[j];
+        log_prob -= log((double)std[j]) + LOSS_HALF_LOG_2PI;
+        kl += 0.5 * ratio * ratio - 0.5 - log(ratio);
+    }
+    constant[actions] = (float)log_prob;
+    constant[actions + 1] = (float)kl;
+}
+
+/* log of the normal density of `action`, independent dimensions. */
+static inline MILD_HD float loss_log_prob(int actions, const float *action, const float *mean,
+                                          const float *std) {
+    double sum = 0.0;
+    for (int j = 0; j < actions; j++) {
+        const double t = ((double)action[j] - (double)mean[j]) / (double)std[j];
+        sum -= 0.5 * t * t + log((double)std[j]) + LOSS_HALF_LOG_2PI;
+    }
+    return (float)sum;
 }
 
 /* constant [actions + 2]: see loss_surrogate_constants. */

@@ -59,6 +59,17 @@ static inline MILD_HD int order_cuts(int steps, int envs, int m, int minibatches
     return cut[PPO_SHARDS];
 }
 
+/* Samples of the largest minibatch. */
+static inline int order_largest(int steps, int envs, int minibatches) {
+    int largest = 0;
+    for (int m = 0; m < minibatches; m++) {
+        int cut[PPO_SHARDS + 1];
+        const int count = order_cuts(steps, envs, m, minibatches, cut);
+        largest = count > largest ? count : largest;
+    }
+    return largest;
+}
+
 /* A permutation of 0 .. count - 1. */
 typedef struct {
     uint32_t count;

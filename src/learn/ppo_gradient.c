@@ -3,9 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/random.h"
 #include "learn/adam.h"
 #include "learn/noise.h"
+#include "learn/ppo_step.h"
 #include "learn/product.h"
 
 typedef struct {
@@ -18,17 +18,6 @@ typedef struct {
 
 static int chunk_mirrored(const Ppo *ppo, int rows) {
     return ppo->mirror.observation_index ? (int)(ppo->def.mirror_share * rows + 0.5) : 0;
-}
-
-int ppo_largest_minibatch(const Ppo *ppo) {
-    int largest = 0;
-    for (int m = 0; m < ppo->def.minibatches; m++) {
-        int cut[PPO_SHARDS + 1];
-        const int count =
-            order_cuts(ppo->batch.steps, ppo->batch.envs, m, ppo->def.minibatches, cut);
-        largest = count > largest ? count : largest;
-    }
-    return largest;
 }
 
 int ppo_mirrored(const Ppo *ppo, const int *cut, int *which) {
@@ -44,11 +33,6 @@ int ppo_mirrored(const Ppo *ppo, const int *cut, int *which) {
         }
     }
     return total;
-}
-
-uint64_t ppo_latent_key(const Ppo *ppo, uint32_t draw) {
-    Random key = random_at(ppo->seed ^ 0x76616573u, (uint32_t)ppo->iteration, draw);
-    return random_bits(&key);
 }
 
 /* A chunk that begins at sample `at` takes its numbers from 2 at latent onward (gather_actor). */
@@ -81,8 +65,8 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
     for (int r = 0; r < chunk->mirrored; r++) {
         loss_mirror_row(job->loss, chunk, r, chunk->rows + r);
     }
-    noise_normal(ppo_latent_key(ppo, job->minibatch->draw), 2 * (int64_t)at * n->def.latent,
-                 chunk->rows * n->def.latent, chunk->noise);
+    noise_normal(step_latent_key(ppo->seed, ppo->iteration, job->minibatch->draw),
+                 2 * (int64_t)at * n->def.latent, chunk->rows * n->def.latent, chunk->noise);
 }
 
 static void gather_critic(const GradientJob *job, int at, LossChunk *chunk) {
@@ -165,19 +149,6 @@ static void reduce_piece(void *context, int range, int thread) {
     job->squares[range] = squares;
 }
 
-/* Squared norm of a range, after a backend has written the sum to shard 0. */
-static void square_piece(void *context, int range, int thread) {
-    (void)thread;
-    GradientJob *job = context;
-    const Ppo *ppo = job->ppo;
-    int64_t end = range_begin(ppo->policy->network.count, range + 1);
-    double squares = 0.0;
-    for (int64_t i = range_begin(ppo->policy->network.count, range); i < end; i++) {
-        squares += (double)ppo->gradient[i] * ppo->gradient[i];
-    }
-    job->squares[range] = squares;
-}
-
 static void add_sums(LossSums *to, const LossSums *from) {
     to->surrogate += from->surrogate;
     to->kl += from->kl;
@@ -194,21 +165,11 @@ static void add_sums(LossSums *to, const LossSums *from) {
 void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
                   LossSums *sums, double *norm) {
     GradientJob job = {.ppo = ppo, .loss = context, .minibatch = minibatch};
-    const PpoBackend *backend = &ppo->backend;
     *sums = (LossSums){0};
-    if (backend->gradient) {
-        if (backend->gradient(backend->self, context, minibatch, ppo->gradient, sums,
-                              &ppo->error)) {
-            *norm = NAN; /* drops the minibatch */
-            return;
-        }
-        pool_run(ppo->pool, PPO_RANGES, square_piece, &job);
-    } else {
-        pool_run(ppo->pool, 2 * PPO_SHARDS, gradient_piece, &job);
-        pool_run(ppo->pool, PPO_RANGES, reduce_piece, &job);
-        for (int piece = 0; piece < 2 * PPO_SHARDS; piece++) {
-            add_sums(sums, &job.sums[piece]);
-        }
+    pool_run(ppo->pool, 2 * PPO_SHARDS, gradient_piece, &job);
+    pool_run(ppo->pool, PPO_RANGES, reduce_piece, &job);
+    for (int piece = 0; piece < 2 * PPO_SHARDS; piece++) {
+        add_sums(sums, &job.sums[piece]);
     }
     double squares = 0.0;
     for (int range = 0; range < PPO_RANGES; range++) {
@@ -236,7 +197,7 @@ void ppo_optimise(Ppo *ppo, double gradient_scale) {
     OptimiseJob job = {ppo, adam_step(ppo->learning_rate, ++ppo->adam_steps, gradient_scale)};
     pool_run(ppo->pool, PPO_RANGES, optimise_piece, &job);
     const Network *n = &ppo->policy->network;
-    float floor = (float)log(ppo->def.std_min);
+    const float floor = step_noise_floor(&ppo->def);
     for (int64_t i = n->log_std; i < n->count; i++) {
         ppo->policy->parameters[i] = fmaxf(ppo->policy->parameters[i], floor);
     }

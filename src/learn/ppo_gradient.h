@@ -2,18 +2,25 @@
 #ifndef MILD_PPO_GRADIENT_H
 #define MILD_PPO_GRADIENT_H
 
+#include "learn/loss.h"
+#include "learn/order.h"
 #include "learn/ppo_private.h"
+
+/* Samples of the rollout in runs, one for each shard (learn/order.h). Shards may be empty. */
+typedef struct {
+    const int *samples;      /* [cut[PPO_SHARDS]] places in the rollout */
+    int cut[PPO_SHARDS + 1]; /* shard s is samples[cut[s]] .. samples[cut[s + 1] - 1]; cut[0] = 0 */
+    uint32_t draw;           /* number in this update, which picks the random numbers */
+} PpoMinibatch;
 
 /* Gradient of the loss over a minibatch into ppo->gradient (shard 0), its norm, and the sums. */
 void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
                   LossSums *sums, double *norm);
-int ppo_largest_minibatch(const Ppo *ppo); /* [samples] */
 /* Samples of a minibatch with these cuts that get a mirror image: how many, and with `which` not
  * NULL their places in the minibatch. */
 int ppo_mirrored(const Ppo *ppo, const int *cut, int *which);
 /* Random numbers for the sampled z: sample p of the minibatch uses the numbers from row[p] * latent
- * onward of this stream. row: [samples of the minibatch]. */
-uint64_t ppo_latent_key(const Ppo *ppo, uint32_t draw);
+ * onward of the stream step_latent_key. row: [samples of the minibatch]. */
 void ppo_latent_rows(const int *cut, int *row);
 /* One step of Adam along the gradient times gradient_scale; keeps the action noise above its floor.
  */

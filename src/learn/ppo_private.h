@@ -4,6 +4,7 @@
 
 #include "base/pool.h"
 #include "learn/backend.h"
+#include "learn/order.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
 #include "learn/ppo_batch.h"
@@ -20,18 +21,20 @@ typedef struct Ppo {
     PpoDef def;
     Policy *policy;
     Pool *pool;
-    PpoBackend backend; /* act NULL: the processor */
-    MildError error;    /* of the backend, which drops its minibatches */
+    PpoBackend backend; /* act NULL: the CPU */
+    MildError error;    /* of the backend */
     PpoMirror mirror;   /* observation_index NULL: none */
     int *mirror_index;  /* [observation + actions] the arrays that `mirror` points to */
     float *mirror_sign; /* [observation + actions] */
     uint64_t seed;
-    PpoBatch batch;
+    PpoBatch batch; /* the rollout */
+    PpoBatch start; /* on the CPU: its rows of time 0, with which a checkpoint's rollout begins */
+    int resident;   /* bool: `batch` is on the device of the backend */
     int64_t iteration;
     int64_t adam_steps;
     double learning_rate;
     Policy *average;   /* NULL: none */
-    void *batch_block; /* memory of the batch's arrays */
+    void *batch_block; /* memory of the arrays of `start`, and of `batch` unless it is resident */
     size_t batch_bytes;
     float *gradient; /* [PPO_SHARDS][stride]; the sum ends in shard 0 */
     size_t stride;   /* [floats] of a shard's gradient */
@@ -46,6 +49,13 @@ typedef struct Ppo {
     int starved;  /* bool: a stratum has no usable sample, so this update takes no step */
     size_t bytes; /* held in all */
 } Ppo;
+
+/* Places the arrays of a rollout of b->steps x b->envs in the block, which is aligned to 64 bytes,
+ * and returns its bytes. NULL: only counts them. */
+size_t ppo_place_batch(PpoBatch *b, const Network *network, void *block);
+/* Moves the rollout to these arrays, which are the backend's. Frees its memory on the CPU but for
+ * the rows of time 0. */
+MildStatus ppo_move_rollout(Ppo *ppo, const PpoBatch *device, MildError *error);
 
 /* First environment or sample of piece i. */
 static inline int ppo_piece_begin(int count, int piece) {

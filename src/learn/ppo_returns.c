@@ -2,41 +2,15 @@
 
 #include <math.h>
 
-static int sample_usable(const PpoBatch *b, int64_t i) {
-    return b->valid[i] && isfinite(b->value[i]) && isfinite(b->reward[i]);
-}
-
-/* Backward over time for one environment:
- *   delta_t = r_t + gamma V(s_t+1) (1 - done) - V(s_t),  A_t = delta_t + gamma lambda (1 - done)
- * A_t+1, where an end by time has r_t += gamma V(s_t), as if the episode went on. An unusable
- * sample cuts like an end. */
-static void environment_returns(const PpoDef *def, PpoBatch *b, int env) {
-    double advantage = 0.0, next_value = b->value[(int64_t)b->steps * b->envs + env];
-    next_value = isfinite(next_value) ? next_value : 0.0;
-    for (int t = b->steps - 1; t >= 0; t--) {
-        int64_t i = (int64_t)t * b->envs + env;
-        if (!sample_usable(b, i)) {
-            b->advantage[i] = b->returns[i] = 0.0f;
-            advantage = 0.0;
-            next_value = isfinite(b->value[i]) ? b->value[i] : 0.0;
-            continue;
-        }
-        double value = b->value[i], live = b->done[i] ? 0.0 : 1.0;
-        double reward = b->reward[i] + (b->done[i] && b->timeout[i] ? def->gamma * value : 0.0);
-        double delta = reward + live * def->gamma * next_value - value;
-        advantage = delta + live * def->gamma * def->lambda * advantage;
-        b->advantage[i] = (float)advantage;
-        b->returns[i] = (float)(advantage + value);
-        next_value = value;
-    }
-}
+#include "learn/ppo_step.h"
+#include "learn/returns.h"
 
 static void returns_piece(void *context, int piece, int thread) {
     (void)thread;
     Ppo *ppo = context;
     const int end = ppo_piece_begin(ppo->batch.envs, piece + 1);
     for (int env = ppo_piece_begin(ppo->batch.envs, piece); env < end; env++) {
-        environment_returns(&ppo->def, &ppo->batch, env);
+        returns_environment(ppo->def.gamma, ppo->def.lambda, &ppo->batch, env);
     }
 }
 
@@ -49,7 +23,7 @@ static void substitute_stratum(void *context, int index, int thread) {
     int next = -1;
     for (int k = 2 * stratum.count - 1; k >= 0; k--) {
         const int i = order_sample(stratum, b->envs, k % stratum.count);
-        next = sample_usable(b, i) ? i : next;
+        next = returns_usable(b, i) ? i : next;
         ppo->substitute[i] = next < 0 ? i : next;
     }
 }
@@ -76,7 +50,7 @@ static void add_stratum(void *context, int index, int thread) {
     double count = 0.0, gaps[NUMBERS] = {0.0}, squares[NUMBERS] = {0.0};
     for (int k = 0; k < stratum.count; k++) {
         const int i = order_sample(stratum, b->envs, k);
-        if (sample_usable(b, i)) {
+        if (returns_usable(b, i)) {
             count += 1.0;
             for (int n = 0; n < NUMBERS; n++) {
                 const double gap = numbers[n][i] - job->about[n];
@@ -119,7 +93,7 @@ static void normalise_piece(void *context, int piece, int thread) {
     const PpoBatch *b = &job->ppo->batch;
     const int samples = b->steps * b->envs, end = ppo_piece_begin(samples, piece + 1);
     for (int i = ppo_piece_begin(samples, piece); i < end; i++) {
-        if (sample_usable(b, i)) {
+        if (returns_usable(b, i)) {
             float *a = &b->advantage[i];
             *a = (float)((*a - job->mean[ADVANTAGE]) / (job->std[ADVANTAGE] + 1e-8));
         }
@@ -137,9 +111,5 @@ void ppo_returns(Ppo *ppo, PpoReport *report) {
         ppo->starved |= stratum.count > 0 && job.count[s] == 0.0;
     }
     pool_run(ppo->pool, PPO_PIECES, normalise_piece, &job);
-    report->value_mean = job.mean[VALUE];
-    report->advantage_std = job.std[ADVANTAGE];
-    /* returns - value is the advantage before it is normalised */
-    report->explained_variance =
-        job.std[RETURNS] > 0.0 ? 1.0 - pow(job.std[ADVANTAGE] / job.std[RETURNS], 2) : 0.0;
+    step_report_returns(report, job.mean[VALUE], job.std[ADVANTAGE], job.std[RETURNS]);
 }

@@ -1,6 +1,6 @@
 /* The update around the gradient: learning rate, anneal, clipping, bounds of the noise, averages,
- * shuffling, the report. A backend with scripted results stands in for the networks, so that every
- * number is known. */
+ * order, the report. Scripted results stand in for the networks (the linker puts the functions below in
+ * place of policy_value and ppo_gradient), so that every number is known. */
 #include "check.h"
 
 #include <math.h>
@@ -10,15 +10,17 @@
 
 #include "learn/ppo.h"
 #include "learn/ppo_gradient.h"
+#include "learn/ppo_step.h"
 
 enum { STEPS = 6, ENVS = 5, SAMPLES = STEPS * ENVS, CALLS = 64 };
 
 typedef struct {
-    Ppo *ppo;
+    const PpoBatch *batch;
     LossSums sums; /* per sample: what every call returns, times the count of samples */
     float gradient;
-    int fail_at, bad_at; /* call that fails, or whose kl is no number; -1: none */
-    float value;
+    int bad_at;       /* call whose kl is no number; -1: none */
+    float value;      /* of every sample */
+    int half_rewards; /* bool: or half of its reward */
     /* what was asked */
     int calls, values;
     int count[CALLS], samples[CALLS][SAMPLES];
@@ -26,34 +28,39 @@ typedef struct {
     LossContext context;
 } Script;
 
-static MildStatus script_values(void *self, MildError *error) {
-    Script *s = self;
-    (void)error;
-    PpoBatch *b = ppo_batch(s->ppo);
-    for (int i = 0; i < (STEPS + 1) * ENVS; i++) {
-        b->value[i] = s->value;
+static Script *script; /* of the run that is open */
+
+void __wrap_policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values);
+void __wrap_ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
+                         LossSums *sums, double *norm);
+
+void __wrap_policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values) {
+    (void)policy;
+    (void)pool;
+    (void)critic;
+    assert_int_equal(rows, (STEPS + 1) * ENVS);
+    for (int i = 0; i < rows; i++) {
+        values[i] = !script->half_rewards ? script->value
+                    : i < SAMPLES         ? 0.5f * script->batch->reward[i]
+                                          : 0.0f;
     }
-    s->values++;
-    return MILD_OK;
+    script->values++;
 }
 
-static MildStatus script_gradient(void *self, const LossContext *context,
-                                  const PpoMinibatch *minibatch, float *gradient, LossSums *sums,
-                                  MildError *error) {
-    Script *s = self;
+void __wrap_ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
+                         LossSums *sums, double *norm) {
+    Script *s = script;
     const int call = s->calls++, count = minibatch->cut[PPO_SHARDS];
     if (call < CALLS) {
         s->count[call] = count;
-        s->key[call] = ppo_latent_key(s->ppo, minibatch->draw);
+        s->key[call] = step_latent_key(ppo->seed, ppo->iteration, minibatch->draw);
         memcpy(s->samples[call], minibatch->samples, (size_t)count * sizeof *minibatch->samples);
     }
     s->context = *context;
-    if (call == s->fail_at) {
-        return mild_fail(error, MILD_ERROR_IO, "the device is gone");
-    }
     for (int64_t i = 0; i < context->network->count; i++) {
-        gradient[i] = s->gradient;
+        ppo->gradient[i] = s->gradient;
     }
+    *norm = sqrt((double)context->network->count) * fabs((double)s->gradient);
     const double n = count;
     *sums = (LossSums){n * s->sums.surrogate,
                        call == s->bad_at ? NAN : n * s->sums.kl,
@@ -63,7 +70,6 @@ static MildStatus script_gradient(void *self, const LossContext *context,
                        {n * s->sums.estimate[0], n * s->sums.estimate[1], n * s->sums.estimate[2]},
                        n * s->sums.mirror,
                        n * s->sums.value};
-    return MILD_OK;
 }
 
 typedef struct {
@@ -93,9 +99,8 @@ static void run_open(Run *run, PpoDef def, const PpoMirror *mirror) {
     run->pool = pool_create(1);
     run->ppo = ppo_create(&def, run->policy, run->pool, mirror, ENVS, 17, &error);
     assert_non_null(run->ppo);
-    run->script = (Script){.ppo = run->ppo, .gradient = 1e-4f, .fail_at = -1, .bad_at = -1};
-    PpoBackend backend = {&run->script, NULL, script_values, script_gradient, NULL};
-    ppo_use(run->ppo, &backend);
+    run->script = (Script){.batch = ppo_batch(run->ppo), .gradient = 1e-4f, .bad_at = -1};
+    script = &run->script;
 }
 
 static void run_close(Run *run) {
@@ -131,7 +136,7 @@ static double rate_after(double kl, double rate, PpoDef def, int64_t iteration) 
 }
 
 /* Above twice the target the rate is divided by 1.5, below half of it multiplied, between them it
- * stays; a divergence of zero says nothing. */
+ * stays; a divergence that is rounding says nothing. */
 static void rate_follows_the_divergence(void **state) {
     (void)state;
     const PpoDef def = plain_def();
@@ -141,6 +146,8 @@ static void rate_follows_the_divergence(void **state) {
     assert_close("just above half", rate_after(0.0051, 9e-4, def, 0), 9e-4, 1e-12);
     assert_close("just below half", rate_after(0.0049, 9e-4, def, 0), 1.35e-3, 1e-12);
     assert_close("zero", rate_after(0.0, 9e-4, def, 0), 9e-4, 1e-12);
+    assert_close("rounding", rate_after(0.9e-8, 9e-4, def, 0), 9e-4, 1e-12);
+    assert_close("just above it", rate_after(1.1e-8, 9e-4, def, 0), 1.35e-3, 1e-12);
     assert_close("negative by rounding", rate_after(-1e-9, 9e-4, def, 0), 9e-4, 1e-12);
     assert_close("upper bound", rate_after(1e-4, 1.5e-3, def, 0), 2e-3, 1e-12);
     assert_close("lower bound", rate_after(1.0, 1.2e-5, def, 0), 1e-5, 1e-12);
@@ -251,19 +258,27 @@ static void bad_sums_cost_their_minibatch(void **state) {
     }
 }
 
+/* The device is lost in the second update: the error stays, and the policy with it. */
+static MildStatus update_once(void *self, PpoReport *report, MildError *error) {
+    int *calls = self;
+    report->skipped = 3;
+    return (*calls)++ > 0 ? mild_fail(error, MILD_ERROR_IO, "the device is gone") : MILD_OK;
+}
+
 static void a_backend_that_fails_is_reported(void **state) {
     (void)state;
     Run run;
     MildError error = {0};
-    PpoDef def = plain_def();
-    def.minibatches = 3;
-    run_open(&run, def, NULL);
+    int calls = 0;
+    run_open(&run, plain_def(), NULL);
+    ppo_use(run.ppo, &(PpoBackend){.self = &calls, .update = update_once});
+    assert_int_equal(update(&run).skipped, 3);
     assert_int_equal(ppo_status(run.ppo, &error), MILD_OK);
-    run.script.fail_at = 1;
-    PpoReport report = update(&run);
-    assert_int_equal(report.skipped, 1);
+    update(&run);
     assert_int_equal(ppo_status(run.ppo, &error), MILD_ERROR_IO);
     assert_string_equal(error.text, "the device is gone");
+    assert_int_equal(calls, 2);
+    assert_int_equal(run.script.calls, 0);
     run_close(&run);
 }
 
@@ -362,23 +377,13 @@ static void values_and_explained_variance(void **state) {
 }
 
 /* With values that carry half of the return the other half remains: 1 - (1/2)^2. */
-static MildStatus half_values(void *self, MildError *error) {
-    Script *s = self;
-    (void)error;
-    PpoBatch *b = ppo_batch(s->ppo);
-    for (int i = 0; i < (STEPS + 1) * ENVS; i++) {
-        b->value[i] = i < SAMPLES ? 0.5f * b->reward[i] : 0.0f;
-    }
-    return MILD_OK;
-}
-
 static void explained_variance_of_half(void **state) {
     (void)state;
     Run run;
     PpoDef def = plain_def();
     def.gamma = 0.0;
     run_open(&run, def, NULL);
-    run.ppo->backend.values = half_values;
+    run.script.half_rewards = 1;
     PpoBatch *b = ppo_batch(run.ppo);
     for (int i = 0; i < SAMPLES; i++) {
         b->reward[i] = (float)(i * i % 7);
