@@ -27,6 +27,8 @@ static const struct {
      "newton compared with the paper's gauss_seidel sweeps, at the same error"},
     {"walk", bench_walk, "the same as step, along a walk of the shipped policy"},
     {"batch", bench_batch, "the contact solver in batches, on train.device, along that walk"},
+    {"update", bench_update,
+     "the learner alone: actions of a rollout and update, on train.device, from random numbers"},
     {"train", bench_train, "policy steps per second in training, and how the time is spent"},
 };
 enum { BENCHES = sizeof benches / sizeof *benches };

@@ -18,6 +18,8 @@ MildStatus bench_solver(const ExperimentDef *def, BenchReport *report, MildError
 MildStatus bench_walk(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The ground in batches on train.device: steps per second along a walk, and how near in float. */
 MildStatus bench_batch(const ExperimentDef *def, BenchReport *report, MildError *error);
+/* The learner alone on train.device, from a rollout of random numbers. */
+MildStatus bench_update(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Training as a whole, and how its time is spent. */
 MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Bytes held by a training run of train.envs robots. */

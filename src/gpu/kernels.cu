@@ -26,8 +26,9 @@ static __device__ int row_of(const int *index, int64_t r) {
 
 /* ---- rows ---- */
 
-static __global__ void gather(uint32_t count, int width, uint32_t pitch, const int *index,
-                              const float *from, float *to) {
+static __global__ void gather(uint32_t count, int width, uint32_t pitch,
+                              const int *__restrict__ index, const float *__restrict__ from,
+                              float *__restrict__ to) {
     const uint32_t i = (uint32_t)item();
     if (i < count) {
         const int column = (int)(i % pitch);
@@ -83,8 +84,8 @@ static __device__ float activate(int elu, float x) {
 }
 
 /* A thread has four columns of a row. width: in fours. */
-static __global__ void add_bias(uint32_t count, uint32_t width, int elu, const float4 *bias,
-                                float4 *y) {
+static __global__ void add_bias(uint32_t count, uint32_t width, int elu,
+                                const float4 *__restrict__ bias, float4 *__restrict__ y) {
     const uint32_t i = (uint32_t)item();
     if (i >= count) {
         return;
@@ -105,8 +106,8 @@ void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float
 }
 
 /* Block (column group, slice of rows): LANES partial sums a column, added in order. */
-static __global__ void bias_backward(int rows, int width, const float *y, float *d,
-                                     float *partial) {
+static __global__ void bias_backward(int rows, int width, const float *__restrict__ y,
+                                     float *__restrict__ d, float *__restrict__ partial) {
     __shared__ float part[LANES][COLUMNS];
     const int column = (int)(blockIdx.x * COLUMNS + threadIdx.x), slice = (int)blockIdx.y;
     const int slices = (int)gridDim.y, end = (int)((int64_t)rows * (slice + 1) / slices);

@@ -609,6 +609,11 @@ void *gpu_learner_stream(const Ppo *ppo) {
     return g ? g->queue.stream : NULL;
 }
 
+size_t gpu_learner_bytes(const Ppo *ppo) {
+    const GpuLearner *g = learner_of(ppo);
+    return g ? g->bytes : 0;
+}
+
 static MildStatus copy_rollout(const Ppo *ppo, void *to, const void *from, enum cudaMemcpyKind kind,
                                MildError *error) {
     GpuLearner *g = learner_of(ppo);

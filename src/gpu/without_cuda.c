@@ -16,6 +16,11 @@ void *gpu_learner_stream(const Ppo *ppo) {
     return NULL;
 }
 
+size_t gpu_learner_bytes(const Ppo *ppo) {
+    (void)ppo;
+    return 0;
+}
+
 MildStatus gpu_learner_write(Ppo *ppo, const void *block, MildError *error) {
     (void)ppo;
     (void)block;
