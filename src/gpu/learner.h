@@ -17,12 +17,12 @@ typedef struct {
 } GpuLearnerDef;
 
 /* From now on `ppo` computes on the device, until ppo_destroy. Fails without a device, and in a
- * build without CUDA; then only ppo_destroy may follow. Without memory it says how much is needed and
- * how many robots would fit. */
+ * build without CUDA; then only ppo_destroy may follow. Without memory it says how much is needed
+ * and how many robots would fit. */
 MildStatus gpu_learner_attach(Ppo *ppo, const GpuLearnerDef *def, MildError *error);
 /* The cudaStream_t on which act and update are enqueued; NULL without a device. With a resident
- * rollout ppo_act only launches kernels, whose arguments depend on t alone. So it may be captured in
- * a CUDA graph on this stream, which stays right as the iterations go on. */
+ * rollout ppo_act only launches kernels, whose arguments depend on t alone. So it may be captured
+ * in a CUDA graph on this stream, which stays right as the iterations go on. */
 void *gpu_learner_stream(const Ppo *ppo);
 size_t gpu_learner_bytes(const Ppo *ppo); /* memory held on the device; 0 without one */
 /* Copies the device's whole rollout from a block on the CPU, or to it, whose arrays are those of

@@ -1,7 +1,7 @@
-/* A compute backend is the learner on a device other than the CPU: networks, optimiser and counters.
- * It computes the same functions as ppo.c, from the same random numbers and equal up to rounding, so
- * a resumed run may change its device. The rollout is in the arrays of the batch, which may be on
- * the device too (ppo_is_resident). */
+/* A compute backend is the learner on a device other than the CPU: networks, optimiser and
+ * counters. It computes the same functions as ppo.c, from the same random numbers and equal up to
+ * rounding, so a resumed run may change its device. The rollout is in the arrays of the batch,
+ * which may be on the device too (ppo_is_resident). */
 #ifndef MILD_BACKEND_H
 #define MILD_BACKEND_H
 

@@ -17,8 +17,8 @@ void ppo_destroy(Ppo *ppo);
  * ppo_destroy destroys. */
 struct PpoBackend;
 void ppo_use(Ppo *ppo, const struct PpoBackend *backend);
-/* The rollout. Its arrays are on the backend's device if ppo_is_resident, else on the CPU. The rows
- * of time 0 of the first rollout are the caller's to write, and those of time t + 1 after act(t). */
+/* The rollout. Its arrays are on the backend's device if ppo_is_resident, else on the CPU. The
+ * caller writes the rows of time 0 of the first rollout, and those of time t + 1 after act(t). */
 PpoBatch *ppo_batch(Ppo *ppo);
 int ppo_is_resident(const Ppo *ppo);
 /* Places arrays of the rollout's shape in a block that is aligned to 64 bytes, and returns their
@@ -33,8 +33,8 @@ void ppo_act(Ppo *ppo, int t);
  * policy on the CPU stay as they were: see ppo_pull. */
 void ppo_update(Ppo *ppo, PpoReport *report);
 int64_t ppo_iteration(const Ppo *ppo);
-/* Brings policy, running mean and the rows of time 0 on the CPU up to date with the device. ppo_save
- * and ppo_average do it themselves. Nothing to do without a backend. */
+/* Brings policy, running mean and the rows of time 0 on the CPU up to date with the device.
+ * ppo_save and ppo_average do it themselves. Nothing to do without a backend. */
 MildStatus ppo_pull(Ppo *ppo, MildError *error);
 /* The running mean of the weights (Polyak and Juditsky 1992), or the policy itself with def.average
  * = 0. Owned by ppo. */

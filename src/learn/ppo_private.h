@@ -10,8 +10,8 @@
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
 
-/* A minibatch consists of PPO_SHARDS runs of samples, each with its own gradient, and a shard is cut
- * into chunks. Sums are taken in the order of the shards. So no result depends on the number of
+/* A minibatch consists of PPO_SHARDS runs of samples, each with its own gradient, and a shard is
+ * cut into chunks. Sums are taken in the order of the shards. So no result depends on the number of
  * threads. */
 #define PPO_CHUNK 256
 #define PPO_RANGES 64 /* pieces of the parameter arrays in reduction and optimiser */

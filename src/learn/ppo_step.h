@@ -67,8 +67,8 @@ static inline MILD_HD double step_anneal(const PpoDef *def, int64_t iteration) {
 }
 
 /* The rate that keeps the divergence from the rollout's policy near its target [vendor:
- * factor 1.5]. Below a millionth of the target the divergence is rounding: the first minibatch of an
- * update has none. */
+ * factor 1.5]. Below a millionth of the target the divergence is rounding: the first minibatch of
+ * an update has none. */
 static inline MILD_HD double step_learning_rate(const PpoDef *def, int64_t iteration, double rate,
                                                 double kl) {
     if (!(def->kl_target > 0.0)) {

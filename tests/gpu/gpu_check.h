@@ -10,6 +10,7 @@
 
 #include "gpu/learner_private.h"
 #include "learn/ppo_gradient.h"
+#include "learn/ppo_returns.h"
 
 enum { ON_CPU, MIXED, RESIDENT };
 

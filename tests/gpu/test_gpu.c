@@ -274,6 +274,64 @@ static void compare_reports(const PpoReport *a, const PpoReport *b, double bound
     assert_close("explained variance", a->explained_variance, b->explained_variance, 1e-5);
 }
 
+/* Advantages, moments and substitutes of a large rollout, of which any share may be valid. */
+static void compare_returns(double valid) {
+    enum { ENVS = 701 };
+    PpoDef def = ppo_def_default();
+    PolicyDef policy = small_def();
+    Learner cpu, gpu;
+    learner_open(&cpu, ON_CPU, &policy, &def, ENVS, 0);
+    learner_open(&gpu, RESIDENT, &policy, &def, ENVS, 100);
+    learner_fill_rollout(&cpu, 5);
+    learner_fill_rollout(&gpu, 5);
+    PpoBatch *a = &cpu.batch, *b = &gpu.batch;
+    const int samples = def.steps * ENVS;
+    Random random = random_at(6, 6, 6);
+    fill_normal(a->value, samples + ENVS, 1.0, &random);
+    for (int i = 0; i < samples; i++) {
+        a->valid[i] = random_unit(&random) < valid;
+        a->reward[i] = a->valid[i] && i % 97 == 0 ? NAN : a->reward[i];
+    }
+    memcpy(b->value, a->value, (size_t)(samples + ENVS) * sizeof(float));
+    memcpy(b->reward, a->reward, (size_t)samples * sizeof(float));
+    memcpy(b->valid, a->valid, (size_t)samples);
+    learner_write(&gpu);
+    PpoReport report = {0};
+    ppo_returns(cpu.ppo, &report);
+    GpuLearner *g = gpu.gpu;
+    const cudaStream_t stream = g->queue.stream;
+    gpu_begin_update(stream, def, policy.actions, g->parameters + g->network.log_std, g->progress);
+    gpu_returns(stream, def, g->batch, g->substitute, g->partial, g->progress);
+    GpuProgress progress;
+    int *substitute = malloc((size_t)samples * sizeof *substitute);
+    assert_non_null(substitute);
+    cudaMemcpyAsync(&progress, g->progress, sizeof progress, cudaMemcpyDeviceToHost, stream);
+    cudaMemcpyAsync(substitute, g->substitute, (size_t)samples * sizeof *substitute,
+                    cudaMemcpyDeviceToHost, stream);
+    learner_read(&gpu);
+    assert_memory_equal(substitute, cpu.ppo->substitute, (size_t)samples * sizeof *substitute);
+    assert_int_equal(progress.starved, cpu.ppo->starved);
+    assert_int_equal(progress.starved, valid == 0.0);
+    for (int i = 0; i < samples; i++) {
+        assert_true(fabs((double)(b->returns[i] - a->returns[i])) < 1e-5);
+        assert_true(fabs((double)(b->advantage[i] - a->advantage[i])) < 1e-5);
+    }
+    assert_close("mean value", progress.report.value_mean, report.value_mean, 1e-12);
+    assert_close("deviation", progress.report.advantage_std, report.advantage_std, 1e-9);
+    assert_close("explained", progress.report.explained_variance, report.explained_variance, 1e-9);
+    free(substitute);
+    learner_close(&cpu);
+    learner_close(&gpu);
+}
+
+static void returns_are_those_of_the_cpu(void **state) {
+    (void)state;
+    static const double shares[] = {1.0, 0.9, 0.3, 0.01, 0.0};
+    for (size_t i = 0; i < sizeof shares / sizeof *shares; i++) {
+        compare_returns(shares[i]);
+    }
+}
+
 /* What may be wrong with a rollout. */
 enum { NOTHING, INVALID, NOT_FINITE, STARVED, FAULTS };
 
@@ -642,6 +700,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(padding_is_zero_and_reversible),
         cmocka_unit_test(gradients_are_those_of_the_cpu),
+        cmocka_unit_test(returns_are_those_of_the_cpu),
         cmocka_unit_test(updates_are_those_of_the_cpu),
         cmocka_unit_test(runs_repeat),
         cmocka_unit_test(learns_and_changes_device),

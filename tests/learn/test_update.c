@@ -1,6 +1,6 @@
 /* The update around the gradient: learning rate, anneal, clipping, bounds of the noise, averages,
- * order, the report. Scripted results stand in for the networks (the linker puts the functions below in
- * place of policy_value and ppo_gradient), so that every number is known. */
+ * order, the report. Scripted results stand in for the networks (the linker puts the functions
+ * below in place of policy_value and ppo_gradient), so that every number is known. */
 #include "check.h"
 
 #include <math.h>
@@ -398,8 +398,8 @@ static void explained_variance_of_half(void **state) {
 
 /* ---- order of the samples ---- */
 
-/* Each of 30 samples once an epoch, and the two that are not valid replaced by the next step of their
- * environment, which is a stratum of its own here. */
+/* Each of 30 samples once an epoch, and the two that are not valid replaced by the next step of
+ * their environment, which is a stratum of its own here. */
 static void every_sample_once_an_epoch(void **state) {
     (void)state;
     Run run;
