@@ -46,7 +46,7 @@ static void set_sizes(GpuLearner *g, int envs) {
     const int steps = ppo->batch.steps;
     /* the elementwise passes count the numbers of a chunk with 32 bits */
     const int64_t most = (int64_t)INT32_MAX / (2 * widest_layer(&g->network)),
-                  wanted = g->def.rows > 0 ? g->def.rows : ROWS_MAX;
+                  wanted = g->wanted_rows > 0 ? g->wanted_rows : ROWS_MAX;
     g->envs = envs;
     g->minibatch = order_largest(steps, envs, ppo->def.minibatches);
     int rows = g->minibatch > envs ? g->minibatch : envs;
@@ -136,7 +136,7 @@ static int robots_that_fit(const GpuLearner *g, size_t bytes) {
 static int enter(const GpuLearner *g) {
     int before = 0;
     cudaGetDevice(&before);
-    cudaSetDevice(g->def.device);
+    cudaSetDevice(g->device);
     return before;
 }
 
@@ -279,7 +279,7 @@ static MildStatus act_from_host(GpuLearner *g, int t, MildError *error) {
     const PpoBatch *host = &g->ppo->batch, *b = &g->batch;
     const size_t envs = (size_t)g->envs, row = (size_t)t * envs,
                  actions = (size_t)g->network.def.actions,
-                 history = (size_t)(g->network.def.frames * g->network.def.observation);
+                 history = (size_t)g->ppo->policy->network.history;
     upload(g, b->history + row * history, host->history + row * history,
            envs * history * sizeof(float));
     gpu_enqueue_act(g, t);
@@ -295,7 +295,7 @@ static MildStatus learner_act(void *self, int t, MildError *error) {
     GpuLearner *g = self;
     MildStatus status = MILD_OK;
     const int before = enter(g);
-    if (g->def.resident) {
+    if (g->ppo->resident) {
         gpu_enqueue_act(g, t);
     } else {
         status = act_from_host(g, t, error);
@@ -321,7 +321,7 @@ static GpuOptimiser optimiser(const GpuLearner *g) {
 /* first: as in gpu_enqueue_gradient. */
 static void enqueue_minibatch(GpuLearner *g, GpuOrder order, int first) {
     const PpoDef *def = &g->ppo->def;
-    const cudaStream_t stream = g->queue.stream;
+    cudaStream_t stream = g->queue.stream;
     const int actions = g->network.def.actions;
     gpu_order(stream, order, g->substitute, g->progress, g->order);
     gpu_begin_minibatch(stream, (uint32_t)(order.epoch * def->minibatches + order.m), actions,
@@ -355,7 +355,7 @@ static void enqueue_epoch(GpuLearner *g, int epoch) {
 static void enqueue_update(GpuLearner *g) {
     const PpoDef *def = &g->ppo->def;
     const Network *n = &g->network;
-    const cudaStream_t stream = g->queue.stream;
+    cudaStream_t stream = g->queue.stream;
     if (def->decoder_target == PPO_TARGET_NEXT) {
         gpu_shift_frames(stream, g->batch, n->def.observation);
     }
@@ -501,7 +501,7 @@ static MildStatus open_device(GpuLearner *g, MildError *error) {
     static const cublasComputeType_t arithmetic[PPO_MATMULS] = {
         CUBLAS_COMPUTE_32F, CUBLAS_COMPUTE_32F_FAST_TF32, CUBLAS_COMPUTE_32F_FAST_16BF};
     char device[512];
-    if (!describe(g->def.device, device, sizeof device)) {
+    if (!describe(g->device, device, sizeof device)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "%s; train.device = cpu needs none", device);
     }
     GpuQueue *q = &g->queue;
@@ -547,7 +547,7 @@ static void pin_rollout(GpuLearner *g) {
     }
 }
 
-static MildStatus open_learner(GpuLearner *g, MildError *error) {
+static MildStatus open_learner(GpuLearner *g, int resident, MildError *error) {
     Ppo *ppo = g->ppo;
     const PolicyDef *def = policy_def(ppo->policy);
     const size_t samples = (size_t)ppo->batch.steps * (size_t)ppo->batch.envs;
@@ -570,7 +570,7 @@ static MildStatus open_learner(GpuLearner *g, MildError *error) {
         upload(g, g->mirror_index, ppo->mirror_index, count * sizeof(int));
         upload(g, g->mirror_sign, ppo->mirror_sign, count * sizeof(float));
     }
-    if (g->def.resident) {
+    if (resident) {
         status = ppo_move_rollout(ppo, &g->batch, error);
     } else {
         pin_rollout(g);
@@ -585,9 +585,10 @@ MildStatus gpu_learner_attach(Ppo *ppo, const GpuLearnerDef *def, MildError *err
         return mild_fail(error, MILD_ERROR_MEMORY, "no memory for a learner on the GPU");
     }
     g->ppo = ppo;
-    g->def = *def;
+    g->device = def->device;
+    g->wanted_rows = def->rows;
     const int before = enter(g);
-    const MildStatus status = open_learner(g, error);
+    const MildStatus status = open_learner(g, def->resident, error);
     leave(before);
     if (status) {
         learner_destroy(g);

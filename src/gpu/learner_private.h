@@ -2,7 +2,6 @@
 #ifndef MILD_GPU_LEARNER_PRIVATE_H
 #define MILD_GPU_LEARNER_PRIVATE_H
 
-#include "gpu/learner.h"
 #include "gpu/mlp.h"
 #include "gpu/network.h"
 #include "gpu/update.h"
@@ -35,7 +34,8 @@ typedef struct {
 
 typedef struct {
     Ppo *ppo;
-    GpuLearnerDef def;
+    int device;      /* its number */
+    int wanted_rows; /* GpuLearnerDef.rows */
     GpuQueue queue;
     Network network; /* padded */
     GpuWidths widths;
@@ -73,8 +73,8 @@ typedef struct {
 
 /* Places a chunk of at most `rows` samples and `mirrored` images in the block and returns its
  * floats. NULL: only counts them. */
-size_t gpu_chunk_carve(const Network *padded, const GpuWidths *widths, int rows, int mirrored,
-                       float *block, GpuChunk *chunk);
+size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int rows, int mirrored, float *block,
+                       GpuChunk *c);
 
 /* All of the following only enqueue. */
 

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "gpu/learner.h"
 #include "gpu/learner_private.h"
 #include "learn/ppo_gradient.h"
 #include "learn/ppo_returns.h"

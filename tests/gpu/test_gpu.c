@@ -526,6 +526,16 @@ static void assert_same_state(const Learner *a, const Learner *b) {
     assert_true(a->ppo->seed == b->ppo->seed);
 }
 
+static uint64_t device_seed(const Learner *l) {
+    uint64_t seed = l->ppo->seed;
+    if (l->gpu) {
+        cudaMemcpyAsync(&seed, &l->gpu->progress->seed, sizeof seed, cudaMemcpyDeviceToHost,
+                        l->gpu->queue.stream);
+        assert_int_equal(cudaStreamSynchronize(l->gpu->queue.stream), cudaSuccess);
+    }
+    return seed;
+}
+
 /* A checkpoint of one device goes on with the other as it was, and learning works on both. */
 static void learns_and_changes_device(void **state) {
     (void)state;
@@ -546,7 +556,10 @@ static void learns_and_changes_device(void **state) {
         if (part == 0) {
             learner_start_toy(&l[0], &toy);
         } else {
+            l[part].ppo->seed = 12; /* the checkpoint's takes its place, on the device too */
+            learner_push(&l[part]);
             assert_int_equal(ppo_load(l[part].ppo, path, &toy, sizeof toy, &error), MILD_OK);
+            assert_true(device_seed(&l[part]) == 11);
             learner_read(&l[part]);
             learner_pull(&l[part]); /* what the device holds */
             assert_same_state(&l[part - 1], &l[part]);
