@@ -4,7 +4,7 @@ if(NOT MILD_CUDA)
   return()
 endif()
 # -fmad=false: the random numbers equal the processor's bit for bit; these kernels wait for memory, not for arithmetic
-add_library(gpu_kernels STATIC ${CMAKE_SOURCE_DIR}/src/gpu/kernels.cu)
+add_library(gpu_kernels STATIC ${CMAKE_SOURCE_DIR}/src/gpu/kernels.cu ${CMAKE_SOURCE_DIR}/src/gpu/update.cu)
 target_include_directories(gpu_kernels PRIVATE ${CMAKE_BINARY_DIR}/layers/gpu)
 target_link_libraries(gpu_kernels PRIVATE layer_learn)
 target_compile_options(gpu_kernels PRIVATE -fmad=false)

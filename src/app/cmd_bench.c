@@ -28,6 +28,8 @@ static const struct {
     {"walk", bench_walk, "the same as step, along a walk of the shipped policy"},
     {"batch", bench_batch, "the contact solver in batches, on train.device, along that walk"},
     {"robots", bench_robots, "the environments alone on train.device, in the batch engine"},
+    {"update", bench_update,
+     "the learner alone: actions of a rollout and update, on train.device, from random numbers"},
     {"train", bench_train, "policy steps per second in training, and how the time is spent"},
 };
 enum { BENCHES = sizeof benches / sizeof *benches };

@@ -24,7 +24,8 @@ static inline MILD_BOTH uint64_t random_mix(uint64_t x) {
 }
 
 static inline MILD_BOTH Random random_at(uint64_t seed, uint32_t stream, uint32_t step) {
-    return (Random){seed, stream, step, 0};
+    const Random random = {seed, stream, step, 0};
+    return random;
 }
 
 /* 64 random bits. The key is derived from (seed, stream); the counter is (step, use). */
@@ -43,21 +44,21 @@ static inline MILD_BOTH uint64_t random_bits(Random *r) {
 }
 
 /* Uniform in [0, 1). */
-static inline MILD_BOTH double random_unit(Random *r) {
+static inline double random_unit(Random *r) {
     return (double)(random_bits(r) >> 11) * 0x1.0p-53;
 }
 
-static inline MILD_BOTH double random_uniform(Random *r, double low, double high) {
+static inline double random_uniform(Random *r, double low, double high) {
     return low + (high - low) * random_unit(r);
 }
 
 /* Integer in [0, count). */
-static inline MILD_BOTH uint32_t random_index(Random *r, uint32_t count) {
+static inline uint32_t random_index(Random *r, uint32_t count) {
     return (uint32_t)(((random_bits(r) >> 32) * (uint64_t)count) >> 32);
 }
 
 /* Standard normal (Box-Muller, one of the pair). */
-static inline MILD_BOTH double random_normal(Random *r) {
+static inline double random_normal(Random *r) {
     double u = 1.0 - random_unit(r), v = random_unit(r);
     return sqrt(-2.0 * log(u)) * cos(6.283185307179586 * v);
 }

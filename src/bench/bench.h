@@ -21,6 +21,8 @@ MildStatus bench_batch(const ExperimentDef *def, BenchReport *report, MildError 
 /* The environments alone on train.device: batch engine, ground and task under no action but the
  * assistance. */
 MildStatus bench_robots(const ExperimentDef *def, BenchReport *report, MildError *error);
+/* The learner alone on train.device, from a rollout of random numbers. */
+MildStatus bench_update(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Training as a whole, and how its time is spent. */
 MildStatus bench_train(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Bytes held by a training run of train.envs robots. */

@@ -1,123 +1,120 @@
 #include "gpu/kernels.h"
 
+#include "gpu/launch.h"
 #include "learn/loss_sample.h"
 #include "learn/noise.h"
 
-#define THREADS 256
 #define COLUMNS 32 /* of a block in the column sums */
 #define LANES (THREADS / COLUMNS)
-
-#ifndef LAUNCH /* the tests run the kernels on the processor */
-#define LAUNCH(kernel, grid, block, stream, ...) kernel<<<grid, block, 0, stream>>>(__VA_ARGS__)
-#endif
-
-static const dim3 line = {THREADS, 1, 1}; /* of threads: the block of every kernel but one */
-
-static dim3 blocks_of(int64_t items) {
-    return {items > 0 ? (unsigned)((items + THREADS - 1) / THREADS) : 1u, 1, 1};
-}
+#define SLICE_ROWS (8 * LANES) /* of a slice, at least */
 
 int gpu_blocks(int rows) {
     return (int)blocks_of(rows).x;
 }
 
-static __device__ int64_t item() {
-    return (int64_t)blockIdx.x * THREADS + threadIdx.x;
-}
-
 /* Adds the block's sum of x to *to; every thread of the block calls. */
 static __device__ void add_block_sum(double x, double *to) {
-    __shared__ double part[THREADS];
-    part[threadIdx.x] = x;
-    for (unsigned half = THREADS / 2; half > 0; half /= 2) {
-        __syncthreads();
-        if (threadIdx.x < half) {
-            part[threadIdx.x] += part[threadIdx.x + half];
-        }
-    }
+    const double sum = block_sum(x);
     if (threadIdx.x == 0) {
-        *to += part[0];
+        *to += sum;
     }
-    __syncthreads();
+}
+
+static __device__ int row_of(const int *index, int64_t r) {
+    return index ? index[r] : (int)r;
 }
 
 /* ---- rows ---- */
 
-static __global__ void gather(int64_t count, int width, const int *index, const float *from,
-                              float *to) {
-    int64_t i = item();
+static __global__ void gather(uint32_t count, int width, uint32_t pitch,
+                              const int *__restrict__ index, const float *__restrict__ from,
+                              float *__restrict__ to) {
+    const uint32_t i = (uint32_t)item();
     if (i < count) {
-        to[i] = from[(int64_t)index[i / width] * width + i % width];
+        const int column = (int)(i % pitch);
+        to[i] = column < width ? from[(int64_t)row_of(index, i / pitch) * width + column] : 0.0f;
     }
 }
 
-void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, const float *from,
-                float *to) {
-    int64_t count = (int64_t)rows * width;
-    LAUNCH(gather, blocks_of(count), line, stream, count, width, index, from, to);
+void gpu_gather(cudaStream_t stream, int rows, int width, int pitch, const int *index,
+                const float *from, float *to) {
+    const int64_t count = (int64_t)rows * pitch;
+    LAUNCH(gather, blocks_of(count), line, stream, (uint32_t)count, width, (uint32_t)pitch, index,
+           from, to);
 }
 
 static __global__ void mirror_history(GpuImages m, const float *history, float *to) {
-    int64_t i = item();
+    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)m.pitch;
     const int width = m.frames * m.observation;
-    if (i >= (int64_t)m.images * width) {
+    if (i >= (uint32_t)m.images * pitch) {
         return;
     }
-    int image = (int)(i / width), column = (int)(i % width), k = column % m.observation;
-    const float *row = history + (int64_t)(m.which[image] - m.first) * width;
-    to[i] = m.sign[k] * row[column - k + m.index[k]];
+    const int column = (int)(i % pitch), k = column % m.observation;
+    const int sample = m.order[m.which[i / pitch] - m.first];
+    const float *row = history + (int64_t)sample * width;
+    to[i] = column < width ? m.sign[k] * row[column - k + m.index[k]] : 0.0f;
 }
 
 void gpu_mirror_history(cudaStream_t stream, GpuImages m, const float *history, float *to) {
-    LAUNCH(mirror_history, blocks_of((int64_t)m.images * m.frames * m.observation), line, stream, m,
-           history, to);
+    LAUNCH(mirror_history, blocks_of((int64_t)m.images * m.pitch), line, stream, m, history, to);
 }
 
-static __global__ void latent_noise(int64_t count, int latent, uint32_t key0, uint32_t key1,
-                                    const int *row, float *noise) {
-    int64_t i = item();
+static __global__ void latent_noise(int64_t count, int latent, const uint64_t *key, const int *row,
+                                    float *noise) {
+    const int64_t i = item();
     if (i >= count) {
         return;
     }
-    int64_t number = (int64_t)row[i / latent] * latent + i % latent;
+    const int64_t number = (int64_t)row[i / latent] * latent + i % latent;
     float even, odd;
-    noise_pair(key0, key1, (uint32_t)(number / 2), &even, &odd);
+    noise_pair((uint32_t)*key, (uint32_t)(*key >> 32), (uint32_t)(number / 2), &even, &odd);
     noise[i] = number % 2 ? odd : even;
 }
 
-void gpu_latent_noise(cudaStream_t stream, int rows, int latent, uint64_t key, const int *row,
-                      float *noise) {
-    int64_t count = (int64_t)rows * latent;
-    LAUNCH(latent_noise, blocks_of(count), line, stream, count, latent, (uint32_t)key,
-           (uint32_t)(key >> 32), row, noise);
+void gpu_latent_noise(cudaStream_t stream, int rows, int latent, const uint64_t *key,
+                      const int *row, float *noise) {
+    const int64_t count = (int64_t)rows * latent;
+    LAUNCH(latent_noise, blocks_of(count), line, stream, count, latent, key, row, noise);
 }
 
 /* ---- layers ---- */
 
-static __global__ void add_bias(int64_t count, int width, int elu, const float *bias, float *y) {
-    int64_t i = item();
+static __device__ float activate(int elu, float x) {
+    return elu ? vector_elu(x) : x;
+}
+
+/* A thread has four columns of a row. width: in fours. */
+static __global__ void add_bias(uint32_t count, uint32_t width, int elu,
+                                const float4 *__restrict__ bias, float4 *__restrict__ y) {
+    const uint32_t i = (uint32_t)item();
     if (i >= count) {
         return;
     }
-    float x = y[i] + bias[i % width];
-    y[i] = elu ? vector_elu(x) : x;
+    const float4 b = bias[i % width];
+    float4 x = y[i];
+    x.x = activate(elu, x.x + b.x);
+    x.y = activate(elu, x.y + b.y);
+    x.z = activate(elu, x.z + b.z);
+    x.w = activate(elu, x.w + b.w);
+    y[i] = x;
 }
 
 void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float *bias, float *y) {
-    int64_t count = (int64_t)rows * width;
-    LAUNCH(add_bias, blocks_of(count), line, stream, count, width, elu, bias, y);
+    const int64_t count = (int64_t)rows * (width / 4);
+    LAUNCH(add_bias, blocks_of(count), line, stream, (uint32_t)count, (uint32_t)(width / 4), elu,
+           (const float4 *)bias, (float4 *)y);
 }
 
 /* Block (column group, slice of rows): LANES partial sums a column, added in order. */
-static __global__ void bias_backward(int rows, int width, const float *y, float *d,
-                                     float *partial) {
+static __global__ void bias_backward(int rows, int width, const float *__restrict__ y,
+                                     float *__restrict__ d, float *__restrict__ partial) {
     __shared__ float part[LANES][COLUMNS];
     const int column = (int)(blockIdx.x * COLUMNS + threadIdx.x), slice = (int)blockIdx.y;
-    const int end = (int)((int64_t)rows * (slice + 1) / GPU_SUM_SLICES);
+    const int slices = (int)gridDim.y, end = (int)((int64_t)rows * (slice + 1) / slices);
     float sum = 0.0f;
-    for (int r = (int)((int64_t)rows * slice / GPU_SUM_SLICES) + (int)threadIdx.y;
+    for (int r = (int)((int64_t)rows * slice / slices) + (int)threadIdx.y;
          column < width && r < end; r += LANES) {
-        int64_t i = (int64_t)r * width + column;
+        const int64_t i = (int64_t)r * width + column;
         float x = d[i];
         if (y) {
             x *= vector_elu_slope(y[i]);
@@ -136,13 +133,14 @@ static __global__ void bias_backward(int rows, int width, const float *y, float 
     partial[slice * width + column] = sum;
 }
 
-static __global__ void add_slices(int width, const float *partial, float beta, float *sum) {
-    int column = (int)item();
+static __global__ void add_slices(int slices, int width, const float *partial, float beta,
+                                  float *sum) {
+    const int column = (int)item();
     if (column >= width) {
         return;
     }
     float total = 0.0f;
-    for (int slice = 0; slice < GPU_SUM_SLICES; slice++) {
+    for (int slice = 0; slice < slices; slice++) {
         total += partial[slice * width + column];
     }
     sum[column] = beta == 0.0f ? total : sum[column] + total;
@@ -150,66 +148,84 @@ static __global__ void add_slices(int width, const float *partial, float beta, f
 
 void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d,
                        float *partial, float beta, float *d_bias) {
-    const dim3 grid = {(unsigned)((width + COLUMNS - 1) / COLUMNS), GPU_SUM_SLICES, 1},
+    const int wanted = (rows + SLICE_ROWS - 1) / SLICE_ROWS,
+              slices = wanted < GPU_SUM_SLICES ? wanted : GPU_SUM_SLICES;
+    const dim3 grid = {(unsigned)((width + COLUMNS - 1) / COLUMNS), (unsigned)slices, 1},
                block = {COLUMNS, LANES, 1};
     LAUNCH(bias_backward, grid, block, stream, rows, width, y, d, partial);
-    LAUNCH(add_slices, blocks_of(width), line, stream, width, partial, beta, d_bias);
+    LAUNCH(add_slices, blocks_of(width), line, stream, slices, width, partial, beta, d_bias);
 }
 
 /* ---- rows between the networks ---- */
 
-/* One thread a number of the input [newest frame | estimates | theta1 mu + theta2]. */
-static __global__ void actor_input(GpuWidths w, int rows, const float *history, const float *heads,
-                                   const float *theta, float *input) {
-    int64_t i = item();
-    const int width = w.observation + w.estimates + w.latent;
-    if (i >= (int64_t)rows * width) {
-        return;
-    }
-    const int64_t r = i / width;
-    const int column = (int)(i % width), head = column - w.observation, j = head - w.estimates;
-    const float *h = heads + r * (w.estimates + 2 * w.latent);
-    if (head < 0) {
-        input[i] = history[(r + 1) * w.history - w.observation + column];
-    } else if (j < 0) {
-        input[i] = h[head];
-    } else {
-        const float *t = theta + r * (w.per_dimension ? 2 * w.latent : 2);
-        input[i] = t[w.per_dimension ? j : 0] * h[head] + t[w.per_dimension ? w.latent + j : 1];
+static __global__ void feet_input(GpuWidths w, uint32_t count, const float *heads, float *feet) {
+    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.feet;
+    if (i < count) {
+        const int column = (int)(i % pitch);
+        const float *h = heads + (int64_t)(i / pitch) * w.heads + w.feet_offset;
+        feet[i] = column < w.feet_count ? h[column] : 0.0f;
     }
 }
 
-void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, const float *history,
+void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *heads, float *feet) {
+    const int64_t count = (int64_t)rows * w.feet;
+    LAUNCH(feet_input, blocks_of(count), line, stream, w, (uint32_t)count, heads, feet);
+}
+
+/* One thread a number of the input [newest frame | estimates | theta1 mu + theta2]. */
+static __global__ void actor_input(GpuWidths w, uint32_t count, int newest, const float *history,
+                                   const float *heads, const float *theta, float *input) {
+    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.actor_input;
+    if (i >= count) {
+        return;
+    }
+    const int64_t r = i / pitch;
+    const int column = (int)(i % pitch), head = column - w.observation, j = head - w.estimates;
+    const float *h = heads + r * w.heads;
+    float x = 0.0f;
+    if (head < 0) {
+        x = history[r * w.history + newest + column];
+    } else if (j < 0) {
+        x = h[head];
+    } else if (j < w.latent) {
+        const float *t = theta + r * w.theta;
+        x = t[w.per_dimension ? j : 0] * h[head] + t[w.per_dimension ? w.latent + j : 1];
+    }
+    input[i] = x;
+}
+
+void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, const float *history,
                      const float *heads, const float *theta, float *input) {
-    LAUNCH(actor_input, blocks_of((int64_t)rows * (w.observation + w.estimates + w.latent)), line,
-           stream, w, rows, history, heads, theta, input);
+    const int64_t count = (int64_t)rows * w.actor_input;
+    LAUNCH(actor_input, blocks_of(count), line, stream, w, (uint32_t)count, newest, history, heads,
+           theta, input);
 }
 
 /* One thread a number of the decoder's input [z | estimates]. */
-static __global__ void sample_latent(GpuWidths w, int rows, const float *heads, const float *noise,
-                                     float *spread, float *input) {
-    int64_t i = item();
-    const int width = w.latent + w.estimates;
-    if (i >= (int64_t)rows * width) {
+static __global__ void sample_latent(GpuWidths w, uint32_t count, const float *heads,
+                                     const float *noise, float *spread, float *input) {
+    const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.decoder_input;
+    if (i >= count) {
         return;
     }
-    const int64_t r = i / width;
-    const int j = (int)(i % width);
-    const float *h = heads + r * (w.estimates + 2 * w.latent);
+    const int64_t r = i / pitch;
+    const int j = (int)(i % pitch);
+    const float *h = heads + r * w.heads;
     if (j >= w.latent) {
-        input[i] = h[j - w.latent];
+        input[i] = j < w.latent + w.estimates ? h[j - w.latent] : 0.0f;
         return;
     }
     const float *mu = h + w.estimates;
-    float s = loss_spread(mu[w.latent + j]);
+    const float s = loss_spread(mu[w.latent + j]);
     spread[r * w.latent + j] = s;
     input[i] = mu[j] + s * noise[r * w.latent + j];
 }
 
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
                        const float *noise, float *spread, float *input) {
-    LAUNCH(sample_latent, blocks_of((int64_t)rows * (w.latent + w.estimates)), line, stream, w,
-           rows, heads, noise, spread, input);
+    const int64_t count = (int64_t)rows * w.decoder_input;
+    LAUNCH(sample_latent, blocks_of(count), line, stream, w, (uint32_t)count, heads, noise, spread,
+           input);
 }
 
 /* ---- losses: one thread a sample ---- */
@@ -218,16 +234,20 @@ static __global__ void surrogate(GpuSurrogate s, int rows, double *sums) {
     const int64_t r = item();
     double loss = 0.0, divergence = 0.0, clipped = 0.0;
     if (r < rows) {
-        const int actions = s.actions;
-        const float *action = s.action + r * actions, *mean = s.mean + r * actions;
+        const int actions = s.actions, i = s.order[r];
+        const float *action = s.action + (int64_t)i * actions, *mean = s.mean + r * s.pitch;
         const LossSurrogate sample =
-            loss_surrogate(actions, s.constant, s.clip, action, mean, s.old_mean + r * actions,
-                           s.old_log_prob[r], s.advantage[r]);
+            loss_surrogate(actions, s.constant, s.clip, action, mean,
+                           s.old_mean + (int64_t)i * actions, s.old_log_prob[i], s.advantage[i]);
         const float d_log_prob = sample.d_log_prob * s.weight;
+        float *d_mean = s.d_mean + r * s.pitch, *d_log_std = s.d_log_std + r * s.pitch;
         for (int j = 0; j < actions; j++) {
             const float t = loss_standard(action[j], mean[j], s.constant[j]);
-            s.d_mean[r * actions + j] = loss_mean_gradient(d_log_prob, t, s.constant[j]);
-            s.d_log_std[r * actions + j] = loss_log_std_gradient(d_log_prob, t) - s.entropy;
+            d_mean[j] = loss_mean_gradient(d_log_prob, t, s.constant[j]);
+            d_log_std[j] = loss_log_std_gradient(d_log_prob, t) - s.entropy;
+        }
+        for (int j = actions; j < s.pitch; j++) {
+            d_log_std[j] = 0.0f;
         }
         loss = sample.loss;
         clipped = sample.clipped;
@@ -249,9 +269,9 @@ static __global__ void mirror_loss(GpuMirror m, int images, double *sums) {
     float sum = 0.0f;
     if (r < images) {
         const int64_t sample = m.which[r] - m.first;
-        sum = loss_mirror(m.actions, m.index, m.sign, m.weight, m.mean + sample * m.actions,
-                          m.image + r * m.actions, m.d_mean + sample * m.actions,
-                          m.d_image + r * m.actions);
+        sum = loss_mirror(m.actions, m.index, m.sign, m.weight, m.mean + sample * m.pitch,
+                          m.image + r * m.pitch, m.d_mean + sample * m.pitch,
+                          m.d_image + r * m.pitch);
     }
     add_block_sum((double)sum / m.actions, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_MIRROR);
 }
@@ -260,22 +280,30 @@ void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums)
     LAUNCH(mirror_loss, blocks_of(images), line, stream, m, images, sums);
 }
 
-static __global__ void reconstruction(int rows, int width, float weight, const float *decoded,
-                                      const float *target, float *d, double *sums) {
-    const int64_t r = item();
-    float sum = 0.0f;
-    for (int64_t i = r * width; r < rows && i < (r + 1) * width; i++) {
-        float gap = decoded[i] - target[i];
-        sum += gap * gap;
-        d[i] = weight * gap;
+/* A block has THREADS rows and takes their numbers in order, so that neighbours read neighbours. */
+static __global__ void reconstruction(GpuWidths w, int rows, float weight, const int *order,
+                                      const float *frame, const float *decoded, float *d,
+                                      double *sums) {
+    const int pitch = w.decoded, width = w.observation;
+    const int64_t first = (int64_t)blockIdx.x * THREADS * pitch, count = (int64_t)rows * pitch;
+    double sum = 0.0;
+    for (int k = 0; k < pitch; k++) {
+        const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
+        const int column = (int)(within % (uint32_t)pitch);
+        const int64_t i = first + within;
+        if (i < count && column < width) {
+            const int sample = order[(int64_t)blockIdx.x * THREADS + within / (uint32_t)pitch];
+            const float gap = decoded[i] - frame[(int64_t)sample * width + column];
+            sum += (double)(gap * gap);
+            d[i] = weight * gap;
+        }
     }
-    add_block_sum((double)sum / width,
-                  sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
+    add_block_sum(sum / width, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
 }
 
-void gpu_reconstruction(cudaStream_t stream, int rows, int width, float weight,
-                        const float *decoded, const float *target, float *d, double *sums) {
-    LAUNCH(reconstruction, blocks_of(rows), line, stream, rows, width, weight, decoded, target, d,
+void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight, const int *order,
+                        const float *frame, const float *decoded, float *d, double *sums) {
+    LAUNCH(reconstruction, blocks_of(rows), line, stream, w, rows, weight, order, frame, decoded, d,
            sums);
 }
 
@@ -283,13 +311,11 @@ static __global__ void modulation_backward(GpuWidths w, int rows, const float *h
                                            const float *theta, const float *d_input, float *d_heads,
                                            float *d_theta) {
     const int64_t r = item();
-    if (r >= rows) {
-        return;
+    if (r < rows) {
+        loss_modulation(w.estimates, w.latent, w.per_dimension, heads + r * w.heads,
+                        theta + r * w.theta, d_input + r * w.actor_input + w.observation,
+                        d_heads + r * w.heads, d_theta + r * w.theta);
     }
-    const int width = w.estimates + 2 * w.latent, theta_width = w.per_dimension ? 2 * w.latent : 2;
-    loss_modulation(w.estimates, w.latent, w.per_dimension, heads + r * width,
-                    theta + r * theta_width, d_input + r * (w.estimates + w.latent),
-                    d_heads + r * width, d_theta + r * theta_width);
 }
 
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
@@ -313,15 +339,16 @@ static __device__ double latent_row(int latent, float weight, const float *mu, c
 
 static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all, double *sums) {
     const int64_t r = item();
-    const int width = w.estimates + 2 * w.latent, feet_end = w.feet_offset + w.feet_count;
+    const int feet_end = w.feet_offset + w.feet_count;
     double group[3] = {0.0, 0.0, 0.0}, divergence = 0.0;
-    float *d = h.d_heads + r * width;
+    float *d = h.d_heads + r * w.heads;
     for (int j = 0; r < all && j < w.feet_count; j++) {
-        d[w.feet_offset + j] += h.d_feet[r * w.feet_count + j];
+        d[w.feet_offset + j] += h.d_feet[r * w.feet + j];
     }
     if (r < rows) {
-        const float *heads = h.heads + r * width, *target = h.estimate + r * w.estimates;
-        const float *d_input = h.d_decoder_input + r * (w.latent + w.estimates);
+        const float *heads = h.heads + r * w.heads;
+        const float *target = h.target + (int64_t)h.order[r] * w.estimates;
+        const float *d_input = h.d_decoder_input + r * w.decoder_input;
         for (int j = 0; j < w.estimates; j++) {
             d[j] += d_input[w.latent + j];
         }
@@ -344,23 +371,20 @@ void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, 
     LAUNCH(heads_backward, blocks_of(all), line, stream, w, h, rows, all, sums);
 }
 
-static __global__ void value_loss(int rows, int clip_value, float clip, float weight,
-                                  const float *value, const float *returns, const float *old_value,
-                                  float *d, double *sums) {
+static __global__ void value_loss(GpuValue v, int rows, double *sums) {
     const int64_t r = item();
     double loss = 0.0;
     if (r < rows) {
+        const int i = v.order[r];
         float half;
-        const float gap = loss_value(clip_value, clip, value[r], old_value[r], returns[r], &half);
+        const float gap = loss_value(v.clip_value, v.clip, v.value[r * v.pitch], v.old_value[i],
+                                     v.returns[i], &half);
         loss = (double)gap * gap;
-        d[r] = weight * half;
+        v.d[r * v.pitch] = v.weight * half;
     }
     add_block_sum(loss, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_VALUE);
 }
 
-void gpu_value_loss(cudaStream_t stream, int rows, int clip_value, float clip, float weight,
-                    const float *value, const float *returns, const float *old_value, float *d,
-                    double *sums) {
-    LAUNCH(value_loss, blocks_of(rows), line, stream, rows, clip_value, clip, weight, value,
-           returns, old_value, d, sums);
+void gpu_value_loss(cudaStream_t stream, GpuValue v, int rows, double *sums) {
+    LAUNCH(value_loss, blocks_of(rows), line, stream, v, rows, sums);
 }

@@ -1,7 +1,8 @@
-/* The learner's elementwise passes on the GPU; cuBLAS computes the products. Each pass is the
- * loop of the same name in src/learn (mlp.c, network.c, loss.c) over device arrays, row-major
- * [rows][width]. It only enqueues work on the stream, so errors show at the next call of the
- * runtime. Every sum has one fixed tree, so no result depends on the order in which blocks run. */
+/* Passes of the learner's networks and losses on the GPU; cuBLAS computes the products. Each pass
+ * is the loop of the same name in src/learn (mlp.c, network.c, loss.c) over device arrays,
+ * row-major with rows of `pitch` floats. The columns after a row's width are zero (gpu/network.h).
+ * A pass only enqueues work on the stream, so errors show at the next call of the runtime. Every
+ * sum has one fixed tree, so no result depends on the order in which blocks run. */
 #ifndef MILD_GPU_KERNELS_H
 #define MILD_GPU_KERNELS_H
 
@@ -9,9 +10,9 @@
 #include <stdint.h>
 
 #define GPU_ACTIONS_MAX 64
-#define GPU_SUM_SLICES 128 /* a column sum adds up this many partial sums */
+#define GPU_SUM_SLICES 128 /* a column sum adds up at most this many partial sums */
 
-/* Sums over samples, as in LossSums. Every block of a pass adds to its own row of sums
+/* Sums over samples: the members of LossSums. Every block of a pass adds to its own row of sums
  * [blocks][GPU_SUMS]. */
 enum {
     GPU_SUM_SURROGATE,
@@ -31,19 +32,26 @@ extern "C" {
 
 int gpu_blocks(int rows); /* rows of `sums` that passes over this many rows need */
 
-/* to[r] = from[index[r]], rows of `width`. */
-void gpu_gather(cudaStream_t stream, int rows, int width, const int *index, const float *from,
-                float *to);
-/* Row m of `to` is the mirror image of row which[m] - first of history, frame by frame. */
+/* ---- rows ---- */
+
+/* Row r of `to` is row index[r] of `from`, or row r with index NULL. width: floats from row to row
+ * of `from`. The columns of `to` from width on become 0. */
+void gpu_gather(cudaStream_t stream, int rows, int width, int pitch, const int *index,
+                const float *from, float *to);
+/* Row m of `to` is the mirror image of row order[which[m] - first] of the rollout's history, frame
+ * by frame. */
 typedef struct {
-    int images, frames, observation, first;
+    int images, frames, observation, pitch, first;
+    const int *order;         /* samples of the chunk */
     const int *which, *index; /* [images], [observation] */
     const float *sign;        /* [observation] */
 } GpuImages;
 void gpu_mirror_history(cudaStream_t stream, GpuImages images, const float *history, float *to);
-/* noise [rows][latent]: numbers row[r] * latent .. of the stream `key` (noise.h). */
-void gpu_latent_noise(cudaStream_t stream, int rows, int latent, uint64_t key, const int *row,
-                      float *noise);
+/* noise [rows][latent]: numbers row[r] * latent .. of the stream *key (noise.h). */
+void gpu_latent_noise(cudaStream_t stream, int rows, int latent, const uint64_t *key,
+                      const int *row, float *noise);
+
+/* ---- layers; widths are pitches, multiples of 4 ---- */
 
 void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float *bias, float *y);
 /* d *= slope(y) unless y is NULL; d_bias = beta d_bias + column sums of d. partial:
@@ -51,38 +59,48 @@ void gpu_add_bias(cudaStream_t stream, int rows, int width, int elu, const float
 void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y, float *d,
                        float *partial, float beta, float *d_bias);
 
-/* Widths of the rows between the networks. */
+/* ---- rows between the networks ---- */
+
 typedef struct {
-    int history, observation, estimates, latent, per_dimension, feet_offset, feet_count, actions;
+    int observation, estimates, latent, per_dimension, feet_offset, feet_count, actions;
+    /* pitches */
+    int history, heads, feet, theta, actor_input, action, decoder_input, decoded, value;
 } GpuWidths;
 
-void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, const float *history,
+/* feet [rows][feet]: the estimated feet velocities, the modulation's input. */
+void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *heads, float *feet);
+/* newest: first column of the newest frame in history. */
+void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, const float *history,
                      const float *heads, const float *theta, float *input);
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
                        const float *noise, float *spread, float *input);
 
+/* ---- losses. order: [rows] samples, whose numbers are read from the rollout ---- */
+
 typedef struct {
-    int actions;
-    float constant[GPU_ACTIONS_MAX + 2]; /* loss_surrogate_constants */
-    float clip, weight;                  /* weight: of a sample in the joint loss */
-    float entropy;                       /* of a sample in the gradient of log std */
-    const float *action, *old_mean, *old_log_prob, *advantage, *mean;
-    float *d_mean, *d_log_std; /* [rows][actions] both */
+    int actions, pitch;
+    const float *constant; /* [actions + 2] loss_surrogate_constants */
+    float clip, weight;    /* weight: of a sample in the joint loss */
+    float entropy;         /* of a sample in the gradient of log std */
+    const int *order;
+    const float *action, *old_mean, *old_log_prob, *advantage; /* of the rollout */
+    const float *mean;                                         /* [rows][pitch] */
+    float *d_mean, *d_log_std;                                 /* [rows][pitch] */
 } GpuSurrogate;
 void gpu_surrogate(cudaStream_t stream, GpuSurrogate s, int rows, double *sums);
 
 typedef struct {
-    int actions, first;
+    int actions, pitch, first;
     const int *which, *index; /* [images], [actions] */
     const float *sign;        /* [actions] */
     float weight;
-    const float *mean, *image; /* [rows][actions], [images][actions] */
+    const float *mean, *image; /* [rows][pitch], [images][pitch] */
     float *d_mean, *d_image;
 } GpuMirror;
 void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums);
 
-void gpu_reconstruction(cudaStream_t stream, int rows, int width, float weight,
-                        const float *decoded, const float *target, float *d, double *sums);
+void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight, const int *order,
+                        const float *frame, const float *decoded, float *d, double *sums);
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
                              const float *theta, const float *d_input, float *d_heads,
                              float *d_theta);
@@ -91,15 +109,23 @@ void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const f
  * through the feet velocities for all. */
 typedef struct {
     float estimate_weight, latent_weight; /* of a sample */
-    const float *heads, *estimate, *spread, *noise, *d_feet, *d_decoder_input;
+    const int *order;
+    const float *target; /* of the rollout */
+    const float *heads, *spread, *noise, *d_feet, *d_decoder_input;
     float *d_heads;
 } GpuHeads;
 void gpu_heads_backward(cudaStream_t stream, GpuWidths w, GpuHeads h, int rows, int all,
                         double *sums);
 
-void gpu_value_loss(cudaStream_t stream, int rows, int clip_value, float clip, float weight,
-                    const float *value, const float *returns, const float *old_value, float *d,
-                    double *sums);
+typedef struct {
+    int pitch, clip_value;
+    float clip, weight;
+    const int *order;
+    const float *returns, *old_value; /* of the rollout */
+    const float *value;               /* [rows][pitch] */
+    float *d;                         /* [rows][pitch] */
+} GpuValue;
+void gpu_value_loss(cudaStream_t stream, GpuValue v, int rows, double *sums);
 
 #ifdef __cplusplus
 }

@@ -4,40 +4,74 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "gpu/kernels.h"
-#include "gpu/mlp.h"
+#include "gpu/learner_private.h"
 #include "learn/ppo_gradient.h"
+#include "learn/ppo_step.h"
 
-/* Rows go through the networks in chunks of at most this many. That fills a large GPU and bounds
+/* Rows go through the networks in chunks of at most this many. That fills a large device and bounds
  * the memory. */
-#ifndef GPU_ROWS
-#define GPU_ROWS 32768
-#endif
+#define ROWS_MAX 131072
+
+/* [bytes] for cuBLAS, as its manual recommends for Hopper. Its own memory cannot be used while a
+ * graph is captured. */
+#define WORKSPACE ((size_t)32 << 20)
 
 _Static_assert(GPU_ACTIONS_MAX == NETWORK_ACTIONS_MAX, "one bound");
+_Static_assert(sizeof(LossSums) == GPU_SUMS * sizeof(double), "the same sums");
 
-typedef struct {
-    Ppo *ppo;
-    GpuQueue queue;
-    GpuWidths widths;
-    int rows, minibatch; /* most rows of a chunk, most samples of a minibatch */
-    void *block;         /* all device memory */
-    float *parameters, *gradient;
-    PpoBatch batch; /* the rollout on the device; flags and reward stay with the processor */
-    LossChunk chunk;
-    int *order, *latent_row, *which; /* [minibatch] samples, ppo_latent_rows, ppo_mirrored */
-    int *mirror_index;               /* [observation + actions] */
-    float *mirror_sign;
-    double *sums; /* [sum_blocks][GPU_SUMS] */
-    int sum_blocks;
-    /* on the processor */
-    int *host_rows; /* [2][minibatch]: latent_row, which, of the last size of minibatch */
-    int known_count, images;
-    double *host_sums;
-    void *pinned[3];
-} GpuLearner;
+/* ---- sizes and memory ---- */
 
-/* ---- memory ---- */
+static int widest_layer(const Network *network) {
+    int widest = 0;
+    for (int i = 0; i < NETWORK_MLPS; i++) {
+        const char *name;
+        const int width = mlp_widest(network_mlp(network, i, &name));
+        widest = width > widest ? width : widest;
+    }
+    return widest > network->history ? widest : network->history;
+}
+
+/* Most images that a run of this many samples of a minibatch can have: it meets at most so many
+ * chunks of the CPU's, each with as many images as a full one. */
+static int most_images(const Ppo *ppo, int rows) {
+    const int64_t images = ppo->mirror.observation_index
+                               ? (int64_t)(rows / PPO_CHUNK + 2 + PPO_SHARDS) * ppo->mirror_rows
+                               : 0;
+    return images < rows ? (int)images : rows;
+}
+
+static void set_sizes(GpuLearner *g, int envs) {
+    const Ppo *ppo = g->ppo;
+    const PolicyDef *def = policy_def(ppo->policy);
+    const int steps = ppo->batch.steps;
+    /* the elementwise passes count the numbers of a chunk with 32 bits */
+    const int64_t most = (int64_t)INT32_MAX / (2 * widest_layer(&g->network)),
+                  wanted = g->wanted_rows > 0 ? g->wanted_rows : ROWS_MAX;
+    g->envs = envs;
+    g->minibatch = order_largest(steps, envs, ppo->def.minibatches);
+    int rows = g->minibatch > envs ? g->minibatch : envs;
+    rows = rows < wanted ? rows : (int)wanted;
+    g->rows = rows < most ? rows : (int)most;
+    g->images = most_images(ppo, g->rows);
+    g->sum_blocks = gpu_blocks(g->rows + g->images);
+    const Network *n = &g->network;
+    g->widths = (GpuWidths){.observation = def->observation,
+                            .estimates = def->estimates,
+                            .latent = def->latent,
+                            .per_dimension = def->modulation_per_dimension,
+                            .feet_offset = def->feet_velocity_offset,
+                            .feet_count = def->feet_velocity_count,
+                            .actions = def->actions,
+                            .history = n->history,
+                            .heads = n->heads,
+                            .feet = n->modulation.layer[0].in,
+                            .theta = n->theta,
+                            .actor_input = n->actor_input,
+                            .action = gpu_pitch(def->actions),
+                            .decoder_input = n->decoder_input,
+                            .decoded = gpu_pitch(def->observation),
+                            .value = gpu_pitch(1)};
+}
 
 static void *carve(char *block, size_t *used, size_t bytes) {
     void *at = block ? block + *used : NULL;
@@ -45,91 +79,70 @@ static void *carve(char *block, size_t *used, size_t bytes) {
     return at;
 }
 
-static int widest_layer(const Network *network) {
-    int widest = 0;
-    for (int i = 0; i < NETWORK_MLPS; i++) {
-        const char *name;
-        int width = mlp_widest(network_mlp(network, i, &name));
-        widest = width > widest ? width : widest;
-    }
-    return widest;
-}
-
 /* Places all arrays in the device's block and returns its bytes. NULL: only counts them. */
 static size_t layout(GpuLearner *g, char *block) {
-    const Network *n = &g->ppo->policy->network;
-    const PpoBatch *host = &g->ppo->batch;
-    const size_t samples = (size_t)host->steps * (size_t)host->envs,
-                 more = samples + (size_t)host->envs;
-    const size_t mirror = (size_t)n->def.observation + (size_t)n->def.actions,
-                 minibatch = (size_t)g->minibatch;
-    const struct {
-        float **at;
-        size_t count;
-    } areas[] = {
-        {&g->parameters, (size_t)n->count},
-        {&g->gradient, (size_t)n->count},
-        {&g->queue.partial, (size_t)(GPU_SUM_SLICES * widest_layer(n))},
-        {&g->mirror_sign, mirror},
-        {&g->batch.history, samples * (size_t)n->history},
-        {&g->batch.critic, more * (size_t)n->def.critic_input},
-        {&g->batch.target, samples * (size_t)n->def.estimates},
-        {&g->batch.frame, samples * (size_t)n->def.observation},
-        {&g->batch.action, samples * (size_t)n->def.actions},
-        {&g->batch.mean, samples * (size_t)n->def.actions},
-        {&g->batch.log_prob, samples},
-        {&g->batch.value, more},
-        {&g->batch.advantage, samples},
-        {&g->batch.returns, samples},
-    };
+    const Network *n = &g->network;
+    const size_t parameters = (size_t)n->count * sizeof(float),
+                 samples = (size_t)g->ppo->batch.steps * (size_t)g->envs,
+                 mirror = (size_t)n->def.observation + (size_t)n->def.actions;
     size_t used = 0;
-    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
-        *areas[i].at = carve(block, &used, areas[i].count * sizeof(float));
+    float **const vectors[] = {&g->parameters, &g->gradient, &g->first, &g->second, &g->average};
+    for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++) {
+        const int wanted = vectors[i] != &g->average || g->ppo->average;
+        *vectors[i] = wanted ? carve(block, &used, parameters) : NULL;
     }
-    int **const indices[] = {&g->order, &g->latent_row, &g->which, &g->mirror_index};
-    for (size_t i = 0; i < sizeof indices / sizeof *indices; i++) {
-        *indices[i] = carve(block, &used, (i < 3 ? minibatch : mirror) * sizeof(int));
-    }
+    g->progress = carve(block, &used, sizeof *g->progress);
+    g->mirror_index = carve(block, &used, mirror * sizeof *g->mirror_index);
+    g->mirror_sign = carve(block, &used, mirror * sizeof *g->mirror_sign);
+    g->substitute = carve(block, &used, samples * sizeof *g->substitute);
+    g->latent_row = carve(block, &used, samples * sizeof *g->latent_row);
+    g->which = carve(block, &used, samples * sizeof *g->which);
+    g->order = carve(block, &used, (size_t)g->minibatch * sizeof *g->order);
     g->sums = carve(block, &used, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums);
-    size_t floats = loss_carve(n, g->rows, g->rows, NULL, &g->chunk);
+    g->partial = carve(block, &used, (size_t)GPU_PARTS * 7 * sizeof *g->partial);
+    g->queue.partial =
+        carve(block, &used, (size_t)(GPU_SUM_SLICES * widest_layer(n)) * sizeof(float));
+    g->workspace = carve(block, &used, WORKSPACE);
+    g->batch.steps = g->ppo->batch.steps;
+    g->batch.envs = g->envs;
+    const Network *tight = &g->ppo->policy->network;
+    g->rollout = carve(block, &used, ppo_place_batch(&g->batch, tight, NULL));
+    ppo_place_batch(&g->batch, tight, g->rollout);
+    const size_t floats = gpu_chunk_carve(n, &g->widths, g->rows, g->images, NULL, &g->chunk);
     float *chunk = carve(block, &used, floats * sizeof(float));
-    loss_carve(n, g->rows, g->rows, chunk, &g->chunk);
+    gpu_chunk_carve(n, &g->widths, g->rows, g->images, chunk, &g->chunk);
     return used;
 }
 
-/* Pins an array that is copied often, which makes the copies several times as fast. A failure only
- * costs speed. */
-static void pin(GpuLearner *g, int slot, void *memory, size_t bytes) {
-    if (cudaHostRegister(memory, bytes, cudaHostRegisterDefault) == cudaSuccess) {
-        g->pinned[slot] = memory;
-    } else {
-        cudaGetLastError();
-    }
-}
-
-static void learner_destroy(void *self) {
-    GpuLearner *g = self;
-    if (!g) {
-        return;
-    }
-    for (size_t i = 0; i < sizeof g->pinned / sizeof *g->pinned; i++) {
-        if (g->pinned[i]) {
-            cudaHostUnregister(g->pinned[i]);
+/* Most robots for which everything fits into so many bytes. */
+static int robots_that_fit(const GpuLearner *g, size_t bytes) {
+    GpuLearner other = *g;
+    int fits = 0, too_many = g->envs;
+    while (too_many - fits > 1) {
+        const int envs = fits + (too_many - fits) / 2;
+        set_sizes(&other, envs);
+        if (layout(&other, NULL) <= bytes) {
+            fits = envs;
+        } else {
+            too_many = envs;
         }
     }
-    if (g->queue.blas) {
-        cublasDestroy(g->queue.blas);
-    }
-    cudaFree(g->block);
-    if (g->queue.stream) {
-        cudaStreamDestroy(g->queue.stream);
-    }
-    free(g->host_rows);
-    free(g->host_sums);
-    free(g);
+    return fits;
 }
 
 /* ---- traffic ---- */
+
+/* Makes the learner's device the current one. Returns the one before, for leave. */
+static int enter(const GpuLearner *g) {
+    int before = 0;
+    cudaGetDevice(&before);
+    cudaSetDevice(g->device);
+    return before;
+}
+
+static void leave(int before) {
+    cudaSetDevice(before);
+}
 
 static MildStatus check(cudaError_t code, const char *what, MildError *error) {
     return code == cudaSuccess
@@ -145,14 +158,9 @@ static void download(GpuLearner *g, void *to, const void *from, size_t bytes) {
     cudaMemcpyAsync(to, from, bytes, cudaMemcpyDeviceToHost, g->queue.stream);
 }
 
-static void upload_parameters(GpuLearner *g) {
-    const Policy *policy = g->ppo->policy;
-    upload(g, g->parameters, policy->parameters, (size_t)policy->network.count * sizeof(float));
-}
-
 /* Waits for all enqueued work and returns its first failure. */
 static MildStatus finish(GpuLearner *g, const char *what, MildError *error) {
-    cudaError_t launched = cudaGetLastError(), ran = cudaStreamSynchronize(g->queue.stream);
+    const cudaError_t launched = cudaGetLastError(), ran = cudaStreamSynchronize(g->queue.stream);
     MildStatus status = check(launched ? launched : ran, what, error);
     if (status == MILD_OK && g->queue.status) {
         status = mild_fail(error, MILD_ERROR_IO, "GPU: %s: %s", what,
@@ -161,309 +169,304 @@ static MildStatus finish(GpuLearner *g, const char *what, MildError *error) {
     return status;
 }
 
-/* ---- forward ---- */
+/* The rows of time t of the four arrays with a row after the last step. */
+enum { CARRIED = 4 };
+static void carried(const Network *n, const PpoBatch *b, int t, float *at[CARRIED],
+                    size_t bytes[CARRIED]) {
+    float *const arrays[CARRIED] = {b->history, b->critic, b->target, b->frame};
+    const int widths[CARRIED] = {n->def.frames * n->def.observation, n->def.critic_input,
+                                 n->def.estimates, n->def.observation};
+    for (int i = 0; i < CARRIED; i++) {
+        const size_t floats = (size_t)b->envs * (size_t)widths[i];
+        at[i] = arrays[i] + (size_t)t * floats;
+        bytes[i] = floats * sizeof(float);
+    }
+}
 
-/* As network_forward. */
-static float *forward(GpuLearner *g, int rows, const float *history) {
-    const Network *n = &g->ppo->policy->network;
-    const NetworkOutputs *out = &g->chunk.outputs;
-    GpuQueue *q = &g->queue;
-    const float *heads =
-        gpu_mlp_forward(q, &n->encoder, g->parameters, rows, history, n->history, &out->encoder);
-    const float *theta =
-        gpu_mlp_forward(q, &n->modulation, g->parameters, rows, heads + n->def.feet_velocity_offset,
-                        n->heads, &out->modulation);
-    gpu_actor_input(q->stream, g->widths, rows, history, heads, theta, out->actor_input);
-    return gpu_mlp_forward(q, &n->actor, g->parameters, rows, out->actor_input, n->actor_input,
-                           &out->actor);
+/* ---- parameters and counters ---- */
+
+typedef struct {
+    float *host, *device;
+} Vector;
+
+/* Parameters, moments and running mean, on the CPU and padded on the device. Returns their number.
+ */
+static int vectors(GpuLearner *g, Vector vector[4]) {
+    Ppo *ppo = g->ppo;
+    vector[0] = (Vector){ppo->policy->parameters, g->parameters};
+    vector[1] = (Vector){ppo->first, g->first};
+    vector[2] = (Vector){ppo->second, g->second};
+    if (!ppo->average) {
+        return 3;
+    }
+    vector[3] = (Vector){policy_parameters(ppo->average), g->average};
+    return 4;
+}
+
+static MildStatus pull(GpuLearner *g, MildError *error) {
+    Ppo *ppo = g->ppo;
+    const size_t bytes = (size_t)g->network.count * sizeof(float);
+    Vector vector[4];
+    const int count = vectors(g, vector);
+    for (int i = 0; i < count; i++) {
+        download(g, g->padded, vector[i].device, bytes);
+        const MildStatus status = finish(g, "pull", error);
+        if (status) {
+            return status;
+        }
+        gpu_network_strip(&ppo->policy->network, &g->network, g->padded, vector[i].host);
+    }
+    if (ppo->resident) {
+        float *from[CARRIED], *to[CARRIED];
+        size_t sizes[CARRIED];
+        carried(&g->network, &g->batch, 0, from, sizes);
+        carried(&g->network, &ppo->start, 0, to, sizes);
+        for (int i = 0; i < CARRIED; i++) {
+            download(g, to[i], from[i], sizes[i]);
+        }
+    }
+    return finish(g, "pull", error);
+}
+
+static MildStatus push(GpuLearner *g, MildError *error) {
+    const Ppo *ppo = g->ppo;
+    const size_t bytes = (size_t)g->network.count * sizeof(float);
+    Vector vector[4];
+    const int count = vectors(g, vector);
+    for (int i = 0; i < count; i++) {
+        gpu_network_pad(&ppo->policy->network, &g->network, vector[i].host, g->padded);
+        upload(g, vector[i].device, g->padded, bytes);
+        const MildStatus status = finish(g, "push", error); /* before the next one is padded */
+        if (status) {
+            return status;
+        }
+    }
+    const GpuProgress progress = {.seed = ppo->seed,
+                                  .iteration = ppo->iteration,
+                                  .adam_steps = ppo->adam_steps,
+                                  .learning_rate = ppo->learning_rate};
+    upload(g, g->progress, &progress, sizeof progress);
+    if (ppo->resident) {
+        float *from[CARRIED], *to[CARRIED];
+        size_t sizes[CARRIED];
+        carried(&g->network, &ppo->start, 0, from, sizes);
+        carried(&g->network, &g->batch, 0, to, sizes);
+        for (int i = 0; i < CARRIED; i++) {
+            upload(g, to[i], from[i], sizes[i]);
+        }
+    }
+    return finish(g, "push", error);
+}
+
+static MildStatus learner_pull(void *self, MildError *error) {
+    const int before = enter(self);
+    const MildStatus status = pull(self, error);
+    leave(before);
+    return status;
+}
+
+static MildStatus learner_push(void *self, MildError *error) {
+    const int before = enter(self);
+    const MildStatus status = push(self, error);
+    leave(before);
+    return status;
+}
+
+/* ---- acting ---- */
+
+/* With the rollout on the CPU: copies what the networks read there, and what they give back. */
+static MildStatus act_from_host(GpuLearner *g, int t, MildError *error) {
+    const PpoBatch *host = &g->ppo->batch, *b = &g->batch;
+    const size_t envs = (size_t)g->envs, row = (size_t)t * envs,
+                 actions = (size_t)g->network.def.actions,
+                 history = (size_t)g->ppo->policy->network.history;
+    upload(g, b->history + row * history, host->history + row * history,
+           envs * history * sizeof(float));
+    gpu_enqueue_act(g, t);
+    download(g, host->mean + row * actions, b->mean + row * actions,
+             envs * actions * sizeof(float));
+    download(g, host->action + row * actions, b->action + row * actions,
+             envs * actions * sizeof(float));
+    download(g, host->log_prob + row, b->log_prob + row, envs * sizeof(float));
+    return finish(g, "act", error);
 }
 
 static MildStatus learner_act(void *self, int t, MildError *error) {
     GpuLearner *g = self;
-    const Network *n = &g->ppo->policy->network;
-    const PpoBatch *b = &g->ppo->batch;
-    const size_t history = (size_t)n->history, actions = (size_t)n->def.actions;
-    upload_parameters(g);
-    for (int first = 0; first < b->envs; first += g->rows) {
-        const int rows = b->envs - first < g->rows ? b->envs - first : g->rows;
-        const size_t row = (size_t)t * (size_t)b->envs + (size_t)first;
-        upload(g, g->chunk.history, b->history + row * history,
-               (size_t)rows * history * sizeof(float));
-        const float *mean = forward(g, rows, g->chunk.history);
-        download(g, b->mean + row * actions, mean, (size_t)rows * actions * sizeof(float));
+    MildStatus status = MILD_OK;
+    const int before = enter(g);
+    if (g->ppo->resident) {
+        gpu_enqueue_act(g, t);
+    } else {
+        status = act_from_host(g, t, error);
     }
-    return finish(g, "act", error);
+    leave(before);
+    return status;
 }
 
-/* Copies the rollout to the device, once per update. */
-static void upload_batch(GpuLearner *g) {
-    const PolicyDef *def = policy_def(g->ppo->policy);
-    const PpoBatch *host = &g->ppo->batch, *b = &g->batch;
-    const size_t samples = (size_t)host->steps * (size_t)host->envs,
-                 more = samples + (size_t)host->envs;
-    const struct {
-        float *to;
-        const float *from;
-        size_t rows;
-        int width;
-    } areas[] = {
-        {b->critic, host->critic, more, def->critic_input},
-        {b->history, host->history, samples, g->widths.history},
-        {b->target, host->target, samples, def->estimates},
-        {b->frame, host->frame, samples, def->observation},
-        {b->action, host->action, samples, def->actions},
-        {b->mean, host->mean, samples, def->actions},
-        {b->log_prob, host->log_prob, samples, 1},
-    };
-    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
-        upload(g, areas[i].to, areas[i].from,
-               areas[i].rows * (size_t)areas[i].width * sizeof(float));
-    }
+/* ---- update ---- */
+
+static GpuOptimiser optimiser(const GpuLearner *g) {
+    return (GpuOptimiser){.count = g->network.count,
+                          .log_std = g->network.log_std,
+                          .actions = g->network.def.actions,
+                          .floor = step_noise_floor(&g->ppo->def),
+                          .gradient = g->gradient,
+                          .parameters = g->parameters,
+                          .first = g->first,
+                          .second = g->second,
+                          .mean = g->average};
 }
 
-static MildStatus learner_values(void *self, MildError *error) {
-    GpuLearner *g = self;
-    const Network *n = &g->ppo->policy->network;
-    const PpoBatch *host = &g->ppo->batch;
-    const int count = (host->steps + 1) * host->envs, width = n->def.critic_input;
-    upload_parameters(g);
-    upload_batch(g);
-    for (int first = 0; first < count; first += g->rows) {
-        const int rows = count - first < g->rows ? count - first : g->rows;
-        const float *value = gpu_mlp_forward(&g->queue, &n->critic, g->parameters, rows,
-                                             g->batch.critic + (size_t)first * (size_t)width, width,
-                                             &g->chunk.value);
-        cudaMemcpyAsync(g->batch.value + first, value, (size_t)rows * sizeof *value,
-                        cudaMemcpyDeviceToDevice, g->queue.stream);
-    }
-    download(g, host->value, g->batch.value, (size_t)count * sizeof(float));
-    return finish(g, "values", error);
-}
-
-/* ---- gradient ---- */
-
-/* What a chunk [at, at + rows) of the minibatch needs besides g->chunk. */
-typedef struct {
-    const LossContext *loss;
-    uint64_t latent_key;
-    const int *order, *latent_row, *which; /* device, of this chunk */
-    int at;                                /* `which` counts from the minibatch's begin */
-    float beta;
-} ChunkJob;
-
-static void gather(GpuLearner *g, const ChunkJob *job) {
-    const PolicyDef *def = policy_def(g->ppo->policy);
-    LossChunk *c = &g->chunk;
-    const PpoBatch *b = &g->batch;
-    const struct {
-        float *to;
-        const float *from;
-        int width;
-    } areas[] = {
-        {c->history, b->history, g->widths.history},
-        {c->estimate, b->target, def->estimates},
-        {c->decoder_target, b->frame, def->observation},
-        {c->action, b->action, def->actions},
-        {c->old_mean, b->mean, def->actions},
-        {c->old_log_prob, b->log_prob, 1},
-        {c->advantage, b->advantage, 1},
-        {c->critic, b->critic, def->critic_input},
-        {c->old_value, b->value, 1},
-        {c->returns, b->returns, 1},
-    };
+/* first: as in gpu_enqueue_gradient. */
+static void enqueue_minibatch(GpuLearner *g, GpuOrder order, int first) {
+    const PpoDef *def = &g->ppo->def;
     cudaStream_t stream = g->queue.stream;
-    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
-        gpu_gather(stream, c->rows, areas[i].width, job->order, areas[i].from, areas[i].to);
-    }
-    if (c->mirrored > 0) {
-        const GpuImages images = {c->mirrored, def->frames,     def->observation, job->at,
-                                  job->which,  g->mirror_index, g->mirror_sign};
-        gpu_mirror_history(stream, images, c->history,
-                           c->history + (size_t)c->rows * (size_t)g->widths.history);
-    }
-    gpu_latent_noise(stream, c->rows, def->latent, job->latent_key, job->latent_row, c->noise);
+    const int actions = g->network.def.actions;
+    gpu_order(stream, order, g->substitute, g->progress, g->order);
+    gpu_begin_minibatch(stream, (uint32_t)(order.epoch * def->minibatches + order.m), actions,
+                        g->parameters + g->network.log_std, g->progress);
+    gpu_enqueue_gradient(g, order.cut, first);
+    const GpuDecision decision = {.def = *def,
+                                  .actions = actions,
+                                  .samples = order.cut[PPO_SHARDS],
+                                  .images = ppo_mirrored(g->ppo, order.cut, NULL),
+                                  .blocks = g->sum_blocks,
+                                  .count = g->network.count,
+                                  .sums = g->sums,
+                                  .gradient = g->gradient};
+    gpu_decide(stream, decision, g->partial, g->progress);
+    gpu_optimise(stream, optimiser(g), g->progress);
 }
 
-/* As policy_loss and mirror_loss. The samples' gradients of log std are kept in a work area
- * until they are summed. */
-static void action_losses(GpuLearner *g, const ChunkJob *job, const float *mean) {
-    const LossContext *loss = job->loss;
-    const PolicyDef *def = policy_def(g->ppo->policy);
-    LossChunk *c = &g->chunk;
-    const int actions = def->actions;
-    const float share = (float)(1.0 - loss->def->epsilon) * loss->sample_weight;
-    GpuSurrogate s = {.actions = actions,
-                      .clip = (float)loss->def->clip,
-                      .weight = share,
-                      .entropy = share * (float)loss->def->entropy,
-                      .action = c->action,
-                      .old_mean = c->old_mean,
-                      .old_log_prob = c->old_log_prob,
-                      .advantage = c->advantage,
-                      .mean = mean,
-                      .d_mean = c->d_mean,
-                      .d_log_std = c->work[0]};
-    loss_surrogate_constants(loss, s.constant);
-    gpu_surrogate(g->queue.stream, s, c->rows, g->sums);
-    gpu_bias_backward(g->queue.stream, c->rows, actions, NULL, s.d_log_std, g->queue.partial,
-                      job->beta, g->gradient + g->ppo->policy->network.log_std);
-    if (c->mirrored > 0) {
-        const size_t images = (size_t)c->rows * (size_t)actions;
-        const GpuMirror m = {actions,
-                             job->at,
-                             job->which,
-                             g->mirror_index + def->observation,
-                             g->mirror_sign + def->observation,
-                             2.0f * (float)loss->def->mirror_weight * loss->mirror_weight /
-                                 (float)actions,
-                             mean,
-                             mean + images,
-                             c->d_mean,
-                             c->d_mean + images};
-        gpu_mirror_loss(g->queue.stream, m, c->mirrored, g->sums);
+static void enqueue_epoch(GpuLearner *g, int epoch) {
+    const int minibatches = g->ppo->def.minibatches;
+    GpuOrder order = {
+        .steps = g->batch.steps, .envs = g->envs, .minibatches = minibatches, .epoch = epoch};
+    for (int first = 0; order.m < minibatches; order.m++) {
+        const int count = order_cuts(order.steps, order.envs, order.m, minibatches, order.cut);
+        if (count > 0) {
+            enqueue_minibatch(g, order, first);
+        }
+        first += count;
     }
 }
 
-/* As loss_actor. */
-static void actor_half(GpuLearner *g, const ChunkJob *job) {
-    const LossContext *loss = job->loss;
-    const Network *n = &g->ppo->policy->network;
-    GpuQueue *q = &g->queue;
-    LossChunk *c = &g->chunk;
-    NetworkOutputs *out = &c->outputs;
-    const int rows = c->rows, all = rows + c->mirrored, estimates = n->def.estimates;
-    const float epsilon = (float)loss->def->epsilon * loss->sample_weight, beta = job->beta;
-    const float *mean = forward(g, all, c->history), *heads = network_heads(n, out),
-                *theta = network_theta(n, out);
-    gpu_sample_latent(q->stream, g->widths, rows, heads, c->noise, c->spread, c->decoder_input);
-    const float *decoded = gpu_mlp_forward(q, &n->decoder, g->parameters, rows, c->decoder_input,
-                                           n->decoder_input, &c->decoder);
-
-    action_losses(g, job, mean);
-    gpu_reconstruction(q->stream, rows, n->def.observation,
-                       2.0f * epsilon / (float)n->def.observation, decoded, c->decoder_target,
-                       c->d_decoded, g->sums);
-
-    gpu_mlp_backward(q, &n->decoder, g->parameters, rows, c->decoder_input, n->decoder_input,
-                     &c->decoder, c->d_decoded, c->work, g->gradient, beta,
-                     (MlpInputGradient){c->d_decoder_input, 0, n->decoder_input});
-    gpu_mlp_backward(
-        q, &n->actor, g->parameters, all, out->actor_input, n->actor_input, &out->actor, c->d_mean,
-        c->work, g->gradient, beta,
-        (MlpInputGradient){c->d_actor_input, n->def.observation, estimates + n->def.latent});
-    gpu_modulation_backward(q->stream, g->widths, all, heads, theta, c->d_actor_input, c->d_heads,
-                            c->d_theta);
-    gpu_mlp_backward(q, &n->modulation, g->parameters, all, heads + n->def.feet_velocity_offset,
-                     n->heads, &out->modulation, c->d_theta, c->work, g->gradient, beta,
-                     (MlpInputGradient){c->d_feet, 0, n->def.feet_velocity_count});
-    const GpuHeads h = {2.0f * epsilon, epsilon * (float)loss->def->kl_weight,
-                        heads,          c->estimate,
-                        c->spread,      c->noise,
-                        c->d_feet,      c->d_decoder_input,
-                        c->d_heads};
-    gpu_heads_backward(q->stream, g->widths, h, rows, all, g->sums);
-    gpu_mlp_backward(q, &n->encoder, g->parameters, all, c->history, n->history, &out->encoder,
-                     c->d_heads, c->work, g->gradient, beta, (MlpInputGradient){0});
-}
-
-/* As loss_critic. */
-static void critic_half(GpuLearner *g, const ChunkJob *job) {
-    const LossContext *loss = job->loss;
-    const PpoDef *def = loss->def;
-    const Network *n = &g->ppo->policy->network;
-    LossChunk *c = &g->chunk;
-    const float weight =
-        2.0f * (float)((1.0 - def->epsilon) * def->value_weight) * loss->sample_weight;
-    const float *value = gpu_mlp_forward(&g->queue, &n->critic, g->parameters, c->rows, c->critic,
-                                         n->def.critic_input, &c->value);
-    gpu_value_loss(g->queue.stream, c->rows, def->clip_value, (float)def->clip, weight, value,
-                   c->returns, c->old_value, c->d_value, g->sums);
-    gpu_mlp_backward(&g->queue, &n->critic, g->parameters, c->rows, c->critic, n->def.critic_input,
-                     &c->value, c->d_value, c->work, g->gradient, job->beta, (MlpInputGradient){0});
-}
-
-/* Uploads all that the chunks of a minibatch read. */
-static void upload_minibatch(GpuLearner *g, const int *samples, int count) {
-    const PpoBatch *host = &g->ppo->batch;
-    const size_t all = (size_t)host->steps * (size_t)host->envs * sizeof(float),
-                 indices = (size_t)count * sizeof(int);
-    if (count != g->known_count) {
-        ppo_latent_rows(count, g->host_rows);
-        g->images = ppo_mirrored(g->ppo, count, g->host_rows + g->minibatch);
-        g->known_count = count;
-        upload(g, g->latent_row, g->host_rows, indices);
-        upload(g, g->which, g->host_rows + g->minibatch, (size_t)g->images * sizeof(int));
+static void enqueue_update(GpuLearner *g) {
+    const PpoDef *def = &g->ppo->def;
+    const Network *n = &g->network;
+    cudaStream_t stream = g->queue.stream;
+    if (def->decoder_target == PPO_TARGET_NEXT) {
+        gpu_shift_frames(stream, g->batch, n->def.observation);
     }
-    upload_parameters(g);
-    upload(g, g->batch.advantage, host->advantage, all);
-    upload(g, g->batch.returns, host->returns, all);
-    upload(g, g->order, samples, indices);
-    cudaMemsetAsync(g->sums, 0, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums,
-                    g->queue.stream);
+    gpu_begin_update(stream, *def, n->def.actions, g->parameters + n->log_std, g->progress);
+    gpu_enqueue_values(g);
+    gpu_returns(stream, *def, g->batch, g->substitute, g->partial, g->progress);
+    for (int epoch = 0; epoch < def->epochs; epoch++) {
+        enqueue_epoch(g, epoch);
+    }
+    gpu_finish_update(stream, optimiser(g), g->progress);
+    float *from[CARRIED], *to[CARRIED];
+    size_t sizes[CARRIED];
+    carried(n, &g->batch, g->batch.steps, from, sizes);
+    carried(n, &g->batch, 0, to, sizes);
+    for (int i = 0; i < CARRIED; i++) {
+        cudaMemcpyAsync(to[i], from[i], sizes[i], cudaMemcpyDeviceToDevice, stream);
+    }
 }
 
-/* Number of images whose sample comes before `end`; `which` ascends. */
-static int images_before(const GpuLearner *g, int from, int end) {
-    while (from < g->images && g->host_rows[g->minibatch + from] < end) {
-        from++;
+/* Every update enqueues the same work, so the CPU needs to describe it only once. What cannot be
+ * captured is enqueued anew each time, which only costs speed. */
+static void capture_update(GpuLearner *g) {
+    cudaGraph_t graph = NULL;
+    const cublasStatus_t status = g->queue.status;
+    if (cudaStreamBeginCapture(g->queue.stream, cudaStreamCaptureModeThreadLocal) == cudaSuccess) {
+        enqueue_update(g);
+        if (cudaStreamEndCapture(g->queue.stream, &graph) != cudaSuccess ||
+            cudaGraphInstantiate(&g->graph, graph, 0) != cudaSuccess) {
+            g->graph = NULL;
+        }
     }
-    return from;
+    if (graph) {
+        cudaGraphDestroy(graph);
+    }
+    if (!g->graph) {
+        cudaGetLastError();
+        g->queue.status = status;
+    }
 }
 
-static void add_sums(const GpuLearner *g, LossSums *sums) {
-    double total[GPU_SUMS] = {0.0};
-    for (int i = 0; i < g->sum_blocks * GPU_SUMS; i++) {
-        total[i % GPU_SUMS] += g->host_sums[i];
+/* The first update is not captured, because cuBLAS loads its kernels then. */
+static MildStatus update(GpuLearner *g, PpoReport *report, MildError *error) {
+    Ppo *ppo = g->ppo;
+    if (!ppo->resident) {
+        upload(g, g->rollout, ppo->batch_block, ppo->batch_bytes);
     }
-    *sums = (LossSums){
-        .surrogate = total[GPU_SUM_SURROGATE],
-        .kl = total[GPU_SUM_KL],
-        .clipped = total[GPU_SUM_CLIPPED],
-        .reconstruction = total[GPU_SUM_RECONSTRUCTION],
-        .vae_kl = total[GPU_SUM_VAE_KL],
-        .estimate = {total[GPU_SUM_ESTIMATE], total[GPU_SUM_ESTIMATE + 1],
-                     total[GPU_SUM_ESTIMATE + 2]},
-        .mirror = total[GPU_SUM_MIRROR],
-        .value = total[GPU_SUM_VALUE],
-    };
+    if (g->updates++ == 1) {
+        capture_update(g);
+    }
+    if (g->graph) {
+        cudaGraphLaunch(g->graph, g->queue.stream);
+    } else {
+        enqueue_update(g);
+    }
+    GpuProgress progress;
+    download(g, &progress, g->progress, sizeof progress);
+    const MildStatus status = finish(g, "update", error);
+    if (status == MILD_OK) {
+        *report = progress.report;
+        ppo->iteration = progress.iteration;
+        ppo->adam_steps = progress.adam_steps;
+        ppo->learning_rate = progress.learning_rate;
+    }
+    return status;
 }
 
-static MildStatus learner_gradient(void *self, const LossContext *context, const int *samples,
-                                   int count, uint64_t latent_key, float *gradient, LossSums *sums,
-                                   MildError *error) {
-    GpuLearner *g = self;
-    upload_minibatch(g, samples, count);
-    for (int at = 0, image = 0; at < count; at += g->rows) {
-        g->chunk.rows = count - at < g->rows ? count - at : g->rows;
-        const int next = images_before(g, image, at + g->chunk.rows);
-        g->chunk.mirrored = next - image;
-        const ChunkJob job = {
-            context,          latent_key, g->order + at,        g->latent_row + at,
-            g->which + image, at,         at == 0 ? 0.0f : 1.0f};
-        gather(g, &job);
-        actor_half(g, &job);
-        critic_half(g, &job);
-        image = next;
-    }
-    download(g, gradient, g->gradient, (size_t)g->ppo->policy->network.count * sizeof *gradient);
-    download(g, g->host_sums, g->sums, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums);
-    MildStatus status = finish(g, "gradient", error);
-    add_sums(g, sums);
+static MildStatus learner_update(void *self, PpoReport *report, MildError *error) {
+    const int before = enter(self);
+    const MildStatus status = update(self, report, error);
+    leave(before);
     return status;
 }
 
 /* ---- creation ---- */
 
-int gpu_device(char *text, size_t size) {
+static void learner_destroy(void *self) {
+    GpuLearner *g = self;
+    const int before = enter(g);
+    if (g->pinned) {
+        cudaHostUnregister(g->pinned);
+    }
+    if (g->graph) {
+        cudaGraphExecDestroy(g->graph);
+    }
+    if (g->queue.blas) {
+        cublasDestroy(g->queue.blas);
+    }
+    cudaFree(g->block);
+    if (g->queue.stream) {
+        cudaStreamDestroy(g->queue.stream);
+    }
+    leave(before);
+    free(g->host_rows);
+    free(g->padded);
+    free(g);
+}
+
+/* Writes the name of the device as one line, or the reason why there is none. Returns whether there
+ * is one of that number. */
+static int describe(int device, char *text, size_t size) {
     int count = 0;
     struct cudaDeviceProp properties;
     cudaError_t code = cudaGetDeviceCount(&count);
-    if (code == cudaSuccess && count > 0) {
-        code = cudaGetDeviceProperties(&properties, 0);
+    if (code == cudaSuccess && device < count) {
+        code = cudaGetDeviceProperties(&properties, device);
     }
-    if (code != cudaSuccess || count <= 0) {
-        snprintf(text, size, "no CUDA device: %s",
-                 code ? cudaGetErrorString(code) : "none is installed");
+    if (code != cudaSuccess || device >= count) {
+        snprintf(text, size, "no CUDA device %d: %s", device,
+                 code         ? cudaGetErrorString(code)
+                 : count == 0 ? "none is installed"
+                              : "there are fewer");
         return 0;
     }
     snprintf(text, size, "%s, %.0f GiB, compute capability %d.%d", properties.name,
@@ -471,80 +474,163 @@ int gpu_device(char *text, size_t size) {
     return 1;
 }
 
-static void set_sizes(GpuLearner *g) {
-    const Ppo *ppo = g->ppo;
-    const PolicyDef *def = policy_def(ppo->policy);
-    const int64_t samples = (int64_t)ppo->batch.steps * ppo->batch.envs,
-                  all = samples + ppo->batch.envs;
-    g->rows = all < GPU_ROWS ? (int)all : GPU_ROWS;
-    g->minibatch = (int)((samples + ppo->def.minibatches - 1) / ppo->def.minibatches);
-    g->sum_blocks = gpu_blocks(2 * g->rows);
-    g->widths = (GpuWidths){ppo->policy->network.history,
-                            def->observation,
-                            def->estimates,
-                            def->latent,
-                            def->modulation_per_dimension,
-                            def->feet_velocity_offset,
-                            def->feet_velocity_count,
-                            def->actions};
+int gpu_device(char *text, size_t size) {
+    return describe(0, text, size);
+}
+
+static MildStatus open_memory(GpuLearner *g, const char *device, MildError *error) {
+    const double gibi = 1073741824.0;
+    size_t available = 0, total = 0;
+    g->bytes = layout(g, NULL);
+    if (cudaMalloc(&g->block, g->bytes) == cudaSuccess) {
+        layout(g, g->block);
+        return MILD_OK;
+    }
+    cudaGetLastError();
+    g->block = NULL;
+    cudaMemGetInfo(&available, &total);
+    return mild_fail(
+        error, MILD_ERROR_MEMORY,
+        "%s: %d robots x %d steps need %.1f GiB of its memory and %.1f are free, which "
+        "is enough for %d robots; lower train.envs or ppo.steps",
+        device, g->envs, g->batch.steps, (double)g->bytes / gibi, (double)available / gibi,
+        robots_that_fit(g, available));
 }
 
 static MildStatus open_device(GpuLearner *g, MildError *error) {
+    static const cublasComputeType_t arithmetic[PPO_MATMULS] = {
+        CUBLAS_COMPUTE_32F, CUBLAS_COMPUTE_32F_FAST_TF32, CUBLAS_COMPUTE_32F_FAST_16BF};
     char device[512];
-    if (!gpu_device(device, sizeof device)) {
+    if (!describe(g->device, device, sizeof device)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "%s; train.device = cpu needs none", device);
     }
-    const size_t bytes = layout(g, NULL);
+    GpuQueue *q = &g->queue;
+    q->arithmetic = arithmetic[g->ppo->def.matmul];
     MildStatus status =
-        check(cudaStreamCreateWithFlags(&g->queue.stream, cudaStreamNonBlocking), device, error);
-    if (!status && cudaMalloc(&g->block, bytes) != cudaSuccess) {
-        status = mild_fail(error, MILD_ERROR_MEMORY,
-                           "%s: no %.1f GiB free; lower train.envs or ppo.steps", device,
-                           (double)bytes / 1073741824.0);
+        check(cudaStreamCreateWithFlags(&q->stream, cudaStreamNonBlocking), device, error);
+    if (!status) {
+        status = open_memory(g, device, error);
     }
-    if (!status && (cublasCreate(&g->queue.blas) != CUBLAS_STATUS_SUCCESS ||
-                    cublasSetStream(g->queue.blas, g->queue.stream) != CUBLAS_STATUS_SUCCESS)) {
+    if (!status &&
+        (cublasCreate(&q->blas) != CUBLAS_STATUS_SUCCESS ||
+         cublasSetStream(q->blas, q->stream) != CUBLAS_STATUS_SUCCESS ||
+         cublasSetWorkspace(q->blas, g->workspace, WORKSPACE) != CUBLAS_STATUS_SUCCESS)) {
         status = mild_fail(error, MILD_ERROR_IO, "%s: cuBLAS does not start", device);
     }
     return status;
 }
 
-static MildStatus open_learner(GpuLearner *g, MildError *error) {
+/* latent_row and which of all minibatches, which are the same in every epoch. */
+static void fill_rows(GpuLearner *g) {
+    const int minibatches = g->ppo->def.minibatches;
+    const size_t samples = (size_t)g->batch.steps * (size_t)g->envs;
+    for (int m = 0, first = 0; m < minibatches; m++) {
+        int cut[PPO_SHARDS + 1];
+        const int count = order_cuts(g->batch.steps, g->envs, m, minibatches, cut);
+        ppo_latent_rows(cut, g->host_rows + first);
+        ppo_mirrored(g->ppo, cut, g->host_rows + samples + first);
+        first += count;
+    }
+    upload(g, g->latent_row, g->host_rows, samples * sizeof *g->host_rows);
+    upload(g, g->which, g->host_rows + samples, samples * sizeof *g->host_rows);
+}
+
+/* Pins the rollout on the CPU, which makes its copies several times as fast. A failure only costs
+ * speed. */
+static void pin_rollout(GpuLearner *g) {
     Ppo *ppo = g->ppo;
-    const Network *n = &ppo->policy->network;
-    set_sizes(g);
-    g->host_rows = malloc(2 * (size_t)g->minibatch * sizeof *g->host_rows);
-    g->host_sums = malloc((size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->host_sums);
-    if (!g->host_rows || !g->host_sums) {
+    if (cudaHostRegister(ppo->batch_block, ppo->batch_bytes, cudaHostRegisterDefault) ==
+        cudaSuccess) {
+        g->pinned = ppo->batch_block;
+    } else {
+        cudaGetLastError();
+    }
+}
+
+static MildStatus open_learner(GpuLearner *g, int resident, MildError *error) {
+    Ppo *ppo = g->ppo;
+    const PolicyDef *def = policy_def(ppo->policy);
+    const size_t samples = (size_t)ppo->batch.steps * (size_t)ppo->batch.envs;
+    g->network = gpu_network(&ppo->policy->network);
+    set_sizes(g, ppo->batch.envs);
+    g->host_rows = calloc(2 * samples, sizeof *g->host_rows);
+    g->padded = malloc((size_t)g->network.count * sizeof *g->padded);
+    if (!g->host_rows || !g->padded) {
         return mild_fail(error, MILD_ERROR_MEMORY, "no memory for a learner on the GPU");
     }
     MildStatus status = open_device(g, error);
     if (status) {
         return status;
     }
-    layout(g, g->block);
-    pin(g, 0, ppo->batch_block, ppo->batch_bytes);
-    pin(g, 1, ppo->policy->parameters, (size_t)n->count * sizeof(float));
-    pin(g, 2, ppo->gradient, (size_t)n->count * sizeof(float));
+    cudaMemsetAsync(g->block, 0, g->bytes, g->queue.stream);
+    cudaMemsetAsync(g->batch.valid, 1, samples, g->queue.stream);
+    fill_rows(g);
     if (ppo->mirror.observation_index) {
-        const size_t count = (size_t)n->def.observation + (size_t)n->def.actions;
+        const size_t count = (size_t)def->observation + (size_t)def->actions;
         upload(g, g->mirror_index, ppo->mirror_index, count * sizeof(int));
         upload(g, g->mirror_sign, ppo->mirror_sign, count * sizeof(float));
     }
-    return finish(g, "start", error);
+    if (resident) {
+        status = ppo_move_rollout(ppo, &g->batch, error);
+    } else {
+        pin_rollout(g);
+    }
+    gpu_enqueue_act(g, 0); /* loads the kernels of cuBLAS, which a capture of act could not */
+    return status ? status : push(g, error);
 }
 
-MildStatus gpu_learner_attach(Ppo *ppo, MildError *error) {
+MildStatus gpu_learner_attach(Ppo *ppo, const GpuLearnerDef *def, MildError *error) {
     GpuLearner *g = calloc(1, sizeof *g);
     if (!g) {
         return mild_fail(error, MILD_ERROR_MEMORY, "no memory for a learner on the GPU");
     }
     g->ppo = ppo;
-    MildStatus status = open_learner(g, error);
+    g->device = def->device;
+    g->wanted_rows = def->rows;
+    const int before = enter(g);
+    const MildStatus status = open_learner(g, def->resident, error);
+    leave(before);
     if (status) {
         learner_destroy(g);
         return status;
     }
-    ppo_use(ppo, &(PpoBackend){g, learner_act, learner_values, learner_gradient, learner_destroy});
+    ppo_use(ppo, &(PpoBackend){g, learner_act, learner_update, learner_pull, learner_push,
+                               learner_destroy});
     return MILD_OK;
+}
+
+/* ---- for the steps of the environments, tests and benches ---- */
+
+static GpuLearner *learner_of(const Ppo *ppo) {
+    return ppo->backend.destroy == learner_destroy ? ppo->backend.self : NULL;
+}
+
+void *gpu_learner_stream(const Ppo *ppo) {
+    const GpuLearner *g = learner_of(ppo);
+    return g ? g->queue.stream : NULL;
+}
+
+size_t gpu_learner_bytes(const Ppo *ppo) {
+    const GpuLearner *g = learner_of(ppo);
+    return g ? g->bytes : 0;
+}
+
+static MildStatus copy_rollout(const Ppo *ppo, void *to, const void *from, enum cudaMemcpyKind kind,
+                               MildError *error) {
+    GpuLearner *g = learner_of(ppo);
+    PpoBatch shape = g->batch;
+    const int before = enter(g);
+    cudaMemcpyAsync(to ? to : g->rollout, from ? from : g->rollout,
+                    ppo_place_batch(&shape, &ppo->policy->network, NULL), kind, g->queue.stream);
+    const MildStatus status = finish(g, "copy of the rollout", error);
+    leave(before);
+    return status;
+}
+
+MildStatus gpu_learner_write(Ppo *ppo, const void *block, MildError *error) {
+    return copy_rollout(ppo, NULL, block, cudaMemcpyHostToDevice, error);
+}
+
+MildStatus gpu_learner_read(Ppo *ppo, void *block, MildError *error) {
+    return copy_rollout(ppo, block, NULL, cudaMemcpyDeviceToHost, error);
 }

@@ -1,25 +1,25 @@
-/* A compute backend runs the learner's networks on a device other than the CPU. It computes the
- * same functions as policy_act, policy_value and ppo_gradient, from the same random numbers and
- * equal up to rounding. Optimiser, advantages, order of the samples and checkpoints
- * stay with the learner, so a resumed run may change its device. */
+/* A compute backend is the learner on a device other than the CPU: networks, optimiser and
+ * counters. It computes the same functions as ppo.c, from the same random numbers and equal up to
+ * rounding, so a resumed run may change its device. The rollout is in the arrays of the batch,
+ * which may be on the device too (ppo_is_resident). */
 #ifndef MILD_BACKEND_H
 #define MILD_BACKEND_H
 
-#include "learn/loss.h"
+#include "learn/ppo_batch.h"
+#include "mild/error.h"
 
-/* `self` is the first argument of every function. A function that fails gives the reason and may
- * leave its results unwritten. */
+/* `self` is the first argument of every function. A function that fails gives the reason. */
 typedef struct PpoBackend {
     void *self;
-    /* batch->mean at time t from batch->history at time t. */
+    /* As ppo_act. With a resident rollout it only enqueues work, and errors show in update. */
     MildStatus (*act)(void *self, int t, MildError *error);
-    /* batch->value from batch->critic. The rollout is complete. Until the next act() the learner
-     * changes only the parameters and the batch's advantage and returns. */
-    MildStatus (*values)(void *self, MildError *error);
-    /* Gradient of the loss over `count` samples of the batch into gradient [parameters], and the
-     * sums. latent_key: the random numbers of the sampled z, see ppo_latent_key. */
-    MildStatus (*gradient)(void *self, const LossContext *context, const int *samples, int count,
-                           uint64_t latent_key, float *gradient, LossSums *sums, MildError *error);
+    /* As ppo_update, without the rows that the next rollout begins with if they are on the CPU.
+     * Sets the learner's counters and learning rate. */
+    MildStatus (*update)(void *self, PpoReport *report, MildError *error);
+    /* Parameters, moments, running mean of the weights and ppo->start from the device to the
+     * learner, and back, with the counters, seed and learning rate. */
+    MildStatus (*pull)(void *self, MildError *error);
+    MildStatus (*push)(void *self, MildError *error);
     void (*destroy)(void *self);
 } PpoBackend;
 

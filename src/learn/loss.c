@@ -3,10 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "learn/loss_sample.h"
-
-#define HALF_LOG_2PI 0.91893853320467274
-
 size_t loss_carve(const Network *network, int rows, int mirrored, float *block, LossChunk *chunk) {
     const PolicyDef *def = &network->def;
     const Mlp *const mlps[] = {&network->encoder, &network->decoder, &network->modulation,
@@ -66,15 +62,6 @@ void loss_mirror_row(const LossContext *context, LossChunk *chunk, int from, int
     }
 }
 
-float loss_log_prob(int actions, const float *action, const float *mean, const float *std) {
-    double sum = 0.0;
-    for (int j = 0; j < actions; j++) {
-        double t = ((double)action[j] - mean[j]) / std[j];
-        sum -= 0.5 * t * t + log(std[j]) + HALF_LOG_2PI;
-    }
-    return (float)sum;
-}
-
 /* Clipped surrogate of sample r. */
 static void surrogate_row(const LossContext *c, const LossChunk *chunk, int r,
                           const float *constant, const float *mean, float *d_mean, float *d_log_std,
@@ -95,25 +82,12 @@ static void surrogate_row(const LossContext *c, const LossChunk *chunk, int r,
     sums->kl += s.kl;
 }
 
-void loss_surrogate_constants(const LossContext *c, float *constant) {
-    const int actions = c->network->def.actions;
-    double log_prob = 0.0, kl = 0.0;
-    for (int j = 0; j < actions; j++) {
-        double ratio = (double)c->old_std[j] / c->std[j];
-        constant[j] = 1.0f / c->std[j];
-        log_prob -= log(c->std[j]) + HALF_LOG_2PI;
-        kl += 0.5 * ratio * ratio - 0.5 - log(ratio);
-    }
-    constant[actions] = (float)log_prob;
-    constant[actions + 1] = (float)kl;
-}
-
 /* Surrogate and entropy sum log std: writes d_mean of the samples and the gradient of log std. */
 static void policy_loss(const LossContext *c, LossChunk *chunk, const float *mean, float *d_log_std,
                         float beta, LossSums *sums) {
     const int actions = c->network->def.actions;
     float constant[NETWORK_ACTIONS_MAX + 2];
-    loss_surrogate_constants(c, constant);
+    loss_surrogate_constants(actions, c->std, c->old_std, constant);
     float entropy_share =
         (float)((1.0 - c->def->epsilon) * c->def->entropy) * c->sample_weight * (float)chunk->rows;
     for (int j = 0; j < actions; j++) {

@@ -9,12 +9,9 @@
 #ifndef MILD_LOSS_H
 #define MILD_LOSS_H
 
+#include "learn/loss_sample.h"
 #include "learn/network.h"
 #include "learn/ppo_def.h"
-
-/* Groups of estimates: before, in and after the feet velocities. These are base velocity, feet
- * velocities and feet heights. */
-#define LOSS_GROUPS 3
 
 /* Constants of one minibatch. */
 typedef struct {
@@ -27,19 +24,6 @@ typedef struct {
     float std[NETWORK_ACTIONS_MAX];     /* [-] of the action noise now */
     float old_std[NETWORK_ACTIONS_MAX]; /* [-] in the rollout */
 } LossContext;
-
-/* Sums over samples, not yet divided. The entropy is missing, because it does not depend on the
- * sample. */
-typedef struct {
-    double surrogate;
-    double kl;      /* [nat] KL(old || new) of the action */
-    double clipped; /* samples whose ratio is outside the clip range */
-    double reconstruction;
-    double vae_kl; /* [nat] of the latent */
-    double estimate[LOSS_GROUPS];
-    double mirror;
-    double value;
-} LossSums;
 
 /* One chunk of `rows` samples. After them history holds `mirrored` more rows: the mirror images
  * of the first samples. */
@@ -87,13 +71,5 @@ void loss_actor(const LossContext *context, LossChunk *chunk, float *gradient, f
                 LossSums *sums);
 void loss_critic(const LossContext *context, LossChunk *chunk, float *gradient, float beta,
                  LossSums *sums);
-
-/* The part of the surrogate that is the same for all samples: 1/std [actions], then the constants
- * of log_prob and of KL(old || new), which is
- *     sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
-void loss_surrogate_constants(const LossContext *context, float *constant);
-
-/* log of the normal density of `action`, independent dimensions. */
-float loss_log_prob(int actions, const float *action, const float *mean, const float *std);
 
 #endif

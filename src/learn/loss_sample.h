@@ -7,13 +7,32 @@
 
 #include <math.h>
 
-#include "base/device.h"
+#include "base/both.h"
 #include "learn/vector.h"
 
 /* The log-variance is clamped to these bounds, so that e^logvar cannot overflow early in
  * training. */
 #define LOSS_LOGVAR_MIN (-12.0f)
 #define LOSS_LOGVAR_MAX 6.0f
+
+#define LOSS_HALF_LOG_2PI 0.91893853320467274
+
+/* Groups of estimates: before, in and after the feet velocities. These are base velocity, feet
+ * velocities and feet heights. */
+#define LOSS_GROUPS 3
+
+/* Sums over samples, not yet divided. The entropy is missing, because it does not depend on the
+ * sample. */
+typedef struct {
+    double surrogate;
+    double kl;      /* [nat] KL(old || new) of the action */
+    double clipped; /* samples whose ratio is outside the clip range */
+    double reconstruction;
+    double vae_kl; /* [nat] of the latent */
+    double estimate[LOSS_GROUPS];
+    double mirror;
+    double value;
+} LossSums;
 
 /* ---- clipped surrogate: -min(r A, clip(r) A), r = exp(log_prob - old_log_prob) ---- */
 
@@ -25,12 +44,39 @@ typedef struct {
 } LossSurrogate;
 
 /* Distance of an action from the mean, in standard deviations. inverse: 1 / std. */
-static inline MILD_HD float loss_standard(float action, float mean, float inverse) {
+static inline MILD_BOTH float loss_standard(float action, float mean, float inverse) {
     return (action - mean) * inverse;
 }
 
+/* The part of the surrogate that is the same for all samples: 1/std [actions], then the constants
+ * of log_prob and of KL(old || new), which is
+ *     sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
+static inline MILD_BOTH void loss_surrogate_constants(int actions, const float *std,
+                                                    const float *old_std, float *constant) {
+    double log_prob = 0.0, kl = 0.0;
+    for (int j = 0; j < actions; j++) {
+        const double ratio = (double)old_std[j] / (double)std[j];
+        constant[j] = 1.0f / std[j];
+        log_prob -= log((double)std[j]) + LOSS_HALF_LOG_2PI;
+        kl += 0.5 * ratio * ratio - 0.5 - log(ratio);
+    }
+    constant[actions] = (float)log_prob;
+    constant[actions + 1] = (float)kl;
+}
+
+/* log of the normal density of `action`, independent dimensions. */
+static inline MILD_BOTH float loss_log_prob(int actions, const float *action, const float *mean,
+                                          const float *std) {
+    double sum = 0.0;
+    for (int j = 0; j < actions; j++) {
+        const double t = ((double)action[j] - (double)mean[j]) / (double)std[j];
+        sum -= 0.5 * t * t + log((double)std[j]) + LOSS_HALF_LOG_2PI;
+    }
+    return (float)sum;
+}
+
 /* constant [actions + 2]: see loss_surrogate_constants. */
-static inline MILD_HD LossSurrogate loss_surrogate(int actions, const float *constant, float clip,
+static inline MILD_BOTH LossSurrogate loss_surrogate(int actions, const float *constant, float clip,
                                                    const float *action, const float *mean,
                                                    const float *old_mean, float old_log_prob,
                                                    float advantage) {
@@ -56,11 +102,11 @@ static inline MILD_HD LossSurrogate loss_surrogate(int actions, const float *con
 
 /* Converts the gradient with respect to log_prob to those with respect to the mean and the log std
  * of an action. t: loss_standard. */
-static inline MILD_HD float loss_mean_gradient(float d_log_prob, float t, float inverse) {
+static inline MILD_BOTH float loss_mean_gradient(float d_log_prob, float t, float inverse) {
     return d_log_prob * t * inverse;
 }
 
-static inline MILD_HD float loss_log_std_gradient(float d_log_prob, float t) {
+static inline MILD_BOTH float loss_log_std_gradient(float d_log_prob, float t) {
     return d_log_prob * (t * t - 1.0f);
 }
 
@@ -69,7 +115,7 @@ static inline MILD_HD float loss_log_std_gradient(float d_log_prob, float t) {
 /* Returns the sum. The gradient flows through both means, because either may be the better one.
  * Adds to d_mean and overwrites d_image. weight: of the gradient, which is twice the weight of the
  * sum. */
-static inline MILD_HD float loss_mirror(int actions, const int *index, const float *sign,
+static inline MILD_BOTH float loss_mirror(int actions, const int *index, const float *sign,
                                         float weight, const float *mean, const float *image,
                                         float *d_mean, float *d_image) {
     float sum = 0.0f;
@@ -90,7 +136,7 @@ static inline MILD_HD float loss_mirror(int actions, const int *index, const flo
 
 /* Mean square of the estimates begin .. end-1; adds to d. weight: twice that of the mean. An empty
  * group costs nothing. */
-static inline MILD_HD double loss_estimates(int begin, int end, float weight, const float *estimate,
+static inline MILD_BOTH double loss_estimates(int begin, int end, float weight, const float *estimate,
                                             const float *target, float *d) {
     if (begin == end) {
         return 0.0;
@@ -107,29 +153,29 @@ static inline MILD_HD double loss_estimates(int begin, int end, float weight, co
 
 /* ---- latent: z = mu + spread noise, KL(N(mu, e^logvar) || N(0, 1)) ---- */
 
-static inline MILD_HD float loss_held_logvar(float logvar) {
+static inline MILD_BOTH float loss_held_logvar(float logvar) {
     const float held = logvar < LOSS_LOGVAR_MIN ? LOSS_LOGVAR_MIN : logvar;
     return held > LOSS_LOGVAR_MAX ? LOSS_LOGVAR_MAX : held;
 }
 
 /* Standard deviation of the latent. */
-static inline MILD_HD float loss_spread(float logvar) {
+static inline MILD_BOTH float loss_spread(float logvar) {
     return vector_exp(0.5f * loss_held_logvar(logvar));
 }
 
 /* Twice the KL term of one dimension: mu^2 + e^logvar - 1 - logvar. */
-static inline MILD_HD float loss_latent_twice(float mu, float logvar, float spread) {
+static inline MILD_BOTH float loss_latent_twice(float mu, float logvar, float spread) {
     return mu * mu + spread * spread - 1.0f - loss_held_logvar(logvar);
 }
 
 /* d loss / d mu: from the decoder through z, and from the KL term. */
-static inline MILD_HD float loss_mu_gradient(float weight, float mu, float d_z) {
+static inline MILD_BOTH float loss_mu_gradient(float weight, float mu, float d_z) {
     return d_z + weight * mu;
 }
 
 /* d loss / d logvar. Outside its bounds the log-variance receives only gradients that lead back
  * inside. */
-static inline MILD_HD float loss_logvar_gradient(float weight, float logvar, float spread,
+static inline MILD_BOTH float loss_logvar_gradient(float weight, float logvar, float spread,
                                                  float noise, float d_z) {
     const float d = 0.5f * (d_z * spread * noise + weight * (spread * spread - 1.0f));
     const float outward = (logvar - loss_held_logvar(logvar)) * d;
@@ -141,7 +187,7 @@ static inline MILD_HD float loss_logvar_gradient(float weight, float logvar, flo
 /* Back through z~ = theta1 mu + theta2. heads and d_heads are [estimates | mu | logvar], d_input is
  * [estimates | z~]; theta has two numbers, or two for each latent dimension. Overwrites d_heads
  * (logvar: 0) and d_theta. */
-static inline MILD_HD void loss_modulation(int estimates, int latent, int per_dimension,
+static inline MILD_BOTH void loss_modulation(int estimates, int latent, int per_dimension,
                                            const float *heads, const float *theta,
                                            const float *d_input, float *d_heads, float *d_theta) {
     float d_scale = 0.0f;
@@ -171,7 +217,7 @@ static inline MILD_HD void loss_modulation(int estimates, int latent, int per_di
 
 /* Returns the gap whose square is the loss, and writes half of the gradient. Where the clipped
  * branch is the larger one, its gradient is that of V inside the clip range and 0 outside. */
-static inline MILD_HD float loss_value(int clip_value, float clip, float value, float old_value,
+static inline MILD_BOTH float loss_value(int clip_value, float clip, float value, float old_value,
                                        float returns, float *half_gradient) {
     const float gap = value - returns;
     const float move = value - old_value;

@@ -4,13 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/random.h"
 #include "learn/noise.h"
 #include "learn/ppo_gradient.h"
 #include "learn/ppo_returns.h"
+#include "learn/ppo_step.h"
+#include "learn/returns.h"
 
-/* Places the arrays of the batch in the block. With NULL it only counts bytes. */
-static size_t batch_layout(PpoBatch *b, const Network *n, char *block) {
+size_t ppo_place_batch(PpoBatch *b, const Network *n, void *block) {
     const size_t samples = (size_t)b->steps * (size_t)b->envs, more = samples + (size_t)b->envs;
     struct {
         float **at;
@@ -30,7 +30,7 @@ static size_t batch_layout(PpoBatch *b, const Network *n, char *block) {
     };
     size_t used = 0;
     for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
-        *areas[i].at = mlp_carve((float *)(void *)block, &used, areas[i].count);
+        *areas[i].at = mlp_carve(block, &used, areas[i].count);
     }
     used *= sizeof(float);
     uint8_t **flags[] = {&b->done, &b->timeout, &b->valid};
@@ -75,17 +75,18 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
         !take_mirror(ppo, mirror)) {
         return 0;
     }
+    const int largest = order_largest(ppo->batch.steps, ppo->batch.envs, ppo->def.minibatches);
     LossChunk chunk;
     ppo->stride = (count + 15) / 16 * 16;
     ppo->scratch_floats = loss_carve(n, PPO_CHUNK, ppo->mirror_rows, NULL, &chunk);
-    ppo->batch_bytes = batch_layout(&ppo->batch, n, NULL);
+    ppo->batch_bytes = ppo_place_batch(&ppo->batch, n, NULL);
     ppo->batch_block = take(ppo, ppo->batch_bytes);
     ppo->gradient = take(ppo, PPO_SHARDS * ppo->stride * sizeof(float));
     ppo->first = take(ppo, count * sizeof(float));
     ppo->second = take(ppo, count * sizeof(float));
     ppo->scratch = take(ppo, (size_t)pool_threads(ppo->pool) * ppo->scratch_floats * sizeof(float));
-    ppo->order = take(ppo, samples * sizeof *ppo->order);
-    ppo->draw = take(ppo, samples * sizeof *ppo->draw);
+    ppo->order = take(ppo, (size_t)largest * sizeof *ppo->order);
+    ppo->substitute = take(ppo, samples * sizeof *ppo->substitute);
     if (ppo->def.average > 0.0) {
         ppo->average = policy_create(policy_def(ppo->policy), ppo->seed, NULL);
         ppo->bytes += count * sizeof(float);
@@ -95,12 +96,13 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
         memcpy(policy_parameters(ppo->average), ppo->policy->parameters, count * sizeof(float));
     }
     if (!ppo->batch_block || !ppo->gradient || !ppo->first || !ppo->second || !ppo->scratch ||
-        !ppo->order || !ppo->draw) {
+        !ppo->order || !ppo->substitute) {
         return 0;
     }
     memset(ppo->batch_block, 0, ppo->batch_bytes);
-    batch_layout(&ppo->batch, n, ppo->batch_block);
+    ppo_place_batch(&ppo->batch, n, ppo->batch_block);
     memset(ppo->batch.valid, 1, samples);
+    ppo->start = ppo->batch;
     memset(ppo->first, 0, count * sizeof(float));
     memset(ppo->second, 0, count * sizeof(float));
     return 1;
@@ -179,9 +181,57 @@ void ppo_destroy(Ppo *ppo) {
         free(ppo->second);
         free(ppo->scratch);
         free(ppo->order);
-        free(ppo->draw);
+        free(ppo->substitute);
         free(ppo);
     }
+}
+
+/* Copies the rows of time t of `from` to time 0 of `to`. */
+static void copy_rows(const Network *n, const PpoBatch *to, const PpoBatch *from, int t) {
+    const struct {
+        float *to;
+        const float *from;
+        int width;
+    } areas[] = {{to->history, from->history, n->history},
+                 {to->critic, from->critic, n->def.critic_input},
+                 {to->target, from->target, n->def.estimates},
+                 {to->frame, from->frame, n->def.observation}};
+    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
+        const size_t floats = (size_t)from->envs * (size_t)areas[i].width;
+        memcpy(areas[i].to, areas[i].from + (size_t)t * floats, floats * sizeof(float));
+    }
+}
+
+MildStatus ppo_move_rollout(Ppo *ppo, const PpoBatch *device, MildError *error) {
+    const Network *n = &ppo->policy->network;
+    PpoBatch start = {.steps = 0, .envs = ppo->batch.envs};
+    const size_t bytes = ppo_place_batch(&start, n, NULL), before = ppo->bytes;
+    void *block = take(ppo, bytes);
+    if (!block) {
+        ppo->bytes = before;
+        return mild_fail(error, MILD_ERROR_MEMORY, "no memory for the observations of %d robots",
+                         start.envs);
+    }
+    ppo_place_batch(&start, n, block);
+    copy_rows(n, &start, &ppo->start, 0);
+    free(ppo->batch_block);
+    ppo->bytes -= (ppo->batch_bytes + 63) / 64 * 64;
+    ppo->batch_block = block;
+    ppo->batch_bytes = bytes;
+    ppo->start = start;
+    ppo->batch = *device;
+    ppo->resident = 1;
+    return MILD_OK;
+}
+
+size_t ppo_batch_like(const Ppo *ppo, void *block, PpoBatch *batch) {
+    batch->steps = ppo->batch.steps;
+    batch->envs = ppo->batch.envs;
+    return ppo_place_batch(batch, &ppo->policy->network, block);
+}
+
+int ppo_is_resident(const Ppo *ppo) {
+    return ppo->resident;
 }
 
 PpoBatch *ppo_batch(Ppo *ppo) {
@@ -192,7 +242,12 @@ size_t ppo_bytes(const Ppo *ppo) {
     return ppo->bytes;
 }
 
+MildStatus ppo_pull(Ppo *ppo, MildError *error) {
+    return ppo->backend.pull ? ppo->backend.pull(ppo->backend.self, error) : MILD_OK;
+}
+
 Policy *ppo_average(Ppo *ppo) {
+    ppo_pull(ppo, ppo->error.status ? NULL : &ppo->error);
     return ppo->average ? ppo->average : ppo->policy;
 }
 
@@ -241,181 +296,90 @@ void ppo_act(Ppo *ppo, int t) {
     const int64_t first = (int64_t)t * b->envs;
     if (ppo->backend.act) {
         ppo->backend.act(ppo->backend.self, t, &ppo->error);
-    } else {
-        policy_act(ppo->policy, ppo->pool, b->envs, b->history + first * n->history,
-                   b->mean + first * n->def.actions, NULL, NULL);
+        return;
     }
-    Random key = random_at(ppo->seed, (uint32_t)ppo->iteration, (uint32_t)t);
-    ActJob job = {ppo, t, random_bits(&key), policy_std(ppo->policy)};
+    policy_act(ppo->policy, ppo->pool, b->envs, b->history + first * n->history,
+               b->mean + first * n->def.actions, NULL, NULL);
+    ActJob job = {ppo, t, step_action_key(ppo->seed, ppo->iteration, t), policy_std(ppo->policy)};
     pool_run(ppo->pool, PPO_PIECES, act_piece, &job);
 }
 
 typedef struct {
     Ppo *ppo;
-    Random random;
-} ShuffleJob;
+    int epoch, m;
+    const int *cut;
+} OrderJob;
 
-static void draw_piece(void *context, int piece, int thread) {
+static void order_shard(void *context, int shard, int thread) {
     (void)thread;
-    const ShuffleJob *job = context;
-    const int end = ppo_piece_begin(job->ppo->samples, piece + 1);
-    for (int k = ppo_piece_begin(job->ppo->samples, piece); k < end; k++) {
-        Random random = job->random;
-        random.use = (uint32_t)k;
-        job->ppo->draw[k] = (int)random_index(&random, (uint32_t)(job->ppo->samples - k));
+    const OrderJob *job = context;
+    Ppo *ppo = job->ppo;
+    const PpoBatch *b = &ppo->batch;
+    const OrderStratum stratum = order_stratum(b->steps, b->envs, shard);
+    const Order order = order_make(stratum.count, ppo->seed, ppo->iteration, job->epoch, shard);
+    const int first = order_begin(stratum.count, job->m, ppo->def.minibatches);
+    for (int p = job->cut[shard]; p < job->cut[shard + 1]; p++) {
+        const int k = order_at(&order, first + p - job->cut[shard]);
+        ppo->order[p] = ppo->substitute[order_sample(stratum, b->envs, k)];
     }
 }
 
-/* Fisher-Yates: a pure function of (seed, iteration, epoch). */
-static void shuffle(Ppo *ppo, int epoch) {
-    ShuffleJob job = {
-        ppo, random_at(ppo->seed ^ 0x6f72646572u, (uint32_t)ppo->iteration, (uint32_t)epoch)};
-    pool_run(ppo->pool, PPO_PIECES, draw_piece, &job);
-    for (int i = ppo->samples - 1; i > 0; i--) {
-        int j = ppo->draw[ppo->samples - 1 - i], held = ppo->order[i];
-        ppo->order[i] = ppo->order[j];
-        ppo->order[j] = held;
-    }
+/* Samples of minibatch m of the epoch. */
+static PpoMinibatch draw_minibatch(Ppo *ppo, int epoch, int m) {
+    const int minibatches = ppo->def.minibatches;
+    PpoMinibatch minibatch = {.samples = ppo->order, .draw = (uint32_t)(epoch * minibatches + m)};
+    order_cuts(ppo->batch.steps, ppo->batch.envs, m, minibatches, minibatch.cut);
+    OrderJob job = {ppo, epoch, m, minibatch.cut};
+    pool_run(ppo->pool, PPO_SHARDS, order_shard, &job);
+    return minibatch;
 }
 
-/* 0 before the annealing, 1 after it. A function of the iteration alone, so a resumed run
- * continues in the same way. */
-static double anneal_share(const Ppo *ppo) {
-    const int first = ppo->def.anneal[0], last = ppo->def.anneal[1];
-    return first < last ? fmin(fmax((double)(ppo->iteration - first) / (last - first), 0.0), 1.0)
-                        : 0.0;
-}
-
-/* The rate that keeps the divergence from the rollout's policy near its target [vendor:
- * factor 1.5]. */
-static void adapt_learning_rate(Ppo *ppo, double kl) {
-    const PpoDef *def = &ppo->def;
-    const double anneal = pow(def->anneal_factor, anneal_share(ppo)),
-                 target = anneal * def->kl_target;
-    if (kl > 2.0 * target) {
-        ppo->learning_rate /= 1.5;
-    } else if (kl > 0.0 && kl < 0.5 * target) {
-        ppo->learning_rate *= 1.5;
-    }
-    const double most = fmax(anneal * def->learning_rate_max, def->learning_rate_min);
-    ppo->learning_rate = fmin(fmax(ppo->learning_rate, def->learning_rate_min), most);
-}
-
-/* Applied between updates, so that the rollout samples from the distribution that the update
- * compares with. */
 static void bound_noise(Ppo *ppo) {
-    const double *std_max = ppo->def.std_max;
-    const float ceiling =
-        (float)(log(std_max[0]) + anneal_share(ppo) * log(std_max[1] / std_max[0]));
     const Network *n = &ppo->policy->network;
+    const float ceiling = step_noise_ceiling(&ppo->def, ppo->iteration);
     for (int64_t i = n->log_std; i < n->count; i++) {
         ppo->policy->parameters[i] = fminf(ppo->policy->parameters[i], ceiling);
     }
 }
 
-/* A young average decays faster, because otherwise it would retain the initial weights for long. */
 static void average_weights(Ppo *ppo) {
-    const double young = (1.0 + (double)ppo->iteration) / (10.0 + (double)ppo->iteration);
-    const float step = (float)(1.0 - fmin(ppo->def.average, young));
+    const float share = step_average(&ppo->def, ppo->iteration);
     const float *now = ppo->policy->parameters;
     float *mean = policy_parameters(ppo->average);
     for (int64_t i = 0; i < ppo->policy->network.count; i++) {
-        mean[i] += step * (now[i] - mean[i]);
+        mean[i] += share * (now[i] - mean[i]);
     }
 }
 
-static double entropy_of(const LossContext *context) {
-    double entropy = 0.0;
-    for (int j = 0; j < context->network->def.actions; j++) {
-        entropy += log(context->std[j]) + 1.4189385332046727; /* (1 + ln 2 pi) / 2 */
-    }
-    return entropy;
-}
-
-/* Adds the means of a minibatch to the report. Returns 0 when one of them is not finite. */
-static int report_minibatch(PpoReport *report, const LossContext *context, const LossSums *s,
-                            double norm) {
-    const double w = context->sample_weight;
-    const double check = s->surrogate + s->kl + s->reconstruction + s->vae_kl + s->estimate[0] +
-                         s->estimate[1] + s->estimate[2] + s->mirror + s->value + norm;
-    if (!isfinite(check)) {
+/* Returns whether a step was taken. */
+static int update_minibatch(Ppo *ppo, LossContext *context, const PpoMinibatch *minibatch,
+                            PpoReport *report) {
+    const int count = minibatch->cut[PPO_SHARDS],
+              mirrored = ppo_mirrored(ppo, minibatch->cut, NULL);
+    if (count == 0 || ppo->starved) {
+        report->skipped += count > 0;
         return 0;
     }
-    report->surrogate += w * s->surrogate;
-    report->kl += w * s->kl;
-    report->clip_share += w * s->clipped;
-    report->vae_reconstruction += w * s->reconstruction;
-    report->vae_kl += w * s->vae_kl;
-    for (int g = 0; g < LOSS_GROUPS; g++) {
-        report->estimate_loss[g] += w * s->estimate[g];
-    }
-    report->mirror += context->mirror_weight * s->mirror;
-    report->value_loss += w * s->value;
-    report->entropy += entropy_of(context);
-    report->gradient_norm += norm;
-    return 1;
-}
-
-static int update_minibatch(Ppo *ppo, LossContext *context, const int *samples, int count,
-                            uint32_t draw, PpoReport *report) {
-    const int mirrored = ppo_mirrored(ppo, count, NULL);
     context->sample_weight = 1.0f / (float)count;
     context->mirror_weight = mirrored > 0 ? 1.0f / (float)mirrored : 0.0f;
     memcpy(context->std, policy_std(ppo->policy),
            (size_t)context->network->def.actions * sizeof *context->std);
     LossSums sums;
     double norm;
-    ppo_gradient(ppo, context, samples, count, draw, &sums, &norm);
-    if (!report_minibatch(report, context, &sums, norm)) {
+    ppo_gradient(ppo, context, minibatch, &sums, &norm);
+    const double entropy = step_entropy(context->network->def.actions, context->std);
+    if (!step_report(report, &sums, (double)context->sample_weight, (double)context->mirror_weight,
+                     entropy, norm)) {
         report->skipped++;
         return 0;
     }
-    if (ppo->def.kl_target > 0.0) {
-        adapt_learning_rate(ppo, sums.kl / count);
-    }
-    ppo_optimise(ppo, norm > ppo->def.max_gradient_norm ? ppo->def.max_gradient_norm / norm : 1.0);
+    ppo->learning_rate =
+        step_learning_rate(&ppo->def, ppo->iteration, ppo->learning_rate, sums.kl / count);
+    ppo_optimise(ppo, step_clip(&ppo->def, norm));
     return 1;
 }
 
-/* Sums over minibatches become means. */
-static void finish_report(const Ppo *ppo, PpoReport *report, int minibatches) {
-    const double w = minibatches > 0 ? 1.0 / minibatches : 0.0;
-    double *const means[] = {&report->surrogate,        &report->value_loss,
-                             &report->entropy,          &report->kl,
-                             &report->clip_share,       &report->gradient_norm,
-                             &report->mirror,           &report->vae_kl,
-                             &report->estimate_loss[0], &report->estimate_loss[1],
-                             &report->estimate_loss[2], &report->vae_reconstruction};
-    for (size_t i = 0; i < sizeof means / sizeof *means; i++) {
-        *means[i] *= w;
-    }
-    const int actions = policy_def(ppo->policy)->actions;
-    const float *std = policy_std(ppo->policy);
-    for (int j = 0; j < actions; j++) {
-        report->action_std += (double)std[j] / actions;
-    }
-    report->learning_rate = ppo->learning_rate;
-}
-
-/* The rows after the last step are the first rows of the next rollout. */
-static void carry_over(Ppo *ppo) {
-    const Network *n = &ppo->policy->network;
-    PpoBatch *b = &ppo->batch;
-    const struct {
-        float *at;
-        int width;
-    } areas[] = {{b->history, n->history},
-                 {b->critic, n->def.critic_input},
-                 {b->target, n->def.estimates},
-                 {b->frame, n->def.observation}};
-    for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
-        size_t floats = (size_t)b->envs * (size_t)areas[i].width;
-        memcpy(areas[i].at, areas[i].at + (size_t)b->steps * floats, floats * sizeof(float));
-    }
-}
-
-/* Replaces each frame of the piece's environments by its successor. The last frame of an episode
- * and a frame before one that is not valid stay. */
+/* Replaces each frame of the piece's environments by its successor. */
 static void shift_piece(void *context, int piece, int thread) {
     (void)thread;
     const Ppo *ppo = context;
@@ -425,7 +389,7 @@ static void shift_piece(void *context, int piece, int thread) {
     for (int t = 0; t < b->steps; t++) {
         for (int env = first; env < end; env++) {
             const int64_t now = (int64_t)t * b->envs + env, next = now + b->envs;
-            if (!b->done[now] && (t + 1 == b->steps || b->valid[next])) {
+            if (returns_has_next(b, t, now)) {
                 memcpy(b->frame + now * width, b->frame + next * width,
                        (size_t)width * sizeof *b->frame);
             }
@@ -433,41 +397,42 @@ static void shift_piece(void *context, int piece, int thread) {
     }
 }
 
-void ppo_update(Ppo *ppo, PpoReport *report) {
+static void update(Ppo *ppo, PpoReport *report) {
     const Network *n = &ppo->policy->network;
     PpoBatch *b = &ppo->batch;
-    *report = (PpoReport){0};
     if (ppo->def.decoder_target == PPO_TARGET_NEXT) {
         pool_run(ppo->pool, PPO_PIECES, shift_piece, ppo);
     }
-    if (ppo->backend.values) {
-        ppo->backend.values(ppo->backend.self, &ppo->error);
-    } else {
-        policy_value(ppo->policy, ppo->pool, (b->steps + 1) * b->envs, b->critic, b->value);
-    }
+    policy_value(ppo->policy, ppo->pool, (b->steps + 1) * b->envs, b->critic, b->value);
     ppo_returns(ppo, report);
 
     LossContext context = {.def = &ppo->def, .network = n, .parameters = ppo->policy->parameters};
     context.mirror = ppo->mirror.observation_index ? &ppo->mirror : NULL;
     memcpy(context.old_std, policy_std(ppo->policy),
            (size_t)n->def.actions * sizeof *context.old_std);
-    int done = 0;
+    int taken = 0;
     for (int epoch = 0; epoch < ppo->def.epochs; epoch++) {
-        shuffle(ppo, epoch);
         for (int m = 0; m < ppo->def.minibatches; m++) {
-            int begin = (int)((int64_t)ppo->samples * m / ppo->def.minibatches),
-                end = (int)((int64_t)ppo->samples * (m + 1) / ppo->def.minibatches);
-            if (begin < end) {
-                done += update_minibatch(ppo, &context, ppo->order + begin, end - begin,
-                                         (uint32_t)(epoch * ppo->def.minibatches + m), report);
-            }
+            const PpoMinibatch minibatch = draw_minibatch(ppo, epoch, m);
+            taken += update_minibatch(ppo, &context, &minibatch, report);
         }
     }
     bound_noise(ppo);
     if (ppo->average) {
         average_weights(ppo);
     }
-    finish_report(ppo, report, done);
-    carry_over(ppo);
+    step_finish_report(report, taken, n->def.actions, policy_std(ppo->policy), ppo->learning_rate);
     ppo->iteration++;
+}
+
+void ppo_update(Ppo *ppo, PpoReport *report) {
+    *report = (PpoReport){0};
+    if (ppo->backend.update) {
+        ppo->backend.update(ppo->backend.self, report, &ppo->error);
+    } else {
+        update(ppo, report);
+    }
+    if (!ppo->resident) { /* the rows after the last step are the first of the next rollout */
+        copy_rows(&ppo->policy->network, &ppo->batch, &ppo->batch, ppo->batch.steps);
+    }
 }

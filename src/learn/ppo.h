@@ -17,20 +17,30 @@ void ppo_destroy(Ppo *ppo);
  * ppo_destroy destroys. */
 struct PpoBackend;
 void ppo_use(Ppo *ppo, const struct PpoBackend *backend);
+/* The rollout. Its arrays are on the backend's device if ppo_is_resident, else on the CPU. The
+ * caller writes the rows of time 0 of the first rollout, and those of time t + 1 after act(t). */
 PpoBatch *ppo_batch(Ppo *ppo);
+int ppo_is_resident(const Ppo *ppo);
+/* Places arrays of the rollout's shape in a block that is aligned to 64 bytes, and returns their
+ * bytes. NULL: only counts them. */
+size_t ppo_batch_like(const Ppo *ppo, void *block, PpoBatch *batch);
 size_t ppo_bytes(const Ppo *ppo); /* memory held */
 /* Fills batch->action/mean/log_prob at time t from batch->history[t]; noise is a function of (seed,
- * iteration, t, env). */
+ * iteration, t, env). With a resident rollout it only enqueues work on the backend's stream. */
 void ppo_act(Ppo *ppo, int t);
 /* Computes values and advantages, runs the epochs of minibatches, moves the rows of time `steps` to
- * time 0 for the next rollout, and increments the iteration. */
+ * time 0 for the next rollout, and increments the iteration. On a device the parameters of the
+ * policy on the CPU stay as they were: see ppo_pull. */
 void ppo_update(Ppo *ppo, PpoReport *report);
 int64_t ppo_iteration(const Ppo *ppo);
+/* Brings policy, running mean and the rows of time 0 on the CPU up to date with the device.
+ * ppo_save and ppo_average do it themselves. Nothing to do without a backend. */
+MildStatus ppo_pull(Ppo *ppo, MildError *error);
 /* The running mean of the weights (Polyak and Juditsky 1992), or the policy itself with def.average
  * = 0. Owned by ppo. */
 Policy *ppo_average(Ppo *ppo);
-/* The error that stopped the compute backend, if any. The parameters are those of the last step
- * that succeeded. */
+/* The error that stopped the compute backend, if any. The parameters on the CPU are those of the
+ * last ppo_pull. */
 MildStatus ppo_status(const Ppo *ppo, MildError *error);
 
 /* Saves everything that resuming needs: parameters, moments, learning rate, counters, and a block

@@ -10,7 +10,7 @@ typedef struct {
     float *history; /* [steps+1][envs][frames*observation] */
     float *critic;  /* [steps+1][envs][critic_input] */
     float *target;  /* [steps+1][envs][estimates] true estimates for the regression heads */
-    /* [steps+1][envs][observation] Newest frame, as the policy saw it. The update replaces rows
+    /* [steps+1][envs][observation] Newest frame, as the policy saw it. The update may replace rows
      * 0 .. steps - 1 by the decoder's targets. */
     float *frame;
     float *action;    /* [steps][envs][actions] sampled */
@@ -20,7 +20,7 @@ typedef struct {
     uint8_t *done;    /* [steps][envs] episode ended at this step (failure or time-out) */
     uint8_t *timeout; /* [steps][envs] ended by time: bootstrap with gamma * V(s_t) */
     uint8_t *valid;   /* [steps][envs] 0: a number was not finite here; the sample gets no weight */
-    /* filled by the learner */
+    /* filled by the learner; on a device, only where the rollout is resident */
     float *value;     /* [steps+1][envs] */
     float *advantage; /* [steps][envs] */
     float *returns;   /* [steps][envs] */

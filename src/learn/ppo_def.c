@@ -28,6 +28,7 @@ PpoDef ppo_def_default(void) {
 }
 
 static const char *const target_names[PPO_TARGETS] = {"newest", "next"};
+static const char *const matmul_names[PPO_MATMULS] = {"fp32", "tf32", "bf16"};
 
 const MildField ppo_fields[] = {
     MILD_FIELD(PpoDef, steps, MILD_FIELD_INT, 1, 1, 1024, "[-] rollout length per environment"),
@@ -78,5 +79,9 @@ const MildField ppo_fields[] = {
         PpoDef, average, MILD_FIELD_DOUBLE, 1, 0.0, 0.9999,
         "[-] decay per iteration of the running mean of the weights; the mean is saved as the "
         "policy; 0: no mean"),
+    MILD_FIELD_CHOICE(
+        PpoDef, matmul, matmul_names, PPO_MATMULS,
+        "[-] arithmetic of the matrix products with train.device = cuda; tf32 and bf16 "
+        "round the factors (docs/gpu.md)"),
 };
 const int ppo_field_count = (int)(sizeof ppo_fields / sizeof *ppo_fields);

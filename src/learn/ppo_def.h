@@ -10,6 +10,10 @@
  * the newest one anyway. The last frame of an episode has no successor and is its own target. */
 typedef enum { PPO_TARGET_NEWEST, PPO_TARGET_NEXT, PPO_TARGETS } PpoTarget;
 
+/* Arithmetic of the matrix products on a GPU: 32-bit floats, or factors rounded to 11 (TF32) or 8
+ * (bfloat16) significant bits, which the tensor cores multiply. Sums have 32 bits always. */
+typedef enum { PPO_MATMUL_FP32, PPO_MATMUL_TF32, PPO_MATMUL_BF16, PPO_MATMULS } PpoMatmul;
+
 typedef struct {
     int steps;       /* rollout length per environment, 24 */
     int epochs;      /* 4 */
@@ -36,6 +40,7 @@ typedef struct {
     double std_max[2];    /* upper bound of the action noise before and after it */
     double average; /* decay per iteration of the running mean of the weights, which is saved as the
                        policy; 0: none */
+    int matmul;     /* a PpoMatmul */
 } PpoDef;
 PpoDef ppo_def_default(void);
 extern const MildField ppo_fields[];

@@ -27,7 +27,7 @@ static Safetensor tensor_of(const char *name, SafetensorsType type, const void *
 static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const void *extra,
                          size_t extra_size, Safetensor tensors[TRAIN_TENSORS]) {
     const Network *n = &ppo->policy->network;
-    const PpoBatch *b = &ppo->batch;
+    const PpoBatch *b = &ppo->start;
     const int64_t envs = b->envs;
     int count = 0;
     tensors[count++] = tensor_of("train.counters", SAFETENSORS_I64, counters, COUNTERS);
@@ -53,6 +53,11 @@ static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const
 
 MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size,
                     const char *note, MildError *error) {
+    const PpoBackend *backend = &ppo->backend;
+    MildStatus status = backend->pull ? backend->pull(backend->self, error) : MILD_OK;
+    if (status) {
+        return status;
+    }
     PolicyTensors policy;
     PolicyTexts texts;
     Safetensor all[TRAIN_TENSORS + POLICY_TENSORS_MAX];
@@ -144,10 +149,10 @@ static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters
     } areas[] = {
         {"train.first_moment", ppo->first},
         {"train.second_moment", ppo->second},
-        {"train.history", ppo->batch.history},
-        {"train.critic", ppo->batch.critic},
-        {"train.target", ppo->batch.target},
-        {"train.frame", ppo->batch.frame},
+        {"train.history", ppo->start.history},
+        {"train.critic", ppo->start.critic},
+        {"train.target", ppo->start.target},
+        {"train.frame", ppo->start.frame},
         {"train.average", ppo->average ? policy_parameters(ppo->average) : NULL},
         {"train.extra", extra},
     };
@@ -194,7 +199,7 @@ static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path,
         memcpy(policy_parameters(ppo->average), spare, (size_t)n->count * sizeof *spare);
     }
     take_train(ppo, file, counters, learning_rate, extra);
-    return MILD_OK;
+    return ppo->backend.push ? ppo->backend.push(ppo->backend.self, error) : MILD_OK;
 }
 
 MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra,

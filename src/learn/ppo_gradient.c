@@ -3,34 +3,28 @@
 #include <math.h>
 #include <string.h>
 
-#include "base/random.h"
 #include "learn/adam.h"
 #include "learn/noise.h"
+#include "learn/ppo_step.h"
 #include "learn/product.h"
 
 typedef struct {
     Ppo *ppo;
     const LossContext *loss;
-    const int *samples;
-    int count;
-    uint32_t draw;
+    const PpoMinibatch *minibatch;
     LossSums sums[2 * PPO_SHARDS];
     double squares[PPO_RANGES];
 } GradientJob;
-
-static int shard_begin(int count, int shard) {
-    return (int)((int64_t)count * shard / PPO_SHARDS);
-}
 
 static int chunk_mirrored(const Ppo *ppo, int rows) {
     return ppo->mirror.observation_index ? (int)(ppo->def.mirror_share * rows + 0.5) : 0;
 }
 
-int ppo_mirrored(const Ppo *ppo, int count, int *which) {
+int ppo_mirrored(const Ppo *ppo, const int *cut, int *which) {
     int total = 0;
     for (int s = 0; s < PPO_SHARDS; s++) {
-        int end = shard_begin(count, s + 1);
-        for (int at = shard_begin(count, s); at < end; at += PPO_CHUNK) {
+        const int end = cut[s + 1];
+        for (int at = cut[s]; at < end; at += PPO_CHUNK) {
             int images = chunk_mirrored(ppo, end - at < PPO_CHUNK ? end - at : PPO_CHUNK);
             for (int r = 0; which && r < images; r++) {
                 which[total + r] = at + r;
@@ -41,17 +35,11 @@ int ppo_mirrored(const Ppo *ppo, int count, int *which) {
     return total;
 }
 
-uint64_t ppo_latent_key(const Ppo *ppo, uint32_t draw) {
-    Random key = random_at(ppo->seed ^ 0x76616573u, (uint32_t)ppo->iteration, draw);
-    return random_bits(&key);
-}
-
 /* A chunk that begins at sample `at` takes its numbers from 2 at latent onward (gather_actor). */
-void ppo_latent_rows(int count, int *row) {
+void ppo_latent_rows(const int *cut, int *row) {
     for (int s = 0; s < PPO_SHARDS; s++) {
-        int begin = shard_begin(count, s), end = shard_begin(count, s + 1);
-        for (int p = begin; p < end; p++) {
-            row[p] = p + begin + (p - begin) / PPO_CHUNK * PPO_CHUNK;
+        for (int p = cut[s]; p < cut[s + 1]; p++) {
+            row[p] = p + cut[s] + (p - cut[s]) / PPO_CHUNK * PPO_CHUNK;
         }
     }
 }
@@ -65,7 +53,7 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
     const Network *n = &ppo->policy->network;
     const PpoBatch *b = &ppo->batch;
     for (int r = 0; r < chunk->rows; r++) {
-        int64_t i = job->samples[at + r];
+        int64_t i = job->minibatch->samples[at + r];
         copy_row(chunk->history, r, b->history, i, n->history);
         copy_row(chunk->estimate, r, b->target, i, n->def.estimates);
         copy_row(chunk->decoder_target, r, b->frame, i, n->def.observation);
@@ -77,15 +65,15 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
     for (int r = 0; r < chunk->mirrored; r++) {
         loss_mirror_row(job->loss, chunk, r, chunk->rows + r);
     }
-    noise_normal(ppo_latent_key(ppo, job->draw), 2 * (int64_t)at * n->def.latent,
-                 chunk->rows * n->def.latent, chunk->noise);
+    noise_normal(step_latent_key(ppo->seed, ppo->iteration, job->minibatch->draw),
+                 2 * (int64_t)at * n->def.latent, chunk->rows * n->def.latent, chunk->noise);
 }
 
 static void gather_critic(const GradientJob *job, int at, LossChunk *chunk) {
     const PpoBatch *b = &job->ppo->batch;
     const int width = job->ppo->policy->network.def.critic_input;
     for (int r = 0; r < chunk->rows; r++) {
-        int64_t i = job->samples[at + r];
+        int64_t i = job->minibatch->samples[at + r];
         copy_row(chunk->critic, r, b->critic, i, width);
         chunk->old_value[r] = b->value[i];
         chunk->returns[r] = b->returns[i];
@@ -114,8 +102,8 @@ static void gradient_piece(void *context, int piece, int thread) {
     LossChunk chunk;
     loss_carve(n, PPO_CHUNK, ppo->mirror_rows, ppo->scratch + (size_t)thread * ppo->scratch_floats,
                &chunk);
-    int entered = product_enter(), begin = shard_begin(job->count, shard),
-        end = shard_begin(job->count, shard + 1);
+    const int begin = job->minibatch->cut[shard], end = job->minibatch->cut[shard + 1];
+    const int entered = product_enter();
     if (begin == end) {
         clear_half(n, critic, gradient);
     }
@@ -161,19 +149,6 @@ static void reduce_piece(void *context, int range, int thread) {
     job->squares[range] = squares;
 }
 
-/* Squared norm of a range, after a backend has written the sum to shard 0. */
-static void square_piece(void *context, int range, int thread) {
-    (void)thread;
-    GradientJob *job = context;
-    const Ppo *ppo = job->ppo;
-    int64_t end = range_begin(ppo->policy->network.count, range + 1);
-    double squares = 0.0;
-    for (int64_t i = range_begin(ppo->policy->network.count, range); i < end; i++) {
-        squares += (double)ppo->gradient[i] * ppo->gradient[i];
-    }
-    job->squares[range] = squares;
-}
-
 static void add_sums(LossSums *to, const LossSums *from) {
     to->surrogate += from->surrogate;
     to->kl += from->kl;
@@ -187,25 +162,14 @@ static void add_sums(LossSums *to, const LossSums *from) {
     to->value += from->value;
 }
 
-void ppo_gradient(Ppo *ppo, const LossContext *context, const int *samples, int count,
-                  uint32_t draw, LossSums *sums, double *norm) {
-    GradientJob job = {
-        .ppo = ppo, .loss = context, .samples = samples, .count = count, .draw = draw};
-    const PpoBackend *backend = &ppo->backend;
+void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
+                  LossSums *sums, double *norm) {
+    GradientJob job = {.ppo = ppo, .loss = context, .minibatch = minibatch};
     *sums = (LossSums){0};
-    if (backend->gradient) {
-        if (backend->gradient(backend->self, context, samples, count, ppo_latent_key(ppo, draw),
-                              ppo->gradient, sums, &ppo->error)) {
-            *norm = NAN; /* drops the minibatch */
-            return;
-        }
-        pool_run(ppo->pool, PPO_RANGES, square_piece, &job);
-    } else {
-        pool_run(ppo->pool, 2 * PPO_SHARDS, gradient_piece, &job);
-        pool_run(ppo->pool, PPO_RANGES, reduce_piece, &job);
-        for (int piece = 0; piece < 2 * PPO_SHARDS; piece++) {
-            add_sums(sums, &job.sums[piece]);
-        }
+    pool_run(ppo->pool, 2 * PPO_SHARDS, gradient_piece, &job);
+    pool_run(ppo->pool, PPO_RANGES, reduce_piece, &job);
+    for (int piece = 0; piece < 2 * PPO_SHARDS; piece++) {
+        add_sums(sums, &job.sums[piece]);
     }
     double squares = 0.0;
     for (int range = 0; range < PPO_RANGES; range++) {
@@ -233,7 +197,7 @@ void ppo_optimise(Ppo *ppo, double gradient_scale) {
     OptimiseJob job = {ppo, adam_step(ppo->learning_rate, ++ppo->adam_steps, gradient_scale)};
     pool_run(ppo->pool, PPO_RANGES, optimise_piece, &job);
     const Network *n = &ppo->policy->network;
-    float floor = (float)log(ppo->def.std_min);
+    const float floor = step_noise_floor(&ppo->def);
     for (int64_t i = n->log_std; i < n->count; i++) {
         ppo->policy->parameters[i] = fmaxf(ppo->policy->parameters[i], floor);
     }

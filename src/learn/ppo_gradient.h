@@ -2,19 +2,26 @@
 #ifndef MILD_PPO_GRADIENT_H
 #define MILD_PPO_GRADIENT_H
 
+#include "learn/loss.h"
+#include "learn/order.h"
 #include "learn/ppo_private.h"
 
-/* Gradient of the loss over `count` samples into ppo->gradient (shard 0), its norm, and the sums.
- * draw: number of the minibatch in this update, which picks the random numbers. */
-void ppo_gradient(Ppo *ppo, const LossContext *context, const int *samples, int count,
-                  uint32_t draw, LossSums *sums, double *norm);
-/* Samples of the minibatch that get a mirror image: how many, and with `which` not NULL their
- * places in the minibatch. */
-int ppo_mirrored(const Ppo *ppo, int count, int *which);
+/* Samples of the rollout in runs, one for each shard (learn/order.h). Shards may be empty. */
+typedef struct {
+    const int *samples;      /* [cut[PPO_SHARDS]] places in the rollout */
+    int cut[PPO_SHARDS + 1]; /* shard s is samples[cut[s]] .. samples[cut[s + 1] - 1]; cut[0] = 0 */
+    uint32_t draw;           /* number in this update, which picks the random numbers */
+} PpoMinibatch;
+
+/* Gradient of the loss over a minibatch into ppo->gradient (shard 0), its norm, and the sums. */
+void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
+                  LossSums *sums, double *norm);
+/* Samples of a minibatch with these cuts that get a mirror image: how many, and with `which` not
+ * NULL their places in the minibatch. */
+int ppo_mirrored(const Ppo *ppo, const int *cut, int *which);
 /* Random numbers for the sampled z: sample p of the minibatch uses the numbers from row[p] * latent
- * onward of this stream. row: [count]. */
-uint64_t ppo_latent_key(const Ppo *ppo, uint32_t draw);
-void ppo_latent_rows(int count, int *row);
+ * onward of the stream step_latent_key. row: [samples of the minibatch]. */
+void ppo_latent_rows(const int *cut, int *row);
 /* One step of Adam along the gradient times gradient_scale; keeps the action noise above its floor.
  */
 void ppo_optimise(Ppo *ppo, double gradient_scale);

@@ -4,15 +4,15 @@
 
 #include "base/pool.h"
 #include "learn/backend.h"
+#include "learn/order.h"
 #include "learn/policy.h"
 #include "learn/policy_private.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
 
-/* A minibatch is cut into PPO_SHARDS equal runs of samples, each with its own gradient, and a shard
- * into chunks. Sums are taken in the order of the shards. So no result depends on the number of
+/* A minibatch consists of PPO_SHARDS runs of samples, each with its own gradient, and a shard is
+ * cut into chunks. Sums are taken in the order of the shards. So no result depends on the number of
  * threads. */
-#define PPO_SHARDS 8
 #define PPO_CHUNK 256
 #define PPO_RANGES 64 /* pieces of the parameter arrays in reduction and optimiser */
 #define PPO_PIECES 64 /* pieces of the environments and samples in everything else */
@@ -21,18 +21,20 @@ typedef struct Ppo {
     PpoDef def;
     Policy *policy;
     Pool *pool;
-    PpoBackend backend; /* act NULL: the processor */
-    MildError error;    /* of the backend, which drops its minibatches */
+    PpoBackend backend; /* act NULL: the CPU */
+    MildError error;    /* of the backend */
     PpoMirror mirror;   /* observation_index NULL: none */
     int *mirror_index;  /* [observation + actions] the arrays that `mirror` points to */
     float *mirror_sign; /* [observation + actions] */
     uint64_t seed;
-    PpoBatch batch;
+    PpoBatch batch; /* the rollout */
+    PpoBatch start; /* on the CPU: its rows of time 0, with which a checkpoint's rollout begins */
+    int resident;   /* bool: `batch` is on the device of the backend */
     int64_t iteration;
     int64_t adam_steps;
     double learning_rate;
     Policy *average;   /* NULL: none */
-    void *batch_block; /* memory of the batch's arrays */
+    void *batch_block; /* memory of the arrays of `start`, and of `batch` unless it is resident */
     size_t batch_bytes;
     float *gradient; /* [PPO_SHARDS][stride]; the sum ends in shard 0 */
     size_t stride;   /* [floats] of a shard's gradient */
@@ -41,11 +43,19 @@ typedef struct Ppo {
     float *scratch;  /* [threads][scratch_floats] */
     size_t scratch_floats;
     int mirror_rows; /* images per full chunk */
-    int *order;      /* [steps * envs] the valid samples, shuffled every epoch */
-    int *draw;       /* [steps * envs] random numbers of the shuffle */
-    int samples;     /* number of valid samples */
-    size_t bytes;    /* held in all */
+    int *order;      /* [largest minibatch] samples of the present minibatch */
+    /* [steps * envs] The sample itself if it is usable, else the next usable one of its stratum. */
+    int *substitute;
+    int starved;  /* bool: a stratum has no usable sample, so this update takes no step */
+    size_t bytes; /* held in all */
 } Ppo;
+
+/* Places the arrays of a rollout of b->steps x b->envs in the block, which is aligned to 64 bytes,
+ * and returns its bytes. NULL: only counts them. */
+size_t ppo_place_batch(PpoBatch *b, const Network *network, void *block);
+/* Moves the rollout to these arrays, which are the backend's. Frees its memory on the CPU but for
+ * the rows of time 0. */
+MildStatus ppo_move_rollout(Ppo *ppo, const PpoBatch *device, MildError *error);
 
 /* First environment or sample of piece i. */
 static inline int ppo_piece_begin(int count, int piece) {

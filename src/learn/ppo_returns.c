@@ -2,77 +2,114 @@
 
 #include <math.h>
 
-static int sample_usable(const PpoBatch *b, int64_t i) {
-    return b->valid[i] && isfinite(b->value[i]) && isfinite(b->reward[i]);
-}
-
-/* Backward over time for one environment:
- *   delta_t = r_t + gamma V(s_t+1) (1 - done) - V(s_t),  A_t = delta_t + gamma lambda (1 - done)
- * A_t+1, where an end by time has r_t += gamma V(s_t), as if the episode went on. An unusable
- * sample cuts like an end. */
-static void environment_returns(const PpoDef *def, PpoBatch *b, int env) {
-    double advantage = 0.0, next_value = b->value[(int64_t)b->steps * b->envs + env];
-    next_value = isfinite(next_value) ? next_value : 0.0;
-    for (int t = b->steps - 1; t >= 0; t--) {
-        int64_t i = (int64_t)t * b->envs + env;
-        if (!sample_usable(b, i)) {
-            b->advantage[i] = b->returns[i] = 0.0f;
-            advantage = 0.0;
-            next_value = isfinite(b->value[i]) ? b->value[i] : 0.0;
-            continue;
-        }
-        double value = b->value[i], live = b->done[i] ? 0.0 : 1.0;
-        double reward = b->reward[i] + (b->done[i] && b->timeout[i] ? def->gamma * value : 0.0);
-        double delta = reward + live * def->gamma * next_value - value;
-        advantage = delta + live * def->gamma * def->lambda * advantage;
-        b->advantage[i] = (float)advantage;
-        b->returns[i] = (float)(advantage + value);
-        next_value = value;
-    }
-}
-
-typedef struct {
-    double mean, std;
-} Moments;
-
-static Moments moments_of(const Ppo *ppo, const float *x) {
-    double sum = 0.0, squares = 0.0, n = ppo->samples > 0 ? (double)ppo->samples : 1.0;
-    for (int k = 0; k < ppo->samples; k++) {
-        sum += x[ppo->order[k]];
-    }
-    for (int k = 0; k < ppo->samples; k++) {
-        double gap = x[ppo->order[k]] - sum / n;
-        squares += gap * gap;
-    }
-    return (Moments){sum / n, sqrt(squares / n)};
-}
+#include "learn/ppo_step.h"
+#include "learn/returns.h"
 
 static void returns_piece(void *context, int piece, int thread) {
     (void)thread;
     Ppo *ppo = context;
     const int end = ppo_piece_begin(ppo->batch.envs, piece + 1);
     for (int env = ppo_piece_begin(ppo->batch.envs, piece); env < end; env++) {
-        environment_returns(&ppo->def, &ppo->batch, env);
+        returns_environment(ppo->def.gamma, ppo->def.lambda, &ppo->batch, env);
+    }
+}
+
+/* Each sample's next usable one, cyclic within the stratum. */
+static void substitute_stratum(void *context, int index, int thread) {
+    (void)thread;
+    Ppo *ppo = context;
+    const PpoBatch *b = &ppo->batch;
+    const OrderStratum stratum = order_stratum(b->steps, b->envs, index);
+    int next = -1;
+    for (int k = 2 * stratum.count - 1; k >= 0; k--) {
+        const int i = order_sample(stratum, b->envs, k % stratum.count);
+        next = returns_usable(b, i) ? i : next;
+        ppo->substitute[i] = next < 0 ? i : next;
+    }
+}
+
+/* ---- moments over the usable samples ---- */
+
+enum { ADVANTAGE, RETURNS, VALUE, NUMBERS };
+
+typedef struct {
+    Ppo *ppo;
+    double about[NUMBERS]; /* gaps are the distances from these */
+    double count[PPO_SHARDS];
+    double gaps[NUMBERS][PPO_SHARDS];
+    double squares[NUMBERS][PPO_SHARDS]; /* of the gaps */
+    double mean[NUMBERS], std[NUMBERS];
+} MomentsJob;
+
+static void add_stratum(void *context, int index, int thread) {
+    (void)thread;
+    MomentsJob *job = context;
+    const PpoBatch *b = &job->ppo->batch;
+    const float *const numbers[NUMBERS] = {b->advantage, b->returns, b->value};
+    const OrderStratum stratum = order_stratum(b->steps, b->envs, index);
+    double count = 0.0, gaps[NUMBERS] = {0.0}, squares[NUMBERS] = {0.0};
+    for (int k = 0; k < stratum.count; k++) {
+        const int i = order_sample(stratum, b->envs, k);
+        if (returns_usable(b, i)) {
+            count += 1.0;
+            for (int n = 0; n < NUMBERS; n++) {
+                const double gap = numbers[n][i] - job->about[n];
+                gaps[n] += gap;
+                squares[n] += gap * gap;
+            }
+        }
+    }
+    job->count[index] = count;
+    for (int n = 0; n < NUMBERS; n++) {
+        job->gaps[n][index] = gaps[n];
+        job->squares[n][index] = squares[n];
+    }
+}
+
+static double total(const double x[PPO_SHARDS]) {
+    double sum = 0.0;
+    for (int s = 0; s < PPO_SHARDS; s++) {
+        sum += x[s];
+    }
+    return sum;
+}
+
+/* The means first, then the squares of the distances from them. */
+static void find_moments(MomentsJob *job) {
+    pool_run(job->ppo->pool, PPO_SHARDS, add_stratum, job);
+    const double count = fmax(total(job->count), 1.0);
+    for (int n = 0; n < NUMBERS; n++) {
+        job->about[n] = job->mean[n] = total(job->gaps[n]) / count;
+    }
+    pool_run(job->ppo->pool, PPO_SHARDS, add_stratum, job);
+    for (int n = 0; n < NUMBERS; n++) {
+        job->std[n] = sqrt(total(job->squares[n]) / count);
+    }
+}
+
+static void normalise_piece(void *context, int piece, int thread) {
+    (void)thread;
+    const MomentsJob *job = context;
+    const PpoBatch *b = &job->ppo->batch;
+    const int samples = b->steps * b->envs, end = ppo_piece_begin(samples, piece + 1);
+    for (int i = ppo_piece_begin(samples, piece); i < end; i++) {
+        if (returns_usable(b, i)) {
+            float *a = &b->advantage[i];
+            *a = (float)((*a - job->mean[ADVANTAGE]) / (job->std[ADVANTAGE] + 1e-8));
+        }
     }
 }
 
 void ppo_returns(Ppo *ppo, PpoReport *report) {
-    PpoBatch *b = &ppo->batch;
     pool_run(ppo->pool, PPO_PIECES, returns_piece, ppo);
-    ppo->samples = 0;
-    for (int i = 0; i < b->steps * b->envs; i++) {
-        if (sample_usable(b, i)) {
-            ppo->order[ppo->samples++] = i;
-        }
+    pool_run(ppo->pool, PPO_SHARDS, substitute_stratum, ppo);
+    MomentsJob job = {.ppo = ppo};
+    find_moments(&job);
+    ppo->starved = 0;
+    for (int s = 0; s < PPO_SHARDS; s++) {
+        const OrderStratum stratum = order_stratum(ppo->batch.steps, ppo->batch.envs, s);
+        ppo->starved |= stratum.count > 0 && job.count[s] == 0.0;
     }
-    Moments advantage = moments_of(ppo, b->advantage), returns = moments_of(ppo, b->returns);
-    report->value_mean = moments_of(ppo, b->value).mean;
-    report->advantage_std = advantage.std;
-    /* returns - value is the advantage before it is normalised */
-    report->explained_variance =
-        returns.std > 0.0 ? 1.0 - pow(advantage.std / returns.std, 2) : 0.0;
-    for (int k = 0; k < ppo->samples; k++) {
-        float *a = &b->advantage[ppo->order[k]];
-        *a = (float)((*a - advantage.mean) / (advantage.std + 1e-8));
-    }
+    pool_run(ppo->pool, PPO_PIECES, normalise_piece, &job);
+    step_report_returns(report, job.mean[VALUE], job.std[ADVANTAGE], job.std[RETURNS]);
 }

@@ -4,8 +4,9 @@
 
 #include "learn/ppo_private.h"
 
-/* From batch->value: fills advantage (normalised over the valid samples), returns, and ppo->order
- * with the valid samples. */
+/* From batch->value: fills advantage (normalised over the usable samples), returns, and
+ * ppo->substitute and ppo->starved. A sample is usable if it is valid and its reward and value are
+ * finite. */
 void ppo_returns(Ppo *ppo, PpoReport *report);
 
 #endif

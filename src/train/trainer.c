@@ -69,7 +69,8 @@ static int build(Trainer *trainer, MildError *error) {
     if (!trainer->ppo) {
         return 0;
     }
-    if (strcmp(def->train.device, "cuda") == 0 && gpu_learner_attach(trainer->ppo, error)) {
+    if (strcmp(def->train.device, "cuda") == 0 &&
+        gpu_learner_attach(trainer->ppo, &(GpuLearnerDef){.resident = 0}, error)) {
         return 0;
     }
     if (terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error) != MILD_OK) {

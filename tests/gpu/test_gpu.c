@@ -1,106 +1,59 @@
-/* The learner on the GPU against the same learner on the processor. With MILD_CUDA on the device,
- * skipped (77) where there is none; else with small networks on a stand-in for CUDA (emulated/),
- * which runs the same text of the layer. */
-#include "../learn/toy.h"
+/* The learner on the GPU against the same learner on the CPU. With MILD_CUDA on the device, skipped
+ * (77) where there is none; else with small networks on a stand-in for CUDA (emulated/), which runs
+ * the same text of the layer. */
+#include "gpu_check.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <unistd.h>
-
-#include "gpu/learner.h"
-#include "learn/ppo_gradient.h"
-#include "learn/ppo_returns.h"
 
 #ifdef EMULATED
 extern int emulated_failure;
+extern size_t emulated_memory;
 #endif
 
-typedef struct {
-    Policy *policy;
-    Pool *pool;
-    Ppo *ppo;
-    int mirror_index[64];
-    float mirror_sign[64];
-} Learner;
+/* ---- parameters ---- */
 
-/* Swaps neighbours and changes every third sign: its own inverse, as a mirror is. */
-static PpoMirror some_mirror(Learner *l, const PolicyDef *def) {
-    const int count = def->observation > def->actions ? def->observation : def->actions;
-    for (int i = 0; i < count; i++) {
-        l->mirror_index[i] = i;
-        l->mirror_sign[i] = i % 3 ? 1.0f : -1.0f;
+/* Every parameter keeps its value through the padded form, which holds nothing else but zeros. */
+static void padding_is_zero_and_reversible(void **state) {
+    (void)state;
+    PolicyDef def = small_def();
+    Network tight, wide;
+    assert_int_equal(network_layout(&tight, &def, NULL), MILD_OK);
+    wide = gpu_network(&tight);
+    float *from = malloc((size_t)tight.count * sizeof *from),
+          *to = malloc((size_t)wide.count * sizeof *to),
+          *back = calloc((size_t)tight.count, sizeof *back);
+    assert_true(from && to && back);
+    double sum = 0.0, padded = 0.0;
+    for (int64_t i = 0; i < tight.count; i++) {
+        from[i] = (float)(i + 1);
+        sum += (double)from[i];
     }
-    for (int i = 0; i + 1 < def->actions && i + 1 < def->observation; i += 2) {
-        l->mirror_index[i] = i + 1;
-        l->mirror_index[i + 1] = i;
+    gpu_network_pad(&tight, &wide, from, to);
+    for (int64_t i = 0; i < wide.count; i++) {
+        padded += (double)to[i];
     }
-    return (PpoMirror){l->mirror_index, l->mirror_sign, l->mirror_index, l->mirror_sign};
+    assert_true(sum == padded);
+    gpu_network_strip(&tight, &wide, to, back);
+    assert_memory_equal(from, back, (size_t)tight.count * sizeof *from);
+    for (int i = 0; i < NETWORK_MLPS; i++) {
+        const char *name;
+        const Mlp *mlp = network_mlp(&wide, i, &name);
+        for (int l = 0; l < mlp->layers; l++) {
+            assert_true(mlp->layer[l].in % 4 == 0 && mlp->layer[l].out % 4 == 0);
+            assert_true(mlp->layer[l].weight % 4 == 0 && mlp->layer[l].bias % 4 == 0);
+            assert_true(l == 0 || mlp->layer[l].in == mlp->layer[l - 1].out);
+        }
+    }
+    free(from);
+    free(to);
+    free(back);
 }
 
-static void learner_open(Learner *l, int cuda, const PolicyDef *policy, const PpoDef *def,
-                         int envs) {
-    MildError error = {0};
-    PpoMirror mirror =
-        policy->observation == TOY_OBSERVATION ? toy_mirror() : some_mirror(l, policy);
-    l->policy = policy_create(policy, 5, &error);
-    l->pool = pool_create(cuda ? 1 : 0);
-    assert_true(l->policy && l->pool);
-    l->ppo = ppo_create(def, l->policy, l->pool, &mirror, envs, 11, &error);
-    assert_non_null(l->ppo);
-    if (cuda && gpu_learner_attach(l->ppo, &error)) {
-        fail_msg("%s", error.text);
-    }
-}
-
-static void learner_close(Learner *l) {
-    ppo_destroy(l->ppo);
-    policy_destroy(l->policy);
-    pool_destroy(l->pool);
-}
-
-/* Random parameters (the modulation begins at zero otherwise) and a random rollout, the same in
- * both. */
-static void fill_both(Learner *a, Learner *b, uint64_t seed) {
-    Random random = random_at(seed, 1, 2);
-    const Network *n = &a->policy->network;
-    for (int64_t i = 0; i < n->log_std; i++) {
-        a->policy->parameters[i] += (float)(0.03 * random_normal(&random));
-    }
-    memcpy(b->policy->parameters, a->policy->parameters, (size_t)n->count * sizeof(float));
-    PpoBatch *x = ppo_batch(a->ppo);
-    const int64_t samples = (int64_t)x->steps * x->envs, more = samples + x->envs;
-    fill_normal(x->history, more * n->history, 1.0, &random);
-    fill_normal(x->critic, more * n->def.critic_input, 1.0, &random);
-    fill_normal(x->target, more * n->def.estimates, 1.0, &random);
-    fill_normal(x->frame, more * n->def.observation, 1.0, &random);
-    fill_normal(x->reward, samples, 1.0, &random);
-    for (int64_t i = 0; i < samples; i++) {
-        x->done[i] = random_unit(&random) < 0.02;
-        x->timeout[i] = x->done[i] && random_unit(&random) < 0.5;
-    }
-    memcpy(b->ppo->batch_block, a->ppo->batch_block, a->ppo->batch_bytes);
-}
-
-/* |a - b| / |b| over a range. */
-static double distance(const float *a, const float *b, int64_t count) {
-    double gap = 0.0, size = 0.0;
-    for (int64_t i = 0; i < count; i++) {
-        gap += ((double)a[i] - b[i]) * ((double)a[i] - b[i]);
-        size += (double)b[i] * b[i];
-    }
-    return size > 0.0 ? sqrt(gap / size) : sqrt(gap);
-}
-
-static void worse(double *worst, double value) {
-    assert_true(isfinite(value));
-    *worst = value > *worst ? value : *worst;
-}
+/* ---- gradient ---- */
 
 /* Gradients of every layer, weights and biases apart. */
-static double gradient_distance(const Learner *cpu, const Learner *gpu, const char **where) {
-    const Network *n = &cpu->policy->network;
-    const float *a = gpu->ppo->gradient, *b = cpu->ppo->gradient;
+static double gradient_distance(const Network *n, const float *a, const float *b,
+                                const char **where) {
     double worst = distance(a + n->log_std, b + n->log_std, n->def.actions);
     *where = "log_std";
     for (int i = 0; i < NETWORK_MLPS; i++) {
@@ -108,7 +61,7 @@ static double gradient_distance(const Learner *cpu, const Learner *gpu, const ch
         const Mlp *mlp = network_mlp(n, i, &name);
         for (int l = 0; l < mlp->layers; l++) {
             const MlpLayer *layer = &mlp->layer[l];
-            double before = worst;
+            const double before = worst;
             worse(&worst,
                   distance(a + layer->weight, b + layer->weight, layer->bias - layer->weight));
             worse(&worst, distance(a + layer->bias, b + layer->bias, layer->out));
@@ -120,125 +73,405 @@ static double gradient_distance(const Learner *cpu, const Learner *gpu, const ch
 
 /* Of the means over the samples: where one nearly cancels, its error is that of numbers of size
  * 1. */
-static double sums_distance(const LossSums *a, const LossSums *b, int samples) {
-    const double x[] = {a->surrogate, a->kl,          a->clipped,     a->reconstruction,
-                        a->vae_kl,    a->estimate[0], a->estimate[1], a->estimate[2],
-                        a->mirror,    a->value};
-    const double y[] = {b->surrogate, b->kl,          b->clipped,     b->reconstruction,
-                        b->vae_kl,    b->estimate[0], b->estimate[1], b->estimate[2],
-                        b->mirror,    b->value};
+static double sums_distance(const double *a, const double *b, int samples) {
     double worst = 0.0;
-    for (size_t i = 0; i < sizeof x / sizeof *x; i++) {
-        worse(&worst, fabs(x[i] - y[i]) / (samples + fabs(y[i])));
+    for (int i = 0; i < GPU_SUMS; i++) {
+        worse(&worst, fabs(a[i] - b[i]) / (samples + fabs(b[i])));
     }
     return worst;
 }
 
-/* One gradient of the first `count` samples of an order, on both. */
-static void compare_gradient(Learner *cpu, Learner *gpu, int count, uint32_t draw,
-                             double worst[2]) {
-    Learner *both[] = {cpu, gpu};
-    LossSums sums[2];
-    double norm[2];
-    for (int k = 0; k < 2; k++) {
-        Ppo *ppo = both[k]->ppo;
-        const int images = ppo_mirrored(ppo, count, NULL);
-        LossContext context = {.def = &ppo->def,
-                               .network = &ppo->policy->network,
-                               .mirror = &ppo->mirror,
-                               .parameters = ppo->policy->parameters,
-                               .sample_weight = 1.0f / (float)count,
-                               .mirror_weight = images ? 1.0f / (float)images : 0.0f};
-        const float *std = policy_std(ppo->policy);
-        for (int j = 0; j < policy_def(ppo->policy)->actions; j++) {
-            context.std[j] = std[j];
-            context.old_std[j] = 1.1f * std[j];
-        }
-        ppo_gradient(ppo, &context, cpu->ppo->order, count, draw, &sums[k], &norm[k]);
+/* As ppo_gradient, of any samples and cuts. */
+static void gradient_on_device(Learner *l, const LossContext *context,
+                               const PpoMinibatch *minibatch, float *gradient, double *sums) {
+    GpuLearner *g = l->gpu;
+    const cudaStream_t stream = g->queue.stream;
+    const Network *n = &g->network;
+    const size_t samples = (size_t)g->batch.steps * (size_t)g->envs,
+                 indices = (size_t)minibatch->cut[PPO_SHARDS] * sizeof(int);
+    const float *log_std = g->parameters + n->log_std;
+    ppo_latent_rows(minibatch->cut, g->host_rows);
+    ppo_mirrored(l->ppo, minibatch->cut, g->host_rows + samples);
+    cudaMemcpyAsync(g->latent_row, g->host_rows, indices, cudaMemcpyHostToDevice, stream);
+    cudaMemcpyAsync(g->which, g->host_rows + samples, indices, cudaMemcpyHostToDevice, stream);
+    cudaMemcpyAsync(g->order, minibatch->samples, indices, cudaMemcpyHostToDevice, stream);
+    gpu_begin_update(stream, l->ppo->def, n->def.actions, log_std, g->progress);
+    cudaMemcpyAsync(g->progress->old_std, context->old_std, sizeof context->old_std,
+                    cudaMemcpyHostToDevice, stream);
+    gpu_begin_minibatch(stream, minibatch->draw, n->def.actions, log_std, g->progress);
+    gpu_enqueue_gradient(g, minibatch->cut, 0);
+    double *parts = malloc((size_t)(g->sum_blocks * GPU_SUMS) * sizeof *parts);
+    assert_non_null(parts);
+    cudaMemcpyAsync(g->padded, g->gradient, (size_t)n->count * sizeof(float),
+                    cudaMemcpyDeviceToHost, stream);
+    cudaMemcpyAsync(parts, g->sums, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *parts,
+                    cudaMemcpyDeviceToHost, stream);
+    assert_int_equal(cudaStreamSynchronize(stream), cudaSuccess);
+    gpu_network_strip(&l->policy->network, n, g->padded, gradient);
+    memset(sums, 0, GPU_SUMS * sizeof *sums);
+    for (int i = 0; i < g->sum_blocks * GPU_SUMS; i++) {
+        sums[i % GPU_SUMS] += parts[i];
     }
-    const char *where;
-    double apart = gradient_distance(cpu, gpu, &where);
-    print_message("  %6d samples: gradient %.1e (%s), norm %.1e, sums %.1e\n", count, apart, where,
-                  fabs(norm[1] / norm[0] - 1.0), sums_distance(&sums[1], &sums[0], count));
-    /* of five samples the modulation's gradient is a small difference of large numbers */
-    worse(&worst[0], count < 100 ? 0.2 * apart : apart);
-    worse(&worst[1], sums_distance(&sums[1], &sums[0], count));
+    free(parts);
 }
 
-static void compare_learner(const PolicyDef *policy, const PpoDef *def, int envs, double worst[4]) {
-    Learner cpu, gpu;
-    learner_open(&cpu, 0, policy, def, envs);
-    learner_open(&gpu, 1, policy, def, envs);
-    fill_both(&cpu, &gpu, 3);
-    PpoBatch *a = ppo_batch(cpu.ppo), *b = ppo_batch(gpu.ppo);
-    const int samples = a->steps * a->envs;
-    for (int t = 0; t < a->steps; t++) {
-        ppo_act(cpu.ppo, t);
-        ppo_act(gpu.ppo, t);
+/* One gradient of the first `count` samples of an order, on both. */
+static void compare_gradient(Learner *cpu, Learner *gpu, const int *order, int count, uint32_t draw,
+                             double worst[2]) {
+    Ppo *ppo = cpu->ppo;
+    PpoMinibatch minibatch = {.samples = order, .draw = draw};
+    for (int s = 0; s <= PPO_SHARDS; s++) { /* shards of other sizes than those of an update */
+        minibatch.cut[s] = (int)((int64_t)count * s * s / (PPO_SHARDS * PPO_SHARDS));
     }
-    worse(&worst[2], distance(b->mean, a->mean, (int64_t)samples * policy->actions));
-    /* off the means, so that ratios leave the clip range */
+    const int images = ppo_mirrored(ppo, minibatch.cut, NULL);
+    LossContext context = {.def = &ppo->def,
+                           .network = &ppo->policy->network,
+                           .mirror = &ppo->mirror,
+                           .parameters = ppo->policy->parameters,
+                           .sample_weight = 1.0f / (float)count,
+                           .mirror_weight = images ? 1.0f / (float)images : 0.0f};
+    const float *std = policy_std(ppo->policy);
+    for (int j = 0; j < policy_def(ppo->policy)->actions; j++) {
+        context.std[j] = std[j];
+        context.old_std[j] = 1.1f * std[j];
+    }
+    LossSums sums;
+    double norm, device_sums[GPU_SUMS], host_sums[GPU_SUMS];
+    float *gradient = malloc((size_t)ppo->policy->network.count * sizeof *gradient);
+    assert_non_null(gradient);
+    ppo_gradient(ppo, &context, &minibatch, &sums, &norm);
+    memcpy(host_sums, &sums, sizeof host_sums);
+    gradient_on_device(gpu, &context, &minibatch, gradient, device_sums);
+    const char *where;
+    const double apart = gradient_distance(&ppo->policy->network, gradient, ppo->gradient, &where);
+    print_message("  %6d samples: gradient %.1e (%s), sums %.1e\n", count, apart, where,
+                  sums_distance(device_sums, host_sums, count));
+    /* of five samples the modulation's gradient is a small difference of large numbers */
+    worse(&worst[0], count < 100 ? 0.2 * apart : apart);
+    worse(&worst[1], sums_distance(device_sums, host_sums, count));
+    free(gradient);
+}
+
+static int *some_order(int samples) {
     Random random = random_at(8, 8, 8);
+    int *order = malloc((size_t)samples * sizeof *order);
+    assert_non_null(order);
+    for (int i = 0; i < samples; i++) {
+        const int j = (int)random_index(&random, (uint32_t)i + 1u);
+        order[i] = order[j];
+        order[j] = i;
+    }
+    return order;
+}
+
+/* Two learners with the same parameters and rollout, whose actions are those of the first. Ratios
+ * leave their clip range. */
+static void act_both(Learner *cpu, Learner *gpu, double *apart) {
+    PpoBatch *a = &cpu->batch, *b = &gpu->batch;
+    const int actions = policy_def(cpu->policy)->actions, samples = a->steps * a->envs;
+    for (int t = 0; t < a->steps; t++) {
+        ppo_act(cpu->ppo, t);
+        ppo_act(gpu->ppo, t);
+    }
+    learner_read(gpu);
+    worse(apart, distance(b->mean, a->mean, (int64_t)samples * actions));
+    worse(apart, distance(b->action, a->action, (int64_t)samples * actions));
+    worse(apart, distance(b->log_prob, a->log_prob, samples));
+    Random random = random_at(8, 8, 9);
     for (int64_t i = 0; i < samples; i++) {
         a->log_prob[i] += (float)(0.2 * random_normal(&random));
     }
-    memcpy(b->mean, a->mean, (size_t)samples * (size_t)policy->actions * sizeof(float));
-    memcpy(b->action, a->action, (size_t)samples * (size_t)policy->actions * sizeof(float));
+    memcpy(b->mean, a->mean, (size_t)samples * (size_t)actions * sizeof(float));
+    memcpy(b->action, a->action, (size_t)samples * (size_t)actions * sizeof(float));
     memcpy(b->log_prob, a->log_prob, (size_t)samples * sizeof(float));
-    policy_value(cpu.policy, cpu.pool, samples + envs, a->critic, a->value);
-    MildError error = {0};
-    assert_int_equal(gpu.ppo->backend.values(gpu.ppo->backend.self, &error), MILD_OK);
-    worse(&worst[3], distance(b->value, a->value, samples + envs));
-    PpoReport report;
-    ppo_returns(cpu.ppo, &report);
-    memcpy(b->advantage, a->advantage, (size_t)samples * sizeof(float));
+    learner_write(gpu);
+}
+
+static void compare_learner(const PolicyDef *policy, const PpoDef *def, int envs, int rows,
+                            double worst[3]) {
+    Learner cpu, gpu;
+    learner_open(&cpu, ON_CPU, policy, def, envs, 0);
+    learner_open(&gpu, RESIDENT, policy, def, envs, rows);
+    learner_fill_parameters(&cpu, 3);
+    learner_fill_parameters(&gpu, 3);
+    learner_fill_rollout(&cpu, 3);
+    learner_fill_rollout(&gpu, 3);
+    act_both(&cpu, &gpu, &worst[2]);
+    PpoBatch *a = &cpu.batch, *b = &gpu.batch;
+    const int samples = a->steps * a->envs;
+    Random random = random_at(4, 4, 4);
+    fill_normal(a->value, samples, 1.0, &random);
+    fill_normal(a->returns, samples, 1.0, &random);
+    fill_normal(a->advantage, samples, 1.0, &random);
+    memcpy(b->value, a->value, (size_t)samples * sizeof(float));
     memcpy(b->returns, a->returns, (size_t)samples * sizeof(float));
-    for (int i = samples - 1; i > 0; i--) {
-        int j = (int)random_index(&random, (uint32_t)i + 1u), held = cpu.ppo->order[i];
-        cpu.ppo->order[i] = cpu.ppo->order[j], cpu.ppo->order[j] = held;
-    }
-    const int minibatch = (samples + def->minibatches - 1) / def->minibatches,
+    memcpy(b->advantage, a->advantage, (size_t)samples * sizeof(float));
+    learner_write(&gpu);
+    int *order = some_order(samples);
+    const int minibatch = order_largest(a->steps, a->envs, def->minibatches),
               counts[] = {minibatch, minibatch - 1, 300, 5};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
-        compare_gradient(&cpu, &gpu, counts[i] < minibatch ? counts[i] : minibatch, (uint32_t)i,
-                         worst);
+        compare_gradient(&cpu, &gpu, order, counts[i] < minibatch ? counts[i] : minibatch,
+                         (uint32_t)i, worst);
     }
+    free(order);
     learner_close(&cpu);
     learner_close(&gpu);
 }
 
-static void test_same_function(void **state) {
+static void gradients_are_those_of_the_cpu(void **state) {
     (void)state;
-    double worst[4] = {0.0};
+    double worst[3] = {0.0};
     PpoDef def = ppo_def_default();
     PolicyDef small = small_def();
-    compare_learner(&small, &def, 37, worst);
+    compare_learner(&small, &def, 37, 100, worst); /* several chunks a minibatch */
+    compare_learner(&small, &def, 37, 0, worst);
     small.modulation_per_dimension = 1;
     small.latent = 3;
     def.mirror_share = 1.0;
     def.clip_value = 0;
-    compare_learner(&small, &def, 37, worst);
+    compare_learner(&small, &def, 37, 100, worst);
 #ifndef EMULATED
     def = ppo_def_default();
     PolicyDef full = policy_def_default();
-    compare_learner(&full, &def, 256, worst);
-    def.minibatches = 1; /* more rows than one chunk on the device */
-    compare_learner(&full, &def, 1500, worst);
+    compare_learner(&full, &def, 256, 0, worst);
+    def.minibatches = 1;
+    compare_learner(&full, &def, 1500, 0, worst);
+    compare_learner(&full, &def, 1500, 10000, worst);
 #endif
-    print_message("worst against the processor: gradient %.1e, sums %.1e, means %.1e, values %.1e "
-                  "(relative)\n",
-                  worst[0], worst[1], worst[2], worst[3]);
-    assert_true(worst[0] < 1e-5 && worst[1] < 1e-5 && worst[2] < 1e-5 && worst[3] < 1e-5);
+    print_message("worst against the CPU: gradient %.1e, sums %.1e, actions %.1e (relative)\n",
+                  worst[0], worst[1], worst[2]);
+    assert_true(worst[0] < 1e-5 && worst[1] < 1e-5 && worst[2] < 1e-5);
 }
 
-/* Two runs on the device, bit for bit; and the first update stays near the processor's. */
-static void test_repeats(void **state) {
+/* ---- update ---- */
+
+static void assert_close(const char *what, double ours, double expected, double bound) {
+    if (!(fabs(ours - expected) <= bound * fmax(1.0, fabs(expected)))) {
+        fail_msg("%s: %.9g, on the CPU %.9g", what, ours, expected);
+    }
+}
+
+/* Everything that an update decides is the same, everything that it computes within `bound`. */
+static void compare_reports(const PpoReport *a, const PpoReport *b, double bound) {
+    assert_int_equal(a->skipped, b->skipped);
+    assert_close("learning rate", a->learning_rate, b->learning_rate, 1e-12);
+    assert_close("surrogate", a->surrogate, b->surrogate, bound);
+    assert_close("value loss", a->value_loss, b->value_loss, bound);
+    assert_close("entropy", a->entropy, b->entropy, bound);
+    assert_close("kl", a->kl, b->kl, bound);
+    assert_close("clip share", a->clip_share, b->clip_share, 1e-3); /* counts samples */
+    assert_close("norm", a->gradient_norm, b->gradient_norm, bound);
+    assert_close("std", a->action_std, b->action_std, bound);
+    assert_close("reconstruction", a->vae_reconstruction, b->vae_reconstruction, bound);
+    assert_close("vae kl", a->vae_kl, b->vae_kl, bound);
+    for (int g = 0; g < 3; g++) {
+        assert_close("estimates", a->estimate_loss[g], b->estimate_loss[g], bound);
+    }
+    assert_close("mirror", a->mirror, b->mirror, bound);
+    assert_close("mean value", a->value_mean, b->value_mean, 1e-6);
+    assert_close("deviation of the advantage", a->advantage_std, b->advantage_std, 1e-6);
+    assert_close("explained variance", a->explained_variance, b->explained_variance, 1e-5);
+}
+
+/* Advantages, moments and substitutes of a large rollout, of which any share may be valid. */
+static void compare_returns(double valid) {
+    enum { ENVS = 701 };
+    PpoDef def = ppo_def_default();
+    PolicyDef policy = small_def();
+    Learner cpu, gpu;
+    learner_open(&cpu, ON_CPU, &policy, &def, ENVS, 0);
+    learner_open(&gpu, RESIDENT, &policy, &def, ENVS, 100);
+    learner_fill_rollout(&cpu, 5);
+    learner_fill_rollout(&gpu, 5);
+    PpoBatch *a = &cpu.batch, *b = &gpu.batch;
+    const int samples = def.steps * ENVS;
+    Random random = random_at(6, 6, 6);
+    fill_normal(a->value, samples + ENVS, 1.0, &random);
+    for (int i = 0; i < samples; i++) {
+        a->valid[i] = random_unit(&random) < valid;
+        a->reward[i] = a->valid[i] && i % 97 == 0 ? NAN : a->reward[i];
+    }
+    memcpy(b->value, a->value, (size_t)(samples + ENVS) * sizeof(float));
+    memcpy(b->reward, a->reward, (size_t)samples * sizeof(float));
+    memcpy(b->valid, a->valid, (size_t)samples);
+    learner_write(&gpu);
+    PpoReport report = {0};
+    ppo_returns(cpu.ppo, &report);
+    GpuLearner *g = gpu.gpu;
+    const cudaStream_t stream = g->queue.stream;
+    gpu_begin_update(stream, def, policy.actions, g->parameters + g->network.log_std, g->progress);
+    gpu_returns(stream, def, g->batch, g->substitute, g->partial, g->progress);
+    GpuProgress progress;
+    int *substitute = malloc((size_t)samples * sizeof *substitute);
+    assert_non_null(substitute);
+    cudaMemcpyAsync(&progress, g->progress, sizeof progress, cudaMemcpyDeviceToHost, stream);
+    cudaMemcpyAsync(substitute, g->substitute, (size_t)samples * sizeof *substitute,
+                    cudaMemcpyDeviceToHost, stream);
+    learner_read(&gpu);
+    assert_memory_equal(substitute, cpu.ppo->substitute, (size_t)samples * sizeof *substitute);
+    assert_int_equal(progress.starved, cpu.ppo->starved);
+    assert_int_equal(progress.starved, valid == 0.0);
+    for (int i = 0; i < samples; i++) {
+        assert_true(fabs((double)(b->returns[i] - a->returns[i])) < 1e-5);
+        assert_true(fabs((double)(b->advantage[i] - a->advantage[i])) < 1e-5);
+    }
+    assert_close("mean value", progress.report.value_mean, report.value_mean, 1e-12);
+    assert_close("deviation", progress.report.advantage_std, report.advantage_std, 1e-9);
+    assert_close("explained", progress.report.explained_variance, report.explained_variance, 1e-9);
+    free(substitute);
+    learner_close(&cpu);
+    learner_close(&gpu);
+}
+
+static void returns_are_those_of_the_cpu(void **state) {
+    (void)state;
+    static const double shares[] = {1.0, 0.9, 0.3, 0.01, 0.0};
+    for (size_t i = 0; i < sizeof shares / sizeof *shares; i++) {
+        compare_returns(shares[i]);
+    }
+}
+
+/* What may be wrong with a rollout. */
+enum { NOTHING, INVALID, NOT_FINITE, STARVED, FAULTS };
+
+static void spoil(PpoBatch *b, const Network *n, int fault) {
+    const int samples = b->steps * b->envs;
+    for (int i = 0; i < samples; i++) {
+        if (fault == INVALID && (i % 11 == 3 || i >= samples - b->envs / 2)) {
+            b->valid[i] = 0;
+            b->reward[i] = b->history[(int64_t)i * n->history] = NAN;
+            b->frame[(int64_t)i * n->def.observation] = b->target[i * n->def.estimates] = NAN;
+        }
+        if (fault == STARVED && i % b->envs < b->envs / PPO_SHARDS) {
+            b->valid[i] = 0;
+        }
+    }
+    if (fault == NOT_FINITE) { /* one minibatch of every epoch; and a value, as if not valid */
+        b->history[(int64_t)(samples / 2) * n->history + 1] = NAN;
+        b->critic[(int64_t)(samples / 3) * n->def.critic_input + 1] = INFINITY;
+    }
+}
+
+/* Two updates from the same rollout: arrays, order, decisions, and how far the parameters move. */
+static double compare_update(const PolicyDef *policy, const PpoDef *def, int envs, int rows,
+                             int fault) {
+    Learner cpu, gpu;
+    double apart = 0.0, moved = 0.0;
+    learner_open(&cpu, ON_CPU, policy, def, envs, 0);
+    learner_open(&gpu, RESIDENT, policy, def, envs, rows);
+    Learner *const both[] = {&cpu, &gpu};
+    const Network *n = &cpu.policy->network;
+    const size_t bytes = (size_t)n->count * sizeof(float);
+    float *before = malloc(bytes), *steps[2] = {malloc(bytes), malloc(bytes)};
+    assert_true(before && steps[0] && steps[1]);
+    for (int round = 0; round < 2; round++) { /* the second one may be a graph's */
+        PpoReport report[2];
+        memcpy(gpu.policy->parameters, cpu.policy->parameters, bytes);
+        for (int k = 0; k < 2; k++) {
+            learner_fill_parameters(both[k], 3);
+            learner_fill_rollout(both[k], 3 + (uint64_t)round);
+        }
+        memcpy(before, cpu.policy->parameters, bytes);
+        act_both(&cpu, &gpu, &apart);
+        for (int k = 0; k < 2; k++) {
+            spoil(&both[k]->batch, n, fault);
+            learner_write(both[k]);
+            report[k] = learner_update(both[k]);
+            learner_pull(both[k]);
+            learner_read(both[k]);
+            for (int64_t i = 0; i < n->count; i++) {
+                steps[k][i] = both[k]->policy->parameters[i] - before[i];
+            }
+        }
+        const int samples = def->steps * envs;
+        compare_reports(&report[1], &report[0], 1e-4);
+        assert_int_equal(report[0].skipped > 0, fault >= NOT_FINITE);
+        for (int i = 0; i < samples; i++) {
+            assert_true(fabs((double)gpu.batch.advantage[i] - (double)cpu.batch.advantage[i]) <
+                        1e-4);
+            assert_true(fabs((double)gpu.batch.returns[i] - (double)cpu.batch.returns[i]) < 1e-4);
+        }
+        int *order = malloc((size_t)samples * sizeof *order);
+        assert_non_null(order);
+        cudaMemcpyAsync(order, gpu.gpu->substitute, (size_t)samples * sizeof *order,
+                        cudaMemcpyDeviceToHost, gpu.gpu->queue.stream);
+        assert_int_equal(cudaStreamSynchronize(gpu.gpu->queue.stream), cudaSuccess);
+        assert_memory_equal(order, cpu.ppo->substitute, (size_t)samples * sizeof *order);
+        int cut[PPO_SHARDS + 1];
+        const int last = order_cuts(def->steps, envs, def->minibatches - 1, def->minibatches, cut);
+        cudaMemcpyAsync(order, gpu.gpu->order, (size_t)last * sizeof *order, cudaMemcpyDeviceToHost,
+                        gpu.gpu->queue.stream);
+        assert_int_equal(cudaStreamSynchronize(gpu.gpu->queue.stream), cudaSuccess);
+        assert_memory_equal(order, cpu.ppo->order, (size_t)last * sizeof *order);
+        free(order);
+        assert_int_equal(gpu.ppo->adam_steps, cpu.ppo->adam_steps);
+        assert_int_equal(gpu.ppo->iteration, cpu.ppo->iteration);
+        /* the next rollout begins with the same rows */
+        assert_memory_equal(gpu.ppo->start.history, cpu.ppo->start.history,
+                            (size_t)envs * (size_t)n->history * sizeof(float));
+        assert_memory_equal(gpu.ppo->start.frame, cpu.ppo->start.frame,
+                            (size_t)envs * (size_t)n->def.observation * sizeof(float));
+        if (fault == STARVED) {
+            assert_memory_equal(steps[1], steps[0], bytes);
+        } else {
+            worse(&moved, distance(steps[1], steps[0], n->count));
+        }
+        if (def->average > 0.0) {
+            worse(&apart, distance(policy_parameters(gpu.ppo->average),
+                                   policy_parameters(cpu.ppo->average), n->count));
+        }
+    }
+    assert_true(apart < 1e-4);
+    free(before);
+    free(steps[0]);
+    free(steps[1]);
+    learner_close(&cpu);
+    learner_close(&gpu);
+    return moved;
+}
+
+/* A step of Adam moves a parameter by rate * m / sqrt(v). With v from a run that has learned, that
+ * is smooth in the gradient, whose rounding is 1e-5 of its size. Every step begins where the last
+ * one ended, so the differences add up; 1e-3 of the way is far above that and far below any step
+ * that is missing or wrong. */
+static void updates_are_those_of_the_cpu(void **state) {
     (void)state;
     PpoDef def = ppo_def_default();
+    PolicyDef policy = small_def();
+    double worst = 0.0;
+    def.average = 0.9;
+    for (int fault = 0; fault < FAULTS; fault++) {
+        worse(&worst, compare_update(&policy, &def, 37, fault == NOTHING ? 100 : 0, fault));
+    }
+    def.decoder_target = PPO_TARGET_NEWEST;
+    def.average = 0.0;
+    def.kl_target = 0.0;
+    def.minibatches = 3;
+    def.max_gradient_norm = 0.05;
+    def.std_min = 0.99; /* the noise meets its floor at a step and its ceiling at the end */
+    def.std_max[0] = def.std_max[1] = 0.7;
+    worse(&worst, compare_update(&policy, &def, 5, 0, NOTHING));
+#ifndef EMULATED
+    PolicyDef full = policy_def_default();
+    def = ppo_def_default();
+    worse(&worst, compare_update(&full, &def, 256, 0, NOTHING));
+    worse(&worst, compare_update(&full, &def, 256, 0, INVALID));
+#endif
+    print_message("way of the parameters in an update, against the CPU's: %.1e (relative)\n",
+                  worst);
+    assert_true(worst < 1e-3);
+}
+
+/* Two runs on the device, bit for bit, and a third with the rollout on the CPU. */
+static void runs_repeat(void **state) {
+    (void)state;
+    PpoDef def = ppo_def_default();
+    def.average = 0.9;
 #ifdef EMULATED
     PolicyDef policy = small_def();
     const int envs = 21;
-    def.epochs = 1;
+    def.epochs = 2;
 #else
     PolicyDef policy = policy_def_default();
     const int envs = 200;
@@ -246,91 +479,230 @@ static void test_repeats(void **state) {
     Learner l[3];
     PpoReport report[3];
     for (int k = 0; k < 3; k++) {
-        learner_open(&l[k], k < 2, &policy, &def, envs);
-        fill_both(&l[k], &l[k], 4);
-        for (int t = 0; t < def.steps; t++) {
-            ppo_act(l[k].ppo, t);
+        learner_open(&l[k], k < 2 ? RESIDENT : MIXED, &policy, &def, envs, 0);
+        learner_fill_parameters(&l[k], 4);
+        for (int round = 0; round < 3; round++) {
+            learner_fill_rollout(&l[k], (uint64_t)round);
+            for (int t = 0; t < def.steps; t++) {
+                ppo_act(l[k].ppo, t);
+            }
+            report[k] = learner_update(&l[k]);
         }
-        ppo_update(l[k].ppo, &report[k]);
-        assert_int_equal(ppo_status(l[k].ppo, &(MildError){0}), MILD_OK);
+        learner_pull(&l[k]);
+        assert_int_equal(ppo_iteration(l[k].ppo), 3);
     }
     const size_t bytes = (size_t)policy_parameter_count(l[0].policy) * sizeof(float);
-    assert_memory_equal(policy_parameters(l[0].policy), policy_parameters(l[1].policy), bytes);
-    assert_memory_equal(&report[0], &report[1], sizeof *report);
-    print_message("after an update of %d steps, against the processor: parameters %.1e, value loss "
-                  "%.1e (relative)\n",
-                  def.epochs * def.minibatches,
-                  distance(policy_parameters(l[0].policy), policy_parameters(l[2].policy),
-                           policy_parameter_count(l[0].policy)),
-                  fabs(report[0].value_loss / report[2].value_loss - 1.0));
+    for (int k = 1; k < 3; k++) {
+        assert_memory_equal(policy_parameters(l[0].policy), policy_parameters(l[k].policy), bytes);
+        assert_memory_equal(policy_parameters(ppo_average(l[0].ppo)),
+                            policy_parameters(ppo_average(l[k].ppo)), bytes);
+        assert_memory_equal(&report[0], &report[k], sizeof *report);
+    }
     for (int k = 0; k < 3; k++) {
         learner_close(&l[k]);
     }
 }
 
-#ifdef EMULATED
-/* A device that stops answering stops the learning: no step is taken with what it left behind. */
-static void test_failure_stops_learning(void **state) {
-    (void)state;
+/* ---- learning ---- */
+
+static PpoDef toy_ppo_def(void) {
     PpoDef def = ppo_def_default();
-    PolicyDef policy = small_def();
-    Learner l;
-    learner_open(&l, 1, &policy, &def, 4);
-    const size_t count = (size_t)policy_parameter_count(l.policy);
-    float *before = malloc(count * sizeof *before);
-    assert_non_null(before);
-    memcpy(before, policy_parameters(l.policy), count * sizeof *before);
-    for (int t = 0; t < def.steps; t++) {
-        ppo_act(l.ppo, t);
-    }
-    emulated_failure = 3; /* the values arrive, the first gradient does not */
-    PpoReport report;
-    ppo_update(l.ppo, &report);
-    emulated_failure = 0;
-    MildError error = {0};
-    assert_int_equal(ppo_status(l.ppo, &error), MILD_ERROR_IO);
-    assert_string_equal(error.text, "GPU: gradient: out of memory");
-    assert_int_equal(report.skipped, def.epochs * def.minibatches);
-    assert_memory_equal(before, policy_parameters(l.policy), count * sizeof *before);
-    free(before);
-    learner_close(&l);
+    def.steps = 40;
+    def.minibatches = 2;
+    return def;
 }
-#else
-/* A checkpoint of one device goes on with the other, and learning works on both. */
-static void test_learns_and_changes_device(void **state) {
+
+static void assert_same_state(const Learner *a, const Learner *b) {
+    const Network *n = &a->policy->network;
+    const size_t bytes = (size_t)n->count * sizeof(float), envs = (size_t)a->batch.envs;
+    assert_memory_equal(a->policy->parameters, b->policy->parameters, bytes);
+    assert_memory_equal(a->ppo->first, b->ppo->first, bytes);
+    assert_memory_equal(a->ppo->second, b->ppo->second, bytes);
+    assert_memory_equal(a->ppo->start.history, b->ppo->start.history,
+                        envs * (size_t)n->history * sizeof(float));
+    assert_memory_equal(a->ppo->start.critic, b->ppo->start.critic,
+                        envs * (size_t)n->def.critic_input * sizeof(float));
+    assert_true(a->ppo->iteration == b->ppo->iteration);
+    assert_true(a->ppo->adam_steps == b->ppo->adam_steps);
+    assert_true(a->ppo->learning_rate == b->ppo->learning_rate);
+    assert_true(a->ppo->seed == b->ppo->seed);
+}
+
+static uint64_t device_seed(const Learner *l) {
+    uint64_t seed = l->ppo->seed;
+    if (l->gpu) {
+        cudaMemcpyAsync(&seed, &l->gpu->progress->seed, sizeof seed, cudaMemcpyDeviceToHost,
+                        l->gpu->queue.stream);
+        assert_int_equal(cudaStreamSynchronize(l->gpu->queue.stream), cudaSuccess);
+    }
+    return seed;
+}
+
+/* A checkpoint of one device goes on with the other as it was, and learning works on both. */
+static void learns_and_changes_device(void **state) {
     (void)state;
     const char *path = "build_test_gpu.safetensors";
     static Toy toy;
     PolicyDef policy = toy_policy_def();
-    PpoDef def = ppo_def_default();
-    def.steps = 40;
-    def.minibatches = 2;
+    PpoDef def = toy_ppo_def();
     MildError error = {0};
-    double reward[2] = {0.0, 0.0};
-    for (int part = 0; part < 2; part++) {
-        Learner l;
-        learner_open(&l, part == 0, &policy, &def, 64);
+#ifdef EMULATED
+    static const int where[] = {RESIDENT, ON_CPU, RESIDENT}, iterations[] = {50, 30, 2};
+#else
+    static const int where[] = {RESIDENT, ON_CPU, MIXED}, iterations[] = {60, 30, 30};
+#endif
+    Learner l[3];
+    double reward[3];
+    for (int part = 0; part < 3; part++) {
+        learner_open(&l[part], where[part], &policy, &def, 32, 0);
         if (part == 0) {
-            toy_start(&toy, l.ppo);
+            l[0].ppo->seed = 12;
+            learner_push(&l[0]);
+            learner_start_toy(&l[0], &toy);
         } else {
-            assert_int_equal(ppo_load(l.ppo, path, &toy, sizeof toy, &error), MILD_OK);
+            assert_int_equal(ppo_load(l[part].ppo, path, &toy, sizeof toy, &error), MILD_OK);
+            assert_true(device_seed(&l[part]) == 12); /* not that of this run */
+            learner_read(&l[part]);
+            learner_pull(&l[part]); /* what the device holds */
+            assert_same_state(&l[part - 1], &l[part]);
         }
-        for (int i = 0; i < 60; i++) {
-            PpoReport report;
-            toy_rollout(&toy, l.ppo);
-            ppo_update(l.ppo, &report);
-            reward[part] = toy.reward;
-        }
-        assert_int_equal(ppo_save(l.ppo, path, &toy, sizeof toy, "toy", &error), MILD_OK);
-        learner_close(&l);
+        reward[part] = learner_play(&l[part], &toy, iterations[part]);
+        assert_int_equal(ppo_save(l[part].ppo, path, &toy, sizeof toy, "toy", &error), MILD_OK);
     }
     unlink(path);
-    print_message("toy task: reward %.2f after 60 iterations on the GPU, %.2f after 60 more on the "
-                  "processor\n",
-                  reward[0], reward[1]);
-    assert_true(reward[0] > 0.9 && reward[1] > 0.9);
+    Learner alone; /* on the CPU from the start */
+    learner_open(&alone, ON_CPU, &policy, &def, 32, 0);
+    learner_start_toy(&alone, &toy);
+    const double expected = learner_play(&alone, &toy, iterations[0]);
+    print_message("toy task: reward %.2f after %d iterations on the GPU (%.2f on the CPU), %.2f "
+                  "after %d more on the CPU, %.2f after %d more on the GPU\n",
+                  reward[0], iterations[0], expected, reward[1], iterations[1], reward[2],
+                  iterations[2]);
+    assert_true(reward[0] > 0.9 && reward[1] > 0.9 && reward[2] > 0.9);
+    assert_true(fabs(reward[0] - expected) < 0.05);
+    learner_close(&alone);
+    for (int part = 0; part < 3; part++) {
+        learner_close(&l[part]);
+    }
 }
 
+/* ---- failures ---- */
+
+#ifdef EMULATED
+/* A device that stops answering stops the learning, and says so. */
+static void a_failure_stops_learning(void **state) {
+    (void)state;
+    PpoDef def = ppo_def_default();
+    PolicyDef policy = small_def();
+    for (int where = MIXED; where <= RESIDENT; where++) {
+        Learner l;
+        learner_open(&l, where, &policy, &def, 4, 0);
+        for (int t = 0; t < def.steps; t++) {
+            ppo_act(l.ppo, t);
+        }
+        emulated_failure = 1;
+        PpoReport report;
+        ppo_update(l.ppo, &report);
+        emulated_failure = 0;
+        MildError error = {0};
+        assert_int_equal(ppo_status(l.ppo, &error), MILD_ERROR_IO);
+        assert_string_equal(error.text, "GPU: update: out of memory");
+        assert_int_equal(ppo_iteration(l.ppo), 0);
+        learner_close(&l);
+    }
+}
+
+static MildStatus attach(int envs, MildError *error) {
+    PpoDef def = ppo_def_default();
+    PolicyDef policy_def = small_def();
+    Policy *policy = policy_create(&policy_def, 5, error);
+    Pool *pool = pool_create(1);
+    Ppo *ppo = ppo_create(&def, policy, pool, NULL, envs, 11, error);
+    assert_non_null(ppo);
+    const MildStatus status = gpu_learner_attach(ppo, &(GpuLearnerDef){.resident = 1}, error);
+    ppo_destroy(ppo);
+    policy_destroy(policy);
+    pool_destroy(pool);
+    return status;
+}
+
+/* Too little memory: the line tells how many robots fit, and so many do, but not one more. */
+static void memory_that_is_missing_is_told(void **state) {
+    (void)state;
+    MildError error = {0};
+    emulated_memory = (size_t)40 << 20;
+    assert_int_equal(attach(5000, &error), MILD_ERROR_MEMORY);
+    const char *at = strstr(error.text, "enough for ");
+    assert_non_null(at);
+    assert_non_null(strstr(error.text, "5000 robots x 24 steps"));
+    const int robots = atoi(at + strlen("enough for "));
+    print_message("%s\n", error.text);
+    assert_true(robots > 100 && robots < 5000);
+    assert_int_equal(attach(robots, &error), MILD_OK);
+    assert_int_equal(attach(robots + 1, &error), MILD_ERROR_MEMORY);
+    emulated_memory = (size_t)1 << 34;
+}
+
+#else
+
+/* A rollout of acts, captured once, is right in every iteration. */
+static void acts_are_captured(void **state) {
+    (void)state;
+    PpoDef def = ppo_def_default();
+    PolicyDef policy = policy_def_default();
+    Learner l[2];
+    cudaGraph_t graph = NULL;
+    cudaGraphExec_t exec = NULL;
+    for (int k = 0; k < 2; k++) {
+        learner_open(&l[k], RESIDENT, &policy, &def, 200, 0);
+        learner_fill_parameters(&l[k], 4);
+        const cudaStream_t stream = gpu_learner_stream(l[k].ppo);
+        if (k == 1) {
+            assert_int_equal(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal),
+                             cudaSuccess);
+            for (int t = 0; t < def.steps; t++) {
+                ppo_act(l[k].ppo, t);
+            }
+            assert_int_equal(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+            assert_int_equal(cudaGraphInstantiate(&exec, graph, 0), cudaSuccess);
+        }
+        for (int round = 0; round < 3; round++) {
+            learner_fill_rollout(&l[k], (uint64_t)round);
+            for (int t = 0; k == 0 && t < def.steps; t++) {
+                ppo_act(l[k].ppo, t);
+            }
+            if (k == 1) {
+                assert_int_equal(cudaGraphLaunch(exec, stream), cudaSuccess);
+            }
+            learner_update(&l[k]);
+        }
+        learner_pull(&l[k]);
+    }
+    assert_non_null(l[0].gpu->graph);
+    assert_memory_equal(policy_parameters(l[0].policy), policy_parameters(l[1].policy),
+                        (size_t)policy_parameter_count(l[0].policy) * sizeof(float));
+    cudaGraphExecDestroy(exec);
+    cudaGraphDestroy(graph);
+    learner_close(&l[0]);
+    learner_close(&l[1]);
+}
+
+/* Products with rounded factors: near the CPU's, as far as 11 or 8 bits go. */
+static void rounded_products_are_near(void **state) {
+    (void)state;
+    static const double bounds[PPO_MATMULS] = {1e-5, 5e-3, 5e-2};
+    PolicyDef policy = policy_def_default();
+    for (int matmul = 0; matmul < PPO_MATMULS; matmul++) {
+        PpoDef def = ppo_def_default();
+        def.matmul = matmul;
+        double worst[3] = {0.0};
+        compare_learner(&policy, &def, 256, 0, worst);
+        print_message("%s: gradient %.1e, sums %.1e, actions %.1e (relative, bound %.0e)\n",
+                      ppo_fields[ppo_field_count - 1].names[matmul], worst[0], worst[1], worst[2],
+                      bounds[matmul]);
+        assert_true(worst[1] < bounds[matmul] && worst[2] < bounds[matmul]);
+    }
+}
 #endif
 
 int main(void) {
@@ -341,12 +713,18 @@ int main(void) {
     }
     printf("%s\n", device);
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_same_function),
-        cmocka_unit_test(test_repeats),
+        cmocka_unit_test(padding_is_zero_and_reversible),
+        cmocka_unit_test(gradients_are_those_of_the_cpu),
+        cmocka_unit_test(returns_are_those_of_the_cpu),
+        cmocka_unit_test(updates_are_those_of_the_cpu),
+        cmocka_unit_test(runs_repeat),
+        cmocka_unit_test(learns_and_changes_device),
 #ifdef EMULATED
-        cmocka_unit_test(test_failure_stops_learning),
+        cmocka_unit_test(a_failure_stops_learning),
+        cmocka_unit_test(memory_that_is_missing_is_told),
 #else
-        cmocka_unit_test(test_learns_and_changes_device),
+        cmocka_unit_test(acts_are_captured),
+        cmocka_unit_test(rounded_products_are_near),
 #endif
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

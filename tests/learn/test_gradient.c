@@ -9,6 +9,7 @@
 #include "learn/noise.h"
 #include "learn/ppo.h"
 #include "learn/ppo_gradient.h"
+#include "learn/ppo_step.h"
 #include "learn/product.h"
 
 enum { STEPS = 70, ENVS = 50, SAMPLES = STEPS * ENVS };
@@ -67,6 +68,16 @@ static void case_close(Case *c) {
     pool_destroy(c->pool);
 }
 
+/* Shards of unequal sizes, one of them empty. */
+static PpoMinibatch minibatch_of(const int *samples, int count, uint32_t draw) {
+    PpoMinibatch minibatch = {.samples = samples, .draw = draw};
+    for (int s = 0; s <= PPO_SHARDS; s++) {
+        minibatch.cut[s] = (int)((int64_t)count * s * s / (PPO_SHARDS * PPO_SHARDS));
+    }
+    minibatch.cut[4] = minibatch.cut[3];
+    return minibatch;
+}
+
 /* The loss of sample p of the minibatch alone, added to gradient and sums. */
 static void one_sample(const Case *c, LossChunk *chunk, int p, int image, const int *rows,
                        uint64_t key, float *gradient, LossSums *sums) {
@@ -105,21 +116,23 @@ static void check_minibatch(Case *c, int count, uint32_t draw, double share) {
     float *block = aligned_alloc(64, (floats * sizeof(float) + 63) / 64 * 64);
     assert_true(which && rows && sum && block);
     loss_carve(&c->policy->network, 1, 1, block, &chunk);
-    const int images = ppo_mirrored(c->ppo, count, which);
-    assert_int_equal(images, ppo_mirrored(c->ppo, count, NULL));
+    const PpoMinibatch minibatch = minibatch_of(c->samples, count, draw);
+    const int images = ppo_mirrored(c->ppo, minibatch.cut, which);
+    assert_int_equal(images, ppo_mirrored(c->ppo, minibatch.cut, NULL));
     assert_true(fabs(images - share * count) <= 8.0 * (1.0 + count / 2048.0));
-    ppo_latent_rows(count, rows);
+    ppo_latent_rows(minibatch.cut, rows);
     c->context.sample_weight = 1.0f / (float)count;
     c->context.mirror_weight = images ? 1.0f / (float)images : 0.0f;
     LossSums sums, expected = {0};
     double norm, squares = 0.0, worst = 0.0;
     memset(c->ppo->gradient, 0xff, PPO_SHARDS * c->ppo->stride * sizeof(float)); /* NaN */
-    ppo_gradient(c->ppo, &c->context, c->samples, count, draw, &sums, &norm);
+    ppo_gradient(c->ppo, &c->context, &minibatch, &sums, &norm);
     int entered = product_enter();
     for (int p = 0, next = 0; p < count; p++) {
         int image = next < images && which[next] == p;
         next += image;
-        one_sample(c, &chunk, p, image, rows, ppo_latent_key(c->ppo, draw), sum, &expected);
+        one_sample(c, &chunk, p, image, rows,
+                   step_latent_key(c->ppo->seed, c->ppo->iteration, draw), sum, &expected);
     }
     product_leave(entered);
     for (int64_t i = 0; i < parameters; i++) {
@@ -172,23 +185,17 @@ static void latents_are_drawn_apart(void **state) {
     static const int counts[] = {1, 7, 8, 100, 2048, 2049, 8000};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         memset(used, 0, sizeof used);
-        ppo_latent_rows(counts[i], row);
+        ppo_latent_rows(minibatch_of(NULL, counts[i], 0).cut, row);
         for (int p = 0; p < counts[i]; p++) {
             assert_true(row[p] >= 0 && row[p] < 2 * counts[i]);
             assert_int_equal(used[row[p]]++, 0);
         }
     }
-    Case c;
-    case_open(&c, 0.5);
-    uint64_t key = ppo_latent_key(c.ppo, 0);
-    assert_true(key == ppo_latent_key(c.ppo, 0));
-    assert_true(key != ppo_latent_key(c.ppo, 1));
-    c.ppo->iteration++;
-    assert_true(key != ppo_latent_key(c.ppo, 0));
-    c.ppo->iteration--;
-    c.ppo->seed++;
-    assert_true(key != ppo_latent_key(c.ppo, 0));
-    case_close(&c);
+    const uint64_t key = step_latent_key(5, 0, 0);
+    assert_true(key == step_latent_key(5, 0, 0));
+    assert_true(key != step_latent_key(5, 0, 1));
+    assert_true(key != step_latent_key(5, 1, 0));
+    assert_true(key != step_latent_key(6, 0, 0));
 }
 
 int main(void) {

@@ -1,6 +1,6 @@
 /* The update around the gradient: learning rate, anneal, clipping, bounds of the noise, averages,
- * shuffling, the report. A backend with scripted results stands in for the networks, so that every
- * number is known. */
+ * order, the report. Scripted results stand in for the networks (the linker puts the functions
+ * below in place of policy_value and ppo_gradient), so that every number is known. */
 #include "check.h"
 
 #include <math.h>
@@ -10,15 +10,17 @@
 
 #include "learn/ppo.h"
 #include "learn/ppo_gradient.h"
+#include "learn/ppo_step.h"
 
 enum { STEPS = 6, ENVS = 5, SAMPLES = STEPS * ENVS, CALLS = 64 };
 
 typedef struct {
-    Ppo *ppo;
+    const PpoBatch *batch;
     LossSums sums; /* per sample: what every call returns, times the count of samples */
     float gradient;
-    int fail_at, bad_at; /* call that fails, or whose kl is no number; -1: none */
-    float value;
+    int bad_at;       /* call whose kl is no number; -1: none */
+    float value;      /* of every sample */
+    int half_rewards; /* bool: or half of its reward */
     /* what was asked */
     int calls, values;
     int count[CALLS], samples[CALLS][SAMPLES];
@@ -26,34 +28,39 @@ typedef struct {
     LossContext context;
 } Script;
 
-static MildStatus script_values(void *self, MildError *error) {
-    Script *s = self;
-    (void)error;
-    PpoBatch *b = ppo_batch(s->ppo);
-    for (int i = 0; i < (STEPS + 1) * ENVS; i++) {
-        b->value[i] = s->value;
+static Script *script; /* of the run that is open */
+
+void __wrap_policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values);
+void __wrap_ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
+                         LossSums *sums, double *norm);
+
+void __wrap_policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values) {
+    (void)policy;
+    (void)pool;
+    (void)critic;
+    assert_int_equal(rows, (STEPS + 1) * ENVS);
+    for (int i = 0; i < rows; i++) {
+        values[i] = !script->half_rewards ? script->value
+                    : i < SAMPLES         ? 0.5f * script->batch->reward[i]
+                                          : 0.0f;
     }
-    s->values++;
-    return MILD_OK;
+    script->values++;
 }
 
-static MildStatus script_gradient(void *self, const LossContext *context, const int *samples,
-                                  int count, uint64_t latent_key, float *gradient, LossSums *sums,
-                                  MildError *error) {
-    Script *s = self;
-    const int call = s->calls++;
+void __wrap_ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
+                         LossSums *sums, double *norm) {
+    Script *s = script;
+    const int call = s->calls++, count = minibatch->cut[PPO_SHARDS];
     if (call < CALLS) {
         s->count[call] = count;
-        s->key[call] = latent_key;
-        memcpy(s->samples[call], samples, (size_t)count * sizeof *samples);
+        s->key[call] = step_latent_key(ppo->seed, ppo->iteration, minibatch->draw);
+        memcpy(s->samples[call], minibatch->samples, (size_t)count * sizeof *minibatch->samples);
     }
     s->context = *context;
-    if (call == s->fail_at) {
-        return mild_fail(error, MILD_ERROR_IO, "the device is gone");
-    }
     for (int64_t i = 0; i < context->network->count; i++) {
-        gradient[i] = s->gradient;
+        ppo->gradient[i] = s->gradient;
     }
+    *norm = sqrt((double)context->network->count) * fabs((double)s->gradient);
     const double n = count;
     *sums = (LossSums){n * s->sums.surrogate,
                        call == s->bad_at ? NAN : n * s->sums.kl,
@@ -63,7 +70,6 @@ static MildStatus script_gradient(void *self, const LossContext *context, const 
                        {n * s->sums.estimate[0], n * s->sums.estimate[1], n * s->sums.estimate[2]},
                        n * s->sums.mirror,
                        n * s->sums.value};
-    return MILD_OK;
 }
 
 typedef struct {
@@ -93,9 +99,8 @@ static void run_open(Run *run, PpoDef def, const PpoMirror *mirror) {
     run->pool = pool_create(1);
     run->ppo = ppo_create(&def, run->policy, run->pool, mirror, ENVS, 17, &error);
     assert_non_null(run->ppo);
-    run->script = (Script){.ppo = run->ppo, .gradient = 1e-4f, .fail_at = -1, .bad_at = -1};
-    PpoBackend backend = {&run->script, NULL, script_values, script_gradient, NULL};
-    ppo_use(run->ppo, &backend);
+    run->script = (Script){.batch = ppo_batch(run->ppo), .gradient = 1e-4f, .bad_at = -1};
+    script = &run->script;
 }
 
 static void run_close(Run *run) {
@@ -131,7 +136,7 @@ static double rate_after(double kl, double rate, PpoDef def, int64_t iteration) 
 }
 
 /* Above twice the target the rate is divided by 1.5, below half of it multiplied, between them it
- * stays; a divergence of zero says nothing. */
+ * stays; a divergence that is rounding says nothing. */
 static void rate_follows_the_divergence(void **state) {
     (void)state;
     const PpoDef def = plain_def();
@@ -141,6 +146,8 @@ static void rate_follows_the_divergence(void **state) {
     assert_close("just above half", rate_after(0.0051, 9e-4, def, 0), 9e-4, 1e-12);
     assert_close("just below half", rate_after(0.0049, 9e-4, def, 0), 1.35e-3, 1e-12);
     assert_close("zero", rate_after(0.0, 9e-4, def, 0), 9e-4, 1e-12);
+    assert_close("rounding", rate_after(0.9e-8, 9e-4, def, 0), 9e-4, 1e-12);
+    assert_close("just above it", rate_after(1.1e-8, 9e-4, def, 0), 1.35e-3, 1e-12);
     assert_close("negative by rounding", rate_after(-1e-9, 9e-4, def, 0), 9e-4, 1e-12);
     assert_close("upper bound", rate_after(1e-4, 1.5e-3, def, 0), 2e-3, 1e-12);
     assert_close("lower bound", rate_after(1.0, 1.2e-5, def, 0), 1e-5, 1e-12);
@@ -251,19 +258,27 @@ static void bad_sums_cost_their_minibatch(void **state) {
     }
 }
 
+/* The device is lost in the second update: the error stays, and the policy with it. */
+static MildStatus update_once(void *self, PpoReport *report, MildError *error) {
+    int *calls = self;
+    report->skipped = 3;
+    return (*calls)++ > 0 ? mild_fail(error, MILD_ERROR_IO, "the device is gone") : MILD_OK;
+}
+
 static void a_backend_that_fails_is_reported(void **state) {
     (void)state;
     Run run;
     MildError error = {0};
-    PpoDef def = plain_def();
-    def.minibatches = 3;
-    run_open(&run, def, NULL);
+    int calls = 0;
+    run_open(&run, plain_def(), NULL);
+    ppo_use(run.ppo, &(PpoBackend){.self = &calls, .update = update_once});
+    assert_int_equal(update(&run).skipped, 3);
     assert_int_equal(ppo_status(run.ppo, &error), MILD_OK);
-    run.script.fail_at = 1;
-    PpoReport report = update(&run);
-    assert_int_equal(report.skipped, 1);
+    update(&run);
     assert_int_equal(ppo_status(run.ppo, &error), MILD_ERROR_IO);
     assert_string_equal(error.text, "the device is gone");
+    assert_int_equal(calls, 2);
+    assert_int_equal(run.script.calls, 0);
     run_close(&run);
 }
 
@@ -307,8 +322,7 @@ static const int mirror_o[] = {0, 2, 1, 4, 3}, mirror_a[] = {1, 0};
 static const float sign_o[] = {-1, 1, 1, -1, -1}, sign_a[] = {-1, -1};
 static const PpoMirror mirror = {mirror_o, sign_o, mirror_a, sign_a};
 
-/* Half of each shard's samples have an image: 30 samples in 8 shards of 3 or 4, each with 2 images.
- */
+/* Half of each shard's samples have an image: five shards of 6 samples, three without any. */
 static void mirror_is_averaged_over_the_images(void **state) {
     (void)state;
     Run run;
@@ -317,13 +331,15 @@ static void mirror_is_averaged_over_the_images(void **state) {
     run.script.sums.mirror = 0.8; /* times 30 samples: a sum of 24 */
     PpoReport report = update(&run);
     int which[SAMPLES];
-    const int images = ppo_mirrored(run.ppo, SAMPLES, which);
-    assert_int_equal(images, 16);
+    int cut[PPO_SHARDS + 1];
+    assert_int_equal(order_cuts(STEPS, ENVS, 0, 1, cut), SAMPLES);
+    const int images = ppo_mirrored(run.ppo, cut, which);
+    assert_int_equal(images, 15);
     for (int r = 1; r < images; r++) {
         assert_true(which[r] > which[r - 1] && which[r] < SAMPLES);
     }
-    assert_close("mirror", report.mirror, 24.0 / 16, 1e-6);
-    assert_close("weight", (double)run.script.context.mirror_weight, 1.0 / 16, 1e-6);
+    assert_close("mirror", report.mirror, 24.0 / 15, 1e-6);
+    assert_close("weight", (double)run.script.context.mirror_weight, 1.0 / 15, 1e-6);
     assert_close("sample weight", (double)run.script.context.sample_weight, 1.0 / SAMPLES, 1e-6);
     run_close(&run);
     def.mirror_weight = 0.0;
@@ -361,23 +377,13 @@ static void values_and_explained_variance(void **state) {
 }
 
 /* With values that carry half of the return the other half remains: 1 - (1/2)^2. */
-static MildStatus half_values(void *self, MildError *error) {
-    Script *s = self;
-    (void)error;
-    PpoBatch *b = ppo_batch(s->ppo);
-    for (int i = 0; i < (STEPS + 1) * ENVS; i++) {
-        b->value[i] = i < SAMPLES ? 0.5f * b->reward[i] : 0.0f;
-    }
-    return MILD_OK;
-}
-
 static void explained_variance_of_half(void **state) {
     (void)state;
     Run run;
     PpoDef def = plain_def();
     def.gamma = 0.0;
     run_open(&run, def, NULL);
-    run.ppo->backend.values = half_values;
+    run.script.half_rewards = 1;
     PpoBatch *b = ppo_batch(run.ppo);
     for (int i = 0; i < SAMPLES; i++) {
         b->reward[i] = (float)(i * i % 7);
@@ -392,6 +398,8 @@ static void explained_variance_of_half(void **state) {
 
 /* ---- order of the samples ---- */
 
+/* Each of 30 samples once an epoch, and the two that are not valid replaced by the next step of
+ * their environment, which is a stratum of its own here. */
 static void every_sample_once_an_epoch(void **state) {
     (void)state;
     Run run;
@@ -400,10 +408,10 @@ static void every_sample_once_an_epoch(void **state) {
     def.minibatches = 4;
     run_open(&run, def, NULL);
     PpoBatch *b = ppo_batch(run.ppo);
-    b->valid[3] = b->valid[17] = 0;
+    b->valid[3] = b->valid[SAMPLES - 1] = 0;
     update(&run);
     assert_int_equal(run.script.calls, 12);
-    static const int sizes[4] = {7, 7, 7, 7}; /* 28 valid samples */
+    static const int sizes[4] = {5, 10, 5, 10}; /* of 6 samples a stratum: 1, 2, 1, 2 */
     int epochs[3][SAMPLES], same = 0;
     for (int epoch = 0; epoch < 3; epoch++) {
         int seen[SAMPLES] = {0}, k = 0;
@@ -415,14 +423,15 @@ static void every_sample_once_an_epoch(void **state) {
                 epochs[epoch][k++] = run.script.samples[call][i];
             }
         }
-        for (int i = 0; i < SAMPLES; i++) {
-            assert_int_equal(seen[i], i != 3 && i != 17);
+        for (int i = 0; i < SAMPLES; i++) { /* the last one's next is the first, at place 4 */
+            const int bad = i == 3 || i == SAMPLES - 1, next = i == 3 + ENVS || i == 4;
+            assert_int_equal(seen[i], bad ? 0 : next ? 2 : 1);
         }
     }
-    for (int k = 0; k < 28; k++) {
+    for (int k = 0; k < SAMPLES; k++) {
         same += epochs[0][k] == epochs[1][k];
     }
-    assert_true(same < 8);
+    assert_true(same < 15);        /* 30 / 6 of them by chance */
     for (int a = 0; a < 12; a++) { /* each minibatch draws its own latents */
         for (int c = 0; c < a; c++) {
             assert_true(run.script.key[a] != run.script.key[c]);
@@ -431,40 +440,20 @@ static void every_sample_once_an_epoch(void **state) {
     run_close(&run);
 }
 
-/* Where sample 0 ends up after a shuffle is uniform, and so is what ends up first: chi-square with
- * 5 degrees of freedom, 1 in 100 000 lies above 30.9. The order goes on from epoch to epoch. */
-static void shuffles_are_uniform(void **state) {
+/* A stratum without any usable sample stops the steps of its update. */
+static void nothing_usable_takes_no_step(void **state) {
     (void)state;
-    enum { FEW = 6, ROUNDS = 200, EPOCHS = 16 };
     Run run;
-    PpoDef def = plain_def();
-    def.epochs = EPOCHS;
-    run_open(&run, def, NULL);
+    run_open(&run, plain_def(), NULL);
     PpoBatch *b = ppo_batch(run.ppo);
-    memset(b->valid, 0, SAMPLES);
-    memset(b->valid, 1, FEW);
-    double where[FEW] = {0}, first[FEW] = {0}, last[FEW] = {0};
-    for (int round = 0; round < ROUNDS; round++) {
-        run.script.calls = 0;
-        update(&run);
-        for (int epoch = 0; epoch < EPOCHS; epoch++) {
-            const int *order = run.script.samples[epoch];
-            for (int k = 0; k < FEW; k++) {
-                where[k] += order[k] == 0;
-            }
-            first[order[0]]++;
-            last[order[FEW - 1]]++;
-        }
+    for (int t = 0; t < STEPS; t++) {
+        b->valid[t * ENVS + 2] = 0;
     }
-    double chi[3] = {0}, expected = (double)ROUNDS * EPOCHS / FEW;
-    for (int k = 0; k < FEW; k++) {
-        chi[0] += pow(where[k] - expected, 2) / expected;
-        chi[1] += pow(first[k] - expected, 2) / expected;
-        chi[2] += pow(last[k] - expected, 2) / expected;
-    }
-    print_message("chi-square of a shuffle's places: %.1f, first %.1f, last %.1f (5 degrees)\n",
-                  chi[0], chi[1], chi[2]);
-    assert_true(chi[0] < 30.9 && chi[1] < 30.9 && chi[2] < 30.9);
+    assert_int_equal(update(&run).skipped, 1);
+    assert_int_equal(run.script.calls, 0);
+    b->valid[2] = 1;
+    assert_int_equal(update(&run).skipped, 0);
+    assert_int_equal(run.script.calls, 1);
     run_close(&run);
 }
 
@@ -636,7 +625,7 @@ int main(void) {
         cmocka_unit_test(values_and_explained_variance),
         cmocka_unit_test(explained_variance_of_half),
         cmocka_unit_test(every_sample_once_an_epoch),
-        cmocka_unit_test(shuffles_are_uniform),
+        cmocka_unit_test(nothing_usable_takes_no_step),
         cmocka_unit_test(noise_stays_within_its_bounds),
         cmocka_unit_test(average_of_the_weights),
         cmocka_unit_test(the_last_observation_is_carried_over),

@@ -99,25 +99,30 @@ static inline void toy_start(Toy *toy, Ppo *ppo) {
     }
 }
 
+/* Steps all environments with the actions of time t. */
+static inline void toy_advance(Toy *toy, PpoBatch *b, int t) {
+    toy->reward = t == 0 ? 0.0 : toy->reward;
+    for (int e = 0; e < b->envs; e++) {
+        const int64_t i = (int64_t)t * b->envs + e;
+        ToyEnv *env = &toy->env[e];
+        const double rate = toy_step(env, b->action + i * 2); /* [1/s] */
+        b->reward[i] = (float)(TOY_PERIOD * rate);
+        b->timeout[i] = env->step >= TOY_EPISODE;
+        b->done[i] = b->timeout[i] || fabs(env->x[0]) > 3.0 || fabs(env->x[1]) > 3.0;
+        b->valid[i] = 1;
+        toy->reward += rate / ((double)b->steps * b->envs);
+        if (b->done[i]) {
+            toy_reset(env, e);
+        }
+        toy_observe(env, b, t + 1, e);
+    }
+}
+
 static inline void toy_rollout(Toy *toy, Ppo *ppo) {
     PpoBatch *b = ppo_batch(ppo);
-    toy->reward = 0.0;
     for (int t = 0; t < b->steps; t++) {
         ppo_act(ppo, t);
-        for (int e = 0; e < b->envs; e++) {
-            const int64_t i = (int64_t)t * b->envs + e;
-            ToyEnv *env = &toy->env[e];
-            const double rate = toy_step(env, b->action + i * 2); /* [1/s] */
-            b->reward[i] = (float)(TOY_PERIOD * rate);
-            b->timeout[i] = env->step >= TOY_EPISODE;
-            b->done[i] = b->timeout[i] || fabs(env->x[0]) > 3.0 || fabs(env->x[1]) > 3.0;
-            b->valid[i] = 1;
-            toy->reward += rate / ((double)b->steps * b->envs);
-            if (b->done[i]) {
-                toy_reset(env, e);
-            }
-            toy_observe(env, b, t + 1, e);
-        }
+        toy_advance(toy, b, t);
     }
 }
 

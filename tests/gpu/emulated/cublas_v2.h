@@ -7,6 +7,12 @@
 typedef struct EmulatedBlas *cublasHandle_t;
 typedef enum { CUBLAS_STATUS_SUCCESS } cublasStatus_t;
 typedef enum { CUBLAS_OP_N, CUBLAS_OP_T } cublasOperation_t;
+typedef enum {
+    CUBLAS_COMPUTE_32F,
+    CUBLAS_COMPUTE_32F_FAST_TF32,
+    CUBLAS_COMPUTE_32F_FAST_16BF
+} cublasComputeType_t;
+enum { CUDA_R_32F, CUBLAS_GEMM_DEFAULT };
 
 static inline const char *cublasGetStatusString(cublasStatus_t status) {
     (void)status;
@@ -25,26 +31,41 @@ static inline cublasStatus_t cublasSetStream(cublasHandle_t handle, cudaStream_t
     return CUBLAS_STATUS_SUCCESS;
 }
 
+static inline cublasStatus_t cublasSetWorkspace(cublasHandle_t handle, void *workspace,
+                                                size_t bytes) {
+    (void)handle, (void)workspace, (void)bytes;
+    return CUBLAS_STATUS_SUCCESS;
+}
+
 /* C = alpha op(A) op(B) + beta C by its definition, column-major: X(i, j) = x[i + j ldx]. C is not
  * read where beta is 0. */
-static inline cublasStatus_t cublasSgemm(cublasHandle_t handle, cublasOperation_t op_a,
-                                         cublasOperation_t op_b, int m, int n, int k,
-                                         const float *alpha, const float *a, int lda,
-                                         const float *b, int ldb, const float *beta, float *c,
-                                         int ldc) {
-    (void)handle;
+static inline cublasStatus_t cublasGemmEx(cublasHandle_t handle, cublasOperation_t op_a,
+                                          cublasOperation_t op_b, int m, int n, int k,
+                                          const void *alpha, const void *a, int a_type, int lda,
+                                          const void *b, int b_type, int ldb, const void *beta,
+                                          void *c, int c_type, int ldc,
+                                          cublasComputeType_t arithmetic, int algorithm) {
+    (void)handle, (void)a_type, (void)b_type, (void)c_type, (void)arithmetic, (void)algorithm;
+    const float scale = *(const float *)alpha, kept = *(const float *)beta;
+    const float *x = (const float *)a, *y = (const float *)b;
+    double *sum = (double *)malloc((size_t)m * sizeof *sum);
     for (long j = 0; j < n; j++) {
         for (long i = 0; i < m; i++) {
-            double sum = 0.0;
-            for (long l = 0; l < k; l++) {
-                double a_il = (double)(op_a == CUBLAS_OP_N ? a[i + l * lda] : a[l + i * lda]);
-                double b_lj = (double)(op_b == CUBLAS_OP_N ? b[l + j * ldb] : b[j + l * ldb]);
-                sum += a_il * b_lj;
+            sum[i] = 0.0;
+        }
+        for (long l = 0; l < k; l++) { /* in this order the inner loop reads neighbours, or few */
+            const double b_lj = (double)(op_b == CUBLAS_OP_N ? y[l + j * ldb] : y[j + l * ldb]);
+            const long row = op_a == CUBLAS_OP_N ? 1 : lda, column = op_a == CUBLAS_OP_N ? lda : 1;
+            for (long i = 0; i < m; i++) {
+                sum[i] += (double)x[i * row + l * column] * b_lj;
             }
-            float *to = &c[i + j * ldc];
-            *to = *alpha * (float)sum + (*beta == 0.0f ? 0.0f : *beta * *to);
+        }
+        for (long i = 0; i < m; i++) {
+            float *to = (float *)c + i + j * ldc;
+            *to = scale * (float)sum[i] + (kept == 0.0f ? 0.0f : kept * *to);
         }
     }
+    free(sum);
     return CUBLAS_STATUS_SUCCESS;
 }
 

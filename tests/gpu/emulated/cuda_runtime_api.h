@@ -12,10 +12,16 @@ typedef struct {
     unsigned x, y, z;
 } uint3;
 typedef uint3 dim3;
+typedef struct {
+    float x, y, z, w;
+} float4;
 typedef struct EmulatedStream *cudaStream_t;
-typedef enum { cudaSuccess, cudaErrorMemoryAllocation } cudaError_t;
-enum { cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost, cudaMemcpyDeviceToDevice };
+typedef struct EmulatedGraph *cudaGraph_t;
+typedef struct EmulatedGraphExec *cudaGraphExec_t;
+typedef enum { cudaSuccess, cudaErrorMemoryAllocation, cudaErrorNotSupported } cudaError_t;
+enum cudaMemcpyKind { cudaMemcpyHostToDevice, cudaMemcpyDeviceToHost, cudaMemcpyDeviceToDevice };
 enum { cudaStreamNonBlocking = 1, cudaHostRegisterDefault = 0 };
+enum { cudaStreamCaptureModeThreadLocal };
 struct cudaDeviceProp {
     char name[256];
     size_t totalGlobalMem;
@@ -24,6 +30,8 @@ struct cudaDeviceProp {
 
 extern int emulated_failure; /* > 0: so many waits succeed, then one reports failure and so do all
                                 after it */
+
+extern size_t emulated_memory; /* [bytes] of the device */
 
 static inline const char *cudaGetErrorString(cudaError_t code) {
     return code ? "out of memory" : "no error";
@@ -42,11 +50,23 @@ static inline cudaError_t cudaGetDeviceProperties(struct cudaDeviceProp *propert
     return cudaSuccess;
 }
 static inline cudaError_t cudaMalloc(void **memory, size_t bytes) {
-    *memory = malloc(bytes);
+    *memory = bytes <= emulated_memory ? malloc(bytes) : NULL;
     if (*memory) {
         memset(*memory, 0xff, bytes); /* NaN: what nobody wrote shows */
     }
     return *memory ? cudaSuccess : cudaErrorMemoryAllocation;
+}
+static inline cudaError_t cudaMemGetInfo(size_t *available, size_t *total) {
+    *available = *total = emulated_memory;
+    return cudaSuccess;
+}
+static inline cudaError_t cudaGetDevice(int *device) {
+    *device = 0;
+    return cudaSuccess;
+}
+static inline cudaError_t cudaSetDevice(int device) {
+    (void)device;
+    return cudaSuccess;
 }
 static inline cudaError_t cudaFree(void *memory) {
     free(memory);
@@ -76,10 +96,36 @@ static inline cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
     }
     return emulated_failure == 1 ? cudaErrorMemoryAllocation : cudaSuccess;
 }
-static inline cudaError_t cudaMemcpyAsync(void *to, const void *from, size_t bytes, int kind,
-                                          cudaStream_t stream) {
+/* Work is done at once and leaves nothing to replay: a graph is refused. */
+static inline cudaError_t cudaStreamBeginCapture(cudaStream_t stream, int mode) {
+    (void)stream, (void)mode;
+    return cudaErrorNotSupported;
+}
+static inline cudaError_t cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t *graph) {
+    (void)stream, (void)graph;
+    return cudaErrorNotSupported;
+}
+static inline cudaError_t cudaGraphInstantiate(cudaGraphExec_t *exec, cudaGraph_t graph,
+                                               unsigned long long flags) {
+    (void)exec, (void)graph, (void)flags;
+    return cudaErrorNotSupported;
+}
+static inline cudaError_t cudaGraphLaunch(cudaGraphExec_t exec, cudaStream_t stream) {
+    (void)exec, (void)stream;
+    return cudaErrorNotSupported;
+}
+static inline cudaError_t cudaGraphDestroy(cudaGraph_t graph) {
+    (void)graph;
+    return cudaSuccess;
+}
+static inline cudaError_t cudaGraphExecDestroy(cudaGraphExec_t exec) {
+    (void)exec;
+    return cudaSuccess;
+}
+static inline cudaError_t cudaMemcpyAsync(void *to, const void *from, size_t bytes,
+                                          enum cudaMemcpyKind kind, cudaStream_t stream) {
     (void)kind, (void)stream;
-    memcpy(to, from, bytes);
+    memmove(to, from, bytes);
     return cudaSuccess;
 }
 static inline cudaError_t cudaMemsetAsync(void *to, int value, size_t bytes, cudaStream_t stream) {

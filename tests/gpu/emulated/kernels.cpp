@@ -1,5 +1,5 @@
-/* The kernels on the processor: the threads of a block are coroutines that take turns at every
- * __syncthreads. */
+/* The kernels on the CPU: the threads of a block run one after the other. One that waits at
+ * __syncthreads keeps its coroutine, and the next thread runs in another. */
 #include <setjmp.h>
 #include <ucontext.h>
 
@@ -7,10 +7,12 @@
 #include <vector>
 
 #include "gpu/kernels.h"
+#include "gpu/update.h"
 
 int emulated_failure;
+size_t emulated_memory = (size_t)1 << 34;
 
-static uint3 threadIdx, blockIdx;
+static uint3 threadIdx, blockIdx, gridDim;
 
 namespace {
 
@@ -19,26 +21,34 @@ struct Fiber {
     ucontext_t context;
     jmp_buf resume;
     std::vector<char> stack;
-    bool started, finished;
-    uint3 thread;
+    bool started, waits; /* waits: at __syncthreads */
+    uint3 thread;        /* its thread then */
 };
 ucontext_t entry;
 jmp_buf scheduler;
 std::vector<Fiber> fibers;
 size_t running;
 std::function<void()> body;
+dim3 size;
+unsigned next_thread, threads;
 
-void fiber_yield() {
+void fiber_yield(bool waits) {
+    fibers[running].waits = waits;
     if (!_setjmp(fibers[running].resume)) {
         _longjmp(scheduler, 1);
     }
 }
 
+/* Runs threads of the block until one waits or none is left. */
 void fiber_main() {
     for (;;) {
-        body();
-        fibers[running].finished = true;
-        fiber_yield();
+        while (next_thread < threads) {
+            const unsigned i = next_thread++;
+            threadIdx = uint3{i % size.x, i / size.x, 0};
+            fibers[running].thread = threadIdx;
+            body();
+        }
+        fiber_yield(false);
     }
 }
 
@@ -65,38 +75,41 @@ void fiber_resume(size_t i) {
     fiber_start(fiber);
 }
 
-void run_block(dim3 size) {
-    const size_t count = size.x * size.y;
-    if (fibers.size() < count) {
-        fibers.resize(count); /* once: every block has as many threads */
+/* Every thread comes to the first barrier or to its end, then those that wait to the next. */
+void run_block() {
+    size_t used = 0;
+    for (next_thread = 0; next_thread < threads; used++) {
+        fiber_resume(used);
     }
-    for (size_t i = 0; i < count; i++) {
-        fibers[i].finished = false;
-        fibers[i].thread = uint3{unsigned(i % size.x), unsigned(i / size.x), 0};
-    }
-    for (size_t left = count; left > 0;) {
-        for (size_t i = 0; i < count; i++) {
-            if (fibers[i].finished) {
-                continue;
+    for (bool left = true; left;) {
+        left = false;
+        for (size_t i = 0; i < used; i++) {
+            if (fibers[i].waits) {
+                fiber_resume(i);
+                left |= fibers[i].waits;
             }
-            fiber_resume(i);
-            left -= fibers[i].finished;
         }
     }
 }
 
 void launch(dim3 grid, dim3 block, std::function<void()> kernel) {
     body = kernel;
+    size = block;
+    gridDim = grid;
+    threads = block.x * block.y;
+    if (fibers.size() < threads) {
+        fibers.resize(threads); /* once: no block has more threads than the first */
+    }
     for (unsigned y = 0; y < grid.y; y++) {
         for (unsigned x = 0; x < grid.x; x++) {
             blockIdx = uint3{x, y, 0};
-            run_block(block);
+            run_block();
         }
     }
 }
 
 void __syncthreads() {
-    fiber_yield();
+    fiber_yield(true);
 }
 
 } // namespace
@@ -108,3 +121,4 @@ void __syncthreads() {
     ((void)(stream), launch(grid, block, [&] { kernel(__VA_ARGS__); }))
 
 #include "gpu/kernels.cu"
+#include "gpu/update.cu"

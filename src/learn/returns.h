@@ -1,0 +1,48 @@
+/* Advantages of one environment, for CPU (ppo_returns.c) and GPU (gpu/update.cu). Written in the
+ * common subset of C17 and CUDA C++. */
+#ifndef MILD_RETURNS_H
+#define MILD_RETURNS_H
+
+#include <math.h>
+
+#include "base/both.h"
+#include "learn/ppo_batch.h"
+
+/* Bool: sample i is valid and its numbers are finite. */
+static inline MILD_BOTH int returns_usable(const PpoBatch *b, int64_t i) {
+    return b->valid[i] && isfinite(b->value[i]) && isfinite(b->reward[i]);
+}
+
+/* Backward over time:
+ *   delta_t = r_t + gamma V(s_t+1) (1 - done) - V(s_t),  A_t = delta_t + gamma lambda (1 - done)
+ * A_t+1, where an end by time has r_t += gamma V(s_t), as if the episode went on. An unusable
+ * sample cuts like an end. */
+static inline MILD_BOTH void returns_environment(double gamma, double lambda, const PpoBatch *b,
+                                               int env) {
+    double advantage = 0.0, next_value = b->value[(int64_t)b->steps * b->envs + env];
+    next_value = isfinite(next_value) ? next_value : 0.0;
+    for (int t = b->steps - 1; t >= 0; t--) {
+        const int64_t i = (int64_t)t * b->envs + env;
+        if (!returns_usable(b, i)) {
+            b->advantage[i] = b->returns[i] = 0.0f;
+            advantage = 0.0;
+            next_value = isfinite(b->value[i]) ? b->value[i] : 0.0;
+            continue;
+        }
+        const double value = b->value[i], live = b->done[i] ? 0.0 : 1.0;
+        const double reward = b->reward[i] + (b->done[i] && b->timeout[i] ? gamma * value : 0.0);
+        const double delta = reward + live * gamma * next_value - value;
+        advantage = delta + live * gamma * lambda * advantage;
+        b->advantage[i] = (float)advantage;
+        b->returns[i] = (float)(advantage + value);
+        next_value = value;
+    }
+}
+
+/* Bool: the frame of sample i = (t, env) is followed by one that it may be replaced with as the
+ * decoder's target. The last frame of an episode and a frame before one that is not valid stay. */
+static inline MILD_BOTH int returns_has_next(const PpoBatch *b, int t, int64_t i) {
+    return !b->done[i] && (t + 1 == b->steps || b->valid[i + b->envs]);
+}
+
+#endif

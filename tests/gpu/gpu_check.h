@@ -1,0 +1,188 @@
+/* A learner on the CPU or on the GPU, and the distances between two of them. */
+#ifndef MILD_TEST_GPU_CHECK_H
+#define MILD_TEST_GPU_CHECK_H
+
+#include "../learn/toy.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "gpu/learner.h"
+#include "gpu/learner_private.h"
+#include "learn/ppo_gradient.h"
+#include "learn/ppo_returns.h"
+
+enum { ON_CPU, MIXED, RESIDENT };
+
+typedef struct {
+    Policy *policy;
+    Pool *pool;
+    Ppo *ppo;
+    GpuLearner *gpu; /* NULL: on the CPU */
+    int mirror_index[64];
+    float mirror_sign[64];
+    /* With a resident rollout a copy of it on the CPU, else the rollout. */
+    PpoBatch batch;
+    void *block;
+} Learner;
+
+/* Swaps neighbours and changes every third sign: its own inverse, as a mirror is. */
+static inline PpoMirror some_mirror(Learner *l, const PolicyDef *def) {
+    const int count = def->observation > def->actions ? def->observation : def->actions;
+    for (int i = 0; i < count; i++) {
+        l->mirror_index[i] = i;
+        l->mirror_sign[i] = i % 3 ? 1.0f : -1.0f;
+    }
+    for (int i = 0; i + 1 < def->actions && i + 1 < def->observation; i += 2) {
+        l->mirror_index[i] = i + 1;
+        l->mirror_index[i + 1] = i;
+    }
+    return (PpoMirror){l->mirror_index, l->mirror_sign, l->mirror_index, l->mirror_sign};
+}
+
+/* rows: most rows of a chunk on the device; 0: the default. */
+static inline void learner_open(Learner *l, int where, const PolicyDef *policy, const PpoDef *def,
+                                int envs, int rows) {
+    MildError error = {0};
+    memset(l, 0, sizeof *l);
+    PpoMirror mirror =
+        policy->observation == TOY_OBSERVATION ? toy_mirror() : some_mirror(l, policy);
+    l->policy = policy_create(policy, 5, &error);
+    l->pool = pool_create(where == ON_CPU ? 0 : 1);
+    assert_true(l->policy && l->pool);
+    l->ppo = ppo_create(def, l->policy, l->pool, &mirror, envs, 11, &error);
+    assert_non_null(l->ppo);
+    if (where != ON_CPU) {
+        const GpuLearnerDef gpu = {.resident = where == RESIDENT, .rows = rows};
+        if (gpu_learner_attach(l->ppo, &gpu, &error)) {
+            fail_msg("%s", error.text);
+        }
+        l->gpu = l->ppo->backend.self;
+    }
+    assert_int_equal(ppo_is_resident(l->ppo), where == RESIDENT);
+    l->batch = *ppo_batch(l->ppo);
+    if (where == RESIDENT) {
+        const size_t bytes = ppo_batch_like(l->ppo, NULL, &l->batch);
+        l->block = aligned_alloc(64, (bytes + 63) / 64 * 64);
+        assert_non_null(l->block);
+        ppo_batch_like(l->ppo, l->block, &l->batch);
+        assert_int_equal(gpu_learner_read(l->ppo, l->block, &error), MILD_OK);
+    }
+}
+
+static inline void learner_close(Learner *l) {
+    free(l->block);
+    ppo_destroy(l->ppo);
+    policy_destroy(l->policy);
+    pool_destroy(l->pool);
+}
+
+/* Brings the device's rollout to the CPU, or back; nothing to do where it is there. */
+static inline void learner_read(Learner *l) {
+    assert_true(!l->block || gpu_learner_read(l->ppo, l->block, NULL) == MILD_OK);
+}
+
+static inline void learner_write(Learner *l) {
+    assert_true(!l->block || gpu_learner_write(l->ppo, l->block, NULL) == MILD_OK);
+}
+
+static inline void learner_pull(Learner *l) {
+    MildError error = {0};
+    if (ppo_pull(l->ppo, &error)) {
+        fail_msg("%s", error.text);
+    }
+}
+
+/* After a change of the parameters or moments on the CPU. */
+static inline void learner_push(Learner *l) {
+    assert_true(!l->gpu || l->ppo->backend.push(l->gpu, NULL) == MILD_OK);
+}
+
+static inline PpoReport learner_update(Learner *l) {
+    PpoReport report;
+    MildError error = {0};
+    ppo_update(l->ppo, &report);
+    if (ppo_status(l->ppo, &error)) {
+        fail_msg("%s", error.text);
+    }
+    return report;
+}
+
+/* Random parameters, because the modulation begins at zero otherwise. The second moments are those
+ * of a run that has learned for a while: Adam's first steps divide every gradient by its own size,
+ * which enlarges the rounding of small ones without bound. */
+static inline void learner_fill_parameters(Learner *l, uint64_t seed) {
+    Random random = random_at(seed, 1, 1);
+    const Network *n = &l->policy->network;
+    for (int64_t i = 0; i < n->log_std; i++) {
+        l->policy->parameters[i] += (float)(0.03 * random_normal(&random));
+    }
+    for (int64_t i = 0; i < n->count; i++) {
+        l->ppo->first[i] = (float)(1e-3 * random_normal(&random));
+        l->ppo->second[i] = (float)(1e-2 * (1.0 + random_unit(&random)));
+    }
+    l->ppo->adam_steps = 10000;
+    learner_push(l);
+}
+
+/* A random rollout but for what the policy adds to it. */
+static inline void learner_fill_rollout(Learner *l, uint64_t seed) {
+    Random random = random_at(seed, 1, 2);
+    const Network *n = &l->policy->network;
+    PpoBatch *b = &l->batch;
+    const int64_t samples = (int64_t)b->steps * b->envs, more = samples + b->envs;
+    fill_normal(b->history, more * n->history, 1.0, &random);
+    fill_normal(b->critic, more * n->def.critic_input, 1.0, &random);
+    fill_normal(b->target, more * n->def.estimates, 1.0, &random);
+    fill_normal(b->frame, more * n->def.observation, 1.0, &random);
+    fill_normal(b->reward, samples, 1.0, &random);
+    for (int64_t i = 0; i < samples; i++) {
+        b->done[i] = random_unit(&random) < 0.02;
+        b->timeout[i] = b->done[i] && random_unit(&random) < 0.5;
+        b->valid[i] = 1;
+    }
+    learner_write(l);
+}
+
+/* |a - b| / |b| over a range. */
+static inline double distance(const float *a, const float *b, int64_t count) {
+    double gap = 0.0, size = 0.0;
+    for (int64_t i = 0; i < count; i++) {
+        gap += ((double)a[i] - b[i]) * ((double)a[i] - b[i]);
+        size += (double)b[i] * b[i];
+    }
+    return size > 0.0 ? sqrt(gap / size) : sqrt(gap);
+}
+
+static inline void worse(double *worst, double value) {
+    assert_true(isfinite(value));
+    *worst = value > *worst ? value : *worst;
+}
+
+/* Learns the toy task for some iterations; returns the last reward [1/s]. */
+static inline double learner_play(Learner *l, Toy *toy, int iterations) {
+    for (int i = 0; i < iterations; i++) {
+        for (int t = 0; t < l->batch.steps; t++) {
+            ppo_act(l->ppo, t);
+            learner_read(l);
+            toy_advance(toy, &l->batch, t);
+            learner_write(l);
+        }
+        learner_update(l);
+        learner_read(l);
+    }
+    return toy->reward;
+}
+
+static inline void learner_start_toy(Learner *l, Toy *toy) {
+    memset(toy, 0, sizeof *toy);
+    toy->envs = l->batch.envs;
+    for (int e = 0; e < toy->envs; e++) {
+        toy_reset(&toy->env[e], e);
+        toy_observe(&toy->env[e], &l->batch, 0, e);
+    }
+    learner_write(l);
+}
+
+#endif
