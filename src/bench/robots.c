@@ -76,7 +76,7 @@ static MildStatus run(Crowd *crowd, const ExperimentDef *def, Rows *rows, BenchR
         status = time_steps(crowd, rows, envs, steps, &seconds, error);
     }
     if (status == MILD_OK) {
-        status = crowd_take_stats(crowd, &stats, NULL, error);
+        status = crowd_take_sums(crowd, &stats, NULL, error);
     }
     if (status == MILD_OK) {
         bench_add(report, "robots", "envs", envs, "-");

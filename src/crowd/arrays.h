@@ -5,6 +5,7 @@
 #include "batch/batch.h"
 #include "engine/data.h"
 #include "task/ground.h"
+#include "task/task.h"
 
 /* Sums over the episodes of an environment that ended since the last crowd_take_stats; see
  * VecStats. */
@@ -13,6 +14,7 @@ enum {
     TALLY_FALLS,
     TALLY_DIVERGED,
     TALLY_STEPS,
+    TALLY_PAID,
     TALLY_LENGTH,
     TALLY_REWARD,
     TALLY_SPEED_ERROR,
@@ -56,6 +58,7 @@ typedef struct {
     uint8_t *fresh;    /* [envs] bool: an episode began */
     uint8_t *rigid;    /* [envs] bool: of the episode */
     int32_t *order;    /* [envs] in which a GPU steps them: those on rigid ground first */
+    TaskKept *kept;    /* [envs] for crowd_keep */
     double *tally;     /* [TALLY_NUMBERS] sums over the environments */
     EngineWork *work;  /* [envs] between the parts of a step */
     CrowdContact contact;

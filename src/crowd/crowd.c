@@ -82,6 +82,7 @@ static MildStatus take_arrays(Crowd *crowd, int feet, MildError *error) {
                   {&all->order, envs * sizeof *all->order},
                   {&all->work, envs * sizeof *all->work},
                   {&all->depth, rows * sizeof(float)},
+                  {&all->kept, envs * sizeof *all->kept},
                   {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
                   {&contact->position, 3 * rows * sizeof(float)},
                   {&contact->rotation, 9 * rows * sizeof(float)},
@@ -332,7 +333,7 @@ MildStatus crowd_step(Crowd *crowd, const float *action, float *reward, uint8_t 
     return status == MILD_OK ? finish(crowd, &call, stream, error) : status;
 }
 
-MildStatus crowd_take_stats(Crowd *crowd, VecStats *stats, void *stream, MildError *error) {
+MildStatus crowd_take_sums(Crowd *crowd, VecStats *sums, void *stream, MildError *error) {
     const CrowdArrays *all = &crowd->arrays;
     double sum[TALLY_NUMBERS];
     if (crowd->device != MILD_BATCH_HOST) {
@@ -348,17 +349,48 @@ MildStatus crowd_take_stats(Crowd *crowd, VecStats *stats, void *stream, MildErr
     if (status != MILD_OK) {
         return status;
     }
-    *stats = (VecStats){.episodes = (int)sum[TALLY_EPISODES],
-                        .falls = (int)sum[TALLY_FALLS],
-                        .diverged = (int)sum[TALLY_DIVERGED],
-                        .steps = sum[TALLY_STEPS],
-                        .length = sum[TALLY_LENGTH],
-                        .reward = sum[TALLY_REWARD],
-                        .speed_error = sum[TALLY_SPEED_ERROR],
-                        .assist = sum[TALLY_ASSIST] / all->envs};
-    memcpy(stats->terms, sum + TALLY_TERMS, sizeof stats->terms);
-    vec_stats_means(stats);
+    *sums = (VecStats){.episodes = (int)sum[TALLY_EPISODES],
+                       .falls = (int)sum[TALLY_FALLS],
+                       .diverged = (int)sum[TALLY_DIVERGED],
+                       .steps = sum[TALLY_STEPS],
+                       .paid = sum[TALLY_PAID],
+                       .length = sum[TALLY_LENGTH],
+                       .reward = sum[TALLY_REWARD],
+                       .speed_error = sum[TALLY_SPEED_ERROR],
+                       .assist = sum[TALLY_ASSIST]};
+    memcpy(sums->terms, sum + TALLY_TERMS, sizeof sums->terms);
     return MILD_OK;
+}
+
+/* Between the environments and arrays.kept. */
+static MildStatus move_kept(const Crowd *crowd, int back, MildError *error) {
+    if (crowd->device == MILD_BATCH_HOST) {
+        crowd_host_keep(&crowd->arrays, back);
+        return MILD_OK;
+    }
+    MildStatus status = device_wait(crowd->device, error);
+    status =
+        status == MILD_OK ? checked(crowd_device_keep(&crowd->arrays, back, NULL), error) : status;
+    return status == MILD_OK ? device_wait(crowd->device, error) : status;
+}
+
+MildStatus crowd_keep(Crowd *crowd, TaskKept *kept, MildError *error) {
+    const CrowdArrays *all = &crowd->arrays;
+    MildStatus status = move_kept(crowd, 0, error);
+    return status == MILD_OK
+               ? batch_copy(crowd->device, kept, all->kept, (size_t)all->envs * sizeof *kept, error)
+               : status;
+}
+
+MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
+    const CrowdArrays *all = &crowd->arrays;
+    MildStatus status =
+        batch_copy(crowd->device, all->kept, kept, (size_t)all->envs * sizeof *kept, error);
+    return status == MILD_OK ? move_kept(crowd, 1, error) : status;
+}
+
+size_t crowd_bytes(const Crowd *crowd) {
+    return crowd_robot_bytes(crowd) * (size_t)crowd->arrays.envs;
 }
 
 const TaskEnv *crowd_env(const Crowd *crowd, int i) {

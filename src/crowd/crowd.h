@@ -35,10 +35,15 @@ MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildErr
 MildStatus crowd_step(Crowd *crowd, const float *action, float *reward, uint8_t *done,
                       uint8_t *timeout, uint8_t *valid, const VecView *next, void *stream,
                       MildError *error);
-/* Statistics of the episodes that ended since the last call. Waits for the stream. */
-MildStatus crowd_take_stats(Crowd *crowd, VecStats *stats, void *stream, MildError *error);
+/* As vec_take_sums. Waits for the device. */
+MildStatus crowd_take_sums(Crowd *crowd, VecStats *sums, void *stream, MildError *error);
 /* [B] Of the device for one robot. */
 size_t crowd_robot_bytes(const Crowd *crowd);
+/* What lasts beyond an episode, [envs] on the host, and back, before crowd_reset. Waits for the
+ * device. */
+MildStatus crowd_keep(Crowd *crowd, TaskKept *kept, MildError *error);
+MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error);
+size_t crowd_bytes(const Crowd *crowd);
 /* State of an environment, on the host only. */
 const TaskEnv *crowd_env(const Crowd *crowd, int i);
 

@@ -104,6 +104,14 @@ static __global__ void __launch_bounds__(ORDER_THREADS)
     }
 }
 
+static __global__ void __launch_bounds__(TASK_THREADS)
+    keep(const __grid_constant__ CrowdArrays all, int back) {
+    const long robot = thread_robot();
+    if (robot < all.envs) {
+        crowd_keep_env(&all, robot, back);
+    }
+}
+
 /* Block n sums number n of all tallies, in a fixed order. */
 static __global__ void __launch_bounds__(TALLY_THREADS)
     tally(const __grid_constant__ CrowdArrays all) {
@@ -164,6 +172,11 @@ extern "C" const char *crowd_device_first(const CrowdArrays *all, const CrowdSte
     pose<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all);
     observe<<<warp_blocks(all->envs), WARP_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    return launched();
+}
+
+extern "C" const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream) {
+    keep<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
     return launched();
 }
 

@@ -32,6 +32,12 @@ void crowd_host_end(const CrowdArrays *all, const CrowdStep *call, long robot) {
     crowd_end(all, call, robot);
 }
 
+void crowd_host_keep(const CrowdArrays *all, int back) {
+    for (long robot = 0; robot < all->envs; robot++) {
+        crowd_keep_env(all, robot, back);
+    }
+}
+
 void crowd_host_tally(const CrowdArrays *all) {
     for (int n = 0; n < TALLY_NUMBERS; n++) {
         all->tally[n] = 0;

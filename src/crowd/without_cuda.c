@@ -32,6 +32,13 @@ const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call, void
     return none;
 }
 
+const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream) {
+    (void)all;
+    (void)back;
+    (void)stream;
+    return none;
+}
+
 const char *crowd_device_tally(const CrowdArrays *all, void *stream) {
     (void)all;
     (void)stream;

@@ -50,5 +50,14 @@ MildStatus ppo_status(const Ppo *ppo, MildError *error);
 MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size,
                     const char *note, MildError *error);
 MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error);
+/* The same without the rows of time 0, for environments that begin new episodes when a run goes on.
+ * ppo_load_learner reads files of both kinds. found: bool, whether `kept` was read, which it is
+ * from a file of ppo_save_learner with as many bytes. */
+MildStatus ppo_save_learner(const Ppo *ppo, const char *path, const void *kept, size_t kept_size,
+                            const char *note, MildError *error);
+MildStatus ppo_load_learner(Ppo *ppo, const char *path, void *kept, size_t kept_size, int *found,
+                            MildError *error);
+/* Bool: a readable file of ppo_save. */
+int ppo_file_is_whole(const char *path);
 
 #endif

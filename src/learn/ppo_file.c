@@ -22,10 +22,25 @@ static Safetensor tensor_of(const char *name, SafetensorsType type, const void *
                         .bytes = sizes[type] * (size_t)count};
 }
 
-/* What resuming needs besides the policy. The next rollout starts from the batch's rows of time
- * 0. */
-static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const void *extra,
-                         size_t extra_size, Safetensor tensors[TRAIN_TENSORS]) {
+/* The caller's bytes in a checkpoint, and what belongs to them. */
+typedef struct {
+    const char *name; /* of the tensor */
+    const void *bytes;
+    size_t size; /* 0: none */
+    int rows;    /* bool: the rows of time 0, from which the next rollout starts, are there too */
+} Extra;
+
+static Extra whole_extra(const void *bytes, size_t size) {
+    return (Extra){"train.extra", bytes, size, 1};
+}
+
+static Extra kept_extra(const void *bytes, size_t size) {
+    return (Extra){"train.kept", bytes, size, 0};
+}
+
+/* What resuming needs besides the policy. */
+static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const Extra *extra,
+                         Safetensor tensors[TRAIN_TENSORS]) {
     const Network *n = &ppo->policy->network;
     const PpoBatch *b = &ppo->start;
     const int64_t envs = b->envs;
@@ -34,25 +49,29 @@ static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const
     tensors[count++] = tensor_of("train.learning_rate", SAFETENSORS_F64, &ppo->learning_rate, 1);
     tensors[count++] = tensor_of("train.first_moment", SAFETENSORS_F32, ppo->first, n->count);
     tensors[count++] = tensor_of("train.second_moment", SAFETENSORS_F32, ppo->second, n->count);
-    tensors[count++] = tensor_of("train.history", SAFETENSORS_F32, b->history, envs * n->history);
-    tensors[count++] =
-        tensor_of("train.critic", SAFETENSORS_F32, b->critic, envs * n->def.critic_input);
-    tensors[count++] =
-        tensor_of("train.target", SAFETENSORS_F32, b->target, envs * n->def.estimates);
-    tensors[count++] =
-        tensor_of("train.frame", SAFETENSORS_F32, b->frame, envs * n->def.observation);
+    if (extra->rows) {
+        tensors[count++] =
+            tensor_of("train.history", SAFETENSORS_F32, b->history, envs * n->history);
+        tensors[count++] =
+            tensor_of("train.critic", SAFETENSORS_F32, b->critic, envs * n->def.critic_input);
+        tensors[count++] =
+            tensor_of("train.target", SAFETENSORS_F32, b->target, envs * n->def.estimates);
+        tensors[count++] =
+            tensor_of("train.frame", SAFETENSORS_F32, b->frame, envs * n->def.observation);
+    }
     if (ppo->average) {
         tensors[count++] =
             tensor_of("train.average", SAFETENSORS_F32, policy_parameters(ppo->average), n->count);
     }
-    if (extra_size > 0) {
-        tensors[count++] = tensor_of("train.extra", SAFETENSORS_U8, extra, (int64_t)extra_size);
+    if (extra->size > 0) {
+        tensors[count++] =
+            tensor_of(extra->name, SAFETENSORS_U8, extra->bytes, (int64_t)extra->size);
     }
     return count;
 }
 
-MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size,
-                    const char *note, MildError *error) {
+static MildStatus save(const Ppo *ppo, const char *path, const Extra *extra, const char *note,
+                       MildError *error) {
     const PpoBackend *backend = &ppo->backend;
     MildStatus status = backend->pull ? backend->pull(backend->self, error) : MILD_OK;
     if (status) {
@@ -62,17 +81,29 @@ MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t 
     PolicyTexts texts;
     Safetensor all[TRAIN_TENSORS + POLICY_TENSORS_MAX];
     const int64_t counters[COUNTERS] = {ppo->iteration, ppo->adam_steps, (int64_t)ppo->seed};
-    int count = train_tensors(ppo, counters, extra, extra_size, all);
+    int count = train_tensors(ppo, counters, extra, all);
     policy_file_tensors(&ppo->policy->network, ppo->policy->parameters, &policy);
     policy_file_texts(&ppo->policy->network, POLICY_CHECKPOINT_KIND, note, &texts);
     /* the caller's bytes last, so that every number before them stays aligned */
-    const int numbers = extra_size > 0 ? count - 1 : count;
+    const int numbers = extra->size > 0 ? count - 1 : count;
     const Safetensor last = all[count - 1];
     memcpy(all + numbers, policy.tensor, (size_t)policy.count * sizeof *all);
     if (numbers < count) {
         all[numbers + policy.count] = last;
     }
     return safetensors_write(path, all, count + policy.count, texts.text, texts.count, error);
+}
+
+MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size,
+                    const char *note, MildError *error) {
+    const Extra whole = whole_extra(extra, extra_size);
+    return save(ppo, path, &whole, note, error);
+}
+
+MildStatus ppo_save_learner(const Ppo *ppo, const char *path, const void *kept, size_t kept_size,
+                            const char *note, MildError *error) {
+    const Extra some = kept_extra(kept, kept_size);
+    return save(ppo, path, &some, note, error);
 }
 
 static MildStatus check_same_network(const Safetensors *file, const char *path,
@@ -116,9 +147,12 @@ static int all_finite(const Safetensor *tensor) {
 }
 
 static MildStatus check_train(const Safetensors *file, const char *path, const Safetensor *wanted,
-                              int count, int has_extra, MildError *error) {
+                              int count, const Extra *extra, MildError *error) {
     for (int i = 0; i < count; i++) {
         const Safetensor *have = safetensors_find(file, wanted[i].name);
+        if (!extra->rows && strcmp(wanted[i].name, extra->name) == 0) {
+            continue; /* taken where it fits */
+        }
         if (!have && strcmp(wanted[i].name, "train.average") == 0) {
             continue; /* the run had none: it starts from the weights */
         }
@@ -134,7 +168,7 @@ static MildStatus check_train(const Safetensors *file, const char *path, const S
                              path, wanted[i].name);
         }
     }
-    if (!safetensors_find(file, "train.extra") != !has_extra) {
+    if (extra->rows && !safetensors_find(file, extra->name) != !extra->size) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "%s: contains an environment state that this run does not expect", path);
     }
@@ -142,19 +176,20 @@ static MildStatus check_train(const Safetensors *file, const char *path, const S
 }
 
 static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters[COUNTERS],
-                       double learning_rate, void *extra) {
+                       double learning_rate, const Extra *extra, void *to) {
+    const int rows = extra->rows;
     const struct {
         const char *name;
         void *to;
     } areas[] = {
         {"train.first_moment", ppo->first},
         {"train.second_moment", ppo->second},
-        {"train.history", ppo->start.history},
-        {"train.critic", ppo->start.critic},
-        {"train.target", ppo->start.target},
-        {"train.frame", ppo->start.frame},
+        {"train.history", rows ? ppo->start.history : NULL},
+        {"train.critic", rows ? ppo->start.critic : NULL},
+        {"train.target", rows ? ppo->start.target : NULL},
+        {"train.frame", rows ? ppo->start.frame : NULL},
         {"train.average", ppo->average ? policy_parameters(ppo->average) : NULL},
-        {"train.extra", extra},
+        {extra->name, to},
     };
     for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
         const Safetensor *have = safetensors_find(file, areas[i].name);
@@ -169,19 +204,19 @@ static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters
 }
 
 /* Checks everything, and reads the parameters into a spare array, before it changes `ppo`. */
-static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra,
-                            size_t extra_size, float *spare, MildError *error) {
+static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path, const Extra *extra,
+                            void *to, float *spare, MildError *error) {
     const Network *n = &ppo->policy->network;
     Safetensor wanted[TRAIN_TENSORS];
     int64_t counters[COUNTERS] = {0};
     double learning_rate;
-    int count = train_tensors(ppo, counters, extra, extra_size, wanted);
+    int count = train_tensors(ppo, counters, extra, wanted);
     MildStatus status = check_same_network(file, path, n, error);
     if (!status) {
         status = policy_file_parameters(file, path, n, spare, error);
     }
     if (!status) {
-        status = check_train(file, path, wanted, count, extra_size > 0, error);
+        status = check_train(file, path, wanted, count, extra, error);
     }
     if (status) {
         return status;
@@ -198,18 +233,53 @@ static MildStatus take_file(Ppo *ppo, const Safetensors *file, const char *path,
     if (ppo->average) {
         memcpy(policy_parameters(ppo->average), spare, (size_t)n->count * sizeof *spare);
     }
-    take_train(ppo, file, counters, learning_rate, extra);
+    take_train(ppo, file, counters, learning_rate, extra, to);
     return ppo->backend.push ? ppo->backend.push(ppo->backend.self, error) : MILD_OK;
+}
+
+static MildStatus take(Ppo *ppo, const Safetensors *file, const char *path, const Extra *extra,
+                       void *to, MildError *error) {
+    float *spare = malloc((size_t)ppo->policy->network.count * sizeof *spare);
+    MildStatus status = spare
+                            ? take_file(ppo, file, path, extra, to, spare, error)
+                            : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
+    free(spare);
+    return status;
 }
 
 MildStatus ppo_load_file(Ppo *ppo, const Safetensors *file, const char *path, void *extra,
                          size_t extra_size, MildError *error) {
-    float *spare = malloc((size_t)ppo->policy->network.count * sizeof *spare);
-    MildStatus status = spare
-                            ? take_file(ppo, file, path, extra, extra_size, spare, error)
-                            : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
-    free(spare);
+    const Extra whole = whole_extra(extra, extra_size);
+    return take(ppo, file, path, &whole, extra, error);
+}
+
+/* Takes the caller's bytes only if the file has as many of them. */
+static MildStatus load_learner(Ppo *ppo, const Safetensors *file, const char *path, void *kept,
+                               size_t kept_size, int *found, MildError *error) {
+    const Safetensor *have = safetensors_find(file, "train.kept");
+    const Extra some = kept_extra(kept, kept_size);
+    *found = have && have->bytes == kept_size;
+    return take(ppo, file, path, &some, *found ? kept : NULL, error);
+}
+
+MildStatus ppo_load_learner(Ppo *ppo, const char *path, void *kept, size_t kept_size, int *found,
+                            MildError *error) {
+    MildError cause = {0};
+    Safetensors *file = safetensors_read(path, &cause);
+    MildStatus status =
+        file ? load_learner(ppo, file, path, kept, kept_size, found, &cause) : cause.status;
+    if (error && status != MILD_OK) {
+        *error = cause;
+    }
+    safetensors_destroy(file);
     return status;
+}
+
+int ppo_file_is_whole(const char *path) {
+    Safetensors *file = safetensors_read(path, NULL);
+    const int whole = file && safetensors_find(file, "train.history");
+    safetensors_destroy(file);
+    return whole;
 }
 
 MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error) {

@@ -26,6 +26,16 @@ TASK_FN float *task_env_frame(TaskEnv *env, int age) {
     return task_env_history(env) + env->shape.history + place * (uint32_t)env->shape.observation;
 }
 
+TASK_FN TaskKept task_keep(const TaskEnv *env) {
+    const TaskKept kept = {env->assist_level, env->tick};
+    return kept;
+}
+
+TASK_FN void task_restore(TaskEnv *env, TaskKept kept) {
+    env->assist_level = kept.assist_level;
+    env->tick = env->tick_first = (uint32_t)kept.tick;
+}
+
 /* ---- start of an episode ---- */
 
 /* depth: [m] how deep the feet stand in this ground, so that episodes start neither in the air nor
@@ -51,7 +61,7 @@ static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const 
     env->phase = random_unit(&r) < 0.5 ? 0 : 0.5;
     /* The first episodes end at different times, so that the environments do not reset in
      * lockstep. */
-    env->step = env->tick == 0 && !env->command_frozen
+    env->step = env->tick == env->tick_first && !env->command_frozen
                     ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit)
                     : 0;
     env->step_first = env->step;

@@ -42,8 +42,9 @@ TaskShape task_shape(const Robot *robot);
 typedef struct {
     TaskShape shape;
     uint64_t seed;
-    uint32_t index; /* number of the environment, which selects its stream of random numbers */
-    uint32_t tick;  /* policy steps since creation, never reset */
+    uint32_t index;      /* number of the environment, which selects its stream of random numbers */
+    uint32_t tick;       /* policy steps since creation, never reset */
+    uint32_t tick_first; /* at creation or when the run went on: then episodes are staggered */
     /* episode */
     uint32_t step;          /* policy steps on the clock of this episode */
     uint32_t step_limit;    /* step at which the episode times out */
@@ -81,6 +82,12 @@ typedef struct {
     /* sums over the running episode, for the log */
     double reward_sum, term_sum[TASK_REWARD_COUNT], speed_error_sum;
 } TaskEnv;
+
+/* What lasts beyond an episode. */
+typedef struct {
+    double assist_level;
+    uint64_t tick;
+} TaskKept;
 
 /* Result of one policy step. */
 typedef struct {
@@ -192,6 +199,10 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
                                         const RobotSim *sim, const double *torque);
 /* Writes the weighted terms per second to `terms`. Returns their clipped sum times the period. */
 TASK_FN double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
+
+/* What an environment keeps, and back, before a new episode (step.c). */
+TASK_FN TaskKept task_keep(const TaskEnv *env);
+TASK_FN void task_restore(TaskEnv *env, TaskKept kept);
 
 /* Draws ground, robot and sensors of an episode (randomize.c). */
 TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);

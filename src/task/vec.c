@@ -137,6 +137,7 @@ void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8
         timeout[i] = step->timeout;
         valid[i] = step->valid;
         vec->stats.diverged += !step->valid;
+        vec->stats.paid += (double)step->reward;
         if (step->done) {
             count_episode(vec, step);
         }
@@ -144,26 +145,32 @@ void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8
     vec->stats.steps += vec->envs;
 }
 
-void vec_stats_means(VecStats *stats) {
-    if (stats->episodes) {
-        double lived = stats->length > 0 ? stats->length : 1;
-        for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-            stats->terms[i] /= lived;
-        }
-        stats->length /= stats->episodes;
-        stats->reward /= stats->episodes;
-        stats->speed_error /= stats->episodes;
+VecStats vec_take_sums(Vec *vec) {
+    VecStats sums = vec->stats;
+    for (int i = 0; i < vec->envs; i++) {
+        sums.assist += task_assist_share(env_at(vec, i), &vec->def);
     }
+    memset(&vec->stats, 0, sizeof vec->stats);
+    return sums;
+}
+
+VecStats vec_stats_from(VecStats sums, int envs) {
+    VecStats stats = sums;
+    stats.assist /= envs;
+    if (stats.episodes) {
+        double lived = stats.length > 0 ? stats.length : 1;
+        for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+            stats.terms[i] /= lived;
+        }
+        stats.length /= stats.episodes;
+        stats.reward /= stats.episodes;
+        stats.speed_error /= stats.episodes;
+    }
+    return stats;
 }
 
 VecStats vec_take_stats(Vec *vec) {
-    VecStats stats = vec->stats;
-    for (int i = 0; i < vec->envs; i++) {
-        stats.assist += task_assist_share(env_at(vec, i), &vec->def) / vec->envs;
-    }
-    vec_stats_means(&stats);
-    memset(&vec->stats, 0, sizeof vec->stats);
-    return stats;
+    return vec_stats_from(vec_take_sums(vec), vec->envs);
 }
 
 void vec_take_times(Vec *vec, double *physics, double *ground) {
@@ -179,6 +186,18 @@ void vec_take_times(Vec *vec, double *physics, double *ground) {
 void *vec_state(Vec *vec, size_t *bytes) {
     *bytes = (size_t)vec->envs * vec->stride;
     return vec->state;
+}
+
+void vec_keep(const Vec *vec, TaskKept *kept) {
+    for (int i = 0; i < vec->envs; i++) {
+        kept[i] = task_keep(env_at(vec, i));
+    }
+}
+
+void vec_restore(Vec *vec, const TaskKept *kept) {
+    for (int i = 0; i < vec->envs; i++) {
+        task_restore(env_at(vec, i), kept[i]);
+    }
 }
 
 size_t vec_bytes(const Vec *vec) {

@@ -19,6 +19,7 @@ typedef struct {
 typedef struct {
     int episodes, falls, diverged;
     double steps;                    /* policy steps */
+    double paid;                     /* sum of the rewards of all these steps */
     double length;                   /* [s] mean */
     double reward;                   /* mean sum of an episode */
     double speed_error;              /* [m/s] mean */
@@ -36,13 +37,18 @@ void vec_reset(Vec *vec, const VecView *first);
 void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout,
               uint8_t *valid, const VecView *next);
 VecStats vec_take_stats(Vec *vec);
-/* From sums over episodes to means. */
-void vec_stats_means(VecStats *stats);
+/* The same in two steps, between which those of several Vecs may be added: sums over the episodes
+ * (`assist` over the robots), and means from them. envs: environments of all. */
+VecStats vec_take_sums(Vec *vec);
+VecStats vec_stats_from(VecStats sums, int envs);
 /* [s] Thread time spent in physics since the last call, and the part of it spent in the ground. */
 void vec_take_times(Vec *vec, double *physics, double *ground);
 /* Everything that persists, as one block without pointers, so that saving and loading are
  * copies. */
 void *vec_state(Vec *vec, size_t *bytes);
+/* What lasts beyond an episode, [envs], and back, before vec_reset. */
+void vec_keep(const Vec *vec, TaskKept *kept);
+void vec_restore(Vec *vec, const TaskKept *kept);
 size_t vec_bytes(const Vec *vec);
 /* FNV-1a of everything that moves: robots, histories, commands, reward sums, ground memory. */
 uint64_t vec_hash(const Vec *vec);

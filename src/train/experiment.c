@@ -54,8 +54,8 @@ MildStatus experiment_check(const ExperimentDef *def, MildError *error) {
                          "ppo.learning_rate_min %g is above ppo.learning_rate_max %g",
                          def->ppo.learning_rate_min, def->ppo.learning_rate_max);
     }
-    if (strcmp(def->train.device, "cpu") != 0 && strcmp(def->train.device, "cuda") != 0) {
-        return mild_fail(error, MILD_ERROR_RANGE, "train.device = %s: neither cpu nor cuda",
+    if (train_device(&def->train) < -1) {
+        return mild_fail(error, MILD_ERROR_RANGE, "train.device = %s: neither cpu, cuda nor cuda:N",
                          def->train.device);
     }
     if ((int64_t)def->train.envs * def->ppo.steps < def->ppo.minibatches) {

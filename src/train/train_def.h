@@ -17,8 +17,24 @@ typedef struct {
     int keep_checkpoints;         /* how many to keep, the newest ones */
     uint64_t seed;
     int threads;    /* 0: one per core */
-    char device[8]; /* where the networks run: cpu, cuda */
+    char device[8]; /* where the networks run: cpu, cuda, cuda:N */
+    int robots;     /* TrainRobots */
+    int grounds;    /* that the batch engine's episodes choose from */
 } TrainDef;
+
+/* What steps the robots: MuJoCo with mild/ground.h on the CPU, or the batch engine with mild/batch.h
+ * where the networks run. */
+typedef enum {
+    TRAIN_ROBOTS_AUTO,
+    TRAIN_ROBOTS_MUJOCO,
+    TRAIN_ROBOTS_BATCH,
+    TRAIN_ROBOTS
+} TrainRobots;
+
+/* Number of the CUDA device, -1 for the CPU, -2 for neither. */
+int train_device(const TrainDef *def);
+/* Bool: the batch engine steps the robots; `auto` is batch on a GPU. */
+int train_is_batch(const TrainDef *def);
 
 TrainDef train_def_default(void);
 extern const MildField train_fields[];

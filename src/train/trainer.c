@@ -6,6 +6,7 @@
 #include "base/clock.h"
 #include "base/paths.h"
 #include "gpu/learner.h"
+#include "train/envs.h"
 
 enum { TRAIN_MATERIALS = 3 }; /* drawn for the pattern of a terrain, as for stripes */
 
@@ -16,30 +17,21 @@ struct Trainer {
     Pool *pool;
     Policy *policy;
     Ppo *ppo;
-    Vec *vec;
+    TrainEnvs *envs;
+    void *stream; /* of the learner's device; NULL: none */
 };
 
 void train_destroy(Trainer *trainer) {
     if (!trainer) {
         return;
     }
-    vec_destroy(trainer->vec);
+    train_envs_destroy(trainer->envs);
     mild_map_destroy(trainer->map);
     ppo_destroy(trainer->ppo);
     policy_destroy(trainer->policy);
     pool_destroy(trainer->pool);
     robot_destroy(trainer->robot);
     free(trainer);
-}
-
-static VecView view_of(const PpoBatch *batch, int t, const ExperimentDef *def) {
-    size_t row = (size_t)t * (size_t)batch->envs;
-    return (VecView){
-        .history = batch->history + row * (size_t)(def->policy.frames * def->policy.observation),
-        .critic = batch->critic + row * (size_t)def->policy.critic_input,
-        .estimate = batch->target + row * (size_t)def->policy.estimates,
-        .frame = batch->frame + row * (size_t)def->policy.observation,
-    };
 }
 
 static int build(Trainer *trainer, MildError *error) {
@@ -69,18 +61,21 @@ static int build(Trainer *trainer, MildError *error) {
     if (!trainer->ppo) {
         return 0;
     }
-    if (strcmp(def->train.device, "cuda") == 0 &&
-        gpu_learner_attach(trainer->ppo, &(GpuLearnerDef){.resident = 0}, error)) {
+    const GpuLearnerDef gpu = {.device = train_device(&def->train),
+                               .resident = train_is_batch(&def->train)};
+    if (gpu.device >= 0 && gpu_learner_attach(trainer->ppo, &gpu, error)) {
         return 0;
     }
+    trainer->stream = gpu_learner_stream(trainer->ppo);
     if (terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error) != MILD_OK) {
         return 0;
     }
     trainer->def.task.map = trainer->map;
     trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
-    trainer->vec = vec_create(&def->task, trainer->robot, trainer->pool, def->train.envs,
-                              def->train.seed, error);
-    return trainer->vec != NULL;
+    trainer->envs =
+        train_envs_create(def, trainer->robot, trainer->pool, def->train.envs, 0, error);
+    return trainer->envs != NULL && train_envs_reset(trainer->envs, ppo_batch(trainer->ppo),
+                                                     trainer->stream, error) == MILD_OK;
 }
 
 Trainer *train_create(const ExperimentDef *def, MildError *error) {
@@ -94,39 +89,50 @@ Trainer *train_create(const ExperimentDef *def, MildError *error) {
         train_destroy(trainer);
         return NULL;
     }
-    VecView first = view_of(ppo_batch(trainer->ppo), 0, &trainer->def);
-    vec_reset(trainer->vec, &first);
     return trainer;
 }
 
-MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error) {
+/* One rollout. On a GPU actions and environments are only enqueued, and take their time
+ * together. */
+static MildStatus roll_out(Trainer *trainer, TrainTimes *times, MildError *error) {
     PpoBatch *batch = ppo_batch(trainer->ppo);
-    size_t envs = (size_t)batch->envs, actions = (size_t)trainer->def.policy.actions;
-    TrainTimes times = {0};
-    double start = clock_seconds(), reward = 0;
-    for (int t = 0; t < batch->steps; t++) {
+    MildStatus status = MILD_OK;
+    for (int t = 0; t < batch->steps && status == MILD_OK; t++) {
         double before = clock_seconds();
         ppo_act(trainer->ppo, t);
         double between = clock_seconds();
-        size_t row = (size_t)t * envs;
-        VecView next = view_of(batch, t + 1, &trainer->def);
-        vec_step(trainer->vec, batch->action + row * actions, batch->reward + row,
-                 batch->done + row, batch->timeout + row, batch->valid + row, &next);
-        times.inference += between - before;
-        times.environments += clock_seconds() - between;
+        status = train_envs_step(trainer->envs, batch, t, trainer->stream, error);
+        times->inference += between - before;
+        times->environments += clock_seconds() - between;
     }
-    for (size_t i = 0; i < envs * (size_t)batch->steps; i++) {
-        reward += (double)batch->reward[i];
+    double before = clock_seconds();
+    status = status == MILD_OK ? train_envs_wait(trainer->envs, error) : status;
+    times->environments += clock_seconds() - before;
+    return status;
+}
+
+MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error) {
+    const double samples = (double)trainer->def.train.envs * trainer->def.ppo.steps;
+    TrainTimes times = {0};
+    VecStats sums;
+    double start = clock_seconds();
+    MildStatus status = roll_out(trainer, &times, error);
+    if (status != MILD_OK) {
+        return status;
     }
     times.rollout = clock_seconds() - start;
     ppo_update(trainer->ppo, &report->ppo);
     double wall = clock_seconds() - start;
     times.update = wall - times.rollout;
-    vec_take_times(trainer->vec, &times.physics, &times.ground);
+    train_envs_take_times(trainer->envs, &times.physics, &times.ground);
     report->times = times;
-    report->episodes = vec_take_stats(trainer->vec);
-    report->steps_per_s = (double)(envs * (size_t)batch->steps) / wall;
-    report->reward_per_step = reward / (double)(envs * (size_t)batch->steps);
+    status = train_envs_take_sums(trainer->envs, &sums, trainer->stream, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    report->episodes = vec_stats_from(sums, trainer->def.train.envs);
+    report->steps_per_s = samples / wall;
+    report->reward_per_step = sums.paid / samples;
     return ppo_status(trainer->ppo, error);
 }
 
@@ -139,7 +145,8 @@ Policy *train_policy(Trainer *trainer) {
 }
 
 size_t train_bytes(const Trainer *trainer) {
-    return vec_bytes(trainer->vec) + ppo_bytes(trainer->ppo);
+    return train_envs_bytes(trainer->envs) + ppo_bytes(trainer->ppo) +
+           gpu_learner_bytes(trainer->ppo);
 }
 
 int train_threads(const Trainer *trainer) {
@@ -148,12 +155,41 @@ int train_threads(const Trainer *trainer) {
 
 MildStatus train_save(Trainer *trainer, const char *path, const char *note, MildError *error) {
     size_t bytes;
-    void *state = vec_state(trainer->vec, &bytes);
-    return ppo_save(trainer->ppo, path, state, bytes, note, error);
+    void *state = train_envs_state(trainer->envs, &bytes);
+    if (state) {
+        return ppo_save(trainer->ppo, path, state, bytes, note, error);
+    }
+    bytes = (size_t)trainer->def.train.envs * sizeof(TaskKept);
+    TaskKept *kept = malloc(bytes);
+    MildStatus status = kept ? train_envs_keep(trainer->envs, kept, error)
+                             : mild_fail(error, MILD_ERROR_MEMORY, "no memory for a checkpoint");
+    status =
+        status == MILD_OK ? ppo_save_learner(trainer->ppo, path, kept, bytes, note, error) : status;
+    free(kept);
+    return status;
+}
+
+/* The learner alone: the environments begin new episodes. */
+static MildStatus load_learner(Trainer *trainer, const char *path, MildError *error) {
+    const size_t bytes = (size_t)trainer->def.train.envs * sizeof(TaskKept);
+    TaskKept *kept = malloc(bytes);
+    int found = 0;
+    if (!kept) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "no memory for a checkpoint");
+    }
+    MildStatus status = ppo_load_learner(trainer->ppo, path, kept, bytes, &found, error);
+    if (status == MILD_OK && found) {
+        status = train_envs_restore(trainer->envs, kept, error);
+    }
+    free(kept);
+    return status == MILD_OK
+               ? train_envs_reset(trainer->envs, ppo_batch(trainer->ppo), trainer->stream, error)
+               : status;
 }
 
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error) {
     size_t bytes;
-    void *state = vec_state(trainer->vec, &bytes);
-    return ppo_load(trainer->ppo, path, state, bytes, error);
+    void *state = train_envs_state(trainer->envs, &bytes);
+    return state && ppo_file_is_whole(path) ? ppo_load(trainer->ppo, path, state, bytes, error)
+                                            : load_learner(trainer, path, error);
 }

@@ -33,8 +33,10 @@ Policy *train_policy(Trainer *trainer); /* the policy to save; with ppo.average 
 size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */
 int train_threads(const Trainer *trainer);
 
-/* Saves all that resuming needs in one file with a checksum. A resumed run equals one that was
- * never stopped, bit for bit. */
+/* Saves all that resuming needs in one file with a checksum. Where MuJoCo steps the robots, a
+ * resumed run equals one that was never stopped, bit for bit. Where the batch engine does, the file
+ * holds the learner, the level of assistance of each robot and its clock (below 16 MiB with the
+ * default networks), and the robots begin new episodes. Each reads the other's files. */
 MildStatus train_save(Trainer *trainer, const char *path, const char *note, MildError *error);
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error);
 
