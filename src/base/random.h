@@ -44,16 +44,16 @@ static inline MILD_BOTH uint64_t random_bits(Random *r) {
 }
 
 /* Uniform in [0, 1). */
-static inline double random_unit(Random *r) {
+static inline MILD_BOTH double random_unit(Random *r) {
     return (double)(random_bits(r) >> 11) * 0x1.0p-53;
 }
 
-static inline double random_uniform(Random *r, double low, double high) {
+static inline MILD_BOTH double random_uniform(Random *r, double low, double high) {
     return low + (high - low) * random_unit(r);
 }
 
 /* Integer in [0, count). */
-static inline uint32_t random_index(Random *r, uint32_t count) {
+static inline MILD_BOTH uint32_t random_index(Random *r, uint32_t count) {
     return (uint32_t)(((random_bits(r) >> 32) * (uint64_t)count) >> 32);
 }
 

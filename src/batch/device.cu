@@ -15,14 +15,20 @@ static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
 
 /* Robots of a block. Two blocks fit a multiprocessor; three would be 1 % faster at 65 536 robots,
  * and 12 % slower at 4096, for they spill registers. */
-enum { WARPS = 4, THREADS = WARPS * LANES };
+#ifndef BATCH_WARPS
+#define BATCH_WARPS 4
+#endif
+#ifndef BATCH_BLOCKS
+#define BATCH_BLOCKS 2
+#endif
+enum { WARPS = BATCH_WARPS, THREADS = WARPS * LANES };
 
 extern "C" size_t batch_memory_numbers(const BatchShape *shape);
 
 /* ---- the step ---- */
 
 #define DEVICE_ROBOTS(kind)                                                                        \
-    __global__ void __launch_bounds__(THREADS, 2) device_robots_##kind(                            \
+    __global__ void __launch_bounds__(THREADS, BATCH_BLOCKS) device_robots_##kind(                            \
         const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,      \
         const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
         const __grid_constant__ MildBatchOutput output, int advance) {                             \

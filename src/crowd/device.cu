@@ -1,6 +1,8 @@
 /* A crowd on a GPU. The text is compiled for robots of one size (ENGINE_JOINTS ... of model.h), or
  * without these definitions for any. */
 #define MILD_REAL_FLOAT
+#include <climits>
+
 #include <cuda_runtime.h>
 
 #include "crowd/crowd.inc"
@@ -12,7 +14,9 @@
 #ifndef CROWD_BLOCKS
 #define CROWD_BLOCKS (ENGINE_FIXED ? 6 : 1) /* blocks of a multiprocessor, at least */
 #endif
-enum { WARP_THREADS = LANES * CROWD_WARPS, TASK_THREADS = 32, TALLY_THREADS = 256, ORDER_THREADS = 1024 };
+/* TASK_ROBOTS of a warp's threads have a robot: what one thread does waits for memory most of the
+ * time, and more warps hide more of it. */
+enum { WARP_THREADS = LANES * CROWD_WARPS, TASK_THREADS = 32, TASK_ROBOTS = 8, TALLY_THREADS = 256, ORDER_THREADS = 1024 };
 
 static const size_t place_bytes = CROWD_WARPS * sizeof(CrowdPlace);
 
@@ -21,7 +25,7 @@ static __device__ long warp_robot(void) {
 }
 
 static __device__ long thread_robot(void) {
-    return (long)blockIdx.x * TASK_THREADS + threadIdx.x;
+    return threadIdx.x < TASK_ROBOTS ? (long)blockIdx.x * TASK_ROBOTS + threadIdx.x : LONG_MAX;
 }
 
 static int warp_blocks(int envs) {
@@ -29,7 +33,7 @@ static int warp_blocks(int envs) {
 }
 
 static int thread_blocks(int envs) {
-    return (envs + TASK_THREADS - 1) / TASK_THREADS;
+    return (envs + TASK_ROBOTS - 1) / TASK_ROBOTS;
 }
 
 static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
@@ -42,7 +46,7 @@ static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
     }
 }
 
-static __global__ void __launch_bounds__(TASK_THREADS)
+static __global__ void __launch_bounds__(TASK_THREADS, 16)
     end(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call) {
     const long robot = thread_robot();
     if (robot < all.envs) {

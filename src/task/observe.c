@@ -187,17 +187,21 @@ static inline MILD_BOTH void fill_frames(TaskEnv *env, TaskLane at) {
 /* Five means of older frames, then the newest frame. */
 static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, TaskLane at,
                                            float *history) {
-    int width = env->shape.observation;
+    int width = env->shape.observation, stride = def->history_stride;
+    const float *frames = task_env_history(env) + env->shape.history;
+    uint32_t oldest = env->newest + 1 < env->held ? env->newest + 1 : 0;
     for (int j = at.lane; j < width; j += at.lanes) {
+        uint32_t place = oldest;
         for (int i = 0; i < TASK_FRAMES - 1; i++) {
-            int oldest = (TASK_FRAMES - 1 - i) * def->history_stride;
-            float sum = task_env_frame(env, oldest)[j];
-            for (int k = 1; k < def->history_stride; k++) {
-                sum += task_env_frame(env, oldest - k)[j];
+            float sum = 0;
+            PLACE_UNROLL
+            for (int k = 0; k < stride; k++) {
+                sum += frames[place * (uint32_t)width + (uint32_t)j];
+                place = place + 1 < env->held ? place + 1 : 0;
             }
-            history[i * width + j] = sum / (float)def->history_stride;
+            history[i * width + j] = sum / (float)stride;
         }
-        history[(TASK_FRAMES - 1) * width + j] = task_env_frame(env, 0)[j];
+        history[(TASK_FRAMES - 1) * width + j] = frames[place * (uint32_t)width + (uint32_t)j];
     }
 }
 

@@ -15,6 +15,13 @@
 #include "robot/robot.h"
 #endif
 
+/* Lets a GPU wait for several numbers at once. */
+#ifdef __CUDACC__
+#define PLACE_UNROLL _Pragma("unroll 8")
+#else
+#define PLACE_UNROLL
+#endif
+
 /* [m] Height of the undisturbed surface. */
 static inline MILD_BOTH double place_height(const MildTerrain *terrain, double x, double y) {
 #ifdef TASK_ON_DEVICE
