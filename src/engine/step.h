@@ -10,7 +10,8 @@
  * and on rigid ground
  *
  *         engine_begin_rigid(model, variation, torque, push, work);
- *         engine_collide(model, friction, surface, level, work);   the corners
+ *         engine_collide(model, friction, surface, level, work);   the corners, or
+ *         engine_collide_on(model, friction, ground, work);        on a map
  *         bad |= engine_end_rigid(model, work);
  *
  * The ground reads work->foot_position, foot_rotation, foot_velocity, now.support.free_velocity and

@@ -69,7 +69,7 @@ EngineCase device_case(int rigid, uint32_t draw) {
         memset(in.wrench, 0, sizeof in.wrench);
         return in;
     }
-    in = rigid_case(sim, draw % 4 < 2 ? draw : draw - 2); /* others are on a slope */
+    in = rigid_case(sim, NULL, draw % 4 < 2 ? draw : draw - 2); /* others are on a slope */
     in.qpos[2] -= in.height;
     in.height = 0;
     round_case(&in);
