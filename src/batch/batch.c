@@ -231,11 +231,7 @@ MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
     if (batch->device != MILD_BATCH_HOST) {
         return device_step(batch, input, output, advance, stream, error);
     }
-    if (batch->shape.map) {
-        host_step_map(&batch->shape, &batch->arrays, input, output, advance);
-    } else {
-        host_step(&batch->shape, &batch->arrays, input, output, advance);
-    }
+    host_step(&batch->shape, &batch->arrays, input, output, advance);
     return MILD_OK;
 }
 

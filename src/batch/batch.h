@@ -56,11 +56,9 @@ MildStatus batch_copy(int device, void *to, const void *from, size_t bytes, Mild
 MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildError *error);
 void batch_map_close(const MapView *view, int device);
 
-/* ---- the CPU: host.c, host_map.c ---- */
+/* ---- the CPU: host.c ---- */
 void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
                const MildBatchOutput *output, int advance);
-void host_step_map(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
-                   const MildBatchOutput *output, int advance);
 
 /* ---- a GPU: device.cu and device_map.cu, or without_cuda.c ---- */
 /* Opens the device. */
