@@ -56,7 +56,7 @@ MILD_HD Real map_number(MapNumber number) {
 
 /* Where a spot is along an axis. */
 typedef struct {
-    int cell;
+    int cell;  /* as if the axis had no end */
     Real rest; /* [m] from the start of that cell */
 } MapPlace;
 
@@ -73,12 +73,6 @@ MILD_HD Real map_whole(Real cells) {
     return real_min(real_max(REAL_FLOOR(cells), -MAP_FAR), MAP_FAR);
 }
 
-/* Index of a cell on an axis that repeats. */
-MILD_HD int map_wrap(const MapAxis *axis, int cell) {
-    const int within = cell % axis->cells;
-    return within < 0 ? within + axis->cells : within;
-}
-
 /* at + more: [m] from the map's origin, `more` far smaller. With n the whole number of cells up to
  * it, the rest is at - n cell, of which fma rounds only the difference. */
 MILD_HD MapPlace map_place(const MapAxis *axis, Real at, Real more) {
@@ -86,7 +80,7 @@ MILD_HD MapPlace map_place(const MapAxis *axis, Real at, Real more) {
     const Real from = map_whole(at * (Real)axis->inverse.high + start);
     const Real cells = from - start;
     MapPlace place;
-    place.cell = axis->repeats ? map_wrap(axis, (int)from) : (int)from;
+    place.cell = (int)from;
     place.rest =
         REAL_FMA(-cells, (Real)axis->cell.high, at) + (more - cells * (Real)axis->cell.low);
     return place;
@@ -100,7 +94,8 @@ MILD_HD GridPlace map_near(const MapAxis *axis, const MapPlace *spot, Real way) 
     const Real share = cells - whole;
     GridPlace place;
     if (axis->repeats) {
-        place.cell = map_wrap(axis, cell);
+        const int within = cell % axis->cells;
+        place.cell = within < 0 ? within + axis->cells : within;
         place.share = share;
         place.inside = 1;
         return place;

@@ -523,7 +523,17 @@ static void store_on(const Shape *shape, int device) {
     if (!crowd.map) {
         assert_memory_equal(arrays.wrench, other.wrench, sizeof(float) * 12 * ROBOTS);
     }
+    /* what they remember is forgotten in the air */
     for (int r = 0; r < ROBOTS; r++) {
+        Kit *kit = &crowd.kit[r];
+        for (int f = 0; f < kit->feet; f++) {
+            kit->input.position[f][2] += 1.0;
+        }
+        mild_ground_solve(grounds[r], &kit->terrain, &kit->input, kit->scratch, &kit->result);
+        mild_ground_advance(grounds[r], &kit->terrain, &kit->input, kit->scratch, &kit->result);
+        for (int n = 0; n < kit->feet * mild_sole_elements(kit->soles[0]); n++) {
+            assert_true(mild_ground_depth_max(grounds[r], n % kit->feet)[n / kit->feet] == 0.0);
+        }
         free(grounds[r]);
     }
     side_close(&walked);

@@ -323,7 +323,7 @@ static void run_shape(const Shape *shape, int walks, double tolerance, void (*ru
 
 /* Newton's steps are those of the ground: the derivative is right. */
 static int same_steps(const Worst *worst) {
-    return abs(worst->iterations - worst->iterations_ground) <= worst->iterations_ground / 50;
+    return abs(worst->iterations - worst->iterations_ground) <= worst->iterations_ground / 25;
 }
 
 static void double_text_is_the_ground(void **state) {
