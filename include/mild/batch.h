@@ -124,8 +124,8 @@ MildStatus mild_batch_load(MildBatch *batch, int robot, const MildGround *ground
  * what the ground under a robot does. Waits for the device. Fails like mild_batch_load. */
 MildStatus mild_batch_store(const MildBatch *batch, int robot, MildGround *ground,
                             MildError *error);
-/* Both for robots first .. first + count - 1 at once. grounds: [count]. Fails, with nothing changed,
- * when one of them does not fit; the device may fail later. */
+/* Both for robots first .. first + count - 1 at once. grounds: [count]. Fails, with nothing
+ * changed, when one of them does not fit; the device may fail later. */
 MildStatus mild_batch_load_robots(MildBatch *batch, int first, int count,
                                   const MildGround *const *grounds, MildError *error);
 MildStatus mild_batch_store_robots(const MildBatch *batch, int first, int count,

@@ -69,8 +69,8 @@ typedef struct {
  * With a map four more of each follow: number `plane` [m] and the gradient [-] along x and y of the
  * plane that the last step had for the ground, and the label that a loaded element touched down on.
  * The depth below this plane at the way r [m] from where the foot's reference point was is plane +
- * gradient . (r_x, r_y) - r_z. Then [5][foot] follow: x, y and z of that point and the height of the
- * ground [m], and whether there was a step, 1 or 0. */
+ * gradient . (r_x, r_y) - r_z. Then [5][foot] follow: x, y and z of that point and the height of
+ * the ground [m], and whether there was a step, 1 or 0. */
 enum {
     CONTACT_MEMORY = sizeof(ElementMemory) / sizeof(Real),
     CONTACT_MAP_MEMORY = CONTACT_MEMORY + 4,

@@ -1,6 +1,7 @@
 /* The batch engine on a GPU: one step of random states against the text in double and in float on
- * the processor, on level ground and on a map, then its speed. Usage: engine_device_engine FOLDER_OF_ROBOT [STATES]; with STATES
- * it compares so many and times nothing, as compute-sanitizer wants it.
+ * the processor, on level ground and on a map, then its speed. Usage: engine_device_engine
+ * FOLDER_OF_ROBOT [STATES]; with STATES it compares so many and times nothing, as compute-sanitizer
+ * wants it.
  *
  * Compiled for one robot (the definitions of engine_model_sizes) or for any. Errors of qacc are
  * relative to the largest acceleration of their kind (base, joints) of that state. Exit 1 when one
