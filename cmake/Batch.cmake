@@ -1,7 +1,8 @@
 # The layer batch, with its steps on a GPU when MILD_CUDA is on.
 mild_layer(batch layer_ground)
 if(MILD_CUDA)
-  add_library(batch_device STATIC ${CMAKE_SOURCE_DIR}/src/batch/device.cu)
+  add_library(batch_device STATIC ${CMAKE_SOURCE_DIR}/src/batch/device.cu
+    ${CMAKE_SOURCE_DIR}/src/batch/device_map.cu)
   target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch)
   target_link_libraries(batch_device PRIVATE layer_ground)
   # quotients and roots within two units in the last place, and no denormal numbers

@@ -13,9 +13,14 @@
  * Newton steps do not solve keeps the best point seen, with its residual, and one in which friction
  * would create energy is not solved again; mild_ground_solve does more in both cases.
  *
- * Each robot stands on one material and on level ground. There are no maps, patches, mixtures of
- * materials or imprints yet. The models whose law depends on the direction of motion (ecc_quasi,
- * ecc_quasi_3d, bekker) are refused by name.
+ * The ground is level, or has the heights and the labels of one map (mild_batch_set_map), in which
+ * each robot has a place, a height and materials of its own. There are no patches, blended borders
+ * or imprints yet. Blended borders, and models whose law depends on the direction of motion
+ * (ecc_quasi, ecc_quasi_3d, bekker), are refused by name.
+ *
+ * World coordinates are floats: 50 m from the origin they are in steps of 4e-6 m. The place on the
+ * map follows from them without further loss, so that a depth is wrong by what the foot's own
+ * coordinates are, times the slope.
  *
  * Thread safety: a batch belongs to one thread at a time, and on a GPU to one stream. SI units. */
 #ifndef MILD_BATCH_H
@@ -51,10 +56,11 @@ typedef struct {
     const float *velocity;        /* [robots][feet][6] [m/s, rad/s] twist: linear, angular */
     const float *inverse_inertia; /* [robots][6 feet][6 feet] A; see MildContactInput */
     const float *free_velocity;   /* [robots][6 feet] [m/s, rad/s] V_free */
-    /* [robots] Index of mild_batch_set_materials; NULL: 0. A robot whose index is none gets results
-     * that are not numbers where it touches the ground. */
+    /* [robots], with a map [robots][labels]: index of mild_batch_set_materials; NULL: 0. A robot
+     * with an index that is none gets results that are not numbers where it touches such ground. */
     const int32_t *material;
-    const float *height; /* [robots] [m] of the surface; NULL: 0 */
+    const float *height;     /* [robots] [m] of the surface, added to the map's; NULL: 0 */
+    const float *map_origin; /* [robots][2] [m] world position of the map's origin; NULL: 0 */
 } MildBatchInput;
 
 /* Sums over the loaded elements of a foot, as in MildFootResult. */
@@ -71,7 +77,8 @@ typedef struct {
     float *velocity;     /* [robots][feet][6] [m/s, rad/s] twists after the step */
     MildBatchFoot *foot; /* [robots][feet] */
     float *elements;     /* [robots][4][feet][stride] depth [m], normal, tangent_x, tangent_y [N] of
-                            the elements, in their order; stride: mild_batch_stride */
+                            the elements, in their order; stride: mild_batch_stride. On uneven
+                            ground the depth that the law takes (docs/model.md section 6) */
     float *residual;     /* [robots] [-] relative, in the metric of kinetic energy; 0 in the air */
     int32_t *iterations; /* [robots] Newton steps; 0 in the air */
 } MildBatchOutput;
@@ -94,6 +101,13 @@ int mild_batch_stride(const MildBatch *batch);
 MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                     MildError *error);
 
+/* Puts the robots on a map, which is copied to the device; NULL, or a map without heights and
+ * labels: on level ground. Each robot forgets what its ground remembers. With labels,
+ * MildBatchInput.material has mild_map_label_count numbers for a robot. Waits for the device; a
+ * graph captured before must be captured again. Fails, with everything unchanged, for a map whose
+ * borders are blended, or when out of memory. */
+MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *error);
+
 /* Solves a contact step of every robot and, with `advance`, moves the memory of the ground to its
  * end: do that once for each step that the engine keeps. On a GPU it only puts the work into
  * `stream` (a cudaStream_t; NULL: the default one), allocates nothing and waits for nothing, so it
@@ -102,9 +116,20 @@ MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
                            const MildBatchOutput *output, int advance, void *stream,
                            MildError *error);
 /* Sets what the ground under robot 0 .. robots - 1 remembers to what `ground`, of the same soles,
- * remembers, to go on with a simulation that began on the CPU. Waits for the device. Fails, with
- * the memory unchanged, when the ground has other soles, imprints or several materials. */
+ * remembers, to go on with a simulation that began on the CPU; materials of that ground are labels
+ * here. Waits for the device. Fails, with the memory unchanged, when the ground has other soles,
+ * imprints, mixtures, materials without a label, or is uneven and the batch is not. */
 MildStatus mild_batch_load(MildBatch *batch, int robot, const MildGround *ground, MildError *error);
+/* The other way: `ground`, of the same soles and without imprints, forgets everything and remembers
+ * what the ground under a robot does. Waits for the device. Fails like mild_batch_load. */
+MildStatus mild_batch_store(const MildBatch *batch, int robot, MildGround *ground,
+                            MildError *error);
+/* Both for robots first .. first + count - 1 at once. grounds: [count]. Fails, with nothing
+ * changed, when one of them does not fit; the device may fail later. */
+MildStatus mild_batch_load_robots(MildBatch *batch, int first, int count,
+                                  const MildGround *const *grounds, MildError *error);
+MildStatus mild_batch_store_robots(const MildBatch *batch, int first, int count,
+                                   MildGround *const *grounds, MildError *error);
 /* Robots whose flag is not 0 forget everything, as after they were moved to another place. which:
  * [robots] in the memory of the device; NULL: all. In `stream`, as mild_batch_step. */
 MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, void *stream, MildError *error);

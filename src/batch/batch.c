@@ -1,7 +1,5 @@
 #include "batch/batch.h"
 
-#include "ground/state.h"
-
 #include <stdlib.h>
 #include <string.h>
 
@@ -134,6 +132,7 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     const BatchShape *shape = &batch->shape;
     BatchArrays *arrays = &batch->arrays;
     const size_t feet = (size_t)shape->feet, robots = (size_t)shape->robots;
+    arrays->map.labels = 1;
     arrays->centers =
         batch_alloc(batch->device, 2 * feet * (size_t)shape->stride * sizeof(float), error);
     arrays->memory = arrays->centers
@@ -175,6 +174,7 @@ void mild_batch_destroy(MildBatch *batch) {
     batch_free(batch->device, batch->arrays.centers);
     batch_free(batch->device, batch->arrays.materials);
     batch_free(batch->device, batch->arrays.memory);
+    batch_map_close(&batch->arrays.map, batch->device);
     free(batch);
 }
 
@@ -233,58 +233,6 @@ MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
     }
     host_step(&batch->shape, &batch->arrays, input, output, advance);
     return MILD_OK;
-}
-
-void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory) {
-    memset(memory, 0, batch_memory_numbers(shape) * sizeof *memory);
-    for (int f = 0; f < shape->feet; f++) {
-        const Memory of = ground_memory(ground, f);
-        const double *const all[] = {of.depth_max, of.middle,    of.front_speed,
-                                     of.drift,     of.pending_x, of.pending_y,
-                                     of.held_x,    of.held_y,    of.held_stiffness};
-        for (size_t n = 0; n < sizeof all / sizeof *all; n++) {
-            float *to = memory + ((int)n * shape->groups + f) * shape->stride;
-            for (int e = 0; e < shape->elements[f]; e++) {
-                to[e] = (float)all[n][e];
-            }
-        }
-    }
-}
-
-/* Bool: the ground remembers nothing that a batch could not. */
-static int ground_fits(const BatchShape *shape, const MildGround *ground) {
-    int fits = ground->feet == shape->feet && ground->tiles == 0;
-    for (int f = 0; fits && f < shape->feet; f++) {
-        const Memory memory = ground_memory(ground, f);
-        fits = ground->elements[f] == shape->elements[f] && !ground->uneven[f];
-        for (int e = 0; fits && e < shape->elements[f]; e++) {
-            fits = memory.material[e] <= 0;
-        }
-    }
-    return fits;
-}
-
-MildStatus mild_batch_load(MildBatch *batch, int robot, const MildGround *ground,
-                           MildError *error) {
-    const BatchShape *shape = &batch->shape;
-    const size_t numbers = batch_memory_numbers(shape);
-    if (robot < 0 || robot >= shape->robots) {
-        return mild_fail(error, MILD_ERROR_RANGE, "batch: robot %d is outside 0 .. %d", robot,
-                         shape->robots - 1);
-    }
-    if (!ground_fits(shape, ground)) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "batch: the ground has other soles, imprints, a map or several materials");
-    }
-    float *memory = malloc(numbers * sizeof *memory);
-    if (!memory) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
-    }
-    batch_memory_of(shape, ground, memory);
-    MildStatus status = batch_copy(batch->device, batch->arrays.memory + (size_t)robot * numbers,
-                                   memory, numbers * sizeof *memory, error);
-    free(memory);
-    return status;
 }
 
 MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, void *stream,

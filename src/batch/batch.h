@@ -3,6 +3,7 @@
 #define MILD_BATCH_PRIVATE_H
 
 #include "batch/material.h"
+#include "ground/map_view.h"
 #include "mild/batch.h"
 
 /* The same for all robots; in float whatever Real is. */
@@ -15,6 +16,7 @@ typedef struct {
     float dt, tolerance;
     int limit;
     int materials;               /* in the table; behind them one that is not a number */
+    int map;                     /* bool: on BatchArrays.map, not on level ground */
     int elements[MILD_FEET_MAX]; /* of a sole */
     float z[MILD_FEET_MAX];      /* [m] of its plane */
     float area[MILD_FEET_MAX];   /* [m^2] of an element */
@@ -24,7 +26,8 @@ typedef struct {
 typedef struct {
     float *centers;             /* [2][feet][stride] [m] x and y of the elements */
     MaterialNumbers *materials; /* [materials + 1][feet] */
-    float *memory;              /* [robots][CONTACT_MEMORY][groups][stride] */
+    float *memory;              /* [robots] of contact.h */
+    MapView map;                /* all 0 without a map */
 } BatchArrays;
 
 struct MildBatch {
@@ -35,11 +38,10 @@ struct MildBatch {
     double pitch[MILD_FEET_MAX]; /* [m] */
 };
 
-/* The memory of a ground as that of one robot, [batch_memory_numbers]. */
-void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory);
-
 /* [numbers] of a robot's memory. */
 size_t batch_memory_numbers(const BatchShape *shape);
+/* The memory of a ground as that of one robot, [batch_memory_numbers]. */
+void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory);
 
 /* ---- memory of a device or of MILD_BATCH_HOST ---- */
 /* All 0. NULL with a message that says how much was asked for. */
@@ -48,11 +50,17 @@ void batch_free(int device, void *memory); /* may be NULL */
 /* Copies to, from or within the device and waits. */
 MildStatus batch_copy(int device, void *to, const void *from, size_t bytes, MildError *error);
 
+/* ---- a map: map.c ---- */
+/* Makes a view of a map whose arrays are copies in the memory of a device. Fails for a map that a
+ * batch does not know yet. */
+MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildError *error);
+void batch_map_close(const MapView *view, int device);
+
 /* ---- the CPU: host.c ---- */
 void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
                const MildBatchOutput *output, int advance);
 
-/* ---- a GPU: device.cu, or without_cuda.c ---- */
+/* ---- a GPU: device.cu and device_map.cu, or without_cuda.c ---- */
 /* Opens the device. */
 MildStatus device_open(int device, MildError *error);
 /* Device memory, all 0; NULL with a message that says how much was asked for. */
@@ -64,6 +72,13 @@ MildStatus device_copy(int device, void *to, const void *from, size_t bytes, Mil
 MildStatus device_wait(int device, MildError *error);
 MildStatus device_step(const MildBatch *batch, const MildBatchInput *input,
                        const MildBatchOutput *output, int advance, void *stream, MildError *error);
+/* The two that device_step is one of: without and with a map. */
+MildStatus device_step_level(const MildBatch *batch, const MildBatchInput *input,
+                             const MildBatchOutput *output, int advance, void *stream,
+                             MildError *error);
+MildStatus device_step_map(const MildBatch *batch, const MildBatchInput *input,
+                           const MildBatchOutput *output, int advance, void *stream,
+                           MildError *error);
 MildStatus device_reset(const MildBatch *batch, const uint8_t *which, void *stream,
                         MildError *error);
 

@@ -8,6 +8,7 @@
 #include "batch/lanes.h"
 #include "ground/begin.h"
 #include "ground/impulse.h"
+#include "ground/map_view.h"
 #include "ground/motion.h"
 #include "ground/remember.h"
 
@@ -43,6 +44,7 @@ typedef struct {
     Real dt;        /* [s] */
     Real tolerance; /* [-] of the residual, in the metric of kinetic energy */
     int limit;      /* of Newton steps */
+    MapView map;    /* in a version with CONTACT_MAP */
 } ContactSetup;
 
 /* What a robot's engine knows before the step; see MildContactInput. */
@@ -52,12 +54,53 @@ typedef struct {
     const Real *velocity;            /* [feet][6] [m/s, rad/s] */
     const Real *inverse_inertia;     /* [6 feet][6 feet] [1/kg, 1/(kg m), 1/(kg m^2)] */
     const Real *free_velocity;       /* [6 feet] [m/s, rad/s] */
-    const ContactMaterial *material; /* [feet] */
+    const ContactMaterial *material; /* [feet] without a map */
     Real height;                     /* [m] of the surface */
+    /* With a map. */
+    const ContactMaterial *table; /* [materials + 1][feet]; the last is no material */
+    const int *label_material;    /* [labels] index of a label's material; NULL: 0 */
+    int materials;
+    const Real *map_origin; /* [2] [m] world; NULL: 0 */
 } ContactProblem;
 
-/* Numbers of an element's memory, in the order of ElementMemory: memory[number][foot][stride]. */
-enum { CONTACT_MEMORY = sizeof(ElementMemory) / sizeof(Real) };
+/* Memory of a robot: CONTACT_MEMORY numbers of each element, in the order of ElementMemory, as
+ * [number][foot][stride].
+ *
+ * With a map four more of each follow: number `plane` [m] and the gradient [-] along x and y of the
+ * plane that the last step had for the ground, and the label that a loaded element touched down on.
+ * The depth below this plane at the way r [m] from where the foot's reference point was is plane +
+ * gradient . (r_x, r_y) - r_z. Then [5][foot] follow: x, y and z of that point and the height of
+ * the ground [m], and whether there was a step, 1 or 0. */
+enum {
+    CONTACT_MEMORY = sizeof(ElementMemory) / sizeof(Real),
+    CONTACT_MAP_MEMORY = CONTACT_MEMORY + 4,
+    CONTACT_FOOT_MEMORY = LANES /* numbers that [5][foot] have room in */
+};
+#define CONTACT_LABELS 256 /* a map has less */
+#define CONTACT_NO_PLANE                                                                           \
+    REAL(1e6) /* [m] `plane` of an element that was not there in the last step */
+
+/* [numbers] of the memory of a robot with room for `elements` elements. map: bool. */
+MILD_HD int contact_memory_numbers(int elements, int map) {
+    return map ? elements * CONTACT_MAP_MEMORY + CONTACT_FOOT_MEMORY : elements * CONTACT_MEMORY;
+}
+
+/* Velocity of an element, along the world's axes. descent: speed at which its depth grows. */
+typedef struct {
+    Real x, y;    /* [m/s] */
+    Real descent; /* [m/s] */
+} ContactVelocity;
+
+/* Gives an element its material. */
+MILD_HD void contact_stand_on(const ContactMaterial *material, Element *e) {
+    e->law = material->law;
+    e->recovery = material->recovery;
+    e->mu = material->mu;
+    e->k_drift = material->k_drift;
+    e->b_drift = material->b_drift;
+    e->exit_drag = material->exit_drag;
+    e->entry_drag = material->entry_drag;
+}
 
 /* What the ground does to a foot, mean over the step. */
 typedef struct {

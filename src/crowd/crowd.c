@@ -297,9 +297,14 @@ MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildErr
 static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, MildError *error) {
     const CrowdArrays *all = &crowd->arrays;
     const CrowdContact *c = &all->contact;
-    const MildBatchInput input = {c->position,      c->rotation,   c->velocity, c->inverse_inertia,
-                                  c->free_velocity, all->material, c->height};
-    const MildBatchOutput output = {c->wrench, c->twist, c->foot, NULL, NULL, NULL};
+    const MildBatchInput input = {.position = c->position,
+                                  .rotation = c->rotation,
+                                  .velocity = c->velocity,
+                                  .inverse_inertia = c->inverse_inertia,
+                                  .free_velocity = c->free_velocity,
+                                  .material = all->material,
+                                  .height = c->height};
+    const MildBatchOutput output = {.wrench = c->wrench, .velocity = c->twist, .foot = c->foot};
     MildStatus status = MILD_OK;
     for (call->part = 0; status == MILD_OK && call->part <= crowd->steps; call->part++) {
         if (call->part > 0) {

@@ -13,16 +13,11 @@
 #define MILD_ENGINE_CONSTRAINT_H
 
 #include "engine/feet.h"
+#include "engine/ground.h"
 
 #define CONSTRAINT_STEPS 30      /* of Newton's method; walks take 1 to 5 */
 #define CONSTRAINT_LINE_STEPS 10 /* of the line search */
 #define REGULARIZER_LEAST REAL(1e-15)
-
-/* What rigid ground is like under a corner. */
-typedef struct {
-    Real height;   /* [m] of the surface under the corner's centre, world */
-    Real slope[2]; /* [-] along world x and y */
-} EngineSurface;
 
 /* x^power; 2 is MuJoCo's default. */
 MILD_HD Real soft_power(Real x, Real power) {
@@ -152,13 +147,28 @@ MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineS
     }
 }
 
-/* surface: [corners], or one for all of them when `level`. */
+/* surface: [corners] under their centres, or one for all of them when `level`. */
 LANE_FN void engine_collide(const EngineModel *model, Real friction, const EngineSurface *surface,
                             int level, EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
         for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
             corner_edges(model, friction, surface + (level ? 0 : c), work, c);
+        }
+    }
+    lanes_meet();
+}
+
+/* The same on any ground. A corner touches the tangent plane under its centre. */
+LANE_FN void engine_collide_on(const EngineModel *model, Real friction, const EngineGround *ground,
+                               EngineWork *work) {
+    EACH_LANE(l) {
+        const MapSpot spot = engine_spot(ground, work);
+        for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
+            Real center[3];
+            corner_center(model, work, c, center);
+            const EngineSurface surface = engine_surface(ground, work, &spot, center[0], center[1]);
+            corner_edges(model, friction, &surface, work, c);
         }
     }
     lanes_meet();

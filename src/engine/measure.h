@@ -3,7 +3,7 @@
 #ifndef MILD_ENGINE_MEASURE_H
 #define MILD_ENGINE_MEASURE_H
 
-#include "engine/data.h"
+#include "engine/ground.h"
 
 #define MEASURE_NONE REAL(1e9) /* [m] where there is nothing to measure */
 
@@ -38,7 +38,7 @@ MILD_HD void sole_center(const EngineModel *model, const EngineWork *work, int f
     add_cross3(twist + 3, arm, velocity);
 }
 
-/* [m] Lowest point of a shell, and the point under its centre. */
+/* [m] Lowest point of a shell, and the point under its centre, from the base's origin. */
 MILD_HD Real shell_lowest(const EngineModel *model, const EngineWork *work, int s, Real *under) {
     const EngineShell *shell = &model->number.shell[s];
     const int link = model->tree.shell_link[s];
@@ -54,41 +54,68 @@ MILD_HD Real shell_lowest(const EngineModel *model, const EngineWork *work, int 
                         R[8] * shell->rotation[6 + k];
         low -= REAL_ABS(up) * shell->half[k];
     }
-    under[0] = work->base[0] + center[0];
-    under[1] = work->base[1] + center[1];
+    under[0] = center[0];
+    under[1] = center[1];
     return low;
 }
 
-/* [m] Lowest point of the shells above level ground at `height`. */
-LANE_FN Real engine_body_clearance(const EngineModel *model, const EngineWork *work, Real height) {
+/* [m] Least height of a shell's lowest point above the ground under its centre. */
+LANE_FN Real engine_body_clearance_on(const EngineModel *model, const EngineWork *work,
+                                      const EngineGround *ground) {
     Real most[LANE_COPIES];
     EACH_LANE(l) {
+        const MapSpot spot = engine_spot(ground, work);
         most[l] = -MEASURE_NONE;
         LANE_ROLLED
         for (int s = LANE(l); s < model->tree.shells; s += LANES) {
             Real under[2];
-            most[l] = real_max(most[l], height - shell_lowest(model, work, s, under));
+            const Real low = shell_lowest(model, work, s, under);
+            const EngineSurface surface = engine_surface(ground, work, &spot, under[0], under[1]);
+            most[l] = real_max(most[l], surface.height - low);
         }
     }
     return -lane_max(most);
 }
 
-/* [m] Lowest point of a sole above level ground at `height`; of a round foot its reference
- * point. */
-LANE_FN Real engine_sole_height(const EngineModel *model, const EngineWork *work, int foot,
-                                Real height) {
+/* The same above level ground at `height`. */
+LANE_FN Real engine_body_clearance(const EngineModel *model, const EngineWork *work, Real height) {
+    const EngineGround level = {NULL, NULL, height};
+    return engine_body_clearance_on(model, work, &level);
+}
+
+/* [m] Height of a point of the world below the ground there. */
+MILD_HD Real point_depth(const EngineGround *ground, const EngineWork *work, const MapSpot *spot,
+                         const Real *point) {
+    const EngineSurface surface =
+        engine_surface(ground, work, spot, point[0] - work->base[0], point[1] - work->base[1]);
+    return surface.height - point[2];
+}
+
+/* [m] Least height of a point of a sole's outline above the ground under it; of a round foot that
+ * of its reference point. */
+LANE_FN Real engine_sole_height_on(const EngineModel *model, const EngineWork *work, int foot,
+                                   const EngineGround *ground) {
     Real most[LANE_COPIES];
     EACH_LANE(l) {
-        most[l] = model->tree.outline_points[foot] ? -MEASURE_NONE
-                                                   : height - work->foot_position[foot][2];
+        const MapSpot spot = engine_spot(ground, work);
+        most[l] = model->tree.outline_points[foot]
+                      ? -MEASURE_NONE
+                      : point_depth(ground, work, &spot, work->foot_position[foot]);
         LANE_ROLLED
         for (int i = LANE(l); i < model->tree.outline_points[foot]; i += LANES) {
             Real point[3];
             sole_point(model, work, foot, i, point);
-            most[l] = real_max(most[l], height - point[2]);
+            most[l] = real_max(most[l], point_depth(ground, work, &spot, point));
         }
     }
     return -lane_max(most);
+}
+
+/* The same above level ground at `height`. */
+LANE_FN Real engine_sole_height(const EngineModel *model, const EngineWork *work, int foot,
+                                Real height) {
+    const EngineGround level = {NULL, NULL, height};
+    return engine_sole_height_on(model, work, foot, &level);
 }
 
 /* [m] Of b beyond a along the base's lateral axis laid level, to the left. */

@@ -4,14 +4,22 @@
 #include "batch/contact.h"
 #include "engine/step.h"
 
-/* The ground's step for this number of feet; see contact.inc. */
+/* The ground's step for this number of feet, level and on a map; see contact.inc. */
 #ifndef ENGINE_PER
 #define ENGINE_PER 5 /* elements of a lane */
 #endif
-#define CONTACT_FEET (ENGINE_FEET == 3 ? 4 : ENGINE_FEET)
-#define CONTACT_PER ENGINE_PER
+#define GROUND_FEET (ENGINE_FEET == 3 ? 4 : ENGINE_FEET)
 #define CONTACT_CURVES LAW_CONE
+#define CONTACT_FEET GROUND_FEET
+#define CONTACT_PER ENGINE_PER
+#define CONTACT_MAP 0
 #define CONTACT(name) ground_##name
+#include "batch/contact.inc"
+#undef CONTACT_MAP
+#define CONTACT_FEET GROUND_FEET
+#define CONTACT_PER ENGINE_PER
+#define CONTACT_MAP 1
+#define CONTACT(name) ground_##name##_map
 #include "batch/contact.inc"
 #include "batch/robot.inc"
 
@@ -49,17 +57,21 @@ LANE_FN void motors(const EngineModel *model, const EngineRobots *robots, long r
     lanes_meet();
 }
 
-/* In the air or on rigid ground. */
-LANE_FN int step(const EngineModel *model, const EngineRobots *robots, long robot,
-                 Workplace *place) {
+LANE_FN const Real *origin_of(const EngineRobots *robots, long robot) {
+    return robots->map_origin ? robots->map_origin + 2 * robot : NULL;
+}
+
+/* In the air or on rigid ground. map: of that, or NULL. */
+LANE_FN int step(const EngineModel *model, const EngineRobots *robots, const MapView *map,
+                 long robot, Workplace *place) {
     EngineWork *work = &place->work;
     const EngineAction action = {&robots->variation[robot], place->torque,
                                  robots->push ? robots->push + 6 * robot : NULL, robots->rigid};
     motors(model, robots, robot, place);
     engine_begin(model, &action, work);
     if (robots->rigid) {
-        const EngineSurface level = {0, {0, 0}};
-        engine_collide(model, action.variation->friction, &level, 1, work);
+        const EngineGround ground = {map, origin_of(robots, robot), 0};
+        engine_collide_on(model, action.variation->friction, &ground, work);
     } else {
         EACH_LANE(l) {
             for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
@@ -71,24 +83,41 @@ LANE_FN int step(const EngineModel *model, const EngineRobots *robots, long robo
     return engine_end(model, robots->rigid, work);
 }
 
-/* On soft ground: from the feet's pose, A and V_free to the wrenches. */
+/* What a robot's ground is made of. */
+LANE_FN void material_of(const EngineRobots *robots, const BatchShape *shape,
+                         const BatchArrays *arrays, long robot, ContactProblem *problem) {
+    const long labels = shape->map ? arrays->map.labels : 1;
+    const int *materials = robots->material ? robots->material + robot * labels : NULL;
+    problem->table = (const ContactMaterial *)arrays->materials;
+    problem->material = problem->table + (materials ? materials[0] : 0) * shape->feet;
+    problem->label_material = materials;
+    problem->materials = shape->materials;
+    problem->map_origin = origin_of(robots, robot);
+    problem->height = 0;
+}
+
+/* On soft ground: from the feet's pose, A and V_free to the wrenches. problem: what stays the same
+ * from step to step. */
+template <int MAP>
 LANE_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
-                      const ContactSetup *setup, const ContactMaterial *material, long robot,
-                      Real *memory, ground_Shared *shared, Workplace *place) {
+                      const ContactSetup *setup, ContactProblem problem, long robot, Real *memory,
+                      ground_Shared *shared, Workplace *place) {
     EngineWork *work = &place->work;
     const EngineAction action = {&robots->variation[robot], place->torque,
                                  robots->push ? robots->push + 6 * robot : NULL, 0};
     motors(model, robots, robot, place);
     engine_begin(model, &action, work);
-    const ContactProblem problem = {work->foot_position[0],
-                                    work->foot_rotation[0],
-                                    work->foot_velocity[0],
-                                    work->now.support.ground.inverse_inertia,
-                                    work->now.support.free_velocity[0],
-                                    material,
-                                    0};
+    problem.position = work->foot_position[0];
+    problem.rotation = work->foot_rotation[0];
+    problem.velocity = work->foot_velocity[0];
+    problem.inverse_inertia = work->now.support.ground.inverse_inertia;
+    problem.free_velocity = work->now.support.free_velocity[0];
     const ContactResult result = {work->wrench[0], work->next_velocity[0], NULL, NULL, NULL, NULL};
-    ground_robot(setup, &problem, shared, memory, 1, &result);
+    if (MAP) {
+        ground_robot_map(setup, &problem, (ground_Shared_map *)shared, memory, 1, &result);
+    } else {
+        ground_robot(setup, &problem, shared, memory, 1, &result);
+    }
     lanes_meet();
     return engine_end(model, 0, work);
 }
@@ -109,8 +138,9 @@ LANE_FN void report(const EngineModel *model, const EngineRobots *robots, long r
     }
 }
 
-/* SOFT: bool, on the ground of setup, shape and arrays. */
-template <int SOFT>
+/* SOFT: bool, on the ground of setup, shape and arrays. MAP: bool, that or rigid ground has the
+ * shape setup.map. */
+template <int SOFT, int MAP>
 static __global__ void __launch_bounds__(THREADS, ENGINE_BLOCKS)
     step_robots(const EngineModel *__restrict__ model, const __grid_constant__ EngineRobots robots,
                 const __grid_constant__ ContactSetup setup,
@@ -127,16 +157,18 @@ static __global__ void __launch_bounds__(THREADS, ENGINE_BLOCKS)
     }
     Real *qpos = robots.qpos + robot * (7 + tree->joints);
     Real *qvel = robots.qvel + robot * (6 + tree->joints);
-    const int material = SOFT && robots.material ? robots.material[robot] : 0;
+    ContactProblem problem = {};
     int bad = 0;
+    if (SOFT) {
+        material_of(&robots, &shape, &arrays, robot, &problem);
+    }
     engine_load(model, qpos, qvel, &place->work);
     for (int k = 0; k < steps && !bad; k++) {
         if (SOFT) {
-            bad = step_soft(model, &robots, &setup,
-                            (const ContactMaterial *)(arrays.materials + material * shape.feet),
-                            robot, batch_memory(&shape, &arrays, robot), &contact[warp], place);
+            bad = step_soft<MAP>(model, &robots, &setup, problem, robot,
+                                 batch_memory(&shape, &arrays, robot), &contact[warp], place);
         } else {
-            bad = step(model, &robots, robot, place);
+            bad = step(model, &robots, MAP ? &setup.map : NULL, robot, place);
         }
     }
     engine_store(model, &place->work, qpos, qvel);
@@ -152,20 +184,22 @@ size_t engine_shared_bytes(void) {
 
 static const size_t block_bytes = ENGINE_WARPS * sizeof(Workplace);
 
-/* Both kernels may take the shared memory that they need. */
-static cudaError_t allow_shared(void) {
-    const cudaError_t status = cudaFuncSetAttribute(
-        step_robots<0>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)block_bytes);
-    return status == cudaSuccess
-               ? cudaFuncSetAttribute(step_robots<1>, cudaFuncAttributeMaxDynamicSharedMemorySize,
-                                      (int)block_bytes)
-               : status;
+typedef void (*Kernel)(const EngineModel *model, EngineRobots robots, ContactSetup setup,
+                       BatchShape shape, BatchArrays arrays, int steps);
+
+/* The kernel of a ground, which may take the shared memory that it needs. */
+static cudaError_t kernel_of(int soft, int map, Kernel *kernel) {
+    static const Kernel kernels[2][2] = {{step_robots<0, 0>, step_robots<0, 1>},
+                                         {step_robots<1, 0>, step_robots<1, 1>}};
+    *kernel = kernels[soft != 0][map != 0];
+    return cudaFuncSetAttribute(*kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                                (int)block_bytes);
 }
 
-cudaError_t engine_kernel_facts(int soft, cudaFuncAttributes *facts, int *robots_at_once) {
-    const void *kernel = soft ? (const void *)step_robots<1> : (const void *)step_robots<0>;
+cudaError_t engine_kernel_facts(int soft, int map, cudaFuncAttributes *facts, int *robots_at_once) {
+    Kernel kernel;
     int blocks = 0;
-    cudaError_t status = allow_shared();
+    cudaError_t status = kernel_of(soft, map, &kernel);
     if (status == cudaSuccess) {
         status =
             cudaOccupancyMaxActiveBlocksPerMultiprocessor(&blocks, kernel, THREADS, block_bytes);
@@ -177,23 +211,25 @@ cudaError_t engine_kernel_facts(int soft, cudaFuncAttributes *facts, int *robots
 cudaError_t engine_step_robots(const EngineModel *model, const EngineRobots *robots, int steps,
                                cudaStream_t stream) {
     const int blocks = (robots->count + ENGINE_WARPS - 1) / ENGINE_WARPS;
-    const cudaError_t status = allow_shared();
+    ContactSetup setup = {};
+    BatchShape shape = {};
+    BatchArrays arrays = {};
+    if (robots->ground) {
+        shape = robots->ground->shape;
+        arrays = robots->ground->arrays;
+        if (shape.per != ENGINE_PER || (robots->ground->curves & ~LAW_CONE)) {
+            return cudaErrorInvalidValue;
+        }
+        batch_setup(&shape, &arrays, &setup);
+    } else if (robots->map) {
+        setup.map = *robots->map;
+    }
+    const int map = robots->ground ? shape.map : robots->rigid && robots->map;
+    Kernel kernel;
+    const cudaError_t status = kernel_of(robots->ground != NULL, map, &kernel);
     if (status != cudaSuccess) {
         return status;
     }
-    if (robots->ground) {
-        const BatchShape *shape = &robots->ground->shape;
-        const BatchArrays *arrays = &robots->ground->arrays;
-        ContactSetup setup;
-        if (shape->per != ENGINE_PER || (robots->ground->curves & ~LAW_CONE)) {
-            return cudaErrorInvalidValue;
-        }
-        batch_setup(shape, arrays, &setup);
-        step_robots<1><<<blocks, THREADS, block_bytes, stream>>>(model, *robots, setup, *shape,
-                                                                 *arrays, steps);
-    } else {
-        step_robots<0><<<blocks, THREADS, block_bytes, stream>>>(
-            model, *robots, ContactSetup{}, BatchShape{}, BatchArrays{}, steps);
-    }
+    kernel<<<blocks, THREADS, block_bytes, stream>>>(model, *robots, setup, shape, arrays, steps);
     return cudaGetLastError();
 }

@@ -12,10 +12,13 @@
  * of robot.ini. */
 typedef struct {
     int count;
-    int rigid;                        /* bool: on a level rigid ground at height 0 */
+    int rigid;                        /* bool: on rigid ground at height 0 */
+    const MapView *map;               /* shape of the rigid ground, with arrays on the device; NULL:
+                                         level */
     const MildBatch *ground;          /* soft ground under these robots at height 0, on the device,
                                          of cones and lines only; NULL: none */
-    const int32_t *material;          /* [count] of the ground's table; NULL: 0 */
+    const int32_t *material;          /* of the ground's table, as MildBatchInput.material */
+    const Real *map_origin;           /* [count][2] [m] on either ground's map; NULL: 0 */
     Real *qpos;                       /* [count][7 + joints] as in RobotState */
     Real *qvel;                       /* [count][6 + joints] */
     const Real *torque;               /* [count][joints] [N m] held over the steps */
@@ -34,8 +37,8 @@ cudaError_t engine_step_robots(const EngineModel *model, const EngineRobots *rob
                                cudaStream_t stream);
 /* [B] of shared memory that a robot takes. */
 size_t engine_shared_bytes(void);
-/* Registers, stack and static shared memory of the kernel with or without soft ground, and robots
- * that a multiprocessor holds. */
-cudaError_t engine_kernel_facts(int soft, cudaFuncAttributes *facts, int *robots_at_once);
+/* Registers, stack and static shared memory of the kernel with or without soft ground, with or
+ * without a map, and robots that a multiprocessor holds. */
+cudaError_t engine_kernel_facts(int soft, int map, cudaFuncAttributes *facts, int *robots_at_once);
 
 #endif

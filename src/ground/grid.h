@@ -5,9 +5,10 @@
 
 #include <math.h>
 
+#include "ground/surface.h"
 #include "mild/map.h"
 
-/* Cell (0, 0) begins at (x0, y0). */
+/* Cell (0, 0) begins at (x0, y0), a whole number of half cells from the map's origin. */
 typedef struct {
     int columns;      /* cells along x */
     int rows;         /* cells along y */
@@ -23,13 +24,6 @@ typedef struct {
 static inline Grid grid_make(int columns, int rows, double cell_x, double cell_y, int repeats) {
     return (Grid){columns, rows, repeats, 0.0, 0.0, cell_x, cell_y, 1.0 / cell_x, 1.0 / cell_y};
 }
-
-/* Position on a grid along one axis. */
-typedef struct {
-    int cell;      /* index of the cell */
-    double share;  /* [-] position in the cell, 0 .. 1 */
-    double inside; /* 1 within the grid, 0 beyond its border */
-} GridPlace;
 
 /* at: coordinate from the start of the grid, in cells. Any number gives a valid cell, because the
  * comparisons are false for NaN. */

@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 
+#include "ground/map_view.h"
 #include "ground/pattern.h"
 #include "ground/shape.h"
 
@@ -139,9 +140,6 @@ void mild_map_range(const MildMap *map, double *low, double *high) {
     *high = map->slope == 0.0 ? map->high : INFINITY;
 }
 
-/* Bilinear interpolation. With s and t the position in the cell along x and y, from 0 to 1:
- *
- *     h = (1 - t) ((1 - s) h00 + s h10) + t ((1 - s) h01 + s h11) */
 double map_surface(const MildMap *map, double x, double y, double slope[2]) {
     const Grid *grid = &map->heights;
     double height = map->slope * x;
@@ -152,17 +150,8 @@ double map_surface(const MildMap *map, double x, double y, double slope[2]) {
     }
     GridPlace a = grid_place((x - grid->x0) * grid->inverse_x, grid->columns, grid->repeats);
     GridPlace b = grid_place((y - grid->y0) * grid->inverse_y, grid->rows, grid->repeats);
-    size_t stride = (size_t)grid->columns + 1;
-    const float *at = map->height + (size_t)b.cell * stride + (size_t)a.cell;
-    double h00 = (double)at[0];
-    double h10 = (double)at[1];
-    double h01 = (double)at[stride];
-    double h11 = (double)at[stride + 1];
-    double low = h00 + a.share * (h10 - h00);
-    double high = h01 + a.share * (h11 - h01);
-    slope[0] += a.inside * grid->inverse_x * ((h10 - h00) + b.share * ((h11 - h01) - (h10 - h00)));
-    slope[1] += b.inside * grid->inverse_y * (high - low);
-    return height + low + b.share * (high - low);
+    return cell_surface(map->height, grid->columns, a, b, grid->inverse_x, grid->inverse_y, height,
+                        slope);
 }
 
 Label map_label(const MildMap *map, double x, double y) {
@@ -173,4 +162,33 @@ Label map_label(const MildMap *map, double x, double y) {
     GridPlace a = grid_place((x - grid->x0) * grid->inverse_x, grid->columns, grid->repeats);
     GridPlace b = grid_place((y - grid->y0) * grid->inverse_y, grid->rows, grid->repeats);
     return map->label[(size_t)b.cell * (size_t)grid->columns + (size_t)a.cell];
+}
+
+static MapNumber map_number_of(double number) {
+    const float high = (float)number;
+    return (MapNumber){high, (float)(number - (double)high)};
+}
+
+/* begin: [m] where the first cell begins. */
+static MapAxis map_axis(int cells, int repeats, double begin, double cell) {
+    return (MapAxis){cells, repeats, (float)(0.5 * round(-2.0 * begin / cell)), map_number_of(cell),
+                     map_number_of(1.0 / cell)};
+}
+
+MapView map_view(const MildMap *map) {
+    const Grid *h = &map->heights;
+    const Grid *l = &map->labels;
+    MapView view = {.height = map->height,
+                    .slope = map_number_of(map->slope),
+                    .labels = map->label_count,
+                    .uneven = !mild_map_is_level(map)};
+    if (map->height) {
+        view.x = map_axis(h->columns, h->repeats, h->x0, h->cell_x);
+        view.y = map_axis(h->rows, h->repeats, h->y0, h->cell_y);
+    }
+    if (map->label) {
+        view.label_x = map_axis(l->columns, l->repeats, l->x0, l->cell_x);
+        view.label_y = map_axis(l->rows, l->repeats, l->y0, l->cell_y);
+    }
+    return view;
 }

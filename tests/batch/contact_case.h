@@ -2,18 +2,28 @@
 #ifndef CONTACT_CASE_H
 #define CONTACT_CASE_H
 
-enum { CASE_FEET = 4, CASE_ELEMENTS = 256, CASE_MEMORY = 9, CASE_LAW = 13 };
+#include "ground/map_view.h"
+
+enum { CASE_FEET = 4, CASE_ELEMENTS = 256, CASE_MEMORY = 9, CASE_LAW = 13, CASE_LABELS = 4 };
+
+typedef struct {
+    double law[CASE_LAW], recovery, mu, k_drift, b_drift, exit_drag, entry_drag;
+    int curves;
+} CaseMaterial;
 
 typedef struct {
     int feet, groups, per;
     int elements[CASE_FEET];
     double x[CASE_FEET][CASE_ELEMENTS], y[CASE_FEET][CASE_ELEMENTS], z[CASE_FEET];
     double dt, tolerance, height;
-    int limit, curves;
-    double law[CASE_LAW], recovery, mu, k_drift, b_drift, exit_drag, entry_drag;
+    int limit;
+    CaseMaterial material[CASE_LABELS]; /* [0] without a map */
     double position[3 * CASE_FEET], rotation[9 * CASE_FEET], velocity[6 * CASE_FEET];
     double inverse_inertia[36 * CASE_FEET * CASE_FEET], free_velocity[6 * CASE_FEET];
     double memory[CASE_MEMORY][CASE_FEET][CASE_ELEMENTS]; /* in and out */
+    MapView map;                                          /* the next three: with a map */
+    double map_origin[2];
+    double plane[4][CASE_FEET][CASE_ELEMENTS], last[5][CASE_FEET]; /* in and out, see contact.h */
     /* out */
     double wrench[6 * CASE_FEET], after[6 * CASE_FEET], residual;
     double foot[CASE_FEET][6];                   /* ContactFoot */
@@ -21,8 +31,10 @@ typedef struct {
     int iterations;
 } ContactCase;
 
-/* Solves and advances. */
+/* Solves and advances, on level ground and on a map. */
 void contact_case_double(ContactCase *c);
 void contact_case_float(ContactCase *c);
+void contact_map_double(ContactCase *c);
+void contact_map_float(ContactCase *c);
 
 #endif

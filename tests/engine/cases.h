@@ -12,16 +12,20 @@
 #include "base/random.h"
 #include "robot/sim.h"
 
+/* Rounds to float. (volatile: at -O3 gcc 12 drops the two conversions of neighbours) */
+static inline void round_numbers(double *number, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        const volatile float rounded = (float)number[i];
+        number[i] = (double)rounded;
+    }
+}
+
 /* Float takes these numbers as they are, so that its error is that of its arithmetic. */
 static inline void round_case(EngineCase *in) {
-    double *number = (double *)in;
-    size_t count = offsetof(EngineCase, variation) / sizeof(double);
-    for (size_t i = 0; i < count; i++) {
-        number[i] = (double)(float)number[i];
-    }
-    in->height = (double)(float)in->height;
-    in->slope[0] = (double)(float)in->slope[0];
-    in->slope[1] = (double)(float)in->slope[1];
+    round_numbers((double *)in, offsetof(EngineCase, variation) / sizeof(double));
+    round_numbers(&in->height, 1);
+    round_numbers(in->slope, 2);
+    round_numbers(in->map_origin, 2);
 }
 
 static inline void spread(Random *random, double *x, int count, double size) {
@@ -78,17 +82,29 @@ static inline EngineCase random_case(const Robot *robot, uint32_t draw) {
     return in;
 }
 
-/* [m] By how much the robot of the case may sink before a corner touches the plane. */
+/* [m] Height of rigid ground at a point, and gradient [-]. */
+static inline double case_height(const EngineCase *in, double x, double y, double slope[2]) {
+    MildTerrain terrain = {.map = in->map, .map_x = in->map_origin[0], .map_y = in->map_origin[1]};
+    memcpy(slope, in->slope, sizeof in->slope);
+    if (in->map) {
+        mild_terrain_slope_at(&terrain, x, y, slope);
+        return in->height + mild_terrain_height_at(&terrain, x, y);
+    }
+    return in->height + slope[0] * x + slope[1] * y;
+}
+
+/* [m] By how much the robot of the case may sink before a corner touches the ground. */
 static inline double clearance(RobotSim *sim, const EngineCase *in) {
     const mjModel *m = sim->model;
-    const double steep = sqrt(1 + in->slope[0] * in->slope[0] + in->slope[1] * in->slope[1]);
     RobotState state = {.qpos = {0}};
     double least = 1e9;
     memcpy(state.qpos, in->qpos, sizeof state.qpos);
     robot_sim_load(sim, &state, &in->variation);
     for (int g = 0; g < m->ngeom; g++) {
         const double *c = sim->data->geom_xpos + 3 * g;
-        double height = in->height + in->slope[0] * c[0] + in->slope[1] * c[1];
+        double slope[2];
+        double height = case_height(in, c[0], c[1], slope);
+        double steep = sqrt(1 + slope[0] * slope[0] + slope[1] * slope[1]);
         if (g != sim->robot->floor_geom) {
             least = fmin(least, c[2] - height - steep * m->geom_size[3 * g]);
         }
@@ -97,10 +113,11 @@ static inline double clearance(RobotSim *sim, const EngineCase *in) {
 }
 
 /* Near the default pose, the lowest corner of the feet up to 4 mm in the ground, or above it. Half
- * of the cases move as a stand does, half as a walk, some with joints beyond their limits. */
-static inline EngineCase rigid_case(RobotSim *sim, uint32_t draw) {
+ * of the cases move as a stand does, half as a walk, some with joints beyond their limits. map: or
+ * NULL for planes. */
+static inline EngineCase rigid_case(RobotSim *sim, const MildMap *map, uint32_t draw) {
     const Robot *robot = sim->robot;
-    EngineCase in = {.qpos = {0}};
+    EngineCase in = {.qpos = {0}, .map = map};
     Random random = random_at(43, draw, 0);
     double motion = draw % 2 ? 1 : 0.05;
     in.variation = random_variation(robot, &random);
@@ -124,7 +141,9 @@ static inline EngineCase rigid_case(RobotSim *sim, uint32_t draw) {
     spread(&random, in.qvel + 6, robot->def.joints, 4 * motion);
     spread(&random, in.push, 3, 50);
     in.height = random_uniform(&random, -0.2, 0.2);
-    if (draw % 4 >= 2) {
+    if (map) {
+        spread(&random, in.map_origin, 2, 3);
+    } else if (draw % 4 >= 2) {
         spread(&random, in.slope, 2, draw % 8 == 7 ? 1 : 0.2);
     }
     in.qpos[2] -= clearance(sim, &in) + random_uniform(&random, -0.001, 0.004);

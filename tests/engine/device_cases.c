@@ -27,6 +27,30 @@ int device_robot_open(const char *folder, double dt, DeviceRobot *device) {
     return 1;
 }
 
+MildMap *device_map(void) {
+    MildMapDef def = mild_map_def_default();
+    MildError error = {0};
+    def.kind = MILD_MAP_ROUGH;
+    def.patches = MILD_PATTERN_CHECKER;
+    def.patch_size = 0.07;
+    def.patch_count = DEVICE_LABELS;
+    MildMap *map = mild_map_create(&def, &error);
+    if (!map) {
+        fprintf(stderr, "%s\n", error.text);
+    }
+    return map;
+}
+
+void device_materials(MildMaterial materials[DEVICE_LABELS]) {
+    materials[0] = mild_material_default();
+    mild_material_preset("grass", &materials[1]);
+}
+
+double device_height(const MildMap *map, double x, double y) {
+    const MildTerrain terrain = {.material_count = 1, .map = map};
+    return mild_terrain_height_at(&terrain, x, y);
+}
+
 const MildSole *const *device_soles(void) {
     return robot_soles(robot);
 }
@@ -34,8 +58,8 @@ const MildSole *const *device_soles(void) {
 int device_soft_reference(const DeviceRobot *device, const EngineCase *in, int steps, double *qpos,
                           double *qvel) {
     const int joints = device->tree.joints;
-    const MildMaterial sand = mild_material_default();
-    const MildTerrain terrain = mild_terrain_uniform(&sand);
+    MildTerrain terrain = {.material_count = DEVICE_LABELS, .map = in->map};
+    device_materials(terrain.materials);
     void *block = aligned_alloc(64, mild_ground_bytes(robot_soles(robot), robot_feet(robot)));
     if (!block) {
         return 0;
@@ -62,14 +86,14 @@ int device_soft_reference(const DeviceRobot *device, const EngineCase *in, int s
     return !bad;
 }
 
-EngineCase device_case(int rigid, uint32_t draw) {
+EngineCase device_case(int rigid, const MildMap *map, uint32_t draw) {
     EngineCase in;
     if (!rigid) {
         in = random_case(robot, draw);
         memset(in.wrench, 0, sizeof in.wrench);
         return in;
     }
-    in = rigid_case(sim, draw % 4 < 2 ? draw : draw - 2); /* others are on a slope */
+    in = rigid_case(sim, map, draw % 4 < 2 ? draw : draw - 2); /* others are on a slope */
     in.qpos[2] -= in.height;
     in.height = 0;
     round_case(&in);

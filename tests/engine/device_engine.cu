@@ -1,6 +1,7 @@
 /* The batch engine on a GPU: one step of random states against the text in double and in float on
- * the processor, then its speed. Usage: engine_device_engine FOLDER_OF_ROBOT [STATES]; with STATES
- * it compares so many and times nothing, as compute-sanitizer wants it.
+ * the processor, on level ground and on a map, then its speed. Usage: engine_device_engine
+ * FOLDER_OF_ROBOT [STATES]; with STATES it compares so many and times nothing, as compute-sanitizer
+ * wants it.
  *
  * Compiled for one robot (the definitions of engine_model_sizes) or for any. Errors of qacc are
  * relative to the largest acceleration of their kind (base, joints) of that state. Exit 1 when one
@@ -14,6 +15,7 @@
 #include <vector>
 
 extern "C" {
+#include "batch/batch.h"
 #include "device_cases.h"
 }
 
@@ -63,12 +65,13 @@ static EngineRobots robots_of(const DeviceRobot &robot, const std::vector<Engine
     const int joints = robot.tree.joints;
     const int rows = 6 * robot.tree.feet;
     const size_t count = cases.size();
-    std::vector<float> qpos, qvel, torque, target, push, kp(joints), kd(joints);
+    std::vector<float> qpos, qvel, torque, target, push, origin, kp(joints), kd(joints);
     std::vector<EngineVariation> variation;
     for (const EngineCase &in : cases) {
         qpos.insert(qpos.end(), in.qpos, in.qpos + 7 + joints);
         qvel.insert(qvel.end(), in.qvel, in.qvel + 6 + joints);
         push.insert(push.end(), in.push, in.push + 6);
+        origin.insert(origin.end(), in.map_origin, in.map_origin + 2);
         variation.push_back(variation_of(&in.variation));
         for (int j = 0; j < joints; j++) {
             torque.push_back(pd ? 0 : (float)in.torque[j]);
@@ -87,6 +90,7 @@ static EngineRobots robots_of(const DeviceRobot &robot, const std::vector<Engine
     robots.kp = on_device(kp);
     robots.kd = on_device(kd);
     robots.push = on_device(push);
+    robots.map_origin = on_device(origin);
     robots.variation = on_device(variation);
     robots.acceleration = on_device(std::vector<float>(count * (6 + joints), NAN));
     robots.inverse_inertia =
@@ -101,7 +105,8 @@ static void free_robots(EngineRobots *robots) {
                             robots->kp,           robots->kd,
                             robots->push,         robots->variation,
                             robots->acceleration, robots->inverse_inertia,
-                            robots->bad};
+                            robots->bad,          robots->map_origin,
+                            robots->material};
     for (const void *array : arrays) {
         cudaFree((void *)array);
     }
@@ -167,14 +172,30 @@ static double note_robot(const DeviceRobot &robot, const Answers &got, const Eng
     return error;
 }
 
-static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid, int count) {
+/* A map on the device; nothing for none. */
+static MapView view_of(const MildMap *map) {
+    MapView view = {};
+    MildError error = {MILD_OK, {0}};
+    if (map && batch_map_open(&view, map, 0, &error) != MILD_OK) {
+        fprintf(stderr, "%s\n", error.text);
+        exit(2);
+    }
+    return view;
+}
+
+/* map: of rigid ground, or NULL. A state whose corner lies on the border of a cell may see the next
+ * one's gradient. */
+static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid,
+                   const MildMap *map, int count) {
     static const char *const name[2] = {"double", "float"};
     static EngineText *const text[2] = {engine_text_double, engine_text_float};
     std::vector<EngineCase> cases;
     for (int i = 0; i < count; i++) {
-        cases.push_back(device_case(rigid, (uint32_t)i));
+        cases.push_back(device_case(rigid, map, (uint32_t)i));
     }
     EngineRobots robots = robots_of(robot, cases, rigid, 0);
+    const MapView view = view_of(map);
+    robots.map = map ? &view : nullptr;
     check(engine_step_robots(model, &robots, 1, 0), "step");
     check(cudaDeviceSynchronize(), "step");
     const Answers got = answers_of(robot, robots);
@@ -191,33 +212,54 @@ static int compare(const DeviceRobot &robot, const EngineModel *model, int rigid
     for (int k = 0; k < 2; k++) {
         printf("%-13s %d states, device against %-6s: worst qacc %.1e  A %.1e  qvel after %.1e  "
                "qpos after %.1e\n",
-               rigid ? "rigid ground," : "in the air,", count, name[k], worst[k].qacc, worst[k].A,
-               worst[k].qvel, worst[k].qpos);
+               map     ? "rigid map,"
+               : rigid ? "rigid ground,"
+                       : "in the air,",
+               count, name[k], worst[k].qacc, worst[k].A, worst[k].qvel, worst[k].qpos);
     }
     printf("              %d beyond 1e-4 of double, %d bad\n", off, bad);
     free_robots(&robots);
-    return worst[0].qacc < (rigid ? 1e-3 : 1e-4) && bad == 0;
+    batch_map_close(&view, 0);
+    return bad == 0 && (map ? off <= count / 100 : worst[0].qacc < (rigid ? 1e-3 : 1e-4));
 }
 
 /* ---- soft ground ---- */
 
-static MildBatch *ground_of(int robots) {
+/* map: or NULL. */
+static MildBatch *ground_of(int robots, const MildMap *map) {
+    MildMaterial materials[DEVICE_LABELS];
     MildError error = {MILD_OK, {0}};
     MildBatchDef def = {robots, ROBOT_FEET_MAX, device_soles(), dt, 0, 0, 0};
     def.feet = ENGINE_FIXED ? ENGINE_FEET : 2;
     MildBatch *ground = mild_batch_create(&def, &error);
-    if (!ground) {
+    device_materials(materials);
+    if (!ground || mild_batch_set_materials(ground, materials, DEVICE_LABELS, &error) ||
+        mild_batch_set_map(ground, map, &error)) {
         fprintf(stderr, "%s\n", error.text);
         exit(2);
     }
     return ground;
 }
 
-/* Robots that come down on sand with different legs and speeds, their motors holding a pose. */
-static std::vector<EngineCase> landings(const DeviceRobot &robot, int count) {
+/* The materials of all robots' labels. */
+static const int32_t *materials_of(int robots) {
+    std::vector<int32_t> material((size_t)robots * DEVICE_LABELS);
+    for (size_t i = 0; i < material.size(); i++) {
+        material[i] = (int32_t)(i % DEVICE_LABELS);
+    }
+    return on_device(material);
+}
+
+/* Robots that come down on sand, or on a map, with different legs and speeds, their motors holding
+ * a pose. */
+static std::vector<EngineCase> landings(const DeviceRobot &robot, const MildMap *map, int count) {
     std::vector<EngineCase> cases((size_t)count, robot.stand);
     for (int i = 0; i < count; i++) {
-        cases[i].qpos[2] += 0.01;
+        cases[i].map = map;
+        cases[i].qpos[0] += map ? i % 64 / 8 : 0;
+        cases[i].qpos[1] += map ? i % 8 : 0;
+        cases[i].qpos[2] +=
+            0.01 + (map ? device_height(map, cases[i].qpos[0], cases[i].qpos[1]) : 0);
         cases[i].qvel[0] = 0.3 * sin(1.7 * i);
         cases[i].qvel[1] = 0.1 * sin(2.3 * i);
         for (int j = 0; j < robot.tree.joints; j++) {
@@ -233,12 +275,14 @@ static std::vector<EngineCase> landings(const DeviceRobot &robot, int count) {
     return cases;
 }
 
-/* A while on sand, against MuJoCo with mild/ground.h. */
-static int compare_soft(const DeviceRobot &robot, const EngineModel *model, int count, int steps) {
-    const std::vector<EngineCase> cases = landings(robot, count);
-    MildBatch *ground = ground_of(count);
+/* A while on sand, or on a map of sand and grass, against MuJoCo with mild/ground.h. */
+static int compare_soft(const DeviceRobot &robot, const EngineModel *model, const MildMap *map,
+                        int count, int steps) {
+    const std::vector<EngineCase> cases = landings(robot, map, count);
+    MildBatch *ground = ground_of(count, map);
     EngineRobots robots = robots_of(robot, cases, 0, 1);
     robots.ground = ground;
+    robots.material = map ? materials_of(count) : nullptr;
     robots.push = nullptr;
     check(engine_step_robots(model, &robots, steps, 0), "step");
     check(cudaDeviceSynchronize(), "step");
@@ -258,9 +302,9 @@ static int compare_soft(const DeviceRobot &robot, const EngineModel *model, int 
             note(&joint, fabs(got.qpos[q + 7 + j] - qpos[7 + j]));
         }
     }
-    printf("on sand,      %d robots, %d steps, device against MuJoCo and mild/ground.h in double: "
+    printf("%-13s %d robots, %d steps, device against MuJoCo and mild/ground.h in double: "
            "base %.1e m, its speed %.1e m/s, joints %.1e rad, %d bad\n",
-           count, steps, height, speed, joint, bad);
+           map ? "on a map," : "on sand,", count, steps, height, speed, joint, bad);
     free_robots(&robots);
     mild_batch_destroy(ground);
     return height < 1e-3 && joint < 1e-2 && bad == 0;
@@ -268,22 +312,27 @@ static int compare_soft(const DeviceRobot &robot, const EngineModel *model, int 
 
 /* ---- speed ---- */
 
-enum Kind { AIR, RIGID, SAND, KINDS };
-static const char *const names[KINDS] = {"in the air,", "rigid ground,", "on sand,"};
+enum Kind { AIR, RIGID, RIGID_MAP, SAND, SAND_MAP, KINDS };
+static const char *const names[KINDS] = {"in the air,", "rigid ground,", "rigid map,", "on sand,",
+                                         "on a map,"};
 
 /* Fastest and slowest of a few runs. */
-static void time_robots(const DeviceRobot &robot, const EngineModel *model, Kind kind, int count,
-                        int steps) {
+static void time_robots(const DeviceRobot &robot, const EngineModel *model, Kind kind,
+                        const MildMap *all, int count, int steps) {
     enum { RUNS = 5, LAUNCHES = 20 };
-    const std::vector<EngineCase> cases = landings(robot, count);
-    EngineRobots robots = robots_of(robot, cases, kind == RIGID, 1);
+    const MildMap *map = kind == RIGID_MAP || kind == SAND_MAP ? all : nullptr;
+    const std::vector<EngineCase> cases = landings(robot, map, count);
+    const MapView view = view_of(kind == RIGID_MAP ? map : nullptr);
+    EngineRobots robots = robots_of(robot, cases, kind == RIGID || kind == RIGID_MAP, 1);
     const std::vector<float> qpos =
         from_device(robots.qpos, (size_t)count * (7 + robot.tree.joints));
     const std::vector<float> qvel =
         from_device(robots.qvel, (size_t)count * (6 + robot.tree.joints));
-    MildBatch *ground = kind == SAND ? ground_of(count) : nullptr;
+    MildBatch *ground = kind >= SAND ? ground_of(count, map) : nullptr;
     MildError error = {MILD_OK, {0}};
     robots.ground = ground;
+    robots.map = kind == RIGID_MAP ? &view : nullptr;
+    robots.material = kind == SAND_MAP ? materials_of(count) : nullptr;
     robots.push = nullptr;
     cudaEvent_t begin, end;
     check(cudaEventCreate(&begin), "event");
@@ -316,6 +365,7 @@ static void time_robots(const DeviceRobot &robot, const EngineModel *model, Kind
     cudaEventDestroy(begin);
     cudaEventDestroy(end);
     free_robots(&robots);
+    batch_map_close(&view, 0);
     mild_batch_destroy(ground);
 }
 
@@ -339,22 +389,30 @@ int main(int argc, char **argv) {
     const EngineModel *there = on_device(std::vector<EngineModel>(1, model));
     cudaFuncAttributes facts;
     int at_once = 0;
-    for (int soft = 0; soft < 2; soft++) {
-        check(engine_kernel_facts(soft, &facts, &at_once), "kernel");
-        printf("%s: %d registers, %zu bytes of local memory, %zu bytes of shared memory a robot, "
-               "%d robots a multiprocessor\n",
-               soft ? "soft ground" : "without", facts.numRegs, facts.localSizeBytes,
-               engine_shared_bytes(), at_once);
+    MildMap *map = device_map();
+    if (!map) {
+        return 2;
     }
-    const int good = compare(robot, there, 0, states) & compare(robot, there, 1, states) &
-                     compare_soft(robot, there, 64, 1) & compare_soft(robot, there, 64, 100);
+    for (int k = 0; k < 4; k++) {
+        check(engine_kernel_facts(k / 2, k % 2, &facts, &at_once), "kernel");
+        printf("%s%s: %d registers, %zu bytes of local memory, %zu bytes of shared memory a robot, "
+               "%d robots a multiprocessor\n",
+               k / 2 ? "soft ground" : "without", k % 2 ? ", map" : "", facts.numRegs,
+               facts.localSizeBytes, engine_shared_bytes(), at_once);
+    }
+    const int good =
+        compare(robot, there, 0, nullptr, states) & compare(robot, there, 1, nullptr, states) &
+        compare(robot, there, 1, map, states) & compare_soft(robot, there, nullptr, 64, 1) &
+        compare_soft(robot, there, nullptr, 64, 100) & compare_soft(robot, there, map, 64, 1) &
+        compare_soft(robot, there, map, 64, 100);
     static const int counts[] = {4096, 16384, 65536};
     for (int kind = 0; kind < KINDS && argc == 2; kind++) {
         for (int count : counts) {
-            time_robots(robot, there, (Kind)kind, count, 1);
-            time_robots(robot, there, (Kind)kind, count, 4);
+            time_robots(robot, there, (Kind)kind, map, count, 1);
+            time_robots(robot, there, (Kind)kind, map, count, 4);
         }
     }
+    mild_map_destroy(map);
     printf("%s\n", good ? "ok" : "FAILED");
     return !good;
 }

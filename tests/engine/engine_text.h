@@ -15,6 +15,8 @@ typedef struct {
     RobotVariation variation; /* rigid: on rigid ground instead of under the wrenches */
     double height;            /* [m] of rigid ground at the origin */
     double slope[2];          /* [-] of it */
+    const MildMap *map;       /* or NULL; then slope is 0 */
+    double map_origin[2];     /* [m] */
 } EngineCase;
 
 /* Degrees of freedom in the engine's order. */

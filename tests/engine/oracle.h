@@ -117,8 +117,24 @@ static inline void oracle_feet(RobotSim *sim, Oracle *o) {
     }
 }
 
-/* Contacts with a plane of the height and slope of the case. */
+/* The map of a case, or level ground. */
+static inline MildTerrain oracle_terrain(const EngineCase *in) {
+    const MildMaterial any = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&any);
+    terrain.height = in->height;
+    terrain.map = in->map;
+    terrain.map_x = in->map_origin[0];
+    terrain.map_y = in->map_origin[1];
+    return terrain;
+}
+
+/* Contacts with a plane of the height and slope of the case, or with its map. */
 static inline void oracle_collide(RobotSim *sim, const EngineCase *in) {
+    if (in->map) {
+        const MildTerrain terrain = oracle_terrain(in);
+        rigid_collide(sim, &terrain);
+        return;
+    }
     const double length = sqrt(1 + in->slope[0] * in->slope[0] + in->slope[1] * in->slope[1]);
     const double normal[3] = {-in->slope[0] / length, -in->slope[1] / length, 1 / length};
     const int floor = sim->robot->floor_geom;
@@ -193,9 +209,7 @@ static inline void oracle_finish(RobotSim *sim, Oracle *o) {
 
 /* What RobotSim tells a task of the pose. */
 static inline void oracle_measure(RobotSim *sim, const EngineCase *in, Oracle *o) {
-    const MildMaterial any = mild_material_default();
-    MildTerrain terrain = mild_terrain_uniform(&any);
-    terrain.height = in->height;
+    const MildTerrain terrain = oracle_terrain(in);
     o->body_clearance = robot_sim_body_clearance(sim, &terrain);
     o->knee_distance = robot_sim_knee_distance(sim);
     o->foot_distance = robot_sim_foot_distance(sim);

@@ -17,6 +17,7 @@
 #include "oracle.h"
 
 #include "control/stand.h"
+#include "ground/grid.h"
 
 #include "../sa01.h"
 #include "../widest.h"
@@ -283,8 +284,8 @@ static void check_worst(const Worst at_double, const Worst at_float) {
     }
 }
 
-/* A case by MuJoCo and by both texts. */
-static void run_case(const Kit *kit, const EngineCase *in, Worst at_double, Worst at_float,
+/* A case by MuJoCo and by both texts. at_float: NULL where float says something else. */
+static void run_case(const Kit *kit, const EngineCase *in, Worst at_double, double *at_float,
                      int *newton) {
     double before[ROBOT_NV_MAX];
     memcpy(before, in->qvel, sizeof before);
@@ -295,6 +296,9 @@ static void run_case(const Kit *kit, const EngineCase *in, Worst at_double, Wors
     engine_text_double(&kit->tree, kit->number, in, &result);
     note_case(kit, in, before, at_double);
     *newton = result.newton > *newton ? result.newton : *newton;
+    if (!at_float) {
+        return;
+    }
     engine_text_float(&kit->tree, kit->number, in, &result);
     note_case(kit, in, before, at_float);
     *newton = result.newton > *newton ? result.newton : *newton;
@@ -327,7 +331,7 @@ static void test_rigid_ground(void **unused) {
         Worst at_double = {0}, at_float = {0};
         int touching = 0, newton = 0;
         for (uint32_t draw = 0; draw < (uint32_t)cases[k]; draw++) {
-            EngineCase in = rigid_case(kits[k].sim, draw);
+            EngineCase in = rigid_case(kits[k].sim, NULL, draw);
             run_case(&kits[k], &in, at_double, at_float, &newton);
             touching += oracle.rows > 0;
         }
@@ -338,6 +342,100 @@ static void test_rigid_ground(void **unused) {
     }
 }
 
+/* ---- maps ---- */
+
+typedef struct {
+    const char *name;
+    MildMapKind kind;
+    double far; /* [m] of the robot from the origin */
+} Relief;
+
+static const Relief reliefs[] = {
+    {"slope", MILD_MAP_SLOPE, 0}, {"steps", MILD_MAP_STEPS, 0},
+    {"waves", MILD_MAP_WAVES, 0}, {"rough", MILD_MAP_ROUGH, 0},
+    {"image", MILD_MAP_IMAGE, 0}, {"rough, 50 m away", MILD_MAP_ROUGH, 50}};
+enum { RELIEFS = sizeof reliefs / sizeof *reliefs, IMAGE = 30 };
+
+static MildMap *relief_map(const Relief *relief) {
+    static double heights[IMAGE * (IMAGE + 2)];
+    MildError error = {0};
+    MildMapDef def = mild_map_def_default();
+    Random random = random_at(47, 0, 0);
+    for (int i = 0; i < IMAGE * (IMAGE + 2); i++) {
+        heights[i] = random_unit(&random);
+    }
+    def.kind = (int)relief->kind;
+    def.slope = 0.2;
+    def.heights = heights;
+    def.height_columns = IMAGE;
+    def.height_rows = IMAGE + 2;
+    if (relief->kind == MILD_MAP_IMAGE) {
+        def.cell = 0.15; /* 4.35 m wide: some robots stand beside it */
+    }
+    MildMap *map = mild_map_create(&def, &error);
+    print_message("%s", error.text);
+    assert_non_null(map);
+    return map;
+}
+
+/* [cells] How near a coordinate is to the border of a cell. */
+static double border(double at, double cell) {
+    return fabs(at / cell - round(at / cell));
+}
+
+/* Bool: a corner is so near to the border of a cell that a float may see the gradient of the next
+ * one. The robot is as the last oracle_step loaded it. */
+static int on_border(RobotSim *sim, const EngineCase *in, double near) {
+    const Grid *grid = &in->map->heights;
+    RobotState state = {.qpos = {0}};
+    memcpy(state.qpos, in->qpos, sizeof state.qpos);
+    robot_sim_load(sim, &state, &in->variation);
+    for (int g = 0; in->map->height && g < sim->model->ngeom; g++) {
+        const double *c = sim->data->geom_xpos + 3 * g;
+        const double x = border(c[0] - in->map_origin[0] - grid->x0, grid->cell_x);
+        const double y = border(c[1] - in->map_origin[1] - grid->y0, grid->cell_y);
+        if (g != sim->robot->floor_geom && fmin(x, y) * grid->cell_x < near) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static void run_relief(const Relief *relief, int k, const MildMap *map) {
+    Worst at_double = {0}, at_float = {0};
+    int touching = 0, newton = 0, left_out = 0;
+    const int cases = k == WIDEST_KIT ? 100 : 1000;
+    for (uint32_t draw = 0; draw < (uint32_t)cases; draw++) {
+        EngineCase in = rigid_case(kits[k].sim, map, draw);
+        in.qpos[0] += relief->far;
+        in.map_origin[0] += relief->far / 2;
+        in.qpos[2] -= clearance(kits[k].sim, &in) + 1e-3 * (draw % 6 - 0.5);
+        round_case(&in);
+        const int out = on_border(kits[k].sim, &in, 1e-6);
+        run_case(&kits[k], &in, at_double, out ? NULL : at_float, &newton);
+        left_out += out;
+        touching += oracle.rows > 0;
+    }
+    print_message("%s: ", relief->name);
+    print_worst(kit_name[k], cases, at_double, at_float);
+    print_message("    with rows: %d; at most %d Newton steps; %d left out of float\n", touching,
+                  newton, left_out);
+    check_worst(at_double, at_float);
+    assert_true(touching > cases / 2 && left_out < cases / 20);
+}
+
+/* Rigid ground of a map, and what is measured above it, as RobotSim has them. */
+static void test_maps(void **unused) {
+    (void)unused;
+    for (int r = 0; r < RELIEFS; r++) {
+        MildMap *map = relief_map(&reliefs[r]);
+        for (int k = 0; k < KITS; k++) {
+            run_relief(&reliefs[r], k, map);
+        }
+        mild_map_destroy(map);
+    }
+}
+
 /* No lane of a block needs what another one does there: on a GPU they run at once. */
 static void test_order_of_lanes(void **unused) {
     (void)unused;
@@ -345,7 +443,7 @@ static void test_order_of_lanes(void **unused) {
     for (int k = 0; k < KITS; k++) {
         for (uint32_t draw = 0; draw < 200; draw++) {
             EngineCase in =
-                draw % 2 ? rigid_case(kits[k].sim, draw) : random_case(kits[k].robot, draw);
+                draw % 2 ? rigid_case(kits[k].sim, NULL, draw) : random_case(kits[k].robot, draw);
             engine_text_double(&kits[k].tree, kits[k].number, &in, &result);
             engine_text_reverse(&kits[k].tree, kits[k].number, &in, &reverse);
             assert_memory_equal(result.qpos, reverse.qpos, sizeof result.qpos);
@@ -370,9 +468,10 @@ static void march_torque(const Robot *robot, const double *qpos, const double *q
     }
 }
 
-typedef enum { RECORDED, RIGID, SOFT, MARCHES } March;
-static const char *const march_name[MARCHES] = {"recorded wrenches of sand",
-                                                "rigid ground of its own", "sand of its own"};
+typedef enum { RECORDED, RIGID, SOFT, RIGID_WAVES, SOFT_WAVES, MARCHES } March;
+static const char *const march_name[MARCHES] = {
+    "recorded wrenches of sand", "rigid ground of its own", "sand of its own",
+    "rigid waves of its own", "waves of sand of its own"};
 
 /* Follows a sim with torques from its own state, under the wrenches of the sim's ground or on
  * ground of its own. */
@@ -443,6 +542,7 @@ static double march(March kind, const EngineCase *start, Follower followers[2]) 
     MildMaterial sand;
     assert_true(mild_material_preset("sand_loose", &sand));
     MildTerrain terrain = mild_terrain_uniform(&sand);
+    terrain.map = start->map;
     RobotState state = {.qpos = {0}};
     double load = 0;
     memcpy(state.qpos, start->qpos, sizeof state.qpos);
@@ -451,7 +551,7 @@ static double march(March kind, const EngineCase *start, Follower followers[2]) 
     for (int f = 0; f < 2; f++) {
         MildError error = {0};
         followers[f].state = *start;
-        followers[f].ground = kind == SOFT ? new_ground(kit) : NULL;
+        followers[f].ground = kind == SOFT || kind == SOFT_WAVES ? new_ground(kit) : NULL;
         followers[f].scratch = mild_scratch_create(robot_soles(kit->robot), 2, &error);
     }
     for (int step = 0; step < SECOND; step++) {
@@ -477,9 +577,13 @@ static void test_march(void **unused) {
     EngineCase start = {.qpos = {0, 0, robot->stand_height + 0.002, 1}};
     memcpy(start.qpos + 7, robot->def.pose, sizeof robot->def.pose);
     start.variation = robot_variation_nominal();
+    const Relief relief = {"waves", MILD_MAP_WAVES, 0}; /* 20 mm high: it comes down on them */
+    MildMap *waves = relief_map(&relief);
     for (int kind = 0; kind < MARCHES; kind++) {
+        start.map = kind >= RIGID_WAVES ? waves : NULL;
+        start.qpos[2] = robot->stand_height + (start.map ? 0.012 : 0.002);
         Follower followers[2] = {{.text = engine_text_double}, {.text = engine_text_float}};
-        start.variation.rigid = kind == RIGID;
+        start.variation.rigid = kind == RIGID || kind == RIGID_WAVES;
         const double load = march((March)kind, &start, followers);
         const double *at_double = followers[0].drift;
         const double *at_float = followers[1].drift;
@@ -494,6 +598,7 @@ static void test_march(void **unused) {
             assert_true(at_float[k] < 1e-3);
         }
     }
+    mild_map_destroy(waves);
 }
 
 /* ---- the model ---- */
@@ -550,10 +655,10 @@ static void test_bad_numbers(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_states),  cmocka_unit_test(test_rigid_ground),
-        cmocka_unit_test(test_order_of_lanes), cmocka_unit_test(test_march),
-        cmocka_unit_test(test_sizes),          cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_bad_numbers),
+        cmocka_unit_test(test_random_states), cmocka_unit_test(test_rigid_ground),
+        cmocka_unit_test(test_maps),          cmocka_unit_test(test_order_of_lanes),
+        cmocka_unit_test(test_march),         cmocka_unit_test(test_sizes),
+        cmocka_unit_test(test_refusals),      cmocka_unit_test(test_bad_numbers),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
