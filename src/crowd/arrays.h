@@ -24,11 +24,18 @@ enum {
     TALLY_NUMBERS
 };
 
-/* The same for all environments. task.grounds points to `grounds` of the same block. */
+/* The same for all environments; the task comes first. task.grounds points to `grounds` of the same
+ * block. */
 typedef struct {
     TaskDef task;
     RobotTable robot;
     TaskGrounds grounds;
+    MapView map;          /* its arrays are the ground's */
+    double map_extent[2]; /* [m] */
+    int has_map;          /* bool */
+    int uneven;           /* bool: the map is */
+    int labels;           /* of the map; 1 without */
+    int striped;          /* bool: the labels are stripes of the share patch_share of episodes */
 } CrowdTask;
 
 /* Of one environment besides its TaskEnv. */
@@ -54,7 +61,8 @@ typedef struct {
     CrowdRobot *robot; /* [envs] */
     void *sim;         /* [envs] RobotSim of device_robot.h */
     void *reading;     /* [envs] TaskReading */
-    int32_t *material; /* [envs] of the ground's table */
+    int32_t *material; /* [envs][labels] of the ground's table */
+    Real *map_origin;  /* [envs][2] [m] */
     uint8_t *fresh;    /* [envs] bool: an episode began */
     uint8_t *rigid;    /* [envs] bool: of the episode */
     int32_t *order;    /* [envs] in which a GPU steps them: those on rigid ground first */

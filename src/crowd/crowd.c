@@ -24,14 +24,15 @@ struct Crowd {
 static MildStatus check_def(const CrowdDef *def, MildError *error) {
     const TaskDef *task = def->task;
     MildStatus status = task_def_check_robot(task, def->robot, error);
-    const char *missing = task->map                         ? "terrain: a map"
-                          : task->randomize.patch_share > 0 ? "randomize.patch_share above 0"
-                          : task->print_tiles               ? "terrain.memory"
-                          : !task->newton                   ? "task.newton = 0"
-                                                            : NULL;
+    const int patches = task->randomize.patch_share > 0 && !def->striped &&
+                        !(task->map && mild_map_label_count(task->map) > 1);
+    const char *missing = patches             ? "randomize.patch_share above 0"
+                          : task->print_tiles ? "terrain.memory"
+                          : !task->newton     ? "task.newton = 0"
+                                              : NULL;
     return status == MILD_OK && missing
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
-                           "%s is not there on a device yet; train.robots = cpu has it", missing)
+                           "%s is not there on a device yet; train.robots = mujoco has it", missing)
                : status;
 }
 
@@ -56,6 +57,9 @@ static MildStatus open_ground(Crowd *crowd, const CrowdDef *def, const TaskGroun
         crowd->ground ? mild_batch_set_materials(crowd->ground, materials, grounds->count, error)
                       : MILD_ERROR_ARGUMENT;
     free(materials);
+    if (status == MILD_OK && def->task->map) {
+        status = mild_batch_set_map(crowd->ground, def->task->map, error);
+    }
     return status;
 }
 
@@ -65,7 +69,11 @@ static void *take(Crowd *crowd, size_t bytes, MildError *error) {
     return batch_alloc(crowd->device, bytes, error);
 }
 
-static MildStatus take_arrays(Crowd *crowd, int feet, MildError *error) {
+static int labels_of(const TaskDef *task) {
+    return task->map ? mild_map_label_count(task->map) : 1;
+}
+
+static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *error) {
     CrowdArrays *all = &crowd->arrays;
     CrowdContact *contact = &all->contact;
     const size_t envs = (size_t)all->envs, rows = envs * (size_t)feet;
@@ -76,7 +84,8 @@ static MildStatus take_arrays(Crowd *crowd, int feet, MildError *error) {
                   {&all->robot, envs * sizeof *all->robot},
                   {&all->sim, envs * crowd_sim_bytes()},
                   {&all->reading, envs * crowd_reading_bytes()},
-                  {&all->material, envs * sizeof *all->material},
+                  {&all->material, envs * (size_t)labels * sizeof *all->material},
+                  {&all->map_origin, 2 * envs * sizeof *all->map_origin},
                   {&all->fresh, envs},
                   {&all->rigid, envs},
                   {&all->order, envs * sizeof *all->order},
@@ -132,7 +141,16 @@ static MildStatus copy_task(Crowd *crowd, const CrowdDef *def, const TaskGrounds
     if (!ground) {
         return MILD_ERROR_MEMORY;
     }
-    CrowdTask task = {.task = *def->task, .grounds = {grounds->count, ground}};
+    CrowdTask task = {.task = *def->task,
+                      .grounds = {grounds->count, ground},
+                      .map = crowd->ground->arrays.map,
+                      .has_map = def->task->map != NULL,
+                      .labels = labels_of(def->task),
+                      .striped = def->striped};
+    if (task.has_map) {
+        mild_map_extent(def->task->map, &task.map_extent[0], &task.map_extent[1]);
+        task.uneven = !mild_map_is_level(def->task->map);
+    }
     task.task.grounds = &at->grounds;
     robot_fill_table(def->robot, &task.robot);
     MildStatus status = batch_copy(crowd->device, ground, grounds->ground, bytes, error);
@@ -180,7 +198,8 @@ static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGround
     crowd->arrays.envs = def->envs;
     crowd->arrays.stride = task_env_head_bytes(def->task, &shape);
     MildStatus status = open_ground(crowd, def, grounds, error);
-    status = status == MILD_OK ? take_arrays(crowd, shape.feet, error) : status;
+    status =
+        status == MILD_OK ? take_arrays(crowd, shape.feet, labels_of(def->task), error) : status;
     status = status == MILD_OK ? copy_envs(crowd, def, error) : status;
     status = status == MILD_OK ? copy_task(crowd, def, grounds, error) : status;
     return status == MILD_OK ? copy_model(crowd, def, error) : status;
@@ -303,6 +322,7 @@ static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, Mil
                                   .inverse_inertia = c->inverse_inertia,
                                   .free_velocity = c->free_velocity,
                                   .material = all->material,
+                                  .map_origin = all->map_origin,
                                   .height = c->height};
     const MildBatchOutput output = {.wrench = c->wrench, .velocity = c->twist, .foot = c->foot};
     MildStatus status = MILD_OK;

@@ -23,10 +23,12 @@ typedef struct {
     uint32_t first;      /* number of the first one, which selects its random numbers */
     int grounds;         /* drawn beforehand; episodes choose among them */
     uint64_t seed;
+    int striped; /* bool: the labels of task->map are stripes, which only the share patch_share of
+                    the soft episodes has; the others are uniform */
 } CrowdDef;
 
-/* NULL, with one line in *error, for what the device does not have yet (maps, patches, imprints),
- * and when device or memory is missing. */
+/* NULL, with one line in *error, for what the device does not have yet (imprints, blended borders,
+ * patches other than stripes of a map), and when device or memory is missing. */
 Crowd *crowd_create(const CrowdDef *def, MildError *error);
 void crowd_destroy(Crowd *crowd); /* may be NULL */
 

@@ -17,6 +17,8 @@ typedef struct {
     double body_clearance;
     double knee_distance;
     double foot_distance;
+    double above; /* [m] height of the base above the ground under it */
+    int label;    /* of the map there */
 } RobotSim;
 
 #define DEVICE_ROBOT_LIST(name)                                                                    \

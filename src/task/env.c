@@ -74,8 +74,9 @@ static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, 
                           const TaskView *view) {
     mild_ground_reset(task_env_ground(env));
     lend_map(env, def);
-    double depth =
-        env->variation.rigid ? 0 : task_standing_depth(robot, place_material(&env->terrain, 0, 0));
+    const MildMaterial *material =
+        &env->terrain.materials[mild_terrain_material_at(&env->terrain, 0, 0)];
+    double depth = env->variation.rigid ? 0 : task_standing_depth(robot, material);
     task_begin_episode(env, def, robot, depth);
     if (env->terrain.map && !mild_map_is_level(env->terrain.map)) {
         start_on_map(env, robot, sim);

@@ -134,7 +134,7 @@ void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Rand
 }
 
 void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r) {
-    MildMaterial material = draw_material(r, def, robot, &env->ground);
+    MildMaterial material = draw_material(r, def, robot, &env->ground[0]);
     env->terrain = mild_terrain_uniform(&material);
     int striped = random_unit(r) < def->randomize.patch_share;
     if (striped && !(def->map && mild_map_label_count(def->map) > 1)) {

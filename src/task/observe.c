@@ -105,8 +105,7 @@ static inline MILD_BOTH void write_estimates(const TaskEnv *env, const RobotSim 
  * represents a whole sole are converted to those of one of its cells. */
 static inline MILD_BOTH float *write_ground(const TaskEnv *env, const Robot *robot,
                                             const RobotSim *sim, float *out) {
-    const double *qpos = robot_sim_qpos(sim);
-    const MildMaterial *m = place_material(&env->terrain, qpos[0], qpos[1]);
+    const MildMaterial *m = place_material(sim, &env->terrain);
     double cells = place_cells(robot, m->model);
     const double values[] = {m->k_pen / 500 / cells,
                              m->sigma_cone / 1e5,
@@ -156,8 +155,7 @@ static inline MILD_BOTH void write_critic(const TaskEnv *env, const TaskDef *def
         *out++ = (float)(env->variation.com_offset[i] * 100);
     }
     out = write_ground(env, robot, sim, out);
-    *out++ = (float)(robot_sim_qpos(sim)[2] -
-                     place_height(&env->terrain, robot_sim_qpos(sim)[0], robot_sim_qpos(sim)[1]));
+    *out++ = (float)place_above(sim, &env->terrain);
     *out++ = (float)env->strength[0];
     *out++ = (float)env->variation.armature_scale;
     double step = def->physics_dt / TASK_PERIOD;

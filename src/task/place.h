@@ -22,25 +22,25 @@
 #define PLACE_UNROLL
 #endif
 
-/* [m] Height of the undisturbed surface. */
-static inline MILD_BOTH double place_height(const MildTerrain *terrain, double x, double y) {
+/* [m] Height of the base above the undisturbed surface. */
+static inline MILD_BOTH double place_above(const RobotSim *sim, const MildTerrain *terrain) {
 #ifdef TASK_ON_DEVICE
-    (void)x;
-    (void)y;
-    return terrain->height;
+    (void)terrain;
+    return sim->above;
 #else
-    return mild_terrain_height_at(terrain, x, y);
+    const double *qpos = robot_sim_qpos(sim);
+    return qpos[2] - mild_terrain_height_at(terrain, qpos[0], qpos[1]);
 #endif
 }
 
-static inline MILD_BOTH const MildMaterial *place_material(const MildTerrain *terrain, double x,
-                                                           double y) {
+/* The material under the base. */
+static inline MILD_BOTH const MildMaterial *place_material(const RobotSim *sim,
+                                                           const MildTerrain *terrain) {
 #ifdef TASK_ON_DEVICE
-    (void)x;
-    (void)y;
-    return &terrain->materials[0];
+    return &terrain->materials[sim->label];
 #else
-    return &terrain->materials[mild_terrain_material_at(terrain, x, y)];
+    const double *qpos = robot_sim_qpos(sim);
+    return &terrain->materials[mild_terrain_material_at(terrain, qpos[0], qpos[1])];
 #endif
 }
 

@@ -55,7 +55,7 @@ typedef struct {
     int command_frozen;     /* bool: eval and play set the command themselves */
     /* what was drawn for this episode */
     RobotVariation variation;
-    int ground;          /* of TaskDef.grounds; unused without them */
+    int ground[MILD_MATERIALS_MAX]; /* of TaskDef.grounds, by label; unused without them */
     MildTerrain terrain; /* its map is that of TaskDef during a call and NULL between calls, so
                             that the block contains no pointer */
     double kp_scale[ROBOT_JOINTS_MAX];     /* [-] */

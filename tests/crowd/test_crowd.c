@@ -173,8 +173,10 @@ static void draw_actions(int t) {
  * as a robot has not been thrown: legs that swing freely against their limits double a difference
  * within a few steps, so that an environment is left alone once it differs, until its next
  * episode; most must never. */
-static void follow(int device) {
+static void follow(int device, const MildMapDef *on) {
     TaskDef def = some_def();
+    MildMap *map = on ? mild_map_create(on, NULL) : NULL;
+    def.map = map;
     int apart[ENVS] = {0}, steps = 0, together = 0, done = 0, timeouts = 0;
     pair_open(&def, device);
     pair_reset();
@@ -204,11 +206,28 @@ static void follow(int device) {
            steps, done, timeouts);
     assert_true(together > 0.85 * steps && done > 20 && timeouts > 5);
     pair_close();
+    mild_map_destroy(map);
 }
 
 static void follows_mujoco(void **unused) {
     (void)unused;
-    follow(MILD_BATCH_HOST);
+    follow(MILD_BATCH_HOST, NULL);
+}
+
+/* Waves, and three materials in squares. */
+static MildMapDef some_map(void) {
+    MildMapDef map = mild_map_def_default();
+    map.kind = MILD_MAP_WAVES;
+    map.patches = MILD_PATTERN_CHECKER;
+    map.patch_size = 0.4;
+    map.patch_count = 3;
+    return map;
+}
+
+static void follows_mujoco_on_a_map(void **unused) {
+    (void)unused;
+    const MildMapDef map = some_map();
+    follow(MILD_BATCH_HOST, &map);
 }
 
 static void device_follows_mujoco(void **unused) {
@@ -216,12 +235,15 @@ static void device_follows_mujoco(void **unused) {
     if (!has_device()) {
         skip();
     }
-    follow(0);
+    const MildMapDef map = some_map();
+    follow(0, NULL);
+    follow(0, &map);
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follows_mujoco),
+        cmocka_unit_test(follows_mujoco_on_a_map),
         cmocka_unit_test(device_follows_mujoco),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
