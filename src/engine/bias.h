@@ -5,111 +5,81 @@
 
 #include "engine/inertia.h"
 
-/* Motion of a link from that of its parent. The accelerations are those of the material points,
- * less gravity. */
-MILD_HD void engine_link_motion(const EngineModel *model, EngineWork *work, int i) {
-    EngineDynamics *now = &work->now.dynamics;
-    const int parent = model->tree.parent[i];
-    const Real *spin = now->spin[parent];
-    Real arm[3];
+/* Motion of a link without qacc. Accelerations are those of material points less gravity. */
+typedef struct {
+    Real spin[3];         /* [rad/s] */
+    Real spin_rate[3];    /* [rad/s^2] */
+    Real acceleration[3]; /* [m/s^2] of the anchor, upward 9.81 at rest */
+} EngineMotion;
+
+/* Takes the motion of a parent to link i. */
+MILD_HD void engine_descend(const EngineWork *work, int i, EngineMotion *motion) {
+    const Real *arm = work->now.dynamics.arm[i];
     Real turn[3]; /* [rad/s] of the hinge */
     Real sweep[3];
+    cross3(motion->spin, arm, sweep);
+    add_cross3(motion->spin_rate, arm, motion->acceleration);
+    add_cross3(motion->spin, sweep, motion->acceleration);
     for (int k = 0; k < 3; k++) {
-        arm[k] = work->position[i][k] - work->position[parent][k];
         turn[k] = work->rate[5 + i] * work->axis[i][k];
-        now->spin[i][k] = spin[k] + turn[k];
-        now->spin_rate[i][k] = now->spin_rate[parent][k];
-        now->acceleration[i][k] = now->acceleration[parent][k];
     }
-    add_cross3(spin, turn, now->spin_rate[i]);
-    cross3(spin, arm, sweep);
-    add_cross3(now->spin_rate[parent], arm, now->acceleration[i]);
-    add_cross3(spin, sweep, now->acceleration[i]);
+    add_cross3(motion->spin, turn, motion->spin_rate);
+    for (int k = 0; k < 3; k++) {
+        motion->spin[k] += turn[k];
+    }
 }
 
-/* Newton and Euler: the force and torque about the anchor that this motion takes. */
-MILD_HD void engine_link_force(EngineWork *work, int i) {
-    EngineDynamics *now = &work->now.dynamics;
-    const Real *inertia = now->inertia[i];
+/* Motion of link i, from the base down. */
+MILD_HD void engine_link_motion(const EngineModel *model, const EngineWork *work, int i,
+                                EngineMotion *motion) {
+    const EngineTree *tree = &model->tree;
+    for (int k = 0; k < 3; k++) {
+        motion->spin[k] = dot3(work->rotation[0] + 3 * k, work->rate + 3);
+        motion->spin_rate[k] = 0;
+        motion->acceleration[k] = -model->number.gravity[k];
+    }
+    LANE_ROLLED
+    for (int place = 6; place < engine_row_length(tree, i); place++) {
+        engine_descend(work, tree->row_dof[i][place] - 5, motion);
+    }
+}
+
+/* Newton and Euler: the force and torque about the anchor that a motion takes. */
+MILD_HD void engine_link_force(const Real *inertia, const EngineMotion *motion, Real *force,
+                               Real *torque) {
     const Real *moment = inertia + INERTIA_MOMENT;
-    const Real *spin = now->spin[i];
-    Real *force = now->force[i];
-    Real *torque = force + 3;
     Real sweep[3];
     Real momentum[3];
-    cross3(spin, moment, sweep);
+    cross3(motion->spin, moment, sweep);
     for (int k = 0; k < 3; k++) {
-        force[k] = inertia[INERTIA_MASS] * now->acceleration[i][k];
+        force[k] = inertia[INERTIA_MASS] * motion->acceleration[k];
     }
-    add_cross3(now->spin_rate[i], moment, force);
-    add_cross3(spin, sweep, force);
-    symmetric3(inertia + INERTIA_TENSOR, now->spin_rate[i], torque);
-    symmetric3(inertia + INERTIA_TENSOR, spin, momentum);
-    add_cross3(spin, momentum, torque);
-    add_cross3(moment, now->acceleration[i], torque);
+    add_cross3(motion->spin_rate, moment, force);
+    add_cross3(motion->spin, sweep, force);
+    symmetric3(inertia + INERTIA_TENSOR, motion->spin_rate, torque);
+    symmetric3(inertia + INERTIA_TENSOR, motion->spin, momentum);
+    add_cross3(motion->spin, momentum, torque);
+    add_cross3(moment, motion->acceleration, torque);
 }
 
-/* Adds to a link's force those of the links on it. */
-MILD_HD void engine_gather_force(const EngineTree *tree, EngineWork *work, int parent, int begin,
-                                 int end) {
-    EngineDynamics *now = &work->now.dynamics;
-    LANE_ROLLED
-    for (int c = begin; c < end; c++) {
-        const int child = tree->level_link[c];
-        if (tree->parent[child] != parent) {
-            continue;
-        }
-        Real arm[3];
-        for (int k = 0; k < 3; k++) {
-            arm[k] = work->position[child][k] - work->position[parent][k];
-            now->force[parent][k] += now->force[child][k];
-            now->force[parent][3 + k] += now->force[child][3 + k];
-        }
-        add_cross3(arm, now->force[child], now->force[parent] + 3);
-    }
-}
-
-LANE_FN void engine_link_forces(const EngineModel *model, EngineWork *work) {
-    const EngineTree *tree = &model->tree;
-    EngineDynamics *now = &work->now.dynamics;
-    EACH_LANE(l) {
-        for (int k = LANE(l); k < 3; k += LANES) {
-            now->spin[0][k] = dot3(work->rotation[0] + 3 * k, work->rate + 3);
-            now->spin_rate[0][k] = 0;
-            now->acceleration[0][k] = -model->number.gravity[k];
-        }
-    }
-    lanes_meet();
-    LANE_ROLLED
-    for (int level = 1; level < tree->levels; level++) {
-        EACH_LANE(l) {
-            LANE_ROLLED
-            for (int n = tree->level_begin[level] + LANE(l); n < tree->level_begin[level + 1];
-                 n += LANES) {
-                engine_link_motion(model, work, tree->level_link[n]);
-            }
-        }
-        lanes_meet();
-    }
+/* Inertia and force of each link by itself. A lane follows the motion down to its link, because
+ * that takes no more instructions than a level of the tree after the other. */
+LANE_FN void engine_link_forces(const EngineModel *model, const EngineVariation *variation,
+                                EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int i = LANE(l); i < engine_links(tree); i += LANES) {
-            engine_link_force(work, i);
+        for (int i = LANE(l); i < engine_links(&model->tree); i += LANES) {
+            EngineMotion motion;
+            Real number[LINK_NUMBERS];
+            engine_link_motion(model, work, i, &motion);
+            engine_link_inertia(model, variation, work, i, number);
+            engine_link_force(number, &motion, number + LINK_FORCE, number + LINK_TORQUE);
+            for (int k = 0; k < LINK_NUMBERS; k += 4) {
+                store4(number + k, work->now.dynamics.link[i] + k);
+            }
         }
     }
     lanes_meet();
-    LANE_ROLLED
-    for (int level = tree->levels - 1; level > 0; level--) {
-        EACH_LANE(l) {
-            LANE_ROLLED
-            for (int n = tree->level_begin[level - 1] + LANE(l); n < tree->level_begin[level];
-                 n += LANES) {
-                engine_gather_force(tree, work, tree->level_link[n], tree->level_begin[level],
-                                    tree->level_begin[level + 1]);
-            }
-        }
-        lanes_meet();
-    }
 }
 
 /* Force of a push on the base's centre of mass along degree of freedom d < 6. push: force and
@@ -129,31 +99,31 @@ MILD_HD Real engine_push_force(const EngineModel *model, const EngineVariation *
     return R[d - 3] * torque[0] + R[d] * torque[1] + R[d + 3] * torque[2];
 }
 
-/* work->force: joint torques [joints] in the order of robot.ini, less gyroscopic, Coriolis and
- * gravity forces and damping, and the push [6] or NULL. Before the inertias become composite. */
+/* work->force, acceleration: joint torques [joints] in the order of robot.ini, less gyroscopic, Coriolis and
+ * gravity forces and damping, and the push [6] or NULL. After engine_gather. */
 LANE_FN void engine_smooth_force(const EngineModel *model, const EngineVariation *variation,
                                  const Real *torque, const Real *push, EngineWork *work) {
     const EngineTree *tree = &model->tree;
-    const Real(*force)[6] = (const Real(*)[6])work->now.dynamics.force;
     const Real *R = work->rotation[0];
-    engine_link_forces(model, work);
     EACH_LANE(l) {
         LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            const int i = engine_dof_link(d);
+            const Real *total = work->now.dynamics.of.total[i];
+            const Real *bias = total + LINK_TORQUE;
             Real sum = 0;
             if (d < 3) {
-                sum = -force[0][d];
+                sum = -total[LINK_FORCE + d];
             } else if (d < 6) {
-                sum = -(R[d - 3] * force[0][3] + R[d] * force[0][4] + R[d + 3] * force[0][5]);
+                sum = -(R[d - 3] * bias[0] + R[d] * bias[1] + R[d + 3] * bias[2]);
             } else {
-                const int i = d - 5;
-                sum = torque[tree->joint[i]] - dot3(work->axis[i], force[i] + 3) -
+                sum = torque[tree->joint[i]] - dot3(work->axis[i], bias) -
                       model->number.link[i].damping * work->rate[d];
             }
             if (push && d < 6) {
                 sum += engine_push_force(model, variation, work, push, d);
             }
-            work->force[d] = sum;
+            work->force[d] = work->acceleration[d] = sum;
         }
     }
     lanes_meet();

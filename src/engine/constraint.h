@@ -86,6 +86,16 @@ MILD_HD void corner_center(const EngineModel *model, const EngineWork *work, int
     }
 }
 
+/* [m] Of a foot's reference point from the base's origin, world axes. */
+MILD_HD void foot_point(const EngineModel *model, const EngineWork *work, int foot, Real *point) {
+    const int link = model->tree.foot_link[foot];
+    turn3(work->rotation[link], model->number.foot[foot].reference, point);
+    for (int k = 0; k < 3; k++) {
+        point[k] += work->position[link][k];
+    }
+    point[2] -= model->number.foot[foot].radius;
+}
+
 /* Unit normal of the surface, and the tangents that MuJoCo's mju_makeFrame takes. */
 MILD_HD void surface_frame(const Real *slope, Real frame[3][3]) {
     const Real scale = REAL_INVERSE_SQRT(1 + slope[0] * slope[0] + slope[1] * slope[1]);
@@ -139,7 +149,7 @@ MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineS
         for (int place = 0; place < engine_row_length(tree, link); place++) {
             const Real *column = support->jacobian[f][place];
             speed += (dot3(edge, column) + dot3(edge + 3, column + 3)) *
-                     work->rate[engine_row_dof(tree, link, place)];
+                     work->rate[tree->row_dof[link][place]];
         }
         contact->reference[row] = -soft->damping * speed - soft->stiffness * d * distance;
         contact->weight[row] =
@@ -254,13 +264,11 @@ LANE_FN void engine_stiffen_rows(const EngineTree *tree, EngineSupport *support)
 /* Entry of J^T stiffness J of the feet that move with degree of freedom d. */
 MILD_HD Real stiffened_entry(const EngineTree *tree, const EngineSupport *support, int d,
                              int place) {
-    const int i = d < 6 ? 0 : d - 5;
-    const int own = d < 6 ? d : engine_row_length(tree, i) - 1;
     Real sum = 0;
     LANE_ROLLED
     for (int f = 0; f < engine_feet(tree); f++) {
-        if (tree->foot_link[f] >= i && tree->foot_link[f] < tree->end[i]) {
-            const Real *row = support->half[f][own];
+        if (foot_moves(tree, f, d)) {
+            const Real *row = support->half[f][tree->above[d]];
             const Real *column = support->jacobian[f][place];
             sum += dot3(row, column) + dot3(row + 3, column + 3);
         }
@@ -271,13 +279,11 @@ MILD_HD Real stiffened_entry(const EngineTree *tree, const EngineSupport *suppor
 /* Degree of freedom d of J^T times the sums of engine_push_of_edges: a round foot, too, takes the
  * moment of a contact at its surface. */
 MILD_HD Real pushes_along(const EngineTree *tree, const EngineWork *work, int d) {
-    const int i = d < 6 ? 0 : d - 5;
-    const int place = d < 6 ? d : engine_row_length(tree, i) - 1;
     Real sum = 0;
     LANE_ROLLED
     for (int f = 0; f < engine_feet(tree); f++) {
-        if (tree->foot_link[f] >= i && tree->foot_link[f] < tree->end[i]) {
-            const Real *column = work->now.support.jacobian[f][place];
+        if (foot_moves(tree, f, d)) {
+            const Real *column = work->now.support.jacobian[f][tree->above[d]];
             sum += dot3(column, work->wrench[f]) + dot3(column + 3, work->wrench[f] + 3);
         }
     }
@@ -293,8 +299,8 @@ MILD_HD int limit_pushes(const EngineWork *work, int i) {
     return work->limit_side[i] != 0 && limit_residual(work, i) < 0;
 }
 
-/* factor <- L of M + J^T weight J over the pushing rows; change <- what is left of the forces, of
- * the rows and of M a, which is the descent of the cost; residue <- the part of it without rows. */
+/* factor <- L of M + J^T weight J over the pushing rows; change <- the residue and what is left of
+ * the rows, which is the descent of the cost. */
 LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int edges) {
     EngineSupport *support = &work->now.support;
     if (edges) {
@@ -306,21 +312,18 @@ LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
         for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
             const int d = tree->entry_dof[e];
             const int place = tree->entry_place[e];
-            Real sum = work->mass[e];
+            Real sum = work->mass[d][place];
             if (edges) {
                 sum += stiffened_entry(tree, support, d, place);
             }
-            if (d >= 6 && place == engine_row_length(tree, d - 5) - 1 &&
-                limit_pushes(work, d - 5)) {
+            if (d >= 6 && place == tree->above[d] && limit_pushes(work, d - 5)) {
                 sum += work->limit_weight[d - 5];
             }
-            work->factor[e] = sum;
+            work->factor[d][place] = sum;
         }
         LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-            const Real residue =
-                work->force[d] - mass_times(tree, work->mass, work->acceleration, d);
-            Real sum = residue;
+            Real sum = support->residue[d];
             if (edges) {
                 sum += pushes_along(tree, work, d);
             }
@@ -328,12 +331,11 @@ LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
                 sum -= work->limit_side[d - 5] * work->limit_weight[d - 5] *
                        limit_residual(work, d - 5);
             }
-            support->residue[d] = residue;
             support->change[d] = sum;
         }
     }
     lanes_meet();
-    engine_factorise(tree, work->factor);
+    engine_factorise(tree, work->factor[0], work->factor[0], work->inverse);
 }
 
 /* ---- the line search ---- */
@@ -386,7 +388,8 @@ LANE_FN LinePoint engine_line_rows(const EngineTree *tree, EngineWork *work, int
     return point;
 }
 
-/* The smooth part at t = 0: slope (a - a0)^T M change, and curvature change^T M change. */
+/* The smooth part at t = 0: slope (a - a0)^T M change, and curvature change^T M change. product <-
+ * M change. */
 LANE_FN LinePoint engine_line_smooth(const EngineTree *tree, EngineWork *work) {
     EngineSupport *support = &work->now.support;
     Real slope[LANE_COPIES];
@@ -395,7 +398,8 @@ LANE_FN LinePoint engine_line_smooth(const EngineTree *tree, EngineWork *work) {
         slope[l] = curvature[l] = 0;
         LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-            const Real product = mass_times(tree, work->mass, support->change, d);
+            const Real product = mass_times(tree, work->mass[0], support->change, d);
+            support->product[d] = product;
             slope[l] -= support->residue[d] * support->change[d];
             curvature[l] += support->change[d] * product;
         }
@@ -427,8 +431,9 @@ LANE_FN Real engine_line_search(const EngineTree *tree, EngineWork *work, int ed
     return t;
 }
 
-/* acceleration <- acceleration + t change. Returns whether it moved by more than rounding. */
-LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t) {
+/* acceleration <- acceleration + t change; the residue follows when the product is there. Returns
+ * whether it moved by more than rounding. */
+LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t, int product) {
     Real moved[LANE_COPIES];
     Real size[LANE_COPIES];
     EACH_LANE(l) {
@@ -437,6 +442,9 @@ LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t) {
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             const Real change = t * work->now.support.change[d];
             work->acceleration[d] += change;
+            if (product) {
+                work->now.support.residue[d] -= t * work->now.support.product[d];
+            }
             moved[l] = real_max(moved[l], REAL_ABS(change));
             size[l] = real_max(size[l], REAL_ABS(work->acceleration[d]));
         }
@@ -447,30 +455,35 @@ LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t) {
 }
 
 /* From the acceleration without the rows to that with them; `edges`: engine_collide was called.
- * Needs mass, force, limits and J; overwrites factor, half and, with edges, the wrench. Returns
+ * Needs mass, limits and J; overwrites factor, half and, with edges, the wrench. Returns
  * Newton steps. */
 LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges) {
     EngineSupport *support = &work->now.support;
     EngineContact *contact = &support->ground.contact;
     int step = 0;
     int going = 1;
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            support->residue[d] = 0;
+        }
+    }
+    lanes_meet();
     while (going && step < CONSTRAINT_STEPS) {
         step++;
         if (edges) {
             engine_residuals(tree, work);
         }
         engine_newton_system(tree, work, edges);
-        engine_solve_transposed(tree, work->factor, support->change);
-        engine_solve(tree, work->factor, support->change);
+        engine_solve_transposed(tree, work->factor[0], work->inverse, support->change);
+        engine_solve(tree, work->factor[0], work->inverse, support->change);
         if (edges) {
             engine_twists(tree, support, support->change, contact->twist_change);
         }
-        if (engine_line_rows(tree, work, edges, 1).changed > 0) {
-            going = engine_move(tree, work, engine_line_search(tree, work, edges));
-        } else {
-            engine_move(tree, work, 1);
-            going = 0;
-        }
+        const int others = engine_line_rows(tree, work, edges, 1).changed > 0; /* push then */
+        const Real length = others ? engine_line_search(tree, work, edges) : 1;
+        const int moved = engine_move(tree, work, length, others);
+        going = others && moved;
     }
     if (edges) {
         engine_residuals(tree, work);

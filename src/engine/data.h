@@ -1,4 +1,4 @@
-/* Working data of one robot: in shared memory on a GPU. For SA01 in float 5.4 kB (a test prints
+/* Working data of one robot: in shared memory on a GPU. For SA01 in float 6.3 kB (a test prints
  * it). Poses are in world axes; positions of links and corners count from the base's origin, so
  * that float loses nothing far from the world's. */
 #ifndef MILD_ENGINE_DATA_H
@@ -8,17 +8,20 @@
 
 #define ENGINE_EDGES (4 * ENGINE_CORNERS) /* of all corners' pyramids */
 
+/* Inertia of a link about its anchor in world axes, then the force and the torque about the anchor
+ * that its motion takes [N, N m]. */
+enum { LINK_FORCE = INERTIA_NUMBERS, LINK_TORQUE = LINK_FORCE + 3, LINK_NUMBERS = LINK_TORQUE + 3 };
+
 /* Needed until M and the bias are there. */
 typedef struct {
-    Real local[ENGINE_LINKS][9];                 /* [-] rotation link -> parent */
-    Real wave[ENGINE_LINKS][2];                  /* [-] cosine and sine of the hinge's angle */
-    Real inertia[ENGINE_LINKS][INERTIA_NUMBERS]; /* about the anchor; then of all behind it, too */
-    Real spin[ENGINE_LINKS][3];                  /* [rad/s] */
-    Real spin_rate[ENGINE_LINKS][3];             /* [rad/s^2] without qacc */
-    Real acceleration[ENGINE_LINKS][3];          /* [m/s^2] of the anchor, without qacc, upward
-                                                     9.81 at rest */
-    Real force[ENGINE_LINKS][6];                 /* [N, N m] on the link, torque about the anchor */
-    Real unit[ENGINE_DOFS][6]; /* force and torque that accelerate a degree of freedom by 1 */
+    union {
+        Real local[ENGINE_LINKS][12]; /* [-, m] link -> parent, rows as in EngineLink.turn */
+        /* Sums over a link and all that hangs on it; then, about the base's anchor, over each link
+         * that hangs on the base and all that hangs on that. */
+        Real total[2 * ENGINE_LINKS - 1][LINK_NUMBERS];
+    } of;
+    Real link[ENGINE_LINKS][LINK_NUMBERS];
+    Real arm[ENGINE_LINKS][3]; /* [m] from the parent's anchor, world */
 } EngineDynamics;
 
 /* The pyramids of the corners on rigid ground: four edges each. */
@@ -38,13 +41,15 @@ typedef struct {
     Real half[ENGINE_FEET][ENGINE_CHAIN][6];     /* L^-T J^T with M = L^T L */
     Real free_velocity[ENGINE_FEET]
                       [6]; /* [m/s, rad/s] V_free: twists after a step without ground */
-    union {
+    /* From here on it is not needed between engine_begin and engine_end. */
+    alignas(16) union {
         Real inverse_inertia[6 * ENGINE_FEET * 6 * ENGINE_FEET]; /* A = J M^-1 J^T, row major with
                                                                     stride 6 feet: soft ground */
         EngineContact contact;                                   /* rigid ground */
     } ground;
     Real change[ENGINE_DOFS];  /* of the acceleration in a Newton step */
-    Real residue[ENGINE_DOFS]; /* force less M qacc there */
+    Real product[ENGINE_DOFS]; /* M times that */
+    Real residue[ENGINE_DOFS]; /* M times what qacc is away from that without rows */
 } EngineSupport;
 
 typedef struct {
@@ -64,16 +69,18 @@ typedef struct {
     Real next_velocity[ENGINE_FEET][6]; /* [m/s, rad/s] twist after the step, by the ground */
     Real wrench[ENGINE_FEET][6]; /* [N, N m] of the ground on the foot, at the reference point */
     /* ---- dynamics ---- */
-    Real mass[ENGINE_ENTRIES];      /* M, packed; see tree.h */
-    Real factor[ENGINE_ENTRIES];    /* L with M = L^T L, each diagonal entry inverted */
-    Real force[ENGINE_DOFS];        /* torques and pushes less the bias */
-    Real acceleration[ENGINE_DOFS]; /* qacc [m/s^2, rad/s^2] */
-    int newton;                     /* steps of the constraints' solver in the last step */
+    Real mass[ENGINE_DOFS][ENGINE_STRIDE];   /* M by rows, see tree.h; of the base all 6 x 6 */
+    Real factor[ENGINE_DOFS][ENGINE_STRIDE]; /* L with M = L^T L, but for its diagonal */
+    Real inverse[ENGINE_DOFS];               /* 1 / diagonal of L */
+    Real force[ENGINE_DOFS];                 /* torques and pushes less the bias */
+    Real acceleration[ENGINE_DOFS];          /* qacc [m/s^2, rad/s^2]; L^-T force until
+                                                engine_accelerate */
+    int newton;                              /* steps of the constraints' solver in the last step */
     /* ---- joint limits; by link, [0] unused ---- */
     Real limit_side[ENGINE_LINKS];      /* [-] 1 at the lower limit, -1 at the upper, 0 inside */
     Real limit_reference[ENGINE_LINKS]; /* [rad/s^2] reference acceleration, away from the limit */
     Real limit_weight[ENGINE_LINKS];    /* [kg m^2] 1/R */
-    union {
+    alignas(16) union {
         EngineDynamics dynamics;
         EngineSupport support;
     } now;

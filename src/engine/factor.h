@@ -1,6 +1,6 @@
 /* M = L^T L, and what is solved with it. L is lower triangular and as sparse as M, because rows are
  * eliminated from the leaves to the root (Featherstone 2008, section 8.5: his L^T L factorisation;
- * with L^T D L the sums have one product more). Diagonal entries of L are stored inverted. */
+ * with L^T D L the sums have one product more). Diagonal entries are kept inverted, apart. */
 #ifndef MILD_ENGINE_FACTOR_H
 #define MILD_ENGINE_FACTOR_H
 
@@ -10,74 +10,141 @@
 #define DOF_SLOTS ((ENGINE_DOFS + LANES - 1) / LANES)
 #define DOF_SLOT(d) (DOF_SLOTS == 1 ? 0 : (d) / LANES)
 
-/* Row and column of the entry e of a packed lower triangle. */
-MILD_HD void triangle_place(int e, int *row, int *column) {
-    int r = (int)((REAL_SQRT(8 * REAL(e) + 1) - 1) / 2);
-    r -= r * (r + 1) / 2 > e;
-    r += (r + 1) * (r + 2) / 2 <= e;
-    *row = r;
-    *column = e - r * (r + 1) / 2;
-}
+/* A bit for each degree of freedom: a GPU takes two instructions for a long one. */
+#if ENGINE_DOFS <= 32
+typedef unsigned EngineBits;
+#else
+typedef EnginePath EngineBits;
+#endif
 
-/* factor: a symmetric matrix with the sparsity of M, replaced by L. Degree of freedom k takes its
- * row's part from the rows of its ancestors, last one first:
+/* The rows of the hinges of a level, after those behind them; k are the degrees of freedom behind
+ * d, i its ancestors:
  *
- *     L_kk = sqrt(M_kk),   L_ki = M_ki/L_kk,   M_ij -= L_ki L_kj   for the ancestors i, j of k */
-LANE_CALL void engine_factorise(const EngineTree *tree, Real *factor) {
-    LANE_ROLLED
-    for (int k = engine_dofs(tree) - 1; k >= 0; k--) {
-        const int link = k < 6 ? 0 : k - 5;
-        const int above = k < 6 ? k : engine_row_length(tree, link) - 1;
-        Real *row = factor + tree->row[k];
-        const Real inverse = REAL_INVERSE_SQRT(row[above]);
-        lanes_meet();
-        EACH_LANE(l) {
+ *     L_dd^2 = M_dd - sum_k L_kd^2,   L_di = (M_di - sum_k L_kd L_ki)/L_dd
+ *
+ * A lane has an entry, and finds L_dd for itself. */
+LANE_FN void engine_factorise_level(const EngineTree *tree, int level, const Real *matrix,
+                                    Real *factor, Real *inverse) {
+    const int own = 5 + level; /* place of L_dd */
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int e = tree->level_entry[level] + LANE(l); e < tree->level_entry[level + 1];
+             e += LANES) {
+            const int d = tree->entry_dof[e];
+            const int place = tree->entry_place[e];
+            const int at = d * ENGINE_STRIDE + place;
+            const Real *row = factor + d * ENGINE_STRIDE;
+            Real diagonal = matrix[at - place + own];
+            Real sum = matrix[at];
             LANE_ROLLED
-            for (int place = LANE(l); place <= above; place += LANES) {
-                row[place] = place < above ? row[place] * inverse : inverse;
+            for (int k = tree->behind[d] - d - 1; k > 0; k--) {
+                row += ENGINE_STRIDE;
+                diagonal -= row[own] * row[own];
+                sum -= row[own] * row[place];
+            }
+            const Real scale = REAL_INVERSE_SQRT(diagonal);
+            if (place == own) {
+                inverse[d] = scale;
+            } else {
+                factor[at] = sum * scale;
             }
         }
-        lanes_meet();
-        EACH_LANE(l) {
+    }
+    lanes_meet();
+}
+
+/* The base's rows, after all hinges. A lane has an entry M_ij; the row k takes its part from those
+ * above it: M_ij -= L_ki L_kj. */
+LANE_FN void engine_factorise_base(const EngineTree *tree, const Real *matrix, Real *factor,
+                                   Real *inverse) {
+    Real x[LANE_COPIES];
+    EACH_LANE(l) {
+        x[l] = 0;
+        if (LANE(l) < ENGINE_BASE_ENTRIES) {
+            const int i = tree->entry_dof[LANE(l)];
+            const int j = tree->entry_place[LANE(l)];
+            const Real *row = factor + 5 * ENGINE_STRIDE;
+            x[l] = matrix[i * ENGINE_STRIDE + j];
             LANE_ROLLED
-            for (int e = LANE(l); e < above * (above + 1) / 2; e += LANES) {
-                int i, j;
-                triangle_place(e, &i, &j);
-                factor[tree->row[engine_row_dof(tree, link, i)] + j] -= row[i] * row[j];
+            for (int k = 6; k < engine_dofs(tree); k++) {
+                row += ENGINE_STRIDE;
+                x[l] -= row[i] * row[j];
+            }
+            factor[i * ENGINE_STRIDE + j] = x[l];
+        }
+    }
+    lanes_meet();
+    LANE_ROLLED
+    for (int k = 5; k >= 0; k--) {
+        const Real *row = factor + k * ENGINE_STRIDE; /* L_kk L_k */
+        const Real scale = REAL_INVERSE_SQRT(row[k]);
+        EACH_LANE(l) {
+            if (LANE(l) < ENGINE_BASE_ENTRIES) {
+                const int i = tree->entry_dof[LANE(l)];
+                const int j = tree->entry_place[LANE(l)];
+                if (i < k) {
+                    x[l] -= row[i] * scale * (row[j] * scale);
+                    factor[i * ENGINE_STRIDE + j] = x[l];
+                } else if (i == k) {
+                    x[l] = j == k ? scale : x[l] * scale;
+                }
             }
         }
         lanes_meet();
     }
+    EACH_LANE(l) {
+        if (LANE(l) < ENGINE_BASE_ENTRIES) {
+            const int i = tree->entry_dof[LANE(l)];
+            const int j = tree->entry_place[LANE(l)];
+            if (i == j) {
+                inverse[i] = x[l];
+            } else {
+                factor[i * ENGINE_STRIDE + j] = x[l];
+            }
+        }
+    }
+    lanes_meet();
+}
+
+/* factor and inverse <- L of a matrix with the sparsity of M, which may be `factor` itself. */
+LANE_CALL void engine_factorise(const EngineTree *tree, const Real *matrix, Real *factor,
+                                Real *inverse) {
+    LANE_ROLLED
+    for (int level = tree->levels - 1; level > 0; level--) {
+        engine_factorise_level(tree, level, matrix, factor, inverse);
+    }
+    engine_factorise_base(tree, matrix, factor, inverse);
 }
 
 /* x <- L^-T x, leaves first. A lane has x of its degrees of freedom in registers. */
-LANE_CALL void engine_solve_transposed(const EngineTree *tree, const Real *factor, Real *x) {
-    Real own[DOF_SLOTS][LANE_COPIES], inverse[DOF_SLOTS][LANE_COPIES];
+LANE_CALL void engine_solve_transposed(const EngineTree *tree, const Real *factor,
+                                       const Real *inverse, Real *x) {
+    Real own[DOF_SLOTS][LANE_COPIES], scale[DOF_SLOTS][LANE_COPIES];
+    int above[DOF_SLOTS][LANE_COPIES], behind[DOF_SLOTS][LANE_COPIES];
     EACH_LANE(l) {
         LANE_UNROLL
         for (int s = 0; s < DOF_SLOTS; s++) {
             const int d = LANE(l) + s * LANES;
             const int in = d < engine_dofs(tree);
             own[s][l] = in ? x[d] : 0;
-            inverse[s][l] = in ? factor[tree->row[d] + engine_dofs_above(tree, d)] : 0;
+            scale[s][l] = in ? inverse[d] : 0;
+            above[s][l] = in ? tree->above[d] : 0;
+            behind[s][l] = in ? tree->behind[d] : 0;
         }
     }
     LANE_ROLLED
-    for (int k = engine_dofs(tree) - 1; k >= 0; k--) {
+    for (int k = engine_dofs(tree) - 1; k > 0; k--) {
         Real scaled[LANE_COPIES];
-        const Real *row = factor + tree->row[k];
-        const EnginePath path = tree->path[k];
+        const Real *row = factor + k * ENGINE_STRIDE;
         EACH_LANE(l) {
-            scaled[l] = own[DOF_SLOT(k)][l] * inverse[DOF_SLOT(k)][l];
+            scaled[l] = own[DOF_SLOT(k)][l] * scale[DOF_SLOT(k)][l];
         }
         const Real solved = lane_read(scaled, k % LANES);
         EACH_LANE(l) {
             LANE_UNROLL
             for (int s = 0; s < DOF_SLOTS; s++) {
-                const int d = LANE(l) + s * LANES;
-                if (path >> d & 1) {
-                    own[s][l] =
-                        d == k ? solved : own[s][l] - row[engine_dofs_above(tree, d)] * solved;
+                if (k > LANE(l) + s * LANES && k < behind[s][l]) {
+                    own[s][l] -= row[above[s][l]] * solved;
                 }
             }
         }
@@ -86,39 +153,42 @@ LANE_CALL void engine_solve_transposed(const EngineTree *tree, const Real *facto
         LANE_UNROLL
         for (int s = 0; s < DOF_SLOTS; s++) {
             if (LANE(l) + s * LANES < engine_dofs(tree)) {
-                x[LANE(l) + s * LANES] = own[s][l];
+                x[LANE(l) + s * LANES] = own[s][l] * scale[s][l];
             }
         }
     }
     lanes_meet();
 }
 
-/* x <- L^-1 x, root first. */
-LANE_CALL void engine_solve(const EngineTree *tree, const Real *factor, Real *x) {
-    Real own[DOF_SLOTS][LANE_COPIES], inverse[DOF_SLOTS][LANE_COPIES];
+/* x <- L^-1 x, root first: what a lane takes is the next entry of its row. */
+LANE_CALL void engine_solve(const EngineTree *tree, const Real *factor, const Real *inverse,
+                            Real *x) {
+    Real own[DOF_SLOTS][LANE_COPIES], scale[DOF_SLOTS][LANE_COPIES];
+    EngineBits ancestors[DOF_SLOTS][LANE_COPIES];
+    const Real *next[DOF_SLOTS][LANE_COPIES];
     EACH_LANE(l) {
         LANE_UNROLL
         for (int s = 0; s < DOF_SLOTS; s++) {
             const int d = LANE(l) + s * LANES;
             const int in = d < engine_dofs(tree);
             own[s][l] = in ? x[d] : 0;
-            inverse[s][l] = in ? factor[tree->row[d] + engine_dofs_above(tree, d)] : 0;
+            scale[s][l] = in ? inverse[d] : 0;
+            ancestors[s][l] = in ? (EngineBits)tree->path[d] & ~((EngineBits)1 << d) : 0;
+            next[s][l] = factor + d * ENGINE_STRIDE;
         }
     }
     LANE_ROLLED
-    for (int k = 0; k < engine_dofs(tree); k++) {
+    for (int k = 0; k < engine_dofs(tree) - 1; k++) {
         Real scaled[LANE_COPIES];
-        const int above = engine_dofs_above(tree, k);
         EACH_LANE(l) {
-            scaled[l] = own[DOF_SLOT(k)][l] * inverse[DOF_SLOT(k)][l];
+            scaled[l] = own[DOF_SLOT(k)][l] * scale[DOF_SLOT(k)][l];
         }
         const Real solved = lane_read(scaled, k % LANES);
         EACH_LANE(l) {
             LANE_UNROLL
             for (int s = 0; s < DOF_SLOTS; s++) {
-                const int d = LANE(l) + s * LANES;
-                if (d < engine_dofs(tree) && (tree->path[d] >> k & 1)) {
-                    own[s][l] = d == k ? solved : own[s][l] - factor[tree->row[d] + above] * solved;
+                if (ancestors[s][l] >> k & 1) {
+                    own[s][l] -= *next[s][l]++ * solved;
                 }
             }
         }
@@ -127,35 +197,27 @@ LANE_CALL void engine_solve(const EngineTree *tree, const Real *factor, Real *x)
         LANE_UNROLL
         for (int s = 0; s < DOF_SLOTS; s++) {
             if (LANE(l) + s * LANES < engine_dofs(tree)) {
-                x[LANE(l) + s * LANES] = own[s][l];
+                x[LANE(l) + s * LANES] = own[s][l] * scale[s][l];
             }
         }
     }
     lanes_meet();
-}
-
-/* x of degree of freedom d, at `place` in the rows behind its link i, less what those take. */
-MILD_HD Real gathered(const EngineTree *tree, const Real *factor, const Real *x, int i, int place) {
-    Real sum = 0;
-    LANE_ROLLED
-    for (int k = i + 1; k < tree->end[i]; k++) {
-        sum += factor[tree->row[5 + k] + place] * x[5 + k];
-    }
-    return sum;
 }
 
 /* Row d of M x. */
 MILD_HD Real mass_times(const EngineTree *tree, const Real *mass, const Real *x, int d) {
-    const int i = d < 6 ? 0 : d - 5;
-    const int last = d < 6 ? d : engine_row_length(tree, i) - 1;
-    const Real *row = mass + tree->row[d];
-    Real sum = gathered(tree, mass, x, i, last);
+    const EngineIndex *dof = tree->row_dof[engine_dof_link(d)];
+    const int above = tree->above[d];
+    const int last = d < 6 ? 5 : above; /* the base's rows are whole */
+    const Real *row = mass + d * ENGINE_STRIDE;
+    Real sum = 0;
     LANE_ROLLED
     for (int place = 0; place <= last; place++) {
-        sum += row[place] * x[d < 6 ? place : engine_row_dof(tree, i, place)];
+        sum += row[place] * x[dof[place]];
     }
-    for (int k = d + 1; k < 6; k++) {
-        sum += mass[k * (k + 1) / 2 + d] * x[k];
+    LANE_ROLLED
+    for (int k = d < 6 ? 6 : d + 1; k < tree->behind[d]; k++) {
+        sum += mass[k * ENGINE_STRIDE + above] * x[k];
     }
     return sum;
 }

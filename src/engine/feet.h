@@ -12,32 +12,41 @@ MILD_HD int foot_parts(const EngineTree *tree, int foot) {
     return tree->foot_round[foot] ? 3 : 6;
 }
 
-/* [m] Of a foot's reference point from the base's origin, world axes. */
-MILD_HD void foot_point(const EngineModel *model, const EngineWork *work, int foot, Real *point) {
-    const int link = model->tree.foot_link[foot];
-    turn3(work->rotation[link], model->number.foot[foot].reference, point);
-    for (int k = 0; k < 3; k++) {
-        point[k] += work->position[link][k];
+/* Number e of the pose of a foot: nine of its rotation, three of its position, which counts from
+ * the base here. */
+MILD_HD void foot_pose_number(const EngineModel *model, EngineWork *work, int f, int e) {
+    const int link = model->tree.foot_link[f];
+    const EngineFoot *foot = &model->number.foot[f];
+    const int k = e < 9 ? e / 3 : e - 9;
+    const Real *row = work->rotation[link] + 3 * k;
+    const Real *column = e < 9 ? foot->turn + e % 3 : foot->reference;
+    const int step = e < 9 ? 3 : 1;
+    const Real sum = row[0] * column[0] + row[1] * column[step] + row[2] * column[2 * step];
+    if (e < 9) {
+        work->foot_rotation[f][e] = model->tree.foot_round[f] ? (e % 4 == 0) : sum;
+    } else {
+        const Real lower = k == 2 ? foot->radius : 0;
+        work->foot_position[f][k] = work->position[link][k] + sum - lower;
     }
-    point[2] -= model->number.foot[foot].radius;
 }
 
 /* Twist of a foot per unit of the degree of freedom at a place of its row. */
-MILD_HD void foot_column(const EngineModel *model, const EngineWork *work, int foot, int place,
-                         Real *column) {
-    const EngineTree *tree = &model->tree;
-    const int j = place < 6 ? 0 : tree->ancestor[tree->foot_link[foot]][place - 5];
+MILD_HD void foot_column(const EngineTree *tree, EngineWork *work, int f, int place) {
+    Real *column = work->now.support.jacobian[f][place];
+    const int j = engine_dof_link(tree->row_dof[tree->foot_link[f]][place]);
+    const int turns = place < 3 ? place : place - 3; /* column of the base's rotation */
+    const Real *from = place < 6 ? work->rotation[0] + turns : work->axis[j];
+    const int step = place < 6 ? 3 : 1;
     Real axis[3];
     Real arm[3];
-    foot_point(model, work, foot, arm);
+    Real move[3];
     for (int k = 0; k < 3; k++) {
-        axis[k] = place < 6 ? work->rotation[0][3 * k + (place < 3 ? place : place - 3)]
-                            : work->axis[j][k];
-        arm[k] -= work->position[j][k];
+        axis[k] = from[step * k];
+        arm[k] = work->foot_position[f][k] - work->position[j][k];
     }
-    cross3(axis, arm, column);
+    cross3(axis, arm, move);
     for (int k = 0; k < 3; k++) {
-        column[k] = place < 3 ? (place == k) : column[k];
+        column[k] = place < 3 ? (place == k) : move[k];
         column[3 + k] = place < 3 ? 0 : axis[k];
     }
 }
@@ -46,11 +55,13 @@ MILD_HD void foot_column(const EngineModel *model, const EngineWork *work, int f
 MILD_HD Real foot_twist(const EngineTree *tree, const EngineSupport *support, const Real *x,
                         int foot, int c) {
     const int link = tree->foot_link[foot];
-    const int length = engine_row_length(tree, link);
+    const EngineIndex *dof = tree->row_dof[link];
+    const Real *number = support->jacobian[foot][0] + c;
     Real sum = 0;
     LANE_ROLLED
-    for (int place = 0; place < length; place++) {
-        sum += support->jacobian[foot][place][c] * x[engine_row_dof(tree, link, place)];
+    for (int left = engine_row_length(tree, link); left > 0; left--) {
+        sum += *number * x[*dof++];
+        number += 6;
     }
     return sum;
 }
@@ -58,15 +69,20 @@ MILD_HD Real foot_twist(const EngineTree *tree, const EngineSupport *support, co
 /* Poses and twists of the feet, and J. */
 LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
     const EngineTree *tree = &model->tree;
-    EngineSupport *support = &work->now.support;
     const int feet = engine_feet(tree);
+    const int chain = engine_chain(tree);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int f = 0; f < feet; f++) {
-            const int length = engine_row_length(tree, tree->foot_link[f]);
-            LANE_ROLLED
-            for (int place = LANE(l); place < length; place += LANES) {
-                foot_column(model, work, f, place, support->jacobian[f][place]);
+        for (int n = LANE(l); n < 12 * feet; n += LANES) {
+            foot_pose_number(model, work, n / 12, n % 12);
+        }
+    }
+    lanes_meet();
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int n = LANE(l); n < chain * feet; n += LANES) {
+            if (n % chain < engine_row_length(tree, tree->foot_link[n / chain])) {
+                foot_column(tree, work, n / chain, n % chain);
             }
         }
     }
@@ -76,21 +92,11 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
         for (int n = LANE(l); n < 6 * feet; n += LANES) {
             const int f = n / 6;
             const int c = n % 6;
-            work->foot_velocity[f][c] =
-                c < foot_parts(tree, f) ? foot_twist(tree, support, work->rate, f, c) : 0;
-        }
-        LANE_ROLLED
-        for (int f = LANE(l); f < feet; f += LANES) {
-            const Real *R = work->rotation[tree->foot_link[f]];
-            const Real *turn = model->number.foot[f].turn;
-            foot_point(model, work, f, work->foot_position[f]);
-            for (int k = 0; k < 3; k++) {
-                work->foot_position[f][k] += work->base[k];
-            }
-            for (int e = 0; e < 9; e++) {
-                const Real column[3] = {turn[e % 3], turn[3 + e % 3], turn[6 + e % 3]};
-                work->foot_rotation[f][e] =
-                    tree->foot_round[f] ? (e % 4 == 0) : dot3(R + 3 * (e / 3), column);
+            work->foot_velocity[f][c] = c < foot_parts(tree, f)
+                                            ? foot_twist(tree, &work->now.support, work->rate, f, c)
+                                            : 0;
+            if (c < 3) {
+                work->foot_position[f][c] += work->base[c];
             }
         }
     }
@@ -104,9 +110,11 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
 #define CHAIN_LOOP LANE_ROLLED
 #endif
 
-/* L^-T J^T: a lane has a column of a foot, whose chain is a path, so it needs no other lane. As in
+/* half <- L^-T J^T, and V_free = J (qvel + dt L^-1 y) = J qvel + dt half^T y, where y = L^-T force.
+ * A lane has a column of a foot, whose chain is a path, so it needs no other lane. As in
  * engine_solve_transposed, a solved entry is taken from those above it. */
-LANE_FN void engine_half_solve(const EngineTree *tree, EngineWork *work) {
+LANE_FN void engine_half_solve(const EngineModel *model, EngineWork *work) {
+    const EngineTree *tree = &model->tree;
     EngineSupport *support = &work->now.support;
     EACH_LANE(l) {
         LANE_ROLLED
@@ -116,6 +124,7 @@ LANE_FN void engine_half_solve(const EngineTree *tree, EngineWork *work) {
             const int link = tree->foot_link[f];
             const int length = engine_row_length(tree, link);
             const int part = c < foot_parts(tree, f);
+            Real gain = 0;
             Real x[ENGINE_CHAIN];
             CHAIN_LOOP
             for (int place = 0; place < ENGINE_CHAIN; place++) {
@@ -124,101 +133,82 @@ LANE_FN void engine_half_solve(const EngineTree *tree, EngineWork *work) {
             CHAIN_LOOP
             for (int k = ENGINE_CHAIN - 1; k >= 0; k--) {
                 if (k < length) {
-                    const Real *row = work->factor + tree->row[engine_row_dof(tree, link, k)];
-                    x[k] *= row[k];
+                    const int d = tree->row_dof[link][k];
+                    x[k] *= work->inverse[d];
                     support->half[f][k][c] = x[k];
+                    gain += x[k] * work->acceleration[d];
                     CHAIN_LOOP
                     for (int place = 0; place < k; place++) {
-                        x[place] -= row[place] * x[k];
+                        x[place] -= work->factor[d][place] * x[k];
                     }
                 }
             }
+            support->free_velocity[f][c] = work->foot_velocity[f][c] + model->number.dt * gain;
         }
     }
     lanes_meet();
 }
 
-/* A = J M^-1 J^T, of two feet over the degrees of freedom that move both. */
+/* A = J M^-1 J^T, of two feet over the degrees of freedom that move both. A lane has a tile of two
+ * rows and three columns. */
 LANE_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
     EngineSupport *support = &work->now.support;
-    const int rows = 6 * engine_feet(tree);
-    engine_half_solve(tree, work);
+    const int feet = engine_feet(tree);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int n = LANE(l); n < rows * rows; n += LANES) {
-            const int f = n / rows / 6;
-            const int g = n % rows / 6;
-            const int r = n / rows % 6;
-            const int c = n % rows % 6;
-            Real sum = 0;
+        for (int n = LANE(l); n < 3 * feet * 2 * feet; n += LANES) {
+            const int row = n / (2 * feet);
+            const int column = n % (2 * feet);
+            const int f = row / 3;
+            const int g = column / 2;
+            const Real *left = support->half[f][0] + 2 * (row % 3);
+            const Real *right = support->half[g][0] + 3 * (column % 2);
+            Real *to = support->ground.inverse_inertia + 12 * feet * row + 3 * column;
+            Real sum[2][3] = {{0, 0, 0}, {0, 0, 0}};
             LANE_ROLLED
-            for (int place = 0; place < tree->shared[f][g]; place++) {
-                sum += support->half[f][place][r] * support->half[g][place][c];
+            for (int place = tree->shared[f][g]; place > 0; place--) {
+                for (int k = 0; k < 3; k++) {
+                    sum[0][k] += left[0] * right[k];
+                    sum[1][k] += left[1] * right[k];
+                }
+                left += 6;
+                right += 6;
             }
-            support->ground.inverse_inertia[n] = sum;
-        }
-    }
-    lanes_meet();
-}
-
-/* V_free = J (qvel + dt qacc). */
-LANE_FN void engine_free_velocity(const EngineModel *model, EngineWork *work) {
-    EngineSupport *support = &work->now.support;
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
-            const int f = n / 6;
-            const int c = n % 6;
-            Real gain = 0;
-            if (c < foot_parts(&model->tree, f)) {
-                gain =
-                    model->number.dt * foot_twist(&model->tree, support, work->acceleration, f, c);
+            for (int k = 0; k < 3; k++) {
+                to[k] = sum[0][k];
+                to[6 * feet + k] = sum[1][k];
             }
-            support->free_velocity[f][c] = work->foot_velocity[f][c] + gain;
         }
     }
     lanes_meet();
 }
 
-/* Degree of freedom d of the sum over the feet of rows^T wrench; rows [feet][chain][6]: J^T or
- * L^-T J^T. */
-MILD_HD Real wrench_along(const EngineTree *tree, const EngineWork *work, const Real *rows, int d) {
-    const int i = d < 6 ? 0 : d - 5;
-    const int place = d < 6 ? d : engine_row_length(tree, i) - 1;
-    Real sum = 0;
-    LANE_ROLLED
-    for (int f = 0; f < engine_feet(tree); f++) {
-        if (tree->foot_link[f] < i || tree->foot_link[f] >= tree->end[i]) {
-            continue; /* moves without the foot */
-        }
-        LANE_ROLLED
-        for (int c = 0; c < foot_parts(tree, f); c++) {
-            sum += rows[6 * (ENGINE_CHAIN * f + place) + c] * work->wrench[f][c];
-        }
-    }
-    return sum;
+/* bool: foot f moves with degree of freedom d. */
+MILD_HD int foot_moves(const EngineTree *tree, int f, int d) {
+    const int hinge = 5 + tree->foot_link[f];
+    return d < 6 || (d <= hinge && hinge < tree->behind[d]);
 }
 
-/* Adds M^-1 J^T wrench to the acceleration, and J^T wrench to the force. Needs the rows of
- * engine_half_solve. */
-LANE_FN void engine_add_wrench(const EngineTree *tree, EngineWork *work) {
-    EngineSupport *support = &work->now.support;
+/* acceleration <- L^-1 (L^-T force + the sum over the feet of half wrench): qacc with the wrenches
+ * of soft ground, or without ground. wrenches: bool. */
+LANE_FN void engine_accelerate(const EngineTree *tree, EngineWork *work, int wrenches) {
+    const EngineSupport *support = &work->now.support;
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-            work->force[d] += wrench_along(tree, work, support->jacobian[0][0], d);
-            support->change[d] = wrench_along(tree, work, support->half[0][0], d);
+        for (int d = LANE(l); wrenches && d < engine_dofs(tree); d += LANES) {
+            Real sum = work->acceleration[d];
+            LANE_ROLLED
+            for (int f = 0; f < engine_feet(tree); f++) {
+                if (foot_moves(tree, f, d)) {
+                    const Real *half = support->half[f][tree->above[d]];
+                    sum += dot3(half, work->wrench[f]) + dot3(half + 3, work->wrench[f] + 3);
+                }
+            }
+            work->acceleration[d] = sum;
         }
     }
     lanes_meet();
-    engine_solve(tree, work->factor, support->change);
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-            work->acceleration[d] += support->change[d];
-        }
-    }
-    lanes_meet();
+    engine_solve(tree, work->factor[0], work->inverse, work->acceleration);
 }
 
 #endif

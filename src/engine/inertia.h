@@ -13,19 +13,20 @@ MILD_HD void inertia_add(Real *sum, const Real *inertia, const Real *arm) {
     const Real mass = inertia[INERTIA_MASS];
     const Real *moment = inertia + INERTIA_MOMENT;
     const Real *tensor = inertia + INERTIA_TENSOR;
-    Real both[3]; /* 2 moment + mass arm, half of which goes with arm */
+    Real shifted[3]; /* moment about the sum's point */
+    Real square[3];  /* arm (moment + shifted), component by component */
     for (int k = 0; k < 3; k++) {
-        both[k] = 2 * moment[k] + mass * arm[k];
+        shifted[k] = moment[k] + mass * arm[k];
+        square[k] = arm[k] * (moment[k] + shifted[k]);
+        sum[INERTIA_MOMENT + k] += shifted[k];
     }
-    const Real trace = dot3(arm, both);
     sum[INERTIA_MASS] += mass;
-    for (int k = 0; k < 3; k++) {
-        sum[INERTIA_MOMENT + k] += moment[k] + mass * arm[k];
-        sum[INERTIA_TENSOR + k] += tensor[k] + trace - arm[k] * both[k];
-    }
-    sum[INERTIA_TENSOR + 3] += tensor[3] - (arm[0] * both[1] + arm[1] * both[0]) / 2;
-    sum[INERTIA_TENSOR + 4] += tensor[4] - (arm[0] * both[2] + arm[2] * both[0]) / 2;
-    sum[INERTIA_TENSOR + 5] += tensor[5] - (arm[1] * both[2] + arm[2] * both[1]) / 2;
+    sum[INERTIA_TENSOR] += tensor[0] + (square[1] + square[2]);
+    sum[INERTIA_TENSOR + 1] += tensor[1] + (square[0] + square[2]);
+    sum[INERTIA_TENSOR + 2] += tensor[2] + (square[0] + square[1]);
+    sum[INERTIA_TENSOR + 3] += tensor[3] - (moment[0] * arm[1] + arm[0] * shifted[1]);
+    sum[INERTIA_TENSOR + 4] += tensor[4] - (moment[0] * arm[2] + arm[0] * shifted[2]);
+    sum[INERTIA_TENSOR + 5] += tensor[5] - (moment[1] * arm[2] + arm[1] * shifted[2]);
 }
 
 /* [m] Centre of mass of the base's own body in the base's frame, as varied. */
@@ -35,18 +36,27 @@ MILD_HD void base_center(const EngineModel *model, const EngineVariation *variat
     }
 }
 
-/* The base's own body: mass added, inertia about the centre of mass in proportion to mass. */
-MILD_HD void base_inertia(const EngineModel *model, const EngineVariation *variation,
-                          Real *inertia) {
+/* Adds the base's own body: mass added, inertia about the centre of mass in proportion to mass. */
+MILD_HD void base_inertia(const EngineModel *model, const EngineVariation *variation, Real *sum) {
     const EngineNumbers *n = &model->number;
     const Real mass = n->base_mass * variation->link_mass_scale[0] + variation->base_mass_add;
-    Real at_center[INERTIA_NUMBERS] = {mass, 0, 0, 0};
+    const Real scale = mass / n->base_mass;
+    Real *tensor = sum + INERTIA_TENSOR;
     Real center[3];
-    for (int k = 0; k < 6; k++) {
-        at_center[INERTIA_TENSOR + k] = mass / n->base_mass * n->base_inertia[k];
-    }
+    Real moment[3];
     base_center(model, variation, center);
-    inertia_add(inertia, at_center, center);
+    for (int k = 0; k < 3; k++) {
+        moment[k] = mass * center[k];
+        sum[INERTIA_MOMENT + k] += moment[k];
+    }
+    const Real trace = dot3(center, moment);
+    sum[INERTIA_MASS] += mass;
+    for (int k = 0; k < 3; k++) {
+        tensor[k] += scale * n->base_inertia[k] + trace - center[k] * moment[k];
+    }
+    tensor[3] += scale * n->base_inertia[3] - center[0] * moment[1];
+    tensor[4] += scale * n->base_inertia[4] - center[0] * moment[2];
+    tensor[5] += scale * n->base_inertia[5] - center[1] * moment[2];
 }
 
 /* From link axes to world axes. */
@@ -67,126 +77,130 @@ MILD_HD void inertia_turn(const Real *R, const Real *own, Real *world) {
     out[5] = dot3(half + 3, R + 6);
 }
 
-LANE_FN void engine_link_inertia(const EngineModel *model, const EngineVariation *variation,
-                                 EngineWork *work) {
+/* Inertia of link i about its anchor, world axes. */
+MILD_HD void engine_link_inertia(const EngineModel *model, const EngineVariation *variation,
+                                 const EngineWork *work, int i, Real *inertia) {
+    const EngineLink *link = &model->number.link[i];
+    const Real scale = i == 0 ? 0 : variation->link_mass_scale[model->tree.scale[i]];
+    Real own[INERTIA_NUMBERS];
+    for (int k = 0; k < INERTIA_NUMBERS; k++) {
+        own[k] = link->welded[k] + scale * link->inertia[k];
+    }
+    if (i == 0) {
+        base_inertia(model, variation, own);
+    }
+    inertia_turn(work->rotation[i], own, inertia);
+}
+
+/* Sums of the links from `begin` to before `end` about the anchor of link i. */
+MILD_HD void engine_gather_links(const EngineWork *work, int i, int begin, int end, Real *total) {
+    Real sum[LINK_NUMBERS];
+    Real own[3];
+    for (int k = 0; k < LINK_NUMBERS; k++) {
+        sum[k] = 0;
+    }
+    for (int k = 0; k < 3; k++) {
+        own[k] = work->position[i][k];
+    }
+    LANE_ROLLED
+    for (int j = begin; j < end; j++) {
+        Real number[LINK_NUMBERS];
+        Real arm[3];
+        for (int k = 0; k < LINK_NUMBERS; k += 4) {
+            load4(work->now.dynamics.link[j] + k, number + k);
+        }
+        for (int k = 0; k < 3; k++) {
+            arm[k] = work->position[j][k] - own[k];
+            sum[LINK_FORCE + k] += number[LINK_FORCE + k];
+            sum[LINK_TORQUE + k] += number[LINK_TORQUE + k];
+        }
+        inertia_add(sum, number, arm);
+        add_cross3(arm, number + LINK_FORCE, sum + LINK_TORQUE);
+    }
+    for (int k = 0; k < LINK_NUMBERS; k += 4) {
+        store4(sum + k, total + k);
+    }
+}
+
+/* Inertia and force of each link with all that hangs on it, rigid. The base would be the longest
+ * sum, so it is taken in as many parts as links hang on it. */
+LANE_FN void engine_gather(const EngineTree *tree, EngineWork *work) {
+    EngineDynamics *now = &work->now.dynamics;
+    const int links = engine_links(tree);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int i = LANE(l); i < engine_links(&model->tree); i += LANES) {
-            const EngineLink *link = &model->number.link[i];
-            const Real scale = variation->link_mass_scale[model->tree.scale[i]];
-            Real own[INERTIA_NUMBERS];
-            for (int k = 0; k < INERTIA_NUMBERS; k++) {
-                own[k] = link->welded[k] + (i == 0 ? 0 : scale * link->inertia[k]);
-            }
-            if (i == 0) {
-                base_inertia(model, variation, own);
-            }
-            inertia_turn(work->rotation[i], own, work->now.dynamics.inertia[i]);
+        for (int n = 1 + LANE(l); n < links + tree->base_links; n += LANES) {
+            const int begin = n < links ? n : tree->base_link[n - links];
+            engine_gather_links(work, n < links ? n : 0, begin, tree->end[begin], now->of.total[n]);
         }
     }
     lanes_meet();
-}
-
-/* Each link takes up the inertia of all that hangs on it, deepest level first. A lane has a parent,
- * so that no two add to one sum. */
-LANE_FN void engine_composite_inertia(const EngineModel *model, EngineWork *work) {
-    const EngineTree *tree = &model->tree;
-    LANE_ROLLED
-    for (int level = tree->levels - 1; level > 0; level--) {
-        const int begin = tree->level_begin[level - 1];
-        const int middle = tree->level_begin[level];
-        const int end = tree->level_begin[level + 1];
-        EACH_LANE(l) {
+    EACH_LANE(l) {
+        if (LANE(l) < LINK_NUMBERS) {
+            Real sum = now->link[0][LANE(l)];
             LANE_ROLLED
-            for (int n = begin + LANE(l); n < middle; n += LANES) {
-                const int parent = tree->level_link[n];
-                LANE_ROLLED
-                for (int c = middle; c < end; c++) {
-                    const int child = tree->level_link[c];
-                    if (tree->parent[child] != parent) {
-                        continue;
-                    }
-                    Real arm[3];
-                    for (int k = 0; k < 3; k++) {
-                        arm[k] = work->position[child][k] - work->position[parent][k];
-                    }
-                    inertia_add(work->now.dynamics.inertia[parent],
-                                work->now.dynamics.inertia[child], arm);
-                }
+            for (int n = links; n < links + tree->base_links; n++) {
+                sum += now->of.total[n][LANE(l)];
             }
+            now->of.total[0][LANE(l)] = sum;
         }
-        lanes_meet();
     }
+    lanes_meet();
 }
 
 /* What accelerates degree of freedom d by 1 with all behind it rigid: force, and torque about its
  * anchor. */
-MILD_HD void engine_unit_force(const EngineWork *work, int d, Real *out) {
-    const int i = d < 6 ? 0 : d - 5;
-    const Real *inertia = work->now.dynamics.inertia[i];
+MILD_HD void engine_unit_force(const EngineWork *work, int d, Real *force, Real *torque) {
+    const int i = engine_dof_link(d);
+    const Real *inertia = work->now.dynamics.of.total[i];
     const Real *moment = inertia + INERTIA_MOMENT;
     const Real *R = work->rotation[0];
-    if (d < 3) {
-        Real unit[3];
-        for (int k = 0; k < 3; k++) {
-            unit[k] = k == d ? REAL(1) : REAL(0);
-            out[k] = inertia[INERTIA_MASS] * unit[k];
-        }
-        cross3(moment, unit, out + 3);
-    } else {
-        Real axis[3];
-        for (int k = 0; k < 3; k++) {
-            axis[k] = d < 6 ? R[3 * k + d - 3] : work->axis[i][k];
-        }
-        cross3(axis, moment, out);
-        symmetric3(inertia + INERTIA_TENSOR, axis, out + 3);
-    }
-}
-
-/* Entry of M: what the unit force of one degree of freedom does along an ancestor. */
-MILD_HD Real engine_mass_entry(const EngineModel *model, const EngineVariation *variation,
-                               const EngineWork *work, int d, int place) {
-    const EngineTree *tree = &model->tree;
-    const Real *unit = work->now.dynamics.unit[d];
-    const Real *R = work->rotation[0];
-    const int i = d < 6 ? 0 : d - 5;
-    if (place < 3) {
-        return unit[place];
-    }
-    const int j = place < 6 ? 0 : tree->ancestor[i][place - 5];
-    Real arm[3];
-    Real torque[3] = {unit[3], unit[4], unit[5]};
+    Real axis[3]; /* of a turn */
+    Real unit[3]; /* of a move */
     for (int k = 0; k < 3; k++) {
-        arm[k] = work->position[i][k] - work->position[j][k];
+        const int turns = d - 3;
+        axis[k] = d < 3 ? 0 : d < 6 ? R[3 * k + turns] : work->axis[i][k];
+        unit[k] = k == d;
+        force[k] = inertia[INERTIA_MASS] * unit[k];
     }
-    add_cross3(arm, unit, torque);
-    if (j == 0) {
-        return R[place - 3] * torque[0] + R[place] * torque[1] + R[place + 3] * torque[2];
-    }
-    const EngineLink *link = &model->number.link[i];
-    const Real rotor =
-        variation->armature_scale * link->armature + model->number.dt * link->damping;
-    return dot3(work->axis[j], torque) + (j == i ? rotor : 0);
+    add_cross3(axis, moment, force);
+    symmetric3(inertia + INERTIA_TENSOR, axis, torque);
+    add_cross3(moment, unit, torque);
 }
 
-/* M. Armature adds to the diagonal, and so does dt damping: MuJoCo's Euler integrator takes damping
- * at the end of the step. */
+/* Row d of M: what the unit force does along the ancestors, from anchor to anchor up to the base.
+ * Armature adds to the diagonal, and so does dt damping: MuJoCo's Euler integrator takes damping at
+ * the end of the step. */
+MILD_HD void engine_mass_row(const EngineModel *model, const EngineVariation *variation,
+                             EngineWork *work, int d) {
+    const EngineTree *tree = &model->tree;
+    const int i = engine_dof_link(d);
+    const EngineLink *link = &model->number.link[i];
+    const Real *R = work->rotation[0];
+    Real *row = work->mass[d];
+    Real force[3];
+    Real torque[3];
+    Real rotor = variation->armature_scale * link->armature + model->number.dt * link->damping;
+    engine_unit_force(work, d, force, torque);
+    LANE_ROLLED
+    for (int place = tree->above[d]; place > 5; place--) {
+        const int j = tree->row_dof[i][place] - 5;
+        row[place] = rotor + dot3(work->axis[j], torque);
+        add_cross3(work->now.dynamics.arm[j], force, torque);
+        rotor = 0;
+    }
+    for (int k = 0; k < 3; k++) {
+        row[k] = force[k];
+        row[3 + k] = R[k] * torque[0] + R[3 + k] * torque[1] + R[6 + k] * torque[2];
+    }
+}
+
 LANE_FN void engine_mass_matrix(const EngineModel *model, const EngineVariation *variation,
                                 EngineWork *work) {
-    const EngineTree *tree = &model->tree;
-    engine_composite_inertia(model, work);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-            engine_unit_force(work, d, work->now.dynamics.unit[d]);
-        }
-    }
-    lanes_meet();
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
-            work->mass[e] =
-                engine_mass_entry(model, variation, work, tree->entry_dof[e], tree->entry_place[e]);
+        for (int d = LANE(l); d < engine_dofs(&model->tree); d += LANES) {
+            engine_mass_row(model, variation, work, d);
         }
     }
     lanes_meet();

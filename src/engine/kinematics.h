@@ -4,95 +4,99 @@
 
 #include "engine/data.h"
 
-/* Rotation matrix of a unit quaternion. */
-MILD_HD void quaternion_matrix(const Real *q, Real *R) {
+/* Row k of the rotation matrix of a unit quaternion. */
+MILD_HD void quaternion_row(const Real *q, int k, Real *row) {
+    const int i = k == 2 ? 0 : k + 1;
+    const int j = k == 0 ? 2 : k - 1;
     const Real w = q[0];
-    const Real x = q[1];
-    const Real y = q[2];
-    const Real z = q[3];
-    R[0] = w * w + x * x - y * y - z * z;
-    R[1] = 2 * (x * y - w * z);
-    R[2] = 2 * (x * z + w * y);
-    R[3] = 2 * (x * y + w * z);
-    R[4] = w * w - x * x + y * y - z * z;
-    R[5] = 2 * (y * z - w * x);
-    R[6] = 2 * (x * z - w * y);
-    R[7] = 2 * (y * z + w * x);
-    R[8] = w * w - x * x - y * y + z * z;
+    const Real x = q[1 + k];
+    const Real y = q[1 + i];
+    const Real z = q[1 + j];
+    row[k] = w * w + x * x - y * y - z * z;
+    row[i] = 2 * (x * y - w * z);
+    row[j] = 2 * (x * z + w * y);
 }
 
-/* Rotation of each link in its parent's frame. A turn about a fixed axis is 1, cosine and sine
- * times three constant matrices, so a lane computes an entry without knowing the axis. */
+MILD_HD void quaternion_matrix(const Real *q, Real *R) {
+    for (int k = 0; k < 3; k++) {
+        quaternion_row(q, k, R + 3 * k);
+    }
+}
+
+/* Each link in its parent's frame, and the base. A turn about a fixed axis is 1, cosine and sine
+ * times three constant matrices, so a lane computes a row without knowing the axis. */
 LANE_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
-    EngineDynamics *now = &work->now.dynamics;
-    const int links = engine_links(&model->tree);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int i = 1 + LANE(l); i < links; i += LANES) {
-            const Real angle = work->angle[i] - model->number.link[i].reference;
-            real_sine_cosine(angle, &now->wave[i][1], &now->wave[i][0]);
-        }
-    }
-    lanes_meet();
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int n = 9 + LANE(l); n < 9 * links; n += LANES) {
-            const int i = n / 9;
-            const int e = n % 9;
+        for (int n = LANE(l); n < 3 * engine_links(&model->tree); n += LANES) {
+            const int i = n / 3;
+            const int k = n % 3;
             const EngineLink *link = &model->number.link[i];
-            now->local[i][e] = link->turn[0][e] + now->wave[i][0] * link->turn[1][e] +
-                               now->wave[i][1] * link->turn[2][e];
-        }
-        if (LANE(l) == 0) {
-            quaternion_matrix(work->quaternion, work->rotation[0]);
-            for (int k = 0; k < 3; k++) {
-                work->position[0][k] = 0;
-                work->axis[0][k] = 0;
+            Real part[3][4];
+            Real row[4];
+            Real sine;
+            Real cosine;
+            if (i == 0) {
+                quaternion_row(work->quaternion, k, work->rotation[0] + 3 * k);
+                work->position[0][k] = work->axis[0][k] = 0;
+                continue;
             }
+            real_sine_cosine(work->angle[i] - link->reference, &sine, &cosine);
+            for (int m = 0; m < 3; m++) {
+                load4(link->turn[m] + 4 * k, part[m]);
+            }
+            for (int c = 0; c < 4; c++) {
+                row[c] = part[0][c] + cosine * part[1][c] + sine * part[2][c];
+            }
+            store4(row, work->now.dynamics.of.local[i] + 4 * k);
         }
     }
     lanes_meet();
 }
 
-/* One number of the pose of link i: nine of the rotation, three of the position. */
-MILD_HD void engine_pose_number(const EngineModel *model, EngineWork *work, int i, int e) {
-    const int parent = model->tree.parent[i];
-    const Real *R = work->rotation[parent];
-    if (e < 9) {
-        const Real *local = work->now.dynamics.local[i];
-        const int row = 3 * (e / 3);
-        const int column = e % 3;
-        work->rotation[i][e] = R[row] * local[column] + R[row + 1] * local[3 + column] +
-                               R[row + 2] * local[6 + column];
-    } else {
-        const int k = e - 9;
-        work->position[i][k] =
-            work->position[parent][k] + dot3(R + 3 * k, model->number.link[i].anchor);
+/* Row k of the rotations, and component k of the positions, from the base down to a leaf. */
+MILD_HD void engine_chain_row(const EngineTree *tree, EngineWork *work, int leaf, int k) {
+    EngineDynamics *now = &work->now.dynamics;
+    Real row[3];
+    Real position = 0;
+    for (int c = 0; c < 3; c++) {
+        row[c] = work->rotation[0][3 * k + c];
+    }
+    LANE_ROLLED
+    for (int place = 6; place < engine_row_length(tree, leaf); place++) {
+        const int i = tree->row_dof[leaf][place] - 5;
+        Real local[3][4];
+        Real next[4];
+        for (int m = 0; m < 3; m++) {
+            load4(now->of.local[i] + 4 * m, local[m]);
+        }
+        for (int c = 0; c < 4; c++) {
+            next[c] = row[0] * local[0][c] + row[1] * local[1][c] + row[2] * local[2][c];
+        }
+        for (int c = 0; c < 3; c++) {
+            work->rotation[i][3 * k + c] = row[c] = next[c];
+        }
+        now->arm[i][k] = next[3];
+        work->position[i][k] = position = position + next[3];
     }
 }
 
-/* Level by level, twelve lanes a link. */
+/* A row of a rotation follows from the same row of the parent's, so a lane takes one down a chain
+ * without the others. Links that several chains share get the same numbers several times. */
 LANE_FN void engine_kinematics(const EngineModel *model, EngineWork *work) {
     const EngineTree *tree = &model->tree;
     engine_hinges(model, work);
-    LANE_ROLLED
-    for (int level = 1; level < tree->levels; level++) {
-        const int begin = tree->level_begin[level];
-        const int numbers = 12 * (tree->level_begin[level + 1] - begin);
-        EACH_LANE(l) {
-            LANE_ROLLED
-            for (int n = LANE(l); n < numbers; n += LANES) {
-                engine_pose_number(model, work, tree->level_link[begin + n / 12], n % 12);
-            }
-        }
-        lanes_meet();
-    }
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int n = 3 + LANE(l); n < 3 * engine_links(tree); n += LANES) {
-            const int i = n / 3;
-            work->axis[i][n % 3] =
-                dot3(work->rotation[i] + 3 * (n % 3), model->number.link[i].axis);
+        for (int n = LANE(l); n < 3 * tree->leaves; n += LANES) {
+            engine_chain_row(tree, work, tree->leaf[n / 3], n % 3);
+        }
+    }
+    lanes_meet();
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
+            turn3(work->rotation[i], model->number.link[i].axis, work->axis[i]);
         }
     }
     lanes_meet();

@@ -4,6 +4,8 @@
 #ifndef MILD_ENGINE_MODEL_H
 #define MILD_ENGINE_MODEL_H
 
+#include <stdalign.h>
+
 #include "engine/real.h"
 #include "engine/tree.h"
 
@@ -25,9 +27,9 @@ typedef struct {
 enum { INERTIA_MASS, INERTIA_MOMENT = 1, INERTIA_TENSOR = 4, INERTIA_NUMBERS = 10 };
 
 typedef struct {
-    Real turn[3][9];               /* [-] link -> parent at the angle q from the reference:
-                                      turn[0] + cos q turn[1] + sin q turn[2], row major */
-    Real anchor[3];                /* [m] of the hinge, parent's frame */
+    Real turn[3][12];              /* [-, m] link -> parent at the angle q from the reference:
+                                      turn[0] + cos q turn[1] + sin q turn[2], three rows of four
+                                      numbers, the last of them of the anchor, parent's frame */
     Real axis[3];                  /* [-] of the hinge, link's frame */
     Real inertia[INERTIA_NUMBERS]; /* of the body that the hinge moves, which variations scale */
     Real welded[INERTIA_NUMBERS];  /* of bodies without a joint behind it */
@@ -40,6 +42,7 @@ typedef struct {
     Real margin;                   /* [rad] the limit acts so much before it */
     Real inverse_inertia;          /* [1/(kg m^2)] of the limit: dof_invweight0 */
     EngineSoft limit;
+    Real spare[2]; /* a link has a multiple of four numbers */
 } EngineLink;
 
 typedef struct {
@@ -64,13 +67,13 @@ typedef struct {
 
 /* Real numbers only, so that it may be filled from doubles number by number. */
 typedef struct {
+    EngineLink link[ENGINE_LINKS_MAX]; /* of link 0 `welded` only */
     Real gravity[3];                   /* [m/s^2] */
     Real dt;                           /* [s] */
     Real base_mass;                    /* [kg] of the base's own body, as what follows */
     Real base_center[3];               /* [m] centre of mass, base frame */
     Real base_inertia[6];              /* [kg m^2] about the centre of mass, base axes */
     EngineSoft contact;                /* of the corners with rigid ground */
-    EngineLink link[ENGINE_LINKS_MAX]; /* of link 0 `welded` only */
     EngineFoot foot[ROBOT_FEET_MAX];
     Real corner[ENGINE_CORNERS_MAX][3]; /* [m] centres, frame of the foot's link */
     EngineShell shell[ROBOT_SHELLS_MAX];
@@ -78,7 +81,7 @@ typedef struct {
 
 typedef struct {
     EngineTree tree;
-    EngineNumbers number;
+    alignas(16) EngineNumbers number;
 } EngineModel;
 
 /* What differs from robot to robot; see RobotVariation. */
@@ -106,6 +109,9 @@ typedef struct {
 #endif
 #define ENGINE_LINKS (1 + ENGINE_JOINTS)
 #define ENGINE_DOFS (6 + ENGINE_JOINTS)
+/* From a row of M to the next: odd, so that lanes that read one column use different banks of the
+ * memory. */
+#define ENGINE_STRIDE (ENGINE_CHAIN | 1)
 
 MILD_HD int engine_links(const EngineTree *tree) {
     return ENGINE_FIXED ? ENGINE_LINKS : 1 + tree->joints;
@@ -127,19 +133,18 @@ MILD_HD int engine_entries(const EngineTree *tree) {
     return ENGINE_FIXED ? ENGINE_ENTRIES : tree->entries;
 }
 
+MILD_HD int engine_chain(const EngineTree *tree) {
+    return ENGINE_FIXED ? ENGINE_CHAIN : tree->chain;
+}
+
 /* Entries of the row of link i > 0: the base's six, and the hinges down to it. */
 MILD_HD int engine_row_length(const EngineTree *tree, int link) {
     return 6 + tree->level[link];
 }
 
-/* Degrees of freedom above d, which is its place in the rows behind it. */
-MILD_HD int engine_dofs_above(const EngineTree *tree, int d) {
-    return d < 6 ? d : 5 + tree->level[d - 5];
-}
-
-/* Degree of freedom at a place of the row of a link. */
-MILD_HD int engine_row_dof(const EngineTree *tree, int link, int place) {
-    return place < 6 ? place : 5 + tree->ancestor[link][place - 5];
+/* The link whose hinge is degree of freedom d; the base for its six. */
+MILD_HD int engine_dof_link(int d) {
+    return d < 6 ? 0 : d - 5;
 }
 
 #endif

@@ -54,14 +54,18 @@ static void read_tree(Reading *r) {
         const int parent = above < 6 ? 0 : above - 5;
         tree->parent[i] = (EngineIndex)parent;
         tree->level[i] = (EngineIndex)(tree->level[parent] + 1);
-        memcpy(tree->ancestor[i], tree->ancestor[parent], tree->level[i]);
-        tree->ancestor[i][tree->level[i]] = (EngineIndex)i;
         tree->levels = tree->level[i] >= tree->levels ? tree->level[i] + 1 : tree->levels;
+        if (parent == 0) {
+            tree->base_link[tree->base_links++] = (EngineIndex)i;
+        }
     }
     for (int i = links - 1; i >= 0; i--) {
         const int parent = tree->parent[i];
         tree->end[i] = tree->end[i] > i ? tree->end[i] : (EngineIndex)(i + 1);
         tree->end[parent] = tree->end[parent] > tree->end[i] ? tree->end[parent] : tree->end[i];
+        if (tree->end[i] == i + 1) {
+            tree->leaf[tree->leaves++] = (EngineIndex)i;
+        }
     }
     for (int j = 0; j < tree->joints; j++) { /* of a body with several hinges the last one counts */
         const int i = r->robot->dof[j] - 5;
@@ -74,39 +78,49 @@ static void read_tree(Reading *r) {
     }
 }
 
-static void add_row(EngineTree *tree, int dof, int length) {
-    tree->row[dof] = (short)tree->entries;
-    for (int place = 0; place < length; place++) {
+/* The degrees of freedom down to each link, and what follows for each of them. */
+static void read_rows(EngineTree *tree) {
+    const int dofs = 6 + tree->joints;
+    for (int i = 0; i <= tree->joints; i++) {
+        const int level = tree->level[i];
+        for (int place = 0; place < 6; place++) {
+            tree->row_dof[i][place] = (EngineIndex)place;
+        }
+        if (i > 0) {
+            memcpy(tree->row_dof[i], tree->row_dof[tree->parent[i]], (size_t)(5 + level));
+            tree->row_dof[i][5 + level] = (EngineIndex)(5 + i);
+        }
+    }
+    for (int d = 0; d < dofs; d++) {
+        const int link = d < 6 ? 0 : d - 5;
+        tree->above[d] = (EngineIndex)(d < 6 ? d : 5 + tree->level[link]);
+        tree->behind[d] = (EngineIndex)(d < 6 ? dofs : 5 + tree->end[link]);
+        for (int place = 0; place <= tree->above[d]; place++) {
+            tree->path[d] |= 1ull << tree->row_dof[link][place];
+        }
+    }
+    tree->chain = 5 + tree->levels;
+}
+
+static void add_row(EngineTree *tree, int dof) {
+    for (int place = 0; place <= tree->above[dof]; place++) {
         tree->entry_dof[tree->entries] = (EngineIndex)dof;
         tree->entry_place[tree->entries++] = (EngineIndex)place;
     }
 }
 
-static void pack_rows(EngineTree *tree) {
-    int listed = 0;
+static void list_entries(EngineTree *tree) {
     for (int d = 0; d < 6; d++) {
-        add_row(tree, d, d + 1);
+        add_row(tree, d);
     }
-    for (int level = 0; level < tree->levels; level++) {
-        tree->level_begin[level] = (EngineIndex)listed;
-        tree->level_entry[level] = (short)(level ? tree->entries : 0);
-        for (int i = 0; i <= tree->joints; i++) {
-            if (tree->level[i] != level) {
-                continue;
-            }
-            tree->level_link[listed++] = (EngineIndex)i;
-            if (i > 0) {
-                add_row(tree, 5 + i, 6 + level);
+    for (int level = 1; level < tree->levels; level++) {
+        tree->level_entry[level] = (short)tree->entries;
+        for (int i = 1; i <= tree->joints; i++) {
+            if (tree->level[i] == level) {
+                add_row(tree, 5 + i);
             }
         }
     }
-    for (int d = 0; d < 6 + tree->joints; d++) {
-        tree->path[d] = d < 6 ? (2ull << d) - 1 : 63;
-        for (int level = 1; d >= 6 && level <= tree->level[d - 5]; level++) {
-            tree->path[d] |= 1ull << (5 + tree->ancestor[d - 5][level]);
-        }
-    }
-    tree->level_begin[tree->levels] = (EngineIndex)listed;
     tree->level_entry[tree->levels] = (short)tree->entries;
 }
 
@@ -141,9 +155,14 @@ static void read_turn(EngineLink *link, const double *rest, const double *axis) 
         outer[e] = axis[e / 3] * axis[e % 3];
         across[e] = identity[e] - outer[e];
     }
-    mju_mulMatMat(link->turn[0], rest, outer, 3, 3, 3);
-    mju_mulMatMat(link->turn[1], rest, across, 3, 3, 3);
-    mju_mulMatMat(link->turn[2], rest, cross, 3, 3, 3);
+    const double *const part[3] = {outer, across, cross};
+    for (int n = 0; n < 3; n++) {
+        double turn[9];
+        mju_mulMatMat(turn, rest, part[n], 3, 3, 3);
+        for (int e = 0; e < 9; e++) {
+            link->turn[n][e / 3 * 4 + e % 3] = turn[e];
+        }
+    }
 }
 
 /* Hinge `id`, whose body lies at *mount before it turns; moves *mount behind it. */
@@ -152,8 +171,11 @@ static MildStatus read_hinge(Reading *r, int id, Mount *mount) {
     const int dof = m->jnt_dofadr[id];
     EngineLink *link = &r->number->link[dof - 5];
     const double *range = m->jnt_range + 2 * id;
-    mju_mulMatVec3(link->anchor, mount->rotation, m->jnt_pos + 3 * id);
-    mju_addTo3(link->anchor, mount->position);
+    double anchor[3];
+    mju_mulMatVec3(anchor, mount->rotation, m->jnt_pos + 3 * id);
+    for (int k = 0; k < 3; k++) {
+        link->turn[0][4 * k + 3] = anchor[k] + mount->position[k];
+    }
     mju_copy3(link->axis, m->jnt_axis + 3 * id);
     read_turn(link, mount->rotation, link->axis);
     link->reference = m->qpos0[m->jnt_qposadr[id]];
@@ -266,7 +288,6 @@ static void read_foot(Reading *r, int f) {
     const Mount at = mount_at(mount, limb->round ? def->center : origin, upright);
     tree->foot_link[f] = (EngineIndex)mount->link;
     tree->foot_round[f] = limb->round != 0;
-    tree->chain = limb->dofs > tree->chain ? limb->dofs : tree->chain;
     mju_copy3(foot->reference, at.position);
     foot->radius = limb->round ? def->radius : 0;
     memcpy(foot->turn, at.rotation, sizeof foot->turn);
@@ -314,7 +335,8 @@ static MildStatus read_robot(Reading *r) {
     tree->feet = r->robot->def.feet;
     tree->levels = 1;
     read_tree(r);
-    pack_rows(tree);
+    read_rows(tree);
+    list_entries(tree);
     mju_copy3(r->number->gravity, r->model->opt.gravity);
     r->number->contact = read_soft(r, r->model->pair_solref, r->model->pair_solimp);
     MildStatus status = read_bodies(r);

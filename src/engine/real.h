@@ -36,6 +36,31 @@ MILD_HD void real_sine_cosine(Real x, Real *sine, Real *cosine) {
 #endif
 }
 
+/* Four numbers from and to memory, at multiples of 16 bytes: a GPU takes one instruction. */
+MILD_HD void load4(const Real *memory, Real *x) {
+#if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
+    const float4 four = *(const float4 *)memory;
+    x[0] = four.x;
+    x[1] = four.y;
+    x[2] = four.z;
+    x[3] = four.w;
+#else
+    for (int k = 0; k < 4; k++) {
+        x[k] = memory[k];
+    }
+#endif
+}
+
+MILD_HD void store4(const Real *x, Real *memory) {
+#if defined(__CUDA_ARCH__) && defined(MILD_REAL_FLOAT)
+    *(float4 *)memory = make_float4(x[0], x[1], x[2], x[3]);
+#else
+    for (int k = 0; k < 4; k++) {
+        memory[k] = x[k];
+    }
+#endif
+}
+
 MILD_HD Real dot3(const Real *a, const Real *b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }

@@ -146,7 +146,7 @@ static __global__ void __launch_bounds__(THREADS, ENGINE_BLOCKS)
                 const __grid_constant__ ContactSetup setup,
                 const __grid_constant__ BatchShape shape,
                 const __grid_constant__ BatchArrays arrays, int steps) {
-    extern __shared__ Real shared[];
+    extern __shared__ __align__(16) Real shared[];
     __shared__ ground_Shared contact[SOFT ? ENGINE_WARPS : 1];
     const int warp = threadIdx.x / LANES;
     Workplace *place = (Workplace *)shared + warp;

@@ -89,30 +89,20 @@ typedef struct {
     int rigid;          /* bool: on rigid ground */
 } EngineAction;
 
-/* M and its factor, and the acceleration without ground and limits. After engine_kinematics. */
+/* M and its factor, and half of the way to the acceleration, which engine_accelerate goes on with:
+ * L^-T force. After engine_kinematics. */
 LANE_FN void engine_smooth(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     const EngineTree *tree = &model->tree;
-    engine_link_inertia(model, action->variation, work);
+    engine_link_forces(model, action->variation, work);
+    engine_gather(tree, work);
     engine_smooth_force(model, action->variation, action->torque, action->push, work);
     engine_mass_matrix(model, action->variation, work);
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
-            work->factor[e] = work->mass[e];
-        }
-        LANE_ROLLED
-        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-            work->acceleration[d] = work->force[d];
-        }
-    }
-    lanes_meet();
-    engine_factorise(tree, work->factor);
-    engine_solve_transposed(tree, work->factor, work->acceleration);
-    engine_solve(tree, work->factor, work->acceleration);
+    engine_factorise(tree, work->mass[0], work->factor[0], work->inverse);
+    engine_solve_transposed(tree, work->factor[0], work->inverse, work->acceleration);
 }
 
-/* Poses and twists of links and feet; with an action also the acceleration without ground, and what
- * soft ground asks for. */
+/* Poses and twists of links and feet; with an action also what engine_end needs, and what soft
+ * ground asks for. */
 LANE_FN void engine_begin(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     engine_kinematics(model, work);
     if (action) {
@@ -120,8 +110,8 @@ LANE_FN void engine_begin(const EngineModel *model, const EngineAction *action, 
     }
     engine_feet_pose(model, work);
     if (action && !action->rigid) {
+        engine_half_solve(model, work);
         engine_foot_inertia(&model->tree, work);
-        engine_free_velocity(model, work);
     }
 }
 
@@ -195,9 +185,7 @@ LANE_FN void engine_next_twists(const EngineModel *model, EngineWork *work) {
 /* The wrenches of soft ground, or rigid ground where engine_collide was called; limits; the next
  * state. Returns 1 when a velocity went bad. */
 LANE_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
-    if (!rigid) {
-        engine_add_wrench(&model->tree, work);
-    }
+    engine_accelerate(&model->tree, work, !rigid);
     const int beyond = engine_limits(model, work);
     const int newton = rigid || beyond ? engine_constrain(&model->tree, work, rigid) : 0;
     if (rigid) {

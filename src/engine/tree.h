@@ -9,7 +9,7 @@
  * M and its factor are stored by rows. The row of a degree of freedom has one entry for each of its
  * ancestors, root first, and one for itself; no other entry of that row is ever other than zero. So
  * the place of an ancestor in a row is the number of degrees of freedom above it, the same in all
- * rows. Rows are packed level by level, the base's first. */
+ * rows. */
 #ifndef MILD_ENGINE_TREE_H
 #define MILD_ENGINE_TREE_H
 
@@ -30,21 +30,25 @@ typedef struct {
     int corners; /* of all feet */
     int levels;  /* of the tree; the base is level 0 */
     int entries; /* of M */
-    int chain;   /* most degrees of freedom that move one foot */
+    int chain;   /* entries of the longest row of M */
+    int leaves;  /* links that carry no other */
     /* ---- links ---- */
     EngineIndex parent[ENGINE_LINKS_MAX];
     EngineIndex level[ENGINE_LINKS_MAX]; /* number of hinges between the link and the base */
     EngineIndex end[ENGINE_LINKS_MAX];   /* behind the last link that hangs on it */
     EngineIndex joint[ENGINE_LINKS_MAX]; /* the link's hinge in the order of robot.ini */
     EngineIndex scale[ENGINE_LINKS_MAX]; /* its body's place in RobotVariation.link_mass_scale */
-    /* The ancestor of a link on each level up to its own, which holds the link itself. */
-    EngineIndex ancestor[ENGINE_LINKS_MAX][ENGINE_LINKS_MAX];
-    EngineIndex level_begin[ENGINE_LINKS_MAX + 1]; /* [levels + 1] into level_link */
-    EngineIndex level_link[ENGINE_LINKS_MAX];      /* links, level by level */
+    /* The degrees of freedom down to a link: the base's six, then a hinge on each level. */
+    EngineIndex row_dof[ENGINE_LINKS_MAX][ENGINE_DOFS_MAX];
+    EngineIndex leaf[ENGINE_LINKS_MAX];      /* [leaves] */
+    EngineIndex base_link[ENGINE_LINKS_MAX]; /* [base_links] links that hang on the base */
+    int base_links;
     /* ---- M ---- */
-    EnginePath path[ENGINE_DOFS_MAX];        /* of a degree of freedom: its ancestors and itself */
-    short row[ENGINE_DOFS_MAX];              /* where the row of a degree of freedom begins */
-    short level_entry[ENGINE_LINKS_MAX + 1]; /* [levels + 1] where the rows of a level begin */
+    EnginePath path[ENGINE_DOFS_MAX];   /* of a degree of freedom: its ancestors and itself */
+    EngineIndex above[ENGINE_DOFS_MAX]; /* how many are above it: its place in the rows behind it */
+    EngineIndex behind[ENGINE_DOFS_MAX]; /* the first one that does not move with it or before it */
+    /* Entries level by level, those of the base first. */
+    short level_entry[ENGINE_LINKS_MAX + 1];     /* [levels + 1] where those of a level begin */
     EngineIndex entry_dof[ENGINE_ENTRIES_MAX];   /* whose row */
     EngineIndex entry_place[ENGINE_ENTRIES_MAX]; /* where in it */
     /* ---- feet ---- */

@@ -152,7 +152,7 @@ static void note_matrices(const Kit *kit, Worst worst) {
     for (int e = 0; e < tree->entries; e++) {
         const int d = tree->entry_dof[e];
         const int place = tree->entry_place[e];
-        const int j = place < 6 ? place : 5 + tree->ancestor[d - 5][place - 5];
+        const int j = tree->row_dof[d < 6 ? 0 : d - 5][place];
         note(worst, MASS,
              fabs(result.mass[e] - M[d * nv + j]) / sqrt(M[d * nv + d] * M[j * nv + j]));
     }
@@ -612,7 +612,7 @@ static void test_sizes(void **unused) {
                   engine_work_bytes_sa01(), engine_work_bytes());
     assert_string_equal(text, "-DENGINE_JOINTS=12 -DENGINE_FEET=2 -DENGINE_CORNERS=8 "
                               "-DENGINE_ENTRIES=135 -DENGINE_CHAIN=12");
-    assert_true(engine_work_bytes_sa01() <= 6 * 1024);
+    assert_true(engine_work_bytes_sa01() <= 6.5 * 1024);
 }
 
 /* What the engine does not compute is refused by name. */
