@@ -5,8 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/random.h"
 #include "mild/ground.h"
 #include "task/image.h"
+
+#define RANDOM_USE_STRIPES 0x53545250u
+#define STRIPE_PIXEL 0.1       /* [m] */
+enum { STRIPE_PIXELS = 2048 }; /* several times the way of an episode */
 
 static const MildField own_fields[] = {
     MILD_FIELD(
@@ -78,10 +83,44 @@ static MildStatus check_used(const char *key, const char *path, int used, const 
                      "terrain.%s = %s is not used: set terrain.%s = image", key, path, switched);
 }
 
-MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, MildError *error) {
+/* Makes the map. label: NULL, or labels [columns] of one row. */
+static MildStatus make(const TerrainDef *def, int materials, unsigned char *label, int columns,
+                       MildMap **map, MildError *error) {
     MildMapDef want = def->map;
-    Image heights = {0}, labels = {0};
-    unsigned char *label = NULL;
+    Image heights = {0}, labels = {.columns = columns, .rows = 1};
+    unsigned char *own = NULL;
+    MildStatus status = MILD_OK;
+    want.patch_count = materials;
+    if (want.kind == MILD_MAP_IMAGE) {
+        status = read_image("image", def->image, &heights, error);
+    }
+    if (label) {
+        want.patches = MILD_PATTERN_IMAGE;
+        want.patch_size = STRIPE_PIXEL;
+        want.border = 0;
+    } else if (status == MILD_OK && want.patches == MILD_PATTERN_IMAGE) {
+        status = read_image("labels", def->labels, &labels, error);
+        own = status == MILD_OK ? make_labels(&labels, materials) : NULL;
+        if (status == MILD_OK && !own) {
+            status = mild_fail(error, MILD_ERROR_MEMORY, "terrain.labels: out of memory");
+        }
+    }
+    want.heights = heights.grey, want.height_columns = heights.columns,
+    want.height_rows = heights.rows;
+    want.labels = label ? label : own;
+    want.label_columns = labels.columns, want.label_rows = labels.rows;
+    if (status == MILD_OK && !(*map = mild_map_create(&want, error))) {
+        status = error->status;
+    }
+    image_close(&heights);
+    if (!label) {
+        image_close(&labels);
+    }
+    free(own);
+    return status;
+}
+
+MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, MildError *error) {
     *map = NULL;
     MildStatus status =
         check_used("image", def->image, def->map.kind == MILD_MAP_IMAGE, "kind", error);
@@ -92,25 +131,22 @@ MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, Mil
     if (status != MILD_OK || !terrain_has_map(def)) {
         return status;
     }
-    want.patch_count = materials;
-    if (want.kind == MILD_MAP_IMAGE) {
-        status = read_image("image", def->image, &heights, error);
-    }
-    if (status == MILD_OK && want.patches == MILD_PATTERN_IMAGE) {
-        status = read_image("labels", def->labels, &labels, error);
-        label = status == MILD_OK ? make_labels(&labels, materials) : NULL;
-        if (status == MILD_OK && !label) {
-            status = mild_fail(error, MILD_ERROR_MEMORY, "terrain.labels: out of memory");
+    return make(def, materials, NULL, 0, map, error);
+}
+
+MildStatus terrain_make_striped(const TerrainDef *def, int materials, const double length[2],
+                                uint64_t seed, MildMap **map, MildError *error) {
+    unsigned char label[STRIPE_PIXELS];
+    Random random = random_at(seed ^ RANDOM_USE_STRIPES, 0, 0);
+    double end = 0;
+    unsigned char now = 0;
+    for (int i = 0; i < STRIPE_PIXELS; i++) {
+        if (i * STRIPE_PIXEL >= end) {
+            end += random_uniform(&random, length[0], length[1]);
+            now = (unsigned char)random_index(&random, (uint32_t)materials);
         }
+        label[i] = now;
     }
-    want.heights = heights.grey, want.height_columns = heights.columns,
-    want.height_rows = heights.rows;
-    want.labels = label, want.label_columns = labels.columns, want.label_rows = labels.rows;
-    if (status == MILD_OK && !(*map = mild_map_create(&want, error))) {
-        status = error->status;
-    }
-    image_close(&heights);
-    image_close(&labels);
-    free(label);
-    return status;
+    *map = NULL;
+    return make(def, materials, label, STRIPE_PIXELS, map, error);
 }

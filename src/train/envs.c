@@ -12,8 +12,8 @@ struct TrainEnvs {
     PolicyDef policy;
 };
 
-static int make(TrainEnvs *envs, const ExperimentDef *def, const Robot *robot, Pool *pool,
-                int count, int first, MildError *error) {
+static int make(TrainEnvs *envs, const ExperimentDef *def, int striped, const Robot *robot,
+                Pool *pool, int count, int first, MildError *error) {
     envs->policy = def->policy;
     envs->device = train_device(&def->train);
     if (!train_is_batch(&def->train)) {
@@ -27,19 +27,20 @@ static int make(TrainEnvs *envs, const ExperimentDef *def, const Robot *robot, P
                             .envs = count,
                             .first = (uint32_t)first,
                             .grounds = def->train.grounds,
-                            .seed = def->train.seed};
+                            .seed = def->train.seed,
+                            .striped = striped};
     envs->crowd = crowd_create(&crowd, error);
     return envs->crowd != NULL;
 }
 
-TrainEnvs *train_envs_create(const ExperimentDef *def, const Robot *robot, Pool *pool, int count,
-                             int first, MildError *error) {
+TrainEnvs *train_envs_create(const ExperimentDef *def, int striped, const Robot *robot, Pool *pool,
+                             int count, int first, MildError *error) {
     TrainEnvs *envs = calloc(1, sizeof *envs);
     if (!envs) {
         mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
         return NULL;
     }
-    if (!make(envs, def, robot, pool, count, first, error)) {
+    if (!make(envs, def, striped, robot, pool, count, first, error)) {
         free(envs);
         return NULL;
     }

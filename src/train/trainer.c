@@ -34,6 +34,20 @@ void train_destroy(Trainer *trainer) {
     free(trainer);
 }
 
+/* The batch engine has patches as stripes of the map. */
+static int is_striped(const ExperimentDef *def) {
+    return train_is_batch(&def->train) && def->task.randomize.patch_share > 0 &&
+           def->terrain.map.patches == MILD_PATTERN_NONE;
+}
+
+static MildStatus make_map(Trainer *trainer, MildError *error) {
+    const ExperimentDef *def = &trainer->def;
+    return is_striped(def) ? terrain_make_striped(&def->terrain, TRAIN_MATERIALS,
+                                                  def->task.randomize.patch_length, def->train.seed,
+                                                  &trainer->map, error)
+                           : terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error);
+}
+
 static int build(Trainer *trainer, MildError *error) {
     const ExperimentDef *def = &trainer->def;
     MildError cause = {0};
@@ -67,13 +81,13 @@ static int build(Trainer *trainer, MildError *error) {
         return 0;
     }
     trainer->stream = gpu_learner_stream(trainer->ppo);
-    if (terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error) != MILD_OK) {
+    if (make_map(trainer, error) != MILD_OK) {
         return 0;
     }
     trainer->def.task.map = trainer->map;
     trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
-    trainer->envs =
-        train_envs_create(def, trainer->robot, trainer->pool, def->train.envs, 0, error);
+    trainer->envs = train_envs_create(def, is_striped(def), trainer->robot, trainer->pool,
+                                      def->train.envs, 0, error);
     return trainer->envs != NULL && train_envs_reset(trainer->envs, ppo_batch(trainer->ppo),
                                                      trainer->stream, error) == MILD_OK;
 }
