@@ -21,9 +21,17 @@ typedef enum {
     MILD_MAP_WAVES, /* amplitude (sin(2 pi x/wavelength) + sin(2 pi y/wavelength))/2 */
     MILD_MAP_ROUGH, /* random heights in [-amplitude, amplitude] about one wavelength apart,
                        interpolated smoothly; repeats after `size` */
-    MILD_MAP_IMAGE  /* amplitude heights[row][column]; row 0 has the largest y, the middle of the
+    MILD_MAP_IMAGE, /* amplitude heights[row][column]; row 0 has the largest y, the middle of the
                        image lies at the origin, and its border heights extend outward */
+    MILD_MAP_MIXED  /* MILD_MAP_TILES x MILD_MAP_TILES square tiles of height 0 at their edges;
+                       repeats after `size`. A quarter of the tiles are level. The others are in
+                       equal shares pyramids, up or down, whose sides rise by a share of `slope`
+                       per metre, and waves, steps and rough ground of a share of `amplitude`, which
+                       fade out over the last half metre. Seed and tile give relief and share, which
+                       is uniform in [0.25, 1]. */
 } MildMapKind;
+
+#define MILD_MAP_TILES 5 /* tiles of MILD_MAP_MIXED along x, and along y */
 
 /* Label of the material at (x, y). Labels count from 0. */
 typedef enum {
@@ -37,11 +45,11 @@ typedef enum {
 typedef struct {
     int kind;    /* MildMapKind */
     double cell; /* [m] edge of the cells of the height grid, and of the labels near a border */
-    double size; /* [m] rough: period after which the heights repeat */
+    double size; /* [m] rough, mixed: period after which the heights repeat; mixed: at least 10 */
     double amplitude;            /* [m] see MildMapKind */
     double wavelength;           /* [m] see MildMapKind */
-    double slope;                /* [-] rise per metre along x */
-    uint64_t seed;               /* rough: seed of the random heights */
+    double slope;                /* [-] slope: rise per metre along x; mixed: of pyramids */
+    uint64_t seed;               /* rough, mixed: seed of the random numbers */
     int patches;                 /* MildPattern */
     double patch_size;           /* [m] */
     int patch_count;             /* materials that stripes and checker use in turn, 1 .. 255 */

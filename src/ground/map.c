@@ -9,20 +9,23 @@
 #define FIELD(member, low, high, help)                                                             \
     MILD_FIELD(MildMapDef, member, MILD_FIELD_DOUBLE, 1, low, high, help)
 #define COUNT(names) ((int)(sizeof(names) / sizeof *(names)))
-static const char *const kinds[] = {"flat", "slope", "steps", "waves", "rough", "image"};
+static const char *const kinds[] = {"flat", "slope", "steps", "waves", "rough", "image", "mixed"};
 static const char *const patterns[] = {"none", "stripes", "checker", "image"};
 const MildField mild_map_fields[] = {
     MILD_FIELD_CHOICE(MildMapDef, kind, kinds, COUNT(kinds), "[-] shape of the surface"),
     FIELD(cell, 0.001, 1.0, "[m] spacing of the height grid; with kind = image, of the pixels"),
-    FIELD(size, 0.1, 1000.0, "[m] rough: period after which the heights repeat"),
+    FIELD(size, 0.1, 1000.0,
+          "[m] rough, mixed: period after which the heights repeat; mixed: at least 10"),
     FIELD(amplitude, 0.0, 5.0,
-          "[m] waves, rough: largest height above and below the mean; steps, image: total height"),
+          "[m] waves, rough: largest height above and below the mean; steps, image: total height; "
+          "mixed: most of either"),
     FIELD(wavelength, 0.02, 100.0,
           "[m] waves: wavelength; steps: length of one step up and one down; rough: spacing of the "
-          "random heights"),
-    FIELD(slope, -1.0, 1.0, "[-] slope: rise per metre along x"),
+          "random heights; mixed: all three"),
+    FIELD(slope, -1.0, 1.0,
+          "[-] slope: rise per metre along x; mixed: steepest side of the pyramids"),
     MILD_FIELD(MildMapDef, seed, MILD_FIELD_UINT64, 1, 0, 1.8446744073709552e19,
-               "[-] rough: seed of the random heights"),
+               "[-] rough, mixed: seed of the random numbers"),
     MILD_FIELD_CHOICE(MildMapDef, patches, patterns, COUNT(patterns),
                       "[-] pattern in which the materials are laid out"),
     FIELD(patch_size, 0.01, 1000.0,

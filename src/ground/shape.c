@@ -5,6 +5,8 @@
 #include <stdlib.h>
 
 #define TWO_PI 6.283185307179586
+#define TILE_EDGE_MIN 2.0 /* [m] so that a tile has more than what fades */
+#define TILE_FADE 0.5     /* [m] width within a tile's edge over which its relief fades out */
 
 typedef double (*ShapeHeight)(const MildMapDef *def, double x, double y);
 
@@ -48,6 +50,33 @@ static double height_rough(const MildMapDef *def, double x, double y) {
     return def->amplitude * ((1.0 - t) * low + t * high);
 }
 
+/* One tile of mixed ground with its own relief. z: random number in [-1, 1).
+ * share = 1/4 + 3/4 |z|, d: distance to the tile's edge, f = smooth(d/TILE_FADE) up to 1.
+ * pyramid: sign(z) share slope d; waves, steps, rough: share f height of that kind. */
+static double height_mixed(const MildMapDef *def, double x, double y) {
+    const double edge = def->size / MILD_MAP_TILES;
+    const GridPlace a = grid_place(x / edge, MILD_MAP_TILES, 1);
+    const GridPlace b = grid_place(y / edge, MILD_MAP_TILES, 1);
+    const double d = edge * (0.5 - fmax(fabs(a.share - 0.5), fabs(b.share - 0.5)));
+
+    /* Rough ground uses the random numbers of points from 0 up, so tiles use those below. */
+    const int tile = -1 - (b.cell * MILD_MAP_TILES + a.cell);
+    const double relief = 8.0 * (1.0 + lattice_height(def->seed, tile, 0)); /* [0, 16) */
+    const double z = lattice_height(def->seed, tile, 1);
+    const double share = 0.25 + 0.75 * fabs(z);
+    const double faded = share * smooth(fmin(d / TILE_FADE, 1.0));
+    if (relief < 4.0) {
+        return 0.0;
+    }
+    if (relief < 7.0) {
+        return copysign(share, z) * def->slope * d;
+    }
+    if (relief < 10.0) {
+        return faded * height_waves(def, x, y);
+    }
+    return faded * (relief < 13.0 ? height_steps(def, x, y) : height_rough(def, x, y));
+}
+
 static MildStatus shape_allocate(MildMap *map, double columns, double rows, double cell_x,
                                  double cell_y, int repeats, MildError *error) {
     if ((columns + 1.0) * (rows + 1.0) > MILD_MAP_POINTS_MAX) {
@@ -79,6 +108,20 @@ static MildStatus shape_formula(MildMap *map, const MildMapDef *def, double peri
         }
     }
     return MILD_OK;
+}
+
+/* The cells divide a tile evenly, so that the edges of tiles lie on grid points. */
+static MildStatus shape_mixed(MildMap *map, const MildMapDef *def, MildError *error) {
+    const double edge = def->size / MILD_MAP_TILES;
+    if (edge < TILE_EDGE_MIN) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "terrain.size = %g makes tiles of %g m, which is too small for "
+                         "terrain.kind = mixed: use at least %g",
+                         def->size, edge, MILD_MAP_TILES * TILE_EDGE_MIN);
+    }
+    MildMapDef even = *def;
+    even.cell = edge / ceil(edge / def->cell - 1e-9);
+    return shape_formula(map, &even, def->size, 1, height_mixed, error);
 }
 
 static MildStatus shape_image(MildMap *map, const MildMapDef *def, MildError *error) {
@@ -119,6 +162,7 @@ MildStatus shape_fill(MildMap *map, const MildMapDef *def, MildError *error) {
     case MILD_MAP_WAVES: return shape_formula(map, def, def->wavelength, 1, height_waves, error);
     case MILD_MAP_ROUGH: return shape_formula(map, def, def->size, 1, height_rough, error);
     case MILD_MAP_IMAGE: return shape_image(map, def, error);
+    case MILD_MAP_MIXED: return shape_mixed(map, def, error);
     }
     return MILD_OK;
 }

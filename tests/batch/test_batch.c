@@ -61,6 +61,7 @@ static const Shape shapes[] = {
     {"slope", 1, MILD_MODEL_MILD, MILD_MAP_SLOPE, MILD_PATTERN_NONE},
     {"four feet on steps", 4, MILD_MODEL_MILD, MILD_MAP_STEPS, MILD_PATTERN_NONE},
     {"stripes", 3, MILD_MODEL_MILD, MILD_MAP_FLAT, MILD_PATTERN_STRIPES},
+    {"mixed, checker", 2, MILD_MODEL_MILD, MILD_MAP_MIXED, MILD_PATTERN_CHECKER},
     {"con_cone on waves", 2, MILD_MODEL_CON_CONE, MILD_MAP_WAVES, MILD_PATTERN_CHECKER},
     {"hunt_crossley on waves", 2, MILD_MODEL_HUNT_CROSSLEY, MILD_MAP_WAVES, MILD_PATTERN_CHECKER},
 };
@@ -99,7 +100,7 @@ static int material_of(int robot, int label) {
 
 static MildMap *crowd_map(const Shape *of, int *labels) {
     MildMapDef def = shape(of->kind, 0.03, 0.5);
-    def.size = 4.0;
+    def.size = of->kind == MILD_MAP_MIXED ? 10.0 : 4.0;
     def.slope = 0.2;
     def.patches = (int)of->pattern;
     def.patch_size = 0.11;

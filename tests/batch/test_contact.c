@@ -369,6 +369,7 @@ static const Relief reliefs[] = {
     {"waves", 1, 1, 3, MILD_MAP_WAVES, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
     {"rough", 4, 4, 4, MILD_MAP_ROUGH, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
     {"image", 3, 4, 4, MILD_MAP_IMAGE, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
+    {"mixed", 2, 2, 5, MILD_MAP_MIXED, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
     {"level, stripes", 2, 2, 8, MILD_MAP_FLAT, MILD_PATTERN_STRIPES, 0, 1, MILD_MODEL_MILD},
     {"rough, checker", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_MILD},
     {"image, image", 2, 2, 5, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 0, 1, MILD_MODEL_MILD},
@@ -409,6 +410,9 @@ static MildMap *relief_map(const Relief *relief, uint64_t *random) {
         def.cell = 0.04;
         def.patch_size = 0.04;
     }
+    if (relief->kind == MILD_MAP_MIXED) {
+        def.size = 10.0;
+    }
     return make_map(&def);
 }
 
@@ -419,6 +423,10 @@ static void stand_above(Kit *kit, const Relief *relief, uint64_t *random) {
     kit->terrain.map_y = kit_uniform(random, -0.4, 0.4);
     if (relief->kind == MILD_MAP_IMAGE) { /* it does not repeat */
         kit->terrain.map_x += relief->far;
+    }
+    if (relief->kind == MILD_MAP_MIXED) { /* on any tile */
+        kit->terrain.map_x = kit_uniform(random, -5.0, 5.0);
+        kit->terrain.map_y = kit_uniform(random, -5.0, 5.0);
     }
     for (int f = 0; f < kit->feet; f++) {
         double *at = kit->input.position[f];

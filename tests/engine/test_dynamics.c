@@ -350,10 +350,13 @@ typedef struct {
     double far; /* [m] of the robot from the origin */
 } Relief;
 
-static const Relief reliefs[] = {
-    {"slope", MILD_MAP_SLOPE, 0}, {"steps", MILD_MAP_STEPS, 0},
-    {"waves", MILD_MAP_WAVES, 0}, {"rough", MILD_MAP_ROUGH, 0},
-    {"image", MILD_MAP_IMAGE, 0}, {"rough, 50 m away", MILD_MAP_ROUGH, 50}};
+static const Relief reliefs[] = {{"slope", MILD_MAP_SLOPE, 0},
+                                 {"steps", MILD_MAP_STEPS, 0},
+                                 {"waves", MILD_MAP_WAVES, 0},
+                                 {"rough", MILD_MAP_ROUGH, 0},
+                                 {"image", MILD_MAP_IMAGE, 0},
+                                 {"mixed", MILD_MAP_MIXED, 0},
+                                 {"rough, 50 m away", MILD_MAP_ROUGH, 50}};
 enum { RELIEFS = sizeof reliefs / sizeof *reliefs, IMAGE = 30 };
 
 static MildMap *relief_map(const Relief *relief) {
@@ -371,6 +374,9 @@ static MildMap *relief_map(const Relief *relief) {
     def.height_rows = IMAGE + 2;
     if (relief->kind == MILD_MAP_IMAGE) {
         def.cell = 0.15; /* 4.35 m wide: some robots stand beside it */
+    }
+    if (relief->kind == MILD_MAP_MIXED) {
+        def.size = 10.0; /* tiles of 2 m, robots within 3 m */
     }
     MildMap *map = mild_map_create(&def, &error);
     print_message("%s", error.text);

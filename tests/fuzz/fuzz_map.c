@@ -11,7 +11,7 @@ static MildMapDef take_def(Bytes *bytes, double heights[EDGE * EDGE],
     MildMapDef def = mild_map_def_default();
     double *const numbers[] = {&def.cell,  &def.size,       &def.amplitude, &def.wavelength,
                                &def.slope, &def.patch_size, &def.border};
-    def.kind = take_below(bytes, 7);
+    def.kind = take_below(bytes, 8);
     def.patches = take_below(bytes, 5);
     def.seed = take_byte(bytes);
     def.patch_count = take_below(bytes, 16);

@@ -162,11 +162,17 @@ static void test_measures(void **state) {
 /* What only becomes visible with a kind is usable as it is: uneven by some mm to some dm. */
 static void test_defaults(void **state) {
     (void)state;
-    for (int kind = MILD_MAP_SLOPE; kind <= MILD_MAP_ROUGH; kind++) {
+    for (int kind = MILD_MAP_SLOPE; kind <= MILD_MAP_MIXED; kind++) {
         for (int patches = MILD_PATTERN_NONE; patches <= MILD_PATTERN_CHECKER; patches++) {
             MildMapDef def = mild_map_def_default();
             assert_true(def.kind == MILD_MAP_FLAT && def.patches == MILD_PATTERN_NONE);
             def.kind = kind, def.patches = patches;
+            if (kind == MILD_MAP_IMAGE) {
+                continue; /* it has no default */
+            }
+            if (kind == MILD_MAP_MIXED) {
+                def.size = 10.0; /* the least */
+            }
             MildMap *map = make_map(&def);
             MildTerrain terrain = terrain_on(map, 0.0);
             double low = INFINITY, high = -INFINITY;
@@ -279,7 +285,7 @@ static void test_refused(void **state) {
     struct {
         MildMapDef def;
         const char *names;
-    } bad[12];
+    } bad[13];
     int count = 0;
 #define BAD(member, value, name)                                                                   \
     bad[count].def = mild_map_def_default(), bad[count].def.member = (value),                      \
@@ -296,6 +302,8 @@ static void test_refused(void **state) {
     BAD(size, 1000.0, "terrain.cell");
     bad[count - 1].def.kind = MILD_MAP_ROUGH;
     bad[count - 1].def.cell = 0.001;
+    BAD(size, 8.0, "terrain.size");
+    bad[count - 1].def.kind = MILD_MAP_MIXED;
     BAD(heights, NULL, "terrain.image");
     bad[count - 1].def.kind = MILD_MAP_IMAGE;
     BAD(heights, bad_heights, "terrain.image");
