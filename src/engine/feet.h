@@ -55,13 +55,15 @@ MILD_HD void foot_column(const EngineTree *tree, EngineWork *work, int f, int pl
 MILD_HD Real foot_twist(const EngineTree *tree, const EngineSupport *support, const Real *x,
                         int foot, int c) {
     const int link = tree->foot_link[foot];
-    const EngineIndex *dof = tree->row_dof[link];
     const Real *number = support->jacobian[foot][0] + c;
     Real sum = 0;
+    ENGINE_LOOP
+    for (int d = 0; d < 6; d++) {
+        sum += number[6 * d] * x[d];
+    }
     LANE_ROLLED
-    for (int left = engine_row_length(tree, link); left > 0; left--) {
-        sum += *number * x[*dof++];
-        number += 6;
+    for (int place = 6; place < engine_row_length(tree, link); place++) {
+        sum += number[6 * place] * x[tree->row_dof[link][place]];
     }
     return sum;
 }
@@ -103,13 +105,6 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
     lanes_meet();
 }
 
-/* In registers where the length of a chain is known to the compiler. */
-#if ENGINE_FIXED
-#define CHAIN_LOOP LANE_UNROLL
-#else
-#define CHAIN_LOOP LANE_ROLLED
-#endif
-
 /* half <- L^-T J^T, and V_free = J (qvel + dt L^-1 y) = J qvel + dt half^T y, where y = L^-T force.
  * A lane has a column of a foot, whose chain is a path, so it needs no other lane. As in
  * engine_solve_transposed, a solved entry is taken from those above it. */
@@ -126,18 +121,18 @@ LANE_FN void engine_half_solve(const EngineModel *model, EngineWork *work) {
             const int part = c < foot_parts(tree, f);
             Real gain = 0;
             Real x[ENGINE_CHAIN];
-            CHAIN_LOOP
+            ENGINE_LOOP
             for (int place = 0; place < ENGINE_CHAIN; place++) {
                 x[place] = part && place < length ? support->jacobian[f][place][c] : 0;
             }
-            CHAIN_LOOP
+            ENGINE_LOOP
             for (int k = ENGINE_CHAIN - 1; k >= 0; k--) {
                 if (k < length) {
-                    const int d = tree->row_dof[link][k];
+                    const int d = k < 6 ? k : tree->row_dof[link][k];
                     x[k] *= work->inverse[d];
                     support->half[f][k][c] = x[k];
                     gain += x[k] * work->acceleration[d];
-                    CHAIN_LOOP
+                    ENGINE_LOOP
                     for (int place = 0; place < k; place++) {
                         x[place] -= work->factor[d][place] * x[k];
                     }
