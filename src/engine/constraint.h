@@ -202,7 +202,8 @@ LANE_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
     lanes_meet();
 }
 
-/* For each foot, sums over its pushing edges: the stiffness, and the wrench of their forces. */
+/* For each foot, sums over its pushing edges: the stiffness, and the wrench of their forces, also
+ * the moment of a contact at the surface of a round foot. */
 LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work) {
     EngineContact *contact = &work->now.support.ground.contact;
     EACH_LANE(l) {
@@ -262,20 +263,6 @@ MILD_HD Real stiffened_entry(const EngineTree *tree, const EngineSupport *suppor
     return sum;
 }
 
-/* Degree of freedom d of J^T times the sums of engine_push_of_edges: a round foot, too, takes the
- * moment of a contact at its surface. */
-MILD_HD Real pushes_along(const EngineTree *tree, const EngineWork *work, int d) {
-    Real sum = 0;
-    LANE_ROLLED
-    for (int f = 0; f < engine_feet(tree); f++) {
-        if (foot_moves(tree, f, d)) {
-            const Real *column = work->now.support.jacobian[f][tree->above[d]];
-            sum += dot3(column, work->wrench[f]) + dot3(column + 3, work->wrench[f] + 3);
-        }
-    }
-    return sum;
-}
-
 /* x of the limit of link i. */
 MILD_HD Real limit_residual(const EngineWork *work, int i) {
     return work->limit_side[i] * work->acceleration[5 + i] - work->limit_reference[i];
@@ -311,7 +298,7 @@ LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             Real sum = support->residue[d];
             if (edges) {
-                sum += pushes_along(tree, work, d);
+                sum += wrench_along(tree, work, support->jacobian[0], d);
             }
             if (d >= 6 && limit_pushes(work, d - 5)) {
                 sum -= work->limit_side[d - 5] * work->limit_weight[d - 5] *

@@ -112,23 +112,26 @@ LANE_FN void engine_factorise(const EngineTree *tree, const Real *matrix, Real *
 /* x <- L^-T x, leaves first. A lane has x of its degrees of freedom in registers. */
 LANE_FN void engine_solve_transposed(const EngineTree *tree, const Real *factor,
                                      const Real *inverse, Real *x) {
+    const int dofs = engine_dofs(tree);
     Real own[DOF_SLOTS][LANE_COPIES], scale[DOF_SLOTS][LANE_COPIES];
-    int above[DOF_SLOTS][LANE_COPIES], behind[DOF_SLOTS][LANE_COPIES]; /* how many */
+    unsigned behind[DOF_SLOTS][LANE_COPIES];   /* how many */
+    unsigned after[DOF_SLOTS][LANE_COPIES];    /* of those before k, which wraps around below 0 */
+    const Real *entry[DOF_SLOTS][LANE_COPIES]; /* of row k */
     EACH_LANE(l) {
         LANE_UNROLL
         for (int s = 0; s < DOF_SLOTS; s++) {
             const int d = LANE(l) + s * LANES;
-            const int in = d < engine_dofs(tree);
+            const int in = d < dofs;
             own[s][l] = in ? x[d] : 0;
             scale[s][l] = in ? inverse[d] : 0;
-            above[s][l] = in ? tree->above[d] : 0;
-            behind[s][l] = in ? tree->behind[d] - 1 - d : 0;
+            behind[s][l] = in ? (unsigned)(tree->behind[d] - 1 - d) : 0;
+            after[s][l] = (unsigned)(dofs - 2 - d);
+            entry[s][l] = factor + (dofs - 1) * ENGINE_STRIDE + (in ? tree->above[d] : 0);
         }
     }
     LANE_ROLLED
-    for (int k = engine_dofs(tree) - 1; k > 0; k--) {
+    for (int k = dofs - 1; k > 0; k--) {
         Real scaled[LANE_COPIES];
-        const Real *row = factor + k * ENGINE_STRIDE;
         EACH_LANE(l) {
             scaled[l] = own[DOF_SLOT(k)][l] * scale[DOF_SLOT(k)][l];
         }
@@ -136,17 +139,18 @@ LANE_FN void engine_solve_transposed(const EngineTree *tree, const Real *factor,
         EACH_LANE(l) {
             LANE_UNROLL
             for (int s = 0; s < DOF_SLOTS; s++) {
-                const int after = k - 1 - LANE(l) - s * LANES;
-                if ((unsigned)after < (unsigned)behind[s][l]) {
-                    own[s][l] -= row[above[s][l]] * solved;
+                if (after[s][l] < behind[s][l]) {
+                    own[s][l] -= *entry[s][l] * solved;
                 }
+                after[s][l]--;
+                entry[s][l] -= ENGINE_STRIDE;
             }
         }
     }
     EACH_LANE(l) {
         LANE_UNROLL
         for (int s = 0; s < DOF_SLOTS; s++) {
-            if (LANE(l) + s * LANES < engine_dofs(tree)) {
+            if (LANE(l) + s * LANES < dofs) {
                 x[LANE(l) + s * LANES] = own[s][l] * scale[s][l];
             }
         }

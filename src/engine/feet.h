@@ -62,7 +62,7 @@ MILD_HD Real foot_twist(const EngineTree *tree, const EngineSupport *support, co
         sum += number[6 * d] * x[d];
     }
     LANE_ROLLED
-    for (int place = 6; place < engine_row_length(tree, link); place++) {
+    for (int place = 6; place < tree->shared[foot][foot]; place++) {
         sum += number[6 * place] * x[tree->row_dof[link][place]];
     }
     return sum;
@@ -83,8 +83,9 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = LANE(l); n < chain * feet; n += LANES) {
-            if (n % chain < engine_row_length(tree, tree->foot_link[n / chain])) {
-                foot_column(tree, work, n / chain, n % chain);
+            const int f = n / chain;
+            if (n % chain < tree->shared[f][f]) {
+                foot_column(tree, work, f, n % chain);
             }
         }
     }
@@ -117,7 +118,7 @@ LANE_FN void engine_half_solve(const EngineModel *model, EngineWork *work) {
             const int f = n / 6;
             const int c = n % 6;
             const int link = tree->foot_link[f];
-            const int length = engine_row_length(tree, link);
+            const int length = tree->shared[f][f];
             const int part = c < foot_parts(tree, f);
             Real gain = 0;
             Real x[ENGINE_CHAIN];
@@ -181,28 +182,37 @@ LANE_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
 /* bool: foot f moves with degree of freedom d. */
 MILD_HD int foot_moves(const EngineTree *tree, int f, int d) {
     const int hinge = 5 + tree->foot_link[f];
-    return d < 6 || (d <= hinge && hinge < tree->behind[d]);
+    return (hinge >= d) & (hinge < tree->behind[d]);
+}
+
+/* Degree of freedom d of the sum over the feet of rows^T wrench; rows [feet * chain][6]: J^T or
+ * L^-T J^T. */
+MILD_HD Real wrench_along(const EngineTree *tree, const EngineWork *work, const Real (*rows)[6],
+                          int d) {
+    const int above = tree->above[d];
+    Real sum = 0;
+    LANE_ROLLED
+    for (int f = 0; f < engine_feet(tree); f++) {
+        if (foot_moves(tree, f, d)) {
+            const Real *row = rows[ENGINE_CHAIN * f + above];
+            sum += dot3(row, work->wrench[f]) + dot3(row + 3, work->wrench[f] + 3);
+        }
+    }
+    return sum;
 }
 
 /* acceleration <- L^-1 (L^-T force + the sum over the feet of half wrench): qacc with the wrenches
  * of soft ground, or without ground. wrenches: bool. */
 LANE_FN void engine_accelerate(const EngineTree *tree, EngineWork *work, int wrenches) {
-    const EngineSupport *support = &work->now.support;
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int d = LANE(l); wrenches && d < engine_dofs(tree); d += LANES) {
-            Real sum = work->acceleration[d];
+    if (wrenches) {
+        EACH_LANE(l) {
             LANE_ROLLED
-            for (int f = 0; f < engine_feet(tree); f++) {
-                if (foot_moves(tree, f, d)) {
-                    const Real *half = support->half[f][tree->above[d]];
-                    sum += dot3(half, work->wrench[f]) + dot3(half + 3, work->wrench[f] + 3);
-                }
+            for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+                work->acceleration[d] += wrench_along(tree, work, work->now.support.half[0], d);
             }
-            work->acceleration[d] = sum;
         }
+        lanes_meet();
     }
-    lanes_meet();
     engine_solve(tree, work->factor[0], work->inverse, work->acceleration);
 }
 
