@@ -77,6 +77,8 @@ static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *err
     CrowdArrays *all = &crowd->arrays;
     CrowdContact *contact = &all->contact;
     const size_t envs = (size_t)all->envs, rows = envs * (size_t)feet;
+    const size_t work =
+        crowd->device == MILD_BATCH_HOST ? sizeof *all->work : crowd_device_work_bytes();
     const struct {
         void *at; /* pointer to the array's pointer */
         size_t bytes;
@@ -89,7 +91,7 @@ static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *err
                   {&all->fresh, envs},
                   {&all->rigid, envs},
                   {&all->order, envs * sizeof *all->order},
-                  {&all->work, envs * sizeof *all->work},
+                  {&all->work, envs * work},
                   {&all->depth, rows * sizeof(float)},
                   {&all->kept, envs * sizeof *all->kept},
                   {&all->tally, TALLY_NUMBERS * sizeof *all->tally},

@@ -142,6 +142,10 @@ static const char *launched(void) {
     return status == cudaSuccess ? NULL : cudaGetErrorString(status);
 }
 
+extern "C" size_t crowd_device_work_bytes(void) {
+    return sizeof(EngineWork);
+}
+
 extern "C" const char *crowd_device_fits(const EngineTree *tree) {
     if (ENGINE_FIXED && (tree->joints != ENGINE_JOINTS || tree->feet != ENGINE_FEET ||
                          tree->corners != ENGINE_CORNERS || tree->entries != ENGINE_ENTRIES ||

@@ -37,6 +37,8 @@ const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int
 const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call, void *stream);
 const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream);
 const char *crowd_device_tally(const CrowdArrays *all, void *stream);
+/* [B] of EngineWork in CrowdArrays, which may be compiled for one robot. */
+size_t crowd_device_work_bytes(void);
 /* NULL if the kernels are compiled for such a robot, else the reason. */
 const char *crowd_device_fits(const EngineTree *tree);
 #ifdef __cplusplus

@@ -45,6 +45,10 @@ const char *crowd_device_tally(const CrowdArrays *all, void *stream) {
     return none;
 }
 
+size_t crowd_device_work_bytes(void) {
+    return 0;
+}
+
 const char *crowd_device_fits(const EngineTree *tree) {
     (void)tree;
     return none;

@@ -112,16 +112,16 @@ MILD_HD void surface_frame(const Real *slope, Real frame[3][3]) {
     cross3(frame[0], frame[1], frame[2]);
 }
 
-/* The four edges of a corner's pyramid: normal plus and minus friction times each tangent. */
+/* The four edges of a corner's pyramid: normal plus and minus friction times each tangent.
+ * contact.twist is that of the foot's motion, all six numbers. */
 MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineSurface *surface,
                           EngineWork *work, int corner) {
-    EngineSupport *support = &work->now.support;
-    EngineContact *contact = &support->ground.contact;
+    EngineContact *contact = &work->now.support.ground.contact;
     const EngineTree *tree = &model->tree;
     const EngineSoft *soft = &model->number.contact;
     const int f = tree->corner_foot[corner];
     const EngineFoot *foot = &model->number.foot[f];
-    const int link = tree->foot_link[f];
+    const Real *twist = contact->twist[f];
     Real frame[3][3];
     Real arm[3];
     Real point[3];
@@ -140,51 +140,16 @@ MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineS
         const int row = 4 * corner + e;
         const Real lean = e % 2 ? -friction : friction;
         Real *edge = contact->edge[row];
-        Real speed = 0;
         for (int k = 0; k < 3; k++) {
             edge[k] = frame[0][k] + lean * frame[1 + e / 2][k];
         }
         cross3(arm, edge, edge + 3);
-        LANE_ROLLED
-        for (int place = 0; place < engine_row_length(tree, link); place++) {
-            const Real *column = support->jacobian[f][place];
-            speed += (dot3(edge, column) + dot3(edge + 3, column + 3)) *
-                     work->rate[tree->row_dof[link][place]];
-        }
+        const Real speed = dot3(edge, twist) + dot3(edge + 3, twist + 3);
         contact->reference[row] = -soft->damping * speed - soft->stiffness * d * distance;
         contact->weight[row] =
             distance < 0 ? 1 / real_max(regularizer, REGULARIZER_LEAST) : REAL(0);
     }
 }
-
-/* surface: [corners] under their centres, or one for all of them when `level`. */
-LANE_FN void engine_collide(const EngineModel *model, Real friction, const EngineSurface *surface,
-                            int level, EngineWork *work) {
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
-            corner_edges(model, friction, surface + (level ? 0 : c), work, c);
-        }
-    }
-    lanes_meet();
-}
-
-/* The same on any ground. A corner touches the tangent plane under its centre. */
-LANE_FN void engine_collide_on(const EngineModel *model, Real friction, const EngineGround *ground,
-                               EngineWork *work) {
-    EACH_LANE(l) {
-        const MapSpot spot = engine_spot(ground, work);
-        for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
-            Real center[3];
-            corner_center(model, work, c, center);
-            const EngineSurface surface = engine_surface(ground, work, &spot, center[0], center[1]);
-            corner_edges(model, friction, &surface, work, c);
-        }
-    }
-    lanes_meet();
-}
-
-/* ---- one Newton step ---- */
 
 /* J x of all feet. */
 LANE_FN void engine_twists(const EngineTree *tree, EngineSupport *support, const Real *x,
@@ -197,6 +162,40 @@ LANE_FN void engine_twists(const EngineTree *tree, EngineSupport *support, const
     }
     lanes_meet();
 }
+
+/* surface: [corners], or one for all of them when `level`. */
+LANE_FN void engine_collide(const EngineModel *model, Real friction, const EngineSurface *surface,
+                            int level, EngineWork *work) {
+    EngineSupport *support = &work->now.support;
+    engine_twists(&model->tree, support, work->rate, support->ground.contact.twist);
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
+            corner_edges(model, friction, surface + (level ? 0 : c), work, c);
+        }
+    }
+    lanes_meet();
+}
+
+/* The same on any ground. A corner touches the tangent plane under its centre. */
+LANE_FN void engine_collide_on(const EngineModel *model, Real friction, const EngineGround *ground,
+                               EngineWork *work) {
+    engine_twists(&model->tree, &work->now.support, work->rate,
+                  work->now.support.ground.contact.twist);
+    EACH_LANE(l) {
+        const MapSpot spot = engine_spot(ground, work);
+        LANE_ROLLED
+        for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
+            Real center[3];
+            corner_center(model, work, c, center);
+            const EngineSurface surface = engine_surface(ground, work, &spot, center[0], center[1]);
+            corner_edges(model, friction, &surface, work, c);
+        }
+    }
+    lanes_meet();
+}
+
+/* ---- one Newton step ---- */
 
 MILD_HD Real edge_along(const EngineContact *contact, int row, const Real *twist) {
     return dot3(contact->edge[row], twist) + dot3(contact->edge[row] + 3, twist + 3);
@@ -216,7 +215,8 @@ LANE_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
     lanes_meet();
 }
 
-/* For each foot, sums over its pushing edges: the stiffness, and the wrench of their forces. */
+/* For each foot, sums over its pushing edges: the stiffness, and the wrench of their forces, also
+ * the moment of a contact at the surface of a round foot. */
 LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work) {
     EngineContact *contact = &work->now.support.ground.contact;
     EACH_LANE(l) {
@@ -276,20 +276,6 @@ MILD_HD Real stiffened_entry(const EngineTree *tree, const EngineSupport *suppor
     return sum;
 }
 
-/* Degree of freedom d of J^T times the sums of engine_push_of_edges: a round foot, too, takes the
- * moment of a contact at its surface. */
-MILD_HD Real pushes_along(const EngineTree *tree, const EngineWork *work, int d) {
-    Real sum = 0;
-    LANE_ROLLED
-    for (int f = 0; f < engine_feet(tree); f++) {
-        if (foot_moves(tree, f, d)) {
-            const Real *column = work->now.support.jacobian[f][tree->above[d]];
-            sum += dot3(column, work->wrench[f]) + dot3(column + 3, work->wrench[f] + 3);
-        }
-    }
-    return sum;
-}
-
 /* x of the limit of link i. */
 MILD_HD Real limit_residual(const EngineWork *work, int i) {
     return work->limit_side[i] * work->acceleration[5 + i] - work->limit_reference[i];
@@ -310,8 +296,8 @@ LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
     EACH_LANE(l) {
         LANE_ROLLED
         for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
-            const int d = tree->entry_dof[e];
-            const int place = tree->entry_place[e];
+            const int d = tree->entry[e].dof;
+            const int place = tree->entry[e].place;
             Real sum = work->mass[d][place];
             if (edges) {
                 sum += stiffened_entry(tree, support, d, place);
@@ -325,7 +311,7 @@ LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             Real sum = support->residue[d];
             if (edges) {
-                sum += pushes_along(tree, work, d);
+                sum += wrench_along(tree, work, support->jacobian[0], d);
             }
             if (d >= 6 && limit_pushes(work, d - 5)) {
                 sum -= work->limit_side[d - 5] * work->limit_weight[d - 5] *

@@ -22,28 +22,28 @@ typedef EnginePath EngineBits;
  *
  *     L_dd^2 = M_dd - sum_k L_kd^2,   L_di = (M_di - sum_k L_kd L_ki)/L_dd
  *
- * A lane has an entry, and finds L_dd for itself. */
-LANE_FN void engine_factorise_level(const EngineTree *tree, int level, const Real *matrix,
-                                    Real *factor, Real *inverse) {
-    const int own = 5 + level; /* place of L_dd */
+ * A lane has an entry, and finds L_dd for itself. own: place of L_dd. */
+LANE_FN void engine_factorise_level(const EngineTree *tree, int own, int begin, int end,
+                                    const Real *matrix, Real *factor, Real *inverse) {
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int e = tree->level_entry[level] + LANE(l); e < tree->level_entry[level + 1];
-             e += LANES) {
-            const int d = tree->entry_dof[e];
-            const int place = tree->entry_place[e];
-            const int at = d * ENGINE_STRIDE + place;
-            const Real *row = factor + d * ENGINE_STRIDE;
-            Real diagonal = matrix[at - place + own];
+        for (int e = begin + LANE(l); e < end; e += LANES) {
+            const EngineEntry entry = tree->entry[e];
+            const int d = entry.dof;
+            const int at = d * ENGINE_STRIDE + entry.place;
+            const Real *left = factor + d * ENGINE_STRIDE + own;
+            const Real *right = factor + at;
+            Real diagonal = matrix[d * ENGINE_STRIDE + own];
             Real sum = matrix[at];
             LANE_ROLLED
-            for (int k = tree->behind[d] - d - 1; k > 0; k--) {
-                row += ENGINE_STRIDE;
-                diagonal -= row[own] * row[own];
-                sum -= row[own] * row[place];
+            for (int k = entry.behind - d; k > 1; k--) {
+                left += ENGINE_STRIDE;
+                right += ENGINE_STRIDE;
+                diagonal -= *left * *left;
+                sum -= *left * *right;
             }
             const Real scale = REAL_INVERSE_SQRT(diagonal);
-            if (place == own) {
+            if (entry.place == own) {
                 inverse[d] = scale;
             } else {
                 factor[at] = sum * scale;
@@ -58,84 +58,80 @@ LANE_FN void engine_factorise_level(const EngineTree *tree, int level, const Rea
 LANE_FN void engine_factorise_base(const EngineTree *tree, const Real *matrix, Real *factor,
                                    Real *inverse) {
     Real x[LANE_COPIES];
+    int row[LANE_COPIES], place[LANE_COPIES];
     EACH_LANE(l) {
-        x[l] = 0;
+        const EngineEntry entry = tree->entry[LANE(l) < ENGINE_BASE_ENTRIES ? LANE(l) : 0];
+        const int i = row[l] = entry.dof;
+        const int j = place[l] = entry.place;
+        x[l] = matrix[i * ENGINE_STRIDE + j];
+        ENGINE_LOOP
+        for (int k = 6; k < engine_dofs(tree); k++) {
+            x[l] -= factor[k * ENGINE_STRIDE + i] * factor[k * ENGINE_STRIDE + j];
+        }
         if (LANE(l) < ENGINE_BASE_ENTRIES) {
-            const int i = tree->entry_dof[LANE(l)];
-            const int j = tree->entry_place[LANE(l)];
-            const Real *row = factor + 5 * ENGINE_STRIDE;
-            x[l] = matrix[i * ENGINE_STRIDE + j];
-            LANE_ROLLED
-            for (int k = 6; k < engine_dofs(tree); k++) {
-                row += ENGINE_STRIDE;
-                x[l] -= row[i] * row[j];
-            }
             factor[i * ENGINE_STRIDE + j] = x[l];
         }
     }
     lanes_meet();
     LANE_ROLLED
     for (int k = 5; k >= 0; k--) {
-        const Real *row = factor + k * ENGINE_STRIDE; /* L_kk L_k */
-        const Real scale = REAL_INVERSE_SQRT(row[k]);
+        const Real *from = factor + k * ENGINE_STRIDE; /* L_kk L_k */
+        const Real scale = REAL_INVERSE_SQRT(from[k]);
         EACH_LANE(l) {
-            if (LANE(l) < ENGINE_BASE_ENTRIES) {
-                const int i = tree->entry_dof[LANE(l)];
-                const int j = tree->entry_place[LANE(l)];
-                if (i < k) {
-                    x[l] -= row[i] * scale * (row[j] * scale);
-                    factor[i * ENGINE_STRIDE + j] = x[l];
-                } else if (i == k) {
-                    x[l] = j == k ? scale : x[l] * scale;
-                }
+            if (LANE(l) < ENGINE_BASE_ENTRIES && row[l] < k) {
+                x[l] -= from[row[l]] * scale * (from[place[l]] * scale);
+                factor[row[l] * ENGINE_STRIDE + place[l]] = x[l];
+            }
+            if (LANE(l) == k) {
+                inverse[k] = scale;
             }
         }
         lanes_meet();
     }
     EACH_LANE(l) {
         if (LANE(l) < ENGINE_BASE_ENTRIES) {
-            const int i = tree->entry_dof[LANE(l)];
-            const int j = tree->entry_place[LANE(l)];
-            if (i == j) {
-                inverse[i] = x[l];
-            } else {
-                factor[i * ENGINE_STRIDE + j] = x[l];
-            }
+            factor[row[l] * ENGINE_STRIDE + place[l]] = x[l] * inverse[row[l]];
         }
     }
     lanes_meet();
 }
 
 /* factor and inverse <- L of a matrix with the sparsity of M, which may be `factor` itself. */
-LANE_CALL void engine_factorise(const EngineTree *tree, const Real *matrix, Real *factor,
-                                Real *inverse) {
+LANE_FN void engine_factorise(const EngineTree *tree, const Real *matrix, Real *factor,
+                              Real *inverse) {
+    int end = engine_entries(tree);
     LANE_ROLLED
     for (int level = tree->levels - 1; level > 0; level--) {
-        engine_factorise_level(tree, level, matrix, factor, inverse);
+        const int begin = tree->level_entry[level];
+        engine_factorise_level(tree, 5 + level, begin, end, matrix, factor, inverse);
+        end = begin;
     }
     engine_factorise_base(tree, matrix, factor, inverse);
 }
 
 /* x <- L^-T x, leaves first. A lane has x of its degrees of freedom in registers. */
-LANE_CALL void engine_solve_transposed(const EngineTree *tree, const Real *factor,
-                                       const Real *inverse, Real *x) {
+LANE_FN void engine_solve_transposed(const EngineTree *tree, const Real *factor,
+                                     const Real *inverse, Real *x) {
+    const int dofs = engine_dofs(tree);
     Real own[DOF_SLOTS][LANE_COPIES], scale[DOF_SLOTS][LANE_COPIES];
-    int above[DOF_SLOTS][LANE_COPIES], behind[DOF_SLOTS][LANE_COPIES];
+    unsigned behind[DOF_SLOTS][LANE_COPIES];   /* how many */
+    unsigned after[DOF_SLOTS][LANE_COPIES];    /* of those before k, which wraps around below 0 */
+    const Real *entry[DOF_SLOTS][LANE_COPIES]; /* of row k */
     EACH_LANE(l) {
         LANE_UNROLL
         for (int s = 0; s < DOF_SLOTS; s++) {
             const int d = LANE(l) + s * LANES;
-            const int in = d < engine_dofs(tree);
+            const int in = d < dofs;
             own[s][l] = in ? x[d] : 0;
             scale[s][l] = in ? inverse[d] : 0;
-            above[s][l] = in ? tree->above[d] : 0;
-            behind[s][l] = in ? tree->behind[d] : 0;
+            behind[s][l] = in ? (unsigned)(tree->behind[d] - 1 - d) : 0;
+            after[s][l] = (unsigned)(dofs - 2 - d);
+            entry[s][l] = factor + (dofs - 1) * ENGINE_STRIDE + (in ? tree->above[d] : 0);
         }
     }
     LANE_ROLLED
-    for (int k = engine_dofs(tree) - 1; k > 0; k--) {
+    for (int k = dofs - 1; k > 0; k--) {
         Real scaled[LANE_COPIES];
-        const Real *row = factor + k * ENGINE_STRIDE;
         EACH_LANE(l) {
             scaled[l] = own[DOF_SLOT(k)][l] * scale[DOF_SLOT(k)][l];
         }
@@ -143,16 +139,18 @@ LANE_CALL void engine_solve_transposed(const EngineTree *tree, const Real *facto
         EACH_LANE(l) {
             LANE_UNROLL
             for (int s = 0; s < DOF_SLOTS; s++) {
-                if (k > LANE(l) + s * LANES && k < behind[s][l]) {
-                    own[s][l] -= row[above[s][l]] * solved;
+                if (after[s][l] < behind[s][l]) {
+                    own[s][l] -= *entry[s][l] * solved;
                 }
+                after[s][l]--;
+                entry[s][l] -= ENGINE_STRIDE;
             }
         }
     }
     EACH_LANE(l) {
         LANE_UNROLL
         for (int s = 0; s < DOF_SLOTS; s++) {
-            if (LANE(l) + s * LANES < engine_dofs(tree)) {
+            if (LANE(l) + s * LANES < dofs) {
                 x[LANE(l) + s * LANES] = own[s][l] * scale[s][l];
             }
         }
@@ -161,8 +159,8 @@ LANE_CALL void engine_solve_transposed(const EngineTree *tree, const Real *facto
 }
 
 /* x <- L^-1 x, root first: what a lane takes is the next entry of its row. */
-LANE_CALL void engine_solve(const EngineTree *tree, const Real *factor, const Real *inverse,
-                            Real *x) {
+LANE_FN void engine_solve(const EngineTree *tree, const Real *factor, const Real *inverse,
+                          Real *x) {
     Real own[DOF_SLOTS][LANE_COPIES], scale[DOF_SLOTS][LANE_COPIES];
     EngineBits ancestors[DOF_SLOTS][LANE_COPIES];
     const Real *next[DOF_SLOTS][LANE_COPIES];
@@ -187,9 +185,11 @@ LANE_CALL void engine_solve(const EngineTree *tree, const Real *factor, const Re
         EACH_LANE(l) {
             LANE_UNROLL
             for (int s = 0; s < DOF_SLOTS; s++) {
-                if (ancestors[s][l] >> k & 1) {
-                    own[s][l] -= *next[s][l]++ * solved;
+                const int takes = ancestors[s][l] >> k & 1;
+                if (takes) {
+                    own[s][l] -= *next[s][l] * solved;
                 }
+                next[s][l] += takes;
             }
         }
     }

@@ -55,13 +55,15 @@ MILD_HD void foot_column(const EngineTree *tree, EngineWork *work, int f, int pl
 MILD_HD Real foot_twist(const EngineTree *tree, const EngineSupport *support, const Real *x,
                         int foot, int c) {
     const int link = tree->foot_link[foot];
-    const EngineIndex *dof = tree->row_dof[link];
     const Real *number = support->jacobian[foot][0] + c;
     Real sum = 0;
+    ENGINE_LOOP
+    for (int d = 0; d < 6; d++) {
+        sum += number[6 * d] * x[d];
+    }
     LANE_ROLLED
-    for (int left = engine_row_length(tree, link); left > 0; left--) {
-        sum += *number * x[*dof++];
-        number += 6;
+    for (int place = 6; place < tree->shared[foot][foot]; place++) {
+        sum += number[6 * place] * x[tree->row_dof[link][place]];
     }
     return sum;
 }
@@ -81,8 +83,9 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = LANE(l); n < chain * feet; n += LANES) {
-            if (n % chain < engine_row_length(tree, tree->foot_link[n / chain])) {
-                foot_column(tree, work, n / chain, n % chain);
+            const int f = n / chain;
+            if (n % chain < tree->shared[f][f]) {
+                foot_column(tree, work, f, n % chain);
             }
         }
     }
@@ -103,13 +106,6 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
     lanes_meet();
 }
 
-/* In registers where the length of a chain is known to the compiler. */
-#if ENGINE_FIXED
-#define CHAIN_LOOP LANE_UNROLL
-#else
-#define CHAIN_LOOP LANE_ROLLED
-#endif
-
 /* half <- L^-T J^T, and V_free = J (qvel + dt L^-1 y) = J qvel + dt half^T y, where y = L^-T force.
  * A lane has a column of a foot, whose chain is a path, so it needs no other lane. As in
  * engine_solve_transposed, a solved entry is taken from those above it. */
@@ -122,22 +118,22 @@ LANE_FN void engine_half_solve(const EngineModel *model, EngineWork *work) {
             const int f = n / 6;
             const int c = n % 6;
             const int link = tree->foot_link[f];
-            const int length = engine_row_length(tree, link);
+            const int length = tree->shared[f][f];
             const int part = c < foot_parts(tree, f);
             Real gain = 0;
             Real x[ENGINE_CHAIN];
-            CHAIN_LOOP
+            ENGINE_LOOP
             for (int place = 0; place < ENGINE_CHAIN; place++) {
                 x[place] = part && place < length ? support->jacobian[f][place][c] : 0;
             }
-            CHAIN_LOOP
+            ENGINE_LOOP
             for (int k = ENGINE_CHAIN - 1; k >= 0; k--) {
                 if (k < length) {
-                    const int d = tree->row_dof[link][k];
+                    const int d = k < 6 ? k : tree->row_dof[link][k];
                     x[k] *= work->inverse[d];
                     support->half[f][k][c] = x[k];
                     gain += x[k] * work->acceleration[d];
-                    CHAIN_LOOP
+                    ENGINE_LOOP
                     for (int place = 0; place < k; place++) {
                         x[place] -= work->factor[d][place] * x[k];
                     }
@@ -186,28 +182,37 @@ LANE_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
 /* bool: foot f moves with degree of freedom d. */
 MILD_HD int foot_moves(const EngineTree *tree, int f, int d) {
     const int hinge = 5 + tree->foot_link[f];
-    return d < 6 || (d <= hinge && hinge < tree->behind[d]);
+    return (hinge >= d) & (hinge < tree->behind[d]);
+}
+
+/* Degree of freedom d of the sum over the feet of rows^T wrench; rows [feet * chain][6]: J^T or
+ * L^-T J^T. */
+MILD_HD Real wrench_along(const EngineTree *tree, const EngineWork *work, const Real (*rows)[6],
+                          int d) {
+    const int above = tree->above[d];
+    Real sum = 0;
+    LANE_ROLLED
+    for (int f = 0; f < engine_feet(tree); f++) {
+        if (foot_moves(tree, f, d)) {
+            const Real *row = rows[ENGINE_CHAIN * f + above];
+            sum += dot3(row, work->wrench[f]) + dot3(row + 3, work->wrench[f] + 3);
+        }
+    }
+    return sum;
 }
 
 /* acceleration <- L^-1 (L^-T force + the sum over the feet of half wrench): qacc with the wrenches
  * of soft ground, or without ground. wrenches: bool. */
 LANE_FN void engine_accelerate(const EngineTree *tree, EngineWork *work, int wrenches) {
-    const EngineSupport *support = &work->now.support;
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int d = LANE(l); wrenches && d < engine_dofs(tree); d += LANES) {
-            Real sum = work->acceleration[d];
+    if (wrenches) {
+        EACH_LANE(l) {
             LANE_ROLLED
-            for (int f = 0; f < engine_feet(tree); f++) {
-                if (foot_moves(tree, f, d)) {
-                    const Real *half = support->half[f][tree->above[d]];
-                    sum += dot3(half, work->wrench[f]) + dot3(half + 3, work->wrench[f] + 3);
-                }
+            for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+                work->acceleration[d] += wrench_along(tree, work, work->now.support.half[0], d);
             }
-            work->acceleration[d] = sum;
         }
+        lanes_meet();
     }
-    lanes_meet();
     engine_solve(tree, work->factor[0], work->inverse, work->acceleration);
 }
 

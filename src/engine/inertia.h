@@ -13,20 +13,21 @@ MILD_HD void inertia_add(Real *sum, const Real *inertia, const Real *arm) {
     const Real mass = inertia[INERTIA_MASS];
     const Real *moment = inertia + INERTIA_MOMENT;
     const Real *tensor = inertia + INERTIA_TENSOR;
+    Real *total = sum + INERTIA_TENSOR;
     Real shifted[3]; /* moment about the sum's point */
-    Real square[3];  /* arm (moment + shifted), component by component */
+    Real both[3];
     for (int k = 0; k < 3; k++) {
         shifted[k] = moment[k] + mass * arm[k];
-        square[k] = arm[k] * (moment[k] + shifted[k]);
+        both[k] = moment[k] + shifted[k];
         sum[INERTIA_MOMENT + k] += shifted[k];
     }
     sum[INERTIA_MASS] += mass;
-    sum[INERTIA_TENSOR] += tensor[0] + (square[1] + square[2]);
-    sum[INERTIA_TENSOR + 1] += tensor[1] + (square[0] + square[2]);
-    sum[INERTIA_TENSOR + 2] += tensor[2] + (square[0] + square[1]);
-    sum[INERTIA_TENSOR + 3] += tensor[3] - (moment[0] * arm[1] + arm[0] * shifted[1]);
-    sum[INERTIA_TENSOR + 4] += tensor[4] - (moment[0] * arm[2] + arm[0] * shifted[2]);
-    sum[INERTIA_TENSOR + 5] += tensor[5] - (moment[1] * arm[2] + arm[1] * shifted[2]);
+    total[0] = total[0] + tensor[0] + arm[1] * both[1] + arm[2] * both[2];
+    total[1] = total[1] + tensor[1] + arm[0] * both[0] + arm[2] * both[2];
+    total[2] = total[2] + tensor[2] + arm[0] * both[0] + arm[1] * both[1];
+    total[3] = total[3] + tensor[3] - moment[0] * arm[1] - arm[0] * shifted[1];
+    total[4] = total[4] + tensor[4] - moment[0] * arm[2] - arm[0] * shifted[2];
+    total[5] = total[5] + tensor[5] - moment[1] * arm[2] - arm[1] * shifted[2];
 }
 
 /* [m] Centre of mass of the base's own body in the base's frame, as varied. */

@@ -4,51 +4,57 @@
 
 #include "engine/data.h"
 
-/* Row k of the rotation matrix of a unit quaternion. */
-MILD_HD void quaternion_row(const Real *q, int k, Real *row) {
-    const int i = k == 2 ? 0 : k + 1;
-    const int j = k == 0 ? 2 : k - 1;
+/* Rotation matrix of a unit quaternion. */
+MILD_HD void quaternion_matrix(const Real *q, Real *R) {
     const Real w = q[0];
-    const Real x = q[1 + k];
-    const Real y = q[1 + i];
-    const Real z = q[1 + j];
-    row[k] = w * w + x * x - y * y - z * z;
-    row[i] = 2 * (x * y - w * z);
-    row[j] = 2 * (x * z + w * y);
+    const Real x = q[1];
+    const Real y = q[2];
+    const Real z = q[3];
+    R[0] = w * w + x * x - y * y - z * z;
+    R[1] = 2 * (x * y - w * z);
+    R[2] = 2 * (x * z + w * y);
+    R[3] = 2 * (x * y + w * z);
+    R[4] = w * w - x * x + y * y - z * z;
+    R[5] = 2 * (y * z - w * x);
+    R[6] = 2 * (x * z - w * y);
+    R[7] = 2 * (y * z + w * x);
+    R[8] = w * w - x * x - y * y + z * z;
 }
 
-MILD_HD void quaternion_matrix(const Real *q, Real *R) {
-    for (int k = 0; k < 3; k++) {
-        quaternion_row(q, k, R + 3 * k);
+/* A link in its parent's frame. */
+MILD_HD void engine_hinge(const EngineLink *link, Real angle, Real *local) {
+    Real sine;
+    Real cosine;
+    real_sine_cosine(angle - link->reference, &sine, &cosine);
+    for (int k = 0; k < 12; k += 4) {
+        Real still[4];
+        Real with_cosine[4];
+        Real with_sine[4];
+        load4(link->turn[0] + k, still);
+        load4(link->turn[1] + k, with_cosine);
+        load4(link->turn[2] + k, with_sine);
+        for (int c = 0; c < 3; c++) {
+            still[c] = still[c] + cosine * with_cosine[c] + sine * with_sine[c];
+        }
+        store4(still, local + k);
     }
 }
 
-/* Each link in its parent's frame, and the base. A turn about a fixed axis is 1, cosine and sine
- * times three constant matrices, so a lane computes a row without knowing the axis. */
+/* The base in the world, and each link in its parent's frame. */
 LANE_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int n = LANE(l); n < 3 * engine_links(&model->tree); n += LANES) {
-            const int i = n / 3;
-            const int k = n % 3;
-            const EngineLink *link = &model->number.link[i];
-            Real part[3][4];
-            Real row[4];
-            Real sine;
-            Real cosine;
-            if (i == 0) {
-                quaternion_row(work->quaternion, k, work->rotation[0] + 3 * k);
-                work->position[0][k] = work->axis[0][k] = 0;
+        for (int i = LANE(l); i < engine_links(&model->tree); i += LANES) {
+            if (i > 0) {
+                engine_hinge(&model->number.link[i], work->angle[i],
+                             work->now.dynamics.of.local[i]);
                 continue;
             }
-            real_sine_cosine(work->angle[i] - link->reference, &sine, &cosine);
-            for (int m = 0; m < 3; m++) {
-                load4(link->turn[m] + 4 * k, part[m]);
+            quaternion_matrix(work->quaternion, work->rotation[0]);
+            for (int k = 0; k < 3; k++) {
+                work->position[0][k] = 0;
+                work->axis[0][k] = 0;
             }
-            for (int c = 0; c < 4; c++) {
-                row[c] = part[0][c] + cosine * part[1][c] + sine * part[2][c];
-            }
-            store4(row, work->now.dynamics.of.local[i] + 4 * k);
         }
     }
     lanes_meet();
@@ -57,14 +63,15 @@ LANE_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
 /* Row k of the rotations, and component k of the positions, from the base down to a leaf. */
 MILD_HD void engine_chain_row(const EngineTree *tree, EngineWork *work, int leaf, int k) {
     EngineDynamics *now = &work->now.dynamics;
-    Real row[3];
-    Real position = 0;
-    for (int c = 0; c < 3; c++) {
-        row[c] = work->rotation[0][3 * k + c];
-    }
+    const EngineIndex *dof = tree->row_dof[leaf] + 6;
+    Real *rotation = work->rotation[0] + 3 * k;
+    Real *position = work->position[0] + k;
+    Real *arm = now->arm[0] + k;
+    Real row[3] = {rotation[0], rotation[1], rotation[2]};
+    Real place = 0;
     LANE_ROLLED
-    for (int place = 6; place < engine_row_length(tree, leaf); place++) {
-        const int i = tree->row_dof[leaf][place] - 5;
+    for (int level = tree->level[leaf]; level > 0; level--) {
+        const int i = *dof++ - 5;
         Real local[3][4];
         Real next[4];
         for (int m = 0; m < 3; m++) {
@@ -74,10 +81,10 @@ MILD_HD void engine_chain_row(const EngineTree *tree, EngineWork *work, int leaf
             next[c] = row[0] * local[0][c] + row[1] * local[1][c] + row[2] * local[2][c];
         }
         for (int c = 0; c < 3; c++) {
-            work->rotation[i][3 * k + c] = row[c] = next[c];
+            rotation[9 * i + c] = row[c] = next[c];
         }
-        now->arm[i][k] = next[3];
-        work->position[i][k] = position = position + next[3];
+        arm[3 * i] = next[3];
+        position[3 * i] = place = place + next[3];
     }
 }
 

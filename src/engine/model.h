@@ -107,6 +107,12 @@ typedef struct {
 #define ENGINE_ENTRIES ENGINE_ENTRIES_MAX
 #define ENGINE_CHAIN ENGINE_DOFS_MAX
 #endif
+/* For a short loop of that many rounds. */
+#if ENGINE_FIXED
+#define ENGINE_LOOP LANE_UNROLL
+#else
+#define ENGINE_LOOP LANE_ROLLED
+#endif
 #define ENGINE_LINKS (1 + ENGINE_JOINTS)
 #define ENGINE_DOFS (6 + ENGINE_JOINTS)
 /* From a row of M to the next: odd, so that lanes that read one column use different banks of the

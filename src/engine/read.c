@@ -104,8 +104,8 @@ static void read_rows(EngineTree *tree) {
 
 static void add_row(EngineTree *tree, int dof) {
     for (int place = 0; place <= tree->above[dof]; place++) {
-        tree->entry_dof[tree->entries] = (EngineIndex)dof;
-        tree->entry_place[tree->entries++] = (EngineIndex)place;
+        tree->entry[tree->entries++] =
+            (EngineEntry){(EngineIndex)dof, (EngineIndex)place, tree->behind[dof]};
     }
 }
 

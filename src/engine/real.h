@@ -79,9 +79,9 @@ MILD_HD void cross3(const Real *a, const Real *b, Real *out) {
 }
 
 MILD_HD void add_cross3(const Real *a, const Real *b, Real *out) {
-    out[0] += a[1] * b[2] - a[2] * b[1];
-    out[1] += a[2] * b[0] - a[0] * b[2];
-    out[2] += a[0] * b[1] - a[1] * b[0];
+    out[0] = out[0] + a[1] * b[2] - a[2] * b[1];
+    out[1] = out[1] + a[2] * b[0] - a[0] * b[2];
+    out[2] = out[2] + a[0] * b[1] - a[1] * b[0];
 }
 
 /* out = R v, R row major. */

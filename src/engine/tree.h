@@ -24,6 +24,13 @@
 typedef unsigned char EngineIndex;
 typedef unsigned long long EnginePath; /* a bit for each degree of freedom */
 
+/* An entry of M. */
+typedef struct {
+    EngineIndex dof;    /* whose row */
+    EngineIndex place;  /* where in it */
+    EngineIndex behind; /* EngineTree.behind of the row */
+} EngineEntry;
+
 typedef struct {
     int joints;
     int feet;
@@ -48,9 +55,8 @@ typedef struct {
     EngineIndex above[ENGINE_DOFS_MAX]; /* how many are above it: its place in the rows behind it */
     EngineIndex behind[ENGINE_DOFS_MAX]; /* the first one that does not move with it or before it */
     /* Entries level by level, those of the base first. */
-    short level_entry[ENGINE_LINKS_MAX + 1];     /* [levels + 1] where those of a level begin */
-    EngineIndex entry_dof[ENGINE_ENTRIES_MAX];   /* whose row */
-    EngineIndex entry_place[ENGINE_ENTRIES_MAX]; /* where in it */
+    short level_entry[ENGINE_LINKS_MAX + 1]; /* [levels + 1] where those of a level begin */
+    EngineEntry entry[ENGINE_ENTRIES_MAX];
     /* ---- feet ---- */
     EngineIndex foot_link[ROBOT_FEET_MAX];              /* link that carries the sole */
     EngineIndex foot_round[ROBOT_FEET_MAX];             /* bool: transmits no moment */

@@ -49,8 +49,8 @@ static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, 
     }
     if (at.lane == 0) {
         int still = !def->clock || task_is_standing(env->command_seen);
-        clock[0] = still ? 0 : (float)sin(TWO_PI * env->phase);
-        clock[1] = still ? 0 : (float)cos(TWO_PI * env->phase);
+        clock[0] = still ? 0 : (float)place_sin(TWO_PI * env->phase);
+        clock[1] = still ? 0 : (float)place_cos(TWO_PI * env->phase);
     }
 }
 

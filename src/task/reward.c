@@ -24,8 +24,8 @@ static inline MILD_BOTH double per_pair(const TaskMotion *m, double sum) {
  * would hide one. */
 static inline MILD_BOTH double tracking(const TaskMotion *m, double error) {
     const RewardDef *def = &m->def->reward;
-    return 0.5 * (exp(-def->tracking_sharpness * square(error)) +
-                  exp(-fabs(error) / def->tracking_width));
+    return 0.5 * (place_exp(-def->tracking_sharpness * square(error)) +
+                  place_exp(-fabs(error) / def->tracking_width));
 }
 
 /* Forward and sideways errors count separately. In the norm of both, a little sway would hide a
@@ -73,7 +73,7 @@ static inline MILD_BOTH double reward_slip(const TaskMotion *m) {
 }
 
 static inline MILD_BOTH double reward_base_acceleration(const TaskMotion *m) {
-    return exp(-3 * m->twist_change);
+    return place_exp(-3 * m->twist_change);
 }
 
 static inline MILD_BOTH double reward_action_smoothness(const TaskMotion *m) {
@@ -91,8 +91,8 @@ static inline MILD_BOTH double reward_reference_motion(const TaskMotion *m) {
         sum +=
             square(m->q[i] - task_gait_reference(m->def, m->robot, m->env->phase, m->standing, i));
     }
-    double d = sqrt(sum);
-    return exp(-2 * d) - 0.2 * clamp(d, 0, 0.5);
+    double d = place_root(sum);
+    return place_exp(-2 * d) - 0.2 * clamp(d, 0, 0.5);
 }
 
 /* The vendor's exp(-100 x) alone is flat beyond a fifth of a radian, and so gives no signal
@@ -106,23 +106,24 @@ static inline MILD_BOTH double reward_default_pose(const TaskMotion *m) {
             int same = robot_joint_foot(m->robot)[i] == f;
             leg += same ? square(still[i] * (m->q[i] - pose[i])) : 0;
         }
-        away += sqrt(leg);
+        away += place_root(leg);
     }
     for (int i = 0; i < m->env->shape.joints; i++) {
         all += square(m->q[i] - pose[i]);
     }
-    return 0.5 * (exp(-100 * clamp(away - 0.1, 0, 50)) + exp(-3 * away)) - 0.01 * sqrt(all);
+    return 0.5 * (place_exp(-100 * clamp(away - 0.1, 0, 50)) + place_exp(-3 * away)) -
+           0.01 * place_root(all);
 }
 
 static inline MILD_BOTH double reward_base_height(const TaskMotion *m) {
-    return exp(-100 * fabs(m->base_height - task_nominal_height(m->def, m->robot)));
+    return place_exp(-100 * fabs(m->base_height - task_nominal_height(m->def, m->robot)));
 }
 
 static inline MILD_BOTH double within(double distance, const double wanted[2],
                                       const double own[2]) {
     const double *limits = wanted[1] > 0 ? wanted : own;
     double below = clamp(limits[0] - distance, 0, 0.5), above = clamp(distance - limits[1], 0, 0.5);
-    return 0.5 * (exp(-100 * below) + exp(-100 * above));
+    return 0.5 * (place_exp(-100 * below) + place_exp(-100 * above));
 }
 
 static inline MILD_BOTH double reward_feet_distance(const TaskMotion *m) {
@@ -134,8 +135,9 @@ static inline MILD_BOTH double reward_knee_distance(const TaskMotion *m) {
 }
 
 static inline MILD_BOTH double reward_orientation(const TaskMotion *m) {
-    double tilt = sqrt(square(m->gravity[0]) + square(m->gravity[1]));
-    return 0.5 * (exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + exp(-4 * tilt));
+    double tilt = place_root(square(m->gravity[0]) + square(m->gravity[1]));
+    return 0.5 *
+           (place_exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + place_exp(-4 * tilt));
 }
 
 /* Paid once, at touchdown. It is divided by the period, because rewards are rates that are
@@ -146,8 +148,8 @@ static inline MILD_BOTH double reward_air_time(const TaskMotion *m) {
 }
 
 static inline MILD_BOTH double reward_base_motion(const TaskMotion *m) {
-    return 0.5 * (exp(-10 * square(m->velocity[2])) +
-                  exp(-5 * sqrt(square(m->omega[0]) + square(m->omega[1]))));
+    return 0.5 * (place_exp(-10 * square(m->velocity[2])) +
+                  place_exp(-5 * place_root(square(m->omega[0]) + square(m->omega[1]))));
 }
 
 static inline MILD_BOTH double reward_contact_force(const TaskMotion *m) {

@@ -48,8 +48,8 @@ static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const 
     memset(&env->robot, 0, sizeof env->robot);
     double yaw = env->command_frozen ? 0 : PI * (2 * random_unit(&r) - 1);
     env->robot.qpos[2] = env->terrain.height + robot_stand_height(robot) - depth + 0.002;
-    env->robot.qpos[3] = cos(0.5 * yaw);
-    env->robot.qpos[6] = sin(0.5 * yaw);
+    env->robot.qpos[3] = place_cos(0.5 * yaw);
+    env->robot.qpos[6] = place_sin(0.5 * yaw);
     for (int i = 0; i < env->shape.joints; i++) {
         double q = pose[i] + z->initial_joint * (2 * random_unit(&r) - 1);
         env->robot.qpos[7 + i] =
@@ -157,8 +157,9 @@ static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const
         const RobotFoot *foot = robot_sim_foot(sim, f);
         const double *v = foot->sole_center_velocity, *force = foot->force;
         m->foot_height[f] = foot->sole_height;
-        m->foot_speed[f] = sqrt(v[0] * v[0] + v[1] * v[1]);
-        m->foot_force[f] = sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
+        m->foot_speed[f] = place_root(v[0] * v[0] + v[1] * v[1]);
+        m->foot_force[f] =
+            place_root(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
         m->contact[f] = force[2] > CONTACT_FORCE;
         m->stance[f] = task_gait_stance(robot, env->phase, m->standing, f);
         m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
@@ -183,8 +184,9 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     memset(&m, 0, sizeof m);
     m.def = def, m.robot = robot, m.env = env;
     const double *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
-    double heading = atan2(rotation[3], rotation[0]), c = cos(heading), s = sin(heading), twist[6],
-           change = 0;
+    double length = place_root(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
+    double c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
+    double twist[6], change = 0;
     m.standing = task_is_standing(env->command);
     m.velocity[0] = c * qvel[0] + s * qvel[1];
     m.velocity[1] = -s * qvel[0] + c * qvel[1];
@@ -197,18 +199,21 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     for (int i = 0; i < 6; i++) {
         change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
     }
-    m.twist_change = sqrt(change);
+    m.twist_change = place_root(change);
     const double now[3] = {m.velocity[0], m.velocity[1], m.omega[2]};
     for (int i = 0; i < 3; i++) {
         env->smooth_velocity[i] +=
             TASK_PERIOD / def->reward.tracking_time * (now[i] - env->smooth_velocity[i]);
     }
     memcpy(env->base_twist, twist, sizeof twist);
-    memcpy(m.q, robot_sim_qpos(sim) + 7, sizeof m.q);
-    memcpy(m.qd, qvel + 6, sizeof m.qd);
-    memcpy(m.qd_before, env->joint_speed, sizeof m.qd_before);
-    memcpy(env->joint_speed, m.qd, sizeof m.qd);
-    memcpy(m.torque, torque, (size_t)env->shape.joints * sizeof *torque);
+    const double *q = robot_sim_qpos(sim) + 7;
+    for (int i = 0; i < env->shape.joints; i++) {
+        m.q[i] = q[i];
+        m.qd[i] = qvel[6 + i];
+        m.qd_before[i] = env->joint_speed[i];
+        env->joint_speed[i] = m.qd[i];
+        m.torque[i] = torque[i];
+    }
     m.foot_distance = robot_sim_foot_distance(sim);
     m.knee_distance = robot_sim_knee_distance(sim);
     feet_motion(env, def, robot, sim, &m);
@@ -220,7 +225,7 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
 static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
                                        const RobotSim *sim) {
     return robot_sim_foot_distance(sim) < def->crossing_limit ||
-           robot_sim_base_rotation(sim)[8] < cos(def->tilt_limit) ||
+           robot_sim_base_rotation(sim)[8] < place_cos(def->tilt_limit) ||
            robot_sim_body_clearance(sim, &env->terrain) < 0;
 }
 

@@ -150,8 +150,8 @@ static void note_matrices(const Kit *kit, Worst worst) {
     const int rows = 6 * tree->feet;
     const double *M = oracle.mass;
     for (int e = 0; e < tree->entries; e++) {
-        const int d = tree->entry_dof[e];
-        const int place = tree->entry_place[e];
+        const int d = tree->entry[e].dof;
+        const int place = tree->entry[e].place;
         const int j = tree->row_dof[d < 6 ? 0 : d - 5][place];
         note(worst, MASS,
              fabs(result.mass[e] - M[d * nv + j]) / sqrt(M[d * nv + d] * M[j * nv + j]));
