@@ -38,7 +38,7 @@ static int thread_blocks(int envs) {
 
 static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
     part(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call, int k) {
-    extern __shared__ Real shared[];
+    extern __shared__ __align__(16) Real shared[];
     const long place = warp_robot();
     if (place < all.envs) {
         crowd_part(&all, &call, all.order[place], k,
@@ -64,7 +64,7 @@ static __global__ void __launch_bounds__(TASK_THREADS)
 
 static __global__ void __launch_bounds__(WARP_THREADS)
     pose(const __grid_constant__ CrowdArrays all) {
-    extern __shared__ Real shared[];
+    extern __shared__ __align__(16) Real shared[];
     const long robot = warp_robot();
     if (robot < all.envs) {
         crowd_pose(&all, robot, (CrowdPlace *)shared + threadIdx.x / LANES);

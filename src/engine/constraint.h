@@ -215,29 +215,41 @@ LANE_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
     lanes_meet();
 }
 
-/* For each foot, sums over its pushing edges: the stiffness, and the wrench of their forces, also
- * the moment of a contact at the surface of a round foot. */
-LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work) {
+/* Number n of the sums over a foot's pushing edges: six of the wrench of their forces, also the
+ * moment of a contact at the surface of a round foot, then 21 of the stiffness, which is symmetric
+ * as the base's part of M. */
+MILD_HD void engine_push_number(const EngineTree *tree, EngineWork *work, int f, int n) {
     EngineContact *contact = &work->now.support.ground.contact;
+    const int begin = 4 * tree->corner_begin[f];
+    const int end = 4 * tree->corner_begin[f + 1];
+    const int r = n < 6 ? n : tree->entry[n - 6].dof;
+    const int c = n < 6 ? 0 : tree->entry[n - 6].place;
+    const Real *value = n < 6 ? contact->residual + begin : contact->edge[begin] + c;
+    const int step = n < 6 ? 1 : 6;
+    Real sum = 0;
+    LANE_ROLLED
+    for (int row = begin; row < end; row++) {
+        if (contact->residual[row] < 0) {
+            sum += contact->weight[row] * contact->edge[row][r] * *value;
+        }
+        value += step;
+    }
+    if (n < 6) {
+        work->wrench[f][r] = -sum;
+    } else {
+        contact->stiffness[f][r][c] = sum;
+        contact->stiffness[f][c][r] = sum;
+    }
+}
+
+/* For each foot, the wrench of its pushing edges, and their stiffness if that is wanted. */
+LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, int stiffness) {
+    const int feet = engine_feet(tree);
+    const int count = feet * (stiffness ? 6 + ENGINE_BASE_ENTRIES : 6);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int n = LANE(l); n < 42 * engine_feet(tree); n += LANES) {
-            const int f = n / 42;
-            const int r = n % 42 / 7;
-            const int c = n % 7; /* 6: the wrench */
-            Real sum = 0;
-            LANE_ROLLED
-            for (int row = 4 * tree->corner_begin[f]; row < 4 * tree->corner_begin[f + 1]; row++) {
-                const Real x = contact->residual[row];
-                const Real *edge = contact->edge[row];
-                const Real value = c < 6 ? edge[c < 6 ? c : 0] : -x;
-                sum += x < 0 ? contact->weight[row] * edge[r] * value : 0;
-            }
-            if (c < 6) {
-                contact->stiffness[f][r][c] = sum;
-            } else {
-                work->wrench[f][r] = sum;
-            }
+        for (int n = LANE(l); n < count; n += LANES) {
+            engine_push_number(tree, work, n % feet, n / feet);
         }
     }
     lanes_meet();
@@ -248,9 +260,8 @@ LANE_FN void engine_stiffen_rows(const EngineTree *tree, EngineSupport *support)
     EACH_LANE(l) {
         LANE_ROLLED
         for (int f = 0; f < engine_feet(tree); f++) {
-            const int length = engine_row_length(tree, tree->foot_link[f]);
             LANE_ROLLED
-            for (int n = LANE(l); n < 6 * length; n += LANES) {
+            for (int n = LANE(l); n < 6 * tree->shared[f][f]; n += LANES) {
                 const Real *stiffness = support->ground.contact.stiffness[f][n % 6];
                 const Real *column = support->jacobian[f][n / 6];
                 support->half[f][n / 6][n % 6] =
@@ -286,11 +297,10 @@ MILD_HD int limit_pushes(const EngineWork *work, int i) {
 }
 
 /* factor <- L of M + J^T weight J over the pushing rows; change <- the residue and what is left of
- * the rows, which is the descent of the cost. */
+ * the rows, which is the descent of the cost. After engine_push_of_edges. */
 LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int edges) {
     EngineSupport *support = &work->now.support;
     if (edges) {
-        engine_push_of_edges(tree, work);
         engine_stiffen_rows(tree, support);
     }
     EACH_LANE(l) {
@@ -441,8 +451,8 @@ LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t, int pr
 }
 
 /* From the acceleration without the rows to that with them; `edges`: engine_collide was called.
- * Needs mass, limits and J; overwrites factor, half and, with edges, the wrench. Returns
- * Newton steps. */
+ * Needs mass, limits and J; overwrites factor, half and, with edges, the wrench. Returns Newton
+ * steps. */
 LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges) {
     EngineSupport *support = &work->now.support;
     EngineContact *contact = &support->ground.contact;
@@ -455,11 +465,16 @@ LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges
         }
     }
     lanes_meet();
-    while (going && step < CONSTRAINT_STEPS) {
-        step++;
+    for (;;) {
+        const int last = !going || step == CONSTRAINT_STEPS;
         if (edges) {
             engine_residuals(tree, work);
+            engine_push_of_edges(tree, work, !last);
         }
+        if (last) {
+            return step;
+        }
+        step++;
         engine_newton_system(tree, work, edges);
         engine_solve_transposed(tree, work->factor[0], work->inverse, support->change);
         engine_solve(tree, work->factor[0], work->inverse, support->change);
@@ -471,11 +486,6 @@ LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges
         const int moved = engine_move(tree, work, length, others);
         going = others && moved;
     }
-    if (edges) {
-        engine_residuals(tree, work);
-        engine_push_of_edges(tree, work);
-    }
-    return step;
 }
 
 #endif

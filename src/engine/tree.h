@@ -58,9 +58,10 @@ typedef struct {
     short level_entry[ENGINE_LINKS_MAX + 1]; /* [levels + 1] where those of a level begin */
     EngineEntry entry[ENGINE_ENTRIES_MAX];
     /* ---- feet ---- */
-    EngineIndex foot_link[ROBOT_FEET_MAX];              /* link that carries the sole */
-    EngineIndex foot_round[ROBOT_FEET_MAX];             /* bool: transmits no moment */
-    EngineIndex shared[ROBOT_FEET_MAX][ROBOT_FEET_MAX]; /* degrees of freedom that move both */
+    EngineIndex foot_link[ROBOT_FEET_MAX];  /* link that carries the sole */
+    EngineIndex foot_round[ROBOT_FEET_MAX]; /* bool: transmits no moment */
+    /* Degrees of freedom that move both feet; of a foot and itself, the entries of its row. */
+    EngineIndex shared[ROBOT_FEET_MAX][ROBOT_FEET_MAX];
     EngineIndex knee_link[ROBOT_FEET_MAX];
     short outline_points[ROBOT_FEET_MAX];    /* of a flat sole; round: 0 */
     int pairs;                               /* of mirrored feet */
