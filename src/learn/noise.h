@@ -7,7 +7,7 @@
 
 #include "learn/vector.h"
 
-/* Writes numbers first .. first+count-1 of the stream `key` to out; `first` must be even.
+/* Writes numbers first .. first+count-1 of the stream `key` to out.
  * Box-Muller on 24-bit uniforms, so |number| <= 5.77. */
 void noise_normal(uint64_t key, int64_t first, int count, float *out);
 

@@ -59,6 +59,35 @@ static inline MILD_HD int order_cuts(int steps, int envs, int m, int minibatches
     return cut[PPO_SHARDS];
 }
 
+/* The part of the rollout that one of several processes has: a run of whole strata. Its arrays are
+ * [steps][width]. */
+typedef struct {
+    int envs;          /* of the whole */
+    int first, width;  /* first environment of the part; environments of the part */
+    int shard, shards; /* first stratum and shard; strata of the part */
+} OrderPart;
+
+/* ranks divides PPO_SHARDS. */
+static inline MILD_HD OrderPart order_part(int envs, int rank, int ranks) {
+    OrderPart part;
+    part.envs = envs;
+    part.shards = PPO_SHARDS / ranks;
+    part.shard = rank * part.shards;
+    part.first = order_begin(envs, part.shard, PPO_SHARDS);
+    part.width = order_begin(envs, part.shard + part.shards, PPO_SHARDS) - part.first;
+    return part;
+}
+
+/* The stratum in the arrays of the part; one of another process is empty. */
+static inline MILD_HD OrderStratum order_part_stratum(int steps, OrderPart part, int stratum) {
+    OrderStratum s = order_stratum(steps, part.envs, stratum);
+    if (stratum < part.shard || stratum >= part.shard + part.shards) {
+        s.width = s.count = 0;
+    }
+    s.first -= part.first;
+    return s;
+}
+
 /* A permutation of 0 .. count - 1. */
 typedef struct {
     uint32_t count;

@@ -80,7 +80,7 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     ppo->scratch_floats = loss_carve(n, PPO_CHUNK, ppo->mirror_rows, NULL, &chunk);
     ppo->batch_bytes = batch_layout(&ppo->batch, n, NULL);
     ppo->batch_block = take(ppo, ppo->batch_bytes);
-    ppo->gradient = take(ppo, PPO_SHARDS * ppo->stride * sizeof(float));
+    ppo->gradient = take(ppo, (size_t)ppo->part.shards * ppo->stride * sizeof(float));
     ppo->first = take(ppo, count * sizeof(float));
     ppo->second = take(ppo, count * sizeof(float));
     ppo->scratch = take(ppo, (size_t)pool_threads(ppo->pool) * ppo->scratch_floats * sizeof(float));
@@ -142,7 +142,18 @@ static MildStatus check_def(const PpoDef *def, int envs, MildError *error) {
 
 Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror, int envs,
                 uint64_t seed, MildError *error) {
+    return ppo_create_part(def, policy, pool, mirror, envs, seed, NULL, error);
+}
+
+Ppo *ppo_create_part(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror,
+                     int envs, uint64_t seed, Ranks *ranks, MildError *error) {
+    _Static_assert(PPO_SHARDS % RANKS_MAX == 0, "a process has whole shards");
     if (check_def(def, envs, error) || check_mirror(policy_def(policy), mirror, error)) {
+        return NULL;
+    }
+    if (envs < ranks_count(ranks)) {
+        mild_fail(error, MILD_ERROR_RANGE, "train.envs = %d is too few for %d processes", envs,
+                  ranks_count(ranks));
         return NULL;
     }
     Ppo *ppo = calloc(1, sizeof *ppo);
@@ -153,7 +164,9 @@ Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *
         ppo->seed = seed;
         ppo->learning_rate = def->learning_rate;
         ppo->batch.steps = def->steps;
-        ppo->batch.envs = envs;
+        ppo->ranks = ranks;
+        ppo->part = order_part(envs, ranks_number(ranks), ranks_count(ranks));
+        ppo->batch.envs = ppo->part.width;
     }
     if (!ppo || !take_all(ppo, mirror)) {
         mild_fail(error, MILD_ERROR_MEMORY,
@@ -200,6 +213,10 @@ int64_t ppo_iteration(const Ppo *ppo) {
     return ppo->iteration;
 }
 
+int ppo_first_env(const Ppo *ppo) {
+    return ppo->part.first;
+}
+
 void ppo_use(Ppo *ppo, const PpoBackend *backend) {
     ppo->backend = *backend;
 }
@@ -215,24 +232,34 @@ typedef struct {
     const float *std;
 } ActJob;
 
-/* Samples actions around the means for the piece's environments. A piece begins at an even
- * environment, so that its noise begins at an even number. */
+/* Samples actions around the means for the piece's environments. */
 static void act_piece(void *context, int piece, int thread) {
     (void)thread;
     const ActJob *job = context;
     PpoBatch *b = &job->ppo->batch;
-    const int actions = policy_def(job->ppo->policy)->actions, pairs = (b->envs + 1) / 2;
-    int first = 2 * ppo_piece_begin(pairs, piece), end = 2 * ppo_piece_begin(pairs, piece + 1);
-    end = end < b->envs ? end : b->envs;
+    const int actions = policy_def(job->ppo->policy)->actions;
+    const int first = ppo_piece_begin(b->envs, piece), end = ppo_piece_begin(b->envs, piece + 1);
     const int64_t row = (int64_t)job->t * b->envs + first;
     float *mean = b->mean + row * actions, *action = b->action + row * actions;
-    noise_normal(job->key, (int64_t)first * actions, (end - first) * actions, action);
+    noise_normal(job->key, (int64_t)(job->ppo->part.first + first) * actions,
+                 (end - first) * actions, action);
     for (int env = 0; env < end - first; env++, mean += actions, action += actions) {
         for (int j = 0; j < actions; j++) {
             action[j] = mean[j] + job->std[j] * action[j];
         }
         b->log_prob[row + env] = loss_log_prob(actions, action, mean, job->std);
     }
+}
+
+/* Rows of `times` time steps, cut between the strata, so that a row is multiplied among the same
+ * neighbours whichever process has it: oneDNN's products can depend on them in the last bit. */
+static PolicyRows rows_of(const Ppo *ppo, int times) {
+    PolicyRows rows = {.blocks = times, .runs = ppo->part.shards};
+    for (int s = 0; s < ppo->part.shards; s++) {
+        const OrderStratum stratum = order_part_stratum(1, ppo->part, ppo->part.shard + s);
+        rows.cut[s + 1] = stratum.first + stratum.width;
+    }
+    return rows;
 }
 
 void ppo_act(Ppo *ppo, int t) {
@@ -242,8 +269,9 @@ void ppo_act(Ppo *ppo, int t) {
     if (ppo->backend.act) {
         ppo->backend.act(ppo->backend.self, t, &ppo->error);
     } else {
-        policy_act(ppo->policy, ppo->pool, b->envs, b->history + first * n->history,
-                   b->mean + first * n->def.actions, NULL, NULL);
+        const PolicyRows rows = rows_of(ppo, 1);
+        policy_act_rows(ppo->policy, ppo->pool, &rows, b->history + first * n->history,
+                        b->mean + first * n->def.actions);
     }
     Random key = random_at(ppo->seed, (uint32_t)ppo->iteration, (uint32_t)t);
     ActJob job = {ppo, t, random_bits(&key), policy_std(ppo->policy)};
@@ -256,17 +284,19 @@ typedef struct {
     const int *cut;
 } OrderJob;
 
-static void order_shard(void *context, int shard, int thread) {
+static void order_shard(void *context, int piece, int thread) {
     (void)thread;
     const OrderJob *job = context;
     Ppo *ppo = job->ppo;
+    const int shard = ppo->part.shard + piece, *cut = job->cut;
     const PpoBatch *b = &ppo->batch;
-    const OrderStratum stratum = order_stratum(b->steps, b->envs, shard);
+    const OrderStratum stratum = order_part_stratum(b->steps, ppo->part, shard);
     const Order order = order_make(stratum.count, ppo->seed, ppo->iteration, job->epoch, shard);
     const int first = order_begin(stratum.count, job->m, ppo->def.minibatches);
-    for (int p = job->cut[shard]; p < job->cut[shard + 1]; p++) {
-        const int k = order_at(&order, first + p - job->cut[shard]);
-        ppo->order[p] = ppo->substitute[order_sample(stratum, b->envs, k)];
+    int *samples = ppo->order + (cut[shard] - cut[ppo->part.shard]);
+    for (int p = 0; p < cut[shard + 1] - cut[shard]; p++) {
+        const int k = order_at(&order, first + p);
+        samples[p] = ppo->substitute[order_sample(stratum, b->envs, k)];
     }
 }
 
@@ -274,9 +304,9 @@ static void order_shard(void *context, int shard, int thread) {
 static PpoMinibatch draw_minibatch(Ppo *ppo, int epoch, int m) {
     const int minibatches = ppo->def.minibatches;
     PpoMinibatch minibatch = {.samples = ppo->order, .draw = (uint32_t)(epoch * minibatches + m)};
-    order_cuts(ppo->batch.steps, ppo->batch.envs, m, minibatches, minibatch.cut);
+    order_cuts(ppo->batch.steps, ppo->part.envs, m, minibatches, minibatch.cut);
     OrderJob job = {ppo, epoch, m, minibatch.cut};
-    pool_run(ppo->pool, PPO_SHARDS, order_shard, &job);
+    pool_run(ppo->pool, ppo->part.shards, order_shard, &job);
     return minibatch;
 }
 
@@ -451,7 +481,8 @@ void ppo_update(Ppo *ppo, PpoReport *report) {
     if (ppo->backend.values) {
         ppo->backend.values(ppo->backend.self, &ppo->error);
     } else {
-        policy_value(ppo->policy, ppo->pool, (b->steps + 1) * b->envs, b->critic, b->value);
+        const PolicyRows rows = rows_of(ppo, b->steps + 1);
+        policy_value_rows(ppo->policy, ppo->pool, &rows, b->critic, b->value);
     }
     ppo_returns(ppo, report);
 

@@ -94,6 +94,12 @@ void vec_destroy(Vec *vec) {
     free(vec);
 }
 
+void vec_number_from(Vec *vec, int first) {
+    for (int i = 0; i < vec->envs; i++) {
+        env_at(vec, i)->index = (uint32_t)(first + i);
+    }
+}
+
 static void reset_piece(void *context, int piece, int thread) {
     Vec *vec = context;
     TaskView view = view_at(vec, piece);
@@ -144,11 +150,17 @@ void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8
     vec->stats.steps += vec->envs;
 }
 
-VecStats vec_take_stats(Vec *vec) {
-    VecStats stats = vec->stats;
+VecStats vec_take_sums(Vec *vec) {
+    VecStats sums = vec->stats;
     for (int i = 0; i < vec->envs; i++) {
-        stats.assist += task_assist_share(env_at(vec, i), &vec->def) / vec->envs;
+        sums.assist += task_assist_share(env_at(vec, i), &vec->def);
     }
+    memset(&vec->stats, 0, sizeof vec->stats);
+    return sums;
+}
+
+VecStats vec_stats_from(VecStats stats, int envs) {
+    stats.assist /= envs;
     if (stats.episodes) {
         double lived = stats.length > 0 ? stats.length : 1;
         for (int i = 0; i < TASK_REWARD_COUNT; i++) {
@@ -158,8 +170,11 @@ VecStats vec_take_stats(Vec *vec) {
         stats.reward /= stats.episodes;
         stats.speed_error /= stats.episodes;
     }
-    memset(&vec->stats, 0, sizeof vec->stats);
     return stats;
+}
+
+VecStats vec_take_stats(Vec *vec) {
+    return vec_stats_from(vec_take_sums(vec), vec->envs);
 }
 
 void vec_take_times(Vec *vec, double *physics, double *ground) {

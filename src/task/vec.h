@@ -30,12 +30,19 @@ typedef struct {
 Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, uint64_t seed,
                 MildError *error);
 void vec_destroy(Vec *vec);
+/* The environments have numbers `first` onward, which select their random numbers; 0 at first. Call
+ * it before the reset. */
+void vec_number_from(Vec *vec, int first);
 void vec_reset(Vec *vec, const VecView *first);
 /* One policy step of all. action [envs][robot_joints]; reward, done, timeout, valid [envs]; next:
  * the observation after. */
 void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout,
               uint8_t *valid, const VecView *next);
 VecStats vec_take_stats(Vec *vec);
+/* The same in two steps, between which those of several Vecs may be added: sums over the episodes
+ * (`assist` over the robots), and means from them. envs: environments of all. */
+VecStats vec_take_sums(Vec *vec);
+VecStats vec_stats_from(VecStats sums, int envs);
 /* [s] Thread time spent in physics since the last call, and the part of it spent in the ground. */
 void vec_take_times(Vec *vec, double *physics, double *ground);
 /* Everything that persists, as one block without pointers, so that saving and loading are

@@ -11,6 +11,7 @@ enum { TRAIN_MATERIALS = 3 }; /* drawn for the pattern of a terrain, as for stri
 
 struct Trainer {
     ExperimentDef def;
+    Ranks *ranks; /* NULL: alone */
     MildMap *map; /* NULL: level ground */
     Robot *robot;
     Pool *pool;
@@ -55,47 +56,111 @@ static int build(Trainer *trainer, MildError *error) {
     const PpoMirror mirror = {sides.observation_index, sides.observation_sign, sides.action_index,
                               sides.action_sign};
     robot_set_model(trainer->robot, (MildModel)def->task.randomize.model);
-    trainer->pool = pool_create(def->train.threads);
+    const int threads = def->train.threads ? def->train.threads : ranks_threads(trainer->ranks);
+    trainer->pool = pool_create(threads);
     if (!trainer->pool) {
-        mild_fail(error, MILD_ERROR_MEMORY, "cannot start %d threads", def->train.threads);
+        mild_fail(error, MILD_ERROR_MEMORY, "cannot start %d threads", threads);
         return 0;
     }
     trainer->policy = policy_create(&def->policy, def->train.seed, error);
     if (!trainer->policy) {
         return 0;
     }
-    trainer->ppo = ppo_create(&def->ppo, trainer->policy, trainer->pool, &mirror, def->train.envs,
-                              def->train.seed, error);
+    trainer->ppo = ppo_create_part(&def->ppo, trainer->policy, trainer->pool, &mirror,
+                                   def->train.envs, def->train.seed, trainer->ranks, error);
     if (!trainer->ppo) {
         return 0;
     }
-    if (strcmp(def->train.device, "cuda") == 0 && gpu_learner_attach(trainer->ppo, error)) {
-        return 0;
+    if (strcmp(def->train.device, "cuda") == 0) {
+        if (ranks_count(trainer->ranks) > 1) {
+            mild_fail(error, MILD_ERROR_ARGUMENT,
+                      "train.device = cuda trains in one process; start one, or take cpu");
+            return 0;
+        }
+        if (gpu_learner_attach(trainer->ppo, error) != MILD_OK) {
+            return 0;
+        }
     }
     if (terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error) != MILD_OK) {
         return 0;
     }
     trainer->def.task.map = trainer->map;
     trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
-    trainer->vec = vec_create(&def->task, trainer->robot, trainer->pool, def->train.envs,
-                              def->train.seed, error);
+    trainer->vec = vec_create(&def->task, trainer->robot, trainer->pool,
+                              ppo_batch(trainer->ppo)->envs, def->train.seed, error);
+    if (trainer->vec) {
+        vec_number_from(trainer->vec, ppo_first_env(trainer->ppo));
+    }
     return trainer->vec != NULL;
 }
 
 Trainer *train_create(const ExperimentDef *def, MildError *error) {
+    return train_create_part(def, NULL, error);
+}
+
+Trainer *train_create_part(const ExperimentDef *def, Ranks *ranks, MildError *error) {
+    MildError cause = {0};
     Trainer *trainer = calloc(1, sizeof *trainer);
     if (!trainer) {
-        mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
-        return NULL;
+        mild_fail(&cause, MILD_ERROR_MEMORY, "out of memory");
+    } else {
+        trainer->def = *def;
+        trainer->ranks = ranks;
     }
-    trainer->def = *def;
-    if (!build(trainer, error)) {
+    const int built = trainer && build(trainer, &cause);
+    if (ranks_agree(ranks, built ? MILD_OK : cause.status, &cause) != MILD_OK) {
+        mild_fail(error, cause.status, "%s", cause.text);
         train_destroy(trainer);
         return NULL;
     }
     VecView first = view_of(ppo_batch(trainer->ppo), 0, &trainer->def);
     vec_reset(trainer->vec, &first);
     return trainer;
+}
+
+/* ---- several processes ---- */
+
+/* Sums over the environments of all. Their last bits depend on the number of processes. */
+static void sum_over_ranks(Ranks *ranks, VecStats *sums, double *reward) {
+    double numbers[9 + TASK_REWARD_COUNT] = {sums->episodes,    sums->falls,  sums->diverged,
+                                             sums->steps,       sums->length, sums->reward,
+                                             sums->speed_error, sums->assist, *reward};
+    memcpy(numbers + 9, sums->terms, sizeof sums->terms);
+    ranks_sum_double(ranks, numbers, 9 + TASK_REWARD_COUNT);
+    *sums = (VecStats){.episodes = (int)numbers[0],
+                       .falls = (int)numbers[1],
+                       .diverged = (int)numbers[2],
+                       .steps = numbers[3],
+                       .length = numbers[4],
+                       .reward = numbers[5],
+                       .speed_error = numbers[6],
+                       .assist = numbers[7]};
+    *reward = numbers[8];
+    memcpy(sums->terms, numbers + 9, sizeof sums->terms);
+}
+
+uint64_t train_hash(Trainer *trainer) {
+    const uint32_t *words = (const uint32_t *)(const void *)policy_parameters(trainer->policy);
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (int64_t i = 0; i < policy_parameter_count(trainer->policy); i++) {
+        hash = (hash ^ words[i]) * 0x100000001b3u;
+    }
+    return hash;
+}
+
+/* Every process applies the same sums to the same parameters. Another kind of processor may round
+ * them differently. */
+static MildStatus check_same(Trainer *trainer, MildError *error) {
+    if (ranks_count(trainer->ranks) == 1) {
+        return MILD_OK;
+    }
+    const uint64_t mine = train_hash(trainer);
+    uint64_t first = mine;
+    ranks_broadcast(trainer->ranks, &first, sizeof first);
+    return mine == first ? MILD_OK
+                         : mild_fail(error, MILD_ERROR_ARGUMENT,
+                                     "its parameters differ from those of process 1; start the "
+                                     "same program on processors of the same kind");
 }
 
 MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error) {
@@ -119,14 +184,21 @@ MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error
     }
     times.rollout = clock_seconds() - start;
     ppo_update(trainer->ppo, &report->ppo);
+    if (ranks_count(trainer->ranks) > 1 && ppo_status(trainer->ppo, error) != MILD_OK) {
+        ranks_abort(error); /* the others may wait for this one's gradient */
+    }
     double wall = clock_seconds() - start;
     times.update = wall - times.rollout;
     vec_take_times(trainer->vec, &times.physics, &times.ground);
     report->times = times;
-    report->episodes = vec_take_stats(trainer->vec);
-    report->steps_per_s = (double)(envs * (size_t)batch->steps) / wall;
-    report->reward_per_step = reward / (double)(envs * (size_t)batch->steps);
-    return ppo_status(trainer->ppo, error);
+    VecStats sums = vec_take_sums(trainer->vec);
+    sum_over_ranks(trainer->ranks, &sums, &reward);
+    const double samples = (double)trainer->def.train.envs * batch->steps;
+    report->episodes = vec_stats_from(sums, trainer->def.train.envs);
+    report->steps_per_s = samples / wall;
+    report->reward_per_step = reward / samples;
+    MildStatus status = check_same(trainer, error);
+    return status == MILD_OK ? ppo_status(trainer->ppo, error) : status;
 }
 
 int64_t train_iteration(const Trainer *trainer) {
