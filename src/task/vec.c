@@ -159,22 +159,23 @@ VecStats vec_take_sums(Vec *vec) {
     return sums;
 }
 
-VecStats vec_stats_from(VecStats stats, int envs) {
-    stats.assist /= envs;
-    if (stats.episodes) {
-        double lived = stats.length > 0 ? stats.length : 1;
+void vec_stats_means(VecStats *stats) {
+    if (stats->episodes) {
+        double lived = stats->length > 0 ? stats->length : 1;
         for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-            stats.terms[i] /= lived;
+            stats->terms[i] /= lived;
         }
-        stats.length /= stats.episodes;
-        stats.reward /= stats.episodes;
-        stats.speed_error /= stats.episodes;
+        stats->length /= stats->episodes;
+        stats->reward /= stats->episodes;
+        stats->speed_error /= stats->episodes;
     }
-    return stats;
 }
 
 VecStats vec_take_stats(Vec *vec) {
-    return vec_stats_from(vec_take_sums(vec), vec->envs);
+    VecStats stats = vec_take_sums(vec);
+    stats.assist /= vec->envs;
+    vec_stats_means(&stats);
+    return stats;
 }
 
 void vec_take_times(Vec *vec, double *physics, double *ground) {

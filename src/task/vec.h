@@ -39,10 +39,10 @@ void vec_reset(Vec *vec, const VecView *first);
 void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout,
               uint8_t *valid, const VecView *next);
 VecStats vec_take_stats(Vec *vec);
-/* The same in two steps, between which those of several Vecs may be added: sums over the episodes
- * (`assist` over the robots), and means from them. envs: environments of all. */
+/* The same, but sums over the episodes, and in `assist` over the robots. */
 VecStats vec_take_sums(Vec *vec);
-VecStats vec_stats_from(VecStats sums, int envs);
+/* From sums over episodes to means; `assist` stays. */
+void vec_stats_means(VecStats *stats);
 /* [s] Thread time spent in physics since the last call, and the part of it spent in the ground. */
 void vec_take_times(Vec *vec, double *physics, double *ground);
 /* Everything that persists, as one block without pointers, so that saving and loading are

@@ -194,7 +194,9 @@ MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error
     VecStats sums = vec_take_sums(trainer->vec);
     sum_over_ranks(trainer->ranks, &sums, &reward);
     const double samples = (double)trainer->def.train.envs * batch->steps;
-    report->episodes = vec_stats_from(sums, trainer->def.train.envs);
+    sums.assist /= trainer->def.train.envs;
+    vec_stats_means(&sums);
+    report->episodes = sums;
     report->steps_per_s = samples / wall;
     report->reward_per_step = reward / samples;
     MildStatus status = check_same(trainer, error);
