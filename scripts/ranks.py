@@ -24,7 +24,7 @@ def without_frames(lines):
             told = "\n".join(frame)
             if told.startswith("mpirun noticed"):
                 yield told.replace("\n", " ") + "\n"
-            elif "non-zero" not in told:  # a mistake in its options, say
+            elif "non-zero" not in told and "MPI_ABORT" not in told:  # a mistake in its options, say
                 yield told + "\n"
             frame = None
         elif frame is None:

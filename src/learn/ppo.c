@@ -292,11 +292,12 @@ static void order_shard(void *context, int piece, int thread) {
     const PpoBatch *b = &ppo->batch;
     const OrderStratum stratum = order_part_stratum(b->steps, ppo->part, shard);
     const Order order = order_make(stratum.count, ppo->seed, ppo->iteration, job->epoch, shard);
-    const int first = order_begin(stratum.count, job->m, ppo->def.minibatches);
-    int *samples = ppo->order + (cut[shard] - cut[ppo->part.shard]);
-    for (int p = 0; p < cut[shard + 1] - cut[shard]; p++) {
-        const int k = order_at(&order, first + p);
-        samples[p] = ppo->substitute[order_sample(stratum, b->envs, k)];
+    const int minibatches = ppo->def.minibatches,
+              end = order_begin(stratum.count, job->m + 1, minibatches);
+    int *sample = ppo->order + (cut[shard] - cut[ppo->part.shard]);
+    for (int place = order_begin(stratum.count, job->m, minibatches); place < end; place++) {
+        const int k = order_at(&order, place);
+        *sample++ = ppo->substitute[order_sample(stratum, b->envs, k)];
     }
 }
 

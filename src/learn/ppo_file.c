@@ -68,7 +68,9 @@ static MildStatus gather(const Ppo *ppo, Safetensor *tensors, int count, char **
             ranks_gather(ppo->ranks, tensors[i].data,
                          part_bytes(ppo, tensors[i].bytes, ppo->part.width), to);
             tensors[i].data = to;
-            to += leads ? tensors[i].bytes : 0;
+            if (leads) {
+                to += tensors[i].bytes;
+            }
         }
     }
     return status;

@@ -317,7 +317,7 @@ static MildStatus build(TrainRun *run, MildError *error) {
 TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error) {
     TrainRun *run = calloc(1, sizeof *run);
     MildStatus status = run ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
-    if (ranks_agree(def->ranks, status, error) != MILD_OK) {
+    if (ranks_agree(def->ranks, status, error) != MILD_OK || !run) {
         free(run);
         return NULL;
     }

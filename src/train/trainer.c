@@ -108,7 +108,7 @@ Trainer *train_create_part(const ExperimentDef *def, Ranks *ranks, MildError *er
         trainer->ranks = ranks;
     }
     const int built = trainer && build(trainer, &cause);
-    if (ranks_agree(ranks, built ? MILD_OK : cause.status, &cause) != MILD_OK) {
+    if (ranks_agree(ranks, built ? MILD_OK : cause.status, &cause) != MILD_OK || !trainer) {
         mild_fail(error, cause.status, "%s", cause.text);
         train_destroy(trainer);
         return NULL;
