@@ -1,28 +1,33 @@
 #!/usr/bin/env bash
 # Makes build/bundle: the program without drawing, with CUDA, and all libraries that it needs except libc and CUDA's. Copy
 # the folder to a machine with only an NVIDIA driver and cuBLAS 13. docs/gpu.md says how to use it.
+# Usage: scripts/bundle.sh [ranks]; with `ranks` for several GPUs (docs/ranks.md): that machine has Open MPI 4 and NCCL too.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bundle=build/bundle
 jobs=${JOBS:-$(nproc)}
 
+ranks=(-DMILD_MPI=OFF)
+[ "${1:-}" != ranks ] || ranks=(-DMILD_MPI=ON -DMILD_NCCL=ON)
+
 rm -rf "$bundle"
 mkdir -p "$bundle/bin" "$bundle/lib"
 for march in x86-64-v3 x86-64-v4; do
-    cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_CUDA=ON -DMILD_VIEW=OFF \
+    cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_CUDA=ON -DMILD_VIEW=OFF "${ranks[@]}" \
         -DMILD_MARCH=$march -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
         -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' >/dev/null
     cmake --build "build/$march" --parallel "$jobs" --target mild gpu_test_gpu batch_test_batch \
-        engine_device_engine >/dev/null
+        engine_device_engine ranks_test_ranks >/dev/null
     strip -o "$bundle/bin/mild-$march" "build/$march/mild"
 done
 strip -o "$bundle/bin/test_gpu" build/x86-64-v3/tests/gpu_test_gpu
 strip -o "$bundle/bin/test_batch" build/x86-64-v3/tests/batch_test_batch
 strip -o "$bundle/bin/device_engine" build/x86-64-v3/tests/engine_device_engine
+strip -o "$bundle/bin/test_ranks" build/x86-64-v3/tests/ranks_test_ranks
 
-# the libraries that ldd lists, without libc, the loader and CUDA
+# the libraries that ldd lists, without libc, the loader, CUDA, MPI and NCCL
 ldd build/x86-64-v3/mild build/x86-64-v3/tests/gpu_test_gpu | awk '$2 == "=>" { print $3 }' | sort -u |
-    grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
+    grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt|libnccl|libmpi|libopen-rte|libopen-pal)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
 strip "$bundle"/lib/*
 cp -r robots configs policies "$bundle/"
 
@@ -33,8 +38,11 @@ here=$(dirname "$(readlink -f "$0")")
 program=$1
 shift
 wheel=$(python3 -c 'import nvidia; print(list(nvidia.__path__)[0])' 2>/dev/null)
-for folder in /usr/local/cuda*/lib64 /usr/local/cuda*/targets/x86_64-linux/lib "$wheel"/cu13/lib "$wheel"/cublas/lib; do
-    [ -e "$folder/libcublas.so.13" ] && LD_LIBRARY_PATH=$folder${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH} && break
+for library in libcublas.so.13 libnccl.so.2; do
+    for folder in /usr/local/cuda*/lib64 /usr/local/cuda*/targets/x86_64-linux/lib "$wheel"/cu13/lib "$wheel"/cublas/lib \
+        "$wheel"/nccl/lib; do
+        [ -e "$folder/$library" ] && LD_LIBRARY_PATH=$folder${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH} && break
+    done
 done
 export LD_LIBRARY_PATH
 if [ "$program" = mild ]; then

@@ -2,6 +2,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "app/build.h"
 #include "app/cli.h"
@@ -10,9 +11,11 @@
 #include "app/robots.h"
 #include "base/file.h"
 #include "config/experiment_keys.h"
+#include "ranks/ranks.h"
 #include "train/run.h"
 
 typedef struct {
+    Ranks *ranks; /* NULL: alone */
     const char *config, *out, *robot;
     int resume;
     ExperimentDef def;
@@ -126,7 +129,9 @@ static int stop(void *self) {
 
 static MildStatus train(const Command *command, MildError *error) {
     Display display = {0};
-    const TrainRunDef def = {.folder = command->out,
+    const int leads = ranks_number(command->ranks) == 0;
+    const TrainRunDef def = {.ranks = command->ranks,
+                             .folder = command->out,
                              .resume = command->resume,
                              .def = &command->def,
                              .config = command->config_text,
@@ -137,22 +142,31 @@ static MildStatus train(const Command *command, MildError *error) {
                               .passed_over = tell_passed_over,
                               .stop = stop,
                               .iterated = display_take};
+    if (leads && ranks_count(command->ranks) > 1) {
+        const int threads = command->def.train.threads;
+        printf("%d processes, %d threads each\n", ranks_count(command->ranks),
+               threads ? threads : ranks_threads(command->ranks));
+    }
     TrainRun *run = train_run_open(&def, &watch, error);
     if (!run) {
         return error->status;
     }
-    display.bar = progress_begin("training");
+    if (leads) {
+        display.bar = progress_begin("training");
+    }
     display.iteration = train_run_iteration(run);
     MildStatus status = train_run_loop(run, error);
-    progress_end(
-        &display.bar,
-        "iteration %" PRId64 "  %.0f steps/s  reward %.2f/s  episode %.1f s  diverged %" PRId64,
-        display.iteration, display.steps_per_s, display.reward, display.length, display.bad);
+    if (leads) {
+        progress_end(
+            &display.bar,
+            "iteration %" PRId64 "  %.0f steps/s  reward %.2f/s  episode %.1f s  diverged %" PRId64,
+            display.iteration, display.steps_per_s, display.reward, display.length, display.bad);
+    }
     train_run_close(run);
     return status;
 }
 
-static MildStatus prepare_and_train(Command *run, const CliArgs *args, MildError *error) {
+static MildStatus prepare(Command *run, const CliArgs *args, MildError *error) {
     MildStatus status = train_run_check_folder(run->out, run->resume, error);
     if (status == MILD_OK) {
         status = check_config_kept(run, error);
@@ -164,7 +178,56 @@ static MildStatus prepare_and_train(Command *run, const CliArgs *args, MildError
         write_note(run, args);
         status = make_config_text(run, error);
     }
+    return status;
+}
+
+/* ---- several processes: rank 0 reads the command line and the config, and speaks ---- */
+
+/* The others need not see the files of rank 0. */
+static MildStatus share_config(Command *run, MildError *error) {
+    const int leads = ranks_number(run->ranks) == 0;
+    size_t size = leads ? strlen(run->config_text) + 1 : 0;
+    ranks_broadcast(run->ranks, &run->resume, sizeof run->resume);
+    ranks_broadcast(run->ranks, &size, sizeof size);
+    run->config_text = leads ? run->config_text : malloc(size);
+    MildStatus status =
+        run->config_text ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    status = ranks_agree(run->ranks, status, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    ranks_broadcast(run->ranks, run->config_text, size);
+    if (!leads) {
+        run->def = experiment_def_default();
+        status = experiment_read_text(&run->def, run->config_text, error);
+    }
+    return ranks_agree(run->ranks, status, error);
+}
+
+static MildStatus prepare_and_train(Command *run, const CliArgs *args, MildError *error) {
+    MildStatus status = ranks_number(run->ranks) == 0 ? prepare(run, args, error) : MILD_OK;
+    status = ranks_agree(run->ranks, status, error);
+    if (status == MILD_OK) {
+        status = share_config(run, error);
+    }
     return status == MILD_OK ? train(run, error) : status;
+}
+
+/* Parses on rank 0. Returns whether all go on; otherwise *code is the exit code. */
+static int parse(const CliCommand *command, int argc, char **argv, CliArgs *args, Command *run,
+                 int *code) {
+    int goes_on = 0;
+    *code = 0;
+    if (ranks_number(run->ranks) == 0) {
+        const CliOutcome outcome = cli_parse(command, argc, argv, args);
+        goes_on = outcome == CLI_RUN && run->out;
+        if (outcome == CLI_BAD) {
+            *code = CLI_EXIT_BAD_INPUT;
+        } else if (outcome == CLI_RUN && !run->out) {
+            *code = cli_fail_text("train", "--out FOLDER is missing");
+        }
+    }
+    return ranks_any(run->ranks, goes_on);
 }
 
 int cmd_train(int argc, char **argv) {
@@ -200,16 +263,15 @@ int cmd_train(int argc, char **argv) {
     };
     MildError error = {0};
     int code = 0;
-    CliOutcome outcome = cli_parse(&command, argc, argv, args);
-    if (outcome != CLI_RUN) {
-        code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
-    } else if (!run->out) {
-        code = cli_fail_text("train", "--out FOLDER is missing");
-    } else {
-        interrupt_install();
-        MildStatus status = prepare_and_train(run, args, &error);
-        code = status == MILD_OK ? 0 : cli_fail("train", &error);
+    interrupt_install();
+    MildStatus status = ranks_open(&run->ranks, &error);
+    if (status == MILD_OK && parse(&command, argc, argv, args, run, &code)) {
+        status = prepare_and_train(run, args, &error);
     }
+    if (status != MILD_OK) {
+        code = ranks_number(run->ranks) == 0 ? cli_fail("train", &error) : CLI_EXIT_BAD_INPUT;
+    }
+    ranks_close(run->ranks);
     free(run->config_text);
     free(run);
     free(args);

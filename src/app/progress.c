@@ -88,7 +88,8 @@ static atomic_int interrupted;
 static void *wait_for_signals(void *signals) {
     for (int signal_number; sigwait(signals, &signal_number) == 0;) {
         int before = atomic_exchange(&interrupted, 1);
-        if (before && signal_number != SIGHUP) { /* a closing terminal may hang up twice */
+        /* a closing terminal may hang up twice */
+        if (before && (signal_number == SIGINT || signal_number == SIGTERM)) {
             _exit(128 + signal_number);
         }
     }
@@ -102,6 +103,7 @@ void interrupt_install(void) {
     sigemptyset(&signals);
     sigaddset(&signals, SIGINT);
     sigaddset(&signals, SIGTERM);
+    sigaddset(&signals, SIGUSR1);
     if (sigaction(SIGHUP, NULL, &hangup) == 0 && hangup.sa_handler != SIG_IGN) {
         sigaddset(&signals, SIGHUP); /* the terminal was closed; ignored under nohup */
     }

@@ -20,9 +20,9 @@ void progress_show(Progress *progress, double share, const char *format, ...);
 /* Shows the last state in any case, and ends the line. */
 void progress_end(Progress *progress, const char *format, ...);
 
-/* From now on the first Ctrl-C (or SIGTERM, or SIGHUP from a terminal that closes) only sets a
- * flag. A second Ctrl-C or SIGTERM ends the program at once. Call it before any other thread
- * starts. */
+/* From now on the first Ctrl-C (or SIGTERM, or SIGUSR1, which mpirun passes on, or SIGHUP from a
+ * terminal that closes) only sets a flag. A second Ctrl-C or SIGTERM ends the program at once. Call
+ * it before any other thread starts. */
 void interrupt_install(void);
 int interrupt_requested(void);
 

@@ -44,6 +44,14 @@ MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *
     return status;
 }
 
+MildStatus experiment_read_text(ExperimentDef *def, const char *text, MildError *error) {
+    ConfigSection sections[EXPERIMENT_SECTIONS];
+    experiment_sections(def, sections);
+    MildStatus status =
+        config_read_text(sections, EXPERIMENT_SECTIONS, text, "config.ini", 1, error);
+    return status == MILD_OK ? experiment_check(def, error) : status;
+}
+
 MildStatus experiment_nominal_task(TaskDef *task, char robot[TRAIN_ROBOT_SIZE], const char *config,
                                    MildError *error) {
     ExperimentDef def = experiment_def_default();

@@ -20,6 +20,9 @@ ConfigSection ground_section(MildMaterial *material);
 MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides,
                            int override_count, MildError *error);
 
+/* Reads a complete config, such as config_text writes, and checks it. */
+MildStatus experiment_read_text(ExperimentDef *def, const char *text, MildError *error);
+
 /* The nominal task for evaluation and play and the robot, from the config that the policy was
  * trained with (NULL: the defaults). */
 MildStatus experiment_nominal_task(TaskDef *task, char robot[TRAIN_ROBOT_SIZE], const char *config,

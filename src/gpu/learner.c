@@ -48,7 +48,7 @@ static void set_sizes(GpuLearner *g, int envs) {
     const int64_t most = (int64_t)INT32_MAX / (2 * widest_layer(&g->network)),
                   wanted = g->wanted_rows > 0 ? g->wanted_rows : ROWS_MAX;
     g->envs = envs;
-    g->minibatch = order_largest(steps, envs, ppo->def.minibatches);
+    g->minibatch = order_largest(steps, order_part(envs, 0, 1), ppo->def.minibatches);
     int rows = g->minibatch > envs ? g->minibatch : envs;
     rows = rows < wanted ? rows : (int)wanted;
     g->rows = rows < most ? rows : (int)most;

@@ -1,7 +1,5 @@
 #include "learn/noise.h"
 
-#include <assert.h>
-
 #define NOISE_BLOCK 64
 
 static void noise_block(uint32_t key0, uint32_t key1, uint32_t pair, float *restrict even,
@@ -13,9 +11,12 @@ static void noise_block(uint32_t key0, uint32_t key1, uint32_t pair, float *rest
 }
 
 void noise_normal(uint64_t key, int64_t first, int count, float *out) {
-    assert(first % 2 == 0);
     uint32_t key0 = (uint32_t)key, key1 = (uint32_t)(key >> 32);
     float even[NOISE_BLOCK], odd[NOISE_BLOCK];
+    if (first % 2 != 0 && count > 0) { /* the second of a pair */
+        noise_pair(key0, key1, (uint32_t)(first / 2), even, out);
+        first++, count--, out++;
+    }
     for (int done = 0; done < count; done += 2 * NOISE_BLOCK) {
         noise_block(key0, key1, (uint32_t)((first + done) / 2), even, odd);
         int left = count - done < 2 * NOISE_BLOCK ? count - done : 2 * NOISE_BLOCK;

@@ -7,7 +7,7 @@
 
 #include "learn/vector.h"
 
-/* Writes numbers first .. first+count-1 of the stream `key` to out; `first` must be even.
+/* Writes numbers first .. first+count-1 of the stream `key` to out.
  * Box-Muller on 24-bit uniforms, so |number| <= 5.77. */
 void noise_normal(uint64_t key, int64_t first, int count, float *out);
 
@@ -46,7 +46,7 @@ static inline MILD_BOTH float noise_cos(float a) {
 /* Numbers 2 pair and 2 pair + 1 of the stream: radius sqrt(-2 ln u), angle 2 pi v. The angle is a
  * uniform half turn with a random sign in front, which keeps the series' argument small. */
 static inline MILD_BOTH void noise_pair(uint32_t key0, uint32_t key1, uint32_t pair, float *even,
-                                      float *odd) {
+                                        float *odd) {
     uint32_t counter = pair * 0x9e3779b9u;
     uint32_t h0 = noise_mix(counter ^ key0), h1 = noise_mix(noise_mix(counter + key1) ^ key0);
     float u = (float)(int32_t)((h0 >> 8) + 1u) * 0x1.0p-24f;

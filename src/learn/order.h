@@ -59,12 +59,42 @@ static inline MILD_BOTH int order_cuts(int steps, int envs, int m, int minibatch
     return cut[PPO_SHARDS];
 }
 
-/* Samples of the largest minibatch. */
-static inline int order_largest(int steps, int envs, int minibatches) {
+/* The part of the rollout that one of several processes has: a run of whole strata. Its arrays are
+ * [steps][width]. */
+typedef struct {
+    int envs;          /* of the whole */
+    int first, width;  /* first environment of the part; environments of the part */
+    int shard, shards; /* first stratum and shard; strata of the part */
+} OrderPart;
+
+/* ranks divides PPO_SHARDS. */
+static inline MILD_BOTH OrderPart order_part(int envs, int rank, int ranks) {
+    OrderPart part;
+    part.envs = envs;
+    part.shards = PPO_SHARDS / ranks;
+    part.shard = rank * part.shards;
+    part.first = order_begin(envs, part.shard, PPO_SHARDS);
+    part.width = order_begin(envs, part.shard + part.shards, PPO_SHARDS) - part.first;
+    return part;
+}
+
+/* The stratum in the arrays of the part; one of another process is empty. */
+static inline MILD_BOTH OrderStratum order_part_stratum(int steps, OrderPart part, int stratum) {
+    OrderStratum s = order_stratum(steps, part.envs, stratum);
+    if (stratum < part.shard || stratum >= part.shard + part.shards) {
+        s.width = s.count = 0;
+    }
+    s.first -= part.first;
+    return s;
+}
+
+/* Samples of the part's shards in its largest minibatch. */
+static inline int order_largest(int steps, OrderPart part, int minibatches) {
     int largest = 0;
     for (int m = 0; m < minibatches; m++) {
         int cut[PPO_SHARDS + 1];
-        const int count = order_cuts(steps, envs, m, minibatches, cut);
+        order_cuts(steps, part.envs, m, minibatches, cut);
+        const int count = cut[part.shard + part.shards] - cut[part.shard];
         largest = count > largest ? count : largest;
     }
     return largest;
@@ -78,7 +108,7 @@ typedef struct {
 } Order;
 
 static inline MILD_BOTH Order order_make(int count, uint64_t seed, int64_t iteration, int epoch,
-                                       int stratum) {
+                                         int stratum) {
     Random random = random_at(seed ^ 0x6f72646572u, (uint32_t)iteration, (uint32_t)epoch);
     random.use = (uint32_t)stratum;
     const uint64_t key = random_bits(&random);

@@ -81,7 +81,9 @@ const float *policy_std(const Policy *policy) {
 
 typedef struct {
     Policy *policy;
-    int rows, slots;
+    const PolicyRows *rows;
+    int per_run; /* chunks of a run; the last ones of a short run are empty */
+    int chunks, slots;
     const float *input;
     float *actions, *estimates, *latent, *values;
 } PolicyJob;
@@ -115,6 +117,16 @@ static void value_chunk(const PolicyJob *job, int first, int rows, const MlpOutp
     memcpy(job->values + first, value, (size_t)rows * sizeof *value);
 }
 
+/* First row of a chunk, and how many. */
+static int chunk_rows(const PolicyJob *job, int chunk, int *count) {
+    const PolicyRows *rows = job->rows;
+    const int run = chunk / job->per_run % rows->runs, block = chunk / job->per_run / rows->runs;
+    const int first = rows->cut[run] + chunk % job->per_run * POLICY_CHUNK,
+              left = rows->cut[run + 1] - first;
+    *count = left < POLICY_CHUNK ? left : POLICY_CHUNK;
+    return block * rows->cut[rows->runs] + first;
+}
+
 static void run_slot(void *context, int slot, int thread) {
     (void)thread;
     const PolicyJob *job = context;
@@ -123,11 +135,12 @@ static void run_slot(void *context, int slot, int thread) {
     carve_slot(&job->policy->network,
                job->policy->scratch + (size_t)slot * job->policy->slot_floats, &outputs, &critic);
     int entered = product_enter();
-    for (int first = slot * POLICY_CHUNK; first < job->rows; first += job->slots * POLICY_CHUNK) {
-        int rows = job->rows - first < POLICY_CHUNK ? job->rows - first : POLICY_CHUNK;
-        if (job->values) {
+    for (int chunk = slot; chunk < job->chunks; chunk += job->slots) {
+        int rows;
+        const int first = chunk_rows(job, chunk, &rows);
+        if (rows > 0 && job->values) {
             value_chunk(job, first, rows, &critic);
-        } else {
+        } else if (rows > 0) {
             act_chunk(job, first, rows, &outputs);
         }
     }
@@ -135,8 +148,15 @@ static void run_slot(void *context, int slot, int thread) {
 }
 
 static void run_job(PolicyJob *job, Pool *pool) {
-    int chunks = (job->rows + POLICY_CHUNK - 1) / POLICY_CHUNK;
-    job->slots = chunks < POLICY_SLOTS ? chunks : POLICY_SLOTS;
+    const PolicyRows *rows = job->rows;
+    int longest = 0;
+    for (int run = 0; run < rows->runs; run++) {
+        const int length = rows->cut[run + 1] - rows->cut[run];
+        longest = length > longest ? length : longest;
+    }
+    job->per_run = (longest + POLICY_CHUNK - 1) / POLICY_CHUNK;
+    job->chunks = rows->blocks * rows->runs * job->per_run;
+    job->slots = job->chunks < POLICY_SLOTS ? job->chunks : POLICY_SLOTS;
     if (pool) {
         pool_run(pool, job->slots, run_slot, job);
     } else {
@@ -148,8 +168,9 @@ static void run_job(PolicyJob *job, Pool *pool) {
 
 void policy_act(Policy *policy, Pool *pool, int rows, const float *history, float *actions,
                 float *estimates, float *latent) {
+    const PolicyRows all = {.blocks = 1, .runs = 1, .cut = {0, rows}};
     PolicyJob job = {.policy = policy,
-                     .rows = rows,
+                     .rows = &all,
                      .input = history,
                      .actions = actions,
                      .estimates = estimates,
@@ -157,7 +178,19 @@ void policy_act(Policy *policy, Pool *pool, int rows, const float *history, floa
     run_job(&job, pool);
 }
 
+void policy_act_rows(Policy *policy, Pool *pool, const PolicyRows *rows, const float *history,
+                     float *actions) {
+    PolicyJob job = {.policy = policy, .rows = rows, .input = history, .actions = actions};
+    run_job(&job, pool);
+}
+
 void policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values) {
+    const PolicyRows all = {.blocks = 1, .runs = 1, .cut = {0, rows}};
+    policy_value_rows(policy, pool, &all, critic, values);
+}
+
+void policy_value_rows(Policy *policy, Pool *pool, const PolicyRows *rows, const float *critic,
+                       float *values) {
     PolicyJob job = {.policy = policy, .rows = rows, .input = critic, .values = values};
     run_job(&job, pool);
 }

@@ -75,13 +75,13 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
         !take_mirror(ppo, mirror)) {
         return 0;
     }
-    const int largest = order_largest(ppo->batch.steps, ppo->batch.envs, ppo->def.minibatches);
+    const int largest = order_largest(ppo->batch.steps, ppo->part, ppo->def.minibatches);
     LossChunk chunk;
     ppo->stride = (count + 15) / 16 * 16;
     ppo->scratch_floats = loss_carve(n, PPO_CHUNK, ppo->mirror_rows, NULL, &chunk);
     ppo->batch_bytes = ppo_place_batch(&ppo->batch, n, NULL);
     ppo->batch_block = take(ppo, ppo->batch_bytes);
-    ppo->gradient = take(ppo, PPO_SHARDS * ppo->stride * sizeof(float));
+    ppo->gradient = take(ppo, (size_t)ppo->part.shards * ppo->stride * sizeof(float));
     ppo->first = take(ppo, count * sizeof(float));
     ppo->second = take(ppo, count * sizeof(float));
     ppo->scratch = take(ppo, (size_t)pool_threads(ppo->pool) * ppo->scratch_floats * sizeof(float));
@@ -144,7 +144,18 @@ static MildStatus check_def(const PpoDef *def, int envs, MildError *error) {
 
 Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror, int envs,
                 uint64_t seed, MildError *error) {
+    return ppo_create_part(def, policy, pool, mirror, envs, seed, NULL, error);
+}
+
+Ppo *ppo_create_part(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror,
+                     int envs, uint64_t seed, Ranks *ranks, MildError *error) {
+    _Static_assert(PPO_SHARDS % RANKS_MAX == 0, "a process has whole shards");
     if (check_def(def, envs, error) || check_mirror(policy_def(policy), mirror, error)) {
+        return NULL;
+    }
+    if (envs < ranks_count(ranks)) {
+        mild_fail(error, MILD_ERROR_RANGE, "train.envs = %d is too few for %d processes", envs,
+                  ranks_count(ranks));
         return NULL;
     }
     Ppo *ppo = calloc(1, sizeof *ppo);
@@ -155,7 +166,9 @@ Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *
         ppo->seed = seed;
         ppo->learning_rate = def->learning_rate;
         ppo->batch.steps = def->steps;
-        ppo->batch.envs = envs;
+        ppo->ranks = ranks;
+        ppo->part = order_part(envs, ranks_number(ranks), ranks_count(ranks));
+        ppo->batch.envs = ppo->part.width;
     }
     if (!ppo || !take_all(ppo, mirror)) {
         mild_fail(error, MILD_ERROR_MEMORY,
@@ -255,6 +268,10 @@ int64_t ppo_iteration(const Ppo *ppo) {
     return ppo->iteration;
 }
 
+int ppo_first_env(const Ppo *ppo) {
+    return ppo->part.first;
+}
+
 void ppo_use(Ppo *ppo, const PpoBackend *backend) {
     ppo->backend = *backend;
 }
@@ -270,24 +287,34 @@ typedef struct {
     const float *std;
 } ActJob;
 
-/* Samples actions around the means for the piece's environments. A piece begins at an even
- * environment, so that its noise begins at an even number. */
+/* Samples actions around the means for the piece's environments. */
 static void act_piece(void *context, int piece, int thread) {
     (void)thread;
     const ActJob *job = context;
     PpoBatch *b = &job->ppo->batch;
-    const int actions = policy_def(job->ppo->policy)->actions, pairs = (b->envs + 1) / 2;
-    int first = 2 * ppo_piece_begin(pairs, piece), end = 2 * ppo_piece_begin(pairs, piece + 1);
-    end = end < b->envs ? end : b->envs;
+    const int actions = policy_def(job->ppo->policy)->actions;
+    const int first = ppo_piece_begin(b->envs, piece), end = ppo_piece_begin(b->envs, piece + 1);
     const int64_t row = (int64_t)job->t * b->envs + first;
     float *mean = b->mean + row * actions, *action = b->action + row * actions;
-    noise_normal(job->key, (int64_t)first * actions, (end - first) * actions, action);
+    noise_normal(job->key, (int64_t)(job->ppo->part.first + first) * actions,
+                 (end - first) * actions, action);
     for (int env = 0; env < end - first; env++, mean += actions, action += actions) {
         for (int j = 0; j < actions; j++) {
             action[j] = mean[j] + job->std[j] * action[j];
         }
         b->log_prob[row + env] = loss_log_prob(actions, action, mean, job->std);
     }
+}
+
+/* Rows of `times` time steps, cut between the strata, so that a row is multiplied among the same
+ * neighbours whichever process has it: oneDNN's products can depend on them in the last bit. */
+static PolicyRows rows_of(const Ppo *ppo, int times) {
+    PolicyRows rows = {.blocks = times, .runs = ppo->part.shards};
+    for (int s = 0; s < ppo->part.shards; s++) {
+        const OrderStratum stratum = order_part_stratum(1, ppo->part, ppo->part.shard + s);
+        rows.cut[s + 1] = stratum.first + stratum.width;
+    }
+    return rows;
 }
 
 void ppo_act(Ppo *ppo, int t) {
@@ -298,8 +325,9 @@ void ppo_act(Ppo *ppo, int t) {
         ppo->backend.act(ppo->backend.self, t, &ppo->error);
         return;
     }
-    policy_act(ppo->policy, ppo->pool, b->envs, b->history + first * n->history,
-               b->mean + first * n->def.actions, NULL, NULL);
+    const PolicyRows rows = rows_of(ppo, 1);
+    policy_act_rows(ppo->policy, ppo->pool, &rows, b->history + first * n->history,
+                    b->mean + first * n->def.actions);
     ActJob job = {ppo, t, step_action_key(ppo->seed, ppo->iteration, t), policy_std(ppo->policy)};
     pool_run(ppo->pool, PPO_PIECES, act_piece, &job);
 }
@@ -310,17 +338,20 @@ typedef struct {
     const int *cut;
 } OrderJob;
 
-static void order_shard(void *context, int shard, int thread) {
+static void order_shard(void *context, int piece, int thread) {
     (void)thread;
     const OrderJob *job = context;
     Ppo *ppo = job->ppo;
+    const int shard = ppo->part.shard + piece, *cut = job->cut;
     const PpoBatch *b = &ppo->batch;
-    const OrderStratum stratum = order_stratum(b->steps, b->envs, shard);
+    const OrderStratum stratum = order_part_stratum(b->steps, ppo->part, shard);
     const Order order = order_make(stratum.count, ppo->seed, ppo->iteration, job->epoch, shard);
-    const int first = order_begin(stratum.count, job->m, ppo->def.minibatches);
-    for (int p = job->cut[shard]; p < job->cut[shard + 1]; p++) {
-        const int k = order_at(&order, first + p - job->cut[shard]);
-        ppo->order[p] = ppo->substitute[order_sample(stratum, b->envs, k)];
+    const int minibatches = ppo->def.minibatches,
+              end = order_begin(stratum.count, job->m + 1, minibatches);
+    int *sample = ppo->order + (cut[shard] - cut[ppo->part.shard]);
+    for (int place = order_begin(stratum.count, job->m, minibatches); place < end; place++) {
+        const int k = order_at(&order, place);
+        *sample++ = ppo->substitute[order_sample(stratum, b->envs, k)];
     }
 }
 
@@ -328,9 +359,9 @@ static void order_shard(void *context, int shard, int thread) {
 static PpoMinibatch draw_minibatch(Ppo *ppo, int epoch, int m) {
     const int minibatches = ppo->def.minibatches;
     PpoMinibatch minibatch = {.samples = ppo->order, .draw = (uint32_t)(epoch * minibatches + m)};
-    order_cuts(ppo->batch.steps, ppo->batch.envs, m, minibatches, minibatch.cut);
+    order_cuts(ppo->batch.steps, ppo->part.envs, m, minibatches, minibatch.cut);
     OrderJob job = {ppo, epoch, m, minibatch.cut};
-    pool_run(ppo->pool, PPO_SHARDS, order_shard, &job);
+    pool_run(ppo->pool, ppo->part.shards, order_shard, &job);
     return minibatch;
 }
 
@@ -403,7 +434,8 @@ static void update(Ppo *ppo, PpoReport *report) {
     if (ppo->def.decoder_target == PPO_TARGET_NEXT) {
         pool_run(ppo->pool, PPO_PIECES, shift_piece, ppo);
     }
-    policy_value(ppo->policy, ppo->pool, (b->steps + 1) * b->envs, b->critic, b->value);
+    const PolicyRows rows = rows_of(ppo, b->steps + 1);
+    policy_value_rows(ppo->policy, ppo->pool, &rows, b->critic, b->value);
     ppo_returns(ppo, report);
 
     LossContext context = {.def = &ppo->def, .network = n, .parameters = ppo->policy->parameters};

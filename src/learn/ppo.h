@@ -7,12 +7,19 @@
 #include "learn/policy.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
+#include "ranks/ranks.h"
 
 typedef struct Ppo Ppo;
 /* Borrows policy and pool. mirror: NULL for none; it is copied. */
 Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror, int envs,
                 uint64_t seed, MildError *error);
+/* One of several processes that train together; borrows ranks (NULL: alone). envs: of all of them.
+ * The batch has this process's part, environments ppo_first_env onward. ppo_update, ppo_save and
+ * ppo_load then are calls of all ranks, whose parameters are always the same. */
+Ppo *ppo_create_part(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror,
+                     int envs, uint64_t seed, Ranks *ranks, MildError *error);
 void ppo_destroy(Ppo *ppo);
+int ppo_first_env(const Ppo *ppo);
 /* Computes on another device from now on (learn/backend.h). Takes ownership of the backend, which
  * ppo_destroy destroys. */
 struct PpoBackend;

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/file.h"
 #include "learn/policy_file.h"
 #include "learn/ppo_private.h"
 
@@ -22,6 +23,82 @@ static Safetensor tensor_of(const char *name, SafetensorsType type, const void *
                         .bytes = sizes[type] * (size_t)count};
 }
 
+/* ---- several processes: the file has the environments of all, each of them those of its part */
+
+static int has_rows(const char *name) {
+    static const char *const names[] = {"train.history", "train.critic", "train.target",
+                                        "train.frame",   "train.extra",  "train.kept"};
+    int found = 0;
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        found |= strcmp(name, names[i]) == 0;
+    }
+    return found;
+}
+
+/* Bytes of all environments from those of the part, and back. Of a process alone any number. */
+static size_t whole_bytes(const Ppo *ppo, size_t part) {
+    return part * (size_t)ppo->part.envs / (size_t)ppo->part.width;
+}
+
+static size_t part_bytes(const Ppo *ppo, size_t whole, int environments) {
+    return whole * (size_t)environments / (size_t)ppo->part.envs;
+}
+
+/* Replaces the data of the part by those of all environments, in *block, on rank 0. */
+static MildStatus gather(const Ppo *ppo, Safetensor *tensors, int count, char **block,
+                         MildError *error) {
+    const int leads = ranks_number(ppo->ranks) == 0;
+    size_t bytes = 0;
+    *block = NULL;
+    if (ranks_count(ppo->ranks) == 1) {
+        return MILD_OK;
+    }
+    for (int i = 0; i < count; i++) {
+        bytes += has_rows(tensors[i].name) ? tensors[i].bytes : 0;
+    }
+    *block = leads ? malloc(bytes) : NULL;
+    MildStatus status =
+        leads && !*block
+            ? mild_fail(error, MILD_ERROR_MEMORY, "no memory for the checkpoint's %zu bytes", bytes)
+            : MILD_OK;
+    status = ranks_agree(ppo->ranks, status, error);
+    char *to = *block;
+    for (int i = 0; i < count && status == MILD_OK; i++) {
+        if (has_rows(tensors[i].name)) {
+            ranks_gather(ppo->ranks, tensors[i].data,
+                         part_bytes(ppo, tensors[i].bytes, ppo->part.width), to);
+            tensors[i].data = to;
+            if (leads) {
+                to += tensors[i].bytes;
+            }
+        }
+    }
+    return status;
+}
+
+/* Rank 0 reads the file, because other machines need not see it. */
+static Safetensors *read_file(Ranks *ranks, const char *path, MildError *error) {
+    const int leads = ranks_number(ranks) == 0;
+    size_t size = 0;
+    char *bytes = leads ? file_read(path, SIZE_MAX - 1, &size, error) : NULL;
+    if (ranks_agree(ranks, leads && !bytes ? error->status : MILD_OK, error) != MILD_OK) {
+        free(bytes);
+        return NULL;
+    }
+    ranks_broadcast(ranks, &size, sizeof size);
+    bytes = leads ? bytes : malloc(size);
+    MildStatus status =
+        bytes ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
+    if (ranks_agree(ranks, status, error) != MILD_OK) {
+        free(bytes);
+        return NULL;
+    }
+    ranks_broadcast(ranks, bytes, size);
+    return safetensors_parse((unsigned char *)bytes, size, path, error);
+}
+
+/* ---- tensors ---- */
+
 /* The caller's bytes in a checkpoint, and what belongs to them. */
 typedef struct {
     const char *name; /* of the tensor */
@@ -38,12 +115,13 @@ static Extra kept_extra(const void *bytes, size_t size) {
     return (Extra){"train.kept", bytes, size, 0};
 }
 
-/* What resuming needs besides the policy. */
+/* What resuming needs besides the policy. The sizes are those of the file; the data are those of the
+ * part. */
 static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const Extra *extra,
                          Safetensor tensors[TRAIN_TENSORS]) {
     const Network *n = &ppo->policy->network;
     const PpoBatch *b = &ppo->start;
-    const int64_t envs = b->envs;
+    const int64_t envs = ppo->part.envs;
     int count = 0;
     tensors[count++] = tensor_of("train.counters", SAFETENSORS_I64, counters, COUNTERS);
     tensors[count++] = tensor_of("train.learning_rate", SAFETENSORS_F64, &ppo->learning_rate, 1);
@@ -64,8 +142,8 @@ static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const
             tensor_of("train.average", SAFETENSORS_F32, policy_parameters(ppo->average), n->count);
     }
     if (extra->size > 0) {
-        tensors[count++] =
-            tensor_of(extra->name, SAFETENSORS_U8, extra->bytes, (int64_t)extra->size);
+        tensors[count++] = tensor_of(extra->name, SAFETENSORS_U8, extra->bytes,
+                                     (int64_t)whole_bytes(ppo, extra->size));
     }
     return count;
 }
@@ -81,7 +159,13 @@ static MildStatus save(const Ppo *ppo, const char *path, const Extra *extra, con
     PolicyTexts texts;
     Safetensor all[TRAIN_TENSORS + POLICY_TENSORS_MAX];
     const int64_t counters[COUNTERS] = {ppo->iteration, ppo->adam_steps, (int64_t)ppo->seed};
+    char *block;
     int count = train_tensors(ppo, counters, extra, all);
+    status = gather(ppo, all, count, &block, error);
+    if (status != MILD_OK) {
+        free(block);
+        return status;
+    }
     policy_file_tensors(&ppo->policy->network, ppo->policy->parameters, &policy);
     policy_file_texts(&ppo->policy->network, POLICY_CHECKPOINT_KIND, note, &texts);
     /* the caller's bytes last, so that every number before them stays aligned */
@@ -91,7 +175,11 @@ static MildStatus save(const Ppo *ppo, const char *path, const Extra *extra, con
     if (numbers < count) {
         all[numbers + policy.count] = last;
     }
-    return safetensors_write(path, all, count + policy.count, texts.text, texts.count, error);
+    if (ranks_number(ppo->ranks) == 0) {
+        status = safetensors_write(path, all, count + policy.count, texts.text, texts.count, error);
+    }
+    free(block);
+    return ranks_agree(ppo->ranks, status, error);
 }
 
 MildStatus ppo_save(const Ppo *ppo, const char *path, const void *extra, size_t extra_size,
@@ -194,7 +282,10 @@ static void take_train(Ppo *ppo, const Safetensors *file, const int64_t counters
     for (size_t i = 0; i < sizeof areas / sizeof *areas; i++) {
         const Safetensor *have = safetensors_find(file, areas[i].name);
         if (have && areas[i].to) {
-            memcpy(areas[i].to, have->data, have->bytes);
+            const int rows = has_rows(areas[i].name);
+            const size_t skip = rows ? part_bytes(ppo, have->bytes, ppo->part.first) : 0,
+                         take = rows ? part_bytes(ppo, have->bytes, ppo->part.width) : have->bytes;
+            memcpy(areas[i].to, (const char *)have->data + skip, take);
         }
     }
     ppo->iteration = counters[COUNTER_ITERATION];
@@ -258,16 +349,17 @@ static MildStatus load_learner(Ppo *ppo, const Safetensors *file, const char *pa
                                size_t kept_size, int *found, MildError *error) {
     const Safetensor *have = safetensors_find(file, "train.kept");
     const Extra some = kept_extra(kept, kept_size);
-    *found = have && have->bytes == kept_size;
+    *found = have && have->bytes == whole_bytes(ppo, kept_size);
     return take(ppo, file, path, &some, *found ? kept : NULL, error);
 }
 
 MildStatus ppo_load_learner(Ppo *ppo, const char *path, void *kept, size_t kept_size, int *found,
                             MildError *error) {
     MildError cause = {0};
-    Safetensors *file = safetensors_read(path, &cause);
+    Safetensors *file = read_file(ppo->ranks, path, &cause);
     MildStatus status =
         file ? load_learner(ppo, file, path, kept, kept_size, found, &cause) : cause.status;
+    status = ranks_agree(ppo->ranks, status, &cause);
     if (error && status != MILD_OK) {
         *error = cause;
     }
@@ -284,9 +376,10 @@ int ppo_file_is_whole(const char *path) {
 
 MildStatus ppo_load(Ppo *ppo, const char *path, void *extra, size_t extra_size, MildError *error) {
     MildError cause = {0};
-    Safetensors *file = safetensors_read(path, &cause);
+    Safetensors *file = read_file(ppo->ranks, path, &cause);
     MildStatus status =
         file ? ppo_load_file(ppo, file, path, extra, extra_size, &cause) : cause.status;
+    status = ranks_agree(ppo->ranks, status, &cause);
     if (error && status != MILD_OK) {
         *error = cause;
     }

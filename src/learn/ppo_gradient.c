@@ -48,12 +48,18 @@ static void copy_row(float *to, int row, const float *from, int64_t sample, int 
     memcpy(to + (int64_t)row * width, from + sample * width, (size_t)width * sizeof *to);
 }
 
+/* Samples from place `at` of the minibatch onward. */
+static const int *samples_at(const GradientJob *job, int at) {
+    return job->minibatch->samples + (at - job->minibatch->cut[job->ppo->part.shard]);
+}
+
 static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
     const Ppo *ppo = job->ppo;
     const Network *n = &ppo->policy->network;
     const PpoBatch *b = &ppo->batch;
+    const int *samples = samples_at(job, at);
     for (int r = 0; r < chunk->rows; r++) {
-        int64_t i = job->minibatch->samples[at + r];
+        int64_t i = samples[r];
         copy_row(chunk->history, r, b->history, i, n->history);
         copy_row(chunk->estimate, r, b->target, i, n->def.estimates);
         copy_row(chunk->decoder_target, r, b->frame, i, n->def.observation);
@@ -72,8 +78,9 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
 static void gather_critic(const GradientJob *job, int at, LossChunk *chunk) {
     const PpoBatch *b = &job->ppo->batch;
     const int width = job->ppo->policy->network.def.critic_input;
+    const int *samples = samples_at(job, at);
     for (int r = 0; r < chunk->rows; r++) {
-        int64_t i = job->minibatch->samples[at + r];
+        int64_t i = samples[r];
         copy_row(chunk->critic, r, b->critic, i, width);
         chunk->old_value[r] = b->value[i];
         chunk->returns[r] = b->returns[i];
@@ -91,14 +98,16 @@ static void clear_half(const Network *n, int critic, float *gradient) {
     }
 }
 
-/* Pieces 0 .. PPO_SHARDS - 1 compute the actor's half of a shard, which takes longer and so starts
- * first. The other pieces compute the critic's half. */
+/* The first pieces compute the actor's half of a shard each, which takes longer and so starts
+ * first. The others compute the critic's half. */
 static void gradient_piece(void *context, int piece, int thread) {
     GradientJob *job = context;
     Ppo *ppo = job->ppo;
     const Network *n = &ppo->policy->network;
-    const int critic = piece >= PPO_SHARDS, shard = piece % PPO_SHARDS;
-    float *gradient = ppo->gradient + (size_t)shard * ppo->stride;
+    const int critic = piece >= ppo->part.shards, own = piece % ppo->part.shards;
+    const int shard = ppo->part.shard + own;
+    float *gradient = ppo->gradient + (size_t)own * ppo->stride;
+    LossSums *sums = &job->sums[critic * PPO_SHARDS + shard];
     LossChunk chunk;
     loss_carve(n, PPO_CHUNK, ppo->mirror_rows, ppo->scratch + (size_t)thread * ppo->scratch_floats,
                &chunk);
@@ -113,10 +122,10 @@ static void gradient_piece(void *context, int piece, int thread) {
         float beta = at == begin ? 0.0f : 1.0f;
         if (critic) {
             gather_critic(job, at, &chunk);
-            loss_critic(job->loss, &chunk, gradient, beta, &job->sums[piece]);
+            loss_critic(job->loss, &chunk, gradient, beta, sums);
         } else {
             gather_actor(job, at, &chunk);
-            loss_actor(job->loss, &chunk, gradient, beta, &job->sums[piece]);
+            loss_actor(job->loss, &chunk, gradient, beta, sums);
         }
     }
     product_leave(entered);
@@ -126,25 +135,41 @@ static int64_t range_begin(int64_t count, int range) {
     return range >= PPO_RANGES ? count : count * range / PPO_RANGES / 16 * 16;
 }
 
-/* Sum of the shards into shard 0 over a range, and that range's share of the squared norm. */
+static void add_range(float *restrict sum, const float *restrict more, int64_t count) {
+#pragma omp simd
+    for (int64_t i = 0; i < count; i++) {
+        sum[i] += more[i];
+    }
+}
+
+/* Sum of this process's shards into its first over a range, ((0+1)+(2+3))+((4+5)+(6+7)). Together
+ * with ranks_sum that is the sum of all eight in this order, for any number of processes. */
 static void reduce_piece(void *context, int range, int thread) {
     (void)thread;
     GradientJob *job = context;
     const Ppo *ppo = job->ppo;
-    int64_t begin = range_begin(ppo->policy->network.count, range),
-            end = range_begin(ppo->policy->network.count, range + 1);
-    float *restrict sum = ppo->gradient;
-    const float *g = ppo->gradient;
-    const size_t s = ppo->stride;
+    const int64_t begin = range_begin(ppo->policy->network.count, range),
+                  end = range_begin(ppo->policy->network.count, range + 1);
+    float *gradient = ppo->gradient + begin;
+    for (int step = 1; step < ppo->part.shards; step *= 2) {
+        for (int own = 0; own < ppo->part.shards; own += 2 * step) {
+            add_range(gradient + (size_t)own * ppo->stride,
+                      gradient + (size_t)(own + step) * ppo->stride, end - begin);
+        }
+    }
+}
+
+/* Squared norm of a range of the sum. */
+static void square_piece(void *context, int range, int thread) {
+    (void)thread;
+    GradientJob *job = context;
+    const Ppo *ppo = job->ppo;
+    const int64_t end = range_begin(ppo->policy->network.count, range + 1);
+    const float *gradient = ppo->gradient;
     double squares = 0.0;
-    _Static_assert(PPO_SHARDS == 8, "the sum below names every shard");
 #pragma omp simd reduction(+ : squares)
-    for (int64_t i = begin; i < end; i++) {
-        const size_t k = (size_t)i;
-        float x = ((sum[k] + g[s + k]) + (g[2 * s + k] + g[3 * s + k])) +
-                  ((g[4 * s + k] + g[5 * s + k]) + (g[6 * s + k] + g[7 * s + k]));
-        sum[k] = x;
-        squares += (double)x * x;
+    for (int64_t i = range_begin(ppo->policy->network.count, range); i < end; i++) {
+        squares += (double)gradient[i] * gradient[i];
     }
     job->squares[range] = squares;
 }
@@ -162,15 +187,24 @@ static void add_sums(LossSums *to, const LossSums *from) {
     to->value += from->value;
 }
 
+/* The sums of a shard are zero but in the one process that has it, so theirs are exact. */
+static void sum_over_ranks(GradientJob *job) {
+    const Ppo *ppo = job->ppo;
+    ranks_sum(ppo->ranks, ppo->gradient, ppo->policy->network.count);
+    ranks_sum_double(ppo->ranks, (double *)(void *)job->sums, sizeof job->sums / (sizeof(double)));
+}
+
 void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
                   LossSums *sums, double *norm) {
     GradientJob job = {.ppo = ppo, .loss = context, .minibatch = minibatch};
     *sums = (LossSums){0};
-    pool_run(ppo->pool, 2 * PPO_SHARDS, gradient_piece, &job);
+    pool_run(ppo->pool, 2 * ppo->part.shards, gradient_piece, &job);
     pool_run(ppo->pool, PPO_RANGES, reduce_piece, &job);
+    sum_over_ranks(&job);
     for (int piece = 0; piece < 2 * PPO_SHARDS; piece++) {
         add_sums(sums, &job.sums[piece]);
     }
+    pool_run(ppo->pool, PPO_RANGES, square_piece, &job);
     double squares = 0.0;
     for (int range = 0; range < PPO_RANGES; range++) {
         squares += job.squares[range];

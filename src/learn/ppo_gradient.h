@@ -8,12 +8,13 @@
 
 /* Samples of the rollout in runs, one for each shard (learn/order.h). Shards may be empty. */
 typedef struct {
-    const int *samples;      /* [cut[PPO_SHARDS]] places in the rollout */
+    const int *samples;      /* [cut[PPO_SHARDS]] places in the rollout; with several processes
+                                (ranks/ranks.h) the shards of this one alone, without the others' */
     int cut[PPO_SHARDS + 1]; /* shard s is samples[cut[s]] .. samples[cut[s + 1] - 1]; cut[0] = 0 */
     uint32_t draw;           /* number in this update, which picks the random numbers */
 } PpoMinibatch;
 
-/* Gradient of the loss over a minibatch into ppo->gradient (shard 0), its norm, and the sums. */
+/* Gradient of the loss over a minibatch into ppo->gradient (the first shard's), its norm, and the sums. */
 void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
                   LossSums *sums, double *norm);
 /* Samples of a minibatch with these cuts that get a mirror image: how many, and with `which` not

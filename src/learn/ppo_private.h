@@ -9,10 +9,11 @@
 #include "learn/policy_private.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
+#include "ranks/ranks.h"
 
 /* A minibatch consists of PPO_SHARDS runs of samples, each with its own gradient, and a shard is
  * cut into chunks. Sums are taken in the order of the shards. So no result depends on the number of
- * threads. */
+ * threads or processes. */
 #define PPO_CHUNK 256
 #define PPO_RANGES 64 /* pieces of the parameter arrays in reduction and optimiser */
 #define PPO_PIECES 64 /* pieces of the environments and samples in everything else */
@@ -27,7 +28,9 @@ typedef struct Ppo {
     int *mirror_index;  /* [observation + actions] the arrays that `mirror` points to */
     float *mirror_sign; /* [observation + actions] */
     uint64_t seed;
-    PpoBatch batch; /* the rollout */
+    Ranks *ranks;   /* NULL: alone */
+    OrderPart part; /* that this process has */
+    PpoBatch batch; /* the rollout of its environments */
     PpoBatch start; /* on the CPU: its rows of time 0, with which a checkpoint's rollout begins */
     int resident;   /* bool: `batch` is on the device of the backend */
     int64_t iteration;
@@ -36,14 +39,14 @@ typedef struct Ppo {
     Policy *average;   /* NULL: none */
     void *batch_block; /* memory of the arrays of `start`, and of `batch` unless it is resident */
     size_t batch_bytes;
-    float *gradient; /* [PPO_SHARDS][stride]; the sum ends in shard 0 */
+    float *gradient; /* [part.shards][stride]; the sum ends in the first */
     size_t stride;   /* [floats] of a shard's gradient */
     float *first;    /* [parameters] Adam's first moments */
     float *second;   /* [parameters] Adam's second moments */
     float *scratch;  /* [threads][scratch_floats] */
     size_t scratch_floats;
     int mirror_rows; /* images per full chunk */
-    int *order;      /* [largest minibatch] samples of the present minibatch */
+    int *order;      /* [largest minibatch] this process's samples of the present minibatch */
     /* [steps * envs] The sample itself if it is usable, else the next usable one of its stratum. */
     int *substitute;
     int starved;  /* bool: a stratum has no usable sample, so this update takes no step */

@@ -19,7 +19,7 @@ static void substitute_stratum(void *context, int index, int thread) {
     (void)thread;
     Ppo *ppo = context;
     const PpoBatch *b = &ppo->batch;
-    const OrderStratum stratum = order_stratum(b->steps, b->envs, index);
+    const OrderStratum stratum = order_part_stratum(b->steps, ppo->part, index);
     int next = -1;
     for (int k = 2 * stratum.count - 1; k >= 0; k--) {
         const int i = order_sample(stratum, b->envs, k % stratum.count);
@@ -35,9 +35,11 @@ enum { ADVANTAGE, RETURNS, VALUE, NUMBERS };
 typedef struct {
     Ppo *ppo;
     double about[NUMBERS]; /* gaps are the distances from these */
-    double count[PPO_SHARDS];
-    double gaps[NUMBERS][PPO_SHARDS];
-    double squares[NUMBERS][PPO_SHARDS]; /* of the gaps */
+    struct {
+        double count[PPO_SHARDS];
+        double gaps[NUMBERS][PPO_SHARDS];
+        double squares[NUMBERS][PPO_SHARDS]; /* of the gaps */
+    } sums;                                  /* of each stratum */
     double mean[NUMBERS], std[NUMBERS];
 } MomentsJob;
 
@@ -46,7 +48,7 @@ static void add_stratum(void *context, int index, int thread) {
     MomentsJob *job = context;
     const PpoBatch *b = &job->ppo->batch;
     const float *const numbers[NUMBERS] = {b->advantage, b->returns, b->value};
-    const OrderStratum stratum = order_stratum(b->steps, b->envs, index);
+    const OrderStratum stratum = order_part_stratum(b->steps, job->ppo->part, index);
     double count = 0.0, gaps[NUMBERS] = {0.0}, squares[NUMBERS] = {0.0};
     for (int k = 0; k < stratum.count; k++) {
         const int i = order_sample(stratum, b->envs, k);
@@ -59,10 +61,10 @@ static void add_stratum(void *context, int index, int thread) {
             }
         }
     }
-    job->count[index] = count;
+    job->sums.count[index] = count;
     for (int n = 0; n < NUMBERS; n++) {
-        job->gaps[n][index] = gaps[n];
-        job->squares[n][index] = squares[n];
+        job->sums.gaps[n][index] = gaps[n];
+        job->sums.squares[n][index] = squares[n];
     }
 }
 
@@ -74,16 +76,23 @@ static double total(const double x[PPO_SHARDS]) {
     return sum;
 }
 
+/* A stratum is empty but in the one process that has it, so the sum over the ranks is exact. */
+static void add_strata(MomentsJob *job) {
+    pool_run(job->ppo->pool, PPO_SHARDS, add_stratum, job);
+    ranks_sum_double(job->ppo->ranks, (double *)(void *)&job->sums,
+                     sizeof job->sums / sizeof(double));
+}
+
 /* The means first, then the squares of the distances from them. */
 static void find_moments(MomentsJob *job) {
-    pool_run(job->ppo->pool, PPO_SHARDS, add_stratum, job);
-    const double count = fmax(total(job->count), 1.0);
+    add_strata(job);
+    const double count = fmax(total(job->sums.count), 1.0);
     for (int n = 0; n < NUMBERS; n++) {
-        job->about[n] = job->mean[n] = total(job->gaps[n]) / count;
+        job->about[n] = job->mean[n] = total(job->sums.gaps[n]) / count;
     }
-    pool_run(job->ppo->pool, PPO_SHARDS, add_stratum, job);
+    add_strata(job);
     for (int n = 0; n < NUMBERS; n++) {
-        job->std[n] = sqrt(total(job->squares[n]) / count);
+        job->std[n] = sqrt(total(job->sums.squares[n]) / count);
     }
 }
 
@@ -107,8 +116,8 @@ void ppo_returns(Ppo *ppo, PpoReport *report) {
     find_moments(&job);
     ppo->starved = 0;
     for (int s = 0; s < PPO_SHARDS; s++) {
-        const OrderStratum stratum = order_stratum(ppo->batch.steps, ppo->batch.envs, s);
-        ppo->starved |= stratum.count > 0 && job.count[s] == 0.0;
+        const OrderStratum stratum = order_stratum(ppo->batch.steps, ppo->part.envs, s);
+        ppo->starved |= stratum.count > 0 && job.sums.count[s] == 0.0;
     }
     pool_run(ppo->pool, PPO_PIECES, normalise_piece, &job);
     step_report_returns(report, job.mean[VALUE], job.std[ADVANTAGE], job.std[RETURNS]);

@@ -94,6 +94,12 @@ void vec_destroy(Vec *vec) {
     free(vec);
 }
 
+void vec_number_from(Vec *vec, int first) {
+    for (int i = 0; i < vec->envs; i++) {
+        env_at(vec, i)->index = (uint32_t)(first + i);
+    }
+}
+
 static void reset_piece(void *context, int piece, int thread) {
     Vec *vec = context;
     TaskView view = view_at(vec, piece);

@@ -31,6 +31,9 @@ typedef struct {
 Vec *vec_create(const TaskDef *def, const Robot *robot, Pool *pool, int envs, uint64_t seed,
                 MildError *error);
 void vec_destroy(Vec *vec);
+/* The environments have numbers `first` onward, which select their random numbers; 0 at first. Call
+ * it before the reset. */
+void vec_number_from(Vec *vec, int first);
 void vec_reset(Vec *vec, const VecView *first);
 /* One policy step of all. action [envs][robot_joints]; reward, done, timeout, valid [envs]; next:
  * the observation after. */

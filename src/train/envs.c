@@ -18,6 +18,9 @@ static int make(TrainEnvs *envs, const ExperimentDef *def, int striped, const Ro
     envs->device = train_device(&def->train);
     if (!train_is_batch(&def->train)) {
         envs->vec = vec_create(&def->task, robot, pool, count, def->train.seed, error);
+        if (envs->vec) {
+            vec_number_from(envs->vec, first);
+        }
         return envs->vec != NULL;
     }
     const CrowdDef crowd = {.task = &def->task,

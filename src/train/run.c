@@ -77,6 +77,16 @@ static void fill_row(const TrainRun *run, const TrainReport *r, double row[COLUM
     memcpy(row + COLUMNS_FIXED, r->episodes.terms, sizeof r->episodes.terms);
 }
 
+/* ---- several processes: rank 0 has the folder, and all agree on every step that can fail ---- */
+
+static int leads(const TrainRun *run) {
+    return ranks_number(run->def.ranks) == 0;
+}
+
+static MildStatus agree(const TrainRun *run, MildStatus status, MildError *error) {
+    return ranks_agree(run->def.ranks, status, error);
+}
+
 /* ---- the run folder ---- */
 
 static int64_t checkpoint_number(const char *name) {
@@ -121,15 +131,10 @@ static int64_t newest_checkpoint(const char *folder, int64_t limit, int64_t *old
     return newest;
 }
 
-static MildStatus save_checkpoint(TrainRun *run, MildError *error) {
+/* Writes policy.safetensors and removes the oldest checkpoints. */
+static MildStatus save_policy(TrainRun *run, MildError *error) {
     char path[PATH_SIZE];
-    MildStatus status = checkpoint_path(run, train_iteration(run->trainer), path, error);
-    if (status == MILD_OK) {
-        status = train_save(run->trainer, path, run->def.note, error);
-    }
-    if (status == MILD_OK) {
-        status = path_join(run->def.folder, "policy.safetensors", path, error);
-    }
+    MildStatus status = path_join(run->def.folder, "policy.safetensors", path, error);
     if (status == MILD_OK) {
         status = policy_save(train_policy(run->trainer), path, run->def.note, error);
     }
@@ -143,6 +148,20 @@ static MildStatus save_checkpoint(TrainRun *run, MildError *error) {
         newest_checkpoint(run->def.folder, INT64_MAX, &oldest, &(int){0});
     }
     return status;
+}
+
+static MildStatus save_checkpoint(TrainRun *run, MildError *error) {
+    char path[PATH_SIZE] = "";
+    MildStatus status =
+        leads(run) ? checkpoint_path(run, train_iteration(run->trainer), path, error) : MILD_OK;
+    status = agree(run, status, error);
+    if (status == MILD_OK) {
+        status = train_save(run->trainer, path, run->def.note, error);
+    }
+    if (status == MILD_OK && leads(run)) {
+        status = save_policy(run, error);
+    }
+    return agree(run, status, error);
 }
 
 /* Writes a text to a file of the folder. */
@@ -160,28 +179,38 @@ static MildStatus write_config(const TrainRun *run, MildError *error) {
     return status == MILD_OK ? write_text(run, "version.txt", version, error) : status;
 }
 
+/* Newest checkpoint below `limit`, or -1. */
+static int64_t checkpoint_below(const TrainRun *run, int64_t limit) {
+    int64_t oldest, number = -1;
+    if (leads(run)) {
+        number = newest_checkpoint(run->def.folder, limit, &oldest, &(int){0});
+    }
+    ranks_broadcast(run->def.ranks, &number, sizeof number);
+    return number;
+}
+
 /* Loads the newest checkpoint that is not damaged (by a power loss or a broken disk). A checkpoint
  * of another config is an error, because the earlier ones have that config too. */
 static MildStatus resume(TrainRun *run, MildError *error) {
-    const char *folder = run->def.folder;
-    int64_t oldest, number = newest_checkpoint(folder, INT64_MAX, &oldest, &(int){0});
+    int64_t number = checkpoint_below(run, INT64_MAX);
     for (;;) {
-        char path[PATH_SIZE];
-        MildStatus status = checkpoint_path(run, number, path, error);
+        char path[PATH_SIZE] = "";
+        MildStatus status = leads(run) ? checkpoint_path(run, number, path, error) : MILD_OK;
+        status = agree(run, status, error);
         if (status == MILD_OK) {
             status = train_load(run->trainer, path, error);
         }
-        if (status == MILD_OK && run->watch.resumed) {
+        if (status == MILD_OK && leads(run) && run->watch.resumed) {
             run->watch.resumed(run->watch.self, path);
         }
         if (status == MILD_OK || status == MILD_ERROR_ARGUMENT) {
             return status;
         }
-        number = newest_checkpoint(folder, number, &oldest, &(int){0});
+        number = checkpoint_below(run, number);
         if (number < 0) {
             return status;
         }
-        if (run->watch.passed_over) {
+        if (leads(run) && run->watch.passed_over) {
             run->watch.passed_over(run->watch.self, error->text);
         }
     }
@@ -252,36 +281,44 @@ MildStatus train_run_check_folder(const char *folder, int resume, MildError *err
     return MILD_OK;
 }
 
-static MildStatus build(TrainRun *run, MildError *error) {
-    const char *folder = run->def.folder;
-    MildStatus status = train_run_check_folder(folder, run->def.resume, error);
-    if (status != MILD_OK) {
-        return status;
-    }
-    run->trainer = train_create(run->def.def, error);
-    if (!run->trainer) {
-        return error->status;
-    }
-    status = take_folder(run, error);
-    if (status == MILD_OK && run->def.resume) {
-        status = resume(run, error);
-    }
-    if (status == MILD_OK) {
-        status = write_config(run, error);
-    }
+static MildStatus open_log(TrainRun *run, MildError *error) {
+    MildStatus status = write_config(run, error);
     if (status != MILD_OK) {
         return status;
     }
     name_columns(run);
-    run->log = log_open(folder, run->column, COLUMNS,
+    run->log = log_open(run->def.folder, run->column, COLUMNS,
                         run->def.resume ? train_iteration(run->trainer) : -1, error);
     return run->log ? MILD_OK : error->status;
 }
 
+static MildStatus build(TrainRun *run, MildError *error) {
+    MildStatus status = MILD_OK;
+    if (leads(run)) {
+        status = train_run_check_folder(run->def.folder, run->def.resume, error);
+    }
+    if (agree(run, status, error) != MILD_OK) {
+        return error->status;
+    }
+    run->trainer = train_create_part(run->def.def, run->def.ranks, error);
+    if (!run->trainer) {
+        return error->status;
+    }
+    status = agree(run, leads(run) ? take_folder(run, error) : MILD_OK, error);
+    if (status == MILD_OK && run->def.resume) {
+        status = resume(run, error);
+    }
+    if (status == MILD_OK && leads(run)) {
+        status = open_log(run, error);
+    }
+    return agree(run, status, error);
+}
+
 TrainRun *train_run_open(const TrainRunDef *def, const TrainWatch *watch, MildError *error) {
     TrainRun *run = calloc(1, sizeof *run);
-    if (!run) {
-        mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    MildStatus status = run ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    if (ranks_agree(def->ranks, status, error) != MILD_OK || !run) {
+        free(run);
         return NULL;
     }
     run->lock.file = -1;
@@ -323,23 +360,30 @@ static double share_done(const TrainRun *run) {
 }
 
 static int goes_on(const TrainRun *run) {
-    return !(run->watch.stop && run->watch.stop(run->watch.self)) && share_done(run) < 1;
+    const int stop = run->watch.stop && run->watch.stop(run->watch.self);
+    return !ranks_any(run->def.ranks, stop || share_done(run) >= 1);
+}
+
+static MildStatus log_iteration(TrainRun *run, const TrainReport *report, MildError *error) {
+    double row[COLUMNS];
+    const int64_t iteration = train_iteration(run->trainer);
+    fill_row(run, report, row);
+    MildStatus status = log_row(run->log, iteration, row, error);
+    if (run->watch.iterated) {
+        run->watch.iterated(run->watch.self, iteration, report, share_done(run));
+    }
+    return status;
 }
 
 static MildStatus iterate(TrainRun *run, MildError *error) {
     TrainReport report;
-    double row[COLUMNS];
     MildStatus status = train_iterate(run->trainer, &report, error);
-    if (status != MILD_OK) {
-        return status;
+    if (status == MILD_OK && leads(run)) {
+        status = log_iteration(run, &report, error);
     }
-    fill_row(run, &report, row);
-    int64_t iteration = train_iteration(run->trainer);
-    status = log_row(run->log, iteration, row, error);
-    if (run->watch.iterated) {
-        run->watch.iterated(run->watch.self, iteration, &report, share_done(run));
-    }
-    if (status == MILD_OK && iteration % run->def.def->train.checkpoint_every == 0) {
+    status = agree(run, status, error);
+    if (status == MILD_OK &&
+        train_iteration(run->trainer) % run->def.def->train.checkpoint_every == 0) {
         status = save_checkpoint(run, error);
     }
     return status;

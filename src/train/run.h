@@ -6,6 +6,7 @@
 #include "train/trainer.h"
 
 typedef struct {
+    Ranks *ranks; /* NULL: alone. Rank 0 has the folder; the others need none of the texts */
     const char *folder;
     int resume; /* bool: continue from the newest checkpoint that loads */
     const ExperimentDef *def;
@@ -14,7 +15,8 @@ typedef struct {
     const char *note;    /* one line on how the policy was made, saved with it */
 } TrainRunDef;
 
-/* Observer of a run. Any function may be NULL. */
+/* Observer of a run. Any function may be NULL. With several processes the others than rank 0 call
+ * only `stop`, and one that stops ends the run of all. */
 typedef struct {
     void *self;
     void (*resumed)(void *self, const char *checkpoint);

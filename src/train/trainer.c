@@ -12,6 +12,7 @@ enum { TRAIN_MATERIALS = 3 }; /* drawn for the pattern of a terrain, as for stri
 
 struct Trainer {
     ExperimentDef def;
+    Ranks *ranks; /* NULL: alone */
     MildMap *map; /* NULL: level ground */
     Robot *robot;
     Pool *pool;
@@ -48,9 +49,27 @@ static MildStatus make_map(Trainer *trainer, MildError *error) {
                            : terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error);
 }
 
+/* Several processes train on the CPU, with MuJoCo. */
+static MildStatus check_ranks(const Trainer *trainer, MildError *error) {
+    const TrainDef *def = &trainer->def.train;
+    if (ranks_count(trainer->ranks) > 1 && train_device(def) >= 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "train.device = %s trains in one process; start one, or take cpu",
+                         def->device);
+    }
+    if (ranks_count(trainer->ranks) > 1 && train_is_batch(def)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "train.robots = batch trains in one process; start one, or take mujoco");
+    }
+    return MILD_OK;
+}
+
 static int build(Trainer *trainer, MildError *error) {
     const ExperimentDef *def = &trainer->def;
     MildError cause = {0};
+    if (check_ranks(trainer, error) != MILD_OK) {
+        return 0;
+    }
     trainer->robot = robot_open(def->train.robot, &cause);
     if (!trainer->robot) {
         mild_fail(error, cause.status, "train.robot: %s", cause.text);
@@ -61,17 +80,18 @@ static int build(Trainer *trainer, MildError *error) {
     const PpoMirror mirror = {sides.observation_index, sides.observation_sign, sides.action_index,
                               sides.action_sign};
     robot_set_model(trainer->robot, (MildModel)def->task.randomize.model);
-    trainer->pool = pool_create(def->train.threads);
+    const int threads = def->train.threads ? def->train.threads : ranks_threads(trainer->ranks);
+    trainer->pool = pool_create(threads);
     if (!trainer->pool) {
-        mild_fail(error, MILD_ERROR_MEMORY, "cannot start %d threads", def->train.threads);
+        mild_fail(error, MILD_ERROR_MEMORY, "cannot start %d threads", threads);
         return 0;
     }
     trainer->policy = policy_create(&def->policy, def->train.seed, error);
     if (!trainer->policy) {
         return 0;
     }
-    trainer->ppo = ppo_create(&def->ppo, trainer->policy, trainer->pool, &mirror, def->train.envs,
-                              def->train.seed, error);
+    trainer->ppo = ppo_create_part(&def->ppo, trainer->policy, trainer->pool, &mirror,
+                                   def->train.envs, def->train.seed, trainer->ranks, error);
     if (!trainer->ppo) {
         return 0;
     }
@@ -86,24 +106,78 @@ static int build(Trainer *trainer, MildError *error) {
     }
     trainer->def.task.map = trainer->map;
     trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
-    trainer->envs = train_envs_create(def, is_striped(def), trainer->robot, trainer->pool,
-                                      def->train.envs, 0, error);
+    trainer->envs =
+        train_envs_create(def, is_striped(def), trainer->robot, trainer->pool,
+                          ppo_batch(trainer->ppo)->envs, ppo_first_env(trainer->ppo), error);
     return trainer->envs != NULL && train_envs_reset(trainer->envs, ppo_batch(trainer->ppo),
                                                      trainer->stream, error) == MILD_OK;
 }
 
 Trainer *train_create(const ExperimentDef *def, MildError *error) {
+    return train_create_part(def, NULL, error);
+}
+
+Trainer *train_create_part(const ExperimentDef *def, Ranks *ranks, MildError *error) {
+    MildError cause = {0};
     Trainer *trainer = calloc(1, sizeof *trainer);
     if (!trainer) {
-        mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
-        return NULL;
+        mild_fail(&cause, MILD_ERROR_MEMORY, "out of memory");
+    } else {
+        trainer->def = *def;
+        trainer->ranks = ranks;
     }
-    trainer->def = *def;
-    if (!build(trainer, error)) {
+    const int built = trainer && build(trainer, &cause);
+    if (ranks_agree(ranks, built ? MILD_OK : cause.status, &cause) != MILD_OK || !trainer) {
+        mild_fail(error, cause.status, "%s", cause.text);
         train_destroy(trainer);
         return NULL;
     }
     return trainer;
+}
+
+/* ---- several processes ---- */
+
+/* Sums over the environments of all. Their last bits depend on the number of processes. */
+static void sum_over_ranks(Ranks *ranks, VecStats *sums) {
+    double numbers[9 + TASK_REWARD_COUNT] = {sums->episodes,    sums->falls,  sums->diverged,
+                                             sums->steps,       sums->length, sums->reward,
+                                             sums->speed_error, sums->assist, sums->paid};
+    memcpy(numbers + 9, sums->terms, sizeof sums->terms);
+    ranks_sum_double(ranks, numbers, 9 + TASK_REWARD_COUNT);
+    *sums = (VecStats){.episodes = (int)numbers[0],
+                       .falls = (int)numbers[1],
+                       .diverged = (int)numbers[2],
+                       .steps = numbers[3],
+                       .length = numbers[4],
+                       .reward = numbers[5],
+                       .speed_error = numbers[6],
+                       .assist = numbers[7],
+                       .paid = numbers[8]};
+    memcpy(sums->terms, numbers + 9, sizeof sums->terms);
+}
+
+uint64_t train_hash(Trainer *trainer) {
+    const uint32_t *words = (const uint32_t *)(const void *)policy_parameters(trainer->policy);
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (int64_t i = 0; i < policy_parameter_count(trainer->policy); i++) {
+        hash = (hash ^ words[i]) * 0x100000001b3u;
+    }
+    return hash;
+}
+
+/* Every process applies the same sums to the same parameters. Another kind of processor may round
+ * them differently. */
+static MildStatus check_same(Trainer *trainer, MildError *error) {
+    if (ranks_count(trainer->ranks) == 1) {
+        return MILD_OK;
+    }
+    const uint64_t mine = train_hash(trainer);
+    uint64_t first = mine;
+    ranks_broadcast(trainer->ranks, &first, sizeof first);
+    return mine == first ? MILD_OK
+                         : mild_fail(error, MILD_ERROR_ARGUMENT,
+                                     "its parameters differ from those of process 1; start the "
+                                     "same program on processors of the same kind");
 }
 
 /* One rollout. On a GPU actions and environments are only enqueued, and take their time
@@ -130,24 +204,30 @@ MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error
     TrainTimes times = {0};
     VecStats sums;
     double start = clock_seconds();
-    MildStatus status = roll_out(trainer, &times, error);
+    MildStatus status = ranks_agree(trainer->ranks, roll_out(trainer, &times, error), error);
     if (status != MILD_OK) {
         return status;
     }
     times.rollout = clock_seconds() - start;
     ppo_update(trainer->ppo, &report->ppo);
+    if (ranks_count(trainer->ranks) > 1 && ppo_status(trainer->ppo, error) != MILD_OK) {
+        ranks_abort(error); /* the others may wait for this one's gradient */
+    }
     double wall = clock_seconds() - start;
     times.update = wall - times.rollout;
     train_envs_take_times(trainer->envs, &times.physics, &times.ground);
     report->times = times;
-    status = train_envs_take_sums(trainer->envs, &sums, trainer->stream, error);
+    status = ranks_agree(trainer->ranks,
+                         train_envs_take_sums(trainer->envs, &sums, trainer->stream, error), error);
     if (status != MILD_OK) {
         return status;
     }
+    sum_over_ranks(trainer->ranks, &sums);
     report->episodes = vec_stats_from(sums, trainer->def.train.envs);
     report->steps_per_s = samples / wall;
     report->reward_per_step = sums.paid / samples;
-    return ppo_status(trainer->ppo, error);
+    status = check_same(trainer, error);
+    return status == MILD_OK ? ppo_status(trainer->ppo, error) : status;
 }
 
 int64_t train_iteration(const Trainer *trainer) {
@@ -173,10 +253,11 @@ MildStatus train_save(Trainer *trainer, const char *path, const char *note, Mild
     if (state) {
         return ppo_save(trainer->ppo, path, state, bytes, note, error);
     }
-    bytes = (size_t)trainer->def.train.envs * sizeof(TaskKept);
+    bytes = (size_t)ppo_batch(trainer->ppo)->envs * sizeof(TaskKept);
     TaskKept *kept = malloc(bytes);
     MildStatus status = kept ? train_envs_keep(trainer->envs, kept, error)
                              : mild_fail(error, MILD_ERROR_MEMORY, "no memory for a checkpoint");
+    status = ranks_agree(trainer->ranks, status, error);
     status =
         status == MILD_OK ? ppo_save_learner(trainer->ppo, path, kept, bytes, note, error) : status;
     free(kept);
@@ -185,13 +266,15 @@ MildStatus train_save(Trainer *trainer, const char *path, const char *note, Mild
 
 /* The learner alone: the environments begin new episodes. */
 static MildStatus load_learner(Trainer *trainer, const char *path, MildError *error) {
-    const size_t bytes = (size_t)trainer->def.train.envs * sizeof(TaskKept);
+    const size_t bytes = (size_t)ppo_batch(trainer->ppo)->envs * sizeof(TaskKept);
     TaskKept *kept = malloc(bytes);
     int found = 0;
-    if (!kept) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "no memory for a checkpoint");
+    MildStatus status =
+        kept ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "no memory for a checkpoint");
+    status = ranks_agree(trainer->ranks, status, error);
+    if (status == MILD_OK) {
+        status = ppo_load_learner(trainer->ppo, path, kept, bytes, &found, error);
     }
-    MildStatus status = ppo_load_learner(trainer->ppo, path, kept, bytes, &found, error);
     if (status == MILD_OK && found) {
         status = train_envs_restore(trainer->envs, kept, error);
     }
@@ -204,6 +287,8 @@ static MildStatus load_learner(Trainer *trainer, const char *path, MildError *er
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error) {
     size_t bytes;
     void *state = train_envs_state(trainer->envs, &bytes);
-    return state && ppo_file_is_whole(path) ? ppo_load(trainer->ppo, path, state, bytes, error)
-                                            : load_learner(trainer, path, error);
+    const int leads = ranks_number(trainer->ranks) == 0,
+              whole = ranks_any(trainer->ranks, leads && state && ppo_file_is_whole(path));
+    return whole ? ppo_load(trainer->ppo, path, state, bytes, error)
+                 : load_learner(trainer, path, error);
 }

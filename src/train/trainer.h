@@ -4,12 +4,13 @@
 #define TRAIN_TRAINER_H
 
 #include "learn/ppo.h"
+#include "ranks/ranks.h"
 #include "task/vec.h"
 #include "train/experiment.h"
 
 typedef struct Trainer Trainer;
 
-/* Wall time of one iteration [s]. */
+/* Wall time of one iteration [s], of this process. */
 typedef struct {
     double rollout, inference, environments, update;
     double physics, ground; /* thread time inside environments, summed over the threads; ground is
@@ -25,6 +26,10 @@ typedef struct {
 } TrainReport;
 
 Trainer *train_create(const ExperimentDef *def, MildError *error);
+/* One of several processes that train together: it has its part of train.envs (learn/order.h).
+ * Borrows ranks (NULL: alone). This and the functions that can fail are calls of all ranks.
+ * train_iterate may fail on one rank alone; the others agree. Reports are those of the whole. */
+Trainer *train_create_part(const ExperimentDef *def, Ranks *ranks, MildError *error);
 void train_destroy(Trainer *trainer);
 /* One rollout and one update. Fails when train.device does. */
 MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
@@ -32,6 +37,7 @@ int64_t train_iteration(const Trainer *trainer);
 Policy *train_policy(Trainer *trainer); /* the policy to save; with ppo.average the mean weights */
 size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */
 int train_threads(const Trainer *trainer);
+uint64_t train_hash(Trainer *trainer); /* of the parameters; the same on all ranks */
 
 /* Saves all that resuming needs in one file with a checksum. Where MuJoCo steps the robots, a
  * resumed run equals one that was never stopped, bit for bit. Where the batch engine does, the file

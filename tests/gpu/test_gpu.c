@@ -208,7 +208,7 @@ static void compare_learner(const PolicyDef *policy, const PpoDef *def, int envs
     memcpy(b->advantage, a->advantage, (size_t)samples * sizeof(float));
     learner_write(&gpu);
     int *order = some_order(samples);
-    const int minibatch = order_largest(a->steps, a->envs, def->minibatches),
+    const int minibatch = order_largest(a->steps, order_part(a->envs, 0, 1), def->minibatches),
               counts[] = {minibatch, minibatch - 1, 300, 5};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         compare_gradient(&cpu, &gpu, order, counts[i] < minibatch ? counts[i] : minibatch,

@@ -117,12 +117,48 @@ static void strata_and_cuts_cover_everything(void **state) {
     }
 }
 
+/* The parts of 1, 2, 4 and 8 processes hold every environment once, and the strata of a part name
+ * its samples by their places in its own arrays. */
+static void parts_are_whole_strata(void **state) {
+    (void)state;
+    enum { STEPS = 3, ENVS = 37 };
+    for (int ranks = 1; ranks <= PPO_SHARDS; ranks *= 2) {
+        int next = 0;
+        for (int rank = 0; rank < ranks; rank++) {
+            const OrderPart part = order_part(ENVS, rank, ranks);
+            assert_int_equal(part.envs, ENVS);
+            assert_int_equal(part.first, next);
+            next += part.width;
+            int strata = 0;
+            for (int s = 0; s < PPO_SHARDS; s++) {
+                const OrderStratum whole = order_stratum(STEPS, ENVS, s),
+                                   own = order_part_stratum(STEPS, part, s);
+                if (s * ranks / PPO_SHARDS != rank) {
+                    assert_int_equal(own.count, 0);
+                    continue;
+                }
+                assert_int_equal(own.count, whole.count);
+                strata++;
+                for (int k = 0; k < whole.count; k++) {
+                    const int at = order_sample(whole, ENVS, k),
+                              mine = order_sample(own, part.width, k);
+                    assert_int_equal(mine / part.width, at / ENVS);
+                    assert_int_equal(part.first + mine % part.width, at % ENVS);
+                }
+            }
+            assert_int_equal(strata, part.shards);
+        }
+        assert_int_equal(next, ENVS);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(orders_are_permutations),
         cmocka_unit_test(pairs_are_uniform),
         cmocka_unit_test(one_order_is_mixed),
         cmocka_unit_test(strata_and_cuts_cover_everything),
+        cmocka_unit_test(parts_are_whole_strata),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

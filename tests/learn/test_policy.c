@@ -87,6 +87,52 @@ static void test_act_and_value(void **state) {
     pool_destroy(pool);
 }
 
+/* Rows in blocks and runs, as the learner has them: each row once, and the same bits whether a
+ * process has both runs of a block or one of them. */
+static void test_rows_in_runs(void **state) {
+    (void)state;
+    enum { BLOCKS = 3, FIRST = 150, SECOND = 31, WIDTH = FIRST + SECOND, ROWS = BLOCKS * WIDTH };
+    PolicyDef def = policy_def_default();
+    def.critic_input = 98;
+    Policy *policy = policy_create(&def, 3, NULL);
+    Pool *pool = pool_create(3);
+    assert_true(policy && pool);
+    Random random = random_at(6, 0, 0);
+    static float history[ROWS * 282], critic[ROWS * 98], part[BLOCKS * SECOND * 282];
+    static float actions[3][ROWS * 12], values[3][ROWS];
+    fill_normal(history, ROWS * 282, 1.0, &random);
+    fill_normal(critic, ROWS * 98, 1.0, &random);
+    const PolicyRows both = {BLOCKS, 2, {0, FIRST, WIDTH}}, second = {BLOCKS, 1, {0, SECOND}};
+    memset(actions[1], 0xff, sizeof actions[1]);
+    memset(values[1], 0xff, sizeof values[1]);
+    policy_act(policy, NULL, ROWS, history, actions[0], NULL, NULL);
+    policy_value(policy, NULL, ROWS, critic, values[0]);
+    policy_act_rows(policy, pool, &both, history, actions[1]);
+    policy_value_rows(policy, pool, &both, critic, values[1]);
+    for (int i = 0; i < ROWS * 12; i++) {
+        assert_true(fabs((double)actions[1][i] - (double)actions[0][i]) < 1e-5);
+        assert_true(fabs((double)values[1][i / 12] - (double)values[0][i / 12]) < 1e-5);
+    }
+    for (int block = 0; block < BLOCKS; block++) {
+        memcpy(part + block * SECOND * 282, history + (block * WIDTH + FIRST) * 282,
+               SECOND * 282 * sizeof *part);
+    }
+    policy_act_rows(policy, NULL, &second, part, actions[2]);
+    for (int block = 0; block < BLOCKS; block++) {
+        memcpy(part + block * SECOND * 98, critic + (block * WIDTH + FIRST) * 98,
+               SECOND * 98 * sizeof *part);
+    }
+    policy_value_rows(policy, NULL, &second, part, values[2]);
+    for (int block = 0; block < BLOCKS; block++) {
+        assert_memory_equal(actions[2] + block * SECOND * 12,
+                            actions[1] + (block * WIDTH + FIRST) * 12, SECOND * 12 * sizeof(float));
+        assert_memory_equal(values[2] + block * SECOND, values[1] + block * WIDTH + FIRST,
+                            SECOND * sizeof(float));
+    }
+    policy_destroy(policy);
+    pool_destroy(pool);
+}
+
 /* One network forward in double: rows of weights times inputs plus bias, ELU between layers. */
 static void forward(const Mlp *mlp, const float *parameters, const double *x, double *y) {
     double in[64];
@@ -530,6 +576,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_answers),
         cmocka_unit_test(test_act_and_value),
+        cmocka_unit_test(test_rows_in_runs),
         cmocka_unit_test(test_modulation_starts_at_identity),
         cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_name_of_the_robot),

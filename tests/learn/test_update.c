@@ -1,6 +1,6 @@
 /* The update around the gradient: learning rate, anneal, clipping, bounds of the noise, averages,
  * order, the report. Scripted results stand in for the networks (the linker puts the functions
- * below in place of policy_value and ppo_gradient), so that every number is known. */
+ * below in place of policy_value_rows and ppo_gradient), so that every number is known. */
 #include "check.h"
 
 #include <math.h>
@@ -30,16 +30,19 @@ typedef struct {
 
 static Script *script; /* of the run that is open */
 
-void __wrap_policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values);
+void __wrap_policy_value_rows(Policy *policy, Pool *pool, const PolicyRows *rows,
+                              const float *critic, float *values);
 void __wrap_ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
                          LossSums *sums, double *norm);
 
-void __wrap_policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values) {
+void __wrap_policy_value_rows(Policy *policy, Pool *pool, const PolicyRows *rows,
+                              const float *critic, float *values) {
+    const int count = rows->blocks * rows->cut[rows->runs];
     (void)policy;
     (void)pool;
     (void)critic;
-    assert_int_equal(rows, (STEPS + 1) * ENVS);
-    for (int i = 0; i < rows; i++) {
+    assert_int_equal(count, (STEPS + 1) * ENVS);
+    for (int i = 0; i < count; i++) {
         values[i] = !script->half_rewards ? script->value
                     : i < SAMPLES         ? 0.5f * script->batch->reward[i]
                                           : 0.0f;

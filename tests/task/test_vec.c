@@ -341,6 +341,43 @@ static void refused(void **unused) {
     pool_destroy(pool);
 }
 
+/* Environments that are a part of more: the number selects the random numbers. */
+static void numbered_from(void **unused) {
+    (void)unused;
+    const TaskDef def = task_def_default();
+    open_many(&def, 2);
+    VecView view = all_views();
+    vec_number_from(many.vec, 70);
+    vec_reset(many.vec, &view);
+    for (int e = 0; e < ENVS; e++) {
+        Rig alone;
+        rig_open(&alone, &def, 21, (uint32_t)(70 + e));
+        task_env_reset(alone.env, &def, robot, alone.sim, &alone.view);
+        expect_row(e, &alone);
+        rig_close(&alone);
+    }
+    close_many();
+}
+
+/* The means of two groups of robots together. */
+static void statistics_of_two(void **unused) {
+    (void)unused;
+    VecStats stats = {.episodes = 3 + 1, .falls = 2, .steps = 50, .assist = 1.5 + 0.5};
+    stats.length = 6 + 2;
+    stats.reward = 30 + 10;
+    stats.speed_error = 0.6 + 0.6;
+    stats.terms[1] = 4;
+    stats = vec_stats_from(stats, 4);
+    assert_int_equal(stats.episodes, 4);
+    assert_int_equal(stats.falls, 2);
+    expect_near("steps", stats.steps, 50, 0);
+    expect_near("length", stats.length, 2, 1e-15);
+    expect_near("reward", stats.reward, 10, 1e-15);
+    expect_near("speed error", stats.speed_error, 0.3, 1e-15);
+    expect_near("help", stats.assist, 0.5, 0);
+    expect_near("term", stats.terms[1], 0.5, 1e-15);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(refused),
@@ -352,6 +389,8 @@ int main(void) {
         cmocka_unit_test(views_may_be_missing),
         cmocka_unit_test(statistics),
         cmocka_unit_test(each_is_as_alone),
+        cmocka_unit_test(numbered_from),
+        cmocka_unit_test(statistics_of_two),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

@@ -1,0 +1,141 @@
+#!/usr/bin/env bash
+# Training by several processes: the same numbers whatever the split, from checkpoint to checkpoint too; a process that
+# fails or dies is one line, and the last checkpoint is whole. Usage: test_ranks.sh PATH_TO_MILD PATH_TO_RANKS_TEST PATH_TO_RANKS_PY
+source "$(dirname "$0")/../kit.sh" "$1"
+test_ranks=$(realpath "$2")
+ranks_py=$(realpath "$3")
+# no network; a short path for its sockets; as many processes as wanted, as root too
+# products whose last bits depend on the rows beside a row, on any processor
+export DNNL_MAX_CPU_ISA=AVX2
+export TMPDIR=$work OMPI_MCA_btl=self,vader OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_ALLOW_RUN_AS_ROOT=1 \
+    OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+
+tiny=(--train.envs=20 --train.minutes=0 --train.checkpoint_every=1 --ppo.steps=24
+    --policy.actor_hidden=32,0,0,0 --policy.critic_hidden=32,0,0,0 --policy.encoder_hidden=32,0,0,0
+    --policy.decoder_hidden=32,0,0,0)
+last=checkpoint_000000004.safetensors
+
+# All but the header of a safetensors file: it holds the note, which names the command.
+numbers() {
+    tail -c +$(($(od -An -t u8 -N 8 "$1") + 9)) "$1"
+}
+
+same_numbers() {
+    numbers "$1" >one.numbers
+    numbers "$2" >other.numbers
+    cmp one.numbers other.numbers || fail "$1 and $2 differ"
+}
+
+# The log without the columns that tell the time it took.
+log_numbers() {
+    awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) timed[i] = $i ~ /^rate\// }
+        { for (i = 1; i <= NF; i++) if (!timed[i]) printf "%.5g,", $i; print "" }' "$1/log.csv"
+}
+
+good() {
+    output=$("$@" 2>&1 </dev/null) || fail "exit $?: $* -> $output"
+}
+
+# The reward on the last progress line of good's command.
+reward() {
+    grep -o 'reward [-0-9.]*/s' <<<"$output" | tail -1
+}
+
+# the calls
+for n in 2 4 8; do
+    good mpirun -n $n "$test_ranks"
+done
+
+# the split changes nothing: parameters, moments, environments, log; one process may be alone or rank 0 of 1
+good "$mild" train --out alone "${tiny[@]}" --train.iterations=4 --train.threads=2
+reward_alone=$(reward)
+[ -n "$reward_alone" ] || fail "no reward in: $output"
+for n in 1 2 8; do
+    good mpirun -n $n "$mild" train --out by$n "${tiny[@]}" --train.iterations=4
+    [ "$(reward)" = "$reward_alone" ] || fail "$reward_alone alone, $(reward) by $n processes"
+    same_numbers alone/$last by$n/$last
+    same_numbers alone/policy.safetensors by$n/policy.safetensors
+    [ "$(log_numbers alone)" = "$(log_numbers by$n)" ] || fail "the logs of 1 and $n processes differ"
+    # rank 0 alone writes
+    [ "$(ls alone | sed 's/tfevents.*/tfevents/')" = "$(ls by$n | sed 's/tfevents.*/tfevents/')" ] ||
+        fail "files of $n processes: $(ls by$n)"
+done
+
+# on with another number: 2, alone, 4
+good "$ranks_py" -n 2 "$mild" train --out on "${tiny[@]}" --train.iterations=1
+good "$mild" train --out on --resume --train.iterations=2
+good "$ranks_py" -n 4 "$mild" train --out on --resume --train.iterations=4
+same_numbers alone/$last on/$last
+
+# on from a run of the batch engine, whose checkpoint has the learner and the help of each robot
+good "$mild" train --out batch "${tiny[@]}" --train.robots=batch --train.grounds=16 --train.iterations=3
+cp -r batch batch2
+good "$mild" train --out batch --resume --train.robots=mujoco --train.iterations=4
+good "$ranks_py" -n 2 "$mild" train --out batch2 --resume --train.robots=mujoco --train.iterations=4
+same_numbers batch/$last batch2/$last
+
+# mistakes: one line, exit 2, nothing left
+bad "nearest is --out" "$ranks_py" -n 2 "$mild" train --ot on
+bad "nearest is 'train.envs'" "$ranks_py" -n 2 "$mild" train --out wrong --train.env=4
+bad "3 processes: 1, 2, 4 or 8" "$ranks_py" -n 3 "$mild" train --out wrong
+bad "train.envs = 3 is too few for 4 processes" "$ranks_py" -n 4 "$mild" train --out wrong "${tiny[@]}" --train.envs=3
+bad "train.device = cuda trains in one process" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda
+bad "train.robots = batch trains in one process" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.robots=batch
+bad "cannot make folder" "$ranks_py" -n 2 "$mild" train --out /dev/null/wrong "${tiny[@]}"
+bad "holds 3 checkpoints" "$ranks_py" -n 2 "$mild" train --out on
+# 20000 robots need 300 MB, and the second process may not have them
+many=("$mild" train --out wrong "${tiny[@]}" --train.envs=20000 --train.iterations=1)
+bad "process 2 of 2: .*memory" "$ranks_py" -n 1 "${many[@]}" : -n 1 bash -c 'ulimit -v 400000; exec "$@"' - "${many[@]}"
+expect 0 'usage: mild train' "$ranks_py" -n 2 "$mild" train --help
+
+# a torn checkpoint is passed over, with one word about it
+cp -r by2 torn
+truncate -s 1000 torn/$last
+[ "$("$ranks_py" -n 2 "$mild" train --out torn --resume 2>&1 >/dev/null | grep -c 'trying the checkpoint before')" = 1 ] ||
+    fail "torn checkpoint"
+same_numbers alone/$last torn/$last
+
+# endless FOLDER: starts training without an end in the background, waits for its first checkpoint; $launcher is its process
+endless() {
+    "$ranks_py" -n 2 "$mild" train --out "$1" "${tiny[@]}" --train.iterations=0 >"$1.out" 2>"$1.err" &
+    launcher=$!
+    for _ in {1..200}; do
+        [ -z "$(ls "$1"/checkpoint_* 2>/dev/null)" ] || return
+        sleep 0.1
+    done
+    fail "no checkpoint of $1: $(cat "$1.err")"
+}
+
+# ended FOLDER CODE: it ends with that code
+ended() {
+    wait $launcher
+    local got=$?
+    [ $got = "$2" ] || fail "$1: exit $got instead of $2: $(cat "$1.err")"
+}
+
+# a process that is killed ends the run with one line; the run goes on from the last checkpoint as if nothing had happened
+endless killed
+mpirun=$(pgrep -P $launcher)
+victims=($(pgrep -P "$mpirun" mild))
+[ ${#victims[@]} = 2 ] || fail "processes of mpirun: ${victims[*]}"
+kill -KILL "${victims[1]}"
+ended killed 137
+[ "$(grep -vc '^training ' killed.err)" = 1 ] || fail "not one line: $(cat killed.err)"
+grep -q 'exited on signal 9' killed.err || fail "killed: $(cat killed.err)"
+[ -z "$(find killed -name '*.tmp')" ] || fail "temporary files in killed"
+number=$((10#$(ls killed | sed -n 's/checkpoint_\(.*\)\.safetensors/\1/p' | tail -1)))
+good "$mild" train --out killed --resume --train.iterations=$((number + 1))
+good "$mild" train --out whole "${tiny[@]}" --train.iterations=$((number + 1))
+same_numbers whole/checkpoint_$(printf %09d $((number + 1))).safetensors killed/checkpoint_$(printf %09d $((number + 1))).safetensors
+
+# signals save the run and end it
+for signal in INT TERM; do
+    endless stopped$signal
+    kill -$signal $launcher
+    ended stopped$signal 0
+    rows=$(($(wc -l <stopped$signal/log.csv) - 1))
+    [ -s stopped$signal/checkpoint_$(printf %09d $rows).safetensors ] || fail "SIG$signal: the last iteration is not saved"
+    [ ! -e stopped$signal/lock ] || fail "SIG$signal: the lock is still there"
+done
+
+finish "training by several processes: all as expected"
