@@ -27,7 +27,6 @@ enum { LANES = 32 };
 #ifdef __CUDACC__
 
 #define LANE_FN static __device__ __forceinline__
-#define LANE_CALL static __device__ __noinline__ /* once in the text, for several callers */
 #define LANE_COPIES 1
 #define EACH_LANE(l) for (int l = 0; l < 1; l++)
 #define LANE(l) ((int)(threadIdx.x % LANES))
@@ -68,7 +67,6 @@ LANE_FN void group_max(Real *x, int size) {
 #else
 
 #define LANE_FN static inline
-#define LANE_CALL static inline
 #define LANE_COPIES LANES
 #define EACH_LANE(l) for (int l = 0; l < LANES; l++)
 #define LANE(l) (l)

@@ -30,7 +30,7 @@ static inline MILD_BOTH AdamStep adam_step(double learning_rate, int64_t t, doub
 /* m = b1 m + (1-b1) g, v = b2 v + (1-b2) g^2, p -= lr m^ / (sqrt(v^) + eps), with m^ and v^
  * corrected for their bias towards 0. */
 static inline MILD_BOTH void adam_element(AdamStep step, float gradient, float *parameter,
-                                        float *first, float *second) {
+                                          float *first, float *second) {
     const float g = gradient * step.gradient_scale;
     const float m = (float)ADAM_BETA1 * *first + (float)(1.0 - ADAM_BETA1) * g;
     const float v = (float)ADAM_BETA2 * *second + (float)(1.0 - ADAM_BETA2) * g * g;

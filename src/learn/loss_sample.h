@@ -52,7 +52,7 @@ static inline MILD_BOTH float loss_standard(float action, float mean, float inve
  * of log_prob and of KL(old || new), which is
  *     sum log(std/old) + (old^2 + (old_mean - mean)^2) / (2 std^2) - 1/2. */
 static inline MILD_BOTH void loss_surrogate_constants(int actions, const float *std,
-                                                    const float *old_std, float *constant) {
+                                                      const float *old_std, float *constant) {
     double log_prob = 0.0, kl = 0.0;
     for (int j = 0; j < actions; j++) {
         const double ratio = (double)old_std[j] / (double)std[j];
@@ -66,7 +66,7 @@ static inline MILD_BOTH void loss_surrogate_constants(int actions, const float *
 
 /* log of the normal density of `action`, independent dimensions. */
 static inline MILD_BOTH float loss_log_prob(int actions, const float *action, const float *mean,
-                                          const float *std) {
+                                            const float *std) {
     double sum = 0.0;
     for (int j = 0; j < actions; j++) {
         const double t = ((double)action[j] - (double)mean[j]) / (double)std[j];
@@ -77,9 +77,9 @@ static inline MILD_BOTH float loss_log_prob(int actions, const float *action, co
 
 /* constant [actions + 2]: see loss_surrogate_constants. */
 static inline MILD_BOTH LossSurrogate loss_surrogate(int actions, const float *constant, float clip,
-                                                   const float *action, const float *mean,
-                                                   const float *old_mean, float old_log_prob,
-                                                   float advantage) {
+                                                     const float *action, const float *mean,
+                                                     const float *old_mean, float old_log_prob,
+                                                     float advantage) {
     LossSurrogate s;
     float log_prob = constant[actions];
     s.kl = constant[actions + 1];
@@ -116,8 +116,8 @@ static inline MILD_BOTH float loss_log_std_gradient(float d_log_prob, float t) {
  * Adds to d_mean and overwrites d_image. weight: of the gradient, which is twice the weight of the
  * sum. */
 static inline MILD_BOTH float loss_mirror(int actions, const int *index, const float *sign,
-                                        float weight, const float *mean, const float *image,
-                                        float *d_mean, float *d_image) {
+                                          float weight, const float *mean, const float *image,
+                                          float *d_mean, float *d_image) {
     float sum = 0.0f;
     for (int j = 0; j < actions; j++) {
         d_image[j] = 0.0f;
@@ -136,8 +136,9 @@ static inline MILD_BOTH float loss_mirror(int actions, const int *index, const f
 
 /* Mean square of the estimates begin .. end-1; adds to d. weight: twice that of the mean. An empty
  * group costs nothing. */
-static inline MILD_BOTH double loss_estimates(int begin, int end, float weight, const float *estimate,
-                                            const float *target, float *d) {
+static inline MILD_BOTH double loss_estimates(int begin, int end, float weight,
+                                              const float *estimate, const float *target,
+                                              float *d) {
     if (begin == end) {
         return 0.0;
     }
@@ -176,7 +177,7 @@ static inline MILD_BOTH float loss_mu_gradient(float weight, float mu, float d_z
 /* d loss / d logvar. Outside its bounds the log-variance receives only gradients that lead back
  * inside. */
 static inline MILD_BOTH float loss_logvar_gradient(float weight, float logvar, float spread,
-                                                 float noise, float d_z) {
+                                                   float noise, float d_z) {
     const float d = 0.5f * (d_z * spread * noise + weight * (spread * spread - 1.0f));
     const float outward = (logvar - loss_held_logvar(logvar)) * d;
     return outward < 0.0f ? 0.0f : d;
@@ -188,8 +189,8 @@ static inline MILD_BOTH float loss_logvar_gradient(float weight, float logvar, f
  * [estimates | z~]; theta has two numbers, or two for each latent dimension. Overwrites d_heads
  * (logvar: 0) and d_theta. */
 static inline MILD_BOTH void loss_modulation(int estimates, int latent, int per_dimension,
-                                           const float *heads, const float *theta,
-                                           const float *d_input, float *d_heads, float *d_theta) {
+                                             const float *heads, const float *theta,
+                                             const float *d_input, float *d_heads, float *d_theta) {
     float d_scale = 0.0f;
     float d_shift = 0.0f;
     for (int j = 0; j < estimates; j++) {
@@ -218,7 +219,7 @@ static inline MILD_BOTH void loss_modulation(int estimates, int latent, int per_
 /* Returns the gap whose square is the loss, and writes half of the gradient. Where the clipped
  * branch is the larger one, its gradient is that of V inside the clip range and 0 outside. */
 static inline MILD_BOTH float loss_value(int clip_value, float clip, float value, float old_value,
-                                       float returns, float *half_gradient) {
+                                         float returns, float *half_gradient) {
     const float gap = value - returns;
     const float move = value - old_value;
     const float held_move = move < -clip ? -clip : move > clip ? clip : move;

@@ -38,7 +38,7 @@ static inline MILD_BOTH double step_entropy(int actions, const float *std) {
 /* Adds the means of a minibatch to the report. Returns 0 when one of them is not finite. weight,
  * mirror_weight: 1 / samples, 1 / samples with a mirror image. norm: of the gradient. */
 static inline MILD_BOTH int step_report(PpoReport *report, const LossSums *s, double weight,
-                                      double mirror_weight, double entropy, double norm) {
+                                        double mirror_weight, double entropy, double norm) {
     const double check = s->surrogate + s->kl + s->reconstruction + s->vae_kl + s->estimate[0] +
                          s->estimate[1] + s->estimate[2] + s->mirror + s->value + norm;
     if (!isfinite(check)) {
@@ -70,7 +70,7 @@ static inline MILD_BOTH double step_anneal(const PpoDef *def, int64_t iteration)
  * factor 1.5]. Below a millionth of the target the divergence is rounding: the first minibatch of
  * an update has none. */
 static inline MILD_BOTH double step_learning_rate(const PpoDef *def, int64_t iteration, double rate,
-                                                double kl) {
+                                                  double kl) {
     if (!(def->kl_target > 0.0)) {
         return rate;
     }
@@ -113,7 +113,7 @@ static inline MILD_BOTH float step_average(const PpoDef *def, int64_t iteration)
 
 /* Sums over `taken` minibatches become means. */
 static inline MILD_BOTH void step_finish_report(PpoReport *report, int taken, int actions,
-                                              const float *std, double learning_rate) {
+                                                const float *std, double learning_rate) {
     const double w = taken > 0 ? 1.0 / taken : 0.0;
     double *const means[] = {&report->surrogate,        &report->value_loss,
                              &report->entropy,          &report->kl,
@@ -133,7 +133,7 @@ static inline MILD_BOTH void step_finish_report(PpoReport *report, int taken, in
 /* From the moments over the usable samples. returns - value is the advantage before it is
  * normalised. */
 static inline MILD_BOTH void step_report_returns(PpoReport *report, double value_mean,
-                                               double advantage_std, double returns_std) {
+                                                 double advantage_std, double returns_std) {
     report->value_mean = value_mean;
     report->advantage_std = advantage_std;
     report->explained_variance =

@@ -18,7 +18,7 @@ static inline MILD_BOTH int returns_usable(const PpoBatch *b, int64_t i) {
  * A_t+1, where an end by time has r_t += gamma V(s_t), as if the episode went on. An unusable
  * sample cuts like an end. */
 static inline MILD_BOTH void returns_environment(double gamma, double lambda, const PpoBatch *b,
-                                               int env) {
+                                                 int env) {
     double advantage = 0.0, next_value = b->value[(int64_t)b->steps * b->envs + env];
     next_value = isfinite(next_value) ? next_value : 0.0;
     for (int t = b->steps - 1; t >= 0; t--) {
