@@ -16,7 +16,13 @@
 #endif
 /* TASK_ROBOTS of a warp's threads have a robot: what one thread does waits for memory most of the
  * time, and more warps hide more of it. */
-enum { WARP_THREADS = LANES * CROWD_WARPS, TASK_THREADS = 32, TASK_ROBOTS = 8, TALLY_THREADS = 256, ORDER_THREADS = 1024 };
+enum {
+    WARP_THREADS = LANES * CROWD_WARPS,
+    TASK_THREADS = 32,
+    TASK_ROBOTS = 8,
+    TALLY_THREADS = 256,
+    ORDER_THREADS = 1024
+};
 
 static const size_t place_bytes = CROWD_WARPS * sizeof(CrowdPlace);
 
@@ -41,8 +47,7 @@ static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
     extern __shared__ __align__(16) Real shared[];
     const long place = warp_robot();
     if (place < all.envs) {
-        crowd_part(&all, &call, all.order[place], k,
-                   (CrowdPlace *)shared + threadIdx.x / LANES);
+        crowd_part(&all, &call, all.order[place], k, (CrowdPlace *)shared + threadIdx.x / LANES);
     }
 }
 
@@ -165,7 +170,7 @@ extern "C" const char *crowd_device_begin(const CrowdArrays *all, void *stream) 
 extern "C" const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k,
                                          void *stream) {
     part<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all, *call,
-                                                                                     k);
+                                                                                      k);
     return launched();
 }
 
