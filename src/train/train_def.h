@@ -22,8 +22,8 @@ typedef struct {
     int grounds;    /* that the batch engine's episodes choose from */
 } TrainDef;
 
-/* What steps the robots: MuJoCo with mild/ground.h on the CPU, or the batch engine with mild/batch.h
- * where the networks run. */
+/* What steps the robots: MuJoCo with mild/ground.h on the CPU, or the batch engine with
+ * mild/batch.h where the networks run. */
 typedef enum {
     TRAIN_ROBOTS_AUTO,
     TRAIN_ROBOTS_MUJOCO,
