@@ -21,9 +21,9 @@ const MildField *terrain_fields(int *count);
  * first material, white the last. *map is NULL for level ground without a pattern. Destroy it with
  * mild_map_destroy. */
 MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, MildError *error);
-/* The same with stripes across x of lengths drawn from `length` [m], whose labels 0 .. materials - 1
- * are drawn too: patches for the batch engine, which has those of a map alone. def has no pattern
- * of its own. */
+/* The same with stripes across x of lengths drawn from `length` [m], whose labels, 0 .. materials
+ * - 1, are drawn too: patches for the batch engine, which has those of a map alone. def has no
+ * pattern of its own. */
 MildStatus terrain_make_striped(const TerrainDef *def, int materials, const double length[2],
                                 uint64_t seed, MildMap **map, MildError *error);
 /* Tiles for mild_ground_bytes_prints; 0 without memory. */
