@@ -99,8 +99,8 @@ MILD_HD Real engine_push_force(const EngineModel *model, const EngineVariation *
     return R[d - 3] * torque[0] + R[d] * torque[1] + R[d + 3] * torque[2];
 }
 
-/* work->force, acceleration: joint torques [joints] in the order of robot.ini, less gyroscopic, Coriolis and
- * gravity forces and damping, and the push [6] or NULL. After engine_gather. */
+/* work->force, acceleration: joint torques [joints] in the order of robot.ini, less gyroscopic,
+ * Coriolis and gravity forces and damping, and the push [6] or NULL. After engine_gather. */
 LANE_FN void engine_smooth_force(const EngineModel *model, const EngineVariation *variation,
                                  const Real *torque, const Real *push, EngineWork *work) {
     const EngineTree *tree = &model->tree;

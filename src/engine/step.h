@@ -15,8 +15,8 @@
  * between the two. After a step the state is new and poses are those of its beginning;
  * engine_begin without an action brings them up to date for an observer (measure.h).
  *
- * Loops are rolled but for the shortest ones: a GPU reads its instructions from a small cache, and a
- * step executes most of them once. */
+ * Loops are rolled but for the shortest ones: a GPU reads its instructions from a small cache, and
+ * a step executes most of them once. */
 #ifndef MILD_ENGINE_STEP_H
 #define MILD_ENGINE_STEP_H
 

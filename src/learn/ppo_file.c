@@ -115,8 +115,8 @@ static Extra kept_extra(const void *bytes, size_t size) {
     return (Extra){"train.kept", bytes, size, 0};
 }
 
-/* What resuming needs besides the policy. The sizes are those of the file; the data are those of the
- * part. */
+/* What resuming needs besides the policy. The sizes are those of the file; the data are those of
+ * the part. */
 static int train_tensors(const Ppo *ppo, const int64_t counters[COUNTERS], const Extra *extra,
                          Safetensor tensors[TRAIN_TENSORS]) {
     const Network *n = &ppo->policy->network;

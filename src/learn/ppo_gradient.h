@@ -14,7 +14,8 @@ typedef struct {
     uint32_t draw;           /* number in this update, which picks the random numbers */
 } PpoMinibatch;
 
-/* Gradient of the loss over a minibatch into ppo->gradient (the first shard's), its norm, and the sums. */
+/* Gradient of the loss over a minibatch into ppo->gradient (the first shard's), its norm, and the
+ * sums. */
 void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
                   LossSums *sums, double *norm);
 /* Samples of a minibatch with these cuts that get a mirror image: how many, and with `which` not

@@ -1,5 +1,5 @@
-/* What a simulation of a robot reads and writes: plain numbers without pointers. Joints and feet are
- * numbered in the order of robot.ini. */
+/* What a simulation of a robot reads and writes: plain numbers without pointers. Joints and feet
+ * are numbered in the order of robot.ini. */
 #ifndef ROBOT_STATE_H
 #define ROBOT_STATE_H
 

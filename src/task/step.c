@@ -138,8 +138,8 @@ TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot
     return motor;
 }
 
-/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). A motor at its speed limit gives no
- * torque in the direction of motion. */
+/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). A motor at its speed limit gives
+ * no torque in the direction of motion. */
 TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd) {
     double tau = motor->kp * (motor->target[late] - q) - motor->kd * qd;
     tau = tau > motor->limit ? motor->limit : tau < -motor->limit ? -motor->limit : tau;
