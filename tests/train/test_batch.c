@@ -24,7 +24,7 @@ static Trainer *trainer_of(TrainRobots robots) {
     def.train.envs = ENVS;
     def.train.threads = 2;
     def.train.grounds = 32;
-    def.train.robots = robots;
+    def.train.robots = (int)robots;
     def.ppo.steps = 8;
     def.task.physics_dt = 0.005;
     Trainer *trainer = train_create(&def, &error);
