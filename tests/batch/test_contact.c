@@ -323,7 +323,8 @@ static void run_shape(const Shape *shape, int walks, double tolerance, void (*ru
 
 /* Newton's steps are those of the ground: the derivative is right. */
 static int same_steps(const Worst *worst) {
-    return abs(worst->iterations - worst->iterations_ground) <= worst->iterations_ground / 25;
+    return abs(worst->iterations - worst->iterations_ground) <=
+           worst->iterations_ground / 25 + 12; /* a dozen: where few steps are drawn */
 }
 
 static void double_text_is_the_ground(void **state) {
