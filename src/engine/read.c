@@ -87,7 +87,7 @@ static void read_rows(EngineTree *tree) {
             tree->row_dof[i][place] = (EngineIndex)place;
         }
         if (i > 0) {
-            memcpy(tree->row_dof[i], tree->row_dof[tree->parent[i]], (size_t)(5 + level));
+            memcpy(tree->row_dof[i], tree->row_dof[tree->parent[i]], 5 + (size_t)level);
             tree->row_dof[i][5 + level] = (EngineIndex)(5 + i);
         }
     }

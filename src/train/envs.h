@@ -9,9 +9,9 @@
 
 typedef struct TrainEnvs TrainEnvs;
 
-/* envs: of this process, with numbers from `first`. striped: see CrowdDef. */
+/* count: of this process, with numbers from `first`. striped: see CrowdDef. */
 TrainEnvs *train_envs_create(const ExperimentDef *def, int striped, const Robot *robot, Pool *pool,
-                             int envs, int first, MildError *error);
+                             int count, int first, MildError *error);
 void train_envs_destroy(TrainEnvs *envs); /* may be NULL */
 /* New episodes; their observations to the rows of time 0. stream: of the learner, see
  * gpu_learner_stream. */
