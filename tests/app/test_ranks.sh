@@ -7,8 +7,8 @@ ranks_py=$(realpath "$3")
 # no network; a short path for its sockets; as many processes as wanted, as root too
 # products whose last bits depend on the rows beside a row, on any processor
 export DNNL_MAX_CPU_ISA=AVX2
-export TMPDIR=$work OMPI_MCA_btl=self,vader OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_ALLOW_RUN_AS_ROOT=1 \
-    OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
+export TMPDIR=$work OMPI_MCA_btl=self,vader OMPI_MCA_btl_vader_single_copy_mechanism=none \
+    OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 
 tiny=(--train.envs=20 --train.minutes=0 --train.checkpoint_every=1 --ppo.steps=24
     --policy.actor_hidden=32,0,0,0 --policy.critic_hidden=32,0,0,0 --policy.encoder_hidden=32,0,0,0
