@@ -99,7 +99,7 @@ MILD_HD Real engine_push_force(const EngineModel *model, const EngineVariation *
     return R[d - 3] * torque[0] + R[d] * torque[1] + R[d + 3] * torque[2];
 }
 
-/* work->force, acceleration: joint torques [joints] in the order of robot.ini, less gyroscopic,
+/* work->acceleration <- force: joint torques [joints] in the order of robot.ini, less gyroscopic,
  * Coriolis and gravity forces and damping, and the push [6] or NULL. After engine_gather. */
 LANE_FN void engine_smooth_force(const EngineModel *model, const EngineVariation *variation,
                                  const Real *torque, const Real *push, EngineWork *work) {
@@ -123,7 +123,7 @@ LANE_FN void engine_smooth_force(const EngineModel *model, const EngineVariation
             if (push && d < 6) {
                 sum += engine_push_force(model, variation, work, push, d);
             }
-            work->force[d] = work->acceleration[d] = sum;
+            work->acceleration[d] = sum;
         }
     }
     lanes_meet();

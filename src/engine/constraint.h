@@ -237,8 +237,7 @@ MILD_HD void engine_push_number(const EngineTree *tree, EngineWork *work, int f,
     if (n < 6) {
         work->wrench[f][r] = -sum;
     } else {
-        contact->stiffness[f][r][c] = sum;
-        contact->stiffness[f][c][r] = sum;
+        contact->stiffness[f][n - 6] = sum;
     }
 }
 
@@ -255,6 +254,16 @@ LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, int 
     lanes_meet();
 }
 
+/* Row r of a foot's stiffness times x [6]. */
+MILD_HD Real stiffness_times(const Real *stiffness, int r, const Real *x) {
+    Real sum = 0;
+    ENGINE_LOOP
+    for (int c = 0; c < 6; c++) {
+        sum += stiffness[c < r ? r * (r + 1) / 2 + c : c * (c + 1) / 2 + r] * x[c];
+    }
+    return sum;
+}
+
 /* half <- stiffness J^T of the feet. */
 LANE_FN void engine_stiffen_rows(const EngineTree *tree, EngineSupport *support) {
     EACH_LANE(l) {
@@ -262,10 +271,8 @@ LANE_FN void engine_stiffen_rows(const EngineTree *tree, EngineSupport *support)
         for (int f = 0; f < engine_feet(tree); f++) {
             LANE_ROLLED
             for (int n = LANE(l); n < 6 * tree->shared[f][f]; n += LANES) {
-                const Real *stiffness = support->ground.contact.stiffness[f][n % 6];
-                const Real *column = support->jacobian[f][n / 6];
-                support->half[f][n / 6][n % 6] =
-                    dot3(stiffness, column) + dot3(stiffness + 3, column + 3);
+                support->half[f][n / 6][n % 6] = stiffness_times(
+                    support->ground.contact.stiffness[f], n % 6, support->jacobian[f][n / 6]);
             }
         }
     }

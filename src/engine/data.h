@@ -1,6 +1,6 @@
-/* Working data of one robot: in shared memory on a GPU. For SA01 in float 6.3 kB (a test prints
- * it). Poses are in world axes; positions of links and corners count from the base's origin, so
- * that float loses nothing far from the world's. */
+/* Working data of one robot: in shared memory on a GPU. For SA01 in float 6 kB (a test prints it).
+ * Poses are in world axes; positions of links and corners count from the base's origin, so that
+ * float loses nothing far from the world's. */
 #ifndef MILD_ENGINE_DATA_H
 #define MILD_ENGINE_DATA_H
 
@@ -26,11 +26,13 @@ typedef struct {
 
 /* The pyramids of the corners on rigid ground: four edges each. */
 typedef struct {
-    Real edge[ENGINE_EDGES][6];        /* [-, m] the row of an edge in terms of the foot's twist */
-    Real reference[ENGINE_EDGES];      /* [m/s^2] reference acceleration */
-    Real weight[ENGINE_EDGES];         /* [kg] 1/R; 0: does not touch */
-    Real residual[ENGINE_EDGES];       /* [m/s^2] x; an edge with x < 0 pushes */
-    Real stiffness[ENGINE_FEET][6][6]; /* sum of weights times edge edge^T, of the pushing edges */
+    Real edge[ENGINE_EDGES][6];   /* [-, m] the row of an edge in terms of the foot's twist */
+    Real reference[ENGINE_EDGES]; /* [m/s^2] reference acceleration */
+    Real weight[ENGINE_EDGES];    /* [kg] 1/R; 0: does not touch */
+    Real residual[ENGINE_EDGES];  /* [m/s^2] x; an edge with x < 0 pushes */
+    /* Sum of weights times edge edge^T, of the pushing edges: the entries on and below the
+     * diagonal, row by row. */
+    Real stiffness[ENGINE_FEET][ENGINE_BASE_ENTRIES];
     Real twist[ENGINE_FEET][6];        /* J qacc */
     Real twist_change[ENGINE_FEET][6]; /* J times the change of qacc */
 } EngineContact;
@@ -66,13 +68,11 @@ typedef struct {
     Real foot_position[ENGINE_FEET][3]; /* [m] reference point, world */
     Real foot_rotation[ENGINE_FEET][9]; /* [-] foot -> world, row major; round feet: identity */
     Real foot_velocity[ENGINE_FEET][6]; /* [m/s, rad/s] twist there */
-    Real next_velocity[ENGINE_FEET][6]; /* [m/s, rad/s] twist after the step, by the ground */
     Real wrench[ENGINE_FEET][6]; /* [N, N m] of the ground on the foot, at the reference point */
     /* ---- dynamics ---- */
     Real mass[ENGINE_DOFS][ENGINE_STRIDE];   /* M by rows, see tree.h; of the base all 6 x 6 */
     Real factor[ENGINE_DOFS][ENGINE_STRIDE]; /* L with M = L^T L, but for its diagonal */
     Real inverse[ENGINE_DOFS];               /* 1 / diagonal of L */
-    Real force[ENGINE_DOFS];                 /* torques and pushes less the bias */
     Real acceleration[ENGINE_DOFS];          /* qacc [m/s^2, rad/s^2]; L^-T force until
                                                 engine_accelerate */
     int newton;                              /* steps of the constraints' solver in the last step */

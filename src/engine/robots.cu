@@ -112,7 +112,8 @@ LANE_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
     problem.velocity = work->foot_velocity[0];
     problem.inverse_inertia = work->now.support.ground.inverse_inertia;
     problem.free_velocity = work->now.support.free_velocity[0];
-    const ContactResult result = {work->wrench[0], work->next_velocity[0], NULL, NULL, NULL, NULL};
+    const ContactResult result = {
+        work->wrench[0], work->now.support.free_velocity[0], NULL, NULL, NULL, NULL};
     if (MAP) {
         ground_robot_map(setup, &problem, (ground_Shared_map *)shared, memory, 1, &result);
     } else {

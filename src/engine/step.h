@@ -11,8 +11,7 @@
  *
  * The ground reads work->foot_position, foot_rotation, foot_velocity, now.support.free_velocity and
  * now.support.ground.inverse_inertia, in the layout of ContactProblem, and writes work->wrench, all
- * of it, zeros for feet in the air, and, if it likes, work->next_velocity. Nothing else passes
- * between the two. After a step the state is new and poses are those of its beginning;
+ * of it, zeros for feet in the air. Nothing else passes between the two. After a step the state is new and poses are those of its beginning;
  * engine_begin without an action brings them up to date for an observer (measure.h).
  *
  * Loops are rolled but for the shortest ones: a GPU reads its instructions from a small cache, and
@@ -166,31 +165,12 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
     return 0;
 }
 
-/* Twists of the feet after a step on rigid ground. */
-LANE_FN void engine_next_twists(const EngineModel *model, EngineWork *work) {
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {
-            const int f = n / 6;
-            const int c = n % 6;
-            const Real gain = work->now.support.ground.contact.twist[f][c];
-            work->next_velocity[f][c] = c < foot_parts(&model->tree, f)
-                                            ? work->foot_velocity[f][c] + model->number.dt * gain
-                                            : 0;
-        }
-    }
-    lanes_meet();
-}
-
 /* The wrenches of soft ground, or rigid ground where engine_collide was called; limits; the next
  * state. Returns 1 when a velocity went bad. */
 LANE_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
     engine_accelerate(&model->tree, work, !rigid);
     const int beyond = engine_limits(model, work);
     const int newton = rigid || beyond ? engine_constrain(&model->tree, work, rigid) : 0;
-    if (rigid) {
-        engine_next_twists(model, work);
-    }
     EACH_LANE(l) {
         if (LANE(l) == 0) {
             work->newton = newton;
