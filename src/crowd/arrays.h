@@ -3,7 +3,7 @@
 #define CROWD_ARRAYS_H
 
 #include "batch/batch.h"
-#include "engine/data.h"
+#include "engine/model.h"
 #include "task/ground.h"
 #include "task/task.h"
 
@@ -36,21 +36,19 @@ typedef struct {
     int uneven;           /* bool: the map is */
     int labels;           /* of the map; 1 without */
     int striped;          /* bool: the labels are stripes of the share patch_share of episodes */
+    /* what environments are made from, see task_env_init_head */
+    TaskShape shape;
+    double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
+    uint64_t seed;
+    uint32_t first; /* number of the first environment */
 } CrowdTask;
 
-/* Of one environment besides its TaskEnv. */
-typedef struct {
-    EngineVariation variation;
-    double tally[TALLY_KEPT];
-    double torque[ROBOT_JOINTS_MAX]; /* [N m] of the last physics step */
-    int diverged;                    /* bool: in this policy step */
-} CrowdRobot;
-
-/* What passes between engine and ground; see MildBatchInput and MildBatchOutput. */
+/* What passes between engine and ground; see MildBatchInput and MildBatchOutput. The twists after
+ * the step take the place of free_velocity. */
 typedef struct {
     float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
-    float *wrench, *twist;
-    MildBatchFoot *foot;
+    float *wrench;
+    MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */
 } CrowdContact;
 #define CROWD_FAR 1000 /* [m] below a robot on rigid ground: the soft one does not touch it */
 
@@ -58,9 +56,7 @@ typedef struct {
     int envs;
     size_t stride;     /* [B] of a TaskEnv and its frames */
     char *env;         /* [envs][stride] */
-    CrowdRobot *robot; /* [envs] */
-    void *sim;         /* [envs] RobotSim of device_robot.h */
-    void *reading;     /* [envs] TaskReading */
+    void *robot;       /* [envs] CrowdRobot of crowd.inc */
     int32_t *material; /* [envs][labels] of the ground's table */
     Real *map_origin;  /* [envs][2] [m] */
     uint8_t *fresh;    /* [envs] bool: an episode began */
@@ -68,9 +64,7 @@ typedef struct {
     int32_t *order;    /* [envs] in which a GPU steps them: those on rigid ground first */
     TaskKept *kept;    /* [envs] for crowd_keep */
     double *tally;     /* [TALLY_NUMBERS] sums over the environments */
-    EngineWork *work;  /* [envs] between the parts of a step */
     CrowdContact contact;
-    float *depth; /* [envs][feet] [m] mean depth of the last step */
     const CrowdTask *task;
     const EngineModel *model;
 } CrowdArrays;

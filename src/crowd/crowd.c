@@ -19,6 +19,10 @@ struct Crowd {
     size_t bytes; /* of the device, without the ground */
 };
 
+static MildStatus checked(const char *why, MildError *error) {
+    return why ? mild_fail(error, MILD_ERROR_IO, "GPU: robots: %s", why) : MILD_OK;
+}
+
 /* ---- creation ---- */
 
 static MildStatus check_def(const CrowdDef *def, MildError *error) {
@@ -73,26 +77,20 @@ static int labels_of(const TaskDef *task) {
     return task->map ? mild_map_label_count(task->map) : 1;
 }
 
-static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *error) {
+static MildStatus take_arrays(Crowd *crowd, size_t robot, int feet, int labels, MildError *error) {
     CrowdArrays *all = &crowd->arrays;
     CrowdContact *contact = &all->contact;
     const size_t envs = (size_t)all->envs, rows = envs * (size_t)feet;
-    const size_t work =
-        crowd->device == MILD_BATCH_HOST ? sizeof *all->work : crowd_device_work_bytes();
     const struct {
         void *at; /* pointer to the array's pointer */
         size_t bytes;
     } arrays[] = {{&all->env, envs * all->stride},
-                  {&all->robot, envs * sizeof *all->robot},
-                  {&all->sim, envs * crowd_sim_bytes()},
-                  {&all->reading, envs * crowd_reading_bytes()},
+                  {&all->robot, envs * robot},
                   {&all->material, envs * (size_t)labels * sizeof *all->material},
                   {&all->map_origin, 2 * envs * sizeof *all->map_origin},
                   {&all->fresh, envs},
                   {&all->rigid, envs},
                   {&all->order, envs * sizeof *all->order},
-                  {&all->work, envs * work},
-                  {&all->depth, rows * sizeof(float)},
                   {&all->kept, envs * sizeof *all->kept},
                   {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
                   {&contact->position, 3 * rows * sizeof(float)},
@@ -102,7 +100,6 @@ static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *err
                   {&contact->free_velocity, 6 * rows * sizeof(float)},
                   {&contact->height, envs * sizeof(float)},
                   {&contact->wrench, 6 * rows * sizeof(float)},
-                  {&contact->twist, 6 * rows * sizeof(float)},
                   {&contact->foot, rows * sizeof *contact->foot}};
     size_t bytes = 0;
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
@@ -115,22 +112,6 @@ static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *err
         at += (arrays[i].bytes + 255) / 256 * 256;
     }
     return crowd->block ? MILD_OK : MILD_ERROR_MEMORY;
-}
-
-static MildStatus copy_envs(Crowd *crowd, const CrowdDef *def, MildError *error) {
-    CrowdArrays *all = &crowd->arrays;
-    char *envs = aligned_alloc(64, (size_t)all->envs * all->stride);
-    if (!envs) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d environments", all->envs);
-    }
-    for (int i = 0; i < all->envs; i++) {
-        task_env_init_head((TaskEnv *)(void *)(envs + (size_t)i * all->stride), def->task,
-                           def->robot, def->seed, def->first + (uint32_t)i);
-    }
-    MildStatus status =
-        batch_copy(crowd->device, all->env, envs, (size_t)all->envs * all->stride, error);
-    free(envs);
-    return status;
 }
 
 /* Task, robot and grounds in one block of the device: its pointers are the device's. */
@@ -148,14 +129,19 @@ static MildStatus copy_task(Crowd *crowd, const CrowdDef *def, const TaskGrounds
                       .map = crowd->ground->arrays.map,
                       .has_map = def->task->map != NULL,
                       .labels = labels_of(def->task),
-                      .striped = def->striped};
+                      .striped = def->striped,
+                      .shape = task_shape(def->robot),
+                      .seed = def->seed,
+                      .first = def->first};
     if (task.has_map) {
         mild_map_extent(def->task->map, &task.map_extent[0], &task.map_extent[1]);
         task.uneven = !mild_map_is_level(def->task->map);
     }
     task.task.grounds = &at->grounds;
     robot_fill_table(def->robot, &task.robot);
-    MildStatus status = batch_copy(crowd->device, ground, grounds->ground, bytes, error);
+    MildStatus status = task_gains(def->task, def->robot, task.kp, task.kd, error);
+    status = status == MILD_OK ? batch_copy(crowd->device, ground, grounds->ground, bytes, error)
+                               : status;
     if (status != MILD_OK) {
         batch_free(crowd->device, ground);
         return status;
@@ -191,6 +177,21 @@ static MildStatus copy_model(Crowd *crowd, const CrowdDef *def, MildError *error
     return status;
 }
 
+static void create_piece(void *context, int piece, int thread) {
+    (void)thread;
+    crowd_host_create(context, piece);
+}
+
+static MildStatus create_envs(Crowd *crowd, MildError *error) {
+    CrowdArrays *all = &crowd->arrays;
+    if (crowd->device != MILD_BATCH_HOST) {
+        MildStatus status = checked(crowd_device_create(all, NULL), error);
+        return status == MILD_OK ? device_wait(crowd->device, error) : status;
+    }
+    pool_run(crowd->pool, all->envs, create_piece, all);
+    return MILD_OK;
+}
+
 static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
                              MildError *error) {
     const TaskShape shape = task_shape(def->robot);
@@ -198,13 +199,16 @@ static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGround
     crowd->pool = def->pool;
     crowd->steps = (int)(TASK_PERIOD / def->task->physics_dt + 0.5);
     crowd->arrays.envs = def->envs;
-    crowd->arrays.stride = task_env_head_bytes(def->task, &shape);
+    const CrowdBytes bytes = def->device == MILD_BATCH_HOST ? crowd_host_bytes(def->task, &shape)
+                                                            : crowd_device_bytes(def->task, &shape);
+    crowd->arrays.stride = bytes.stride;
     MildStatus status = open_ground(crowd, def, grounds, error);
-    status =
-        status == MILD_OK ? take_arrays(crowd, shape.feet, labels_of(def->task), error) : status;
-    status = status == MILD_OK ? copy_envs(crowd, def, error) : status;
+    status = status == MILD_OK
+                 ? take_arrays(crowd, bytes.robot, shape.feet, labels_of(def->task), error)
+                 : status;
     status = status == MILD_OK ? copy_task(crowd, def, grounds, error) : status;
-    return status == MILD_OK ? copy_model(crowd, def, error) : status;
+    status = status == MILD_OK ? copy_model(crowd, def, error) : status;
+    return status == MILD_OK ? create_envs(crowd, error) : status;
 }
 
 Crowd *crowd_create(const CrowdDef *def, MildError *error) {
@@ -286,10 +290,6 @@ static void first_piece(void *context, int piece, int thread) {
     crowd_host_first(&call->crowd->arrays, &call->step, piece);
 }
 
-static MildStatus checked(const char *why, MildError *error) {
-    return why ? mild_fail(error, MILD_ERROR_IO, "GPU: robots: %s", why) : MILD_OK;
-}
-
 /* New episodes forget their ground, and all are seen. */
 static MildStatus finish(const Crowd *crowd, Call *call, void *stream, MildError *error) {
     const CrowdArrays *all = &crowd->arrays;
@@ -326,7 +326,8 @@ static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, Mil
                                   .material = all->material,
                                   .map_origin = all->map_origin,
                                   .height = c->height};
-    const MildBatchOutput output = {.wrench = c->wrench, .velocity = c->twist, .foot = c->foot};
+    const MildBatchOutput output = {
+        .wrench = c->wrench, .velocity = c->free_velocity, .foot = c->foot};
     MildStatus status = MILD_OK;
     for (call->part = 0; status == MILD_OK && call->part <= crowd->steps; call->part++) {
         if (call->part > 0) {
@@ -418,8 +419,4 @@ MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
 
 size_t crowd_bytes(const Crowd *crowd) {
     return crowd_robot_bytes(crowd) * (size_t)crowd->arrays.envs;
-}
-
-const TaskEnv *crowd_env(const Crowd *crowd, int i) {
-    return (const TaskEnv *)(void *)(crowd->arrays.env + (size_t)i * crowd->arrays.stride);
 }

@@ -46,7 +46,5 @@ size_t crowd_robot_bytes(const Crowd *crowd);
 MildStatus crowd_keep(Crowd *crowd, TaskKept *kept, MildError *error);
 MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error);
 size_t crowd_bytes(const Crowd *crowd);
-/* State of an environment, on the host only. */
-const TaskEnv *crowd_env(const Crowd *crowd, int i);
 
 #endif

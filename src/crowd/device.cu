@@ -60,6 +60,14 @@ static __global__ void __launch_bounds__(TASK_THREADS, 16)
 }
 
 static __global__ void __launch_bounds__(TASK_THREADS)
+    create(const __grid_constant__ CrowdArrays all) {
+    const long robot = thread_robot();
+    if (robot < all.envs) {
+        crowd_create_env(&all, robot);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
     begin(const __grid_constant__ CrowdArrays all) {
     const long robot = thread_robot();
     if (robot < all.envs) {
@@ -147,8 +155,9 @@ static const char *launched(void) {
     return status == cudaSuccess ? NULL : cudaGetErrorString(status);
 }
 
-extern "C" size_t crowd_device_work_bytes(void) {
-    return sizeof(EngineWork);
+extern "C" CrowdBytes crowd_device_bytes(const TaskDef *def, const TaskShape *shape) {
+    const CrowdBytes bytes = {crowd_stride(def, shape), sizeof(CrowdRobot)};
+    return bytes;
 }
 
 extern "C" const char *crowd_device_fits(const EngineTree *tree) {
@@ -159,6 +168,11 @@ extern "C" const char *crowd_device_fits(const EngineTree *tree) {
     }
     cudaFuncSetAttribute(part, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
+    return launched();
+}
+
+extern "C" const char *crowd_device_create(const CrowdArrays *all, void *stream) {
+    create<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 

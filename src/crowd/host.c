@@ -4,12 +4,12 @@
 #include "crowd/crowd.inc"
 #include "crowd/text.h"
 
-size_t crowd_sim_bytes(void) {
-    return sizeof(RobotSim);
+CrowdBytes crowd_host_bytes(const TaskDef *def, const TaskShape *shape) {
+    return (CrowdBytes){crowd_stride(def, shape), sizeof(CrowdRobot)};
 }
 
-size_t crowd_reading_bytes(void) {
-    return sizeof(TaskReading);
+void crowd_host_create(const CrowdArrays *all, long robot) {
+    crowd_create_env(all, robot);
 }
 
 void crowd_host_begin(const CrowdArrays *all, long robot) {

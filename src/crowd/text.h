@@ -7,13 +7,18 @@
 
 #define CROWD_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
 
-/* [B] of RobotSim and TaskReading in CrowdArrays. */
-size_t crowd_sim_bytes(void);
-size_t crowd_reading_bytes(void);
+/* [B] of an environment in CrowdArrays, by the text of the CPU or of a device, which may be compiled
+ * for one robot. */
+typedef struct {
+    size_t stride;
+    size_t robot;
+} CrowdBytes;
+CrowdBytes crowd_host_bytes(const TaskDef *def, const TaskShape *shape);
 /* From what engine_model_read fills. */
 void crowd_model_fill(const EngineTree *tree, const double *number, EngineModel *model);
 
 /* ---- the CPU, environment by environment ---- */
+void crowd_host_create(const CrowdArrays *all, long robot);
 /* Draws the first episode. */
 void crowd_host_begin(const CrowdArrays *all, long robot);
 /* Part k of a policy step, and what follows the last one up to the next episode. */
@@ -31,14 +36,14 @@ void crowd_host_tally(const CrowdArrays *all);
 extern "C" {
 #endif
 /* The same on a device, in the stream. They return NULL or what went wrong. */
+const char *crowd_device_create(const CrowdArrays *all, void *stream);
 const char *crowd_device_begin(const CrowdArrays *all, void *stream);
 const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call, void *stream);
 const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k, void *stream);
 const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call, void *stream);
 const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream);
 const char *crowd_device_tally(const CrowdArrays *all, void *stream);
-/* [B] of EngineWork in CrowdArrays, which may be compiled for one robot. */
-size_t crowd_device_work_bytes(void);
+CrowdBytes crowd_device_bytes(const TaskDef *def, const TaskShape *shape);
 /* NULL if the kernels are compiled for such a robot, else the reason. */
 const char *crowd_device_fits(const EngineTree *tree);
 #ifdef __cplusplus

@@ -4,6 +4,12 @@
 
 static const char *const none = "this build is without CUDA";
 
+const char *crowd_device_create(const CrowdArrays *all, void *stream) {
+    (void)all;
+    (void)stream;
+    return none;
+}
+
 const char *crowd_device_begin(const CrowdArrays *all, void *stream) {
     (void)all;
     (void)stream;
@@ -45,8 +51,10 @@ const char *crowd_device_tally(const CrowdArrays *all, void *stream) {
     return none;
 }
 
-size_t crowd_device_work_bytes(void) {
-    return 0;
+CrowdBytes crowd_device_bytes(const TaskDef *def, const TaskShape *shape) {
+    (void)def;
+    (void)shape;
+    return (CrowdBytes){0, 0};
 }
 
 const char *crowd_device_fits(const EngineTree *tree) {

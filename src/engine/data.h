@@ -56,10 +56,12 @@ typedef struct {
 
 typedef struct {
     /* ---- state; hinges by link, degrees of freedom in the tree's order ---- */
-    Real base[3];             /* [m] world position of the base's origin */
-    Real quaternion[4];       /* [-] base -> world, w x y z */
-    Real angle[ENGINE_LINKS]; /* [rad] of the hinges; [0] unused */
-    Real rate[ENGINE_DOFS];   /* [m/s, rad/s] */
+    Real base[3];                   /* [m] world position of the base's origin */
+    Real quaternion[4];             /* [-] base -> world, w x y z */
+    Real angle[ENGINE_LINKS];       /* [rad] of the hinges; [0] unused */
+    Real rate[ENGINE_DOFS];         /* [m/s, rad/s] */
+    Real acceleration[ENGINE_DOFS]; /* qacc [m/s^2, rad/s^2]; L^-T force until engine_accelerate */
+    Real wrench[ENGINE_FEET][6];    /* [N, N m] of the ground on the foot, at the reference point */
     /* ---- pose: engine_kinematics ---- */
     Real rotation[ENGINE_LINKS][9]; /* [-] link -> world, row major */
     Real position[ENGINE_LINKS][3]; /* [m] of the anchor, from the base */
@@ -68,13 +70,10 @@ typedef struct {
     Real foot_position[ENGINE_FEET][3]; /* [m] reference point, world */
     Real foot_rotation[ENGINE_FEET][9]; /* [-] foot -> world, row major; round feet: identity */
     Real foot_velocity[ENGINE_FEET][6]; /* [m/s, rad/s] twist there */
-    Real wrench[ENGINE_FEET][6]; /* [N, N m] of the ground on the foot, at the reference point */
     /* ---- dynamics ---- */
     Real mass[ENGINE_DOFS][ENGINE_STRIDE];   /* M by rows, see tree.h; of the base all 6 x 6 */
     Real factor[ENGINE_DOFS][ENGINE_STRIDE]; /* L with M = L^T L, but for its diagonal */
     Real inverse[ENGINE_DOFS];               /* 1 / diagonal of L */
-    Real acceleration[ENGINE_DOFS];          /* qacc [m/s^2, rad/s^2]; L^-T force until
-                                                engine_accelerate */
     int newton;                              /* steps of the constraints' solver in the last step */
     /* ---- joint limits; by link, [0] unused ---- */
     Real limit_side[ENGINE_LINKS];      /* [-] 1 at the lower limit, -1 at the upper, 0 inside */

@@ -3,7 +3,7 @@
 #ifndef ROBOT_TABLE_H
 #define ROBOT_TABLE_H
 
-#include "robot/state.h"
+#include "robot/limits.h"
 
 typedef struct {
     int joints;

@@ -47,12 +47,12 @@ TASK_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const Ro
 }
 
 TASK_FN int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                        const double *rotation, const double *qvel, double wrench[6]) {
+                        const TaskReal *rotation, const TaskReal *qvel, TaskReal wrench[6]) {
     double share = task_assist_share(env, def);
     if (share == 0) {
         return 0;
     }
-    const double *turn = rotation, *v = qvel;
+    const TaskReal *turn = rotation, *v = qvel;
     double length = place_root(turn[0] * turn[0] + turn[3] * turn[3]);
     double c = length > 0 ? turn[0] / length : 1, s = length > 0 ? turn[3] / length : 0;
     const double *hand = robot_assist(robot);

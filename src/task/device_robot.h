@@ -1,5 +1,6 @@
 /* Robot and RobotSim of a device: the numbers that the functions of robot.h return for the task's
- * text (place.h), as functions of the same names. Never together with robot.h. */
+ * text (place.h), as functions of the same names, and of robot/state.h what that text uses. Include
+ * place.h; never together with robot.h. */
 #ifndef TASK_DEVICE_ROBOT_H
 #define TASK_DEVICE_ROBOT_H
 
@@ -8,18 +9,48 @@
 
 typedef RobotTable Robot;
 
+typedef struct {
+    TaskReal qpos[7 + TASK_JOINTS];
+    TaskReal qvel[6 + TASK_JOINTS];
+} RobotState;
+
+typedef struct {
+    TaskReal base_mass_add;
+    TaskReal com_offset[3];
+    TaskReal link_mass_scale[1 + TASK_JOINTS];
+    TaskReal armature_scale;
+    TaskReal rigid_friction;
+    int rigid;
+} RobotVariation;
+
+typedef struct {
+    TaskReal force[3];
+    TaskReal sole_height;
+    TaskReal sole_center[3];
+    TaskReal sole_center_velocity[3];
+    struct {
+        TaskReal depth_mean;
+    } result;
+} RobotFoot;
+
 /* What the last physics step left behind, as RobotSim answers. */
 typedef struct {
     const RobotState *state;
-    double rotation[9];
-    RobotFoot foot[ROBOT_FEET_MAX]; /* sole_height, sole_center, sole_center_velocity, force and
-                                       result.depth_mean */
-    double body_clearance;
-    double knee_distance;
-    double foot_distance;
-    double above; /* [m] height of the base above the ground under it */
-    int label;    /* of the map there */
+    TaskReal rotation[9];
+    RobotFoot foot[TASK_FEET];
+    TaskReal body_clearance;
+    TaskReal knee_distance;
+    TaskReal foot_distance;
+    TaskReal above; /* [m] height of the base above the ground under it */
+    int label;      /* of the map there */
 } RobotSim;
+
+/* Of MildTerrain what differs from episode to episode. */
+typedef struct {
+    TaskReal height;
+    TaskReal map_x;
+    TaskReal map_y;
+} TaskTerrain;
 
 #define DEVICE_ROBOT_LIST(name)                                                                    \
     static inline MILD_BOTH const double *robot_##name(const Robot *robot) {                       \
@@ -59,15 +90,15 @@ static inline MILD_BOTH double robot_gait_offset(const Robot *robot, int foot) {
     return robot->gait_offset[foot];
 }
 
-static inline MILD_BOTH const double *robot_sim_qpos(const RobotSim *sim) {
+static inline MILD_BOTH const TaskReal *robot_sim_qpos(const RobotSim *sim) {
     return sim->state->qpos;
 }
 
-static inline MILD_BOTH const double *robot_sim_qvel(const RobotSim *sim) {
+static inline MILD_BOTH const TaskReal *robot_sim_qvel(const RobotSim *sim) {
     return sim->state->qvel;
 }
 
-static inline MILD_BOTH const double *robot_sim_base_rotation(const RobotSim *sim) {
+static inline MILD_BOTH const TaskReal *robot_sim_base_rotation(const RobotSim *sim) {
     return sim->rotation;
 }
 
@@ -76,7 +107,7 @@ static inline MILD_BOTH const RobotFoot *robot_sim_foot(const RobotSim *sim, int
 }
 
 static inline MILD_BOTH double robot_sim_body_clearance(const RobotSim *sim,
-                                                        const MildTerrain *terrain) {
+                                                        const TaskTerrain *terrain) {
     (void)terrain;
     return sim->body_clearance;
 }

@@ -4,52 +4,24 @@
 
 #include "task/task.h"
 
-static size_t whole_lines(size_t bytes) {
-    return (bytes + 63) / 64 * 64;
-}
-
-/* Frames of the ring, as many as the means of the history reach back. */
-static uint32_t frames_held(const TaskDef *def) {
-    return (uint32_t)((TASK_FRAMES - 1) * def->history_stride + 1);
-}
-
-static size_t ground_at(const TaskShape *shape, uint32_t held) {
-    size_t floats = (size_t)shape->history + held * (size_t)shape->observation;
-    return task_env_frames_at() + whole_lines(floats * sizeof(float));
-}
-
-size_t task_env_head_bytes(const TaskDef *def, const TaskShape *shape) {
-    return ground_at(shape, frames_held(def));
-}
-
 size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
     TaskShape shape = task_shape(robot);
-    return task_env_head_bytes(def, &shape) +
+    return task_env_head_bytes(&shape, task_frames_held(def)) +
            mild_ground_bytes_prints(robot_soles(robot), shape.feet, def->print_tiles);
 }
 
 MildGround *task_env_ground(TaskEnv *env) {
-    return (MildGround *)(void *)((char *)env + ground_at(&env->shape, env->held));
-}
-
-void task_env_init_head(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
-                        uint32_t index) {
-    TaskShape shape = task_shape(robot);
-    memset(env, 0, task_env_head_bytes(def, &shape));
-    env->shape = shape;
-    env->held = frames_held(def);
-    MildStatus status = task_gains(def, robot, env->kp, env->kd, NULL);
-    assert(status == MILD_OK); /* task_def_check_robot has seen them */
-    (void)status;
-    env->seed = seed;
-    env->index = index;
-    env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
-    env->assist_level = 1;
+    return (MildGround *)(void *)((char *)env + task_env_head_bytes(&env->shape, env->held));
 }
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index) {
-    task_env_init_head(env, def, robot, seed, index);
+    const TaskShape shape = task_shape(robot);
+    double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
+    MildStatus status = task_gains(def, robot, kp, kd, NULL);
+    assert(status == MILD_OK); /* task_def_check_robot has seen them */
+    (void)status;
+    task_env_init_head(env, def, shape, kp, kd, seed, index);
     mild_ground_init_prints(task_env_ground(env), robot_soles(robot), env->shape.feet,
                             def->print_tiles);
 }

@@ -4,7 +4,7 @@
 
 #define TWO_PI 6.283185307179586
 
-TASK_FN int task_is_standing(const double command[3]) {
+TASK_FN int task_is_standing(const TaskReal command[3]) {
     return fabs(command[0]) < 0.1 && fabs(command[1]) < 0.1 && fabs(command[2]) < 0.1;
 }
 

@@ -142,6 +142,13 @@ void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Rand
     }
 }
 
+const MildMaterial *task_material_under(const TaskEnv *env, const TaskDef *def,
+                                        const RobotSim *sim) {
+    (void)def;
+    const double *qpos = robot_sim_qpos(sim);
+    return &env->terrain.materials[mild_terrain_material_at(&env->terrain, qpos[0], qpos[1])];
+}
+
 double task_standing_depth(const Robot *robot, const MildMaterial *material) {
     return mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot));
 }

@@ -18,7 +18,7 @@
 #define RANDOM_USE_NOISE 0x4e4f4953u
 
 TASK_FN void task_read_imu(const RobotSim *sim, TaskReading *reading) {
-    const double *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
+    const TaskReal *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
     for (int i = 0; i < 3; i++) {
         reading->omega[i] = qvel[3 + i];
         reading->gravity[i] = -rotation[6 + i];
@@ -32,8 +32,8 @@ TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading) {
 
 /* Entries of a frame that lane `lane` of `lanes` writes, without noise. q, qd: [joints]. */
 static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, const double *pose,
-                                        const double *omega, const double *gravity,
-                                        const double *joint, const double *speed, TaskLane at,
+                                        const TaskReal *omega, const TaskReal *gravity,
+                                        const TaskReal *joint, const TaskReal *speed, TaskLane at,
                                         float *frame) {
     int joints = env->shape.joints;
     for (int i = at.lane; i < 3; i += at.lanes) {
@@ -80,7 +80,7 @@ static inline MILD_BOTH void add_noise(const TaskEnv *env, const TaskDef *def, T
 }
 
 /* Rotates a world vector into the base frame. */
-static inline MILD_BOTH void to_base(const double *rotation, const double *v, float *out) {
+static inline MILD_BOTH void to_base(const TaskReal *rotation, const TaskReal *v, float *out) {
     for (int i = 0; i < 3; i++) {
         out[i] = (float)(rotation[i] * v[0] + rotation[3 + i] * v[1] + rotation[6 + i] * v[2]);
     }
@@ -88,7 +88,7 @@ static inline MILD_BOTH void to_base(const double *rotation, const double *v, fl
 
 static inline MILD_BOTH void write_estimates(const TaskEnv *env, const RobotSim *sim,
                                              float *estimate) {
-    const double *rotation = robot_sim_base_rotation(sim);
+    const TaskReal *rotation = robot_sim_base_rotation(sim);
     int feet = env->shape.feet;
     to_base(rotation, robot_sim_qvel(sim), estimate);
     for (int i = 0; i < 3; i++) {
@@ -103,9 +103,9 @@ static inline MILD_BOTH void write_estimates(const TaskEnv *env, const RobotSim 
 
 /* Material under the base, with each parameter scaled to about one. Parameters of an element that
  * represents a whole sole are converted to those of one of its cells. */
-static inline MILD_BOTH float *write_ground(const TaskEnv *env, const Robot *robot,
-                                            const RobotSim *sim, float *out) {
-    const MildMaterial *m = place_material(sim, &env->terrain);
+static inline MILD_BOTH float *write_ground(const TaskEnv *env, const TaskDef *def,
+                                            const Robot *robot, const RobotSim *sim, float *out) {
+    const MildMaterial *m = task_material_under(env, def, sim);
     double cells = place_cells(robot, m->model);
     const double values[] = {m->k_pen / 500 / cells,
                              m->sigma_cone / 1e5,
@@ -132,7 +132,7 @@ static inline MILD_BOTH void write_critic(const TaskEnv *env, const TaskDef *def
                                           const Robot *robot, const RobotSim *sim, float *out) {
     write_estimates(env, sim, out);
     out += env->shape.estimates;
-    const double *rotation = robot_sim_base_rotation(sim);
+    const TaskReal *rotation = robot_sim_base_rotation(sim);
     int standing = task_is_standing(env->command);
     const float force_scale = (float)(0.6 * robot_foot_force(robot)); /* [N] */
     for (int f = 0; f < env->shape.feet; f++) {
@@ -154,7 +154,7 @@ static inline MILD_BOTH void write_critic(const TaskEnv *env, const TaskDef *def
     for (int i = 0; i < 3; i++) {
         *out++ = (float)(env->variation.com_offset[i] * 100);
     }
-    out = write_ground(env, robot, sim, out);
+    out = write_ground(env, def, robot, sim, out);
     *out++ = (float)place_above(sim, &env->terrain);
     *out++ = (float)env->strength[0];
     *out++ = (float)env->variation.armature_scale;
@@ -175,31 +175,28 @@ static inline MILD_BOTH void copy_row(const float *from, int width, TaskLane at,
     }
 }
 
-/* At the start of an episode the first frame also fills the older ones. */
-static inline MILD_BOTH void fill_frames(TaskEnv *env, TaskLane at) {
-    for (int age = 1; age < (int)env->held; age++) {
-        copy_row(task_env_frame(env, 0), env->shape.observation, at, task_env_frame(env, age));
-    }
-}
-
-/* Five means of older frames, then the newest frame. */
-static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, TaskLane at,
+/* Five means of older frames before the frame, which then takes the place of the oldest in the
+ * ring. At the start of an episode the first frame also fills the older ones. */
+static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, int first, TaskLane at,
                                            float *history) {
     int width = env->shape.observation, stride = def->history_stride;
-    const float *frames = task_env_history(env) + env->shape.history;
-    uint32_t oldest = env->newest + 1 < env->held ? env->newest + 1 : 0;
+    const float *frame = history + (TASK_FRAMES - 1) * width;
     for (int j = at.lane; j < width; j += at.lanes) {
-        uint32_t place = oldest;
+        TaskFrame *column = task_env_frames(env) + j;
+        uint32_t place = env->oldest;
+        for (uint32_t k = 0; first && k < env->held; k++) {
+            column[k * (uint32_t)width] = place_pack(frame[j]);
+        }
         for (int i = 0; i < TASK_FRAMES - 1; i++) {
             float sum = 0;
             PLACE_UNROLL
             for (int k = 0; k < stride; k++) {
-                sum += frames[place * (uint32_t)width + (uint32_t)j];
+                sum += place_unpack(column[place * (uint32_t)width]);
                 place = place + 1 < env->held ? place + 1 : 0;
             }
             history[i * width + j] = sum / (float)stride;
         }
-        history[(TASK_FRAMES - 1) * width + j] = frames[place * (uint32_t)width + (uint32_t)j];
+        column[place * (uint32_t)width] = place_pack(frame[j]);
     }
 }
 
@@ -207,22 +204,19 @@ TASK_FN void task_observe_lane(TaskEnv *env, const TaskDef *def, const Robot *ro
                                const RobotSim *sim, const TaskReading *reading, int first,
                                const TaskView *view, TaskLane at) {
     const double *pose = robot_default_pose(robot);
-    uint32_t newest = (env->newest + 1) % env->held;
-    place_meet();
-    env->newest = newest; /* every lane writes the same */
-    float *frame = task_env_frame(env, 0);
+    float *history = PLACE_HISTORY ? task_env_history(env) : view->history;
+    float *frame = history + (TASK_FRAMES - 1) * env->shape.observation;
     make_frame(env, def, pose, reading->omega, reading->gravity, reading->q, reading->qd, at,
                frame);
     if (def->observe_noise) {
         add_noise(env, def, at, frame);
     }
     place_meet();
-    if (first) {
-        fill_frames(env, at);
-        place_meet();
+    write_history(env, def, first, at, history);
+    place_meet();
+    if (at.lane == 0) {
+        env->oldest = (env->oldest + 1) % env->held;
     }
-    float *history = place_history(task_env_history(env), view->history);
-    write_history(env, def, at, history);
     if (view->history && view->history != history) {
         copy_row(history, env->shape.history, at, view->history);
     }
@@ -233,9 +227,9 @@ TASK_FN void task_observe_lane(TaskEnv *env, const TaskDef *def, const Robot *ro
         write_estimates(env, sim, view->estimate);
     }
     if (view->critic) {
-        const double *qpos = robot_sim_qpos(sim), *qvel = robot_sim_qvel(sim);
-        const double *rotation = robot_sim_base_rotation(sim);
-        const double gravity[3] = {-rotation[6], -rotation[7], -rotation[8]};
+        const TaskReal *qpos = robot_sim_qpos(sim), *qvel = robot_sim_qvel(sim);
+        const TaskReal *rotation = robot_sim_base_rotation(sim);
+        const TaskReal gravity[3] = {-rotation[6], -rotation[7], -rotation[8]};
         make_frame(env, def, pose, qvel + 3, gravity, qpos + 7, qvel + 6, at, view->critic);
         if (at.lane == at.lanes - 1) {
             write_critic(env, def, robot, sim, view->critic + env->shape.observation);

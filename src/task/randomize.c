@@ -25,7 +25,7 @@ TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot
     const RandomizeDef *z = &def->randomize;
     Random r = random_at(env->seed ^ RANDOM_USE_EPISODE, env->index, env->tick);
     memset(&env->variation, 0, sizeof env->variation);
-    for (int i = 0; i <= ROBOT_JOINTS_MAX; i++) {
+    for (int i = 0; i <= TASK_JOINTS; i++) {
         env->variation.link_mass_scale[i] = 1;
     }
     env->variation.rigid = random_unit(&r) < z->rigid_share || z->model == MILD_MODEL_RIGID;

@@ -31,7 +31,7 @@ static inline MILD_BOTH double tracking(const TaskMotion *m, double error) {
 /* Forward and sideways errors count separately. In the norm of both, a little sway would hide a
  * forward error. */
 static inline MILD_BOTH double reward_linear_velocity(const TaskMotion *m) {
-    const double *v = m->env->smooth_velocity, *command = m->env->command;
+    const TaskReal *v = m->env->smooth_velocity, *command = m->env->command;
     return tracking(m, v[0] - command[0]) * tracking(m, v[1] - command[1]);
 }
 
@@ -190,7 +190,7 @@ static inline MILD_BOTH double reward_collision(const TaskMotion *m) {
            (m->knee_distance < robot_knee_least(m->robot));
 }
 
-TASK_FN double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]) {
+TASK_FN double task_reward(const TaskMotion *motion, TaskReal terms[TASK_REWARD_COUNT]) {
     const double *weight = motion->def->reward.weight;
     double sum = 0;
 #define TASK_REWARD_TERM(name, weight_, help)                                                      \

@@ -13,17 +13,46 @@
 
 /* ---- the block: TaskEnv, history, ring of frames ---- */
 
-TASK_FN size_t task_env_frames_at(void) {
-    return (sizeof(TaskEnv) + 63) / 64 * 64;
+static inline MILD_BOTH size_t whole_lines(size_t bytes) {
+    return (bytes + 63) / 64 * 64;
+}
+
+static inline MILD_BOTH size_t history_bytes(const TaskShape *shape) {
+    return PLACE_HISTORY ? (size_t)shape->history * sizeof(float) : 0;
+}
+
+TASK_FN uint32_t task_frames_held(const TaskDef *def) {
+    return (uint32_t)((TASK_FRAMES - 1) * def->history_stride);
+}
+
+TASK_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held) {
+    const size_t frames = held * (size_t)shape->observation * sizeof(TaskFrame);
+    return whole_lines(sizeof(TaskEnv)) + whole_lines(history_bytes(shape) + frames);
 }
 
 TASK_FN float *task_env_history(TaskEnv *env) {
-    return (float *)(void *)((char *)env + task_env_frames_at());
+    return (float *)(void *)((char *)env + whole_lines(sizeof(TaskEnv)));
 }
 
-TASK_FN float *task_env_frame(TaskEnv *env, int age) {
-    uint32_t place = (env->newest + env->held - (uint32_t)age) % env->held;
-    return task_env_history(env) + env->shape.history + place * (uint32_t)env->shape.observation;
+TASK_FN TaskFrame *task_env_frames(TaskEnv *env) {
+    return (TaskFrame *)(void *)((char *)env + whole_lines(sizeof(TaskEnv)) +
+                                 history_bytes(&env->shape));
+}
+
+TASK_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shape, const double *kp,
+                                const double *kd, uint64_t seed, uint32_t index) {
+    const uint32_t held = task_frames_held(def);
+    memset(env, 0, task_env_head_bytes(&shape, held));
+    env->shape = shape;
+    env->held = held;
+    for (int i = 0; i < shape.joints; i++) {
+        env->kp[i] = kp[i];
+        env->kd[i] = kd[i];
+    }
+    env->seed = seed;
+    env->index = index;
+    env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
+    env->assist_level = 1;
 }
 
 TASK_FN TaskKept task_keep(const TaskEnv *env) {
@@ -155,7 +184,7 @@ static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const
     int stances = 0;
     for (int f = 0; f < env->shape.feet; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
-        const double *v = foot->sole_center_velocity, *force = foot->force;
+        const TaskReal *v = foot->sole_center_velocity, *force = foot->force;
         m->foot_height[f] = foot->sole_height;
         m->foot_speed[f] = place_root(v[0] * v[0] + v[1] * v[1]);
         m->foot_force[f] =
@@ -179,14 +208,15 @@ static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const
 }
 
 TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                        const RobotSim *sim, const double *torque) {
+                                        const RobotSim *sim, const TaskReal *torque) {
     TaskMotion m;
     memset(&m, 0, sizeof m);
     m.def = def, m.robot = robot, m.env = env;
-    const double *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
+    const TaskReal *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
     double length = place_root(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
     double c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
-    double twist[6], change = 0;
+    TaskReal twist[6];
+    double change = 0;
     m.standing = task_is_standing(env->command);
     m.velocity[0] = c * qvel[0] + s * qvel[1];
     m.velocity[1] = -s * qvel[0] + c * qvel[1];
@@ -206,7 +236,7 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
             TASK_PERIOD / def->reward.tracking_time * (now[i] - env->smooth_velocity[i]);
     }
     memcpy(env->base_twist, twist, sizeof twist);
-    const double *q = robot_sim_qpos(sim) + 7;
+    const TaskReal *q = robot_sim_qpos(sim) + 7;
     for (int i = 0; i < env->shape.joints; i++) {
         m.q[i] = q[i];
         m.qd[i] = qvel[6 + i];
@@ -244,7 +274,8 @@ static inline MILD_BOTH void advance_clock(TaskEnv *env, const TaskDef *def) {
 static inline MILD_BOTH void report_episode(const TaskEnv *env, TaskStep *out) {
     out->length = env->step - env->step_first;
     out->episode_reward = (float)env->reward_sum;
-    out->episode_speed_error = (float)(env->speed_error_sum / (out->length ? out->length : 1));
+    out->episode_speed_error =
+        (float)(env->speed_error_sum / (out->length ? (TaskReal)out->length : 1));
     for (int i = 0; i < TASK_REWARD_COUNT; i++) {
         out->episode_terms[i] = (float)env->term_sum[i];
     }
@@ -252,8 +283,9 @@ static inline MILD_BOTH void report_episode(const TaskEnv *env, TaskStep *out) {
 
 /* Computes the reward of the step just made. Returns 0 when it is not finite. */
 static inline MILD_BOTH int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                        const RobotSim *sim, const double *torque, float *reward) {
-    double terms[TASK_REWARD_COUNT];
+                                        const RobotSim *sim, const TaskReal *torque,
+                                        float *reward) {
+    TaskReal terms[TASK_REWARD_COUNT];
     TaskMotion motion = task_describe_motion(env, def, robot, sim, torque);
     *reward = (float)task_reward(&motion, terms);
     if (!isfinite(*reward)) {
@@ -269,7 +301,7 @@ static inline MILD_BOTH int take_reward(TaskEnv *env, const TaskDef *def, const 
 }
 
 TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                               const RobotSim *sim, const double *torque, int diverged) {
+                               const RobotSim *sim, const TaskReal *torque, int diverged) {
     TaskStep out;
     memset(&out, 0, sizeof out);
     int bad = diverged || !take_reward(env, def, robot, sim, torque, &out.reward);

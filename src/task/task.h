@@ -46,41 +46,42 @@ typedef struct {
     uint32_t tick;       /* policy steps since creation, never reset */
     uint32_t tick_first; /* at creation or when the run went on: then episodes are staggered */
     /* episode */
-    uint32_t step;          /* policy steps on the clock of this episode */
-    uint32_t step_limit;    /* step at which the episode times out */
-    uint32_t step_first;    /* step at which the episode began */
-    double phase;           /* [-] gait clock in [0, 1) */
-    double command[3];      /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
-    double command_seen[3]; /* what the policy sees, one policy step late */
-    int command_frozen;     /* bool: eval and play set the command themselves */
+    uint32_t step;            /* policy steps on the clock of this episode */
+    uint32_t step_limit;      /* step at which the episode times out */
+    uint32_t step_first;      /* step at which the episode began */
+    double phase;             /* [-] gait clock in [0, 1) */
+    TaskReal command[3];      /* [m/s, m/s, rad/s] vx, vy, wz in the heading frame */
+    TaskReal command_seen[3]; /* what the policy sees, one policy step late */
+    int command_frozen;       /* bool: eval and play set the command themselves */
     /* what was drawn for this episode */
     RobotVariation variation;
     int ground[MILD_MATERIALS_MAX]; /* of TaskDef.grounds, by label; unused without them */
-    MildTerrain terrain; /* its map is that of TaskDef during a call and NULL between calls, so
+    TaskTerrain terrain; /* its map is that of TaskDef during a call and NULL between calls, so
                             that the block contains no pointer */
-    double kp_scale[ROBOT_JOINTS_MAX];     /* [-] */
-    double kd_scale[ROBOT_JOINTS_MAX];     /* [-] */
-    double strength[ROBOT_JOINTS_MAX];     /* [-] of the torque */
-    double motor_offset[ROBOT_JOINTS_MAX]; /* [rad] */
-    int lag_command, lag_motor, lag_imu;   /* [physics steps] */
-    double assist_level; /* [-] level of assistance: decays while on its feet, rises with falls;
+    TaskReal kp_scale[TASK_JOINTS];      /* [-] */
+    TaskReal kd_scale[TASK_JOINTS];      /* [-] */
+    TaskReal strength[TASK_JOINTS];      /* [-] of the torque */
+    TaskReal motor_offset[TASK_JOINTS];  /* [rad] */
+    int lag_command, lag_motor, lag_imu; /* [physics steps] */
+    double assist_level;  /* [-] level of assistance: decays while on its feet, rises with falls;
                             persists across episodes */
-    double assist_draw;  /* [-] share of the level used in this episode, in [0.5, 1) */
-    double push[6];      /* [m/s, rad/s] last push, for the critic; decays */
+    TaskReal assist_draw; /* [-] share of the level used in this episode, in [0.5, 1) */
+    TaskReal push[6];     /* [m/s, rad/s] last push, for the critic; decays */
     /* state */
     RobotState robot;
-    double kp[ROBOT_JOINTS_MAX];       /* [N m/rad] task.kp or the robot's */
-    double kd[ROBOT_JOINTS_MAX];       /* [N m s/rad] task.kd or the robot's */
-    float action[3][ROBOT_JOINTS_MAX]; /* now, one and two steps ago */
-    uint32_t newest;                   /* frame in the ring, see task_env_frame */
-    uint32_t held;                     /* frames of the ring */
-    double base_twist[6]; /* one policy step ago: linear in the world, angular in the base frame */
-    double smooth_velocity[3]; /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over
+    TaskReal kp[TASK_JOINTS];     /* [N m/rad] task.kp or the robot's */
+    TaskReal kd[TASK_JOINTS];     /* [N m s/rad] task.kd or the robot's */
+    float action[3][TASK_JOINTS]; /* now, one and two steps ago */
+    uint32_t oldest;              /* place of the oldest frame in the ring, the next to go */
+    uint32_t held;                /* frames of the ring */
+    TaskReal
+        base_twist[6]; /* one policy step ago: linear in the world, angular in the base frame */
+    TaskReal smooth_velocity[3];       /* [m/s, m/s, rad/s] vx, vy, wz, heading frame, smoothed over
                                          reward.tracking_time */
-    double joint_speed[ROBOT_JOINTS_MAX]; /* one policy step ago */
-    double air_time[ROBOT_FEET_MAX];
+    TaskReal joint_speed[TASK_JOINTS]; /* one policy step ago */
+    TaskReal air_time[TASK_FEET];
     /* sums over the running episode, for the log */
-    double reward_sum, term_sum[TASK_REWARD_COUNT], speed_error_sum;
+    TaskReal reward_sum, term_sum[TASK_REWARD_COUNT], speed_error_sum;
 } TaskEnv;
 
 /* What lasts beyond an episode. */
@@ -117,19 +118,19 @@ typedef struct {
 
 /* One block: TaskEnv, its frames, its ground memory; a multiple of 64. */
 size_t task_env_bytes(const TaskDef *def, const Robot *robot);
+/* Frames of the ring: as many as the means of the history reach back. */
+TASK_FN uint32_t task_frames_held(const TaskDef *def);
 /* Of the block without ground memory. */
-size_t task_env_head_bytes(const TaskDef *def, const TaskShape *shape);
+TASK_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held);
 MildGround *task_env_ground(TaskEnv *env);
-/* Where the block's frames begin. */
-TASK_FN size_t task_env_frames_at(void);
 /* [shape.history] What the policy sees: five means of older frames, then the newest frame. */
 TASK_FN float *task_env_history(TaskEnv *env);
-/* [shape.observation] The frame of `age` policy steps ago, 0 .. held - 1. */
-TASK_FN float *task_env_frame(TaskEnv *env, int age);
+/* [held][shape.observation] The ring of the last frames. */
+TASK_FN TaskFrame *task_env_frames(TaskEnv *env);
 
-/* The same for a block without ground memory. */
-void task_env_init_head(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
-                        uint32_t index);
+/* The same for a block without ground memory. kp, kd: [shape.joints] of task_gains. */
+TASK_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shape, const double *kp,
+                                const double *kd, uint64_t seed, uint32_t index);
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index);
 /* Draws a new episode and writes its first observation. */
@@ -149,8 +150,8 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 
 /* Readings of one instant (observe.c). */
 typedef struct {
-    double omega[3], gravity[3]; /* base frame */
-    double q[ROBOT_JOINTS_MAX], qd[ROBOT_JOINTS_MAX];
+    TaskReal omega[3], gravity[3]; /* base frame */
+    TaskReal q[TASK_JOINTS], qd[TASK_JOINTS];
 } TaskReading;
 TASK_FN void task_read_imu(const RobotSim *sim, TaskReading *reading);
 TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading);
@@ -171,34 +172,34 @@ typedef struct {
     const TaskDef *def;
     const Robot *robot;
     const TaskEnv *env;
-    double velocity[3];                   /* [m/s] of the base, heading frame */
-    double omega[3];                      /* [rad/s] of the base, base frame */
-    double gravity[3];                    /* [-] unit vector along gravity, base frame */
-    double twist_change;                  /* norm of the change of the base twist in this step */
-    double q[ROBOT_JOINTS_MAX];           /* [rad] */
-    double qd[ROBOT_JOINTS_MAX];          /* [rad/s] */
-    double qd_before[ROBOT_JOINTS_MAX];   /* [rad/s] one policy step ago */
-    double torque[ROBOT_JOINTS_MAX];      /* [N m] */
-    double base_height;                   /* [m] above the stance soles */
-    double foot_height[ROBOT_FEET_MAX];   /* [m] lowest sole point above the undisturbed surface */
-    double foot_force[ROBOT_FEET_MAX];    /* [N] of the ground on the foot */
-    double foot_speed[ROBOT_FEET_MAX];    /* [m/s] horizontal, of the sole */
-    double landed_air_time;               /* [s] summed over the feet that touched down */
-    int contact[ROBOT_FEET_MAX];          /* bool: the ground carries the foot */
-    int stance[ROBOT_FEET_MAX];           /* bool: the clock wants the foot in stance */
-    int either[ROBOT_FEET_MAX];           /* bool: stance and swing are both right */
-    double wanted_height[ROBOT_FEET_MAX]; /* [m] h_des of the clock */
-    double foot_distance;                 /* [m] see robot_sim_foot_distance */
-    double knee_distance;                 /* [m] see robot_sim_knee_distance */
-    int standing;                         /* bool: the command is to stand */
+    TaskReal velocity[3];              /* [m/s] of the base, heading frame */
+    TaskReal omega[3];                 /* [rad/s] of the base, base frame */
+    TaskReal gravity[3];               /* [-] unit vector along gravity, base frame */
+    TaskReal twist_change;             /* norm of the change of the base twist in this step */
+    TaskReal q[TASK_JOINTS];           /* [rad] */
+    TaskReal qd[TASK_JOINTS];          /* [rad/s] */
+    TaskReal qd_before[TASK_JOINTS];   /* [rad/s] one policy step ago */
+    TaskReal torque[TASK_JOINTS];      /* [N m] */
+    TaskReal base_height;              /* [m] above the stance soles */
+    TaskReal foot_height[TASK_FEET];   /* [m] lowest sole point above the undisturbed surface */
+    TaskReal foot_force[TASK_FEET];    /* [N] of the ground on the foot */
+    TaskReal foot_speed[TASK_FEET];    /* [m/s] horizontal, of the sole */
+    TaskReal landed_air_time;          /* [s] summed over the feet that touched down */
+    int contact[TASK_FEET];            /* bool: the ground carries the foot */
+    int stance[TASK_FEET];             /* bool: the clock wants the foot in stance */
+    int either[TASK_FEET];             /* bool: stance and swing are both right */
+    TaskReal wanted_height[TASK_FEET]; /* [m] h_des of the clock */
+    TaskReal foot_distance;            /* [m] see robot_sim_foot_distance */
+    TaskReal knee_distance;            /* [m] see robot_sim_knee_distance */
+    int standing;                      /* bool: the command is to stand */
 } TaskMotion;
 /* Describes the policy step just made. The sim is at the end of the step. env still has the base
  * twist, joint speeds, smoothed velocity and air times of the previous step, which are updated.
  * torque: [robot_joints] of the last physics step. */
 TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                        const RobotSim *sim, const double *torque);
+                                        const RobotSim *sim, const TaskReal *torque);
 /* Writes the weighted terms per second to `terms`. Returns their clipped sum times the period. */
-TASK_FN double task_reward(const TaskMotion *motion, double terms[TASK_REWARD_COUNT]);
+TASK_FN double task_reward(const TaskMotion *motion, TaskReal terms[TASK_REWARD_COUNT]);
 
 /* What an environment keeps, and back, before a new episode (step.c). */
 TASK_FN TaskKept task_keep(const TaskEnv *env);
@@ -211,16 +212,19 @@ TASK_FN void task_draw_command(TaskEnv *env, const TaskDef *def);
 TASK_FN void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);
 /* Draws where on the map it begins, and a material for each of its labels. */
 TASK_FN void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);
+/* The material under the base. */
+TASK_FN const MildMaterial *task_material_under(const TaskEnv *env, const TaskDef *def,
+                                                const RobotSim *sim);
 /* [m] Depth of the soles of a robot that stands on a material. */
 double task_standing_depth(const Robot *robot, const MildMaterial *material);
 
 /* A motor during a policy step. */
 typedef struct {
-    double target[2]; /* [rad] of the action now and of the one before */
-    double kp;        /* [N m/rad] */
-    double kd;        /* [N m s/rad] */
-    double limit;     /* [N m] */
-    double fastest;   /* [rad/s] 0: no limit */
+    TaskReal target[2]; /* [rad] of the action now and of the one before */
+    TaskReal kp;        /* [N m/rad] */
+    TaskReal kd;        /* [N m s/rad] */
+    TaskReal limit;     /* [N m] */
+    TaskReal fastest;   /* [rad/s] 0: no limit */
 } TaskMotor;
 
 /* A policy step (step.c): what comes before its physics steps, the motor of joint i, its torque at
@@ -230,7 +234,7 @@ TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *acti
 TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i);
 TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd);
 TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                               const RobotSim *sim, const double *torque, int diverged);
+                               const RobotSim *sim, const TaskReal *torque, int diverged);
 /* An episode on what task_randomize drew (step.c). depth: [m] how deep the feet stand in its
  * ground. The first reading is taken from the sim of its first pose. */
 TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, double depth);
@@ -243,12 +247,12 @@ TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *
 TASK_FN double task_assist_share(const TaskEnv *env, const TaskDef *def);
 TASK_FN void task_assist_adapt(TaskEnv *env, int fallen);
 TASK_FN int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *robot,
-                        const double *rotation, const double *qvel, double wrench[6]);
+                        const TaskReal *rotation, const TaskReal *qvel, TaskReal wrench[6]);
 TASK_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i);
 
 /* Gait clock (gait.c): a foot is in stance during the half of the period that starts at its
  * offset. */
-TASK_FN int task_is_standing(const double command[3]);
+TASK_FN int task_is_standing(const TaskReal command[3]);
 TASK_FN int task_gait_stance(const Robot *robot, double phase, int standing, int foot);
 TASK_FN double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
                                 int foot);

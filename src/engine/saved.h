@@ -1,0 +1,92 @@
+/* What engine_end needs of engine_begin's work where something else is done between the two: a third
+ * of EngineWork, in any memory. M and its factor are lists of their entries. */
+#ifndef MILD_ENGINE_SAVED_H
+#define MILD_ENGINE_SAVED_H
+
+#include <stddef.h>
+
+#include "engine/data.h"
+
+/* Numbers of EngineWork before the pose. */
+#define ENGINE_STATE ((int)(offsetof(EngineWork, rotation) / sizeof(Real)))
+
+typedef struct {
+    Real mass[ENGINE_ENTRIES];   /* M in the order of EngineTree.entry */
+    Real factor[ENGINE_ENTRIES]; /* L, its diagonal inverted */
+    Real state[offsetof(EngineWork, rotation) / sizeof(Real)];
+    Real rows[6 * ENGINE_FEET * ENGINE_CHAIN]; /* soft ground: half, rigid ground: J^T */
+    Real foot_link[12 * ENGINE_FEET];          /* rigid ground: pose of the links with soles */
+} EngineSaved;
+
+/* Place of number e of the pose of a link: nine of its rotation, three of its position. */
+MILD_HD Real *link_pose_number(EngineWork *work, int link, int e) {
+    return e < 9 ? work->rotation[link] + e : work->position[link] + e - 9;
+}
+
+/* From work to saved. rigid: bool, on rigid ground. */
+LANE_FN void engine_save(const EngineTree *tree, int rigid, EngineWork *work, EngineSaved *saved) {
+    EngineSupport *support = &work->now.support;
+    const Real *state = (const Real *)(const void *)work;
+    const Real *rows = rigid ? support->jacobian[0][0] : support->half[0][0];
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
+            const EngineEntry entry = tree->entry[e];
+            const int d = entry.dof;
+            const int diagonal = entry.place == tree->above[d];
+            saved->mass[e] = work->mass[d][entry.place];
+            saved->factor[e] = diagonal ? work->inverse[d] : work->factor[d][entry.place];
+        }
+        LANE_ROLLED
+        for (int n = LANE(l); n < ENGINE_STATE; n += LANES) {
+            saved->state[n] = state[n];
+        }
+        LANE_ROLLED
+        for (int n = LANE(l); n < 6 * ENGINE_CHAIN * engine_feet(tree); n += LANES) {
+            saved->rows[n] = rows[n];
+        }
+        LANE_ROLLED
+        for (int n = LANE(l); rigid && n < 12 * engine_feet(tree); n += LANES) {
+            saved->foot_link[n] = *link_pose_number(work, tree->foot_link[n / 12], n % 12);
+        }
+    }
+}
+
+/* And back. */
+LANE_FN void engine_restore(const EngineTree *tree, int rigid, const EngineSaved *saved,
+                            EngineWork *work) {
+    EngineSupport *support = &work->now.support;
+    Real *state = (Real *)(void *)work;
+    Real *rows = rigid ? support->jacobian[0][0] : support->half[0][0];
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
+            const EngineEntry entry = tree->entry[e];
+            const int d = entry.dof;
+            work->mass[d][entry.place] = saved->mass[e];
+            if (d < 6) {
+                work->mass[entry.place][d] = saved->mass[e];
+            }
+            if (entry.place == tree->above[d]) {
+                work->inverse[d] = saved->factor[e];
+            } else {
+                work->factor[d][entry.place] = saved->factor[e];
+            }
+        }
+        LANE_ROLLED
+        for (int n = LANE(l); n < ENGINE_STATE; n += LANES) {
+            state[n] = saved->state[n];
+        }
+        LANE_ROLLED
+        for (int n = LANE(l); n < 6 * ENGINE_CHAIN * engine_feet(tree); n += LANES) {
+            rows[n] = saved->rows[n];
+        }
+        LANE_ROLLED
+        for (int n = LANE(l); rigid && n < 12 * engine_feet(tree); n += LANES) {
+            *link_pose_number(work, tree->foot_link[n / 12], n % 12) = saved->foot_link[n];
+        }
+    }
+    lanes_meet();
+}
+
+#endif
