@@ -28,6 +28,12 @@ static inline MILD_BOTH Random random_at(uint64_t seed, uint32_t stream, uint32_
     return random;
 }
 
+/* The same numbers from the count-th on, for loops whose rounds draw apart. */
+static inline MILD_BOTH Random random_after(Random r, int count) {
+    r.use += (uint32_t)count;
+    return r;
+}
+
 /* 64 random bits. The key is derived from (seed, stream); the counter is (step, use). */
 static inline MILD_BOTH uint64_t random_bits(Random *r) {
     uint32_t x0 = r->step, x1 = r->use++;

@@ -24,12 +24,18 @@ enum {
     TALLY_NUMBERS
 };
 
-/* The same for all environments; the task comes first. task.grounds points to `grounds` of the same
- * block. */
+/* A ground to draw. */
+typedef struct {
+    double depth; /* [m] that the robot stands in it */
+    float numbers[TASK_GROUND_NUMBERS];
+} CrowdGround;
+
+/* The same for all environments; the task comes first. */
 typedef struct {
     TaskDef task;
     RobotTable robot;
-    TaskGrounds grounds;
+    const CrowdGround *ground; /* [grounds] to draw from */
+    int grounds;
     MapView map;          /* its arrays are the ground's */
     double map_extent[2]; /* [m] */
     int has_map;          /* bool */

@@ -12,9 +12,10 @@ _Static_assert(CROWD_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fi
 struct Crowd {
     CrowdArrays arrays; /* their memory is the device's */
     MildBatch *ground;
-    void *block; /* where the arrays are, but for task and model */
-    Pool *pool;  /* of the host */
-    int steps;   /* of physics in a policy step */
+    void *block;        /* where the arrays are, but for task and model */
+    CrowdGround *drawn; /* of the device: the grounds of CrowdTask */
+    Pool *pool;         /* of the host */
+    int steps;          /* of physics in a policy step */
     int device;
     size_t bytes; /* of the device, without the ground */
 };
@@ -114,18 +115,30 @@ static MildStatus take_arrays(Crowd *crowd, size_t robot, int feet, int labels, 
     return crowd->block ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
-/* Task, robot and grounds in one block of the device: its pointers are the device's. */
+/* What is drawn of the grounds. */
+static MildStatus copy_grounds(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
+                               MildError *error) {
+    const size_t bytes = (size_t)grounds->count * sizeof *crowd->drawn;
+    CrowdGround *made = malloc(bytes);
+    if (!made) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d grounds", grounds->count);
+    }
+    for (int i = 0; i < grounds->count; i++) {
+        made[i].depth = grounds->ground[i].depth;
+        task_ground_numbers(def->robot, &grounds->ground[i].material, made[i].numbers);
+    }
+    crowd->drawn = take(crowd, bytes, error);
+    MildStatus status = crowd->drawn ? batch_copy(crowd->device, crowd->drawn, made, bytes, error)
+                                     : MILD_ERROR_MEMORY;
+    free(made);
+    return status;
+}
+
 static MildStatus copy_task(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
                             MildError *error) {
-    const size_t bytes = (size_t)grounds->count * sizeof *grounds->ground;
-    CrowdTask *at = take(crowd, sizeof *at, error);
-    crowd->arrays.task = at;
-    TaskGround *ground = at ? take(crowd, bytes, error) : NULL;
-    if (!ground) {
-        return MILD_ERROR_MEMORY;
-    }
     CrowdTask task = {.task = *def->task,
-                      .grounds = {grounds->count, ground},
+                      .ground = crowd->drawn,
+                      .grounds = grounds->count,
                       .map = crowd->ground->arrays.map,
                       .has_map = def->task->map != NULL,
                       .labels = labels_of(def->task),
@@ -137,16 +150,11 @@ static MildStatus copy_task(Crowd *crowd, const CrowdDef *def, const TaskGrounds
         mild_map_extent(def->task->map, &task.map_extent[0], &task.map_extent[1]);
         task.uneven = !mild_map_is_level(def->task->map);
     }
-    task.task.grounds = &at->grounds;
     robot_fill_table(def->robot, &task.robot);
     MildStatus status = task_gains(def->task, def->robot, task.kp, task.kd, error);
-    status = status == MILD_OK ? batch_copy(crowd->device, ground, grounds->ground, bytes, error)
-                               : status;
-    if (status != MILD_OK) {
-        batch_free(crowd->device, ground);
-        return status;
-    }
-    return batch_copy(crowd->device, at, &task, sizeof task, error);
+    CrowdTask *at = status == MILD_OK ? take(crowd, sizeof *at, error) : NULL;
+    crowd->arrays.task = at;
+    return at ? batch_copy(crowd->device, at, &task, sizeof task, error) : MILD_ERROR_MEMORY;
 }
 
 static MildStatus copy_model(Crowd *crowd, const CrowdDef *def, MildError *error) {
@@ -206,6 +214,7 @@ static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGround
     status = status == MILD_OK
                  ? take_arrays(crowd, bytes.robot, shape.feet, labels_of(def->task), error)
                  : status;
+    status = status == MILD_OK ? copy_grounds(crowd, def, grounds, error) : status;
     status = status == MILD_OK ? copy_task(crowd, def, grounds, error) : status;
     status = status == MILD_OK ? copy_model(crowd, def, error) : status;
     return status == MILD_OK ? create_envs(crowd, error) : status;
@@ -234,12 +243,7 @@ void crowd_destroy(Crowd *crowd) {
         return;
     }
     const CrowdArrays *all = &crowd->arrays;
-    if (all->task) {
-        CrowdTask task = {.grounds = {0, NULL}};
-        if (batch_copy(crowd->device, &task, all->task, sizeof task, NULL) == MILD_OK) {
-            batch_free(crowd->device, task.grounds.ground);
-        }
-    }
+    batch_free(crowd->device, crowd->drawn);
     batch_free(crowd->device, crowd->block);
     batch_free(crowd->device, (void *)all->task);
     batch_free(crowd->device, (void *)all->model);

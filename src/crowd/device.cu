@@ -1,8 +1,6 @@
 /* A crowd on a GPU. The text is compiled for robots of one size (ENGINE_JOINTS ... of model.h), or
  * without these definitions for any. */
 #define MILD_REAL_FLOAT
-#include <climits>
-
 #include <cuda_runtime.h>
 
 #include "crowd/crowd.inc"
@@ -14,12 +12,11 @@
 #ifndef CROWD_BLOCKS
 #define CROWD_BLOCKS (ENGINE_FIXED ? 6 : 1) /* blocks of a multiprocessor, at least */
 #endif
-/* TASK_ROBOTS of a warp's threads have a robot: what one thread does waits for memory most of the
- * time, and more warps hide more of it. */
 enum {
     WARP_THREADS = LANES * CROWD_WARPS,
-    TASK_THREADS = 32,
-    TASK_ROBOTS = 8,
+    TASK_THREADS = 128,
+    TASK_ROBOTS = TASK_THREADS / PLACE_LANES, /* of a block */
+    TASK_BLOCKS = 8,                          /* blocks of a multiprocessor, at least */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -30,15 +27,16 @@ static __device__ long warp_robot(void) {
     return (long)blockIdx.x * CROWD_WARPS + threadIdx.x / LANES;
 }
 
-static __device__ long thread_robot(void) {
-    return threadIdx.x < TASK_ROBOTS ? (long)blockIdx.x * TASK_ROBOTS + threadIdx.x : LONG_MAX;
+/* PLACE_LANES threads have a robot. */
+static __device__ long lanes_robot(void) {
+    return (long)blockIdx.x * TASK_ROBOTS + threadIdx.x / PLACE_LANES;
 }
 
 static int warp_blocks(int envs) {
     return (envs + CROWD_WARPS - 1) / CROWD_WARPS;
 }
 
-static int thread_blocks(int envs) {
+static int lanes_blocks(int envs) {
     return (envs + TASK_ROBOTS - 1) / TASK_ROBOTS;
 }
 
@@ -51,9 +49,9 @@ static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
     }
 }
 
-static __global__ void __launch_bounds__(TASK_THREADS, 16)
+static __global__ void __launch_bounds__(TASK_THREADS, TASK_BLOCKS)
     end(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call) {
-    const long robot = thread_robot();
+    const long robot = lanes_robot();
     if (robot < all.envs) {
         crowd_end(&all, &call, robot);
     }
@@ -61,7 +59,7 @@ static __global__ void __launch_bounds__(TASK_THREADS, 16)
 
 static __global__ void __launch_bounds__(TASK_THREADS)
     create(const __grid_constant__ CrowdArrays all) {
-    const long robot = thread_robot();
+    const long robot = lanes_robot();
     if (robot < all.envs) {
         crowd_create_env(&all, robot);
     }
@@ -69,7 +67,7 @@ static __global__ void __launch_bounds__(TASK_THREADS)
 
 static __global__ void __launch_bounds__(TASK_THREADS)
     begin(const __grid_constant__ CrowdArrays all) {
-    const long robot = thread_robot();
+    const long robot = lanes_robot();
     if (robot < all.envs) {
         crowd_begin(&all, robot);
     }
@@ -84,12 +82,11 @@ static __global__ void __launch_bounds__(WARP_THREADS)
     }
 }
 
-static __global__ void __launch_bounds__(WARP_THREADS)
+static __global__ void __launch_bounds__(TASK_THREADS, TASK_BLOCKS)
     observe(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call) {
-    const long robot = warp_robot();
+    const long robot = lanes_robot();
     if (robot < all.envs) {
-        const TaskLane at = {(int)threadIdx.x % LANES, LANES};
-        crowd_observe(&all, &call, robot, at);
+        crowd_observe(&all, &call, robot);
     }
 }
 
@@ -123,7 +120,7 @@ static __global__ void __launch_bounds__(ORDER_THREADS)
 
 static __global__ void __launch_bounds__(TASK_THREADS)
     keep(const __grid_constant__ CrowdArrays all, int back) {
-    const long robot = thread_robot();
+    const long robot = lanes_robot();
     if (robot < all.envs) {
         crowd_keep_env(&all, robot, back);
     }
@@ -172,12 +169,12 @@ extern "C" const char *crowd_device_fits(const EngineTree *tree) {
 }
 
 extern "C" const char *crowd_device_create(const CrowdArrays *all, void *stream) {
-    create<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    create<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
 extern "C" const char *crowd_device_begin(const CrowdArrays *all, void *stream) {
-    begin<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    begin<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
@@ -190,20 +187,20 @@ extern "C" const char *crowd_device_part(const CrowdArrays *all, const CrowdStep
 
 extern "C" const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call,
                                         void *stream) {
-    end<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
+    end<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     return launched();
 }
 
 extern "C" const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call,
                                           void *stream) {
     pose<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all);
-    observe<<<warp_blocks(all->envs), WARP_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
+    observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
 extern "C" const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream) {
-    keep<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
+    keep<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
     return launched();
 }
 

@@ -17,10 +17,9 @@ void crowd_host_begin(const CrowdArrays *all, long robot) {
 }
 
 void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot) {
-    const TaskLane alone = {0, 1};
     CrowdPlace place;
     crowd_pose(all, robot, &place);
-    crowd_observe(all, call, robot, alone);
+    crowd_observe(all, call, robot);
 }
 
 void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long robot) {

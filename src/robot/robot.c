@@ -565,7 +565,6 @@ void robot_fill_table(const Robot *robot, RobotTable *table) {
     table->nominal_height = robot_nominal_height(robot);
     table->action_scale = robot_action_scale(robot);
     table->foot_force = robot_foot_force(robot);
-    table->cells = robot->is_concentric ? mild_sole_elements(robot->soles[0]) : 1;
 }
 
 const MildSole *const *robot_soles(const Robot *robot) {

@@ -27,8 +27,6 @@ typedef struct {
     double nominal_height;
     double action_scale;
     double foot_force;
-    double cells; /* [-] elements of the raster of the first sole that an element of it in use
-                     stands for: 1, or all for concentric models */
 } RobotTable;
 
 #endif

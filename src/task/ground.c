@@ -142,11 +142,36 @@ void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Rand
     }
 }
 
-const MildMaterial *task_material_under(const TaskEnv *env, const TaskDef *def,
-                                        const RobotSim *sim) {
+/* Parameters of an element that represents a whole sole are converted to those of one of its
+ * cells. */
+void task_ground_numbers(const Robot *robot, const MildMaterial *m, float *numbers) {
+    double cells = mild_model_is_concentric((MildModel)m->model)
+                       ? mild_sole_elements(robot_rasters(robot)[0])
+                       : 1;
+    const double values[TASK_GROUND_NUMBERS] = {m->k_pen / 500 / cells,
+                                                m->sigma_cone / 1e5,
+                                                m->alpha,
+                                                m->nu,
+                                                m->c_g / 4,
+                                                m->c_d / 20,
+                                                m->phi,
+                                                m->mu,
+                                                m->k_drift / 500 / cells,
+                                                m->b_drift * 10 / cells,
+                                                m->recovery,
+                                                m->bed_depth * 10};
+    for (int i = 0; i < TASK_GROUND_NUMBERS; i++) {
+        numbers[i] = (float)values[i];
+    }
+}
+
+const float *task_ground_under(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                               const RobotSim *sim, float *buffer) {
     (void)def;
     const double *qpos = robot_sim_qpos(sim);
-    return &env->terrain.materials[mild_terrain_material_at(&env->terrain, qpos[0], qpos[1])];
+    const int material = mild_terrain_material_at(&env->terrain, qpos[0], qpos[1]);
+    task_ground_numbers(robot, &env->terrain.materials[material], buffer);
+    return buffer;
 }
 
 double task_standing_depth(const Robot *robot, const MildMaterial *material) {

@@ -30,24 +30,24 @@ TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading) {
     memcpy(reading->qd, robot_sim_qvel(sim) + 6, sizeof reading->qd);
 }
 
-/* Entries of a frame that lane `lane` of `lanes` writes, without noise. q, qd: [joints]. */
+/* A frame without noise. joint, speed: [joints]. */
 static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, const double *pose,
                                         const TaskReal *omega, const TaskReal *gravity,
-                                        const TaskReal *joint, const TaskReal *speed, TaskLane at,
+                                        const TaskReal *joint, const TaskReal *speed,
                                         float *frame) {
     int joints = env->shape.joints;
-    for (int i = at.lane; i < 3; i += at.lanes) {
+    for (int i = place_lane(); i < 3; i += PLACE_LANES) {
         frame[i] = (float)omega[i];
         frame[3 + i] = (float)(env->command_seen[i] * (i < 2 ? 2 : 1));
         frame[6 + i] = (float)gravity[i];
     }
     float *q = frame + 9, *qd = q + joints, *action = qd + joints, *clock = action + joints;
-    for (int i = at.lane; i < joints; i += at.lanes) {
+    for (int i = place_lane(); i < joints; i += PLACE_LANES) {
         q[i] = (float)(joint[i] - pose[i]);
         qd[i] = (float)(0.05 * speed[i]);
         action[i] = env->action[0][i];
     }
-    if (at.lane == 0) {
+    if (place_lane() == 0) {
         int still = !def->clock || task_is_standing(env->command_seen);
         clock[0] = still ? 0 : (float)place_sin(TWO_PI * env->phase);
         clock[1] = still ? 0 : (float)place_cos(TWO_PI * env->phase);
@@ -62,20 +62,18 @@ static inline MILD_BOTH void draw_noise(const TaskEnv *env, int pair, double noi
     noise[1] = 2 * random_unit(&r) - 1;
 }
 
-/* To the entries that this lane has written. */
-static inline MILD_BOTH void add_noise(const TaskEnv *env, const TaskDef *def, TaskLane at,
-                                       float *frame) {
+static inline MILD_BOTH void add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
     float *q = frame + 9, *qd = q + env->shape.joints;
-    double noise[2];
-    for (int i = at.lane; i < 3; i += at.lanes) {
-        draw_noise(env, i, noise);
-        frame[i] += (float)(def->noise_omega * noise[0]);
-        frame[6 + i] += (float)(def->noise_gravity * noise[1]);
-    }
-    for (int i = at.lane; i < env->shape.joints; i += at.lanes) {
-        draw_noise(env, 3 + i, noise);
-        q[i] += (float)(def->noise_q * noise[0]);
-        qd[i] += (float)(def->noise_qd * noise[1]);
+    for (int pair = place_lane(); pair < 3 + env->shape.joints; pair += PLACE_LANES) {
+        double noise[2];
+        draw_noise(env, pair, noise);
+        if (pair < 3) {
+            frame[pair] += (float)(def->noise_omega * noise[0]);
+            frame[6 + pair] += (float)(def->noise_gravity * noise[1]);
+        } else {
+            q[pair - 3] += (float)(def->noise_q * noise[0]);
+            qd[pair - 3] += (float)(def->noise_qd * noise[1]);
+        }
     }
 }
 
@@ -86,102 +84,89 @@ static inline MILD_BOTH void to_base(const TaskReal *rotation, const TaskReal *v
     }
 }
 
+/* Velocity of the base, then velocities and heights of the feet. */
 static inline MILD_BOTH void write_estimates(const TaskEnv *env, const RobotSim *sim,
                                              float *estimate) {
     const TaskReal *rotation = robot_sim_base_rotation(sim);
     int feet = env->shape.feet;
-    to_base(rotation, robot_sim_qvel(sim), estimate);
-    for (int i = 0; i < 3; i++) {
-        estimate[i] *= (float)TASK_VELOCITY_SCALE;
-    }
-    for (int f = 0; f < feet; f++) {
-        const RobotFoot *foot = robot_sim_foot(sim, f);
-        to_base(rotation, foot->sole_center_velocity, estimate + 3 + 3 * f);
-        estimate[3 + 3 * feet + f] = (float)(TASK_HEIGHT_SCALE * foot->sole_height);
+    for (int n = place_lane(); n <= feet; n += PLACE_LANES) {
+        const RobotFoot *foot = robot_sim_foot(sim, n > 0 ? n - 1 : 0);
+        float *velocity = estimate + 3 * n;
+        to_base(rotation, n > 0 ? foot->sole_center_velocity : robot_sim_qvel(sim), velocity);
+        if (n > 0) {
+            estimate[2 + 3 * feet + n] = (float)(TASK_HEIGHT_SCALE * foot->sole_height);
+            continue;
+        }
+        for (int i = 0; i < 3; i++) {
+            velocity[i] *= (float)TASK_VELOCITY_SCALE;
+        }
     }
 }
 
-/* Material under the base, with each parameter scaled to about one. Parameters of an element that
- * represents a whole sole are converted to those of one of its cells. */
-static inline MILD_BOTH float *write_ground(const TaskEnv *env, const TaskDef *def,
-                                            const Robot *robot, const RobotSim *sim, float *out) {
-    const MildMaterial *m = task_material_under(env, def, sim);
-    double cells = place_cells(robot, m->model);
-    const double values[] = {m->k_pen / 500 / cells,
-                             m->sigma_cone / 1e5,
-                             m->alpha,
-                             m->nu,
-                             m->c_g / 4,
-                             m->c_d / 20,
-                             m->phi,
-                             m->mu,
-                             m->k_drift / 500 / cells,
-                             m->b_drift * 10 / cells,
-                             m->recovery,
-                             m->bed_depth * 10};
-    int rigid = env->variation.rigid;
-    for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
-        *out++ = rigid ? 0 : (float)values[i];
-    }
-    *out++ = (float)rigid;
-    return out;
-}
-
-/* What follows the frame in the critic's row. */
-static inline MILD_BOTH void write_critic(const TaskEnv *env, const TaskDef *def,
-                                          const Robot *robot, const RobotSim *sim, float *out) {
-    write_estimates(env, sim, out);
-    out += env->shape.estimates;
-    const TaskReal *rotation = robot_sim_base_rotation(sim);
+/* Six numbers of each foot. */
+static inline MILD_BOTH void write_feet(const TaskEnv *env, const Robot *robot, const RobotSim *sim,
+                                        float *out) {
     int standing = task_is_standing(env->command);
     const float force_scale = (float)(0.6 * robot_foot_force(robot)); /* [N] */
-    for (int f = 0; f < env->shape.feet; f++) {
+    for (int f = place_lane(); f < env->shape.feet; f += PLACE_LANES) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
-        to_base(rotation, foot->force, out);
+        float *own = out + 6 * f;
+        to_base(robot_sim_base_rotation(sim), foot->force, own);
         for (int i = 0; i < 3; i++) {
-            float scaled = out[i] / force_scale;
-            out[i] = scaled > 5 ? 5 : scaled < -5 ? -5 : scaled;
+            float scaled = own[i] / force_scale;
+            own[i] = scaled > 5 ? 5 : scaled < -5 ? -5 : scaled;
         }
-        out[3] = foot->force[2] > 5;
-        out[4] = (float)task_gait_stance(robot, env->phase, standing, f);
-        out[5] = (float)(10 * foot->result.depth_mean);
-        out += 6;
-    }
-    for (int i = 0; i < 6; i++) {
-        *out++ = (float)env->push[i];
-    }
-    *out++ = (float)(env->variation.base_mass_add / 4);
-    for (int i = 0; i < 3; i++) {
-        *out++ = (float)(env->variation.com_offset[i] * 100);
-    }
-    out = write_ground(env, def, robot, sim, out);
-    *out++ = (float)place_above(sim, &env->terrain);
-    *out++ = (float)env->strength[0];
-    *out++ = (float)env->variation.armature_scale;
-    double step = def->physics_dt / TASK_PERIOD;
-    *out++ = (float)(env->lag_command * step);
-    *out++ = (float)(env->lag_motor * step);
-    *out++ = (float)(env->lag_imu * step);
-    *out++ = (float)env->variation.rigid_friction;
-    *out++ = (float)task_assist_share(env, def);
-    for (int i = 0; i < 3; i++) {
-        *out++ = (float)env->smooth_velocity[i];
+        own[3] = foot->force[2] > 5;
+        own[4] = (float)task_gait_stance(robot, env->phase, standing, f);
+        own[5] = (float)(10 * foot->result.depth_mean);
     }
 }
 
-static inline MILD_BOTH void copy_row(const float *from, int width, TaskLane at, float *to) {
-    for (int j = at.lane; j < width; j += at.lanes) {
+/* What was drawn for the episode. */
+static inline MILD_BOTH void write_episode(const TaskEnv *env, const TaskDef *def,
+                                           const Robot *robot, const RobotSim *sim, float *out) {
+    float buffer[TASK_GROUND_NUMBERS];
+    const float *ground = task_ground_under(env, def, robot, sim, buffer);
+    const RobotVariation *variation = &env->variation;
+    float *const rest = out + 10 + TASK_GROUND_NUMBERS;
+    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
+        out[i] = (float)env->push[i];
+    }
+    for (int i = place_lane(); i < 3; i += PLACE_LANES) {
+        out[7 + i] = (float)(variation->com_offset[i] * 100);
+        rest[9 + i] = (float)env->smooth_velocity[i];
+    }
+    for (int i = place_lane(); i < TASK_GROUND_NUMBERS; i += PLACE_LANES) {
+        out[10 + i] = variation->rigid ? 0 : ground[i];
+    }
+    if (place_lane() == 0) {
+        const double step = def->physics_dt / TASK_PERIOD;
+        out[6] = (float)(variation->base_mass_add / 4);
+        rest[0] = (float)variation->rigid;
+        rest[1] = (float)place_above(sim, &env->terrain);
+        rest[2] = (float)env->strength[0];
+        rest[3] = (float)variation->armature_scale;
+        rest[4] = (float)(env->lag_command * step);
+        rest[5] = (float)(env->lag_motor * step);
+        rest[6] = (float)(env->lag_imu * step);
+        rest[7] = (float)variation->rigid_friction;
+        rest[8] = (float)task_assist_share(env, def);
+    }
+}
+
+static inline MILD_BOTH void copy_row(const float *from, int width, float *to) {
+    for (int j = place_lane(); j < width; j += PLACE_LANES) {
         to[j] = from[j];
     }
 }
 
 /* Five means of older frames before the frame, which then takes the place of the oldest in the
  * ring. At the start of an episode the first frame also fills the older ones. */
-static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, int first, TaskLane at,
+static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, int first,
                                            float *history) {
     int width = env->shape.observation, stride = def->history_stride;
     const float *frame = history + (TASK_FRAMES - 1) * width;
-    for (int j = at.lane; j < width; j += at.lanes) {
+    for (int j = place_lane(); j < width; j += PLACE_LANES) {
         TaskFrame *column = task_env_frames(env) + j;
         uint32_t place = env->oldest;
         for (uint32_t k = 0; first && k < env->held; k++) {
@@ -200,45 +185,40 @@ static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, int
     }
 }
 
-TASK_FN void task_observe_lane(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                               const RobotSim *sim, const TaskReading *reading, int first,
-                               const TaskView *view, TaskLane at) {
+TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
+                          const TaskReading *reading, int first, const TaskView *view) {
     const double *pose = robot_default_pose(robot);
+    const int width = env->shape.observation;
     float *history = PLACE_HISTORY ? task_env_history(env) : view->history;
-    float *frame = history + (TASK_FRAMES - 1) * env->shape.observation;
-    make_frame(env, def, pose, reading->omega, reading->gravity, reading->q, reading->qd, at,
-               frame);
+    float *frame = history + (TASK_FRAMES - 1) * width;
+    make_frame(env, def, pose, reading->omega, reading->gravity, reading->q, reading->qd, frame);
+    place_meet();
     if (def->observe_noise) {
-        add_noise(env, def, at, frame);
+        add_noise(env, def, frame);
+        place_meet();
     }
+    write_history(env, def, first, history);
     place_meet();
-    write_history(env, def, first, at, history);
-    place_meet();
-    if (at.lane == 0) {
+    if (place_lane() == 0) {
         env->oldest = (env->oldest + 1) % env->held;
     }
     if (view->history && view->history != history) {
-        copy_row(history, env->shape.history, at, view->history);
+        copy_row(history, env->shape.history, view->history);
     }
     if (view->frame) {
-        copy_row(frame, env->shape.observation, at, view->frame);
+        copy_row(frame, width, view->frame);
     }
-    if (view->estimate && at.lane == 0) {
+    if (view->estimate) {
         write_estimates(env, sim, view->estimate);
     }
     if (view->critic) {
         const TaskReal *qpos = robot_sim_qpos(sim), *qvel = robot_sim_qvel(sim);
         const TaskReal *rotation = robot_sim_base_rotation(sim);
         const TaskReal gravity[3] = {-rotation[6], -rotation[7], -rotation[8]};
-        make_frame(env, def, pose, qvel + 3, gravity, qpos + 7, qvel + 6, at, view->critic);
-        if (at.lane == at.lanes - 1) {
-            write_critic(env, def, robot, sim, view->critic + env->shape.observation);
-        }
+        make_frame(env, def, pose, qvel + 3, gravity, qpos + 7, qvel + 6, view->critic);
+        float *rest = view->critic + width;
+        write_estimates(env, sim, rest);
+        write_feet(env, robot, sim, rest + env->shape.estimates);
+        write_episode(env, def, robot, sim, rest + env->shape.estimates + 6 * env->shape.feet);
     }
-}
-
-TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
-                          const TaskReading *reading, int first, const TaskView *view) {
-    const TaskLane alone = {0, 1};
-    task_observe_lane(env, def, robot, sim, reading, first, view, alone);
 }

@@ -30,35 +30,35 @@ typedef MildTerrain TaskTerrain;
 #endif
 
 /* On a GPU to the accuracy of float, for a tenth of the instructions. */
-static inline MILD_BOTH double place_exp(double x) {
+static inline MILD_BOTH TaskReal place_exp(double x) {
 #ifdef __CUDA_ARCH__
-    return (double)expf((float)x);
+    return expf((float)x);
 #else
-    return exp(x);
+    return (TaskReal)exp(x);
 #endif
 }
 
-static inline MILD_BOTH double place_sin(double x) {
+static inline MILD_BOTH TaskReal place_sin(double x) {
 #ifdef __CUDA_ARCH__
-    return (double)sinf((float)x);
+    return sinf((float)x);
 #else
-    return sin(x);
+    return (TaskReal)sin(x);
 #endif
 }
 
-static inline MILD_BOTH double place_cos(double x) {
+static inline MILD_BOTH TaskReal place_cos(double x) {
 #ifdef __CUDA_ARCH__
-    return (double)cosf((float)x);
+    return cosf((float)x);
 #else
-    return cos(x);
+    return (TaskReal)cos(x);
 #endif
 }
 
-static inline MILD_BOTH double place_root(double x) {
+static inline MILD_BOTH TaskReal place_root(double x) {
 #ifdef __CUDA_ARCH__
-    return (double)sqrtf((float)x);
+    return sqrtf((float)x);
 #else
-    return sqrt(x);
+    return (TaskReal)sqrt(x);
 #endif
 }
 
@@ -118,22 +118,48 @@ enum { PLACE_HISTORY = 0 };
 enum { PLACE_HISTORY = 1 };
 #endif
 
-/* Makes what each lane of an environment wrote visible to the others. */
-static inline MILD_BOTH void place_meet(void) {
+/* On a GPU so many threads, the lanes of an environment, call the functions of a policy step
+ * together and take the same way through them. Each has its share of a loop
+ *
+ *     for (int i = place_lane(); i < count; i += PLACE_LANES)
+ *
+ * and lane 0 adds to what is not in such a loop. What one lane writes another reads after
+ * place_meet. */
+#ifdef __CUDACC__
+enum { PLACE_LANES = 8 };
+#else
+enum { PLACE_LANES = 1 };
+#endif
+
+static inline MILD_BOTH int place_lane(void) {
 #ifdef __CUDA_ARCH__
-    __syncwarp();
+    return (int)(threadIdx.x % PLACE_LANES);
+#else
+    return 0;
 #endif
 }
 
-/* [-] Elements of the raster of a sole that one element of the model in use stands for. */
-static inline MILD_BOTH double place_cells(const Robot *robot, int model) {
-#ifdef TASK_ON_DEVICE
-    (void)model;
-    return robot->cells;
-#else
-    return mild_model_is_concentric((MildModel)model) ? mild_sole_elements(robot_rasters(robot)[0])
-                                                      : 1;
+#ifdef __CUDA_ARCH__
+static inline __device__ unsigned place_mask(void) {
+    return ((1u << PLACE_LANES) - 1) << (threadIdx.x % 32 / PLACE_LANES * PLACE_LANES);
+}
 #endif
+
+/* Makes what each lane wrote visible to the others. */
+static inline MILD_BOTH void place_meet(void) {
+#ifdef __CUDA_ARCH__
+    __syncwarp(place_mask());
+#endif
+}
+
+/* The sum over the lanes. */
+static inline MILD_BOTH TaskReal place_sum(TaskReal x) {
+#ifdef __CUDA_ARCH__
+    for (int step = PLACE_LANES / 2; step > 0; step /= 2) {
+        x += __shfl_xor_sync(place_mask(), x, step);
+    }
+#endif
+    return x;
 }
 
 #endif

@@ -24,10 +24,11 @@ static inline MILD_BOTH int draw_lag(Random *r, const TaskDef *def) {
 TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot) {
     const RandomizeDef *z = &def->randomize;
     Random r = random_at(env->seed ^ RANDOM_USE_EPISODE, env->index, env->tick);
-    memset(&env->variation, 0, sizeof env->variation);
-    for (int i = 0; i <= TASK_JOINTS; i++) {
-        env->variation.link_mass_scale[i] = 1;
+    place_meet();
+    if (place_lane() == 0) {
+        memset(&env->variation, 0, sizeof env->variation);
     }
+    place_meet();
     env->variation.rigid = random_unit(&r) < z->rigid_share || z->model == MILD_MODEL_RIGID;
     task_draw_ground(env, def, robot, &r);
     env->variation.rigid_friction = draw(&r, z->mu);
@@ -36,16 +37,21 @@ TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot
     for (int i = 0; i < 3; i++) {
         env->variation.com_offset[i] = spread(&r, z->com_offset);
     }
-    for (int i = 0; i <= env->shape.joints; i++) {
-        env->variation.link_mass_scale[i] = draw(&r, z->link_mass);
+    for (int i = place_lane(); i <= TASK_JOINTS; i += PLACE_LANES) {
+        Random own = random_after(r, i);
+        env->variation.link_mass_scale[i] =
+            i <= env->shape.joints ? (TaskReal)draw(&own, z->link_mass) : 1;
     }
+    r = random_after(r, env->shape.joints + 1);
     double strength = draw(&r, z->strength);
-    for (int i = 0; i < env->shape.joints; i++) {
-        env->kp_scale[i] = draw(&r, z->gain);
-        env->kd_scale[i] = draw(&r, z->gain);
+    for (int i = place_lane(); i < env->shape.joints; i += PLACE_LANES) {
+        Random own = random_after(r, 3 * i);
+        env->kp_scale[i] = draw(&own, z->gain);
+        env->kd_scale[i] = draw(&own, z->gain);
         env->strength[i] = strength;
-        env->motor_offset[i] = spread(&r, z->motor_offset);
+        env->motor_offset[i] = spread(&own, z->motor_offset);
     }
+    r = random_after(r, 3 * env->shape.joints);
     env->assist_draw = random_uniform(&r, 0.5, 1);
     if (def->map) {
         Random place = random_at(env->seed ^ RANDOM_USE_MAP, env->index, env->tick);
@@ -54,6 +60,7 @@ TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot
     env->lag_command = draw_lag(&r, def);
     env->lag_motor = draw_lag(&r, def);
     env->lag_imu = draw_lag(&r, def);
+    place_meet();
 }
 
 TASK_FN void task_draw_command(TaskEnv *env, const TaskDef *def) {

@@ -5,16 +5,16 @@
 
 #include "task/task.h"
 
-static inline MILD_BOTH double square(double x) {
+static inline MILD_BOTH TaskReal square(TaskReal x) {
     return x * x;
 }
 
-static inline MILD_BOTH double clamp(double x, double low, double high) {
+static inline MILD_BOTH TaskReal clamp(TaskReal x, TaskReal low, TaskReal high) {
     return x < low ? low : x > high ? high : x;
 }
 
 /* Scales a sum over feet to two feet. */
-static inline MILD_BOTH double per_pair(const TaskMotion *m, double sum) {
+static inline MILD_BOTH TaskReal per_pair(const TaskMotion *m, TaskReal sum) {
     return sum * (2.0 / m->env->shape.feet);
 }
 
@@ -22,7 +22,7 @@ static inline MILD_BOTH double per_pair(const TaskMotion *m, double sum) {
  * too slow costs only 1 %. exp(-|e|/width) keeps its slope down to zero error. Both use the
  * velocity smoothed over half a gait period, because the sway within a step is not an error and
  * would hide one. */
-static inline MILD_BOTH double tracking(const TaskMotion *m, double error) {
+static inline MILD_BOTH TaskReal tracking(const TaskMotion *m, TaskReal error) {
     const RewardDef *def = &m->def->reward;
     return 0.5 * (place_exp(-def->tracking_sharpness * square(error)) +
                   place_exp(-fabs(error) / def->tracking_width));
@@ -30,12 +30,12 @@ static inline MILD_BOTH double tracking(const TaskMotion *m, double error) {
 
 /* Forward and sideways errors count separately. In the norm of both, a little sway would hide a
  * forward error. */
-static inline MILD_BOTH double reward_linear_velocity(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_linear_velocity(const TaskMotion *m) {
     const TaskReal *v = m->env->smooth_velocity, *command = m->env->command;
     return tracking(m, v[0] - command[0]) * tracking(m, v[1] - command[1]);
 }
 
-static inline MILD_BOTH double reward_yaw_rate(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_yaw_rate(const TaskMotion *m) {
     return tracking(m, m->env->smooth_velocity[2] - m->env->command[2]);
 }
 
@@ -44,98 +44,99 @@ static inline MILD_BOTH double reward_yaw_rate(const TaskMotion *m) {
  * perfect swing) and has a slope from the first millimetre. Lifting too high costs half as much per
  * metre as lifting gains. The scale is such that following h_des = apex sin(pi s) gives 1 on
  * average over the swing. */
-static inline MILD_BOTH double reward_feet_clearance(const TaskMotion *m) {
-    double sum = 0;
+static inline MILD_BOTH TaskReal reward_feet_clearance(const TaskMotion *m) {
+    TaskReal sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
         if (!m->stance[f]) {
-            double h = m->foot_height[f], wanted = m->wanted_height[f];
+            TaskReal h = m->foot_height[f], wanted = m->wanted_height[f];
             sum += 1.5707963 * (clamp(h, 0, wanted) - 0.5 * clamp(h - wanted, 0, 0.3)) /
-                   m->def->swing_apex;
+                   (TaskReal)m->def->swing_apex;
         }
     }
     return per_pair(m, sum);
 }
 
-static inline MILD_BOTH double reward_gait(const TaskMotion *m) {
-    double sum = 0;
+static inline MILD_BOTH TaskReal reward_gait(const TaskMotion *m) {
+    TaskReal sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
         sum += m->either[f] || m->contact[f] == m->stance[f] ? 1 : -0.3;
     }
     return sum / m->env->shape.feet;
 }
 
-static inline MILD_BOTH double reward_slip(const TaskMotion *m) {
-    double sum = 0;
+static inline MILD_BOTH TaskReal reward_slip(const TaskMotion *m) {
+    TaskReal sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
         sum += m->contact[f] ? m->foot_speed[f] : 0;
     }
     return per_pair(m, sum);
 }
 
-static inline MILD_BOTH double reward_base_acceleration(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_base_acceleration(const TaskMotion *m) {
     return place_exp(-3 * m->twist_change);
 }
 
-static inline MILD_BOTH double reward_action_smoothness(const TaskMotion *m) {
-    double sum = 0;
-    for (int i = 0; i < m->env->shape.actions; i++) {
-        double a = m->env->action[0][i], a1 = m->env->action[1][i], a2 = m->env->action[2][i];
+static inline MILD_BOTH TaskReal reward_action_smoothness(const TaskMotion *m) {
+    TaskReal sum = 0;
+    for (int i = place_lane(); i < m->env->shape.actions; i += PLACE_LANES) {
+        TaskReal a = m->env->action[0][i], a1 = m->env->action[1][i], a2 = m->env->action[2][i];
         sum += square(a - a1) + square(a - 2 * a1 + a2);
     }
-    return sum;
+    return place_sum(sum);
 }
 
-static inline MILD_BOTH double reward_reference_motion(const TaskMotion *m) {
-    double sum = 0;
-    for (int i = 0; i < m->env->shape.joints; i++) {
+static inline MILD_BOTH TaskReal reward_reference_motion(const TaskMotion *m) {
+    TaskReal sum = 0;
+    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
         sum +=
             square(m->q[i] - task_gait_reference(m->def, m->robot, m->env->phase, m->standing, i));
     }
-    double d = place_root(sum);
+    TaskReal d = place_root(place_sum(sum));
     return place_exp(-2 * d) - 0.2 * clamp(d, 0, 0.5);
 }
 
 /* The vendor's exp(-100 x) alone is flat beyond a fifth of a radian, and so gives no signal
  * there. */
-static inline MILD_BOTH double reward_default_pose(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_default_pose(const TaskMotion *m) {
     const double *pose = robot_default_pose(m->robot), *still = robot_still(m->robot);
-    double away = 0, all = 0;
+    TaskReal away = 0, all = 0;
     for (int f = -1; f < m->env->shape.feet; f++) { /* -1: the trunk's joints */
-        double leg = 0;
-        for (int i = 0; i < m->env->shape.joints; i++) {
+        TaskReal leg = 0;
+        for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
             int same = robot_joint_foot(m->robot)[i] == f;
             leg += same ? square(still[i] * (m->q[i] - pose[i])) : 0;
         }
-        away += place_root(leg);
+        away += place_root(place_sum(leg));
     }
-    for (int i = 0; i < m->env->shape.joints; i++) {
+    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
         all += square(m->q[i] - pose[i]);
     }
     return 0.5 * (place_exp(-100 * clamp(away - 0.1, 0, 50)) + place_exp(-3 * away)) -
-           0.01 * place_root(all);
+           0.01 * place_root(place_sum(all));
 }
 
-static inline MILD_BOTH double reward_base_height(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_base_height(const TaskMotion *m) {
     return place_exp(-100 * fabs(m->base_height - task_nominal_height(m->def, m->robot)));
 }
 
-static inline MILD_BOTH double within(double distance, const double wanted[2],
-                                      const double own[2]) {
+static inline MILD_BOTH TaskReal within(TaskReal distance, const double wanted[2],
+                                        const double own[2]) {
     const double *limits = wanted[1] > 0 ? wanted : own;
-    double below = clamp(limits[0] - distance, 0, 0.5), above = clamp(distance - limits[1], 0, 0.5);
+    TaskReal below = clamp(limits[0] - distance, 0, 0.5),
+             above = clamp(distance - limits[1], 0, 0.5);
     return 0.5 * (place_exp(-100 * below) + place_exp(-100 * above));
 }
 
-static inline MILD_BOTH double reward_feet_distance(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_feet_distance(const TaskMotion *m) {
     return within(m->foot_distance, m->def->reward.feet_range, robot_feet_range(m->robot));
 }
 
-static inline MILD_BOTH double reward_knee_distance(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_knee_distance(const TaskMotion *m) {
     return within(m->knee_distance, m->def->reward.knee_range, robot_knee_range(m->robot));
 }
 
-static inline MILD_BOTH double reward_orientation(const TaskMotion *m) {
-    double tilt = place_root(square(m->gravity[0]) + square(m->gravity[1]));
+static inline MILD_BOTH TaskReal reward_orientation(const TaskMotion *m) {
+    TaskReal tilt = place_root(square(m->gravity[0]) + square(m->gravity[1]));
     return 0.5 *
            (place_exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + place_exp(-4 * tilt));
 }
@@ -143,63 +144,63 @@ static inline MILD_BOTH double reward_orientation(const TaskMotion *m) {
 /* Paid once, at touchdown. It is divided by the period, because rewards are rates that are
  * multiplied by the period. The vendor's version lacks this, so only a hundredth of it remains,
  * which a learner does not notice. */
-static inline MILD_BOTH double reward_air_time(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_air_time(const TaskMotion *m) {
     return m->standing ? 0 : per_pair(m, m->landed_air_time) / TASK_PERIOD;
 }
 
-static inline MILD_BOTH double reward_base_motion(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_base_motion(const TaskMotion *m) {
     return 0.5 * (place_exp(-10 * square(m->velocity[2])) +
                   place_exp(-5 * place_root(square(m->omega[0]) + square(m->omega[1]))));
 }
 
-static inline MILD_BOTH double reward_contact_force(const TaskMotion *m) {
-    double sum = 0, hard = robot_foot_force(m->robot);
+static inline MILD_BOTH TaskReal reward_contact_force(const TaskMotion *m) {
+    TaskReal sum = 0, hard = robot_foot_force(m->robot);
     for (int f = 0; f < m->env->shape.feet; f++) {
         sum += clamp(m->foot_force[f] - hard, 0, 0.8 * hard);
     }
     return per_pair(m, sum);
 }
 
-static inline MILD_BOTH double reward_torque(const TaskMotion *m) {
-    double sum = 0;
-    for (int i = 0; i < m->env->shape.joints; i++) {
+static inline MILD_BOTH TaskReal reward_torque(const TaskMotion *m) {
+    TaskReal sum = 0;
+    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
         sum += square(m->torque[i]);
     }
-    return sum;
+    return place_sum(sum);
 }
 
-static inline MILD_BOTH double reward_joint_speed(const TaskMotion *m) {
-    double sum = 0;
-    for (int i = 0; i < m->env->shape.joints; i++) {
+static inline MILD_BOTH TaskReal reward_joint_speed(const TaskMotion *m) {
+    TaskReal sum = 0;
+    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
         sum += square(m->qd[i]);
     }
-    return sum;
+    return place_sum(sum);
 }
 
-static inline MILD_BOTH double reward_joint_acceleration(const TaskMotion *m) {
-    double sum = 0;
-    for (int i = 0; i < m->env->shape.joints; i++) {
+static inline MILD_BOTH TaskReal reward_joint_acceleration(const TaskMotion *m) {
+    TaskReal sum = 0;
+    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
         sum += square((m->qd[i] - m->qd_before[i]) / TASK_PERIOD);
     }
-    return sum;
+    return place_sum(sum);
 }
 
 /* Penalises legs that are too close, because the engine computes no contact between them. */
-static inline MILD_BOTH double reward_collision(const TaskMotion *m) {
+static inline MILD_BOTH TaskReal reward_collision(const TaskMotion *m) {
     return (m->foot_distance < robot_feet_least(m->robot)) +
            (m->knee_distance < robot_knee_least(m->robot));
 }
 
-TASK_FN double task_reward(const TaskMotion *motion, TaskReal terms[TASK_REWARD_COUNT]) {
+TASK_FN TaskReal task_reward(const TaskMotion *motion, TaskReal terms[TASK_REWARD_COUNT]) {
     const double *weight = motion->def->reward.weight;
-    double sum = 0;
+    TaskReal sum = 0;
 #define TASK_REWARD_TERM(name, weight_, help)                                                      \
     terms[REWARD_##name] =                                                                         \
-        weight[REWARD_##name] == 0 ? 0 : weight[REWARD_##name] * reward_##name(motion);            \
+        weight[REWARD_##name] == 0 ? 0 : (TaskReal)weight[REWARD_##name] * reward_##name(motion);  \
     sum += terms[REWARD_##name];
     TASK_REWARD_LIST(TASK_REWARD_TERM)
     if (motion->def->reward.clip_sum && sum < 0) {
         sum = 0;
     }
-    return sum * TASK_PERIOD;
+    return sum * (TaskReal)TASK_PERIOD;
 }

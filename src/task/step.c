@@ -74,19 +74,22 @@ static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const 
     const RandomizeDef *z = &def->randomize;
     Random r = random_at(env->seed ^ RANDOM_USE_START, env->index, env->tick);
     const double *pose = robot_default_pose(robot);
-    memset(&env->robot, 0, sizeof env->robot);
     double yaw = env->command_frozen ? 0 : PI * (2 * random_unit(&r) - 1);
     env->robot.qpos[2] = env->terrain.height + robot_stand_height(robot) - depth + 0.002;
     env->robot.qpos[3] = place_cos(0.5 * yaw);
     env->robot.qpos[6] = place_sin(0.5 * yaw);
-    for (int i = 0; i < env->shape.joints; i++) {
-        double q = pose[i] + z->initial_joint * (2 * random_unit(&r) - 1);
+    for (int i = place_lane(); i < env->shape.joints; i += PLACE_LANES) {
+        Random own = random_after(r, i);
+        double q = pose[i] + z->initial_joint * (2 * random_unit(&own) - 1);
         env->robot.qpos[7 + i] =
             fmin(fmax(q, robot_joint_low(robot)[i]), robot_joint_high(robot)[i]);
     }
-    for (int i = 0; i < 6; i++) {
-        env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&r) - 1);
+    r = random_after(r, env->shape.joints);
+    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
+        Random own = random_after(r, i);
+        env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&own) - 1);
     }
+    r = random_after(r, 6);
     env->phase = random_unit(&r) < 0.5 ? 0 : 0.5;
     /* The first episodes end at different times, so that the environments do not reset in
      * lockstep. */
@@ -96,13 +99,9 @@ static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const 
     env->step_first = env->step;
 }
 
-TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                                double depth) {
-    draw_start(env, def, robot, depth);
-    if (!env->command_frozen) {
-        task_draw_command(env, def);
-    }
-    memcpy(env->command_seen, env->command, sizeof env->command);
+/* What an episode knows of the one before, and its command. */
+static inline MILD_BOTH void clear(TaskEnv *env, const TaskDef *def) {
+    memset(&env->robot, 0, sizeof env->robot);
     memset(env->action, 0, sizeof env->action);
     memset(env->air_time, 0, sizeof env->air_time);
     memset(env->joint_speed, 0, sizeof env->joint_speed);
@@ -110,6 +109,20 @@ TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *r
     memset(env->push, 0, sizeof env->push);
     memset(env->term_sum, 0, sizeof env->term_sum);
     env->reward_sum = env->speed_error_sum = 0;
+    if (!env->command_frozen) {
+        task_draw_command(env, def);
+    }
+    memcpy(env->command_seen, env->command, sizeof env->command);
+}
+
+TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                double depth) {
+    if (place_lane() == 0) {
+        clear(env, def);
+    }
+    place_meet();
+    draw_start(env, def, robot, depth);
+    place_meet();
 }
 
 TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *reading) {
@@ -121,18 +134,18 @@ TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *
 /* ---- before the physics ---- */
 
 static inline MILD_BOTH void accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
-    memcpy(env->action[2], env->action[1], sizeof env->action[0]);
-    memcpy(env->action[1], env->action[0], sizeof env->action[0]);
     float limit = (float)def->action_clip;
-    for (int i = 0; i < env->shape.actions; i++) {
+    for (int i = place_lane(); i < env->shape.actions; i += PLACE_LANES) {
         float a = action[i];
+        env->action[2][i] = env->action[1][i];
+        env->action[1][i] = env->action[0][i];
         env->action[0][i] = !(a > -limit) ? -limit : a > limit ? limit : a;
     }
 }
 
 static inline MILD_BOTH void push_base(TaskEnv *env, const TaskDef *def) {
     const RandomizeDef *z = &def->randomize;
-    for (int i = 0; i < 6; i++) {
+    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
         env->push[i] *= 0.95;
     }
     uint32_t interval = (uint32_t)(z->push_interval / TASK_PERIOD + 0.5);
@@ -140,9 +153,10 @@ static inline MILD_BOTH void push_base(TaskEnv *env, const TaskDef *def) {
         return;
     }
     Random r = random_at(env->seed ^ RANDOM_USE_PUSH, env->index, env->tick);
-    for (int i = 0; i < 6; i++) {
+    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
+        Random own = random_after(r, i);
         double size = i == 2 ? 0 : i < 3 ? z->push_linear : z->push_angular;
-        env->push[i] = size * (2 * random_unit(&r) - 1);
+        env->push[i] = size * (2 * random_unit(&own) - 1);
         env->robot.qvel[i] += env->push[i];
     }
 }
@@ -195,9 +209,6 @@ static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const
         m->wanted_height[f] = task_gait_height(def, robot, env->phase, m->standing, f);
         if (m->contact[f]) {
             m->landed_air_time += fmin(env->air_time[f], 0.5 * def->gait_period);
-            env->air_time[f] = 0;
-        } else {
-            env->air_time[f] += TASK_PERIOD;
         }
         if (m->stance[f]) {
             stance_height += foot->sole_center[2];
@@ -205,6 +216,10 @@ static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const
         }
     }
     m->base_height = robot_sim_qpos(sim)[2] - stance_height / (stances ? stances : 1);
+    place_meet();
+    for (int f = place_lane(); f < env->shape.feet; f += PLACE_LANES) {
+        env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + TASK_PERIOD;
+    }
 }
 
 TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
@@ -230,14 +245,17 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
         change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
     }
     m.twist_change = place_root(change);
-    const double now[3] = {m.velocity[0], m.velocity[1], m.omega[2]};
-    for (int i = 0; i < 3; i++) {
+    place_meet();
+    for (int i = place_lane(); i < 3; i += PLACE_LANES) {
+        const double now = i < 2 ? m.velocity[i] : m.omega[2];
         env->smooth_velocity[i] +=
-            TASK_PERIOD / def->reward.tracking_time * (now[i] - env->smooth_velocity[i]);
+            TASK_PERIOD / def->reward.tracking_time * (now - env->smooth_velocity[i]);
     }
-    memcpy(env->base_twist, twist, sizeof twist);
+    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
+        env->base_twist[i] = twist[i];
+    }
     const TaskReal *q = robot_sim_qpos(sim) + 7;
-    for (int i = 0; i < env->shape.joints; i++) {
+    for (int i = place_lane(); i < env->shape.joints; i += PLACE_LANES) {
         m.q[i] = q[i];
         m.qd[i] = qvel[6 + i];
         m.qd_before[i] = env->joint_speed[i];
@@ -247,6 +265,7 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     m.foot_distance = robot_sim_foot_distance(sim);
     m.knee_distance = robot_sim_knee_distance(sim);
     feet_motion(env, def, robot, sim, &m);
+    place_meet();
     return m;
 }
 
@@ -291,10 +310,12 @@ static inline MILD_BOTH int take_reward(TaskEnv *env, const TaskDef *def, const 
     if (!isfinite(*reward)) {
         return 0;
     }
-    env->speed_error_sum +=
-        hypot(env->smooth_velocity[0] - env->command[0], env->smooth_velocity[1] - env->command[1]);
-    env->reward_sum += (double)*reward;
-    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+    if (place_lane() == 0) {
+        env->speed_error_sum += hypot(env->smooth_velocity[0] - env->command[0],
+                                      env->smooth_velocity[1] - env->command[1]);
+        env->reward_sum += (TaskReal)*reward;
+    }
+    for (int i = place_lane(); i < TASK_REWARD_COUNT; i += PLACE_LANES) {
         env->term_sum[i] += terms[i] * TASK_PERIOD;
     }
     return 1;
@@ -309,11 +330,15 @@ TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *ro
         out.reward = 0;
     }
     out.valid = !bad;
-    advance_clock(env, def);
     int fallen = bad || has_fallen(env, def, sim);
+    place_meet();
+    if (place_lane() == 0) {
+        advance_clock(env, def);
+        task_assist_adapt(env, fallen);
+    }
+    place_meet();
     out.timeout = !fallen && env->step >= env->step_limit;
     out.done = fallen || out.timeout;
-    task_assist_adapt(env, fallen);
     if (out.done) {
         report_episode(env, &out);
     }

@@ -155,15 +155,7 @@ typedef struct {
 } TaskReading;
 TASK_FN void task_read_imu(const RobotSim *sim, TaskReading *reading);
 TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading);
-/* Which of the lanes that work on one environment; alone 0 of 1. */
-typedef struct {
-    int lane, lanes;
-} TaskLane;
-/* Appends the frame made from the readings to the history and writes the view. All lanes call. */
-TASK_FN void task_observe_lane(TaskEnv *env, const TaskDef *def, const Robot *robot,
-                               const RobotSim *sim, const TaskReading *reading, int first,
-                               const TaskView *view, TaskLane at);
-/* The same by one. */
+/* Appends the frame made from the readings to the history and writes the view. */
 TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, const RobotSim *sim,
                           const TaskReading *reading, int first, const TaskView *view);
 
@@ -199,7 +191,7 @@ typedef struct {
 TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                         const RobotSim *sim, const TaskReal *torque);
 /* Writes the weighted terms per second to `terms`. Returns their clipped sum times the period. */
-TASK_FN double task_reward(const TaskMotion *motion, TaskReal terms[TASK_REWARD_COUNT]);
+TASK_FN TaskReal task_reward(const TaskMotion *motion, TaskReal terms[TASK_REWARD_COUNT]);
 
 /* What an environment keeps, and back, before a new episode (step.c). */
 TASK_FN TaskKept task_keep(const TaskEnv *env);
@@ -212,9 +204,13 @@ TASK_FN void task_draw_command(TaskEnv *env, const TaskDef *def);
 TASK_FN void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);
 /* Draws where on the map it begins, and a material for each of its labels. */
 TASK_FN void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r);
-/* The material under the base. */
-TASK_FN const MildMaterial *task_material_under(const TaskEnv *env, const TaskDef *def,
-                                                const RobotSim *sim);
+/* The numbers of the material under the base that the critic sees, each scaled to about one;
+ * [TASK_GROUND_NUMBERS], in the buffer or elsewhere. */
+enum { TASK_GROUND_NUMBERS = 12 };
+TASK_FN const float *task_ground_under(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                       const RobotSim *sim, float *buffer);
+/* The same of any material. */
+void task_ground_numbers(const Robot *robot, const MildMaterial *material, float *numbers);
 /* [m] Depth of the soles of a robot that stands on a material. */
 double task_standing_depth(const Robot *robot, const MildMaterial *material);
 
