@@ -9,6 +9,10 @@
 #include <stdint.h>
 #include <string.h>
 
+#ifdef __CUDACC__
+#include <cuda_fp16.h>
+#endif
+
 #include "base/both.h"
 
 #ifndef TASK_JOINTS /* sizes of a robot's arrays; where the text is compiled for one, its own */
@@ -28,6 +32,9 @@ typedef double TaskReal;
 #include "robot/robot.h"
 typedef MildTerrain TaskTerrain;
 #endif
+#define TASK_REAL(number) ((TaskReal)(number))
+
+#define PLACE_TURN 0.3183098861837907 /* 1/pi */
 
 /* On a GPU to the accuracy of float, for a tenth of the instructions. */
 static inline MILD_BOTH TaskReal place_exp(double x) {
@@ -40,7 +47,7 @@ static inline MILD_BOTH TaskReal place_exp(double x) {
 
 static inline MILD_BOTH TaskReal place_sin(double x) {
 #ifdef __CUDA_ARCH__
-    return sinf((float)x);
+    return sinpif((float)(x * PLACE_TURN)); /* sinf has a long path for large x */
 #else
     return (TaskReal)sin(x);
 #endif
@@ -48,7 +55,7 @@ static inline MILD_BOTH TaskReal place_sin(double x) {
 
 static inline MILD_BOTH TaskReal place_cos(double x) {
 #ifdef __CUDA_ARCH__
-    return cosf((float)x);
+    return cospif((float)(x * PLACE_TURN));
 #else
     return (TaskReal)cos(x);
 #endif
@@ -81,23 +88,31 @@ static inline MILD_BOTH double place_above(const RobotSim *sim, const TaskTerrai
 }
 
 /* A number of a frame that is kept for the means of the history. On a device it has 16 bits, as in
- * IEEE 754 with a rounding error of at most 2^-11 of the number, below 6e-5 zero: the noise of
- * sensors is a hundred times larger. Scaled by 2^-112 a float has the exponent of the short one. */
+ * IEEE 754, with a rounding error of at most 2^-11 of the number: the noise of sensors is a hundred
+ * times larger. Scaled by 2^-112 a float has the exponent of the short one. */
 #ifdef TASK_ON_DEVICE
 typedef uint16_t TaskFrame;
 
 static inline MILD_BOTH TaskFrame place_pack(float x) {
+#ifdef __CUDA_ARCH__
+    return __half_as_ushort(__float2half_rn(fminf(fmaxf(x, -65504.0f), 65504.0f)));
+#else
     const float size = fminf(fabsf(x), 65504) * 0x1p-112f;
     uint32_t bits;
     memcpy(&bits, &size, sizeof bits);
     return (TaskFrame)(((bits + 0xfff + (bits >> 13 & 1)) >> 13) | (x < 0 ? 0x8000 : 0));
+#endif
 }
 
 static inline MILD_BOTH float place_unpack(TaskFrame frame) {
+#ifdef __CUDA_ARCH__
+    return __half2float(__ushort_as_half(frame));
+#else
     const uint32_t bits = (uint32_t)(frame & 0x7fff) << 13 | (uint32_t)(frame & 0x8000) << 16;
     float size;
     memcpy(&size, &bits, sizeof size);
     return size * 0x1p112f;
+#endif
 }
 #else
 typedef float TaskFrame;

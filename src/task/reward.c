@@ -15,7 +15,7 @@ static inline MILD_BOTH TaskReal clamp(TaskReal x, TaskReal low, TaskReal high) 
 
 /* Scales a sum over feet to two feet. */
 static inline MILD_BOTH TaskReal per_pair(const TaskMotion *m, TaskReal sum) {
-    return sum * (2.0 / m->env->shape.feet);
+    return sum * (2 / TASK_REAL(m->env->shape.feet));
 }
 
 /* The paper's exp(-k e^2) gives a signal even at large errors, but is flat near 0: being 0.05 m/s
@@ -24,8 +24,8 @@ static inline MILD_BOTH TaskReal per_pair(const TaskMotion *m, TaskReal sum) {
  * would hide one. */
 static inline MILD_BOTH TaskReal tracking(const TaskMotion *m, TaskReal error) {
     const RewardDef *def = &m->def->reward;
-    return 0.5 * (place_exp(-def->tracking_sharpness * square(error)) +
-                  place_exp(-fabs(error) / def->tracking_width));
+    return TASK_REAL(0.5) * (place_exp(-def->tracking_sharpness * square(error)) +
+                             place_exp(-fabs(error) / def->tracking_width));
 }
 
 /* Forward and sideways errors count separately. In the norm of both, a little sway would hide a
@@ -49,8 +49,9 @@ static inline MILD_BOTH TaskReal reward_feet_clearance(const TaskMotion *m) {
     for (int f = 0; f < m->env->shape.feet; f++) {
         if (!m->stance[f]) {
             TaskReal h = m->foot_height[f], wanted = m->wanted_height[f];
-            sum += 1.5707963 * (clamp(h, 0, wanted) - 0.5 * clamp(h - wanted, 0, 0.3)) /
-                   (TaskReal)m->def->swing_apex;
+            sum += TASK_REAL(1.5707963) *
+                   (clamp(h, 0, wanted) - TASK_REAL(0.5) * clamp(h - wanted, 0, 0.3)) /
+                   TASK_REAL(m->def->swing_apex);
         }
     }
     return per_pair(m, sum);
@@ -59,9 +60,9 @@ static inline MILD_BOTH TaskReal reward_feet_clearance(const TaskMotion *m) {
 static inline MILD_BOTH TaskReal reward_gait(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
-        sum += m->either[f] || m->contact[f] == m->stance[f] ? 1 : -0.3;
+        sum += m->either[f] || m->contact[f] == m->stance[f] ? 1 : TASK_REAL(-0.3);
     }
-    return sum / m->env->shape.feet;
+    return sum / TASK_REAL(m->env->shape.feet);
 }
 
 static inline MILD_BOTH TaskReal reward_slip(const TaskMotion *m) {
@@ -92,7 +93,7 @@ static inline MILD_BOTH TaskReal reward_reference_motion(const TaskMotion *m) {
             square(m->q[i] - task_gait_reference(m->def, m->robot, m->env->phase, m->standing, i));
     }
     TaskReal d = place_root(place_sum(sum));
-    return place_exp(-2 * d) - 0.2 * clamp(d, 0, 0.5);
+    return place_exp(-2 * d) - TASK_REAL(0.2) * clamp(d, 0, 0.5);
 }
 
 /* The vendor's exp(-100 x) alone is flat beyond a fifth of a radian, and so gives no signal
@@ -111,8 +112,9 @@ static inline MILD_BOTH TaskReal reward_default_pose(const TaskMotion *m) {
     for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
         all += square(m->q[i] - pose[i]);
     }
-    return 0.5 * (place_exp(-100 * clamp(away - 0.1, 0, 50)) + place_exp(-3 * away)) -
-           0.01 * place_root(place_sum(all));
+    return TASK_REAL(0.5) *
+               (place_exp(-100 * clamp(away - TASK_REAL(0.1), 0, 50)) + place_exp(-3 * away)) -
+           TASK_REAL(0.01) * place_root(place_sum(all));
 }
 
 static inline MILD_BOTH TaskReal reward_base_height(const TaskMotion *m) {
@@ -124,7 +126,7 @@ static inline MILD_BOTH TaskReal within(TaskReal distance, const double wanted[2
     const double *limits = wanted[1] > 0 ? wanted : own;
     TaskReal below = clamp(limits[0] - distance, 0, 0.5),
              above = clamp(distance - limits[1], 0, 0.5);
-    return 0.5 * (place_exp(-100 * below) + place_exp(-100 * above));
+    return TASK_REAL(0.5) * (place_exp(-100 * below) + place_exp(-100 * above));
 }
 
 static inline MILD_BOTH TaskReal reward_feet_distance(const TaskMotion *m) {
@@ -137,7 +139,7 @@ static inline MILD_BOTH TaskReal reward_knee_distance(const TaskMotion *m) {
 
 static inline MILD_BOTH TaskReal reward_orientation(const TaskMotion *m) {
     TaskReal tilt = place_root(square(m->gravity[0]) + square(m->gravity[1]));
-    return 0.5 *
+    return TASK_REAL(0.5) *
            (place_exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + place_exp(-4 * tilt));
 }
 
@@ -145,18 +147,18 @@ static inline MILD_BOTH TaskReal reward_orientation(const TaskMotion *m) {
  * multiplied by the period. The vendor's version lacks this, so only a hundredth of it remains,
  * which a learner does not notice. */
 static inline MILD_BOTH TaskReal reward_air_time(const TaskMotion *m) {
-    return m->standing ? 0 : per_pair(m, m->landed_air_time) / TASK_PERIOD;
+    return m->standing ? 0 : per_pair(m, m->landed_air_time) / TASK_REAL(TASK_PERIOD);
 }
 
 static inline MILD_BOTH TaskReal reward_base_motion(const TaskMotion *m) {
-    return 0.5 * (place_exp(-10 * square(m->velocity[2])) +
-                  place_exp(-5 * place_root(square(m->omega[0]) + square(m->omega[1]))));
+    return TASK_REAL(0.5) * (place_exp(-10 * square(m->velocity[2])) +
+                             place_exp(-5 * place_root(square(m->omega[0]) + square(m->omega[1]))));
 }
 
 static inline MILD_BOTH TaskReal reward_contact_force(const TaskMotion *m) {
     TaskReal sum = 0, hard = robot_foot_force(m->robot);
     for (int f = 0; f < m->env->shape.feet; f++) {
-        sum += clamp(m->foot_force[f] - hard, 0, 0.8 * hard);
+        sum += clamp(m->foot_force[f] - hard, 0, TASK_REAL(0.8) * hard);
     }
     return per_pair(m, sum);
 }
@@ -180,15 +182,16 @@ static inline MILD_BOTH TaskReal reward_joint_speed(const TaskMotion *m) {
 static inline MILD_BOTH TaskReal reward_joint_acceleration(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
-        sum += square((m->qd[i] - m->qd_before[i]) / TASK_PERIOD);
+        sum += square((m->qd[i] - m->qd_before[i]) / TASK_REAL(TASK_PERIOD));
     }
     return place_sum(sum);
 }
 
 /* Penalises legs that are too close, because the engine computes no contact between them. */
 static inline MILD_BOTH TaskReal reward_collision(const TaskMotion *m) {
-    return (m->foot_distance < robot_feet_least(m->robot)) +
-           (m->knee_distance < robot_knee_least(m->robot));
+    int close = (m->foot_distance < robot_feet_least(m->robot)) +
+                (m->knee_distance < robot_knee_least(m->robot));
+    return TASK_REAL(close);
 }
 
 TASK_FN TaskReal task_reward(const TaskMotion *motion, TaskReal terms[TASK_REWARD_COUNT]) {
@@ -196,11 +199,11 @@ TASK_FN TaskReal task_reward(const TaskMotion *motion, TaskReal terms[TASK_REWAR
     TaskReal sum = 0;
 #define TASK_REWARD_TERM(name, weight_, help)                                                      \
     terms[REWARD_##name] =                                                                         \
-        weight[REWARD_##name] == 0 ? 0 : (TaskReal)weight[REWARD_##name] * reward_##name(motion);  \
+        weight[REWARD_##name] == 0 ? 0 : TASK_REAL(weight[REWARD_##name]) * reward_##name(motion); \
     sum += terms[REWARD_##name];
     TASK_REWARD_LIST(TASK_REWARD_TERM)
     if (motion->def->reward.clip_sum && sum < 0) {
         sum = 0;
     }
-    return sum * (TaskReal)TASK_PERIOD;
+    return sum * TASK_REAL(TASK_PERIOD);
 }

@@ -194,7 +194,7 @@ TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd
 
 static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                          const RobotSim *sim, TaskMotion *m) {
-    double stance_height = 0;
+    TaskReal stance_height = 0;
     int stances = 0;
     for (int f = 0; f < env->shape.feet; f++) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
@@ -208,17 +208,17 @@ static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const
         m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
         m->wanted_height[f] = task_gait_height(def, robot, env->phase, m->standing, f);
         if (m->contact[f]) {
-            m->landed_air_time += fmin(env->air_time[f], 0.5 * def->gait_period);
+            m->landed_air_time += fmin((double)env->air_time[f], 0.5 * def->gait_period);
         }
         if (m->stance[f]) {
             stance_height += foot->sole_center[2];
             stances++;
         }
     }
-    m->base_height = robot_sim_qpos(sim)[2] - stance_height / (stances ? stances : 1);
+    m->base_height = robot_sim_qpos(sim)[2] - stance_height / (TaskReal)(stances ? stances : 1);
     place_meet();
     for (int f = place_lane(); f < env->shape.feet; f += PLACE_LANES) {
-        env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + TASK_PERIOD;
+        env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + TASK_REAL(TASK_PERIOD);
     }
 }
 
@@ -228,10 +228,9 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     memset(&m, 0, sizeof m);
     m.def = def, m.robot = robot, m.env = env;
     const TaskReal *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
-    double length = place_root(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
-    double c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
-    TaskReal twist[6];
-    double change = 0;
+    TaskReal length = place_root(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
+    TaskReal c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
+    TaskReal twist[6], change = 0;
     m.standing = task_is_standing(env->command);
     m.velocity[0] = c * qvel[0] + s * qvel[1];
     m.velocity[1] = -s * qvel[0] + c * qvel[1];
@@ -247,9 +246,9 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     m.twist_change = place_root(change);
     place_meet();
     for (int i = place_lane(); i < 3; i += PLACE_LANES) {
-        const double now = i < 2 ? m.velocity[i] : m.omega[2];
-        env->smooth_velocity[i] +=
-            TASK_PERIOD / def->reward.tracking_time * (now - env->smooth_velocity[i]);
+        const TaskReal now = i < 2 ? m.velocity[i] : m.omega[2];
+        env->smooth_velocity[i] += TASK_REAL(TASK_PERIOD) / TASK_REAL(def->reward.tracking_time) *
+                                   (now - env->smooth_velocity[i]);
     }
     for (int i = place_lane(); i < 6; i += PLACE_LANES) {
         env->base_twist[i] = twist[i];
@@ -316,7 +315,7 @@ static inline MILD_BOTH int take_reward(TaskEnv *env, const TaskDef *def, const 
         env->reward_sum += (TaskReal)*reward;
     }
     for (int i = place_lane(); i < TASK_REWARD_COUNT; i += PLACE_LANES) {
-        env->term_sum[i] += terms[i] * TASK_PERIOD;
+        env->term_sum[i] += terms[i] * TASK_REAL(TASK_PERIOD);
     }
     return 1;
 }
