@@ -26,8 +26,10 @@ TASK_FN void task_read_imu(const RobotSim *sim, TaskReading *reading) {
 }
 
 TASK_FN void task_read_motors(const RobotSim *sim, TaskReading *reading) {
-    memcpy(reading->q, robot_sim_qpos(sim) + 7, sizeof reading->q);
-    memcpy(reading->qd, robot_sim_qvel(sim) + 6, sizeof reading->qd);
+    for (int i = 0; i < TASK_JOINTS; i++) {
+        reading->q[i] = robot_sim_qpos(sim)[7 + i];
+        reading->qd[i] = robot_sim_qvel(sim)[6 + i];
+    }
 }
 
 /* A frame without noise. joint, speed: [joints]. */

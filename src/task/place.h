@@ -167,6 +167,18 @@ static inline MILD_BOTH void place_meet(void) {
 #endif
 }
 
+/* Sets numbers of TaskReal, or of float, to 0. */
+static inline MILD_BOTH void place_clear(void *numbers, size_t bytes) {
+#ifdef TASK_ON_DEVICE
+    float *number = (float *)numbers;
+    for (size_t i = (size_t)place_lane(); i < bytes / sizeof *number; i += PLACE_LANES) {
+        number[i] = 0;
+    }
+#else
+    memset(numbers, 0, bytes);
+#endif
+}
+
 /* The sum over the lanes. */
 static inline MILD_BOTH TaskReal place_sum(TaskReal x) {
 #ifdef __CUDA_ARCH__

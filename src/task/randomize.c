@@ -24,11 +24,6 @@ static inline MILD_BOTH int draw_lag(Random *r, const TaskDef *def) {
 TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot) {
     const RandomizeDef *z = &def->randomize;
     Random r = random_at(env->seed ^ RANDOM_USE_EPISODE, env->index, env->tick);
-    place_meet();
-    if (place_lane() == 0) {
-        memset(&env->variation, 0, sizeof env->variation);
-    }
-    place_meet();
     env->variation.rigid = random_unit(&r) < z->rigid_share || z->model == MILD_MODEL_RIGID;
     task_draw_ground(env, def, robot, &r);
     env->variation.rigid_friction = draw(&r, z->mu);
@@ -66,7 +61,7 @@ TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot
 TASK_FN void task_draw_command(TaskEnv *env, const TaskDef *def) {
     Random r = random_at(env->seed ^ RANDOM_USE_COMMAND, env->index, env->tick);
     double kind = random_unit(&r);
-    memset(env->command, 0, sizeof env->command);
+    env->command[0] = env->command[1] = env->command[2] = 0;
     if (kind < def->standing_share) {
         return;
     }

@@ -99,34 +99,41 @@ static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const 
     env->step_first = env->step;
 }
 
+static inline MILD_BOTH void see_command(TaskEnv *env) {
+    for (int i = 0; i < 3; i++) {
+        env->command_seen[i] = env->command[i];
+    }
+}
+
 /* What an episode knows of the one before, and its command. */
 static inline MILD_BOTH void clear(TaskEnv *env, const TaskDef *def) {
-    memset(&env->robot, 0, sizeof env->robot);
-    memset(env->action, 0, sizeof env->action);
-    memset(env->air_time, 0, sizeof env->air_time);
-    memset(env->joint_speed, 0, sizeof env->joint_speed);
-    memset(env->smooth_velocity, 0, sizeof env->smooth_velocity);
-    memset(env->push, 0, sizeof env->push);
-    memset(env->term_sum, 0, sizeof env->term_sum);
+    place_clear(&env->robot, sizeof env->robot);
+    place_clear(env->action, sizeof env->action);
+    place_clear(env->air_time, sizeof env->air_time);
+    place_clear(env->joint_speed, sizeof env->joint_speed);
+    place_clear(env->smooth_velocity, sizeof env->smooth_velocity);
+    place_clear(env->push, sizeof env->push);
+    place_clear(env->term_sum, sizeof env->term_sum);
     env->reward_sum = env->speed_error_sum = 0;
-    if (!env->command_frozen) {
+    if (place_lane() == 0 && !env->command_frozen) {
         task_draw_command(env, def);
     }
-    memcpy(env->command_seen, env->command, sizeof env->command);
+    place_meet();
+    see_command(env);
 }
 
 TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                 double depth) {
-    if (place_lane() == 0) {
-        clear(env, def);
-    }
+    clear(env, def);
     place_meet();
     draw_start(env, def, robot, depth);
     place_meet();
 }
 
 TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *reading) {
-    memcpy(env->base_twist, robot_sim_qvel(sim), sizeof env->base_twist);
+    for (int i = 0; i < 6; i++) {
+        env->base_twist[i] = robot_sim_qvel(sim)[i];
+    }
     task_read_imu(sim, reading);
     task_read_motors(sim, reading);
 }
@@ -235,12 +242,12 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     m.velocity[0] = c * qvel[0] + s * qvel[1];
     m.velocity[1] = -s * qvel[0] + c * qvel[1];
     m.velocity[2] = qvel[2];
-    memcpy(twist, qvel, sizeof twist);
     for (int i = 0; i < 3; i++) {
         m.omega[i] = qvel[3 + i];
         m.gravity[i] = -rotation[6 + i];
     }
     for (int i = 0; i < 6; i++) {
+        twist[i] = qvel[i];
         change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
     }
     m.twist_change = place_root(change);
@@ -280,7 +287,7 @@ static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
 static inline MILD_BOTH void advance_clock(TaskEnv *env, const TaskDef *def) {
     env->tick++;
     env->step++;
-    memcpy(env->command_seen, env->command, sizeof env->command);
+    see_command(env);
     env->phase += TASK_PERIOD / def->gait_period;
     env->phase -= floor(env->phase);
     uint32_t interval = (uint32_t)(def->command_interval / TASK_PERIOD + 0.5);
