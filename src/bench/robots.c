@@ -83,7 +83,12 @@ static MildStatus run(Crowd *crowd, const ExperimentDef *def, Rows *rows, BenchR
         bench_add(report, "robots", "policy_steps_per_s", (double)envs * steps / seconds, "1/s");
         bench_add(report, "robots", "episodes_ended", stats.episodes, "-");
         bench_add(report, "robots", "diverged", stats.diverged, "-");
+        const CrowdMemory memory = crowd_memory(crowd);
         bench_add(report, "robots", "memory_per_robot", (double)crowd_robot_bytes(crowd), "B");
+        bench_add(report, "robots", "memory_task", (double)memory.task, "B");
+        bench_add(report, "robots", "memory_engine", (double)memory.engine, "B");
+        bench_add(report, "robots", "memory_ground", (double)memory.ground, "B");
+        bench_add(report, "robots", "memory_rest", (double)memory.rest, "B");
     }
     return status;
 }

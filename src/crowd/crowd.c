@@ -17,6 +17,7 @@ struct Crowd {
     Pool *pool;         /* of the host */
     int steps;          /* of physics in a policy step */
     int device;
+    size_t robot; /* [B] of CrowdRobot */
     size_t bytes; /* of the device, without the ground */
 };
 
@@ -78,7 +79,7 @@ static int labels_of(const TaskDef *task) {
     return task->map ? mild_map_label_count(task->map) : 1;
 }
 
-static MildStatus take_arrays(Crowd *crowd, size_t robot, int feet, int labels, MildError *error) {
+static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *error) {
     CrowdArrays *all = &crowd->arrays;
     CrowdContact *contact = &all->contact;
     const size_t envs = (size_t)all->envs, rows = envs * (size_t)feet;
@@ -86,7 +87,7 @@ static MildStatus take_arrays(Crowd *crowd, size_t robot, int feet, int labels, 
         void *at; /* pointer to the array's pointer */
         size_t bytes;
     } arrays[] = {{&all->env, envs * all->stride},
-                  {&all->robot, envs * robot},
+                  {&all->robot, envs * crowd->robot},
                   {&all->material, envs * (size_t)labels * sizeof *all->material},
                   {&all->map_origin, 2 * envs * sizeof *all->map_origin},
                   {&all->fresh, envs},
@@ -210,10 +211,10 @@ static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGround
     const CrowdBytes bytes = def->device == MILD_BATCH_HOST ? crowd_host_bytes(def->task, &shape)
                                                             : crowd_device_bytes(def->task, &shape);
     crowd->arrays.stride = bytes.stride;
+    crowd->robot = bytes.robot;
     MildStatus status = open_ground(crowd, def, grounds, error);
-    status = status == MILD_OK
-                 ? take_arrays(crowd, bytes.robot, shape.feet, labels_of(def->task), error)
-                 : status;
+    status =
+        status == MILD_OK ? take_arrays(crowd, shape.feet, labels_of(def->task), error) : status;
     status = status == MILD_OK ? copy_grounds(crowd, def, grounds, error) : status;
     status = status == MILD_OK ? copy_task(crowd, def, grounds, error) : status;
     status = status == MILD_OK ? copy_model(crowd, def, error) : status;
@@ -251,8 +252,17 @@ void crowd_destroy(Crowd *crowd) {
     free(crowd);
 }
 
+CrowdMemory crowd_memory(const Crowd *crowd) {
+    const size_t task = crowd->arrays.stride, engine = crowd->robot;
+    return (CrowdMemory){.task = task,
+                         .engine = engine,
+                         .ground = mild_batch_robot_bytes(crowd->ground),
+                         .rest = crowd->bytes / (size_t)crowd->arrays.envs - task - engine};
+}
+
 size_t crowd_robot_bytes(const Crowd *crowd) {
-    return crowd->bytes / (size_t)crowd->arrays.envs + mild_batch_robot_bytes(crowd->ground);
+    const CrowdMemory memory = crowd_memory(crowd);
+    return memory.task + memory.engine + memory.ground + memory.rest;
 }
 
 /* ---- steps ---- */

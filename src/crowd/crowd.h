@@ -40,6 +40,14 @@ MildStatus crowd_step(Crowd *crowd, const float *action, float *reward, uint8_t 
 /* As vec_take_sums. Waits for the device. */
 MildStatus crowd_take_sums(Crowd *crowd, VecStats *sums, void *stream, MildError *error);
 /* [B] Of the device for one robot. */
+typedef struct {
+    size_t task;   /* TaskEnv and the frames of its history */
+    size_t engine; /* between the parts of a step, and what the task reads of it */
+    size_t ground; /* of mild/batch.h */
+    size_t rest;   /* what passes between engine and ground; shares of model, task and grounds */
+} CrowdMemory;
+CrowdMemory crowd_memory(const Crowd *crowd);
+/* Their sum. */
 size_t crowd_robot_bytes(const Crowd *crowd);
 /* What lasts beyond an episode, [envs] on the host, and back, before crowd_reset. Waits for the
  * device. */

@@ -166,12 +166,13 @@ static inline MILD_BOTH void copy_row(const float *from, int width, float *to) {
  * ring. At the start of an episode the first frame also fills the older ones. */
 static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, int first,
                                            float *history) {
-    int width = env->shape.observation, stride = def->history_stride;
+    const int width = env->shape.observation, stride = def->history_stride;
+    const uint32_t held = env->held;
     const float *frame = history + (TASK_FRAMES - 1) * width;
     for (int j = place_lane(); j < width; j += PLACE_LANES) {
         TaskFrame *column = task_env_frames(env) + j;
         uint32_t place = env->oldest;
-        for (uint32_t k = 0; first && k < env->held; k++) {
+        for (uint32_t k = 0; first && k < held; k++) {
             column[k * (uint32_t)width] = place_pack(frame[j]);
         }
         for (int i = 0; i < TASK_FRAMES - 1; i++) {
@@ -179,7 +180,7 @@ static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, int
             PLACE_UNROLL
             for (int k = 0; k < stride; k++) {
                 sum += place_unpack(column[place * (uint32_t)width]);
-                place = place + 1 < env->held ? place + 1 : 0;
+                place = place + 1 < held ? place + 1 : 0;
             }
             history[i * width + j] = sum / (float)stride;
         }
