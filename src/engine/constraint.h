@@ -458,13 +458,14 @@ LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t, int pr
 }
 
 /* From the acceleration without the rows to that with them; `edges`: engine_collide was called.
- * Needs mass, limits and J; overwrites factor, half and, with edges, the wrench. Returns Newton
- * steps. */
+ * Needs the factor of M, limits and J; overwrites it, mass, half and, with edges, the wrench.
+ * Returns Newton steps. */
 LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges) {
     EngineSupport *support = &work->now.support;
     EngineContact *contact = &support->ground.contact;
     int step = 0;
     int going = 1;
+    engine_multiply_out(tree, work->factor[0], work->inverse, work->mass[0]);
     EACH_LANE(l) {
         LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {

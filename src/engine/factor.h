@@ -109,6 +109,34 @@ LANE_FN void engine_factorise(const EngineTree *tree, const Real *matrix, Real *
     engine_factorise_base(tree, matrix, factor, inverse);
 }
 
+/* mass <- M = L^T L again: M_ij is the sum of L_ki L_kj over k, which are i and what is behind it. */
+LANE_FN void engine_multiply_out(const EngineTree *tree, const Real *factor, const Real *inverse,
+                                 Real *mass) {
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
+            const EngineEntry entry = tree->entry[e];
+            const int d = entry.dof;
+            const int own = tree->above[d];
+            const Real *left = factor + d * ENGINE_STRIDE + own;
+            const Real *right = factor + d * ENGINE_STRIDE + entry.place;
+            const Real diagonal = 1 / inverse[d];
+            Real sum = diagonal * (entry.place == own ? diagonal : *right);
+            LANE_ROLLED
+            for (int k = entry.behind - d; k > 1; k--) {
+                left += ENGINE_STRIDE;
+                right += ENGINE_STRIDE;
+                sum += *left * *right;
+            }
+            mass[d * ENGINE_STRIDE + entry.place] = sum;
+            if (d < 6) {
+                mass[entry.place * ENGINE_STRIDE + d] = sum;
+            }
+        }
+    }
+    lanes_meet();
+}
+
 /* x <- L^-T x, leaves first. A lane has x of its degrees of freedom in registers. */
 LANE_FN void engine_solve_transposed(const EngineTree *tree, const Real *factor,
                                      const Real *inverse, Real *x) {

@@ -1,5 +1,5 @@
-/* What engine_end needs of engine_begin's work where something else is done between the two: a third
- * of EngineWork, in any memory. M and its factor are lists of their entries. */
+/* What engine_end needs of engine_begin's work where something else is done between the two: a
+ * quarter of EngineWork, in any memory. The factor of M is a list of its entries. */
 #ifndef MILD_ENGINE_SAVED_H
 #define MILD_ENGINE_SAVED_H
 
@@ -11,8 +11,7 @@
 #define ENGINE_STATE ((int)(offsetof(EngineWork, rotation) / sizeof(Real)))
 
 typedef struct {
-    Real mass[ENGINE_ENTRIES];   /* M in the order of EngineTree.entry */
-    Real factor[ENGINE_ENTRIES]; /* L, its diagonal inverted */
+    Real factor[ENGINE_ENTRIES]; /* L in the order of EngineTree.entry, its diagonal inverted */
     Real state[offsetof(EngineWork, rotation) / sizeof(Real)];
     Real rows[6 * ENGINE_FEET * ENGINE_CHAIN]; /* soft ground: half, rigid ground: J^T */
     Real foot_link[12 * ENGINE_FEET];          /* rigid ground: pose of the links with soles */
@@ -34,7 +33,6 @@ LANE_FN void engine_save(const EngineTree *tree, int rigid, EngineWork *work, En
             const EngineEntry entry = tree->entry[e];
             const int d = entry.dof;
             const int diagonal = entry.place == tree->above[d];
-            saved->mass[e] = work->mass[d][entry.place];
             saved->factor[e] = diagonal ? work->inverse[d] : work->factor[d][entry.place];
         }
         LANE_ROLLED
@@ -63,10 +61,6 @@ LANE_FN void engine_restore(const EngineTree *tree, int rigid, const EngineSaved
         for (int e = LANE(l); e < engine_entries(tree); e += LANES) {
             const EngineEntry entry = tree->entry[e];
             const int d = entry.dof;
-            work->mass[d][entry.place] = saved->mass[e];
-            if (d < 6) {
-                work->mass[entry.place][d] = saved->mass[e];
-            }
             if (entry.place == tree->above[d]) {
                 work->inverse[d] = saved->factor[e];
             } else {
