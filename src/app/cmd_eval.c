@@ -15,6 +15,7 @@
 #include "config/experiment_keys.h"
 #include "control/controller.h"
 #include "eval/eval.h"
+#include "mild/batch.h"
 
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
 
@@ -28,7 +29,9 @@ typedef struct {
     EvalDef eval;
     TaskDef task;
     TerrainDef terrain;
+    TrainDef train; /* what steps the robots, and where */
     GroundsDef finish;
+    Scene scenes[CLI_LIST_MAX]; /* of the batch engine */
     EvalRow rows[ROWS_MAX];
     int row_count;
 } Eval;
@@ -93,6 +96,65 @@ static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildMap **
     return status;
 }
 
+/* Prints a row and counts it. */
+static void take_row(Eval *e, FILE *table) {
+    char line[256];
+    eval_print_row(&e->rows[e->row_count++], line, sizeof line);
+    fprintf(table, "%s\n", line);
+    fflush(table);
+}
+
+/* Ground after ground, speed after speed, by MuJoCo. */
+static MildStatus evaluate_rows(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                                FILE *table, MildError *error) {
+    MildStatus status = MILD_OK;
+    for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
+        Scene scene;
+        MildMap *map;
+        status = make_scene(e, e->grounds.name[g], &scene, &map, error);
+        for (int s = 0; status == MILD_OK && s < e->speeds.count; s++) {
+            e->eval.speed = e->speeds.value[s];
+            status = eval_run(&e->task, robot, pool, controller, &scene, &e->eval,
+                              &e->rows[e->row_count], error);
+            if (status == MILD_OK) {
+                take_row(e, table);
+            }
+        }
+        mild_map_destroy(map);
+    }
+    return status;
+}
+
+/* All at once, by the batch engine. */
+static MildStatus evaluate_batch(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                                 FILE *table, MildError *error) {
+    const int device = train_device(&e->train);
+    MildMap *map = NULL; /* the same for all, because each has one material */
+    MildStatus status = MILD_OK;
+    for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
+        mild_map_destroy(map);
+        status = make_scene(e, e->grounds.name[g], &e->scenes[g], &map, error);
+    }
+    const EvalBatch batch = {.task = &e->task,
+                             .robot = robot,
+                             .pool = pool,
+                             .controller = controller,
+                             .device = device < 0 ? MILD_BATCH_HOST : device,
+                             .scenes = e->scenes,
+                             .scene_count = e->grounds.count,
+                             .speeds = e->speeds.value,
+                             .speed_count = e->speeds.count,
+                             .eval = e->eval};
+    if (status == MILD_OK) {
+        status = eval_run_batch(&batch, e->rows, error);
+    }
+    mild_map_destroy(map);
+    while (status == MILD_OK && e->row_count < batch.scene_count * batch.speed_count) {
+        take_row(e, table);
+    }
+    return status;
+}
+
 static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                            MildError *error) {
     char line[256];
@@ -102,27 +164,10 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
     }
     eval_print_header(line, sizeof line);
     fprintf(table, "%s\n", line);
-    for (int g = 0; g < e->grounds.count; g++) {
-        Scene scene;
-        MildMap *map;
-        MildStatus status = make_scene(e, e->grounds.name[g], &scene, &map, error);
-        for (int s = 0; status == MILD_OK && s < e->speeds.count; s++) {
-            e->eval.speed = e->speeds.value[s];
-            EvalRow *row = &e->rows[e->row_count];
-            status = eval_run(&e->task, robot, pool, controller, &scene, &e->eval, row, error);
-            if (status == MILD_OK) {
-                e->row_count++;
-                eval_print_row(row, line, sizeof line);
-                fprintf(table, "%s\n", line);
-                fflush(table);
-            }
-        }
-        mild_map_destroy(map);
-        if (status != MILD_OK) {
-            return status;
-        }
-    }
-    return e->json ? write_json(e, robot, error) : MILD_OK;
+    MildStatus status = train_is_batch(&e->train)
+                            ? evaluate_batch(e, robot, pool, controller, table, error)
+                            : evaluate_rows(e, robot, pool, controller, table, error);
+    return status == MILD_OK && e->json ? write_json(e, robot, error) : status;
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an
@@ -136,6 +181,16 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
         mild_map_destroy(map);
     }
     return status;
+}
+
+/* train.robots and train.device. */
+static MildStatus check_place(const Eval *e, MildError *error) {
+    const int device = train_device(&e->train);
+    if (device == -2) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "train.device = %s is none of cpu, cuda, cuda:N",
+                         e->train.device);
+    }
+    return MILD_OK;
 }
 
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
@@ -155,7 +210,9 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     Controller controller = {0};
     if (robot) {
         e->finish = grounds_for_robot(model, robot, &e->task, &e->terrain, args);
+        e->finish.train = &e->train;
         status = check_grounds(e, error);
+        status = status == MILD_OK ? check_place(e, error) : status;
     } else {
         status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
     }
@@ -186,6 +243,7 @@ int cmd_eval(int argc, char **argv) {
     e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
     e->patch = 2.5;
     e->terrain = terrain_def_default();
+    e->train = train_def_default();
     e->speeds = (CliNumbers){1, {0.6}};
     e->grounds.count = 3;
     strcpy(e->grounds.name[0], "rigid");

@@ -12,13 +12,18 @@ typedef struct {
     float *history; /* [rows_max][width] */
 } Learned;
 
+static void learned_act_on(void *self, int rows, const float *history, float *actions) {
+    Learned *learned = self;
+    policy_act(learned->policy, learned->pool, rows, history, actions, NULL, NULL);
+}
+
 static void learned_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
     Learned *learned = self;
     for (int i = 0; i < rows; i++) {
         memcpy(learned->history + (size_t)i * learned->width, task_env_history(envs[i]),
                learned->width * sizeof *learned->history);
     }
-    policy_act(learned->policy, learned->pool, rows, learned->history, actions, NULL, NULL);
+    learned_act_on(self, rows, learned->history, actions);
 }
 
 static void learned_destroy(void *self) {
@@ -64,7 +69,7 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
         return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
     }
     *learned = (Learned){policy, pool, rows_max, (size_t)shape.history, history};
-    *controller = (Controller){learned, "learned", learned_act, learned_destroy};
+    *controller = (Controller){learned, "learned", learned_act, learned_destroy, learned_act_on};
     return MILD_OK;
 }
 

@@ -3,6 +3,7 @@
 #define CROWD_ARRAYS_H
 
 #include "batch/batch.h"
+#include "crowd/trial.h"
 #include "engine/data.h"
 #include "task/ground.h"
 #include "task/task.h"
@@ -71,6 +72,9 @@ typedef struct {
     EngineWork *work;  /* [envs] between the parts of a step */
     CrowdContact contact;
     float *depth; /* [envs][feet] [m] mean depth of the last step */
+    const CrowdTrial *trial; /* [envs] or NULL */
+    double *command;         /* [envs][3] of the trials */
+    CrowdSample *sample;     /* [envs][physics steps] or NULL */
     const CrowdTask *task;
     const EngineModel *model;
 } CrowdArrays;

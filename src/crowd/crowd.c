@@ -13,6 +13,7 @@ struct Crowd {
     CrowdArrays arrays; /* their memory is the device's */
     MildBatch *ground;
     void *block; /* where the arrays are, but for task and model */
+    void *trials; /* where those of trials are */
     Pool *pool;  /* of the host */
     int steps;   /* of physics in a policy step */
     int device;
@@ -29,7 +30,9 @@ static MildStatus check_def(const CrowdDef *def, MildError *error) {
     const char *missing = patches             ? "randomize.patch_share above 0"
                           : task->print_tiles ? "terrain.memory"
                           : !task->newton     ? "task.newton = 0"
-                                              : NULL;
+                          : def->trial && task->map && mild_map_label_count(task->map) > 1
+                              ? "terrain.patches"
+                              : NULL;
     return status == MILD_OK && missing
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
                            "%s is not there on a device yet; train.robots = mujoco has it", missing)
@@ -117,6 +120,20 @@ static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *err
     return crowd->block ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
+/* Trials and their commands. */
+static MildStatus copy_trials(Crowd *crowd, const CrowdDef *def, MildError *error) {
+    CrowdArrays *all = &crowd->arrays;
+    const size_t envs = (size_t)def->envs, commands = 3 * envs * sizeof *all->command;
+    crowd->trials = take(crowd, commands + envs * sizeof *all->trial, error);
+    if (!crowd->trials) {
+        return MILD_ERROR_MEMORY;
+    }
+    CrowdTrial *trial = (void *)((char *)crowd->trials + commands);
+    all->command = crowd->trials;
+    all->trial = trial;
+    return batch_copy(crowd->device, trial, def->trial, envs * sizeof *trial, error);
+}
+
 static MildStatus copy_envs(Crowd *crowd, const CrowdDef *def, MildError *error) {
     CrowdArrays *all = &crowd->arrays;
     char *envs = aligned_alloc(64, (size_t)all->envs * all->stride);
@@ -125,7 +142,8 @@ static MildStatus copy_envs(Crowd *crowd, const CrowdDef *def, MildError *error)
     }
     for (int i = 0; i < all->envs; i++) {
         task_env_init_head((TaskEnv *)(void *)(envs + (size_t)i * all->stride), def->task,
-                           def->robot, def->seed, def->first + (uint32_t)i);
+                           def->robot, def->seed,
+                           def->trial ? def->trial[i].stream : def->first + (uint32_t)i);
     }
     MildStatus status =
         batch_copy(crowd->device, all->env, envs, (size_t)all->envs * all->stride, error);
@@ -202,6 +220,7 @@ static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGround
     MildStatus status = open_ground(crowd, def, grounds, error);
     status =
         status == MILD_OK ? take_arrays(crowd, shape.feet, labels_of(def->task), error) : status;
+    status = status == MILD_OK && def->trial ? copy_trials(crowd, def, error) : status;
     status = status == MILD_OK ? copy_envs(crowd, def, error) : status;
     status = status == MILD_OK ? copy_task(crowd, def, grounds, error) : status;
     return status == MILD_OK ? copy_model(crowd, def, error) : status;
@@ -211,8 +230,11 @@ Crowd *crowd_create(const CrowdDef *def, MildError *error) {
     if (check_def(def, error) != MILD_OK) {
         return NULL;
     }
-    TaskGrounds *grounds =
-        task_grounds_create(def->task, def->robot, def->grounds, def->seed, def->pool, error);
+    TaskGrounds *drawn =
+        def->chosen ? NULL
+                    : task_grounds_create(def->task, def->robot, def->grounds, def->seed, def->pool,
+                                          error);
+    const TaskGrounds *grounds = def->chosen ? def->chosen : drawn;
     Crowd *crowd = grounds ? calloc(1, sizeof *crowd) : NULL;
     if (grounds && !crowd) {
         mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
@@ -221,7 +243,7 @@ Crowd *crowd_create(const CrowdDef *def, MildError *error) {
         crowd_destroy(crowd);
         crowd = NULL;
     }
-    task_grounds_destroy(grounds);
+    task_grounds_destroy(drawn);
     return crowd;
 }
 
@@ -237,6 +259,7 @@ void crowd_destroy(Crowd *crowd) {
         }
     }
     batch_free(crowd->device, crowd->block);
+    batch_free(crowd->device, crowd->trials);
     batch_free(crowd->device, (void *)all->task);
     batch_free(crowd->device, (void *)all->model);
     mild_batch_destroy(crowd->ground);
@@ -272,6 +295,17 @@ static void part_piece(void *context, int piece, int thread) {
     const Call *call = context;
     (void)thread;
     crowd_host_part(&call->crowd->arrays, &call->step, call->part, piece);
+}
+
+static void watch_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    crowd_host_watch(&call->crowd->arrays, call->part, piece);
+}
+
+static void tell_piece(void *context, int piece, int thread) {
+    (void)thread;
+    crowd_host_tell(&((const Call *)context)->crowd->arrays, piece);
 }
 
 static void end_piece(void *context, int piece, int thread) {
@@ -314,6 +348,15 @@ MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildErr
     return finish(crowd, &call, stream, error);
 }
 
+static MildStatus watch(const Crowd *crowd, Call *call, void *stream, MildError *error) {
+    const CrowdArrays *all = &crowd->arrays;
+    if (crowd->device != MILD_BATCH_HOST) {
+        return checked(crowd_device_watch(all, call->part, stream), error);
+    }
+    pool_run(crowd->pool, all->envs, watch_piece, call);
+    return MILD_OK;
+}
+
 /* The physics steps of a policy step: parts with the ground between them. */
 static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, MildError *error) {
     const CrowdArrays *all = &crowd->arrays;
@@ -336,6 +379,9 @@ static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, Mil
             status = checked(crowd_device_part(all, &call->step, call->part, stream), error);
         } else if (status == MILD_OK) {
             pool_run(crowd->pool, all->envs, part_piece, call);
+        }
+        if (status == MILD_OK && all->sample) {
+            status = watch(crowd, call, stream, error);
         }
     }
     return status;
@@ -414,6 +460,28 @@ MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
     MildStatus status =
         batch_copy(crowd->device, all->kept, kept, (size_t)all->envs * sizeof *kept, error);
     return status == MILD_OK ? move_kept(crowd, 1, error) : status;
+}
+
+MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error) {
+    const CrowdArrays *all = &crowd->arrays;
+    Call call = {crowd, {0}, 0};
+    MildStatus status = batch_copy(crowd->device, all->command, command,
+                                   3 * (size_t)all->envs * sizeof *command, error);
+    if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
+        return checked(crowd_device_tell(all, NULL), error);
+    }
+    if (status == MILD_OK) {
+        pool_run(crowd->pool, all->envs, tell_piece, &call);
+    }
+    return status;
+}
+
+void crowd_watch(Crowd *crowd, CrowdSample *sample) {
+    crowd->arrays.sample = sample;
+}
+
+int crowd_samples(const Crowd *crowd) {
+    return crowd->steps;
 }
 
 size_t crowd_bytes(const Crowd *crowd) {

@@ -85,6 +85,23 @@ static __global__ void __launch_bounds__(WARP_THREADS)
     }
 }
 
+static __global__ void __launch_bounds__(WARP_THREADS)
+    watch(const __grid_constant__ CrowdArrays all, int k) {
+    extern __shared__ __align__(16) Real shared[];
+    const long robot = warp_robot();
+    if (robot < all.envs) {
+        crowd_watch_part(&all, robot, k, (CrowdPlace *)shared + threadIdx.x / LANES);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    tell(const __grid_constant__ CrowdArrays all) {
+    const long robot = thread_robot();
+    if (robot < all.envs) {
+        crowd_tell(&all, robot);
+    }
+}
+
 /* The order in which the robots are stepped, by one block: a warp on rigid ground takes other paths
  * than one on soft ground, so that a block has but one kind. */
 static __global__ void __launch_bounds__(ORDER_THREADS)
@@ -159,6 +176,7 @@ extern "C" const char *crowd_device_fits(const EngineTree *tree) {
     }
     cudaFuncSetAttribute(part, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
+    cudaFuncSetAttribute(watch, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     return launched();
 }
 
@@ -190,6 +208,16 @@ extern "C" const char *crowd_device_first(const CrowdArrays *all, const CrowdSte
 
 extern "C" const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream) {
     keep<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
+    return launched();
+}
+
+extern "C" const char *crowd_device_watch(const CrowdArrays *all, int k, void *stream) {
+    watch<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all, k);
+    return launched();
+}
+
+extern "C" const char *crowd_device_tell(const CrowdArrays *all, void *stream) {
+    tell<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 

@@ -28,6 +28,15 @@ void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long 
     crowd_part(all, call, robot, k, &place);
 }
 
+void crowd_host_watch(const CrowdArrays *all, int k, long robot) {
+    CrowdPlace place;
+    crowd_watch_part(all, robot, k, &place);
+}
+
+void crowd_host_tell(const CrowdArrays *all, long robot) {
+    crowd_tell(all, robot);
+}
+
 void crowd_host_end(const CrowdArrays *all, const CrowdStep *call, long robot) {
     crowd_end(all, call, robot);
 }

@@ -4,19 +4,21 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#define GRAVITY 9.81
 #define HEADING_GAIN 1.0  /* [1/s] */
 #define HEADING_LIMIT 0.5 /* [rad/s] */
 
-void eval_command(TaskEnv *env, double speed, double sideways) {
-    const double *q = env->robot.qpos + 3;
+void eval_direct(const double q[4], double speed, double sideways, double command[3]) {
     double yaw = atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
+    command[0] = speed;
+    command[1] = sideways;
+    command[2] = speed == 0 && sideways == 0
+                     ? 0
+                     : fmin(fmax(-HEADING_GAIN * yaw, -HEADING_LIMIT), HEADING_LIMIT);
+}
+
+void eval_command(TaskEnv *env, double speed, double sideways) {
     env->command_frozen = 1;
-    env->command[0] = speed;
-    env->command[1] = sideways;
-    env->command[2] = speed == 0 && sideways == 0
-                          ? 0
-                          : fmin(fmax(-HEADING_GAIN * yaw, -HEADING_LIMIT), HEADING_LIMIT);
+    eval_direct(env->robot.qpos + 3, speed, sideways, env->command);
 }
 
 typedef struct {
@@ -110,7 +112,7 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
             pool_run(pool, eval->trials, step_trial, &t);
         }
         eval_summarise(row, scene->name, eval, t.measure, t.over,
-                       robot_total_mass(robot) * GRAVITY);
+                       robot_total_mass(robot) * EVAL_GRAVITY);
     }
     free_trials(&t, eval->trials, pool_threads(pool));
     return status;

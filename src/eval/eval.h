@@ -2,6 +2,8 @@
 #ifndef MILD_EVAL_H
 #define MILD_EVAL_H
 
+#define EVAL_GRAVITY 9.81 /* [m/s^2] of a robot's weight */
+
 #include "base/pool.h"
 #include "control/controller.h"
 #include "eval/measure.h"
@@ -43,11 +45,34 @@ typedef struct {
 MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller,
                     const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error);
 
+/* The same for all rows at once, by the batch engine. */
+typedef struct {
+    const TaskDef *task;
+    const Robot *robot;
+    Pool *pool;
+    Controller *controller; /* one that acts on histories alone */
+    int device;             /* a CUDA device, or MILD_BATCH_HOST */
+    const Scene *scenes;    /* [scene_count] of one material each, on the map of `task` */
+    int scene_count;
+    const double *speeds; /* [m/s] [speed_count] of each scene, in the place of eval.speed */
+    int speed_count;
+    EvalDef eval;
+} EvalBatch;
+
+/* Robots of a batch, at most. */
+#define EVAL_ROBOTS_MAX 65536
+/* rows: [scene_count][speed_count]. The same measures; the same random numbers, but for the
+ * latencies. Fails for what the batch engine has not, and for more robots. */
+MildStatus eval_run_batch(const EvalBatch *batch, EvalRow *rows, MildError *error);
+
 /* Finishes the measures of the trials and summarises them in a row. measures, fallen (bool):
  * [eval->trials]. weight: [N] of the robot. */
 void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
                     const uint8_t *fallen, double weight);
 
+/* [m/s, m/s, rad/s] The command of a robot with the orientation `quaternion` (w x y z); see
+ * eval_command. */
+void eval_direct(const double quaternion[4], double speed, double sideways, double command[3]);
 /* Heading hold of eval and play: sets a command that turns the robot back to world x. speed,
  * sideways [m/s]: forward and to the left. If both are 0 the robot stands, without heading hold.
  * Writes env->command and freezes it. */

@@ -143,7 +143,7 @@ static EvalRow run(Zero *zero, const char *ground, EvalDef eval, int threads) {
     TaskDef def = task_def_default();
     task_def_make_nominal(&def);
     *zero = (Zero){0};
-    Controller controller = {zero, "zero", zero_act, zero_destroy};
+    Controller controller = {zero, "zero", zero_act, zero_destroy, NULL};
     Pool *pool = pool_create(threads);
     Scene scene;
     EvalRow row;
