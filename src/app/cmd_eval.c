@@ -127,7 +127,7 @@ static MildStatus evaluate_rows(Eval *e, const Robot *robot, Pool *pool, Control
 
 /* All at once, by the batch engine. */
 static MildStatus evaluate_batch(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                                 FILE *table, MildError *error) {
+                                 MildError *error) {
     const int device = train_device(&e->train);
     MildMap *map = NULL; /* the same for all, because each has one material */
     MildStatus status = MILD_OK;
@@ -149,24 +149,33 @@ static MildStatus evaluate_batch(Eval *e, const Robot *robot, Pool *pool, Contro
         status = eval_run_batch(&batch, e->rows, error);
     }
     mild_map_destroy(map);
-    while (status == MILD_OK && e->row_count < batch.scene_count * batch.speed_count) {
-        take_row(e, table);
-    }
     return status;
 }
 
-static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                           MildError *error) {
+static void print_header(const Eval *e, FILE *table) {
     char line[256];
-    FILE *table = e->json && strcmp(e->json, "-") == 0 ? stderr : stdout;
     if (e->finish.model != MILD_MODEL_MILD) {
         fprintf(table, "ground model %s\n", mild_model_names[e->finish.model]);
     }
     eval_print_header(line, sizeof line);
     fprintf(table, "%s\n", line);
-    MildStatus status = train_is_batch(&e->train)
-                            ? evaluate_batch(e, robot, pool, controller, table, error)
-                            : evaluate_rows(e, robot, pool, controller, table, error);
+}
+
+static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                           MildError *error) {
+    FILE *table = e->json && strcmp(e->json, "-") == 0 ? stderr : stdout;
+    const int batch = train_is_batch(&e->train);
+    MildStatus status = batch ? evaluate_batch(e, robot, pool, controller, error) : MILD_OK;
+    if (status != MILD_OK) {
+        return status;
+    }
+    print_header(e, table);
+    if (!batch) {
+        status = evaluate_rows(e, robot, pool, controller, table, error);
+    }
+    while (batch && e->row_count < e->grounds.count * e->speeds.count) {
+        take_row(e, table);
+    }
     return status == MILD_OK && e->json ? write_json(e, robot, error) : status;
 }
 
@@ -183,11 +192,16 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
     return status;
 }
 
-/* train.robots and train.device. */
 static MildStatus check_place(const Eval *e, MildError *error) {
     const int device = train_device(&e->train);
-    if (device == -2) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "train.device = %s is none of cpu, cuda, cuda:N",
+    if (device < -1) {
+        return mild_fail(error, MILD_ERROR_RANGE, "train.device = %s: neither cpu, cuda nor cuda:N",
+                         e->train.device);
+    }
+    if (device >= 0 && !train_is_batch(&e->train)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "train.device = %s: MuJoCo runs on the processor; leave it out, or give "
+                         "--train.robots=batch",
                          e->train.device);
     }
     return MILD_OK;
@@ -294,11 +308,13 @@ int cmd_eval(int argc, char **argv) {
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "
-                     "--terrain.kind=waves --terrain.memory=true",
+                     "--terrain.kind=waves --terrain.memory=true; --train.robots=batch runs all "
+                     "rows at once in the batch engine, on --train.device=cpu or cuda:N",
         .examples =
             "  mild eval --ground rigid,foam45,sand_loose --speed 0.3,0.6\n"
             "  mild eval --ground sand_loose --terrain.kind=rough --terrain.amplitude=0.02\n"
-            "  mild eval --robot go1 --controller stand --speed 0\n",
+            "  mild eval --robot go1 --controller stand --speed 0\n"
+            "  mild eval --train.device=cuda --trials 1000\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     int code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;

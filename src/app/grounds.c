@@ -80,8 +80,8 @@ static MildStatus overlay(const GroundsDef *def, MildMaterial *material, MildErr
         sections[count++] = terrain_section(def->terrain);
     }
     if (def->train) {
-        sections[count++] = (ConfigSection){"train", train_place_fields, train_place_field_count,
-                                            def->train};
+        sections[count++] =
+            (ConfigSection){"train", train_place_fields, train_place_field_count, def->train};
     }
     return config_overrides(sections, count, def->args->overrides, def->args->override_count,
                             error);

@@ -71,7 +71,7 @@ typedef struct {
     double *tally;     /* [TALLY_NUMBERS] sums over the environments */
     EngineWork *work;  /* [envs] between the parts of a step */
     CrowdContact contact;
-    float *depth; /* [envs][feet] [m] mean depth of the last step */
+    float *depth;            /* [envs][feet] [m] mean depth of the last step */
     const CrowdTrial *trial; /* [envs] or NULL */
     double *command;         /* [envs][3] of the trials */
     CrowdSample *sample;     /* [envs][physics steps] or NULL */

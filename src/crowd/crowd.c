@@ -12,10 +12,10 @@ _Static_assert(CROWD_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fi
 struct Crowd {
     CrowdArrays arrays; /* their memory is the device's */
     MildBatch *ground;
-    void *block; /* where the arrays are, but for task and model */
+    void *block;  /* where the arrays are, but for task and model */
     void *trials; /* where those of trials are */
-    Pool *pool;  /* of the host */
-    int steps;   /* of physics in a policy step */
+    Pool *pool;   /* of the host */
+    int steps;    /* of physics in a policy step */
     int device;
     size_t bytes; /* of the device, without the ground */
 };
@@ -230,10 +230,9 @@ Crowd *crowd_create(const CrowdDef *def, MildError *error) {
     if (check_def(def, error) != MILD_OK) {
         return NULL;
     }
-    TaskGrounds *drawn =
-        def->chosen ? NULL
-                    : task_grounds_create(def->task, def->robot, def->grounds, def->seed, def->pool,
-                                          error);
+    TaskGrounds *drawn = def->chosen ? NULL
+                                     : task_grounds_create(def->task, def->robot, def->grounds,
+                                                           def->seed, def->pool, error);
     const TaskGrounds *grounds = def->chosen ? def->chosen : drawn;
     Crowd *crowd = grounds ? calloc(1, sizeof *crowd) : NULL;
     if (grounds && !crowd) {

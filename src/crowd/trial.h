@@ -17,10 +17,10 @@ typedef struct {
 
 /* A physics step, for the measures of an evaluation. */
 typedef struct {
-    int valid;                     /* bool: the step was made; 0 from a divergence on */
-    float base[3];                 /* [m] world */
-    float above;                   /* [m] height of the base above the ground under it */
-    float quaternion[4];           /* [-] base -> world, w x y z */
+    int valid;                      /* bool: the step was made; 0 from a divergence on */
+    float base[3];                  /* [m] world */
+    float above;                    /* [m] height of the base above the ground under it */
+    float quaternion[4];            /* [-] base -> world, w x y z */
     float torque[ROBOT_JOINTS_MAX]; /* [N m] */
     float speed[ROBOT_JOINTS_MAX];  /* [rad/s] after the step */
     struct {

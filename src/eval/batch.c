@@ -35,29 +35,44 @@ typedef struct {
 
 /* ---- creation ---- */
 
+/* A ground that a row can be on. */
+static MildStatus check_scene(const Scene *scene, MildError *error) {
+    const MildMaterial *material = &scene->terrain.materials[0];
+    MaterialNumbers numbers;
+    if (scene->terrain.material_count > 1) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--ground %s: the batch engine has no courses; give "
+                         "--train.robots=mujoco, or single grounds",
+                         scene->name);
+    }
+    if (!scene->rigid && material_numbers(material, 1, 0, &numbers, NULL) != MILD_OK) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--ground %s: the batch engine has no model %s; give "
+                         "--train.robots=mujoco, or another --model",
+                         scene->name, mild_model_names[material->model]);
+    }
+    return MILD_OK;
+}
+
 static MildStatus check(const EvalBatch *def, MildError *error) {
-    const long long robots =
-        (long long)def->scene_count * def->speed_count * (long long)def->eval.trials;
+    const int rows = def->scene_count * def->speed_count;
     if (!def->controller->act_on) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "controller %s reads what the batch engine does not hand over; give "
+                         "--controller %s reads what the batch engine does not hand over; give "
                          "--train.robots=mujoco",
                          def->controller->name);
     }
-    if (robots > EVAL_ROBOTS_MAX) {
+    if (def->eval.trials > EVAL_ROBOTS_MAX / rows) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "%d rows of --trials %d are more than %d robots at once; ask for fewer",
-                         def->scene_count * def->speed_count, def->eval.trials, EVAL_ROBOTS_MAX);
+                         "--trials %d of %d rows are more than %d robots at once; ask for fewer, "
+                         "or give --train.robots=mujoco",
+                         def->eval.trials, rows, EVAL_ROBOTS_MAX);
     }
-    for (int i = 0; i < def->scene_count; i++) {
-        if (def->scenes[i].terrain.material_count > 1) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT,
-                             "--ground %s: the batch engine has no courses; give "
-                             "--train.robots=mujoco",
-                             def->scenes[i].name);
-        }
+    MildStatus status = MILD_OK;
+    for (int i = 0; status == MILD_OK && i < def->scene_count; i++) {
+        status = check_scene(&def->scenes[i], error);
     }
-    return MILD_OK;
+    return status;
 }
 
 static TaskGround *make_grounds(const EvalBatch *def) {
@@ -65,8 +80,7 @@ static TaskGround *make_grounds(const EvalBatch *def) {
     for (int i = 0; ground && i < def->scene_count; i++) {
         const Scene *scene = &def->scenes[i];
         ground[i].material = scene->rigid ? mild_material_default() : scene->terrain.materials[0];
-        ground[i].depth =
-            scene->rigid ? 0 : task_standing_depth(def->robot, &ground[i].material);
+        ground[i].depth = scene->rigid ? 0 : task_standing_depth(def->robot, &ground[i].material);
     }
     return ground;
 }
@@ -131,8 +145,7 @@ static MildStatus open_arrays(Batch *b, MildError *error) {
     }
     b->device_block = batch_alloc(b->def->device, b->bytes, error);
     if (b->device_block) {
-        b->device_action =
-            batch_alloc(b->def->device, trials * joints * sizeof *b->action, error);
+        b->device_action = batch_alloc(b->def->device, trials * joints * sizeof *b->action, error);
     }
     if (!b->device_action) {
         return MILD_ERROR_MEMORY;
