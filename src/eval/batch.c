@@ -168,8 +168,11 @@ static void close_batch(Batch *b) {
 
 /* ---- trials ---- */
 
-static double speed_of(const EvalBatch *def, int trial) {
-    return def->speeds[trial / def->eval.trials % def->speed_count];
+/* The command of a trial in its next policy step. */
+static void direct(Batch *b, int trial, const double *quaternion) {
+    EvalDef eval = b->def->eval;
+    eval.speed = b->def->speeds[trial / eval.trials % b->def->speed_count];
+    eval_direct(&eval, b->measure[trial].time, quaternion, b->command + 3 * (size_t)trial);
 }
 
 static void start_trial(void *context, int trial, int thread) {
@@ -178,17 +181,23 @@ static void start_trial(void *context, int trial, int thread) {
     (void)thread;
     measure_start(&b->measure[trial], b->task.physics_dt);
     b->measure[trial].steady_end = b->def->eval.stop;
-    eval_direct(level, speed_of(b->def, trial), b->def->eval.sideways, b->command + 3 * trial);
+    direct(b, trial, level);
 }
 
-static void take_sample(Measure *measure, const CrowdSample *from, const TaskShape *shape) {
+/* quaternion: written, the orientation after the step. */
+static void take_sample(Measure *measure, const CrowdSample *from, const TaskShape *shape,
+                        double quaternion[4]) {
     double torque[ROBOT_JOINTS_MAX], speed[ROBOT_JOINTS_MAX];
+    for (int i = 0; i < 4; i++) {
+        quaternion[i] = (double)from->quaternion[i];
+    }
     MeasureSample sample = {.torque = torque,
                             .joint_speed = speed,
                             .joints = shape->joints,
                             .feet = shape->feet,
                             .base = {(double)from->base[0], (double)from->base[1]},
-                            .base_height = (double)from->above};
+                            .base_height = (double)from->above,
+                            .yaw = measure_yaw(quaternion)};
     for (int i = 0; i < shape->joints; i++) {
         torque[i] = (double)from->torque[i];
         speed[i] = (double)from->speed[i];
@@ -211,20 +220,14 @@ static void take_trial(void *context, int trial, int thread) {
     if (b->over[trial]) {
         return;
     }
-    const EvalDef *eval = &b->def->eval;
     const TaskShape shape = task_shape(b->def->robot);
     const CrowdSample *sample = b->host.sample + (size_t)trial * (size_t)b->samples;
     double quaternion[4] = {1, 0, 0, 0};
     for (int k = 0; k < b->samples && sample[k].valid; k++) {
-        take_sample(&b->measure[trial], &sample[k], &shape);
-        for (int i = 0; i < 4; i++) {
-            quaternion[i] = (double)sample[k].quaternion[i];
-        }
+        take_sample(&b->measure[trial], &sample[k], &shape, quaternion);
     }
     b->over[trial] = b->host.done[trial] && !b->host.timeout[trial];
-    const int stopped = eval->stop > 0 && b->measure[trial].time >= eval->stop;
-    eval_direct(quaternion, stopped ? 0 : speed_of(b->def, trial), stopped ? 0 : eval->sideways,
-                b->command + 3 * trial);
+    direct(b, trial, quaternion);
 }
 
 static MildStatus start(Batch *b, MildError *error) {

@@ -9,26 +9,41 @@
 #include "eval/measure.h"
 #include "eval/scene.h"
 
+/* Called after each decision of the controller for a trial that is not over, `trial` by `trial`, at
+ * `time` [s]. */
+typedef struct {
+    void (*decided)(void *context, const Scene *scene, double speed, int trial, double time,
+                    const TaskEnv *env);
+    void *context;
+} EvalWatch;
+
 typedef struct {
     double speed;    /* [m/s] commanded, forward */
     double sideways; /* [m/s] commanded, to the left */
+    double turn;     /* [rad/s] commanded; 0: the heading is held */
+    double push;     /* [m/s] added to the base in a random direction, every 4 s; by MuJoCo */
     int trials;
     double seconds; /* [s] per trial */
     double stop;    /* [s] when the command becomes 0 and speed measurement ends; 0: never */
     uint64_t seed;  /* trial k uses stream k */
+    const EvalWatch *watch; /* NULL: nobody; by MuJoCo */
 } EvalDef;
 
 /* Means over the trials, SI units. */
 typedef struct {
     char ground[160];
-    double speed;             /* [m/s] commanded, forward */
-    int trials;               /* number of trials */
-    int success;              /* trials without termination */
-    double velocity;          /* [m/s] forward, after the first 2 s, of trials that lasted longer */
-    double velocity_low;      /* [m/s] 95 % interval of the mean over trials: lower end */
-    double velocity_high;     /* [m/s] upper end */
-    double sideways;          /* [m/s] commanded, to the left */
+    double speed;         /* [m/s] commanded, forward */
+    int trials;           /* number of trials */
+    int success;          /* trials without termination */
+    double velocity;      /* [m/s] forward, after the first 2 s, of trials that lasted longer: along
+                        world x, or along the robot's heading when it is told to turn */
+    double velocity_low;  /* [m/s] 95 % interval of the mean over trials: lower end */
+    double velocity_high; /* [m/s] upper end */
+    double sideways;      /* [m/s] commanded, to the left */
     double velocity_sideways; /* [m/s] measured, to the left */
+    double turn;              /* [rad/s] commanded */
+    double velocity_turn;     /* [rad/s] measured */
+    double push;              /* [m/s] */
     double cot;               /* [-] sum |tau qd| / (m g v) */
     double torque_max;        /* [N m] largest over joints and time, mean over trials */
     double clearance;         /* [m] swing apex of the lowest sole point above h0 */
@@ -70,9 +85,9 @@ MildStatus eval_run_batch(const EvalBatch *batch, EvalRow *rows, MildError *erro
 void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
                     const uint8_t *fallen, double weight);
 
-/* [m/s, m/s, rad/s] The command of a robot with the orientation `quaternion` (w x y z); see
- * eval_command. */
-void eval_direct(const double quaternion[4], double speed, double sideways, double command[3]);
+/* [m/s, m/s, rad/s] The command at a time of a trial [s] for a robot with the orientation
+ * `quaternion` (w x y z): that of eval_command, `turn` where it is not 0, and 0 from the stop on. */
+void eval_direct(const EvalDef *eval, double time, const double quaternion[4], double command[3]);
 /* Heading hold of eval and play: sets a command that turns the robot back to world x. speed,
  * sideways [m/s]: forward and to the left. If both are 0 the robot stands, without heading hold.
  * Writes env->command and freezes it. */
