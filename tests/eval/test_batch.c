@@ -11,8 +11,8 @@
 
 #include <cmocka.h>
 
+#include "batch/batch.h"
 #include "eval/eval.h"
-#include "mild/batch.h"
 #include "sa01.h"
 
 enum { ROWS = 4 };
@@ -84,15 +84,15 @@ static int scenes_of(const char *const *names, Scene *scene) {
     return count;
 }
 
-static MildStatus run_batch(Controller *controller, Pool *pool, const char *const *names,
-                            const double *speeds, int speed_count, EvalDef eval, EvalRow *rows,
-                            MildError *error) {
+static MildStatus run_on(int device, Controller *controller, Pool *pool, const char *const *names,
+                         const double *speeds, int speed_count, EvalDef eval, EvalRow *rows,
+                         MildError *error) {
     Scene scene[ROWS];
     const EvalBatch batch = {.task = &def,
                              .robot = robot,
                              .pool = pool,
                              .controller = controller,
-                             .device = MILD_BATCH_HOST,
+                             .device = device,
                              .scenes = scene,
                              .scene_count = scenes_of(names, scene),
                              .speeds = speeds,
@@ -100,6 +100,12 @@ static MildStatus run_batch(Controller *controller, Pool *pool, const char *cons
                              .eval = eval};
     memset(rows, 0xff, ROWS * sizeof *rows);
     return eval_run_batch(&batch, rows, error);
+}
+
+static MildStatus run_batch(Controller *controller, Pool *pool, const char *const *names,
+                            const double *speeds, int speed_count, EvalDef eval, EvalRow *rows,
+                            MildError *error) {
+    return run_on(MILD_BATCH_HOST, controller, pool, names, speeds, speed_count, eval, rows, error);
 }
 
 static void near(const char *what, const EvalRow *row, double is, double wanted, double within) {
@@ -110,17 +116,18 @@ static void near(const char *what, const EvalRow *row, double is, double wanted,
 }
 
 /* All rows of a batch against MuJoCo's, each measure within what six trials scatter. */
-static void compare_rows(const char *const *names, const double *speeds, int speed_count) {
+static void compare_rows(const char *const *names, const double *speeds, int speed_count,
+                         double turn, int device) {
     MildError error = {0};
-    EvalDef eval = {.trials = 6, .seconds = 6, .seed = 1};
+    EvalDef eval = {.turn = turn, .trials = 6, .seconds = 6, .seed = 1};
     Pool *pool = pool_create(2);
     Controller controller = walker(pool, eval.trials);
     EvalRow rows[ROWS], own;
     Scene scene[ROWS];
     char line[256];
     const int count = scenes_of(names, scene) * speed_count;
-    assert_int_equal(run_batch(&controller, pool, names, speeds, speed_count, eval, rows, &error),
-                     MILD_OK);
+    assert_int_equal(
+        run_on(device, &controller, pool, names, speeds, speed_count, eval, rows, &error), MILD_OK);
     for (int i = 0; i < count; i++) {
         const EvalRow *row = &rows[i];
         eval.speed = speeds[i % speed_count];
@@ -142,6 +149,7 @@ static void compare_rows(const char *const *names, const double *speeds, int spe
         near("drift", row, row->drift / own.drift, 1, 0.2);
         near("energy", row, row->energy / own.energy, 1, 0.04);
         near("base_oscillation", row, row->base_oscillation / own.base_oscillation, 1, 0.1);
+        near("turning", row, row->velocity_turn, own.velocity_turn, 0.02);
         near("seconds", row, row->seconds, own.seconds, 1e-9);
     }
     controller_destroy(&controller);
@@ -152,7 +160,7 @@ static void rows_agree_with_mujoco(void **state) {
     (void)state;
     static const char *const names[] = {"rigid", "foam45", "sand_loose", NULL};
     static const double speed = 0.6;
-    compare_rows(names, &speed, 1);
+    compare_rows(names, &speed, 1, 0, MILD_BATCH_HOST);
 }
 
 /* The same rows at two speeds, on waves. */
@@ -166,9 +174,29 @@ static void rows_agree_on_a_map(void **state) {
     MildMap *map = mild_map_create(&waves, NULL);
     assert_non_null(map);
     def.map = map;
-    compare_rows(names, speeds, 2);
+    compare_rows(names, speeds, 2, 0, MILD_BATCH_HOST);
     def.map = NULL;
     mild_map_destroy(map);
+}
+
+static void turning_rows_agree(void **state) {
+    (void)state;
+    static const char *const names[] = {"foam60", NULL};
+    static const double speed = 0.4;
+    compare_rows(names, &speed, 1, 0.5, MILD_BATCH_HOST);
+}
+
+/* By a GPU, where there is one. */
+static void rows_of_a_device_agree(void **state) {
+    (void)state;
+    static const char *const names[] = {"rigid", "foam45", "sand_loose", NULL};
+    static const double speed = 0.6;
+    MildError error = {0};
+    if (device_open(0, &error) != MILD_OK) {
+        skip();
+    }
+    compare_rows(names, &speed, 1, 0, 0);
+    compare_rows(names, &speed, 1, 0.5, 0);
 }
 
 /* The bits of a row depend neither on threads nor on the rows beside it. */
@@ -275,6 +303,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_agree_with_mujoco),
         cmocka_unit_test(rows_agree_on_a_map),
+        cmocka_unit_test(turning_rows_agree),
+        cmocka_unit_test(rows_of_a_device_agree),
         cmocka_unit_test(rows_repeat),
         cmocka_unit_test(falls_are_counted),
         cmocka_unit_test(commands_arrive),
