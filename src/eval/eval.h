@@ -86,7 +86,8 @@ void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measu
                     const uint8_t *fallen, double weight);
 
 /* [m/s, m/s, rad/s] The command at a time of a trial [s] for a robot with the orientation
- * `quaternion` (w x y z): that of eval_command, `turn` where it is not 0, and 0 from the stop on. */
+ * `quaternion` (w x y z): that of eval_command, with `turn` where it is not 0, and none from the
+ * stop on. */
 void eval_direct(const EvalDef *eval, double time, const double quaternion[4], double command[3]);
 /* Heading hold of eval and play: sets a command that turns the robot back to world x. speed,
  * sideways [m/s]: forward and to the left. If both are 0 the robot stands, without heading hold.
