@@ -78,7 +78,7 @@ typedef struct {
 #define EVAL_ROBOTS_MAX 65536
 /* rows: [scene_count][speed_count]. The same measures; the same random numbers, but for the
  * latencies. Fails for what the batch engine has not, and for more robots. */
-MildStatus eval_run_batch(const EvalBatch *batch, EvalRow *rows, MildError *error);
+MildStatus eval_run_batch(const EvalBatch *def, EvalRow *rows, MildError *error);
 
 /* Finishes the measures of the trials and summarises them in a row. measures, fallen (bool):
  * [eval->trials]. weight: [N] of the robot. */
