@@ -296,12 +296,6 @@ static void part_piece(void *context, int piece, int thread) {
     crowd_host_part(&call->crowd->arrays, &call->step, call->part, piece);
 }
 
-static void watch_piece(void *context, int piece, int thread) {
-    const Call *call = context;
-    (void)thread;
-    crowd_host_watch(&call->crowd->arrays, call->part, piece);
-}
-
 static void tell_piece(void *context, int piece, int thread) {
     (void)thread;
     crowd_host_tell(&((const Call *)context)->crowd->arrays, piece);
@@ -347,15 +341,6 @@ MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildErr
     return finish(crowd, &call, stream, error);
 }
 
-static MildStatus watch(const Crowd *crowd, Call *call, void *stream, MildError *error) {
-    const CrowdArrays *all = &crowd->arrays;
-    if (crowd->device != MILD_BATCH_HOST) {
-        return checked(crowd_device_watch(all, call->part, stream), error);
-    }
-    pool_run(crowd->pool, all->envs, watch_piece, call);
-    return MILD_OK;
-}
-
 /* The physics steps of a policy step: parts with the ground between them. */
 static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, MildError *error) {
     const CrowdArrays *all = &crowd->arrays;
@@ -378,9 +363,6 @@ static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, Mil
             status = checked(crowd_device_part(all, &call->step, call->part, stream), error);
         } else if (status == MILD_OK) {
             pool_run(crowd->pool, all->envs, part_piece, call);
-        }
-        if (status == MILD_OK && all->sample) {
-            status = watch(crowd, call, stream, error);
         }
     }
     return status;

@@ -42,12 +42,14 @@ static int thread_blocks(int envs) {
     return (envs + TASK_ROBOTS - 1) / TASK_ROBOTS;
 }
 
+template <int WATCHED>
 static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
     part(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call, int k) {
     extern __shared__ __align__(16) Real shared[];
     const long place = warp_robot();
     if (place < all.envs) {
-        crowd_part(&all, &call, all.order[place], k, (CrowdPlace *)shared + threadIdx.x / LANES);
+        crowd_part(&all, &call, all.order[place], k, WATCHED,
+                   (CrowdPlace *)shared + threadIdx.x / LANES);
     }
 }
 
@@ -82,15 +84,6 @@ static __global__ void __launch_bounds__(WARP_THREADS)
     if (robot < all.envs) {
         const TaskLane at = {(int)threadIdx.x % LANES, LANES};
         crowd_observe(&all, &call, robot, at);
-    }
-}
-
-static __global__ void __launch_bounds__(WARP_THREADS)
-    watch(const __grid_constant__ CrowdArrays all, int k) {
-    extern __shared__ __align__(16) Real shared[];
-    const long robot = warp_robot();
-    if (robot < all.envs) {
-        crowd_watch_part(&all, robot, k, (CrowdPlace *)shared + threadIdx.x / LANES);
     }
 }
 
@@ -174,9 +167,9 @@ extern "C" const char *crowd_device_fits(const EngineTree *tree) {
                          tree->chain != ENGINE_CHAIN)) {
         return "this build steps robots of another size on a GPU";
     }
-    cudaFuncSetAttribute(part, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
+    cudaFuncSetAttribute(part<0>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
-    cudaFuncSetAttribute(watch, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
+    cudaFuncSetAttribute(part<1>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     return launched();
 }
 
@@ -187,8 +180,10 @@ extern "C" const char *crowd_device_begin(const CrowdArrays *all, void *stream) 
 
 extern "C" const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k,
                                          void *stream) {
-    part<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all, *call,
-                                                                                      k);
+    (all->sample
+         ? part<1>
+         : part<0>)<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(
+        *all, *call, k);
     return launched();
 }
 
@@ -208,11 +203,6 @@ extern "C" const char *crowd_device_first(const CrowdArrays *all, const CrowdSte
 
 extern "C" const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream) {
     keep<<<thread_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
-    return launched();
-}
-
-extern "C" const char *crowd_device_watch(const CrowdArrays *all, int k, void *stream) {
-    watch<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all, k);
     return launched();
 }
 

@@ -25,12 +25,7 @@ void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot)
 
 void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long robot) {
     CrowdPlace place;
-    crowd_part(all, call, robot, k, &place);
-}
-
-void crowd_host_watch(const CrowdArrays *all, int k, long robot) {
-    CrowdPlace place;
-    crowd_watch_part(all, robot, k, &place);
+    crowd_part(all, call, robot, k, all->sample != NULL, &place);
 }
 
 void crowd_host_tell(const CrowdArrays *all, long robot) {

@@ -21,8 +21,7 @@ void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long 
 void crowd_host_end(const CrowdArrays *all, const CrowdStep *call, long robot);
 /* Pose of a new episode, and the observation. */
 void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot);
-/* For an evaluation: the samples of part k, and arrays.command to the environment. */
-void crowd_host_watch(const CrowdArrays *all, int k, long robot);
+/* From arrays.command to the environment. */
 void crowd_host_tell(const CrowdArrays *all, long robot);
 /* From the environment to arrays.kept, or back. */
 void crowd_host_keep(const CrowdArrays *all, int back);
@@ -39,7 +38,6 @@ const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call, vo
 const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k, void *stream);
 const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call, void *stream);
 const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream);
-const char *crowd_device_watch(const CrowdArrays *all, int k, void *stream);
 const char *crowd_device_tell(const CrowdArrays *all, void *stream);
 const char *crowd_device_tally(const CrowdArrays *all, void *stream);
 /* [B] of EngineWork in CrowdArrays, which may be compiled for one robot. */

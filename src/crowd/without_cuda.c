@@ -39,13 +39,6 @@ const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream) {
     return none;
 }
 
-const char *crowd_device_watch(const CrowdArrays *all, int k, void *stream) {
-    (void)all;
-    (void)k;
-    (void)stream;
-    return none;
-}
-
 const char *crowd_device_tell(const CrowdArrays *all, void *stream) {
     (void)all;
     (void)stream;
