@@ -14,7 +14,8 @@
 #include "config/config.h"
 #include "config/experiment_keys.h"
 #include "control/controller.h"
-#include "eval/eval.h"
+#include "eval/inside.h"
+#include "mild/batch.h"
 
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
 
@@ -24,11 +25,15 @@ typedef struct {
     CliNames grounds;
     CliNumbers speeds;
     double patch;
+    const char *latent, *ablate; /* NULL: not given */
+    Ablation ablation;
     int threads;
     EvalDef eval;
     TaskDef task;
     TerrainDef terrain;
+    TrainDef train; /* what steps the robots, and where */
     GroundsDef finish;
+    Scene scenes[CLI_LIST_MAX]; /* of the batch engine */
     EvalRow rows[ROWS_MAX];
     int row_count;
 } Eval;
@@ -54,7 +59,10 @@ static cJSON *row_json(const EvalRow *row) {
                   {"sideways", row->sideways},
                   {"velocity_sideways", row->velocity_sideways},
                   {"base_oscillation", row->base_oscillation},
-                  {"seconds", row->seconds}};
+                  {"seconds", row->seconds},
+                  {"turn", row->turn},
+                  {"velocity_turn", row->velocity_turn},
+                  {"push", row->push}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }
@@ -67,6 +75,9 @@ static MildStatus write_json(const Eval *e, const Robot *robot, MildError *error
     int learned = strcmp(e->controller, "learned") == 0;
     cJSON_AddStringToObject(root, learned ? "policy" : "controller",
                             learned ? e->policy : e->controller);
+    if (e->ablate) {
+        cJSON_AddStringToObject(root, "ablate", e->ablate);
+    }
     cJSON_AddStringToObject(root, "robot", robot_name(robot));
     cJSON_AddStringToObject(root, "model", mild_model_names[e->finish.model]);
     cJSON_AddStringToObject(root, "version", build_version());
@@ -93,36 +104,148 @@ static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildMap **
     return status;
 }
 
-static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                           MildError *error) {
+/* Prints a row and counts it. */
+static void take_row(Eval *e, FILE *table) {
     char line[256];
-    FILE *table = e->json && strcmp(e->json, "-") == 0 ? stderr : stdout;
+    eval_print_row(&e->rows[e->row_count++], line, sizeof line);
+    fprintf(table, "%s\n", line);
+    fflush(table);
+}
+
+/* Ground after ground, speed after speed, by MuJoCo. table: NULL: rows are not kept. */
+static MildStatus evaluate_rows(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                                FILE *table, MildError *error) {
+    MildStatus status = MILD_OK;
+    for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
+        Scene scene;
+        MildMap *map;
+        status = make_scene(e, e->grounds.name[g], &scene, &map, error);
+        for (int s = 0; status == MILD_OK && s < e->speeds.count; s++) {
+            e->eval.speed = e->speeds.value[s];
+            status = eval_run(&e->task, robot, pool, controller, &scene, &e->eval,
+                              &e->rows[e->row_count], error);
+            if (status == MILD_OK && table) {
+                take_row(e, table);
+            }
+        }
+        mild_map_destroy(map);
+    }
+    return status;
+}
+
+/* The means of all trials with the whole controller take the place of a part of it. */
+static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                         InsideLog *log, MildError *error) {
+    const int meant = e->ablation == ABLATION_z || e->ablation == ABLATION_estimates;
+    const size_t width = (size_t)log->inside->latent + (size_t)log->inside->estimates;
+    double *sum = calloc(width, sizeof *sum);
+    float *means = calloc(width, sizeof *means);
+    MildStatus status = MILD_OK;
+    if (!sum || !means) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    } else if (meant) {
+        log->sum = sum;
+        status = evaluate_rows(e, robot, pool, controller, NULL, error);
+        inside_means(log, means);
+        log->sum = NULL;
+    }
+    if (status == MILD_OK) {
+        learned_ablate(controller, e->ablation, means);
+    }
+    free(sum);
+    free(means);
+    return status;
+}
+
+/* With --latent or --ablate: rows whose controller is looked into. */
+static MildStatus evaluate_inside(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                                  FILE *table, MildError *error) {
+    InsideLog log = {.feet = robot_feet(robot)};
+    const EvalWatch watch = {inside_decided, &log};
+    char *text = NULL;
+    size_t size = 0;
+    MildStatus status = learned_watch(controller, &log.inside, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    e->eval.watch = &watch;
+    status = e->ablate ? ablate(e, robot, pool, controller, &log, error) : MILD_OK;
+    if (status == MILD_OK && e->latent) {
+        log.csv = open_memstream(&text, &size);
+        status = log.csv ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    }
+    if (status == MILD_OK && log.csv) {
+        inside_print_header(&log);
+    }
+    if (status == MILD_OK) {
+        status = evaluate_rows(e, robot, pool, controller, table, error);
+    }
+    if (log.csv && fclose(log.csv) && status == MILD_OK) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "--latent: out of memory");
+    }
+    if (status == MILD_OK && e->latent) {
+        status = report_text(text, size, e->latent, error);
+    }
+    free(text);
+    e->eval.watch = NULL;
+    return status;
+}
+
+/* All at once, by the batch engine. */
+static MildStatus evaluate_batch(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                                 MildError *error) {
+    const int device = train_device(&e->train);
+    MildMap *map = NULL; /* the same for all, because each has one material */
+    MildStatus status = MILD_OK;
+    for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
+        mild_map_destroy(map);
+        status = make_scene(e, e->grounds.name[g], &e->scenes[g], &map, error);
+    }
+    const EvalBatch batch = {.task = &e->task,
+                             .robot = robot,
+                             .pool = pool,
+                             .controller = controller,
+                             .device = device < 0 ? MILD_BATCH_HOST : device,
+                             .scenes = e->scenes,
+                             .scene_count = e->grounds.count,
+                             .speeds = e->speeds.value,
+                             .speed_count = e->speeds.count,
+                             .eval = e->eval};
+    if (status == MILD_OK) {
+        status = eval_run_batch(&batch, e->rows, error);
+    }
+    mild_map_destroy(map);
+    return status;
+}
+
+static void print_header(const Eval *e, FILE *table) {
+    char line[256];
     if (e->finish.model != MILD_MODEL_MILD) {
         fprintf(table, "ground model %s\n", mild_model_names[e->finish.model]);
     }
     eval_print_header(line, sizeof line);
     fprintf(table, "%s\n", line);
-    for (int g = 0; g < e->grounds.count; g++) {
-        Scene scene;
-        MildMap *map;
-        MildStatus status = make_scene(e, e->grounds.name[g], &scene, &map, error);
-        for (int s = 0; status == MILD_OK && s < e->speeds.count; s++) {
-            e->eval.speed = e->speeds.value[s];
-            EvalRow *row = &e->rows[e->row_count];
-            status = eval_run(&e->task, robot, pool, controller, &scene, &e->eval, row, error);
-            if (status == MILD_OK) {
-                e->row_count++;
-                eval_print_row(row, line, sizeof line);
-                fprintf(table, "%s\n", line);
-                fflush(table);
-            }
-        }
-        mild_map_destroy(map);
-        if (status != MILD_OK) {
-            return status;
-        }
+}
+
+static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                           MildError *error) {
+    const int taken = (e->json && strcmp(e->json, "-") == 0) ||
+                      (e->latent && strcmp(e->latent, "-") == 0); /* standard output */
+    FILE *table = taken ? stderr : stdout;
+    const int batch = train_is_batch(&e->train);
+    MildStatus status = batch ? evaluate_batch(e, robot, pool, controller, error) : MILD_OK;
+    if (status != MILD_OK) {
+        return status;
     }
-    return e->json ? write_json(e, robot, error) : MILD_OK;
+    print_header(e, table);
+    if (!batch) {
+        status = (e->latent || e->ablate ? evaluate_inside
+                                         : evaluate_rows)(e, robot, pool, controller, table, error);
+    }
+    while (batch && e->row_count < e->grounds.count * e->speeds.count) {
+        take_row(e, table);
+    }
+    return status == MILD_OK && e->json ? write_json(e, robot, error) : status;
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an
@@ -138,11 +261,38 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
     return status;
 }
 
+static MildStatus check_place(const Eval *e, MildError *error) {
+    const int device = train_device(&e->train);
+    const char *missing = e->latent           ? "--latent"
+                          : e->ablate         ? "--ablate"
+                          : e->eval.push != 0 ? "--push"
+                                              : NULL;
+    if (device < -1) {
+        return mild_fail(error, MILD_ERROR_RANGE, "train.device = %s: neither cpu, cuda nor cuda:N",
+                         e->train.device);
+    }
+    if (device >= 0 && !train_is_batch(&e->train)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "train.device = %s: MuJoCo runs on the processor; leave it out, or give "
+                         "--train.robots=batch",
+                         e->train.device);
+    }
+    return missing && train_is_batch(&e->train)
+               ? mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "%s is not there in the batch engine; leave it out, or give "
+                           "--train.robots=mujoco",
+                           missing)
+               : MILD_OK;
+}
+
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     MildModel model;
     MildStatus status = experiment_nominal_task(&e->task, e->config_robot, e->config, error);
     if (status == MILD_OK) {
         status = controller_check(e->controller, error);
+    }
+    if (status == MILD_OK && e->ablate) {
+        status = ablation_find(e->ablate, &e->ablation, error);
     }
     if (status == MILD_OK) {
         status = grounds_model(e->model, args, &model, error);
@@ -155,7 +305,9 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     Controller controller = {0};
     if (robot) {
         e->finish = grounds_for_robot(model, robot, &e->task, &e->terrain, args);
+        e->finish.train = &e->train;
         status = check_grounds(e, error);
+        status = status == MILD_OK ? check_place(e, error) : status;
     } else {
         status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
     }
@@ -186,6 +338,7 @@ int cmd_eval(int argc, char **argv) {
     e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
     e->patch = 2.5;
     e->terrain = terrain_def_default();
+    e->train = train_def_default();
     e->speeds = (CliNumbers){1, {0.6}};
     e->grounds.count = 3;
     strcpy(e->grounds.name[0], "rigid");
@@ -201,14 +354,20 @@ int cmd_eval(int argc, char **argv) {
         {"config", CLI_INPUT, &e->config, 0, 0, "FILE",
          "config that the policy was trained with, for its section [task]"},
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
-         "grounds, one row each; rubber+foam45 is a course of both (default "
+         "grounds, one row each; rubber+foam45 is a course of both, in which rigid is a very hard "
+         "material (default "
          "rigid,foam45,sand_loose)"},
         {"model", CLI_TEXT, &e->model, 0, 0, "NAME",
          grounds_model_help(model_help, sizeof model_help)},
         {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]",
          "[m/s] commanded forward speeds, one row each (default 0.6)"},
-        {"sideways", CLI_NUMBER, &e->eval.sideways, -1, 1, "V",
+        {"sideways", CLI_NUMBER, &e->eval.sideways, -1.5, 1.5, "V",
          "[m/s] commanded speed to the left (default 0)"},
+        {"turn", CLI_NUMBER, &e->eval.turn, -1.5, 1.5, "W",
+         "[rad/s] commanded turning speed to the left; speeds are then along the robot's heading "
+         "(default 0: the heading is held along x)"},
+        {"push", CLI_NUMBER, &e->eval.push, 0, 5, "V",
+         "[m/s] added to the speed of the base every 4 s, in a random direction (default 0)"},
         {"stop", CLI_NUMBER, &e->eval.stop, 0, 3600, "T",
          "[s] time at which the command becomes 0; 0: never (default 0)"},
         {"trials", CLI_INT, &e->eval.trials, 1, 10000, "N",
@@ -221,6 +380,13 @@ int cmd_eval(int argc, char **argv) {
          "the same seed gives the same trials (default 1)"},
         {"threads", CLI_INT, &e->threads, 0, 1024, "N",
          "threads; 0: one per core; the results do not depend on it (default 0)"},
+        {"latent", CLI_OUTPUT, &e->latent, 0, 0, "FILE",
+         "also write what passes between the networks at every decision, as CSV: trial, ground, "
+         "speed, time, phase of the gait, z, z modulated, theta1, theta2, estimates"},
+        {"ablate", CLI_TEXT, &e->ablate, 0, 0, "PART",
+         "take a part out of the policy: z (its mean instead), modulation (z as it is), estimates "
+         "(their means for the actor), history (the newest frame in each place); means are those "
+         "of the whole policy in the same trials of all rows, which run once more for them"},
         {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
          "also write the table as JSON to FILE; - for standard output"},
     };
@@ -232,15 +398,17 @@ int cmd_eval(int argc, char **argv) {
                    "transport, largest torque, foot clearance above the undisturbed ground, "
                    "sinkage and slip of a stance, and energy. The sensors have the noise and "
                    "delay of training. The robot has its nominal parameters, and nobody pushes "
-                   "it.",
+                   "it without --push.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "
-                     "--terrain.kind=waves --terrain.memory=true",
+                     "--terrain.kind=waves --terrain.memory=true; --train.robots=batch runs all "
+                     "rows at once in the batch engine, on --train.device=cpu or cuda:N",
         .examples =
             "  mild eval --ground rigid,foam45,sand_loose --speed 0.3,0.6\n"
             "  mild eval --ground sand_loose --terrain.kind=rough --terrain.amplitude=0.02\n"
-            "  mild eval --robot go1 --controller stand --speed 0\n",
+            "  mild eval --robot go1 --controller stand --speed 0\n"
+            "  mild eval --train.device=cuda --trials 1000\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     int code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;

@@ -7,8 +7,9 @@
 #include "app/commands.h"
 #include "app/figure.h"
 #include "app/grounds.h"
+#include "app/report.h"
 #include "app/robots.h"
-#include "base/file.h"
+#include "base/paths.h"
 #include "base/text.h"
 #include "lab/press.h"
 #include "robot/robot.h"
@@ -137,14 +138,8 @@ static MildStatus csv_write(const PressResult *result, int more, const char *pat
                             MildError *error) {
     size_t size = 0;
     char *text = csv_text(result, more, &size);
-    MildStatus status = MILD_OK;
-    if (!text) {
-        status = mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
-    } else if (strcmp(path, "-") != 0) {
-        status = file_write(path, text, size, error);
-    } else if (fwrite(text, 1, size, stdout) != size || fflush(stdout) != 0) {
-        status = mild_fail(error, MILD_ERROR_IO, "cannot write to standard output");
-    }
+    MildStatus status = text ? report_text(text, size, path, error)
+                             : mild_fail(error, MILD_ERROR_MEMORY, "press: out of memory");
     free(text);
     return status;
 }

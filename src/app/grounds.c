@@ -62,18 +62,26 @@ MildStatus grounds_model(const char *option, const CliArgs *args, MildModel *mod
 GroundsDef grounds_for_robot(MildModel model, Robot *robot, TaskDef *task, TerrainDef *terrain,
                              const CliArgs *args) {
     robot_set_model(robot, model);
-    return (GroundsDef){model,  robot_rasters(robot)[0], robot_foot_load(robot), args, task,
-                        terrain};
+    return (GroundsDef){.model = model,
+                        .sole = robot_rasters(robot)[0],
+                        .load = robot_foot_load(robot),
+                        .args = args,
+                        .task = task,
+                        .terrain = terrain};
 }
 
 static MildStatus overlay(const GroundsDef *def, MildMaterial *material, MildError *error) {
-    ConfigSection sections[3] = {ground_section(material)};
+    ConfigSection sections[4] = {ground_section(material)};
     int count = 1;
     if (def->task) {
         sections[count++] = (ConfigSection){"task", task_fields, task_field_count, def->task};
     }
     if (def->terrain) {
         sections[count++] = terrain_section(def->terrain);
+    }
+    if (def->train) {
+        sections[count++] =
+            (ConfigSection){"train", train_place_fields, train_place_field_count, def->train};
     }
     return config_overrides(sections, count, def->args->overrides, def->args->override_count,
                             error);

@@ -26,6 +26,7 @@ typedef struct {
     const CliArgs *args; /* --ground.KEY=VALUE, applied to the matched material; --task.KEY=VALUE */
     TaskDef *task;       /* NULL: the command takes no --task */
     TerrainDef *terrain; /* NULL: the command takes no --terrain */
+    TrainDef *train;     /* of --train.device and --train.robots; NULL: the command takes neither */
 } GroundsDef;
 
 /* The GroundsDef for a robot: models are matched under half its weight, and overrides come from

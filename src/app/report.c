@@ -6,6 +6,15 @@
 
 #include "base/file.h"
 
+MildStatus report_text(const char *text, size_t size, const char *path, MildError *error) {
+    if (strcmp(path, "-") != 0) {
+        return file_write(path, text, size, error);
+    }
+    return fwrite(text, 1, size, stdout) != size || fflush(stdout) != 0
+               ? mild_fail(error, MILD_ERROR_IO, "cannot write to standard output")
+               : MILD_OK;
+}
+
 MildStatus report_save(cJSON *root, const char *path, MildError *error) {
     char *text = root ? cJSON_Print(root) : NULL;
     cJSON_Delete(root);
@@ -16,12 +25,7 @@ MildStatus report_save(cJSON *root, const char *path, MildError *error) {
         return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
     }
     strcpy(line + length, "\n");
-    MildStatus status = MILD_OK;
-    if (strcmp(path, "-") != 0) {
-        status = file_write(path, line, length + 1, error);
-    } else if (fputs(line, stdout) < 0) {
-        status = mild_fail(error, MILD_ERROR_IO, "cannot write to standard output");
-    }
+    MildStatus status = report_text(line, length + 1, path, error);
     free(line);
     return status;
 }

@@ -1,4 +1,4 @@
-/* Writes a JSON result completely or not at all. */
+/* Writes a result completely or not at all. */
 #ifndef MILD_REPORT_H
 #define MILD_REPORT_H
 
@@ -6,7 +6,10 @@
 
 #include "mild/error.h"
 
-/* Takes ownership of `root`; NULL means that memory ran out while it was built. path "-":
+/* A text of `size` bytes. path "-": stdout. */
+MildStatus report_text(const char *text, size_t size, const char *path, MildError *error);
+
+/* JSON. Takes ownership of `root`; NULL means that memory ran out while it was built. path "-":
  * stdout. */
 MildStatus report_save(cJSON *root, const char *path, MildError *error);
 

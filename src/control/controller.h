@@ -13,6 +13,8 @@ typedef struct {
      * a time. */
     void (*act)(void *self, int rows, TaskEnv *const *envs, float *actions);
     void (*destroy)(void *self);
+    /* The same from their histories alone, [rows][TaskShape.history]; NULL: it needs more. */
+    void (*act_on)(void *self, int rows, const float *history, float *actions);
 } Controller;
 
 /* Name and summary; the file defines controller_make_NAME. */

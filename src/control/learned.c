@@ -1,32 +1,120 @@
+#include "control/learned.h"
+
 #include <stdlib.h>
 #include <string.h>
 
-#include "control/controller.h"
+#include "base/text.h"
 #include "learn/policy.h"
 
 typedef struct {
     Policy *policy;
     Pool *pool;
     int rows_max;
-    size_t width;   /* of a history */
-    float *history; /* [rows_max][width] */
+    size_t width;         /* of a history */
+    float *history;       /* [rows_max][width] */
+    LearnedInside inside; /* of a watched one, else all NULL */
+    float *seen;          /* memory of its rows, then that of the means */
+    PolicyInstead instead;
+    int newest; /* bool: the older frames are the newest one */
 } Learned;
+
+static void learned_act_on(void *self, int rows, const float *history, float *actions) {
+    Learned *learned = self;
+    policy_act(learned->policy, learned->pool, rows, history, actions, NULL, NULL);
+}
+
+/* The newest frame over the older ones of a history. */
+static void forget(const Learned *learned, float *history) {
+    const size_t frame = learned->width / TASK_FRAMES;
+    for (int i = 0; i < TASK_FRAMES - 1; i++) {
+        memcpy(history + (size_t)i * frame, history + (TASK_FRAMES - 1) * frame,
+               frame * sizeof *history);
+    }
+}
 
 static void learned_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
     Learned *learned = self;
     for (int i = 0; i < rows; i++) {
-        memcpy(learned->history + (size_t)i * learned->width, task_env_history(envs[i]),
-               learned->width * sizeof *learned->history);
+        float *history = learned->history + (size_t)i * learned->width;
+        memcpy(history, task_env_history(envs[i]), learned->width * sizeof *history);
+        if (learned->newest) {
+            forget(learned, history);
+        }
     }
-    policy_act(learned->policy, learned->pool, rows, learned->history, actions, NULL, NULL);
+    policy_act_inside(learned->policy, learned->pool, rows, learned->history, &learned->instead,
+                      actions, &learned->inside.rows);
 }
 
 static void learned_destroy(void *self) {
     Learned *learned = self;
     policy_destroy(learned->policy);
     free(learned->history);
+    free(learned->seen);
     free(learned);
 }
+
+/* ---- inside ---- */
+
+MildStatus ablation_find(const char *name, Ablation *ablation, MildError *error) {
+#define ABLATION_NAME(name, what) #name,
+    static const char *const names[ABLATIONS] = {ABLATION_LIST(ABLATION_NAME)};
+#undef ABLATION_NAME
+    for (int i = ABLATION_none + 1; i < ABLATIONS; i++) {
+        if (strcmp(name, names[i]) == 0) {
+            *ablation = (Ablation)i;
+            return MILD_OK;
+        }
+    }
+    return mild_fail(error, MILD_ERROR_ARGUMENT, "--ablate: unknown part '%.60s'; nearest is '%s'",
+                     name, text_nearest(name, (const char **)names + 1, ABLATIONS - 1));
+}
+
+MildStatus learned_watch(Controller *controller, const LearnedInside **inside, MildError *error) {
+    Learned *learned = controller->self;
+    if (controller->act != learned_act) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "controller %s has no networks to look into; give --controller learned",
+                         controller->name);
+    }
+    LearnedInside *seen = &learned->inside;
+    const PolicyDef *def = policy_def(learned->policy);
+    const size_t rows = (size_t)learned->rows_max, latent = (size_t)def->latent,
+                 estimates = (size_t)def->estimates, theta = (size_t)policy_theta(learned->policy);
+    if (!learned->seen) {
+        learned->seen = calloc(rows * (2 * latent + theta + estimates) + latent + estimates,
+                               sizeof *learned->seen);
+    }
+    if (!learned->seen) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "controller: out of memory for %d rows",
+                         learned->rows_max);
+    }
+    seen->latent = def->latent;
+    seen->theta = (int)theta;
+    seen->estimates = def->estimates;
+    seen->rows.latent = learned->seen;
+    seen->rows.modulated = seen->rows.latent + rows * latent;
+    seen->rows.theta = seen->rows.modulated + rows * latent;
+    seen->rows.estimates = seen->rows.theta + rows * theta;
+    *inside = seen;
+    return MILD_OK;
+}
+
+void learned_ablate(Controller *controller, Ablation ablation, const float *means) {
+    Learned *learned = controller->self;
+    const LearnedInside *seen = &learned->inside;
+    const size_t latent = (size_t)seen->latent, estimates = (size_t)seen->estimates;
+    float *kept = seen->rows.estimates + (size_t)learned->rows_max * estimates;
+    memset(&learned->instead, 0, sizeof learned->instead);
+    learned->newest = ablation == ABLATION_history;
+    learned->instead.plain = ablation == ABLATION_modulation;
+    if (ablation == ABLATION_z || ablation == ABLATION_estimates) {
+        memcpy(kept, means, (latent + estimates) * sizeof *kept);
+        learned->instead.latent = ablation == ABLATION_z ? kept : NULL;
+        learned->instead.estimates = ablation == ABLATION_estimates ? kept + latent : NULL;
+    }
+}
+
+/* ---- creation ---- */
 
 MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
                               Controller *controller, MildError *error) {
@@ -63,8 +151,12 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
         policy_destroy(policy);
         return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
     }
-    *learned = (Learned){policy, pool, rows_max, (size_t)shape.history, history};
-    *controller = (Controller){learned, "learned", learned_act, learned_destroy};
+    *learned = (Learned){.policy = policy,
+                         .pool = pool,
+                         .rows_max = rows_max,
+                         .width = (size_t)shape.history,
+                         .history = history};
+    *controller = (Controller){learned, "learned", learned_act, learned_destroy, learned_act_on};
     return MILD_OK;
 }
 

@@ -3,6 +3,7 @@
 #define CROWD_ARRAYS_H
 
 #include "batch/batch.h"
+#include "crowd/trial.h"
 #include "engine/model.h"
 #include "task/ground.h"
 #include "task/task.h"
@@ -71,6 +72,9 @@ typedef struct {
     TaskKept *kept;    /* [envs] for crowd_keep */
     double *tally;     /* [TALLY_NUMBERS] sums over the environments */
     CrowdContact contact;
+    const CrowdTrial *trial; /* [envs] or NULL */
+    double *command;         /* [envs][3] of the trials */
+    CrowdSample *sample;     /* [envs][physics steps] or NULL */
     const CrowdTask *task;
     const EngineModel *model;
 } CrowdArrays;

@@ -14,6 +14,7 @@ struct Crowd {
     MildBatch *ground;
     void *block;        /* where the arrays are, but for task and model */
     CrowdGround *drawn; /* of the device: the grounds of CrowdTask */
+    void *trials;       /* where those of trials are */
     Pool *pool;         /* of the host */
     int steps;          /* of physics in a policy step */
     int device;
@@ -35,7 +36,9 @@ static MildStatus check_def(const CrowdDef *def, MildError *error) {
     const char *missing = patches             ? "randomize.patch_share above 0"
                           : task->print_tiles ? "terrain.memory"
                           : !task->newton     ? "task.newton = 0"
-                                              : NULL;
+                          : def->trial && task->map && mild_map_label_count(task->map) > 1
+                              ? "terrain.patches"
+                              : NULL;
     return status == MILD_OK && missing
                ? mild_fail(error, MILD_ERROR_ARGUMENT,
                            "%s is not there on a device yet; train.robots = mujoco has it", missing)
@@ -114,6 +117,20 @@ static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *err
         at += (arrays[i].bytes + 255) / 256 * 256;
     }
     return crowd->block ? MILD_OK : MILD_ERROR_MEMORY;
+}
+
+/* Trials and their commands. */
+static MildStatus copy_trials(Crowd *crowd, const CrowdDef *def, MildError *error) {
+    CrowdArrays *all = &crowd->arrays;
+    const size_t envs = (size_t)def->envs, commands = 3 * envs * sizeof *all->command;
+    crowd->trials = take(crowd, commands + envs * sizeof *all->trial, error);
+    if (!crowd->trials) {
+        return MILD_ERROR_MEMORY;
+    }
+    CrowdTrial *trial = (void *)((char *)crowd->trials + commands);
+    all->command = crowd->trials;
+    all->trial = trial;
+    return batch_copy(crowd->device, trial, def->trial, envs * sizeof *trial, error);
 }
 
 /* What is drawn of the grounds. */
@@ -216,6 +233,7 @@ static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGround
     status =
         status == MILD_OK ? take_arrays(crowd, shape.feet, labels_of(def->task), error) : status;
     status = status == MILD_OK ? copy_grounds(crowd, def, grounds, error) : status;
+    status = status == MILD_OK && def->trial ? copy_trials(crowd, def, error) : status;
     status = status == MILD_OK ? copy_task(crowd, def, grounds, error) : status;
     status = status == MILD_OK ? copy_model(crowd, def, error) : status;
     return status == MILD_OK ? create_envs(crowd, error) : status;
@@ -225,8 +243,10 @@ Crowd *crowd_create(const CrowdDef *def, MildError *error) {
     if (check_def(def, error) != MILD_OK) {
         return NULL;
     }
-    TaskGrounds *grounds =
-        task_grounds_create(def->task, def->robot, def->grounds, def->seed, def->pool, error);
+    TaskGrounds *drawn = def->chosen ? NULL
+                                     : task_grounds_create(def->task, def->robot, def->grounds,
+                                                           def->seed, def->pool, error);
+    const TaskGrounds *grounds = def->chosen ? def->chosen : drawn;
     Crowd *crowd = grounds ? calloc(1, sizeof *crowd) : NULL;
     if (grounds && !crowd) {
         mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
@@ -235,7 +255,7 @@ Crowd *crowd_create(const CrowdDef *def, MildError *error) {
         crowd_destroy(crowd);
         crowd = NULL;
     }
-    task_grounds_destroy(grounds);
+    task_grounds_destroy(drawn);
     return crowd;
 }
 
@@ -246,6 +266,7 @@ void crowd_destroy(Crowd *crowd) {
     const CrowdArrays *all = &crowd->arrays;
     batch_free(crowd->device, crowd->drawn);
     batch_free(crowd->device, crowd->block);
+    batch_free(crowd->device, crowd->trials);
     batch_free(crowd->device, (void *)all->task);
     batch_free(crowd->device, (void *)all->model);
     mild_batch_destroy(crowd->ground);
@@ -290,6 +311,11 @@ static void part_piece(void *context, int piece, int thread) {
     const Call *call = context;
     (void)thread;
     crowd_host_part(&call->crowd->arrays, &call->step, call->part, piece);
+}
+
+static void tell_piece(void *context, int piece, int thread) {
+    (void)thread;
+    crowd_host_tell(&((const Call *)context)->crowd->arrays, piece);
 }
 
 static void end_piece(void *context, int piece, int thread) {
@@ -429,6 +455,28 @@ MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
     MildStatus status =
         batch_copy(crowd->device, all->kept, kept, (size_t)all->envs * sizeof *kept, error);
     return status == MILD_OK ? move_kept(crowd, 1, error) : status;
+}
+
+MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error) {
+    const CrowdArrays *all = &crowd->arrays;
+    Call call = {crowd, {0}, 0};
+    MildStatus status = batch_copy(crowd->device, all->command, command,
+                                   3 * (size_t)all->envs * sizeof *command, error);
+    if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
+        return checked(crowd_device_tell(all, NULL), error);
+    }
+    if (status == MILD_OK) {
+        pool_run(crowd->pool, all->envs, tell_piece, &call);
+    }
+    return status;
+}
+
+void crowd_watch(Crowd *crowd, CrowdSample *sample) {
+    crowd->arrays.sample = sample;
+}
+
+int crowd_samples(const Crowd *crowd) {
+    return crowd->steps;
 }
 
 size_t crowd_bytes(const Crowd *crowd) {

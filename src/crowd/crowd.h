@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "base/pool.h"
+#include "crowd/trial.h"
 #include "task/vec.h"
 
 typedef struct Crowd Crowd;
@@ -25,6 +26,8 @@ typedef struct {
     uint64_t seed;
     int striped; /* bool: the labels of task->map are stripes, which only the share patch_share of
                     the soft episodes has; the others are uniform */
+    const TaskGrounds *chosen; /* copied; NULL: `grounds` are drawn */
+    const CrowdTrial *trial;   /* [envs] copied; NULL: episodes draw their ground and command */
 } CrowdDef;
 
 /* NULL, with one line in *error, for what the device does not have yet (imprints, blended borders,
@@ -53,6 +56,13 @@ size_t crowd_robot_bytes(const Crowd *crowd);
  * device. */
 MildStatus crowd_keep(Crowd *crowd, TaskKept *kept, MildError *error);
 MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error);
+/* With CrowdDef.trial. Commands from the next policy step on, [envs][3] on the host, see
+ * TaskEnv.command; the first ones before crowd_reset. Waits for the device. */
+MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error);
+/* From now on the physics steps of each policy step are written to `sample`,
+ * [envs][crowd_samples] in the memory of the device; NULL: no longer. */
+void crowd_watch(Crowd *crowd, CrowdSample *sample);
+int crowd_samples(const Crowd *crowd); /* physics steps of a policy step */
 size_t crowd_bytes(const Crowd *crowd);
 
 #endif

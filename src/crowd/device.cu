@@ -40,12 +40,14 @@ static int lanes_blocks(int envs) {
     return (envs + TASK_ROBOTS - 1) / TASK_ROBOTS;
 }
 
+template <int WATCHED>
 static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
     part(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call, int k) {
     extern __shared__ __align__(16) Real shared[];
     const long place = warp_robot();
     if (place < all.envs) {
-        crowd_part(&all, &call, all.order[place], k, (CrowdPlace *)shared + threadIdx.x / LANES);
+        crowd_part(&all, &call, all.order[place], k, WATCHED,
+                   (CrowdPlace *)shared + threadIdx.x / LANES);
     }
 }
 
@@ -87,6 +89,14 @@ static __global__ void __launch_bounds__(TASK_THREADS, TASK_BLOCKS)
     const long robot = lanes_robot();
     if (robot < all.envs) {
         crowd_observe(&all, &call, robot);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    tell(const __grid_constant__ CrowdArrays all) {
+    const long robot = lanes_robot();
+    if (robot < all.envs) {
+        crowd_tell(&all, robot);
     }
 }
 
@@ -163,8 +173,9 @@ extern "C" const char *crowd_device_fits(const EngineTree *tree) {
                          tree->chain != ENGINE_CHAIN)) {
         return "this build steps robots of another size on a GPU";
     }
-    cudaFuncSetAttribute(part, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
+    cudaFuncSetAttribute(part<0>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
+    cudaFuncSetAttribute(part<1>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     return launched();
 }
 
@@ -180,8 +191,10 @@ extern "C" const char *crowd_device_begin(const CrowdArrays *all, void *stream) 
 
 extern "C" const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k,
                                          void *stream) {
-    part<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all, *call,
-                                                                                      k);
+    (all->sample
+         ? part<1>
+         : part<0>)<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(
+        *all, *call, k);
     return launched();
 }
 
@@ -201,6 +214,11 @@ extern "C" const char *crowd_device_first(const CrowdArrays *all, const CrowdSte
 
 extern "C" const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream) {
     keep<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
+    return launched();
+}
+
+extern "C" const char *crowd_device_tell(const CrowdArrays *all, void *stream) {
+    tell<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 

@@ -24,7 +24,11 @@ void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot)
 
 void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long robot) {
     CrowdPlace place;
-    crowd_part(all, call, robot, k, &place);
+    crowd_part(all, call, robot, k, all->sample != NULL, &place);
+}
+
+void crowd_host_tell(const CrowdArrays *all, long robot) {
+    crowd_tell(all, robot);
 }
 
 void crowd_host_end(const CrowdArrays *all, const CrowdStep *call, long robot) {

@@ -26,6 +26,8 @@ void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long 
 void crowd_host_end(const CrowdArrays *all, const CrowdStep *call, long robot);
 /* Pose of a new episode, and the observation. */
 void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot);
+/* From arrays.command to the environment. */
+void crowd_host_tell(const CrowdArrays *all, long robot);
 /* From the environment to arrays.kept, or back. */
 void crowd_host_keep(const CrowdArrays *all, int back);
 /* Fills arrays.tally. */
@@ -42,6 +44,7 @@ const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call, vo
 const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k, void *stream);
 const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call, void *stream);
 const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream);
+const char *crowd_device_tell(const CrowdArrays *all, void *stream);
 const char *crowd_device_tally(const CrowdArrays *all, void *stream);
 CrowdBytes crowd_device_bytes(const TaskDef *def, const TaskShape *shape);
 /* NULL if the kernels are compiled for such a robot, else the reason. */

@@ -45,6 +45,12 @@ const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream) {
     return none;
 }
 
+const char *crowd_device_tell(const CrowdArrays *all, void *stream) {
+    (void)all;
+    (void)stream;
+    return none;
+}
+
 const char *crowd_device_tally(const CrowdArrays *all, void *stream) {
     (void)all;
     (void)stream;

@@ -4,19 +4,46 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#define GRAVITY 9.81
 #define HEADING_GAIN 1.0  /* [1/s] */
 #define HEADING_LIMIT 0.5 /* [rad/s] */
+#define PUSH_INTERVAL 4.0 /* [s] */
+#define RANDOM_USE_PUSH 0x45505553u
+#define TWO_PI 6.283185307179586
+
+static void hold_heading(const double quaternion[4], double speed, double sideways,
+                         double command[3]) {
+    const double turn = -HEADING_GAIN * measure_yaw(quaternion);
+    command[0] = speed;
+    command[1] = sideways;
+    command[2] = speed == 0 && sideways == 0 ? 0 : fmin(fmax(turn, -HEADING_LIMIT), HEADING_LIMIT);
+}
+
+void eval_direct(const EvalDef *eval, double time, const double quaternion[4], double command[3]) {
+    if (eval->stop > 0 && time >= eval->stop) {
+        hold_heading(quaternion, 0, 0, command);
+        return;
+    }
+    hold_heading(quaternion, eval->speed, eval->sideways, command);
+    if (eval->turn != 0) {
+        command[2] = eval->turn;
+    }
+}
 
 void eval_command(TaskEnv *env, double speed, double sideways) {
-    const double *q = env->robot.qpos + 3;
-    double yaw = atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
     env->command_frozen = 1;
-    env->command[0] = speed;
-    env->command[1] = sideways;
-    env->command[2] = speed == 0 && sideways == 0
-                          ? 0
-                          : fmin(fmax(-HEADING_GAIN * yaw, -HEADING_LIMIT), HEADING_LIMIT);
+    hold_heading(env->robot.qpos + 3, speed, sideways, env->command);
+}
+
+/* A push in a random direction every PUSH_INTERVAL, each trial's at other times. */
+static void push_trial(TaskEnv *env, double speed) {
+    const uint32_t interval = (uint32_t)(PUSH_INTERVAL / TASK_PERIOD + 0.5);
+    if (speed == 0 || (env->step + env->index * 97u) % interval != 0) {
+        return;
+    }
+    Random r = random_at(env->seed ^ RANDOM_USE_PUSH, env->index, env->tick);
+    const double angle = TWO_PI * random_unit(&r);
+    env->robot.qvel[0] += speed * cos(angle);
+    env->robot.qvel[1] += speed * sin(angle);
 }
 
 typedef struct {
@@ -32,11 +59,13 @@ typedef struct {
 } Trials;
 
 static void start_trial(void *context, int trial, int thread) {
+    static const double ahead[4] = {1, 0, 0, 0};
     Trials *t = context;
     TaskView none = {0};
     TaskEnv *env = t->env[trial];
     task_env_init(env, t->def, t->robot, t->eval->seed, (uint32_t)trial);
-    eval_command(env, t->eval->speed, t->eval->sideways);
+    env->command_frozen = 1;
+    eval_direct(t->eval, 0, ahead, env->command);
     task_env_reset_on(env, t->def, t->robot, t->sim[thread], &t->scene->terrain, t->scene->rigid,
                       &none);
     measure_start(&t->measure[trial], t->def->physics_dt);
@@ -53,9 +82,19 @@ static void step_trial(void *context, int trial, int thread) {
     TaskStep step = task_env_step(t->env[trial], t->def, t->robot, t->sim[thread],
                                   t->action + trial * robot_joints(t->robot), 0, &none, &probe);
     t->over[trial] = step.done && !step.timeout;
-    const EvalDef *eval = t->eval;
-    int stopped = eval->stop > 0 && t->measure[trial].time >= eval->stop;
-    eval_command(t->env[trial], stopped ? 0 : eval->speed, stopped ? 0 : eval->sideways);
+    TaskEnv *env = t->env[trial];
+    eval_direct(t->eval, t->measure[trial].time, env->robot.qpos + 3, env->command);
+    push_trial(env, t->eval->push);
+}
+
+static void tell_watch(const Trials *t, int step) {
+    const EvalWatch *watch = t->eval->watch;
+    for (int i = 0; watch && i < t->eval->trials; i++) {
+        if (!t->over[i]) {
+            watch->decided(watch->context, t->scene, t->eval->speed, i, step * TASK_PERIOD,
+                           t->env[i]);
+        }
+    }
 }
 
 static void free_trials(Trials *t, int trials, int threads) {
@@ -107,10 +146,11 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
         int steps = (int)(eval->seconds / TASK_PERIOD + 0.5);
         for (int step = 0; step < steps; step++) {
             controller->act(controller->self, eval->trials, t.env, t.action);
+            tell_watch(&t, step);
             pool_run(pool, eval->trials, step_trial, &t);
         }
         eval_summarise(row, scene->name, eval, t.measure, t.over,
-                       robot_total_mass(robot) * GRAVITY);
+                       robot_total_mass(robot) * EVAL_GRAVITY);
     }
     free_trials(&t, eval->trials, pool_threads(pool));
     return status;

@@ -5,7 +5,12 @@
 
 #define CONTACT_FORCE 5.0  /* [N] */
 #define SWING_HEIGHT 0.005 /* [m] a lower lift does not count as a swing */
-#define CHATTER_TIME 0.03  /* [s] a shorter loss of contact does not end a stance */
+#define TWO_PI 6.283185307179586
+#define CHATTER_TIME 0.03 /* [s] a shorter loss of contact does not end a stance */
+
+double measure_yaw(const double q[4]) {
+    return atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
+}
 
 void measure_start(Measure *measure, double dt) {
     memset(measure, 0, sizeof *measure);
@@ -57,6 +62,11 @@ static void measure_steady(Measure *m, const MeasureSample *sample, double power
         memcpy(m->start, m->base, sizeof m->start);
     }
     memcpy(m->end, sample->base, sizeof m->end);
+    double x = sample->base[0] - m->base[0], y = sample->base[1] - m->base[1];
+    double c = cos(m->yaw), s = sin(m->yaw);
+    m->way[0] += c * x + s * y;
+    m->way[1] += c * y - s * x;
+    m->turned += remainder(sample->yaw - m->yaw, TWO_PI);
     m->steady_time += m->dt;
     m->work += power_abs * m->dt;
     m->base_low = fmin(m->base_low, sample->base_height);
@@ -77,6 +87,7 @@ void measure_sample(Measure *m, const MeasureSample *sample) {
     }
     m->time += m->dt;
     memcpy(m->base, sample->base, sizeof m->base);
+    m->yaw = sample->yaw;
     for (int f = 0; f < sample->feet; f++) {
         measure_foot(m, f, &sample->foot[f]);
     }
@@ -90,6 +101,7 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
         .joints = env->shape.joints,
         .feet = env->shape.feet,
         .base = {qpos[0], qpos[1]},
+        .yaw = measure_yaw(qpos + 3),
         .base_height = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]),
     };
     for (int f = 0; f < sample.feet; f++) {

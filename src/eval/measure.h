@@ -21,6 +21,7 @@ typedef struct {
     int joints;
     double base[2];     /* [m] world x (along the walk) and y */
     double base_height; /* [m] above the undisturbed ground */
+    double yaw;         /* [rad] of the base */
     int feet;
     MeasureFoot foot[ROBOT_FEET_MAX]; /* [feet] */
 } MeasureSample;
@@ -33,12 +34,15 @@ typedef struct {
     double energy;     /* [J] integral |sum tau qd| dt */
     double torque_max; /* [N m] */
     double base[2];    /* [m] after the latest step */
+    double yaw;        /* [rad] after the latest step */
 
     /* steady part */
     double steady_end;          /* [s] where it ends; 0: with the trial */
     double steady_time;         /* [s] */
     double start[2];            /* [m] base at the start of the steady part */
     double end[2];              /* [m] base at its end */
+    double way[2];              /* [m] sum of the base's steps, forward and to the left */
+    double turned;              /* [rad] */
     double work;                /* [J] integral sum |tau qd| dt */
     double base_low, base_high; /* [m] */
 
@@ -55,6 +59,8 @@ typedef struct {
     double apex_sum, deepest_sum, drift_sum; /* [m] */
 } Measure;
 
+/* [rad] Heading of a base with this orientation (w x y z). */
+double measure_yaw(const double quaternion[4]);
 void measure_start(Measure *measure, double dt);
 void measure_sample(Measure *measure, const MeasureSample *sample);
 /* The same from a robot: a TaskProbe. */

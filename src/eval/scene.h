@@ -1,5 +1,5 @@
-/* A ground to walk on, by name: one preset, `rigid`, or a course of presets crossed in order
- * ("rubber+foam45+sand_loose"). */
+/* A ground to walk on, by name: one preset, `rigid`, or a course of them crossed in order
+ * ("rubber+foam45+rigid"). In a course `rigid` is a very hard material. */
 #ifndef MILD_SCENE_H
 #define MILD_SCENE_H
 

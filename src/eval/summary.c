@@ -19,12 +19,15 @@ static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_
         if (m->steady_time <= STEADY_LEAST || (row->success && fallen[i])) {
             continue;
         }
-        double distance = m->end[0] - m->start[0], left = m->end[1] - m->start[1];
+        const int turns = row->turn != 0; /* world x is then nobody's direction */
+        double distance = turns ? m->way[0] : m->end[0] - m->start[0];
+        double left = turns ? m->way[1] : m->end[1] - m->start[1];
         double v = distance / m->steady_time;
         double way = row->sideways != 0 ? hypot(distance, left) : fabs(distance);
         v_sum += v;
         v_square += v * v;
         row->velocity_sideways += left / m->steady_time;
+        row->velocity_turn += m->turned / m->steady_time;
         row->cot += m->work / (weight * fmax(way, DISTANCE_LEAST));
         row->base_oscillation += m->base_high - m->base_low;
         steady++;
@@ -39,6 +42,7 @@ static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_
     row->velocity_low = row->velocity - half;
     row->velocity_high = row->velocity + half;
     row->velocity_sideways /= steady;
+    row->velocity_turn /= steady;
     row->cot /= steady;
     row->base_oscillation /= steady;
 }
@@ -48,7 +52,11 @@ void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measu
     const int trials = eval->trials;
     int swings = 0, stances = 0;
     double apex = 0, deepest = 0, drift = 0;
-    *row = (EvalRow){.speed = eval->speed, .sideways = eval->sideways, .trials = trials};
+    *row = (EvalRow){.speed = eval->speed,
+                     .sideways = eval->sideways,
+                     .turn = eval->turn,
+                     .push = eval->push,
+                     .trials = trials};
     snprintf(row->ground, sizeof row->ground, "%s", ground);
     for (int i = 0; i < trials; i++) {
         Measure *m = &measures[i];
@@ -75,7 +83,7 @@ void eval_print_header(char *text, int size) {
 }
 
 void eval_print_row(const EvalRow *row, char *text, int size) {
-    char cot[16] = "-", sideways[48] = ""; /* standing has no cost of transport */
+    char cot[16] = "-", sideways[48] = "", turning[48] = ""; /* standing has no cost of transport */
     if (row->speed != 0 || row->sideways != 0) {
         snprintf(cot, sizeof cot, "%.2f", row->cot);
     }
@@ -83,10 +91,14 @@ void eval_print_row(const EvalRow *row, char *text, int size) {
         snprintf(sideways, sizeof sideways, "  sideways %.3f of %.2f m/s", row->velocity_sideways,
                  row->sideways);
     }
+    if (row->turn != 0) {
+        snprintf(turning, sizeof turning, "  turning %.3f of %.2f rad/s", row->velocity_turn,
+                 row->turn);
+    }
     snprintf(text, (size_t)size,
-             "%-26s %5.2f %4d/%-2d %6.3f +- %5.3f %5s %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f%s",
+             "%-26s %5.2f %4d/%-2d %6.3f +- %5.3f %5s %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f%s%s",
              row->ground, row->speed, row->success, row->trials, row->velocity,
              0.5 * (row->velocity_high - row->velocity_low), cot, row->torque_max,
              1e3 * row->clearance, 1e3 * row->penetration, 1e3 * row->drift,
-             row->seconds > 0 ? row->energy / row->seconds : 0, sideways);
+             row->seconds > 0 ? row->energy / row->seconds : 0, sideways, turning);
 }

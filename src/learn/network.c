@@ -143,24 +143,30 @@ float *network_theta(const Network *network, const NetworkOutputs *outputs) {
     return outputs->modulation.y[network->modulation.layers - 1];
 }
 
+/* z~ = theta1 z + theta2 of one row, z: mu or what there is instead of it. */
+static void modulate(const Network *network, const float *mu, const float *theta,
+                     const PolicyInstead *instead, float *modulated) {
+    const int latent = network->def.latent, per_dimension = network->def.modulation_per_dimension;
+    const float *z = instead && instead->latent ? instead->latent : mu;
+    for (int j = 0; j < latent; j++) {
+        float theta1 = theta[per_dimension ? j : 0], theta2 = theta[per_dimension ? latent + j : 1];
+        modulated[j] = instead && instead->plain ? z[j] : theta1 * z[j] + theta2;
+    }
+}
+
 /* [newest frame | estimates | theta1 mu + theta2]; paper, "Terrain Estimator and Modulation Net".
  */
 static void fill_actor_input(const Network *network, int rows, const float *history,
-                             const NetworkOutputs *outputs) {
-    const int observation = network->def.observation, estimates = network->def.estimates,
-              latent = network->def.latent;
-    const int per_dimension = network->def.modulation_per_dimension;
+                             const PolicyInstead *instead, const NetworkOutputs *outputs) {
+    const int observation = network->def.observation, estimates = network->def.estimates;
     const float *heads = network_heads(network, outputs), *theta = network_theta(network, outputs);
     float *input = outputs->actor_input;
     for (int r = 0; r < rows; r++) {
+        const float *told = instead && instead->estimates ? instead->estimates : heads;
         memcpy(input, history + network->history - observation,
                (size_t)observation * sizeof *input);
-        memcpy(input + observation, heads, (size_t)estimates * sizeof *input);
-        for (int j = 0; j < latent; j++) {
-            float theta1 = theta[per_dimension ? j : 0],
-                  theta2 = theta[per_dimension ? latent + j : 1];
-            input[observation + estimates + j] = theta1 * heads[estimates + j] + theta2;
-        }
+        memcpy(input + observation, told, (size_t)estimates * sizeof *input);
+        modulate(network, heads + estimates, theta, instead, input + observation + estimates);
         history += network->history;
         heads += network->heads;
         theta += network->theta;
@@ -168,13 +174,19 @@ static void fill_actor_input(const Network *network, int rows, const float *hist
     }
 }
 
-float *network_forward(const Network *network, const float *parameters, int rows,
-                       const float *history, const NetworkOutputs *outputs) {
+float *network_forward_instead(const Network *network, const float *parameters, int rows,
+                               const float *history, const PolicyInstead *instead,
+                               const NetworkOutputs *outputs) {
     const float *heads = mlp_forward(&network->encoder, parameters, rows, history, network->history,
                                      &outputs->encoder);
     mlp_forward(&network->modulation, parameters, rows, heads + network->def.feet_velocity_offset,
                 network->heads, &outputs->modulation);
-    fill_actor_input(network, rows, history, outputs);
+    fill_actor_input(network, rows, history, instead, outputs);
     return mlp_forward(&network->actor, parameters, rows, outputs->actor_input,
                        network->actor_input, &outputs->actor);
+}
+
+float *network_forward(const Network *network, const float *parameters, int rows,
+                       const float *history, const NetworkOutputs *outputs) {
+    return network_forward_instead(network, parameters, rows, history, NULL, outputs);
 }

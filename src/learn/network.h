@@ -12,6 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "learn/inside.h"
 #include "learn/mlp.h"
 #include "learn/policy_def.h"
 #include "mild/error.h"
@@ -50,5 +51,9 @@ float *network_theta(const Network *network, const NetworkOutputs *outputs); /* 
 /* history [rows][history] -> all outputs. Returns the mean actions [rows][actions]. */
 float *network_forward(const Network *network, const float *parameters, int rows,
                        const float *history, const NetworkOutputs *outputs);
+/* The same with an actor that gets other numbers; NULL: its own. */
+float *network_forward_instead(const Network *network, const float *parameters, int rows,
+                               const float *history, const PolicyInstead *instead,
+                               const NetworkOutputs *outputs);
 
 #endif

@@ -85,28 +85,37 @@ typedef struct {
     int per_run; /* chunks of a run; the last ones of a short run are empty */
     int chunks, slots;
     const float *input;
-    float *actions, *estimates, *latent, *values;
+    float *actions, *values;
+    PolicyInside inside;
+    const PolicyInstead *instead;
 } PolicyJob;
+
+/* The first `width` numbers of each row, the rows `stride` apart; to: NULL, not wanted. */
+static void copy_columns(const float *from, int stride, int width, int first, int rows, float *to) {
+    for (int r = 0; to && r < rows; r++) {
+        memcpy(to + (int64_t)(first + r) * width, from + (int64_t)r * stride,
+               (size_t)width * sizeof *to);
+    }
+}
 
 static void act_chunk(const PolicyJob *job, int first, int rows, const NetworkOutputs *outputs) {
     const Network *network = &job->policy->network;
     const PolicyDef *def = &network->def;
-    const float *mean = network_forward(network, job->policy->parameters, rows,
-                                        job->input + (int64_t)first * network->history, outputs);
+    const PolicyInside *inside = &job->inside;
+    const float *mean = network_forward_instead(network, job->policy->parameters, rows,
+                                                job->input + (int64_t)first * network->history,
+                                                job->instead, outputs);
+    const float *heads = network_heads(network, outputs);
+    const int modulated = def->observation + def->estimates;
     // NOLINTNEXTLINE(clang-analyzer-core.NonNullParamChecker): one without values wants actions
     memcpy(job->actions + (int64_t)first * def->actions, mean,
            (size_t)rows * (size_t)def->actions * sizeof *mean);
-    const float *input = outputs->actor_input + def->observation;
-    for (int r = 0; r < rows; r++, input += network->actor_input) {
-        if (job->estimates) {
-            memcpy(job->estimates + (int64_t)(first + r) * def->estimates, input,
-                   (size_t)def->estimates * sizeof *input);
-        }
-        if (job->latent) {
-            memcpy(job->latent + (int64_t)(first + r) * def->latent, input + def->estimates,
-                   (size_t)def->latent * sizeof *input);
-        }
-    }
+    copy_columns(heads, network->heads, def->estimates, first, rows, inside->estimates);
+    copy_columns(heads + def->estimates, network->heads, def->latent, first, rows, inside->latent);
+    copy_columns(network_theta(network, outputs), network->theta, network->theta, first, rows,
+                 inside->theta);
+    copy_columns(outputs->actor_input + modulated, network->actor_input, def->latent, first, rows,
+                 inside->modulated);
 }
 
 static void value_chunk(const PolicyJob *job, int first, int rows, const MlpOutputs *outputs) {
@@ -166,16 +175,26 @@ static void run_job(PolicyJob *job, Pool *pool) {
     }
 }
 
-void policy_act(Policy *policy, Pool *pool, int rows, const float *history, float *actions,
-                float *estimates, float *latent) {
+void policy_act_inside(Policy *policy, Pool *pool, int rows, const float *history,
+                       const PolicyInstead *instead, float *actions, const PolicyInside *inside) {
     const PolicyRows all = {.blocks = 1, .runs = 1, .cut = {0, rows}};
     PolicyJob job = {.policy = policy,
                      .rows = &all,
                      .input = history,
                      .actions = actions,
-                     .estimates = estimates,
-                     .latent = latent};
+                     .inside = *inside,
+                     .instead = instead};
     run_job(&job, pool);
+}
+
+void policy_act(Policy *policy, Pool *pool, int rows, const float *history, float *actions,
+                float *estimates, float *latent) {
+    const PolicyInside inside = {.estimates = estimates, .modulated = latent};
+    policy_act_inside(policy, pool, rows, history, NULL, actions, &inside);
+}
+
+int policy_theta(const Policy *policy) {
+    return policy->network.theta;
 }
 
 void policy_act_rows(Policy *policy, Pool *pool, const PolicyRows *rows, const float *history,

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "base/pool.h"
+#include "learn/inside.h"
 #include "learn/policy_def.h"
 #include "mild/error.h"
 
@@ -23,6 +24,11 @@ float *policy_parameters(Policy *policy); /* flat, policy_parameter_count() */
  * the pool (NULL: caller's thread). One caller at a time per policy. */
 void policy_act(Policy *policy, Pool *pool, int rows, const float *history, float *actions,
                 float *estimates, float *latent);
+/* The same actions from an actor that gets other numbers (NULL: its own), and all that passes
+ * inside. policy_theta: numbers of theta in a row. */
+void policy_act_inside(Policy *policy, Pool *pool, int rows, const float *history,
+                       const PolicyInstead *instead, float *actions, const PolicyInside *inside);
+int policy_theta(const Policy *policy);
 /* Critic values [rows] for critic inputs [rows][critic_input]. */
 void policy_value(Policy *policy, Pool *pool, int rows, const float *critic, float *values);
 const float *policy_std(const Policy *policy); /* [actions] current standard deviation */

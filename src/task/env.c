@@ -72,7 +72,7 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     task_randomize(env, def, robot);
     env->terrain = *terrain;
     env->variation.rigid = rigid;
-    env->variation.rigid_friction = 0.8;
+    env->variation.rigid_friction = TASK_RIGID_FRICTION;
     start_episode(env, def, robot, sim, view);
 }
 

@@ -13,6 +13,8 @@
 
 #define TASK_FRAMES 6 /* H + 1, newest last (paper, H = 5) */
 
+/* [-] Friction of rigid ground that a caller has chosen (task_env_reset_on). */
+#define TASK_RIGID_FRICTION 0.8
 /* Scale of the feet heights among the estimates, so that centimetres count as much in the
  * regression as velocities in m/s. */
 #define TASK_HEIGHT_SCALE 10.0
@@ -137,7 +139,7 @@ void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_
 void task_env_reset(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                     const TaskView *view);
 /* The same, but the caller has chosen the terrain, except for its map, and whether to use the
- * engine's rigid ground. The map is that of the TaskDef. */
+ * engine's rigid ground, with the friction TASK_RIGID_FRICTION. The map is that of the TaskDef. */
 void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                        const MildTerrain *terrain, int rigid, const TaskView *view);
 /* One policy step. When the episode ends, with auto_reset a new one is drawn and its first

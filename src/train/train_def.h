@@ -39,5 +39,8 @@ int train_is_batch(const TrainDef *def);
 TrainDef train_def_default(void);
 extern const MildField train_fields[];
 extern const int train_field_count;
+/* Of these, device and robots, which evaluation has too. */
+extern const MildField train_place_fields[];
+extern const int train_place_field_count;
 
 #endif

@@ -79,6 +79,44 @@ for model in $models; do
         "--randomize.model=$model"
 done
 
+# evaluation: turning, pushes, courses with rigid ground, what passes inside, parts taken out
+expect 0 'turning .* of 0.40 rad/s' "$mild" eval --ground grass --turn 0.4 --speed 0.3 --trials 1 --seconds 3
+expect 0 'sideways .* of 0.20 m/s' "$mild" eval --ground grass --sideways 0.2 --trials 1 --seconds 0.2
+expect 0 'rubber+rigid .*1/1 ' "$mild" eval --ground rubber+rigid --model con_spring --trials 1 --seconds 0.2
+expect 0 '1/1 ' "$mild" eval --ground grass --speed=-1.5,1.5 --sideways=-1.5 --turn=1.5 --push 0.3 --trials 1 --seconds 0.2 --json told.json
+grep -q '"turn":.*1.5' told.json && grep -q '"push":.*0.3' told.json || fail "told.json: $(cat told.json)"
+bad "outside" "$mild" eval --turn 1.6
+bad "outside" "$mild" eval --push=-1
+bad "nearest is 'history'" "$mild" eval --ablate histroy
+bad "give --controller learned" "$mild" eval --controller stand --latent latent.csv --trials 1 --seconds 0.1
+bad "give --controller learned" "$mild" eval --controller zero --ablate z --trials 1 --seconds 0.1
+expect 0 '2/2' "$mild" eval --ground rigid,rubber+rigid --trials 2 --seconds 0.2 --latent latent.csv
+awk -F, 'NR == 1 { columns = NF; next } NF != columns { exit 1 } { n[$2]++ }
+    END { exit !(NR == 81 && columns == 50 && n["rigid"] == 40 && n["rubber"] == 40) }' latent.csv ||
+    fail "rows of latent.csv: $(head -2 latent.csv)"
+"$mild" eval --ground rigid --trials 1 --seconds 0.1 --latent - 2>/dev/null | head -1 | grep -q '^trial,ground,' ||
+    fail "--latent -: standard output is not the CSV alone"
+bad "No space left" "$mild" eval --ground rigid --trials 1 --seconds 0.1 --latent /dev/full
+torque() { "$mild" eval --ground grass --trials 2 --seconds 0.3 "$@" --json - 2>/dev/null | sed -n 's/.*"torque_max": *//p'; }
+whole=$(torque)
+for part in z modulation estimates history; do
+    [ -n "$whole" ] && [ "$(torque --ablate $part)" != "$whole" ] || fail "--ablate $part changes nothing"
+done
+
+# evaluation by the batch engine: the same whatever the threads, and what it has not is refused with the remedy
+batch=("$mild" eval --train.robots=batch --trials 2 --seconds 0.3)
+expect 0 'foam45 .*2/2 ' "${batch[@]}" --ground rigid,foam45 --speed 0.3,0.6 --turn 0.2 --threads 1 --json one.json
+expect 0 'foam45 .*2/2 ' "${batch[@]}" --ground rigid,foam45 --speed 0.3,0.6 --turn 0.2 --threads 2 --json two.json
+cmp -s one.json two.json || fail "rows of the batch engine depend on --threads"
+expect 0 'grass .*2/2 ' "${batch[@]}" --ground rigid,grass --terrain.kind=waves
+for option in "--controller stand" "--ground rubber+grass" "--ground clay" "--terrain.memory=true" "--task.newton=0" "--trials 9999 --speed 0.1,0.2,0.3,0.4" \
+    "--push 0.5" "--latent latent.csv" "--ablate z"; do
+    bad "train.robots *= *mujoco" "${batch[@]}" $option
+done
+bad "train.device = gpu: neither cpu, cuda nor cuda:N" "${batch[@]}" --train.device=gpu
+bad "leave it out, or give --train.robots=batch" "$mild" eval --train.device=cuda --train.robots=mujoco
+bad "nearest is 'train.robots'" "$mild" eval --train.robot=batch
+
 # terrain
 bad "rigid is the engine's own contact and has no materials" "$mild" eval --ground rigid --terrain.patches=stripes
 for option in "--ground rigid" "--ground sand_loose --model rigid"; do

@@ -76,7 +76,7 @@ printf 'X' | dd of=torn/policy.safetensors bs=1 seek=20000 conv=notrunc 2>/dev/n
 bad "damaged" "$mild" eval --policy torn/policy.safetensors
 bad "nowhere.safetensors: cannot read" "$mild" eval --policy nowhere.safetensors
 bad "unknown ground 'foam54'" "$mild" eval --policy whole/policy.safetensors --ground rigid,foam54
-bad "part of a course" "$mild" eval --policy whole/policy.safetensors --ground rubber+rigid
+bad "unknown ground 'rigidd'" "$mild" eval --policy whole/policy.safetensors --ground rubber+rigidd
 
 # the evaluation's JSON: its keys, in the contract's order, and numbers as they must be
 good "$mild" eval --policy whole/policy.safetensors --ground rigid,rubber+sand_loose --speed 0,0.6 --trials 2 --seconds 3 \

@@ -12,8 +12,9 @@
 #include <cmocka.h>
 
 #include "base/random.h"
-#include "control/controller.h"
+#include "control/learned.h"
 #include "learn/policy.h"
+#include "learn/policy_private.h"
 #include "sa01.h"
 
 #define PATH "build_test_controller.safetensors"
@@ -153,6 +154,117 @@ static void remembers_nothing(void **state) {
     unlink(PATH);
 }
 
+/* ---- parts taken out ---- */
+
+static double worst_gap(const float *a, const float *b, int count) {
+    double worst = 0;
+    for (int i = 0; i < count; i++) {
+        worst = fmax(worst, fabs((double)a[i] - (double)b[i]));
+    }
+    return worst;
+}
+
+/* The same file, but that z~ = z: its modulation says 1 and 0 whatever it is told. */
+static void plain_actions(Policy *policy, const float *history, float *actions) {
+    const char *name;
+    const Mlp *modulation = network_mlp(&policy->network, 2, &name);
+    const MlpLayer *last = &modulation->layer[modulation->layers - 1];
+    const int width = policy->network.theta;
+    float *p = policy->parameters;
+    assert_string_equal(name, "modulation");
+    for (int i = 0; i < width * policy->network.def.modulation_hidden; i++) {
+        p[last->weight + i] = 0;
+    }
+    for (int i = 0; i < width; i++) {
+        p[last->bias + i] = i < width / 2;
+    }
+    policy_act(policy, NULL, ENVS, history, actions, NULL, NULL);
+}
+
+/* Rows of a controller without a part. means: latent, then estimates. */
+static const LearnedInside *act_without(Controller *controller, Ablation part, const float *means,
+                                        float *actions) {
+    MildError error = {0};
+    const LearnedInside *inside;
+    assert_int_equal(learned_watch(controller, &inside, &error), MILD_OK);
+    learned_ablate(controller, part, means);
+    controller->act(controller->self, ENVS, made, actions);
+    return inside;
+}
+
+/* Row 0 gets its own z or its own estimates as the mean and acts as before; the others do not. */
+static void means_take_the_place(Controller *controller, Ablation part, const float *whole) {
+    float means[64], actions[ENVS * SA01_JOINTS], modulated[ENVS * 64];
+    const LearnedInside *inside = act_without(controller, ABLATION_none, NULL, actions);
+    const size_t latent = (size_t)inside->latent, estimates = (size_t)inside->estimates;
+    assert_memory_equal(actions, whole, sizeof actions);
+    memcpy(means, inside->rows.latent, latent * sizeof *means);
+    memcpy(means + latent, inside->rows.estimates, estimates * sizeof *means);
+    memcpy(modulated, inside->rows.modulated, ENVS * latent * sizeof *modulated);
+    act_without(controller, part, means, actions);
+    assert_memory_equal(actions, whole, SA01_JOINTS * sizeof *actions);
+    for (int e = 1; e < ENVS; e++) {
+        const int row = e * SA01_JOINTS;
+        assert_true(worst_gap(actions + row, whole + row, SA01_JOINTS) > 1e-4);
+    }
+    const double changed = worst_gap(modulated, inside->rows.modulated, ENVS * inside->latent);
+    assert_true(part == ABLATION_z ? changed > 0.1 : changed == 0);
+}
+
+static void parts_are_taken_out(void **state) {
+    (void)state;
+    MildError error = {0};
+    PolicyDef def = task_policy_def();
+    Policy *policy = save_policy(&def);
+    Controller controller = {0};
+    static float history[ENVS][SA01_HISTORY];
+    float whole[ENVS * SA01_JOINTS], actions[ENVS * SA01_JOINTS], wanted[ENVS * SA01_JOINTS];
+    assert_int_equal(controller_learned(PATH, robot, NULL, ENVS, &controller, &error), MILD_OK);
+    fill_histories(made, 5);
+    controller.act(controller.self, ENVS, made, whole);
+    means_take_the_place(&controller, ABLATION_z, whole);
+    means_take_the_place(&controller, ABLATION_estimates, whole);
+    for (int e = 0; e < ENVS; e++) {
+        const float *newest = task_env_history(made[e]) + SA01_HISTORY - SA01_OBSERVATION;
+        for (int i = 0; i < SA01_HISTORY; i++) {
+            history[e][i] = newest[i % SA01_OBSERVATION];
+        }
+    }
+    act_without(&controller, ABLATION_history, NULL, actions);
+    policy_act(policy, NULL, ENVS, history[0], wanted, NULL, NULL);
+    assert_true(worst_gap(actions, wanted, ENVS * SA01_JOINTS) < 1e-6);
+    assert_true(worst_gap(actions, whole, ENVS * SA01_JOINTS) > 1e-3);
+    const LearnedInside *inside = act_without(&controller, ABLATION_modulation, NULL, actions);
+    for (int e = 0; e < ENVS; e++) {
+        memcpy(history[e], task_env_history(made[e]), sizeof history[e]);
+    }
+    plain_actions(policy, history[0], wanted);
+    assert_true(worst_gap(actions, wanted, ENVS * SA01_JOINTS) < 1e-6);
+    assert_true(worst_gap(actions, whole, ENVS * SA01_JOINTS) > 1e-4);
+    assert_memory_equal(inside->rows.latent, inside->rows.modulated,
+                        ENVS * (size_t)inside->latent * sizeof(float));
+    act_without(&controller, ABLATION_none, NULL, actions);
+    assert_memory_equal(actions, whole, sizeof whole);
+    controller_destroy(&controller);
+    policy_destroy(policy);
+    unlink(PATH);
+}
+
+static void parts_have_names(void **state) {
+    (void)state;
+    MildError error = {0};
+    Ablation part = ABLATION_none;
+    const LearnedInside *inside;
+    Controller other = {.name = "other"};
+    assert_int_equal(ablation_find("estimates", &part, &error), MILD_OK);
+    assert_int_equal(part, ABLATION_estimates);
+    assert_int_equal(ablation_find("none", &part, &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(ablation_find("histroy", &part, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "nearest is 'history'"));
+    assert_int_equal(learned_watch(&other, &inside, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "--controller learned"));
+}
+
 /* Whose shape is not the task's is refused with both shapes named, and nothing is made. */
 static void another_shape_is_refused(void **state) {
     (void)state;
@@ -209,7 +321,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(acts_as_its_policy),       cmocka_unit_test(remembers_nothing),
         cmocka_unit_test(another_shape_is_refused), cmocka_unit_test(destroy_is_called_once),
-        cmocka_unit_test(a_missing_file_is_named),
+        cmocka_unit_test(a_missing_file_is_named),  cmocka_unit_test(parts_are_taken_out),
+        cmocka_unit_test(parts_have_names),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -251,10 +251,84 @@ static void device_follows_mujoco(void **unused) {
     follow(0, &map);
 }
 
+/* Trials have what was chosen for them in every episode, and no more: ground, the map's origin,
+ * random numbers by their stream, a command that stays, a start along x. */
+static void trials_are_chosen(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    enum { TRIALS = 6 };
+    MildMapDef waves = mild_map_def_default();
+    waves.kind = MILD_MAP_WAVES;
+    TaskDef def = some_def();
+    MildMap *map = mild_map_create(&waves, &error);
+    TaskGround ground[3];
+    const TaskGrounds chosen = {3, ground};
+    CrowdTrial trial[TRIALS];
+    double command[TRIALS][3];
+    static float history[TRIALS][SA01_HISTORY], action[TRIALS][SA01_JOINTS], reward[TRIALS];
+    static CrowdSample sample[TRIALS][2];
+    uint8_t flags[3][TRIALS];
+    const VecView view = {.history = history[0]};
+    if (!map) {
+        fail_msg("%s", error.text);
+    }
+    def.map = map;
+    Robot *robot = robot_create(SA01, &error);
+    Pool *pool = pool_create(2);
+    for (int i = 0; i < 3; i++) {
+        ground[i].material = mild_material_default();
+        ground[i].material.k_pen = 300 + 100 * i;
+        ground[i].depth = 0.01 * i;
+    }
+    for (int i = 0; i < TRIALS; i++) {
+        trial[i] = (CrowdTrial){.stream = (uint32_t)(i % 2), .ground = i / 2, .rigid = i == 3};
+        command[i][0] = 0.1 * i;
+        command[i][1] = -0.2;
+        command[i][2] = 0.3;
+    }
+    const CrowdDef of = {.task = &def,
+                         .robot = robot,
+                         .pool = pool,
+                         .device = MILD_BATCH_HOST,
+                         .envs = TRIALS,
+                         .seed = 7,
+                         .chosen = &chosen,
+                         .trial = trial};
+    Crowd *crowd = crowd_create(&of, &error);
+    if (!crowd) {
+        fail_msg("%s", error.text);
+    }
+    assert_int_equal(crowd_samples(crowd), 2);
+    crowd_watch(crowd, sample[0]);
+    assert_int_equal(crowd_command(crowd, command[0], &error), MILD_OK);
+    assert_int_equal(crowd_reset(crowd, &view, NULL, &error), MILD_OK);
+    for (int t = 0; t <= 130; t++) { /* falls and time limits begin further episodes */
+        for (int i = 0; i < TRIALS; i++) {
+            const TaskEnv *env = crowd_env(crowd, i);
+            assert_true(env->index == (uint32_t)(i % 2) && env->ground[0] == i / 2);
+            assert_true(env->terrain.materials[0].k_pen == 300 + 100 * (i / 2));
+            assert_true(env->terrain.map_x == 0 && env->terrain.map_y == 0);
+            assert_true(env->variation.rigid == (i == 3) && env->variation.rigid_friction == 0.8);
+            assert_memory_equal(env->command, command[i], sizeof env->command);
+            assert_true(t > 0 || (env->step == 0 && env->robot.qpos[6] == 0));
+        }
+        assert_true(t > 0 || memcmp(crowd_env(crowd, 0)->kp_scale, crowd_env(crowd, 4)->kp_scale,
+                                    SA01_JOINTS * sizeof(double)) == 0);
+        assert_int_equal(
+            crowd_step(crowd, action[0], reward, flags[0], flags[1], flags[2], &view, NULL, &error),
+            MILD_OK);
+    }
+    crowd_destroy(crowd);
+    pool_destroy(pool);
+    robot_destroy(robot);
+    mild_map_destroy(map);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follows_mujoco),
         cmocka_unit_test(follows_mujoco_on_a_map),
+        cmocka_unit_test(trials_are_chosen),
         cmocka_unit_test(device_follows_mujoco),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -38,8 +38,6 @@ static void courses_have_bounds(void **state) {
     Scene scene;
     MildError error = {0};
     char name[64], text[400] = "rubber";
-    assert_int_not_equal(scene_make(&scene, "rubber+rigid", 2, &error), MILD_OK);
-    assert_non_null(strstr(error.text, "rigid is the engine's own floor"));
     assert_int_not_equal(scene_make(&scene, "sand", 2, &error), MILD_OK);
     assert_non_null(strstr(error.text, "known: rigid, "));
     for (int i = 0; i < mild_material_preset_count(); i++) {
@@ -143,7 +141,7 @@ static EvalRow run(Zero *zero, const char *ground, EvalDef eval, int threads) {
     TaskDef def = task_def_default();
     task_def_make_nominal(&def);
     *zero = (Zero){0};
-    Controller controller = {zero, "zero", zero_act, zero_destroy};
+    Controller controller = {zero, "zero", zero_act, zero_destroy, NULL};
     Pool *pool = pool_create(threads);
     Scene scene;
     EvalRow row;
@@ -206,6 +204,22 @@ static void stopped_trials_are_told_to_stand(void **state) {
     run(&zero, "rubber", eval, 1);
     assert_true(zero.command[0] == 0 && zero.command[1] == 0 && zero.command[2] == 0);
     assert_int_equal(zero.moving, 20);
+}
+
+/* Told to turn, a robot is neither held on its heading nor asked to stand. */
+static void turning_is_asked_for(void **state) {
+    (void)state;
+    Zero zero;
+    EvalDef eval = {.speed = 0.3, .turn = 0.4, .trials = 3, .seconds = 0.3, .seed = 1};
+    EvalRow row = run(&zero, "rubber", eval, 1);
+    assert_true(zero.command[0] == 0.3 && zero.command[2] == 0.4 && zero.most_turn == 0.4);
+    assert_true(row.turn == 0.4);
+    eval.speed = 0;
+    run(&zero, "rubber", eval, 1);
+    assert_true(zero.command[0] == 0 && zero.command[2] == 0.4);
+    eval.stop = 0.2;
+    run(&zero, "rubber", eval, 1);
+    assert_true(zero.command[2] == 0);
 }
 
 /* As many steps as come nearest to the time. */
@@ -322,6 +336,109 @@ static void speed_is_measured_until_the_stop(void **state) {
     assert_true(stopped.energy > before.energy && fabs(stopped.seconds - 4) < 1e-9);
 }
 
+/* ---- pushes ---- */
+
+enum { PUSHED = 5, PUSH_STEPS = 420 };
+
+/* A controller that notes the base's speed before it acts. */
+typedef struct {
+    Controller inner;
+    int step;
+    double speed[PUSHED][PUSH_STEPS][2];
+} Noting;
+
+static void noting_act(void *self, int rows, TaskEnv *const *envs, float *actions) {
+    Noting *noting = self;
+    for (int i = 0; i < rows; i++) {
+        memcpy(noting->speed[i][noting->step], envs[i]->robot.qvel, 2 * sizeof(double));
+    }
+    noting->step++;
+    noting->inner.act(noting->inner.self, rows, envs, actions);
+}
+
+static Noting noted[2];
+
+static void walk_pushed(Noting *noting, double push) {
+    MildError error = {0};
+    const EvalDef eval = {
+        .speed = 0.3, .push = push, .trials = PUSHED, .seconds = PUSH_STEPS * 0.01, .seed = 1};
+    TaskDef def = task_def_default();
+    task_def_make_nominal(&def);
+    Scene scene;
+    EvalRow row;
+    Pool *pool = pool_create(2);
+    assert_int_equal(scene_make(&scene, "rubber", 2, &error), MILD_OK);
+    assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, pool,
+                                        PUSHED, &noting->inner, &error),
+                     MILD_OK);
+    Controller controller = {noting, "noting", noting_act, NULL, NULL};
+    assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
+                     MILD_OK);
+    assert_true(row.push == push && row.success == PUSHED);
+    controller_destroy(&noting->inner);
+    pool_destroy(pool);
+}
+
+/* Every 4 s, each trial at another time, by the speed asked for, each in another direction; until
+ * then nothing changes by a bit. */
+static void pushes_come_every_four_seconds(void **state) {
+    (void)state;
+    double angle[PUSHED];
+    walk_pushed(&noted[0], 0);
+    walk_pushed(&noted[1], 0.3);
+    for (int i = 0; i < PUSHED; i++) {
+        const int at = i ? 400 - 97 * i : 400;
+        const double *before = noted[0].speed[i][at], *after = noted[1].speed[i][at];
+        assert_memory_equal(noted[0].speed[i], noted[1].speed[i],
+                            (size_t)at * sizeof noted[0].speed[i][0]);
+        assert_true(fabs(hypot(after[0] - before[0], after[1] - before[1]) - 0.3) < 1e-12);
+        angle[i] = atan2(after[1] - before[1], after[0] - before[0]);
+        for (int j = 0; j < i; j++) {
+            assert_true(fabs(angle[i] - angle[j]) > 1e-3);
+        }
+    }
+}
+
+/* ---- rigid ground inside a course ---- */
+
+static EvalRow walk_on(const char *ground) {
+    MildError error = {0};
+    TaskDef def = task_def_default();
+    task_def_make_nominal(&def);
+    Controller controller;
+    const EvalDef eval = {.speed = 0.5, .trials = 3, .seconds = 5, .seed = 1};
+    Scene scene;
+    EvalRow row;
+    Pool *pool = pool_create(2);
+    assert_int_equal(scene_make(&scene, ground, 50, &error), MILD_OK);
+    assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, pool,
+                                        3, &controller, &error),
+                     MILD_OK);
+    assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
+                     MILD_OK);
+    controller_destroy(&controller);
+    pool_destroy(pool);
+    return row;
+}
+
+/* A course whose first 50 m are rigid is walked as the engine's own floor is, and not as rubber. */
+static void rigid_inside_a_course(void **state) {
+    (void)state;
+    Scene scene;
+    MildError error = {0};
+    char name[64];
+    assert_int_equal(scene_make(&scene, "foam45+rigid+rubber", 2, &error), MILD_OK);
+    assert_false(scene.rigid);
+    assert_int_equal(mild_material_check(&scene.terrain.materials[1], &error), MILD_OK);
+    assert_string_equal(scene_ground_at(&scene, 3, 0, name, sizeof name), "rigid");
+    EvalRow course = walk_on("rigid+foam45"), floor = walk_on("rigid"), soft = walk_on("rubber");
+    assert_true(course.success == 3 && floor.success == 3);
+    assert_true(fabs(course.velocity - floor.velocity) < 0.02);
+    assert_true(fabs(course.cot / floor.cot - 1) < 0.05);
+    assert_true(fabs(course.clearance - floor.clearance) < 0.004);
+    assert_true(course.penetration < 0.007 && soft.penetration > 0.02);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scenes_by_name),
@@ -330,6 +447,9 @@ int main(void) {
         cmocka_unit_test(zero_action_falls_and_is_counted),
         cmocka_unit_test(short_trials_succeed),
         cmocka_unit_test(stopped_trials_are_told_to_stand),
+        cmocka_unit_test(turning_is_asked_for),
+        cmocka_unit_test(pushes_come_every_four_seconds),
+        cmocka_unit_test(rigid_inside_a_course),
         cmocka_unit_test(time_is_rounded_to_steps),
         cmocka_unit_test(a_row_is_what_its_trials_did),
         cmocka_unit_test(the_shipped_policy_walks),

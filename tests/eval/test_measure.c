@@ -95,6 +95,50 @@ static void power_and_speed(void **state) {
     assert_close("end of the steady part", m.end[0], 0.5, 1e-12);
 }
 
+/* On a circle to the left: 0.5 m/s forward and 0.1 m/s to the left of a heading that turns by 0.8
+ * rad/s, 10 s, so that the heading passes pi and the robot comes back to where it was. The steady
+ * part lasts 8 s. */
+static void speeds_of_a_turning_robot(void **state) {
+    (void)state;
+    const double v = 0.5, left = 0.1, w = 0.8;
+    const uint8_t fallen = 0;
+    EvalDef eval = {.speed = 0.5, .turn = 0.7, .trials = 1, .seconds = 10};
+    Script s;
+    Measure m;
+    EvalRow row;
+    script_start(&s);
+    measure_start(&m, DT);
+    for (int k = 1; k <= STEPS(10); k++) {
+        const double yaw = w * k * DT;
+        s.sample.base[0] = (v * sin(yaw) + left * (cos(yaw) - 1)) / w;
+        s.sample.base[1] = (v * (1 - cos(yaw)) + left * sin(yaw)) / w;
+        s.sample.yaw = remainder(yaw, 2 * 3.141592653589793);
+        measure_sample(&m, &s.sample);
+    }
+    assert_close("turned", m.turned, w * 8, 1e-9);
+    assert_close("way forward", m.way[0], v * 8, 1e-2);
+    assert_close("way to the left", m.way[1], left * 8, 1e-2);
+    eval_summarise(&row, "foam45", &eval, &m, &fallen, 400);
+    assert_close("speed", row.velocity, v, 1e-3);
+    assert_close("speed to the left", row.velocity_sideways, left, 1e-3);
+    assert_close("turning", row.velocity_turn, w, 1e-9);
+    assert_true(row.turn == 0.7);
+    eval.turn = 0; /* along x, however it turns */
+    eval_summarise(&row, "foam45", &eval, &m, &fallen, 400);
+    assert_close("speed along x", row.velocity, (m.end[0] - m.start[0]) / 8, 1e-12);
+    assert_true(fabs(row.velocity) < 0.1);
+}
+
+/* The heading of a base that is turned about z, then pitched and rolled. */
+static void yaw_of_an_orientation(void **state) {
+    (void)state;
+    for (double yaw = -3; yaw < 3.1; yaw += 0.5) {
+        const double cz = cos(0.5 * yaw), sz = sin(0.5 * yaw), cy = cos(0.2), sy = sin(0.2);
+        const double q[4] = {cz * cy, -sz * sy, cz * sy, sz * cy};
+        assert_close("yaw", measure_yaw(q), yaw, 1e-12);
+    }
+}
+
 static void nothing_is_steady_before_two_seconds(void **state) {
     (void)state;
     Script s;
@@ -566,6 +610,8 @@ static void a_robot_is_read(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(power_and_speed),
+        cmocka_unit_test(speeds_of_a_turning_robot),
+        cmocka_unit_test(yaw_of_an_orientation),
         cmocka_unit_test(nothing_is_steady_before_two_seconds),
         cmocka_unit_test(one_stance_and_one_swing),
         cmocka_unit_test(contact_is_a_load_above_five_newton),
