@@ -434,3 +434,7 @@ MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
 size_t crowd_bytes(const Crowd *crowd) {
     return crowd_robot_bytes(crowd) * (size_t)crowd->arrays.envs;
 }
+
+CrowdEpisode crowd_episode(const Crowd *crowd, int i) {
+    return crowd_host_episode(&crowd->arrays, i);
+}
