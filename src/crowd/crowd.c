@@ -482,3 +482,7 @@ int crowd_samples(const Crowd *crowd) {
 size_t crowd_bytes(const Crowd *crowd) {
     return crowd_robot_bytes(crowd) * (size_t)crowd->arrays.envs;
 }
+
+CrowdEpisode crowd_episode(const Crowd *crowd, int i) {
+    return crowd_host_episode(&crowd->arrays, i);
+}

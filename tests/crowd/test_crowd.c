@@ -176,6 +176,32 @@ static void draw_actions(int t) {
     }
 }
 
+static void assert_near(double a, double b, double tolerance) {
+    assert_true(fabs(a - b) <= tolerance);
+}
+
+/* The episode of an environment is that of the CPU, rounded. */
+static void same_episode(int e) {
+    size_t bytes;
+    const char *envs = vec_state(pair.vec, &bytes);
+    const TaskEnv *a = (const TaskEnv *)(const void *)(envs + (size_t)e * (bytes / ENVS));
+    const CrowdEpisode b = crowd_episode(pair.crowd, e);
+    assert_true(a->index == b.index && a->step == b.step);
+    assert_true(a->ground[0] == b.ground[0] && a->variation.rigid == b.rigid);
+    assert_near(a->variation.rigid_friction, b.friction, 1e-7);
+    assert_near(a->terrain.map_x, b.map[0], 1e-6);
+    assert_near(a->terrain.map_y, b.map[1], 1e-6);
+    for (int i = 0; i < 3; i++) {
+        assert_near(a->command[i], b.command[i], 1e-7);
+    }
+    for (int i = 0; i < 7 + SA01_JOINTS; i++) {
+        assert_near(a->robot.qpos[i], b.qpos[i], i == 2 ? 1e-6 : 3e-7);
+    }
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        assert_near(a->kp_scale[i], b.kp_scale[i], 1e-7);
+    }
+}
+
 /* Robots that stagger under random actions, fall and begin again. Within float's rounding as long
  * as a robot has not been thrown: legs that swing freely against their limits double a difference
  * within a few steps, so that an environment is left alone once it differs, until its next
@@ -190,6 +216,9 @@ static void follow(int device, const MildMapDef *on) {
     pair_reset();
     for (int e = 0; e < ENVS; e++) {
         compare(-1, e, 2e-5);
+        if (device == MILD_BATCH_HOST) {
+            same_episode(e);
+        }
     }
     for (int t = 0; t < STEPS; t++) {
         draw_actions(t);
@@ -209,6 +238,9 @@ static void follow(int device, const MildMapDef *on) {
             assert_int_equal(pair.a.timeout[e], pair.b.timeout[e]);
             assert_int_equal(pair.a.valid[e], pair.b.valid[e]);
             compare(t, e, 1e-2);
+            if (device == MILD_BATCH_HOST && pair.b.done[e]) {
+                same_episode(e);
+            }
         }
     }
     printf(
