@@ -336,16 +336,18 @@ static void trials_are_chosen(void **unused) {
     assert_int_equal(crowd_reset(crowd, &view, NULL, &error), MILD_OK);
     for (int t = 0; t <= 130; t++) { /* falls and time limits begin further episodes */
         for (int i = 0; i < TRIALS; i++) {
-            const TaskEnv *env = crowd_env(crowd, i);
-            assert_true(env->index == (uint32_t)(i % 2) && env->ground[0] == i / 2);
-            assert_true(env->terrain.materials[0].k_pen == 300 + 100 * (i / 2));
-            assert_true(env->terrain.map_x == 0 && env->terrain.map_y == 0);
-            assert_true(env->variation.rigid == (i == 3) && env->variation.rigid_friction == 0.8);
-            assert_memory_equal(env->command, command[i], sizeof env->command);
-            assert_true(t > 0 || (env->step == 0 && env->robot.qpos[6] == 0));
+            const CrowdEpisode is = crowd_episode(crowd, i);
+            assert_true(is.index == (uint32_t)(i % 2) && is.ground[0] == i / 2);
+            assert_true(is.map[0] == 0 && is.map[1] == 0);
+            assert_true(is.rigid == (i == 3));
+            assert_near(is.friction, 0.8, 1e-7);
+            for (int k = 0; k < 3; k++) {
+                assert_near(is.command[k], command[i][k], 1e-7);
+            }
+            assert_true(t > 0 || (is.step == 0 && is.qpos[6] == 0));
         }
-        assert_true(t > 0 || memcmp(crowd_env(crowd, 0)->kp_scale, crowd_env(crowd, 4)->kp_scale,
-                                    SA01_JOINTS * sizeof(double)) == 0);
+        const CrowdEpisode first = crowd_episode(crowd, 0), fourth = crowd_episode(crowd, 4);
+        assert_true(t > 0 || memcmp(first.kp_scale, fourth.kp_scale, sizeof first.kp_scale) == 0);
         assert_int_equal(
             crowd_step(crowd, action[0], reward, flags[0], flags[1], flags[2], &view, NULL, &error),
             MILD_OK);
