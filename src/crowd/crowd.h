@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "base/pool.h"
+#include "crowd/episode.h"
 #include "crowd/trial.h"
 #include "task/vec.h"
 
@@ -64,17 +65,7 @@ MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error);
 void crowd_watch(Crowd *crowd, CrowdSample *sample);
 int crowd_samples(const Crowd *crowd); /* physics steps of a policy step */
 size_t crowd_bytes(const Crowd *crowd);
-/* What the episode of an environment is, on the host only. */
-typedef struct {
-    uint32_t index, step;           /* of TaskEnv, as all of these */
-    int ground[MILD_MATERIALS_MAX]; /* by label */
-    int rigid;                      /* bool */
-    double friction;                /* [-] of rigid ground */
-    double map[2];                  /* [m] */
-    double command[3];              /* [m/s, m/s, rad/s] */
-    double qpos[ROBOT_NQ_MAX];
-    double kp_scale[ROBOT_JOINTS_MAX];
-} CrowdEpisode;
+/* The episode of an environment, on the host only. */
 CrowdEpisode crowd_episode(const Crowd *crowd, int i);
 
 #endif

@@ -4,7 +4,7 @@
 #define CROWD_TEXT_H
 
 #include "crowd/arrays.h"
-#include "crowd/crowd.h"
+#include "crowd/episode.h"
 
 #define CROWD_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
 
