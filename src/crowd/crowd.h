@@ -36,7 +36,8 @@ typedef struct {
 Crowd *crowd_create(const CrowdDef *def, MildError *error);
 void crowd_destroy(Crowd *crowd); /* may be NULL */
 
-/* As vec_reset and vec_step; arrays in the memory of the device. stream: a cudaStream_t. */
+/* As vec_reset and vec_step; arrays in the memory of the device, the history not NULL. stream: a
+ * cudaStream_t. */
 MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildError *error);
 MildStatus crowd_step(Crowd *crowd, const float *action, float *reward, uint8_t *done,
                       uint8_t *timeout, uint8_t *valid, const VecView *next, void *stream,

@@ -1,4 +1,4 @@
-/* What the episode of an environment is, in the same numbers whatever text the environment is of. */
+/* The episode of an environment in the same numbers, whatever text the environment is of. */
 #ifndef CROWD_EPISODE_H
 #define CROWD_EPISODE_H
 

@@ -8,8 +8,8 @@
 
 #define CROWD_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
 
-/* [B] of an environment in CrowdArrays, by the text of the CPU or of a device, which may be compiled
- * for one robot. */
+/* [B] of an environment in CrowdArrays, by the text of the CPU or of a device, which may be
+ * compiled for one robot. */
 typedef struct {
     size_t stride;
     size_t robot;

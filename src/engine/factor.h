@@ -109,7 +109,7 @@ LANE_FN void engine_factorise(const EngineTree *tree, const Real *matrix, Real *
     engine_factorise_base(tree, matrix, factor, inverse);
 }
 
-/* mass <- M = L^T L again: M_ij is the sum of L_ki L_kj over k, which are i and what is behind it. */
+/* mass <- M = L^T L again: M_ij is the sum of L_ki L_kj over k, i and what is behind it. */
 LANE_FN void engine_multiply_out(const EngineTree *tree, const Real *factor, const Real *inverse,
                                  Real *mass) {
     EACH_LANE(l) {

@@ -11,8 +11,9 @@
  *
  * The ground reads work->foot_position, foot_rotation, foot_velocity, now.support.free_velocity and
  * now.support.ground.inverse_inertia, in the layout of ContactProblem, and writes work->wrench, all
- * of it, zeros for feet in the air. Nothing else passes between the two. After a step the state is new and poses are those of its beginning;
- * engine_begin without an action brings them up to date for an observer (measure.h).
+ * of it, zeros for feet in the air. Nothing else passes between the two. After a step the state is
+ * new and poses are those of its beginning; engine_begin without an action brings them up to date
+ * for an observer (measure.h).
  *
  * Loops are rolled but for the shortest ones: a GPU reads its instructions from a small cache, and
  * a step executes most of them once. */

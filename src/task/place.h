@@ -138,8 +138,8 @@ enum { PLACE_HISTORY = 1 };
  *
  *     for (int i = place_lane(); i < count; i += PLACE_LANES)
  *
- * and lane 0 adds to what is not in such a loop. What one lane writes another reads after
- * place_meet. */
+ * and lane 0 adds to what is not in such a loop; what all write is the same number. What one lane
+ * writes another reads after place_meet. */
 #ifdef __CUDACC__
 enum { PLACE_LANES = 8 };
 #else
