@@ -283,6 +283,13 @@ static void device_follows_mujoco(void **unused) {
     follow(0, &map);
 }
 
+/* The sample of a physics step above the map. */
+static void check_sample(const CrowdSample *sample, const MildTerrain *terrain) {
+    const double x = (double)sample->base[0], y = (double)sample->base[1];
+    const double above = (double)sample->base[2] - mild_terrain_height_at(terrain, x, y);
+    assert_true(sample->valid && fabs((double)sample->above - above) < 1e-5);
+}
+
 /* Trials have what was chosen for them in every episode, and no more: ground, the map's origin,
  * random numbers by their stream, a command that stays, a start along x. */
 static void trials_are_chosen(void **unused) {
@@ -305,6 +312,9 @@ static void trials_are_chosen(void **unused) {
         fail_msg("%s", error.text);
     }
     def.map = map;
+    const MildMaterial any = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(&any);
+    assert_int_equal(mild_terrain_set_map(&terrain, map, &error), MILD_OK);
     Robot *robot = robot_create(SA01, &error);
     Pool *pool = pool_create(2);
     for (int i = 0; i < 3; i++) {
@@ -351,6 +361,18 @@ static void trials_are_chosen(void **unused) {
         assert_int_equal(
             crowd_step(crowd, action[0], reward, flags[0], flags[1], flags[2], &view, NULL, &error),
             MILD_OK);
+        for (int i = 0; i < TRIALS; i++) {
+            check_sample(&sample[i][0], &terrain);
+            check_sample(&sample[i][1], &terrain);
+        }
+    }
+    /* one that is thrown diverges in the first physics step of the next policy step */
+    ((TaskEnv *)(uintptr_t)crowd_env(crowd, 2))->robot.qvel[0] = 1e4;
+    assert_int_equal(
+        crowd_step(crowd, action[0], reward, flags[0], flags[1], flags[2], &view, NULL, &error),
+        MILD_OK);
+    for (int i = 0; i < TRIALS; i++) {
+        assert_true(flags[2][i] == (i != 2) && sample[i][0].valid == (i != 2));
     }
     crowd_destroy(crowd);
     pool_destroy(pool);
