@@ -423,20 +423,19 @@ LANE_FN Real engine_line_search(const EngineTree *tree, EngineWork *work, int ed
         const LinePoint rows = engine_line_rows(tree, work, edges, t);
         const Real slope = smooth.slope + t * smooth.curvature + rows.slope;
         const Real next = t - slope / (smooth.curvature + rows.curvature + REAL_LEAST);
+        if (REAL_ABS(next - t) <= REAL_ROUNDING * t) {
+            return next;
+        }
         low = slope < 0 ? t : low;
         high = slope > 0 ? t : high;
-        const Real step = next > low && next < high ? next : (low + real_min(high, 2 * t)) / 2;
-        if (slope == 0 || REAL_ABS(step - t) <= REAL_ROUNDING * t) {
-            return t;
-        }
-        t = step;
+        t = next > low && next < high ? next : (low + real_min(high, 2 * t)) / 2;
     }
     return t;
 }
 
 /* acceleration <- acceleration + t change; the residue follows when the product is there. Returns
- * whether it moved by more than rounding. */
-LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t, int product) {
+ * the largest change over the largest acceleration then. */
+LANE_FN Real engine_move(const EngineTree *tree, EngineWork *work, Real t, int product) {
     Real moved[LANE_COPIES];
     Real size[LANE_COPIES];
     EACH_LANE(l) {
@@ -454,10 +453,13 @@ LANE_FN int engine_move(const EngineTree *tree, EngineWork *work, Real t, int pr
     }
     lanes_meet();
     const Real most = lane_max(moved);
-    return most > REAL_ROUNDING * lane_max(size);
+    return most / (lane_max(size) + REAL_LEAST);
 }
 
-/* From the acceleration without the rows to that with them; `edges`: engine_collide was called.
+/* From the acceleration without the rows to that with them; `edges`: engine_collide was called. The
+ * last step leaves the same rows pushing. It has a rounding error in proportion to its length, so
+ * one that comes back a long way from where those before it went is followed by another.
+ *
  * Needs the factor of M, limits and J; overwrites it, mass, half and, with edges, the wrench.
  * Returns Newton steps. */
 LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges) {
@@ -490,9 +492,10 @@ LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges
             engine_twists(tree, support, support->change, contact->twist_change);
         }
         const int others = engine_line_rows(tree, work, edges, 1).changed > 0; /* push then */
-        const Real length = others ? engine_line_search(tree, work, edges) : 1;
-        const int moved = engine_move(tree, work, length, others);
-        going = others && moved;
+        const int again = others || step > 1;
+        const Real length = again ? engine_line_search(tree, work, edges) : 1;
+        const Real moved = engine_move(tree, work, length, again);
+        going = again && moved > (others ? REAL_ROUNDING : 1);
     }
 }
 

@@ -25,7 +25,6 @@
 #define DT 0.0025
 #define LIMIT_DOUBLE 1e-9
 #define LIMIT_FLOAT 1e-4
-#define LIMIT_MAP 2e-4    /* of rigid ground in float on maps, whose cells are steep */
 #define LIMIT_WRENCH 1e-3 /* of rigid ground in float: small differences of stiff rows */
 
 /* ---- robots ---- */
@@ -278,11 +277,10 @@ static void print_worst(const char *name, int cases, const Worst at_double, cons
     }
 }
 
-/* limit: of the numbers in float. */
-static void check_worst(const Worst at_double, const Worst at_float, double limit) {
+static void check_worst(const Worst at_double, const Worst at_float) {
     for (int k = 0; k < ERRORS; k++) {
         assert_true(at_double[k] < LIMIT_DOUBLE);
-        assert_true(at_float[k] < (k == GROUND_WRENCH ? LIMIT_WRENCH : limit));
+        assert_true(at_float[k] < (k == GROUND_WRENCH ? LIMIT_WRENCH : LIMIT_FLOAT));
     }
 }
 
@@ -319,7 +317,7 @@ static void test_random_states(void **unused) {
         }
         print_worst(kit_name[k], cases[k], at_double, at_float);
         print_message("    beyond limits: %d; at most %d Newton steps\n", limited, newton);
-        check_worst(at_double, at_float, LIMIT_FLOAT);
+        check_worst(at_double, at_float);
         assert_true(limited > cases[k] / 5);
     }
 }
@@ -339,7 +337,7 @@ static void test_rigid_ground(void **unused) {
         }
         print_worst(kit_name[k], cases[k], at_double, at_float);
         print_message("    with rows: %d; at most %d Newton steps\n", touching, newton);
-        check_worst(at_double, at_float, LIMIT_FLOAT);
+        check_worst(at_double, at_float);
         assert_true(touching > cases[k] / 2);
     }
 }
@@ -428,7 +426,7 @@ static void run_relief(const Relief *relief, int k, const MildMap *map) {
     print_worst(kit_name[k], cases, at_double, at_float);
     print_message("    with rows: %d; at most %d Newton steps; %d left out of float\n", touching,
                   newton, left_out);
-    check_worst(at_double, at_float, LIMIT_MAP);
+    check_worst(at_double, at_float);
     assert_true(touching > cases / 2 && left_out < cases / 20);
 }
 
