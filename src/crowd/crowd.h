@@ -10,7 +10,6 @@
 #include <stdint.h>
 
 #include "base/pool.h"
-#include "crowd/episode.h"
 #include "task/vec.h"
 
 typedef struct Crowd Crowd;
@@ -56,7 +55,7 @@ size_t crowd_robot_bytes(const Crowd *crowd);
 MildStatus crowd_keep(Crowd *crowd, TaskKept *kept, MildError *error);
 MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error);
 size_t crowd_bytes(const Crowd *crowd);
-/* The episode of an environment, on the host only. */
-CrowdEpisode crowd_episode(const Crowd *crowd, int i);
+/* The TaskEnv of an environment as a device has it (task/place.h), on the host only: for tests. */
+void *crowd_env(const Crowd *crowd, int i);
 
 #endif
