@@ -483,6 +483,6 @@ size_t crowd_bytes(const Crowd *crowd) {
     return crowd_robot_bytes(crowd) * (size_t)crowd->arrays.envs;
 }
 
-CrowdEpisode crowd_episode(const Crowd *crowd, int i) {
-    return crowd_host_episode(&crowd->arrays, i);
+void *crowd_env(const Crowd *crowd, int i) {
+    return crowd->arrays.env + (size_t)i * crowd->arrays.stride;
 }

@@ -10,7 +10,6 @@
 #include <stdint.h>
 
 #include "base/pool.h"
-#include "crowd/episode.h"
 #include "crowd/trial.h"
 #include "task/vec.h"
 
@@ -66,7 +65,7 @@ MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error);
 void crowd_watch(Crowd *crowd, CrowdSample *sample);
 int crowd_samples(const Crowd *crowd); /* physics steps of a policy step */
 size_t crowd_bytes(const Crowd *crowd);
-/* The episode of an environment, on the host only. */
-CrowdEpisode crowd_episode(const Crowd *crowd, int i);
+/* The TaskEnv of an environment as a device has it (task/place.h), on the host only: for tests. */
+void *crowd_env(const Crowd *crowd, int i);
 
 #endif

@@ -41,26 +41,6 @@ void crowd_host_keep(const CrowdArrays *all, int back) {
     }
 }
 
-CrowdEpisode crowd_host_episode(const CrowdArrays *all, long robot) {
-    const TaskEnv *env = crowd_env_at(all, robot);
-    CrowdEpisode episode = {.index = env->index,
-                            .step = env->step,
-                            .rigid = env->variation.rigid,
-                            .friction = env->variation.rigid_friction,
-                            .map = {env->terrain.map_x, env->terrain.map_y}};
-    memcpy(episode.ground, env->ground, sizeof episode.ground);
-    for (int i = 0; i < 3; i++) {
-        episode.command[i] = env->command[i];
-    }
-    for (int i = 0; i < 7 + env->shape.joints; i++) {
-        episode.qpos[i] = env->robot.qpos[i];
-    }
-    for (int i = 0; i < env->shape.joints; i++) {
-        episode.kp_scale[i] = env->kp_scale[i];
-    }
-    return episode;
-}
-
 void crowd_host_tally(const CrowdArrays *all) {
     for (int n = 0; n < TALLY_NUMBERS; n++) {
         all->tally[n] = 0;

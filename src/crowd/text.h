@@ -4,7 +4,6 @@
 #define CROWD_TEXT_H
 
 #include "crowd/arrays.h"
-#include "crowd/episode.h"
 
 #define CROWD_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
 
@@ -31,7 +30,6 @@ void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot)
 void crowd_host_tell(const CrowdArrays *all, long robot);
 /* From the environment to arrays.kept, or back. */
 void crowd_host_keep(const CrowdArrays *all, int back);
-CrowdEpisode crowd_host_episode(const CrowdArrays *all, long robot);
 /* Fills arrays.tally. */
 void crowd_host_tally(const CrowdArrays *all);
 

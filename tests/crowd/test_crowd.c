@@ -13,6 +13,7 @@
 
 #include "batch/batch.h"
 #include "crowd/crowd.h"
+#include "episode.h"
 #include "mild/batch.h"
 #include "sa01.h"
 #include "task/ground.h"
@@ -185,7 +186,7 @@ static void same_episode(int e) {
     size_t bytes;
     const char *envs = vec_state(pair.vec, &bytes);
     const TaskEnv *a = (const TaskEnv *)(const void *)(envs + (size_t)e * (bytes / ENVS));
-    const CrowdEpisode b = crowd_episode(pair.crowd, e);
+    const Episode b = episode_of(crowd_env(pair.crowd, e));
     assert_true(a->index == b.index && a->step == b.step);
     assert_true(a->ground[0] == b.ground[0] && a->variation.rigid == b.rigid);
     assert_near(a->variation.rigid_friction, b.friction, 1e-7);
@@ -273,6 +274,23 @@ static void follows_mujoco_on_a_map(void **unused) {
     follow(MILD_BATCH_HOST, &map);
 }
 
+/* A robot that is thrown diverges, and alone begins a new episode. */
+static void one_diverges(void **unused) {
+    (void)unused;
+    const TaskDef def = some_def();
+    pair_open(&def, MILD_BATCH_HOST);
+    pair_reset();
+    episode_throw(crowd_env(pair.crowd, 5), 1e4);
+    pair_step();
+    for (int e = 0; e < ENVS; e++) {
+        assert_int_equal(pair.b.valid[e], e != 5);
+        assert_true(e != 5 || (pair.b.done[e] && !pair.b.timeout[e] && pair.b.reward[e] == 0));
+    }
+    const Episode next = episode_of(crowd_env(pair.crowd, 5));
+    assert_true(next.step == 0 && next.qpos[0] == 0);
+    pair_close();
+}
+
 static void device_follows_mujoco(void **unused) {
     (void)unused;
     if (!has_device()) {
@@ -346,7 +364,7 @@ static void trials_are_chosen(void **unused) {
     assert_int_equal(crowd_reset(crowd, &view, NULL, &error), MILD_OK);
     for (int t = 0; t <= 130; t++) { /* falls and time limits begin further episodes */
         for (int i = 0; i < TRIALS; i++) {
-            const CrowdEpisode is = crowd_episode(crowd, i);
+            const Episode is = episode_of(crowd_env(crowd, i));
             assert_true(is.index == (uint32_t)(i % 2) && is.ground[0] == i / 2);
             assert_true(is.map[0] == 0 && is.map[1] == 0);
             assert_true(is.rigid == (i == 3));
@@ -356,7 +374,8 @@ static void trials_are_chosen(void **unused) {
             }
             assert_true(t > 0 || (is.step == 0 && is.qpos[6] == 0));
         }
-        const CrowdEpisode first = crowd_episode(crowd, 0), fourth = crowd_episode(crowd, 4);
+        const Episode first = episode_of(crowd_env(crowd, 0));
+        const Episode fourth = episode_of(crowd_env(crowd, 4));
         assert_true(t > 0 || memcmp(first.kp_scale, fourth.kp_scale, sizeof first.kp_scale) == 0);
         assert_int_equal(
             crowd_step(crowd, action[0], reward, flags[0], flags[1], flags[2], &view, NULL, &error),
@@ -367,7 +386,7 @@ static void trials_are_chosen(void **unused) {
         }
     }
     /* one that is thrown diverges in the first physics step of the next policy step */
-    ((TaskEnv *)(uintptr_t)crowd_env(crowd, 2))->robot.qvel[0] = 1e4;
+    episode_throw(crowd_env(crowd, 2), 1e4);
     assert_int_equal(
         crowd_step(crowd, action[0], reward, flags[0], flags[1], flags[2], &view, NULL, &error),
         MILD_OK);
@@ -385,6 +404,7 @@ int main(void) {
         cmocka_unit_test(follows_mujoco),
         cmocka_unit_test(follows_mujoco_on_a_map),
         cmocka_unit_test(trials_are_chosen),
+        cmocka_unit_test(one_diverges),
         cmocka_unit_test(device_follows_mujoco),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

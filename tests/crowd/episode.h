@@ -1,13 +1,14 @@
-/* The episode of an environment in the same numbers, whatever text the environment is of. */
-#ifndef CROWD_EPISODE_H
-#define CROWD_EPISODE_H
+/* What is in an environment of a crowd, which has a text of its own. */
+#ifndef TEST_EPISODE_H
+#define TEST_EPISODE_H
 
 #include <stdint.h>
 
 #include "robot/limits.h"
 
+/* Of TaskEnv. */
 typedef struct {
-    uint32_t index, step;           /* of TaskEnv, as all of these */
+    uint32_t index, step;
     int ground[MILD_MATERIALS_MAX]; /* by label */
     int rigid;                      /* bool */
     double friction;                /* [-] of rigid ground */
@@ -15,6 +16,11 @@ typedef struct {
     double command[3];              /* [m/s, m/s, rad/s] */
     double qpos[ROBOT_NQ_MAX];
     double kp_scale[ROBOT_JOINTS_MAX];
-} CrowdEpisode;
+} Episode;
+
+/* env: of crowd_env. */
+Episode episode_of(const void *env);
+/* Gives the base a speed [m/s] forward. */
+void episode_throw(void *env, double speed);
 
 #endif
