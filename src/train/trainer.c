@@ -49,17 +49,13 @@ static MildStatus make_map(Trainer *trainer, MildError *error) {
                            : terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error);
 }
 
-/* Several processes train on the CPU, with MuJoCo. */
+/* Several processes train on the CPU. */
 static MildStatus check_ranks(const Trainer *trainer, MildError *error) {
     const TrainDef *def = &trainer->def.train;
     if (ranks_count(trainer->ranks) > 1 && train_device(def) >= 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "train.device = %s trains in one process; start one, or take cpu",
                          def->device);
-    }
-    if (ranks_count(trainer->ranks) > 1 && train_is_batch(def)) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "train.robots = batch trains in one process; start one, or take mujoco");
     }
     return MILD_OK;
 }

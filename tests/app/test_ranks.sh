@@ -67,8 +67,22 @@ good "$mild" train --out on --resume --train.iterations=2
 good "$ranks_py" -n 4 "$mild" train --out on --resume --train.iterations=4
 same_numbers alone/$last on/$last
 
-# on from a run of the batch engine, whose checkpoint has the learner and the help of each robot
-good "$mild" train --out batch "${tiny[@]}" --train.robots=batch --train.grounds=16 --train.iterations=3
+# the same with the batch engine, whose checkpoint has the learner and the help of each robot
+batch=("${tiny[@]}" --train.robots=batch --train.grounds=16)
+good "$mild" train --out batch "${batch[@]}" --train.iterations=3
+reward_alone=$(reward)
+for n in 2 4; do
+    good "$ranks_py" -n $n "$mild" train --out batch$n "${batch[@]}" --train.iterations=3
+    [ "$(reward)" = "$reward_alone" ] || fail "batch: $reward_alone alone, $(reward) by $n processes"
+    same_numbers batch/checkpoint_000000003.safetensors batch$n/checkpoint_000000003.safetensors
+    [ "$(log_numbers batch)" = "$(log_numbers batch$n)" ] || fail "batch: the logs of 1 and $n processes differ"
+done
+good "$ranks_py" -n 2 "$mild" train --out batch4 --resume --train.iterations=4
+good "$ranks_py" -n 8 "$mild" train --out batch2 --resume --train.iterations=4
+same_numbers batch2/$last batch4/$last
+
+# on with MuJoCo from there
+rm -r batch2
 cp -r batch batch2
 good "$mild" train --out batch --resume --train.robots=mujoco --train.iterations=4
 good "$ranks_py" -n 2 "$mild" train --out batch2 --resume --train.robots=mujoco --train.iterations=4
@@ -80,7 +94,6 @@ bad "nearest is 'train.envs'" "$ranks_py" -n 2 "$mild" train --out wrong --train
 bad "3 processes: 1, 2, 4 or 8" "$ranks_py" -n 3 "$mild" train --out wrong
 bad "train.envs = 3 is too few for 4 processes" "$ranks_py" -n 4 "$mild" train --out wrong "${tiny[@]}" --train.envs=3
 bad "train.device = cuda trains in one process" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda
-bad "train.robots = batch trains in one process" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.robots=batch
 bad "cannot make folder" "$ranks_py" -n 2 "$mild" train --out /dev/null/wrong "${tiny[@]}"
 bad "holds 3 checkpoints" "$ranks_py" -n 2 "$mild" train --out on
 # 20000 robots need 300 MB, and the second process may not have them
