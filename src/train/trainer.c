@@ -152,22 +152,13 @@ static void sum_over_ranks(Ranks *ranks, VecStats *sums) {
     memcpy(sums->terms, numbers + 9, sizeof sums->terms);
 }
 
-uint64_t train_hash(Trainer *trainer) {
-    const uint32_t *words = (const uint32_t *)(const void *)policy_parameters(trainer->policy);
-    uint64_t hash = 0xcbf29ce484222325u;
-    for (int64_t i = 0; i < policy_parameter_count(trainer->policy); i++) {
-        hash = (hash ^ words[i]) * 0x100000001b3u;
-    }
-    return hash;
-}
-
-/* Every process applies the same sums to the same parameters. Another kind of processor may round
- * them differently. */
+/* Every process applies the same sums to the same parameters. Another kind of processor or GPU may
+ * round them differently. */
 static MildStatus check_same(Trainer *trainer, MildError *error) {
     if (ranks_count(trainer->ranks) == 1) {
         return MILD_OK;
     }
-    const uint64_t mine = train_hash(trainer);
+    const uint64_t mine = ppo_hash(trainer->ppo);
     uint64_t first = mine;
     ranks_broadcast(trainer->ranks, &first, sizeof first);
     return mine == first ? MILD_OK

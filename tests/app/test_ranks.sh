@@ -1,9 +1,13 @@
 #!/usr/bin/env bash
 # Training by several processes: the same numbers whatever the split, from checkpoint to checkpoint too; a process that
-# fails or dies is one line, and the last checkpoint is whole. Usage: test_ranks.sh PATH_TO_MILD PATH_TO_RANKS_TEST PATH_TO_RANKS_PY
+# fails or dies is one line, and the last checkpoint is whole.
+# Usage: test_ranks.sh PATH_TO_MILD PATH_TO_RANKS_PY TEST_FOR_MPIRUN...
 source "$(dirname "$0")/../kit.sh" "$1"
-test_ranks=$(realpath "$2")
-ranks_py=$(realpath "$3")
+ranks_py=$(realpath "$2")
+for_mpirun=()
+for test in "${@:3}"; do
+    for_mpirun+=("$(realpath "$test")")
+done
 # no network; a short path for its sockets; as many processes as wanted, as root too
 # products whose last bits depend on the rows beside a row, on any processor
 export DNNL_MAX_CPU_ISA=AVX2
@@ -41,9 +45,11 @@ reward() {
     grep -o 'reward [-0-9.]*/s' <<<"$output" | tail -1
 }
 
-# the calls
+# the calls of ranks.h, and the learner on GPUs (a stand-in for them) by parts
 for n in 2 4 8; do
-    good mpirun -n $n "$test_ranks"
+    for test in "${for_mpirun[@]}"; do
+        good mpirun -n $n "$test"
+    done
 done
 
 # the split changes nothing: parameters, moments, environments, log; one process may be alone or rank 0 of 1
