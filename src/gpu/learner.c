@@ -661,6 +661,10 @@ size_t gpu_learner_bytes(const Ppo *ppo) {
     return g ? g->bytes : 0;
 }
 
+size_t gpu_learner_sum_bytes(const Ppo *ppo) {
+    return (size_t)gpu_network(&ppo->policy->network).count * sizeof(float);
+}
+
 static MildStatus copy_rollout(const Ppo *ppo, void *to, const void *from, enum cudaMemcpyKind kind,
                                MildError *error) {
     GpuLearner *g = learner_of(ppo);

@@ -99,7 +99,8 @@ bad "nearest is --out" "$ranks_py" -n 2 "$mild" train --ot on
 bad "nearest is 'train.envs'" "$ranks_py" -n 2 "$mild" train --out wrong --train.env=4
 bad "3 processes: 1, 2, 4 or 8" "$ranks_py" -n 3 "$mild" train --out wrong
 bad "train.envs = 3 is too few for 4 processes" "$ranks_py" -n 4 "$mild" train --out wrong "${tiny[@]}" --train.envs=3
-bad "train.device = cuda trains in one process" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda
+bad "train.device = cuda.*: .*" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda
+bad "train.device = cuda:1 in 2 processes: .* write cuda" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda:1
 bad "cannot make folder" "$ranks_py" -n 2 "$mild" train --out /dev/null/wrong "${tiny[@]}"
 bad "holds 3 checkpoints" "$ranks_py" -n 2 "$mild" train --out on
 # 20000 robots need 300 MB, and the second process may not have them

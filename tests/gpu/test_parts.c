@@ -197,6 +197,7 @@ int main(void) {
         printf("skipped: %s\n", device);
         return 77;
     }
+    /* as the trainer does, but for networks of any size */
     if (ranks_open(&ranks, &error) || ranks_open_device(ranks, (size_t)16 << 20, &error)) {
         fprintf(stderr, "%s\n", error.text);
         return 2;
