@@ -286,9 +286,10 @@ static MildStatus load_learner(Trainer *trainer, const char *path, MildError *er
         status = train_envs_restore(trainer->envs, kept, error);
     }
     free(kept);
-    return status == MILD_OK
-               ? train_envs_reset(trainer->envs, ppo_batch(trainer->ppo), trainer->stream, error)
-               : status;
+    if (status == MILD_OK) {
+        status = train_envs_reset(trainer->envs, ppo_batch(trainer->ppo), trainer->stream, error);
+    }
+    return ranks_agree(trainer->ranks, status, error);
 }
 
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error) {
