@@ -38,17 +38,16 @@ if [ "${1:-}" = ranks ]; then
     done
     find "$bundle" -name 'mca_*.so' | grep -E '_(ucx|ofi|openib|psm2?|slurm|flux|jsm|gridengine|simulator|romio[0-9]*|bzip)\.so$' |
         xargs rm
-    for program in orterun orted; do
-        cp -L "$(place bindir)/$program" "$bundle/bin/"
-        programs+=("$bundle/bin/$program")
-    done
+    mkdir "$bundle/libexec"
+    cp -L "$(place bindir)/orterun" "$bundle/libexec/mpirun"
+    cp -L "$(place bindir)/orted" "$bundle/bin/"
     mapfile -t plugins < <(find "$bundle" -name 'mca_*.so')
-    programs+=("${plugins[@]}")
+    programs+=("$bundle/libexec/mpirun" "$bundle/bin/orted" "${plugins[@]}")
     cat >"$bundle/bin/mpirun" <<'MPIRUN'
 #!/bin/sh
 here=$(dirname "$(dirname "$(readlink -f "$0")")")
 export OPAL_PREFIX="$here" LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
-exec "$here/bin/orterun" "$@"
+exec "$here/libexec/mpirun" "$@"
 MPIRUN
     chmod +x "$bundle/bin/mpirun"
     cp scripts/gpus.py scripts/ranks.py "$bundle/"
@@ -73,7 +72,7 @@ for library in libcublas.so.13 libnccl.so.2; do
         [ -e "$folder/$library" ] && LD_LIBRARY_PATH=$folder${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH} && break
     done
 done
-export LD_LIBRARY_PATH
+export LD_LIBRARY_PATH="${LD_LIBRARY_PATH:+$LD_LIBRARY_PATH:}$here/lib" # libmpi.so looks for its libraries at home only
 if [ "$program" = mild ]; then
     program=mild-x86-64-v3
     grep -q avx512vl /proc/cpuinfo && program=mild-x86-64-v4
