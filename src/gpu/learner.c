@@ -538,7 +538,7 @@ static MildStatus open_memory(GpuLearner *g, const char *device, MildError *erro
         error, MILD_ERROR_MEMORY,
         "%s: %d robots x %d steps need %.1f GiB of its memory and %.1f are free, which "
         "is enough for %d robots; lower train.envs or ppo.steps",
-        device, g->envs, g->batch.steps, (double)g->bytes / gibi, (double)available / gibi,
+        device, g->part.envs, g->batch.steps, (double)g->bytes / gibi, (double)available / gibi,
         robots_that_fit(g, available));
 }
 

@@ -183,7 +183,7 @@ static void updates_are_those_of_the_whole(void **state) {
     def = ppo_def_default();
     worse(&worst, compare_update(RESIDENT, &policy, &def, 256, 0, NOTHING));
     def.minibatches = 2;
-    worse(&worst, compare_update(RESIDENT, &policy, &def, 1500, 0, INVALID));
+    worse(&worst, compare_update(RESIDENT, &policy, &def, 520, 0, INVALID));
 #endif
     if (ranks_number(ranks) == 0) {
         print_message("%d processes: way of the parameters in an update, against one learner on "
