@@ -135,14 +135,13 @@ Trainer *train_create(const ExperimentDef *def, MildError *error) {
 Trainer *train_create_part(const ExperimentDef *def, Ranks *ranks, MildError *error) {
     MildError cause = {0};
     Trainer *trainer = calloc(1, sizeof *trainer);
-    if (!trainer) {
-        mild_fail(&cause, MILD_ERROR_MEMORY, "out of memory");
-    } else {
+    MildStatus status = trainer ? MILD_OK : mild_fail(&cause, MILD_ERROR_MEMORY, "out of memory");
+    status = ranks_agree(ranks, status, &cause);
+    if (status == MILD_OK && trainer) {
         trainer->def = *def;
         trainer->ranks = ranks;
+        status = ranks_agree(ranks, build(trainer, &cause), &cause);
     }
-    MildStatus status = ranks_agree(ranks, cause.status, &cause);
-    status = status == MILD_OK ? ranks_agree(ranks, build(trainer, &cause), &cause) : status;
     if (status != MILD_OK) {
         mild_fail(error, cause.status, "%s", cause.text);
         train_destroy(trainer);
