@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes build/bundle: the program without drawing, with CUDA, and all libraries that it needs except libc and CUDA's. Copy
 # the folder to a machine with only an NVIDIA driver and cuBLAS 13. docs/gpu.md says how to use it.
-# Usage: scripts/bundle.sh [ranks]; with `ranks` for several GPUs (docs/ranks.md): that machine has Open MPI 4 and NCCL too.
+# Usage: scripts/bundle.sh [ranks]; with `ranks` for several GPUs (docs/ranks.md): Open MPI of this machine comes along, and
+# that machine has NCCL 2 too.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bundle=build/bundle
@@ -16,24 +17,51 @@ for march in x86-64-v3 x86-64-v4; do
     cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_CUDA=ON -DMILD_VIEW=OFF "${ranks[@]}" \
         -DMILD_MARCH=$march -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
         -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' >/dev/null
-    cmake --build "build/$march" --parallel "$jobs" --target mild gpu_test_gpu batch_test_batch \
+    cmake --build "build/$march" --parallel "$jobs" --target mild gpu_test_gpu gpu_test_parts batch_test_batch \
         engine_device_engine ranks_test_ranks >/dev/null
     strip -o "$bundle/bin/mild-$march" "build/$march/mild"
 done
 strip -o "$bundle/bin/test_gpu" build/x86-64-v3/tests/gpu_test_gpu
+strip -o "$bundle/bin/test_parts" build/x86-64-v3/tests/gpu_test_parts
 strip -o "$bundle/bin/test_batch" build/x86-64-v3/tests/batch_test_batch
 strip -o "$bundle/bin/device_engine" build/x86-64-v3/tests/engine_device_engine
 strip -o "$bundle/bin/test_ranks" build/x86-64-v3/tests/ranks_test_ranks
 
-# the libraries that ldd lists, without libc, the loader, CUDA, MPI and NCCL
-ldd build/x86-64-v3/mild build/x86-64-v3/tests/gpu_test_gpu | awk '$2 == "=>" { print $3 }' | sort -u |
-    grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt|libnccl|libmpi|libopen-rte|libopen-pal)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
-strip "$bundle"/lib/*
+# Open MPI for one machine: it finds its plugins and texts below OPAL_PREFIX, as below its own prefix. Those for networks
+# and batch systems stay here.
+programs=(build/x86-64-v3/mild build/x86-64-v3/tests/gpu_test_gpu)
+if [ "${1:-}" = ranks ]; then
+    place() { ompi_info --parsable --path "$1" | cut -d: -f3; }
+    for folder in "$(place pkglibdir)" "$(place pkgdatadir)"; do
+        mkdir -p "$bundle${folder#"$(place prefix)"}"
+        cp -rL "$folder/." "$bundle${folder#"$(place prefix)"}"
+    done
+    find "$bundle" -name 'mca_*.so' | grep -E '_(ucx|ofi|openib|psm2?|slurm|flux|jsm|gridengine|simulator|romio[0-9]*|bzip)\.so$' |
+        xargs rm
+    mkdir "$bundle/libexec"
+    cp -L "$(place bindir)/orterun" "$bundle/libexec/mpirun"
+    cp -L "$(place bindir)/orted" "$bundle/bin/"
+    mapfile -t plugins < <(find "$bundle" -name 'mca_*.so')
+    programs+=("$bundle/libexec/mpirun" "$bundle/bin/orted" "${plugins[@]}")
+    cat >"$bundle/bin/mpirun" <<'MPIRUN'
+#!/bin/sh
+here=$(dirname "$(dirname "$(readlink -f "$0")")")
+export OPAL_PREFIX="$here" LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+exec "$here/libexec/mpirun" "$@"
+MPIRUN
+    chmod +x "$bundle/bin/mpirun"
+    cp scripts/gpus.py scripts/ranks.py "$bundle/"
+fi
+
+# the libraries that ldd lists, without libc, the loader, CUDA and NCCL
+ldd "${programs[@]}" | awk '$2 == "=>" { print $3 }' | sort -u |
+    grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt|libnccl)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
+find "$bundle/lib" -name '*.so*' -type f -exec strip {} +
 cp -r robots configs policies "$bundle/"
 
 cat >"$bundle/run" <<'RUN'
 #!/bin/sh
-# run PROGRAM ARGUMENTS: starts this folder's mild or test_gpu with the cuBLAS of this machine.
+# run PROGRAM ARGUMENTS: starts this folder's mild, test_gpu or mpirun, or a script, with the cuBLAS and NCCL of this machine.
 here=$(dirname "$(readlink -f "$0")")
 program=$1
 shift
@@ -44,12 +72,13 @@ for library in libcublas.so.13 libnccl.so.2; do
         [ -e "$folder/$library" ] && LD_LIBRARY_PATH=$folder${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH} && break
     done
 done
-export LD_LIBRARY_PATH
+export LD_LIBRARY_PATH="${LD_LIBRARY_PATH:+$LD_LIBRARY_PATH:}$here/lib" # libmpi.so looks for its libraries at home only
 if [ "$program" = mild ]; then
     program=mild-x86-64-v3
     grep -q avx512vl /proc/cpuinfo && program=mild-x86-64-v4
 fi
-exec "$here/bin/$program" "$@"
+export PATH="$here/bin:$PATH"
+exec "$program" "$@"
 RUN
 chmod +x "$bundle/run"
 du -sh "$bundle"

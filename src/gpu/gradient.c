@@ -76,8 +76,14 @@ void gpu_enqueue_act(GpuLearner *g, int t) {
         gpu_gather(g->queue.stream, rows, width, n->history, NULL,
                    g->batch.history + row * (size_t)width, g->chunk.history);
         const float *mean = forward(g, rows);
-        const GpuActions actions = {
-            t, first, rows, n->def.actions, g->widths.action, g->parameters + n->log_std, mean};
+        const GpuActions actions = {.t = t,
+                                    .first = first,
+                                    .number = g->part.first,
+                                    .rows = rows,
+                                    .actions = n->def.actions,
+                                    .pitch = g->widths.action,
+                                    .log_std = g->parameters + n->log_std,
+                                    .mean = mean};
         gpu_sample_actions(g->queue.stream, actions, g->batch, g->progress);
     }
 }
@@ -238,9 +244,14 @@ static int images_before(const int *which, int from, int images, int end) {
     return next - from;
 }
 
-void gpu_enqueue_gradient(GpuLearner *g, const int *cut, int first) {
-    const int count = cut[PPO_SHARDS], images = ppo_mirrored(g->ppo, cut, NULL);
+void gpu_enqueue_gradient(GpuLearner *g, const GpuMinibatch *minibatch) {
+    const int count = minibatch->cut[PPO_SHARDS], first = minibatch->first,
+              images = ppo_mirrored(g->ppo, minibatch->cut, NULL);
     const int *which = g->host_rows + (size_t)g->batch.steps * (size_t)g->envs + first;
+    if (count == 0) { /* all samples are other processes' */
+        cudaMemsetAsync(g->gradient, 0, (size_t)g->network.count * sizeof *g->gradient,
+                        g->queue.stream);
+    }
     cudaMemsetAsync(g->sums, 0, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums,
                     g->queue.stream);
     for (int at = 0, image = 0; at < count; at += g->rows) {
@@ -250,8 +261,9 @@ void gpu_enqueue_gradient(GpuLearner *g, const int *cut, int first) {
                               .latent_row = g->latent_row + first + at,
                               .which = g->which + first + image,
                               .at = at,
-                              .sample_weight = 1.0f / (float)count,
-                              .mirror_weight = images > 0 ? 1.0f / (float)images : 0.0f,
+                              .sample_weight = 1.0f / (float)minibatch->samples,
+                              .mirror_weight =
+                                  minibatch->images > 0 ? 1.0f / (float)minibatch->images : 0.0f,
                               .beta = at == 0 ? 0.0f : 1.0f};
         gather(g, &job);
         actor_half(g, &job);

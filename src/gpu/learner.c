@@ -7,6 +7,7 @@
 #include "gpu/learner_private.h"
 #include "learn/ppo_gradient.h"
 #include "learn/ppo_step.h"
+#include "ranks/device.h"
 
 /* Rows go through the networks in chunks of at most this many. That fills a large device and bounds
  * the memory. */
@@ -40,6 +41,7 @@ static int most_images(const Ppo *ppo, int rows) {
     return images < rows ? (int)images : rows;
 }
 
+/* envs: of all processes. */
 static void set_sizes(GpuLearner *g, int envs) {
     const Ppo *ppo = g->ppo;
     const PolicyDef *def = policy_def(ppo->policy);
@@ -47,9 +49,10 @@ static void set_sizes(GpuLearner *g, int envs) {
     /* the elementwise passes count the numbers of a chunk with 32 bits */
     const int64_t most = (int64_t)INT32_MAX / (2 * widest_layer(&g->network)),
                   wanted = g->wanted_rows > 0 ? g->wanted_rows : ROWS_MAX;
-    g->envs = envs;
-    g->minibatch = order_largest(steps, order_part(envs, 0, 1), ppo->def.minibatches);
-    int rows = g->minibatch > envs ? g->minibatch : envs;
+    g->part = order_part(envs, ranks_number(ppo->ranks), ranks_count(ppo->ranks));
+    g->envs = g->part.width;
+    g->minibatch = order_largest(steps, g->part, ppo->def.minibatches);
+    int rows = g->minibatch > g->envs ? g->minibatch : g->envs;
     rows = rows < wanted ? rows : (int)wanted;
     g->rows = rows < most ? rows : (int)most;
     g->images = most_images(ppo, g->rows);
@@ -99,7 +102,7 @@ static size_t layout(GpuLearner *g, char *block) {
     g->which = carve(block, &used, samples * sizeof *g->which);
     g->order = carve(block, &used, (size_t)g->minibatch * sizeof *g->order);
     g->sums = carve(block, &used, (size_t)(g->sum_blocks * GPU_SUMS) * sizeof *g->sums);
-    g->partial = carve(block, &used, (size_t)GPU_PARTS * 7 * sizeof *g->partial);
+    g->partial = carve(block, &used, (size_t)GPU_PARTS * GPU_MOMENTS * sizeof *g->partial);
     g->queue.partial =
         carve(block, &used, (size_t)(GPU_SUM_SLICES * widest_layer(n)) * sizeof(float));
     g->workspace = carve(block, &used, WORKSPACE);
@@ -117,7 +120,7 @@ static size_t layout(GpuLearner *g, char *block) {
 /* Most robots for which everything fits into so many bytes. */
 static int robots_that_fit(const GpuLearner *g, size_t bytes) {
     GpuLearner other = *g;
-    int fits = 0, too_many = g->envs;
+    int fits = 0, too_many = g->part.envs;
     while (too_many - fits > 1) {
         const int envs = fits + (too_many - fits) / 2;
         set_sizes(&other, envs);
@@ -165,6 +168,9 @@ static MildStatus finish(GpuLearner *g, const char *what, MildError *error) {
     if (status == MILD_OK && g->queue.status) {
         status = mild_fail(error, MILD_ERROR_IO, "GPU: %s: %s", what,
                            cublasGetStatusString(g->queue.status));
+    }
+    if (status == MILD_OK && g->error.status) {
+        status = mild_fail(error, g->error.status, "%s", g->error.text);
     }
     return status;
 }
@@ -318,20 +324,45 @@ static GpuOptimiser optimiser(const GpuLearner *g) {
                           .mean = g->average};
 }
 
-/* first: as in gpu_enqueue_gradient. */
-static void enqueue_minibatch(GpuLearner *g, GpuOrder order, int first) {
+static int is_alone(const GpuLearner *g) {
+    return ranks_count(g->ppo->ranks) == 1;
+}
+
+/* Sums x [rows][width] over the processes. Returns how many rows are still to be added up. */
+static int sum_rows(GpuLearner *g, double *x, int rows, int width) {
+    if (is_alone(g)) {
+        return rows;
+    }
+    gpu_add_rows(g->queue.stream, rows, width, x);
+    ranks_sum_device_double(g->ppo->ranks, x, width, g->queue.stream, &g->error);
+    return 1;
+}
+
+void gpu_enqueue_returns(GpuLearner *g) {
+    cudaStream_t stream = g->queue.stream;
+    gpu_returns(stream, g->ppo->def, g->batch, g->part, g->substitute, g->progress);
+    for (int last = 0; last < 2; last++) {
+        const int parts = gpu_add_moments(stream, g->batch, g->progress, g->partial),
+                  rows = sum_rows(g, g->partial, parts, GPU_MOMENTS);
+        gpu_finish_moments(stream, last, rows, g->partial, g->progress);
+    }
+    gpu_normalise(stream, g->batch, g->progress);
+}
+
+static void enqueue_minibatch(GpuLearner *g, const GpuOrder *order, const GpuMinibatch *minibatch) {
     const PpoDef *def = &g->ppo->def;
     cudaStream_t stream = g->queue.stream;
     const int actions = g->network.def.actions;
-    gpu_order(stream, order, g->substitute, g->progress, g->order);
-    gpu_begin_minibatch(stream, (uint32_t)(order.epoch * def->minibatches + order.m), actions,
+    gpu_order(stream, *order, g->substitute, g->progress, g->order);
+    gpu_begin_minibatch(stream, (uint32_t)(order->epoch * def->minibatches + order->m), actions,
                         g->parameters + g->network.log_std, g->progress);
-    gpu_enqueue_gradient(g, order.cut, first);
+    gpu_enqueue_gradient(g, minibatch);
+    ranks_sum_device(g->ppo->ranks, g->gradient, g->network.count, stream, &g->error);
     const GpuDecision decision = {.def = *def,
                                   .actions = actions,
-                                  .samples = order.cut[PPO_SHARDS],
-                                  .images = ppo_mirrored(g->ppo, order.cut, NULL),
-                                  .blocks = g->sum_blocks,
+                                  .samples = minibatch->samples,
+                                  .images = minibatch->images,
+                                  .blocks = sum_rows(g, g->sums, g->sum_blocks, GPU_SUMS),
                                   .count = g->network.count,
                                   .sums = g->sums,
                                   .gradient = g->gradient};
@@ -342,13 +373,18 @@ static void enqueue_minibatch(GpuLearner *g, GpuOrder order, int first) {
 static void enqueue_epoch(GpuLearner *g, int epoch) {
     const int minibatches = g->ppo->def.minibatches;
     GpuOrder order = {
-        .steps = g->batch.steps, .envs = g->envs, .minibatches = minibatches, .epoch = epoch};
-    for (int first = 0; order.m < minibatches; order.m++) {
-        const int count = order_cuts(order.steps, order.envs, order.m, minibatches, order.cut);
-        if (count > 0) {
-            enqueue_minibatch(g, order, first);
+        .steps = g->batch.steps, .minibatches = minibatches, .epoch = epoch, .part = g->part};
+    GpuMinibatch minibatch = {.first = 0};
+    for (; order.m < minibatches; order.m++) {
+        int cut[PPO_SHARDS + 1];
+        minibatch.samples = order_cuts(order.steps, g->part.envs, order.m, minibatches, cut);
+        minibatch.images = ppo_mirrored(g->ppo, cut, NULL);
+        const int own = order_own_cuts(g->part, cut, order.cut);
+        memcpy(minibatch.cut, order.cut, sizeof order.cut);
+        if (minibatch.samples > 0) {
+            enqueue_minibatch(g, &order, &minibatch);
         }
-        first += count;
+        minibatch.first += own;
     }
 }
 
@@ -361,11 +397,14 @@ static void enqueue_update(GpuLearner *g) {
     }
     gpu_begin_update(stream, *def, n->def.actions, g->parameters + n->log_std, g->progress);
     gpu_enqueue_values(g);
-    gpu_returns(stream, *def, g->batch, g->substitute, g->partial, g->progress);
+    gpu_enqueue_returns(g);
     for (int epoch = 0; epoch < def->epochs; epoch++) {
         enqueue_epoch(g, epoch);
     }
     gpu_finish_update(stream, optimiser(g), g->progress);
+    if (!is_alone(g)) {
+        gpu_hash(stream, n->count, g->parameters, g->partial, g->progress);
+    }
     float *from[CARRIED], *to[CARRIED];
     size_t sizes[CARRIED];
     carried(n, &g->batch, g->batch.steps, from, sizes);
@@ -376,7 +415,7 @@ static void enqueue_update(GpuLearner *g) {
 }
 
 /* Every update enqueues the same work, so the CPU needs to describe it only once. What cannot be
- * captured is enqueued anew each time, which only costs speed. */
+ * captured, by all processes, is enqueued anew each time, which only costs speed. */
 static void capture_update(GpuLearner *g) {
     cudaGraph_t graph = NULL;
     const cublasStatus_t status = g->queue.status;
@@ -390,9 +429,14 @@ static void capture_update(GpuLearner *g) {
     if (graph) {
         cudaGraphDestroy(graph);
     }
+    if (ranks_any(g->ppo->ranks, !g->graph) && g->graph) {
+        cudaGraphExecDestroy(g->graph);
+        g->graph = NULL;
+    }
     if (!g->graph) {
         cudaGetLastError();
         g->queue.status = status;
+        g->error.status = MILD_OK;
     }
 }
 
@@ -418,6 +462,7 @@ static MildStatus update(GpuLearner *g, PpoReport *report, MildError *error) {
         ppo->iteration = progress.iteration;
         ppo->adam_steps = progress.adam_steps;
         ppo->learning_rate = progress.learning_rate;
+        ppo->hash = (uint64_t)progress.hash;
     }
     return status;
 }
@@ -493,7 +538,7 @@ static MildStatus open_memory(GpuLearner *g, const char *device, MildError *erro
         error, MILD_ERROR_MEMORY,
         "%s: %d robots x %d steps need %.1f GiB of its memory and %.1f are free, which "
         "is enough for %d robots; lower train.envs or ppo.steps",
-        device, g->envs, g->batch.steps, (double)g->bytes / gibi, (double)available / gibi,
+        device, g->part.envs, g->batch.steps, (double)g->bytes / gibi, (double)available / gibi,
         robots_that_fit(g, available));
 }
 
@@ -525,10 +570,11 @@ static void fill_rows(GpuLearner *g) {
     const int minibatches = g->ppo->def.minibatches;
     const size_t samples = (size_t)g->batch.steps * (size_t)g->envs;
     for (int m = 0, first = 0; m < minibatches; m++) {
-        int cut[PPO_SHARDS + 1];
-        const int count = order_cuts(g->batch.steps, g->envs, m, minibatches, cut);
-        ppo_latent_rows(cut, g->host_rows + first);
-        ppo_mirrored(g->ppo, cut, g->host_rows + samples + first);
+        int cut[PPO_SHARDS + 1], own[PPO_SHARDS + 1];
+        order_cuts(g->batch.steps, g->part.envs, m, minibatches, cut);
+        const int count = order_own_cuts(g->part, cut, own);
+        ppo_latent_rows(own, cut[g->part.shard], g->host_rows + first);
+        ppo_mirrored(g->ppo, own, g->host_rows + samples + first);
         first += count;
     }
     upload(g, g->latent_row, g->host_rows, samples * sizeof *g->host_rows);
@@ -552,7 +598,7 @@ static MildStatus open_learner(GpuLearner *g, int resident, MildError *error) {
     const PolicyDef *def = policy_def(ppo->policy);
     const size_t samples = (size_t)ppo->batch.steps * (size_t)ppo->batch.envs;
     g->network = gpu_network(&ppo->policy->network);
-    set_sizes(g, ppo->batch.envs);
+    set_sizes(g, ppo->part.envs);
     g->host_rows = calloc(2 * samples, sizeof *g->host_rows);
     g->padded = malloc((size_t)g->network.count * sizeof *g->padded);
     if (!g->host_rows || !g->padded) {
@@ -613,6 +659,10 @@ void *gpu_learner_stream(const Ppo *ppo) {
 size_t gpu_learner_bytes(const Ppo *ppo) {
     const GpuLearner *g = learner_of(ppo);
     return g ? g->bytes : 0;
+}
+
+size_t gpu_learner_sum_bytes(const Ppo *ppo) {
+    return (size_t)gpu_network(&ppo->policy->network).count * sizeof(float);
 }
 
 static MildStatus copy_rollout(const Ppo *ppo, void *to, const void *from, enum cudaMemcpyKind kind,

@@ -39,8 +39,9 @@ typedef struct {
     GpuQueue queue;
     Network network; /* padded */
     GpuWidths widths;
-    int envs;       /* of the rollout */
-    int minibatch;  /* samples of the largest */
+    OrderPart part; /* of the rollout, that this process has */
+    int envs;       /* part.width */
+    int minibatch;  /* samples of the largest, of this process */
     int rows;       /* most samples of a chunk */
     int images;     /* most images of a chunk */
     int sum_blocks; /* rows of `sums` */
@@ -60,16 +61,24 @@ typedef struct {
     int *mirror_index; /* [observation + actions] */
     float *mirror_sign;
     double *sums;          /* [sum_blocks][GPU_SUMS] */
-    double *partial;       /* [GPU_PARTS][7] */
+    double *partial;       /* [GPU_PARTS][GPU_MOMENTS] */
     void *workspace;       /* of cuBLAS */
     cudaGraphExec_t graph; /* of an update; NULL: not captured */
     int updates;           /* so far: the second one is captured */
+    MildError error;       /* of the sums over the processes */
 
     /* on the CPU */
     int *host_rows; /* [2][steps * envs] latent_row, which */
     float *padded;  /* [network.count] on its way */
     void *pinned;   /* the rollout; NULL: not pinned */
 } GpuLearner;
+
+/* A minibatch as this process sees it. */
+typedef struct {
+    int cut[PPO_SHARDS + 1]; /* order_own_cuts */
+    int first;               /* number of its first entry in latent_row and which */
+    int samples, images;     /* of all processes */
+} GpuMinibatch;
 
 /* Places a chunk of at most `rows` samples and `mirrored` images in the block and returns its
  * floats. NULL: only counts them. */
@@ -82,8 +91,10 @@ size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int rows, int mirro
 void gpu_enqueue_act(GpuLearner *g, int t);
 /* batch.value from batch.critic. */
 void gpu_enqueue_values(GpuLearner *g);
-/* Gradient of the loss over a minibatch of these cuts, whose samples are g->order, into g->gradient
- * and g->sums. first: number of its first entry in latent_row and which. */
-void gpu_enqueue_gradient(GpuLearner *g, const int *cut, int first);
+/* Advantages, returns and substitutes, from batch.value. */
+void gpu_enqueue_returns(GpuLearner *g);
+/* This process's part of the gradient of the loss over a minibatch, whose samples are g->order,
+ * into g->gradient and g->sums. */
+void gpu_enqueue_gradient(GpuLearner *g, const GpuMinibatch *minibatch);
 
 #endif

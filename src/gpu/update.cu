@@ -25,7 +25,7 @@ static __global__ void sample_actions(GpuActions a, PpoBatch b, const GpuProgres
     for (int j = 0; j < a.actions; j++) {
         std[j] = expf(a.log_std[j]);
         mean[j] = a.mean[r * a.pitch + j];
-        action[j] = mean[j] + std[j] * noise_number(key, env * a.actions + j);
+        action[j] = mean[j] + std[j] * noise_number(key, (a.number + env) * a.actions + j);
     }
     b.log_prob[i] = loss_log_prob(a.actions, action, mean, std);
 }
@@ -102,9 +102,10 @@ static __global__ void environments(double gamma, double lambda, PpoBatch b) {
 
 /* A block has a stratum, a thread a run of its samples: first usable one of the run, of the runs
  * after it in the cycle, then backward over the run. */
-static __global__ void substitute_samples(PpoBatch b, int *substitute, GpuProgress *progress) {
+static __global__ void substitute_samples(PpoBatch b, OrderPart part, int *substitute,
+                                          GpuProgress *progress) {
     __shared__ int usable[THREADS];
-    const OrderStratum s = order_stratum(b.steps, b.envs, (int)blockIdx.x);
+    const OrderStratum s = order_part_stratum(b.steps, part, (int)blockIdx.x);
     const int self = (int)threadIdx.x, begin = order_begin(s.count, self, THREADS),
               end = order_begin(s.count, self + 1, THREADS);
     usable[self] = -1;
@@ -127,14 +128,21 @@ static __global__ void substitute_samples(PpoBatch b, int *substitute, GpuProgre
     }
 }
 
-enum { ADVANTAGE, RETURNS, VALUE, NUMBERS, MOMENTS = 1 + 2 * NUMBERS };
+void gpu_returns(cudaStream_t stream, PpoDef def, PpoBatch batch, OrderPart part, int *substitute,
+                 GpuProgress *progress) {
+    const dim3 strata = {PPO_SHARDS, 1, 1};
+    LAUNCH(environments, blocks_of(batch.envs), line, stream, def.gamma, def.lambda, batch);
+    LAUNCH(substitute_samples, strata, line, stream, batch, part, substitute, progress);
+}
 
-/* Of the usable samples: their number, and sums of the gaps from progress->moment and of their
- * squares. */
+enum { ADVANTAGE, RETURNS, VALUE, NUMBERS, STARVED = 1 + 2 * NUMBERS };
+static_assert(STARVED + 1 == GPU_MOMENTS, "the sums of a moment");
+
 static __global__ void add_moments(PpoBatch b, const GpuProgress *progress, double *partial) {
     const float *const numbers[NUMBERS] = {b.advantage, b.returns, b.value};
     const int64_t samples = (int64_t)b.steps * b.envs;
-    double sum[MOMENTS] = {0.0};
+    double sum[GPU_MOMENTS] = {0.0};
+    sum[STARVED] = item() == 0 ? progress->starved : 0.0;
     for (int64_t i = item(); i < samples; i += (int64_t)gridDim.x * THREADS) {
         if (returns_usable(&b, i)) {
             sum[0] += 1.0;
@@ -145,25 +153,32 @@ static __global__ void add_moments(PpoBatch b, const GpuProgress *progress, doub
             }
         }
     }
-    for (int k = 0; k < MOMENTS; k++) {
+    for (int k = 0; k < GPU_MOMENTS; k++) {
         const double total = block_sum(sum[k]);
         if (threadIdx.x == 0) {
-            partial[blockIdx.x * MOMENTS + k] = total;
+            partial[blockIdx.x * GPU_MOMENTS + k] = total;
         }
     }
 }
 
-/* last 0: the means. 1: the deviations. */
-static __global__ void finish_moments(int last, int parts, const double *partial,
+int gpu_add_moments(cudaStream_t stream, PpoBatch batch, const GpuProgress *progress,
+                    double *partial) {
+    const dim3 parts = parts_of((int64_t)batch.steps * batch.envs);
+    LAUNCH(add_moments, parts, line, stream, batch, progress, partial);
+    return (int)parts.x;
+}
+
+static __global__ void finish_moments(int last, int rows, const double *partial,
                                       GpuProgress *progress) {
-    double sum[MOMENTS];
-    for (int k = 0; k < MOMENTS; k++) {
-        sum[k] = block_sum((int)threadIdx.x < parts ? partial[threadIdx.x * MOMENTS + k] : 0.0);
+    double sum[GPU_MOMENTS];
+    for (int k = 0; k < GPU_MOMENTS; k++) {
+        sum[k] = block_sum((int)threadIdx.x < rows ? partial[threadIdx.x * GPU_MOMENTS + k] : 0.0);
     }
     const double count = fmax(sum[0], 1.0);
     if (threadIdx.x > 0) {
         return;
     }
+    progress->starved = sum[STARVED] > 0.0;
     if (!last) {
         for (int n = 0; n < NUMBERS; n++) {
             progress->moment[n] = sum[1 + n] / count;
@@ -176,6 +191,11 @@ static __global__ void finish_moments(int last, int parts, const double *partial
                         sqrt(squares[RETURNS] / count));
 }
 
+void gpu_finish_moments(cudaStream_t stream, int last, int rows, const double *partial,
+                        GpuProgress *progress) {
+    LAUNCH(finish_moments, one_block, line, stream, last, rows, partial, progress);
+}
+
 static __global__ void normalise(PpoBatch b, const GpuProgress *progress) {
     const int64_t i = item();
     if (i < (int64_t)b.steps * b.envs && returns_usable(&b, i)) {
@@ -184,16 +204,55 @@ static __global__ void normalise(PpoBatch b, const GpuProgress *progress) {
     }
 }
 
-void gpu_returns(cudaStream_t stream, PpoDef def, PpoBatch batch, int *substitute, double *partial,
-                 GpuProgress *progress) {
-    const dim3 strata = {PPO_SHARDS, 1, 1}, parts = parts_of((int64_t)batch.steps * batch.envs);
-    LAUNCH(environments, blocks_of(batch.envs), line, stream, def.gamma, def.lambda, batch);
-    LAUNCH(substitute_samples, strata, line, stream, batch, substitute, progress);
-    for (int last = 0; last < 2; last++) {
-        LAUNCH(add_moments, parts, line, stream, batch, progress, partial);
-        LAUNCH(finish_moments, one_block, line, stream, last, (int)parts.x, partial, progress);
-    }
+void gpu_normalise(cudaStream_t stream, PpoBatch batch, const GpuProgress *progress) {
     LAUNCH(normalise, blocks_of((int64_t)batch.steps * batch.envs), line, stream, batch, progress);
+}
+
+/* ---- several processes ---- */
+
+static __global__ void add_rows(int rows, int width, double *x) {
+    for (int k = 0; k < width; k++) {
+        double sum = 0.0;
+        for (int row = (int)threadIdx.x; row < rows; row += THREADS) {
+            sum += x[(int64_t)row * width + k];
+        }
+        sum = block_sum(sum);
+        if (threadIdx.x == 0) {
+            x[k] = sum;
+        }
+    }
+}
+
+void gpu_add_rows(cudaStream_t stream, int rows, int width, double *x) {
+    LAUNCH(add_rows, one_block, line, stream, rows, width, x);
+}
+
+/* Sums of 32-bit hashes are exact in double up to 2^21 parameters. */
+static __global__ void add_hashes(int64_t count, const float *parameters, double *partial) {
+    double sum = 0.0;
+    for (int64_t i = item(); i < count; i += (int64_t)gridDim.x * THREADS) {
+        uint32_t bits;
+        memcpy(&bits, &parameters[i], sizeof bits);
+        sum += noise_mix(bits ^ noise_mix((uint32_t)i));
+    }
+    sum = block_sum(sum);
+    if (threadIdx.x == 0) {
+        partial[blockIdx.x] = sum;
+    }
+}
+
+static __global__ void finish_hash(int parts, const double *partial, GpuProgress *progress) {
+    const double sum = block_sum((int)threadIdx.x < parts ? partial[threadIdx.x] : 0.0);
+    if (threadIdx.x == 0) {
+        progress->hash = sum;
+    }
+}
+
+void gpu_hash(cudaStream_t stream, int64_t count, const float *parameters, double *partial,
+              GpuProgress *progress) {
+    const dim3 parts = parts_of(count);
+    LAUNCH(add_hashes, parts, line, stream, count, parameters, partial);
+    LAUNCH(finish_hash, one_block, line, stream, (int)parts.x, partial, progress);
 }
 
 /* ---- a minibatch ---- */
@@ -208,11 +267,11 @@ static __global__ void order_samples(GpuOrder o, const int *substitute, const Gp
     while (p >= o.cut[shard + 1]) {
         shard++;
     }
-    const OrderStratum stratum = order_stratum(o.steps, o.envs, shard);
+    const OrderStratum stratum = order_part_stratum(o.steps, o.part, shard);
     const Order permutation =
         order_make(stratum.count, progress->seed, progress->iteration, o.epoch, shard);
     const int place = order_begin(stratum.count, o.m, o.minibatches) + (int)p - o.cut[shard];
-    order[p] = substitute[order_sample(stratum, o.envs, order_at(&permutation, place))];
+    order[p] = substitute[order_sample(stratum, o.part.width, order_at(&permutation, place))];
 }
 
 void gpu_order(cudaStream_t stream, GpuOrder o, const int *substitute, const GpuProgress *progress,

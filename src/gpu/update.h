@@ -14,6 +14,7 @@
 #include "learn/ppo_def.h"
 
 #define GPU_PARTS 256 /* most partial sums of the moments and of the gradient's norm */
+#define GPU_MOMENTS 8 /* sums of a moment: see gpu_add_moments */
 
 /* The learner's numbers, on the device. */
 typedef struct {
@@ -33,6 +34,7 @@ typedef struct {
     float std[GPU_ACTIONS_MAX], constant[GPU_ACTIONS_MAX + 2];
     int go; /* bool: its step is taken */
     AdamStep step;
+    double hash; /* gpu_hash */
 } GpuProgress;
 
 #ifdef __cplusplus
@@ -42,9 +44,9 @@ extern "C" {
 /* ---- acting ---- */
 
 /* Samples the actions of environments first .. first + rows - 1 at time t around mean [rows][pitch]
- * into the rollout. */
+ * into the rollout. number: of its environment 0 among those of all processes. */
 typedef struct {
-    int t, first, rows, actions, pitch;
+    int t, first, number, rows, actions, pitch;
     const float *log_std, *mean;
 } GpuActions;
 void gpu_sample_actions(cudaStream_t stream, GpuActions a, PpoBatch batch,
@@ -58,15 +60,33 @@ void gpu_begin_update(cudaStream_t stream, PpoDef def, int actions, const float 
 void gpu_shift_frames(cudaStream_t stream, PpoBatch batch, int width);
 /* Fills value from the critic's output [rows][pitch] of samples first .. first + rows - 1. */
 void gpu_take_values(cudaStream_t stream, int rows, int pitch, const float *output, float *value);
-/* As ppo_returns. partial: [GPU_PARTS][7]. */
-void gpu_returns(cudaStream_t stream, PpoDef def, PpoBatch batch, int *substitute, double *partial,
+/* As ppo_returns, up to the moments. */
+void gpu_returns(cudaStream_t stream, PpoDef def, PpoBatch batch, OrderPart part, int *substitute,
                  GpuProgress *progress);
+/* Sums over the usable samples into the rows of partial [GPU_PARTS][GPU_MOMENTS]: their number, the
+ * gaps of advantage, returns and value from progress->moment, the squares of the gaps, and whether
+ * a stratum is starved. Returns the number of rows. */
+int gpu_add_moments(cudaStream_t stream, PpoBatch batch, const GpuProgress *progress,
+                    double *partial);
+/* Means (last = 0), then deviations (last = 1), from so many rows. */
+void gpu_finish_moments(cudaStream_t stream, int last, int rows, const double *partial,
+                        GpuProgress *progress);
+void gpu_normalise(cudaStream_t stream, PpoBatch batch, const GpuProgress *progress);
+
+/* ---- several processes ---- */
+
+/* Row 0 of x [rows][width] becomes the sum of the rows. */
+void gpu_add_rows(cudaStream_t stream, int rows, int width, double *x);
+/* Hash of the parameters [count] into progress->hash. partial: [GPU_PARTS]. */
+void gpu_hash(cudaStream_t stream, int64_t count, const float *parameters, double *partial,
+              GpuProgress *progress);
 
 /* ---- a minibatch ---- */
 
 typedef struct {
-    int steps, envs, minibatches, m, epoch;
-    int cut[PPO_SHARDS + 1]; /* order_cuts */
+    int steps, minibatches, m, epoch;
+    OrderPart part;
+    int cut[PPO_SHARDS + 1]; /* order_own_cuts */
 } GpuOrder;
 void gpu_order(cudaStream_t stream, GpuOrder o, const int *substitute, const GpuProgress *progress,
                int *order);

@@ -21,6 +21,11 @@ size_t gpu_learner_bytes(const Ppo *ppo) {
     return 0;
 }
 
+size_t gpu_learner_sum_bytes(const Ppo *ppo) {
+    (void)ppo;
+    return 0;
+}
+
 MildStatus gpu_learner_write(Ppo *ppo, const void *block, MildError *error) {
     (void)ppo;
     (void)block;

@@ -88,6 +88,17 @@ static inline MILD_BOTH OrderStratum order_part_stratum(int steps, OrderPart par
     return s;
 }
 
+/* The part's own of these cuts of a minibatch: counted from its first sample; shards of other
+ * processes are empty. Returns own[PPO_SHARDS], the number of its samples. */
+static inline int order_own_cuts(OrderPart part, const int *cut, int *own) {
+    const int begin = cut[part.shard], end = cut[part.shard + part.shards];
+    for (int s = 0; s <= PPO_SHARDS; s++) {
+        const int place = cut[s] < begin ? begin : cut[s];
+        own[s] = (place > end ? end : place) - begin;
+    }
+    return own[PPO_SHARDS];
+}
+
 /* Samples of the part's shards in its largest minibatch. */
 static inline int order_largest(int steps, OrderPart part, int minibatches) {
     int largest = 0;

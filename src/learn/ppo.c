@@ -264,6 +264,15 @@ Policy *ppo_average(Ppo *ppo) {
     return ppo->average ? ppo->average : ppo->policy;
 }
 
+uint64_t ppo_hash(const Ppo *ppo) {
+    const uint32_t *words = (const uint32_t *)(const void *)ppo->policy->parameters;
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (int64_t i = 0; !ppo->backend.update && i < ppo->policy->network.count; i++) {
+        hash = (hash ^ words[i]) * 0x100000001b3u;
+    }
+    return ppo->backend.update ? ppo->hash : hash;
+}
+
 int64_t ppo_iteration(const Ppo *ppo) {
     return ppo->iteration;
 }

@@ -43,6 +43,8 @@ int64_t ppo_iteration(const Ppo *ppo);
 /* Brings policy, running mean and the rows of time 0 on the CPU up to date with the device.
  * ppo_save and ppo_average do it themselves. Nothing to do without a backend. */
 MildStatus ppo_pull(Ppo *ppo, MildError *error);
+/* Hash of the parameters after the last update. On a device only several processes have it. */
+uint64_t ppo_hash(const Ppo *ppo);
 /* The running mean of the weights (Polyak and Juditsky 1992), or the policy itself with def.average
  * = 0. Owned by ppo. */
 Policy *ppo_average(Ppo *ppo);

@@ -152,6 +152,7 @@ static MildStatus save(const Ppo *ppo, const char *path, const Extra *extra, con
                        MildError *error) {
     const PpoBackend *backend = &ppo->backend;
     MildStatus status = backend->pull ? backend->pull(backend->self, error) : MILD_OK;
+    status = ranks_agree(ppo->ranks, status, error);
     if (status) {
         return status;
     }

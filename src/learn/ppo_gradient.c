@@ -35,11 +35,12 @@ int ppo_mirrored(const Ppo *ppo, const int *cut, int *which) {
     return total;
 }
 
-/* A chunk that begins at sample `at` takes its numbers from 2 at latent onward (gather_actor). */
-void ppo_latent_rows(const int *cut, int *row) {
+/* A chunk that begins at sample `at` of the minibatch takes its numbers from 2 at latent onward
+ * (gather_actor). */
+void ppo_latent_rows(const int *cut, int first, int *row) {
     for (int s = 0; s < PPO_SHARDS; s++) {
         for (int p = cut[s]; p < cut[s + 1]; p++) {
-            row[p] = p + cut[s] + (p - cut[s]) / PPO_CHUNK * PPO_CHUNK;
+            row[p] = 2 * first + p + cut[s] + (p - cut[s]) / PPO_CHUNK * PPO_CHUNK;
         }
     }
 }

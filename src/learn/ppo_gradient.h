@@ -18,12 +18,13 @@ typedef struct {
  * sums. */
 void ppo_gradient(Ppo *ppo, const LossContext *context, const PpoMinibatch *minibatch,
                   LossSums *sums, double *norm);
-/* Samples of a minibatch with these cuts that get a mirror image: how many, and with `which` not
- * NULL their places in the minibatch. */
+/* Samples of these cuts (of a minibatch, or order_own_cuts) that get a mirror image: how many, and
+ * with `which` not NULL their places. */
 int ppo_mirrored(const Ppo *ppo, const int *cut, int *which);
-/* Random numbers for the sampled z: sample p of the minibatch uses the numbers from row[p] * latent
- * onward of the stream step_latent_key. row: [samples of the minibatch]. */
-void ppo_latent_rows(const int *cut, int *row);
+/* Random numbers for the sampled z: sample p of the cuts uses the numbers from row[p] * latent
+ * onward of the stream step_latent_key. first: place of sample 0 in the whole minibatch, which is
+ * above 0 for order_own_cuts. row: [samples of the cuts]. */
+void ppo_latent_rows(const int *cut, int first, int *row);
 /* One step of Adam along the gradient times gradient_scale; keeps the action noise above its floor.
  */
 void ppo_optimise(Ppo *ppo, double gradient_scale);

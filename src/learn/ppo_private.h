@@ -36,6 +36,7 @@ typedef struct Ppo {
     int64_t iteration;
     int64_t adam_steps;
     double learning_rate;
+    uint64_t hash;     /* of the parameters on the backend's device: see ppo_hash */
     Policy *average;   /* NULL: none */
     void *batch_block; /* memory of the arrays of `start`, and of `batch` unless it is resident */
     size_t batch_bytes;

@@ -22,6 +22,10 @@ int ranks_number(const Ranks *ranks) {
     return ranks ? ranks->number : 0;
 }
 
+int ranks_local(const Ranks *ranks) {
+    return ranks ? ranks->local : 0;
+}
+
 int ranks_threads(const Ranks *ranks) {
     if (!ranks) {
         return 0;

@@ -23,6 +23,7 @@ void ranks_close(Ranks *ranks);
 
 int ranks_count(const Ranks *ranks);
 int ranks_number(const Ranks *ranks); /* 0 .. count - 1; rank 0 reads, writes and speaks for all */
+int ranks_local(const Ranks *ranks);  /* number among the ranks of its machine */
 /* Threads for this rank: its share of the machine's cores, or as many as the launcher has bound it
  * to. 0 for a process alone. */
 int ranks_threads(const Ranks *ranks);

@@ -46,7 +46,7 @@ const int train_place_field_count = sizeof train_place_fields / sizeof *train_pl
 const MildField train_fields[] = {
     MILD_FIELD(TrainDef, robot, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->robot, 0, 0,
                "[-] name of a folder under robots/, or a folder of your own, with a slash"),
-    FIELD(envs, MILD_FIELD_INT, 1, 65536, "[-] robots that are simulated at the same time"),
+    FIELD(envs, MILD_FIELD_INT, 1, 524288, "[-] robots that are simulated at the same time"),
     FIELD(iterations, MILD_FIELD_INT, 0, 1e9, "[-] iterations of PPO; 0: no limit"),
     FIELD(minutes, MILD_FIELD_DOUBLE, 0, 1e6, "[min] wall time of the run; 0: no limit"),
     FIELD(checkpoint_every, MILD_FIELD_INT, 1, 1e9, "[-] iterations between checkpoints"),

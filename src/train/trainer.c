@@ -1,11 +1,13 @@
 #include "train/trainer.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "base/paths.h"
 #include "gpu/learner.h"
+#include "ranks/device.h"
 #include "train/envs.h"
 
 enum { TRAIN_MATERIALS = 3 }; /* drawn for the pattern of a terrain, as for stripes */
@@ -49,27 +51,10 @@ static MildStatus make_map(Trainer *trainer, MildError *error) {
                            : terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error);
 }
 
-/* Several processes train on the CPU, with MuJoCo. */
-static MildStatus check_ranks(const Trainer *trainer, MildError *error) {
-    const TrainDef *def = &trainer->def.train;
-    if (ranks_count(trainer->ranks) > 1 && train_device(def) >= 0) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "train.device = %s trains in one process; start one, or take cpu",
-                         def->device);
-    }
-    if (ranks_count(trainer->ranks) > 1 && train_is_batch(def)) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "train.robots = batch trains in one process; start one, or take mujoco");
-    }
-    return MILD_OK;
-}
-
-static int build(Trainer *trainer, MildError *error) {
+/* Robot, threads, networks and learner, on the CPU. Returns 0 on failure. */
+static int make_learner(Trainer *trainer, MildError *error) {
     const ExperimentDef *def = &trainer->def;
     MildError cause = {0};
-    if (check_ranks(trainer, error) != MILD_OK) {
-        return 0;
-    }
     trainer->robot = robot_open(def->train.robot, &cause);
     if (!trainer->robot) {
         mild_fail(error, cause.status, "train.robot: %s", cause.text);
@@ -92,25 +77,55 @@ static int build(Trainer *trainer, MildError *error) {
     }
     trainer->ppo = ppo_create_part(&def->ppo, trainer->policy, trainer->pool, &mirror,
                                    def->train.envs, def->train.seed, trainer->ranks, error);
-    if (!trainer->ppo) {
-        return 0;
+    return trainer->ppo != NULL;
+}
+
+/* Each of several processes takes the GPU with its number on its machine. No process may be missing
+ * here, because all wait for each other. */
+static MildStatus join_devices(Trainer *trainer, MildError *error) {
+    TrainDef *def = &trainer->def.train;
+    const int count = ranks_count(trainer->ranks), device = train_device(def);
+    if (count == 1 || device < 0) {
+        return MILD_OK;
     }
-    const GpuLearnerDef gpu = {.device = train_device(&def->train),
-                               .resident = train_is_batch(&def->train)};
-    if (gpu.device >= 0 && gpu_learner_attach(trainer->ppo, &gpu, error)) {
-        return 0;
+    if (device > 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "train.device = %s in %d processes: each takes a GPU of its own; write "
+                         "cuda",
+                         def->device, count);
+    }
+    snprintf(def->device, sizeof def->device, "cuda:%d", ranks_local(trainer->ranks));
+    return ranks_open_device(trainer->ranks, gpu_learner_sum_bytes(trainer->ppo), error);
+}
+
+static MildStatus move_learner(Trainer *trainer, MildError *error) {
+    const TrainDef *def = &trainer->def.train;
+    const GpuLearnerDef gpu = {.device = train_device(def), .resident = train_is_batch(def)};
+    return gpu.device >= 0 ? gpu_learner_attach(trainer->ppo, &gpu, error) : MILD_OK;
+}
+
+static MildStatus make_envs(Trainer *trainer, MildError *error) {
+    const ExperimentDef *def = &trainer->def;
+    if (make_map(trainer, error) != MILD_OK) {
+        return error->status;
     }
     trainer->stream = gpu_learner_stream(trainer->ppo);
-    if (make_map(trainer, error) != MILD_OK) {
-        return 0;
-    }
     trainer->def.task.map = trainer->map;
     trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
     trainer->envs =
         train_envs_create(def, is_striped(def), trainer->robot, trainer->pool,
                           ppo_batch(trainer->ppo)->envs, ppo_first_env(trainer->ppo), error);
-    return trainer->envs != NULL && train_envs_reset(trainer->envs, ppo_batch(trainer->ppo),
-                                                     trainer->stream, error) == MILD_OK;
+    return trainer->envs
+               ? train_envs_reset(trainer->envs, ppo_batch(trainer->ppo), trainer->stream, error)
+               : error->status;
+}
+
+static MildStatus build(Trainer *trainer, MildError *error) {
+    MildStatus status = make_learner(trainer, error) ? MILD_OK : error->status;
+    status = ranks_agree(trainer->ranks, status, error);
+    status = status == MILD_OK ? join_devices(trainer, error) : status;
+    status = status == MILD_OK ? move_learner(trainer, error) : status;
+    return status == MILD_OK ? make_envs(trainer, error) : status;
 }
 
 Trainer *train_create(const ExperimentDef *def, MildError *error) {
@@ -120,14 +135,14 @@ Trainer *train_create(const ExperimentDef *def, MildError *error) {
 Trainer *train_create_part(const ExperimentDef *def, Ranks *ranks, MildError *error) {
     MildError cause = {0};
     Trainer *trainer = calloc(1, sizeof *trainer);
-    if (!trainer) {
-        mild_fail(&cause, MILD_ERROR_MEMORY, "out of memory");
-    } else {
+    MildStatus status = trainer ? MILD_OK : mild_fail(&cause, MILD_ERROR_MEMORY, "out of memory");
+    status = ranks_agree(ranks, status, &cause);
+    if (status == MILD_OK && trainer) {
         trainer->def = *def;
         trainer->ranks = ranks;
+        status = ranks_agree(ranks, build(trainer, &cause), &cause);
     }
-    const int built = trainer && build(trainer, &cause);
-    if (ranks_agree(ranks, built ? MILD_OK : cause.status, &cause) != MILD_OK || !trainer) {
+    if (status != MILD_OK) {
         mild_fail(error, cause.status, "%s", cause.text);
         train_destroy(trainer);
         return NULL;
@@ -156,22 +171,13 @@ static void sum_over_ranks(Ranks *ranks, VecStats *sums) {
     memcpy(sums->terms, numbers + 9, sizeof sums->terms);
 }
 
-uint64_t train_hash(Trainer *trainer) {
-    const uint32_t *words = (const uint32_t *)(const void *)policy_parameters(trainer->policy);
-    uint64_t hash = 0xcbf29ce484222325u;
-    for (int64_t i = 0; i < policy_parameter_count(trainer->policy); i++) {
-        hash = (hash ^ words[i]) * 0x100000001b3u;
-    }
-    return hash;
-}
-
-/* Every process applies the same sums to the same parameters. Another kind of processor may round
- * them differently. */
+/* Every process applies the same sums to the same parameters. Another kind of processor or GPU may
+ * round them differently. */
 static MildStatus check_same(Trainer *trainer, MildError *error) {
     if (ranks_count(trainer->ranks) == 1) {
         return MILD_OK;
     }
-    const uint64_t mine = train_hash(trainer);
+    const uint64_t mine = ppo_hash(trainer->ppo);
     uint64_t first = mine;
     ranks_broadcast(trainer->ranks, &first, sizeof first);
     return mine == first ? MILD_OK
@@ -279,9 +285,10 @@ static MildStatus load_learner(Trainer *trainer, const char *path, MildError *er
         status = train_envs_restore(trainer->envs, kept, error);
     }
     free(kept);
-    return status == MILD_OK
-               ? train_envs_reset(trainer->envs, ppo_batch(trainer->ppo), trainer->stream, error)
-               : status;
+    if (status == MILD_OK) {
+        status = train_envs_reset(trainer->envs, ppo_batch(trainer->ppo), trainer->stream, error);
+    }
+    return ranks_agree(trainer->ranks, status, error);
 }
 
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error) {

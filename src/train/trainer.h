@@ -37,7 +37,6 @@ int64_t train_iteration(const Trainer *trainer);
 Policy *train_policy(Trainer *trainer); /* the policy to save; with ppo.average the mean weights */
 size_t train_bytes(const Trainer *trainer); /* memory of environments, batch and learner */
 int train_threads(const Trainer *trainer);
-uint64_t train_hash(Trainer *trainer); /* of the parameters; the same on all ranks */
 
 /* Saves all that resuming needs in one file with a checksum. Where MuJoCo steps the robots, a
  * resumed run equals one that was never stopped, bit for bit. Where the batch engine does, the file

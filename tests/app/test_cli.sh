@@ -15,7 +15,7 @@ done
 printf '[train]\nenvs = 4\niteration = 1\n' >bad_key.ini
 printf '[train]\nenvs = 0\n' >bad_value.ini
 bad "bad_key.ini:3: unknown key 'train.iteration'; nearest is 'train.iterations'" "$mild" train --config bad_key.ini --out run
-bad "bad_value.ini:2: .*outside 1 .. 65536" "$mild" train --config bad_value.ini --out run
+bad "bad_value.ini:2: .*outside 1 .. 524288" "$mild" train --config bad_value.ini --out run
 bad "missing.ini" "$mild" train --config missing.ini --out run
 bad "nearest is 'train.envs'" "$mild" train --out run --train.env=4
 bad "nearest is 'train'" "$mild" train --out run --trian.envs=4

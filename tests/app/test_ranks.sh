@@ -1,9 +1,13 @@
 #!/usr/bin/env bash
 # Training by several processes: the same numbers whatever the split, from checkpoint to checkpoint too; a process that
-# fails or dies is one line, and the last checkpoint is whole. Usage: test_ranks.sh PATH_TO_MILD PATH_TO_RANKS_TEST PATH_TO_RANKS_PY
+# fails or dies is one line, and the last checkpoint is whole.
+# Usage: test_ranks.sh PATH_TO_MILD PATH_TO_RANKS_PY TEST_FOR_MPIRUN...
 source "$(dirname "$0")/../kit.sh" "$1"
-test_ranks=$(realpath "$2")
-ranks_py=$(realpath "$3")
+ranks_py=$(realpath "$2")
+for_mpirun=()
+for test in "${@:3}"; do
+    for_mpirun+=("$(realpath "$test")")
+done
 # no network; a short path for its sockets; as many processes as wanted, as root too
 # products whose last bits depend on the rows beside a row, on any processor
 export DNNL_MAX_CPU_ISA=AVX2
@@ -41,9 +45,11 @@ reward() {
     grep -o 'reward [-0-9.]*/s' <<<"$output" | tail -1
 }
 
-# the calls
+# the calls of ranks.h, and the learner on GPUs (a stand-in for them) by parts
 for n in 2 4 8; do
-    good mpirun -n $n "$test_ranks"
+    for test in "${for_mpirun[@]}"; do
+        good mpirun -n $n "$test"
+    done
 done
 
 # the split changes nothing: parameters, moments, environments, log; one process may be alone or rank 0 of 1
@@ -67,8 +73,22 @@ good "$mild" train --out on --resume --train.iterations=2
 good "$ranks_py" -n 4 "$mild" train --out on --resume --train.iterations=4
 same_numbers alone/$last on/$last
 
-# on from a run of the batch engine, whose checkpoint has the learner and the help of each robot
-good "$mild" train --out batch "${tiny[@]}" --train.robots=batch --train.grounds=16 --train.iterations=3
+# the same with the batch engine, whose checkpoint has the learner and the help of each robot
+batch=("${tiny[@]}" --train.robots=batch --train.grounds=16)
+good "$mild" train --out batch "${batch[@]}" --train.iterations=3
+reward_alone=$(reward)
+for n in 2 4; do
+    good "$ranks_py" -n $n "$mild" train --out batch$n "${batch[@]}" --train.iterations=3
+    [ "$(reward)" = "$reward_alone" ] || fail "batch: $reward_alone alone, $(reward) by $n processes"
+    same_numbers batch/checkpoint_000000003.safetensors batch$n/checkpoint_000000003.safetensors
+    [ "$(log_numbers batch)" = "$(log_numbers batch$n)" ] || fail "batch: the logs of 1 and $n processes differ"
+done
+good "$ranks_py" -n 2 "$mild" train --out batch4 --resume --train.iterations=4
+good "$ranks_py" -n 8 "$mild" train --out batch2 --resume --train.iterations=4
+same_numbers batch2/$last batch4/$last
+
+# on with MuJoCo from there
+rm -r batch2
 cp -r batch batch2
 good "$mild" train --out batch --resume --train.robots=mujoco --train.iterations=4
 good "$ranks_py" -n 2 "$mild" train --out batch2 --resume --train.robots=mujoco --train.iterations=4
@@ -79,8 +99,8 @@ bad "nearest is --out" "$ranks_py" -n 2 "$mild" train --ot on
 bad "nearest is 'train.envs'" "$ranks_py" -n 2 "$mild" train --out wrong --train.env=4
 bad "3 processes: 1, 2, 4 or 8" "$ranks_py" -n 3 "$mild" train --out wrong
 bad "train.envs = 3 is too few for 4 processes" "$ranks_py" -n 4 "$mild" train --out wrong "${tiny[@]}" --train.envs=3
-bad "train.device = cuda trains in one process" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda
-bad "train.robots = batch trains in one process" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.robots=batch
+bad "train.device = cuda.*: .*" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda
+bad "train.device = cuda:1 in 2 processes: .* write cuda" "$ranks_py" -n 2 "$mild" train --out wrong "${tiny[@]}" --train.device=cuda:1
 bad "cannot make folder" "$ranks_py" -n 2 "$mild" train --out /dev/null/wrong "${tiny[@]}"
 bad "holds 3 checkpoints" "$ranks_py" -n 2 "$mild" train --out on
 # 20000 robots need 300 MB, and the second process may not have them

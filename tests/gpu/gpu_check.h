@@ -41,9 +41,10 @@ static inline PpoMirror some_mirror(Learner *l, const PolicyDef *def) {
     return (PpoMirror){l->mirror_index, l->mirror_sign, l->mirror_index, l->mirror_sign};
 }
 
-/* rows: most rows of a chunk on the device; 0: the default. */
-static inline void learner_open(Learner *l, int where, const PolicyDef *policy, const PpoDef *def,
-                                int envs, int rows) {
+/* rows: most rows of a chunk on the device; 0: the default. ranks: with which it shares the
+ * environments. */
+static inline void learner_open_part(Learner *l, int where, const PolicyDef *policy,
+                                     const PpoDef *def, int envs, int rows, Ranks *ranks) {
     MildError error = {0};
     memset(l, 0, sizeof *l);
     PpoMirror mirror =
@@ -51,10 +52,11 @@ static inline void learner_open(Learner *l, int where, const PolicyDef *policy, 
     l->policy = policy_create(policy, 5, &error);
     l->pool = pool_create(where == ON_CPU ? 0 : 1);
     assert_true(l->policy && l->pool);
-    l->ppo = ppo_create(def, l->policy, l->pool, &mirror, envs, 11, &error);
+    l->ppo = ppo_create_part(def, l->policy, l->pool, &mirror, envs, 11, ranks, &error);
     assert_non_null(l->ppo);
     if (where != ON_CPU) {
-        const GpuLearnerDef gpu = {.resident = where == RESIDENT, .rows = rows};
+        const GpuLearnerDef gpu = {
+            .device = ranks_local(ranks), .resident = where == RESIDENT, .rows = rows};
         if (gpu_learner_attach(l->ppo, &gpu, &error)) {
             fail_msg("%s", error.text);
         }
@@ -69,6 +71,11 @@ static inline void learner_open(Learner *l, int where, const PolicyDef *policy, 
         ppo_batch_like(l->ppo, l->block, &l->batch);
         assert_int_equal(gpu_learner_read(l->ppo, l->block, &error), MILD_OK);
     }
+}
+
+static inline void learner_open(Learner *l, int where, const PolicyDef *policy, const PpoDef *def,
+                                int envs, int rows) {
+    learner_open_part(l, where, policy, def, envs, rows, NULL);
 }
 
 static inline void learner_close(Learner *l) {
@@ -183,6 +190,57 @@ static inline void learner_start_toy(Learner *l, Toy *toy) {
         toy_observe(&toy->env[e], &l->batch, 0, e);
     }
     learner_write(l);
+}
+
+/* ---- updates ---- */
+
+static inline void assert_close(const char *what, double ours, double expected, double bound) {
+    if (!(fabs(ours - expected) <= bound * fmax(1.0, fabs(expected)))) {
+        fail_msg("%s: %.9g, on the CPU %.9g", what, ours, expected);
+    }
+}
+
+/* Everything that an update decides is the same, everything that it computes within `bound`. */
+static inline void compare_reports(const PpoReport *a, const PpoReport *b, double bound) {
+    assert_int_equal(a->skipped, b->skipped);
+    assert_close("learning rate", a->learning_rate, b->learning_rate, 1e-12);
+    assert_close("surrogate", a->surrogate, b->surrogate, bound);
+    assert_close("value loss", a->value_loss, b->value_loss, bound);
+    assert_close("entropy", a->entropy, b->entropy, bound);
+    assert_close("kl", a->kl, b->kl, bound);
+    assert_close("clip share", a->clip_share, b->clip_share, 1e-3); /* counts samples */
+    assert_close("norm", a->gradient_norm, b->gradient_norm, bound);
+    assert_close("std", a->action_std, b->action_std, bound);
+    assert_close("reconstruction", a->vae_reconstruction, b->vae_reconstruction, bound);
+    assert_close("vae kl", a->vae_kl, b->vae_kl, bound);
+    for (int g = 0; g < 3; g++) {
+        assert_close("estimates", a->estimate_loss[g], b->estimate_loss[g], bound);
+    }
+    assert_close("mirror", a->mirror, b->mirror, bound);
+    assert_close("mean value", a->value_mean, b->value_mean, 1e-6);
+    assert_close("deviation of the advantage", a->advantage_std, b->advantage_std, 1e-6);
+    assert_close("explained variance", a->explained_variance, b->explained_variance, 1e-5);
+}
+
+/* What may be wrong with a rollout. */
+enum { NOTHING, INVALID, NOT_FINITE, STARVED, FAULTS };
+
+static inline void spoil(PpoBatch *b, const Network *n, int fault) {
+    const int samples = b->steps * b->envs;
+    for (int i = 0; i < samples; i++) {
+        if (fault == INVALID && (i % 11 == 3 || i >= samples - b->envs / 2)) {
+            b->valid[i] = 0;
+            b->reward[i] = b->history[(int64_t)i * n->history] = NAN;
+            b->frame[(int64_t)i * n->def.observation] = b->target[i * n->def.estimates] = NAN;
+        }
+        if (fault == STARVED && i % b->envs < b->envs / PPO_SHARDS) {
+            b->valid[i] = 0;
+        }
+    }
+    if (fault == NOT_FINITE) { /* one minibatch of every epoch; and a value, as if not valid */
+        b->history[(int64_t)(samples / 2) * n->history + 1] = NAN;
+        b->critic[(int64_t)(samples / 3) * n->def.critic_input + 1] = INFINITY;
+    }
 }
 
 #endif

@@ -90,7 +90,7 @@ static void gradient_on_device(Learner *l, const LossContext *context,
     const size_t samples = (size_t)g->batch.steps * (size_t)g->envs,
                  indices = (size_t)minibatch->cut[PPO_SHARDS] * sizeof(int);
     const float *log_std = g->parameters + n->log_std;
-    ppo_latent_rows(minibatch->cut, g->host_rows);
+    ppo_latent_rows(minibatch->cut, 0, g->host_rows);
     ppo_mirrored(l->ppo, minibatch->cut, g->host_rows + samples);
     cudaMemcpyAsync(g->latent_row, g->host_rows, indices, cudaMemcpyHostToDevice, stream);
     cudaMemcpyAsync(g->which, g->host_rows + samples, indices, cudaMemcpyHostToDevice, stream);
@@ -99,7 +99,10 @@ static void gradient_on_device(Learner *l, const LossContext *context,
     cudaMemcpyAsync(g->progress->old_std, context->old_std, sizeof context->old_std,
                     cudaMemcpyHostToDevice, stream);
     gpu_begin_minibatch(stream, minibatch->draw, n->def.actions, log_std, g->progress);
-    gpu_enqueue_gradient(g, minibatch->cut, 0);
+    GpuMinibatch whole = {.samples = minibatch->cut[PPO_SHARDS],
+                          .images = ppo_mirrored(l->ppo, minibatch->cut, NULL)};
+    memcpy(whole.cut, minibatch->cut, sizeof whole.cut);
+    gpu_enqueue_gradient(g, &whole);
     double *parts = malloc((size_t)(g->sum_blocks * GPU_SUMS) * sizeof *parts);
     assert_non_null(parts);
     cudaMemcpyAsync(g->padded, g->gradient, (size_t)n->count * sizeof(float),
@@ -246,34 +249,6 @@ static void gradients_are_those_of_the_cpu(void **state) {
 
 /* ---- update ---- */
 
-static void assert_close(const char *what, double ours, double expected, double bound) {
-    if (!(fabs(ours - expected) <= bound * fmax(1.0, fabs(expected)))) {
-        fail_msg("%s: %.9g, on the CPU %.9g", what, ours, expected);
-    }
-}
-
-/* Everything that an update decides is the same, everything that it computes within `bound`. */
-static void compare_reports(const PpoReport *a, const PpoReport *b, double bound) {
-    assert_int_equal(a->skipped, b->skipped);
-    assert_close("learning rate", a->learning_rate, b->learning_rate, 1e-12);
-    assert_close("surrogate", a->surrogate, b->surrogate, bound);
-    assert_close("value loss", a->value_loss, b->value_loss, bound);
-    assert_close("entropy", a->entropy, b->entropy, bound);
-    assert_close("kl", a->kl, b->kl, bound);
-    assert_close("clip share", a->clip_share, b->clip_share, 1e-3); /* counts samples */
-    assert_close("norm", a->gradient_norm, b->gradient_norm, bound);
-    assert_close("std", a->action_std, b->action_std, bound);
-    assert_close("reconstruction", a->vae_reconstruction, b->vae_reconstruction, bound);
-    assert_close("vae kl", a->vae_kl, b->vae_kl, bound);
-    for (int g = 0; g < 3; g++) {
-        assert_close("estimates", a->estimate_loss[g], b->estimate_loss[g], bound);
-    }
-    assert_close("mirror", a->mirror, b->mirror, bound);
-    assert_close("mean value", a->value_mean, b->value_mean, 1e-6);
-    assert_close("deviation of the advantage", a->advantage_std, b->advantage_std, 1e-6);
-    assert_close("explained variance", a->explained_variance, b->explained_variance, 1e-5);
-}
-
 /* Advantages, moments and substitutes of a large rollout, of which any share may be valid. */
 static void compare_returns(double valid) {
     enum { ENVS = 701 };
@@ -301,7 +276,7 @@ static void compare_returns(double valid) {
     GpuLearner *g = gpu.gpu;
     const cudaStream_t stream = g->queue.stream;
     gpu_begin_update(stream, def, policy.actions, g->parameters + g->network.log_std, g->progress);
-    gpu_returns(stream, def, g->batch, g->substitute, g->partial, g->progress);
+    gpu_enqueue_returns(g);
     GpuProgress progress;
     int *substitute = malloc((size_t)samples * sizeof *substitute);
     assert_non_null(substitute);
@@ -329,27 +304,6 @@ static void returns_are_those_of_the_cpu(void **state) {
     static const double shares[] = {1.0, 0.9, 0.3, 0.01, 0.0};
     for (size_t i = 0; i < sizeof shares / sizeof *shares; i++) {
         compare_returns(shares[i]);
-    }
-}
-
-/* What may be wrong with a rollout. */
-enum { NOTHING, INVALID, NOT_FINITE, STARVED, FAULTS };
-
-static void spoil(PpoBatch *b, const Network *n, int fault) {
-    const int samples = b->steps * b->envs;
-    for (int i = 0; i < samples; i++) {
-        if (fault == INVALID && (i % 11 == 3 || i >= samples - b->envs / 2)) {
-            b->valid[i] = 0;
-            b->reward[i] = b->history[(int64_t)i * n->history] = NAN;
-            b->frame[(int64_t)i * n->def.observation] = b->target[i * n->def.estimates] = NAN;
-        }
-        if (fault == STARVED && i % b->envs < b->envs / PPO_SHARDS) {
-            b->valid[i] = 0;
-        }
-    }
-    if (fault == NOT_FINITE) { /* one minibatch of every epoch; and a value, as if not valid */
-        b->history[(int64_t)(samples / 2) * n->history + 1] = NAN;
-        b->critic[(int64_t)(samples / 3) * n->def.critic_input + 1] = INFINITY;
     }
 }
 

@@ -120,7 +120,7 @@ static void check_minibatch(Case *c, int count, uint32_t draw, double share) {
     const int images = ppo_mirrored(c->ppo, minibatch.cut, which);
     assert_int_equal(images, ppo_mirrored(c->ppo, minibatch.cut, NULL));
     assert_true(fabs(images - share * count) <= 8.0 * (1.0 + count / 2048.0));
-    ppo_latent_rows(minibatch.cut, rows);
+    ppo_latent_rows(minibatch.cut, 0, rows);
     c->context.sample_weight = 1.0f / (float)count;
     c->context.mirror_weight = images ? 1.0f / (float)images : 0.0f;
     LossSums sums, expected = {0};
@@ -185,7 +185,7 @@ static void latents_are_drawn_apart(void **state) {
     static const int counts[] = {1, 7, 8, 100, 2048, 2049, 8000};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         memset(used, 0, sizeof used);
-        ppo_latent_rows(minibatch_of(NULL, counts[i], 0).cut, row);
+        ppo_latent_rows(minibatch_of(NULL, counts[i], 0).cut, 0, row);
         for (int p = 0; p < counts[i]; p++) {
             assert_true(row[p] >= 0 && row[p] < 2 * counts[i]);
             assert_int_equal(used[row[p]]++, 0);
