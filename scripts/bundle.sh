@@ -27,8 +27,8 @@ strip -o "$bundle/bin/test_batch" build/x86-64-v3/tests/batch_test_batch
 strip -o "$bundle/bin/device_engine" build/x86-64-v3/tests/engine_device_engine
 strip -o "$bundle/bin/test_ranks" build/x86-64-v3/tests/ranks_test_ranks
 
-# Open MPI for one machine: it finds its plugins and texts below OPAL_PREFIX, as below its own prefix. Those for networks
-# and batch systems stay here.
+# Open MPI for one machine: it finds its plugins and texts below OPAL_PREFIX, as below its own prefix, and its PMIx those in
+# PMIX_PKGLIBDIR. Those for networks and batch systems stay here.
 programs=(build/x86-64-v3/mild build/x86-64-v3/tests/gpu_test_gpu)
 if [ "${1:-}" = ranks ]; then
     place() { ompi_info --parsable --path "$1" | cut -d: -f3; }
@@ -38,6 +38,8 @@ if [ "${1:-}" = ranks ]; then
     done
     find "$bundle" -name 'mca_*.so' | grep -E '_(ucx|ofi|openib|psm2?|slurm|flux|jsm|gridengine|simulator|romio[0-9]*|bzip)\.so$' |
         xargs rm
+    pmix=$(dirname "$(readlink -f "$(ldconfig -p | awk '/libpmix\.so\.2/ { print $NF; exit }')")")/pmix
+    [ ! -d "$pmix" ] || cp -r "$pmix" "$bundle/lib/"
     mkdir "$bundle/libexec"
     cp -L "$(place bindir)/orterun" "$bundle/libexec/mpirun"
     cp -L "$(place bindir)/orted" "$bundle/bin/"
@@ -46,7 +48,7 @@ if [ "${1:-}" = ranks ]; then
     cat >"$bundle/bin/mpirun" <<'MPIRUN'
 #!/bin/sh
 here=$(dirname "$(dirname "$(readlink -f "$0")")")
-export OPAL_PREFIX="$here" LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+export OPAL_PREFIX="$here" PMIX_PKGLIBDIR="$here/lib/pmix" LD_LIBRARY_PATH="$here/lib${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 exec "$here/libexec/mpirun" "$@"
 MPIRUN
     chmod +x "$bundle/bin/mpirun"

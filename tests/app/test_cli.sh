@@ -146,7 +146,7 @@ bad "no blanks around it" "$mild" train --robot ' ./x' --out run
 bad "too long" "$mild" train --robot "./$(printf '%600s' | tr ' ' x)" --out run
 [ ! -e run ] || fail "a refused robot left a folder"
 bad "./nowhere/robot.ini" "$mild" eval --robot ./nowhere
-bad "robot go1 needs 47 x 6 and 12, 19" "$mild" eval --robot go1
+bad "this policy is for robot sa01, not for go1; give --robot sa01 or another --policy" "$mild" eval --robot go1
 bad "unknown controller 'stnad'; nearest is 'stand'" "$mild" eval --controller stnad
 bad "unknown controller 'stnad'; nearest is 'stand'" "$mild" play --controller stnad
 expect 0 'foam45 .* 2/2' "$mild" eval --robot go1 --controller stand --ground foam45 --speed 0 --trials 2 --seconds 3 \

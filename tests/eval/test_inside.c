@@ -39,7 +39,7 @@ static int teardown(void **state) {
     return 0;
 }
 
-/* A walk over a border at x = 0.3, whose decisions are logged. */
+/* A walk over a border at x = 0.2, whose decisions are logged. */
 static char *log_walk(InsideLog *log, Controller *controller) {
     MildError error = {0};
     const EvalWatch watch = {inside_decided, log};
@@ -50,7 +50,7 @@ static char *log_walk(InsideLog *log, Controller *controller) {
     static char *text; /* its address is the stream's */
     static size_t size;
     Pool *pool = pool_create(2);
-    assert_int_equal(scene_make(&scene, "foam60+rigid", 0.3, &error), MILD_OK);
+    assert_int_equal(scene_make(&scene, "foam60+rigid", 0.2, &error), MILD_OK);
     log->feet = robot_feet(robot);
     assert_int_equal(learned_watch(controller, &log->inside, &error), MILD_OK);
     log->csv = open_memstream(&text, &size);
