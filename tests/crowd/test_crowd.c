@@ -401,10 +401,8 @@ static void trials_are_chosen(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(follows_mujoco),
-        cmocka_unit_test(follows_mujoco_on_a_map),
-        cmocka_unit_test(trials_are_chosen),
-        cmocka_unit_test(one_diverges),
+        cmocka_unit_test(follows_mujoco),        cmocka_unit_test(follows_mujoco_on_a_map),
+        cmocka_unit_test(trials_are_chosen),     cmocka_unit_test(one_diverges),
         cmocka_unit_test(device_follows_mujoco),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
