@@ -48,20 +48,9 @@ LANE_FN void group_read(const Real *x, int at, int size, Real *y) {
     y[0] = __shfl_sync(0xffffffffu, x[0], at, size);
 }
 
-/* To each lane, the sum over its group. */
-LANE_FN void group_sum(Real *x, int size) {
-    LANE_UNROLL
-    for (int step = size / 2; step > 0; step /= 2) {
-        x[0] += __shfl_xor_sync(0xffffffffu, x[0], step);
-    }
-}
-
-/* To each lane, the largest of its group. */
-LANE_FN void group_max(Real *x, int size) {
-    LANE_UNROLL
-    for (int step = size / 2; step > 0; step /= 2) {
-        x[0] = real_max(x[0], __shfl_xor_sync(0xffffffffu, x[0], step));
-    }
+/* x of the lane whose number differs in the bit `step`. */
+LANE_FN void lane_swap(const Real *x, int step, Real *y) {
+    y[0] = __shfl_xor_sync(0xffffffffu, x[0], step);
 }
 
 #else
@@ -89,31 +78,74 @@ LANE_FN void group_read(const Real *x, int at, int size, Real *y) {
     }
 }
 
-LANE_FN void group_sum(Real *x, int size) {
-    for (int step = size / 2; step > 0; step /= 2) {
-        Real sum[LANES];
-        for (int l = 0; l < LANES; l++) {
-            sum[l] = x[l] + x[l ^ step];
-        }
-        for (int l = 0; l < LANES; l++) {
-            x[l] = sum[l];
-        }
-    }
-}
-
-LANE_FN void group_max(Real *x, int size) {
-    for (int step = size / 2; step > 0; step /= 2) {
-        Real most[LANES];
-        for (int l = 0; l < LANES; l++) {
-            most[l] = real_max(x[l], x[l ^ step]);
-        }
-        for (int l = 0; l < LANES; l++) {
-            x[l] = most[l];
-        }
+LANE_FN void lane_swap(const Real *x, int step, Real *y) {
+    for (int l = 0; l < LANES; l++) {
+        y[l] = x[l ^ step];
     }
 }
 
 #endif
+
+/* To each lane, the sum over its group. */
+LANE_FN void group_sum(Real *x, int size) {
+    LANE_UNROLL
+    for (int step = size / 2; step > 0; step /= 2) {
+        Real other[LANE_COPIES];
+        lane_swap(x, step, other);
+        EACH_LANE(l) {
+            x[l] += other[l];
+        }
+    }
+}
+
+/* To each lane, the largest of its group. */
+LANE_FN void group_max(Real *x, int size) {
+    LANE_UNROLL
+    for (int step = size / 2; step > 0; step /= 2) {
+        Real other[LANE_COPIES];
+        lane_swap(x, step, other);
+        EACH_LANE(l) {
+            x[l] = real_max(x[l], other[l]);
+        }
+    }
+}
+
+/* group_sum of x[0] to x[count - 1], to the bit, by recursive halving: at the distances size / 2,
+ * size / 4, ..., 1 a lane keeps every second of its entries, the odd ones where that bit of its
+ * number is set, sends the others, and adds what it gets. Then entry i is x[i / size] of the lane
+ * whose number has the bits of i % size in reverse, and all read it there. About 2 count values
+ * pass from lane to lane instead of count log2(size). x is overwritten. The inner loop has the
+ * bound `count` too, because nvcc keeps x in registers only where bounds are constants. */
+LANE_FN void group_sums(Real (*x)[LANE_COPIES], int count, int size, Real (*sum)[LANE_COPIES]) {
+    int entries = count;
+    LANE_UNROLL
+    for (int step = size / 2; step > 0; step /= 2) {
+        LANE_UNROLL
+        for (int i = 0; i < count && i < entries; i += 2) {
+            Real sent[LANE_COPIES], got[LANE_COPIES];
+            EACH_LANE(l) {
+                const Real even = x[i][l];
+                const Real odd = i + 1 < entries ? x[i + 1][l] : 0;
+                x[i / 2][l] = LANE(l) & step ? odd : even;
+                sent[l] = LANE(l) & step ? even : odd;
+            }
+            lane_swap(sent, step, got);
+            EACH_LANE(l) {
+                x[i / 2][l] += got[l];
+            }
+        }
+        entries = (entries + 1) / 2;
+    }
+    LANE_UNROLL
+    for (int i = 0; i < count; i++) {
+        int lane = 0;
+        LANE_UNROLL
+        for (int bit = 1; bit < size; bit *= 2) {
+            lane += i & bit ? size / 2 / bit : 0;
+        }
+        group_read(x[i / size], lane, size, sum[i]);
+    }
+}
 
 /* The sum over all lanes. x is overwritten. */
 LANE_FN Real lane_sum(Real *x) {
