@@ -321,8 +321,8 @@ static void run_shape(const Shape *shape, int walks, double tolerance, void (*ru
     }
 }
 
-/* Newton's steps are those of the ground, within 4 % of 800 steps: the derivative is right. The mean
- * of fewer steps differs by more. */
+/* Newton's steps are those of the ground, within 4 % of 800 steps: the derivative is right. The
+ * mean of fewer steps differs by more. */
 static int same_steps(const Worst *worst) {
     const double scale = fmax(1, sqrt(800.0 / worst->steps));
     return abs(worst->iterations - worst->iterations_ground) <=
