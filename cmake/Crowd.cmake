@@ -2,7 +2,8 @@
 mild_layer(crowd layer_task layer_engine)
 # lanes in loops: nothing gains from -O3 but the time to compile
 # an environment keeps floats, and computes in double where it reads a definition
-set_source_files_properties(crowd/host.c PROPERTIES COMPILE_OPTIONS "-O2;-Wno-float-conversion")
+set_source_files_properties(crowd/host.c PROPERTIES COMPILE_OPTIONS
+    "-O2;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
 if(MILD_CUDA)
   # compiled for the robots of this size (engine_model_sizes)
   set(MILD_CUDA_ROBOT ENGINE_JOINTS=12 ENGINE_FEET=2 ENGINE_CORNERS=8 ENGINE_ENTRIES=135 ENGINE_CHAIN=12
