@@ -19,7 +19,7 @@ typedef struct {
 
 /* Place of number e of the pose of a link: nine of its rotation, three of its position. */
 MILD_HD Real *link_pose_number(EngineWork *work, int link, int e) {
-    return e < 9 ? work->rotation[link] + e : work->position[link] + e - 9;
+    return e < 9 ? work->rotation[link] + e : work->position[link] + (e - 9);
 }
 
 /* From work to saved. rigid: bool, on rigid ground. */
