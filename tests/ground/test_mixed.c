@@ -89,10 +89,14 @@ static Relief relief_of(const MildTerrain *terrain, const MildTerrain *rough,
 
 /* Every tile is one of the reliefs at all its grid points. Of 300 tiles a quarter are level and
  * 3/16 each of the others, within three standard deviations (22 and 20); half of the pyramids
- * go up. Shares are uniform in [1/4, 1]: 225 have a mean of 0.625 within three times 0.0144. */
+ * go up. Shares are uniform in [1/4, 1]: 225 have a mean of 0.625 within three times 0.0144. With
+ * the next seed 81 % of the tiles have another relief, and all another share. */
 static void test_tiles(void **state) {
     (void)state;
     int count[RELIEFS] = {0};
+    Relief last[TILES * TILES] = {LEVEL};
+    double last_share[TILES * TILES] = {0};
+    int others = 0;
     double least = 1.0, most = 0.0, sum = 0.0;
     for (uint64_t seed = 1; seed <= SEEDS; seed++) {
         MildMapDef def = mixed(seed), plain = def;
@@ -104,7 +108,11 @@ static void test_tiles(void **state) {
             double share = 0.0;
             const Relief relief = relief_of(&terrain, &rough, corner, &share);
             count[relief]++;
+            others += seed > 1 && relief != last[tile];
+            last[tile] = relief;
             if (relief != LEVEL) {
+                assert_true(fabs(share - last_share[tile]) > 1e-5);
+                last_share[tile] = share;
                 least = fmin(least, share), most = fmax(most, share), sum += share;
             }
         }
@@ -115,13 +123,15 @@ static void test_tiles(void **state) {
         print_message("%s: %d  ", names[relief], count[relief]);
     }
     const double mean = sum / (SEEDS * TILES * TILES - count[LEVEL]);
-    print_message("of %d tiles; shares %.3f .. %.3f, mean %.3f\n", SEEDS * TILES * TILES, least,
-                  most, mean);
+    print_message(
+        "of %d tiles; shares %.3f .. %.3f, mean %.3f; other relief with the next seed: %d\n",
+        SEEDS * TILES * TILES, least, most, mean, others);
     assert_true(abs(count[LEVEL] - 75) <= 22 && abs(count[UP] + count[DOWN] - 56) <= 20);
     assert_true(abs(count[WAVES] - 56) <= 20 && abs(count[STEPS] - 56) <= 20);
     assert_true(abs(count[ROUGH] - 56) <= 20 && abs(count[UP] - count[DOWN]) <= 22);
     assert_true(least > 0.25 - 1e-6 && least < 0.28 && most > 0.97 && most < 1.0 + 1e-6);
     assert_true(fabs(mean - 0.625) < 0.043);
+    assert_true(others > (SEEDS - 1) * TILES * TILES * 7 / 10);
 }
 
 /* The height is 0 along all edges of tiles, and does not jump across them: beside an edge it is at

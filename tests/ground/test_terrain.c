@@ -139,15 +139,20 @@ static const char *kind_name(int kind) {
 
 /* *kind: of the map. */
 static MildMap *random_map(uint64_t *random, double steepest, int *kind) {
-    static const MildMapKind kinds[4] = {MILD_MAP_WAVES, MILD_MAP_ROUGH, MILD_MAP_STEPS,
-                                         MILD_MAP_SLOPE};
-    MildMapDef def = shape(kinds[kit_index(random, 4)], 0.0, kit_uniform(random, 0.15, 1.0));
+    static const MildMapKind kinds[5] = {MILD_MAP_WAVES, MILD_MAP_ROUGH, MILD_MAP_STEPS,
+                                         MILD_MAP_SLOPE, MILD_MAP_MIXED};
+    MildMapDef def = shape(kinds[kit_index(random, 5)], 0.0, kit_uniform(random, 0.15, 1.0));
     def.seed = (uint64_t)kit_index(random, 1000);
-    def.size = 4.0;
+    def.size = def.kind == MILD_MAP_MIXED ? 10.0 : 4.0;
     def.amplitude = kit_uniform(random, 0.0, 0.05) * fmin(1.0, steepest * def.wavelength / 0.2);
     def.slope = kit_uniform(random, -0.5, 0.5);
     *kind = def.kind;
     return make_map(&def);
+}
+
+/* [m] Moves the origin from the edge of a tile, where mixed ground is level, to the middle. */
+static double off_edge(int kind) {
+    return kind == MILD_MAP_MIXED ? 1.0 : 0.0;
 }
 
 /* Feet thrown and shaken at random over uneven ground until they leave it: the ground has taken
@@ -170,6 +175,7 @@ static void test_passive(void **state) {
         kit_open(&kit, 1, sole, NULL, &m, dt);
         kit.terrain.map = map;
         kit.terrain.map_x = kit_uniform(&random, -5.0, 5.0);
+        kit.terrain.map_y = off_edge(kind);
         kit_random_state(&kit, &random);
         kit.input.position[0][2] +=
             0.25 + mild_terrain_height_at(&kit.terrain, kit.input.position[0][0],
@@ -295,6 +301,7 @@ static void test_solvers(void **state) {
         Kit kit;
         kit_open(&kit, 1 + t % 2, left, right, &m, t % 3 ? 1e-3 : 5e-3);
         kit.terrain.map = map;
+        kit.terrain.map_x = kit.terrain.map_y = off_edge(kind);
         kit_random_state(&kit, &random);
         for (int f = 0; f < kit.feet; f++) {
             kit.input.position[f][2] += mild_terrain_height_at(
