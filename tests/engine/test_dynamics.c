@@ -25,6 +25,7 @@
 #define DT 0.0025
 #define LIMIT_DOUBLE 1e-9
 #define LIMIT_FLOAT 1e-4
+#define LIMIT_MAP 6e-5    /* of maps: 8e-5 where constraints leave out the step that comes back */
 #define LIMIT_WRENCH 1e-3 /* of rigid ground in float: small differences of stiff rows */
 
 /* ---- robots ---- */
@@ -277,10 +278,11 @@ static void print_worst(const char *name, int cases, const Worst at_double, cons
     }
 }
 
-static void check_worst(const Worst at_double, const Worst at_float) {
+/* limit: of the numbers in float. */
+static void check_worst(const Worst at_double, const Worst at_float, double limit) {
     for (int k = 0; k < ERRORS; k++) {
         assert_true(at_double[k] < LIMIT_DOUBLE);
-        assert_true(at_float[k] < (k == GROUND_WRENCH ? LIMIT_WRENCH : LIMIT_FLOAT));
+        assert_true(at_float[k] < (k == GROUND_WRENCH ? LIMIT_WRENCH : limit));
     }
 }
 
@@ -317,7 +319,7 @@ static void test_random_states(void **unused) {
         }
         print_worst(kit_name[k], cases[k], at_double, at_float);
         print_message("    beyond limits: %d; at most %d Newton steps\n", limited, newton);
-        check_worst(at_double, at_float);
+        check_worst(at_double, at_float, LIMIT_FLOAT);
         assert_true(limited > cases[k] / 5);
     }
 }
@@ -337,7 +339,7 @@ static void test_rigid_ground(void **unused) {
         }
         print_worst(kit_name[k], cases[k], at_double, at_float);
         print_message("    with rows: %d; at most %d Newton steps\n", touching, newton);
-        check_worst(at_double, at_float);
+        check_worst(at_double, at_float, LIMIT_FLOAT);
         assert_true(touching > cases[k] / 2);
     }
 }
@@ -426,7 +428,7 @@ static void run_relief(const Relief *relief, int k, const MildMap *map) {
     print_worst(kit_name[k], cases, at_double, at_float);
     print_message("    with rows: %d; at most %d Newton steps; %d left out of float\n", touching,
                   newton, left_out);
-    check_worst(at_double, at_float);
+    check_worst(at_double, at_float, LIMIT_MAP);
     assert_true(touching > cases / 2 && left_out < cases / 20);
 }
 
