@@ -28,6 +28,9 @@ static const struct {
     {"walk", bench_walk, "the same as step, along a walk of the shipped policy"},
     {"batch", bench_batch, "the contact solver in batches, on train.device, along that walk"},
     {"robots", bench_robots, "the environments alone on train.device, in the batch engine"},
+    {"episodes", bench_episodes,
+     "returns of the shipped policy in whole episodes: batch engine, on train.device, against "
+     "MuJoCo; distance is Kolmogorov's, below 1.36 in 19 of 20 cases if they are alike"},
     {"update", bench_update,
      "the learner alone: actions of a rollout and update, on train.device, from random numbers"},
     {"train", bench_train, "policy steps per second in training, and how the time is spent"},

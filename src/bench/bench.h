@@ -21,6 +21,9 @@ MildStatus bench_batch(const ExperimentDef *def, BenchReport *report, MildError 
 /* The environments alone on train.device: batch engine, ground and task under no action but the
  * assistance. */
 MildStatus bench_robots(const ExperimentDef *def, BenchReport *report, MildError *error);
+/* Returns of the shipped policy's episodes in the batch engine on train.device, and by MuJoCo: the
+ * same distribution? */
+MildStatus bench_episodes(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* The learner alone on train.device, from a rollout of random numbers. */
 MildStatus bench_update(const ExperimentDef *def, BenchReport *report, MildError *error);
 /* Training as a whole, and how its time is spent. */

@@ -63,7 +63,7 @@ LANE_FN void engine_factorise_base(const EngineTree *tree, const Real *matrix, R
         const EngineEntry entry = tree->entry[LANE(l) < ENGINE_BASE_ENTRIES ? LANE(l) : 0];
         const int i = row[l] = entry.dof;
         const int j = place[l] = entry.place;
-        x[l] = matrix[i * ENGINE_STRIDE + j];
+        x[l] = LANE(l) < ENGINE_BASE_ENTRIES ? matrix[i * ENGINE_STRIDE + j] : 0;
         ENGINE_LOOP
         for (int k = 6; k < engine_dofs(tree); k++) {
             x[l] -= factor[k * ENGINE_STRIDE + i] * factor[k * ENGINE_STRIDE + j];

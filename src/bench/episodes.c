@@ -1,0 +1,225 @@
+/* Whether the batch engine's environments are those of MuJoCo: the shipped policy's returns in
+ * whole episodes of both, with the same random numbers. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/paths.h"
+#include "batch/batch.h"
+#include "bench/bench.h"
+#include "control/controller.h"
+#include "train/envs.h"
+
+enum { DEVICE_EPISODES = 1000, HOST_EPISODES = 40 };
+
+/* One kind of environments. Rows 0 and 1 of the batch are present and next. */
+typedef struct {
+    int device, count;
+    TrainEnvs *envs;
+    PpoBatch batch;
+    float *history, *action, *reward; /* copies on the host */
+    uint8_t *done, *timeout;
+    double *returns; /* [count] of each environment's first episode */
+    int *steps;      /* [count] of it; below 0 while it lasts */
+    int falls;
+} Side;
+
+static MildStatus open_arrays(Side *side, const PolicyDef *p, MildError *error) {
+    const size_t n = (size_t)side->count;
+    PpoBatch *b = &side->batch;
+    struct {
+        float **at;
+        int width;
+    } floats[] = {{&b->history, p->frames * p->observation},
+                  {&b->critic, p->critic_input},
+                  {&b->target, p->estimates},
+                  {&b->frame, p->observation},
+                  {&b->action, p->actions},
+                  {&b->reward, 1}};
+    uint8_t **bytes[] = {&b->done, &b->timeout, &b->valid};
+    MildStatus status = MILD_OK;
+    for (size_t i = 0; i < sizeof floats / sizeof *floats; i++) {
+        const size_t size = 2 * n * (size_t)floats[i].width * sizeof(float);
+        *floats[i].at = status == MILD_OK ? batch_alloc(side->device, size, error) : NULL;
+        status = *floats[i].at ? MILD_OK : error->status;
+    }
+    for (int i = 0; i < 3; i++) {
+        *bytes[i] = status == MILD_OK ? batch_alloc(side->device, n, error) : NULL;
+        status = *bytes[i] ? MILD_OK : error->status;
+    }
+    side->history = calloc(n * (size_t)(p->frames * p->observation), sizeof *side->history);
+    side->action = calloc(n * (size_t)p->actions, sizeof *side->action);
+    side->reward = calloc(n, sizeof *side->reward);
+    side->done = calloc(n, 2);
+    side->timeout = side->done ? side->done + n : NULL;
+    side->returns = calloc(n, sizeof *side->returns);
+    side->steps = calloc(n, sizeof *side->steps);
+    if (status == MILD_OK && (!side->history || !side->action || !side->reward || !side->done ||
+                              !side->returns || !side->steps)) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    }
+    return status;
+}
+
+static void close_side(Side *side) {
+    const PpoBatch *b = &side->batch;
+    void *const there[] = {b->history, b->critic, b->target,  b->frame, b->action,
+                           b->reward,  b->done,   b->timeout, b->valid};
+    void *const here[] = {side->history, side->action,  side->reward,
+                          side->done,    side->returns, side->steps};
+    for (size_t i = 0; i < sizeof there / sizeof *there; i++) {
+        batch_free(side->device, there[i]);
+    }
+    for (size_t i = 0; i < sizeof here / sizeof *here; i++) {
+        free(here[i]);
+    }
+    train_envs_destroy(side->envs);
+}
+
+/* Adds a step's rewards. Returns the episodes that still last. */
+static int take_step(Side *side) {
+    int lasting = 0;
+    for (int i = 0; i < side->count; i++) {
+        if (side->steps[i] < 0) {
+            continue;
+        }
+        side->returns[i] += (double)side->reward[i];
+        side->steps[i]++;
+        if (side->done[i]) {
+            side->falls += !side->timeout[i];
+            side->steps[i] = -side->steps[i];
+        }
+        lasting += side->steps[i] > 0;
+    }
+    return lasting;
+}
+
+/* A policy step of all; *lasting as take_step. */
+static MildStatus step(Side *side, const Controller *controller, const PolicyDef *p, int row,
+                       int *lasting, MildError *error) {
+    const size_t n = (size_t)side->count, size = sizeof(float);
+    const size_t history = n * (size_t)(p->frames * p->observation);
+    const struct {
+        void *to;
+        const void *from;
+        size_t bytes;
+    } back[] = {{side->reward, side->batch.reward, n * size},
+                {side->done, side->batch.done, n},
+                {side->timeout, side->batch.timeout, n}};
+    MildStatus status =
+        batch_copy(side->device, side->history, side->batch.history + (size_t)row * history,
+                   history * size, error);
+    if (status == MILD_OK) {
+        controller->act_on(controller->self, side->count, side->history, side->action);
+        status = batch_copy(side->device, side->batch.action, side->action,
+                            n * (size_t)p->actions * size, error);
+    }
+    if (status == MILD_OK) {
+        status = train_envs_step(side->envs, &side->batch, 0, NULL, error);
+    }
+    for (int i = 0; i < 3 && status == MILD_OK; i++) {
+        status = batch_copy(side->device, back[i].to, back[i].from, back[i].bytes, error);
+    }
+    *lasting = take_step(side);
+    return status;
+}
+
+static MildStatus run(Side *side, const ExperimentDef *def, const Robot *robot, Pool *pool,
+                      const Controller *controller, MildError *error) {
+    side->batch.envs = side->count;
+    side->batch.steps = 1;
+    side->envs = train_envs_create(def, 0, robot, pool, side->count, 0, error);
+    MildStatus status = side->envs ? open_arrays(side, &def->policy, error) : error->status;
+    if (status == MILD_OK) {
+        status = train_envs_reset(side->envs, &side->batch, NULL, error);
+    }
+    for (int t = 0, lasting = 1; status == MILD_OK && lasting; t++) {
+        status = step(side, controller, &def->policy, t > 0, &lasting, error);
+    }
+    return status;
+}
+
+static int rising(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* sqrt(n/2) times the largest distance between the two samples' distribution functions, both
+ * sorted: below 1.36 in 95 % of the cases if they have one distribution (Kolmogorov, Smirnov). */
+static double distance(const Side *a, const Side *b) {
+    const int n = a->count;
+    double largest = 0;
+    for (int i = 0, j = 0; i < n && j < n;) {
+        const double x = a->returns[i] < b->returns[j] ? a->returns[i] : b->returns[j];
+        for (; i < n && a->returns[i] <= x; i++) {
+        }
+        for (; j < n && b->returns[j] <= x; j++) {
+        }
+        largest = fmax(largest, fabs((double)(i - j)) / n);
+    }
+    return largest * sqrt(n / 2.0);
+}
+
+static void report_side(BenchReport *report, const char *names[4], Side *side) {
+    double sum = 0;
+    qsort(side->returns, (size_t)side->count, sizeof *side->returns, rising);
+    for (int i = 0; i < side->count; i++) {
+        sum += side->returns[i];
+    }
+    bench_add(report, "episodes", names[0], sum / side->count, "-");
+    bench_add(report, "episodes", names[1], side->returns[side->count / 10], "-");
+    bench_add(report, "episodes", names[2], side->returns[side->count / 2], "-");
+    bench_add(report, "episodes", names[3], side->falls, "-");
+}
+
+static MildStatus compare(const ExperimentDef *def, const Robot *robot, Pool *pool,
+                          const Controller *controller, BenchReport *report, MildError *error) {
+    static const char *names[2][4] = {
+        {"mujoco_return_mean", "mujoco_return_tenth", "mujoco_return_median", "mujoco_falls"},
+        {"batch_return_mean", "batch_return_tenth", "batch_return_median", "batch_falls"}};
+    ExperimentDef mujoco = *def, batch = *def;
+    const int device = train_device(&def->train) < 0 ? MILD_BATCH_HOST : train_device(&def->train);
+    const int count = device == MILD_BATCH_HOST ? HOST_EPISODES : DEVICE_EPISODES;
+    Side a = {.device = MILD_BATCH_HOST, .count = count}, b = {.device = device, .count = count};
+    mujoco.train.robots = TRAIN_ROBOTS_MUJOCO;
+    batch.train.robots = TRAIN_ROBOTS_BATCH;
+    MildStatus status = run(&a, &mujoco, robot, pool, controller, error);
+    if (status == MILD_OK) {
+        status = run(&b, &batch, robot, pool, controller, error);
+    }
+    if (status == MILD_OK) {
+        bench_add(report, "episodes", "episodes", count, "-");
+        report_side(report, names[0], &a);
+        report_side(report, names[1], &b);
+        bench_add(report, "episodes", "distance", distance(&a, &b), "-");
+    }
+    close_side(&a);
+    close_side(&b);
+    return status;
+}
+
+MildStatus bench_episodes(const ExperimentDef *def, BenchReport *report, MildError *error) {
+    char path[PATH_SIZE];
+    ExperimentDef local = *def;
+    Controller controller = {0};
+    local.task.assist = 0;
+    local.task.randomize.patch_share = 0; /* the batch engine has patches on maps only */
+    Robot *robot = robot_open(def->train.robot, error);
+    Pool *pool = robot ? pool_create(def->train.threads) : NULL;
+    MildStatus status = robot ? MILD_OK : error->status;
+    if (robot && !pool) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
+    }
+    if (status == MILD_OK) {
+        experiment_fit_robot(&local, robot);
+        robot_set_model(robot, (MildModel)local.task.randomize.model);
+        status = controller_learned(path_data("policies/mild.safetensors", path), robot, pool,
+                                    DEVICE_EPISODES, &controller, error);
+    }
+    if (status == MILD_OK) {
+        status = compare(&local, robot, pool, &controller, report, error);
+        controller_destroy(&controller);
+    }
+    pool_destroy(pool);
+    robot_destroy(robot);
+    return status;
+}
