@@ -25,7 +25,7 @@ typedef struct {
     CliNames grounds;
     CliNumbers speeds;
     double patch;
-    const char *latent, *ablate; /* NULL: not given */
+    const char *latent, *ablate, *stances; /* NULL: not given */
     Ablation ablation;
     int threads;
     EvalDef eval;
@@ -53,6 +53,8 @@ static cJSON *row_json(const EvalRow *row) {
                   {"clearance", row->clearance},
                   {"penetration", row->penetration},
                   {"drift", row->drift},
+                  {"drift_forward", row->drift_forward},
+                  {"drift_left", row->drift_left},
                   {"energy", row->energy},
                   {"velocity_low", row->velocity_low},
                   {"velocity_high", row->velocity_high},
@@ -104,6 +106,30 @@ static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildMap **
     return status;
 }
 
+/* A CSV in memory, so that its file is written whole or not at all. */
+typedef struct {
+    FILE *file;
+    char *text;
+    size_t size;
+} Sheet;
+
+static MildStatus sheet_open(Sheet *sheet, MildError *error) {
+    sheet->file = open_memstream(&sheet->text, &sheet->size);
+    return sheet->file ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+}
+
+/* Writes it to `path` if all went well so far. A sheet that was not opened is left. */
+static MildStatus sheet_close(Sheet *sheet, const char *path, MildStatus status, MildError *error) {
+    if (sheet->file && fclose(sheet->file) && status == MILD_OK) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
+    }
+    if (sheet->file && status == MILD_OK) {
+        status = report_text(sheet->text, sheet->size, path, error);
+    }
+    free(sheet->text);
+    return status;
+}
+
 /* Prints a row and counts it. */
 static void take_row(Eval *e, FILE *table) {
     char line[256];
@@ -144,8 +170,11 @@ static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *co
     if (!sum || !means) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     } else if (meant) {
+        FILE *stances = e->eval.stances;
         log->sum = sum;
+        e->eval.stances = NULL;
         status = evaluate_rows(e, robot, pool, controller, NULL, error);
+        e->eval.stances = stances;
         inside_means(log, means);
         log->sum = NULL;
     }
@@ -162,8 +191,7 @@ static MildStatus evaluate_inside(Eval *e, const Robot *robot, Pool *pool, Contr
                                   FILE *table, MildError *error) {
     InsideLog log = {.feet = robot_feet(robot)};
     const EvalWatch watch = {inside_decided, &log};
-    char *text = NULL;
-    size_t size = 0;
+    Sheet sheet = {0};
     MildStatus status = learned_watch(controller, &log.inside, error);
     if (status != MILD_OK) {
         return status;
@@ -171,24 +199,17 @@ static MildStatus evaluate_inside(Eval *e, const Robot *robot, Pool *pool, Contr
     e->eval.watch = &watch;
     status = e->ablate ? ablate(e, robot, pool, controller, &log, error) : MILD_OK;
     if (status == MILD_OK && e->latent) {
-        log.csv = open_memstream(&text, &size);
-        status = log.csv ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+        status = sheet_open(&sheet, error);
     }
-    if (status == MILD_OK && log.csv) {
+    if (status == MILD_OK && sheet.file) {
+        log.csv = sheet.file;
         inside_print_header(&log);
     }
     if (status == MILD_OK) {
         status = evaluate_rows(e, robot, pool, controller, table, error);
     }
-    if (log.csv && fclose(log.csv) && status == MILD_OK) {
-        status = mild_fail(error, MILD_ERROR_MEMORY, "--latent: out of memory");
-    }
-    if (status == MILD_OK && e->latent) {
-        status = report_text(text, size, e->latent, error);
-    }
-    free(text);
     e->eval.watch = NULL;
-    return status;
+    return sheet_close(&sheet, e->latent, status, error);
 }
 
 /* All at once, by the batch engine. */
@@ -227,10 +248,13 @@ static void print_header(const Eval *e, FILE *table) {
     fprintf(table, "%s\n", line);
 }
 
-static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
-                           MildError *error) {
-    const int taken = (e->json && strcmp(e->json, "-") == 0) ||
-                      (e->latent && strcmp(e->latent, "-") == 0); /* standard output */
+static MildStatus evaluate_table(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                                 MildError *error) {
+    const char *outputs[] = {e->json, e->latent, e->stances};
+    int taken = 0; /* bool: standard output */
+    for (int i = 0; i < 3; i++) {
+        taken = taken || (outputs[i] && strcmp(outputs[i], "-") == 0);
+    }
     FILE *table = taken ? stderr : stdout;
     const int batch = train_is_batch(&e->train);
     MildStatus status = batch ? evaluate_batch(e, robot, pool, controller, error) : MILD_OK;
@@ -246,6 +270,21 @@ static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *
         take_row(e, table);
     }
     return status == MILD_OK && e->json ? write_json(e, robot, error) : status;
+}
+
+static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
+                           MildError *error) {
+    Sheet sheet = {0};
+    MildStatus status = e->stances ? sheet_open(&sheet, error) : MILD_OK;
+    if (sheet.file) {
+        eval_print_stances_header(sheet.file);
+        e->eval.stances = sheet.file;
+    }
+    if (status == MILD_OK) {
+        status = evaluate_table(e, robot, pool, controller, error);
+    }
+    e->eval.stances = NULL;
+    return sheet_close(&sheet, e->stances, status, error);
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an
@@ -387,6 +426,9 @@ int cmd_eval(int argc, char **argv) {
          "take a part out of the policy: z (its mean instead), modulation (z as it is), estimates "
          "(their means for the actor), history (the newest frame in each place); means are those "
          "of the whole policy in the same trials of all rows, which run once more for them"},
+        {"stances", CLI_OUTPUT, &e->stances, 0, 0, "FILE",
+         "also write each stance of each foot as CSV: ground, speed, trial, foot, start, duration, "
+         "depth, slip along the heading and to the left, apex of the swing before"},
         {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
          "also write the table as JSON to FILE; - for standard output"},
     };

@@ -162,7 +162,7 @@ static void close_batch(Batch *b) {
     free(b->block);
     free(b->action);
     free(b->command);
-    free(b->measure);
+    measure_free(b->measure, b->trials);
     free(b->over);
 }
 
@@ -181,6 +181,7 @@ static void start_trial(void *context, int trial, int thread) {
     (void)thread;
     measure_start(&b->measure[trial], b->task.physics_dt);
     b->measure[trial].steady_end = b->def->eval.stop;
+    b->measure[trial].keep = b->def->eval.stances != NULL;
     direct(b, trial, level);
 }
 
@@ -264,16 +265,18 @@ static MildStatus step(Batch *b, MildError *error) {
     return status;
 }
 
-static void summarise(Batch *b, EvalRow *rows) {
+static MildStatus summarise(Batch *b, EvalRow *rows, MildError *error) {
     const EvalBatch *def = b->def;
     EvalDef eval = def->eval;
-    for (int row = 0; row < b->rows; row++) {
+    MildStatus status = MILD_OK;
+    for (int row = 0; row < b->rows && status == MILD_OK; row++) {
         const int first = row * eval.trials;
         eval.speed = def->speeds[row % def->speed_count];
-        eval_summarise(&rows[row], def->scenes[row / def->speed_count].name, &eval,
-                       b->measure + first, b->over + first,
-                       robot_total_mass(def->robot) * EVAL_GRAVITY);
+        status = eval_summarise(&rows[row], def->scenes[row / def->speed_count].name, &eval,
+                                b->measure + first, b->over + first,
+                                robot_total_mass(def->robot) * EVAL_GRAVITY, error);
     }
+    return status;
 }
 
 MildStatus eval_run_batch(const EvalBatch *def, EvalRow *rows, MildError *error) {
@@ -292,7 +295,7 @@ MildStatus eval_run_batch(const EvalBatch *def, EvalRow *rows, MildError *error)
         status = step(&b, error);
     }
     if (status == MILD_OK) {
-        summarise(&b, rows);
+        status = summarise(&b, rows, error);
     }
     close_batch(&b);
     return status;

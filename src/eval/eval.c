@@ -70,6 +70,7 @@ static void start_trial(void *context, int trial, int thread) {
                       &none);
     measure_start(&t->measure[trial], t->def->physics_dt);
     t->measure[trial].steady_end = t->eval->stop;
+    t->measure[trial].keep = t->eval->stances != NULL;
 }
 
 static void step_trial(void *context, int trial, int thread) {
@@ -106,7 +107,7 @@ static void free_trials(Trials *t, int trials, int threads) {
     }
     free(t->env);
     free(t->sim);
-    free(t->measure);
+    measure_free(t->measure, trials);
     free(t->action);
     free(t->over);
 }
@@ -149,8 +150,8 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
             tell_watch(&t, step);
             pool_run(pool, eval->trials, step_trial, &t);
         }
-        eval_summarise(row, scene->name, eval, t.measure, t.over,
-                       robot_total_mass(robot) * EVAL_GRAVITY);
+        status = eval_summarise(row, scene->name, eval, t.measure, t.over,
+                                robot_total_mass(robot) * EVAL_GRAVITY, error);
     }
     free_trials(&t, eval->trials, pool_threads(pool));
     return status;

@@ -4,6 +4,8 @@
 
 #define EVAL_GRAVITY 9.81 /* [m/s^2] of a robot's weight */
 
+#include <stdio.h>
+
 #include "base/pool.h"
 #include "control/controller.h"
 #include "eval/measure.h"
@@ -27,6 +29,7 @@ typedef struct {
     double stop;    /* [s] when the command becomes 0 and speed measurement ends; 0: never */
     uint64_t seed;  /* trial k uses stream k */
     const EvalWatch *watch; /* NULL: nobody; by MuJoCo */
+    FILE *stances;          /* a row of CSV for each stance of each trial; NULL: none */
 } EvalDef;
 
 /* Means over the trials, SI units. */
@@ -49,6 +52,8 @@ typedef struct {
     double clearance;         /* [m] swing apex of the lowest sole point above h0 */
     double penetration;       /* [m] deepest element of each stance */
     double drift;             /* [m] horizontal travel of the sole between touchdown and lift-off */
+    double drift_forward;     /* [m] magnitude of its part along the robot's heading */
+    double drift_left;        /* [m] and across it */
     double energy;            /* [J] integral |tau . qd| dt */
     double base_oscillation;  /* [m] peak to peak of the base height over the steady part */
     double seconds;           /* [s] mean time until a fall or the end */
@@ -80,10 +85,11 @@ typedef struct {
  * latencies. Fails for what the batch engine has not, and for more robots. */
 MildStatus eval_run_batch(const EvalBatch *def, EvalRow *rows, MildError *error);
 
-/* Finishes the measures of the trials and summarises them in a row. measures, fallen (bool):
+/* Finishes the measures of the trials, summarises them in a row, and prints the stances that they
+ * kept. measures, fallen (bool):
  * [eval->trials]. weight: [N] of the robot. */
-void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
-                    const uint8_t *fallen, double weight);
+MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
+                          const uint8_t *fallen, double weight, MildError *error);
 
 /* [m/s, m/s, rad/s] The command at a time of a trial [s] for a robot with the orientation
  * `quaternion` (w x y z): that of eval_command, with `turn` where it is not 0, and none from the
@@ -93,6 +99,9 @@ void eval_direct(const EvalDef *eval, double time, const double quaternion[4], d
  * sideways [m/s]: forward and to the left. If both are 0 the robot stands, without heading hold.
  * Writes env->command and freezes it. */
 void eval_command(TaskEnv *env, double speed, double sideways);
+
+/* The names of the columns of EvalDef.stances, SI units. */
+void eval_print_stances_header(FILE *csv);
 
 /* Text table. */
 void eval_print_header(char *text, int size);

@@ -1,6 +1,7 @@
 #include "eval/measure.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define CONTACT_FORCE 5.0  /* [N] */
@@ -20,20 +21,51 @@ void measure_start(Measure *measure, double dt) {
 }
 
 static void start_stance(Measure *m, int f, const double *at) {
+    m->swing[f] = 0;
     if (m->apex[f] > SWING_HEIGHT) {
-        m->apex_sum += m->apex[f];
+        m->apex_sum += m->swing[f] = m->apex[f];
         m->swings++;
     }
     m->in_stance[f] = 1;
+    m->began[f] = m->time - m->dt;
     m->touchdown[f][0] = at[0];
     m->touchdown[f][1] = at[1];
     m->deepest[f] = 0;
 }
 
+static void keep_stance(Measure *m, const MeasureStance *stance) {
+    if (m->stances == m->room) {
+        MeasureStance *more = m->stances == 0 || m->kept
+                                  ? realloc(m->kept, (size_t)(2 * m->room + 16) * sizeof *more)
+                                  : NULL;
+        if (!more) {
+            free(m->kept);
+        }
+        m->kept = more;
+        m->room = 2 * m->room + 16;
+    }
+    if (m->kept) {
+        m->kept[m->stances] = *stance;
+    }
+}
+
 static void end_stance(Measure *m, int f) {
+    const double x = m->last[f][0] - m->touchdown[f][0], y = m->last[f][1] - m->touchdown[f][1];
+    const double c = cos(m->yaw), s = sin(m->yaw);
+    const MeasureStance stance = {.foot = f,
+                                  .start = m->began[f],
+                                  .duration = m->lasted[f],
+                                  .depth = m->deepest[f],
+                                  .way = {c * x + s * y, c * y - s * x},
+                                  .apex = m->swing[f]};
     m->in_stance[f] = 0;
-    m->deepest_sum += m->deepest[f];
-    m->drift_sum += hypot(m->last[f][0] - m->touchdown[f][0], m->last[f][1] - m->touchdown[f][1]);
+    m->deepest_sum += stance.depth;
+    m->drift_sum += hypot(x, y);
+    m->way_sum[0] += fabs(stance.way[0]);
+    m->way_sum[1] += fabs(stance.way[1]);
+    if (m->keep) {
+        keep_stance(m, &stance);
+    }
     m->stances++;
 }
 
@@ -45,6 +77,7 @@ static void measure_foot(Measure *m, int f, const MeasureFoot *foot) {
         m->air_time[f] = m->apex[f] = 0;
         m->last[f][0] = foot->center[0];
         m->last[f][1] = foot->center[1];
+        m->lasted[f] = m->time - m->began[f];
         m->deepest[f] = fmax(m->deepest[f], foot->depth);
         return;
     }
@@ -123,4 +156,11 @@ void measure_finish(Measure *m) {
             end_stance(m, f);
         }
     }
+}
+
+void measure_free(Measure *measures, int count) {
+    for (int i = 0; measures && i < count; i++) {
+        free(measures[i].kept);
+    }
+    free(measures);
 }

@@ -26,6 +26,15 @@ typedef struct {
     MeasureFoot foot[ROBOT_FEET_MAX]; /* [feet] */
 } MeasureSample;
 
+/* A finished stance. */
+typedef struct {
+    int foot;
+    double start, duration; /* [s] first contact; until the last one */
+    double depth;           /* [m] deepest element */
+    double way[2]; /* [m] of the sole's centre, along the robot's heading and to the left */
+    double apex;   /* [m] of the swing before it; 0: none */
+} MeasureStance;
+
 /* A stance begins when the ground carries the foot and ends with the last contact before a pause of
  * CHATTER_TIME. */
 typedef struct {
@@ -53,10 +62,17 @@ typedef struct {
     double air_time[ROBOT_FEET_MAX];     /* [s] since the latest contact */
     double apex[ROBOT_FEET_MAX];         /* [m] highest of the foot since then */
     double deepest[ROBOT_FEET_MAX];      /* [m] */
+    double began[ROBOT_FEET_MAX];        /* [s] */
+    double lasted[ROBOT_FEET_MAX];       /* [s] */
+    double swing[ROBOT_FEET_MAX];        /* [m] apex of the swing before */
 
     /* finished ones */
     int swings, stances;
     double apex_sum, deepest_sum, drift_sum; /* [m] */
+    double way_sum[2];                       /* [m] of the magnitudes of MeasureStance.way */
+    int keep;            /* bool: each of them is kept; the owner frees `kept` */
+    MeasureStance *kept; /* [stances]; NULL if memory ran out */
+    int room;            /* of kept */
 } Measure;
 
 /* [rad] Heading of a base with this orientation (w x y z). */
@@ -68,5 +84,6 @@ void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const 
 /* Ends the trial. If no foot was ever lifted, the open stances count, so that sinkage and drift are
  * still measured. */
 void measure_finish(Measure *measure);
+void measure_free(Measure *measures, int count); /* measures: from calloc; may be NULL */
 
 #endif

@@ -47,11 +47,30 @@ static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_
     row->base_oscillation /= steady;
 }
 
-void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
-                    const uint8_t *fallen, double weight) {
+void eval_print_stances_header(FILE *csv) {
+    fprintf(csv,
+            "ground,speed_m_s,trial,foot,start_s,duration_s,depth_m,forward_m,left_m,apex_m\n");
+}
+
+static MildStatus print_stances(const EvalRow *row, int trial, const Measure *m, FILE *csv,
+                                MildError *error) {
+    if (m->stances && !m->kept) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "out of memory for %d stances", m->stances);
+    }
+    for (int i = 0; i < m->stances; i++) {
+        const MeasureStance *s = &m->kept[i];
+        fprintf(csv, "%s,%g,%d,%d,%.4f,%.4f,%.6f,%.6f,%.6f,%.6f\n", row->ground, row->speed, trial,
+                s->foot, s->start, s->duration, s->depth, s->way[0], s->way[1], s->apex);
+    }
+    return MILD_OK;
+}
+
+MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
+                          const uint8_t *fallen, double weight, MildError *error) {
     const int trials = eval->trials;
+    MildStatus status = MILD_OK;
     int swings = 0, stances = 0;
-    double apex = 0, deepest = 0, drift = 0;
+    double apex = 0, deepest = 0, drift = 0, way[2] = {0, 0};
     *row = (EvalRow){.speed = eval->speed,
                      .sideways = eval->sideways,
                      .turn = eval->turn,
@@ -69,12 +88,20 @@ void eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measu
         swings += m->swings;
         deepest += m->deepest_sum;
         drift += m->drift_sum;
+        way[0] += m->way_sum[0];
+        way[1] += m->way_sum[1];
         stances += m->stances;
+        if (eval->stances && status == MILD_OK) {
+            status = print_stances(row, i, m, eval->stances, error);
+        }
     }
     summarise_motion(row, measures, fallen, weight);
     row->clearance = swings ? apex / swings : 0;
     row->penetration = stances ? deepest / stances : 0;
     row->drift = stances ? drift / stances : 0;
+    row->drift_forward = stances ? way[0] / stances : 0;
+    row->drift_left = stances ? way[1] / stances : 0;
+    return status;
 }
 
 void eval_print_header(char *text, int size) {

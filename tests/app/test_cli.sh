@@ -97,6 +97,13 @@ awk -F, 'NR == 1 { columns = NF; next } NF != columns { exit 1 } { n[$2]++ }
 "$mild" eval --ground rigid --trials 1 --seconds 0.1 --latent - 2>/dev/null | head -1 | grep -q '^trial,ground,' ||
     fail "--latent -: standard output is not the CSV alone"
 bad "No space left" "$mild" eval --ground rigid --trials 1 --seconds 0.1 --latent /dev/full
+for robots in mujoco batch; do
+    "$mild" eval --ground grass --trials 2 --seconds 2 --train.robots=$robots --stances stances.csv >table || fail "--stances, $robots"
+    grep -q '^ground,speed_m_s,trial,foot,start_s,duration_s,depth_m,forward_m,left_m,apex_m$' stances.csv || fail "stances.csv: its names"
+    awk -F, -v robots=$robots 'NR > 1 && ($1 != "grass" || $6 < 0.1 || $6 > 2 || $7 < 0.01 || $7 > 0.1 || $10 > 0.3) {bad++}
+        END {exit bad || NR < 6}' stances.csv || fail "stances.csv of $robots"
+done
+bad "No space left" "$mild" eval --ground rigid --trials 1 --seconds 0.1 --stances /dev/full
 torque() { "$mild" eval --ground grass --trials 2 --seconds 0.3 "$@" --json - 2>/dev/null | sed -n 's/.*"torque_max": *//p'; }
 whole=$(torque)
 for part in z modulation estimates history; do

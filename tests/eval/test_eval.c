@@ -317,7 +317,7 @@ static void a_row_is_what_its_trials_did(void **state) {
     }
     robot_sim_destroy(sim);
     controller_destroy(&controller);
-    eval_summarise(&own, "foam60", &eval, measure, over, robot_total_mass(robot) * 9.81);
+    eval_summarise(&own, "foam60", &eval, measure, over, robot_total_mass(robot) * 9.81, NULL);
     assert_true(row.success == 2 && row.velocity > 0.3 && row.cot > 0.1);
     assert_true(fabs(row.velocity / own.velocity - 1) < 1e-5);
     assert_true(fabs(row.velocity_sideways - own.velocity_sideways) < 1e-5);

@@ -118,13 +118,13 @@ static void speeds_of_a_turning_robot(void **state) {
     assert_close("turned", m.turned, w * 8, 1e-9);
     assert_close("way forward", m.way[0], v * 8, 1e-2);
     assert_close("way to the left", m.way[1], left * 8, 1e-2);
-    eval_summarise(&row, "foam45", &eval, &m, &fallen, 400);
+    eval_summarise(&row, "foam45", &eval, &m, &fallen, 400, NULL);
     assert_close("speed", row.velocity, v, 1e-3);
     assert_close("speed to the left", row.velocity_sideways, left, 1e-3);
     assert_close("turning", row.velocity_turn, w, 1e-9);
     assert_true(row.turn == 0.7);
     eval.turn = 0; /* along x, however it turns */
-    eval_summarise(&row, "foam45", &eval, &m, &fallen, 400);
+    eval_summarise(&row, "foam45", &eval, &m, &fallen, 400, NULL);
     assert_close("speed along x", row.velocity, (m.end[0] - m.start[0]) / 8, 1e-12);
     assert_true(fabs(row.velocity) < 0.1);
 }
@@ -216,6 +216,57 @@ static void one_stance_and_one_swing(void **state) {
         measure_finish(&m); /* the other foot's open stance does not count */
         assert_int_equal(m.stances, 2);
     }
+}
+
+/* The same stances one by one, of a robot that looks 0.5 rad to the left: of 3 mm along x and 4 mm
+ * along y. */
+static void stances_are_kept(void **state) {
+    (void)state;
+    char *text = NULL;
+    size_t size = 0;
+    FILE *csv = open_memstream(&text, &size);
+    const EvalDef eval = {.speed = 0.5, .trials = 1, .seconds = 1, .stances = csv};
+    const uint8_t fallen = 0;
+    const double forward = 0.003 * cos(0.5) + 0.004 * sin(0.5);
+    const double left = 0.004 * cos(0.5) - 0.003 * sin(0.5);
+    Script s;
+    Measure *m = calloc(1, sizeof *m);
+    EvalRow row;
+    script_start(&s);
+    s.sample.yaw = 0.5;
+    measure_start(m, DT);
+    m->keep = 1;
+    hold(m, &s, 50);
+    for (int k = 0; k < 40; k++) {
+        set_foot(&s, 1, 100, 0.2, -0.1, 0.012);
+        hold(m, &s, 100);
+        set_foot(&s, 1, 100, 0.203, -0.096, 0.006);
+        hold(m, &s, 100);
+        lift(&s, 1, 0.05);
+        hold(m, &s, 50);
+    }
+    assert_int_equal(m->stances, 40);
+    for (int k = 0; k < 40; k++) {
+        const MeasureStance *stance = &m->kept[k];
+        assert_int_equal(stance->foot, 1);
+        assert_close("start", stance->start, k ? (50 + 250 * k) * DT : 0, 1e-12);
+        assert_close("duration", stance->duration, (k ? 200 : 250) * DT, 1e-12);
+        assert_close("depth", stance->depth, 0.012, 0);
+        assert_close("forward", stance->way[0], k ? forward : 0.203 * cos(0.5) - 0.096 * sin(0.5),
+                     1e-12);
+        assert_close("left", stance->way[1], k ? left : -0.096 * cos(0.5) - 0.203 * sin(0.5),
+                     1e-12);
+        assert_close("apex", stance->apex, k ? 0.05 : 0, 0);
+    }
+    assert_int_equal(eval_summarise(&row, "foam45", &eval, m, &fallen, 400, NULL), MILD_OK);
+    assert_close("magnitude along the heading", row.drift_forward,
+                 (39 * forward + m->kept[0].way[0]) / 40, 1e-12);
+    assert_close("and across it", row.drift_left, (39 * left - m->kept[0].way[1]) / 40, 1e-12);
+    fclose(csv);
+    assert_non_null(
+        strstr(text, "foam45,0.5,0,1,0.2930,0.1953,0.012000,0.004550,0.002072,0.050000\n"));
+    free(text);
+    measure_free(m, 1);
 }
 
 /* Contact is more than 5 N. */
@@ -358,7 +409,7 @@ static EvalRow summarise(Measure *m, const uint8_t *fallen, int trials) {
     const EvalDef eval = {.speed = 0.5, .trials = trials};
     EvalRow row;
     memset(&row, 0xff, sizeof row);
-    eval_summarise(&row, "foam45", &eval, m, fallen, 400);
+    eval_summarise(&row, "foam45", &eval, m, fallen, 400, NULL);
     assert_string_equal(row.ground, "foam45");
     assert_true(row.speed == 0.5 && row.sideways == 0);
     return row;
@@ -439,7 +490,7 @@ static void sideways(void **state) {
         m[1].end[1] = m[1].start[1] + 0.4;
         const EvalDef eval = {.speed = 0.4, .sideways = asked ? 0.3 : 0, .trials = 2};
         EvalRow row;
-        eval_summarise(&row, "foam45", &eval, m, fallen, 400);
+        eval_summarise(&row, "foam45", &eval, m, fallen, 400, NULL);
         assert_close("asked", row.sideways, asked ? 0.3 : 0, 0);
         assert_close("velocity", row.velocity, 0.4, 1e-12);
         assert_close("to the left", row.velocity_sideways, 0.3, 1e-12);
@@ -613,6 +664,7 @@ int main(void) {
         cmocka_unit_test(speeds_of_a_turning_robot),
         cmocka_unit_test(yaw_of_an_orientation),
         cmocka_unit_test(nothing_is_steady_before_two_seconds),
+        cmocka_unit_test(stances_are_kept),
         cmocka_unit_test(one_stance_and_one_swing),
         cmocka_unit_test(contact_is_a_load_above_five_newton),
         cmocka_unit_test(chatter_ends_no_stance),
