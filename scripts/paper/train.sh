@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# Trains one policy per ground model and seed, by configs/models.ini, on one GPU: FOLDER/MODEL-SEED.safetensors. What is there is kept.
+# Usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]
+set -euo pipefail
+out=${1:?usage: scripts/paper/train.sh FOLDER [SEEDS [MODEL ...]]}
+seeds=${2:-3}
+shift $(($# < 2 ? $# : 2))
+models=("$@")
+[ $# -gt 0 ] || models=(mild con_cone con_spring ecc_spring ecc_quasi ecc_quasi_3d rigid)
+mild=${MILD:-build/mild}
+config="$(dirname "$0")/../../configs/models.ini"
+runs=$(mktemp -d)
+trap 'rm -rf "$runs"' EXIT
+mkdir -p "$out"
+for seed in $(seq "$seeds"); do
+    for model in "${models[@]}"; do
+        policy=$out/$model-$seed.safetensors
+        [ -e "$policy" ] && continue
+        "$mild" train --config "$config" --out "$runs/run" --randomize.model="$model" --train.seed="$seed" >"$runs/log" 2>&1 ||
+            { cat "$runs/log" >&2; exit 1; }
+        tail -1 "$runs/log"
+        cp "$runs/run/log.csv" "$out/$model-$seed.csv"
+        mv "$runs/run/policy.safetensors" "$policy"
+        rm -rf "$runs/run"
+    done
+done
