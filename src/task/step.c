@@ -197,6 +197,13 @@ TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd
     return over ? 0 : tau;
 }
 
+/* With torque_hold the torque is computed when the action arrives, after lag_command steps, and held
+ * for a whole policy period. A new episode has none to hold. */
+TASK_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int steps) {
+    const int begins = k == 0 && env->step == env->step_first;
+    return !def->torque_hold || begins || k == env->lag_command % steps;
+}
+
 /* ---- after the physics ---- */
 
 static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
@@ -246,8 +253,11 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
         m.omega[i] = qvel[3 + i];
         m.gravity[i] = -rotation[6 + i];
     }
+    const int parts = def->reward.acceleration_form == TASK_ACCELERATION_LINEAR ? 3 : 6;
     for (int i = 0; i < 6; i++) {
         twist[i] = qvel[i];
+    }
+    for (int i = 0; i < parts; i++) {
         change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
     }
     m.twist_change = place_root(change);
