@@ -40,9 +40,9 @@ static inline MILD_BOTH TaskReal reward_yaw_rate(const TaskMotion *m) {
     return tracking(m, m->env->smooth_velocity[2] - m->env->command[2]);
 }
 
-/* The paper prints a positive weight on an error (TASK_CLEARANCE_ERROR), which pays a foot for being
- * at a wrong height. The lift gives nothing to a foot that stays down (exp(-k error) would give it
- * a third of a perfect swing) and has a slope from the first millimetre. Lifting too high costs half
+/* The paper prints a positive weight on an error (TASK_CLEARANCE_ERROR), which pays a foot for a
+ * wrong height. The lift gives nothing to a foot that stays down (exp(-k error) would give it a
+ * third of a perfect swing) and has a slope from the first millimetre. Lifting too high costs half
  * as much per metre as lifting gains. The scale is such that following h_des = apex sin(pi s) gives
  * 1 on average over the swing. */
 static inline MILD_BOTH TaskReal reward_feet_clearance(const TaskMotion *m) {

@@ -197,8 +197,8 @@ TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd
     return over ? 0 : tau;
 }
 
-/* With torque_hold the torque is computed when the action arrives, after lag_command steps, and held
- * for a whole policy period. A new episode has none to hold. */
+/* With torque_hold the torque is computed when the action arrives, after lag_command steps, and
+ * held for a whole policy period. A new episode has none to hold. */
 TASK_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int steps) {
     const int begins = k == 0 && env->step == env->step_first;
     return !def->torque_hold || begins || k == env->lag_command % steps;

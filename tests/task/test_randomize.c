@@ -373,8 +373,8 @@ static void ranges_of_grounds(void **unused) {
     free(env);
 }
 
-/* k_D and b_D from ranges move no other draw; passive = false leaves c_g and c_d as drawn, of presets
- * too. */
+/* k_D and b_D from ranges move no other draw; passive = false leaves c_g and c_d as drawn, those of
+ * presets too. */
 static void drift_and_energy(void **unused) {
     (void)unused;
     open_env();
