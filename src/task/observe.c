@@ -50,7 +50,7 @@ static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, 
         action[i] = env->action[0][i];
     }
     if (place_lane() == 0) {
-        int still = !def->clock || task_is_standing(env->command_seen);
+        int still = !def->clock || task_is_standing(def, env->command_seen);
         clock[0] = still ? 0 : (float)place_sin(TWO_PI * env->phase);
         clock[1] = still ? 0 : (float)place_cos(TWO_PI * env->phase);
     }
@@ -106,9 +106,9 @@ static inline MILD_BOTH void write_estimates(const TaskEnv *env, const TaskDef *
 }
 
 /* Six numbers of each foot. */
-static inline MILD_BOTH void write_feet(const TaskEnv *env, const Robot *robot, const RobotSim *sim,
-                                        float *out) {
-    int standing = task_is_standing(env->command);
+static inline MILD_BOTH void write_feet(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                        const RobotSim *sim, float *out) {
+    int standing = task_is_standing(def, env->command);
     const float force_scale = (float)(0.6 * robot_foot_force(robot)); /* [N] */
     for (int f = place_lane(); f < env->shape.feet; f += PLACE_LANES) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
@@ -221,7 +221,7 @@ TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, 
         make_frame(env, def, pose, qvel + 3, gravity, qpos + 7, qvel + 6, view->critic);
         float *rest = view->critic + width;
         write_estimates(env, def, sim, rest);
-        write_feet(env, robot, sim, rest + env->shape.estimates);
+        write_feet(env, def, robot, sim, rest + env->shape.estimates);
         write_episode(env, def, robot, sim, rest + env->shape.estimates + 6 * env->shape.feet);
     }
 }

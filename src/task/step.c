@@ -245,7 +245,7 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     TaskReal length = place_root(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
     TaskReal c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
     TaskReal twist[6], change = 0;
-    m.standing = task_is_standing(env->command);
+    m.standing = task_is_standing(def, env->command);
     m.velocity[0] = c * qvel[0] + s * qvel[1];
     m.velocity[1] = -s * qvel[0] + c * qvel[1];
     m.velocity[2] = qvel[2];

@@ -118,6 +118,7 @@ typedef struct {
     double command_interval;  /* [s] */
     double vx[2], vy[2], wz[2];
     double backward_share, backward_vx[2], standing_share, straight_share;
+    double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
     double gait_period;    /* [s] */
     double swing_apex;     /* [m] */
     double double_support; /* [-] |sin(2 pi phase)| below which either contact state is right */

@@ -40,16 +40,17 @@ static const char *const printed[] = {
     "task.torque_hold=true", "task.action_scale=1", "task.clock=false", "task.history_stride=1",
     "task.velocity_scale=1", "task.height_scale=1", "ppo.epsilon=0.3", "ppo.decoder_target=newest",
     /* what it has not */
-    "task.vy=0 0", "task.backward_share=0", "task.standing_share=0", "task.straight_share=0",
-    "task.observe_noise=false", "task.assist=false", "task.action_clip=100", "task.torque_share=1",
-    "ppo.mirror_weight=0", "ppo.mirror_share=0", "reward.clip_sum=false",
-    "reward.reference_motion=0", "reward.knee_distance=0", "reward.orientation=0",
-    "reward.air_time=0", "reward.base_motion=0", "reward.contact_force=0", "reward.joint_speed=0",
-    "randomize.rigid_share=0", "randomize.preset_share=0", "randomize.patch_share=0",
-    "randomize.sinkage_max=1", "randomize.recovery=1 1", "randomize.bed_depth=10 10",
-    "randomize.link_mass=1 1", "randomize.armature=1 1", "randomize.gain=1 1",
-    "randomize.strength=1 1", "randomize.push_interval=0", "randomize.push_linear=0",
-    "randomize.push_angular=0", "randomize.initial_joint=0", "randomize.initial_velocity=0"};
+    "task.vy=0 0", "task.backward_share=0", "task.standing_share=0", "task.standing_below=0",
+    "task.straight_share=0", "task.observe_noise=false", "task.assist=false",
+    "task.action_clip=100", "task.torque_share=1", "ppo.mirror_weight=0", "ppo.mirror_share=0",
+    "reward.clip_sum=false", "reward.reference_motion=0", "reward.knee_distance=0",
+    "reward.orientation=0", "reward.air_time=0", "reward.base_motion=0", "reward.contact_force=0",
+    "reward.joint_speed=0", "randomize.rigid_share=0", "randomize.preset_share=0",
+    "randomize.patch_share=0", "randomize.sinkage_max=1", "randomize.recovery=1 1",
+    "randomize.bed_depth=10 10", "randomize.link_mass=1 1", "randomize.armature=1 1",
+    "randomize.gain=1 1", "randomize.strength=1 1", "randomize.push_interval=0",
+    "randomize.push_linear=0", "randomize.push_angular=0", "randomize.initial_joint=0",
+    "randomize.initial_velocity=0"};
 enum { PRINTED = sizeof printed / sizeof *printed };
 
 static ExperimentDef read_paper(void) {

@@ -278,6 +278,9 @@ static void follows_mujoco_on_a_map(void **unused) {
 static TaskDef printed_def(void) {
     TaskDef def = some_def();
     def.torque_hold = 1;
+    def.standing_below = 0;
+    def.vx[1] = def.vy[1] = def.wz[1] = 0.3; /* some would stand */
+    def.vy[0] = def.wz[0] = 0;
     def.velocity_scale = def.height_scale = 1;
     def.reward.tracking_narrow = 0;
     def.reward.tracking_time = 0.01;
