@@ -157,7 +157,8 @@ const MildField task_fields[] = {
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     T(newton, B, 1, 0, 1,
-      "[bool] contact solver: true for Newton (fast), false for the paper's Gauss-Seidel sweeps"),
+      "[bool] contact solver: true for Newton (fast), false for sweeps as in the paper's Algorithm "
+      "1, over the same implicit equations"),
     T(contact_tolerance, D, 1, 1e-12, 0.1,
       "[-] relative residual at which the contact solver stops"),
     T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000,
