@@ -189,7 +189,7 @@ static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *co
 /* With --latent or --ablate: rows whose controller is looked into. */
 static MildStatus evaluate_inside(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                                   FILE *table, MildError *error) {
-    InsideLog log = {.feet = robot_feet(robot)};
+    InsideLog log = {.task = &e->task, .feet = robot_feet(robot)};
     const EvalWatch watch = {inside_decided, &log};
     Sheet sheet = {0};
     MildStatus status = learned_watch(controller, &log.inside, error);

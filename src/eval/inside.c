@@ -47,9 +47,9 @@ static void print_row(const InsideLog *log, const Scene *scene, double speed, in
     print_numbers(log->csv, rows->latent + (size_t)trial * (size_t)in->latent, in->latent, 1);
     print_numbers(log->csv, rows->modulated + (size_t)trial * (size_t)in->latent, in->latent, 1);
     print_numbers(log->csv, rows->theta + (size_t)trial * (size_t)in->theta, in->theta, 1);
-    print_numbers(log->csv, estimates, 3, TASK_VELOCITY_SCALE);
+    print_numbers(log->csv, estimates, 3, log->task->velocity_scale);
     print_numbers(log->csv, estimates + 3, 3 * log->feet, 1);
-    print_numbers(log->csv, estimates + 3 + 3 * log->feet, log->feet, TASK_HEIGHT_SCALE);
+    print_numbers(log->csv, estimates + 3 + 3 * log->feet, log->feet, log->task->height_scale);
     fprintf(log->csv, "\n");
 }
 

@@ -9,6 +9,7 @@
 
 typedef struct {
     const LearnedInside *inside;
+    const TaskDef *task; /* of the policy: the scales of its estimates */
     int feet;
     FILE *csv;   /* a row per decision; NULL: none */
     double *sum; /* [latent] of z, then [estimates], over the decisions; NULL: none */

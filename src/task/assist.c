@@ -41,7 +41,7 @@ TASK_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const Ro
     if (share == 0) {
         return rest;
     }
-    int standing = task_is_standing(env->command);
+    int standing = task_is_standing(def, env->command);
     double reference = task_gait_reference(def, robot, env->phase, standing, i);
     return rest + share * ASSIST_LEAD * (reference - rest);
 }

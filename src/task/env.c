@@ -79,7 +79,7 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
 /* Physics steps of one policy period, with the three latencies. Returns 1 when the simulation
  * diverged. */
 static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
-                       TaskReading *reading, double *torque, const TaskProbe *probe) {
+                       TaskReading *reading, const TaskProbe *probe) {
     int steps = (int)(TASK_PERIOD / def->physics_dt + 0.5);
     TaskMotor motor[ROBOT_JOINTS_MAX];
     for (int i = 0; i < env->shape.joints; i++) {
@@ -96,17 +96,18 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
             break;
         }
         const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim);
-        for (int i = 0; i < env->shape.joints; i++) {
-            torque[i] = task_torque(&motor[i], k < env->lag_command, q[i], qd[6 + i]);
+        const int act = task_motors_act(env, def, k, steps);
+        for (int i = 0; act && i < env->shape.joints; i++) {
+            env->torque[i] = task_torque(&motor[i], k < env->lag_command, q[i], qd[6 + i]);
         }
         double wrench[6];
         int helped = task_assist(env, def, robot, robot_sim_base_rotation(sim), qd, wrench);
-        if (robot_sim_step(sim, torque, helped ? wrench : NULL, &env->terrain,
+        if (robot_sim_step(sim, env->torque, helped ? wrench : NULL, &env->terrain,
                            task_env_ground(env))) {
             return 1;
         }
         if (probe) {
-            probe->physics_step(probe->context, env, sim, torque);
+            probe->physics_step(probe->context, env, sim, env->torque);
         }
     }
     return 0;
@@ -116,17 +117,16 @@ TaskStep task_env_step(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
                        const float *action, int auto_reset, const TaskView *view,
                        const TaskProbe *probe) {
     TaskReading reading;
-    double torque[ROBOT_JOINTS_MAX];
     task_begin_step(env, def, action);
     lend_map(env, def);
     robot_sim_set_solver(sim, def->newton ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL,
                          def->contact_tolerance, def->contact_iterations);
     robot_sim_load(sim, &env->robot, &env->variation);
-    int diverged = run_physics(env, def, robot, sim, &reading, torque, probe);
+    int diverged = run_physics(env, def, robot, sim, &reading, probe);
     if (!diverged) {
         robot_sim_store(sim, &env->robot);
     }
-    TaskStep out = task_end_step(env, def, robot, sim, torque, diverged);
+    TaskStep out = task_end_step(env, def, robot, sim, env->torque, diverged);
     if (out.done && auto_reset) {
         task_env_reset(env, def, robot, sim, view);
     } else if (out.valid) {

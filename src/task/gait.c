@@ -4,8 +4,9 @@
 
 #define TWO_PI 6.283185307179586
 
-TASK_FN int task_is_standing(const TaskReal command[3]) {
-    return fabs(command[0]) < 0.1 && fabs(command[1]) < 0.1 && fabs(command[2]) < 0.1;
+TASK_FN int task_is_standing(const TaskDef *def, const TaskReal command[3]) {
+    const double below = def->standing_below;
+    return fabs(command[0]) < below && fabs(command[1]) < below && fabs(command[2]) < below;
 }
 
 /* [-] Progress of the foot's swing, the half of the period before its stance; -1 in stance. */

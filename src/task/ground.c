@@ -9,6 +9,7 @@
 
 #define DRAW_TRIES 100 /* of a material that the model can match */
 #define RANDOM_USE_GROUNDS 0x47524e44u
+#define RANDOM_USE_DRIFT 0x44524654u
 
 static double draw(Random *r, const double range[2]) {
     return random_uniform(r, range[0], range[1]);
@@ -50,6 +51,8 @@ static void limit_sinkage(MildMaterial *m, const Robot *robot, double sinkage) {
 
 static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot *robot) {
     MildMaterial m = mild_material_default();
+    Random drift = *r; /* apart, so that it moves no other draw */
+    drift.seed ^= RANDOM_USE_DRIFT;
     m.k_pen = draw(r, def->k_pen);
     m.sigma_cone = draw(r, def->sigma_cone);
     m.alpha = draw(r, def->alpha);
@@ -59,6 +62,8 @@ static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot 
     m.phi = draw(r, def->phi);
     m.mu = draw(r, def->mu);
     m.rho = draw(r, def->rho);
+    m.k_drift = draw(&drift, def->k_drift);
+    m.b_drift = draw(&drift, def->b_drift);
     m.recovery = draw(r, def->recovery);
     m.bed_depth = draw(r, def->bed_depth);
     limit_sinkage(&m, robot, def->sinkage_max);
@@ -72,6 +77,7 @@ static MildMaterial draw_new(Random *r, const RandomizeDef *def, const Robot *ro
     MildMaterial m, rival;
     for (int tries = 0; tries < DRAW_TRIES; tries++) {
         m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot);
+        m.passive = def->passive;
         if (def->model == MILD_MODEL_RIGID) {
             return m; /* the engine's contact does not use it */
         }

@@ -50,7 +50,7 @@ static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, 
         action[i] = env->action[0][i];
     }
     if (place_lane() == 0) {
-        int still = !def->clock || task_is_standing(env->command_seen);
+        int still = !def->clock || task_is_standing(def, env->command_seen);
         clock[0] = still ? 0 : (float)place_sin(TWO_PI * env->phase);
         clock[1] = still ? 0 : (float)place_cos(TWO_PI * env->phase);
     }
@@ -87,8 +87,8 @@ static inline MILD_BOTH void to_base(const TaskReal *rotation, const TaskReal *v
 }
 
 /* Velocity of the base, then velocities and heights of the feet. */
-static inline MILD_BOTH void write_estimates(const TaskEnv *env, const RobotSim *sim,
-                                             float *estimate) {
+static inline MILD_BOTH void write_estimates(const TaskEnv *env, const TaskDef *def,
+                                             const RobotSim *sim, float *estimate) {
     const TaskReal *rotation = robot_sim_base_rotation(sim);
     int feet = env->shape.feet;
     for (int n = place_lane(); n <= feet; n += PLACE_LANES) {
@@ -96,19 +96,19 @@ static inline MILD_BOTH void write_estimates(const TaskEnv *env, const RobotSim 
         float *velocity = estimate + 3 * n;
         to_base(rotation, n > 0 ? foot->sole_center_velocity : robot_sim_qvel(sim), velocity);
         if (n > 0) {
-            estimate[2 + 3 * feet + n] = (float)(TASK_HEIGHT_SCALE * foot->sole_height);
+            estimate[2 + 3 * feet + n] = (float)(def->height_scale * foot->sole_height);
             continue;
         }
         for (int i = 0; i < 3; i++) {
-            velocity[i] *= (float)TASK_VELOCITY_SCALE;
+            velocity[i] *= (float)def->velocity_scale;
         }
     }
 }
 
 /* Six numbers of each foot. */
-static inline MILD_BOTH void write_feet(const TaskEnv *env, const Robot *robot, const RobotSim *sim,
-                                        float *out) {
-    int standing = task_is_standing(env->command);
+static inline MILD_BOTH void write_feet(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                        const RobotSim *sim, float *out) {
+    int standing = task_is_standing(def, env->command);
     const float force_scale = (float)(0.6 * robot_foot_force(robot)); /* [N] */
     for (int f = place_lane(); f < env->shape.feet; f += PLACE_LANES) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
@@ -212,7 +212,7 @@ TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, 
         copy_row(frame, width, view->frame);
     }
     if (view->estimate) {
-        write_estimates(env, sim, view->estimate);
+        write_estimates(env, def, sim, view->estimate);
     }
     if (view->critic) {
         const TaskReal *qpos = robot_sim_qpos(sim), *qvel = robot_sim_qvel(sim);
@@ -220,8 +220,8 @@ TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, 
         const TaskReal gravity[3] = {-rotation[6], -rotation[7], -rotation[8]};
         make_frame(env, def, pose, qvel + 3, gravity, qpos + 7, qvel + 6, view->critic);
         float *rest = view->critic + width;
-        write_estimates(env, sim, rest);
-        write_feet(env, robot, sim, rest + env->shape.estimates);
+        write_estimates(env, def, sim, rest);
+        write_feet(env, def, robot, sim, rest + env->shape.estimates);
         write_episode(env, def, robot, sim, rest + env->shape.estimates + 6 * env->shape.feet);
     }
 }

@@ -24,8 +24,9 @@ static inline MILD_BOTH TaskReal per_pair(const TaskMotion *m, TaskReal sum) {
  * would hide one. */
 static inline MILD_BOTH TaskReal tracking(const TaskMotion *m, TaskReal error) {
     const RewardDef *def = &m->def->reward;
-    return TASK_REAL(0.5) * (place_exp(-def->tracking_sharpness * square(error)) +
-                             place_exp(-fabs(error) / def->tracking_width));
+    const TaskReal narrow = TASK_REAL(def->tracking_narrow);
+    return (1 - narrow) * place_exp(-def->tracking_sharpness * square(error)) +
+           narrow * place_exp(-fabs(error) / def->tracking_width);
 }
 
 /* Forward and sideways errors count separately. In the norm of both, a little sway would hide a
@@ -39,16 +40,18 @@ static inline MILD_BOTH TaskReal reward_yaw_rate(const TaskMotion *m) {
     return tracking(m, m->env->smooth_velocity[2] - m->env->command[2]);
 }
 
-/* The paper prints a positive weight on an error. Of the interpretations in docs/task.md section 8,
- * this one gives nothing to a foot that stays down (exp(-k error) would give it a third of a
- * perfect swing) and has a slope from the first millimetre. Lifting too high costs half as much per
- * metre as lifting gains. The scale is such that following h_des = apex sin(pi s) gives 1 on
- * average over the swing. */
+/* The paper prints a positive weight on an error (TASK_CLEARANCE_ERROR), which pays a foot for a
+ * wrong height. The lift gives nothing to a foot that stays down (exp(-k error) would give it a
+ * third of a perfect swing) and has a slope from the first millimetre. Lifting too high costs half
+ * as much per metre as lifting gains. The scale is such that following h_des = apex sin(pi s) gives
+ * 1 on average over the swing. */
 static inline MILD_BOTH TaskReal reward_feet_clearance(const TaskMotion *m) {
     TaskReal sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
-        if (!m->stance[f]) {
-            TaskReal h = m->foot_height[f], wanted = m->wanted_height[f];
+        TaskReal h = m->foot_height[f], wanted = m->wanted_height[f];
+        if (!m->stance[f] && m->def->reward.clearance_form == TASK_CLEARANCE_ERROR) {
+            sum += TASK_REAL(fabs(wanted - h));
+        } else if (!m->stance[f]) {
             sum += TASK_REAL(1.5707963) *
                    (clamp(h, 0, wanted) - TASK_REAL(0.5) * clamp(h - wanted, 0, 0.3)) /
                    TASK_REAL(m->def->swing_apex);
@@ -57,12 +60,17 @@ static inline MILD_BOTH TaskReal reward_feet_clearance(const TaskMotion *m) {
     return per_pair(m, sum);
 }
 
+/* The paper's sum over two feet has its -0.3 once: both match 2.3, one 1, none -0.3. The mean has a
+ * range that does not depend on the number of feet. */
 static inline MILD_BOTH TaskReal reward_gait(const TaskMotion *m) {
+    const int sums = m->def->reward.gait_form == TASK_GAIT_SUM;
     TaskReal sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
-        sum += m->either[f] || m->contact[f] == m->stance[f] ? 1 : TASK_REAL(-0.3);
+        const int matches = m->either[f] || m->contact[f] == m->stance[f];
+        sum += matches ? 1 : sums ? 0 : TASK_REAL(-0.3);
     }
-    return sum / TASK_REAL(m->env->shape.feet);
+    return sums ? TASK_REAL(1.3) * per_pair(m, sum) - TASK_REAL(0.3)
+                : sum / TASK_REAL(m->env->shape.feet);
 }
 
 static inline MILD_BOTH TaskReal reward_slip(const TaskMotion *m) {

@@ -197,6 +197,13 @@ TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd
     return over ? 0 : tau;
 }
 
+/* With torque_hold the torque is computed when the action arrives, after lag_command steps, and
+ * held for a whole policy period. A new episode has none to hold. */
+TASK_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int steps) {
+    const int begins = k == 0 && env->step == env->step_first;
+    return !def->torque_hold || begins || k == env->lag_command % steps;
+}
+
 /* ---- after the physics ---- */
 
 static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
@@ -238,7 +245,7 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     TaskReal length = place_root(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
     TaskReal c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
     TaskReal twist[6], change = 0;
-    m.standing = task_is_standing(env->command);
+    m.standing = task_is_standing(def, env->command);
     m.velocity[0] = c * qvel[0] + s * qvel[1];
     m.velocity[1] = -s * qvel[0] + c * qvel[1];
     m.velocity[2] = qvel[2];
@@ -246,8 +253,11 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
         m.omega[i] = qvel[3 + i];
         m.gravity[i] = -rotation[6 + i];
     }
+    const int parts = def->reward.acceleration_form == TASK_ACCELERATION_LINEAR ? 3 : 6;
     for (int i = 0; i < 6; i++) {
         twist[i] = qvel[i];
+    }
+    for (int i = 0; i < parts; i++) {
         change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
     }
     m.twist_change = place_root(change);

@@ -15,12 +15,6 @@
 
 /* [-] Friction of rigid ground that a caller has chosen (task_env_reset_on). */
 #define TASK_RIGID_FRICTION 0.8
-/* Scale of the feet heights among the estimates, so that centimetres count as much in the
- * regression as velocities in m/s. */
-#define TASK_HEIGHT_SCALE 10.0
-/* Scale of the base velocity. 0.05 m/s is a tenth of a slow walk, so it must matter to the
- * regression and to the actor. */
-#define TASK_VELOCITY_SCALE 4.0
 
 /* Numbers per environment; they follow from the robot's joints and feet. */
 typedef struct {
@@ -74,6 +68,7 @@ typedef struct {
     TaskReal kp[TASK_JOINTS];     /* [N m/rad] task.kp or the robot's */
     TaskReal kd[TASK_JOINTS];     /* [N m s/rad] task.kd or the robot's */
     float action[3][TASK_JOINTS]; /* now, one and two steps ago */
+    TaskReal torque[TASK_JOINTS]; /* [N m] of the last physics step */
     uint32_t oldest;              /* place of the oldest frame in the ring, the next to go */
     uint32_t held;                /* frames of the ring */
     TaskReal
@@ -166,12 +161,13 @@ typedef struct {
     const TaskDef *def;
     const Robot *robot;
     const TaskEnv *env;
-    TaskReal velocity[3];              /* [m/s] of the base, heading frame */
-    TaskReal omega[3];                 /* [rad/s] of the base, base frame */
-    TaskReal gravity[3];               /* [-] unit vector along gravity, base frame */
-    TaskReal twist_change;             /* norm of the change of the base twist in this step */
-    TaskReal q[TASK_JOINTS];           /* [rad] */
-    TaskReal qd[TASK_JOINTS];          /* [rad/s] */
+    TaskReal velocity[3];     /* [m/s] of the base, heading frame */
+    TaskReal omega[3];        /* [rad/s] of the base, base frame */
+    TaskReal gravity[3];      /* [-] unit vector along gravity, base frame */
+    TaskReal twist_change;    /* norm of the change of the base twist in this step, or of its linear
+                              part (acceleration_form) */
+    TaskReal q[TASK_JOINTS];  /* [rad] */
+    TaskReal qd[TASK_JOINTS]; /* [rad/s] */
     TaskReal qd_before[TASK_JOINTS];   /* [rad/s] one policy step ago */
     TaskReal torque[TASK_JOINTS];      /* [N m] */
     TaskReal base_height;              /* [m] above the stance soles */
@@ -227,10 +223,13 @@ typedef struct {
 
 /* A policy step (step.c): what comes before its physics steps, the motor of joint i, its torque at
  * angle q and speed qd, and what comes after them. late: bool, the last action still counts.
+ * task_motors_act is true when physics step k of `steps` computes torques anew; otherwise those of
+ * the step before go on, which env->torque has kept.
  * torque: [joints] of the last physics step. diverged: bool, they broke off. */
 TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *action);
 TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i);
 TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd);
+TASK_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int steps);
 TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                const RobotSim *sim, const TaskReal *torque, int diverged);
 /* An episode on what task_randomize drew (step.c). depth: [m] how deep the feet stand in its
@@ -250,7 +249,7 @@ TASK_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const Ro
 
 /* Gait clock (gait.c): a foot is in stance during the half of the period that starts at its
  * offset. */
-TASK_FN int task_is_standing(const TaskReal command[3]);
+TASK_FN int task_is_standing(const TaskDef *def, const TaskReal command[3]);
 TASK_FN int task_gait_stance(const Robot *robot, double phase, int standing, int foot);
 TASK_FN double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
                                 int foot);

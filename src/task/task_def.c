@@ -15,6 +15,7 @@ TaskDef task_def_default(void) {
         .physics_dt = 0.0025,
         .action_clip = 8.0,
         .torque_share = 0.85,
+        .torque_hold = 0,
         .kp = "robot",
         .kd = "robot",
         .episode = 24,
@@ -26,6 +27,7 @@ TaskDef task_def_default(void) {
         .backward_vx = {-0.6, 0},
         .standing_share = 0.05,
         .straight_share = 0.4,
+        .standing_below = 0.1,
         .gait_period = 0.8,
         .swing_apex = 0.10,
         .double_support = 0.1,
@@ -36,6 +38,8 @@ TaskDef task_def_default(void) {
         .noise_qd = 0.19,
         .noise_omega = 0.3,
         .noise_gravity = 0.075,
+        .velocity_scale = 4,
+        .height_scale = 10,
         .tilt_limit = 1.0,
         .crossing_limit = 0.0,
         .assist = 1,
@@ -44,6 +48,7 @@ TaskDef task_def_default(void) {
         .contact_iterations = 20,
         .reward = {.clip_sum = 1,
                    .tracking_sharpness = 5,
+                   .tracking_narrow = 0.5,
                    .tracking_width = 0.1,
                    .tracking_time = 0.4,
                    .reference_amplitude = 0.40},
@@ -61,8 +66,11 @@ TaskDef task_def_default(void) {
                       .phi = {0.50, 0.64},
                       .mu = {0.2, 1.3},
                       .rho = {1000, 1000},
+                      .k_drift = {400, 400},
+                      .b_drift = {0.10, 0.10},
                       .recovery = {0, 1},
                       .bed_depth = {0.10, 0.15},
+                      .passive = 1,
                       .sinkage_max = 0.07,
                       .base_mass = {-4, 4},
                       .com_offset = 0.006,
@@ -108,6 +116,9 @@ const MildField task_fields[] = {
     T(action_scale, D, 1, 0, 2, "[rad] joint offset per unit of action; 0: the robot's"),
     T(action_clip, D, 1, 0.1, 100, "[-] actions are clipped to plus or minus this"),
     T(torque_share, D, 1, 0.1, 1, "[-] torque limit as a share of the joint's effort"),
+    T(torque_hold, B, 1, 0, 1,
+      "[bool] the PD torque is computed once per policy step, when the action arrives, and held "
+      "(paper: 100 Hz); false: at every physics step"),
     T(kp, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0,
       "[N m/rad] position gain: robot, one number, one per joint, or one per joint of a leg"),
     T(kd, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0, "[N m s/rad] as kp"),
@@ -121,6 +132,8 @@ const MildField task_fields[] = {
     T(standing_share, D, 1, 0, 1, "[-] share of commands to stand"),
     T(straight_share, D, 1, 0, 1,
       "[-] share of walking commands without sideways and turning motion"),
+    T(standing_below, D, 1, 0, 10,
+      "[m/s, rad/s] a command whose three parts are all below this is to stand; 0: none is"),
     T(gait_period, D, 1, 0.2, 3, "[s] period of the gait clock"),
     T(swing_apex, D, 1, 0.01, 0.4,
       "[m] height of the swing foot above the undisturbed surface that the clock asks for"),
@@ -134,6 +147,9 @@ const MildField task_fields[] = {
     T(noise_qd, D, 1, 0, 5, "[-] bound of the uniform noise of joint speeds, in units of 20 rad/s"),
     T(noise_omega, D, 1, 0, 5, "[rad/s] bound of the uniform noise of the angular velocity"),
     T(noise_gravity, D, 1, 0, 1, "[-] bound of the uniform noise of the unit vector along gravity"),
+    T(velocity_scale, D, 1, 0.01, 100,
+      "[-] scale of the base velocity among the estimates; its error counts with the square"),
+    T(height_scale, D, 1, 0.01, 100, "[-] scale of the feet heights among the estimates"),
     T(tilt_limit, D, 1, 0.1, 3.1, "[rad] the episode ends when the base tilts more than this"),
     T(crossing_limit, D, 1, -1, 1,
       "[m] the episode ends when the feet are laterally closer than this, because the simulated "
@@ -141,7 +157,8 @@ const MildField task_fields[] = {
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     T(newton, B, 1, 0, 1,
-      "[bool] contact solver: true for Newton (fast), false for the paper's Gauss-Seidel sweeps"),
+      "[bool] contact solver: true for Newton (fast), false for sweeps as in the paper's Algorithm "
+      "1, over the same implicit equations"),
     T(contact_tolerance, D, 1, 1e-12, 0.1,
       "[-] relative residual at which the contact solver stops"),
     T(contact_iterations, MILD_FIELD_INT, 1, 1, 100000,
@@ -160,6 +177,9 @@ const int task_field_count = sizeof task_fields / sizeof *task_fields;
      1e3,                                                                                          \
      "[1/s] weight of " help,                                                                      \
      NULL},
+static const char *const clearance_names[TASK_CLEARANCES] = {"lift", "error"};
+static const char *const gait_names[TASK_GAITS] = {"mean", "sum"};
+static const char *const acceleration_names[TASK_ACCELERATIONS] = {"twist", "linear"};
 const MildField reward_fields[] = {
     TASK_REWARD_LIST(TASK_REWARD_FIELD)
         R(clip_sum, B, 1, 0, 1, "[bool] the reward of a step is never below 0"),
@@ -167,10 +187,21 @@ const MildField reward_fields[] = {
     R(tracking_time, D, 1, 0.01, 10,
       "[s] time over which the velocity is smoothed before it is compared with the command"),
     R(tracking_sharpness, D, 1, 0, 100, "[s^2/m^2] k in linear_velocity and yaw_rate"),
+    R(tracking_narrow, D, 1, 0, 1,
+      "[-] share n of exp(-|e|/width) in linear_velocity and yaw_rate; 0: the paper's"),
     R(tracking_width, D, 1, 0.001, 10, "[m/s, rad/s] width in linear_velocity and yaw_rate"),
     R(feet_range, D, 2, 0, 1, "[m] limits of the lateral distance of the feet; 0 0: the robot's"),
     R(knee_range, D, 2, 0, 1, "[m] limits of the lateral distance of the knees; 0 0: the robot's"),
     R(reference_amplitude, D, 1, 0, 1, "[rad] amplitude of the joints in reference_motion"),
+    MILD_FIELD_CHOICE(RewardDef, clearance_form, clearance_names, TASK_CLEARANCES,
+                      "[-] feet_clearance: lift, (pi/2) (clip(h, 0, h_des) minus half of the "
+                      "excess)/apex; error, the paper's |h_des - h| [m]"),
+    MILD_FIELD_CHOICE(RewardDef, gait_form, gait_names, TASK_GAITS,
+                      "[-] gait: mean over feet of 1 or -0.3; sum, the paper's 1.3 (feet that "
+                      "match, of two) - 0.3"),
+    MILD_FIELD_CHOICE(RewardDef, acceleration_form, acceleration_names, TASK_ACCELERATIONS,
+                      "[-] base_acceleration: change of the twist, m/s and rad/s; of the linear "
+                      "velocity, the paper's v^b"),
 };
 const int reward_field_count = sizeof reward_fields / sizeof *reward_fields;
 
@@ -194,8 +225,13 @@ const MildField randomize_fields[] = {
     Z(phi, 2, 0.1, 1, "[-] volume fraction, low and high (paper)"),
     Z(mu, 2, 0.01, 3, "[-] friction coefficient, low and high (paper)"),
     Z(rho, 2, 1, 5000, "[kg/m^3] grain density, low and high"),
+    Z(k_drift, 2, 0, 1e6, "[N/m^2] drift stiffness k_D of an element, low and high"),
+    Z(b_drift, 2, 0, 1e3, "[N s/m] drift damping b_D of an element, low and high"),
     Z(recovery, 2, 0, 1, "[-] share of the depth that springs back, low and high"),
     Z(bed_depth, 2, 0.001, 10, "[m] depth of the firm bed below the surface, low and high"),
+    MILD_FIELD(RandomizeDef, passive, B, 1, 0, 1,
+               "[bool] c_g below 0 acts as 0 and c_d below 1/2 as 1/2, so that no ground creates "
+               "energy; false: as drawn (paper)"),
     Z(sinkage_max, 1, 0.005, 1,
       "[m] softer grounds are made stiffer, so that one foot sinks at most this deep"),
     Z(base_mass, 2, -8, 20, "[kg] mass added to the base, low and high (paper)"),

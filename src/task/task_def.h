@@ -16,15 +16,16 @@
  * and docs/task.md section 8. */
 #define TASK_REWARD_LIST(X)                                                                        \
     X(linear_velocity, 2.0,                                                                        \
-      "f(v_x - command) f(v_y - command), f(e) = (exp(-k e^2) + exp(-|e|/width))/2, v smoothed, "  \
-      "in the heading frame (paper)")                                                              \
-    X(yaw_rate, 1.1, "f(w_z - command) (paper)")                                                   \
+      "f(v_x - command) f(v_y - command), f(e) = (1 - n) exp(-k e^2) + n exp(-|e|/width), n: "     \
+      "tracking_narrow, v smoothed, in the heading frame (after the paper)")                       \
+    X(yaw_rate, 1.1, "f(w_z - command) (after the paper)")                                         \
     X(feet_clearance, 2.4,                                                                         \
-      "clip(h, 0, h_des) of swing feet minus half of the excess over h_des; h: lowest sole "       \
-      "point above the undisturbed surface (paper)")                                               \
-    X(gait, 1.4, "the mean over feet: 1 where contact matches the clock, else -0.3 (paper)")       \
+      "the height of swing feet, see clearance_form; h: lowest sole point above the undisturbed "  \
+      "surface (after the paper)")                                                                 \
+    X(gait, 1.4, "feet whose contact matches the clock, see gait_form (after the paper)")          \
     X(slip, -0.1, "the horizontal speed [m/s] of feet in contact (paper)")                         \
-    X(base_acceleration, 0.2, "exp(-3 |change of base twist in one step|) (paper)")                \
+    X(base_acceleration, 0.2,                                                                      \
+      "exp(-3 |change of base twist in one step|), see acceleration_form (after the paper)")       \
     X(action_smoothness, -0.003, "|a - a1|^2 + |a - 2 a1 + a2|^2 (paper)")                         \
     X(reference_motion, 2.2, "exp(-2 d) - 0.2 min(d, 0.5), d = |q - q_ref(phase)| (vendor)")       \
     X(default_pose, 1.2,                                                                           \
@@ -48,15 +49,28 @@
 enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };
 #undef TASK_REWARD_ENUM
 
+/* Forms of a reward: ours, and the paper's formula to the letter (docs/deviations.md). */
+typedef enum { TASK_CLEARANCE_LIFT, TASK_CLEARANCE_ERROR, TASK_CLEARANCES } TaskClearance;
+typedef enum { TASK_GAIT_MEAN, TASK_GAIT_SUM, TASK_GAITS } TaskGait;
+typedef enum {
+    TASK_ACCELERATION_TWIST,
+    TASK_ACCELERATION_LINEAR,
+    TASK_ACCELERATIONS
+} TaskAcceleration;
+
 typedef struct {
     double weight[TASK_REWARD_COUNT]; /* [1/s] */
     int clip_sum;                     /* bool: the sum of a step is never below 0 (vendor) */
     double nominal_height;            /* [m] of the base above the stance soles; 0: the robot's */
     double tracking_sharpness;        /* [s^2/m^2] k = 5 in the velocity terms */
-    double tracking_width;            /* [m/s] of the sharp part of the velocity terms */
+    double tracking_narrow;           /* [-] share of the narrow part of the velocity terms */
+    double tracking_width;            /* [m/s] of the narrow part */
     double tracking_time;             /* [s] over which the tracked velocity is smoothed */
     double feet_range[2], knee_range[2]; /* [m] limits; 0 0: the robot's */
     double reference_amplitude;          /* [rad] */
+    int clearance_form;                  /* a TaskClearance */
+    int gait_form;                       /* a TaskGait */
+    int acceleration_form;               /* a TaskAcceleration */
 } RewardDef;
 
 /* Domain randomisation; ranges are uniform. docs/task.md section 11. */
@@ -71,7 +85,8 @@ typedef struct {
     double patch_share;     /* [-] soft episodes whose ground changes in stripes */
     double patch_length[2]; /* [m] */
     double k_pen[2], sigma_cone[2], alpha[2], nu[2], c_g[2], c_d[2], phi[2], mu[2], rho[2],
-        recovery[2], bed_depth[2];
+        k_drift[2], b_drift[2], recovery[2], bed_depth[2];
+    int passive;        /* bool: of the materials, see MildMaterial */
     double sinkage_max; /* [m] a draw whose one-foot static sinkage is deeper is made stiffer until
                            it fits */
     /* robot */
@@ -96,12 +111,14 @@ typedef struct {
     double action_scale;      /* [rad] per unit action; 0: the robot's */
     double action_clip;       /* [-] */
     double torque_share;      /* [-] of the joint's effort */
+    int torque_hold;          /* bool: one torque per policy step */
     char kp[TASK_GAINS_SIZE]; /* [N m/rad] "robot": the robot's; or numbers, see task_gains */
     char kd[TASK_GAINS_SIZE]; /* [N m s/rad] */
     double episode;           /* [s] */
     double command_interval;  /* [s] */
     double vx[2], vy[2], wz[2];
     double backward_share, backward_vx[2], standing_share, straight_share;
+    double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
     double gait_period;    /* [s] */
     double swing_apex;     /* [m] */
     double double_support; /* [-] |sin(2 pi phase)| below which either contact state is right */
@@ -109,7 +126,11 @@ typedef struct {
     int clock;             /* bool: clock in the observation */
     int observe_noise;     /* bool */
     double noise_q, noise_qd, noise_omega, noise_gravity; /* +- uniform, qd after scaling */
-    double tilt_limit;                                    /* [rad] */
+    double velocity_scale; /* [-] of the base velocity among the estimates. 0.05 m/s is a tenth of a
+                              slow walk, so it must matter to the regression and to the actor */
+    double height_scale; /* [-] of the feet heights, so that centimetres count as much as velocities
+                              in m/s */
+    double tilt_limit;   /* [rad] */
     double crossing_limit;    /* [m] lateral distance of the feet below which the episode ends */
     int assist;               /* bool: helping hand for beginners (assist.c) */
     int newton;               /* bool: fast solver; off: the paper's sweeps */

@@ -153,6 +153,48 @@ static void command_latency(double dt, int steps) {
     rig_close(&rig);
 }
 
+/* With torque_hold the torque is that of the state and the action in the physics step in which the
+ * action arrives, and stays for a policy period: over the border of the policy steps. */
+static void held_torque(double dt, int steps) {
+    for (int lag = 0; lag <= steps; lag++) {
+        open_with_dt(dt);
+        rig.def.torque_hold = 1;
+        rig.env->lag_command = lag;
+        const double *pose = robot_default_pose(robot);
+        RobotState state = kit_moving_state(2, 20);
+        put(&state);
+        double wanted[SA01_JOINTS], action = 0, moved = 0;
+        for (int t = 0; t < 3; t++) {
+            float now[SA01_JOINTS];
+            const double before = action;
+            action = 0.5 - 0.25 * t;
+            for (int i = 0; i < SA01_JOINTS; i++) {
+                now[i] = (float)action;
+            }
+            traced_step(now);
+            assert_int_equal(trace.count, steps);
+            for (int k = 0; k < steps; k++) {
+                const int acts = (t == 0 && k == 0) || k == lag % steps;
+                for (int i = 0; i < SA01_JOINTS; i++) {
+                    const double anew = wanted_torque(i, pose, k < lag ? before : action, k);
+                    moved = fmax(moved, acts ? 0 : fabs(anew - wanted[i]));
+                    wanted[i] = acts ? anew : wanted[i];
+                    expect_entry("held torque", i, trace.torque[k + 1][i], wanted[i], 1e-9);
+                }
+            }
+        }
+        assert_true(moved > 1); /* a torque of the present state would be another */
+        rig_close(&rig);
+    }
+}
+
+static void torque_is_held(void **unused) {
+    (void)unused;
+    held_torque(0.005, 2);
+    held_torque(0.0025, 4);
+    held_torque(0.001, 10);
+}
+
 static void expect_imu(const char *what, int k) {
     for (int i = 0; i < 3; i++) {
         expect_entry(what, i, (double)rig.frame[i], trace.omega[k][i], 2e-6);
@@ -339,6 +381,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(torque),
         cmocka_unit_test(action_is_clipped),
+        cmocka_unit_test(torque_is_held),
         cmocka_unit_test(latencies),
         cmocka_unit_test(command_is_seen_late),
         cmocka_unit_test(intervals_are_rounded),

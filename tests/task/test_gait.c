@@ -4,16 +4,22 @@
 
 static void standing_commands(void **unused) {
     (void)unused;
+    TaskDef def = task_def_default();
     const double none[3] = {0}, small[3] = {0.0999, -0.0999, 0.0999};
-    assert_true(task_is_standing(none));
-    assert_true(task_is_standing(small));
+    assert_true(task_is_standing(&def, none));
+    assert_true(task_is_standing(&def, small));
     for (int i = 0; i < 3; i++) {
         for (int sign = -1; sign <= 1; sign += 2) {
             double command[3] = {0};
             command[i] = 0.1001 * sign;
-            assert_false(task_is_standing(command));
+            assert_false(task_is_standing(&def, command));
         }
     }
+    def.standing_below = 0.05;
+    assert_true(task_is_standing(&def, none));
+    assert_false(task_is_standing(&def, small));
+    def.standing_below = 0; /* the robot always walks */
+    assert_false(task_is_standing(&def, none));
 }
 
 /* Left stands in the first half of the period, right in the second. */

@@ -73,6 +73,23 @@ static void change_of_twist(void **unused) {
     rig_close(&rig);
 }
 
+/* The linear part alone: 0.1, 0.2, 0.2 m/s have the norm 0.3, whatever the base turns. */
+static void change_of_velocity(void **unused) {
+    (void)unused;
+    rig_open_quiet(&rig, 0.5);
+    rig.def.reward.acceleration_form = TASK_ACCELERATION_LINEAR;
+    const double step[6] = {0.1, -0.2, 0.2, 3, -0.4, 1};
+    place(3);
+    for (int i = 0; i < 6; i++) {
+        rig.env->base_twist[i] = rig.env->robot.qvel[i] - step[i];
+    }
+    expect_near("velocity", describe().twist_change, 0.3, TOLERANCE);
+    for (int i = 0; i < 6; i++) {
+        expect_entry("base_twist", i, rig.env->base_twist[i], rig.env->robot.qvel[i], 0);
+    }
+    rig_close(&rig);
+}
+
 /* One step of 0.01 s moves a mean over 0.4 s by a fortieth of the way. */
 static void smoothed_velocity(void **unused) {
     (void)unused;
@@ -188,13 +205,10 @@ static void contact_and_air_time(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(base_and_joints),
-        cmocka_unit_test(change_of_twist),
-        cmocka_unit_test(smoothed_velocity),
-        cmocka_unit_test(feet_and_knees),
-        cmocka_unit_test(schedule),
-        cmocka_unit_test(double_support),
-        cmocka_unit_test(contact_and_air_time),
+        cmocka_unit_test(base_and_joints),    cmocka_unit_test(change_of_twist),
+        cmocka_unit_test(change_of_velocity), cmocka_unit_test(smoothed_velocity),
+        cmocka_unit_test(feet_and_knees),     cmocka_unit_test(schedule),
+        cmocka_unit_test(double_support),     cmocka_unit_test(contact_and_air_time),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

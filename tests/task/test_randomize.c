@@ -373,6 +373,44 @@ static void ranges_of_grounds(void **unused) {
     free(env);
 }
 
+/* k_D and b_D from ranges move no other draw; passive = false leaves c_g and c_d as drawn, those of
+ * presets too. */
+static void drift_and_energy(void **unused) {
+    (void)unused;
+    open_env();
+    clear_columns();
+    def.randomize.rigid_share = 0;
+    def.randomize.preset_jitter = 0.02;
+    TaskDef wide = def;
+    const double k_drift[2] = {50, 900}, b_drift[2] = {0.02, 0.2};
+    memcpy(wide.randomize.k_drift, k_drift, sizeof k_drift);
+    memcpy(wide.randomize.b_drift, b_drift, sizeof b_drift);
+    wide.randomize.passive = 0;
+    int drawn = 0, apart = 0;
+    for (int t = 0; t < DRAWS; t++) {
+        draw_next();
+        const MildMaterial plain = env->terrain.materials[0];
+        double factor[7];
+        assert_true(plain.passive);
+        task_randomize(env, &wide, robot);
+        MildMaterial m = env->terrain.materials[0];
+        assert_false(m.passive);
+        if (preset_of(&plain, factor) < 0) {
+            note("k_drift", -1, 50, 900, m.k_drift);
+            note("b_drift", -1, 0.02, 0.2, m.b_drift);
+            apart += fabs((m.k_drift - 50) / 850 - (m.b_drift - 0.02) / 0.18) > 0.01;
+            m.k_drift = plain.k_drift;
+            m.b_drift = plain.b_drift;
+            drawn++;
+        }
+        m.passive = 1;
+        assert_memory_equal(&m, &plain, sizeof m);
+    }
+    expect_columns();
+    assert_true(drawn > DRAWS / 3 && apart > 0.95 * drawn);
+    free(env);
+}
+
 /* Whatever is drawn, one foot under the whole weight rests no deeper than 0.07 m; what rests higher
  * is left alone; what was stiffened rests at 0.07 m. k_pen and sigma_cone grow by one factor. */
 static void limit_of_sinkage(void **unused) {
@@ -671,6 +709,7 @@ int main(void) {
         cmocka_unit_test(shares_of_grounds),
         cmocka_unit_test(latencies_are_independent),
         cmocka_unit_test(ranges_of_grounds),
+        cmocka_unit_test(drift_and_energy),
         cmocka_unit_test(start),
         cmocka_unit_test(robot_and_sensors),
     };

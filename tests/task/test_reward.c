@@ -79,6 +79,24 @@ static void linear_velocity(void **unused) {
     expect_term(REWARD_linear_velocity, "sharpness 2, width 0.3", 1.2187047018);
 }
 
+/* n = 0 is the paper's exp(-5 |v - command|^2): e^-0.2 at 0.2 m/s, e^-0.25 at (0.2, 0.1) m/s. With
+ * n = 1/4, f(0.2) = 0.75 e^-0.2 + 0.25 e^-2. */
+static void tracking_as_printed(void **unused) {
+    (void)unused;
+    new_scene();
+    scene.def.reward.tracking_narrow = 0;
+    set_command(0.6, 0.1, -0.3);
+    set_velocity(0.8, 0.1, -0.3);
+    expect_term(REWARD_linear_velocity, "0.2 m/s too fast", 1.6374615062);
+    expect_term(REWARD_yaw_rate, "as commanded", 1.1);
+    set_velocity(0.8, 0.0, 0.1);
+    expect_term(REWARD_linear_velocity, "too fast and aside", 1.5576015661);
+    expect_term(REWARD_yaw_rate, "0.4 rad/s off", 0.4942618605);
+    scene.def.reward.tracking_narrow = 0.25;
+    set_velocity(0.8, 0.1, -0.3);
+    expect_term(REWARD_linear_velocity, "a quarter", 1.2957637713);
+}
+
 /* f(0.4) = (e^-0.8 + e^-4)/2 = 0.23382230. */
 static void yaw_rate(void **unused) {
     (void)unused;
@@ -119,6 +137,41 @@ static void feet_clearance(void **unused) {
     expect_term(REWARD_feet_clearance, "two feet", 2.6389378290);
     m->stance[0] = m->stance[1] = 1;
     expect_term(REWARD_feet_clearance, "both stand", 0);
+}
+
+/* The paper's formula, 2.4 |h_des - h| of the feet that swing: an error is paid for. */
+static void clearance_as_printed(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    scene.def.reward.clearance_form = TASK_CLEARANCE_ERROR;
+    m->foot_height[0] = 0.3; /* stands */
+    m->foot_height[1] = 0.08;
+    expect_term(REWARD_feet_clearance, "wanted height", 0);
+    m->foot_height[1] = 0.05;
+    expect_term(REWARD_feet_clearance, "30 mm too low", 0.072);
+    m->foot_height[1] = 0.10;
+    expect_term(REWARD_feet_clearance, "20 mm too high", 0.048);
+    m->foot_height[1] = -0.02;
+    expect_term(REWARD_feet_clearance, "sunk by 20 mm", 0.24);
+    m->stance[0] = 0;
+    m->wanted_height[0] = 0.1;
+    expect_term(REWARD_feet_clearance, "two feet", 0.72);
+    m->stance[0] = m->stance[1] = 1;
+    expect_term(REWARD_feet_clearance, "both stand", 0);
+}
+
+/* The paper's formula, 1.4 (1.3 (feet that match) - 0.3): 2.3, 1 and -0.3 times 1.4. */
+static void gait_as_printed(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    scene.def.reward.gait_form = TASK_GAIT_SUM;
+    expect_term(REWARD_gait, "both as scheduled", 3.22);
+    m->contact[1] = 1;
+    expect_term(REWARD_gait, "the right drags", 1.4);
+    m->contact[0] = 0;
+    expect_term(REWARD_gait, "both wrong", -0.42);
+    m->either[0] = 1;
+    expect_term(REWARD_gait, "left in double support", 1.4);
 }
 
 static void gait(void **unused) {
@@ -373,9 +426,12 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(names_follow_the_enum),
         cmocka_unit_test(linear_velocity),
+        cmocka_unit_test(tracking_as_printed),
         cmocka_unit_test(yaw_rate),
         cmocka_unit_test(feet_clearance),
+        cmocka_unit_test(clearance_as_printed),
         cmocka_unit_test(gait),
+        cmocka_unit_test(gait_as_printed),
         cmocka_unit_test(slip),
         cmocka_unit_test(base_acceleration),
         cmocka_unit_test(action_smoothness),
