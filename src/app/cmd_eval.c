@@ -90,10 +90,11 @@ static MildStatus write_json(const Eval *e, const Robot *robot, MildError *error
     return report_save(root, e->json, error);
 }
 
-static MildStatus make_scene(Eval *e, const char *name, Scene *scene, MildMap **map,
+/* speed: of the walk; a course lies where it leads. */
+static MildStatus make_scene(Eval *e, const char *name, double speed, Scene *scene, MildMap **map,
                              MildError *error) {
     *map = NULL;
-    MildStatus status = scene_make(scene, name, e->patch, error);
+    MildStatus status = scene_make(scene, name, speed < 0 ? -e->patch : e->patch, error);
     if (status == MILD_OK) {
         status = grounds_finish_scene(&e->finish, scene, error);
     }
@@ -142,17 +143,18 @@ static void take_row(Eval *e, FILE *table) {
 static MildStatus evaluate_rows(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                                 FILE *table, MildError *error) {
     MildStatus status = MILD_OK;
-    for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
+    for (int i = 0; status == MILD_OK && i < e->grounds.count * e->speeds.count; i++) {
         Scene scene;
         MildMap *map;
-        status = make_scene(e, e->grounds.name[g], &scene, &map, error);
-        for (int s = 0; status == MILD_OK && s < e->speeds.count; s++) {
-            e->eval.speed = e->speeds.value[s];
+        e->eval.speed = e->speeds.value[i % e->speeds.count];
+        status =
+            make_scene(e, e->grounds.name[i / e->speeds.count], e->eval.speed, &scene, &map, error);
+        if (status == MILD_OK) {
             status = eval_run(&e->task, robot, pool, controller, &scene, &e->eval,
                               &e->rows[e->row_count], error);
-            if (status == MILD_OK && table) {
-                take_row(e, table);
-            }
+        }
+        if (status == MILD_OK && table) {
+            take_row(e, table);
         }
         mild_map_destroy(map);
     }
@@ -220,7 +222,7 @@ static MildStatus evaluate_batch(Eval *e, const Robot *robot, Pool *pool, Contro
     MildStatus status = MILD_OK;
     for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
         mild_map_destroy(map);
-        status = make_scene(e, e->grounds.name[g], &e->scenes[g], &map, error);
+        status = make_scene(e, e->grounds.name[g], 0, &e->scenes[g], &map, error);
     }
     const EvalBatch batch = {.task = &e->task,
                              .robot = robot,
@@ -294,7 +296,7 @@ static MildStatus check_grounds(Eval *e, MildError *error) {
     Scene scene;
     for (int g = 0; status == MILD_OK && g < e->grounds.count; g++) {
         MildMap *map;
-        status = make_scene(e, e->grounds.name[g], &scene, &map, error);
+        status = make_scene(e, e->grounds.name[g], 0, &scene, &map, error);
         mild_map_destroy(map);
     }
     return status;
@@ -414,7 +416,7 @@ int cmd_eval(int argc, char **argv) {
         {"seconds", CLI_NUMBER, &e->eval.seconds, 0.1, 3600, "T",
          "[s] length of a trial (default 20)"},
         {"patch", CLI_NUMBER, &e->patch, 0.1, 1000, "L",
-         "[m] length of each ground of a course (default 2.5)"},
+         "[m] length of each ground of a course, which lies where the walk leads (default 2.5)"},
         {"seed", CLI_UINT64, &e->eval.seed, 0, 0, "S",
          "the same seed gives the same trials (default 1)"},
         {"threads", CLI_INT, &e->threads, 0, 1024, "N",

@@ -1,5 +1,6 @@
 #include "eval/scene.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -46,7 +47,8 @@ MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildE
     }
     char parts[sizeof scene->name];
     strcpy(parts, name);
-    double start = -SCENE_FAR, end = patch_length;
+    const int back = patch_length < 0;
+    double start = -SCENE_FAR, end = fabs(patch_length);
     int count = 0;
     for (char *part = parts, *next; part; part = next, count++) {
         next = strchr(part, '+');
@@ -66,13 +68,14 @@ MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildE
         } else {
             scene->terrain.materials[scene->terrain.material_count++] = material;
         }
-        MildPatch patch = {start, next ? end : SCENE_FAR, -SCENE_FAR, SCENE_FAR, count};
+        const double far = next ? end : SCENE_FAR;
+        MildPatch patch = {back ? -far : start, back ? -start : far, -SCENE_FAR, SCENE_FAR, count};
         status = count > 0 ? mild_terrain_add_patch(&scene->terrain, &patch, error) : MILD_OK;
         if (status != MILD_OK) {
             return status;
         }
         start = end;
-        end += patch_length;
+        end += fabs(patch_length);
     }
     return MILD_OK;
 }

@@ -11,8 +11,9 @@ typedef struct {
     int rigid; /* bool: the engine's own contact */
 } Scene;
 
-/* patch_length: [m] length of each ground of a course. The first ground also extends behind the
- * start, and the last has no end. */
+/* patch_length: [m] length of each ground of a course; negative: they follow each other backward
+ * from the start. The first ground also extends to the other side of the start, and the last has no
+ * end. */
 MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildError *error);
 /* Name of the ground under x. */
 const char *scene_ground_at(const Scene *scene, double x, double y, char *text, int size);

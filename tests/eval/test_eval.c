@@ -55,6 +55,12 @@ static void courses_have_bounds(void **state) {
     assert_string_equal(scene_ground_at(&scene, 1.4, -500, name, sizeof name), "rubber");
     assert_int_equal(mild_terrain_material_at(&scene.terrain, 2.9, 0), 1);
     assert_int_equal(mild_terrain_material_at(&scene.terrain, 3.1, 0), 2);
+    assert_int_equal(scene_make(&scene, text, -1.5, &error), MILD_OK); /* backward */
+    assert_int_equal(mild_terrain_material_at(&scene.terrain, -2.9, 0), 1);
+    assert_int_equal(mild_terrain_material_at(&scene.terrain, -3.1, 0), 2);
+    assert_int_equal(mild_terrain_material_at(&scene.terrain, -900, 0), MILD_MATERIALS_MAX - 1);
+    assert_int_equal(mild_terrain_material_at(&scene.terrain, -1.4, 0), 0);
+    assert_int_equal(mild_terrain_material_at(&scene.terrain, 900, 0), 0);
     strcat(text, "+grass");
     assert_int_equal(scene_make(&scene, text, 2, &error), MILD_ERROR_ARGUMENT);
     assert_non_null(strstr(error.text, "at most"));
