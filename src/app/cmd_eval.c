@@ -27,7 +27,7 @@ typedef struct {
     double patch;
     const char *latent, *ablate, *stances; /* NULL: not given */
     Ablation ablation;
-    int threads;
+    int threads, randomize;
     EvalDef eval;
     TaskDef task;
     TerrainDef terrain;
@@ -328,7 +328,7 @@ static MildStatus check_place(const Eval *e, MildError *error) {
 
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     MildModel model;
-    MildStatus status = experiment_nominal_task(&e->task, e->config_robot, e->config, error);
+    MildStatus status = experiment_task(&e->task, e->randomize, e->config_robot, e->config, error);
     if (status == MILD_OK) {
         status = controller_check(e->controller, error);
     }
@@ -409,6 +409,9 @@ int cmd_eval(int argc, char **argv) {
          "(default 0: the heading is held along x)"},
         {"push", CLI_NUMBER, &e->eval.push, 0, 5, "V",
          "[m/s] added to the speed of the base every 4 s, in a random direction (default 0)"},
+        {"randomize", CLI_FLAG, &e->randomize, 0, 0, NULL,
+         "draw robots as in training, and push them so: section [randomize] of --config, but for "
+         "its grounds"},
         {"stop", CLI_NUMBER, &e->eval.stop, 0, 3600, "T",
          "[s] time at which the command becomes 0; 0: never (default 0)"},
         {"trials", CLI_INT, &e->eval.trials, 1, 10000, "N",
@@ -442,7 +445,7 @@ int cmd_eval(int argc, char **argv) {
                    "transport, largest torque, foot clearance above the undisturbed ground, "
                    "sinkage and slip of a stance, and energy. The sensors have the noise and "
                    "delay of training. The robot has its nominal parameters, and nobody pushes "
-                   "it without --push.",
+                   "it, without --randomize or --push.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "

@@ -240,7 +240,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     Play *play = &c->play;
     Controller controller = {0};
     MildModel model;
-    MildStatus status = experiment_nominal_task(&c->task, c->config_robot, c->config, error);
+    MildStatus status = experiment_task(&c->task, 0, c->config_robot, c->config, error);
     if (status == MILD_OK) {
         status = controller_check(c->controller, error);
     }

@@ -52,12 +52,16 @@ MildStatus experiment_read_text(ExperimentDef *def, const char *text, MildError 
     return status == MILD_OK ? experiment_check(def, error) : status;
 }
 
-MildStatus experiment_nominal_task(TaskDef *task, char robot[TRAIN_ROBOT_SIZE], const char *config,
-                                   MildError *error) {
+MildStatus experiment_task(TaskDef *task, int randomized, char robot[TRAIN_ROBOT_SIZE],
+                           const char *config, MildError *error) {
     ExperimentDef def = experiment_def_default();
     MildStatus status = config ? experiment_read(&def, config, NULL, 0, error) : MILD_OK;
     *task = def.task;
     memcpy(robot, def.train.robot, sizeof def.train.robot);
-    task_def_make_nominal(task);
+    if (randomized) {
+        task_def_choose_ground(task);
+    } else {
+        task_def_make_nominal(task);
+    }
     return status;
 }

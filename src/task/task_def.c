@@ -91,12 +91,18 @@ TaskDef task_def_default(void) {
     return def;
 }
 
-void task_def_make_nominal(TaskDef *def) {
+void task_def_choose_ground(TaskDef *def) {
     RandomizeDef *r = &def->randomize;
     r->rigid_share = 0;
     r->preset_share = 1;
     r->preset_jitter = 0;
     r->patch_share = 0;
+    def->assist = 0;
+}
+
+void task_def_make_nominal(TaskDef *def) {
+    RandomizeDef *r = &def->randomize;
+    task_def_choose_ground(def);
     r->base_mass[0] = r->base_mass[1] = 0;
     r->com_offset = r->motor_offset = 0;
     r->link_mass[0] = r->link_mass[1] = 1;
@@ -104,7 +110,6 @@ void task_def_make_nominal(TaskDef *def) {
     r->gain[0] = r->gain[1] = 1;
     r->strength[0] = r->strength[1] = 1;
     r->push_interval = 0;
-    def->assist = 0;
 }
 
 #define D MILD_FIELD_DOUBLE

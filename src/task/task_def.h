@@ -148,7 +148,9 @@ typedef struct {
 typedef struct TaskGrounds TaskGrounds;
 
 TaskDef task_def_default(void);
-/* The nominal robot, undisturbed, for evaluation and play; sensor noise, latencies and the start
+/* For evaluation and play, on grounds that the caller chooses: no draw of them, no assistance. */
+void task_def_choose_ground(TaskDef *def);
+/* The same and the nominal robot, undisturbed; sensor noise, latencies and the start
  * are still drawn. */
 void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);

@@ -85,6 +85,8 @@ expect 0 'sideways .* of 0.20 m/s' "$mild" eval --ground grass --sideways 0.2 --
 expect 0 'rubber+rigid .*1/1 ' "$mild" eval --ground rubber+rigid --model con_spring --trials 1 --seconds 0.2
 expect 0 '1/1 ' "$mild" eval --ground grass --speed=-1.5,1.5 --sideways=-1.5 --turn=1.5 --push 0.3 --trials 1 --seconds 0.2 --json told.json
 grep -q '"turn":.*1.5' told.json && grep -q '"push":.*0.3' told.json || fail "told.json: $(cat told.json)"
+walk() { "$mild" eval --ground grass --trials 2 --seconds 1 "$@" --json - 2>/dev/null | grep -v randomize; }
+[ "$(walk)" != "$(walk --randomize)" ] || fail "--randomize changes nothing"
 bad "outside" "$mild" eval --turn 1.6
 bad "outside" "$mild" eval --push=-1
 bad "nearest is 'history'" "$mild" eval --ablate histroy
