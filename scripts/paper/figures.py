@@ -4,7 +4,11 @@ import csv
 import matplotlib
 import numpy as np
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from sklearn.linear_model import RidgeCV
 from sklearn.manifold import TSNE
+from sklearn.metrics import r2_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
@@ -122,6 +126,27 @@ def latent(path):
     for each, title in zip(axes, ("t-SNE of z~, by ground", "the same, by command")):
         each.set(title=title, xticks=[], yticks=[])
         each.legend(frameon=False, fontsize=8)
+    return figure, found
+
+
+def regression(tables, known, names):
+    """z~ of a walk in each table, text of --latent, against the numbers that are known of its ground."""
+    values = []
+    for table in tables:
+        names_of, *rows = csv.reader(table.splitlines())
+        use = [i for i, name in enumerate(names_of) if name.startswith("modulated")]
+        values.append(np.mean([[float(row[i]) for i in use] for row in rows if float(row[3]) >= START], axis=0))
+    values, known = np.array(values), np.array(known)
+    held = np.arange(len(values)) % 3 == 0
+    model = make_pipeline(StandardScaler(), RidgeCV(np.logspace(-3, 3, 13))).fit(values[~held], known[~held])
+    told = model.predict(values[held])
+    figure, axes = panels(len(names), 9, 4)
+    found = {}
+    for i, (each, name) in enumerate(zip(axes, names)):
+        found[name] = r2_score(known[held][:, i], told[:, i])
+        each.plot(known[held][:, i], told[:, i], "o")
+        each.axline((known[0, i], known[0, i]), slope=1, color="#999999", linewidth=0.8)
+        each.set(xlabel=f"{name} of the ground", ylabel="from z~", title=f"R2 {found[name]:.2f}")
     return figure, found
 
 
