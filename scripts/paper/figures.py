@@ -61,13 +61,16 @@ def matrices(values, rows, columns):
     figure, axes = panels(len(values), 15, 4.6)
     for each, (title, matrix) in zip(axes, values.items()):
         data = np.array(matrix, float)
-        each.imshow(data, cmap="viridis" if "upright" in title else "viridis_r", aspect="auto",
-                    vmin=0 if "upright" in title else None, vmax=100 if "upright" in title else np.nanquantile(data, 0.9))
+        share = "%" in title
+        shown = each.imshow(data, cmap="Blues" if share else "Blues_r", aspect="auto", vmin=0 if share else None,
+                            vmax=100 if share else np.nanquantile(data, 0.9))
         each.set_xticks(range(len(columns)), columns, rotation=60, ha="right")
         each.set_yticks(range(len(rows)), rows)
         each.set(title=title, xlabel="walked on")
         for (i, j), value in np.ndenumerate(data):
-            each.text(j, i, f"{value:.0f}" if "%" in title else f"{value:.2f}", ha="center", va="center", color="white", fontsize=8)
+            text = "-" if np.isnan(value) else f"{value:.0f}" if share else f"{value:.2f}"
+            dark = not np.isnan(value) and (shown.norm(value) > 0.55) == share
+            each.text(j, i, text, ha="center", va="center", color="white" if dark else "black", fontsize=8)
     axes[0].set(ylabel="trained on")
     return figure
 
