@@ -188,8 +188,8 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
         gpu_mlp_forward(q, &n->decoder, g->parameters, rows, c->decoder_input, &c->decoder);
 
     action_losses(g, job, mean);
-    gpu_reconstruction(q->stream, w, rows, 2.0f * epsilon / (float)w.observation, job->order,
-                       g->batch.frame, decoded, c->d_decoded, g->sums);
+    gpu_reconstruction(q->stream, w, rows, 2.0f * epsilon, job->order, g->batch.frame,
+                       g->batch.critic, decoded, c->d_decoded, g->sums);
 
     gpu_mlp_backward(q, &n->decoder, g->parameters, rows, c->decoder_input, &c->decoder,
                      c->d_decoded, c->work, g->gradient, beta, c->d_decoder_input);
@@ -201,6 +201,7 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
                      c->work, g->gradient, beta, c->d_feet);
     const GpuHeads h = {.estimate_weight = 2.0f * epsilon,
                         .latent_weight = epsilon * (float)def->kl_weight,
+                        .free_bits = (float)def->free_bits,
                         .order = job->order,
                         .target = g->batch.target,
                         .heads = heads,

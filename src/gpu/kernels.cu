@@ -282,29 +282,38 @@ void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums)
 
 /* A block has THREADS rows and takes their numbers in order, so that neighbours read neighbours. */
 static __global__ void reconstruction(GpuWidths w, int rows, float weight, const int *order,
-                                      const float *frame, const float *decoded, float *d,
-                                      double *sums) {
-    const int pitch = w.decoded, width = w.observation;
+                                      const float *frame, const float *critic, const float *decoded,
+                                      float *d, double *sums) {
+    const int pitch = w.decoded;
     const int64_t first = (int64_t)blockIdx.x * THREADS * pitch, count = (int64_t)rows * pitch;
-    double sum = 0.0;
-    for (int k = 0; k < pitch; k++) {
-        const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
-        const int column = (int)(within % (uint32_t)pitch);
-        const int64_t i = first + within;
-        if (i < count && column < width) {
-            const int sample = order[(int64_t)blockIdx.x * THREADS + within / (uint32_t)pitch];
-            const float gap = decoded[i] - frame[(int64_t)sample * width + column];
-            sum += (double)(gap * gap);
-            d[i] = weight * gap;
+    double loss = 0.0;
+    for (int part = 0; part < 2; part++) { /* frame, ground */
+        const int begin = part ? w.decoded_frame : 0;
+        const int width = part ? w.ground_count : w.decoded_frame;
+        const int stride = part ? w.critic_input : w.observation;
+        const float *target = part ? critic + w.ground_offset : frame;
+        double sum = 0.0;
+        for (int k = 0; width > 0 && k < pitch; k++) {
+            const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
+            const int column = (int)(within % (uint32_t)pitch) - begin;
+            const int64_t i = first + within;
+            if (i < count && column >= 0 && column < width) {
+                const int sample = order[(int64_t)blockIdx.x * THREADS + within / (uint32_t)pitch];
+                const float gap = decoded[i] - target[(int64_t)sample * stride + column];
+                sum += (double)(gap * gap);
+                d[i] = weight / (float)width * gap;
+            }
         }
+        loss += width > 0 ? sum / width : 0.0;
     }
-    add_block_sum(sum / width, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
+    add_block_sum(loss, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
 }
 
 void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight, const int *order,
-                        const float *frame, const float *decoded, float *d, double *sums) {
-    LAUNCH(reconstruction, blocks_of(rows), line, stream, w, rows, weight, order, frame, decoded, d,
-           sums);
+                        const float *frame, const float *critic, const float *decoded, float *d,
+                        double *sums) {
+    LAUNCH(reconstruction, blocks_of(rows), line, stream, w, rows, weight, order, frame, critic,
+           decoded, d, sums);
 }
 
 static __global__ void modulation_backward(GpuWidths w, int rows, const float *heads,
@@ -325,14 +334,17 @@ void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const f
            d_heads, d_theta);
 }
 
-static __device__ double latent_row(int latent, float weight, const float *mu, const float *spread,
-                                    const float *noise, const float *d_z, float *d_mu) {
+static __device__ double latent_row(int latent, float weight, float free_bits, const float *mu,
+                                    const float *spread, const float *noise, const float *d_z,
+                                    float *d_mu) {
     const float *logvar = mu + latent;
     float *d_logvar = d_mu + latent, twice = 0.0f;
     for (int j = 0; j < latent; j++) {
-        twice += loss_latent_twice(mu[j], logvar[j], spread[j]);
-        d_mu[j] += loss_mu_gradient(weight, mu[j], d_z[j]);
-        d_logvar[j] = loss_logvar_gradient(weight, logvar[j], spread[j], noise[j], d_z[j]);
+        const float own = loss_latent_twice(mu[j], logvar[j], spread[j]);
+        const float w = loss_kl_weight(weight, free_bits, own);
+        twice += own;
+        d_mu[j] += loss_mu_gradient(w, mu[j], d_z[j]);
+        d_logvar[j] = loss_logvar_gradient(w, logvar[j], spread[j], noise[j], d_z[j]);
     }
     return 0.5 * (double)twice;
 }
@@ -356,8 +368,8 @@ static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all
         group[1] = loss_estimates(w.feet_offset, feet_end, h.estimate_weight, heads, target, d);
         group[2] = loss_estimates(feet_end, w.estimates, h.estimate_weight, heads, target, d);
         divergence =
-            latent_row(w.latent, h.latent_weight, heads + w.estimates, h.spread + r * w.latent,
-                       h.noise + r * w.latent, d_input, d + w.estimates);
+            latent_row(w.latent, h.latent_weight, h.free_bits, heads + w.estimates,
+                       h.spread + r * w.latent, h.noise + r * w.latent, d_input, d + w.estimates);
     }
     double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
     for (int g = 0; g < 3; g++) {

@@ -63,8 +63,9 @@ void gpu_begin_update(cudaStream_t stream, PpoDef def, int actions, const float 
     LAUNCH(begin_update, one_block, line, stream, def, actions, log_std, progress);
 }
 
-/* One thread a column of an environment's frames. */
-static __global__ void shift_frames(PpoBatch b, int width) {
+/* One thread a column of an environment's frames. from: frames, or rows of the critic, [stride]. */
+static __global__ void write_frames(PpoBatch b, int is_next, const float *from, int width,
+                                    int stride) {
     const int64_t i = item();
     if (i >= (int64_t)b.envs * width) {
         return;
@@ -72,14 +73,15 @@ static __global__ void shift_frames(PpoBatch b, int width) {
     const int64_t env = i / width, column = i % width;
     for (int t = 0; t < b.steps; t++) {
         const int64_t now = (int64_t)t * b.envs + env;
-        if (returns_has_next(&b, t, now)) {
-            b.frame[now * width + column] = b.frame[(now + b.envs) * width + column];
-        }
+        const int64_t row = is_next && returns_has_next(&b, t, now) ? now + b.envs : now;
+        b.frame[now * width + column] = from[row * stride + column];
     }
 }
 
-void gpu_shift_frames(cudaStream_t stream, PpoBatch batch, int width) {
-    LAUNCH(shift_frames, blocks_of((int64_t)batch.envs * width), line, stream, batch, width);
+void gpu_write_frames(cudaStream_t stream, PpoDef def, PpoBatch batch, int width, int stride) {
+    LAUNCH(write_frames, blocks_of((int64_t)batch.envs * width), line, stream, batch,
+           step_frame_is_next(&def), def.target_noise ? batch.frame : batch.critic, width,
+           def.target_noise ? width : stride);
 }
 
 static __global__ void take_values(int rows, int pitch, const float *output, float *value) {

@@ -56,8 +56,8 @@ void gpu_sample_actions(cudaStream_t stream, GpuActions a, PpoBatch batch,
 
 void gpu_begin_update(cudaStream_t stream, PpoDef def, int actions, const float *log_std,
                       GpuProgress *progress);
-/* Each frame [width] becomes its successor. */
-void gpu_shift_frames(cudaStream_t stream, PpoBatch batch, int width);
+/* The decoder's frames [width] into batch.frame. stride: width of the critic's input. */
+void gpu_write_frames(cudaStream_t stream, PpoDef def, PpoBatch batch, int width, int stride);
 /* Fills value from the critic's output [rows][pitch] of samples first .. first + rows - 1. */
 void gpu_take_values(cudaStream_t stream, int rows, int pitch, const float *output, float *value);
 /* As ppo_returns, up to the moments. */

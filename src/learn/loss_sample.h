@@ -169,6 +169,12 @@ static inline MILD_BOTH float loss_latent_twice(float mu, float logvar, float sp
     return mu * mu + spread * spread - 1.0f - loss_held_logvar(logvar);
 }
 
+/* Weight of the gradient of a dimension's KL term max(KL, free_bits) [nat] (Kingma et al. 2016,
+ * "free bits"): the dimension may tell this much for nothing. twice: 2 KL. */
+static inline MILD_BOTH float loss_kl_weight(float weight, float free_bits, float twice) {
+    return free_bits > 0.0f && twice < 2.0f * free_bits ? 0.0f : weight;
+}
+
 /* d loss / d mu: from the decoder through z, and from the KL term. */
 static inline MILD_BOTH float loss_mu_gradient(float weight, float mu, float d_z) {
     return d_z + weight * mu;

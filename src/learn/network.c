@@ -71,6 +71,14 @@ static MildStatus check_def(const PolicyDef *def, MildError *error) {
                          "policy: feet velocities %d..+%d are not among the %d estimates",
                          def->feet_velocity_offset, def->feet_velocity_count, def->estimates);
     }
+    if (def->ground_offset < 0 || def->ground_count < 0 || def->ground_offset > def->critic_input ||
+        def->ground_count > def->critic_input - def->ground_offset ||
+        (!def->decoder_frame && def->ground_count == 0)) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "policy: the decoder rebuilds numbers %d..+%d of the critic's %d%s",
+                         def->ground_offset, def->ground_count, def->critic_input,
+                         def->decoder_frame ? "" : ", and no frame");
+    }
     return MILD_OK;
 }
 
@@ -87,10 +95,12 @@ MildStatus network_layout(Network *network, const PolicyDef *def, MildError *err
     network->theta = def->modulation_per_dimension ? 2 * def->latent : 2;
     network->actor_input = def->observation + def->estimates + def->latent;
     network->decoder_input = def->latent + def->estimates;
+    network->decoded_frame = def->decoder_frame ? def->observation : 0;
+    network->decoded = network->decoded_frame + def->ground_count;
     int64_t at =
         mlp_layout(&network->encoder, network->history, def->encoder_hidden, network->heads, 0);
     at = mlp_layout(&network->decoder, network->decoder_input, def->decoder_hidden,
-                    def->observation, at);
+                    network->decoded, at);
     at = mlp_layout(&network->modulation, def->feet_velocity_count, modulation_hidden,
                     network->theta, at);
     at = mlp_layout(&network->actor, network->actor_input, def->actor_hidden, def->actions, at);

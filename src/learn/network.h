@@ -4,7 +4,7 @@
  *   theta   = modulation(estimated feet velocities), [theta1 | theta2]
  *   z~      = theta1 * mu + theta2 (FiLM)
  *   mean    = actor([newest frame | estimates | z~])
- *   decoded = decoder([z | estimates]), in the loss only, with a sampled z
+ *   decoded = decoder([z | estimates]) = [frame | ground], in the loss only, with a sampled z
  *   value   = critic(critic input) */
 #ifndef MILD_NETWORK_H
 #define MILD_NETWORK_H
@@ -31,6 +31,8 @@ typedef struct {
     int theta;            /* width: 2, or 2 latent */
     int actor_input;      /* width: observation + estimates + latent */
     int decoder_input;    /* width: latent + estimates */
+    int decoded_frame;    /* width of the frame in the decoder's output: observation, or 0 */
+    int decoded;          /* width of that output: decoded_frame + ground_count */
 } Network;
 
 /* Checks the def and sets the offsets of the parameters. */

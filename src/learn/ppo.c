@@ -124,6 +124,25 @@ static MildStatus check_mirror(const PolicyDef *def, const PpoMirror *mirror, Mi
     return MILD_OK;
 }
 
+/* The decoder's shape is the target's. */
+static MildStatus check_decoder(const PpoDef *def, const PolicyDef *policy, MildError *error) {
+    const int frame = def->decoder_target != PPO_TARGET_GROUND,
+              ground = !frame || def->decoder_target == PPO_TARGET_BOTH;
+    if (policy->decoder_frame != frame || (policy->ground_count > 0) != ground) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "ppo.decoder_target does not fit the policy, whose decoder rebuilds %s "
+                         "frame and %d parameters of the ground",
+                         policy->decoder_frame ? "a" : "no", policy->ground_count);
+    }
+    if (!def->target_noise && policy->critic_input < policy->observation) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "ppo.target_noise = 0: the critic's %d numbers do not begin with a frame "
+                         "of %d",
+                         policy->critic_input, policy->observation);
+    }
+    return MILD_OK;
+}
+
 static MildStatus check_def(const PpoDef *def, int envs, MildError *error) {
     MildStatus status = mild_fields_check(ppo_fields, ppo_field_count, def, "ppo", error);
     if (status) {
@@ -150,7 +169,8 @@ Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *
 Ppo *ppo_create_part(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror,
                      int envs, uint64_t seed, Ranks *ranks, MildError *error) {
     _Static_assert(PPO_SHARDS % RANKS_MAX == 0, "a process has whole shards");
-    if (check_def(def, envs, error) || check_mirror(policy_def(policy), mirror, error)) {
+    if (check_def(def, envs, error) || check_decoder(def, policy_def(policy), error) ||
+        check_mirror(policy_def(policy), mirror, error)) {
         return NULL;
     }
     if (envs < ranks_count(ranks)) {
@@ -419,20 +439,22 @@ static int update_minibatch(Ppo *ppo, LossContext *context, const PpoMinibatch *
     return 1;
 }
 
-/* Replaces each frame of the piece's environments by its successor. */
-static void shift_piece(void *context, int piece, int thread) {
+/* Writes the decoder's frames of the piece's environments: this one or its successor, from the
+ * frames or from the critic's input, which begins with a frame without noise. */
+static void frame_piece(void *context, int piece, int thread) {
     (void)thread;
     const Ppo *ppo = context;
     const PpoBatch *b = &ppo->batch;
-    const int width = policy_def(ppo->policy)->observation;
+    const PolicyDef *def = policy_def(ppo->policy);
+    const int width = def->observation, stride = ppo->def.target_noise ? width : def->critic_input,
+              is_next = step_frame_is_next(&ppo->def);
+    const float *from = ppo->def.target_noise ? b->frame : b->critic;
     const int first = ppo_piece_begin(b->envs, piece), end = ppo_piece_begin(b->envs, piece + 1);
     for (int t = 0; t < b->steps; t++) {
         for (int env = first; env < end; env++) {
-            const int64_t now = (int64_t)t * b->envs + env, next = now + b->envs;
-            if (returns_has_next(b, t, now)) {
-                memcpy(b->frame + now * width, b->frame + next * width,
-                       (size_t)width * sizeof *b->frame);
-            }
+            const int64_t now = (int64_t)t * b->envs + env;
+            const int64_t row = is_next && returns_has_next(b, t, now) ? now + b->envs : now;
+            memmove(b->frame + now * width, from + row * stride, (size_t)width * sizeof *from);
         }
     }
 }
@@ -440,8 +462,8 @@ static void shift_piece(void *context, int piece, int thread) {
 static void update(Ppo *ppo, PpoReport *report) {
     const Network *n = &ppo->policy->network;
     PpoBatch *b = &ppo->batch;
-    if (ppo->def.decoder_target == PPO_TARGET_NEXT) {
-        pool_run(ppo->pool, PPO_PIECES, shift_piece, ppo);
+    if (step_writes_frames(&ppo->def)) {
+        pool_run(ppo->pool, PPO_PIECES, frame_piece, ppo);
     }
     const PolicyRows rows = rows_of(ppo, b->steps + 1);
     policy_value_rows(ppo->policy, ppo->pool, &rows, b->critic, b->value);

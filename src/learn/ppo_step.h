@@ -24,6 +24,19 @@ static inline MILD_BOTH uint64_t step_latent_key(uint64_t seed, int64_t iteratio
     return random_bits(&random);
 }
 
+/* ---- the decoder's frames ---- */
+
+/* Bool: the decoder's frame is the next one. */
+static inline MILD_BOTH int step_frame_is_next(const PpoDef *def) {
+    return def->decoder_target == PPO_TARGET_NEXT || def->decoder_target == PPO_TARGET_BOTH;
+}
+
+/* Bool: batch.frame has the decoder's frames only after they were written there. */
+static inline MILD_BOTH int step_writes_frames(const PpoDef *def) {
+    return def->decoder_target != PPO_TARGET_GROUND &&
+           (step_frame_is_next(def) || !def->target_noise);
+}
+
 /* ---- one minibatch ---- */
 
 /* Entropy of the action, a sum of log std + (1 + ln 2 pi) / 2. */
