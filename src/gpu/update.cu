@@ -7,10 +7,24 @@
 
 /* ---- acting ---- */
 
-static __device__ float noise_number(uint64_t key, int64_t number) {
-    float even, odd;
-    noise_pair((uint32_t)key, (uint32_t)(key >> 32), (uint32_t)(number / 2), &even, &odd);
-    return number % 2 ? odd : even;
+static __global__ void sampled_noise(GpuSampled s, int64_t count, const GpuProgress *progress,
+                                     float *noise) {
+    const int64_t i = item();
+    if (i >= count) {
+        return;
+    }
+    const int row = (int)(i / s.latent), j = (int)(i % s.latent);
+    const int own = row < s.rows ? row : s.which[row - s.rows] - s.at;
+    const int sample = s.order ? s.order[own] : s.first + own;
+    const uint64_t key = step_sampled_key(progress->seed, progress->iteration, sample / s.envs);
+    const int64_t env = s.number + sample % s.envs;
+    noise[i] = noise_number(key, env * s.latent + j);
+}
+
+void gpu_sampled_noise(cudaStream_t stream, GpuSampled s, const GpuProgress *progress,
+                       float *noise) {
+    const int64_t count = (int64_t)(s.rows + s.images) * s.latent;
+    LAUNCH(sampled_noise, blocks_of(count), line, stream, s, count, progress, noise);
 }
 
 static __global__ void sample_actions(GpuActions a, PpoBatch b, const GpuProgress *progress) {

@@ -19,7 +19,7 @@ size_t loss_carve(const Network *network, int rows, int mirrored, float *block, 
         {&chunk->history, all * (size_t)network->history},
         {&chunk->estimate, n * (size_t)def->estimates},
         {&chunk->decoder_target, n * (size_t)network->decoded},
-        {&chunk->noise, n * (size_t)def->latent},
+        {&chunk->noise, all * (size_t)def->latent},
         {&chunk->action, n * (size_t)def->actions},
         {&chunk->old_mean, n * (size_t)def->actions},
         {&chunk->old_log_prob, n},
@@ -180,8 +180,8 @@ static void estimate_row(const LossContext *c, const float *estimate, const floa
 
 /* max(KL(N(mu, e^logvar) || N(0, 1)), free bits) of each dimension, and the decoder's gradient through the sampled z. */
 static void latent_row(const LossContext *c, const float *mu, const float *logvar,
-                       const float *spread, const float *noise, const float *d_z, float *d_mu,
-                       float *d_logvar, LossSums *sums) {
+                       const float *spread, const float *noise, int sampled, const float *d_z,
+                       float *d_mu, float *d_logvar, LossSums *sums) {
     const int latent = c->network->def.latent;
     const float weight = (float)(c->def->epsilon * c->def->kl_weight) * c->sample_weight;
     const float free_bits = (float)c->def->free_bits;
@@ -191,20 +191,22 @@ static void latent_row(const LossContext *c, const float *mu, const float *logva
         const float own = loss_latent_twice(mu[j], logvar[j], spread[j]),
                     w = loss_kl_weight(weight, free_bits, own);
         twice += own;
+        const float d_draw = loss_draw_gradient(sampled, d_z[j], d_mu[j]);
         d_mu[j] += loss_mu_gradient(w, mu[j], d_z[j]);
-        d_logvar[j] = loss_logvar_gradient(w, logvar[j], spread[j], noise[j], d_z[j]);
+        d_logvar[j] = loss_logvar_gradient(w, logvar[j], spread[j], noise[j], d_draw);
     }
     sums->vae_kl += 0.5 * (double)twice;
 }
 
-/* Back through z~ = theta1 mu + theta2: d_heads (estimates and mu; logvar 0) and d_theta. */
+/* Back through z~ = theta1 z + theta2: d_heads and d_theta. */
 static void modulation_backward(const LossContext *c, LossChunk *chunk, int all,
                                 const float *heads) {
     const Network *n = c->network;
-    const float *theta = network_theta(n, &chunk->outputs);
+    const float *theta = network_theta(n, &chunk->outputs), *noise = chunk->outputs.noise;
     for (int64_t r = 0; r < all; r++) {
         loss_modulation(n->def.estimates, n->def.latent, n->def.modulation_per_dimension,
-                        heads + r * n->heads, theta + r * n->theta,
+                        heads + r * n->heads, noise ? noise + r * n->def.latent : NULL,
+                        theta + r * n->theta,
                         chunk->d_actor_input + r * (n->def.estimates + n->def.latent),
                         chunk->d_heads + r * n->heads, chunk->d_theta + r * n->theta);
     }
@@ -231,8 +233,9 @@ static void heads_backward(const LossContext *c, LossChunk *chunk, int all, cons
         }
         estimate_row(c, heads, chunk->estimate + (int64_t)r * estimates, d, sums);
         latent_row(c, heads + estimates, heads + estimates + latent,
-                   chunk->spread + (int64_t)r * latent, chunk->noise + (int64_t)r * latent, d_input,
-                   d + estimates, d + estimates + latent, sums);
+                   chunk->spread + (int64_t)r * latent, chunk->noise + (int64_t)r * latent,
+                   chunk->outputs.noise != NULL, d_input, d + estimates, d + estimates + latent,
+                   sums);
     }
 }
 

@@ -35,14 +35,16 @@ typedef struct {
     float *history;        /* [rows + mirrored][history] */
     float *estimate;       /* [rows][estimates] target */
     float *decoder_target; /* [rows][decoded] frame, then parameters of the ground */
-    float *noise;          /* [rows][latent] standard normal, for the sampled z */
-    float *action;         /* [rows][actions] */
-    float *old_mean;       /* [rows][actions] */
-    float *old_log_prob;   /* [rows] */
-    float *advantage;      /* [rows] */
-    float *critic;         /* [rows][critic_input] */
-    float *old_value;      /* [rows] */
-    float *returns;        /* [rows] */
+    /* [rows + mirrored][latent] standard normal, for the sampled z. outputs.noise is NULL, or these
+     * are the actor's too; otherwise those of the images have no meaning. */
+    float *noise;
+    float *action;       /* [rows][actions] */
+    float *old_mean;     /* [rows][actions] */
+    float *old_log_prob; /* [rows] */
+    float *advantage;    /* [rows] */
+    float *critic;       /* [rows][critic_input] */
+    float *old_value;    /* [rows] */
+    float *returns;      /* [rows] */
     /* forward */
     NetworkOutputs outputs;
     MlpOutputs decoder;

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "learn/loss_sample.h"
+
 /* Widths are bounded so that no product of two of them leaves the range of int. */
 #define WIDTH_MAX 16384
 
@@ -142,6 +144,7 @@ void network_carve(const Network *network, int rows, float *block, size_t *used,
     mlp_carve_outputs(&network->encoder, rows, block, used, &outputs->encoder);
     mlp_carve_outputs(&network->modulation, rows, block, used, &outputs->modulation);
     mlp_carve_outputs(&network->actor, rows, block, used, &outputs->actor);
+    outputs->noise = NULL;
     outputs->actor_input = mlp_carve(block, used, (size_t)rows * (size_t)network->actor_input);
 }
 
@@ -153,14 +156,16 @@ float *network_theta(const Network *network, const NetworkOutputs *outputs) {
     return outputs->modulation.y[network->modulation.layers - 1];
 }
 
-/* z~ = theta1 z + theta2 of one row, z: mu or what there is instead of it. */
-static void modulate(const Network *network, const float *mu, const float *theta,
-                     const PolicyInstead *instead, float *modulated) {
+/* z~ = theta1 z + theta2 of one row, z: mu, a draw around it, or what there is instead. */
+static void modulate(const Network *network, const float *mu, const float *noise,
+                     const float *theta, const PolicyInstead *instead, float *modulated) {
     const int latent = network->def.latent, per_dimension = network->def.modulation_per_dimension;
-    const float *z = instead && instead->latent ? instead->latent : mu;
+    const float *logvar = mu + latent;
     for (int j = 0; j < latent; j++) {
         float theta1 = theta[per_dimension ? j : 0], theta2 = theta[per_dimension ? latent + j : 1];
-        modulated[j] = instead && instead->plain ? z[j] : theta1 * z[j] + theta2;
+        const float z =
+            instead && instead->latent ? instead->latent[j] : loss_latent(mu, logvar, noise, j);
+        modulated[j] = instead && instead->plain ? z : theta1 * z + theta2;
     }
 }
 
@@ -170,13 +175,16 @@ static void fill_actor_input(const Network *network, int rows, const float *hist
                              const PolicyInstead *instead, const NetworkOutputs *outputs) {
     const int observation = network->def.observation, estimates = network->def.estimates;
     const float *heads = network_heads(network, outputs), *theta = network_theta(network, outputs);
+    const float *noise = outputs->noise;
     float *input = outputs->actor_input;
     for (int r = 0; r < rows; r++) {
         const float *told = instead && instead->estimates ? instead->estimates : heads;
         memcpy(input, history + network->history - observation,
                (size_t)observation * sizeof *input);
         memcpy(input + observation, told, (size_t)estimates * sizeof *input);
-        modulate(network, heads + estimates, theta, instead, input + observation + estimates);
+        modulate(network, heads + estimates, noise, theta, instead,
+                 input + observation + estimates);
+        noise = noise ? noise + network->def.latent : NULL;
         history += network->history;
         heads += network->heads;
         theta += network->theta;

@@ -2,7 +2,7 @@
  *
  *   heads   = encoder(history), [estimates | mu | logvar]
  *   theta   = modulation(estimated feet velocities), [theta1 | theta2]
- *   z~      = theta1 * mu + theta2 (FiLM)
+ *   z~      = theta1 * z + theta2 (FiLM), z = mu; with ppo.sample_latent a draw, in training
  *   mean    = actor([newest frame | estimates | z~])
  *   decoded = decoder([z | estimates]) = [frame | ground], in the loss only, with a sampled z
  *   value   = critic(critic input) */
@@ -44,6 +44,7 @@ const Mlp *network_mlp(const Network *network, int index, const char **name);
 typedef struct {
     MlpOutputs encoder, modulation, actor;
     float *actor_input; /* [rows][actor_input] */
+    const float *noise; /* [rows][latent] input: z = mu + e^(logvar/2) noise; NULL: z = mu */
 } NetworkOutputs;
 
 void network_carve(const Network *network, int rows, float *block, size_t *used,

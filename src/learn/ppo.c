@@ -87,6 +87,13 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     ppo->scratch = take(ppo, (size_t)pool_threads(ppo->pool) * ppo->scratch_floats * sizeof(float));
     ppo->order = take(ppo, (size_t)largest * sizeof *ppo->order);
     ppo->substitute = take(ppo, samples * sizeof *ppo->substitute);
+    if (ppo->def.sample_latent) {
+        ppo->noise =
+            take(ppo, (size_t)ppo->part.width * (size_t)n->def.latent * sizeof *ppo->noise);
+        if (!ppo->noise) {
+            return 0;
+        }
+    }
     if (ppo->def.average > 0.0) {
         ppo->average = policy_create(policy_def(ppo->policy), ppo->seed, NULL);
         ppo->bytes += count * sizeof(float);
@@ -213,6 +220,7 @@ void ppo_destroy(Ppo *ppo) {
         free(ppo->first);
         free(ppo->second);
         free(ppo->scratch);
+        free(ppo->noise);
         free(ppo->order);
         free(ppo->substitute);
         free(ppo);
@@ -355,7 +363,11 @@ void ppo_act(Ppo *ppo, int t) {
         return;
     }
     const PolicyRows rows = rows_of(ppo, 1);
-    policy_act_rows(ppo->policy, ppo->pool, &rows, b->history + first * n->history,
+    if (ppo->noise) {
+        noise_normal(step_sampled_key(ppo->seed, ppo->iteration, t),
+                     (int64_t)ppo->part.first * n->def.latent, b->envs * n->def.latent, ppo->noise);
+    }
+    policy_act_rows(ppo->policy, ppo->pool, &rows, b->history + first * n->history, ppo->noise,
                     b->mean + first * n->def.actions);
     ActJob job = {ppo, t, step_action_key(ppo->seed, ppo->iteration, t), policy_std(ppo->policy)};
     pool_run(ppo->pool, PPO_PIECES, act_piece, &job);

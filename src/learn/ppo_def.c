@@ -77,6 +77,9 @@ const MildField ppo_fields[] = {
                "[-] weight of the KL divergence between the latent and N(0, I)"),
     MILD_FIELD(PpoDef, free_bits, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
                "[nat] KL divergence of each latent dimension below which it costs nothing"),
+    MILD_FIELD(PpoDef, sample_latent, MILD_FIELD_BOOL, 1, 0, 1,
+               "[bool] in training the actor gets a latent drawn around mu, as the decoder does; "
+               "false: mu"),
     MILD_FIELD(PpoDef, mirror_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
                "[-] weight of the mirror symmetry loss"),
     MILD_FIELD(PpoDef, mirror_share, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,

@@ -45,6 +45,7 @@ typedef struct {
     int target_noise;   /* bool: its frame as the policy sees it; 0: without noise, as the critic */
     double kl_weight;   /* phi of the VAE's KL term */
     double free_bits;   /* [nat] KL of a latent dimension below which it costs nothing */
+    int sample_latent;  /* bool: in training the actor's z is a draw of N(mu, e^logvar), else mu */
     double mirror_weight;
     double mirror_share;  /* share of each minibatch on which the mirror loss is evaluated */
     double std_min;       /* lower bound of the action noise */

@@ -62,6 +62,20 @@ static const int *samples_at(const GradientJob *job, int at) {
     return job->minibatch->samples + (at - job->minibatch->cut[job->ppo->part.shard]);
 }
 
+/* The noise of z in the rollout. An image has that of its sample. */
+static void sampled_noise(const Ppo *ppo, const int *samples, LossChunk *chunk) {
+    const int latent = ppo->policy->network.def.latent, envs = ppo->batch.envs;
+    float *noise = chunk->noise;
+    for (int r = 0; r < chunk->rows + chunk->mirrored; r++, noise += latent) {
+        const int i = samples[r < chunk->rows ? r : r - chunk->rows],
+                  env = ppo->part.first + i % envs;
+        const uint64_t key = step_sampled_key(ppo->seed, ppo->iteration, i / envs);
+        for (int j = 0; j < latent; j++) {
+            noise[j] = noise_number(key, (int64_t)env * latent + j);
+        }
+    }
+}
+
 static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
     const Ppo *ppo = job->ppo;
     const Network *n = &ppo->policy->network;
@@ -79,6 +93,11 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
     }
     for (int r = 0; r < chunk->mirrored; r++) {
         loss_mirror_row(job->loss, chunk, r, chunk->rows + r);
+    }
+    chunk->outputs.noise = ppo->def.sample_latent ? chunk->noise : NULL;
+    if (ppo->def.sample_latent) {
+        sampled_noise(ppo, samples, chunk);
+        return;
     }
     noise_normal(step_latent_key(ppo->seed, ppo->iteration, job->minibatch->draw),
                  2 * (int64_t)at * n->def.latent, chunk->rows * n->def.latent, chunk->noise);

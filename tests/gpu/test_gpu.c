@@ -237,6 +237,7 @@ static void gradients_are_those_of_the_cpu(void **state) {
     for (int target = PPO_TARGET_GROUND; target <= PPO_TARGET_BOTH; target++) {
         def.decoder_target = target;
         def.free_bits = 0.1; /* some dimensions below, some above */
+        def.sample_latent = target == PPO_TARGET_BOTH;
         ppo_set_decoder(&def, 4, 3, &small);
         compare_learner(&small, &def, 37, 100, worst);
     }
@@ -418,6 +419,7 @@ static void updates_are_those_of_the_cpu(void **state) {
             PolicyDef other = small_def();
             def.decoder_target = target;
             def.target_noise = noise;
+            def.sample_latent = noise;
             ppo_set_decoder(&def, 4, 3, &other);
             worse(&worst, compare_update(&other, &def, 5, 0, INVALID));
         }

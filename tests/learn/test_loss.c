@@ -188,8 +188,9 @@ static void mlp_double(const Mlp *mlp, const double *p, const double *x, double 
     memcpy(y, out, (size_t)mlp->layer[mlp->layers - 1].out * sizeof *y);
 }
 
-static void act_double(const Network *n, const double *p, const double *history, double *heads,
-                       double *mean) {
+/* noise: of the actor's z; NULL: z = mu. */
+static void act_double(const Network *n, const double *p, const double *history, const float *noise,
+                       double *heads, double *mean) {
     const PolicyDef *d = &n->def;
     double theta[64], input[64];
     mlp_double(&n->encoder, p, history, heads);
@@ -199,7 +200,9 @@ static void act_double(const Network *n, const double *p, const double *history,
     for (int j = 0; j < d->latent; j++) {
         int a = d->modulation_per_dimension ? j : 0,
             b = d->modulation_per_dimension ? d->latent + j : 1;
-        input[d->observation + d->estimates + j] = theta[a] * heads[d->estimates + j] + theta[b];
+        const double spread = exp(0.5 * heads[d->estimates + d->latent + j]),
+                     z = heads[d->estimates + j] + (noise ? spread * (double)noise[j] : 0.0);
+        input[d->observation + d->estimates + j] = theta[a] * z + theta[b];
     }
     mlp_double(&n->actor, p, input, mean);
 }
@@ -270,10 +273,12 @@ static double loss_double(const Case *c, const double *p) {
             image[i] =
                 (double)sign_o[k] * (double)c->chunk.history[r * n->history + f + mirror_o[k]];
         }
-        act_double(n, p, history, heads, mean);
+        const float *noise = c->chunk.outputs.noise ? c->chunk.noise + r * d->latent : NULL;
+        act_double(n, p, history, noise, heads, mean);
         loss += c->def.epsilon * regression_double(c, p, heads, r) / ROWS;
         loss += (1.0 - c->def.epsilon) * policy_double(c, p, mean, r) / ROWS;
-        act_double(n, p, image, heads, turned);
+        noise = noise && r < MIRRORED ? noise + ROWS * d->latent : noise;
+        act_double(n, p, image, noise, heads, turned);
         for (int j = 0; r < MIRRORED && j < d->actions; j++) {
             loss += c->def.mirror_weight *
                     pow(mean[j] - (double)sign_a[j] * turned[mirror_a[j]], 2) /
@@ -291,6 +296,9 @@ static void fill_inputs(Case *c, Random *random) {
     fill_normal(k->estimate, ROWS * d->estimates, 1.0, random);
     fill_normal(k->decoder_target, ROWS * c->network.decoded, 1.0, random);
     fill_normal(k->noise, ROWS * d->latent, 1.0, random);
+    if (k->outputs.noise) {
+        fill_normal(k->noise + ROWS * d->latent, MIRRORED * d->latent, 1.0, random);
+    }
     fill_normal(k->action, ROWS * d->actions, 1.0, random);
     fill_normal(k->old_mean, ROWS * d->actions, 1.0, random);
     fill_normal(k->advantage, ROWS, 1.0, random);
@@ -308,13 +316,14 @@ static void fill_inputs(Case *c, Random *random) {
 /* Central differences with step 1e-6 in double leave about 1e-9; single precision about 1e-6. A
  * parameter whose difference straddles a corner of the loss would show as an outlier: with these
  * draws there is none. */
-static void check_differences(PolicyDef policy_def, int clip_value, double free_bits,
+static void check_differences(PolicyDef policy_def, int clip_value, double free_bits, int sampled,
                               uint64_t seed) {
     Case c;
     Random random = random_at(seed, 0, 0);
     case_open(&c, policy_def);
     c.def.clip_value = clip_value;
     c.def.free_bits = free_bits;
+    c.chunk.outputs.noise = sampled ? c.chunk.noise : NULL;
     fill_inputs(&c, &random);
     case_run(&c);
     double *p = calloc((size_t)c.network.count, sizeof *p), worst = 0.0;
@@ -340,12 +349,12 @@ static void check_differences(PolicyDef policy_def, int clip_value, double free_
 static void test_matches_differences(void **state) {
     (void)state;
     PolicyDef def = small_def();
-    check_differences(def, 1, 0.0, 1);
+    check_differences(def, 1, 0.0, 0, 1);
     def.modulation_per_dimension = 1;
-    check_differences(def, 0, 0.0, 2);
+    check_differences(def, 0, 0.0, 0, 2);
     def.feet_velocity_offset = 0; /* no first group of estimates */
     def.actor_hidden[0] = 0, def.actor_hidden[1] = 0, def.actor_hidden[2] = 0; /* a linear actor */
-    check_differences(def, 1, 0.0, 3);
+    check_differences(def, 1, 0.0, 0, 3);
 }
 
 /* What the decoder rebuilds, each part with the mean of its own; and free bits. */
@@ -354,10 +363,14 @@ static void test_awareness_matches_differences(void **state) {
     PolicyDef def = small_def();
     def.ground_offset = 3;
     def.ground_count = 2;
-    check_differences(def, 1, 0.0, 11);
+    check_differences(def, 1, 0.0, 0, 11);
     def.decoder_frame = 0;
-    check_differences(def, 1, 0.0, 12);
-    check_differences(small_def(), 1, 0.7, 13);
+    check_differences(def, 1, 0.0, 0, 12);
+    check_differences(small_def(), 1, 0.7, 0, 13);
+    def = small_def();
+    check_differences(def, 1, 0.0, 1, 14);
+    def.modulation_per_dimension = 1;
+    check_differences(def, 1, 0.7, 1, 15);
 }
 
 /* Each part of the decoder's output is a mean over its own numbers: 2^2 + 3^2, whatever the widths.
@@ -454,7 +467,7 @@ static void test_areas_are_apart(void **state) {
     } areas[] = {{k->history, all, n->history},
                  {k->estimate, ROWS, d->estimates},
                  {k->decoder_target, ROWS, n->decoded},
-                 {k->noise, ROWS, d->latent},
+                 {k->noise, all, d->latent},
                  {k->action, ROWS, d->actions},
                  {k->old_mean, ROWS, d->actions},
                  {k->old_log_prob, ROWS, 1},

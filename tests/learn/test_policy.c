@@ -107,7 +107,7 @@ static void test_rows_in_runs(void **state) {
     memset(values[1], 0xff, sizeof values[1]);
     policy_act(policy, NULL, ROWS, history, actions[0], NULL, NULL);
     policy_value(policy, NULL, ROWS, critic, values[0]);
-    policy_act_rows(policy, pool, &both, history, actions[1]);
+    policy_act_rows(policy, pool, &both, history, NULL, actions[1]);
     policy_value_rows(policy, pool, &both, critic, values[1]);
     for (int i = 0; i < ROWS * 12; i++) {
         assert_true(fabs((double)actions[1][i] - (double)actions[0][i]) < 1e-5);
@@ -117,7 +117,7 @@ static void test_rows_in_runs(void **state) {
         memcpy(part + block * SECOND * 282, history + (block * WIDTH + FIRST) * 282,
                SECOND * 282 * sizeof *part);
     }
-    policy_act_rows(policy, NULL, &second, part, actions[2]);
+    policy_act_rows(policy, NULL, &second, part, NULL, actions[2]);
     for (int block = 0; block < BLOCKS; block++) {
         memcpy(part + block * SECOND * 98, critic + (block * WIDTH + FIRST) * 98,
                SECOND * 98 * sizeof *part);

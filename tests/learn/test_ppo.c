@@ -223,6 +223,46 @@ static void test_frames_of_the_decoder(void **state) {
     }
 }
 
+/* The latent that an action was drawn with is the one of its probability in the update: before the
+ * first step both policies are the same, so their divergence is rounding. Robots that see the same
+ * have latents of their own, at every time. */
+static void test_sampled_latent(void **state) {
+    (void)state;
+    enum { ENVS = 16 };
+    for (int sampled = 0; sampled < 2; sampled++) {
+        Run run;
+        PpoDef def = toy_ppo_def();
+        def.sample_latent = sampled;
+        def.epochs = def.minibatches = 1;
+        run_open(&run, 2, ENVS, def);
+        Random random = random_at(3, 3, 3);
+        float *p = policy_parameters(run.policy);
+        for (int64_t i = 0; i < policy_parameter_count(run.policy) - 2; i++) { /* not log std */
+            p[i] += (float)(0.1 * random_normal(&random));
+        }
+        PpoBatch *b = ppo_batch(run.ppo);
+        const int width = TOY_FRAMES * TOY_OBSERVATION;
+        toy_rollout(&run.toy, run.ppo);
+        PpoReport report;
+        ppo_update(run.ppo, &report);
+        print_message("kl of the first step %.1e\n", report.kl);
+        assert_true(fabs(report.kl) < 1e-10 && report.clip_share == 0.0);
+        int apart = 0;
+        for (int i = 1; i < 2 * ENVS; i++) {
+            memcpy(b->history + i * width, b->history, (size_t)width * sizeof(float));
+        }
+        ppo_act(run.ppo, 0);
+        ppo_act(run.ppo, 1);
+        for (int i = 0; i < 2 * ENVS; i++) {
+            for (int k = 0; k < i; k++) {
+                apart += fabsf(b->mean[2 * i] - b->mean[2 * k]) > 1e-6f;
+            }
+        }
+        assert_int_equal(apart, sampled ? 2 * ENVS * (2 * ENVS - 1) / 2 : 0);
+        run_close(&run);
+    }
+}
+
 /* A decoder of another shape than its target needs. */
 static void test_decoder_must_fit(void **state) {
     (void)state;
@@ -331,6 +371,7 @@ int main(void) {
         cmocka_unit_test(test_bad_numbers_are_dropped),
         cmocka_unit_test(test_frames_of_the_decoder),
         cmocka_unit_test(test_decoder_must_fit),
+        cmocka_unit_test(test_sampled_latent),
         cmocka_unit_test(test_invalid_samples_have_no_weight),
         cmocka_unit_test(test_nothing_valid_changes_nothing),
         cmocka_unit_test(test_learns_the_toy_task),
