@@ -18,7 +18,7 @@ size_t gpu_chunk_carve(const Network *n, const GpuWidths *w, int rows, int mirro
     } areas[] = {
         {&c->history, all, (size_t)w->history},
         {&c->critic, rows, (size_t)n->critic.layer[0].in},
-        {&c->noise, rows, (size_t)w->latent},
+        {&c->noise, all, (size_t)w->latent},
         {&c->feet, all, (size_t)w->feet},
         {&c->actor_input, all, (size_t)w->actor_input},
         {&c->decoder_input, rows, (size_t)w->decoder_input},
@@ -52,7 +52,12 @@ static float *last_of(const Mlp *mlp, const MlpOutputs *outputs) {
     return outputs->y[mlp->layers - 1];
 }
 
-/* As network_forward, from chunk.history. */
+/* Of the actor's z; NULL: z = mu. */
+static const float *actor_noise(const GpuLearner *g) {
+    return g->ppo->def.sample_latent ? g->chunk.noise : NULL;
+}
+
+/* As network_forward, from chunk.history and, with ppo.sample_latent, chunk.noise. */
 static const float *forward(GpuLearner *g, int rows) {
     const Network *n = &g->network;
     GpuChunk *c = &g->chunk;
@@ -63,7 +68,8 @@ static const float *forward(GpuLearner *g, int rows) {
     const float *theta =
         gpu_mlp_forward(q, &n->modulation, g->parameters, rows, c->feet, &c->modulation);
     const int newest = (n->def.frames - 1) * n->def.observation;
-    gpu_actor_input(q->stream, g->widths, rows, newest, c->history, heads, theta, c->actor_input);
+    gpu_actor_input(q->stream, g->widths, rows, newest, c->history, heads, actor_noise(g), theta,
+                    c->actor_input);
     return gpu_mlp_forward(q, &n->actor, g->parameters, rows, c->actor_input, &c->actor);
 }
 
@@ -75,6 +81,14 @@ void gpu_enqueue_act(GpuLearner *g, int t) {
         const size_t row = (size_t)t * (size_t)g->envs + (size_t)first;
         gpu_gather(g->queue.stream, rows, width, n->history, NULL,
                    g->batch.history + row * (size_t)width, g->chunk.history);
+        if (g->ppo->def.sample_latent) {
+            const GpuSampled sampled = {.rows = rows,
+                                        .latent = n->def.latent,
+                                        .envs = g->envs,
+                                        .number = g->part.first,
+                                        .first = (int)row};
+            gpu_sampled_noise(g->queue.stream, sampled, g->progress, g->chunk.noise);
+        }
         const float *mean = forward(g, rows);
         const GpuActions actions = {.t = t,
                                     .first = first,
@@ -125,6 +139,18 @@ static void gather(GpuLearner *g, const ChunkJob *job) {
                                   job->which,  g->mirror_index, g->mirror_sign};
         gpu_mirror_history(stream, images, g->batch.history,
                            c->history + (size_t)c->rows * (size_t)n->history);
+    }
+    if (g->ppo->def.sample_latent) {
+        const GpuSampled sampled = {.rows = c->rows,
+                                    .images = c->mirrored,
+                                    .latent = n->def.latent,
+                                    .envs = g->envs,
+                                    .number = g->part.first,
+                                    .at = job->at,
+                                    .order = job->order,
+                                    .which = job->which};
+        gpu_sampled_noise(stream, sampled, g->progress, c->noise);
+        return;
     }
     gpu_latent_noise(stream, c->rows, n->def.latent, &g->progress->latent_key, job->latent_row,
                      c->noise);
@@ -188,19 +214,21 @@ static void actor_half(GpuLearner *g, const ChunkJob *job) {
         gpu_mlp_forward(q, &n->decoder, g->parameters, rows, c->decoder_input, &c->decoder);
 
     action_losses(g, job, mean);
-    gpu_reconstruction(q->stream, w, rows, 2.0f * epsilon / (float)w.observation, job->order,
-                       g->batch.frame, decoded, c->d_decoded, g->sums);
+    gpu_reconstruction(q->stream, w, rows, 2.0f * epsilon, job->order, g->batch.frame,
+                       g->batch.critic, decoded, c->d_decoded, g->sums);
 
     gpu_mlp_backward(q, &n->decoder, g->parameters, rows, c->decoder_input, &c->decoder,
                      c->d_decoded, c->work, g->gradient, beta, c->d_decoder_input);
     gpu_mlp_backward(q, &n->actor, g->parameters, all, c->actor_input, &c->actor, c->d_mean,
                      c->work, g->gradient, beta, c->d_actor_input);
-    gpu_modulation_backward(q->stream, w, all, heads, theta, c->d_actor_input, c->d_heads,
-                            c->d_theta);
+    gpu_modulation_backward(q->stream, w, all, heads, actor_noise(g), theta, c->d_actor_input,
+                            c->d_heads, c->d_theta);
     gpu_mlp_backward(q, &n->modulation, g->parameters, all, c->feet, &c->modulation, c->d_theta,
                      c->work, g->gradient, beta, c->d_feet);
     const GpuHeads h = {.estimate_weight = 2.0f * epsilon,
                         .latent_weight = epsilon * (float)def->kl_weight,
+                        .free_bits = (float)def->free_bits,
+                        .sampled = def->sample_latent,
                         .order = job->order,
                         .target = g->batch.target,
                         .heads = heads,

@@ -172,9 +172,10 @@ void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *hea
     LAUNCH(feet_input, blocks_of(count), line, stream, w, (uint32_t)count, heads, feet);
 }
 
-/* One thread a number of the input [newest frame | estimates | theta1 mu + theta2]. */
+/* One thread a number of the input [newest frame | estimates | theta1 z + theta2]. */
 static __global__ void actor_input(GpuWidths w, uint32_t count, int newest, const float *history,
-                                   const float *heads, const float *theta, float *input) {
+                                   const float *heads, const float *noise, const float *theta,
+                                   float *input) {
     const uint32_t i = (uint32_t)item(), pitch = (uint32_t)w.actor_input;
     if (i >= count) {
         return;
@@ -189,16 +190,18 @@ static __global__ void actor_input(GpuWidths w, uint32_t count, int newest, cons
         x = h[head];
     } else if (j < w.latent) {
         const float *t = theta + r * w.theta;
-        x = t[w.per_dimension ? j : 0] * h[head] + t[w.per_dimension ? w.latent + j : 1];
+        const float *mu = h + w.estimates;
+        const float z = loss_latent(mu, mu + w.latent, noise ? noise + r * w.latent : NULL, j);
+        x = t[w.per_dimension ? j : 0] * z + t[w.per_dimension ? w.latent + j : 1];
     }
     input[i] = x;
 }
 
 void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, const float *history,
-                     const float *heads, const float *theta, float *input) {
+                     const float *heads, const float *noise, const float *theta, float *input) {
     const int64_t count = (int64_t)rows * w.actor_input;
     LAUNCH(actor_input, blocks_of(count), line, stream, w, (uint32_t)count, newest, history, heads,
-           theta, input);
+           noise, theta, input);
 }
 
 /* One thread a number of the decoder's input [z | estimates]. */
@@ -282,57 +285,71 @@ void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums)
 
 /* A block has THREADS rows and takes their numbers in order, so that neighbours read neighbours. */
 static __global__ void reconstruction(GpuWidths w, int rows, float weight, const int *order,
-                                      const float *frame, const float *decoded, float *d,
-                                      double *sums) {
-    const int pitch = w.decoded, width = w.observation;
+                                      const float *frame, const float *critic, const float *decoded,
+                                      float *d, double *sums) {
+    const int pitch = w.decoded;
     const int64_t first = (int64_t)blockIdx.x * THREADS * pitch, count = (int64_t)rows * pitch;
-    double sum = 0.0;
-    for (int k = 0; k < pitch; k++) {
-        const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
-        const int column = (int)(within % (uint32_t)pitch);
-        const int64_t i = first + within;
-        if (i < count && column < width) {
-            const int sample = order[(int64_t)blockIdx.x * THREADS + within / (uint32_t)pitch];
-            const float gap = decoded[i] - frame[(int64_t)sample * width + column];
-            sum += (double)(gap * gap);
-            d[i] = weight * gap;
+    double loss = 0.0;
+    for (int part = 0; part < 2; part++) { /* frame, ground */
+        const int begin = part ? w.decoded_frame : 0;
+        const int width = part ? w.ground_count : w.decoded_frame;
+        const int stride = part ? w.critic_input : w.observation;
+        const float *target = part ? critic + w.ground_offset : frame;
+        double sum = 0.0;
+        for (int k = 0; width > 0 && k < pitch; k++) {
+            const uint32_t within = (uint32_t)(k * THREADS) + threadIdx.x;
+            const int column = (int)(within % (uint32_t)pitch) - begin;
+            const int64_t i = first + within;
+            if (i < count && column >= 0 && column < width) {
+                const int sample = order[(int64_t)blockIdx.x * THREADS + within / (uint32_t)pitch];
+                const float gap = decoded[i] - target[(int64_t)sample * stride + column];
+                sum += (double)(gap * gap);
+                d[i] = weight / (float)width * gap;
+            }
         }
+        loss += width > 0 ? sum / width : 0.0;
     }
-    add_block_sum(sum / width, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
+    add_block_sum(loss, sums + (int64_t)blockIdx.x * GPU_SUMS + GPU_SUM_RECONSTRUCTION);
 }
 
 void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight, const int *order,
-                        const float *frame, const float *decoded, float *d, double *sums) {
-    LAUNCH(reconstruction, blocks_of(rows), line, stream, w, rows, weight, order, frame, decoded, d,
-           sums);
+                        const float *frame, const float *critic, const float *decoded, float *d,
+                        double *sums) {
+    LAUNCH(reconstruction, blocks_of(rows), line, stream, w, rows, weight, order, frame, critic,
+           decoded, d, sums);
 }
 
 static __global__ void modulation_backward(GpuWidths w, int rows, const float *heads,
-                                           const float *theta, const float *d_input, float *d_heads,
-                                           float *d_theta) {
+                                           const float *noise, const float *theta,
+                                           const float *d_input, float *d_heads, float *d_theta) {
     const int64_t r = item();
     if (r < rows) {
         loss_modulation(w.estimates, w.latent, w.per_dimension, heads + r * w.heads,
-                        theta + r * w.theta, d_input + r * w.actor_input + w.observation,
-                        d_heads + r * w.heads, d_theta + r * w.theta);
+                        noise ? noise + r * w.latent : NULL, theta + r * w.theta,
+                        d_input + r * w.actor_input + w.observation, d_heads + r * w.heads,
+                        d_theta + r * w.theta);
     }
 }
 
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                             const float *theta, const float *d_input, float *d_heads,
-                             float *d_theta) {
-    LAUNCH(modulation_backward, blocks_of(rows), line, stream, w, rows, heads, theta, d_input,
-           d_heads, d_theta);
+                             const float *noise, const float *theta, const float *d_input,
+                             float *d_heads, float *d_theta) {
+    LAUNCH(modulation_backward, blocks_of(rows), line, stream, w, rows, heads, noise, theta,
+           d_input, d_heads, d_theta);
 }
 
-static __device__ double latent_row(int latent, float weight, const float *mu, const float *spread,
-                                    const float *noise, const float *d_z, float *d_mu) {
+static __device__ double latent_row(int latent, float weight, float free_bits, int sampled,
+                                    const float *mu, const float *spread, const float *noise,
+                                    const float *d_z, float *d_mu) {
     const float *logvar = mu + latent;
     float *d_logvar = d_mu + latent, twice = 0.0f;
     for (int j = 0; j < latent; j++) {
-        twice += loss_latent_twice(mu[j], logvar[j], spread[j]);
-        d_mu[j] += loss_mu_gradient(weight, mu[j], d_z[j]);
-        d_logvar[j] = loss_logvar_gradient(weight, logvar[j], spread[j], noise[j], d_z[j]);
+        const float own = loss_latent_twice(mu[j], logvar[j], spread[j]);
+        const float w = loss_kl_weight(weight, free_bits, own);
+        twice += own;
+        const float d_draw = loss_draw_gradient(sampled, d_z[j], d_mu[j]);
+        d_mu[j] += loss_mu_gradient(w, mu[j], d_z[j]);
+        d_logvar[j] = loss_logvar_gradient(w, logvar[j], spread[j], noise[j], d_draw);
     }
     return 0.5 * (double)twice;
 }
@@ -356,8 +373,8 @@ static __global__ void heads_backward(GpuWidths w, GpuHeads h, int rows, int all
         group[1] = loss_estimates(w.feet_offset, feet_end, h.estimate_weight, heads, target, d);
         group[2] = loss_estimates(feet_end, w.estimates, h.estimate_weight, heads, target, d);
         divergence =
-            latent_row(w.latent, h.latent_weight, heads + w.estimates, h.spread + r * w.latent,
-                       h.noise + r * w.latent, d_input, d + w.estimates);
+            latent_row(w.latent, h.latent_weight, h.free_bits, h.sampled, heads + w.estimates,
+                       h.spread + r * w.latent, h.noise + r * w.latent, d_input, d + w.estimates);
     }
     double *own = sums + (int64_t)blockIdx.x * GPU_SUMS;
     for (int g = 0; g < 3; g++) {

@@ -63,15 +63,17 @@ void gpu_bias_backward(cudaStream_t stream, int rows, int width, const float *y,
 
 typedef struct {
     int observation, estimates, latent, per_dimension, feet_offset, feet_count, actions;
+    int decoded_frame, ground_offset, ground_count; /* of the decoder's target */
+    int critic_input;                               /* from row to row in the rollout */
     /* pitches */
     int history, heads, feet, theta, actor_input, action, decoder_input, decoded, value;
 } GpuWidths;
 
 /* feet [rows][feet]: the estimated feet velocities, the modulation's input. */
 void gpu_feet_input(cudaStream_t stream, GpuWidths w, int rows, const float *heads, float *feet);
-/* newest: first column of the newest frame in history. */
+/* newest: first column of the newest frame in history. noise: [rows][latent] of z; NULL: z = mu. */
 void gpu_actor_input(cudaStream_t stream, GpuWidths w, int rows, int newest, const float *history,
-                     const float *heads, const float *theta, float *input);
+                     const float *heads, const float *noise, const float *theta, float *input);
 void gpu_sample_latent(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
                        const float *noise, float *spread, float *input);
 
@@ -99,16 +101,20 @@ typedef struct {
 } GpuMirror;
 void gpu_mirror_loss(cudaStream_t stream, GpuMirror m, int images, double *sums);
 
+/* weight: of a sample. frame, critic: of the rollout. */
 void gpu_reconstruction(cudaStream_t stream, GpuWidths w, int rows, float weight, const int *order,
-                        const float *frame, const float *decoded, float *d, double *sums);
+                        const float *frame, const float *critic, const float *decoded, float *d,
+                        double *sums);
 void gpu_modulation_backward(cudaStream_t stream, GpuWidths w, int rows, const float *heads,
-                             const float *theta, const float *d_input, float *d_heads,
-                             float *d_theta);
+                             const float *noise, const float *theta, const float *d_input,
+                             float *d_heads, float *d_theta);
 
 /* Adds the gradient of the regression for the first `rows` of `all`, and that of the modulation
  * through the feet velocities for all. */
 typedef struct {
     float estimate_weight, latent_weight; /* of a sample */
+    float free_bits;
+    int sampled; /* bool: the actor got the decoder's z */
     const int *order;
     const float *target; /* of the rollout */
     const float *heads, *spread, *noise, *d_feet, *d_decoder_input;

@@ -65,6 +65,10 @@ static void set_sizes(GpuLearner *g, int envs) {
                             .feet_offset = def->feet_velocity_offset,
                             .feet_count = def->feet_velocity_count,
                             .actions = def->actions,
+                            .decoded_frame = n->decoded_frame,
+                            .ground_offset = def->ground_offset,
+                            .ground_count = def->ground_count,
+                            .critic_input = def->critic_input,
                             .history = n->history,
                             .heads = n->heads,
                             .feet = n->modulation.layer[0].in,
@@ -72,7 +76,7 @@ static void set_sizes(GpuLearner *g, int envs) {
                             .actor_input = n->actor_input,
                             .action = gpu_pitch(def->actions),
                             .decoder_input = n->decoder_input,
-                            .decoded = gpu_pitch(def->observation),
+                            .decoded = gpu_pitch(n->decoded),
                             .value = gpu_pitch(1)};
 }
 
@@ -392,8 +396,8 @@ static void enqueue_update(GpuLearner *g) {
     const PpoDef *def = &g->ppo->def;
     const Network *n = &g->network;
     cudaStream_t stream = g->queue.stream;
-    if (def->decoder_target == PPO_TARGET_NEXT) {
-        gpu_shift_frames(stream, g->batch, n->def.observation);
+    if (step_writes_frames(def)) {
+        gpu_write_frames(stream, *def, g->batch, n->def.observation, n->def.critic_input);
     }
     gpu_begin_update(stream, *def, n->def.actions, g->parameters + n->log_std, g->progress);
     gpu_enqueue_values(g);

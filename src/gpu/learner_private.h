@@ -13,7 +13,7 @@ typedef struct {
     int rows, mirrored;
     float *history; /* [rows + mirrored] */
     float *critic;  /* [rows] the critic's input */
-    float *noise;   /* [rows][latent] standard normal, for the sampled z */
+    float *noise;   /* [rows + mirrored][latent] standard normal, for the sampled z */
     MlpOutputs encoder, modulation, actor, decoder, value;
     float *feet;          /* [rows + mirrored] the modulation's input */
     float *actor_input;   /* [rows + mirrored] */

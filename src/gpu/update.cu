@@ -7,10 +7,24 @@
 
 /* ---- acting ---- */
 
-static __device__ float noise_number(uint64_t key, int64_t number) {
-    float even, odd;
-    noise_pair((uint32_t)key, (uint32_t)(key >> 32), (uint32_t)(number / 2), &even, &odd);
-    return number % 2 ? odd : even;
+static __global__ void sampled_noise(GpuSampled s, int64_t count, const GpuProgress *progress,
+                                     float *noise) {
+    const int64_t i = item();
+    if (i >= count) {
+        return;
+    }
+    const int row = (int)(i / s.latent), j = (int)(i % s.latent);
+    const int own = row < s.rows ? row : s.which[row - s.rows] - s.at;
+    const int sample = s.order ? s.order[own] : s.first + own;
+    const uint64_t key = step_sampled_key(progress->seed, progress->iteration, sample / s.envs);
+    const int64_t env = s.number + sample % s.envs;
+    noise[i] = noise_number(key, env * s.latent + j);
+}
+
+void gpu_sampled_noise(cudaStream_t stream, GpuSampled s, const GpuProgress *progress,
+                       float *noise) {
+    const int64_t count = (int64_t)(s.rows + s.images) * s.latent;
+    LAUNCH(sampled_noise, blocks_of(count), line, stream, s, count, progress, noise);
 }
 
 static __global__ void sample_actions(GpuActions a, PpoBatch b, const GpuProgress *progress) {
@@ -63,8 +77,9 @@ void gpu_begin_update(cudaStream_t stream, PpoDef def, int actions, const float 
     LAUNCH(begin_update, one_block, line, stream, def, actions, log_std, progress);
 }
 
-/* One thread a column of an environment's frames. */
-static __global__ void shift_frames(PpoBatch b, int width) {
+/* One thread a column of an environment's frames. from: frames, or rows of the critic, [stride]. */
+static __global__ void write_frames(PpoBatch b, int is_next, const float *from, int width,
+                                    int stride) {
     const int64_t i = item();
     if (i >= (int64_t)b.envs * width) {
         return;
@@ -72,14 +87,15 @@ static __global__ void shift_frames(PpoBatch b, int width) {
     const int64_t env = i / width, column = i % width;
     for (int t = 0; t < b.steps; t++) {
         const int64_t now = (int64_t)t * b.envs + env;
-        if (returns_has_next(&b, t, now)) {
-            b.frame[now * width + column] = b.frame[(now + b.envs) * width + column];
-        }
+        const int64_t row = is_next && returns_has_next(&b, t, now) ? now + b.envs : now;
+        b.frame[now * width + column] = from[row * stride + column];
     }
 }
 
-void gpu_shift_frames(cudaStream_t stream, PpoBatch batch, int width) {
-    LAUNCH(shift_frames, blocks_of((int64_t)batch.envs * width), line, stream, batch, width);
+void gpu_write_frames(cudaStream_t stream, PpoDef def, PpoBatch batch, int width, int stride) {
+    LAUNCH(write_frames, blocks_of((int64_t)batch.envs * width), line, stream, batch,
+           step_frame_is_next(&def), def.target_noise ? batch.frame : batch.critic, width,
+           def.target_noise ? width : stride);
 }
 
 static __global__ void take_values(int rows, int pitch, const float *output, float *value) {

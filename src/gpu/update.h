@@ -52,12 +52,22 @@ typedef struct {
 void gpu_sample_actions(cudaStream_t stream, GpuActions a, PpoBatch batch,
                         const GpuProgress *progress);
 
+/* noise [rows + images][latent] of z with ppo.sample_latent: of samples order[0 .. rows - 1], or
+ * first .. first + rows - 1 of the rollout with order NULL; then that of the images' samples,
+ * which[] - at of these. number: as in GpuActions. */
+typedef struct {
+    int rows, images, latent, envs, number, first, at;
+    const int *order, *which;
+} GpuSampled;
+void gpu_sampled_noise(cudaStream_t stream, GpuSampled s, const GpuProgress *progress,
+                       float *noise);
+
 /* ---- before the minibatches ---- */
 
 void gpu_begin_update(cudaStream_t stream, PpoDef def, int actions, const float *log_std,
                       GpuProgress *progress);
-/* Each frame [width] becomes its successor. */
-void gpu_shift_frames(cudaStream_t stream, PpoBatch batch, int width);
+/* The decoder's frames [width] into batch.frame. stride: width of the critic's input. */
+void gpu_write_frames(cudaStream_t stream, PpoDef def, PpoBatch batch, int width, int stride);
 /* Fills value from the critic's output [rows][pitch] of samples first .. first + rows - 1. */
 void gpu_take_values(cudaStream_t stream, int rows, int pitch, const float *output, float *value);
 /* As ppo_returns, up to the moments. */

@@ -18,8 +18,8 @@ size_t loss_carve(const Network *network, int rows, int mirrored, float *block, 
     } areas[] = {
         {&chunk->history, all * (size_t)network->history},
         {&chunk->estimate, n * (size_t)def->estimates},
-        {&chunk->decoder_target, n * (size_t)def->observation},
-        {&chunk->noise, n * (size_t)def->latent},
+        {&chunk->decoder_target, n * (size_t)network->decoded},
+        {&chunk->noise, all * (size_t)def->latent},
         {&chunk->action, n * (size_t)def->actions},
         {&chunk->old_mean, n * (size_t)def->actions},
         {&chunk->old_log_prob, n},
@@ -34,7 +34,7 @@ size_t loss_carve(const Network *network, int rows, int mirrored, float *block, 
         {&chunk->d_theta, all * (size_t)network->theta},
         {&chunk->d_actor_input, all * (size_t)(def->estimates + def->latent)},
         {&chunk->d_feet, all * (size_t)def->feet_velocity_count},
-        {&chunk->d_decoded, n * (size_t)def->observation},
+        {&chunk->d_decoded, n * (size_t)network->decoded},
         {&chunk->d_decoder_input, n * (size_t)network->decoder_input},
         {&chunk->d_value, n},
         {&chunk->work[0], all * widest},
@@ -133,14 +133,16 @@ static void sample_latent(const LossContext *c, LossChunk *chunk, const float *h
     }
 }
 
-/* MSE(o, decoded): mean over samples and over the frame. */
-static void reconstruction_loss(const LossContext *c, LossChunk *chunk, const float *decoded,
-                                LossSums *sums) {
-    const int width = c->network->def.observation;
+/* Numbers first .. first + width - 1 of the decoder's output: mean over samples and over them of
+ * (decoded - target)^2. */
+static void reconstruction_part(const LossContext *c, LossChunk *chunk, const float *decoded,
+                                int first, int width, LossSums *sums) {
+    const int stride = c->network->decoded;
     const float weight = 2.0f * (float)c->def->epsilon * c->sample_weight / (float)width;
-    const float *target = chunk->decoder_target;
-    float *d = chunk->d_decoded;
-    for (int r = 0; r < chunk->rows; r++, decoded += width, target += width, d += width) {
+    const float *target = chunk->decoder_target + first;
+    float *d = chunk->d_decoded + first;
+    decoded += first;
+    for (int r = 0; r < chunk->rows; r++, decoded += stride, target += stride, d += stride) {
         float sum = 0.0f;
 #pragma omp simd reduction(+ : sum)
         for (int j = 0; j < width; j++) {
@@ -149,6 +151,17 @@ static void reconstruction_loss(const LossContext *c, LossChunk *chunk, const fl
             d[j] = weight * gap;
         }
         sums->reconstruction += (double)sum / width;
+    }
+}
+
+static void reconstruction_loss(const LossContext *c, LossChunk *chunk, const float *decoded,
+                                LossSums *sums) {
+    const int frame = c->network->decoded_frame, ground = c->network->def.ground_count;
+    if (frame > 0) {
+        reconstruction_part(c, chunk, decoded, 0, frame, sums);
+    }
+    if (ground > 0) {
+        reconstruction_part(c, chunk, decoded, frame, ground, sums);
     }
 }
 
@@ -165,30 +178,35 @@ static void estimate_row(const LossContext *c, const float *estimate, const floa
     }
 }
 
-/* KL(N(mu, e^logvar) || N(0, I)), and the decoder's gradient through the sampled z. */
+/* max(KL(N(mu, e^logvar) || N(0, 1)), free bits) of each dimension, and the decoder's gradient through the sampled z. */
 static void latent_row(const LossContext *c, const float *mu, const float *logvar,
-                       const float *spread, const float *noise, const float *d_z, float *d_mu,
-                       float *d_logvar, LossSums *sums) {
+                       const float *spread, const float *noise, int sampled, const float *d_z,
+                       float *d_mu, float *d_logvar, LossSums *sums) {
     const int latent = c->network->def.latent;
     const float weight = (float)(c->def->epsilon * c->def->kl_weight) * c->sample_weight;
+    const float free_bits = (float)c->def->free_bits;
     float twice = 0.0f;
 #pragma omp simd reduction(+ : twice)
     for (int j = 0; j < latent; j++) {
-        twice += loss_latent_twice(mu[j], logvar[j], spread[j]);
-        d_mu[j] += loss_mu_gradient(weight, mu[j], d_z[j]);
-        d_logvar[j] = loss_logvar_gradient(weight, logvar[j], spread[j], noise[j], d_z[j]);
+        const float own = loss_latent_twice(mu[j], logvar[j], spread[j]),
+                    w = loss_kl_weight(weight, free_bits, own);
+        twice += own;
+        const float d_draw = loss_draw_gradient(sampled, d_z[j], d_mu[j]);
+        d_mu[j] += loss_mu_gradient(w, mu[j], d_z[j]);
+        d_logvar[j] = loss_logvar_gradient(w, logvar[j], spread[j], noise[j], d_draw);
     }
     sums->vae_kl += 0.5 * (double)twice;
 }
 
-/* Back through z~ = theta1 mu + theta2: d_heads (estimates and mu; logvar 0) and d_theta. */
+/* Back through z~ = theta1 z + theta2: d_heads and d_theta. */
 static void modulation_backward(const LossContext *c, LossChunk *chunk, int all,
                                 const float *heads) {
     const Network *n = c->network;
-    const float *theta = network_theta(n, &chunk->outputs);
+    const float *theta = network_theta(n, &chunk->outputs), *noise = chunk->outputs.noise;
     for (int64_t r = 0; r < all; r++) {
         loss_modulation(n->def.estimates, n->def.latent, n->def.modulation_per_dimension,
-                        heads + r * n->heads, theta + r * n->theta,
+                        heads + r * n->heads, noise ? noise + r * n->def.latent : NULL,
+                        theta + r * n->theta,
                         chunk->d_actor_input + r * (n->def.estimates + n->def.latent),
                         chunk->d_heads + r * n->heads, chunk->d_theta + r * n->theta);
     }
@@ -215,8 +233,9 @@ static void heads_backward(const LossContext *c, LossChunk *chunk, int all, cons
         }
         estimate_row(c, heads, chunk->estimate + (int64_t)r * estimates, d, sums);
         latent_row(c, heads + estimates, heads + estimates + latent,
-                   chunk->spread + (int64_t)r * latent, chunk->noise + (int64_t)r * latent, d_input,
-                   d + estimates, d + estimates + latent, sums);
+                   chunk->spread + (int64_t)r * latent, chunk->noise + (int64_t)r * latent,
+                   chunk->outputs.noise != NULL, d_input, d + estimates, d + estimates + latent,
+                   sums);
     }
 }
 

@@ -1,9 +1,10 @@
 /* Loss and gradient of one chunk of samples. Two independent halves: the actor's (encoder,
  * modulation, actor, decoder, log std) and the critic's.
  *
- *   L = (1-eps) (surrogate - w_H entropy + w_V value) + eps (recon + phi KL + sum over groups MSE)
+ *   L = (1-eps) (surrogate - w_H entropy + w_V value) + eps (recon + phi sum max(KL_i, free_bits) + sum over groups MSE)
  * + w_M mirror   (eq 16)
  *
+ * recon = MSE(frame) + MSE(ground), the parts of the decoder's output (PpoTarget).
  * Means are over the minibatch. The caller gives 1 / (its samples), so the results of chunks and
  * shards add up. */
 #ifndef MILD_LOSS_H
@@ -33,15 +34,17 @@ typedef struct {
     /* input */
     float *history;        /* [rows + mirrored][history] */
     float *estimate;       /* [rows][estimates] target */
-    float *decoder_target; /* [rows][observation] */
-    float *noise;          /* [rows][latent] standard normal, for the sampled z */
-    float *action;         /* [rows][actions] */
-    float *old_mean;       /* [rows][actions] */
-    float *old_log_prob;   /* [rows] */
-    float *advantage;      /* [rows] */
-    float *critic;         /* [rows][critic_input] */
-    float *old_value;      /* [rows] */
-    float *returns;        /* [rows] */
+    float *decoder_target; /* [rows][decoded] frame, then parameters of the ground */
+    /* [rows + mirrored][latent] standard normal, for the sampled z. outputs.noise is NULL, or these
+     * are the actor's too; otherwise those of the images have no meaning. */
+    float *noise;
+    float *action;       /* [rows][actions] */
+    float *old_mean;     /* [rows][actions] */
+    float *old_log_prob; /* [rows] */
+    float *advantage;    /* [rows] */
+    float *critic;       /* [rows][critic_input] */
+    float *old_value;    /* [rows] */
+    float *returns;      /* [rows] */
     /* forward */
     NetworkOutputs outputs;
     MlpOutputs decoder;
@@ -54,7 +57,7 @@ typedef struct {
     float *d_theta;         /* [rows + mirrored][theta] */
     float *d_actor_input;   /* [rows + mirrored][estimates + latent] the part after the frame */
     float *d_feet;          /* [rows + mirrored][feet velocities] */
-    float *d_decoded;       /* [rows][observation] */
+    float *d_decoded;       /* [rows][decoded] */
     float *d_decoder_input; /* [rows][decoder_input] */
     float *d_value;         /* [rows] */
     float *work[2];         /* [rows + mirrored][widest layer] each */

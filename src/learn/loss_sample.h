@@ -164,9 +164,27 @@ static inline MILD_BOTH float loss_spread(float logvar) {
     return vector_exp(0.5f * loss_held_logvar(logvar));
 }
 
+/* Dimension j of z: a draw, or mu without noise. */
+static inline MILD_BOTH float loss_latent(const float *mu, const float *logvar, const float *noise,
+                                          int j) {
+    return noise ? mu[j] + loss_spread(logvar[j]) * noise[j] : mu[j];
+}
+
 /* Twice the KL term of one dimension: mu^2 + e^logvar - 1 - logvar. */
 static inline MILD_BOTH float loss_latent_twice(float mu, float logvar, float spread) {
     return mu * mu + spread * spread - 1.0f - loss_held_logvar(logvar);
+}
+
+/* Weight of the gradient of a dimension's KL term max(KL, free_bits) [nat] (Kingma et al. 2016,
+ * "free bits"): the dimension may tell this much for nothing. twice: 2 KL. */
+static inline MILD_BOTH float loss_kl_weight(float weight, float free_bits, float twice) {
+    return free_bits > 0.0f && twice < 2.0f * free_bits ? 0.0f : weight;
+}
+
+/* d_z of a sample: from the decoder, and from the actor if it got the same draw. d_mu: what the
+ * actor has left. */
+static inline MILD_BOTH float loss_draw_gradient(int sampled, float d_z, float d_mu) {
+    return sampled ? d_z + d_mu : d_z;
 }
 
 /* d loss / d mu: from the decoder through z, and from the KL term. */
@@ -185,12 +203,14 @@ static inline MILD_BOTH float loss_logvar_gradient(float weight, float logvar, f
 
 /* ---- modulation ---- */
 
-/* Back through z~ = theta1 mu + theta2. heads and d_heads are [estimates | mu | logvar], d_input is
- * [estimates | z~]; theta has two numbers, or two for each latent dimension. Overwrites d_heads
- * (logvar: 0) and d_theta. */
+/* Back through z~ = theta1 z + theta2, z: loss_latent. heads and d_heads are [estimates | mu |
+ * logvar], d_input is [estimates | z~]; theta has two numbers, or two for each latent dimension.
+ * Overwrites d_heads and d_theta. noise: NULL, z = mu. */
 static inline MILD_BOTH void loss_modulation(int estimates, int latent, int per_dimension,
-                                             const float *heads, const float *theta,
-                                             const float *d_input, float *d_heads, float *d_theta) {
+                                             const float *heads, const float *noise,
+                                             const float *theta, const float *d_input,
+                                             float *d_heads, float *d_theta) {
+    const float *mu = heads + estimates, *logvar = mu + latent;
     float d_scale = 0.0f;
     float d_shift = 0.0f;
     for (int j = 0; j < estimates; j++) {
@@ -198,14 +218,17 @@ static inline MILD_BOTH void loss_modulation(int estimates, int latent, int per_
     }
     for (int j = 0; j < latent; j++) {
         const float d = d_input[estimates + j];
-        const float d_times_mu = d * heads[estimates + j];
-        d_heads[estimates + j] = d * theta[per_dimension ? j : 0];
-        d_heads[estimates + latent + j] = 0.0f;
+        const float d_times_z = d * loss_latent(mu, logvar, noise, j);
+        const float d_z = d * theta[per_dimension ? j : 0];
+        d_heads[estimates + j] = d_z;
+        d_heads[estimates + latent + j] =
+            noise ? loss_logvar_gradient(0.0f, logvar[j], loss_spread(logvar[j]), noise[j], d_z)
+                  : 0.0f;
         if (per_dimension) {
-            d_theta[j] = d_times_mu;
+            d_theta[j] = d_times_z;
             d_theta[latent + j] = d;
         }
-        d_scale += d_times_mu;
+        d_scale += d_times_z;
         d_shift += d;
     }
     if (!per_dimension) {

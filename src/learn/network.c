@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "learn/loss_sample.h"
+
 /* Widths are bounded so that no product of two of them leaves the range of int. */
 #define WIDTH_MAX 16384
 
@@ -71,6 +73,14 @@ static MildStatus check_def(const PolicyDef *def, MildError *error) {
                          "policy: feet velocities %d..+%d are not among the %d estimates",
                          def->feet_velocity_offset, def->feet_velocity_count, def->estimates);
     }
+    if (def->ground_offset < 0 || def->ground_count < 0 || def->ground_offset > def->critic_input ||
+        def->ground_count > def->critic_input - def->ground_offset ||
+        (!def->decoder_frame && def->ground_count == 0)) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "policy: the decoder rebuilds numbers %d..+%d of the critic's %d%s",
+                         def->ground_offset, def->ground_count, def->critic_input,
+                         def->decoder_frame ? "" : ", and no frame");
+    }
     return MILD_OK;
 }
 
@@ -87,10 +97,12 @@ MildStatus network_layout(Network *network, const PolicyDef *def, MildError *err
     network->theta = def->modulation_per_dimension ? 2 * def->latent : 2;
     network->actor_input = def->observation + def->estimates + def->latent;
     network->decoder_input = def->latent + def->estimates;
+    network->decoded_frame = def->decoder_frame ? def->observation : 0;
+    network->decoded = network->decoded_frame + def->ground_count;
     int64_t at =
         mlp_layout(&network->encoder, network->history, def->encoder_hidden, network->heads, 0);
     at = mlp_layout(&network->decoder, network->decoder_input, def->decoder_hidden,
-                    def->observation, at);
+                    network->decoded, at);
     at = mlp_layout(&network->modulation, def->feet_velocity_count, modulation_hidden,
                     network->theta, at);
     at = mlp_layout(&network->actor, network->actor_input, def->actor_hidden, def->actions, at);
@@ -132,6 +144,7 @@ void network_carve(const Network *network, int rows, float *block, size_t *used,
     mlp_carve_outputs(&network->encoder, rows, block, used, &outputs->encoder);
     mlp_carve_outputs(&network->modulation, rows, block, used, &outputs->modulation);
     mlp_carve_outputs(&network->actor, rows, block, used, &outputs->actor);
+    outputs->noise = NULL;
     outputs->actor_input = mlp_carve(block, used, (size_t)rows * (size_t)network->actor_input);
 }
 
@@ -143,14 +156,16 @@ float *network_theta(const Network *network, const NetworkOutputs *outputs) {
     return outputs->modulation.y[network->modulation.layers - 1];
 }
 
-/* z~ = theta1 z + theta2 of one row, z: mu or what there is instead of it. */
-static void modulate(const Network *network, const float *mu, const float *theta,
-                     const PolicyInstead *instead, float *modulated) {
+/* z~ = theta1 z + theta2 of one row, z: mu, a draw around it, or what there is instead. */
+static void modulate(const Network *network, const float *mu, const float *noise,
+                     const float *theta, const PolicyInstead *instead, float *modulated) {
     const int latent = network->def.latent, per_dimension = network->def.modulation_per_dimension;
-    const float *z = instead && instead->latent ? instead->latent : mu;
+    const float *logvar = mu + latent;
     for (int j = 0; j < latent; j++) {
         float theta1 = theta[per_dimension ? j : 0], theta2 = theta[per_dimension ? latent + j : 1];
-        modulated[j] = instead && instead->plain ? z[j] : theta1 * z[j] + theta2;
+        const float z =
+            instead && instead->latent ? instead->latent[j] : loss_latent(mu, logvar, noise, j);
+        modulated[j] = instead && instead->plain ? z : theta1 * z + theta2;
     }
 }
 
@@ -160,13 +175,16 @@ static void fill_actor_input(const Network *network, int rows, const float *hist
                              const PolicyInstead *instead, const NetworkOutputs *outputs) {
     const int observation = network->def.observation, estimates = network->def.estimates;
     const float *heads = network_heads(network, outputs), *theta = network_theta(network, outputs);
+    const float *noise = outputs->noise;
     float *input = outputs->actor_input;
     for (int r = 0; r < rows; r++) {
         const float *told = instead && instead->estimates ? instead->estimates : heads;
         memcpy(input, history + network->history - observation,
                (size_t)observation * sizeof *input);
         memcpy(input + observation, told, (size_t)estimates * sizeof *input);
-        modulate(network, heads + estimates, theta, instead, input + observation + estimates);
+        modulate(network, heads + estimates, noise, theta, instead,
+                 input + observation + estimates);
+        noise = noise ? noise + network->def.latent : NULL;
         history += network->history;
         heads += network->heads;
         theta += network->theta;

@@ -2,9 +2,9 @@
  *
  *   heads   = encoder(history), [estimates | mu | logvar]
  *   theta   = modulation(estimated feet velocities), [theta1 | theta2]
- *   z~      = theta1 * mu + theta2 (FiLM)
+ *   z~      = theta1 * z + theta2 (FiLM), z = mu; with ppo.sample_latent a draw, in training
  *   mean    = actor([newest frame | estimates | z~])
- *   decoded = decoder([z | estimates]), in the loss only, with a sampled z
+ *   decoded = decoder([z | estimates]) = [frame | ground], in the loss only, with a sampled z
  *   value   = critic(critic input) */
 #ifndef MILD_NETWORK_H
 #define MILD_NETWORK_H
@@ -31,6 +31,8 @@ typedef struct {
     int theta;            /* width: 2, or 2 latent */
     int actor_input;      /* width: observation + estimates + latent */
     int decoder_input;    /* width: latent + estimates */
+    int decoded_frame;    /* width of the frame in the decoder's output: observation, or 0 */
+    int decoded;          /* width of that output: decoded_frame + ground_count */
 } Network;
 
 /* Checks the def and sets the offsets of the parameters. */
@@ -42,6 +44,7 @@ const Mlp *network_mlp(const Network *network, int index, const char **name);
 typedef struct {
     MlpOutputs encoder, modulation, actor;
     float *actor_input; /* [rows][actor_input] */
+    const float *noise; /* [rows][latent] input: z = mu + e^(logvar/2) noise; NULL: z = mu */
 } NetworkOutputs;
 
 void network_carve(const Network *network, int rows, float *block, size_t *used,

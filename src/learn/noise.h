@@ -57,4 +57,11 @@ static inline MILD_BOTH void noise_pair(uint32_t key0, uint32_t key1, uint32_t p
     *odd = radius * noise_sin(a);
 }
 
+/* One number of the stream. */
+static inline MILD_BOTH float noise_number(uint64_t key, int64_t number) {
+    float even, odd;
+    noise_pair((uint32_t)key, (uint32_t)(key >> 32), (uint32_t)(number / 2), &even, &odd);
+    return number % 2 ? odd : even;
+}
+
 #endif

@@ -85,6 +85,7 @@ typedef struct {
     int per_run; /* chunks of a run; the last ones of a short run are empty */
     int chunks, slots;
     const float *input;
+    const float *noise; /* of z; NULL: none */
     float *actions, *values;
     PolicyInside inside;
     const PolicyInstead *instead;
@@ -98,10 +99,11 @@ static void copy_columns(const float *from, int stride, int width, int first, in
     }
 }
 
-static void act_chunk(const PolicyJob *job, int first, int rows, const NetworkOutputs *outputs) {
+static void act_chunk(const PolicyJob *job, int first, int rows, NetworkOutputs *outputs) {
     const Network *network = &job->policy->network;
     const PolicyDef *def = &network->def;
     const PolicyInside *inside = &job->inside;
+    outputs->noise = job->noise ? job->noise + (int64_t)first * def->latent : NULL;
     const float *mean = network_forward_instead(network, job->policy->parameters, rows,
                                                 job->input + (int64_t)first * network->history,
                                                 job->instead, outputs);
@@ -198,8 +200,9 @@ int policy_theta(const Policy *policy) {
 }
 
 void policy_act_rows(Policy *policy, Pool *pool, const PolicyRows *rows, const float *history,
-                     float *actions) {
-    PolicyJob job = {.policy = policy, .rows = rows, .input = history, .actions = actions};
+                     const float *noise, float *actions) {
+    PolicyJob job = {
+        .policy = policy, .rows = rows, .input = history, .noise = noise, .actions = actions};
     run_job(&job, pool);
 }
 

@@ -9,6 +9,7 @@ PolicyDef policy_def_default(void) {
         .estimates = 11,
         .feet_velocity_offset = 3,
         .feet_velocity_count = 6,
+        .decoder_frame = 1,
         .latent = 16,
         .encoder_hidden = {256, 128},
         .decoder_hidden = {64, 128},

@@ -12,11 +12,15 @@ typedef struct {
     char robot[64];           /* name of the robot that it was trained for; empty: not known */
     int observation;          /* width of one frame, 47 */
     int frames;               /* frames in the history, newest last: H + 1 = 6 */
-    int critic_input;         /* width of the critic's input */
+    int critic_input;         /* width of the critic's input, which begins with a noiseless frame */
     int actions;              /* 12 */
     int estimates;            /* 11: base velocity 3, feet velocities 6, feet heights 2 */
     int feet_velocity_offset; /* 3: first of the estimates that drive the modulation */
     int feet_velocity_count;  /* 6: how many do */
+    /* what the decoder rebuilds: a frame, then numbers of the critic's input */
+    int decoder_frame; /* bool */
+    int ground_offset; /* first of the ground's parameters in the critic's input */
+    int ground_count;  /* how many the decoder rebuilds; 0: none */
     /* config, section [policy] */
     int latent;                            /* 16 */
     int encoder_hidden[POLICY_LAYERS_MAX]; /* zero-terminated or full: 256 128 */

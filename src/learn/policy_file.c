@@ -22,6 +22,17 @@ static const MildField shape_fields[] = {
 };
 #define SHAPE_FIELDS ((int)(sizeof shape_fields / sizeof *shape_fields))
 
+/* What the decoder rebuilds. A file without them has the decoder of a frame alone, and is written
+ * without them. */
+static const MildField decoder_fields[] = {
+    MILD_FIELD(PolicyDef, decoder_frame, MILD_FIELD_BOOL, 1, 0, 1, "[bool] it rebuilds a frame"),
+    MILD_FIELD(PolicyDef, ground_offset, MILD_FIELD_INT, 1, 0, 16384,
+               "[-] first of the ground's parameters in the critic's input"),
+    MILD_FIELD(PolicyDef, ground_count, MILD_FIELD_INT, 1, 1, 16384,
+               "[-] parameters of the ground that it rebuilds"),
+};
+#define DECODER_FIELDS ((int)(sizeof decoder_fields / sizeof *decoder_fields))
+
 static const MildField *file_field(int index) {
     return index < SHAPE_FIELDS ? &shape_fields[index] : &policy_fields[index - SHAPE_FIELDS];
 }
@@ -64,6 +75,13 @@ static void add_text(PolicyTexts *texts, const char *key, const char *value) {
     texts->text[texts->count++] = (SafetensorsText){key, value};
 }
 
+static void add_field(PolicyTexts *texts, const MildField *field, const PolicyDef *def) {
+    const int at = texts->count;
+    snprintf(texts->key[at], sizeof texts->key[at], "policy.%s", field->name);
+    mild_field_print(field, def, texts->value[at], sizeof texts->value[at]);
+    add_text(texts, texts->key[at], texts->value[at]);
+}
+
 void policy_file_texts(const Network *network, const char *kind, const char *note,
                        PolicyTexts *texts) {
     texts->count = 0;
@@ -74,10 +92,10 @@ void policy_file_texts(const Network *network, const char *kind, const char *not
         add_text(texts, "robot", network->def.robot);
     }
     for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
-        const int at = texts->count;
-        snprintf(texts->key[at], sizeof texts->key[at], "policy.%s", file_field(f)->name);
-        mild_field_print(file_field(f), &network->def, texts->value[at], sizeof texts->value[at]);
-        add_text(texts, texts->key[at], texts->value[at]);
+        add_field(texts, file_field(f), &network->def);
+    }
+    for (int f = 0; network->def.ground_count > 0 && f < DECODER_FIELDS; f++) {
+        add_field(texts, &decoder_fields[f], &network->def);
     }
 }
 
@@ -86,6 +104,22 @@ static MildStatus missing_key(const char *path, const char *key, MildError *erro
                      "%s: its metadata key '%s' is missing; give a policy or checkpoint that "
                      "`mild train` wrote",
                      path, key);
+}
+
+static MildStatus take_field(const Safetensors *file, const char *path, const MildField *field,
+                             int needed, PolicyDef *def, MildError *error) {
+    char key[48];
+    snprintf(key, sizeof key, "policy.%s", field->name);
+    const char *text = safetensors_text(file, key);
+    MildError inner = {0};
+    if (!text) {
+        return needed ? missing_key(path, key, error) : MILD_OK;
+    }
+    if (mild_field_parse(field, def, text, "policy", &inner)) {
+        return mild_fail(error, MILD_ERROR_FORMAT, "%s: %.200s; this program cannot use the file",
+                         path, inner.text);
+    }
+    return MILD_OK;
 }
 
 MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef *def,
@@ -113,21 +147,14 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
         return mild_fail(error, MILD_ERROR_FORMAT, "%s: its metadata key 'robot' is too long",
                          path);
     }
-    for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
-        const MildField *field = file_field(f);
-        char key[48];
-        snprintf(key, sizeof key, "policy.%s", field->name);
-        const char *text = safetensors_text(file, key);
-        MildError inner = {0};
-        if (!text) {
-            return missing_key(path, key, error);
-        }
-        if (mild_field_parse(field, def, text, "policy", &inner)) {
-            return mild_fail(error, MILD_ERROR_FORMAT,
-                             "%s: %.200s; this program cannot use the file", path, inner.text);
-        }
+    MildStatus status = MILD_OK;
+    for (int f = 0; !status && f < SHAPE_FIELDS + policy_field_count; f++) {
+        status = take_field(file, path, file_field(f), 1, def, error);
     }
-    return MILD_OK;
+    for (int f = 0; !status && f < DECODER_FIELDS; f++) {
+        status = take_field(file, path, &decoder_fields[f], 0, def, error);
+    }
+    return status;
 }
 
 static MildStatus wrong_tensor(const char *path, const char *name, const char *what,

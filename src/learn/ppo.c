@@ -87,6 +87,13 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     ppo->scratch = take(ppo, (size_t)pool_threads(ppo->pool) * ppo->scratch_floats * sizeof(float));
     ppo->order = take(ppo, (size_t)largest * sizeof *ppo->order);
     ppo->substitute = take(ppo, samples * sizeof *ppo->substitute);
+    if (ppo->def.sample_latent) {
+        ppo->noise =
+            take(ppo, (size_t)ppo->part.width * (size_t)n->def.latent * sizeof *ppo->noise);
+        if (!ppo->noise) {
+            return 0;
+        }
+    }
     if (ppo->def.average > 0.0) {
         ppo->average = policy_create(policy_def(ppo->policy), ppo->seed, NULL);
         ppo->bytes += count * sizeof(float);
@@ -124,6 +131,25 @@ static MildStatus check_mirror(const PolicyDef *def, const PpoMirror *mirror, Mi
     return MILD_OK;
 }
 
+/* The decoder's shape is the target's. */
+static MildStatus check_decoder(const PpoDef *def, const PolicyDef *policy, MildError *error) {
+    const int frame = def->decoder_target != PPO_TARGET_GROUND,
+              ground = !frame || def->decoder_target == PPO_TARGET_BOTH;
+    if (policy->decoder_frame != frame || (policy->ground_count > 0) != ground) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "ppo.decoder_target does not fit the policy, whose decoder rebuilds %s "
+                         "frame and %d parameters of the ground",
+                         policy->decoder_frame ? "a" : "no", policy->ground_count);
+    }
+    if (!def->target_noise && policy->critic_input < policy->observation) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "ppo.target_noise = 0: the critic's %d numbers do not begin with a frame "
+                         "of %d",
+                         policy->critic_input, policy->observation);
+    }
+    return MILD_OK;
+}
+
 static MildStatus check_def(const PpoDef *def, int envs, MildError *error) {
     MildStatus status = mild_fields_check(ppo_fields, ppo_field_count, def, "ppo", error);
     if (status) {
@@ -150,7 +176,8 @@ Ppo *ppo_create(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *
 Ppo *ppo_create_part(const PpoDef *def, Policy *policy, Pool *pool, const PpoMirror *mirror,
                      int envs, uint64_t seed, Ranks *ranks, MildError *error) {
     _Static_assert(PPO_SHARDS % RANKS_MAX == 0, "a process has whole shards");
-    if (check_def(def, envs, error) || check_mirror(policy_def(policy), mirror, error)) {
+    if (check_def(def, envs, error) || check_decoder(def, policy_def(policy), error) ||
+        check_mirror(policy_def(policy), mirror, error)) {
         return NULL;
     }
     if (envs < ranks_count(ranks)) {
@@ -193,6 +220,7 @@ void ppo_destroy(Ppo *ppo) {
         free(ppo->first);
         free(ppo->second);
         free(ppo->scratch);
+        free(ppo->noise);
         free(ppo->order);
         free(ppo->substitute);
         free(ppo);
@@ -335,7 +363,11 @@ void ppo_act(Ppo *ppo, int t) {
         return;
     }
     const PolicyRows rows = rows_of(ppo, 1);
-    policy_act_rows(ppo->policy, ppo->pool, &rows, b->history + first * n->history,
+    if (ppo->noise) {
+        noise_normal(step_sampled_key(ppo->seed, ppo->iteration, t),
+                     (int64_t)ppo->part.first * n->def.latent, b->envs * n->def.latent, ppo->noise);
+    }
+    policy_act_rows(ppo->policy, ppo->pool, &rows, b->history + first * n->history, ppo->noise,
                     b->mean + first * n->def.actions);
     ActJob job = {ppo, t, step_action_key(ppo->seed, ppo->iteration, t), policy_std(ppo->policy)};
     pool_run(ppo->pool, PPO_PIECES, act_piece, &job);
@@ -419,20 +451,22 @@ static int update_minibatch(Ppo *ppo, LossContext *context, const PpoMinibatch *
     return 1;
 }
 
-/* Replaces each frame of the piece's environments by its successor. */
-static void shift_piece(void *context, int piece, int thread) {
+/* Writes the decoder's frames of the piece's environments: this one or its successor, from the
+ * frames or from the critic's input, which begins with a frame without noise. */
+static void frame_piece(void *context, int piece, int thread) {
     (void)thread;
     const Ppo *ppo = context;
     const PpoBatch *b = &ppo->batch;
-    const int width = policy_def(ppo->policy)->observation;
+    const PolicyDef *def = policy_def(ppo->policy);
+    const int width = def->observation, stride = ppo->def.target_noise ? width : def->critic_input,
+              is_next = step_frame_is_next(&ppo->def);
+    const float *from = ppo->def.target_noise ? b->frame : b->critic;
     const int first = ppo_piece_begin(b->envs, piece), end = ppo_piece_begin(b->envs, piece + 1);
     for (int t = 0; t < b->steps; t++) {
         for (int env = first; env < end; env++) {
-            const int64_t now = (int64_t)t * b->envs + env, next = now + b->envs;
-            if (returns_has_next(b, t, now)) {
-                memcpy(b->frame + now * width, b->frame + next * width,
-                       (size_t)width * sizeof *b->frame);
-            }
+            const int64_t now = (int64_t)t * b->envs + env;
+            const int64_t row = is_next && returns_has_next(b, t, now) ? now + b->envs : now;
+            memmove(b->frame + now * width, from + row * stride, (size_t)width * sizeof *from);
         }
     }
 }
@@ -440,8 +474,8 @@ static void shift_piece(void *context, int piece, int thread) {
 static void update(Ppo *ppo, PpoReport *report) {
     const Network *n = &ppo->policy->network;
     PpoBatch *b = &ppo->batch;
-    if (ppo->def.decoder_target == PPO_TARGET_NEXT) {
-        pool_run(ppo->pool, PPO_PIECES, shift_piece, ppo);
+    if (step_writes_frames(&ppo->def)) {
+        pool_run(ppo->pool, PPO_PIECES, frame_piece, ppo);
     }
     const PolicyRows rows = rows_of(ppo, b->steps + 1);
     policy_value_rows(ppo->policy, ppo->pool, &rows, b->critic, b->value);

@@ -18,6 +18,7 @@ PpoDef ppo_def_default(void) {
         .max_gradient_norm = 1.0,
         .epsilon = 0.3,
         .decoder_target = PPO_TARGET_NEXT,
+        .target_noise = 1,
         .kl_weight = 0.001,
         .mirror_weight = 1.0,
         .mirror_share = 0.5,
@@ -27,7 +28,15 @@ PpoDef ppo_def_default(void) {
     };
 }
 
-static const char *const target_names[PPO_TARGETS] = {"newest", "next"};
+void ppo_set_decoder(const PpoDef *def, int ground_offset, int ground_count, PolicyDef *policy) {
+    const int ground =
+        def->decoder_target == PPO_TARGET_GROUND || def->decoder_target == PPO_TARGET_BOTH;
+    policy->decoder_frame = def->decoder_target != PPO_TARGET_GROUND;
+    policy->ground_offset = ground ? ground_offset : 0;
+    policy->ground_count = ground ? ground_count : 0;
+}
+
+static const char *const target_names[PPO_TARGETS] = {"newest", "next", "ground", "both"};
 static const char *const matmul_names[PPO_MATMULS] = {"fp32", "tf32", "bf16"};
 
 const MildField ppo_fields[] = {
@@ -58,9 +67,19 @@ const MildField ppo_fields[] = {
     MILD_FIELD(PpoDef, epsilon, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,
                "[-] share of the regression losses in the joint loss; the rest is PPO's"),
     MILD_FIELD_CHOICE(PpoDef, decoder_target, target_names, PPO_TARGETS,
-                      "[-] frame that the decoder reconstructs: the newest or the next one"),
+                      "[-] what the decoder reconstructs: the newest frame, the next one, the "
+                      "ground's parameters in the critic's input, or the next frame and these"),
+    MILD_FIELD(
+        PpoDef, target_noise, MILD_FIELD_BOOL, 1, 0, 1,
+        "[bool] the decoder's frame as the policy sees it; false: without noise and latency, as "
+        "the critic sees it"),
     MILD_FIELD(PpoDef, kl_weight, MILD_FIELD_DOUBLE, 1, 0.0, 10.0,
                "[-] weight of the KL divergence between the latent and N(0, I)"),
+    MILD_FIELD(PpoDef, free_bits, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
+               "[nat] KL divergence of each latent dimension below which it costs nothing"),
+    MILD_FIELD(PpoDef, sample_latent, MILD_FIELD_BOOL, 1, 0, 1,
+               "[bool] in training the actor gets a latent drawn around mu, as the decoder does; "
+               "false: mu"),
     MILD_FIELD(PpoDef, mirror_weight, MILD_FIELD_DOUBLE, 1, 0.0, 100.0,
                "[-] weight of the mirror symmetry loss"),
     MILD_FIELD(PpoDef, mirror_share, MILD_FIELD_DOUBLE, 1, 0.0, 1.0,

@@ -3,12 +3,23 @@
 #ifndef MILD_PPO_DEF_H
 #define MILD_PPO_DEF_H
 
+#include "learn/policy_def.h"
 #include "mild/field.h"
 
-/* Frame that the decoder reconstructs from z and the estimates: the newest frame of the history,
- * or the next frame. The next frame makes z predict how the ground answers, while the actor sees
- * the newest one anyway. The last frame of an episode has no successor and is its own target. */
-typedef enum { PPO_TARGET_NEWEST, PPO_TARGET_NEXT, PPO_TARGETS } PpoTarget;
+/* What the decoder reconstructs from z and the estimates: the newest frame of the history, the next
+ * frame, the ground's parameters in the critic's input, or the next frame and the parameters. The
+ * next frame makes z predict how the ground answers, while the actor sees the newest one anyway.
+ * The last frame of an episode has no successor and is its own target. The loss is
+ *     mean over the frame of (decoded - frame)^2 + mean over the ground of (decoded - ground)^2,
+ * each mean over its own numbers, so that 47 of a frame do not outweigh 13 of the ground. The shape
+ * in PolicyDef says the same: ppo_set_decoder. */
+typedef enum {
+    PPO_TARGET_NEWEST,
+    PPO_TARGET_NEXT,
+    PPO_TARGET_GROUND,
+    PPO_TARGET_BOTH,
+    PPO_TARGETS
+} PpoTarget;
 
 /* Arithmetic of the matrix products on a GPU: 32-bit floats, or factors rounded to 11 (TF32) or 8
  * (bfloat16) significant bits, which the tensor cores multiply. Sums have 32 bits always. */
@@ -31,7 +42,10 @@ typedef struct {
     double max_gradient_norm;
     double epsilon;     /* 0.3: share of loss_reg in the joint loss (eq 16) */
     int decoder_target; /* a PpoTarget */
+    int target_noise;   /* bool: its frame as the policy sees it; 0: without noise, as the critic */
     double kl_weight;   /* phi of the VAE's KL term */
+    double free_bits;   /* [nat] KL of a latent dimension below which it costs nothing */
+    int sample_latent;  /* bool: in training the actor's z is a draw of N(mu, e^logvar), else mu */
     double mirror_weight;
     double mirror_share;  /* share of each minibatch on which the mirror loss is evaluated */
     double std_min;       /* lower bound of the action noise */
@@ -43,6 +57,8 @@ typedef struct {
     int matmul;     /* a PpoMatmul */
 } PpoDef;
 PpoDef ppo_def_default(void);
+/* The shape of the decoder that a target needs. ground_offset, ground_count: of the task. */
+void ppo_set_decoder(const PpoDef *def, int ground_offset, int ground_count, PolicyDef *policy);
 extern const MildField ppo_fields[];
 extern const int ppo_field_count;
 

@@ -49,9 +49,31 @@ static void copy_row(float *to, int row, const float *from, int64_t sample, int 
     memcpy(to + (int64_t)row * width, from + sample * width, (size_t)width * sizeof *to);
 }
 
+/* [frame | ground] of sample i. */
+static void copy_decoder_target(const Network *n, const PpoBatch *b, int64_t i, float *to) {
+    const float *critic = b->critic + i * n->def.critic_input;
+    memcpy(to, b->frame + i * n->def.observation, (size_t)n->decoded_frame * sizeof *to);
+    memcpy(to + n->decoded_frame, critic + n->def.ground_offset,
+           (size_t)n->def.ground_count * sizeof *to);
+}
+
 /* Samples from place `at` of the minibatch onward. */
 static const int *samples_at(const GradientJob *job, int at) {
     return job->minibatch->samples + (at - job->minibatch->cut[job->ppo->part.shard]);
+}
+
+/* The noise of z in the rollout. An image has that of its sample. */
+static void sampled_noise(const Ppo *ppo, const int *samples, LossChunk *chunk) {
+    const int latent = ppo->policy->network.def.latent, envs = ppo->batch.envs;
+    float *noise = chunk->noise;
+    for (int r = 0; r < chunk->rows + chunk->mirrored; r++, noise += latent) {
+        const int i = samples[r < chunk->rows ? r : r - chunk->rows],
+                  env = ppo->part.first + i % envs;
+        const uint64_t key = step_sampled_key(ppo->seed, ppo->iteration, i / envs);
+        for (int j = 0; j < latent; j++) {
+            noise[j] = noise_number(key, (int64_t)env * latent + j);
+        }
+    }
 }
 
 static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
@@ -63,7 +85,7 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
         int64_t i = samples[r];
         copy_row(chunk->history, r, b->history, i, n->history);
         copy_row(chunk->estimate, r, b->target, i, n->def.estimates);
-        copy_row(chunk->decoder_target, r, b->frame, i, n->def.observation);
+        copy_decoder_target(n, b, i, chunk->decoder_target + (int64_t)r * n->decoded);
         copy_row(chunk->action, r, b->action, i, n->def.actions);
         copy_row(chunk->old_mean, r, b->mean, i, n->def.actions);
         chunk->old_log_prob[r] = b->log_prob[i];
@@ -71,6 +93,11 @@ static void gather_actor(const GradientJob *job, int at, LossChunk *chunk) {
     }
     for (int r = 0; r < chunk->mirrored; r++) {
         loss_mirror_row(job->loss, chunk, r, chunk->rows + r);
+    }
+    chunk->outputs.noise = ppo->def.sample_latent ? chunk->noise : NULL;
+    if (ppo->def.sample_latent) {
+        sampled_noise(ppo, samples, chunk);
+        return;
     }
     noise_normal(step_latent_key(ppo->seed, ppo->iteration, job->minibatch->draw),
                  2 * (int64_t)at * n->def.latent, chunk->rows * n->def.latent, chunk->noise);

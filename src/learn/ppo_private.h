@@ -47,6 +47,7 @@ typedef struct Ppo {
     float *scratch;  /* [threads][scratch_floats] */
     size_t scratch_floats;
     int mirror_rows; /* images per full chunk */
+    float *noise;    /* [part.width][latent] of z, ppo.sample_latent; NULL: none */
     int *order;      /* [largest minibatch] this process's samples of the present minibatch */
     /* [steps * envs] The sample itself if it is usable, else the next usable one of its stratum. */
     int *substitute;

@@ -18,10 +18,30 @@ static inline MILD_BOTH uint64_t step_action_key(uint64_t seed, int64_t iteratio
     return random_bits(&random);
 }
 
+/* Number env * latent + j of the stream is the noise of z_j at time t with ppo.sample_latent, in the
+ * rollout and in every minibatch. So an action's probability is that given its own noise. */
+static inline MILD_BOTH uint64_t step_sampled_key(uint64_t seed, int64_t iteration, int t) {
+    Random random = random_at(seed ^ 0x7a6c6174u, (uint32_t)iteration, (uint32_t)t);
+    return random_bits(&random);
+}
+
 /* draw: number of the minibatch in its update. See ppo_latent_rows. */
 static inline MILD_BOTH uint64_t step_latent_key(uint64_t seed, int64_t iteration, uint32_t draw) {
     Random random = random_at(seed ^ 0x76616573u, (uint32_t)iteration, draw);
     return random_bits(&random);
+}
+
+/* ---- the decoder's frames ---- */
+
+/* Bool: the decoder's frame is the next one. */
+static inline MILD_BOTH int step_frame_is_next(const PpoDef *def) {
+    return def->decoder_target == PPO_TARGET_NEXT || def->decoder_target == PPO_TARGET_BOTH;
+}
+
+/* Bool: batch.frame has the decoder's frames only after they were written there. */
+static inline MILD_BOTH int step_writes_frames(const PpoDef *def) {
+    return def->decoder_target != PPO_TARGET_GROUND &&
+           (step_frame_is_next(def) || !def->target_noise);
 }
 
 /* ---- one minibatch ---- */

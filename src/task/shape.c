@@ -13,6 +13,10 @@ TaskShape task_shape(const Robot *robot) {
     return shape;
 }
 
+int task_critic_ground(const TaskShape *shape) {
+    return shape->observation + shape->estimates + 6 * shape->feet + 10; /* push 6, masses 4 */
+}
+
 /* Mirror image in the x-z plane. y components, roll, yaw and their rates change sign, and the
  * joints swap sides. If left and right legs alternate, the clock shifts by half a period, (sin,
  * cos) -> (-sin, -cos). If they move together, it does not change. */

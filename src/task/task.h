@@ -34,6 +34,9 @@ enum { /* of a robot with ROBOT_JOINTS_MAX joints and ROBOT_FEET_MAX feet */
        TASK_CRITIC_MAX = TASK_OBSERVATION_MAX + TASK_ESTIMATES_MAX + 6 * ROBOT_FEET_MAX + 34
 };
 TaskShape task_shape(const Robot *robot);
+/* First of the ground's numbers in the critic's input: TASK_GROUND_NUMBERS, then whether it is
+ * rigid, where the numbers are 0. */
+int task_critic_ground(const TaskShape *shape);
 
 typedef struct {
     TaskShape shape;

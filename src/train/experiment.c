@@ -26,6 +26,7 @@ void experiment_fit_robot(ExperimentDef *def, const Robot *robot) {
     def->policy.estimates = shape.estimates;
     def->policy.feet_velocity_offset = 3; /* behind the base's velocity */
     def->policy.feet_velocity_count = 3 * shape.feet;
+    ppo_set_decoder(&def->ppo, task_critic_ground(&shape), TASK_GROUND_NUMBERS + 1, &def->policy);
 }
 
 MildStatus experiment_check(const ExperimentDef *def, MildError *error) {

@@ -234,6 +234,13 @@ static void gradients_are_those_of_the_cpu(void **state) {
     def.mirror_share = 1.0;
     def.clip_value = 0;
     compare_learner(&small, &def, 37, 100, worst);
+    for (int target = PPO_TARGET_GROUND; target <= PPO_TARGET_BOTH; target++) {
+        def.decoder_target = target;
+        def.free_bits = 0.1; /* some dimensions below, some above */
+        def.sample_latent = target == PPO_TARGET_BOTH;
+        ppo_set_decoder(&def, 4, 3, &small);
+        compare_learner(&small, &def, 37, 100, worst);
+    }
 #ifndef EMULATED
     def = ppo_def_default();
     PolicyDef full = policy_def_default();
@@ -406,6 +413,17 @@ static void updates_are_those_of_the_cpu(void **state) {
     def.std_min = 0.99; /* the noise meets its floor at a step and its ceiling at the end */
     def.std_max[0] = def.std_max[1] = 0.7;
     worse(&worst, compare_update(&policy, &def, 5, 0, NOTHING));
+    def = ppo_def_default();
+    for (int target = 0; target < PPO_TARGETS; target++) {
+        for (int noise = 0; noise < 2; noise++) {
+            PolicyDef other = small_def();
+            def.decoder_target = target;
+            def.target_noise = noise;
+            def.sample_latent = noise;
+            ppo_set_decoder(&def, 4, 3, &other);
+            worse(&worst, compare_update(&other, &def, 5, 0, INVALID));
+        }
+    }
 #ifndef EMULATED
     PolicyDef full = policy_def_default();
     def = ppo_def_default();

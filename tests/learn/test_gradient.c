@@ -26,10 +26,12 @@ typedef struct {
     int samples[SAMPLES];
 } Case;
 
-static void case_open(Case *c, double mirror_share) {
+static void case_open(Case *c, double mirror_share, int target) {
     MildError error = {0};
     PolicyDef policy_def = small_def();
     PpoDef def = ppo_def_default();
+    def.decoder_target = target;
+    ppo_set_decoder(&def, 4, 2, &policy_def);
     def.steps = STEPS;
     def.kl_weight = 0.1;
     def.mirror_share = mirror_share;
@@ -87,7 +89,11 @@ static void one_sample(const Case *c, LossChunk *chunk, int p, int image, const 
     chunk->mirrored = image;
     memcpy(chunk->history, b->history + i * 15, 15 * sizeof(float));
     memcpy(chunk->estimate, b->target + i * 6, 6 * sizeof(float));
-    memcpy(chunk->decoder_target, b->frame + i * 5, 5 * sizeof(float));
+    const int frame = c->ppo->def.decoder_target == PPO_TARGET_GROUND ? 0 : 5;
+    memcpy(chunk->decoder_target, b->frame + i * 5, (size_t)frame * sizeof(float));
+    if (c->ppo->def.decoder_target > PPO_TARGET_NEXT) { /* numbers 4 and 5 of the critic's */
+        memcpy(chunk->decoder_target + frame, b->critic + i * 7 + 4, 2 * sizeof(float));
+    }
     memcpy(chunk->action, b->action + i * 2, 2 * sizeof(float));
     memcpy(chunk->old_mean, b->mean + i * 2, 2 * sizeof(float));
     memcpy(chunk->critic, b->critic + i * 7, 7 * sizeof(float));
@@ -164,15 +170,15 @@ static void check_minibatch(Case *c, int count, uint32_t draw, double share) {
 static void minibatch_is_the_sum_of_its_samples(void **state) {
     (void)state;
     Case c;
-    case_open(&c, 0.5);
+    case_open(&c, 0.5, PPO_TARGET_NEXT);
     check_minibatch(&c, SAMPLES, 0, 0.5);
     check_minibatch(&c, 1001, 1, 0.5);
     check_minibatch(&c, 5, 2, 0.5);
     case_close(&c);
-    case_open(&c, 1.0);
+    case_open(&c, 1.0, PPO_TARGET_GROUND);
     check_minibatch(&c, 2100, 3, 1.0);
     case_close(&c);
-    case_open(&c, 0.0);
+    case_open(&c, 0.0, PPO_TARGET_BOTH);
     check_minibatch(&c, 300, 4, 0.0);
     case_close(&c);
 }

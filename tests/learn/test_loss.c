@@ -188,8 +188,9 @@ static void mlp_double(const Mlp *mlp, const double *p, const double *x, double 
     memcpy(y, out, (size_t)mlp->layer[mlp->layers - 1].out * sizeof *y);
 }
 
-static void act_double(const Network *n, const double *p, const double *history, double *heads,
-                       double *mean) {
+/* noise: of the actor's z; NULL: z = mu. */
+static void act_double(const Network *n, const double *p, const double *history, const float *noise,
+                       double *heads, double *mean) {
     const PolicyDef *d = &n->def;
     double theta[64], input[64];
     mlp_double(&n->encoder, p, history, heads);
@@ -199,7 +200,9 @@ static void act_double(const Network *n, const double *p, const double *history,
     for (int j = 0; j < d->latent; j++) {
         int a = d->modulation_per_dimension ? j : 0,
             b = d->modulation_per_dimension ? d->latent + j : 1;
-        input[d->observation + d->estimates + j] = theta[a] * heads[d->estimates + j] + theta[b];
+        const double spread = exp(0.5 * heads[d->estimates + d->latent + j]),
+                     z = heads[d->estimates + j] + (noise ? spread * (double)noise[j] : 0.0);
+        input[d->observation + d->estimates + j] = theta[a] * z + theta[b];
     }
     mlp_double(&n->actor, p, input, mean);
 }
@@ -213,13 +216,15 @@ static double regression_double(const Case *c, const double *p, const double *he
     for (int j = 0; j < d->latent; j++) {
         double mu = heads[d->estimates + j], logvar = heads[d->estimates + d->latent + j];
         input[j] = mu + exp(0.5 * logvar) * (double)c->chunk.noise[r * d->latent + j];
-        loss -= 0.5 * c->def.kl_weight * (1.0 + logvar - mu * mu - exp(logvar));
+        loss += c->def.kl_weight *
+                fmax(-0.5 * (1.0 + logvar - mu * mu - exp(logvar)), c->def.free_bits);
     }
     memcpy(input + d->latent, heads, (size_t)d->estimates * sizeof *input);
     mlp_double(&n->decoder, p, input, decoded);
-    for (int j = 0; j < d->observation; j++) {
-        loss += pow(decoded[j] - (double)c->chunk.decoder_target[r * d->observation + j], 2) /
-                d->observation;
+    const int frame = d->decoder_frame ? d->observation : 0, width = frame + d->ground_count;
+    for (int j = 0; j < width; j++) {
+        loss += pow(decoded[j] - (double)c->chunk.decoder_target[r * width + j], 2) /
+                (j < frame ? frame : d->ground_count);
     }
     for (int g = 0; g < 3; g++) {
         for (int j = ends[g]; j < ends[g + 1]; j++) {
@@ -268,10 +273,12 @@ static double loss_double(const Case *c, const double *p) {
             image[i] =
                 (double)sign_o[k] * (double)c->chunk.history[r * n->history + f + mirror_o[k]];
         }
-        act_double(n, p, history, heads, mean);
+        const float *noise = c->chunk.outputs.noise ? c->chunk.noise + r * d->latent : NULL;
+        act_double(n, p, history, noise, heads, mean);
         loss += c->def.epsilon * regression_double(c, p, heads, r) / ROWS;
         loss += (1.0 - c->def.epsilon) * policy_double(c, p, mean, r) / ROWS;
-        act_double(n, p, image, heads, turned);
+        noise = noise && r < MIRRORED ? noise + ROWS * d->latent : noise;
+        act_double(n, p, image, noise, heads, turned);
         for (int j = 0; r < MIRRORED && j < d->actions; j++) {
             loss += c->def.mirror_weight *
                     pow(mean[j] - (double)sign_a[j] * turned[mirror_a[j]], 2) /
@@ -287,8 +294,11 @@ static void fill_inputs(Case *c, Random *random) {
     fill_normal(c->parameters, c->network.count, 0.35, random);
     fill_normal(k->history, ROWS * c->network.history, 1.0, random);
     fill_normal(k->estimate, ROWS * d->estimates, 1.0, random);
-    fill_normal(k->decoder_target, ROWS * d->observation, 1.0, random);
+    fill_normal(k->decoder_target, ROWS * c->network.decoded, 1.0, random);
     fill_normal(k->noise, ROWS * d->latent, 1.0, random);
+    if (k->outputs.noise) {
+        fill_normal(k->noise + ROWS * d->latent, MIRRORED * d->latent, 1.0, random);
+    }
     fill_normal(k->action, ROWS * d->actions, 1.0, random);
     fill_normal(k->old_mean, ROWS * d->actions, 1.0, random);
     fill_normal(k->advantage, ROWS, 1.0, random);
@@ -306,11 +316,14 @@ static void fill_inputs(Case *c, Random *random) {
 /* Central differences with step 1e-6 in double leave about 1e-9; single precision about 1e-6. A
  * parameter whose difference straddles a corner of the loss would show as an outlier: with these
  * draws there is none. */
-static void check_differences(PolicyDef policy_def, int clip_value, uint64_t seed) {
+static void check_differences(PolicyDef policy_def, int clip_value, double free_bits, int sampled,
+                              uint64_t seed) {
     Case c;
     Random random = random_at(seed, 0, 0);
     case_open(&c, policy_def);
     c.def.clip_value = clip_value;
+    c.def.free_bits = free_bits;
+    c.chunk.outputs.noise = sampled ? c.chunk.noise : NULL;
     fill_inputs(&c, &random);
     case_run(&c);
     double *p = calloc((size_t)c.network.count, sizeof *p), worst = 0.0;
@@ -336,12 +349,56 @@ static void check_differences(PolicyDef policy_def, int clip_value, uint64_t see
 static void test_matches_differences(void **state) {
     (void)state;
     PolicyDef def = small_def();
-    check_differences(def, 1, 1);
+    check_differences(def, 1, 0.0, 0, 1);
     def.modulation_per_dimension = 1;
-    check_differences(def, 0, 2);
+    check_differences(def, 0, 0.0, 0, 2);
     def.feet_velocity_offset = 0; /* no first group of estimates */
     def.actor_hidden[0] = 0, def.actor_hidden[1] = 0, def.actor_hidden[2] = 0; /* a linear actor */
-    check_differences(def, 1, 3);
+    check_differences(def, 1, 0.0, 0, 3);
+}
+
+/* What the decoder rebuilds, each part with the mean of its own; and free bits. */
+static void test_awareness_matches_differences(void **state) {
+    (void)state;
+    PolicyDef def = small_def();
+    def.ground_offset = 3;
+    def.ground_count = 2;
+    check_differences(def, 1, 0.0, 0, 11);
+    def.decoder_frame = 0;
+    check_differences(def, 1, 0.0, 0, 12);
+    check_differences(small_def(), 1, 0.7, 0, 13);
+    def = small_def();
+    check_differences(def, 1, 0.0, 1, 14);
+    def.modulation_per_dimension = 1;
+    check_differences(def, 1, 0.7, 1, 15);
+}
+
+/* Each part of the decoder's output is a mean over its own numbers: 2^2 + 3^2, whatever the widths.
+ */
+static void test_parts_of_the_decoder_weigh_the_same(void **state) {
+    (void)state;
+    Case c;
+    Random random = random_at(9, 0, 0);
+    PolicyDef def = small_def();
+    def.ground_offset = 5;
+    def.ground_count = 2;
+    case_open(&c, def);
+    assert_int_equal(c.network.decoded, 7);
+    fill_inputs(&c, &random);
+    const MlpLayer *last = &c.network.decoder.layer[c.network.decoder.layers - 1];
+    memset(c.parameters + last->weight, 0, (size_t)(last->in * last->out) * sizeof(float));
+    memset(c.parameters + last->bias, 0, (size_t)last->out * sizeof(float));
+    for (int i = 0; i < ROWS * 7; i++) { /* decoded 0: squares 4 and 9 */
+        c.chunk.decoder_target[i] = i % 7 < 5 ? 2.0f : 3.0f;
+    }
+    case_run(&c);
+    double worst = 0.0;
+    assert_near("loss", c.sums.reconstruction / ROWS, 4.0 + 9.0, 1e-6, &worst);
+    for (int j = 0; j < 7; j++) { /* epsilon 2 (0 - target) / width of the part */
+        assert_near("gradient", c.gradient[last->bias + j],
+                    j < 5 ? -0.3 * 4.0 / 5.0 : -0.3 * 6.0 / 2.0, 1e-6, &worst);
+    }
+    case_close(&c);
 }
 
 /* Chunks add up: the gradient with beta 1 on top of another is their sum. */
@@ -381,7 +438,9 @@ static void claim(const float *block, size_t floats, char *taken, const float *a
 static void test_areas_are_apart(void **state) {
     (void)state;
     Case c;
-    case_open(&c, small_def());
+    PolicyDef def = small_def();
+    def.ground_count = 3;
+    case_open(&c, def);
     const Network *n = &c.network;
     const PolicyDef *d = &n->def;
     const LossChunk *k = &c.chunk;
@@ -407,8 +466,8 @@ static void test_areas_are_apart(void **state) {
         int rows, width;
     } areas[] = {{k->history, all, n->history},
                  {k->estimate, ROWS, d->estimates},
-                 {k->decoder_target, ROWS, d->observation},
-                 {k->noise, ROWS, d->latent},
+                 {k->decoder_target, ROWS, n->decoded},
+                 {k->noise, all, d->latent},
                  {k->action, ROWS, d->actions},
                  {k->old_mean, ROWS, d->actions},
                  {k->old_log_prob, ROWS, 1},
@@ -424,7 +483,7 @@ static void test_areas_are_apart(void **state) {
                  {k->d_theta, all, n->theta},
                  {k->d_actor_input, all, d->estimates + d->latent},
                  {k->d_feet, all, d->feet_velocity_count},
-                 {k->d_decoded, ROWS, d->observation},
+                 {k->d_decoded, ROWS, n->decoded},
                  {k->d_decoder_input, ROWS, n->decoder_input},
                  {k->d_value, ROWS, 1},
                  {k->work[0], all, widest},
@@ -514,9 +573,14 @@ static void test_logvar_bounds(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_logvar_is_held),      cmocka_unit_test(test_matches_pytorch),
-        cmocka_unit_test(test_matches_differences), cmocka_unit_test(test_chunks_add),
-        cmocka_unit_test(test_logvar_bounds),       cmocka_unit_test(test_areas_are_apart),
+        cmocka_unit_test(test_logvar_is_held),
+        cmocka_unit_test(test_matches_pytorch),
+        cmocka_unit_test(test_matches_differences),
+        cmocka_unit_test(test_chunks_add),
+        cmocka_unit_test(test_logvar_bounds),
+        cmocka_unit_test(test_areas_are_apart),
+        cmocka_unit_test(test_awareness_matches_differences),
+        cmocka_unit_test(test_parts_of_the_decoder_weigh_the_same),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

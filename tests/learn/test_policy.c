@@ -107,7 +107,7 @@ static void test_rows_in_runs(void **state) {
     memset(values[1], 0xff, sizeof values[1]);
     policy_act(policy, NULL, ROWS, history, actions[0], NULL, NULL);
     policy_value(policy, NULL, ROWS, critic, values[0]);
-    policy_act_rows(policy, pool, &both, history, actions[1]);
+    policy_act_rows(policy, pool, &both, history, NULL, actions[1]);
     policy_value_rows(policy, pool, &both, critic, values[1]);
     for (int i = 0; i < ROWS * 12; i++) {
         assert_true(fabs((double)actions[1][i] - (double)actions[0][i]) < 1e-5);
@@ -117,7 +117,7 @@ static void test_rows_in_runs(void **state) {
         memcpy(part + block * SECOND * 282, history + (block * WIDTH + FIRST) * 282,
                SECOND * 282 * sizeof *part);
     }
-    policy_act_rows(policy, NULL, &second, part, actions[2]);
+    policy_act_rows(policy, NULL, &second, part, NULL, actions[2]);
     for (int block = 0; block < BLOCKS; block++) {
         memcpy(part + block * SECOND * 98, critic + (block * WIDTH + FIRST) * 98,
                SECOND * 98 * sizeof *part);
@@ -265,6 +265,36 @@ static void test_name_of_the_robot(void **state) {
         assert_non_null(policy);
         assert_string_equal(policy_def(policy)->robot, names[i]);
         policy_destroy(policy);
+        unlink(PATH);
+    }
+}
+
+/* A decoder of the ground is written with its place in the critic's input; one of a frame alone
+ * without, as in every file from before there was another. */
+static void test_decoder_of_the_ground(void **state) {
+    (void)state;
+    for (int count = 0; count < 3; count++) {
+        MildError error = {0};
+        PolicyDef def = small_def();
+        def.decoder_frame = count != 1;
+        def.ground_offset = count > 0 ? 4 : 0;
+        def.ground_count = count;
+        Policy *policy = policy_create(&def, 4, &error);
+        assert_non_null(policy);
+        assert_int_equal(policy->network.decoded, count == 1 ? 1 : 5 + count);
+        assert_int_equal(policy_save(policy, PATH, NULL, &error), MILD_OK);
+        Safetensors *file = safetensors_read(PATH, &error);
+        assert_non_null(file);
+        assert_true((safetensors_text(file, "policy.ground_count") == NULL) == (count == 0));
+        assert_true((safetensors_text(file, "policy.decoder_frame") == NULL) == (count == 0));
+        safetensors_destroy(file);
+        Policy *read = policy_load(PATH, NULL, 0, &error);
+        assert_non_null(read);
+        assert_memory_equal(policy_def(read), policy_def(policy), sizeof def);
+        assert_memory_equal(read->parameters, policy->parameters,
+                            (size_t)policy->network.count * sizeof(float));
+        policy_destroy(policy);
+        policy_destroy(read);
         unlink(PATH);
     }
 }
@@ -544,6 +574,15 @@ static void test_unusable_defs(void **state) {
     def = small_def();
     def.feet_velocity_count = 6;
     assert_null(policy_create(&def, 1, &error));
+    static const int grounds[][3] = {{0, 8, 1}, {4, 4, 1}, {-1, 2, 1}, {3, -1, 1}, {3, 0, 0}};
+    for (size_t i = 0; i < sizeof grounds / sizeof *grounds; i++) { /* of 7 numbers */
+        def = small_def();
+        def.ground_offset = grounds[i][0];
+        def.ground_count = grounds[i][1];
+        def.decoder_frame = grounds[i][2];
+        assert_null(policy_create(&def, 1, &error));
+        assert_non_null(strstr(error.text, "decoder"));
+    }
     def = small_def();
     def.init_std = NAN;
     assert_null(policy_create(&def, 1, &error));
@@ -580,6 +619,7 @@ int main(void) {
         cmocka_unit_test(test_modulation_starts_at_identity),
         cmocka_unit_test(test_round_trip),
         cmocka_unit_test(test_name_of_the_robot),
+        cmocka_unit_test(test_decoder_of_the_ground),
         cmocka_unit_test(test_damaged_files),
         cmocka_unit_test(test_lying_headers),
         cmocka_unit_test(test_missing_keys),

@@ -18,6 +18,7 @@ static void run_open(Run *run, int threads, int envs, PpoDef def) {
     MildError error = {0};
     PolicyDef policy_def = toy_policy_def();
     PpoMirror mirror = toy_mirror();
+    ppo_set_decoder(&def, 2, 2, &policy_def); /* the speeds, if any */
     run->policy = policy_create(&policy_def, 5, &error);
     run->pool = pool_create(threads);
     assert_non_null(run->policy);
@@ -177,35 +178,115 @@ static void test_invalid_samples_have_no_weight(void **state) {
     run_close(&b);
 }
 
-/* Each target is the frame one step later, but an episode's last frame stands for itself. */
-static void test_decoder_target_is_the_next_frame(void **state) {
-    (void)state;
+/* Each target is the frame one step later, but an episode's last frame stands for itself. Without
+ * noise the frames are those that the critic's input begins with. */
+static void check_frames(int target, int noise) {
     enum { ENVS = 16, STEPS = 40, FLOATS = ENVS * TOY_OBSERVATION };
+    Run run;
+    PpoDef def = toy_ppo_def();
+    def.decoder_target = target;
+    def.target_noise = noise;
+    run_open(&run, 2, ENVS, def);
+    toy_rollout(&run.toy, run.ppo);
+    PpoBatch *b = ppo_batch(run.ppo);
+    b->done[5 * ENVS + 3] = 1;
+    b->valid[9 * ENVS + 7] = 0;
+    for (int i = 0; i < (STEPS + 1) * FLOATS; i++) { /* a noise that cannot be missed */
+        b->frame[i] += 1000.0f;
+    }
+    static float before[(STEPS + 1) * FLOATS], noiseless[(STEPS + 1) * FLOATS];
+    memcpy(before, b->frame, sizeof before);
+    memcpy(noiseless, b->critic, sizeof noiseless);
+    const float *from =
+        noise || target == PPO_TARGET_GROUND ? before : noiseless; /* the ground needs no frame */
+    PpoReport report;
+    ppo_update(run.ppo, &report);
+    const int moves = target == PPO_TARGET_NEXT || target == PPO_TARGET_BOTH;
+    int moved = 0;
+    for (int i = ENVS; i < STEPS * ENVS; i++) { /* the update carried row 0 over */
+        int stays = !moves || b->done[i] || i == 8 * ENVS + 7;
+        const float *expected = from + (i + (stays ? 0 : ENVS)) * TOY_OBSERVATION;
+        assert_memory_equal(b->frame + i * TOY_OBSERVATION, expected,
+                            TOY_OBSERVATION * sizeof *expected);
+        moved += !stays;
+    }
+    assert_true(moves ? moved > 500 : moved == 0);
+    assert_memory_equal(b->frame, before + STEPS * FLOATS, FLOATS * sizeof *before);
+    run_close(&run);
+}
+
+static void test_frames_of_the_decoder(void **state) {
+    (void)state;
     for (int target = 0; target < PPO_TARGETS; target++) {
+        check_frames(target, 1);
+        check_frames(target, 0);
+    }
+}
+
+/* The latent that an action was drawn with is the one of its probability in the update: before the
+ * first step both policies are the same, so their divergence is rounding. Robots that see the same
+ * have latents of their own, at every time. */
+static void test_sampled_latent(void **state) {
+    (void)state;
+    enum { ENVS = 16 };
+    for (int sampled = 0; sampled < 2; sampled++) {
         Run run;
         PpoDef def = toy_ppo_def();
-        def.decoder_target = target;
+        def.sample_latent = sampled;
+        def.epochs = def.minibatches = 1;
         run_open(&run, 2, ENVS, def);
-        toy_rollout(&run.toy, run.ppo);
+        Random random = random_at(3, 3, 3);
+        float *p = policy_parameters(run.policy);
+        for (int64_t i = 0; i < policy_parameter_count(run.policy) - 2; i++) { /* not log std */
+            p[i] += (float)(0.1 * random_normal(&random));
+        }
         PpoBatch *b = ppo_batch(run.ppo);
-        b->done[5 * ENVS + 3] = 1;
-        b->valid[9 * ENVS + 7] = 0;
-        static float before[(STEPS + 1) * FLOATS];
-        memcpy(before, b->frame, sizeof before);
+        const int width = TOY_FRAMES * TOY_OBSERVATION;
+        toy_rollout(&run.toy, run.ppo);
         PpoReport report;
         ppo_update(run.ppo, &report);
-        int moved = 0;
-        for (int i = ENVS; i < STEPS * ENVS; i++) { /* the update carried row 0 over */
-            int stays = target == PPO_TARGET_NEWEST || b->done[i] || i == 8 * ENVS + 7;
-            const float *expected = before + (i + (stays ? 0 : ENVS)) * TOY_OBSERVATION;
-            assert_memory_equal(b->frame + i * TOY_OBSERVATION, expected,
-                                TOY_OBSERVATION * sizeof *expected);
-            moved += !stays;
+        print_message("kl of the first step %.1e\n", report.kl);
+        assert_true(fabs(report.kl) < 1e-10 && report.clip_share == 0.0);
+        int apart = 0;
+        for (int i = 1; i < 2 * ENVS; i++) {
+            memcpy(b->history + i * width, b->history, (size_t)width * sizeof(float));
         }
-        assert_true(target == PPO_TARGET_NEWEST ? moved == 0 : moved > 500);
-        assert_memory_equal(b->frame, before + STEPS * FLOATS, FLOATS * sizeof *before);
+        ppo_act(run.ppo, 0);
+        ppo_act(run.ppo, 1);
+        for (int i = 0; i < 2 * ENVS; i++) {
+            for (int k = 0; k < i; k++) {
+                apart += fabsf(b->mean[2 * i] - b->mean[2 * k]) > 1e-6f;
+            }
+        }
+        assert_int_equal(apart, sampled ? 2 * ENVS * (2 * ENVS - 1) / 2 : 0);
         run_close(&run);
     }
+}
+
+/* A decoder of another shape than its target needs. */
+static void test_decoder_must_fit(void **state) {
+    (void)state;
+    static const int ground[PPO_TARGETS] = {0, 0, 2, 2}, frame[PPO_TARGETS] = {1, 1, 0, 1};
+    Pool *pool = pool_create(0);
+    for (int target = 0; target < PPO_TARGETS; target++) {
+        for (int shape = 0; shape < PPO_TARGETS; shape++) {
+            MildError error = {0};
+            PolicyDef policy_def = toy_policy_def();
+            PpoDef def = toy_ppo_def();
+            def.decoder_target = target;
+            policy_def.decoder_frame = frame[shape];
+            policy_def.ground_count = ground[shape];
+            Policy *policy = policy_create(&policy_def, 5, &error);
+            assert_non_null(policy);
+            Ppo *ppo = ppo_create(&def, policy, pool, NULL, 4, 11, &error);
+            const int fits = ground[shape] == ground[target] && frame[shape] == frame[target];
+            assert_true(fits == (ppo != NULL));
+            assert_true(fits || strstr(error.text, "ppo.decoder_target"));
+            ppo_destroy(ppo);
+            policy_destroy(policy);
+        }
+    }
+    pool_destroy(pool);
 }
 
 static void test_nothing_valid_changes_nothing(void **state) {
@@ -288,7 +369,9 @@ int main(void) {
         cmocka_unit_test(test_resume_is_as_if_never_stopped),
         cmocka_unit_test(test_another_run_is_refused),
         cmocka_unit_test(test_bad_numbers_are_dropped),
-        cmocka_unit_test(test_decoder_target_is_the_next_frame),
+        cmocka_unit_test(test_frames_of_the_decoder),
+        cmocka_unit_test(test_decoder_must_fit),
+        cmocka_unit_test(test_sampled_latent),
         cmocka_unit_test(test_invalid_samples_have_no_weight),
         cmocka_unit_test(test_nothing_valid_changes_nothing),
         cmocka_unit_test(test_learns_the_toy_task),

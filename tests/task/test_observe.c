@@ -284,6 +284,7 @@ static void episode_of_the_critic(void **unused) {
             expect_entry("critic", 92 + i, (double)rig.critic[92 + i], last[i], TOLERANCE);
         }
     }
+    assert_int_equal(task_critic_ground(&rig.env->shape), 80);
     rig.def.assist = 0;
     look(&reading);
     expect_near("nobody helps", (double)rig.critic[100], 0, 0);

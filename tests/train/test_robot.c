@@ -115,6 +115,28 @@ static void a_policy_without_a_name_loads(void **unused) {
     robot_destroy(sa01);
 }
 
+/* Where the decoder of the ground finds its 13 numbers: behind the frame, the estimates, six of each
+ * foot, the push and four masses. */
+static void the_decoder_is_that_of_the_target(void **unused) {
+    (void)unused;
+    static const char *const names[] = {"sa01", "go1"};
+    static const int first[] = {47 + 11 + 12 + 10, 47 + 19 + 24 + 10};
+    MildError error = {0};
+    for (int r = 0; r < 2; r++) {
+        Robot *robot = robot_open(names[r], &error);
+        ExperimentDef def = experiment_def_default();
+        for (int target = PPO_TARGETS - 1; target >= 0; target--) {
+            def.ppo.decoder_target = target;
+            experiment_fit_robot(&def, robot);
+            const int ground = target >= PPO_TARGET_GROUND;
+            assert_int_equal(def.policy.decoder_frame, target != PPO_TARGET_GROUND);
+            assert_int_equal(def.policy.ground_offset, ground ? first[r] : 0);
+            assert_int_equal(def.policy.ground_count, ground ? 13 : 0);
+        }
+        robot_destroy(robot);
+    }
+}
+
 static void an_unknown_robot_is_named(void **unused) {
     (void)unused;
     MildError error = {0};
@@ -128,6 +150,7 @@ int main(void) {
         cmocka_unit_test(a_quadruped_trains),
         cmocka_unit_test(another_robots_policy_is_refused),
         cmocka_unit_test(a_policy_without_a_name_loads),
+        cmocka_unit_test(the_decoder_is_that_of_the_target),
         cmocka_unit_test(an_unknown_robot_is_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
