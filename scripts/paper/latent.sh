@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# What makes the latent name the ground: one change at a time, SEEDS each, by configs/models.ini on one GPU (half a minute a run). Measures
+# each policy on the processor meanwhile: FOLDER/NAME-SEED.txt. What is there is kept. Usage: scripts/paper/latent.sh FOLDER SEEDS [NAME ...]
+set -euo pipefail
+out=${1:?usage: scripts/paper/latent.sh FOLDER SEEDS [NAME ...]}
+seeds=${2:?usage: scripts/paper/latent.sh FOLDER SEEDS [NAME ...]}
+shift 2
+here=$(dirname "$0")
+mild=${MILD:-build/mild}
+config=$here/../../configs/models.ini
+declare -A change=(
+    [none]="--ppo.kl_weight=10"
+    [newest]="--ppo.decoder_target=newest"
+    [next]=""
+    [clean]="--ppo.target_noise=false"
+    [ground]="--ppo.decoder_target=ground"
+    [both]="--ppo.decoder_target=both --ppo.target_noise=false"
+    [sampled]="--ppo.decoder_target=ground --ppo.sample_latent=true"
+    [dimensions]="--ppo.decoder_target=ground --policy.modulation_per_dimension=true"
+    [window]="--ppo.decoder_target=ground --task.history_stride=16"
+    [free]="--ppo.decoder_target=ground --ppo.kl_weight=0.01 --ppo.free_bits=0.25"
+)
+names=("$@")
+[ $# -gt 0 ] || names=(none newest next clean ground both sampled dimensions window free)
+mkdir -p "$out"
+
+# measure RUN NAME-SEED: walks with and without z, and what z knows.
+measure() {
+    local policy=(eval --policy "$1/policy.safetensors" --config "$1/config.ini") grounds=rigid,rubber,foam60,foam45,foam28,foam25,grass,sand_loose,sand_dense
+    {
+        echo "== whole"
+        "$mild" "${policy[@]}" --ground "$grounds" --speed 0.3,0.6,0.8 --trials 6 --threads 4
+        echo "== without z"
+        "$mild" "${policy[@]}" --ground "$grounds" --speed 0.3,0.6,0.8 --trials 6 --threads 4 --ablate z
+        "$mild" "${policy[@]}" --ground "$grounds" --speed 0.6 --trials 9 --seconds 14.2 --threads 4 --latent "$1/latent.csv" >/dev/null
+        echo "== nine grounds"
+        "$here/../latent.py" "$1/latent.csv" | grep windows || true # who falls has none
+        grep -v -E '^[0-9]+,(foam25|sand_dense),' "$1/latent.csv" >"$1/seven.csv"
+        echo "== seven grounds"
+        "$here/../latent.py" "$1/seven.csv" | grep windows || true
+    } >"$2.part" 2>&1
+    mv "$2.part" "$2.txt"
+    cp "$1/policy.safetensors" "$2.safetensors"
+    rm -rf "$1"
+}
+
+runs=$(mktemp -d)
+trap 'wait; rm -rf "$runs"' EXIT
+for seed in $(seq "$seeds"); do
+    for name in "${names[@]}"; do
+        [ -e "$out/$name-$seed.txt" ] && continue
+        run=$runs/$name-$seed
+        # shellcheck disable=SC2086 # several options
+        "$mild" train --config "$config" --out "$run" --train.seed="$seed" ${change[$name]} >"$runs/log" 2>&1 || { cat "$runs/log" >&2; exit 1; }
+        echo "$name-$seed $(tail -1 "$runs/log")"
+        cp "$run/log.csv" "$out/$name-$seed.csv"
+        measure "$run" "$out/$name-$seed" &
+    done
+done
