@@ -2,12 +2,16 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "lab/fit_solve.h"
 
 /* [-] An effect below this share of the force is none. */
 #define FIT_NOTHING 1e-12
+
+/* Of more rows the mean of neighbours is fitted. */
+enum { FIT_ROWS = 20000 };
 
 /* How often a lower sum of squares, met on the way to an interval's end, starts the fit again. */
 enum { FIT_AGAIN = 4 };
@@ -262,12 +266,33 @@ static void run_finish(Run *run) {
     }
 }
 
-MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,
-                   MildError *error) {
-    MildStatus status = fit_check(def, points, count, error);
-    if (status != MILD_OK) {
-        return status;
+/* Means of `group` neighbouring rows, fewer where a record ends: the next begins less deep. Returns
+ * their count. */
+static int rows_mean(const FitPoint *points, int count, int group, FitPoint *means) {
+    int kept = 0;
+    for (int i = 0, n = 0; i < count; i += n) {
+        FitPoint sum = {.time = NAN};
+        for (n = 0; n < group && i + n < count; n++) {
+            const FitPoint *row = &points[i + n];
+            if (n && row->depth < row[-1].depth) {
+                break;
+            }
+            sum.depth += row->depth;
+            sum.force += row->force;
+            sum.speed += row->speed;
+            sum.acceleration += row->acceleration;
+        }
+        sum.depth /= n;
+        sum.force /= n;
+        sum.speed /= n;
+        sum.acceleration /= n;
+        means[kept++] = sum;
     }
+    return kept;
+}
+
+static MildStatus run_rows(const FitDef *def, const FitPoint *points, int count, FitResult *result,
+                           MildError *error) {
     Run run = {.def = def,
                .result = result,
                .fit = {.plate = def->plate, .points = points, .count = count, .fixed = -1}};
@@ -284,4 +309,24 @@ MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResu
     run_finish(&run);
     fit_close(&run.fit);
     return MILD_OK;
+}
+
+MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,
+                   MildError *error) {
+    MildStatus status = fit_check(def, points, count, error);
+    if (status != MILD_OK || count <= FIT_ROWS) {
+        return status == MILD_OK ? run_rows(def, points, count, result, error) : status;
+    }
+    FitPoint *means = malloc(sizeof *means * (size_t)count);
+    if (!means) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
+    }
+    const int kept = rows_mean(points, count, (count + FIT_ROWS - 1) / FIT_ROWS, means);
+    status = run_rows(def, means, kept, result, error);
+    free(means);
+    if (status == MILD_OK) {
+        result->points = count;
+        result->rows *= (double)count / kept;
+    }
+    return status;
 }

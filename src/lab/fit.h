@@ -53,7 +53,8 @@ typedef struct {
     int points;
 } FitResult;
 
-/* Fits the loading rows of all records together. Fails on fewer than FIT_POINTS_MIN points or not
+/* Fits the loading rows of all records together; of more than 20 000 the means of neighbours, which
+ * is what `residual` is of then. Fails on fewer than FIT_POINTS_MIN points or not
  * more than parameters, on a model without soft ground, and on a material out of range. */
 MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,
                    MildError *error);

@@ -215,15 +215,15 @@ static void project_out(const Fit *fit, int n, double *vector) {
     }
 }
 
-/* The own part of column p is orthogonal to all other columns. own/|own|^2 is p's row of the
+/* The own part of a column is orthogonal to all other columns. own/|own|^2 is its row of the
  * pseudoinverse of J. */
-double fit_own(Fit *fit, int p) {
+double fit_own(Fit *fit, int coordinate) {
     const int count = fit->count;
-    const double *column = fit->column + p * count;
+    const double *column = fit->column + coordinate * count;
     int n = 0;
     for (int q = 0; q < fit->coordinates; q++) {
         double *vector = fit->basis + n * count;
-        if (q == p) {
+        if (q == coordinate) {
             continue;
         }
         memcpy(vector, fit->column + q * count, sizeof *vector * (size_t)count);
@@ -245,7 +245,7 @@ double fit_own(Fit *fit, int p) {
         project_out(fit, n, fit->own);
     }
     const double square = dot(fit->own, fit->own, count) + DBL_MIN;
-    for (int i = 0; i < count; i++) { /* basis and own part together span all columns, for any p */
+    for (int i = 0; i < count; i++) { /* basis and own part together span all columns */
         fit->leverage[i] = fit->own[i] * fit->own[i] / square;
         for (int k = 0; k < n; k++) {
             fit->leverage[i] += fit->basis[k * count + i] * fit->basis[k * count + i];
@@ -254,7 +254,7 @@ double fit_own(Fit *fit, int p) {
     return sqrt(dot(fit->own, fit->own, count) / (dot(column, column, count) + DBL_MIN));
 }
 
-/* [N^2] The variance of a row that is assumed at least: no sensor is exact, and neither is a law. */
+/* [N^2] The variance of a row that is assumed at least, because no sensor is exact. */
 static double floor_variance(const Fit *fit) {
     double force = 0;
     for (int i = 0; i < fit->count; i++) {

@@ -22,7 +22,7 @@ typedef enum {
     NOISE_OF_ROW
 } Noise; /* the same on every row, or in proportion to its force */
 
-static FitPoint points[3 * ROWS];
+static FitPoint points[3 * ROWS], many[50 * ROWS];
 
 static FitDef plate(const char *ground) {
     FitDef def = {.plate = {55, 0.0195}};
@@ -299,6 +299,33 @@ static void interval_linear(void **state) {
     }
 }
 
+/* Of 50 000 rows the means of three are fitted, to the same end: the interval of a spring is that of
+ * the formula for all rows. Two records, of which the first ends within a group. */
+static void interval_many(void **state) {
+    (void)state;
+    enum { FIRST = 20 * ROWS + 1, COUNT = 50 * ROWS };
+    FitDef truth = plate("grass");
+    FitResult result;
+    MildError error = {0};
+    double xx = 0, xy = 0, yy = 0;
+    truth.material.model = MILD_MODEL_ECC_SPRING;
+    press(&truth, many, FIRST, 0.04, 0.01, NOISE_OF_PEAK, 5);
+    press(&truth, many + FIRST, COUNT - FIRST, 0.04, 0.01, NOISE_OF_PEAK, 6);
+    for (int i = 0; i < COUNT; i++) {
+        const double x = 55 * many[i].depth, y = many[i].force;
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    assert_int_equal(fit_run(&truth, many, COUNT, &result, &error), MILD_OK);
+    const FitValue *k_pen = value_of(&result, "k_pen");
+    const double half = 1.95996 * sqrt((yy - xy * xy / xx) / COUNT / xx);
+    printf("50 000 rows: half width %.4f of the formula's\n", (k_pen->high - k_pen->value) / half);
+    assert_true(fabs(k_pen->value / (xy / xx) - 1) < 1e-6);
+    assert_true(fabs((k_pen->high - k_pen->low) / (2 * half) - 1) < 0.03);
+    assert_true(result.points == COUNT && fabs(result.rows / COUNT - 1) < 1e-9);
+}
+
 /* Least sum of squares of a slow press for a given u_f, and the coefficients: the force is linear
  * in k_pen and kappa, F = n (k_pen P + kappa (u - P)), P = u_f (t - t^2 + t^3/3). */
 static double sum_at(double u_f, int count) {
@@ -503,6 +530,7 @@ int main(void) {
         cmocka_unit_test(models),
         cmocka_unit_test(interval_linear),
         cmocka_unit_test(interval_profile),
+        cmocka_unit_test(interval_many),
         cmocka_unit_test(untold),
         cmocka_unit_test(filled),
         cmocka_unit_test(neighbours),
