@@ -140,6 +140,7 @@ refuse "nearest is 'sand_loose'" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold
 refuse 'clay: a ground of bekker has no numbers for mild' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold-from clay
 refuse 'alpha = 2 is outside 0.1 .. 1.5' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=2
 refuse 'c_g = -1 is outside 0 .. 10' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_g=-1
+refuse 'c_d = 0.1 is outside 0.5 .. 100' "${fit[@]}" sand_loose.csv "${plate[@]}" --hold c_d=0.1
 refuse "'alpha' is not NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha
 refuse "'alpha=nan' is not NAME=VALUE" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold alpha=nan
 refuse "'mu' is no parameter that a press on mild tells" "${fit[@]}" sand_loose.csv "${plate[@]}" --hold mu=0.5
