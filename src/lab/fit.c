@@ -154,6 +154,9 @@ static void values_find(Run *run) {
     FitInterval interval[FIT_PARAMETERS_MAX];
     fit_start(fit, &start);
     for (int again = 0, met = 0; !met && again < FIT_AGAIN; again++) {
+        for (int p = 0; p < fit->coordinates; p++) { /* until they are found */
+            interval[p] = (FitInterval){.open_low = 1, .open_high = 1};
+        }
         fit_minimise(fit);
         met = 1;
         for (int p = 0; p < fit->coordinates && met; p++) {
