@@ -177,20 +177,28 @@ static void values_find(Run *run) {
     }
 }
 
+/* Bool: the parameter may be held at the number of `fill`, because the data neither tell it nor
+ * contradict that number. */
+static int is_fillable(const Run *run, int index) {
+    const FitValue *value = &run->result->parameter[index];
+    MildMaterial fill = *run->def->fill;
+    const double number = *fit_number(&fill, value->field);
+    const int untold = value->state == FIT_LIMIT || value->state == FIT_OPEN;
+    return untold && !(number < value->low) && !(number > value->high);
+}
+
 /* Fits. With something to fill them with, holds the parameters that the data do not tell, one after
  * the other, until they tell the rest. */
 static void values_fill(Run *run) {
-    for (;;) {
+    int again = 1;
+    while (again) {
         int untold[FIT_PARAMETERS_MAX] = {0};
         ties_find(run);
         values_find(run);
-        for (int i = 0; i < run->result->parameters; i++) {
-            const FitState state = run->result->parameter[i].state;
-            untold[i] = state == FIT_LIMIT || state == FIT_OPEN;
+        for (int i = 0; i < run->result->parameters && run->def->fill; i++) {
+            untold[i] = is_fillable(run, i);
         }
-        if (!run->def->fill || !put_aside(run, untold, FIT_OPEN)) {
-            return;
-        }
+        again = put_aside(run, untold, FIT_OPEN);
     }
 }
 

@@ -18,8 +18,8 @@ typedef struct {
     FitPlate plate;
     MildMaterial material; /* the model, the numbers that are held, bed_depth and plate_width */
     int held[FIT_PARAMETERS_MAX]; /* bool, in the order of fit_parameters */
-    const MildMaterial *fill; /* where the data do not tell a parameter, hold it at this material's
-                                 number; NULL: do not */
+    const MildMaterial *fill;     /* where the data neither tell a parameter nor contradict this
+                                 material's number, hold it there; NULL: do not */
 } FitDef;
 
 typedef enum {

@@ -79,6 +79,10 @@ grep -q '^nu  *1\.[56]' table.txt || fail "nu is not fitted"
 "$mild" fit bed.csv "${plate[@]}" --hold bed_depth=0.03 --json fit.json >table.txt
 near "bed at 30 mm: k_pen" "$(value fit.json k_pen)" 480 0.1
 
+"$mild" press --ground sand_loose --depth 0.2 --ground.bed_depth=1 --csv deep.csv >/dev/null
+"$mild" fit deep.csv "${plate[@]}" --json fit.json >/dev/null
+near "no bed to 0.2 m: k_pen" "$(value fit.json k_pen)" 380 0.1
+
 # two speeds tell the drag
 "$mild" press --ground sand_loose --depth 0.04 --speed 1 --csv fast.csv >/dev/null
 "$mild" fit sand_loose.csv fast.csv "${plate[@]}" --hold-from sand_loose --fit k_pen,sigma_cone,alpha,c_d --json fit.json >table.txt
@@ -117,6 +121,9 @@ near "hunt_crossley: dissipation" "$(value hunt_crossley.json dissipation)" 0.3 
 "$mild" fit clay.csv "${plate[@]}" --model bekker --hold-from clay --json clay.json >/dev/null
 near "clay: k_phi" "$(value clay.json k_phi)" 692150 0.1
 near "clay: exponent" "$(value clay.json exponent)" 0.5 0.1
+"$mild" press --ground clay --plate 0.3,0.2 --ground.plate_width=0.2 --depth 0.04 --csv wide.csv >/dev/null
+"$mild" fit wide.csv --plate 0.3,0.2 --model bekker --hold-from clay --json clay.json >/dev/null
+near "clay, a plate 0.2 m wide: k_phi" "$(value clay.json k_phi)" 692150 0.1
 
 # the columns may stand in any order, with remarks and Windows line ends
 printf '\xef\xbb\xbf# a remark\r\nforce_n, depth_m\r\n' >order.csv

@@ -323,8 +323,8 @@ static void interval_linear(void **state) {
     }
 }
 
-/* Of 50 000 rows the means of three are fitted, to the same end: the interval of a spring is that of
- * the formula for all rows. Two records, of which the first ends within a group. */
+/* Of 50 000 rows the means of three are fitted, to the same end: the interval of a spring is that
+ * of the formula for all rows. Two records, of which the first ends within a group. */
 static void interval_many(void **state) {
     (void)state;
     enum { FIRST = 20 * ROWS + 1, COUNT = 50 * ROWS };
@@ -344,7 +344,7 @@ static void interval_many(void **state) {
     assert_int_equal(fit_run(&truth, many, COUNT, &result, &error), MILD_OK);
     const FitValue *k_pen = value_of(&result, "k_pen");
     const double half = 1.95996 * sqrt((yy - xy * xy / xx) / COUNT / xx);
-    printf("50 000 rows: half width %.4f of the formula's\n", (k_pen->high - k_pen->value) / half);
+    printf("50 000 rows: %.4f of the width\n", (k_pen->high - k_pen->low) / (2 * half));
     assert_true(fabs(k_pen->value / (xy / xx) - 1) < 1e-6);
     assert_true(fabs((k_pen->high - k_pen->low) / (2 * half) - 1) < 0.03);
     assert_true(result.points == COUNT && fabs(result.rows / COUNT - 1) < 1e-9);
@@ -477,6 +477,23 @@ static void filled(void **state) {
     }
 }
 
+/* A limit that contradicts the filling stays a limit: foam is not given the mass of sand. */
+static void not_filled(void **state) {
+    (void)state;
+    FitDef def = plate("foam45");
+    MildMaterial sand;
+    assert_true(mild_material_preset("sand_loose", &sand));
+    def.fill = &sand;
+    press_exactly(&def, points, ROWS, 0.04, 0.01, 0);
+    press_exactly(&def, points + ROWS, ROWS, 0.04, 1, 0);
+    FitResult result = run(&def, 2 * ROWS);
+    const FitValue *c_g = value_of(&result, "c_g");
+    assert_int_equal(c_g->state, FIT_LIMIT);
+    assert_true(isnan(c_g->value) && c_g->high < 0.01);
+    is_near(&result, "k_pen", 480);
+    assert_int_equal(value_of(&result, "alpha")->state, FIT_FILLED);
+}
+
 /* Noise with a correlation of 0.8 between neighbours, and a law that misses the curve: the rows
  * count for less, and the interval is wider. */
 static void neighbours(void **state) {
@@ -562,8 +579,8 @@ int main(void) {
         cmocka_unit_test(models),           cmocka_unit_test(interval_linear),
         cmocka_unit_test(interval_profile), cmocka_unit_test(interval_many),
         cmocka_unit_test(untold),           cmocka_unit_test(filled),
-        cmocka_unit_test(neighbours),       cmocka_unit_test(loading),
-        cmocka_unit_test(refused),
+        cmocka_unit_test(not_filled),       cmocka_unit_test(neighbours),
+        cmocka_unit_test(loading),          cmocka_unit_test(refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
