@@ -310,7 +310,7 @@ static MildStatus run_rows(const FitDef *def, const FitPoint *points, int count,
     run_open(&run);
     if (count <= result->parameters) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "fit: %d loading rows for %d parameters, more are needed", count,
+                         "%d loading rows for %d parameters; record more rows", count,
                          result->parameters);
     }
     if (!fit_open(&run.fit, result->parameters)) {

@@ -170,6 +170,8 @@ edit 'NR == 9 { $1 = 0 } { print }' && refuse 'bad.csv:9: time_s 0 does not come
 edit 'NR > 1 { $2 *= 1000 } { print }' && refuse 'depth_m .* is beyond 2; it must be in metres' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR > 1 { $2 = -$2 } { print }' && refuse 'depth_m: 0 of 2001 rows.*positive down' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR > 1 { $3 = -$3 } { print }' && refuse 'force_n does not push back' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR < 11 { print }' && refuse '8 loading rows for 8 parameters; record more rows' "${fit[@]}" bad.csv "${plate[@]}"
+edit 'NR < 3 { print }' && refuse 'depth_m: 0 of 1 rows' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR < 9 { print }' && refuse 'depth_m: 6 of 7 rows.*at least 8' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 1 { print $0, "depth_m"; next } { print }' && refuse 'two columns are named depth_m' "${fit[@]}" bad.csv "${plate[@]}"
 edit 'NR == 1' && refuse 'depth_m: 0 of 0 rows' "${fit[@]}" bad.csv "${plate[@]}"
