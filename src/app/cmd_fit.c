@@ -12,18 +12,21 @@
 #include "app/report.h"
 #include "base/file.h"
 #include "base/text.h"
+#include "lab/fit.h"
 #include "lab/fit_csv.h"
 #include "lab/press.h"
 
 typedef struct {
-    const char *ground, *json, *figure;
+    const char *model, *from, *json, *figure;
     CliNumbers plate;
-    CliNames fit;
-    double alpha, nu; /* NaN: as the ground's */
+    CliNames fit, hold; /* hold: NAME=VALUE */
 } FitOptions;
 
 typedef struct {
     FitDef def;
+    MildMaterial preset; /* of --hold-from */
+    const char *from;    /* its name; NULL: none */
+    int bed;             /* bool: bed_depth is held */
     FitPoint *points;
     int count;
     int first[CLI_LIST_MAX + 1]; /* of each file, in points */
@@ -33,23 +36,25 @@ typedef struct {
 /* grass.png is drawn from grass_fit.csv, because grass.csv may be the record. */
 #define NUMBERS_END "_fit.csv"
 
-static const char *const units[FIT_PARAMETERS] = {"N/m", "N/m^3", "rad", "-", "-", "-"};
-
 static int options_read(int argc, char **argv, FitOptions *options, CliArgs *args) {
-    char grounds[200], ground_help[400];
-    snprintf(ground_help, sizeof ground_help,
-             "preset that gives the parameters that are not fitted (default sand_loose); one of %s",
-             grounds_names(grounds, sizeof grounds));
+    char models[200] = "";
+    for (int m = 0; m < MILD_MODEL_RIGID; m++) {
+        strcat(strcat(models, " "), mild_model_names[m]);
+    }
+    char model_help[300];
+    snprintf(model_help, sizeof model_help, "ground model (default mild): one of%s", models);
     const CliOption table[] = {
         {"plate", CLI_NUMBERS, &options->plate, 0.0195, 1, "L,W",
          "[m] length and width of the plate"},
+        {"model", CLI_TEXT, &options->model, 0, 0, "NAME", model_help},
+        {"hold", CLI_NAMES, &options->hold, 0, 0, "NAME=VALUE[,...]",
+         "hold parameters at values that are known, e.g. alpha=1.05; also bed_depth, the depth of "
+         "a firm bed (default: none within the record)"},
+        {"hold-from", CLI_TEXT, &options->from, 0, 0, "PRESET",
+         "where the data do not tell a parameter, hold it at this preset's value (`mild info "
+         "grounds`)"},
         {"fit", CLI_NAMES, &options->fit, 0, 0, "NAME[,NAME]",
-         "parameters to fit, of k_pen, sigma_cone, alpha, nu, c_g, c_d (default k_pen,sigma_cone)"},
-        {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
-        {"alpha", CLI_NUMBER, &options->alpha, 0.1, 1.5, "A",
-         "[rad] shear band angle: its value, or the start of its fit"},
-        {"nu", CLI_NUMBER, &options->nu, 0.1, 10, "N",
-         "[-] recruitment rate: its value, or the start of its fit"},
+         "fit these only and hold all others at the preset of --hold-from"},
         {"json", CLI_OUTPUT, &options->json, 0, 0, "FILE",
          "write values and intervals to FILE; - for standard output"},
         {"figure", CLI_OUTPUT, &options->figure, 0, 0, "FILE.png",
@@ -58,21 +63,22 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
     const CliCommand command = {
         .name = "fit",
         .usage = "DATA.csv [DATA2.csv ...] --plate L,W [options]",
-        .summary = "Finds the parameters of a ground from presses of a level plate. It prints "
-                   "each value with its 95 % interval and says which parameters the data cannot "
-                   "determine. A CSV file has a header line with the columns depth_m and "
-                   "force_n, and time_s or speed_m_s where speed matters. Several files may "
-                   "differ in speed, which c_d needs; c_g also needs a record that brakes, such "
-                   "as a drop. Rows that are not deeper than all before them (unloading) are "
-                   "ignored. The intervals assume that the errors of the rows are independent.",
+        .summary = "Finds the parameters of a ground from presses of a level plate: all those that "
+                   "the data determine, each with its 95 % interval by profile likelihood. Nothing "
+                   "is held unless --hold or --hold-from says so. A parameter that the data do not "
+                   "determine gets no value; where they tell a combination, such as "
+                   "sigma_cone/cos(alpha), that is printed. A CSV file has a header line with the "
+                   "columns depth_m and force_n, and time_s or speed_m_s where speed matters. "
+                   "Several files may differ in speed, which c_d and dissipation need; c_g also "
+                   "needs a record that brakes, such as a drop. Rows that are not deeper than all "
+                   "before them (unloading) are ignored.",
         .options = table,
         .option_count = sizeof table / sizeof *table,
-        .overrides = "any parameter of the ground, e.g. --ground.bed_depth=0.05; `mild info "
-                     "grounds` lists them",
         .examples = "  mild press --ground grass --depth 0.04 --csv grass.csv\n"
-                    "  mild fit grass.csv --plate 0.2,0.1 --ground grass --figure grass.png\n"
-                    "  mild fit slow.csv fast.csv --plate 0.2,0.1 --fit k_pen,sigma_cone,alpha,c_d "
-                    "--json out.json\n",
+                    "  mild fit grass.csv --plate 0.2,0.1 --figure grass.png\n"
+                    "  mild fit grass.csv --plate 0.2,0.1 --hold alpha=1.1\n"
+                    "  mild fit slow.csv fast.csv --plate 0.2,0.1 --hold-from sand_loose\n"
+                    "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n",
         .positional_max = CLI_LIST_MAX,
         .positional_input = 1,
         .picture = "figure",
@@ -85,121 +91,373 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
     return outcome == CLI_DONE ? -1 : 0;
 }
 
-static MildStatus names_read(const CliNames *names, FitDef *def, MildError *error) {
-    for (int i = 0; i < names->count; i++) {
-        int found = 0;
-        for (int p = 0; p < FIT_PARAMETERS; p++) {
-            if (strcmp(names->name[i], fit_names[p]) == 0) {
-                def->free[p] = found = 1;
-            }
+/* ---- what is fitted and what is held ---- */
+
+/* Index of a parameter of the model; -1 and a message for any other name. */
+static int parameter_find(const FitDef *def, const char *option, const char *name,
+                          MildError *error) {
+    const MildField *fields[FIT_PARAMETERS_MAX];
+    const char *names[FIT_PARAMETERS_MAX];
+    char list[300] = "";
+    const MildModel model = (MildModel)def->material.model;
+    const int count = fit_parameters(model, fields);
+    for (int i = 0; i < count; i++) {
+        names[i] = fields[i]->name;
+        if (strcmp(names[i], name) == 0) {
+            return i;
         }
-        if (found) {
-            continue;
-        }
+        snprintf(list + strlen(list), sizeof list - strlen(list), i ? ", %s" : "%s", names[i]);
+    }
+    mild_fail(error, MILD_ERROR_ARGUMENT,
+              "--%s: '%.40s' is no parameter that a press on %s tells; nearest is '%s' (%s)",
+              option, name, mild_model_names[model], text_nearest(name, names, count), list);
+    return -1;
+}
+
+static MildStatus hold_one(const char *text, FitWork *work, MildError *error) {
+    char name[64];
+    FitDef *def = &work->def;
+    const char *equals = strchr(text, '=');
+    double value, low, high;
+    if (!equals || !text_double(equals + 1, &value)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--fit: unknown parameter '%s'; nearest is '%s' (k_pen, sigma_cone, "
-                         "alpha, nu, c_g, c_d)",
-                         names->name[i], text_nearest(names->name[i], fit_names, FIT_PARAMETERS));
+                         "--hold: '%s' is not NAME=VALUE, such as alpha=1.05", text);
+    }
+    snprintf(name, sizeof name, "%.*s", (int)(equals - text), text);
+    const int geometry = fit_is_geometry((MildModel)def->material.model, name);
+    const int index = geometry ? -1 : parameter_find(def, "hold", name, error);
+    if (!geometry && index < 0) {
+        return error->status;
+    }
+    const MildField *field =
+        mild_field_find(mild_material_fields, mild_material_field_count, name, NULL);
+    fit_range(field, &low, &high);
+    if (!(value >= low && value <= high)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "--hold: %s = %g is outside %g .. %g: %s", name,
+                         value, low, high, field->help);
+    }
+    *fit_number(&def->material, field) = value;
+    work->bed |= strcmp(name, "bed_depth") == 0;
+    if (index >= 0) {
+        def->held[index] = 1;
     }
     return MILD_OK;
 }
 
-static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitDef *def,
-                           MildError *error) {
-    MildStatus status = grounds_find(options->ground, &def->material, NULL, error);
+static MildStatus from_read(const FitOptions *options, FitWork *work, MildError *error) {
+    FitDef *def = &work->def;
+    const int model = def->material.model;
+    MildStatus status = grounds_find(options->from, &work->preset, NULL, error);
     if (status != MILD_OK) {
         return status;
     }
-    ConfigSection section = ground_section(&def->material);
-    status = config_overrides(&section, 1, args->overrides, args->override_count, error);
-    if (status == MILD_OK) {
-        status = names_read(&options->fit, def, error);
+    if (work->preset.model != model) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--hold-from %s: a ground of %s has no numbers for %s; use --hold "
+                         "NAME=VALUE",
+                         options->from, mild_model_names[work->preset.model],
+                         mild_model_names[model]);
     }
+    work->preset.plate_width = def->material.plate_width;
+    def->material = work->preset;
+    def->fill = options->fit.count ? NULL : &work->preset;
+    work->from = options->from;
+    work->bed = 1;
+    return MILD_OK;
+}
+
+/* --fit: everything else is held. */
+static MildStatus fit_names_read(const CliNames *names, FitDef *def, MildError *error) {
+    for (int i = 0; i < FIT_PARAMETERS_MAX; i++) {
+        def->held[i] = 1;
+    }
+    for (int i = 0; i < names->count; i++) {
+        const int index = parameter_find(def, "fit", names->name[i], error);
+        if (index < 0) {
+            return error->status;
+        }
+        def->held[index] = 0;
+    }
+    return MILD_OK;
+}
+
+/* A name is held once, and is not fitted. */
+static MildStatus names_check(const FitOptions *options, MildError *error) {
+    for (int i = 0; i < options->hold.count; i++) {
+        const char *name = options->hold.name[i];
+        const size_t length = strcspn(name, "=");
+        for (int k = 0; k < options->fit.count; k++) {
+            if (strncmp(name, options->fit.name[k], length) == 0 && !options->fit.name[k][length]) {
+                return mild_fail(error, MILD_ERROR_ARGUMENT,
+                                 "--hold %s and --fit %s contradict each other; leave out one",
+                                 name, options->fit.name[k]);
+            }
+        }
+        for (int k = 0; k < i; k++) {
+            if (strncmp(name, options->hold.name[k], length + 1) == 0) {
+                return mild_fail(error, MILD_ERROR_ARGUMENT,
+                                 "--hold: %s and %s name the same parameter; leave out one",
+                                 options->hold.name[k], name);
+            }
+        }
+    }
+    return MILD_OK;
+}
+
+static MildStatus held_read(const FitOptions *options, FitWork *work, MildError *error) {
+    const MildField *fields[FIT_PARAMETERS_MAX];
+    FitDef *def = &work->def;
+    MildStatus status = names_check(options, error);
     if (status != MILD_OK) {
         return status;
     }
-    if (isfinite(options->alpha)) {
-        def->material.alpha = options->alpha;
+    if (options->fit.count && !options->from) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--fit needs --hold-from PRESET, which gives the values of all others; "
+                         "without both, all that the data determine is fitted");
     }
-    if (isfinite(options->nu)) {
-        def->material.nu = options->nu;
+    if (options->from) {
+        status = from_read(options, work, error);
     }
+    if (status == MILD_OK && options->fit.count) {
+        status = fit_names_read(&options->fit, def, error);
+    }
+    for (int i = 0; i < options->hold.count && status == MILD_OK; i++) {
+        status = hold_one(options->hold.name[i], work, error);
+    }
+    const int count = fit_parameters((MildModel)def->material.model, fields);
+    int held = 0;
+    for (int i = 0; i < count; i++) {
+        held += def->held[i];
+    }
+    if (status == MILD_OK && held == count) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--hold: every parameter of %s is held, which leaves nothing to fit",
+                         mild_model_names[def->material.model]);
+    }
+    return status;
+}
+
+/* The plate in the elements of the model, as press lays it out. */
+static MildStatus plate_lay(const FitOptions *options, FitDef *def, MildError *error) {
     MildSole *plate = press_plate_create(options->plate.value[0], options->plate.value[1], error);
-    if (!plate) {
+    MildSole *sole = plate;
+    if (plate && mild_model_is_concentric((MildModel)def->material.model)) {
+        sole = mild_sole_concentric(plate, error);
+        mild_sole_destroy(plate);
+    }
+    if (!sole) {
         return error->status;
     }
-    def->elements = mild_sole_elements(plate); /* as press lays it out */
-    def->pitch = mild_sole_pitch(plate);
-    mild_sole_destroy(plate);
+    def->plate = (FitPlate){mild_sole_elements(sole), mild_sole_pitch(sole)};
+    mild_sole_destroy(sole);
     return MILD_OK;
+}
+
+static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitWork *work,
+                           MildError *error) {
+    FitDef *def = &work->def;
+    MildModel model;
+    MildStatus status = grounds_model(options->model, args, &model, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    if (model == MILD_MODEL_RIGID) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--model rigid: the engine's own contact has no parameters that a press "
+                         "could tell; choose another model");
+    }
+    const MildField *bed =
+        mild_field_find(mild_material_fields, mild_material_field_count, "bed_depth", NULL);
+    def->material = mild_material_default();
+    def->material.model = (int)model;
+    def->material.bed_depth = bed->max;
+    def->material.plate_width = fmin(options->plate.value[0], options->plate.value[1]);
+    status = plate_lay(options, def, error);
+    return status == MILD_OK ? held_read(options, work, error) : status;
 }
 
 /* ---- the printed result ---- */
 
-static void say_held(const FitResult *result, FitName name) {
-    const FitParameter *p = &result->parameter[name];
-    char held[64];
-    snprintf(held, sizeof held, "it is held at %.4g", p->value);
-    switch (p->state) {
-    case FIT_HELD:
-    case FIT_FITTED: break;
-    case FIT_NO_SPEEDS:
-        printf(
-            "%s: the data cannot determine it, because all rows have about the same speed; %s (add "
-            "a press at another speed)\n",
-            fit_names[name], held);
-        break;
-    case FIT_NO_MASS:
-        printf("c_d: has no effect, because this ground has no added mass (c_g = 0); %s\n", held);
-        break;
-    case FIT_NO_EFFECT:
-        printf("%s: has no effect on these forces; %s\n", fit_names[name], held);
-        break;
-    case FIT_TIED:
-        printf(
-            "%s and %s: the data cannot tell them apart (correlation %.3f); %s is held at %.4g\n",
-            fit_names[name], fit_names[p->partner], p->correlation, fit_names[name], p->value);
-        break;
-    case FIT_WIDE: printf("%s: the data cannot determine it; %s\n", fit_names[name], held); break;
+static const char *number_text(double value, char text[16]) {
+    snprintf(text, 16, isfinite(value) ? "%.5g" : "-", value);
+    return text;
+}
+
+static void value_print(const FitValue *value) {
+    char number[16], low[16], high[16];
+    const int held = value->state == FIT_HELD || value->state == FIT_FILLED;
+    printf("%-24s %12s %12s %12s  %s\n", value->name, number_text(value->value, number),
+           held ? "held" : number_text(value->low, low), held ? "" : number_text(value->high, high),
+           value->unit);
+}
+
+/* Prints "name, name" of the parameters in a set of states, after `title`; nothing for none. With
+ * `values` "name = value". Returns their number. */
+static int names_print(const FitResult *result, unsigned states, int values, const char *title) {
+    int count = 0;
+    for (int i = 0; i < result->parameters; i++) {
+        const FitValue *value = &result->parameter[i];
+        if (states >> value->state & 1) {
+            printf("%s%s", count++ ? ", " : title, value->name);
+            if (values) {
+                printf(" = %.5g", value->value);
+            }
+        }
     }
+    return count;
+}
+
+/* Bool: some ground has numbers for --hold-from. */
+static int has_presets(MildModel model) {
+    return model == MILD_MODEL_MILD || mild_model_info(model)->presets[0];
+}
+
+static unsigned bit(FitState state) {
+    return 1U << state;
+}
+
+/* What the intervals rest on. */
+static void assumptions_print(const FitWork *work) {
+    const FitResult *result = &work->result;
+    double deepest = 0, fastest = 0;
+    for (int i = 0; i < work->count; i++) {
+        deepest = fmax(deepest, work->points[i].depth);
+        fastest = fmax(fastest, work->points[i].speed);
+    }
+    if (names_print(result, bit(FIT_HELD), 1, "the intervals assume ")) {
+        printf("\n");
+    }
+    if (names_print(result, bit(FIT_FILLED), 1, "the intervals assume ")) {
+        printf(" of %s, because the data do not tell\n", work->from);
+    }
+    if (!work->bed) {
+        printf("the intervals assume no firm bed down to %.4g m (--hold bed_depth=D if there is)\n",
+               deepest);
+    } else if (deepest > work->def.material.bed_depth) {
+        printf("the intervals assume bed_depth = %.5g\n", work->def.material.bed_depth);
+    }
+    if (fastest == 0) {
+        printf("the intervals assume a slow press, because the records have neither time_s nor "
+               "speed_m_s\n");
+    }
+    if (result->neighbours > 0) {
+        printf("the residuals of neighbouring rows are alike (correlation %.2f): the law misses "
+               "the curve, or the noise is slow; the %d rows count as %.0f\n",
+               result->neighbours, result->points, result->rows);
+    }
+}
+
+/* Bool: all rows have about the same speed. */
+static int is_one_speed(const FitWork *work) {
+    double slowest = INFINITY, fastest = 0;
+    for (int i = 0; i < work->count; i++) {
+        slowest = fmin(slowest, work->points[i].speed);
+        fastest = fmax(fastest, work->points[i].speed);
+    }
+    return fastest <= 1.3 * slowest;
+}
+
+/* Parameters of the model that no press straight down tells, such as friction. */
+static void never_print(const FitWork *work) {
+    const MildModel model = (MildModel)work->def.material.model;
+    const MildModelInfo *info = mild_model_info(model);
+    int count = 0;
+    for (int i = 0; i < MILD_MODEL_FIELDS && info->fields[i]; i++) {
+        int told =
+            fit_is_geometry(model, info->fields[i]) || strcmp(info->fields[i], "passive") == 0;
+        for (int k = 0; k < work->result.parameters; k++) {
+            told |= strcmp(info->fields[i], work->result.parameter[k].name) == 0;
+        }
+        if (!told) {
+            printf("%s%s", count++ ? ", " : "no way straight down tells ", info->fields[i]);
+        }
+    }
+    printf("%s", count ? "\n" : "");
+}
+
+/* What the data do not tell, and the remedy. */
+static void untold_print(const FitWork *work) {
+    const FitResult *result = &work->result;
+    const MildModel model = (MildModel)work->def.material.model;
+    const unsigned untold = bit(FIT_LIMIT) | bit(FIT_OPEN) | bit(FIT_TIED) | bit(FIT_NO_EFFECT);
+    if (names_print(result, untold, 0, "not determined by these data: ")) {
+        printf("; hold what you know (--hold NAME=VALUE)%s\n",
+               work->from || !has_presets(model) ? ""
+                                                 : ", or what is missing (--hold-from PRESET)");
+    }
+    int rate = 0;
+    for (int i = 0; i < result->parameters && is_one_speed(work); i++) {
+        const FitValue *value = &result->parameter[i];
+        if (untold >> value->state & 1 && fit_is_rate(model, value->field)) {
+            printf("%s%s", rate++ ? ", " : "a press at another speed or a drop tells more of ",
+                   value->name);
+        }
+    }
+    printf("%s", rate ? "\n" : "");
+    never_print(work);
 }
 
 static void table_print(const FitWork *work, int files) {
     const FitResult *result = &work->result;
-    printf("%-12s %12s %12s %12s  %s\n", "parameter", "value", "low 95 %", "high 95 %", "unit");
-    for (int i = 0; i < FIT_PARAMETERS; i++) {
-        const FitParameter *p = &result->parameter[i];
-        if (p->state == FIT_FITTED) {
-            printf("%-12s %12.5g %12.5g %12.5g  %s\n", fit_names[i], p->value, p->low, p->high,
-                   units[i]);
-        } else {
-            printf("%-12s %12.5g %12s %12s  %s\n", fit_names[i], p->value, "held", "", units[i]);
-        }
+    printf("%-24s %12s %12s %12s  %s\n", "parameter", "value", "low 95 %", "high 95 %", "unit");
+    for (int i = 0; i < result->parameters; i++) {
+        value_print(&result->parameter[i]);
+    }
+    for (int i = 0; i < result->combinations; i++) {
+        value_print(&result->combination[i]);
     }
     printf("residual %.4g N, %.2f %% of the force (root mean square); %d loading rows of %d "
-           "file%s, %d elements\n",
+           "file%s, %d element%s\n",
            result->residual, 100 * result->residual_share, result->points, files,
-           files == 1 ? "" : "s", work->def.elements);
-    for (int i = 0; i < FIT_PARAMETERS; i++) {
-        say_held(result, (FitName)i);
+           files == 1 ? "" : "s", work->def.plate.elements,
+           work->def.plate.elements == 1 ? "" : "s");
+    assumptions_print(work);
+    untold_print(work);
+}
+
+/* Adds a value to the list that its state belongs to. */
+static int json_value(cJSON *root, const char *list, const FitValue *value) {
+    const char *names[] = {"value", "low", "high"};
+    const double numbers[] = {value->value, value->low, value->high};
+    cJSON *item;
+    switch (value->state) {
+    case FIT_HELD:
+    case FIT_FILLED:
+        return cJSON_AddNumberToObject(cJSON_GetObjectItem(root, "held"), value->name,
+                                       value->value) != NULL;
+    case FIT_FITTED:
+    case FIT_LIMIT:
+        item = cJSON_AddObjectToObject(
+            cJSON_GetObjectItem(root, value->state == FIT_FITTED ? list : "limits"), value->name);
+        for (int i = 0; i < 3; i++) {
+            if (isfinite(numbers[i]) && !cJSON_AddNumberToObject(item, names[i], numbers[i])) {
+                return 0;
+            }
+        }
+        return item != NULL;
+    default:
+        item = cJSON_CreateString(value->name);
+        return cJSON_AddItemToArray(cJSON_GetObjectItem(root, "undetermined"), item);
     }
 }
 
-static MildStatus json_save(const FitResult *result, const char *path, MildError *error) {
-    cJSON *root = cJSON_CreateObject(), *fitted = cJSON_AddObjectToObject(root, "parameters");
-    cJSON *held = cJSON_AddObjectToObject(root, "held");
+static MildStatus json_save(const FitWork *work, const char *path, MildError *error) {
+    const FitResult *result = &work->result;
+    cJSON *root = cJSON_CreateObject();
     int whole =
-        root && fitted && held && cJSON_AddNumberToObject(root, "residual", result->residual);
-    for (int i = 0; i < FIT_PARAMETERS && whole; i++) {
-        const FitParameter *p = &result->parameter[i];
-        if (p->state != FIT_FITTED) {
-            whole = cJSON_AddNumberToObject(held, fit_names[i], p->value) != NULL;
-            continue;
-        }
-        cJSON *item = cJSON_AddObjectToObject(fitted, fit_names[i]);
-        whole = item && cJSON_AddNumberToObject(item, "value", p->value) &&
-                cJSON_AddNumberToObject(item, "low", p->low) &&
-                cJSON_AddNumberToObject(item, "high", p->high);
+        root &&
+        cJSON_AddStringToObject(root, "model", mild_model_names[work->def.material.model]) &&
+        cJSON_AddObjectToObject(root, "parameters") &&
+        cJSON_AddObjectToObject(root, "combinations") && cJSON_AddObjectToObject(root, "held") &&
+        cJSON_AddObjectToObject(root, "limits") && cJSON_AddArrayToObject(root, "undetermined") &&
+        cJSON_AddNumberToObject(root, "residual", result->residual) &&
+        cJSON_AddNumberToObject(root, "independent_rows", result->rows);
+    for (int i = 0; i < result->parameters && whole; i++) {
+        whole = json_value(root, "parameters", &result->parameter[i]);
+    }
+    for (int i = 0; i < result->combinations && whole; i++) {
+        whole = json_value(root, "combinations", &result->combination[i]);
     }
     if (!whole) {
         cJSON_Delete(root);
@@ -218,14 +476,14 @@ static MildStatus data_write(const FitWork *work, const CliArgs *args, const cha
     if (!memory) {
         return mild_fail(error, MILD_ERROR_MEMORY, "fit: out of memory");
     }
-    FitDef def = work->def;
-    def.material = work->result.material;
+    const FitResult *result = &work->result;
     fprintf(memory, "record,depth_m,force_n,speed_m_s,fit_n\n");
     for (int f = 0; f < args->positional_count; f++) {
         for (int i = work->first[f]; i < work->first[f + 1]; i++) {
             const FitPoint *p = &work->points[i];
-            fprintf(memory, "%d,%.9g,%.9g,%.9g,%.9g\n", f + 1, p->depth, p->force, p->speed,
-                    fit_force(&def, p));
+            double force;
+            fit_forces(&work->def.plate, &result->curve, p, 1, &force);
+            fprintf(memory, "%d,%.9g,%.9g,%.9g,%.9g\n", f + 1, p->depth, p->force, p->speed, force);
         }
     }
     MildStatus status = MILD_OK;
@@ -270,7 +528,7 @@ static MildStatus fit_report(const FitOptions *options, const CliArgs *args, Fit
         table_print(work, args->positional_count);
     }
     if (options->json) {
-        status = json_save(&work->result, options->json, error);
+        status = json_save(work, options->json, error);
     }
     if (status == MILD_OK && options->figure) {
         status = figure_save(work, args, options->figure, error);
@@ -279,10 +537,7 @@ static MildStatus fit_report(const FitOptions *options, const CliArgs *args, Fit
 }
 
 int cmd_fit(int argc, char **argv) {
-    FitOptions options = {.ground = "sand_loose",
-                          .fit = {.count = 2, .name = {"k_pen", "sigma_cone"}},
-                          .alpha = NAN,
-                          .nu = NAN};
+    FitOptions options = {0};
     CliArgs args;
     int code = options_read(argc, argv, &options, &args);
     if (code) {
@@ -298,7 +553,7 @@ int cmd_fit(int argc, char **argv) {
     }
     MildError error;
     FitWork work = {0};
-    MildStatus status = def_make(&options, &args, &work.def, &error);
+    MildStatus status = def_make(&options, &args, &work, &error);
     if (status == MILD_OK) {
         status = fit_report(&options, &args, &work, &error);
     }

@@ -1,90 +1,61 @@
-/* Parameters of a ground from measured forces: bounded least squares on the element law, with
- * confidence intervals, and a verdict on the parameters that the data cannot determine.
+/* Parameters of a ground from measured forces: those that the data determine, each with an
+ * interval, and the names of the others.
  *
- * A level plate of n elements that goes down at speed w meets (eqs 4 and 5)
- *     F(u, w) = n (F_g(u) + c_d m_a'(u) w^2 + m_a(u) dw/dt).
- * F is linear in k_pen and sigma_cone. alpha and nu act through u_f = R tan(alpha)/nu and
- * sigma_cone/cos(alpha) alone as long as the drag is small. So slow data determine three numbers
- * and never all four. At constant speed the force depends only on the product c_g c_d. To determine
- * c_g alone takes a record that brakes, such as a drop. Pure functions: thread safe, print nothing.
- */
+ * Nothing is held but what the caller holds. All other parameters that a press straight down can
+ * sense are fitted together by bounded least squares. Where the data tell a combination of several
+ * and none of them by itself, the combination is the result. An interval (95 %) is where the sum of
+ * squares, minimised over all others, stays below a bound that allows rows of unequal noise. A
+ * parameter without a bound on both sides within its range has no value. Pure functions: thread
+ * safe, print nothing. */
 #ifndef LAB_FIT_H
 #define LAB_FIT_H
 
-#include "mild/ground.h"
+#include "lab/fit_law.h"
 
-typedef enum {
-    FIT_K_PEN,
-    FIT_SIGMA_CONE,
-    FIT_ALPHA,
-    FIT_NU,
-    FIT_C_G,
-    FIT_C_D,
-    FIT_PARAMETERS
-} FitName;
-
-enum { FIT_POINTS_MIN = 8 };
-
-/* One row of a record. time and speed may be NaN where unknown; fit_speeds fills speed and
- * acceleration. */
-typedef struct {
-    double time;         /* [s] */
-    double depth;        /* [m] */
-    double force;        /* [N] up, on the plate */
-    double speed;        /* [m/s] down */
-    double acceleration; /* [m/s^2] down */
-} FitPoint;
+enum { FIT_COMBINATIONS_MAX = 4 };
 
 typedef struct {
-    MildMaterial material; /* starting values of fitted parameters, values of held ones */
-    int elements;
-    double pitch;             /* [m] */
-    int free[FIT_PARAMETERS]; /* bool: fit it, if the data can determine it */
+    FitPlate plate;
+    MildMaterial material; /* the model, the numbers that are held, bed_depth and plate_width */
+    int held[FIT_PARAMETERS_MAX]; /* bool, in the order of fit_parameters */
+    const MildMaterial *fill;     /* where the data neither tell a parameter nor contradict this
+                                 material's number, hold it there; NULL: do not */
 } FitDef;
 
-/* Why a parameter has its value. */
 typedef enum {
-    FIT_HELD,      /* the caller did not ask to fit it */
-    FIT_FITTED,    /* determined by the data, with an interval */
-    FIT_NO_SPEEDS, /* c_g, c_d: all rows have about the same speed */
-    FIT_NO_MASS,   /* c_d: no effect, because the ground has no added mass */
-    FIT_NO_EFFECT, /* the forces do not depend on it in these data */
-    FIT_TIED,      /* has the same effect as `partner`, see `correlation` */
-    FIT_WIDE,      /* its interval is wider than half its range */
+    FIT_HELD,      /* by the caller; value */
+    FIT_FILLED,    /* held at the number of `fill`, because the data do not tell it; value */
+    FIT_FITTED,    /* value, low, high */
+    FIT_LIMIT,     /* the data bound it on one side: low or high is that bound, the other is NaN */
+    FIT_OPEN,      /* the data do not bound it within its range */
+    FIT_TIED,      /* the data tell it only together with others */
+    FIT_NO_EFFECT, /* the forces in these rows do not depend on it */
 } FitState;
 
 typedef struct {
-    double value, low, high; /* 95 %; low and high are NaN unless FIT_FITTED */
+    const char *name;
+    const MildField *field; /* NULL: a combination */
+    char unit[24];
     FitState state;
-    FitName partner;    /* FIT_TIED */
-    double correlation; /* FIT_TIED: of the two estimates; +-1: exactly the same effect */
-} FitParameter;
+    double value, low, high; /* NaN where the state names none; 95 % */
+} FitValue;
 
 typedef struct {
-    FitParameter parameter[FIT_PARAMETERS];
-    MildMaterial material; /* the fitted ground */
+    FitValue parameter[FIT_PARAMETERS_MAX];
+    int parameters;
+    FitValue combination[FIT_COMBINATIONS_MAX]; /* of tied parameters */
+    int combinations;
+    MildMaterial curve;    /* gives the fitted forces; numbers of tied parameters mean nothing */
     double residual;       /* [N] root mean square */
     double residual_share; /* of the root mean square force */
+    double neighbours;     /* correlation of the residuals of neighbouring rows; 0 if by chance */
+    double rows;           /* number of independent rows that they count as */
     int points;
 } FitResult;
 
-extern const char *const fit_names[FIT_PARAMETERS];
-double *fit_value(MildMaterial *material, FitName name);
-/* Bounds of a parameter: those of the material. A passive material has c_d >= 1/2 and c_g >= 0. */
-void fit_range(const MildMaterial *material, FitName name, double *low, double *high);
-
-/* [N] The force on the plate. */
-double fit_force(const FitDef *def, const FitPoint *point);
-
-/* Keeps the loading part, in place: rows below the surface that are at least as deep as all rows
- * before them. Returns their count. */
-int fit_loading(FitPoint *points, int count);
-/* Fills unknown speeds and all accelerations from the times of one record's loading part. Each
- * comes from a polynomial through the nearest twentieth of the rows. Without times both are 0. */
-void fit_speeds(FitPoint *points, int count);
-
-/* Fits the loading rows of all records together. Fails on fewer than FIT_POINTS_MIN points, on
- * nothing to fit, and on a material out of range. */
+/* Fits the loading rows of all records together; of more than 20 000 the means of neighbours, which
+ * is what `residual` is of then. Fails on fewer than FIT_POINTS_MIN points or not
+ * more than parameters, on a model without soft ground, and on a material out of range. */
 MildStatus fit_run(const FitDef *def, const FitPoint *points, int count, FitResult *result,
                    MildError *error);
 

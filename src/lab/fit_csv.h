@@ -4,7 +4,8 @@
 
 #include <stdio.h>
 
-#include "lab/fit.h"
+#include "lab/fit_record.h"
+#include "mild/error.h"
 
 enum { FIT_CSV_ROWS_MAX = 1000000 };
 

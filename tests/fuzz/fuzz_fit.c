@@ -3,28 +3,41 @@
 #include <stdio.h>
 
 #include "fuzz.h"
+#include "lab/fit.h"
 #include "lab/fit_csv.h"
 
-static void fit(const FitPoint *points, int count) {
-    FitDef def = {.material = mild_material_default(),
-                  .elements = 55,
-                  .pitch = 0.0195,
-                  .free = {1, 1, 1, 1, 1, 1}};
+static void check(const FitValue *value) {
+    if (value->state == FIT_FITTED) {
+        fuzz_check(value->low <= value->value && value->value <= value->high);
+    } else if (value->state == FIT_LIMIT) {
+        fuzz_check(isnan(value->value) && isfinite(value->low) + isfinite(value->high) == 1);
+    } else if (value->state != FIT_HELD && value->state != FIT_FILLED) {
+        fuzz_check(isnan(value->value) && isnan(value->low) && isnan(value->high));
+    }
+}
+
+static void fit(const FitPoint *points, int count, int model) {
+    const MildMaterial fill = mild_material_default();
+    FitDef def = {.plate = {55, 0.0195}, .material = fill, .fill = model % 2 ? &fill : NULL};
     FitResult result;
     MildError error;
-    fuzz_check(fit_run(&def, points, count, &result, &error) == MILD_OK);
-    for (int p = 0; p < FIT_PARAMETERS; p++) {
-        const FitParameter *parameter = &result.parameter[p];
-        double low, high;
-        fit_range(&def.material, (FitName)p, &low, &high);
-        fuzz_check(parameter->value >= low && parameter->value <= high);
-        if (parameter->state != FIT_FITTED) {
-            continue;
-        }
-        fuzz_check(parameter->low >= low && parameter->low <= parameter->value);
-        fuzz_check(parameter->high <= high && parameter->high >= parameter->value);
+    def.material.model = model / 2;
+    const MildStatus status = fit_run(&def, points, count, &result, &error);
+    fuzz_check(status == MILD_OK || count < FIT_POINTS_MIN + FIT_PARAMETERS_MAX);
+    if (status != MILD_OK) {
+        return;
     }
-    fuzz_check(isfinite(result.residual));
+    for (int i = 0; i < result.parameters; i++) {
+        const FitValue *value = &result.parameter[i];
+        double low, high;
+        check(value);
+        fit_range(value->field, &low, &high);
+        fuzz_check(!(value->low < low) && !(value->high > high));
+    }
+    for (int i = 0; i < result.combinations; i++) {
+        check(&result.combination[i]);
+    }
+    fuzz_check(isfinite(result.residual) && result.rows > 0 && result.rows <= count);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -40,7 +53,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (status == MILD_OK) {
         fuzz_check(count >= FIT_POINTS_MIN);
         if (count < 24 && fuzz_sample(data, size, 4096)) {
-            fit(points, count);
+            fit(points, count, data[size - 1] % (2 * MILD_MODEL_RIGID));
         }
     } else {
         fuzz_check(error.status == status && error.text[0]);
