@@ -50,7 +50,7 @@ struct Relief {
     double position[MILD_FEET_MAX][3], rotation[MILD_FEET_MAX][9];
     float *peak, *shown; /* [ny][nx] deepest and present depth of the surface */
     float *base;         /* [ny][nx] [m] undisturbed height */
-    int *pressed;                /* [tiles] vertices that are not at their undisturbed height */
+    int *pressed;        /* [tiles] vertices that are not at their undisturbed height */
     unsigned char *dirty;
     signed char *material; /* [tiles] */
 };
@@ -130,14 +130,19 @@ static double outside(double value, double half) {
     return fmax(fabs(value) - half, 0.0);
 }
 
+/* The squares of neighbours overlap by the gap around a sole. Inside several the point belongs to the
+ * nearest centre, so that it is well inside. */
 static unsigned short nearest_element(const SoleMask *mask, double px, double py) {
     const double *x = mild_sole_x(mask->sole), *y = mild_sole_y(mask->sole);
-    double least = INFINITY;
+    double least = INFINITY, least_center = INFINITY;
     int best = 0;
     for (int e = 0; e < mild_sole_elements(mask->sole); e++) {
-        double distance = hypot(outside(px - x[e], mask->half), outside(py - y[e], mask->half));
-        if (distance < least) {
+        double dx = px - x[e], dy = py - y[e];
+        double distance = hypot(outside(dx, mask->half), outside(dy, mask->half));
+        double center = fmax(fabs(dx), fabs(dy));
+        if (distance < least || (distance == least && center < least_center)) {
             least = distance;
+            least_center = center;
             best = e;
         }
     }
@@ -162,8 +167,7 @@ static int mask_create(SoleMask *mask, const MildSole *sole) {
     mask->step = mild_sole_pitch(sole) / MASK_PER_PITCH;
     mask->columns = (int)ceil((x_max - mask->x_min) / mask->step);
     mask->rows = (int)ceil((y_max - mask->y_min) / mask->step);
-    mask->nearest =
-        malloc((size_t)mask->columns * (size_t)mask->rows * sizeof *mask->nearest);
+    mask->nearest = malloc((size_t)mask->columns * (size_t)mask->rows * sizeof *mask->nearest);
     if (!mask->nearest) {
         return 0;
     }
@@ -458,8 +462,7 @@ static float height(const Relief *relief, int i, int j) {
     return relief->base[at] - relief->shown[at];
 }
 
-void relief_tile_surface(const Relief *relief, int tile, int step, float *position,
-                         float *normal) {
+void relief_tile_surface(const Relief *relief, int tile, int step, float *position, float *normal) {
     int i0, j0;
     tile_origin(relief, tile, &i0, &j0);
     const float run = 2.0F * (float)step * (float)relief->cell;

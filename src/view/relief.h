@@ -49,8 +49,7 @@ int relief_tile_pressed(const Relief *relief, int tile);
 int relief_tile_take_dirty(Relief *relief, int tile);
 /* Position [m, world] and unit normal of every step-th vertex (a divisor of RELIEF_TILE_CELLS), rows
  * along y, x fastest: [n][n][3] each, n = RELIEF_TILE_CELLS/step + 1. Tiles share their edges. */
-void relief_tile_surface(const Relief *relief, int tile, int step, float *position,
-                         float *normal);
+void relief_tile_surface(const Relief *relief, int tile, int step, float *position, float *normal);
 /* [m] Depth of the drawn surface below the undisturbed one, linear between vertices; 0 outside. */
 double relief_depth_at(const Relief *relief, double x, double y);
 /* [PIXELS][PIXELS][3] first row at y max, margin included; pressed ground is darker. */

@@ -3,15 +3,15 @@
 #include <math.h>
 #include <string.h>
 
-#define EDGE_LEAST 14   /* [-] of 255: smaller differences of brightness are no edge */
-#define EDGE_SHARE 8    /* [-] nor is a difference below the brightness divided by this */
+#define EDGE_LEAST 20   /* [-] of 255: smaller differences of brightness are no edge */
+#define EDGE_SHARE 4    /* [-] nor is a difference below the brightness divided by this: grain */
 #define REACH_MAX 8.0F  /* [pixels] farthest sample along an edge */
 #define GENTLE 0.03125F /* [-] share of the brightness added to a gradient before dividing by it */
 
 /* What is around a pixel. */
 typedef struct {
-    int least, most;     /* brightness */
-    float across, along; /* [pixels] direction of the edge, x and y */
+    int least, most; /* brightness */
+    float x, y;      /* [pixels] direction of the edge */
 } Edge;
 
 static int brightness(const unsigned char *rgb) {
@@ -26,8 +26,8 @@ static int most(int a, int b) {
     return a > b ? a : b;
 }
 
-static float limited(float value) {
-    return fminf(fmaxf(value, -REACH_MAX), REACH_MAX);
+static float limited(float value, float lowest, float highest) {
+    return value < lowest ? lowest : value > highest ? highest : value;
 }
 
 /* Whether an edge passes the pixel. The direction is normal to the gradient over the four corners
@@ -42,17 +42,18 @@ static int find_edge(const unsigned char *luma, int width, Edge *edge) {
     float x = (float)(down[-1] + down[1] - up[-1] - up[1]);
     float y = (float)(up[-1] + down[-1] - up[1] - down[1]);
     float sum = (float)(up[-1] + up[1] + down[-1] + down[1]);
-    float scale = 1.0F / (fminf(fabsf(x), fabsf(y)) + GENTLE * sum + 0.5F);
-    edge->across = limited(x * scale);
-    edge->along = limited(y * scale);
+    float smaller = fabsf(x) < fabsf(y) ? fabsf(x) : fabsf(y);
+    float scale = 1.0F / (smaller + GENTLE * sum + 0.5F);
+    edge->x = limited(x * scale, -REACH_MAX, REACH_MAX);
+    edge->y = limited(y * scale, -REACH_MAX, REACH_MAX);
     return 1;
 }
 
 /* Adds weight times the colour at (x, y) [pixels], linear between pixels. */
 static void sample(const unsigned char *rgb, int width, int height, float x, float y, float weight,
                    float sum[3]) {
-    x = fminf(fmaxf(x, 0.0F), (float)(width - 2));
-    y = fminf(fmaxf(y, 0.0F), (float)(height - 2));
+    x = limited(x, 0.0F, (float)(width - 2));
+    y = limited(y, 0.0F, (float)(height - 2));
     int i = (int)x, j = (int)y;
     float u = x - (float)i, v = y - (float)j;
     const unsigned char *low = rgb + 3 * ((size_t)j * (size_t)width + (size_t)i);
@@ -78,16 +79,14 @@ static void smooth_pixel(const unsigned char *from, int width, int height, int i
     unsigned char mean[3];
     for (int side = -1; side <= 1; side += 2) {
         float at = inner * (float)side;
-        sample(from, width, height, (float)i + at * edge->across, (float)j + at * edge->along, 0.5F,
-               two);
+        sample(from, width, height, (float)i + at * edge->x, (float)j + at * edge->y, 0.5F, two);
     }
     for (int c = 0; c < 3; c++) {
         four[c] = 0.5F * two[c];
     }
     for (int side = -1; side <= 1; side += 2) {
         float at = outer * (float)side;
-        sample(from, width, height, (float)i + at * edge->across, (float)j + at * edge->along,
-               0.25F, four);
+        sample(from, width, height, (float)i + at * edge->x, (float)j + at * edge->y, 0.25F, four);
     }
     store(four, mean);
     int seen = brightness(mean);

@@ -22,9 +22,9 @@
 #define VIEW_RADIUS_UNEVEN 4.0 /* [m] the same on uneven ground */
 #define VIEW_FLOOR 40.0        /* [m] half the size of the surrounding floor */
 #define VIEW_GEOMS 4000
-#define VIEW_SHADOW 1024     /* [pixels] edge of the shadow map */
-#define VIEW_SHADOW_CLIP 1.3F/* [-] half of what it covers, in extents of the robot */
-#define VIEW_SLICES 20       /* sides of a drawn cylinder */
+#define VIEW_SHADOW 1024             /* [pixels] edge of the shadow map */
+#define VIEW_SHADOW_CLIP 1.3F        /* [-] half of what it covers, in extents of the robot */
+#define VIEW_SLICES 16               /* sides of a drawn cylinder */
 #define VIEW_CAMERA_TIME 0.45        /* [s] time constant of the camera */
 #define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
 #define VIEW_CLOSE_TIME 0.25         /* [s] the same for the close-up of the feet */
@@ -167,7 +167,8 @@ static mjModel *make_model(const View *view, MildError *error) {
     }
     spec->visual.global.offwidth = view->def.width;
     spec->visual.global.offheight = view->def.height;
-    spec->visual.quality.offsamples = 0; /* edges are smoothed afterwards */
+    spec->visual.quality.offsamples = 0; /* smooth_picture instead: four samples cost a
+                                              * software renderer half of its time */
     spec->visual.quality.shadowsize = VIEW_SHADOW;
     spec->visual.map.shadowclip = VIEW_SHADOW_CLIP;
     spec->visual.quality.numslices = VIEW_SLICES;
@@ -247,8 +248,8 @@ static int make_buffers(View *view) {
     view->labelled = malloc(frame);
     view->luma = malloc(frame / 3);
     view->data = mj_makeData(view->model);
-    if (!view->slot_of || !view->inset || !view->pixels || !view->scene_pixels ||
-        !view->labelled || !view->luma || !view->data) {
+    if (!view->slot_of || !view->inset || !view->pixels || !view->scene_pixels || !view->labelled ||
+        !view->luma || !view->data) {
         return 0;
     }
     for (int t = 0; t < tiles; t++) {
