@@ -257,11 +257,16 @@ static void update_vertex(Relief *relief, int i, int j) {
     }
 }
 
+/* The vertices that a foot may press: none while it swings above the highest ground. */
 static Box foot_box(const Relief *relief, int foot) {
-    double reach = relief->mask[foot].reach;
-    const double *p = relief->position[foot];
+    const SoleMask *mask = &relief->mask[foot];
+    const double *p = relief->position[foot], *r = relief->rotation[foot];
+    double reach = mask->reach, x = mask->x_min, y = mask->y_min;
+    double x_end = x + mask->columns * mask->step, y_end = y + mask->rows * mask->step;
+    double lowest =
+        p[2] + r[8] * mask->z + fmin(r[6] * x, r[6] * x_end) + fmin(r[7] * y, r[7] * y_end);
     Box box = {0, 0, 0, 0};
-    if (p[2] - reach > relief->high) {
+    if (lowest > relief->high) {
         return box;
     }
     double i0 = floor((p[0] - reach - relief->x0) / relief->cell),

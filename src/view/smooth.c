@@ -30,23 +30,32 @@ static float limited(float value, float lowest, float highest) {
     return value < lowest ? lowest : value > highest ? highest : value;
 }
 
-/* Whether an edge passes the pixel. The direction is normal to the gradient over the four corners
- * and long where the edge is close to a row or a column, as a step of it then is. */
-static int find_edge(const unsigned char *luma, int width, Edge *edge) {
+/* Marks the pixels of a row whose brightness differs enough from that of a neighbour. */
+static void find_edges(const unsigned char *restrict luma, int width,
+                       unsigned char *restrict edge) {
     const unsigned char *up = luma - width, *down = luma + width;
-    edge->least = least(least(luma[0], least(up[0], down[0])), least(luma[-1], luma[1]));
-    edge->most = most(most(luma[0], most(up[0], down[0])), most(luma[-1], luma[1]));
-    if (edge->most - edge->least < most(EDGE_LEAST, edge->most / EDGE_SHARE)) {
-        return 0;
+    for (int i = 1; i < width - 1; i++) {
+        int dark = least(least(luma[i], least(up[i], down[i])), least(luma[i - 1], luma[i + 1]));
+        int light = most(most(luma[i], most(up[i], down[i])), most(luma[i - 1], luma[i + 1]));
+        edge[i] = light - dark >= EDGE_LEAST && EDGE_SHARE * (light - dark) >= light;
     }
+}
+
+/* The direction is normal to the gradient over the four corners and long where the edge is close to
+ * a row or a column, as a step of it then is. */
+static Edge edge_of(const unsigned char *luma, int width) {
+    const unsigned char *up = luma - width, *down = luma + width;
     float x = (float)(down[-1] + down[1] - up[-1] - up[1]);
     float y = (float)(up[-1] + down[-1] - up[1] - down[1]);
     float sum = (float)(up[-1] + up[1] + down[-1] + down[1]);
     float smaller = fabsf(x) < fabsf(y) ? fabsf(x) : fabsf(y);
     float scale = 1.0F / (smaller + GENTLE * sum + 0.5F);
-    edge->x = limited(x * scale, -REACH_MAX, REACH_MAX);
-    edge->y = limited(y * scale, -REACH_MAX, REACH_MAX);
-    return 1;
+    return (Edge){
+        .least = least(least(luma[0], least(up[0], down[0])), least(luma[-1], luma[1])),
+        .most = most(most(luma[0], most(up[0], down[0])), most(luma[-1], luma[1])),
+        .x = limited(x * scale, -REACH_MAX, REACH_MAX),
+        .y = limited(y * scale, -REACH_MAX, REACH_MAX),
+    };
 }
 
 /* Adds weight times the colour at (x, y) [pixels], linear between pixels. */
@@ -97,16 +106,18 @@ static void smooth_pixel(const unsigned char *from, int width, int height, int i
 void smooth_edges(const unsigned char *from, int width, int height, unsigned char *luma,
                   unsigned char *to) {
     const size_t pixels = (size_t)width * (size_t)height;
+    unsigned char *edge = luma + pixels;
     memcpy(to, from, 3 * pixels);
     for (size_t p = 0; p < pixels; p++) {
         luma[p] = (unsigned char)brightness(from + 3 * p);
     }
     for (int j = 1; j < height - 1; j++) {
+        const size_t row = (size_t)j * (size_t)width;
+        find_edges(luma + row, width, edge);
         for (int i = 1; i < width - 1; i++) {
-            size_t at = (size_t)j * (size_t)width + (size_t)i;
-            Edge edge;
-            if (find_edge(luma + at, width, &edge)) {
-                smooth_pixel(from, width, height, i, j, &edge, to + 3 * at);
+            if (edge[i]) {
+                const Edge found = edge_of(luma + row + i, width);
+                smooth_pixel(from, width, height, i, j, &found, to + 3 * (row + (size_t)i));
             }
         }
     }

@@ -246,7 +246,7 @@ static int make_buffers(View *view) {
     view->pixels = malloc(frame);
     view->scene_pixels = malloc(frame);
     view->labelled = malloc(frame);
-    view->luma = malloc(frame / 3);
+    view->luma = malloc(frame / 3 + (size_t)view->def.width);
     view->data = mj_makeData(view->model);
     if (!view->slot_of || !view->inset || !view->pixels || !view->scene_pixels || !view->labelled ||
         !view->luma || !view->data) {
@@ -636,6 +636,11 @@ static void draw_text(View *view, mjrRect viewport, const RobotSim *sim, const V
     mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, viewport, keys, values, &view->context);
 }
 
+static mjrRect inset_place(const View *view, mjrRect viewport) {
+    return (mjrRect){viewport.width - view->layout.width - 10, 10, view->layout.width,
+                     view->layout.height};
+}
+
 static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     const double *normal[ROBOT_FEET_MAX];
     for (int f = 0; f < view->feet; f++) {
@@ -643,7 +648,7 @@ static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     }
     const InsetLayout *layout = &view->layout;
     inset_draw(layout, view->soles, view->feet, normal, view->def.pressure_max, view->inset);
-    mjrRect box = {viewport.width - layout->width - 10, 10, layout->width, layout->height};
+    mjrRect box = inset_place(view, viewport);
     mjr_drawPixels(view->inset, NULL, box, &view->context);
     char text[32];
     mjrRect title = {box.left, box.bottom + layout->title_bottom, box.width, layout->title_height};
@@ -699,13 +704,16 @@ static void smooth_picture(View *view, mjrRect size) {
     flip_rows(view->labelled, size, view->pixels);
 }
 
-/* Copies the pixels that the labels changed. */
-static void paste_labels(View *view, mjrRect size) {
-    mjr_readPixels(view->labelled, NULL, size, &view->context);
-    size_t row = (size_t)size.width * 3, rows = (size_t)size.height;
-    for (size_t r = 0; r < rows; r++) {
-        const unsigned char *now = view->labelled + r * row, *before = view->scene_pixels + r * row;
-        unsigned char *to = view->pixels + (rows - 1 - r) * row;
+/* Copies the pixels of a part of the picture that the labels changed. */
+static void paste_labels(View *view, mjrRect size, mjrRect part) {
+    const size_t width = (size_t)size.width * 3, row = (size_t)part.width * 3;
+    mjr_readPixels(view->labelled, NULL, part, &view->context);
+    for (int r = 0; r < part.height; r++) {
+        int y = part.bottom + r;
+        size_t left = 3 * (size_t)part.left;
+        const unsigned char *now = view->labelled + (size_t)r * row,
+                            *before = view->scene_pixels + (size_t)y * width + left;
+        unsigned char *to = view->pixels + (size_t)(size.height - 1 - y) * width + left;
         for (size_t i = 0; i < row; i++) {
             to[i] = now[i] != before[i] ? now[i] : to[i];
         }
@@ -753,7 +761,11 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     }
     smooth_picture(view, viewport);
     draw_labels(view, viewport, sim, info);
-    paste_labels(view, viewport);
+    mjrRect text = {0, viewport.height / 2, viewport.width / 2, viewport.height / 2};
+    paste_labels(view, viewport, text);
+    if (!view->def.rigid) {
+        paste_labels(view, viewport, inset_place(view, viewport));
+    }
 }
 
 const unsigned char *view_pixels(const View *view) {

@@ -15,7 +15,7 @@
 #define HEIGHT 64
 #define SAMPLES 16 /* of a side of a pixel, in the reference */
 
-static unsigned char from[HEIGHT][WIDTH][3], to[HEIGHT][WIDTH][3], luma[HEIGHT * WIDTH];
+static unsigned char from[HEIGHT][WIDTH][3], to[HEIGHT][WIDTH][3], luma[(HEIGHT + 1) * WIDTH];
 
 /* Bright above a line through the middle, dark below. */
 static int above(double x, double y, double slope) {
