@@ -79,7 +79,7 @@ static void the_rest_stays(void **state) {
     for (int j = 0; j < HEIGHT; j++) {
         for (int i = 0; i < WIDTH; i++) {
             for (int c = 0; c < 3; c++) {
-                from[j][i][c] = (unsigned char)(180 + rand() % 19);
+                from[j][i][c] = (unsigned char)(178 + rand() % 45);
             }
         }
     }
@@ -87,10 +87,28 @@ static void the_rest_stays(void **state) {
     assert_memory_equal(from, to, sizeof from);
 }
 
+/* A slanted line two pixels wide keeps its brightness: colours are mixed along it, not across. */
+static void lines_stay(void **state) {
+    (void)state;
+    for (int side = 0; side < 2; side++) {
+        memset(from, 30, sizeof from);
+        for (int j = 1; j < HEIGHT; j++) {
+            for (int k = 0; k < 2; k++) {
+                memset(from[j][side ? WIDTH - 20 - j + k : 20 + j + k], 220, 3);
+            }
+        }
+        smooth_edges(&from[0][0][0], WIDTH, HEIGHT, luma, &to[0][0][0]);
+        for (int j = 8; j < HEIGHT - 8; j++) {
+            assert_true(to[j][side ? WIDTH - 20 - j : 20 + j][1] > 170);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(slanted_edges_come_closer_to_the_truth),
         cmocka_unit_test(the_rest_stays),
+        cmocka_unit_test(lines_stay),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
