@@ -55,17 +55,18 @@ static double error_of(unsigned char picture[HEIGHT][WIDTH][3], double slope) {
     return sqrt(sum / cut);
 }
 
-/* Steps are longest where an edge is close to a row or a column: there the error halves. Elsewhere
+/* Steps are longest where an edge is close to a row or a column: there the error halves. The sixth
+ * is mixed along its own direction, not along its mirror image, which would leave more. Elsewhere
  * it does not grow. */
 static void slanted_edges_come_closer_to_the_truth(void **state) {
     (void)state;
-    const double slopes[] = {0.06, -0.12, 0.2, 8, -16, -0.3, 0.45, 0.9, -1.0, 3};
+    const double slopes[] = {0.06, -0.12, 0.2, 8, -16, 0.9, -0.3, 0.45, -1.0, 3};
     for (int k = 0; k < 10; k++) {
         draw(slopes[k]);
         smooth_edges(&from[0][0][0], WIDTH, HEIGHT, luma, &to[0][0][0]);
         double before = error_of(from, slopes[k]), after = error_of(to, slopes[k]);
         print_message("slope %6.2f: off by %.0f before, %.0f after\n", slopes[k], before, after);
-        assert_true(after < (k < 5 ? 0.6 : 1.01) * before);
+        assert_true(after < (k < 6 ? 0.6 : 1.01) * before);
     }
 }
 
