@@ -22,9 +22,9 @@
 #define VIEW_RADIUS_UNEVEN 4.0 /* [m] the same on uneven ground */
 #define VIEW_FLOOR 40.0        /* [m] half the size of the surrounding floor */
 #define VIEW_GEOMS 4000
-#define VIEW_SHADOW 1024             /* [pixels] edge of the shadow map */
+#define VIEW_SHADOW 768              /* [pixels] edge of the shadow map */
 #define VIEW_SHADOW_CLIP 1.3F        /* [-] half of what it covers, in extents of the robot */
-#define VIEW_SLICES 16               /* sides of a drawn cylinder */
+#define VIEW_SLICES 14               /* sides of a drawn cylinder */
 #define VIEW_CAMERA_TIME 0.45        /* [s] time constant of the camera */
 #define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
 #define VIEW_CLOSE_TIME 0.25         /* [s] the same for the close-up of the feet */
