@@ -16,9 +16,10 @@ WEIGHT, AREA, WIDTH = 40 * 9.81, 77 * 0.0195**2, 0.1  # [N], [m^2] of one sole, 
 SOILS = {
     "dry sand": (1.1, 0.99, 1528.43),
     "Mars simulant": (0.8, 5.79, 180.0),
-    "snow (U.S.)": (1.6, 4.37, 196.72),
-    "snow (Sweden)": (1.44, 10.55, 66.08),
 }
+# What figure sinkage compares, and the pressure [kPa] at which it names the other grounds
+PAIRS = {"sand_dense": "dry sand", "sand_loose": "Mars simulant"}
+LABELS = {"rubber": 26, "foam60": 17, "foam45": 2.5, "foam28": 8.5, "foam25": 5.2, "grass": 3.4}
 
 
 def read(folder, name):
@@ -155,20 +156,35 @@ def impact(folder, path):
 
 
 def sinkage(folder, path):
+    """One message: under a robot the two sands sink as deep as Bekker's soils of their kind. All else is pale."""
     figure, axes = plt.subplots(figsize=(8.5, 5.2), layout="constrained")
+    two, one = 0.5e-3 * WEIGHT / AREA, 1e-3 * WEIGHT / AREA
+    axes.axhspan(two, one, color="0.94", linewidth=0)
+    axes.text(0.62, math.sqrt(two * one), "40 kg on two feet\n(lower edge)\nto one foot (upper)", fontsize=9, color="0.35",
+              va="center")
     for ground in GROUNDS:
         depth, force = down(read(folder, ground))
-        axes.plot([1e3 * d for d in depth], [1e-3 * f / AREA for f in force], color=COLORS[ground], linewidth=2, label=ground)
-    for (soil, (n, k_c, k_phi)), style in zip(SOILS.items(), ("--", "-.", ":", (0, (1, 3)))):
+        sand = ground in PAIRS
+        x, y = [1e3 * d for d in depth], [1e-3 * f / AREA for f in force]
+        axes.plot(x, y, color=COLORS[ground] if sand else "0.75", linewidth=3 if sand else 1.2, zorder=3 if sand else 1)
+        if not sand:
+            label = next(i for i, p in enumerate(y) if p > LABELS[ground])
+            axes.text(x[label], y[label], ground, color="0.45", fontsize=8, ha="center", va="center",
+                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8})
+    for ground, soil in PAIRS.items():
+        n, k_c, k_phi = SOILS[soil]
         z = [10 ** (-0.3 + 0.02 * i) for i in range(140)]
-        axes.plot(z, [(k_c / WIDTH + k_phi) * (1e-3 * d) ** n for d in z], color="black", linestyle=style, linewidth=1.4,
-                  label=f"{soil}, n = {n:g}")
-    for load, text in ((0.5 * WEIGHT, "two feet"), (WEIGHT, "one foot")):
-        axes.axhline(1e-3 * load / AREA, color="0.6", linewidth=0.8)
-        axes.text(0.53, 1.03e-3 * load / AREA, f"40 kg on {text}", fontsize=8, color="0.35", va="bottom")
-    axes.set(xscale="log", yscale="log", xlim=(0.5, 250), ylim=(0.5, 60), xlabel="sinkage [mm]",
+        axes.plot(z, [(k_c / WIDTH + k_phi) * (1e-3 * d) ** n for d in z], color=COLORS[ground], linestyle="--",
+                  linewidth=1.8, zorder=2, label=f"{soil}, Bekker, measured")
+        axes.plot([], [], color=COLORS[ground], linewidth=3, label=f"{ground}, ours")
+    axes.set(xscale="log", yscale="log", xlim=(0.5, 80), ylim=(2, 40), xlabel="sinkage [mm]",
              ylabel="mean pressure under the sole [kPa]")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9)
+    ticks = (2, 5, 10, 20, 40), (0.5, 1, 2, 5, 10, 20, 50)
+    axes.set_yticks(ticks[0], [f"{t:g}" for t in ticks[0]])
+    axes.set_xticks(ticks[1], [f"{t:g}" for t in ticks[1]])
+    axes.minorticks_off()
+    axes.set_title("Under a robot's weight our sands sink as deep as the soils of their kind, within a factor of 1.5", fontsize=11)
+    axes.legend(frameon=False, fontsize=9, loc="lower right")
     finish(figure, [axes], path)
 
 

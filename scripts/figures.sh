@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain]; without a name all of them.
+# Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]; without a name all.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -55,20 +55,34 @@ eccentric() {
     done
 }
 
+# still VIDEO PICTURE FILTER: frames of a video as a picture of 256 colours, a third of the size of one with all
+still() {
+    ffmpeg -loglevel error -y -i "$1" -frames:v 1 -vsync 0 \
+        -filter_complex "$3,split[a][b];[a]palettegen=stats_mode=full[p];[b][p]paletteuse=dither=sierra2_4a" "$2"
+}
+
+# The first part of `make run`: six moments of the walk, and the sole pressure.
+walk() {
+    "$mild" play --ground rubber,foam45,sand_loose --video "$work/walk.mp4" --pressure docs/pressure.png
+    rm docs/pressure.csv
+    still "$work/walk.mp4" docs/walk.png \
+        "select='eq(n,40)+eq(n,109)+eq(n,150)+eq(n,205)+eq(n,255)+eq(n,300)',scale=640:-1:flags=area,tile=3x2"
+}
+
 # A robot among its imprints on waves of two materials, after five seconds.
 terrain() {
     "$mild" play --ground sand_dense,sand_loose --speed 0.5 --seconds 5.2 --video "$work/terrain.mp4" \
         --terrain.kind=waves --terrain.amplitude=0.04 --terrain.wavelength=1.6 --terrain.memory=true \
         --terrain.patches=checker --terrain.patch_size=1.2 --terrain.border=0.3
-    ffmpeg -loglevel error -y -ss 5 -i "$work/terrain.mp4" -frames:v 1 docs/terrain.png
+    still "$work/terrain.mp4" docs/terrain.png "select='eq(n,125)'"
 }
 
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
-    terrain) terrain ;;
+    terrain | walk) "$name" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric terrain; do "$0" "$each"; done ;;
-    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain walk; do "$0" "$each"; done ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk" >&2 && exit 2 ;;
     esac
 done

@@ -2,7 +2,7 @@
 """Draws what `mild play --pressure` measured: pressure.py DATA.csv PICTURE.png
 
 For each ground the left and right sole seen from above: mean pressure per element over the stances, peak pressure, and
-the centre of pressure from heel strike (circle) to lift-off (cross)."""
+the path of the centre of pressure from touchdown to lift-off, mean over the stances. A legend names every mark."""
 import csv
 import sys
 from collections import OrderedDict
@@ -13,10 +13,12 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.collections import PatchCollection  # noqa: E402
 from matplotlib.colors import Normalize  # noqa: E402
-from matplotlib.patches import Rectangle  # noqa: E402
+from matplotlib.lines import Line2D  # noqa: E402
+from matplotlib.patches import Patch, Rectangle  # noqa: E402
 
 ROWS = (("mean_kpa", "mean over stance"), ("peak_kpa", "peak"))
 GAP = 0.03  # [m] between the drawn soles
+PATH = "#0aa3c2"
 
 
 def read(path):
@@ -48,15 +50,29 @@ def draw_foot(axes, foot, key, norm, shift, path):
     axes.add_collection(cells)
     if path and foot["path"]:
         px, py = values(foot["path"], "x_m"), values(foot["path"], "y_m")
-        axes.plot([shift - b for b in py], px, color="#0aa3c2", linewidth=2, solid_capstyle="round", zorder=3)
-        axes.plot(shift - py[0], px[0], "o", color="#0aa3c2", markeredgecolor="white", markersize=7, zorder=4)
-        axes.plot(shift - py[-1], px[-1], "X", color="#0aa3c2", markeredgecolor="white", markersize=8, zorder=4)
+        axes.plot([shift - b for b in py], px, color=PATH, linewidth=2, solid_capstyle="round", zorder=3)
+        axes.plot(shift - py[0], px[0], "o", color=PATH, markeredgecolor="white", markersize=7, zorder=4)
+        axes.plot(shift - py[-1], px[-1], "X", color=PATH, markeredgecolor="white", markersize=8, zorder=4)
     return cells
+
+
+def legend(figure, element):
+    """What every mark means, below the soles."""
+    spot = {"color": "none", "markerfacecolor": PATH, "markeredgecolor": "white"}
+    edge = 1e3 * pitch(element)
+    marks = (
+        (Line2D([], [], color=PATH, linewidth=2), "path of the centre of pressure,\nmean over the stances"),
+        (Line2D([], [], marker="o", markersize=9, **spot), "touchdown"),
+        (Line2D([], [], marker="X", markersize=10, **spot), "lift-off"),
+        (Patch(facecolor="#f1605d", edgecolor="white"), f"element of the sole,\n{edge:.1f} x {edge:.1f} mm, toes up"),
+    )
+    handles, labels = zip(*marks)
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(marks), frameon=False, fontsize=9)
 
 
 def draw(grounds, path):
     width = 2.3 * max(len(grounds), 2) + 1.6
-    figure, panels = plt.subplots(len(ROWS), len(grounds), figsize=(width, 6.4), squeeze=False, layout="constrained")
+    figure, panels = plt.subplots(len(ROWS), len(grounds), figsize=(width, 6.9), squeeze=False, layout="constrained")
     for index, ((key, title), row) in enumerate(zip(ROWS, panels)):
         top = max(max(values(foot["element"], key)) for feet in grounds.values() for foot in feet.values())
         norm = Normalize(0, top)
@@ -74,6 +90,7 @@ def draw(grounds, path):
                 axes.set_title(ground, fontsize=11)
         bar = figure.colorbar(cells, ax=row.tolist(), shrink=0.85, pad=0.02)
         bar.set_label(f"{title} [kPa]")
+    legend(figure, next(iter(next(iter(grounds.values())).values()))["element"])
     figure.suptitle("Sole pressure while walking", fontsize=13)
     figure.savefig(path, dpi=150)
 

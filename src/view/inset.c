@@ -6,6 +6,7 @@
 #define INSET_MARGIN 10
 #define INSET_BAR 10
 #define INSET_LABELS 40 /* [pixels] room for the numbers beside the bar */
+#define INSET_LEAST 64  /* [pixels] height of the bar, for its two numbers */
 #define INSET_TITLE 24
 
 static const unsigned char background[3] = {30, 33, 38}, idle[3] = {70, 74, 80},
@@ -52,10 +53,11 @@ InsetLayout inset_layout(const MildSole *const *soles, int feet, int cell) {
         int n = cells_along(e.x_max - e.x_min, pitch);
         rows = n > rows ? n : rows;
     }
-    layout.height = rows * cell + 2 * INSET_MARGIN + INSET_TITLE;
+    int tall = rows * cell > INSET_LEAST ? rows * cell : INSET_LEAST;
+    layout.height = tall + 2 * INSET_MARGIN + INSET_TITLE;
     layout.bar_left = layout.width;
     layout.bar_bottom = INSET_MARGIN;
-    layout.bar_top = INSET_MARGIN + rows * cell;
+    layout.bar_top = INSET_MARGIN + tall;
     layout.bar_right = layout.bar_left + INSET_BAR;
     layout.width = layout.bar_right + INSET_LABELS;
     layout.title_bottom = layout.bar_top + INSET_MARGIN / 2;

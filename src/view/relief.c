@@ -9,16 +9,21 @@
     0.005 /* [m] width of the gap drawn around a sole, which keeps its edge visible */
 #define UNDER_SOLE 0.0015  /* [m] gap drawn below a sole, which prevents flicker */
 #define CHANGE_SEEN 0.0003 /* [m] smaller changes are not uploaded */
-#define SHADE_DEPTH 0.030  /* [m] depth at which pressed ground is almost as dark as it gets */
+#define SKIRT_MAX 0.10     /* [m] widest slope around a sole */
+#define SHADE_DEPTH 0.020  /* [m] depth at which pressed ground is almost as dark as it gets */
+#define SHADE_MOST 0.55F   /* [-] share of the light that the deepest ground loses */
+#define SHADE_SLOPE 0.012  /* [m] depth that shades as much as a wall of 45 degrees */
 #define TILE_INNER (RELIEF_TILE_PIXELS - 2 * RELIEF_TILE_MARGIN)
 #define NO_DEPTH (-1e9f)
 
-/* The shape of a sole, on a raster finer than its elements. */
+/* The shape of a sole and its surroundings, on a raster finer than its elements. */
 typedef struct {
+    const MildSole *sole;
     double x_min, y_min, step, z;
+    double half; /* [m] half the edge of the square drawn for an element */
     int columns, rows;
-    double reach; /* [m] ankle to the farthest sole point */
-    unsigned char *inside;
+    double reach;            /* [m] ankle to the farthest point of the raster */
+    unsigned short *nearest; /* [rows][columns] element nearest to the cell */
 } SoleMask;
 
 typedef struct {
@@ -45,7 +50,8 @@ struct Relief {
     double position[MILD_FEET_MAX][3], rotation[MILD_FEET_MAX][9];
     float *peak, *shown; /* [ny][nx] deepest and present depth of the surface */
     float *base;         /* [ny][nx] [m] undisturbed height */
-    unsigned char *touched, *dirty;
+    int *pressed;        /* [tiles] vertices that are not at their undisturbed height */
+    unsigned char *dirty;
     signed char *material; /* [tiles] */
 };
 
@@ -120,42 +126,74 @@ static void paint(const Look *look, int px, int py, float dark, unsigned char *r
 
 /* ---- sole raster ---- */
 
+static double outside(double value, double half) {
+    return fmax(fabs(value) - half, 0.0);
+}
+
+/* The squares of neighbours overlap by the gap around a sole. Inside several the point belongs to the
+ * nearest centre, so that it is well inside. */
+static unsigned short nearest_element(const SoleMask *mask, double px, double py) {
+    const double *x = mild_sole_x(mask->sole), *y = mild_sole_y(mask->sole);
+    double least = INFINITY, least_center = INFINITY;
+    int best = 0;
+    for (int e = 0; e < mild_sole_elements(mask->sole); e++) {
+        double dx = px - x[e], dy = py - y[e];
+        double distance = hypot(outside(dx, mask->half), outside(dy, mask->half));
+        double center = fmax(fabs(dx), fabs(dy));
+        if (distance < least || (distance == least && center < least_center)) {
+            least = distance;
+            least_center = center;
+            best = e;
+        }
+    }
+    return (unsigned short)best;
+}
+
 static int mask_create(SoleMask *mask, const MildSole *sole) {
-    int elements = mild_sole_elements(sole);
-    double half = 0.5 * mild_sole_pitch(sole) + SOLE_MARGIN, x_max = -1e9, y_max = -1e9;
+    double margin, x_max = -1e9, y_max = -1e9;
     const double *x = mild_sole_x(sole), *y = mild_sole_y(sole);
+    mask->sole = sole;
     mask->z = mild_sole_z(sole);
+    mask->half = 0.5 * mild_sole_pitch(sole) + SOLE_MARGIN;
     mask->x_min = mask->y_min = 1e9;
     mask->reach = 0;
-    for (int e = 0; e < elements; e++) {
-        mask->x_min = fmin(mask->x_min, x[e] - half), mask->y_min = fmin(mask->y_min, y[e] - half);
-        x_max = fmax(x_max, x[e] + half), y_max = fmax(y_max, y[e] + half);
-        mask->reach = fmax(mask->reach, hypot(hypot(x[e], y[e]), mask->z) + 1.5 * half);
+    margin = mask->half + SKIRT_MAX;
+    for (int e = 0; e < mild_sole_elements(sole); e++) {
+        mask->x_min = fmin(mask->x_min, x[e] - margin);
+        mask->y_min = fmin(mask->y_min, y[e] - margin);
+        x_max = fmax(x_max, x[e] + margin), y_max = fmax(y_max, y[e] + margin);
+        mask->reach = fmax(mask->reach, hypot(hypot(x[e], y[e]), mask->z) + 1.5 * margin);
     }
     mask->step = mild_sole_pitch(sole) / MASK_PER_PITCH;
     mask->columns = (int)ceil((x_max - mask->x_min) / mask->step);
     mask->rows = (int)ceil((y_max - mask->y_min) / mask->step);
-    mask->inside = calloc((size_t)mask->columns * (size_t)mask->rows, 1);
-    if (!mask->inside) {
+    mask->nearest = malloc((size_t)mask->columns * (size_t)mask->rows * sizeof *mask->nearest);
+    if (!mask->nearest) {
         return 0;
     }
     for (int r = 0; r < mask->rows; r++) {
         for (int c = 0; c < mask->columns; c++) {
-            double px = mask->x_min + (c + 0.5) * mask->step,
-                   py = mask->y_min + (r + 0.5) * mask->step;
-            for (int e = 0; e < elements; e++) {
-                if (fabs(px - x[e]) < half && fabs(py - y[e]) < half) {
-                    mask->inside[r * mask->columns + c] = 1;
-                }
-            }
+            mask->nearest[r * mask->columns + c] = nearest_element(
+                mask, mask->x_min + (c + 0.5) * mask->step, mask->y_min + (r + 0.5) * mask->step);
         }
     }
     return 1;
 }
 
-/* Depth of the foot's sole plane under the vertical through (x, y), NO_DEPTH beside the sole. The
- * plane's points p have n.(p - ankle) = z_sole, n the foot's z axis. */
-static float sole_depth(const Relief *relief, int foot, double x, double y, double surface) {
+/* Depth [m] of the surface at a distance [m] from the edge of a sole that is `depth` deep:
+ * depth (1 - 3 s^2 + 2 s^3), s = distance/run. Grains stand steeper than a sheet that is pulled
+ * down with the sole, so the run grows with `recovery`. */
+static double skirt(double depth, double distance, double recovery) {
+    double run = fmin(0.012 + 0.018 * recovery + (0.40 + 0.80 * recovery) * depth, SKIRT_MAX);
+    double s = fmin(distance / run, 1.0);
+    return depth * (1.0 - s * s * (3.0 - 2.0 * s));
+}
+
+/* Depth to which a foot presses the surface under the vertical through (x, y): that of the sole
+ * plane under the sole, a smooth slope beside it, NO_DEPTH farther away. The plane's points p have
+ * n.(p - ankle) = z_sole, n the foot's z axis. */
+static float sole_depth(const Relief *relief, int foot, double x, double y, double surface,
+                        double recovery) {
     const SoleMask *mask = &relief->mask[foot];
     const double *p = relief->position[foot], *r = relief->rotation[foot];
     double dx = x - p[0], dy = y - p[1];
@@ -165,11 +203,18 @@ static float sole_depth(const Relief *relief, int foot, double x, double y, doub
     double dz = (mask->z - r[2] * dx - r[5] * dy) / r[8];
     double sx = r[0] * dx + r[3] * dy + r[6] * dz, sy = r[1] * dx + r[4] * dy + r[7] * dz;
     double fc = (sx - mask->x_min) / mask->step, fr = (sy - mask->y_min) / mask->step;
-    if (fc < 0 || fr < 0 || fc >= mask->columns || fr >= mask->rows ||
-        !mask->inside[(int)fr * mask->columns + (int)fc]) {
+    if (fc < 0 || fr < 0 || fc >= mask->columns || fr >= mask->rows) {
         return NO_DEPTH;
     }
-    return (float)(surface - (p[2] + dz) + UNDER_SOLE);
+    int e = mask->nearest[(int)fr * mask->columns + (int)fc];
+    double cx = mild_sole_x(mask->sole)[e], cy = mild_sole_y(mask->sole)[e], half = mask->half;
+    double qx = fmin(fmax(sx, cx - half), cx + half), qy = fmin(fmax(sy, cy - half), cy + half);
+    double z = p[2] + r[6] * qx + r[7] * qy + r[8] * mask->z; /* of the sole's nearest point */
+    double depth = surface - z + UNDER_SOLE;
+    if (depth <= UNDER_SOLE) {
+        return NO_DEPTH;
+    }
+    return (float)skirt(depth, hypot(sx - qx, sy - qy), recovery);
 }
 
 /* ---- surface ---- */
@@ -178,14 +223,15 @@ static const MildMaterial *material_at(const Relief *relief, double x, double y)
     return &relief->terrain.materials[mild_terrain_material_at(&relief->terrain, x, y)];
 }
 
-static void mark(Relief *relief, int i, int j) {
-    int c1 = i / RELIEF_TILE_CELLS, r1 = j / RELIEF_TILE_CELLS;
-    /* a vertex on an edge belongs to both neighbours */
-    int c0 = i % RELIEF_TILE_CELLS == 0 && c1 > 0 ? c1 - 1 : c1,
-        r0 = j % RELIEF_TILE_CELLS == 0 && r1 > 0 ? r1 - 1 : r1;
-    for (int r = r0; r <= r1 && r < relief->rows; r++) {
-        for (int c = c0; c <= c1 && c < relief->columns; c++) {
-            relief->touched[r * relief->columns + c] = relief->dirty[r * relief->columns + c] = 1;
+/* The tiles of a vertex, and those of its neighbours, whose normals it changes, must be drawn again.
+ * pressed: 1 when the vertex was undisturbed before, -1 when it is again, else 0. */
+static void mark(Relief *relief, int i, int j, int pressed) {
+    int c0 = (i + RELIEF_TILE_CELLS - 2) / RELIEF_TILE_CELLS - 1, c1 = (i + 1) / RELIEF_TILE_CELLS;
+    int r0 = (j + RELIEF_TILE_CELLS - 2) / RELIEF_TILE_CELLS - 1, r1 = (j + 1) / RELIEF_TILE_CELLS;
+    for (int r = r0 > 0 ? r0 : 0; r <= r1 && r < relief->rows; r++) {
+        for (int c = c0 > 0 ? c0 : 0; c <= c1 && c < relief->columns; c++) {
+            relief->pressed[r * relief->columns + c] += pressed;
+            relief->dirty[r * relief->columns + c] = 1;
         }
     }
 }
@@ -193,27 +239,34 @@ static void mark(Relief *relief, int i, int j) {
 static void update_vertex(Relief *relief, int i, int j) {
     double x = relief->x0 + i * relief->cell, y = relief->y0 + j * relief->cell;
     size_t at = (size_t)j * (size_t)relief->nx + (size_t)i;
-    float depth = NO_DEPTH;
+    double recovery = material_at(relief, x, y)->recovery;
+    float depth = 0;
     for (int f = 0; f < relief->feet; f++) {
-        depth = fmaxf(depth, sole_depth(relief, f, x, y, (double)relief->base[at]));
+        depth = fmaxf(depth, sole_depth(relief, f, x, y, (double)relief->base[at], recovery));
     }
-    if (depth <= (float)UNDER_SOLE && relief->peak[at] <= 0.0F) {
+    if (depth <= 0.0F && relief->peak[at] <= 0.0F) {
         return;
     }
     relief->peak[at] = fmaxf(relief->peak[at], depth);
-    float left = (float)(1.0 - material_at(relief, x, y)->recovery) * relief->peak[at];
-    float shown = fmaxf(left, fmaxf(depth, 0.0F));
-    if (fabsf(shown - relief->shown[at]) > (float)CHANGE_SEEN) {
+    float left = (float)(1.0 - recovery) * relief->peak[at];
+    float before = relief->shown[at], shown = fmaxf(left, depth);
+    int pressed = (shown > 0.0F) - (before > 0.0F);
+    if (pressed || fabsf(shown - before) > (float)CHANGE_SEEN) {
         relief->shown[at] = shown;
-        mark(relief, i, j);
+        mark(relief, i, j, pressed);
     }
 }
 
+/* The vertices that a foot may press: none while it swings above the highest ground. */
 static Box foot_box(const Relief *relief, int foot) {
-    double reach = relief->mask[foot].reach;
-    const double *p = relief->position[foot];
+    const SoleMask *mask = &relief->mask[foot];
+    const double *p = relief->position[foot], *r = relief->rotation[foot];
+    double reach = mask->reach, x = mask->x_min, y = mask->y_min;
+    double x_end = x + mask->columns * mask->step, y_end = y + mask->rows * mask->step;
+    double lowest =
+        p[2] + r[8] * mask->z + fmin(r[6] * x, r[6] * x_end) + fmin(r[7] * y, r[7] * y_end);
     Box box = {0, 0, 0, 0};
-    if (p[2] - reach > relief->high) {
+    if (lowest > relief->high) {
         return box;
     }
     double i0 = floor((p[0] - reach - relief->x0) / relief->cell),
@@ -272,13 +325,13 @@ static int allocate(Relief *relief, const MildSole *const *soles) {
     size_t vertices = (size_t)relief->nx * (size_t)relief->ny,
            tiles = (size_t)relief->columns * (size_t)relief->rows;
     relief->peak = calloc(3 * vertices, sizeof *relief->peak);
-    relief->touched = calloc(3 * tiles, 1);
-    if (!relief->peak || !relief->touched) {
+    relief->pressed = calloc(tiles, sizeof *relief->pressed);
+    relief->dirty = calloc(2 * tiles, 1);
+    if (!relief->peak || !relief->pressed || !relief->dirty) {
         return 0;
     }
     relief->shown = relief->peak + vertices;
     relief->base = relief->shown + vertices;
-    relief->dirty = relief->touched + tiles;
     relief->material = (signed char *)(relief->dirty + tiles);
     for (int f = 0; f < relief->feet; f++) {
         if (!mask_create(&relief->mask[f], soles[f])) {
@@ -342,10 +395,11 @@ void relief_destroy(Relief *relief) {
         return;
     }
     for (int f = 0; f < relief->feet; f++) {
-        free(relief->mask[f].inside);
+        free(relief->mask[f].nearest);
     }
     free(relief->peak);
-    free(relief->touched);
+    free(relief->pressed);
+    free(relief->dirty);
     free(relief);
 }
 
@@ -389,8 +443,8 @@ int relief_tile_material(const Relief *relief, int tile) {
     return relief->material[tile];
 }
 
-int relief_tile_touched(const Relief *relief, int tile) {
-    return relief->touched[tile];
+int relief_tile_pressed(const Relief *relief, int tile) {
+    return relief->pressed[tile] > 0;
 }
 
 int relief_tile_take_dirty(Relief *relief, int tile) {
@@ -399,22 +453,61 @@ int relief_tile_take_dirty(Relief *relief, int tile) {
     return dirty;
 }
 
-static const float *tile_row(const Relief *relief, int tile, int row) {
-    size_t i = (size_t)(tile % relief->columns) * RELIEF_TILE_CELLS;
-    size_t j = (size_t)(tile / relief->columns) * RELIEF_TILE_CELLS + (size_t)row;
-    return relief->shown + j * (size_t)relief->nx + i;
+/* Of the vertex in the tile's lower left corner. */
+static void tile_origin(const Relief *relief, int tile, int *i, int *j) {
+    *i = tile % relief->columns * RELIEF_TILE_CELLS;
+    *j = tile / relief->columns * RELIEF_TILE_CELLS;
 }
 
-void relief_tile_heights(const Relief *relief, int tile, double depth, int step, float *heights) {
-    float low = (float)(relief->low - depth),
-          scale = 1.0F / (float)(relief->high - relief->low + depth);
-    for (int j = 0; j < RELIEF_TILE_VERTICES; j += step) {
-        const float *shown = tile_row(relief, tile, j),
-                    *base = relief->base + (shown - relief->shown);
-        for (int i = 0; i < RELIEF_TILE_VERTICES; i += step) {
-            *heights++ = fmaxf(0.0F, (base[i] - shown[i] - low) * scale);
+/* Height [m] of a vertex. Indices outside the area drawn are those of its edge. */
+static float height(const Relief *relief, int i, int j) {
+    int column = i < 0 ? 0 : i >= relief->nx ? relief->nx - 1 : i;
+    int row = j < 0 ? 0 : j >= relief->ny ? relief->ny - 1 : j;
+    size_t at = (size_t)row * (size_t)relief->nx + (size_t)column;
+    return relief->base[at] - relief->shown[at];
+}
+
+void relief_tile_surface(const Relief *relief, int tile, int step, float *position, float *normal) {
+    int i0, j0;
+    tile_origin(relief, tile, &i0, &j0);
+    const float run = 2.0F * (float)step * (float)relief->cell;
+    for (int j = j0; j <= j0 + RELIEF_TILE_CELLS; j += step) {
+        for (int i = i0; i <= i0 + RELIEF_TILE_CELLS; i += step, position += 3, normal += 3) {
+            position[0] = (float)(relief->x0 + i * relief->cell);
+            position[1] = (float)(relief->y0 + j * relief->cell);
+            position[2] = height(relief, i, j);
+            /* of the plane through the four neighbours */
+            float sx = (height(relief, i + step, j) - height(relief, i - step, j)) / run;
+            float sy = (height(relief, i, j + step) - height(relief, i, j - step)) / run;
+            float size = sqrtf(1.0F + sx * sx + sy * sy);
+            normal[0] = -sx / size, normal[1] = -sy / size, normal[2] = 1.0F / size;
         }
     }
+}
+
+/* Depth [m] of the drawn surface and its slope [-], linear between the vertices. */
+typedef struct {
+    double depth, slope;
+} Dent;
+
+/* (fi, fj): place in vertices, inside the area. */
+static Dent dent_at(const Relief *relief, double fi, double fj) {
+    int i = (int)fmin(fi, relief->nx - 2), j = (int)fmin(fj, relief->ny - 2);
+    const float *low = relief->shown + (size_t)j * (size_t)relief->nx + i, *high = low + relief->nx;
+    double u = fi - i, v = fj - j;
+    double left = (1 - v) * (double)low[0] + v * (double)high[0];
+    double right = (1 - v) * (double)low[1] + v * (double)high[1];
+    double bottom = (1 - u) * (double)low[0] + u * (double)low[1];
+    double top = (1 - u) * (double)high[0] + u * (double)high[1];
+    return (Dent){(1 - u) * left + u * right, hypot(right - left, top - bottom) / relief->cell};
+}
+
+double relief_depth_at(const Relief *relief, double x, double y) {
+    double fi = (x - relief->x0) / relief->cell, fj = (y - relief->y0) / relief->cell;
+    if (!(fi >= 0 && fi <= relief->nx - 1 && fj >= 0 && fj <= relief->ny - 1)) {
+        return 0;
+    }
+    return dent_at(relief, fi, fj).depth;
 }
 
 static const Look *look_at(const Relief *relief, int material) {
@@ -426,22 +519,28 @@ static double inner(int pixel) {
     return fmin(fmax((pixel - RELIEF_TILE_MARGIN + 0.5) / TILE_INNER, 0.0), 1.0 - 1e-9);
 }
 
+/* Share of the light that a dent loses. It stands in for the shadows of its walls, because the
+ * ground casts none, and makes imprints distinct. */
+static float dent_shade(Dent dent) {
+    if (!(dent.depth > 0)) {
+        return 0.0F;
+    }
+    double shade = (dent.depth + SHADE_SLOPE * dent.slope) / SHADE_DEPTH;
+    return SHADE_MOST * (1.0F - expf(-(float)shade));
+}
+
 void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb) {
-    double center[2], edge = relief_tile_edge(relief);
-    relief_tile_center(relief, tile, center);
+    int i0, j0;
+    tile_origin(relief, tile, &i0, &j0);
     for (int py = 0; py < RELIEF_TILE_PIXELS; py++) {
-        double v = inner(RELIEF_TILE_PIXELS - 1 - py); /* picture rows go down, y goes up */
-        const float *low = tile_row(relief, tile, (int)(v * RELIEF_TILE_CELLS)),
-                    *high = low + relief->nx;
+        /* picture rows go down, y goes up */
+        double fj = j0 + RELIEF_TILE_CELLS * inner(RELIEF_TILE_PIXELS - 1 - py);
         for (int px = 0; px < RELIEF_TILE_PIXELS; px++, rgb += 3) {
-            double u = inner(px);
-            int i = (int)(u * RELIEF_TILE_CELLS);
-            float depth = 0.25F * (low[i] + low[i + 1] + high[i] + high[i + 1]);
-            double x = center[0] + (u - 0.5) * edge, y = center[1] + (v - 0.5) * edge;
+            double fi = i0 + RELIEF_TILE_CELLS * inner(px);
+            double x = relief->x0 + fi * relief->cell, y = relief->y0 + fj * relief->cell;
             int material =
                 relief->rigid ? RELIEF_RIGID : mild_terrain_material_at(&relief->terrain, x, y);
-            float dark = 0.42F * (1.0F - expf(-depth / (float)SHADE_DEPTH));
-            paint(look_at(relief, material), px, py, dark, rgb);
+            paint(look_at(relief, material), px, py, dent_shade(dent_at(relief, fi, fj)), rgb);
         }
     }
 }

@@ -1,6 +1,7 @@
 /* The visible ground: a height map that the soles press in and that springs back by its material's
- * `recovery`. It is only for drawing; physics never reads it. The map is divided into square tiles,
- * so that a renderer need refresh only those that changed. It does not depend on a renderer. */
+ * `recovery`. Under a sole it is as deep as the sole; around it the surface rises in a smooth slope.
+ * It is only for drawing; physics never reads it. The map is divided into square tiles, so that a
+ * renderer need refresh only those that changed. It does not depend on a renderer. */
 #ifndef VIEW_RELIEF_H
 #define VIEW_RELIEF_H
 
@@ -41,12 +42,16 @@ double relief_height_at(const Relief *relief, double x, double y);
 /* The one material of the tile (RELIEF_RIGID where nothing yields), or -2 when several meet in it.
  */
 int relief_tile_material(const Relief *relief, int tile);
-int relief_tile_touched(const Relief *relief, int tile);
+/* Whether a vertex of the tile lies below the undisturbed surface: never again on elastic ground
+ * once the foot has left. */
+int relief_tile_pressed(const Relief *relief, int tile);
 /* Whether the tile changed since the last call. */
 int relief_tile_take_dirty(Relief *relief, int tile);
-/* Every step-th vertex (a divisor of RELIEF_TILE_CELLS), rows along y: 1 at relief_high, 0 at
- * `depth` below relief_low. */
-void relief_tile_heights(const Relief *relief, int tile, double depth, int step, float *heights);
+/* Position [m, world] and unit normal of every step-th vertex (a divisor of RELIEF_TILE_CELLS), rows
+ * along y, x fastest: [n][n][3] each, n = RELIEF_TILE_CELLS/step + 1. Tiles share their edges. */
+void relief_tile_surface(const Relief *relief, int tile, int step, float *position, float *normal);
+/* [m] Depth of the drawn surface below the undisturbed one, linear between vertices; 0 outside. */
+double relief_depth_at(const Relief *relief, double x, double y);
 /* [PIXELS][PIXELS][3] first row at y max, margin included; pressed ground is darker. */
 void relief_tile_pixels(const Relief *relief, int tile, unsigned char *rgb);
 /* The same for untouched ground of one material, seamless between tiles. */

@@ -6,23 +6,28 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "view/follow.h"
 #include "view/gl.h"
 #include "view/inset.h"
 #include "view/relief.h"
+#include "view/smooth.h"
 
 #define VIEW_CELL 0.01         /* [m] vertices of the visible ground */
-#define VIEW_OVERLAP 1.0015    /* [-] scale of a tile, which prevents gaps between tiles */
-#define VIEW_SLOTS 96          /* most tiles that are deformed or of mixed material at once */
-#define VIEW_SLOTS_UNEVEN 192  /* the same on uneven ground, where every tile has a shape */
+#define VIEW_OVERLAP 1.0015F   /* [-] scale of a tile, which prevents gaps between tiles */
+#define VIEW_FINE 64           /* most tiles with imprints at once */
+#define VIEW_PLAIN 96          /* most tiles without imprints but of mixed material */
+#define VIEW_PLAIN_UNEVEN 192  /* the same on uneven ground, where every tile has a shape */
 #define VIEW_COARSE 4          /* [vertices] spacing of drawn vertices on a tile without imprints */
-#define VIEW_DEPTH 0.20        /* [m] deepest imprint that can be drawn */
 #define VIEW_RADIUS 9.0        /* [m] tiles farther from the robot are drawn as plain floor */
 #define VIEW_RADIUS_UNEVEN 4.0 /* [m] the same on uneven ground */
 #define VIEW_FLOOR 40.0        /* [m] half the size of the surrounding floor */
 #define VIEW_GEOMS 4000
-#define VIEW_CAMERA_TIME 0.35        /* [s] time constant of the camera */
+#define VIEW_SHADOW 768              /* [pixels] edge of the shadow map */
+#define VIEW_SHADOW_CLIP 1.3F        /* [-] half of what it covers, in extents of the robot */
+#define VIEW_SLICES 14               /* sides of a drawn cylinder */
+#define VIEW_CAMERA_TIME 0.45        /* [s] time constant of the camera */
 #define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
-#define VIEW_CLOSE_TIME 0.20         /* [s] the same for the close-up of the feet */
+#define VIEW_CLOSE_TIME 0.25         /* [s] the same for the close-up of the feet */
 #define VIEW_CLOSE_HEIGHT 0.04       /* [m] */
 #define VIEW_CLOSE_TURN 22.0         /* [deg] azimuth relative to the main camera */
 #define VIEW_CLOSE_ELEVATION (-22.0) /* [deg] */
@@ -31,10 +36,13 @@
 #define VIEW_HIDDEN_GROUP 5
 #define VIEW_FORCE_SEEN 15.0 /* [N] smaller contact forces get no arrow */
 
+/* A surface of the model, lent to a tile that is not plain: a skin, because a skin has smooth
+ * normals and goes to the graphics card without a new display list. */
 typedef struct {
     int tile; /* -1: free */
-    int hfield, texture, material;
-    int drawn_once; /* bool: texture and heights are those of `tile` */
+    int step; /* [vertices] between the vertices of the skin */
+    int skin, texture, material;
+    int drawn_once; /* bool: texture and vertices are those of `tile` */
 } Slot;
 
 struct View {
@@ -53,15 +61,18 @@ struct View {
     mjvOption option;
     mjvCamera camera, close; /* close: on the feet */
     int scene_made, context_made;
-    int jumped; /* bool: the cameras jump to the robot in the next frame */
+    Follow base, foothold; /* what the two cameras look at */
+    double time;           /* [s] of the last frame */
+    int jumped;            /* bool: the cameras jump to the robot in the next frame */
     Relief *relief;
-    Slot slots[VIEW_SLOTS_UNEVEN];
-    int slot_count;
+    Slot slots[VIEW_PLAIN_UNEVEN + VIEW_FINE]; /* first those without imprints */
+    int plain_count, slot_count;
     int *slot_of;                              /* [tiles] -1: none */
     int flat_material[MILD_MATERIALS_MAX + 1]; /* model material of untouched ground; last: rigid */
     int floor_material;
     InsetLayout layout;
-    unsigned char *inset, *pixels, *flipped;
+    unsigned char *inset, *pixels;
+    unsigned char *scene_pixels, *labelled, *luma; /* of smooth_picture and paste_labels */
 };
 
 ViewDef view_def_default(void) {
@@ -76,7 +87,7 @@ ViewDef view_def_default(void) {
                      .force_arrow = 0.0012,
                      .closeup = 1,
                      .azimuth = 128,
-                     .elevation = -16,
+                     .elevation = -20,
                      .distance = 2.35};
 }
 
@@ -95,22 +106,49 @@ static void add_material(mjSpec *spec, const char *name, double repeat, int unif
     material->texuniform = (mjtByte)uniform;
 }
 
-static void add_ground(mjSpec *spec, const Relief *relief, int slots) {
+/* The vertices of a tile are moved in every frame; here only their number, faces and texture count.
+ */
+static void add_skin(mjSpec *spec, const char *name, int step) {
+    enum { MOST = RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES };
+    static float zero[3 * MOST], texture[2 * MOST], weight[MOST];
+    static int face[6 * RELIEF_TILE_CELLS * RELIEF_TILE_CELLS], all[MOST];
+    const int n = RELIEF_TILE_CELLS / step + 1;
+    const float unit[4] = {1, 0, 0, 0};
+    const float margin = (float)RELIEF_TILE_MARGIN / RELIEF_TILE_PIXELS;
+    int faces = 0;
+    for (int v = 0; v < n * n; v++) {
+        float x = (float)(v % n) / (float)(n - 1), y = (float)(v / n) / (float)(n - 1);
+        texture[2 * v] = margin + (1 - 2 * margin) * x;
+        texture[2 * v + 1] = margin + (1 - 2 * margin) * (1 - y);
+        weight[v] = 1;
+        all[v] = v;
+        if (v % n < n - 1 && v / n < n - 1) {
+            const int two[6] = {v, v + 1, v + n + 1, v, v + n + 1, v + n};
+            memcpy(face + faces, two, sizeof two);
+            faces += 6;
+        }
+    }
+    mjsSkin *skin = mjs_addSkin(spec);
+    mjs_setName(skin->element, name);
+    mjs_setFloat(skin->vert, zero, 3 * n * n);
+    mjs_setFloat(skin->texcoord, texture, 2 * n * n);
+    mjs_setInt(skin->face, face, faces);
+    mjs_appendString(skin->bodyname, "world");
+    mjs_setFloat(skin->bindpos, zero, 3);
+    mjs_setFloat(skin->bindquat, unit, 4);
+    mjs_appendIntVec(skin->vertid, all, n * n);
+    mjs_appendFloatVec(skin->vertweight, weight, n * n);
+}
+
+static void add_ground(mjSpec *spec, const Relief *relief, int plain, int slots) {
     double edge = relief_tile_edge(relief);
-    static const float level[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES] = {0};
     const double share =
         1.0 - 2.0 * RELIEF_TILE_MARGIN / RELIEF_TILE_PIXELS; /* of the picture that a tile shows */
     char name[32];
     for (int i = 0; i < slots; i++) {
         snprintf(name, sizeof name, "view_tile_%d", i);
         add_material(spec, name, share, 0);
-        mjsHField *hfield = mjs_addHField(spec);
-        mjs_setName(hfield->element, name);
-        hfield->nrow = hfield->ncol = RELIEF_TILE_VERTICES;
-        hfield->size[0] = hfield->size[1] = 0.5 * VIEW_OVERLAP * edge;
-        hfield->size[2] = VIEW_DEPTH + relief_high(relief) - relief_low(relief);
-        hfield->size[3] = 0.01;
-        mjs_setFloat(hfield->userdata, level, RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES);
+        add_skin(spec, name, i < plain ? VIEW_COARSE : 1);
     }
     for (int m = 0; m <= MILD_MATERIALS_MAX; m++) {
         snprintf(name, sizeof name, "view_flat_%d", m);
@@ -119,19 +157,24 @@ static void add_ground(mjSpec *spec, const Relief *relief, int slots) {
     add_material(spec, "view_floor", share / edge, 1);
 }
 
-static mjModel *make_model(const ViewDef *def, const char *xml, const Relief *relief, int slots,
-                           MildError *error) {
+static mjModel *make_model(const View *view, MildError *error) {
+    const char *xml = robot_model_path(view->robot);
     char text[300] = "";
     mjSpec *spec = mj_parseXML(xml, NULL, text, sizeof text);
     if (!spec) {
         mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", xml, text);
         return NULL;
     }
-    spec->visual.global.offwidth = def->width;
-    spec->visual.global.offheight = def->height;
-    spec->visual.quality.offsamples = 4;
-    spec->visual.quality.shadowsize = 2048;
-    add_ground(spec, relief, slots);
+    spec->visual.global.offwidth = view->def.width;
+    spec->visual.global.offheight = view->def.height;
+    spec->visual.quality.offsamples = 0; /* smooth_picture instead: four samples cost a
+                                              * software renderer half of its time */
+    spec->visual.quality.shadowsize = VIEW_SHADOW;
+    spec->visual.map.shadowclip = VIEW_SHADOW_CLIP;
+    spec->visual.quality.numslices = VIEW_SLICES;
+    spec->visual.quality.numstacks = VIEW_SLICES / 2;
+    spec->visual.quality.numquads = 1;
+    add_ground(spec, view->relief, view->plain_count, view->slot_count);
     mjModel *model = mj_compile(spec, NULL);
     if (!model) {
         mild_fail(error, MILD_ERROR_FORMAT, "%s: cannot add the visible ground: %s", xml,
@@ -151,9 +194,12 @@ static void index_model(View *view) {
     char name[32];
     for (int i = 0; i < view->slot_count; i++) {
         snprintf(name, sizeof name, "view_tile_%d", i);
-        view->slots[i] = (Slot){-1, mj_name2id(model, mjOBJ_HFIELD, name),
+        view->slots[i] = (Slot){-1,
+                                i < view->plain_count ? VIEW_COARSE : 1,
+                                mj_name2id(model, mjOBJ_SKIN, name),
                                 mj_name2id(model, mjOBJ_TEXTURE, name),
-                                mj_name2id(model, mjOBJ_MATERIAL, name), 0};
+                                mj_name2id(model, mjOBJ_MATERIAL, name),
+                                0};
     }
     for (int m = 0; m <= MILD_MATERIALS_MAX; m++) {
         snprintf(name, sizeof name, "view_flat_%d", m);
@@ -198,9 +244,12 @@ static int make_buffers(View *view) {
     size_t frame = (size_t)view->def.width * (size_t)view->def.height * 3;
     view->inset = malloc((size_t)view->layout.width * (size_t)view->layout.height * 3);
     view->pixels = malloc(frame);
-    view->flipped = malloc(frame);
+    view->scene_pixels = malloc(frame);
+    view->labelled = malloc(frame);
+    view->luma = malloc(frame / 3 + (size_t)view->def.width);
     view->data = mj_makeData(view->model);
-    if (!view->slot_of || !view->inset || !view->pixels || !view->flipped || !view->data) {
+    if (!view->slot_of || !view->inset || !view->pixels || !view->scene_pixels || !view->labelled ||
+        !view->luma || !view->data) {
         return 0;
     }
     for (int t = 0; t < tiles; t++) {
@@ -214,6 +263,7 @@ static void make_scene(View *view) {
     mjv_makeScene(view->model, &view->scene, VIEW_GEOMS);
     view->scene_made = 1;
     mjv_defaultOption(&view->option);
+    view->option.flags[mjVIS_SKIN] = 0; /* the only skins are the tiles, which draw_tile draws */
     mjr_defaultContext(&view->context);
     mjr_makeContext(view->model, &view->context,
                     view->def.height >= 700 ? mjFONTSCALE_150 : mjFONTSCALE_100);
@@ -250,11 +300,10 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->rasters = robot_rasters(robot);
     view->terrain = *terrain;
     view->relief = make_relief(view, error);
-    view->slot_count =
-        view->relief && relief_is_uneven(view->relief) ? VIEW_SLOTS_UNEVEN : VIEW_SLOTS;
-    view->model = view->relief ? make_model(def, robot_model_path(robot), view->relief,
-                                            view->slot_count, error)
-                               : NULL;
+    view->plain_count =
+        view->relief && relief_is_uneven(view->relief) ? VIEW_PLAIN_UNEVEN : VIEW_PLAIN;
+    view->slot_count = view->plain_count + VIEW_FINE;
+    view->model = view->relief ? make_model(view, error) : NULL;
     if (!view->model || !open_context(view, error)) {
         view_destroy(view);
         return NULL;
@@ -291,7 +340,9 @@ void view_destroy(View *view) {
     free(view->slot_of);
     free(view->inset);
     free(view->pixels);
-    free(view->flipped);
+    free(view->scene_pixels);
+    free(view->labelled);
+    free(view->luma);
     free(view);
 }
 
@@ -335,12 +386,20 @@ static double tile_distance(const View *view, int tile) {
     return hypot(center[0] - view->camera.lookat[0], center[1] - view->camera.lookat[1]);
 }
 
+static void slot_free(View *view, Slot *slot) {
+    if (slot->tile >= 0) {
+        view->slot_of[slot->tile] = -1;
+    }
+    slot->tile = -1;
+}
+
 /* A slot for the tile: a free one, otherwise that of the tile farthest away, whose heights remain
  * in the relief. */
-static Slot *slot_take(View *view, int tile) {
+static Slot *slot_take(View *view, int tile, int fine) {
     Slot *best = NULL;
     double farthest = tile_distance(view, tile);
-    for (int i = 0; i < view->slot_count; i++) {
+    int end = fine ? view->slot_count : view->plain_count;
+    for (int i = fine ? view->plain_count : 0; i < end; i++) {
         Slot *slot = &view->slots[i];
         if (slot->tile < 0) {
             best = slot;
@@ -354,13 +413,24 @@ static Slot *slot_take(View *view, int tile) {
     if (!best) {
         return NULL;
     }
-    if (best->tile >= 0) {
-        view->slot_of[best->tile] = -1;
-    }
+    slot_free(view, best);
     best->tile = tile;
     best->drawn_once = 0;
     view->slot_of[tile] = (int)(best - view->slots);
     return best;
+}
+
+/* The slot of a tile. A tile changes to another when it gets its first imprint or loses its last.
+ */
+static Slot *slot_for(View *view, int tile, int fine) {
+    int at = view->slot_of[tile];
+    if (at >= 0 && (view->slots[at].step == 1) == fine) {
+        return &view->slots[at];
+    }
+    if (at >= 0) {
+        slot_free(view, &view->slots[at]);
+    }
+    return slot_take(view, tile, fine);
 }
 
 static void slot_refresh(View *view, Slot *slot) {
@@ -370,14 +440,16 @@ static void slot_refresh(View *view, Slot *slot) {
     }
     relief_tile_pixels(view->relief, slot->tile, texture_pixels(model, slot->texture));
     mjr_uploadTexture(model, &view->context, slot->texture);
-    int touched = relief_tile_touched(view->relief, slot->tile);
-    if (touched || relief_is_uneven(view->relief)) {
-        int step = touched ? 1 : VIEW_COARSE;
-        model->hfield_nrow[slot->hfield] = model->hfield_ncol[slot->hfield] =
-            RELIEF_TILE_CELLS / step + 1;
-        relief_tile_heights(view->relief, slot->tile, VIEW_DEPTH, step,
-                            model->hfield_data + model->hfield_adr[slot->hfield]);
-        mjr_uploadHField(model, &view->context, slot->hfield);
+    double center[2];
+    relief_tile_center(view->relief, slot->tile, center);
+    float *vertex = view->scene.skinvert + 3 * view->scene.skinvertadr[slot->skin];
+    relief_tile_surface(view->relief, slot->tile, slot->step, vertex,
+                        view->scene.skinnormal + 3 * view->scene.skinvertadr[slot->skin]);
+    for (int v = 0; v < view->scene.skinvertnum[slot->skin]; v++) {
+        for (int k = 0; k < 2; k++) {
+            float middle = (float)center[k];
+            vertex[3 * v + k] = middle + VIEW_OVERLAP * (vertex[3 * v + k] - middle);
+        }
     }
     slot->drawn_once = 1;
 }
@@ -392,7 +464,7 @@ static mjvGeom *add_geom(View *view, int type, double sx, double sy, double sz,
     const double size[3] = {sx, sy, sz};
     mjv_initGeom(geom, type, size, position, NULL, white);
     geom->matid = material;
-    geom->category = mjCAT_STATIC;
+    geom->category = mjCAT_DECOR; /* casts no shadow; as a caster the ground fills the shadow map */
     geom->specular = 0.05F;
     geom->shininess = 0.1F;
     return geom;
@@ -404,26 +476,39 @@ static void draw_tile(View *view, int tile) {
     double position[3] = {center[0], center[1],
                           relief_height_at(view->relief, center[0], center[1])};
     int material = relief_tile_material(view->relief, tile);
-    int touched = relief_tile_touched(view->relief, tile) || relief_is_uneven(view->relief);
+    int pressed = relief_tile_pressed(view->relief, tile);
+    int shaped = pressed || relief_is_uneven(view->relief);
     Slot *slot = NULL;
-    if (touched || material == -2) {
-        slot = view->slot_of[tile] >= 0 ? &view->slots[view->slot_of[tile]] : slot_take(view, tile);
+    if (shaped || material == -2) {
+        slot = slot_for(view, tile, pressed);
         if (slot) {
             slot_refresh(view, slot);
         }
+    } else if (view->slot_of[tile] >= 0) {
+        slot_free(view, &view->slots[view->slot_of[tile]]);
     }
-    if (slot && touched) {
-        position[2] = relief_low(view->relief) - VIEW_DEPTH;
-        mjvGeom *geom = add_geom(view, mjGEOM_HFIELD, 0.5 * edge, 0.5 * edge, VIEW_DEPTH, position,
-                                 slot->material);
+    if (slot && shaped) {
+        position[0] = position[1] = position[2] = 0; /* a skin has world coordinates */
+        mjvGeom *geom = add_geom(view, mjGEOM_SKIN, 1, 1, 1, position, slot->material);
         if (geom) {
-            geom->dataid = slot->hfield;
+            geom->objid = slot->skin;
+            geom->texcoord = 1;
         }
         return;
     }
     int look = material == RELIEF_RIGID ? MILD_MATERIALS_MAX : material < 0 ? 0 : material;
     add_geom(view, mjGEOM_PLANE, 0.5 * edge, 0.5 * edge, 0.1, position,
              slot ? slot->material : view->flat_material[look]);
+}
+
+/* Only the skins up to the last slot in use go to the graphics card. */
+static void count_skins(View *view) {
+    view->scene.nskin = 0;
+    for (int i = 0; i < view->slot_count; i++) {
+        if (view->slots[i].tile >= 0 && view->slots[i].skin >= view->scene.nskin) {
+            view->scene.nskin = view->slots[i].skin + 1;
+        }
+    }
 }
 
 /* Draws the floor as four plates around the tiles. It must not lie under them, because it would
@@ -461,25 +546,45 @@ static void draw_ground(View *view) {
             draw_tile(view, r * columns + c);
         }
     }
+    count_skins(view);
     draw_floor(view, origin[0] + c0 * edge, origin[0] + c1 * edge, origin[1] + r0 * edge,
                origin[1] + r1 * edge);
 }
 
 /* ---- frame ---- */
 
-/* Share of the distance to its target that a camera with this time constant moves in one frame. */
-static double camera_share(const View *view, double lag) {
-    return 1.0 - exp(-1.0 / (view->def.rate * lag));
+/* Moves the camera that looks at `follow` for the time since the last frame. */
+static void follow_target(const View *view, Follow *follow, const double target[3], double time,
+                          double lag, double look[3]) {
+    if (view->jumped) {
+        follow_jump(follow, target);
+    } else {
+        follow_step(follow, target, time - view->time, lag);
+    }
+    follow_position(follow, look);
 }
 
-static void follow(View *view, const double *base) {
-    double share = view->jumped ? 1.0 : camera_share(view, VIEW_CAMERA_TIME);
+static void follow_base(View *view, const double *base, double time) {
     double target[3] = {base[0], base[1],
                         relief_height_at(view->relief, base[0], base[1]) +
                             VIEW_LOOK_HEIGHT * robot_nominal_height(view->robot)};
-    for (int k = 0; k < 3; k++) {
-        view->camera.lookat[k] += share * (target[k] - view->camera.lookat[k]);
+    follow_target(view, &view->base, target, time, VIEW_CAMERA_TIME, view->camera.lookat);
+}
+
+/* [m] Horizontal middle of the soles. */
+static void feet_middle(const View *view, const RobotSim *sim, double middle[2]) {
+    middle[0] = middle[1] = 0;
+    for (int f = 0; f < view->feet; f++) {
+        middle[0] += robot_sim_foot(sim, f)->sole_center[0] / view->feet;
+        middle[1] += robot_sim_foot(sim, f)->sole_center[1] / view->feet;
     }
+}
+
+static void follow_feet(View *view, const RobotSim *sim, double time) {
+    double target[3] = {0};
+    feet_middle(view, sim, target);
+    target[2] = relief_height_at(view->relief, target[0], target[1]) + VIEW_CLOSE_HEIGHT;
+    follow_target(view, &view->foothold, target, time, VIEW_CLOSE_TIME, view->close.lookat);
 }
 
 static void draw_arrows(View *view, const RobotSim *sim) {
@@ -502,15 +607,6 @@ static void draw_arrows(View *view, const RobotSim *sim) {
         mjv_initGeom(geom, mjGEOM_ARROW, NULL, NULL, NULL, color);
         mjv_connector(geom, mjGEOM_ARROW, 0.012, from, to);
         geom->category = mjCAT_DECOR;
-    }
-}
-
-/* [m] Horizontal middle of the soles. */
-static void feet_middle(const View *view, const RobotSim *sim, double middle[2]) {
-    middle[0] = middle[1] = 0;
-    for (int f = 0; f < view->feet; f++) {
-        middle[0] += robot_sim_foot(sim, f)->sole_center[0] / view->feet;
-        middle[1] += robot_sim_foot(sim, f)->sole_center[1] / view->feet;
     }
 }
 
@@ -540,6 +636,11 @@ static void draw_text(View *view, mjrRect viewport, const RobotSim *sim, const V
     mjr_overlay(mjFONT_NORMAL, mjGRID_TOPLEFT, viewport, keys, values, &view->context);
 }
 
+static mjrRect inset_place(const View *view, mjrRect viewport) {
+    return (mjrRect){viewport.width - view->layout.width - 10, 10, view->layout.width,
+                     view->layout.height};
+}
+
 static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     const double *normal[ROBOT_FEET_MAX];
     for (int f = 0; f < view->feet; f++) {
@@ -547,7 +648,7 @@ static void draw_inset(View *view, mjrRect viewport, const RobotSim *sim) {
     }
     const InsetLayout *layout = &view->layout;
     inset_draw(layout, view->soles, view->feet, normal, view->def.pressure_max, view->inset);
-    mjrRect box = {viewport.width - layout->width - 10, 10, layout->width, layout->height};
+    mjrRect box = inset_place(view, viewport);
     mjr_drawPixels(view->inset, NULL, box, &view->context);
     char text[32];
     mjrRect title = {box.left, box.bottom + layout->title_bottom, box.width, layout->title_height};
@@ -576,37 +677,70 @@ static void move_lights(View *view) {
 
 /* A close-up of the feet in the upper right corner, which shows how they sink. It has no shadows,
  * because a second shadow pass costs more than the rest of this small picture. */
-static void draw_closeup(View *view, mjrRect viewport, const RobotSim *sim) {
-    double middle[2];
-    feet_middle(view, sim, middle);
-    double share = view->jumped ? 1.0 : camera_share(view, VIEW_CLOSE_TIME);
-    view->jumped = 0;
-    mjvCamera *camera = &view->close;
-    for (int k = 0; k < 2; k++) {
-        camera->lookat[k] += share * (middle[k] - camera->lookat[k]);
-    }
-    camera->lookat[2] =
-        relief_height_at(view->relief, camera->lookat[0], camera->lookat[1]) + VIEW_CLOSE_HEIGHT;
-    camera->azimuth = view->camera.azimuth - VIEW_CLOSE_TURN;
+static void draw_closeup(View *view, mjrRect viewport) {
+    view->close.azimuth = view->camera.azimuth - VIEW_CLOSE_TURN;
     /* a third of the width, so that the robot in the middle is not covered */
     const int width = viewport.width / 3, height = viewport.height / 3;
     mjrRect box = {viewport.width - width - 10, viewport.height - height - 10, width, height};
     mjrRect frame = {box.left - 2, box.bottom - 2, box.width + 4, box.height + 4};
     mjr_rectangle(frame, 0.12F, 0.13F, 0.15F, 1);
-    mjv_updateCamera(view->model, view->data, camera, &view->scene);
+    mjv_updateCamera(view->model, view->data, &view->close, &view->scene);
     view->scene.flags[mjRND_SHADOW] = 0;
     mjr_render(box, &view->scene, &view->context);
     view->scene.flags[mjRND_SHADOW] = 1;
 }
 
-void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
-    const double *qpos = robot_sim_qpos(sim);
+static void flip_rows(const unsigned char *rgb, mjrRect size, unsigned char *flipped) {
+    size_t row = (size_t)size.width * 3, rows = (size_t)size.height;
+    for (size_t r = 0; r < rows; r++) {
+        memcpy(flipped + r * row, rgb + (rows - 1 - r) * row, row);
+    }
+}
+
+/* Reads what was drawn and smooths it, before labels are drawn, whose letters must stay sharp. */
+static void smooth_picture(View *view, mjrRect size) {
+    mjr_readPixels(view->scene_pixels, NULL, size, &view->context);
+    smooth_edges(view->scene_pixels, size.width, size.height, view->luma, view->labelled);
+    flip_rows(view->labelled, size, view->pixels);
+}
+
+/* Copies the pixels of a part of the picture that the labels changed. */
+static void paste_labels(View *view, mjrRect size, mjrRect part) {
+    const size_t width = (size_t)size.width * 3, row = (size_t)part.width * 3;
+    mjr_readPixels(view->labelled, NULL, part, &view->context);
+    for (int r = 0; r < part.height; r++) {
+        int y = part.bottom + r;
+        size_t left = 3 * (size_t)part.left;
+        const unsigned char *now = view->labelled + (size_t)r * row,
+                            *before = view->scene_pixels + (size_t)y * width + left;
+        unsigned char *to = view->pixels + (size_t)(size.height - 1 - y) * width + left;
+        for (size_t i = 0; i < row; i++) {
+            to[i] = now[i] != before[i] ? now[i] : to[i];
+        }
+    }
+}
+
+static void pose_robot(View *view, const double *qpos) {
     robot_engine_qpos(view->robot, qpos, view->data->qpos);
     mj_kinematics(view->model, view->data);
     mj_comPos(view->model, view->data);
     mj_camlight(view->model, view->data);
+}
+
+static void draw_labels(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
+    draw_text(view, viewport, sim, info);
+    if (!view->def.rigid) {
+        draw_inset(view, viewport, sim);
+    }
+}
+
+void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
+    pose_robot(view, robot_sim_qpos(sim));
     view_observe(view, sim);
-    follow(view, qpos);
+    follow_base(view, robot_sim_qpos(sim), info->time);
+    follow_feet(view, sim, info->time);
+    view->time = info->time;
+    view->jumped = 0;
     mjv_updateScene(view->model, view->data, &view->option, NULL, &view->camera, mjCAT_ALL,
                     &view->scene);
     move_lights(view);
@@ -619,19 +753,18 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     }
     mjr_render(viewport, &view->scene, &view->context);
     if (view->def.closeup) {
-        draw_closeup(view, viewport, sim);
-    }
-    draw_text(view, viewport, sim, info);
-    if (!view->def.rigid) {
-        draw_inset(view, viewport, sim);
+        draw_closeup(view, viewport);
     }
     if (view->window) {
+        draw_labels(view, viewport, sim, info);
         return;
     }
-    mjr_readPixels(view->flipped, NULL, viewport, &view->context);
-    size_t row = (size_t)viewport.width * 3, rows = (size_t)viewport.height;
-    for (size_t r = 0; r < rows; r++) {
-        memcpy(view->pixels + r * row, view->flipped + (rows - 1 - r) * row, row);
+    smooth_picture(view, viewport);
+    draw_labels(view, viewport, sim, info);
+    mjrRect text = {0, viewport.height / 2, viewport.width / 2, viewport.height / 2};
+    paste_labels(view, viewport, text);
+    if (!view->def.rigid) {
+        paste_labels(view, viewport, inset_place(view, viewport));
     }
 }
 

@@ -11,8 +11,9 @@
 
 #include "view/relief.h"
 
-#define RANGE 0.2
 #define CELL 0.01
+#define GAP 0.0015 /* [m] the surface is drawn this far below a sole */
+#define VERTICES (RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES)
 #define DEPTH 0.03
 
 static const double outline[] = {-0.07, -0.05, 0.20, -0.05, 0.20, 0.05, -0.07, 0.05};
@@ -47,19 +48,14 @@ static void press(double x, double y, double depth) {
     relief_press(relief, position, (const double(*)[9])rotation);
 }
 
-/* Drawn depth at the vertex nearest to (x, y). */
+static void press_tilted(const double position[3], double pitch) {
+    const double c = cos(pitch), n = sin(pitch);
+    const double rotation[1][9] = {{c, 0, n, 0, 1, 0, -n, 0, c}};
+    relief_press(relief, (const double(*)[3])position, rotation);
+}
+
 static double depth_at(double x, double y) {
-    static float heights[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES];
-    double edge = relief_tile_edge(relief), first[2], center[2];
-    relief_tile_center(relief, 0, first);
-    int column = (int)floor((x - first[0]) / edge + 0.5),
-        row = (int)floor((y - first[1]) / edge + 0.5);
-    int tile = row * relief_tile_columns(relief) + column;
-    relief_tile_center(relief, tile, center);
-    relief_tile_heights(relief, tile, RANGE, 1, heights);
-    int i = (int)lround((x - center[0] + 0.5 * edge) / CELL),
-        j = (int)lround((y - center[1] + 0.5 * edge) / CELL);
-    return RANGE * (1.0 - (double)heights[j * RELIEF_TILE_VERTICES + i]);
+    return relief_depth_at(relief, x, y);
 }
 
 static double print_after_lift(const char *material) {
@@ -85,6 +81,111 @@ static void recovery_by_material(void **state) {
     assert_true(fabs(grass - 0.5 * DEPTH) < 0.002);
 }
 
+/* Under every element of a pressed, tilted sole the surface is as deep as the element's centre. */
+static void dent_is_as_deep_as_the_elements(void **state) {
+    (void)state;
+    const char *grounds[] = {"foam25", "rubber", "sand_loose"};
+    double worst = 0;
+    for (int g = 0; g < 3; g++) {
+        for (int k = -1; k <= 1; k++) {
+            const double pitch = 0.05 * k, position[3] = {0.031, -0.017, 0.055 - 0.035};
+            make(grounds[g], 0);
+            press_tilted(position, pitch);
+            for (int e = 0; e < mild_sole_elements(sole); e++) {
+                double px = mild_sole_x(sole)[e], pz = mild_sole_z(sole);
+                double x = position[0] + cos(pitch) * px + sin(pitch) * pz;
+                double y = position[1] + mild_sole_y(sole)[e];
+                double depth = -(position[2] - sin(pitch) * px + cos(pitch) * pz);
+                worst = fmax(worst, fabs(depth_at(x, y) - depth - GAP));
+            }
+            destroy();
+        }
+    }
+    print_message("drawn depth under an element: off by %.3f mm\n", 1e3 * worst);
+    assert_true(worst < 1e-5);
+}
+
+/* Walks away from the edge of the sole: the surface rises without a step and ends at 0. Grains stand
+ * steeper than a sheet. */
+static double skirt_width(const char *material) {
+    const double edge = 0.05 + 0.5 * CELL; /* the raster's squares and the gap beside the sole */
+    make(material, 0);
+    press(0, 0, DEPTH);
+    double before = depth_at(0.06, 0), width = 0, steepest = 0;
+    assert_true(fabs(before - DEPTH - GAP) < 1e-6);
+    for (double y = 0; y < 0.25; y += 0.001) {
+        double depth = depth_at(0.06, y);
+        assert_true(depth <= before + 1e-9);
+        steepest = fmax(steepest, (before - depth) / 0.001);
+        width = depth > 1e-6 ? y - edge : width;
+        before = depth;
+    }
+    assert_true(before == 0);
+    print_message("%s: slope %.0f mm wide, at most %.2f\n", material, 1e3 * width, steepest);
+    assert_true(steepest < 2.2);
+    destroy();
+    return width;
+}
+
+static void surface_rises_smoothly_beside_the_sole(void **state) {
+    (void)state;
+    /* 31.5 mm deep, recovery 0, 0.5, 1; a vertex of the grid farther at most */
+    assert_true(fabs(skirt_width("sand_loose") - 0.0246) < 1.1 * CELL);
+    assert_true(fabs(skirt_width("grass") - 0.0462) < 1.1 * CELL);
+    assert_true(fabs(skirt_width("foam45") - 0.0678) < 1.1 * CELL);
+}
+
+/* The dent follows a foot that is lifted slowly: foam back to the sole at every height, sand not. */
+static void dent_follows_the_lifted_foot(void **state) {
+    (void)state;
+    make("foam25", 0);
+    for (double depth = DEPTH; depth > 0; depth -= 0.005) {
+        press(0.1, 0.05, depth);
+        assert_true(fabs(depth_at(0.15, 0.05) - depth - GAP) < 1e-6);
+    }
+    assert_true(relief_tile_pressed(relief, 4) || relief_tile_pressed(relief, 5) ||
+                relief_tile_pressed(relief, 9) || relief_tile_pressed(relief, 10));
+    press(0.1, 0.05, -0.02);
+    for (int tile = 0; tile < relief_tile_columns(relief) * relief_tile_rows(relief); tile++) {
+        assert_false(relief_tile_pressed(relief, tile));
+    }
+    destroy();
+    make("sand_loose", 0);
+    press(0.1, 0.05, DEPTH);
+    press(0.1, 0.05, 0.01);
+    assert_true(fabs(depth_at(0.15, 0.05) - DEPTH - GAP) < 1e-6);
+    destroy();
+}
+
+/* Normals against differences of the drawn depth; unit length; upright where nothing was pressed. */
+static void normals_are_those_of_the_surface(void **state) {
+    (void)state;
+    static float position[3 * VERTICES], normal[3 * VERTICES];
+    make("foam28", 0);
+    press(0.1, 0.05, DEPTH);
+    double worst = 0, steepest = 0;
+    for (int tile = 0; tile < relief_tile_columns(relief) * relief_tile_rows(relief); tile++) {
+        relief_tile_surface(relief, tile, 1, position, normal);
+        for (int v = 0; v < VERTICES; v++) {
+            double x = (double)position[3 * v], y = (double)position[3 * v + 1];
+            if (fabs(x) > 0.9 || fabs(y) > 0.9) {
+                continue;
+            }
+            const float *n = normal + 3 * v;
+            double sx = (depth_at(x + CELL, y) - depth_at(x - CELL, y)) / (2 * CELL);
+            double sy = (depth_at(x, y + CELL) - depth_at(x, y - CELL)) / (2 * CELL);
+            worst = fmax(worst, fabs((double)(n[0] / n[2]) - sx));
+            worst = fmax(worst, fabs((double)(n[1] / n[2]) - sy));
+            worst = fmax(worst, fabs((double)(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]) - 1));
+            assert_true(fabs((double)position[3 * v + 2] + depth_at(x, y)) < 1e-4);
+            steepest = fmax(steepest, hypot(sx, sy));
+        }
+    }
+    print_message("normals off by %.1e, steepest slope %.2f\n", worst, steepest);
+    assert_true(worst < 1e-2 && steepest > 0.4);
+    destroy();
+}
+
 static void print_stays_when_the_foot_walks_on(void **state) {
     (void)state;
     make("sand_loose", 0);
@@ -105,18 +206,46 @@ static void tiles_agree_on_their_edge(void **state) {
     assert_true(relief_tile_take_dirty(relief, 0));
     assert_true(relief_tile_take_dirty(relief, 1));
     assert_false(relief_tile_take_dirty(relief, 0));
-    assert_false(relief_tile_touched(relief, 2));
-    static float a[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES],
-        b[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES];
-    relief_tile_heights(relief, 0, RANGE, 1, a);
-    relief_tile_heights(relief, 1, RANGE, 1, b);
+    assert_false(relief_tile_pressed(relief, 2));
+    static float a[3 * VERTICES], b[3 * VERTICES], na[3 * VERTICES], nb[3 * VERTICES];
+    relief_tile_surface(relief, 0, 1, a, na);
+    relief_tile_surface(relief, 1, 1, b, nb);
     int low = 0;
     for (int j = 0; j < RELIEF_TILE_VERTICES; j++) {
-        assert_true(a[j * RELIEF_TILE_VERTICES + RELIEF_TILE_CELLS] == b[j * RELIEF_TILE_VERTICES]);
-        low += b[j * RELIEF_TILE_VERTICES] < 1.0F;
+        int right = 3 * (j * RELIEF_TILE_VERTICES + RELIEF_TILE_CELLS),
+            left = 3 * j * RELIEF_TILE_VERTICES;
+        assert_memory_equal(a + right, b + left, 3 * sizeof *a);
+        assert_memory_equal(na + right, nb + left, 3 * sizeof *na);
+        low += b[left + 2] < 0.0F;
     }
     assert_true(low > 5);
     destroy();
+}
+
+/* A vertex beside a tile turns the normals of its edge: that tile must be drawn again, too. */
+static void neighbours_are_refreshed(void **state) {
+    (void)state;
+    int beside = 0;
+    for (int k = 0; k < 40; k++) {
+        make("sand_loose", 0);
+        double edge = relief_tile_edge(relief), first[2];
+        relief_tile_center(relief, 0, first);
+        double seam = first[0] + 0.5 * edge;
+        press(seam - 0.2 - 0.002 * k, first[1], 0.5 * DEPTH);
+        if (depth_at(seam - CELL, first[1]) > 1e-6 && depth_at(seam, first[1]) < 1e-6) {
+            assert_true(relief_tile_take_dirty(relief, 1));
+            beside++;
+        }
+        destroy();
+        make("sand_loose", 0);
+        press(seam + 0.07 + 0.002 * k, first[1], 0.5 * DEPTH);
+        if (depth_at(seam + CELL, first[1]) > 1e-6 && depth_at(seam, first[1]) < 1e-6) {
+            assert_true(relief_tile_take_dirty(relief, 0));
+            beside++;
+        }
+        destroy();
+    }
+    assert_true(beside > 4);
 }
 
 static void pressed_ground_is_darker(void **state) {
@@ -163,26 +292,21 @@ static void prints_follow_the_map(void **state) {
     relief = relief_create(&area, &terrain, soles, 1, &error);
     assert_true(relief_is_uneven(relief) && relief_low(relief) < -0.045 &&
                 relief_high(relief) > 0.045);
-    static float heights[RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES];
-    double edge = relief_tile_edge(relief), center[2], worst = 0,
-           range = relief_high(relief) - relief_low(relief) + RANGE;
+    static float position[3 * VERTICES], normal[3 * VERTICES];
+    double worst = 0;
     press(0.05, 0.0, DEPTH);
     for (int tile = 0; tile < relief_tile_columns(relief) * relief_tile_rows(relief); tile++) {
-        relief_tile_center(relief, tile, center);
-        relief_tile_heights(relief, tile, RANGE, 1, heights);
-        for (int j = 0; j < RELIEF_TILE_VERTICES; j += 4) {
-            for (int i = 0; i < RELIEF_TILE_VERTICES; i += 4) {
-                double x = center[0] - 0.5 * edge + CELL * i, y = center[1] - 0.5 * edge + CELL * j;
-                double z = relief_low(relief) - RANGE +
-                           range * (double)heights[j * RELIEF_TILE_VERTICES + i];
-                double wanted = mild_terrain_height_at(&terrain, x, y);
-                if (x > -0.01 && x < 0.24 && fabs(y) < 0.045) {
-                    wanted = fmin(wanted, -DEPTH);
-                } else if (x > -0.05 && x < 0.28 && fabs(y) < 0.075) {
-                    continue; /* beside the sole's edge */
-                }
-                worst = fmax(worst, fabs(z - wanted));
+        relief_tile_surface(relief, tile, 4, position, normal);
+        for (int v = 0; v < (RELIEF_TILE_CELLS / 4 + 1) * (RELIEF_TILE_CELLS / 4 + 1); v++) {
+            double x = (double)position[3 * v], y = (double)position[3 * v + 1],
+                   z = (double)position[3 * v + 2];
+            double wanted = mild_terrain_height_at(&terrain, x, y);
+            if (x > -0.01 && x < 0.24 && fabs(y) < 0.045) {
+                wanted = fmin(wanted, -DEPTH);
+            } else if (x > -0.12 && x < 0.35 && fabs(y) < 0.15) {
+                continue; /* beside the sole's edge */
             }
+            worst = fmax(worst, fabs(z - wanted));
         }
     }
     print_message("drawn heights on waves: off by %.2f mm\n", 1e3 * worst);
@@ -194,8 +318,13 @@ static void prints_follow_the_map(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(recovery_by_material),
+        cmocka_unit_test(dent_is_as_deep_as_the_elements),
+        cmocka_unit_test(surface_rises_smoothly_beside_the_sole),
+        cmocka_unit_test(dent_follows_the_lifted_foot),
+        cmocka_unit_test(normals_are_those_of_the_surface),
         cmocka_unit_test(print_stays_when_the_foot_walks_on),
         cmocka_unit_test(tiles_agree_on_their_edge),
+        cmocka_unit_test(neighbours_are_refreshed),
         cmocka_unit_test(pressed_ground_is_darker),
         cmocka_unit_test(rigid_ground_never_yields),
         cmocka_unit_test(prints_follow_the_map),
