@@ -45,7 +45,7 @@ typedef struct {
     int striped;          /* bool: the labels are stripes of the share patch_share of episodes */
     /* what environments are made from, see task_env_init_head */
     TaskShape shape;
-    double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
+    TaskGains gains;
     uint64_t seed;
     uint32_t first; /* number of the first environment */
 } CrowdTask;
@@ -69,7 +69,7 @@ typedef struct {
     uint8_t *fresh;    /* [envs] bool: an episode began */
     uint8_t *rigid;    /* [envs] bool: of the episode */
     int32_t *order;    /* [envs] in which a GPU steps them: those on rigid ground first */
-    TaskKept *kept;    /* [envs] for crowd_keep */
+    TaskKept *kept;    /* [envs] or NULL, in crowd_keep and crowd_restore */
     double *tally;     /* [TALLY_NUMBERS] sums over the environments */
     CrowdContact contact;
     const CrowdTrial *trial; /* [envs] or NULL */

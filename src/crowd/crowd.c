@@ -103,7 +103,6 @@ static MildStatus take_arrays(Crowd *crowd, const TaskShape *shape, const TaskDe
                   {&all->fresh, envs},
                   {&all->rigid, envs},
                   {&all->order, envs * sizeof *all->order},
-                  {&all->kept, envs * sizeof *all->kept},
                   {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
                   {&contact->position, 3 * rows * sizeof(float)},
                   {&contact->rotation, 9 * rows * sizeof(float)},
@@ -176,7 +175,7 @@ static MildStatus copy_task(Crowd *crowd, const CrowdDef *def, const TaskGrounds
         task.uneven = !mild_map_is_level(def->task->map);
     }
     robot_fill_table(def->robot, &task.robot);
-    MildStatus status = task_gains(def->task, def->robot, task.kp, task.kd, error);
+    MildStatus status = task_gains(def->task, def->robot, task.gains.kp, task.gains.kd, error);
     CrowdTask *at = status == MILD_OK ? take(crowd, sizeof *at, error) : NULL;
     crowd->arrays.task = at;
     return at ? batch_copy(crowd->device, at, &task, sizeof task, error) : MILD_ERROR_MEMORY;
@@ -462,31 +461,37 @@ MildStatus crowd_take_sums(Crowd *crowd, VecStats *sums, void *stream, MildError
     return MILD_OK;
 }
 
-/* Between the environments and arrays.kept. */
-static MildStatus move_kept(const Crowd *crowd, int back, MildError *error) {
+/* Between the environments and `all->kept`. */
+static MildStatus move_kept(const Crowd *crowd, const CrowdArrays *all, int back,
+                            MildError *error) {
     if (crowd->device == MILD_BATCH_HOST) {
-        crowd_host_keep(&crowd->arrays, back);
+        crowd_host_keep(all, back);
         return MILD_OK;
     }
     MildStatus status = device_wait(crowd->device, error);
-    status = status == MILD_OK ? checked(crowd->kernels->keep(&crowd->arrays, back, NULL), error)
-                               : status;
+    status = status == MILD_OK ? checked(crowd->kernels->keep(all, back, NULL), error) : status;
     return status == MILD_OK ? device_wait(crowd->device, error) : status;
 }
 
 MildStatus crowd_keep(Crowd *crowd, TaskKept *kept, MildError *error) {
-    const CrowdArrays *all = &crowd->arrays;
-    MildStatus status = move_kept(crowd, 0, error);
-    return status == MILD_OK
-               ? batch_copy(crowd->device, kept, all->kept, (size_t)all->envs * sizeof *kept, error)
-               : status;
+    const size_t bytes = (size_t)crowd->arrays.envs * sizeof *kept;
+    CrowdArrays all = crowd->arrays;
+    all.kept = batch_alloc(crowd->device, bytes, error);
+    MildStatus status = all.kept ? move_kept(crowd, &all, 0, error) : MILD_ERROR_MEMORY;
+    status = status == MILD_OK ? batch_copy(crowd->device, kept, all.kept, bytes, error) : status;
+    batch_free(crowd->device, all.kept);
+    return status;
 }
 
 MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
-    const CrowdArrays *all = &crowd->arrays;
+    const size_t bytes = (size_t)crowd->arrays.envs * sizeof *kept;
+    CrowdArrays all = crowd->arrays;
+    all.kept = batch_alloc(crowd->device, bytes, error);
     MildStatus status =
-        batch_copy(crowd->device, all->kept, kept, (size_t)all->envs * sizeof *kept, error);
-    return status == MILD_OK ? move_kept(crowd, 1, error) : status;
+        all.kept ? batch_copy(crowd->device, all.kept, kept, bytes, error) : MILD_ERROR_MEMORY;
+    status = status == MILD_OK ? move_kept(crowd, &all, 1, error) : status;
+    batch_free(crowd->device, all.kept);
+    return status;
 }
 
 MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error) {
