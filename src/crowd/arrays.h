@@ -50,11 +50,10 @@ typedef struct {
     uint32_t first; /* number of the first environment */
 } CrowdTask;
 
-/* What passes between engine and ground; see MildBatchInput and MildBatchOutput. The twists after
- * the step take the place of free_velocity. */
+/* What passes between engine and ground; see MildBatchInput and MildBatchOutput. The ground writes
+ * over what it has read: the wrenches over velocity, the twists after the step over free_velocity. */
 typedef struct {
     float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
-    float *wrench;
     MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */
 } CrowdContact;
 #define CROWD_FAR 1000 /* [m] below a robot on rigid ground: the soft one does not touch it */

@@ -110,7 +110,6 @@ static MildStatus take_arrays(Crowd *crowd, const TaskShape *shape, const TaskDe
                   {&contact->inverse_inertia, 36 * rows * feet * sizeof(float)},
                   {&contact->free_velocity, 6 * rows * sizeof(float)},
                   {&contact->height, envs * sizeof(float)},
-                  {&contact->wrench, 6 * rows * sizeof(float)},
                   {&contact->foot, rows * sizeof *contact->foot}};
     size_t bytes = 0;
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
@@ -398,7 +397,7 @@ static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, Mil
                                   .map_origin = all->map_origin,
                                   .height = c->height};
     const MildBatchOutput output = {
-        .wrench = c->wrench, .velocity = c->free_velocity, .foot = c->foot};
+        .wrench = c->velocity, .velocity = c->free_velocity, .foot = c->foot};
     MildStatus status = MILD_OK;
     for (call->part = 0; status == MILD_OK && call->part <= crowd->steps; call->part++) {
         if (call->part > 0) {
