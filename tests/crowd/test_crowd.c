@@ -11,19 +11,19 @@ static int has_device(void) {
 
 static void follows_mujoco(void **unused) {
     (void)unused;
-    follow(SA01, MILD_BATCH_HOST, NULL);
+    follow(SA01, some_def(), MILD_BATCH_HOST, NULL, 0.85);
 }
 
 static void follows_mujoco_on_a_map(void **unused) {
     (void)unused;
     const MildMapDef map = some_map();
-    follow(SA01, MILD_BATCH_HOST, &map);
+    follow(SA01, some_def(), MILD_BATCH_HOST, &map, 0.85);
 }
 
 /* Four round feet; on a map in test_go1.c. */
 static void go1_follows_mujoco(void **unused) {
     (void)unused;
-    follow(GO1, MILD_BATCH_HOST, NULL);
+    follow(GO1, some_def(), MILD_BATCH_HOST, NULL, 0.85);
 }
 
 /* A robot that is thrown diverges, and alone begins a new episode. */
@@ -49,10 +49,10 @@ static void device_follows_mujoco(void **unused) {
         skip();
     }
     const MildMapDef map = some_map();
-    follow(SA01, 0, NULL);
-    follow(SA01, 0, &map);
-    follow(GO1, 0, NULL);
-    follow(GO1, 0, &map);
+    follow(SA01, some_def(), 0, NULL, 0.85);
+    follow(SA01, some_def(), 0, &map, 0.85);
+    follow(GO1, some_def(), 0, NULL, 0.85);
+    follow(GO1, some_def(), 0, &map, 0.85);
 }
 
 /* The sample of a physics step above the map. */

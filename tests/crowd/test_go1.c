@@ -3,13 +3,13 @@
 
 static void go1_follows_mujoco(void **unused) {
     (void)unused;
-    follow(GO1, MILD_BATCH_HOST, NULL);
+    follow(GO1, some_def(), MILD_BATCH_HOST, NULL, 0.85);
 }
 
 static void go1_follows_mujoco_on_a_map(void **unused) {
     (void)unused;
     const MildMapDef map = some_map();
-    follow(GO1, MILD_BATCH_HOST, &map);
+    follow(GO1, some_def(), MILD_BATCH_HOST, &map, 0.85);
 }
 
 int main(void) {
