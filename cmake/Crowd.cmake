@@ -5,13 +5,61 @@ mild_layer(crowd layer_task layer_engine)
 set_source_files_properties(crowd/host.c PROPERTIES COMPILE_OPTIONS
     "-O2;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
 if(MILD_CUDA)
-  # compiled for the robots of this size (engine_model_sizes)
-  set(MILD_CUDA_ROBOT ENGINE_JOINTS=12 ENGINE_FEET=2 ENGINE_CORNERS=8 ENGINE_ENTRIES=135 ENGINE_CHAIN=12
-    CACHE STRING "sizes of the robot that a GPU steps; empty: any, several times slower")
-  add_library(crowd_device STATIC ${CMAKE_SOURCE_DIR}/src/crowd/device.cu)
+  # The kernels, compiled once for each robot, whose sizes the program `engine_sizes` reads from its folder, and once for
+  # any robot, last.
+  set(MILD_CUDA_ROBOTS "" CACHE STRING
+    "robots that a GPU has kernels for besides those of robots/: folders, relative ones from the source tree")
+  set(MILD_ENGINE_SIZES engine_sizes CACHE STRING
+    "program that reads a robot's sizes: this build's, or its path in a build with a MILD_MARCH that runs here")
+  if(MILD_ENGINE_SIZES STREQUAL "engine_sizes")
+    add_executable(engine_sizes engine/sizes.c)
+    target_link_libraries(engine_sizes PRIVATE layer_engine mild_options)
+  endif()
+  add_library(crowd_device STATIC)
+  set(generated ${CMAKE_BINARY_DIR}/generated/crowd)
+  function(crowd_kernels name sizes) # sizes: text that includes those of a robot
+    set(file ${generated}/${name}.cu)
+    file(CONFIGURE OUTPUT ${file} CONTENT [=[
+@sizes@
+#define CROWD_KERNELS crowd_kernels_@name@
+#include "crowd/device.cu"
+]=] @ONLY)
+    target_sources(crowd_device PRIVATE ${file} ${ARGN})
+    set(crowd_list "${crowd_list} &crowd_kernels_${name}," PARENT_SCOPE)
+    set(crowd_names "${crowd_names}extern const CrowdKernels crowd_kernels_${name};\n" PARENT_SCOPE)
+  endfunction()
+  file(GLOB robots CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/robots/*/robot.ini)
+  list(TRANSFORM robots REPLACE "/robot.ini$" "")
+  foreach(robot ${MILD_CUDA_ROBOTS})
+    get_filename_component(folder ${robot} ABSOLUTE BASE_DIR ${CMAKE_SOURCE_DIR})
+    list(APPEND robots ${folder})
+  endforeach()
+  list(REMOVE_DUPLICATES robots)
+  foreach(folder ${robots})
+    if(NOT EXISTS ${folder}/robot.ini)
+      message(FATAL_ERROR "MILD_CUDA_ROBOTS: ${folder} is no folder of a robot: it has no robot.ini")
+    endif()
+    get_filename_component(name ${folder} NAME)
+    string(MAKE_C_IDENTIFIER ${name} name)
+    if(crowd_list MATCHES "_kernels_${name}," OR name STREQUAL "any")
+      message(FATAL_ERROR "MILD_CUDA_ROBOTS: a second robot has the folder name ${name}; rename ${folder}")
+    endif()
+    file(GLOB sources CONFIGURE_DEPENDS ${folder}/robot.ini ${folder}/*.xml)
+    add_custom_command(OUTPUT ${generated}/${name}.h
+      COMMAND ${MILD_ENGINE_SIZES} ${folder} ${generated}/${name}.h DEPENDS ${MILD_ENGINE_SIZES} ${sources} VERBATIM)
+    crowd_kernels(${name} "#include \"${generated}/${name}.h\"" ${generated}/${name}.h)
+  endforeach()
+  crowd_kernels(any "/* sizes: the largest */")
+  file(CONFIGURE OUTPUT ${generated}/kernels.c CONTENT [=[
+#define MILD_REAL_FLOAT
+#include "crowd/text.h"
+
+@crowd_names@
+const CrowdKernels *const crowd_kernels[] = {@crowd_list@ NULL};
+]=] @ONLY)
+  target_sources(layer_crowd PRIVATE ${generated}/kernels.c)
   target_include_directories(crowd_device PRIVATE ${CMAKE_BINARY_DIR}/layers/crowd)
   target_link_libraries(crowd_device PRIVATE layer_task layer_engine)
-  target_compile_definitions(crowd_device PRIVATE ${MILD_CUDA_ROBOT})
   # as the kernels of the layer batch
   target_compile_options(crowd_device PRIVATE -ftz=true -prec-div=false -prec-sqrt=false)
   set_target_properties(crowd_device PROPERTIES CUDA_STANDARD 17 POSITION_INDEPENDENT_CODE ON)

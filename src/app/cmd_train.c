@@ -178,6 +178,9 @@ static MildStatus prepare(Command *run, const CliArgs *args, MildError *error) {
         write_note(run, args);
         status = make_config_text(run, error);
     }
+    if (status == MILD_OK) {
+        robots_tell_slow("train", &run->def.train, run->def.train.robot);
+    }
     return status;
 }
 

@@ -6,6 +6,7 @@
 #include "app/cli.h"
 #include "config/experiment_keys.h"
 #include "control/controller.h"
+#include "crowd/crowd.h"
 
 enum { LINE = 100 }; /* characters */
 
@@ -22,6 +23,18 @@ MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error) 
     }
     experiment_sections(def, sections);
     return config_overrides(sections, EXPERIMENT_SECTIONS, &override, 1, error);
+}
+
+void robots_tell_slow(const char *command, const TrainDef *def, const char *robot) {
+    MildError unused;
+    Robot *is = train_is_batch(def) && train_device(def) >= 0 ? robot_open(robot, &unused) : NULL;
+    if (is && crowd_is_slow(is)) {
+        fprintf(stderr,
+                "mild %s: this build has no CUDA kernels of %s's size, and those for any robot are "
+                "several times slower; build with -DMILD_CUDA_ROBOTS=FOLDER (docs/gpu.md)\n",
+                command, robot_name(is));
+    }
+    robot_destroy(is);
 }
 
 const char *robots_controller_help(char *text, size_t size) {

@@ -11,6 +11,8 @@
 Robot *robots_open(const char *option, const char *otherwise, MildError *error);
 /* Sets train.robot from --robot. Refuses names that a config file cannot hold, like an override. */
 MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error);
+/* Says on standard error, in one line, that a GPU steps the robot by kernels for any robot. */
+void robots_tell_slow(const char *command, const TrainDef *def, const char *robot);
 /* Help on --controller; returns `text`. */
 const char *robots_controller_help(char *text, size_t size);
 /* The robots that ship: joints, feet, mass, height, source. Returns the exit code. */

@@ -21,8 +21,8 @@ static void standing_act(void *self, int rows, TaskEnv *const *envs, float *acti
     const double *pose = robot_default_pose(standing->robot);
     for (int e = 0; e < rows; e++) {
         double target[ROBOT_JOINTS_MAX];
-        memcpy(envs[e]->kp, robot_stand_kp(standing->robot), bytes);
-        memcpy(envs[e]->kd, robot_stand_kd(standing->robot), bytes);
+        memcpy(envs[e]->gains.kp, robot_stand_kp(standing->robot), bytes);
+        memcpy(envs[e]->gains.kd, robot_stand_kd(standing->robot), bytes);
         robot_sim_load(standing->sim, &envs[e]->robot, &envs[e]->variation);
         stand_target(standing->stand, standing->sim, target);
         for (int i = 0; i < joints; i++) {

@@ -45,16 +45,15 @@ typedef struct {
     int striped;          /* bool: the labels are stripes of the share patch_share of episodes */
     /* what environments are made from, see task_env_init_head */
     TaskShape shape;
-    double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
+    TaskGains gains;
     uint64_t seed;
     uint32_t first; /* number of the first environment */
 } CrowdTask;
 
-/* What passes between engine and ground; see MildBatchInput and MildBatchOutput. The twists after
- * the step take the place of free_velocity. */
+/* What passes between engine and ground; see MildBatchInput and MildBatchOutput. The ground writes
+ * over what it has read: the wrenches over velocity, the twists after the step over free_velocity. */
 typedef struct {
     float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
-    float *wrench;
     MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */
 } CrowdContact;
 #define CROWD_FAR 1000 /* [m] below a robot on rigid ground: the soft one does not touch it */
@@ -69,7 +68,7 @@ typedef struct {
     uint8_t *fresh;    /* [envs] bool: an episode began */
     uint8_t *rigid;    /* [envs] bool: of the episode */
     int32_t *order;    /* [envs] in which a GPU steps them: those on rigid ground first */
-    TaskKept *kept;    /* [envs] for crowd_keep */
+    TaskKept *kept;    /* [envs] or NULL, in crowd_keep and crowd_restore */
     double *tally;     /* [TALLY_NUMBERS] sums over the environments */
     CrowdContact contact;
     const CrowdTrial *trial; /* [envs] or NULL */

@@ -12,11 +12,12 @@ _Static_assert(CROWD_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fi
 struct Crowd {
     CrowdArrays arrays; /* their memory is the device's */
     MildBatch *ground;
-    void *block;        /* where the arrays are, but for task and model */
-    CrowdGround *drawn; /* of the device: the grounds of CrowdTask */
-    void *trials;       /* where those of trials are */
-    Pool *pool;         /* of the host */
-    int steps;          /* of physics in a policy step */
+    const CrowdKernels *kernels; /* NULL: on the host */
+    void *block;                 /* where the arrays are, but for task and model */
+    CrowdGround *drawn;          /* of the device: the grounds of CrowdTask */
+    void *trials;                /* where those of trials are */
+    Pool *pool;                  /* of the host */
+    int steps;                   /* of physics in a policy step */
     int device;
     size_t robot; /* [B] of CrowdRobot */
     size_t bytes; /* of the device, without the ground */
@@ -82,29 +83,33 @@ static int labels_of(const TaskDef *task) {
     return task->map ? mild_map_label_count(task->map) : 1;
 }
 
-static MildStatus take_arrays(Crowd *crowd, int feet, int labels, MildError *error) {
+static MildStatus take_arrays(Crowd *crowd, const TaskShape *shape, const TaskDef *task,
+                              MildError *error) {
     CrowdArrays *all = &crowd->arrays;
     CrowdContact *contact = &all->contact;
-    const size_t envs = (size_t)all->envs, rows = envs * (size_t)feet;
+    const CrowdBytes of =
+        crowd->kernels ? crowd->kernels->bytes(task, shape) : crowd_host_bytes(task, shape);
+    const size_t envs = (size_t)all->envs, labels = (size_t)labels_of(task);
+    const size_t feet = (size_t)shape->feet, rows = envs * feet;
+    all->stride = of.stride;
+    crowd->robot = of.robot;
     const struct {
         void *at; /* pointer to the array's pointer */
         size_t bytes;
     } arrays[] = {{&all->env, envs * all->stride},
                   {&all->robot, envs * crowd->robot},
-                  {&all->material, envs * (size_t)labels * sizeof *all->material},
+                  {&all->material, envs * labels * sizeof *all->material},
                   {&all->map_origin, 2 * envs * sizeof *all->map_origin},
                   {&all->fresh, envs},
                   {&all->rigid, envs},
                   {&all->order, envs * sizeof *all->order},
-                  {&all->kept, envs * sizeof *all->kept},
                   {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
                   {&contact->position, 3 * rows * sizeof(float)},
                   {&contact->rotation, 9 * rows * sizeof(float)},
                   {&contact->velocity, 6 * rows * sizeof(float)},
-                  {&contact->inverse_inertia, 36 * rows * (size_t)feet * sizeof(float)},
+                  {&contact->inverse_inertia, 36 * rows * feet * sizeof(float)},
                   {&contact->free_velocity, 6 * rows * sizeof(float)},
                   {&contact->height, envs * sizeof(float)},
-                  {&contact->wrench, 6 * rows * sizeof(float)},
                   {&contact->foot, rows * sizeof *contact->foot}};
     size_t bytes = 0;
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
@@ -169,12 +174,35 @@ static MildStatus copy_task(Crowd *crowd, const CrowdDef *def, const TaskGrounds
         task.uneven = !mild_map_is_level(def->task->map);
     }
     robot_fill_table(def->robot, &task.robot);
-    MildStatus status = task_gains(def->task, def->robot, task.kp, task.kd, error);
+    MildStatus status = task_gains(def->task, def->robot, task.gains.kp, task.gains.kd, error);
     CrowdTask *at = status == MILD_OK ? take(crowd, sizeof *at, error) : NULL;
     crowd->arrays.task = at;
     return at ? batch_copy(crowd->device, at, &task, sizeof task, error) : MILD_ERROR_MEMORY;
 }
 
+/* The first that fit; NULL if none do. */
+static const CrowdKernels *kernels_for(const EngineTree *tree) {
+    const CrowdKernels *const *at = crowd_kernels;
+    while (*at && !(*at)->fits(tree)) {
+        at++;
+    }
+    return *at;
+}
+
+static MildStatus choose_kernels(Crowd *crowd, const Robot *robot, const EngineTree *tree,
+                                 MildError *error) {
+    if (crowd->device == MILD_BATCH_HOST) {
+        return MILD_OK;
+    }
+    crowd->kernels = kernels_for(tree);
+    return crowd->kernels ? checked(crowd->kernels->open(), error)
+                          : mild_fail(error, MILD_ERROR_ARGUMENT,
+                                      "%s: this build has no kernels for a robot of its size; "
+                                      "train.robots = mujoco steps it",
+                                      robot_name(robot));
+}
+
+/* The robot as the engine knows it, and what steps it. */
 static MildStatus copy_model(Crowd *crowd, const CrowdDef *def, MildError *error) {
     EngineModel *model = calloc(1, sizeof *model);
     double *number = calloc(ENGINE_NUMBERS, sizeof *number);
@@ -185,11 +213,7 @@ static MildStatus copy_model(Crowd *crowd, const CrowdDef *def, MildError *error
     } else {
         status = engine_model_read(def->robot, def->task->physics_dt, &tree, number, error);
     }
-    if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
-        const char *why = crowd_device_fits(&tree);
-        status = why ? mild_fail(error, MILD_ERROR_ARGUMENT, "%s: %s", robot_name(def->robot), why)
-                     : MILD_OK;
-    }
+    status = status == MILD_OK ? choose_kernels(crowd, def->robot, &tree, error) : status;
     EngineModel *at = status == MILD_OK ? take(crowd, sizeof *at, error) : NULL;
     crowd->arrays.model = at;
     if (at) {
@@ -203,6 +227,17 @@ static MildStatus copy_model(Crowd *crowd, const CrowdDef *def, MildError *error
     return status;
 }
 
+int crowd_is_slow(const Robot *robot) {
+    double *number = calloc(ENGINE_NUMBERS, sizeof *number);
+    EngineTree tree;
+    MildError unused;
+    const int read =
+        number && engine_model_read(robot, TASK_PERIOD, &tree, number, &unused) == MILD_OK;
+    const CrowdKernels *kernels = read ? kernels_for(&tree) : NULL;
+    free(number);
+    return kernels && !kernels->fixed;
+}
+
 static void create_piece(void *context, int piece, int thread) {
     (void)thread;
     crowd_host_create(context, piece);
@@ -211,7 +246,7 @@ static void create_piece(void *context, int piece, int thread) {
 static MildStatus create_envs(Crowd *crowd, MildError *error) {
     CrowdArrays *all = &crowd->arrays;
     if (crowd->device != MILD_BATCH_HOST) {
-        MildStatus status = checked(crowd_device_create(all, NULL), error);
+        MildStatus status = checked(crowd->kernels->create(all, NULL), error);
         return status == MILD_OK ? device_wait(crowd->device, error) : status;
     }
     pool_run(crowd->pool, all->envs, create_piece, all);
@@ -225,17 +260,12 @@ static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGround
     crowd->pool = def->pool;
     crowd->steps = (int)(TASK_PERIOD / def->task->physics_dt + 0.5);
     crowd->arrays.envs = def->envs;
-    const CrowdBytes bytes = def->device == MILD_BATCH_HOST ? crowd_host_bytes(def->task, &shape)
-                                                            : crowd_device_bytes(def->task, &shape);
-    crowd->arrays.stride = bytes.stride;
-    crowd->robot = bytes.robot;
     MildStatus status = open_ground(crowd, def, grounds, error);
-    status =
-        status == MILD_OK ? take_arrays(crowd, shape.feet, labels_of(def->task), error) : status;
+    status = status == MILD_OK ? copy_model(crowd, def, error) : status;
+    status = status == MILD_OK ? take_arrays(crowd, &shape, def->task, error) : status;
     status = status == MILD_OK ? copy_grounds(crowd, def, grounds, error) : status;
     status = status == MILD_OK && def->trial ? copy_trials(crowd, def, error) : status;
     status = status == MILD_OK ? copy_task(crowd, def, grounds, error) : status;
-    status = status == MILD_OK ? copy_model(crowd, def, error) : status;
     return status == MILD_OK ? create_envs(crowd, error) : status;
 }
 
@@ -338,7 +368,7 @@ static MildStatus finish(const Crowd *crowd, Call *call, void *stream, MildError
         return status;
     }
     if (crowd->device != MILD_BATCH_HOST) {
-        return checked(crowd_device_first(all, &call->step, stream), error);
+        return checked(crowd->kernels->first(all, &call->step, stream), error);
     }
     pool_run(crowd->pool, all->envs, first_piece, call);
     return MILD_OK;
@@ -347,7 +377,7 @@ static MildStatus finish(const Crowd *crowd, Call *call, void *stream, MildError
 MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildError *error) {
     Call call = {crowd, step_into(first), 0};
     if (crowd->device != MILD_BATCH_HOST) {
-        MildStatus status = checked(crowd_device_begin(&crowd->arrays, stream), error);
+        MildStatus status = checked(crowd->kernels->begin(&crowd->arrays, stream), error);
         return status == MILD_OK ? finish(crowd, &call, stream, error) : status;
     }
     pool_run(crowd->pool, crowd->arrays.envs, begin_piece, &call);
@@ -367,14 +397,14 @@ static MildStatus step_physics(const Crowd *crowd, Call *call, void *stream, Mil
                                   .map_origin = all->map_origin,
                                   .height = c->height};
     const MildBatchOutput output = {
-        .wrench = c->wrench, .velocity = c->free_velocity, .foot = c->foot};
+        .wrench = c->velocity, .velocity = c->free_velocity, .foot = c->foot};
     MildStatus status = MILD_OK;
     for (call->part = 0; status == MILD_OK && call->part <= crowd->steps; call->part++) {
         if (call->part > 0) {
             status = mild_batch_step(crowd->ground, &input, &output, 1, stream, error);
         }
         if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
-            status = checked(crowd_device_part(all, &call->step, call->part, stream), error);
+            status = checked(crowd->kernels->part(all, &call->step, call->part, stream), error);
         } else if (status == MILD_OK) {
             pool_run(crowd->pool, all->envs, part_piece, call);
         }
@@ -394,7 +424,7 @@ MildStatus crowd_step(Crowd *crowd, const float *action, float *reward, uint8_t 
     call.step.valid = valid;
     MildStatus status = step_physics(crowd, &call, stream, error);
     if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
-        status = checked(crowd_device_end(all, &call.step, stream), error);
+        status = checked(crowd->kernels->end(all, &call.step, stream), error);
     } else if (status == MILD_OK) {
         pool_run(crowd->pool, all->envs, end_piece, &call);
     }
@@ -405,7 +435,7 @@ MildStatus crowd_take_sums(Crowd *crowd, VecStats *sums, void *stream, MildError
     const CrowdArrays *all = &crowd->arrays;
     double sum[TALLY_NUMBERS];
     if (crowd->device != MILD_BATCH_HOST) {
-        MildStatus status = checked(crowd_device_tally(all, stream), error);
+        MildStatus status = checked(crowd->kernels->tally(all, stream), error);
         status = status == MILD_OK ? device_wait(crowd->device, error) : status;
         if (status != MILD_OK) {
             return status;
@@ -430,31 +460,37 @@ MildStatus crowd_take_sums(Crowd *crowd, VecStats *sums, void *stream, MildError
     return MILD_OK;
 }
 
-/* Between the environments and arrays.kept. */
-static MildStatus move_kept(const Crowd *crowd, int back, MildError *error) {
+/* Between the environments and `all->kept`. */
+static MildStatus move_kept(const Crowd *crowd, const CrowdArrays *all, int back,
+                            MildError *error) {
     if (crowd->device == MILD_BATCH_HOST) {
-        crowd_host_keep(&crowd->arrays, back);
+        crowd_host_keep(all, back);
         return MILD_OK;
     }
     MildStatus status = device_wait(crowd->device, error);
-    status =
-        status == MILD_OK ? checked(crowd_device_keep(&crowd->arrays, back, NULL), error) : status;
+    status = status == MILD_OK ? checked(crowd->kernels->keep(all, back, NULL), error) : status;
     return status == MILD_OK ? device_wait(crowd->device, error) : status;
 }
 
 MildStatus crowd_keep(Crowd *crowd, TaskKept *kept, MildError *error) {
-    const CrowdArrays *all = &crowd->arrays;
-    MildStatus status = move_kept(crowd, 0, error);
-    return status == MILD_OK
-               ? batch_copy(crowd->device, kept, all->kept, (size_t)all->envs * sizeof *kept, error)
-               : status;
+    const size_t bytes = (size_t)crowd->arrays.envs * sizeof *kept;
+    CrowdArrays all = crowd->arrays;
+    all.kept = batch_alloc(crowd->device, bytes, error);
+    MildStatus status = all.kept ? move_kept(crowd, &all, 0, error) : MILD_ERROR_MEMORY;
+    status = status == MILD_OK ? batch_copy(crowd->device, kept, all.kept, bytes, error) : status;
+    batch_free(crowd->device, all.kept);
+    return status;
 }
 
 MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
-    const CrowdArrays *all = &crowd->arrays;
+    const size_t bytes = (size_t)crowd->arrays.envs * sizeof *kept;
+    CrowdArrays all = crowd->arrays;
+    all.kept = batch_alloc(crowd->device, bytes, error);
     MildStatus status =
-        batch_copy(crowd->device, all->kept, kept, (size_t)all->envs * sizeof *kept, error);
-    return status == MILD_OK ? move_kept(crowd, 1, error) : status;
+        all.kept ? batch_copy(crowd->device, all.kept, kept, bytes, error) : MILD_ERROR_MEMORY;
+    status = status == MILD_OK ? move_kept(crowd, &all, 1, error) : status;
+    batch_free(crowd->device, all.kept);
+    return status;
 }
 
 MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error) {
@@ -463,7 +499,7 @@ MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error) 
     MildStatus status = batch_copy(crowd->device, all->command, command,
                                    3 * (size_t)all->envs * sizeof *command, error);
     if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
-        return checked(crowd_device_tell(all, NULL), error);
+        return checked(crowd->kernels->tell(all, NULL), error);
     }
     if (status == MILD_OK) {
         pool_run(crowd->pool, all->envs, tell_piece, &call);

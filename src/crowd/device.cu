@@ -1,5 +1,6 @@
 /* A crowd on a GPU. The text is compiled for robots of one size (ENGINE_JOINTS ... of model.h), or
- * without these definitions for any. */
+ * without these definitions for any, by cmake/Crowd.cmake. Before the inclusion: CROWD_KERNELS, the
+ * name of what it gives. */
 #define MILD_REAL_FLOAT
 #include <cuda_runtime.h>
 
@@ -162,35 +163,36 @@ static const char *launched(void) {
     return status == cudaSuccess ? NULL : cudaGetErrorString(status);
 }
 
-extern "C" CrowdBytes crowd_device_bytes(const TaskDef *def, const TaskShape *shape) {
+static CrowdBytes kernels_bytes(const TaskDef *def, const TaskShape *shape) {
     const CrowdBytes bytes = {crowd_stride(def, shape), sizeof(CrowdRobot)};
     return bytes;
 }
 
-extern "C" const char *crowd_device_fits(const EngineTree *tree) {
-    if (ENGINE_FIXED && (tree->joints != ENGINE_JOINTS || tree->feet != ENGINE_FEET ||
-                         tree->corners != ENGINE_CORNERS || tree->entries != ENGINE_ENTRIES ||
-                         tree->chain != ENGINE_CHAIN)) {
-        return "this build steps robots of another size on a GPU";
-    }
+static int kernels_fits(const EngineTree *tree) {
+    return !ENGINE_FIXED || (tree->joints == ENGINE_JOINTS && tree->feet == ENGINE_FEET &&
+                             tree->corners == ENGINE_CORNERS && tree->entries == ENGINE_ENTRIES &&
+                             tree->chain == ENGINE_CHAIN);
+}
+
+static const char *kernels_open(void) {
     cudaFuncSetAttribute(part<0>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     cudaFuncSetAttribute(part<1>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)place_bytes);
     return launched();
 }
 
-extern "C" const char *crowd_device_create(const CrowdArrays *all, void *stream) {
+static const char *kernels_create(const CrowdArrays *all, void *stream) {
     create<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
-extern "C" const char *crowd_device_begin(const CrowdArrays *all, void *stream) {
+static const char *kernels_begin(const CrowdArrays *all, void *stream) {
     begin<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
-extern "C" const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k,
-                                         void *stream) {
+static const char *kernels_part(const CrowdArrays *all, const CrowdStep *call, int k,
+                                void *stream) {
     (all->sample
          ? part<1>
          : part<0>)<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(
@@ -198,31 +200,36 @@ extern "C" const char *crowd_device_part(const CrowdArrays *all, const CrowdStep
     return launched();
 }
 
-extern "C" const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call,
-                                        void *stream) {
+static const char *kernels_end(const CrowdArrays *all, const CrowdStep *call, void *stream) {
     end<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     return launched();
 }
 
-extern "C" const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call,
-                                          void *stream) {
+static const char *kernels_first(const CrowdArrays *all, const CrowdStep *call, void *stream) {
     pose<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all);
     observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
-extern "C" const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream) {
+static const char *kernels_keep(const CrowdArrays *all, int back, void *stream) {
     keep<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
     return launched();
 }
 
-extern "C" const char *crowd_device_tell(const CrowdArrays *all, void *stream) {
+static const char *kernels_tell(const CrowdArrays *all, void *stream) {
     tell<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
 }
 
-extern "C" const char *crowd_device_tally(const CrowdArrays *all, void *stream) {
+static const char *kernels_tally(const CrowdArrays *all, void *stream) {
     tally<<<TALLY_NUMBERS, TALLY_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
+}
+
+extern "C" {
+extern const CrowdKernels CROWD_KERNELS;
+const CrowdKernels CROWD_KERNELS = {ENGINE_FIXED,   kernels_fits,  kernels_open,  kernels_bytes,
+                                    kernels_create, kernels_begin, kernels_first, kernels_part,
+                                    kernels_end,    kernels_keep,  kernels_tell,  kernels_tally};
 }

@@ -34,23 +34,26 @@ void crowd_host_keep(const CrowdArrays *all, int back);
 void crowd_host_tally(const CrowdArrays *all);
 
 /* ---- a GPU ---- */
-#ifdef __cplusplus
-extern "C" {
-#endif
-/* The same on a device, in the stream. They return NULL or what went wrong. */
-const char *crowd_device_create(const CrowdArrays *all, void *stream);
-const char *crowd_device_begin(const CrowdArrays *all, void *stream);
-const char *crowd_device_first(const CrowdArrays *all, const CrowdStep *call, void *stream);
-const char *crowd_device_part(const CrowdArrays *all, const CrowdStep *call, int k, void *stream);
-const char *crowd_device_end(const CrowdArrays *all, const CrowdStep *call, void *stream);
-const char *crowd_device_keep(const CrowdArrays *all, int back, void *stream);
-const char *crowd_device_tell(const CrowdArrays *all, void *stream);
-const char *crowd_device_tally(const CrowdArrays *all, void *stream);
-CrowdBytes crowd_device_bytes(const TaskDef *def, const TaskShape *shape);
-/* NULL if the kernels are compiled for such a robot, else the reason. */
-const char *crowd_device_fits(const EngineTree *tree);
-#ifdef __cplusplus
-}
-#endif
+
+/* The same on a GPU, compiled for robots of one size or for any (device.cu). Functions put their
+ * work into the stream and return NULL, or what went wrong. */
+typedef struct {
+    int fixed;                           /* bool: for robots of one size */
+    int (*fits)(const EngineTree *tree); /* bool: for such a robot */
+    const char *(*open)(void);           /* before all that follow; waits */
+    CrowdBytes (*bytes)(const TaskDef *def, const TaskShape *shape);
+    const char *(*create)(const CrowdArrays *all, void *stream);
+    const char *(*begin)(const CrowdArrays *all, void *stream);
+    const char *(*first)(const CrowdArrays *all, const CrowdStep *call, void *stream);
+    const char *(*part)(const CrowdArrays *all, const CrowdStep *call, int k, void *stream);
+    const char *(*end)(const CrowdArrays *all, const CrowdStep *call, void *stream);
+    const char *(*keep)(const CrowdArrays *all, int back, void *stream);
+    const char *(*tell)(const CrowdArrays *all, void *stream);
+    const char *(*tally)(const CrowdArrays *all, void *stream);
+} CrowdKernels;
+
+/* Those of this build, NULL behind them: cmake/Crowd.cmake, or without_cuda.c. A robot takes the
+ * first that fit. */
+extern const CrowdKernels *const crowd_kernels[];
 
 #endif

@@ -372,7 +372,7 @@ MildStatus engine_model_read(const Robot *robot, double dt, EngineTree *tree, do
 
 void engine_model_sizes(const EngineTree *tree, char *text, size_t size) {
     snprintf(text, size,
-             "-DENGINE_JOINTS=%d -DENGINE_FEET=%d -DENGINE_CORNERS=%d -DENGINE_ENTRIES=%d "
-             "-DENGINE_CHAIN=%d",
+             "#define ENGINE_JOINTS %d\n#define ENGINE_FEET %d\n#define ENGINE_CORNERS %d\n"
+             "#define ENGINE_ENTRIES %d\n#define ENGINE_CHAIN %d\n",
              tree->joints, tree->feet, tree->corners, tree->entries, tree->chain);
 }

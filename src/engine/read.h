@@ -23,8 +23,7 @@ extern "C" {
 MildStatus engine_model_read(const Robot *robot, double dt, EngineTree *tree, double *number,
                              MildError *error);
 
-/* The sizes of a robot as compiler options, e.g. "-DENGINE_JOINTS=12 -DENGINE_FEET=2 ...", for the
- * text compiled for it alone. */
+/* The sizes of a robot as lines "#define ENGINE_JOINTS 12", for the text compiled for it alone. */
 void engine_model_sizes(const EngineTree *tree, char *text, size_t size);
 
 #ifdef __cplusplus

@@ -7,12 +7,12 @@
 
 #include "engine/data.h"
 
-/* Numbers of EngineWork before the pose. */
-#define ENGINE_STATE ((int)(offsetof(EngineWork, rotation) / sizeof(Real)))
+/* Numbers of EngineWork before the wrench, which either ground writes anew. */
+#define ENGINE_STATE ((int)(offsetof(EngineWork, wrench) / sizeof(Real)))
 
 typedef struct {
     Real factor[ENGINE_ENTRIES]; /* L in the order of EngineTree.entry, its diagonal inverted */
-    Real state[offsetof(EngineWork, rotation) / sizeof(Real)];
+    Real state[offsetof(EngineWork, wrench) / sizeof(Real)];
     Real rows[6 * ENGINE_FEET * ENGINE_CHAIN]; /* soft ground: half, rigid ground: J^T */
     Real foot_link[12 * ENGINE_FEET];          /* rigid ground: pose of the links with soles */
 } EngineSaved;

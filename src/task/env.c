@@ -17,11 +17,11 @@ MildGround *task_env_ground(TaskEnv *env) {
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index) {
     const TaskShape shape = task_shape(robot);
-    double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
-    MildStatus status = task_gains(def, robot, kp, kd, NULL);
+    TaskGains gains = {{0}, {0}};
+    MildStatus status = task_gains(def, robot, gains.kp, gains.kd, NULL);
     assert(status == MILD_OK); /* task_def_check_robot has seen them */
     (void)status;
-    task_env_init_head(env, def, shape, kp, kd, seed, index);
+    task_env_init_head(env, def, shape, &gains, seed, index);
     mild_ground_init_prints(task_env_ground(env), robot_soles(robot), env->shape.feet,
                             def->print_tiles);
 }

@@ -25,30 +25,47 @@ TASK_FN uint32_t task_frames_held(const TaskDef *def) {
     return (uint32_t)((TASK_FRAMES - 1) * def->history_stride);
 }
 
+/* A device has no history, and the frames right behind TaskEnv. */
+static inline MILD_BOTH size_t history_place(void) {
+    return PLACE_HISTORY ? whole_lines(sizeof(TaskEnv)) : sizeof(TaskEnv);
+}
+
 TASK_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held) {
     const size_t frames = held * (size_t)shape->observation * sizeof(TaskFrame);
-    return whole_lines(sizeof(TaskEnv)) + whole_lines(history_bytes(shape) + frames);
+    return whole_lines(history_place() + history_bytes(shape) + frames);
 }
 
 TASK_FN float *task_env_history(TaskEnv *env) {
-    return (float *)(void *)((char *)env + whole_lines(sizeof(TaskEnv)));
+    return (float *)(void *)((char *)env + history_place());
 }
 
 TASK_FN TaskFrame *task_env_frames(TaskEnv *env) {
-    return (TaskFrame *)(void *)((char *)env + whole_lines(sizeof(TaskEnv)) +
-                                 history_bytes(&env->shape));
+    return (TaskFrame *)(void *)((char *)env + history_place() + history_bytes(&env->shape));
 }
 
-TASK_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shape, const double *kp,
-                                const double *kd, uint64_t seed, uint32_t index) {
+static inline MILD_BOTH const TaskGains *gains_of(const TaskEnv *env) {
+#ifdef TASK_ON_DEVICE
+    return env->gains;
+#else
+    return &env->gains;
+#endif
+}
+
+static inline MILD_BOTH void set_gains(TaskEnv *env, const TaskGains *gains) {
+#ifdef TASK_ON_DEVICE
+    env->gains = gains;
+#else
+    env->gains = *gains;
+#endif
+}
+
+TASK_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shape,
+                                const TaskGains *gains, uint64_t seed, uint32_t index) {
     const uint32_t held = task_frames_held(def);
     memset(env, 0, task_env_head_bytes(&shape, held));
     env->shape = shape;
     env->held = held;
-    for (int i = 0; i < shape.joints; i++) {
-        env->kp[i] = kp[i];
-        env->kd[i] = kd[i];
-    }
+    set_gains(env, gains);
     env->seed = seed;
     env->index = index;
     env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
@@ -176,13 +193,14 @@ TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *acti
 /* ---- motors ---- */
 
 TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i) {
+    const TaskGains *gains = gains_of(env);
     TaskMotor motor;
     double rest = task_assist_pose(env, def, robot, i), scale = task_action_scale(def, robot);
     for (int late = 0; late < 2; late++) {
         motor.target[late] = rest + scale * (double)env->action[late][i] + env->motor_offset[i];
     }
-    motor.kp = env->strength[i] * env->kp[i] * env->kp_scale[i];
-    motor.kd = env->strength[i] * env->kd[i] * env->kd_scale[i];
+    motor.kp = env->strength[i] * TASK_REAL(gains->kp[i]) * env->kp_scale[i];
+    motor.kd = env->strength[i] * TASK_REAL(gains->kd[i]) * env->kd_scale[i];
     motor.limit = def->torque_share * robot_effort(robot)[i];
     motor.fastest = robot_speed(robot)[i];
     return motor;

@@ -38,6 +38,19 @@ TaskShape task_shape(const Robot *robot);
  * rigid, where the numbers are 0. */
 int task_critic_ground(const TaskShape *shape);
 
+/* Gains of the joints. */
+typedef struct {
+    double kp[ROBOT_JOINTS_MAX]; /* [N m/rad] task.kp or the robot's */
+    double kd[ROBOT_JOINTS_MAX]; /* [N m s/rad] task.kd or the robot's */
+} TaskGains;
+
+/* As an environment has them: on the CPU its own, on a device those of its crowd. */
+#ifdef TASK_ON_DEVICE
+typedef const TaskGains *TaskOwnGains;
+#else
+typedef TaskGains TaskOwnGains;
+#endif
+
 typedef struct {
     TaskShape shape;
     uint64_t seed;
@@ -68,8 +81,7 @@ typedef struct {
     TaskReal push[6];     /* [m/s, rad/s] last push, for the critic; decays */
     /* state */
     RobotState robot;
-    TaskReal kp[TASK_JOINTS];     /* [N m/rad] task.kp or the robot's */
-    TaskReal kd[TASK_JOINTS];     /* [N m s/rad] task.kd or the robot's */
+    TaskOwnGains gains;
     float action[3][TASK_JOINTS]; /* now, one and two steps ago */
     TaskReal torque[TASK_JOINTS]; /* [N m] of the last physics step */
     uint32_t oldest;              /* place of the oldest frame in the ring, the next to go */
@@ -128,9 +140,10 @@ TASK_FN float *task_env_history(TaskEnv *env);
 /* [held][shape.observation] The ring of the last frames. */
 TASK_FN TaskFrame *task_env_frames(TaskEnv *env);
 
-/* The same for a block without ground memory. kp, kd: [shape.joints] of task_gains. */
-TASK_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shape, const double *kp,
-                                const double *kd, uint64_t seed, uint32_t index);
+/* The same for a block without ground memory. gains: of task_gains, 0 beyond the robot's joints; on
+ * a device they stay where they are. */
+TASK_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shape,
+                                const TaskGains *gains, uint64_t seed, uint32_t index);
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
                    uint32_t index);
 /* Draws a new episode and writes its first observation. */

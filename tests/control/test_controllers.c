@@ -118,8 +118,8 @@ static void stand_acts_as_the_stand(void **unused) {
         for (int i = 0; i < joints; i++) {
             double target = robot_default_pose(scene.robot)[i] +
                             robot_action_scale(scene.robot) * (double)action[i];
-            double torque = scene.env->kp[i] * (target - scene.env->robot.qpos[7 + i]) -
-                            scene.env->kd[i] * scene.env->robot.qvel[6 + i];
+            double torque = scene.env->gains.kp[i] * (target - scene.env->robot.qpos[7 + i]) -
+                            scene.env->gains.kd[i] * scene.env->robot.qvel[6 + i];
             double effort = robot_effort(scene.robot)[i];
             torque = fmax(-effort, fmin(effort, torque));
             worst = fmax(worst, fabs(torque - wanted[i]));

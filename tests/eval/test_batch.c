@@ -246,6 +246,51 @@ static void falls_are_counted(void **state) {
     pool_destroy(pool);
 }
 
+/* The Go1, held in its pose by a policy of zeros and stiff joints, on four round feet. It has as many
+ * joints as SA01, and so an observation of the same width. */
+static void four_feet_are_measured(void **state) {
+    (void)state;
+    static const char *const names[] = {"rigid", "rubber", "sand_loose", NULL};
+    static const double speed = 0.3;
+    const EvalDef eval = {.speed = speed, .trials = 3, .seconds = 3, .seed = 1};
+    MildError error = {0};
+    Asked asked;
+    Controller controller = zero_controller(&asked);
+    Robot *biped = robot;
+    const TaskDef before = def;
+    Pool *pool = pool_create(2);
+    EvalRow rows[ROWS], own;
+    Scene scene[ROWS];
+    char line[256];
+    const int count = scenes_of(names, scene);
+    strcpy(def.kp, "50");
+    strcpy(def.kd, "1.5");
+    robot = robot_create(MILD_SOURCE_DIR "/robots/go1", &error);
+    assert_true(robot && robot_feet(robot) == 4 && robot_joints(robot) == SA01_JOINTS);
+    assert_int_equal(run_batch(&controller, pool, names, &speed, 1, eval, rows, &error), MILD_OK);
+    for (int i = 0; i < count; i++) {
+        const EvalRow *row = &rows[i];
+        assert_int_equal(eval_run(&def, robot, pool, &controller, &scene[i], &eval, &own, &error),
+                         MILD_OK);
+        eval_print_row(row, line, sizeof line);
+        printf("%s\n", line);
+        eval_print_row(&own, line, sizeof line);
+        printf("%s\n", line);
+        assert_true(row->success == own.success && row->success > 0);
+        near("velocity", row, row->velocity, own.velocity, 1e-4);
+        near("cot", row, row->cot / own.cot, 1, 1e-3);
+        near("torque_max", row, row->torque_max / own.torque_max, 1, 1e-3);
+        near("clearance", row, row->clearance, own.clearance, 1e-5);
+        near("penetration", row, row->penetration, own.penetration, 1e-3 * own.penetration);
+        near("drift", row, row->drift / own.drift, 1, 1e-3);
+        near("energy", row, row->energy / own.energy, 1, 1e-3);
+    }
+    pool_destroy(pool);
+    robot_destroy(robot);
+    robot = biped;
+    def = before;
+}
+
 /* What the policy sees: its own speed, sideways too, turned towards world x, until the stop. */
 static void commands_arrive(void **state) {
     (void)state;
@@ -307,6 +352,7 @@ int main(void) {
         cmocka_unit_test(rows_of_a_device_agree),
         cmocka_unit_test(rows_repeat),
         cmocka_unit_test(falls_are_counted),
+        cmocka_unit_test(four_feet_are_measured),
         cmocka_unit_test(commands_arrive),
         cmocka_unit_test(what_is_not_there_is_refused),
     };

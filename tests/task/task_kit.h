@@ -130,8 +130,8 @@ static inline TaskStep rig_step(Rig *rig, const float *action) {
 
 /* Joints without torque: in the air the robot then falls without turning or bending. */
 static inline void rig_go_limp(Rig *rig) {
-    memset(rig->env->kp, 0, sizeof rig->env->kp);
-    memset(rig->env->kd, 0, sizeof rig->env->kd);
+    memset(rig->env->gains.kp, 0, sizeof rig->env->gains.kp);
+    memset(rig->env->gains.kd, 0, sizeof rig->env->gains.kd);
 }
 
 /* ---- states ---- */

@@ -287,7 +287,7 @@ static void led_pose(void **unused) {
 static void torque_follows_the_led_pose(void **unused) {
     (void)unused;
     open_in_the_air(0);
-    rig.env->kp[KNEE] = rig.env->kp[LEG_JOINTS + KNEE] = 10;
+    rig.env->gains.kp[KNEE] = rig.env->gains.kp[LEG_JOINTS + KNEE] = 10;
     rig.env->phase = 0.25;
     help(1, 0.5);
     RobotState before = rig.env->robot;
