@@ -50,6 +50,8 @@ static TaskDef some_def(void) {
     def.physics_dt = 0.005;
     def.randomize.patch_share = 0;
     def.randomize.rigid_share = 0.3;
+    def.randomize.rigid_time[0] = 0.02;
+    def.randomize.rigid_time[1] = 0.2;
     def.episode = 1.2;
     return def;
 }
@@ -190,6 +192,7 @@ static void same_episode(int e) {
     assert_true(a->index == b.index && a->step == b.step);
     assert_true(a->ground[0] == b.ground[0] && a->variation.rigid == b.rigid);
     assert_near(a->variation.rigid_friction, b.friction, 1e-7);
+    assert_near(a->variation.rigid_time, b.rigid_time, 1e-7);
     assert_near(a->terrain.map_x, b.map[0], 1e-6);
     assert_near(a->terrain.map_y, b.map[1], 1e-6);
     for (int i = 0; i < 3; i++) {

@@ -121,6 +121,10 @@ static void robot_and_sensors(void **unused) {
     (void)unused;
     open_env();
     clear_columns();
+    draw_next();
+    assert_true(env->variation.rigid_time == 0);
+    def.randomize.rigid_time[0] = 0.02;
+    def.randomize.rigid_time[1] = 0.4;
     int lags[3][6] = {{0}};
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
@@ -128,6 +132,7 @@ static void robot_and_sensors(void **unused) {
         note("base_mass_add", -1, -4, 4, v->base_mass_add);
         note("armature_scale", -1, 0.7, 1.3, v->armature_scale);
         note("rigid_friction", -1, 0.2, 1.3, v->rigid_friction);
+        note("rigid_time", -1, 0.02, 0.4, v->rigid_time);
         note("assist_draw", -1, 0.5, 1, env->assist_draw);
         note("strength", -1, 0.9, 1.1, env->strength[0]);
         for (int i = 0; i < 3; i++) {
