@@ -66,15 +66,15 @@ enum { MILD_ENVS_REWARDS_MAX = 32 };
 
 /* Of the episodes that ended since the last call. */
 typedef struct {
-    int episodes;       /* that ended */
-    int falls;          /* of these, not by time */
-    int diverged;       /* steps */
-    double steps;       /* [-] policy steps of all environments */
-    double paid;        /* [-] sum of all rewards of these steps */
-    double length;      /* [s] mean */
-    double reward;      /* [-] mean sum of an episode */
-    double speed_error; /* [m/s] mean */
-    double assist;      /* [-] mean level of help of all robots now */
+    int episodes;                        /* that ended */
+    int falls;                           /* of these, not by time */
+    int diverged;                        /* steps */
+    double steps;                        /* [-] policy steps of all environments */
+    double paid;                         /* [-] sum of all rewards of these steps */
+    double length;                       /* [s] mean */
+    double reward;                       /* [-] mean sum of an episode */
+    double speed_error;                  /* [m/s] mean */
+    double assist;                       /* [-] mean level of help of all robots now */
     double terms[MILD_ENVS_REWARDS_MAX]; /* [1/s] mean of each term while alive */
 } MildEnvsStatistics;
 
