@@ -1,7 +1,7 @@
-/* The rival "Clock" (Singh et al. 2024, Robust Humanoid Walking on Compliant and Uneven Terrain with
- * Deep Reinforcement Learning): a network of two hidden layers that sees the newest frame alone,
- * with its gait clock. It decides 40 times a second, so a decision lasts two and three policy
- * periods in turn, and the action moves half the way to each new one. Trained by
+/* The rival "Clock" (Singh et al. 2024, Robust Humanoid Walking on Compliant and Uneven Terrain
+ * with Deep Reinforcement Learning): a network of two hidden layers that sees the newest frame
+ * alone, with its gait clock. It decides 40 times a second, so a decision lasts two and three
+ * policy periods in turn, and the action moves half the way to each new one. Trained by
  * scripts/rivals/train_clock.py, whose files it reads.
  *
  * It remembers nothing: the period of an episode and the present action are the environment's. */

@@ -1,10 +1,13 @@
-/* The rival "HT-2" (Radosavovic et al. 2024, Learning Humanoid Locomotion over Challenging Terrain):
- * a causal transformer over the last frames of the episode and the actions before them. Trained by
- * scripts/rivals/train_ht2.py, whose files it reads.
+/* The rival "HT-2" (Radosavovic et al. 2024, Learning Humanoid Locomotion over Challenging
+ * Terrain): a causal transformer over the last frames of the episode and the actions before them.
+ * Trained by scripts/rivals/train_ht2.py, whose files it reads.
  *
- * Token j of a context, oldest first, with the frame o_j without its last action, and that action
- * a_j:   x_j = W_o o_j + b_o + W_a a_j + p_j,   the mask token m for W_a a_j where an episode begins.
- * Each layer:   x += out(attention(norm1(x))),   x += down(gelu(up(norm2(x)))).
+ * Token j of a context, oldest first, is made from the frame o_j without its last action, from that
+ * action a_j, and from its place p_j: x_j = W_o o_j + b_o + W_a a_j + p_j. Where the episode begins
+ * there is no action before, and the mask token m takes the place of W_a a_j. Each layer:
+ *
+ *     x += out(attention(norm1(x))),   x += down(gelu(up(norm2(x))))
+ *
  * The action is that of the newest token: action(norm(x)). */
 #include <math.h>
 #include <stdio.h>

@@ -25,8 +25,8 @@ void weights_destroy(Weights *weights); /* may be NULL */
 int weights_length(const Weights *weights, const char *name, int dimension);
 /* A number that is a text of the file, 1 .. 1000. 0 after a failure, as what follows. */
 int weights_number(Weights *weights, const char *key);
-/* A tensor [rows][columns], or with columns = 0 a vector [rows]; it lasts as long as `weights`. NULL
- * after a failure. */
+/* A tensor [rows][columns], or with columns = 0 a vector [rows]. It lasts as long as `weights`.
+ * NULL after a failure. */
 const float *weights_take(Weights *weights, const char *name, int rows, int columns);
 /* NAME.weight and NAME.bias. */
 Linear weights_take_linear(Weights *weights, const char *name, int in, int out);
