@@ -36,8 +36,10 @@ class Statistics(ctypes.Structure):
 
 
 def load_library(path=None):
+    """path: of libmild_envs.so; else that of the build, or of a bundle (scripts/bundle.sh)."""
     os.environ.setdefault("MILD_HOME", str(ROOT))
-    library = ctypes.CDLL(str(path or os.environ.get("MILD_ENVS", ROOT / "build" / "libmild_envs.so")))
+    built = ROOT / "build" / "libmild_envs.so"
+    library = ctypes.CDLL(str(path or (built if built.exists() else ROOT / "lib" / "libmild_envs.so")))
     library.mild_envs_open.restype = c_void_p
     library.mild_envs_open.argtypes = [c_char_p, POINTER(c_char_p), c_int, POINTER(Error)]
     library.mild_envs_close.argtypes = [c_void_p]

@@ -104,12 +104,14 @@ class Ppo:
             self.std_max = s.std * (s.std_end / s.std) ** share
 
     def follow(self, kl):
-        """Moves the learning rate toward the KL target."""
+        """Moves the learning rate toward the KL target, as step_learning_rate of src/learn/ppo_step.h."""
         s = self.settings
         if kl > 2 * self.kl_target:
-            self.rate = max(self.rate / 1.5, s.rate_min)
-        elif 0 < kl < self.kl_target / 2:
-            self.rate = min(self.rate * 1.5, s.rate_max)
+            self.rate /= 1.5
+        elif 1e-6 * self.kl_target < kl < self.kl_target / 2:
+            self.rate *= 1.5
+        most = max(s.rate_max * self.kl_target / s.kl_target, s.rate_min)
+        self.rate = min(max(self.rate, s.rate_min), most)
         for group in self.optimizer.param_groups:
             group["lr"] = self.rate
 

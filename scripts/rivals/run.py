@@ -23,7 +23,7 @@ def options(text, minutes):
     parser.add_argument("--envs", type=int, default=8192, help="environments (default 8192)")
     parser.add_argument("--device", default="cuda", help="cuda, cuda:N or cpu (default cuda)")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--library", help="libmild_envs.so (default build/libmild_envs.so)")
+    parser.add_argument("--library", help="libmild_envs.so (default: in build/, or of this bundle)")
     return parser
 
 

@@ -644,6 +644,7 @@ static void start_of_a_trial(void **unused) {
     (void)unused;
     Rig rig;
     TaskDef start_def = task_def_default();
+    start_def.randomize.rigid_time[0] = start_def.randomize.rigid_time[1] = 0.1;
     rig_open(&rig, &start_def, 11, 0);
     MildTerrain terrain = kit_sand();
     terrain.height = 0.4;
@@ -655,6 +656,7 @@ static void start_of_a_trial(void **unused) {
     task_env_reset_on(rig.env, &rig.def, robot, rig.sim, &terrain, 0, &rig.view);
     expect_near("on higher ground", rig.env->robot.qpos[2], z + 0.4, 1e-12);
     expect_near("friction of rigid ground", rig.env->variation.rigid_friction, 0.8, 0);
+    expect_near("its time constant", rig.env->variation.rigid_time, 0, 0);
     assert_false(rig.env->variation.rigid);
     task_env_reset_on(rig.env, &rig.def, robot, rig.sim, &terrain, 1, &rig.view);
     assert_true(rig.env->variation.rigid);
