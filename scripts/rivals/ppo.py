@@ -164,6 +164,19 @@ class Ppo:
         report = {name: torch.stack(numbers).mean().item() for name, numbers in means.items() if numbers}
         return {**report, "rate": self.rate, "std": torch.exp(self.log_std).mean().item()}
 
+    def save(self, path):
+        """What a later run goes on from: the moments of Adam begin anew."""
+        torch.save({"actor": self.actor.state_dict(), "critic": self.critic.state_dict(), "log_std": self.log_std.detach(),
+                    "rate": self.rate}, path)
+
+    def load(self, path):
+        state = torch.load(path, map_location=self.device, weights_only=True)
+        self.actor.load_state_dict(state["actor"])
+        self.critic.load_state_dict(state["critic"])
+        with torch.no_grad():
+            self.log_std.copy_(state["log_std"])
+        self.rate = state["rate"]
+
     @torch.no_grad()
     def remember(self):
         now = self.actor.state_dict()

@@ -23,6 +23,7 @@ def options(text, minutes):
     parser.add_argument("--envs", type=int, default=8192, help="environments (default 8192)")
     parser.add_argument("--device", default="cuda", help="cuda, cuda:N or cpu (default cuda)")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--go-on", type=pathlib.Path, help="state.pt of an earlier run: only the last phase is trained, from there")
     parser.add_argument("--library", help="libmild_envs.so (default: in build/, or of this bundle)")
     return parser
 
@@ -75,5 +76,5 @@ class Progress:
         print(f"{row['seconds']:6.0f} s  iteration {row['iteration']:5d}  {row['steps_per_s'] / 1e6:.2f} M steps/s  "
               f"reward {100 * row['paid'] / max(row['steps'], 1):6.2f}/s  episode {row['length']:5.1f} s  falls {100 * falls:3.0f} %  "
               f"speed error {row['speed_error']:.2f} m/s  assist {row['assist']:.2f}  rate {row['rate']:.1e}  std {row['std']:.2f}  "
-              f"kl {row.get('kl', 0):.4f}  diverged {row['diverged']}", flush=True)
+              f"kl {row.get('kl', 0):.4f}  rollout {row['rollout_s']:.2f} s  diverged {row['diverged']}", flush=True)
         return True

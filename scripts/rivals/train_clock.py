@@ -7,6 +7,8 @@ contact whose time constant is drawn. Task, rewards and commands are those of co
   scripts/rivals/train_clock.py --out runs/clock
   build/mild eval --controller clock --policy runs/clock/clock.safetensors --config configs/walk.ini --ground rigid --speed 0.6
 """
+import time
+
 import torch
 from torch import nn
 
@@ -98,16 +100,22 @@ def train(arguments):
     device = run.begin(arguments)
     clock, progress, steps = None, run.Progress(arguments), arguments.envs * sum(HOLD) * SETTINGS.steps // 2
     path = arguments.out / "clock.safetensors"
-    for end, keys in PHASES:
+    for end, keys in PHASES[-1:] if arguments.go_on else PHASES:
         envs = run.open_envs(arguments, keys)
         clock = clock or Clock(envs, device)
+        if arguments.go_on:
+            clock.ppo.load(arguments.go_on)
         clock.begin(envs)
         while progress.share() < end:
             clock.ppo.anneal(progress.share())
+            begin = time.time()
             clock.roll_out()
+            envs.wait()
+            rollout = time.time() - begin
             report = clock.update()
-            if progress.log({**envs.statistics(), **report}, steps):
+            if progress.log({**envs.statistics(), **report, "rollout_s": rollout}, steps):
                 clock.save(path, f"scripts/rivals/train_clock.py, iteration {progress.iteration}")
+                clock.ppo.save(arguments.out / "state.pt")
         print(f"phase up to {end:g} of the run is over", flush=True)
         envs.close()
     clock.save(path, f"scripts/rivals/train_clock.py, {progress.iteration} iterations of {steps} steps")

@@ -165,18 +165,29 @@ def train(arguments):
 
     path = arguments.out / "ht2.safetensors"
     progress = run.Progress(arguments)  # the clock of both stages
-    net = pretrain(arguments, device, autocast)
-    ht2.save(arguments.out / "ht2_first_stage.safetensors", net.state_dict(), ht2.HEADS, ht2.LAYERS, "stage 1 of scripts/rivals/train_ht2.py")
-    learner = Learner(net, run.open_envs(arguments, UNEVEN), device, autocast)
+    envs = run.open_envs(arguments, UNEVEN)
+    if arguments.go_on:
+        net = ht2.Ht2(envs.shape.observation, envs.shape.actions).to(device)
+    else:
+        net = pretrain(arguments, device, autocast)
+        ht2.save(arguments.out / "ht2_first_stage.safetensors", net.state_dict(), ht2.HEADS, ht2.LAYERS,
+                 "stage 1 of scripts/rivals/train_ht2.py")
+    learner = Learner(net, envs, device, autocast)
+    if arguments.go_on:
+        learner.ppo.load(arguments.go_on)
     steps = arguments.envs * SETTINGS.steps
     while not progress.over():
         learner.ppo.anneal(progress.share())
+        begin = time.time()
         learner.roll_out()
-        report = learner.update(actor=progress.iteration >= WARM)
-        if progress.log({**learner.envs.statistics(), **report}, steps):
+        envs.wait()
+        rollout = time.time() - begin
+        report = learner.update(actor=arguments.go_on is not None or progress.iteration >= WARM)
+        if progress.log({**envs.statistics(), **report, "rollout_s": rollout}, steps):
             ht2.save(path, learner.ppo.mean_weights, ht2.HEADS, ht2.LAYERS,
                      f"scripts/rivals/train_ht2.py, iteration {progress.iteration} of {steps} steps")
-    learner.envs.close()
+            learner.ppo.save(arguments.out / "state.pt")
+    envs.close()
 
 
 if __name__ == "__main__":
