@@ -19,6 +19,7 @@ class Settings:
     learning_rate: float = 1e-3
     rate_min: float = 1e-5
     rate_max: float = 1e-2
+    critic_rate: float = 0.0  # of the critic; 0: the actor's
     kl_target: float = 0.01  # [nat]
     gradient_norm: float = 1.0
     std: float = 0.5  # of the action noise at the start
@@ -84,9 +85,10 @@ class Ppo:
         self.log_std = nn.Parameter(torch.full((actions,), math.log(settings.std), device=device))
         self.mean_weights = None  # running mean of the actor's
         self.rate, self.kl_target, self.std_max = settings.learning_rate, settings.kl_target, 10.0
-        parameters = [*actor.parameters(), *critic.parameters(), self.log_std]
-        self.parameters = [p for p in parameters if p.requires_grad]
-        self.optimizer = torch.optim.Adam(self.parameters, lr=self.rate, fused=device.type == "cuda")
+        groups = [{"params": [*actor.parameters(), self.log_std]},
+                  {"params": list(critic.parameters()), "lr": settings.critic_rate or self.rate}]
+        self.parameters = [p for group in groups for p in group["params"]]
+        self.optimizer = torch.optim.Adam(groups, lr=self.rate, fused=device.type == "cuda")
 
     def sample(self, mean):
         action = mean + torch.exp(self.log_std) * torch.randn_like(mean)
@@ -112,7 +114,7 @@ class Ppo:
             self.rate *= 1.5
         most = max(s.rate_max * self.kl_target / s.kl_target, s.rate_min)
         self.rate = min(max(self.rate, s.rate_min), most)
-        for group in self.optimizer.param_groups:
+        for group in self.optimizer.param_groups[: 1 if s.critic_rate else 2]:
             group["lr"] = self.rate
 
     def step(self, loss):

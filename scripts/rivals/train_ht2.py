@@ -25,8 +25,8 @@ NOISE = 0.15  # of the earlier policy's actions, in half of the environments
 MISSING = 0.25  # share of the trajectories without actions
 RECORD, BATCH, RATE = 400, 4096, 1e-3  # policy steps, contexts of a gradient step, learning rate
 WARM = 20  # iterations that train the critic alone
-SETTINGS = ppo.Settings(steps=24, epochs=3, minibatches=8, gamma=0.994, decay=0.95, learning_rate=3e-5, rate_min=1e-6, rate_max=1e-3, std=0.25,
-                        kl_target=0.01)
+SETTINGS = ppo.Settings(steps=24, epochs=3, minibatches=8, gamma=0.994, decay=0.95, learning_rate=3e-5, rate_min=1e-6, rate_max=1e-3, critic_rate=1e-3,
+                        std=0.25, kl_target=0.01)
 
 
 class Teacher:
