@@ -81,7 +81,7 @@ static MildStatus clock_take(Clock *clock, MildError *error) {
     if (weights_status(weights, error) != MILD_OK) {
         return error->status;
     }
-    clock->hidden[0] = calloc((size_t)(first + second), sizeof *clock->hidden[0]);
+    clock->hidden[0] = calloc((size_t)first + (size_t)second, sizeof *clock->hidden[0]);
     clock->hidden[1] = clock->hidden[0] + first;
     return clock->hidden[0] ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "clock: out of memory");
 }
