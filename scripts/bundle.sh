@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes build/bundle: the program without drawing, with CUDA, and all libraries that it needs except libc and CUDA's. Copy
-# the folder to a machine with only an NVIDIA driver and cuBLAS 13. docs/gpu.md says how to use it.
+# Makes build/bundle: the program without drawing, the environments as a library, with CUDA, and all libraries that they need
+# except libc and CUDA's. Copy the folder to a machine with only an NVIDIA driver and cuBLAS 13. docs/gpu.md says how to use it.
 # Usage: scripts/bundle.sh [ranks]; with `ranks` for several GPUs (docs/ranks.md): Open MPI of this machine comes along, and
 # that machine has NCCL 2 too.
 set -euo pipefail
@@ -18,7 +18,7 @@ for march in x86-64-v3 x86-64-v4; do
     cmake -S . -B "build/$march" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_CUDA=ON -DMILD_VIEW=OFF "${ranks[@]}" \
         -DMILD_MARCH=$march -DMILD_ENGINE_SIZES="$sizes" -DCMAKE_EXE_LINKER_FLAGS=-Wl,--disable-new-dtags \
         -DCMAKE_BUILD_RPATH='$ORIGIN/../lib' >/dev/null
-    cmake --build "build/$march" --parallel "$jobs" --target mild gpu_test_gpu gpu_test_parts batch_test_batch \
+    cmake --build "build/$march" --parallel "$jobs" --target mild mild_envs gpu_test_gpu gpu_test_parts batch_test_batch \
         engine_device_engine ranks_test_ranks >/dev/null
     strip -o "$bundle/bin/mild-$march" "build/$march/mild"
     sizes=$PWD/build/$march/src/engine_sizes
@@ -61,6 +61,9 @@ fi
 ldd "${programs[@]}" | awk '$2 == "=>" { print $3 }' | sort -u |
     grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt|libnccl)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
 find "$bundle/lib" -name '*.so*' -type f -exec strip {} +
+strip -o "$bundle/lib/libmild_envs.so" build/x86-64-v3/libmild_envs.so
+mkdir "$bundle/scripts"
+cp -r scripts/rivals "$bundle/scripts/"
 cp -r robots configs policies "$bundle/"
 
 cat >"$bundle/run" <<'RUN'

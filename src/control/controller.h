@@ -19,6 +19,8 @@ typedef struct {
 
 /* Name and summary; the file defines controller_make_NAME. */
 #define CONTROLLER_LIST(X)                                                                         \
+    X(clock, "a network that sees one frame, at 40 Hz (Singh et al. 2024), of --policy")           \
+    X(ht2, "a transformer (Radosavovic et al. 2024), of --policy")                                 \
     X(learned, "the policy of --policy")                                                           \
     X(stand,                                                                                       \
       "stands still and balances, ignores the command; gains stand_kp, stand_kd of robot.ini")     \
@@ -26,7 +28,7 @@ typedef struct {
 
 /* What a controller may need. It is borrowed and must outlive the controller. */
 typedef struct {
-    const char *policy; /* file, for `learned` */
+    const char *policy; /* file, for `learned`, `clock`, `ht2` */
     const TaskDef *task;
     const Robot *robot;
     Pool *pool;   /* may be NULL */

@@ -112,13 +112,26 @@ MILD_HD void surface_frame(const Real *slope, Real frame[3][3]) {
     cross3(frame[0], frame[1], frame[2]);
 }
 
+/* The model's contact, with the robot's own time constant T instead of the model's: MuJoCo's solref
+ * (T, 1), stiffness 1/(d T)^2 and damping 2/(d T) with d beyond the width, T at least two steps. */
+MILD_HD EngineSoft corner_soft(const EngineModel *model, EngineRigid rigid) {
+    EngineSoft soft = model->number.contact;
+    if (rigid.time > 0) {
+        const Real rate = 1 / (soft.farthest * real_max(rigid.time, 2 * model->number.dt));
+        soft.stiffness = rate * rate;
+        soft.damping = 2 * rate;
+    }
+    return soft;
+}
+
 /* The four edges of a corner's pyramid: normal plus and minus friction times each tangent.
  * contact.twist is that of the foot's motion, all six numbers. */
-MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineSurface *surface,
+MILD_HD void corner_edges(const EngineModel *model, EngineRigid rigid, const EngineSurface *surface,
                           EngineWork *work, int corner) {
     EngineContact *contact = &work->now.support.ground.contact;
     const EngineTree *tree = &model->tree;
-    const EngineSoft *soft = &model->number.contact;
+    const EngineSoft soft = corner_soft(model, rigid);
+    const Real friction = rigid.friction;
     const int f = tree->corner_foot[corner];
     const EngineFoot *foot = &model->number.foot[f];
     const Real *twist = contact->twist[f];
@@ -130,7 +143,7 @@ MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineS
     surface_frame(surface->slope, frame);
     const Real distance =
         (arm[2] + work->base[2] - surface->height) * frame[0][2] - foot->corner_radius;
-    const Real d = soft_impedance(soft, distance);
+    const Real d = soft_impedance(&soft, distance);
     const Real regularizer =
         2 * friction * friction * (1 - d) / d * (1 + friction * friction) * foot->inverse_inertia;
     for (int k = 0; k < 3; k++) { /* halfway between the surfaces */
@@ -145,7 +158,7 @@ MILD_HD void corner_edges(const EngineModel *model, Real friction, const EngineS
         }
         cross3(arm, edge, edge + 3);
         const Real speed = dot3(edge, twist) + dot3(edge + 3, twist + 3);
-        contact->reference[row] = -soft->damping * speed - soft->stiffness * d * distance;
+        contact->reference[row] = -soft.damping * speed - soft.stiffness * d * distance;
         contact->weight[row] =
             distance < 0 ? 1 / real_max(regularizer, REGULARIZER_LEAST) : REAL(0);
     }
@@ -164,22 +177,22 @@ LANE_FN void engine_twists(const EngineTree *tree, EngineSupport *support, const
 }
 
 /* surface: [corners], or one for all of them when `level`. */
-LANE_FN void engine_collide(const EngineModel *model, Real friction, const EngineSurface *surface,
-                            int level, EngineWork *work) {
+LANE_FN void engine_collide(const EngineModel *model, EngineRigid rigid,
+                            const EngineSurface *surface, int level, EngineWork *work) {
     EngineSupport *support = &work->now.support;
     engine_twists(&model->tree, support, work->rate, support->ground.contact.twist);
     EACH_LANE(l) {
         LANE_ROLLED
         for (int c = LANE(l); c < engine_corners(&model->tree); c += LANES) {
-            corner_edges(model, friction, surface + (level ? 0 : c), work, c);
+            corner_edges(model, rigid, surface + (level ? 0 : c), work, c);
         }
     }
     lanes_meet();
 }
 
 /* The same on any ground. A corner touches the tangent plane under its centre. */
-LANE_FN void engine_collide_on(const EngineModel *model, Real friction, const EngineGround *ground,
-                               EngineWork *work) {
+LANE_FN void engine_collide_on(const EngineModel *model, EngineRigid rigid,
+                               const EngineGround *ground, EngineWork *work) {
     engine_twists(&model->tree, &work->now.support, work->rate,
                   work->now.support.ground.contact.twist);
     EACH_LANE(l) {
@@ -189,7 +202,7 @@ LANE_FN void engine_collide_on(const EngineModel *model, Real friction, const En
             Real center[3];
             corner_center(model, work, c, center);
             const EngineSurface surface = engine_surface(ground, work, &spot, center[0], center[1]);
-            corner_edges(model, friction, &surface, work, c);
+            corner_edges(model, rigid, &surface, work, c);
         }
     }
     lanes_meet();

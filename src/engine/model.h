@@ -84,13 +84,19 @@ typedef struct {
     alignas(16) EngineNumbers number;
 } EngineModel;
 
+/* What a robot's rigid ground has of its own. */
+typedef struct {
+    Real friction; /* [-] */
+    Real time;     /* [s] time constant of the contact, critically damped; 0: the model's contact */
+} EngineRigid;
+
 /* What differs from robot to robot; see RobotVariation. */
 typedef struct {
     Real base_mass_add;                     /* [kg] */
     Real center_offset[3];                  /* [m] of the base's centre of mass */
     Real link_mass_scale[ENGINE_LINKS_MAX]; /* [-] base, joints' bodies in robot.ini's order */
     Real armature_scale;                    /* [-] */
-    Real friction;                          /* [-] of rigid ground */
+    EngineRigid rigid;
 } EngineVariation;
 
 /* ---- sizes: of the working data, and of loops where the robot is known to the compiler ---- */

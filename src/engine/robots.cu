@@ -71,7 +71,7 @@ LANE_FN int step(const EngineModel *model, const EngineRobots *robots, const Map
     engine_begin(model, &action, work);
     if (robots->rigid) {
         const EngineGround ground = {map, origin_of(robots, robot), 0};
-        engine_collide_on(model, action.variation->friction, &ground, work);
+        engine_collide_on(model, action.variation->rigid, &ground, work);
     } else {
         EACH_LANE(l) {
             for (int n = LANE(l); n < 6 * engine_feet(&model->tree); n += LANES) {

@@ -4,8 +4,8 @@
  *     for each step:
  *         engine_begin(model, &action, work);      up to A and V_free
  *         soft ground: from the feet's pose, A and V_free to work->wrench
- *         rigid ground: engine_collide(model, friction, surface, level, work), the corners, or
- *             engine_collide_on(model, friction, ground, work), the same on a map
+ *         rigid ground: engine_collide(model, rigid, surface, level, work), the corners, or
+ *             engine_collide_on(model, rigid, ground, work), the same on a map
  *         bad |= engine_end(model, rigid, work);   limits and corners, then the next state
  *     engine_store(model, work, qpos, qvel);       once
  *

@@ -21,7 +21,8 @@ typedef struct {
     double link_mass_scale[1 + ROBOT_JOINTS_MAX];
     double armature_scale; /* [-] of the joints' armature */
     double rigid_friction; /* [-] friction coefficient of the engine's contact when rigid */
-    int rigid; /* bool: the engine's own contact under the feet's corners, no soft ground */
+    double rigid_time; /* [s] time constant of that contact, critically damped; 0: the model's */
+    int rigid;         /* bool: the engine's own contact under the feet's corners, no soft ground */
 } RobotVariation;
 
 /* State of a foot after a step, in world axes about its reference point. The reference point is the

@@ -49,5 +49,9 @@ void variation_apply(RobotSim *sim, const RobotVariation *variation) {
     for (int p = 0; p < m->npair; p++) {
         m->pair_friction[5 * p] = variation->rigid_friction;
         m->pair_friction[5 * p + 1] = variation->rigid_friction;
+        const int own = variation->rigid_time > 0;
+        double *solref = m->pair_solref + mjNREF * p;
+        solref[0] = own ? variation->rigid_time : nominal->pair_solref[mjNREF * p];
+        solref[1] = own ? 1 : nominal->pair_solref[mjNREF * p + 1];
     }
 }

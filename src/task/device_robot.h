@@ -20,6 +20,7 @@ typedef struct {
     TaskReal link_mass_scale[1 + TASK_JOINTS];
     TaskReal armature_scale;
     TaskReal rigid_friction;
+    TaskReal rigid_time;
     int rigid;
 } RobotVariation;
 

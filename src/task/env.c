@@ -73,6 +73,7 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     env->terrain = *terrain;
     env->variation.rigid = rigid;
     env->variation.rigid_friction = TASK_RIGID_FRICTION;
+    env->variation.rigid_time = 0;
     start_episode(env, def, robot, sim, view);
 }
 

@@ -6,6 +6,7 @@
 #include "task/task.h"
 
 #define RANDOM_USE_EPISODE 0x45504953u
+#define RANDOM_USE_RIGID 0x52494749u
 #define RANDOM_USE_MAP 0x4d415050u
 #define RANDOM_USE_COMMAND 0x434f4d4du
 
@@ -27,6 +28,8 @@ TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot
     env->variation.rigid = random_unit(&r) < z->rigid_share || z->model == MILD_MODEL_RIGID;
     task_draw_ground(env, def, robot, &r);
     env->variation.rigid_friction = draw(&r, z->mu);
+    Random contact = random_at(env->seed ^ RANDOM_USE_RIGID, env->index, env->tick);
+    env->variation.rigid_time = draw(&contact, z->rigid_time);
     env->variation.base_mass_add = draw(&r, z->base_mass);
     env->variation.armature_scale = draw(&r, z->armature);
     for (int i = 0; i < 3; i++) {

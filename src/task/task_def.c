@@ -94,6 +94,7 @@ TaskDef task_def_default(void) {
 void task_def_choose_ground(TaskDef *def) {
     RandomizeDef *r = &def->randomize;
     r->rigid_share = 0;
+    r->rigid_time[0] = r->rigid_time[1] = 0;
     r->preset_share = 1;
     r->preset_jitter = 0;
     r->patch_share = 0;
@@ -215,6 +216,9 @@ const MildField randomize_fields[] = {
     MILD_FIELD_CHOICE(RandomizeDef, model, mild_model_names, MILD_MODELS,
                       "[-] ground model; its parameters are matched to those drawn for mild"),
     Z(rigid_share, 1, 0, 1, "[-] share of episodes on the engine's own rigid contact"),
+    Z(rigid_time, 2, 0, 2,
+      "[s] time constant of the rigid contact (MuJoCo's solref, damping ratio 1), low and high; "
+      "0 0: the robot's own"),
     Z(preset_share, 1, 0, 1,
       "[-] share of episodes on a preset; the others draw their ground from the ranges below"),
     Z(preset_jitter, 1, 0, 0.9,

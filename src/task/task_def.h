@@ -80,6 +80,7 @@ typedef struct {
     /* ground: shares of episodes; what remains after rigid and preset draws from the paper's ranges
      */
     double rigid_share;     /* [-] engine contact */
+    double rigid_time[2];   /* [s] its time constant; 0 0: the robot's own contact */
     double preset_share;    /* [-] a named preset, parameters times 1 +- preset_jitter */
     double preset_jitter;   /* [-] */
     double patch_share;     /* [-] soft episodes whose ground changes in stripes */

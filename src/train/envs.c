@@ -5,12 +5,24 @@
 #include "batch/batch.h"
 #include "crowd/crowd.h"
 
+enum { TRAIN_MATERIALS = 3 }; /* drawn for the pattern of a terrain, as for stripes */
+
 struct TrainEnvs {
     Vec *vec;     /* or */
     Crowd *crowd; /* the other is NULL */
     int device;   /* of the crowd */
     PolicyDef policy;
 };
+
+/* The batch engine has patches as stripes of the map. */
+MildStatus train_make_map(const ExperimentDef *def, MildMap **map, int *striped, MildError *error) {
+    *striped = train_is_batch(&def->train) && def->task.randomize.patch_share > 0 &&
+               def->terrain.map.patches == MILD_PATTERN_NONE;
+    return *striped ? terrain_make_striped(&def->terrain, TRAIN_MATERIALS,
+                                           def->task.randomize.patch_length, def->train.seed, map,
+                                           error)
+                    : terrain_make(&def->terrain, TRAIN_MATERIALS, map, error);
+}
 
 static int make(TrainEnvs *envs, const ExperimentDef *def, int striped, const Robot *robot,
                 Pool *pool, int count, int first, MildError *error) {
@@ -69,27 +81,37 @@ static VecView view_of(const TrainEnvs *envs, const PpoBatch *batch, int t) {
     };
 }
 
+MildStatus train_envs_reset_into(TrainEnvs *envs, const VecView *first, void *stream,
+                                 MildError *error) {
+    if (envs->crowd) {
+        return crowd_reset(envs->crowd, first, stream, error);
+    }
+    vec_reset(envs->vec, first);
+    return MILD_OK;
+}
+
+MildStatus train_envs_step_into(TrainEnvs *envs, const float *action, float *reward, uint8_t *done,
+                                uint8_t *timeout, uint8_t *valid, const VecView *next, void *stream,
+                                MildError *error) {
+    if (envs->crowd) {
+        return crowd_step(envs->crowd, action, reward, done, timeout, valid, next, stream, error);
+    }
+    vec_step(envs->vec, action, reward, done, timeout, valid, next);
+    return MILD_OK;
+}
+
 MildStatus train_envs_reset(TrainEnvs *envs, PpoBatch *batch, void *stream, MildError *error) {
     const VecView first = view_of(envs, batch, 0);
-    if (envs->crowd) {
-        return crowd_reset(envs->crowd, &first, stream, error);
-    }
-    vec_reset(envs->vec, &first);
-    return MILD_OK;
+    return train_envs_reset_into(envs, &first, stream, error);
 }
 
 MildStatus train_envs_step(TrainEnvs *envs, PpoBatch *batch, int t, void *stream,
                            MildError *error) {
     const size_t row = (size_t)t * (size_t)batch->envs;
     const float *action = batch->action + row * (size_t)envs->policy.actions;
-    float *reward = batch->reward + row;
-    uint8_t *done = batch->done + row, *timeout = batch->timeout + row, *valid = batch->valid + row;
     const VecView next = view_of(envs, batch, t + 1);
-    if (envs->crowd) {
-        return crowd_step(envs->crowd, action, reward, done, timeout, valid, &next, stream, error);
-    }
-    vec_step(envs->vec, action, reward, done, timeout, valid, &next);
-    return MILD_OK;
+    return train_envs_step_into(envs, action, batch->reward + row, batch->done + row,
+                                batch->timeout + row, batch->valid + row, &next, stream, error);
 }
 
 MildStatus train_envs_wait(const TrainEnvs *envs, MildError *error) {

@@ -9,6 +9,10 @@
 
 typedef struct TrainEnvs TrainEnvs;
 
+/* The map of the terrain, which the caller sets in def->task.map and destroys after the
+ * environments; NULL for level ground. striped: written, see CrowdDef. */
+MildStatus train_make_map(const ExperimentDef *def, MildMap **map, int *striped, MildError *error);
+
 /* count: of this process, with numbers from `first`. striped: see CrowdDef. */
 TrainEnvs *train_envs_create(const ExperimentDef *def, int striped, const Robot *robot, Pool *pool,
                              int count, int first, MildError *error);
@@ -18,6 +22,12 @@ void train_envs_destroy(TrainEnvs *envs); /* may be NULL */
 MildStatus train_envs_reset(TrainEnvs *envs, PpoBatch *batch, void *stream, MildError *error);
 /* A policy step from time t, with the batch's actions. */
 MildStatus train_envs_step(TrainEnvs *envs, PpoBatch *batch, int t, void *stream, MildError *error);
+/* The same into arrays of the caller, where the environments are: rows [envs], see vec_step. */
+MildStatus train_envs_reset_into(TrainEnvs *envs, const VecView *first, void *stream,
+                                 MildError *error);
+MildStatus train_envs_step_into(TrainEnvs *envs, const float *action, float *reward, uint8_t *done,
+                                uint8_t *timeout, uint8_t *valid, const VecView *next, void *stream,
+                                MildError *error);
 /* Until the steps are done. */
 MildStatus train_envs_wait(const TrainEnvs *envs, MildError *error);
 /* As vec_take_sums and vec_take_times. */

@@ -10,8 +10,6 @@
 #include "ranks/device.h"
 #include "train/envs.h"
 
-enum { TRAIN_MATERIALS = 3 }; /* drawn for the pattern of a terrain, as for stripes */
-
 struct Trainer {
     ExperimentDef def;
     Ranks *ranks; /* NULL: alone */
@@ -35,20 +33,6 @@ void train_destroy(Trainer *trainer) {
     pool_destroy(trainer->pool);
     robot_destroy(trainer->robot);
     free(trainer);
-}
-
-/* The batch engine has patches as stripes of the map. */
-static int is_striped(const ExperimentDef *def) {
-    return train_is_batch(&def->train) && def->task.randomize.patch_share > 0 &&
-           def->terrain.map.patches == MILD_PATTERN_NONE;
-}
-
-static MildStatus make_map(Trainer *trainer, MildError *error) {
-    const ExperimentDef *def = &trainer->def;
-    return is_striped(def) ? terrain_make_striped(&def->terrain, TRAIN_MATERIALS,
-                                                  def->task.randomize.patch_length, def->train.seed,
-                                                  &trainer->map, error)
-                           : terrain_make(&def->terrain, TRAIN_MATERIALS, &trainer->map, error);
 }
 
 /* Robot, threads, networks and learner, on the CPU. Returns 0 on failure. */
@@ -106,14 +90,15 @@ static MildStatus move_learner(Trainer *trainer, MildError *error) {
 
 static MildStatus make_envs(Trainer *trainer, MildError *error) {
     const ExperimentDef *def = &trainer->def;
-    if (make_map(trainer, error) != MILD_OK) {
+    int striped = 0;
+    if (train_make_map(def, &trainer->map, &striped, error) != MILD_OK) {
         return error->status;
     }
     trainer->stream = gpu_learner_stream(trainer->ppo);
     trainer->def.task.map = trainer->map;
     trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
     trainer->envs =
-        train_envs_create(def, is_striped(def), trainer->robot, trainer->pool,
+        train_envs_create(def, striped, trainer->robot, trainer->pool,
                           ppo_batch(trainer->ppo)->envs, ppo_first_env(trainer->ppo), error);
     return trainer->envs
                ? train_envs_reset(trainer->envs, ppo_batch(trainer->ppo), trainer->stream, error)

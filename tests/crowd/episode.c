@@ -14,6 +14,7 @@ Episode episode_of(const void *env) {
                        .step = from->step,
                        .rigid = from->variation.rigid,
                        .friction = from->variation.rigid_friction,
+                       .rigid_time = from->variation.rigid_time,
                        .map = {from->terrain.map_x, from->terrain.map_y}};
     memcpy(episode.ground, from->ground, sizeof episode.ground);
     for (int i = 0; i < 3; i++) {

@@ -12,6 +12,7 @@ typedef struct {
     int ground[MILD_MATERIALS_MAX]; /* by label */
     int rigid;                      /* bool */
     double friction;                /* [-] of rigid ground */
+    double rigid_time;              /* [s] */
     double map[2];                  /* [m] */
     double command[3];              /* [m/s, m/s, rad/s] */
     double qpos[ROBOT_NQ_MAX];

@@ -54,6 +54,8 @@ static TaskDef some_def(void) {
     def.physics_dt = 0.005;
     def.randomize.patch_share = 0;
     def.randomize.rigid_share = 0.3;
+    def.randomize.rigid_time[0] = 0.02;
+    def.randomize.rigid_time[1] = 0.2;
     def.episode = 1.2;
     def.contact_iterations = 60; /* the two leave different steps of the Go1 unsolved at 20 */
     return def;

@@ -43,6 +43,9 @@ static inline RobotVariation random_variation(const Robot *robot, Random *random
     }
     variation.armature_scale = random_uniform(random, 0.7, 1.3);
     variation.rigid_friction = random_uniform(random, 0.2, 1.2);
+    if (variation.armature_scale < 1) {
+        variation.rigid_time = 0.02 + (1 - variation.armature_scale);
+    }
     return variation;
 }
 

@@ -48,7 +48,7 @@ static EngineVariation variation_of(const RobotVariation *from) {
     EngineVariation to = {};
     to.base_mass_add = (float)from->base_mass_add;
     to.armature_scale = (float)from->armature_scale;
-    to.friction = (float)from->rigid_friction;
+    to.rigid = {(float)from->rigid_friction, (float)from->rigid_time};
     for (int k = 0; k < 3; k++) {
         to.center_offset[k] = (float)from->com_offset[k];
     }

@@ -344,6 +344,23 @@ static void test_rigid_ground(void **unused) {
     }
 }
 
+/* A time constant below two steps is two steps. Rows so stiff are rough in float. */
+static void test_shortest_time(void **unused) {
+    (void)unused;
+    Worst at_double = {0};
+    int touching = 0, newton = 0;
+    for (uint32_t draw = 0; draw < 100; draw++) {
+        EngineCase in = rigid_case(kits[0].sim, NULL, draw);
+        in.variation.rigid_time = DT / 2;
+        run_case(&kits[0], &in, at_double, NULL, &newton);
+        touching += oracle.rows > 0;
+    }
+    for (int k = 0; k < ERRORS; k++) {
+        assert_true(at_double[k] < LIMIT_DOUBLE);
+    }
+    assert_true(touching > 50);
+}
+
 /* ---- maps ---- */
 
 typedef struct {
@@ -664,10 +681,11 @@ static void test_bad_numbers(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_random_states), cmocka_unit_test(test_rigid_ground),
-        cmocka_unit_test(test_maps),          cmocka_unit_test(test_order_of_lanes),
-        cmocka_unit_test(test_march),         cmocka_unit_test(test_sizes),
-        cmocka_unit_test(test_refusals),      cmocka_unit_test(test_bad_numbers),
+        cmocka_unit_test(test_random_states),  cmocka_unit_test(test_rigid_ground),
+        cmocka_unit_test(test_shortest_time),  cmocka_unit_test(test_maps),
+        cmocka_unit_test(test_order_of_lanes), cmocka_unit_test(test_march),
+        cmocka_unit_test(test_sizes),          cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_bad_numbers),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

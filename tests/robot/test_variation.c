@@ -35,6 +35,7 @@ static RobotVariation draw_variation(uint32_t draw) {
     for (int i = 0; i <= SA01_JOINTS; i++) {
         v.link_mass_scale[i] = random_uniform(&r, 0.7, 1.4);
     }
+    v.rigid_time = draw % 2 ? random_uniform(&r, 0.02, 0.4) : 0;
     return v;
 }
 
@@ -92,6 +93,10 @@ static void test_numbers(void **unused) {
         }
         assert_int_equal(m->npair, 8);
         for (int p = 0; p < m->npair; p++) {
+            const double *solref = m->pair_solref + mjNREF * p;
+            const double *own = plain->pair_solref + mjNREF * p;
+            near("time constant", p, solref[0], v.rigid_time > 0 ? v.rigid_time : own[0], 0);
+            near("damping ratio", p, solref[1], v.rigid_time > 0 ? 1 : own[1], 0);
             for (int c = 0; c < 5; c++) {
                 double wanted = c < 2 ? v.rigid_friction : plain->pair_friction[5 * p + c];
                 near("friction", 5 * p + c, m->pair_friction[5 * p + c], wanted, 0);
@@ -107,6 +112,7 @@ static void test_nominal(void **unused) {
     (void)unused;
     RobotVariation v = robot_variation_nominal();
     assert_true(v.base_mass_add == 0 && v.armature_scale == 1 && v.rigid_friction == 0.8);
+    assert_true(v.rigid_time == 0);
     assert_int_equal(v.rigid, 0);
     for (int k = 0; k < 3; k++) {
         assert_true(v.com_offset[k] == 0);

@@ -121,6 +121,10 @@ static void robot_and_sensors(void **unused) {
     (void)unused;
     open_env();
     clear_columns();
+    draw_next();
+    assert_true(env->variation.rigid_time == 0);
+    def.randomize.rigid_time[0] = 0.02;
+    def.randomize.rigid_time[1] = 0.4;
     int lags[3][6] = {{0}};
     for (int t = 0; t < DRAWS; t++) {
         draw_next();
@@ -128,6 +132,7 @@ static void robot_and_sensors(void **unused) {
         note("base_mass_add", -1, -4, 4, v->base_mass_add);
         note("armature_scale", -1, 0.7, 1.3, v->armature_scale);
         note("rigid_friction", -1, 0.2, 1.3, v->rigid_friction);
+        note("rigid_time", -1, 0.02, 0.4, v->rigid_time);
         note("assist_draw", -1, 0.5, 1, env->assist_draw);
         note("strength", -1, 0.9, 1.1, env->strength[0]);
         for (int i = 0; i < 3; i++) {
@@ -677,6 +682,7 @@ static void start_of_a_trial(void **unused) {
     (void)unused;
     Rig rig;
     TaskDef start_def = task_def_default();
+    start_def.randomize.rigid_time[0] = start_def.randomize.rigid_time[1] = 0.1;
     rig_open(&rig, &start_def, 11, 0);
     MildTerrain terrain = kit_sand();
     terrain.height = 0.4;
@@ -688,6 +694,7 @@ static void start_of_a_trial(void **unused) {
     task_env_reset_on(rig.env, &rig.def, robot, rig.sim, &terrain, 0, &rig.view);
     expect_near("on higher ground", rig.env->robot.qpos[2], z + 0.4, 1e-12);
     expect_near("friction of rigid ground", rig.env->variation.rigid_friction, 0.8, 0);
+    expect_near("its time constant", rig.env->variation.rigid_time, 0, 0);
     assert_false(rig.env->variation.rigid);
     task_env_reset_on(rig.env, &rig.def, robot, rig.sim, &terrain, 1, &rig.view);
     assert_true(rig.env->variation.rigid);

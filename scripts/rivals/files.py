@@ -1,0 +1,36 @@
+"""Policies in safetensors files as src/learn/safetensors.h reads them: texts under __metadata__, of which crc32 is the checksum of the
+whole file with its own eight digits as zeros."""
+import json
+import struct
+import zlib
+
+import torch
+
+
+def write(path, tensors, texts):
+    header, data = {"__metadata__": {"crc32": "00000000", **texts}}, b""
+    for name, tensor in tensors.items():
+        raw = tensor.detach().cpu().float().contiguous().numpy().tobytes()
+        header[name] = {"dtype": "F32", "shape": list(tensor.shape), "data_offsets": [len(data), len(data) + len(raw)]}
+        data += raw
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)
+    whole = struct.pack("<Q", len(text)) + text + data
+    crc = b'"crc32":"%08x"' % zlib.crc32(whole)
+    with open(path, "wb") as file:
+        file.write(whole.replace(b'"crc32":"00000000"', crc, 1))
+
+
+def read(path):
+    """({name: tensor}, texts); tensors of 32-bit floats only."""
+    with open(path, "rb") as file:
+        whole = file.read()
+    size = struct.unpack("<Q", whole[:8])[0]
+    header = json.loads(whole[8 : 8 + size])
+    texts, tensors = header.pop("__metadata__", {}), {}
+    for name, entry in header.items():
+        begin, end = entry["data_offsets"]
+        if entry["dtype"] == "F32":
+            raw = bytearray(whole[8 + size + begin : 8 + size + end])
+            tensors[name] = torch.frombuffer(raw, dtype=torch.float32).reshape(entry["shape"])
+    return tensors, texts

@@ -1,0 +1,194 @@
+/* The environments for other learners: the numbers of Vec, and errors. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "config/experiment_keys.h"
+#include "envs/envs.h"
+#include "sa01.h"
+#include "task/vec.h"
+
+enum { ENVS = 5, STEPS = 60 };
+
+static const char *const keys[] = {"train.envs=5", "train.threads=2", "train.seed=7",
+                                   "terrain.kind=waves", "train.robots=mujoco"};
+enum { KEYS = sizeof keys / sizeof *keys };
+
+/* Rows of all arrays. */
+typedef struct {
+    float history[ENVS][SA01_HISTORY], critic[ENVS][SA01_CRITIC], estimate[ENVS][SA01_ESTIMATES],
+        frame[ENVS][SA01_OBSERVATION], reward[ENVS];
+    uint8_t done[ENVS], timeout[ENVS], valid[ENVS];
+} Rows;
+
+static MildEnvsView view_of(Rows *rows) {
+    return (MildEnvsView){rows->history[0], rows->critic[0], rows->estimate[0], rows->frame[0]};
+}
+
+/* The same environments without the interface. */
+typedef struct {
+    ExperimentDef def;
+    MildMap *map;
+    Robot *robot;
+    Pool *pool;
+    Vec *vec;
+} Plain;
+
+static void open_plain(Plain *plain) {
+    MildError error = {0};
+    plain->def = experiment_def_default();
+    assert_int_equal(experiment_read(&plain->def, NULL, keys, KEYS, &error), MILD_OK);
+    plain->robot = robot_create(SA01, &error);
+    plain->pool = pool_create(1);
+    assert_int_equal(terrain_make(&plain->def.terrain, 3, &plain->map, &error), MILD_OK);
+    assert_non_null(plain->map);
+    plain->def.task.map = plain->map;
+    plain->vec = vec_create(&plain->def.task, plain->robot, plain->pool, ENVS, 7, &error);
+    assert_non_null(plain->vec);
+}
+
+static void close_plain(Plain *plain) {
+    vec_destroy(plain->vec);
+    mild_map_destroy(plain->map);
+    pool_destroy(plain->pool);
+    robot_destroy(plain->robot);
+}
+
+static void draw_actions(int step, float action[ENVS][SA01_JOINTS]) {
+    for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
+        action[i / SA01_JOINTS][i % SA01_JOINTS] = (float)(1.5 * sin(0.3 * step + i));
+    }
+}
+
+static MildEnvs *open_envs(const char *const *overrides, int count) {
+    MildError error = {0};
+    MildEnvs *envs = mild_envs_open(NULL, overrides, count, &error);
+    if (!envs) {
+        fail_msg("%s", error.text);
+    }
+    return envs;
+}
+
+static void numbers_of_vec(void **state) {
+    (void)state;
+    static Plain plain;
+    static Rows a, b;
+    MildEnvs *envs = open_envs(keys, KEYS);
+    open_plain(&plain);
+    const MildEnvsShape shape = mild_envs_shape(envs);
+    assert_true(shape.envs == ENVS && shape.actions == SA01_JOINTS && shape.device == -1);
+    assert_true(shape.observation == SA01_OBSERVATION && shape.frames == TASK_FRAMES);
+    assert_true(shape.critic == SA01_CRITIC && shape.estimates == SA01_ESTIMATES);
+    assert_true(shape.period == 0.01 && shape.rewards == TASK_REWARD_COUNT);
+    const MildEnvsView view = view_of(&a);
+    const VecView plain_view = {b.history[0], b.critic[0], b.estimate[0], b.frame[0]};
+    assert_int_equal(mild_envs_reset(envs, &view, NULL, NULL), MILD_OK);
+    vec_reset(plain.vec, &plain_view);
+    double paid = 0;
+    int ended = 0;
+    for (int t = 0; t < STEPS; t++) {
+        float action[ENVS][SA01_JOINTS];
+        draw_actions(t, action);
+        const MildEnvsStep step = {action[0], a.reward, a.done, a.timeout, a.valid, view};
+        assert_int_equal(mild_envs_step(envs, &step, NULL, NULL), MILD_OK);
+        vec_step(plain.vec, action[0], b.reward, b.done, b.timeout, b.valid, &plain_view);
+        assert_memory_equal(&a, &b, sizeof a);
+        for (int e = 0; e < ENVS; e++) {
+            paid += (double)a.reward[e];
+            ended += a.done[e];
+        }
+    }
+    MildEnvsStatistics statistics;
+    assert_int_equal(mild_envs_statistics(envs, &statistics, NULL, NULL), MILD_OK);
+    assert_true(ended > 0 && statistics.episodes == ended && statistics.steps == ENVS * STEPS);
+    assert_true(fabs(statistics.paid - paid) < 1e-4 && statistics.length > 0);
+    const VecStats wanted = vec_take_stats(plain.vec);
+    assert_true(statistics.falls == wanted.falls && statistics.reward == wanted.reward);
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        assert_true(statistics.terms[i] == wanted.terms[i]);
+        assert_string_equal(mild_envs_reward_name(i), task_reward_names[i]);
+    }
+    assert_int_equal(mild_envs_statistics(envs, &statistics, NULL, NULL), MILD_OK);
+    assert_true(statistics.episodes == 0 && statistics.steps == 0);
+    close_plain(&plain);
+    mild_envs_close(envs);
+}
+
+/* The batch engine on the CPU sees what MuJoCo sees, within the rounding of float. */
+static void batch_engine(void **state) {
+    (void)state;
+    static Rows a, b;
+    const char *batch[KEYS];
+    memcpy(batch, keys, sizeof batch);
+    batch[KEYS - 1] = "train.robots=batch";
+    MildEnvs *mujoco = open_envs(keys, KEYS), *engine = open_envs(batch, KEYS);
+    const MildEnvsView first = view_of(&a), second = {b.history[0], NULL, NULL, b.frame[0]};
+    assert_int_equal(mild_envs_reset(mujoco, &first, NULL, NULL), MILD_OK);
+    assert_int_equal(mild_envs_reset(engine, &second, NULL, NULL), MILD_OK);
+    for (int n = 0; n < ENVS * SA01_OBSERVATION; n++) {
+        const int e = n / SA01_OBSERVATION, i = n % SA01_OBSERVATION;
+        assert_true(fabsf(a.frame[e][i] - b.frame[e][i]) < 1e-4F);
+    }
+    mild_envs_close(mujoco);
+    mild_envs_close(engine);
+}
+
+static void mirror(void **state) {
+    (void)state;
+    MildEnvs *envs = open_envs(keys, KEYS);
+    MildError error = {0};
+    Robot *robot = robot_create(SA01, &error);
+    const TaskMirror wanted = task_mirror(robot);
+    int observation[SA01_OBSERVATION], action[SA01_JOINTS];
+    float observation_sign[SA01_OBSERVATION], action_sign[SA01_JOINTS];
+    mild_envs_mirror(envs, observation, observation_sign, action, action_sign);
+    assert_memory_equal(observation, wanted.observation_index, sizeof observation);
+    assert_memory_equal(observation_sign, wanted.observation_sign, sizeof observation_sign);
+    assert_memory_equal(action, wanted.action_index, sizeof action);
+    assert_memory_equal(action_sign, wanted.action_sign, sizeof action_sign);
+    robot_destroy(robot);
+    mild_envs_close(envs);
+}
+
+static void one_clear_line(void **state) {
+    (void)state;
+    static const struct {
+        const char *config, *key, *message;
+    } cases[] = {
+        {NULL, "train.env=4", "train.envs"},
+        {NULL, "train.envs=0", "train.envs"},
+        {NULL, "train.robot=none", "none"},
+        {NULL, "train.device=gpu", "train.device"},
+        {"no/such.ini", "train.envs=4", "no/such.ini"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        MildError error = {0};
+        assert_null(mild_envs_open(cases[i].config, &cases[i].key, 1, &error));
+        assert_null(mild_envs_open(cases[i].config, &cases[i].key, 1, NULL));
+        assert_true(error.status != MILD_OK);
+        if (!strstr(error.text, cases[i].message)) {
+            fail_msg("'%s' is not in '%s'", cases[i].message, error.text);
+        }
+    }
+    MildError error = {0};
+    const char *const both[] = {"train.device=cuda", "train.robots=mujoco"};
+    assert_null(mild_envs_open(NULL, both, 2, &error));
+    assert_non_null(strstr(error.text, "write train.device = cpu"));
+    mild_envs_close(NULL);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(numbers_of_vec),
+        cmocka_unit_test(batch_engine),
+        cmocka_unit_test(mirror),
+        cmocka_unit_test(one_clear_line),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
