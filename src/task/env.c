@@ -76,6 +76,16 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     start_episode(env, def, robot, sim, view);
 }
 
+/* Torques of the drive within the limits of the motors. */
+static void drive_torque(const TaskEnv *env, const TaskDrive *drive, RobotSim *sim,
+                         const TaskMotor *motor, double *torque) {
+    const double *qd = robot_sim_qvel(sim) + 6;
+    drive->torque(drive->context, env, sim, torque);
+    for (int i = 0; i < env->shape.joints; i++) {
+        torque[i] = task_limit_torque(&motor[i], torque[i], qd[i]);
+    }
+}
+
 /* Physics steps of one policy period, with the three latencies. Returns 1 when the simulation
  * diverged. */
 static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
@@ -99,13 +109,16 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
         for (int i = 0; i < env->shape.joints; i++) {
             torque[i] = task_torque(&motor[i], k < env->lag_command, q[i], qd[6 + i]);
         }
+        if (probe && probe->drive) {
+            drive_torque(env, probe->drive, sim, motor, torque);
+        }
         double wrench[6];
         int helped = task_assist(env, def, robot, robot_sim_base_rotation(sim), qd, wrench);
         if (robot_sim_step(sim, torque, helped ? wrench : NULL, &env->terrain,
                            task_env_ground(env))) {
             return 1;
         }
-        if (probe) {
+        if (probe && probe->physics_step) {
             probe->physics_step(probe->context, env, sim, torque);
         }
     }
