@@ -59,7 +59,8 @@ fi
 ldd "${programs[@]}" | awk '$2 == "=>" { print $3 }' | sort -u |
     grep -Ev '/(libc|libm|libdl|librt|libpthread|libcublas|libcublasLt|libnccl)\.so' | xargs -I{} cp -L {} "$bundle/lib/"
 find "$bundle/lib" -name '*.so*' -type f -exec strip {} +
-cp -r robots configs policies "$bundle/"
+cp -r robots configs policies LICENSE NOTICE "$bundle/"
+cp .venv/daqp-*/LICENSE "$bundle/LICENSE-DAQP" # part of the program
 
 cat >"$bundle/run" <<'RUN'
 #!/bin/sh
