@@ -31,6 +31,8 @@ void controller_row_torque(void *row, const TaskEnv *env, RobotSim *sim, double 
 /* Name and summary; the file defines controller_make_NAME. */
 #define CONTROLLER_LIST(X)                                                                         \
     X(learned, "the policy of --policy")                                                           \
+    X(passivity,                                                                                   \
+      "walks by a DCM plan and whole-body impedances with torques from the true state; bipeds")    \
     X(stand,                                                                                       \
       "stands still and balances, ignores the command; gains stand_kp, stand_kd of robot.ini")     \
     X(zero, "takes no action, so the joints hold the default pose")
