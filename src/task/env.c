@@ -76,13 +76,15 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     start_episode(env, def, robot, sim, view);
 }
 
-/* Torques of the drive within the limits of the motors. */
+/* Torques of the drive within the limits of the motors: those of motors whose PD asks for them. */
 static void drive_torque(const TaskEnv *env, const TaskDrive *drive, RobotSim *sim,
                          const TaskMotor *motor, double *torque) {
     const double *qd = robot_sim_qvel(sim) + 6;
     drive->torque(drive->context, env, sim, torque);
     for (int i = 0; i < env->shape.joints; i++) {
-        torque[i] = task_limit_torque(&motor[i], torque[i], qd[i]);
+        const TaskMotor asked = {
+            .target = {torque[i]}, .kp = 1, .limit = motor[i].limit, .fastest = motor[i].fastest};
+        torque[i] = task_torque(&asked, 0, 0, qd[i]);
     }
 }
 
@@ -118,7 +120,7 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
                            task_env_ground(env))) {
             return 1;
         }
-        if (probe && probe->physics_step) {
+        if (probe) {
             probe->physics_step(probe->context, env, sim, torque);
         }
     }

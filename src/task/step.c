@@ -188,18 +188,13 @@ TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot
     return motor;
 }
 
-/* A motor at its speed limit gives no torque in the direction of motion. */
-TASK_FN double task_limit_torque(const TaskMotor *motor, double torque, double qd) {
-    double tau = torque;
+/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). A motor at its speed limit gives
+ * no torque in the direction of motion. */
+TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd) {
+    double tau = motor->kp * (motor->target[late] - q) - motor->kd * qd;
     tau = tau > motor->limit ? motor->limit : tau < -motor->limit ? -motor->limit : tau;
     int over = motor->fastest > 0 && fabs(qd) >= motor->fastest && tau * qd > 0;
     return over ? 0 : tau;
-}
-
-/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). */
-TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd) {
-    double tau = motor->kp * (motor->target[late] - q) - motor->kd * qd;
-    return task_limit_torque(motor, tau, qd);
 }
 
 /* ---- after the physics ---- */

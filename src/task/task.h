@@ -235,13 +235,11 @@ typedef struct {
 } TaskMotor;
 
 /* A policy step (step.c): what comes before its physics steps, the motor of joint i, its torque at
- * angle q and speed qd, what its limits leave of a torque, and what comes after the physics steps.
- * late: bool, the last action still counts.
+ * angle q and speed qd, and what comes after them. late: bool, the last action still counts.
  * torque: [joints] of the last physics step. diverged: bool, they broke off. */
 TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *action);
 TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i);
 TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd);
-TASK_FN double task_limit_torque(const TaskMotor *motor, double torque, double qd);
 TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                const RobotSim *sim, const TaskReal *torque, int diverged);
 /* An episode on what task_randomize drew (step.c). depth: [m] how deep the feet stand in its

@@ -216,6 +216,11 @@ typedef struct {
     int fell; /* policy step, or 0 */
 } Run;
 
+static void see_nothing(void *context, const TaskEnv *env, const RobotSim *sim,
+                        const double *torque) {
+    (void)context, (void)env, (void)sim, (void)torque;
+}
+
 static Run run(const char *ground, double speed, double seconds) {
     MildError error = {0};
     TaskDef def = task_def_default();
@@ -234,7 +239,7 @@ static Run run(const char *ground, double speed, double seconds) {
     TaskView none = {0};
     ControllerRow row = {&controller, 0};
     TaskDrive drive = {controller_row_torque, &row};
-    TaskProbe probe = {NULL, NULL, &drive};
+    TaskProbe probe = {see_nothing, NULL, &drive};
     Run out = {.z_low = 1e9};
     task_env_init(env, &def, robot, 1, 0);
     env->command_frozen = 1;

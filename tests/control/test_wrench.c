@@ -198,6 +198,26 @@ static void easy_wrench_is_given(void **unused) {
     wrench_solver_destroy(solver);
 }
 
+/* What was solved before leaves no trace: the same to the last bit. */
+static void no_memory(void **unused) {
+    (void)unused;
+    WrenchSolver *solver = wrench_solver_create();
+    Random r = random_at(9, 1, 0);
+    static WrenchProgram program[2];
+    for (int p = 0; p < 2; p++) {
+        WrenchFoot foot[WRENCH_FEET] = {draw_foot(&r, 0), draw_foot(&r, 1)};
+        const double wanted[WRENCH_SIZE] = {60 - 120 * p, 40, 300 + 90 * p, 20, -30, 5};
+        wrench_program(foot, WRENCH_FEET, wanted, &program[p]);
+    }
+    double first[WRENCH_NUMBERS], between[WRENCH_NUMBERS], again[WRENCH_NUMBERS];
+    assert_int_equal(wrench_solve(solver, &program[0], first), 0);
+    assert_int_equal(wrench_solve(solver, &program[1], between), 0);
+    assert_int_equal(wrench_solve(solver, &program[0], again), 0);
+    assert_memory_equal(first, again, sizeof first);
+    assert_memory_not_equal(first, between, sizeof first);
+    wrench_solver_destroy(solver);
+}
+
 /* A foot that may carry nothing gets nothing. */
 static void unloaded_foot_is_free(void **unused) {
     (void)unused;
@@ -226,6 +246,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(solution_is_the_minimum),
         cmocka_unit_test(easy_wrench_is_given),
+        cmocka_unit_test(no_memory),
         cmocka_unit_test(unloaded_foot_is_free),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
