@@ -153,7 +153,6 @@ int wrench_solve(WrenchSolver *solver, const WrenchProgram *program, double x[WR
         DAQP_UPDATE_Rinv | DAQP_UPDATE_M | DAQP_UPDATE_v | DAQP_UPDATE_d | DAQP_UPDATE_sense;
     DAQPResult result = {.x = solver->x, .lam = solver->multiplier};
     solver->program = *program;
-    reset_daqp_workspace(&solver->work);
     if (daqp_update_ldp(all, &solver->work, &solver->problem) < 0) {
         return 1;
     }
