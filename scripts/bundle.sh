@@ -64,7 +64,8 @@ find "$bundle/lib" -name '*.so*' -type f -exec strip {} +
 strip -o "$bundle/lib/libmild_envs.so" build/x86-64-v3/libmild_envs.so
 mkdir "$bundle/scripts"
 cp -r scripts/rivals "$bundle/scripts/"
-cp -r robots configs policies "$bundle/"
+cp -r robots configs policies LICENSE NOTICE "$bundle/"
+cp .venv/daqp-*/LICENSE "$bundle/LICENSE-DAQP" # part of the program
 
 cat >"$bundle/run" <<'RUN'
 #!/bin/sh

@@ -23,7 +23,7 @@ fi
 if ! command -v dpkg-query >/dev/null; then
     echo "setup: this script installs Debian packages, and dpkg-query is not here." >&2
     echo "setup: install the equivalents of: ${packages[*]}" >&2
-    echo "setup: then build with: cmake -S . -B build -DMUJOCO_ROOT=FOLDER && cmake --build build" >&2
+    echo "setup: then build with: cmake -S . -B build -DMUJOCO_ROOT=FOLDER -DDAQP_ROOT=FOLDER && cmake --build build" >&2
     exit 1
 fi
 
@@ -56,4 +56,14 @@ if ! cmp -s scripts/requirements.txt .venv/requirements.installed; then
     "$python" -m venv --clear .venv # from nothing: two MuJoCo wheels side by side would be ambiguous
     .venv/bin/python -m pip install --quiet --disable-pip-version-check -r scripts/requirements.txt
     cp scripts/requirements.txt .venv/requirements.installed
+fi
+
+# Sources that are built with ours: the archives of the package index, unpacked into .venv.
+if ! cmp -s scripts/sources.txt .venv/sources.installed; then
+    echo "setup: fetching $(cut -d' ' -f1 scripts/sources.txt | paste -sd' ')"
+    rm -rf .venv/sources .venv/daqp-*
+    .venv/bin/python -m pip download --quiet --disable-pip-version-check --no-deps --no-binary daqp --require-hashes \
+        -d .venv/sources -r scripts/sources.txt
+    tar -xzf .venv/sources/daqp-*.tar.gz -C .venv
+    cp scripts/sources.txt .venv/sources.installed
 fi

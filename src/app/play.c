@@ -75,7 +75,9 @@ static void step(Walk *walk) {
     Play *play = walk->play;
     float action[ROBOT_JOINTS_MAX];
     TaskView none = {0};
-    TaskProbe probe = {watch, walk};
+    ControllerRow row = {play->controller, 0};
+    TaskDrive drive = {controller_row_torque, &row};
+    TaskProbe probe = {watch, walk, play->controller->torque ? &drive : NULL};
     play->controller->act(play->controller->self, 1, &walk->env, action);
     TaskStep out =
         task_env_step(walk->env, &walk->task, play->robot, walk->sim, action, 0, &none, &probe);

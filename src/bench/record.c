@@ -39,7 +39,7 @@ static void record_torque(void *context, const TaskEnv *env, const RobotSim *sim
 static int walk_step(Walk *walk, ReplayPeriod *period) {
     float action[ROBOT_JOINTS_MAX];
     TaskView none = {0};
-    TaskProbe probe = {record_torque, walk};
+    TaskProbe probe = {record_torque, walk, NULL};
     if (period) {
         MildGround *ground = task_env_ground(walk->env);
         period->state = walk->env->robot;

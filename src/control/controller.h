@@ -15,13 +15,26 @@ typedef struct {
     void (*destroy)(void *self);
     /* The same from their histories alone, [rows][TaskShape.history]; NULL: it needs more. */
     void (*act_on)(void *self, int rows, const float *history, float *actions);
+    /* Writes the torques [robot_joints] of one row's environment at the start of a physics step
+     * (TaskDrive), in place of its actions. Called after `act`, for different rows at the same
+     * time. NULL: the joints' PD on the actions. */
+    void (*torque)(void *self, int row, const TaskEnv *env, RobotSim *sim, double *torque);
 } Controller;
+
+/* The context of a TaskDrive: one row of a controller that commands torques. */
+typedef struct {
+    const Controller *controller;
+    int row;
+} ControllerRow;
+void controller_row_torque(void *row, const TaskEnv *env, RobotSim *sim, double *torque);
 
 /* Name and summary; the file defines controller_make_NAME. */
 #define CONTROLLER_LIST(X)                                                                         \
     X(clock, "a network that sees one frame, at 40 Hz (Singh et al. 2024), of --policy")           \
     X(ht2, "a transformer (Radosavovic et al. 2024), of --policy")                                 \
     X(learned, "the policy of --policy")                                                           \
+    X(passivity,                                                                                   \
+      "walks by a DCM plan and whole-body impedances with torques from the true state; bipeds")    \
     X(stand,                                                                                       \
       "stands still and balances, ignores the command; gains stand_kp, stand_kd of robot.ini")     \
     X(zero, "takes no action, so the joints hold the default pose")

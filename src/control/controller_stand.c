@@ -52,6 +52,6 @@ MildStatus controller_make_stand(const ControllerDef *def, Controller *controlle
         standing_destroy(standing);
         return mild_fail(error, MILD_ERROR_MEMORY, "stand: out of memory");
     }
-    *controller = (Controller){standing, "stand", standing_act, standing_destroy, NULL};
+    *controller = (Controller){standing, "stand", standing_act, standing_destroy, NULL, NULL};
     return MILD_OK;
 }

@@ -46,6 +46,11 @@ MildStatus controller_make(const char *name, const ControllerDef *def, Controlle
     return controller_check(name, error);
 }
 
+void controller_row_torque(void *row, const TaskEnv *env, RobotSim *sim, double *torque) {
+    const ControllerRow *r = row;
+    r->controller->torque(r->controller->self, r->row, env, sim, torque);
+}
+
 void controller_destroy(Controller *controller) {
     if (controller->self) {
         controller->destroy(controller->self);

@@ -156,7 +156,8 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
                          .rows_max = rows_max,
                          .width = (size_t)shape.history,
                          .history = history};
-    *controller = (Controller){learned, "learned", learned_act, learned_destroy, learned_act_on};
+    *controller =
+        (Controller){learned, "learned", learned_act, learned_destroy, learned_act_on, NULL};
     return MILD_OK;
 }
 

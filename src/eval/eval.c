@@ -51,6 +51,7 @@ typedef struct {
     const Robot *robot;
     const Scene *scene;
     const EvalDef *eval;
+    const Controller *controller;
     TaskEnv **env;    /* [trials] */
     RobotSim **sim;   /* [threads] */
     Measure *measure; /* [trials] */
@@ -79,7 +80,9 @@ static void step_trial(void *context, int trial, int thread) {
         return;
     }
     TaskView none = {0};
-    TaskProbe probe = {measure_step, &t->measure[trial]};
+    ControllerRow row = {t->controller, trial};
+    TaskDrive drive = {controller_row_torque, &row};
+    TaskProbe probe = {measure_step, &t->measure[trial], t->controller->torque ? &drive : NULL};
     TaskStep step = task_env_step(t->env[trial], t->def, t->robot, t->sim[thread],
                                   t->action + trial * robot_joints(t->robot), 0, &none, &probe);
     t->over[trial] = step.done && !step.timeout;
@@ -140,7 +143,8 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
                     const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error) {
     TaskDef local = *def;
     local.episode = eval->seconds;
-    Trials t = {.def = &local, .robot = robot, .scene = scene, .eval = eval};
+    Trials t = {
+        .def = &local, .robot = robot, .scene = scene, .eval = eval, .controller = controller};
     MildStatus status = make_trials(&t, eval->trials, pool_threads(pool), error);
     if (status == MILD_OK) {
         pool_run(pool, eval->trials, start_trial, &t);

@@ -77,6 +77,18 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     start_episode(env, def, robot, sim, view);
 }
 
+/* Torques of the drive within the limits of the motors: those of motors whose PD asks for them. */
+static void drive_torque(const TaskEnv *env, const TaskDrive *drive, RobotSim *sim,
+                         const TaskMotor *motor, double *torque) {
+    const double *qd = robot_sim_qvel(sim) + 6;
+    drive->torque(drive->context, env, sim, torque);
+    for (int i = 0; i < env->shape.joints; i++) {
+        const TaskMotor asked = {
+            .target = {torque[i]}, .kp = 1, .limit = motor[i].limit, .fastest = motor[i].fastest};
+        torque[i] = task_torque(&asked, 0, 0, qd[i]);
+    }
+}
+
 /* Physics steps of one policy period, with the three latencies. Returns 1 when the simulation
  * diverged. */
 static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
@@ -100,6 +112,9 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
         const int act = task_motors_act(env, def, k, steps);
         for (int i = 0; act && i < env->shape.joints; i++) {
             env->torque[i] = task_torque(&motor[i], k < env->lag_command, q[i], qd[6 + i]);
+        }
+        if (probe && probe->drive) {
+            drive_torque(env, probe->drive, sim, motor, env->torque);
         }
         double wrench[6];
         int helped = task_assist(env, def, robot, robot_sim_base_rotation(sim), qd, wrench);

@@ -120,12 +120,21 @@ typedef struct {
     float *frame;    /* [observation] newest noisy frame: the decoder's target */
 } TaskView;
 
+/* A controller that commands torques. It is called at the start of every physics step and writes
+ * [robot_joints] torques, which take the place of the joints' PD, without its latency. The limits
+ * of the motors apply to them. The terrain's map is set during the call. */
+typedef struct {
+    void (*torque)(void *context, const TaskEnv *env, RobotSim *sim, double *torque);
+    void *context;
+} TaskDrive;
+
 /* Observer for measures and pictures. It is called at the end of every physics step. The terrain's
  * map is set during the call. */
 typedef struct {
     void (*physics_step)(void *context, const TaskEnv *env, const RobotSim *sim,
                          const double *torque);
     void *context;
+    const TaskDrive *drive; /* NULL: the joints' PD on the actions */
 } TaskProbe;
 
 /* One block: TaskEnv, its frames, its ground memory; a multiple of 64. */

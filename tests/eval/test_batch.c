@@ -63,7 +63,7 @@ static void zero_act(void *self, int rows, TaskEnv *const *envs, float *actions)
 
 static Controller zero_controller(Asked *asked) {
     *asked = (Asked){0};
-    return (Controller){asked, "zero", zero_act, NULL, zero_act_on};
+    return (Controller){asked, "zero", zero_act, NULL, zero_act_on, NULL};
 }
 
 static Controller walker(Pool *pool, int rows) {

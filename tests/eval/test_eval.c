@@ -147,7 +147,7 @@ static EvalRow run(Zero *zero, const char *ground, EvalDef eval, int threads) {
     TaskDef def = task_def_default();
     task_def_make_nominal(&def);
     *zero = (Zero){0};
-    Controller controller = {zero, "zero", zero_act, zero_destroy, NULL};
+    Controller controller = {zero, "zero", zero_act, zero_destroy, NULL, NULL};
     Pool *pool = pool_create(threads);
     Scene scene;
     EvalRow row;
@@ -313,7 +313,7 @@ static void a_row_is_what_its_trials_did(void **state) {
         measure_start(&measure[i], longer.physics_dt);
         for (int k = 0; k < 300; k++) {
             float action[SA01_JOINTS];
-            const TaskProbe probe = {measure_step, &measure[i]};
+            const TaskProbe probe = {measure_step, &measure[i], NULL};
             controller.act(controller.self, 1, &env, action);
             const TaskStep step = task_env_step(env, &longer, robot, sim, action, 0, &none, &probe);
             assert_false(step.done && !step.timeout);
@@ -377,7 +377,7 @@ static void walk_pushed(Noting *noting, double push) {
     assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, pool,
                                         PUSHED, &noting->inner, &error),
                      MILD_OK);
-    Controller controller = {noting, "noting", noting_act, NULL, NULL};
+    Controller controller = {noting, "noting", noting_act, NULL, NULL, NULL};
     assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
                      MILD_OK);
     assert_true(row.push == push && row.success == PUSHED);

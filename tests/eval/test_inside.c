@@ -161,7 +161,7 @@ static void the_numbers_are_the_policys(void **state) {
     InsideLog log = {.task = &scaled, .feet = SA01_FEET};
     const EvalWatch watch = {inside_decided, &log};
     const EvalDef eval = {.speed = 0.5, .trials = TRIALS, .seconds = 0.2, .watch = &watch};
-    Controller controller = {&keeping, "keeping", keeping_act, NULL, NULL};
+    Controller controller = {&keeping, "keeping", keeping_act, NULL, NULL, NULL};
     double sum[LATENT + SA01_ESTIMATES] = {0};
     Scene scene;
     EvalRow row;

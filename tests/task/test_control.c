@@ -41,11 +41,23 @@ static void note_step(void *context, const TaskEnv *env, const RobotSim *sim,
 
 /* One policy step, traced. */
 static TaskStep traced_step(const float *action) {
-    const TaskProbe probe = {note_step, NULL};
+    const TaskProbe probe = {note_step, NULL, NULL};
     trace.count = 0;
     robot_sim_load(rig.sim, &rig.env->robot, &rig.env->variation);
     note_state();
     return task_env_step(rig.env, &rig.def, robot, rig.sim, action, 0, &rig.view, &probe);
+}
+
+/* A drive that asks for 3 N m of every joint, and for much more of the first of each leg. */
+static void ask_torque(void *context, const TaskEnv *env, RobotSim *sim, double *torque) {
+    int *calls = context;
+    assert_ptr_equal(env, rig.env);
+    assert_ptr_equal(sim, rig.sim);
+    assert_int_equal(*calls, trace.count); /* before the step that it drives */
+    (*calls)++;
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        torque[i] = i == 0 ? 500 : i == LEG_JOINTS ? -500 : 3;
+    }
 }
 
 static void put(const RobotState *state) {
@@ -69,6 +81,26 @@ static double wanted_torque(int i, const double *pose, double action, int k) {
                      (pose[i] + 0.5 * action + rig.env->motor_offset[i] - trace.q[k][i]) -
                  kd[j] * rig.env->kd_scale[i] * trace.qd[k][i];
     return fmin(fmax(tau * rig.env->strength[i], -limit[j]), limit[j]);
+}
+
+/* The torques of a drive take the place of the PD's at every physics step, within the limits. */
+static void drive(void **unused) {
+    (void)unused;
+    open_with_dt(0.0025);
+    int calls = 0;
+    const TaskDrive asked = {ask_torque, &calls};
+    const TaskProbe probe = {note_step, NULL, &asked};
+    float action[SA01_JOINTS] = {0};
+    trace.count = 0;
+    task_env_step(rig.env, &rig.def, robot, rig.sim, action, 0, &rig.view, &probe);
+    assert_int_equal(calls, 4);
+    for (int k = 1; k <= 4; k++) {
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            const double wanted = i == 0 ? 119 : i == LEG_JOINTS ? -119 : 3;
+            assert_true(trace.torque[k][i] == wanted);
+        }
+    }
+    rig_close(&rig);
 }
 
 /* Gains, strengths and offsets of every joint apart; some torques at their limits of 119 and 20.4
@@ -380,6 +412,7 @@ static void solver_follows_the_keys(void **unused) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(torque),
+        cmocka_unit_test(drive),
         cmocka_unit_test(action_is_clipped),
         cmocka_unit_test(torque_is_held),
         cmocka_unit_test(latencies),

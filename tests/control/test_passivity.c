@@ -1,0 +1,316 @@
+/* The passivity-based controller: its torques against the dynamics of MuJoCo, then standing and
+ * walking. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+#include <mujoco/mujoco.h>
+
+#include "control/body.h"
+#include "control/controller.h"
+
+#define GRAVITY 9.81
+enum { NV = 18 };
+
+static Robot *robot;
+
+static int setup(void **state) {
+    (void)state;
+    MildError error = {0};
+    robot = robot_open("sa01", &error);
+    return robot == NULL;
+}
+
+static int teardown(void **state) {
+    (void)state;
+    robot_destroy(robot);
+    return 0;
+}
+
+/* ---- torques ---- */
+
+/* Upright in the default pose with the soles on the ground; everything moves a little. */
+static RobotState some_state(double speed) {
+    RobotState state = {.qpos = {0, 0, robot_stand_height(robot), 1, 0, 0, 0}};
+    for (int i = 0; i < robot_joints(robot); i++) {
+        state.qpos[7 + i] = robot_default_pose(robot)[i] + 0.02 * ((i * 7) % 5 - 2);
+    }
+    for (int i = 0; i < NV; i++) {
+        state.qvel[i] = speed * ((i * 5) % 7 - 3);
+    }
+    return state;
+}
+
+/* Accelerations of MuJoCo's model under the torques and the shares of the ground, each on its foot
+ * at its support point. */
+static void accelerate(RobotSim *sim, const Body *body, const WalkState *state,
+                       const double *torque, double qacc[NV]) {
+    mjModel *m = robot_sim_model(sim);
+    mjData *d = robot_sim_data(sim);
+    double wanted[WRENCH_SIZE], share[WALK_FEET][WRENCH_SIZE];
+    body_wrenches(body, wanted, share);
+    mj_forward(m, d);
+    mju_scl(d->qfrc_smooth, d->qfrc_bias, -1, NV);
+    for (int i = 0; i < robot_joints(robot); i++) {
+        d->qfrc_smooth[robot_joint_dof(robot)[i]] += torque[i];
+    }
+    for (int f = 0; f < WALK_FEET; f++) {
+        mj_applyFT(m, d, share[f], share[f] + 3, state->support[f], robot_foot_body(robot, f),
+                   d->qfrc_smooth);
+    }
+    mj_solveM(m, d, qacc, d->qfrc_smooth, 1);
+}
+
+/* [m/s^2] Acceleration of a point of a foot. */
+static void foot_acceleration(RobotSim *sim, int f, const double point[3], const double qacc[NV],
+                              double linear[3], double angular[3]) {
+    mjModel *m = robot_sim_model(sim);
+    mjData *d = robot_sim_data(sim);
+    double j[2][3 * NV], rate[2][3 * NV];
+    mj_jac(m, d, j[0], j[1], point, robot_foot_body(robot, f));
+    mj_jacDot(m, d, rate[0], rate[1], point, robot_foot_body(robot, f));
+    for (int k = 0; k < 3; k++) {
+        linear[k] = mju_dot(j[0] + NV * k, qacc, NV) + mju_dot(rate[0] + NV * k, d->qvel, NV);
+        angular[k] = mju_dot(j[1] + NV * k, qacc, NV) + mju_dot(rate[1] + NV * k, d->qvel, NV);
+    }
+}
+
+/* Standing on both feet at rest, the base where it should be, the DCM off its plan: the feet do not
+ * accelerate, and the centre of mass does as the plan wants. With velocities, too, once the
+ * impedances that answer them are off. */
+static void torques_give_the_planned_motion(void **unused) {
+    (void)unused;
+    for (int moving = 0; moving < 2; moving++) {
+        MildError error = {0};
+        const double b = 0.24, k = 3;
+        BodyDef def = body_def_default();
+        def.stance_damping = def.stance_turn_damping = def.turn_damping = 0;
+        def.still_turn_damping = def.turn_stiffness = 0;
+        Body *body = body_create(robot, &def, 1, &error);
+        RobotSim *sim = robot_sim_create(robot, 0.001, &error);
+        assert_non_null(body);
+        assert_non_null(sim);
+        RobotState start = some_state(moving ? 0.02 : 0);
+        RobotVariation nominal = robot_variation_nominal();
+        robot_sim_load(sim, &start, &nominal);
+        WalkState state = {0};
+        WalkTarget target = {.stands = {1, 1}, .share = {1, 1}, .swing = -1};
+        double torque[ROBOT_JOINTS_MAX], qacc[NV], worst_foot = 0, worst_mass = 0;
+        body_measure(body, sim, b, &state);
+        const mjData *d = robot_sim_data(sim);
+        double com[3];
+        memcpy(com, d->subtree_com + 3, sizeof com);
+        for (int i = 0; i < 3; i++) {
+            target.point[i] = com[i] + 0.004 * (i - 1);
+            target.dcm[i] = state.dcm[i] + 0.003 * (2 - i);
+        }
+        assert_int_equal(body_torque(body, &target, b, torque), 0);
+        double wanted[WRENCH_SIZE], share[WALK_FEET][WRENCH_SIZE];
+        body_wrenches(body, wanted, share);
+        accelerate(sim, body, &state, torque, qacc);
+        for (int f = 0; f < WALK_FEET; f++) {
+            double linear[3], angular[3];
+            foot_acceleration(sim, f, state.support[f], qacc, linear, angular);
+            for (int i = 0; i < 3; i++) {
+                worst_foot = fmax(worst_foot, fmax(fabs(linear[i]), fabs(angular[i])));
+            }
+        }
+        for (int i = 0; i < 3; i++) {
+            const double force = share[0][i] + share[1][i];
+            const double got = force / robot_total_mass(robot) - (i == 2 ? GRAVITY : 0);
+            const double plan = (com[i] - target.point[i]) / (b * b) -
+                                (1 + k * b) / (b * b) * (state.dcm[i] - target.dcm[i]);
+            worst_mass = fmax(worst_mass, fabs(got - plan));
+        }
+        printf("%s: feet accelerate by %.1e m/s^2, rad/s^2; centre of mass off by %.1e m/s^2\n",
+               moving ? "moving" : "at rest", worst_foot, worst_mass);
+        /* the program's own weights cost 1e-4 of a force; the inverse is damped */
+        assert_true(worst_mass < 0.02);
+        assert_true(worst_foot < 0.05);
+        robot_sim_destroy(sim);
+        body_destroy(body);
+    }
+}
+
+/* The damping of a foot that stands is a force and a torque on that foot against its twist, through
+ * the joints of its leg. */
+static void moving_soles_are_damped(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    double torque[2][ROBOT_JOINTS_MAX], worst = 0, largest = 0;
+    BodyDef def = body_def_default();
+    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
+    RobotVariation nominal = robot_variation_nominal();
+    RobotState start = some_state(0.01);
+    WalkState state = {0};
+    for (int damped = 0; damped < 2; damped++) {
+        def.stance_damping = damped ? 50 : 0;
+        def.stance_turn_damping = damped ? 2 : 0;
+        Body *body = body_create(robot, &def, 1, &error);
+        WalkTarget target = {.stands = {1, 1}, .share = {1, 1}, .swing = -1};
+        robot_sim_load(sim, &start, &nominal);
+        body_measure(body, sim, 0.24, &state);
+        memcpy(target.dcm, state.dcm, sizeof target.dcm);
+        memcpy(target.point, state.dcm, sizeof target.point);
+        assert_int_equal(body_torque(body, &target, 0.24, torque[damped]), 0);
+        body_destroy(body);
+    }
+    const mjModel *m = robot_sim_model(sim);
+    const mjData *d = robot_sim_data(sim);
+    for (int i = 0; i < robot_joints(robot); i++) {
+        const int f = robot_joint_foot(robot)[i], dof = robot_joint_dof(robot)[i];
+        double j[6 * NV], wanted = 0;
+        mj_jac(m, d, j, j + 3 * NV, state.support[f], robot_foot_body(robot, f));
+        for (int k = 0; k < 6; k++) {
+            wanted -= (k < 3 ? 50 : 2) * j[NV * k + dof] * mju_dot(j + NV * k, d->qvel, NV);
+        }
+        worst = fmax(worst, fabs(torque[1][i] - torque[0][i] - wanted));
+        largest = fmax(largest, fabs(wanted));
+    }
+    printf("damping off by %.1e of %.2f N m\n", worst, largest);
+    assert_true(worst < 1e-6 && largest > 0.5);
+    robot_sim_destroy(sim);
+}
+
+/* A base turned about an axis is turned back about it; one that turns is braked. */
+static void base_is_turned_back(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    BodyDef def = body_def_default();
+    Body *body = body_create(robot, &def, 1, &error);
+    RobotSim *sim = robot_sim_create(robot, 0.001, &error);
+    RobotVariation nominal = robot_variation_nominal();
+    for (int axis = 0; axis < 3; axis++) {
+        double wanted[2][WRENCH_SIZE], share[WALK_FEET][WRENCH_SIZE], torque[ROBOT_JOINTS_MAX];
+        for (int turned = 0; turned < 2; turned++) {
+            RobotState start = some_state(0);
+            start.qpos[3] = cos(0.025 * turned);
+            start.qpos[4 + axis] = sin(0.025 * turned);
+            robot_sim_load(sim, &start, &nominal);
+            WalkState state = {0};
+            WalkTarget target = {.stands = {1, 1}, .share = {1, 1}, .swing = -1};
+            body_measure(body, sim, 0.24, &state);
+            memcpy(target.dcm, state.dcm, sizeof target.dcm);
+            memcpy(target.point, state.dcm, sizeof target.point);
+            body_torque(body, &target, 0.24, torque);
+            body_wrenches(body, wanted[turned], share);
+        }
+        const double back = wanted[1][3 + axis] - wanted[0][3 + axis];
+        printf("turned about %c: %.3f N m\n", "xyz"[axis], back);
+        assert_true(fabs(back + def.turn_stiffness * 0.05) < 0.01 * def.turn_stiffness * 0.05);
+    }
+    robot_sim_destroy(sim);
+    body_destroy(body);
+}
+
+/* ---- through the environment ---- */
+
+typedef struct {
+    double x, z_low, tilt, load;
+    int fell; /* policy step, or 0 */
+} Run;
+
+static void see_nothing(void *context, const TaskEnv *env, const RobotSim *sim,
+                        const double *torque) {
+    (void)context, (void)env, (void)sim, (void)torque;
+}
+
+static Run run(const char *ground, double speed, double seconds) {
+    MildError error = {0};
+    TaskDef def = task_def_default();
+    task_def_make_nominal(&def);
+    def.randomize.initial_joint = def.randomize.initial_velocity = 0;
+    def.episode = seconds + 1;
+    Controller controller = {0};
+    const ControllerDef wanted = {NULL, &def, robot, NULL, 1};
+    assert_int_equal(controller_make("passivity", &wanted, &controller, &error), MILD_OK);
+    RobotSim *sim = robot_sim_create(robot, def.physics_dt, &error);
+    TaskEnv *env = aligned_alloc(64, task_env_bytes(&def, robot));
+    MildMaterial material = mild_material_default();
+    const int rigid = strcmp(ground, "rigid") == 0;
+    assert_true(rigid || mild_material_preset(ground, &material));
+    MildTerrain terrain = mild_terrain_uniform(&material);
+    TaskView none = {0};
+    ControllerRow row = {&controller, 0};
+    TaskDrive drive = {controller_row_torque, &row};
+    TaskProbe probe = {see_nothing, NULL, &drive};
+    Run out = {.z_low = 1e9};
+    task_env_init(env, &def, robot, 1, 0);
+    env->command_frozen = 1;
+    memset(env->command, 0, sizeof env->command);
+    env->command[0] = speed;
+    task_env_reset_on(env, &def, robot, sim, &terrain, rigid, &none);
+    for (int t = 0; !out.fell && t < (int)(seconds / TASK_PERIOD); t++) {
+        float action[ROBOT_JOINTS_MAX];
+        controller.act(controller.self, 1, &env, action);
+        if (task_env_step(env, &def, robot, sim, action, 0, &none, &probe).done) {
+            out.fell = t + 1;
+        }
+        out.z_low = fmin(out.z_low, env->robot.qpos[2]);
+        out.tilt = fmax(out.tilt, 1 - robot_sim_base_rotation(sim)[8]);
+    }
+    out.x = env->robot.qpos[0];
+    out.load = (robot_sim_foot(sim, 0)->force[2] + robot_sim_foot(sim, 1)->force[2]) /
+               (robot_total_mass(robot) * GRAVITY);
+    printf("%s at %.1f m/s: x %.3f m, base above %.3f m, 1 - cos(tilt) %.4f, load %.4f%s\n", ground,
+           speed, out.x, out.z_low, out.tilt, out.load, out.fell ? ", fell" : "");
+    controller_destroy(&controller);
+    robot_sim_destroy(sim);
+    free(env);
+    return out;
+}
+
+static void stands(void **unused) {
+    (void)unused;
+    static const char *const grounds[] = {"rigid", "foam60"};
+    for (int g = 0; g < 2; g++) {
+        Run out = run(grounds[g], 0, 10);
+        assert_int_equal(out.fell, 0);
+        assert_true(fabs(out.x) < 0.06);
+        assert_true(fabs(out.load - 1) < 0.01);
+        assert_true(out.tilt < 0.01);
+    }
+}
+
+/* The command rises by 0.3 m/s^2 after the first double support of 0.8 s: in 5 s the robot comes
+ * about 0.4 (5 - 0.8 - 0.67) m far. */
+static void walks(void **unused) {
+    (void)unused;
+    Run out = run("rigid", 0.4, 5);
+    assert_int_equal(out.fell, 0);
+    assert_true(out.x > 1.3 && out.x < 1.8);
+    assert_true(out.z_low > 0.6 && out.tilt < 0.05);
+}
+
+static void refuses_a_quadruped(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    Robot *go1 = robot_open("go1", &error);
+    assert_non_null(go1);
+    TaskDef def = task_def_default();
+    Controller controller = {0};
+    const ControllerDef wanted = {NULL, &def, go1, NULL, 1};
+    assert_int_equal(controller_make("passivity", &wanted, &controller, &error),
+                     MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "robot go1 is no biped with six joints a leg"));
+    assert_null(controller.self);
+    robot_destroy(go1);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(torques_give_the_planned_motion),
+        cmocka_unit_test(moving_soles_are_damped),
+        cmocka_unit_test(base_is_turned_back),
+        cmocka_unit_test(stands),
+        cmocka_unit_test(walks),
+        cmocka_unit_test(refuses_a_quadruped),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
