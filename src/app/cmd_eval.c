@@ -53,8 +53,6 @@ static cJSON *row_json(const EvalRow *row) {
                   {"clearance", row->clearance},
                   {"penetration", row->penetration},
                   {"drift", row->drift},
-                  {"drift_forward", row->drift_forward},
-                  {"drift_left", row->drift_left},
                   {"energy", row->energy},
                   {"velocity_low", row->velocity_low},
                   {"velocity_high", row->velocity_high},
@@ -64,7 +62,9 @@ static cJSON *row_json(const EvalRow *row) {
                   {"seconds", row->seconds},
                   {"turn", row->turn},
                   {"velocity_turn", row->velocity_turn},
-                  {"push", row->push}};
+                  {"push", row->push},
+                  {"drift_forward", row->drift_forward},
+                  {"drift_left", row->drift_left}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }

@@ -101,6 +101,6 @@ MildStatus controller_make_clock(const ControllerDef *def, Controller *controlle
         clock_destroy(clock);
         return mild_fail(error, cause.status, "%s", cause.text);
     }
-    *controller = (Controller){clock, "clock", clock_act, clock_destroy, NULL};
+    *controller = (Controller){clock, "clock", clock_act, clock_destroy, NULL, NULL};
     return MILD_OK;
 }
