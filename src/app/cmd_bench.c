@@ -26,7 +26,9 @@ static const struct {
     {"solver", bench_solver,
      "newton compared with the paper's gauss_seidel sweeps, at the same error"},
     {"walk", bench_walk, "the same as step, along a walk of the shipped policy"},
-    {"batch", bench_batch, "the contact solver in batches, on train.device, along that walk"},
+    {"batch", bench_batch,
+     "the contact solver in batches, on train.device, along that walk, on grounds of "
+     "randomize.model"},
     {"robots", bench_robots, "the environments alone on train.device, in the batch engine"},
     {"update", bench_update,
      "the learner alone: actions of a rollout and update, on train.device, from random numbers"},

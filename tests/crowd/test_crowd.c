@@ -159,7 +159,10 @@ static void compare(int when, int env, double tolerance) {
     memcpy(critic, b->critic[env], sizeof critic);
     for (int f = 0; f < SA01_FEET; f++) { /* of the corners that push: it jumps with them */
         const int depth = SA01_OBSERVATION + SA01_ESTIMATES + 6 * f + 5;
-        compare_rows("depth", when, env, a->critic[env] + depth, critic + depth, 1, 20 * tolerance);
+        if (fabs((double)a->critic[env][depth - 3]) > tolerance) { /* it pushes */
+            compare_rows("depth", when, env, a->critic[env] + depth, critic + depth, 1,
+                         20 * tolerance);
+        }
         critic[depth] = a->critic[env][depth];
     }
     compare_rows("critic", when, env, a->critic[env], critic, SA01_CRITIC, tolerance);
@@ -203,14 +206,28 @@ static void same_episode(int e) {
     }
 }
 
+/* [300 N] Largest difference of the feet's forces, as the critic has them. */
+static double forces_apart(int e) {
+    double most = 0;
+    for (int i = 0; i < 3 * SA01_FEET; i++) {
+        const int at = SA01_OBSERVATION + SA01_ESTIMATES + 6 * (i / 3) + i % 3;
+        most = fmax(most, fabs((double)pair.a.critic[e][at] - (double)pair.b.critic[e][at]));
+    }
+    return most;
+}
+
 /* Robots that stagger under random actions, fall and begin again. Within float's rounding as long
  * as a robot has not been thrown: legs that swing freely against their limits double a difference
  * within a few steps, so that an environment is left alone once it differs, until its next
- * episode; most must never. */
-static void follow(int device, const MildMapDef *on) {
+ * episode; most must never. In resistive force theory the force jumps where a sole begins to move
+ * at 4 mm/s, in three dimensions also where it comes to face its motion (plate.h), and rounding
+ * decides in which step. */
+static void follow(MildModel model, int device, const MildMapDef *on) {
+    const int jumps = model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
     TaskDef def = some_def();
     MildMap *map = on ? mild_map_create(on, NULL) : NULL;
     def.map = map;
+    def.randomize.model = model;
     int apart[ENVS] = {0}, steps = 0, together = 0, done = 0, timeouts = 0;
     double worst = 0;
     pair_open(&def, device);
@@ -227,7 +244,7 @@ static void follow(int device, const MildMapDef *on) {
         for (int e = 0; e < ENVS; e++) {
             const double gap = fabs((double)(pair.a.reward[e] - pair.b.reward[e]));
             const int same = pair.a.done[e] == pair.b.done[e];
-            apart[e] |= !(gap < 1e-5) || !same;
+            apart[e] |= !(gap < 1e-5) || !same || (jumps && forces_apart(e) > 1e-2);
             steps++;
             together += !apart[e];
             done += pair.b.done[e];
@@ -245,17 +262,18 @@ static void follow(int device, const MildMapDef *on) {
         }
     }
     printf(
-        "device %d: %d of %d steps together, %d episodes ended, %d by time; rewards of the first "
+        "%s, device %d: %d of %d steps together, %d episodes ended, %d by time; rewards of the first "
         "ten steps differ by %.1e\n",
-        device, together, steps, done, timeouts, worst);
-    assert_true(together > 0.85 * steps && done > 20 && timeouts > 5);
+        mild_model_names[model], device, together, steps, done, timeouts, worst);
+    const double most = model == MILD_MODEL_ECC_QUASI_3D ? 0.6 : 0.85;
+    assert_true(together > most * steps && done > 20 && timeouts > 5);
     pair_close();
     mild_map_destroy(map);
 }
 
 static void follows_mujoco(void **unused) {
     (void)unused;
-    follow(MILD_BATCH_HOST, NULL);
+    follow(MILD_MODEL_MILD, MILD_BATCH_HOST, NULL);
 }
 
 /* Waves, and three materials in squares. */
@@ -271,7 +289,15 @@ static MildMapDef some_map(void) {
 static void follows_mujoco_on_a_map(void **unused) {
     (void)unused;
     const MildMapDef map = some_map();
-    follow(MILD_BATCH_HOST, &map);
+    follow(MILD_MODEL_MILD, MILD_BATCH_HOST, &map);
+}
+
+static void follows_mujoco_on_other_models(void **unused) {
+    (void)unused;
+    const MildMapDef map = some_map();
+    follow(MILD_MODEL_ECC_QUASI, MILD_BATCH_HOST, NULL);
+    follow(MILD_MODEL_ECC_QUASI_3D, MILD_BATCH_HOST, NULL);
+    follow(MILD_MODEL_BEKKER, MILD_BATCH_HOST, &map);
 }
 
 /* A robot that is thrown diverges, and alone begins a new episode. */
@@ -297,8 +323,11 @@ static void device_follows_mujoco(void **unused) {
         skip();
     }
     const MildMapDef map = some_map();
-    follow(0, NULL);
-    follow(0, &map);
+    follow(MILD_MODEL_MILD, 0, NULL);
+    follow(MILD_MODEL_MILD, 0, &map);
+    follow(MILD_MODEL_ECC_QUASI, 0, NULL);
+    follow(MILD_MODEL_ECC_QUASI_3D, 0, &map);
+    follow(MILD_MODEL_BEKKER, 0, NULL);
 }
 
 /* The sample of a physics step above the map. */
@@ -401,8 +430,11 @@ static void trials_are_chosen(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(follows_mujoco),        cmocka_unit_test(follows_mujoco_on_a_map),
-        cmocka_unit_test(trials_are_chosen),     cmocka_unit_test(one_diverges),
+        cmocka_unit_test(follows_mujoco),
+        cmocka_unit_test(follows_mujoco_on_a_map),
+        cmocka_unit_test(follows_mujoco_on_other_models),
+        cmocka_unit_test(trials_are_chosen),
+        cmocka_unit_test(one_diverges),
         cmocka_unit_test(device_follows_mujoco),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
