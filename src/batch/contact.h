@@ -112,7 +112,7 @@ MILD_HD void contact_direct(const ContactMaterial *material, const Real *rotatio
                             const ContactVelocity *now, Real dt, const ElementMemory *memory,
                             Element *e) {
     const int curves = material->curves;
-    if (curves & (LAW_PLANE | LAW_SPACE)) {
+    if (curves & LAW_RESIST) {
         const Plate plate = plate_of(rotation);
         element_resist(e, memory, &plate, (curves & LAW_SPACE) != 0, curves, dt, 1 / dt,
                        material->law.line_stiffness, now->x, now->y, now->descent);

@@ -56,7 +56,8 @@ typedef enum {
 typedef enum {
     LAW_PLANE = 8,  /* resistive force theory in the plane of motion (plate.h) */
     LAW_SPACE = 16, /* the same in three dimensions */
-    LAW_SHEAR = 32  /* shear strength that builds up with slip (shear.h) */
+    LAW_SHEAR = 32, /* shear strength that builds up with slip (shear.h) */
+    LAW_RESIST = LAW_PLANE | LAW_SPACE
 } LawMotion;
 
 typedef struct {

@@ -213,6 +213,9 @@ static void rows_of_a_device_agree(void **state) {
     }
     compare_rows(names, &speed, 1, 0, 0);
     compare_rows(names, &speed, 1, 0.5, 0);
+    model = MILD_MODEL_ECC_QUASI;
+    compare_rows(names, &speed, 1, 0, 0);
+    model = MILD_MODEL_MILD;
 }
 
 /* The bits of a row depend neither on threads nor on the rows beside it. */
