@@ -27,7 +27,11 @@
 #ifndef MILD_GROUND_PLATE_H
 #define MILD_GROUND_PLATE_H
 
+#include "base/both.h"
 #include "ground/friction.h"
+
+/* Once for each foot, so that it need not be inlined; gcc would round some last bits otherwise. */
+#define PLATE_FN static MILD_BOTH __attribute__((unused))
 
 #define RESIST_REST REAL(1e-3) /* [m/s] speed below which the direction of motion fades out */
 /* [-] Upper bound on alpha_z in both theories, whose largest values are 1 (2D, level plate,
@@ -56,14 +60,10 @@ MILD_HD Alpha plane_alpha(Real c2, Real s2, Real c, Real s) {
     return alpha;
 }
 
-/* A polynomial of the 3D theory for a given plate, for which x2 is constant: coefficients of 1, x1,
- * x3, x1^2, x1 x3, x3^2, x1^3, x1^2 x3, x1 x3^2, x3^3. */
-typedef Real Cubic[10];
-
 /* The 3D theory (Agarwal et al. 2023, supplement): alpha = f1 n + f2 v + f3 (0, 0, -1). The
  * coefficients of f1, f2, f3 belong to powers of x1 = sin(gamma) = -v_z, x2 = cos(beta) = -n_z, x3
- * = n . v. k: which of the three. y: x2. */
-MILD_HD void cubic_at(int k, Real y, Cubic a) {
+ * = n . v. */
+static inline MILD_BOTH const Real *space_coefficients(int k) {
     static const Real coefficients[3][20] = {
         {REAL(0.00212), REAL(-0.02320), REAL(-0.20890), REAL(-0.43083), REAL(-0.00259),
          REAL(0.48872), REAL(-0.00415), REAL(0.07204),  REAL(-0.02750), REAL(-0.08772),
@@ -77,7 +77,14 @@ MILD_HD void cubic_at(int k, Real y, Cubic a) {
          REAL(-1.31290), REAL(-0.05532), REAL(0.06790),  REAL(-0.16404), REAL(0.02287),
          REAL(0.02927),  REAL(0.95406),  REAL(-0.00131), REAL(-0.11028), REAL(0.01487),
          REAL(-0.02730), REAL(0.10911),  REAL(-0.04097), REAL(0.07881),  REAL(-0.27519)}};
-    const Real *c = coefficients[k];
+    return coefficients[k];
+}
+
+/* A polynomial of the 3D theory for a given plate, for which x2 = y is constant: coefficients of 1,
+ * x1, x3, x1^2, x1 x3, x3^2, x1^3, x1^2 x3, x1 x3^2, x3^3. c: [20] space_coefficients. */
+typedef Real Cubic[10];
+
+PLATE_FN void cubic_at(const Real *c, Real y, Cubic a) {
     const Real square = y * y;
     a[0] = c[0] + c[2] * y + c[5] * square + c[11] * square * y;
     a[1] = c[1] + c[7] * y + c[13] * square;
@@ -104,7 +111,7 @@ typedef struct {
 } Plate;
 
 /* rotation: [9] of the foot. */
-MILD_HD Plate plate_of(const Real *rotation) {
+PLATE_FN Plate plate_of(const Real *rotation) {
     const Real side = rotation[8] > 0 ? -1 : 1; /* the face of the sole that points down */
     Plate plate;
     plate.normal[0] = side * rotation[2];
@@ -112,9 +119,9 @@ MILD_HD Plate plate_of(const Real *rotation) {
     plate.normal[2] = real_min(side * rotation[8], REAL(-1e-6));
     plate.tilt = REAL_SQRT(plate.normal[0] * plate.normal[0] + plate.normal[1] * plate.normal[1]) +
                  ELEMENT_TINY;
-    cubic_at(0, -plate.normal[2], plate.f[0]);
-    cubic_at(1, -plate.normal[2], plate.f[1]);
-    cubic_at(2, -plate.normal[2], plate.f[2]);
+    for (int k = 0; k < 3; k++) {
+        cubic_at(space_coefficients(k), -plate.normal[2], plate.f[k]);
+    }
     return plate;
 }
 

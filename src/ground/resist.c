@@ -15,7 +15,7 @@ void mild_resist_space(const double normal[3], const double direction[3], double
     double f[3];
     for (int k = 0; k < 3; k++) {
         Cubic a;
-        cubic_at(k, -normal[2], a);
+        cubic_at(space_coefficients(k), -normal[2], a);
         f[k] = cubic(a, x, z);
     }
     double scale = z < 0.0 ? 0.0 : 1.0 / RESIST_LEVEL; /* no force on a trailing face */

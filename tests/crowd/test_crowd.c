@@ -298,6 +298,7 @@ static void follows_mujoco_on_other_models(void **unused) {
     follow(MILD_MODEL_ECC_QUASI, MILD_BATCH_HOST, NULL);
     follow(MILD_MODEL_ECC_QUASI_3D, MILD_BATCH_HOST, NULL);
     follow(MILD_MODEL_BEKKER, MILD_BATCH_HOST, &map);
+    follow(MILD_MODEL_RIGID, MILD_BATCH_HOST, NULL);
 }
 
 /* A robot that is thrown diverges, and alone begins a new episode. */
