@@ -116,8 +116,11 @@ MILD_HD void contact_direct(const ContactMaterial *material, const Real *rotatio
         const Plate plate = plate_of(rotation);
         element_resist(e, memory, &plate, (curves & LAW_SPACE) != 0, curves, dt, 1 / dt,
                        material->law.line_stiffness, now->x, now->y, now->descent);
-        /* Not before `middle`, as float may round it: on a way of no length that is infinite. */
-        e->yield_depth = real_max(e->yield_depth, e->middle);
+        /* Not before `middle`, where float may round it to: on a way of no length the force would
+         * be infinite. The text in double is that of mild/ground.h. */
+        if (sizeof(Real) < sizeof(double)) {
+            e->yield_depth = real_max(e->yield_depth, e->middle);
+        }
     }
     if (curves & LAW_SHEAR) {
         const Shear shear = {material->mu, material->cohesion, material->shear_length, area};
