@@ -15,8 +15,9 @@
  *
  * The ground is level, or has the heights and the labels of one map (mild_batch_set_map), in which
  * each robot has a place, a height and materials of its own. There are no patches, blended borders
- * or imprints yet. Blended borders, and models whose law depends on the direction of motion
- * (ecc_quasi, ecc_quasi_3d, bekker), are refused by name.
+ * or imprints yet. Blended borders are refused by name. Materials may be of any model but rigid, which
+ * has none; materials of several models may be in one table, if the soles are those of each
+ * (mild_sole_concentric).
  *
  * World coordinates are floats: 50 m from the origin they are in steps of 4e-6 m. The place on the
  * map follows from them without further loss, so that a depth is wrong by what the foot's own
@@ -96,7 +97,7 @@ size_t mild_batch_robot_bytes(const MildBatch *batch);
 int mild_batch_stride(const MildBatch *batch);
 
 /* Replaces the table of materials that MildBatchInput.material points into. materials: [count], of
- * any model that is said to be there above, checked by mild_material_check. Waits for the device.
+ * any model, checked by mild_material_check. Waits for the device.
  * A graph captured before holds the old table: capture it again. Fails with the table unchanged. */
 MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
                                     MildError *error);

@@ -26,7 +26,9 @@ static const struct {
     {"solver", bench_solver,
      "newton compared with the paper's gauss_seidel sweeps, at the same error"},
     {"walk", bench_walk, "the same as step, along a walk of the shipped policy"},
-    {"batch", bench_batch, "the contact solver in batches, on train.device, along that walk"},
+    {"batch", bench_batch,
+     "the contact solver in batches, on train.device, along that walk, on grounds of "
+     "randomize.model"},
     {"robots", bench_robots, "the environments alone on train.device, in the batch engine"},
     {"episodes", bench_episodes,
      "returns of the shipped policy in whole episodes: batch engine, on train.device, against "

@@ -10,7 +10,9 @@
 #include "ground/impulse.h"
 #include "ground/map_view.h"
 #include "ground/motion.h"
+#include "ground/plate.h"
 #include "ground/remember.h"
+#include "ground/shear.h"
 
 #define CONTACT_FEET_MAX 4
 #define CONTACT_PADDING REAL(-1e3) /* [m] depth of elements that a foot does not have */
@@ -19,13 +21,15 @@
 /* What a step needs of a material under one element of a foot. */
 typedef struct {
     Law law;
-    Real recovery;   /* [-] as in Element */
-    Real mu;         /* [-] */
-    Real k_drift;    /* [N/m^2] */
-    Real b_drift;    /* [N s/m] */
-    Real exit_drag;  /* [kg/m] */
-    Real entry_drag; /* [kg/m] */
-    int curves;      /* LawCurve bits of the law */
+    Real recovery;     /* [-] as in Element */
+    Real mu;           /* [-] */
+    Real k_drift;      /* [N/m^2] */
+    Real b_drift;      /* [N s/m] */
+    Real exit_drag;    /* [kg/m] */
+    Real entry_drag;   /* [kg/m] */
+    Real cohesion;     /* [N/m^2] as in Shear */
+    Real shear_length; /* [m] */
+    int curves;        /* LawCurve and LawMotion bits of the law */
 } ContactMaterial;
 
 /* One foot's sole. */
@@ -100,6 +104,28 @@ MILD_HD void contact_stand_on(const ContactMaterial *material, Element *e) {
     e->b_drift = material->b_drift;
     e->exit_drag = material->exit_drag;
     e->entry_drag = material->entry_drag;
+}
+
+/* Adapts an element to its motion at the start of the step, after element_begin. rotation: [9] of
+ * the foot. area: [m^2] of the element. */
+MILD_HD void contact_direct(const ContactMaterial *material, const Real *rotation, Real area,
+                            const ContactVelocity *now, Real dt, const ElementMemory *memory,
+                            Element *e) {
+    const int curves = material->curves;
+    if (curves & LAW_RESIST) {
+        const Plate plate = plate_of(rotation);
+        element_resist(e, memory, &plate, (curves & LAW_SPACE) != 0, curves, dt, 1 / dt,
+                       material->law.line_stiffness, now->x, now->y, now->descent);
+        /* Not before `middle`, where float may round it to: on a way of no length the force would
+         * be infinite. The text in double is that of mild/ground.h. */
+        if (sizeof(Real) < sizeof(double)) {
+            e->yield_depth = real_max(e->yield_depth, e->middle);
+        }
+    }
+    if (curves & LAW_SHEAR) {
+        const Shear shear = {material->mu, material->cohesion, material->shear_length, area};
+        element_shear(e, memory, &shear, curves, dt, 1 / dt);
+    }
 }
 
 /* What the ground does to a foot, mean over the step. */

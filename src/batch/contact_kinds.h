@@ -79,6 +79,20 @@
 #define CONTACT(name) contact_##name##_4_8_cone
 #include "batch/contact.inc"
 #undef CONTACT_CURVES
+
+/* And for resistive force theory alone, on the feet of most robots. */
+#define CONTACT_RESIST_KINDS(KIND) KIND(2, 5) KIND(4, 4)
+
+#define CONTACT_CURVES LAW_RESIST
+#define CONTACT_FEET 2
+#define CONTACT_PER 5
+#define CONTACT(name) contact_##name##_2_5_resist
+#include "batch/contact.inc"
+#define CONTACT_FEET 4
+#define CONTACT_PER 4
+#define CONTACT(name) contact_##name##_4_4_resist
+#include "batch/contact.inc"
+#undef CONTACT_CURVES
 #endif
 
 #endif

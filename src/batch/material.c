@@ -13,12 +13,6 @@ MildStatus material_numbers(const MildMaterial *material, double pitch, int inde
     if (mild_material_check(material, &cause) != MILD_OK) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: material %d: %s", index, cause.text);
     }
-    if (model_row(material->model)->direction) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "batch: material %d: the model %s is not there in batches yet; use "
-                         "mild/ground.h, or another model",
-                         index, mild_model_names[material->model]);
-    }
     const Law law = law_of(material, pitch);
     int n = 0;
 #define MATERIAL_LAW_STORE(name) numbers->law[n++] = (float)law.name;
@@ -29,6 +23,8 @@ MildStatus material_numbers(const MildMaterial *material, double pitch, int inde
     numbers->b_drift = (float)material->b_drift;
     numbers->exit_drag = (float)law_exit_drag(&law);
     numbers->entry_drag = (float)law_entry_drag(&law);
-    numbers->curves = law_curves(&law);
+    numbers->cohesion = (float)material->cohesion;
+    numbers->shear_length = (float)material->shear_length;
+    numbers->curves = law_curves(&law) | model_row(material->model)->motion;
     return MILD_OK;
 }

@@ -10,11 +10,12 @@
 typedef struct {
     float law[MATERIAL_LAW_NUMBERS];                             /* in the order of LAW_NUMBERS */
     float recovery, mu, k_drift, b_drift, exit_drag, entry_drag; /* as in ContactMaterial */
+    float cohesion, shear_length;
     int curves;
 } MaterialNumbers;
 
-/* Under an element of area pitch^2. Fails for a material that a batch does not know yet, and for
- * one that mild_material_check refuses. index: of the material, for the message. */
+/* Under an element of area pitch^2. Fails for a material that mild_material_check refuses. index: of
+ * the material, for the message. */
 MildStatus material_numbers(const MildMaterial *material, double pitch, int index,
                             MaterialNumbers *numbers, MildError *error);
 

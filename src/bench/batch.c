@@ -1,5 +1,5 @@
-/* The ground in batches (mild/batch.h): contact problems of a recorded walk, as many robots as the
- * device is asked for. */
+/* The ground in batches (mild/batch.h): contact problems of a walk recorded on grounds of
+ * randomize.model, as many robots as the device is asked for. */
 #include "batch/batch.h"
 
 #include <assert.h>
@@ -26,6 +26,7 @@ typedef struct {
 
 typedef struct {
     Robot *robot;
+    MildModel model;
     MildMaterial material[GROUNDS];
     Problem *problem; /* [PROBLEMS_MAX] */
     int problems;
@@ -91,7 +92,8 @@ static MildStatus record(BatchBench *bench, const ExperimentDef *def, MildError 
     MildBatch *shape = open_batch(&host, 1, error);
     MildStatus status = shape ? MILD_OK : MILD_ERROR_MEMORY;
     for (int g = 0; g < GROUNDS && status == MILD_OK; g++) {
-        Replay *replay = bench_record_walk(def, bench->robot, grounds[g], PERIODS, error);
+        Replay *replay =
+            bench_record_walk(def, bench->robot, grounds[g], bench->model, PERIODS, error);
         status = replay ? record_problems(bench, replay, g, &shape->shape, error) : MILD_ERROR_IO;
         replay_destroy(replay);
     }
@@ -305,9 +307,13 @@ MildStatus bench_batch(const ExperimentDef *def, BenchReport *report, MildError 
     static const int sizes[2][4] = {{1024, 0}, {4096, 16384, 65536, 0}};
     const int device = strncmp(def->train.device, "cuda", 4) == 0 ? 0 : MILD_BATCH_HOST;
     BatchBench bench = {.robot = bench_robot(def, error),
+                        .model = (MildModel)def->task.randomize.model,
                         .problem = calloc(PROBLEMS_MAX, sizeof(Problem)),
                         .dt = def->task.physics_dt,
                         .device = device};
+    if (bench.robot) {
+        robot_set_model(bench.robot, bench.model);
+    }
     MildStatus status = bench.robot && bench.problem ? record(&bench, def, error) : MILD_ERROR_IO;
     for (int i = 0; status == MILD_OK && sizes[device >= 0][i] > 0; i++) {
         status = measure(&bench, sizes[device >= 0][i], i == 0, report, error);

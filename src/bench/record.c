@@ -93,7 +93,7 @@ static MildStatus walk_record(Walk *walk, const Scene *scene, Replay *replay, Mi
 }
 
 Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
-                          int periods, MildError *error) {
+                          MildModel model, int periods, MildError *error) {
     Walk walk = {.def = def->task, .robot = robot};
     Scene scene;
     task_def_make_nominal(&walk.def);
@@ -101,6 +101,10 @@ Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const ch
     int steps = (int)(TASK_PERIOD / walk.def.physics_dt + 0.5);
     Replay *replay = replay_create(robot, periods, steps, walk.def.physics_dt, error);
     MildStatus status = replay ? scene_make(&scene, ground, 1.0, error) : error->status;
+    if (status == MILD_OK && model != MILD_MODEL_MILD) {
+        const MildMaterial mild = scene.terrain.materials[0];
+        status = robot_match_model(robot, model, &mild, &scene.terrain.materials[0], error);
+    }
     if (status == MILD_OK) {
         status = walk_open(&walk, error);
     }

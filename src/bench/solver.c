@@ -266,7 +266,7 @@ static MildStatus standing_problems(SolverBench *bench, const Robot *robot, doub
 /* The first step of every recorded period of the walk. */
 static MildStatus walking_problems(SolverBench *bench, const ExperimentDef *def, const Robot *robot,
                                    int count, MildError *error) {
-    Replay *replay = bench_record_walk(def, robot, "sand_loose", count, error);
+    Replay *replay = bench_record_walk(def, robot, "sand_loose", MILD_MODEL_MILD, count, error);
     RobotSim *sim = replay ? robot_sim_create(robot, replay->dt, error) : NULL;
     for (int p = 0; sim && p < replay->periods; p++) {
         const ReplayPeriod *period = &replay->period[p];

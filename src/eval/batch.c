@@ -37,19 +37,11 @@ typedef struct {
 
 /* A ground that a row can be on. */
 static MildStatus check_scene(const Scene *scene, MildError *error) {
-    const MildMaterial *material = &scene->terrain.materials[0];
-    MaterialNumbers numbers;
     if (scene->terrain.material_count > 1) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--ground %s: the batch engine has no courses; give "
                          "--train.robots=mujoco, or single grounds",
                          scene->name);
-    }
-    if (!scene->rigid && material_numbers(material, 1, 0, &numbers, NULL) != MILD_OK) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--ground %s: the batch engine has no model %s; give "
-                         "--train.robots=mujoco, or another --model",
-                         scene->name, mild_model_names[material->model]);
     }
     return MILD_OK;
 }

@@ -52,6 +52,14 @@ typedef enum {
     LAW_ALL = 7
 } LawCurve;
 
+/* How an element's law or friction depends on its motion so far; bits beside those of LawCurve. */
+typedef enum {
+    LAW_PLANE = 8,  /* resistive force theory in the plane of motion (plate.h) */
+    LAW_SPACE = 16, /* the same in three dimensions */
+    LAW_SHEAR = 32, /* shear strength that builds up with slip (shear.h) */
+    LAW_RESIST = LAW_PLANE | LAW_SPACE
+} LawMotion;
+
 typedef struct {
     Real flat_stiffness;     /* k_pen - kappa [N/m] of the cone, per recruited depth        eq 4 */
     Real line_stiffness;     /* kappa [N/m] of the line, per depth                          eq 4 */

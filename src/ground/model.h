@@ -23,6 +23,9 @@ typedef struct {
      * differs. */
     void (*reference)(MildMaterial *material, double area);
 
+    /* LawMotion bit of `direction`, whose formulas src/batch has too (contact_direct). 0: NULL. */
+    int motion;
+
     /* Called once per step after element_begin. Adapts the law or the friction of the foot's slots
      * that stand on `model` to their motion, at the start of the step or so far. rotation: of the
      * foot. NULL: neither depends on the motion. */

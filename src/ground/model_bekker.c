@@ -5,9 +5,9 @@
  *     s = (c + p mu) (1 - exp(-j/K))
  * j is the distance that the element has slid since it touched down, which is its drift
  * (ElementMemory in element.h). */
-#include "ground/friction.h"
 #include "ground/model.h"
 #include "ground/scratch.h"
+#include "ground/shear.h"
 
 /* Wong 2008, table 2.3, gives n, k_c, k_phi, c and the angle of the first four soils, in the rows
  * named below. It gives K by the kind of ground: 10 mm for firm sand, 25 mm for loose sand, 6 mm
@@ -95,16 +95,11 @@ static void bekker_shear(const FootScratch *foot, const MildTerrain *terrain, in
         if (material->model != model) {
             continue;
         }
-        const double slid = s->drift[i] / material->shear_length;             /* j/K [-] */
-        const double share = 1.0 - real_exp2(-1.4426950408889634074 * slid);  /* 1/ln 2 */
-        const double cohesion = s->depth[i] > 0.0 ? material->cohesion : 0.0; /* [N/m^2] */
+        const Shear shear = {slot_mu(terrain, foot->slot_material[i]), material->cohesion,
+                             material->shear_length, area};
         const ElementMemory memory = slot_memory(s, i);
         Element element = slot_element(s, i);
-        element.mu = share * slot_mu(terrain, foot->slot_material[i]);
-        element.drift_bound += dt * share * cohesion * area;
-        const double force = law_force(&element.law, foot->curves, element.yield_depth) +
-                             law_elastic_force(&element.law, foot->curves, element.middle);
-        friction_hold(&element, &memory, dt, 1.0 / dt, force);
+        element_shear(&element, &memory, &shear, foot->curves, dt, 1.0 / dt);
         s->mu[i] = element.mu;
         slot_store(s, i, &element);
     }
@@ -120,6 +115,7 @@ const ModelRow model_bekker = {
              .match_note = "exponent 1.1, k_c : k_phi of dry sand, cohesion 0"},
     .law = bekker_law,
     .reference = bekker_material,
+    .motion = LAW_SHEAR,
     .direction = bekker_shear,
     .preset = bekker_preset,
 };

@@ -9,5 +9,6 @@ const ModelRow model_ecc_quasi_3d = {
              .match_note = "recovery 0; mu, k_drift, b_drift 0: friction is part of zeta"},
     .law = resist_law,
     .reference = resist_material,
+    .motion = LAW_SPACE,
     .direction = resist_space,
 };

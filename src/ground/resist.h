@@ -2,12 +2,8 @@
 #ifndef MILD_GROUND_RESIST_H
 #define MILD_GROUND_RESIST_H
 
+#include "ground/plate.h"
 #include "ground/scratch.h"
-
-#define RESIST_REST 1e-3 /* [m/s] speed below which the direction of motion fades out */
-/* [-] Upper bound on alpha_z in both theories, whose largest values are 1 (2D, level plate,
- * straight down) and 1.076 (3D, at 27 degrees). */
-#define RESIST_PEAK 1.08
 
 /* The law of a level plate moving straight down: F = zeta 1e6 N/m^3 u per area. */
 Law resist_law(const MildMaterial *material, double pitch);

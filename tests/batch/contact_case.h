@@ -8,6 +8,7 @@ enum { CASE_FEET = 4, CASE_ELEMENTS = 256, CASE_MEMORY = 9, CASE_LAW = 13, CASE_
 
 typedef struct {
     double law[CASE_LAW], recovery, mu, k_drift, b_drift, exit_drag, entry_drag;
+    double cohesion, shear_length;
     int curves;
 } CaseMaterial;
 
@@ -15,6 +16,7 @@ typedef struct {
     int feet, groups, per;
     int elements[CASE_FEET];
     double x[CASE_FEET][CASE_ELEMENTS], y[CASE_FEET][CASE_ELEMENTS], z[CASE_FEET];
+    double area[CASE_FEET];
     double dt, tolerance, height;
     int limit;
     CaseMaterial material[CASE_LABELS]; /* [0] without a map */

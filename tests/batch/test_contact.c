@@ -31,13 +31,15 @@ static int close_soles(void **state) {
 static void case_law(CaseMaterial *c, const MildMaterial *m, double pitch) {
     const Law law = law_of(m, pitch);
     memcpy(c->law, &law, sizeof c->law);
-    c->curves = law_curves(&law);
+    c->curves = law_curves(&law) | model_row(m->model)->motion;
     c->recovery = law_recovery(&law, m->recovery);
     c->mu = m->mu;
     c->k_drift = m->k_drift;
     c->b_drift = m->b_drift;
     c->exit_drag = law_exit_drag(&law);
     c->entry_drag = law_entry_drag(&law);
+    c->cohesion = m->cohesion;
+    c->shear_length = m->shear_length;
 }
 
 static void case_memory(ContactCase *c, const MildGround *ground, int into) {
@@ -90,6 +92,7 @@ static void case_of(ContactCase *c, const Kit *kit, int groups, int per, double 
         memcpy(c->x[f], mild_sole_x(sole), (size_t)c->elements[f] * sizeof(double));
         memcpy(c->y[f], mild_sole_y(sole), (size_t)c->elements[f] * sizeof(double));
         c->z[f] = mild_sole_z(sole);
+        c->area[f] = mild_sole_pitch(sole) * mild_sole_pitch(sole);
         memcpy(c->position + 3 * f, kit->input.position[f], 3 * sizeof(double));
         memcpy(c->rotation + 9 * f, kit->input.rotation[f], 9 * sizeof(double));
         memcpy(c->velocity + 6 * f, kit->input.velocity[f], 6 * sizeof(double));
@@ -281,6 +284,10 @@ static const Shape shapes[] = {
     {"con_cone", 2, 2, 1, MILD_MODEL_CON_CONE},
     {"con_spring", 2, 2, 1, MILD_MODEL_CON_SPRING},
     {"ecc_spring", 2, 2, 5, MILD_MODEL_ECC_SPRING},
+    {"ecc_quasi", 2, 2, 5, MILD_MODEL_ECC_QUASI},
+    {"ecc_quasi_3d", 2, 2, 5, MILD_MODEL_ECC_QUASI_3D},
+    {"ecc_quasi_3d, four plates", 4, 4, 4, MILD_MODEL_ECC_QUASI_3D},
+    {"bekker", 2, 2, 5, MILD_MODEL_BEKKER},
     {"hunt_crossley", 2, 2, 5, MILD_MODEL_HUNT_CROSSLEY},
 };
 enum { SHAPES = sizeof shapes / sizeof *shapes };
@@ -351,6 +358,7 @@ static void float_text_is_near_it(void **state) {
         worst_print(shapes[i].name, &worst);
         assert_true(quantile(&worst, 0.5) < 1e-5 && quantile(&worst, 0.99) < 2e-2);
         assert_true(worst.twist < 5e-3 && worst.unsolved < worst.steps / 20);
+        assert_true(worst.memory < 10.0); /* nothing has run away */
     }
 }
 
@@ -378,6 +386,11 @@ static const Relief reliefs[] = {
     {"image, image", 2, 2, 5, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 0, 1, MILD_MODEL_MILD},
     {"waves, springs too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
      MILD_MODEL_ECC_SPRING},
+    {"waves, ecc_quasi too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
+     MILD_MODEL_ECC_QUASI},
+    {"rough, ecc_quasi_3d too", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1,
+     MILD_MODEL_ECC_QUASI_3D},
+    {"waves, bekker too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_BEKKER},
     {"waves, hunt_crossley too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
      MILD_MODEL_HUNT_CROSSLEY},
     {"slope, 50 m away", 2, 2, 5, MILD_MAP_SLOPE, MILD_PATTERN_STRIPES, 50, 1, MILD_MODEL_MILD},
@@ -500,6 +513,7 @@ static void float_text_is_near_it_on_maps(void **state) {
         assert_true(quantile(&worst, 0.5) < (reliefs[i].exact ? 3e-6 : 1e-5));
         assert_true(quantile(&worst, 0.99) < 1e-3);
         assert_true(worst.twist < 5e-3 && worst.unsolved < worst.steps / 20);
+        assert_true(worst.memory < 10.0);
     }
 }
 

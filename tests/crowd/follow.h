@@ -163,7 +163,9 @@ static void compare(int when, int env, double tolerance) {
     memcpy(critic, b->critic + env * shape->critic, (size_t)shape->critic * sizeof *critic);
     for (int f = 0; f < shape->feet; f++) { /* of the corners that push: it jumps with them */
         const int depth = width + shape->estimates + 6 * f + 5;
-        compare_rows("depth", when, env, wanted + depth, critic + depth, 1, 20 * tolerance);
+        if (fabs((double)wanted[depth - 3]) > tolerance) { /* it pushes */
+            compare_rows("depth", when, env, wanted + depth, critic + depth, 1, 20 * tolerance);
+        }
         critic[depth] = wanted[depth];
     }
     compare_rows("critic", when, env, wanted, critic, shape->critic, tolerance);
@@ -208,11 +210,27 @@ static void same_episode(int e) {
     }
 }
 
+/* [300 N] Largest difference of the feet's forces, as the critic has them. */
+static double forces_apart(int e) {
+    const TaskShape *shape = &pair.shape;
+    const int first = e * shape->critic + shape->observation + shape->estimates;
+    double most = 0;
+    for (int i = 0; i < 3 * shape->feet; i++) {
+        const int at = first + 6 * (i / 3) + i % 3;
+        most = fmax(most, fabs((double)pair.a.critic[at] - (double)pair.b.critic[at]));
+    }
+    return most;
+}
+
 /* Robots that stagger under random actions, fall and begin again. Within float's rounding as long
  * as a robot has not been thrown: legs that swing freely against their limits double a difference
  * within a few steps, so that an environment is left alone once it differs, until its next
- * episode; a share of `least` of the steps is before that. */
+ * episode; a share of `least` of the steps is before that. In resistive force theory the force
+ * jumps where a sole begins to move at 4 mm/s, in three dimensions also where it comes to face its
+ * motion (plate.h), and rounding decides in which step. */
 static void follow(const char *robot, TaskDef def, int device, const MildMapDef *on, double least) {
+    const int model = def.randomize.model;
+    const int jumps = model == MILD_MODEL_ECC_QUASI || model == MILD_MODEL_ECC_QUASI_3D;
     MildMap *map = on ? mild_map_create(on, NULL) : NULL;
     def.map = map;
     int apart[ENVS] = {0}, steps = 0, together = 0, done = 0, timeouts = 0;
@@ -231,7 +249,7 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
         for (int e = 0; e < ENVS; e++) {
             const double gap = fabs((double)(pair.a.reward[e] - pair.b.reward[e]));
             const int same = pair.a.done[e] == pair.b.done[e];
-            apart[e] |= !(gap < 1e-5) || !same;
+            apart[e] |= !(gap < 1e-5) || !same || (jumps && forces_apart(e) > 1e-2);
             steps++;
             together += !apart[e];
             done += pair.b.done[e];
@@ -249,9 +267,10 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
         }
     }
     printf(
-        "%s, device %d: %d of %d steps together, %d episodes ended, %d by time; rewards of the first "
+        "%s, %s, device %d: %d of %d steps together, %d episodes ended, %d by time; rewards of the first "
         "ten steps differ by %.1e\n",
-        robot_name(pair.robot), device, together, steps, done, timeouts, worst);
+        robot_name(pair.robot), mild_model_names[model], device, together, steps, done, timeouts,
+        worst);
     assert_true(together > least * steps && done > 20 && timeouts > 5);
     pair_close();
     mild_map_destroy(map);

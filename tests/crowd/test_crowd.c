@@ -45,6 +45,21 @@ static void follows_mujoco_as_printed(void **unused) {
     follow(SA01, printed_def(), MILD_BATCH_HOST, NULL, 0.65);
 }
 
+static TaskDef model_def(MildModel model) {
+    TaskDef def = some_def();
+    def.randomize.model = model;
+    return def;
+}
+
+static void follows_mujoco_on_other_models(void **unused) {
+    (void)unused;
+    const MildMapDef map = some_map();
+    follow(SA01, model_def(MILD_MODEL_ECC_QUASI), MILD_BATCH_HOST, NULL, 0.85);
+    follow(SA01, model_def(MILD_MODEL_ECC_QUASI_3D), MILD_BATCH_HOST, NULL, 0.6);
+    follow(SA01, model_def(MILD_MODEL_BEKKER), MILD_BATCH_HOST, &map, 0.85);
+    follow(SA01, model_def(MILD_MODEL_RIGID), MILD_BATCH_HOST, NULL, 0.85);
+}
+
 /* Four round feet; on a map in test_go1.c. */
 static void go1_follows_mujoco(void **unused) {
     (void)unused;
@@ -79,6 +94,9 @@ static void device_follows_mujoco(void **unused) {
     follow(SA01, printed_def(), 0, NULL, 0.65);
     follow(GO1, some_def(), 0, NULL, 0.85);
     follow(GO1, some_def(), 0, &map, 0.85);
+    follow(SA01, model_def(MILD_MODEL_ECC_QUASI), 0, NULL, 0.85);
+    follow(SA01, model_def(MILD_MODEL_ECC_QUASI_3D), 0, &map, 0.6);
+    follow(SA01, model_def(MILD_MODEL_BEKKER), 0, NULL, 0.85);
 }
 
 /* The sample of a physics step above the map. */
@@ -183,6 +201,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follows_mujoco),
         cmocka_unit_test(follows_mujoco_on_a_map),
+        cmocka_unit_test(follows_mujoco_on_other_models),
         cmocka_unit_test(follows_mujoco_as_printed),
         cmocka_unit_test(trials_are_chosen),
         cmocka_unit_test(one_diverges),

@@ -19,6 +19,7 @@ enum { ROWS = 4 };
 
 static Robot *robot;
 static TaskDef def;
+static MildModel model; /* that grounds are matched to */
 
 static int setup(void **state) {
     (void)state;
@@ -80,6 +81,11 @@ static int scenes_of(const char *const *names, Scene *scene) {
     int count = 0;
     for (; names[count]; count++) {
         assert_int_equal(scene_make(&scene[count], names[count], 2, &error), MILD_OK);
+        MildMaterial *material = &scene[count].terrain.materials[0];
+        const MildMaterial mild = *material;
+        if (model != MILD_MODEL_MILD && mild.model == MILD_MODEL_MILD) {
+            assert_int_equal(robot_match_model(robot, model, &mild, material, &error), MILD_OK);
+        }
     }
     return count;
 }
@@ -179,6 +185,16 @@ static void rows_agree_on_a_map(void **state) {
     mild_map_destroy(map);
 }
 
+/* A soil of bekker, and grounds matched to another model. */
+static void rows_agree_on_other_models(void **state) {
+    (void)state;
+    static const char *const names[] = {"dry_sand", "grass", NULL};
+    static const double speed = 0.5;
+    model = MILD_MODEL_ECC_QUASI_3D;
+    compare_rows(names, &speed, 1, 0, MILD_BATCH_HOST);
+    model = MILD_MODEL_MILD;
+}
+
 static void turning_rows_agree(void **state) {
     (void)state;
     static const char *const names[] = {"foam60", NULL};
@@ -197,6 +213,9 @@ static void rows_of_a_device_agree(void **state) {
     }
     compare_rows(names, &speed, 1, 0, 0);
     compare_rows(names, &speed, 1, 0.5, 0);
+    model = MILD_MODEL_ECC_QUASI;
+    compare_rows(names, &speed, 1, 0, 0);
+    model = MILD_MODEL_MILD;
 }
 
 /* The bits of a row depend neither on threads nor on the rows beside it. */
@@ -333,7 +352,6 @@ static void refused(const char *ground, int trials, int histories, const char *s
 static void what_is_not_there_is_refused(void **state) {
     (void)state;
     refused("rubber+grass", 1, 1, "--ground rubber+grass");
-    refused("clay", 1, 1, "bekker");
     refused("grass", EVAL_ROBOTS_MAX + 1, 1, "--trials 65537");
     refused("grass", 1, 0, "--controller zero");
     def.newton = 0;
@@ -348,6 +366,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rows_agree_with_mujoco),
         cmocka_unit_test(rows_agree_on_a_map),
+        cmocka_unit_test(rows_agree_on_other_models),
         cmocka_unit_test(turning_rows_agree),
         cmocka_unit_test(rows_of_a_device_agree),
         cmocka_unit_test(rows_repeat),

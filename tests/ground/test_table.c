@@ -2,6 +2,8 @@
  * those and no others. */
 #include "ground_kit.h"
 
+#include "ground/models.h"
+
 #define SOFT_MODELS MILD_MODEL_RIGID
 
 static const MildField *field_of(const char *key) {
@@ -43,6 +45,10 @@ static void test_rows(void **state) {
             assert_int_equal(mild_material_check(&material, &error), MILD_OK);
         }
         assert_true(m == MILD_MODEL_RIGID || info->fields[0]);
+        /* what depends on the motion says how: the batch has no other way to know */
+        const ModelRow *row = model_row(m);
+        assert_int_equal(row->motion != 0, row->direction != NULL);
+        assert_int_equal(row->motion & LAW_ALL, 0);
         assert_true(m == MILD_MODEL_MILD || m == MILD_MODEL_RIGID || info->scaled[0]);
     }
     assert_false(mild_model_find("ecc_sprin", &(MildModel){0}));
