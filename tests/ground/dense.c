@@ -285,8 +285,8 @@ static void resist_alpha(int model, const double *n, const double *heading, doub
 /* The line is that of the greatest coefficient. It gives the yield force, a share of it, at the
  * front, which lies behind the depth that the line belongs to and never behind the element. v: the
  * element's velocity, w: du/dt, now. */
-static void element_resist(double dt, DenseElement *e, int model, const double *n, const double *v,
-                           double w) {
+static void dense_resist(double dt, DenseElement *e, int model, const double *n, const double *v,
+                         double w) {
     DenseLaw *law = &e->law;
     double tilt = hypot(n[0], n[1]), heading[2] = {v[0], v[1]}, level = hypot(v[0], v[1]),
            down = fmax(w, 0.0), x[2], z[2];
@@ -478,7 +478,7 @@ static void dense_element(Dense *d, const Find *find) {
     element_line(e);
     dense_drag(d->dt, e, e->free[3] - now[3]);
     if (directed) {
-        element_resist(d->dt, e, nearer->model, find->normal, now, now[3]);
+        dense_resist(d->dt, e, nearer->model, find->normal, now, now[3]);
     }
     if (nearer->model == MILD_MODEL_BEKKER) {
         element_shear(d->dt, e, nearer, find->pitch * find->pitch, memory->drift[i]);
