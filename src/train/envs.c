@@ -18,10 +18,10 @@ struct TrainEnvs {
 MildStatus train_make_map(const ExperimentDef *def, MildMap **map, int *striped, MildError *error) {
     *striped = train_is_batch(&def->train) && def->task.randomize.patch_share > 0 &&
                def->terrain.map.patches == MILD_PATTERN_NONE;
-    return *striped ? terrain_make_striped(&def->terrain, TRAIN_MATERIALS,
-                                           def->task.randomize.patch_length, def->train.seed, map,
-                                           error)
-                    : terrain_make(&def->terrain, TRAIN_MATERIALS, map, error);
+    return *striped
+               ? terrain_make_striped(&def->terrain, TRAIN_MATERIALS,
+                                      def->task.randomize.patch_length, def->train.seed, map, error)
+               : terrain_make(&def->terrain, TRAIN_MATERIALS, map, error);
 }
 
 static int make(TrainEnvs *envs, const ExperimentDef *def, int striped, const Robot *robot,

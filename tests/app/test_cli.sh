@@ -118,7 +118,8 @@ expect 0 'foam45 .*2/2 ' "${batch[@]}" --ground rigid,foam45 --speed 0.3,0.6 --t
 expect 0 'foam45 .*2/2 ' "${batch[@]}" --ground rigid,foam45 --speed 0.3,0.6 --turn 0.2 --threads 2 --json two.json
 cmp -s one.json two.json || fail "rows of the batch engine depend on --threads"
 expect 0 'grass .*2/2 ' "${batch[@]}" --ground rigid,grass --terrain.kind=waves
-for option in "--controller stand" "--ground rubber+grass" "--ground clay" "--terrain.memory=true" "--task.newton=0" "--trials 9999 --speed 0.1,0.2,0.3,0.4" \
+expect 0 'clay .*2/2 ' "${batch[@]}" --ground clay
+for option in "--controller stand" "--ground rubber+grass" "--terrain.memory=true" "--task.newton=0" "--trials 9999 --speed 0.1,0.2,0.3,0.4" \
     "--push 0.5" "--latent latent.csv" "--ablate z"; do
     bad "train.robots *= *mujoco" "${batch[@]}" $option
 done
