@@ -15,8 +15,8 @@
  *
  * The ground is level, or has the heights and the labels of one map (mild_batch_set_map), in which
  * each robot has a place, a height and materials of its own. There are no patches, blended borders
- * or imprints yet. Blended borders are refused by name. Materials may be of any model but rigid, which
- * has none; materials of several models may be in one table, if the soles are those of each
+ * or imprints yet. Blended borders are refused by name. Materials may be of any model but rigid,
+ * which has none; materials of several models may be in one table, if the soles are those of each
  * (mild_sole_concentric).
  *
  * World coordinates are floats: 50 m from the origin they are in steps of 4e-6 m. The place on the

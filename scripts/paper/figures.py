@@ -134,12 +134,15 @@ def latent(path):
 
 def regression(tables, known, names):
     """z~ of a walk in each table, text of --latent, against the numbers that are known of its ground."""
-    values = []
-    for table in tables:
+    values, kept = [], []
+    for table, truth in zip(tables, known):
         names_of, *rows = csv.reader(table.splitlines())
         use = [i for i, name in enumerate(names_of) if name.startswith("modulated")]
-        values.append(np.mean([[float(row[i]) for i in use] for row in rows if float(row[3]) >= START], axis=0))
-    values, known = np.array(values), np.array(known)
+        late = [[float(row[i]) for i in use] for row in rows if float(row[3]) >= START]
+        if late:  # it has not fallen at once
+            values.append(np.mean(late, axis=0))
+            kept.append(truth)
+    values, known = np.array(values), np.array(kept)
     held = np.arange(len(values)) % 3 == 0
     model = make_pipeline(StandardScaler(), RidgeCV(np.logspace(-3, 3, 13))).fit(values[~held], known[~held])
     told = model.predict(values[held])

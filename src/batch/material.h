@@ -14,8 +14,8 @@ typedef struct {
     int curves;
 } MaterialNumbers;
 
-/* Under an element of area pitch^2. Fails for a material that mild_material_check refuses. index: of
- * the material, for the message. */
+/* Under an element of area pitch^2. Fails for a material that mild_material_check refuses. index:
+ * of the material, for the message. */
 MildStatus material_numbers(const MildMaterial *material, double pitch, int index,
                             MaterialNumbers *numbers, MildError *error);
 

@@ -8,8 +8,8 @@
 /* NULL, with the reason in *error. */
 Robot *bench_robot(const ExperimentDef *def, MildError *error);
 /* Records the shipped policy at 0.6 m/s on a ground (scene.h), matched to a model whose soles the
- * robot has; replay_destroy it. NULL when it falls, is a policy of another robot, or when the ground
- * has no match. */
+ * robot has; replay_destroy it. NULL when it falls, is a policy of another robot, or when the
+ * ground has no match. */
 Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const char *ground,
                           MildModel model, int periods, MildError *error);
 

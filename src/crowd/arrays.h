@@ -51,7 +51,8 @@ typedef struct {
 } CrowdTask;
 
 /* What passes between engine and ground; see MildBatchInput and MildBatchOutput. The ground writes
- * over what it has read: the wrenches over velocity, the twists after the step over free_velocity. */
+ * over what it has read: the wrenches over velocity, the twists after the step over free_velocity.
+ */
 typedef struct {
     float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
     MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */

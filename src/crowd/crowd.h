@@ -34,8 +34,8 @@ typedef struct {
  * patches other than stripes of a map), and when device or memory is missing. */
 Crowd *crowd_create(const CrowdDef *def, MildError *error);
 void crowd_destroy(Crowd *crowd); /* may be NULL */
-/* Bool: on a GPU this build has no kernels of the robot's own size, and those for any robot, several
- * times slower, step it. */
+/* Bool: on a GPU this build has no kernels of the robot's own size, and those for any robot,
+ * several times slower, step it. */
 int crowd_is_slow(const Robot *robot);
 
 /* As vec_reset and vec_step; arrays in the memory of the device, the history not NULL. stream: a

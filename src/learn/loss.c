@@ -178,7 +178,8 @@ static void estimate_row(const LossContext *c, const float *estimate, const floa
     }
 }
 
-/* max(KL(N(mu, e^logvar) || N(0, 1)), free bits) of each dimension, and the decoder's gradient through the sampled z. */
+/* max(KL(N(mu, e^logvar) || N(0, 1)), free bits) of each dimension, and the decoder's gradient
+ * through the sampled z. */
 static void latent_row(const LossContext *c, const float *mu, const float *logvar,
                        const float *spread, const float *noise, int sampled, const float *d_z,
                        float *d_mu, float *d_logvar, LossSums *sums) {

@@ -1,8 +1,8 @@
 /* Loss and gradient of one chunk of samples. Two independent halves: the actor's (encoder,
  * modulation, actor, decoder, log std) and the critic's.
  *
- *   L = (1-eps) (surrogate - w_H entropy + w_V value) + eps (recon + phi sum max(KL_i, free_bits) + sum over groups MSE)
- * + w_M mirror   (eq 16)
+ *   L = (1-eps) (surrogate - w_H entropy + w_V value) + eps (recon + phi sum max(KL_i, free_bits) +
+ * sum over groups MSE) + w_M mirror   (eq 16)
  *
  * recon = MSE(frame) + MSE(ground), the parts of the decoder's output (PpoTarget).
  * Means are over the minibatch. The caller gives 1 / (its samples), so the results of chunks and

@@ -18,8 +18,8 @@ static inline MILD_BOTH uint64_t step_action_key(uint64_t seed, int64_t iteratio
     return random_bits(&random);
 }
 
-/* Number env * latent + j of the stream is the noise of z_j at time t with ppo.sample_latent, in the
- * rollout and in every minibatch. So an action's probability is that given its own noise. */
+/* Number env * latent + j of the stream is the noise of z_j at time t with ppo.sample_latent, in
+ * the rollout and in every minibatch. So an action's probability is that given its own noise. */
 static inline MILD_BOTH uint64_t step_sampled_key(uint64_t seed, int64_t iteration, int t) {
     Random random = random_at(seed ^ 0x7a6c6174u, (uint32_t)iteration, (uint32_t)t);
     return random_bits(&random);

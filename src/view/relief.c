@@ -130,8 +130,8 @@ static double outside(double value, double half) {
     return fmax(fabs(value) - half, 0.0);
 }
 
-/* The squares of neighbours overlap by the gap around a sole. Inside several the point belongs to the
- * nearest centre, so that it is well inside. */
+/* The squares of neighbours overlap by the gap around a sole. Inside several the point belongs to
+ * the nearest centre, so that it is well inside. */
 static unsigned short nearest_element(const SoleMask *mask, double px, double py) {
     const double *x = mild_sole_x(mask->sole), *y = mild_sole_y(mask->sole);
     double least = INFINITY, least_center = INFINITY;
@@ -223,8 +223,8 @@ static const MildMaterial *material_at(const Relief *relief, double x, double y)
     return &relief->terrain.materials[mild_terrain_material_at(&relief->terrain, x, y)];
 }
 
-/* The tiles of a vertex, and those of its neighbours, whose normals it changes, must be drawn again.
- * pressed: 1 when the vertex was undisturbed before, -1 when it is again, else 0. */
+/* The tiles of a vertex, and those of its neighbours, whose normals it changes, must be drawn
+ * again. pressed: 1 when the vertex was undisturbed before, -1 when it is again, else 0. */
 static void mark(Relief *relief, int i, int j, int pressed) {
     int c0 = (i + RELIEF_TILE_CELLS - 2) / RELIEF_TILE_CELLS - 1, c1 = (i + 1) / RELIEF_TILE_CELLS;
     int r0 = (j + RELIEF_TILE_CELLS - 2) / RELIEF_TILE_CELLS - 1, r1 = (j + 1) / RELIEF_TILE_CELLS;

@@ -1,7 +1,7 @@
 /* The visible ground: a height map that the soles press in and that springs back by its material's
- * `recovery`. Under a sole it is as deep as the sole; around it the surface rises in a smooth slope.
- * It is only for drawing; physics never reads it. The map is divided into square tiles, so that a
- * renderer need refresh only those that changed. It does not depend on a renderer. */
+ * `recovery`. Under a sole it is as deep as the sole; around it the surface rises in a smooth
+ * slope. It is only for drawing; physics never reads it. The map is divided into square tiles, so
+ * that a renderer need refresh only those that changed. It does not depend on a renderer. */
 #ifndef VIEW_RELIEF_H
 #define VIEW_RELIEF_H
 
@@ -47,8 +47,9 @@ int relief_tile_material(const Relief *relief, int tile);
 int relief_tile_pressed(const Relief *relief, int tile);
 /* Whether the tile changed since the last call. */
 int relief_tile_take_dirty(Relief *relief, int tile);
-/* Position [m, world] and unit normal of every step-th vertex (a divisor of RELIEF_TILE_CELLS), rows
- * along y, x fastest: [n][n][3] each, n = RELIEF_TILE_CELLS/step + 1. Tiles share their edges. */
+/* Position [m, world] and unit normal of every step-th vertex (a divisor of RELIEF_TILE_CELLS),
+ * rows along y, x fastest: [n][n][3] each, n = RELIEF_TILE_CELLS/step + 1. Tiles share their edges.
+ */
 void relief_tile_surface(const Relief *relief, int tile, int step, float *position, float *normal);
 /* [m] Depth of the drawn surface below the undisturbed one, linear between vertices; 0 outside. */
 double relief_depth_at(const Relief *relief, double x, double y);

@@ -4,8 +4,8 @@
 #ifndef VIEW_SMOOTH_H
 #define VIEW_SMOOTH_H
 
-/* from, to: [height][width][3], not the same. luma: [height + 1][width] for use inside. Pixels without
- * an edge beside them, and those of the border, are copied. */
+/* from, to: [height][width][3], not the same. luma: [height + 1][width] for use inside. Pixels
+ * without an edge beside them, and those of the border, are copied. */
 void smooth_edges(const unsigned char *from, int width, int height, unsigned char *luma,
                   unsigned char *to);
 

@@ -267,8 +267,8 @@ static void follow(const char *robot, TaskDef def, int device, const MildMapDef 
         }
     }
     printf(
-        "%s, %s, device %d: %d of %d steps together, %d episodes ended, %d by time; rewards of the first "
-        "ten steps differ by %.1e\n",
+        "%s, %s, device %d: %d of %d steps together, %d episodes ended, %d by time; rewards of the "
+        "first ten steps differ by %.1e\n",
         robot_name(pair.robot), mild_model_names[model], device, together, steps, done, timeouts,
         worst);
     assert_true(together > least * steps && done > 20 && timeouts > 5);

@@ -265,8 +265,8 @@ static void falls_are_counted(void **state) {
     pool_destroy(pool);
 }
 
-/* The Go1, held in its pose by a policy of zeros and stiff joints, on four round feet. It has as many
- * joints as SA01, and so an observation of the same width. */
+/* The Go1, held in its pose by a policy of zeros and stiff joints, on four round feet. It has as
+ * many joints as SA01, and so an observation of the same width. */
 static void four_feet_are_measured(void **state) {
     (void)state;
     static const char *const names[] = {"rigid", "rubber", "sand_loose", NULL};

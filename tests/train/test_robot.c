@@ -115,8 +115,8 @@ static void a_policy_without_a_name_loads(void **unused) {
     robot_destroy(sa01);
 }
 
-/* Where the decoder of the ground finds its 13 numbers: behind the frame, the estimates, six of each
- * foot, the push and four masses. */
+/* Where the decoder of the ground finds its 13 numbers: behind the frame, the estimates, six of
+ * each foot, the push and four masses. */
 static void the_decoder_is_that_of_the_target(void **unused) {
     (void)unused;
     static const char *const names[] = {"sa01", "go1"};

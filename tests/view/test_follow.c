@@ -27,8 +27,9 @@ static double followed(double seconds, double rate) {
     return look[0] - 1;
 }
 
-/* The response of (1 + 2 T s)/(1 + T s)^2 to the ramp v t: v t (1 - exp(-t/T)), by hand. Five frames
- * a second give what hundred give, up to the path within a frame of the filter's own output. */
+/* The response of (1 + 2 T s)/(1 + T s)^2 to the ramp v t: v t (1 - exp(-t/T)), by hand. Five
+ * frames a second give what hundred give, up to the path within a frame of the filter's own output.
+ */
 static void same_at_any_frame_rate(void **state) {
     (void)state;
     double worst = 0, seconds[] = {0.4, 1, 2, 5};

@@ -105,8 +105,8 @@ static void dent_is_as_deep_as_the_elements(void **state) {
     assert_true(worst < 1e-5);
 }
 
-/* Walks away from the edge of the sole: the surface rises without a step and ends at 0. Grains stand
- * steeper than a sheet. */
+/* Walks away from the edge of the sole: the surface rises without a step and ends at 0. Grains
+ * stand steeper than a sheet. */
 static double skirt_width(const char *material) {
     const double edge = 0.05 + 0.5 * CELL; /* the raster's squares and the gap beside the sole */
     make(material, 0);
@@ -135,7 +135,8 @@ static void surface_rises_smoothly_beside_the_sole(void **state) {
     assert_true(fabs(skirt_width("foam45") - 0.0678) < 1.1 * CELL);
 }
 
-/* The dent follows a foot that is lifted slowly: foam back to the sole at every height, sand not. */
+/* The dent follows a foot that is lifted slowly: foam back to the sole at every height, sand not.
+ */
 static void dent_follows_the_lifted_foot(void **state) {
     (void)state;
     make("foam25", 0);
@@ -157,7 +158,8 @@ static void dent_follows_the_lifted_foot(void **state) {
     destroy();
 }
 
-/* Normals against differences of the drawn depth; unit length; upright where nothing was pressed. */
+/* Normals against differences of the drawn depth; unit length; upright where nothing was pressed.
+ */
 static void normals_are_those_of_the_surface(void **state) {
     (void)state;
     static float position[3 * VERTICES], normal[3 * VERTICES];
