@@ -12,8 +12,9 @@ SEED ?= 1
 MUTANTS ?=
 FAULTS ?=
 STAGES ?=
+QUICK ?=
 
-.PHONY: setup build test run bench install docs check fuzz mutants clean help
+.PHONY: setup build test run bench install docs paper check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -25,6 +26,7 @@ help:
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
 	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
+	@echo "make paper   the paper's experiments as one page, out/paper/index.html (docs/paper.md); QUICK=1: few trials"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
@@ -64,6 +66,12 @@ fuzz: setup
 # Makes its own builds; MUTANTS: further options (scripts/mutants.py --help).
 mutants: setup
 	@scripts/mutants.py --layer $(LAYER) -n $(N) --seed $(SEED) --jobs $(JOBS) $(if $(FAULTS),--faults) $(MUTANTS)
+
+# Trains only where there is a GPU (a build with CMAKE_FLAGS=-DMILD_CUDA=ON); keeps what runs/paper has.
+paper: build
+	@.venv/bin/pip install -q -r scripts/paper/requirements.txt
+	@if nvidia-smi >/dev/null 2>&1; then scripts/paper/train.sh runs/paper; fi
+	@.venv/bin/python scripts/paper/paper.py $(if $(QUICK),--trials 3)
 
 docs:
 	@mkdir -p build

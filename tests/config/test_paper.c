@@ -39,6 +39,7 @@ static const char *const printed[] = {
     "task.wz=-1.5 1.5", "task.kp=50 50 70 70 20 20", "task.kd=5 5 7 7 0.2 0.2",
     "task.torque_hold=true", "task.action_scale=1", "task.clock=false", "task.history_stride=1",
     "task.velocity_scale=1", "task.height_scale=1", "ppo.epsilon=0.3", "ppo.decoder_target=newest",
+    "ppo.sample_latent=true",
     /* what it has not */
     "task.vy=0 0", "task.backward_share=0", "task.standing_share=0", "task.standing_below=0",
     "task.straight_share=0", "task.observe_noise=false", "task.assist=false",
