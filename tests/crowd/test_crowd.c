@@ -47,7 +47,7 @@ static void follows_mujoco_as_printed(void **unused) {
 
 static TaskDef model_def(MildModel model) {
     TaskDef def = some_def();
-    def.randomize.model = model;
+    def.randomize.model = (int)model;
     return def;
 }
 
