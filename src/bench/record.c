@@ -100,7 +100,10 @@ Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const ch
     walk.def.episode = walk_settle + (periods + 1) * TASK_PERIOD;
     int steps = (int)(TASK_PERIOD / walk.def.physics_dt + 0.5);
     Replay *replay = replay_create(robot, periods, steps, walk.def.physics_dt, error);
-    MildStatus status = replay ? scene_make(&scene, ground, 1.0, error) : error->status;
+    if (!replay) {
+        return NULL;
+    }
+    MildStatus status = scene_make(&scene, ground, 1.0, error);
     if (status == MILD_OK && model != MILD_MODEL_MILD) {
         const MildMaterial mild = scene.terrain.materials[0];
         status = robot_match_model(robot, model, &mild, &scene.terrain.materials[0], error);
