@@ -225,6 +225,13 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
     return MILD_OK;
 }
 
+MildBatch batch_share(const MildBatch *batch, int first, int count) {
+    MildBatch share = *batch;
+    share.shape.robots = count;
+    share.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
+    return share;
+}
+
 MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
                            const MildBatchOutput *output, int advance, void *stream,
                            MildError *error) {

@@ -42,6 +42,8 @@ struct MildBatch {
 size_t batch_memory_numbers(const BatchShape *shape);
 /* The memory of a ground as that of one robot, [batch_memory_numbers]. */
 void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory);
+/* `count` robots of a batch from `first` on, as a batch that borrows its memory. */
+MildBatch batch_share(const MildBatch *batch, int first, int count);
 
 /* ---- memory of a device or of MILD_BATCH_HOST ---- */
 /* All 0. NULL with a message that says how much was asked for. */
@@ -81,5 +83,15 @@ MildStatus device_step_map(const MildBatch *batch, const MildBatchInput *input,
                            MildError *error);
 MildStatus device_reset(const MildBatch *batch, const uint8_t *which, void *stream,
                         MildError *error);
+
+/* ---- streams beside that of a caller ---- */
+typedef struct DeviceFork DeviceFork;
+DeviceFork *device_fork_create(int device, int streams, MildError *error);
+void device_fork_destroy(DeviceFork *fork); /* may be NULL */
+void *device_fork_stream(const DeviceFork *fork, int i);
+/* Work put into the streams from now on waits for what is in the caller's; after device_join the
+ * caller's waits for what is in them. A graph may capture both. */
+MildStatus device_fork(DeviceFork *fork, void *stream, MildError *error);
+MildStatus device_join(DeviceFork *fork, void *stream, MildError *error);
 
 #endif

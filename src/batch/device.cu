@@ -1,4 +1,4 @@
-/* Steps on level ground, and the memory of a GPU. */
+/* Steps on level ground, and the memory and the streams of a GPU. */
 #define CONTACT_MAP 0
 #define DEVICE_STEP device_step_level
 #include "batch/device.inc"
@@ -81,4 +81,80 @@ extern "C" MildStatus device_copy(int device, void *to, const void *from, size_t
                                   MildError *error) {
     OnDevice on(device);
     return checked(cudaMemcpy(to, from, bytes, cudaMemcpyDefault), "copy", error);
+}
+
+/* ---- streams ---- */
+
+struct DeviceFork {
+    int device;
+    int streams;
+    cudaStream_t *stream; /* [streams] */
+    cudaEvent_t *joined;  /* [streams] */
+    cudaEvent_t forked;
+};
+
+extern "C" void device_fork_destroy(DeviceFork *fork) {
+    if (!fork) {
+        return;
+    }
+    OnDevice on(fork->device);
+    for (int i = 0; i < fork->streams; i++) {
+        cudaStreamDestroy(fork->stream[i]);
+        cudaEventDestroy(fork->joined[i]);
+    }
+    cudaEventDestroy(fork->forked);
+    free(fork->stream);
+    free(fork->joined);
+    free(fork);
+}
+
+extern "C" DeviceFork *device_fork_create(int device, int streams, MildError *error) {
+    DeviceFork *fork = (DeviceFork *)calloc(1, sizeof *fork);
+    OnDevice on(device);
+    cudaError_t status = cudaErrorMemoryAllocation;
+    if (fork) {
+        fork->device = device;
+        fork->stream = (cudaStream_t *)calloc((size_t)streams, sizeof *fork->stream);
+        fork->joined = (cudaEvent_t *)calloc((size_t)streams, sizeof *fork->joined);
+        status = fork->stream && fork->joined
+                     ? cudaEventCreateWithFlags(&fork->forked, cudaEventDisableTiming)
+                     : status;
+    }
+    for (int i = 0; status == cudaSuccess && i < streams; i++) {
+        status = cudaStreamCreateWithFlags(&fork->stream[i], cudaStreamNonBlocking);
+        if (status == cudaSuccess) {
+            status = cudaEventCreateWithFlags(&fork->joined[i], cudaEventDisableTiming);
+        }
+        fork->streams = i + 1;
+    }
+    if (checked(status, "streams", error) != MILD_OK) {
+        device_fork_destroy(fork);
+        return NULL;
+    }
+    return fork;
+}
+
+extern "C" void *device_fork_stream(const DeviceFork *fork, int i) {
+    return fork->stream[i];
+}
+
+extern "C" MildStatus device_fork(DeviceFork *fork, void *stream, MildError *error) {
+    OnDevice on(fork->device);
+    cudaError_t status = cudaEventRecord(fork->forked, (cudaStream_t)stream);
+    for (int i = 0; status == cudaSuccess && i < fork->streams; i++) {
+        status = cudaStreamWaitEvent(fork->stream[i], fork->forked, 0);
+    }
+    return checked(status, "streams", error);
+}
+
+extern "C" MildStatus device_join(DeviceFork *fork, void *stream, MildError *error) {
+    OnDevice on(fork->device);
+    cudaError_t status = cudaSuccess;
+    for (int i = 0; status == cudaSuccess && i < fork->streams; i++) {
+        status = cudaEventRecord(fork->joined[i], fork->stream[i]);
+        if (status == cudaSuccess) {
+            status = cudaStreamWaitEvent((cudaStream_t)stream, fork->joined[i], 0);
+        }
+    }
+    return checked(status, "streams", error);
 }

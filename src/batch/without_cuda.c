@@ -45,3 +45,31 @@ MildStatus device_reset(const MildBatch *batch, const uint8_t *which, void *stre
     (void)stream;
     return device_open(batch->device, error);
 }
+
+DeviceFork *device_fork_create(int device, int streams, MildError *error) {
+    (void)streams;
+    device_open(device, error);
+    return NULL;
+}
+
+void device_fork_destroy(DeviceFork *fork) {
+    (void)fork;
+}
+
+void *device_fork_stream(const DeviceFork *fork, int i) {
+    (void)fork;
+    (void)i;
+    return NULL;
+}
+
+MildStatus device_fork(DeviceFork *fork, void *stream, MildError *error) {
+    (void)fork;
+    (void)stream;
+    return device_open(0, error);
+}
+
+MildStatus device_join(DeviceFork *fork, void *stream, MildError *error) {
+    (void)fork;
+    (void)stream;
+    return device_open(0, error);
+}
