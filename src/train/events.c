@@ -157,7 +157,7 @@ int events_write_scalars(FILE *file, double wall_time, int64_t step, const char 
 
 /* ---- a text, and the hyperparameters: tensors that a plugin of TensorBoard reads ---- */
 
-/* SummaryMetadata: plugin_data = 1 {plugin_name = 1 string, content = 2 bytes}, data_class = 4 enum.
+/* SummaryMetadata: plugin_data = 1 {plugin_name = 1 string, content = 2 bytes}, data_class = 4.
  * The buffer holds the content. Turns it into the metadata of a Summary.Value. */
 static void enclose_metadata(Buffer *buffer, const char *plugin) {
     enclose(buffer, 0, 2);

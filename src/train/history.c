@@ -1,5 +1,6 @@
 #include "train/history.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -137,4 +138,27 @@ int history_column(const History *history, const char *name) {
         }
     }
     return -1;
+}
+
+void history_means(const History *history, int column, double first, double last, int points,
+                   double *mean) {
+    const double places = last > first ? (points - 1) / (last - first) : 0;
+    int place = 0, count = 0;
+    double sum = 0;
+    for (int i = 0; i < points; i++) {
+        mean[i] = NAN;
+    }
+    for (int i = 0; i < history->rows; i++) {
+        const double *row = history->value + (size_t)i * (size_t)history->columns;
+        const int here = (int)((row[0] - first) * places + 0.5);
+        if (!isfinite(row[column]) || here < 0 || here >= points) {
+            continue;
+        }
+        if (here != place) {
+            sum = count = 0;
+            place = here;
+        }
+        sum += row[column];
+        mean[place] = sum / ++count;
+    }
 }

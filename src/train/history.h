@@ -20,4 +20,9 @@ void history_free(History *history);
 /* Index of the column, or -1. */
 int history_column(const History *history, const char *name);
 
+/* Means of a column over the rows whose iteration is nearest to each of `points` even places
+ * between first and last. mean: [points], NaN where there is no number. */
+void history_means(const History *history, int column, double first, double last, int points,
+                   double *mean);
+
 #endif

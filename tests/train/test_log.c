@@ -293,6 +293,20 @@ static void test_history(void **state) {
         assert_int_not_equal(read_log(bad[i].text, bad[i].size, &history, &error), MILD_OK);
         assert_non_null(strstr(error.text, bad[i].says));
     }
+    char *many = malloc(20000), *end = stpcpy(many, "iteration,a\n");
+    for (int i = 0; i <= 999; i++) {
+        end += sprintf(end, i % 2 ? "%d,nan\n" : "%d,%d\n", i, 3 * i);
+    }
+    assert_int_equal(read_log(many, (size_t)(end - many), &history, &error), MILD_OK);
+    free(many);
+    double mean[10]; /* at 0, 111 .. 999: of the even iterations within 55.5 */
+    history_means(&history, 1, 0, 999, 10, mean);
+    assert_true(mean[0] == 3 * 27 && mean[1] == 3 * 111 && mean[2] == 3 * 222);
+    assert_true(mean[9] == 3 * 971);
+    history_means(&history, 1, -2000, -1000, 10, mean);
+    assert_true(isnan(mean[0]) && isnan(mean[9]));
+    history_free(&history);
+
     assert_int_equal(read_log("iteration,a\r\n1,2\r\n", 18, &history, &error), MILD_OK);
     assert_string_equal(history.name[1], "a");
     history_free(&history);
