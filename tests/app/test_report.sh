@@ -11,35 +11,36 @@ run() {
 }
 run seed1 1 1
 run seed2 2 3
+run seed3 3 5
 run other 1 0.5 '<128>'
 printf '0.1.0 & more\nmild train\n' >seed1/version.txt
 cat >seed2/eval.json <<'END'
 {"rows": [{"ground": "sand_loose", "speed": 0.6, "trials": 10, "success": 9, "velocity": 0.59, "cot": 0.7, "penetration": 0.074}]}
 END
-printf 'few bytes' >seed1/small.mp4
+printf 'ten bytes!' >seed1/small.mp4
 head -c 4194305 /dev/zero >'other/big one.mp4'
 mkdir pages
 
 expect 0 'report seed1/report.html' "$mild" report seed1
-expect 0 '' "$mild" report seed1 seed2 other --out pages/page.html
+expect 0 '' "$mild" report seed1 seed2 other seed3 --out pages/page.html
 page=$(cat pages/page.html)
 "$mild" report seed1 seed2 --out - | head -1 | grep -q '^<!doctype html>$' || fail "--out -: standard output is not the page alone"
 ! grep -qE '(src|href)="?(http|//)|<script|<link|@import|url\(' <<<"$page" || fail "the page needs other files"
 has() { grep -qF -- "$1" <<<"$page" || fail "the page has not: $1"; }
 has '0.1.0 &amp; more'
 has '<td>sand_loose<td class=n>9 of 10<td class=n>0.60<td class=n>0.59<td class=n>0.70<td class=n><td class=n><td class=n>74<td'
-has "src=\"data:video/mp4;base64,$(printf 'few bytes' | base64)\""
+has "src=\"data:video/mp4;base64,$(printf 'ten bytes!' | base64)\""
 has 'src="../other/big%20one.mp4"'
 has '<tr><td>train.envs<td>64<td>&lt;128&gt;<td>' # default: whatever it is
-has 'seed1 (2 seeds)'
+has 'seed1 (3 seeds)'
 has '>gait</text>'
 ! grep -q '>none</text>' <<<"$page" || fail "a chart of a reward that is 0 throughout"
 ! grep -q '<td>terrain.seed' <<<"$(sed -n '/Between the runs/,/<\/table>/p' <<<"$page")" || fail "keys that do not differ are listed"
 alone=$(cat seed1/report.html)
 grep -q 'From the defaults' <<<"$alone" && ! grep -q 'Between the runs' <<<"$alone" || fail "differences of a single run"
 
-# The curves of the return: the mean of the seeds is 2 i, its band from i to 3 i, the other run is i / 2. So at the last iteration
-# the heights above that of the first are as 2 to 1 to 3 to 0.5, and the axis is linear in i.
+# The curves of the return: the mean of the seeds is 3 i, its band from i to 5 i, the other run is i / 2. So at the last iteration
+# the heights above that of the first are as 3 to 1 to 5 to 0.5, and the axis is linear in i.
 python3 - pages/page.html <<'END' || fail "curves of the return"
 import re, sys
 page = open(sys.argv[1], encoding="utf-8").read()
@@ -52,8 +53,8 @@ def paths(title):
 assert band_color == mean_color != other_color
 assert len(mean) == len(other) == 101 and len(band) == 202
 rise = lambda p: mean[0][1] - p[1]
-assert abs(rise(mean[100]) - 4 * rise(other[100])) < 0.3, (mean[100], other[100])
-assert abs(rise(band[100]) - 1.5 * rise(mean[100])) < 0.2 and abs(rise(band[101]) - 0.5 * rise(mean[100])) < 0.2
+assert abs(rise(mean[100]) - 6 * rise(other[100])) < 0.3, (mean[100], other[100])
+assert abs(rise(band[100]) - 5 / 3 * rise(mean[100])) < 0.2 and abs(rise(band[101]) - rise(mean[100]) / 3) < 0.2
 assert all(abs(rise(p) - i / 100 * rise(mean[100])) < 0.11 for i, p in enumerate(mean))
 assert all(abs(p[0] - mean[0][0] - i / 100 * (mean[100][0] - mean[0][0])) < 0.11 for i, p in enumerate(mean))
 _, value = paths("value loss")[-1]  # 10^(-i / 50): a straight line where the axis is logarithmic
