@@ -7,6 +7,7 @@
 #include "base/file.h"
 
 enum { LOG_MAX = 1 << 30 }; /* bytes */
+#define ITERATION_MAX 1e15
 
 static int count_of(const char *text, char what) {
     int count = 0;
@@ -71,6 +72,10 @@ static MildStatus read_rows(History *history, const char *text, const char *path
                              "%s:%d: %d numbers under %d columns; remove the line", path, line,
                              count, history->columns);
         }
+        if (!(row[0] >= 0 && row[0] <= ITERATION_MAX)) {
+            return mild_fail(error, MILD_ERROR_FORMAT, "%s:%d: %g is no iteration; remove the line",
+                             path, line, row[0]);
+        }
         if (history->rows && !(row[0] > row[-history->columns])) {
             return mild_fail(error, MILD_ERROR_FORMAT,
                              "%s:%d: iteration %g after %g; remove the lines of one of the two "
@@ -106,15 +111,12 @@ static MildStatus read_text(History *history, const char *path, MildError *error
                : mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory for the log", path);
 }
 
-MildStatus history_read(const char *path, History *history, MildError *error) {
-    size_t size;
-    *history = (History){.text = file_read(path, LOG_MAX, &size, error)};
-    if (!history->text) {
-        return error->status;
-    }
-    const size_t length = strlen(history->text);
+MildStatus history_parse(char *text, size_t size, const char *path, History *history,
+                         MildError *error) {
+    const size_t length = strlen(text);
+    *history = (History){.text = text};
     MildStatus status =
-        memchr(history->text + length, '\n', size - length)
+        memchr(text + length, '\n', size - length)
             ? mild_fail(error, MILD_ERROR_FORMAT,
                         "%s: damaged, there is a zero byte in it; name a whole log.csv", path)
             : read_text(history, path, error);
@@ -122,6 +124,13 @@ MildStatus history_read(const char *path, History *history, MildError *error) {
         history_free(history);
     }
     return status;
+}
+
+MildStatus history_read(const char *path, History *history, MildError *error) {
+    size_t size;
+    char *text = file_read(path, LOG_MAX, &size, error);
+    *history = (History){0};
+    return text ? history_parse(text, size, path, history, error) : error->status;
 }
 
 void history_free(History *history) {

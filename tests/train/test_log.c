@@ -288,6 +288,9 @@ static void test_history(void **state) {
                {"iteration,a\n1,x\n", "log.csv:2: '1,x' is not a row", 16},
                {"iteration,a\n\n", "log.csv:2: '' is not a row", 13},
                {"iteration,a\n2,2\n2,3\n", "log.csv:3: iteration 2 after 2", 20},
+               {"iteration,a\nnan,2\n", "log.csv:2: nan is no iteration", 18},
+               {"iteration,a\n-1,2\n", "log.csv:2: -1 is no iteration", 17},
+               {"iteration,a\n1e300,2\n", "log.csv:2: 1e+300 is no iteration", 20},
                {"iteration,a\n1,2\n\0,3\n", "zero byte", 20}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         assert_int_not_equal(read_log(bad[i].text, bad[i].size, &history, &error), MILD_OK);
