@@ -1,7 +1,6 @@
 # Installation of the program, its data, man page and completion, and the Debian package (`make deb`, docs/install.md).
 # MuJoCo has no Debian package: its library goes into lib/mild, where only this program looks for it.
 set(MILD_MUJOCO_PLACE lib/mild)
-file(REAL_PATH ${mujoco_library} mujoco_file)
 set_target_properties(mild PROPERTIES INSTALL_RPATH "$ORIGIN/../${MILD_MUJOCO_PLACE}")
 install(TARGETS mild RUNTIME DESTINATION bin COMPONENT program)
 install(FILES ${mujoco_file} DESTINATION ${MILD_MUJOCO_PLACE} COMPONENT program)

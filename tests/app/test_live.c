@@ -29,9 +29,10 @@ static MildTerrain course(void) {
     return terrain;
 }
 
-static void presets_lie_everywhere(void **state) {
-    (void)state;
-    const MildTerrain terrain = course();
+/* patches: whether grass lies beyond x = 2. */
+static void check_presets(int patches) {
+    MildTerrain terrain = course();
+    terrain.patch_count = patches;
     MildTerrain episode = terrain;
     episode.height = 0.25;
     Live live = live_begin(&terrain, 2);
@@ -41,9 +42,15 @@ static void presets_lie_everywhere(void **state) {
         live_apply(&live, &episode);
         const int before = key == 0, now = key == 1 ? 2 : 3;
         assert_int_equal(mild_terrain_material_at(&episode, 0, 0), before ? 0 : now);
-        assert_int_equal(mild_terrain_material_at(&episode, 1e5, -1e5), before ? 1 : now);
+        assert_int_equal(mild_terrain_material_at(&episode, 1e5, -1e5), before ? patches : now);
     }
     assert_true(episode.height == 0.25);
+}
+
+static void presets_lie_everywhere(void **state) {
+    (void)state;
+    check_presets(0);
+    check_presets(1);
 }
 
 static void keys_scale(void **state) {
