@@ -196,8 +196,8 @@ static int info_build(void) {
     printf("mild      %s\n", build_version());
     printf("compiler  %s, %s\n", build_compiler(), build_type());
     printf("flags     %s\n", build_flags());
-    printf("MuJoCo    %s (headers %d.%d.%d)\n", mj_versionString(), mjVERSION_HEADER / 100,
-           mjVERSION_HEADER / 10 % 10, mjVERSION_HEADER % 10);
+    printf("MuJoCo    %s (headers %d.%d.%d)\n", mj_versionString(), mjVERSION_HEADER / 1000000,
+           mjVERSION_HEADER / 1000 % 1000, mjVERSION_HEADER % 1000);
     printf("oneDNN    %d.%d.%d\n", dnnl->major, dnnl->minor, dnnl->patch);
     printf("cJSON     %s\n", cJSON_Version());
     printf("inih      system library\n");

@@ -15,7 +15,8 @@ typedef struct {
 
 /* Reads all complete rows. A last line without an end is left out, because a training may be
  * writing it. The columns may be those of any version, but the first must be "iteration", whose
- * numbers are from 0 to 1e15 and rise. Fails with "PATH:LINE: reason"; there is then nothing to free. */
+ * numbers are from 0 to 1e15 and rise. Fails with "PATH:LINE: reason"; there is then nothing to
+ * free. */
 MildStatus history_read(const char *path, History *history, MildError *error);
 /* The same from a text of `size` bytes and a '\0', which comes from malloc and is owned from now
  * on. path: its name in messages. */

@@ -1,5 +1,5 @@
-/* Any bytes as a log.csv and as a config.ini. Refused with a message, or rows whose iterations rise,
- * means within their extremes, and every key found again. */
+/* Any bytes as a log.csv and as a config.ini. Refused with a message, or rows whose iterations
+ * rise, means within their extremes, and every key found again. */
 #include "fuzz.h"
 #include "train/history.h"
 #include "train/settings.h"
