@@ -30,6 +30,7 @@ const AppCommand commands[] = {
     {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
 };
 const int command_count = sizeof commands / sizeof *commands;
+_Static_assert(sizeof commands / sizeof *commands <= COMMANDS_MAX, "main has room for their names");
 
 void commands_describe(void (*print)(const CliCommand *command)) {
     for (int i = 0; i < command_count; i++) {

@@ -10,6 +10,7 @@ typedef struct {
     int (*run)(int argc, char **argv);
     const char *help;
 } AppCommand;
+enum { COMMANDS_MAX = 32 };
 extern const AppCommand commands[];
 extern const int command_count;
 

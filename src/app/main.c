@@ -57,7 +57,7 @@ int main(int argc, char **argv) {
         printf("mild %s\n", build_version());
         return finish(0);
     }
-    const char *names[16];
+    const char *names[COMMANDS_MAX];
     for (int i = 0; i < command_count; i++) {
         if (strcmp(argv[1], commands[i].name) == 0) {
             return finish(commands[i].run(argc - 1, argv + 1));

@@ -33,7 +33,9 @@ for command in $commands; do
         [ "$option" = --help ] || sed -n "/^.SS mild $command$/,/^.S[SH]/p" <<<"$plain" | grep -q "^$option\b" || fail "man: no $command $option"
     done
 done
-offers 'grounds models robots config build devices man completion' mild info ''
+topics=$("$mild" info --help | sed -n '/^topics:/,/^$/s/^  \([a-z]*\) .*/\1/p')
+[ "$(wc -w <<<"$topics")" -ge 8 ] || fail "topics: $topics"
+offers "$(echo $topics)" mild info ''
 
 # values, also the second of a list and behind an equals sign; files are the shell's
 offers 'sand_loose sand_dense sandy_loam' mild press --ground sand
