@@ -13,8 +13,9 @@ MUTANTS ?=
 FAULTS ?=
 STAGES ?=
 QUICK ?=
+TEST ?=
 
-.PHONY: setup build test run bench install docs paper check fuzz mutants clean help
+.PHONY: setup build test run bench install deb docs site paper check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -28,6 +29,8 @@ help:
 	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
 	@echo "make paper   the paper's experiments as one page, out/paper/index.html (docs/paper.md); QUICK=1: few trials"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
+	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
+	@echo "make site    all documentation as static pages, build/site/index.html, with its links checked"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
 
@@ -77,6 +80,17 @@ docs:
 	@mkdir -p build
 	@scripts/api.py include/mild/*.h >build/api.md
 	@echo build/api.md
+
+# Its own build, for any x86 with AVX2; TEST=1 needs root (debootstrap).
+deb: setup
+	@JOBS=$(JOBS) scripts/deb.sh $(if $(TEST),test)
+
+# Its own Python environment, for one package more than the program needs.
+site:
+	@[ -x build/site-venv/bin/markdown_py ] || { python3 -m venv build/site-venv && \
+		build/site-venv/bin/pip install -q --disable-pip-version-check markdown==3.11.3; }
+	@build/site-venv/bin/python scripts/site.py build/site
+	@echo build/site/index.html
 
 clean:
 	rm -rf build

@@ -11,6 +11,10 @@ if(NOT mujoco_library)
   message(FATAL_ERROR "MuJoCo not found: run `make setup` (installs the wheel into .venv) or pass -DMUJOCO_ROOT=FOLDER")
 endif()
 list(GET mujoco_library 0 mujoco_library)
+file(REAL_PATH ${mujoco_library} mujoco_file)
+if(mujoco_file MATCHES "\\.so\\.([0-3]\\.[0-9.]+)$") # src/robot/engine.c hands it a log handler
+  message(FATAL_ERROR "MuJoCo ${CMAKE_MATCH_1} (${mujoco_file}): the program needs 4.0 or newer; libmild alone needs none (-DMILD_APP=OFF)")
+endif()
 get_filename_component(mujoco_folder ${mujoco_library} DIRECTORY)
 add_library(mujoco::mujoco SHARED IMPORTED GLOBAL)
 set_target_properties(mujoco::mujoco PROPERTIES IMPORTED_LOCATION ${mujoco_library}

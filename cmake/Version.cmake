@@ -1,4 +1,6 @@
-# Version of the program: the project's, and the commit it was built from when git knows it.
+# Version of the program: the project's (CMakeLists.txt says it, CITATION.cff and CHANGELOG.md repeat it), and the commit it
+# was built from when git knows it: 0.1.0+g1234567ab. On a commit with the tag v0.1.0 it is 0.1.0; a tag that says something
+# else is an error.
 # Included: makes the target `version`, which runs this same file at every build; as a script it writes the header,
 # and only when something changed, so that nothing is compiled again without need.
 if(NOT CMAKE_SCRIPT_MODE_FILE)
@@ -21,5 +23,13 @@ execute_process(COMMAND git -C ${SOURCE} describe --always --dirty=.dirty --abbr
   OUTPUT_VARIABLE commit OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE failed)
 if(NOT failed AND commit)
   set(text "${BASE}+g${commit}")
+  execute_process(COMMAND git -C ${SOURCE} tag --points-at HEAD --list "v[0-9]*"
+    OUTPUT_VARIABLE tag OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+  if(tag AND NOT tag STREQUAL "v${BASE}")
+    message(FATAL_ERROR "the commit has the tag ${tag}, but CMakeLists.txt says VERSION ${BASE}: change one of the two")
+  endif()
+  if(tag AND NOT commit MATCHES "dirty$")
+    set(text ${BASE})
+  endif()
 endif()
 file(CONFIGURE OUTPUT ${HEADER} CONTENT "#define MILD_VERSION \"${text}\"\n" @ONLY)

@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 
 packages=(
     build-essential cmake
-    libdnnl-dev libinih-dev libcjson-dev libpng-dev
+    libdnnl-dev libinih-dev libcjson-dev libpng-dev zlib1g-dev
     libopenmpi-dev openmpi-bin
     libcmocka-dev
     libglfw3-dev libgl-dev libosmesa6-dev libegl-dev libegl1 libgl1-mesa-dri

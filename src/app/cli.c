@@ -90,6 +90,12 @@ static void print_command_help(const CliCommand *command) {
     }
 }
 
+static void (*help_printer)(const CliCommand *) = print_command_help;
+
+void cli_set_help(void (*print)(const CliCommand *command)) {
+    help_printer = print ? print : print_command_help;
+}
+
 /* ---- values ---- */
 
 static int out_of_range(const CliCommand *command, const CliOption *option, const char *text) {
@@ -363,7 +369,7 @@ CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *
     args->positional_count = args->override_count = 0;
     for (int i = 1; i < argc; i++) {
         if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
-            print_command_help(command);
+            help_printer(command);
             return CLI_DONE;
         }
     }

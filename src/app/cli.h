@@ -62,6 +62,7 @@ typedef struct {
     const CliWord *words;
     int word_count;
     const char *overrides; /* help on --section.key=value; NULL: the command takes none */
+    const char *sections;  /* of these, for completion: "task ground"; NULL: those of a training */
     const char *examples;  /* whole lines, or NULL */
     int positional_max;    /* largest number of words without dashes */
     int positional_input;  /* bool: these words are files that the command reads */
@@ -82,6 +83,9 @@ typedef enum { CLI_RUN, CLI_DONE, CLI_BAD } CliOutcome;
 /* Parses argv[1..]. CLI_DONE: the help was printed, exit with 0. CLI_BAD: an error was printed to
  * stderr, exit with CLI_EXIT_BAD_INPUT. */
 CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args);
+
+/* Chooses who prints a command's help; NULL: cli_parse itself, as text on standard output. */
+void cli_set_help(void (*print)(const CliCommand *command));
 
 /* Prints "mild COMMAND: text" to stderr. Returns CLI_EXIT_BAD_INPUT, so that `return cli_fail(...)`
  * ends a command. */

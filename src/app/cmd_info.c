@@ -196,8 +196,8 @@ static int info_build(void) {
     printf("mild      %s\n", build_version());
     printf("compiler  %s, %s\n", build_compiler(), build_type());
     printf("flags     %s\n", build_flags());
-    printf("MuJoCo    %s (headers %d.%d.%d)\n", mj_versionString(), mjVERSION_HEADER / 100,
-           mjVERSION_HEADER / 10 % 10, mjVERSION_HEADER % 10);
+    printf("MuJoCo    %s (headers %d.%d.%d)\n", mj_versionString(), mjVERSION_HEADER / 1000000,
+           mjVERSION_HEADER / 1000 % 1000, mjVERSION_HEADER % 1000);
     printf("oneDNN    %d.%d.%d\n", dnnl->major, dnnl->minor, dnnl->patch);
     printf("cJSON     %s\n", cJSON_Version());
     printf("inih      system library\n");
@@ -237,6 +237,8 @@ static const struct {
      "every config key with its meaning, range and default, as a complete config file"},
     {"build", info_build, "version, compiler and libraries"},
     {"devices", info_devices, "processor, memory and GPU of this machine"},
+    {"man", manual_print, "the man page, of all commands, in roff: mild info man | man -l -"},
+    {"completion", completion_print, "completion for bash and zsh: source <(mild info completion)"},
 };
 enum { TOPICS = sizeof topics / sizeof *topics };
 
@@ -247,7 +249,7 @@ int cmd_info(int argc, char **argv) {
     }
     const CliCommand command = {
         .name = "info",
-        .usage = "grounds | models | robots | config | build | devices",
+        .usage = "grounds | models | robots | config | build | devices | man | completion",
         .summary = "Prints what the program offers and what it runs on.",
         .words_title = "topics",
         .words = words,

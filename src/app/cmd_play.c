@@ -71,6 +71,23 @@ static MildStatus make_scene(Command *c, MildError *error) {
     return status == MILD_OK ? task_def_check(&c->task, error) : status;
 }
 
+/* Appends the presets that the keys of a window choose from, as many as there is room for. */
+static MildStatus add_presets(Command *c, MildError *error) {
+    MildTerrain *terrain = &c->scene.terrain;
+    MildStatus status = MILD_OK;
+    for (int i = 0; i < mild_material_preset_count() && status == MILD_OK &&
+                    terrain->material_count < MILD_MATERIALS_MAX && !c->scene.rigid;
+         i++) {
+        const int m = terrain->material_count;
+        c->names[m] = mild_material_preset_name(i);
+        mild_material_preset(c->names[m], &terrain->materials[m]);
+        status = grounds_finish(&c->finish, &terrain->materials[m], error);
+        terrain->material_count++;
+        c->play.presets++;
+    }
+    return status;
+}
+
 /* Makes the file's folder. Fails before the walk when the file cannot be written. */
 static MildStatus make_place(const char *path, MildError *error) {
     char folder[PATH_SIZE];
@@ -263,6 +280,9 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     play->controller = &controller;
     play->window = !c->video && !c->pressure;
     status = make_scene(c, error);
+    if (status == MILD_OK && play->window) {
+        status = add_presets(c, error);
+    }
     if (status == MILD_OK) {
         status = prepare(c, error);
     }
@@ -318,12 +338,15 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         .summary = "Shows a policy walking. Several grounds make a course, which it crosses in "
                    "order. Keys in the window: the arrows change speed and turn, Q and E step "
                    "sideways, S stops, space pauses, - and = change how fast time passes, R "
-                   "restarts, Esc quits; the mouse turns the camera. At the end a table has a "
-                   "row for each ground.",
+                   "restarts, Esc quits; the mouse turns the camera. 1 to 8 lay another ground "
+                   "under the robot, in the order of mild info grounds; F and V change friction, "
+                   "K and M stiffness, up and down by a tenth. At the end a table has a row for "
+                   "each ground, until keys changed it.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .picture = "pressure",
         .numbers = ".csv",
+        .sections = "task ground terrain",
         .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "
                      "--terrain.kind=waves --terrain.memory=true",
         .examples = "  mild play --ground rubber,foam45,sand_loose --video out/walk.mp4 --pressure "

@@ -1,4 +1,4 @@
-/* The program `mild`: a table of commands. Only this layer turns text into structs and errors into
+/* The program `mild`. Only this layer turns text into structs and errors into
  * exit codes. */
 #include <errno.h>
 #include <stdio.h>
@@ -11,44 +11,14 @@
 #include "base/text.h"
 #include "robot/engine.h"
 
-#ifndef MILD_VIEW
-int cmd_play(int argc, char **argv) {
-    (void)argc;
-    (void)argv;
-    return cli_fail_text("play", "built without drawing; configure with -DMILD_VIEW=ON");
-}
-#endif
-
-static const struct {
-    const char *name;
-    int (*run)(int argc, char **argv);
-    const char *help;
-} commands[] = {
-    {"train", cmd_train, "train a walking policy on soft ground"},
-    {"eval", cmd_eval, "measure how a policy walks on several grounds and at several speeds"},
-    {"play", cmd_play, "watch a policy walk, in a window or as a video"},
-    {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
-    {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
-    {"bench", cmd_bench, "measure speed and memory on this machine"},
-    {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
-};
-enum { COMMANDS = sizeof commands / sizeof *commands };
-
 static void print_help(FILE *file) {
-    fprintf(
-        file,
-        "mild %s: soft ground for legged robots\n\nusage: mild COMMAND [options]\n\ncommands:\n",
-        build_version());
-    for (int i = 0; i < COMMANDS; i++) {
+    fprintf(file, "mild %s: %s\n\nusage: mild COMMAND [options]\n\ncommands:\n", build_version(),
+            commands_about);
+    for (int i = 0; i < command_count; i++) {
         fprintf(file, "  %-8s%s\n", commands[i].name, commands[i].help);
     }
-    fprintf(
-        file,
-        "\nRun `mild COMMAND --help` for the options of a command. The exit code is 0 on success "
-        "and 2 after\nan error, which is one line on standard error.\n\n"
-        "try first:\n"
-        "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
-        "  mild press --ground foam45 --depth 0.03\n");
+    fprintf(file, "\nRun `mild COMMAND --help` for the options of a command. %s\n\ntry first:\n%s",
+            commands_exit, commands_examples);
 }
 
 /* Only the last flush shows whether standard output took everything, for example on a full disk. */
@@ -87,14 +57,14 @@ int main(int argc, char **argv) {
         printf("mild %s\n", build_version());
         return finish(0);
     }
-    const char *names[COMMANDS];
-    for (int i = 0; i < COMMANDS; i++) {
+    const char *names[COMMANDS_MAX];
+    for (int i = 0; i < command_count; i++) {
         if (strcmp(argv[1], commands[i].name) == 0) {
             return finish(commands[i].run(argc - 1, argv + 1));
         }
         names[i] = commands[i].name;
     }
     fprintf(stderr, "mild: unknown command '%s'; nearest is '%s' (mild --help lists all)\n",
-            argv[1], text_nearest(argv[1], names, COMMANDS));
+            argv[1], text_nearest(argv[1], names, command_count));
     return CLI_EXIT_BAD_INPUT;
 }

@@ -1,10 +1,12 @@
 #include "app/play.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
+#include "app/live.h"
 #include "app/progress.h"
 #include "base/clock.h"
 #include "eval/eval.h"
@@ -12,12 +14,19 @@
 #define START_TIME 1.0  /* [s] time for starting, not counted in speeds and pressures */
 #define FALL_TIME 1.0   /* [s] how long the picture stays after a fall */
 #define SPEED_TIME 0.5  /* [s] the shown speed is a running mean over about this long */
+#define PACE_TIME 0.5   /* [s] over which the real-time factor is measured */
 #define OWED_MAX 0.2    /* [s] delay behind real time that is caught up with at once */
 #define WINDOW_TIME 1e6 /* [s] a window's walk has no end */
 
 /* [m/s, m/s, rad/s] Largest command of the keys, which is the range that the shipped policy was
  * trained on. */
 static const double command_max[3] = {1.3, 0.3, 0.8};
+
+/* How fast the walk passes: seconds of it per second of the clock, over the last PACE_TIME. */
+typedef struct {
+    double walked, clock; /* [s] at the start of the time that is measured now */
+    double factor;        /* [-] of the time before */
+} Pace;
 
 /* State of the walk. */
 typedef struct {
@@ -30,7 +39,9 @@ typedef struct {
     double speed;      /* [m/s] shown */
     double end;        /* [s] */
     int ground;        /* material under the base */
-    int lost;          /* bool: the simulation diverged, so the state must not be drawn */
+    Live live;         /* the ground, which keys change in a window */
+    Pace pace;
+    int lost; /* bool: the simulation diverged, so the state must not be drawn */
 } Walk;
 
 /* TaskProbe: every physics step. */
@@ -41,7 +52,7 @@ static void watch(void *context, const TaskEnv *env, const RobotSim *sim, const 
     walk->ground = mild_terrain_material_at(&env->terrain, qpos[0], qpos[1]);
     PlayLeg *leg = &play->leg[walk->ground];
     play->time += robot_sim_dt(sim);
-    if (play->time < START_TIME || play->fell) {
+    if (play->time < START_TIME || play->fell || play->changed) {
         return;
     }
     if (leg->steps++ == 0) {
@@ -66,7 +77,7 @@ static void start(Walk *walk) {
     Play *play = walk->play;
     TaskView none = {0};
     set_command(walk);
-    task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &play->scene->terrain,
+    task_env_reset_on(walk->env, &walk->task, play->robot, walk->sim, &walk->live.terrain,
                       play->scene->rigid, &none);
     walk->speed = 0;
 }
@@ -105,7 +116,16 @@ static MildStatus frame(Walk *walk, MildError *error) {
         return MILD_OK;
     }
     ViewInfo info = {.time = play->time, .speed = walk->speed, .fell = play->fell};
+    char ground[96] = "rigid ground", note[300];
     memcpy(info.command, walk->env->command, sizeof info.command);
+    if (play->window) {
+        if (!play->scene->rigid) {
+            live_tell(&walk->live, walk->ground, ground, sizeof ground);
+        }
+        snprintf(note, sizeof note, "%s%s\n%.2f x real time (- =)", ground,
+                 play->presets ? ", other ground (1 2 3 ...)" : "", walk->pace.factor);
+        info.note = note;
+    }
     view_frame(play->view, walk->sim, &info);
     play->frames++;
     return play->video ? video_frame(play->video, view_pixels(play->view), error) : MILD_OK;
@@ -148,7 +168,8 @@ static MildStatus restart(Walk *walk, MildError *error) {
     play->fell = walk->lost = 0;
     play->time = 0;
     start(walk);
-    return view_reset(play->view, &play->scene->terrain, error);
+    walk->pace = (Pace){0};
+    return view_reset(play->view, &walk->live.terrain, error);
 }
 
 static void take_keys(Walk *walk, const WindowInput *input) {
@@ -164,6 +185,27 @@ static void take_keys(Walk *walk, const WindowInput *input) {
     }
 }
 
+/* The keys that change the ground. What was measured on it before does not go on. */
+static MildStatus take_ground_keys(Walk *walk, const WindowInput *input, MildError *error) {
+    if (walk->play->scene->rigid || !(input->ground || input->friction || input->stiffness)) {
+        return MILD_OK;
+    }
+    const int other = live_take(&walk->live, walk->ground, input);
+    live_apply(&walk->live, &walk->env->terrain);
+    walk->play->changed = 1;
+    return other ? view_reset(walk->play->view, &walk->live.terrain, error) : MILD_OK;
+}
+
+static void measure_pace(Walk *walk, double now, int paused) {
+    Pace *pace = &walk->pace;
+    if (paused || pace->clock == 0) {
+        *pace = (Pace){walk->play->time, now, paused ? 0 : pace->factor};
+    } else if (now - pace->clock >= PACE_TIME) {
+        const double factor = (walk->play->time - pace->walked) / (now - pace->clock);
+        *pace = (Pace){walk->play->time, now, factor};
+    }
+}
+
 static MildStatus run_window(Walk *walk, MildError *error) {
     Play *play = walk->play;
     WindowInput input = {.time_scale = 1};
@@ -174,6 +216,9 @@ static MildStatus run_window(Walk *walk, MildError *error) {
         status = frame(walk, error);
         view_show(play->view, &input);
         take_keys(walk, &input);
+        if (status == MILD_OK) {
+            status = take_ground_keys(walk, &input, error);
+        }
         if (input.reset || (play->fell && shown > fallen + FALL_TIME)) {
             status = restart(walk, error);
         }
@@ -184,6 +229,7 @@ static MildStatus run_window(Walk *walk, MildError *error) {
             step(walk);
         }
         shown = now;
+        measure_pace(walk, now, input.paused);
         if (!play->fell) {
             fallen = now;
         }
@@ -193,6 +239,7 @@ static MildStatus run_window(Walk *walk, MildError *error) {
 
 MildStatus play_run(Play *play, MildError *error) {
     Walk walk = {.play = play, .task = *play->task, .command = {play->speed, 0, 0}};
+    walk.live = live_begin(&play->scene->terrain, play->presets);
     walk.end = play->seconds;
     walk.task.episode = play->window ? WINDOW_TIME : play->seconds + 1.0;
     walk.env = aligned_alloc(64, task_env_bytes(&walk.task, play->robot));

@@ -28,11 +28,13 @@ typedef struct {
     Pressure *pressure;          /* NULL: not measured */
     double seconds, speed, rate; /* [s], [m/s], [1/s] frames */
     uint64_t seed;
-    int window; /* bool: real time, keys */
+    int window;  /* bool: real time, keys */
+    int presets; /* materials at the end of the scene's terrain that keys lay under the robot */
     /* filled */
     PlayLeg leg[MILD_MATERIALS_MAX];
     double time; /* [s] walked */
     int fell;    /* bool */
+    int changed; /* bool: keys changed the ground; the legs are measured until then */
     int frames;
 } Play;
 

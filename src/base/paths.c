@@ -29,13 +29,16 @@ const char *path_data(const char *relative, char path[PATH_SIZE]) {
         snprintf(path, PATH_SIZE, "%s/%s", home, relative);
         return path;
     }
+    static const char *const below[] = {"", "/share/mild"};
     char beside[PATH_SIZE];
     executable_home(beside);
-    if (*beside && snprintf(path, PATH_SIZE, "%s/%s", beside, relative) < PATH_SIZE &&
-        exists(path)) {
-        return path;
+    for (int i = 0; i < 2 && *beside; i++) {
+        if (snprintf(path, PATH_SIZE, "%s%s/%s", beside, below[i], relative) < PATH_SIZE &&
+            exists(path)) {
+            return path;
+        }
     }
-    snprintf(path, PATH_SIZE, "%s/%s", MILD_SOURCE_DIR, relative);
+    snprintf(path, PATH_SIZE, "%s/%s", MILD_DATA_DIR, relative);
     return path;
 }
 

@@ -10,7 +10,8 @@ enum { PATH_SIZE = 1024 };
 
 /* Full path of a shipped file such as "robots/sa01/robot.ini" or "configs/default.ini". It is
  * looked for under $MILD_HOME if that is set, otherwise beside the folder of the executable
- * (build/..), otherwise in the source tree that the program was built from. */
+ * (build/..), otherwise in share/mild there (/usr/bin/../share/mild), otherwise in the folder that
+ * the build names (MILD_DATA_DIR: the source tree). */
 const char *path_data(const char *relative, char path[PATH_SIZE]);
 
 /* folder + "/" + name; fails when longer than PATH_SIZE. */

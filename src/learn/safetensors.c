@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <zlib.h>
 
 #include "base/file.h"
 
@@ -26,21 +27,7 @@ struct Safetensors {
 static const char *const type_names[] = {"F32", "F64", "I64", "U8"};
 static const size_t type_sizes[] = {4, 8, 8, 1};
 
-/* ---- checksum ---- */
-
-/* CRC-32 of IEEE 802.3 (reflected, polynomial 0x04c11db7), a nibble at a time. */
-static uint32_t crc_add(uint32_t crc, const unsigned char *bytes, size_t size) {
-    static const uint32_t table[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac,
-                                       0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
-                                       0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
-                                       0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
-    crc = ~crc;
-    for (size_t i = 0; i < size; i++) {
-        crc = table[(crc ^ bytes[i]) & 15u] ^ (crc >> 4);
-        crc = table[(crc ^ (uint32_t)(bytes[i] >> 4)) & 15u] ^ (crc >> 4);
-    }
-    return ~crc;
-}
+/* ---- checksum: CRC-32 of IEEE 802.3 ---- */
 
 static uint64_t header_length(const unsigned char *bytes) {
     uint64_t length = 0;
@@ -65,10 +52,10 @@ static size_t crc_position(const unsigned char *bytes, size_t size) {
 
 static void crc_text(const unsigned char *bytes, size_t size, size_t at,
                      char text[CRC_DIGITS + 1]) {
-    uint32_t crc = crc_add(0, bytes, at);
-    crc = crc_add(crc, (const unsigned char *)"00000000", CRC_DIGITS);
-    crc = crc_add(crc, bytes + at + CRC_DIGITS, size - at - CRC_DIGITS);
-    snprintf(text, CRC_DIGITS + 1, "%08lx", (unsigned long)crc);
+    unsigned long crc = crc32_z(0, bytes, at);
+    crc = crc32_z(crc, (const unsigned char *)"00000000", CRC_DIGITS);
+    crc = crc32_z(crc, bytes + at + CRC_DIGITS, size - at - CRC_DIGITS);
+    snprintf(text, CRC_DIGITS + 1, "%08lx", crc);
 }
 
 int safetensors_seal(unsigned char *bytes, size_t size) {

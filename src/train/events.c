@@ -1,6 +1,9 @@
 #include "train/events.h"
 
+#include <stdlib.h>
 #include <string.h>
+
+#include "base/text.h"
 
 /* Most bytes of an event's head (wall time, step, length prefix), and of a scalar. */
 enum { HEAD_BYTES = 40, SCALAR_BYTES = EVENTS_TAG_MAX + 20, PAYLOAD_MAX = 128 * SCALAR_BYTES };
@@ -73,6 +76,17 @@ static void put_bytes(Buffer *buffer, int field, const void *data, size_t size) 
     buffer->size += size;
 }
 
+/* Makes the bytes from `begin` on one field: moves them and writes key and length before them. */
+static void enclose(Buffer *buffer, size_t begin, int field) {
+    unsigned char head[20];
+    Buffer before = {head, 0};
+    put_key(&before, field, WIRE_BYTES);
+    put_varint(&before, buffer->size - begin);
+    memmove(buffer->data + begin + before.size, buffer->data + begin, buffer->size - begin);
+    memcpy(buffer->data + begin, head, before.size);
+    buffer->size += before.size;
+}
+
 static int write_record(FILE *file, const Buffer *record) {
     unsigned char head[12], tail[4];
     Buffer head_buffer = {head, 0}, tail_buffer = {tail, 0};
@@ -139,4 +153,99 @@ int events_write_scalars(FILE *file, double wall_time, int64_t step, const char 
         count -= taken;
     }
     return 0;
+}
+
+/* ---- a text, and the hyperparameters: tensors that a plugin of TensorBoard reads ---- */
+
+/* SummaryMetadata: plugin_data = 1 {plugin_name = 1 string, content = 2 bytes}, data_class = 4.
+ * The buffer holds the content. Turns it into the metadata of a Summary.Value. */
+static void enclose_metadata(Buffer *buffer, const char *plugin) {
+    enclose(buffer, 0, 2);
+    put_bytes(buffer, 1, plugin, strlen(plugin));
+    enclose(buffer, 0, 1);
+    put_key(buffer, 4, WIRE_VARINT);
+    put_varint(buffer, 2); /* DATA_CLASS_TENSOR */
+    enclose(buffer, 0, 9);
+}
+
+/* TensorProto: dtype = 1 enum, tensor_shape = 2, float_val = 5, string_val = 8. text NULL: the
+ * number 0, for plugins that read the metadata only. */
+static void put_tensor(Buffer *buffer, const char *text) {
+    enum { TYPE_FLOAT = 1, TYPE_STRING = 7 };
+    size_t begin = buffer->size;
+    put_key(buffer, 1, WIRE_VARINT);
+    put_varint(buffer, text ? TYPE_STRING : TYPE_FLOAT);
+    put_bytes(buffer, 2, "", 0); /* a scalar */
+    if (text) {
+        put_bytes(buffer, 8, text, strlen(text));
+    } else {
+        put_float(buffer, 5, 0);
+    }
+    enclose(buffer, begin, 8); /* Summary.Value.tensor */
+}
+
+/* The buffer holds the plugin's content. Writes the event around it. */
+static int write_tensor(FILE *file, Buffer *buffer, double wall_time, const char *tag,
+                        const char *plugin, const char *text) {
+    enclose_metadata(buffer, plugin);
+    put_bytes(buffer, 1, tag, strnlen(tag, EVENTS_TAG_MAX));
+    put_tensor(buffer, text);
+    enclose(buffer, 0, 1); /* Summary.value */
+    enclose(buffer, 0, 5); /* Event.summary */
+    put_double(buffer, 1, wall_time);
+    return write_record(file, buffer);
+}
+
+enum { TENSOR_BYTES = EVENTS_TAG_MAX + 200 }; /* most that write_tensor adds to content and text */
+
+int events_write_text(FILE *file, double wall_time, const char *tag, const char *text) {
+    Buffer buffer = {malloc(strlen(text) + TENSOR_BYTES), 0};
+    int failed = !buffer.data || write_tensor(file, &buffer, wall_time, tag, "text", text) != 0;
+    free(buffer.data);
+    return failed ? -1 : 0;
+}
+
+/* google.protobuf.Value: number_value = 2 double, string_value = 3, bool_value = 4. */
+static void put_value(Buffer *buffer, const char *text) {
+    double number;
+    if (text_double(text, &number)) {
+        put_double(buffer, 2, number);
+    } else if (strcmp(text, "true") == 0 || strcmp(text, "false") == 0) {
+        put_key(buffer, 4, WIRE_VARINT);
+        put_varint(buffer, text[0] == 't');
+    } else {
+        put_bytes(buffer, 3, text, strlen(text));
+    }
+}
+
+/* SessionStartInfo: hparams = 1 map of string (1) to Value (2), start_time_secs = 5 double. It is
+ * field 3 of HParamsPluginData. */
+static void put_session(Buffer *buffer, const Settings *settings, double wall_time) {
+    for (int i = 0; i < settings->count; i++) {
+        size_t entry = buffer->size;
+        put_bytes(buffer, 1, settings->list[i].key, strlen(settings->list[i].key));
+        size_t value = buffer->size;
+        put_value(buffer, settings->list[i].value);
+        enclose(buffer, value, 2);
+        enclose(buffer, entry, 1);
+    }
+    put_double(buffer, 5, wall_time);
+    enclose(buffer, 0, 3);
+}
+
+int events_write_settings(FILE *file, double wall_time, const Settings *settings) {
+    enum { PAIR_BYTES = 40 }; /* keys and lengths around the texts, or a number */
+    size_t size = TENSOR_BYTES;
+    for (int i = 0; i < settings->count; i++) {
+        size += strlen(settings->list[i].key) + strlen(settings->list[i].value) + PAIR_BYTES;
+    }
+    Buffer buffer = {malloc(size), 0};
+    int failed = !buffer.data;
+    if (!failed) {
+        put_session(&buffer, settings, wall_time);
+        failed = write_tensor(file, &buffer, wall_time, "_hparams_/session_start_info", "hparams",
+                              NULL) != 0;
+    }
+    free(buffer.data);
+    return failed ? -1 : 0;
 }

@@ -137,6 +137,42 @@ Log *log_open(const char *folder, const char *const *columns, int count, int64_t
     return log;
 }
 
+/* Markdown of a text that is shown as it is: four blanks before each line. Returns NULL when memory
+ * runs out. */
+static char *indented(const char *text) {
+    char *copy = NULL;
+    size_t size;
+    FILE *out = open_memstream(&copy, &size);
+    for (; out && *text; text += strcspn(text, "\n"), text += *text == '\n') {
+        fprintf(out, "    %.*s\n", (int)strcspn(text, "\n"), text);
+    }
+    if (!out || fclose(out) != 0) {
+        free(copy);
+        return NULL;
+    }
+    return copy;
+}
+
+MildStatus log_config(Log *log, const char *config, MildError *error) {
+    Settings settings;
+    MildStatus status = settings_read(config, "config.ini", &settings, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    char *text = indented(config);
+    const double now = wall_time();
+    if (!text) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "log: out of memory");
+    } else if (events_write_text(log->events, now, "config", text) != 0 ||
+               events_write_settings(log->events, now, &settings) != 0 ||
+               fflush(log->events) != 0) {
+        status = io_fail(log->events_path, error);
+    }
+    free(text);
+    settings_free(&settings);
+    return status;
+}
+
 MildStatus log_row(Log *log, int64_t iteration, const double *values, MildError *error) {
     int failed = fprintf(log->csv, "%lld", (long long)iteration) < 0;
     for (int i = 0; i < log->count && !failed; i++) {

@@ -17,6 +17,10 @@ typedef struct Log Log;
 Log *log_open(const char *folder, const char *const *columns, int count, int64_t resume_after,
               MildError *error);
 
+/* Writes the text of config.ini into the TensorBoard file, as a text and as hyperparameters. Call
+ * it once, after log_open. */
+MildStatus log_config(Log *log, const char *config, MildError *error);
+
 /* values: [count]. Both files are complete up to here when the call returns. */
 MildStatus log_row(Log *log, int64_t iteration, const double *values, MildError *error);
 

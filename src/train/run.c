@@ -289,7 +289,7 @@ static MildStatus open_log(TrainRun *run, MildError *error) {
     name_columns(run);
     run->log = log_open(run->def.folder, run->column, COLUMNS,
                         run->def.resume ? train_iteration(run->trainer) : -1, error);
-    return run->log ? MILD_OK : error->status;
+    return run->log ? log_config(run->log, run->def.config, error) : error->status;
 }
 
 static MildStatus build(TrainRun *run, MildError *error) {

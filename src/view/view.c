@@ -729,6 +729,9 @@ static void pose_robot(View *view, const double *qpos) {
 
 static void draw_labels(View *view, mjrRect viewport, const RobotSim *sim, const ViewInfo *info) {
     draw_text(view, viewport, sim, info);
+    if (info->note) {
+        mjr_overlay(mjFONT_NORMAL, mjGRID_BOTTOMLEFT, viewport, info->note, NULL, &view->context);
+    }
     if (!view->def.rigid) {
         draw_inset(view, viewport, sim);
     }
@@ -763,6 +766,10 @@ void view_frame(View *view, const RobotSim *sim, const ViewInfo *info) {
     draw_labels(view, viewport, sim, info);
     mjrRect text = {0, viewport.height / 2, viewport.width / 2, viewport.height / 2};
     paste_labels(view, viewport, text);
+    if (info->note) {
+        text.bottom = 0;
+        paste_labels(view, viewport, text);
+    }
     if (!view->def.rigid) {
         paste_labels(view, viewport, inset_place(view, viewport));
     }

@@ -27,6 +27,7 @@ typedef struct {
     double command[3]; /* [m/s, m/s, rad/s] */
     double speed;      /* [m/s] measured, forward */
     int fell;          /* bool */
+    const char *note;  /* in the lower left corner, below each other; NULL: nothing */
 } ViewInfo;
 
 typedef struct View View;

@@ -28,6 +28,9 @@ static void on_key(GLFWwindow *handle, int key, int scancode, int action, int mo
         return;
     }
     WindowInput *input = &((Window *)glfwGetWindowUserPointer(handle))->input;
+    if (key >= GLFW_KEY_1 && key <= GLFW_KEY_9) {
+        input->ground = key - GLFW_KEY_1 + 1;
+    }
     switch (key) {
     case GLFW_KEY_ESCAPE: input->quit = 1; break;
     case GLFW_KEY_SPACE: input->paused = !input->paused; break;
@@ -39,6 +42,10 @@ static void on_key(GLFWwindow *handle, int key, int scancode, int action, int mo
     case GLFW_KEY_Q: input->command[1] += SPEED_STEP; break;
     case GLFW_KEY_E: input->command[1] -= SPEED_STEP; break;
     case GLFW_KEY_S: input->halt = 1; break;
+    case GLFW_KEY_F: input->friction++; break;
+    case GLFW_KEY_V: input->friction--; break;
+    case GLFW_KEY_K: input->stiffness++; break;
+    case GLFW_KEY_M: input->stiffness--; break;
     case GLFW_KEY_EQUAL: input->time_scale = fmin(2.0 * input->time_scale, 4.0); break;
     case GLFW_KEY_MINUS: input->time_scale = fmax(0.5 * input->time_scale, 0.0625); break;
     default: break;
@@ -117,6 +124,7 @@ void window_show(Window *window, WindowInput *input) {
     }
     *input = window->input;
     window->input.reset = window->input.halt = 0;
+    window->input.ground = window->input.friction = window->input.stiffness = 0;
     window->input.turn = window->input.lift = window->input.zoom = 0;
     memset(window->input.command, 0, sizeof window->input.command);
 }

@@ -7,11 +7,13 @@
 typedef struct Window Window;
 
 typedef struct {
-    int quit;          /* bool: Esc or the window was closed */
-    int paused;        /* bool: toggled by space */
-    int reset;         /* bool: R was pressed since the last call */
-    int halt;          /* bool: S was pressed since the last call */
-    double time_scale; /* [-] 1 is real time; - and = change it */
+    int quit;                /* bool: Esc or the window was closed */
+    int paused;              /* bool: toggled by space */
+    int reset;               /* bool: R was pressed since the last call */
+    int halt;                /* bool: S was pressed since the last call */
+    int ground;              /* 1 .. 9: that digit was pressed since the last call; 0: none */
+    int friction, stiffness; /* presses of F less those of V, of K less those of M, since then */
+    double time_scale;       /* [-] 1 is real time; - and = change it */
     double command[3]; /* [m/s, m/s, rad/s] change wished since the last call: arrows and Q/E */
     double turn, lift, zoom; /* camera: mouse drag [rad], wheel [-], since the last call */
 } WindowInput;

@@ -67,6 +67,11 @@ truncate -s 1000 torn/checkpoint_000000002.safetensors
 good "$mild" train --out torn "${tiny[@]}" --train.iterations=4 --resume
 same_numbers whole/$last torn/$last
 
+# the config is in the event file too, as TensorBoard's hyperparameters
+for word in _hparams_/session_start_info train.checkpoint_every; do
+    grep -qa "$word" whole/events.out.tfevents.* || fail "no $word in the event file"
+done
+
 # mistakes
 bad "holds 3 checkpoints" "$mild" train --out whole
 bad "resume with the checkpoint's config" "$mild" train --out whole --resume --train.envs=8

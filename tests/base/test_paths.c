@@ -81,6 +81,16 @@ static void test_data(void **state) {
     *name = '/';
     const char *relative = parent + 1; /* tests/base_test_paths: only beside the executable */
     assert_string_equal(path_data(relative, path), itself);
+
+    char installed[PATH_SIZE]; /* as bin/mild finds share/mild/... */
+    *parent = '\0';
+    assert_true(snprintf(installed, sizeof installed, "%.900s/share/mild/paths", itself) > 0);
+    assert_int_equal(path_make_folder(installed, NULL), MILD_OK);
+    assert_string_equal(path_data("paths", path), installed);
+    for (int level = 0; level < 3; level++) { /* paths, mild, share */
+        assert_int_equal(rmdir(installed), 0);
+        *strrchr(installed, '/') = '\0';
+    }
 }
 
 static void test_make_folder(void **state) {

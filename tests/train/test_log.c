@@ -1,5 +1,7 @@
-/* The run log: CSV that survives a kill, TensorBoard records whose frames check. */
+/* The run log: CSV that survives a kill and reads back, TensorBoard records whose frames check and
+ * which hold the config. */
 #include <dirent.h>
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -14,6 +16,7 @@
 
 #include "base/paths.h"
 #include "train/events.h"
+#include "train/history.h"
 #include "train/log.h"
 
 static char folder[64];
@@ -127,11 +130,215 @@ static void test_records(void **state) {
     assert_true(records >= 3);
 }
 
+/* The bytes of a protobuf field, by its number: of the first, or of the one after `previous`. */
+typedef struct {
+    const unsigned char *data;
+    size_t size; /* of a varint: 0, and `number` is its value */
+    uint64_t number;
+} Part;
+
+static uint64_t varint(const unsigned char **at) {
+    uint64_t value = 0;
+    for (int shift = 0;; shift += 7) {
+        value |= (uint64_t)(**at & 0x7f) << shift;
+        if (!(*(*at)++ & 0x80)) {
+            return value;
+        }
+    }
+}
+
+static Part part(Part whole, uint64_t field, int skip) {
+    const unsigned char *at = whole.data, *end = whole.data + whole.size;
+    while (at < end) {
+        const uint64_t key = varint(&at), wire = key & 7;
+        Part found = {at, wire == 1 ? 8 : wire == 5 ? 4 : 0, 0};
+        if (wire == 0 || wire == 2) {
+            found.number = varint(&at);
+            found.data = at;
+            found.size = wire == 2 ? found.number : 0;
+        }
+        at = found.data + found.size;
+        if (key >> 3 == field && skip-- == 0) {
+            return found;
+        }
+    }
+    fail_msg("no field %d", (int)field);
+    return whole;
+}
+
+/* Follows a path of field numbers. */
+static Part follow(Part whole, const int *path) {
+    for (; *path; path++) {
+        whole = part(whole, (uint64_t)*path, 0);
+    }
+    return whole;
+}
+#define FOLLOW(whole, ...) follow(whole, (const int[]){__VA_ARGS__, 0})
+
+static void assert_text(Part found, const char *text) {
+    assert_int_equal(found.size, strlen(text));
+    assert_memory_equal(found.data, text, found.size);
+}
+
+static double number_in(Part found) {
+    double value;
+    assert_int_equal(found.size, 8);
+    memcpy(&value, found.data, 8);
+    return value;
+}
+
+/* The n-th record of the folder's event file. */
+static Part record(const char *data, int n) {
+    for (; n--; data += 16 + little_endian((const unsigned char *)data)) {
+        continue;
+    }
+    return (Part){(const unsigned char *)data + 12, little_endian((const unsigned char *)data), 0};
+}
+
+/* Field numbers of TensorBoard's event.proto, summary.proto, tensor.proto and hparams' plugin_data
+ * .proto: an event's summary (5), its value (1): tag 1, tensor 8, metadata 9. */
+static void test_config(void **state) {
+    (void)state;
+    static const char *const columns[] = {"rate"};
+    static char data[4096];
+    MildError error = {0};
+    Log *log = log_open(folder, columns, 1, -1, &error);
+    assert_non_null(log);
+    assert_int_equal(
+        log_config(log, "[train]\nenvs = 64\nvx = 0 1.2\n\n[ppo]\nmirror = true\n", &error),
+        MILD_OK);
+    log_close(log);
+    DIR *dir = opendir(folder);
+    char path[PATH_SIZE] = "";
+    for (struct dirent *entry; (entry = readdir(dir));) {
+        if (strncmp(entry->d_name, "events.", 7) == 0) {
+            path_join(folder, entry->d_name, path, NULL);
+        }
+    }
+    closedir(dir);
+    read_file(path, data, sizeof data);
+
+    const Part text = FOLLOW(record(data, 1), 5, 1);
+    assert_text(FOLLOW(text, 1), "config");
+    assert_text(FOLLOW(text, 9, 1, 1), "text");
+    assert_int_equal(FOLLOW(text, 8, 1).number, 7); /* DT_STRING */
+    assert_text(FOLLOW(text, 8, 8), "    [train]\n    envs = 64\n    vx = 0 1.2\n    \n    [ppo]\n"
+                                    "    mirror = true\n");
+
+    const Part session = FOLLOW(record(data, 2), 5, 1);
+    assert_text(FOLLOW(session, 1), "_hparams_/session_start_info");
+    assert_text(FOLLOW(session, 9, 1, 1), "hparams");
+    const Part start = FOLLOW(session, 9, 1, 2, 3);
+    assert_true(number_in(FOLLOW(start, 5)) > 1e9);
+    assert_text(FOLLOW(part(start, 1, 0), 1), "train.envs");
+    assert_true(number_in(FOLLOW(part(start, 1, 0), 2, 2)) == 64);
+    assert_text(FOLLOW(part(start, 1, 1), 1), "train.vx");
+    assert_text(FOLLOW(part(start, 1, 1), 2, 3), "0 1.2");
+    assert_text(FOLLOW(part(start, 1, 2), 1), "ppo.mirror");
+    assert_int_equal(FOLLOW(part(start, 1, 2), 2, 4).number, 1);
+}
+
+/* ---- log.csv read back ---- */
+
+static MildStatus read_log(const char *text, size_t size, History *history, MildError *error) {
+    char path[PATH_SIZE];
+    path_join(folder, "log.csv", path, NULL);
+    FILE *file = fopen(path, "wb");
+    assert_int_equal(fwrite(text, 1, size, file), size);
+    fclose(file);
+    return history_read(path, history, error);
+}
+
+static void test_history(void **state) {
+    (void)state;
+    static const char *const columns[] = {"reward/gait", "rate"};
+    char path[PATH_SIZE];
+    MildError error = {0};
+    History history;
+    Log *log = log_open(folder, columns, 2, -1, &error);
+    assert_int_equal(log_row(log, 3, (double[]){0.125, 1e9}, &error), MILD_OK);
+    assert_int_equal(log_row(log, 4, (double[]){NAN, -2e-7}, &error), MILD_OK);
+    log_close(log);
+    path_join(folder, "log.csv", path, NULL);
+    FILE *torn = fopen(path, "a");
+    fputs("5,2.5,7", torn);
+    fclose(torn);
+    assert_int_equal(history_read(path, &history, &error), MILD_OK);
+    assert_int_equal(history.rows, 2);
+    assert_int_equal(history.columns, 3);
+    assert_int_equal(history_column(&history, "reward/gait"), 1);
+    assert_int_equal(history_column(&history, "reward"), -1);
+    const double *v = history.value;
+    assert_true(v[0] == 3 && v[1] == 0.125 && v[2] == 1e9 && v[3] == 4 && v[5] == -2e-7);
+    assert_true(isnan(v[4]));
+    history_free(&history);
+
+    static const struct {
+        const char *text, *says;
+        size_t size;
+    } bad[] = {{"", "does not begin with", 0},
+               {"iteration,a", "does not begin with", 11},
+               {"time,a\n1,2\n", "does not begin with", 11},
+               {"iteration\n1\n", "does not begin with", 12},
+               {"iteration,a\n", "no row yet", 12},
+               {"iteration,a\n1,2", "no row yet", 15},
+               {"iteration,a\n1,2\n2\n3,4\n", "log.csv:3: 1 numbers under 2", 22},
+               {"iteration,a\n1,2,3\n", "log.csv:2: 3 numbers under 2", 18},
+               {"iteration,a\n1,\n2,3\n", "log.csv:2: '1,' is not a row", 19},
+               {"iteration,a\n1,x\n", "log.csv:2: '1,x' is not a row", 16},
+               {"iteration,a\n\n", "log.csv:2: '' is not a row", 13},
+               {"iteration,a\n2,2\n2,3\n", "log.csv:3: iteration 2 after 2", 20},
+               {"iteration,a\nnan,2\n", "log.csv:2: nan is no iteration", 18},
+               {"iteration,a\n-1,2\n", "log.csv:2: -1 is no iteration", 17},
+               {"iteration,a\n1e300,2\n", "log.csv:2: 1e+300 is no iteration", 20},
+               {"iteration,a\n1,2\n\0,3\n", "zero byte", 20}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_int_not_equal(read_log(bad[i].text, bad[i].size, &history, &error), MILD_OK);
+        assert_non_null(strstr(error.text, bad[i].says));
+    }
+    char *many = malloc(20000), *end = stpcpy(many, "iteration,a\n");
+    for (int i = 0; i <= 999; i++) {
+        end += sprintf(end, i % 2 ? "%d,nan\n" : "%d,%d\n", i, 3 * i);
+    }
+    assert_int_equal(read_log(many, (size_t)(end - many), &history, &error), MILD_OK);
+    free(many);
+    double mean[10]; /* at 0, 111 .. 999: of the even iterations within 55.5 */
+    history_means(&history, 1, 0, 999, 10, mean);
+    assert_true(mean[0] == 3 * 27 && mean[1] == 3 * 111 && mean[2] == 3 * 222);
+    assert_true(mean[9] == 3 * 971);
+    history_means(&history, 1, -2000, -1000, 10, mean);
+    assert_true(isnan(mean[0]) && isnan(mean[9]));
+    history_free(&history);
+
+    assert_int_equal(read_log("iteration,a\r\n1,2\r\n", 18, &history, &error), MILD_OK);
+    assert_string_equal(history.name[1], "a");
+    history_free(&history);
+}
+
+static void test_settings(void **state) {
+    (void)state;
+    MildError error = {0};
+    Settings settings;
+    assert_int_equal(settings_read("[train]\nenvs = 4\n; a remark\n[ppo]\nenvs = a b\n", "it",
+                                   &settings, &error),
+                     MILD_OK);
+    assert_int_equal(settings.count, 2);
+    assert_string_equal(settings_find(&settings, "train.envs"), "4");
+    assert_string_equal(settings_find(&settings, "ppo.envs"), "a b");
+    assert_null(settings_find(&settings, "envs"));
+    settings_free(&settings);
+    assert_int_not_equal(settings_read("[train]\nenvs\n", "it", &settings, &error), MILD_OK);
+    assert_non_null(strstr(error.text, "it:2: "));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_crc32c),
         cmocka_unit_test_setup_teardown(test_csv_resume, make_folder, remove_folder),
         cmocka_unit_test_setup_teardown(test_records, make_folder, remove_folder),
+        cmocka_unit_test_setup_teardown(test_config, make_folder, remove_folder),
+        cmocka_unit_test_setup_teardown(test_history, make_folder, remove_folder),
+        cmocka_unit_test(test_settings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

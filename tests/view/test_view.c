@@ -121,6 +121,14 @@ static void robot_and_prints_are_seen(void **state) {
     assert_true(prints > 20 && prints < robot_pixels);
     assert_int_equal(view_reset(view, &terrain, &error), MILD_OK);
     view_frame(view, sim, &info);
+    memcpy(standing, view_pixels(view), bytes);
+    info.note = "friction 0.60";
+    view_frame(view, sim, &info);
+    const size_t half = bytes / 2; /* rows from the top: the note is in the lower half */
+    assert_true(pixels_different(standing + half, view_pixels(view) + half, half) > 100);
+    assert_true(pixels_different(standing, view_pixels(view), half) < 100);
+    info.note = NULL;
+    view_frame(view, sim, &info);
     assert_true(pixels_different(empty, view_pixels(view), bytes) < prints / 4);
     free(empty);
     free(standing);

@@ -1,0 +1,44 @@
+/* The table of commands. */
+#include "app/commands.h"
+
+#include <stdio.h>
+
+#ifndef MILD_VIEW
+int cmd_play(int argc, char **argv) {
+    (void)argc;
+    (void)argv;
+    return cli_fail_text("play", "built without drawing; configure with -DMILD_VIEW=ON");
+}
+#endif
+
+const char commands_about[] = "soft ground for legged robots";
+const char commands_exit[] =
+    "The exit code is 0 on success and 2 after\nan error, which is one line "
+    "on standard error.";
+const char commands_examples[] =
+    "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
+    "  mild press --ground foam45 --depth 0.03\n";
+
+const AppCommand commands[] = {
+    {"train", cmd_train, "train a walking policy on soft ground"},
+    {"eval", cmd_eval, "measure how a policy walks on several grounds and at several speeds"},
+    {"play", cmd_play, "watch a policy walk, in a window or as a video"},
+    {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
+    {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
+    {"report", cmd_report, "draw the curves of training runs on one page"},
+    {"bench", cmd_bench, "measure speed and memory on this machine"},
+    {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
+};
+const int command_count = sizeof commands / sizeof *commands;
+_Static_assert(sizeof commands / sizeof *commands <= COMMANDS_MAX, "main has room for their names");
+
+void commands_describe(void (*print)(const CliCommand *command)) {
+    for (int i = 0; i < command_count; i++) {
+        char name[16], help[] = "--help";
+        char *words[] = {name, help, NULL};
+        snprintf(name, sizeof name, "%s", commands[i].name);
+        cli_set_help(print);
+        commands[i].run(2, words);
+    }
+    cli_set_help(NULL);
+}

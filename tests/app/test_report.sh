@@ -1,0 +1,93 @@
+#!/usr/bin/env bash
+# mild report: what the page shows of run folders, and what it says of damaged ones. Usage: test_report.sh PATH_TO_MILD
+source "$(dirname "$0")/../kit.sh" "$1"
+
+# run FOLDER SEED FACTOR: a run of 101 iterations whose return is FACTOR times the iteration, and a column of its own.
+run() {
+    mkdir "$1"
+    awk -v f="$3" 'BEGIN { print "iteration,episode/reward,loss/value,reward/gait,reward/none,mine"
+        for (i = 0; i <= 100; i++) printf "%d,%g,%g,0.5,0,nan\n", i, f * i, 10 ^ (-i / 50) }' >"$1/log.csv"
+    printf '[train]\nenvs = %s\nseed = %s\n[terrain]\nseed = 1\n' "${4:-64}" "$2" >"$1/config.ini"
+}
+run seed1 1 1
+run seed2 2 3
+run seed3 3 5
+run other 1 0.5 '<128>'
+printf '0.1.0 & more\nmild train\n' >seed1/version.txt
+cat >seed2/eval.json <<'END'
+{"rows": [{"ground": "sand_loose", "speed": 0.6, "trials": 10, "success": 9, "velocity": 0.59, "cot": 0.7, "penetration": 0.074}]}
+END
+printf 'ten bytes!' >seed1/small.mp4
+head -c 4194305 /dev/zero >'other/big one.mp4'
+mkdir pages
+
+expect 0 'report seed1/report.html' "$mild" report seed1
+expect 0 '' "$mild" report seed1 seed2 other seed3 --out pages/page.html
+page=$(cat pages/page.html)
+"$mild" report seed1 seed2 --out - | head -1 | grep -q '^<!doctype html>$' || fail "--out -: standard output is not the page alone"
+! grep -qE '(src|href)="?(http|//)|<script|<link|@import|url\(' <<<"$page" || fail "the page needs other files"
+has() { grep -qF -- "$1" <<<"$page" || fail "the page has not: $1"; }
+has '0.1.0 &amp; more'
+has '<td>sand_loose<td class=n>9 of 10<td class=n>0.60<td class=n>0.59<td class=n>0.70<td class=n><td class=n><td class=n>74<td'
+has "src=\"data:video/mp4;base64,$(printf 'ten bytes!' | base64)\""
+has 'src="../other/big%20one.mp4"'
+has '<tr><td>train.envs<td>64<td>&lt;128&gt;<td>' # default: whatever it is
+has 'seed1 (3 seeds)'
+has '>gait</text>'
+! grep -q '>none</text>' <<<"$page" || fail "a chart of a reward that is 0 throughout"
+! grep -q '<td>terrain.seed' <<<"$(sed -n '/Between the runs/,/<\/table>/p' <<<"$page")" || fail "keys that do not differ are listed"
+alone=$(cat seed1/report.html)
+grep -q 'From the defaults' <<<"$alone" && ! grep -q 'Between the runs' <<<"$alone" || fail "differences of a single run"
+
+# The curves of the return: the mean of the seeds is 3 i, its band from i to 5 i, the other run is i / 2. So at the last iteration
+# the heights above that of the first are as 3 to 1 to 5 to 0.5, and the axis is linear in i.
+python3 - pages/page.html <<'END' || fail "curves of the return"
+import re, sys
+page = open(sys.argv[1], encoding="utf-8").read()
+def paths(title):
+    svg = next(s for s in page.split("<svg")[1:] if f">{title}</text>" in s.split("</svg>")[0])
+    svg = svg.split("</svg>")[0]
+    return [(re.search("#[0-9a-f]{6}", style).group(), [tuple(map(float, p.split())) for p in re.findall(r"[ML]([^MLh]+)", way)])
+            for style, way in re.findall(r'<path (fill.*?) d="([^"]*)"', svg)]
+(band_color, band), (mean_color, mean), (other_color, other) = paths("return of an episode")
+assert band_color == mean_color != other_color
+assert len(mean) == len(other) == 101 and len(band) == 202
+rise = lambda p: mean[0][1] - p[1]
+assert abs(rise(mean[100]) - 6 * rise(other[100])) < 0.3, (mean[100], other[100])
+assert abs(rise(band[100]) - 5 / 3 * rise(mean[100])) < 0.2 and abs(rise(band[101]) - rise(mean[100]) / 3) < 0.2
+assert all(abs(rise(p) - i / 100 * rise(mean[100])) < 0.11 for i, p in enumerate(mean))
+assert all(abs(p[0] - mean[0][0] - i / 100 * (mean[100][0] - mean[0][0])) < 0.11 for i, p in enumerate(mean))
+_, value = paths("value loss")[-1]  # 10^(-i / 50): a straight line where the axis is logarithmic
+assert all(abs(p[1] - value[0][1] - i / 100 * (value[100][1] - value[0][1])) < 0.11 for i, p in enumerate(value))
+labels = [float(x) for x in re.findall(r"text-anchor=end>([-0-9.e]+)<", page.split(">value loss</text>")[1].split("</svg>")[0])]
+assert labels == [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1], labels
+END
+
+# a training is writing the last row; a run without a config
+printf '101,7' >>seed1/log.csv
+rm other/config.ini
+expect 0 '' "$mild" report seed1 other --out again.html
+grep -q '<td class=n>100<' again.html || fail "the last complete row is not the last iteration"
+
+bad 'nowhere/log.csv: cannot read: No such file.*; name a run folder' "$mild" report nowhere
+bad 'no run given' "$mild" report
+bad 'seed1/config.ini is read' "$mild" report seed1 --out seed1/config.ini
+bad 'seed2/eval.json is read' "$mild" report seed1 seed2 --out seed2/eval.json
+bad 'No space left' "$mild" report seed1 --out /dev/full
+bad 'no/where.html' "$mild" report seed1 --out no/where.html
+mkdir new torn foreign odd folder folder/log.csv
+head -1 seed1/log.csv >new/log.csv
+bad 'new/log.csv: no row yet; wait' "$mild" report new
+sed '3s/,.*//' seed2/log.csv >torn/log.csv
+bad 'torn/log.csv:3: 1 numbers under 6 columns; remove the line' "$mild" report seed2 torn
+printf 'time_s,depth_m\n0,1\n' >foreign/log.csv
+bad "foreign/log.csv: its first line does not begin with 'iteration,'" "$mild" report foreign
+cp seed2/log.csv odd/
+printf '{"rows": 1}' >odd/eval.json
+bad 'odd/eval.json: not what mild eval --json writes' "$mild" report odd
+rm odd/eval.json
+printf '[train]\nenvs\n' >odd/config.ini
+bad 'odd/config.ini:2: neither' "$mild" report odd
+bad 'folder/log.csv' "$mild" report folder
+
+finish "report: pages, curves, bad input"

@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Every JSON that the program writes fits its schema in docs/schema, and the check sees what does not.
+# Usage: test_schema.sh PATH_TO_MILD SOURCE_FOLDER
+source=$(realpath "$2")
+source "$(dirname "$0")/../kit.sh" "$1"
+check=(python3 "$source/tests/app/schema.py")
+
+fit() {
+    "${check[@]}" "$source/docs/schema/$1.json" "${@:2}" || fail "$1: ${*:2}"
+}
+# unfit SCHEMA PATTERN: what bad.json breaks.
+unfit() {
+    "${check[@]}" "$source/docs/schema/$1.json" bad.json | grep -- "$2" >/dev/null || fail "$1: '$2' is not seen in $(cat bad.json)"
+}
+
+eval=("$mild" eval --trials 1 --seconds 0.3)
+"${eval[@]}" --ground rigid,rubber+foam45 --speed 0,0.6 --json walk.json >/dev/null || fail "eval"
+"${eval[@]}" --ground grass --ablate z --turn 0.4 --json ablate.json >/dev/null || fail "eval --ablate"
+"${eval[@]}" --ground grass --controller stand --speed 0 --seconds 3 --json stand.json >/dev/null || fail "eval --controller"
+"${eval[@]}" --ground grass --train.robots=batch --json batch.json >/dev/null || fail "eval in the batch engine"
+fit eval walk.json ablate.json stand.json batch.json
+
+"$mild" bench memory --train.envs=16 --json bench.json >/dev/null || fail "bench"
+fit bench bench.json
+
+"$mild" press --ground foam45 --plate 0.2,0.1 --depth 0.03 --csv foam.csv >/dev/null || fail "press"
+"$mild" press --ground sand_loose --plate 0.1,0.1 --csv sand.csv >/dev/null || fail "press"
+"$mild" fit foam.csv --plate 0.2,0.1 --json foam.json >/dev/null || fail "fit"
+"$mild" fit sand.csv --plate 0.1,0.1 --hold alpha=1.05 --json sand.json >/dev/null || fail "fit --hold"
+"$mild" fit sand.csv --plate 0.1,0.1 --model bekker --json bekker.json >/dev/null || fail "fit --model"
+fit fit foam.json sand.json bekker.json
+
+# each kind of fault, in a copy of what fits
+sed 's/"trials":.*/"trials": 1.5,/' walk.json >bad.json && unfit eval '.rows\[0\].trials: no integer'
+sed 's/"cot":.*/"cot": null,/' walk.json >bad.json && unfit eval '.rows\[0\].cot: no number'
+sed '/"speed":/d' walk.json >bad.json && unfit eval '.rows\[3\]: no speed'
+sed 's/"energy":/"energie":/' walk.json >bad.json && unfit eval '.rows\[0\].energie: not in the schema'
+sed 's/"torque_max":.*/"torque_max": -1,/' walk.json >bad.json && unfit eval 'torque_max: below 0'
+sed 's/"version":.*/"version": "new",/' walk.json >bad.json && unfit eval '.version: not of the form'
+sed '/"policy":/d' walk.json >bad.json && unfit eval ': not one of'
+printf '{"machine": "m", "version": "0.1.0", "rows": []}' >bad.json && unfit bench '.rows: fewer than 1'
+sed 's/"value":.*/"value": "much",/' foam.json >bad.json && unfit fit '.value: no number'
+
+finish "every JSON fits its schema"

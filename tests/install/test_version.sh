@@ -1,0 +1,53 @@
+#!/usr/bin/env bash
+# One version: CMakeLists.txt, CITATION.cff and CHANGELOG.md agree, and the program's version follows commit and tag as
+# cmake/Version.cmake says. Usage: test_version.sh SOURCE_FOLDER
+set -u
+source=$(realpath "$1")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work"
+failures=0
+
+fail() {
+    echo "FAIL: $*" >&2
+    failures=$((failures + 1))
+}
+
+version=$(sed -n 's/^project(mild VERSION \([0-9.]*\) .*/\1/p' "$source/CMakeLists.txt")
+[[ $version =~ ^[0-9]+\.[0-9]+\.[0-9]+$ ]] || fail "version of CMakeLists.txt: '$version'"
+[ "$(sed -n 's/^version: //p' "$source/CITATION.cff")" = "$version" ] || fail "CITATION.cff does not say $version"
+[ "$(sed -n 's/^## \[\([0-9.]*\)\].*/\1/p' "$source/CHANGELOG.md" | head -1)" = "$version" ] ||
+    fail "the newest version in CHANGELOG.md is not $version"
+
+# says PATTERN: what the header says of the folder `tree`.
+says() {
+    rm -f header.h
+    cmake -DSOURCE="$work/tree" -DBASE=1.2.3 -DHEADER="$work/header.h" -P "$source/cmake/Version.cmake" 2>errors
+    grep -qE "^#define MILD_VERSION \"$1\"\$" header.h || fail "not $1 but $(cat header.h errors)"
+}
+git() {
+    GIT_CONFIG_GLOBAL=/dev/null command git -C tree -c user.name=a -c user.email=a@b "$@" >/dev/null || fail "git $*"
+}
+
+mkdir tree
+GIT_CEILING_DIRECTORIES=$work says '1\.2\.3' # no repository
+command git init -q tree
+echo one >tree/file
+git add file
+git commit -qm one
+says '1\.2\.3\+g[0-9a-f]{9,}'
+git tag checkpoint-v9
+says '1\.2\.3\+g[0-9a-f]{9,}'
+git tag v1.2.3
+says '1\.2\.3'
+echo two >tree/file
+says '1\.2\.3\+g[0-9a-f]{9,}\.dirty'
+git commit -qam two
+says '1\.2\.3\+g[0-9a-f]{9,}'
+git tag v1.3.0
+cmake -DSOURCE="$work/tree" -DBASE=1.2.3 -DHEADER="$work/header.h" -P "$source/cmake/Version.cmake" 2>errors &&
+    fail "a wrong tag is not an error"
+tr -s ' \n' ' ' <errors | grep -q 'the tag v1.3.0, but CMakeLists.txt says VERSION 1.2.3: change one' || fail "$(cat errors)"
+
+[ "$failures" = 0 ] && echo "version $version; commit and tag decide the rest"
+exit $((failures > 0))
