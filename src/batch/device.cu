@@ -17,30 +17,23 @@ extern "C" MildStatus device_wait(int device, MildError *error) {
     return checked(cudaDeviceSynchronize(), "step", error);
 }
 
-/* Few robots of a call forget: a warp looks at several. */
-enum { FORGET_THREADS = 256, FORGET_ROBOTS = 4 };
-
 __global__ void device_forget(BatchShape shape, BatchArrays arrays, const uint8_t *which) {
+    const long robot = blockIdx.x;
+    if (which && !which[robot]) {
+        return;
+    }
+    Real *memory = batch_memory(&shape, &arrays, robot);
     const int numbers = contact_memory_numbers(shape.groups * shape.stride, shape.map);
-    const long warp = (blockIdx.x * (long)FORGET_THREADS + threadIdx.x) / LANES;
-    for (long robot = FORGET_ROBOTS * warp; robot < FORGET_ROBOTS * (warp + 1); robot++) {
-        if (robot >= shape.robots || (which && !which[robot])) {
-            continue;
-        }
-        Real *memory = batch_memory(&shape, &arrays, robot);
-        for (int i = LANE(0); i < numbers; i += LANES) {
-            memory[i] = 0;
-        }
+    for (int i = (int)threadIdx.x; i < numbers; i += (int)blockDim.x) {
+        memory[i] = 0;
     }
 }
 
 extern "C" MildStatus device_reset(const MildBatch *batch, const uint8_t *which, void *stream,
                                    MildError *error) {
-    enum { BLOCK_ROBOTS = FORGET_THREADS / LANES * FORGET_ROBOTS };
-    const int blocks = (batch->shape.robots + BLOCK_ROBOTS - 1) / BLOCK_ROBOTS;
     OnDevice on(batch->device);
-    device_forget<<<blocks, FORGET_THREADS, 0, (cudaStream_t)stream>>>(batch->shape, batch->arrays,
-                                                                       which);
+    device_forget<<<batch->shape.robots, 256, 0, (cudaStream_t)stream>>>(batch->shape,
+                                                                         batch->arrays, which);
     return checked(cudaGetLastError(), "reset", error);
 }
 

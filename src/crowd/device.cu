@@ -18,7 +18,6 @@ enum {
     TASK_THREADS = 128,
     TASK_ROBOTS = TASK_THREADS / PLACE_LANES, /* of a block */
     TASK_BLOCKS = 8,                          /* blocks of a multiprocessor, at least */
-    POSE_ROBOTS = 4,                          /* that a warp looks at, since few begin an episode */
     TALLY_THREADS = 256,
     ORDER_THREADS = 1024
 };
@@ -80,8 +79,8 @@ static __global__ void __launch_bounds__(TASK_THREADS)
 static __global__ void __launch_bounds__(WARP_THREADS)
     pose(const __grid_constant__ CrowdArrays all) {
     extern __shared__ __align__(16) Real shared[];
-    const long warps = (long)gridDim.x * CROWD_WARPS;
-    for (long robot = warp_robot(); robot < all.envs; robot += warps) {
+    const long robot = warp_robot();
+    if (robot < all.envs) {
         crowd_pose(&all, robot, (CrowdPlace *)shared + threadIdx.x / LANES);
     }
 }
@@ -207,8 +206,7 @@ static const char *kernels_end(const CrowdArrays *all, const CrowdStep *call, vo
 }
 
 static const char *kernels_first(const CrowdArrays *all, const CrowdStep *call, void *stream) {
-    pose<<<warp_blocks((all->envs + POSE_ROBOTS - 1) / POSE_ROBOTS), WARP_THREADS, place_bytes,
-           (cudaStream_t)stream>>>(*all);
+    pose<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all);
     observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);
     return launched();
