@@ -7,6 +7,8 @@
 /* Exported by libmujoco, but not declared in its headers:
  * qDeriv = d (passive + actuator forces) / d qvel, the D of the implicit integrators. */
 void mjd_smooth_vel(const mjModel *m, mjData *d, int flg_bias);
+/* Damping of the actuator of a joint: returns the linear part, adds the others to poly. */
+mjtNum mj_actuatorDamping(const mjModel *m, mjtObj type, int id, mjtNum poly[mjNPOLY]);
 
 #define PIVOT 1e-14 /* smallest pivot of a factorisation */
 
@@ -18,8 +20,10 @@ int metric_alloc(Metric *metric, const mjModel *m) {
     metric->inertia = calloc(square + 1, sizeof *metric->inertia);
     metric->factor = calloc(square + 1, sizeof *metric->factor);
     metric->stiff = calloc(square + 1, sizeof *metric->stiff);
+    metric->full = calloc(square + 1, sizeof *metric->full);
+    metric->pivot = calloc(nv + 1, sizeof *metric->pivot);
     return metric->dof && metric->place && metric->tree && metric->inertia && metric->factor &&
-           metric->stiff;
+           metric->stiff && metric->full && metric->pivot;
 }
 
 void metric_free(Metric *metric) {
@@ -29,24 +33,40 @@ void metric_free(Metric *metric) {
     free(metric->inertia);
     free(metric->factor);
     free(metric->stiff);
+    free(metric->full);
+    free(metric->pivot);
 }
 
 static int is_disabled(const mjModel *m, int flag) {
     return (m->opt.disableflags & flag) != 0;
 }
 
+/* [N m s/rad] Slope of the damping force a v + b v |v| + c v^3 of a degree of freedom. */
+static double damping_slope(const mjModel *m, const mjData *d, int dof) {
+    const double speed = fabs(d->qvel[dof]);
+    double poly[mjNPOLY], power = 1;
+    mju_copy(poly, m->dof_dampingpoly + (size_t)mjNPOLY * (size_t)dof, mjNPOLY);
+    double slope =
+        m->dof_damping[dof] + mj_actuatorDamping(m, mjOBJ_JOINT, m->dof_jntid[dof], poly);
+    for (int k = 0; k < mjNPOLY; k++) {
+        power *= speed;
+        slope += (k + 2) * poly[k] * power;
+    }
+    return slope;
+}
+
 /* Bool: Euler's method treats joint damping implicitly. */
-static int euler_damps(const mjModel *m) {
+static int euler_damps(const mjModel *m, const mjData *d) {
     int damped = 0;
     for (int i = 0; i < m->nv; i++) {
-        damped |= m->dof_damping[i] > 0;
+        damped |= damping_slope(m, d, i) != 0;
     }
     return damped && !is_disabled(m, mjDSBL_EULERDAMP) && !is_disabled(m, mjDSBL_DAMPER);
 }
 
-int metric_is_step(const mjModel *m) {
+int metric_is_step(const mjModel *m, const mjData *d) {
     return m->opt.integrator == mjINT_DISCRETE ||
-           (m->opt.integrator == mjINT_EULER && !euler_damps(m));
+           (m->opt.integrator == mjINT_EULER && !euler_damps(m, d));
 }
 
 /* ---- rows: constraints, tendons, actuators ---- */
@@ -169,14 +189,14 @@ static void add_sparse(Metric *metric, const mjModel *m, const double *value, do
     }
 }
 
-static void add_diagonal(Metric *metric, const double *value, double scale) {
-    for (int i = 0; i < metric->dofs; i++) {
-        metric->inertia[i * metric->dofs + i] += scale * value[metric->dof[i]];
+static void add_euler(Metric *metric, const mjModel *m, const mjData *d) {
+    for (int i = 0; i < metric->dofs && euler_damps(m, d); i++) {
+        metric->inertia[i * metric->dofs + i] +=
+            m->opt.timestep * damping_slope(m, d, metric->dof[i]);
     }
 }
 
-/* - h qDeriv, symmetrised, in the sparsity of M: implicitfast. The derivatives of the Coriolis
- * forces that `implicit` adds are left out, for they are not symmetric. */
+/* - h qDeriv in the sparsity of M: implicitfast. */
 static void add_implicit(Metric *metric, const mjModel *m, mjData *d) {
     const int n = metric->dofs;
     mjd_smooth_vel(m, d, 0);
@@ -191,6 +211,68 @@ static void add_implicit(Metric *metric, const mjModel *m, mjData *d) {
     }
 }
 
+/* ---- `implicit`: N with the derivatives of Coriolis forces, which are not symmetric ---- */
+
+/* LU factors in place, with exchange of rows. */
+static void factor_full(Metric *metric) {
+    const int n = metric->dofs;
+    double *a = metric->full;
+    for (int p = 0; p < n; p++) {
+        int best = p;
+        for (int i = p + 1; i < n; i++) {
+            best = fabs(a[i * n + p]) > fabs(a[best * n + p]) ? i : best;
+        }
+        metric->pivot[p] = best;
+        for (int j = 0; j < n && best != p; j++) {
+            const double other = a[p * n + j];
+            a[p * n + j] = a[best * n + j];
+            a[best * n + j] = other;
+        }
+        for (int i = p + 1; i < n; i++) {
+            const double factor = a[i * n + p] /= a[p * n + p];
+            for (int j = p + 1; j < n; j++) {
+                a[i * n + j] -= factor * a[p * n + j];
+            }
+        }
+    }
+}
+
+static void solve_full(const Metric *metric, double *x) {
+    const int n = metric->dofs;
+    const double *a = metric->full;
+    for (int p = 0; p < n; p++) {
+        const double other = x[metric->pivot[p]];
+        x[metric->pivot[p]] = x[p];
+        x[p] = other;
+    }
+    for (int i = 0; i < n; i++) {
+        x[i] -= mju_dot(a + i * n, x, i);
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        x[i] = (x[i] - mju_dot(a + i * n + i + 1, x + i + 1, n - 1 - i)) / a[i * n + i];
+    }
+}
+
+static void build_full(Metric *metric, const mjModel *m, mjData *d) {
+    const int n = metric->dofs;
+    memset(metric->full, 0, (size_t)n * (size_t)n * sizeof *metric->full);
+    mjd_smooth_vel(m, d, 1);
+    for (int i = 0; i < n; i++) {
+        const int row = metric->dof[i];
+        for (int k = m->M_rowadr[row]; k < m->M_rowadr[row] + m->M_rownnz[row]; k++) {
+            const int j = metric->place[m->M_colind[k]];
+            metric->full[i * n + j] = metric->full[j * n + i] = d->M[k];
+        }
+    }
+    for (int i = 0; i < n; i++) {
+        const int row = metric->dof[i];
+        for (int k = m->D_rowadr[row]; k < m->D_rowadr[row] + m->D_rownnz[row]; k++) {
+            metric->full[i * n + metric->place[m->D_colind[k]]] -= m->opt.timestep * d->qDeriv[k];
+        }
+    }
+    factor_full(metric);
+}
+
 /* h D + h^2 K of `discrete`: its own arrays. */
 static void add_discrete(Metric *metric, const mjModel *m, const mjData *d) {
     Row row;
@@ -198,8 +280,8 @@ static void add_discrete(Metric *metric, const mjModel *m, const mjData *d) {
     if (!d->efm_active) {
         return;
     }
-    if (d->efm_diag) {
-        add_diagonal(metric, d->efm_diag, 1);
+    for (int i = 0; i < metric->dofs && d->efm_diag; i++) {
+        metric->inertia[i * metric->dofs + i] += d->efm_diag[metric->dof[i]];
     }
     if (d->efm_fluid) {
         add_sparse(metric, m, d->efm_fluid, 1);
@@ -218,13 +300,22 @@ void metric_build(Metric *metric, const mjModel *m, mjData *d) {
     case mjINT_IMPLICIT:
     case mjINT_IMPLICITFAST: add_implicit(metric, m, d); break;
     case mjINT_DISCRETE: add_discrete(metric, m, d); break;
-    default:
-        if (euler_damps(m)) {
-            add_diagonal(metric, m->dof_damping, m->opt.timestep);
-        }
+    default: add_euler(metric, m, d);
     }
     memcpy(metric->factor, metric->inertia, square * sizeof *metric->factor);
     mju_cholFactor(metric->factor, metric->dofs, PIVOT);
+    metric->active = 0;
+    if (m->opt.integrator == mjINT_IMPLICIT) {
+        build_full(metric, m, d);
+    }
+}
+
+void metric_integrate(const Metric *metric, const mjModel *m, double *x) {
+    if (m->opt.integrator == mjINT_IMPLICIT) {
+        solve_full(metric, x);
+    } else {
+        metric_solve(metric, metric->factor, x);
+    }
 }
 
 /* ---- active constraints ---- */
@@ -252,24 +343,44 @@ static int contact_sticks(const mjData *d, int first) {
     return force[0] > 0 && sqrt(sum) < 0.999 * force[0];
 }
 
+/* D of row i in the present state, 0 when it does not respond. */
+static double active_stiffness(const mjData *d, int i) {
+    if (d->efc_type[i] != mjCNSTR_CONTACT_ELLIPTIC) {
+        return row_stiffness(d, i);
+    }
+    const int first = d->contact[d->efc_id[i]].efc_address;
+    if (i == first) {
+        return row_stiffness(d, i);
+    }
+    return contact_sticks(d, first) ? d->efc_D[i] : 0;
+}
+
+/* Hash of the set of constraints that respond; above 0. */
+static uint64_t active_set(const mjData *d) {
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (int i = 0; i < d->nefc; i++) {
+        hash = (hash ^ (uint64_t)(active_stiffness(d, i) > 0)) * 0x100000001b3u;
+    }
+    return hash | 1;
+}
+
 int metric_stiffen(Metric *metric, const mjModel *m, const mjData *d) {
     const size_t square = (size_t)metric->dofs * (size_t)metric->dofs;
-    int active = 0;
+    const uint64_t active = active_set(d);
+    if (active == metric->active) {
+        return 0;
+    }
+    metric->active = active;
     memcpy(metric->stiff, metric->inertia, square * sizeof *metric->stiff);
     for (int i = 0; i < d->nefc; i++) {
-        const int elliptic = d->efc_type[i] == mjCNSTR_CONTACT_ELLIPTIC;
-        const int first = elliptic ? d->contact[d->efc_id[i]].efc_address : i;
-        const double D = !elliptic || i == first    ? row_stiffness(d, i)
-                         : contact_sticks(d, first) ? d->efc_D[i]
-                                                    : 0;
+        const double D = active_stiffness(d, i);
         const Row row = constraint_row(m, d, i);
         if (D > 0) {
             row_add(metric, metric->stiff, &row, D);
-            active = 1;
         }
     }
     mju_cholFactor(metric->stiff, metric->dofs, PIVOT);
-    return active;
+    return 1;
 }
 
 void metric_solve(const Metric *metric, const double *factor, double *x) {

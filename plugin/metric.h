@@ -12,6 +12,8 @@
 #ifndef PLUGIN_METRIC_H
 #define PLUGIN_METRIC_H
 
+#include <stdint.h>
+
 #include <mujoco/mujoco.h>
 
 typedef struct {
@@ -22,6 +24,9 @@ typedef struct {
     double *inertia; /* [dofs][dofs] N, symmetric */
     double *factor;  /* [dofs][dofs] its Cholesky factor, lower */
     double *stiff;   /* [dofs][dofs] factor of N + J_c^T D_c J_c */
+    double *full;    /* [dofs][dofs] LU factors of N with Coriolis terms: `implicit` */
+    int *pivot;      /* [dofs] rows that were exchanged */
+    uint64_t active; /* hash of the constraints in `stiff`; 0: none yet */
 } Metric;
 
 /* Returns 0 when out of memory; free with metric_free. */
@@ -29,13 +34,15 @@ int metric_alloc(Metric *metric, const mjModel *m);
 void metric_free(Metric *metric);
 
 /* Bool: the acceleration of MuJoCo's solver is the one that the integrator applies. */
-int metric_is_step(const mjModel *m);
+int metric_is_step(const mjModel *m, const mjData *d);
 /* Builds N for the trees whose flag in metric->tree is set, and those coupled to them. Needs
  * everything up to the actuator forces. */
 void metric_build(Metric *metric, const mjModel *m, mjData *d);
+/* x = N^-1 x in place, with the N of the integrator; [dofs]. */
+void metric_integrate(const Metric *metric, const mjModel *m, double *x);
 /* Factors N + J_c^T D_c J_c: how the velocity after the step responds to a force while the
- * constraints that are active now stay active. Needs the constraint forces. Returns 0 when no
- * constraint is active; stiff is then the factor of N. */
+ * constraints that are active now stay active. Needs the constraint forces. Returns 0 when the
+ * constraints are those of the last call. */
 int metric_stiffen(Metric *metric, const mjModel *m, const mjData *d);
 /* x = factor^-1 x in place. factor: metric->factor or metric->stiff; x: [dofs]. */
 void metric_solve(const Metric *metric, const double *factor, double *x);

@@ -225,14 +225,14 @@ static void apply(const Soft *soft, const mjModel *m, mjData *d, const double *w
 /* Twists of the feet after the step that MuJoCo would do now. */
 static void outcome(Soft *soft, const mjModel *m, const mjData *d, double *twist) {
     const Metric *metric = &soft->metric;
-    const int nv = (int)m->nv, direct = metric_is_step(m);
+    const int nv = (int)m->nv, direct = metric_is_step(m, d);
     double *a = soft->acceleration;
     for (int i = 0; i < metric->dofs; i++) {
         const int dof = metric->dof[i];
         a[i] = direct ? d->qacc[dof] : d->qfrc_smooth[dof] + d->qfrc_constraint[dof];
     }
     if (!direct) {
-        metric_solve(metric, metric->factor, a);
+        metric_integrate(metric, m, a);
     }
     twists(soft, nv, d->qvel, twist);
     for (int r = 0; r < 6 * soft->feet; r++) {
@@ -248,16 +248,6 @@ static void read_wrench(const Soft *soft, double *wrench) {
         memcpy(wrench + 6 * f, soft->contact.foot[f].force, 3 * sizeof *wrench);
         memcpy(wrench + 6 * f + 3, soft->contact.foot[f].torque, 3 * sizeof *wrench);
     }
-}
-
-/* Largest difference of the twists that the ground counts with and those that MuJoCo gives. */
-static double disagreement(const Soft *soft, const double *twist) {
-    double most = 0;
-    for (int r = 0; r < 6 * soft->feet; r++) {
-        const double difference = fabs(twist[r] - soft->contact.velocity[r]);
-        most = difference > most ? difference : most;
-    }
-    return most;
 }
 
 /* V_free = V - h A W, from the outcome V of the wrench W. */
@@ -283,23 +273,47 @@ static void forces_without_ground(const mjModel *m, mjData *d) {
     mj_fwdConstraint(m, d);
 }
 
-/* Ground and constraints in turn. Without constraints the first solve is final. */
+/* change = what MuJoCo gives beyond what the ground counts with; [6 feet]. Returns its largest
+ * number. */
+static double disagreement(const Soft *soft, const double *twist, double *change) {
+    double most = 0;
+    for (int r = 0; r < 6 * soft->feet; r++) {
+        change[r] = twist[r] - soft->contact.velocity[r];
+        most = fmax(most, fabs(change[r]));
+    }
+    return most;
+}
+
+/* A and V_free for the constraints that are active now. While they stay the same, V_free moves by
+ * the disagreement. */
+static void respond(Soft *soft, const mjModel *m, const mjData *d, const double *twist,
+                    const double *wrench, const double *change) {
+    if (metric_stiffen(&soft->metric, m, d) || soft->rounds == 0) {
+        inverse_inertia(soft, soft->metric.stiff, (int)m->nv);
+        free_twists(soft, twist, wrench);
+        mix_start(&soft->mix, 6 * soft->feet);
+    } else {
+        mix_next(&soft->mix, soft->input.free_velocity, change);
+    }
+}
+
+/* Ground and constraints in turn. Where the response is linear and known the first solve is
+ * final. */
 static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
-    double wrench[FOOT_ROWS] = {0}, twist[FOOT_ROWS];
+    const int exact = d->nefc == 0 && m->opt.integrator != mjINT_IMPLICIT;
+    double wrench[FOOT_ROWS] = {0}, twist[FOOT_ROWS], change[FOOT_ROWS];
     forces_without_ground(m, d);
     metric_build(&soft->metric, m, d);
     for (soft->rounds = 0; soft->rounds < ROUNDS_MAX; soft->rounds++) {
         outcome(soft, m, d, twist);
-        if (soft->rounds > 0 && disagreement(soft, twist) < AGREEMENT) {
+        if (soft->rounds > 0 && disagreement(soft, twist, change) < AGREEMENT) {
             break;
         }
-        const int stiff = d->nefc > 0 && metric_stiffen(&soft->metric, m, d);
-        inverse_inertia(soft, stiff ? soft->metric.stiff : soft->metric.factor, (int)m->nv);
-        free_twists(soft, twist, wrench);
+        respond(soft, m, d, twist, wrench, change);
         mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
         read_wrench(soft, wrench);
-        apply(soft, m, d, wrench, d->nefc > 0);
-        if (d->nefc == 0) {
+        apply(soft, m, d, wrench, !exact);
+        if (exact) {
             break;
         }
     }

@@ -5,6 +5,7 @@
 
 #include "plugin/foot.h"
 #include "plugin/metric.h"
+#include "plugin/mix.h"
 
 #define FOOT_ROWS (6 * MILD_FEET_MAX)
 
@@ -17,6 +18,7 @@ typedef struct {
     MildTerrain terrain;
     MildScratch *scratch;
     Metric metric;
+    Mix mix;
     double *jacobian; /* [6 feet][nv] twist of each foot: linear, angular; world axes */
     double *response; /* [6 feet][nv] of the metric's degrees of freedom: N^-1 J^T, transposed */
     double *passive;  /* [nv] qfrc_passive without the ground */

@@ -31,14 +31,14 @@ static const Case cases[] = {
     {"armature", {"armature='.02'", "armature='.02'", "armature='.005'"}, ""},
     {"damping", {"damping='4'", "damping='3'", "damping='2'"}, ""},
     {"polynomials", {"damping='1 2'", "damping='1 0 3'", "stiffness='30 20' damping='0 2'"}, ""},
-    {"springs", {"stiffness='200'", "stiffness='300' springref='20'", "stiffness='90'"}, ""},
+    {"springs", {"stiffness='60'", "stiffness='90' springref='50'", "stiffness='30'"}, ""},
     {"motors", {"", "", ""}, "<actuator><motor joint='hip'/><motor joint='knee'/></actuator>"},
     {"PD", {"", "", ""}, PD("300", "20")},
     {"strong PD", {"armature='.01'", "", ""}, PD("2000", "100")},
     {"saturated",
      {"", "", "damping='1'"},
-     "<actuator><position joint='hip' kp='300' kv='20' forcerange='-5 5'/><position joint='knee' "
-     "kp='300' kv='20'/><position joint='ankle' kp='90' kv='9'/></actuator>"},
+     "<actuator><position joint='hip' kp='300' kv='20'/><position joint='knee' kp='300' kv='20' "
+     "forcerange='-9 9'/><position joint='ankle' kp='90' kv='9'/></actuator>"},
     {"joint limit of force",
      {"actuatorfrcrange='-8 8'", "", ""},
      "<actuator><position joint='hip' kp='300' kv='20'/><position joint='knee' kp='300' "
@@ -106,31 +106,27 @@ static double surprise(const Case *c, double dt, const char *integrator, int *lo
     return worst;
 }
 
+/* Bool: Euler's method, which treats feedback explicitly, is stable. */
+static int is_mild(const Case *c) {
+    return !strstr(c->rest, "kv=") && !strstr(c->rest, "biasprm");
+}
+
 static void step_is_as_expected(void **state) {
     (void)state;
-    static const char *const integrators[] = {"Euler", "implicitfast", "discrete"};
-    for (int k = 0; k < 3; k++) {
+    static const char *const integrators[] = {"Euler", "implicitfast", "implicit", "discrete"};
+    for (int k = 0; k < 4; k++) {
         for (int c = 0; c < CASES; c++) {
             int loaded, rounds;
+            if (k == 0 && !is_mild(&cases[c])) {
+                continue;
+            }
             const double worst = surprise(&cases[c], 0.004, integrators[k], &loaded, &rounds);
             print_message("%-12s %-20s twist apart by %.1e, %d steps loaded, %d rounds\n",
                           integrators[k], cases[c].name, worst, loaded, rounds);
             assert_true(loaded > 20);
-            assert_true(worst < 2e-6);
-            assert_in_range(rounds, 0, 29);
+            assert_true(worst < 2e-7);
+            assert_in_range(rounds, 0, 20);
         }
-    }
-}
-
-/* `implicit` also has derivatives of Coriolis forces, which the ground leaves out: nearly the
- * same. */
-static void implicit_is_nearly_as_expected(void **state) {
-    (void)state;
-    for (int c = 0; c < CASES; c++) {
-        int loaded, rounds;
-        const double worst = surprise(&cases[c], 0.002, "implicit", &loaded, &rounds);
-        print_message("implicit     %-20s twist apart by %.1e\n", cases[c].name, worst);
-        assert_true(worst < 0.05);
     }
 }
 
@@ -166,7 +162,6 @@ static void strong_feedback_is_stable(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(step_is_as_expected),
-        cmocka_unit_test(implicit_is_nearly_as_expected),
         cmocka_unit_test(strong_feedback_is_stable),
     };
     return cmocka_run_group_tests(tests, kit_setup, NULL);
