@@ -32,14 +32,16 @@ const int plugin_field_count = (int)(sizeof plugin_fields / sizeof *plugin_field
 /* ---- names of the attributes ---- */
 
 typedef struct {
-    const char *prefix;
+    const char *name;   /* in messages */
+    const char *prefix; /* of its attributes */
     const MildField *fields;
     const int *count;
 } Section;
 
-static const Section sections[] = {{"", plugin_fields, &plugin_field_count},
-                                   {"ground.", mild_material_fields, &mild_material_field_count},
-                                   {"terrain.", mild_map_fields, &mild_map_field_count}};
+static const Section sections[] = {
+    {"plugin", "", plugin_fields, &plugin_field_count},
+    {"ground", "ground.", mild_material_fields, &mild_material_field_count},
+    {"terrain", "terrain.", mild_map_fields, &mild_map_field_count}};
 enum { SECTIONS = 3, PLUGIN_SECTION = 0, MATERIAL_SECTION, MAP_SECTION, ATTRIBUTES_MAX = 96 };
 
 static void attribute_name(const Section *section, int field, char *name, size_t size) {
@@ -72,11 +74,8 @@ static MildStatus read_section(const mjModel *m, int instance, const Section *se
         char name[48];
         attribute_name(section, i, name, sizeof name);
         const char *text = plugin_text(m, instance, name);
-        char place[16];
-        snprintf(place, sizeof place, "%.*s", (int)strcspn(name, "."),
-                 *section->prefix ? name : "plugin");
         MildStatus status =
-            text ? mild_field_parse(&section->fields[i], def, text, place, error) : MILD_OK;
+            text ? mild_field_parse(&section->fields[i], def, text, section->name, error) : MILD_OK;
         if (status != MILD_OK) {
             return status;
         }

@@ -1,6 +1,6 @@
 /* The engine plugin: soft ground under any MJCF (docs/plugin.md). It has two capabilities, because
  * MuJoCo has a stage of actuation only in models with actuators (soft.h). */
-#include <stdio.h>
+#include <stdatomic.h>
 #include <string.h>
 
 #include "plugin/check.h"
@@ -26,16 +26,19 @@ static Soft *create(const mjModel *m, int instance, MildError *error) {
     return check_model(m, instance, error) == MILD_OK ? soft_create(m, instance, error) : NULL;
 }
 
+/* Bool: the warning about the feet of the model that was compiled last has been given. */
+static atomic_int warned;
+
 /* Called first, when the model is compiled; what is wrong is said by `init`. */
 static int state_size(const mjModel *m, int instance) {
     Soft *soft = create(m, instance, NULL);
     const int numbers = soft ? (int)(soft_bytes(soft) / sizeof(mjtNum)) : 0;
     soft_destroy(soft);
+    atomic_store(&warned, 0);
     return numbers;
 }
 
 static int init(const mjModel *m, mjData *d, int instance) {
-    static _Thread_local uint64_t warned; /* signature of the last model with a warning */
     MildError error = {0};
     char text[400];
     Soft *soft = create(m, instance, &error);
@@ -44,8 +47,8 @@ static int init(const mjModel *m, mjData *d, int instance) {
         say(m, instance, error.text);
         return -1;
     }
-    if (warned != m->signature && check_feet(m, soft, text, sizeof text)) {
-        warned = m->signature;
+    /* the compiler makes an mjData of its own, for which the model has no signature yet */
+    if (m->signature && check_feet(m, soft, text, sizeof text) && !atomic_exchange(&warned, 1)) {
         say(m, instance, text);
     }
     return 0;

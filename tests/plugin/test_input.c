@@ -1,0 +1,193 @@
+/* What a user may get wrong in the MJCF: one message that names it, and no ground or no model. */
+#include <math.h>
+
+#include "plugin_kit.h"
+
+#define BODY                                                                                       \
+    "<worldbody><geom name='floor' type='plane' size='1 1 .1' %s/><body name='pole'><geom "        \
+    "name='post' size='.01'/></body><body name='foot' pos='0 0 .1' %s><freejoint/><geom "          \
+    "name='box' mass='1' %s/><site name='sole' pos='0 0 -.01'/></body></worldbody>"
+#define BOX "type='box' size='.1 .05 .01' "
+
+/* The model of the keys, with attributes of floor, body and foot and an end. */
+static mjModel *compile(const char *option, const char *configs, const char *floor,
+                        const char *body, const char *geom, const char *end) {
+    char text[6000], world[1500];
+    snprintf(world, sizeof world, BODY, floor, body, geom);
+    snprintf(text, sizeof text,
+             "<mujoco><option %s/><extension><plugin plugin='mild.ground'><instance "
+             "name='soft'>%s</instance></plugin></extension>%s%s</mujoco>",
+             option, configs, world, end);
+    kit_messages = 0;
+    kit_said[0] = '\0';
+    return kit_compile(text);
+}
+
+#define OFF "contype='0' conaffinity='0'"
+#define FOOT CONFIG("feet", "foot")
+
+/* The model must not compile, with a message that holds both words. */
+static void check_refused(const char *option, const char *configs, const char *word,
+                          const char *other) {
+    mjModel *m = compile(option, configs, OFF, "", BOX OFF, "");
+    print_message("%s\n",
+                  strstr(kit_said, "mild.ground '") ? strstr(kit_said, "mild.ground '") : kit_said);
+    assert_null(m);
+    assert_non_null(strstr(kit_said, word));
+    assert_non_null(strstr(kit_said, other));
+}
+
+static void refuses_what_is_wrong(void **state) {
+    (void)state;
+    check_refused("", "", "no feet", "feet");
+    check_refused("", CONFIG("feet", "fool"), "'fool'", "nearest is 'foot'");
+    check_refused("", CONFIG("feet", "foot foot foot foot foot"), "more than 4", "feet");
+    check_refused("", CONFIG("feet", "pole"), "'pole'", "fixed to the world");
+    check_refused("", CONFIG("feet", "world"), "'world'", "fixed to the world");
+    check_refused("", FOOT CONFIG("sole", "bax"), "'bax'", "nearest is 'box'");
+    check_refused("", FOOT CONFIG("sole", "post"), "'post'", "feet");
+    check_refused("", FOOT CONFIG("outline", "0 0 1 0"), "outline", "3 points");
+    check_refused("", FOOT CONFIG("outline", "0 0 1 0 1 x"), "outline", "'x'");
+    check_refused("", FOOT CONFIG("outline", "0 0 1 0 1 1; 0 0 1 0 1 1"), "2 polygons", "1 feet");
+    check_refused("", FOOT CONFIG("outline", "0 0 1 0 2 0"), "outline", "area");
+    check_refused("", FOOT CONFIG("outline", "-9 -9 9 -9 9 9 -9 9"), "pitch", "");
+    check_refused("", FOOT CONFIG("ground", "sand_lose"), "'sand_lose'", "'sand_loose'");
+    check_refused("", FOOT CONFIG("ground", "rigid"), "'rigid'", "leave the plugin out");
+    check_refused("", FOOT CONFIG("ground", "grass rubber"), "2 grounds", "terrain.patches");
+    check_refused("", FOOT CONFIG("ground.model", "bekkers"), "ground.model", "bekker");
+    check_refused("", FOOT CONFIG("ground.model", "rigid"), "rigid", "leave the plugin out");
+    check_refused("", FOOT CONFIG("ground", "clay") CONFIG("ground.model", "mild"), "'clay'",
+                  "bekker");
+    check_refused("", FOOT CONFIG("ground.k_pen", "-1"), "ground.k_pen", "outside");
+    check_refused("", FOOT CONFIG("ground.k_pen", "much"), "ground.k_pen", "much");
+    check_refused("", FOOT CONFIG("ground.k_pan", "1"), "ground.k_pan", "");
+    check_refused("", FOOT CONFIG("pitch", "0"), "pitch", "outside");
+    check_refused("", FOOT CONFIG("prints", "-4"), "prints", "outside");
+    check_refused("", FOOT CONFIG("terrain.kind", "hills"), "terrain.kind", "hills");
+    check_refused("", FOOT CONFIG("terrain.kind", "image"), "image", "");
+    check_refused("integrator='RK4'", FOOT, "RK4", "implicitfast");
+}
+
+static void refuses_a_second_instance(void **state) {
+    (void)state;
+    kit_messages = 0;
+    mjModel *m = kit_compile(
+        "<mujoco><extension><plugin plugin='mild.ground'><instance name='a'>" FOOT
+        "</instance><instance name='b'>" FOOT "</instance></plugin></extension><worldbody><body "
+        "name='foot'><freejoint/><geom type='box' size='.1 .1 .1'/></body></worldbody></mujoco>");
+    print_message("%s\n", kit_said);
+    assert_null(m);
+    assert_non_null(strstr(kit_said, "one instance"));
+}
+
+/* A foot that MuJoCo also lets stand on its own floor is warned about, whatever the way. */
+static void warns_of_a_rigid_floor(void **state) {
+    (void)state;
+    const struct {
+        const char *floor;
+        const char *geom;
+        const char *end;
+        int warns;
+    } cases[] = {
+        {"", BOX, "", 1},
+        {"", BOX OFF, "", 0},
+        {OFF, BOX, "", 0},
+        {"contype='0'", BOX, "", 1}, /* contype of one and conaffinity of the other are enough */
+        {"", BOX "contype='2' conaffinity='2'", "", 0},
+        {"", BOX, "<contact><exclude body1='world' body2='foot'/></contact>", 0},
+        {OFF, BOX OFF, "<contact><pair geom1='box' geom2='floor'/></contact>", 1},
+    };
+    for (int c = 0; c < 7; c++) {
+        mjModel *m = compile("", FOOT, cases[c].floor, "", cases[c].geom, cases[c].end);
+        const int warns = cases[c].warns;
+        assert_non_null(m);
+        mjData *first = mj_makeData(m);
+        print_message("%d: %s\n", c, kit_said);
+        assert_int_equal(kit_messages, warns);
+        if (warns) {
+            assert_non_null(strstr(kit_said, "geom 'box'"));
+            assert_non_null(strstr(kit_said, "geom 'floor'"));
+            assert_non_null(strstr(kit_said, "contype"));
+        }
+        mjData *d = mj_makeData(m); /* said once for a model */
+        assert_int_equal(kit_messages, warns);
+        mj_deleteData(first);
+        mj_deleteData(d);
+        mj_deleteModel(m);
+    }
+}
+
+static void warns_of_a_foot_that_lies_on_its_side(void **state) {
+    (void)state;
+    mjModel *m = compile("", FOOT, OFF, "euler='90 0 0'", BOX OFF, "");
+    assert_non_null(m);
+    mjData *d = mj_makeData(m);
+    print_message("%s\n", kit_said);
+    assert_non_null(strstr(kit_said, "z axis"));
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+/* The integrator may be changed after compilation. */
+static void rk4_at_run_time(void **state) {
+    (void)state;
+    mjModel *m = compile("", FOOT, OFF, "", BOX OFF, "");
+    mjData *d = mj_makeData(m);
+    m->opt.integrator = mjINT_RK4;
+    kit_messages = 0;
+    for (int i = 0; i < 10; i++) {
+        mj_step(m, d);
+    }
+    assert_int_equal(kit_messages, 1);
+    assert_non_null(strstr(kit_said, "RK4"));
+    assert_true(fabs(d->qvel[2] + 9.81 * d->time) < 1e-9); /* falls */
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+/* ---- soles ---- */
+
+static int elements_of(const char *configs, const char *geom) {
+    mjModel *m = compile("", configs, OFF, "", geom, "");
+    if (!m) {
+        fail_msg("%s", kit_said);
+    }
+    mjData *d = mj_makeData(m);
+    const int elements = mild_sole_elements(plugin_soft(m, d)->soles[0]);
+    mj_deleteData(d);
+    mj_deleteModel(m);
+    return elements;
+}
+
+/* Area of the sole over that of an element, for outlines from shapes, sites and numbers. */
+static void soles_follow_the_shapes(void **state) {
+    (void)state;
+    const double element = 0.0195 * 0.0195;
+    assert_in_range(elements_of(FOOT, BOX OFF), 0.94 * 0.02 / element, 1.06 * 0.02 / element);
+    assert_in_range(elements_of(CONFIG("feet", "sole"), BOX OFF), 0.94 * 0.02 / element,
+                    1.06 * 0.02 / element);
+    assert_in_range(elements_of(CONFIG("sole", "box"), BOX OFF), 0.94 * 0.02 / element,
+                    1.06 * 0.02 / element);
+    assert_int_equal(elements_of(FOOT CONFIG("elements", "40"), BOX OFF), 40);
+    assert_in_range(elements_of(FOOT CONFIG("outline", "-.1 -.1 .1 -.1 .1 .1 -.1 .1"), BOX OFF),
+                    0.94 * 0.04 / element, 1.06 * 0.04 / element);
+    const double round = 3.1416 * 0.06 * 0.06 / element;
+    assert_in_range(elements_of(FOOT, "type='cylinder' size='.06 .02' " OFF), 0.93 * round,
+                    1.07 * round);
+    const double capsule = (0.2 * 0.1 + 3.1416 * 0.05 * 0.05) / element;
+    assert_in_range(elements_of(FOOT, "type='capsule' size='.05 .1' euler='0 90 0' " OFF),
+                    0.93 * capsule, 1.07 * capsule);
+    assert_in_range(elements_of(FOOT, "type='ellipsoid' size='.12 .12 .01' " OFF), 40, 130);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(refuses_what_is_wrong),
+        cmocka_unit_test(refuses_a_second_instance),
+        cmocka_unit_test(warns_of_a_rigid_floor),
+        cmocka_unit_test(warns_of_a_foot_that_lies_on_its_side),
+        cmocka_unit_test(rk4_at_run_time),
+        cmocka_unit_test(soles_follow_the_shapes),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, NULL);
+}
