@@ -236,6 +236,60 @@ static void foreign_state_is_reset(void **state) {
     mj_deleteModel(m);
 }
 
+static int count_decor(const mjvScene *scene, int type) {
+    int count = 0;
+    for (int i = 0; i < scene->ngeom; i++) {
+        count += scene->geoms[i].category == mjCAT_DECOR && scene->geoms[i].type == type;
+    }
+    return count;
+}
+
+/* The scene shows what the ground remembers: patches at the depth of the surface, as many as there
+ * is room for, and an arrow for each loaded foot. */
+static void prints_are_drawn(void **state) {
+    (void)state;
+    mjModel *m = hopper(MOTOR);
+    mjData *d = mj_makeData(m);
+    mjvScene scene, small;
+    mjvOption option;
+    mjvCamera camera;
+    mjv_defaultScene(&scene);
+    mjv_defaultScene(&small);
+    mjv_defaultOption(&option);
+    mjv_defaultCamera(&camera);
+    mjv_makeScene(m, &scene, 5000);
+    mjv_makeScene(m, &small, 10);
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
+    assert_int_equal(count_decor(&scene, mjGEOM_BOX), 0);
+    steps(m, d, 500);
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
+    print_message("%d patches\n", count_decor(&scene, mjGEOM_BOX));
+    assert_in_range(count_decor(&scene, mjGEOM_BOX), 50, 1500);
+    for (int i = 0; i < scene.ngeom; i++) {
+        const MildTerrain *terrain = &plugin_soft(m, d)->terrain;
+        const float *at = scene.geoms[i].pos;
+        const double surface = mild_terrain_height_at(terrain, (double)at[0], (double)at[1]);
+        if (scene.geoms[i].category == mjCAT_DECOR) {
+            assert_true(fabs((double)at[2] - surface) < 0.002);
+            assert_true(hypot((double)at[0], (double)at[1]) < 1);
+        }
+    }
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &small);
+    assert_in_range(small.ngeom, 1, 10);
+    option.flags[mjVIS_CONTACTFORCE] = 1;
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
+    int loaded = 0;
+    for (int f = 0; f < 2; f++) {
+        loaded += plugin_soft(m, d)->contact.foot[f].contacts > 0;
+    }
+    assert_true(loaded > 0);
+    assert_int_equal(count_decor(&scene, mjGEOM_ARROW), loaded);
+    mjv_freeScene(&scene);
+    mjv_freeScene(&small);
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(restores_bit_by_bit),
@@ -245,6 +299,7 @@ int main(void) {
         cmocka_unit_test(ways_through_the_stages_agree),
         cmocka_unit_test(threads_agree),
         cmocka_unit_test(foreign_state_is_reset),
+        cmocka_unit_test(prints_are_drawn),
     };
     return cmocka_run_group_tests(tests, kit_setup, NULL);
 }
