@@ -60,11 +60,10 @@ static const char *geom_name(const mjModel *m, int geom, char *text, size_t size
 }
 
 /* A plane or height field of the world that touches a geom of the foot. */
-static int standing_on(const mjModel *m, const Soft *soft, const Foot *foot, char *text,
-                       size_t size) {
+static int standing_on(const mjModel *m, const Foot *foot, char *text, size_t size) {
     char a[80], b[80];
     for (int g = 0; g < m->ngeom; g++) {
-        for (int w = 0; w < m->ngeom && foot_has_geom(m, &soft->def, foot, g); w++) {
+        for (int w = 0; w < m->ngeom && foot_may_meet_floor(m, foot, g); w++) {
             const int floor = m->geom_type[w] == mjGEOM_PLANE || m->geom_type[w] == mjGEOM_HFIELD;
             if (!floor || m->body_weldid[m->geom_bodyid[w]] != 0 || !may_touch(m, g, w)) {
                 continue;
@@ -97,7 +96,7 @@ static double upright(const mjModel *m, const Foot *foot) {
 int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size) {
     for (int f = 0; f < soft->feet; f++) {
         const Foot *foot = &soft->foot[f];
-        if (standing_on(m, soft, foot, text, size)) {
+        if (standing_on(m, foot, text, size)) {
             return 1;
         }
         if (!foot->round && fabs(upright(m, foot)) < UPRIGHT) {

@@ -11,6 +11,7 @@
 #define WORD 128         /* bytes of a name */
 #define SOLE_BAND 0.01   /* [m] what lies higher above the lowest point is not the sole */
 #define CIRCLE_POINTS 32 /* corners of a round outline */
+#define SINKS 0.05       /* [m] depth to which a foot is expected to sink */
 #define OUTLINE_MAX 4096 /* corners of an outline, the limit of MildSoleDef */
 #define PI 3.141592653589793
 
@@ -112,7 +113,8 @@ static int has_primitive(const mjModel *m, int body) {
     return 0;
 }
 
-int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom) {
+/* Bool: the geom is part of the foot's sole. */
+static int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom) {
     const char *text = def->sole;
     char word[WORD];
     if (m->geom_bodyid[geom] != foot->body) {
@@ -122,6 +124,25 @@ int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int 
         return is_named(m, def->sole, geom);
     }
     return m->geom_type[geom] != mjGEOM_MESH || !has_primitive(m, foot->body);
+}
+
+int foot_may_meet_floor(const mjModel *m, const Foot *foot, int geom) {
+    double arm[3], local[3];
+    if (m->geom_bodyid[geom] != foot->body) {
+        return 0;
+    }
+    if (foot->round) {
+        mju_sub3(arm, m->geom_pos + 3 * geom, foot->center);
+        return mju_norm3(arm) - m->geom_rbound[geom] < foot->radius + SINKS;
+    }
+    mju_copy3(local, m->geom_pos + 3 * geom);
+    if (foot->site >= 0) {
+        double turn[9];
+        mju_quat2Mat(turn, m->site_quat + 4 * foot->site);
+        mju_sub3(arm, local, m->site_pos + 3 * foot->site);
+        mju_mulMatTVec3(local, turn, arm);
+    }
+    return local[2] - m->geom_rbound[geom] < mild_sole_z(foot->raster) + SINKS;
 }
 
 /* ---- outlines from geoms ---- */

@@ -22,8 +22,8 @@ MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, 
                        int *count, MildError *error);
 void feet_destroy(Foot *feet, int count);
 
-/* Bool: the geom is one of those under which the foot stands, and so must not touch the floor. */
-int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom);
+/* Bool: the geom is on the foot's body and would meet a floor that the sole sinks into. */
+int foot_may_meet_floor(const mjModel *m, const Foot *foot, int geom);
 
 /* Present place of the foot's frame. */
 void foot_pose(const mjData *d, const Foot *foot, double position[3], double rotation[9]);

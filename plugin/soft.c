@@ -16,7 +16,7 @@
 #include "ground/state.h"
 
 #define ROUNDS_MAX 30  /* solves of ground and constraints in one step */
-#define AGREEMENT 1e-7 /* [m/s, rad/s] difference of the twists at which they agree */
+#define AGREEMENT 1e-6 /* [m/s, rad/s] difference of the twists at which they agree */
 
 /* ---- making one ---- */
 

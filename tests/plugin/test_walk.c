@@ -294,7 +294,7 @@ static void policy_walks(void **state) {
     MildError error = {0};
     Robot *robot = robot_create(MILD_SOURCE_DIR "/robots/sa01", &error);
     assert_non_null(robot);
-    check_walk(robot, "sand_loose", 0.0025, "Euler", 10);
+    check_walk(robot, "sand_loose", 0.002, "Euler", 10);
     check_walk(robot, "rubber", 0.001, "implicitfast", 2);
     check_walk(robot, "foam45", 0.005, "discrete", 2);
     robot_destroy(robot);
