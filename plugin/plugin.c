@@ -7,6 +7,7 @@
 #include "plugin/plugin.h"
 #include "plugin/visual.h"
 
+/* NULL in an mjData whose `init` has failed, which the compiler may go on with. */
 static Soft *soft_of(const mjData *d, int instance) {
     return (Soft *)d->plugin_data[instance];
 }
@@ -31,11 +32,8 @@ static atomic_int warned;
 
 /* Called first, when the model is compiled; what is wrong is said by `init`. */
 static int state_size(const mjModel *m, int instance) {
-    Soft *soft = create(m, instance, NULL);
-    const int numbers = soft ? (int)(soft_bytes(soft) / sizeof(mjtNum)) : 0;
-    soft_destroy(soft);
     atomic_store(&warned, 0);
-    return numbers;
+    return (int)(soft_state_bytes(m, instance) / sizeof(mjtNum));
 }
 
 static int init(const mjModel *m, mjData *d, int instance) {
@@ -60,18 +58,25 @@ static void destroy(mjData *d, int instance) {
 }
 
 static void copy(mjData *to, const mjModel *m, const mjData *from, int instance) {
-    soft_copy(soft_of(to, instance), m, soft_of(from, instance));
+    if (soft_of(to, instance) && soft_of(from, instance)) {
+        soft_copy(soft_of(to, instance), m, soft_of(from, instance));
+    }
 }
 
 static void reset(const mjModel *m, mjtNum *state, void *data, int instance) {
     (void)m;
     (void)instance;
-    soft_reset(data, state);
+    if (data) {
+        soft_reset(data, state);
+    }
 }
 
 static void compute(const mjModel *m, mjData *d, int instance, int capability) {
     Soft *soft = soft_of(d, instance);
     MildGround *ground = ground_of(m, d, instance);
+    if (!soft) {
+        return;
+    }
     if (!soft_owns(soft, ground)) {
         say(m, instance, "its state is not one of this ground; it was reset");
         soft_reset(soft, ground);
@@ -84,14 +89,16 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability) {
 }
 
 static void advance(const mjModel *m, mjData *d, int instance) {
-    soft_advance(soft_of(d, instance), m, d, ground_of(m, d, instance));
+    if (soft_of(d, instance)) {
+        soft_advance(soft_of(d, instance), m, d, ground_of(m, d, instance));
+    }
 }
 
 static void visualize(const mjModel *m, mjData *d, const mjvOption *option, mjvScene *scene,
                       int instance) {
     const Soft *soft = soft_of(d, instance);
     const MildGround *ground = ground_of(m, d, instance);
-    if (soft_owns(soft, ground)) {
+    if (soft && soft_owns(soft, ground)) {
         visual_add(soft, m, ground, option, scene);
     }
 }

@@ -20,10 +20,23 @@
 
 /* ---- making one ---- */
 
-/* [N] Weight of everything that moves with a foot, divided by the number of feet. */
+/* First body of the tree that a body belongs to. */
+static int root_of(const mjModel *m, int body) {
+    while (m->body_parentid[body] > 0) {
+        body = m->body_parentid[body];
+    }
+    return body;
+}
+
+/* [N] Weight of everything that moves with the first foot, divided by the number of feet. The
+ * compiler asks before it has summed the masses. */
 static double foot_load(const mjModel *m, const Foot *feet, int count) {
-    const int root = m->body_rootid[feet[0].body];
-    return m->body_subtreemass[root] * fabs(m->opt.gravity[2]) / count;
+    const int root = root_of(m, feet[0].body);
+    double mass = 0;
+    for (int b = 1; b < m->nbody; b++) {
+        mass += root_of(m, b) == root ? m->body_mass[b] : 0;
+    }
+    return mass * fabs(m->opt.gravity[2]) / count;
 }
 
 /* The height of a map that is not level, or has a pattern, is added to `height`. */
@@ -47,7 +60,8 @@ static int alloc_arrays(Soft *soft, const mjModel *m) {
            metric_alloc(&soft->metric, m);
 }
 
-static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *error) {
+/* What the size of the state follows from. */
+static MildStatus make_feet(Soft *soft, const mjModel *m, int instance, MildError *error) {
     MildModel model = MILD_MODEL_MILD;
     MildStatus status = plugin_def_read(m, instance, &soft->def, error);
     if (status == MILD_OK) {
@@ -55,6 +69,20 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
     }
     if (status == MILD_OK) {
         status = feet_create(m, &soft->def, model, soft->foot, &soft->feet, error);
+    }
+    for (int f = 0; f < soft->feet && status == MILD_OK; f++) {
+        soft->soles[f] = soft->foot[f].sole;
+    }
+    return status;
+}
+
+static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *error) {
+    MildStatus status = make_feet(soft, m, instance, error);
+    if (status == MILD_OK &&
+        (size_t)m->plugin_statenum[instance] * sizeof(mjtNum) != soft_bytes(soft)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "the model was compiled with other feet, soles or prints; compile it "
+                         "again");
     }
     if (status == MILD_OK) {
         status = plugin_def_materials(m, instance, &soft->def, soft->foot[0].raster,
@@ -65,9 +93,6 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
     }
     if (status != MILD_OK) {
         return status;
-    }
-    for (int f = 0; f < soft->feet; f++) {
-        soft->soles[f] = soft->foot[f].sole;
     }
     soft->scratch = mild_scratch_create(soft->soles, soft->feet, error);
     if (!soft->scratch || !alloc_arrays(soft, m)) {
@@ -103,6 +128,14 @@ void soft_destroy(Soft *soft) {
     free(soft->passive);
     free(soft->acceleration);
     free(soft);
+}
+
+size_t soft_state_bytes(const mjModel *m, int instance) {
+    Soft *soft = calloc(1, sizeof *soft);
+    const int good = soft && make_feet(soft, m, instance, NULL) == MILD_OK;
+    const size_t bytes = good ? soft_bytes(soft) : 0;
+    soft_destroy(soft);
+    return bytes;
 }
 
 size_t soft_bytes(const Soft *soft) {

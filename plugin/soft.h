@@ -37,6 +37,8 @@ typedef struct {
 Soft *soft_create(const mjModel *m, int instance, MildError *error);
 void soft_destroy(Soft *soft); /* may be NULL */
 
+/* [B] Memory of the ground that soft_create would make; 0 when it would fail. */
+size_t soft_state_bytes(const mjModel *m, int instance);
 /* [B] Memory of the ground, a multiple of 8. */
 size_t soft_bytes(const Soft *soft);
 /* Initialises the state: a ground that remembers nothing. */

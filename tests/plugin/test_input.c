@@ -6,7 +6,8 @@
 #define BODY                                                                                       \
     "<worldbody><geom name='floor' type='plane' size='1 1 .1' %s/><body name='pole'><geom "        \
     "name='post' size='.01'/></body><body name='foot' pos='0 0 .1' %s><freejoint/><geom "          \
-    "name='box' mass='1' %s/><site name='sole' pos='0 0 -.01'/></body></worldbody>"
+    "name='box' mass='1' %s/><site name='sole' pos='0 0 -.01'/>"                                   \
+    "<site name='end' euler='0 90 0'/></body></worldbody>"
 #define BOX "type='box' size='.1 .05 .01' "
 
 /* The model of the keys, with attributes of floor, body and foot and an end. */
@@ -171,6 +172,12 @@ static void soles_follow_the_shapes(void **state) {
     assert_int_equal(elements_of(FOOT CONFIG("elements", "40"), BOX OFF), 40);
     assert_in_range(elements_of(FOOT CONFIG("outline", "-.1 -.1 .1 -.1 .1 .1 -.1 .1"), BOX OFF),
                     0.94 * 0.04 / element, 1.06 * 0.04 / element);
+    /* a site whose z axis is the long axis of the box: the sole is its end */
+    assert_in_range(elements_of(CONFIG("feet", "end"), BOX OFF), 4, 7);
+    /* what lies 80 mm above the sole is not the sole */
+    assert_in_range(
+        elements_of(FOOT, BOX OFF "/><geom type='box' size='.3 .3 .01' pos='0 0 .08' " OFF),
+        0.94 * 0.02 / element, 1.06 * 0.02 / element);
     const double round = 3.1416 * 0.06 * 0.06 / element;
     assert_in_range(elements_of(FOOT, "type='cylinder' size='.06 .02' " OFF), 0.93 * round,
                     1.07 * round);
@@ -178,6 +185,76 @@ static void soles_follow_the_shapes(void **state) {
     assert_in_range(elements_of(FOOT, "type='capsule' size='.05 .1' euler='0 90 0' " OFF),
                     0.93 * capsule, 1.07 * capsule);
     assert_in_range(elements_of(FOOT, "type='ellipsoid' size='.12 .12 .01' " OFF), 40, 130);
+}
+
+/* ---- keys ---- */
+
+/* The ground of the keys, to be freed with its model. */
+static const Soft *soft_of_keys(const char *configs, mjModel **m, mjData **d) {
+    *m = compile("", configs, OFF, "", BOX OFF, "");
+    if (!*m) {
+        fail_msg("%s", kit_said);
+    }
+    *d = mj_makeData(*m);
+    return plugin_soft(*m, *d);
+}
+
+static void free_both(mjModel *m, mjData *d) {
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+/* Each key does what the program's key of the same name does. */
+static void keys_reach_the_ground(void **state) {
+    (void)state;
+    mjModel *m;
+    mjData *d;
+    MildMaterial grass;
+    assert_true(mild_material_preset("grass", &grass));
+    const Soft *soft = soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.k_pen", "800")
+                                        CONFIG("ground.mu", "0.25") CONFIG("height", "0.5"),
+                                    &m, &d);
+    const MildMaterial *material = soft->terrain.materials;
+    assert_true(material->k_pen == 800 && material->mu == 0.25);
+    assert_true(material->sigma_cone == grass.sigma_cone && material->recovery == grass.recovery);
+    assert_true(mild_terrain_height_at(&soft->terrain, 3, 4) == 0.5);
+    const mjtSize plain = m->npluginstate;
+    free_both(m, d);
+
+    soft =
+        soft_of_keys(FOOT CONFIG("terrain.kind", "slope") CONFIG("terrain.slope", "0.2")
+                         CONFIG("prints", "100") CONFIG("ground", "grass rubber")
+                             CONFIG("terrain.patches", "stripes") CONFIG("terrain.patch_size", "1"),
+                     &m, &d);
+    assert_true(fabs(mild_terrain_height_at(&soft->terrain, 3, 4) - 0.6) < 1e-6);
+    assert_int_equal(mild_terrain_material_at(&soft->terrain, 0.5, 0), 0);
+    assert_int_equal(mild_terrain_material_at(&soft->terrain, 1.5, 0), 1);
+    assert_true(soft->terrain.materials[0].k_pen == grass.k_pen);
+    assert_true((m->npluginstate - plain) * 8 > 100 * 128);
+    free_both(m, d);
+}
+
+/* Another model sinks as deep under the weight, and a concentric one has a single element. */
+static void models_are_matched(void **state) {
+    (void)state;
+    mjModel *m;
+    mjData *d;
+    MildMaterial grass;
+    assert_true(mild_material_preset("grass", &grass));
+    const Soft *soft =
+        soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.model", "bekker"), &m, &d);
+    const double weight = 9.81;
+    const double wanted = mild_sole_sinkage(soft->soles[0], &grass, weight);
+    assert_int_equal(soft->terrain.materials[0].model, MILD_MODEL_BEKKER);
+    assert_true(fabs(mild_sole_sinkage(soft->soles[0], soft->terrain.materials, weight) - wanted) <
+                0.001 * wanted);
+    free_both(m, d);
+    soft = soft_of_keys(FOOT CONFIG("ground.model", "con_spring"), &m, &d);
+    assert_int_equal(mild_sole_elements(soft->soles[0]), 1);
+    free_both(m, d);
+    soft = soft_of_keys(FOOT CONFIG("ground", "clay"), &m, &d);
+    assert_int_equal(soft->terrain.materials[0].model, MILD_MODEL_BEKKER);
+    free_both(m, d);
 }
 
 int main(void) {
@@ -188,6 +265,8 @@ int main(void) {
         cmocka_unit_test(warns_of_a_foot_that_lies_on_its_side),
         cmocka_unit_test(rk4_at_run_time),
         cmocka_unit_test(soles_follow_the_shapes),
+        cmocka_unit_test(keys_reach_the_ground),
+        cmocka_unit_test(models_are_matched),
     };
     return cmocka_run_group_tests(tests, kit_setup, NULL);
 }
