@@ -191,7 +191,9 @@ static void soles_follow_the_shapes(void **state) {
 
 /* The ground of the keys, to be freed with its model. */
 static const Soft *soft_of_keys(const char *configs, mjModel **m, mjData **d) {
-    *m = compile("", configs, OFF, "", BOX OFF, "");
+    *m = compile("", configs, OFF, "", BOX OFF,
+                 "<worldbody><body pos='3 0 1'><freejoint/><geom size='.1' mass='50'/></body>"
+                 "</worldbody>");
     if (!*m) {
         fail_msg("%s", kit_said);
     }
@@ -251,6 +253,9 @@ static void models_are_matched(void **state) {
     free_both(m, d);
     soft = soft_of_keys(FOOT CONFIG("ground.model", "con_spring"), &m, &d);
     assert_int_equal(mild_sole_elements(soft->soles[0]), 1);
+    free_both(m, d);
+    soft = soft_of_keys(CONFIG("feet", "sole"), &m, &d); /* 10 mm below the body's origin */
+    assert_true(fabs(mild_sole_z(soft->soles[0])) < 1e-12);
     free_both(m, d);
     soft = soft_of_keys(FOOT CONFIG("ground", "clay"), &m, &d);
     assert_int_equal(soft->terrain.materials[0].model, MILD_MODEL_BEKKER);
