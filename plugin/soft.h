@@ -43,7 +43,8 @@ size_t soft_state_bytes(const mjModel *m, int instance);
 size_t soft_bytes(const Soft *soft);
 /* Initialises the state: a ground that remembers nothing. */
 void soft_reset(Soft *soft, void *state);
-/* Takes over what a solve left in `from`, of the same model; the scratch is made again if needed. */
+/* Takes over what a solve left in `from`, of the same model; the scratch is filled again when it is
+ * needed. */
 void soft_copy(Soft *soft, const mjModel *m, const Soft *from);
 
 /* Called where qfrc_passive has just been computed. */

@@ -1,6 +1,7 @@
 /* The inertia that the ground counts with is the integrator's: the twists of the feet that the
  * ground expects at the end of a step are those that MuJoCo gives, for every kind of force that an
- * integrator treats implicitly. With another inertia robots with strong feedback become unstable. */
+ * integrator treats implicitly. With another inertia robots with strong feedback become
+ * unstable. */
 #include <math.h>
 
 #include "plugin_kit.h"

@@ -88,7 +88,7 @@ static void restores_bit_by_bit(void **state) {
     mj_deleteModel(m);
 }
 
-/* The memory matters: with the plates where they were and the ground forgotten they go elsewhere. */
+/* The memory matters: the plates where they were, on ground that has forgotten, go elsewhere. */
 static void memory_matters(void **state) {
     (void)state;
     mjModel *m = hopper(MOTOR);
