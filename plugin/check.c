@@ -11,6 +11,11 @@ MildStatus check_model(const mjModel *m, int instance, MildError *error) {
                          "integrator RK4 is not supported, for it evaluates a step four times; set "
                          "<option integrator=\"implicitfast\"/>, discrete or Euler");
     }
+    if (soft_without_actuation(m) && soft_without_passive(m)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "without actuation, and with the flags spring and damper disabled, MuJoCo "
+                         "calls no plugin; enable one of the two flags");
+    }
     for (int i = 0; i < m->nplugin; i++) {
         if (i != instance && m->plugin[i] == m->plugin[instance]) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,

@@ -4,7 +4,8 @@
 
 #include "plugin/soft.h"
 
-/* Fails for a model that the plugin cannot serve: the integrator, a second instance. */
+/* Fails for a model that the plugin cannot serve: the integrator, flags, a second
+ * instance. */
 MildStatus check_model(const mjModel *m, int instance, MildError *error);
 /* Writes one line about a foot that stands on MuJoCo's own contact as well, or whose frame is not
  * upright in qpos0. Returns 0 when there is nothing to say. */

@@ -38,7 +38,7 @@ static void remember(Mix *mix, const double *x, const double *c) {
 /* share = argmin |c - sum share_j dc_j|^2, by Gauss elimination of the normal equations. */
 static void best_shares(const Mix *mix, const double *c, double *share) {
     const int n = mix->steps;
-    double a[MIX_DEPTH][MIX_DEPTH];
+    double a[MIX_DEPTH][MIX_DEPTH] = {{0}};
     for (int i = 0; i < n; i++) {
         share[i] = dot(mix->dc[i], c, mix->rows);
         for (int j = 0; j < n; j++) {
@@ -65,7 +65,7 @@ static void best_shares(const Mix *mix, const double *c, double *share) {
 }
 
 void mix_next(Mix *mix, double *x, const double *c) {
-    double share[MIX_DEPTH];
+    double share[MIX_DEPTH] = {0};
     int finite = 1;
     remember(mix, x, c);
     best_shares(mix, c, share);

@@ -375,17 +375,27 @@ static int integrator_fits(Soft *soft, const mjModel *m) {
     return 0;
 }
 
+int soft_without_actuation(const mjModel *m) {
+    return m->nu == 0 || (m->opt.disableflags & mjDSBL_ACTUATION);
+}
+
+int soft_without_passive(const mjModel *m) {
+    const int both = mjDSBL_SPRING | mjDSBL_DAMPER;
+    return (m->opt.disableflags & both) == both;
+}
+
 static void ground_step(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
     if (!integrator_fits(soft, m)) {
         soft->known = 0;
         return;
     }
-    if (soft->fresh) {
+    if (soft_without_passive(m)) {
+        mju_zero(soft->passive, (int)m->nv);
+    } else if (soft->fresh) {
         mju_copy(soft->passive, d->qfrc_passive, (int)m->nv);
-        soft->fresh = 0;
-    } else { /* the stage is evaluated again */
-        mju_copy(d->qfrc_passive, soft->passive, (int)m->nv);
     }
+    soft->fresh = 0;
+    mju_copy(d->qfrc_passive, soft->passive, (int)m->nv); /* if the stage is evaluated again */
     soft->inside = 1;
     place_feet(soft, m, d);
     memset(soft->metric.tree, 0, (size_t)m->ntree * sizeof *soft->metric.tree);
@@ -409,7 +419,7 @@ void soft_passive(Soft *soft, const mjModel *m, mjData *d, const MildGround *gro
         return;
     }
     soft->fresh = 1;
-    if (m->nu > 0 && !(m->opt.disableflags & mjDSBL_ACTUATION)) {
+    if (!soft_without_actuation(m)) {
         return;
     }
     soft->inside = 1;

@@ -54,6 +54,10 @@ void soft_actuation(Soft *soft, const mjModel *m, mjData *d, const MildGround *g
 /* Called when MuJoCo has stepped: moves the ground's memory. */
 void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *ground);
 
+/* Bool: MuJoCo has no actuation in this model, or no passive forces, and so leaves the stage out. */
+int soft_without_actuation(const mjModel *m);
+int soft_without_passive(const mjModel *m);
+
 /* Bool: the state is that of this ground, and not one of another model or zeros. */
 int soft_owns(const Soft *soft, const MildGround *ground);
 

@@ -69,6 +69,33 @@ static void refuses_what_is_wrong(void **state) {
     check_refused("integrator='RK4'", FOOT, "RK4", "implicitfast");
 }
 
+/* Without passive forces MuJoCo leaves out a stage. */
+static void disabled_flags(void **state) {
+    (void)state;
+    const char *const off = "<option><flag spring='disable' damper='disable'/></option>";
+    const char *const motor = "<option><flag spring='disable' damper='disable'/></option>"
+                              "<actuator><motor site='sole' gear='0 0 0 0 0 1'/></actuator>";
+    assert_null(compile("", FOOT, OFF, "", BOX OFF, off));
+    print_message("%s\n", kit_said);
+    assert_non_null(strstr(kit_said, "spring and damper"));
+    mjModel *m = compile("", FOOT, OFF, "", BOX OFF, motor);
+    assert_non_null(m);
+    mjData *d = mj_makeData(m);
+    m->opt.disableflags = 0; /* passive forces that are stale later */
+    d->qpos[2] = 0.012;
+    kit_run(m, d, 0.1);
+    m->opt.disableflags = mjDSBL_SPRING | mjDSBL_DAMPER;
+    for (int i = 0; i < 1000; i++) {
+        mj_forward(m, d);
+        mj_forwardSkip(m, d, mjSTAGE_VEL, 1);
+        mj_step(m, d);
+    }
+    assert_true(d->qpos[2] < 0.01 && d->qpos[2] > 0);
+    assert_true(fabs(d->qvel[2]) < 1e-6);
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
 static void refuses_a_second_instance(void **state) {
     (void)state;
     kit_messages = 0;
@@ -265,6 +292,7 @@ static void models_are_matched(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(refuses_what_is_wrong),
+        cmocka_unit_test(disabled_flags),
         cmocka_unit_test(refuses_a_second_instance),
         cmocka_unit_test(warns_of_a_rigid_floor),
         cmocka_unit_test(warns_of_a_foot_that_lies_on_its_side),
