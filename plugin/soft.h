@@ -54,7 +54,8 @@ void soft_actuation(Soft *soft, const mjModel *m, mjData *d, const MildGround *g
 /* Called when MuJoCo has stepped: moves the ground's memory. */
 void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *ground);
 
-/* Bool: MuJoCo has no actuation in this model, or no passive forces, and so leaves the stage out. */
+/* Bool: MuJoCo leaves the stage of actuation out, for there are no actuators or they are disabled;
+ * and the plugins at the stage of passive forces, which are disabled. */
 int soft_without_actuation(const mjModel *m);
 int soft_without_passive(const mjModel *m);
 
