@@ -12,10 +12,11 @@ SEED ?= 1
 MUTANTS ?=
 FAULTS ?=
 STAGES ?=
+MUJOCO_ROOT ?=
 QUICK ?=
 TEST ?=
 
-.PHONY: setup build test run bench install deb docs site paper check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin deb docs site paper check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -24,6 +25,7 @@ help:
 	@echo "make build   set up, build build/mild"
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
+	@echo "make plugin  the MuJoCo plugin into PREFIX, for MUJOCO_ROOT= (docs/plugin.md)"
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
 	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
@@ -61,6 +63,13 @@ install:
 		-DMILD_MARCH=$(MARCH) -DCMAKE_INSTALL_PREFIX=$(PREFIX) $(CMAKE_FLAGS)
 	@cmake --build build/library --parallel $(JOBS) --target mild_shared mild_static
 	@cmake --install build/library
+
+# For the MuJoCo of .venv, or for any other, which needs no setup. MUJOCO_ROOT: docs/plugin.md.
+plugin: $(if $(MUJOCO_ROOT),,setup)
+	@cmake -S . -B build/mujoco -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_APP=OFF -DMILD_TESTS=OFF \
+		-DMILD_PLUGIN=ON -DMILD_MARCH=$(MARCH) -DMUJOCO_ROOT=$(MUJOCO_ROOT) -DCMAKE_INSTALL_PREFIX=$(PREFIX) $(CMAKE_FLAGS)
+	@cmake --build build/mujoco --parallel $(JOBS) --target mild_plugin
+	@cmake --install build/mujoco --component plugin
 
 # Set up as for a build; not `build` itself, for it has a folder and a compiler of its own.
 fuzz: setup

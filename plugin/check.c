@@ -1,0 +1,117 @@
+#include "plugin/check.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#define UPRIGHT 0.9 /* [-] cosine of the tilt of a foot in qpos0 that is still a foot's */
+
+MildStatus check_model(const mjModel *m, int instance, MildError *error) {
+    if (m->opt.integrator == mjINT_RK4) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "integrator RK4 is not supported, for it evaluates a step four times; set "
+                         "<option integrator=\"implicitfast\"/>, discrete or Euler");
+    }
+    if (soft_without_actuation(m) && soft_without_passive(m)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "without actuation, and with the flags spring and damper disabled, MuJoCo "
+                         "calls no plugin; enable one of the two flags");
+    }
+    for (int i = 0; i < m->nplugin; i++) {
+        if (i != instance && m->plugin[i] == m->plugin[instance]) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "a model has one instance; name all feet in its feet, and grounds in "
+                             "its ground and terrain.patches");
+        }
+    }
+    return MILD_OK;
+}
+
+static int pair_exists(const mjModel *m, int a, int b) {
+    for (int p = 0; p < m->npair; p++) {
+        const int g = m->pair_geom1[p], h = m->pair_geom2[p];
+        if ((g == a && h == b) || (g == b && h == a)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static int bodies_excluded(const mjModel *m, int a, int b) {
+    const int low = a < b ? a : b, high = a < b ? b : a;
+    for (int e = 0; e < m->nexclude; e++) {
+        if (m->exclude_signature[e] == (low << 16) + high) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Bool: MuJoCo lets the two geoms touch. */
+static int may_touch(const mjModel *m, int a, int b) {
+    if (pair_exists(m, a, b)) {
+        return 1;
+    }
+    if (bodies_excluded(m, m->geom_bodyid[a], m->geom_bodyid[b])) {
+        return 0;
+    }
+    return (m->geom_contype[a] & m->geom_conaffinity[b]) != 0 ||
+           (m->geom_contype[b] & m->geom_conaffinity[a]) != 0;
+}
+
+static const char *geom_name(const mjModel *m, int geom, char *text, size_t size) {
+    const char *name = mj_id2name(m, mjOBJ_GEOM, geom);
+    snprintf(text, size, name ? "geom '%.60s'" : "geom %.0s%d", name ? name : "", geom);
+    return text;
+}
+
+/* A plane or height field of the world that touches a geom of the foot. */
+static int standing_on(const mjModel *m, const Foot *foot, char *text, size_t size) {
+    char a[80], b[80];
+    for (int g = 0; g < m->ngeom; g++) {
+        for (int w = 0; w < m->ngeom && foot_may_meet_floor(m, foot, g); w++) {
+            const int floor = m->geom_type[w] == mjGEOM_PLANE || m->geom_type[w] == mjGEOM_HFIELD;
+            if (!floor || m->body_weldid[m->geom_bodyid[w]] != 0 || !may_touch(m, g, w)) {
+                continue;
+            }
+            snprintf(text, size,
+                     "%s of foot body '%.60s' still touches %s, which is rigid; set its contype "
+                     "and conaffinity to 0, or exclude the two bodies",
+                     geom_name(m, g, a, sizeof a), mj_id2name(m, mjOBJ_BODY, foot->body),
+                     geom_name(m, w, b, sizeof b));
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* [-] Vertical component of the foot's z axis in qpos0. */
+static double upright(const mjModel *m, const Foot *foot) {
+    double turn[4] = {1, 0, 0, 0}, product[4], matrix[9];
+    if (foot->site >= 0) {
+        mju_copy4(turn, m->site_quat + 4 * foot->site);
+    }
+    for (int b = foot->body; b > 0; b = m->body_parentid[b]) {
+        mju_mulQuat(product, m->body_quat + 4 * b, turn);
+        mju_copy4(turn, product);
+    }
+    mju_quat2Mat(matrix, turn);
+    return matrix[8];
+}
+
+int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size) {
+    for (int f = 0; f < soft->feet; f++) {
+        const Foot *foot = &soft->foot[f];
+        if (standing_on(m, foot, text, size)) {
+            return 1;
+        }
+        if (!foot->round && fabs(upright(m, foot)) < UPRIGHT) {
+            snprintf(text, size,
+                     "the z axis of foot '%.60s' is not vertical in the pose of the file; its sole "
+                     "lies across z: name a site whose z axis points up from the sole",
+                     mj_id2name(m, foot->site < 0 ? mjOBJ_BODY : mjOBJ_SITE,
+                                foot->site < 0 ? foot->body : foot->site));
+            return 1;
+        }
+    }
+    return 0;
+}

@@ -1,0 +1,14 @@
+/* Private to the plugin: warnings about a model that compiles but will not do what is meant. */
+#ifndef PLUGIN_CHECK_H
+#define PLUGIN_CHECK_H
+
+#include "plugin/soft.h"
+
+/* Fails for a model that the plugin cannot serve: the integrator, flags, a second
+ * instance. */
+MildStatus check_model(const mjModel *m, int instance, MildError *error);
+/* Writes one line about a foot that stands on MuJoCo's own contact as well, or whose frame is not
+ * upright in qpos0. Returns 0 when there is nothing to say. */
+int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size);
+
+#endif

@@ -1,0 +1,199 @@
+#include "plugin/def.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "base/text.h"
+
+#define WORD 128 /* bytes of a name */
+
+#define FIELD(member, type, count, low, high, help)                                                \
+    MILD_FIELD(PluginDef, member, type, count, low, high, help)
+const MildField plugin_fields[] = {
+    FIELD(feet, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
+          "[text] bodies or sites that are feet, 1 .. 4; z points up from the sole"),
+    FIELD(sole, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
+          "[text] geoms that form the soles (default: the shapes of the foot's body); a single "
+          "sphere is a round foot"),
+    FIELD(outline, MILD_FIELD_TEXT, PLUGIN_OUTLINE_SIZE, 0, 0,
+          "[m] polygon x y x y ... of the sole in the frame of the foot; one for all feet, or one "
+          "for each, separated by ;"),
+    FIELD(ground, MILD_FIELD_TEXT, PLUGIN_TEXT_SIZE, 0, 0,
+          "[text] preset; several when terrain.patches is set (default sand_loose)"),
+    FIELD(sole_z, MILD_FIELD_DOUBLE, 1, -10, 10, "[m] height of the outline's plane in that frame"),
+    FIELD(pitch, MILD_FIELD_DOUBLE, 1, 1e-4, 1, "[m] edge of a ground element"),
+    FIELD(elements, MILD_FIELD_INT, 1, 0, 65536, "[-] elements of a sole; 0: as many as fit"),
+    FIELD(height, MILD_FIELD_DOUBLE, 1, -1e3, 1e3, "[m] of the surface above z = 0"),
+    FIELD(prints, MILD_FIELD_INT, 1, 0, MILD_PRINT_TILES_MAX,
+          "[-] tiles of imprints that stay, about ten a footprint; 0: the ground forgets"),
+};
+const int plugin_field_count = (int)(sizeof plugin_fields / sizeof *plugin_fields);
+
+/* ---- names of the attributes ---- */
+
+typedef struct {
+    const char *name;   /* in messages */
+    const char *prefix; /* of its attributes */
+    const MildField *fields;
+    const int *count;
+} Section;
+
+static const Section sections[] = {
+    {"plugin", "", plugin_fields, &plugin_field_count},
+    {"ground", "ground.", mild_material_fields, &mild_material_field_count},
+    {"terrain", "terrain.", mild_map_fields, &mild_map_field_count}};
+enum { SECTIONS = 3, PLUGIN_SECTION = 0, MATERIAL_SECTION, MAP_SECTION, ATTRIBUTES_MAX = 96 };
+
+static void attribute_name(const Section *section, int field, char *name, size_t size) {
+    snprintf(name, size, "%s%s", section->prefix, section->fields[field].name);
+}
+
+const char *const *plugin_attributes(int *count) {
+    static char names[ATTRIBUTES_MAX][48];
+    static const char *attributes[ATTRIBUTES_MAX];
+    int filled = 0;
+    for (int s = 0; s < SECTIONS; s++) {
+        for (int i = 0; i < *sections[s].count && filled < ATTRIBUTES_MAX; i++, filled++) {
+            attribute_name(&sections[s], i, names[filled], sizeof names[filled]);
+            attributes[filled] = names[filled];
+        }
+    }
+    *count = filled;
+    return attributes;
+}
+
+const char *plugin_text(const mjModel *m, int instance, const char *attribute) {
+    const char *text = mj_getPluginConfig(m, instance, attribute);
+    return text && *text ? text : NULL;
+}
+
+/* Overwrites the fields of `def` that the instance gives. */
+static MildStatus read_section(const mjModel *m, int instance, const Section *section, void *def,
+                               MildError *error) {
+    for (int i = 0; i < *section->count; i++) {
+        char name[48];
+        attribute_name(section, i, name, sizeof name);
+        const char *text = plugin_text(m, instance, name);
+        MildStatus status =
+            text ? mild_field_parse(&section->fields[i], def, text, section->name, error) : MILD_OK;
+        if (status != MILD_OK) {
+            return status;
+        }
+    }
+    return MILD_OK;
+}
+
+MildStatus plugin_def_read(const mjModel *m, int instance, PluginDef *def, MildError *error) {
+    *def = (PluginDef){
+        .ground = "sand_loose", .sole_z = 0, .pitch = 0.0195, .map = mild_map_def_default()};
+    MildStatus status = read_section(m, instance, &sections[PLUGIN_SECTION], def, error);
+    return status == MILD_OK ? read_section(m, instance, &sections[MAP_SECTION], &def->map, error)
+                             : status;
+}
+
+int plugin_word(const char **text, char *word, size_t size) {
+    static const char space[] = " \t\r\n,";
+    const char *start = *text + strspn(*text, space);
+    size_t length = strcspn(start, space);
+    if (length == 0 || length >= size) {
+        return 0;
+    }
+    memcpy(word, start, length);
+    word[length] = '\0';
+    *text = start + length;
+    return 1;
+}
+
+/* ---- materials ---- */
+
+static MildStatus find_preset(const char *name, MildMaterial *material, MildError *error) {
+    const char *names[32];
+    int count = 0;
+    if (mild_material_preset(name, material)) {
+        return MILD_OK;
+    }
+    if (strcmp(name, "rigid") == 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "ground 'rigid' is MuJoCo's own contact; leave the plugin out");
+    }
+    for (; count < mild_material_preset_count() && count < 32; count++) {
+        names[count] = mild_material_preset_name(count);
+    }
+    return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown ground '%.60s'; nearest is '%s'", name,
+                     text_nearest(name, names, count));
+}
+
+MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def, MildModel *model,
+                            MildError *error) {
+    const char *text = def->ground;
+    char word[WORD] = "";
+    MildMaterial material;
+    if (!plugin_word(&text, word, sizeof word)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "plugin.ground names no ground");
+    }
+    MildStatus status = find_preset(word, &material, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    const int own = material.model;
+    status = read_section(m, instance, &sections[MATERIAL_SECTION], &material, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    *model = (MildModel)material.model;
+    if (*model == MILD_MODEL_RIGID) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "ground.model 'rigid' is MuJoCo's own contact; leave the plugin out");
+    }
+    if (own != MILD_MODEL_MILD && material.model != own) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "ground '%.60s' is one of %s, which has no match in %s; leave out "
+                         "ground.model",
+                         word, mild_model_names[own], mild_model_names[*model]);
+    }
+    return MILD_OK;
+}
+
+/* A preset as a material of the model, with the keys ground.*. */
+static MildStatus finish_material(const mjModel *m, int instance, MildModel model,
+                                  const MildSole *sole, double load, MildMaterial *material,
+                                  MildError *error) {
+    const MildMaterial mild = *material;
+    MildStatus status = MILD_OK;
+    if (mild.model == MILD_MODEL_MILD && model != MILD_MODEL_MILD) {
+        status = mild_model_match(model, &mild, sole, load, material, error);
+    }
+    if (status == MILD_OK) {
+        status = read_section(m, instance, &sections[MATERIAL_SECTION], material, error);
+    }
+    return status == MILD_OK ? mild_material_check(material, error) : status;
+}
+
+MildStatus plugin_def_materials(const mjModel *m, int instance, const PluginDef *def,
+                                const MildSole *sole, double load, MildTerrain *terrain,
+                                MildError *error) {
+    const char *text = def->ground;
+    char word[WORD];
+    MildModel model = MILD_MODEL_MILD;
+    MildStatus status = plugin_def_model(m, instance, def, &model, error);
+    *terrain = (MildTerrain){.height = def->height};
+    while (status == MILD_OK && plugin_word(&text, word, sizeof word)) {
+        MildMaterial *material = &terrain->materials[terrain->material_count];
+        if (terrain->material_count == MILD_MATERIALS_MAX) {
+            return mild_fail(error, MILD_ERROR_RANGE, "plugin.ground names more than %d grounds",
+                             MILD_MATERIALS_MAX);
+        }
+        status = find_preset(word, material, error);
+        if (status == MILD_OK) {
+            status = finish_material(m, instance, model, sole, load, material, error);
+        }
+        terrain->material_count++;
+    }
+    if (status == MILD_OK && terrain->material_count > 1 && def->map.patches == MILD_PATTERN_NONE) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "plugin.ground names %d grounds; set terrain.patches to stripes or "
+                         "checker, or name one",
+                         terrain->material_count);
+    }
+    return status;
+}

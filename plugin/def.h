@@ -1,0 +1,52 @@
+/* Private to the plugin: what the MJCF asks for. Attributes of the plugin are the keys of the
+ * program: ground.KEY of MildMaterial, terrain.KEY of MildMapDef, and the ones below. */
+#ifndef PLUGIN_DEF_H
+#define PLUGIN_DEF_H
+
+#include <mujoco/mujoco.h>
+
+#include "mild/ground.h"
+
+#define PLUGIN_NAME "mild.ground"
+#define PLUGIN_TEXT_SIZE 1024
+#define PLUGIN_OUTLINE_SIZE 16384
+
+/* Section [plugin]: the attributes without a prefix. */
+typedef struct {
+    char feet[PLUGIN_TEXT_SIZE];       /* names of bodies or sites */
+    char sole[PLUGIN_TEXT_SIZE];       /* names of geoms */
+    char outline[PLUGIN_OUTLINE_SIZE]; /* [m] polygons, one or one for each foot */
+    char ground[PLUGIN_TEXT_SIZE];     /* names of presets, by label of the terrain's pattern */
+    double sole_z;                     /* [m] plane of the outline in the frame of the foot */
+    double pitch;                      /* [m] edge of an element */
+    int elements;                      /* of a sole; 0: as many as fit */
+    double height;                     /* [m] of the surface */
+    int prints;                        /* tiles of imprints; 0: none */
+    MildMapDef map;                    /* terrain.* */
+} PluginDef;
+
+extern const MildField plugin_fields[];
+extern const int plugin_field_count;
+
+/* All attributes, for mjpPlugin: [*count]. */
+const char *const *plugin_attributes(int *count);
+
+/* Text of an attribute of an instance; NULL when it is absent. */
+const char *plugin_text(const mjModel *m, int instance, const char *attribute);
+
+/* Reads everything but ground.*, which needs the soles. */
+MildStatus plugin_def_read(const mjModel *m, int instance, PluginDef *def, MildError *error);
+/* Lays the materials of `ground` in the terrain, as the commands of the program do: presets,
+ * matched to ground.model on the sole under `load` [N], then the keys ground.*. */
+MildStatus plugin_def_materials(const mjModel *m, int instance, const PluginDef *def,
+                                const MildSole *sole, double load, MildTerrain *terrain,
+                                MildError *error);
+/* The model of ground.model or of the first preset. */
+MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def, MildModel *model,
+                            MildError *error);
+
+/* Takes the next word from *text into `word` and moves *text behind it. Returns 0 at the end, or
+ * when the word is longer than `size`. */
+int plugin_word(const char **text, char *word, size_t size);
+
+#endif

@@ -1,0 +1,31 @@
+/* Private to the plugin: the feet of a model and their soles. */
+#ifndef PLUGIN_FOOT_H
+#define PLUGIN_FOOT_H
+
+#include "plugin/def.h"
+
+/* A foot. Its frame is that of its body or site; the frame of a round foot is level and has its
+ * origin in the lowest point of the sphere. */
+typedef struct {
+    int body;         /* that carries the sole */
+    int site;         /* whose frame is the foot's; -1: the body's frame */
+    int round;        /* bool: a sphere that transmits no moment */
+    double center[3]; /* [m] round: centre of the sphere, body frame */
+    double radius;    /* [m] round */
+    MildSole *raster;
+    MildSole *sole; /* the raster, or one element in its middle (mild_sole_concentric) */
+} Foot;
+
+/* Finds the feet of an instance and makes their soles. feet: [MILD_FEET_MAX], zeroed. Writes their
+ * number, also on failure, when those made so far must be destroyed. */
+MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, Foot *feet,
+                       int *count, MildError *error);
+void feet_destroy(Foot *feet, int count);
+
+/* Bool: the geom is on the foot's body and would meet a floor that the sole sinks into. */
+int foot_may_meet_floor(const mjModel *m, const Foot *foot, int geom);
+
+/* Present place of the foot's frame. */
+void foot_pose(const mjData *d, const Foot *foot, double position[3], double rotation[9]);
+
+#endif

@@ -1,0 +1,25 @@
+/* Private to the plugin: Anderson's acceleration of a fixed-point iteration x <- x + c(x) (Anderson
+ * 1965). Of all combinations of the last few steps it takes the one whose change c would be
+ * smallest if c were linear. */
+#ifndef PLUGIN_MIX_H
+#define PLUGIN_MIX_H
+
+#define MIX_DEPTH 4 /* steps remembered */
+#define MIX_ROWS 24 /* most numbers in x */
+
+typedef struct {
+    int rows;  /* in use */
+    int known; /* bool: x and c are those of the last call */
+    int steps; /* remembered */
+    double x[MIX_ROWS];
+    double c[MIX_ROWS];
+    double dx[MIX_DEPTH][MIX_ROWS]; /* differences between successive calls */
+    double dc[MIX_DEPTH][MIX_ROWS];
+} Mix;
+
+/* Forgets everything. */
+void mix_start(Mix *mix, int rows);
+/* Replaces x by the next one to try. c: [rows] change of x at x. */
+void mix_next(Mix *mix, double *x, const double *c);
+
+#endif

@@ -1,0 +1,443 @@
+/* A step on soft ground inside MuJoCo's. At the stage where actuator forces are computed all forces
+ * but those of the constraints and of the ground are known. The ground needs the twists of the feet
+ * after the step as a function of its wrench W:
+ *
+ *     V = V_free + h A W,    A = J N^-1 J^T    (N: metric.h)
+ *
+ * Constraints (joint limits, contacts of other bodies) respond to the ground's force, and the
+ * ground to theirs. Both are solved in turn until the twists agree, with an A that holds the
+ * constraints' response while the same ones stay active. */
+#include "plugin/soft.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "ground/state.h"
+
+#define ROUNDS_MAX 30  /* solves of ground and constraints in one step */
+#define AGREEMENT 1e-6 /* [m/s, rad/s] difference of the twists at which they agree */
+
+/* ---- making one ---- */
+
+/* First body of the tree that a body belongs to. */
+static int root_of(const mjModel *m, int body) {
+    while (m->body_parentid[body] > 0) {
+        body = m->body_parentid[body];
+    }
+    return body;
+}
+
+/* [N] Weight of everything that moves with the first foot, divided by the number of feet. The
+ * compiler asks before it has summed the masses. */
+static double foot_load(const mjModel *m, const Foot *feet, int count) {
+    const int root = root_of(m, feet[0].body);
+    double mass = 0;
+    for (int b = 1; b < m->nbody; b++) {
+        mass += root_of(m, b) == root ? m->body_mass[b] : 0;
+    }
+    return mass * fabs(m->opt.gravity[2]) / count;
+}
+
+/* The height of a map that is not level, or has a pattern, is added to `height`. */
+static MildStatus lay_map(Soft *soft, MildError *error) {
+    MildMapDef *map = &soft->def.map;
+    if (map->kind == MILD_MAP_FLAT && map->patches == MILD_PATTERN_NONE) {
+        return MILD_OK;
+    }
+    map->patch_count = soft->terrain.material_count;
+    soft->map = mild_map_create(map, error);
+    return soft->map ? mild_terrain_set_map(&soft->terrain, soft->map, error) : MILD_ERROR_ARGUMENT;
+}
+
+static int alloc_arrays(Soft *soft, const mjModel *m) {
+    const size_t nv = (size_t)m->nv;
+    soft->jacobian = calloc(FOOT_ROWS * nv + 1, sizeof *soft->jacobian);
+    soft->response = calloc(FOOT_ROWS * nv + 1, sizeof *soft->response);
+    soft->passive = calloc(nv + 1, sizeof *soft->passive);
+    soft->acceleration = calloc(nv + 1, sizeof *soft->acceleration);
+    return soft->jacobian && soft->response && soft->passive && soft->acceleration &&
+           metric_alloc(&soft->metric, m);
+}
+
+/* What the size of the state follows from. */
+static MildStatus make_feet(Soft *soft, const mjModel *m, int instance, MildError *error) {
+    MildModel model = MILD_MODEL_MILD;
+    MildStatus status = plugin_def_read(m, instance, &soft->def, error);
+    if (status == MILD_OK) {
+        status = plugin_def_model(m, instance, &soft->def, &model, error);
+    }
+    if (status == MILD_OK) {
+        status = feet_create(m, &soft->def, model, soft->foot, &soft->feet, error);
+    }
+    for (int f = 0; f < soft->feet && status == MILD_OK; f++) {
+        soft->soles[f] = soft->foot[f].sole;
+    }
+    return status;
+}
+
+static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *error) {
+    MildStatus status = make_feet(soft, m, instance, error);
+    if (status == MILD_OK &&
+        (size_t)m->plugin_statenum[instance] * sizeof(mjtNum) != soft_bytes(soft)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "the model was compiled with other feet, soles or prints; compile it "
+                         "again");
+    }
+    if (status == MILD_OK) {
+        status = plugin_def_materials(m, instance, &soft->def, soft->foot[0].raster,
+                                      foot_load(m, soft->foot, soft->feet), &soft->terrain, error);
+    }
+    if (status == MILD_OK) {
+        status = lay_map(soft, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    soft->scratch = mild_scratch_create(soft->soles, soft->feet, error);
+    if (!soft->scratch || !alloc_arrays(soft, m)) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    }
+    soft->fresh = 1;
+    return MILD_OK;
+}
+
+Soft *soft_create(const mjModel *m, int instance, MildError *error) {
+    Soft *soft = calloc(1, sizeof *soft);
+    if (!soft) {
+        mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+        return NULL;
+    }
+    if (make(soft, m, instance, error) != MILD_OK) {
+        soft_destroy(soft);
+        return NULL;
+    }
+    return soft;
+}
+
+void soft_destroy(Soft *soft) {
+    if (!soft) {
+        return;
+    }
+    mild_scratch_destroy(soft->scratch);
+    mild_map_destroy(soft->map);
+    feet_destroy(soft->foot, soft->feet);
+    metric_free(&soft->metric);
+    free(soft->jacobian);
+    free(soft->response);
+    free(soft->passive);
+    free(soft->acceleration);
+    free(soft);
+}
+
+size_t soft_state_bytes(const mjModel *m, int instance) {
+    Soft *soft = calloc(1, sizeof *soft);
+    const int good = soft && make_feet(soft, m, instance, NULL) == MILD_OK;
+    const size_t bytes = good ? soft_bytes(soft) : 0;
+    soft_destroy(soft);
+    return bytes;
+}
+
+size_t soft_bytes(const Soft *soft) {
+    return mild_ground_bytes_prints(soft->soles, soft->feet, soft->def.prints);
+}
+
+void soft_reset(Soft *soft, void *state) {
+    mild_ground_init_prints(state, soft->soles, soft->feet, soft->def.prints);
+    soft->known = soft->solved = 0;
+}
+
+/* Bool: a material as Memory encodes it (ground/state.h) is one of the terrain. */
+static int is_material(const MildTerrain *terrain, int32_t code) {
+    return code < 0 ||
+           ((code & 255) < terrain->material_count && (code >> 8 & 255) < terrain->material_count);
+}
+
+int soft_owns(const Soft *soft, const MildGround *ground) {
+    if (ground->feet != soft->feet) {
+        return 0;
+    }
+    for (int f = 0; f < soft->feet; f++) {
+        if (ground->elements[f] != mild_sole_elements(soft->soles[f]) ||
+            ground->padded[f] != sole_padded(soft->soles[f])) {
+            return 0;
+        }
+    }
+    if (ground->tiles < 0 || mild_ground_size(ground) != soft_bytes(soft)) {
+        return 0;
+    }
+    for (int f = 0; f < soft->feet; f++) {
+        const Memory memory = ground_memory(ground, f);
+        for (int e = 0; e < ground->elements[f]; e++) {
+            if (!is_material(&soft->terrain, memory.material[e])) {
+                return 0;
+            }
+        }
+    }
+    return 1;
+}
+
+void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
+    const size_t nv = (size_t)m->nv * sizeof(double);
+    soft->input = from->input;
+    soft->contact = from->contact;
+    soft->known = from->known;
+    soft->solved = 0;
+    soft->fresh = from->fresh;
+    soft->rounds = from->rounds;
+    memcpy(soft->passive, from->passive, nv);
+    memcpy(soft->jacobian, from->jacobian, FOOT_ROWS * nv);
+}
+
+/* ---- the feet ---- */
+
+/* twist[r] = J_r . velocity; [6 feet]. */
+static void twists(const Soft *soft, int nv, const double *velocity, double *twist) {
+    for (int r = 0; r < 6 * soft->feet; r++) {
+        twist[r] = mju_dot(soft->jacobian + (size_t)r * (size_t)nv, velocity, nv);
+    }
+}
+
+/* Pose, Jacobian and twist of the feet. A round foot transmits no moment, so that its angular rows
+ * are 0. */
+static void place_feet(Soft *soft, const mjModel *m, const mjData *d) {
+    const int nv = (int)m->nv;
+    double twist[FOOT_ROWS];
+    soft->input.feet = soft->feet;
+    soft->input.dt = m->opt.timestep;
+    for (int f = 0; f < soft->feet; f++) {
+        double *rows = soft->jacobian + (size_t)(6 * f) * (size_t)nv;
+        foot_pose(d, &soft->foot[f], soft->input.position[f], soft->input.rotation[f]);
+        mj_jac(m, d, rows, rows + 3 * nv, soft->input.position[f], soft->foot[f].body);
+        if (soft->foot[f].round) {
+            mju_zero(rows + 3 * nv, 3 * nv);
+        }
+    }
+    twists(soft, nv, d->qvel, twist);
+    memcpy(soft->input.velocity, twist, (size_t)(6 * soft->feet) * sizeof *twist);
+}
+
+/* A = J x, with x = factor^-1 J^T in soft->response. */
+static void inverse_inertia(Soft *soft, const double *factor, int nv) {
+    const Metric *metric = &soft->metric;
+    const int rows = 6 * soft->feet, n = metric->dofs;
+    double *a = soft->input.inverse_inertia;
+    for (int r = 0; r < rows; r++) {
+        double *x = soft->response + (size_t)r * (size_t)nv;
+        for (int i = 0; i < n; i++) {
+            x[i] = soft->jacobian[(size_t)r * (size_t)nv + (size_t)metric->dof[i]];
+        }
+        metric_solve(metric, factor, x);
+        for (int c = 0; c <= r; c++) {
+            const double *row = soft->jacobian + (size_t)c * (size_t)nv;
+            double sum = 0;
+            for (int i = 0; i < n; i++) {
+                sum += row[metric->dof[i]] * x[i];
+            }
+            a[r * rows + c] = a[c * rows + r] = sum;
+        }
+    }
+}
+
+/* ---- the step ---- */
+
+/* qfrc_passive = what MuJoCo computed + J^T W, and all that follows from it up to qacc and
+ * qfrc_constraint. Without `act` nothing follows. */
+static void apply(const Soft *soft, const mjModel *m, mjData *d, const double *wrench, int act) {
+    const int nv = (int)m->nv;
+    mju_copy(d->qfrc_passive, soft->passive, nv);
+    for (int r = 0; r < 6 * soft->feet; r++) {
+        mju_addToScl(d->qfrc_passive, soft->jacobian + (size_t)r * (size_t)nv, wrench[r], nv);
+    }
+    if (act) {
+        mj_fwdAcceleration(m, d);
+        mj_fwdConstraint(m, d);
+    }
+}
+
+/* Twists of the feet after the step that MuJoCo would do now. */
+static void outcome(Soft *soft, const mjModel *m, const mjData *d, double *twist) {
+    const Metric *metric = &soft->metric;
+    const int nv = (int)m->nv, direct = metric_is_step(m, d);
+    double *a = soft->acceleration;
+    for (int i = 0; i < metric->dofs; i++) {
+        const int dof = metric->dof[i];
+        a[i] = direct ? d->qacc[dof] : d->qfrc_smooth[dof] + d->qfrc_constraint[dof];
+    }
+    if (!direct) {
+        metric_integrate(metric, m, a);
+    }
+    twists(soft, nv, d->qvel, twist);
+    for (int r = 0; r < 6 * soft->feet; r++) {
+        const double *row = soft->jacobian + (size_t)r * (size_t)nv;
+        for (int i = 0; i < metric->dofs; i++) {
+            twist[r] += soft->input.dt * row[metric->dof[i]] * a[i];
+        }
+    }
+}
+
+static void read_wrench(const Soft *soft, double *wrench) {
+    for (int f = 0; f < soft->feet; f++) {
+        memcpy(wrench + 6 * f, soft->contact.foot[f].force, 3 * sizeof *wrench);
+        memcpy(wrench + 6 * f + 3, soft->contact.foot[f].torque, 3 * sizeof *wrench);
+    }
+}
+
+/* V_free = V - h A W, from the outcome V of the wrench W. */
+static void free_twists(Soft *soft, const double *twist, const double *wrench) {
+    const int rows = 6 * soft->feet;
+    for (int r = 0; r < rows; r++) {
+        soft->input.free_velocity[r] =
+            twist[r] -
+            soft->input.dt * mju_dot(soft->input.inverse_inertia + r * rows, wrench, rows);
+    }
+}
+
+/* Everything up to qacc and qfrc_constraint: the clamped actuator forces, which are not there yet,
+ * and what follows from them. The metric of `discrete` is complete only between MuJoCo's stages, so
+ * there they run as a whole, with mjcb_control. */
+static void forces_without_ground(const mjModel *m, mjData *d) {
+    if (m->opt.integrator == mjINT_DISCRETE) {
+        mj_forwardSkip(m, d, mjSTAGE_VEL, 1);
+        return;
+    }
+    mj_fwdActuation(m, d);
+    mj_fwdAcceleration(m, d);
+    mj_fwdConstraint(m, d);
+}
+
+/* change = what MuJoCo gives beyond what the ground counts with; [6 feet]. Returns its largest
+ * number. */
+static double disagreement(const Soft *soft, const double *twist, double *change) {
+    double most = 0;
+    for (int r = 0; r < 6 * soft->feet; r++) {
+        change[r] = twist[r] - soft->contact.velocity[r];
+        most = fmax(most, fabs(change[r]));
+    }
+    return most;
+}
+
+/* A and V_free for the constraints that are active now. While they stay the same, V_free moves by
+ * the disagreement. */
+static void respond(Soft *soft, const mjModel *m, const mjData *d, const double *twist,
+                    const double *wrench, const double *change) {
+    if (metric_stiffen(&soft->metric, m, d) || soft->rounds == 0) {
+        inverse_inertia(soft, soft->metric.stiff, (int)m->nv);
+        free_twists(soft, twist, wrench);
+        mix_start(&soft->mix, 6 * soft->feet);
+    } else {
+        mix_next(&soft->mix, soft->input.free_velocity, change);
+    }
+}
+
+/* Ground and constraints in turn. Where the response is linear and known the first solve is
+ * final. */
+static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
+    const int exact = d->nefc == 0 && m->opt.integrator != mjINT_IMPLICIT;
+    double wrench[FOOT_ROWS] = {0}, twist[FOOT_ROWS], change[FOOT_ROWS];
+    forces_without_ground(m, d);
+    metric_build(&soft->metric, m, d);
+    for (soft->rounds = 0; soft->rounds < ROUNDS_MAX; soft->rounds++) {
+        outcome(soft, m, d, twist);
+        if (soft->rounds > 0 && disagreement(soft, twist, change) < AGREEMENT) {
+            break;
+        }
+        respond(soft, m, d, twist, wrench, change);
+        mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
+        read_wrench(soft, wrench);
+        apply(soft, m, d, wrench, !exact);
+        if (exact) {
+            break;
+        }
+    }
+    soft->known = soft->solved = 1;
+}
+
+static int finite_state(const Soft *soft) {
+    for (int r = 0; r < 6 * soft->feet; r++) {
+        if (!isfinite(soft->contact.velocity[r])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Bool: this integrator evaluates a step once. Complains once if it does not. */
+static int integrator_fits(Soft *soft, const mjModel *m) {
+    if (m->opt.integrator != mjINT_RK4) {
+        return 1;
+    }
+    if (!soft->refused) {
+        mju_warning(PLUGIN_NAME ": integrator RK4 is not supported, the ground is off; set "
+                                "<option integrator=\"implicitfast\"/>, discrete or Euler");
+        soft->refused = 1;
+    }
+    return 0;
+}
+
+int soft_without_actuation(const mjModel *m) {
+    return m->nu == 0 || (m->opt.disableflags & mjDSBL_ACTUATION);
+}
+
+int soft_without_passive(const mjModel *m) {
+    const int both = mjDSBL_SPRING | mjDSBL_DAMPER;
+    return (m->opt.disableflags & both) == both;
+}
+
+static void ground_step(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
+    if (!integrator_fits(soft, m)) {
+        soft->known = 0;
+        return;
+    }
+    if (soft_without_passive(m)) {
+        mju_zero(soft->passive, (int)m->nv);
+    } else if (soft->fresh) {
+        mju_copy(soft->passive, d->qfrc_passive, (int)m->nv);
+    }
+    soft->fresh = 0;
+    mju_copy(d->qfrc_passive, soft->passive, (int)m->nv); /* if the stage is evaluated again */
+    soft->inside = 1;
+    place_feet(soft, m, d);
+    memset(soft->metric.tree, 0, (size_t)m->ntree * sizeof *soft->metric.tree);
+    for (int f = 0; f < soft->feet; f++) {
+        soft->metric.tree[m->body_treeid[soft->foot[f].body]] = 1;
+    }
+    solve(soft, m, d, ground);
+    soft->inside = 0;
+}
+
+void soft_actuation(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
+    if (!soft->inside) {
+        ground_step(soft, m, d, ground);
+    }
+}
+
+/* Without actuators MuJoCo has no stage of actuation. The ground then acts here, before bias forces
+ * and constraints of this velocity are known; MuJoCo is made to compute them first. */
+void soft_passive(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
+    if (soft->inside) {
+        return;
+    }
+    soft->fresh = 1;
+    if (!soft_without_actuation(m)) {
+        return;
+    }
+    soft->inside = 1;
+    mj_fwdVelocity(m, d);
+    soft->inside = 0;
+    ground_step(soft, m, d, ground);
+}
+
+void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *ground) {
+    if (!soft->known) {
+        return;
+    }
+    if (!soft->solved) {
+        mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
+    }
+    twists(soft, (int)m->nv, d->qvel, soft->contact.velocity);
+    if (finite_state(soft)) {
+        mild_ground_advance(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
+    }
+    soft->known = soft->solved = 0;
+}

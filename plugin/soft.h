@@ -1,0 +1,65 @@
+/* Private to the plugin: soft ground in one mjData. Its memory, a MildGround, is the plugin's
+ * state, so that MuJoCo saves and restores it. Everything here can be made anew from the model. */
+#ifndef PLUGIN_SOFT_H
+#define PLUGIN_SOFT_H
+
+#include "plugin/foot.h"
+#include "plugin/metric.h"
+#include "plugin/mix.h"
+
+#define FOOT_ROWS (6 * MILD_FEET_MAX)
+
+typedef struct {
+    PluginDef def;
+    Foot foot[MILD_FEET_MAX];
+    int feet;
+    const MildSole *soles[MILD_FEET_MAX];
+    MildMap *map; /* NULL: level ground of one material */
+    MildTerrain terrain;
+    MildScratch *scratch;
+    Metric metric;
+    Mix mix;
+    double *jacobian; /* [6 feet][nv] twist of each foot: linear, angular; world axes */
+    double *response; /* [6 feet][nv] of the metric's degrees of freedom: N^-1 J^T, transposed */
+    double *passive;  /* [nv] qfrc_passive without the ground */
+    double *acceleration; /* [nv] (v+ - v) / h of the metric's degrees of freedom */
+    int fresh;            /* bool: qfrc_passive was computed anew since the last solve */
+    int inside;           /* bool: MuJoCo calls back while it is called from here */
+    int solved;           /* bool: the scratch is that of `input` and `contact` */
+    int known;            /* bool: `input` and `contact` are those of a solve */
+    int refused;          /* bool: the integrator has been complained about */
+    int rounds;           /* of ground and constraints in the last solve */
+    MildContactInput input;
+    MildContactResult contact;
+} Soft;
+
+/* Makes the ground of an instance. Returns NULL with one line in *error. */
+Soft *soft_create(const mjModel *m, int instance, MildError *error);
+void soft_destroy(Soft *soft); /* may be NULL */
+
+/* [B] Memory of the ground that soft_create would make; 0 when it would fail. */
+size_t soft_state_bytes(const mjModel *m, int instance);
+/* [B] Memory of the ground, a multiple of 8. */
+size_t soft_bytes(const Soft *soft);
+/* Initialises the state: a ground that remembers nothing. */
+void soft_reset(Soft *soft, void *state);
+/* Takes over what a solve left in `from`, of the same model; the scratch is filled again when it is
+ * needed. */
+void soft_copy(Soft *soft, const mjModel *m, const Soft *from);
+
+/* Called where qfrc_passive has just been computed. */
+void soft_passive(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground);
+/* Called where actuator forces are computed: adds the ground's force to qfrc_passive. */
+void soft_actuation(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground);
+/* Called when MuJoCo has stepped: moves the ground's memory. */
+void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *ground);
+
+/* Bool: MuJoCo leaves the stage of actuation out, for there are no actuators or they are disabled;
+ * and the plugins at the stage of passive forces, which are disabled. */
+int soft_without_actuation(const mjModel *m);
+int soft_without_passive(const mjModel *m);
+
+/* Bool: the state is that of this ground, and not one of another model or zeros. */
+int soft_owns(const Soft *soft, const MildGround *ground);
+
+#endif

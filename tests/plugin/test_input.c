@@ -1,0 +1,305 @@
+/* What a user may get wrong in the MJCF: one message that names it, and no ground or no model. */
+#include <math.h>
+
+#include "plugin_kit.h"
+
+#define BODY                                                                                       \
+    "<worldbody><geom name='floor' type='plane' size='1 1 .1' %s/><body name='pole'><geom "        \
+    "name='post' size='.01'/></body><body name='foot' pos='0 0 .1' %s><freejoint/><geom "          \
+    "name='box' mass='1' %s/><site name='sole' pos='0 0 -.01'/>"                                   \
+    "<site name='end' euler='0 90 0'/></body></worldbody>"
+#define BOX "type='box' size='.1 .05 .01' "
+
+/* The model of the keys, with attributes of floor, body and foot and an end. */
+static mjModel *compile(const char *option, const char *configs, const char *floor,
+                        const char *body, const char *geom, const char *end) {
+    char text[6000], world[1500];
+    snprintf(world, sizeof world, BODY, floor, body, geom);
+    snprintf(text, sizeof text,
+             "<mujoco><option %s/><extension><plugin plugin='mild.ground'><instance "
+             "name='soft'>%s</instance></plugin></extension>%s%s</mujoco>",
+             option, configs, world, end);
+    kit_messages = 0;
+    kit_said[0] = '\0';
+    return kit_compile(text);
+}
+
+#define OFF "contype='0' conaffinity='0'"
+#define FOOT CONFIG("feet", "foot")
+
+/* The model must not compile, with a message that holds both words. */
+static void check_refused(const char *option, const char *configs, const char *word,
+                          const char *other) {
+    mjModel *m = compile(option, configs, OFF, "", BOX OFF, "");
+    print_message("%s\n",
+                  strstr(kit_said, "mild.ground '") ? strstr(kit_said, "mild.ground '") : kit_said);
+    assert_null(m);
+    assert_non_null(strstr(kit_said, word));
+    assert_non_null(strstr(kit_said, other));
+}
+
+static void refuses_what_is_wrong(void **state) {
+    (void)state;
+    check_refused("", "", "no feet", "feet");
+    check_refused("", CONFIG("feet", "fool"), "'fool'", "nearest is 'foot'");
+    check_refused("", CONFIG("feet", "foot foot foot foot foot"), "more than 4", "feet");
+    check_refused("", CONFIG("feet", "pole"), "'pole'", "fixed to the world");
+    check_refused("", CONFIG("feet", "world"), "'world'", "fixed to the world");
+    check_refused("", FOOT CONFIG("sole", "bax"), "'bax'", "nearest is 'box'");
+    check_refused("", FOOT CONFIG("sole", "post"), "'post'", "feet");
+    check_refused("", FOOT CONFIG("outline", "0 0 1 0"), "outline", "3 points");
+    check_refused("", FOOT CONFIG("outline", "0 0 1 0 1 x"), "outline", "'x'");
+    check_refused("", FOOT CONFIG("outline", "0 0 1 0 1 1; 0 0 1 0 1 1"), "2 polygons", "1 feet");
+    check_refused("", FOOT CONFIG("outline", "0 0 1 0 2 0"), "outline", "area");
+    check_refused("", FOOT CONFIG("outline", "-9 -9 9 -9 9 9 -9 9"), "pitch", "");
+    check_refused("", FOOT CONFIG("ground", "sand_lose"), "'sand_lose'", "'sand_loose'");
+    check_refused("", FOOT CONFIG("ground", "rigid"), "'rigid'", "leave the plugin out");
+    check_refused("", FOOT CONFIG("ground", "grass rubber"), "2 grounds", "terrain.patches");
+    check_refused("", FOOT CONFIG("ground.model", "bekkers"), "ground.model", "bekker");
+    check_refused("", FOOT CONFIG("ground.model", "rigid"), "rigid", "leave the plugin out");
+    check_refused("", FOOT CONFIG("ground", "clay") CONFIG("ground.model", "mild"), "'clay'",
+                  "bekker");
+    check_refused("", FOOT CONFIG("ground.k_pen", "-1"), "ground.k_pen", "outside");
+    check_refused("", FOOT CONFIG("ground.k_pen", "much"), "ground.k_pen", "much");
+    check_refused("", FOOT CONFIG("ground.k_pan", "1"), "ground.k_pan", "");
+    check_refused("", FOOT CONFIG("pitch", "0"), "pitch", "outside");
+    check_refused("", FOOT CONFIG("prints", "-4"), "prints", "outside");
+    check_refused("", FOOT CONFIG("terrain.kind", "hills"), "terrain.kind", "hills");
+    check_refused("", FOOT CONFIG("terrain.kind", "image"), "image", "");
+    check_refused("integrator='RK4'", FOOT, "RK4", "implicitfast");
+}
+
+/* Without passive forces MuJoCo leaves out a stage. */
+static void disabled_flags(void **state) {
+    (void)state;
+    const char *const off = "<option><flag spring='disable' damper='disable'/></option>";
+    const char *const motor = "<option><flag spring='disable' damper='disable'/></option>"
+                              "<actuator><motor site='sole' gear='0 0 0 0 0 1'/></actuator>";
+    assert_null(compile("", FOOT, OFF, "", BOX OFF, off));
+    print_message("%s\n", kit_said);
+    assert_non_null(strstr(kit_said, "spring and damper"));
+    mjModel *m = compile("", FOOT, OFF, "", BOX OFF, motor);
+    assert_non_null(m);
+    mjData *d = mj_makeData(m);
+    m->opt.disableflags = 0; /* passive forces that are stale later */
+    d->qpos[2] = 0.012;
+    kit_run(m, d, 0.1);
+    m->opt.disableflags = mjDSBL_SPRING | mjDSBL_DAMPER;
+    for (int i = 0; i < 1000; i++) {
+        mj_forward(m, d);
+        mj_forwardSkip(m, d, mjSTAGE_VEL, 1);
+        mj_step(m, d);
+    }
+    assert_true(d->qpos[2] < 0.01 && d->qpos[2] > 0);
+    assert_true(fabs(d->qvel[2]) < 1e-6);
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+static void refuses_a_second_instance(void **state) {
+    (void)state;
+    kit_messages = 0;
+    mjModel *m = kit_compile(
+        "<mujoco><extension><plugin plugin='mild.ground'><instance name='a'>" FOOT
+        "</instance><instance name='b'>" FOOT "</instance></plugin></extension><worldbody><body "
+        "name='foot'><freejoint/><geom type='box' size='.1 .1 .1'/></body></worldbody></mujoco>");
+    print_message("%s\n", kit_said);
+    assert_null(m);
+    assert_non_null(strstr(kit_said, "one instance"));
+}
+
+/* A foot that MuJoCo also lets stand on its own floor is warned about, whatever the way. */
+static void warns_of_a_rigid_floor(void **state) {
+    (void)state;
+    const struct {
+        const char *floor;
+        const char *geom;
+        const char *end;
+        int warns;
+    } cases[] = {
+        {"", BOX, "", 1},
+        {"", BOX OFF, "", 0},
+        {OFF, BOX, "", 0},
+        {"contype='0'", BOX, "", 1}, /* contype of one and conaffinity of the other are enough */
+        {"", BOX "contype='2' conaffinity='2'", "", 0},
+        {"", BOX, "<contact><exclude body1='world' body2='foot'/></contact>", 0},
+        {OFF, BOX OFF, "<contact><pair geom1='box' geom2='floor'/></contact>", 1},
+    };
+    for (int c = 0; c < 7; c++) {
+        mjModel *m = compile("", FOOT, cases[c].floor, "", cases[c].geom, cases[c].end);
+        const int warns = cases[c].warns;
+        assert_non_null(m);
+        mjData *first = mj_makeData(m);
+        print_message("%d: %s\n", c, kit_said);
+        assert_int_equal(kit_messages, warns);
+        if (warns) {
+            assert_non_null(strstr(kit_said, "geom 'box'"));
+            assert_non_null(strstr(kit_said, "geom 'floor'"));
+            assert_non_null(strstr(kit_said, "contype"));
+        }
+        mjData *d = mj_makeData(m); /* said once for a model */
+        assert_int_equal(kit_messages, warns);
+        mj_deleteData(first);
+        mj_deleteData(d);
+        mj_deleteModel(m);
+    }
+}
+
+static void warns_of_a_foot_that_lies_on_its_side(void **state) {
+    (void)state;
+    mjModel *m = compile("", FOOT, OFF, "euler='90 0 0'", BOX OFF, "");
+    assert_non_null(m);
+    mjData *d = mj_makeData(m);
+    print_message("%s\n", kit_said);
+    assert_non_null(strstr(kit_said, "z axis"));
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+/* The integrator may be changed after compilation. */
+static void rk4_at_run_time(void **state) {
+    (void)state;
+    mjModel *m = compile("", FOOT, OFF, "", BOX OFF, "");
+    mjData *d = mj_makeData(m);
+    m->opt.integrator = mjINT_RK4;
+    kit_messages = 0;
+    for (int i = 0; i < 10; i++) {
+        mj_step(m, d);
+    }
+    assert_int_equal(kit_messages, 1);
+    assert_non_null(strstr(kit_said, "RK4"));
+    assert_true(fabs(d->qvel[2] + 9.81 * d->time) < 1e-9); /* falls */
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+/* ---- soles ---- */
+
+static int elements_of(const char *configs, const char *geom) {
+    mjModel *m = compile("", configs, OFF, "", geom, "");
+    if (!m) {
+        fail_msg("%s", kit_said);
+    }
+    mjData *d = mj_makeData(m);
+    const int elements = mild_sole_elements(plugin_soft(m, d)->soles[0]);
+    mj_deleteData(d);
+    mj_deleteModel(m);
+    return elements;
+}
+
+/* Area of the sole over that of an element, for outlines from shapes, sites and numbers. */
+static void soles_follow_the_shapes(void **state) {
+    (void)state;
+    const double element = 0.0195 * 0.0195;
+    assert_in_range(elements_of(FOOT, BOX OFF), 0.94 * 0.02 / element, 1.06 * 0.02 / element);
+    assert_in_range(elements_of(CONFIG("feet", "sole"), BOX OFF), 0.94 * 0.02 / element,
+                    1.06 * 0.02 / element);
+    assert_in_range(elements_of(CONFIG("sole", "box"), BOX OFF), 0.94 * 0.02 / element,
+                    1.06 * 0.02 / element);
+    assert_int_equal(elements_of(FOOT CONFIG("elements", "40"), BOX OFF), 40);
+    assert_in_range(elements_of(FOOT CONFIG("outline", "-.1 -.1 .1 -.1 .1 .1 -.1 .1"), BOX OFF),
+                    0.94 * 0.04 / element, 1.06 * 0.04 / element);
+    /* a site whose z axis is the long axis of the box: the sole is its end */
+    assert_in_range(elements_of(CONFIG("feet", "end"), BOX OFF), 4, 7);
+    /* what lies 80 mm above the sole is not the sole */
+    assert_in_range(
+        elements_of(FOOT, BOX OFF "/><geom type='box' size='.3 .3 .01' pos='0 0 .08' " OFF),
+        0.94 * 0.02 / element, 1.06 * 0.02 / element);
+    const double round = 3.1416 * 0.06 * 0.06 / element;
+    assert_in_range(elements_of(FOOT, "type='cylinder' size='.06 .02' " OFF), 0.93 * round,
+                    1.07 * round);
+    const double capsule = (0.2 * 0.1 + 3.1416 * 0.05 * 0.05) / element;
+    assert_in_range(elements_of(FOOT, "type='capsule' size='.05 .1' euler='0 90 0' " OFF),
+                    0.93 * capsule, 1.07 * capsule);
+    assert_in_range(elements_of(FOOT, "type='ellipsoid' size='.12 .12 .01' " OFF), 40, 130);
+}
+
+/* ---- keys ---- */
+
+/* The ground of the keys, to be freed with its model. */
+static const Soft *soft_of_keys(const char *configs, mjModel **m, mjData **d) {
+    *m = compile("", configs, OFF, "", BOX OFF,
+                 "<worldbody><body pos='3 0 1'><freejoint/><geom size='.1' mass='50'/></body>"
+                 "</worldbody>");
+    if (!*m) {
+        fail_msg("%s", kit_said);
+    }
+    *d = mj_makeData(*m);
+    return plugin_soft(*m, *d);
+}
+
+static void free_both(mjModel *m, mjData *d) {
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+/* Each key does what the program's key of the same name does. */
+static void keys_reach_the_ground(void **state) {
+    (void)state;
+    mjModel *m;
+    mjData *d;
+    MildMaterial grass;
+    assert_true(mild_material_preset("grass", &grass));
+    const Soft *soft = soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.k_pen", "800")
+                                        CONFIG("ground.mu", "0.25") CONFIG("height", "0.5"),
+                                    &m, &d);
+    const MildMaterial *material = soft->terrain.materials;
+    assert_true(material->k_pen == 800 && material->mu == 0.25);
+    assert_true(material->sigma_cone == grass.sigma_cone && material->recovery == grass.recovery);
+    assert_true(mild_terrain_height_at(&soft->terrain, 3, 4) == 0.5);
+    const mjtSize plain = m->npluginstate;
+    free_both(m, d);
+
+    soft =
+        soft_of_keys(FOOT CONFIG("terrain.kind", "slope") CONFIG("terrain.slope", "0.2")
+                         CONFIG("prints", "100") CONFIG("ground", "grass rubber")
+                             CONFIG("terrain.patches", "stripes") CONFIG("terrain.patch_size", "1"),
+                     &m, &d);
+    assert_true(fabs(mild_terrain_height_at(&soft->terrain, 3, 4) - 0.6) < 1e-6);
+    assert_int_equal(mild_terrain_material_at(&soft->terrain, 0.5, 0), 0);
+    assert_int_equal(mild_terrain_material_at(&soft->terrain, 1.5, 0), 1);
+    assert_true(soft->terrain.materials[0].k_pen == grass.k_pen);
+    assert_true((m->npluginstate - plain) * 8 > 100 * 128);
+    free_both(m, d);
+}
+
+/* Another model sinks as deep under the weight, and a concentric one has a single element. */
+static void models_are_matched(void **state) {
+    (void)state;
+    mjModel *m;
+    mjData *d;
+    MildMaterial grass;
+    assert_true(mild_material_preset("grass", &grass));
+    const Soft *soft =
+        soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.model", "bekker"), &m, &d);
+    const double weight = 9.81;
+    const double wanted = mild_sole_sinkage(soft->soles[0], &grass, weight);
+    assert_int_equal(soft->terrain.materials[0].model, MILD_MODEL_BEKKER);
+    assert_true(fabs(mild_sole_sinkage(soft->soles[0], soft->terrain.materials, weight) - wanted) <
+                0.001 * wanted);
+    free_both(m, d);
+    soft = soft_of_keys(FOOT CONFIG("ground.model", "con_spring"), &m, &d);
+    assert_int_equal(mild_sole_elements(soft->soles[0]), 1);
+    free_both(m, d);
+    soft = soft_of_keys(CONFIG("feet", "sole"), &m, &d); /* 10 mm below the body's origin */
+    assert_true(fabs(mild_sole_z(soft->soles[0])) < 1e-12);
+    free_both(m, d);
+    soft = soft_of_keys(FOOT CONFIG("ground", "clay"), &m, &d);
+    assert_int_equal(soft->terrain.materials[0].model, MILD_MODEL_BEKKER);
+    free_both(m, d);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(refuses_what_is_wrong),
+        cmocka_unit_test(disabled_flags),
+        cmocka_unit_test(refuses_a_second_instance),
+        cmocka_unit_test(warns_of_a_rigid_floor),
+        cmocka_unit_test(warns_of_a_foot_that_lies_on_its_side),
+        cmocka_unit_test(rk4_at_run_time),
+        cmocka_unit_test(soles_follow_the_shapes),
+        cmocka_unit_test(keys_reach_the_ground),
+        cmocka_unit_test(models_are_matched),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, NULL);
+}

@@ -1,0 +1,209 @@
+/* The inertia that the ground counts with is the integrator's: the twists of the feet that the
+ * ground expects at the end of a step are those that MuJoCo gives, for every kind of force that an
+ * integrator treats implicitly. With another inertia robots with strong feedback become
+ * unstable. */
+#include <math.h>
+
+#include "plugin_kit.h"
+
+#define LEG                                                                                        \
+    "<worldbody><body name='trunk' pos='0 0 0.62'><freejoint/><geom type='box' size='.1 .08 .05' " \
+    "mass='8' contype='0' conaffinity='0'/>"                                                       \
+    "<body pos='0 0 -0.05'><joint name='hip' axis='0 1 0' range='-90 90' %s/><geom "               \
+    "type='capsule' fromto='0 0 0 0.1 0 -.25' size='.03' mass='.8' contype='0' conaffinity='0'/>"  \
+    "<body pos='0.1 0 -0.25'><joint name='knee' axis='0 1 0' range='-2 120' %s/><geom "            \
+    "type='capsule' fromto='0 0 0 -0.1 0 -.28' size='.025' mass='.4' contype='0' "                 \
+    "conaffinity='0'/>"                                                                            \
+    "<body name='foot' pos='-0.1 0 -0.28'><joint name='ankle' axis='0 1 0' range='-60 60' %s/>"    \
+    "<geom type='box' size='.11 .08 .01' pos='0.02 0 -.03' mass='.2' contype='0' "                 \
+    "conaffinity='0'/></body></body></body></body></worldbody>"
+#define PD(kp, kv)                                                                                 \
+    "<actuator><position joint='hip' kp='" kp "' kv='" kv "'/><position joint='knee' kp='" kp      \
+    "' kv='" kv "'/><position joint='ankle' kp='" kp "' kv='" kv "'/></actuator>"
+
+typedef struct {
+    const char *name;
+    const char *joints[3]; /* attributes of hip, knee and ankle */
+    const char *rest;      /* of the MJCF */
+} Case;
+
+static const Case cases[] = {
+    {"nothing", {"", "", ""}, ""},
+    {"armature", {"armature='.02'", "armature='.02'", "armature='.005'"}, ""},
+    {"damping", {"damping='4'", "damping='3'", "damping='2'"}, ""},
+    {"polynomials", {"damping='1 2'", "damping='1 0 3'", "stiffness='30 20' damping='0 2'"}, ""},
+    {"springs", {"stiffness='60'", "stiffness='90' springref='50'", "stiffness='30'"}, ""},
+    {"motors", {"", "", ""}, "<actuator><motor joint='hip'/><motor joint='knee'/></actuator>"},
+    {"PD", {"", "", ""}, PD("300", "20")},
+    {"strong PD", {"armature='.01'", "", ""}, PD("2000", "100")},
+    {"saturated",
+     {"", "", "damping='1'"},
+     "<actuator><position joint='hip' kp='300' kv='20'/><position joint='knee' kp='300' kv='20' "
+     "forcerange='-9 9'/><position joint='ankle' kp='90' kv='9'/></actuator>"},
+    {"joint limit of force",
+     {"actuatorfrcrange='-8 8'", "", ""},
+     "<actuator><position joint='hip' kp='300' kv='20'/><position joint='knee' kp='300' "
+     "kv='20'/></actuator>"},
+    {"activation",
+     {"", "", ""},
+     "<actuator><general joint='knee' dyntype='filter' dynprm='.02' gainprm='200' "
+     "biastype='affine' biasprm='0 -200 -15'/></actuator>"},
+    {"tendon",
+     {"", "", ""},
+     "<tendon><fixed name='t' stiffness='80' damping='6'><joint joint='hip' coef='1'/><joint "
+     "joint='knee' coef='-.7'/></fixed></tendon><actuator><position tendon='t' kp='100' "
+     "kv='8'/></actuator>"},
+    {"gravity compensation",
+     {"actuatorgravcomp='true'", "", ""},
+     "<actuator><position joint='hip' kp='200' kv='10'/></actuator>"},
+    {"friction", {"frictionloss='2'", "frictionloss='1'", "frictionloss='.5'"}, PD("200", "10")},
+    {"equality",
+     {"", "", ""},
+     "<equality><joint joint1='knee' joint2='hip' polycoef='0 -1 0 0 0'/></equality>"},
+};
+enum { CASES = sizeof cases / sizeof *cases };
+
+static mjModel *leg(const Case *c, double dt, const char *integrator, const char *ground) {
+    char head[1000], body[4000], text[6000];
+    kit_head(head, sizeof head, dt, integrator, "foot", ground, "");
+    snprintf(body, sizeof body, LEG, c->joints[0], c->joints[1], c->joints[2]);
+    snprintf(text, sizeof text, "%s%s%s</mujoco>", head, body, c->rest);
+    return kit_model(text);
+}
+
+/* The leg falls on the ground, bent and moving, with targets that change. */
+static void start(const mjModel *m, mjData *d) {
+    static const double bend[3] = {-0.4, 0.9, -0.5};
+    memcpy(d->qpos + 7, bend, sizeof bend);
+    d->qpos[2] = 0.6;
+    d->qvel[0] = 0.3;
+    d->qvel[4] = 0.5;
+    for (int i = 0; i < m->nu; i++) {
+        d->ctrl[i] = i < 3 ? bend[i] : 0;
+    }
+}
+
+/* Largest difference between the twists that the ground expects and those of the step. */
+static double surprise(const Case *c, double dt, const char *integrator, int *loaded, int *rounds) {
+    double worst = 0;
+    mjModel *m = leg(c, dt, integrator, "foam45");
+    mjData *d = mj_makeData(m);
+    start(m, d);
+    *loaded = *rounds = 0;
+    for (int i = 0; i < (int)(0.6 / dt); i++) {
+        double expected[6];
+        mj_forward(m, d);
+        const Soft *soft = plugin_soft(m, d);
+        memcpy(expected, soft->contact.velocity, sizeof expected);
+        mj_step(m, d);
+        for (int r = 0; r < 6; r++) {
+            worst = fmax(worst, fabs(expected[r] - soft->contact.velocity[r]));
+        }
+        *loaded += soft->contact.foot[0].contacts > 0;
+        *rounds = soft->rounds > *rounds ? soft->rounds : *rounds;
+    }
+    mj_deleteData(d);
+    mj_deleteModel(m);
+    return worst;
+}
+
+/* Bool: Euler's method, which treats feedback explicitly, is stable. */
+static int is_mild(const Case *c) {
+    return !strstr(c->rest, "kv=") && !strstr(c->rest, "biasprm");
+}
+
+static void step_is_as_expected(void **state) {
+    (void)state;
+    static const char *const integrators[] = {"Euler", "implicitfast", "implicit", "discrete"};
+    for (int k = 0; k < 4; k++) {
+        for (int c = 0; c < CASES; c++) {
+            int loaded, rounds;
+            if (k == 0 && !is_mild(&cases[c])) {
+                continue;
+            }
+            const double worst = surprise(&cases[c], 0.004, integrators[k], &loaded, &rounds);
+            print_message("%-12s %-20s twist apart by %.1e, %d steps loaded, %d rounds\n",
+                          integrators[k], cases[c].name, worst, loaded, rounds);
+            assert_true(loaded > 20);
+            assert_true(worst < 2e-6);
+            assert_in_range(rounds, 0, 20);
+        }
+    }
+}
+
+/* In the air a model moves as it does without the plugin. */
+static void air_is_as_without(void **state) {
+    (void)state;
+    static const int integrators[] = {mjINT_EULER, mjINT_IMPLICITFAST, mjINT_IMPLICIT,
+                                      mjINT_DISCRETE};
+    for (int c = 0; c < CASES; c++) {
+        for (int k = 0; k < 4; k++) {
+            char body[4000], text[6000];
+            double worst = 0;
+            if (k == 0 && !is_mild(&cases[c])) {
+                continue;
+            }
+            mjModel *m = leg(&cases[c], 0.001, "Euler", "foam45");
+            snprintf(body, sizeof body, LEG, cases[c].joints[0], cases[c].joints[1],
+                     cases[c].joints[2]);
+            snprintf(text, sizeof text, "<mujoco><option timestep='0.001'/>%s%s</mujoco>", body,
+                     cases[c].rest);
+            mjModel *without = kit_model(text);
+            m->opt.integrator = without->opt.integrator = integrators[k];
+            mjData *d = mj_makeData(m), *e = mj_makeData(without);
+            start(m, d);
+            start(without, e);
+            d->qpos[2] = e->qpos[2] = 5;
+            for (int i = 0; i < 300; i++) {
+                mj_step(m, d);
+                mj_step(without, e);
+            }
+            for (int i = 0; i < m->nq; i++) {
+                worst = fmax(worst, fabs(d->qpos[i] - e->qpos[i]));
+            }
+            assert_true(worst < 1e-12);
+            mj_deleteData(d);
+            mj_deleteData(e);
+            mj_deleteModel(m);
+            mj_deleteModel(without);
+        }
+    }
+}
+
+/* A leg with strong feedback stands still at all steps. */
+static void strong_feedback_is_stable(void **state) {
+    (void)state;
+    static const char *const grounds[] = {"rubber", "foam45", "sand_loose"};
+    static const double steps[] = {0.001, 0.002, 0.005};
+    static const char *const integrators[] = {"implicitfast", "discrete"};
+    const Case strong = {"", {"", "", ""}, PD("900", "60")};
+    for (int n = 0; n < 18; n++) {
+        mjModel *m = leg(&strong, steps[n % 3], integrators[n / 9], grounds[n / 3 % 3]);
+        mjData *d = mj_makeData(m);
+        double fastest = 0;
+        start(m, d);
+        d->qvel[0] = d->qvel[4] = 0;
+        kit_run(m, d, 0.6);
+        for (int i = 0; i < (int)(0.2 / steps[n % 3]); i++) {
+            mj_step(m, d);
+            for (int k = 6; k < m->nv; k++) { /* the leg as a whole may topple */
+                fastest = fmax(fastest, fabs(d->qvel[k]));
+            }
+        }
+        print_message("%-12s %-10s %g ms: joints move by %.3f rad/s at most\n", integrators[n / 9],
+                      grounds[n / 3 % 3], 1e3 * steps[n % 3], fastest);
+        assert_true(fastest < 1);
+        assert_int_equal(d->warning[mjWARN_BADQACC].number, 0);
+        mj_deleteData(d);
+        mj_deleteModel(m);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(step_is_as_expected),
+        cmocka_unit_test(air_is_as_without),
+        cmocka_unit_test(strong_feedback_is_stable),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, NULL);
+}

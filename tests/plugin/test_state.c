@@ -1,0 +1,310 @@
+/* The ground's memory is part of MuJoCo's state: saved and restored bit by bit, copied, stepped in
+ * halves, evaluated again, and by several threads at once. */
+#include <math.h>
+#include <pthread.h>
+
+#include "plugin_kit.h"
+
+/* Two plates joined by a hinge with a motor, on two grounds, with prints. They hop. */
+static mjModel *hopper(const char *more) {
+    char head[1500], text[3500];
+    kit_head(head, sizeof head, 0.002, "implicitfast", "left right", "sand_loose foam45",
+             CONFIG("terrain.patches", "stripes") CONFIG("terrain.patch_size", "0.2")
+                 CONFIG("prints", "64") CONFIG("terrain.kind", "waves")
+                     CONFIG("terrain.amplitude", "0.01"));
+    snprintf(text, sizeof text,
+             "%s<worldbody><body name='left' pos='0 .12 0.02'><freejoint/><geom type='box' "
+             "size='.1 .05 .01' mass='3' contype='0' conaffinity='0'/><body name='right' pos='0 "
+             "-.24 0'><joint name='hip' axis='1 0 0' range='-40 40' damping='.5'/><geom "
+             "type='box' size='.1 .05 .01' mass='3' contype='0' conaffinity='0'/></body></body>"
+             "</worldbody>%s</mujoco>",
+             head, more);
+    return kit_model(text);
+}
+#define MOTOR "<actuator><position joint='hip' kp='60' kv='3'/></actuator>"
+
+/* Swings the hinge, so that the plates lift off and land. */
+static void steps(const mjModel *m, mjData *d, int count) {
+    for (int i = 0; i < count; i++) {
+        for (int u = 0; u < m->nu; u++) {
+            d->ctrl[u] = 0.6 * sin(20 * d->time);
+        }
+        mj_step(m, d);
+    }
+}
+
+static void check_same(const mjModel *m, const mjData *a, const mjData *b) {
+    assert_memory_equal(a->qpos, b->qpos, (size_t)m->nq * sizeof(double));
+    assert_memory_equal(a->qvel, b->qvel, (size_t)m->nv * sizeof(double));
+    assert_memory_equal(a->plugin_state, b->plugin_state, (size_t)m->npluginstate * sizeof(double));
+}
+
+/* Elements that are deeper than 1 mm now. */
+static int pressed(const mjModel *m, const mjData *d) {
+    const MildGround *ground = (const MildGround *)(void *)d->plugin_state;
+    const Soft *soft = plugin_soft(m, d);
+    int count = 0;
+    for (int f = 0; f < 2; f++) {
+        for (int e = 0; e < mild_sole_elements(soft->soles[f]); e++) {
+            count += mild_ground_depth_max(ground, f)[e] > 0.001;
+        }
+    }
+    return count;
+}
+
+/* Bool: the ground remembers something, so that the comparisons mean something. */
+static int remembers(const mjModel *m, const mjData *d) {
+    return pressed(m, d) > 0;
+}
+
+static void restores_bit_by_bit(void **state) {
+    (void)state;
+    mjModel *m = hopper(MOTOR);
+    mjData *d = mj_makeData(m), *other = mj_makeData(m);
+    const int size = mj_stateSize(m, mjSTATE_INTEGRATION);
+    double *saved = calloc((size_t)size, sizeof *saved);
+    steps(m, d, 237);
+    assert_true(remembers(m, d));
+    mj_getState(m, d, saved, mjSTATE_INTEGRATION);
+    steps(m, other, 50); /* elsewhere in between */
+    mj_setState(m, other, saved, mjSTATE_INTEGRATION);
+    steps(m, d, 300);
+    steps(m, other, 300);
+    check_same(m, d, other);
+    mj_setState(m, d, saved, mjSTATE_INTEGRATION);
+    steps(m, d, 300);
+    check_same(m, d, other);
+    mj_resetData(m, d);
+    mj_resetData(m, other);
+    assert_false(remembers(m, d));
+    steps(m, d, 537);
+    steps(m, other, 237);
+    mj_setState(m, other, saved, mjSTATE_INTEGRATION);
+    steps(m, other, 300);
+    check_same(m, d, other);
+    free(saved);
+    mj_deleteData(d);
+    mj_deleteData(other);
+    mj_deleteModel(m);
+}
+
+/* The memory matters: the plates where they were, on ground that has forgotten, go elsewhere. */
+static void memory_matters(void **state) {
+    (void)state;
+    mjModel *m = hopper(MOTOR);
+    mjData *d = mj_makeData(m), *other = mj_makeData(m);
+    const int size = mj_stateSize(m, mjSTATE_PHYSICS);
+    double *saved = calloc((size_t)size, sizeof *saved);
+    steps(m, d, 237);
+    mj_getState(m, d, saved, mjSTATE_PHYSICS);
+    mj_setState(m, other, saved, mjSTATE_PHYSICS);
+    other->time = d->time;
+    steps(m, d, 100);
+    steps(m, other, 100);
+    assert_true(fabs(d->qpos[2] - other->qpos[2]) > 1e-4);
+    free(saved);
+    mj_deleteData(d);
+    mj_deleteData(other);
+    mj_deleteModel(m);
+}
+
+static void copies_go_on_alike(void **state) {
+    (void)state;
+    mjModel *m = hopper(MOTOR);
+    mjData *d = mj_makeData(m);
+    steps(m, d, 237);
+    mjData *copy = mj_copyData(NULL, m, d);
+    steps(m, d, 100);
+    steps(m, copy, 100);
+    check_same(m, d, copy);
+    mj_forward(m, d); /* a copy within a step */
+    mj_copyData(copy, m, d);
+    mj_implicit(m, d);
+    mj_implicit(m, copy);
+    check_same(m, d, copy);
+    mj_deleteData(d);
+    mj_deleteData(copy);
+    mj_deleteModel(m);
+}
+
+/* Evaluating a step again changes nothing, neither as a whole nor from a later stage on, and
+ * mj_step1 with mj_step2 is mj_step. */
+static void evaluates_again(void **state) {
+    (void)state;
+    mjModel *m = hopper(MOTOR);
+    mjData *d = mj_makeData(m), *other = mj_makeData(m);
+    for (int i = 0; i < 300; i++) {
+        d->ctrl[0] = other->ctrl[0] = 0.6 * sin(20 * d->time);
+        mj_step(m, d);
+        if (i % 3 == 0) {
+            mj_forward(m, other);
+            mj_forwardSkip(m, other, mjSTAGE_POS, 1);
+            mj_forwardSkip(m, other, mjSTAGE_VEL, 0);
+            mj_forwardSkip(m, other, mjSTAGE_VEL, 1);
+            mj_implicit(m, other);
+        } else {
+            mj_step1(m, other);
+            mj_step2(m, other);
+        }
+    }
+    assert_true(remembers(m, d));
+    check_same(m, d, other);
+    mj_deleteData(d);
+    mj_deleteData(other);
+    mj_deleteModel(m);
+}
+
+/* A model without actuators, or with actuation disabled, takes another way through MuJoCo and must
+ * end at the same place. */
+static void ways_through_the_stages_agree(void **state) {
+    (void)state;
+    static const int integrators[] = {mjINT_EULER, mjINT_IMPLICITFAST, mjINT_IMPLICIT,
+                                      mjINT_DISCRETE};
+    for (int k = 0; k < 4; k++) {
+        mjModel *none = hopper(""), *motor = hopper("<actuator><motor joint='hip'/></actuator>"),
+                *off = hopper("<actuator><motor joint='hip'/></actuator>");
+        none->opt.integrator = motor->opt.integrator = off->opt.integrator = integrators[k];
+        off->opt.disableflags |= mjDSBL_ACTUATION;
+        mjData *a = mj_makeData(none), *b = mj_makeData(motor), *c = mj_makeData(off);
+        a->qvel[6] = b->qvel[6] = c->qvel[6] = 3;
+        kit_run(none, a, 0.6);
+        kit_run(motor, b, 0.6);
+        kit_run(off, c, 0.6);
+        assert_true(remembers(none, a));
+        check_same(none, a, b);
+        check_same(none, a, c);
+        mj_deleteData(a);
+        mj_deleteData(b);
+        mj_deleteData(c);
+        mj_deleteModel(none);
+        mj_deleteModel(motor);
+        mj_deleteModel(off);
+    }
+}
+
+typedef struct {
+    const mjModel *model;
+    mjData *data;
+    int count;
+} Work;
+
+static void *work(void *context) {
+    Work *w = context;
+    w->data = mj_makeData(w->model);
+    steps(w->model, w->data, w->count);
+    return NULL;
+}
+
+static void threads_agree(void **state) {
+    (void)state;
+    enum { THREADS = 6 };
+    mjModel *m = hopper(MOTOR);
+    pthread_t thread[THREADS];
+    Work works[THREADS];
+    for (int t = 0; t < THREADS; t++) {
+        works[t] = (Work){m, NULL, 500};
+        assert_int_equal(pthread_create(&thread[t], NULL, work, &works[t]), 0);
+    }
+    for (int t = 0; t < THREADS; t++) {
+        pthread_join(thread[t], NULL);
+        check_same(m, works[0].data, works[t].data);
+    }
+    for (int t = 0; t < THREADS; t++) {
+        mj_deleteData(works[t].data);
+    }
+    mj_deleteModel(m);
+}
+
+/* Any bytes in the place of the state are noticed, said and replaced. */
+static void foreign_state_is_reset(void **state) {
+    (void)state;
+    mjModel *m = hopper(MOTOR);
+    mjData *d = mj_makeData(m), *fresh = mj_makeData(m);
+    for (int round = 0; round < 4; round++) {
+        mj_resetData(m, d);
+        steps(m, d, 100);
+        unsigned char *bytes = (unsigned char *)d->plugin_state;
+        const int size = (int)m->npluginstate * (int)sizeof(double);
+        if (round == 0) {
+            memset(bytes, 0, (size_t)size);
+        }
+        for (int i = 0; i < size && round > 0; i++) {
+            bytes[i] = (unsigned char)(i * 37 + round * 101);
+        }
+        kit_messages = 0;
+        mj_step(m, d);
+        assert_int_equal(kit_messages, 1);
+        assert_non_null(strstr(kit_said, "state"));
+    }
+    mj_deleteData(d);
+    mj_deleteData(fresh);
+    mj_deleteModel(m);
+}
+
+static int count_decor(const mjvScene *scene, int type) {
+    int count = 0;
+    for (int i = 0; i < scene->ngeom; i++) {
+        count += scene->geoms[i].category == mjCAT_DECOR && scene->geoms[i].type == type;
+    }
+    return count;
+}
+
+/* The scene shows what the ground remembers: patches at the depth of the surface, as many as there
+ * is room for, and an arrow for each loaded foot. */
+static void prints_are_drawn(void **state) {
+    (void)state;
+    mjModel *m = hopper(MOTOR);
+    mjData *d = mj_makeData(m);
+    mjvScene scene, small;
+    mjvOption option;
+    mjvCamera camera;
+    mjv_defaultScene(&scene);
+    mjv_defaultScene(&small);
+    mjv_defaultOption(&option);
+    mjv_defaultCamera(&camera);
+    mjv_makeScene(m, &scene, 5000);
+    mjv_makeScene(m, &small, 10);
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
+    assert_int_equal(count_decor(&scene, mjGEOM_BOX), 0);
+    steps(m, d, 500);
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
+    print_message("%d patches\n", count_decor(&scene, mjGEOM_BOX));
+    assert_in_range(count_decor(&scene, mjGEOM_BOX), pressed(m, d) + 20, 1500);
+    for (int i = 0; i < scene.ngeom; i++) {
+        const MildTerrain *terrain = &plugin_soft(m, d)->terrain;
+        const float *at = scene.geoms[i].pos;
+        const double surface = mild_terrain_height_at(terrain, (double)at[0], (double)at[1]);
+        if (scene.geoms[i].category == mjCAT_DECOR) {
+            assert_true(fabs((double)at[2] - surface) < 0.002);
+            assert_true(hypot((double)at[0], (double)at[1]) < 1);
+        }
+    }
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &small);
+    assert_in_range(small.ngeom, 1, 10);
+    option.flags[mjVIS_CONTACTFORCE] = 1;
+    mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
+    int loaded = 0;
+    for (int f = 0; f < 2; f++) {
+        loaded += plugin_soft(m, d)->contact.foot[f].contacts > 0;
+    }
+    assert_true(loaded > 0);
+    assert_int_equal(count_decor(&scene, mjGEOM_ARROW), loaded);
+    mjv_freeScene(&scene);
+    mjv_freeScene(&small);
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(restores_bit_by_bit),
+        cmocka_unit_test(memory_matters),
+        cmocka_unit_test(copies_go_on_alike),
+        cmocka_unit_test(evaluates_again),
+        cmocka_unit_test(ways_through_the_stages_agree),
+        cmocka_unit_test(threads_agree),
+        cmocka_unit_test(foreign_state_is_reset),
+        cmocka_unit_test(prints_are_drawn),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, NULL);
+}

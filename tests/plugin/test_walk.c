@@ -1,0 +1,309 @@
+/* Robots on the plugin as on our own step: `eval` and the stand controller, with every physics step
+ * made by mj_step of the robot's MJCF with the plugin. The linker puts the step below in the place
+ * of robot_sim_step. */
+#include <math.h>
+
+#include "plugin_kit.h"
+
+#include "control/stand.h"
+#include "eval/eval.h"
+#include "robot/sim.h"
+
+/* The robot in MuJoCo. NULL: robot_sim_step makes our own step. */
+static mjModel *model;
+static mjData *data;
+
+int __real_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
+                          const MildTerrain *terrain, MildGround *ground);
+int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
+                          const MildTerrain *terrain, MildGround *ground);
+
+/* ---- the model: MJCF, a motor for each joint, soles of robot.ini as attributes ---- */
+
+static void add(char *text, size_t size, const char *format, ...) {
+    va_list arguments;
+    size_t length = strlen(text);
+    va_start(arguments, format);
+    vsnprintf(text + length, size - length, format, arguments);
+    va_end(arguments);
+    assert_true(strlen(text) + 1 < size);
+}
+
+/* <config> of the feet: outlines of flat soles, spheres of round ones. */
+static void feet_config(const RobotDef *def, char *text, size_t size) {
+    const RobotFootDef *first = &def->foot[0];
+    add(text, size, "<config key='feet' value='");
+    for (int f = 0; f < def->feet; f++) {
+        add(text, size, "%s ", def->foot[f].body);
+    }
+    add(text, size, "'/>");
+    if (first->shape == ROBOT_SOLE_ROUND) {
+        add(text, size, "<config key='sole' value='");
+        for (int f = 0; f < def->feet; f++) {
+            add(text, size, "ball%d ", f);
+        }
+        add(text, size, "'/>");
+        return;
+    }
+    add(text, size, "<config key='sole_z' value='%.17g'/><config key='pitch' value='%.17g'/>",
+        first->z, first->pitch);
+    add(text, size, "<config key='elements' value='%d'/><config key='outline' value='",
+        first->elements);
+    for (int f = 0; f < def->feet; f++) {
+        add(text, size, f ? ";" : "");
+        for (int i = 0; i < 2 * def->foot[f].outline_points; i++) {
+            add(text, size, " %.17g", def->foot[f].outline[i]);
+        }
+    }
+    add(text, size, "'/>");
+}
+
+static void material_config(const MildMaterial *material, char *text, size_t size) {
+    for (int i = 0; i < mild_material_field_count; i++) {
+        char value[64];
+        mild_field_print(&mild_material_fields[i], material, value, sizeof value);
+        add(text, size, "<config key='ground.%s' value='%s'/>", mild_material_fields[i].name,
+            value);
+    }
+}
+
+/* The robot's own file with the plugin, motors, and spheres where round feet are. */
+static mjModel *robot_in_mujoco(const Robot *robot, const MildMaterial *material, double dt,
+                                const char *integrator) {
+    static char text[40000], head[20000];
+    const RobotDef *def = &robot->def;
+    char error[500] = "";
+    head[0] = text[0] = '\0';
+    feet_config(def, head, sizeof head);
+    material_config(material, head, sizeof head);
+    add(text, sizeof text,
+        "<mujoco><include file='%s'/><option timestep='%.17g' integrator='%s'/><extension><plugin "
+        "plugin='mild.ground'><instance name='soft'>%s</instance></plugin></extension></mujoco>",
+        robot->path, dt, integrator, head);
+    mjVFS vfs;
+    mj_defaultVFS(&vfs);
+    mj_addBufferVFS(&vfs, "robot.xml", text, (int)strlen(text));
+    mjSpec *spec = mj_parseXML("robot.xml", &vfs, error, (int)sizeof error);
+    if (!spec) {
+        fail_msg("%s", error);
+    }
+    for (mjsElement *e = mjs_firstElement(spec, mjOBJ_ACTUATOR), *next; e; e = next) {
+        next = mjs_nextElement(spec, e);
+        mjs_delete(spec, e);
+    }
+    for (int i = 0; i < def->joints; i++) {
+        mjsActuator *motor = mjs_addActuator(spec, NULL);
+        motor->trntype = mjTRN_JOINT;
+        mjs_setString(motor->target, def->joint[i]);
+    }
+    for (int f = 0; f < def->feet && def->foot[f].shape == ROBOT_SOLE_ROUND; f++) {
+        char name[16];
+        snprintf(name, sizeof name, "ball%d", f);
+        mjsGeom *ball = mjs_addGeom(mjs_findBody(spec, def->foot[f].body), NULL);
+        mjs_setName(ball->element, name);
+        ball->type = mjGEOM_SPHERE;
+        ball->contype = ball->conaffinity = 0;
+        ball->mass = 0;
+        ball->size[0] = def->foot[f].radius;
+        memcpy(ball->pos, def->foot[f].center, sizeof ball->pos);
+    }
+    mjModel *compiled = mj_compile(spec, &vfs);
+    if (!compiled) {
+        fail_msg("%s %s", mjs_getError(spec), kit_said);
+    }
+    mj_deleteSpec(spec);
+    mj_deleteVFS(&vfs);
+    return compiled;
+}
+
+static void use_plugin(const Robot *robot, const MildMaterial *material, double dt,
+                       const char *integrator) {
+    model = robot_in_mujoco(robot, material, dt, integrator);
+    data = mj_makeData(model);
+    assert_non_null(data);
+}
+
+static void use_own_step(void) {
+    mj_deleteData(data);
+    mj_deleteModel(model);
+    data = NULL;
+    model = NULL;
+}
+
+/* ---- the step ---- */
+
+/* Brings the robot's workspace to where MuJoCo is, with the forces of the plugin. */
+static void show(RobotSim *sim) {
+    const Soft *soft = plugin_soft(model, data);
+    const size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
+    RobotState state;
+    memcpy(sim->data->qpos, data->qpos, nq * sizeof(double));
+    memcpy(sim->data->qvel, data->qvel, nv * sizeof(double));
+    memcpy(sim->data->qacc_warmstart, data->qacc_warmstart, nv * sizeof(double));
+    robot_sim_store(sim, &state);
+    const RobotVariation variation = sim->variation;
+    robot_sim_load(sim, &state, &variation);
+    sim->contact = soft->contact;
+    for (int f = 0; f < sim->robot->def.feet; f++) {
+        sim->feet[f].result = soft->contact.foot[f];
+        memcpy(sim->feet[f].force, soft->contact.foot[f].force, sizeof sim->feet[f].force);
+        memcpy(sim->feet[f].torque, soft->contact.foot[f].torque, sizeof sim->feet[f].torque);
+    }
+}
+
+int __wrap_robot_sim_step(RobotSim *sim, const double *torque, const double *push,
+                          const MildTerrain *terrain, MildGround *ground) {
+    if (!model || sim->variation.rigid) {
+        return __real_robot_sim_step(sim, torque, push, terrain, ground);
+    }
+    assert_null(push);
+    const size_t nq = (size_t)model->nq, nv = (size_t)model->nv;
+    assert_int_equal((size_t)model->npluginstate * sizeof(double), mild_ground_size(ground));
+    memcpy(data->qpos, sim->data->qpos, nq * sizeof(double));
+    memcpy(data->qvel, sim->data->qvel, nv * sizeof(double));
+    memcpy(data->qacc_warmstart, sim->data->qacc_warmstart, nv * sizeof(double));
+    memcpy(data->plugin_state, ground, mild_ground_size(ground));
+    memcpy(data->ctrl, torque, (size_t)model->nu * sizeof(double));
+    mj_step(model, data);
+    memcpy(ground, data->plugin_state, mild_ground_size(ground));
+    show(sim);
+    for (int i = 0; i < model->nv; i++) {
+        if (!(fabs(data->qvel[i]) < 1e3)) {
+            return 1;
+        }
+    }
+    return data->warning[mjWARN_BADQACC].number + data->warning[mjWARN_BADQVEL].number > 0;
+}
+
+/* ---- standing ---- */
+
+typedef struct {
+    int stands;
+    double depth; /* [m] mean over the feet at the end */
+    double load;  /* [N] on all feet at the end */
+} Standing;
+
+static Standing stand_for(const Robot *robot, const MildMaterial *material, double dt,
+                          double seconds) {
+    MildError error = {0};
+    Stand *stand = stand_create(robot, &error);
+    RobotSim *sim = robot_sim_create(robot, dt, &error);
+    assert_non_null(stand);
+    assert_non_null(sim);
+    const int feet = robot_feet(robot);
+    MildGround *ground = calloc(1, mild_ground_bytes(robot_soles(robot), feet));
+    mild_ground_init(ground, robot_soles(robot), feet);
+    MildTerrain terrain = mild_terrain_uniform(material);
+    RobotVariation variation = robot_variation_nominal();
+    RobotState state = stand_state(
+        stand, 1, mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot)));
+    Standing result = {.stands = 1};
+    robot_sim_load(sim, &state, &variation);
+    for (int i = 0; i < (int)(seconds / dt + 0.5) && result.stands; i++) {
+        double torque[ROBOT_JOINTS_MAX] = {0};
+        stand_torque(stand, sim, 1, torque);
+        int bad = robot_sim_step(sim, torque, NULL, &terrain, ground);
+        result.stands = !bad && robot_sim_base_rotation(sim)[8] > 0.9;
+    }
+    for (int f = 0; f < feet; f++) {
+        result.depth += robot_sim_foot(sim, f)->result.depth_mean / feet;
+        result.load += robot_sim_foot(sim, f)->force[2];
+    }
+    free(ground);
+    robot_sim_destroy(sim);
+    stand_destroy(stand);
+    return result;
+}
+
+static void check_stand(const char *name, const char *ground, double dt, const char *integrator) {
+    char folder[200];
+    MildError error = {0};
+    MildMaterial material;
+    snprintf(folder, sizeof folder, MILD_SOURCE_DIR "/robots/%s", name);
+    Robot *robot = robot_create(folder, &error);
+    assert_non_null(robot);
+    assert_true(mild_material_preset(ground, &material));
+    const Standing own = stand_for(robot, &material, dt, 4);
+    use_plugin(robot, &material, dt, integrator);
+    const Standing mujoco = stand_for(robot, &material, dt, 4);
+    use_own_step();
+    print_message("%s %-10s %g ms %-12s sinks %7.3f mm, by our own step %7.3f, load %.1f N\n", name,
+                  ground, 1e3 * dt, integrator, 1e3 * mujoco.depth, 1e3 * own.depth, mujoco.load);
+    assert_true(own.stands && mujoco.stands);
+    assert_true(fabs(mujoco.depth - own.depth) < 0.02 * own.depth);
+    robot_destroy(robot);
+}
+
+static void robots_stand(void **state) {
+    (void)state;
+    static const char *const grounds[] = {"rubber", "foam45", "sand_loose"};
+    static const char *const integrators[] = {"Euler", "implicitfast", "discrete"};
+    static const double steps[] = {0.001, 0.002, 0.005};
+    for (int g = 0; g < 3; g++) {
+        for (int k = 0; k < 3; k++) {
+            check_stand("sa01", grounds[g], steps[k], integrators[(g + k) % 3]);
+            check_stand("go1", grounds[g], steps[k], integrators[(g + k) % 3]);
+        }
+    }
+}
+
+/* ---- walking ---- */
+
+static EvalRow walk(const Robot *robot, const char *ground, double dt, double speed, int trials) {
+    MildError error = {0};
+    TaskDef def = task_def_default();
+    task_def_make_nominal(&def);
+    def.physics_dt = dt;
+    Pool *pool = pool_create(1);
+    Controller controller;
+    if (controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, pool, trials,
+                           &controller, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
+    Scene scene;
+    assert_int_equal(scene_make(&scene, ground, 3, &error), MILD_OK);
+    EvalDef eval = {.speed = speed, .trials = trials, .seconds = 10, .seed = 1};
+    EvalRow row;
+    if (eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
+    controller_destroy(&controller);
+    pool_destroy(pool);
+    return row;
+}
+
+static void check_walk(const Robot *robot, const char *ground, double dt, const char *integrator,
+                       int trials) {
+    MildMaterial material;
+    assert_true(mild_material_preset(ground, &material));
+    const EvalRow own = walk(robot, ground, dt, 0.5, trials);
+    use_plugin(robot, &material, dt, integrator);
+    const EvalRow mujoco = walk(robot, ground, dt, 0.5, trials);
+    use_own_step();
+    print_message("%-10s %g ms %-12s %d of %d, %.4f m/s, %.2f mm; by our own step %d, %.4f m/s, "
+                  "%.2f mm\n",
+                  ground, 1e3 * dt, integrator, mujoco.success, trials, mujoco.velocity,
+                  1e3 * mujoco.penetration, own.success, own.velocity, 1e3 * own.penetration);
+    assert_int_equal(mujoco.success, trials);
+    assert_true(fabs(mujoco.velocity - own.velocity) < 0.02 * own.velocity);
+    assert_true(fabs(mujoco.penetration - own.penetration) < 0.04 * own.penetration);
+}
+
+static void policy_walks(void **state) {
+    (void)state;
+    MildError error = {0};
+    Robot *robot = robot_create(MILD_SOURCE_DIR "/robots/sa01", &error);
+    assert_non_null(robot);
+    check_walk(robot, "sand_loose", 0.002, "Euler", 10);
+    check_walk(robot, "rubber", 0.001, "implicitfast", 2);
+    check_walk(robot, "foam45", 0.005, "discrete", 2);
+    robot_destroy(robot);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(robots_stand),
+        cmocka_unit_test(policy_walks),
+    };
+    return cmocka_run_group_tests(tests, kit_setup, NULL);
+}
