@@ -23,6 +23,7 @@
 #define SLOPE_LEAST 0.006   /* [m] */
 
 _Static_assert(offsetof(WebModel, task) % 8 == 0, "as TaskDef");
+_Static_assert(offsetof(WebModel, geom) - offsetof(WebModel, geoms) == 4, "as web_picture says");
 
 /* Distances from the outline of a sole, negative inside [m]. */
 typedef struct {
@@ -642,6 +643,7 @@ static int open_soles(const WebModel *file) {
             view->y[f][e] = (float)mild_sole_y(web.sole[f])[e];
         }
     }
+    view->bytes = (int32_t)sizeof *view;
     view->pitch = (float)mild_sole_pitch(web.sole[0]);
     view->cell = (float)window_cell();
     web.scratch = mild_scratch_create((const MildSole *const *)web.sole, web.feet, NULL);
@@ -735,8 +737,12 @@ const char *web_open(const WebModel *file, size_t bytes) {
     return NULL;
 }
 
-const WebView *web_view(void) {
+WebView *web_view(void) {
     return &web.view;
+}
+
+const int32_t *web_picture(void) {
+    return &web.file->geoms;
 }
 
 const float *web_history(void) {

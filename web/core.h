@@ -100,27 +100,29 @@ typedef struct {
     int32_t x, y, width, height;
 } WebDirty;
 
-/* What a page draws: filled by web_start and web_step. */
+/* What a page draws, all in words of four bytes: filled by web_start and web_step. */
 typedef struct {
+    int32_t bytes; /* of this struct */
     int32_t links;
     int32_t elements;                    /* of each sole */
-    float link[ENGINE_LINKS_MAX][12];    /* [-, m] link -> world, three rows of four */
+    float pitch;                         /* [m] edge of an element */
+    float cell;                          /* [m] edge of a cell of the window */
+    float period;                        /* [m] of the heights */
     float velocity[3];                   /* [m/s, m/s, rad/s] measured, in the heading frame */
     float yaw;                           /* [rad] */
-    float load[2];                       /* [N] */
+    float load[2];                       /* [N] on each foot */
     float depth[2];                      /* [m] deepest element */
     float center[2][2];                  /* [m] of pressure, foot's frame */
     float x[2][WEB_ELEMENTS_MAX];        /* [m] elements, foot's frame */
     float y[2][WEB_ELEMENTS_MAX];        /* [m] */
     float pressure[2][WEB_ELEMENTS_MAX]; /* [Pa] */
-    float pitch;                         /* [m] edge of an element */
-    float cell;                          /* [m] edge of a cell of the window */
-    float period;                        /* [m] of the heights */
-    int32_t dirty_count;                 /* -1: the whole window */
+    float link[ENGINE_LINKS_MAX][12];    /* [-, m] link -> world, three rows of four */
+    int32_t dirty_count;                 /* of `dirty`; -1: the whole window */
     WebDirty dirty[WEB_DIRTY_MAX];
 } WebView;
 
-/* Takes a file of pack.c, aligned to 16 bytes, which the caller keeps. Returns NULL, or what is wrong with it. */
+/* Takes a file of pack.c, aligned to 16 bytes, which the caller keeps. Returns NULL, or what is
+ * wrong with it. */
 const char *web_open(const WebModel *file, size_t bytes);
 /* Stands the robot up at the origin of a ground without prints, facing x. Returns NULL, or what is
  * wrong. prints: bool, they stay from then on. web_again: where it is, on the same ground. */
@@ -130,9 +132,11 @@ void web_again(void);
 void web_change(double stiffness, double friction);
 /* A policy step of 10 ms with a command [m/s, m/s, rad/s]. Returns whether the robot has fallen. */
 int web_step(float vx, float vy, float wz);
-const WebView *web_view(void);
+WebView *web_view(void);
+/* The number of the robot's parts, and behind it the parts (WebModel.geom). */
+const int32_t *web_picture(void);
 /* Depths of the ground [m], [WEB_WINDOW][WEB_WINDOW]: cell (i, j) of the world is at i and j modulo
- * WEB_WINDOW. The caller sets dirty_count to 0 when it has drawn them. */
+ * WEB_WINDOW. Who has drawn what is dirty sets dirty_count to 0. */
 const float *web_window(void);
 /* Heights of the undisturbed ground [m], [WEB_HILLS][WEB_HILLS] over a period. */
 const float *web_hills(void);
