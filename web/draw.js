@@ -17,6 +17,7 @@ const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [
   a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const clampTo = (x, low, high) => Math.min(Math.max(x, low), high);
 const unit = (a) => { const n = Math.hypot(...a); return a.map((x) => x / n); };
 
 function lookAt(eye, target, up) {
@@ -509,7 +510,7 @@ export class Picture {
   constructor(canvas, parts, looks, cell, stripe) {
     const gl = canvas.getContext('webgl2', { antialias: true, powerPreference: 'high-performance' });
     if (!gl) throw new Error('This page needs WebGL2, which this browser does not have.');
-    Object.assign(this, { canvas, gl, cell, stripe, looks: looks.flat(), scale: 1, slow: 0, period: 8, blades: 1 });
+    Object.assign(this, { canvas, gl, cell, stripe, looks: looks.flat(), scale: 1, slow: 1 / 60, since: 0, period: 8, blades: 1 });
     this.sky = new Program(gl, SKY_VERTEX, SKY_FRAGMENT);
     this.ground = new Program(gl, GROUND_VERTEX, GROUND_FRAGMENT);
     this.robot = new Program(gl, ROBOT_VERTEX, ROBOT_FRAGMENT);
@@ -596,13 +597,17 @@ export class Picture {
     gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, HILLS, HILLS, gl.RED, gl.FLOAT, heights);
   }
 
-  // Fewer pixels where frames take long. seconds: of the last frame.
+  // Fewer pixels and blades where frames take long. seconds: of the last frame.
   adapt(seconds) {
-    this.slow = 0.95 * this.slow + 0.05 * Math.min(seconds, 0.2);
-    this.age = (this.age || 0) + 1;
-    if (this.age < 30) return;
-    if (this.slow > 0.026 && this.scale > 0.35) { this.scale *= 0.8; this.age = 0; this.blades *= 0.6; }
-    else if (this.slow < 0.0175 && this.scale < 1) { this.scale = Math.min(1, this.scale * 1.12); this.blades = Math.min(1, this.blades * 1.3); this.age = -60; }
+    this.slow += (seconds - this.slow) * Math.min(1, 2 * seconds);
+    this.since += seconds;
+    const better = this.slow < 0.0175 && this.since > 3 && this.scale < 1, worse = this.slow > 0.026 && this.since > 0.7 && this.scale > 0.3;
+    if (better || worse) {
+      const factor = better ? 1.12 : clampTo(Math.sqrt(0.022 / this.slow), 0.5, 0.9);
+      this.scale = clampTo(this.scale * factor, 0.3, 1);
+      this.blades = clampTo(this.blades * factor ** 3, 0.05, 1);
+      this.since = 0;
+    }
   }
 
   resize() {

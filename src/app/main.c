@@ -31,6 +31,7 @@ static const struct {
     {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
     {"bench", cmd_bench, "measure speed and memory on this machine"},
     {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
+    {"web", cmd_web, "serve the walk in a browser that `make web` builds"},
 };
 enum { COMMANDS = sizeof commands / sizeof *commands };
 
