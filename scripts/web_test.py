@@ -167,7 +167,7 @@ def shoot(address, folder, names):
         browser = Browser(width, height)
         browser.call("Page.navigate", url=f"{address}?{query}")
         browser.wait("window.app && app.steps > 0", 20)
-        browser.value("app.picture.adapt = () => {}; app.script = () => [0.55, 0, 0]; app.driver.touched = true")
+        browser.value("app.picture.adapt = () => {}; app.picture.scale = app.picture.blades = 1; app.script = () => [0.55, 0, 0]; app.driver.touched = true")
         browser.wait(f"app.time > {seconds}", 90)
         browser.picture(f"{folder}/{name}.png")
         print(f"web_test: {folder}/{name}.png")

@@ -19,7 +19,7 @@
 #define OUTLINE_MARGIN 0.12 /* [m] ground around a sole that it may draw down */
 #define UNDER_SOLE 0.0015   /* [m] gap below a sole, which prevents flicker */
 #define SLOPE_SAND 0.45     /* [-] width of the slope around a print, over its depth */
-#define SLOPE_FOAM 1.4      /* [-] the same of ground that springs back */
+#define SLOPE_FOAM 0.55     /* [-] the same of ground that springs back */
 #define SLOPE_LEAST 0.006   /* [m] */
 
 _Static_assert(offsetof(WebModel, task) % 8 == 0, "as TaskDef");
@@ -91,16 +91,19 @@ static long network_numbers(const WebNetwork *network) {
 }
 
 /* y = W x + b, then ELU; weight: [in][out], then b. */
-static void apply_layer(const float *weight, int in, int out, int last, const float *x, float *y) {
+static void apply_layer(const float *restrict weight, int in, int out, int last,
+                        const float *restrict x, float *restrict y) {
     memcpy(y, weight + (size_t)in * (size_t)out, (size_t)out * sizeof *y);
     for (int i = 0; i < in; i++) {
         const float *row = weight + (size_t)i * (size_t)out;
         const float factor = x[i];
+#pragma omp simd
         for (int j = 0; j < out; j++) {
             y[j] += factor * row[j];
         }
     }
-    for (int j = 0; j < out && !last; j++) {
+#pragma omp simd
+    for (int j = 0; j < (last ? 0 : out); j++) {
         y[j] = vector_elu(y[j]);
     }
 }

@@ -324,7 +324,9 @@ void main() {
     gloss = 0.12; tone += 0.25 * (fine.g - 0.5) * near;
   } else if (kind <= 4) { // foam: pores
     float q = texture(noise, p * (kind == 1 ? 3.2 : kind == 2 ? 2.2 : 1.6)).a;
-    tone *= mix(1.0, q, 0.42 * near) ; tone += 0.05 * (mid.b - 0.5);
+    vec2 g = abs(fract(p / 0.1 + 0.5) - 0.5) * 0.1, line = smoothstep(vec2(0.0), vec2(0.0015 + 1.2 * fwidth(p.x)), g);
+    tone *= mix(1.0, q, 0.42 * near) * mix(1.0, line.x * line.y, 0.30 * near * near);
+    tone += 0.05 * (mid.b - 0.5) - 0.30 * smoothstep(0.0, 0.05, depth);
   } else if (kind == 5) { // grass
     tone += 0.75 * (fine.b - 0.5) * (0.35 + near) + 0.5 * (mid.b - 0.5) + 0.5 * (large.r - 0.5);
     base = mix(base, base * vec3(1.25, 1.05, 0.6), clamp(1.6 * (mid.r - 0.45), 0.0, 0.6));
@@ -349,7 +351,7 @@ void main() {
   float light = max(dot(n, SUN), 0.0);
   light = mix(light, 0.75 * light + 0.14, 0.4 * rough);
   float sun = light * shade * sunlit(place, vec3(0.0, 0.0, 1.0));
-  float open = exp(-26.0 * max(depth - around, 0.0)) * (1.0 - 0.35 * smoothstep(0.0, 0.06, depth));
+  float open = exp(-26.0 * max(depth - around, 0.0)) * (1.0 - 0.55 * smoothstep(0.0, 0.05, depth));
   for (int k = 0; k < 12; k++) {
     vec3 d = blockers[k].xyz - place;
     float q = dot(d, d), r = blockers[k].w;
@@ -511,6 +513,9 @@ export class Picture {
     const gl = canvas.getContext('webgl2', { antialias: true, powerPreference: 'high-performance' });
     if (!gl) throw new Error('This page needs WebGL2, which this browser does not have.');
     Object.assign(this, { canvas, gl, cell, stripe, looks: looks.flat(), scale: 1, slow: 1 / 60, since: 0, period: 8, blades: 1 });
+    const named = gl.getExtension('WEBGL_debug_renderer_info');
+    const renderer = String(gl.getParameter(named ? named.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+    if (/swiftshader|llvmpipe|software/i.test(renderer)) Object.assign(this, { scale: 0.3, blades: 0.05 }); // no GPU
     this.sky = new Program(gl, SKY_VERTEX, SKY_FRAGMENT);
     this.ground = new Program(gl, GROUND_VERTEX, GROUND_FRAGMENT);
     this.robot = new Program(gl, ROBOT_VERTEX, ROBOT_FRAGMENT);
