@@ -127,12 +127,46 @@ def serve(mild):
     return server, found[0]
 
 
+def press(browser, kind, code, key):
+    browser.call("Input.dispatchKeyEvent", type=kind, code=code, key=key)
+
+
+def drive(browser):
+    """Keys, sliders and the list of grounds as somebody uses them; returns what is wrong."""
+    wrong = []
+    browser.value("app.script = null; app.choose(6, 0)")
+    press(browser, "keyDown", "KeyS", "s")
+    if not browser.wait("app.core.view().velocity[0] < -0.3", 20):
+        wrong.append("the key S does not walk backward")
+    press(browser, "keyUp", "KeyS", "s")
+    press(browser, "keyDown", "ArrowLeft", "ArrowLeft")
+    if not browser.wait("app.core.view().velocity[2] > 0.5", 20):
+        wrong.append("the key ArrowLeft does not turn")
+    press(browser, "keyUp", "ArrowLeft", "ArrowLeft")
+    press(browser, "keyDown", "Digit1", "1")
+    press(browser, "keyUp", "Digit1", "1")
+    if not browser.wait("app.ground === 0 && app.core.view().link[3] < 0.5", 5):
+        wrong.append("the key 1 does not choose rubber")
+    browser.value("document.querySelectorAll('#grounds button')[7].click()")
+    if not browser.wait("app.ground === 6", 5):
+        wrong.append("a click does not choose loose sand")
+    browser.value("$ = document.getElementById('stiffness'); $.value = 1; $.dispatchEvent(new Event('input'))")
+    if not browser.wait("app.time > 0 && document.getElementById('stiffness-value').textContent === '\u00d7 4.00'", 5):
+        wrong.append("the slider of the stiffness does not say what it is")
+    browser.value("app.time0 = app.time; app.driver.touched = true")
+    stiff = browser.wait("app.time > app.time0 + 2 && Math.max(...app.core.view().depth)", 20)
+    if not stiff or stiff > 0.03:
+        wrong.append(f"loose sand four times as stiff carries the robot at {stiff} m")
+    return wrong
+
+
 def walk(address, bounds):
     """The page's own test; returns what is wrong."""
     browser = Browser(480, 300)
     wrong = []
     browser.call("Page.navigate", url=f"{address}?test=0.6&ground=6")
     report = browser.wait("window.report && JSON.stringify(window.report)", 60)
+    wrong += drive(browser) if report and bounds else []
     if report:
         report = json.loads(report)
         print("web_test: " + ", ".join(f"{k} {v:.4g}" for k, v in report.items()))

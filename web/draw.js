@@ -329,7 +329,7 @@ void main() {
     tone += 0.05 * (mid.b - 0.5) - 0.30 * smoothstep(0.0, 0.05, depth);
   } else if (kind == 5) { // grass
     tone += 0.75 * (fine.b - 0.5) * (0.35 + near) + 0.5 * (mid.b - 0.5) + 0.5 * (large.r - 0.5);
-    base = mix(base, base * vec3(1.25, 1.05, 0.6), clamp(1.6 * (mid.r - 0.45), 0.0, 0.6));
+    base = mix(base, base * vec3(1.15, 1.03, 0.75), clamp(1.6 * (mid.r - 0.45), 0.0, 0.6));
     base *= 1.0 - 0.35 * smoothstep(0.004, 0.03, depth);
     rough = 1.0;
   } else if (kind <= 7) { // sand: grains and soft ripples
@@ -446,7 +446,7 @@ void main() {
   vec2 bend = (way * (0.25 + 0.5 * hash(c, 5) + 1.8 * pressed) * tall + wind * (1.0 - pressed)) * t * t;
   place = vec3(p + bend + vec2(-way.y, way.x) * side * 0.0028 * (1.0 - t), hillAt(p) - inWindow(p) * dent + tall * t);
   float kind = hash(c, 6);
-  tint = mix(mix(vec3(0.23, 0.38, 0.13), vec3(0.43, 0.55, 0.20), kind), vec3(0.62, 0.60, 0.30), step(0.93, kind));
+  tint = mix(mix(vec3(0.25, 0.36, 0.17), vec3(0.43, 0.52, 0.25), kind), vec3(0.62, 0.59, 0.36), step(0.93, kind));
   height = t;
   gl_Position = grows ? view * vec4(place, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
 }`;

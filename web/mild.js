@@ -14,7 +14,7 @@ const GROUNDS = {
   foam45: ['Foam, medium', [0.86, 0.81, 0.69]],
   foam28: ['Foam, soft', [0.83, 0.62, 0.56]],
   foam25: ['Foam, very soft', [0.72, 0.64, 0.79]],
-  grass: ['Grass', [0.37, 0.47, 0.20]],
+  grass: ['Grass', [0.36, 0.43, 0.23]],
   sand_loose: ['Sand, loose', [0.86, 0.72, 0.56]],
   sand_dense: ['Sand, dense', [0.74, 0.58, 0.43]],
   rigid: ['Rigid floor', [0.69, 0.70, 0.69]],
@@ -103,7 +103,8 @@ class Driver {
     this.wanted = [0, 0, 0];
     this.command = [0, 0, 0];
     this.heading = null;
-    this.touched = false;
+    this.touched = false; // somebody has driven
+    this.again = false; // somebody wants it to stand up
     addEventListener('keydown', (e) => {
       if (e.target.tagName === 'INPUT' && e.key.startsWith('Arrow')) return;
       this.keys.add(e.code);
@@ -140,10 +141,9 @@ class Driver {
       if (!pad) continue;
       const axis = (i) => (Math.abs(pad.axes[i] || 0) > 0.12 ? pad.axes[i] : 0);
       forward -= axis(1); left -= axis(0); turn -= axis(2);
-      if (pad.buttons[0] && pad.buttons[0].pressed) this.keys.add('KeyR');
+      this.again ||= Boolean(pad.buttons[0] && pad.buttons[0].pressed);
     }
-    const asked = forward || left || turn;
-    this.touched ||= Boolean(asked);
+    this.touched ||= Boolean(forward || left || turn);
     return [clamp(forward, -1, 1), clamp(left, -1, 1), clamp(turn, -1, 1)];
   }
 
@@ -173,7 +173,6 @@ class Panel {
   constructor(app) {
     this.app = app;
     this.soles = $('soles').getContext('2d');
-    this.peak = [0, 0];
     $('scale').firstElementChild.style.background =
       `linear-gradient(90deg, ${Array.from({ length: 13 }, (_, i) => `rgb(${heat(i / 12)})`).join(', ')})`;
     this.makeGrounds();
@@ -223,7 +222,7 @@ class Panel {
       for (let e = 0; e < view.elements; e++) {
         const pressure = view.pressure[128 * f + e];
         const x = middle - scale * view.y[128 * f + e], y = foot - scale * view.x[128 * f + e];
-        soles.fillStyle = `rgb(${heat(Math.sqrt(pressure / PRESSURE) * (pressure > 0))})`;
+        soles.fillStyle = pressure > 0 ? `rgb(${heat(Math.sqrt(pressure / PRESSURE))})` : 'rgba(60, 50, 40, 0.07)';
         soles.beginPath();
         soles.roundRect(x - (scale * size) / 2, y - (scale * size) / 2, scale * size, scale * size, 5);
         soles.fill();
@@ -236,7 +235,8 @@ class Panel {
         soles.arc(middle - scale * view.center[2 * f + 1], foot - scale * view.center[2 * f], 9, 0, 7);
         soles.stroke();
       }
-      $(f === 0 ? 'left' : 'right').textContent = `${Math.round(view.load[f])} N · ${Math.round(1e3 * view.depth[f])} mm`;
+      const depth = this.app.core.names[this.app.ground] === 'rigid' ? 'rigid' : `${Math.round(1e3 * view.depth[f])} mm`;
+      $(f === 0 ? 'left' : 'right').textContent = `${Math.round(view.load[f])} N · ${depth}`;
     }
   }
 
@@ -317,7 +317,11 @@ class App {
     this.links = this.before.slice();
     Object.assign(this, { owed: 0, steps: 0, time: 0, pace: 1, fallen: 0, last: null });
     this.choose(this.ground, this.shape);
-    addEventListener('keydown', (e) => { if (e.code === 'KeyR') this.standUp(); });
+    addEventListener('keydown', (e) => {
+      const digit = /^Digit(\d)$/.exec(e.code);
+      if (e.code === 'KeyR') this.driver.again = true;
+      if (digit && !e.repeat) this.choose(digit[1] === '0' ? core.names.length : Number(digit[1]) - 1, this.shape);
+    });
   }
 
   choose(ground, shape) {
@@ -336,8 +340,7 @@ class App {
   }
 
   restart() {
-    this.driver.command = [0, 0, 0];
-    this.driver.heading = null;
+    Object.assign(this.driver, { command: [0, 0, 0], heading: null, again: false });
     this.camera.target = null;
     this.before = this.core.view().link.slice();
     $('toast').classList.remove('on');
@@ -367,6 +370,7 @@ class App {
     this.last = now;
     this.owed = Math.min(this.owed + seconds, BEHIND);
     const asked = this.driver.ask();
+    if (this.driver.again) this.standUp();
     this.driver.wanted = this.script ? this.script(this.time) : this.driver.touched ? asked : this.wander();
     while (this.owed >= PERIOD) {
       this.owed -= PERIOD;

@@ -240,7 +240,7 @@ static void test_walks(void **state) {
     (void)state;
     for (int ground = 0; ground <= WEB_STRIPES; ground++) {
         start(ground, WEB_LEVEL, 1);
-        const double speed = walk(10, 0.6f);
+        const double speed = walk(7, 0.6f);
         printf("  ground %d: %.3f m/s of 0.6, leans by %.3f\n", ground, speed,
                1 - (double)web_view()->link[0][10]);
         assert_true(fabs(speed - 0.6) < 0.05);
