@@ -174,7 +174,7 @@ class Panel {
     this.app = app;
     this.soles = $('soles').getContext('2d');
     $('scale').firstElementChild.style.background =
-      `linear-gradient(90deg, ${Array.from({ length: 13 }, (_, i) => `rgb(${heat(i / 12)})`).join(', ')})`;
+      `linear-gradient(90deg, ${Array.from({ length: 13 }, (_, i) => `rgb(${heat(0.08 + (0.92 * i) / 12)})`).join(', ')})`;
     this.makeGrounds();
     for (const id of ['stiffness', 'friction']) $(id).addEventListener('input', () => this.change());
     $('more').addEventListener('click', () => $('side').classList.toggle('on'));
@@ -222,7 +222,7 @@ class Panel {
       for (let e = 0; e < view.elements; e++) {
         const pressure = view.pressure[128 * f + e];
         const x = middle - scale * view.y[128 * f + e], y = foot - scale * view.x[128 * f + e];
-        soles.fillStyle = pressure > 0 ? `rgb(${heat(Math.sqrt(pressure / PRESSURE))})` : 'rgba(60, 50, 40, 0.07)';
+        soles.fillStyle = pressure > 0 ? `rgb(${heat(0.08 + (0.92 * pressure) / PRESSURE)})` : 'rgba(60, 50, 40, 0.07)';
         soles.beginPath();
         soles.roundRect(x - (scale * size) / 2, y - (scale * size) / 2, scale * size, scale * size, 5);
         soles.fill();
