@@ -319,14 +319,16 @@ static void test_window(void **state) {
     web_again();
     walk(12, 1.0f);
     const double far = (double)web_view()->link[0][3];
+    const double ahead = pressed_between(far + 1, far + 4);
     walk(12, -1.0f);
     const double back = (double)web_view()->link[0][3], after = pressed_between(0.2, 1.2);
     printf("  %.3f m^2 pressed; after a way to %.2f m and back to %.2f m %.3f m^2\n", before, far,
            back, after);
     assert_true(far > 10 && back > 2 && back < 4.5 && before > 0.05);
-    assert_true(fabs(after / before - 1) < 0.2);
+    assert_true(fabs(after / before - 1) < 0.2 && ahead == 0);
 }
 
+/* [m] The deepest elements of the two feet of a robot that stands. */
 static double standing_depth(double stiffness) {
     web_change(stiffness, 1);
     for (int t = 0; t < 4 * SECOND; t++) {
@@ -352,7 +354,8 @@ static void test_sliders(void **state) {
     const double hard = standing_depth(3), plain = standing_depth(1), soft = standing_depth(0.7);
     printf("  depth on foam45 at 0.7, 1, 3 times its stiffness: %.1f, %.1f, %.1f mm\n", 1e3 * soft,
            1e3 * plain, 1e3 * hard);
-    assert_true(soft > 1.1 * plain && plain > 1.3 * hard);
+    /* a level sole at rest: 1.8 and 3.8 times; of k_pen alone the robot stands at 1.4 and 2.0 */
+    assert_true(soft > 1.6 * plain && plain > 2.2 * hard);
     for (int t = 0; t < 4 * SECOND; t++) {
         web_step(0, 0, 0);
         load += carried() / (4 * SECOND);
