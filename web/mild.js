@@ -2,7 +2,7 @@
 import { Picture } from './draw.js';
 
 const PERIOD = 0.01; // [s] policy step
-const BEHIND = 1; // [s] the most that is made good after a pause
+const BEHIND = 1.5; // [s] the most that is made good after a pause
 const TICK = 20; // [ms] between steps where drawing takes longer
 const STRIPE = 2.4; // [m] WEB_STRIPE
 const LEVEL = 0;
@@ -247,7 +247,7 @@ class Panel {
     $('measured').style.left = `${Math.min(zero, now)}%`;
     $('measured').style.width = `${Math.abs(now - zero)}%`;
     $('asked').style.left = `${place(command[0])}%`;
-    $('numbers').innerHTML = `<b>${v.toFixed(2)}</b> m/s measured · ${command[0].toFixed(2)} asked`;
+    $('numbers').innerHTML = `<b>${v.toFixed(2)}</b> m/s · ${command[0].toFixed(2)} asked`;
     $('pace').textContent = `${pace.toFixed(2)} × real time`;
   }
 
@@ -264,7 +264,7 @@ class Panel {
 
 class Camera {
   constructor(canvas) {
-    Object.assign(this, { turn: -0.62, tilt: 0.2, distance: 2.75, yaw: 0, target: null, idle: 9 });
+    Object.assign(this, { turn: -0.62, tilt: 0.2, distance: 3, yaw: 0, target: null, idle: 9 });
     const held = new Map();
     canvas.addEventListener('pointerdown', (e) => { held.set(e.pointerId, e); canvas.setPointerCapture(e.pointerId); canvas.focus(); });
     canvas.addEventListener('pointermove', (e) => {
@@ -287,7 +287,7 @@ class Camera {
   zoom(factor) { this.distance = clamp(this.distance * factor, 0.9, 8); }
 
   follow(base, yaw, height, seconds, drift) {
-    const goal = [base[0], base[1], 0.55 + height];
+    const goal = [base[0], base[1], 0.47 + height];
     if (!this.target || Math.hypot(goal[0] - this.target[0], goal[1] - this.target[1]) > 1.5) { this.target = goal; this.yaw = yaw; }
     const share = [1 - Math.exp(-seconds * 5), 1 - Math.exp(-seconds * 2.5)];
     this.target = this.target.map((x, k) => x + (goal[k] - x) * share[k < 2 ? 0 : 1]);
@@ -384,6 +384,13 @@ class App {
     this.pace += (this.time - before - seconds * this.pace) * 0.5;
   }
 
+  // A processor that draws, and does so slowly, rests as long as it drew.
+  rest(next) {
+    const { slow } = this.picture;
+    if (slow > 0.06) setTimeout(next, 1e3 * Math.min(slow, 0.2));
+    else next();
+  }
+
   frame(now) {
     const seconds = Math.min((now - (this.drawn ?? now)) / 1e3, 0.25);
     this.drawn = now;
@@ -403,7 +410,7 @@ class App {
     if (this.driver.touched) $('hint').classList.add('gone');
     this.panel.drawSoles(view);
     this.panel.drawSpeed(view, this.asked || [0, 0, 0], this.pace, seconds);
-    requestAnimationFrame((t) => this.frame(t));
+    this.rest(() => requestAnimationFrame((t) => this.frame(t)));
   }
 }
 
