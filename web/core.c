@@ -230,9 +230,9 @@ static void recall_cells(int i0, int i1, int j0, int j1) {
     mark_cells(i0, i1, j0, j1);
 }
 
-/* Moves the window so that the robot is in its middle. again: bool, all of it is new. */
-static void follow(int again) {
-    int first[2];
+/* Moves the window so that the robot is in its middle. */
+static void follow(void) {
+    int first[2], again = 0;
     for (int k = 0; k < 2; k++) {
         const double middle = (double)web.place->work.base[k] / window_cell();
         first[k] = WINDOW_STRIDE * (int)floor(middle / WINDOW_STRIDE) - WEB_WINDOW / 2;
@@ -328,7 +328,7 @@ static void press_cells(const int box[4], const double *most) {
 static void show_ground(void) {
     const double cell = window_cell();
     double most[ROBOT_FEET_MAX];
-    follow(0);
+    follow();
     for (int f = 0; f < web.feet; f++) {
         most[f] = sole_deepest(f);
     }
@@ -584,7 +584,9 @@ const char *web_start(int ground, int relief, int prints) {
     web.ground = mild_ground_init_prints(block, soles, web.feet, tiles);
     show_hills();
     stand_up(ground == WEB_STRIPES ? WEB_STRIPE / 2 : 0, 0, 0);
-    follow(1);
+    memset(web.shown, 0, 2 * sizeof *web.shown * WEB_WINDOW * WEB_WINDOW);
+    web.window[0] = web.window[1] = -WEB_WINDOW / 2;
+    web.view.dirty_count = -1;
     return NULL;
 }
 

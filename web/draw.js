@@ -508,11 +508,10 @@ class Program {
 }
 
 export class Picture {
-  // parts: the robot's. looks: [LOOKS] colours of the ground, sRGB in 0 .. 1. cell: [m] of the window.
-  constructor(canvas, parts, looks, cell, stripe) {
+  constructor(canvas) {
     const gl = canvas.getContext('webgl2', { antialias: true, powerPreference: 'high-performance' });
     if (!gl) throw new Error('This page needs WebGL2, which this browser does not have.');
-    Object.assign(this, { canvas, gl, cell, stripe, looks: looks.flat(), scale: 1, slow: 1 / 60, since: 0, period: 8, blades: 1 });
+    Object.assign(this, { canvas, gl, scale: 1, slow: 1 / 60, since: 0, period: 8, blades: 1 });
     const named = gl.getExtension('WEBGL_debug_renderer_info');
     const renderer = String(gl.getParameter(named ? named.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
     if (/swiftshader|llvmpipe|software/i.test(renderer)) Object.assign(this, { scale: 0.3, blades: 0.05 }); // no GPU
@@ -521,7 +520,13 @@ export class Picture {
     this.robot = new Program(gl, ROBOT_VERTEX, ROBOT_FRAGMENT);
     this.caster = new Program(gl, SHADOW_VERTEX, SHADOW_FRAGMENT);
     this.grass = new Program(gl, GRASS_VERTEX, GRASS_FRAGMENT);
-    for (const program of [this.sky, this.ground, this.robot, this.caster, this.grass]) program.check();
+    this.nothing = gl.createVertexArray();
+    this.makeTextures();
+  }
+
+  // parts: the robot's. looks: [LOOKS] colours of the ground, sRGB in 0 .. 1. cell: [m] of the window; stripe: [m].
+  setWorld(parts, looks, cell, stripe) {
+    Object.assign(this, { looks: looks.flat(), cell, stripe });
     const mesh = new Mesh();
     for (const part of parts) mesh.add(part);
     this.robotMesh = this.upload(new Float32Array(mesh.vertices), new Uint32Array(mesh.indices), [3, 3, 1, 3, 2]);
@@ -529,8 +534,7 @@ export class Picture {
     this.fineMesh = this.upload(fine.points, fine.indices, [2]);
     this.innerMesh = this.upload(inner.points, inner.indices, [2]);
     this.outerMesh = this.upload(outer.points, outer.indices, [2]);
-    this.nothing = gl.createVertexArray();
-    this.makeTextures();
+    for (const program of [this.sky, this.ground, this.robot, this.caster, this.grass]) program.check();
   }
 
   upload(vertices, indices, widths) {

@@ -302,14 +302,13 @@ class Camera {
 // ---- the whole ----
 
 class App {
-  constructor(core) {
-    this.core = core;
+  constructor(core, picture) {
+    Object.assign(this, { core, picture });
     this.ground = Number(options.get('ground') ?? core.names.length); // all in stripes
     this.shape = Number(options.get('shape') ?? LEVEL);
-    core.start(this.ground, this.shape);
     const looks = core.names.map((name) => GROUNDS[name][1]);
     while (looks.length < 10) looks.push([0.5, 0.5, 0.5]);
-    this.picture = new Picture($('picture'), core.parts, looks, core.view().cell, STRIPE);
+    picture.setWorld(core.parts, looks, core.view().cell, STRIPE);
     this.driver = new Driver();
     this.camera = new Camera($('picture'));
     this.panel = new Panel(this);
@@ -416,7 +415,7 @@ class App {
 
 // ---- the test hook: ?test walks ten seconds and tells window.report what came of it ----
 
-function runTest(app, ready) {
+function runTest(app) {
   const speed = Number(options.get('test') || 0.6), start = performance.now();
   let x = null;
   app.script = () => [speed / 1.15, 0, 0];
@@ -426,7 +425,7 @@ function runTest(app, ready) {
     if (app.steps >= 300 && !x) x = [link[3], link[7], app.steps];
     if (elapsed < 10 || !x) { setTimeout(watch, 50); return; }
     const report = {
-      ready, elapsed, simulated: PERIOD * app.steps, upright: link[10], fell: app.fallen, asked: speed,
+      elapsed, simulated: PERIOD * app.steps, upright: link[10], fell: app.fallen, asked: speed,
       speed: Math.hypot(link[3] - x[0], link[7] - x[1]) / (PERIOD * (app.steps - x[2])), scale: app.picture.scale,
     };
     const before = performance.now();
@@ -441,13 +440,16 @@ function runTest(app, ready) {
 }
 
 async function main() {
-  const app = new App(await Core.load());
+  const loading = Core.load();
+  const picture = new Picture($('picture')); // its programs are compiled meanwhile
+  const app = new App(await loading, picture);
   window.app = app;
   setInterval(() => app.physics(performance.now()), TICK);
   requestAnimationFrame((t) => {
     app.frame(t);
     $('veil').classList.add('clear');
-    if (options.has('test')) runTest(app, performance.now() / 1e3);
+    app.ready = performance.now() / 1e3; // [s]
+    if (options.has('test')) runTest(app);
   });
 }
 
