@@ -84,7 +84,7 @@ enum {
     WEB_ELEMENTS_MAX = 128, /* of a sole */
     WEB_WINDOW = 1024,      /* cells along an edge of the ground drawn */
     WEB_HILLS = 512,        /* the same of a period of its heights */
-    WEB_TILES = 32768,      /* of prints, those of an hour */
+    WEB_TILES = 32768,      /* of prints: some 3000 */
     WEB_DIRTY_MAX = 64
 };
 #define WEB_STRIPE 2.4 /* [m] width of a ground where all are shown */
