@@ -16,7 +16,7 @@ MUJOCO_ROOT ?=
 QUICK ?=
 TEST ?=
 
-.PHONY: setup build test run bench install plugin deb docs site paper check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin deb docs site paper web web-test check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -30,6 +30,8 @@ help:
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
 	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
 	@echo "make paper   the paper's experiments as one page, out/paper/index.html (docs/paper.md); QUICK=1: few trials"
+	@echo "make web     the walk in a browser, build/web, for \`build/mild web\` or any static host (docs/web.md)"
+	@echo "make web-test   ten seconds of it in headless Chromium"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
 	@echo "make site    all documentation as static pages, build/site/index.html, with its links checked"
@@ -84,6 +86,16 @@ paper: build
 	@.venv/bin/pip install -q -r scripts/paper/requirements.txt
 	@if nvidia-smi >/dev/null 2>&1; then scripts/paper/train.sh runs/paper; fi
 	@.venv/bin/python scripts/paper/paper.py $(if $(QUICK),--trials 3)
+
+# emscripten and, for the test, Chromium: large, so nothing else installs them.
+web:
+	@scripts/setup.sh web
+	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
+	@scripts/web.sh
+
+web-test: web
+	@cmake --build build --parallel $(JOBS) --target mild
+	@scripts/web_test.py
 
 docs:
 	@mkdir -p build

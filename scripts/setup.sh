@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what building, running and testing need, except what is already installed. Safe to repeat.
-# Usage: scripts/setup.sh [check]; with `check` also what `make check` needs.
+# Usage: scripts/setup.sh [check|web]; with `check` also what `make check` needs, with `web` what the page does.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -18,6 +18,9 @@ if [ "${1:-}" = check ]; then
         clang-14 clang-format-14 clang-tidy-14 libclang-rt-14-dev llvm-14
         gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user
     )
+fi
+if [ "${1:-}" = web ]; then
+    packages+=(emscripten chromium)
 fi
 
 if ! command -v dpkg-query >/dev/null; then

@@ -28,6 +28,7 @@ const AppCommand commands[] = {
     {"report", cmd_report, "draw the curves of training runs on one page"},
     {"bench", cmd_bench, "measure speed and memory on this machine"},
     {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
+    {"web", cmd_web, "serve the walk in a browser that `make web` builds"},
 };
 const int command_count = sizeof commands / sizeof *commands;
 _Static_assert(sizeof commands / sizeof *commands <= COMMANDS_MAX, "main has room for their names");

@@ -33,5 +33,6 @@ int cmd_fit(int argc, char **argv);
 int cmd_report(int argc, char **argv);
 int cmd_bench(int argc, char **argv);
 int cmd_info(int argc, char **argv);
+int cmd_web(int argc, char **argv);
 
 #endif

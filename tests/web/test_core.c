@@ -1,0 +1,398 @@
+/* The core of the page, compiled for this machine, beside what it stands for: the crowd on the CPU
+ * and the policy on oneDNN. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define MILD_REAL_FLOAT
+#include "config/experiment_keys.h"
+#include "crowd/crowd.h"
+#include "learn/policy.h"
+#include "mild/batch.h"
+#include "sa01.h"
+#include "task/ground.h"
+#include "web/core.h"
+
+#define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
+#define WALK MILD_SOURCE_DIR "/configs/walk.ini"
+
+enum { SECOND = 100 /* policy steps */ };
+
+static WebModel *model;
+static size_t model_bytes;
+static Robot *robot;
+static Pool *pool;
+static Policy *policy;
+static TaskDef task;
+
+static int setup(void **state) {
+    char unused[TRAIN_ROBOT_SIZE];
+    MildError error = {0};
+    (void)state;
+    FILE *file = fopen(WEB_ROBOT, "rb");
+    assert_non_null(file);
+    model = aligned_alloc(64, 1 << 20);
+    model_bytes = fread(model, 1, 1 << 20, file);
+    fclose(file);
+    pool = pool_create(1);
+    robot = robot_create(SA01, &error);
+    policy = policy_load(POLICY, NULL, 0, &error);
+    assert_non_null(robot);
+    assert_non_null(policy);
+    return experiment_task(&task, 0, unused, WALK, &error);
+}
+
+static int teardown(void **state) {
+    (void)state;
+    policy_destroy(policy);
+    robot_destroy(robot);
+    pool_destroy(pool);
+    free(model);
+    return 0;
+}
+
+static int preset(const char *name) {
+    for (int i = 0; i < mild_material_preset_count(); i++) {
+        if (strcmp(name, mild_material_preset_name(i)) == 0) {
+            return i;
+        }
+    }
+    fail_msg("no ground %s", name);
+    return -1;
+}
+
+static void start(int ground, int relief, int prints) {
+    assert_null(web_open(model, model_bytes));
+    assert_null(web_start(ground, relief, prints));
+}
+
+/* What a file says that is not one. */
+static void test_files(void **state) {
+    (void)state;
+    WebModel *other = aligned_alloc(64, 1 << 20);
+    assert_non_null(web_open(model, 20));
+    assert_non_null(web_open(model, sizeof *model - 1));
+    assert_non_null(web_open(model, model_bytes - 1));
+    memcpy(other, model, model_bytes);
+    other->magic[3] = 'x';
+    assert_non_null(web_open(other, model_bytes));
+    memcpy(other, model, model_bytes);
+    other->bytes--;
+    assert_non_null(web_open(other, model_bytes));
+    memcpy(other, model, model_bytes);
+    other->policy.actor.width[1]--;
+    assert_non_null(web_open(other, model_bytes));
+    other->policy.actor.layers = 1000;
+    assert_non_null(web_open(other, model_bytes));
+    free(other);
+    start(0, WEB_LEVEL, 1);
+    assert_non_null(web_start(-1, WEB_LEVEL, 1));
+    assert_non_null(web_start(WEB_STRIPES + 1, WEB_LEVEL, 1));
+    assert_non_null(web_start(0, WEB_RELIEFS, 1));
+}
+
+/* Weights of 16 bits are within 2^-11 of those of the file. */
+static void test_policy(void **state) {
+    (void)state;
+    float worst = 0, largest = 0;
+    start(preset("sand_loose"), WEB_LEVEL, 0);
+    for (int t = 0; t < 2 * SECOND; t++) {
+        float mine[SA01_JOINTS], theirs[SA01_JOINTS];
+        web_act(web_history(), mine);
+        policy_act(policy, NULL, 1, web_history(), theirs, NULL, NULL);
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            worst = fmaxf(worst, fabsf(mine[i] - theirs[i]));
+            largest = fmaxf(largest, fabsf(theirs[i]));
+        }
+        assert_false(web_step(0.6f, 0, 0));
+    }
+    printf("  actions up to %.2f, apart by at most %.5f (bound 0.01)\n", (double)largest,
+           (double)worst);
+    assert_true(worst < 0.01f && worst > 0);
+}
+
+/* ---- beside the crowd ---- */
+
+typedef struct {
+    Crowd *crowd;
+    float history[SA01_HISTORY], reward;
+    uint8_t done, timeout, valid;
+} Rival;
+
+static void rival_start(Rival *rival, int ground) {
+    MildError error = {0};
+    TaskGround material = {.material = mild_material_default()};
+    const int rigid = ground == WEB_RIGID;
+    if (!rigid) {
+        mild_material_preset(mild_material_preset_name(ground), &material.material);
+    }
+    material.depth = rigid ? 0 : task_standing_depth(robot, &material.material);
+    const TaskGrounds grounds = {1, &material};
+    const CrowdTrial trial = {.rigid = rigid};
+    const CrowdDef def = {.task = &task,
+                          .robot = robot,
+                          .pool = pool,
+                          .device = MILD_BATCH_HOST,
+                          .envs = 1,
+                          .seed = 1,
+                          .chosen = &grounds,
+                          .trial = &trial};
+    const double stand[3] = {0, 0, 0}, walk[3] = {0.6, 0, 0};
+    const VecView view = {.history = rival->history};
+    rival->crowd = crowd_create(&def, &error);
+    assert_non_null(rival->crowd);
+    assert_int_equal(crowd_command(rival->crowd, stand, &error), MILD_OK);
+    assert_int_equal(crowd_reset(rival->crowd, &view, NULL, &error), MILD_OK);
+    assert_int_equal(crowd_command(rival->crowd, walk, &error), MILD_OK);
+}
+
+static void rival_step(Rival *rival, const float *action) {
+    MildError error = {0};
+    const VecView view = {.history = rival->history};
+    assert_int_equal(crowd_step(rival->crowd, action, &rival->reward, &rival->done, &rival->timeout,
+                                &rival->valid, &view, NULL, &error),
+                     MILD_OK);
+}
+
+/* Largest difference of two histories. */
+static double apart(const float *a, const float *b) {
+    double worst = 0;
+    for (int i = 0; i < SA01_HISTORY; i++) {
+        worst = fmax(worst, fabs((double)a[i] - (double)b[i]));
+    }
+    return worst;
+}
+
+/* With the same actions the two see the same; the grounds' solvers differ by their tolerance, and
+ * what differs grows with the gait. */
+static void test_same_steps(void **state) {
+    static const float walk[3] = {0.6f, 0, 0};
+    const int grounds[] = {preset("sand_loose"), preset("foam45"), preset("grass"), WEB_RIGID};
+    (void)state;
+    for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
+        Rival rival = {0};
+        double first = 0, worst = 0;
+        start(grounds[g], WEB_LEVEL, 0);
+        rival_start(&rival, grounds[g]);
+        for (int t = 0; t < 60; t++) {
+            float action[SA01_JOINTS];
+            web_act(rival.history, action);
+            rival_step(&rival, action);
+            assert_false(web_move(action, walk));
+            const double now = apart(web_history(), rival.history);
+            first = t == 0 ? now : first;
+            worst = fmax(worst, now);
+        }
+        printf("  ground %d: after a step %.1e apart (bound 2e-4), in 60 steps %.1e (bound 0.02)\n",
+               grounds[g], first, worst);
+        assert_true(first < 2e-4 && worst < 0.02);
+        crowd_destroy(rival.crowd);
+    }
+}
+
+/* ---- walks ---- */
+
+/* Walks, and returns the speed from the third second on, from where the base gets to. */
+static double walk(double seconds, float speed) {
+    const WebView *view = web_view();
+    const int steps = (int)(seconds * SECOND);
+    double x = 0, y = 0;
+    for (int t = 0; t < steps; t++) {
+        if (web_step(speed, 0, 0)) {
+            fail_msg("fell after %g s", 0.01 * t);
+        }
+        x = t == 2 * SECOND - 1 ? (double)view->link[0][3] : x;
+        y = t == 2 * SECOND - 1 ? (double)view->link[0][7] : y;
+    }
+    return hypot((double)view->link[0][3] - x, (double)view->link[0][7] - y) / (0.01 * steps - 2);
+}
+
+static double rival_walk(int ground) {
+    Rival rival = {0};
+    CrowdSample sample[8];
+    double before[2] = {0, 0};
+    rival_start(&rival, ground);
+    crowd_watch(rival.crowd, sample);
+    for (int t = 0; t < 10 * SECOND; t++) {
+        float action[SA01_JOINTS];
+        policy_act(policy, NULL, 1, rival.history, action, NULL, NULL);
+        rival_step(&rival, action);
+        assert_false(rival.done);
+        if (t == 2 * SECOND - 1) {
+            before[0] = (double)sample[0].base[0];
+            before[1] = (double)sample[0].base[1];
+        }
+    }
+    const double x = (double)sample[0].base[0] - before[0];
+    const double y = (double)sample[0].base[1] - before[1];
+    crowd_destroy(rival.crowd);
+    return hypot(x, y) / 8;
+}
+
+static void test_walks(void **state) {
+    (void)state;
+    for (int ground = 0; ground <= WEB_STRIPES; ground++) {
+        start(ground, WEB_LEVEL, 1);
+        const double speed = walk(7, 0.6f);
+        printf("  ground %d: %.3f m/s of 0.6, leans by %.3f\n", ground, speed,
+               1 - (double)web_view()->link[0][10]);
+        assert_true(fabs(speed - 0.6) < 0.05);
+        assert_true(web_view()->link[0][10] > 0.95f);
+    }
+    const int sand = preset("sand_loose");
+    start(sand, WEB_LEVEL, 0);
+    const double mine = walk(10, 0.6f), theirs = rival_walk(sand);
+    printf("  sand_loose: %.4f m/s, the crowd %.4f (bound 2 %%)\n", mine, theirs);
+    assert_true(fabs(mine / theirs - 1) < 0.02);
+}
+
+static void test_hills(void **state) {
+    (void)state;
+    for (int relief = WEB_WAVES; relief < WEB_RELIEFS; relief++) {
+        start(preset("grass"), relief, 1);
+        const double speed = walk(10, 0.6f);
+        float low = 1, high = -1;
+        for (int n = 0; n < WEB_HILLS * WEB_HILLS; n++) {
+            low = fminf(low, web_hills()[n]);
+            high = fmaxf(high, web_hills()[n]);
+        }
+        printf("  relief %d: %.3f m/s, ground from %.3f to %.3f m\n", relief, speed, (double)low,
+               (double)high);
+        assert_true(fabs(speed - 0.6) < 0.1 && low < -0.02f && high > 0.02f);
+    }
+}
+
+/* ---- the picture ---- */
+
+/* [m^2] of the window that lies deeper than a centimetre. */
+static double pressed(void) {
+    const double cell = (double)web_view()->cell;
+    int cells = 0;
+    for (int n = 0; n < WEB_WINDOW * WEB_WINDOW; n++) {
+        cells += web_window()[n] > 0.01f;
+    }
+    return cells * cell * cell;
+}
+
+/* Prints stay on sand, 0.6 m/s in steps of 0.4 s; foam springs back. */
+static void test_prints(void **state) {
+    (void)state;
+    start(preset("sand_loose"), WEB_LEVEL, 1);
+    walk(5, 0.6f);
+    const double sand = pressed();
+    start(preset("foam45"), WEB_LEVEL, 1);
+    walk(5, 0.6f);
+    const double foam = pressed();
+    printf("  pressed after 5 s: sand %.3f m^2, foam %.3f m^2\n", sand, foam);
+    assert_true(sand > 10 * 0.02 && sand < 26 * 0.04);
+    assert_true(foam > 0.01 && foam < 0.2);
+    start(preset("sand_loose"), WEB_LEVEL, 1);
+    assert_true(pressed() == 0);
+}
+
+/* [m^2] The same between two places along x. */
+static double pressed_between(double low, double high) {
+    const double cell = (double)web_view()->cell;
+    int cells = 0;
+    for (int i = (int)floor(low / cell); i < (int)floor(high / cell); i++) {
+        for (int j = 0; j < WEB_WINDOW; j++) {
+            cells += web_window()[j * WEB_WINDOW + (i & (WEB_WINDOW - 1))] > 0.01f;
+        }
+    }
+    return cells * cell * cell;
+}
+
+/* The window follows the robot: what left it and comes back is what the ground remembers, which
+ * standing up again leaves as it is. Elements are coarser than the outline that is drawn first. */
+static void test_window(void **state) {
+    (void)state;
+    start(preset("sand_loose"), WEB_LEVEL, 1);
+    walk(5, 0.6f);
+    const double before = pressed_between(0.2, 1.2);
+    web_again();
+    walk(12, 1.0f);
+    const double far = (double)web_view()->link[0][3];
+    const double ahead = pressed_between(far + 1, far + 4);
+    walk(12, -1.0f);
+    const double back = (double)web_view()->link[0][3], after = pressed_between(0.2, 1.2);
+    printf("  %.3f m^2 pressed; after a way to %.2f m and back to %.2f m %.3f m^2\n", before, far,
+           back, after);
+    assert_true(far > 10 && back > 2 && back < 4.5 && before > 0.05);
+    assert_true(fabs(after / before - 1) < 0.2 && ahead == 0);
+}
+
+/* [m] The deepest elements of the two feet of a robot that stands. */
+static double standing_depth(double stiffness) {
+    web_change(stiffness, 1);
+    for (int t = 0; t < 4 * SECOND; t++) {
+        assert_false(web_step(0, 0, 0));
+    }
+    return (double)(web_view()->depth[0] + web_view()->depth[1]) / 2;
+}
+
+/* [N] The sum of what the elements press. */
+static double carried(void) {
+    const WebView *view = web_view();
+    double sum = 0;
+    for (int e = 0; e < 2 * view->elements; e++) {
+        sum += (double)view->pressure[e / view->elements][e % view->elements];
+    }
+    return sum * pow((double)view->pitch, 2);
+}
+
+static void test_sliders(void **state) {
+    (void)state;
+    double load = 0;
+    start(preset("foam45"), WEB_LEVEL, 1);
+    const double hard = standing_depth(3), plain = standing_depth(1), soft = standing_depth(0.7);
+    printf("  depth on foam45 at 0.7, 1, 3 times its stiffness: %.1f, %.1f, %.1f mm\n", 1e3 * soft,
+           1e3 * plain, 1e3 * hard);
+    /* a level sole at rest: 1.8 and 3.8 times; of k_pen alone the robot stands at 1.4 and 2.0 */
+    assert_true(soft > 1.6 * plain && plain > 2.2 * hard);
+    for (int t = 0; t < 4 * SECOND; t++) {
+        web_step(0, 0, 0);
+        load += carried() / (4 * SECOND);
+    }
+    printf("  the soles carry %.1f N of %.1f N\n", load, 9.81 * robot_total_mass(robot));
+    assert_true(fabs(load / (9.81 * robot_total_mass(robot)) - 1) < 0.03);
+    start(preset("rubber"), WEB_LEVEL, 1);
+    web_change(1, 0.05);
+    float fastest = 0;
+    for (int t = 0; t < 3 * SECOND && !web_step(0.8f, 0, 0); t++) {
+        fastest = fmaxf(fastest, web_view()->velocity[0]);
+    }
+    printf("  on ice it gets to %.2f of 0.8 m/s\n", (double)fastest);
+    assert_true(fastest < 0.6f);
+}
+
+/* It stands up where it fell, and the prints are there still. */
+static void test_again(void **state) {
+    (void)state;
+    start(preset("sand_loose"), WEB_LEVEL, 1);
+    walk(4, 0.6f);
+    const double before = pressed(), x = (double)web_view()->link[0][3];
+    web_again();
+    walk(3, 0.0f);
+    printf("  at %.2f m, then %.2f m; pressed %.3f, then %.3f m^2\n", x,
+           (double)web_view()->link[0][3], before, pressed());
+    assert_true(fabs((double)web_view()->link[0][3] - x) < 0.1);
+    assert_true(pressed() >= before);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_files),      cmocka_unit_test(test_policy),
+        cmocka_unit_test(test_same_steps), cmocka_unit_test(test_walks),
+        cmocka_unit_test(test_hills),      cmocka_unit_test(test_prints),
+        cmocka_unit_test(test_window),     cmocka_unit_test(test_sliders),
+        cmocka_unit_test(test_again),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,461 @@
+// The page: it loads the core (core.c as mild.wasm) and a robot, steps them in real time, and shows what they do.
+import { Picture } from './draw.js';
+
+const PERIOD = 0.01; // [s] policy step
+const BEHIND = 1.5; // [s] the most that is made good after a pause
+const TICK = 20; // [ms] between steps where drawing takes longer
+const STRIPE = 2.4; // [m] WEB_STRIPE
+const LEVEL = 0;
+
+// What a ground is called, and its colour as drawn.
+const GROUNDS = {
+  rubber: ['Rubber', [0.25, 0.29, 0.34]],
+  foam60: ['Foam, firm', [0.50, 0.61, 0.71]],
+  foam45: ['Foam, medium', [0.86, 0.81, 0.69]],
+  foam28: ['Foam, soft', [0.83, 0.62, 0.56]],
+  foam25: ['Foam, very soft', [0.72, 0.64, 0.79]],
+  grass: ['Grass', [0.36, 0.43, 0.23]],
+  sand_loose: ['Sand, loose', [0.86, 0.72, 0.56]],
+  sand_dense: ['Sand, dense', [0.74, 0.58, 0.43]],
+  rigid: ['Rigid floor', [0.69, 0.70, 0.69]],
+};
+const SHAPES = ['Level', 'Waves', 'Rough'];
+
+const $ = (id) => document.getElementById(id);
+const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+const wrap = (a) => a - 2 * Math.PI * Math.round(a / (2 * Math.PI));
+const options = new URLSearchParams(location.search);
+
+// ---- the core ----
+
+class Core {
+  static async load() {
+    const nothing = new Proxy({}, { get: () => () => 0 });
+    const [wasm, robot] = await Promise.all([fetch('mild.wasm'), fetch('robot.bin').then((r) => {
+      if (!r.ok) throw new Error(`robot.bin: ${r.status}`);
+      return r.arrayBuffer();
+    })]);
+    if (!wasm.ok) throw new Error(`mild.wasm: ${wasm.status}`);
+    const { instance } = await WebAssembly.instantiate(await wasm.arrayBuffer(), { env: nothing, wasi_snapshot_preview1: nothing });
+    return new Core(instance.exports, robot);
+  }
+
+  constructor(exports, robot) {
+    this.c = exports;
+    if (exports._initialize) exports._initialize();
+    const at = (exports.malloc(robot.byteLength + 16) + 15) & ~15;
+    new Uint8Array(exports.memory.buffer).set(new Uint8Array(robot), at);
+    this.check(exports.web_open(at, robot.byteLength));
+    const count = exports.mild_material_preset_count();
+    this.names = Array.from({ length: count }, (_, i) => this.text(exports.mild_material_preset_name(i))).concat('rigid');
+    this.readParts();
+  }
+
+  text(at) {
+    const bytes = new Uint8Array(this.c.memory.buffer);
+    return String.fromCharCode(...bytes.subarray(at, bytes.indexOf(0, at)));
+  }
+
+  check(message) {
+    if (message) throw new Error(this.text(message));
+  }
+
+  floats(at, count) { return new Float32Array(this.c.memory.buffer, at, count); }
+  ints(at, count) { return new Int32Array(this.c.memory.buffer, at, count); }
+
+  readParts() { // WebGeom
+    const at = this.c.web_picture(), words = 22;
+    this.parts = Array.from({ length: this.ints(at, 1)[0] }, (_, i) => {
+      const [shape, link] = this.ints(at + 4 + 4 * words * i, 2), f = this.floats(at + 12 + 4 * words * i, words - 2);
+      return {
+        shape, link, size: [...f.subarray(0, 3)], position: [...f.subarray(3, 6)], rotation: [...f.subarray(6, 15)],
+        color: [...f.subarray(15, 18)], shine: f[18], glow: f[19],
+      };
+    });
+  }
+
+  // WebView, word by word.
+  view() {
+    const start = this.c.web_view();
+    let at = start;
+    const take = (count) => { at += 4 * count; return this.floats(at - 4 * count, count); };
+    const takeInts = (count) => { at += 4 * count; return this.ints(at - 4 * count, count); };
+    const [bytes, links, elements] = takeInts(3), [pitch, cell, period] = take(3);
+    const view = {
+      links, elements, pitch, cell, period, velocity: take(3), yaw: take(1)[0], load: take(2), depth: take(2), center: take(4),
+      x: take(256), y: take(256), pressure: take(256), link: take(12 * 41), dirtyCount: takeInts(1), dirty: takeInts(4 * 64),
+    };
+    if (at - start !== bytes) throw new Error('mild.wasm and mild.js are of different builds');
+    return view;
+  }
+
+  start(ground, shape) { this.check(this.c.web_start(ground, shape, 1)); }
+  window() { return this.floats(this.c.web_window(), 1024 * 1024); }
+  hills() { return this.floats(this.c.web_hills(), 512 * 512); }
+}
+
+// ---- what the driver asks for: keys, touch, gamepad ----
+
+class Driver {
+  constructor() {
+    this.keys = new Set();
+    this.stick = [0, 0];
+    this.wanted = [0, 0, 0];
+    this.command = [0, 0, 0];
+    this.heading = null;
+    this.touched = false; // somebody has driven
+    this.again = false; // somebody wants it to stand up
+    addEventListener('keydown', (e) => {
+      if (e.target.tagName === 'INPUT' && e.key.startsWith('Arrow')) return;
+      this.keys.add(e.code);
+      if (e.code.startsWith('Arrow') || e.code === 'Space') e.preventDefault();
+    });
+    addEventListener('keyup', (e) => this.keys.delete(e.code));
+    addEventListener('blur', () => this.keys.clear());
+    this.followStick($('stick'));
+  }
+
+  followStick(stick) {
+    const knob = stick.firstElementChild, move = (e) => {
+      const box = stick.getBoundingClientRect(), r = box.width / 2;
+      let x = (e.clientX - box.left) / r - 1, y = 1 - (e.clientY - box.top) / r;
+      const n = Math.max(1, Math.hypot(x, y));
+      x /= n; y /= n;
+      this.stick = [y, x];
+      knob.style.transform = `translate(${x * 40}px, ${-y * 40}px)`;
+    };
+    stick.addEventListener('pointerdown', (e) => { stick.setPointerCapture(e.pointerId); move(e); });
+    stick.addEventListener('pointermove', (e) => { if (e.pressure > 0 || e.buttons) move(e); });
+    for (const end of ['pointerup', 'pointercancel']) {
+      stick.addEventListener(end, () => { this.stick = [0, 0]; knob.style.transform = ''; });
+    }
+  }
+
+  // [forward, left, turn], each in -1 .. 1, and whether somebody asks at all.
+  ask() {
+    const key = (...codes) => (codes.some((code) => this.keys.has(code)) ? 1 : 0);
+    const pace = key('ShiftLeft', 'ShiftRight') ? 1 : 0.55;
+    let forward = pace * (key('KeyW', 'ArrowUp') - key('KeyS', 'ArrowDown')) + this.stick[0];
+    let left = key('KeyQ') - key('KeyE'), turn = key('KeyA', 'ArrowLeft') - key('KeyD', 'ArrowRight') - this.stick[1];
+    for (const pad of navigator.getGamepads ? navigator.getGamepads() : []) {
+      if (!pad) continue;
+      const axis = (i) => (Math.abs(pad.axes[i] || 0) > 0.12 ? pad.axes[i] : 0);
+      forward -= axis(1); left -= axis(0); turn -= axis(2);
+      this.again ||= Boolean(pad.buttons[0] && pad.buttons[0].pressed);
+    }
+    this.touched ||= Boolean(forward || left || turn);
+    return [clamp(forward, -1, 1), clamp(left, -1, 1), clamp(turn, -1, 1)];
+  }
+
+  // The command of the next policy step [m/s, m/s, rad/s]: gentle changes, and the heading held where nobody turns.
+  next(yaw) {
+    const limits = [this.wanted[0] > 0 ? 1.15 : 0.9, 0.35, 1.0], rate = [1.1, 0.9, 3.0];
+    this.command = this.command.map((now, i) => now + clamp(this.wanted[i] * limits[i] - now, -rate[i] * PERIOD, rate[i] * PERIOD));
+    if (this.heading === null || this.command[2] !== 0) this.heading = yaw;
+    const moves = this.command.some((x) => Math.abs(x) > 0.1);
+    const turn = this.command[2] || (moves ? clamp(1.2 * wrap(this.heading - yaw), -0.5, 0.5) : 0);
+    return [this.command[0], this.command[1], turn];
+  }
+}
+
+// ---- what one sees beside the picture ----
+
+// Dark to bright, t in 0 .. 1.
+function heat(t) {
+  const stops = [[236, 230, 221], [169, 196, 200], [72, 140, 160], [58, 84, 128], [92, 46, 92], [200, 70, 50], [245, 140, 40]];
+  const x = clamp(t, 0, 1) * (stops.length - 1), i = Math.min(Math.floor(x), stops.length - 2);
+  return stops[i].map((a, k) => Math.round(a + (stops[i + 1][k] - a) * (x - i)));
+}
+
+const PRESSURE = 40e3; // [Pa] the end of the scale
+
+class Panel {
+  constructor(app) {
+    this.app = app;
+    this.soles = $('soles').getContext('2d');
+    $('scale').firstElementChild.style.background =
+      `linear-gradient(90deg, ${Array.from({ length: 13 }, (_, i) => `rgb(${heat(0.08 + (0.92 * i) / 12)})`).join(', ')})`;
+    this.makeGrounds();
+    for (const id of ['stiffness', 'friction']) $(id).addEventListener('input', () => this.change());
+    $('more').addEventListener('click', () => $('side').classList.toggle('on'));
+    this.change();
+  }
+
+  makeGrounds() {
+    const { app } = this, list = $('grounds'), add = (to, text, color, act) => {
+      const button = document.createElement('button'), dot = document.createElement('i');
+      if (color) { dot.style.background = color; button.append(dot); }
+      button.append(text);
+      button.addEventListener('click', () => { act(); $('picture').focus(); });
+      to.append(button);
+      return button;
+    };
+    const rgb = (c) => `rgb(${c.map((x) => Math.round(255 * x))})`, { names } = app.core;
+    const all = `conic-gradient(${names.map((n, i) => `${rgb(GROUNDS[n][1])} ${i / names.length}turn ${(i + 1) / names.length}turn`)})`;
+    this.grounds = names.map((name, i) => add(list, GROUNDS[name][0], rgb(GROUNDS[name][1]), () => app.choose(i, app.shape)));
+    this.grounds.push(add(list, 'All in stripes', all, () => app.choose(names.length, app.shape)));
+    list.prepend(this.grounds[names.length]);
+    const shapes = document.createElement('div');
+    shapes.className = 'shapes';
+    this.shapes = SHAPES.map((text, i) => add(shapes, text, null, () => app.choose(app.ground, i)));
+    list.append(shapes);
+  }
+
+  chosen() {
+    this.grounds.forEach((button, i) => button.setAttribute('aria-pressed', i === this.app.ground));
+    this.shapes.forEach((button, i) => button.setAttribute('aria-pressed', i === this.app.shape));
+  }
+
+  change() {
+    const stiffness = 4 ** Number($('stiffness').value), friction = 5 ** Number($('friction').value);
+    $('stiffness-value').textContent = `× ${stiffness.toFixed(2)}`;
+    $('friction-value').textContent = `× ${friction.toFixed(2)}`;
+    this.app.core.c.web_change(stiffness, friction);
+  }
+
+  drawSoles(view) {
+    const { soles } = this, { width, height } = soles.canvas, size = 0.94 * view.pitch, scale = height / 0.30;
+    soles.clearRect(0, 0, width, height);
+    for (let f = 0; f < 2; f++) {
+      const middle = width * (f === 0 ? 0.28 : 0.72), foot = height * 0.68;
+      let area = 0;
+      for (let e = 0; e < view.elements; e++) {
+        const pressure = view.pressure[128 * f + e];
+        const x = middle - scale * view.y[128 * f + e], y = foot - scale * view.x[128 * f + e];
+        soles.fillStyle = pressure > 0 ? `rgb(${heat(0.08 + (0.92 * pressure) / PRESSURE)})` : 'rgba(60, 50, 40, 0.07)';
+        soles.beginPath();
+        soles.roundRect(x - (scale * size) / 2, y - (scale * size) / 2, scale * size, scale * size, 5);
+        soles.fill();
+        area += pressure > 0;
+      }
+      if (area > 0) {
+        soles.strokeStyle = 'rgba(255, 255, 255, 0.95)';
+        soles.lineWidth = 4;
+        soles.beginPath();
+        soles.arc(middle - scale * view.center[2 * f + 1], foot - scale * view.center[2 * f], 9, 0, 7);
+        soles.stroke();
+      }
+      const depth = this.app.core.names[this.app.ground] === 'rigid' ? 'rigid' : `${Math.round(1e3 * view.depth[f])} mm`;
+      $(f === 0 ? 'left' : 'right').textContent = `${Math.round(view.load[f])} N · ${depth}`;
+    }
+  }
+
+  drawSpeed(view, command, pace, seconds) {
+    const place = (v) => 50 + (50 * clamp(v, -1.3, 1.3)) / 1.3;
+    const v = this.smooth = (this.smooth || 0) + (view.velocity[0] - (this.smooth || 0)) * (1 - Math.exp(-3 * seconds));
+    const zero = place(0), now = place(v);
+    $('measured').style.left = `${Math.min(zero, now)}%`;
+    $('measured').style.width = `${Math.abs(now - zero)}%`;
+    $('asked').style.left = `${place(command[0])}%`;
+    $('numbers').innerHTML = `<b>${v.toFixed(2)}</b> m/s · ${command[0].toFixed(2)} asked`;
+    $('pace').textContent = `${pace.toFixed(2)} × real time`;
+  }
+
+  say(text, seconds) {
+    const toast = $('toast');
+    toast.textContent = text;
+    toast.classList.add('on');
+    clearTimeout(this.quiet);
+    if (seconds) this.quiet = setTimeout(() => toast.classList.remove('on'), 1e3 * seconds);
+  }
+}
+
+// ---- the camera: behind the robot, at a distance, unhurried ----
+
+class Camera {
+  constructor(canvas) {
+    Object.assign(this, { turn: -0.62, tilt: 0.2, distance: 3, yaw: 0, target: null, idle: 9 });
+    const held = new Map();
+    canvas.addEventListener('pointerdown', (e) => { held.set(e.pointerId, e); canvas.setPointerCapture(e.pointerId); canvas.focus(); });
+    canvas.addEventListener('pointermove', (e) => {
+      const before = held.get(e.pointerId);
+      if (!before) return;
+      const others = [...held.values()].filter((o) => o.pointerId !== e.pointerId);
+      if (others.length) {
+        const gap = (p) => Math.hypot(p.clientX - others[0].clientX, p.clientY - others[0].clientY);
+        this.zoom(gap(before) / Math.max(gap(e), 1));
+      } else {
+        this.turn -= 0.006 * (e.clientX - before.clientX);
+        this.tilt = clamp(this.tilt + 0.005 * (e.clientY - before.clientY), -0.02, 1.35);
+      }
+      held.set(e.pointerId, e);
+    });
+    for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, (e) => held.delete(e.pointerId));
+    canvas.addEventListener('wheel', (e) => { e.preventDefault(); this.zoom(Math.exp(0.0012 * e.deltaY)); }, { passive: false });
+  }
+
+  zoom(factor) { this.distance = clamp(this.distance * factor, 0.9, 8); }
+
+  follow(base, yaw, height, seconds, drift) {
+    const goal = [base[0], base[1], 0.47 + height];
+    if (!this.target || Math.hypot(goal[0] - this.target[0], goal[1] - this.target[1]) > 1.5) { this.target = goal; this.yaw = yaw; }
+    const share = [1 - Math.exp(-seconds * 5), 1 - Math.exp(-seconds * 2.5)];
+    this.target = this.target.map((x, k) => x + (goal[k] - x) * share[k < 2 ? 0 : 1]);
+    this.yaw += wrap(yaw - this.yaw) * (1 - Math.exp(-seconds * 0.9));
+    this.turn += drift * seconds;
+    const a = this.yaw + Math.PI + this.turn, c = Math.cos(this.tilt) * this.distance;
+    return { eye: [this.target[0] + c * Math.cos(a), this.target[1] + c * Math.sin(a), this.target[2] + Math.sin(this.tilt) * this.distance],
+      target: this.target };
+  }
+}
+
+// ---- the whole ----
+
+class App {
+  constructor(core, picture) {
+    Object.assign(this, { core, picture });
+    this.ground = Number(options.get('ground') ?? core.names.length); // all in stripes
+    this.shape = Number(options.get('shape') ?? LEVEL);
+    const looks = core.names.map((name) => GROUNDS[name][1]);
+    while (looks.length < 10) looks.push([0.5, 0.5, 0.5]);
+    picture.setWorld(core.parts, looks, core.view().cell, STRIPE);
+    this.driver = new Driver();
+    this.camera = new Camera($('picture'));
+    this.panel = new Panel(this);
+    this.before = core.view().link.slice();
+    this.links = this.before.slice();
+    Object.assign(this, { owed: 0, steps: 0, time: 0, pace: 1, fallen: 0, last: null });
+    this.choose(this.ground, this.shape);
+    addEventListener('keydown', (e) => {
+      const digit = /^Digit(\d)$/.exec(e.code);
+      if (e.code === 'KeyR') this.driver.again = true;
+      if (digit && !e.repeat) this.choose(digit[1] === '0' ? core.names.length : Number(digit[1]) - 1, this.shape);
+    });
+  }
+
+  choose(ground, shape) {
+    Object.assign(this, { ground, shape, fallen: 0 });
+    this.core.start(ground, shape);
+    this.panel.change();
+    this.picture.setHills(this.core.hills(), this.core.view().period);
+    this.panel.chosen();
+    this.restart();
+  }
+
+  standUp() {
+    this.core.c.web_again();
+    this.fallen = 0;
+    this.restart();
+  }
+
+  restart() {
+    Object.assign(this.driver, { command: [0, 0, 0], heading: null, again: false });
+    this.camera.target = null;
+    this.before = this.core.view().link.slice();
+    $('toast').classList.remove('on');
+  }
+
+  // Nobody drives: it walks on its own, and wanders a little.
+  wander() {
+    const t = this.time;
+    return t < 0.8 ? [0, 0, 0] : [0.45, 0, 0.16 * Math.sin(0.21 * t)];
+  }
+
+  step() {
+    const { core, driver } = this, command = driver.next(core.view().yaw);
+    this.before.set(core.view().link);
+    this.asked = command;
+    this.steps++;
+    this.time += PERIOD;
+    if (core.c.web_step(...command) && !this.fallen) {
+      this.fallen = this.time;
+      this.panel.say('It fell. It stands up again in a moment.', 2.2);
+    }
+  }
+
+  // Called by every frame, and by a timer, so that a slow picture does not slow the robot.
+  physics(now) {
+    const seconds = this.last === null ? 0 : Math.min((now - this.last) / 1e3, BEHIND), before = this.time;
+    this.last = now;
+    this.owed = Math.min(this.owed + seconds, BEHIND);
+    const asked = this.driver.ask();
+    if (this.driver.again) this.standUp();
+    this.driver.wanted = this.script ? this.script(this.time) : this.driver.touched ? asked : this.wander();
+    while (this.owed >= PERIOD) {
+      this.owed -= PERIOD;
+      if (this.fallen) {
+        this.time += PERIOD;
+        if (this.time > this.fallen + 1.6) this.standUp();
+      } else {
+        this.step();
+      }
+    }
+    this.pace += (this.time - before - seconds * this.pace) * 0.5;
+  }
+
+  // A processor that draws, and does so slowly, rests as long as it drew.
+  rest(next) {
+    const { slow } = this.picture;
+    if (slow > 0.06) setTimeout(next, 1e3 * Math.min(slow, 0.2));
+    else next();
+  }
+
+  frame(now) {
+    const seconds = Math.min((now - (this.drawn ?? now)) / 1e3, 0.25);
+    this.drawn = now;
+    this.physics(performance.now());
+    const view = this.core.view(), share = this.owed / PERIOD;
+    for (let i = 0; i < 12 * view.links; i++) this.links[i] = this.before[i] + (view.link[i] - this.before[i]) * share;
+    if (view.dirtyCount[0]) {
+      const all = view.dirtyCount[0] < 0;
+      this.picture.setDents(this.core.window(), all ? null : Array.from({ length: view.dirtyCount[0] }, (_, i) => view.dirty.subarray(4 * i, 4 * i + 4)));
+      view.dirtyCount[0] = 0;
+    }
+    const base = [this.links[3], this.links[7], this.links[11]];
+    const camera = this.camera.follow(base, view.yaw, base[2] - 0.8, Math.max(seconds, 1e-3), this.driver.touched || this.script ? 0 : 0.05);
+    const { names } = this.core, links = this.links.subarray(0, 12 * view.links);
+    this.picture.adapt(seconds);
+    this.picture.draw(links, camera, this.ground === names.length ? -1 : this.ground, this.time);
+    if (this.driver.touched) $('hint').classList.add('gone');
+    this.panel.drawSoles(view);
+    this.panel.drawSpeed(view, this.asked || [0, 0, 0], this.pace, seconds);
+    this.rest(() => requestAnimationFrame((t) => this.frame(t)));
+  }
+}
+
+// ---- the test hook: ?test walks ten seconds and tells window.report what came of it ----
+
+function runTest(app) {
+  const speed = Number(options.get('test') || 0.6), start = performance.now();
+  let x = null;
+  app.script = () => [speed / 1.15, 0, 0];
+  app.steps = 0;
+  const watch = () => {
+    const { link } = app.core.view(), elapsed = (performance.now() - start) / 1e3;
+    if (app.steps >= 300 && !x) x = [link[3], link[7], app.steps];
+    if (elapsed < 10 || !x) { setTimeout(watch, 50); return; }
+    const report = {
+      elapsed, simulated: PERIOD * app.steps, upright: link[10], fell: app.fallen, asked: speed,
+      speed: Math.hypot(link[3] - x[0], link[7] - x[1]) / (PERIOD * (app.steps - x[2])), scale: app.picture.scale,
+    };
+    const before = performance.now();
+    for (let i = 0; i < 100; i++) app.core.c.web_step(speed, 0, 0);
+    window.report = {
+      ...report, step_ms: (performance.now() - before) / 100,
+      bytes: performance.getEntriesByType('resource').concat(performance.getEntriesByType('navigation'))
+        .reduce((sum, e) => sum + (e.transferSize || e.encodedBodySize), 0),
+    };
+  };
+  watch();
+}
+
+async function main() {
+  const loading = Core.load();
+  const picture = new Picture($('picture')); // its programs are compiled meanwhile
+  const app = new App(await loading, picture);
+  window.app = app;
+  setInterval(() => app.physics(performance.now()), TICK);
+  requestAnimationFrame((t) => {
+    app.frame(t);
+    $('veil').classList.add('clear');
+    app.ready = performance.now() / 1e3; // [s]
+    if (options.has('test')) runTest(app);
+  });
+}
+
+main().catch((error) => {
+  console.error(error);
+  $('veil').classList.add('clear');
+  $('toast').textContent = error.message;
+  $('toast').classList.add('on');
+});

@@ -1,0 +1,224 @@
+/* Writes what the page needs of a robot and its policy as one file (core.h).
+ * Usage: web_pack ROBOT_FOLDER POLICY CONFIG OUTPUT */
+#define MILD_REAL_FLOAT
+#include "web/core.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "config/experiment_keys.h"
+#include "crowd/text.h"
+#include "engine/read.h"
+#include "learn/network.h"
+#include "learn/policy.h"
+#include "robot/description.h"
+
+#define HIDDEN_GROUP 3 /* of geoms that are not drawn */
+
+static int stop(const char *text) {
+    fprintf(stderr, "web_pack: %s\n", text);
+    return 2;
+}
+
+/* ---- the robot ---- */
+
+static MildStatus pack_model(const Robot *robot, const TaskDef *task, WebModel *file,
+                             MildError *error) {
+    static double number[ENGINE_NUMBERS];
+    static EngineTree tree;
+    MildStatus status = engine_model_read(robot, task->physics_dt, &tree, number, error);
+    if (status == MILD_OK) {
+        crowd_model_fill(&tree, number, &file->model);
+        robot_fill_table(robot, &file->robot);
+        file->shape = task_shape(robot);
+        file->gravity = -robot->model->opt.gravity[2];
+        memcpy(file->task, task, sizeof file->task);
+        status = task_gains(task, robot, file->gains.kp, file->gains.kd, error);
+    }
+    for (int f = 0; status == MILD_OK && f < robot->def.feet; f++) {
+        const RobotFootDef *foot = &robot->def.foot[f];
+        WebSole *sole = &file->sole[f];
+        *sole = (WebSole){foot->outline_points, foot->elements, foot->pitch, foot->z, {0}};
+        memcpy(sole->outline, foot->outline, sizeof sole->outline);
+    }
+    return status;
+}
+
+/* The link that a body moves with, -1 for the world, and where the link is in the reference pose:
+ * its origin is the anchor of its last hinge. */
+static int link_of(const mjModel *m, const mjData *d, int body, double *origin, double *rotation) {
+    while (body > 0 && m->body_jntnum[body] == 0) {
+        body = m->body_parentid[body];
+    }
+    if (body == 0) {
+        return -1;
+    }
+    const int joint = m->body_jntadr[body] + m->body_jntnum[body] - 1;
+    const int hinge = m->jnt_type[joint] == mjJNT_HINGE;
+    mju_copy(rotation, d->xmat + 9 * body, 9);
+    mju_copy3(origin, hinge ? d->xanchor + 3 * joint : d->xpos + 3 * body);
+    return hinge ? m->jnt_dofadr[joint] - 5 : 0;
+}
+
+static int shape_of(const mjModel *m, int geom) {
+    switch (m->geom_type[geom]) {
+    case mjGEOM_BOX: return WEB_BOX;
+    case mjGEOM_CYLINDER: return WEB_CYLINDER;
+    case mjGEOM_SPHERE:
+    case mjGEOM_CAPSULE: return WEB_CAPSULE;
+    case mjGEOM_ELLIPSOID: return WEB_ELLIPSOID;
+    default: return -1;
+    }
+}
+
+static void pack_geom(const mjModel *m, const mjData *d, int id, WebModel *file) {
+    double origin[3], turn[9], way[3], position[3], rotation[9];
+    WebGeom *geom = &file->geom[file->geoms];
+    const int link = link_of(m, d, m->geom_bodyid[id], origin, turn);
+    if (m->geom_group[id] == HIDDEN_GROUP || link < 0 || shape_of(m, id) < 0 ||
+        file->geoms == WEB_GEOMS_MAX) {
+        return;
+    }
+    const int material = m->geom_matid[id];
+    const float *color = material >= 0 ? m->mat_rgba + 4 * material : m->geom_rgba + 4 * id;
+    mju_sub3(way, d->geom_xpos + 3 * id, origin);
+    mju_mulMatTVec3(position, turn, way);
+    mju_mulMatTMat(rotation, turn, d->geom_xmat + 9 * id, 3, 3, 3);
+    geom->shape = shape_of(m, id);
+    geom->link = link;
+    for (int k = 0; k < 9; k++) {
+        geom->rotation[k] = (float)rotation[k];
+    }
+    for (int k = 0; k < 3; k++) {
+        geom->size[k] = (float)m->geom_size[3 * id + k];
+        geom->position[k] = (float)position[k];
+        geom->color[k] = color[k];
+    }
+    geom->shine = material >= 0 ? m->mat_specular[material] : 0.2f;
+    geom->glow = material >= 0 ? m->mat_emission[material] : 0;
+    file->geoms++;
+}
+
+static MildStatus pack_picture(const Robot *robot, WebModel *file, MildError *error) {
+    const mjModel *m = robot->visual;
+    mjData *d = mj_makeData(m);
+    if (!d) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    }
+    mj_kinematics(m, d);
+    for (int id = 0; id < m->ngeom; id++) {
+        pack_geom(m, d, id, file);
+    }
+    mj_deleteData(d);
+    return MILD_OK;
+}
+
+/* ---- the policy ---- */
+
+/* The nearest number of 16 bits (IEEE 754), ties to even; weights are far from its limits. */
+static uint16_t pack_half(float x) {
+    const float size = fminf(fabsf(x), 65504) * 0x1p-112f;
+    uint32_t bits;
+    memcpy(&bits, &size, sizeof bits);
+    return (uint16_t)(((bits + 0xfff + (bits >> 13 & 1)) >> 13) | (x < 0 ? 0x8000 : 0));
+}
+
+static WebNetwork widths_of(const Mlp *mlp) {
+    WebNetwork network = {.layers = mlp->layers, .width = {mlp->layer[0].in}};
+    for (int l = 0; l < mlp->layers; l++) {
+        network.width[l + 1] = mlp->layer[l].out;
+    }
+    return network;
+}
+
+static uint16_t *pack_mlp(const Mlp *mlp, const float *parameters, uint16_t *to) {
+    for (int l = 0; l < mlp->layers; l++) {
+        const MlpLayer *layer = &mlp->layer[l];
+        for (int i = 0; i < layer->in; i++) {
+            for (int j = 0; j < layer->out; j++) {
+                *to++ = pack_half(parameters[layer->weight + j * layer->in + i]);
+            }
+        }
+        for (int j = 0; j < layer->out; j++) {
+            *to++ = pack_half(parameters[layer->bias + j]);
+        }
+    }
+    return to;
+}
+
+static long mlp_numbers(const Mlp *mlp) {
+    const MlpLayer *last = &mlp->layer[mlp->layers - 1];
+    return (long)(last->bias + last->out - mlp->layer[0].weight);
+}
+
+/* The weights, to be freed; NULL when out of memory. */
+static uint16_t *pack_policy(Policy *policy, WebModel *file) {
+    Network network;
+    const PolicyDef *def = policy_def(policy);
+    network_layout(&network, def, NULL);
+    file->policy = (WebPolicy){.encoder = widths_of(&network.encoder),
+                               .modulation = widths_of(&network.modulation),
+                               .actor = widths_of(&network.actor),
+                               .estimates = def->estimates,
+                               .latent = def->latent,
+                               .feet_velocity = def->feet_velocity_offset,
+                               .per_dimension = def->modulation_per_dimension};
+    file->weights = (int32_t)(mlp_numbers(&network.encoder) + mlp_numbers(&network.modulation) +
+                              mlp_numbers(&network.actor));
+    uint16_t *weights = malloc((size_t)file->weights * sizeof *weights);
+    if (weights) {
+        const float *parameters = policy_parameters(policy);
+        uint16_t *to = pack_mlp(&network.encoder, parameters, weights);
+        to = pack_mlp(&network.modulation, parameters, to);
+        pack_mlp(&network.actor, parameters, to);
+    }
+    return weights;
+}
+
+/* ---- the file ---- */
+
+static int write_file(const char *path, const WebModel *file, const uint16_t *weights) {
+    FILE *to = fopen(path, "wb");
+    const size_t count = (size_t)file->weights;
+    int good = to && fwrite(file, sizeof *file, 1, to) == 1 &&
+               fwrite(weights, sizeof *weights, count, to) == count;
+    good = to && fclose(to) == 0 && good;
+    return good ? 0 : stop("cannot write the file");
+}
+
+static int pack(const Robot *robot, Policy *policy, const TaskDef *task, const char *path,
+                MildError *error) {
+    static WebModel file;
+    const TaskShape shape = task_shape(robot);
+    memcpy(file.magic, WEB_MAGIC, sizeof file.magic);
+    file.bytes = (int32_t)sizeof file;
+    if (shape.feet != 2 || policy_def(policy)->observation != shape.observation) {
+        return stop("the page is for a biped and a policy of its own");
+    }
+    MildStatus status = pack_model(robot, task, &file, error);
+    status = status == MILD_OK ? pack_picture(robot, &file, error) : status;
+    uint16_t *weights = status == MILD_OK ? pack_policy(policy, &file) : NULL;
+    const int code = weights             ? write_file(path, &file, weights)
+                     : status == MILD_OK ? stop("out of memory")
+                                         : stop(error->text);
+    free(weights);
+    return code;
+}
+
+int main(int argc, char **argv) {
+    char unused[TRAIN_ROBOT_SIZE];
+    TaskDef task;
+    MildError error = {0};
+    if (argc != 5) {
+        return stop("usage: web_pack ROBOT_FOLDER POLICY CONFIG OUTPUT");
+    }
+    Robot *robot = robot_create(argv[1], &error);
+    Policy *policy = robot ? policy_load(argv[2], NULL, 0, &error) : NULL;
+    const int ready = policy && experiment_task(&task, 0, unused, argv[3], &error) == MILD_OK;
+    const int code = ready ? pack(robot, policy, &task, argv[4], &error) : stop(error.text);
+    policy_destroy(policy);
+    robot_destroy(robot);
+    return code;
+}
