@@ -29,6 +29,7 @@ static const struct {
     {"play", cmd_play, "watch a policy walk, in a window or as a video"},
     {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
     {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
+    {"actuator", cmd_actuator, "fit a network to logs of a robot's motors"},
     {"bench", cmd_bench, "measure speed and memory on this machine"},
     {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
 };
@@ -40,7 +41,7 @@ static void print_help(FILE *file) {
         "mild %s: soft ground for legged robots\n\nusage: mild COMMAND [options]\n\ncommands:\n",
         build_version());
     for (int i = 0; i < COMMANDS; i++) {
-        fprintf(file, "  %-8s%s\n", commands[i].name, commands[i].help);
+        fprintf(file, "  %-10s%s\n", commands[i].name, commands[i].help);
     }
     fprintf(
         file,
