@@ -194,7 +194,6 @@ static int compare(const void *a, const void *b) {
 /* The median of the times between rows. */
 static MildStatus find_interval(const Reader *reader, MildError *error) {
     RecordFile *file = reader->file;
-    const double *time = reader->record->time + file->first;
     file->rows = reader->record->rows - file->first;
     if (file->rows < 2) {
         return mild_fail(error, MILD_ERROR_FORMAT, "%.200s: at least two rows are needed",
@@ -204,6 +203,7 @@ static MildStatus find_interval(const Reader *reader, MildError *error) {
     if (!between) {
         return mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", reader->text.path);
     }
+    const double *time = reader->record->time + file->first;
     for (int i = 0; i + 1 < file->rows; i++) {
         between[i] = time[i + 1] - time[i];
     }
