@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # mild actuator, and what uses its file. Usage: test_actuator.sh PATH_TO_MILD
-source "$(dirname "$0")/../kit.sh" "$1"
 root=$(cd "$(dirname "$0")/../.." && pwd)
+source "$(dirname "$0")/../kit.sh" "$1"
 
 expect 0 'usage: mild actuator fit' "$mild" actuator --help
 bad "'' is neither fit nor log" "$mild" actuator

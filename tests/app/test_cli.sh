@@ -90,6 +90,7 @@ walk() { "$mild" eval --ground grass --trials 2 --seconds 1 "$@" --json - 2>/dev
 bad "outside" "$mild" eval --turn 1.6
 bad "outside" "$mild" eval --push=-1
 bad "nearest is 'history'" "$mild" eval --ablate histroy
+bad "unknown part 'zz'; nearest is 'z'" "$mild" eval --ablate zz
 bad "give --controller learned" "$mild" eval --controller stand --latent latent.csv --trials 1 --seconds 0.1
 bad "give --controller learned" "$mild" eval --controller zero --ablate z --trials 1 --seconds 0.1
 expect 0 '2/2' "$mild" eval --ground rigid,rubber+rigid --trials 2 --seconds 0.2 --latent latent.csv
