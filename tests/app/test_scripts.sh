@@ -20,5 +20,6 @@ printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3\n' >short
 bad "latent.py: short: .*; give what mild eval --latent wrote" latent short
 printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3,1\n' >one
 bad "latent.py: one: trials are shorter than 2.8 s or fewer than 2" latent one
-bad "paper.py: unknown experiment nosuch; there are speeds " "$python" -B "$root/scripts/paper/paper.py" nosuch
+# its figures need what scripts/paper/requirements.txt names
+"$python" -c 'import sklearn' 2>/dev/null && bad "paper.py: unknown experiment nosuch; there are speeds " "$python" -B "$root/scripts/paper/paper.py" nosuch
 finish "scripts: bad input"
