@@ -1,56 +1,30 @@
 /* The actuator network: its kinds of motors, its torque and gradient against formulas written out
  * here, its history in the task, its file; and the made-up motor. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
+#include "actuator_kit.h"
 
-#include <cmocka.h>
+#include <unistd.h>
 
 #include "actuator/actuator.h"
 #include "actuator/motor.h"
 #include "base/file.h"
-#include "base/random.h"
 #include "learn/safetensors.h"
-#include "sa01.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
 
-enum { KINDS = 3, WIDTH = 32, INPUTS = 6, NUMBERS = (INPUTS + 1) * 32 + 33 * 32 + 33 };
+enum { WIDTH = 32, INPUTS = 6, NUMBERS = (INPUTS + 1) * 32 + 33 * 32 + 33 };
 
-static Robot *robot;
 static float weights[KINDS][NUMBERS];
 static const ActuatorScale scales[KINDS] = {{0.1, 2, 30}, {0.2, 3, 40}, {0.3, 5, 6}};
 
 static int setup(void **state) {
-    (void)state;
-    MildError error = {0};
     Random r = random_at(5, 0, 0);
     for (int k = 0; k < KINDS; k++) {
         for (int i = 0; i < NUMBERS; i++) {
             weights[k][i] = (float)(0.6 * random_normal(&r));
         }
     }
-    robot = robot_create(SA01, &error);
-    return robot == NULL;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    robot_destroy(robot);
-    return 0;
-}
-
-static void expect(const char *what, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s: %.9g instead of %.9g", what, got, wanted);
-    }
+    return kit_setup(state);
 }
 
 static Actuator *make(double spacing) {
@@ -315,5 +289,5 @@ int main(void) {
         cmocka_unit_test(gradient_of_softsign), cmocka_unit_test(history_in_the_task),
         cmocka_unit_test(file_and_task),        cmocka_unit_test(made_up_motor),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, setup, kit_teardown);
 }

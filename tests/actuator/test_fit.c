@@ -1,44 +1,12 @@
 /* Logs as CSV, and fits to logs whose law is known. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "actuator_kit.h"
 
 #include "actuator/fit.h"
-#include "base/random.h"
-#include "sa01.h"
 
 #define INTERVAL 0.005 /* [s] between rows */
 #define TEXT_SIZE 400
 
-enum { KINDS = 3, LAG = 2, SECONDS = 40, ROWS = SECONDS * 200 };
-
-static Robot *robot;
-
-static int setup(void **state) {
-    (void)state;
-    MildError error = {0};
-    robot = robot_create(SA01, &error);
-    return robot == NULL;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    robot_destroy(robot);
-    return 0;
-}
-
-static void expect(const char *what, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s: %.9g instead of %.9g", what, got, wanted);
-    }
-}
+enum { LAG = 2, SECONDS = 40, ROWS = SECONDS * 200 };
 
 /* ---- logs ---- */
 
@@ -368,5 +336,5 @@ int main(void) {
         cmocka_unit_test(log_of_a_motor),      cmocka_unit_test(held_out_is_not_seen),
         cmocka_unit_test(logs_that_do_not_do),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

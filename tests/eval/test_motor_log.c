@@ -1,29 +1,14 @@
 /* From the made-up motor to a log, to the network, and back under the policy: the robot walks with
  * the network as it does with the motor. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "eval_kit.h"
 
 #include "actuator/fit.h"
 #include "actuator/motor.h"
-#include "eval/eval.h"
 #include "eval/motor_log.h"
-#include "sa01.h"
-
-#define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
 
 enum { KINDS = 3, SECONDS = 20, TRIALS = 4, GROUNDS = 3, DRIVES = 3 };
 
-static Robot *robot;
 static Pool *pool;
-static TaskDef task;
 static Motor motor;
 static Actuator *actuator;
 static ActuatorScore score[KINDS];
@@ -40,7 +25,7 @@ static char *log_text(uint64_t seed, int *falls) {
     static size_t size;
     MildError error = {0};
     Controller controller = policy();
-    MotorLogDef def = {.task = &task,
+    MotorLogDef log = {.task = &def,
                        .robot = robot,
                        .controller = &controller,
                        .motors = &motor.motors,
@@ -48,9 +33,9 @@ static char *log_text(uint64_t seed, int *falls) {
                        .shake = 0.1,
                        .seed = seed,
                        .csv = open_memstream(&text, &size)};
-    assert_non_null(def.csv);
-    assert_int_equal(motor_log(&def, falls, &error), MILD_OK);
-    fclose(def.csv);
+    assert_non_null(log.csv);
+    assert_int_equal(motor_log(&log, falls, &error), MILD_OK);
+    fclose(log.csv);
     controller_destroy(&controller);
     return text;
 }
@@ -58,20 +43,16 @@ static char *log_text(uint64_t seed, int *falls) {
 /* A network fitted to 20 s of the motor, with a history of 0, 5 and 10 ms, among which is the
  * motor's delay of 5 ms. */
 static int setup(void **state) {
-    (void)state;
     MildError error = {0};
     Record record = {0};
     ActuatorFitDef fit = actuator_fit_default();
-    const MotorDef def = motor_def_default();
+    const MotorDef made_up = motor_def_default();
     int falls;
-    robot = robot_create(SA01, &error);
     pool = pool_create(2);
-    task = task_def_default();
-    task_def_make_nominal(&task);
-    if (!robot || !pool) {
+    if (kit_setup(state) || !pool) {
         return 1;
     }
-    motor_init(&motor, &def, robot, task.physics_dt);
+    motor_init(&motor, &made_up, robot, def.physics_dt);
     char *text = log_text(1, &falls);
     FILE *csv = fmemopen(text, strlen(text), "r");
     record.robot = robot;
@@ -88,11 +69,9 @@ static int setup(void **state) {
 }
 
 static int teardown(void **state) {
-    (void)state;
     actuator_destroy(actuator);
     pool_destroy(pool);
-    robot_destroy(robot);
-    return 0;
+    return kit_teardown(state);
 }
 
 /* The log has a row per physics step, of the motor's torque; the same seed gives the same log. */
@@ -108,8 +87,8 @@ static void log_of_the_motor(void **state) {
     assert_non_null(csv);
     assert_int_equal(record_read_file(&record, csv, "log", &error), MILD_OK);
     fclose(csv);
-    assert_int_equal(record.rows, (int)(SECONDS / task.physics_dt + 0.5));
-    assert_true(fabs(record.file[0].interval - task.physics_dt) < 1e-9);
+    assert_int_equal(record.rows, (int)(SECONDS / def.physics_dt + 0.5));
+    assert_true(fabs(record.file[0].interval - def.physics_dt) < 1e-9);
     /* the PD of two rows before, less friction, within half of the effort */
     int slipping = 0;
     for (int row = 2; row < record.rows; row++) {
@@ -147,7 +126,7 @@ static void walk(const TaskActuator *motors, EvalRow row[GROUNDS]) {
     static const char *const ground[GROUNDS] = {"rigid", "foam45", "sand_loose"};
     MildError error = {0};
     const EvalDef eval = {.speed = 0.6, .trials = TRIALS, .seconds = 6, .seed = 1};
-    TaskDef own = task;
+    TaskDef own = def;
     own.motors = motors;
     Controller controller = policy();
     for (int g = 0; g < GROUNDS; g++) {
@@ -164,7 +143,7 @@ static void walk(const TaskActuator *motors, EvalRow row[GROUNDS]) {
 static void walks_as_with_the_motor(void **state) {
     (void)state;
     MildError error = {0};
-    TaskDef opened = task;
+    TaskDef opened = def;
     EvalRow row[DRIVES][GROUNDS];
     double apart[2] = {0, 0}, cost[2] = {0, 0};
     assert_int_equal(actuator_use(actuator, &opened, &error), MILD_OK);
