@@ -192,13 +192,17 @@ static MildStatus take_networks(const Safetensors *file, const char *path, Actua
 Actuator *actuator_file_read(const Safetensors *file, const char *path, const Robot *robot,
                              MildError *error) {
     Actuator *actuator = actuator_create(robot, 0, error);
-    float *parameters =
-        actuator ? calloc((size_t)actuator->kinds * (size_t)actuator_parameters(), sizeof(float))
-                 : NULL;
-    MildStatus status = !actuator ? error->status
-                        : !parameters
-                            ? mild_fail(error, MILD_ERROR_MEMORY, "out of memory")
-                            : check_texts(file, path, actuator, &actuator->spacing, error);
+    if (!actuator) {
+        return NULL;
+    }
+    const size_t count = (size_t)actuator->kinds * (size_t)actuator_parameters();
+    float *parameters = calloc(count, sizeof *parameters);
+    if (!parameters) {
+        mild_fail(error, MILD_ERROR_MEMORY, "%.200s: out of memory", path);
+        actuator_destroy(actuator);
+        return NULL;
+    }
+    MildStatus status = check_texts(file, path, actuator, &actuator->spacing, error);
     if (status == MILD_OK) {
         status = take_networks(file, path, actuator, parameters, error);
     }

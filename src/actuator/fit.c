@@ -339,16 +339,10 @@ static void print_held(const Work *work, int kinds, FILE *csv) {
     }
 }
 
-Actuator *actuator_fit(const ActuatorFitDef *def, const Record *record, Pool *pool,
-                       ActuatorScore *score, MildError *error) {
-    int kind[ROBOT_JOINTS_MAX];
-    const int kinds = actuator_kinds(record->robot, kind);
-    Actuator *actuator = actuator_create(record->robot, def->spacing, error);
-    Work *work = calloc((size_t)kinds, sizeof *work);
-    MildStatus status = !actuator ? error->status
-                        : !work   ? mild_fail(error, MILD_ERROR_MEMORY, "actuator: out of memory")
-                                  : MILD_OK;
-    for (int k = 0; status == MILD_OK && k < kinds; k++) {
+/* The kinds' work, before their samples are listed. */
+static void begin(const ActuatorFitDef *def, const Record *record, Actuator *actuator, int kinds,
+                  const int *kind, ActuatorScore *score, Work *work) {
+    for (int k = 0; k < kinds; k++) {
         work[k] = (Work){
             .def = def, .record = record, .actuator = actuator, .kind = k, .score = &score[k]};
         score[k] = (ActuatorScore){0};
@@ -356,13 +350,28 @@ Actuator *actuator_fit(const ActuatorFitDef *def, const Record *record, Pool *po
             score[k].joint++;
         }
     }
-    if (status == MILD_OK) {
-        status = fit_all(work, kinds, kind, pool, error);
+}
+
+Actuator *actuator_fit(const ActuatorFitDef *def, const Record *record, Pool *pool,
+                       ActuatorScore *score, MildError *error) {
+    int kind[ROBOT_JOINTS_MAX];
+    const int kinds = actuator_kinds(record->robot, kind);
+    Actuator *actuator = actuator_create(record->robot, def->spacing, error);
+    if (!actuator) {
+        return NULL;
     }
+    Work *work = calloc((size_t)kinds, sizeof *work);
+    if (!work) {
+        mild_fail(error, MILD_ERROR_MEMORY, "actuator: out of memory");
+        actuator_destroy(actuator);
+        return NULL;
+    }
+    begin(def, record, actuator, kinds, kind, score, work);
+    MildStatus status = fit_all(work, kinds, kind, pool, error);
     if (status == MILD_OK && def->held_out) {
         print_held(work, kinds, def->held_out);
     }
-    for (int k = 0; work && k < kinds; k++) {
+    for (int k = 0; k < kinds; k++) {
         free(work[k].sample[0]);
         free(work[k].sample[1]);
     }

@@ -159,7 +159,7 @@ static MildStatus read_row(Reader *reader, char *line, MildError *error) {
     Record *record = reader->record;
     char *cells[CSV_CELLS_MAX];
     const int count = csv_split(line, cells), row = record->rows;
-    double value[PLACES];
+    double value[PLACES] = {0};
     MildStatus status = count < 0
                             ? mild_fail(error, MILD_ERROR_FORMAT, "%.200s:%d: more than %d columns",
                                         reader->text.path, reader->text.number, CSV_CELLS_MAX)

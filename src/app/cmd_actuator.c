@@ -97,20 +97,19 @@ static MildStatus run_fit(FitCommand *command, const CliArgs *args, MildError *e
         return error->status;
     }
     Record *record = calloc(1, sizeof *record);
-    MildStatus status =
-        record ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "actuator: out of memory");
-    if (record) {
-        record->robot = robot;
+    if (!record) {
+        robot_destroy(robot);
+        return mild_fail(error, MILD_ERROR_MEMORY, "actuator: out of memory");
     }
+    record->robot = robot;
+    MildStatus status = MILD_OK;
     for (int i = 0; status == MILD_OK && i < args->positional_count; i++) {
         status = record_read(record, args->positional[i], error);
     }
     if (status == MILD_OK) {
         status = fit_record(command, record, error);
     }
-    if (record) {
-        record_free(record);
-    }
+    record_free(record);
     free(record);
     robot_destroy(robot);
     return status;
@@ -166,19 +165,19 @@ static int cmd_fit_actuator(int argc, char **argv) {
 typedef struct {
     const char *out, *robot, *policy, *controller;
     MotorDef motor;
+    Motor made_up;
+    Controller walker;
     MotorLogDef log;
     TaskDef task;
 } LogCommand;
 
-static MildStatus write_log(LogCommand *c, const Robot *robot, Controller *controller,
-                            MildError *error) {
-    Motor motor;
+static MildStatus write_log(LogCommand *c, const Robot *robot, MildError *error) {
     char *text = NULL;
     size_t size = 0;
     int falls;
-    motor_init(&motor, &c->motor, robot, c->task.physics_dt);
-    c->log.task = &c->task, c->log.robot = robot, c->log.controller = controller;
-    c->log.motors = &motor.motors;
+    motor_init(&c->made_up, &c->motor, robot, c->task.physics_dt);
+    c->log.task = &c->task, c->log.robot = robot, c->log.controller = &c->walker;
+    c->log.motors = &c->made_up.motors;
     c->log.csv = open_memstream(&text, &size);
     if (!c->log.csv) {
         return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
@@ -199,7 +198,6 @@ static MildStatus write_log(LogCommand *c, const Robot *robot, Controller *contr
 }
 
 static MildStatus run_log(LogCommand *c, MildError *error) {
-    Controller controller = {0};
     if (!c->out) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--out LOG.csv is missing");
     }
@@ -211,11 +209,11 @@ static MildStatus run_log(LogCommand *c, MildError *error) {
     task_def_make_nominal(&c->task);
     c->task.randomize.push_interval = pushes;
     const ControllerDef def = {c->policy, &c->task, robot, NULL, 1};
-    MildStatus status = controller_make(c->controller, &def, &controller, error);
+    MildStatus status = controller_make(c->controller, &def, &c->walker, error);
     if (status == MILD_OK) {
-        status = write_log(c, robot, &controller, error);
+        status = write_log(c, robot, error);
     }
-    controller_destroy(&controller);
+    controller_destroy(&c->walker);
     robot_destroy(robot);
     return status;
 }
