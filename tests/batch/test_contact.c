@@ -125,8 +125,8 @@ static double quantile(Worst *w, double share) {
     return w->force[(int)(share * (w->steps - 1))];
 }
 
-/* The forces' error that one walk in twenty, and at least one, may exceed. Errors are alike within a
- * walk: where one goes another way for a rounding, all of its steps from there on are apart. */
+/* The forces' error that one walk in twenty, and at least one, may exceed. Errors are alike within
+ * a walk: where one goes another way for a rounding, all of its steps from there on are apart. */
 static double usual_worst(Worst *w) {
     const int apart = w->steps / 20 > WALK_STEPS ? w->steps / 20 : WALK_STEPS;
     const int last = w->steps - 1 - apart;
