@@ -271,21 +271,38 @@ static int cmd_log_actuator(int argc, char **argv) {
     return run_log(&c, &error) == MILD_OK ? 0 : cli_fail("actuator log", &error);
 }
 
+/* ---- the command ---- */
+
 int cmd_actuator(int argc, char **argv) {
-    const char *what = argc > 1 ? argv[1] : "";
-    if (strcmp(what, "fit") == 0) {
+    static const CliWord words[] = {
+        {"fit", "train the network of a robot's motors on logs of its joints"},
+        {"log",
+         "log the joints of a simulated robot whose motors have friction, saturation, delay"},
+    };
+    const CliCommand command = {
+        .name = "actuator",
+        .usage = "fit LOG.csv [LOG2.csv ...] --out FILE.safetensors | log --out LOG.csv",
+        .summary = "Fits a network to the motors of a robot, for task.actuator, and logs simulated "
+                   "ones. Each of the two has a --help of its own.",
+        .words_title = "first word",
+        .words = words,
+        .word_count = sizeof words / sizeof *words,
+        .examples = "  mild actuator log --out motor.csv\n"
+                    "  mild actuator fit motor.csv --out motor.safetensors\n"
+                    "  mild eval --task.actuator=motor.safetensors\n",
+        .positional_max = 1,
+    };
+    if (argc > 1 && strcmp(argv[1], "fit") == 0) {
         return cmd_fit_actuator(argc - 1, argv + 1);
     }
-    if (strcmp(what, "log") == 0) {
+    if (argc > 1 && strcmp(argv[1], "log") == 0) {
         return cmd_log_actuator(argc - 1, argv + 1);
     }
-    if (strcmp(what, "--help") == 0 || strcmp(what, "-h") == 0) {
-        printf("usage: mild actuator fit LOG.csv [LOG2.csv ...] --out FILE.safetensors [options]\n"
-               "       mild actuator log --out LOG.csv [options]\n\n"
-               "Fits a network to the motors of a robot, and logs simulated ones. Each has a "
-               "--help of its own.\n");
-        return 0;
+    CliArgs args;
+    CliOutcome outcome = cli_parse(&command, argc, argv, &args);
+    if (outcome != CLI_RUN) {
+        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
     return cli_fail_text("actuator", "'%.40s' is neither fit nor log; see mild actuator --help",
-                         what);
+                         args.positional_count ? args.positional[0] : "");
 }

@@ -4,6 +4,7 @@ root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$(dirname "$0")/../kit.sh" "$1"
 
 expect 0 'usage: mild actuator fit' "$mild" actuator --help
+bad "unknown option --no-such" "$mild" actuator --no-such
 bad "'' is neither fit nor log" "$mild" actuator
 bad "'fti' is neither fit nor log" "$mild" actuator fti
 for what in fit log; do
