@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]; without a name all.
+# Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]
+# [actuator]; without a name all.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -77,12 +78,19 @@ terrain() {
     still "$work/terrain.mp4" docs/terrain.png "select='eq(n,125)'"
 }
 
+# Torques of a held-out second: a made-up motor, the network fitted to it, the best PD.
+actuator() {
+    "$mild" actuator log --out "$work/motor.csv"
+    "$mild" actuator fit "$work/motor.csv" --out "$work/motor.safetensors" --spacing 0.005 --figure "$work/actuator.png"
+    cp "$work/actuator.png" docs/actuator.png
+}
+
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
-    terrain | walk) "$name" ;;
+    terrain | walk | actuator) "$name" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric terrain walk; do "$0" "$each"; done ;;
-    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain walk actuator; do "$0" "$each"; done ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk actuator" >&2 && exit 2 ;;
     esac
 done

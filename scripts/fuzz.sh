@@ -23,7 +23,8 @@ export ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=4:max_malloc_fill_s
 length() {
     case $1 in
     policy | checkpoint) echo 3500 ;;
-    config | fit | history | png) echo 512 ;;
+    actuator) echo 20000 ;;
+    config | fit | history | record | png) echo 512 ;;
     *) echo 256 ;;
     esac
 }

@@ -9,9 +9,15 @@ classes together decide: the largest of mu^T S^-1 x - mu^T S^-1 mu / 2. The firs
 """
 import argparse
 import csv
-import sys
 
 START = 2.0  # [s]
+
+
+class Parser(argparse.ArgumentParser):
+    """One line for a mistake."""
+
+    def error(self, message):
+        self.exit(2, f"{self.prog}: {message}\n")
 
 
 def windows(path, seconds):
@@ -20,8 +26,8 @@ def windows(path, seconds):
     with open(path, newline="") as file:
         reader = csv.DictReader(file)
         columns = [name for name in reader.fieldnames or () if name.startswith("modulated")]
-        if not columns:
-            sys.exit(f"{path}: no columns modulated0, ...; write it by mild eval --latent")
+        if not columns or not {"ground", "trial", "speed_m_s", "time_s"} <= set(reader.fieldnames):
+            raise ValueError("has not the columns ground, trial, time_s, modulated0 and so on")
         for row in reader:
             if float(row["time_s"]) >= START:
                 key = row["ground"], row["speed_m_s"], int(row["trial"])
@@ -81,16 +87,21 @@ def classify(train, test):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("csv", help="what mild eval --latent wrote")
     parser.add_argument("--window", type=float, nargs="+", default=[0.8, 12.0], help="[s] lengths (default 0.8 12)")
     arguments = parser.parse_args()
     for seconds in arguments.window:
-        found = windows(arguments.csv, seconds)
+        try:
+            found = windows(arguments.csv, seconds)
+        except OSError as error:
+            parser.error(f"{arguments.csv}: cannot read: {error.strerror}")
+        except (ValueError, TypeError, csv.Error) as error:
+            parser.error(f"{arguments.csv}: {error}; give what mild eval --latent wrote")
         train = [row for row in found if row[1] % 3]
         test = [row for row in found if row[1] % 3 == 0]
         if not train or not test:
-            sys.exit(f"{arguments.csv}: trials are shorter than {START + seconds:g} s or fewer than 2")
+            parser.error(f"{arguments.csv}: trials are shorter than {START + seconds:g} s or fewer than 2")
         counts = classify(train, test)
         right = sum(count for (ground, named), count in counts.items() if ground == named)
         print(f"{seconds:g} s: {100 * right / len(test):.1f} % of {len(test)} windows")

@@ -3,7 +3,11 @@
 # goes on from the one before. docs/training-log.md says why there are four.
 # Usage: scripts/train_walk.sh FOLDER
 set -euo pipefail
-out=${1:?usage: scripts/train_walk.sh FOLDER}
+if [ $# -ne 1 ]; then
+    echo 'train_walk: usage: scripts/train_walk.sh FOLDER' >&2
+    exit 2
+fi
+out=$1
 mild=${MILD:-build/mild}
 config="$(dirname "$0")/../configs/walk.ini"
 

@@ -266,7 +266,7 @@ def main():
     given = parser.parse_args()
     unknown = [name for name in given.experiments if name not in EXPERIMENTS]
     if unknown:
-        parser.error(f"unknown experiment {unknown[0]}; there are {' '.join(EXPERIMENTS)}")
+        parser.exit(2, f"{parser.prog}: unknown experiment {unknown[0]}; there are {' '.join(EXPERIMENTS)}\n")
     given.config, given.models_config = ROOT / "configs/walk.ini", ROOT / "configs/models.ini"
     given.out.mkdir(parents=True, exist_ok=True)
     names = given.experiments or list(EXPERIMENTS)

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "actuator/actuator.h"
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
@@ -344,11 +345,13 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     Pool *pool = pool_create(e->threads);
     Robot *robot = pool ? robots_open(e->robot, e->config_robot, error) : NULL;
     Controller controller = {0};
+    Actuator *actuator = NULL;
     if (robot) {
         e->finish = grounds_for_robot(model, robot, &e->task, &e->terrain, args);
         e->finish.train = &e->train;
         status = check_grounds(e, error);
         status = status == MILD_OK ? check_place(e, error) : status;
+        status = status == MILD_OK ? actuator_open(&e->task, robot, &actuator, error) : status;
     } else {
         status = pool ? error->status : mild_fail(error, MILD_ERROR_MEMORY, "cannot start threads");
     }
@@ -361,6 +364,7 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
         status = evaluate(e, robot, pool, &controller, error);
     }
     controller_destroy(&controller);
+    actuator_destroy(actuator);
     robot_destroy(robot);
     pool_destroy(pool);
     return status;

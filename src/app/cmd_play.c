@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "actuator/actuator.h"
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/figure.h"
@@ -32,6 +33,7 @@ typedef struct {
     TaskDef task;
     TerrainDef terrain;
     MildMap *map;
+    Actuator *actuator;
     Scene scene;
     const char *names[MILD_MATERIALS_MAX];
     Play play;
@@ -233,7 +235,10 @@ static MildStatus prepare(Command *c, MildError *error) {
                          "--pressure: rigid ground has no elements, choose a soft one");
     }
     const ControllerDef def = {c->policy, &c->task, play->robot, NULL, 1};
-    status = controller_make(c->controller, &def, play->controller, error);
+    status = actuator_open(&c->task, play->robot, &c->actuator, error);
+    if (status == MILD_OK) {
+        status = controller_make(c->controller, &def, play->controller, error);
+    }
     if (status == MILD_OK && c->video) {
         status = make_place(c->video, error);
     }
@@ -297,6 +302,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     controller_destroy(&controller);
     robot_destroy(robot);
     mild_map_destroy(c->map);
+    actuator_destroy(c->actuator);
     return status;
 }
 

@@ -25,6 +25,7 @@ const AppCommand commands[] = {
     {"play", cmd_play, "watch a policy walk, in a window or as a video"},
     {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
     {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
+    {"actuator", cmd_actuator, "fit a network to logs of a robot's motors"},
     {"report", cmd_report, "draw the curves of training runs on one page"},
     {"bench", cmd_bench, "measure speed and memory on this machine"},
     {"info", cmd_info, "list grounds, models, config keys, versions and devices"},

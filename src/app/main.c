@@ -15,7 +15,7 @@ static void print_help(FILE *file) {
     fprintf(file, "mild %s: %s\n\nusage: mild COMMAND [options]\n\ncommands:\n", build_version(),
             commands_about);
     for (int i = 0; i < command_count; i++) {
-        fprintf(file, "  %-8s%s\n", commands[i].name, commands[i].help);
+        fprintf(file, "  %-10s%s\n", commands[i].name, commands[i].help);
     }
     fprintf(file, "\nRun `mild COMMAND --help` for the options of a command. %s\n\ntry first:\n%s",
             commands_exit, commands_examples);

@@ -103,7 +103,10 @@ Replay *bench_record_walk(const ExperimentDef *def, const Robot *robot, const ch
     if (!replay) {
         return NULL;
     }
-    MildStatus status = scene_make(&scene, ground, 1.0, error);
+    MildStatus status = task_def_check_robot(&walk.def, robot, error);
+    if (status == MILD_OK) {
+        status = scene_make(&scene, ground, 1.0, error);
+    }
     if (status == MILD_OK && model != MILD_MODEL_MILD) {
         const MildMaterial mild = scene.terrain.materials[0];
         status = robot_match_model(robot, model, &mild, &scene.terrain.materials[0], error);

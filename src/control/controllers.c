@@ -39,9 +39,16 @@ MildStatus controller_check(const char *name, MildError *error) {
 MildStatus controller_make(const char *name, const ControllerDef *def, Controller *controller,
                            MildError *error) {
     for (int i = 0; i < CONTROLLERS; i++) {
-        if (strcmp(name, controllers[i].name) == 0) {
-            return controllers[i].make(def, controller, error);
+        if (strcmp(name, controllers[i].name) != 0) {
+            continue;
         }
+        if (def->task->motors && (strcmp(name, "stand") == 0 || strcmp(name, "passivity") == 0)) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "task.actuator has no effect on controller %s, which has gains or "
+                             "torques of its own; leave out one of them",
+                             name);
+        }
+        return controllers[i].make(def, controller, error);
     }
     return controller_check(name, error);
 }

@@ -1,6 +1,7 @@
 #include "control/wrench.h"
 
 #include <math.h>
+#include <stdalign.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,13 +15,51 @@ static const double error_weight[WRENCH_SIZE] = {1, 1, 1, 0.5, 0.5, 0.5};
  * load so that each foot's centre of pressure is near its point. */
 static const double own_weight[WRENCH_SIZE] = {1e-4, 1e-4, 1e-5, 1e-2, 1e-2, 1e-2};
 
+/* [B] DAQP takes 7 kB of it for a program of this size. */
+#define MEMORY_SIZE 16384
+#define MEMORY_ALIGNMENT 16
+
 struct WrenchSolver {
+    size_t used; /* [B] of memory */
+    alignas(MEMORY_ALIGNMENT) unsigned char memory[MEMORY_SIZE];
     DAQPWorkspace work;
     DAQPProblem problem;
     WrenchProgram program;
     double x[WRENCH_NUMBERS];
     double multiplier[WRENCH_ROWS];
 };
+
+/* ---- memory of DAQP ---- */
+
+/* DAQP does not look at what malloc returns, and allocates only while a solver is set up. So its
+ * sources are compiled with these in the place of malloc, calloc and free (cmake/Daqp.cmake), and
+ * its blocks lie within the solver, whose own allocation is checked. */
+void *wrench_take(size_t size);
+void *wrench_take_zeros(size_t count, size_t size);
+void wrench_give(void *block);
+
+static _Thread_local WrenchSolver *made; /* the solver that is being set up */
+
+void *wrench_take(size_t size) {
+    const size_t whole = (size + MEMORY_ALIGNMENT - 1) / MEMORY_ALIGNMENT * MEMORY_ALIGNMENT;
+    if (!made || size > MEMORY_SIZE || whole > MEMORY_SIZE - made->used) {
+        abort(); /* another DAQP, or a setting that needs memory while it solves */
+    }
+    void *block = made->memory + made->used;
+    made->used += whole;
+    return block;
+}
+
+/* Nothing is taken twice, so it is still 0. */
+void *wrench_take_zeros(size_t count, size_t size) {
+    return wrench_take(count * size);
+}
+
+void wrench_give(void *block) {
+    (void)block;
+}
+
+/* ---- the program ---- */
 
 /* Wrench about the centre of mass of a wrench at `point`: [6][6]. */
 static void shift_map(const double point[3], double map[WRENCH_SIZE][WRENCH_SIZE]) {
@@ -133,7 +172,10 @@ WrenchSolver *wrench_solver_create(void) {
                                     .A = program->a[0],
                                     .bupper = program->high,
                                     .blower = program->low};
-    if (setup_daqp(&solver->problem, &solver->work, NULL) < 0) {
+    made = solver;
+    const int status = setup_daqp(&solver->problem, &solver->work, NULL);
+    made = NULL;
+    if (status < 0) {
         free(solver);
         return NULL;
     }
@@ -141,11 +183,7 @@ WrenchSolver *wrench_solver_create(void) {
 }
 
 void wrench_solver_destroy(WrenchSolver *solver) {
-    if (solver) {
-        free_daqp_workspace(&solver->work);
-        free_daqp_ldp(&solver->work);
-        free(solver);
-    }
+    free(solver);
 }
 
 int wrench_solve(WrenchSolver *solver, const WrenchProgram *program, double x[WRENCH_NUMBERS]) {

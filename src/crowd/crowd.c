@@ -45,6 +45,7 @@ static MildStatus check_def(const CrowdDef *def, MildError *error) {
     const char *missing = patches             ? "randomize.patch_share above 0"
                           : task->print_tiles ? "terrain.memory"
                           : !task->newton     ? "task.newton = 0"
+                          : task->motors      ? "task.actuator"
                           : def->trial && task->map && mild_map_label_count(task->map) > 1
                               ? "terrain.patches"
                               : NULL;

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "actuator/actuator.h"
 #include "config/experiment_keys.h"
 #include "train/envs.h"
 
@@ -10,7 +11,8 @@ struct MildEnvs {
     ExperimentDef def;
     Robot *robot;
     Pool *pool;
-    MildMap *map; /* NULL: level ground */
+    MildMap *map;       /* NULL: level ground */
+    Actuator *actuator; /* NULL: the joints' PD */
     TaskShape shape;
     TrainEnvs *envs;
 };
@@ -36,6 +38,9 @@ static MildStatus build(MildEnvs *envs, MildError *error) {
     }
     def->task.map = envs->map;
     def->task.print_tiles = terrain_print_tiles(&def->terrain);
+    if (actuator_open(&def->task, envs->robot, &envs->actuator, error) != MILD_OK) {
+        return error->status;
+    }
     envs->envs =
         train_envs_create(def, striped, envs->robot, envs->pool, def->train.envs, 0, error);
     return envs->envs ? MILD_OK : error->status;
@@ -75,6 +80,7 @@ void mild_envs_close(MildEnvs *envs) {
     if (envs) {
         train_envs_destroy(envs->envs);
         mild_map_destroy(envs->map);
+        actuator_destroy(envs->actuator);
         pool_destroy(envs->pool);
         robot_destroy(envs->robot);
         free(envs);

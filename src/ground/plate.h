@@ -165,7 +165,7 @@ MILD_HD void element_yield(Element *e, const ElementMemory *memory, Real dt, Rea
     const Real yield_force = share * peak * b + bed;
     const Real travel = real_min(ELEMENT_ELASTIC, b) + ELEMENT_TINY;
     const Real line = real_max(peak_force / travel, peak + law_bed_slope(&e->law, b));
-    const Real inverse = 1 / line;
+    const Real inverse = 1 / (line + ELEMENT_TINY); /* no strength: a line of no length */
     e->law.line_stiffness = share * peak;
     e->virgin_depth = b;
     e->unload_stiffness = line;

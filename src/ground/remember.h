@@ -51,7 +51,10 @@ MILD_HD Real element_peak(const Element *e, int curves, Real normal, Real speed,
     const Real slope = real_max(law_bedless_slope(&e->law, curves, at), 0) +
                        law_bed_slope(&e->law, at) + law_elastic_slope(&e->law, curves, at);
     const Real root = REAL_SQRT(force * force + 2 * slope * energy);
-    const Real way = 2 * energy / (force + root + ELEMENT_TINY);
+    if (force + root <= 0) {
+        return middle; /* ground without force, as under a trailing face: only rounding slowed it */
+    }
+    const Real way = 2 * energy / (force + root);
     const Real beyond = real_max(real_max(p, a) + way - middle, 0);
     return middle + (1 + e->recovery) / 2 * beyond;
 }

@@ -12,6 +12,7 @@ int64_t mlp_layout(Mlp *mlp, int in, const int *hidden, int out, int64_t offset)
         count++;
     }
     mlp->layers = count + 1;
+    mlp->activation = MLP_ELU;
     for (int l = 0; l <= count; l++) {
         MlpLayer *layer = &mlp->layer[l];
         layer->in = l == 0 ? in : hidden[l - 1];
@@ -76,6 +77,15 @@ static void add_bias_elu(int rows, int width, const float *restrict bias, float 
     }
 }
 
+static void add_bias_softsign(int rows, int width, const float *restrict bias, float *restrict y) {
+    for (int r = 0; r < rows; r++, y += width) {
+#pragma omp simd
+        for (int j = 0; j < width; j++) {
+            y[j] = vector_softsign(y[j] + bias[j]);
+        }
+    }
+}
+
 /* d *= slope(y), and the bias' gradient += the column sums of d. */
 static void elu_backward(int rows, int width, const float *restrict y, float *restrict d,
                          float *restrict d_bias) {
@@ -83,6 +93,17 @@ static void elu_backward(int rows, int width, const float *restrict y, float *re
 #pragma omp simd
         for (int j = 0; j < width; j++) {
             d[j] *= vector_elu_slope(y[j]);
+            d_bias[j] += d[j];
+        }
+    }
+}
+
+static void softsign_backward(int rows, int width, const float *restrict y, float *restrict d,
+                              float *restrict d_bias) {
+    for (int r = 0; r < rows; r++, y += width, d += width) {
+#pragma omp simd
+        for (int j = 0; j < width; j++) {
+            d[j] *= vector_softsign_slope(y[j]);
             d_bias[j] += d[j];
         }
     }
@@ -107,7 +128,8 @@ float *mlp_forward(const Mlp *mlp, const float *parameters, int rows, const floa
         if (l == last) {
             add_bias(rows, layer->out, parameters + layer->bias, outputs->y[l]);
         } else {
-            add_bias_elu(rows, layer->out, parameters + layer->bias, outputs->y[l]);
+            (mlp->activation == MLP_SOFTSIGN ? add_bias_softsign : add_bias_elu)(
+                rows, layer->out, parameters + layer->bias, outputs->y[l]);
         }
         x = outputs->y[l];
         ldx = layer->out;
@@ -146,7 +168,8 @@ void mlp_backward(const Mlp *mlp, const float *parameters, int rows, const float
             for (int j = 0; j < layer->in && beta == 0.0f; j++) {
                 d_bias[j] = 0.0f;
             }
-            elu_backward(rows, layer->in, outputs->y[l - 1], next, d_bias);
+            (mlp->activation == MLP_SOFTSIGN ? softsign_backward : elu_backward)(
+                rows, layer->in, outputs->y[l - 1], next, d_bias);
         }
         d = next;
     }

@@ -1,6 +1,6 @@
-/* Multilayer perceptron with ELU after every layer but the last: y = W x + b, W [out][in] as
- * PyTorch keeps it. Parameters live in a flat array that the caller owns; a layer knows its
- * offsets. */
+/* Multilayer perceptron with ELU, or softsign, after every layer but the last: y = W x + b,
+ * W [out][in] as PyTorch keeps it. Parameters live in a flat array that the caller owns; a layer
+ * knows its offsets. */
 #ifndef MILD_MLP_H
 #define MILD_MLP_H
 
@@ -16,8 +16,11 @@ typedef struct {
     int64_t weight, bias; /* offsets into the parameters */
 } MlpLayer;
 
+typedef enum { MLP_ELU, MLP_SOFTSIGN } MlpActivation;
+
 typedef struct {
     int layers;
+    MlpActivation activation; /* of the hidden layers; on a GPU always ELU */
     MlpLayer layer[MLP_LAYERS_MAX];
 } Mlp;
 
@@ -33,8 +36,8 @@ typedef struct {
     int first, count;
 } MlpInputGradient;
 
-/* hidden: zero-terminated or POLICY_LAYERS_MAX widths. Parameters start at `offset`; returns the
- * offset after them. */
+/* With ELU. hidden: zero-terminated or POLICY_LAYERS_MAX widths. Parameters start at `offset`;
+ * returns the offset after them. */
 int64_t mlp_layout(Mlp *mlp, int in, const int *hidden, int out, int64_t offset);
 int mlp_widest(const Mlp *mlp); /* the widest layer output */
 

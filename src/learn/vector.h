@@ -43,6 +43,16 @@ static inline MILD_BOTH float vector_elu_slope(float y) {
     return y > 0.0f ? 1.0f : y + 1.0f;
 }
 
+/* Softsign x / (1 + |x|), and its derivative from the output y: (1 - |y|)^2. */
+static inline MILD_BOTH float vector_softsign(float x) {
+    return x / (1.0f + (x < 0.0f ? -x : x));
+}
+
+static inline MILD_BOTH float vector_softsign_slope(float y) {
+    const float left = 1.0f - (y < 0.0f ? -y : y);
+    return left * left;
+}
+
 /* Natural logarithm to 2e-7 for normal positive x. x = 2^e m with m in [sqrt(1/2), sqrt(2)); with s
  * = (m-1)/(m+1), ln m = 2 (s + s^3/3 + s^5/5 + ...), |s| <= 0.172, cut after s^9/9. */
 static inline MILD_BOTH float vector_log(float x) {

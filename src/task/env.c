@@ -7,11 +7,17 @@
 size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
     TaskShape shape = task_shape(robot);
     return task_env_head_bytes(&shape, task_frames_held(def)) +
-           mild_ground_bytes_prints(robot_soles(robot), shape.feet, def->print_tiles);
+           mild_ground_bytes_prints(robot_soles(robot), shape.feet, def->print_tiles) +
+           (def->motors ? def->motors->bytes : 0);
 }
 
 MildGround *task_env_ground(TaskEnv *env) {
     return (MildGround *)(void *)((char *)env + task_env_head_bytes(&env->shape, env->held));
+}
+
+void *task_env_motors(TaskEnv *env) {
+    MildGround *ground = task_env_ground(env);
+    return (char *)ground + mild_ground_size(ground);
 }
 
 void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_t seed,
@@ -45,6 +51,9 @@ static void start_on_map(TaskEnv *env, const Robot *robot, RobotSim *sim) {
 static void start_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, RobotSim *sim,
                           const TaskView *view) {
     mild_ground_reset(task_env_ground(env));
+    if (def->motors) {
+        memset(task_env_motors(env), 0, def->motors->bytes);
+    }
     lend_map(env, def);
     const MildMaterial *material =
         &env->terrain.materials[mild_terrain_material_at(&env->terrain, 0, 0)];
@@ -77,15 +86,37 @@ void task_env_reset_on(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
     start_episode(env, def, robot, sim, view);
 }
 
-/* Torques of the drive within the limits of the motors: those of motors whose PD asks for them. */
+/* A torque within the limits of the motor: that of a motor whose PD asks for it. */
+static double limited(const TaskMotor *motor, double torque, double qd) {
+    const TaskMotor asked = {
+        .target = {torque}, .kp = 1, .limit = motor->limit, .fastest = motor->fastest};
+    return task_torque(&asked, 0, 0, qd);
+}
+
+/* Torques of the drive within the limits of the motors. */
 static void drive_torque(const TaskEnv *env, const TaskDrive *drive, RobotSim *sim,
                          const TaskMotor *motor, double *torque) {
     const double *qd = robot_sim_qvel(sim) + 6;
     drive->torque(drive->context, env, sim, torque);
     for (int i = 0; i < env->shape.joints; i++) {
-        const TaskMotor asked = {
-            .target = {torque[i]}, .kp = 1, .limit = motor[i].limit, .fastest = motor[i].fastest};
-        torque[i] = task_torque(&asked, 0, 0, qd[i]);
+        torque[i] = limited(&motor[i], torque[i], qd[i]);
+    }
+}
+
+/* Torques of the joints at angles q and speeds qd: of their PD, or of TaskDef.motors, which sees
+ * every step. act, late: bool, see task_motors_act and task_torque. */
+static void joint_torque(TaskEnv *env, const TaskDef *def, const TaskMotor *motor, int act,
+                         int late, const double *q, const double *qd) {
+    double error[ROBOT_JOINTS_MAX], asked[ROBOT_JOINTS_MAX];
+    if (def->motors) {
+        for (int i = 0; i < env->shape.joints; i++) {
+            error[i] = motor[i].target[late] - q[i];
+        }
+        def->motors->torque(def->motors->self, task_env_motors(env), error, qd, asked);
+    }
+    for (int i = 0; act && i < env->shape.joints; i++) {
+        env->torque[i] = def->motors ? limited(&motor[i], env->strength[i] * asked[i], qd[i])
+                                     : task_torque(&motor[i], late, q[i], qd[i]);
     }
 }
 
@@ -109,10 +140,8 @@ static int run_physics(TaskEnv *env, const TaskDef *def, const Robot *robot, Rob
             break;
         }
         const double *q = robot_sim_qpos(sim) + 7, *qd = robot_sim_qvel(sim);
-        const int act = task_motors_act(env, def, k, steps);
-        for (int i = 0; act && i < env->shape.joints; i++) {
-            env->torque[i] = task_torque(&motor[i], k < env->lag_command, q[i], qd[6 + i]);
-        }
+        joint_torque(env, def, motor, task_motors_act(env, def, k, steps), k < env->lag_command, q,
+                     qd + 6);
         if (probe && probe->drive) {
             drive_torque(env, probe->drive, sim, motor, env->torque);
         }

@@ -137,13 +137,15 @@ typedef struct {
     const TaskDrive *drive; /* NULL: the joints' PD on the actions */
 } TaskProbe;
 
-/* One block: TaskEnv, its frames, its ground memory; a multiple of 64. */
+/* One block: TaskEnv, its frames, its ground memory, the state of TaskDef.motors; a multiple of
+ * 64. */
 size_t task_env_bytes(const TaskDef *def, const Robot *robot);
 /* Frames of the ring: as many as the means of the history reach back. */
 TASK_FN uint32_t task_frames_held(const TaskDef *def);
 /* Of the block without ground memory. */
 TASK_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held);
 MildGround *task_env_ground(TaskEnv *env);
+void *task_env_motors(TaskEnv *env); /* state of TaskDef.motors */
 /* [shape.history] What the policy sees: five means of older frames, then the newest frame. */
 TASK_FN float *task_env_history(TaskEnv *env);
 /* [held][shape.observation] The ring of the last frames. */

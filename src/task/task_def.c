@@ -128,6 +128,9 @@ const MildField task_fields[] = {
     T(kp, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0,
       "[N m/rad] position gain: robot, one number, one per joint, or one per joint of a leg"),
     T(kd, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0, "[N m s/rad] as kp"),
+    T(actuator, MILD_FIELD_TEXT, TASK_GAINS_SIZE, 0, 0,
+      "[text] file of an actuator network, written by `mild actuator fit`, in the place of the PD; "
+      "empty: none"),
     T(episode, D, 1, 0.1, 1000, "[s] longest episode"),
     T(command_interval, D, 1, 0.1, 1000, "[s] time after which a new command is drawn"),
     T(vx, D, 2, -3, 3, "[m/s] forward command, low and high"),
@@ -330,6 +333,11 @@ MildStatus task_gains(const TaskDef *def, const Robot *robot, double *kp, double
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error) {
     double kp[ROBOT_JOINTS_MAX], kd[ROBOT_JOINTS_MAX];
     MildStatus status = task_def_check(def, error);
+    if (status == MILD_OK && def->actuator[0] && !def->motors) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "task.actuator = %.100s: there is no actuator network here; leave it out",
+                         def->actuator);
+    }
     return status == MILD_OK ? task_gains(def, robot, kp, kd, error) : status;
 }
 

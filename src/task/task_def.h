@@ -108,15 +108,16 @@ typedef struct {
 enum { TASK_GAINS_SIZE = 152 }; /* characters of a list of gains, as long as a config's text */
 
 typedef struct {
-    double physics_dt;        /* [s] */
-    double action_scale;      /* [rad] per unit action; 0: the robot's */
-    double action_clip;       /* [-] */
-    double torque_share;      /* [-] of the joint's effort */
-    int torque_hold;          /* bool: one torque per policy step */
-    char kp[TASK_GAINS_SIZE]; /* [N m/rad] "robot": the robot's; or numbers, see task_gains */
-    char kd[TASK_GAINS_SIZE]; /* [N m s/rad] */
-    double episode;           /* [s] */
-    double command_interval;  /* [s] */
+    double physics_dt;              /* [s] */
+    double action_scale;            /* [rad] per unit action; 0: the robot's */
+    double action_clip;             /* [-] */
+    double torque_share;            /* [-] of the joint's effort */
+    int torque_hold;                /* bool: one torque per policy step */
+    char kp[TASK_GAINS_SIZE];       /* [N m/rad] "robot": the robot's; or numbers, see task_gains */
+    char kd[TASK_GAINS_SIZE];       /* [N m s/rad] */
+    char actuator[TASK_GAINS_SIZE]; /* file of an actuator network; "": the PD */
+    double episode;                 /* [s] */
+    double command_interval;        /* [s] */
     double vx[2], vy[2], wz[2];
     double backward_share, backward_vx[2], standing_share, straight_share;
     double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
@@ -143,10 +144,22 @@ typedef struct {
     const MildMap *map; /* borrowed: shape of the ground, and the pattern of the soft one; NULL:
                            level, one material */
     int print_tiles;    /* of prints, see mild_ground_bytes_prints */
+    const struct TaskActuator *motors; /* borrowed: of the file `actuator`; NULL: the PD */
     const struct TaskGrounds *grounds; /* borrowed: what episodes draw their ground from; NULL: from
                                           the ranges */
 } TaskDef;
 typedef struct TaskGrounds TaskGrounds;
+
+/* What turns the errors of the joints into torques, in the place of their PD, on the CPU. `torque`
+ * is called at every physics step, because it may remember: [joints] target minus angle [rad] and
+ * speed [rad/s] -> [N m], before the drawn strength and the limits of the motors. state: `bytes` of
+ * the environment, a multiple of 64, all 0 when an episode begins. */
+typedef struct TaskActuator {
+    const void *self;
+    size_t bytes;
+    void (*torque)(const void *self, void *state, const double *error, const double *speed,
+                   double *torque);
+} TaskActuator;
 
 TaskDef task_def_default(void);
 /* For evaluation and play, on grounds that the caller chooses: no draw of them, no assistance. */
@@ -155,7 +168,7 @@ void task_def_choose_ground(TaskDef *def);
  * are still drawn. */
 void task_def_make_nominal(TaskDef *def);
 MildStatus task_def_check(const TaskDef *def, MildError *error);
-/* The same, and that the lists of gains fit the robot. */
+/* The same, that the lists of gains fit the robot, and that a file of an actuator has been read. */
 MildStatus task_def_check_robot(const TaskDef *def, const Robot *robot, MildError *error);
 /* Gains of each joint [robot_joints]: the robot's, or the list of the def: one number, one per
  * joint, or one per joint of a leg, which every leg repeats. */

@@ -232,6 +232,7 @@ uint64_t vec_hash(const Vec *vec) {
         hash = hash_bytes(hash, env->command, sizeof env->command);
         hash = hash_bytes(hash, &env->reward_sum, sizeof env->reward_sum);
         hash = hash_bytes(hash, task_env_ground(env), mild_ground_size(task_env_ground(env)));
+        hash = hash_bytes(hash, task_env_motors(env), vec->def.motors ? vec->def.motors->bytes : 0);
     }
     return hash;
 }

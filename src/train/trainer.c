@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "actuator/actuator.h"
 #include "base/clock.h"
 #include "base/paths.h"
 #include "gpu/learner.h"
@@ -12,8 +13,9 @@
 
 struct Trainer {
     ExperimentDef def;
-    Ranks *ranks; /* NULL: alone */
-    MildMap *map; /* NULL: level ground */
+    Ranks *ranks;       /* NULL: alone */
+    MildMap *map;       /* NULL: level ground */
+    Actuator *actuator; /* NULL: the joints' PD */
     Robot *robot;
     Pool *pool;
     Policy *policy;
@@ -28,6 +30,7 @@ void train_destroy(Trainer *trainer) {
     }
     train_envs_destroy(trainer->envs);
     mild_map_destroy(trainer->map);
+    actuator_destroy(trainer->actuator);
     ppo_destroy(trainer->ppo);
     policy_destroy(trainer->policy);
     pool_destroy(trainer->pool);
@@ -97,6 +100,9 @@ static MildStatus make_envs(Trainer *trainer, MildError *error) {
     trainer->stream = gpu_learner_stream(trainer->ppo);
     trainer->def.task.map = trainer->map;
     trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
+    if (actuator_open(&trainer->def.task, trainer->robot, &trainer->actuator, error) != MILD_OK) {
+        return error->status;
+    }
     trainer->envs =
         train_envs_create(def, striped, trainer->robot, trainer->pool,
                           ppo_batch(trainer->ppo)->envs, ppo_first_env(trainer->ppo), error);

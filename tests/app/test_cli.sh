@@ -6,7 +6,7 @@ expect 0 'usage: mild COMMAND' "$mild" --help
 expect 0 'mild [0-9]*\.[0-9]*\.[0-9]*' "$mild" --version
 expect 2 'usage: mild COMMAND' "$mild"
 bad "nearest is 'press'" "$mild" pres
-for command in train eval play press fit report bench info web; do
+for command in train eval play press fit actuator report bench info web; do
     expect 0 "usage: mild $command" "$mild" "$command" --help
     bad "unknown option --no-such" "$mild" "$command" --no-such
 done
@@ -90,6 +90,7 @@ walk() { "$mild" eval --ground grass --trials 2 --seconds 1 "$@" --json - 2>/dev
 bad "outside" "$mild" eval --turn 1.6
 bad "outside" "$mild" eval --push=-1
 bad "nearest is 'history'" "$mild" eval --ablate histroy
+bad "unknown part 'zz'; nearest is 'z'" "$mild" eval --ablate zz
 bad "give --controller learned" "$mild" eval --controller stand --latent latent.csv --trials 1 --seconds 0.1
 bad "give --controller learned" "$mild" eval --controller zero --ablate z --trials 1 --seconds 0.1
 expect 0 '2/2' "$mild" eval --ground rigid,rubber+rigid --trials 2 --seconds 0.2 --latent latent.csv

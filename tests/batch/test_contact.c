@@ -105,7 +105,7 @@ static void case_of(ContactCase *c, const Kit *kit, int groups, int per, double 
     case_memory(c, kit->ground, 1);
 }
 
-enum { STEPS_MAX = 100000 };
+enum { STEPS_MAX = 100000, WALK_STEPS = 40 };
 
 /* Worst values over many steps, and the errors of all their forces. */
 typedef struct {
@@ -123,6 +123,15 @@ static int ascending(const void *a, const void *b) {
 static double quantile(Worst *w, double share) {
     qsort(w->force, (size_t)w->steps, sizeof *w->force, ascending);
     return w->force[(int)(share * (w->steps - 1))];
+}
+
+/* The forces' error that one walk in twenty, and at least one, may exceed. Errors are alike within
+ * a walk: where one goes another way for a rounding, all of its steps from there on are apart. */
+static double usual_worst(Worst *w) {
+    const int apart = w->steps / 20 > WALK_STEPS ? w->steps / 20 : WALK_STEPS;
+    const int last = w->steps - 1 - apart;
+    qsort(w->force, (size_t)w->steps, sizeof *w->force, ascending);
+    return w->force[last > 0 ? last : 0];
 }
 
 static double distance(const double *a, const double *b, int count, double scale) {
@@ -217,10 +226,10 @@ static void compare_planes(Worst *worst, const ContactCase *c, const Kit *kit) {
 
 static void worst_print(const char *name, Worst *w) {
     print_message(
-        "%-26s %5d steps, %d left out: force median %.1e, 99 %% %.1e; worst: wrench %.1e, "
+        "%-26s %5d steps, %d left out: force median %.1e, 95 %% %.1e; worst: wrench %.1e, "
         "twist %.1e, foot %.1e, elements %.1e, memory %.1e; Newton steps %.2f (%.2f)\n",
-        name, w->steps, w->unsolved, quantile(w, 0.5), quantile(w, 0.99), w->wrench, w->twist,
-        w->foot, w->element, w->memory, (double)w->iterations / w->steps,
+        name, w->steps, w->unsolved, quantile(w, 0.5), usual_worst(w), w->wrench, w->twist, w->foot,
+        w->element, w->memory, (double)w->iterations / w->steps,
         (double)w->iterations_ground / w->steps);
 }
 
@@ -323,7 +332,7 @@ static void run_shape(const Shape *shape, int walks, double tolerance, void (*ru
         }
         kit.input.tolerance = 1e-11;
         kit.terrain.height = kit_uniform(&random, -0.002, 0.002);
-        walk(&kit, &random, 40, tolerance, shape->groups, shape->per, 0, run, worst);
+        walk(&kit, &random, WALK_STEPS, tolerance, shape->groups, shape->per, 0, run, worst);
         kit_close(&kit);
     }
 }
@@ -356,7 +365,7 @@ static void float_text_is_near_it(void **state) {
         worst = (Worst){0};
         run_shape(&shapes[i], kit_draws(20), 1e-4, contact_case_float, &worst);
         worst_print(shapes[i].name, &worst);
-        assert_true(quantile(&worst, 0.5) < 1e-5 && quantile(&worst, 0.99) < 2e-2);
+        assert_true(quantile(&worst, 0.5) < 1e-5 && usual_worst(&worst) < 1e-3);
         assert_true(worst.twist < 5e-3 && worst.unsolved < worst.steps / 20);
         assert_true(worst.memory < 10.0); /* nothing has run away */
     }
@@ -484,7 +493,8 @@ static void run_relief(const Relief *relief, int walks, double tolerance,
         kit.input.tolerance = 1e-11;
         kit_random_state(&kit, &random);
         stand_above(&kit, relief, &random);
-        walk(&kit, &random, 40, tolerance, relief->groups, relief->per, relief->exact, run, worst);
+        walk(&kit, &random, WALK_STEPS, tolerance, relief->groups, relief->per, relief->exact, run,
+             worst);
         kit_close(&kit);
         mild_map_destroy(map);
     }
@@ -511,7 +521,7 @@ static void float_text_is_near_it_on_maps(void **state) {
         run_relief(&reliefs[i], kit_draws(20), 1e-4, contact_map_float, &worst);
         worst_print(reliefs[i].name, &worst);
         assert_true(quantile(&worst, 0.5) < (reliefs[i].exact ? 3e-6 : 1e-5));
-        assert_true(quantile(&worst, 0.99) < 1e-3);
+        assert_true(usual_worst(&worst) < 1e-3);
         assert_true(worst.twist < 5e-3 && worst.unsolved < worst.steps / 20);
         assert_true(worst.memory < 10.0);
     }

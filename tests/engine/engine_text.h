@@ -44,6 +44,7 @@ typedef struct {
     double next_position[ROBOT_FEET_MAX][3]; /* [m] of the feet after the step */
     int newton;                              /* steps of the constraints' solver */
     int bad;
+    int overrun; /* bool: engine_save wrote behind EngineSaved */
 } EngineResult;
 
 typedef void EngineText(const EngineTree *tree, const double *number, const EngineCase *in,

@@ -216,6 +216,7 @@ static void note_step(const Kit *kit, Worst worst) {
         note(worst, NEXT_POSE, fabs(got - oracle.qpos[i]));
     }
     assert_int_equal(result.bad, 0);
+    assert_int_equal(result.overrun, 0);
     for (int n = 0; n < 3 * kit->tree.feet; n++) {
         note(worst, NEXT_FEET,
              fabs(result.next_position[n / 3][n % 3] - oracle.next_position[n / 3][n % 3]));

@@ -1,43 +1,12 @@
 /* Trials by the batch engine against those that MuJoCo steps: the same rows within the noise of a
  * few trials, whatever the number of threads and of other rows. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "eval_kit.h"
 
 #include "batch/batch.h"
-#include "eval/eval.h"
-#include "sa01.h"
 
 enum { ROWS = 4 };
 
-static Robot *robot;
-static TaskDef def;
 static MildModel model; /* that grounds are matched to */
-
-static int setup(void **state) {
-    (void)state;
-    MildError error = {0};
-    robot = robot_create(SA01, &error);
-    def = task_def_default();
-    task_def_make_nominal(&def);
-    if (!robot) {
-        fprintf(stderr, "%s\n", error.text);
-    }
-    return robot == NULL;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    robot_destroy(robot);
-    return 0;
-}
 
 /* What the policy's place is asked and answers. */
 typedef struct {
@@ -375,5 +344,5 @@ int main(void) {
         cmocka_unit_test(commands_arrive),
         cmocka_unit_test(what_is_not_there_is_refused),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

@@ -1,17 +1,5 @@
 /* Scenes by name, the heading hold, and trials: who falls, who does not, which random numbers. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include "eval/eval.h"
-#include "sa01.h"
+#include "eval_kit.h"
 
 static void scenes_by_name(void **state) {
     (void)state;
@@ -100,24 +88,6 @@ static void heading_is_held(void **state) {
     }
 }
 
-static Robot *robot;
-
-static int setup(void **state) {
-    (void)state;
-    MildError error = {0};
-    robot = robot_create(SA01, &error);
-    if (!robot) {
-        fprintf(stderr, "%s\n", error.text);
-    }
-    return robot == NULL;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    robot_destroy(robot);
-    return 0;
-}
-
 /* The paper's gains do not balance (docs/task.md section 3): a policy of zeros must fall, and be
  * counted as fallen. What it was asked is written down. */
 typedef struct {
@@ -144,8 +114,6 @@ static void zero_destroy(void *self) {
 
 static EvalRow run(Zero *zero, const char *ground, EvalDef eval, int threads) {
     MildError error = {0};
-    TaskDef def = task_def_default();
-    task_def_make_nominal(&def);
     *zero = (Zero){0};
     Controller controller = {zero, "zero", zero_act, zero_destroy, NULL, NULL};
     Pool *pool = pool_create(threads);
@@ -243,17 +211,13 @@ static void time_is_rounded_to_steps(void **state) {
 
 static EvalRow walk(double seconds, double stop) {
     MildError error = {0};
-    TaskDef def = task_def_default();
-    task_def_make_nominal(&def);
     Controller controller;
     EvalDef eval = {.speed = 0.5, .trials = 2, .seconds = seconds, .stop = stop, .seed = 1};
     Scene scene;
     EvalRow row;
     char line[256];
     assert_int_equal(scene_make(&scene, "foam60", 2, &error), MILD_OK);
-    assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, NULL,
-                                        2, &controller, &error),
-                     MILD_OK);
+    assert_int_equal(controller_learned(POLICY, robot, NULL, 2, &controller, &error), MILD_OK);
     Pool *pool = pool_create(1);
     assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
                      MILD_OK);
@@ -281,21 +245,17 @@ static void the_shipped_policy_walks(void **state) {
 static void a_row_is_what_its_trials_did(void **state) {
     (void)state;
     MildError error = {0};
-    TaskDef def = task_def_default(), longer;
-    task_def_make_nominal(&def);
-    longer = def;
+    TaskDef shorter = def, longer = def;
+    shorter.episode = 1;
     longer.episode = 3;
-    def.episode = 1;
     const EvalDef eval = {.speed = 0.5, .sideways = 0.05, .trials = 2, .seconds = 3, .seed = 7};
     Controller controller;
-    assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, NULL,
-                                        2, &controller, &error),
-                     MILD_OK);
+    assert_int_equal(controller_learned(POLICY, robot, NULL, 2, &controller, &error), MILD_OK);
     Scene scene;
     assert_int_equal(scene_make(&scene, "foam60", 2, &error), MILD_OK);
     Pool *pool = pool_create(1);
     EvalRow row, own;
-    assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
+    assert_int_equal(eval_run(&shorter, robot, pool, &controller, &scene, &eval, &row, &error),
                      MILD_OK);
     pool_destroy(pool);
 
@@ -368,14 +328,11 @@ static void walk_pushed(Noting *noting, double push) {
     MildError error = {0};
     const EvalDef eval = {
         .speed = 0.3, .push = push, .trials = PUSHED, .seconds = PUSH_STEPS * 0.01, .seed = 1};
-    TaskDef def = task_def_default();
-    task_def_make_nominal(&def);
     Scene scene;
     EvalRow row;
     Pool *pool = pool_create(2);
     assert_int_equal(scene_make(&scene, "rubber", 2, &error), MILD_OK);
-    assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, pool,
-                                        PUSHED, &noting->inner, &error),
+    assert_int_equal(controller_learned(POLICY, robot, pool, PUSHED, &noting->inner, &error),
                      MILD_OK);
     Controller controller = {noting, "noting", noting_act, NULL, NULL, NULL};
     assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
@@ -409,17 +366,13 @@ static void pushes_come_every_four_seconds(void **state) {
 
 static EvalRow walk_on(const char *ground) {
     MildError error = {0};
-    TaskDef def = task_def_default();
-    task_def_make_nominal(&def);
     Controller controller;
     const EvalDef eval = {.speed = 0.5, .trials = 3, .seconds = 5, .seed = 1};
     Scene scene;
     EvalRow row;
     Pool *pool = pool_create(2);
     assert_int_equal(scene_make(&scene, ground, 50, &error), MILD_OK);
-    assert_int_equal(controller_learned(MILD_SOURCE_DIR "/policies/mild.safetensors", robot, pool,
-                                        3, &controller, &error),
-                     MILD_OK);
+    assert_int_equal(controller_learned(POLICY, robot, pool, 3, &controller, &error), MILD_OK);
     assert_int_equal(eval_run(&def, robot, pool, &controller, &scene, &eval, &row, &error),
                      MILD_OK);
     controller_destroy(&controller);
@@ -461,5 +414,5 @@ int main(void) {
         cmocka_unit_test(the_shipped_policy_walks),
         cmocka_unit_test(speed_is_measured_until_the_stop),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

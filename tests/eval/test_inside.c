@@ -1,43 +1,13 @@
 /* What passes inside a policy, along a walk: the columns of the CSV against the policy's file and
  * the formulas of the paper, and the means of an ablation. */
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
+#include "eval_kit.h"
 
 #include "eval/inside.h"
 #include "learn/policy.h"
-#include "sa01.h"
-
-#define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
 
 enum { TRIALS = 2, STEPS = 150, LATENT = 16, TEXTS = 2, COLUMNS = 5 + 2 * LATENT + 2 + 11 };
 enum { SPEED = 2, TIME, PHASE, Z, MODULATED = Z + LATENT, THETA = MODULATED + LATENT };
 enum { ESTIMATES = THETA + 2 };
-
-static Robot *robot;
-static TaskDef def;
-
-static int setup(void **state) {
-    (void)state;
-    MildError error = {0};
-    robot = robot_create(SA01, &error);
-    def = task_def_default();
-    task_def_make_nominal(&def);
-    return robot == NULL;
-}
-
-static int teardown(void **state) {
-    (void)state;
-    robot_destroy(robot);
-    return 0;
-}
 
 /* A walk over a border at x = 0.2, whose decisions are logged. */
 static char *log_walk(InsideLog *log, Controller *controller) {
@@ -212,5 +182,5 @@ int main(void) {
         cmocka_unit_test(the_columns),
         cmocka_unit_test(the_numbers_are_the_policys),
     };
-    return cmocka_run_group_tests(tests, setup, teardown);
+    return cmocka_run_group_tests(tests, kit_setup, kit_teardown);
 }

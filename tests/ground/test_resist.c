@@ -2,6 +2,7 @@
  * coefficients. */
 #include "ground_kit.h"
 
+#include "ground/begin.h"
 #include "ground/resist.h"
 
 #define PI 3.14159265358979323846
@@ -244,10 +245,84 @@ static void test_shaken(void **state) {
     mild_sole_destroy(sole);
 }
 
+/* No element remembers 3 mm more than it has been deep and can go in a step: not where its face
+ * trails, so that nothing but rounding stops it, nor on ground without strength. */
+static void test_remembered_depth(void **state) {
+    (void)state;
+    static const double zeta[] = {100, 0}; /* stiff and deep: there rounding is felt most */
+    const double dt = 5e-3;
+    MildSole *sole = kit_plate(5, 3);
+    uint64_t random = 12;
+    for (int model = MILD_MODEL_ECC_QUASI; model <= MILD_MODEL_ECC_QUASI_3D; model++) {
+        double most = 0;
+        for (int draw = 0; draw < kit_draws(2000); draw++) {
+            MildMaterial mild = mild_material_default(), m;
+            Kit kit;
+            double deepest = 0, fastest = 0;
+            assert_int_equal(mild_model_match((MildModel)model, &mild, sole, 50, &m, NULL),
+                             MILD_OK);
+            m.zeta *= zeta[draw % 8 == 0];
+            m.bed_depth = 10;
+            kit_open(&kit, 1, sole, NULL, &m, dt);
+            kit_random_state(&kit, &random);
+            kit.input.position[0][2] -= kit_uniform(&random, 0, 0.1);
+            if (draw % 2) { /* lifted while it goes the way that its face does not */
+                const double *R = kit.input.rotation[0];
+                kit.input.velocity[0][0] = 20 * R[2];
+                kit.input.velocity[0][1] = 20 * R[5];
+                kit.input.velocity[0][2] = kit_uniform(&random, -0.3, 0);
+            }
+            for (int step = 0; step < 20; step++) {
+                const double pull = 10 * kit.mass[0];
+                const double force[1][3] = {
+                    {kit_uniform(&random, -pull, pull), kit_uniform(&random, -pull, pull),
+                     kit_uniform(&random, draw % 2 ? pull : -pull, 3 * pull)}};
+                const double *v = kit.input.velocity[0];
+                fastest = fmax(fastest, fabs(v[2]) + 0.15 * hypot(v[3], v[4]));
+                kit_step(&kit, force);
+                fastest = fmax(fastest, fabs(v[2]) + 0.15 * hypot(v[3], v[4]));
+                const double *depth = mild_ground_depth_max(kit.ground, 0);
+                /* of the lowest corner of the plate, 60 mm from its middle */
+                const double *R = kit.input.rotation[0];
+                const double low =
+                    -kit.input.position[0][2] - R[8] * KIT_SOLE_Z + 0.06 * hypot(R[6], R[7]);
+                deepest = fmax(deepest, low);
+                for (int e = 0; e < mild_sole_elements(sole); e++) {
+                    assert_true(isfinite(depth[e]));
+                    most = fmax(most, depth[e] - deepest - dt * fastest);
+                }
+            }
+            kit_close(&kit);
+        }
+        print_message("%-12s remembers at most %.2e m more than it has been\n",
+                      mild_model_names[model], most);
+        assert_true(most < 3e-3);
+    }
+    mild_sole_destroy(sole);
+}
+
+/* Ground without strength has no line to unload on: it is of no length, at the depth reached. */
+static void test_no_strength(void **state) {
+    (void)state;
+    const double dt = 5e-3, rotation[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    const Plate plate = plate_of(rotation);
+    for (int bed = 0; bed < 2; bed++) {
+        Element e = {.depth = 0.02, .law = {.bed_depth = bed ? 0.015 : 10, .bed_stiffness = 1e4}};
+        const ElementMemory memory = {.depth_max = 0.021, .middle = 0.0195};
+        element_begin(&e, &memory, LAW_LINE, dt, 1 / dt, 0.1);
+        element_resist(&e, &memory, &plate, 1, LAW_LINE, dt, 1 / dt, 0, 0, 0, 0.1);
+        assert_true(isfinite(e.zero_depth) && isfinite(e.unload_stiffness));
+        assert_true(fabs(e.yield_depth - 0.021) < 1e-12);
+        const double held = e.unload_stiffness * (e.yield_depth - e.zero_depth);
+        assert_true(fabs(held - (bed ? 1e4 * 0.006 : 0)) < 1e-9);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_published), cmocka_unit_test(test_signs),
-        cmocka_unit_test(test_symmetry), cmocka_unit_test(test_contact_step),
-        cmocka_unit_test(test_shaken)};
+        cmocka_unit_test(test_published),  cmocka_unit_test(test_signs),
+        cmocka_unit_test(test_symmetry),   cmocka_unit_test(test_contact_step),
+        cmocka_unit_test(test_shaken),     cmocka_unit_test(test_remembered_depth),
+        cmocka_unit_test(test_no_strength)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -135,6 +135,60 @@ static void torque(void **unused) {
     rig_close(&rig);
 }
 
+/* Motors that ask for 10 N m/rad of the error, 1000 of joint 0, and count the steps of an episode
+ * in their state. */
+static void ask_for_error(const void *self, void *state, const double *error, const double *speed,
+                          double *torque) {
+    int *steps = state;
+    assert_ptr_equal(self, &rig);
+    assert_int_equal((size_t)(uintptr_t)state % 64, 0);
+    (*steps)++;
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        assert_true(speed[i] == robot_sim_qvel(rig.sim)[6 + i]);
+        torque[i] = (i == 0 ? 1000 : 10) * error[i];
+    }
+}
+
+/* The motors of the task take the place of the PD: times the strength, within the limits, with the
+ * command's latency; held they are asked all the same; a new episode begins with a state of 0. */
+static void motors(void **unused) {
+    (void)unused;
+    const TaskActuator asked = {&rig, 64, ask_for_error};
+    TaskDef def = kit_quiet_def();
+    def.motors = &asked;
+    for (int hold = 0; hold < 2; hold++) {
+        def.torque_hold = hold;
+        rig_open(&rig, &def, 3, 0);
+        rig_start(&rig, 0.5, 0, 0);
+        rig.env->lag_command = 2;
+        const int *steps = task_env_motors(rig.env);
+        float action[2][SA01_JOINTS];
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            rig.env->strength[i] = 1 + 0.01 * i;
+            rig.env->motor_offset[i] = 0.01 * i;
+            action[0][i] = 0.1f * (float)(i + 1);
+            action[1][i] = -0.05f * (float)(i + 2);
+        }
+        traced_step(action[0]);
+        traced_step(action[1]);
+        assert_int_equal(*steps, 8);
+        for (int k = 1; k <= 4; k++) {
+            const int from = hold ? 2 : k - 1, late = k - 1 < 2;
+            for (int i = 0; i < SA01_JOINTS && !(hold && late); i++) {
+                const double target =
+                    robot_default_pose(robot)[i] + 0.5 * (double)action[!late][i] + 0.01 * i;
+                const double wanted =
+                    (1 + 0.01 * i) * (i == 0 ? 1000 : 10) * (target - trace.q[from][i]);
+                expect_entry("torque", i, trace.torque[k][i], fmin(fmax(wanted, -119), 119), 1e-9);
+            }
+        }
+        assert_true(fabs(trace.torque[4][0]) > 30);
+        rig_start(&rig, 0.5, 0, 0);
+        assert_int_equal(*steps, 0);
+        rig_close(&rig);
+    }
+}
+
 /* +-8; what is no number becomes -8. The two actions before are kept. */
 static void action_is_clipped(void **unused) {
     (void)unused;
@@ -413,6 +467,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(torque),
         cmocka_unit_test(drive),
+        cmocka_unit_test(motors),
         cmocka_unit_test(action_is_clipped),
         cmocka_unit_test(torque_is_held),
         cmocka_unit_test(latencies),

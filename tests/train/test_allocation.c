@@ -15,6 +15,7 @@
 
 #include <cmocka.h>
 
+#include "actuator/fit.h"
 #include "control/controller.h"
 #include "lab/fit_csv.h"
 #include "mild/map.h"
@@ -164,6 +165,48 @@ static int attempt_controller(MildError *error) {
     return made;
 }
 
+static int attempt_passivity(MildError *error) {
+    const TaskDef task = task_def_default();
+    const ControllerDef def = {NULL, &task, walker, NULL, 2};
+    Controller controller = {0};
+    int made = controller_make("passivity", &def, &controller, error) == MILD_OK;
+    controller_destroy(&controller);
+    return made;
+}
+
+/* A log of 11 s and its network. */
+static int attempt_actuator(MildError *error) {
+    char *text = NULL;
+    size_t size;
+    double zero[SA01_JOINTS] = {0};
+    FILE *csv = open_memstream(&text, &size);
+    assert_non_null(csv);
+    record_print_header(walker, csv);
+    for (int row = 0; row < 1100; row++) {
+        record_print_row(SA01_JOINTS, 0.01 * row, zero, zero, zero, csv);
+    }
+    fclose(csv);
+    FILE *file = fmemopen(text, size, "r");
+    assert_non_null(file);
+    Record record = {.robot = walker};
+    const ActuatorFitDef def = {.spacing = 0.01, .steps = 1};
+    ActuatorScore score[SA01_JOINTS];
+    Pool *pool = pool_create(1);
+    Actuator *actuator = NULL;
+    if (!pool) {
+        mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    } else if (record_read_file(&record, file, "log", error) == MILD_OK) {
+        actuator = actuator_fit(&def, &record, pool, score, error);
+    }
+    int made = actuator != NULL;
+    actuator_destroy(actuator);
+    pool_destroy(pool);
+    record_free(&record);
+    fclose(file);
+    free(text);
+    return made;
+}
+
 static int attempt_record(MildError *error) {
     char text[2000] = "depth_m,force_n\n";
     for (int i = 0; i < 40; i++) {
@@ -224,6 +267,8 @@ static void test_every_allocation_may_fail(void **state) {
     fail_each("record", attempt_record);
     fail_each("robot", attempt_robot);
     fail_each("policy", attempt_controller);
+    fail_each("passivity", attempt_passivity);
+    fail_each("actuator", attempt_actuator);
     fail_each("trainer", attempt_trainer);
 }
 

@@ -1,0 +1,43 @@
+/* What the tests of the actuator share: the robot, comparisons that name what differs. */
+#ifndef ACTUATOR_KIT_H
+#define ACTUATOR_KIT_H
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/random.h"
+#include "robot/robot.h"
+#include "sa01.h"
+
+enum { KINDS = 3 }; /* of the robot's motors */
+
+static Robot *robot;
+
+static inline int kit_setup(void **state) {
+    (void)state;
+    MildError error = {0};
+    robot = robot_create(SA01, &error);
+    return robot == NULL;
+}
+
+static inline int kit_teardown(void **state) {
+    (void)state;
+    robot_destroy(robot);
+    return 0;
+}
+
+static inline void expect(const char *what, double got, double wanted, double tolerance) {
+    if (!(fabs(got - wanted) <= tolerance)) {
+        fail_msg("%s: %.9g instead of %.9g", what, got, wanted);
+    }
+}
+
+#endif

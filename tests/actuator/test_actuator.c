@@ -1,0 +1,293 @@
+/* The actuator network: its kinds of motors, its torque and gradient against formulas written out
+ * here, its history in the task, its file; and the made-up motor. */
+#include "actuator_kit.h"
+
+#include <unistd.h>
+
+#include "actuator/actuator.h"
+#include "actuator/motor.h"
+#include "base/file.h"
+#include "learn/safetensors.h"
+
+#define GO1 MILD_SOURCE_DIR "/robots/go1"
+#define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
+
+enum { WIDTH = 32, INPUTS = 6, NUMBERS = (INPUTS + 1) * 32 + 33 * 32 + 33 };
+
+static float weights[KINDS][NUMBERS];
+static const ActuatorScale scales[KINDS] = {{0.1, 2, 30}, {0.2, 3, 40}, {0.3, 5, 6}};
+
+static int setup(void **state) {
+    Random r = random_at(5, 0, 0);
+    for (int k = 0; k < KINDS; k++) {
+        for (int i = 0; i < NUMBERS; i++) {
+            weights[k][i] = (float)(0.6 * random_normal(&r));
+        }
+    }
+    return kit_setup(state);
+}
+
+static Actuator *make(double spacing) {
+    MildError error = {0};
+    Actuator *actuator = actuator_create(robot, spacing, &error);
+    assert_non_null(actuator);
+    for (int k = 0; k < KINDS; k++) {
+        actuator_set(actuator, k, scales[k], weights[k]);
+    }
+    return actuator;
+}
+
+/* Hip roll and yaw, hip pitch and knee, both ankles; of the quadruped, thighs and calves. */
+static void kinds_of_motors(void **state) {
+    (void)state;
+    MildError error = {0};
+    int kind[ROBOT_JOINTS_MAX];
+    Robot *go1 = robot_create(GO1, &error);
+    assert_non_null(go1);
+    assert_int_equal(actuator_kinds(robot, kind), KINDS);
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        assert_int_equal(kind[i], i % 6 / 2);
+    }
+    assert_int_equal(actuator_kinds(go1, kind), 2);
+    for (int i = 0; i < 12; i++) {
+        assert_int_equal(kind[i], i % 3 == 2);
+    }
+    robot_destroy(go1);
+}
+
+/* W2 s(W1 s(W0 x + b0) + b1) + b2, s(x) = x/(1 + |x|), W [out][in]. */
+static double formula(const float *w, const double *x) {
+    double first[WIDTH], second[WIDTH];
+    const float *b0 = w + INPUTS * WIDTH, *w1 = b0 + WIDTH, *b1 = w1 + WIDTH * WIDTH;
+    const float *w2 = b1 + WIDTH;
+    double sum = (double)w2[WIDTH];
+    for (int o = 0; o < WIDTH; o++) {
+        double y = (double)b0[o];
+        for (int i = 0; i < INPUTS; i++) {
+            y += (double)w[o * INPUTS + i] * x[i];
+        }
+        first[o] = y / (1 + fabs(y));
+    }
+    for (int o = 0; o < WIDTH; o++) {
+        double y = (double)b1[o];
+        for (int i = 0; i < WIDTH; i++) {
+            y += (double)w1[o * WIDTH + i] * first[i];
+        }
+        second[o] = y / (1 + fabs(y));
+        sum += (double)w2[o] * second[o];
+    }
+    return sum;
+}
+
+static double wanted_torque(int joint, const double *error, const double *speed) {
+    const int k = joint % 6 / 2;
+    double x[INPUTS];
+    for (int t = 0; t < 3; t++) {
+        x[t] = error[t] / scales[k].error;
+        x[3 + t] = speed[t] / scales[k].speed;
+    }
+    return scales[k].torque * formula(weights[k], x);
+}
+
+static void torque_is_the_network(void **state) {
+    (void)state;
+    Actuator *actuator = make(0.01);
+    Random r = random_at(6, 0, 0);
+    assert_int_equal(actuator_parameters(), NUMBERS);
+    for (int i = 0; i < 100; i++) {
+        double error[3], speed[3];
+        for (int t = 0; t < 3; t++) {
+            error[t] = random_uniform(&r, -0.5, 0.5);
+            speed[t] = random_uniform(&r, -8, 8);
+        }
+        const int joint = i % SA01_JOINTS;
+        expect("torque", actuator_torque(actuator, joint, error, speed),
+               wanted_torque(joint, error, speed), 2e-4);
+    }
+    actuator_destroy(actuator);
+}
+
+/* The learner's own forward pass gives the formula, and its gradient the differences of the
+ * formula. */
+static void gradient_of_softsign(void **state) {
+    (void)state;
+    enum { ROWS = 3 };
+    const Mlp mlp = actuator_mlp();
+    float x[ROWS][INPUTS], y[3][ROWS * WIDTH], slope[ROWS], work[2][ROWS * WIDTH];
+    float gradient[NUMBERS];
+    double at[ROWS][INPUTS], worst = 0;
+    Random r = random_at(7, 0, 0);
+    const MlpOutputs outputs = {{y[0], y[1], y[2]}};
+    const MlpInputGradient none = {NULL, 0, 0};
+    float *const areas[2] = {work[0], work[1]};
+    for (int b = 0; b < ROWS; b++) {
+        slope[b] = (float)(b + 1) / 2;
+        for (int i = 0; i < INPUTS; i++) {
+            x[b][i] = (float)random_normal(&r);
+            at[b][i] = (double)x[b][i];
+        }
+    }
+    const float *out = mlp_forward(&mlp, weights[0], ROWS, x[0], INPUTS, &outputs);
+    for (int b = 0; b < ROWS; b++) {
+        expect("forward", (double)out[b], formula(weights[0], at[b]), 1e-5);
+    }
+    mlp_backward(&mlp, weights[0], ROWS, x[0], INPUTS, &outputs, slope, areas, gradient, 0, none);
+    for (int i = 0; i < NUMBERS; i++) {
+        float copy[NUMBERS];
+        double difference = 0;
+        memcpy(copy, weights[0], sizeof copy);
+        for (int side = -1; side <= 1; side += 2) {
+            copy[i] = weights[0][i] + (float)side * 0x1p-7f;
+            for (int b = 0; b < ROWS; b++) {
+                difference += side * (double)slope[b] * formula(copy, at[b]);
+            }
+        }
+        worst = fmax(worst, fabs(difference * 0x1p6 - (double)gradient[i]));
+    }
+    printf("gradient: worst difference %.1e, bound 2e-3\n", worst);
+    assert_true(worst < 2e-3);
+}
+
+/* Steps of 2.5 ms: the network sees t, t - 4 steps and t - 8 steps; what came before the first step
+ * is taken to be as in it. */
+static void history_in_the_task(void **state) {
+    (void)state;
+    enum { STEPS = 40, LAG = 4 };
+    MildError error = {0};
+    TaskDef task = task_def_default();
+    Actuator *actuator = make(0.01);
+    double errors[STEPS][SA01_JOINTS], speeds[STEPS][SA01_JOINTS], torque[SA01_JOINTS];
+    Random r = random_at(8, 0, 0);
+    assert_int_equal(actuator_use(actuator, &task, &error), MILD_OK);
+    assert_int_equal(task.motors->bytes % 64, 0);
+    void *memory = aligned_alloc(64, task.motors->bytes + 64);
+    assert_non_null(memory);
+    memset(memory, 0, task.motors->bytes);
+    memset((char *)memory + task.motors->bytes, 77, 64);
+    for (int k = 0; k < STEPS; k++) {
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            errors[k][i] = random_uniform(&r, -0.5, 0.5);
+            speeds[k][i] = random_uniform(&r, -8, 8);
+        }
+        task.motors->torque(task.motors->self, memory, errors[k], speeds[k], torque);
+        for (int i = 0; i < SA01_JOINTS; i++) {
+            double e[3], v[3];
+            for (int t = 0; t < 3; t++) {
+                const int then = k - t * LAG > 0 ? k - t * LAG : 0;
+                e[t] = errors[then][i];
+                v[t] = speeds[then][i];
+            }
+            expect("torque", torque[i], wanted_torque(i, e, v), 2e-4);
+        }
+    }
+    for (int i = 0; i < 64; i++) {
+        assert_int_equal(((char *)memory)[task.motors->bytes + (size_t)i], 77);
+    }
+    free(memory);
+    actuator_destroy(actuator);
+}
+
+static void refused(const char *pattern, const TaskDef *task) {
+    MildError error = {0};
+    TaskDef copy = *task;
+    Actuator *actuator;
+    assert_int_not_equal(actuator_open(&copy, robot, &actuator, &error), MILD_OK);
+    if (!strstr(error.text, pattern)) {
+        fail_msg("no '%s' in: %s", pattern, error.text);
+    }
+    actuator_destroy(actuator);
+}
+
+static void file_and_task(void **state) {
+    (void)state;
+    char path[] = "/tmp/mild_actuator_XXXXXX";
+    const int made = mkstemp(path);
+    assert_true(made >= 0);
+    close(made);
+    MildError error = {0};
+    TaskDef task = task_def_default();
+    Actuator *actuator = make(0.01), *read;
+    assert_int_equal(actuator_open(&task, robot, &read, &error), MILD_OK); /* no file: the PD */
+    assert_null(read);
+    assert_null(task.motors);
+    assert_int_equal(actuator_save(actuator, path, "a note", &error), MILD_OK);
+    snprintf(task.actuator, sizeof task.actuator, "%s", path);
+    TaskDef opened = task;
+    assert_int_equal(actuator_open(&opened, robot, &read, &error), MILD_OK);
+    assert_non_null(opened.motors);
+    for (int i = 0; i < SA01_JOINTS; i++) {
+        const double e[3] = {0.1, -0.2, 0.05 * i}, v[3] = {1, -3, 2};
+        assert_true(actuator_torque(read, i, e, v) == actuator_torque(actuator, i, e, v));
+    }
+    actuator_destroy(read);
+    /* what does not fit */
+    TaskDef wrong = task;
+    wrong.physics_dt = 0.004;
+    refused("whole multiple", &wrong);
+    wrong = task;
+    strcpy(wrong.kd, "5");
+    refused("task.kp and task.kd", &wrong);
+    wrong = task;
+    snprintf(wrong.actuator, sizeof wrong.actuator, "%s", POLICY);
+    refused("holds no actuator network", &wrong);
+    strcpy(wrong.actuator, "/tmp/there/is/none");
+    refused("task.actuator: /tmp/there/is/none", &wrong);
+    Robot *go1 = robot_create(GO1, &error);
+    assert_non_null(go1);
+    assert_null(actuator_load(path, go1, &error));
+    assert_non_null(strstr(error.text, "of robot sa01, and this is go1"));
+    robot_destroy(go1);
+    size_t size;
+    char *bytes = file_read(path, 1 << 20, &size, &error);
+    assert_non_null(bytes);
+    bytes[size / 2] ^= 1;
+    assert_int_equal(file_write(path, bytes, size, &error), MILD_OK);
+    refused("checksum", &task);
+    assert_int_equal(file_write(path, bytes, size / 2, &error), MILD_OK);
+    refused(path, &task);
+    free(bytes);
+    unlink(path);
+    actuator_destroy(actuator);
+}
+
+/* Numbers of the hip pitch: kp 70, kd 7, effort 140 N m, 25 rad/s. */
+static void made_up_motor(void **state) {
+    (void)state;
+    enum { JOINT = 2 };
+    Motor motor;
+    const MotorDef def = {.delay = 0.005, .coulomb = 0.02, .viscous = 0.1, .peak = 0.5};
+    double error[SA01_JOINTS] = {0}, speed[SA01_JOINTS] = {0}, torque[SA01_JOINTS];
+    motor_init(&motor, &def, robot, 0.0025);
+    void *memory = aligned_alloc(64, motor.motors.bytes);
+    assert_non_null(memory);
+    memset(memory, 0, motor.motors.bytes);
+    const struct {
+        double error, speed, torque;
+    } steps[] = {
+        {0.5, 0, 35}, /* the first step stands for those before */
+        {0.1, 0, 35},
+        {0.2, 1, 35 - 140 * (0.02 * tanh(1 / 0.3) + 0.1 / 25)},
+        {3.0, 0, 7},
+        {3.0, 0, 7},                                        /* 70 0.2 - 7 1 */
+        {3.0, 20, 70 * 0.4 - 140 * (0.02 + 0.1 * 20 / 25)}, /* 2 (1 - 20/25) of 70 N m */
+        {3.0, -20, 70 + 140 * (0.02 + 0.1 * 20 / 25)},      /* brakes with all of it */
+        {0, 0, 70},
+    };
+    for (size_t k = 0; k < sizeof steps / sizeof *steps; k++) {
+        error[JOINT] = steps[k].error;
+        speed[JOINT] = steps[k].speed;
+        motor.motors.torque(motor.motors.self, memory, error, speed, torque);
+        expect("motor", torque[JOINT], steps[k].torque, 1e-9);
+        assert_true(torque[0] == 0);
+    }
+    free(memory);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(kinds_of_motors),      cmocka_unit_test(torque_is_the_network),
+        cmocka_unit_test(gradient_of_softsign), cmocka_unit_test(history_in_the_task),
+        cmocka_unit_test(file_and_task),        cmocka_unit_test(made_up_motor),
+    };
+    return cmocka_run_group_tests(tests, setup, kit_teardown);
+}

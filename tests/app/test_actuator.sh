@@ -1,0 +1,76 @@
+#!/usr/bin/env bash
+# mild actuator, and what uses its file. Usage: test_actuator.sh PATH_TO_MILD
+root=$(cd "$(dirname "$0")/../.." && pwd)
+source "$(dirname "$0")/../kit.sh" "$1"
+
+expect 0 'usage: mild actuator fit' "$mild" actuator --help
+bad "unknown option --no-such" "$mild" actuator --no-such
+bad "'' is neither fit nor log" "$mild" actuator
+bad "'fti' is neither fit nor log" "$mild" actuator fti
+for what in fit log; do
+    expect 0 "usage: mild actuator $what" "$mild" actuator $what --help
+    bad "unknown option --no-such" "$mild" actuator $what --no-such
+    bad "out .* is missing" "$mild" actuator $what
+done
+
+# logs
+expect 0 '12 s, 0 falls, written: motor.csv' "$mild" actuator log --out motor.csv --seconds 12
+expect 0 '6 s, .* falls' "$mild" actuator log --out go1.csv --seconds 6 --robot go1 --controller zero --seed 2
+[ "$(wc -l <motor.csv)" = 4801 ] && [ "$(head -1 motor.csv | tr ',' '\n' | wc -l)" = 37 ] || fail "rows or columns of motor.csv"
+"$mild" actuator log --out - --seconds 12 2>/dev/null | cmp -s - motor.csv || fail "the same seed, another log"
+bad "outside" "$mild" actuator log --out x.csv --peak 0
+bad "policy is for robot sa01\|robot" "$mild" actuator log --out x.csv --robot go1
+bad "cannot be written" "$mild" actuator log --out none/x.csv
+
+# fits
+expect 0 'leg_l5_joint .* kp ' "$mild" actuator fit motor.csv --out motor.safetensors --spacing 0.005 --steps 300 --figure torque.png
+[ -s torque.png ] && [ "$(head -1 torque_held.csv)" = "joint,time_s,measured_nm,network_nm,pd_fit_nm,pd_nm" ] ||
+    fail "figure or its numbers"
+expect 0 'leg_l5_joint' "$mild" actuator fit motor.csv --out again.safetensors --spacing 0.005 --steps 300 --threads 1
+cmp -s motor.safetensors again.safetensors || fail "another number of threads, another network"
+expect 0 'leg_l5_joint' "$mild" actuator fit motor.csv --out again.safetensors --spacing 0.005 --steps 300 --seed 2
+! cmp -s motor.safetensors again.safetensors || fail "--seed does nothing"
+expect 0 'FL_hip_joint' "$mild" actuator fit go1.csv --robot go1 --out go1.safetensors --steps 50
+bad "no log is given" "$mild" actuator fit --out x.safetensors
+bad "none.csv: cannot read" "$mild" actuator fit none.csv --out x.safetensors
+bad "go1.csv:1: no column names a joint of robot sa01" "$mild" actuator fit go1.csv --out x.safetensors
+bad "no whole multiple" "$mild" actuator fit motor.csv --out x.safetensors --spacing 0.007
+head -c 20000 motor.csv >short.csv
+bad "short.csv:[0-9]*: leg_.* is not a finite number" "$mild" actuator fit short.csv --out x.safetensors
+head -200 motor.csv >short.csv
+bad "100 of each are needed" "$mild" actuator fit short.csv --out x.safetensors
+bad "motor.csv" "$mild" actuator fit motor.csv --out motor.csv
+
+# the key
+eval_row() { "$mild" eval --ground sand_loose --trials 1 --seconds 3 "$@" | tail -1; }
+[ "$(eval_row)" != "$(eval_row --task.actuator=motor.safetensors)" ] || fail "task.actuator does nothing in eval"
+expect 0 'sand_loose .* 1/1 ' eval_row --task.actuator=motor.safetensors
+expect 0 'sole pressure' "$mild" play --ground sand_loose --seconds 3 --pressure p.csv --task.actuator=motor.safetensors
+train() { # the last override wins
+    "$mild" train --train.envs=2 --train.iterations=2 --ppo.steps=4 --ppo.minibatches=2 "$@"
+}
+expect 0 iteration train --out plain
+expect 0 iteration train --out with --task.actuator=motor.safetensors
+! cmp -s <(tail -c 4096 plain/policy.safetensors) <(tail -c 4096 with/policy.safetensors) || fail "task.actuator does nothing in train"
+grep -q '^actuator = motor.safetensors$' with/config.ini || fail "task.actuator is not in config.ini"
+expect 0 iteration "$mild" train --out with --resume --train.iterations=4
+expect 0 iteration train --out whole --task.actuator=motor.safetensors --train.iterations=4
+# but for the header, whose note names the command
+numbers() { tail -c +$(($(od -An -t u8 -N 8 "$1") + 9)) "$1"; }
+cmp -s <(numbers whole/policy.safetensors) <(numbers with/policy.safetensors) || fail "a resumed run has other bits"
+for command in eval "play --pressure p.csv" "train --out x"; do
+    bad "go1.safetensors: is an actuator network of robot go1, and this is sa01" "$mild" $command --task.actuator=go1.safetensors
+    bad "task.actuator: none.safetensors: cannot read" "$mild" $command --task.actuator=none.safetensors
+    bad "holds no actuator network" "$mild" $command "--task.actuator=$root/policies/mild.safetensors"
+    bad "is not a whole multiple of task.physics_dt = 0.002" "$mild" $command --task.actuator=motor.safetensors --task.physics_dt=0.002
+    bad "leave them at robot" "$mild" $command --task.actuator=motor.safetensors --task.kp=60
+done
+head -c 3000 motor.safetensors >cut.safetensors
+bad "cut.safetensors" "$mild" eval --task.actuator=cut.safetensors
+bad "task.actuator is not there on a device" "$mild" eval --task.actuator=motor.safetensors --train.robots=batch
+bad "task.actuator is not there on a device" "$mild" train --out x --task.actuator=motor.safetensors --train.robots=batch \
+    --randomize.patch_share=0 --train.envs=2
+bad "no effect on controller stand" "$mild" eval --controller stand --speed 0 --task.actuator=motor.safetensors
+bad "no effect on controller passivity" "$mild" eval --controller passivity --task.actuator=motor.safetensors
+bad "there is no actuator network here" "$mild" bench walk --task.actuator=motor.safetensors
+finish "actuator: logs, fits, the key"

@@ -1,0 +1,42 @@
+/* What the tests of trials share: the robot, the nominal task, the shipped policy's path. */
+#ifndef EVAL_KIT_H
+#define EVAL_KIT_H
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "eval/eval.h"
+#include "sa01.h"
+
+#define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
+
+static Robot *robot;
+static TaskDef def; /* nominal; what a test changes it puts back */
+
+static inline int kit_setup(void **state) {
+    (void)state;
+    MildError error = {0};
+    robot = robot_create(SA01, &error);
+    def = task_def_default();
+    task_def_make_nominal(&def);
+    if (!robot) {
+        fprintf(stderr, "%s\n", error.text);
+    }
+    return robot == NULL;
+}
+
+static inline int kit_teardown(void **state) {
+    (void)state;
+    robot_destroy(robot);
+    return 0;
+}
+
+#endif
