@@ -29,6 +29,7 @@ static const struct {
     {"play", cmd_play, "watch a policy walk, in a window or as a video"},
     {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
     {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
+    {"export", cmd_export, "write a policy as an ONNX graph or as C, to run it elsewhere"},
     {"bench", cmd_bench, "measure speed and memory on this machine"},
     {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
 };
