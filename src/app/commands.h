@@ -9,6 +9,7 @@ int cmd_play(int argc, char **argv);
 int cmd_press(int argc, char **argv);
 int cmd_fit(int argc, char **argv);
 int cmd_export(int argc, char **argv);
+int cmd_drive(int argc, char **argv);
 int cmd_bench(int argc, char **argv);
 int cmd_info(int argc, char **argv);
 

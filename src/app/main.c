@@ -30,6 +30,7 @@ static const struct {
     {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
     {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
     {"export", cmd_export, "write a policy as an ONNX graph or as C, to run it elsewhere"},
+    {"drive", cmd_drive, "run a policy for a robot over UDP, or be that robot, simulated"},
     {"bench", cmd_bench, "measure speed and memory on this machine"},
     {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
 };

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# `mild export`: the C and the ONNX graph that it writes do what `mild eval` did, faults in the C are noticed, bad input leaves nothing.
+# What `mild export` writes, C and ONNX, does what `mild eval` did; faults in the C are noticed; bad input leaves nothing.
 # Usage: test_export.sh PATH_TO_MILD PYTHON ONNX, ONNX: ON when the program was built with it
 tests=$(realpath "$(dirname "$0")")
 source "$tests/../kit.sh" "$1"
