@@ -204,22 +204,23 @@ static MildStatus run_runner(Drive *d, const Robot *robot, MildError *error) {
 
 /* ---- the simulated robot ---- */
 
-static MildStatus walk_on(Drive *d, const Robot *robot, const Scene *scene, MildError *error) {
+static MildStatus walk_on(const Drive *d, const Robot *robot, const Scene *scene,
+                          MildError *error) {
     Udp udp = {.file = -1};
-    SimulatedDef *def = &d->simulated;
+    SimulatedDef def = d->simulated;
     SimulatedReport report;
-    def->robot = robot;
-    def->task = &d->task;
-    def->terrain = &scene->terrain;
-    def->rigid = scene->rigid;
-    def->udp = &udp;
-    def->lockstep = d->lockstep;
-    def->seconds = d->seconds > 0 ? d->seconds : 3600;
-    def->delay_share = d->delay.value[0];
-    def->delay = d->delay.value[1];
+    def.robot = robot;
+    def.task = &d->task;
+    def.terrain = &scene->terrain;
+    def.rigid = scene->rigid;
+    def.udp = &udp;
+    def.lockstep = d->lockstep;
+    def.seconds = d->seconds > 0 ? d->seconds : 3600;
+    def.delay_share = d->delay.value[0];
+    def.delay = d->delay.value[1];
     MildStatus status = udp_connect(&udp, "connect", d->connect ? d->connect : ADDRESS, error);
     if (status == MILD_OK) {
-        status = simulated_run(def, &report, error);
+        status = simulated_run(&def, &report, error);
     }
     udp_close(&udp);
     if (status != MILD_OK) {

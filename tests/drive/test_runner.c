@@ -20,7 +20,8 @@
 enum { JOINTS = 12 };
 
 static Robot *robot;
-static TaskDef task;
+static TaskDef task,
+    noisy; /* the environment's; the runner's, which adds no noise to a robot's own */
 static const double forward[3] = {0.5, 0, 0};
 
 static int setup(void **state) {
@@ -30,6 +31,7 @@ static int setup(void **state) {
     task = task_def_default();
     task_def_make_nominal(&task);
     task.randomize.latency[0] = task.randomize.latency[1] = 0;
+    noisy = task;
     task.observe_noise = 0;
     return robot == NULL;
 }
@@ -40,19 +42,23 @@ static int teardown(void **state) {
     return 0;
 }
 
-static Runner *make_runner(void) {
+static Runner *make_runner_with(double torque_share) {
     MildError error = {0};
     const RunnerDef def = {.policy = POLICY,
                            .robot = robot,
-                           .task = &task,
+                           .task = &noisy,
                            .late = 0.02,
                            .damp_after = 0.1,
                            .speed_limit = 30,
                            .angle_limit = 0.2,
-                           .torque_share = 1};
+                           .torque_share = torque_share};
     Runner *runner = runner_create(&def, &error);
     assert_non_null(runner);
     return runner;
+}
+
+static Runner *make_runner(void) {
+    return make_runner_with(1);
 }
 
 /* A robot that stands upright in its default pose. */
@@ -224,6 +230,7 @@ static void old_states(void **unused) {
     give(runner, &state, 0.005);
     state = standing(11, 0.0025);
     give(runner, &state, 0.006);
+    state = standing(12, 0.005); /* the newest once more */
     give(runner, &state, 0.007);
     const TargetPacket target = tick(runner, 0.01, forward);
     assert_int_equal(target.answers, 12);
@@ -330,6 +337,21 @@ static void limits(void **unused) {
     }
 }
 
+/* A tenth of the torque: 11.9 N m at the knee, which is 1.5 rad off and moves. */
+static void a_share_of_the_torque(void **unused) {
+    (void)unused;
+    Runner *runner = make_runner_with(0.1);
+    StatePacket state = standing(1, 0);
+    state.angle[3] += 1.5f;
+    state.speed[3] = -2;
+    give(runner, &state, 0);
+    const TargetPacket target = tick(runner, 0, forward);
+    const double asked = 70 * (double)(target.angle[3] - state.angle[3]) - 7 * -2.0;
+    assert_true(fabs((double)target.limit[3] - 11.9) < 1e-4 && fabs(asked + 11.9) < 1e-3);
+    assert_true(runner_report(runner)->targets_limited >= 1);
+    runner_destroy(runner);
+}
+
 /* Commands end at the task's ranges, and what is no number is 0: by the action that comes out. */
 static void commands(void **unused) {
     (void)unused;
@@ -416,6 +438,7 @@ int main(void) {
         cmocka_unit_test(late_states),
         cmocka_unit_test(a_dead_robot),
         cmocka_unit_test(limits),
+        cmocka_unit_test(a_share_of_the_torque),
         cmocka_unit_test(commands),
         cmocka_unit_test(garbage),
         cmocka_unit_test(the_end),
