@@ -103,8 +103,8 @@ int udp_same(const struct sockaddr_in *a, const struct sockaddr_in *b) {
 }
 
 void udp_send(const Udp *udp, const uint8_t *bytes, size_t size) {
-    if (udp->has_peer && sendto(udp->file, bytes, size, 0, (const struct sockaddr *)&udp->peer,
-                                sizeof udp->peer) < 0) {
-        return;
+    if (udp->has_peer) {
+        (void)sendto(udp->file, bytes, size, 0, (const struct sockaddr *)&udp->peer,
+                     sizeof udp->peer);
     }
 }

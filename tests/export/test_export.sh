@@ -15,8 +15,8 @@ printf '[task]\nphysics_dt = 0.005\nobserve_noise = false\n[randomize]\nlatency 
 # another policy: other widths, one theta for each dimension of z, another task; every tensor random, so that nothing is 0 or 1
 "$python" "$tests/make_policy.py" "$root/policies/mild.safetensors" other.safetensors || fail "make_policy.py"
 other=(--task.history_stride=3 --task.gait_period=0.7 --task.action_clip=0.6 --task.action_scale=0.3 --task.standing_below=0.5)
-"$mild" eval --policy other.safetensors "${other[@]}" --config exact.ini --ground foam45 --trials 2 --seconds 1 --stop 0.2 --actions other.csv \
-    >/dev/null || fail "eval of another policy"
+"$mild" eval --policy other.safetensors "${other[@]}" --config exact.ini --ground foam45 --trials 2 --seconds 1 --stop 0.2 \
+    --actions other.csv >/dev/null || fail "eval of another policy"
 
 # near OUTPUT NAME: the error that the example prints for NAME is below 1e-5
 near() {
