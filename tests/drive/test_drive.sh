@@ -135,6 +135,32 @@ wait "$peer" || fail "the robot of stopped"
 holds stopped.json end 'x == "signal"'
 holds stopped_robot.json end 'x == "runner"'
 
+# a state as docs/drive.md makes it in Python: taken, and answered
+start snippet --damp-after 0.1
+"$python" - "$address" "$tests/../../docs/drive.md" <<'PY' || fail "the packet of docs/drive.md"
+import re, socket, struct, sys, zlib
+host, port = sys.argv[1].split(":")
+sequence, answers, microseconds = 5, 0, 123456
+quaternion, omega = [1, 0, 0, 0], [0, 0, 0]
+angles, speeds = [0, 0, -0.24, 0.48, -0.24, 0] * 2, [0] * 12
+page = open(sys.argv[2], encoding="utf-8").read()
+lines = re.findall(r"^    ((?:body|packet) .*)", page, re.M)
+assert len(lines) == 3
+exec("\n".join(lines))
+robot = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+robot.settimeout(60)
+robot.sendto(packet, (host, int(port)))
+target = robot.recv(4096)
+assert len(packet) == 152 and len(target) == 220
+assert target[:4] == b"MILD" and target[4:8] == bytes([1, 2, 12, 1])
+assert struct.unpack("<I", target[12:16])[0] == sequence
+assert struct.unpack("<I", target[-4:])[0] == zlib.crc32(target[:-4])
+kp = struct.unpack("<12f", target[24 + 48 : 24 + 96])
+assert kp == (50, 50, 70, 70, 20, 20) * 2
+PY
+ended 2
+holds snippet.json received 'x == 1'
+
 # keys of a terminal: x damps
 "$python" - "$mild" <<'PY' || fail "keys"
 import os, pty, subprocess, sys, time

@@ -57,6 +57,18 @@ def worst(program, trials, own):
     return {"action": action, "observation": observation}
 
 
+def check_shapes():
+    """The table of tensors on the page."""
+    names = {}
+    exec(compile(text, "policy.py", "exec"), names)
+    tensors = names["read"](policy)
+    for net in "encoder", "modulation", "actor":
+        weights = [name for name in tensors if name.startswith(net) and name.endswith("weight")]
+        places = f"`{net}.0 " + " ".join("." + name.split(".")[1] for name in weights[1:]) + "`"
+        shapes = " ".join(str(list(tensors[name].shape)) for name in weights)
+        assert f"| {places} | {shapes} |" in page, f"docs/policy.md does not say {places} | {shapes}"
+
+
 def main():
     walked, walked_noisy = recorded.trials(exact), recorded.trials(noisy)
     found = worst(text, walked, True)
@@ -64,6 +76,7 @@ def main():
     print(f"actions {found['action']:.1e}, with noise {found_noisy['action']:.1e}; observations {found['observation']:.1e}")
     assert max(*found.values(), found_noisy["action"]) < TOLERANCE
     assert text in page, "docs/policy.md holds another program than examples/python/policy.py"
+    check_shapes()
     least = {"action": 1e9, "observation": 1e9}
     for old, new, what in FAULTS:
         assert text.count(old) == 1, f"'{old}' is not once in the program"
