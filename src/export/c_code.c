@@ -1,12 +1,9 @@
 /* The policy as C: files of c/ as they are, the numbers in the header, the weights as arrays. */
-#include <math.h>
-#include <stdarg.h>
+#include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "base/file.h"
 #include "base/paths.h"
 #include "c_text.h" /* text_policy_h, text_policy_c, text_example_c: files of c/ */
 #include "export/export.h"
@@ -189,23 +186,20 @@ static const struct {
 enum { FILES = sizeof files / sizeof *files };
 
 static MildStatus write_one(const Export *export, const char *folder, int index, MildError *error) {
-    char path[PATH_SIZE], *text = NULL;
-    size_t size = 0;
+    char path[PATH_SIZE];
     MildStatus status = path_join(folder, files[index].name, path, error);
-    FILE *file = status == MILD_OK ? open_memstream(&text, &size) : NULL;
+    FILE *file = status == MILD_OK ? fopen(path, "w") : NULL;
     if (status == MILD_OK && !file) {
-        return mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
+        return mild_fail(error, MILD_ERROR_IO, "%s: cannot be written: %s", path, strerror(errno));
     }
     if (status == MILD_OK) {
         status = files[index].print(file, export, error);
-        if (fclose(file) != 0 && status == MILD_OK) {
-            status = mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory", path);
+        const int lost = ferror(file);
+        if ((fclose(file) != 0 || lost) && status == MILD_OK) {
+            status = mild_fail(error, MILD_ERROR_IO, "%s: cannot be written: %s", path,
+                               errno ? strerror(errno) : "part of it is lost");
         }
     }
-    if (status == MILD_OK) {
-        status = file_write(path, text, size, error);
-    }
-    free(text);
     return status;
 }
 

@@ -47,4 +47,17 @@ fit=("$mild" fit press.csv --plate 0.2,0.1)
 total=$(count "${fit[@]}")
 for n in $(seq "$first" 2 "$total"); do starved "$n" "" "${fit[@]}"; done
 
+# what is written stays as it was; a folder is made whole or not at all
+"$mild" export --c made >/dev/null || fail "no export"
+if "$mild" export --onnx policy.onnx >/dev/null 2>&1; then # built with it
+    onnx=("$mild" export --onnx policy.onnx)
+    total=$(count "${onnx[@]}")
+    for n in $(seq $((total - 60)) "$total"); do starved "$n" "" "${onnx[@]}"; done
+fi
+total=$(count "$mild" export --c counted)
+for n in $(seq $((total - 40)) 2 "$total"); do
+    starved "$n" "" "$mild" export --c new
+    [ ! -e new ] || { diff -r made new >/dev/null || fail "allocation $n: a folder that is not whole"; rm -r new; }
+done
+
 finish "memory: $tried allocations failed, $refused of them refused in one line each"
