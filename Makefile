@@ -16,7 +16,7 @@ MUJOCO_ROOT ?=
 QUICK ?=
 TEST ?=
 
-.PHONY: setup build test run bench install plugin deb docs site paper web web-test check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin deb docs site paper web web-test check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -26,6 +26,7 @@ help:
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
 	@echo "make plugin  the MuJoCo plugin into PREFIX, for MUJOCO_ROOT= (docs/plugin.md)"
+	@echo "make export-check  what mild export --onnx writes, in ONNX Runtime (installs it into build/onnxruntime)"
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
 	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
@@ -52,6 +53,11 @@ test: build
 check:
 	@scripts/setup.sh check
 	@JOBS=$(JOBS) scripts/check.sh $(STAGES)
+
+export-check: build
+	@.venv/bin/python -m venv build/onnxruntime
+	@build/onnxruntime/bin/python -m pip install --quiet --disable-pip-version-check -r tests/export/requirements.txt
+	@RUNTIME=1 tests/export/test_export.sh build/mild build/onnxruntime/bin/python ON
 
 run: build
 	@MINUTES=$(MINUTES) scripts/run.sh

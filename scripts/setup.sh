@@ -8,6 +8,7 @@ packages=(
     build-essential cmake
     libdnnl-dev libinih-dev libcjson-dev libpng-dev zlib1g-dev
     libopenmpi-dev openmpi-bin
+    libprotobuf-c-dev protobuf-c-compiler libonnx-dev
     libcmocka-dev
     libglfw3-dev libgl-dev libosmesa6-dev libegl-dev libegl1 libgl1-mesa-dri
     ffmpeg

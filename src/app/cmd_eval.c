@@ -15,6 +15,7 @@
 #include "config/config.h"
 #include "config/experiment_keys.h"
 #include "control/controller.h"
+#include "eval/actions.h"
 #include "eval/inside.h"
 #include "mild/batch.h"
 
@@ -26,7 +27,7 @@ typedef struct {
     CliNames grounds;
     CliNumbers speeds;
     double patch;
-    const char *latent, *ablate, *stances; /* NULL: not given */
+    const char *latent, *ablate, *stances, *actions; /* NULL: not given */
     Ablation ablation;
     int threads, randomize;
     EvalDef eval;
@@ -173,11 +174,11 @@ static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *co
     if (!sum || !means) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     } else if (meant) {
-        FILE *stances = e->eval.stances;
+        const EvalDef whole = e->eval;
         log->sum = sum;
-        e->eval.stances = NULL;
+        e->eval.stances = e->eval.actions = NULL;
         status = evaluate_rows(e, robot, pool, controller, NULL, error);
-        e->eval.stances = stances;
+        e->eval = whole;
         inside_means(log, means);
         log->sum = NULL;
     }
@@ -253,9 +254,9 @@ static void print_header(const Eval *e, FILE *table) {
 
 static MildStatus evaluate_table(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                                  MildError *error) {
-    const char *outputs[] = {e->json, e->latent, e->stances};
+    const char *outputs[] = {e->json, e->latent, e->stances, e->actions};
     int taken = 0; /* bool: standard output */
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         taken = taken || (outputs[i] && strcmp(outputs[i], "-") == 0);
     }
     FILE *table = taken ? stderr : stdout;
@@ -277,17 +278,25 @@ static MildStatus evaluate_table(Eval *e, const Robot *robot, Pool *pool, Contro
 
 static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                            MildError *error) {
-    Sheet sheet = {0};
-    MildStatus status = e->stances ? sheet_open(&sheet, error) : MILD_OK;
-    if (sheet.file) {
-        eval_print_stances_header(sheet.file);
-        e->eval.stances = sheet.file;
+    Sheet stances = {0}, actions = {0};
+    MildStatus status = e->stances ? sheet_open(&stances, error) : MILD_OK;
+    if (stances.file) {
+        eval_print_stances_header(stances.file);
+        e->eval.stances = stances.file;
+    }
+    if (status == MILD_OK && e->actions) {
+        status = sheet_open(&actions, error);
+    }
+    if (actions.file) {
+        actions_print_header(actions.file, robot);
+        e->eval.actions = actions.file;
     }
     if (status == MILD_OK) {
         status = evaluate_table(e, robot, pool, controller, error);
     }
-    e->eval.stances = NULL;
-    return sheet_close(&sheet, e->stances, status, error);
+    e->eval.stances = e->eval.actions = NULL;
+    status = sheet_close(&stances, e->stances, status, error);
+    return sheet_close(&actions, e->actions, status, error);
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an
@@ -307,6 +316,7 @@ static MildStatus check_place(const Eval *e, MildError *error) {
     const int device = train_device(&e->train);
     const char *missing = e->latent           ? "--latent"
                           : e->ablate         ? "--ablate"
+                          : e->actions        ? "--actions"
                           : e->eval.push != 0 ? "--push"
                                               : NULL;
     if (device < -1) {
@@ -439,6 +449,9 @@ int cmd_eval(int argc, char **argv) {
         {"stances", CLI_OUTPUT, &e->stances, 0, 0, "FILE",
          "also write each stance of each foot as CSV: ground, speed, trial, foot, start, duration, "
          "depth, slip along the heading and to the left, apex of the swing before"},
+        {"actions", CLI_OUTPUT, &e->actions, 0, 0, "FILE",
+         "also write what the controller saw and did at every decision, as CSV: trial, ground, "
+         "speed, time, the true state, the observation, the action (docs/policy.md)"},
         {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
          "also write the table as JSON to FILE; - for standard output"},
     };

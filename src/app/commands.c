@@ -26,6 +26,8 @@ const AppCommand commands[] = {
     {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
     {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
     {"actuator", cmd_actuator, "fit a network to logs of a robot's motors"},
+    {"export", cmd_export, "write a policy as an ONNX graph or as C, to run it elsewhere"},
+    {"drive", cmd_drive, "run a policy for a robot over UDP, or be that robot, simulated"},
     {"report", cmd_report, "draw the curves of training runs on one page"},
     {"bench", cmd_bench, "measure speed and memory on this machine"},
     {"info", cmd_info, "list grounds, models, config keys, versions and devices"},

@@ -32,6 +32,8 @@ int cmd_press(int argc, char **argv);
 int cmd_fit(int argc, char **argv);
 int cmd_report(int argc, char **argv);
 int cmd_actuator(int argc, char **argv);
+int cmd_export(int argc, char **argv);
+int cmd_drive(int argc, char **argv);
 int cmd_bench(int argc, char **argv);
 int cmd_info(int argc, char **argv);
 int cmd_web(int argc, char **argv);

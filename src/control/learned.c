@@ -116,12 +116,12 @@ void learned_ablate(Controller *controller, Ablation ablation, const float *mean
 
 /* ---- creation ---- */
 
-MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
-                              Controller *controller, MildError *error) {
-    TaskShape shape = task_shape(robot);
-    Policy *policy = policy_load(path, NULL, 0, error);
+Policy *learned_policy(const char *path, const Robot *robot, char *note, int note_size,
+                       MildError *error) {
+    const TaskShape shape = task_shape(robot);
+    Policy *policy = policy_load(path, note, note_size, error);
     if (!policy) {
-        return error ? error->status : MILD_ERROR_FORMAT;
+        return NULL;
     }
     const PolicyDef *def = policy_def(policy);
     if (def->robot[0] && strcmp(def->robot, robot_name(robot)) != 0) {
@@ -130,7 +130,7 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
             "%s: this policy is for robot %s, not for %s; give --robot %s or another --policy",
             path, def->robot, robot_name(robot), def->robot);
         policy_destroy(policy);
-        return MILD_ERROR_FORMAT;
+        return NULL;
     }
     if (def->observation != shape.observation || def->frames != TASK_FRAMES ||
         def->actions != shape.actions || def->estimates != shape.estimates) {
@@ -141,7 +141,18 @@ MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, 
             path, def->observation, def->frames, def->actions, def->estimates, robot_name(robot),
             shape.observation, TASK_FRAMES, shape.actions, shape.estimates);
         policy_destroy(policy);
-        return MILD_ERROR_FORMAT;
+        return NULL;
+    }
+    return policy;
+}
+
+MildStatus controller_learned(const char *path, const Robot *robot, Pool *pool, int rows_max,
+                              Controller *controller, MildError *error) {
+    const TaskShape shape = task_shape(robot);
+    MildError inner = {0};
+    Policy *policy = learned_policy(path, robot, NULL, 0, &inner);
+    if (!policy) {
+        return mild_fail(error, inner.status, "%s", inner.text);
     }
     Learned *learned = calloc(1, sizeof *learned);
     float *history = calloc((size_t)rows_max * (size_t)shape.history, sizeof *history);

@@ -1,10 +1,15 @@
-/* Looking into a learned controller: what passes between its networks, and how it acts without one
- * of its parts. */
+/* The policy behind a learned controller. Looking into one: what passes between its networks, and
+ * how it acts without one of its parts. */
 #ifndef CONTROL_LEARNED_H
 #define CONTROL_LEARNED_H
 
 #include "control/controller.h"
 #include "learn/inside.h"
+#include "learn/policy.h"
+
+/* The policy of a file, if it is one for this robot. note: as of policy_load. */
+Policy *learned_policy(const char *path, const Robot *robot, char *note, int note_size,
+                       MildError *error);
 
 /* Parts that may be taken out, and what the actor gets in their place. */
 #define ABLATION_LIST(X)                                                                           \

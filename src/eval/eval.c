@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "eval/actions.h"
+
 #define HEADING_GAIN 1.0  /* [1/s] */
 #define HEADING_LIMIT 0.5 /* [rad/s] */
 #define PUSH_INTERVAL 4.0 /* [s] */
@@ -101,6 +103,21 @@ static void tell_watch(const Trials *t, int step) {
     }
 }
 
+static void print_actions(const Trials *t, int step) {
+    for (int i = 0; t->eval->actions && i < t->eval->trials; i++) {
+        const ActionsRow row = {.task = t->def,
+                                .scene = t->scene,
+                                .speed = t->eval->speed,
+                                .trial = i,
+                                .time = step * TASK_PERIOD,
+                                .env = t->env[i],
+                                .action = t->action + i * robot_joints(t->robot)};
+        if (!t->over[i]) {
+            actions_print_row(t->eval->actions, &row);
+        }
+    }
+}
+
 static void free_trials(Trials *t, int trials, int threads) {
     for (int i = 0; t->env && i < trials; i++) {
         free(t->env[i]);
@@ -152,6 +169,7 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
         for (int step = 0; step < steps; step++) {
             controller->act(controller->self, eval->trials, t.env, t.action);
             tell_watch(&t, step);
+            print_actions(&t, step);
             pool_run(pool, eval->trials, step_trial, &t);
         }
         status = eval_summarise(row, scene->name, eval, t.measure, t.over,

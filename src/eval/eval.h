@@ -30,6 +30,7 @@ typedef struct {
     uint64_t seed;  /* trial k uses stream k */
     const EvalWatch *watch; /* NULL: nobody; by MuJoCo */
     FILE *stances;          /* a row of CSV for each stance of each trial; NULL: none */
+    FILE *actions;          /* one for each decision, see eval/actions.h; NULL: none; by MuJoCo */
 } EvalDef;
 
 /* Means over the trials, SI units. */

@@ -312,7 +312,7 @@ static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
            robot_sim_body_clearance(sim, &env->terrain) < 0;
 }
 
-static inline MILD_BOTH void advance_clock(TaskEnv *env, const TaskDef *def) {
+TASK_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {
     env->tick++;
     env->step++;
     see_command(env);
@@ -367,7 +367,7 @@ TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *ro
     int fallen = bad || has_fallen(env, def, sim);
     place_meet();
     if (place_lane() == 0) {
-        advance_clock(env, def);
+        task_advance_clock(env, def);
         task_assist_adapt(env, fallen);
     }
     place_meet();

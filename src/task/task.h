@@ -259,6 +259,9 @@ TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd
 TASK_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int steps);
 TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                const RobotSim *sim, const TaskReal *torque, int diverged);
+/* One policy step on the clocks of the episode: the phase, the command that the policy sees and, if
+ * the caller does not set it, a new command (step.c). */
+TASK_FN void task_advance_clock(TaskEnv *env, const TaskDef *def);
 /* An episode on what task_randomize drew (step.c). depth: [m] how deep the feet stand in its
  * ground. The first reading is taken from the sim of its first pose. */
 TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot, double depth);

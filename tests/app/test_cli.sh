@@ -6,7 +6,7 @@ expect 0 'usage: mild COMMAND' "$mild" --help
 expect 0 'mild [0-9]*\.[0-9]*\.[0-9]*' "$mild" --version
 expect 2 'usage: mild COMMAND' "$mild"
 bad "nearest is 'press'" "$mild" pres
-for command in train eval play press fit actuator report bench info web; do
+for command in train eval play press fit actuator export drive report bench info web; do
     expect 0 "usage: mild $command" "$mild" "$command" --help
     bad "unknown option --no-such" "$mild" "$command" --no-such
 done

@@ -56,5 +56,17 @@ report=("$mild" report run --out -)
 total=$(count "${report[@]}")
 for share in {0..60}; do starved $((first + (total - first) * share / 60)) "" "${report[@]}"; done
 for n in $(seq $((total - 40)) "$total"); do starved "$n" "" "${report[@]}"; done
+# what is written stays as it was; a folder is made whole or not at all
+"$mild" export --c made >/dev/null || fail "no export"
+if "$mild" export --onnx policy.onnx >/dev/null 2>&1; then # built with it
+    onnx=("$mild" export --onnx policy.onnx)
+    total=$(count "${onnx[@]}")
+    for n in $(seq $((total - 60)) "$total"); do starved "$n" "" "${onnx[@]}"; done
+fi
+total=$(count "$mild" export --c counted)
+for n in $(seq $((total - 40)) 2 "$total"); do
+    starved "$n" "" "$mild" export --c new
+    [ ! -e new ] || { diff -r made new >/dev/null || fail "allocation $n: a folder that is not whole"; rm -r new; }
+done
 
 finish "memory: $tried allocations failed, $refused of them refused in one line each"

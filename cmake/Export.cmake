@@ -1,0 +1,36 @@
+# The layer export: a policy as an ONNX graph, with protobuf-c and ONNX's schema where both are installed, and as C.
+find_program(protoc_c protoc-c)
+find_path(onnx_schema onnx/onnx.proto)
+find_library(protobuf_c protobuf-c)
+if(protoc_c AND onnx_schema AND protobuf_c)
+  set(mild_onnx ON)
+  list(APPEND left_out "/export/without_onnx\\.c$")
+else()
+  set(mild_onnx OFF)
+  list(APPEND left_out "/export/onnx\\.c$")
+endif()
+set(mild_onnx ${mild_onnx} CACHE INTERNAL "") # for the tests
+mild_layer(export layer_control)
+set(export_generated ${CMAKE_BINARY_DIR}/generated/export)
+target_include_directories(layer_export PRIVATE ${export_generated})
+
+# c_text.h: the files of c/ as texts
+set(texts "")
+foreach(name policy.h policy.c example.c)
+  set(file ${CMAKE_CURRENT_SOURCE_DIR}/export/c/${name})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+  file(READ ${file} bytes HEX)
+  string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
+  string(MAKE_C_IDENTIFIER "text_${name}" symbol)
+  string(APPEND texts "static const char ${symbol}[] = {${bytes}0};\n")
+endforeach()
+file(CONFIGURE OUTPUT ${export_generated}/c_text.h CONTENT "@texts@" @ONLY)
+
+if(mild_onnx)
+  add_custom_command(OUTPUT ${export_generated}/onnx.pb-c.c ${export_generated}/onnx.pb-c.h
+    COMMAND ${protoc_c} --proto_path=${onnx_schema}/onnx --c_out=${export_generated} ${onnx_schema}/onnx/onnx.proto VERBATIM)
+  add_library(onnx_messages STATIC ${export_generated}/onnx.pb-c.c ${export_generated}/onnx.pb-c.h)
+  target_include_directories(onnx_messages SYSTEM PUBLIC ${export_generated})
+  target_link_libraries(onnx_messages PUBLIC ${protobuf_c})
+  target_link_libraries(layer_export PRIVATE onnx_messages)
+endif()

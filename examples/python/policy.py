@@ -1,0 +1,54 @@
+"""Runs policies/mild.safetensors from its file alone (docs/policy.md). Needs numpy."""
+import json
+
+import numpy as np
+
+POSE = np.array([0, 0, -0.24, 0.48, -0.24, 0] * 2)  # [rad] default pose, joints as in the table
+
+
+def read(path):
+    """The tensors of a safetensors file by name."""
+    raw = open(path, "rb").read()
+    end = 8 + int.from_bytes(raw[:8], "little")
+    header = json.loads(raw[8:end])
+    header.pop("__metadata__")
+    return {k: np.frombuffer(raw[end + v["data_offsets"][0] : end + v["data_offsets"][1]], "<f4")
+            .reshape(v["shape"]) for k, v in header.items()}
+
+
+class Policy:
+    def __init__(self, path, stride=8, period=0.8, clip=8.0):
+        self.tensors, self.stride, self.period, self.clip = read(path), stride, period, clip
+        self.frames = None  # the last 5 * stride frames, oldest first; none before the first
+        self.phase, self.last = 0.0, np.zeros(12)
+
+    def observe(self, omega, gravity, command, q, qd):
+        """The frame [47] of readings in SI units; gravity: unit vector, base frame."""
+        stand = np.all(np.abs(command) < 0.1)
+        turn = 2 * np.pi * self.phase
+        clock = [0, 0] if stand else [np.sin(turn), np.cos(turn)]
+        return np.concatenate([omega, np.multiply(command, [2, 2, 1]), gravity,
+                               q - POSE, 0.05 * qd, self.last, clock])
+
+    def network(self, name, x):
+        layers = sorted({int(k.split(".")[1]) for k in self.tensors if k.startswith(name + ".")})
+        for i in layers:
+            x = self.tensors[f"{name}.{i}.weight"] @ x + self.tensors[f"{name}.{i}.bias"]
+            x = x if i == layers[-1] else np.where(x > 0, x, np.expm1(np.minimum(x, 0)))  # ELU
+        return x
+
+    def act(self, frame):
+        """The action [12] for the newest frame; 10 ms later comes the next one."""
+        if self.frames is None:
+            self.frames = np.tile(frame, (5 * self.stride, 1))
+        means = self.frames.reshape(5, self.stride, -1).mean(axis=1)
+        heads = self.network("encoder", np.concatenate([means.ravel(), frame]))
+        estimates, mu = heads[:11], heads[11:27]  # heads[27:43]: log variance, unused
+        theta = self.network("modulation", estimates[3:9])
+        half = len(theta) // 2
+        z = theta[:half] * mu + theta[half:]
+        action = self.network("actor", np.concatenate([frame, estimates, z]))
+        self.last = np.clip(action, -self.clip, self.clip)
+        self.frames = np.vstack([self.frames[1:], frame])
+        self.phase = (self.phase + 0.01 / self.period) % 1
+        return self.last  # the joints' targets are POSE + 0.5 * action

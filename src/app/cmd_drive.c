@@ -1,0 +1,397 @@
+/* mild drive: runs a policy for a robot on the other end of a UDP socket, or is that robot,
+ * simulated. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "app/build.h"
+#include "app/cli.h"
+#include "app/commands.h"
+#include "app/grounds.h"
+#include "app/report.h"
+#include "app/robots.h"
+#include "base/paths.h"
+#include "config/experiment_keys.h"
+#include "drive/drive.h"
+#include "drive/simulated.h"
+#include "eval/scene.h"
+
+#define ADDRESS "127.0.0.1:9870"
+
+typedef struct {
+    const char *policy, *robot, *config, *json, *gamepad;
+    const char *listen, *connect, *ground, *model; /* NULL: not given */
+    char config_robot[TRAIN_ROBOT_SIZE];
+    CliNumbers command, delay;
+    int simulate, no_keys, lockstep;
+    TaskDef task;
+    TerrainDef terrain;
+    RunnerDef runner;
+    SimulatedDef simulated;
+    double seconds;
+} Drive;
+
+/* ---- results ---- */
+
+static cJSON *add_times(cJSON *parent, const char *name, const Times *times) {
+    cJSON *o = cJSON_AddObjectToObject(parent, name);
+    cJSON_AddNumberToObject(o, "count", (double)times->count);
+    cJSON_AddNumberToObject(o, "p50_s", times_quantile(times, 0.5));
+    cJSON_AddNumberToObject(o, "p99_s", times_quantile(times, 0.99));
+    cJSON_AddNumberToObject(o, "p999_s", times_quantile(times, 0.999));
+    cJSON_AddNumberToObject(o, "longest_s", times->longest);
+    cJSON *bins = cJSON_AddArrayToObject(o, "bins"); /* [from, to, count] where there are any */
+    for (int i = 0; i < TIMES_BINS; i++) {
+        if (times->bin[i] > 0) {
+            const double bin[3] = {times_edge(i), times_edge(i + 1), (double)times->bin[i]};
+            cJSON_AddItemToArray(bins, cJSON_CreateDoubleArray(bin, 3));
+        }
+    }
+    return o;
+}
+
+static cJSON *runner_json(const Drive *d, const Robot *robot, const DriveReport *report,
+                          const RunnerReport *runner) {
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "policy", d->policy);
+    cJSON_AddStringToObject(root, "robot", robot_name(robot));
+    cJSON_AddStringToObject(root, "version", build_version());
+    cJSON_AddStringToObject(root, "end", report->end);
+    cJSON_AddStringToObject(root, "why_damped", runner->why);
+    const struct {
+        const char *name;
+        double value;
+    } counts[] = {{"seconds", report->seconds},
+                  {"ticks", (double)report->ticks},
+                  {"missed_ticks", (double)report->missed},
+                  {"strangers", (double)report->strangers},
+                  {"received", (double)runner->received},
+                  {"lost", (double)runner->lost},
+                  {"reordered", (double)runner->reordered},
+                  {"late", (double)runner->late},
+                  {"steps", (double)runner->steps},
+                  {"holds", (double)runner->holds},
+                  {"damps", (double)runner->damps},
+                  {"targets_limited", (double)runner->targets_limited}};
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        cJSON_AddNumberToObject(root, counts[i].name, counts[i].value);
+    }
+    cJSON *refused = cJSON_AddObjectToObject(root, "refused");
+    for (int i = PACKET_FAULT_none + 1; i < PACKET_FAULTS; i++) {
+        cJSON_AddNumberToObject(refused, packet_faults[i], (double)runner->refused[i]);
+    }
+    add_times(root, "wakeup", &report->wakeup);
+    add_times(root, "compute", &report->compute);
+    add_times(root, "reply", &report->reply);
+    add_times(root, "age", &runner->age);
+    return root;
+}
+
+static void print_times(FILE *file, const char *name, const Times *times) {
+    fprintf(file, "%-9s%12.1f%12.1f%12.1f%12.1f\n", name, 1e6 * times_quantile(times, 0.5),
+            1e6 * times_quantile(times, 0.99), 1e6 * times_quantile(times, 0.999),
+            1e6 * times->longest);
+}
+
+/* Bars of the time to compute a tick, 1, 2 and 5 of each decade. */
+static void print_histogram(FILE *file, const Times *times) {
+    static const double step[3] = {2, 2.5, 2};
+    double edge = 1e-6;
+    int bin = 0;
+    for (int row = 0; bin < TIMES_BINS; row++) {
+        long count = 0;
+        edge *= step[row % 3];
+        for (; bin < TIMES_BINS && times_edge(bin + 1) < edge * 1.05; bin++) {
+            count += times->bin[bin];
+        }
+        if (count > 0) {
+            fprintf(file, "  below %8.0f us %8ld ", 1e6 * edge, count);
+            for (long i = 0; i < (50 * count + times->count - 1) / times->count; i++) {
+                fputc('#', file);
+            }
+            fputc('\n', file);
+        }
+    }
+}
+
+static void print_runner(FILE *file, const DriveReport *report, const RunnerReport *runner) {
+    long refused = 0;
+    for (int i = PACKET_FAULT_none + 1; i < PACKET_FAULTS; i++) {
+        refused += runner->refused[i];
+    }
+    fprintf(file,
+            "%.2f s, %ld ticks, %ld missed; %ld steps, %ld holds, %ld damped; targets limited %ld\n"
+            "states %ld, lost %ld, reordered %ld, late %ld, refused %ld, of strangers %ld\n"
+            "[us]            median         p99       p99.9     longest\n",
+            report->seconds, report->ticks, report->missed, runner->steps, runner->holds,
+            runner->damps, runner->targets_limited, runner->received, runner->lost,
+            runner->reordered, runner->late, refused, report->strangers);
+    print_times(file, "wake-up", &report->wakeup);
+    print_times(file, "compute", &report->compute);
+    print_times(file, "reply", &report->reply);
+    print_times(file, "age", &runner->age);
+    fprintf(file, "time to compute a tick:\n");
+    print_histogram(file, &report->compute);
+}
+
+static cJSON *simulated_json(const SimulatedReport *report) {
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "end", report->end);
+    cJSON_AddBoolToObject(root, "fallen", report->fallen);
+    const struct {
+        const char *name;
+        double value;
+    } values[] = {{"seconds", report->seconds},         {"way_x_m", report->way[0]},
+                  {"way_y_m", report->way[1]},          {"real_time_factor", report->rate},
+                  {"damped_s", report->damped},         {"sent", (double)report->sent},
+                  {"dropped", (double)report->dropped}, {"delayed", (double)report->delayed},
+                  {"targets", (double)report->targets}, {"refused", (double)report->refused}};
+    for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
+        cJSON_AddNumberToObject(root, values[i].name, values[i].value);
+    }
+    return root;
+}
+
+/* ---- the runner ---- */
+
+static double greater(double a, double b) {
+    return a > b ? a : b;
+}
+
+static MildStatus run_on(Drive *d, const Robot *robot, Runner *runner, Udp *udp, MildError *error) {
+    const TaskDef *t = &d->task;
+    const double range[3] = {t->vx[1], greater(t->vy[1], -t->vy[0]), greater(t->wz[1], -t->wz[0])};
+    const int taken = d->json && strcmp(d->json, "-") == 0;
+    char text[32];
+    Input input;
+    DriveReport report;
+    MildStatus status = input_open(&input, d->command.value, range, !d->no_keys, d->gamepad, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    fprintf(stderr, "mild drive: %s at %s; %s\n", robot_name(robot), udp_text(&udp->own, text),
+            input.keys ? INPUT_KEYS : "Ctrl-C ends");
+    const DriveDef def = {runner, udp, &input, d->seconds};
+    drive_run(&def, &report);
+    input_close(&input);
+    const RunnerReport *counts = runner_report(runner);
+    print_runner(taken ? stderr : stdout, &report, counts);
+    if (d->json) {
+        status = report_save(runner_json(d, robot, &report, counts), d->json, error);
+    }
+    return status == MILD_OK && counts->why[0]
+               ? mild_fail(error, MILD_ERROR_IO, "damped: %s", counts->why)
+               : status;
+}
+
+static MildStatus run_runner(Drive *d, const Robot *robot, MildError *error) {
+    Udp udp = {.file = -1};
+    d->runner.policy = d->policy;
+    d->runner.robot = robot;
+    d->runner.task = &d->task;
+    Runner *runner = runner_create(&d->runner, error);
+    MildStatus status = runner ? MILD_OK : error->status;
+    if (status == MILD_OK) {
+        status = udp_listen(&udp, "listen", d->listen ? d->listen : ADDRESS, error);
+    }
+    if (status == MILD_OK) {
+        status = run_on(d, robot, runner, &udp, error);
+    }
+    udp_close(&udp);
+    runner_destroy(runner);
+    return status;
+}
+
+/* ---- the simulated robot ---- */
+
+static MildStatus walk_on(const Drive *d, const Robot *robot, const Scene *scene,
+                          MildError *error) {
+    Udp udp = {.file = -1};
+    SimulatedDef def = d->simulated;
+    SimulatedReport report;
+    def.robot = robot;
+    def.task = &d->task;
+    def.terrain = &scene->terrain;
+    def.rigid = scene->rigid;
+    def.udp = &udp;
+    def.lockstep = d->lockstep;
+    def.seconds = d->seconds > 0 ? d->seconds : 3600;
+    def.delay_share = d->delay.value[0];
+    def.delay = d->delay.value[1];
+    MildStatus status = udp_connect(&udp, "connect", d->connect ? d->connect : ADDRESS, error);
+    if (status == MILD_OK) {
+        status = simulated_run(&def, &report, error);
+    }
+    udp_close(&udp);
+    if (status != MILD_OK) {
+        return status;
+    }
+    fprintf(d->json && strcmp(d->json, "-") == 0 ? stderr : stdout,
+            "%s on %s: %s after %.2f s and %.2f m, %.2f of real time; states %ld, dropped %ld, "
+            "delayed %ld; targets %ld, refused %ld; damped %.2f s\n",
+            robot_name(robot), scene->name, report.end, report.seconds, report.way[0], report.rate,
+            report.sent, report.dropped, report.delayed, report.targets, report.refused,
+            report.damped);
+    return d->json ? report_save(simulated_json(&report), d->json, error) : MILD_OK;
+}
+
+static MildStatus run_simulated(Drive *d, Robot *robot, const CliArgs *args, MildError *error) {
+    MildModel model;
+    Scene scene;
+    MildMap *map = NULL;
+    MildStatus status = grounds_model(d->model, args, &model, error);
+    if (status == MILD_OK) {
+        const GroundsDef finish = grounds_for_robot(model, robot, &d->task, &d->terrain, args);
+        status = scene_make(&scene, d->ground ? d->ground : "rigid", 2.5, error);
+        if (status == MILD_OK) {
+            status = grounds_finish_scene(&finish, &scene, error);
+        }
+        if (status == MILD_OK) {
+            status = task_def_check_robot(&d->task, robot, error);
+        }
+        if (status == MILD_OK) {
+            status = grounds_lay_map(&finish, &scene, &map, error);
+        }
+    }
+    if (status == MILD_OK) {
+        status = walk_on(d, robot, &scene, error);
+    }
+    mild_map_destroy(map);
+    return status;
+}
+
+/* ---- the command ---- */
+
+/* Options that the other half of the command reads. */
+static MildStatus check_options(const Drive *d, MildError *error) {
+    const char *other = d->simulate             ? d->listen          ? "--listen"
+                                                  : d->gamepad       ? "--gamepad"
+                                                  : d->command.count ? "--command"
+                                                                     : NULL
+                        : d->connect            ? "--connect"
+                        : d->ground             ? "--ground"
+                        : d->model              ? "--model"
+                        : d->lockstep           ? "--lockstep"
+                        : d->simulated.drop > 0 ? "--drop"
+                        : d->delay.count        ? "--delay"
+                                                : NULL;
+    if (other) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         d->simulate ? "%s is for the runner, not for --simulate"
+                                     : "%s needs --simulate",
+                         other);
+    }
+    if (d->command.count && d->command.count != 3) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--command: forward, sideways and turning speed, as 0.5,0,0");
+    }
+    if (d->delay.count && (d->delay.count != 2 || d->delay.value[0] > 1)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--delay: a share in 0 .. 1 and seconds, as 0.05,0.02");
+    }
+    return MILD_OK;
+}
+
+static MildStatus run_drive(Drive *d, const CliArgs *args, MildError *error) {
+    const ConfigSection section = {"task", task_fields, task_field_count, &d->task};
+    MildStatus status = check_options(d, error);
+    if (status == MILD_OK) {
+        status = experiment_task(&d->task, 0, d->config_robot, d->config, error);
+    }
+    if (status == MILD_OK && !d->simulate) {
+        status = config_overrides(&section, 1, args->overrides, args->override_count, error);
+    }
+    Robot *robot = status == MILD_OK ? robots_open(d->robot, d->config_robot, error) : NULL;
+    if (status == MILD_OK && !robot) {
+        return error->status;
+    }
+    if (status == MILD_OK) {
+        status = task_def_check_robot(&d->task, robot, error);
+    }
+    if (status == MILD_OK) {
+        status = d->simulate ? run_simulated(d, robot, args, error) : run_runner(d, robot, error);
+    }
+    robot_destroy(robot);
+    return status;
+}
+
+int cmd_drive(int argc, char **argv) {
+    static Drive d;
+    static CliArgs args;
+    char shipped[PATH_SIZE], model_help[320];
+    d.policy = path_data("policies/mild.safetensors", shipped);
+    d.terrain = terrain_def_default();
+    d.runner = (RunnerDef){
+        .late = 0.02, .damp_after = 0.1, .speed_limit = 30, .angle_limit = 0.2, .torque_share = 1};
+    d.simulated = (SimulatedDef){.patience = 30, .seed = 1};
+    const CliOption options[] = {
+        {"policy", CLI_INPUT, &d.policy, 0, 0, "FILE",
+         "policy to run (default policies/mild.safetensors)"},
+        {"robot", CLI_TEXT, &d.robot, 0, 0, "NAME|DIR",
+         ROBOTS_HELP " (default: the config's, or sa01)"},
+        {"config", CLI_INPUT, &d.config, 0, 0, "FILE",
+         "config that the policy was trained with, for its section [task]"},
+        {"listen", CLI_TEXT, &d.listen, 0, 0, "HOST:PORT",
+         "where states arrive; targets go to where they come from (default " ADDRESS ")"},
+        {"command", CLI_NUMBERS, &d.command, -10, 10, "VX,VY,WZ",
+         "[m/s, m/s, rad/s] forward, to the left, turning left; brought into the ranges of section "
+         "[task] (default 0,0,0)"},
+        {"gamepad", CLI_TEXT, &d.gamepad, 0, 0, "FILE",
+         "a gamepad of Linux, /dev/input/js0: left stick walks, right stick turns, button 1 damps"},
+        {"no-keys", CLI_FLAG, &d.no_keys, 0, 0, NULL, "leave the terminal's keys alone"},
+        {"late", CLI_NUMBER, &d.runner.late, 0.001, 10, "T",
+         "[s] a state that took so much longer than the fastest one is not used (default 0.02)"},
+        {"damp-after", CLI_NUMBER, &d.runner.damp_after, 0.01, 60, "T",
+         "[s] without a state until the robot is damped, for good (default 0.1)"},
+        {"speed-limit", CLI_NUMBER, &d.runner.speed_limit, 0, 1000, "W",
+         "[rad/s] a joint that is faster damps the robot; 0: none (default 30)"},
+        {"angle-limit", CLI_NUMBER, &d.runner.angle_limit, -1, 10, "A",
+         "[rad] a joint so far beyond its range damps the robot; negative: none (default 0.2)"},
+        {"torque-share", CLI_NUMBER, &d.runner.torque_share, 0.01, 1, "S",
+         "[-] of the torque limit of the task that targets may ask for (default 1)"},
+        {"seconds", CLI_NUMBER, &d.seconds, 0, 86400, "T",
+         "[s] from the first state on; 0: until Ctrl-C (default 0)"},
+        {"simulate", CLI_FLAG, &d.simulate, 0, 0, NULL,
+         "be the robot, simulated in MuJoCo, and send states to --connect"},
+        {"connect", CLI_TEXT, &d.connect, 0, 0, "HOST:PORT",
+         "simulated robot: where the runner listens (default " ADDRESS ")"},
+        {"ground", CLI_TEXT, &d.ground, 0, 0, "NAME[+NAME]",
+         "simulated robot: ground, or a course of them (default rigid)"},
+        {"model", CLI_TEXT, &d.model, 0, 0, "NAME",
+         grounds_model_help(model_help, sizeof model_help)},
+        {"lockstep", CLI_FLAG, &d.lockstep, 0, 0, NULL,
+         "simulated robot: its time stands still until a state is answered"},
+        {"patience", CLI_NUMBER, &d.simulated.patience, 0.1, 3600, "T",
+         "[s] simulated robot: wait so long for the first answer, and in lockstep for each "
+         "(default 30)"},
+        {"drop", CLI_NUMBER, &d.simulated.drop, 0, 1, "P",
+         "[-] simulated robot: share of its states that are lost (default 0)"},
+        {"delay", CLI_NUMBERS, &d.delay, 0, 10, "P,T",
+         "[-, s] simulated robot: share of its states that are sent so late (default 0,0)"},
+        {"seed", CLI_UINT64, &d.simulated.seed, 0, 0, "S",
+         "simulated robot: its start, and what is lost (default 1)"},
+        {"json", CLI_OUTPUT, &d.json, 0, 0, "FILE",
+         "also write counts and times as JSON to FILE; - for standard output"},
+    };
+    const CliCommand command = {
+        .name = "drive",
+        .usage = "[--listen HOST:PORT] [options] | --simulate [options]",
+        .summary = "Runs a policy at 100 Hz for a robot that sends its state and takes joint "
+                   "targets by UDP (docs/drive.md), and prints how long everything took. Without "
+                   "a new state it holds the last targets, then damps the robot. With --simulate "
+                   "it is the robot.",
+        .options = options,
+        .option_count = sizeof options / sizeof *options,
+        .overrides = "any key of section [task]; with --simulate also of [ground] and [terrain]",
+        .examples =
+            "  mild drive --command 0.5,0,0\n"
+            "  mild drive --simulate --ground sand_loose    # in another terminal\n"
+            "  mild drive --listen 0.0.0.0:9870 --gamepad /dev/input/js0 --json drive.json\n",
+    };
+    const CliOutcome outcome = cli_parse(&command, argc, argv, &args);
+    if (outcome != CLI_RUN) {
+        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    }
+    MildError error = {0};
+    return run_drive(&d, &args, &error) == MILD_OK ? 0 : cli_fail("drive", &error);
+}

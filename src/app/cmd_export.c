@@ -1,0 +1,105 @@
+/* mild export: a policy for programs that are not ours, as an ONNX graph and as C. */
+#include "export/export.h"
+
+#include <stdio.h>
+
+#include "app/build.h"
+#include "app/cli.h"
+#include "app/commands.h"
+#include "app/robots.h"
+#include "base/paths.h"
+#include "config/config.h"
+#include "config/experiment_keys.h"
+#include "control/learned.h"
+
+typedef struct {
+    const char *policy, *robot, *config, *onnx, *c; /* onnx, c: NULL: not given */
+    char config_robot[TRAIN_ROBOT_SIZE];
+    TaskDef task;
+} Exporting;
+
+static MildStatus write_files(const Exporting *e, const Robot *robot, MildError *error) {
+    char note[1024];
+    Network network;
+    MildStatus status = MILD_OK;
+    Policy *policy = learned_policy(e->policy, robot, note, sizeof note, error);
+    if (!policy) {
+        return error->status;
+    }
+    const Export export = {.robot = robot,
+                           .task = &e->task,
+                           .network = &network,
+                           .parameters = policy_parameters(policy),
+                           .note = note,
+                           .version = build_version()};
+    status = network_layout(&network, policy_def(policy), error);
+    if (status == MILD_OK && e->c) {
+        status = export_c(&export, e->c, error);
+    }
+    if (status == MILD_OK && e->onnx) {
+        status = export_onnx(&export, e->onnx, error);
+    }
+    policy_destroy(policy);
+    return status;
+}
+
+static MildStatus run_export(Exporting *e, const CliArgs *args, MildError *error) {
+    MildStatus status = experiment_task(&e->task, 0, e->config_robot, e->config, error);
+    const ConfigSection section = {"task", task_fields, task_field_count, &e->task};
+    if (status == MILD_OK) {
+        status = config_overrides(&section, 1, args->overrides, args->override_count, error);
+    }
+    Robot *robot = status == MILD_OK ? robots_open(e->robot, e->config_robot, error) : NULL;
+    if (status == MILD_OK && !robot) {
+        return error->status;
+    }
+    if (status == MILD_OK) {
+        status = task_def_check_robot(&e->task, robot, error);
+    }
+    if (status == MILD_OK) {
+        status = write_files(e, robot, error);
+    }
+    robot_destroy(robot);
+    return status;
+}
+
+int cmd_export(int argc, char **argv) {
+    char shipped[PATH_SIZE];
+    Exporting e = {.policy = path_data("policies/mild.safetensors", shipped)};
+    const CliOption options[] = {
+        {"policy", CLI_INPUT, &e.policy, 0, 0, "FILE",
+         "policy to export (default policies/mild.safetensors)"},
+        {"robot", CLI_TEXT, &e.robot, 0, 0, "NAME|DIR",
+         ROBOTS_HELP " (default: the config's, or sa01)"},
+        {"config", CLI_INPUT, &e.config, 0, 0, "FILE",
+         "config that the policy was trained with, for its section [task]"},
+        {"onnx", CLI_OUTPUT, &e.onnx, 0, 0, "FILE",
+         "write one graph with weights, history and metadata"},
+        {"c", CLI_OUTPUT_LATER, &e.c, 0, 0, "FOLDER",
+         "make a folder with policy.h, policy.c, policy_weights.h and example.c, in C99 that "
+         "needs libm alone and allocates nothing"},
+    };
+    const CliCommand command = {
+        .name = "export",
+        .usage = "--onnx FILE | --c FOLDER [options]",
+        .summary = "Writes a policy with everything that a program of your own must know to run "
+                   "it: joints and their order, default pose, gains, limits, scales, history and "
+                   "clock (docs/policy.md).",
+        .options = options,
+        .option_count = sizeof options / sizeof *options,
+        .overrides = "any key of section [task] that the policy was trained with, e.g. "
+                     "--task.gait_period=0.7",
+        .examples = "  mild export --onnx policy.onnx\n"
+                    "  mild export --c deploy && cc -O3 -march=native deploy/*.c -lm -o run\n",
+    };
+    static CliArgs args;
+    const CliOutcome outcome = cli_parse(&command, argc, argv, &args);
+    if (outcome != CLI_RUN) {
+        return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    }
+    if (!e.onnx && !e.c) {
+        return cli_fail_text("export", "nothing to write; give --onnx FILE or --c FOLDER");
+    }
+    MildError error = {0};
+    return run_export(&e, &args, &error) == MILD_OK ? 0 : cli_fail("export", &error);
+}

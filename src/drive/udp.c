@@ -1,0 +1,110 @@
+#include "drive/udp.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <netdb.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/select.h>
+#include <unistd.h>
+
+#include "base/text.h"
+
+static MildStatus find_address(const char *option, const char *text, struct sockaddr_in *address,
+                               MildError *error) {
+    char host[256];
+    int port;
+    const char *colon = strrchr(text, ':');
+    const struct addrinfo wanted = {.ai_family = AF_INET, .ai_socktype = SOCK_DGRAM};
+    struct addrinfo *found;
+    if (!colon || colon == text || colon - text >= (long)sizeof host ||
+        !text_int(colon + 1, &port) || port < 0 || port > 65535) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--%s: '%.100s' is not HOST:PORT, as 127.0.0.1:9870", option, text);
+    }
+    memcpy(host, text, (size_t)(colon - text));
+    host[colon - text] = '\0';
+    const int failed = getaddrinfo(host, NULL, &wanted, &found);
+    if (failed) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--%s: %.100s: %s", option, host,
+                         gai_strerror(failed));
+    }
+    memcpy(address, found->ai_addr, sizeof *address);
+    address->sin_port = htons((uint16_t)port);
+    freeaddrinfo(found);
+    return MILD_OK;
+}
+
+static MildStatus open_bound(Udp *udp, const char *option, const char *text, MildError *error) {
+    socklen_t size = sizeof udp->own;
+    udp->has_peer = 0;
+    udp->file = socket(AF_INET, SOCK_DGRAM, 0);
+    if (udp->file < 0 || udp->file >= FD_SETSIZE || fcntl(udp->file, F_SETFL, O_NONBLOCK) != 0 ||
+        bind(udp->file, (const struct sockaddr *)&udp->own, sizeof udp->own) != 0 ||
+        getsockname(udp->file, (struct sockaddr *)&udp->own, &size) != 0) {
+        mild_fail(error, MILD_ERROR_IO, "--%s: %.100s: %s", option, text, strerror(errno));
+        udp_close(udp);
+        return MILD_ERROR_IO;
+    }
+    return MILD_OK;
+}
+
+MildStatus udp_listen(Udp *udp, const char *option, const char *address, MildError *error) {
+    MildStatus status = find_address(option, address, &udp->own, error);
+    return status == MILD_OK ? open_bound(udp, option, address, error) : status;
+}
+
+MildStatus udp_connect(Udp *udp, const char *option, const char *address, MildError *error) {
+    struct sockaddr_in peer;
+    MildStatus status = find_address(option, address, &peer, error);
+    memset(&udp->own, 0, sizeof udp->own);
+    udp->own.sin_family = AF_INET;
+    if (status == MILD_OK) {
+        status = open_bound(udp, option, address, error);
+    }
+    udp->peer = peer;
+    udp->has_peer = status == MILD_OK;
+    return status;
+}
+
+void udp_close(Udp *udp) {
+    if (udp->file >= 0) {
+        close(udp->file);
+    }
+    udp->file = -1;
+}
+
+const char *udp_text(const struct sockaddr_in *address, char text[32]) {
+    char host[INET_ADDRSTRLEN] = "?";
+    inet_ntop(AF_INET, &address->sin_addr, host, sizeof host);
+    snprintf(text, 32, "%s:%d", host, ntohs(address->sin_port));
+    return text;
+}
+
+void udp_wait(const Udp *udp, double seconds) {
+    const double whole = floor(fmax(seconds, 0));
+    const struct timespec most = {(time_t)whole, (long)(1e9 * (fmax(seconds, 0) - whole))};
+    fd_set files;
+    FD_ZERO(&files);
+    FD_SET(udp->file, &files);
+    pselect(udp->file + 1, &files, NULL, NULL, &most, NULL);
+}
+
+int udp_receive(const Udp *udp, uint8_t *bytes, size_t most, struct sockaddr_in *from) {
+    socklen_t size = sizeof *from;
+    const ssize_t got = recvfrom(udp->file, bytes, most, 0, (struct sockaddr *)from, &size);
+    return got < 0 ? -1 : (int)got; /* -1 also for a peer's port that is closed */
+}
+
+int udp_same(const struct sockaddr_in *a, const struct sockaddr_in *b) {
+    return a->sin_addr.s_addr == b->sin_addr.s_addr && a->sin_port == b->sin_port;
+}
+
+void udp_send(const Udp *udp, const uint8_t *bytes, size_t size) {
+    if (udp->has_peer) {
+        (void)sendto(udp->file, bytes, size, 0, (const struct sockaddr *)&udp->peer,
+                     sizeof udp->peer);
+    }
+}

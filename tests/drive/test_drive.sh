@@ -1,0 +1,198 @@
+#!/usr/bin/env bash
+# Two processes, a runner and a simulated robot: a walk; states that are lost or come late; either side dead; garbage; bad input. In
+# lockstep, so that a busy machine only makes it slower. Usage: test_drive.sh PATH_TO_MILD PYTHON
+tests=$(realpath "$(dirname "$0")")
+source "$tests/../kit.sh" "$1"
+python=$2
+config=$(realpath "$tests/../../configs/walk.ini")
+
+# start NAME OPTIONS...: a runner in the background, $runner, at $address, which writes NAME.json, .out, .err
+start() {
+    local name=$1
+    shift
+    "$mild" drive --config "$config" --listen 127.0.0.1:0 --late 10 --damp-after 20 --json "$name.json" "$@" \
+        >"$name.out" 2>"$name.err" </dev/null &
+    runner=$!
+    for ((i = 0; i < 600; i++)); do
+        address=$(sed -n 's/^mild drive: sa01 at \([0-9.]*:[0-9]*\);.*/\1/p' "$name.err" 2>/dev/null)
+        [ -n "$address" ] && return
+        sleep 0.05
+    done
+    fail "the runner of $name says no address: $(cat "$name.err")"
+}
+
+# robot NAME OPTIONS...: a simulated robot, which writes NAME_robot.json
+robot() {
+    local name=$1
+    shift
+    timeout 120 "$mild" drive --simulate --lockstep --config "$config" --connect "$address" --json "${name}_robot.json" "$@" >/dev/null
+}
+
+# ended CODE: the runner ends so
+ended() {
+    wait "$runner"
+    local got=$?
+    [ "$got" = "$1" ] || fail "the runner ended with $got instead of $1"
+}
+
+# value FILE KEY
+value() {
+    sed -n "s/.*\"$2\":[^0-9a-z\"-]*\"*\([^\",]*\).*/\1/p" "$1"
+}
+
+# holds FILE KEY CONDITION: of x, the value
+holds() {
+    awk -v x="$(value "$1" "$2")" "BEGIN { exit !($3) }" || fail "$1: $2 is $(value "$1" "$2"), not $3"
+}
+
+# five seconds on loose sand
+start walk --command 0.6,0,0
+robot walk --ground sand_loose --seconds 5 || fail "the robot of walk"
+ended 0
+holds walk_robot.json seconds 'x == 5'
+holds walk_robot.json way_x_m 'x > 2 && x < 3.2'
+holds walk_robot.json fallen 'x == "false"'
+holds walk_robot.json damped_s 'x == 0'
+holds walk_robot.json sent 'x == 500'
+holds walk.json steps 'x >= 500 && x <= 504'
+holds walk.json lost 'x == 0'
+holds walk.json end 'x == "robot"'
+[ "$(value walk.json count | head -1)" -ge 500 ] || fail "wake-ups: $(value walk.json count)"
+grep -q '^compute ' walk.out && grep -q 'below .* us .*#' walk.out || fail "no histogram: $(cat walk.out)"
+
+# a state of twenty is lost, another comes 25 ms late, when newer ones have been used: it stays upright
+start lossy --command 0.6,0,0
+robot lossy --ground foam45 --seconds 3 --drop 0.05 --delay 0.05,0.025 || fail "the robot of lossy"
+ended 0
+holds lossy_robot.json fallen 'x == "false"'
+holds lossy_robot.json way_x_m 'x > 0.9'
+holds lossy_robot.json dropped 'x > 5 && x < 30'
+holds lossy.json reordered 'x > 5'
+holds lossy.json lost "x >= $(value lossy_robot.json dropped)"
+holds lossy.json holds 'x > 10'
+holds lossy.json steps "x >= 300 - $(value lossy_robot.json dropped) - $(value lossy_robot.json delayed) && x < 300"
+
+# in real time, where a busy machine may let it fall: it is never faster than the clock, and states come at every physics step
+start clock --command 0.3,0,0
+timeout 120 "$mild" drive --simulate --config "$config" --connect "$address" --json clock_robot.json --seconds 1 >/dev/null ||
+    fail "the robot of clock"
+wait "$runner" # with 2 where the robot has fallen
+holds clock_robot.json real_time_factor 'x > 0 && x < 1.05'
+holds clock_robot.json sent "x >= 199 * $(value clock_robot.json seconds) && x <= 202 * $(value clock_robot.json seconds)"
+holds clock.json steps 'x > 0 && x <= 110'
+
+# garbage from elsewhere, before the robot is there and while it walks
+start garbage --command 0.3,0,0
+"$python" - "$address" <<'PY' &
+import os, random, socket, sys, time
+host, port = sys.argv[1].split(":")
+sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+random.seed(1)
+for k in range(600):
+    head = b"MILD\1\1\14\1" if k % 3 == 0 else b""
+    sender.sendto(head + os.urandom(random.randrange(0, 2000 if k % 5 == 0 else 200)), (host, int(port)))
+    time.sleep(0.002)
+PY
+robot garbage --seconds 2 || fail "the robot of garbage"
+wait $!
+ended 0
+holds garbage_robot.json fallen 'x == "false"'
+holds garbage.json steps 'x >= 200'
+refused=$(($(value garbage.json magic) + $(value garbage.json size) + $(value garbage.json checksum)))
+[ $((refused + $(value garbage.json strangers))) -ge 300 ] || fail "garbage was not counted"
+
+# the robot dies: the runner damps, says so, and ends
+start dead --command 0.3,0,0 --damp-after 0.2
+"$mild" drive --simulate --lockstep --connect "$address" &
+peer=$!
+sleep 3
+kill -KILL "$peer"
+ended 2
+grep -q 'mild drive: damped: no state for' dead.err || fail "dead: $(cat dead.err)"
+holds dead.json end 'x == "damped"'
+holds dead.json damps 'x > 50'
+
+# the runner dies: the robot damps itself after 0.1 s of its own time
+start silent --command 0.3,0,0
+robot silent --seconds 60 --patience 5 &
+peer=$!
+sleep 3
+kill -KILL "$runner"
+wait "$runner" 2>/dev/null
+wait "$peer" || fail "the robot of silent"
+holds silent_robot.json damped_s 'x > 0'
+holds silent_robot.json end 'x == "fallen"'
+rm -f silent.json
+
+# Ctrl-C ends both
+start stopped --command 0.3,0,0
+robot stopped --seconds 60 &
+peer=$!
+sleep 3
+kill -INT "$runner"
+ended 0
+wait "$peer" || fail "the robot of stopped"
+holds stopped.json end 'x == "signal"'
+holds stopped_robot.json end 'x == "runner"'
+
+# a state as docs/drive.md makes it in Python: taken, and answered
+start snippet --damp-after 0.1
+"$python" - "$address" "$tests/../../docs/drive.md" <<'PY' || fail "the packet of docs/drive.md"
+import re, socket, struct, sys, zlib
+host, port = sys.argv[1].split(":")
+sequence, answers, microseconds = 5, 0, 123456
+quaternion, omega = [1, 0, 0, 0], [0, 0, 0]
+angles, speeds = [0, 0, -0.24, 0.48, -0.24, 0] * 2, [0] * 12
+page = open(sys.argv[2], encoding="utf-8").read()
+lines = re.findall(r"^    ((?:body|packet) .*)", page, re.M)
+assert len(lines) == 3
+exec("\n".join(lines))
+robot = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+robot.settimeout(60)
+robot.sendto(packet, (host, int(port)))
+target = robot.recv(4096)
+assert len(packet) == 152 and len(target) == 220
+assert target[:4] == b"MILD" and target[4:8] == bytes([1, 2, 12, 1])
+assert struct.unpack("<I", target[12:16])[0] == sequence
+assert struct.unpack("<I", target[-4:])[0] == zlib.crc32(target[:-4])
+kp = struct.unpack("<12f", target[24 + 48 : 24 + 96])
+assert kp == (50, 50, 70, 70, 20, 20) * 2
+PY
+ended 2
+holds snippet.json received 'x == 1'
+
+# keys of a terminal: x damps
+"$python" - "$mild" <<'PY' || fail "keys"
+import os, pty, subprocess, sys, time
+ours, theirs = pty.openpty()
+run = subprocess.Popen(
+    [sys.argv[1], "drive", "--listen", "127.0.0.1:0"], stdin=theirs, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+)
+assert "w s: 0.1 m/s" in run.stderr.readline()
+time.sleep(0.2)
+os.write(ours, b"wwa x")
+assert run.wait(60) == 2
+assert "damped: by key or button" in run.stderr.read()
+PY
+
+bad "no answer from 127.0.0.1:9 for 0.2 s" "$mild" drive --simulate --connect 127.0.0.1:9 --patience 0.2 --json x.json
+bad "is not HOST:PORT" "$mild" drive --listen 9870
+bad "is not HOST:PORT" "$mild" drive --listen 127.0.0.1:99999
+bad "is not HOST:PORT" "$mild" drive --simulate --connect :9870
+bad "no_such.invalid" "$mild" drive --listen no_such.invalid:9870
+bad "192.0.2.1" "$mild" drive --listen 192.0.2.1:9870
+bad "no_such.safetensors" "$mild" drive --policy no_such.safetensors
+bad "is for robot sa01, not for go1" "$mild" drive --robot go1
+bad "/dev/input/none" "$mild" drive --gamepad /dev/input/none
+bad "--ground needs --simulate" "$mild" drive --ground foam45
+bad "--drop needs --simulate" "$mild" drive --drop 0.1
+bad "--command is for the runner" "$mild" drive --simulate --command 0,0,0
+bad "as 0.5,0,0" "$mild" drive --command 0.5
+bad "as 0.05,0.02" "$mild" drive --simulate --delay 0.05
+bad "unknown ground 'foma45'" "$mild" drive --simulate --ground foma45
+bad "nearest is 'task.gait_period'" "$mild" drive --task.gait_perod=0.7
+bad "no_such_folder" "$mild" drive --json no_such_folder/x.json
+for option in late damp-after speed-limit angle-limit torque-share seconds patience drop; do
+    bad "--$option" "$mild" drive "--$option" -7
+done
+finish "two processes walk, and end as they should"

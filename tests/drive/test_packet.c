@@ -1,0 +1,224 @@
+/* The packets, byte by byte as docs/drive.md says, and what is refused; the histogram; the
+ * gamepad. */
+#include <linux/joystick.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "base/random.h"
+#include "drive/input.h"
+#include "drive/packet.h"
+#include "drive/times.h"
+
+enum { JOINTS = 12, STATE_SIZE = 24 + 4 * (7 + 24) + 4, TARGET_SIZE = 24 + 4 * 48 + 4 };
+
+static StatePacket any_state(void) {
+    StatePacket state = {.mode = PACKET_walk,
+                         .sequence = 0x01020304,
+                         .answers = 7,
+                         .time = 0x1122334455667788,
+                         .quaternion = {0.6f, 0, 0.8f, 0},
+                         .angular_velocity = {1, 2, 3}};
+    for (int i = 0; i < JOINTS; i++) {
+        state.angle[i] = (float)i;
+        state.speed[i] = (float)-i;
+    }
+    return state;
+}
+
+/* CRC-32 bit by bit: polynomial 0xEDB88320, all ones before and after. */
+static uint32_t crc(const uint8_t *bytes, size_t size) {
+    uint32_t c = 0xffffffffu;
+    for (size_t i = 0; i < size; i++) {
+        c ^= bytes[i];
+        for (int b = 0; b < 8; b++) {
+            c = c & 1 ? c >> 1 ^ 0xedb88320u : c >> 1;
+        }
+    }
+    return ~c;
+}
+
+static uint32_t word(const uint8_t *bytes) {
+    return bytes[0] | (uint32_t)bytes[1] << 8 | (uint32_t)bytes[2] << 16 | (uint32_t)bytes[3] << 24;
+}
+
+static double number(const uint8_t *bytes) {
+    const uint32_t bits = word(bytes);
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return (double)value;
+}
+
+static void the_bytes(void **unused) {
+    (void)unused;
+    uint8_t bytes[PACKET_MAX];
+    const StatePacket state = any_state();
+    assert_int_equal(packet_write_state(&state, JOINTS, bytes), STATE_SIZE);
+    assert_memory_equal(bytes, "MILD\1\1\14\1\4\3\2\1\7\0\0\0\x88\x77\x66\x55\x44\x33\x22\x11", 24);
+    assert_true(number(bytes + 24) == (double)0.6f && number(bytes + 24 + 16) == 1);
+    assert_true(number(bytes + 24 + 28 + 4 * 11) == 11 && number(bytes + STATE_SIZE - 8) == -11);
+    assert_int_equal(word(bytes + STATE_SIZE - 4), crc(bytes, STATE_SIZE - 4));
+
+    TargetPacket target = {.mode = PACKET_damp, .sequence = 9, .answers = 8, .time = 1};
+    for (int i = 0; i < JOINTS; i++) {
+        target.angle[i] = (float)i;
+        target.kp[i] = 100;
+        target.kd[i] = 2;
+        target.limit[i] = (float)(50 + i);
+    }
+    assert_int_equal(packet_write_target(&target, JOINTS, bytes), TARGET_SIZE);
+    assert_memory_equal(bytes, "MILD\1\2\14\3\11\0\0\0\10\0\0\0\1\0\0\0\0\0\0\0", 24);
+    assert_true(number(bytes + 24 + 4) == 1 && number(bytes + 24 + 48) == 100);
+    assert_true(number(bytes + 24 + 96) == 2 && number(bytes + TARGET_SIZE - 8) == 61);
+    assert_int_equal(word(bytes + TARGET_SIZE - 4), crc(bytes, TARGET_SIZE - 4));
+}
+
+static void there_and_back(void **unused) {
+    (void)unused;
+    uint8_t bytes[PACKET_MAX];
+    StatePacket state = any_state(), read = {0};
+    size_t size = packet_write_state(&state, JOINTS, bytes);
+    assert_int_equal(packet_read_state(bytes, size, JOINTS, &read), PACKET_FAULT_none);
+    assert_true(read.mode == state.mode && read.sequence == state.sequence);
+    assert_true(read.answers == state.answers && read.time == state.time);
+    assert_memory_equal(read.angle, state.angle, sizeof state.angle);
+    assert_memory_equal(read.speed, state.speed, sizeof state.speed);
+    assert_memory_equal(read.angular_velocity, state.angular_velocity,
+                        sizeof read.angular_velocity);
+    assert_true(fabs((double)read.quaternion[2] - 0.8) < 1e-6);
+    TargetPacket target = {.mode = PACKET_hold, .limit = {1, 2}}, back = {0};
+    size = packet_write_target(&target, JOINTS, bytes);
+    assert_int_equal(packet_read_target(bytes, size, JOINTS, &back), PACKET_FAULT_none);
+    assert_memory_equal(&back, &target, sizeof back);
+    /* a quaternion that is a little too long is of length 1 afterwards */
+    state.quaternion[0] = 0.62f;
+    size = packet_write_state(&state, JOINTS, bytes);
+    assert_int_equal(packet_read_state(bytes, size, JOINTS, &read), PACKET_FAULT_none);
+    const double w = (double)read.quaternion[0], y = (double)read.quaternion[2];
+    assert_true(fabs(w * w + y * y - 1) < 1e-6 && fabs(y / w - 0.8 / 0.62) < 1e-6);
+}
+
+/* Changes a byte and makes the checksum right again. */
+static PacketFault with_byte(size_t at, uint8_t value) {
+    uint8_t bytes[PACKET_MAX];
+    StatePacket state = any_state();
+    const size_t size = packet_write_state(&state, JOINTS, bytes);
+    bytes[at] = value;
+    const uint32_t sum = crc(bytes, size - 4);
+    for (int i = 0; i < 4; i++) {
+        bytes[size - 4 + (size_t)i] = (uint8_t)(sum >> (8 * i));
+    }
+    return packet_read_state(bytes, size, JOINTS, &state);
+}
+
+static PacketFault with_numbers(float quaternion, float speed) {
+    uint8_t bytes[PACKET_MAX];
+    StatePacket state = any_state();
+    state.quaternion[1] = quaternion;
+    state.speed[JOINTS - 1] = speed;
+    const size_t size = packet_write_state(&state, JOINTS, bytes);
+    return packet_read_state(bytes, size, JOINTS, &state);
+}
+
+static void what_is_refused(void **unused) {
+    (void)unused;
+    uint8_t bytes[PACKET_MAX + 1];
+    StatePacket state = any_state();
+    TargetPacket target;
+    const size_t size = packet_write_state(&state, JOINTS, bytes);
+    assert_int_equal(with_byte(3, 'X'), PACKET_FAULT_magic);
+    assert_int_equal(with_byte(4, 2), PACKET_FAULT_version);
+    assert_int_equal(with_byte(5, 2), PACKET_FAULT_kind);
+    assert_int_equal(with_byte(7, PACKET_MODES), PACKET_FAULT_kind);
+    assert_int_equal(with_byte(6, 11), PACKET_FAULT_joints);
+    assert_int_equal(with_numbers(NAN, 0), PACKET_FAULT_number);
+    assert_int_equal(with_numbers(0.5f, 0), PACKET_FAULT_number);
+    assert_int_equal(with_numbers(0, INFINITY), PACKET_FAULT_number);
+    assert_int_equal(with_numbers(0, 1.1e6f), PACKET_FAULT_number);
+    assert_int_equal(with_numbers(0, -1e6f), PACKET_FAULT_none);
+    assert_int_equal(packet_read_target(bytes, size, JOINTS, &target), PACKET_FAULT_kind);
+    for (size_t cut = 0; cut < size; cut++) {
+        assert_int_equal(packet_read_state(bytes, cut, JOINTS, &state), PACKET_FAULT_size);
+    }
+    assert_int_equal(packet_read_state(bytes, size + 1, JOINTS, &state), PACKET_FAULT_size);
+    /* every single bit counts */
+    for (size_t bit = 0; bit < 8 * size; bit++) {
+        bytes[bit / 8] ^= (uint8_t)(1 << bit % 8);
+        assert_int_not_equal(packet_read_state(bytes, size, JOINTS, &state), PACKET_FAULT_none);
+        bytes[bit / 8] ^= (uint8_t)(1 << bit % 8);
+    }
+    assert_int_equal(packet_read_state(bytes, size, JOINTS, &state), PACKET_FAULT_none);
+}
+
+static void the_histogram(void **unused) {
+    (void)unused;
+    Times times = {0};
+    assert_true(times_quantile(&times, 0.5) == 0);
+    for (int i = 1; i <= 10000; i++) {
+        times_add(&times, 1e-6 * i); /* 1 us to 10 ms */
+    }
+    const double half = times_quantile(&times, 0.5), most = times_quantile(&times, 0.999);
+    assert_true(half >= 5e-3 && half < 5e-3 * 1.11 && most >= 9.99e-3 && most <= 1e-2);
+    assert_true(times.longest == 1e-2 && times.count == 10000);
+    times_add(&times, -1), times_add(&times, 0), times_add(&times, 1e9);
+    assert_true(times.bin[0] >= 2 && times.bin[TIMES_BINS - 1] == 1);
+    assert_true(times_quantile(&times, 1) == 1e9);
+    assert_true(fabs(times_edge(TIMES_DECADE) / 1e-5 - 1) < 1e-12);
+}
+
+static int play(Input *input, int file, uint8_t type, uint8_t index, int16_t value) {
+    const struct js_event event = {0, value, type, index};
+    assert_int_equal(write(file, &event, sizeof event), sizeof event);
+    return input_poll(input);
+}
+
+/* A pipe in the place of the device. */
+static void the_gamepad(void **unused) {
+    (void)unused;
+    const double start[3] = {0.3, 0, 0}, range[3] = {1.2, 0.4, 1.5};
+    MildError error = {0};
+    Input input;
+    int ends[2];
+    char path[64];
+    assert_int_equal(pipe(ends), 0);
+    snprintf(path, sizeof path, "/dev/fd/%d", ends[0]);
+    assert_int_equal(input_open(&input, start, range, 0, path, &error), MILD_OK);
+    assert_int_equal(input_poll(&input), 0);
+    assert_true(input.command[0] == 0.3);                                 /* until a stick moves */
+    assert_int_equal(play(&input, ends[1], JS_EVENT_AXIS, 1, -32767), 0); /* up: forward */
+    assert_true(input.command[0] == 1.2 && input.command[1] == 0);
+    assert_int_equal(play(&input, ends[1], JS_EVENT_AXIS, 1, 32767), 0);
+    assert_true(input.command[0] == -1.2);
+    assert_int_equal(play(&input, ends[1], JS_EVENT_AXIS, 0, 16384), 0); /* right */
+    assert_true(fabs(input.command[1] + 0.2) < 1e-4);
+    assert_int_equal(play(&input, ends[1], JS_EVENT_AXIS, 3, -16384), 0); /* left: turns left */
+    assert_true(fabs(input.command[2] - 0.75) < 1e-4);
+    assert_int_equal(play(&input, ends[1], JS_EVENT_AXIS, 3, 3000), 0); /* at rest */
+    assert_true(input.command[2] == 0);
+    assert_int_equal(play(&input, ends[1], JS_EVENT_AXIS, 7, 32767), 0); /* another axis */
+    assert_int_equal(play(&input, ends[1], JS_EVENT_BUTTON, 0, 1), 0);
+    assert_int_equal(play(&input, ends[1], JS_EVENT_BUTTON, 1, 0), 0);
+    assert_int_equal(play(&input, ends[1], JS_EVENT_BUTTON | JS_EVENT_INIT, 1, 1), 0);
+    assert_int_equal(play(&input, ends[1], JS_EVENT_BUTTON, 1, 1), 1);
+    input_close(&input);
+    close(ends[0]), close(ends[1]);
+    assert_int_not_equal(input_open(&input, start, range, 0, "/dev/input/none", &error), MILD_OK);
+    assert_non_null(strstr(error.text, "--gamepad: /dev/input/none"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_bytes),       cmocka_unit_test(there_and_back),
+        cmocka_unit_test(what_is_refused), cmocka_unit_test(the_histogram),
+        cmocka_unit_test(the_gamepad),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

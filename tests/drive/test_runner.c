@@ -1,0 +1,447 @@
+/* The runner with time that the test gives: its targets are those of the task's own environment;
+ * lost, late, old and damaged packets; a dead robot; limits. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/random.h"
+#include "drive/runner.h"
+#include "eval/scene.h"
+#include "sa01.h"
+
+#define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
+
+enum { JOINTS = 12 };
+
+static Robot *robot;
+static TaskDef task,
+    noisy; /* the environment's; the runner's, which adds no noise to a robot's own */
+static const double forward[3] = {0.5, 0, 0};
+
+static int setup(void **state) {
+    (void)state;
+    MildError error = {0};
+    robot = robot_create(SA01, &error);
+    task = task_def_default();
+    task_def_make_nominal(&task);
+    task.randomize.latency[0] = task.randomize.latency[1] = 0;
+    noisy = task;
+    task.observe_noise = 0;
+    return robot == NULL;
+}
+
+static int teardown(void **state) {
+    (void)state;
+    robot_destroy(robot);
+    return 0;
+}
+
+static Runner *make_runner_with(double torque_share) {
+    MildError error = {0};
+    const RunnerDef def = {.policy = POLICY,
+                           .robot = robot,
+                           .task = &noisy,
+                           .late = 0.02,
+                           .damp_after = 0.1,
+                           .speed_limit = 30,
+                           .angle_limit = 0.2,
+                           .torque_share = torque_share};
+    Runner *runner = runner_create(&def, &error);
+    assert_non_null(runner);
+    return runner;
+}
+
+static Runner *make_runner(void) {
+    return make_runner_with(1);
+}
+
+/* A robot that stands upright in its default pose. */
+static StatePacket standing(uint32_t sequence, double time) {
+    StatePacket state = {.mode = PACKET_walk,
+                         .sequence = sequence,
+                         .time = (uint64_t)llround(1e6 * time),
+                         .quaternion = {1, 0, 0, 0}};
+    for (int i = 0; i < JOINTS; i++) {
+        state.angle[i] = (float)robot_default_pose(robot)[i];
+    }
+    return state;
+}
+
+/* arrived: [s] at the runner, by whose clock the robot's is 5 s behind. */
+static void give(Runner *runner, const StatePacket *state, double arrived) {
+    uint8_t bytes[PACKET_MAX];
+    const size_t size = packet_write_state(state, JOINTS, bytes);
+    assert_int_equal(runner_take(runner, bytes, size, 5 + arrived), PACKET_FAULT_none);
+}
+
+static TargetPacket tick(Runner *runner, double now, const double *command) {
+    uint8_t bytes[PACKET_MAX];
+    TargetPacket target = {0};
+    const size_t size = runner_tick(runner, 5 + now, command, bytes);
+    assert_int_equal(packet_read_target(bytes, size, JOINTS, &target), PACKET_FAULT_none);
+    return target;
+}
+
+/* ---- the task's own environment ---- */
+
+typedef struct {
+    TaskEnv *env;
+    RobotSim *sim;
+    Controller controller;
+    float action[JOINTS];
+} World;
+
+static World make_world(void) {
+    MildError error = {0};
+    const TaskView none = {0};
+    Scene scene;
+    World w = {.env = aligned_alloc(64, task_env_bytes(&task, robot)),
+               .sim = robot_sim_create(robot, task.physics_dt, &error)};
+    assert_non_null(w.env);
+    assert_non_null(w.sim);
+    assert_int_equal(controller_learned(POLICY, robot, NULL, 1, &w.controller, &error), MILD_OK);
+    assert_int_equal(scene_make(&scene, "foam45", 1, &error), MILD_OK);
+    for (uint32_t index = 0;; index++) { /* one whose clock starts at 0, as the runner's does */
+        task_env_init(w.env, &task, robot, 1, index);
+        w.env->command_frozen = 1;
+        memcpy(w.env->command, forward, sizeof forward);
+        task_env_reset_on(w.env, &task, robot, w.sim, &scene.terrain, 0, &none);
+        if (w.env->phase == 0) {
+            return w;
+        }
+    }
+}
+
+static void free_world(World *w) {
+    controller_destroy(&w->controller);
+    robot_sim_destroy(w->sim);
+    free(w->env);
+}
+
+static StatePacket state_of(const World *w, uint32_t sequence, double time) {
+    StatePacket state = standing(sequence, time);
+    const RobotState *s = &w->env->robot;
+    for (int i = 0; i < 4; i++) {
+        state.quaternion[i] = (float)s->qpos[3 + i];
+    }
+    for (int i = 0; i < 3; i++) {
+        state.angular_velocity[i] = (float)s->qvel[3 + i];
+    }
+    for (int i = 0; i < JOINTS; i++) {
+        state.angle[i] = (float)s->qpos[7 + i];
+        state.speed[i] = (float)s->qvel[6 + i];
+    }
+    return state;
+}
+
+/* Two seconds of a walk that turns and then stands: every target is what the task's motor would
+ * get, but for the torque limit. */
+static void the_same_as_the_task(void **unused) {
+    (void)unused;
+    const TaskView none = {0};
+    World w = make_world();
+    Runner *runner = make_runner();
+    double worst = 0, farthest = 0;
+    int limited = 0;
+    for (uint32_t k = 0; k < 200; k++) {
+        const double now = 0.01 * k,
+                     command[3] = {k < 150 ? 0.5 : 0, 0, k > 80 && k < 150 ? 0.4 : 0};
+        const StatePacket state = state_of(&w, k + 1, now);
+        give(runner, &state, now);
+        const TargetPacket target = tick(runner, now, command);
+        assert_int_equal(target.mode, PACKET_walk);
+        assert_int_equal(target.answers, k + 1);
+        w.controller.act(w.controller.self, 1, &w.env, w.action);
+        for (int i = 0; i < JOINTS; i++) {
+            const double kp = robot_kp(robot)[i], kd = robot_kd(robot)[i],
+                         limit = 0.85 * robot_effort(robot)[i], q = (double)state.angle[i],
+                         qd = (double)state.speed[i];
+            const double wanted = robot_default_pose(robot)[i] + 0.5 * (double)w.action[i];
+            const double torque = kp * (wanted - q) - kd * qd;
+            assert_true(fabs((double)target.kp[i] - kp) < 1e-5);
+            assert_true(fabs((double)target.kd[i] - kd) < 1e-5);
+            assert_true(fabs((double)target.limit[i] - limit) < 1e-4);
+            if (fabs(torque) <= limit) {
+                worst = fmax(worst, fabs((double)target.angle[i] - wanted));
+            } else { /* the PD then asks for the limit */
+                const double asked = kp * ((double)target.angle[i] - q) - kd * qd;
+                assert_true(fabs(asked - copysign(limit, torque)) < 1e-3);
+                limited++;
+            }
+            farthest = fmax(farthest, fabs(wanted - robot_default_pose(robot)[i]));
+        }
+        memcpy(w.env->command, command, sizeof command); /* in the next frame */
+        const TaskStep step = task_env_step(w.env, &task, robot, w.sim, w.action, 0, &none, NULL);
+        assert_true(!step.done);
+    }
+    const RunnerReport *report = runner_report(runner);
+    print_message("targets of up to %.2f rad within %.1e, %d limited\n", farthest, worst, limited);
+    assert_true(worst < 2e-5 && farthest > 0.3);
+    assert_true(report->steps == 200 && report->holds == 0 && report->lost == 0);
+    assert_int_equal(report->targets_limited, limited);
+    runner_destroy(runner);
+    free_world(&w);
+}
+
+/* ---- packets on bad ways ---- */
+
+/* Nothing before the first state; then a state for every tick but some. */
+static void lost_states(void **unused) {
+    (void)unused;
+    uint8_t bytes[PACKET_MAX];
+    Runner *runner = make_runner();
+    const RunnerReport *report = runner_report(runner);
+    TargetPacket before = {0};
+    assert_int_equal(runner_tick(runner, 5, forward, bytes), 0);
+    for (uint32_t k = 0; k < 50; k++) {
+        const int lost = k % 10 == 7 || k % 10 == 8;
+        const StatePacket state = standing(k + 1, 0.01 * k);
+        if (!lost) {
+            give(runner, &state, 0.01 * k);
+        }
+        const TargetPacket target = tick(runner, 0.01 * k, forward);
+        assert_int_equal(target.mode, lost ? PACKET_hold : PACKET_walk);
+        assert_int_equal(target.sequence, k + 1);
+        if (lost) {
+            assert_memory_equal(target.angle, before.angle, sizeof target.angle);
+            assert_memory_equal(target.kp, before.kp, sizeof target.kp);
+        }
+        before = target;
+    }
+    assert_true(report->received == 40 && report->lost == 10 && report->holds == 10);
+    assert_true(report->steps == 40 && report->late == 0 && report->damps == 0);
+    runner_destroy(runner);
+}
+
+/* States of 400 Hz: the newest counts. An old one that comes behind it does not. */
+static void old_states(void **unused) {
+    (void)unused;
+    Runner *runner = make_runner();
+    const RunnerReport *report = runner_report(runner);
+    StatePacket state = standing(10, 0);
+    give(runner, &state, 0);
+    state = standing(12, 0.005);
+    give(runner, &state, 0.005);
+    state = standing(11, 0.0025);
+    give(runner, &state, 0.006);
+    state = standing(12, 0.005); /* the newest once more */
+    give(runner, &state, 0.007);
+    const TargetPacket target = tick(runner, 0.01, forward);
+    assert_int_equal(target.answers, 12);
+    assert_true(report->received == 4 && report->reordered == 2 && report->lost == 1);
+    /* the counter goes through zero */
+    state = standing(0xffffffffu, 0.02);
+    state.sequence = 12 + 0x7fffffffu;
+    give(runner, &state, 0.02);
+    state = standing(12 + 0x7fffffffu + 3, 0.03);
+    give(runner, &state, 0.03);
+    assert_int_equal(report->reordered, 2);
+    runner_destroy(runner);
+}
+
+/* Ways of 3 ms; then some of 35 ms, in order; then all of them. */
+static void late_states(void **unused) {
+    (void)unused;
+    Runner *runner = make_runner();
+    const RunnerReport *report = runner_report(runner);
+    double now = 0;
+    for (uint32_t k = 0; k < 40; k++) {
+        const double sent = 0.01 * k;
+        const StatePacket state = standing(k + 1, sent);
+        const int late = k == 20 || k == 30;
+        now = sent + (late ? 0.035 : 0.003);
+        give(runner, &state, now);
+        const TargetPacket target = tick(runner, now, forward);
+        assert_int_equal(target.mode, late ? PACKET_hold : PACKET_walk);
+    }
+    assert_true(report->late == 2 && report->holds == 2 && report->steps == 38);
+    for (uint32_t k = 40; k < 60; k++) {
+        const StatePacket state = standing(k + 1, 0.01 * k);
+        give(runner, &state, 0.01 * k + 0.035);
+        tick(runner, 0.01 * k + 0.035, forward);
+    }
+    assert_int_equal(runner_mode(runner), PACKET_damp);
+    assert_non_null(strstr(report->why, "no state for 0.1"));
+    runner_destroy(runner);
+}
+
+/* Holds for 0.1 s, then damps, also when the robot comes back. */
+static void a_dead_robot(void **unused) {
+    (void)unused;
+    Runner *runner = make_runner();
+    const RunnerReport *report = runner_report(runner);
+    for (uint32_t k = 0; k < 10; k++) {
+        const StatePacket state = standing(k + 1, 0.01 * k);
+        give(runner, &state, 0.01 * k);
+        tick(runner, 0.01 * k, forward);
+    }
+    for (int k = 10; k < 40; k++) {
+        const TargetPacket target = tick(runner, 0.01 * k + 0.001, forward);
+        assert_int_equal(target.mode, k < 19 ? PACKET_hold : PACKET_damp);
+        for (int i = 0; i < JOINTS; i++) {
+            assert_true((target.kp[i] > 0) == (k < 19) && target.kd[i] > 0);
+        }
+    }
+    const StatePacket back = standing(100, 0.4);
+    give(runner, &back, 0.4);
+    assert_int_equal(tick(runner, 0.4, forward).mode, PACKET_damp);
+    assert_true(report->holds == 9 && report->steps == 10 && report->damps == 22);
+    runner_destroy(runner);
+}
+
+/* ---- limits ---- */
+
+/* The mode after a state like the one of a standing robot, but for this. */
+static PacketMode after(const StatePacket *state, const char *why) {
+    Runner *runner = make_runner();
+    give(runner, state, 0);
+    const TargetPacket target = tick(runner, 0, forward);
+    const char *said = runner_report(runner)->why;
+    if (target.mode == PACKET_damp) {
+        assert_non_null(strstr(said, why));
+        assert_true(target.kp[0] == 0 && target.kd[0] > 0 && target.limit[0] > 0);
+    } else {
+        assert_string_equal(said, "");
+    }
+    runner_destroy(runner);
+    return target.mode;
+}
+
+static void limits(void **unused) {
+    (void)unused;
+    StatePacket state = standing(1, 0);
+    assert_int_equal(after(&state, ""), PACKET_walk);
+    state.speed[4] = -29;
+    assert_int_equal(after(&state, ""), PACKET_walk);
+    state.speed[4] = -31;
+    assert_int_equal(after(&state, "leg_l5_joint moves at 31.0 rad/s"), PACKET_damp);
+    state = standing(1, 0);
+    state.angle[9] = -0.3f; /* the right knee's range ends at -0.15 */
+    assert_int_equal(after(&state, ""), PACKET_walk);
+    state.angle[9] = -0.4f;
+    assert_int_equal(after(&state, "leg_r4_joint is 0.25 rad beyond"), PACKET_damp);
+    state = standing(1, 0);
+    for (int sign = -1; sign <= 1; sign += 2) { /* pitched by 0.9 and 1.1 rad; the limit is 1 */
+        state.quaternion[0] = (float)cos(0.45);
+        state.quaternion[2] = (float)(sign * sin(0.45));
+        assert_int_equal(after(&state, ""), PACKET_walk);
+        state.quaternion[0] = (float)cos(0.55);
+        state.quaternion[2] = (float)(sign * sin(0.55));
+        assert_int_equal(after(&state, "tilted by 1.10 rad"), PACKET_damp);
+    }
+}
+
+/* A tenth of the torque: 11.9 N m at the knee, which is 1.5 rad off and moves. */
+static void a_share_of_the_torque(void **unused) {
+    (void)unused;
+    Runner *runner = make_runner_with(0.1);
+    StatePacket state = standing(1, 0);
+    state.angle[3] += 1.5f;
+    state.speed[3] = -2;
+    give(runner, &state, 0);
+    const TargetPacket target = tick(runner, 0, forward);
+    const double asked = 70 * (double)(target.angle[3] - state.angle[3]) - 7 * -2.0;
+    assert_true(fabs((double)target.limit[3] - 11.9) < 1e-4 && fabs(asked + 11.9) < 1e-3);
+    assert_true(runner_report(runner)->targets_limited >= 1);
+    runner_destroy(runner);
+}
+
+/* Commands end at the task's ranges, and what is no number is 0: by the action that comes out. */
+static void commands(void **unused) {
+    (void)unused;
+    const double given[4][3] = {{9, 0, 0}, {1.2, 0, 0}, {0.5, 0, NAN}, {0.5, 0, 0}};
+    TargetPacket target[4];
+    for (int c = 0; c < 4; c++) {
+        Runner *runner = make_runner();
+        for (uint32_t k = 0; k < 5; k++) {
+            const StatePacket state = standing(k + 1, 0.01 * k);
+            give(runner, &state, 0.01 * k);
+            target[c] = tick(runner, 0.01 * k, given[c]);
+        }
+        runner_destroy(runner);
+    }
+    assert_memory_equal(target[0].angle, target[1].angle, sizeof target[0].angle);
+    assert_memory_equal(target[2].angle, target[3].angle, sizeof target[0].angle);
+    assert_memory_not_equal(target[0].angle, target[2].angle, sizeof target[0].angle);
+}
+
+/* Garbage of any size, and states with a few bits changed: refused, and nothing changes. */
+static void garbage(void **unused) {
+    (void)unused;
+    Runner *runner = make_runner();
+    const RunnerReport *report = runner_report(runner);
+    uint8_t bytes[PACKET_MAX];
+    StatePacket state = standing(1, 0);
+    give(runner, &state, 0);
+    long refused = 0;
+    for (uint32_t k = 0; k < 20000; k++) {
+        Random r = random_at(1, 0, k);
+        state = standing(k + 2, 0.001 * k);
+        size_t size = packet_write_state(&state, JOINTS, bytes);
+        if (k % 2) {
+            size = (size_t)(random_unit(&r) * PACKET_MAX);
+            for (size_t i = k % 4 == 1 ? 0 : 8; i < size; i++) {
+                bytes[i] = (uint8_t)random_bits(&r);
+            }
+        } else {
+            for (int bits = 1 + (int)(random_unit(&r) * 3); bits > 0; bits--) {
+                const size_t bit = (size_t)(random_unit(&r) * 8 * (double)size);
+                bytes[bit / 8] ^= (uint8_t)(1 << bit % 8);
+            }
+        }
+        const PacketFault fault = runner_take(runner, bytes, size, 5.001);
+        assert_true(fault != PACKET_FAULT_none || (k % 2 == 0 && report->received > 1));
+    }
+    for (int i = PACKET_FAULT_none + 1; i < PACKET_FAULTS; i++) {
+        refused += report->refused[i];
+    }
+    assert_true(refused + report->received == 20001 && report->received <= 2);
+    assert_int_equal(tick(runner, 0.002, forward).mode, PACKET_walk);
+    runner_destroy(runner);
+}
+
+static void the_end(void **unused) {
+    (void)unused;
+    uint8_t bytes[PACKET_MAX];
+    Runner *runner = make_runner();
+    StatePacket state = standing(1, 0);
+    give(runner, &state, 0);
+    tick(runner, 0, forward);
+    assert_false(runner_peer_ended(runner));
+    state = standing(2, 0.01);
+    state.mode = PACKET_end;
+    give(runner, &state, 0.01);
+    assert_true(runner_peer_ended(runner));
+    TargetPacket target;
+    const size_t size = runner_end(runner, 5.02, bytes);
+    assert_int_equal(packet_read_target(bytes, size, JOINTS, &target), PACKET_FAULT_none);
+    assert_true(target.mode == PACKET_end && target.kp[3] == 0 && target.kd[3] > 0);
+    runner_destroy(runner);
+
+    MildError error = {0};
+    const RunnerDef none = {.policy = "no_such.safetensors", .robot = robot, .task = &task};
+    assert_null(runner_create(&none, &error));
+    assert_non_null(strstr(error.text, "no_such.safetensors"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_same_as_the_task),
+        cmocka_unit_test(lost_states),
+        cmocka_unit_test(old_states),
+        cmocka_unit_test(late_states),
+        cmocka_unit_test(a_dead_robot),
+        cmocka_unit_test(limits),
+        cmocka_unit_test(a_share_of_the_torque),
+        cmocka_unit_test(commands),
+        cmocka_unit_test(garbage),
+        cmocka_unit_test(the_end),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}

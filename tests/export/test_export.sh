@@ -1,0 +1,93 @@
+#!/usr/bin/env bash
+# What `mild export` writes, C and ONNX, does what `mild eval` did; faults in the C are noticed; bad input leaves nothing.
+# Usage: test_export.sh PATH_TO_MILD PYTHON ONNX, ONNX: ON when the program was built with it
+tests=$(realpath "$(dirname "$0")")
+source "$tests/../kit.sh" "$1"
+root=$(realpath "$tests/../..")
+python=$2
+onnx=$3
+
+printf '[task]\nphysics_dt = 0.005\nobserve_noise = false\n[randomize]\nlatency = 0 0\n' >exact.ini
+"$mild" eval --config exact.ini --ground sand_loose --trials 2 --seconds 2 --stop 1.2 --sideways 0.1 --seed 3 \
+    --actions exact.csv >/dev/null || fail "eval without noise"
+"$mild" eval --ground foam45 --trials 2 --seconds 1 --actions noisy.csv >/dev/null || fail "eval with noise"
+
+# another policy: other widths, one theta for each dimension of z, another task; every tensor random, so that nothing is 0 or 1
+"$python" "$tests/make_policy.py" "$root/policies/mild.safetensors" other.safetensors || fail "make_policy.py"
+other=(--task.history_stride=3 --task.gait_period=0.7 --task.action_clip=0.6 --task.action_scale=0.3 --task.standing_below=0.5)
+"$mild" eval --policy other.safetensors "${other[@]}" --config exact.ini --ground foam45 --trials 2 --seconds 1 --stop 0.2 \
+    --actions other.csv >/dev/null || fail "eval of another policy"
+
+# near OUTPUT NAME: the error that the example prints for NAME is below 1e-5
+near() {
+    local error
+    error=$(sed -n "s/.*$2 within \([0-9.e+-]*\|-*nan\).*/\1/p" <<<"$1")
+    awk -v e="$error" 'BEGIN { exit !(e ~ /^[0-9]/ && e < 1e-5) }'
+}
+
+# ---- C ----
+"$mild" export --c walk || fail "export --c"
+"$mild" export --policy other.safetensors "${other[@]}" --c other || fail "export --c of another policy"
+flags=(-O3 -march=native -Wall -Wextra -Wconversion -pedantic -Werror)
+(cd walk && "${CC:-cc}" -std=c99 "${flags[@]}" policy.c example.c -lm -o run) || fail "C99"
+(cd other && "${CC:-cc}" -std=c17 "${flags[@]}" policy.c example.c -lm -o run) || fail "C17"
+(cd other && "${CXX:-c++}" -x c++ "${flags[@]}" policy.c example.c -lm -o run_cpp) || fail "C++"
+exact=$(walk/run exact.csv) && echo "$exact"
+near "$exact" actions && near "$exact" frames || fail "C on a record without noise: $exact"
+noisy=$(walk/run noisy.csv)
+near "$noisy" actions || fail "C on a record with noise: $noisy"
+for program in run run_cpp; do
+    output=$("other/$program" other.csv)
+    near "$output" actions && near "$output" frames || fail "C of another policy, $program: $output"
+done
+[ "$(nm walk/run | grep -c -w -e malloc -e calloc -e realloc)" = 0 ] || fail "the C allocates"
+
+# fault NAME OLD NEW: the C with NEW for OLD, of the other policy, must be noticed
+fault() {
+    local output
+    rm -rf broken && cp -r other broken
+    "$python" -c 'import sys; path, old, new = sys.argv[1:]; text = open(path).read(); assert text.count(old) == 1, old
+open(path, "w").write(text.replace(old, new))' "broken/$4" "$2" "$3" || fail "no such text: $2"
+    (cd broken && "${CC:-cc}" -O1 -w policy.c example.c -lm -o run) || fail "does not compile: $1"
+    output=$(broken/run other.csv)
+    ! near "$output" actions || ! near "$output" frames || fail "not noticed: $1"
+}
+fault "order of the heads" '*mu = heads + POLICY_ESTIMATES' '*mu = heads + POLICY_LATENT' policy.c
+fault "no modulation" 'theta[one] * mu[j] + theta[POLICY_THETA / 2 + one]' 'mu[j]' policy.c
+fault "ReLU" 'expf(x) - 1' '0' policy.c
+fault "no last action" 'last[i] = state->action[i]' 'last[i] = 0' policy.c
+fault "no clip" 'a > clip ? clip : a;' 'a;' policy.c
+fault "other pose" 'readings->angle[i] - policy_pose[i]' 'readings->angle[i]' policy.c
+fault "gait period" 'POLICY_PERIOD / POLICY_GAIT_PERIOD' 'POLICY_PERIOD / 0.8' policy.c
+fault "stride" '#define POLICY_STRIDE 3' '#define POLICY_STRIDE 2' policy.h
+fault "standing" 'fabsf(command[1]) < below' 'fabsf(command[1]) < 0' policy.c
+
+bad "walk exists already" "$mild" export --c walk
+bad "give --onnx FILE or --c FOLDER" "$mild" export
+bad "no_such" "$mild" export --policy no_such.safetensors --c new
+bad "is for robot sa01, not for go1" "$mild" export --robot go1 --c new
+bad "nearest is 'task.gait_period'" "$mild" export --c new --task.gait_perod=0.7
+bad "unknown section\|nearest is 'task'" "$mild" export --c new --train.envs=7
+bad "outside" "$mild" export --c new --task.gait_period=9
+bad "exact.csv" "$mild" export --c exact.csv
+bad "exact.csv" "$mild" export --c exact.csv/new
+bad "overwritten" "$mild" export --policy other.safetensors --onnx other.safetensors
+
+# ---- ONNX ----
+if [ "$onnx" != ON ]; then
+    bad "built without ONNX" "$mild" export --onnx walk.onnx
+    finish "the C that is written does what eval did; no ONNX here"
+fi
+"$mild" export --onnx walk.onnx || fail "export --onnx"
+"$mild" export --policy other.safetensors "${other[@]}" --onnx other.onnx || fail "export --onnx of another policy"
+"$python" "$tests/test_onnx.py" "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx"
+"$python" "$tests/test_onnx.py" - other.onnx other.csv || fail "other.onnx"
+if [ "${RUNTIME:-}" ]; then # make export-check
+    "$python" "$tests/test_onnx.py" --runtime "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx in ONNX Runtime"
+    "$python" "$tests/test_onnx.py" --runtime - other.onnx other.csv || fail "other.onnx in ONNX Runtime"
+fi
+# of the wrong policy: noticed
+! "$python" "$tests/test_onnx.py" - other.onnx noisy.csv >/dev/null 2>&1 || fail "another policy passes for the shipped one"
+bad "No space left" "$mild" export --onnx /dev/full
+bad "no_such_folder" "$mild" export --onnx no_such_folder/walk.onnx --c new
+finish "what is written does what eval did"

@@ -1,0 +1,75 @@
+"""The graph of `mild export --onnx` on what `mild eval` saw and did: computed by numpy, or by ONNX Runtime where --runtime is given.
+Usage: test_onnx.py [--runtime] SOURCE_FOLDER FILE.onnx RECORD.csv..."""
+
+import pathlib
+import sys
+
+import numpy as np
+import onnx_numpy
+import recorded
+
+runtime = "--runtime" in sys.argv
+source, path, *records = [word for word in sys.argv[1:] if word != "--runtime"]
+TOLERANCE = 1e-6  # of the largest action: 32-bit sums of 512 products, in another order than ours
+
+
+def make_run(model):
+    if not runtime:
+        return model.run
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+    assert session.get_modelmeta().custom_metadata_map == model.metadata
+    names = [output.name for output in session.get_outputs()]
+    return lambda **given: dict(zip(names, session.run(names, given)))
+
+
+def walk(run, trials):
+    """Largest error of the actions, all trials at once, each from a history of its first frame."""
+    shortest = min(len(trial.action) for trial in trials)
+    held = int(model.metadata["history_means"]) * int(model.metadata["history_stride"])
+    obs = np.stack([trial.observation[0] for trial in trials])
+    frames = np.repeat(obs[:, None], held, axis=1)
+    worst = scale = 0.0
+    for k in range(shortest):
+        obs = np.stack([trial.observation[k] for trial in trials])
+        wanted = np.stack([trial.action[k] for trial in trials])
+        out = run(obs=obs, frames_in=frames)
+        frames = out["frames_out"]
+        worst = max(worst, abs(out["actions"] - wanted).max())
+        scale = max(scale, abs(wanted).max())
+        assert (frames[:, -1] == obs).all() and out["estimates"].shape[0] == len(trials)
+    assert not np.isnan(worst)
+    return worst, scale
+
+
+def check_page(metadata):
+    """The joints' table of docs/policy.md: order, pose, gains, limits, ranges."""
+    page = (pathlib.Path(source) / "docs/policy.md").read_text(encoding="utf-8")
+    lists = [metadata[key].split(",") for key in ("default_joint_pos", "joint_stiffness", "joint_damping", "joint_effort_limit")]
+    for i, name in enumerate(metadata["joint_names"].split(",")):
+        row = [cell.strip() for cell in next(line for line in page.splitlines() if line.startswith(f"| `{name}`")).split("|")]
+        assert [float(cell) for cell in row[2:6]] == [float(numbers[i]) for numbers in lists], row
+        low, high = (metadata[key].split(",")[i] for key in ("joint_pos_low", "joint_pos_high"))
+        assert row[6].endswith(f", {float(low):g} to {float(high):g}"), row
+    rows = [line for line in page.splitlines() if line.startswith("| `leg_")]
+    assert [line.split("`")[1] for line in rows] == metadata["joint_names"].split(",")
+
+
+model = onnx_numpy.Model(pathlib.Path(path).read_bytes())
+width = sum(map(int, model.metadata["observation_widths"].split(",")))
+held = int(model.metadata["history_means"]) * int(model.metadata["history_stride"])
+joints = len(model.metadata["joint_names"].split(","))
+assert model.opset == 13
+assert model.inputs == {"obs": ["batch", width], "frames_in": ["batch", held, width]}
+assert list(model.outputs) == ["actions", "frames_out", "estimates"]
+assert model.outputs["actions"] == ["batch", joints] and model.outputs["frames_out"] == model.inputs["frames_in"]
+if source != "-":
+    check_page(model.metadata)
+run = make_run(model)
+for record in records:
+    error, scale = walk(run, recorded.trials(record))
+    print(f"{'ONNX Runtime' if runtime else 'numpy'}: actions of up to {scale:.1f} within {error:.1e}")
+    assert error < TOLERANCE * max(scale, 1)

@@ -1,0 +1,89 @@
+"""The policy in numpy (examples/python/policy.py) against what `mild eval` saw and did, and against faults that it must not
+survive. Usage: test_policy.py SOURCE_FOLDER POLICY EXACT.csv NOISY.csv, of eval --actions without and with noise and delay."""
+
+import pathlib
+import sys
+
+import recorded
+
+TOLERANCE = 1e-5
+source, policy, exact, noisy = pathlib.Path(sys.argv[1]), *sys.argv[2:]
+text = (source / "examples/python/policy.py").read_text(encoding="utf-8")
+page = (source / "docs/policy.md").read_text(encoding="utf-8")
+
+# what would go unnoticed in a port of one's own: text of the program, and what is there instead
+FAULTS = [
+    ("heads[:11], heads[11:27]", "heads[32:43], heads[16:32]", "action"),  # order of the heads
+    ("heads[11:27]", "heads[27:43]", "action"),
+    ("theta[:half] * mu + theta[half:]", "mu", "action"),  # no modulation
+    ("theta[:half] * mu + theta[half:]", "theta[half:] * mu + theta[:half]", "action"),
+    ("estimates[3:9]", "estimates[:6]", "action"),
+    ('.weight"] @ x', '.weight"].T.reshape(self.tensors[f"{name}.{i}.weight"].shape) @ x', "action"),  # transposed weights
+    ("np.expm1(np.minimum(x, 0))", "0", "action"),  # ReLU
+    ("np.expm1(np.minimum(x, 0))", "0.01 * x", "action"),
+    ("x if i == layers[-1] else", "", "action"),  # an activation behind the last layer
+    ("[means.ravel(), frame]", "[frame, means.ravel()]", "action"),
+    ("means.ravel()", "means[::-1].ravel()", "action"),  # newest mean first
+    (".reshape(5, self.stride, -1).mean(axis=1)", ".reshape(5, self.stride, -1)[:, -1]", "action"),  # frames, not their means
+    ("np.vstack([self.frames[1:], frame])", "np.vstack([frame, self.frames[:-1]])", "action"),
+    ("np.tile(frame,", "np.tile(0 * frame,", "action"),
+    ("[frame, estimates, z]", "[frame, z, estimates]", "action"),
+    ("[2, 2, 1]", "[1, 1, 1]", "observation"),
+    ("0.05 * qd", "qd", "observation"),
+    ("q - POSE", "q", "observation"),
+    ("0] * 2)", "0.1] * 2)", "observation"),
+    ("self.last, clock", "0 * self.last, clock", "observation"),
+    ("np.sin(turn), np.cos(turn)", "np.cos(turn), np.sin(turn)", "observation"),
+    ("0.01 / self.period", "0.02 / self.period", "observation"),
+    ("< 0.1)", "< 1)", "observation"),
+    ("1]), gravity,", "1]), -gravity,", "observation"),
+]
+
+
+def worst(program, trials, own):
+    """Largest error of the actions, and of the observations where the program makes its own (bool own)."""
+    names = {}
+    exec(compile(program, "policy.py", "exec"), names)  # the program under test, or one with a fault
+    action = observation = 0.0
+    for trial in trials:
+        runner = names["Policy"](policy)
+        runner.phase = trial.phase[0]
+        for k in range(len(trial.action)):
+            frame = trial.observation[k]
+            if own:
+                made = runner.observe(trial.omega[k], trial.gravity[k], trial.command[k], trial.angle[k], trial.speed[k])
+                observation = max(observation, abs(made - frame).max())
+            action = max(action, abs(runner.act(frame) - trial.action[k]).max())
+    return {"action": action, "observation": observation}
+
+
+def check_shapes():
+    """The table of tensors on the page."""
+    names = {}
+    exec(compile(text, "policy.py", "exec"), names)
+    tensors = names["read"](policy)
+    for net in "encoder", "modulation", "actor":
+        weights = [name for name in tensors if name.startswith(net) and name.endswith("weight")]
+        places = f"`{net}.0 " + " ".join("." + name.split(".")[1] for name in weights[1:]) + "`"
+        shapes = " ".join(str(list(tensors[name].shape)) for name in weights)
+        assert f"| {places} | {shapes} |" in page, f"docs/policy.md does not say {places} | {shapes}"
+
+
+def main():
+    walked, walked_noisy = recorded.trials(exact), recorded.trials(noisy)
+    found = worst(text, walked, True)
+    found_noisy = worst(text, walked_noisy, False)
+    print(f"actions {found['action']:.1e}, with noise {found_noisy['action']:.1e}; observations {found['observation']:.1e}")
+    assert max(*found.values(), found_noisy["action"]) < TOLERANCE
+    assert text in page, "docs/policy.md holds another program than examples/python/policy.py"
+    check_shapes()
+    least = {"action": 1e9, "observation": 1e9}
+    for old, new, what in FAULTS:
+        assert text.count(old) == 1, f"'{old}' is not once in the program"
+        error = worst(text.replace(old, new), walked[:1], True)[what]
+        assert error > 100 * TOLERANCE, f"a fault is not noticed: '{new}' for '{old}': {error:.1e}"
+        least[what] = min(least[what], error)
+    print(f"{len(FAULTS)} faults noticed, the least by {least['action']:.1e} and {least['observation']:.1e}")
+
+
+main()

@@ -1,0 +1,95 @@
+/* Any bytes as packets of a robot, and any numbers in a whole state, to a runner with limits and to
+ * one without: refused, or every number that it sends back is finite and within its bounds. */
+#include "drive/runner.h"
+#include "fuzz.h"
+
+enum { JOINTS = 12, STEPS_MAX = 40 };
+
+static Robot *robot;
+static TaskDef task;
+
+static Runner *make_runner(int limited) {
+    MildError error = {0};
+    if (!robot) {
+        robot = robot_create(MILD_SOURCE_DIR "/robots/sa01", &error);
+        task = task_def_default();
+        task_def_make_nominal(&task);
+    }
+    const RunnerDef def = {.policy = MILD_SOURCE_DIR "/policies/mild.safetensors",
+                           .robot = robot,
+                           .task = &task,
+                           .late = 0.02,
+                           .damp_after = 0.1,
+                           .speed_limit = limited ? 30 : 0,
+                           .angle_limit = limited ? 0.2 : -1,
+                           .torque_share = 1};
+    Runner *runner = runner_create(&def, &error);
+    fuzz_check(runner != NULL);
+    return runner;
+}
+
+static float take_float(Bytes *bytes) {
+    uint8_t raw[4];
+    float number;
+    for (int i = 0; i < 4; i++) {
+        raw[i] = (uint8_t)take_byte(bytes);
+    }
+    memcpy(&number, raw, sizeof number);
+    return number;
+}
+
+/* A state with a right checksum: numbers near those of a standing robot, or any. */
+static size_t write_state(Bytes *bytes, uint32_t step, uint8_t *packet) {
+    const int wild = take_below(bytes, 4) == 0;
+    StatePacket state = {.mode = (PacketMode)take_below(bytes, PACKET_MODES),
+                         .sequence = step + (uint32_t)take_below(bytes, 3) - 1,
+                         .time = 10000u * step + 1000u * take_byte(bytes),
+                         .quaternion = {1, 0, 0, 0}};
+    float *number = wild ? &state.angle[take_below(bytes, JOINTS)] : &state.angular_velocity[0];
+    *number = take_float(bytes);
+    state.speed[take_below(bytes, JOINTS)] =
+        take_below(bytes, 4) ? (float)take_byte(bytes) / 4 - 32 : take_float(bytes);
+    return packet_write_state(&state, JOINTS, packet);
+}
+
+static void check_target(const uint8_t *packet, size_t size) {
+    TargetPacket target;
+    fuzz_check(packet_read_target(packet, size, JOINTS, &target) == PACKET_FAULT_none);
+    for (int i = 0; i < JOINTS; i++) {
+        fuzz_check(target.kp[i] >= 0 && target.kd[i] > 0 && target.limit[i] > 0);
+        fuzz_check(target.mode < PACKET_damp || target.kp[i] == 0);
+    }
+}
+
+static void run(Runner *runner, Bytes *bytes) {
+    double now = 1;
+    for (uint32_t step = 1; step < STEPS_MAX && bytes->at < bytes->end; step++) {
+        const double command[3] = {take_number(bytes, 2), take_number(bytes, 2), 0};
+        uint8_t packet[PACKET_MAX];
+        const size_t size = write_state(bytes, step, packet);
+        if (take_below(bytes, 8) == 0) {
+            packet[take_byte(bytes) % size] ^= (uint8_t)take_byte(bytes);
+        }
+        runner_take(runner, packet, size, now);
+        now += 1e-4 * take_byte(bytes);
+        const size_t sent = runner_tick(runner, now, command, packet);
+        if (sent > 0) {
+            check_target(packet, sent);
+        }
+    }
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    StatePacket state;
+    TargetPacket target;
+    const int joints = size > 6 && data[6] >= 1 && data[6] <= ROBOT_JOINTS_MAX ? data[6] : 1;
+    packet_read_state(data, size, joints, &state);
+    packet_read_target(data, size, joints, &target);
+    if (fuzz_sample(data, size, 32)) { /* a runner reads its policy, which takes milliseconds */
+        Bytes bytes = {data, data + size};
+        Runner *runner = make_runner(take_below(&bytes, 2));
+        run(runner, &bytes);
+        runner_destroy(runner);
+    }
+    return 0;
+}
