@@ -15,6 +15,7 @@
 #include "config/experiment_keys.h"
 #include "control/controller.h"
 #include "eval/inside.h"
+#include "eval/track.h"
 #include "mild/batch.h"
 
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
@@ -25,7 +26,7 @@ typedef struct {
     CliNames grounds;
     CliNumbers speeds;
     double patch;
-    const char *latent, *ablate, *stances; /* NULL: not given */
+    const char *latent, *ablate, *stances, *track; /* NULL: not given */
     Ablation ablation;
     int threads, randomize;
     EvalDef eval;
@@ -50,6 +51,9 @@ static cJSON *row_json(const EvalRow *row) {
                   {"velocity", row->velocity},
                   {"cot", row->cot},
                   {"torque_max", row->torque_max},
+                  {"velocity_deviation", row->velocity_deviation},
+                  {"cot_deviation", row->cot_deviation},
+                  {"torque_deviation", row->torque_deviation},
                   {"clearance", row->clearance},
                   {"penetration", row->penetration},
                   {"drift", row->drift},
@@ -172,11 +176,12 @@ static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *co
     if (!sum || !means) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     } else if (meant) {
-        FILE *stances = e->eval.stances;
+        FILE *stances = e->eval.stances, *track = e->eval.track;
         log->sum = sum;
-        e->eval.stances = NULL;
+        e->eval.stances = e->eval.track = NULL;
         status = evaluate_rows(e, robot, pool, controller, NULL, error);
         e->eval.stances = stances;
+        e->eval.track = track;
         inside_means(log, means);
         log->sum = NULL;
     }
@@ -252,9 +257,9 @@ static void print_header(const Eval *e, FILE *table) {
 
 static MildStatus evaluate_table(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                                  MildError *error) {
-    const char *outputs[] = {e->json, e->latent, e->stances};
+    const char *outputs[] = {e->json, e->latent, e->stances, e->track};
     int taken = 0; /* bool: standard output */
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 4; i++) {
         taken = taken || (outputs[i] && strcmp(outputs[i], "-") == 0);
     }
     FILE *table = taken ? stderr : stdout;
@@ -276,17 +281,25 @@ static MildStatus evaluate_table(Eval *e, const Robot *robot, Pool *pool, Contro
 
 static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                            MildError *error) {
-    Sheet sheet = {0};
-    MildStatus status = e->stances ? sheet_open(&sheet, error) : MILD_OK;
-    if (sheet.file) {
-        eval_print_stances_header(sheet.file);
-        e->eval.stances = sheet.file;
+    Sheet stances = {0}, track = {0};
+    MildStatus status = e->stances ? sheet_open(&stances, error) : MILD_OK;
+    if (status == MILD_OK && e->track) {
+        status = sheet_open(&track, error);
     }
+    if (stances.file) {
+        eval_print_stances_header(stances.file);
+    }
+    if (track.file) {
+        track_print_header(track.file);
+    }
+    e->eval.stances = stances.file;
+    e->eval.track = track.file;
     if (status == MILD_OK) {
         status = evaluate_table(e, robot, pool, controller, error);
     }
-    e->eval.stances = NULL;
-    return sheet_close(&sheet, e->stances, status, error);
+    e->eval.stances = e->eval.track = NULL;
+    status = sheet_close(&stances, e->stances, status, error);
+    return sheet_close(&track, e->track, status, error);
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an
@@ -306,6 +319,7 @@ static MildStatus check_place(const Eval *e, MildError *error) {
     const int device = train_device(&e->train);
     const char *missing = e->latent           ? "--latent"
                           : e->ablate         ? "--ablate"
+                          : e->track          ? "--track"
                           : e->eval.push != 0 ? "--push"
                                               : NULL;
     if (device < -1) {
@@ -435,6 +449,9 @@ int cmd_eval(int argc, char **argv) {
         {"stances", CLI_OUTPUT, &e->stances, 0, 0, "FILE",
          "also write each stance of each foot as CSV: ground, speed, trial, foot, start, duration, "
          "depth, slip along the heading and to the left, apex of the swing before"},
+        {"track", CLI_OUTPUT, &e->track, 0, 0, "FILE",
+         "also write where the robot went, after every policy step, as CSV: ground, speed, trial, "
+         "time, centre of mass, base, roll and pitch of the base"},
         {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
          "also write the table as JSON to FILE; - for standard output"},
     };
