@@ -30,8 +30,7 @@ typedef struct {
     uint64_t seed;  /* trial k uses stream k */
     const EvalWatch *watch; /* NULL: nobody; by MuJoCo */
     FILE *stances;          /* a row of CSV for each stance of each trial; NULL: none */
-    FILE *
-        track; /* a row of CSV for each policy step of each trial (track.h), by MuJoCo; NULL: none */
+    FILE *track;            /* one for each policy step of each trial (track.h), by MuJoCo */
 } EvalDef;
 
 /* Means over the trials, SI units. */
