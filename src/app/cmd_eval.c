@@ -51,9 +51,6 @@ static cJSON *row_json(const EvalRow *row) {
                   {"velocity", row->velocity},
                   {"cot", row->cot},
                   {"torque_max", row->torque_max},
-                  {"velocity_deviation", row->velocity_deviation},
-                  {"cot_deviation", row->cot_deviation},
-                  {"torque_deviation", row->torque_deviation},
                   {"clearance", row->clearance},
                   {"penetration", row->penetration},
                   {"drift", row->drift},
@@ -68,7 +65,10 @@ static cJSON *row_json(const EvalRow *row) {
                   {"velocity_turn", row->velocity_turn},
                   {"push", row->push},
                   {"drift_forward", row->drift_forward},
-                  {"drift_left", row->drift_left}};
+                  {"drift_left", row->drift_left},
+                  {"velocity_deviation", row->velocity_deviation},
+                  {"cot_deviation", row->cot_deviation},
+                  {"torque_deviation", row->torque_deviation}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }
