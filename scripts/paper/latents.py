@@ -7,6 +7,7 @@ import latent_stats
 from measure import SEVEN, evaluate, mean, mild, save, together
 from page import Claim, Section, Table
 
+KEPT = ("ground", "speed", "trials", "success", "velocity", "cot", "cot_deviation", "torque_max")
 HALF_WEIGHT = 33.1 * 9.81 / 2  # [N]
 
 
@@ -25,21 +26,20 @@ def latent(given):
     save(given, "latent", [{"of": a, "names": b, "share": value} for (a, b), value in found.items()])
     save(given, "latent_periods", periods)
     share = {key: 100 * value for key, value in found.items()}
-    text = ("15 s walks at 0.4 and 0.8 m/s on seven grounds. A linear discriminant is fitted on two thirds of the trials and names the rest. "
-            f"From the mean of z~ over one gait period it names the ground in {share['z~, one gait period', 'ground']:.0f} %; with the names of "
-            f"the grounds shuffled among the walks, {share['z~, one gait period', 'ground, shuffled']:.0f} % (one of seven: 14 %). The command "
-            f"it names in {share['z~, one gait period', 'command']:.0f} % (chance: 50 %), and from one instant the phase of the gait, in eighths, in "
-            f"{share['z~, one instant', 'phase']:.0f} % (chance: 13 %). So z~ holds the ground, and the phase and command too; the upper row below "
-            "has one embedding three times, coloured by each, and the lower row means over a gait period, in which the phase is gone.\n\n"
-            f"Of the variance of z~ at an instant, the ground explains {share['z~, one instant', 'variance: ground']:.0f} %, the phase "
-            f"{share['z~, one instant', 'variance: phase']:.0f} %, the command {share['z~, one instant', 'variance: command']:.0f} %; of its means over "
-            f"a period the ground {share['z~, one gait period', 'variance: ground']:.0f} %, the command "
-            f"{share['z~, one gait period', 'variance: command']:.0f} %.")
+    period, instant = ({b: v for (a, b), v in share.items() if a == f"z~, {what}"} for what in ("one gait period", "one instant"))
+    text = f"""15 s walks at 0.4 and 0.8 m/s on seven grounds. A linear discriminant is fitted on two thirds of the trials and names the rest.
+From the mean of z~ over one gait period it names the ground in {period["ground"]:.0f} %; with the names of the grounds shuffled among the walks, in
+{period["ground, shuffled"]:.0f} % (one of seven: 14 %). The command it names in {period["command"]:.0f} % (chance: 50 %), and from one instant the
+phase of the gait, in eighths, in {instant["phase"]:.0f} % (chance: 13 %). So z~ holds the ground, and the phase and command too. The upper row
+has one embedding three times, coloured by each; the lower row means over a gait period, in which the phase is gone.
+
+Of the variance of z~ at an instant, the ground explains {instant["variance: ground"]:.0f} %, the phase {instant["variance: phase"]:.0f} %, the
+command {instant["variance: command"]:.0f} %; of its means over a period the ground {period["variance: ground"]:.0f} %, the command
+{period["variance: command"]:.0f} %."""
     table = [[a, b, f"{100 * value:.0f} %"] for (a, b), value in found.items()]
     named = found["z~, one gait period", "ground"]
-    claims = [Claim("z~ forms clusters by the ground's stiffness", "clusters (figure)",
-                    f"{100 * named:.0f} % of gait periods named ({share['z~, one gait period', 'ground, shuffled']:.0f} % shuffled)", named > 0.92,
-                    "hardware")]
+    ours = f"{100 * named:.0f} % of gait periods named ({period['ground, shuffled']:.0f} % shuffled)"
+    claims = [Claim("z~ forms clusters by the ground's stiffness", "clusters (figure)", ours, named > 0.92, "hardware")]
     return Section("What the latent knows", text, figures.embeddings(periods, moments), [Table(["from", "what", "share"], table)], claims,
                    "hardware", ["latent.csv", "latent_periods.csv"])
 
@@ -69,9 +69,9 @@ def parameters(given):
     rows, found = latent_stats.regression(paths, truth, ("log k_pen", "log sigma_cone", "log sinkage"))
     save(given, "parameters", rows)
     r2 = ", ".join(f"R2 of {name} {value:.2f}" for name, value in found.items())
-    text = ("Means of z~ over 6 s of a walk on each of 90 grounds: foam45, grass or sand_loose with another k_pen and another sigma_cone, each "
-            "drawn for itself; ridge regression, every third ground held out: " + r2 + ". At the depth of a walk a stiffer start and a steeper cone do much the "
-            "same to a foot; the sinkage of one level sole under half the weight is what both make of it.")
+    text = f"""Means of z~ over 6 s of a walk on each of 90 grounds: foam45, grass or sand_loose with another k_pen and another sigma_cone,
+each drawn for itself; ridge regression, every third ground held out: {r2}. At the depth of a walk a stiffer start and a steeper cone do much the
+same to a foot; the sinkage of one level sole under half the weight is what both make of it."""
     return Section("Ground parameters from the latent", text, [figures.regression(rows, found)], [],
                    [Claim("z~ is a continuous measure of stiffness, also on grounds never seen", "stated",
                           r2, min(list(found.values())[:2]) > 0.8, "hardware")],
@@ -91,13 +91,13 @@ def course(given):
     found = dict(zip(tracks, map(latent_stats.course, together(given, work, tracks))))
     save(given, "course", [{"way": way, **r} for way, rows in found.items() for r in rows])
     late = latent_stats.delays(found)
-    text = ("z~ on the axis that tells rubber from foam28 best (walks on either alone), means over one gait period, along a course of rubber, "
-            "foam28 and rubber, 2.5 m each, coloured by the ground under the base. Periods until z~ is past the middle after the base has "
-            f"crossed a border: {', '.join(f'{way} {value:.1f}' for way, value in late.items())} on the mean of all borders and trials.")
-    return Section("Rubber, foam, rubber", text, [figures.course(found)], [],
-                   [Claim("the latent follows a change of ground under way, forward and backward", "distinct tracks (figure)",
-                          ", ".join(f"{way} {value:.1f} gait periods" for way, value in late.items()), max(late.values()) <= 2, "hardware")],
-                   "hardware", ["course.csv"])
+    waits = ", ".join(f"{way} {value:.1f}" for way, value in late.items())
+    text = f"""z~ on the axis that tells rubber from foam28 best (walks on either alone), means over one gait period, along a course of rubber,
+foam28 and rubber, 2.5 m each, coloured by the ground under the base. Whole gait periods after a border until z~ is past the middle, mean of all
+borders and trials: {waits}."""
+    claim = Claim("the latent follows a change of ground under way, forward and backward", "distinct tracks (figure)",
+                  f"within gait periods: {waits}", max(late.values()) <= 2, "hardware")
+    return Section("Rubber, foam, rubber", text, [figures.course(found)], [], [claim], "hardware", ["course.csv"])
 
 
 def ablations(given):
@@ -109,8 +109,7 @@ def ablations(given):
 
     rows, table = [], []
     for part, found in zip(parts, together(given, work, parts)):
-        rows += [{"without": part or "nothing", **{k: r[k] for k in ("ground", "speed", "trials", "success", "velocity", "cot", "cot_deviation",
-                                                                     "torque_max")}} for r in found]
+        rows += [{"without": part or "nothing", **{k: r[k] for k in KEPT}} for r in found]
     save(given, "ablations", rows)
     for part in dict.fromkeys(r["without"] for r in rows):
         own = [r for r in rows if r["without"] == part]
@@ -121,9 +120,11 @@ def ablations(given):
     whole, without = ([r for r in rows if r["without"] == part] for part in ("nothing", "z"))
     falls = sum(r["success"] for r in whole) - sum(r["success"] for r in without)
     error = [mean(abs(r["velocity"] - r["speed"]) for r in own if r["success"]) for own in (whole, without)]
-    text = ("The shipped policy on seven grounds at 0.6 and 1.0 m/s. z and estimates: their means over the same trials in their place; modulation: "
-            "z~ = z; history: the newest frame in all places. Speed error and cost: of rows in which anybody stayed up.")
-    return Section("Without a part", text, [], [Table(["without", "upright", "speed error [m/s]", "cost of transport", "largest torque [N m]"], table)],
-                   [Claim("the latent adapts the walk", "stated", f"without z {falls} more falls, speed error {error[0]:.3f} -> {error[1]:.3f} m/s",
-                          falls > 0.05 * sum(r["trials"] for r in whole) or error[1] > 1.5 * error[0], "hardware")],
+    text = """The shipped policy on seven grounds at 0.6 and 1.0 m/s. z and estimates: their means over the same trials in their place;
+modulation: z~ = z; history: the newest frame in all places. Speed error and cost: of rows in which anybody stayed up."""
+    matters = falls > 0.05 * sum(r["trials"] for r in whole) or error[1] > 1.5 * error[0]
+    claim = Claim("the latent adapts the walk", "stated",
+                  f"without z {falls} more falls, speed error {error[0]:.3f} -> {error[1]:.3f} m/s", matters, "hardware")
+    heads = ["without", "upright", "speed error [m/s]", "cost of transport", "largest torque [N m]"]
+    return Section("Without a part", text, [], [Table(heads, table)], [claim],
                    "no ablation", ["ablations.csv"])

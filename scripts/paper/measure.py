@@ -12,6 +12,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MILD = shlex.split(os.environ.get("MILD", str(ROOT / "build/mild")))
+SHIPPED = ROOT / "policies/paper"  # seed 1 of each, in half precision
 SEVEN = ["rigid", "rubber", "foam60", "foam45", "foam28", "grass", "sand_loose"]  # the paper's six and the rigid plane
 NINE = ["rigid", "rubber", "foam60", "foam45", "foam28", "foam25", "grass", "sand_loose", "sand_dense"]
 TRAINED = ["mild", "con_cone", "con_spring", "ecc_spring", "ecc_quasi", "ecc_quasi_3d", "rigid"]
@@ -69,11 +70,14 @@ def models_of(given):
 
 
 def rivals_of(given):
-    """{name in the paper: (controller, [weights of each seed])} of those that are there."""
-    found = {"HT-2": "ht2", "Clock": "clock"}
-    files = {name: sorted(f for f in given.models.glob(f"{kind}*.safetensors") if "first_stage" not in f.name)
-             for name, kind in found.items()}
-    return {name: (found[name], own) for name, own in files.items() if own}
+    """{name in the paper: (controller, [weights of each seed])} of those that are there, or shipped."""
+    found = {}
+    for name, kind in {"HT-2": "ht2", "Clock": "clock"}.items():
+        for folder in (given.models, SHIPPED):
+            files = sorted(f for f in folder.glob(f"{kind}*.safetensors") if "first_stage" not in f.name)
+            if files and name not in found:
+                found[name] = kind, files
+    return found
 
 
 def note_of(path):

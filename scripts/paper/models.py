@@ -39,8 +39,8 @@ def transfer(given):
     upright = matrix(lambda r: 100 * r["upright"] / r["trials"])
     shown = {"upright [%]": upright, "speed error [m/s]": matrix(lambda r: r["speed_error"], True),
              "cost of transport": matrix(lambda r: r["cot"], True)}
-    rest = {"clearance [mm]": matrix(lambda r: 1e3 * r["clearance"], True), "penetration [mm]": matrix(lambda r: 1e3 * r["penetration"], True),
-            "slip forward [mm]": matrix(lambda r: 1e3 * r["slip_forward"], True)}
+    rest = {f"{name} [mm]": matrix(lambda r, k=key: 1e3 * r[k], True)
+            for name, key in (("clearance", "clearance"), ("penetration", "penetration"), ("slip forward", "slip_forward"))}
     others = {a: mean(u for b, u in zip(JUDGES, row) if b != a) for a, row in zip(trained, upright)}
     outside = {a: mean(u for b, u in zip(JUDGES, row) if b in ("bekker", "hunt_crossley")) for a, row in zip(trained, upright)}
     best, best_outside = max(others, key=others.get), max(outside, key=outside.get)
@@ -51,13 +51,14 @@ def transfer(given):
             ". On bekker and hunt_crossley, with which nobody was trained: " + ", ".join(f"{a} {u:.0f} %" for a, u in outside.items()) +
             ".\n\nCon-Cone and Con-Spring have one element a foot, which carries no moment: who has learnt to lean on the edge of "
             "a sole falls there, and who has not is slow and dear elsewhere.")
-    claims = [Claim("trained on the fine model, a policy survives more than trained on the simpler ones", "highest success rate",
-                    f"on the models but its own: {best} {others[best]:.0f} %, mild {others.get('mild', 0):.0f} %", best == "mild", "hardware"),
+    ours = f"on the models but its own: {best} {others[best]:.0f} %, mild {others.get('mild', 0):.0f} %"
+    claims = [Claim("trained on the fine model, a policy survives more than trained on the simpler ones", "highest success rate", ours,
+                    best == "mild", "hardware"),
               Claim("the same on models with which nobody was trained", "highest success rate",
                     f"{best_outside} {outside[best_outside]:.0f} %, mild {outside.get('mild', 0):.0f} %",
                     outside.get("mild", 0) == outside[best_outside], "hardware")]
-    return Section("Who survives where", text, [figures.matrices(shown, trained, JUDGES), figures.matrices(rest, trained, JUDGES, low=False)],
-                   [], claims, "hardware, 45d foam, in words", ["transfer.csv"])
+    pictures = [figures.matrices(shown, trained, JUDGES), figures.matrices(rest, trained, JUDGES, low=False)]
+    return Section("Who survives where", text, pictures, [], claims, "hardware, 45d foam, in words", ["transfer.csv"])
 
 
 # ---- penetration and slip ----
@@ -98,28 +99,30 @@ def penetration(given):
                      "depth_seeds": deviation(seeds[name]), "forward_mm": mean(map(abs, x)), "forward_deviation": deviation(map(abs, x)),
                      "left_mm": mean(map(abs, y)), "left_deviation": deviation(map(abs, y))})
     save(given, "penetration", rows)
-    save(given, "stances", [{"model": name, "depth_mm": d, "forward_mm": x, "left_mm": y} for name, own in points.items() for d, x, y in own])
+    save(given, "stances", [{"model": name, "depth_mm": d, "forward_mm": x, "left_mm": y}
+                            for name, own in points.items() for d, x, y in own])
     by = {r["model"]: r for r in rows}
 
     def more(name, key="depth_mm"):
         return 100 * (by["mild"][key] / by[name][key] - 1)
 
-    text = ("Each policy walks at 0.6 m/s on foam25 as its own model has it: deepest element of a stance, and how far the sole's centre "
-            "slips in it along the heading and to the left (mean magnitude ± standard deviation over stances).\n\n")
+    text = """Each policy walks at 0.6 m/s on foam25 as its own model has it: deepest element of a stance, and how far the sole's centre slips in
+it along the heading and to the left (mean magnitude ± standard deviation over stances).
+
+"""
     claims = []
     if "mild" in by and "ecc_spring" in by:
-        same = f"ecc_spring, k_pen {equal}"
-        text += (f"Against Ecc-Spring, mild sinks {more('ecc_spring'):+.0f} % and slips {more('ecc_spring', 'forward_mm'):+.0f} % along and "
-                 f"{more('ecc_spring', 'left_mm'):+.0f} % across. The paper's +38 % is a matter of what 'the same ground' means. Here all models "
-                 "are matched to one static sinkage of one foot under half the weight (docs/model.md, section 19), which leaves what the walk "
-                 "makes of it. The paper does not say how it matched them. If the springs have the number k_pen of foam25 itself "
-                 f"(--ground.k_pen={equal}; matched they have {matched_stiffness(equal):.0f}, because the cone's slope falls from k_pen as it completes), mild sinks "
-                 f"{more(same):+.0f} % and slips {more(same, 'forward_mm'):+.0f} %; with 125 N/m, {more('ecc_spring, k_pen 125'):+.0f} % and "
-                 f"{more('ecc_spring, k_pen 125', 'forward_mm'):+.0f} %. So equal parameters, and not another walk, would explain the paper's figure.")
-        claims.append(Claim("deeper penetration than Ecc-Spring on foam, longer slip", "+38 %, longer",
-                            f"matched sinkage: depth {more('ecc_spring'):+.0f} %, slip {more('ecc_spring', 'forward_mm'):+.0f} %; equal k_pen: "
-                            f"{more(same):+.0f} %, {more(same, 'forward_mm'):+.0f} %",
-                            more("ecc_spring") > 20 and more("ecc_spring", "forward_mm") > 0))
+        same, softer = f"ecc_spring, k_pen {equal}", "ecc_spring, k_pen 125"
+        depth, along, across = (more("ecc_spring", f"{k}_mm") for k in ("depth", "forward", "left"))
+        text += f"""Against Ecc-Spring, mild sinks {depth:+.0f} % and slips {along:+.0f} % along and {across:+.0f} % across. The paper's +38 % is a
+matter of what 'the same ground' means. Here all models are matched to one static sinkage of one foot under half the weight (docs/model.md,
+section 19), which leaves what the walk makes of it. The paper does not say how it matched them. If the springs have the number k_pen of foam25
+itself (--ground.k_pen={equal}; matched they have {matched_stiffness(equal):.0f}, because the cone's slope falls from k_pen as it completes), mild
+sinks {more(same):+.0f} % and slips {more(same, "forward_mm"):+.0f} %; with 125 N/m, {more(softer):+.0f} % and {more(softer, "forward_mm"):+.0f} %. So
+equal parameters, and not another walk, would explain the paper's figure."""
+        ours = (f"matched sinkage: depth {depth:+.0f} %, slip {along:+.0f} %; equal k_pen: {more(same):+.0f} %, "
+                f"{more(same, 'forward_mm'):+.0f} %")
+        claims.append(Claim("deeper penetration than Ecc-Spring on foam, longer slip", "+38 %, longer", ours, depth > 20 and along > 0))
     table = [[r["model"], r["stances"], *(f"{r[k + '_mm']:.1f} ± {r[k + '_deviation']:.1f}" for k in ("depth", "forward", "left")),
               f"{r['depth_seeds']:.1f}"] for r in rows]
     return Section("Penetration and slip by ground model", text, [figures.clouds({m: p for m, p in points.items() if "k_pen" not in m})],
@@ -158,8 +161,8 @@ def foam(given):
     dear = {m: mean(r["cot"] for r in rows if r["trained"] == m and r["ground"] == "foam25" and r["success"]) for m in models_of(given)
             if good[m, "foam25"] >= 50}
     cheap = min(dear, key=dear.get) if dear else "none"
-    text = ("Every policy on the same ground: foam25 and foam45 of the paper's own model, at 0.3 and 0.6 m/s. Cost: mean ± standard deviation "
-            "over speeds and seeds of rows in which anybody stayed up.")
+    text = """Every policy on the same ground: foam25 and foam45 of the paper's own model, at 0.3 and 0.6 m/s. Cost: mean ± standard deviation
+over speeds and seeds of rows in which anybody stayed up."""
     claims = [Claim("on foam25 the fine model gives the highest success", "highest (figure)",
                     f"{', '.join(lead)} {first:.0f} %" + ("" if "mild" in lead else f", mild {good.get(('mild', 'foam25'), 0):.0f} %"),
                     lead == ["mild"], "hardware"),

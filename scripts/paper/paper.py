@@ -9,6 +9,7 @@ experiment leaves its numbers as CSV in OUT. Without names: all."""
 import argparse
 import os
 import pathlib
+import resource
 import sys
 import tempfile
 import time
@@ -18,7 +19,7 @@ import latents
 import models
 import page
 import walks
-from measure import ROOT, mild, models_of, rivals_of
+from measure import ROOT, SHIPPED, mild, models_of, rivals_of
 
 EXPERIMENTS = {f.__name__: f for f in (controllers.table2, models.transfer, models.penetration, models.foam, controllers.passivity,
                                        walks.terrains, latents.latent, latents.parameters, latents.course, latents.ablations,
@@ -26,11 +27,20 @@ EXPERIMENTS = {f.__name__: f for f in (controllers.table2, models.transfer, mode
 TRAINED = ("transfer", "penetration", "foam")  # those that need a policy of each model
 
 
+def processor_seconds():
+    """[s] of this program and of all that it started and waited for."""
+    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+
+
+def shown(path):
+    return path.resolve().relative_to(ROOT) if path.resolve().is_relative_to(ROOT) else path
+
+
 def main():
-    trained, shipped = ROOT / "runs/paper", ROOT / "policies/paper"
+    trained = ROOT / "runs/paper"
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("experiments", nargs="*", metavar="EXPERIMENT", help=" ".join(EXPERIMENTS))
-    parser.add_argument("--models", type=pathlib.Path, default=trained if list(trained.glob("*.safetensors")) else shipped)
+    parser.add_argument("--models", type=pathlib.Path, default=trained if list(trained.glob("*.safetensors")) else SHIPPED)
     parser.add_argument("--policy", type=pathlib.Path, default=ROOT / "policies/mild.safetensors")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "out/paper")
     parser.add_argument("--trials", type=int, default=10, help="per row (default 10)")
@@ -49,13 +59,13 @@ def main():
     with tempfile.TemporaryDirectory() as raw:  # large tables that the experiments summarise
         given.raw = pathlib.Path(raw)
         for name in names:
-            begin = time.time()
+            begin, worked = time.time(), processor_seconds()
             sections.append(EXPERIMENTS[name](given))
-            print(f"{name}: {time.time() - begin:.0f} s", flush=True)
+            print(f"{name}: {time.time() - begin:.0f} s, {processor_seconds() - worked:.0f} s of processor time", flush=True)
     seeds = max((len(files) for files in models_of(given).values()), default=0)
     rivals = ", ".join(f"{name} {len(files)}" for name, (_, files) in rivals_of(given).items()) or "none"
-    how = (f"{given.trials} trials a row; seeds of each training by ground model: {seeds}, of the rivals: {rivals}. The policy of a section is "
-           "the shipped one unless it says another.")
+    how = (f"{given.trials} trials a row; weights of {shown(given.models)}; seeds of each training by ground model: {seeds}, of the rivals: "
+           f"{rivals}. The policy of a section is the shipped one unless it says another.")
     page.write(given.out / "index.html", sections, mild("--version").strip(), how)
     print(given.out / "index.html")
 
