@@ -124,7 +124,7 @@ equal parameters, and not another walk, would explain the paper's figure."""
                 f"{more(same, 'forward_mm'):+.0f} %")
         claims.append(Claim("deeper penetration than Ecc-Spring on foam, longer slip", "+38 %, longer", ours, depth > 20 and along > 0))
     table = [[r["model"], r["stances"], *(f"{r[k + '_mm']:.1f} ± {r[k + '_deviation']:.1f}" for k in ("depth", "forward", "left")),
-              f"{r['depth_seeds']:.1f}"] for r in rows]
+              f"{r['depth_seeds']:.1f}" if len(seeds[r["model"]]) > 1 else "-"] for r in rows]
     return Section("Penetration and slip by ground model", text, [figures.clouds({m: p for m, p in points.items() if "k_pen" not in m})],
                    [Table(["trained and walked on", "stances", "penetration [mm]", "slip along [mm]", "slip across [mm]",
                            "penetration: deviation over seeds"], table)], claims, "simulation", ["penetration.csv", "stances.csv"])
@@ -159,10 +159,11 @@ def foam(given):
     first = max(good[m, "foam25"] for m in models_of(given))
     lead = [m for m in models_of(given) if good[m, "foam25"] == first]
     dear = {m: mean(r["cot"] for r in rows if r["trained"] == m and r["ground"] == "foam25" and r["success"]) for m in models_of(given)
-            if good[m, "foam25"] >= 50}
+            if good[m, "foam25"] >= 80}  # of who falls, the cheap walks are left
     cheap = min(dear, key=dear.get) if dear else "none"
     text = """Every policy on the same ground: foam25 and foam45 of the paper's own model, at 0.3 and 0.6 m/s. Cost: mean ± standard deviation
 over speeds and seeds of rows in which anybody stayed up."""
+    text += " In the comparison of energy are those that stay up in 80 % on foam25."
     claims = [Claim("on foam25 the fine model gives the highest success", "highest (figure)",
                     f"{', '.join(lead)} {first:.0f} %" + ("" if "mild" in lead else f", mild {good.get(('mild', 'foam25'), 0):.0f} %"),
                     lead == ["mild"], "hardware"),
