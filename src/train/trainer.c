@@ -39,9 +39,13 @@ void train_destroy(Trainer *trainer) {
  */
 static MildStatus start_policy(Trainer *trainer, MildError *error) {
     const char *path = trainer->def.train.start;
-    Policy *start = path[0] ? policy_load(path, NULL, 0, error) : NULL;
+    MildError cause = {0};
+    if (!path[0]) {
+        return MILD_OK;
+    }
+    Policy *start = policy_load(path, NULL, 0, &cause);
     if (!start) {
-        return path[0] ? error->status : MILD_OK;
+        return mild_fail(error, cause.status, "train.start: %s", cause.text);
     }
     const int64_t count = policy_parameter_count(trainer->policy);
     const PolicyDef *own = policy_def(trainer->policy), *other = policy_def(start);

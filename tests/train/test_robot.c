@@ -145,8 +145,8 @@ static void an_unknown_robot_is_named(void **unused) {
     assert_non_null(strstr(error.text, "train.robot: unknown robot 'sa02'; nearest is 'sa01'"));
 }
 
-/* train.start: the networks of a file in the place of those that the seed draws; another robot's are
- * refused. */
+/* train.start: the networks of a file in the place of those that the seed draws. Those of another
+ * robot are refused. */
 static void a_run_begins_with_a_policy(void **unused) {
     (void)unused;
     MildError error = {0};
