@@ -30,7 +30,7 @@ help:
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
 	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
-	@echo "make paper   the paper's experiments as one page, out/paper/index.html (docs/paper.md); QUICK=1: few trials"
+	@echo "make paper   the paper's experiments as one page, out/paper/index.html (docs/paper.md); QUICK=1: few trials, shipped weights"
 	@echo "make web     the walk in a browser, build/web, for \`build/mild web\` or any static host (docs/web.md)"
 	@echo "make web-test   ten seconds of it in headless Chromium"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
@@ -87,11 +87,11 @@ fuzz: setup
 mutants: setup
 	@scripts/mutants.py --layer $(LAYER) -n $(N) --seed $(SEED) --jobs $(JOBS) $(if $(FAULTS),--faults) $(MUTANTS)
 
-# Trains only where there is a GPU (a build with CMAKE_FLAGS=-DMILD_CUDA=ON); keeps what runs/paper has.
+# Trains only where there is a GPU (a build with CMAKE_FLAGS=-DMILD_CUDA=ON); keeps what runs/paper has. QUICK: the shipped weights.
 paper: build
 	@.venv/bin/pip install -q -r scripts/paper/requirements.txt
-	@if nvidia-smi >/dev/null 2>&1; then scripts/paper/train.sh runs/paper; fi
-	@.venv/bin/python scripts/paper/paper.py $(if $(QUICK),--trials 3)
+	@$(if $(QUICK),:,if nvidia-smi >/dev/null 2>&1; then scripts/paper/train.sh runs/paper; fi)
+	@.venv/bin/python scripts/paper/paper.py $(if $(QUICK),--trials 3 --models policies/paper)
 
 # emscripten and, for the test, Chromium: large, so nothing else installs them.
 web:

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# The tour of `make run`: watch the shipped policy walk, train one from scratch, compare both on one course.
+# The tour of `make run`: watch the shipped policy walk, train one further, compare all on one course. START=none: train one from nothing.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 minutes=${MINUTES:-5}
 mild=build/mild
 shipped=policies/mild.safetensors
+start=${START:-policies/paper/mild-1.safetensors} # half a minute of training on a GPU, by configs/models.ini
 trained=runs/quick/policy.safetensors
 course=(--ground rubber,foam45,sand_loose --speed 0.3,0.6 --trials 5 --seconds 20)
 
@@ -18,16 +19,28 @@ echo "1/3  The shipped policy walks from rubber over foam onto loose sand."
 "$mild" play --policy "$shipped" --ground rubber,foam45,sand_loose --video out/walk.mp4 --pressure out/pressure.png
 
 echo
-echo "2/3  A policy of your own, from nothing, in $minutes minutes. Ctrl-C ends the training early and keeps what it has."
+begin=(--train.start="$start" --ppo.learning_rate=5e-5) # its first steps are small, so that it does not forget
+if [ "$start" = none ]; then
+    begin=()
+    echo "2/3  A policy of your own, from nothing, in $minutes minutes. On two cores a walk takes an hour: expect it to fall."
+else
+    echo "2/3  A policy of your own, in $minutes minutes, from $start."
+fi
+echo "     Ctrl-C ends the training early and keeps what it has."
 rm -rf runs/quick
 set -m # the training is a job of its own: Ctrl-C reaches it alone, and this script goes on
-"$mild" train --config configs/quick.ini --train.minutes="$minutes" --out runs/quick
+"$mild" train --config configs/quick.ini --train.minutes="$minutes" --out runs/quick "${begin[@]}"
 set +m
 
 echo
-echo "3/3  Both policies on the same course."
+echo "3/3  The policies on the same course."
+tables=(shipped=out/shipped.json)
+if [ "$start" != none ]; then
+    "$mild" eval --policy "$start" "${course[@]}" --json out/start.json >out/start.txt
+    tables+=(start=out/start.json)
+fi
 "$mild" eval --policy "$shipped" "${course[@]}" --json out/shipped.json >out/shipped.txt
 "$mild" eval --policy "$trained" "${course[@]}" --json out/trained.json >out/trained.txt
-.venv/bin/python scripts/compare.py shipped=out/shipped.json trained=out/trained.json
+.venv/bin/python scripts/compare.py "${tables[@]}" yours=out/trained.json
 echo
 echo "Video out/walk.mp4, sole pressure out/pressure.png, training log runs/quick/log.csv, your policy $trained."

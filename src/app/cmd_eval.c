@@ -17,6 +17,7 @@
 #include "control/controller.h"
 #include "eval/actions.h"
 #include "eval/inside.h"
+#include "eval/track.h"
 #include "mild/batch.h"
 
 enum { ROWS_MAX = CLI_LIST_MAX * CLI_LIST_MAX };
@@ -27,7 +28,7 @@ typedef struct {
     CliNames grounds;
     CliNumbers speeds;
     double patch;
-    const char *latent, *ablate, *stances, *actions; /* NULL: not given */
+    const char *latent, *ablate, *stances, *actions, *track; /* NULL: not given */
     Ablation ablation;
     int threads, randomize;
     EvalDef eval;
@@ -66,7 +67,10 @@ static cJSON *row_json(const EvalRow *row) {
                   {"velocity_turn", row->velocity_turn},
                   {"push", row->push},
                   {"drift_forward", row->drift_forward},
-                  {"drift_left", row->drift_left}};
+                  {"drift_left", row->drift_left},
+                  {"velocity_deviation", row->velocity_deviation},
+                  {"cot_deviation", row->cot_deviation},
+                  {"torque_deviation", row->torque_deviation}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }
@@ -176,7 +180,7 @@ static MildStatus ablate(Eval *e, const Robot *robot, Pool *pool, Controller *co
     } else if (meant) {
         const EvalDef whole = e->eval;
         log->sum = sum;
-        e->eval.stances = e->eval.actions = NULL;
+        e->eval.stances = e->eval.actions = e->eval.track = NULL;
         status = evaluate_rows(e, robot, pool, controller, NULL, error);
         e->eval = whole;
         inside_means(log, means);
@@ -254,9 +258,9 @@ static void print_header(const Eval *e, FILE *table) {
 
 static MildStatus evaluate_table(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                                  MildError *error) {
-    const char *outputs[] = {e->json, e->latent, e->stances, e->actions};
+    const char *outputs[] = {e->json, e->latent, e->stances, e->actions, e->track};
     int taken = 0; /* bool: standard output */
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 5; i++) {
         taken = taken || (outputs[i] && strcmp(outputs[i], "-") == 0);
     }
     FILE *table = taken ? stderr : stdout;
@@ -278,25 +282,33 @@ static MildStatus evaluate_table(Eval *e, const Robot *robot, Pool *pool, Contro
 
 static MildStatus evaluate(Eval *e, const Robot *robot, Pool *pool, Controller *controller,
                            MildError *error) {
-    Sheet stances = {0}, actions = {0};
+    Sheet stances = {0}, actions = {0}, track = {0};
     MildStatus status = e->stances ? sheet_open(&stances, error) : MILD_OK;
-    if (stances.file) {
-        eval_print_stances_header(stances.file);
-        e->eval.stances = stances.file;
-    }
     if (status == MILD_OK && e->actions) {
         status = sheet_open(&actions, error);
     }
+    if (status == MILD_OK && e->track) {
+        status = sheet_open(&track, error);
+    }
+    if (stances.file) {
+        eval_print_stances_header(stances.file);
+    }
     if (actions.file) {
         actions_print_header(actions.file, robot);
-        e->eval.actions = actions.file;
     }
+    if (track.file) {
+        track_print_header(track.file);
+    }
+    e->eval.stances = stances.file;
+    e->eval.actions = actions.file;
+    e->eval.track = track.file;
     if (status == MILD_OK) {
         status = evaluate_table(e, robot, pool, controller, error);
     }
-    e->eval.stances = e->eval.actions = NULL;
+    e->eval.stances = e->eval.actions = e->eval.track = NULL;
     status = sheet_close(&stances, e->stances, status, error);
-    return sheet_close(&actions, e->actions, status, error);
+    status = sheet_close(&actions, e->actions, status, error);
+    return sheet_close(&track, e->track, status, error);
 }
 
 /* Checks all grounds before the first trial: a typing error in the last one should not cost an
@@ -317,6 +329,7 @@ static MildStatus check_place(const Eval *e, MildError *error) {
     const char *missing = e->latent           ? "--latent"
                           : e->ablate         ? "--ablate"
                           : e->actions        ? "--actions"
+                          : e->track          ? "--track"
                           : e->eval.push != 0 ? "--push"
                                               : NULL;
     if (device < -1) {
@@ -452,6 +465,9 @@ int cmd_eval(int argc, char **argv) {
         {"actions", CLI_OUTPUT, &e->actions, 0, 0, "FILE",
          "also write what the controller saw and did at every decision, as CSV: trial, ground, "
          "speed, time, the true state, the observation, the action (docs/policy.md)"},
+        {"track", CLI_OUTPUT, &e->track, 0, 0, "FILE",
+         "also write where the robot went, after every policy step, as CSV: ground, speed, trial, "
+         "time, centre of mass, base, roll and pitch of the base"},
         {"json", CLI_OUTPUT, &e->json, 0, 0, "FILE",
          "also write the table as JSON to FILE; - for standard output"},
     };

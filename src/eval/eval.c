@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "eval/actions.h"
+#include "eval/track.h"
 
 #define HEADING_GAIN 1.0  /* [1/s] */
 #define HEADING_LIMIT 0.5 /* [rad/s] */
@@ -59,6 +60,7 @@ typedef struct {
     Measure *measure; /* [trials] */
     float *action;    /* [trials][robot_joints] */
     uint8_t *over;    /* [trials] fell or diverged */
+    Track track;      /* if EvalDef.track is given */
 } Trials;
 
 static void start_trial(void *context, int trial, int thread) {
@@ -88,6 +90,9 @@ static void step_trial(void *context, int trial, int thread) {
     TaskStep step = task_env_step(t->env[trial], t->def, t->robot, t->sim[thread],
                                   t->action + trial * robot_joints(t->robot), 0, &none, &probe);
     t->over[trial] = step.done && !step.timeout;
+    if (t->eval->track && !t->over[trial]) {
+        track_take(&t->track, trial, t->sim[thread]);
+    }
     TaskEnv *env = t->env[trial];
     eval_direct(t->eval, t->measure[trial].time, env->robot.qpos + 3, env->command);
     push_trial(env, t->eval->push);
@@ -130,6 +135,7 @@ static void free_trials(Trials *t, int trials, int threads) {
     measure_free(t->measure, trials);
     free(t->action);
     free(t->over);
+    track_free(&t->track);
 }
 
 static MildStatus make_trials(Trials *t, int trials, int threads, MildError *error) {
@@ -163,9 +169,12 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
     Trials t = {
         .def = &local, .robot = robot, .scene = scene, .eval = eval, .controller = controller};
     MildStatus status = make_trials(&t, eval->trials, pool_threads(pool), error);
+    const int steps = (int)(eval->seconds / TASK_PERIOD + 0.5);
+    if (status == MILD_OK && eval->track) {
+        status = track_make(&t.track, eval->trials, steps, error);
+    }
     if (status == MILD_OK) {
         pool_run(pool, eval->trials, start_trial, &t);
-        int steps = (int)(eval->seconds / TASK_PERIOD + 0.5);
         for (int step = 0; step < steps; step++) {
             controller->act(controller->self, eval->trials, t.env, t.action);
             tell_watch(&t, step);
@@ -174,6 +183,9 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
         }
         status = eval_summarise(row, scene->name, eval, t.measure, t.over,
                                 robot_total_mass(robot) * EVAL_GRAVITY, error);
+    }
+    if (status == MILD_OK && eval->track) {
+        track_print(&t.track, scene->name, eval->speed, TASK_PERIOD, eval->track);
     }
     free_trials(&t, eval->trials, pool_threads(pool));
     return status;

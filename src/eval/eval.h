@@ -31,6 +31,7 @@ typedef struct {
     const EvalWatch *watch; /* NULL: nobody; by MuJoCo */
     FILE *stances;          /* a row of CSV for each stance of each trial; NULL: none */
     FILE *actions;          /* one for each decision, see eval/actions.h; NULL: none; by MuJoCo */
+    FILE *track;            /* one for each policy step of each trial (track.h), by MuJoCo */
 } EvalDef;
 
 /* Means over the trials, SI units. */
@@ -44,20 +45,23 @@ typedef struct {
     double velocity_low;  /* [m/s] 95 % interval of the mean over trials: lower end */
     double velocity_high; /* [m/s] upper end */
     double sideways;      /* [m/s] commanded, to the left */
-    double velocity_sideways; /* [m/s] measured, to the left */
-    double turn;              /* [rad/s] commanded */
-    double velocity_turn;     /* [rad/s] measured */
-    double push;              /* [m/s] */
-    double cot;               /* [-] sum |tau qd| / (m g v) */
-    double torque_max;        /* [N m] largest over joints and time, mean over trials */
-    double clearance;         /* [m] swing apex of the lowest sole point above h0 */
-    double penetration;       /* [m] deepest element of each stance */
-    double drift;             /* [m] horizontal travel of the sole between touchdown and lift-off */
-    double drift_forward;     /* [m] magnitude of its part along the robot's heading */
-    double drift_left;        /* [m] and across it */
-    double energy;            /* [J] integral |tau . qd| dt */
-    double base_oscillation;  /* [m] peak to peak of the base height over the steady part */
-    double seconds;           /* [s] mean time until a fall or the end */
+    double velocity_sideways;  /* [m/s] measured, to the left */
+    double turn;               /* [rad/s] commanded */
+    double velocity_turn;      /* [rad/s] measured */
+    double push;               /* [m/s] */
+    double cot;                /* [-] sum |tau qd| / (m g v) */
+    double torque_max;         /* [N m] largest over joints and time, mean over trials */
+    double velocity_deviation; /* [m/s] standard deviation over the trials of velocity */
+    double cot_deviation;      /* [-] of cot */
+    double torque_deviation;   /* [N m] of torque_max */
+    double clearance;          /* [m] swing apex of the lowest sole point above h0 */
+    double penetration;        /* [m] deepest element of each stance */
+    double drift;            /* [m] horizontal travel of the sole between touchdown and lift-off */
+    double drift_forward;    /* [m] magnitude of its part along the robot's heading */
+    double drift_left;       /* [m] and across it */
+    double energy;           /* [J] integral |tau . qd| dt */
+    double base_oscillation; /* [m] peak to peak of the base height over the steady part */
+    double seconds;          /* [s] mean time until a fall or the end */
 } EvalRow;
 
 /* Runs the trials of one row. `def` gives control, gait and sensors. Its randomisation should be

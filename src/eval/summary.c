@@ -8,11 +8,16 @@
 #define STEADY_LEAST 0.5    /* [s] a shorter steady part is too short to measure speed */
 #define DISTANCE_LEAST 1e-3 /* [m] keeps the cost of transport of a standing robot finite */
 
+/* Standard deviation of `count` numbers with this mean and this mean of their squares. */
+static double deviation(double mean, double square, int count) {
+    return sqrt(fmax(square - mean * mean, 0) * count / fmax(count - 1, 1));
+}
+
 /* Speed, cost of transport and base motion over the steady part of the trials without a fall,
  * because a robot that dives forward and falls is not fast. If all trials fell, of all trials. */
 static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_t *fallen,
                              double weight) {
-    double v_sum = 0, v_square = 0;
+    double v_sum = 0, v_square = 0, cot_square = 0;
     int steady = 0;
     for (int i = 0; i < row->trials; i++) {
         const Measure *m = &measures[i];
@@ -28,7 +33,9 @@ static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_
         v_square += v * v;
         row->velocity_sideways += left / m->steady_time;
         row->velocity_turn += m->turned / m->steady_time;
-        row->cot += m->work / (weight * fmax(way, DISTANCE_LEAST));
+        const double cot = m->work / (weight * fmax(way, DISTANCE_LEAST));
+        row->cot += cot;
+        cot_square += cot * cot;
         row->base_oscillation += m->base_high - m->base_low;
         steady++;
     }
@@ -36,14 +43,14 @@ static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_
         return;
     }
     row->velocity = v_sum / steady;
-    double variance =
-        fmax(v_square / steady - row->velocity * row->velocity, 0) * steady / fmax(steady - 1, 1);
-    double half = steady > 1 ? student_95(steady - 1) * sqrt(variance / steady) : 0;
+    row->velocity_deviation = deviation(row->velocity, v_square / steady, steady);
+    double half = steady > 1 ? student_95(steady - 1) * row->velocity_deviation / sqrt(steady) : 0;
     row->velocity_low = row->velocity - half;
     row->velocity_high = row->velocity + half;
     row->velocity_sideways /= steady;
     row->velocity_turn /= steady;
     row->cot /= steady;
+    row->cot_deviation = deviation(row->cot, cot_square / steady, steady);
     row->base_oscillation /= steady;
 }
 
@@ -70,7 +77,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
     const int trials = eval->trials;
     MildStatus status = MILD_OK;
     int swings = 0, stances = 0;
-    double apex = 0, deepest = 0, drift = 0, way[2] = {0, 0};
+    double apex = 0, deepest = 0, drift = 0, way[2] = {0, 0}, torque_square = 0;
     *row = (EvalRow){.speed = eval->speed,
                      .sideways = eval->sideways,
                      .turn = eval->turn,
@@ -84,6 +91,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
         row->energy += m->energy / trials;
         row->seconds += m->time / trials;
         row->torque_max += m->torque_max / trials;
+        torque_square += m->torque_max * m->torque_max / trials;
         apex += m->apex_sum;
         swings += m->swings;
         deepest += m->deepest_sum;
@@ -95,6 +103,7 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
             status = print_stances(row, i, m, eval->stances, error);
         }
     }
+    row->torque_deviation = deviation(row->torque_max, torque_square, trials);
     summarise_motion(row, measures, fallen, weight);
     row->clearance = swings ? apex / swings : 0;
     row->penetration = stances ? deepest / stances : 0;

@@ -2,6 +2,7 @@
 
 #include <cjson/cJSON.h>
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,12 +21,13 @@ struct Safetensors {
     unsigned char *bytes;
     size_t size, data; /* data: where the data begins */
     cJSON *header;
+    float *wide; /* numbers of the tensors that are F16 in the file */
     int count;
     Safetensor tensor[];
 };
 
-static const char *const type_names[] = {"F32", "F64", "I64", "U8"};
-static const size_t type_sizes[] = {4, 8, 8, 1};
+static const char *const type_names[] = {"F32", "F64", "I64", "U8", "F16"};
+static const size_t type_sizes[] = {4, 8, 8, 1, 2};
 
 /* ---- checksum: CRC-32 of IEEE 802.3 ---- */
 
@@ -191,7 +193,7 @@ static const char *parse_tensor(const Safetensors *file, const cJSON *entry, Saf
     *tensor = (Safetensor){.name = entry->string};
     if (!cJSON_IsObject(entry) ||
         !parse_type(cJSON_GetObjectItemCaseSensitive(entry, "dtype"), &tensor->type)) {
-        return "a tensor has a type that is none of F32, F64, I64, U8";
+        return "a tensor has a type that is none of F32, F64, I64, U8, F16";
     }
     if (!cJSON_IsArray(shape) || cJSON_GetArraySize(shape) > SAFETENSORS_RANK_MAX) {
         return "a tensor has no usable shape";
@@ -261,6 +263,43 @@ static const char *parse_header(Safetensors *file) {
     return check_tiling(file);
 }
 
+/* The number of IEEE 754 binary16 with these bits: (-1)^sign (1 + fraction/1024) 2^(exponent - 15);
+ * where the exponent is 0, (-1)^sign fraction/1024 2^-14. */
+static float half_number(unsigned bits) {
+    const int exponent = (int)(bits >> 10 & 31u), fraction = (int)(bits & 1023u);
+    float size;
+    if (exponent == 31) {
+        size = fraction ? NAN : INFINITY;
+    } else {
+        size = exponent ? ldexpf((float)(1024 + fraction), exponent - 25)
+                        : ldexpf((float)fraction, -24);
+    }
+    return bits & 0x8000u ? -size : size;
+}
+
+/* Makes every F16 tensor one of F32, exactly. Returns 0 when out of memory. */
+static int widen(Safetensors *file) {
+    size_t count = 0;
+    for (int i = 0; i < file->count; i++) {
+        count += file->tensor[i].type == SAFETENSORS_F16 ? file->tensor[i].bytes / 2 : 0;
+    }
+    float *at = file->wide = count ? malloc(count * sizeof *at) : NULL;
+    for (int i = 0; i < file->count && at; i++) {
+        Safetensor *tensor = &file->tensor[i];
+        if (tensor->type == SAFETENSORS_F16) {
+            const unsigned char *half = tensor->data;
+            const size_t numbers = tensor->bytes / 2;
+            tensor->type = SAFETENSORS_F32;
+            tensor->data = at;
+            tensor->bytes = numbers * sizeof *at;
+            for (size_t k = 0; k < numbers; k++) {
+                *at++ = half_number(half[2 * k] | (unsigned)half[2 * k + 1] << 8);
+            }
+        }
+    }
+    return count == 0 || file->wide;
+}
+
 /* Everything that can be said before the JSON is looked at. */
 static MildStatus check_frame(const unsigned char *bytes, size_t size, const char *path,
                               MildError *error) {
@@ -316,6 +355,11 @@ Safetensors *safetensors_parse(unsigned char *bytes, size_t size, const char *pa
     }
     if (wrong) {
         damaged(path, wrong, error);
+    } else if (!widen(file)) {
+        wrong = "no memory";
+        mild_fail(error, MILD_ERROR_MEMORY, "%s: no memory to read it", path);
+    }
+    if (wrong) {
         safetensors_destroy(file);
         return NULL;
     }
@@ -331,6 +375,7 @@ Safetensors *safetensors_read(const char *path, MildError *error) {
 void safetensors_destroy(Safetensors *file) {
     if (file) {
         cJSON_Delete(file->header);
+        free(file->wide);
         free(file->bytes);
         free(file);
     }

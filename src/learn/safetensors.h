@@ -12,7 +12,14 @@
 
 #define SAFETENSORS_RANK_MAX 4
 
-typedef enum { SAFETENSORS_F32, SAFETENSORS_F64, SAFETENSORS_I64, SAFETENSORS_U8 } SafetensorsType;
+/* F16, half precision, is for files alone: a reader finds such a tensor as F32. */
+typedef enum {
+    SAFETENSORS_F32,
+    SAFETENSORS_F64,
+    SAFETENSORS_I64,
+    SAFETENSORS_U8,
+    SAFETENSORS_F16
+} SafetensorsType;
 
 typedef struct {
     const char *name;

@@ -111,6 +111,8 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
 const double *robot_sim_qpos(const RobotSim *sim);
 const double *robot_sim_qvel(const RobotSim *sim);
 const double *robot_sim_base_rotation(const RobotSim *sim); /* [9] base to world, row major */
+/* [3] m: centre of mass of the robot, world */
+const double *robot_sim_mass_center(const RobotSim *sim);
 const RobotFoot *robot_sim_foot(const RobotSim *sim, int foot);
 /* [m] Height of the lowest point of all soles above the terrain under it. Also updates the feet's
  * sole_height for this terrain. */

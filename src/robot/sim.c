@@ -366,6 +366,10 @@ const double *robot_sim_base_rotation(const RobotSim *sim) {
     return sim->data->xmat + 9 * sim->robot->base_body;
 }
 
+const double *robot_sim_mass_center(const RobotSim *sim) {
+    return sim->data->subtree_com + 3 * sim->robot->base_body;
+}
+
 const RobotFoot *robot_sim_foot(const RobotSim *sim, int foot) {
     return &sim->feet[foot];
 }

@@ -292,6 +292,15 @@ static MildStatus open_log(TrainRun *run, MildError *error) {
     return run->log ? log_config(run->log, run->def.config, error) : error->status;
 }
 
+/* A resumed run has its networks from its checkpoint. */
+static Trainer *make_trainer(const TrainRun *run, MildError *error) {
+    ExperimentDef def = *run->def.def;
+    if (run->def.resume) {
+        def.train.start[0] = 0;
+    }
+    return train_create_part(&def, run->def.ranks, error);
+}
+
 static MildStatus build(TrainRun *run, MildError *error) {
     MildStatus status = MILD_OK;
     if (leads(run)) {
@@ -300,7 +309,7 @@ static MildStatus build(TrainRun *run, MildError *error) {
     if (agree(run, status, error) != MILD_OK) {
         return error->status;
     }
-    run->trainer = train_create_part(run->def.def, run->def.ranks, error);
+    run->trainer = make_trainer(run, error);
     if (!run->trainer) {
         return error->status;
     }

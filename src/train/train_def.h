@@ -6,7 +6,7 @@
 
 #include "mild/field.h"
 
-enum { TRAIN_ROBOT_SIZE = 128 };
+enum { TRAIN_ROBOT_SIZE = 128, TRAIN_START_SIZE = 256 };
 
 typedef struct {
     char robot[TRAIN_ROBOT_SIZE]; /* folder of robots/ by its name, or any folder with a slash */
@@ -16,10 +16,11 @@ typedef struct {
     int checkpoint_every;         /* iterations */
     int keep_checkpoints;         /* how many to keep, the newest ones */
     uint64_t seed;
-    int threads;    /* 0: one per core */
-    char device[8]; /* where the networks run: cpu, cuda, cuda:N */
-    int robots;     /* TrainRobots */
-    int grounds;    /* that the batch engine's episodes choose from */
+    int threads;                  /* 0: one per core */
+    char device[8];               /* where the networks run: cpu, cuda, cuda:N */
+    int robots;                   /* TrainRobots */
+    int grounds;                  /* that the batch engine's episodes choose from */
+    char start[TRAIN_START_SIZE]; /* policy whose networks a new run begins with; empty: random */
 } TrainDef;
 
 /* What steps the robots: MuJoCo with mild/ground.h on the CPU, or the batch engine with

@@ -38,6 +38,34 @@ void train_destroy(Trainer *trainer) {
     free(trainer);
 }
 
+/* The networks of a policy file, which must have the same shape, take the place of the random ones.
+ */
+static MildStatus start_policy(Trainer *trainer, MildError *error) {
+    const char *path = trainer->def.train.start;
+    MildError cause = {0};
+    if (!path[0]) {
+        return MILD_OK;
+    }
+    Policy *start = policy_load(path, NULL, 0, &cause);
+    if (!start) {
+        return mild_fail(error, cause.status, "train.start: %s", cause.text);
+    }
+    const int64_t count = policy_parameter_count(trainer->policy);
+    const PolicyDef *own = policy_def(trainer->policy), *other = policy_def(start);
+    MildStatus status = MILD_OK;
+    if (policy_parameter_count(start) != count || strcmp(own->robot, other->robot) != 0) {
+        status = mild_fail(error, MILD_ERROR_FORMAT,
+                           "train.start: %s has other networks or another robot than this config "
+                           "asks for; see sections [policy], [ppo] and train.robot",
+                           path);
+    } else {
+        memcpy(policy_parameters(trainer->policy), policy_parameters(start),
+               (size_t)count * sizeof(float));
+    }
+    policy_destroy(start);
+    return status;
+}
+
 /* Robot, threads, networks and learner, on the CPU. Returns 0 on failure. */
 static int make_learner(Trainer *trainer, MildError *error) {
     const ExperimentDef *def = &trainer->def;
@@ -59,7 +87,7 @@ static int make_learner(Trainer *trainer, MildError *error) {
         return 0;
     }
     trainer->policy = policy_create(&def->policy, def->train.seed, error);
-    if (!trainer->policy) {
+    if (!trainer->policy || start_policy(trainer, error) != MILD_OK) {
         return 0;
     }
     trainer->ppo = ppo_create_part(&def->ppo, trainer->policy, trainer->pool, &mirror,

@@ -107,6 +107,16 @@ for robots in mujoco batch; do
         END {exit bad || NR < 6}' stances.csv || fail "stances.csv of $robots"
 done
 bad "No space left" "$mild" eval --ground rigid --trials 1 --seconds 0.1 --stances /dev/full
+expect 0 '' "$mild" eval --ground rigid,grass --speed 0,0.3 --trials 2 --seconds 0.2 --track track.csv
+awk -F, 'NR == 1 && !/^ground,speed_m_s,trial,time_s,com_x_m/ || NF != 12 {bad = 1} END {exit bad}' track.csv && [ "$(wc -l <track.csv)" = 161 ] ||
+    fail "rows of track.csv: $(wc -l <track.csv)"
+bad "leave it out" "$mild" eval --ground grass --trials 1 --seconds 0.1 --train.robots=batch --track track.csv
+# the weights of the paper's experiments, in half precision
+for file in "$(dirname "$0")"/../../policies/paper/*.safetensors; do
+    kind=learned
+    case ${file##*/} in ht2*) kind=ht2 ;; clock*) kind=clock ;; esac
+    expect 0 '1/1' "$mild" eval --policy "$file" --controller $kind --ground rigid --trials 1 --seconds 0.1
+done
 torque() { "$mild" eval --ground grass --trials 2 --seconds 0.3 "$@" --json - 2>/dev/null | sed -n 's/.*"torque_max": *//p'; }
 whole=$(torque)
 for part in z modulation estimates history; do

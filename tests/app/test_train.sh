@@ -59,6 +59,11 @@ policy_before=$(cksum <full/policy.safetensors)
 [ "$(cksum <full/policy.safetensors)" = "$policy_before" ] || fail "a full disk changed the policy"
 [ -z "$(find full -name '*.tmp')" ] || fail "a full disk left a temporary file"
 good "$mild" train --out full "${tiny[@]}" --train.iterations=4 --resume
+# a run that begins with a policy goes on without it
+cp full/policy.safetensors begin.safetensors
+good "$mild" train --out begun "${tiny[@]}" --train.start=begin.safetensors --train.iterations=1
+rm begin.safetensors
+good "$mild" train --out begun --resume --train.iterations=2
 good "$mild" eval --policy full/checkpoint_000000002.safetensors --ground rigid --trials 1 --seconds 0.1
 same_numbers whole/$last full/$last
 

@@ -441,6 +441,9 @@ static void a_row_from_four_trials(void **state) {
     assert_close("low", row.velocity_low, 0.6 - half, 2e-3 * half);
     assert_close("high", row.velocity_high, 0.6 + half, 2e-3 * half);
     assert_close("cost of transport", row.cot, 1, 1e-12);
+    assert_close("deviation of velocity", row.velocity_deviation, sqrt(0.07), 1e-12);
+    assert_close("deviation of cot", row.cot_deviation, sqrt(0.75), 1e-12);
+    assert_close("deviation of torque", row.torque_deviation, sqrt(500.0 / 3), 1e-12);
     assert_close("oscillation", row.base_oscillation, 0.02, 1e-12);
     assert_close("energy", row.energy, 250, 1e-12);
     assert_close("torque", row.torque_max, 35, 1e-12);

@@ -531,6 +531,44 @@ static void test_missing_keys(void **state) {
     unlink(PATH);
 }
 
+/* Every number that half precision has, by the definition of binary16, between tensors that stay as
+ * they are. */
+static void test_half_precision(void **state) {
+    (void)state;
+    enum { COUNT = 1 << 16 };
+    static uint16_t half[COUNT];
+    const float before[3] = {1, 2, 3};
+    const double after = 0.1;
+    for (int i = 0; i < COUNT; i++) {
+        half[i] = (uint16_t)i;
+    }
+    const Safetensor tensors[] = {{"before", SAFETENSORS_F32, 1, {3}, before, 0},
+                                  {"half", SAFETENSORS_F16, 2, {256, 256}, half, 0},
+                                  {"after", SAFETENSORS_F64, 1, {1}, &after, 0}};
+    MildError error = {0};
+    assert_int_equal(safetensors_write(PATH, tensors, 3, NULL, 0, &error), MILD_OK);
+    Safetensors *file = safetensors_read(PATH, &error);
+    assert_non_null(file);
+    const Safetensor *wide = safetensors_find(file, "half");
+    assert_int_equal(wide->type, SAFETENSORS_F32);
+    assert_int_equal(wide->bytes, COUNT * sizeof(float));
+    assert_true(wide->rank == 2 && wide->shape[0] == 256 && wide->shape[1] == 256);
+    for (int i = 0; i < COUNT; i++) {
+        float number;
+        memcpy(&number, (const char *)wide->data + (size_t)i * sizeof number, sizeof number);
+        const int exponent = i / 1024 % 32, fraction = i % 1024;
+        double wanted = pow(2, exponent - 15) * (1 + fraction / 1024.0);
+        wanted = exponent == 0 ? pow(2, -14) * fraction / 1024 : wanted;
+        wanted = exponent == 31 ? (double)INFINITY : wanted;
+        assert_int_equal(signbit(number) != 0, i >= COUNT / 2);
+        assert_true(exponent == 31 && fraction ? isnan(number) : fabs((double)number) == wanted);
+    }
+    assert_memory_equal(safetensors_find(file, "before")->data, before, sizeof before);
+    assert_memory_equal(safetensors_find(file, "after")->data, &after, sizeof after);
+    safetensors_destroy(file);
+    unlink(PATH);
+}
+
 /* A disk that fills up half way: the old file stays, no temporary one is left. */
 static void test_full_disk(void **state) {
     (void)state;
@@ -626,6 +664,7 @@ int main(void) {
         cmocka_unit_test(test_padding_is_blank),
         cmocka_unit_test(test_unreadable_header),
         cmocka_unit_test(test_extreme_shapes),
+        cmocka_unit_test(test_half_precision),
         cmocka_unit_test(test_full_disk),
         cmocka_unit_test(test_unusable_defs),
     };

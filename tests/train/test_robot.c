@@ -145,10 +145,43 @@ static void an_unknown_robot_is_named(void **unused) {
     assert_non_null(strstr(error.text, "train.robot: unknown robot 'sa02'; nearest is 'sa01'"));
 }
 
+/* train.start: the networks of a file in the place of those that the seed draws. Those of another
+ * robot are refused. */
+static void a_run_begins_with_a_policy(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    ExperimentDef def = small_def("sa01");
+    Trainer *first = train_create(&def, &error);
+    assert_non_null(first);
+    assert_int_equal(policy_save(train_policy(first), POLICY, "test", &error), MILD_OK);
+    const size_t bytes = (size_t)policy_parameter_count(train_policy(first)) * sizeof(float);
+    for (int given = 0; given < 2; given++) {
+        def.train.seed = 2;
+        strcpy(def.train.start, given ? POLICY : "");
+        Trainer *second = train_create(&def, &error);
+        assert_non_null(second);
+        assert_int_equal(memcmp(policy_parameters(train_policy(second)),
+                                policy_parameters(train_policy(first)), bytes) == 0,
+                         given);
+        train_destroy(second);
+    }
+    train_destroy(first);
+    def = small_def("go1");
+    strcpy(def.train.start, POLICY);
+    assert_null(train_create(&def, &error));
+    print_message("%s\n", error.text);
+    assert_non_null(strstr(error.text, "train.start: " POLICY));
+    strcpy(def.train.start, "no/such/file");
+    assert_null(train_create(&def, &error));
+    assert_non_null(strstr(error.text, "no/such/file"));
+    unlink(POLICY);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_quadruped_trains),
         cmocka_unit_test(another_robots_policy_is_refused),
+        cmocka_unit_test(a_run_begins_with_a_policy),
         cmocka_unit_test(a_policy_without_a_name_loads),
         cmocka_unit_test(the_decoder_is_that_of_the_target),
         cmocka_unit_test(an_unknown_robot_is_named),

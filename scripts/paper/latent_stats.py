@@ -1,0 +1,157 @@
+"""Statistics of what `mild eval --latent` writes."""
+import csv
+
+import numpy as np
+from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from sklearn.linear_model import RidgeCV
+from sklearn.manifold import TSNE
+from sklearn.metrics import r2_score
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from threadpoolctl import threadpool_limits
+
+PERIOD = 0.8   # [s] of the gait
+START = 2.0    # [s] of a trial that are left out
+MOMENTS = 2100  # decisions in an embedding
+PHASES = 8
+
+
+def read(paths):
+    """Columns of CSVs of --latent, one after the other: {name: array}."""
+    rows = []
+    for path in paths:
+        with open(path, newline="", encoding="utf-8") as file:
+            reader = csv.reader(file)
+            names = next(reader)
+            rows += [row for row in reader if float(row[3]) >= START]
+    columns = list(zip(*rows))
+    return {name: np.array(column) if name == "ground" else np.array(column, float) for name, column in zip(names, columns)}
+
+
+def wide(data, prefix):
+    return np.stack([column for name, column in data.items() if name.startswith(prefix)], axis=1)
+
+
+def periods(data, values):
+    """Means over one gait period: values, ground, speed, trial, time, of each."""
+    key = np.stack([data["trial"], data["speed_m_s"], np.floor((data["time_s"] - START) / PERIOD)], axis=1)
+    _, index, inverse = np.unique(np.column_stack([key, np.unique(data["ground"], return_inverse=True)[1]]), axis=0,
+                                  return_index=True, return_inverse=True)
+    inverse = inverse.reshape(-1)
+    sums = np.zeros((len(index), values.shape[1]))
+    np.add.at(sums, inverse, values)
+    count = np.bincount(inverse)
+    whole = count > 0.9 * count.max()  # the last of a trial, or one across a border, is a piece
+    index, means = index[whole], (sums / count[:, None])[whole]
+    return means, data["ground"][index], data["speed_m_s"][index], data["trial"][index], data["time_s"][index]
+
+
+def named(values, labels, trials):
+    """Share of held-out rows that a linear discriminant names; every third trial is held out."""
+    held = trials % 3 == 0
+    model = LinearDiscriminantAnalysis(solver="lsqr").fit(values[~held], labels[~held])
+    return model.score(values[held], labels[held])
+
+
+def shuffled(values, labels, walks, trials):
+    """The same with the labels shuffled among whole walks, mean of 20 times: what a discriminant finds where there is nothing."""
+    draw, found = np.random.default_rng(1), []
+    names, first, inverse = np.unique(walks, axis=0, return_index=True, return_inverse=True)
+    for _ in range(20):
+        other = labels[first][draw.permutation(len(names))]
+        found.append(named(values, other[inverse.reshape(-1)], trials))
+    return float(np.mean(found))
+
+
+def explained(values, labels):
+    """Share of the variance of the values that the means of the groups have."""
+    middle = values.mean(0)
+    between = sum((labels == g).sum() * ((values[labels == g].mean(0) - middle) ** 2).sum() for g in np.unique(labels))
+    return between / ((values - middle) ** 2).sum()
+
+
+def embed(values):
+    with threadpool_limits(1):  # on busy cores its threads wait for each other
+        return TSNE(random_state=1, perplexity=30).fit_transform((values - values.mean(0)) / (values.std(0) + 1e-9))
+
+
+def latent(data):
+    """({(from, what): share}, rows of periods, rows of moments), each row with its place in the embedding."""
+    z = wide(data, "modulated")
+    means, ground, speed, trial, time = periods(data, z)
+    estimates = periods(data, np.hstack([wide(data, "velocity"), wide(data, "foot")]))[0]
+    both = periods(data, wide(data, "z"))[0]  # mu
+    walks = np.column_stack([np.unique(ground, return_inverse=True)[1], speed, trial])
+    some = np.linspace(0, len(z) - 1, min(len(z), 40 * MOMENTS)).astype(int)  # enough for a discriminant
+    at = {"ground": data["ground"][some], "phase": np.floor(data["phase"][some] % 1 * PHASES).astype(int).astype(str),
+          "command": data["speed_m_s"][some].astype(str)}
+    one, instant = "z~, one gait period", "z~, one instant"
+    found = {(one, "ground"): named(means, ground, trial), (one, "ground, shuffled"): shuffled(means, ground, walks, trial),
+             (one, "command"): named(means, speed.astype(str), trial),
+             (one, "variance: ground"): explained(means, ground), (one, "variance: command"): explained(means, speed),
+             ("mu, one gait period", "ground"): named(both, ground, trial),
+             ("the estimates, one gait period", "ground"): named(estimates, ground, trial)}
+    for what, labels in at.items():
+        found[instant, what] = named(z[some], labels, data["trial"][some])
+    for what, labels in at.items():
+        found[instant, f"variance: {what}"] = explained(z[some], labels)
+    place = embed(means)
+    few = np.linspace(0, len(z) - 1, min(len(z), MOMENTS)).astype(int)
+    where = embed(z[few])
+    rows = [{"ground": str(g), "speed": float(s), "trial": int(t), "time": float(c), "x": float(x), "y": float(y),
+             **{f"z{i}": float(v) for i, v in enumerate(m)}}
+            for g, s, t, c, (x, y), m in zip(ground, speed, trial, time, place, means)]
+    moments = [{"ground": str(data["ground"][i]), "speed": float(data["speed_m_s"][i]), "phase": float(data["phase"][i] % 1),
+                "x": float(x), "y": float(y)} for i, (x, y) in zip(few, where)]
+    return found, rows, moments
+
+
+def regression(paths, known, names):
+    """z~ of a walk in each file against the numbers that are known of its ground: rows, and {name: R2 of those held out}."""
+    values, kept = [], []
+    for path, truth in zip(paths, known):
+        with open(path, encoding="utf-8") as file:
+            late = any(float(row["time_s"]) >= START for row in csv.DictReader(file))
+        if late:  # it has not fallen at once
+            values.append(wide(read([path]), "modulated").mean(0))
+            kept.append(truth)
+    values, known = np.array(values), np.array(kept)
+    held = np.arange(len(values)) % 3 == 0
+    model = make_pipeline(StandardScaler(), RidgeCV(np.logspace(-3, 3, 13))).fit(values[~held], known[~held])
+    told = model.predict(values[held])
+    rows = [{**{name: float(t) for name, t in zip(names, truth)}, **{f"{name} from z~": float(t) for name, t in zip(names, guess)}}
+            for truth, guess in zip(known[held], told)]
+    return rows, {name: float(r2_score(known[held][:, i], told[:, i])) for i, name in enumerate(names)}
+
+
+def course(path):
+    """Walks on rubber, on foam28, and on a course of both: rows of the course, place 0 as on rubber, 1 as on foam28."""
+    data = read([path])
+    scene = np.cumsum(np.r_[False, np.diff(data["time_s"]) < -1])  # rubber, foam28, the course
+    means, ground, _, trial, time = periods({**data, "trial": 1000 * scene + data["trial"]}, wide(data, "modulated"))
+    mixed = trial >= 2000
+    axis = LinearDiscriminantAnalysis().fit(means[~mixed], ground[~mixed])
+    place = means @ axis.coef_[0]
+    middle = [place[~mixed & (ground == g)].mean() for g in ("rubber", "foam28")]
+    place = (place - middle[0]) / (middle[1] - middle[0])
+    rows = [{"trial": int(t) - 2000, "time": float(s), "ground": str(g), "place": float(p)}
+            for t, s, g, p in zip(trial[mixed], time[mixed], ground[mixed], place[mixed])]
+    return sorted(rows, key=lambda r: (r["trial"], r["time"]))
+
+
+def delays(found):
+    """{way: mean number of whole gait periods on a new ground until z~ is on its side of the middle}."""
+    late = {}
+    for way, rows in found.items():
+        waits = []
+        for i in range(1, len(rows)):
+            if rows[i]["trial"] != rows[i - 1]["trial"] or rows[i]["ground"] == rows[i - 1]["ground"]:
+                continue
+            new, count = rows[i]["ground"], 0
+            for row in rows[i:]:
+                count += 1
+                if row["trial"] != rows[i]["trial"] or (row["place"] > 0.5) == (new == "foam28"):
+                    break
+            waits.append(count)
+        late[way] = float(np.mean(waits)) if waits else float("nan")
+    return late
