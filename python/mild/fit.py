@@ -106,21 +106,25 @@ class GroundFit:
         return Tags(estimator_type="regressor", target_tags=TargetTags(required=True), regressor_tags=RegressorTags())
 
 
-def _column(name, values):
+def _numbers(name, values):
     try:
-        column = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name}: not an array of numbers") from None
+        array = np.asarray(values)
+        if array.dtype.kind in "biuf":
+            return array.astype(np.float64)
+    except ValueError:  # rows of different lengths
+        pass
+    raise TypeError(f"{name}: not an array of numbers")
+
+
+def _column(name, values):
+    column = _numbers(name, values)
     if column.ndim != 1:
         raise ValueError(f"{name}: {column.ndim} dimensions, but it must have one")
     return column
 
 
 def _table(X):
-    try:
-        X = np.asarray(X, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise TypeError("X: not an array of numbers") from None
+    X = _numbers("X", X)
     if X.ndim != 2 or not 1 <= X.shape[1] <= 3:
         raise ValueError(f"X: shape {X.shape}, but it must be (n, 1), (n, 2) or (n, 3): depth, speed, acceleration")
     return X

@@ -29,9 +29,9 @@ class _Task:
         self._single = gymnasium.spaces.Box(-high, high), gymnasium.spaces.Box(-clip, clip)
 
     def _seed(self, seed):
-        if self._envs is not None:
-            self._envs.close()
-        self._envs = open_envs(self._count, seed=seed, **self._keys)
+        opened = open_envs(self._count, seed=seed, **self._keys)
+        self._shut()
+        self._envs = opened
 
     def _arrays(self):
         """New arrays for the results of a step."""

@@ -224,9 +224,10 @@ void bind_batch(nb::module_ &module) {
         .def("set_map", set_map, nb::arg("map").none(),
              "Puts the robots on a Map; None: on level ground. All forget what the ground "
              "remembers.")
-        .def("step", step, nb::arg("position"), nb::arg("rotation"), nb::arg("velocity"),
-             nb::arg("inverse_inertia"), nb::arg("free_velocity"), nb::kw_only(), nb::arg("wrench"),
-             nb::arg("new_velocity"), nb::arg("material").none() = nb::none(),
+        .def("step", step, nb::arg("position").none(), nb::arg("rotation").none(),
+             nb::arg("velocity").none(), nb::arg("inverse_inertia").none(),
+             nb::arg("free_velocity").none(), nb::kw_only(), nb::arg("wrench").none(),
+             nb::arg("new_velocity").none(), nb::arg("material").none() = nb::none(),
              nb::arg("height").none() = nb::none(), nb::arg("map_origin").none() = nb::none(),
              nb::arg("foot").none() = nb::none(), nb::arg("elements").none() = nb::none(),
              nb::arg("residual").none() = nb::none(), nb::arg("iterations").none() = nb::none(),

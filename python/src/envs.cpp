@@ -230,11 +230,12 @@ NB_MODULE(_envs, module) {
         "train.envs environments. config: a file, or None; overrides: texts section.key=value.\n"
         "Raises ValueError with the key that is wrong.");
     type.def("__init__", make, nb::arg("config").none(), nb::arg("overrides"))
-        .def("buffers", make_buffers, nb::kw_only(), nb::arg("history"), nb::arg("reward"),
-             nb::arg("done"), nb::arg("timeout"), nb::arg("valid"),
-             nb::arg("critic").none() = nb::none(), nb::arg("frame").none() = nb::none(),
-             nb::arg("estimate").none() = nb::none(), nb::arg("last").none() = nb::none(),
-             nb::arg("last_critic").none() = nb::none(), nb::arg("terms").none() = nb::none(),
+        .def("buffers", make_buffers, nb::kw_only(), nb::arg("history").none(),
+             nb::arg("reward").none(), nb::arg("done").none(), nb::arg("timeout").none(),
+             nb::arg("valid").none(), nb::arg("critic").none() = nb::none(),
+             nb::arg("frame").none() = nb::none(), nb::arg("estimate").none() = nb::none(),
+             nb::arg("last").none() = nb::none(), nb::arg("last_critic").none() = nb::none(),
+             nb::arg("terms").none() = nb::none(),
              "Checks arrays once, for many steps. float32: history (envs, frames, observation), "
              "critic\n(envs, critic), frame (envs, observation), estimate (envs, estimates), last "
              "and\nlast_critic: as history and critic at the end of episodes, terms (envs, "
@@ -243,7 +244,7 @@ NB_MODULE(_envs, module) {
              "array that does not fit.")
         .def("reset", reset, nb::arg("buffers"), nb::arg("stream") = 0,
              "New episodes; writes history, critic, frame and estimate.")
-        .def("step", step, nb::arg("action"), nb::arg("buffers"), nb::arg("stream") = 0,
+        .def("step", step, nb::arg("action").none(), nb::arg("buffers"), nb::arg("stream") = 0,
              "A policy step. action: (envs, actions) float32 in units of the action scale. "
              "Environments\nthat ended begin anew in the same step.")
         .def("statistics", statistics, nb::arg("stream") = 0,

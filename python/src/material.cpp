@@ -15,10 +15,18 @@ nb::ndarray<const double, nb::c_contig, nb::device::cpu>
 numbers_of(nb::handle object, const char *name, int dimensions) {
     nb::object array;
     try {
-        array = nb::module_::import_("numpy").attr("ascontiguousarray")(object, "f8");
+        const nb::module_ numpy = nb::module_::import_("numpy");
+        array = numpy.attr("asarray")(object);
+        const std::string kind = nb::cast<std::string>(array.attr("dtype").attr("kind"));
+        if (std::string("biuf").find(kind) == std::string::npos) {
+            raise(PyExc_TypeError, std::string(name) + ": not an array of numbers");
+        }
+        array = numpy.attr("ascontiguousarray")(array, "f8");
     } catch (nb::python_error &error) {
-        raise(PyExc_TypeError, std::string(name) + ": not an array of numbers (" +
-                                   nb::str(error.value()).c_str() + ")");
+        if (error.matches(PyExc_MemoryError)) {
+            throw;
+        }
+        raise(PyExc_TypeError, std::string(name) + ": not an array of numbers");
     }
     nb::ndarray<const double, nb::c_contig, nb::device::cpu> numbers;
     if (!nb::try_cast(array, numbers, false)) {
