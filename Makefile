@@ -14,7 +14,7 @@ FAULTS ?=
 STAGES ?=
 QUICK ?=
 
-.PHONY: setup build test run bench install docs paper check fuzz mutants clean help
+.PHONY: setup build test run bench install docs paper wheel python-check check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -28,6 +28,8 @@ help:
 	@echo "make mutants FAULTS=1  the named faults of tests/faults.txt: all must be caught"
 	@echo "make paper   the paper's experiments as one page, out/paper/index.html (docs/paper.md); QUICK=1: few trials"
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
+	@echo "make wheel   the Python package as a wheel, build/dist (docs/python.md), for MARCH=x86-64-v3 unless given"
+	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/python-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
 
@@ -77,6 +79,18 @@ docs:
 	@mkdir -p build
 	@scripts/api.py include/mild/*.h >build/api.md
 	@echo build/api.md
+
+wheel: setup
+	@.venv/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w build/dist . \
+		-C cmake.define.MILD_MARCH=$(if $(filter native,$(MARCH)),x86-64-v3,$(MARCH))
+	@ls build/dist/*.whl
+
+# Learners are large: an environment of its own, with the wheel as a user has it.
+python-check: wheel
+	@[ -x build/python-venv/bin/python ] || python3 -m venv build/python-venv
+	@build/python-venv/bin/pip install --quiet --disable-pip-version-check -r scripts/learners.txt
+	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mild-*.whl
+	@build/python-venv/bin/python tests/python/check_learners.py
 
 clean:
 	rm -rf build

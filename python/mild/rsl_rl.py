@@ -59,8 +59,13 @@ class Env(VecEnv):
             extras["log"] = self._log()
         return self.get_observations(), tensors["reward"], tensors["done"].long(), extras
 
+    def statistics(self):
+        """Means over the episodes that ended since the last call or log: a dict, see MildEnvsStatistics of src/envs/envs.h.
+        Waits for the device."""
+        return self._envs.statistics(stream=self._stream())
+
     def _log(self):
-        found = self._envs.statistics(stream=self._stream())
+        found = self.statistics()
         names = ["length", "speed_error"] if found["episodes"] else []
         names += [name for name in found if name.startswith("reward.")] if found["episodes"] else []
         return {"/mild/" + name: found[name] for name in [*names, "assist"]}

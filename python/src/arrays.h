@@ -131,7 +131,7 @@ inline Array take_array(nb::handle object, const Wanted &wanted) {
     if (!nb::try_cast<nb::ndarray<nb::ro>>(object, array.readable, false)) {
         raise(PyExc_TypeError, std::string(wanted.name) + ": a " +
                                    nb::type_name(object.type()).c_str() +
-                                   ", but it must be an array (NumPy, or DLPack without gradient)");
+                                   ", but it must be an array (NumPy, or with __dlpack__)");
     }
     check_array(array.readable, wanted);
     if (wanted.write) {
