@@ -1,11 +1,9 @@
 # MuJoCo from -DMUJOCO_ROOT= (a release folder) or from the wheel in the private environment .venv.
 set(MUJOCO_ROOT "" CACHE PATH "MuJoCo release folder (include/, lib/); empty: the wheel in .venv")
 if(MUJOCO_ROOT)
-  file(GLOB mujoco_library ${MUJOCO_ROOT}/lib/libmujoco.so.* ${MUJOCO_ROOT}/lib/libmujoco.so)
+  file(GLOB mujoco_library ${MUJOCO_ROOT}/lib/libmujoco.so.* ${MUJOCO_ROOT}/lib/libmujoco.so
+    ${MUJOCO_ROOT}/libmujoco.so.*)
   set(mujoco_include ${MUJOCO_ROOT}/include)
-elseif(mujoco_wheel)
-  file(GLOB mujoco_library ${mujoco_wheel}/libmujoco.so.*)
-  set(mujoco_include ${mujoco_wheel}/include)
 else()
   file(GLOB mujoco_library ${CMAKE_SOURCE_DIR}/.venv/lib/python3*/site-packages/mujoco/libmujoco.so.*)
   file(GLOB mujoco_include ${CMAKE_SOURCE_DIR}/.venv/lib/python3*/site-packages/mujoco/include)

@@ -25,19 +25,13 @@ find_package(nanobind CONFIG REQUIRED)
 # ---- layers of a wheel ----
 set(environments ON)
 if(NOT MILD_APP)
-  mild_layer(lab layer_ground)
-  # archives where there are some, so that the wheel needs no library of another machine
-  find_library(INIH_LIBRARY NAMES libinih.a inih)
-  find_library(ZLIB_LIBRARY_RELEASE NAMES libz.a z)
-  find_library(PNG_LIBRARY_RELEASE NAMES libpng.a png)
+  find_library(INIH_LIBRARY inih)
   find_package(PNG QUIET)
   if(INIH_LIBRARY AND PNG_FOUND)
-    add_library(inih INTERFACE)
-    target_link_libraries(inih INTERFACE ${INIH_LIBRARY})
     if(NOT MUJOCO_ROOT) # the wheel that pip installed for this build
       execute_process(COMMAND ${Python_EXECUTABLE} -c "import importlib.util as u; print(u.find_spec('mujoco').origin)"
         OUTPUT_VARIABLE mujoco_init OUTPUT_STRIP_TRAILING_WHITESPACE)
-      get_filename_component(mujoco_wheel ${mujoco_init} DIRECTORY)
+      get_filename_component(MUJOCO_ROOT ${mujoco_init} DIRECTORY)
     endif()
     include(${CMAKE_SOURCE_DIR}/cmake/MuJoCo.cmake)
     list(APPEND left_out "/ranks/mpi\\.c$" "/ranks/without_nccl\\.c$")
@@ -80,7 +74,16 @@ target_link_libraries(_ground PRIVATE layer_lab layer_batch)
 if(environments)
   mild_python_module(_envs ${source}/envs.cpp)
   target_link_libraries(_envs PRIVATE layer_envs)
-  set_target_properties(_envs PROPERTIES INSTALL_RPATH "$ORIGIN/../mujoco") # a neighbour in site-packages
+  # MuJoCo is a neighbour in site-packages; inih and libpng, which another machine may lack, come along
+  set_target_properties(_envs PROPERTIES INSTALL_RPATH "$ORIGIN/../mujoco:$ORIGIN/lib")
+  if(NOT MILD_APP)
+    foreach(library ${INIH_LIBRARY} ${PNG_LIBRARY_RELEASE})
+      file(REAL_PATH ${library} file)
+      execute_process(COMMAND ${CMAKE_OBJDUMP} -p ${file} OUTPUT_VARIABLE header)
+      string(REGEX MATCH "SONAME +([^ \n]+)" soname "${header}")
+      install(FILES ${file} DESTINATION mild/lib RENAME ${CMAKE_MATCH_1} COMPONENT python)
+    endforeach()
+  endif()
 endif()
 
 # ---- what else is in the package ----

@@ -4,8 +4,9 @@ Units are SI and radians, z points up. What is wrong with an argument is raised 
 RuntimeError that names it."""
 from ._ground import Batch, Ground, Map, Material, Press, Sole, Terrain, models, presets, press
 from .fit import GroundFit, loading
+from .spec import attach
 
-__all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "Sole", "Terrain", "loading", "models", "presets",
+__all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "Sole", "Terrain", "attach", "loading", "models", "presets",
            "press"]
 
 try:
