@@ -19,8 +19,8 @@ for step in range(steps):
     observations, rewards, terminated, truncated, info = env.step(actions)
     if info:  # some episodes ended: what the next observation no longer shows
         for i in np.flatnonzero(info["_final_obs"]):
-            terms = info["final_info"]["reward_terms"]
-            ends.append((terminated[i], terms["linear_velocity"][i], terms["orientation"][i]))
+            terms = dict(zip(env.reward_names, info["final_info"]["reward_terms"][i]))
+            ends.append((terminated[i], terms["linear_velocity"], terms["orientation"]))
 seconds = time.perf_counter() - start
 print(f"{robots * steps / seconds:.0f} steps/s; {len(ends)} episodes ended, {sum(fell for fell, *_ in ends)} by a fall")
 if ends:

@@ -80,8 +80,8 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
 
     Every step returns new arrays, into which the library writes without a copy. Environments that ended begin anew in the
     same step (SAME_STEP): the observation is the first of the new episode, info["final_obs"] (num_envs, ...) has the last of
-    the old one where info["_final_obs"], and info["final_info"]["reward_terms"] {name: (num_envs,)} the sums of the reward's
-    terms over it. The first episodes are shorter than the later ones, so that they do not end together. One seed stands for
+    the old one where info["_final_obs"], and info["final_info"]["reward_terms"] (num_envs, terms) the sums of the reward's
+    terms over it, in the order of `reward_names`. The first episodes are shorter than the later ones, so that they do not end together. One seed stands for
     all environments."""
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
@@ -94,7 +94,7 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
         self.single_observation_space, self.single_action_space = self._single
         self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, num_envs)
         self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
-        self._names = self._envs.reward_names
+        self.reward_names = self._envs.reward_names
 
     def reset(self, *, seed=None, options=None):
         """New episodes. seed: a whole number, from which all environments draw differently. options: must be empty."""
@@ -113,9 +113,7 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
     def _info(self, arrays, done):
         if not done.any():
             return {}
-        terms = {name: arrays["terms"][:, i] for i, name in enumerate(self._names)}
-        terms.update(("_" + name, done) for name in self._names)
-        final = {"reward_terms": terms, "_reward_terms": done, "diverged": ~arrays["valid"], "_diverged": done}
+        final = {"reward_terms": arrays["terms"], "_reward_terms": done, "diverged": ~arrays["valid"], "_diverged": done}
         return {"final_obs": self._seen(arrays["last"]), "_final_obs": done, "final_info": final, "_final_info": done}
 
     def statistics(self):

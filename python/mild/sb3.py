@@ -31,9 +31,9 @@ class Env(VecEnv):
         infos = [{} for _ in range(self.num_envs)]
         done = ended | truncated
         for i in np.flatnonzero(done):
-            terms = info["final_info"]["reward_terms"]
+            terms = info["final_info"]["reward_terms"][i].tolist()
             infos[i] = {"terminal_observation": info["final_obs"][i], "TimeLimit.truncated": bool(truncated[i]),
-                        "reward_terms": {name: float(terms[name][i]) for name in terms if name[0] != "_"}}
+                        "reward_terms": dict(zip(self.envs.reward_names, terms))}
         return observation, reward, done, infos
 
     def close(self):
