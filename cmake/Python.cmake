@@ -1,8 +1,8 @@
 # The Python package (python/, docs/python.md): the modules mild._ground and mild._envs, which in this build lie in
 # build/python/mild beside links to the package's files. A wheel (pyproject.toml) is a build with MILD_APP=OFF, which takes
 # of the layers only what environments need: no learner, no drawing.
-if(MILD_PYTHON STREQUAL "AUTO" AND (MILD_SANITIZE OR MILD_FUZZ OR CMAKE_CROSSCOMPILING))
-  return() # an interpreter does not load these
+if(MILD_PYTHON STREQUAL "AUTO" AND (NOT MILD_APP OR MILD_SANITIZE OR MILD_FUZZ))
+  return() # the library alone, and what an interpreter does not load
 endif()
 if(NOT SKBUILD)
   set(Python_EXECUTABLE ${CMAKE_SOURCE_DIR}/.venv/bin/python)
