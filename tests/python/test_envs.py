@@ -137,6 +137,17 @@ class Episodes(unittest.TestCase):
         self.assertGreater(np.abs(runs[0][-1] - runs[2][-1]).max(), 0.1)
         self.assertGreater(np.abs(runs[0][0][0] - runs[0][0][1]).max(), 0.01)  # environments differ
 
+    def test_frame(self):
+        """The newest frame is the end of the history."""
+        env, other = make_vec(3), make_vec(3, observation="frame")
+        history, frame = env.reset(seed=7)[0], other.reset(seed=7)[0]
+        for step in range(30):
+            np.testing.assert_array_equal(history[:, -frame.shape[1]:], frame)
+            history, frame = env.step(actions_of(env, step))[0], other.step(actions_of(env, step))[0]
+        self.assertGreater(np.abs(history[:, : frame.shape[1]] - frame).max(), 0.01)
+        env.close()
+        other.close()
+
     def test_overrides(self):
         """A key does what it says: the command (0.5, 0, 0) is in the frame of every environment, scaled alike."""
         rows = []

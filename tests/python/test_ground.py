@@ -282,6 +282,20 @@ class Fit(unittest.TestCase):
         self.assertLess(np.abs(fit.predict(X) - y).max(), 0.01 * y.max())
         self.assertGreater(fit.score(X, y), 0.999)
 
+    def test_speed(self):
+        """A fast press, with its speeds: the curve of the true numbers is its force, which no slow press has."""
+        sole, truth = mild.Sole.plate(0.2, 0.1), mild.Material("sand_dense")
+        records = [mild.press(truth, sole, depth=0.03, speed=speed) for speed in (0.01, 1.0)]
+        parts = [mild.loading(press.time, press.depth, press.force) for press in records]
+        X, y = (np.concatenate(columns) for columns in zip(*parts))
+        held = {name: getattr(truth, name) for name in ("alpha", "nu", "c_g", "phi", "rho")}
+        fit = mild.GroundFit(hold=held).fit(X, y)
+        low, high = fit.intervals_["c_d"]
+        self.assertLess(abs(fit.parameters_["c_d"] - truth.c_d), 0.05 * abs(truth.c_d))
+        fast = slice(len(y) // 2, None)
+        np.testing.assert_allclose(fit.predict(X)[fast], y[fast], atol=0.01 * y.max())
+        self.assertGreater(np.abs(fit.predict(X[fast, :1]) - y[fast]).max(), 0.05 * y.max())
+
     def test_estimator(self):
         fit = mild.GroundFit(model="bekker")
         self.assertEqual(fit.get_params(), {"plate": (0.2, 0.1), "model": "bekker", "hold": None, "fill": None})
