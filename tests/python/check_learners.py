@@ -52,7 +52,7 @@ class RslRl(unittest.TestCase):
 
     def test_runner(self):
         env = rsl_rl.Env(16, config="configs/quick.ini", overrides=SHORT)
-        with tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
             runner = OnPolicyRunner(env, {**CONFIG, "logger": "tensorboard"}, log_dir=folder, device="cpu")
             before = [p.clone() for p in runner.alg.get_policy().parameters()]
             runner.learn(4, init_at_random_ep_len=True)
