@@ -82,7 +82,7 @@ docs:
 
 wheel: setup
 	@.venv/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w build/dist . \
-		-C cmake.define.MILD_MARCH=$(if $(filter native,$(MARCH)),x86-64-v3,$(MARCH))
+		--config-settings=cmake.define.MILD_MARCH=$(if $(filter native,$(MARCH)),x86-64-v3,$(MARCH))
 	@ls build/dist/*.whl
 
 # Learners are large: an environment of its own, with the wheel as a user has it.
