@@ -28,10 +28,11 @@ if(NOT MILD_APP)
   find_library(INIH_LIBRARY inih)
   find_package(PNG QUIET)
   if(INIH_LIBRARY AND PNG_FOUND)
-    if(NOT MUJOCO_ROOT) # the wheel that pip installed for this build
+    if(NOT EXISTS "${MUJOCO_ROOT}") # the wheel that pip installed for this build
       execute_process(COMMAND ${Python_EXECUTABLE} -c "import importlib.util as u; print(u.find_spec('mujoco').origin)"
         OUTPUT_VARIABLE mujoco_init OUTPUT_STRIP_TRAILING_WHITESPACE)
-      get_filename_component(MUJOCO_ROOT ${mujoco_init} DIRECTORY)
+      get_filename_component(mujoco_wheel ${mujoco_init} DIRECTORY)
+      set(MUJOCO_ROOT ${mujoco_wheel} CACHE PATH "MuJoCo release folder, or Python package" FORCE)
     endif()
     include(${CMAKE_SOURCE_DIR}/cmake/MuJoCo.cmake)
     list(APPEND left_out "/ranks/mpi\\.c$" "/ranks/without_nccl\\.c$")

@@ -3,6 +3,7 @@
 Usage: PYTHONPATH=build/python .venv/bin/python scripts/rollout.py [--mild build/mild] [--rounds 3] [--envs 1024]"""
 import argparse
 import json
+import pathlib
 import statistics
 import subprocess
 import tempfile
@@ -16,9 +17,10 @@ import mild  # noqa: F401, registers the environments
 
 def program(path, envs):
     """Steps per second of the environments in `mild bench train`: what its physics, ground and task take."""
-    with tempfile.NamedTemporaryFile(suffix=".json") as file:
-        subprocess.run([path, "bench", "train", f"--train.envs={envs}", "--json", file.name], check=True, stdout=subprocess.DEVNULL)
-        rows = {row["case"]: row["value"] for row in json.load(file)["rows"]}
+    with tempfile.TemporaryDirectory() as folder:
+        report = pathlib.Path(folder, "bench.json")
+        subprocess.run([path, "bench", "train", f"--train.envs={envs}", "--json", report], check=True, stdout=subprocess.DEVNULL)
+        rows = {row["case"]: row["value"] for row in json.loads(report.read_text())["rows"]}
     return 1e6 / (rows["physics"] + rows["ground"] + rows["task"])
 
 

@@ -81,8 +81,8 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
     Every step returns new arrays, into which the library writes without a copy. Environments that ended begin anew in the
     same step (SAME_STEP): the observation is the first of the new episode, info["final_obs"] (num_envs, ...) has the last of
     the old one where info["_final_obs"], and info["final_info"]["reward_terms"] (num_envs, terms) the sums of the reward's
-    terms over it, in the order of `reward_names`. The first episodes are shorter than the later ones, so that they do not end together. One seed stands for
-    all environments."""
+    terms over it, in the order of `reward_names`. The first episodes are shorter than the later ones, so that they do not
+    end together. One seed stands for all environments."""
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
 

@@ -18,7 +18,7 @@ class Attach(unittest.TestCase):
     def test_arguments(self):
         spec = mujoco.MjSpec.from_string(PLATE)
         for arguments, name in ((("plate", ["plate"]), "spec"), ((spec, ["foot"]), "foot"), ((spec, []), "feet"),
-                                ((spec, ["plate"] * 5), "feet"), ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground")):  # before any plugin is loaded
+                                ((spec, ["plate"] * 5), "feet"), ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground")):
             with self.assertRaisesRegex((TypeError, ValueError), name):
                 mild.attach(*arguments)
         with self.assertRaisesRegex(RuntimeError, "no/such"):
