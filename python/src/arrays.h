@@ -38,6 +38,26 @@ inline void check(MildStatus status, const MildError &error) {
     throw nb::python_error();
 }
 
+/* The text of any object, in UTF-8. Raises ValueError where there is none. */
+inline std::string utf8(nb::handle object, const char *name) {
+    const nb::str text(object);
+    Py_ssize_t size = 0;
+    const char *bytes = PyUnicode_AsUTF8AndSize(text.ptr(), &size);
+    if (!bytes) {
+        PyErr_Clear();
+        raise(PyExc_ValueError, std::string(name) + ": its text is not Unicode");
+    }
+    if (std::string(bytes).size() != (size_t)size) {
+        raise(PyExc_ValueError, std::string(name) + ": its text has a null character");
+    }
+    return bytes;
+}
+
+/* Name of an object's type, for messages. */
+inline std::string type_text(nb::handle object) {
+    return utf8(nb::type_name(object.type()), "type");
+}
+
 /* Where arrays must lie: the CPU, or a CUDA device by its number. */
 constexpr int ON_CPU = -1;
 
@@ -129,8 +149,7 @@ inline Array take_array(nb::handle object, const Wanted &wanted) {
         return array;
     }
     if (!nb::try_cast<nb::ndarray<nb::ro>>(object, array.readable, false)) {
-        raise(PyExc_TypeError, std::string(wanted.name) + ": a " +
-                                   nb::type_name(object.type()).c_str() +
+        raise(PyExc_TypeError, std::string(wanted.name) + ": a " + type_text(object) +
                                    ", but it must be an array (NumPy, or with __dlpack__)");
     }
     check_array(array.readable, wanted);

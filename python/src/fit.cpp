@@ -97,7 +97,7 @@ static FitDef def_of(const Sole &sole, const std::string &model, double width, c
         if (!nb::try_cast(value, wanted)) {
             raise(PyExc_TypeError, "hold: every value must be a number");
         }
-        hold(def, nb::str(key).c_str(), wanted);
+        hold(def, utf8(key, "hold"), wanted);
     }
     def.fill = fill;
     return def;

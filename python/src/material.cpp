@@ -44,13 +44,13 @@ void set_fields(const MildField *fields, int count, void *def, const nb::kwargs 
     MildError error = {};
     for (auto [key, value] : values) {
         const char *nearest = nullptr;
-        const nb::str name(key);
+        const std::string name = utf8(key, kind);
         const MildField *field = mild_field_find(fields, count, name.c_str(), &nearest);
         if (!field) {
-            raise(PyExc_TypeError, std::string(kind) + ": there is no '" + name.c_str() +
+            raise(PyExc_TypeError, std::string(kind) + ": there is no '" + name +
                                        "'; nearest is '" + (nearest ? nearest : "") + "'");
         }
-        const nb::str text(value);
+        const std::string text = utf8(value, field->name);
         check(mild_field_parse(field, def, text.c_str(), kind, &error), error);
     }
 }
@@ -61,7 +61,7 @@ MildMaterial material_of(nb::handle object, const char *name) {
     }
     MildMaterial material = mild_material_default();
     if (!nb::isinstance<nb::str>(object)) {
-        raise(PyExc_TypeError, std::string(name) + ": a " + nb::type_name(object.type()).c_str() +
+        raise(PyExc_TypeError, std::string(name) + ": a " + type_text(object) +
                                    ", but it must be a Material or the name of a preset");
     }
     const std::string preset = nb::cast<std::string>(object);

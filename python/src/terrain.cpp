@@ -18,8 +18,8 @@ std::vector<const MildSole *> soles_of(const nb::sequence &soles) {
     std::vector<const MildSole *> made;
     for (nb::handle sole : soles) {
         if (!nb::isinstance<Sole>(sole)) {
-            raise(PyExc_TypeError, std::string("soles: a ") + nb::type_name(sole.type()).c_str() +
-                                       " among them, but all must be Sole");
+            raise(PyExc_TypeError,
+                  std::string("soles: a ") + type_text(sole) + " among them, but all must be Sole");
         }
         made.push_back(nb::cast<Sole &>(sole).made);
     }

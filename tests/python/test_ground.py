@@ -223,7 +223,7 @@ class Terrain(unittest.TestCase):
             self.assertAlmostEqual(terrain.height_at(x, y), wanted, delta=1e-6)
 
     def test_arguments(self):
-        for make, name in ((lambda: mild.Map("hills"), "kind"), (lambda: mild.Map("waves", amplitud=1), "amplitude"),
+        for make, name in ((lambda: mild.Map("hills"), "kind"), (lambda: mild.Map(amplitude="\ud800"), "amplitude"), (lambda: mild.Map("waves", amplitud=1), "amplitude"),
                            (lambda: mild.Map("image", heights=[[0, 1], [np.inf, 0]]), "height"), (lambda: mild.Map("image"), "height"),
                            (lambda: mild.Map(labels=[[0.5]], patches="image"), "labels"), (lambda: mild.Terrain([]), "materials"),
                            (lambda: mild.Terrain(5), "materials"), (lambda: mild.Terrain("sand"), "sand"),
