@@ -16,7 +16,7 @@ MUJOCO_ROOT ?=
 QUICK ?=
 TEST ?=
 
-.PHONY: setup build test run bench install plugin deb docs site paper web web-test check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin deb docs site paper web web-test wheel python-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -36,6 +36,8 @@ help:
 	@echo "make docs    libmild's interface as one page, build/api.md, from the headers"
 	@echo "make deb     the program and libmild as a Debian package, build/deb/mild_*.deb; TEST=1: tried in a bare chroot"
 	@echo "make site    all documentation as static pages, build/site/index.html, with its links checked"
+	@echo "make wheel   the Python package as a wheel, build/dist (docs/python.md), for MARCH=x86-64-v3 unless given"
+	@echo "make python-check  its tests with PyTorch, rsl_rl and Stable-Baselines3 (2 GB), in build/python-venv"
 	@echo "make setup   install what is missing (Debian packages, private Python environment .venv)"
 	@echo "make clean   remove build/"
 
@@ -118,6 +120,18 @@ site:
 		build/site-venv/bin/pip install -q --disable-pip-version-check markdown==3.11.3; }
 	@build/site-venv/bin/python scripts/site.py build/site
 	@echo build/site/index.html
+
+wheel: setup
+	@.venv/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w build/dist . \
+		--config-settings=cmake.define.MILD_MARCH=$(if $(filter native,$(MARCH)),x86-64-v3,$(MARCH))
+	@ls build/dist/*.whl
+
+# Learners are large: an environment of its own, with the wheel as a user has it.
+python-check: wheel
+	@[ -x build/python-venv/bin/python ] || python3 -m venv build/python-venv
+	@build/python-venv/bin/pip install --quiet --disable-pip-version-check -r scripts/learners.txt
+	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mild-*.whl
+	@build/python-venv/bin/python tests/python/check_learners.py
 
 clean:
 	rm -rf build

@@ -12,7 +12,7 @@ packages=(
     libcmocka-dev
     libglfw3-dev libgl-dev libosmesa6-dev libegl-dev libegl1 libgl1-mesa-dri
     ffmpeg
-    python3-venv
+    python3-venv python3-dev
 )
 if [ "${1:-}" = check ]; then
     packages+=(
@@ -51,8 +51,8 @@ if ((${#missing[@]})); then
     apt-get -qq install --no-install-recommends -y "${missing[@]}"
 fi
 
-# The private environment holds the MuJoCo wheel (library and headers) and matplotlib (figures). The copy of the
-# requirements inside it is written last, so that an interrupted installation is repeated.
+# The private environment holds the MuJoCo wheel (library and headers), matplotlib (figures), and what the Python package
+# is built and tested with. The copy of the requirements inside it is written last, so that an interrupted installation is repeated.
 if ! cmp -s scripts/requirements.txt .venv/requirements.installed; then
     echo "setup: preparing .venv ($(paste -sd' ' scripts/requirements.txt))"
     python=/usr/bin/python3

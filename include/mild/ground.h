@@ -366,6 +366,11 @@ size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tile
 MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, int feet, int tiles);
 /* [B] Size of the block of an initialised ground. */
 size_t mild_ground_size(const MildGround *ground);
+/* Replaces what a ground remembers by a copy of `block`: [bytes] of a ground of the same soles and
+ * tiles, which may come from a file. Fails, with the ground unchanged, when the size or a number
+ * shows that it is none. */
+MildStatus mild_ground_restore(MildGround *ground, const void *block, size_t bytes,
+                               MildError *error);
 /* [m] Greatest depth that the imprint at the world point (x, y) remembers; 0 where there is none.
  * The surface there lies (1 - recovery) times that below h0. */
 double mild_ground_print_at(const MildGround *ground, double x, double y);

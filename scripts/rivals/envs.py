@@ -16,7 +16,7 @@ class Error(ctypes.Structure):
 
 class Shape(ctypes.Structure):
     NAMES = ("envs", "actions", "observation", "frames", "critic", "estimates", "rewards", "device")
-    _fields_ = [(name, c_int) for name in NAMES] + [("period", c_double)]
+    _fields_ = [(name, c_int) for name in NAMES] + [(name, c_double) for name in ("period", "episode", "clip")]
 
 
 class View(ctypes.Structure):
@@ -26,7 +26,7 @@ class View(ctypes.Structure):
 
 class Step(ctypes.Structure):
     NAMES = ("action", "reward", "done", "timeout", "valid")
-    _fields_ = [(name, c_void_p) for name in NAMES] + [("next", View)]
+    _fields_ = [(name, c_void_p) for name in NAMES] + [("next", View), ("last", View), ("terms", c_void_p)]
 
 
 class Statistics(ctypes.Structure):

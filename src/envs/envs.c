@@ -97,7 +97,9 @@ MildEnvsShape mild_envs_shape(const MildEnvs *envs) {
                            .estimates = shape->estimates,
                            .rewards = TASK_REWARD_COUNT,
                            .device = train_device(&envs->def.train),
-                           .period = TASK_PERIOD};
+                           .period = TASK_PERIOD,
+                           .episode = envs->def.task.episode,
+                           .clip = envs->def.task.action_clip};
 }
 
 const char *mild_envs_reward_name(int index) {
@@ -127,7 +129,14 @@ MildStatus mild_envs_reset(MildEnvs *envs, const MildEnvsView *first, void *stre
 
 MildStatus mild_envs_step(MildEnvs *envs, const MildEnvsStep *step, void *stream,
                           MildError *error) {
-    const VecView next = rows_of(&step->next);
+    const VecView next = rows_of(&step->next), last = rows_of(&step->last);
+    if (last.history || step->terms) {
+        MildStatus status =
+            train_envs_watch_ends(envs->envs, last.history ? &last : NULL, step->terms, error);
+        if (status != MILD_OK) {
+            return status;
+        }
+    }
     return train_envs_step_into(envs->envs, step->action, step->reward, step->done, step->timeout,
                                 step->valid, &next, stream, error);
 }

@@ -41,6 +41,8 @@ typedef struct {
     int rewards;     /* terms of the reward */
     int device;      /* CUDA device that the arrays are on; -1: the CPU */
     double period;   /* [s] policy step */
+    double episode;  /* [s] longest episode; the first ones are shorter */
+    double clip;     /* [-] actions are clipped to -clip .. clip */
 } MildEnvsShape;
 
 /* Where to write the next observation; one row for each environment. All but history may be
@@ -60,6 +62,11 @@ typedef struct {
     uint8_t *timeout;    /* [envs] bool: it ended by time; bootstrap from the value before it */
     uint8_t *valid;      /* [envs] bool: 0: the simulation diverged; give the sample no weight */
     MildEnvsView next;   /* the observation after it */
+    /* Of environments that ended, others are left alone; where MuJoCo steps the robots, else NULL.
+     */
+    MildEnvsView last; /* the observation at the end of the episode; 0 where it diverged. Not of a
+                          NULL history */
+    float *terms;      /* [envs][rewards] sum of each term over the episode */
 } MildEnvsStep;
 
 enum { MILD_ENVS_REWARDS_MAX = 32 };

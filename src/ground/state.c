@@ -1,5 +1,6 @@
 #include "ground/state.h"
 
+#include <math.h>
 #include <string.h>
 
 #define MEMORY_DOUBLES 12
@@ -120,4 +121,53 @@ void memory_forget(const Memory *memory, int e, int32_t material) {
 double mild_ground_print_at(const MildGround *ground, double x, double y) {
     Imprints imprints = ground_imprints(ground);
     return imprints_depth(&imprints, x, y);
+}
+
+/* Bool: an encoded material that a step can follow. */
+static int material_is_valid(int32_t material) {
+    return material >= 0 ? (material & 0xff) < MILD_MATERIALS_MAX &&
+                               (material >> 8 & 0xff) < MILD_MATERIALS_MAX && material >> 24 == 0
+                         : material == MATERIAL_NONE || material == MATERIAL_FREE;
+}
+
+/* Bool: the memory of every element of a foot is finite, on materials that exist. */
+static int foot_is_valid(const MildGround *ground, int foot) {
+    const Memory memory = ground_memory(ground, foot);
+    const size_t padded = (size_t)ground->padded[foot];
+    int valid = ground->touched[foot] >= 0 && ground->touched[foot] <= ground->padded[foot];
+    for (size_t i = 0; i < MEMORY_DOUBLES * padded; i++) {
+        valid &= isfinite(memory.depth_max[i]) != 0;
+    }
+    for (size_t i = 0; i < padded; i++) {
+        valid &= material_is_valid(memory.material[i]);
+    }
+    return valid;
+}
+
+/* Bool: the headers are those of grounds of the same soles and tiles. */
+static int layouts_agree(const MildGround *a, const MildGround *b) {
+    return a->feet == b->feet && memcmp(a->elements, b->elements, sizeof a->elements) == 0 &&
+           memcmp(a->padded, b->padded, sizeof a->padded) == 0 && a->tiles == b->tiles &&
+           a->imprint_cell == b->imprint_cell;
+}
+
+MildStatus mild_ground_restore(MildGround *ground, const void *block, size_t bytes,
+                               MildError *error) {
+    const MildGround *saved = block;
+    if (bytes != mild_ground_size(ground)) {
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "state of %zu bytes; this ground has %zu: take that of a ground with the "
+                         "same soles and tiles",
+                         bytes, mild_ground_size(ground));
+    }
+    int valid = layouts_agree(ground, saved);
+    for (int f = 0; valid && f < ground->feet; f++) {
+        valid = foot_is_valid(saved, f);
+    }
+    if (!valid) {
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "state: these bytes are not the memory of a ground with these soles");
+    }
+    memcpy(ground, block, bytes);
+    return MILD_OK;
 }

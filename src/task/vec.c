@@ -20,6 +20,8 @@ struct Vec {
     /* arguments of the call in flight */
     const float *action;
     const VecView *view;
+    const VecView *last; /* of vec_watch_ends */
+    float *terms;
 };
 
 static TaskEnv *env_at(const Vec *vec, int i) {
@@ -30,8 +32,7 @@ static float *row_at(float *rows, int i, int width) {
     return rows ? rows + (size_t)i * (size_t)width : NULL;
 }
 
-static TaskView view_at(const Vec *vec, int i) {
-    const VecView *view = vec->view;
+static TaskView view_at(const Vec *vec, const VecView *view, int i) {
     const TaskShape *shape = &vec->shape;
     return (TaskView){
         .history = row_at(view->history, i, shape->history),
@@ -102,7 +103,7 @@ void vec_number_from(Vec *vec, int first) {
 
 static void reset_piece(void *context, int piece, int thread) {
     Vec *vec = context;
-    TaskView view = view_at(vec, piece);
+    TaskView view = view_at(vec, vec->view, piece);
     task_env_reset(env_at(vec, piece), &vec->def, vec->robot, vec->sim[thread], &view);
 }
 
@@ -111,12 +112,40 @@ void vec_reset(Vec *vec, const VecView *first) {
     pool_run(vec->pool, vec->envs, reset_piece, vec);
 }
 
+static void copy_row(const float *from, int width, int valid, float *to) {
+    if (from && to) {
+        memset(to, 0, (size_t)width * sizeof *to);
+        memcpy(to, from, valid ? (size_t)width * sizeof *to : 0);
+    }
+}
+
+/* The end of an episode is seen where the next observation will be, and copied from there. */
+static void keep_last(const Vec *vec, int piece, const TaskView *view) {
+    const TaskShape *shape = &vec->shape;
+    const TaskView last = view_at(vec, vec->last, piece);
+    const int valid = vec->step[piece].valid;
+    copy_row(view->history, shape->history, valid, last.history);
+    copy_row(view->critic, shape->critic, valid, last.critic);
+    copy_row(view->estimate, shape->estimates, valid, last.estimate);
+    copy_row(view->frame, shape->observation, valid, last.frame);
+}
+
 static void step_piece(void *context, int piece, int thread) {
     Vec *vec = context;
-    TaskView view = view_at(vec, piece);
-    vec->step[piece] =
-        task_env_step(env_at(vec, piece), &vec->def, vec->robot, vec->sim[thread],
-                      vec->action + (size_t)piece * (size_t)vec->shape.actions, 1, &view, NULL);
+    TaskView view = view_at(vec, vec->view, piece);
+    TaskEnv *env = env_at(vec, piece);
+    const float *action = vec->action + (size_t)piece * (size_t)vec->shape.actions;
+    TaskStep *step = &vec->step[piece];
+    *step = task_env_step(env, &vec->def, vec->robot, vec->sim[thread], action, !vec->last, &view,
+                          NULL);
+    if (step->done && vec->last) {
+        keep_last(vec, piece, &view);
+        task_env_reset(env, &vec->def, vec->robot, vec->sim[thread], &view);
+    }
+    if (step->done && vec->terms) {
+        memcpy(vec->terms + (size_t)piece * TASK_REWARD_COUNT, step->episode_terms,
+               sizeof step->episode_terms);
+    }
 }
 
 static void count_episode(Vec *vec, const TaskStep *step) {
@@ -149,6 +178,12 @@ void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8
         }
     }
     vec->stats.steps += vec->envs;
+    vec_watch_ends(vec, NULL, NULL);
+}
+
+void vec_watch_ends(Vec *vec, const VecView *last, float *terms) {
+    vec->last = last;
+    vec->terms = terms;
 }
 
 VecStats vec_take_sums(Vec *vec) {

@@ -39,6 +39,11 @@ void vec_reset(Vec *vec, const VecView *first);
  * the observation after. */
 void vec_step(Vec *vec, const float *action, float *reward, uint8_t *done, uint8_t *timeout,
               uint8_t *valid, const VecView *next);
+/* What the next vec_step also writes, of environments that end in it: their observation before the
+ * new episode (zero where the simulation diverged) to the rows of `last`, whose history is not
+ * NULL, and the sums of their reward terms to terms [envs][TASK_REWARD_COUNT]. Either may be NULL.
+ */
+void vec_watch_ends(Vec *vec, const VecView *last, float *terms);
 VecStats vec_take_stats(Vec *vec);
 /* The same in two steps, between which those of several Vecs may be added: sums over the episodes
  * (`assist` over the robots), and means from them. envs: environments of all. */

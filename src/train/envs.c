@@ -100,6 +100,17 @@ MildStatus train_envs_step_into(TrainEnvs *envs, const float *action, float *rew
     return MILD_OK;
 }
 
+MildStatus train_envs_watch_ends(TrainEnvs *envs, const VecView *last, float *terms,
+                                 MildError *error) {
+    if (envs->crowd) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "the batch engine does not tell how an episode ends; train.robots = "
+                         "mujoco does");
+    }
+    vec_watch_ends(envs->vec, last, terms);
+    return MILD_OK;
+}
+
 MildStatus train_envs_reset(TrainEnvs *envs, PpoBatch *batch, void *stream, MildError *error) {
     const VecView first = view_of(envs, batch, 0);
     return train_envs_reset_into(envs, &first, stream, error);

@@ -28,6 +28,9 @@ MildStatus train_envs_reset_into(TrainEnvs *envs, const VecView *first, void *st
 MildStatus train_envs_step_into(TrainEnvs *envs, const float *action, float *reward, uint8_t *done,
                                 uint8_t *timeout, uint8_t *valid, const VecView *next, void *stream,
                                 MildError *error);
+/* As vec_watch_ends. Fails for the batch engine. */
+MildStatus train_envs_watch_ends(TrainEnvs *envs, const VecView *last, float *terms,
+                                 MildError *error);
 /* Until the steps are done. */
 MildStatus train_envs_wait(const TrainEnvs *envs, MildError *error);
 /* As vec_take_sums and vec_take_times. */

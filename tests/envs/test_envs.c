@@ -95,7 +95,12 @@ static void numbers_of_vec(void **state) {
     for (int t = 0; t < STEPS; t++) {
         float action[ENVS][SA01_JOINTS];
         draw_actions(t, action);
-        const MildEnvsStep step = {action[0], a.reward, a.done, a.timeout, a.valid, view};
+        const MildEnvsStep step = {.action = action[0],
+                                   .reward = a.reward,
+                                   .done = a.done,
+                                   .timeout = a.timeout,
+                                   .valid = a.valid,
+                                   .next = view};
         assert_int_equal(mild_envs_step(envs, &step, NULL, NULL), MILD_OK);
         vec_step(plain.vec, action[0], b.reward, b.done, b.timeout, b.valid, &plain_view);
         assert_memory_equal(&a, &b, sizeof a);
@@ -137,6 +142,96 @@ static void batch_engine(void **state) {
     }
     mild_envs_close(mujoco);
     mild_envs_close(engine);
+}
+
+/* Steps an environment without a reset up to the end of its episode: the step of it, and the
+ * history there. */
+static int play_alone(Plain *plain, int e, float history[SA01_HISTORY], TaskStep *end) {
+    const TaskDef *def = &plain->def.task;
+    RobotSim *sim = robot_sim_create(plain->robot, def->physics_dt, NULL);
+    TaskEnv *env = aligned_alloc(64, (task_env_bytes(def, plain->robot) + 63) / 64 * 64);
+    assert_true(sim && env);
+    const TaskView view = {.history = history};
+    task_env_init(env, def, plain->robot, 7, (uint32_t)e);
+    task_env_reset(env, def, plain->robot, sim, &view);
+    int t = 0;
+    do {
+        float action[ENVS][SA01_JOINTS];
+        draw_actions(t++, action);
+        *end = task_env_step(env, def, plain->robot, sim, action[e], 0, &view, NULL);
+    } while (!end->done);
+    free(env);
+    robot_sim_destroy(sim);
+    return t - 1;
+}
+
+/* The end of an episode is told without changing what follows. */
+static void ends(void **state) {
+    (void)state;
+    static Plain plain;
+    static Rows a, b, last;
+    static float terms[ENVS][TASK_REWARD_COUNT];
+    MildEnvs *told = open_envs(keys, KEYS), *untold = open_envs(keys, KEYS);
+    const MildEnvsView first = view_of(&a), second = view_of(&b), end = view_of(&last);
+    assert_int_equal(mild_envs_reset(told, &first, NULL, NULL), MILD_OK);
+    assert_int_equal(mild_envs_reset(untold, &second, NULL, NULL), MILD_OK);
+    open_plain(&plain);
+    int seen[ENVS] = {0}, compared = 0;
+    for (int t = 0; t < 2 * STEPS; t++) {
+        float action[ENVS][SA01_JOINTS];
+        draw_actions(t, action);
+        const MildEnvsStep step = {action[0], a.reward, a.done, a.timeout,
+                                   a.valid,   first,    end,    terms[0]};
+        MildEnvsStep plainly = step;
+        plainly.reward = b.reward;
+        plainly.done = b.done;
+        plainly.timeout = b.timeout;
+        plainly.valid = b.valid;
+        plainly.next = second;
+        plainly.last = (MildEnvsView){0};
+        plainly.terms = NULL;
+        memset(&last, 0xff, sizeof last);
+        assert_int_equal(mild_envs_step(told, &step, NULL, NULL), MILD_OK);
+        assert_int_equal(mild_envs_step(untold, &plainly, NULL, NULL), MILD_OK);
+        assert_memory_equal(&a, &b, sizeof a);
+        for (int e = 0; e < ENVS; e++) {
+            assert_true(a.done[e] || isnan(last.history[e][0])); /* others are left alone */
+            if (!a.done[e] || seen[e]++) {
+                continue;
+            }
+            float history[SA01_HISTORY];
+            TaskStep alone;
+            assert_int_equal(play_alone(&plain, e, history, &alone), t);
+            assert_memory_equal(last.history[e], history, sizeof history);
+            assert_memory_equal(last.frame[e], &history[SA01_HISTORY - SA01_OBSERVATION],
+                                sizeof last.frame[e]);
+            assert_memory_equal(terms[e], alone.episode_terms, sizeof terms[e]);
+            assert_memory_not_equal(a.history[e], history, sizeof history);
+            compared++;
+        }
+    }
+    assert_int_equal(compared, ENVS);
+    close_plain(&plain);
+    mild_envs_close(told);
+    mild_envs_close(untold);
+}
+
+/* The batch engine does not tell it, and says so. */
+static void no_ends(void **state) {
+    (void)state;
+    static Rows rows, last;
+    const char *batch[KEYS];
+    memcpy(batch, keys, sizeof batch);
+    batch[KEYS - 1] = "train.robots=batch";
+    MildEnvs *envs = open_envs(batch, KEYS);
+    float action[ENVS][SA01_JOINTS] = {{0}};
+    const MildEnvsStep step = {action[0],  rows.reward,    rows.done,      rows.timeout,
+                               rows.valid, view_of(&rows), view_of(&last), NULL};
+    MildError error = {0};
+    assert_int_equal(mild_envs_reset(envs, &step.next, NULL, NULL), MILD_OK);
+    assert_int_equal(mild_envs_step(envs, &step, NULL, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "train.robots = mujoco"));
+    mild_envs_close(envs);
 }
 
 static void mirror(void **state) {
@@ -185,10 +280,9 @@ static void one_clear_line(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(numbers_of_vec),
-        cmocka_unit_test(batch_engine),
-        cmocka_unit_test(mirror),
-        cmocka_unit_test(one_clear_line),
+        cmocka_unit_test(numbers_of_vec), cmocka_unit_test(batch_engine),
+        cmocka_unit_test(ends),           cmocka_unit_test(no_ends),
+        cmocka_unit_test(mirror),         cmocka_unit_test(one_clear_line),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -208,10 +208,53 @@ static void test_copy_continues(void **state) {
     mild_sole_destroy(right);
 }
 
+/* A saved block is taken back; one that no ground wrote is refused, and nothing changes. */
+static void test_restore(void **state) {
+    (void)state;
+    uint64_t random = 35;
+    MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
+    MildMaterial m = mild_material_default();
+    Kit kit;
+    kit_open(&kit, 2, left, right, &m, 1e-3);
+    kit_random_state(&kit, &random);
+    for (int s = 0; s < 50; s++) {
+        kit_step(&kit, NULL);
+    }
+    char *saved = malloc(kit.bytes), *bent = malloc(kit.bytes);
+    assert_true(saved && bent);
+    memcpy(saved, kit.ground, kit.bytes);
+    mild_ground_reset(kit.ground);
+    MildError error = {0};
+    assert_int_equal(mild_ground_restore(kit.ground, saved, kit.bytes, &error), MILD_OK);
+    assert_memory_equal(kit.ground, saved, kit.bytes);
+    /* feet, elements, padded, touched, tiles, cell; a number and a material of the first foot */
+    const size_t number = 128 + 80 * sizeof(double), material = 128 + 80 * 12 * sizeof(double);
+    const size_t places[] = {0, 4, 20, 36, 68, 80, number, material};
+    const uint64_t inf = 0x7ff0000000000000u, far = 77777;
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+        memcpy(bent, saved, kit.bytes);
+        memcpy(bent + places[i], places[i] == number ? &inf : &far, places[i] == number ? 8 : 4);
+        assert_int_equal(mild_ground_restore(kit.ground, bent, kit.bytes, &error),
+                         MILD_ERROR_FORMAT);
+        assert_memory_equal(kit.ground, saved, kit.bytes);
+    }
+    assert_int_equal(mild_ground_restore(kit.ground, saved, kit.bytes - 1, &error),
+                     MILD_ERROR_FORMAT);
+    assert_non_null(strstr(error.text, "bytes"));
+    free(saved);
+    free(bent);
+    kit_close(&kit);
+    mild_sole_destroy(left);
+    mild_sole_destroy(right);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_no_allocation),  cmocka_unit_test(test_failing_allocation),
-        cmocka_unit_test(test_bad_numbers),    cmocka_unit_test(test_taken_away),
-        cmocka_unit_test(test_copy_continues), cmocka_unit_test(test_state_bytes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_restore),
+                                       cmocka_unit_test(test_no_allocation),
+                                       cmocka_unit_test(test_failing_allocation),
+                                       cmocka_unit_test(test_bad_numbers),
+                                       cmocka_unit_test(test_taken_away),
+                                       cmocka_unit_test(test_copy_continues),
+                                       cmocka_unit_test(test_state_bytes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

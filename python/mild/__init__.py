@@ -1,0 +1,19 @@
+"""Soft ground for legged robots (docs/python.md): the ground itself, presses and fits of it, and the environments.
+
+Units are SI and radians, z points up. What is wrong with an argument is raised as one ValueError, TypeError or
+RuntimeError that names it."""
+from ._ground import Batch, Ground, Map, Material, Press, Sole, Terrain, models, presets, press
+from .fit import GroundFit, loading
+from .spec import attach
+
+__all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "Sole", "Terrain", "attach", "loading", "models", "presets",
+           "press"]
+
+try:
+    import gymnasium as _gymnasium
+except ImportError:  # `pip install mild[gym]` for the environments
+    pass
+else:
+    from .gym import register as _register
+
+    _register()

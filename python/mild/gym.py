@@ -1,0 +1,165 @@
+"""Gymnasium: gymnasium.make_vec("mild/SA01-v0", num_envs=...) and gymnasium.make("mild/SA01-v0")."""
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from .envs import open_envs
+
+OBSERVATIONS = ("history", "frame")
+
+
+def register():
+    """Registers mild/SA01-v0. `import mild` does it."""
+    if "mild/SA01-v0" not in gymnasium.registry:
+        gymnasium.register("mild/SA01-v0", entry_point="mild.gym:Env", vector_entry_point="mild.gym:VectorEnv")
+
+
+class _Task:
+    """What both kinds of environment share: opening, seeding, and steps into new arrays, which C fills."""
+
+    def _open(self, num_envs, observation, keys):
+        if observation not in OBSERVATIONS:
+            raise ValueError(f"observation: '{observation}' is none of {', '.join(OBSERVATIONS)}")
+        self._envs, self._count, self._observation, self._keys = None, num_envs, observation, keys
+        self._seed(int(self.np_random.integers(2**63)))
+        shape = self._envs
+        width = shape.observation * (shape.frames if observation == "history" else 1)
+        high = np.full(width, np.inf, np.float32)
+        clip = np.full(shape.actions, shape.clip, np.float32)
+        self._single = gymnasium.spaces.Box(-high, high), gymnasium.spaces.Box(-clip, clip)
+
+    def _seed(self, seed):
+        opened = open_envs(self._count, seed=seed, **self._keys)
+        self._shut()
+        self._envs = opened
+
+    def _arrays(self):
+        """New arrays for the results of a step."""
+        shape, rows = self._envs, self._count
+        arrays = {"history": np.empty((rows, shape.frames, shape.observation), np.float32),
+                  "reward": np.empty(rows, np.float32),
+                  "last": np.empty((rows, shape.frames, shape.observation), np.float32),
+                  "terms": np.empty((rows, shape.rewards), np.float32)}
+        arrays.update((name, np.empty(rows, np.bool_)) for name in ("done", "timeout", "valid"))
+        return arrays
+
+    def _seen(self, history):
+        """The observation in a history: all of it in a row, or its newest frame; a view."""
+        return history.reshape(self._count, -1) if self._observation == "history" else history[:, -1]
+
+    def _begin(self, seed):
+        if self._envs is None:
+            raise RuntimeError("reset: the environment is closed")
+        if seed is not None:
+            if not (isinstance(seed, (int, np.integer)) and 0 <= seed < 2**64):
+                raise ValueError(f"seed: {seed!r}, but it must be a whole number of 0 .. 2^64 - 1")
+            self._seed(int(seed))
+        arrays = self._arrays()
+        self._envs.reset(self._envs.buffers(**arrays))
+        return self._seen(arrays["history"])
+
+    def _act(self, action):
+        if self._envs is None:
+            raise RuntimeError("step: the environment is closed")
+        arrays = self._arrays()
+        self._envs.step(action, self._envs.buffers(**arrays))
+        return arrays
+
+    def _shut(self):
+        if self._envs is not None:
+            self._envs.close()
+            self._envs = None
+
+
+class VectorEnv(gymnasium.vector.VectorEnv, _Task):
+    """`num_envs` robots on soft ground (docs/task.md).
+
+    observation: "history", (num_envs, frames * observation) float32, oldest numbers first, or "frame", the newest only;
+    noisy, as the policy sees it. Actions: (num_envs, actions) float32 in units of the action scale. config, overrides,
+    robot, device, threads: see mild.envs.open_envs; device: cpu, with train.robots=mujoco.
+
+    Every step returns new arrays, into which the library writes without a copy. Environments that ended begin anew in the
+    same step (SAME_STEP): the observation is the first of the new episode, info["final_obs"] (num_envs, ...) has the last of
+    the old one where info["_final_obs"], and info["final_info"]["reward_terms"] (num_envs, terms) the sums of the reward's
+    terms over it, in the order of `reward_names`. The first episodes are shorter than the later ones, so that they do not
+    end together. One seed stands for all environments."""
+
+    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
+
+    def __init__(self, num_envs=1, *, observation="history", render_mode=None, **keys):
+        if render_mode is not None:
+            raise ValueError("render_mode: there is none; `mild play` shows robots")
+        self.num_envs = num_envs
+        self._open(num_envs, observation, keys)
+        self.single_observation_space, self.single_action_space = self._single
+        self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, num_envs)
+        self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
+        self.reward_names = self._envs.reward_names
+
+    def reset(self, *, seed=None, options=None):
+        """New episodes. seed: a whole number, from which all environments draw differently. options: must be empty."""
+        if options:
+            raise ValueError(f"options: {', '.join(options)}: there are none; environments reset themselves (SAME_STEP)")
+        observation = self._begin(seed)
+        super().reset(seed=None if seed is None else int(seed))
+        return observation, {}
+
+    def step(self, actions):
+        """(observations, rewards, terminations, truncations, infos); see the class."""
+        arrays = self._act(np.ascontiguousarray(actions, np.float32))
+        done, truncated = arrays["done"], arrays["timeout"]
+        return self._seen(arrays["history"]), arrays["reward"], done & ~truncated, truncated, self._info(arrays, done)
+
+    def _info(self, arrays, done):
+        if not done.any():
+            return {}
+        final = {"reward_terms": arrays["terms"], "_reward_terms": done, "diverged": ~arrays["valid"], "_diverged": done}
+        return {"final_obs": self._seen(arrays["last"]), "_final_obs": done, "final_info": final, "_final_info": done}
+
+    def statistics(self):
+        """Means over the episodes that ended since the last call: a dict, see MildEnvsStatistics of src/envs/envs.h."""
+        if self._envs is None:
+            raise RuntimeError("statistics: the environment is closed")
+        return self._envs.statistics()
+
+    def close_extras(self, **kwargs):
+        self._shut()
+
+
+class Env(gymnasium.Env, _Task):
+    """One robot; arguments and spaces as those of VectorEnv. info["reward_terms"] of the last step of an episode are the
+    sums of the reward's terms over it."""
+
+    metadata = {"render_modes": []}
+
+    def __init__(self, *, observation="history", render_mode=None, **keys):
+        if render_mode is not None:
+            raise ValueError("render_mode: there is none; `mild play` shows robots")
+        self.render_mode = None
+        self._ended = False
+        self._open(1, observation, {"threads": 1, **keys})
+        self.observation_space, self.action_space = self._single
+
+    def reset(self, *, seed=None, options=None):
+        """A new episode. seed: a whole number. options: must be empty or None."""
+        super().reset(seed=None if seed is None else int(seed))
+        self._ended = False
+        return self._begin(seed)[0], {}
+
+    def step(self, action):
+        """(observation, reward, terminated, truncated, info). Raises RuntimeError after the end of an episode."""
+        if self._ended:
+            raise RuntimeError("step: the episode has ended; call reset()")
+        action = np.ascontiguousarray(action, np.float32)
+        if action.shape != self.action_space.shape:
+            raise ValueError(f"action: shape {action.shape}, but it must be {self.action_space.shape}")
+        arrays = self._act(action[None])
+        self._ended, truncated = bool(arrays["done"][0]), bool(arrays["timeout"][0])
+        info = {}
+        if self._ended:
+            info = {"reward_terms": dict(zip(self._envs.reward_names, arrays["terms"][0].tolist()))}
+        seen = self._seen(arrays["last" if self._ended else "history"])[0]
+        return seen, float(arrays["reward"][0]), self._ended and not truncated, truncated, info
+
+    def close(self):
+        self._shut()

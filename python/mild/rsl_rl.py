@@ -1,0 +1,94 @@
+"""rsl_rl: environments whose tensors the library writes, on the CPU or a CUDA device."""
+import torch
+from rsl_rl.env import VecEnv
+from tensordict import TensorDict
+
+from .envs import open_envs
+
+
+class Env(VecEnv):
+    """`num_envs` robots on soft ground (docs/task.md) for rsl_rl 5.4 and 5.5.
+
+    Observation groups: "policy" (num_envs, frames * observation), noisy, and "critic" (num_envs, critic), noiseless; the
+    runner's obs_groups choose. extras: "time_outs" (num_envs,) bool, and every `log_every` steps "log", means over the
+    episodes that ended since; that waits for the device. device: cpu or cuda:N, where all tensors are. config, overrides,
+    robot, seed, threads: see mild.envs.open_envs."""
+
+    def __init__(self, num_envs=4096, *, device="cpu", config=None, overrides=None, robot="sa01", seed=1, threads=0,
+                 log_every=24):
+        self._envs = open_envs(num_envs, config=config, overrides=overrides, robot=robot, device=str(device), seed=seed,
+                               threads=threads)
+        self.num_envs, self.num_actions = num_envs, self._envs.actions
+        self.max_episode_length = round(self._envs.episode / self._envs.period)
+        self.device = torch.device(f"cuda:{self._envs.device}" if self._envs.device >= 0 else "cpu")
+        self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long, device=self.device)
+        self.cfg = {"config": str(config), "overrides": dict(overrides or {}), "robot": robot, "seed": seed}
+        self.log_every, self._steps = log_every, 0
+        self._tensors = self._new()
+        self._envs.reset(self._envs.buffers(**self._tensors), stream=self._stream())
+
+    def _new(self):
+        """New tensors for a step; the allocator of PyTorch gives back those of earlier steps."""
+        shape, rows, where = self._envs, self.num_envs, {"device": self.device}
+        tensors = {"history": torch.empty(rows, shape.frames, shape.observation, **where),
+                   "critic": torch.empty(rows, shape.critic, **where),
+                   "reward": torch.empty(rows, **where)}
+        tensors.update((name, torch.empty(rows, dtype=torch.bool, **where)) for name in ("done", "timeout", "valid"))
+        return tensors
+
+    def _stream(self):
+        return torch.cuda.current_stream(self.device).cuda_stream if self.device.type == "cuda" else 0
+
+    def get_observations(self):
+        """The present observations: a TensorDict of the groups."""
+        groups = {"policy": self._tensors["history"].view(self.num_envs, -1), "critic": self._tensors["critic"]}
+        return TensorDict(groups, batch_size=[self.num_envs], device=self.device)
+
+    def step(self, actions):
+        """actions: (num_envs, num_actions) in units of the action scale. Returns (observations, rewards (num_envs,), dones
+        (num_envs,) long, extras)."""
+        tensors = self._new()
+        actions = actions.detach().to(self.device, torch.float32).contiguous()
+        self._envs.step(actions, self._envs.buffers(**tensors), stream=self._stream())
+        self._tensors, self._actions = tensors, actions  # kept until the device has read them
+        self.episode_length_buf += 1
+        self.episode_length_buf.masked_fill_(tensors["done"], 0)
+        extras = {"time_outs": tensors["timeout"]}
+        self._steps += 1
+        if self.log_every and self._steps % self.log_every == 0:
+            extras["log"] = self._log()
+        return self.get_observations(), tensors["reward"], tensors["done"].long(), extras
+
+    def statistics(self):
+        """Means over the episodes that ended since the last call or log: a dict, see MildEnvsStatistics of src/envs/envs.h.
+        Waits for the device."""
+        return self._envs.statistics(stream=self._stream())
+
+    def _log(self):
+        found = self.statistics()
+        names = ["length", "speed_error"] if found["episodes"] else []
+        names += [name for name in found if name.startswith("reward.")] if found["episodes"] else []
+        return {"/mild/" + name: found[name] for name in [*names, "assist"]}
+
+    def mirror(self, obs=None, actions=None):
+        """Left and right exchanged: the arguments with their mirror images below them, as rsl_rl's symmetry wants it. Only
+        the group "policy" is mirrored; use it with a critic that sees the same."""
+        if not hasattr(self, "_mirror"):
+            pairs = self._envs.mirror()
+            self._mirror = [(torch.tensor(index, device=self.device), torch.tensor(sign, device=self.device))
+                            for index, sign in pairs]
+        (index, sign), (action_index, action_sign) = self._mirror
+        if obs is not None:
+            other = obs.clone()
+            frames = obs["policy"].view(len(obs), self._envs.frames, self._envs.observation)
+            other["policy"] = (sign * frames[:, :, index]).reshape(len(obs), -1)
+            obs = torch.cat([obs, other])
+        if actions is not None:
+            actions = torch.cat([actions, action_sign * actions[:, action_index]])
+        return obs, actions
+
+    def close(self):
+        """Ends the threads; further steps raise RuntimeError."""
+        if self.device.type == "cuda":
+            torch.cuda.synchronize(self.device)
+        self._envs.close()

@@ -1,0 +1,63 @@
+"""Soft ground under a model of one's own: MuJoCo's MjSpec and the engine plugin (docs/plugin.md)."""
+import os
+import pathlib
+
+PLUGIN = "mild.ground"
+
+
+def attach(spec, feet, ground="sand_loose", *, name="ground", library=None, **attributes):
+    """Puts soft ground under the feet of a mujoco.MjSpec, before spec.compile(); returns the plugin's instance.
+
+    feet: names of 1 .. 4 bodies or sites, z up from the sole; their geoms should not touch a rigid floor any more (contype
+    and conaffinity 0). ground: a preset, a Material, or a list of presets where terrain__patches is given. attributes: those
+    of the plugin with __ for the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the plugin's file; None:
+    $MILD_PLUGIN, or the package's own. Raises TypeError for what is no MjSpec, ValueError for feet that the
+    spec does not have, RuntimeError without the plugin; mujoco reports attributes that are wrong when it compiles."""
+    import mujoco
+
+    if not isinstance(spec, mujoco.MjSpec):
+        raise TypeError(f"spec: a {type(spec).__name__}, but it must be a mujoco.MjSpec")
+    feet = [feet] if isinstance(feet, str) else list(feet)
+    for foot in feet:
+        if spec.body(foot) is None and spec.site(foot) is None:
+            raise ValueError(f"feet: the spec has no body or site '{foot}'")
+    if not 1 <= len(feet) <= 4:
+        raise ValueError(f"feet: {len(feet)} of them, but there must be 1 .. 4")
+    config = {"feet": " ".join(feet), **ground_of(ground)}
+    config.update((key.replace("__", "."), text_of(value)) for key, value in attributes.items())
+    load_plugin(library)
+    spec.activate_plugin(PLUGIN)
+    plugin = spec.add_plugin(plugin_name=PLUGIN, name=name)
+    plugin.config = config
+    return plugin
+
+
+def load_plugin(library=None):
+    """Loads the engine plugin: `library`, else $MILD_PLUGIN, else the package's own. A process that has it may do so again.
+    Raises RuntimeError when there is no such file, or when it is for another MuJoCo."""
+    import mujoco
+
+    path = pathlib.Path(library or os.environ.get("MILD_PLUGIN") or pathlib.Path(__file__).parent / "lib" / "libmild_plugin.so")
+    if not path.is_file():
+        raise RuntimeError(f"library: there is no plugin '{path}'; `make plugin` builds it")
+    try:
+        mujoco.mj_loadPluginLibrary(str(path))
+    except Exception as error:
+        raise RuntimeError(f"library: {path} does not go with MuJoCo {mujoco.__version__}: {error}") from None
+
+
+def ground_of(ground):
+    """The plugin's attributes of a ground."""
+    if isinstance(ground, str):
+        return {"ground": ground}
+    if isinstance(ground, (list, tuple)) and all(isinstance(one, str) for one in ground):
+        return {"ground": " ".join(ground)}
+    from . import Material
+
+    if not isinstance(ground, Material):
+        raise TypeError(f"ground: a {type(ground).__name__}, but it must be a preset, a Material, or a list of presets")
+    return {"ground." + key: value for key, value in ground.as_dict().items()}
+
+
+def text_of(value):
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,256 @@
+/* The module mild._envs: environments of the task (src/envs/envs.h) on arrays of the caller. */
+#include "arrays.h"
+
+#include <memory>
+#include <optional>
+
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <sys/types.h>
+#include <unistd.h>
+
+extern "C" {
+#include "envs/envs.h"
+}
+
+/* Where results of a step go. Its arrays are kept as long as it is. */
+struct Buffers {
+    MildEnvsStep step = {};
+    std::vector<Array> arrays;
+};
+
+struct Envs {
+    MildEnvs *envs = nullptr;
+    MildEnvsShape shape = {};
+    pid_t process = 0; /* a fork has none of the threads */
+    bool begun = false;
+    std::atomic<bool> busy{false};
+
+    Envs() = default;
+    Envs(const Envs &) = delete;
+    ~Envs() {
+        if (process == getpid()) {
+            mild_envs_close(envs);
+        }
+    }
+};
+
+static MildEnvs *open_envs(const Envs &envs) {
+    if (!envs.envs) {
+        raise(PyExc_RuntimeError, "Envs: they are closed");
+    }
+    if (envs.process != getpid()) {
+        raise(PyExc_RuntimeError, "Envs: opened in another process, whose threads a fork does not "
+                                  "have; open them in this one");
+    }
+    return envs.envs;
+}
+
+static void make(Envs *at, const std::optional<std::string> &config,
+                 const std::vector<std::string> &overrides) {
+    std::vector<const char *> keys;
+    for (const std::string &key : overrides) {
+        keys.push_back(key.c_str());
+    }
+    MildError error = {};
+    MildEnvs *envs =
+        mild_envs_open(config ? config->c_str() : nullptr, keys.data(), (int)keys.size(), &error);
+    check(envs ? MILD_OK : error.status, error);
+    new (at) Envs;
+    at->envs = envs;
+    at->shape = mild_envs_shape(envs);
+    at->process = getpid();
+}
+
+static void close_envs(Envs &envs) {
+    Entered entered(envs.busy, "Envs.close");
+    if (envs.envs) {
+        MildEnvs *at = open_envs(envs);
+        envs.envs = nullptr;
+        mild_envs_close(at);
+    }
+}
+
+/* ---- arrays ---- */
+
+static float *view_row(Buffers &buffers, nb::handle array, const char *name,
+                       std::vector<int64_t> shape, int device) {
+    buffers.arrays.push_back(
+        take_optional(array, {name, nb::dtype<float>(), std::move(shape), device, true}));
+    return pointer<float>(buffers.arrays.back());
+}
+
+static uint8_t *flag_row(Buffers &buffers, nb::handle array, const char *name, const Envs &envs) {
+    buffers.arrays.push_back(take_array(
+        array, {name, nb::dtype<uint8_t>(), {envs.shape.envs}, envs.shape.device, true}));
+    return pointer<uint8_t>(buffers.arrays.back());
+}
+
+static std::unique_ptr<Buffers> make_buffers(const Envs &envs, nb::handle history,
+                                             nb::handle reward, nb::handle done, nb::handle timeout,
+                                             nb::handle valid, nb::handle critic, nb::handle frame,
+                                             nb::handle estimate, nb::handle last,
+                                             nb::handle last_critic, nb::handle terms) {
+    const MildEnvsShape &shape = envs.shape;
+    const int64_t n = shape.envs;
+    const int where = shape.device;
+    const std::vector<int64_t> frames = {n, shape.frames, shape.observation};
+    auto buffers = std::make_unique<Buffers>();
+    MildEnvsStep &step = buffers->step;
+    if (history.is_none() || reward.is_none()) {
+        raise(PyExc_TypeError, "history, reward: they must be arrays");
+    }
+    step.next.history = view_row(*buffers, history, "history", frames, where);
+    step.next.critic = view_row(*buffers, critic, "critic", {n, shape.critic}, where);
+    step.next.frame = view_row(*buffers, frame, "frame", {n, shape.observation}, where);
+    step.next.estimate = view_row(*buffers, estimate, "estimate", {n, shape.estimates}, where);
+    step.last.history = view_row(*buffers, last, "last", frames, where);
+    step.last.critic = view_row(*buffers, last_critic, "last_critic", {n, shape.critic}, where);
+    step.terms = view_row(*buffers, terms, "terms", {n, shape.rewards}, where);
+    step.reward = view_row(*buffers, reward, "reward", {n}, where);
+    step.done = flag_row(*buffers, done, "done", envs);
+    step.timeout = flag_row(*buffers, timeout, "timeout", envs);
+    step.valid = flag_row(*buffers, valid, "valid", envs);
+    return buffers;
+}
+
+/* ---- calls ---- */
+
+/* Buffers are of these environments when they were made with their shape. */
+static void check_buffers(const Envs &envs, const Buffers &buffers) {
+    const MildEnvsShape &shape = envs.shape;
+    const nb::ndarray<> &history = buffers.arrays[0].writable;
+    if ((int)history.shape(0) != shape.envs || (int)history.shape(1) != shape.frames ||
+        (int)history.shape(2) != shape.observation) {
+        raise(PyExc_ValueError, "buffers: they were made for environments of another shape");
+    }
+}
+
+static void reset(Envs &envs, Buffers &buffers, uintptr_t stream) {
+    Entered entered(envs.busy, "Envs.reset");
+    MildEnvs *at = open_envs(envs);
+    check_buffers(envs, buffers);
+    MildError error = {};
+    MildStatus status;
+    {
+        nb::gil_scoped_release released;
+        status = mild_envs_reset(at, &buffers.step.next, (void *)stream, &error);
+    }
+    check(status, error);
+    envs.begun = true;
+}
+
+static void step(Envs &envs, nb::handle action, Buffers &buffers, uintptr_t stream) {
+    Entered entered(envs.busy, "Envs.step");
+    MildEnvs *at = open_envs(envs);
+    if (!envs.begun) {
+        raise(PyExc_RuntimeError, "Envs.step: no episode has begun; call reset() first");
+    }
+    check_buffers(envs, buffers);
+    const Array actions = take_array(
+        action,
+        {"action", nb::dtype<float>(), {envs.shape.envs, envs.shape.actions}, envs.shape.device});
+    MildEnvsStep call = buffers.step;
+    call.action = pointer<float>(actions);
+    MildError error = {};
+    MildStatus status;
+    {
+        nb::gil_scoped_release released;
+        status = mild_envs_step(at, &call, (void *)stream, &error);
+    }
+    check(status, error);
+}
+
+static nb::dict statistics(Envs &envs, uintptr_t stream) {
+    Entered entered(envs.busy, "Envs.statistics");
+    MildEnvsStatistics of = {};
+    MildError error = {};
+    check(mild_envs_statistics(open_envs(envs), &of, (void *)stream, &error), error);
+    nb::dict all;
+    all["episodes"] = of.episodes;
+    all["falls"] = of.falls;
+    all["diverged"] = of.diverged;
+    all["steps"] = of.steps;
+    all["paid"] = of.paid;
+    all["length"] = of.length;
+    all["reward"] = of.reward;
+    all["speed_error"] = of.speed_error;
+    all["assist"] = of.assist;
+    for (int i = 0; i < envs.shape.rewards; i++) {
+        all[(std::string("reward.") + mild_envs_reward_name(i)).c_str()] = of.terms[i];
+    }
+    return all;
+}
+
+static nb::tuple mirror(Envs &envs) {
+    const size_t observation = (size_t)envs.shape.observation, actions = (size_t)envs.shape.actions;
+    std::vector<int> frame_index(observation), action_index(actions);
+    std::vector<float> frame_sign(observation), action_sign(actions);
+    mild_envs_mirror(open_envs(envs), frame_index.data(), frame_sign.data(), action_index.data(),
+                     action_sign.data());
+    return nb::make_tuple(nb::make_tuple(frame_index, frame_sign),
+                          nb::make_tuple(action_index, action_sign));
+}
+
+template <typename T> static auto number(T MildEnvsShape::*member) {
+    return [member](const Envs &envs) { return envs.shape.*member; };
+}
+
+static void bind_shape(nb::class_<Envs> &type) {
+    type.def_prop_ro("envs", number(&MildEnvsShape::envs), "Environments.")
+        .def_prop_ro("actions", number(&MildEnvsShape::actions), "Numbers of an action.")
+        .def_prop_ro("observation", number(&MildEnvsShape::observation), "Numbers of a frame.")
+        .def_prop_ro("frames", number(&MildEnvsShape::frames), "Frames of a history.")
+        .def_prop_ro("critic", number(&MildEnvsShape::critic), "Numbers that a critic may see.")
+        .def_prop_ro("estimates", number(&MildEnvsShape::estimates),
+                     "True numbers that an estimator regresses on.")
+        .def_prop_ro("rewards", number(&MildEnvsShape::rewards), "Terms of the reward.")
+        .def_prop_ro("device", number(&MildEnvsShape::device),
+                     "CUDA device of the arrays; -1: the CPU.")
+        .def_prop_ro("period", number(&MildEnvsShape::period), "Policy step [s].")
+        .def_prop_ro("episode", number(&MildEnvsShape::episode), "Longest episode [s].")
+        .def_prop_ro("clip", number(&MildEnvsShape::clip), "Actions are clipped to -clip .. clip.")
+        .def_prop_ro(
+            "reward_names",
+            [](const Envs &envs) {
+                std::vector<std::string> names;
+                for (int i = 0; i < envs.shape.rewards; i++) {
+                    names.push_back(mild_envs_reward_name(i));
+                }
+                return names;
+            },
+            "Names of the terms of the reward.");
+}
+
+NB_MODULE(_envs, module) {
+    module.doc() = "Environments of the task (docs/task.md) on arrays of the caller.";
+    nb::class_<Buffers>(module, "Buffers", "Where results of a step go; see Envs.buffers.");
+    nb::class_<Envs> type(
+        module, "Envs",
+        "train.envs environments. config: a file, or None; overrides: texts section.key=value.\n"
+        "Raises ValueError with the key that is wrong.");
+    type.def("__init__", make, nb::arg("config").none(), nb::arg("overrides"))
+        .def("buffers", make_buffers, nb::kw_only(), nb::arg("history").none(),
+             nb::arg("reward").none(), nb::arg("done").none(), nb::arg("timeout").none(),
+             nb::arg("valid").none(), nb::arg("critic").none() = nb::none(),
+             nb::arg("frame").none() = nb::none(), nb::arg("estimate").none() = nb::none(),
+             nb::arg("last").none() = nb::none(), nb::arg("last_critic").none() = nb::none(),
+             nb::arg("terms").none() = nb::none(),
+             "Checks arrays once, for many steps. float32: history (envs, frames, observation), "
+             "critic\n(envs, critic), frame (envs, observation), estimate (envs, estimates), last "
+             "and\nlast_critic: as history and critic at the end of episodes, terms (envs, "
+             "rewards): of these,\nreward (envs,). bool or uint8 (envs,): done, timeout, valid. On "
+             "the device of the\nenvironments. Raises TypeError or ValueError with the name of the "
+             "array that does not fit.")
+        .def("reset", reset, nb::arg("buffers"), nb::arg("stream") = 0,
+             "New episodes; writes history, critic, frame and estimate.")
+        .def("step", step, nb::arg("action").none(), nb::arg("buffers"), nb::arg("stream") = 0,
+             "A policy step. action: (envs, actions) float32 in units of the action scale. "
+             "Environments\nthat ended begin anew in the same step.")
+        .def("statistics", statistics, nb::arg("stream") = 0,
+             "Means over the episodes that ended since the last call.")
+        .def("mirror", mirror,
+             "((index, sign) of a frame, (index, sign) of an action), left to right.")
+        .def("close", close_envs, "Ends the threads; further calls raise RuntimeError.");
+    bind_shape(type);
+}

@@ -1,0 +1,178 @@
+/* What mild.GroundFit calls (src/lab/fit.h). */
+#include "ground.h"
+
+#include <cmath>
+
+extern "C" {
+#include "lab/fit.h"
+}
+
+static FitPlate plate_of(const Sole &sole) {
+    return {mild_sole_elements(sole.made), mild_sole_pitch(sole.made)};
+}
+
+/* rows: (n, 5) time, depth, force, speed, acceleration; NaN where unknown. */
+static std::vector<FitPoint> points_of(nb::handle rows) {
+    const auto numbers = numbers_of(rows, "rows", 2);
+    if (numbers.shape(1) != 5 || numbers.shape(0) > 1000000) {
+        raise(PyExc_ValueError, "rows: they must have the shape (at most 1000000, 5)");
+    }
+    std::vector<FitPoint> points;
+    for (size_t i = 0; i < numbers.shape(0); i++) {
+        const double *row = numbers.data() + 5 * i;
+        points.push_back({row[0], row[1], row[2], row[3], row[4]});
+    }
+    return points;
+}
+
+static const char *state_name(FitState state) {
+    switch (state) {
+    case FIT_HELD: return "held";
+    case FIT_FILLED: return "filled";
+    case FIT_FITTED: return "fitted";
+    case FIT_LIMIT: return "limit";
+    case FIT_OPEN: return "open";
+    case FIT_TIED: return "tied";
+    default: return "no_effect";
+    }
+}
+
+static nb::dict value_of(const FitValue &value) {
+    nb::dict all;
+    all["value"] = value.value;
+    all["low"] = value.low;
+    all["high"] = value.high;
+    all["state"] = state_name(value.state);
+    all["unit"] = value.unit;
+    return all;
+}
+
+static void hold(FitDef &def, const std::string &name, double value) {
+    const MildField *fields[FIT_PARAMETERS_MAX];
+    const int count = fit_parameters((MildModel)def.material.model, fields);
+    const MildField *field =
+        mild_field_find(mild_material_fields, mild_material_field_count, name.c_str(), nullptr);
+    bool known = field && fit_is_geometry((MildModel)def.material.model, name.c_str());
+    for (int i = 0; i < count; i++) {
+        if (name == fields[i]->name) {
+            def.held[i] = 1;
+            known = true;
+        }
+    }
+    if (!known) {
+        raise(PyExc_ValueError, "hold: '" + name + "' is no parameter of " +
+                                    mild_model_names[def.material.model] +
+                                    " that a press straight down tells");
+    }
+    double low, high;
+    fit_range(field, &low, &high);
+    if (!(value >= low && value <= high)) {
+        raise(PyExc_ValueError, "hold: " + name + " = " + std::to_string(value) + " is outside " +
+                                    std::to_string(low) + " .. " + std::to_string(high));
+    }
+    *fit_number(&def.material, field) = value;
+}
+
+static FitDef def_of(const Sole &sole, const std::string &model, double width, const nb::dict &held,
+                     const MildMaterial *fill) {
+    FitDef def = {};
+    MildModel number;
+    if (!mild_model_find(model.c_str(), &number) || number == MILD_MODEL_RIGID) {
+        raise(PyExc_ValueError, "model: '" + model + "' is none with parameters to fit");
+    }
+    if (fill && fill->model != (int)number) {
+        raise(PyExc_ValueError, "fill: it is a material of another model");
+    }
+    def.plate = plate_of(sole);
+    def.material = fill ? *fill : mild_material_default();
+    def.material.model = (int)number;
+    def.material.plate_width = positive(width, "plate");
+    if (!fill) {
+        def.material.bed_depth =
+            mild_field_find(mild_material_fields, mild_material_field_count, "bed_depth", nullptr)
+                ->max;
+    }
+    for (auto [key, value] : held) {
+        double wanted = 0;
+        if (!nb::try_cast(value, wanted)) {
+            raise(PyExc_TypeError, "hold: every value must be a number");
+        }
+        hold(def, utf8(key, "hold"), wanted);
+    }
+    def.fill = fill;
+    return def;
+}
+
+static nb::dict run(const Sole &sole, double width, nb::handle rows, const std::string &model,
+                    const nb::dict &held, nb::handle fill) {
+    MildMaterial filled;
+    if (!fill.is_none()) {
+        filled = material_of(fill, "fill");
+        filled.plate_width = positive(width, "plate");
+    }
+    const FitDef def = def_of(sole, model, width, held, fill.is_none() ? nullptr : &filled);
+    const std::vector<FitPoint> points = points_of(rows);
+    FitResult result = {};
+    MildError error = {};
+    MildStatus status;
+    {
+        nb::gil_scoped_release released;
+        status = fit_run(&def, points.data(), (int)points.size(), &result, &error);
+    }
+    check(status, error);
+    nb::dict all, parameters, combinations;
+    for (int i = 0; i < result.parameters; i++) {
+        parameters[result.parameter[i].name] = value_of(result.parameter[i]);
+    }
+    for (int i = 0; i < result.combinations; i++) {
+        combinations[result.combination[i].name] = value_of(result.combination[i]);
+    }
+    all["parameters"] = parameters;
+    all["combinations"] = combinations;
+    all["curve"] = Material{result.curve};
+    all["residual"] = result.residual;
+    all["residual_share"] = result.residual_share;
+    all["points"] = result.points;
+    return all;
+}
+
+/* Rows of doubles as a NumPy array that owns them. */
+static nb::object array_of(std::vector<double> numbers, std::vector<size_t> shape) {
+    auto *kept = new std::vector<double>(std::move(numbers));
+    nb::capsule owner(kept, [](void *p) noexcept { delete (std::vector<double> *)p; });
+    return nb::cast(
+        nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
+}
+
+static nb::object forces(const Sole &sole, const Material &material, nb::handle rows) {
+    const std::vector<FitPoint> points = points_of(rows);
+    const FitPlate plate = plate_of(sole);
+    std::vector<double> force(points.size());
+    if (!points.empty()) {
+        fit_forces(&plate, &material.numbers, points.data(), (int)points.size(), force.data());
+    }
+    return array_of(std::move(force), {points.size()});
+}
+
+static nb::object loading(nb::handle rows) {
+    std::vector<FitPoint> points = points_of(rows);
+    const int count = points.empty() ? 0 : fit_loading(points.data(), (int)points.size());
+    if (count > 0) {
+        fit_speeds(points.data(), count);
+    }
+    std::vector<double> kept;
+    for (int i = 0; i < count; i++) {
+        const FitPoint &p = points[(size_t)i];
+        kept.insert(kept.end(), {p.time, p.depth, p.force, p.speed, p.acceleration});
+    }
+    return array_of(std::move(kept), {(size_t)count, 5});
+}
+
+void bind_fit(nb::module_ &module) {
+    module.def("_fit", run, nb::arg("sole"), nb::arg("width"), nb::arg("rows"), nb::arg("model"),
+               nb::arg("hold"), nb::arg("fill").none(), "See mild.GroundFit.");
+    module.def("_fit_forces", forces, nb::arg("sole"), nb::arg("material"), nb::arg("rows"),
+               "Forces [N] in every row: (n,).");
+    module.def("_loading", loading, nb::arg("rows"),
+               "The loading part of a record, with speeds and accelerations: (n, 5).");
+}

@@ -1,0 +1,354 @@
+/* mild.Ground: contact steps on arrays that lie in the library's own structs. */
+#include "ground.h"
+
+#include <cstdlib>
+#include <cstring>
+
+struct Ground {
+    nb::object soles; /* tuple of Sole */
+    Terrain terrain;
+    Terrain used; /* a copy for the step that was solved */
+    int feet = 0;
+    int tiles = 0;
+    void *block = nullptr;
+    MildGround *ground = nullptr;
+    MildScratch *scratch = nullptr;
+    MildContactInput input = {};
+    MildContactResult result = {};
+    bool solved = false;
+    std::atomic<bool> busy{false};
+
+    Ground() = default;
+    Ground(const Ground &) = delete;
+    ~Ground() {
+        mild_scratch_destroy(scratch);
+        std::free(block);
+    }
+};
+
+MildGround *block_of(Ground &ground) {
+    return ground.ground;
+}
+
+/* ---- creation ---- */
+
+static void set_solver(Ground &ground, const std::string &solver) {
+    if (solver != "newton" && solver != "gauss_seidel") {
+        raise(PyExc_ValueError, "solver: '" + solver + "' is neither newton nor gauss_seidel");
+    }
+    ground.input.solver = solver == "newton" ? MILD_SOLVER_NEWTON : MILD_SOLVER_GAUSS_SEIDEL;
+}
+
+static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, double dt, int tiles,
+                 const std::string &solver, double tolerance, int max_iterations) {
+    const std::vector<const MildSole *> made = soles_of(soles);
+    if (tiles < 0 || tiles > MILD_PRINT_TILES_MAX) {
+        raise(PyExc_ValueError, "tiles = " + std::to_string(tiles) + " is outside 0 .. " +
+                                    std::to_string(MILD_PRINT_TILES_MAX));
+    }
+    if (!(tolerance >= 0) || max_iterations < 0) {
+        raise(PyExc_ValueError, "tolerance, max_iterations: they must be 0 or above");
+    }
+    positive(dt, "dt");
+    Terrain under = terrain_of(terrain);
+    auto ground = new (at) Ground;
+    try {
+        set_solver(*ground, solver);
+        MildError error = {};
+        ground->feet = ground->input.feet = (int)made.size();
+        ground->block =
+            std::aligned_alloc(64, mild_ground_bytes_prints(made.data(), ground->feet, tiles));
+        ground->scratch = mild_scratch_create(made.data(), ground->feet, &error);
+        if (!ground->block || !ground->scratch) {
+            raise(PyExc_MemoryError, "Ground: out of memory");
+        }
+        ground->ground = mild_ground_init_prints(ground->block, made.data(), ground->feet, tiles);
+        ground->soles = nb::tuple(soles);
+        ground->terrain = under;
+        ground->tiles = tiles;
+        ground->input.dt = dt;
+        ground->input.tolerance = tolerance;
+        ground->input.max_iterations = max_iterations;
+        for (int f = 0; f < ground->feet; f++) {
+            for (int k = 0; k < 3; k++) {
+                ground->input.rotation[f][4 * k] = 1;
+            }
+        }
+    } catch (...) {
+        at->~Ground();
+        throw;
+    }
+}
+
+/* ---- a step ---- */
+
+static bool solve(Ground &ground) {
+    Entered entered(ground.busy, "Ground.solve");
+    ground.used = ground.terrain;
+    {
+        nb::gil_scoped_release released;
+        mild_ground_solve(ground.ground, &ground.used.terrain, &ground.input, ground.scratch,
+                          &ground.result);
+    }
+    ground.solved = true;
+    return ground.result.converged != 0;
+}
+
+static void advance(Ground &ground) {
+    Entered entered(ground.busy, "Ground.advance");
+    if (!ground.solved) {
+        raise(PyExc_RuntimeError, "Ground.advance: there is no step to keep; call solve() first");
+    }
+    ground.solved = false;
+    nb::gil_scoped_release released;
+    mild_ground_advance(ground.ground, &ground.used.terrain, &ground.input, ground.scratch,
+                        &ground.result);
+}
+
+static void reset(Ground &ground) {
+    Entered entered(ground.busy, "Ground.reset");
+    ground.solved = false;
+    mild_ground_reset(ground.ground);
+}
+
+/* ---- state ---- */
+
+static nb::bytes get_state(Ground &ground) {
+    Entered entered(ground.busy, "Ground.state");
+    return nb::bytes(ground.block, mild_ground_size(ground.ground));
+}
+
+static void set_state(Ground &ground, const nb::bytes &state) {
+    Entered entered(ground.busy, "Ground.state");
+    MildError error = {};
+    check(mild_ground_restore(ground.ground, state.c_str(), state.size(), &error), error);
+    ground.solved = false;
+}
+
+static nb::tuple keep(Ground &ground) {
+    const MildContactInput &input = ground.input;
+    return nb::make_tuple(ground.soles, ground.terrain, input.dt, ground.tiles,
+                          input.solver == MILD_SOLVER_NEWTON ? "newton" : "gauss_seidel",
+                          input.tolerance, input.max_iterations, get_state(ground),
+                          nb::bytes(&input, sizeof input));
+}
+
+static void restore(Ground *ground, const nb::tuple &kept) {
+    make(ground, nb::borrow<nb::sequence>(kept[0]), kept[1], nb::cast<double>(kept[2]),
+         nb::cast<int>(kept[3]), nb::cast<std::string>(kept[4]), nb::cast<double>(kept[5]),
+         nb::cast<int>(kept[6]));
+    const nb::bytes numbers = nb::borrow<nb::bytes>(kept[8]);
+    set_state(*ground, nb::borrow<nb::bytes>(kept[7]));
+    if (numbers.size() == sizeof ground->input) {
+        const MildContactInput made = ground->input;
+        std::memcpy(&ground->input, numbers.c_str(), sizeof ground->input);
+        ground->input.feet = made.feet;
+        ground->input.solver = made.solver;
+        ground->input.dt = made.dt;
+    }
+}
+
+/* ---- arrays: views of input and result ---- */
+
+using Numbers = nb::ndarray<nb::numpy, double>;
+using Results = nb::ndarray<nb::numpy, const double>;
+
+template <typename Choose>
+static auto input_array(Choose choose, std::vector<size_t> (*shape)(size_t feet)) {
+    return [choose, shape](nb::handle self) {
+        Ground &ground = nb::cast<Ground &>(self);
+        const std::vector<size_t> wanted = shape((size_t)ground.feet);
+        return Numbers(choose(ground.input), wanted.size(), wanted.data(), self);
+    };
+}
+
+/* A number or a vector of every MildFootResult. */
+template <typename Choose> static auto foot_array(Choose choose, size_t width) {
+    return [choose, width](nb::handle self) {
+        Ground &ground = nb::cast<Ground &>(self);
+        const size_t shape[] = {(size_t)ground.feet, width};
+        const int64_t strides[] = {sizeof(MildFootResult) / sizeof(double), 1};
+        static_assert(sizeof(MildFootResult) % sizeof(double) == 0, "strides are in doubles");
+        return Results(choose(ground.result.foot[0]), width ? 2 : 1, shape, self, strides);
+    };
+}
+
+static nb::dict elements(nb::handle self, int foot) {
+    Ground &ground = nb::cast<Ground &>(self);
+    Entered entered(ground.busy, "Ground.elements");
+    if (foot < 0 || foot >= ground.feet) {
+        raise(PyExc_IndexError,
+              "foot = " + std::to_string(foot) + ", but there are " + std::to_string(ground.feet));
+    }
+    if (!ground.solved) {
+        raise(PyExc_RuntimeError, "Ground.elements: they are those of a solve; call solve() first");
+    }
+    const MildElements at = mild_scratch_elements(ground.scratch, foot);
+    const size_t count =
+        (size_t)mild_sole_elements(nb::cast<Sole &>(ground.soles[(size_t)foot]).made);
+    nb::dict all;
+    const struct {
+        const char *name;
+        const double *at;
+    } numbers[] = {{"depth", at.depth},         {"normal", at.normal},
+                   {"tangent_x", at.tangent_x}, {"tangent_y", at.tangent_y},
+                   {"point_x", at.point_x},     {"point_y", at.point_y},
+                   {"point_z", at.point_z},     {"flat", at.flat}};
+    for (const auto &one : numbers) {
+        all[one.name] = nb::cast(Results(one.at, {count}, self)).attr("copy")();
+    }
+    using Flags = nb::ndarray<nb::numpy, const uint8_t>;
+    all["state"] = nb::cast(Flags(at.state, {count}, self)).attr("copy")();
+    all["slip"] = nb::cast(Flags(at.slip, {count}, self)).attr("astype")("bool");
+    return all;
+}
+
+static Results depths(nb::handle self, int foot) {
+    Ground &ground = nb::cast<Ground &>(self);
+    if (foot < 0 || foot >= ground.feet) {
+        raise(PyExc_IndexError,
+              "foot = " + std::to_string(foot) + ", but there are " + std::to_string(ground.feet));
+    }
+    const size_t count =
+        (size_t)mild_sole_elements(nb::cast<Sole &>(ground.soles[(size_t)foot]).made);
+    return Results(mild_ground_depth_max(ground.ground, foot), {count}, self);
+}
+
+/* ---- the class ---- */
+
+static void bind_input(nb::class_<Ground> &type) {
+    type.def_prop_ro("position",
+                     input_array([](MildContactInput &input) { return &input.position[0][0]; },
+                                 [](size_t feet) {
+                                     return std::vector<size_t>{feet, 3};
+                                 }),
+                     "Ankles, world [m]: (feet, 3). Assign its elements: ground.position[0] = ...")
+        .def_prop_ro("rotation",
+                     input_array([](MildContactInput &input) { return &input.rotation[0][0]; },
+                                 [](size_t feet) {
+                                     return std::vector<size_t>{feet, 3, 3};
+                                 }),
+                     "Foot to world, orthonormal: (feet, 3, 3); 1 at first.")
+        .def_prop_ro("velocity",
+                     input_array([](MildContactInput &input) { return &input.velocity[0][0]; },
+                                 [](size_t feet) {
+                                     return std::vector<size_t>{feet, 6};
+                                 }),
+                     "Present twist at the ankle, linear then angular, world axes [m/s, rad/s]: "
+                     "(feet, 6).")
+        .def_prop_ro("inverse_inertia",
+                     input_array([](MildContactInput &input) { return input.inverse_inertia; },
+                                 [](size_t feet) {
+                                     return std::vector<size_t>{6 * feet, 6 * feet};
+                                 }),
+                     "A = J M^-1 J^T [1/kg, 1/(kg m), 1/(kg m^2)]: (6 feet, 6 feet).")
+        .def_prop_ro("free_velocity",
+                     input_array([](MildContactInput &input) { return input.free_velocity; },
+                                 [](size_t feet) {
+                                     return std::vector<size_t>{feet, 6};
+                                 }),
+                     "Twists after a step without ground, J (qvel + dt M^-1 (tau - b)) [m/s, "
+                     "rad/s]: (feet, 6).")
+        .def_prop_rw(
+            "dt", [](Ground &ground) { return ground.input.dt; },
+            [](Ground &ground, double dt) { ground.input.dt = positive(dt, "dt"); },
+            "Time step [s].")
+        .def_prop_rw(
+            "terrain", [](Ground &ground) { return ground.terrain; },
+            [](Ground &ground, nb::handle terrain) { ground.terrain = terrain_of(terrain); },
+            "A copy of the terrain; assign one, or a material, to change it.");
+}
+
+static void bind_result(nb::class_<Ground> &type) {
+    type.def_prop_ro("force", foot_array([](const MildFootResult &foot) { return foot.force; }, 3),
+                     "Force on each foot, world, mean over the step [N]: (feet, 3), read-only as "
+                     "all results.")
+        .def_prop_ro("torque",
+                     foot_array([](const MildFootResult &foot) { return foot.torque; }, 3),
+                     "Torque about the ankle, world [N m]: (feet, 3).")
+        .def_prop_ro("pressure_center",
+                     foot_array([](const MildFootResult &foot) { return foot.pressure_center; }, 3),
+                     "Centre of pressure, world [m]: (feet, 3); 0 without load.")
+        .def_prop_ro("area", foot_array([](const MildFootResult &foot) { return &foot.area; }, 0),
+                     "Area of the loaded elements [m^2]: (feet,).")
+        .def_prop_ro("depth_max",
+                     foot_array([](const MildFootResult &foot) { return &foot.depth_max; }, 0),
+                     "Largest depth of a loaded element [m]: (feet,).")
+        .def_prop_ro("depth_mean",
+                     foot_array([](const MildFootResult &foot) { return &foot.depth_mean; }, 0),
+                     "Mean depth of the loaded elements [m]: (feet,).")
+        .def_prop_ro(
+            "new_velocity",
+            [](nb::handle self) {
+                Ground &ground = nb::cast<Ground &>(self);
+                return Results(ground.result.velocity, {(size_t)ground.feet, 6}, self);
+            },
+            "Twists at the ankles after the step [m/s, rad/s]: (feet, 6).")
+        .def_prop_ro(
+            "converged", [](Ground &ground) { return ground.result.converged != 0; },
+            "Whether the last solve reached its tolerance.")
+        .def_prop_ro(
+            "residual", [](Ground &ground) { return ground.result.residual; },
+            "Relative residual of the last solve [-].")
+        .def_prop_ro(
+            "iterations", [](Ground &ground) { return ground.result.iterations; },
+            "Newton steps, or sweeps, of the last solve.");
+}
+
+void bind_ground(nb::module_ &module) {
+    nb::class_<Ground> type(
+        module, "Ground",
+        "Ground under the feet of one robot (include/mild/ground.h).\n\n"
+        "soles: a list of 1 .. 4 Sole. terrain: a Terrain, or a material or preset for a uniform "
+        "one.\ndt [s]. tiles: of the memory of imprints; 0: pressed ground is forgotten at "
+        "lift-off.\nsolver: newton or gauss_seidel; tolerance [-] and max_iterations of it, 0: "
+        "the defaults.\n\nA step: write position, rotation, velocity, inverse_inertia and "
+        "free_velocity, which are\nviews of the library's memory, call solve(), read force, torque "
+        "and new_velocity, which are\nviews too, and advance() once for each step that is kept. "
+        "Pickle and copy.deepcopy keep all.");
+    type.def("__init__", make, nb::arg("soles"), nb::arg("terrain") = "sand_loose",
+             nb::arg("dt") = 0.001, nb::kw_only(), nb::arg("tiles") = 0,
+             nb::arg("solver") = "newton", nb::arg("tolerance") = 0.0,
+             nb::arg("max_iterations") = 0)
+        .def("solve", solve,
+             "Solves the contact step; the ground stays as it is. Returns whether it converged:\n"
+             "False also for input that is not finite.")
+        .def("advance", advance,
+             "Moves the memory of the ground to the end of the step just solved. Raises "
+             "RuntimeError\nwithout one.")
+        .def("reset", reset, "Forgets everything.")
+        .def("elements", elements, nb::arg("foot") = 0,
+             "What the elements of a foot did in the last solve: copies of depth [m], normal, "
+             "tangent_x,\ntangent_y [N], point_x, point_y, point_z [m], flat [-], state (0 free, 1 "
+             "unloading, 2 virgin),\nslip.")
+        .def("element_depths", depths, nb::arg("foot") = 0,
+             "Greatest depth of each element since touchdown [m]: (elements,), a view.")
+        .def(
+            "print_at",
+            [](Ground &ground, double x, double y) {
+                return mild_ground_print_at(ground.ground, x, y);
+            },
+            nb::arg("x"), nb::arg("y"),
+            "Greatest depth [m] that the imprint at the world point (x, y) [m] remembers.")
+        .def_prop_rw("state", get_state, set_state,
+                     "What the ground remembers, as bytes. Raises ValueError for those of another "
+                     "ground.")
+        .def_prop_ro(
+            "feet", [](Ground &ground) { return ground.feet; }, "Number of feet.")
+        .def("__getstate__", keep)
+        .def("__setstate__", restore)
+        .def("__copy__",
+             [](nb::handle self) { return nb::module_::import_("copy").attr("deepcopy")(self); });
+    bind_input(type);
+    bind_result(type);
+}
+
+NB_MODULE(_ground, module) {
+    module.doc() = "The ground of mild (include/mild), without copies of arrays.";
+    bind_material(module);
+    bind_terrain(module);
+    bind_ground(module);
+    bind_press(module);
+    bind_fit(module);
+    bind_batch(module);
+}

@@ -1,0 +1,63 @@
+/* The classes of the module mild._ground that its files share. */
+#ifndef MILD_PYTHON_GROUND_H
+#define MILD_PYTHON_GROUND_H
+
+#include <memory>
+
+#include "arrays.h"
+#include "mild/ground.h"
+
+/* A Python object that holds what one of the library's create functions made. */
+template <typename T, void (*destroy)(T *)> struct Owned {
+    T *made = nullptr;
+    nb::object recipe; /* what __reduce__ returns: (callable, arguments) */
+    Owned(T *made, nb::object recipe) : made(made), recipe(std::move(recipe)) {
+    }
+    Owned(Owned &&other) noexcept : made(other.made), recipe(std::move(other.recipe)) {
+        other.made = nullptr;
+    }
+    Owned(const Owned &) = delete;
+    ~Owned() {
+        destroy(made);
+    }
+};
+
+struct Material {
+    MildMaterial numbers;
+};
+
+using Sole = Owned<MildSole, mild_sole_destroy>;
+using Map = Owned<MildMap, mild_map_destroy>;
+
+struct Terrain {
+    MildTerrain terrain;
+    nb::object map; /* keeps terrain.map */
+};
+
+struct Ground;
+
+/* A material from a Material or the name of a preset. */
+MildMaterial material_of(nb::handle object, const char *name);
+/* The numbers of an argument as an array of doubles in C order; a list is converted. dimensions:
+ * -1: any number */
+nb::ndarray<const double, nb::c_contig, nb::device::cpu>
+numbers_of(nb::handle object, const char *name, int dimensions);
+/* Sets the fields of a struct from keyword arguments. kind: of the object, for messages. */
+void set_fields(const MildField *fields, int count, void *def, const nb::kwargs &values,
+                const char *kind);
+/* A terrain or the material of a uniform one. */
+Terrain terrain_of(nb::handle object);
+/* Soles from a sequence. */
+std::vector<const MildSole *> soles_of(const nb::sequence &soles);
+double positive(double value, const char *name);
+/* The ground in a block, for mild_batch_load. */
+MildGround *block_of(Ground &ground);
+
+void bind_material(nb::module_ &module);
+void bind_terrain(nb::module_ &module);
+void bind_ground(nb::module_ &module);
+void bind_press(nb::module_ &module);
+void bind_fit(nb::module_ &module);
+void bind_batch(nb::module_ &module);
+
+#endif

@@ -1,0 +1,161 @@
+"""The environments under rsl_rl and Stable-Baselines3; needs PyTorch. `make python-check` runs it."""
+import importlib.metadata
+import tempfile
+import unittest
+
+import numpy as np
+import torch
+from rsl_rl.runners import OnPolicyRunner
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_checker import check_env
+
+import mild
+from mild import gym, rsl_rl, sb3
+
+torch.set_num_threads(2)
+SHORT = {"task.episode": 1, "task.assist": False}
+CONFIG = {
+    "num_steps_per_env": 16, "save_interval": 100, "obs_groups": {"actor": ["policy"], "critic": ["critic"]},
+    "algorithm": {"class_name": "PPO", "num_learning_epochs": 2, "num_mini_batches": 2, "learning_rate": 1e-3, "schedule": "adaptive",
+                  "gamma": 0.99, "lam": 0.95, "desired_kl": 0.01, "entropy_coef": 0.005, "value_loss_coef": 1.0, "clip_param": 0.2,
+                  "use_clipped_value_loss": True, "max_grad_norm": 1.0},
+    "actor": {"class_name": "MLPModel", "hidden_dims": [64], "activation": "elu", "obs_normalization": True,
+              "distribution_cfg": {"class_name": "GaussianDistribution", "init_std": 0.6}},
+    "critic": {"class_name": "MLPModel", "hidden_dims": [64], "activation": "elu", "obs_normalization": True}}
+
+
+class RslRl(unittest.TestCase):
+    def test_numbers_of_gymnasium(self):
+        """The same observations, rewards and ends as the Gymnasium environment of the same seed."""
+        env = rsl_rl.Env(6, seed=3, overrides=SHORT)
+        other = gym.VectorEnv(6, overrides=SHORT)
+        seen, _ = other.reset(seed=3)
+        np.testing.assert_array_equal(env.get_observations()["policy"].numpy(), seen)
+        ended = 0
+        for step in range(150):
+            actions = torch.sin(0.3 * step + torch.arange(72.0)).reshape(6, 12)
+            before = env.get_observations()["policy"]
+            kept = before.clone()
+            observations, reward, done, extras = env.step(actions)
+            self.assertTrue(torch.equal(before, kept))  # a step leaves the tensors of the last one alone
+            seen, paid, over, truncated, _ = other.step(actions.numpy())
+            np.testing.assert_array_equal(observations["policy"].numpy(), seen)
+            np.testing.assert_array_equal(reward.numpy(), paid)
+            np.testing.assert_array_equal(done.bool().numpy(), over | truncated)
+            np.testing.assert_array_equal(extras["time_outs"].numpy(), truncated)
+            self.assertTrue((env.episode_length_buf[done.bool()] == 0).all())
+            ended += int(done.sum())
+        self.assertGreater(ended, 6)
+        self.assertEqual(env.max_episode_length, 100)
+        env.close()
+        other.close()
+
+    def test_runner(self):
+        env = rsl_rl.Env(16, config="configs/quick.ini", overrides=SHORT)
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+            runner = OnPolicyRunner(env, {**CONFIG, "logger": "tensorboard"}, log_dir=folder, device="cpu")
+            before = [p.clone() for p in runner.alg.get_policy().parameters()]
+            runner.learn(4, init_at_random_ep_len=True)
+            after = list(runner.alg.get_policy().parameters())
+        self.assertTrue(all(torch.isfinite(p).all() for p in after))
+        self.assertTrue(any(not torch.equal(a, b) for a, b in zip(before, after)))
+        env.close()
+
+    def test_mirror(self):
+        """The mirror image of the mirror image is the thing itself, and no thing is its own."""
+        env = rsl_rl.Env(4)
+        observations, actions = env.get_observations(), torch.randn(4, 12)
+        both, moves = env.mirror(observations, actions)
+        twice, again = env.mirror(both[4:], moves[4:])
+        self.assertTrue(torch.equal(twice["policy"][4:], observations["policy"]))
+        self.assertTrue(torch.equal(again[4:], actions))
+        self.assertFalse(torch.equal(moves[4:], actions))
+        env.close()
+
+    def test_misuse(self):
+        env = rsl_rl.Env(2)
+        with self.assertRaisesRegex(ValueError, "action"):
+            env.step(torch.zeros(2, 11))
+        env.close()
+        with self.assertRaisesRegex(RuntimeError, "closed"):
+            env.step(torch.zeros(2, 12))
+        with self.assertRaisesRegex(ValueError, "task.vx"):
+            rsl_rl.Env(2, overrides={"task.vxy": 1})
+
+
+class StableBaselines(unittest.TestCase):
+    def test_check_env(self):
+        check_env(gym.Env(overrides=SHORT), skip_render_check=True)
+
+    def test_ppo(self):
+        env = sb3.Env(8, overrides=SHORT)
+        model = PPO("MlpPolicy", env, n_steps=64, batch_size=128, n_epochs=1, seed=1)
+        before = [p.clone() for p in model.policy.parameters()]
+        model.learn(1024)
+        self.assertTrue(any(not torch.equal(a, b) for a, b in zip(before, model.policy.parameters())))
+        env.close()
+
+    def test_terminal_observation(self):
+        env, other = sb3.Env(4, overrides=SHORT), gym.VectorEnv(4, overrides=SHORT)
+        env.seed(5)
+        np.testing.assert_array_equal(env.reset(), other.reset(seed=5)[0])
+        ended = 0
+        for step in range(150):
+            actions = np.sin(0.3 * step + np.arange(48)).reshape(4, 12)
+            observation, reward, done, infos = env.step(actions)
+            seen, paid, over, truncated, info = other.step(actions)
+            np.testing.assert_array_equal(observation, seen)
+            for i in np.flatnonzero(done):
+                np.testing.assert_array_equal(infos[i]["terminal_observation"], info["final_obs"][i])
+                self.assertEqual(infos[i]["TimeLimit.truncated"], truncated[i])
+                ended += 1
+        self.assertGreater(ended, 4)
+        env.close()
+        other.close()
+
+
+class Tensors(unittest.TestCase):
+    def test_batch(self):
+        """Tensors of PyTorch in the place of arrays: the same numbers; another device or type is refused."""
+        batch = mild.Batch(3, [mild.Sole.plate(0.2, 0.1)], 0.002)
+        position = torch.tensor([[0.0, 0, -0.01]]).repeat(3, 1, 1)
+        inputs = {"position": position, "rotation": torch.eye(3).repeat(3, 1, 1, 1), "velocity": torch.zeros(3, 1, 6),
+                  "inverse_inertia": torch.eye(6).repeat(3, 1, 1) / 10, "free_velocity": torch.zeros(3, 1, 6)}
+        wrench, after = torch.zeros(3, 1, 6), torch.zeros(3, 1, 6)
+        batch.step(**inputs, wrench=wrench, new_velocity=after)
+        batch.reset()
+        array = np.zeros((3, 1, 6), np.float32)
+        batch.step(**{name: value.numpy() for name, value in inputs.items()}, wrench=array, new_velocity=array.copy())
+        np.testing.assert_array_equal(wrench.numpy(), array)
+        self.assertGreater(array[0, 0, 2], 1)
+        for bad in (position.to("meta"), position.to(torch.bfloat16), position.T):
+            with self.assertRaisesRegex((TypeError, ValueError), "position"):
+                batch.step(**{**inputs, "position": bad}, wrench=wrench, new_velocity=after)
+
+    @unittest.skipUnless(torch.cuda.is_available(), "no CUDA device")
+    def test_batch_on_cuda(self):
+        """The device gives what the CPU does, within the rounding of float; its tensors lie where the batch is."""
+        sole = mild.Sole.plate(0.2, 0.1)
+        batch, host = mild.Batch(64, [sole], 0.002, device="cuda:0"), mild.Batch(64, [sole], 0.002)
+        inputs = {"position": torch.rand(64, 1, 3) * 0.01 - 0.015, "rotation": torch.eye(3).repeat(64, 1, 1, 1),
+                  "velocity": torch.zeros(64, 1, 6), "inverse_inertia": torch.eye(6).repeat(64, 1, 1) / 10,
+                  "free_velocity": torch.rand(64, 1, 6) * 0.05}
+        inputs["velocity"][:] = inputs["free_velocity"]
+        wrench = torch.zeros(64, 1, 6)
+        host.step(**inputs, wrench=wrench, new_velocity=torch.zeros(64, 1, 6))
+        there = {name: value.cuda() for name, value in inputs.items()}
+        far, after = torch.zeros(64, 1, 6).cuda(), torch.zeros(64, 1, 6).cuda()
+        batch.step(**there, wrench=far, new_velocity=after, stream=torch.cuda.current_stream().cuda_stream)
+        torch.cuda.synchronize()
+        self.assertGreater(far[:, 0, 2].max().item(), 10)
+        torch.testing.assert_close(far.cpu(), wrench, rtol=1e-3, atol=1e-2)
+        with self.assertRaisesRegex(ValueError, "position: it is on the CPU"):
+            batch.step(**inputs, wrench=far, new_velocity=after)
+        with self.assertRaisesRegex(ValueError, "wrench: it is on cuda:0"):
+            host.step(**inputs, wrench=far, new_velocity=after)
+
+
+if __name__ == "__main__":
+    print("rsl-rl-lib", importlib.metadata.version("rsl-rl-lib"), "stable-baselines3",
+          importlib.metadata.version("stable-baselines3"), "torch", torch.__version__)
+    unittest.main()

@@ -1,0 +1,260 @@
+"""The Gymnasium environments: Gymnasium's checkers, episodes, seeds, rewards, memory, misuse."""
+import os
+import pickle
+import unittest
+import warnings
+
+import gymnasium
+import numpy as np
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+import mild
+from mild import envs, gym
+
+SHORT = {"task.episode": 1, "task.assist": False}
+
+
+def make_vec(count=8, overrides=None, **keys):
+    return gymnasium.make_vec("mild/SA01-v0", num_envs=count, threads=2, overrides={**SHORT, **(overrides or {})}, **keys)
+
+
+def actions_of(env, step):
+    return (1.5 * np.sin(0.3 * step + np.arange(env.action_space.shape[0] * env.action_space.shape[-1]))).reshape(
+        env.action_space.shape).astype(np.float32)
+
+
+class Checkers(unittest.TestCase):
+    def test_check_env(self):
+        for keys in ({}, {"observation": "frame", "config": "configs/quick.ini"}):
+            env = gymnasium.make("mild/SA01-v0", **keys)
+            with warnings.catch_warnings():  # spaces without bounds, actions beyond 1: what the task has
+                warnings.filterwarnings("ignore", message=".*(Box|recommend).*")
+                check_env(env.unwrapped, skip_render_check=True)
+            env.close()
+
+    def test_vector(self):
+        env = make_vec()
+        self.assertEqual(env.metadata["autoreset_mode"], AutoresetMode.SAME_STEP)
+        observation, info = env.reset(seed=4)
+        self.assertEqual(info, {})
+        for step in range(130):
+            self.assertIn(observation, env.observation_space)
+            observation, reward, ended, truncated, info = env.step(actions_of(env, step))
+            self.assertEqual((reward.shape, ended.dtype, truncated.dtype), ((8,), bool, bool))
+            self.assertFalse((ended & truncated).any())
+            self.assertTrue(np.isfinite(observation).all() and np.isfinite(reward).all())
+        self.assertIn("SA01", repr(env))
+        env = gymnasium.wrappers.vector.RecordEpisodeStatistics(env)
+        env.reset()
+        for step in range(130):
+            info = env.step(actions_of(env, step))[4]
+        env.close()
+
+    def test_sync_vector(self):
+        """Single environments in Gymnasium's own vector environment."""
+        env = gymnasium.make_vec("mild/SA01-v0", num_envs=2, vectorization_mode="sync", overrides=SHORT)
+        env.reset(seed=1)
+        for step in range(120):
+            env.step(actions_of(env, step))
+        env.close()
+
+
+class Episodes(unittest.TestCase):
+    def test_time_and_falls(self):
+        """Standing still for an episode of 0.1 s ends by time; wild actions end by a fall."""
+        env = gymnasium.make("mild/SA01-v0", overrides={**SHORT, "task.episode": 1}, config="configs/quick.ini")
+        env.reset(seed=1)
+        lengths = []
+        for _ in range(3):
+            for length in range(1, 200):
+                _, _, ended, truncated, info = env.step(np.zeros(12, np.float32))
+                if ended or truncated:
+                    break
+            lengths.append(length)
+            self.assertEqual(set(info["reward_terms"]), set(env.unwrapped._envs.reward_names))
+            with self.assertRaisesRegex(RuntimeError, "reset"):
+                env.step(np.zeros(12, np.float32))
+            env.reset()
+        self.assertLessEqual(max(lengths), 100)
+        env.close()
+        env = make_vec(1, {"task.episode": 20})
+        env.reset(seed=1)
+        for step in range(300):
+            _, _, ended, truncated, _ = env.step(8 * actions_of(env, 9 * step))
+            if ended[0]:
+                break
+        self.assertTrue(ended[0] and not truncated[0])
+        env.close()
+
+    def test_same_step(self):
+        """The observation after an end is the first of the next episode; final_obs is what a twin that is not reset sees."""
+        env, single = make_vec(1), gymnasium.make("mild/SA01-v0", overrides=SHORT)
+        observation, _ = env.reset(seed=9)
+        other, _ = single.reset(seed=9)
+        np.testing.assert_array_equal(observation[0], other)
+        for step in range(200):
+            observation, reward, ended, truncated, info = env.step(actions_of(env, step))
+            other, paid, other_ended, other_truncated, _ = single.step(actions_of(env, step)[0])
+            self.assertEqual((reward[0], ended[0], truncated[0]), (np.float32(paid), other_ended, other_truncated))
+            if ended[0] or truncated[0]:
+                break
+            np.testing.assert_array_equal(observation[0], other)
+        self.assertTrue(info["_final_obs"][0] and info["_final_info"][0])
+        np.testing.assert_array_equal(info["final_obs"][0], other)
+        self.assertGreater(np.abs(observation[0] - other).max(), 0.01)
+        env.close()
+        single.close()
+
+    def test_reward_terms(self):
+        """Where the sum is not clipped, the terms of an episode add up to its rewards."""
+        env = make_vec(8, {"reward.clip_sum": False})
+        env.reset(seed=2)
+        paid, seen = np.zeros(8), 0
+        for step in range(250):
+            _, reward, ended, truncated, info = env.step(actions_of(env, step))
+            paid += reward
+            for i in np.flatnonzero(ended | truncated):
+                total = info["final_info"]["reward_terms"][i].sum()
+                self.assertAlmostEqual(total, paid[i], delta=1e-4 * max(1, abs(paid[i])))
+                paid[i], seen = 0, seen + 1
+        self.assertGreater(seen, 8)
+        self.assertEqual(info["final_info"]["reward_terms"].shape if info else (8, len(env.reward_names)), (8, len(env.reward_names)))
+        self.assertGreaterEqual(env.statistics()["episodes"], seen)
+        env.close()
+
+    def test_seeds(self):
+        runs = []
+        for seed in (5, 5, 6):
+            env = make_vec(4)
+            first, _ = env.reset(seed=seed)
+            runs.append([first] + [env.step(actions_of(env, step))[0] for step in range(20)])
+            self.assertEqual(env.np_random_seed, seed)
+            again, _ = env.reset(seed=seed)
+            np.testing.assert_array_equal(again, first)
+            env.close()
+        np.testing.assert_array_equal(runs[0], runs[1])
+        self.assertGreater(np.abs(runs[0][-1] - runs[2][-1]).max(), 0.1)
+        self.assertGreater(np.abs(runs[0][0][0] - runs[0][0][1]).max(), 0.01)  # environments differ
+
+    def test_frame(self):
+        """The newest frame is the end of the history."""
+        env, other = make_vec(3), make_vec(3, observation="frame")
+        history, frame = env.reset(seed=7)[0], other.reset(seed=7)[0]
+        for step in range(30):
+            np.testing.assert_array_equal(history[:, -frame.shape[1]:], frame)
+            history, frame = env.step(actions_of(env, step))[0], other.step(actions_of(env, step))[0]
+        self.assertGreater(np.abs(history[:, : frame.shape[1]] - frame).max(), 0.01)
+        env.close()
+        other.close()
+
+    def test_overrides(self):
+        """A key does what it says: the command (0.5, 0, 0) is in the frame of every environment, scaled alike."""
+        rows = []
+        for speed in (0.4, 0.8):
+            env = make_vec(3, {"task.vx": (speed, speed), "task.vy": "0 0", "task.wz": (0, 0), "task.backward_share": 0,
+                               "task.standing_share": 0}, observation="frame")
+            rows.append(env.reset(seed=1)[0])
+            env.close()
+        column = np.flatnonzero((np.ptp(rows[0], axis=0) < 1e-6) & (np.abs(rows[1] - 2 * rows[0]) < 1e-5).all(axis=0)
+                                & (rows[0][0] != 0))
+        self.assertEqual(len(column), 1)
+
+
+class Memory(unittest.TestCase):
+    def test_no_copy(self):
+        """The library writes into the array that the user gets, which is a new one each step."""
+        env, made = make_vec(4), []
+        make = env._arrays
+        env._arrays = lambda: made.append(make()) or made[-1]
+        observations = [env.reset()[0]] + [env.step(actions_of(env, step))[0] for step in range(3)]
+        for arrays, observation in zip(made, observations, strict=True):
+            self.assertTrue(np.shares_memory(arrays["history"], observation))
+        self.assertFalse(any(np.shares_memory(a, b) for i, a in enumerate(observations) for b in observations[:i]))
+        env.close()
+
+
+class Misuse(unittest.TestCase):
+    def test_arguments(self):
+        for keys, name in (({"overrides": {"task.vxx": 1}}, "task.vx"), ({"overrides": {"task.vx": "fast"}}, "task.vx"),
+                           ({"overrides": {"task.vx": object()}}, "task.vx"), ({"overrides": {"train.envs": 3}}, "train.envs"),
+                           ({"config": "configs/none.ini"}, "none.ini"), ({"robot": "cat"}, "cat"), ({"observation": "all"}, "observation"),
+                           ({"device": "tpu"}, "device"), ({"render_mode": "human"}, "render_mode"), ({"wheels": 4}, "wheels"),
+                           ({"overrides": {"train.robots": "batch"}}, None)):
+            if name:
+                with self.assertRaisesRegex((ValueError, TypeError, OSError), name):
+                    gym.VectorEnv(2, **keys)
+        for count in (0, -1, "many", 1.5):
+            with self.assertRaisesRegex((ValueError, TypeError), "envs"):
+                gym.VectorEnv(count)
+
+    def test_calls(self):
+        env = make_vec(2)
+        with self.assertRaisesRegex(RuntimeError, "reset"):
+            env.step(actions_of(env, 0))
+        env.reset()
+        for action in (np.zeros((2, 11)), np.zeros(12), np.zeros((3, 12)), 0, np.zeros((2, 12, 1))):
+            with self.assertRaisesRegex(ValueError, "action"):
+                env.step(action)
+        for action in ("fast", None, [[object()] * 12] * 2):
+            with self.assertRaises((ValueError, TypeError)):
+                env.step(action)
+        env.step(np.full((2, 12), np.nan))
+        for seed in (-1, 2**64, 1.5, "one", [1, 2]):
+            with self.assertRaisesRegex((ValueError, TypeError), "seed"):
+                env.reset(seed=seed)
+        with self.assertRaisesRegex(ValueError, "reset_mask"):
+            env.reset(options={"reset_mask": np.ones(2, bool)})
+        env.close()
+        env.close()
+        for call in (lambda: env.step(actions_of(env, 0)), env.reset, env.statistics):
+            with self.assertRaisesRegex(RuntimeError, "closed"):
+                call()
+
+    def test_batch_engine(self):
+        """Its environments cannot tell the end of an episode, and say so."""
+        env = gym.VectorEnv(2, overrides={"train.robots": "batch", "randomize.patch_share": 0, "train.grounds": 4})
+        env.reset()
+        with self.assertRaisesRegex(ValueError, "train.robots"):
+            env.step(np.zeros((2, 12)))
+        env.close()
+
+    def test_buffers(self):
+        """Arrays that do not fit, each in one way."""
+        task, env = envs.open_envs(3, threads=1), gym.VectorEnv(3)
+        good = env._arrays()
+        task.reset(task.buffers(**good))
+        for name, array in good.items():
+            read_only = array.copy()
+            read_only.flags.writeable = False
+            for bad in (array[:-1], array.astype(np.float64), np.repeat(array, 2, 0)[::2], array[..., None], "text", 5, read_only,
+                        np.asfortranarray(array) if array.ndim > 1 else array[None]):
+                with self.assertRaisesRegex((ValueError, TypeError), "^" + name + ":"):
+                    task.buffers(**{**good, name: bad})
+        with self.assertRaisesRegex(ValueError, "buffers"):
+            task.step(np.zeros((3, 12), np.float32), envs.open_envs(2).buffers(**gym.VectorEnv(2)._arrays()))
+        with self.assertRaises(TypeError):
+            pickle.dumps(task)
+        task.close()
+        with self.assertRaisesRegex(RuntimeError, "closed"):
+            task.reset(task.buffers(**good))
+        env.close()
+
+    def test_fork(self):
+        """A fork has none of the threads: an exception there, not a wait without end."""
+        env = make_vec(2)
+        env.reset()
+        child = os.fork()
+        if child == 0:
+            try:
+                env.step(actions_of(env, 0))
+            except RuntimeError as error:
+                os._exit(0 if "process" in str(error) else 1)
+            os._exit(2)
+        self.assertEqual(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), 0)
+        env.step(actions_of(env, 0))
+        env.close()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,320 @@
+"""The ground of the package: numbers compared with formulas, with the program, and with the laws of mechanics."""
+import copy
+import os
+import pickle
+import subprocess
+import tempfile
+import threading
+import unittest
+
+import numpy as np
+
+import mild
+
+PROGRAM = os.environ.get("MILD_PROGRAM", "")
+
+
+def body(ground, mass=10.0, inertia=0.05):
+    """A free rigid body as the inverse inertia of a ground with one foot."""
+    ground.inverse_inertia[:3, :3] = np.eye(3) / mass
+    ground.inverse_inertia[3:, 3:] = np.eye(3) / inertia
+
+
+def fall(ground, steps, twist=np.zeros(6)):
+    """Semi-implicit steps under gravity; returns the twist at the end."""
+    for _ in range(steps):
+        ground.velocity[0] = ground.free_velocity[0] = twist
+        ground.free_velocity[0, 2] -= 9.81 * ground.dt
+        assert ground.solve()
+        ground.advance()
+        twist = ground.new_velocity[0].copy()
+        ground.position[0] += twist[:3] * ground.dt
+    return twist
+
+
+class Press(unittest.TestCase):
+    def test_bekker_law(self):
+        """F = area (k_c/b + k_phi) u^n, Bekker 1969, for a slow press; near the surface ours is straight."""
+        sole = mild.Sole.plate(0.2, 0.1)
+        for name in ("clay", "dry_sand", "snow"):
+            soil = mild.Material(name)
+            press = mild.press(soil, sole, depth=0.02, speed=1e-4)
+            down = (press.way == 0) & (press.depth > 2e-3)
+            u = press.depth[down]
+            law = press.area * (soil.k_c / soil.plate_width + soil.k_phi) * u**soil.exponent
+            np.testing.assert_allclose(press.force[down], law, rtol=1e-3)
+            self.assertGreater(down.sum(), 800)
+
+    @unittest.skipUnless(PROGRAM, "MILD_PROGRAM names no program")
+    def test_program(self):
+        """Every number of `mild press --csv`, for a prescribed path, one by force, and a drop."""
+        cases = (({"depth": 0.03}, ["--depth", "0.03"]), ({"force": (200, 50), "cycles": 2}, ["--force", "200,50", "--cycles", "2"]),
+                 ({"drop": 0.05, "tilt": np.deg2rad(5)}, ["--drop", "0.05", "--tilt", "5"]))
+        for arguments, options in cases:
+            with tempfile.NamedTemporaryFile(suffix=".csv") as file:
+                subprocess.run([PROGRAM, "press", "--ground", "grass", "--csv", file.name, *options], check=True,
+                               stdout=subprocess.DEVNULL)
+                rows = np.genfromtxt(file.name, delimiter=",", names=True)
+            press = mild.press("grass", mild.Sole.plate(0.2, 0.1), **arguments)
+            self.assertEqual(len(press), len(rows))
+            for name, column in (("time_s", press.time), ("depth_m", press.depth), ("force_n", press.force),
+                                 ("moment_y_nm", press.moment_y), ("zmp_x_m", press.zmp_x)):
+                np.testing.assert_allclose(column, rows[name], rtol=1e-8, atol=1e-12, err_msg=name)
+
+    def test_arguments(self):
+        sole = mild.Sole.plate(0.2, 0.1)
+        for arguments, name in (({"depth": -1}, "depth"), ({"depth": (0.01, 0.02)}, "depth"), ({"depth": 1, "force": 1}, "force"),
+                                ({"speed": np.nan}, "speed"), ({"drop": 1, "depth": 0.1}, "drop"), ({"cycles": 0}, "cycles"),
+                                ({"force": 1e6}, "force"), ({"tilt": 2}, "tilt")):
+            with self.assertRaisesRegex(ValueError, name):
+                mild.press("grass", sole, **arguments)
+        with self.assertRaisesRegex(TypeError, "depth"):
+            mild.press("grass", sole, depth="deep")
+
+
+class Step(unittest.TestCase):
+    def test_rest(self):
+        """A body on damped elastic ground, F = K u^n, comes to rest where that carries its weight."""
+        sole = mild.Sole.plate(0.2, 0.1)
+        material = mild.Material(model="hunt_crossley", k_pen=500, exponent=1.5, dissipation=2)
+        ground = mild.Ground([sole], material, dt=1e-3)
+        body(ground)
+        twist = fall(ground, 6000)
+        depth = 0.01 * (98.1 / (sole.elements * 500 * 0.01)) ** (1 / 1.5)  # k_pen: force divided by depth at 10 mm
+        self.assertLess(np.abs(twist).max(), 1e-6)
+        self.assertAlmostEqual(-ground.position[0, 2], depth, delta=1e-3 * depth)
+        self.assertAlmostEqual(ground.force[0, 2], 98.1, delta=1e-5)
+        self.assertAlmostEqual(ground.depth_mean[0], depth, delta=1e-3 * depth)
+        self.assertAlmostEqual(ground.area[0], sole.elements * sole.pitch**2, delta=1e-12)
+
+    def test_momentum(self):
+        """V = V_free + A W with W the impulse of forces and torques: two feet, tilted and moving."""
+        rng = np.random.default_rng(1)
+        ground = mild.Ground([mild.Sole.plate(0.2, 0.1)] * 2, "sand_loose", dt=2e-3)
+        half = rng.normal(size=(12, 12))
+        ground.inverse_inertia[:] = half @ half.T / 50
+        ground.position[:] = [[0, 0.1, -0.01], [0, -0.1, -0.005]]
+        ground.velocity[:] = ground.free_velocity[:] = rng.normal(size=(2, 6)) * 0.2
+        self.assertTrue(ground.solve())
+        impulse = np.hstack([ground.force, ground.torque]).ravel() * ground.dt
+        after = ground.free_velocity.ravel() + ground.inverse_inertia @ impulse
+        self.assertGreater(ground.force[:, 2].min(), 1)
+        np.testing.assert_allclose(ground.new_velocity.ravel(), after, atol=1e-9)
+        elements = ground.elements(0)
+        self.assertAlmostEqual(elements["normal"].sum(), ground.force[0, 2], delta=1e-6 * ground.force[0, 2])
+
+    def test_arrays_are_views(self):
+        ground = mild.Ground([mild.Sole.plate(0.2, 0.1)])
+        ground.position[0, 2] = 7
+        self.assertEqual(ground.position[0, 2], 7)
+        self.assertTrue(np.shares_memory(ground.position, ground.position))
+        self.assertTrue(np.shares_memory(ground.force, ground.force))
+        with self.assertRaises(ValueError):
+            ground.force[0] = 0
+        array = ground.position
+        del ground
+        self.assertEqual(array[0, 2], 7)  # it keeps the ground
+
+    def test_order_of_calls(self):
+        ground = mild.Ground([mild.Sole.plate(0.2, 0.1)])
+        with self.assertRaisesRegex(RuntimeError, "solve"):
+            ground.advance()
+        ground.solve()
+        ground.advance()
+        with self.assertRaisesRegex(RuntimeError, "solve"):
+            ground.advance()
+        ground.solve()
+        ground.reset()
+        with self.assertRaisesRegex(RuntimeError, "solve"):
+            ground.advance()
+
+    def test_not_finite(self):
+        ground = mild.Ground([mild.Sole.plate(0.2, 0.1)])
+        ground.position[0, 2] = np.nan
+        self.assertFalse(ground.solve())
+        self.assertFalse(ground.converged)
+
+    def test_threads(self):
+        """Grounds of their own in threads; one ground in two threads raises or waits, and stays whole."""
+        shared = mild.Ground([mild.Sole.plate(0.2, 0.1)], "grass")
+        body(shared)
+        shared.position[0, 2] = -0.01
+        others = []
+
+        def run():
+            for _ in range(300):
+                try:
+                    shared.solve()
+                except RuntimeError as error:
+                    others.append(str(error))
+
+        threads = [threading.Thread(target=run) for _ in range(3)]
+        [thread.start() for thread in threads]
+        [thread.join() for thread in threads]
+        self.assertTrue(all("another thread" in text for text in others))
+        self.assertTrue(shared.solve())
+
+
+class State(unittest.TestCase):
+    def fallen(self, steps):
+        ground = mild.Ground([mild.Sole.plate(0.2, 0.1)], mild.Terrain(["sand_loose", "foam45"], map=mild.Map("waves", amplitude=0.01,
+                             wavelength=0.5, patches="checker", patch_size=0.07, patch_count=2)), tiles=64)
+        body(ground)
+        return ground, fall(ground, steps, np.array([0.2, 0.1, 0, 0, 0, 0]))
+
+    def test_goes_on_with_the_same_bits(self):
+        ground, twist = self.fallen(200)
+        copies = [pickle.loads(pickle.dumps(ground)), copy.deepcopy(ground), copy.copy(ground)]
+        fresh, _ = self.fallen(0)
+        fresh.position[:], fresh.state = ground.position, ground.state
+        end = fall(ground, 50, twist.copy())
+        self.assertGreater(ground.print_at(*ground.position[0, :2]), 0)
+        for other in (*copies, fresh):
+            np.testing.assert_array_equal(fall(other, 50, twist.copy()), end)
+            self.assertEqual(other.state, ground.state)
+
+    def test_foreign_bytes(self):
+        """Bytes that no ground wrote are refused, or can be stepped from."""
+        ground, twist = self.fallen(100)
+        for state in (b"", ground.state[:-1], ground.state + b"\0", bytes(len(ground.state))):
+            with self.assertRaisesRegex(ValueError, "state"):
+                ground.state = state
+        with self.assertRaises(TypeError):
+            ground.state = 5
+        rng, refused = np.random.default_rng(2), 0
+        for _ in range(300):
+            bent = bytearray(ground.state)
+            for place in rng.integers(len(bent), size=rng.integers(1, 6)):
+                bent[place] = rng.integers(256)
+            other = copy.deepcopy(ground)
+            try:
+                other.state = bytes(bent)
+            except ValueError:
+                refused += 1
+            other.solve()
+            other.advance()
+        self.assertTrue(0 < refused < 300)
+
+    def test_pickles(self):
+        material = mild.Material("grass", mu=0.7, passive=False)
+        self.assertEqual(pickle.loads(pickle.dumps(material)), material)
+        self.assertNotEqual(material, mild.Material("grass"))
+        outline = [[0, 0], [0.2, 0], [0.2, 0.1], [0, 0.1]]
+        for sole in (mild.Sole(outline, sole_z=-0.04), mild.Sole.plate(0.1, 0.1), mild.Sole.plate(0.1, 0.1).concentric()):
+            again = pickle.loads(pickle.dumps(sole))
+            np.testing.assert_array_equal(again.x, sole.x)
+            self.assertEqual(again.z, sole.z)
+        terrain = mild.Terrain(["grass", "snow"], map=mild.Map("image", heights=np.arange(12.0).reshape(3, 4), amplitude=0.1, cell=0.5),
+                               height=0.3, map_x=0.1)
+        terrain.add_patch(0, 1, 0, np.inf, 1)
+        again = pickle.loads(pickle.dumps(terrain))
+        for x, y in ((0.2, 0.3), (-0.4, 0.1), (0.9, 5)):
+            self.assertEqual(again.height_at(x, y), terrain.height_at(x, y))
+            self.assertEqual(again.slope_at(x, y), terrain.slope_at(x, y))
+            self.assertEqual(again.material_at(x, y), terrain.material_at(x, y))
+
+
+class Terrain(unittest.TestCase):
+    def test_waves(self):
+        """The formula of MildMapKind at points of the grid."""
+        terrain = mild.Terrain("grass", map=mild.Map("waves", amplitude=0.1, wavelength=1.0, cell=0.05), height=0.5)
+        for x, y in ((0.25, 0.05), (-0.3, 0.7), (2.1, 0)):
+            wanted = 0.5 + 0.05 * (np.sin(2 * np.pi * x) + np.sin(2 * np.pi * y))
+            self.assertAlmostEqual(terrain.height_at(x, y), wanted, delta=1e-6)
+
+    def test_arguments(self):
+        for make, name in ((lambda: mild.Map("hills"), "kind"), (lambda: mild.Map(amplitude="\ud800"), "amplitude"), (lambda: mild.Map("waves", amplitud=1), "amplitude"),
+                           (lambda: mild.Map("image", heights=[[0, 1], [np.inf, 0]]), "height"), (lambda: mild.Map("image"), "height"),
+                           (lambda: mild.Map(labels=[[0.5]], patches="image"), "labels"), (lambda: mild.Terrain([]), "materials"),
+                           (lambda: mild.Terrain(5), "materials"), (lambda: mild.Terrain("sand"), "sand"),
+                           (lambda: mild.Terrain("grass", map=3), "map"), (lambda: mild.Terrain("grass", height=np.nan), "height"),
+                           (lambda: mild.Terrain("grass").add_patch(1, 0, 0, 1, 0), "patch"),
+                           (lambda: mild.Terrain("grass", map=mild.Map(patches="checker", patch_size=1, patch_count=3)), "label"),
+                           (lambda: mild.Sole([[0, 0], [1, 1]]), "outline"), (lambda: mild.Sole("abc"), "outline"),
+                           (lambda: mild.Sole([[0, 0], [1, 1], [0, 1], [1, 0]]), "outline"), (lambda: mild.Sole.plate(0, 1), "length"),
+                           (lambda: mild.Ground([]), "soles"), (lambda: mild.Ground([1]), "soles"),
+                           (lambda: mild.Ground([mild.Sole.plate(0.1, 0.1)], dt=0), "dt"),
+                           (lambda: mild.Ground([mild.Sole.plate(0.1, 0.1)], solver="x"), "solver"),
+                           (lambda: mild.Ground([mild.Sole.plate(0.1, 0.1)], tiles=-1), "tiles"),
+                           (lambda: mild.Material("grass", mu=-1), "mu"), (lambda: mild.Material("grass", my=1), "mu"),
+                           (lambda: mild.Material(model="rigid"), "rigid"), (lambda: mild.Material(3), "preset"),
+                           (lambda: mild.Sole.plate(0.1, 0.1).sinkage("grass", -1), "load")):
+            with self.assertRaisesRegex((ValueError, TypeError), name):
+                make()
+
+
+class Material(unittest.TestCase):
+    def test_fields(self):
+        material = mild.Material("sand_dense")
+        material.mu, material.model, material.passive = 0.9, "bekker", False
+        self.assertEqual((material.mu, material.model, material.passive), (0.9, "bekker", False))
+        with self.assertRaisesRegex(ValueError, "mu"):
+            material.mu = np.nan
+        with self.assertRaisesRegex(ValueError, "model"):
+            material.model = "sand"
+        self.assertEqual(material.mu, 0.9)
+        for name in mild.presets():
+            mild.Material(name)
+
+    def test_match(self):
+        """The same sinkage under the load, by the definition of a match."""
+        sole = mild.Sole.plate(0.2, 0.1)
+        sand = mild.Material("sand_loose")
+        for model in ("ecc_spring", "bekker", "hunt_crossley"):
+            rival = sand.match(model, sole, 200)
+            self.assertAlmostEqual(sole.sinkage(rival, 200), sole.sinkage(sand, 200), delta=1e-6)
+
+
+class Fit(unittest.TestCase):
+    def test_recovers_a_spring(self):
+        """Noise of 1 %: the interval holds the true numbers, and the curve is that of the press."""
+        sole, rng = mild.Sole.plate(0.2, 0.1), np.random.default_rng(5)
+        truth = mild.Material("grass")
+        press = mild.press(truth, sole, depth=0.04)
+        X, y = mild.loading(press.time, press.depth, press.force)
+        fit = mild.GroundFit(hold={"alpha": truth.alpha, "nu": truth.nu}).fit(X, y + 0.01 * y.max() * rng.normal(size=len(y)))
+        for name in ("k_pen", "sigma_cone"):
+            low, high = fit.intervals_[name]
+            self.assertEqual(fit.states_[name], "fitted")
+            self.assertLess(low, getattr(truth, name))
+            self.assertGreater(high, getattr(truth, name))
+        self.assertEqual(fit.parameters_["alpha"], truth.alpha)
+        self.assertLess(np.abs(fit.predict(X) - y).max(), 0.01 * y.max())
+        self.assertGreater(fit.score(X, y), 0.999)
+
+    def test_speed(self):
+        """A fast press, with its speeds: the curve of the true numbers is its force, which no slow press has."""
+        sole, truth = mild.Sole.plate(0.2, 0.1), mild.Material("sand_dense")
+        records = [mild.press(truth, sole, depth=0.03, speed=speed) for speed in (0.01, 1.0)]
+        parts = [mild.loading(press.time, press.depth, press.force) for press in records]
+        X, y = (np.concatenate(columns) for columns in zip(*parts))
+        held = {name: getattr(truth, name) for name in ("alpha", "nu", "c_g", "phi", "rho")}
+        fit = mild.GroundFit(hold=held).fit(X, y)
+        low, high = fit.intervals_["c_d"]
+        self.assertLess(abs(fit.parameters_["c_d"] - truth.c_d), 0.05 * abs(truth.c_d))
+        fast = slice(len(y) // 2, None)
+        np.testing.assert_allclose(fit.predict(X)[fast], y[fast], atol=0.01 * y.max())
+        self.assertGreater(np.abs(fit.predict(X[fast, :1]) - y[fast]).max(), 0.05 * y.max())
+
+    def test_estimator(self):
+        fit = mild.GroundFit(model="bekker")
+        self.assertEqual(fit.get_params(), {"plate": (0.2, 0.1), "model": "bekker", "hold": None, "fill": None})
+        self.assertIs(fit.set_params(plate=(0.1, 0.1)), fit)
+        with self.assertRaisesRegex(ValueError, "depth"):
+            fit.set_params(depth=1)
+        with self.assertRaisesRegex(RuntimeError, "fit"):
+            fit.predict([[0.01]])
+        for arguments, X, y, name in (({}, [[0.01]], [1], "rows"), ({}, [0.01], [1], "X"), ({}, [[0.01]] * 9, [1], "y"),
+                                      ({"model": "rigid"}, [[0.01]] * 9, [1] * 9, "model"),
+                                      ({"hold": {"mu": 1}}, [[0.01]] * 9, [1] * 9, "mu"), ({"plate": 3}, [[0.01]] * 9, [1] * 9, "plate"),
+                                      ({"hold": {"alpha": 90}}, [[0.01]] * 9, [1] * 9, "alpha"),
+                                      ({"fill": "mud"}, [[0.01]] * 9, [1] * 9, "mud"), ({}, [[np.nan]] * 9, [1] * 9, "finite"),
+                                      ({}, "abc", [1], "X")):
+            with self.assertRaisesRegex((ValueError, TypeError), name):
+                mild.GroundFit(**arguments).fit(X, y)
+        with self.assertRaisesRegex(ValueError, "lengths"):
+            mild.loading([0], [0, 1], [0, 1])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,62 @@
+"""mild.attach: soft ground under an MjSpec. With MILD_PLUGIN, a file, also with the engine plugin."""
+import os
+import unittest
+
+import mujoco
+import numpy as np
+
+import mild
+
+PLATE = """<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbody>
+  <body name="plate" pos="0 0 0.02"><freejoint/>
+    <geom type="box" size="0.1 0.05 0.01" mass="10" contype="0" conaffinity="0"/>
+    <site name="under" pos="0 0 -0.01"/></body></worldbody></mujoco>"""
+PLUGIN = os.environ.get("MILD_PLUGIN", "")
+
+
+class Attach(unittest.TestCase):
+    def test_arguments(self):
+        spec = mujoco.MjSpec.from_string(PLATE)
+        for arguments, name in ((("plate", ["plate"]), "spec"), ((spec, ["foot"]), "foot"), ((spec, []), "feet"),
+                                ((spec, ["plate"] * 5), "feet"), ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground")):
+            with self.assertRaisesRegex((TypeError, ValueError), name):
+                mild.attach(*arguments)
+        with self.assertRaisesRegex(RuntimeError, "no/such"):
+            mild.attach(spec, "plate", library="no/such")
+        with self.assertRaisesRegex(RuntimeError, "MuJoCo"):
+            mild.attach(spec, "plate", library=__file__)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_rest(self):
+        """A plate comes to rest where a plate does that falls on mild.Ground, on a preset, a Material and a changed one."""
+        depths = []
+        for feet, ground, keys in ((["plate"], "rubber", {}), ("under", mild.Material("rubber"), {}),
+                                   (["plate"], "rubber", {"ground__k_pen": 4000})):
+            spec = mujoco.MjSpec.from_string(PLATE)
+            mild.attach(spec, feet, ground, **keys)
+            model = spec.compile()
+            data = mujoco.MjData(model)
+            mujoco.mj_step(model, data, 1500)
+            depths.append(0.01 - data.qpos[2])
+        for found, material in zip(depths, (mild.Material("rubber"),) * 2 + (mild.Material("rubber", k_pen=4000),), strict=True):
+            wanted = fall(material)
+            self.assertAlmostEqual(found, wanted, delta=0.01 * wanted)
+        self.assertGreater(depths[0], 1.1 * depths[2])
+
+
+def fall(material):
+    """Depth at which the plate of PLATE rests."""
+    ground = mild.Ground([mild.Sole.plate(0.2, 0.1)], material, 0.002)
+    ground.inverse_inertia[:] = np.diag([0.1] * 3 + [1000] * 3)
+    ground.position[0, 2] = 0.01
+    for _ in range(1500):
+        ground.velocity[:] = ground.free_velocity[:] = ground.new_velocity
+        ground.free_velocity[0, 2] -= 9.81 * ground.dt
+        ground.solve()
+        ground.advance()
+        ground.position[0] += ground.new_velocity[0, :3] * ground.dt
+    return -ground.position[0, 2]
+
+
+if __name__ == "__main__":
+    unittest.main()
