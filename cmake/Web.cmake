@@ -6,9 +6,9 @@ target_include_directories(web_pack PRIVATE ${CMAKE_SOURCE_DIR})
 add_library(web_core STATIC ${CMAKE_SOURCE_DIR}/web/core.c)
 target_link_libraries(web_core PUBLIC layer_crowd PRIVATE mild_options)
 target_include_directories(web_core PUBLIC ${CMAKE_SOURCE_DIR} PRIVATE ${CMAKE_BINARY_DIR}/layers/learn)
-# as crowd/host.c
-target_compile_options(web_core PRIVATE -O2 -Wno-float-conversion
-  $<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>)
+# as crowd/host.c; options of the file, which come behind those of mild_options
+set_source_files_properties(${CMAKE_SOURCE_DIR}/web/core.c PROPERTIES COMPILE_OPTIONS
+  "-O2;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
 set(web_robot ${CMAKE_BINARY_DIR}/generated/web/robot.bin)
 file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/generated/web)
 set(shipped ${CMAKE_SOURCE_DIR}/policies/mild.safetensors ${CMAKE_SOURCE_DIR}/configs/walk.ini)
