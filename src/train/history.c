@@ -106,7 +106,7 @@ static MildStatus read_text(History *history, const char *path, MildError *error
     if (rows) {
         history->value = malloc(lines * (size_t)history->columns * sizeof *history->value);
     }
-    return history->value
+    return rows && history->value
                ? read_rows(history, rows, path, error)
                : mild_fail(error, MILD_ERROR_MEMORY, "%s: out of memory for the log", path);
 }
