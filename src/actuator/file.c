@@ -18,7 +18,7 @@ enum { SCALES = 3, TENSORS_MAX = 2 * MLP_LAYERS_MAX * ROBOT_JOINTS_MAX + 2 };
 typedef struct {
     int count;
     Safetensor tensor[TENSORS_MAX];
-    char name[TENSORS_MAX][32];
+    char name[TENSORS_MAX][40];
 } Tensors;
 
 static void add(Tensors *tensors, SafetensorsType type, const void *data, int rows, int columns) {
