@@ -9,15 +9,15 @@
 
 _Static_assert(CROWD_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fills");
 
-/* Shares of the robots on a GPU. One NVIDIA H200: three make 5 % more steps with 16 384 robots, 7 %
- * with 4096 and 2 % with 65 536; four are no faster. */
+/* Shares of the robots. One NVIDIA H200: three make 5 % more steps with 16 384 robots, 7 % with 4096
+ * and 2 % with 65 536; four are no faster. The CPU steps them in turn, so that its tests see them. */
 enum { SHARES = 3 };
 
 struct Crowd {
     CrowdArrays arrays; /* their memory is the device's */
     MildBatch *ground;
-    DeviceFork *fork; /* a GPU's streams of the shares */
-    int shares;       /* of the robots, stepped side by side */
+    DeviceFork *fork; /* streams of all shares but the first, on a GPU; else NULL */
+    int shares;       /* of the robots */
     TaskShape shape;
     size_t labels;               /* of the map, 1 without */
     const CrowdKernels *kernels; /* NULL: on the host */
@@ -263,13 +263,12 @@ static MildStatus create_envs(Crowd *crowd, MildError *error) {
 }
 
 static MildStatus open_shares(Crowd *crowd, MildError *error) {
-    crowd->shares = 1;
-    if (crowd->device != MILD_BATCH_HOST && crowd->arrays.envs >= SHARES) {
-        crowd->shares = SHARES;
-        crowd->fork = device_fork_create(crowd->device, SHARES - 1, error);
-        return crowd->fork ? MILD_OK : error->status;
+    crowd->shares = crowd->arrays.envs >= SHARES ? SHARES : 1;
+    if (crowd->device == MILD_BATCH_HOST || crowd->shares == 1) {
+        return MILD_OK;
     }
-    return MILD_OK;
+    crowd->fork = device_fork_create(crowd->device, crowd->shares - 1, error);
+    return crowd->fork ? MILD_OK : error->status;
 }
 
 static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
@@ -406,44 +405,45 @@ static Share share_of(const Crowd *crowd, const CrowdStep *step, int i, void *st
     return (Share){.arrays = arrays_from(crowd, (size_t)first, count),
                    .step = step_from(step, &crowd->shape, (size_t)first),
                    .ground = batch_share(crowd->ground, (int)first, count),
-                   .stream = i > 0 ? device_fork_stream(crowd->fork, i - 1) : stream};
+                   .stream =
+                       i > 0 && crowd->fork ? device_fork_stream(crowd->fork, i - 1) : stream};
 }
 
 /* ---- steps on the CPU ---- */
 
 /* One call, for the threads of the host. */
 typedef struct {
-    const Crowd *crowd;
-    CrowdStep step;
+    const CrowdArrays *arrays;
+    const CrowdStep *step;
     int part;
 } Call;
 
 static void begin_piece(void *context, int piece, int thread) {
     (void)thread;
-    crowd_host_begin(&((const Call *)context)->crowd->arrays, piece);
+    crowd_host_begin(((const Call *)context)->arrays, piece);
 }
 
 static void part_piece(void *context, int piece, int thread) {
     const Call *call = context;
     (void)thread;
-    crowd_host_part(&call->crowd->arrays, &call->step, call->part, piece);
+    crowd_host_part(call->arrays, call->step, call->part, piece);
 }
 
 static void tell_piece(void *context, int piece, int thread) {
     (void)thread;
-    crowd_host_tell(&((const Call *)context)->crowd->arrays, piece);
+    crowd_host_tell(((const Call *)context)->arrays, piece);
 }
 
 static void end_piece(void *context, int piece, int thread) {
     const Call *call = context;
     (void)thread;
-    crowd_host_end(&call->crowd->arrays, &call->step, piece);
+    crowd_host_end(call->arrays, call->step, piece);
 }
 
 static void first_piece(void *context, int piece, int thread) {
     const Call *call = context;
     (void)thread;
-    crowd_host_first(&call->crowd->arrays, &call->step, piece);
+    crowd_host_first(call->arrays, call->step, piece);
 }
 
 /* ---- steps ---- */
@@ -475,7 +475,7 @@ static MildStatus step_ground(Share *share, MildError *error) {
 /* The physics steps of a policy step: parts with the ground between them. Then the task. */
 static MildStatus step_share(const Crowd *crowd, Share *share, MildError *error) {
     const CrowdArrays *all = &share->arrays;
-    Call call = {crowd, share->step, 0};
+    Call call = {&share->arrays, &share->step, 0};
     MildStatus status = MILD_OK;
     for (call.part = 0; status == MILD_OK && call.part <= crowd->steps; call.part++) {
         status = call.part > 0 ? step_ground(share, error) : MILD_OK;
@@ -497,7 +497,7 @@ static MildStatus step_share(const Crowd *crowd, Share *share, MildError *error)
 
 /* The first episodes. */
 static MildStatus begin_share(const Crowd *crowd, Share *share, MildError *error) {
-    Call call = {crowd, share->step, 0};
+    Call call = {&share->arrays, &share->step, 0};
     if (crowd->kernels) {
         return checked(crowd->kernels->begin(&share->arrays, share->stream), error);
     }
@@ -508,7 +508,7 @@ static MildStatus begin_share(const Crowd *crowd, Share *share, MildError *error
 /* New episodes forget their ground, and all are seen. */
 static MildStatus see_share(const Crowd *crowd, Share *share, MildError *error) {
     const CrowdArrays *all = &share->arrays;
-    Call call = {crowd, share->step, 0};
+    Call call = {&share->arrays, &share->step, 0};
     MildStatus status = mild_batch_reset(&share->ground, all->fresh, share->stream, error);
     if (status == MILD_OK && crowd->kernels) {
         return checked(crowd->kernels->first(all, &share->step, share->stream), error);
@@ -612,7 +612,7 @@ MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
 
 MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error) {
     const CrowdArrays *all = &crowd->arrays;
-    Call call = {crowd, {0}, 0};
+    Call call = {all, NULL, 0};
     MildStatus status = batch_copy(crowd->device, all->command, command,
                                    3 * (size_t)all->envs * sizeof *command, error);
     if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
