@@ -95,11 +95,8 @@ static double play_engine(Player *player, const ReplayPeriod *period) {
     const int *dof = robot_joint_dof(player->robot);
     int joints = robot_joints(player->robot);
     robot_engine_qpos(player->robot, period->state.qpos, d->qpos);
-    memcpy(d->qvel, period->state.qvel, 6 * sizeof *d->qvel);
-    for (int i = 0; i < joints; i++) {
-        d->qvel[dof[i]] = period->state.qvel[6 + i];
-    }
-    memcpy(d->qacc_warmstart, period->state.warmstart, (size_t)m->nv * sizeof *d->qacc_warmstart);
+    robot_engine_rates(player->robot, period->state.qvel, d->qvel);
+    robot_engine_rates(player->robot, period->state.qacc, d->qacc_warmstart);
     double start = clock_seconds();
     for (int s = 0; s < replay->steps; s++) {
         for (int i = 0; i < joints; i++) {

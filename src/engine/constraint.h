@@ -76,6 +76,72 @@ LANE_FN int engine_limits(const EngineModel *model, EngineWork *work) {
     return lane_max(any) > 0;
 }
 
+/* x of the limit of link i. */
+MILD_HD Real limit_residual(const EngineWork *work, int i) {
+    return work->limit_side[i] * work->acceleration[5 + i] - work->limit_reference[i];
+}
+
+MILD_HD int limit_pushes(const EngineWork *work, int i) {
+    return work->limit_side[i] != 0 && limit_residual(work, i) < 0;
+}
+
+/* ---- limits that push while soft ground does ---- */
+
+/* Limits that are taken to push through the step: those that do at the last step's acceleration,
+ * which is exact while a limit bears a load. While a limit pushes its force is linear in the
+ * acceleration, so
+ *
+ *     M a = f + J^T W + sum of s e_i (r - s a_i)/R   <=>   N a = f' + J^T W,
+ *     N = M + sum of e_i e_i^T/R,   f' = f + sum of s r e_i/R,
+ *
+ * with the side s, reference r and weight 1/R of a row, and the ground that is solved with N and f'
+ * agrees with the limits. Sets beyond and held. none: bool, hold none. Before the forces. */
+LANE_FN void engine_choose_held(const EngineModel *model, EngineWork *work, int none) {
+    const int beyond = engine_limits(model, work);
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int i = 1 + LANE(l); i < engine_links(&model->tree); i += LANES) {
+            work->held[i] =
+                beyond && !none && limit_pushes(work, i) ? work->limit_weight[i] : REAL(0);
+        }
+        if (LANE(l) == 0) {
+            work->beyond = (Real)beyond;
+        }
+    }
+    lanes_meet();
+}
+
+/* M <- N and f <- f'. */
+LANE_FN void engine_hold(const EngineTree *tree, EngineWork *work) {
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
+            const int d = 5 + i;
+            if (work->held[i] > 0) {
+                work->mass[d][tree->above[d]] += work->held[i];
+                work->acceleration[d] +=
+                    work->limit_side[i] * work->held[i] * work->limit_reference[i];
+            }
+        }
+    }
+    lanes_meet();
+}
+
+/* bool: the limits that push at the acceleration are those held. */
+LANE_FN int engine_held_push(const EngineTree *tree, const EngineWork *work) {
+    Real others[LANE_COPIES];
+    EACH_LANE(l) {
+        others[l] = 0;
+        LANE_ROLLED
+        for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
+            others[l] = limit_pushes(work, i) == (work->held[i] > 0) ? others[l] : 1;
+        }
+    }
+    return lane_max(others) == 0;
+}
+
+/* ---- rigid ground ---- */
+
 /* [m] Centre of a corner from the base's origin, world axes. */
 MILD_HD void corner_center(const EngineModel *model, const EngineWork *work, int corner,
                            Real *center) {
@@ -307,15 +373,6 @@ MILD_HD Real stiffened_entry(const EngineTree *tree, const EngineSupport *suppor
     return sum;
 }
 
-/* x of the limit of link i. */
-MILD_HD Real limit_residual(const EngineWork *work, int i) {
-    return work->limit_side[i] * work->acceleration[5 + i] - work->limit_reference[i];
-}
-
-MILD_HD int limit_pushes(const EngineWork *work, int i) {
-    return work->limit_side[i] != 0 && limit_residual(work, i) < 0;
-}
-
 /* factor <- L of M + J^T weight J over the pushing rows; change <- the residue and what is left of
  * the rows, which is the descent of the cost. After engine_push_of_edges. */
 LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int edges) {
@@ -469,25 +526,37 @@ LANE_FN Real engine_move(const EngineTree *tree, EngineWork *work, Real t, int p
     return most / (lane_max(size) + REAL_LEAST);
 }
 
-/* From the acceleration without the rows to that with them; `edges`: engine_collide was called. The
- * last step leaves the same rows pushing. It has a rounding error in proportion to its length, so
+/* mass <- M of the factor of N, and what the held limits have done to the acceleration: its
+ * residue. */
+LANE_FN void engine_start(const EngineTree *tree, EngineWork *work) {
+    engine_multiply_out(tree, work->factor[0], work->inverse, work->mass[0]);
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            const Real held = d < 6 ? 0 : work->held[d - 5];
+            work->now.support.residue[d] = 0;
+            if (held > 0) {
+                work->mass[d][tree->above[d]] -= held;
+                work->now.support.residue[d] =
+                    work->limit_side[d - 5] * held * limit_residual(work, d - 5);
+            }
+        }
+    }
+    lanes_meet();
+}
+
+/* From the acceleration with the held limits to that with all rows; `edges`: engine_collide was
+ * called. The last step leaves the same rows pushing. It has a rounding error in proportion to its length, so
  * one that comes back a long way from where those before it went is followed by another.
  *
- * Needs the factor of M, limits and J; overwrites it, mass, half and, with edges, the wrench.
+ * Needs the factor of N, limits and J; overwrites it, mass, half and, with edges, the wrench.
  * Returns Newton steps. */
 LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges) {
     EngineSupport *support = &work->now.support;
     EngineContact *contact = &support->ground.contact;
     int step = 0;
     int going = 1;
-    engine_multiply_out(tree, work->factor[0], work->inverse, work->mass[0]);
-    EACH_LANE(l) {
-        LANE_ROLLED
-        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-            support->residue[d] = 0;
-        }
-    }
-    lanes_meet();
+    engine_start(tree, work);
     for (;;) {
         const int last = !going || step == CONSTRAINT_STEPS;
         if (edges) {

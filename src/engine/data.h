@@ -60,8 +60,11 @@ typedef struct {
     Real quaternion[4];             /* [-] base -> world, w x y z */
     Real angle[ENGINE_LINKS];       /* [rad] of the hinges; [0] unused */
     Real rate[ENGINE_DOFS];         /* [m/s, rad/s] */
-    Real acceleration[ENGINE_DOFS]; /* qacc [m/s^2, rad/s^2]; L^-T force until engine_accelerate */
-    Real wrench[ENGINE_FEET][6];    /* [N, N m] of the ground on the foot, at the reference point */
+    Real acceleration[ENGINE_DOFS]; /* qacc [m/s^2, rad/s^2], of the last step until engine_begin;
+                                       L^-T force from there to engine_accelerate */
+    Real held[ENGINE_LINKS];     /* [kg m^2] 1/R of the limits in `factor`, of links; 0 of others */
+    Real beyond;                 /* bool: a joint is beyond its limit */
+    Real wrench[ENGINE_FEET][6]; /* [N, N m] of the ground on the foot, at the reference point */
     /* ---- pose: engine_kinematics ---- */
     Real rotation[ENGINE_LINKS][9]; /* [-] link -> world, row major */
     Real position[ENGINE_LINKS][3]; /* [m] of the anchor, from the base */
@@ -72,7 +75,7 @@ typedef struct {
     Real foot_velocity[ENGINE_FEET][6]; /* [m/s, rad/s] twist there */
     /* ---- dynamics ---- */
     Real mass[ENGINE_DOFS][ENGINE_STRIDE];   /* M by rows, see tree.h; of the base all 6 x 6 */
-    Real factor[ENGINE_DOFS][ENGINE_STRIDE]; /* L with M = L^T L, but for its diagonal */
+    Real factor[ENGINE_DOFS][ENGINE_STRIDE]; /* L with N = L^T L, but for its diagonal */
     Real inverse[ENGINE_DOFS];               /* 1 / diagonal of L */
     int newton;                              /* steps of the constraints' solver in the last step */
     /* ---- joint limits; by link, [0] unused ---- */

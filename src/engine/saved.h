@@ -22,6 +22,31 @@ MILD_HD Real *link_pose_number(EngineWork *work, int link, int e) {
     return e < 9 ? work->rotation[link] + e : work->position[link] + (e - 9);
 }
 
+/* Number of the first of the acceleration in EngineSaved.state. */
+#define ENGINE_ACCELERATION ((int)(offsetof(EngineWork, acceleration) / sizeof(Real)))
+
+/* The acceleration alone, from one call of steps to the next. */
+LANE_FN void engine_save_acceleration(const EngineTree *tree, const EngineWork *work,
+                                      EngineSaved *saved) {
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            saved->state[ENGINE_ACCELERATION + d] = work->acceleration[d];
+        }
+    }
+}
+
+LANE_FN void engine_restore_acceleration(const EngineTree *tree, const EngineSaved *saved,
+                                         EngineWork *work) {
+    EACH_LANE(l) {
+        LANE_ROLLED
+        for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
+            work->acceleration[d] = saved->state[ENGINE_ACCELERATION + d];
+        }
+    }
+    lanes_meet();
+}
+
 /* From work to saved. rigid: bool, on rigid ground. */
 LANE_FN void engine_save(const EngineTree *tree, int rigid, EngineWork *work, EngineSaved *saved) {
     EngineSupport *support = &work->now.support;

@@ -33,7 +33,8 @@ MILD_HD void unit_quaternion(const Real *q, Real *unit) {
     }
 }
 
-/* From the order of RobotState, qpos [7 + joints] and qvel [6 + joints], to the tree's. */
+/* From the order of RobotState, qpos [7 + joints] and qvel [6 + joints], to the tree's, as if the
+ * robot had not accelerated before. */
 LANE_FN void engine_load(const EngineModel *model, const Real *qpos, const Real *qvel,
                          EngineWork *work) {
     const EngineTree *tree = &model->tree;
@@ -46,6 +47,7 @@ LANE_FN void engine_load(const EngineModel *model, const Real *qpos, const Real 
         LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
             work->rate[d] = qvel[d < 6 ? d : 6 + tree->joint[d - 5]];
+            work->acceleration[d] = 0;
         }
         for (int k = LANE(l); k < 3; k += LANES) {
             work->base[k] = qpos[k];
@@ -89,7 +91,7 @@ typedef struct {
     int rigid;          /* bool: on rigid ground */
 } EngineAction;
 
-/* M and its factor, and half of the way to the acceleration, which engine_accelerate goes on with:
+/* N and its factor, and half of the way to the acceleration, which engine_accelerate goes on with:
  * L^-T force. After engine_kinematics. */
 LANE_FN void engine_smooth(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     const EngineTree *tree = &model->tree;
@@ -97,6 +99,9 @@ LANE_FN void engine_smooth(const EngineModel *model, const EngineAction *action,
     engine_gather(tree, work);
     engine_smooth_force(model, action->variation, action->torque, action->push, work);
     engine_mass_matrix(model, action->variation, work);
+    if (work->beyond > 0) {
+        engine_hold(tree, work);
+    }
     engine_factorise(tree, work->mass[0], work->factor[0], work->inverse);
     engine_solve_transposed(tree, work->factor[0], work->inverse, work->acceleration);
 }
@@ -106,6 +111,7 @@ LANE_FN void engine_smooth(const EngineModel *model, const EngineAction *action,
 LANE_FN void engine_begin(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     engine_kinematics(model, work);
     if (action) {
+        engine_choose_held(model, work, action->rigid);
         engine_smooth(model, action, work);
     }
     engine_feet_pose(model, work);
@@ -170,8 +176,13 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
  * state. Returns 1 when a velocity went bad. */
 LANE_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
     engine_accelerate(&model->tree, work, !rigid);
-    const int beyond = engine_limits(model, work);
-    const int newton = rigid || beyond ? engine_constrain(&model->tree, work, rigid) : 0;
+    int newton = 0;
+    if (rigid || work->beyond > 0) {
+        engine_limits(model, work); /* anew: engine_save leaves them out */
+        newton = rigid || !engine_held_push(&model->tree, work)
+                     ? engine_constrain(&model->tree, work, rigid)
+                     : 0;
+    }
     EACH_LANE(l) {
         if (LANE(l) == 0) {
             work->newton = newton;

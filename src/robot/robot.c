@@ -588,6 +588,13 @@ const void *robot_visual_model(const Robot *robot) {
     return robot->visual;
 }
 
+void robot_engine_rates(const Robot *robot, const double *rates, double *engine) {
+    memcpy(engine, rates, 6 * sizeof *engine);
+    for (int i = 0; i < robot->def.joints; i++) {
+        engine[robot->dof[i]] = rates[6 + i];
+    }
+}
+
 void robot_engine_qpos(const Robot *robot, const double *qpos, double *engine) {
     memcpy(engine, qpos, 7 * sizeof *engine);
     for (int i = 0; i < robot->def.joints; i++) {

@@ -89,6 +89,8 @@ MildStatus robot_match_model(const Robot *robot, MildModel model, const MildMate
 const void *robot_visual_model(const Robot *robot);
 /* Converts the qpos of a state to the engine's order, for the mjData of either model. */
 void robot_engine_qpos(const Robot *robot, const double *qpos, double *engine);
+/* The same of its qvel or qacc. */
+void robot_engine_rates(const Robot *robot, const double *rates, double *engine);
 
 /* One per thread. dt: physics step [s], 0.0001 .. 0.01. */
 RobotSim *robot_sim_create(const Robot *robot, double dt, MildError *error);

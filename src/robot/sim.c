@@ -133,15 +133,21 @@ static void observe_foot(RobotSim *sim, int f, const MildTerrain *terrain) {
     foot->sole_height = sole_height(sim->robot, f, foot, terrain);
 }
 
+/* Velocities or accelerations from the engine's order to the robot's. */
+static void gather_rates(const Robot *robot, const double *from, double *to) {
+    memcpy(to, from, 6 * sizeof *to);
+    for (int i = 0; i < robot->def.joints; i++) {
+        to[6 + i] = from[robot->dof[i]];
+    }
+}
+
 /* The engine's state in the robot's order. */
 static void gather_state(const Robot *robot, const mjData *d, double *qpos, double *qvel) {
     memcpy(qpos, d->qpos, 7 * sizeof *qpos);
-    memcpy(qvel, d->qvel, 6 * sizeof *qvel);
     for (int i = 0; i < robot->def.joints; i++) {
-        int dof = robot->dof[i];
-        qpos[7 + i] = d->qpos[dof + 1];
-        qvel[6 + i] = d->qvel[dof];
+        qpos[7 + i] = d->qpos[robot->dof[i] + 1];
     }
+    gather_rates(robot, d->qvel, qvel);
 }
 
 /* Updates everything that depends only on qpos and qvel. */
@@ -160,11 +166,8 @@ void robot_sim_load(RobotSim *sim, const RobotState *state, const RobotVariation
     mjData *d = sim->data;
     variation_apply(sim, variation);
     robot_engine_qpos(robot, state->qpos, d->qpos);
-    memcpy(d->qvel, state->qvel, 6 * sizeof *d->qvel);
-    for (int i = 0; i < robot->def.joints; i++) {
-        d->qvel[robot->dof[i]] = state->qvel[6 + i];
-    }
-    memcpy(d->qacc_warmstart, state->warmstart, (size_t)robot->nv * sizeof *d->qacc_warmstart);
+    robot_engine_rates(robot, state->qvel, d->qvel);
+    robot_engine_rates(robot, state->qacc, d->qacc_warmstart);
     d->time = 0.0;
     memset(sim->feet, 0, sizeof sim->feet);
     memset(&sim->contact, 0, sizeof sim->contact);
@@ -183,8 +186,7 @@ double robot_sim_sole_clearance(RobotSim *sim, const MildTerrain *terrain) {
 void robot_sim_store(const RobotSim *sim, RobotState *state) {
     memset(state, 0, sizeof *state);
     gather_state(sim->robot, sim->data, state->qpos, state->qvel);
-    memcpy(state->warmstart, sim->data->qacc_warmstart,
-           (size_t)sim->robot->nv * sizeof *state->warmstart);
+    gather_rates(sim->robot, sim->data->qacc_warmstart, state->qacc);
 }
 
 /* Generalised force of a push (force, torque, world) at the base's centre of mass. */
@@ -206,12 +208,11 @@ static void add_push(RobotSim *sim, const double *push) {
     }
 }
 
-/* M, its factor, the bias b and the acceleration without ground: M qacc_smooth = tau - b. */
+/* M, the bias b and the forces without ground and constraints, f = tau - b. */
 static void smooth_dynamics(RobotSim *sim, const double *torque, const double *push) {
     mjModel *m = sim->model;
     mjData *d = sim->data;
     mj_makeM(m, d);
-    mj_factorM(m, d);
     mj_comVel(m, d);
     mj_rne(m, d, 0, d->qfrc_bias);
     for (int i = 0; i < 6; i++) {
@@ -224,7 +225,12 @@ static void smooth_dynamics(RobotSim *sim, const double *torque, const double *p
     if (push) {
         add_push(sim, push);
     }
-    mj_solveM(m, d, d->qacc_smooth, d->qfrc_smooth, 1);
+}
+
+/* The factor of M, and qacc_smooth = M^-1 f. */
+static void accelerate(RobotSim *sim) {
+    mj_factorM(sim->model, sim->data);
+    mj_solveM(sim->model, sim->data, sim->data->qacc_smooth, sim->data->qfrc_smooth, 1);
 }
 
 /* Fixes the pose of the feet before the step, because forces refer to the pose in which they were
@@ -261,28 +267,15 @@ static void add_ground_wrench(RobotSim *sim) {
     }
 }
 
-static int any_joint_beyond_limit(const RobotSim *sim) {
-    const double *q = sim->qpos + 7;
-    int beyond = 0;
-    for (int i = 0; i < sim->robot->def.joints; i++) {
-        beyond |= q[i] <= sim->robot->low[i] || q[i] >= sim->robot->high[i];
-    }
-    return beyond;
-}
-
-/* Solves the joint limits, and the engine's contacts if there are any. Without constraints the
- * smooth acceleration is final. */
-static void constrain(RobotSim *sim) {
-    mjModel *m = sim->model;
+/* Solves the rows of limits_make. Without any the smooth acceleration is final. */
+static void constrain(RobotSim *sim, int rows) {
     mjData *d = sim->data;
-    if (d->ncon == 0 && !any_joint_beyond_limit(sim)) {
+    if (rows) {
+        mj_projectConstraint(sim->model, d);
+        mj_fwdConstraint(sim->model, d);
+    } else {
         memcpy(d->qacc, d->qacc_smooth, (size_t)sim->robot->nv * sizeof(double));
-        return;
     }
-    mj_makeConstraint(m, d);
-    mj_projectConstraint(m, d);
-    mj_referenceConstraint(m, d);
-    mj_fwdConstraint(m, d);
 }
 
 /* Semi-implicit Euler, as the engine does by default: first the velocity, then the pose with the
@@ -325,20 +318,28 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
     smooth_dynamics(sim, torque, push);
     place_feet(sim);
     sim->data->ncon = 0;
-    t = split(sim, &phases->smooth, t);
     if (rigid) {
+        accelerate(sim);
+        t = split(sim, &phases->smooth, t);
         rigid_collide(sim, terrain);
         t = split(sim, &phases->ground, t);
-        constrain(sim);
+        constrain(sim, limits_make(sim));
         rigid_contact_result(sim);
     } else {
+        const int rows = limits_make(sim), held = limits_hold(sim);
+        accelerate(sim);
+        t = split(sim, &phases->smooth, t);
         free_feet(sim);
         t = split(sim, &phases->map, t);
         mild_ground_solve(ground, terrain, &sim->input, sim->scratch, &sim->contact);
         mild_ground_advance(ground, terrain, &sim->input, sim->scratch, &sim->contact);
         t = split(sim, &phases->ground, t);
+        limits_release(sim, held);
         add_ground_wrench(sim);
-        constrain(sim);
+        if (held) {
+            accelerate(sim);
+        }
+        constrain(sim, rows);
     }
     int bad = integrate(sim);
     if (!bad) {

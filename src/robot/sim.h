@@ -14,6 +14,12 @@ typedef struct {
     double half[ROBOT_FOOT_DOFS_MAX][ROBOT_LANES];     /* L^-T J^T with M = L^T D L */
 } FootMap;
 
+/* What limits_hold replaced: M_ii and f_i of a degree of freedom. */
+typedef struct {
+    int dof;
+    double inertia, force;
+} Unheld;
+
 struct RobotSim {
     const Robot *robot;
     mjModel *model; /* own copy, patched by the variation */
@@ -23,6 +29,7 @@ struct RobotSim {
     double qpos[ROBOT_NQ_MAX]; /* as in RobotState */
     double qvel[ROBOT_NV_MAX];
     FootMap map[ROBOT_FEET_MAX];
+    Unheld without[ROBOT_JOINTS_MAX];
     MildContactInput input;
     MildScratch *scratch;
     MildContactResult contact;
@@ -46,6 +53,14 @@ void foot_map_inverse_inertia(RobotSim *sim);
 /* Generalised force J^T w and its acceleration M^-1 J^T w, both [nv] in the engine's order, of one
  * wrench (force, torque) per foot. */
 void foot_map_wrench(const RobotSim *sim, double (*wrench)[6], double *force, double *acceleration);
+
+/* Makes the engine's rows of joint limits and contacts. Returns 0 if there are none. */
+int limits_make(RobotSim *sim);
+/* M <- N and qfrc_smooth <- f' of the limits that are expected to push, see limit.c. Needs their
+ * rows. Returns how many. */
+int limits_hold(RobotSim *sim);
+/* And back to M and f. */
+void limits_release(RobotSim *sim, int held);
 
 /* The engine's own contact: finds the contacts of the feet's corners with the ground. */
 void rigid_collide(RobotSim *sim, const MildTerrain *terrain);

@@ -10,7 +10,8 @@ typedef struct {
     double qpos[ROBOT_NQ_MAX]; /* [m, -, rad] base x y z, quaternion w x y z, joints */
     /* [m/s, rad/s] Base linear velocity (world axes), angular velocity (base axes), joints. */
     double qvel[ROBOT_NV_MAX];
-    double warmstart[ROBOT_NV_MAX]; /* the engine's qacc_warmstart, in its own order */
+    double qacc[ROBOT_NV_MAX]; /* [m/s^2, rad/s^2] of the last step: which joint limits push in the
+                                  next one, and where its solver starts */
 } RobotState;
 
 /* What differs from robot to robot (domain randomisation). */

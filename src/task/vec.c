@@ -262,7 +262,7 @@ uint64_t vec_hash(const Vec *vec) {
         size_t joints = (size_t)vec->shape.joints, speeds = (6 + joints) * sizeof(double);
         hash = hash_bytes(hash, env->robot.qpos, (7 + joints) * sizeof(double));
         hash = hash_bytes(hash, env->robot.qvel, speeds);
-        hash = hash_bytes(hash, env->robot.warmstart, speeds);
+        hash = hash_bytes(hash, env->robot.qacc, speeds);
         hash = hash_bytes(hash, task_env_history(env), (size_t)vec->shape.history * sizeof(float));
         hash = hash_bytes(hash, env->command, sizeof env->command);
         hash = hash_bytes(hash, &env->reward_sum, sizeof env->reward_sum);

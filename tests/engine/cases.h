@@ -75,6 +75,7 @@ static inline EngineCase random_case(const Robot *robot, uint32_t draw) {
     }
     spread(&random, in.qvel, 6, 4);
     spread(&random, in.qvel + 6, robot->def.joints, 8);
+    spread(&random, in.qacc, robot->nv, 500);
     spread(&random, in.push, 3, 150);
     spread(&random, in.push + 3, 3, 30);
     for (int f = 0; f < robot->def.feet; f++) {

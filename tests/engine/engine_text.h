@@ -9,6 +9,7 @@
 typedef struct {
     double qpos[ROBOT_NQ_MAX];
     double qvel[ROBOT_NV_MAX];
+    double qacc[ROBOT_NV_MAX]; /* of the step before */
     double torque[ROBOT_JOINTS_MAX];
     double push[6];
     double wrench[ROBOT_FEET_MAX][6];
@@ -21,16 +22,16 @@ typedef struct {
 
 /* Degrees of freedom in the engine's order. */
 typedef struct {
-    double mass[ENGINE_ENTRIES_MAX]; /* packed */
-    double force[ROBOT_NV_MAX];
-    double smooth[ROBOT_NV_MAX]; /* qacc without ground and limits */
+    double mass[ENGINE_ENTRIES_MAX]; /* N, packed */
+    double force[ROBOT_NV_MAX];      /* f' */
+    double smooth[ROBOT_NV_MAX];     /* qacc without ground, with the held limits */
     double position[ROBOT_FEET_MAX][3];
     double rotation[ROBOT_FEET_MAX][9];
     double velocity[ROBOT_FEET_MAX][6];
     double free_velocity[ROBOT_FEET_MAX][6];
     double inverse_inertia[36 * ROBOT_FEET_MAX * ROBOT_FEET_MAX];
-    double wrenched[ROBOT_NV_MAX];     /* qacc with the wrenches */
-    double acceleration[ROBOT_NV_MAX]; /* and with limits, or with rigid ground */
+    double wrenched[ROBOT_NV_MAX];     /* and with the wrenches */
+    double acceleration[ROBOT_NV_MAX]; /* with the limits that push, or rigid ground */
     double wrench[ROBOT_FEET_MAX][6];  /* of rigid ground */
     double qpos[ROBOT_NQ_MAX];         /* after the step */
     double qvel[ROBOT_NV_MAX];

@@ -14,7 +14,7 @@ enum { ROWS_MAX = 6 * ROBOT_FEET_MAX };
 
 /* Beside the result what its errors are measured in. */
 typedef struct {
-    double mass[ROBOT_NV_MAX * ROBOT_NV_MAX];    /* dense */
+    double mass[ROBOT_NV_MAX * ROBOT_NV_MAX];    /* N, dense */
     double inverse[ROBOT_NV_MAX * ROBOT_NV_MAX]; /* of it */
     double jacobian[ROWS_MAX][ROBOT_NV_MAX];
     double force[ROBOT_NV_MAX];
@@ -38,16 +38,56 @@ typedef struct {
     double next_velocity[ROWS_MAX];
     double next_position[ROBOT_FEET_MAX][3];
     int rows; /* joints beyond a limit, or edges of contacts */
+    int held; /* limits that are taken to push */
+    double held_inertia[ROBOT_NV_MAX], held_force[ROBOT_NV_MAX]; /* theirs: N - M and f' - f */
 } Oracle;
 
-/* M with dt damping on the diagonal, M^-1, and J of the feet. */
+static inline double oracle_dot(const double *a, const double *b, int count) {
+    double sum = 0;
+    for (int i = 0; i < count; i++) {
+        sum += a[i] * b[i];
+    }
+    return sum;
+}
+
+/* Limits that push at the acceleration of the step before. */
+static inline void oracle_hold(RobotSim *sim, const EngineCase *in, Oracle *o) {
+    const mjModel *m = sim->model;
+    mjData *d = sim->data;
+    double before[ROBOT_NV_MAX];
+    robot_engine_rates(sim->robot, in->qacc, before);
+    memset(o->held_inertia, 0, sizeof o->held_inertia);
+    memset(o->held_force, 0, sizeof o->held_force);
+    o->held = 0;
+    d->ncon = 0;
+    mj_makeConstraint(m, d);
+    mj_referenceConstraint(m, d);
+    for (int row = 0; row < d->nefc && !in->variation.rigid; row++) {
+        double dense[ROBOT_NV_MAX] = {0}; /* the row's Jacobian: one number */
+        for (int k = 0; k < (mj_isSparse(m) ? d->efc_J_rownnz[row] : m->nv); k++) {
+            const int sparse = mj_isSparse(m);
+            const int at = sparse ? d->efc_J_rowadr[row] + k : row * (int)m->nv + k;
+            dense[sparse ? d->efc_J_colind[at] : k] = d->efc_J[at];
+        }
+        if (oracle_dot(dense, before, (int)m->nv) - d->efc_aref[row] < 0) {
+            for (int i = 0; i < m->nv; i++) {
+                o->held_inertia[i] += d->efc_D[row] * dense[i] * dense[i];
+                o->held_force[i] += d->efc_D[row] * dense[i] * d->efc_aref[row];
+            }
+            o->held++;
+        }
+    }
+}
+
+/* N = M with dt damping on the diagonal and the held limits, N^-1, and J of the feet. */
 static inline void oracle_matrices(RobotSim *sim, Oracle *o) {
     const mjModel *m = sim->model;
     mjData *d = sim->data;
     const int nv = (int)m->nv;
     mj_makeM(m, d);
     for (int i = 0; i < nv; i++) {
-        d->M[m->M_rowadr[i] + m->M_rownnz[i] - 1] += sim->dt * m->dof_damping[i];
+        d->M[m->M_rowadr[i] + m->M_rownnz[i] - 1] +=
+            sim->dt * m->dof_damping[i] + o->held_inertia[i];
     }
     mj_factorM(m, d);
     mju_sym2dense(o->mass, d->M, nv, m->M_rownnz, m->M_rowadr, m->M_colind);
@@ -74,14 +114,6 @@ static inline void oracle_matrices(RobotSim *sim, Oracle *o) {
     }
 }
 
-static inline double oracle_dot(const double *a, const double *b, int count) {
-    double sum = 0;
-    for (int i = 0; i < count; i++) {
-        sum += a[i] * b[i];
-    }
-    return sum;
-}
-
 static inline void oracle_forces(RobotSim *sim, const EngineCase *in, Oracle *o) {
     const mjModel *m = sim->model;
     mjData *d = sim->data;
@@ -96,6 +128,9 @@ static inline void oracle_forces(RobotSim *sim, const EngineCase *in, Oracle *o)
         o->force[sim->robot->dof[j]] += in->torque[j];
     }
     mj_applyFT(m, d, in->push, in->push + 3, d->xipos + 3 * base, base, o->force);
+    for (int i = 0; i < nv; i++) {
+        o->force[i] += o->held_force[i];
+    }
     mj_solveM(m, d, o->smooth, o->force, 1);
 }
 
@@ -175,9 +210,14 @@ static inline void oracle_finish(RobotSim *sim, Oracle *o) {
     mjModel *m = sim->model;
     mjData *d = sim->data;
     const int nv = (int)m->nv;
-    memcpy(d->qacc_smooth, o->wrenched, (size_t)nv * sizeof(double));
-    memcpy(d->qacc_warmstart, o->wrenched, (size_t)nv * sizeof(double));
     mj_mulM(m, d, d->qfrc_smooth, o->wrenched);
+    for (int i = 0; i < nv; i++) { /* M and f again */
+        d->M[m->M_rowadr[i] + m->M_rownnz[i] - 1] -= o->held_inertia[i];
+        d->qfrc_smooth[i] -= o->held_force[i];
+    }
+    mj_factorM(m, d);
+    mj_solveM(m, d, d->qacc_smooth, d->qfrc_smooth, 1);
+    memcpy(d->qacc_warmstart, d->qacc_smooth, (size_t)nv * sizeof(double));
     m->opt.tolerance = 1e-15;
     m->opt.ls_tolerance = 1e-12;
     m->opt.iterations = 100;
@@ -229,6 +269,7 @@ static inline void oracle_step(RobotSim *sim, const EngineCase *in, Oracle *o) {
     memcpy(state.qvel, in->qvel, sizeof state.qvel);
     robot_sim_load(sim, &state, &in->variation);
     oracle_measure(sim, in, o);
+    oracle_hold(sim, in, o);
     oracle_matrices(sim, o);
     oracle_forces(sim, in, o);
     oracle_feet(sim, o);

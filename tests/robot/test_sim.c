@@ -373,7 +373,7 @@ static void test_load_and_store(void **unused) {
     state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) + 0.01; /* a foot 10 mm deep */
     state.qvel[2] = -0.5;
     for (int i = 0; i < SA01_NV; i++) {
-        state.warmstart[i] = 0.5 * i;
+        state.qacc[i] = 0.5 * i;
     }
     robot_sim_load(sim, &state, &nominal);
     robot_sim_store(sim, &back);

@@ -300,7 +300,7 @@ static void hash(void **unused) {
         TaskEnv *env = env_of(e);
         wanted = fnv(wanted, env->robot.qpos, SA01_NQ * sizeof(double));
         wanted = fnv(wanted, env->robot.qvel, SA01_NV * sizeof(double));
-        wanted = fnv(wanted, env->robot.warmstart, SA01_NV * sizeof(double));
+        wanted = fnv(wanted, env->robot.qacc, SA01_NV * sizeof(double));
         wanted = fnv(wanted, task_env_history(env), SA01_HISTORY * sizeof(float));
         wanted = fnv(wanted, env->command, sizeof env->command);
         wanted = fnv(wanted, &env->reward_sum, sizeof env->reward_sum);

@@ -320,6 +320,7 @@ static void test_window(void **state) {
     walk(12, 1.0f);
     const double far = (double)web_view()->link[0][3];
     const double ahead = pressed_between(far + 1, far + 4);
+    walk(2, 0);
     walk(12, -1.0f);
     const double back = (double)web_view()->link[0][3], after = pressed_between(0.2, 1.2);
     printf("  %.3f m^2 pressed; after a way to %.2f m and back to %.2f m %.3f m^2\n", before, far,
