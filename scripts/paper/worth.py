@@ -1,0 +1,44 @@
+#!/usr/bin/env python3
+"""Table of the trainings of scripts/paper/worth.sh: worth.py FOLDER. A row per change, over its seeds: trials that stayed up, mean error of
+the speed, cost of transport and swing clearance over grounds and speeds, largest torque."""
+import json
+import pathlib
+import sys
+
+FIRST = "as_it_is"
+
+
+def measures(path):
+    """Upright trials, trials, and means over the rows in which at least half of the trials stayed up."""
+    rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    walked = [row for row in rows if 2 * row["success"] >= row["trials"]]
+
+    def mean(values):
+        return sum(values) / len(walked) if walked else float("nan")
+    return (sum(row["success"] for row in rows), sum(row["trials"] for row in rows), mean([abs(row["velocity"] - row["speed"]) for row in walked]),
+            mean([row["cot"] for row in walked]), mean([1e3 * row["clearance"] for row in walked]),
+            max((row["torque_max"] for row in walked), default=float("nan")))
+
+
+def spread(values, digits):
+    """Mean, with the range of several seeds."""
+    text = f"{sum(values) / len(values):.{digits}f}"
+    return text if len(values) == 1 else f"{text} ({min(values):.{digits}f} to {max(values):.{digits}f})"
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit("worth: usage: worth.py FOLDER")
+    runs = {}
+    for path in sorted(pathlib.Path(sys.argv[1]).glob("*-*.json")):
+        runs.setdefault(path.stem.rsplit("-", 1)[0], []).append(measures(path))
+    if not runs:
+        sys.exit(f"worth: no NAME-SEED.json in {sys.argv[1]}; scripts/paper/worth.sh makes them")
+    print("| set back | seeds | upright | speed off [m/s] | cost of transport | clearance [mm] | largest torque [N m] |\n|---|---|---|---|---|---|---|")
+    for name in sorted(runs, key=lambda name: (name != FIRST, name)):
+        up, trials, error, cost, clearance, torque = zip(*runs[name])
+        print(f"| {name} | {len(up)} | {sum(up)} of {sum(trials)} | {spread(error, 3)} | {spread(cost, 2)} | {spread(clearance, 0)} | {spread(torque, 0)} |")
+
+
+if __name__ == "__main__":
+    main()
