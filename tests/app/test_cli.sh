@@ -157,6 +157,7 @@ expect 0 'newton' "$mild" info models
 
 # robots and controllers
 expect 0 'go1: 12 joints, 4 feet, 12.7 kg' "$mild" info robots
+expect 0 'g1: 12 joints, 2 feet, 33.3 kg' "$mild" info robots
 expect 0 'sa01: 12 joints, 2 feet, 33.1 kg' "$mild" info robots
 bad "unknown robot 'go2'; nearest is 'go1'" "$mild" eval --robot go2
 bad "unknown robot 'go2'; nearest is 'go1'" "$mild" play --robot go2
