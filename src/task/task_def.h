@@ -134,6 +134,7 @@ typedef struct {
                               in m/s */
     double tilt_limit;   /* [rad] */
     double crossing_limit;    /* [m] lateral distance of the feet below which the episode ends */
+    double shell_depth;       /* [m] of the shells in soft ground, past which the episode ends */
     int assist;               /* bool: helping hand for beginners (assist.c) */
     int newton;               /* bool: fast solver; off: the paper's sweeps */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */
