@@ -49,8 +49,14 @@
 enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };
 #undef TASK_REWARD_ENUM
 
-/* Forms of a reward: ours, and the paper's formula to the letter (docs/deviations.md). */
-typedef enum { TASK_CLEARANCE_LIFT, TASK_CLEARANCE_ERROR, TASK_CLEARANCES } TaskClearance;
+/* Forms of a reward: ours, and the paper's formula to the letter (docs/deviations.md). Rise: for feet
+ * that sink deep. */
+typedef enum {
+    TASK_CLEARANCE_LIFT,
+    TASK_CLEARANCE_ERROR,
+    TASK_CLEARANCE_RISE,
+    TASK_CLEARANCES
+} TaskClearance;
 typedef enum { TASK_GAIT_MEAN, TASK_GAIT_SUM, TASK_GAITS } TaskGait;
 typedef enum {
     TASK_ACCELERATION_TWIST,
