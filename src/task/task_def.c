@@ -164,8 +164,8 @@ const MildField task_fields[] = {
       "[m] the episode ends when the feet are laterally closer than this, because the simulated "
       "legs cannot touch each other"),
     T(shell_depth, D, 1, 0, 1,
-      "[m] on soft ground the episode ends when a geom of `shells` of robot.ini is deeper than this "
-      "below the undisturbed surface"),
+      "[m] on soft ground the episode ends when a geom of `shells` of robot.ini is deeper than "
+      "this below the undisturbed surface"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     T(newton, B, 1, 0, 1,

@@ -49,8 +49,8 @@
 enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };
 #undef TASK_REWARD_ENUM
 
-/* Forms of a reward: ours, and the paper's formula to the letter (docs/deviations.md). Rise: for feet
- * that sink deep. */
+/* Forms of a reward: ours, and the paper's formula to the letter (docs/deviations.md). Rise is for
+ * feet that sink deep. */
 typedef enum {
     TASK_CLEARANCE_LIFT,
     TASK_CLEARANCE_ERROR,
