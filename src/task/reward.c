@@ -40,21 +40,36 @@ static inline MILD_BOTH TaskReal reward_yaw_rate(const TaskMotion *m) {
     return tracking(m, m->env->smooth_velocity[2] - m->env->command[2]);
 }
 
+/* [m] Mean depth of the feet that the clock wants in stance, at least 0. */
+static inline MILD_BOTH TaskReal stance_depth(const TaskMotion *m) {
+    TaskReal sum = 0;
+    int feet = 0;
+    for (int f = 0; f < m->env->shape.feet; f++) {
+        sum -= m->stance[f] ? m->foot_height[f] : 0;
+        feet += m->stance[f];
+    }
+    return sum > 0 ? sum / TASK_REAL(feet) : 0;
+}
+
 /* The paper prints a positive weight on an error (TASK_CLEARANCE_ERROR), which pays a foot for a
  * wrong height. The lift gives nothing to a foot that stays down (exp(-k error) would give it a
  * third of a perfect swing) and has a slope from the first millimetre. Lifting too high costs half
  * as much per metre as lifting gains. The scale is such that following h_des = apex sin(pi s) gives
- * 1 on average over the swing. */
+ * 1 on average over the swing. From a deep print a foot lifts far before it meets the surface:
+ * TASK_CLEARANCE_RISE counts from the depth of the standing feet. */
 static inline MILD_BOTH TaskReal reward_feet_clearance(const TaskMotion *m) {
+    const int form = m->def->reward.clearance_form;
+    const TaskReal depth = form == TASK_CLEARANCE_RISE ? stance_depth(m) : 0;
     TaskReal sum = 0;
     for (int f = 0; f < m->env->shape.feet; f++) {
         TaskReal h = m->foot_height[f], wanted = m->wanted_height[f];
-        if (!m->stance[f] && m->def->reward.clearance_form == TASK_CLEARANCE_ERROR) {
+        if (!m->stance[f] && form == TASK_CLEARANCE_ERROR) {
             sum += TASK_REAL(fabs(wanted - h));
         } else if (!m->stance[f]) {
-            sum += TASK_REAL(1.5707963) *
-                   (clamp(h, 0, wanted) - TASK_REAL(0.5) * clamp(h - wanted, 0, 0.3)) /
-                   TASK_REAL(m->def->swing_apex);
+            sum +=
+                TASK_REAL(1.5707963) *
+                (clamp(h + depth, 0, wanted + depth) - TASK_REAL(0.5) * clamp(h - wanted, 0, 0.3)) /
+                (TASK_REAL(m->def->swing_apex) + depth);
         }
     }
     return per_pair(m, sum);

@@ -303,13 +303,14 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     return m;
 }
 
-/* Bool: the base tilts too much, a shell touches the ground, or a foot has passed through the other
- * leg, because the engine computes no contact between the legs. */
+/* Bool: the base tilts too much, a shell touches the ground or is too deep in soft ground, or a
+ * foot has passed through the other leg, because the engine computes no contact between the legs. */
 static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
                                        const RobotSim *sim) {
+    const double depth = env->variation.rigid ? 0 : def->shell_depth;
     return robot_sim_foot_distance(sim) < def->crossing_limit ||
            robot_sim_base_rotation(sim)[8] < place_cos(def->tilt_limit) ||
-           robot_sim_body_clearance(sim, &env->terrain) < 0;
+           robot_sim_body_clearance(sim, &env->terrain) < -depth;
 }
 
 TASK_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {

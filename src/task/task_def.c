@@ -163,6 +163,9 @@ const MildField task_fields[] = {
     T(crossing_limit, D, 1, -1, 1,
       "[m] the episode ends when the feet are laterally closer than this, because the simulated "
       "legs cannot touch each other"),
+    T(shell_depth, D, 1, 0, 1,
+      "[m] on soft ground the episode ends when a geom of `shells` of robot.ini is deeper than "
+      "this below the undisturbed surface"),
     T(assist, B, 1, 0, 1,
       "[bool] an external force assists early training; it fades while a robot stays on its feet"),
     T(newton, B, 1, 0, 1,
@@ -186,7 +189,7 @@ const int task_field_count = sizeof task_fields / sizeof *task_fields;
      1e3,                                                                                          \
      "[1/s] weight of " help,                                                                      \
      NULL},
-static const char *const clearance_names[TASK_CLEARANCES] = {"lift", "error"};
+static const char *const clearance_names[TASK_CLEARANCES] = {"lift", "error", "rise"};
 static const char *const gait_names[TASK_GAITS] = {"mean", "sum"};
 static const char *const acceleration_names[TASK_ACCELERATIONS] = {"twist", "linear"};
 const MildField reward_fields[] = {
@@ -202,9 +205,11 @@ const MildField reward_fields[] = {
     R(feet_range, D, 2, 0, 1, "[m] limits of the lateral distance of the feet; 0 0: the robot's"),
     R(knee_range, D, 2, 0, 1, "[m] limits of the lateral distance of the knees; 0 0: the robot's"),
     R(reference_amplitude, D, 1, 0, 1, "[rad] amplitude of the joints in reference_motion"),
-    MILD_FIELD_CHOICE(RewardDef, clearance_form, clearance_names, TASK_CLEARANCES,
-                      "[-] feet_clearance: lift, (pi/2) (clip(h, 0, h_des) minus half of the "
-                      "excess)/apex; error, the paper's |h_des - h| [m]"),
+    MILD_FIELD_CHOICE(
+        RewardDef, clearance_form, clearance_names, TASK_CLEARANCES,
+        "[-] feet_clearance: lift, (pi/2) (clip(h, 0, h_des) minus half of the "
+        "excess)/apex; error, the paper's |h_des - h| [m]; rise, lift from the depth d of the "
+        "standing feet: h + d, h_des + d, apex + d in the places of h, h_des, apex"),
     MILD_FIELD_CHOICE(RewardDef, gait_form, gait_names, TASK_GAITS,
                       "[-] gait: mean over feet of 1 or -0.3; sum, the paper's 1.3 (feet that "
                       "match, of two) - 0.3"),

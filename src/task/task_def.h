@@ -49,8 +49,14 @@
 enum { TASK_REWARD_LIST(TASK_REWARD_ENUM) TASK_REWARD_COUNT };
 #undef TASK_REWARD_ENUM
 
-/* Forms of a reward: ours, and the paper's formula to the letter (docs/deviations.md). */
-typedef enum { TASK_CLEARANCE_LIFT, TASK_CLEARANCE_ERROR, TASK_CLEARANCES } TaskClearance;
+/* Forms of a reward: ours, and the paper's formula to the letter (docs/deviations.md). Rise is for
+ * feet that sink deep. */
+typedef enum {
+    TASK_CLEARANCE_LIFT,
+    TASK_CLEARANCE_ERROR,
+    TASK_CLEARANCE_RISE,
+    TASK_CLEARANCES
+} TaskClearance;
 typedef enum { TASK_GAIT_MEAN, TASK_GAIT_SUM, TASK_GAITS } TaskGait;
 typedef enum {
     TASK_ACCELERATION_TWIST,
@@ -134,6 +140,7 @@ typedef struct {
                               in m/s */
     double tilt_limit;   /* [rad] */
     double crossing_limit;    /* [m] lateral distance of the feet below which the episode ends */
+    double shell_depth;       /* [m] of the shells in soft ground, past which the episode ends */
     int assist;               /* bool: helping hand for beginners (assist.c) */
     int newton;               /* bool: fast solver; off: the paper's sweeps */
     double contact_tolerance; /* [-] relative residual at which the contact solver stops */

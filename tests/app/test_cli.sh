@@ -157,6 +157,7 @@ expect 0 'newton' "$mild" info models
 
 # robots and controllers
 expect 0 'go1: 12 joints, 4 feet, 12.7 kg' "$mild" info robots
+expect 0 'g1: 12 joints, 2 feet, 33.3 kg' "$mild" info robots
 expect 0 'sa01: 12 joints, 2 feet, 33.1 kg' "$mild" info robots
 bad "unknown robot 'go2'; nearest is 'go1'" "$mild" eval --robot go2
 bad "unknown robot 'go2'; nearest is 'go1'" "$mild" play --robot go2
@@ -175,6 +176,11 @@ expect 0 'foam45 .* 2/2' "$mild" eval --robot go1 --controller stand --ground fo
 grep -q '"controller":.*"stand"' go1.json && grep -q '"robot":.*"go1"' go1.json || fail "go1.json: $(cat go1.json)"
 expect 0 '' "$mild" train --robot go1 --out go1 --train.envs=4 --train.iterations=1 --ppo.steps=4 --ppo.minibatches=1
 grep -qx 'robot = go1' go1/config.ini || fail "config.ini does not keep the robot"
+for robot in go1 g1; do # their own trainings begin
+    expect 0 '' "$mild" train --config "$(dirname "$0")/../../configs/$robot.ini" --out "own_$robot" --train.envs=4 --train.iterations=1 \
+        --ppo.steps=4 --ppo.minibatches=1
+    grep -qx "robot = $robot" "own_$robot/config.ini" || fail "configs/$robot.ini trains another robot"
+done
 bad "for robot go1, not for sa01" "$mild" eval --policy go1/policy.safetensors --trials 1 --seconds 0.1
 expect 0 '' "$mild" eval --config go1/config.ini --policy go1/policy.safetensors --trials 1 --seconds 0.1 --ground foam45
 bad "its robot is 'go1', this run's is 'sa01'" "$mild" train --resume --robot sa01 --out go1 --train.iterations=2

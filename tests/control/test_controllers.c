@@ -97,8 +97,8 @@ static void zero_does_nothing(void **unused) {
 /* The joints' PD on the actions of `stand` is the balanced stand's torque. */
 static void stand_acts_as_the_stand(void **unused) {
     (void)unused;
-    static const char *const robots[] = {"sa01", "go1"};
-    for (int r = 0; r < 2; r++) {
+    static const char *const robots[] = {"sa01", "go1", "g1"};
+    for (int r = 0; r < 3; r++) {
         Scene scene;
         MildError error = {0};
         float action[ROBOT_JOINTS_MAX];
@@ -135,8 +135,8 @@ static void stand_acts_as_the_stand(void **unused) {
 /* Five seconds through the whole environment. */
 static void stand_stands(void **unused) {
     (void)unused;
-    static const char *const robots[] = {"sa01", "go1"};
-    for (int r = 0; r < 2; r++) {
+    static const char *const robots[] = {"sa01", "go1", "g1"};
+    for (int r = 0; r < 3; r++) {
         Scene scene;
         TaskView none = {0};
         float action[ROBOT_JOINTS_MAX];

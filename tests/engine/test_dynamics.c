@@ -38,8 +38,8 @@ typedef struct {
     double number[ENGINE_NUMBERS];
 } Kit;
 
-enum { SA01_KIT, GO1_KIT, LOPSIDED_KIT, WIDEST_KIT, KITS };
-static const char *const kit_name[KITS] = {"sa01", "go1", "lopsided", "widest"};
+enum { SA01_KIT, GO1_KIT, G1_KIT, LOPSIDED_KIT, WIDEST_KIT, KITS };
+static const char *const kit_name[KITS] = {"sa01", "go1", "g1", "lopsided", "widest"};
 static Kit kits[KITS];
 static Oracle oracle;
 static EngineResult result;
@@ -48,6 +48,7 @@ static Robot *open_robot(int k, MildError *error) {
     switch (k) {
     case SA01_KIT: return robot_create(MILD_SOURCE_DIR "/robots/sa01", error);
     case GO1_KIT: return robot_create(MILD_SOURCE_DIR "/robots/go1", error);
+    case G1_KIT: return robot_create(MILD_SOURCE_DIR "/robots/g1", error);
     case LOPSIDED_KIT: return robot_create(MILD_SOURCE_DIR "/tests/engine/lopsided", error);
     default: return widest_open(error);
     }
@@ -312,7 +313,7 @@ static void run_case(const Kit *kit, const EngineCase *in, Worst at_double, doub
 
 static void test_random_states(void **unused) {
     (void)unused;
-    static const int cases[KITS] = {10000, 10000, 10000, 600};
+    static const int cases[KITS] = {10000, 10000, 3000, 10000, 600};
     for (int k = 0; k < KITS; k++) {
         Worst at_double = {0}, at_float = {0};
         int limited = 0, held = 0, newton = 0;
@@ -334,7 +335,7 @@ static void test_random_states(void **unused) {
 
 static void test_rigid_ground(void **unused) {
     (void)unused;
-    static const int cases[KITS] = {10000, 10000, 10000, 600};
+    static const int cases[KITS] = {10000, 10000, 3000, 10000, 600};
     for (int k = 0; k < KITS; k++) {
         Worst at_double = {0}, at_float = {0};
         int touching = 0, newton = 0;

@@ -139,6 +139,31 @@ static void feet_clearance(void **unused) {
     expect_term(REWARD_feet_clearance, "both stand", 0);
 }
 
+/* The standing foot is 0.06 m deep: (pi/2) clip(h + 0.06, 0, 0.14)/0.16, times 2.4; a foot at the
+ * surface has come out of its print and gets 0.06/0.16. */
+static void clearance_from_the_print(void **unused) {
+    (void)unused;
+    TaskMotion *m = new_scene();
+    scene.def.reward.clearance_form = TASK_CLEARANCE_RISE;
+    m->foot_height[0] = -0.06;
+    m->foot_height[1] = 0.08;
+    expect_term(REWARD_feet_clearance, "wanted height", 3.2986722863);
+    m->foot_height[1] = 0;
+    expect_term(REWARD_feet_clearance, "at the surface", 1.4137166941);
+    m->foot_height[1] = -0.04;
+    expect_term(REWARD_feet_clearance, "20 mm out of the print", 0.4712388980);
+    m->foot_height[1] = -0.06;
+    expect_term(REWARD_feet_clearance, "in the print", 0);
+    m->foot_height[1] = -0.09;
+    expect_term(REWARD_feet_clearance, "deeper", 0);
+    m->foot_height[1] = 0.10;
+    expect_term(REWARD_feet_clearance, "20 mm too high", 3.0630528372);
+    m->foot_height[0] = 0.3; /* not down yet: as lift */
+    expect_term(REWARD_feet_clearance, "from the surface", 2.6389378290);
+    m->stance[0] = m->stance[1] = 1;
+    expect_term(REWARD_feet_clearance, "both stand", 0);
+}
+
 /* The paper's formula, 2.4 |h_des - h| of the feet that swing: an error is paid for. */
 static void clearance_as_printed(void **unused) {
     (void)unused;
@@ -429,6 +454,7 @@ int main(void) {
         cmocka_unit_test(tracking_as_printed),
         cmocka_unit_test(yaw_rate),
         cmocka_unit_test(feet_clearance),
+        cmocka_unit_test(clearance_from_the_print),
         cmocka_unit_test(clearance_as_printed),
         cmocka_unit_test(gait),
         cmocka_unit_test(gait_as_printed),

@@ -101,6 +101,24 @@ static void touch(const RobotState *from, const char *box, double height, const 
     }
 }
 
+/* On soft ground `shell_depth` below the surface, on rigid ground the surface. */
+static void deep(const RobotState *from, const char *box) {
+    rig.def.shell_depth = 0.05;
+    for (int rigid = 0; rigid < 2; rigid++) {
+        rig.env->variation.rigid = rigid;
+        for (int past = 0; past < 2; past++) {
+            RobotState state = *from;
+            state.qvel[2] = -0.1;
+            state.qpos[2] += FALL + (past ? -1e-3 : 1e-3) - lowest_of_box(&state, box);
+            state.qpos[2] -= rigid ? 0 : rig.def.shell_depth;
+            rig.env->terrain.height = 0;
+            expect_end("deep", step_from(&state, 10), past, 0);
+        }
+    }
+    rig.env->variation.rigid = 0;
+    rig.def.shell_depth = 0;
+}
+
 /* Hips and knees folded so that both feet are above the base. */
 static RobotState folded(void) {
     RobotState state = kit_state(0);
@@ -125,6 +143,7 @@ static void base_touches(void **unused) {
     }
     touch(&state, "base_link_box", 0, "base");
     touch(&state, "base_link_box", 0.3, "base on higher ground");
+    deep(&state, "base_link_box");
     rig_close(&rig);
 }
 

@@ -1,0 +1,475 @@
+/* The biped robots/g1: its fixed upper body by hand, its geometry, its mirror image, and the stand
+ * controller on every ground. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <mujoco/mujoco.h>
+
+#include "base/random.h"
+#include "control/stand.h"
+#include "mild/map.h"
+
+#define G1 MILD_SOURCE_DIR "/robots/g1"
+
+enum { FEET = 2, JOINTS = 12, LEG = 6, NV = 18, X = 0, Y = 1, Z = 2 };
+
+static Robot *robot;
+static Stand *stand;
+
+static int setup(void **unused) {
+    (void)unused;
+    MildError error = {0};
+    robot = robot_create(G1, &error);
+    if (!robot) {
+        fail_msg("%s", error.text);
+    }
+    stand = stand_create(robot, &error);
+    assert_non_null(stand);
+    return 0;
+}
+
+static int teardown(void **unused) {
+    (void)unused;
+    stand_destroy(stand);
+    robot_destroy(robot);
+    return 0;
+}
+
+static RobotSim *new_sim(double dt) {
+    MildError error = {0};
+    RobotSim *sim = robot_sim_create(robot, dt, &error);
+    assert_non_null(sim);
+    return sim;
+}
+
+static void expect_near(const char *what, double got, double wanted, double tolerance) {
+    if (!(fabs(got - wanted) <= tolerance)) {
+        fail_msg("%s: %.10g, not %.10g +- %.1e", what, got, wanted, tolerance);
+    }
+}
+
+/* ---- the upper body ---- */
+
+/* A body of the published MJCF that is now part of the pelvis. */
+typedef struct {
+    int parent;
+    double position[3], quaternion[4]; /* [m], in the parent */
+    int axis;                          /* of the joint that is fixed */
+    double angle;                      /* [rad] it is fixed at */
+    double mass;                       /* [kg] */
+    double center[3], turn[4];         /* [m] of the inertia, in the body */
+    double inertia[3];                 /* [kg m^2] */
+} Part;
+
+static const Part parts[] = {
+    /* pelvis */
+    {-1,
+     {0},
+     {1, 0, 0, 0},
+     Z,
+     0,
+     3.813,
+     {0, 0, -0.07605},
+     {1, 0, -0.000399148, 0},
+     {0.010549, 0.0093089, 0.0079184}},
+    /* waist_yaw_link */
+    {0,
+     {0, 0, 0},
+     {1, 0, 0, 0},
+     Z,
+     0,
+     0.214,
+     {0.003494, 0.000233, 0.018034},
+     {0.289697, 0.591001, -0.337795, 0.672821},
+     {0.000163531, 0.000107714, 0.000102205}},
+    /* waist_roll_link */
+    {1,
+     {-0.0039635, 0, 0.044},
+     {1, 0, 0, 0},
+     X,
+     0,
+     0.086,
+     {0, 2.3e-05, 0},
+     {0.5, 0.5, -0.5, 0.5},
+     {8.245e-06, 7.079e-06, 6.339e-06}},
+    /* torso_link */
+    {2,
+     {0, 0, 0},
+     {1, 0, 0, 0},
+     Y,
+     0,
+     7.818,
+     {0.00203158, 0.000339683, 0.184568},
+     {0.999803, -6.03319e-05, 0.0198256, 0.00131986},
+     {0.121847, 0.109825, 0.0273735}},
+    /* left_shoulder_pitch_link */
+    {3,
+     {0.0039563, 0.10022, 0.24778},
+     {0.990264, 0.139201, 1.38722e-05, -9.86868e-05},
+     Y,
+     0.2,
+     0.718,
+     {0, 0.035892, -0.011628},
+     {0.654152, 0.0130458, -0.326267, 0.68225},
+     {0.000465864, 0.000432842, 0.000406394}},
+    /* left_shoulder_roll_link */
+    {4,
+     {0, 0.038, -0.013831},
+     {0.990268, -0.139172, 0, 0},
+     X,
+     0.2,
+     0.643,
+     {-0.000227, 0.00727, -0.063243},
+     {0.701256, -0.0196223, -0.00710317, 0.712604},
+     {0.000691311, 0.000618011, 0.000388977}},
+    /* left_shoulder_yaw_link */
+    {5,
+     {0, 0.00624, -0.1032},
+     {1, 0, 0, 0},
+     Z,
+     0,
+     0.734,
+     {0.010773, -0.002949, -0.072009},
+     {0.716879, -0.0964829, -0.0679942, 0.687134},
+     {0.00106187, 0.00103217, 0.000400661}},
+    /* left_elbow_link */
+    {6,
+     {0.015783, 0, -0.080518},
+     {1, 0, 0, 0},
+     Y,
+     0.6,
+     0.6,
+     {0.064956, 0.004454, -0.010062},
+     {0.541765, 0.636132, 0.388821, 0.388129},
+     {0.000443035, 0.000421612, 0.000259353}},
+    /* left_wrist_roll_link */
+    {7,
+     {0.1, 0.00188791, -0.01},
+     {1, 0, 0, 0},
+     X,
+     0,
+     0.085445,
+     {0.0171394, 0.000537591, 4.8864e-07},
+     {0.575338, 0.411667, -0.574906, 0.411094},
+     {5.48211e-05, 4.96646e-05, 3.57798e-05}},
+    /* left_wrist_pitch_link */
+    {8,
+     {0.038, 0, 0},
+     {1, 0, 0, 0},
+     Y,
+     0,
+     0.48405,
+     {0.0229999, -0.00111685, -0.00111658},
+     {0.249998, 0.661363, 0.293036, 0.643608},
+     {0.000430353, 0.000429873, 0.000164648}},
+    /* left_wrist_yaw_link */
+    {9,
+     {0.046, 0, 0},
+     {1, 0, 0, 0},
+     Z,
+     0,
+     0.254576,
+     {0.0708244, 0.000191745, 0.00161742},
+     {0.510571, 0.526295, 0.468078, 0.493188},
+     {0.000646113, 0.000559993, 0.000147566}},
+    /* right_shoulder_pitch_link */
+    {3,
+     {0.0039563, -0.10021, 0.24778},
+     {0.990264, -0.139201, 1.38722e-05, 9.86868e-05},
+     Y,
+     0.2,
+     0.718,
+     {0, -0.035892, -0.011628},
+     {0.68225, -0.326267, 0.0130458, 0.654152},
+     {0.000465864, 0.000432842, 0.000406394}},
+    /* right_shoulder_roll_link */
+    {11,
+     {0, -0.038, -0.013831},
+     {0.990268, 0.139172, 0, 0},
+     X,
+     -0.2,
+     0.643,
+     {-0.000227, -0.00727, -0.063243},
+     {0.712604, -0.00710317, -0.0196223, 0.701256},
+     {0.000691311, 0.000618011, 0.000388977}},
+    /* right_shoulder_yaw_link */
+    {12,
+     {0, -0.00624, -0.1032},
+     {1, 0, 0, 0},
+     Z,
+     0,
+     0.734,
+     {0.010773, 0.002949, -0.072009},
+     {0.687134, -0.0679942, -0.0964829, 0.716879},
+     {0.00106187, 0.00103217, 0.000400661}},
+    /* right_elbow_link */
+    {13,
+     {0.015783, 0, -0.080518},
+     {1, 0, 0, 0},
+     Y,
+     0.6,
+     0.6,
+     {0.064956, -0.004454, -0.010062},
+     {0.388129, 0.388821, 0.636132, 0.541765},
+     {0.000443035, 0.000421612, 0.000259353}},
+    /* right_wrist_roll_link */
+    {14,
+     {0.1, -0.00188791, -0.01},
+     {1, 0, 0, 0},
+     X,
+     0,
+     0.085445,
+     {0.0171394, -0.000537591, 4.8864e-07},
+     {0.411667, 0.575338, -0.411094, 0.574906},
+     {5.48211e-05, 4.96646e-05, 3.57798e-05}},
+    /* right_wrist_pitch_link */
+    {15,
+     {0.038, 0, 0},
+     {1, 0, 0, 0},
+     Y,
+     0,
+     0.48405,
+     {0.0229999, 0.00111685, -0.00111658},
+     {0.643608, 0.293036, 0.661363, 0.249998},
+     {0.000430353, 0.000429873, 0.000164648}},
+    /* right_wrist_yaw_link */
+    {16,
+     {0.046, 0, 0},
+     {1, 0, 0, 0},
+     Z,
+     0,
+     0.254576,
+     {0.0708244, -0.000191745, 0.00161742},
+     {0.493188, 0.468078, 0.526295, 0.510571},
+     {0.000646113, 0.000559993, 0.000147566}},
+};
+enum { PARTS = sizeof parts / sizeof *parts };
+
+/* Frames of the parts in the pelvis. */
+static void place_parts(double position[PARTS][3], double quaternion[PARTS][4]) {
+    for (int p = 0; p < PARTS; p++) {
+        const Part *part = &parts[p];
+        double joint[4] = {cos(0.5 * part->angle), 0, 0, 0}, body[4];
+        joint[1 + part->axis] = sin(0.5 * part->angle);
+        memcpy(body, part->quaternion, sizeof body);
+        mju_normalize4(body);
+        mju_mulQuat(quaternion[p], body, joint);
+        memcpy(position[p], part->position, sizeof part->position);
+        if (part->parent >= 0) {
+            double own[4];
+            memcpy(own, quaternion[p], sizeof own);
+            mju_mulQuat(quaternion[p], quaternion[part->parent], own);
+            mju_rotVecQuat(position[p], part->position, quaternion[part->parent]);
+            mju_addTo3(position[p], position[part->parent]);
+        }
+    }
+}
+
+/* Adds R diag(inertia) R^T + mass (|c|^2 1 - c c^T). */
+static void add_inertia(double tensor[9], const double turn[4], const double inertia[3],
+                        double mass, const double c[3]) {
+    double R[9];
+    mju_quat2Mat(R, turn);
+    for (int e = 0; e < 9; e++) {
+        const int i = e / 3, j = e % 3;
+        for (int k = 0; k < 3; k++) {
+            tensor[e] += R[3 * i + k] * inertia[k] * R[3 * j + k];
+        }
+        tensor[e] += mass * ((i == j) * mju_dot3(c, c) - c[i] * c[j]);
+    }
+}
+
+/* Mass, centre and inertia of the base against the sums over the published bodies. */
+static void the_upper_body_by_hand(void **unused) {
+    (void)unused;
+    double position[PARTS][3], quaternion[PARTS][4], mass = 0, center[3] = {0}, sum[9] = {0};
+    place_parts(position, quaternion);
+    double at[PARTS][3];
+    for (int p = 0; p < PARTS; p++) {
+        mju_rotVecQuat(at[p], parts[p].center, quaternion[p]);
+        mju_addTo3(at[p], position[p]);
+        mju_addToScl3(center, at[p], parts[p].mass);
+        mass += parts[p].mass;
+    }
+    mju_scl3(center, center, 1 / mass);
+    for (int p = 0; p < PARTS; p++) {
+        double own[4], turn[4], c[3];
+        memcpy(own, parts[p].turn, sizeof own);
+        mju_normalize4(own);
+        mju_mulQuat(turn, quaternion[p], own);
+        mju_sub3(c, at[p], center);
+        add_inertia(sum, turn, parts[p].inertia, parts[p].mass, c);
+    }
+    RobotSim *sim = new_sim(0.001);
+    const mjModel *m = robot_sim_model(sim);
+    const int base = mj_name2id(m, mjOBJ_BODY, "pelvis");
+    double got[9] = {0};
+    const double none[3] = {0};
+    add_inertia(got, m->body_iquat + 4 * base, m->body_inertia + 3 * base, 0, none);
+    assert_int_equal(PARTS, 18);
+    assert_int_equal(m->nbody, 2 + JOINTS); /* the world, the base, the links */
+    expect_near("mass of the base", m->body_mass[base], mass, 1e-9);
+    for (int k = 0; k < 3; k++) {
+        expect_near("its centre", m->body_ipos[3 * base + k], center[k], 1e-7);
+    }
+    for (int e = 0; e < 9; e++) {
+        expect_near("its inertia", got[e], sum[e], 1e-7);
+    }
+    expect_near("mass", robot_total_mass(robot), mass + 2 * (1.35 + 1.52 + 1.702 + 1.932 + 0.682),
+                1e-9);
+    print_message("base %.3f kg, centre %.4f %.4f %.4f m\n", mass, center[0], center[1], center[2]);
+    robot_sim_destroy(sim);
+}
+
+/* ---- geometry ---- */
+
+/* Where the feet are in the default pose: hip pitch -0.312, knee 0.669; the hip's body is tilted by
+ * 0.1749 rad, and the knee's back. */
+static void the_pose_by_hand(void **unused) {
+    (void)unused;
+    const double pitch = -0.312, knee = 0.669, tilt = 2 * atan2(0.0873386, 0.996179);
+    const double thigh = pitch - tilt, shank = pitch + knee;
+    const double x = -0.030465 * sin(pitch) + (0.025001 - 0.078273) * cos(thigh) -
+                     (0.12412 + 0.17734) * sin(thigh) - 0.30001 * sin(shank);
+    const double drop = 0.1027 + 0.030465 * cos(pitch) + (0.025001 - 0.078273) * sin(thigh) +
+                        (0.12412 + 0.17734) * cos(thigh) + 0.30001 * cos(shank) + 0.017558 + 0.035;
+    const double y = 0.064452 + 0.052 + 0.0021489 - 9.4445e-5;
+    assert_int_equal(robot_joints(robot), JOINTS);
+    assert_int_equal(robot_feet(robot), FEET);
+    expect_near("height", robot_stand_height(robot), drop, 1e-6);
+    RobotSim *sim = new_sim(0.001);
+    RobotState state = stand_state(stand, 0, 0.0);
+    RobotVariation nominal = robot_variation_nominal();
+    robot_sim_load(sim, &state, &nominal);
+    for (int f = 0; f < FEET; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        expect_near("foot's x", foot->position[0], x, 1e-6);
+        expect_near("foot's y", foot->position[1], f ? -y : y, 1e-6);
+        expect_near("sole's height", foot->sole_height, 0, 1e-9);
+        expect_near("level", foot->rotation[8], 1, 1e-9);
+    }
+    expect_near("feet apart", robot_sim_foot_distance(sim), 2 * y, 1e-6);
+    robot_sim_destroy(sim);
+}
+
+/* Efforts, speeds, and gains of a 10 Hz oscillator, twice critically damped, on the armature. */
+static void motors_and_gait(void **unused) {
+    (void)unused;
+    static const double effort[LEG] = {88, 139, 88, 139, 50, 50};
+    static const double speed[LEG] = {32, 20, 32, 20, 37, 37};
+    const double rate = 2 * 3.14159265358979 * 10;
+    RobotSim *sim = new_sim(0.001);
+    const mjModel *m = robot_sim_model(sim);
+    for (int i = 0; i < JOINTS; i++) {
+        const double armature = m->dof_armature[robot_joint_dof(robot)[i]];
+        expect_near("effort", robot_effort(robot)[i], effort[i % LEG], 1e-9);
+        expect_near("speed", robot_speed(robot)[i], speed[i % LEG], 1e-9);
+        expect_near("kp", robot_kp(robot)[i], armature * rate * rate, 0.05);
+        expect_near("kd", robot_kd(robot)[i], 4 * armature * rate, 0.01);
+        assert_int_equal(robot_joint_foot(robot)[i], i / LEG);
+        assert_int_equal(robot_mirror_joint(robot)[i], (i + LEG) % JOINTS);
+    }
+    expect_near("shift", fabs(robot_gait_offset(robot, 0) - robot_gait_offset(robot, 1)), 0.5, 0);
+    robot_sim_destroy(sim);
+}
+
+/* Mirrored angles put the other foot at the mirrored place. */
+static void the_mirror_image(void **unused) {
+    (void)unused;
+    RobotSim *sim = new_sim(0.001);
+    RobotVariation nominal = robot_variation_nominal();
+    double worst = 0;
+    for (uint32_t draw = 0; draw < 20; draw++) {
+        Random r = random_at(3, draw, 0);
+        RobotState state = stand_state(stand, 0, 0.0), image = state;
+        double position[FEET][3];
+        for (int i = 0; i < JOINTS; i++) {
+            state.qpos[7 + i] += random_uniform(&r, -0.25, 0.25);
+        }
+        for (int i = 0; i < JOINTS; i++) {
+            image.qpos[7 + robot_mirror_joint(robot)[i]] =
+                robot_mirror_sign(robot)[i] * state.qpos[7 + i];
+        }
+        robot_sim_load(sim, &state, &nominal);
+        for (int f = 0; f < FEET; f++) {
+            memcpy(position[f], robot_sim_foot(sim, f)->sole_center, sizeof position[f]);
+        }
+        robot_sim_load(sim, &image, &nominal);
+        for (int f = 0; f < FEET; f++) {
+            const double *other = robot_sim_foot(sim, robot_mirror_foot(robot, f))->sole_center;
+            for (int k = 0; k < 3; k++) {
+                worst = fmax(worst, fabs(position[f][k] - (k == 1 ? -1 : 1) * other[k]));
+            }
+        }
+    }
+    print_message("mirrored feet off by %.1e m\n", worst);
+    assert_true(worst < 1e-9);
+    robot_sim_destroy(sim);
+}
+
+/* ---- standing ---- */
+
+/* Four seconds. material: NULL for rigid ground. */
+static void stand_on(const char *name, const MildMaterial *material) {
+    RobotSim *sim = new_sim(0.0025);
+    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
+    assert_non_null(block);
+    MildGround *ground = mild_ground_init(block, robot_soles(robot), FEET);
+    MildMaterial any = mild_material_default();
+    MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
+    RobotVariation variation = robot_variation_nominal();
+    variation.rigid = material == NULL;
+    const double rest =
+        material ? mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot)) : 0;
+    RobotState state = stand_state(stand, 1, rest);
+    robot_sim_load(sim, &state, &variation);
+    double load = 0, depth = 0, speed = 0;
+    for (int i = 0; i < 1600; i++) {
+        double torque[JOINTS];
+        stand_torque(stand, sim, 1, torque);
+        assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
+        for (int f = 0; f < FEET && i >= 1200; f++) {
+            const RobotFoot *foot = robot_sim_foot(sim, f);
+            load += foot->force[2] / (9.81 * robot_total_mass(robot)) / 400;
+            depth += material ? foot->result.depth_mean / FEET / 400 : 0;
+        }
+    }
+    for (int k = 0; k < 6; k++) {
+        speed = fmax(speed, fabs(robot_sim_qvel(sim)[k]));
+    }
+    print_message("%-11s load %.5f, depth %5.1f of %5.1f mm, still %.1e\n", name, load, 1e3 * depth,
+                  1e3 * rest, speed);
+    expect_near("load", load, 1, 0.01);
+    expect_near("upright", robot_sim_base_rotation(sim)[8], 1, 0.005);
+    expect_near("depth", depth, rest, 0.15 * rest);
+    assert_true(speed < 0.02);
+    free(block);
+    robot_sim_destroy(sim);
+}
+
+static void stands_everywhere(void **unused) {
+    (void)unused;
+    stand_on("rigid", NULL);
+    for (int g = 0; g < mild_material_preset_count(); g++) {
+        MildMaterial material;
+        assert_true(mild_material_preset(mild_material_preset_name(g), &material));
+        stand_on(mild_material_preset_name(g), &material);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_upper_body_by_hand), cmocka_unit_test(the_pose_by_hand),
+        cmocka_unit_test(motors_and_gait),        cmocka_unit_test(the_mirror_image),
+        cmocka_unit_test(stands_everywhere),
+    };
+    return cmocka_run_group_tests(tests, setup, teardown);
+}
