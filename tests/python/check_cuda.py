@@ -6,6 +6,7 @@ import sys
 import time
 import unittest
 
+import numpy as np
 import torch
 
 import mild
@@ -97,6 +98,27 @@ class Numbers(unittest.TestCase):
 
     def test_map_of_labels(self):
         self.follow(512, 2)
+
+    def test_single_grounds(self):
+        """The same as grounds of the CPU in double, one a robot."""
+        batch, worst = make_batch(24), []
+        material = random_inputs(24, 0)["material"]
+        grounds = [mild.Ground(SOLES, mild.Terrain([MATERIALS[index]], height=0.01), DT) for index in material]
+        for step in range(4):
+            inputs, found = random_inputs(24, step) | {"material": material, "height": torch.full((24,), 0.01)}, new_outputs(batch)
+            del inputs["map_origin"]
+            batch.step(**there(inputs), **found, stream=stream())
+            for i, ground in enumerate(grounds):
+                for name in ("position", "rotation", "velocity", "inverse_inertia", "free_velocity"):
+                    getattr(ground, name)[:] = inputs[name][i].numpy()
+                ground.solve()
+                wrench = torch.from_numpy(np.hstack([ground.force, ground.torque])).flatten()
+                worst.append(((found["wrench"][i].cpu().flatten() - wrench).norm() / (wrench.norm() + 1)).item())
+                ground.advance()
+        worst.sort()
+        print(f"{DEVICE} and single grounds: median {worst[len(worst) // 2]:.1e}, worst {worst[-1]:.1e}")
+        self.assertLess(worst[len(worst) // 2], 1e-4)
+        self.assertLess(worst[len(worst) * 9 // 10], 1e-2)
 
     def test_solve_and_advance(self):
         """A step that is not kept may be repeated: the same bits. One that is kept leaves prints."""

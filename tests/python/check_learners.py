@@ -53,7 +53,9 @@ class RslRl(unittest.TestCase):
     def test_runner(self):
         env = rsl_rl.Env(16, config="configs/quick.ini", overrides=SHORT)
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            runner = OnPolicyRunner(env, {**CONFIG, "logger": "tensorboard"}, log_dir=folder, device="cpu")
+            symmetry = {"data_augmentation_func": "mild.rsl_rl:mirror", "use_mirror_loss": True, "mirror_loss_coeff": 1.0}
+            config = {**CONFIG, "logger": "tensorboard", "algorithm": {**CONFIG["algorithm"], "symmetry_cfg": symmetry}}
+            runner = OnPolicyRunner(env, config, log_dir=folder, device="cpu")
             before = [p.clone() for p in runner.alg.get_policy().parameters()]
             runner.learn(4, init_at_random_ep_len=True)
             after = list(runner.alg.get_policy().parameters())
