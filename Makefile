@@ -132,6 +132,7 @@ python-check: wheel
 	@build/python-venv/bin/pip install --quiet --disable-pip-version-check -r scripts/learners.txt
 	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mild-*.whl
 	@build/python-venv/bin/python tests/python/check_learners.py
+	@build/python-venv/bin/python tests/python/check_cuda.py
 
 clean:
 	rm -rf build

@@ -72,7 +72,8 @@ class Env(VecEnv):
 
     def mirror(self, obs=None, actions=None):
         """Left and right exchanged: the arguments with their mirror images below them, as rsl_rl's symmetry wants it. Only
-        the group "policy" is mirrored; use it with a critic that sees the same."""
+        the group "policy" is mirrored: enough for a mirror loss of an actor that sees it; data augmentation needs a critic
+        that sees it too. rsl_rl's configuration names the function: "data_augmentation_func": "mild.rsl_rl:mirror"."""
         if not hasattr(self, "_mirror"):
             pairs = self._envs.mirror()
             self._mirror = [(torch.tensor(index, device=self.device), torch.tensor(sign, device=self.device))
@@ -92,3 +93,8 @@ class Env(VecEnv):
         if self.device.type == "cuda":
             torch.cuda.synchronize(self.device)
         self._envs.close()
+
+
+def mirror(env, obs=None, actions=None):
+    """Env.mirror, in the form that rsl_rl's symmetry_cfg calls."""
+    return env.mirror(obs, actions)
