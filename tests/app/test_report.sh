@@ -69,6 +69,14 @@ rm other/config.ini
 expect 0 '' "$mild" report seed1 other --out again.html
 grep -q '<td class=n>100<' again.html || fail "the last complete row is not the last iteration"
 
+# runs alike whose configs name no seed
+for name in plain same; do
+    run $name 1 1
+    sed -i '/^seed/d' $name/config.ini
+done
+expect 0 '' "$mild" report plain same --out alike.html
+grep -qF 'plain (2 seeds)' alike.html || fail "runs without a seed are not one group"
+
 bad 'nowhere/log.csv: cannot read: No such file.*; name a run folder' "$mild" report nowhere
 bad 'no run given' "$mild" report
 bad 'seed1/config.ini is read' "$mild" report seed1 --out seed1/config.ini

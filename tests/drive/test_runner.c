@@ -261,6 +261,7 @@ static void late_states(void **unused) {
         assert_int_equal(target.mode, late ? PACKET_hold : PACKET_walk);
     }
     assert_true(report->late == 2 && report->holds == 2 && report->steps == 38);
+    assert_int_equal(report->lost, 0);
     for (uint32_t k = 40; k < 60; k++) {
         const StatePacket state = standing(k + 1, 0.01 * k);
         give(runner, &state, 0.01 * k + 0.035);
@@ -268,6 +269,7 @@ static void late_states(void **unused) {
     }
     assert_int_equal(runner_mode(runner), PACKET_damp);
     assert_non_null(strstr(report->why, "no state for 0.1"));
+    assert_true(report->late == 22 && report->lost == 0 && report->received == 60);
     runner_destroy(runner);
 }
 
