@@ -184,6 +184,8 @@ bad "192.0.2.1" "$mild" drive --listen 192.0.2.1:9870
 bad "no_such.safetensors" "$mild" drive --policy no_such.safetensors
 bad "is for robot sa01, not for go1" "$mild" drive --robot go1
 bad "/dev/input/none" "$mild" drive --gamepad /dev/input/none
+bad "/dev/null is no gamepad" "$mild" drive --gamepad /dev/null
+bad "\. is no gamepad" "$mild" drive --gamepad .
 bad "--ground needs --simulate" "$mild" drive --ground foam45
 bad "--drop needs --simulate" "$mild" drive --drop 0.1
 bad "--command is for the runner" "$mild" drive --simulate --command 0,0,0
