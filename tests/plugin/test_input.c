@@ -26,6 +26,8 @@ static mjModel *compile(const char *option, const char *configs, const char *flo
 
 #define OFF "contype='0' conaffinity='0'"
 #define FOOT CONFIG("feet", "foot")
+#define LEG "leg_of_a_robot_with_a_very_long_name_"
+#define LONG_NAME LEG LEG LEG LEG LEG
 
 /* The model must not compile, with a message that holds both words. */
 static void check_refused(const char *option, const char *configs, const char *word,
@@ -42,7 +44,9 @@ static void refuses_what_is_wrong(void **state) {
     (void)state;
     check_refused("", "", "no feet", "feet");
     check_refused("", CONFIG("feet", "fool"), "'fool'", "nearest is 'foot'");
-    check_refused("", CONFIG("feet", "foot foot foot foot foot"), "more than 4", "feet");
+    check_refused("", CONFIG("feet", "foot sole end pole world"), "more than 4", "feet");
+    check_refused("", CONFIG("feet", "foot sole foot"), "twice", "feet");
+    check_refused("", CONFIG("feet", "foot " LONG_NAME), "'leg_of_", "nearest is");
     check_refused("", CONFIG("feet", "pole"), "'pole'", "fixed to the world");
     check_refused("", CONFIG("feet", "world"), "'world'", "fixed to the world");
     check_refused("", FOOT CONFIG("sole", "bax"), "'bax'", "nearest is 'box'");
