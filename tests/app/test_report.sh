@@ -74,7 +74,7 @@ for name in plain same; do
     run $name 1 1
     sed -i '/^seed/d' $name/config.ini
 done
-expect 0 '' "$mild" report plain same --out alike.html
+expect 0 "" "$mild" report plain same seed2 --out alike.html
 grep -qF 'plain (2 seeds)' alike.html || fail "runs without a seed are not one group"
 
 bad 'nowhere/log.csv: cannot read: No such file.*; name a run folder' "$mild" report nowhere
