@@ -91,6 +91,17 @@ static void test_files(void **state) {
     assert_non_null(web_open(other, model_bytes));
     other->policy.actor.layers = 1000;
     assert_non_null(web_open(other, model_bytes));
+    int32_t *const numbers[] = {&other->policy.latent, &other->policy.estimates,
+                                &other->policy.feet_velocity, &other->shape.actions,
+                                &other->shape.observation};
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        memcpy(other, model, model_bytes);
+        *numbers[i] += 9;
+        assert_non_null(web_open(other, model_bytes));
+    }
+    memcpy(other, model, model_bytes);
+    other->policy.per_dimension = !other->policy.per_dimension;
+    assert_non_null(web_open(other, model_bytes));
     free(other);
     start(0, WEB_LEVEL, 1);
     assert_non_null(web_start(-1, WEB_LEVEL, 1));
