@@ -84,6 +84,10 @@ int cmd_export(int argc, char **argv) {
     if (!e.onnx && !e.c) {
         return cli_fail_text("export", "nothing to write; give --onnx FILE or --c FOLDER");
     }
+    const int bad = cli_refuse_dash("export", "onnx", e.onnx);
+    if (bad) {
+        return bad;
+    }
     MildError error = {0};
     return run_export(&e, &args, &error) == MILD_OK ? 0 : cli_fail("export", &error);
 }

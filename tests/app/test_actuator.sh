@@ -39,6 +39,7 @@ head -c 20000 motor.csv >short.csv
 bad "short.csv:[0-9]*: leg_.* is not a finite number" "$mild" actuator fit short.csv --out x.safetensors
 head -200 motor.csv >short.csv
 bad "100 of each are needed" "$mild" actuator fit short.csv --out x.safetensors
+bad "out: - is no file" "$mild" actuator fit motor.csv --out -
 bad "motor.csv" "$mild" actuator fit motor.csv --out motor.csv
 
 # the key

@@ -88,6 +88,7 @@ if [ "${RUNTIME:-}" ]; then # make export-check
 fi
 # of the wrong policy: noticed
 ! "$python" "$tests/test_onnx.py" - other.onnx noisy.csv >/dev/null 2>&1 || fail "another policy passes for the shipped one"
+bad "onnx: - is no file" "$mild" export --onnx -
 bad "No space left" "$mild" export --onnx /dev/full
 bad "no_such_folder" "$mild" export --onnx no_such_folder/walk.onnx --c new
 finish "what is written does what eval did"
