@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define STEP 0.1      /* [m/s, rad/s] of a key */
@@ -16,11 +17,13 @@
 
 static MildStatus open_gamepad(Input *input, const char *path, MildError *error) {
     uint32_t version;
+    struct stat about = {0};
     input->gamepad = open(path, O_RDONLY | O_NONBLOCK);
     if (input->gamepad < 0) {
         return mild_fail(error, MILD_ERROR_IO, "--gamepad: %.200s: %s", path, strerror(errno));
     }
-    if (ioctl(input->gamepad, JSIOCGVERSION, &version) != 0) {
+    fstat(input->gamepad, &about); /* a pipe may stand for the device */
+    if (!S_ISFIFO(about.st_mode) && ioctl(input->gamepad, JSIOCGVERSION, &version) != 0) {
         close(input->gamepad);
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--gamepad: %.200s is no gamepad; name a file as /dev/input/js0", path);
