@@ -176,8 +176,8 @@ class Memory(unittest.TestCase):
 
 class Misuse(unittest.TestCase):
     def test_arguments(self):
-        for keys, name in (({"overrides": {"task.vxx": 1}}, "task.vx"), ({"overrides": {"task.vx": "fast"}}, "task.vx"),
-                           ({"overrides": {"task.vx": object()}}, "task.vx"), ({"overrides": {"train.envs": 3}}, "train.envs"),
+        for keys, name in (({"overrides": 3}, "overrides"), ({"config": 0}, "config"), ({"overrides": {"task.vxx": 1}}, "task.vx"),
+                           ({"overrides": {"task.vx": "fast"}}, "task.vx"), ({"overrides": {"task.vx": object()}}, "task.vx"), ({"overrides": {"train.envs": 3}}, "train.envs"),
                            ({"config": "configs/none.ini"}, "none.ini"), ({"robot": "cat"}, "cat"), ({"observation": "all"}, "observation"),
                            ({"device": "tpu"}, "device"), ({"render_mode": "human"}, "render_mode"), ({"wheels": 4}, "wheels"),
                            ({"overrides": {"train.robots": "batch"}}, None)):

@@ -68,8 +68,9 @@ class Press(unittest.TestCase):
                                 ({"force": 1e6}, "force"), ({"tilt": 2}, "tilt")):
             with self.assertRaisesRegex(ValueError, name):
                 mild.press("grass", sole, **arguments)
-        with self.assertRaisesRegex(TypeError, "depth"):
-            mild.press("grass", sole, depth="deep")
+        for arguments, name in (({"depth": "deep"}, "depth"), ({"drop": "high"}, "drop"), ({"map": 3}, "map")):
+            with self.assertRaisesRegex(TypeError, name):
+                mild.press("grass", sole, **arguments)
 
 
 class Step(unittest.TestCase):
@@ -281,6 +282,7 @@ class Fit(unittest.TestCase):
         self.assertEqual(fit.parameters_["alpha"], truth.alpha)
         self.assertLess(np.abs(fit.predict(X) - y).max(), 0.01 * y.max())
         self.assertGreater(fit.score(X, y), 0.999)
+        self.assertTrue(np.isnan(fit.score(X[:1], y[:1])))
 
     def test_speed(self):
         """A fast press, with its speeds: the curve of the true numbers is its force, which no slow press has."""
@@ -307,7 +309,7 @@ class Fit(unittest.TestCase):
         for arguments, X, y, name in (({}, [[0.01]], [1], "rows"), ({}, [0.01], [1], "X"), ({}, [[0.01]] * 9, [1], "y"),
                                       ({"model": "rigid"}, [[0.01]] * 9, [1] * 9, "model"),
                                       ({"hold": {"mu": 1}}, [[0.01]] * 9, [1] * 9, "mu"), ({"plate": 3}, [[0.01]] * 9, [1] * 9, "plate"),
-                                      ({"hold": {"alpha": 90}}, [[0.01]] * 9, [1] * 9, "alpha"),
+                                      ({"hold": {"alpha": 90}}, [[0.01]] * 9, [1] * 9, "alpha"), ({"hold": 3}, [[0.01]] * 9, [1] * 9, "hold"),
                                       ({"fill": "mud"}, [[0.01]] * 9, [1] * 9, "mud"), ({}, [[np.nan]] * 9, [1] * 9, "finite"),
                                       ({}, "abc", [1], "X")):
             with self.assertRaisesRegex((ValueError, TypeError), name):
