@@ -175,6 +175,13 @@ assert run.wait(60) == 2
 assert "damped: by key or button" in run.stderr.read()
 PY
 
+# all that they wrote fits its schema, and the check sees what does not
+fits() { "$python" "$tests/../app/schema.py" "$tests/../../docs/schema/drive.json" "$@"; }
+fits ./*.json || fail "JSON that does not fit docs/schema/drive.json"
+sed 's/"lost":.*/"lost": 0.5,/' walk.json >bad.json && ! fits bad.json >/dev/null || fail "half a lost state fits the schema"
+sed 's/"fallen":.*/"fallen": 0,/' walk_robot.json >bad.json && ! fits bad.json >/dev/null || fail "0 is no boolean"
+rm bad.json
+
 bad "no answer from 127.0.0.1:9 for 0.2 s" "$mild" drive --simulate --connect 127.0.0.1:9 --patience 0.2 --json x.json
 bad "is not HOST:PORT" "$mild" drive --listen 9870
 bad "is not HOST:PORT" "$mild" drive --listen 127.0.0.1:99999
