@@ -337,7 +337,8 @@ class Fit(unittest.TestCase):
         for arguments, X, y, name in (({}, [[0.01]], [1], "rows"), ({}, [0.01], [1], "X"), ({}, [[0.01]] * 9, [1], "y"),
                                       ({"model": "rigid"}, [[0.01]] * 9, [1] * 9, "model"),
                                       ({"hold": {"mu": 1}}, [[0.01]] * 9, [1] * 9, "mu"), ({"plate": 3}, [[0.01]] * 9, [1] * 9, "plate"),
-                                      ({"hold": {"alpha": 90}}, [[0.01]] * 9, [1] * 9, "alpha"), ({"hold": 3}, [[0.01]] * 9, [1] * 9, "hold"),
+                                      ({"hold": {"alpha": 90}}, [[0.01]] * 9, [1] * 9, "alpha"),
+                                      ({"hold": 3}, [[0.01]] * 9, [1] * 9, "hold"),
                                       ({"fill": "mud"}, [[0.01]] * 9, [1] * 9, "mud"), ({}, [[np.nan]] * 9, [1] * 9, "finite"),
                                       ({}, "abc", [1], "X")):
             with self.assertRaisesRegex((ValueError, TypeError), name):

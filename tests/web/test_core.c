@@ -358,7 +358,7 @@ static double carried(void) {
     return sum * pow((double)view->pitch, 2);
 }
 
-/* The centre of pressure that is shown is that of the elements, whose forces are those on the feet. */
+/* The centre of pressure that is shown is that of the elements; the feet carry the weight. */
 static void test_soles(void **state) {
     const WebView *view = web_view();
     double worst = 0, load = 0;
