@@ -39,6 +39,8 @@ has '>gait</text>'
 ! grep -q '>none</text>' <<<"$page" || fail "a chart of a reward that is 0 throughout"
 ! grep -q '<td>terrain.seed' <<<"$(sed -n '/Between the runs/,/<\/table>/p' <<<"$page")" || fail "keys that do not differ are listed"
 alone=$(cat seed1/report.html)
+defaults=$(sed -n '/From the defaults/,/<\/table>/p' <<<"$alone")
+grep -q '<td>train.envs<td>64' <<<"$defaults" && ! grep -q '<td>terrain.seed' <<<"$defaults" || fail "differences from the defaults: $defaults"
 grep -q 'From the defaults' <<<"$alone" && ! grep -q 'Between the runs' <<<"$alone" || fail "differences of a single run"
 
 # The curves of the return: the mean of the seeds is 3 i, its band from i to 5 i, the other run is i / 2. So at the last iteration
@@ -53,11 +55,14 @@ def paths(title):
             for style, way in re.findall(r'<path (fill.*?) d="([^"]*)"', svg)]
 (band_color, band), (mean_color, mean), (other_color, other) = paths("return of an episode")
 assert band_color == mean_color != other_color
+chips = {name: color for color, name in re.findall(r'<i style="background:(#[0-9a-f]{6})"></i>([a-z0-9]+)<td', page)}
+assert chips == {"seed1": mean_color, "seed2": mean_color, "seed3": mean_color, "other": other_color}, chips
 assert len(mean) == len(other) == 101 and len(band) == 202
 rise = lambda p: mean[0][1] - p[1]
 assert abs(rise(mean[100]) - 6 * rise(other[100])) < 0.3, (mean[100], other[100])
 assert abs(rise(band[100]) - 5 / 3 * rise(mean[100])) < 0.2 and abs(rise(band[101]) - rise(mean[100]) / 3) < 0.2
 assert all(abs(rise(p) - i / 100 * rise(mean[100])) < 0.11 for i, p in enumerate(mean))
+assert rise(mean[100]) > 0 and mean[100][0] > mean[0][0]
 assert all(abs(p[0] - mean[0][0] - i / 100 * (mean[100][0] - mean[0][0])) < 0.11 for i, p in enumerate(mean))
 _, value = paths("value loss")[-1]  # 10^(-i / 50): a straight line where the axis is logarithmic
 assert all(abs(p[1] - value[0][1] - i / 100 * (value[100][1] - value[0][1])) < 0.11 for i, p in enumerate(value))
