@@ -76,7 +76,7 @@ static int standing_on(const mjModel *m, const Foot *foot, char *text, size_t si
             snprintf(text, size,
                      "%s of foot body '%.60s' still touches %s, which is rigid; set its contype "
                      "and conaffinity to 0, or exclude the two bodies",
-                     geom_name(m, g, a, sizeof a), mj_id2name(m, mjOBJ_BODY, foot->body),
+                     geom_name(m, g, a, sizeof a), foot_body_name(m, foot),
                      geom_name(m, w, b, sizeof b));
             return 1;
         }
@@ -108,8 +108,8 @@ int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size) {
             snprintf(text, size,
                      "the z axis of foot '%.60s' is not vertical in the pose of the file; its sole "
                      "lies across z: name a site whose z axis points up from the sole",
-                     mj_id2name(m, foot->site < 0 ? mjOBJ_BODY : mjOBJ_SITE,
-                                foot->site < 0 ? foot->body : foot->site));
+                     foot->site < 0 ? foot_body_name(m, foot)
+                                    : mj_id2name(m, mjOBJ_SITE, foot->site));
             return 1;
         }
     }

@@ -94,14 +94,11 @@ MildStatus plugin_def_read(const mjModel *m, int instance, PluginDef *def, MildE
 int plugin_word(const char **text, char *word, size_t size) {
     static const char space[] = " \t\r\n,";
     const char *start = *text + strspn(*text, space);
-    size_t length = strcspn(start, space);
-    if (length == 0 || length >= size) {
-        return 0;
-    }
-    memcpy(word, start, length);
-    word[length] = '\0';
+    const size_t length = strcspn(start, space), kept = length < size ? length : size - 1;
+    memcpy(word, start, kept);
+    word[kept] = '\0';
     *text = start + length;
-    return 1;
+    return length > 0;
 }
 
 /* ---- materials ---- */

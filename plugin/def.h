@@ -45,8 +45,8 @@ MildStatus plugin_def_materials(const mjModel *m, int instance, const PluginDef 
 MildStatus plugin_def_model(const mjModel *m, int instance, const PluginDef *def, MildModel *model,
                             MildError *error);
 
-/* Takes the next word from *text into `word` and moves *text behind it. Returns 0 at the end, or
- * when the word is longer than `size`. */
+/* Takes the next word from *text into `word` and moves *text behind it. Returns 0 at the end. A
+ * longer word is cut off, and then names nothing. */
 int plugin_word(const char **text, char *word, size_t size);
 
 #endif

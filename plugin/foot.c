@@ -38,9 +38,20 @@ static MildStatus unknown(const mjModel *m, int object, int count, const char *k
     return status;
 }
 
+const char *foot_body_name(const mjModel *m, const Foot *foot) {
+    const char *name = mj_id2name(m, mjOBJ_BODY, foot->body);
+    return name ? name : "";
+}
+
 static MildStatus add_foot(Foot *feet, int *count, int body, int site, MildError *error) {
     if (*count == MILD_FEET_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE, "more than %d feet", MILD_FEET_MAX);
+    }
+    for (int f = 0; f < *count; f++) {
+        if (feet[f].body == body && feet[f].site == site) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "feet: one body or site is there twice; name each foot once");
+        }
     }
     feet[(*count)++] = (Foot){.body = body, .site = site};
     return MILD_OK;
@@ -323,10 +334,9 @@ static MildStatus make_raster(const PluginDef *def, const double *outline, int p
 }
 
 static MildStatus no_shape(const mjModel *m, const Foot *foot, MildError *error) {
-    const char *name = mj_id2name(m, mjOBJ_BODY, foot->body);
     return mild_fail(error, MILD_ERROR_ARGUMENT,
                      "feet: body '%.60s' has no geom with a flat outline; set outline and sole_z",
-                     name ? name : "");
+                     foot_body_name(m, foot));
 }
 
 /* The sole under the geoms of the foot: the convex hull of what lies lowest. */
@@ -452,10 +462,9 @@ static MildStatus make_sole(const mjModel *m, const PluginDef *def, MildModel mo
     const int sphere = only_sphere(m, def, foot);
     MildStatus status;
     if (m->body_weldid[foot->body] == 0) {
-        const char *name = mj_id2name(m, mjOBJ_BODY, foot->body);
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "feet: body '%.60s' is fixed to the world; a foot must move",
-                         name ? name : "");
+                         foot_body_name(m, foot));
     }
     if (def->outline[0]) {
         status = sole_from_outline(def, f, foot, error);

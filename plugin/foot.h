@@ -22,6 +22,9 @@ MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, 
                        int *count, MildError *error);
 void feet_destroy(Foot *feet, int count);
 
+/* Name of the foot's body; empty when it has none. */
+const char *foot_body_name(const mjModel *m, const Foot *foot);
+
 /* Bool: the geom is on the foot's body and would meet a floor that the sole sinks into. */
 int foot_may_meet_floor(const mjModel *m, const Foot *foot, int geom);
 

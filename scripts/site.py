@@ -115,6 +115,9 @@ class Site:
 
 def main(folder):
     site = Site(pathlib.Path(folder))
+    empty = not site.folder.exists() or (site.folder.is_dir() and not any(site.folder.iterdir()))
+    if not empty and not (site.folder / "docs/api.html").exists():
+        sys.exit(f"site: {folder} holds something else than a site, which would be lost; name another folder")
     shutil.rmtree(folder, ignore_errors=True)
     site.make()
     found = list(site.faults())

@@ -11,6 +11,7 @@
 
 #define SEED 1
 #define FOOT_FAR 100.0 /* [m] above the ground: nothing touches */
+#define HEADS_MAX 512  /* numbers that the encoder gives */
 
 /* of the picture */
 #define WINDOW_STRIDE 32    /* cells that the window moves at once */
@@ -126,7 +127,7 @@ static const float *apply(const WebNetwork *network, const float *weight, const 
 void web_act(const float *history, float *action) {
     const WebPolicy *policy = &web.file->policy;
     const int observation = web.file->shape.observation, estimates = policy->estimates;
-    float head[512], theta[512], input[TASK_OBSERVATION_MAX + 512];
+    float head[HEADS_MAX], theta[HEADS_MAX], input[TASK_OBSERVATION_MAX + HEADS_MAX];
     const float *weight = apply(&policy->encoder, web.weight, history, head);
     weight = apply(&policy->modulation, weight, head + policy->feet_velocity, theta);
     memcpy(input, history + web.file->shape.history - observation,
@@ -592,6 +593,25 @@ const char *web_start(int ground, int relief, int prints) {
 
 /* ---- the file ---- */
 
+static int output_of(const WebNetwork *network) {
+    return network->width[network->layers];
+}
+
+/* Bool: each network takes what web_act gives it, and web_act has room for it. */
+static int policy_fits(const WebModel *file) {
+    const WebPolicy *policy = &file->policy;
+    const int estimates = policy->estimates, latent = policy->latent;
+    return estimates >= 0 && latent >= 0 && output_of(&policy->encoder) <= HEADS_MAX &&
+           output_of(&policy->encoder) == estimates + 2 * latent &&
+           policy->encoder.width[0] == file->shape.history &&
+           file->shape.history <= TASK_HISTORY_MAX &&
+           file->shape.observation <= TASK_OBSERVATION_MAX && policy->feet_velocity >= 0 &&
+           policy->feet_velocity + policy->modulation.width[0] <= estimates &&
+           output_of(&policy->modulation) == (policy->per_dimension ? 2 * latent : 2) &&
+           policy->actor.width[0] == file->shape.observation + estimates + latent &&
+           output_of(&policy->actor) == file->shape.actions;
+}
+
 static const char *check_file(const WebModel *file, size_t bytes) {
     if (bytes < sizeof *file || memcmp(file->magic, WEB_MAGIC, sizeof file->magic) != 0) {
         return "not a robot for this page";
@@ -605,8 +625,7 @@ static const char *check_file(const WebModel *file, size_t bytes) {
     const long modulation = network_numbers(&policy->modulation);
     const long actor = network_numbers(&policy->actor);
     if (encoder < 0 || modulation < 0 || actor < 0 ||
-        encoder + modulation + actor != file->weights ||
-        policy->encoder.width[0] != file->shape.history) {
+        encoder + modulation + actor != file->weights || !policy_fits(file)) {
         return "its policy does not fit together";
     }
     return NULL;
@@ -622,7 +641,8 @@ static int widest(const WebNetwork *network, int least) {
 static int open_policy(const WebModel *file) {
     const uint16_t *half = (const uint16_t *)(const void *)(file + 1);
     const WebPolicy *policy = &file->policy;
-    const int wide = widest(&policy->actor, widest(&policy->encoder, 64));
+    const int wide =
+        widest(&policy->actor, widest(&policy->modulation, widest(&policy->encoder, 0)));
     web.weight = malloc((size_t)file->weights * sizeof *web.weight);
     web.wide[0] = malloc((size_t)wide * sizeof(float));
     web.wide[1] = malloc((size_t)wide * sizeof(float));

@@ -25,6 +25,11 @@ const $ = (id) => document.getElementById(id);
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 const wrap = (a) => a - 2 * Math.PI * Math.round(a / (2 * Math.PI));
 const options = new URLSearchParams(location.search);
+// A number of the address below `count`, or another where it names none.
+const choice = (key, count, otherwise) => {
+  const number = options.has(key) ? Number(options.get(key)) : otherwise;
+  return Number.isInteger(number) && number >= 0 && number < count ? number : otherwise;
+};
 
 // ---- the core ----
 
@@ -304,8 +309,8 @@ class Camera {
 class App {
   constructor(core, picture) {
     Object.assign(this, { core, picture });
-    this.ground = Number(options.get('ground') ?? core.names.length); // all in stripes
-    this.shape = Number(options.get('shape') ?? LEVEL);
+    this.ground = choice('ground', core.names.length + 1, core.names.length); // all in stripes
+    this.shape = choice('shape', SHAPES.length, LEVEL);
     const looks = core.names.map((name) => GROUNDS[name][1]);
     while (looks.length < 10) looks.push([0.5, 0.5, 0.5]);
     picture.setWorld(core.parts, looks, core.view().cell, STRIPE);

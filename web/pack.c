@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/file.h"
 #include "config/experiment_keys.h"
 #include "crowd/text.h"
 #include "engine/read.h"
@@ -112,7 +113,10 @@ static MildStatus pack_picture(const Robot *robot, WebModel *file, MildError *er
         pack_geom(m, d, id, file);
     }
     mj_deleteData(d);
-    return MILD_OK;
+    return file->geoms < WEB_GEOMS_MAX
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_RANGE, "the robot has %d parts to draw or more",
+                           WEB_GEOMS_MAX);
 }
 
 /* ---- the policy ---- */
@@ -179,13 +183,18 @@ static uint16_t *pack_policy(Policy *policy, WebModel *file) {
 
 /* ---- the file ---- */
 
-static int write_file(const char *path, const WebModel *file, const uint16_t *weights) {
-    FILE *to = fopen(path, "wb");
-    const size_t count = (size_t)file->weights;
-    int good = to && fwrite(file, sizeof *file, 1, to) == 1 &&
-               fwrite(weights, sizeof *weights, count, to) == count;
-    good = to && fclose(to) == 0 && good;
-    return good ? 0 : stop("cannot write the file");
+static MildStatus write_file(const char *path, const WebModel *file, const uint16_t *weights,
+                             MildError *error) {
+    const size_t count = (size_t)file->weights * sizeof *weights;
+    char *whole = malloc(sizeof *file + count);
+    if (!whole) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    }
+    memcpy(whole, file, sizeof *file);
+    memcpy(whole + sizeof *file, weights, count);
+    MildStatus status = file_write(path, whole, sizeof *file + count, error);
+    free(whole);
+    return status;
 }
 
 static int pack(const Robot *robot, Policy *policy, const TaskDef *task, const char *path,
@@ -200,11 +209,12 @@ static int pack(const Robot *robot, Policy *policy, const TaskDef *task, const c
     MildStatus status = pack_model(robot, task, &file, error);
     status = status == MILD_OK ? pack_picture(robot, &file, error) : status;
     uint16_t *weights = status == MILD_OK ? pack_policy(policy, &file) : NULL;
-    const int code = weights             ? write_file(path, &file, weights)
-                     : status == MILD_OK ? stop("out of memory")
-                                         : stop(error->text);
+    if (status == MILD_OK) {
+        status = weights ? write_file(path, &file, weights, error)
+                         : mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    }
     free(weights);
-    return code;
+    return status == MILD_OK ? 0 : stop(error->text);
 }
 
 int main(int argc, char **argv) {

@@ -1,4 +1,5 @@
 """Opens the environments of the task (docs/task.md) for the adapters gym, rsl_rl and sb3."""
+import collections.abc
 import numbers
 import os
 import pathlib
@@ -13,6 +14,8 @@ def open_envs(num_envs, *, config=None, overrides=None, robot="sa01", device="cp
     "0 1"} or {"task.vx": (0, 1)}. robot: a name, or a folder with a slash. device: cpu, cuda or cuda:N. seed: 0 .. 2^64 - 1.
     threads: 0: one per core. Raises ValueError that names the key, ImportError without the module or its MuJoCo."""
     module = load()
+    if not isinstance(overrides, (collections.abc.Mapping, type(None))):
+        raise TypeError(f"overrides: a {type(overrides).__name__}, but it must be a dict of keys")
     keys = dict(overrides or {})
     for name, value in (("envs", num_envs), ("robot", robot), ("device", device), ("seed", seed), ("threads", threads)):
         if f"train.{name}" in keys:
@@ -37,6 +40,8 @@ def load():
 
 def config_path(config):
     """A file that is there, or one of the package; None stays None."""
+    if not isinstance(config, (str, os.PathLike, type(None))):
+        raise TypeError(f"config: a {type(config).__name__}, but it must be a file's name")
     if config is None or os.path.exists(config):
         return None if config is None else os.fspath(config)
     packaged = DATA / config

@@ -1,4 +1,5 @@
 """Parameters of a ground from a measured press, in the form of a scikit-learn estimator."""
+import collections.abc
 import math
 
 import numpy as np
@@ -56,6 +57,8 @@ class GroundFit:
         X, y = _table(X), _column("y", y)
         if len(X) != len(y):
             raise ValueError(f"y: {len(y)} numbers for {len(X)} rows of X")
+        if not isinstance(self.hold, (collections.abc.Mapping, type(None))):
+            raise TypeError(f"hold: a {type(self.hold).__name__}, but it must be a dict of numbers")
         sole, width = self._plate()
         found = _ground._fit(sole, width, _rows(X, y), self.model, dict(self.hold or {}), self.fill)
         values = found["parameters"]
@@ -77,10 +80,10 @@ class GroundFit:
         return _ground._fit_forces(self._plate()[0], self.material_, _rows(X, np.zeros(len(X))))
 
     def score(self, X, y):
-        """Coefficient of determination R^2 of predict(X) against y."""
+        """Coefficient of determination R^2 of predict(X) against y; NaN where all of y are the same."""
         y = _column("y", y)
         missed, spread = y - self.predict(X), y - y.mean()
-        return 1 - float(missed @ missed) / float(spread @ spread)
+        return 1 - float(missed @ missed) / float(spread @ spread) if spread.any() else math.nan
 
     def _plate(self):
         """The plate in the elements of the model, and its smaller side [m]."""

@@ -19,6 +19,8 @@ def attach(spec, feet, ground="sand_loose", *, name="ground", library=None, **at
         raise TypeError(f"spec: a {type(spec).__name__}, but it must be a mujoco.MjSpec")
     feet = [feet] if isinstance(feet, str) else list(feet)
     for foot in feet:
+        if not isinstance(foot, str) or any(c in foot for c in " \t\r\n,"):
+            raise ValueError(f"feet: {foot!r}, but it must be a name without blanks and commas; name a site instead")
         if spec.body(foot) is None and spec.site(foot) is None:
             raise ValueError(f"feet: the spec has no body or site '{foot}'")
     if not 1 <= len(feet) <= 4:
@@ -41,7 +43,7 @@ def load_plugin(library=None):
     if not path.is_file():
         raise RuntimeError(f"library: there is no plugin '{path}'; `make plugin` builds it")
     try:
-        mujoco.mj_loadPluginLibrary(str(path))
+        mujoco.mj_loadPluginLibrary(str(path.resolve()))
     except Exception as error:
         raise RuntimeError(f"library: {path} does not go with MuJoCo {mujoco.__version__}: {error}") from None
 

@@ -81,10 +81,7 @@ static void set_materials(Batch &batch, const nb::sequence &materials) {
 
 static void set_map(Batch &batch, nb::handle map) {
     Entered entered(batch.busy, "Batch.set_map");
-    if (!map.is_none() && !nb::isinstance<Map>(map)) {
-        raise(PyExc_TypeError, "map: it must be a Map or None");
-    }
-    const MildMap *made = map.is_none() ? nullptr : nb::cast<Map &>(map).made;
+    const MildMap *made = map_of(map);
     MildError error = {};
     check(mild_batch_set_map(open_batch(batch), made, &error), error);
     batch.has_map = made != nullptr;

@@ -45,6 +45,8 @@ numbers_of(nb::handle object, const char *name, int dimensions);
 /* Sets the fields of a struct from keyword arguments. kind: of the object, for messages. */
 void set_fields(const MildField *fields, int count, void *def, const nb::kwargs &values,
                 const char *kind);
+/* The map of a Map; NULL for None. */
+const MildMap *map_of(nb::handle object);
 /* A terrain or the material of a uniform one. */
 Terrain terrain_of(nb::handle object);
 /* Soles from a sequence. */

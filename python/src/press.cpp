@@ -97,13 +97,15 @@ static Press run(nb::handle material, const Sole &sole, nb::handle depth, nb::ha
     def.tilt = tilt;
     def.step = step > 0 ? std::fmax(step, 1e-7) : 0;
     def.print_tiles = tiles;
-    if (!map.is_none()) {
-        def.map = nb::cast<Map &>(map).made;
-    }
+    def.map = map_of(map);
     if (drop.is_none() && impact == 0) {
         set_path(&def, depth, force, speed, cycles, drag);
     } else if (depth.is_none() && force.is_none()) {
-        set_drop(&def, drop.is_none() ? 0 : nb::cast<double>(drop), impact, mass, seconds);
+        double height = 0;
+        if (!drop.is_none() && !nb::try_cast(drop, height)) {
+            raise(PyExc_TypeError, "drop: it must be a number or None");
+        }
+        set_drop(&def, height, impact, mass, seconds);
     } else {
         raise(PyExc_ValueError,
               "drop, impact: the path of a dropped body cannot be prescribed; leave out depth and "

@@ -202,10 +202,16 @@ static std::vector<MildMaterial> materials_of(nb::handle object) {
     return list;
 }
 
+const MildMap *map_of(nb::handle object) {
+    if (!object.is_none() && !nb::isinstance<Map>(object)) {
+        raise(PyExc_TypeError, "map: it must be a Map or None");
+    }
+    return object.is_none() ? nullptr : nb::cast<Map &>(object).made;
+}
+
 static void set_map(Terrain &terrain, nb::object map) {
     MildError error = {};
-    const MildMap *made = map.is_none() ? nullptr : nb::cast<Map &>(map).made;
-    check(mild_terrain_set_map(&terrain.terrain, made, &error), error);
+    check(mild_terrain_set_map(&terrain.terrain, map_of(map), &error), error);
     terrain.map = map;
 }
 
@@ -221,9 +227,6 @@ static Terrain make_terrain(nb::handle materials, nb::object map, double height,
     at.height = finite(height, "height");
     at.map_x = finite(x, "map_x");
     at.map_y = finite(y, "map_y");
-    if (!map.is_none() && !nb::isinstance<Map>(map)) {
-        raise(PyExc_TypeError, "map: it must be a Map or None");
-    }
     set_map(terrain, map);
     return terrain;
 }

@@ -24,6 +24,12 @@ int cli_fail_text(const char *command, const char *format, ...) {
     return CLI_EXIT_BAD_INPUT;
 }
 
+int cli_refuse_dash(const char *command, const char *option, const char *path) {
+    return path && strcmp(path, "-") == 0
+               ? cli_fail_text(command, "--%s: - is no file; name one", option)
+               : 0;
+}
+
 /* ---- help ---- */
 
 /* Prints the words of `text` in lines of HELP_WIDTH characters. A line end counts as a blank. The

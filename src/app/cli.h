@@ -87,6 +87,9 @@ CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *
 /* Chooses who prints a command's help; NULL: cli_parse itself, as text on standard output. */
 void cli_set_help(void (*print)(const CliCommand *command));
 
+/* For an output that no standard output takes: 0, or an error and its exit code when it is `-`. */
+int cli_refuse_dash(const char *command, const char *option, const char *path);
+
 /* Prints "mild COMMAND: text" to stderr. Returns CLI_EXIT_BAD_INPUT, so that `return cli_fail(...)`
  * ends a command. */
 int cli_fail(const char *command, const MildError *error);

@@ -156,6 +156,10 @@ static int cmd_fit_actuator(int argc, char **argv) {
     if (outcome != CLI_RUN) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
+    const int bad = cli_refuse_dash(command.name, "out", c.out);
+    if (bad) {
+        return bad;
+    }
     MildError error = {0};
     return run_fit(&c, &args, &error) == MILD_OK ? 0 : cli_fail("actuator fit", &error);
 }

@@ -11,7 +11,6 @@
 #include "app/report.h"
 #include "app/robots.h"
 #include "base/paths.h"
-#include "config/experiment_keys.h"
 #include "drive/drive.h"
 #include "drive/simulated.h"
 #include "eval/scene.h"
@@ -21,7 +20,6 @@
 typedef struct {
     const char *policy, *robot, *config, *json, *gamepad;
     const char *listen, *connect, *ground, *model; /* NULL: not given */
-    char config_robot[TRAIN_ROBOT_SIZE];
     CliNumbers command, delay;
     int simulate, no_keys, lockstep;
     TaskDef task;
@@ -293,24 +291,16 @@ static MildStatus check_options(const Drive *d, MildError *error) {
 }
 
 static MildStatus run_drive(Drive *d, const CliArgs *args, MildError *error) {
-    const ConfigSection section = {"task", task_fields, task_field_count, &d->task};
     MildStatus status = check_options(d, error);
-    if (status == MILD_OK) {
-        status = experiment_task(&d->task, 0, d->config_robot, d->config, error);
+    if (status != MILD_OK) {
+        return status;
     }
-    if (status == MILD_OK && !d->simulate) {
-        status = config_overrides(&section, 1, args->overrides, args->override_count, error);
-    }
-    Robot *robot = status == MILD_OK ? robots_open(d->robot, d->config_robot, error) : NULL;
-    if (status == MILD_OK && !robot) {
-        return error->status;
-    }
-    if (status == MILD_OK) {
-        status = task_def_check_robot(&d->task, robot, error);
-    }
-    if (status == MILD_OK) {
-        status = d->simulate ? run_simulated(d, robot, args, error) : run_runner(d, robot, error);
-    }
+    /* those of a simulated robot are read with its ground's */
+    Robot *robot =
+        robots_open_task(&d->task, d->config, d->simulate ? NULL : args, d->robot, error);
+    status = !robot        ? error->status
+             : d->simulate ? run_simulated(d, robot, args, error)
+                           : run_runner(d, robot, error);
     robot_destroy(robot);
     return status;
 }

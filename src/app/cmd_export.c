@@ -8,13 +8,10 @@
 #include "app/commands.h"
 #include "app/robots.h"
 #include "base/paths.h"
-#include "config/config.h"
-#include "config/experiment_keys.h"
 #include "control/learned.h"
 
 typedef struct {
     const char *policy, *robot, *config, *onnx, *c; /* onnx, c: NULL: not given */
-    char config_robot[TRAIN_ROBOT_SIZE];
     TaskDef task;
 } Exporting;
 
@@ -44,21 +41,8 @@ static MildStatus write_files(const Exporting *e, const Robot *robot, MildError 
 }
 
 static MildStatus run_export(Exporting *e, const CliArgs *args, MildError *error) {
-    MildStatus status = experiment_task(&e->task, 0, e->config_robot, e->config, error);
-    const ConfigSection section = {"task", task_fields, task_field_count, &e->task};
-    if (status == MILD_OK) {
-        status = config_overrides(&section, 1, args->overrides, args->override_count, error);
-    }
-    Robot *robot = status == MILD_OK ? robots_open(e->robot, e->config_robot, error) : NULL;
-    if (status == MILD_OK && !robot) {
-        return error->status;
-    }
-    if (status == MILD_OK) {
-        status = task_def_check_robot(&e->task, robot, error);
-    }
-    if (status == MILD_OK) {
-        status = write_files(e, robot, error);
-    }
+    Robot *robot = robots_open_task(&e->task, e->config, args, e->robot, error);
+    MildStatus status = robot ? write_files(e, robot, error) : error->status;
     robot_destroy(robot);
     return status;
 }
@@ -99,6 +83,10 @@ int cmd_export(int argc, char **argv) {
     }
     if (!e.onnx && !e.c) {
         return cli_fail_text("export", "nothing to write; give --onnx FILE or --c FOLDER");
+    }
+    const int bad = cli_refuse_dash("export", "onnx", e.onnx);
+    if (bad) {
+        return bad;
     }
     MildError error = {0};
     return run_export(&e, &args, &error) == MILD_OK ? 0 : cli_fail("export", &error);

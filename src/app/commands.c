@@ -19,30 +19,42 @@ const char commands_examples[] =
     "  mild play --policy policies/mild.safetensors --ground sand_loose --video walk.mp4\n"
     "  mild press --ground foam45 --depth 0.03\n";
 
+static const char *const actuator_parts[] = {"fit", "log", NULL};
+
 const AppCommand commands[] = {
-    {"train", cmd_train, "train a walking policy on soft ground"},
-    {"eval", cmd_eval, "measure how a policy walks on several grounds and at several speeds"},
-    {"play", cmd_play, "watch a policy walk, in a window or as a video"},
-    {"press", cmd_press, "press a plate or a sole into a ground and record the force"},
-    {"fit", cmd_fit, "find the parameters of a ground from recorded presses"},
-    {"actuator", cmd_actuator, "fit a network to logs of a robot's motors"},
-    {"export", cmd_export, "write a policy as an ONNX graph or as C, to run it elsewhere"},
-    {"drive", cmd_drive, "run a policy for a robot over UDP, or be that robot, simulated"},
-    {"report", cmd_report, "draw the curves of training runs on one page"},
-    {"bench", cmd_bench, "measure speed and memory on this machine"},
-    {"info", cmd_info, "list grounds, models, config keys, versions and devices"},
-    {"web", cmd_web, "serve the walk in a browser that `make web` builds"},
+    {"train", cmd_train, "train a walking policy on soft ground", NULL},
+    {"eval", cmd_eval, "measure how a policy walks on several grounds and at several speeds", NULL},
+    {"play", cmd_play, "watch a policy walk, in a window or as a video", NULL},
+    {"press", cmd_press, "press a plate or a sole into a ground and record the force", NULL},
+    {"fit", cmd_fit, "find the parameters of a ground from recorded presses", NULL},
+    {"actuator", cmd_actuator, "fit a network to logs of a robot's motors", actuator_parts},
+    {"export", cmd_export, "write a policy as an ONNX graph or as C, to run it elsewhere", NULL},
+    {"drive", cmd_drive, "run a policy for a robot over UDP, or be that robot, simulated", NULL},
+    {"report", cmd_report, "draw the curves of training runs on one page", NULL},
+    {"bench", cmd_bench, "measure speed and memory on this machine", NULL},
+    {"info", cmd_info, "list grounds, models, config keys, versions and devices", NULL},
+    {"web", cmd_web, "serve the walk in a browser that `make web` builds", NULL},
 };
 const int command_count = sizeof commands / sizeof *commands;
 _Static_assert(sizeof commands / sizeof *commands <= COMMANDS_MAX, "main has room for their names");
 
+/* part: a first word, or NULL for the command itself. */
+static void describe(const AppCommand *command, const char *part) {
+    char name[16], word[16], help[] = "--help";
+    char *whole[] = {name, help, NULL}, *one[] = {name, word, help, NULL};
+    snprintf(name, sizeof name, "%s", command->name);
+    snprintf(word, sizeof word, "%s", part ? part : "");
+    command->run(part ? 3 : 2, part ? one : whole);
+}
+
 void commands_describe(void (*print)(const CliCommand *command)) {
+    cli_set_help(print);
     for (int i = 0; i < command_count; i++) {
-        char name[16], help[] = "--help";
-        char *words[] = {name, help, NULL};
-        snprintf(name, sizeof name, "%s", commands[i].name);
-        cli_set_help(print);
-        commands[i].run(2, words);
+        const char *const *part = commands[i].parts;
+        describe(&commands[i], NULL);
+        for (; part && *part; part++) {
+            describe(&commands[i], *part);
+        }
     }
     cli_set_help(NULL);
 }

@@ -9,6 +9,7 @@ typedef struct {
     const char *name;
     int (*run)(int argc, char **argv);
     const char *help;
+    const char *const *parts; /* first words with a help of their own, then NULL; NULL: none */
 } AppCommand;
 enum { COMMANDS_MAX = 32 };
 extern const AppCommand commands[];
@@ -17,7 +18,7 @@ extern const int command_count;
 /* What the program says of itself, for its help and its man page: whole lines each. */
 extern const char commands_about[], commands_exit[], commands_examples[];
 
-/* Gives the description of every command to `print`, in order. */
+/* Gives the description of every command and of its parts to `print`, in order. */
 void commands_describe(void (*print)(const CliCommand *command));
 
 /* Standard output gets the man page, in roff; or the completion, for bash and zsh. Return the exit

@@ -23,10 +23,10 @@ static const char head[] =
     "\n"
     "_mild() {\n"
     "    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]}\n"
-    "    local flags= topics= files= keys= choices= prefix=\n"
-    "    local command=${COMP_WORDS[1]}\n"
+    "    local flags= topics= files= keys= choices= prefix= command=\n"
     "    COMPREPLY=()\n"
-    "    [[ $COMP_CWORD -gt 1 ]] || command=\n"
+    "    [[ $COMP_CWORD -lt 2 ]] || command=\"${COMP_WORDS[1]} \"\n"
+    "    [[ $COMP_CWORD -lt 3 ]] || command+=\"${COMP_WORDS[2]} \"\n"
     "    if [[ $word == '=' ]]; then # --option=, which the shell takes apart\n"
     "        word=\n"
     "    elif [[ $before == '=' ]]; then\n"
@@ -130,8 +130,9 @@ static void print_overrides(const CliCommand *command) {
     }
 }
 
+/* Of a part such as `actuator fit` after those of its command, in whose place they come. */
 static void print_command(const CliCommand *command) {
-    printf("    %s)\n        flags='", command->name);
+    printf("    if [[ $command == '%s '* ]]; then\n        flags='", command->name);
     print_options(command, 0);
     printf("--help'\n        files='");
     print_options(command, 1);
@@ -139,24 +140,22 @@ static void print_command(const CliCommand *command) {
     for (int i = 0; i < command->word_count; i++) {
         printf("%s ", command->words[i].name);
     }
-    printf("'\n");
+    printf("'\n        keys='");
     if (command->overrides) {
-        printf("        keys='");
         print_overrides(command);
-        printf("'\n");
     }
-    printf("        ;;\n");
+    printf("'\n    fi\n");
 }
 
 int completion_print(void) {
     fputs(head, stdout);
-    printf("    case $command in\n    '')\n        flags='--help --version' topics='");
+    printf("    if [[ -z $command ]]; then\n        flags='--help --version' topics='");
     for (int i = 0; i < command_count; i++) {
         printf("%s%s", i ? " " : "", commands[i].name);
     }
-    printf("'\n        ;;\n");
+    printf("'\n    fi\n");
     commands_describe(print_command);
-    printf("    esac\n    case $before in\n");
+    printf("    case $before in\n");
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         printf("    --%s) choices='", values[i].option);
         values[i].print();

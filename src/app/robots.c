@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "app/cli.h"
 #include "config/experiment_keys.h"
 #include "control/controller.h"
 #include "crowd/crowd.h"
@@ -12,6 +11,22 @@ enum { LINE = 100 }; /* characters */
 
 Robot *robots_open(const char *option, const char *otherwise, MildError *error) {
     return robot_open(option ? option : otherwise, error);
+}
+
+Robot *robots_open_task(TaskDef *task, const char *config, const CliArgs *args, const char *option,
+                        MildError *error) {
+    char named[TRAIN_ROBOT_SIZE];
+    const ConfigSection section = {"task", task_fields, task_field_count, task};
+    MildStatus status = experiment_task(task, 0, named, config, error);
+    if (status == MILD_OK && args) {
+        status = config_overrides(&section, 1, args->overrides, args->override_count, error);
+    }
+    Robot *robot = status == MILD_OK ? robots_open(option, named, error) : NULL;
+    if (robot && task_def_check_robot(task, robot, error) != MILD_OK) {
+        robot_destroy(robot);
+        return NULL;
+    }
+    return robot;
 }
 
 MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error) {

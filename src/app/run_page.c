@@ -382,9 +382,10 @@ static void write_value(const Page *page, const char *value) {
 static void write_group_value(const Page *page, int group, const char *key) {
     write_value(page, value_of(page, group, key));
     for (int i = page->first[group] + 1; i < page->count; i++) {
-        if (page->group[i] == group && strcmp(key, "train.seed") == 0) {
+        const char *value = settings_find(&page->runs[i].settings, key);
+        if (page->group[i] == group && strcmp(key, "train.seed") == 0 && value) {
             fputs(", ", page->html);
-            chart_write_text(settings_find(&page->runs[i].settings, key), page->html);
+            chart_write_text(value, page->html);
         }
     }
 }

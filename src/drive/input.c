@@ -5,7 +5,10 @@
 #include <linux/joystick.h>
 #include <math.h>
 #include <poll.h>
+#include <stdint.h>
 #include <string.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define STEP 0.1      /* [m/s, rad/s] of a key */
@@ -13,10 +16,19 @@
 #define DEAD_ZONE 0.1 /* [-] of a stick at rest */
 
 static MildStatus open_gamepad(Input *input, const char *path, MildError *error) {
+    uint32_t version;
+    struct stat about = {0};
     input->gamepad = open(path, O_RDONLY | O_NONBLOCK);
-    return input->gamepad >= 0
-               ? MILD_OK
-               : mild_fail(error, MILD_ERROR_IO, "--gamepad: %.200s: %s", path, strerror(errno));
+    if (input->gamepad < 0) {
+        return mild_fail(error, MILD_ERROR_IO, "--gamepad: %.200s: %s", path, strerror(errno));
+    }
+    fstat(input->gamepad, &about); /* a pipe may stand for the device */
+    if (!S_ISFIFO(about.st_mode) && ioctl(input->gamepad, JSIOCGVERSION, &version) != 0) {
+        close(input->gamepad);
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--gamepad: %.200s is no gamepad; name a file as /dev/input/js0", path);
+    }
+    return MILD_OK;
 }
 
 /* Keys one by one and without an echo; Ctrl-C stays a signal. */
@@ -72,8 +84,8 @@ static int take_key(Input *input, char key) {
 /* Axes 1 and 0 of the left stick: forward and sideways; axis 3 of the right one: turn. Button 1:
  * damp. */
 static int take_event(Input *input, const struct js_event *event) {
-    static const int parts[4] = {1, 0, -1,
-                                 2}; /* of the command, by axis; sticks count right and down */
+    /* of the command, by axis; sticks count right and down */
+    static const int parts[4] = {1, 0, -1, 2};
     const int kind = event->type & ~JS_EVENT_INIT;
     if (kind == JS_EVENT_AXIS && event->number < 4 && parts[event->number] >= 0) {
         const int part = parts[event->number];

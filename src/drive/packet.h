@@ -7,7 +7,7 @@
  *    6  joints n
  *    7  mode: a PacketMode
  *    8  sequence: counts the sender's packets
- *   12  answers: sequence of the newest packet of the other kind, 0: none yet
+ *   12  answers: sequence of the newest packet of the other kind that was used, 0: none yet
  *   16  time [us] of the sender's own clock, 64 bits
  *   24  state: quaternion w x y z, angular velocity 3, angles n, speeds n
  *       target: angles n, kp n, kd n, torque limits n

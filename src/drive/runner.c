@@ -13,7 +13,8 @@ struct Runner {
     Controller controller;
     TaskEnv *env; /* its sensors are packets, its physics is elsewhere */
     PacketMode mode;
-    StatePacket state; /* the newest */
+    StatePacket state; /* the newest that was in time */
+    uint32_t newest;   /* sequence of the newest, also of one that was late */
     int joints;
     int fresh;           /* bool: the policy has not seen it */
     int peer_ended;      /* bool */
@@ -101,7 +102,7 @@ PacketFault runner_take(Runner *r, const uint8_t *bytes, size_t size, double now
         return fault;
     }
     r->peer_ended = r->peer_ended || state.mode == PACKET_end;
-    const int32_t ahead = (int32_t)(state.sequence - r->state.sequence);
+    const int32_t ahead = (int32_t)(state.sequence - r->newest);
     const int late = is_late(r, &state, now);
     const int first = report->received++ == 0;
     if (!first && ahead <= 0) {
@@ -109,6 +110,7 @@ PacketFault runner_take(Runner *r, const uint8_t *bytes, size_t size, double now
         return fault;
     }
     report->lost += first ? 0 : ahead - 1;
+    r->newest = state.sequence;
     if (late) {
         report->late++;
         return fault;

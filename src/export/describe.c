@@ -27,7 +27,7 @@ static void add_numbers(Description *d, const char *key, const double *numbers, 
 static void add_joint_names(Description *d, const Robot *robot) {
     char *value = d->value[d->count];
     size_t used = 0;
-    for (int i = 0; i < robot_joints(robot) && used < DESCRIBE_VALUE; i++) {
+    for (int i = 0; i < robot_joints(robot); i++) {
         used += (size_t)snprintf(value + used, DESCRIBE_VALUE - used, "%s%s", i ? "," : "",
                                  robot_joint_name(robot, i));
     }

@@ -3,8 +3,13 @@
 #define EXPORT_DESCRIBE_H
 
 #include "export/export.h"
+#include "robot/def.h"
 
-enum { DESCRIBE_MAX = 40, DESCRIBE_KEY = 32, DESCRIBE_VALUE = 1024 };
+enum {
+    DESCRIBE_MAX = 40,
+    DESCRIBE_KEY = 32,
+    DESCRIBE_VALUE = ROBOT_JOINTS_MAX * ROBOT_NAME_SIZE /* the names of all joints */
+};
 
 /* Lists are separated by commas, joints in the order of every vector. Names are those that other
  * exporters of walking policies use, where they have one. */

@@ -6,7 +6,7 @@ import re
 import sys
 
 REMARKS = {"$schema", "$defs", "title", "description"}
-TYPES = {"object": dict, "array": list, "string": str, "number": (int, float), "integer": int}
+TYPES = {"object": dict, "array": list, "string": str, "number": (int, float), "integer": int, "boolean": bool}
 
 
 def fits(value, schema, root):
@@ -17,7 +17,8 @@ def faults(value, schema, root, where):
     """Yields what is wrong with a value."""
     checks = {
         "$ref": lambda ref: faults(value, resolve(root, ref), root, where),
-        "type": lambda name: () if isinstance(value, TYPES[name]) and not isinstance(value, bool) else [f"{where}: no {name}"],
+        "type": lambda name: () if isinstance(value, TYPES[name]) and isinstance(value, bool) == (name == "boolean")
+        else [f"{where}: no {name}"],
         "minimum": lambda least: () if value >= least else [f"{where}: below {least}"],
         "pattern": lambda form: () if re.search(form, value) else [f"{where}: not of the form {form}"],
         "minItems": lambda least: () if len(value) >= least else [f"{where}: fewer than {least} items"],

@@ -18,6 +18,9 @@ expect 0 '12 s, 0 falls, written: motor.csv' "$mild" actuator log --out motor.cs
 expect 0 '6 s, .* falls' "$mild" actuator log --out go1.csv --seconds 6 --robot go1 --controller zero --seed 2
 [ "$(wc -l <motor.csv)" = 4801 ] && [ "$(head -1 motor.csv | tr ',' '\n' | wc -l)" = 37 ] || fail "rows or columns of motor.csv"
 "$mild" actuator log --out - --seconds 12 2>/dev/null | cmp -s - motor.csv || fail "the same seed, another log"
+for option in '' --shake --delay --coulomb --viscous; do # each does something, and something else than the others
+    "$mild" actuator log --out - --seconds 1 ${option:+$option 0.015} 2>/dev/null | md5sum
+done | sort -u | wc -l | grep -x 5 >/dev/null || fail "an option of log does what another does, or nothing"
 bad "outside" "$mild" actuator log --out x.csv --peak 0
 bad "policy is for robot sa01\|robot" "$mild" actuator log --out x.csv --robot go1
 bad "cannot be written" "$mild" actuator log --out none/x.csv
@@ -39,6 +42,7 @@ head -c 20000 motor.csv >short.csv
 bad "short.csv:[0-9]*: leg_.* is not a finite number" "$mild" actuator fit short.csv --out x.safetensors
 head -200 motor.csv >short.csv
 bad "100 of each are needed" "$mild" actuator fit short.csv --out x.safetensors
+bad "out: - is no file" "$mild" actuator fit motor.csv --out -
 bad "motor.csv" "$mild" actuator fit motor.csv --out motor.csv
 
 # the key

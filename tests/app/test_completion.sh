@@ -24,15 +24,19 @@ plain=$(sed 's/\\-/-/g; s/\\f[BIR]//g; s/\\&//g' mild.1)
 commands=$("$mild" --help | sed -n '/^commands:/,/^$/s/^  \([a-z]*\) .*/\1/p')
 [ "$(wc -w <<<"$commands")" -ge 8 ] || fail "commands: $commands"
 offers "$(echo $commands)" mild ''
-for command in $commands; do
+parts=$("$mild" actuator --help | sed -n '/^first word:/,/^$/s/^  \([a-z]*\) .*/\1/p')
+[ "$(wc -w <<<"$parts")" -ge 2 ] || fail "parts of actuator: $parts"
+offers "$(echo $parts)" mild actuator ''
+while read -ra words; do
+    command=${words[*]}
     grep -q "^\.SS mild $command$" mild.1 || fail "man: no mild $command"
-    options=$("$mild" "$command" --help | sed -n '/^options:/,/^[a-z]*:$/s/^  \(--[a-z-]*\).*/\1/p')
+    options=$("$mild" "${words[@]}" --help | sed -n '/^options:/,/^[a-z]*:$/s/^  \(--[a-z-]*\).*/\1/p')
     [[ $command = info || $command = actuator ]] || [ "$(wc -w <<<"$options")" -ge 2 ] || fail "options of $command: $options"
-    offers "$(echo $options)" mild "$command" --
+    offers "$(echo $options)" mild "${words[@]}" --
     for option in $options; do
         [ "$option" = --help ] || sed -n "/^.SS mild $command$/,/^.S[SH]/p" <<<"$plain" | grep -q "^$option\b" || fail "man: no $command $option"
     done
-done
+done < <(printf '%s\n' $commands; printf 'actuator %s\n' $parts)
 topics=$("$mild" info --help | sed -n '/^topics:/,/^$/s/^  \([a-z]*\) .*/\1/p')
 [ "$(wc -w <<<"$topics")" -ge 8 ] || fail "topics: $topics"
 offers "$(echo $topics)" mild info ''

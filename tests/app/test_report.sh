@@ -15,7 +15,8 @@ run seed3 3 5
 run other 1 0.5 '<128>'
 printf '0.1.0 & more\nmild train\n' >seed1/version.txt
 cat >seed2/eval.json <<'END'
-{"rows": [{"ground": "sand_loose", "speed": 0.6, "trials": 10, "success": 9, "velocity": 0.59, "cot": 0.7, "penetration": 0.074}]}
+{"rows": [{"ground": "sand_loose", "speed": 0.6, "trials": 10, "success": 9, "velocity": 0.59, "cot": 0.7, "torque_max": 81.4,
+    "clearance": 0.052, "penetration": 0.074, "drift": 0.0032}]}
 END
 printf 'ten bytes!' >seed1/small.mp4
 head -c 4194305 /dev/zero >'other/big one.mp4'
@@ -28,7 +29,8 @@ page=$(cat pages/page.html)
 ! grep -qE '(src|href)="?(http|//)|<script|<link|@import|url\(' <<<"$page" || fail "the page needs other files"
 has() { grep -qF -- "$1" <<<"$page" || fail "the page has not: $1"; }
 has '0.1.0 &amp; more'
-has '<td>sand_loose<td class=n>9 of 10<td class=n>0.60<td class=n>0.59<td class=n>0.70<td class=n><td class=n><td class=n>74<td'
+has '<td>sand_loose<td class=n>9 of 10<td class=n>0.60<td class=n>0.59<td class=n>0.70<td class=n>81<td class=n>52<td class=n>74<td class=n>3'
+has '<td class=n>100<td class=n>97.50<' # iterations, and the mean return over the last six rows
 has "src=\"data:video/mp4;base64,$(printf 'ten bytes!' | base64)\""
 has 'src="../other/big%20one.mp4"'
 has '<tr><td>train.envs<td>64<td>&lt;128&gt;<td>' # default: whatever it is
@@ -37,6 +39,8 @@ has '>gait</text>'
 ! grep -q '>none</text>' <<<"$page" || fail "a chart of a reward that is 0 throughout"
 ! grep -q '<td>terrain.seed' <<<"$(sed -n '/Between the runs/,/<\/table>/p' <<<"$page")" || fail "keys that do not differ are listed"
 alone=$(cat seed1/report.html)
+defaults=$(sed -n '/From the defaults/,/<\/table>/p' <<<"$alone")
+grep -q '<td>train.envs<td>64' <<<"$defaults" && ! grep -q '<td>terrain.seed' <<<"$defaults" || fail "differences from the defaults: $defaults"
 grep -q 'From the defaults' <<<"$alone" && ! grep -q 'Between the runs' <<<"$alone" || fail "differences of a single run"
 
 # The curves of the return: the mean of the seeds is 3 i, its band from i to 5 i, the other run is i / 2. So at the last iteration
@@ -51,11 +55,14 @@ def paths(title):
             for style, way in re.findall(r'<path (fill.*?) d="([^"]*)"', svg)]
 (band_color, band), (mean_color, mean), (other_color, other) = paths("return of an episode")
 assert band_color == mean_color != other_color
+chips = {name: color for color, name in re.findall(r'<i style="background:(#[0-9a-f]{6})"></i>([a-z0-9]+)<td', page)}
+assert chips == {"seed1": mean_color, "seed2": mean_color, "seed3": mean_color, "other": other_color}, chips
 assert len(mean) == len(other) == 101 and len(band) == 202
 rise = lambda p: mean[0][1] - p[1]
 assert abs(rise(mean[100]) - 6 * rise(other[100])) < 0.3, (mean[100], other[100])
 assert abs(rise(band[100]) - 5 / 3 * rise(mean[100])) < 0.2 and abs(rise(band[101]) - rise(mean[100]) / 3) < 0.2
 assert all(abs(rise(p) - i / 100 * rise(mean[100])) < 0.11 for i, p in enumerate(mean))
+assert rise(mean[100]) > 0 and mean[100][0] > mean[0][0]
 assert all(abs(p[0] - mean[0][0] - i / 100 * (mean[100][0] - mean[0][0])) < 0.11 for i, p in enumerate(mean))
 _, value = paths("value loss")[-1]  # 10^(-i / 50): a straight line where the axis is logarithmic
 assert all(abs(p[1] - value[0][1] - i / 100 * (value[100][1] - value[0][1])) < 0.11 for i, p in enumerate(value))
@@ -68,6 +75,14 @@ printf '101,7' >>seed1/log.csv
 rm other/config.ini
 expect 0 '' "$mild" report seed1 other --out again.html
 grep -q '<td class=n>100<' again.html || fail "the last complete row is not the last iteration"
+
+# runs alike whose configs name no seed
+for name in plain same; do
+    run $name 1 1
+    sed -i '/^seed/d' $name/config.ini
+done
+expect 0 "" "$mild" report plain same seed2 --out alike.html
+grep -qF 'plain (2 seeds)' alike.html || fail "runs without a seed are not one group"
 
 bad 'nowhere/log.csv: cannot read: No such file.*; name a run folder' "$mild" report nowhere
 bad 'no run given' "$mild" report

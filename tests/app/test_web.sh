@@ -24,6 +24,7 @@ for _ in $(seq 100); do
 done
 port=$(sed -n 's|.*http://127.0.0.1:\([0-9]*\)/.*|\1|p' said)
 [ -n "$port" ] || fail "no address in: $(cat said)"
+(exec 3<>"/dev/tcp/127.0.0.2/$port") 2>/dev/null && fail "it listens at other addresses than 127.0.0.1"
 bad "try --port 0" "$mild" web --folder page --port "$port"
 
 # ask REQUEST: the answer's head in `head`, the rest in `body`.

@@ -58,6 +58,14 @@ holds walk.json steps 'x >= 500 && x <= 504'
 holds walk.json lost 'x == 0'
 holds walk.json end 'x == "robot"'
 [ "$(value walk.json count | head -1)" -ge 500 ] || fail "wake-ups: $(value walk.json count)"
+"$python" - <<'PY' || fail "times: $(cat walk.json)"
+import json
+run = json.load(open("walk.json", encoding="utf-8"))
+for name in ("wakeup", "compute", "reply", "age"):
+    times = run[name]
+    assert 2e-6 < times["p50_s"] <= times["p99_s"] <= times["p999_s"] <= times["longest_s"], name
+    assert sum(count for _, _, count in times["bins"]) == times["count"], name
+PY
 grep -q '^compute ' walk.out && grep -q 'below .* us .*#' walk.out || fail "no histogram: $(cat walk.out)"
 
 # a state of twenty is lost, another comes 25 ms late, when newer ones have been used: it stays upright
@@ -124,15 +132,33 @@ holds silent_robot.json damped_s 'x > 0'
 holds silent_robot.json end 'x == "fallen"'
 rm -f silent.json
 
-# Ctrl-C ends both
+# the same in real time, where the robot has the age of its targets alone to go by
+start mute
+timeout 120 "$mild" drive --simulate --config "$config" --connect "$address" --json mute_robot.json --seconds 5 >/dev/null &
+peer=$!
+sleep 3
+kill -KILL "$runner"
+wait "$runner" 2>/dev/null
+wait "$peer" || fail "the robot of mute"
+holds mute_robot.json damped_s 'x > 0'
+rm -f mute.json
+
+# Ctrl-C ends both; a runner that was held up has missed ticks, and each tick is either made or missed
 start stopped --command 0.3,0,0
 robot stopped --seconds 60 &
 peer=$!
-sleep 3
+sleep 2
+kill -STOP "$runner"
+sleep 0.5
+kill -CONT "$runner"
+sleep 0.5
 kill -INT "$runner"
 ended 0
 wait "$peer" || fail "the robot of stopped"
 holds stopped.json end 'x == "signal"'
+holds stopped.json missed_ticks 'x > 40'
+holds stopped.json ticks "100 * $(value stopped.json seconds) - x - $(value stopped.json missed_ticks) < 5"
+holds stopped.json ticks "100 * $(value stopped.json seconds) - x - $(value stopped.json missed_ticks) > -5"
 holds stopped_robot.json end 'x == "runner"'
 
 # a state as docs/drive.md makes it in Python: taken, and answered
@@ -175,6 +201,13 @@ assert run.wait(60) == 2
 assert "damped: by key or button" in run.stderr.read()
 PY
 
+# all that they wrote fits its schema, and the check sees what does not
+fits() { "$python" "$tests/../app/schema.py" "$tests/../../docs/schema/drive.json" "$@"; }
+fits ./*.json || fail "JSON that does not fit docs/schema/drive.json"
+sed 's/"lost":.*/"lost": 0.5,/' walk.json >bad.json && ! fits bad.json >/dev/null || fail "half a lost state fits the schema"
+sed 's/"fallen":.*/"fallen": 0,/' walk_robot.json >bad.json && ! fits bad.json >/dev/null || fail "0 is no boolean"
+rm bad.json
+
 bad "no answer from 127.0.0.1:9 for 0.2 s" "$mild" drive --simulate --connect 127.0.0.1:9 --patience 0.2 --json x.json
 bad "is not HOST:PORT" "$mild" drive --listen 9870
 bad "is not HOST:PORT" "$mild" drive --listen 127.0.0.1:99999
@@ -184,6 +217,8 @@ bad "192.0.2.1" "$mild" drive --listen 192.0.2.1:9870
 bad "no_such.safetensors" "$mild" drive --policy no_such.safetensors
 bad "is for robot sa01, not for go1" "$mild" drive --robot go1
 bad "/dev/input/none" "$mild" drive --gamepad /dev/input/none
+bad "/dev/null is no gamepad" "$mild" drive --gamepad /dev/null
+bad "\. is no gamepad" "$mild" drive --gamepad .
 bad "--ground needs --simulate" "$mild" drive --ground foam45
 bad "--drop needs --simulate" "$mild" drive --drop 0.1
 bad "--command is for the runner" "$mild" drive --simulate --command 0,0,0

@@ -212,6 +212,8 @@ static void the_gamepad(void **unused) {
     close(ends[0]), close(ends[1]);
     assert_int_not_equal(input_open(&input, start, range, 0, "/dev/input/none", &error), MILD_OK);
     assert_non_null(strstr(error.text, "--gamepad: /dev/input/none"));
+    assert_int_not_equal(input_open(&input, start, range, 0, "/dev/null", &error), MILD_OK);
+    assert_non_null(strstr(error.text, "/dev/null is no gamepad"));
 }
 
 int main(void) {

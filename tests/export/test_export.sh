@@ -28,6 +28,7 @@ near() {
 # ---- C ----
 "$mild" export --c walk || fail "export --c"
 "$mild" export --policy other.safetensors "${other[@]}" --c other || fail "export --c of another policy"
+"$python" "$tests/joints.py" "$root" walk/policy_weights.h || fail "joints of the C"
 flags=(-O3 -march=native -Wall -Wextra -Wconversion -pedantic -Werror)
 (cd walk && "${CC:-cc}" -std=c99 "${flags[@]}" policy.c example.c -lm -o run) || fail "C99"
 (cd other && "${CC:-cc}" -std=c17 "${flags[@]}" policy.c example.c -lm -o run) || fail "C17"
@@ -81,13 +82,15 @@ fi
 "$mild" export --onnx walk.onnx || fail "export --onnx"
 "$mild" export --policy other.safetensors "${other[@]}" --onnx other.onnx || fail "export --onnx of another policy"
 "$python" "$tests/test_onnx.py" "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx"
-"$python" "$tests/test_onnx.py" - other.onnx other.csv || fail "other.onnx"
+"$python" "$tests/test_onnx.py" - other.onnx other.csv policy_period=0.01 history_stride=3 gait_period=0.7 action_clip=0.6 \
+    action_scale=0.3 standing_below=0.5 clock=1 || fail "other.onnx"
 if [ "${RUNTIME:-}" ]; then # make export-check
     "$python" "$tests/test_onnx.py" --runtime "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx in ONNX Runtime"
     "$python" "$tests/test_onnx.py" --runtime - other.onnx other.csv || fail "other.onnx in ONNX Runtime"
 fi
 # of the wrong policy: noticed
 ! "$python" "$tests/test_onnx.py" - other.onnx noisy.csv >/dev/null 2>&1 || fail "another policy passes for the shipped one"
+bad "onnx: - is no file" "$mild" export --onnx -
 bad "No space left" "$mild" export --onnx /dev/full
 bad "no_such_folder" "$mild" export --onnx no_such_folder/walk.onnx --c new
 finish "what is written does what eval did"

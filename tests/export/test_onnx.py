@@ -1,15 +1,17 @@
 """The graph of `mild export --onnx` on what `mild eval` saw and did: computed by numpy, or by ONNX Runtime where --runtime is given.
-Usage: test_onnx.py [--runtime] SOURCE_FOLDER FILE.onnx RECORD.csv..."""
+Usage: test_onnx.py [--runtime] SOURCE_FOLDER FILE.onnx RECORD.csv... [KEY=NUMBER...], of its metadata"""
 
 import pathlib
 import sys
 
+import joints as joints_page
 import numpy as np
 import onnx_numpy
 import recorded
 
 runtime = "--runtime" in sys.argv
-source, path, *records = [word for word in sys.argv[1:] if word != "--runtime"]
+source, path, *records = [word for word in sys.argv[1:] if word != "--runtime" and "=" not in word]
+wanted = [word for word in sys.argv[1:] if "=" in word]
 TOLERANCE = 1e-6  # of the largest action: 32-bit sums of 512 products, in another order than ours
 
 
@@ -45,19 +47,6 @@ def walk(run, trials):
     return worst, scale
 
 
-def check_page(metadata):
-    """The joints' table of docs/policy.md: order, pose, gains, limits, ranges."""
-    page = (pathlib.Path(source) / "docs/policy.md").read_text(encoding="utf-8")
-    lists = [metadata[key].split(",") for key in ("default_joint_pos", "joint_stiffness", "joint_damping", "joint_effort_limit")]
-    for i, name in enumerate(metadata["joint_names"].split(",")):
-        row = [cell.strip() for cell in next(line for line in page.splitlines() if line.startswith(f"| `{name}`")).split("|")]
-        assert [float(cell) for cell in row[2:6]] == [float(numbers[i]) for numbers in lists], row
-        low, high = (metadata[key].split(",")[i] for key in ("joint_pos_low", "joint_pos_high"))
-        assert row[6].endswith(f", {float(low):g} to {float(high):g}"), row
-    rows = [line for line in page.splitlines() if line.startswith("| `leg_")]
-    assert [line.split("`")[1] for line in rows] == metadata["joint_names"].split(",")
-
-
 model = onnx_numpy.Model(pathlib.Path(path).read_bytes())
 width = sum(map(int, model.metadata["observation_widths"].split(",")))
 held = int(model.metadata["history_means"]) * int(model.metadata["history_stride"])
@@ -67,7 +56,11 @@ assert model.inputs == {"obs": ["batch", width], "frames_in": ["batch", held, wi
 assert list(model.outputs) == ["actions", "frames_out", "estimates"]
 assert model.outputs["actions"] == ["batch", joints] and model.outputs["frames_out"] == model.inputs["frames_in"]
 if source != "-":
-    check_page(model.metadata)
+    keys = ("default_joint_pos", "joint_stiffness", "joint_damping", "joint_effort_limit", "joint_pos_low", "joint_pos_high")
+    lists = [list(map(float, model.metadata[key].split(","))) for key in keys]
+    joints_page.check(source, model.metadata["joint_names"].split(","), *lists)
+for key, value in (word.split("=") for word in wanted):
+    assert float(model.metadata[key]) == float(value), (key, model.metadata[key], value)
 run = make_run(model)
 for record in records:
     error, scale = walk(run, recorded.trials(record))

@@ -1,15 +1,7 @@
 #!/usr/bin/env bash
 # Every relative link of our Markdown leads somewhere, and the check sees one that does not. Usage: test_links.sh SOURCE_FOLDER
-set -u
-source=$(realpath "$1")
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-failures=0
-
-fail() {
-    echo "FAIL: $*" >&2
-    failures=$((failures + 1))
-}
+source "$(dirname "$0")/../kit.sh" "$1"
+source=$mild # no program here
 
 python3 "$source/scripts/links.py" || fail "links of the tree"
 
@@ -41,4 +33,4 @@ docs/page.md:13: page.md#no-heading-no-link: no heading of page.md has this anch
 docs/page.md:13: ../../tree2: outside the tree
 END
 diff "$work/wanted" "$work/said" || fail "the check does not say what is wrong"
-exit $((failures > 0))
+finish "links lead somewhere"

@@ -1,17 +1,8 @@
 #!/usr/bin/env bash
 # One version: CMakeLists.txt, CITATION.cff and CHANGELOG.md agree, and the program's version follows commit and tag as
 # cmake/Version.cmake says. Usage: test_version.sh SOURCE_FOLDER
-set -u
-source=$(realpath "$1")
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work"
-failures=0
-
-fail() {
-    echo "FAIL: $*" >&2
-    failures=$((failures + 1))
-}
+source "$(dirname "$0")/../kit.sh" "$1"
+source=$mild # no program here
 
 version=$(sed -n 's/^project(mild VERSION \([0-9.]*\) .*/\1/p' "$source/CMakeLists.txt")
 [[ $version =~ ^[0-9]+\.[0-9]+\.[0-9]+$ ]] || fail "version of CMakeLists.txt: '$version'"
@@ -49,5 +40,4 @@ cmake -DSOURCE="$work/tree" -DBASE=1.2.3 -DHEADER="$work/header.h" -P "$source/c
     fail "a wrong tag is not an error"
 tr -s ' \n' ' ' <errors | grep -q 'the tag v1.3.0, but CMakeLists.txt says VERSION 1.2.3: change one' || fail "$(cat errors)"
 
-[ "$failures" = 0 ] && echo "version $version; commit and tag decide the rest"
-exit $((failures > 0))
+finish "version $version; commit and tag decide the rest"

@@ -26,6 +26,8 @@ static mjModel *compile(const char *option, const char *configs, const char *flo
 
 #define OFF "contype='0' conaffinity='0'"
 #define FOOT CONFIG("feet", "foot")
+#define LEG "leg_of_a_robot_with_a_very_long_name_"
+#define LONG_NAME LEG LEG LEG LEG LEG
 
 /* The model must not compile, with a message that holds both words. */
 static void check_refused(const char *option, const char *configs, const char *word,
@@ -42,7 +44,9 @@ static void refuses_what_is_wrong(void **state) {
     (void)state;
     check_refused("", "", "no feet", "feet");
     check_refused("", CONFIG("feet", "fool"), "'fool'", "nearest is 'foot'");
-    check_refused("", CONFIG("feet", "foot foot foot foot foot"), "more than 4", "feet");
+    check_refused("", CONFIG("feet", "foot sole end pole world"), "more than 4", "feet");
+    check_refused("", CONFIG("feet", "foot sole foot"), "twice", "feet");
+    check_refused("", CONFIG("feet", "foot " LONG_NAME), "'leg_of_", "nearest is");
     check_refused("", CONFIG("feet", "pole"), "'pole'", "fixed to the world");
     check_refused("", CONFIG("feet", "world"), "'world'", "fixed to the world");
     check_refused("", FOOT CONFIG("sole", "bax"), "'bax'", "nearest is 'box'");
@@ -263,7 +267,15 @@ static void keys_reach_the_ground(void **state) {
     free_both(m, d);
 }
 
-/* Another model sinks as deep under the weight, and a concentric one has a single element. */
+static void check_match(const Soft *soft, const MildMaterial *material, double load) {
+    const double wanted = mild_sole_sinkage(soft->soles[0], material, load);
+    const double got = mild_sole_sinkage(soft->soles[0], soft->terrain.materials, load);
+    assert_int_equal(soft->terrain.materials[0].model, MILD_MODEL_BEKKER);
+    assert_true(fabs(got - wanted) < 0.001 * wanted);
+}
+
+/* Another model sinks as deep under the weight that a foot carries, and a concentric one has a
+ * single element. */
 static void models_are_matched(void **state) {
     (void)state;
     mjModel *m;
@@ -272,11 +284,12 @@ static void models_are_matched(void **state) {
     assert_true(mild_material_preset("grass", &grass));
     const Soft *soft =
         soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.model", "bekker"), &m, &d);
-    const double weight = 9.81;
-    const double wanted = mild_sole_sinkage(soft->soles[0], &grass, weight);
-    assert_int_equal(soft->terrain.materials[0].model, MILD_MODEL_BEKKER);
-    assert_true(fabs(mild_sole_sinkage(soft->soles[0], soft->terrain.materials, weight) - wanted) <
-                0.001 * wanted);
+    check_match(soft, &grass, 9.81);
+    free_both(m, d);
+    soft = soft_of_keys(CONFIG("feet", "foot sole") CONFIG("ground", "grass")
+                            CONFIG("ground.model", "bekker"),
+                        &m, &d);
+    check_match(soft, &grass, 9.81 / 2);
     free_both(m, d);
     soft = soft_of_keys(FOOT CONFIG("ground.model", "con_spring"), &m, &d);
     assert_int_equal(mild_sole_elements(soft->soles[0]), 1);

@@ -249,6 +249,19 @@ static int count_decor(const mjvScene *scene, int type) {
     return count;
 }
 
+/* Bool: one of the four cells of imprints in a patch is pressed. */
+static int on_print(const mjData *d, const float at[3]) {
+    const MildGround *ground = (const MildGround *)(void *)d->plugin_state;
+    const double off = 0.0195 / 4;
+    int found = 0;
+    for (int k = 0; k < 4; k++) {
+        const double x = (double)at[0] + (k % 2 ? off : -off),
+                     y = (double)at[1] + (k / 2 ? off : -off);
+        found |= mild_ground_print_at(ground, x, y) > 0;
+    }
+    return found;
+}
+
 /* The scene shows what the ground remembers: patches at the depth of the surface, as many as there
  * is room for, and an arrow for each loaded foot. */
 static void prints_are_drawn(void **state) {
@@ -270,6 +283,7 @@ static void prints_are_drawn(void **state) {
     mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &scene);
     print_message("%d patches\n", count_decor(&scene, mjGEOM_BOX));
     assert_in_range(count_decor(&scene, mjGEOM_BOX), pressed(m, d) + 20, 1500);
+    int prints = 0;
     for (int i = 0; i < scene.ngeom; i++) {
         const MildTerrain *terrain = &plugin_soft(m, d)->terrain;
         const float *at = scene.geoms[i].pos;
@@ -277,8 +291,10 @@ static void prints_are_drawn(void **state) {
         if (scene.geoms[i].category == mjCAT_DECOR) {
             assert_true(fabs((double)at[2] - surface) < 0.002);
             assert_true(hypot((double)at[0], (double)at[1]) < 1);
+            prints += on_print(d, at);
         }
     }
+    assert_true(prints >= count_decor(&scene, mjGEOM_BOX) - pressed(m, d));
     mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, &small);
     assert_in_range(small.ngeom, 1, 10);
     option.flags[mjVIS_CONTACTFORCE] = 1;

@@ -48,7 +48,14 @@ class Batch(unittest.TestCase):
                 np.testing.assert_allclose(arrays.outputs["wrench"][i], wrench, rtol=1e-3, atol=1e-3 * np.abs(wrench).max())
                 np.testing.assert_allclose(arrays.outputs["new_velocity"][i], ground.new_velocity, atol=1e-3)
                 np.testing.assert_allclose(arrays.outputs["foot"][i, :, 5], ground.area, atol=1e-6)
+                for f, sole in enumerate(self.soles):
+                    of = ground.elements(f)
+                    for k, name in enumerate(("depth", "normal", "tangent_x", "tangent_y")):
+                        got = arrays.outputs["elements"][i, k, f, :sole.elements]
+                        np.testing.assert_allclose(got, of[name], rtol=1e-2, atol=2e-3 * max(np.abs(of[name]).max(), 1e-3))
                 ground.advance()
+            self.assertTrue((arrays.outputs["iterations"] >= 1).all())
+            self.assertTrue((arrays.outputs["residual"] >= 0).all() and arrays.outputs["residual"].max() < 1e-3)
             self.assertGreater(np.abs(arrays.outputs["wrench"]).max(), 10)
 
     def test_load_and_store(self):
@@ -117,6 +124,20 @@ class Batch(unittest.TestCase):
         self.assertGreater(arrays.outputs["wrench"].max(), 100)
         ground = mild.Ground(self.soles, mild.Terrain(names, map=slope, height=0.03), 0.002)
         for i in range(6):
+            for name, array in arrays.inputs.items():
+                getattr(ground, name)[:] = array[i]
+            ground.solve()
+            np.testing.assert_allclose(arrays.outputs["wrench"][i, :, 2], ground.force[:, 2], rtol=1e-3, atol=0.05)
+
+    def test_map_origin(self):
+        """The origin of each robot's map is that of its Terrain."""
+        waves, origin = mild.Map("waves", amplitude=0.05), self.rng.uniform(-1, 1, (6, 2)).astype(np.float32)
+        self.batch.set_materials(["grass"])
+        self.batch.set_map(waves)
+        arrays = Arrays(self.batch, self.rng)
+        self.batch.step(**arrays.all(map_origin=origin))
+        for i, (x, y) in enumerate(origin):
+            ground = mild.Ground(self.soles, mild.Terrain("grass", map=waves, map_x=x, map_y=y), 0.002)
             for name, array in arrays.inputs.items():
                 getattr(ground, name)[:] = array[i]
             ground.solve()

@@ -174,10 +174,38 @@ class Memory(unittest.TestCase):
         env.close()
 
 
+    def test_every_array(self):
+        """What each array of the buffers holds, without noise: the frame in the history and first in the critic's numbers, with
+        the estimates behind it; the last of an episode in rows of their own."""
+        quiet = {**SHORT, "task.observe_noise": False, "randomize.latency": (0, 0)}
+        task, env = envs.open_envs(4, threads=1, overrides=quiet), gym.VectorEnv(4, overrides=quiet)
+        arrays = env._arrays()
+        for name, width in (("critic", task.critic), ("last_critic", task.critic), ("frame", task.observation),
+                            ("estimate", task.estimates)):
+            arrays[name] = np.full((4, width), np.nan, np.float32)
+        buffers = task.buffers(**arrays)
+        task.reset(buffers)
+        ended = 0
+        for step in range(120):
+            task.step(actions_of(env, step), buffers)
+            frame = arrays["history"][:, -1]
+            np.testing.assert_array_equal(arrays["frame"], frame)
+            np.testing.assert_allclose(arrays["critic"][:, : task.observation], frame, atol=1e-5)
+            np.testing.assert_array_equal(arrays["critic"][:, task.observation : task.observation + task.estimates],
+                                          arrays["estimate"])
+            done = arrays["done"]
+            np.testing.assert_allclose(arrays["last_critic"][done, : task.observation], arrays["last"][done, -1], atol=1e-5)
+            ended += done.sum()
+        self.assertGreater(ended, 3)
+        self.assertGreater(np.abs(arrays["estimate"]).max(), 0.01)
+        task.close()
+        env.close()
+
+
 class Misuse(unittest.TestCase):
     def test_arguments(self):
-        for keys, name in (({"overrides": {"task.vxx": 1}}, "task.vx"), ({"overrides": {"task.vx": "fast"}}, "task.vx"),
-                           ({"overrides": {"task.vx": object()}}, "task.vx"), ({"overrides": {"train.envs": 3}}, "train.envs"),
+        for keys, name in (({"overrides": 3}, "overrides"), ({"config": 0}, "config"), ({"overrides": {"task.vxx": 1}}, "task.vx"),
+                           ({"overrides": {"task.vx": "fast"}}, "task.vx"), ({"overrides": {"task.vx": object()}}, "task.vx"), ({"overrides": {"train.envs": 3}}, "train.envs"),
                            ({"config": "configs/none.ini"}, "none.ini"), ({"robot": "cat"}, "cat"), ({"observation": "all"}, "observation"),
                            ({"device": "tpu"}, "device"), ({"render_mode": "human"}, "render_mode"), ({"wheels": 4}, "wheels"),
                            ({"overrides": {"train.robots": "batch"}}, None)):

@@ -49,7 +49,9 @@ class Press(unittest.TestCase):
     def test_program(self):
         """Every number of `mild press --csv`, for a prescribed path, one by force, and a drop."""
         cases = (({"depth": 0.03}, ["--depth", "0.03"]), ({"force": (200, 50), "cycles": 2}, ["--force", "200,50", "--cycles", "2"]),
-                 ({"drop": 0.05, "tilt": np.deg2rad(5)}, ["--drop", "0.05", "--tilt", "5"]))
+                 ({"drop": 0.05, "tilt": np.deg2rad(5)}, ["--drop", "0.05", "--tilt", "5"]),
+                 ({"impact": 0.7, "mass": 10}, ["--impact", "0.7", "--mass", "10"]),
+                 ({"depth": 0.02, "drag": 0.03}, ["--depth", "0.02", "--drag", "0.03"]))
         for arguments, options in cases:
             with tempfile.NamedTemporaryFile(suffix=".csv") as file:
                 subprocess.run([PROGRAM, "press", "--ground", "grass", "--csv", file.name, *options], check=True,
@@ -58,8 +60,16 @@ class Press(unittest.TestCase):
             press = mild.press("grass", mild.Sole.plate(0.2, 0.1), **arguments)
             self.assertEqual(len(press), len(rows))
             for name, column in (("time_s", press.time), ("depth_m", press.depth), ("force_n", press.force),
-                                 ("moment_y_nm", press.moment_y), ("zmp_x_m", press.zmp_x)):
-                np.testing.assert_allclose(column, rows[name], rtol=1e-8, atol=1e-12, err_msg=name)
+                                 ("moment_y_nm", press.moment_y), ("zmp_x_m", press.zmp_x),
+                                 ("force_x_n", press.force_x), ("x_m", press.x)):
+                if name in rows.dtype.names:
+                    np.testing.assert_allclose(column, rows[name], rtol=1e-8, atol=1e-12, err_msg=name)
+
+    def test_prints(self):
+        """Ground with prints is softer the second time, because it remembers the first."""
+        sole = mild.Sole.plate(0.2, 0.1)
+        forgets, remembers = (mild.press("sand_loose", sole, depth=0.02, tilt=0.1, cycles=2, tiles=tiles) for tiles in (0, 64))
+        self.assertLess(remembers.work_in, 0.8 * forgets.work_in)
 
     def test_arguments(self):
         sole = mild.Sole.plate(0.2, 0.1)
@@ -68,8 +78,9 @@ class Press(unittest.TestCase):
                                 ({"force": 1e6}, "force"), ({"tilt": 2}, "tilt")):
             with self.assertRaisesRegex(ValueError, name):
                 mild.press("grass", sole, **arguments)
-        with self.assertRaisesRegex(TypeError, "depth"):
-            mild.press("grass", sole, depth="deep")
+        for arguments, name in (({"depth": "deep"}, "depth"), ({"drop": "high"}, "drop"), ({"map": 3}, "map")):
+            with self.assertRaisesRegex(TypeError, name):
+                mild.press("grass", sole, **arguments)
 
 
 class Step(unittest.TestCase):
@@ -94,6 +105,7 @@ class Step(unittest.TestCase):
         half = rng.normal(size=(12, 12))
         ground.inverse_inertia[:] = half @ half.T / 50
         ground.position[:] = [[0, 0.1, -0.01], [0, -0.1, -0.005]]
+        ground.rotation[0] = [[np.cos(0.05), 0, np.sin(0.05)], [0, 1, 0], [-np.sin(0.05), 0, np.cos(0.05)]]
         ground.velocity[:] = ground.free_velocity[:] = rng.normal(size=(2, 6)) * 0.2
         self.assertTrue(ground.solve())
         impulse = np.hstack([ground.force, ground.torque]).ravel() * ground.dt
@@ -101,7 +113,14 @@ class Step(unittest.TestCase):
         self.assertGreater(ground.force[:, 2].min(), 1)
         np.testing.assert_allclose(ground.new_velocity.ravel(), after, atol=1e-9)
         elements = ground.elements(0)
-        self.assertAlmostEqual(elements["normal"].sum(), ground.force[0, 2], delta=1e-6 * ground.force[0, 2])
+        for name, force in zip(("tangent_x", "tangent_y", "normal"), ground.force[0], strict=True):
+            self.assertAlmostEqual(elements[name].sum(), force, delta=1e-6 * ground.force[0, 2])
+        center = [elements["normal"] @ elements[point] / ground.force[0, 2] for point in ("point_x", "point_y")]
+        np.testing.assert_allclose(ground.pressure_center[0, :2], center, atol=1e-6)
+        loaded = elements["normal"] > 0
+        self.assertAlmostEqual(ground.depth_mean[0], elements["depth"][loaded].mean(), delta=1e-9)
+        self.assertAlmostEqual(ground.depth_max[0], elements["depth"][loaded].max(), delta=1e-9)
+        self.assertGreater(np.ptp(elements["depth"]), 1e-5)
 
     def test_arrays_are_views(self):
         ground = mild.Ground([mild.Sole.plate(0.2, 0.1)])
@@ -222,6 +241,16 @@ class Terrain(unittest.TestCase):
             wanted = 0.5 + 0.05 * (np.sin(2 * np.pi * x) + np.sin(2 * np.pi * y))
             self.assertAlmostEqual(terrain.height_at(x, y), wanted, delta=1e-6)
 
+    def test_origin_and_slope(self):
+        """A map that is moved has its heights elsewhere; the gradient is that of the heights."""
+        waves = mild.Map("waves", amplitude=0.1, wavelength=1.0, cell=0.05)
+        terrain, moved = mild.Terrain("grass", map=waves), mild.Terrain("grass", map=waves, map_x=0.2, map_y=-0.3)
+        for x, y in ((0.22, 0.51), (-0.33, 0.74), (2.12, 0.03)):
+            self.assertAlmostEqual(moved.height_at(x + 0.2, y - 0.3), terrain.height_at(x, y), delta=1e-6)
+            for slope, (dx, dy) in zip(terrain.slope_at(x, y), ((1e-3, 0), (0, 1e-3)), strict=True):
+                rise = terrain.height_at(x + dx, y + dy) - terrain.height_at(x - dx, y - dy)
+                self.assertAlmostEqual(slope, rise / 2e-3, delta=0.02)
+
     def test_arguments(self):
         for make, name in ((lambda: mild.Map("hills"), "kind"), (lambda: mild.Map(amplitude="\ud800"), "amplitude"), (lambda: mild.Map("waves", amplitud=1), "amplitude"),
                            (lambda: mild.Map("image", heights=[[0, 1], [np.inf, 0]]), "height"), (lambda: mild.Map("image"), "height"),
@@ -281,6 +310,7 @@ class Fit(unittest.TestCase):
         self.assertEqual(fit.parameters_["alpha"], truth.alpha)
         self.assertLess(np.abs(fit.predict(X) - y).max(), 0.01 * y.max())
         self.assertGreater(fit.score(X, y), 0.999)
+        self.assertTrue(np.isnan(fit.score(X[:1], y[:1])))
 
     def test_speed(self):
         """A fast press, with its speeds: the curve of the true numbers is its force, which no slow press has."""
@@ -308,6 +338,7 @@ class Fit(unittest.TestCase):
                                       ({"model": "rigid"}, [[0.01]] * 9, [1] * 9, "model"),
                                       ({"hold": {"mu": 1}}, [[0.01]] * 9, [1] * 9, "mu"), ({"plate": 3}, [[0.01]] * 9, [1] * 9, "plate"),
                                       ({"hold": {"alpha": 90}}, [[0.01]] * 9, [1] * 9, "alpha"),
+                                      ({"hold": 3}, [[0.01]] * 9, [1] * 9, "hold"),
                                       ({"fill": "mud"}, [[0.01]] * 9, [1] * 9, "mud"), ({}, [[np.nan]] * 9, [1] * 9, "finite"),
                                       ({}, "abc", [1], "X")):
             with self.assertRaisesRegex((ValueError, TypeError), name):

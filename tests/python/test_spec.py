@@ -18,13 +18,24 @@ class Attach(unittest.TestCase):
     def test_arguments(self):
         spec = mujoco.MjSpec.from_string(PLATE)
         for arguments, name in ((("plate", ["plate"]), "spec"), ((spec, ["foot"]), "foot"), ((spec, []), "feet"),
-                                ((spec, ["plate"] * 5), "feet"), ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground")):
+                                ((spec, ["plate"] * 5), "feet"), ((spec, ["left foot"]), "blanks"), ((spec, [5]), "feet: 5"),
+                                ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground")):
             with self.assertRaisesRegex((TypeError, ValueError), name):
                 mild.attach(*arguments)
         with self.assertRaisesRegex(RuntimeError, "no/such"):
             mild.attach(spec, "plate", library="no/such")
         with self.assertRaisesRegex(RuntimeError, "MuJoCo"):
             mild.attach(spec, "plate", library=__file__)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_library(self):
+        """A file beside the program, by its name alone."""
+        before = os.getcwd()
+        try:
+            os.chdir(os.path.dirname(PLUGIN))
+            mild.attach(mujoco.MjSpec.from_string(PLATE), "plate", library=os.path.basename(PLUGIN))
+        finally:
+            os.chdir(before)
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_rest(self):

@@ -91,6 +91,17 @@ static void test_files(void **state) {
     assert_non_null(web_open(other, model_bytes));
     other->policy.actor.layers = 1000;
     assert_non_null(web_open(other, model_bytes));
+    int32_t *const numbers[] = {&other->policy.latent, &other->policy.estimates,
+                                &other->policy.feet_velocity, &other->shape.actions,
+                                &other->shape.observation};
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+        memcpy(other, model, model_bytes);
+        *numbers[i] += 9;
+        assert_non_null(web_open(other, model_bytes));
+    }
+    memcpy(other, model, model_bytes);
+    other->policy.per_dimension = !other->policy.per_dimension;
+    assert_non_null(web_open(other, model_bytes));
     free(other);
     start(0, WEB_LEVEL, 1);
     assert_non_null(web_start(-1, WEB_LEVEL, 1));
@@ -348,6 +359,57 @@ static double carried(void) {
     return sum * pow((double)view->pitch, 2);
 }
 
+/* The centre of pressure that is shown is that of the elements; the feet carry the weight. */
+static void test_soles(void **state) {
+    const WebView *view = web_view();
+    double worst = 0, load = 0;
+    int seen = 0;
+    (void)state;
+    start(preset("sand_loose"), WEB_LEVEL, 1);
+    for (int t = 0; t < 3 * SECOND; t++) {
+        assert_false(web_step(0.6f, 0, 0));
+        for (int f = 0; f < 2; f++) {
+            double sum = 0, center[2] = {0, 0};
+            for (int e = 0; e < view->elements; e++) {
+                const double pressure = (double)view->pressure[f][e];
+                sum += pressure;
+                center[0] += pressure * (double)view->x[f][e];
+                center[1] += pressure * (double)view->y[f][e];
+            }
+            const double force = sum * pow((double)view->pitch, 2);
+            load += (double)view->load[f] / (3 * SECOND);
+            for (int k = 0; k < 2 && force > 100; k++, seen++) {
+                worst = fmax(worst, fabs(center[k] / sum - (double)view->center[f][k]));
+            }
+        }
+    }
+    printf(
+        "  the centre of pressure is apart by at most %.1f mm; the feet carry %.1f N of %.1f N\n",
+        1e3 * worst, load, 9.81 * robot_total_mass(robot));
+    assert_true(seen > SECOND && worst < 5e-4);
+    assert_true(fabs(load / (9.81 * robot_total_mass(robot)) - 1) < 0.1);
+}
+
+static void walk_to(double x) {
+    for (int t = 0; (double)web_view()->link[0][3] < x; t++) {
+        assert_true(t < 20 * SECOND);
+        assert_false(web_step(1, 0, 0));
+    }
+}
+
+/* In stripes of WEB_STRIPE, as the page draws them: prints stay in sand, and not in foam. */
+static void test_stripes(void **state) {
+    (void)state;
+    const double foam = preset("foam28") * WEB_STRIPE, sand = preset("sand_loose") * WEB_STRIPE;
+    start(WEB_STRIPES, WEB_LEVEL, 1);
+    walk_to(foam + 2 * WEB_STRIPE);
+    const double left = pressed_between(foam + 0.3, foam + WEB_STRIPE - 0.3);
+    walk_to(sand + 1.5 * WEB_STRIPE);
+    const double kept = pressed_between(sand + 0.3, sand + WEB_STRIPE - 0.3);
+    printf("  pressed behind it: %.3f m^2 of foam, %.3f m^2 of sand\n", left, kept);
+    assert_true(left == 0 && kept > 0.1);
+}
+
 static void test_sliders(void **state) {
     (void)state;
     double load = 0;
@@ -363,17 +425,24 @@ static void test_sliders(void **state) {
     }
     printf("  the soles carry %.1f N of %.1f N\n", load, 9.81 * robot_total_mass(robot));
     assert_true(fabs(load / (9.81 * robot_total_mass(robot)) - 1) < 0.03);
-    start(preset("rubber"), WEB_LEVEL, 1);
-    web_change(1, 0.05);
-    float fastest = 0;
-    for (int t = 0; t < 3 * SECOND && !web_step(0.8f, 0, 0); t++) {
-        fastest = fmaxf(fastest, web_view()->velocity[0]);
+    for (int rigid = 0; rigid < 2; rigid++) {
+        start(rigid ? WEB_RIGID : preset("rubber"), WEB_LEVEL, 1);
+        web_change(1, 0.05);
+        float fastest = 0;
+        for (int t = 0; t < 3 * SECOND && !web_step(0.8f, 0, 0); t++) {
+            fastest = fmaxf(fastest, web_view()->velocity[0]);
+        }
+        printf("  on ice it gets to %.2f of 0.8 m/s\n", (double)fastest);
+        assert_true(fastest < 0.6f);
     }
-    printf("  on ice it gets to %.2f of 0.8 m/s\n", (double)fastest);
-    assert_true(fastest < 0.6f);
 }
 
-/* It stands up where it fell, and the prints are there still. */
+/* [rad] Where the robot faces, by its drawn base. */
+static double facing(void) {
+    return atan2((double)web_view()->link[0][4], (double)web_view()->link[0][0]);
+}
+
+/* It stands up where it fell, as it faced, and the prints are there still. */
 static void test_again(void **state) {
     (void)state;
     start(preset("sand_loose"), WEB_LEVEL, 1);
@@ -385,6 +454,15 @@ static void test_again(void **state) {
            (double)web_view()->link[0][3], before, pressed());
     assert_true(fabs((double)web_view()->link[0][3] - x) < 0.1);
     assert_true(pressed() >= before);
+    for (int t = 0; t < 3 * SECOND; t++) {
+        assert_false(web_step(0.3f, 0, 0.5f));
+    }
+    const double turned = facing();
+    web_again();
+    printf("  turned to %.2f rad, shown %.2f rad, then %.2f rad\n", turned, (double)web_view()->yaw,
+           facing());
+    assert_true(turned > 1 && turned < 2 && fabs((double)web_view()->yaw - turned) < 1e-5);
+    assert_true(fabs(facing() - turned) < 0.01);
 }
 
 int main(void) {
@@ -393,6 +471,7 @@ int main(void) {
         cmocka_unit_test(test_same_steps), cmocka_unit_test(test_walks),
         cmocka_unit_test(test_hills),      cmocka_unit_test(test_prints),
         cmocka_unit_test(test_window),     cmocka_unit_test(test_sliders),
+        cmocka_unit_test(test_soles),      cmocka_unit_test(test_stripes),
         cmocka_unit_test(test_again),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
