@@ -71,6 +71,39 @@ float *policy_parameters(Policy *policy) {
     return policy->parameters;
 }
 
+static int same_shape(const Mlp *a, const Mlp *b) {
+    int same = a->layers == b->layers;
+    for (int l = 0; same && l < a->layers; l++) {
+        same = a->layer[l].in == b->layer[l].in && a->layer[l].out == b->layer[l].out;
+    }
+    return same;
+}
+
+int policy_take_networks(Policy *policy, const Policy *from) {
+    const Network *own = &policy->network, *other = &from->network;
+    const char *name;
+    int fits = own->def.actions == other->def.actions;
+    for (int n = 0; n < NETWORK_MLPS; n++) {
+        const Mlp *mlp = network_mlp(own, n, &name);
+        fits &= mlp == &own->decoder || same_shape(mlp, network_mlp(other, n, &name));
+    }
+    if (!fits) {
+        return 0;
+    }
+    for (int n = 0; n < NETWORK_MLPS; n++) {
+        const Mlp *to = network_mlp(own, n, &name), *source = network_mlp(other, n, &name);
+        const MlpLayer *last = &to->layer[to->layers - 1];
+        if (same_shape(to, source)) {
+            const int64_t count = last->bias + last->out - to->layer[0].weight;
+            memcpy(policy->parameters + to->layer[0].weight,
+                   from->parameters + source->layer[0].weight, (size_t)count * sizeof(float));
+        }
+    }
+    memcpy(policy->parameters + own->log_std, from->parameters + other->log_std,
+           (size_t)own->def.actions * sizeof(float));
+    return 1;
+}
+
 const float *policy_std(const Policy *policy) {
     const float *log_std = policy->parameters + policy->network.log_std;
     for (int i = 0; i < policy->network.def.actions; i++) {

@@ -38,8 +38,7 @@ void train_destroy(Trainer *trainer) {
     free(trainer);
 }
 
-/* The networks of a policy file, which must have the same shape, take the place of the random ones.
- */
+/* The networks of a policy file take the place of the random ones. */
 static MildStatus start_policy(Trainer *trainer, MildError *error) {
     const char *path = trainer->def.train.start;
     MildError cause = {0};
@@ -50,17 +49,13 @@ static MildStatus start_policy(Trainer *trainer, MildError *error) {
     if (!start) {
         return mild_fail(error, cause.status, "train.start: %s", cause.text);
     }
-    const int64_t count = policy_parameter_count(trainer->policy);
     const PolicyDef *own = policy_def(trainer->policy), *other = policy_def(start);
     MildStatus status = MILD_OK;
-    if (policy_parameter_count(start) != count || strcmp(own->robot, other->robot) != 0) {
+    if (strcmp(own->robot, other->robot) != 0 || !policy_take_networks(trainer->policy, start)) {
         status = mild_fail(error, MILD_ERROR_FORMAT,
                            "train.start: %s has other networks or another robot than this config "
                            "asks for; see sections [policy], [ppo] and train.robot",
                            path);
-    } else {
-        memcpy(policy_parameters(trainer->policy), policy_parameters(start),
-               (size_t)count * sizeof(float));
     }
     policy_destroy(start);
     return status;

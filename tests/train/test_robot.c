@@ -145,8 +145,28 @@ static void an_unknown_robot_is_named(void **unused) {
     assert_non_null(strstr(error.text, "train.robot: unknown robot 'sa02'; nearest is 'sa01'"));
 }
 
-/* train.start: the networks of a file in the place of those that the seed draws. Those of another
- * robot are refused. */
+/* The same actions, values and noise. */
+static void check_all_but_decoder(Policy *a, Policy *b) {
+    enum { ROWS = 3 };
+    const PolicyDef *def = policy_def(a);
+    const int history = def->frames * def->observation;
+    static float input[ROWS * 4096], out[2][ROWS * 64];
+    Policy *const of[2] = {a, b};
+    assert_true(history <= 4096 && def->critic_input <= 4096 && def->actions <= 20);
+    for (int i = 0; i < ROWS * 4096; i++) {
+        input[i] = (float)sin(0.37 * i);
+    }
+    for (int k = 0; k < 2; k++) {
+        policy_act(of[k], NULL, ROWS, input, out[k], NULL, NULL);
+        policy_value(of[k], NULL, ROWS, input, out[k] + ROWS * 20);
+        memcpy(out[k] + ROWS * 22, policy_std(of[k]), (size_t)def->actions * sizeof(float));
+    }
+    assert_memory_equal(out[0], out[1], sizeof out[0]);
+    assert_true(policy_parameter_count(a) != policy_parameter_count(b));
+}
+
+/* train.start: the networks of a file in the place of those that the seed draws. A decoder of
+ * something else is left out; those of another robot, or of another width, are refused. */
 static void a_run_begins_with_a_policy(void **unused) {
     (void)unused;
     MildError error = {0};
@@ -165,6 +185,14 @@ static void a_run_begins_with_a_policy(void **unused) {
                          given);
         train_destroy(second);
     }
+    def.ppo.decoder_target = PPO_TARGET_GROUND; /* 13 numbers in the place of a frame's 47 */
+    Trainer *second = train_create(&def, &error);
+    assert_non_null(second);
+    check_all_but_decoder(train_policy(second), train_policy(first));
+    train_destroy(second);
+    def.policy.actor_hidden[0] += 8;
+    assert_null(train_create(&def, &error));
+    assert_non_null(strstr(error.text, "has other networks"));
     train_destroy(first);
     def = small_def("go1");
     strcpy(def.train.start, POLICY);
