@@ -5,6 +5,7 @@ import numpy as np
 import torch
 import warp as wp
 from mjlab.sensor.contact_sensor import ContactData
+from mjlab.sim.sim import _suspend_gc
 from mjlab_kernels import add_limits, apply, approach, contact_kernel
 from scipy.spatial import ConvexHull
 
@@ -62,8 +63,8 @@ class SoftGround:
         mjw.deriv_smooth_vel(m, d, self.metric)  # N = M - h dF/dv, the integrator's
         n, dofs, _ = self.jacobian.shape
         wp.launch(approach, dim=(n, len(self.soles), dofs), outputs=[self.place, self.turn, self.jacobian],
-                  inputs=[self.body, m.body_rootid, self.center, self.moves, self.round, self.radius, d.xpos, d.xmat, d.subtree_com, d.cdof,
-                          d.qfrc_passive, d.qfrc_bias, d.qfrc_actuator])
+                  inputs=[self.body, m.body_rootid, self.center, self.moves, self.round, self.radius, d.xpos, d.xmat, d.subtree_com,
+                          d.cdof, d.qfrc_passive, d.qfrc_bias, d.qfrc_actuator])
         wp.launch(add_limits, dim=n, outputs=[self.metric, self.jacobian],
                   inputs=[self.diagonal, m.jnt_dofadr, m.jnt_qposadr, m.jnt_range, d.qpos, d.qacc_warmstart, d.ne, d.nf, d.nl, d.efc.type,
                           d.efc.id, d.efc.D, d.efc.aref])
@@ -85,7 +86,7 @@ class SoftGround:
     def capture_with(self):
         self.capture()  # mjlab's own graphs; those of forward and reset stay
         if self.sim.use_cuda_graph:
-            with wp.ScopedDevice(self.sim.wp_device), wp.ScopedCapture() as capture:
+            with _suspend_gc(), wp.ScopedDevice(self.sim.wp_device), wp.ScopedCapture() as capture:
                 self.step_with(captured=False)
             self.sim.step_graph = capture.graph
 

@@ -69,7 +69,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("robot", nargs="?", default="Go1", choices=FEET)
     parser.add_argument("--grounds", default="rubber,foam45,grass,sand_loose", type=lambda text: text.split(","))
-    parser.add_argument("--test", default="foam60,foam45,sand_dense,sand_loose", type=lambda text: text.split(","), help="walked at the end")
+    parser.add_argument("--test", default="foam60,foam45,sand_dense,sand_loose", type=lambda text: text.split(","), help="walked on")
     parser.add_argument("--speed", type=float, default=0.6)
     parser.add_argument("--envs", type=int, default=4096)
     parser.add_argument("--minutes", type=float, default=4)
