@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]
-# [actuator]; without a name all.
+# [robots] [actuator]; without a name all.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -70,6 +70,15 @@ walk() {
         "select='eq(n,40)+eq(n,109)+eq(n,150)+eq(n,205)+eq(n,255)+eq(n,300)',scale=640:-1:flags=area,tile=3x2"
 }
 
+# The other robots, a moment of each.
+robots() {
+    "$mild" play --robot go1 --config configs/go1.ini --policy policies/go1.safetensors --ground grass --seconds 4 --video "$work/go1.mp4"
+    "$mild" play --robot g1 --config configs/g1.ini --policy policies/g1.safetensors --ground sand_loose --seconds 4 --video "$work/g1.mp4"
+    ffmpeg -loglevel error -y -i "$work/go1.mp4" -i "$work/g1.mp4" -filter_complex \
+        "[0]select='eq(n,70)',setpts=0[a];[1]select='eq(n,72)',setpts=0[b];[a][b]hstack" -frames:v 1 "$work/robots.mkv"
+    still "$work/robots.mkv" docs/robots.png "scale=1280:-1:flags=area"
+}
+
 # A robot among its imprints on waves of two materials, after five seconds.
 terrain() {
     "$mild" play --ground sand_dense,sand_loose --speed 0.5 --seconds 5.2 --video "$work/terrain.mp4" \
@@ -88,9 +97,9 @@ actuator() {
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
-    terrain | walk | actuator) "$name" ;;
+    terrain | walk | robots | actuator) "$name" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric terrain walk actuator; do "$0" "$each"; done ;;
-    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk actuator" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain walk robots actuator; do "$0" "$each"; done ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots actuator" >&2 && exit 2 ;;
     esac
 done
