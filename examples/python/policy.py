@@ -12,7 +12,8 @@ def read(path):
     end = 8 + int.from_bytes(raw[:8], "little")
     header = json.loads(raw[8:end])
     header.pop("__metadata__")
-    return {k: np.frombuffer(raw[end + v["data_offsets"][0] : end + v["data_offsets"][1]], "<f4")
+    return {k: np.frombuffer(raw[end + v["data_offsets"][0] : end + v["data_offsets"][1]],
+                             {"F32": "<f4", "F16": "<f2"}[v["dtype"]]).astype(np.float32)
             .reshape(v["shape"]) for k, v in header.items()}
 
 

@@ -21,5 +21,5 @@ bad "latent.py: short: .*; give what mild eval --latent wrote" latent short
 printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3,1\n' >one
 bad "latent.py: one: trials are shorter than 2.8 s or fewer than 2" latent one
 # its figures need what scripts/paper/requirements.txt names
-"$python" -c 'import sklearn' 2>/dev/null && bad "paper.py: unknown experiment nosuch; there are speeds " "$python" -B "$root/scripts/paper/paper.py" nosuch
+"$python" -c 'import sklearn' 2>/dev/null && bad "paper.py: unknown experiment nosuch; there are table2 " "$python" -B "$root/scripts/paper/paper.py" nosuch
 finish "scripts: bad input"

@@ -24,6 +24,8 @@ texts.update(
         "policy.critic_hidden": "8 0 0 0",
     }
 )
+for key in ("policy.decoder_frame", "policy.ground_offset", "policy.ground_count"):  # without: a frame
+    texts.pop(key, None)
 shapes = {
     "encoder": [282, 40, 17, 11 + 2 * 5],
     "decoder": [16, 8, 47],
