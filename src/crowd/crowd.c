@@ -9,8 +9,9 @@
 
 _Static_assert(CROWD_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fills");
 
-/* Shares of the robots. One NVIDIA H200: three make 5 % more steps with 16 384 robots, 7 % with 4096
- * and 2 % with 65 536; four are no faster. The CPU steps them in turn, so that its tests see them. */
+/* Shares of the robots. One NVIDIA H200: three make 5 % more steps with 16 384 robots, 7 % with
+ * 4096 and 2 % with 65 536; four are no faster. The CPU steps them in turn, so that its tests see
+ * them. */
 enum { SHARES = 3 };
 
 struct Crowd {

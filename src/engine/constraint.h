@@ -546,8 +546,9 @@ LANE_FN void engine_start(const EngineTree *tree, EngineWork *work) {
 }
 
 /* From the acceleration with the held limits to that with all rows; `edges`: engine_collide was
- * called. The last step leaves the same rows pushing. It has a rounding error in proportion to its length, so
- * one that comes back a long way from where those before it went is followed by another.
+ * called. The last step leaves the same rows pushing. It has a rounding error in proportion to its
+ * length, so one that comes back a long way from where those before it went is followed by
+ * another.
  *
  * Needs the factor of N, limits and J; overwrites it, mass, half and, with edges, the wrench.
  * Returns Newton steps. */

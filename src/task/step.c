@@ -304,7 +304,8 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
 }
 
 /* Bool: the base tilts too much, a shell touches the ground or is too deep in soft ground, or a
- * foot has passed through the other leg, because the engine computes no contact between the legs. */
+ * foot has passed through the other leg, because the engine computes no contact between the
+ * legs. */
 static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
                                        const RobotSim *sim) {
     const double depth = env->variation.rigid ? 0 : def->shell_depth;
