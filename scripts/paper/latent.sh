@@ -5,10 +5,9 @@ set -euo pipefail
 out=${1:?usage: scripts/paper/latent.sh FOLDER SEEDS [NAME ...]}
 seeds=${2:?usage: scripts/paper/latent.sh FOLDER SEEDS [NAME ...]}
 shift 2
-here=$(dirname "$0")
-mild=${MILD:-build/mild}
-config=$here/../../configs/models.ini
-declare -A change=(
+# shellcheck source=scripts/paper/changes.sh
+source "$(dirname "$0")/changes.sh"
+change=(
     [none]="--ppo.kl_weight=10"
     [newest]="--ppo.decoder_target=newest"
     [next]=""
@@ -20,10 +19,6 @@ declare -A change=(
     [window]="--ppo.decoder_target=ground --task.history_stride=16"
     [free]="--ppo.decoder_target=ground --ppo.kl_weight=0.01 --ppo.free_bits=0.25"
 )
-names=("$@")
-[ $# -gt 0 ] || names=(none newest next clean ground both sampled dimensions window free)
-mkdir -p "$out"
-
 # measure RUN NAME-SEED: walks with and without z, and what z knows.
 measure() {
     local policy=(eval --policy "$1/policy.safetensors" --config "$1/config.ini") grounds=rigid,rubber,foam60,foam45,foam28,foam25,grass,sand_loose,sand_dense
@@ -44,16 +39,4 @@ measure() {
     rm -rf "$1"
 }
 
-runs=$(mktemp -d)
-trap 'wait; rm -rf "$runs"' EXIT
-for seed in $(seq "$seeds"); do
-    for name in "${names[@]}"; do
-        [ -e "$out/$name-$seed.txt" ] && continue
-        run=$runs/$name-$seed
-        # shellcheck disable=SC2086 # several options
-        "$mild" train --config "$config" --out "$run" --train.seed="$seed" ${change[$name]} >"$runs/log" 2>&1 || { cat "$runs/log" >&2; exit 1; }
-        echo "$name-$seed $(tail -1 "$runs/log")"
-        cp "$run/log.csv" "$out/$name-$seed.csv"
-        measure "$run" "$out/$name-$seed" &
-    done
-done
+train_changes "$out" "$seeds" txt "$@"

@@ -6,10 +6,9 @@ set -euo pipefail
 out=${1:?usage: scripts/paper/worth.sh FOLDER [SEEDS [NAME ...]]}
 seeds=${2:-1}
 shift $(($# < 2 ? $# : 2))
-here=$(dirname "$0")
-mild=${MILD:-build/mild}
-config=$here/../../configs/models.ini
-declare -A change=(
+# shellcheck source=scripts/paper/changes.sh
+source "$(dirname "$0")/changes.sh"
+change=(
     [as_it_is]=""
     [tracking_time]="--reward.tracking_time=0.01"
     [tracking_narrow]="--reward.tracking_narrow=0"
@@ -45,12 +44,6 @@ declare -A change=(
     [epsilon]="--ppo.epsilon=0.3"
     [anneal]="--ppo.anneal=0,0 --ppo.average=0"
 )
-names=("$@")
-[ $# -gt 0 ] || mapfile -t names < <(printf '%s\n' "${!change[@]}" | sort)
-runs=$(mktemp -d)
-trap 'wait; rm -rf "$runs"' EXIT
-mkdir -p "$out"
-
 measure() { # RUN NAME-SEED
     "$mild" eval --policy "$1/policy.safetensors" --config "$1/config.ini" --train.device=cpu --train.robots=mujoco \
         --ground rigid,rubber,foam45,sand_loose --speed 0.3,0.6 --trials 10 --threads 4 --json "$2.part" >/dev/null
@@ -58,14 +51,4 @@ measure() { # RUN NAME-SEED
     rm -rf "$1"
 }
 
-for seed in $(seq "$seeds"); do
-    for name in "${names[@]}"; do
-        [ -e "$out/$name-$seed.json" ] && continue
-        run=$runs/$name-$seed
-        # shellcheck disable=SC2086 # several options
-        "$mild" train --config "$config" --out "$run" --train.seed="$seed" ${change[$name]} >"$runs/log" 2>&1 || { cat "$runs/log" >&2; exit 1; }
-        echo "$name-$seed $(tail -1 "$runs/log")"
-        cp "$run/log.csv" "$out/$name-$seed.csv"
-        measure "$run" "$out/$name-$seed" &
-    done
-done
+train_changes "$out" "$seeds" json "$@"
