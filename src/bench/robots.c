@@ -7,8 +7,6 @@
 #include "control/controller.h"
 #include "crowd/crowd.h"
 
-enum { WARM_STEPS = 100 };
-
 /* Rows of the environments, in the memory of the device. */
 typedef struct {
     int device;
@@ -46,73 +44,51 @@ static void rows_close(Rows *rows) {
     }
 }
 
-/* Who acts, and its copies on the host. */
-typedef struct {
-    Controller controller;
-    float *history, *action;
-} Walker;
-
-/* The actions of the shipped policy. */
-static MildStatus act(const Walker *walker, const Rows *rows, const ExperimentDef *def,
-                      MildError *error) {
-    const PolicyDef *p = &def->policy;
-    const size_t size = (size_t)def->train.envs * sizeof(float);
-    MildStatus status = batch_copy(rows->device, walker->history, rows->history,
-                                   size * (size_t)(p->frames * p->observation), error);
-    if (status == MILD_OK) {
-        walker->controller.act_on(walker->controller.self, def->train.envs, walker->history,
-                                  walker->action);
-        status = batch_copy(rows->device, rows->action, walker->action, size * (size_t)p->actions,
-                            error);
-    }
-    return status;
+/* [steps] Warm ones and those that are timed. */
+static int warm_steps(const Rows *rows) {
+    return rows->device == MILD_BATCH_HOST ? 0 : 100;
 }
 
-/* Seconds of `steps` policy steps, without the time of the walker, which may be NULL. */
-static MildStatus time_steps(Crowd *crowd, const Rows *rows, const ExperimentDef *def,
-                             const Walker *walker, int steps, double *seconds, MildError *error) {
+static int timed_steps(const Rows *rows) {
+    return rows->device == MILD_BATCH_HOST ? 20 : 200;
+}
+
+/* One policy step. script: the actions of every step, [steps][envs][actions]; NULL: nobody acts. */
+static MildStatus step(Crowd *crowd, const Rows *rows, const ExperimentDef *def,
+                       const float *script, int t, MildError *error) {
     const VecView view = {rows->history, rows->critic, rows->estimate, rows->frame};
-    const int envs = def->train.envs, device = rows->device;
+    const size_t envs = (size_t)def->train.envs;
+    const float *action =
+        script ? script + (size_t)t * envs * (size_t)def->policy.actions : rows->action;
+    return crowd_step(crowd, action, rows->reward, rows->flags, rows->flags + envs,
+                      rows->flags + 2 * envs, &view, NULL, error);
+}
+
+/* From the first episodes on: seconds of the timed steps, between which the host does not wait. */
+static MildStatus time_steps(Crowd *crowd, const Rows *rows, const ExperimentDef *def,
+                             const float *script, double *seconds, MildError *error) {
+    const VecView view = {rows->history, rows->critic, rows->estimate, rows->frame};
+    const int warm = warm_steps(rows), all = warm + timed_steps(rows);
+    MildStatus status = crowd_reset(crowd, &view, NULL, error);
     double start = clock_seconds();
-    MildStatus status = MILD_OK;
-    *seconds = 0;
-    for (int t = 0; t < steps && status == MILD_OK; t++) {
-        if (walker) {
-            status = act(walker, rows, def, error);
-            start = clock_seconds();
+    for (int t = 0; t < all && status == MILD_OK; t++) {
+        status = step(crowd, rows, def, script, t, error);
+        if (rows->device != MILD_BATCH_HOST && status == MILD_OK &&
+            (t == warm - 1 || t == all - 1)) {
+            status = device_wait(rows->device, error);
         }
-        if (status == MILD_OK) {
-            status = crowd_step(crowd, rows->action, rows->reward, rows->flags, rows->flags + envs,
-                                rows->flags + 2 * envs, &view, NULL, error);
-        }
-        if (status == MILD_OK && device != MILD_BATCH_HOST && (walker || t == steps - 1)) {
-            status = device_wait(device, error);
-        }
-        if (walker || t == steps - 1) {
-            *seconds += clock_seconds() - start;
-        }
+        start = t == warm - 1 ? clock_seconds() : start;
     }
+    *seconds = clock_seconds() - start;
     return status;
 }
 
 static MildStatus measure(Crowd *crowd, const Rows *rows, const ExperimentDef *def,
-                          const Walker *walker, double *rate, VecStats *stats, MildError *error) {
-    const VecView view = {rows->history, rows->critic, rows->estimate, rows->frame};
-    const int device = rows->device != MILD_BATCH_HOST;
-    const int steps = device ? 200 : 20;
+                          const float *script, double *rate, VecStats *stats, MildError *error) {
     double seconds = 0;
-    MildStatus status = crowd_reset(crowd, &view, NULL, error);
-    if (status == MILD_OK) {
-        status = time_steps(crowd, rows, def, walker, device ? WARM_STEPS : 0, &seconds, error);
-    }
-    if (status == MILD_OK) {
-        status = time_steps(crowd, rows, def, walker, steps, &seconds, error);
-    }
-    if (status == MILD_OK) {
-        status = crowd_take_sums(crowd, stats, NULL, error);
-    }
-    *rate = (double)def->train.envs * steps / seconds;
-    return status;
+    MildStatus status = time_steps(crowd, rows, def, script, &seconds, error);
+    *rate = (double)def->train.envs * timed_steps(rows) / seconds;
+    return status == MILD_OK ? crowd_take_sums(crowd, stats, NULL, error) : status;
 }
 
 static MildStatus march(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
@@ -135,30 +111,90 @@ static MildStatus march(Crowd *crowd, const ExperimentDef *def, const Rows *rows
     return status;
 }
 
-static MildStatus walk(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
-                       const Controller *controller, BenchReport *report, MildError *error) {
+/* ---- a walk: its actions are written down, and walked again by the clock ---- */
+
+/* Room on the host for what the policy sees and does. */
+typedef struct {
+    float *history, *action;
+} Walker;
+
+/* Writes the actions of the policy to the script. */
+static MildStatus write_script(Crowd *crowd, const Rows *rows, const ExperimentDef *def,
+                               const Controller *controller, const Walker *walker, float *script,
+                               MildError *error) {
+    const VecView view = {rows->history, rows->critic, rows->estimate, rows->frame};
     const PolicyDef *p = &def->policy;
-    const size_t envs = (size_t)def->train.envs;
-    Walker walker = {*controller,
-                     calloc(envs * (size_t)(p->frames * p->observation), sizeof(float)),
-                     calloc(envs * (size_t)p->actions, sizeof(float))};
-    double rate = 0;
-    VecStats stats;
-    MildStatus status = walker.history && walker.action
-                            ? measure(crowd, rows, def, &walker, &rate, &stats, error)
-                            : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
-    if (status == MILD_OK) {
-        bench_add(report, "robots", "walking_policy_steps_per_s", rate, "1/s");
-        bench_add(report, "robots", "walking_episodes_ended", stats.episodes, "-");
+    const size_t envs = (size_t)def->train.envs, actions = envs * (size_t)p->actions;
+    MildStatus status = crowd_reset(crowd, &view, NULL, error);
+    for (int t = 0; t < warm_steps(rows) + timed_steps(rows) && status == MILD_OK; t++) {
+        status = batch_copy(rows->device, walker->history, rows->history,
+                            envs * (size_t)(p->frames * p->observation) * sizeof(float), error);
+        if (status == MILD_OK) {
+            controller->act_on(controller->self, def->train.envs, walker->history, walker->action);
+            status = batch_copy(rows->device, script + (size_t)t * actions, walker->action,
+                                actions * sizeof(float), error);
+        }
+        status = status == MILD_OK ? step(crowd, rows, def, script, t, error) : status;
     }
-    free(walker.history);
-    free(walker.action);
     return status;
 }
 
-/* A crowd and its rows, for march, or for walk when there is a controller. */
-static MildStatus with_crowd(const ExperimentDef *def, const Robot *robot, Pool *pool,
+static MildStatus record(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
+                         const Controller *controller, float *script, VecStats *stats,
+                         MildError *error) {
+    const PolicyDef *p = &def->policy;
+    const size_t envs = (size_t)def->train.envs;
+    const Walker walker = {calloc(envs * (size_t)(p->frames * p->observation), sizeof(float)),
+                           calloc(envs * (size_t)p->actions, sizeof(float))};
+    MildStatus status = walker.history && walker.action
+                            ? write_script(crowd, rows, def, controller, &walker, script, error)
+                            : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
+    free(walker.history);
+    free(walker.action);
+    return status == MILD_OK ? crowd_take_sums(crowd, stats, NULL, error) : status;
+}
+
+static MildStatus walk(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
+                       const float *script, const VecStats *recorded, BenchReport *report,
+                       MildError *error) {
+    double rate = 0;
+    VecStats stats;
+    MildStatus status = measure(crowd, rows, def, script, &rate, &stats, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    if (stats.episodes != recorded->episodes || stats.falls != recorded->falls) {
+        return mild_fail(error, MILD_ERROR_RANGE, "bench robots: the walk did not repeat itself");
+    }
+    bench_add(report, "robots", "walking_policy_steps_per_s", rate, "1/s");
+    bench_add(report, "robots", "walking_episodes_ended", stats.episodes, "-");
+    return MILD_OK;
+}
+
+/* ---- both ---- */
+
+static MildStatus walk_twice(const CrowdDef *of, const ExperimentDef *def, const Rows *rows,
                              const Controller *controller, BenchReport *report, MildError *error) {
+    const size_t steps = (size_t)(warm_steps(rows) + timed_steps(rows));
+    const size_t numbers = steps * (size_t)def->train.envs * (size_t)def->policy.actions;
+    float *script = batch_alloc(rows->device, numbers * sizeof *script, error);
+    VecStats recorded;
+    Crowd *crowd = script ? crowd_create(of, error) : NULL;
+    MildStatus status =
+        crowd ? record(crowd, def, rows, controller, script, &recorded, error) : error->status;
+    crowd_destroy(crowd);
+    crowd = status == MILD_OK ? crowd_create(of, error) : NULL;
+    if (status == MILD_OK) {
+        status = crowd ? walk(crowd, def, rows, script, &recorded, report, error) : error->status;
+    }
+    crowd_destroy(crowd);
+    batch_free(rows->device, script);
+    return status;
+}
+
+/* The robots march; or, when there is a controller, walk. */
+static MildStatus with_rows(const ExperimentDef *def, const Robot *robot, Pool *pool,
+                            const Controller *controller, BenchReport *report, MildError *error) {
     const int device = train_device(&def->train);
     Rows rows = {.device = device < 0 ? MILD_BATCH_HOST : device};
     const CrowdDef of = {.task = &def->task,
@@ -168,14 +204,15 @@ static MildStatus with_crowd(const ExperimentDef *def, const Robot *robot, Pool 
                          .envs = def->train.envs,
                          .grounds = 4096,
                          .seed = def->train.seed};
-    Crowd *crowd = crowd_create(&of, error);
-    MildStatus status = crowd ? rows_open(&rows, def, rows.device, error) : error->status;
-    if (status == MILD_OK) {
-        status = controller ? walk(crowd, def, &rows, controller, report, error)
-                            : march(crowd, def, &rows, report, error);
+    MildStatus status = rows_open(&rows, def, rows.device, error);
+    if (status == MILD_OK && controller) {
+        status = walk_twice(&of, def, &rows, controller, report, error);
+    } else if (status == MILD_OK) {
+        Crowd *crowd = crowd_create(&of, error);
+        status = crowd ? march(crowd, def, &rows, report, error) : error->status;
+        crowd_destroy(crowd);
     }
     rows_close(&rows);
-    crowd_destroy(crowd);
     return status;
 }
 
@@ -194,14 +231,14 @@ MildStatus bench_robots(const ExperimentDef *def, BenchReport *report, MildError
     if (status == MILD_OK) {
         experiment_fit_robot(&local, robot);
         robot_set_model(robot, (MildModel)local.task.randomize.model);
-        status = with_crowd(&local, robot, pool, NULL, report, error);
+        status = with_rows(&local, robot, pool, NULL, report, error);
     }
     /* a robot that the shipped policy does not know only marches */
     if (status == MILD_OK &&
         controller_learned(path_data("policies/mild.safetensors", path), robot, pool,
                            local.train.envs, &controller, &unused) == MILD_OK) {
         local.task.assist = 0;
-        status = with_crowd(&local, robot, pool, &controller, report, error);
+        status = with_rows(&local, robot, pool, &controller, report, error);
         controller_destroy(&controller);
     }
     pool_destroy(pool);
