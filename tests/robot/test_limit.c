@@ -6,8 +6,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include <mujoco/mujoco.h>
-
 #include "robot_kit.h"
 
 enum { LEGS = 4 };
@@ -175,74 +173,10 @@ static void test_pressed(void **unused) {
     robot_destroy(stool);
 }
 
-/* ---- thrown about ---- */
-
-/* [J] Kinetic and potential energy. */
-static double energy(RobotSim *sim) {
-    mjModel *m = robot_sim_model(sim);
-    mjData *d = robot_sim_data(sim);
-    mj_comVel(m, d);
-    mj_makeM(m, d);
-    mj_energyPos(m, d);
-    mj_energyVel(m, d);
-    return d->energy[0] + d->energy[1];
-}
-
-/* SA01 without motors falls on the ground from any pose, in any motion, many of its joints against
- * their limits: it never has more energy than at first. Returns the largest gain of a throw, as a
- * share of what it can lose. */
-static double worst_gain(const char *material, double dt, int throws) {
-    const MildTerrain terrain = preset_terrain(material);
-    const RobotVariation nominal = robot_variation_nominal();
-    const double torque[SA01_JOINTS] = {0};
-    RobotSim *sim = new_sim(dt);
-    double worst = 0;
-    for (int n = 0; n < throws; n++) {
-        MildGround *ground = new_ground();
-        Random random = random_at(77, (uint32_t)n, 0);
-        RobotState state = {.qpos = {0, 0, 1.2, 1}};
-        for (int k = 3; k < 7; k++) {
-            state.qpos[k] += random_uniform(&random, -0.3, 0.3);
-        }
-        mju_normalize4(state.qpos + 3);
-        for (int i = 0; i < SA01_JOINTS; i++) {
-            const double low = robot_joint_low(robot)[i], high = robot_joint_high(robot)[i];
-            state.qpos[7 + i] = random_uniform(&random, low, high);
-        }
-        for (int i = 0; i < SA01_NV; i++) {
-            state.qvel[i] = random_uniform(&random, -3, 3) * (i < 6 ? 0.5 : 1);
-        }
-        robot_sim_load(sim, &state, &nominal);
-        state.qpos[2] -= robot_sim_sole_clearance(sim, &terrain) - 0.02;
-        robot_sim_load(sim, &state, &nominal);
-        const double first = energy(sim), scale = robot_total_mass(robot) * 9.81 * 0.8;
-        for (int i = 0; i < (int)(1.5 / dt); i++) {
-            assert_int_equal(robot_sim_step(sim, torque, NULL, &terrain, ground), 0);
-            worst = fmax(worst, (energy(sim) - first) / scale);
-        }
-        free(ground);
-    }
-    robot_sim_destroy(sim);
-    return worst;
-}
-
-static void test_throws(void **unused) {
-    (void)unused;
-    for (int m = 0; m < MATERIALS; m++) {
-        for (int s = 0; s < STEPS; s++) {
-            const double gain = worst_gain(material_name[m], time_step[s], 40);
-            print_message("%-10s %.0f ms: at most %.2g of its energy more\n", material_name[m],
-                          1e3 * time_step[s], gain);
-            assert_true(gain < 1e-3);
-        }
-    }
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_load),
         cmocka_unit_test(test_pressed),
-        cmocka_unit_test(test_throws),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }
