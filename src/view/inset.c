@@ -8,7 +8,7 @@
 #define INSET_LABELS 40 /* [pixels] room for the numbers beside the bar */
 #define INSET_LEAST 64  /* [pixels] height of the bar, for its two numbers */
 #define INSET_TITLE 24
-#define INSET_TITLE_WIDTH 180 /* [pixels] of "sole pressure, kPa" */
+#define INSET_TITLE_CELLS 25 /* width of "sole pressure, kPa" in a picture that has room for it */
 
 static const unsigned char background[3] = {30, 33, 38}, idle[3] = {70, 74, 80},
                            mark[3] = {255, 255, 255};
@@ -61,7 +61,8 @@ InsetLayout inset_layout(const MildSole *const *soles, int feet, int cell) {
     layout.bar_top = INSET_MARGIN + tall;
     layout.bar_right = layout.bar_left + INSET_BAR;
     layout.width = layout.bar_right + INSET_LABELS;
-    layout.width = layout.width > INSET_TITLE_WIDTH ? layout.width : INSET_TITLE_WIDTH;
+    layout.width =
+        layout.width > INSET_TITLE_CELLS * cell ? layout.width : INSET_TITLE_CELLS * cell;
     layout.title_bottom = layout.bar_top + INSET_MARGIN / 2;
     layout.title_height = INSET_TITLE;
     return layout;
