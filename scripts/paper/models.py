@@ -167,8 +167,8 @@ over speeds and seeds of rows in which anybody stayed up."""
     claims = [Claim("on foam25 the fine model gives the highest success", "highest (figure)",
                     f"{', '.join(lead)} {first:.0f} %" + ("" if "mild" in lead else f", mild {good.get(('mild', 'foam25'), 0):.0f} %"),
                     lead == ["mild"], "hardware"),
-              Claim("and the least energy", "least (figure)", f"{cheap} {dear.get(cheap, 0):.2f}, mild {dear.get('mild', 0):.2f}",
-                    cheap == "mild", "hardware")]
+              Claim("and the least energy", "least (figure)", f"{cheap} {dear.get(cheap, 0):.2f}, mild {dear.get('mild', 0):.2f}"
+                    + ("" if len(dear) > 1 else "; nobody else to compare with"), cheap == "mild" and len(dear) > 1, "hardware")]
     heads = [f"{g}: {what}" for g in ("foam25", "foam45") for what in ("upright", "cost of transport", "J/s", "clearance [mm]")]
     return Section("Policies of all models on one foam", text, [figures.grouped(
         {m: [good[m, g] for g in ("foam25", "foam45")] for m in models_of(given)}, ["foam25", "foam45"], "upright [%]")],
