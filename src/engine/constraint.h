@@ -95,20 +95,28 @@ MILD_HD int limit_pushes(const EngineWork *work, int i) {
  *     N = M + sum of e_i e_i^T/R,   f' = f + sum of s r e_i/R,
  *
  * with the side s, reference r and weight 1/R of a row, and the ground that is solved with N and f'
- * agrees with the limits. Sets beyond and held. none: bool, hold none. Before the forces. */
+ * agrees with the limits. none: bool, hold none. Before the forces. */
 LANE_FN void engine_choose_held(const EngineModel *model, EngineWork *work, int none) {
+    const int links = engine_links(&model->tree);
     const int beyond = engine_limits(model, work);
     EACH_LANE(l) {
         LANE_ROLLED
-        for (int i = 1 + LANE(l); i < engine_links(&model->tree); i += LANES) {
-            work->held[i] =
-                beyond && !none && limit_pushes(work, i) ? work->limit_weight[i] : REAL(0);
-        }
-        if (LANE(l) == 0) {
-            work->beyond = (Real)beyond;
+        for (int n = LANE(l); n * ENGINE_HELD_BITS < links; n += LANES) {
+            unsigned bits = n == 0 && beyond;
+            LANE_ROLLED
+            for (int b = n == 0; beyond && !none && b < ENGINE_HELD_BITS; b++) {
+                const int i = n * ENGINE_HELD_BITS + b;
+                bits |= (unsigned)(i < links && limit_pushes(work, i)) << b;
+            }
+            work->held[n] = (Real)bits;
         }
     }
     lanes_meet();
+}
+
+/* bool: the limit of link i is held; of link 0: some joint is beyond its limit. */
+MILD_HD int limit_held(const EngineWork *work, int i) {
+    return (int)((unsigned)work->held[i / ENGINE_HELD_BITS] >> i % ENGINE_HELD_BITS & 1);
 }
 
 /* M <- N and f <- f'. */
@@ -117,10 +125,10 @@ LANE_FN void engine_hold(const EngineTree *tree, EngineWork *work) {
         LANE_ROLLED
         for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
             const int d = 5 + i;
-            if (work->held[i] > 0) {
-                work->mass[d][tree->above[d]] += work->held[i];
+            if (limit_held(work, i)) {
+                work->mass[d][tree->above[d]] += work->limit_weight[i];
                 work->acceleration[d] +=
-                    work->limit_side[i] * work->held[i] * work->limit_reference[i];
+                    work->limit_side[i] * work->limit_weight[i] * work->limit_reference[i];
             }
         }
     }
@@ -134,7 +142,7 @@ LANE_FN int engine_held_push(const EngineTree *tree, const EngineWork *work) {
         others[l] = 0;
         LANE_ROLLED
         for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
-            others[l] = limit_pushes(work, i) == (work->held[i] > 0) ? others[l] : 1;
+            others[l] = limit_pushes(work, i) == limit_held(work, i) ? others[l] : 1;
         }
     }
     return lane_max(others) == 0;
@@ -533,12 +541,12 @@ LANE_FN void engine_start(const EngineTree *tree, EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
         for (int d = LANE(l); d < engine_dofs(tree); d += LANES) {
-            const Real held = d < 6 ? 0 : work->held[d - 5];
+            const int i = d - 5;
             work->now.support.residue[d] = 0;
-            if (held > 0) {
-                work->mass[d][tree->above[d]] -= held;
+            if (i > 0 && limit_held(work, i)) {
+                work->mass[d][tree->above[d]] -= work->limit_weight[i];
                 work->now.support.residue[d] =
-                    work->limit_side[d - 5] * held * limit_residual(work, d - 5);
+                    work->limit_side[i] * work->limit_weight[i] * limit_residual(work, i);
             }
         }
     }

@@ -7,6 +7,7 @@
 #include "engine/model.h"
 
 #define ENGINE_EDGES (4 * ENGINE_CORNERS) /* of all corners' pyramids */
+#define ENGINE_HELD_BITS 24               /* of a whole number that a float holds exactly */
 
 /* Inertia of a link about its anchor in world axes, then the force and the torque about the anchor
  * that its motion takes [N, N m]. */
@@ -62,8 +63,9 @@ typedef struct {
     Real rate[ENGINE_DOFS];         /* [m/s, rad/s] */
     Real acceleration[ENGINE_DOFS]; /* qacc [m/s^2, rad/s^2], of the last step until engine_begin;
                                        L^-T force from there to engine_accelerate */
-    Real held[ENGINE_LINKS];     /* [kg m^2] 1/R of the limits in `factor`, of links; 0 of others */
-    Real beyond;                 /* bool: a joint is beyond its limit */
+    /* Links whose limits are in `factor`, as the bits of whole numbers. Bit 0, the base's: some
+     * joint is beyond its limit. */
+    Real held[(ENGINE_LINKS + ENGINE_HELD_BITS - 1) / ENGINE_HELD_BITS];
     Real wrench[ENGINE_FEET][6]; /* [N, N m] of the ground on the foot, at the reference point */
     /* ---- pose: engine_kinematics ---- */
     Real rotation[ENGINE_LINKS][9]; /* [-] link -> world, row major */

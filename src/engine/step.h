@@ -99,7 +99,7 @@ LANE_FN void engine_smooth(const EngineModel *model, const EngineAction *action,
     engine_gather(tree, work);
     engine_smooth_force(model, action->variation, action->torque, action->push, work);
     engine_mass_matrix(model, action->variation, work);
-    if (work->beyond > 0) {
+    if (limit_held(work, 0)) {
         engine_hold(tree, work);
     }
     engine_factorise(tree, work->mass[0], work->factor[0], work->inverse);
@@ -177,7 +177,7 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
 LANE_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
     engine_accelerate(&model->tree, work, !rigid);
     int newton = 0;
-    if (rigid || work->beyond > 0) {
+    if (rigid || limit_held(work, 0)) {
         engine_limits(model, work); /* anew: engine_save leaves them out */
         newton = rigid || !engine_held_push(&model->tree, work)
                      ? engine_constrain(&model->tree, work, rigid)
