@@ -137,13 +137,16 @@ typedef struct {
     uint8_t done, timeout, valid;
 } Rival;
 
-static void rival_start(Rival *rival, int ground) {
+/* stiffness: factor of the material's. speed: [m/s] forward. */
+static void rival_start(Rival *rival, int ground, double stiffness, double speed) {
     MildError error = {0};
     TaskGround material = {.material = mild_material_default()};
     const int rigid = ground == WEB_RIGID;
     if (!rigid) {
         mild_material_preset(mild_material_preset_name(ground), &material.material);
     }
+    material.material.k_pen *= stiffness;
+    material.material.sigma_cone *= stiffness;
     material.depth = rigid ? 0 : task_standing_depth(robot, &material.material);
     const TaskGrounds grounds = {1, &material};
     const CrowdTrial trial = {.rigid = rigid};
@@ -155,7 +158,7 @@ static void rival_start(Rival *rival, int ground) {
                           .seed = 1,
                           .chosen = &grounds,
                           .trial = &trial};
-    const double stand[3] = {0, 0, 0}, walk[3] = {0.6, 0, 0};
+    const double stand[3] = {0, 0, 0}, walk[3] = {speed, 0, 0};
     const VecView view = {.history = rival->history};
     rival->crowd = crowd_create(&def, &error);
     assert_non_null(rival->crowd);
@@ -191,7 +194,7 @@ static void test_same_steps(void **state) {
         Rival rival = {0};
         double first = 0, worst = 0;
         start(grounds[g], WEB_LEVEL, 0);
-        rival_start(&rival, grounds[g]);
+        rival_start(&rival, grounds[g], 1, 0.6);
         for (int t = 0; t < 60; t++) {
             float action[SA01_JOINTS];
             web_act(rival.history, action);
@@ -229,7 +232,7 @@ static double rival_walk(int ground) {
     Rival rival = {0};
     CrowdSample sample[8];
     double before[2] = {0, 0};
-    rival_start(&rival, ground);
+    rival_start(&rival, ground, 1, 0.6);
     crowd_watch(rival.crowd, sample);
     for (int t = 0; t < 10 * SECOND; t++) {
         float action[SA01_JOINTS];
@@ -331,7 +334,6 @@ static void test_window(void **state) {
     walk(12, 1.0f);
     const double far = (double)web_view()->link[0][3];
     const double ahead = pressed_between(far + 1, far + 4);
-    walk(2, 0);
     walk(12, -1.0f);
     const double back = (double)web_view()->link[0][3], after = pressed_between(0.2, 1.2);
     printf("  %.3f m^2 pressed; after a way to %.2f m and back to %.2f m %.3f m^2\n", before, far,
@@ -410,15 +412,37 @@ static void test_stripes(void **state) {
     assert_true(left == 0 && kept > 0.1);
 }
 
+/* The same of the crowd's robot on a material of that stiffness. */
+static double rival_depth(double stiffness) {
+    Rival rival = {0};
+    rival_start(&rival, preset("foam45"), stiffness, 0);
+    CrowdSample sample[16];
+    assert_true(crowd_samples(rival.crowd) <= 16);
+    crowd_watch(rival.crowd, sample);
+    for (int t = 0; t < 4 * SECOND; t++) {
+        float action[SA01_JOINTS];
+        web_act(rival.history, action);
+        rival_step(&rival, action);
+        assert_false(rival.done);
+    }
+    crowd_destroy(rival.crowd);
+    return (double)(sample[0].foot[0].depth + sample[0].foot[1].depth) / 2;
+}
+
 static void test_sliders(void **state) {
     (void)state;
     double load = 0;
     start(preset("foam45"), WEB_LEVEL, 1);
     const double hard = standing_depth(3), plain = standing_depth(1), soft = standing_depth(0.7);
-    printf("  depth on foam45 at 0.7, 1, 3 times its stiffness: %.1f, %.1f, %.1f mm\n", 1e3 * soft,
-           1e3 * plain, 1e3 * hard);
-    /* a level sole at rest: 1.8 and 3.8 times; of k_pen alone the robot stands at 1.7 and 1.0 */
-    assert_true(soft > 1.6 * plain && plain > 1.8 * hard);
+    const double hard_rival = rival_depth(3), soft_rival = rival_depth(0.7);
+    printf(
+        "  depth on foam45 at 0.7, 1, 3 times its stiffness: %.1f, %.1f, %.1f mm; of the crowd's "
+        "robot %.1f, -, %.1f mm\n",
+        1e3 * soft, 1e3 * plain, 1e3 * hard, 1e3 * soft_rival, 1e3 * hard_rival);
+    /* with k_pen alone three times as large the feet are twice as deep */
+    assert_true(fabs(hard - hard_rival) < 0.15 * hard_rival);
+    assert_true(fabs(soft - soft_rival) < 0.15 * soft_rival);
+    assert_true(soft > 1.6 * plain); /* a level sole at rest: 1.8 */
     for (int t = 0; t < 4 * SECOND; t++) {
         web_step(0, 0, 0);
         load += carried() / (4 * SECOND);
