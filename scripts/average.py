@@ -8,22 +8,32 @@ import sys
 import zlib
 
 
+def fail(text):
+    print(f"average: {text}", file=sys.stderr)
+    sys.exit(2)
+
+
 def split(path):
-    """Header as text and as a dict, and the numbers, of a file whose tensors are all float; src/learn/safetensors.h says what is in it."""
-    whole = pathlib.Path(path).read_bytes()
-    size = struct.unpack("<Q", whole[:8])[0]
-    header = json.loads(whole[8 : 8 + size])
-    shapes = {name: (entry["shape"], entry["data_offsets"]) for name, entry in header.items() if name != "__metadata__"}
-    if any(entry["dtype"] != "F32" for name, entry in header.items() if name != "__metadata__"):
-        sys.exit(f"average: {path}: weights are not F32")
-    return header, shapes, struct.unpack(f"<{(len(whole) - 8 - size) // 4}f", whole[8 + size :])
+    """Header as a dict, shapes and places of the tensors, and their numbers; src/learn/safetensors.h says what is in such a file."""
+    try:
+        whole = pathlib.Path(path).read_bytes()
+        size = struct.unpack("<Q", whole[:8])[0]
+        header = json.loads(whole[8 : 8 + size])
+        shapes = {name: (entry["shape"], entry["data_offsets"]) for name, entry in header.items() if name != "__metadata__"}
+        if any(header[name]["dtype"] != "F32" for name in shapes):
+            fail(f"{path}: weights are not F32; a policy in half precision cannot be one of the two")
+        return header, shapes, struct.unpack(f"<{max(end for _, (_, end) in shapes.values()) // 4}f", whole[8 + size :])
+    except OSError as error:
+        fail(f"{path}: {error.strerror}")
+    except (ValueError, KeyError, TypeError, AttributeError, struct.error):
+        fail(f"{path}: not a whole policy")
 
 
 def average(first, second, share):
     header, shapes, a = split(first)
     _, others, b = split(second)
     if shapes != others:
-        sys.exit(f"average: {first} and {second} have other networks")
+        fail(f"{first} and {second} have other networks")
     header["__metadata__"]["crc32"] = "00000000"
     text = json.dumps(header, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 8)
@@ -34,12 +44,16 @@ def average(first, second, share):
 
 def main():
     if len(sys.argv) != 5:
-        sys.exit(f"average: {__doc__}")
+        fail("usage: average.py A.safetensors B.safetensors SHARE_OF_B OUT.safetensors")
     try:
-        whole = average(sys.argv[1], sys.argv[2], float(sys.argv[3]))
-    except (OSError, ValueError, KeyError, struct.error) as error:
-        sys.exit(f"average: {error}")
-    pathlib.Path(sys.argv[4]).write_bytes(whole)
+        share = float(sys.argv[3])
+    except ValueError:
+        fail(f"{sys.argv[3]}: not a number; give the share of the second policy, 0 .. 1")
+    whole = average(sys.argv[1], sys.argv[2], share)
+    try:
+        pathlib.Path(sys.argv[4]).write_bytes(whole)
+    except OSError as error:
+        fail(f"{sys.argv[4]}: {error.strerror}")
 
 
 if __name__ == "__main__":

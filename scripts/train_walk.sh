@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Trains the shipped policy from nothing on one GPU, 45 minutes on an H100 or H200: seven stages, each from the one before, and a mean of
-# the last two trainings. configs/walk.ini is the last stage. docs/training-log.md says why there are so many.
+# the last two trainings. (The shipped policy had its first four stages before joint limits were mended.) configs/walk.ini is the
+# last stage. docs/training-log.md says why there are so many.
 # Usage: scripts/train_walk.sh FOLDER
 set -euo pipefail
 if [ $# -ne 1 ]; then

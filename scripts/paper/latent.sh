@@ -19,6 +19,7 @@ change=(
     [window]="--ppo.decoder_target=ground --task.history_stride=16"
     [free]="--ppo.decoder_target=ground --ppo.kl_weight=0.01 --ppo.free_bits=0.25"
 )
+
 # measure RUN NAME-SEED: walks with and without z, and what z knows.
 measure() {
     local policy=(eval --policy "$1/policy.safetensors" --config "$1/config.ini") grounds=rigid,rubber,foam60,foam45,foam28,foam25,grass,sand_loose,sand_dense

@@ -8,9 +8,17 @@ import sys
 FIRST = "as_it_is"
 
 
+def fail(text):
+    print(f"worth: {text}", file=sys.stderr)
+    sys.exit(2)
+
+
 def measures(path):
     """Upright trials, trials, and means over the rows in which at least half of the trials stayed up."""
-    rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    except (ValueError, KeyError, TypeError):
+        fail(f"{path}: not a table of mild eval --json")
     walked = [row for row in rows if 2 * row["success"] >= row["trials"]]
 
     def mean(values):
@@ -28,12 +36,12 @@ def spread(values, digits):
 
 def main():
     if len(sys.argv) != 2:
-        sys.exit("worth: usage: worth.py FOLDER")
+        fail("usage: worth.py FOLDER")
     runs = {}
     for path in sorted(pathlib.Path(sys.argv[1]).glob("*-*.json")):
         runs.setdefault(path.stem.rsplit("-", 1)[0], []).append(measures(path))
     if not runs:
-        sys.exit(f"worth: no NAME-SEED.json in {sys.argv[1]}; scripts/paper/worth.sh makes them")
+        fail(f"no NAME-SEED.json in {sys.argv[1]}; scripts/paper/worth.sh makes them")
     print("| set back | seeds | upright | speed off [m/s] | cost of transport | clearance [mm] | largest torque [N m] |\n|---|---|---|---|---|---|---|")
     for name in sorted(runs, key=lambda name: (name != FIRST, name)):
         up, trials, error, cost, clearance, torque = zip(*runs[name])

@@ -44,6 +44,7 @@ change=(
     [epsilon]="--ppo.epsilon=0.3"
     [anneal]="--ppo.anneal=0,0 --ppo.average=0"
 )
+
 measure() { # RUN NAME-SEED
     "$mild" eval --policy "$1/policy.safetensors" --config "$1/config.ini" --train.device=cpu --train.robots=mujoco \
         --ground rigid,rubber,foam45,sand_loose --speed 0.3,0.6 --trials 10 --threads 4 --json "$2.part" >/dev/null

@@ -158,7 +158,7 @@ static MildStatus walk(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
                        const float *script, const VecStats *recorded, BenchReport *report,
                        MildError *error) {
     double rate = 0;
-    VecStats stats;
+    VecStats stats = {0};
     MildStatus status = measure(crowd, rows, def, script, &rate, &stats, error);
     if (status != MILD_OK) {
         return status;
@@ -175,10 +175,10 @@ static MildStatus walk(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
 
 static MildStatus walk_twice(const CrowdDef *of, const ExperimentDef *def, const Rows *rows,
                              const Controller *controller, BenchReport *report, MildError *error) {
-    const size_t steps = (size_t)(warm_steps(rows) + timed_steps(rows));
-    const size_t numbers = steps * (size_t)def->train.envs * (size_t)def->policy.actions;
+    const int steps = warm_steps(rows) + timed_steps(rows);
+    const size_t numbers = (size_t)steps * (size_t)def->train.envs * (size_t)def->policy.actions;
     float *script = batch_alloc(rows->device, numbers * sizeof *script, error);
-    VecStats recorded;
+    VecStats recorded = {0};
     Crowd *crowd = script ? crowd_create(of, error) : NULL;
     MildStatus status =
         crowd ? record(crowd, def, rows, controller, script, &recorded, error) : error->status;

@@ -20,6 +20,30 @@ printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3\n' >short
 bad "latent.py: short: .*; give what mild eval --latent wrote" latent short
 printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3,1\n' >one
 bad "latent.py: one: trials are shorter than 2.8 s or fewer than 2" latent one
+average() { "$python" "$root/scripts/average.py" "$@"; }
+bad "average: usage: average.py" average
+bad "average: none: No such file" average none none 0.5 mean
+bad "average: foreign: not a whole policy" average foreign foreign 0.5 mean
+bad "average: .*mild.safetensors: weights are not F32" average "$root/policies/mild.safetensors" "$root/policies/mild.safetensors" 0.5 mean
+"$python" "$root/tests/export/make_policy.py" "$root/policies/mild.safetensors" a 1
+"$python" "$root/tests/export/make_policy.py" "$root/policies/mild.safetensors" b 2
+head -c 3000 a >torn
+bad "average: torn: not a whole policy" average torn a 0.5 mean
+bad "average: half: not a number" average a b half mean
+[ -e mean ] && fail "average wrote after an error"
+average a b 0.25 mean || fail "average"
+"$python" - <<'CHECK' || fail "the mean is another"
+import json, numpy
+def numbers(path):
+    whole = open(path, "rb").read()
+    return numpy.frombuffer(whole[8 + int.from_bytes(whole[:8], "little"):], "<f4")
+assert numpy.abs(0.75 * numbers("a") + 0.25 * numbers("b") - numbers("mean")).max() < 1e-6 < numpy.abs(numbers("a") - numbers("b")).max()
+CHECK
+good "$mild" eval --policy mean --ground rigid --trials 1 --seconds 0.1
+worth() { "$python" "$root/scripts/paper/worth.py" "$@"; }
+bad "worth: no NAME-SEED.json in ." worth .
+echo '{' >torn-1.json
+bad "worth: torn-1.json: not a table" worth .
 # its figures need what scripts/paper/requirements.txt names
 "$python" -c 'import sklearn' 2>/dev/null && bad "paper.py: unknown experiment nosuch; there are table2 " "$python" -B "$root/scripts/paper/paper.py" nosuch
 finish "scripts: bad input"

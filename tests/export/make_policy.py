@@ -1,5 +1,5 @@
 """A random policy for SA01 in the place of a trained one: other widths, one theta1 and theta2 for each dimension of z.
-Usage: make_policy.py POLICY OTHER"""
+Usage: make_policy.py POLICY OTHER [SEED]"""
 
 import json
 import sys
@@ -33,7 +33,7 @@ shapes = {
     "actor": [47 + 11 + 5, 33, 12],
     "critic": [104, 8, 1],
 }
-random = np.random.default_rng(1)
+random = np.random.default_rng(int(sys.argv[3]) if len(sys.argv) > 3 else 1)
 tensors, data = {}, b""
 for net, widths in shapes.items():
     for layer, (columns, rows) in enumerate(zip(widths, widths[1:])):
