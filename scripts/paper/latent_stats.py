@@ -3,11 +3,14 @@ import csv
 
 import numpy as np
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from sklearn.ensemble import ExtraTreesRegressor
 from sklearn.linear_model import RidgeCV
 from sklearn.manifold import TSNE
 from sklearn.metrics import r2_score
+from sklearn.model_selection import cross_val_score
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
+from sklearn.svm import SVR
 from threadpoolctl import threadpool_limits
 
 PERIOD = 0.8   # [s] of the gait
@@ -17,7 +20,7 @@ PHASES = 8
 
 
 def read(paths):
-    """Columns of CSVs of --latent, one after the other: {name: array}."""
+    """Columns of CSVs of --latent or --actions, one after the other: {name: array}."""
     rows = []
     for path in paths:
         with open(path, newline="", encoding="utf-8") as file:
@@ -106,22 +109,47 @@ def latent(data):
     return found, rows, moments
 
 
-def regression(paths, known, names):
-    """z~ of a walk in each file against the numbers that are known of its ground: rows, and {name: R2 of those held out}."""
-    values, kept = [], []
-    for path, truth in zip(paths, known):
-        with open(path, encoding="utf-8") as file:
-            late = any(float(row["time_s"]) >= START for row in csv.DictReader(file))
-        if late:  # it has not fallen at once
-            values.append(wide(read([path]), "modulated").mean(0))
-            kept.append(truth)
-    values, known = np.array(values), np.array(kept)
-    held = np.arange(len(values)) % 3 == 0
-    model = make_pipeline(StandardScaler(), RidgeCV(np.logspace(-3, 3, 13))).fit(values[~held], known[~held])
-    told = model.predict(values[held])
-    rows = [{**{name: float(t) for name, t in zip(names, truth)}, **{f"{name} from z~": float(t) for name, t in zip(names, guess)}}
-            for truth, guess in zip(known[held], told)]
-    return rows, {name: float(r2_score(known[held][:, i], told[:, i])) for i, name in enumerate(names)}
+def by_phase(values, phase):
+    """Mean and deviation in each tenth of the gait, one after the other."""
+    tenth = np.floor(phase % 1 * 10).astype(int)
+    return np.concatenate([of(values[tenth == i], 0) for i in range(10) for of in (np.mean, np.std)])
+
+
+def walk(latent, actions, stances):
+    """{what is known of one walk: numbers}, or None for a walk that fell: z~, the sensors' readings, and the true state with each depth."""
+    seen = read([actions])
+    if not seen or seen["time_s"].max() < 2 * START:
+        return None
+    state = np.hstack([wide(seen, prefix) for prefix in ("quaternion", "omega", "angle", "speed_leg", "action")])
+    with open(stances, newline="", encoding="utf-8") as file:
+        steps = [[float(row[name]) for name in ("depth_m", "duration_s", "forward_m", "left_m", "apex_m")]
+                 for row in csv.DictReader(file) if float(row["start_s"]) >= START]
+    return {"z~": wide(read([latent]), "modulated").mean(0), "the sensors": by_phase(wide(seen, "observation"), seen["phase"]),
+            "the true state, and the depth of every stance":
+                np.concatenate([by_phase(state, seen["phase"]), np.mean(steps, 0), np.std(steps, 0)])}
+
+
+def told(values, known, held):
+    """The held-out numbers from the values, by that of three regressions which does best among the others (five folds)."""
+    best = max((make_pipeline(StandardScaler(), RidgeCV(np.logspace(-3, 4, 15))), make_pipeline(StandardScaler(), SVR(C=10, epsilon=0.05)),
+                ExtraTreesRegressor(100, min_samples_leaf=2, max_features=min(1.0, 60 / values.shape[1]), random_state=0)),
+               key=lambda model: cross_val_score(model, values[~held], known[~held], cv=5).mean())
+    return best.fit(values[~held], known[~held]).predict(values[held])
+
+
+def regression(seen, known, names):
+    """What is known of walks (walk) against numbers of their grounds: rows of z~, and {(from, name): R2}; every third ground is held out."""
+    known = np.array([numbers for numbers, one in zip(known, seen) if one])
+    seen = [one for one in seen if one]
+    held, found, rows = np.arange(len(seen)) % 3 == 0, {}, []
+    with threadpool_limits(1):
+        for source in seen[0]:
+            values = np.array([one[source] for one in seen])
+            guess = np.column_stack([told(values, known[:, i], held) for i in range(len(names))])
+            found.update({(source, name): float(r2_score(known[held][:, i], guess[:, i])) for i, name in enumerate(names)})
+            rows = rows or [{**dict(zip(names, map(float, numbers))), **{f"{name} from z~": float(g) for name, g in zip(names, guesses)}}
+                            for numbers, guesses in zip(known[held], guess)]
+    return rows, found
 
 
 def course(path):
