@@ -138,6 +138,7 @@ for option in "--controller stand" "--ground rubber+grass" "--terrain.memory=tru
     bad "train.robots *= *mujoco" "${batch[@]}" $option
 done
 bad "train.device = gpu: neither cpu, cuda nor cuda:N" "${batch[@]}" --train.device=gpu
+bad "train.device = cuda:15: ." "$mild" train --out no_gpu --train.device=cuda:15 --train.envs=8
 bad "leave it out, or give --train.robots=batch" "$mild" eval --train.device=cuda --train.robots=mujoco
 bad "nearest is 'train.robots'" "$mild" eval --train.robot=batch
 

@@ -14,6 +14,7 @@ bad "no file link/index.html to read" "$mild" web --folder link
 for file in index.html style.css mild.js mild.wasm robot.bin; do
     head -c 50000 /dev/urandom >page/$file
 done
+bad "name an --address of this" "$mild" web --folder page --address 192.0.2.1
 bad "not a number such as 127.0.0.1" "$mild" web --folder page --address localhost
 echo secret >secret.html
 ln -s ../secret.html page/link.html

@@ -213,7 +213,11 @@ bad "is not HOST:PORT" "$mild" drive --listen 9870
 bad "is not HOST:PORT" "$mild" drive --listen 127.0.0.1:99999
 bad "is not HOST:PORT" "$mild" drive --simulate --connect :9870
 bad "no_such.invalid" "$mild" drive --listen no_such.invalid:9870
-bad "192.0.2.1" "$mild" drive --listen 192.0.2.1:9870
+bad "192.0.2.1.*; name an address of this machine" "$mild" drive --listen 192.0.2.1:9870
+start first
+bad "$address: .* in use; end the program" "$mild" drive --listen "$address"
+kill -INT "$runner"
+wait "$runner"
 bad "no_such.safetensors" "$mild" drive --policy no_such.safetensors
 bad "is for robot sa01, not for go1" "$mild" drive --robot go1
 bad "/dev/input/none" "$mild" drive --gamepad /dev/input/none
