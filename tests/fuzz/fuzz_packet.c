@@ -28,8 +28,8 @@ static void write_policy(void) {
     int *const hidden[] = {def.encoder_hidden, def.decoder_hidden, def.actor_hidden,
                            def.critic_hidden};
     for (int n = 0; n < 4; n++) {
+        memset(hidden[n], 0, sizeof def.encoder_hidden);
         hidden[n][0] = 4;
-        hidden[n][1] = 0;
     }
     Policy *policy = policy_create(&def, 1, &error);
     fuzz_check(policy && policy_save(policy, narrow, "", &error) == MILD_OK);
