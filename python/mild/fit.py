@@ -80,10 +80,15 @@ class GroundFit:
         return _ground._fit_forces(self._plate()[0], self.material_, _rows(X, np.zeros(len(X))))
 
     def score(self, X, y):
-        """Coefficient of determination R^2 of predict(X) against y; NaN where all of y are the same."""
+        """Coefficient of determination R^2 of predict(X) against y, in scikit-learn's convention: where all of y are the same, 1 if
+        they are predicted exactly, else 0; NaN for a single row."""
         y = _column("y", y)
         missed, spread = y - self.predict(X), y - y.mean()
-        return 1 - float(missed @ missed) / float(spread @ spread) if spread.any() else math.nan
+        if len(y) < 2:
+            return math.nan
+        if np.ptp(y) == 0:
+            return float(not missed.any())
+        return 1 - float(missed @ missed) / float(spread @ spread)
 
     def _plate(self):
         """The plate in the elements of the model, and its smaller side [m]."""

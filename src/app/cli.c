@@ -239,7 +239,8 @@ static int take_override(const CliCommand *command, int argc, char **argv, int *
     return 0;
 }
 
-static int take_option(const CliCommand *command, int argc, char **argv, int *index) {
+static int take_option(const CliCommand *command, int argc, char **argv, int *index,
+                       CliArgs *args) {
     const char *word = argv[*index] + 2, *equals = strchr(word, '=');
     char name[64];
     snprintf(name, sizeof name, "%.*s", equals ? (int)(equals - word) : (int)strlen(word), word);
@@ -248,6 +249,7 @@ static int take_option(const CliCommand *command, int argc, char **argv, int *in
         if (strcmp(option->name, name) != 0) {
             continue;
         }
+        args->given |= UINT64_C(1) << i;
         if (option->type == CLI_FLAG) {
             if (equals) {
                 return cli_fail_text(command->name, "--%s takes no value", name);
@@ -274,15 +276,19 @@ static int take_word(const CliCommand *command, int argc, char **argv, int *inde
         if (is_override && command->overrides) {
             return take_override(command, argc, argv, index, args);
         }
-        return take_option(command, argc, argv, index);
+        return take_option(command, argc, argv, index, args);
     }
     if (word[0] == '-' && word[1]) {
         return cli_fail_text(command->name, "unknown option %s; options start with two dashes",
                              word);
     }
     if (args->positional_count >= command->positional_max) {
-        return cli_fail_text(command->name, "unexpected word '%s' (mild %s --help)", word,
-                             command->name);
+        return command->positional_max > 0
+                   ? cli_fail_text(command->name,
+                                   "unexpected word '%s'; it takes at most %d (mild %s --help)",
+                                   word, command->positional_max, command->name)
+                   : cli_fail_text(command->name, "unexpected word '%s' (mild %s --help)", word,
+                                   command->name);
     }
     args->positional[args->positional_count++] = word;
     return 0;
@@ -371,8 +377,21 @@ static int check_files(const CliCommand *command, const CliArgs *args) {
     return 0;
 }
 
+const char *cli_first_given(const CliCommand *command, const CliArgs *args,
+                            const char *const *names) {
+    for (; *names; names++) {
+        for (int i = 0; i < command->option_count; i++) {
+            if (args->given >> i & 1 && strcmp(command->options[i].name, *names) == 0) {
+                return *names;
+            }
+        }
+    }
+    return NULL;
+}
+
 CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args) {
     args->positional_count = args->override_count = 0;
+    args->given = 0;
     for (int i = 1; i < argc; i++) {
         if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
             help_printer(command);

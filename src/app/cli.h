@@ -75,6 +75,7 @@ typedef struct {
     int positional_count;
     const char *overrides[CLI_OVERRIDES_MAX]; /* "section.key=value" */
     int override_count;
+    uint64_t given;                      /* bit i: options[i] of the command is on the line */
     char joined[CLI_OVERRIDES_MAX][160]; /* storage of overrides given as two words */
 } CliArgs;
 
@@ -83,6 +84,10 @@ typedef enum { CLI_RUN, CLI_DONE, CLI_BAD } CliOutcome;
 /* Parses argv[1..]. CLI_DONE: the help was printed, exit with 0. CLI_BAD: an error was printed to
  * stderr, exit with CLI_EXIT_BAD_INPUT. */
 CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *args);
+
+/* The first of the options that is on the line, or NULL. names: without dashes, ended by NULL. */
+const char *cli_first_given(const CliCommand *command, const CliArgs *args,
+                            const char *const *names);
 
 /* Chooses who prints a command's help; NULL: cli_parse itself, as text on standard output. */
 void cli_set_help(void (*print)(const CliCommand *command));

@@ -260,25 +260,20 @@ static MildStatus run_simulated(Drive *d, Robot *robot, const CliArgs *args, Mil
 
 /* ---- the command ---- */
 
-/* Options that the other half of the command reads. */
+/* Fails when an option is there that only the other half of the command reads. */
+static int refuse_other_half(const CliCommand *command, const CliArgs *args, int simulate) {
+    static const char *const runner[] = {"policy",      "listen",       "command",    "gamepad",
+                                         "no-keys",     "late",         "damp-after", "speed-limit",
+                                         "angle-limit", "torque-share", NULL},
+                             *const robot[] = {"connect", "ground", "model", "lockstep", "patience",
+                                               "drop",    "delay",  "seed",  NULL};
+    const char *other = cli_first_given(command, args, simulate ? runner : robot);
+    return !other     ? 0
+           : simulate ? cli_fail_text("drive", "--%s is for the runner, not for --simulate", other)
+                      : cli_fail_text("drive", "--%s needs --simulate", other);
+}
+
 static MildStatus check_options(const Drive *d, MildError *error) {
-    const char *other = d->simulate             ? d->listen          ? "--listen"
-                                                  : d->gamepad       ? "--gamepad"
-                                                  : d->command.count ? "--command"
-                                                                     : NULL
-                        : d->connect            ? "--connect"
-                        : d->ground             ? "--ground"
-                        : d->model              ? "--model"
-                        : d->lockstep           ? "--lockstep"
-                        : d->simulated.drop > 0 ? "--drop"
-                        : d->delay.count        ? "--delay"
-                                                : NULL;
-    if (other) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         d->simulate ? "%s is for the runner, not for --simulate"
-                                     : "%s needs --simulate",
-                         other);
-    }
     if (d->command.count && d->command.count != 3) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "--command: forward, sideways and turning speed, as 0.5,0,0");
@@ -381,6 +376,10 @@ int cmd_drive(int argc, char **argv) {
     const CliOutcome outcome = cli_parse(&command, argc, argv, &args);
     if (outcome != CLI_RUN) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
+    }
+    const int bad = refuse_other_half(&command, &args, d.simulate);
+    if (bad) {
+        return bad;
     }
     MildError error = {0};
     return run_drive(&d, &args, &error) == MILD_OK ? 0 : cli_fail("drive", &error);

@@ -12,6 +12,7 @@
 
 typedef struct {
     const char *policy, *robot, *config, *onnx, *c; /* onnx, c: NULL: not given */
+    int in_double;
     TaskDef task;
 } Exporting;
 
@@ -28,7 +29,8 @@ static MildStatus write_files(const Exporting *e, const Robot *robot, MildError 
                            .network = &network,
                            .parameters = policy_parameters(policy),
                            .note = note,
-                           .version = build_version()};
+                           .version = build_version(),
+                           .in_double = e->in_double};
     status = network_layout(&network, policy_def(policy), error);
     if (status == MILD_OK && e->c) {
         status = export_c(&export, e->c, error);
@@ -59,6 +61,9 @@ int cmd_export(int argc, char **argv) {
          "config that the policy was trained with, for its section [task]"},
         {"onnx", CLI_OUTPUT, &e.onnx, 0, 0, "FILE",
          "write one graph with weights, history and metadata"},
+        {"double", CLI_FLAG, &e.in_double, 0, 0, NULL,
+         "compute the graph in double precision, in more than twice the time; its inputs and "
+         "outputs stay 32-bit floats"},
         {"c", CLI_OUTPUT_LATER, &e.c, 0, 0, "FOLDER",
          "make a folder with policy.h, policy.c, policy_weights.h and example.c, in C99 that "
          "needs libm alone and allocates nothing"},
@@ -83,6 +88,9 @@ int cmd_export(int argc, char **argv) {
     }
     if (!e.onnx && !e.c) {
         return cli_fail_text("export", "nothing to write; give --onnx FILE or --c FOLDER");
+    }
+    if (e.in_double && !e.onnx) {
+        return cli_fail_text("export", "--double is for the graph of --onnx FILE");
     }
     const int bad = cli_refuse_dash("export", "onnx", e.onnx);
     if (bad) {

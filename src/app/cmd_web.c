@@ -1,11 +1,18 @@
 /* mild web: serves the walk in a browser that `make web` built (docs/web.md). */
 #include <stdio.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/serve.h"
 #include "base/paths.h"
+
+/* As serve_folder opens them: no links. */
+static int is_served(const char *path) {
+    struct stat about;
+    return lstat(path, &about) == 0 && S_ISREG(about.st_mode) && access(path, R_OK) == 0;
+}
 
 static MildStatus check_built(const char *folder, MildError *error) {
     static const char *const files[] = {"index.html", "mild.wasm", "robot.bin"};
@@ -15,9 +22,9 @@ static MildStatus check_built(const char *folder, MildError *error) {
         if (status != MILD_OK) {
             return status;
         }
-        if (access(path, R_OK) != 0) {
+        if (!is_served(path)) {
             return mild_fail(error, MILD_ERROR_IO,
-                             "%.200s is not there: the page is not built; run `make web`", path);
+                             "no file %.200s to read: the page is not built; run `make web`", path);
         }
     }
     return MILD_OK;

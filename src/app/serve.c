@@ -219,8 +219,10 @@ int serve_listen(const char *address, int *port, MildError *error) {
         *port = ntohs(at.sin_port);
         return listening;
     }
-    mild_fail(error, MILD_ERROR_IO, "%.60s, port %d: %s; try --port 0, which takes a free one",
-              address, *port, strerror(errno));
+    const char *remedy = errno == EADDRNOTAVAIL ? "name an --address of this machine"
+                                                : "try --port 0, which takes a free one";
+    mild_fail(error, MILD_ERROR_IO, "%.60s, port %d: %s; %s", address, *port, strerror(errno),
+              remedy);
     if (listening >= 0) {
         close(listening);
     }

@@ -37,6 +37,14 @@ static MildStatus find_address(const char *option, const char *text, struct sock
     return MILD_OK;
 }
 
+/* What the user can do about a failed bind, or "". */
+static const char *remedy(int reason) {
+    return reason == EADDRINUSE      ? "; end the program that has it, or name another port"
+           : reason == EADDRNOTAVAIL ? "; name an address of this machine"
+           : reason == EACCES        ? "; name a port from 1024"
+                                     : "";
+}
+
 static MildStatus open_bound(Udp *udp, const char *option, const char *text, MildError *error) {
     socklen_t size = sizeof udp->own;
     udp->has_peer = 0;
@@ -44,7 +52,8 @@ static MildStatus open_bound(Udp *udp, const char *option, const char *text, Mil
     if (udp->file < 0 || udp->file >= FD_SETSIZE || fcntl(udp->file, F_SETFL, O_NONBLOCK) != 0 ||
         bind(udp->file, (const struct sockaddr *)&udp->own, sizeof udp->own) != 0 ||
         getsockname(udp->file, (struct sockaddr *)&udp->own, &size) != 0) {
-        mild_fail(error, MILD_ERROR_IO, "--%s: %.100s: %s", option, text, strerror(errno));
+        mild_fail(error, MILD_ERROR_IO, "--%s: %.100s: %s%s", option, text, strerror(errno),
+                  remedy(errno));
         udp_close(udp);
         return MILD_ERROR_IO;
     }

@@ -54,11 +54,13 @@ MildStatus motor_log(const MotorLogDef *def, int *falls, MildError *error) {
     task.motors = &recorded;
     *falls = 0;
     TaskEnv *env = aligned_alloc(64, task_env_bytes(&task, def->robot));
-    RobotSim *sim = robot_sim_create(def->robot, task.physics_dt, error);
-    if (!env || !sim) {
-        free(env);
-        robot_sim_destroy(sim);
+    if (!env) {
         return mild_fail(error, MILD_ERROR_MEMORY, "log: out of memory");
+    }
+    RobotSim *sim = robot_sim_create(def->robot, task.physics_dt, error);
+    if (!sim) {
+        free(env);
+        return error->status;
     }
     record_print_header(def->robot, def->csv);
     task_env_init(env, &task, def->robot, def->seed, 0);

@@ -13,6 +13,7 @@ typedef struct {
     const float *parameters;
     const char *note;    /* of the policy's file */
     const char *version; /* of this program */
+    int in_double;       /* bool: the ONNX graph computes in double precision, between floats */
 } Export;
 
 /* One graph with weights and metadata, written whole or not at all. Fails in a program without

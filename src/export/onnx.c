@@ -3,6 +3,8 @@
  *   obs [batch, observation], frames_in [batch, held, observation]
  *     -> actions [batch, joints], frames_out (frames_in for the next step), estimates
  *
+ * With export->in_double everything between is computed in double precision.
+ *
  * Messages point into a Graph and to the policy's weights; nothing is copied before it is packed.
  * Names of ONNX's messages and operators are those of its schema and its operator list. */
 #include <stdarg.h>
@@ -18,7 +20,7 @@
 #define OPERATOR_SET 13
 
 enum {
-    NODES_MAX = 64,
+    NODES_MAX = 128,
     TENSORS_MAX = 96,
     INPUTS_MAX = 4,
     RANK_MAX = 4,
@@ -163,6 +165,21 @@ static void set_ints(Node *node, char *name, int64_t value) {
     a->n_ints = 1;
 }
 
+static void add_cast(Graph *g, char *output, char *input, int type) {
+    set_int(add_node(g, "Cast", output, 1, input), "to", type);
+}
+
+/* `name` as the graph computes: itself, or in double precision. Runtimes do so once for weights,
+ * which stay 32-bit floats in the file. */
+static char *widen(Graph *g, char *name) {
+    if (!g->export->in_double) {
+        return name;
+    }
+    char *wide = name_of(g, "%s_double", name);
+    add_cast(g, wide, name, ONNX__TENSOR_PROTO__DATA_TYPE__DOUBLE);
+    return wide;
+}
+
 /* Numbers from..to-1 along axis 1. */
 static char *add_slice(Graph *g, char *output, char *input, int from, int to) {
     const int64_t ends[2] = {from, to}, axis = 1;
@@ -173,6 +190,22 @@ static char *add_slice(Graph *g, char *output, char *input, int from, int to) {
          *end = add_integers(g, name[1], &ends[1], 1);
     snprintf(name[0], NAME_SIZE, "%s_axis", output);
     add_node(g, "Slice", output, 4, input, first, end, add_integers(g, name[0], &axis, 1));
+    return output;
+}
+
+/* ELU. ONNX Runtime has none in double precision: there max(x, exp(min(x, 0)) - 1), because
+ * exp(x) - 1 is never below x. */
+static char *add_elu(Graph *g, char *output, char *x) {
+    if (!g->export->in_double) {
+        add_node(g, "Elu", output, 1, x);
+        return output;
+    }
+    char *negative = name_of(g, "%s_negative", output), *power = name_of(g, "%s_exp", output),
+         *below = name_of(g, "%s_below", output);
+    add_node(g, "Min", negative, 2, x, "zero_double");
+    add_node(g, "Exp", power, 1, negative);
+    add_node(g, "Sub", below, 2, power, "one_double");
+    add_node(g, "Max", output, 2, x, below);
     return output;
 }
 
@@ -188,25 +221,23 @@ static char *add_mlp(Graph *g, const Mlp *mlp, const char *name, char *x, char *
         snprintf(text, sizeof text, "%s.%d.bias", name, 2 * l);
         char *bias = add_weights(g, text, parameters + layer->bias, layer->out, 0);
         char *y = is_last ? output : name_of(g, "%s.%d", name, 2 * l);
-        set_int(add_node(g, "Gemm", y, 3, x, weight, bias), "transB", 1);
-        x = y;
-        if (!is_last) {
-            x = name_of(g, "%s.%d", name, 2 * l + 1);
-            add_node(g, "Elu", x, 1, y);
-        }
+        set_int(add_node(g, "Gemm", y, 3, x, widen(g, weight), widen(g, bias)), "transB", 1);
+        x = is_last ? y : add_elu(g, name_of(g, "%s.%d", name, 2 * l + 1), y);
     }
     return output;
 }
 
 /* ---- the graph ---- */
 
-/* frames_in -> the older part of the history [batch, means * observation], and frames_out. */
-static char *add_history(Graph *g) {
+/* frames_in -> the older part of the history [batch, means * observation], and frames_out.
+ * obs: widened. */
+static char *add_history(Graph *g, char *obs) {
     const int64_t width = g->export->network->def.observation, means = TASK_FRAMES - 1,
                   stride = g->export->task->history_stride, axis = 1;
     const int64_t apart[4] = {0, means, stride, width}, together[2] = {0, means * width};
     Node *mean;
-    add_node(g, "Reshape", "blocks", 2, "frames_in", add_integers(g, "blocks_shape", apart, 4));
+    add_node(g, "Reshape", "blocks", 2, widen(g, "frames_in"),
+             add_integers(g, "blocks_shape", apart, 4));
     mean = add_node(g, "ReduceMean", "means", 1, "blocks");
     set_ints(mean, "axes", 2);
     /* [batch, means, 1, width], because a node has one attribute: the reshape takes out the 1 */
@@ -214,7 +245,7 @@ static char *add_history(Graph *g) {
     add_slice(g, "kept", "frames_in", 1, (int)(means * stride));
     add_node(g, "Unsqueeze", "newest", 2, "obs", add_integers(g, "newest_axis", &axis, 1));
     set_int(add_node(g, "Concat", "frames_out", 2, "kept", "newest"), "axis", 1);
-    set_int(add_node(g, "Concat", "history", 2, "older", "obs"), "axis", 1);
+    set_int(add_node(g, "Concat", "history", 2, "older", obs), "axis", 1);
     return "history";
 }
 
@@ -223,8 +254,15 @@ static void add_nodes(Graph *g) {
     const PolicyDef *def = &network->def;
     const int estimates = def->estimates, half = network->theta / 2;
     const double clip = g->export->task->action_clip;
-    add_mlp(g, &network->encoder, "encoder", add_history(g), "heads");
-    add_slice(g, "estimates", "heads", 0, estimates);
+    const int in_double = g->export->in_double;
+    char *obs = widen(g, "obs"), *own = in_double ? "estimates_double" : "estimates",
+         *mean = in_double ? "mean_double" : "mean";
+    if (in_double) { /* of add_elu */
+        widen(g, add_number(g, "zero", 0));
+        widen(g, add_number(g, "one", 1));
+    }
+    add_mlp(g, &network->encoder, "encoder", add_history(g, obs), "heads");
+    add_slice(g, own, "heads", 0, estimates);
     add_slice(g, "mu", "heads", estimates, estimates + def->latent);
     add_slice(g, "feet_velocities", "heads", def->feet_velocity_offset,
               def->feet_velocity_offset + def->feet_velocity_count);
@@ -233,8 +271,12 @@ static void add_nodes(Graph *g) {
     add_slice(g, "theta2", "theta", half, 2 * half);
     add_node(g, "Mul", "scaled", 2, "theta1", "mu");
     add_node(g, "Add", "z", 2, "scaled", "theta2");
-    set_int(add_node(g, "Concat", "actor_input", 3, "obs", "estimates", "z"), "axis", 1);
-    add_mlp(g, &network->actor, "actor", "actor_input", "mean");
+    set_int(add_node(g, "Concat", "actor_input", 3, obs, own, "z"), "axis", 1);
+    add_mlp(g, &network->actor, "actor", "actor_input", mean);
+    if (in_double) {
+        add_cast(g, "estimates", own, ONNX__TENSOR_PROTO__DATA_TYPE__FLOAT);
+        add_cast(g, "mean", mean, ONNX__TENSOR_PROTO__DATA_TYPE__FLOAT);
+    }
     add_node(g, "Clip", "actions", 3, "mean", add_number(g, "clip_low", -clip),
              add_number(g, "clip_high", clip));
 }

@@ -59,7 +59,9 @@ const MildField train_fields[] = {
     PLACE_FIELDS,
     FIELD(grounds, MILD_FIELD_INT, 1, 1000000,
           "[-] grounds drawn at the start, from which the episodes of the batch engine choose"),
-    MILD_FIELD(TrainDef, start, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->start, 0, 0,
-               "[-] policy whose networks a new run begins with; empty: random ones"),
+    MILD_FIELD(
+        TrainDef, start, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->start, 0, 0,
+        "[-] policy whose networks a new run begins with, but for a decoder of another shape "
+        "(ppo.decoder_target); empty: random ones"),
 };
 const int train_field_count = sizeof train_fields / sizeof *train_fields;

@@ -111,7 +111,11 @@ static MildStatus join_devices(Trainer *trainer, MildError *error) {
 static MildStatus move_learner(Trainer *trainer, MildError *error) {
     const TrainDef *def = &trainer->def.train;
     const GpuLearnerDef gpu = {.device = train_device(def), .resident = train_is_batch(def)};
-    return gpu.device >= 0 ? gpu_learner_attach(trainer->ppo, &gpu, error) : MILD_OK;
+    MildError cause = {0};
+    if (gpu.device < 0 || gpu_learner_attach(trainer->ppo, &gpu, &cause) == MILD_OK) {
+        return MILD_OK;
+    }
+    return mild_fail(error, cause.status, "train.device = %s: %s", def->device, cause.text);
 }
 
 static MildStatus make_envs(Trainer *trainer, MildError *error) {

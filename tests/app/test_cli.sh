@@ -11,6 +11,9 @@ for command in train eval play press fit actuator export drive report bench info
     bad "unknown option --no-such" "$mild" "$command" --no-such
 done
 
+bad "unexpected word 'ground' (mild press --help)" "$mild" press ground
+bad "unexpected word 'run17'; it takes at most 16 (mild report --help)" "$mild" report run{1..17}
+
 # mistakes in configs and overrides
 printf '[train]\nenvs = 4\niteration = 1\n' >bad_key.ini
 printf '[train]\nenvs = 0\n' >bad_value.ini
@@ -135,6 +138,7 @@ for option in "--controller stand" "--ground rubber+grass" "--terrain.memory=tru
     bad "train.robots *= *mujoco" "${batch[@]}" $option
 done
 bad "train.device = gpu: neither cpu, cuda nor cuda:N" "${batch[@]}" --train.device=gpu
+bad "train.device = cuda:15: ." "$mild" train --out no_gpu --train.device=cuda:15 --train.envs=8
 bad "leave it out, or give --train.robots=batch" "$mild" eval --train.device=cuda --train.robots=mujoco
 bad "nearest is 'train.robots'" "$mild" eval --train.robot=batch
 

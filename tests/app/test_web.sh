@@ -6,10 +6,15 @@ expect 0 'usage: mild web' "$mild" web --help
 bad "unknown option --no-such" "$mild" web --no-such
 bad "run .make web" "$mild" web --folder nowhere
 bad "outside" "$mild" web --port 70000
-mkdir page
+mkdir -p page folder/index.html link
+touch {folder,link}/{mild.wasm,robot.bin}
+ln -s ../page/index.html link/index.html
+bad "no file folder/index.html to read" "$mild" web --folder folder
+bad "no file link/index.html to read" "$mild" web --folder link
 for file in index.html style.css mild.js mild.wasm robot.bin; do
     head -c 50000 /dev/urandom >page/$file
 done
+bad "name an --address of this" "$mild" web --folder page --address 192.0.2.1
 bad "not a number such as 127.0.0.1" "$mild" web --folder page --address localhost
 echo secret >secret.html
 ln -s ../secret.html page/link.html

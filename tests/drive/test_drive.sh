@@ -213,15 +213,23 @@ bad "is not HOST:PORT" "$mild" drive --listen 9870
 bad "is not HOST:PORT" "$mild" drive --listen 127.0.0.1:99999
 bad "is not HOST:PORT" "$mild" drive --simulate --connect :9870
 bad "no_such.invalid" "$mild" drive --listen no_such.invalid:9870
-bad "192.0.2.1" "$mild" drive --listen 192.0.2.1:9870
+bad "192.0.2.1.*; name an address of this machine" "$mild" drive --listen 192.0.2.1:9870
+start first
+bad "$address: .* in use; end the program" "$mild" drive --listen "$address"
+kill -INT "$runner"
+wait "$runner"
 bad "no_such.safetensors" "$mild" drive --policy no_such.safetensors
 bad "is for robot sa01, not for go1" "$mild" drive --robot go1
 bad "/dev/input/none" "$mild" drive --gamepad /dev/input/none
 bad "/dev/null is no gamepad" "$mild" drive --gamepad /dev/null
 bad "\. is no gamepad" "$mild" drive --gamepad .
-bad "--ground needs --simulate" "$mild" drive --ground foam45
-bad "--drop needs --simulate" "$mild" drive --drop 0.1
-bad "--command is for the runner" "$mild" drive --simulate --command 0,0,0
+for given in --policy=x --listen=x --command=0,0,0 --gamepad=x --no-keys --late=0.02 --damp-after=1 --speed-limit=30 --angle-limit=0.2 \
+    --torque-share=1; do
+    bad "${given%=*} is for the runner" "$mild" drive --simulate $given
+done
+for given in --connect=x --ground=foam45 --model=mild --lockstep --patience=1 --drop=0 --delay=0,0 --seed=1; do
+    bad "${given%=*} needs --simulate" "$mild" drive $given
+done
 bad "as 0.5,0,0" "$mild" drive --command 0.5
 bad "as 0.05,0.02" "$mild" drive --simulate --delay 0.05
 bad "unknown ground 'foma45'" "$mild" drive --simulate --ground foma45

@@ -110,6 +110,18 @@ static void log_of_the_motor(void **state) {
     free(other);
 }
 
+/* What the simulation says is not taken for memory that ran out. */
+static void failure_keeps_its_reason(void **state) {
+    (void)state;
+    MildError error = {0};
+    TaskDef slow = def;
+    slow.physics_dt = 0.05;
+    const MotorLogDef log = {.task = &slow, .robot = robot, .motors = &motor.motors};
+    int falls;
+    assert_int_equal(motor_log(&log, &falls, &error), MILD_ERROR_RANGE);
+    assert_non_null(strstr(error.text, "time step 0.05 s is outside"));
+}
+
 /* On held-out seconds the network is eight times better than the best PD, and more. */
 static void network_beats_the_pd(void **state) {
     (void)state;
@@ -174,6 +186,7 @@ static void walks_as_with_the_motor(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(log_of_the_motor),
+        cmocka_unit_test(failure_keeps_its_reason),
         cmocka_unit_test(network_beats_the_pd),
         cmocka_unit_test(walks_as_with_the_motor),
     };

@@ -98,7 +98,7 @@ class Model:
 
     @staticmethod
     def ReduceMean(x, axes):
-        return x.mean(axis=tuple(axes), keepdims=True, dtype=np.float32)
+        return x.mean(axis=tuple(axes), keepdims=True, dtype=x.dtype)
 
     @staticmethod
     def Slice(x, start, stop, axes):
@@ -119,6 +119,26 @@ class Model:
     @staticmethod
     def Elu(x):
         return np.where(x > 0, x, np.expm1(np.minimum(x, 0)))
+
+    @staticmethod
+    def Cast(x, to):
+        return x.astype({1: np.float32, 11: np.float64}[to])
+
+    @staticmethod
+    def Min(a, b):
+        return np.minimum(a, b)
+
+    @staticmethod
+    def Max(a, b):
+        return np.maximum(a, b)
+
+    @staticmethod
+    def Exp(x):
+        return np.exp(x)
+
+    @staticmethod
+    def Sub(a, b):
+        return a - b
 
     @staticmethod
     def Mul(a, b):

@@ -65,6 +65,7 @@ fault "standing" 'fabsf(command[1]) < below' 'fabsf(command[1]) < 0' policy.c
 
 bad "walk exists already" "$mild" export --c walk
 bad "give --onnx FILE or --c FOLDER" "$mild" export
+bad "--double is for the graph" "$mild" export --c new --double
 bad "no_such" "$mild" export --policy no_such.safetensors --c new
 bad "is for robot sa01, not for go1" "$mild" export --robot go1 --c new
 bad "nearest is 'task.gait_period'" "$mild" export --c new --task.gait_perod=0.7
@@ -84,7 +85,14 @@ fi
 "$python" "$tests/test_onnx.py" "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx"
 "$python" "$tests/test_onnx.py" - other.onnx other.csv policy_period=0.01 history_stride=3 gait_period=0.7 action_clip=0.6 \
     action_scale=0.3 standing_below=0.5 clock=1 || fail "other.onnx"
+"$mild" export --onnx walk_double.onnx --double || fail "export --onnx --double"
+"$mild" export --policy other.safetensors "${other[@]}" --onnx other_double.onnx --double || fail "--double of another policy"
+"$python" "$tests/test_onnx.py" --double "$root" walk_double.onnx exact.csv noisy.csv || fail "walk_double.onnx"
+"$python" "$tests/test_onnx.py" --double - other_double.onnx other.csv || fail "other_double.onnx"
 if [ "${RUNTIME:-}" ]; then # make export-check
+    "$python" "$tests/test_onnx.py" --runtime --double "$root" walk_double.onnx exact.csv noisy.csv ||
+        fail "walk_double.onnx in ONNX Runtime"
+    "$python" "$tests/test_onnx.py" --runtime --double - other_double.onnx other.csv || fail "other_double.onnx in ONNX Runtime"
     "$python" "$tests/test_onnx.py" --runtime "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx in ONNX Runtime"
     "$python" "$tests/test_onnx.py" --runtime - other.onnx other.csv || fail "other.onnx in ONNX Runtime"
 fi

@@ -1,5 +1,6 @@
 """The graph of `mild export --onnx` on what `mild eval` saw and did: computed by numpy, or by ONNX Runtime where --runtime is given.
-Usage: test_onnx.py [--runtime] SOURCE_FOLDER FILE.onnx RECORD.csv... [KEY=NUMBER...], of its metadata"""
+--double: the graph is of `mild export --onnx --double`.
+Usage: test_onnx.py [--runtime] [--double] SOURCE_FOLDER FILE.onnx RECORD.csv... [KEY=NUMBER...], of its metadata"""
 
 import pathlib
 import sys
@@ -9,10 +10,14 @@ import numpy as np
 import onnx_numpy
 import recorded
 
-runtime = "--runtime" in sys.argv
-source, path, *records = [word for word in sys.argv[1:] if word != "--runtime" and "=" not in word]
+runtime, double = "--runtime" in sys.argv, "--double" in sys.argv
+source, path, *records = [word for word in sys.argv[1:] if word[:2] != "--" and "=" not in word]
 wanted = [word for word in sys.argv[1:] if "=" in word]
-TOLERANCE = 1e-6  # of the largest action: 32-bit sums of 512 products, in another order than ours
+TOLERANCE = 1e-6
+# In 32 bits of the largest action instead: ONNX Runtime adds the products of a row one after the other. Where they are large and cancel,
+# as in the actor's last two layers, the last digits of the greatest partial sum stay. How many products it takes at a time depends on the
+# machine, hence the 2.
+TOLERANCE_RUNTIME = 2e-6
 
 
 def make_run(model):
@@ -42,6 +47,7 @@ def walk(run, trials):
         frames = out["frames_out"]
         worst = max(worst, abs(out["actions"] - wanted).max())
         scale = max(scale, abs(wanted).max())
+        assert all(out[name].dtype == np.float32 for name in out)
         assert (frames[:, -1] == obs).all() and out["estimates"].shape[0] == len(trials)
     assert not np.isnan(worst)
     return worst, scale
@@ -52,6 +58,8 @@ width = sum(map(int, model.metadata["observation_widths"].split(",")))
 held = int(model.metadata["history_means"]) * int(model.metadata["history_stride"])
 joints = len(model.metadata["joint_names"].split(","))
 assert model.opset == 13
+operators = {node[0] for node in model.nodes}
+assert ("Cast" in operators) == double and ("Elu" in operators) != double
 assert model.inputs == {"obs": ["batch", width], "frames_in": ["batch", held, width]}
 assert list(model.outputs) == ["actions", "frames_out", "estimates"]
 assert model.outputs["actions"] == ["batch", joints] and model.outputs["frames_out"] == model.inputs["frames_in"]
@@ -65,4 +73,4 @@ run = make_run(model)
 for record in records:
     error, scale = walk(run, recorded.trials(record))
     print(f"{'ONNX Runtime' if runtime else 'numpy'}: actions of up to {scale:.1f} within {error:.1e}")
-    assert error < TOLERANCE * max(scale, 1)
+    assert error < (TOLERANCE if double else (TOLERANCE_RUNTIME if runtime else TOLERANCE) * max(scale, 1))

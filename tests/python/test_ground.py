@@ -311,6 +311,9 @@ class Fit(unittest.TestCase):
         self.assertLess(np.abs(fit.predict(X) - y).max(), 0.01 * y.max())
         self.assertGreater(fit.score(X, y), 0.999)
         self.assertTrue(np.isnan(fit.score(X[:1], y[:1])))
+        same = np.repeat(X[-1:], 3, axis=0)  # scikit-learn's r2_score of a constant
+        self.assertEqual(fit.score(same, fit.predict(same)), 1.0)
+        self.assertEqual(fit.score(same, np.full(3, 0.1)), 0.0)
 
     def test_speed(self):
         """A fast press, with its speeds: the curve of the true numbers is its force, which no slow press has."""

@@ -1,7 +1,9 @@
-/* What the tests of the robot layer share: the robot of the repository, a workspace, a ground. */
+/* What the tests of the robot layer share: a robot of the repository, a workspace, a ground. The
+ * robot is SA01, or what MODEL names before this is included. */
 #ifndef ROBOT_KIT_H
 #define ROBOT_KIT_H
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,7 +17,9 @@
 #include "robot/robot.h"
 #include "sa01.h"
 
+#ifndef MODEL
 #define MODEL SA01
+#endif
 
 static Robot *robot;
 static Stand *stand;
@@ -48,9 +52,9 @@ static inline RobotSim *new_sim(double dt) {
 
 /* To be freed by the caller. */
 static inline MildGround *new_ground(void) {
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), SA01_FEET));
+    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), robot_feet(robot)));
     assert_non_null(block);
-    return mild_ground_init(block, robot_soles(robot), SA01_FEET);
+    return mild_ground_init(block, robot_soles(robot), robot_feet(robot));
 }
 
 static inline MildMaterial preset(const char *name) {
@@ -64,12 +68,18 @@ static inline MildTerrain preset_terrain(const char *name) {
     return mild_terrain_uniform(&material);
 }
 
+static inline void expect_near(const char *what, double got, double wanted, double tolerance) {
+    if (!(fabs(got - wanted) <= tolerance)) {
+        fail_msg("%s: %.10g, not %.10g +- %.1e", what, got, wanted, tolerance);
+    }
+}
+
 /* Joints a little off their places, all of it in motion. */
 static inline void kit_disturb(RobotState *state, Random *random) {
-    for (int i = 0; i < SA01_JOINTS; i++) {
+    for (int i = 0; i < robot_joints(robot); i++) {
         state->qpos[7 + i] += random_uniform(random, -0.1, 0.1);
     }
-    for (int i = 0; i < SA01_NV; i++) {
+    for (int i = 0; i < 6 + robot_joints(robot); i++) {
         state->qvel[i] = random_uniform(random, -0.5, 0.5);
     }
 }

@@ -1,60 +1,17 @@
 /* The biped robots/g1: its fixed upper body by hand, its geometry, its mirror image, and the stand
  * controller on every ground. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
+#define MODEL MILD_SOURCE_DIR "/robots/g1"
+#include "robot_kit.h"
 
 #include <mujoco/mujoco.h>
 
-#include "base/random.h"
-#include "control/stand.h"
 #include "mild/map.h"
 
-#define G1 MILD_SOURCE_DIR "/robots/g1"
-
 enum { FEET = 2, JOINTS = 12, LEG = 6, NV = 18, X = 0, Y = 1, Z = 2 };
-
-static Robot *robot;
-static Stand *stand;
-
-static int setup(void **unused) {
-    (void)unused;
-    MildError error = {0};
-    robot = robot_create(G1, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
-    stand = stand_create(robot, &error);
-    assert_non_null(stand);
-    return 0;
-}
-
-static int teardown(void **unused) {
-    (void)unused;
-    stand_destroy(stand);
-    robot_destroy(robot);
-    return 0;
-}
-
-static RobotSim *new_sim(double dt) {
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, dt, &error);
-    assert_non_null(sim);
-    return sim;
-}
-
-static void expect_near(const char *what, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s: %.10g, not %.10g +- %.1e", what, got, wanted, tolerance);
-    }
-}
 
 /* ---- the upper body ---- */
 
@@ -420,9 +377,7 @@ static void the_mirror_image(void **unused) {
 /* Four seconds. material: NULL for rigid ground. */
 static void stand_on(const char *name, const MildMaterial *material) {
     RobotSim *sim = new_sim(0.0025);
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
-    assert_non_null(block);
-    MildGround *ground = mild_ground_init(block, robot_soles(robot), FEET);
+    MildGround *ground = new_ground();
     MildMaterial any = mild_material_default();
     MildTerrain terrain = mild_terrain_uniform(material ? material : &any);
     RobotVariation variation = robot_variation_nominal();
@@ -451,7 +406,7 @@ static void stand_on(const char *name, const MildMaterial *material) {
     expect_near("upright", robot_sim_base_rotation(sim)[8], 1, 0.005);
     expect_near("depth", depth, rest, 0.15 * rest);
     assert_true(speed < 0.02);
-    free(block);
+    free(ground);
     robot_sim_destroy(sim);
 }
 

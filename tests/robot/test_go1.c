@@ -1,24 +1,17 @@
 /* The quadruped robots/go1: its geometry by hand, four round feet, and the stand controller on
  * every ground. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include <cmocka.h>
+#define MODEL MILD_SOURCE_DIR "/robots/go1"
+#include "robot_kit.h"
 
 #include <mujoco/mujoco.h>
 
-#include "base/random.h"
-#include "control/stand.h"
 #include "mild/map.h"
 
-#define GO1 MILD_SOURCE_DIR "/robots/go1"
 #define HIP_OFFSET 0.04675                           /* [m] hip roll axis from the middle plane */
 #define ROLL_OFFSET 0.08                             /* [m] thigh from the hip roll axis */
 #define LEG 0.213                                    /* [m] thigh, and knee to the foot's centre */
@@ -27,47 +20,6 @@
 #define WEIGHT (9.81 * MASS)                         /* [N] */
 
 enum { FEET = 4, JOINTS = 12, NV = 18, FL = 0, FR = 1, RL = 2, RR = 3 };
-
-static Robot *robot;
-static Stand *stand;
-
-static int setup(void **unused) {
-    (void)unused;
-    MildError error = {0};
-    robot = robot_create(GO1, &error);
-    if (!robot) {
-        fail_msg("%s", error.text);
-    }
-    stand = stand_create(robot, &error);
-    assert_non_null(stand);
-    return 0;
-}
-
-static int teardown(void **unused) {
-    (void)unused;
-    stand_destroy(stand);
-    robot_destroy(robot);
-    return 0;
-}
-
-static RobotSim *new_sim(double dt) {
-    MildError error = {0};
-    RobotSim *sim = robot_sim_create(robot, dt, &error);
-    assert_non_null(sim);
-    return sim;
-}
-
-static MildGround *new_ground(void) {
-    void *block = calloc(1, mild_ground_bytes(robot_soles(robot), FEET));
-    assert_non_null(block);
-    return mild_ground_init(block, robot_soles(robot), FEET);
-}
-
-static void expect_near(const char *what, double got, double wanted, double tolerance) {
-    if (!(fabs(got - wanted) <= tolerance)) {
-        fail_msg("%s: %.10g, not %.10g +- %.1e", what, got, wanted, tolerance);
-    }
-}
 
 /* ---- the folder ---- */
 
@@ -122,7 +74,7 @@ static void efforts_speeds_and_gait(void **unused) {
 static Robot *changed_robot(const char *from, const char *to, MildError *error) {
     static char text[16384];
     char folder[] = "robot_changed_XXXXXX", ini[64], model[64];
-    FILE *file = fopen(GO1 "/robot.ini", "rb");
+    FILE *file = fopen(MODEL "/robot.ini", "rb");
     assert_non_null(file);
     text[fread(text, 1, sizeof text - 1, file)] = '\0';
     fclose(file);
@@ -135,7 +87,7 @@ static Robot *changed_robot(const char *from, const char *to, MildError *error) 
     assert_non_null(file);
     fprintf(file, "%.*s%s%s", (int)(at - text), text, to, at + strlen(from));
     fclose(file);
-    assert_int_equal(symlink(GO1 "/go1.xml", model), 0);
+    assert_int_equal(symlink(MODEL "/go1.xml", model), 0);
     Robot *made = robot_create(folder, error);
     remove(ini);
     remove(model);
