@@ -4,7 +4,7 @@
 MildStatus device_open(int device, MildError *error) {
     return mild_fail(error, MILD_ERROR_ARGUMENT,
                      "batch: device %d: this build is without CUDA; build with -DMILD_CUDA=ON, or "
-                     "use MILD_BATCH_HOST",
+                     "take the processor (device cpu; in C MILD_BATCH_HOST)",
                      device);
 }
 
