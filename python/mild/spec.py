@@ -5,13 +5,14 @@ import pathlib
 PLUGIN = "mild.ground"
 
 
-def attach(spec, feet, ground="sand_loose", *, exclude=True, name="ground", library=None, **attributes):
+def attach(spec, feet, ground="sand_loose", *, exclude=True, sensor=None, name="ground", library=None, **attributes):
     """Puts soft ground under the feet of a mujoco.MjSpec, before spec.compile(); returns the plugin's instance.
 
     feet: names of 1 .. 4 bodies or sites, z up from the sole. ground: a preset, a Material, or a list of presets where
     terrain__patches is given. exclude: the feet no longer touch geoms of the world body, such as a rigid floor; all else
-    touches them as before. attributes: those of the plugin with __ for the dot: prints=64, ground__mu=0.5,
-    terrain__kind="waves". library: the plugin's file; None: $MILD_PLUGIN, or the package's own. Raises TypeError for what is
+    touches them as before. sensor: name of a sensor to add, whose data are (feet, 12) numbers, a row for each foot: force,
+    torque, centre of pressure, area, largest and mean depth (docs/plugin.md). attributes: those of the plugin with __ for
+    the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the plugin's file; None: $MILD_PLUGIN, or the package's own. Raises TypeError for what is
     no MjSpec, ValueError for feet that the spec does not have, RuntimeError without the plugin; mujoco reports attributes
     that are wrong when it compiles."""
     import mujoco
@@ -34,6 +35,9 @@ def attach(spec, feet, ground="sand_loose", *, exclude=True, name="ground", libr
     plugin.config = config
     if exclude:
         exclude_world(spec, feet)
+    if sensor:
+        listener = spec.add_sensor(name=sensor, type=mujoco.mjtSensor.mjSENS_PLUGIN).plugin
+        listener.active, listener.name, listener.plugin_name = True, name, PLUGIN
     return plugin
 
 

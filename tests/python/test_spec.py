@@ -62,6 +62,19 @@ class Attach(unittest.TestCase):
         self.assertGreater(heights["plate", False], 0.0095)
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_sensor(self):
+        """It reads the weight and the depth of a plate at rest, beside a sensor of the model's own."""
+        spec = mujoco.MjSpec.from_string(PLATE)
+        spec.add_sensor(name="time", type=mujoco.mjtSensor.mjSENS_CLOCK)
+        mild.attach(spec, ["plate"], "sand_loose", sensor="feet", name="other")
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 1500)
+        row = data.sensor("feet").data.reshape(1, 12)[0]
+        np.testing.assert_allclose(row[:6], [0, 0, 98.1, 0, 0, 0], atol=1e-3)
+        np.testing.assert_allclose(row[10:], 0.01 - data.qpos[2], rtol=1e-3)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_exclude_once(self):
         """A pair that the model excludes already is not excluded again."""
         spec = mujoco.MjSpec.from_string(PLATE)
