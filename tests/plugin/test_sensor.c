@@ -1,5 +1,5 @@
-/* The plugin's sensor against MuJoCo's own generalised forces, and the weight and place of what stands
- * still. */
+/* The plugin's sensor against MuJoCo's own generalised forces, and against the weight and the place
+ * of what stands still. */
 #include <math.h>
 
 #include "plugin/sensor.h"
