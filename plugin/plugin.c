@@ -1,10 +1,12 @@
-/* The engine plugin: soft ground under any MJCF (docs/plugin.md). It has two capabilities, because
- * MuJoCo has a stage of actuation only in models with actuators (soft.h). */
+/* The engine plugin: soft ground under any MJCF (docs/plugin.md). It acts at two stages, because
+ * MuJoCo has a stage of actuation only in models with actuators (soft.h); at a third it says what
+ * it did (sensor.h). */
 #include <stdatomic.h>
 #include <string.h>
 
 #include "plugin/check.h"
 #include "plugin/plugin.h"
+#include "plugin/sensor.h"
 #include "plugin/visual.h"
 
 /* NULL in an mjData whose `init` has failed, which the compiler may go on with. */
@@ -34,6 +36,12 @@ static atomic_int warned;
 static int state_size(const mjModel *m, int instance) {
     atomic_store(&warned, 0);
     return (int)(soft_state_bytes(m, instance) / sizeof(mjtNum));
+}
+
+/* Called when a model with a sensor of the instance is compiled. */
+static int sensor_size(const mjModel *m, int instance, int sensor) {
+    (void)sensor;
+    return SENSOR_NUMBERS * soft_feet(m, instance);
 }
 
 static int init(const mjModel *m, mjData *d, int instance) {
@@ -77,6 +85,10 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability) {
     if (!soft) {
         return;
     }
+    if (capability == mjPLUGIN_SENSOR) {
+        sensor_write(soft, m, d, instance);
+        return;
+    }
     if (!soft_owns(soft, ground)) {
         say(m, instance, "its state is not one of this ground; it was reset");
         soft_reset(soft, ground);
@@ -118,7 +130,9 @@ void plugin_register(void) {
     mjp_defaultPlugin(&plugin);
     plugin.name = PLUGIN_NAME;
     plugin.attributes = plugin_attributes(&plugin.nattribute);
-    plugin.capabilityflags = mjPLUGIN_ACTUATOR | mjPLUGIN_PASSIVE;
+    plugin.capabilityflags = mjPLUGIN_ACTUATOR | mjPLUGIN_PASSIVE | mjPLUGIN_SENSOR;
+    plugin.needstage = mjSTAGE_ACC;
+    plugin.nsensordata = sensor_size;
     plugin.nstate = state_size;
     plugin.init = init;
     plugin.destroy = destroy;

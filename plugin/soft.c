@@ -138,6 +138,14 @@ size_t soft_state_bytes(const mjModel *m, int instance) {
     return bytes;
 }
 
+int soft_feet(const mjModel *m, int instance) {
+    Soft *soft = calloc(1, sizeof *soft);
+    const int good = soft && make_feet(soft, m, instance, NULL) == MILD_OK;
+    const int feet = good ? soft->feet : 0;
+    soft_destroy(soft);
+    return feet;
+}
+
 size_t soft_bytes(const Soft *soft) {
     return mild_ground_bytes_prints(soft->soles, soft->feet, soft->def.prints);
 }

@@ -39,6 +39,8 @@ void soft_destroy(Soft *soft); /* may be NULL */
 
 /* [B] Memory of the ground that soft_create would make; 0 when it would fail. */
 size_t soft_state_bytes(const mjModel *m, int instance);
+/* Number of its feet; 0 when it would fail. */
+int soft_feet(const mjModel *m, int instance);
 /* [B] Memory of the ground, a multiple of 8. */
 size_t soft_bytes(const Soft *soft);
 /* Initialises the state: a ground that remembers nothing. */

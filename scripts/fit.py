@@ -33,10 +33,10 @@ def draw(records, path):
             constant = speed[-1] < 1.3 * speed[0]
             label += f", {speed[len(speed) // 2]:.3g} m/s" if constant else f", {speed[0]:.2g} to {speed[-1]:.2g} m/s"
         color = f"C{index}"
-        above.plot(depth, [row["force_n"] for row in rows], ".", color=color, markersize=3, alpha=0.5, label=label)
-        above.plot(depth, [row["fit_n"] for row in rows], color=color, linewidth=2)
+        above.plot(depth, [row["force_n"] for row in rows], ".", color=color, markersize=6, alpha=0.3, label=label)
+        above.plot(depth, [row["fit_n"] for row in rows], color="black", linewidth=0.8, label=None if index else "fit")
         below.plot(depth, [row["force_n"] - row["fit_n"] for row in rows], ".", color=color, markersize=2)
-    above.set(ylabel="force [N]", title="measured (dots) and fitted (lines)")
+    above.set(ylabel="force [N]")
     above.legend(frameon=False)
     below.axhline(0, color="0.4", linewidth=0.8)
     below.set(xlabel="depth [mm]", ylabel="difference [N]")

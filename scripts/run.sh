@@ -6,7 +6,8 @@ minutes=${MINUTES:-5}
 mild=build/mild
 shipped=policies/mild.safetensors
 start=${START:-policies/paper/mild-1.safetensors} # half a minute of training on a GPU, by configs/models.ini
-trained=runs/quick/policy.safetensors
+run=runs/tour # its own folder: it is replaced each time
+trained=$run/policy.safetensors
 course=(--ground rubber,foam45,sand_loose --speed 0.3,0.6 --trials 5 --seconds 20)
 
 if ! [[ $minutes =~ ^[0-9]+(\.[0-9]+)?$ ]]; then
@@ -27,9 +28,9 @@ else
     echo "2/3  A policy of your own, in $minutes minutes, from $start."
 fi
 echo "     Ctrl-C ends the training early and keeps what it has."
-rm -rf runs/quick
+rm -rf "$run"
 set -m # the training is a job of its own: Ctrl-C reaches it alone, and this script goes on
-"$mild" train --config configs/quick.ini --train.minutes="$minutes" --out runs/quick "${begin[@]}"
+"$mild" train --config configs/quick.ini --train.minutes="$minutes" --out "$run" "${begin[@]}"
 set +m
 
 echo
@@ -43,4 +44,4 @@ fi
 "$mild" eval --policy "$trained" "${course[@]}" --json out/trained.json >out/trained.txt
 .venv/bin/python scripts/compare.py "${tables[@]}" yours=out/trained.json
 echo
-echo "Video out/walk.mp4, sole pressure out/pressure.png, training log runs/quick/log.csv, your policy $trained."
+echo "Video out/walk.mp4, sole pressure out/pressure.png, training log $run/log.csv, your policy $trained."

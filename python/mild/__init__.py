@@ -4,10 +4,10 @@ Units are SI and radians, z points up. What is wrong with an argument is raised 
 RuntimeError that names it."""
 from ._ground import Batch, Ground, Map, Material, Press, Sole, Terrain, models, presets, press
 from .fit import GroundFit, loading
-from .spec import attach
+from .spec import attach, load_plugin
 
-__all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "Sole", "Terrain", "attach", "loading", "models", "presets",
-           "press"]
+__all__ = ["Batch", "Ground", "GroundFit", "Map", "Material", "Press", "Sole", "Terrain", "attach", "load_plugin", "loading",
+           "models", "presets", "press"]
 
 try:
     import gymnasium as _gymnasium

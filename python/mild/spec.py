@@ -5,14 +5,16 @@ import pathlib
 PLUGIN = "mild.ground"
 
 
-def attach(spec, feet, ground="sand_loose", *, name="ground", library=None, **attributes):
+def attach(spec, feet, ground="sand_loose", *, exclude=True, sensor=None, name="ground", library=None, **attributes):
     """Puts soft ground under the feet of a mujoco.MjSpec, before spec.compile(); returns the plugin's instance.
 
-    feet: names of 1 .. 4 bodies or sites, z up from the sole; their geoms should not touch a rigid floor any more (contype
-    and conaffinity 0). ground: a preset, a Material, or a list of presets where terrain__patches is given. attributes: those
-    of the plugin with __ for the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the plugin's file; None:
-    $MILD_PLUGIN, or the package's own. Raises TypeError for what is no MjSpec, ValueError for feet that the
-    spec does not have, RuntimeError without the plugin; mujoco reports attributes that are wrong when it compiles."""
+    feet: names of 1 .. 4 bodies or sites, z up from the sole. ground: a preset, a Material, or a list of presets where
+    terrain__patches is given. exclude: the feet no longer touch geoms of the world body, such as a rigid floor; all else
+    touches them as before. sensor: name of a sensor to add, whose data are (feet, 12) numbers, a row for each foot: force,
+    torque, centre of pressure, area, largest and mean depth (docs/plugin.md). attributes: those of the plugin with __ for
+    the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the plugin's file; None: $MILD_PLUGIN, or the package's own. Raises TypeError for what is
+    no MjSpec, ValueError for feet that the spec does not have, RuntimeError without the plugin; mujoco reports attributes
+    that are wrong when it compiles."""
     import mujoco
 
     if not isinstance(spec, mujoco.MjSpec):
@@ -31,12 +33,26 @@ def attach(spec, feet, ground="sand_loose", *, name="ground", library=None, **at
     spec.activate_plugin(PLUGIN)
     plugin = spec.add_plugin(plugin_name=PLUGIN, name=name)
     plugin.config = config
+    if exclude:
+        exclude_world(spec, feet)
+    if sensor:
+        listener = spec.add_sensor(name=sensor, type=mujoco.mjtSensor.mjSENS_PLUGIN).plugin
+        listener.active, listener.name, listener.plugin_name = True, name, PLUGIN
     return plugin
 
 
+def exclude_world(spec, feet):
+    """Excludes the contacts of the feet with the world body. A body without a name cannot be excluded."""
+    bodies = {(spec.body(foot) or spec.site(foot).parent).name for foot in feet}
+    known = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}
+    for body in sorted(bodies - {"", spec.worldbody.name}):
+        if frozenset((body, spec.worldbody.name)) not in known:
+            spec.add_exclude(bodyname1=spec.worldbody.name, bodyname2=body)
+
+
 def load_plugin(library=None):
-    """Loads the engine plugin: `library`, else $MILD_PLUGIN, else the package's own. A process that has it may do so again.
-    Raises RuntimeError when there is no such file, or when it is for another MuJoCo."""
+    """Loads the engine plugin, for models whose XML names it: `library`, else $MILD_PLUGIN, else the package's own. A process
+    that has it may do so again. Raises RuntimeError when there is no such file, or when it is for another MuJoCo."""
     import mujoco
 
     path = pathlib.Path(library or os.environ.get("MILD_PLUGIN") or pathlib.Path(__file__).parent / "lib" / "libmild_plugin.so")

@@ -223,7 +223,7 @@ static MildStatus run_log(LogCommand *c, MildError *error) {
 }
 
 static int cmd_log_actuator(int argc, char **argv) {
-    char shipped[PATH_SIZE], controller_help[320];
+    char shipped[PATH_SIZE], controller_help[ROBOTS_CONTROLLER_HELP];
     LogCommand c = {.policy = path_data("policies/mild.safetensors", shipped),
                     .controller = "learned",
                     .motor = motor_def_default(),

@@ -401,7 +401,7 @@ int cmd_eval(int argc, char **argv) {
         free(args);
         return cli_fail_text("eval", "out of memory");
     }
-    char shipped[PATH_SIZE], model_help[320], controller_help[320];
+    char shipped[PATH_SIZE], model_help[320], controller_help[ROBOTS_CONTROLLER_HELP];
     e->policy = path_data("policies/mild.safetensors", shipped);
     e->controller = "learned";
     e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
@@ -423,9 +423,8 @@ int cmd_eval(int argc, char **argv) {
         {"config", CLI_INPUT, &e->config, 0, 0, "FILE",
          "config that the policy was trained with, for its section [task]"},
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
-         "grounds, one row each; rubber+foam45 is a course of both, in which rigid is a very hard "
-         "material (default "
-         "rigid,foam45,sand_loose)"},
+         "grounds that `mild info grounds` lists, one row each; rubber+foam45 is a course of both, "
+         "in which rigid is a very hard material (default rigid,foam45,sand_loose)"},
         {"model", CLI_TEXT, &e->model, 0, 0, "NAME",
          grounds_model_help(model_help, sizeof model_help)},
         {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]",
@@ -473,12 +472,14 @@ int cmd_eval(int argc, char **argv) {
     };
     const CliCommand command = {
         .name = "eval",
-        .usage = "--policy FILE --ground NAME[,NAME] --speed V[,V] [options]",
+        .usage = "[--policy FILE] [--ground NAME[,NAME]] [--speed V[,V]] [options]",
         .summary = "Lets a policy walk on every ground at every speed and prints one row for "
                    "each: trials without a fall, measured speed with its 95 % interval, cost of "
-                   "transport, largest torque, foot clearance above the undisturbed ground, "
-                   "sinkage and slip of a stance, and energy. The sensors have the noise and "
-                   "delay of training. The robot has its nominal parameters, and nobody pushes "
+                   "transport (COT), largest torque of a joint, clearance of the swinging foot "
+                   "above the undisturbed ground, deepest element (sink) and way of the sole "
+                   "(drift) in a stance, and power of the joints. A - is what cannot be measured, "
+                   "such as the speed of trials that fell within 2.5 s. The sensors have the noise "
+                   "and delay of training. The robot has its nominal parameters, and nobody pushes "
                    "it, without --randomize or --push.",
         .options = options,
         .option_count = sizeof options / sizeof *options,

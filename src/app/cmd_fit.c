@@ -370,7 +370,7 @@ static void never_print(const FitWork *work) {
             told |= strcmp(info->fields[i], work->result.parameter[k].name) == 0;
         }
         if (!told) {
-            printf("%s%s", count++ ? ", " : "no way straight down tells ", info->fields[i]);
+            printf("%s%s", count++ ? ", " : "no press straight down tells ", info->fields[i]);
         }
     }
     printf("%s", count ? "\n" : "");

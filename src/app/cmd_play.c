@@ -307,7 +307,7 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
 }
 
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
-    char model_help[320], controller_help[320];
+    char model_help[320], controller_help[ROBOTS_CONTROLLER_HELP];
     const CliOption options[] = {
         {"policy", CLI_INPUT, &c->policy, 0, 0, "FILE",
          "policy to watch (default policies/mild.safetensors)"},
@@ -339,8 +339,8 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
     };
     const CliCommand command = {
         .name = "play",
-        .usage =
-            "--policy FILE --ground NAME[,NAME] [--video FILE.mp4] [--pressure FILE.png] [options]",
+        .usage = "[--policy FILE] [--ground NAME[,NAME]] [--video FILE.mp4] [--pressure FILE.png] "
+                 "[options]",
         .summary = "Shows a policy walking. Several grounds make a course, which it crosses in "
                    "order. Keys in the window: the arrows change speed and turn, Q and E step "
                    "sideways, S stops, space pauses, - and = change how fast time passes, R "

@@ -222,7 +222,7 @@ static void table_turns(const PressResult *result) {
 static void table_drag(const PressResult *result) {
     int first, end;
     way_find(result, 1, &first, &end);
-    printf("%10s  %16s  %14s\n", "way [mm]", "sideways [N]", "up [N]");
+    printf("%10s  %16s  %14s\n", "moved [mm]", "forward [N]", "up [N]");
     for (int line = 0; line <= TABLE_LINES; line++) {
         const PressRow *row = &result->rows[first + line * (end - 1 - first) / TABLE_LINES];
         printf("%10.2f  %16.3f  %14.3f\n", 1e3 * row->x, row->force_x, row->force);
@@ -304,7 +304,7 @@ static void summary_print(const PressOptions *options, const Tool *tool, const c
             result->peak_force, 1e-3 * result->peak_force / result->area, result->work_in,
             result->work_out, 1e3 * fmax(result->print_depth, 0));
     if (isfinite(options->drag)) {
-        fprintf(file, "work sideways %.3f J\n", result->work_drag);
+        fprintf(file, "work of the drag %.3f J\n", result->work_drag);
     }
 }
 
@@ -346,7 +346,8 @@ static CliOutcome options_parse(const CliOption *table, int count, int argc, cha
 
 static int options_read(int argc, char **argv, PressOptions *options, CliArgs *args) {
     char grounds[200], ground_help[320], model_help[320];
-    snprintf(ground_help, sizeof ground_help, "one of %s", grounds_names(grounds, sizeof grounds));
+    snprintf(ground_help, sizeof ground_help, "one of %s, or one of bekker's: `mild info grounds`",
+             grounds_names(grounds, sizeof grounds));
     const CliOption table[] = {
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
         {"model", CLI_TEXT, &options->model, 0, 0, "NAME",

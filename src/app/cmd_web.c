@@ -43,7 +43,7 @@ int cmd_web(int argc, char **argv) {
     };
     const CliCommand command = {
         .name = "web",
-        .usage = "[--port N]",
+        .usage = "[--port N] [--address A] [--folder DIR]",
         .summary = "Serves the walk in a browser, which `make web` builds. Open the address that "
                    "it prints; Ctrl-C ends it.",
         .options = options,

@@ -59,7 +59,7 @@ const char *robots_controller_help(char *text, size_t size) {
                                  controller_summary(i));
     }
     if (used < size) {
-        snprintf(text + used - 1, size - used + 1, " (learned)");
+        snprintf(text + used - 1, size - used + 1, " (default learned)");
     }
     return text;
 }

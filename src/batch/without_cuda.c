@@ -3,8 +3,8 @@
 
 MildStatus device_open(int device, MildError *error) {
     return mild_fail(error, MILD_ERROR_ARGUMENT,
-                     "batch: device %d: built without CUDA; configure with -DMILD_CUDA=ON, or use "
-                     "the cpu (MILD_BATCH_HOST)",
+                     "batch: device %d: built without CUDA; configure with -DMILD_CUDA=ON, or take "
+                     "the cpu (in C MILD_BATCH_HOST)",
                      device);
 }
 

@@ -34,7 +34,7 @@ void controller_row_torque(void *row, const TaskEnv *env, RobotSim *sim, double 
     X(ht2, "a transformer (Radosavovic et al. 2024), of --policy")                                 \
     X(learned, "the policy of --policy")                                                           \
     X(passivity,                                                                                   \
-      "walks by a DCM plan and whole-body impedances with torques from the true state; bipeds")    \
+      "a biped that knows its true state: a DCM plan and whole-body impedances command torques")   \
     X(stand,                                                                                       \
       "stands still and balances, ignores the command; gains stand_kp, stand_kd of robot.ini")     \
     X(zero, "takes no action, so the joints hold the default pose")

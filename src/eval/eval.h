@@ -40,6 +40,7 @@ typedef struct {
     double speed;         /* [m/s] commanded, forward */
     int trials;           /* number of trials */
     int success;          /* trials without termination */
+    int measured;         /* trials that velocity and cot are means of; 0: all fell too early */
     double velocity;      /* [m/s] forward, after the first 2 s, of trials that lasted longer: along
                         world x, or along the robot's heading when it is told to turn */
     double velocity_low;  /* [m/s] 95 % interval of the mean over trials: lower end */

@@ -39,6 +39,7 @@ static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_
         row->base_oscillation += m->base_high - m->base_low;
         steady++;
     }
+    row->measured = steady;
     if (!steady) {
         return;
     }
@@ -118,9 +119,22 @@ void eval_print_header(char *text, int size) {
              "upright", "measured m/s", "COT", "Nm max", "clear", "sink", "drift", "J/s");
 }
 
+/* The measured speed, and its interval if there are two trials at least. */
+static void print_speed(const EvalRow *row, char *text, size_t size) {
+    const double half = 0.5 * (row->velocity_high - row->velocity_low);
+    if (row->measured > 1) {
+        snprintf(text, size, "%6.3f +- %5.3f", row->velocity, half);
+    } else if (row->measured == 1) {
+        snprintf(text, size, "%6.3f +-     -", row->velocity);
+    } else {
+        snprintf(text, size, "     - +-     -");
+    }
+}
+
 void eval_print_row(const EvalRow *row, char *text, int size) {
-    char cot[16] = "-", sideways[48] = "", turning[48] = ""; /* standing has no cost of transport */
-    if (row->speed != 0 || row->sideways != 0) {
+    char velocity[32], cot[16] = "-", sideways[48] = "", turning[48] = "";
+    print_speed(row, velocity, sizeof velocity);
+    if (row->measured && (row->speed != 0 || row->sideways != 0)) { /* none for standing */
         snprintf(cot, sizeof cot, "%.2f", row->cot);
     }
     if (row->sideways != 0) {
@@ -132,9 +146,8 @@ void eval_print_row(const EvalRow *row, char *text, int size) {
                  row->turn);
     }
     snprintf(text, (size_t)size,
-             "%-26s %5.2f %4d/%-2d %6.3f +- %5.3f %5s %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f%s%s",
-             row->ground, row->speed, row->success, row->trials, row->velocity,
-             0.5 * (row->velocity_high - row->velocity_low), cot, row->torque_max,
+             "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f%s%s", row->ground,
+             row->speed, row->success, row->trials, velocity, cot, row->torque_max,
              1e3 * row->clearance, 1e3 * row->penetration, 1e3 * row->drift,
              row->seconds > 0 ? row->energy / row->seconds : 0, sideways, turning);
 }

@@ -10,6 +10,9 @@ for command in train eval play press fit actuator export drive report bench info
     expect 0 "usage: mild $command" "$mild" "$command" --help
     bad "unknown option --no-such" "$mild" "$command" --no-such
 done
+for command in eval play "actuator log"; do # shellcheck disable=SC2086
+    expect 0 '(default learned)' "$mild" $command --help
+done
 
 bad "unexpected word 'ground' (mild press --help)" "$mild" press ground
 bad "unexpected word 'run17'; it takes at most 16 (mild report --help)" "$mild" report run{1..17}
@@ -52,7 +55,7 @@ awk -F, 'NR == 1 { next } NF != 7 || (NR > 2 && $1 <= time) { exit 1 } { time = 
     END { exit !(NR > 100 && depth == 0.03) }' press.csv ||
     fail "rows of press.csv"
 expect 0 'peak .* N' "$mild" press --ground sand_loose --plate sole --tilt 5
-expect 0 'work sideways' "$mild" press --ground grass --depth 0.01 --drag 0.05 --figure drag.png
+expect 0 'work of the drag' "$mild" press --ground grass --depth 0.01 --drag 0.05 --figure drag.png
 [ -s drag.png ] && [ "$(head -1 drag.csv)" = "time_s,depth_m,force_n,moment_x_nm,moment_y_nm,zmp_x_m,zmp_y_m,force_x_n,force_y_n,x_m,tilt_rad" ] ||
     fail "figure or columns of a drag"
 expect 0 'first stop' "$mild" press --ground sand_dense --drop 0.05 --mass 5

@@ -66,7 +66,7 @@ grep -q '^not determined by these data: sigma_cone, alpha, nu, c_g, c_d, phi, rh
 grep -q '^alpha  *-  *-  *-  rad' table.txt || fail "alpha has a value"
 grep -q '^the intervals assume no firm bed down to 0.04 m' table.txt || fail "the bed"
 grep -q '^a press at another speed or a drop tells more of c_g, c_d' table.txt || fail "one speed"
-grep -q '^no way straight down tells mu, k_drift, b_drift, recovery' table.txt || fail "what no press tells"
+grep -q '^no press straight down tells mu, k_drift, b_drift, recovery' table.txt || fail "what no press tells"
 "$mild" fit foam45.csv "${plate[@]}" --hold alpha=1.1,c_g=0 >table.txt
 grep -q '^the intervals assume alpha = 1.1, c_g = 0$' table.txt || fail "what is held"
 "$mild" fit foam45.csv "${plate[@]}" --hold-from foam45 >table.txt

@@ -436,6 +436,7 @@ static void a_row_from_four_trials(void **state) {
     EvalRow row = summarise(m, fallen, 4);
     assert_int_equal(row.trials, 4);
     assert_int_equal(row.success, 3);
+    assert_int_equal(row.measured, 3);
     assert_close("velocity", row.velocity, 0.6, 1e-12);
     double half = 4.303 * sqrt(0.07 / 3);
     assert_close("low", row.velocity_low, 0.6 - half, 2e-3 * half);
@@ -460,11 +461,13 @@ static void a_row_of_falls(void **state) {
     const uint8_t fallen[3] = {1, 1, 1};
     EvalRow row = summarise(m, fallen, 3);
     assert_int_equal(row.success, 0);
+    assert_int_equal(row.measured, 1);
     assert_close("velocity", row.velocity, 0.5, 1e-12);
     assert_true(row.velocity_low == row.velocity && row.velocity_high == row.velocity);
     assert_close("cost of transport", row.cot, 1, 1e-12);
     assert_close("oscillation", row.base_oscillation, 0.01, 1e-12);
     row = summarise(m + 2, fallen, 1); /* too short for any: zeros */
+    assert_int_equal(row.measured, 0);
     assert_true(row.velocity == 0 && row.cot == 0 && row.velocity_low == 0 &&
                 row.velocity_high == 0 && row.base_oscillation == 0 && row.seconds == 1.5);
     assert_true(row.clearance == 0 && row.penetration == 0 && row.drift == 0);
@@ -551,6 +554,7 @@ static void the_printed_row(void **state) {
                    .speed = 0.5,
                    .trials = 20,
                    .success = 19,
+                   .measured = 19,
                    .velocity = 0.4567,
                    .velocity_low = 0.4467,
                    .velocity_high = 0.4667,
@@ -577,6 +581,12 @@ static void the_printed_row(void **state) {
     eval_print_row(&row, text, sizeof text);
     assert_non_null(strstr(text, "0.010  1.23    98.8"));
     assert_non_null(strstr(text, "       0  sideways -0.247 of -0.30 m/s"));
+    row.measured = 1; /* one trial has no interval */
+    eval_print_row(&row, text, sizeof text);
+    assert_non_null(strstr(text, "19/20  0.457 +-     -  1.23    98.8"));
+    row.measured = 0; /* all fell before there was a speed to measure */
+    eval_print_row(&row, text, sizeof text);
+    assert_non_null(strstr(text, "19/20      - +-     -     -    98.8"));
     char header[256];
     eval_print_header(header, sizeof header);
     printf("%s\n%s\n", header, text);

@@ -1,5 +1,9 @@
 """mild.attach: soft ground under an MjSpec. With MILD_PLUGIN, a file, also with the engine plugin."""
 import os
+import pathlib
+import re
+import subprocess
+import sys
 import unittest
 
 import mujoco
@@ -11,6 +15,7 @@ PLATE = """<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbod
   <body name="plate" pos="0 0 0.02"><freejoint/>
     <geom type="box" size="0.1 0.05 0.01" mass="10" contype="0" conaffinity="0"/>
     <site name="under" pos="0 0 -0.01"/></body></worldbody></mujoco>"""
+WALK = pathlib.Path(__file__).resolve().parents[2] / "examples/python/walk.py"
 PLUGIN = os.environ.get("MILD_PLUGIN", "")
 
 
@@ -36,6 +41,62 @@ class Attach(unittest.TestCase):
             mild.attach(mujoco.MjSpec.from_string(PLATE), "plate", library=os.path.basename(PLUGIN))
         finally:
             os.chdir(before)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_floor(self):
+        """On a rigid floor a foot is soft when attach excludes that pair, named as body or site, and rigid when it does not."""
+        solid = PLATE.replace('contype="0" conaffinity="0"', "").replace(
+            "<worldbody>", '<worldbody><geom type="plane" size="1 1 1"/>')
+        heights = {}
+        for foot, exclude in (("plate", True), ("under", True), ("plate", False)):
+            spec = mujoco.MjSpec.from_string(solid)
+            mild.attach(spec, foot, "foam45", exclude=exclude)
+            model = spec.compile()
+            data = mujoco.MjData(model)
+            mujoco.mj_step(model, data, 1500)
+            self.assertEqual((model.nexclude, data.ncon > 0), (exclude, not exclude))
+            heights[foot, exclude] = data.qpos[2]
+        depth = 0.01 - heights["plate", True]
+        self.assertAlmostEqual(depth, fall(mild.Material("foam45")), delta=0.01 * depth)
+        self.assertAlmostEqual(heights["under", True], heights["plate", True], delta=1e-9)
+        self.assertGreater(heights["plate", False], 0.0095)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_sensor(self):
+        """It reads the weight and the depth of a plate at rest, beside a sensor of the model's own."""
+        spec = mujoco.MjSpec.from_string(PLATE)
+        spec.add_sensor(name="time", type=mujoco.mjtSensor.mjSENS_CLOCK)
+        mild.attach(spec, ["plate"], "sand_loose", sensor="feet", name="other")
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 1500)
+        row = data.sensor("feet").data.reshape(1, 12)[0]
+        np.testing.assert_allclose(row[:6], [0, 0, 98.1, 0, 0, 0], atol=1e-3)
+        np.testing.assert_allclose(row[10:], 0.01 - data.qpos[2], rtol=1e-3)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_exclude_once(self):
+        """A pair that the model excludes already is not excluded again."""
+        spec = mujoco.MjSpec.from_string(PLATE)
+        spec.add_exclude(bodyname1="plate", bodyname2="world")
+        mild.attach(spec, ["plate"])
+        self.assertEqual(spec.compile().nexclude, 1)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_load_plugin(self):
+        """A model whose XML names the plugin."""
+        mild.load_plugin()
+        soft = PLATE.replace("<worldbody>", """<extension><plugin plugin="mild.ground"><instance name="ground">
+            <config key="feet" value="plate"/></instance></plugin></extension><worldbody>""")
+        self.assertEqual(mujoco.MjModel.from_xml_string(soft).nplugin, 1)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_walk(self):
+        """examples/python/walk.py: the shipped policy goes at the speed that it is told, in sand too."""
+        for ground in ("rubber", "sand_loose"):
+            said = subprocess.run([sys.executable, WALK, ground], check=True, capture_output=True, text=True).stdout
+            way, seconds = map(float, re.fullmatch(rf"{ground}: (\S+) m in (\S+) s, upright\n", said).groups())
+            self.assertAlmostEqual(way / (seconds - 0.6), 0.6, delta=0.06, msg=said)  # 0.6 s: the first step
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_rest(self):

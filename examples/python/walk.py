@@ -1,0 +1,49 @@
+"""The shipped policy walks on soft ground in MuJoCo. python walk.py [GROUND] [--view]
+
+The robot is an MJCF, the ground comes by mild.attach, the policy is policy.py: nothing here is special to mild's program.
+--view opens MuJoCo's viewer (`pip install glfw`)."""
+import contextlib
+import pathlib
+import sys
+import time
+
+import mujoco
+import numpy as np
+from policy import POSE, Policy
+
+import mild
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+KP = np.array([50, 50, 70, 70, 20, 20] * 2)  # [N m/rad] docs/policy.md, section 5
+KD = np.array([5, 5, 7, 7, 0.2, 0.2] * 2)  # [N m s/rad]
+LIMIT = 0.85 * np.array([140, 140, 140, 140, 24, 24] * 2)  # [N m]
+SECONDS, COMMAND = 8, [0.6, 0, 0]  # forward, to the left [m/s], turning left [rad/s]
+
+view = "--view" in sys.argv
+ground = next((word for word in sys.argv[1:] if word != "--view"), "sand_loose")
+
+spec = mujoco.MjSpec.from_file(str(ROOT / "robots/sa01/sa01.xml"))
+mild.attach(spec, ["leg_l6_link", "leg_r6_link"], ground, prints=256)
+model = spec.compile()
+model.opt.timestep = 0.0025
+data = mujoco.MjData(model)
+data.qpos[2], data.qpos[7:] = 0.84, POSE
+
+policy, rotation = Policy(ROOT / "policies/mild.safetensors"), np.zeros(9)
+window = contextlib.nullcontext()
+if view:
+    import mujoco.viewer
+    window = mujoco.viewer.launch_passive(model, data)
+with window as viewer:
+    start = time.monotonic()
+    while data.time < SECONDS:
+        mujoco.mju_quat2Mat(rotation, data.qpos[3:7])
+        frame = policy.observe(data.qvel[3:6], -rotation[6:9], COMMAND, data.qpos[7:], data.qvel[6:])
+        target = POSE + 0.5 * policy.act(frame)
+        for _ in range(4):  # 10 ms
+            data.ctrl = np.clip(KP * (target - data.qpos[7:]) - KD * data.qvel[6:], -LIMIT, LIMIT)
+            mujoco.mj_step(model, data)
+        if viewer:
+            viewer.sync()
+            time.sleep(max(0, start + data.time - time.monotonic()))
+print(f"{ground}: {data.qpos[0]:.2f} m in {data.time:.1f} s, {'upright' if data.qpos[2] > 0.6 else 'fallen'}")
