@@ -111,7 +111,7 @@ static void visualize(const mjModel *m, mjData *d, const mjvOption *option, mjvS
     const Soft *soft = soft_of(d, instance);
     const MildGround *ground = ground_of(m, d, instance);
     if (soft && soft_owns(soft, ground)) {
-        visual_add(soft, m, ground, option, scene);
+        visual_add(soft, m, d, ground, option, scene);
     }
 }
 

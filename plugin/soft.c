@@ -6,7 +6,9 @@
  *
  * Constraints (joint limits, contacts of other bodies) respond to the ground's force, and the
  * ground to theirs. Both are solved in turn until the twists agree, with an A that holds the
- * constraints' response while the same ones stay active. */
+ * constraints' response while the same ones stay active. Two sets of active constraints may follow
+ * each other for ever: A of the one makes the other active. The A without constraints ends that.
+ * No set of them responds by more, so the ground never counts with too little. */
 #include "plugin/soft.h"
 
 #include <math.h>
@@ -15,8 +17,9 @@
 
 #include "ground/state.h"
 
-#define ROUNDS_MAX 30  /* solves of ground and constraints in one step */
-#define AGREEMENT 1e-6 /* [m/s, rad/s] difference of the twists at which they agree */
+#define ROUNDS_MAX 30    /* solves of ground and constraints in one step */
+#define ROUNDS_ACTIVE 12 /* of them with the response of the active constraints */
+#define AGREEMENT 1e-6   /* [m/s, rad/s] difference of the twists at which they agree */
 
 /* ---- making one ---- */
 
@@ -152,7 +155,7 @@ size_t soft_bytes(const Soft *soft) {
 
 void soft_reset(Soft *soft, void *state) {
     mild_ground_init_prints(state, soft->soles, soft->feet, soft->def.prints);
-    soft->known = soft->solved = 0;
+    soft->known = soft->solved = soft->warned = 0;
 }
 
 /* Bool: a material as Memory encodes it (ground/state.h) is one of the terrain. */
@@ -193,6 +196,7 @@ void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
     soft->solved = 0;
     soft->fresh = from->fresh;
     soft->rounds = from->rounds;
+    soft->warned = from->warned;
     memcpy(soft->passive, from->passive, nv);
     memcpy(soft->jacobian, from->jacobian, FOOT_ROWS * nv);
 }
@@ -325,17 +329,34 @@ static double disagreement(const Soft *soft, const double *twist, double *change
     return most;
 }
 
-/* A and V_free for the constraints that are active now. While they stay the same, V_free moves by
- * the disagreement. */
+/* A and V_free for the constraints that are active now, and after ROUNDS_ACTIVE without any. While
+ * A stays the same, V_free moves by the disagreement. */
 static void respond(Soft *soft, const mjModel *m, const mjData *d, const double *twist,
                     const double *wrench, const double *change) {
-    if (metric_stiffen(&soft->metric, m, d) || soft->rounds == 0) {
-        inverse_inertia(soft, soft->metric.stiff, (int)m->nv);
+    Metric *metric = &soft->metric;
+    const int active = soft->rounds < ROUNDS_ACTIVE;
+    if (active ? metric_stiffen(metric, m, d) : soft->rounds == ROUNDS_ACTIVE) {
+        inverse_inertia(soft, active ? metric->stiff : metric->factor, (int)m->nv);
         free_twists(soft, twist, wrench);
         mix_start(&soft->mix, 6 * soft->feet);
     } else {
         mix_next(&soft->mix, soft->input.free_velocity, change);
     }
+}
+
+/* Warns of a step in which ground and constraints do not agree, of the first one since a reset. */
+static void warn_of_disagreement(Soft *soft, const mjModel *m, const mjData *d) {
+    double twist[FOOT_ROWS], change[FOOT_ROWS];
+    outcome(soft, m, d, twist);
+    const double most = disagreement(soft, twist, change);
+    if (most < AGREEMENT || soft->warned) {
+        return;
+    }
+    mju_warning(PLUGIN_NAME
+                ": ground and constraints disagree by %.1e m/s at %g s, after %d rounds; a shorter "
+                "time step or more iterations of the solver may help; said once until a reset",
+                most, d->time, ROUNDS_MAX);
+    soft->warned = 1;
 }
 
 /* Ground and constraints in turn. Where the response is linear and known the first solve is
@@ -357,6 +378,9 @@ static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *gro
         if (exact) {
             break;
         }
+    }
+    if (soft->rounds == ROUNDS_MAX) {
+        warn_of_disagreement(soft, m, d);
     }
     soft->known = soft->solved = 1;
 }

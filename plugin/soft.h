@@ -28,6 +28,7 @@ typedef struct {
     int solved;           /* bool: the scratch is that of `input` and `contact` */
     int known;            /* bool: `input` and `contact` are those of a solve */
     int refused;          /* bool: the integrator has been complained about */
+    int warned;           /* bool: a disagreement has been warned of since the last reset */
     int rounds;           /* of ground and constraints in the last solve */
     MildContactInput input;
     MildContactResult contact;

@@ -3,7 +3,7 @@ import json
 
 import numpy as np
 
-POSE = np.array([0, 0, -0.24, 0.48, -0.24, 0] * 2)  # [rad] default pose, joints as in the table
+POSE = np.array([0, 0, -0.24, 0.48, -0.24, 0] * 2)  # [rad] default pose of SA01, joints as in the table
 
 
 def read(path):
@@ -18,8 +18,8 @@ def read(path):
 
 
 class Policy:
-    def __init__(self, path, stride=8, period=0.8, clip=8.0):
-        self.tensors, self.stride, self.period, self.clip = read(path), stride, period, clip
+    def __init__(self, path, pose=POSE, stride=8, period=0.8, clip=8.0):
+        self.tensors, self.pose, self.stride, self.period, self.clip = read(path), pose, stride, period, clip
         self.frames = None  # the last 5 * stride frames, oldest first; none before the first
         self.phase, self.last = 0.0, np.zeros(12)
 
@@ -29,7 +29,7 @@ class Policy:
         turn = 2 * np.pi * self.phase
         clock = [0, 0] if stand else [np.sin(turn), np.cos(turn)]
         return np.concatenate([omega, np.multiply(command, [2, 2, 1]), gravity,
-                               q - POSE, 0.05 * qd, self.last, clock])
+                               q - self.pose, 0.05 * qd, self.last, clock])
 
     def network(self, name, x):
         layers = sorted({int(k.split(".")[1]) for k in self.tensors if k.startswith(name + ".")})
@@ -44,8 +44,9 @@ class Policy:
             self.frames = np.tile(frame, (5 * self.stride, 1))
         means = self.frames.reshape(5, self.stride, -1).mean(axis=1)
         heads = self.network("encoder", np.concatenate([means.ravel(), frame]))
-        estimates, mu = heads[:11], heads[11:27]  # heads[27:43]: log variance, unused
-        theta = self.network("modulation", estimates[3:9])
+        n = 2 * (self.tensors["actor.0.weight"].shape[1] - len(frame)) - len(heads)
+        estimates, mu = heads[:n], heads[n : (n + len(heads)) // 2]  # the rest: log variance, unused
+        theta = self.network("modulation", estimates[3 : 3 + self.tensors["modulation.0.weight"].shape[1]])
         half = len(theta) // 2
         z = theta[:half] * mu + theta[half:]
         action = self.network("actor", np.concatenate([frame, estimates, z]))

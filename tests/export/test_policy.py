@@ -13,11 +13,11 @@ page = (source / "docs/policy.md").read_text(encoding="utf-8")
 
 # what would go unnoticed in a port of one's own: text of the program, and what is there instead
 FAULTS = [
-    ("heads[:11], heads[11:27]", "heads[32:43], heads[16:32]", "action"),  # order of the heads
-    ("heads[11:27]", "heads[27:43]", "action"),
+    ("heads[:n], heads[n : (n + len(heads)) // 2]", "heads[32:], heads[16:32]", "action"),  # order of the heads
+    ("heads[n : (n + len(heads)) // 2]", "heads[(n + len(heads)) // 2 :]", "action"),
     ("theta[:half] * mu + theta[half:]", "mu", "action"),  # no modulation
     ("theta[:half] * mu + theta[half:]", "theta[half:] * mu + theta[:half]", "action"),
-    ("estimates[3:9]", "estimates[:6]", "action"),
+    ("estimates[3 : 3 + ", "estimates[:", "action"),
     ('.weight"] @ x', '.weight"].T.reshape(self.tensors[f"{name}.{i}.weight"].shape) @ x', "action"),  # transposed weights
     ("np.expm1(np.minimum(x, 0))", "0", "action"),  # ReLU
     ("np.expm1(np.minimum(x, 0))", "0.01 * x", "action"),
@@ -30,7 +30,7 @@ FAULTS = [
     ("[frame, estimates, z]", "[frame, z, estimates]", "action"),
     ("[2, 2, 1]", "[1, 1, 1]", "observation"),
     ("0.05 * qd", "qd", "observation"),
-    ("q - POSE", "q", "observation"),
+    ("q - self.pose", "q", "observation"),
     ("0] * 2)", "0.1] * 2)", "observation"),
     ("self.last, clock", "0 * self.last, clock", "observation"),
     ("np.sin(turn), np.cos(turn)", "np.cos(turn), np.sin(turn)", "observation"),
