@@ -14,9 +14,10 @@ FAULTS ?=
 STAGES ?=
 MUJOCO_ROOT ?=
 QUICK ?=
+VERSION ?=
 TEST ?=
 
-.PHONY: setup build test run bench install plugin deb docs site paper web web-test wheel python-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin plugin-check deb docs site paper web web-test wheel python-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -26,6 +27,7 @@ help:
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
 	@echo "make plugin  the MuJoCo plugin into PREFIX, for MUJOCO_ROOT= (docs/plugin.md)"
+	@echo "make plugin-check  VERSION=3.3.7: the plugin in that version of MuJoCo (installs it) as in ours"
 	@echo "make export-check  what mild export --onnx writes, in ONNX Runtime (installs it into build/onnxruntime)"
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
@@ -55,6 +57,9 @@ test: build
 check:
 	@scripts/setup.sh check
 	@JOBS=$(JOBS) scripts/check.sh $(STAGES)
+
+plugin-check: build
+	@tests/plugin/test_version.sh "$(VERSION)" build
 
 export-check: build
 	@.venv/bin/python -m venv build/onnxruntime

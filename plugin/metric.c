@@ -7,10 +7,13 @@
 /* Exported by libmujoco, but not declared in its headers:
  * qDeriv = d (passive + actuator forces) / d qvel, the D of the implicit integrators. */
 void mjd_smooth_vel(const mjModel *m, mjData *d, int flg_bias);
+#ifdef mjNPOLY
 /* Damping of the actuator of a joint: returns the linear part, adds the others to poly. */
 mjtNum mj_actuatorDamping(const mjModel *m, mjtObj type, int id, mjtNum poly[mjNPOLY]);
+#endif
 
-#define PIVOT 1e-14 /* smallest pivot of a factorisation */
+#define PIVOT 1e-14                                /* smallest pivot of a factorisation */
+#define HAS_DISCRETE (mjVERSION_HEADER >= 3013000) /* bool: the integrator, and its arrays efm_ */
 
 int metric_alloc(Metric *metric, const mjModel *m) {
     const size_t nv = (size_t)m->nv, square = nv * nv;
@@ -41,8 +44,10 @@ static int is_disabled(const mjModel *m, int flag) {
     return (m->opt.disableflags & flag) != 0;
 }
 
-/* [N m s/rad] Slope of the damping force a v + b v |v| + c v^3 of a degree of freedom. */
+/* [N m s/rad] Slope of the damping force a v + b v |v| + c v^3 of a degree of freedom. Before
+ * MuJoCo 3.7 there is a alone, and no damping of actuators. */
 static double damping_slope(const mjModel *m, const mjData *d, int dof) {
+#ifdef mjNPOLY
     const double speed = fabs(d->qvel[dof]);
     double poly[mjNPOLY], power = 1;
     mju_copy(poly, m->dof_dampingpoly + (size_t)mjNPOLY * (size_t)dof, mjNPOLY);
@@ -53,6 +58,10 @@ static double damping_slope(const mjModel *m, const mjData *d, int dof) {
         slope += (k + 2) * poly[k] * power;
     }
     return slope;
+#else
+    (void)d;
+    return m->dof_damping[dof];
+#endif
 }
 
 /* Bool: Euler's method treats joint damping implicitly. */
@@ -64,9 +73,17 @@ static int euler_damps(const mjModel *m, const mjData *d) {
     return damped && !is_disabled(m, mjDSBL_EULERDAMP) && !is_disabled(m, mjDSBL_DAMPER);
 }
 
+int metric_is_discrete(const mjModel *m) {
+#if HAS_DISCRETE
+    return m->opt.integrator == mjINT_DISCRETE;
+#else
+    (void)m;
+    return 0;
+#endif
+}
+
 int metric_is_step(const mjModel *m, const mjData *d) {
-    return m->opt.integrator == mjINT_DISCRETE ||
-           (m->opt.integrator == mjINT_EULER && !euler_damps(m, d));
+    return metric_is_discrete(m) || (m->opt.integrator == mjINT_EULER && !euler_damps(m, d));
 }
 
 /* ---- rows: constraints, tendons, actuators ---- */
@@ -124,6 +141,7 @@ static void row_add(const Metric *metric, double *matrix, const Row *row, double
 /* Tendons and actuators with terms in the metric of `discrete`. Returns 0 after the last one. */
 static int next_term(const mjModel *m, const mjData *d, int *at, int *output, Row *row,
                      double *scale) {
+#if HAS_DISCRETE
     if (!d->efm_active) {
         return 0;
     }
@@ -145,6 +163,9 @@ static int next_term(const mjModel *m, const mjData *d, int *at, int *output, Ro
         *scale = d->efm_as[k];
         return 1;
     }
+#else
+    (void)m, (void)d, (void)at, (void)output, (void)row, (void)scale;
+#endif
     return 0;
 }
 
@@ -277,6 +298,7 @@ static void build_full(Metric *metric, const mjModel *m, mjData *d) {
 static void add_discrete(Metric *metric, const mjModel *m, const mjData *d) {
     Row row;
     double scale;
+#if HAS_DISCRETE
     if (!d->efm_active) {
         return;
     }
@@ -286,6 +308,7 @@ static void add_discrete(Metric *metric, const mjModel *m, const mjData *d) {
     if (d->efm_fluid) {
         add_sparse(metric, m, d->efm_fluid, 1);
     }
+#endif
     for (int at = 0, output = 0; next_term(m, d, &at, &output, &row, &scale);) {
         row_add(metric, metric->inertia, &row, scale);
     }
@@ -296,11 +319,12 @@ void metric_build(Metric *metric, const mjModel *m, mjData *d) {
     const size_t square = (size_t)metric->dofs * (size_t)metric->dofs;
     memset(metric->inertia, 0, square * sizeof *metric->inertia);
     add_sparse(metric, m, d->M, 1);
-    switch (m->opt.integrator) {
-    case mjINT_IMPLICIT:
-    case mjINT_IMPLICITFAST: add_implicit(metric, m, d); break;
-    case mjINT_DISCRETE: add_discrete(metric, m, d); break;
-    default: add_euler(metric, m, d);
+    if (metric_is_discrete(m)) {
+        add_discrete(metric, m, d);
+    } else if (m->opt.integrator == mjINT_EULER) {
+        add_euler(metric, m, d);
+    } else {
+        add_implicit(metric, m, d);
     }
     memcpy(metric->factor, metric->inertia, square * sizeof *metric->factor);
     mju_cholFactor(metric->factor, metric->dofs, PIVOT);

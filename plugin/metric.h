@@ -33,6 +33,8 @@ typedef struct {
 int metric_alloc(Metric *metric, const mjModel *m);
 void metric_free(Metric *metric);
 
+/* Bool: the integrator is `discrete`, which MuJoCo has since 3.13. */
+int metric_is_discrete(const mjModel *m);
 /* Bool: the acceleration of MuJoCo's solver is the one that the integrator applies. */
 int metric_is_step(const mjModel *m, const mjData *d);
 /* Builds N for the trees whose flag in metric->tree is set, and those coupled to them. Needs

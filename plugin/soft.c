@@ -309,7 +309,7 @@ static void free_twists(Soft *soft, const double *twist, const double *wrench) {
  * and what follows from them. The metric of `discrete` is complete only between MuJoCo's stages, so
  * there they run as a whole, with mjcb_control. */
 static void forces_without_ground(const mjModel *m, mjData *d) {
-    if (m->opt.integrator == mjINT_DISCRETE) {
+    if (metric_is_discrete(m)) {
         mj_forwardSkip(m, d, mjSTAGE_VEL, 1);
         return;
     }
