@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# examples/python/plugin_walk.py, position actuators under plain mj_step, walks as in `mild eval` without noise and delay.
+# scripts/plugin_walk.py, position actuators under plain mj_step, walks as in `mild eval` without noise and delay.
 # Usage: test_example.sh PATH_TO_MILD PYTHON PLUGIN
 root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/tests/kit.sh" "$1"
@@ -13,7 +13,7 @@ same() {
     "$mild" eval --policy "$root/policies/$2.safetensors" --config exact.ini --ground "$4" --speed 0.5 --seconds 10 --trials 2 \
         --task.physics_dt="$5" --json eval.json >/dev/null || fail "eval of $1"
     local plain
-    plain=$("$python" "$root/examples/python/plugin_walk.py" "$1" --ground "$4" --step "$5" --integrator "$6" --trials 1) ||
+    plain=$("$python" "$root/scripts/plugin_walk.py" "$1" --ground "$4" --step "$5" --integrator "$6" --trials 1) ||
         fail "plugin_walk.py $1"
     "$python" - eval.json "$plain" "$7" <<'CHECK' || fail "$plain"
 import json, re, sys

@@ -1,6 +1,7 @@
+#!/usr/bin/env python3
 """A shipped policy on soft ground in plain MuJoCo: mj_step, the engine plugin, position actuators (docs/plugin.md).
 
-    python examples/python/plugin_walk.py go1 --ground foam45 --step 0.002
+    python scripts/plugin_walk.py go1 --ground foam45 --step 0.002
 
 Needs mujoco, numpy and the plugin, $MILD_PLUGIN or build/mujoco_plugin/libmild_plugin.so. Prints how many trials of ten seconds
 stayed upright, and their mean speed after the first two. --model takes the robot's MJCF from elsewhere, with the same names."""
@@ -8,13 +9,15 @@ import argparse
 import configparser
 import os
 import pathlib
+import sys
 
 import mujoco
 import numpy as np
 
-from policy import Policy
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "examples/python"))
+from policy import Policy  # noqa: E402
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
 PLUGIN = os.environ.get("MILD_PLUGIN") or str(ROOT / "build/mujoco_plugin/libmild_plugin.so")
 # Joints that the policy does not move: angle [rad] by a part of the name, else 0; kp, kd, armature, limit of the torque.
 HELD = {"shoulder_pitch": 0.2, "left_shoulder_roll": 0.2, "right_shoulder_roll": -0.2, "elbow": 0.6}
