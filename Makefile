@@ -48,7 +48,7 @@ build: setup
 	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
 	@cmake --build build --parallel $(JOBS)
 
-# The program alone, in a quarter of the time of all.
+# The program alone; tests, plugin and Python module come with `build`, and take longer than it.
 program: setup
 	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
 	@cmake --build build --parallel $(JOBS) --target mild
