@@ -70,7 +70,8 @@ static cJSON *row_json(const EvalRow *row) {
                   {"drift_left", row->drift_left},
                   {"velocity_deviation", row->velocity_deviation},
                   {"cot_deviation", row->cot_deviation},
-                  {"torque_deviation", row->torque_deviation}};
+                  {"torque_deviation", row->torque_deviation},
+                  {"measured", row->measured}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }
