@@ -123,7 +123,7 @@ static MildStatus check_terrain(const MildTerrain *terrain, MildError *error) {
 
 MildStatus mild_contact_check(const MildGround *ground, const MildTerrain *terrain,
                               const MildContactInput *input, MildError *error) {
-    double scaled[ROWS * ROWS];
+    double scaled[ROWS * ROWS] = {0};
     MildStatus status = check_terrain(terrain, error);
     if (status == MILD_OK && input->feet != ground->feet) {
         status = mild_fail(error, MILD_ERROR_ARGUMENT, "input.feet = %d, but the ground has %d",
