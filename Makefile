@@ -16,7 +16,7 @@ MUJOCO_ROOT ?=
 QUICK ?=
 TEST ?=
 
-.PHONY: setup build program test run bench install plugin deb docs site paper web web-test wheel python-check check export-check fuzz mutants clean help
+.PHONY: setup build test run bench install plugin deb docs site paper web web-test wheel python-check check export-check fuzz mutants clean help
 
 help:
 	@echo "make run     set up, build, watch the shipped policy walk, train one for MINUTES=$(MINUTES), compare the two"
@@ -49,6 +49,7 @@ build: setup
 	@cmake --build build --parallel $(JOBS)
 
 # The program alone; tests, plugin and Python module come with `build`, and take longer than it.
+.PHONY: program
 program: setup
 	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
 	@cmake --build build --parallel $(JOBS) --target mild
