@@ -50,6 +50,12 @@ build: setup
 	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
 	@cmake --build build --parallel $(JOBS)
 
+# The program alone; tests, plugin and Python module come with `build`, and take longer than it.
+.PHONY: program
+program: setup
+	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
+	@cmake --build build --parallel $(JOBS) --target mild
+
 test: build
 	@ctest --test-dir build --output-on-failure --parallel $(JOBS) --timeout 280
 
@@ -66,10 +72,10 @@ export-check: build
 	@build/onnxruntime/bin/python -m pip install --quiet --disable-pip-version-check -r tests/export/requirements.txt
 	@RUNTIME=1 tests/export/test_export.sh build/mild build/onnxruntime/bin/python ON
 
-run: build
+run: program
 	@MINUTES=$(MINUTES) scripts/run.sh
 
-bench: build
+bench: program
 	@build/mild bench
 
 # The library needs no setup; its own folder, so that a program that runs from build/ is left alone.

@@ -15,7 +15,7 @@ COLUMNS = [  # key, heading, format
 
 def cell(row, key, form):
     value = row[key]
-    if value is None or value != value:
+    if value is None or value != value or (key in ("velocity", "cot") and row.get("measured") == 0):
         return "-"
     text = form.format(value)
     return f"{text} of {row['trials']}" if key == "success" else text

@@ -33,8 +33,10 @@ policy, rotation = Policy(ROOT / "policies/mild.safetensors"), np.zeros(9)
 window = contextlib.nullcontext()
 if view:
     import mujoco.viewer
-    window = mujoco.viewer.launch_passive(model, data)
+    window = mujoco.viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
 with window as viewer:
+    if viewer:
+        viewer.cam.type, viewer.cam.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, model.camera("track").id
     start = time.monotonic()
     while data.time < SECONDS:
         mujoco.mju_quat2Mat(rotation, data.qpos[3:7])

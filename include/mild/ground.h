@@ -346,10 +346,11 @@ typedef struct MildGround MildGround;
  * after the other. */
 typedef struct MildScratch MildScratch;
 
-/* [B] Size of the block, a multiple of 64. soles: [feet], feet 1 .. MILD_FEET_MAX. */
+/* [B] Size of the block, a multiple of 64; 0 when feet is not 1 .. MILD_FEET_MAX. soles: [feet]. */
 size_t mild_ground_bytes(const MildSole *const *soles, int feet);
 /* Initialises a block of that size, which is aligned to 8 bytes and owned by the caller. Returns
- * the block as a MildGround that remembers nothing. */
+ * the block as a MildGround that remembers nothing, or NULL when the block is NULL or feet is not
+ * 1 .. MILD_FEET_MAX. */
 MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet);
 /* Forgets everything. Call it after moving the feet to another place. */
 void mild_ground_reset(MildGround *ground);
@@ -390,6 +391,12 @@ void mild_scratch_destroy(MildScratch *scratch);
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                        const MildContactInput *input, MildScratch *scratch,
                        MildContactResult *result);
+/* Checks what mild_ground_solve takes on trust, for engines that are being written: materials,
+ * number of feet, dt, poses and twists that are finite, rotations that are orthonormal, and an A
+ * that is symmetric and positive semidefinite. Fails with the first that is wrong. It costs about
+ * as much as a solve, so leave it out of a release. */
+MildStatus mild_contact_check(const MildGround *ground, const MildTerrain *terrain,
+                              const MildContactInput *input, MildError *error);
 /* Updates the memory of the ground for the step that was just solved with this scratch, input and
  * result. It assumes that positions advance by dt times the new velocity. Call it once for each
  * step that the engine keeps. */

@@ -94,6 +94,12 @@ static bool solve(Ground &ground) {
     return ground.result.converged != 0;
 }
 
+static void check_input(Ground &ground) {
+    Entered entered(ground.busy, "Ground.check");
+    MildError error = {};
+    check(mild_contact_check(ground.ground, &ground.terrain.terrain, &ground.input, &error), error);
+}
+
 static void advance(Ground &ground) {
     Entered entered(ground.busy, "Ground.advance");
     if (!ground.solved) {
@@ -313,6 +319,10 @@ void bind_ground(nb::module_ &module) {
         .def("solve", solve,
              "Solves the contact step; the ground stays as it is. Returns whether it converged:\n"
              "False also for input that is not finite.")
+        .def("check", check_input,
+             "Checks what solve takes on trust: poses and twists that are finite, rotations that "
+             "are\northonormal, an inverse_inertia that is symmetric and positive semidefinite. "
+             "Raises\nValueError for the first that is wrong. Use it while you write an engine.")
         .def("advance", advance,
              "Moves the memory of the ground to the end of the step just solved. Raises "
              "RuntimeError\nwithout one.")

@@ -10,6 +10,7 @@
 #include "app/grounds.h"
 #include "app/report.h"
 #include "app/robots.h"
+#include "app/trained.h"
 #include "base/paths.h"
 #include "drive/drive.h"
 #include "drive/simulated.h"
@@ -293,6 +294,9 @@ static MildStatus run_drive(Drive *d, const CliArgs *args, MildError *error) {
     /* those of a simulated robot are read with its ground's */
     Robot *robot =
         robots_open_task(&d->task, d->config, d->simulate ? NULL : args, d->robot, error);
+    if (robot && !d->simulate) {
+        trained_tell("drive", d->policy, d->config, &d->task);
+    }
     status = !robot        ? error->status
              : d->simulate ? run_simulated(d, robot, args, error)
                            : run_runner(d, robot, error);

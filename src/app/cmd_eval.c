@@ -11,6 +11,7 @@
 #include "app/grounds.h"
 #include "app/report.h"
 #include "app/robots.h"
+#include "app/trained.h"
 #include "base/paths.h"
 #include "config/config.h"
 #include "config/experiment_keys.h"
@@ -70,7 +71,8 @@ static cJSON *row_json(const EvalRow *row) {
                   {"drift_left", row->drift_left},
                   {"velocity_deviation", row->velocity_deviation},
                   {"cot_deviation", row->cot_deviation},
-                  {"torque_deviation", row->torque_deviation}};
+                  {"torque_deviation", row->torque_deviation},
+                  {"measured", row->measured}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(o, values[i].name, values[i].value);
     }
@@ -384,6 +386,9 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     }
     if (status == MILD_OK) {
         robots_tell_slow("eval", &e->train, e->robot ? e->robot : e->config_robot);
+        if (strcmp(e->controller, "learned") == 0) {
+            trained_tell("eval", e->policy, e->config, &e->task);
+        }
         status = evaluate(e, robot, pool, &controller, error);
     }
     controller_destroy(&controller);

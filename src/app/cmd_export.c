@@ -7,6 +7,7 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/robots.h"
+#include "app/trained.h"
 #include "base/paths.h"
 #include "control/learned.h"
 
@@ -45,6 +46,9 @@ static MildStatus write_files(const Exporting *e, const Robot *robot, MildError 
 static MildStatus run_export(Exporting *e, const CliArgs *args, MildError *error) {
     Robot *robot = robots_open_task(&e->task, e->config, args, e->robot, error);
     MildStatus status = robot ? write_files(e, robot, error) : error->status;
+    if (status == MILD_OK) {
+        trained_tell("export", e->policy, e->config, &e->task);
+    }
     robot_destroy(robot);
     return status;
 }

@@ -13,6 +13,7 @@
 #include "app/play.h"
 #include "app/progress.h"
 #include "app/robots.h"
+#include "app/trained.h"
 #include "base/file.h"
 #include "config/config.h"
 #include "config/experiment_keys.h"
@@ -238,6 +239,9 @@ static MildStatus prepare(Command *c, MildError *error) {
     status = actuator_open(&c->task, play->robot, &c->actuator, error);
     if (status == MILD_OK) {
         status = controller_make(c->controller, &def, play->controller, error);
+    }
+    if (status == MILD_OK && strcmp(c->controller, "learned") == 0) {
+        trained_tell("play", c->policy, c->config, &c->task);
     }
     if (status == MILD_OK && c->video) {
         status = make_place(c->video, error);

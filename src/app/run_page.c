@@ -303,6 +303,12 @@ static double number_of(const cJSON *row, const char *key) {
     return cJSON_IsNumber(item) ? item->valuedouble : NAN;
 }
 
+/* A measure; NAN where no trial lasted long enough for it. */
+static double measure_of(const cJSON *row, const char *key) {
+    const int steady = strcmp(key, "velocity") == 0 || strcmp(key, "cot") == 0;
+    return steady && number_of(row, "measured") == 0 ? NAN : number_of(row, key);
+}
+
 static void write_eval_row(const Page *page, const cJSON *row) {
     const cJSON *ground = cJSON_GetObjectItem(row, "ground");
     fputs("<tr><td>", page->html);
@@ -310,7 +316,7 @@ static void write_eval_row(const Page *page, const cJSON *row) {
     fprintf(page->html, "<td class=n>%.0f of %.0f", number_of(row, "success"),
             number_of(row, "trials"));
     for (int i = 0; i < EVAL_COLUMNS; i++) {
-        const double value = eval_columns[i].factor * number_of(row, eval_columns[i].key);
+        const double value = eval_columns[i].factor * measure_of(row, eval_columns[i].key);
         fputs("<td class=n>", page->html);
         if (isfinite(value)) {
             fprintf(page->html, eval_columns[i].format, value);

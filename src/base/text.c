@@ -35,8 +35,10 @@ int text_distance(const char *a, const char *b) {
 const char *text_nearest(const char *name, const char *const *names, int count) {
     const char *best = NULL;
     int best_distance = INT_MAX;
+    const size_t length = strlen(name);
     for (int i = 0; i < count; i++) {
-        int distance = text_distance(name, names[i]);
+        const int begins = length > 1 && strncmp(names[i], name, length) == 0;
+        int distance = begins ? names[i][length] != 0 : text_distance(name, names[i]);
         if (distance < best_distance) {
             best_distance = distance;
             best = names[i];

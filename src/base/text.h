@@ -8,7 +8,8 @@
 /* Levenshtein distance between two names; only the first 63 characters count. */
 int text_distance(const char *a, const char *b);
 
-/* The name among names[0..count) with the smallest distance to `name`; NULL when count is 0. */
+/* The name among names[0..count) with the smallest distance to `name`, where one that begins with
+ * `name` is at a distance of 1; NULL when count is 0. */
 const char *text_nearest(const char *name, const char *const *names, int count);
 
 /* Reads all of `text` as a finite number or an integer. Returns 0 when it is not one. */

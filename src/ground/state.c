@@ -23,6 +23,9 @@ static size_t feet_bytes(const int32_t *padded, int feet) {
 
 size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tiles) {
     int32_t padded[MILD_FEET_MAX];
+    if (feet < 1 || feet > MILD_FEET_MAX) {
+        return 0;
+    }
     for (int f = 0; f < feet; f++) {
         padded[f] = sole_padded(soles[f]);
     }
@@ -65,7 +68,11 @@ Imprints ground_imprints(const MildGround *ground) {
 
 MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, int feet,
                                     int tiles) {
-    memset(block, 0, mild_ground_bytes_prints(soles, feet, tiles));
+    const size_t bytes = mild_ground_bytes_prints(soles, feet, tiles);
+    if (!block || !bytes) {
+        return NULL;
+    }
+    memset(block, 0, bytes);
     MildGround *ground = block;
     ground->feet = feet;
     for (int f = 0; f < feet; f++) {

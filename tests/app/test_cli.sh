@@ -162,6 +162,21 @@ expect 0 'sand_dense' "$mild" info grounds
 expect 0 'k_pen .*\[N/m\]' "$mild" info grounds
 expect 0 'newton' "$mild" info models
 
+# a policy that was trained with another gait: said once, and not when the config or the number is given
+told() { "$mild" eval --ground rigid --trials 1 --seconds 0.1 "$@" 2>&1 >/dev/null; }
+g1=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../../policies/g1.safetensors")
+[ "$(told --robot g1 --policy "$g1")" = "mild eval: $g1 was trained with task.gait_period = 0.7, which is 0.8 here; give --config configs/g1.ini" ] ||
+    fail "$(told --robot g1 --policy "$g1")"
+[ -z "$(told --robot g1 --policy "$g1" --task.gait_period=0.7)$(told)$(told --robot g1 --controller zero)" ] || fail "a word too many"
+[ -z "$(told --policy "$g1" --config "$(dirname "$g1")/../configs/g1.ini")" ] || fail "a word too many with the config"
+printf '[task]\ngait_period = 0.7\n' >gait.ini
+small=(--config gait.ini --train.envs=4 --train.iterations=1 --ppo.steps=4 --ppo.minibatches=1)
+"$mild" train "${small[@]}" --out gait >/dev/null 2>&1
+"$mild" train "${small[@]}" --out own_gait --task.gait_period=0.9 >/dev/null 2>&1 # the config's is not the policy's
+[[ $(told --policy gait/policy.safetensors) = *"0.7, which is 0.8 here; give --config gait.ini" ]] || fail "a config of the user's"
+[ -z "$(told --policy own_gait/policy.safetensors)" ] || fail "$(told --policy own_gait/policy.safetensors)"
+expect 0 'mild export: .*gait_period = 0.7' "$mild" export --robot g1 --policy "$g1" --c g1_policy
+
 # robots and controllers
 expect 0 'go1: 12 joints, 4 feet, 12.7 kg' "$mild" info robots
 expect 0 'g1: 12 joints, 2 feet, 33.3 kg' "$mild" info robots

@@ -16,7 +16,9 @@ run other 1 0.5 '<128>'
 printf '0.1.0 & more\nmild train\n' >seed1/version.txt
 cat >seed2/eval.json <<'END'
 {"rows": [{"ground": "sand_loose", "speed": 0.6, "trials": 10, "success": 9, "velocity": 0.59, "cot": 0.7, "torque_max": 81.4,
-    "clearance": 0.052, "penetration": 0.074, "drift": 0.0032}]}
+    "clearance": 0.052, "penetration": 0.074, "drift": 0.0032},
+    {"ground": "foam25", "speed": 0.6, "trials": 10, "success": 0, "velocity": 0, "cot": 0, "torque_max": 90, "clearance": 0.01,
+    "penetration": 0.1, "drift": 0.001, "measured": 0}]}
 END
 printf 'ten bytes!' >seed1/small.mp4
 head -c 4194305 /dev/zero >'other/big one.mp4'
@@ -30,6 +32,7 @@ page=$(cat pages/page.html)
 has() { grep -qF -- "$1" <<<"$page" || fail "the page has not: $1"; }
 has '0.1.0 &amp; more'
 has '<td>sand_loose<td class=n>9 of 10<td class=n>0.60<td class=n>0.59<td class=n>0.70<td class=n>81<td class=n>52<td class=n>74<td class=n>3'
+has '<td>foam25<td class=n>0 of 10<td class=n>0.60<td class=n><td class=n><td class=n>90<' # they fell too early
 has '<td class=n>100<td class=n>97.50<' # iterations, and the mean return over the last six rows
 has "src=\"data:video/mp4;base64,$(printf 'ten bytes!' | base64)\""
 has 'src="../other/big%20one.mp4"'

@@ -51,8 +51,10 @@ static void test_nearest(void **state) {
     (void)state;
     static const char *const names[] = {"rubber", "foam60", "foam45", "sand_loose"};
     assert_string_equal(text_nearest("foam44", names, 4), "foam45");
-    assert_string_equal(text_nearest("foam", names, 4), "foam60"); /* the first of two alike */
-    assert_string_equal(text_nearest("sand", names, 4), "foam60"); /* 5; sand_loose is 6 away */
+    assert_string_equal(text_nearest("foam", names, 4), "foam60");     /* the first of two alike */
+    assert_string_equal(text_nearest("sand", names, 4), "sand_loose"); /* though 6 away */
+    assert_string_equal(text_nearest("s", names, 4), "rubber");        /* too short to begin one */
+    assert_string_equal(text_nearest("foam45", (const char *[]){"foam45x", "foam45"}, 2), "foam45");
     assert_string_equal(text_nearest("sand_loos", names, 4), "sand_loose");
     assert_string_equal(text_nearest("foam45", names, 2), "foam60");
     assert_null(text_nearest("foam", names, 0));

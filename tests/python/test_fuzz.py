@@ -100,7 +100,7 @@ class Fuzz(unittest.TestCase):
                   (_ground._fit_forces, ("sole", "material", "rows")))
         methods = {mild.Sole: ("sinkage", "concentric"), mild.Terrain: ("add_patch", "height_at", "slope_at", "material_at"),
                    mild.Material: ("match", "__eq__", "__setstate__"), mild.Map: (),
-                   mild.Ground: ("solve", "advance", "reset", "elements", "element_depths", "print_at", "__setstate__"),
+                   mild.Ground: ("solve", "check", "advance", "reset", "elements", "element_depths", "print_at", "__setstate__"),
                    mild.Batch: ("set_materials", "set_map", "step", "reset", "load", "store")}
         settable = {mild.Ground: ("dt", "terrain", "state"), mild.Terrain: ("height",), mild.Material: ("mu", "model", "passive")}
         task = envs.open_envs(2, threads=1)

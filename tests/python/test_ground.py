@@ -174,6 +174,25 @@ class Step(unittest.TestCase):
         self.assertTrue(shared.solve())
 
 
+class Check(unittest.TestCase):
+    def test_faults(self):
+        """A good input passes, and each fault is named."""
+        ground = mild.Ground([mild.Sole.plate(0.2, 0.1)], "foam45", 0.001)
+        body(ground)
+        ground.check()
+        for array, place, value, name in (("position", (0, 2), np.nan, "input.position of foot 0"),
+                                          ("rotation", (0, 1, 1), 2, "not orthonormal"),
+                                          ("inverse_inertia", (1, 4), 1, "not symmetric"),
+                                          ("inverse_inertia", (3, 3), -1, "row 3"),
+                                          ("free_velocity", (0, 5), np.inf, "input.free_velocity")):
+            kept = getattr(ground, array)[place].copy()
+            getattr(ground, array)[place] = value
+            with self.assertRaisesRegex(ValueError, name):
+                ground.check()
+            getattr(ground, array)[place] = kept
+        ground.check()
+
+
 class State(unittest.TestCase):
     def fallen(self, steps):
         ground = mild.Ground([mild.Sole.plate(0.2, 0.1)], mild.Terrain(["sand_loose", "foam45"], map=mild.Map("waves", amplitude=0.01,
