@@ -10,7 +10,6 @@
 #include "app/grounds.h"
 #include "app/report.h"
 #include "app/robots.h"
-#include "app/trained.h"
 #include "base/paths.h"
 #include "drive/drive.h"
 #include "drive/simulated.h"
@@ -292,11 +291,8 @@ static MildStatus run_drive(Drive *d, const CliArgs *args, MildError *error) {
         return status;
     }
     /* those of a simulated robot are read with its ground's */
-    Robot *robot =
-        robots_open_task(&d->task, d->config, d->simulate ? NULL : args, d->robot, error);
-    if (robot && !d->simulate) {
-        trained_tell("drive", d->policy, d->config, &d->task);
-    }
+    Robot *robot = robots_open_task(&d->task, d->config, d->simulate ? NULL : d->policy,
+                                    d->simulate ? NULL : args, d->robot, error);
     status = !robot        ? error->status
              : d->simulate ? run_simulated(d, robot, args, error)
                            : run_runner(d, robot, error);
@@ -319,7 +315,8 @@ int cmd_drive(int argc, char **argv) {
         {"robot", CLI_TEXT, &d.robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP " (default: the config's, or sa01)"},
         {"config", CLI_INPUT, &d.config, 0, 0, "FILE",
-         "config that the policy was trained with, for its section [task]"},
+         "config whose section [task] goes before what the policy's file says, such as that of "
+         "its training"},
         {"listen", CLI_TEXT, &d.listen, 0, 0, "HOST:PORT",
          "where states arrive; targets go to where they come from (default " ADDRESS ")"},
         {"command", CLI_NUMBERS, &d.command, -10, 10, "VX,VY,WZ",

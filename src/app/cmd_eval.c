@@ -11,7 +11,6 @@
 #include "app/grounds.h"
 #include "app/report.h"
 #include "app/robots.h"
-#include "app/trained.h"
 #include "base/paths.h"
 #include "config/config.h"
 #include "config/experiment_keys.h"
@@ -354,7 +353,9 @@ static MildStatus check_place(const Eval *e, MildError *error) {
 
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     MildModel model;
-    MildStatus status = experiment_task(&e->task, e->randomize, e->config_robot, e->config, error);
+    const char *policy = strcmp(e->controller, "learned") == 0 ? e->policy : NULL;
+    MildStatus status =
+        experiment_task(&e->task, e->randomize, e->config_robot, e->config, policy, error);
     if (status == MILD_OK) {
         status = controller_check(e->controller, error);
     }
@@ -386,9 +387,6 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     }
     if (status == MILD_OK) {
         robots_tell_slow("eval", &e->train, e->robot ? e->robot : e->config_robot);
-        if (strcmp(e->controller, "learned") == 0) {
-            trained_tell("eval", e->policy, e->config, &e->task);
-        }
         status = evaluate(e, robot, pool, &controller, error);
     }
     controller_destroy(&controller);
@@ -426,7 +424,8 @@ int cmd_eval(int argc, char **argv) {
         {"controller", CLI_TEXT, &e->controller, 0, 0, "NAME",
          robots_controller_help(controller_help, sizeof controller_help)},
         {"config", CLI_INPUT, &e->config, 0, 0, "FILE",
-         "config that the policy was trained with, for its section [task]"},
+         "config whose section [task] goes before what the policy's file says, such as that of "
+         "its training"},
         {"ground", CLI_NAMES, &e->grounds, 0, 0, "NAME[,NAME]",
          "grounds that `mild info grounds` lists, one row each; rubber+foam45 is a course of both, "
          "in which rigid is a very hard material (default rigid,foam45,sand_loose)"},

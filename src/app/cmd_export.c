@@ -7,7 +7,6 @@
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/robots.h"
-#include "app/trained.h"
 #include "base/paths.h"
 #include "control/learned.h"
 
@@ -44,11 +43,8 @@ static MildStatus write_files(const Exporting *e, const Robot *robot, MildError 
 }
 
 static MildStatus run_export(Exporting *e, const CliArgs *args, MildError *error) {
-    Robot *robot = robots_open_task(&e->task, e->config, args, e->robot, error);
+    Robot *robot = robots_open_task(&e->task, e->config, e->policy, args, e->robot, error);
     MildStatus status = robot ? write_files(e, robot, error) : error->status;
-    if (status == MILD_OK) {
-        trained_tell("export", e->policy, e->config, &e->task);
-    }
     robot_destroy(robot);
     return status;
 }
@@ -62,7 +58,8 @@ int cmd_export(int argc, char **argv) {
         {"robot", CLI_TEXT, &e.robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP " (default: the config's, or sa01)"},
         {"config", CLI_INPUT, &e.config, 0, 0, "FILE",
-         "config that the policy was trained with, for its section [task]"},
+         "config whose section [task] goes before what the policy's file says, such as that of "
+         "its training"},
         {"onnx", CLI_OUTPUT, &e.onnx, 0, 0, "FILE",
          "write one graph with weights, history and metadata"},
         {"double", CLI_FLAG, &e.in_double, 0, 0, NULL,

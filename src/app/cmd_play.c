@@ -13,7 +13,6 @@
 #include "app/play.h"
 #include "app/progress.h"
 #include "app/robots.h"
-#include "app/trained.h"
 #include "base/file.h"
 #include "config/config.h"
 #include "config/experiment_keys.h"
@@ -240,9 +239,6 @@ static MildStatus prepare(Command *c, MildError *error) {
     if (status == MILD_OK) {
         status = controller_make(c->controller, &def, play->controller, error);
     }
-    if (status == MILD_OK && strcmp(c->controller, "learned") == 0) {
-        trained_tell("play", c->policy, c->config, &c->task);
-    }
     if (status == MILD_OK && c->video) {
         status = make_place(c->video, error);
     }
@@ -266,7 +262,8 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     Play *play = &c->play;
     Controller controller = {0};
     MildModel model;
-    MildStatus status = experiment_task(&c->task, 0, c->config_robot, c->config, error);
+    const char *policy = strcmp(c->controller, "learned") == 0 ? c->policy : NULL;
+    MildStatus status = experiment_task(&c->task, 0, c->config_robot, c->config, policy, error);
     if (status == MILD_OK) {
         status = controller_check(c->controller, error);
     }
@@ -336,7 +333,8 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S",
          "seed of start and sensor noise (default 1)"},
         {"config", CLI_INPUT, &c->config, 0, 0, "FILE",
-         "config that the policy was trained with, for its section [task]"},
+         "config whose section [task] goes before what the policy's file says, such as that of "
+         "its training"},
         {"width", CLI_INT, &c->width, 64, 7680, "N", "[pixels] width of the picture (default 960)"},
         {"height", CLI_INT, &c->height, 64, 4320, "N",
          "[pixels] height of the picture (default 540)"},

@@ -13,11 +13,11 @@ Robot *robots_open(const char *option, const char *otherwise, MildError *error) 
     return robot_open(option ? option : otherwise, error);
 }
 
-Robot *robots_open_task(TaskDef *task, const char *config, const CliArgs *args, const char *option,
-                        MildError *error) {
+Robot *robots_open_task(TaskDef *task, const char *config, const char *policy, const CliArgs *args,
+                        const char *option, MildError *error) {
     char named[TRAIN_ROBOT_SIZE];
     const ConfigSection section = {"task", task_fields, task_field_count, task};
-    MildStatus status = experiment_task(task, 0, named, config, error);
+    MildStatus status = experiment_task(task, 0, named, config, policy, error);
     if (status == MILD_OK && args) {
         status = config_overrides(&section, 1, args->overrides, args->override_count, error);
     }

@@ -3,6 +3,8 @@
 #include <string.h>
 
 #include "base/paths.h"
+#include "learn/policy.h"
+#include "task/policy_keys.h"
 
 ConfigSection terrain_section(TerrainDef *def) {
     int count;
@@ -25,13 +27,30 @@ void experiment_sections(ExperimentDef *def, ConfigSection sections[EXPERIMENT_S
     sections[6] = terrain_section(&def->terrain);
 }
 
-MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides,
-                           int override_count, MildError *error) {
+static MildStatus walk_as_trained(TaskDef *task, const char *file, MildError *error) {
+    MildError inner = {0};
+    Policy *policy = policy_load(file, NULL, 0, &inner);
+    MildStatus status = MILD_OK;
+    if (policy && task_policy_keys_read(task, policy_def(policy)->task, &inner) != MILD_OK) {
+        status = mild_fail(error, MILD_ERROR_FORMAT, "%s: its metadata key 'task': %.200s", file,
+                           inner.text);
+    }
+    policy_destroy(policy);
+    return status;
+}
+
+/* configs/default.ini, how the policy walks, the overlay, the overrides. policy, overlay: NULL:
+ * none. */
+static MildStatus read_layers(ExperimentDef *def, const char *policy, const char *overlay,
+                              const char *const *overrides, int override_count, MildError *error) {
     char path[PATH_SIZE];
     ConfigSection sections[EXPERIMENT_SECTIONS];
     experiment_sections(def, sections);
     MildStatus status = config_read(sections, EXPERIMENT_SECTIONS,
                                     path_data("configs/default.ini", path), 1, error);
+    if (status == MILD_OK && policy) {
+        status = walk_as_trained(&def->task, policy, error);
+    }
     if (status == MILD_OK && overlay) {
         status = config_read(sections, EXPERIMENT_SECTIONS, overlay, 0, error);
     }
@@ -44,6 +63,11 @@ MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *
     return status;
 }
 
+MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *const *overrides,
+                           int override_count, MildError *error) {
+    return read_layers(def, NULL, overlay, overrides, override_count, error);
+}
+
 MildStatus experiment_read_text(ExperimentDef *def, const char *text, MildError *error) {
     ConfigSection sections[EXPERIMENT_SECTIONS];
     experiment_sections(def, sections);
@@ -53,9 +77,11 @@ MildStatus experiment_read_text(ExperimentDef *def, const char *text, MildError 
 }
 
 MildStatus experiment_task(TaskDef *task, int randomized, char robot[TRAIN_ROBOT_SIZE],
-                           const char *config, MildError *error) {
+                           const char *config, const char *policy, MildError *error) {
     ExperimentDef def = experiment_def_default();
-    MildStatus status = config ? experiment_read(&def, config, NULL, 0, error) : MILD_OK;
+    MildStatus status = config   ? read_layers(&def, policy, config, NULL, 0, error)
+                        : policy ? walk_as_trained(&def.task, policy, error)
+                                 : MILD_OK;
     *task = def.task;
     memcpy(robot, def.train.robot, sizeof def.train.robot);
     if (randomized) {

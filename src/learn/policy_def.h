@@ -10,6 +10,7 @@
 typedef struct {
     /* shape of the problem: set by the task, not by the config */
     char robot[64];           /* name of the robot that it was trained for; empty: not known */
+    char task[1024];          /* how it walks, see task/policy_keys.h; empty: not known */
     int observation;          /* width of one frame, 47 */
     int frames;               /* frames in the history, newest last: H + 1 = 6 */
     int critic_input;         /* width of the critic's input, which begins with a noiseless frame */

@@ -66,10 +66,13 @@ void policy_file_tensors(const Network *network, const float *parameters, Policy
     strcpy(tensors->name[tensors->count - 1], "log_std");
 }
 
-/* Optional: files from before it was written have none. */
-static const MildField robot_field =
+/* Optional: files from before they were written have none. */
+static const MildField text_fields[] = {
     MILD_FIELD(PolicyDef, robot, MILD_FIELD_TEXT, (int)sizeof((PolicyDef *)NULL)->robot, 0, 0,
-               "[text] robot that the policy was trained for");
+               "[text] robot that the policy was trained for"),
+    MILD_FIELD(PolicyDef, task, MILD_FIELD_TEXT, (int)sizeof((PolicyDef *)NULL)->task, 0, 0,
+               "[text] how it walks"),
+};
 
 static void add_text(PolicyTexts *texts, const char *key, const char *value) {
     texts->text[texts->count++] = (SafetensorsText){key, value};
@@ -90,6 +93,9 @@ void policy_file_texts(const Network *network, const char *kind, const char *not
     add_text(texts, "note", note ? note : "");
     if (network->def.robot[0]) {
         add_text(texts, "robot", network->def.robot);
+    }
+    if (network->def.task[0]) {
+        add_text(texts, "task", network->def.task);
     }
     for (int f = 0; f < SHAPE_FIELDS + policy_field_count; f++) {
         add_field(texts, file_field(f), &network->def);
@@ -142,10 +148,12 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
             version);
     }
     *def = policy_def_default();
-    const char *robot = safetensors_text(file, "robot");
-    if (robot && mild_field_parse(&robot_field, def, robot, "policy", error) != MILD_OK) {
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: its metadata key 'robot' is too long",
-                         path);
+    for (int f = 0; f < 2; f++) {
+        const char *name = text_fields[f].name, *text = safetensors_text(file, name);
+        if (text && mild_field_parse(&text_fields[f], def, text, "policy", error) != MILD_OK) {
+            return mild_fail(error, MILD_ERROR_FORMAT, "%s: its metadata key '%s' is too long",
+                             path, name);
+        }
     }
     MildStatus status = MILD_OK;
     for (int f = 0; !status && f < SHAPE_FIELDS + policy_field_count; f++) {

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "task/policy_keys.h"
 #include "task/task.h"
 
 ExperimentDef experiment_def_default(void) {
@@ -19,6 +20,7 @@ ExperimentDef experiment_def_default(void) {
 void experiment_fit_robot(ExperimentDef *def, const Robot *robot) {
     TaskShape shape = task_shape(robot);
     snprintf(def->policy.robot, sizeof def->policy.robot, "%s", robot_name(robot));
+    task_policy_keys_print(&def->task, def->policy.task, sizeof def->policy.task);
     def->policy.observation = shape.observation;
     def->policy.frames = TASK_FRAMES;
     def->policy.critic_input = shape.critic;

@@ -262,7 +262,7 @@ static EvalRow walk(const Walker *walker, const Robot *robot, const char *ground
     char file[300], name[TRAIN_ROBOT_SIZE];
     MildError error = {0};
     TaskDef def;
-    if (experiment_task(&def, 0, name, walker->config, &error) != MILD_OK) {
+    if (experiment_task(&def, 0, name, walker->config, NULL, &error) != MILD_OK) {
         fail_msg("%s", error.text);
     }
     def.physics_dt = dt;

@@ -1,0 +1,108 @@
+/* What a policy's file says of how it walks: printed and read again, and refused. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "task/policy_keys.h"
+
+#define GAINS "50 50 70 70 20 20 50 50 70 70 20 20"
+
+/* All keys away from their defaults, and others too. */
+static TaskDef changed(void) {
+    TaskDef def = task_def_default();
+    def.gait_period = 0.7;
+    def.standing_below = 0.2;
+    def.clock = 0;
+    def.history_stride = 3;
+    def.velocity_scale = 2;
+    def.height_scale = 5;
+    def.action_scale = 0.3;
+    def.action_clip = 7;
+    def.torque_share = 0.6;
+    def.torque_hold = 1;
+    strcpy(def.kp, GAINS);
+    strcpy(def.kd, "1.5");
+    def.physics_dt = 0.001;
+    return def;
+}
+
+static void printed_and_read(void **state) {
+    (void)state;
+    char text[1024];
+    MildError error = {0};
+    TaskDef from = changed(), to = task_def_default();
+    task_policy_keys_print(&from, text, sizeof text);
+    print_message("%s\n", text);
+    assert_int_equal(task_policy_keys_read(&to, text, &error), MILD_OK);
+    assert_true(to.gait_period == 0.7 && to.standing_below == 0.2 && to.clock == 0);
+    assert_true(to.history_stride == 3 && to.velocity_scale == 2 && to.height_scale == 5);
+    assert_true(to.action_scale == 0.3 && to.action_clip == 7);
+    assert_true(to.torque_share == 0.6 && to.torque_hold == 1);
+    assert_string_equal(to.kp, GAINS);
+    assert_string_equal(to.kd, "1.5");
+    assert_true(to.physics_dt == task_def_default().physics_dt); /* no matter of the policy's */
+    to = changed();
+    assert_int_equal(task_policy_keys_read(&to, "", &error), MILD_OK); /* an older file */
+    assert_true(to.gait_period == 0.7 && to.clock == 0);
+}
+
+/* The longest values have room in a policy's file; where they have not, nothing is printed. */
+static void lengths(void **state) {
+    (void)state;
+    char text[1024];
+    TaskDef def = changed();
+    memset(def.kp, '1', sizeof def.kp - 1);
+    memset(def.kd, '2', sizeof def.kd - 1);
+    def.kp[sizeof def.kp - 1] = def.kd[sizeof def.kd - 1] = '\0';
+    task_policy_keys_print(&def, text, sizeof text);
+    assert_true(strlen(text) > 2 * sizeof def.kp - 2);
+    assert_string_equal(text + strlen(text) - strlen(def.kd), def.kd);
+    const size_t whole = strlen(text);
+    for (size_t size = 1; size <= whole; size++) {
+        task_policy_keys_print(&def, text, size);
+        assert_string_equal(text, "");
+    }
+}
+
+static void refused(void **state) {
+    (void)state;
+    static const char *const texts[][2] = {
+        {"gait_perion = 1", "'gait_perion = 1' is no key"},
+        {"physics_dt = 0.001", "'physics_dt = 0.001' is no key"},
+        {"clock = true; ; clock = true", "'' is no key"},
+        {"gait_period=1", "'gait_period=1' is no key"},
+        {"gait_period = nan", "gait_period"},
+        {"gait_period = -1", "gait_period"},
+        {"clock = 2", "clock"},
+        {"kp = 1 2", NULL}, /* a number a joint; the robot says how many */
+    };
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        TaskDef def = task_def_default();
+        MildError error = {0};
+        const MildStatus status = task_policy_keys_read(&def, texts[i][0], &error);
+        print_message("%s: %s\n", texts[i][0], error.text);
+        assert_int_equal(status == MILD_OK, texts[i][1] == NULL);
+        assert_true(!texts[i][1] || strstr(error.text, texts[i][1]));
+    }
+    char text[2000];
+    TaskDef def = task_def_default();
+    MildError error = {0};
+    memset(text, '1', sizeof text - 1);
+    text[sizeof text - 1] = '\0';
+    memcpy(text, "kp = ", 5);
+    assert_int_not_equal(task_policy_keys_read(&def, text, &error), MILD_OK);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(printed_and_read),
+        cmocka_unit_test(lengths),
+        cmocka_unit_test(refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
