@@ -50,7 +50,7 @@ def walk(policy, ground, speed):
             fallen |= done.bool() & ~extras["time_outs"]
             speeds += [observations["critic"][:, -3]] if step >= 200 else []  # smoothed forward speed, docs/task.md section 6
     speeds = torch.stack(speeds).mean(0)[~fallen]
-    print(f"{ground:10} {speed:.2f} m/s: {10 - int(fallen.sum())} of 10 walk, at {speeds.mean().item():.3f} m/s")
+    print(f"{ground:10} {speed:.2f} m/s: {len(speeds)} of 10 walk" + (f", at {speeds.mean().item():.3f} m/s" if len(speeds) else ""))
 
 
 for kind in ("rigid", "foam45", "sand_loose"):
