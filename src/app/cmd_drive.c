@@ -313,7 +313,7 @@ int cmd_drive(int argc, char **argv) {
         {"policy", CLI_INPUT, &d.policy, 0, 0, "FILE",
          "policy to run (default policies/mild.safetensors)"},
         {"robot", CLI_TEXT, &d.robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP " (default: the config's, or sa01)"},
+         ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
         {"config", CLI_INPUT, &d.config, 0, 0, "FILE",
          "config whose section [task] goes before what the policy's file says, such as that of "
          "its training"},

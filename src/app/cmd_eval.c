@@ -420,7 +420,7 @@ int cmd_eval(int argc, char **argv) {
         {"policy", CLI_INPUT, &e->policy, 0, 0, "FILE",
          "policy to measure (default policies/mild.safetensors)"},
         {"robot", CLI_TEXT, &e->robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP " (default: the config's, or sa01)"},
+         ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
         {"controller", CLI_TEXT, &e->controller, 0, 0, "NAME",
          robots_controller_help(controller_help, sizeof controller_help)},
         {"config", CLI_INPUT, &e->config, 0, 0, "FILE",

@@ -56,7 +56,7 @@ int cmd_export(int argc, char **argv) {
         {"policy", CLI_INPUT, &e.policy, 0, 0, "FILE",
          "policy to export (default policies/mild.safetensors)"},
         {"robot", CLI_TEXT, &e.robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP " (default: the config's, or sa01)"},
+         ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
         {"config", CLI_INPUT, &e.config, 0, 0, "FILE",
          "config whose section [task] goes before what the policy's file says, such as that of "
          "its training"},

@@ -313,7 +313,7 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         {"policy", CLI_INPUT, &c->policy, 0, 0, "FILE",
          "policy to watch (default policies/mild.safetensors)"},
         {"robot", CLI_TEXT, &c->robot, 0, 0, "NAME|DIR",
-         ROBOTS_HELP " (default: the config's, or sa01)"},
+         ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
         {"controller", CLI_TEXT, &c->controller, 0, 0, "NAME",
          robots_controller_help(controller_help, sizeof controller_help)},
         {"ground", CLI_NAMES, &c->grounds, 0, 0, "NAME[,NAME]",

@@ -1,5 +1,6 @@
 #include "config/experiment_keys.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #include "base/paths.h"
@@ -27,20 +28,34 @@ void experiment_sections(ExperimentDef *def, ConfigSection sections[EXPERIMENT_S
     sections[6] = terrain_section(&def->terrain);
 }
 
-static MildStatus walk_as_trained(TaskDef *task, const char *file, MildError *error) {
+/* The robot of a policy, when its name is one of robots/. */
+static void take_robot(TrainDef *train, const char *robot) {
+    char names[ROBOT_LISTED_MAX][ROBOT_LISTED_SIZE];
+    const int count = robot_list(names, ROBOT_LISTED_MAX);
+    for (int i = 0; i < count; i++) {
+        if (strcmp(names[i], robot) == 0) {
+            snprintf(train->robot, sizeof train->robot, "%s", robot);
+        }
+    }
+}
+
+static MildStatus take_policy(ExperimentDef *def, const char *file, MildError *error) {
     MildError inner = {0};
     Policy *policy = policy_load(file, NULL, 0, &inner);
     MildStatus status = MILD_OK;
-    if (policy && task_policy_keys_read(task, policy_def(policy)->task, &inner) != MILD_OK) {
-        status = mild_fail(error, MILD_ERROR_FORMAT, "%s: its metadata key 'task': %.200s", file,
-                           inner.text);
+    if (policy) {
+        take_robot(&def->train, policy_def(policy)->robot);
+        if (task_policy_keys_read(&def->task, policy_def(policy)->task, &inner) != MILD_OK) {
+            status = mild_fail(error, MILD_ERROR_FORMAT, "%s: its metadata key 'task': %.200s",
+                               file, inner.text);
+        }
     }
     policy_destroy(policy);
     return status;
 }
 
-/* configs/default.ini, how the policy walks, the overlay, the overrides. policy, overlay: NULL:
- * none. */
+/* configs/default.ini, what the policy's file says, the overlay, the overrides. policy, overlay:
+ * NULL: none. */
 static MildStatus read_layers(ExperimentDef *def, const char *policy, const char *overlay,
                               const char *const *overrides, int override_count, MildError *error) {
     char path[PATH_SIZE];
@@ -49,7 +64,7 @@ static MildStatus read_layers(ExperimentDef *def, const char *policy, const char
     MildStatus status = config_read(sections, EXPERIMENT_SECTIONS,
                                     path_data("configs/default.ini", path), 1, error);
     if (status == MILD_OK && policy) {
-        status = walk_as_trained(&def->task, policy, error);
+        status = take_policy(def, policy, error);
     }
     if (status == MILD_OK && overlay) {
         status = config_read(sections, EXPERIMENT_SECTIONS, overlay, 0, error);
@@ -80,7 +95,7 @@ MildStatus experiment_task(TaskDef *task, int randomized, char robot[TRAIN_ROBOT
                            const char *config, const char *policy, MildError *error) {
     ExperimentDef def = experiment_def_default();
     MildStatus status = config   ? read_layers(&def, policy, config, NULL, 0, error)
-                        : policy ? walk_as_trained(&def.task, policy, error)
+                        : policy ? take_policy(&def, policy, error)
                                  : MILD_OK;
     *task = def.task;
     memcpy(robot, def.train.robot, sizeof def.train.robot);

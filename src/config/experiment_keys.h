@@ -23,10 +23,11 @@ MildStatus experiment_read(ExperimentDef *def, const char *overlay, const char *
 /* Reads a complete config, such as config_text writes, and checks it. */
 MildStatus experiment_read_text(ExperimentDef *def, const char *text, MildError *error);
 
-/* The task for evaluation and play and the robot: from the defaults, then from what the policy's
- * file says of how it walks, then from the config. policy: NULL: none; a file that cannot be
- * read is refused by who loads it. config: NULL: none. randomized: bool: robots are drawn and
- * pushed as in training, but grounds are not; otherwise they are nominal and undisturbed. */
+/* The task for evaluation and play and the robot: from the defaults, then from the policy's
+ * file, which names its robot and says how it walks, then from the config. policy: NULL: none; a
+ * file that cannot be read is refused by who loads it. config: NULL: none. randomized: bool:
+ * robots are drawn and pushed as in training, but grounds are not; otherwise they are nominal
+ * and undisturbed. */
 MildStatus experiment_task(TaskDef *task, int randomized, char robot[TRAIN_ROBOT_SIZE],
                            const char *config, const char *policy, MildError *error);
 

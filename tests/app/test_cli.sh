@@ -170,6 +170,7 @@ as=(--robot go1 --policy "$go1" --task.physics_dt=0.005 --task.shell_depth=0.06)
 own=$(walked "${as[@]}")
 [ "$own" = "$(walked --policy "$go1" --config "$root/configs/go1.ini")" ] || fail "not as with its config: $own"
 [ "$own" = "$(walked "${as[@]}" --task.gait_period=0.5)" ] && [ "$own" != "$(walked "${as[@]}" --task.gait_period=0.8)" ] || fail "the gait's period"
+[ "$own" = "$(walked --policy "$go1" --task.physics_dt=0.005 --task.shell_depth=0.06)" ] || fail "the policy's robot"
 [ "$(walked --robot go1 --controller stand)" = "$(walked --robot go1 --controller stand --task.gait_period=0.8)" ] || fail "a controller without a policy"
 printf '[train]\nrobot = go1\n[task]\nphysics_dt = 0.005\nshell_depth = 0.06\n' >few.ini
 [ "$own" = "$(walked --policy "$go1" --config few.ini)" ] || fail "a config that says nothing of how it walks"
@@ -207,7 +208,7 @@ for robot in go1 g1; do # their own trainings begin
         --ppo.steps=4 --ppo.minibatches=1
     grep -qx "robot = $robot" "own_$robot/config.ini" || fail "configs/$robot.ini trains another robot"
 done
-bad "for robot go1, not for sa01" "$mild" eval --policy go1/policy.safetensors --trials 1 --seconds 0.1
+bad "for robot go1, not for sa01" "$mild" eval --robot sa01 --policy go1/policy.safetensors --trials 1 --seconds 0.1
 expect 0 '' "$mild" eval --config go1/config.ini --policy go1/policy.safetensors --trials 1 --seconds 0.1 --ground foam45
 bad "its robot is 'go1', this run's is 'sa01'" "$mild" train --resume --robot sa01 --out go1 --train.iterations=2
 expect 0 'MuJoCo' "$mild" info build

@@ -220,9 +220,9 @@ kill -INT "$runner"
 wait "$runner"
 bad "no_such.safetensors" "$mild" drive --policy no_such.safetensors
 bad "is for robot sa01, not for go1" "$mild" drive --robot go1
-bad "/dev/input/none" "$mild" drive --gamepad /dev/input/none
-bad "/dev/null is no gamepad" "$mild" drive --gamepad /dev/null
-bad "\. is no gamepad" "$mild" drive --gamepad .
+bad "/dev/input/none" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/input/none
+bad "/dev/null is no gamepad" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/null
+bad "\. is no gamepad" "$mild" drive --listen 127.0.0.1:0 --gamepad .
 for given in --policy=x --listen=x --command=0,0,0 --gamepad=x --no-keys --late=0.02 --damp-after=1 --speed-limit=30 --angle-limit=0.2 \
     --torque-share=1; do
     bad "${given%=*} is for the runner" "$mild" drive --simulate $given
