@@ -70,7 +70,7 @@ plugin-check: build
 export-check: build
 	@.venv/bin/python -m venv build/onnxruntime
 	@build/onnxruntime/bin/python -m pip install --quiet --disable-pip-version-check -r tests/export/requirements.txt
-	@RUNTIME=1 tests/export/test_export.sh build/mild build/onnxruntime/bin/python ON
+	@RUNTIME=1 tests/export/test_export.sh build/mild $(CURDIR)/build/onnxruntime/bin/python ON
 
 run: program
 	@MINUTES=$(MINUTES) scripts/run.sh

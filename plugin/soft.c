@@ -133,20 +133,25 @@ void soft_destroy(Soft *soft) {
     free(soft);
 }
 
-size_t soft_state_bytes(const mjModel *m, int instance) {
+/* Number of feet, 0 when they cannot be made, and the bytes of their ground. */
+static int measure_feet(const mjModel *m, int instance, size_t *bytes) {
     Soft *soft = calloc(1, sizeof *soft);
     const int good = soft && make_feet(soft, m, instance, NULL) == MILD_OK;
-    const size_t bytes = good ? soft_bytes(soft) : 0;
+    const int feet = good ? soft->feet : 0;
+    *bytes = good ? soft_bytes(soft) : 0;
     soft_destroy(soft);
+    return feet;
+}
+
+size_t soft_state_bytes(const mjModel *m, int instance) {
+    size_t bytes;
+    measure_feet(m, instance, &bytes);
     return bytes;
 }
 
 int soft_feet(const mjModel *m, int instance) {
-    Soft *soft = calloc(1, sizeof *soft);
-    const int good = soft && make_feet(soft, m, instance, NULL) == MILD_OK;
-    const int feet = good ? soft->feet : 0;
-    soft_destroy(soft);
-    return feet;
+    size_t bytes;
+    return measure_feet(m, instance, &bytes);
 }
 
 size_t soft_bytes(const Soft *soft) {

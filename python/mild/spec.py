@@ -12,9 +12,9 @@ def attach(spec, feet, ground="sand_loose", *, exclude=True, sensor=None, name="
     terrain__patches is given. exclude: the feet no longer touch geoms of the world body, such as a rigid floor; all else
     touches them as before. sensor: name of a sensor to add, whose data are (feet, 12) numbers, a row for each foot: force,
     torque, centre of pressure, area, largest and mean depth (docs/plugin.md). attributes: those of the plugin with __ for
-    the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the plugin's file; None: $MILD_PLUGIN, or the package's own. Raises TypeError for what is
-    no MjSpec, ValueError for feet that the spec does not have, RuntimeError without the plugin; mujoco reports attributes
-    that are wrong when it compiles."""
+    the dot: prints=64, ground__mu=0.5, terrain__kind="waves". library: the plugin's file; None: $MILD_PLUGIN, or the
+    package's own. Raises TypeError for what is no MjSpec, ValueError for feet that the spec does not have, RuntimeError
+    without the plugin; mujoco reports attributes that are wrong when it compiles."""
     import mujoco
 
     if not isinstance(spec, mujoco.MjSpec):

@@ -148,7 +148,7 @@ MildStatus policy_file_def(const Safetensors *file, const char *path, PolicyDef 
             version);
     }
     *def = policy_def_default();
-    for (int f = 0; f < 2; f++) {
+    for (size_t f = 0; f < sizeof text_fields / sizeof *text_fields; f++) {
         const char *name = text_fields[f].name, *text = safetensors_text(file, name);
         if (text && mild_field_parse(&text_fields[f], def, text, "policy", error) != MILD_OK) {
             return mild_fail(error, MILD_ERROR_FORMAT, "%s: its metadata key '%s' is too long",
