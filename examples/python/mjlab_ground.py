@@ -28,7 +28,7 @@ class SoftGround:
         self.batch = mild.Batch(n, self.soles, model.opt.timestep, device=str(env.device))
         self.batch.set_materials(grounds)
         self.material = (torch.arange(n, device=env.device) % len(grounds)).int()
-        feet, dofs, rows = len(body), model.nv, 6 * len(body)
+        feet, dofs, rows, self.size = len(body), model.nv, 6 * len(body), 3 if self.round else 6
         dense = np.full((dofs, dofs), self.m.nC)  # where M's element lies in the sparse M; beyond its end: 0
         i, j = self.m.M_fullm_i.numpy(), self.m.M_fullm_j.numpy()
         dense[i, j] = dense[j, i] = self.m.M_elemid.numpy()[i, j]
@@ -42,10 +42,10 @@ class SoftGround:
             self.diagonal = wp.array(dense.diagonal(), dtype=int)
             self.center = wp.array([model.geom_pos[g[0]] * self.round for g in geoms], dtype=wp.vec3)
             self.place, self.turn = wp.zeros((n, feet), dtype=wp.vec3), wp.full((n, feet), wp.mat33(np.eye(3)), dtype=wp.mat33)
-            self.metric, self.jacobian = wp.zeros((n, self.m.nC), dtype=float), wp.zeros((n, dofs, rows + 1), dtype=float)
+            self.metric, self.jacobian = wp.zeros((n, self.m.nC), dtype=float), wp.zeros((n, dofs, feet * self.size + 1), dtype=float)
             self.twist, self.free, self.wrench_wp = (wp.zeros((n, rows), dtype=float) for _ in range(3))
             self.mobility = wp.zeros((n, rows, rows), dtype=float)
-        self.contact, self.shape, self.after = contact_kernel(dofs, rows), *(torch.zeros(n, feet, 6, device=env.device) for _ in range(2))
+        self.contact, self.shape, self.after = contact_kernel(dofs, feet, self.size), *(torch.zeros(n, feet, 6, device=env.device) for _ in range(2))
         self.wrench = wp.to_torch(self.wrench_wp).view(n, feet, 6)
         self.inputs = [wp.to_torch(self.place), wp.to_torch(self.turn), wp.to_torch(self.twist).view(n, feet, 6),
                        wp.to_torch(self.mobility), wp.to_torch(self.free).view(n, feet, 6)]
@@ -68,11 +68,11 @@ class SoftGround:
         wp.launch(add_limits, dim=n, outputs=[self.metric, self.jacobian],
                   inputs=[self.diagonal, m.jnt_dofadr, m.jnt_qposadr, m.jnt_range, d.qpos, d.qacc_warmstart, d.ne, d.nf, d.nl, d.efc.type,
                           d.efc.id, d.efc.D, d.efc.aref])
-        wp.launch_tiled(self.contact, dim=n, block_dim=64, outputs=[self.mobility, self.twist, self.free],
+        wp.launch_tiled(self.contact, dim=n, block_dim=32, outputs=[self.mobility, self.twist, self.free],
                         inputs=[self.env.physics_dt, self.dense, self.metric, self.jacobian, d.qvel])
         self.batch.step(*self.inputs, material=self.material, wrench=self.wrench, new_velocity=self.after, foot=self.shape,
                         stream=wp.get_stream().cuda_stream if wp.get_device().is_cuda else 0)
-        wp.launch(apply, dim=(n, dofs), inputs=[self.jacobian, self.wrench_wp], outputs=[d.qfrc_applied])
+        wp.launch(apply, dim=(n, dofs), inputs=[self.size, self.jacobian, self.wrench_wp], outputs=[d.qfrc_applied])
 
     def step_with(self, captured=True):
         self.on = True

@@ -1,5 +1,5 @@
 """What mild.Batch needs of a step of MuJoCo Warp, as kernels over all worlds; mjlab_ground.py launches them. With J of the feet (rows:
-linear, angular velocity of each), the integrator's metric N = M - h dF/dv and the force f = passive - bias + actuator:
+linear, angular velocity of each; a round foot transmits no moment and has no angular rows), the integrator's metric N = M - h dF/dv and the force f = passive - bias + actuator:
 
     N += D e e^T, f += s D a_ref e            joint limits that pushed at the last acceleration (row s e, weight D, reference a_ref)
     V = J v, A = J N^-1 J^T, V_free = V + h J N^-1 f
@@ -30,9 +30,11 @@ def approach(body: wp.array[int], root: wp.array[int], center: wp.array[wp.vec3]
     if moves[f, i] == 1:  # motions are about the robot's center of mass
         angular = wp.spatial_top(cdof[w, i])
         linear = wp.spatial_bottom(cdof[w, i]) + wp.cross(angular, at - com[w, root[body[f]]])
+    size = wp.where(is_round, 3, 6)
     for k in range(3):
-        jacobian[w, i, 6 * f + k] = linear[k]
-        jacobian[w, i, 6 * f + 3 + k] = wp.where(is_round, 0.0, angular[k])
+        jacobian[w, i, size * f + k] = linear[k]
+        if not is_round:
+            jacobian[w, i, size * f + 3 + k] = angular[k]
     if f == 0:
         jacobian[w, i, jacobian.shape[2] - 1] = passive[w, i] - bias[w, i] + actuator[w, i]
 
@@ -54,8 +56,11 @@ def add_limits(diagonal: wp.array[int], dof_of: wp.array[int], qpos_of: wp.array
                 jacobian[w, dof_of[at], jacobian.shape[2] - 1] += side * weight[w, row] * reference[w, row]
 
 
-def contact_kernel(dofs, rows):
+def contact_kernel(dofs, feet, size):
+    """size: rows of J of a foot, 3 or 6. Those of A, V and V_free are 6 apart."""
+    rows = feet * size
     columns, area = rows + 1, dofs * dofs
+    blocks, block = (1, rows) if size == 6 else (feet, size)
 
     @wp.kernel(enable_backward=False, module="unique")
     def contact(timestep: float, dense: wp.array[int], metric: wp.array2d[float], jacobian: wp.array3d[float], qvel: wp.array2d[float],
@@ -69,18 +74,22 @@ def contact_kernel(dofs, rows):
         now = wp.tile_matmul(wp.tile_load(qvel, shape=(1, dofs), offset=(w, 0), storage="shared"), right)
         half = wp.tile_lower_solve(factor, right)
         product = wp.tile_matmul(wp.tile_transpose(half), half)
-        velocity = wp.tile_view(now, offset=(0, 0), shape=(1, rows))
-        wp.tile_store(mobility[w], wp.tile_view(product, offset=(0, 0), shape=(rows, rows)))
-        wp.tile_store(twist, velocity, offset=(w, 0))
-        wp.tile_store(free, velocity + timestep * wp.tile_view(product, offset=(rows, 0), shape=(1, rows)), offset=(w, 0))
+        for f in range(blocks):
+            velocity = wp.tile_view(now, offset=(0, f * block), shape=(1, block))
+            change = timestep * wp.tile_view(product, offset=(rows, f * block), shape=(1, block))
+            wp.tile_store(twist, velocity, offset=(w, 6 * f))
+            wp.tile_store(free, velocity + change, offset=(w, 6 * f))
+            for g in range(blocks):
+                part = wp.tile_view(product, offset=(f * block, g * block), shape=(block, block))
+                wp.tile_store(mobility[w], part, offset=(6 * f, 6 * g))
 
     return contact
 
 
 @wp.kernel(enable_backward=False)
-def apply(jacobian: wp.array3d[float], wrench: wp.array2d[float], force: wp.array2d[float]):
+def apply(size: int, jacobian: wp.array3d[float], wrench: wp.array2d[float], force: wp.array2d[float]):
     w, i = wp.tid()
     total = float(0.0)
-    for row in range(wrench.shape[1]):
-        total += jacobian[w, i, row] * wrench[w, row]
+    for row in range(jacobian.shape[2] - 1):
+        total += jacobian[w, i, row] * wrench[w, 6 * (row // size) + row % size]
     force[w, i] = total

@@ -21,8 +21,11 @@ def write(path, tensors, texts):
         file.write(whole.replace(b'"crc32":"00000000"', crc, 1))
 
 
+TYPES = {"F32": torch.float32, "F16": torch.float16}
+
+
 def read(path):
-    """({name: tensor}, texts); tensors of 32-bit floats only."""
+    """({name: tensor}, texts); tensors in 32 bits, whatever the file's. Other types, such as a trainer's counters, are left out."""
     with open(path, "rb") as file:
         whole = file.read()
     size = struct.unpack("<Q", whole[:8])[0]
@@ -30,7 +33,7 @@ def read(path):
     texts, tensors = header.pop("__metadata__", {}), {}
     for name, entry in header.items():
         begin, end = entry["data_offsets"]
-        if entry["dtype"] == "F32":
+        if entry["dtype"] in TYPES:
             raw = bytearray(whole[8 + size + begin : 8 + size + end])
-            tensors[name] = torch.frombuffer(raw, dtype=torch.float32).reshape(entry["shape"])
+            tensors[name] = torch.frombuffer(raw, dtype=TYPES[entry["dtype"]]).reshape(entry["shape"]).float()
     return tensors, texts

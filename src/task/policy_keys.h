@@ -1,5 +1,5 @@
-/* The keys of [task] that decide what a policy sees and what becomes of its actions. A policy's
- * file has them, so that it walks as it was trained to. */
+/* The keys of [task] that decide what a policy sees, what becomes of its actions, and how deep the
+ * robot's shells may dip. A policy's file has them, so that it walks as it was trained to. */
 #ifndef TASK_POLICY_KEYS_H
 #define TASK_POLICY_KEYS_H
 

@@ -1,5 +1,7 @@
 """The environments under rsl_rl and Stable-Baselines3; needs PyTorch. `make python-check` runs it."""
 import importlib.metadata
+import pathlib
+import sys
 import tempfile
 import unittest
 
@@ -22,6 +24,21 @@ CONFIG = {
     "actor": {"class_name": "MLPModel", "hidden_dims": [64], "activation": "elu", "obs_normalization": True,
               "distribution_cfg": {"class_name": "GaussianDistribution", "init_std": 0.6}},
     "critic": {"class_name": "MLPModel", "hidden_dims": [64], "activation": "elu", "obs_normalization": True}}
+
+
+class Rivals(unittest.TestCase):
+    def test_teacher(self):
+        """What HT-2 learns from is the shipped policy, read from its file."""
+        root = pathlib.Path(__file__).parents[2]
+        sys.path[:0] = [str(root / "scripts/rivals"), str(root / "examples/python")]
+        import policy
+        import train_ht2
+        path = root / "policies/mild.safetensors"
+        frames = np.random.default_rng(1).normal(0, 0.3, (1, 6, 47)).astype(np.float32)
+        ours = policy.Policy(path, stride=1, clip=1e9)
+        ours.frames = frames[0, :5]
+        action = train_ht2.Teacher(path, "cpu").act(torch.from_numpy(frames))
+        np.testing.assert_allclose(action[0].numpy(), ours.act(frames[0, 5]), atol=2e-5)
 
 
 class RslRl(unittest.TestCase):

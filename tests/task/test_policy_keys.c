@@ -25,6 +25,7 @@ static TaskDef changed(void) {
     def.action_clip = 7;
     def.torque_share = 0.6;
     def.torque_hold = 1;
+    def.shell_depth = 0.04;
     strcpy(def.kp, GAINS);
     strcpy(def.kd, "1.5");
     def.physics_dt = 0.001;
@@ -42,7 +43,7 @@ static void printed_and_read(void **state) {
     assert_true(to.gait_period == 0.7 && to.standing_below == 0.2 && to.clock == 0);
     assert_true(to.history_stride == 3 && to.velocity_scale == 2 && to.height_scale == 5);
     assert_true(to.action_scale == 0.3 && to.action_clip == 7);
-    assert_true(to.torque_share == 0.6 && to.torque_hold == 1);
+    assert_true(to.torque_share == 0.6 && to.torque_hold == 1 && to.shell_depth == 0.04);
     assert_string_equal(to.kp, GAINS);
     assert_string_equal(to.kd, "1.5");
     assert_true(to.physics_dt == task_def_default().physics_dt); /* no matter of the policy's */
