@@ -6,6 +6,7 @@
 #   tidy      clang-tidy 14 over src/, only files that changed since they last passed
 #   thread    gcc, warnings as errors, thread sanitizer: pool, task, evaluation, training
 #   aarch64   the library for another processor, run under qemu
+#   wheel     the Python package, made and installed as a user would; three of its examples
 set -euo pipefail
 cd "$(dirname "$0")/.."
 jobs=${JOBS:-$(nproc)} root=$PWD/build/check
@@ -109,7 +110,20 @@ stage_aarch64() {
     done
 }
 
-for stage in ${*:-format sanitize tidy thread aarch64}; do
+stage_wheel() {
+    local example wheel
+    rm -rf build/dist "$root/wheel"
+    mkdir -p "$root"
+    make --no-print-directory wheel >"$root/wheel.log" 2>&1 || { tail -30 "$root/wheel.log" >&2; return 1; }
+    wheel=$(echo "$PWD"/build/dist/mild-*.whl)
+    .venv/bin/python -m venv "$root/wheel"
+    "$root/wheel/bin/pip" install --quiet --disable-pip-version-check "$wheel[gym]"
+    for example in plate gym_random walk; do
+        (cd "$root/wheel" && PYTHONPATH='' bin/python "$OLDPWD/examples/python/$example.py")
+    done
+}
+
+for stage in ${*:-format sanitize tidy thread aarch64 wheel}; do
     begin=$SECONDS
     echo "check: $stage"
     "stage_$stage"

@@ -27,8 +27,6 @@ change=(
     [action_scale]="--task.action_scale=1"
     [clips]="--task.action_clip=100 --task.torque_share=1"
     [torque_hold]="--task.torque_hold=true"
-    [gains]="--task.kp=50,50,70,70,20,20 --task.kd=5,5,7,7,0.2,0.2"
-    [standing_below]="--task.standing_below=0"
     [observe_noise]="--task.observe_noise=false"
     [terminations]="--task.tilt_limit=3 --task.crossing_limit=-1"
     [passive]="--randomize.passive=false"
@@ -41,7 +39,6 @@ change=(
     [start]="--randomize.initial_joint=0 --randomize.initial_velocity=0"
     [decoder_target]="--ppo.decoder_target=newest"
     [mirror]="--ppo.mirror_weight=0"
-    [epsilon]="--ppo.epsilon=0.3"
     [anneal]="--ppo.anneal=0,0 --ppo.average=0"
 )
 
