@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws what `mild press --figure` recorded: press.py DATA.csv PICTURE.png
+"""Draws what `mild press --figure` recorded: press.py DATA.csv PICTURE.png [TITLE]
 
 Force over depth; beside it whatever else moved: the resistance over the way (dragged), depth and force over time
 (dropped), or the zero moment point over depth (tilted)."""
@@ -86,7 +86,7 @@ def second(data):
     return zmp_over_depth if tilted else None
 
 
-def draw(data, path):
+def draw(data, path, title=None):
     beside = second(data)
     figure, panels = plt.subplots(1, 2 if beside else 1, squeeze=False, figsize=(10 if beside else 6, 4.2),
                                   layout="constrained")
@@ -95,13 +95,14 @@ def draw(data, path):
         beside(panels[0][1], data)
     for axes in panels[0]:
         axes.spines[["top", "right"]].set_visible(False)
+    figure.suptitle(title, fontsize="medium")
     figure.savefig(path, dpi=150)
 
 
 def main(arguments):
-    if len(arguments) != 2:
+    if len(arguments) not in (2, 3):
         sys.exit(__doc__)
-    draw(read(arguments[0]), arguments[1])
+    draw(read(arguments[0]), *arguments[1:])
 
 
 if __name__ == "__main__":

@@ -504,7 +504,7 @@ static MildStatus figure_save(const FitWork *work, const CliArgs *args, const ch
         status = data_write(work, args, data, error);
     }
     if (status == MILD_OK) {
-        status = figure_draw("scripts/fit.py", data, figure, error);
+        status = figure_draw("scripts/fit.py", data, figure, NULL, error);
     }
     return status;
 }

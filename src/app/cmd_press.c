@@ -145,18 +145,19 @@ static MildStatus csv_write(const PressResult *result, int more, const char *pat
 }
 
 /* Draws the picture from the file of --csv, or otherwise from FILE.csv beside FILE.png. */
-static MildStatus figure_save(const PressOptions *options, const PressResult *result, int more,
-                              MildError *error) {
-    char data[PATH_SIZE];
+static MildStatus figure_save(const PressOptions *options, const Tool *tool, const char *model,
+                              const PressResult *result, int more, MildError *error) {
+    char data[PATH_SIZE], title[256];
     const char *figure = options->figure;
+    snprintf(title, sizeof title, "%s (%s) under %s", options->ground, model, tool->name);
     if (options->csv && strcmp(options->csv, "-") != 0) {
-        return figure_draw("scripts/press.py", options->csv, figure, error);
+        return figure_draw("scripts/press.py", options->csv, figure, title, error);
     }
     MildStatus status = path_beside(figure, ".csv", data, error);
     if (status == MILD_OK) {
         status = csv_write(result, more, data, error);
     }
-    return status == MILD_OK ? figure_draw("scripts/press.py", data, figure, error) : status;
+    return status == MILD_OK ? figure_draw("scripts/press.py", data, figure, title, error) : status;
 }
 
 /* ---- the printed result ---- */
@@ -477,19 +478,20 @@ static PressDef options_def(PressOptions *o) {
 static MildStatus press_report(const PressOptions *options, const Tool *tool, const PressDef *def,
                                MildError *error) {
     PressResult result;
+    const char *model = mild_model_names[def->material.model];
     int more = is_dropped(options) || isfinite(options->drag);
     MildStatus status = press_run(def, tool->sole, &result, error);
     if (status == MILD_OK && options->csv) {
         status = csv_write(&result, more, options->csv, error);
     }
     if (status == MILD_OK && options->figure) {
-        status = figure_save(options, &result, more, error);
+        status = figure_save(options, tool, model, &result, more, error);
     }
     if (status == MILD_OK) {
         if (!options->csv) {
             table_print(options, &result);
         }
-        summary_print(options, tool, mild_model_names[def->material.model], &result,
+        summary_print(options, tool, model, &result,
                       options->csv && strcmp(options->csv, "-") == 0 ? stderr : stdout);
     }
     press_result_close(&result);

@@ -10,17 +10,18 @@
 
 extern char **environ;
 
-MildStatus figure_draw(const char *script, const char *data, const char *picture,
+MildStatus figure_draw(const char *script, const char *data, const char *picture, const char *title,
                        MildError *error) {
-    char python[PATH_SIZE], code_path[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE];
+    char python[PATH_SIZE], code_path[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE], above[256];
     path_data(".venv/bin/python", python);
     path_data(script, code_path);
     snprintf(from, sizeof from, "%s", data);
     snprintf(to, sizeof to, "%s", picture);
+    snprintf(above, sizeof above, "%s", title ? title : "");
     if (access(python, X_OK) != 0) {
         snprintf(python, sizeof python, "python3");
     }
-    char *arguments[] = {python, code_path, from, to, NULL};
+    char *arguments[] = {python, code_path, from, to, title ? above : NULL, NULL};
     pid_t child;
     int code = 0, failure = posix_spawnp(&child, python, NULL, NULL, arguments, environ);
     while (failure == 0 && waitpid(child, &code, 0) < 0 && errno == EINTR) {
