@@ -4,8 +4,8 @@
 
 #include "mild/error.h"
 
-/* Runs a shipped script ("scripts/fit.py") with the arguments `data`, `picture`, and `title` if it is
- * not NULL. Uses the Python of .venv, or else the system's. */
+/* Runs a shipped script ("scripts/fit.py") with the arguments `data`, `picture` and, unless it is
+ * NULL, `title`. Uses the Python of .venv, or else the system's. */
 MildStatus figure_draw(const char *script, const char *data, const char *picture, const char *title,
                        MildError *error);
 

@@ -9,6 +9,7 @@
 #include "view/follow.h"
 #include "view/gl.h"
 #include "view/inset.h"
+#include "view/model.h"
 #include "view/relief.h"
 #include "view/smooth.h"
 
@@ -17,14 +18,10 @@
 #define VIEW_FINE 64           /* most tiles with imprints at once */
 #define VIEW_PLAIN 96          /* most tiles without imprints but of mixed material */
 #define VIEW_PLAIN_UNEVEN 192  /* the same on uneven ground, where every tile has a shape */
-#define VIEW_COARSE 4          /* [vertices] spacing of drawn vertices on a tile without imprints */
 #define VIEW_RADIUS 9.0        /* [m] tiles farther from the robot are drawn as plain floor */
 #define VIEW_RADIUS_UNEVEN 4.0 /* [m] the same on uneven ground */
 #define VIEW_FLOOR 40.0        /* [m] half the size of the surrounding floor */
 #define VIEW_GEOMS 4000
-#define VIEW_SHADOW 768              /* [pixels] edge of the shadow map */
-#define VIEW_SHADOW_CLIP 1.3F        /* [-] half of what it covers, in extents of the robot */
-#define VIEW_SLICES 14               /* sides of a drawn cylinder */
 #define VIEW_CAMERA_TIME 0.45        /* [s] time constant of the camera */
 #define VIEW_LOOK_HEIGHT 0.6         /* [-] the camera looks at this share of the robot's height */
 #define VIEW_CLOSE_TIME 0.25         /* [s] the same for the close-up of the feet */
@@ -91,104 +88,11 @@ ViewDef view_def_default(void) {
                      .distance = 2.35};
 }
 
-/* ---- the model for drawing: the robot's own file plus tiles of ground ---- */
-
-static void add_material(mjSpec *spec, const char *name, double repeat, int uniform) {
-    mjsTexture *texture = mjs_addTexture(spec, NULL);
-    mjs_setName(texture->element, name);
-    texture->type = mjTEXTURE_2D;
-    texture->builtin = mjBUILTIN_FLAT;
-    texture->width = texture->height = RELIEF_TILE_PIXELS;
-    mjsMaterial *material = mjs_addMaterial(spec, NULL);
-    mjs_setName(material->element, name);
-    mjs_setInStringVec(material->textures, mjTEXROLE_RGB, name);
-    material->texrepeat[0] = material->texrepeat[1] = (float)repeat;
-    material->texuniform = (mjtByte)uniform;
-}
-
-/* The vertices of a tile are moved in every frame; here only their number, faces and texture count.
- */
-static void add_skin(mjSpec *spec, const char *name, int step) {
-    enum { MOST = RELIEF_TILE_VERTICES * RELIEF_TILE_VERTICES };
-    static float zero[3 * MOST], texture[2 * MOST], weight[MOST];
-    static int face[6 * RELIEF_TILE_CELLS * RELIEF_TILE_CELLS], all[MOST];
-    const int n = RELIEF_TILE_CELLS / step + 1;
-    const float unit[4] = {1, 0, 0, 0};
-    const float margin = (float)RELIEF_TILE_MARGIN / RELIEF_TILE_PIXELS;
-    int faces = 0;
-    for (int v = 0; v < n * n; v++) {
-        float x = (float)(v % n) / (float)(n - 1), y = (float)(v / n) / (float)(n - 1);
-        texture[2 * v] = margin + (1 - 2 * margin) * x;
-        texture[2 * v + 1] = margin + (1 - 2 * margin) * (1 - y);
-        weight[v] = 1;
-        all[v] = v;
-        if (v % n < n - 1 && v / n < n - 1) {
-            const int two[6] = {v, v + 1, v + n + 1, v, v + n + 1, v + n};
-            memcpy(face + faces, two, sizeof two);
-            faces += 6;
-        }
-    }
-    mjsSkin *skin = mjs_addSkin(spec);
-    mjs_setName(skin->element, name);
-    mjs_setFloat(skin->vert, zero, 3 * n * n);
-    mjs_setFloat(skin->texcoord, texture, 2 * n * n);
-    mjs_setInt(skin->face, face, faces);
-    mjs_appendString(skin->bodyname, "world");
-    mjs_setFloat(skin->bindpos, zero, 3);
-    mjs_setFloat(skin->bindquat, unit, 4);
-    mjs_appendIntVec(skin->vertid, all, n * n);
-    mjs_appendFloatVec(skin->vertweight, weight, n * n);
-}
-
-static void add_ground(mjSpec *spec, const Relief *relief, int plain, int slots) {
-    double edge = relief_tile_edge(relief);
-    const double share =
-        1.0 - 2.0 * RELIEF_TILE_MARGIN / RELIEF_TILE_PIXELS; /* of the picture that a tile shows */
-    char name[32];
-    for (int i = 0; i < slots; i++) {
-        snprintf(name, sizeof name, "view_tile_%d", i);
-        add_material(spec, name, share, 0);
-        add_skin(spec, name, i < plain ? VIEW_COARSE : 1);
-    }
-    for (int m = 0; m <= MILD_MATERIALS_MAX; m++) {
-        snprintf(name, sizeof name, "view_flat_%d", m);
-        add_material(spec, name, share, 0);
-    }
-    add_material(spec, "view_floor", share / edge, 1);
-}
-
-static mjModel *make_model(const View *view, MildError *error) {
-    const char *xml = robot_model_path(view->robot);
-    char text[300] = "";
-    mjSpec *spec = mj_parseXML(xml, NULL, text, sizeof text);
-    if (!spec) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", xml, text);
-        return NULL;
-    }
-    spec->visual.global.offwidth = view->def.width;
-    spec->visual.global.offheight = view->def.height;
-    spec->visual.quality.offsamples = 0; /* smooth_picture instead: four samples cost a
-                                              * software renderer half of its time */
-    spec->visual.quality.shadowsize = VIEW_SHADOW;
-    spec->visual.map.shadowclip = VIEW_SHADOW_CLIP;
-    spec->visual.quality.numslices = VIEW_SLICES;
-    spec->visual.quality.numstacks = VIEW_SLICES / 2;
-    spec->visual.quality.numquads = 1;
-    add_ground(spec, view->relief, view->plain_count, view->slot_count);
-    mjModel *model = mj_compile(spec, NULL);
-    if (!model) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: cannot add the visible ground: %s", xml,
-                  mjs_getError(spec));
-    }
-    mj_deleteSpec(spec);
-    return model;
-}
-
 static unsigned char *texture_pixels(mjModel *model, int texture) {
     return model->tex_data + model->tex_adr[texture];
 }
 
-/* Finds the ids of what add_ground added and hides the floor of the file. */
+/* Finds the ids of what view_model added and hides the floor of the file. */
 static void index_model(View *view) {
     mjModel *model = view->model;
     char name[32];
@@ -303,7 +207,10 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
     view->plain_count =
         view->relief && relief_is_uneven(view->relief) ? VIEW_PLAIN_UNEVEN : VIEW_PLAIN;
     view->slot_count = view->plain_count + VIEW_FINE;
-    view->model = view->relief ? make_model(view, error) : NULL;
+    const Surfaces surfaces = {view->plain_count, view->slot_count};
+    view->model = view->relief ? view_model(robot_model_path(view->robot), &view->def, view->relief,
+                                            &surfaces, error)
+                               : NULL;
     if (!view->model || !open_context(view, error)) {
         view_destroy(view);
         return NULL;

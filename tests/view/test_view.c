@@ -13,6 +13,7 @@
 
 #include "control/stand.h"
 #include "sa01.h"
+#include "view/model.h"
 #include "view/pressure.h"
 #include "view/relief.h"
 #include "view/view.h"
@@ -184,6 +185,40 @@ static void bad_size_is_one_line(void **state) {
     assert_int_equal(error.status, MILD_ERROR_RANGE);
 }
 
+static int skies(const char *xml) {
+    MildError error = {0};
+    const ReliefDef def = {.cell = 0.02, .x_min = -1, .x_max = 1, .y_min = -1, .y_max = 1};
+    const ViewDef view = view_def_default();
+    const Surfaces surfaces = {2, 5};
+    Relief *relief = relief_create(&def, &terrain, robot_soles(robot), SA01_FEET, &error);
+    assert_non_null(relief);
+    mjModel *model = view_model(xml, &view, relief, &surfaces, &error);
+    assert_non_null(model);
+    int count = 0;
+    for (int i = 0; i < model->ntex; i++) {
+        count += model->tex_type[i] == mjTEXTURE_SKYBOX;
+    }
+    assert_int_equal(model->nskin, 5);
+    assert_true(model->skin_vertnum[1] < model->skin_vertnum[2]);
+    assert_true(mj_name2id(model, mjOBJ_MATERIAL, "view_tile_4") >= 0);
+    mj_deleteModel(model);
+    relief_destroy(relief);
+    return count;
+}
+
+/* One, of the file or ours. */
+static void every_robot_has_a_sky(void **state) {
+    (void)state;
+    char path[] = "/tmp/mild_sky_XXXXXX";
+    FILE *file = fdopen(mkstemp(path), "w");
+    assert_non_null(file);
+    fputs("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>", file);
+    fclose(file);
+    assert_int_equal(skies(path), 1);
+    assert_int_equal(skies(robot_model_path(robot)), 1);
+    unlink(path);
+}
+
 /* Mean pressure times area over a stance is the mean force of that stance. */
 static void pressure_carries_the_weight(void **state) {
     (void)state;
@@ -245,6 +280,7 @@ int main(void) {
         cmocka_unit_test(robot_and_prints_are_seen),
         cmocka_unit_test(dents_are_where_the_elements_are),
         cmocka_unit_test(bad_size_is_one_line),
+        cmocka_unit_test(every_robot_has_a_sky),
         cmocka_unit_test(pressure_carries_the_weight),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -1,0 +1,26 @@
+/* The model that is drawn: the robot's own file, a sky, and surfaces for tiles of the ground. */
+#ifndef MILD_VIEW_MODEL_H
+#define MILD_VIEW_MODEL_H
+
+#include <mujoco/mujoco.h>
+
+#include "view/relief.h"
+#include "view/view.h"
+
+#define VIEW_COARSE 4 /* [vertices] spacing of drawn vertices on a tile without imprints */
+
+/* Surfaces that view.c lends to tiles. */
+typedef struct {
+    int plain; /* the first of them have coarse vertices, for tiles without imprints */
+    int all;
+} Surfaces;
+
+/* Adds to the file `xml`:
+ * surface i: a skin, a texture and a material named view_tile_i;
+ * material m, and the rigid ground behind the last one: a texture and a material named view_flat_m;
+ * the floor around: view_floor.
+ * Returns NULL on error. Free it with mj_deleteModel. */
+mjModel *view_model(const char *xml, const ViewDef *def, const Relief *relief,
+                    const Surfaces *surfaces, MildError *error);
+
+#endif
