@@ -111,15 +111,15 @@ stage_aarch64() {
 }
 
 stage_wheel() {
-    local example wheel
+    local example wheel here=$PWD
     rm -rf build/dist "$root/wheel"
     mkdir -p "$root"
     make --no-print-directory wheel >"$root/wheel.log" 2>&1 || { tail -30 "$root/wheel.log" >&2; return 1; }
-    wheel=$(echo "$PWD"/build/dist/mild-*.whl)
+    wheel=$(echo "$here"/build/dist/mild-*.whl)
     .venv/bin/python -m venv "$root/wheel"
     "$root/wheel/bin/pip" install --quiet --disable-pip-version-check "$wheel[gym]"
     for example in plate gym_random walk; do
-        (cd "$root/wheel" && PYTHONPATH='' bin/python "$OLDPWD/examples/python/$example.py")
+        (cd "$root/wheel" && PYTHONPATH='' bin/python "$here/examples/python/$example.py")
     done
 }
 

@@ -1,5 +1,6 @@
 """What mild.Batch needs of a step of MuJoCo Warp, as kernels over all worlds; mjlab_ground.py launches them. With J of the feet (rows:
-linear, angular velocity of each; a round foot transmits no moment and has no angular rows), the integrator's metric N = M - h dF/dv and the force f = passive - bias + actuator:
+linear, angular velocity of each; a round foot transmits no moment and has no angular rows),
+the integrator's metric N = M - h dF/dv and the force f = passive - bias + actuator:
 
     N += D e e^T, f += s D a_ref e            joint limits that pushed at the last acceleration (row s e, weight D, reference a_ref)
     V = J v, A = J N^-1 J^T, V_free = V + h J N^-1 f
@@ -17,7 +18,7 @@ def approach(body: wp.array[int], root: wp.array[int], center: wp.array[wp.vec3]
              xpos: wp.array2d[wp.vec3], xmat: wp.array2d[wp.mat33], com: wp.array2d[wp.vec3], cdof: wp.array2d[wp.spatial_vector],
              passive: wp.array2d[float], bias: wp.array2d[float], actuator: wp.array2d[float],
              place: wp.array2d[wp.vec3], turn: wp.array2d[wp.mat33], jacobian: wp.array3d[float]):
-    """Poses of the soles, and J^T with f in its last column. The sole of a sphere is a disc that stays level below its center."""
+    """Poses of the soles, and J^T, `size` columns a foot, with f in its last column. The sole of a sphere is a disc that stays level below its center."""
     w, f, i = wp.tid()
     at = xpos[w, body[f]]
     if is_round:
@@ -57,7 +58,7 @@ def add_limits(diagonal: wp.array[int], dof_of: wp.array[int], qpos_of: wp.array
 
 
 def contact_kernel(dofs, feet, size):
-    """size: rows of J of a foot, 3 or 6. Those of A, V and V_free are 6 apart."""
+    """size: rows of J that a foot has, 3 (round) or 6. In A, V and V_free a foot always has six; those of moments stay zero."""
     rows = feet * size
     columns, area = rows + 1, dofs * dofs
     blocks, block = (1, rows) if size == 6 else (feet, size)
@@ -88,6 +89,7 @@ def contact_kernel(dofs, feet, size):
 
 @wp.kernel(enable_backward=False)
 def apply(size: int, jacobian: wp.array3d[float], wrench: wp.array2d[float], force: wp.array2d[float]):
+    """A wrench has six numbers a foot, J `size` rows."""
     w, i = wp.tid()
     total = float(0.0)
     for row in range(jacobian.shape[2] - 1):
