@@ -17,4 +17,8 @@
 #define MILD_API_END _Pragma("GCC visibility pop")
 #endif
 
+/* Behind a function: argument `text` is as for printf, whose arguments begin with `first`.
+ * The compiler checks them. */
+#define MILD_PRINTF(text, first) __attribute__((format(printf, text, first)))
+
 #endif

@@ -44,8 +44,8 @@ typedef struct {
     int robots;                   /* at least 1 */
     int feet;                     /* of each, 1 .. MILD_FEET_MAX */
     const MildSole *const *soles; /* [feet], not kept */
-    double dt;                    /* [s] above 0 */
-    double tolerance;             /* [-] of the residual; 0: 1e-4 */
+    double dt;                    /* [s] above 0, at most 0.1 */
+    double tolerance;             /* [-] of the residual, below 1; 0: 1e-4 */
     int max_iterations;           /* bound of Newton steps; 0: 20 */
     int device;                   /* a CUDA device, from 0, or MILD_BATCH_HOST */
 } MildBatchDef;
@@ -72,14 +72,16 @@ typedef struct {
     float area;               /* [m^2] */
 } MildBatchFoot;
 
-/* Where the results go. Arrays in the memory of the device; those from `foot` on may be NULL. */
+/* Where the results go. Arrays in the memory of the device; those from `foot` on may be NULL.
+ * wrench may be the input's velocity, and velocity its free_velocity; nothing else may overlap. */
 typedef struct {
     float *wrench;       /* [robots][feet][6] [N, N m] force, torque at the reference point */
     float *velocity;     /* [robots][feet][6] [m/s, rad/s] twists after the step */
     MildBatchFoot *foot; /* [robots][feet] */
     float *elements;     /* [robots][4][feet][stride] depth [m], normal, tangent_x, tangent_y [N] of
-                            the elements, in their order; stride: mild_batch_stride. On uneven
-                            ground the depth that the law takes (docs/model.md section 6) */
+                            the elements, in their order; behind a sole's elements, up to
+                            mild_batch_stride, a depth of -1000 and no force. On uneven ground
+                            the depth that the law takes (docs/model.md section 6) */
     float *residual;     /* [robots] [-] relative, in the metric of kinetic energy; 0 in the air */
     int32_t *iterations; /* [robots] Newton steps; 0 in the air */
 } MildBatchOutput;
@@ -93,7 +95,8 @@ MildBatch *mild_batch_create(const MildBatchDef *def, MildError *error);
 void mild_batch_destroy(MildBatch *batch);
 /* [B] Memory of one robot on the device. */
 size_t mild_batch_robot_bytes(const MildBatch *batch);
-/* Elements of a foot, rounded up to whole lanes: distance of feet in MildBatchOutput.elements. */
+/* Room for the elements of a foot, at least those of the largest sole: distance of feet in
+ * MildBatchOutput.elements. */
 int mild_batch_stride(const MildBatch *batch);
 
 /* Replaces the table of materials that MildBatchInput.material points into. materials: [count], of

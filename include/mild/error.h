@@ -27,7 +27,8 @@ typedef struct {
 
 /* Formats *error (may be NULL) like printf. Returns `status`, so that a function can end with
  * `return mild_fail(...)`. */
-MildStatus mild_fail(MildError *error, MildStatus status, const char *format, ...);
+MildStatus mild_fail(MildError *error, MildStatus status, const char *format, ...)
+    MILD_PRINTF(3, 4);
 
 MILD_API_END
 

@@ -327,8 +327,9 @@ typedef struct {
     MildFootResult foot[MILD_FEET_MAX]; /* [feet] */
     double velocity[6 * MILD_FEET_MAX]; /* [m/s, rad/s] twists at the ankles after the step,
                                            V = V_free + A W with W the wrench impulses */
-    /* [-] Relative residual in the metric of kinetic energy. A converged step may exceed the
-     * tolerance if rounding permits no smaller residual. */
+    /* [-] In the metric of kinetic energy. Newton: relative residual of V = V_free + A W(V).
+     * Sweeps: relative change of the wrench in the last sweep; the two do not compare. A converged
+     * step may exceed the tolerance if rounding permits no smaller residual. */
     double residual;
     int iterations; /* Newton steps or sweeps done */
     /* Bool. Also 0 when a pose or a result is not finite, when a number of a material is NaN, or
@@ -368,8 +369,8 @@ MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, i
 /* [B] Size of the block of an initialised ground. */
 size_t mild_ground_size(const MildGround *ground);
 /* Replaces what a ground remembers by a copy of `block`: [bytes] of a ground of the same soles and
- * tiles, which may come from a file. Fails, with the ground unchanged, when the size or a number
- * shows that it is none. */
+ * tiles, aligned to 8 bytes, which may come from a file. Fails, with the ground unchanged, when
+ * the size or a number shows that it is none. */
 MildStatus mild_ground_restore(MildGround *ground, const void *block, size_t bytes,
                                MildError *error);
 /* [m] Greatest depth that the imprint at the world point (x, y) remembers; 0 where there is none.
@@ -382,19 +383,20 @@ MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildErr
 /* Frees a scratch; NULL is allowed. */
 void mild_scratch_destroy(MildScratch *scratch);
 
-/* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground and
- * writes only scratch and result, so it may be called any number of times before
- * mild_ground_advance. Scratch and ground must have the same soles. It always returns; check
- * result->converged. If that is 0, the result is approximate: either the impulses are those of the
- * ground at twists near the returned ones, or they are exact except for the friction bound
- * (docs/model.md section 7). */
+/* Solves one contact step: impulses by eqs 4, 5, 13 and 14, twists by eq 9. It reads the ground
+ * and writes only scratch and result, so it may be called any number of times before
+ * mild_ground_advance. Scratch and ground must have the same soles; if their numbers of elements
+ * differ, converged is 0, velocity is free_velocity, and mild_ground_advance does nothing. It
+ * always returns; check result->converged. If that is 0, the result is approximate: either the
+ * impulses are those of the ground at twists near the returned ones, or they are exact except for
+ * the friction bound (docs/model.md section 7). */
 void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
                        const MildContactInput *input, MildScratch *scratch,
                        MildContactResult *result);
 /* Checks what mild_ground_solve takes on trust, for engines that are being written: materials,
- * number of feet, dt, poses and twists that are finite, rotations that are orthonormal, and an A
- * that is symmetric and positive semidefinite. Fails with the first that is wrong. It costs about
- * as much as a solve, so leave it out of a release. */
+ * patches, the map's labels, number of feet, dt, poses and twists that are finite, rotations that
+ * are orthonormal, and an A that is symmetric and positive semidefinite. Fails with the first that
+ * is wrong. It costs about as much as a solve, so leave it out of a release. */
 MildStatus mild_contact_check(const MildGround *ground, const MildTerrain *terrain,
                               const MildContactInput *input, MildError *error);
 /* Updates the memory of the ground for the step that was just solved with this scratch, input and
@@ -413,7 +415,10 @@ typedef enum {
 
 /* What the elements of one foot did in the last solve: arrays of mild_sole_elements() numbers. */
 typedef struct {
-    const double *depth;     /* [m] u at the start of the step, negative above the ground */
+    /* [m] u at the start of the step, negative above the ground. On uneven ground the law,
+     * depth_max and depth_mean take the smaller of this and what the ground of the last step
+     * gives. */
+    const double *depth;
     const double *normal;    /* [N] vertical part of the force, mean over the step */
     const double *tangent_x; /* [N] horizontal part, world, mean over the step */
     const double *tangent_y; /* [N] the same */
@@ -425,8 +430,8 @@ typedef struct {
     const uint8_t *state;    /* MildElementState */
     const uint8_t *slip;     /* bool: loaded, and friction is at its bound */
 } MildElements;
-/* Computes them for foot 0 .. feet - 1 after a solve. The arrays lie in the scratch and are valid
- * until the next solve. Cost: one pass over the elements of the foot. */
+/* Computes them for foot 0 .. feet - 1 after a solve. The arrays lie in the scratch, which it
+ * writes to, and are valid until the next solve. Cost: one pass over the elements of the foot. */
 MildElements mild_scratch_elements(const MildScratch *scratch, int foot);
 
 /* [m] Greatest depth that each element has reached since touchdown, 0 in the air: array of

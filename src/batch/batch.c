@@ -9,6 +9,7 @@
 
 /* The shapes of contact_kinds.h. */
 static const int batch_pers[][3] = {{1, 3, 8}, {1, 5, 8}, {1, 4, 8}}; /* of 1, 2, 4 groups */
+_Static_assert(MILD_FEET_MAX == 4, "feet take 1, 2 or 4 groups");
 
 void *batch_alloc(int device, size_t bytes, MildError *error) {
     if (device != MILD_BATCH_HOST) {
@@ -126,8 +127,10 @@ static MildStatus store_centers(MildBatch *batch, const MildSole *const *soles, 
 }
 
 static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildError *error) {
-    if (batch->device != MILD_BATCH_HOST && device_open(batch->device, error) != MILD_OK) {
-        return MILD_ERROR_ARGUMENT;
+    MildStatus status =
+        batch->device == MILD_BATCH_HOST ? MILD_OK : device_open(batch->device, error);
+    if (status != MILD_OK) {
+        return status;
     }
     const BatchShape *shape = &batch->shape;
     BatchArrays *arrays = &batch->arrays;
@@ -142,7 +145,7 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     if (!arrays->memory) {
         return MILD_ERROR_MEMORY;
     }
-    MildStatus status = store_centers(batch, def->soles, error);
+    status = store_centers(batch, def->soles, error);
     if (status != MILD_OK) {
         return status;
     }

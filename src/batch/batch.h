@@ -1,4 +1,5 @@
-/* Private to the layer batch: a batch, and what a device does for it. */
+/* Inside of a batch, for the layers that step it together with an engine, and the memory and
+ * streams of its device. */
 #ifndef MILD_BATCH_PRIVATE_H
 #define MILD_BATCH_PRIVATE_H
 

@@ -39,6 +39,8 @@ void batch_map_close(const MapView *view, int device) {
 }
 
 MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildError *error) {
+    MildError own = {0};
+    error = error ? error : &own; /* says which status */
     MapView opened = map_view(map);
     const size_t points = (size_t)(opened.x.cells + 1) * (size_t)(opened.y.cells + 1);
     const size_t cells = (size_t)opened.label_x.cells * (size_t)opened.label_y.cells;
@@ -48,14 +50,14 @@ MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildErr
         opened.label = labels ? copy_of(labels, cells, device, error) : NULL;
         free(labels);
         if (!opened.label) {
-            return MILD_ERROR_ARGUMENT;
+            return error->status;
         }
     }
     if (map->height) {
         opened.height = copy_of(map->height, points * sizeof *map->height, device, error);
         if (!opened.height) {
             batch_map_close(&opened, device);
-            return MILD_ERROR_MEMORY;
+            return error->status;
         }
     }
     *view = opened;
@@ -68,6 +70,8 @@ static int map_is_plain(const MildMap *map) {
 }
 
 MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *error) {
+    MildError own = {0};
+    error = error ? error : &own; /* says which status */
     BatchShape shape = batch->shape;
     BatchArrays arrays = batch->arrays;
     shape.map = !map_is_plain(map);
@@ -82,7 +86,7 @@ MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *e
     arrays.memory = batch_alloc(batch->device, numbers * sizeof(float), error);
     if (!arrays.memory) {
         batch_map_close(&arrays.map, batch->device);
-        return MILD_ERROR_MEMORY;
+        return error->status;
     }
     batch_free(batch->device, batch->arrays.memory); /* waits until no step uses it */
     batch_map_close(&batch->arrays.map, batch->device);

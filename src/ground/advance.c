@@ -185,6 +185,9 @@ static int foot_advance(const Advance *a, const Memory *memory, const int32_t *m
 void mild_ground_advance(MildGround *ground, const MildTerrain *terrain,
                          const MildContactInput *input, const MildScratch *scratch,
                          const MildContactResult *result) {
+    if (!scratch_fits(scratch, ground)) {
+        return;
+    }
     if (ground->tiles > 0 && ++ground->imprint_time == 0) {
         ground->imprint_time = 1; /* 0 marks an empty tile */
     }

@@ -1,6 +1,7 @@
 /* What a contact step takes on trust, checked number by number: for whoever writes an engine. */
 #include <math.h>
 
+#include "ground/map.h"
 #include "ground/state.h"
 
 #define TURN 1e-6     /* [-] products of a rotation's columns may be off by this */
@@ -106,6 +107,35 @@ static MildStatus check_definite(double *a, int rows, MildError *error) {
     return MILD_OK;
 }
 
+/* Patches and map: that each place has a material. */
+static MildStatus check_places(const MildTerrain *terrain, MildError *error) {
+    const int materials = terrain->material_count;
+    if (terrain->patch_count < 0 || terrain->patch_count > MILD_PATCHES_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE, "terrain.patch_count = %d is outside 0 .. %d",
+                         terrain->patch_count, MILD_PATCHES_MAX);
+    }
+    for (int i = 0; i < terrain->patch_count; i++) {
+        const int material = terrain->patches[i].material;
+        if (material < 0 || material >= materials) {
+            return mild_fail(error, MILD_ERROR_RANGE,
+                             "terrain.patches: patch %d has material %d of %d", i, material,
+                             materials);
+        }
+    }
+    if (!terrain->map) {
+        return MILD_OK;
+    }
+    if (terrain->map->label_count > materials) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "terrain.map: label %d has no material, the terrain has only %d",
+                         terrain->map->label_count - 1, materials);
+    }
+    return isfinite(terrain->map_x) && isfinite(terrain->map_y)
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_ARGUMENT, "terrain.map_x = %g, map_y = %g",
+                           terrain->map_x, terrain->map_y);
+}
+
 static MildStatus check_terrain(const MildTerrain *terrain, MildError *error) {
     if (terrain->material_count < 1 || terrain->material_count > MILD_MATERIALS_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE, "terrain.material_count = %d is outside 1 .. %d",
@@ -114,7 +144,7 @@ static MildStatus check_terrain(const MildTerrain *terrain, MildError *error) {
     if (!isfinite(terrain->height)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "terrain.height = %g", terrain->height);
     }
-    MildStatus status = MILD_OK;
+    MildStatus status = check_places(terrain, error);
     for (int i = 0; i < terrain->material_count && status == MILD_OK; i++) {
         status = mild_material_check(&terrain->materials[i], error);
     }

@@ -1,10 +1,15 @@
 /* One element of a sole in one contact step (docs/model.md section 6).
- * A step of an element consists of four pure functions, called in this order:
+ * A step of an element calls these functions in this order, which write to the element and its
+ * memory alone:
  *
  *     element_begin      begin.h      everything that does not depend on the new velocity
+ *     element_explicit, element_drag  impulses that depend on the motion before the step alone
+ *     element_resist     plate.h      a law that depends on the direction of motion
+ *     element_shear      shear.h      friction that builds up with slip
  *     element_impulse    impulse.h    normal impulse at a trial velocity, any number of times
  *     friction_impulse   friction.h   tangential impulse at the same velocity
  *     element_remember   remember.h   memory at the end of the step
+ *     element_peak       remember.h   the greatest depth within the step
  *
  * In docs/model.md a is the yield depth, m a depth in the middle of a step, w a downward speed. */
 #ifndef MILD_GROUND_ELEMENT_H

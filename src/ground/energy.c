@@ -20,8 +20,6 @@
  * that such an element held is dropped. */
 #include "ground/energy.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "ground/friction.h"

@@ -29,14 +29,16 @@
  * Nothing cancels at small u or small nu/tan(alpha), because u_f is the only length left. F_g is
  * concave when k_pen > kappa, convex otherwise, and straight beyond u_f.
  *
- * The elastic curve is the only one that is not about virgin ground. It acts at every depth, on the
- * way down and up, in a term of its own (impulse.h).
+ * The elastic curve is the only one that is not about virgin ground. It acts at every depth, on
+ * the way down and up, in a term of its own (impulse.h).
  *
- * To add a curve, add its numbers to Law and LAW_NUMBERS, a bit to LawCurve, and its term to each
- * function of this file that takes `curves`, to law_curves and to law_between (element_law.c). A
- * model's `law` (model.h) fills in the numbers. The step needs nothing else. `curves` is a constant
- * in the vector loops, so a curve costs nothing on ground that does not have it. law_variant says
- * which loop serves a foot. */
+ * To add a curve, add its numbers to Law and LAW_NUMBERS, a bit to LawCurve and LAW_ALL, and its
+ * term to each function of this file that takes `curves`, to law_curves and to law_between
+ * (element_law.c). A model's `law` (model.h) fills in the numbers. `curves` is a constant in the
+ * vector loops, so a curve costs nothing on ground that does not have it. law_variant says which
+ * loop serves a foot; for a loop of the new curve alone, add it there and to the switches of
+ * pass.c and prepare.c. Look at element_drag's callers (prepare.c, contact.inc) if the curve has a
+ * drag, and at resist.c if a resistive force may be blended with it. */
 #ifndef MILD_GROUND_LAW_H
 #define MILD_GROUND_LAW_H
 
@@ -49,14 +51,14 @@ typedef enum {
     LAW_CONE = 1,    /* the developing cone, its added mass and its drag */
     LAW_POWER = 2,   /* the power of the depth */
     LAW_ELASTIC = 4, /* the elastic curve without memory */
-    LAW_ALL = 7
+    LAW_ALL = LAW_CONE | LAW_POWER | LAW_ELASTIC
 } LawCurve;
 
 /* How an element's law or friction depends on its motion so far; bits beside those of LawCurve. */
 typedef enum {
-    LAW_PLANE = 8,  /* resistive force theory in the plane of motion (plate.h) */
-    LAW_SPACE = 16, /* the same in three dimensions */
-    LAW_SHEAR = 32, /* shear strength that builds up with slip (shear.h) */
+    LAW_PLANE = 1 << 16, /* resistive force theory in the plane of motion (plate.h) */
+    LAW_SPACE = 1 << 17, /* the same in three dimensions */
+    LAW_SHEAR = 1 << 18, /* shear strength that builds up with slip (shear.h) */
     LAW_RESIST = LAW_PLANE | LAW_SPACE
 } LawMotion;
 

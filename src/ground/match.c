@@ -23,11 +23,12 @@ static double sole_force(const MildSole *sole, const MildMaterial *material, dou
 }
 
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load) {
-    double low = 0.0, high = material->bed_depth;
-    while (sole_force(sole, material, high) < load) {
+    enum { HALVINGS = 60 };
+    double low = 0.0, high = fmax(material->bed_depth, 1e-3);
+    for (int i = 0; i < HALVINGS && sole_force(sole, material, high) < load; i++) {
         high *= 2.0;
     }
-    for (int i = 0; i < 60; i++) { /* bisection, because the force increases with depth */
+    for (int i = 0; i < HALVINGS; i++) { /* bisection, because the force increases with depth */
         double middle = 0.5 * (low + high);
         *(sole_force(sole, material, middle) < load ? &low : &high) = middle;
     }
@@ -60,26 +61,29 @@ static void rival_scale(MildMaterial *m, const ModelRow *row, double pressure, d
     }
 }
 
-static MildStatus match_check(MildModel model, const MildMaterial *mild, double load,
-                              MildError *error) {
+static MildStatus match_check(int model, const MildMaterial *mild, double load, MildError *error) {
+    if (model < 0 || model >= MILD_MODELS) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "model: there is no model %d", model);
+    }
     if (model == MILD_MODEL_RIGID) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "model: rigid is the engine's own contact and has no material");
     }
-    if (mild->model != MILD_MODEL_MILD) {
+    const MildStatus status = mild_material_check(mild, error);
+    if (status == MILD_OK && mild->model != MILD_MODEL_MILD) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "model: only a material of mild can be matched, and this is one of %s",
                          mild_model_names[mild->model]);
     }
-    if (!(load > 0.0 && load < INFINITY)) {
+    if (status == MILD_OK && !(load > 0.0 && load < INFINITY)) {
         return mild_fail(error, MILD_ERROR_RANGE, "model: load = %g N must be positive", load);
     }
-    return mild_material_check(mild, error);
+    return status;
 }
 
 MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const MildSole *sole,
                             double load, MildMaterial *rival, MildError *error) {
-    MildStatus status = match_check(model, mild, load, error);
+    MildStatus status = match_check((int)model, mild, load, error);
     if (status != MILD_OK) {
         return status;
     }

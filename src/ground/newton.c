@@ -31,6 +31,7 @@ typedef union {
 } Row;
 
 _Static_assert(TWIST_MAX < NEWTON_LANES, "a row holds all feet and a right-hand side");
+_Static_assert(TWIST_MAX == 24, "newton_step lists the rows of a unit matrix");
 
 /* The equations of the loaded feet. The lanes of a row beyond the last foot are zero. */
 typedef struct {

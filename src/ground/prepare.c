@@ -155,7 +155,7 @@ static void foot_prepare(FootScratch *foot, const MildGround *ground, int f,
     }
     foot->stops = slots_explicit(foot, terrain->material_count, input->dt, &free);
     if (slots_sink(&foot->slot, foot_end(foot), input->dt)) {
-        if (foot->curves & LAW_POWER) {
+        if (foot->curves & ~LAW_CONE) {
             slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_ALL);
         } else {
             slots_drag(&foot->slot, foot_end(foot), input->dt, &now, &free, LAW_CONE);

@@ -1,9 +1,9 @@
-/* Scalar type and qualifier of the element's law and step.
- * power.h, law.h, element.h, begin.h, impulse.h, friction.h and remember.h are written in the
- * common subset of C17 and CUDA C++. They are pure functions of small structs. They allocate
- * nothing and need only a square root from libm (in float also powf and exp2f). The CPU runs them
- * in double, one element per vector lane. A GPU runs them in float, one element per thread: define
- * MILD_REAL_FLOAT before including the first of these headers. */
+/* Scalar type and qualifier of the element's law and step. power.h, law.h, element.h, begin.h,
+ * impulse.h, friction.h, remember.h, plate.h, shear.h, motion.h, surface.h and map_view.h are
+ * written in the common subset of C17 and CUDA C++. They are functions of small structs, allocate
+ * nothing, and need only what CUDA has of libm. The CPU runs them in double, one element per
+ * vector lane. A GPU runs them in float, one element per thread: define MILD_REAL_FLOAT before
+ * including the first of these headers. */
 #ifndef MILD_GROUND_REAL_H
 #define MILD_GROUND_REAL_H
 

@@ -59,6 +59,14 @@ static void foot_set_slots(FootScratch *foot, double **at, int32_t *integers) {
     }
 }
 
+int scratch_fits(const MildScratch *scratch, const MildGround *ground) {
+    int fits = scratch->feet == ground->feet;
+    for (int f = 0; f < ground->feet; f++) {
+        fits = fits && scratch->foot[f].elements == ground->elements[f];
+    }
+    return fits;
+}
+
 MildScratch *mild_scratch_create(const MildSole *const *soles, int feet, MildError *error) {
     if (feet < 1 || feet > MILD_FEET_MAX) {
         mild_fail(error, MILD_ERROR_RANGE, "feet = %d is outside 1 .. %d", feet, MILD_FEET_MAX);

@@ -78,6 +78,8 @@ struct MildScratch {
     double *block;              /* the one allocation behind all arrays */
 };
 
+/* Bool: made for soles of the same numbers of elements as the ground. */
+int scratch_fits(const MildScratch *scratch, const MildGround *ground);
 /* Points the slots at the arrays of the memory instead of their own copies. */
 void slots_remember(Slots *s, const Memory *memory);
 /* Computes the world position of every element: point_x, point_y, point_z. */

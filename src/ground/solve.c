@@ -170,6 +170,10 @@ void mild_ground_solve(const MildGround *ground, const MildTerrain *terrain,
     size_t bytes = 6 * (size_t)scratch->feet * sizeof(double);
     memset(result, 0, sizeof *result);
     scratch->dt = input->dt;
+    if (!scratch_fits(scratch, ground)) {
+        memcpy(result->velocity, input->free_velocity, bytes);
+        return;
+    }
     if (contact_prepare(ground, terrain, input, scratch) == 0) {
         memcpy(result->velocity, input->free_velocity, bytes);
         result->converged = 1;

@@ -97,6 +97,7 @@ static void foot_forget(MildGround *ground, int foot) {
         memory.material[i] = MATERIAL_NONE;
     }
     ground->touched[foot] = 0;
+    ground->uneven[foot] = 0;
 }
 
 void mild_ground_reset(MildGround *ground) {

@@ -45,7 +45,7 @@ MildStatus mild_terrain_add_patch(MildTerrain *terrain, const MildPatch *patch, 
 MildStatus mild_terrain_set_map(MildTerrain *terrain, const MildMap *map, MildError *error) {
     if (map && map->label_count > terrain->material_count) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "terrain.patches: label %d has no material, the terrain has only %d",
+                         "terrain.map: label %d has no material, the terrain has only %d",
                          map->label_count - 1, terrain->material_count);
     }
     terrain->map = map;

@@ -1,6 +1,6 @@
 /* mild_contact_check: random problems pass, in double and rounded to float, and each fault has its
  * message. */
-#include "ground_kit.h"
+#include "map_kit.h"
 
 static MildSole *soles[2]; /* left, right */
 
@@ -134,6 +134,95 @@ static void faults(void **state) {
     kit_close(&kit);
 }
 
+/* Patches and a map, in places where the functions that set them do not look again. */
+static void places(void **state) {
+    (void)state;
+    static Kit kit;
+    uint64_t random = 4;
+    const MildMaterial foam = kit_material(&random);
+    MildMapDef def = shape(MILD_MAP_FLAT, 0, 1);
+    def.patches = MILD_PATTERN_CHECKER;
+    def.patch_count = 2;
+    MildMap *map = make_map(&def);
+    MildError error = {0};
+    kit_open(&kit, 1, soles[0], soles[0], &foam, 1e-3);
+    kit_random_state(&kit, &random);
+    kit_random_inertia(&kit, &random, 6);
+    kit.terrain.material_count = 2;
+    kit.terrain.materials[1] = foam;
+    kit.terrain.patches[0] = (MildPatch){.x_max = 1, .y_max = 1, .material = 1};
+    kit.terrain.patch_count = 1;
+    kit.terrain.map = map;
+    assert_int_equal(check(&kit, &error), MILD_OK);
+    kit.terrain.patches[0].material = 2;
+    assert_true(check(&kit, &error) != MILD_OK);
+    assert_string_equal(error.text, "terrain.patches: patch 0 has material 2 of 2");
+    kit.terrain.patch_count = MILD_PATCHES_MAX + 1;
+    assert_true(check(&kit, &error) != MILD_OK);
+    assert_non_null(strstr(error.text, "terrain.patch_count = 17"));
+    kit.terrain.patch_count = 0;
+    kit.terrain.map_y = NAN;
+    assert_true(check(&kit, &error) != MILD_OK);
+    assert_non_null(strstr(error.text, "map_y = nan"));
+    kit.terrain.material_count = 1;
+    assert_true(check(&kit, &error) != MILD_OK);
+    assert_non_null(strstr(error.text, "terrain.map: label 1 has no material"));
+    kit_close(&kit);
+    mild_map_destroy(map);
+}
+
+/* A scratch for other soles than the ground's: nothing is computed, and nothing written. */
+static void another_scratch(void **state) {
+    (void)state;
+    static Kit kit;
+    uint64_t random = 4;
+    const MildMaterial foam = kit_material(&random);
+    MildSole *small = kit_plate(4, 5);
+    const MildSole *const others[] = {small, small};
+    kit_open(&kit, 2, soles[0], soles[1], &foam, 1e-3);
+    kit_random_state(&kit, &random);
+    kit_random_inertia(&kit, &random, 12);
+    kit_free(&kit, NULL);
+    kit_solve(&kit);
+    kit_advance(&kit);
+    char *before = malloc(kit.bytes);
+    memcpy(before, kit.ground, kit.bytes);
+    for (int feet = 1; feet <= 2; feet++) {
+        MildScratch *scratch = mild_scratch_create(others, feet, NULL);
+        mild_ground_solve(kit.ground, &kit.terrain, &kit.input, scratch, &kit.result);
+        assert_int_equal(kit.result.converged, 0);
+        assert_memory_equal(kit.result.velocity, kit.input.free_velocity,
+                            6 * (size_t)feet * sizeof(double));
+        mild_ground_advance(kit.ground, &kit.terrain, &kit.input, scratch, &kit.result);
+        assert_memory_equal(kit.ground, before, kit.bytes);
+        mild_scratch_destroy(scratch);
+    }
+    free(before);
+    kit_close(&kit);
+    mild_sole_destroy(small);
+}
+
+/* A ground that walked over waves and was reset is that of the first day, byte by byte. */
+static void reset_is_new(void **state) {
+    (void)state;
+    static Kit kit, fresh;
+    const MildMaterial sand = mild_material_default();
+    const MildMapDef def = shape(MILD_MAP_WAVES, 0.03, 0.5);
+    MildMap *map = make_map(&def);
+    kit_open(&kit, 2, soles[0], soles[1], &sand, 1e-3);
+    kit_open(&fresh, 2, soles[0], soles[1], &sand, 1e-3);
+    kit.terrain = terrain_on(map, 0);
+    for (int s = 0; s < 20; s++) {
+        kit_step(&kit, NULL);
+    }
+    assert_memory_not_equal(kit.ground, fresh.ground, kit.bytes);
+    mild_ground_reset(kit.ground);
+    assert_memory_equal(kit.ground, fresh.ground, kit.bytes);
+    kit_close(&kit);
+    kit_close(&fresh);
+    mild_map_destroy(map);
+}
+
 /* A foot that a rail guides: rows of 0, which nothing may be coupled to. */
 static void rows_of_zero(void **state) {
     (void)state;
@@ -163,10 +252,10 @@ static void too_many_feet(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_problems),
-        cmocka_unit_test(faults),
-        cmocka_unit_test(rows_of_zero),
-        cmocka_unit_test(too_many_feet),
+        cmocka_unit_test(random_problems), cmocka_unit_test(faults),
+        cmocka_unit_test(rows_of_zero),    cmocka_unit_test(too_many_feet),
+        cmocka_unit_test(places),          cmocka_unit_test(another_scratch),
+        cmocka_unit_test(reset_is_new),
     };
     return cmocka_run_group_tests(tests, open_soles, close_soles);
 }

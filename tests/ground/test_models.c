@@ -184,6 +184,23 @@ static void test_refusals(void **state) {
     assert_non_null(strstr(error.text, "ecc_spring"));
     assert_int_not_equal(
         mild_model_match(MILD_MODEL_CON_CONE, &mild, raster[0], NAN, &rival, &error), MILD_OK);
+    static const int unknown[] = {-1, MILD_MODELS, 1 << 30};
+    for (int i = 0; i < 3; i++) {
+        MildMaterial odd = mild;
+        odd.model = unknown[i];
+        error.text[0] = '\0';
+        assert_int_not_equal(
+            mild_model_match(MILD_MODEL_CON_CONE, &odd, raster[0], LOAD, &rival, &error), MILD_OK);
+        assert_non_null(strstr(error.text, "model"));
+        assert_int_not_equal(
+            mild_model_match((MildModel)unknown[i], &mild, raster[0], LOAD, &rival, &error),
+            MILD_OK);
+        assert_non_null(strstr(error.text, "there is no model"));
+    }
+    MildMaterial flat = mild; /* which mild_material_check refuses */
+    flat.bed_depth = 0;
+    const double sinkage = mild_sole_sinkage(raster[0], &flat, LOAD);
+    assert_true(sinkage >= 0 && sinkage < 0.01);
     mild.model = MILD_MODEL_RIGID;
     assert_int_not_equal(mild_material_check(&mild, &error), MILD_OK);
     assert_non_null(strstr(error.text, "ground.model"));
