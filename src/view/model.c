@@ -88,7 +88,7 @@ static void add_sky(mjSpec *spec) {
     memcpy(sky->rgb2, below, sizeof below);
 }
 
-mjModel *view_model(const char *xml, const ViewDef *def, const Relief *relief,
+mjModel *view_model(const char *xml, const int size[2], const Relief *relief,
                     const Surfaces *surfaces, MildError *error) {
     char text[300] = "";
     mjSpec *spec = mj_parseXML(xml, NULL, text, sizeof text);
@@ -96,8 +96,8 @@ mjModel *view_model(const char *xml, const ViewDef *def, const Relief *relief,
         mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", xml, text);
         return NULL;
     }
-    spec->visual.global.offwidth = def->width;
-    spec->visual.global.offheight = def->height;
+    spec->visual.global.offwidth = size[0];
+    spec->visual.global.offheight = size[1];
     spec->visual.quality.offsamples = 0; /* smooth_picture instead: four samples cost a
                                               * software renderer half of its time */
     spec->visual.quality.shadowsize = VIEW_SHADOW;

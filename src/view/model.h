@@ -5,7 +5,6 @@
 #include <mujoco/mujoco.h>
 
 #include "view/relief.h"
-#include "view/view.h"
 
 #define VIEW_COARSE 4 /* [vertices] spacing of drawn vertices on a tile without imprints */
 
@@ -19,8 +18,9 @@ typedef struct {
  * surface i: a skin, a texture and a material named view_tile_i;
  * material m, and the rigid ground behind the last one: a texture and a material named view_flat_m;
  * the floor around: view_floor.
+ * size: [pixels] width and height of the picture.
  * Returns NULL on error. Free it with mj_deleteModel. */
-mjModel *view_model(const char *xml, const ViewDef *def, const Relief *relief,
+mjModel *view_model(const char *xml, const int size[2], const Relief *relief,
                     const Surfaces *surfaces, MildError *error);
 
 #endif

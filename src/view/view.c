@@ -208,7 +208,8 @@ View *view_create(const ViewDef *def, const Robot *robot, const MildTerrain *ter
         view->relief && relief_is_uneven(view->relief) ? VIEW_PLAIN_UNEVEN : VIEW_PLAIN;
     view->slot_count = view->plain_count + VIEW_FINE;
     const Surfaces surfaces = {view->plain_count, view->slot_count};
-    view->model = view->relief ? view_model(robot_model_path(view->robot), &view->def, view->relief,
+    const int size[2] = {def->width, def->height};
+    view->model = view->relief ? view_model(robot_model_path(view->robot), size, view->relief,
                                             &surfaces, error)
                                : NULL;
     if (!view->model || !open_context(view, error)) {

@@ -188,11 +188,11 @@ static void bad_size_is_one_line(void **state) {
 static int skies(const char *xml) {
     MildError error = {0};
     const ReliefDef def = {.cell = 0.02, .x_min = -1, .x_max = 1, .y_min = -1, .y_max = 1};
-    const ViewDef view = view_def_default();
+    const int size[2] = {320, 240};
     const Surfaces surfaces = {2, 5};
     Relief *relief = relief_create(&def, &terrain, robot_soles(robot), SA01_FEET, &error);
     assert_non_null(relief);
-    mjModel *model = view_model(xml, &view, relief, &surfaces, &error);
+    mjModel *model = view_model(xml, size, relief, &surfaces, &error);
     assert_non_null(model);
     int count = 0;
     for (int i = 0; i < model->ntex; i++) {
