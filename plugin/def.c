@@ -24,7 +24,7 @@ const MildField plugin_fields[] = {
     FIELD(pitch, MILD_FIELD_DOUBLE, 1, 1e-4, 1, "[m] edge of a ground element"),
     FIELD(elements, MILD_FIELD_INT, 1, 0, 65536, "[-] elements of a sole; 0: as many as fit"),
     FIELD(height, MILD_FIELD_DOUBLE, 1, -1e3, 1e3, "[m] of the surface above z = 0"),
-    FIELD(prints, MILD_FIELD_INT, 1, 0, MILD_PRINT_TILES_MAX,
+    FIELD(prints, MILD_FIELD_INT, 1, 0, MILD_IMPRINT_TILES_MAX,
           "[-] tiles of imprints that stay, about ten a footprint; 0: the ground forgets"),
 };
 const int plugin_field_count = (int)(sizeof plugin_fields / sizeof *plugin_fields);

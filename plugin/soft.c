@@ -155,11 +155,11 @@ int soft_feet(const mjModel *m, int instance) {
 }
 
 size_t soft_bytes(const Soft *soft) {
-    return mild_ground_bytes_prints(soft->soles, soft->feet, soft->def.prints);
+    return mild_ground_bytes_imprints(soft->soles, soft->feet, soft->def.prints);
 }
 
 void soft_reset(Soft *soft, void *state) {
-    mild_ground_init_prints(state, soft->soles, soft->feet, soft->def.prints);
+    mild_ground_init_imprints(state, soft->soles, soft->feet, soft->def.prints);
     soft->known = soft->solved = soft->warned = 0;
 }
 

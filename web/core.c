@@ -223,7 +223,7 @@ static void recall_cells(int i0, int i1, int j0, int j1) {
     for (int j = j0; j < j1; j++) {
         for (int i = i0; i < i1; i++) {
             const double x = (i + 0.5) * cell, y = (j + 0.5) * cell;
-            const double depth = mild_ground_print_at(web.ground, x, y);
+            const double depth = mild_ground_imprint_at(web.ground, x, y);
             const double stays = depth > 0 ? 1 - material_at(x, y)->recovery : 0;
             web.kept[window_at(i, j)] = web.shown[window_at(i, j)] = (float)(depth * stays);
         }
@@ -572,7 +572,7 @@ const char *web_start(int ground, int relief, int prints) {
     }
     const MildSole *const *soles = (const MildSole *const *)web.sole;
     const int tiles = prints ? WEB_TILES : 0;
-    void *block = aligned_alloc(64, mild_ground_bytes_prints(soles, web.feet, tiles));
+    void *block = aligned_alloc(64, mild_ground_bytes_imprints(soles, web.feet, tiles));
     if (!block) {
         return "out of memory";
     }
@@ -582,7 +582,7 @@ const char *web_start(int ground, int relief, int prints) {
         return wrong;
     }
     free(web.ground);
-    web.ground = mild_ground_init_prints(block, soles, web.feet, tiles);
+    web.ground = mild_ground_init_imprints(block, soles, web.feet, tiles);
     show_hills();
     stand_up(ground == WEB_STRIPES ? WEB_STRIPE / 2 : 0, 0, 0);
     memset(web.shown, 0, 2 * sizeof *web.shown * WEB_WINDOW * WEB_WINDOW);

@@ -361,11 +361,12 @@ void mild_ground_reset(MildGround *ground);
  * Imprints are stored in the block, in `tiles` squares of 8 x 8 cells, whose edge is half the pitch
  * of the first sole. When all tiles are in use the oldest are forgotten. The imprint of a foot of
  * 0.27 x 0.10 m takes about ten tiles. tiles: rounded up to a multiple of 8, at most
- * MILD_PRINT_TILES_MAX; 0: no imprints. */
-#define MILD_PRINT_TILES_MAX 65536
-size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tiles);
+ * MILD_IMPRINT_TILES_MAX; 0: no imprints. */
+#define MILD_IMPRINT_TILES_MAX 65536
+size_t mild_ground_bytes_imprints(const MildSole *const *soles, int feet, int tiles);
 /* Initialises a block of that size as mild_ground_init does. */
-MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, int feet, int tiles);
+MildGround *mild_ground_init_imprints(void *block, const MildSole *const *soles, int feet,
+                                      int tiles);
 /* [B] Size of the block of an initialised ground. */
 size_t mild_ground_size(const MildGround *ground);
 /* Replaces what a ground remembers by a copy of `block`: [bytes] of a ground of the same soles and
@@ -375,7 +376,7 @@ MildStatus mild_ground_restore(MildGround *ground, const void *block, size_t byt
                                MildError *error);
 /* [m] Greatest depth that the imprint at the world point (x, y) remembers; 0 where there is none.
  * The surface there lies (1 - recovery) times that below h0. */
-double mild_ground_print_at(const MildGround *ground, double x, double y);
+double mild_ground_imprint_at(const MildGround *ground, double x, double y);
 
 /* Makes a scratch. Returns NULL when feet is not 1 .. MILD_FEET_MAX, or when out of memory. soles:
  * [feet], not kept. */

@@ -42,9 +42,9 @@ static void set_solver(Ground &ground, const std::string &solver) {
 static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, double dt, int tiles,
                  const std::string &solver, double tolerance, int max_iterations) {
     const std::vector<const MildSole *> made = soles_of(soles);
-    if (tiles < 0 || tiles > MILD_PRINT_TILES_MAX) {
+    if (tiles < 0 || tiles > MILD_IMPRINT_TILES_MAX) {
         raise(PyExc_ValueError, "tiles = " + std::to_string(tiles) + " is outside 0 .. " +
-                                    std::to_string(MILD_PRINT_TILES_MAX));
+                                    std::to_string(MILD_IMPRINT_TILES_MAX));
     }
     if (!(tolerance >= 0) || max_iterations < 0) {
         raise(PyExc_ValueError, "tolerance, max_iterations: they must be 0 or above");
@@ -57,12 +57,12 @@ static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, doub
         MildError error = {};
         ground->feet = ground->input.feet = (int)made.size();
         ground->block =
-            std::aligned_alloc(64, mild_ground_bytes_prints(made.data(), ground->feet, tiles));
+            std::aligned_alloc(64, mild_ground_bytes_imprints(made.data(), ground->feet, tiles));
         ground->scratch = mild_scratch_create(made.data(), ground->feet, &error);
         if (!ground->block || !ground->scratch) {
             raise(PyExc_MemoryError, "Ground: out of memory");
         }
-        ground->ground = mild_ground_init_prints(ground->block, made.data(), ground->feet, tiles);
+        ground->ground = mild_ground_init_imprints(ground->block, made.data(), ground->feet, tiles);
         ground->soles = nb::tuple(soles);
         ground->terrain = under;
         ground->tiles = tiles;
@@ -336,7 +336,7 @@ void bind_ground(nb::module_ &module) {
         .def(
             "print_at",
             [](Ground &ground, double x, double y) {
-                return mild_ground_print_at(ground.ground, x, y);
+                return mild_ground_imprint_at(ground.ground, x, y);
             },
             nb::arg("x"), nb::arg("y"),
             "Greatest depth [m] that the imprint at the world point (x, y) [m] remembers.")

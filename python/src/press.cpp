@@ -93,7 +93,7 @@ static Press run(nb::handle material, const Sole &sole, nb::handle depth, nb::ha
     def.material = material_of(material, "material");
     check_range("tilt", tilt, -0.7854, 0.7854);
     check_range("step", step, 0, 1);
-    check_range("tiles", tiles, 0, MILD_PRINT_TILES_MAX);
+    check_range("tiles", tiles, 0, MILD_IMPRINT_TILES_MAX);
     def.tilt = tilt;
     def.step = step > 0 ? std::fmax(step, 1e-7) : 0;
     def.print_tiles = tiles;

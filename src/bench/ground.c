@@ -141,7 +141,7 @@ static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double 
     def.kind = MILD_MAP_WAVES;
     MildMap *map = mild_map_create(&def, error);
     void *block =
-        aligned_alloc(64, mild_ground_bytes_prints(robot_soles(robot), BENCH_FEET, TILES));
+        aligned_alloc(64, mild_ground_bytes_imprints(robot_soles(robot), BENCH_FEET, TILES));
     MildStatus status = map ? MILD_OK : error->status;
     if (status == MILD_OK && !block) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
@@ -152,7 +152,7 @@ static MildStatus ground_terrain(GroundBench *bench, const Robot *robot, double 
         ground_settle(bench, robot_soles(robot), dt);
         bench_add(report, "ground", "newton_uneven_advance", ground_time(bench, 1), "ns");
         bench->terrain.map = NULL;
-        bench->ground = mild_ground_init_prints(block, robot_soles(robot), BENCH_FEET, TILES);
+        bench->ground = mild_ground_init_imprints(block, robot_soles(robot), BENCH_FEET, TILES);
         ground_settle(bench, robot_soles(robot), dt);
         bench_add(report, "ground", "newton_prints_advance", ground_time(bench, 1), "ns");
         bench->ground = without;

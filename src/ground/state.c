@@ -3,7 +3,14 @@
 #include <math.h>
 #include <string.h>
 
-#define MEMORY_DOUBLES 12
+#include "ground/element.h"
+
+#define MEMORY_DOUBLES 12 /* nine of ElementMemory, three of the plane */
+
+_Static_assert(sizeof(ElementMemory) == 9 * sizeof(double),
+               "another number of ElementMemory also goes to Memory and here, to slots.h (Slots, "
+               "slot_memory), gather.c, scratch.c, advance.c, and to batch/contact.inc (recall, "
+               "record) and batch/memory.c");
 
 int sole_padded(const MildSole *sole) {
     return (mild_sole_elements(sole) + VECTOR_LANES - 1) / VECTOR_LANES * VECTOR_LANES;
@@ -21,7 +28,7 @@ static size_t feet_bytes(const int32_t *padded, int feet) {
     return bytes;
 }
 
-size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tiles) {
+size_t mild_ground_bytes_imprints(const MildSole *const *soles, int feet, int tiles) {
     int32_t padded[MILD_FEET_MAX];
     if (feet < 1 || feet > MILD_FEET_MAX) {
         return 0;
@@ -30,11 +37,11 @@ size_t mild_ground_bytes_prints(const MildSole *const *soles, int feet, int tile
         padded[f] = sole_padded(soles[f]);
     }
     return sizeof(MildGround) + feet_bytes(padded, feet) +
-           (imprints_bytes(imprints_round(tiles, MILD_PRINT_TILES_MAX)) + 63) / 64 * 64;
+           (imprints_bytes(imprints_round(tiles, MILD_IMPRINT_TILES_MAX)) + 63) / 64 * 64;
 }
 
 size_t mild_ground_bytes(const MildSole *const *soles, int feet) {
-    return mild_ground_bytes_prints(soles, feet, 0);
+    return mild_ground_bytes_imprints(soles, feet, 0);
 }
 
 size_t mild_ground_size(const MildGround *ground) {
@@ -66,9 +73,9 @@ Imprints ground_imprints(const MildGround *ground) {
                       1.0 / ground->imprint_cell, ground->imprint_time};
 }
 
-MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, int feet,
-                                    int tiles) {
-    const size_t bytes = mild_ground_bytes_prints(soles, feet, tiles);
+MildGround *mild_ground_init_imprints(void *block, const MildSole *const *soles, int feet,
+                                      int tiles) {
+    const size_t bytes = mild_ground_bytes_imprints(soles, feet, tiles);
     if (!block || !bytes) {
         return NULL;
     }
@@ -79,14 +86,14 @@ MildGround *mild_ground_init_prints(void *block, const MildSole *const *soles, i
         ground->elements[f] = mild_sole_elements(soles[f]);
         ground->padded[f] = sole_padded(soles[f]);
     }
-    ground->tiles = imprints_round(tiles, MILD_PRINT_TILES_MAX);
+    ground->tiles = imprints_round(tiles, MILD_IMPRINT_TILES_MAX);
     ground->imprint_cell = 0.5 * mild_sole_pitch(soles[0]);
     mild_ground_reset(ground);
     return ground;
 }
 
 MildGround *mild_ground_init(void *block, const MildSole *const *soles, int feet) {
-    return mild_ground_init_prints(block, soles, feet, 0);
+    return mild_ground_init_imprints(block, soles, feet, 0);
 }
 
 static void foot_forget(MildGround *ground, int foot) {
@@ -126,7 +133,7 @@ void memory_forget(const Memory *memory, int e, int32_t material) {
     memory->material[e] = material;
 }
 
-double mild_ground_print_at(const MildGround *ground, double x, double y) {
+double mild_ground_imprint_at(const MildGround *ground, double x, double y) {
     Imprints imprints = ground_imprints(ground);
     return imprints_depth(&imprints, x, y);
 }

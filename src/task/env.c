@@ -7,7 +7,7 @@
 size_t task_env_bytes(const TaskDef *def, const Robot *robot) {
     TaskShape shape = task_shape(robot);
     return task_env_head_bytes(&shape, task_frames_held(def)) +
-           mild_ground_bytes_prints(robot_soles(robot), shape.feet, def->print_tiles) +
+           mild_ground_bytes_imprints(robot_soles(robot), shape.feet, def->print_tiles) +
            (def->motors ? def->motors->bytes : 0);
 }
 
@@ -28,8 +28,8 @@ void task_env_init(TaskEnv *env, const TaskDef *def, const Robot *robot, uint64_
     assert(status == MILD_OK); /* task_def_check_robot has seen them */
     (void)status;
     task_env_init_head(env, def, shape, &gains, seed, index);
-    mild_ground_init_prints(task_env_ground(env), robot_soles(robot), env->shape.feet,
-                            def->print_tiles);
+    mild_ground_init_imprints(task_env_ground(env), robot_soles(robot), env->shape.feet,
+                              def->print_tiles);
 }
 
 static void lend_map(TaskEnv *env, const TaskDef *def) {

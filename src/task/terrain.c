@@ -22,7 +22,7 @@ static const MildField own_fields[] = {
     MILD_FIELD(TerrainDef, memory, MILD_FIELD_BOOL, 1, 0, 1,
                "[bool] the ground keeps imprints, which later steps run into"),
     MILD_FIELD(
-        TerrainDef, tiles, MILD_FIELD_INT, 1, 8, MILD_PRINT_TILES_MAX,
+        TerrainDef, tiles, MILD_FIELD_INT, 1, 8, MILD_IMPRINT_TILES_MAX,
         "[-] memory for imprints: tiles of 136 bytes, about ten per imprint of a foot; when all "
         "are in use the oldest are forgotten"),
 };

@@ -10,7 +10,7 @@ typedef struct {
     MildMapDef map;
     char image[200], labels[200]; /* PNG files of kind = image and patches = image */
     int memory;                   /* bool: prints stay */
-    int tiles;                    /* of prints, see mild_ground_bytes_prints */
+    int tiles;                    /* of prints, see mild_ground_bytes_imprints */
 } TerrainDef;
 
 TerrainDef terrain_def_default(void);
@@ -26,7 +26,7 @@ MildStatus terrain_make(const TerrainDef *def, int materials, MildMap **map, Mil
  * pattern of its own. */
 MildStatus terrain_make_striped(const TerrainDef *def, int materials, const double length[2],
                                 uint64_t seed, MildMap **map, MildError *error);
-/* Tiles for mild_ground_bytes_prints; 0 without memory. */
+/* Tiles for mild_ground_bytes_imprints; 0 without memory. */
 int terrain_print_tiles(const TerrainDef *def);
 
 #endif

@@ -22,10 +22,10 @@ static void feet_finish(Feet *feet) {
         feet->scratch[count - 1] = mild_scratch_create(all, count, NULL);
         fuzz_check(feet->scratch[count - 1] != NULL);
         for (int prints = 0; prints < 2; prints++) {
-            void *block = malloc(mild_ground_bytes_prints(all, count, PRINT_TILES * prints));
+            void *block = malloc(mild_ground_bytes_imprints(all, count, PRINT_TILES * prints));
             fuzz_check(block != NULL);
             feet->ground[prints][count - 1] =
-                mild_ground_init_prints(block, all, count, PRINT_TILES * prints);
+                mild_ground_init_imprints(block, all, count, PRINT_TILES * prints);
         }
     }
 }

@@ -378,8 +378,8 @@ static double find_deepest(const Find *find, double recovery) {
     }
     for (int k = 0; k < 9; k++) {
         double a = (k % 3 - 1) * find->pitch / 3.0, b = (k / 3 - 1) * find->pitch / 3.0;
-        sum += mild_ground_print_at(ground, find->at[0] + R[0] * a + R[1] * b,
-                                    find->at[1] + R[3] * a + R[4] * b);
+        sum += mild_ground_imprint_at(ground, find->at[0] + R[0] * a + R[1] * b,
+                                      find->at[1] + R[3] * a + R[4] * b);
     }
     deepest = sum / 9.0;
     if (find->memory.material[find->i] == MATERIAL_FREE && m0 > 0.0) {

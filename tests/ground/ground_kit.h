@@ -158,9 +158,9 @@ static inline void kit_open(Kit *kit, int feet, MildSole *left, MildSole *right,
 /* Ground that remembers prints. */
 static inline void kit_prints(Kit *kit, int tiles) {
     free(kit->ground);
-    kit->bytes = mild_ground_bytes_prints(kit->soles, kit->feet, tiles);
+    kit->bytes = mild_ground_bytes_imprints(kit->soles, kit->feet, tiles);
     kit->ground =
-        mild_ground_init_prints(aligned_alloc(64, kit->bytes), kit->soles, kit->feet, tiles);
+        mild_ground_init_imprints(aligned_alloc(64, kit->bytes), kit->soles, kit->feet, tiles);
 }
 
 static inline void kit_close(Kit *kit) {

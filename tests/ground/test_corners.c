@@ -46,7 +46,7 @@ static void test_slide_into_imprint(void **state) {
         const double on_the_way = lead(&kit, 0.15, -depth, 150);
         const double inside = lead(&kit, 0.0, -depth, 150);
         lead(&kit, 0.0, 0.01, 50);
-        const double left = mild_ground_print_at(kit.ground, 0.0, y);
+        const double left = mild_ground_imprint_at(kit.ground, 0.0, y);
         print_message("slid %.0f mm deep: carries %.3f of virgin ground's force on the way, %.3f "
                       "over the print of 20 mm, and leaves %.2f mm\n",
                       1e3 * depth, on_the_way / virgin, inside / virgin, 1e3 * left);

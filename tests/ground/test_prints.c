@@ -45,7 +45,8 @@ static void test_second_step(void **state) {
         for (int s = 200; s >= -50; s--) {
             move_to(&kit, 1e-4 * s);
         }
-        double print = mild_ground_print_at(kit.ground, 0.0, kit.input.position[0][1]), foot = 16.0;
+        double print = mild_ground_imprint_at(kit.ground, 0.0, kit.input.position[0][1]),
+               foot = 16.0;
         double a = 0.02, top = mild_element_law(&m, KIT_PITCH, a).force,
                travel = fmax(recovery[r] * a, 1e-4);
         for (int s = -50; s <= 300;
@@ -110,8 +111,8 @@ static void test_no_holes(void **state) {
             for (int k = 0; k < 49 && has_neighbours(sole, e); k++) {
                 double x = mild_sole_x(sole)[e] + KIT_PITCH * ((k % 7) / 6.0 - 0.5) * 0.6,
                        y = mild_sole_y(sole)[e] + KIT_PITCH * ((k / 7) / 6.0 - 0.5) * 0.6;
-                holes += mild_ground_print_at(kit.ground, p[0] + R[0] * x + R[1] * y,
-                                              p[1] + R[3] * x + R[4] * y) < 0.00999;
+                holes += mild_ground_imprint_at(kit.ground, p[0] + R[0] * x + R[1] * y,
+                                                p[1] + R[3] * x + R[4] * y) < 0.00999;
                 points++;
             }
         }
@@ -152,7 +153,7 @@ static void test_trail(void **state) {
     }
     double least = 1.0;
     for (double x = 0.0; x < 0.17; x += 0.002) {
-        least = fmin(least, mild_ground_print_at(kit.ground, x, kit.input.position[0][1]));
+        least = fmin(least, mild_ground_imprint_at(kit.ground, x, kit.input.position[0][1]));
     }
     print_message("dragged 0.2 m: the trail is at least %.2f mm deep\n", 1e3 * least);
     assert_true(least > 0.0099);
@@ -242,7 +243,7 @@ static void test_bounded(void **state) {
     MildSole *left = kit_sole(0, 77), *right = kit_sole(1, 77);
     MildMaterial sand = mild_material_default();
     const MildSole *soles[2] = {left, right};
-    size_t none = mild_ground_bytes(soles, 2), some = mild_ground_bytes_prints(soles, 2, TILES);
+    size_t none = mild_ground_bytes(soles, 2), some = mild_ground_bytes_imprints(soles, 2, TILES);
     print_message("state of two feet: %zu bytes without prints, %zu with %d tiles\n", none, some,
                   TILES);
     assert_true(none <= 2 * 16384 && some - none <= TILES * 136);
@@ -261,7 +262,7 @@ static void test_bounded(void **state) {
     }
     for (int n = 0; n < STEPS; n++) {
         int found =
-            mild_ground_print_at(kit.ground, 0.31 * n + 0.05, kit.input.position[0][1]) > 0.0;
+            mild_ground_imprint_at(kit.ground, 0.31 * n + 0.05, kit.input.position[0][1]) > 0.0;
         kept += found;
         newest += found && n >= STEPS - 6;
     }
@@ -269,8 +270,8 @@ static void test_bounded(void **state) {
                   STEPS, newest);
     assert_true(kept >= 8 && kept < 20 && newest == 6);
     mild_ground_reset(kit.ground);
-    assert_true(mild_ground_print_at(kit.ground, 0.31 * (STEPS - 1) + 0.05,
-                                     kit.input.position[0][1]) == 0.0);
+    assert_true(mild_ground_imprint_at(kit.ground, 0.31 * (STEPS - 1) + 0.05,
+                                       kit.input.position[0][1]) == 0.0);
     kit_close(&kit);
     mild_sole_destroy(left);
     mild_sole_destroy(right);

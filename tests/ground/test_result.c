@@ -157,13 +157,13 @@ static void test_prints_keep_what_they_were_given(void **state) {
     MildSole *sole = kit_plate(1, 1);
     const MildSole *soles[1] = {sole};
     MildMaterial sand = mild_material_default();
-    size_t none = mild_ground_bytes_prints(soles, 1, 0);
+    size_t none = mild_ground_bytes_imprints(soles, 1, 0);
     /* a tile: 64 depths of two bytes and eight bytes of place and time */
-    assert_int_equal(mild_ground_bytes_prints(soles, 1, 8) - none, 8 * 136);
-    assert_int_equal(mild_ground_bytes_prints(soles, 1, 1) - none, 8 * 136);
-    assert_int_equal(mild_ground_bytes_prints(soles, 1, 9) - none, 16 * 136);
-    assert_int_equal(mild_ground_bytes_prints(soles, 1, 128) - none, 128 * 136);
-    assert_int_equal(mild_ground_bytes_prints(soles, 1, -3) - none, 0);
+    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 8) - none, 8 * 136);
+    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 1) - none, 8 * 136);
+    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 9) - none, 16 * 136);
+    assert_int_equal(mild_ground_bytes_imprints(soles, 1, 128) - none, 128 * 136);
+    assert_int_equal(mild_ground_bytes_imprints(soles, 1, -3) - none, 0);
     for (int places = 8; places <= 10; places++) {
         Kit kit;
         kit_open(&kit, 1, sole, NULL, &sand, 1e-3);
@@ -184,7 +184,7 @@ static void test_prints_keep_what_they_were_given(void **state) {
         }
         int kept = 0;
         for (int n = 0; n < places; n++) {
-            double depth = mild_ground_print_at(kit.ground, at + apart * n, at);
+            double depth = mild_ground_imprint_at(kit.ground, at + apart * n, at);
             assert_true(n < places - 8 ? depth == 0.0 : fabs(depth - 0.0095) < 1.1e-5);
             kept += depth > 0.0;
         }

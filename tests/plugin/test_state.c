@@ -257,7 +257,7 @@ static int on_print(const mjData *d, const float at[3]) {
     for (int k = 0; k < 4; k++) {
         const double x = (double)at[0] + (k % 2 ? off : -off),
                      y = (double)at[1] + (k / 2 ? off : -off);
-        found |= mild_ground_print_at(ground, x, y) > 0;
+        found |= mild_ground_imprint_at(ground, x, y) > 0;
     }
     return found;
 }

@@ -671,7 +671,7 @@ static void nothing_is_left(void **unused) {
     expect_near("speed_error_sum", rig.env->speed_error_sum, 0, 0);
     expect_near("the level of help lives on", rig.env->assist_level, 0.7, 0);
     MildGround *fresh = aligned_alloc(64, mild_ground_size(task_env_ground(rig.env)));
-    mild_ground_init_prints(fresh, robot_soles(robot), SA01_FEET, 0);
+    mild_ground_init_imprints(fresh, robot_soles(robot), SA01_FEET, 0);
     assert_memory_equal(fresh, task_env_ground(rig.env), mild_ground_size(fresh));
     free(fresh);
     rig_close(&rig);
