@@ -17,7 +17,7 @@ MildStatus material_numbers(const MildMaterial *material, double pitch, int inde
     int n = 0;
 #define MATERIAL_LAW_STORE(name) numbers->law[n++] = (float)law.name;
     LAW_NUMBERS(MATERIAL_LAW_STORE)
-    numbers->recovery = (float)law_recovery(&law, material->recovery);
+    numbers->recovery = (float)law_recovery(&law, recovery_of(material));
     numbers->mu = (float)material->mu;
     numbers->k_drift = (float)material->k_drift;
     numbers->b_drift = (float)material->b_drift;

@@ -49,7 +49,7 @@ static void slot_set_law(const Slots *s, int i, const Law *law, const MildMateri
     s->exit_drag[i] = law_exit_drag(law);
     s->entry_drag[i] = law_entry_drag(law);
     s->strength[i] = law->line_stiffness;
-    s->recovery[i] = law_recovery(law, material->recovery);
+    s->recovery[i] = law_recovery(law, recovery_of(material));
     s->mu[i] = material->mu;
     s->k_drift[i] = material->k_drift;
     s->b_drift[i] = material->b_drift;
@@ -72,7 +72,7 @@ static void slot_set_mixture(const Slots *s, int i, const DerivedLaw *derived, i
         .mu = between(m->mu, n->mu, t),
         .k_drift = between(m->k_drift, n->k_drift, t),
         .b_drift = between(m->b_drift, n->b_drift, t),
-        .recovery = between(m->recovery, n->recovery, t),
+        .recovery = between(recovery_of(m), recovery_of(n), t),
     };
     slot_set_law(s, i, &law, &material);
 }

@@ -38,3 +38,7 @@ const ModelRow *model_row(int model) {
 Law law_of(const MildMaterial *material, double pitch) {
     return model_row(material->model)->law(material, pitch);
 }
+
+double recovery_of(const MildMaterial *material) {
+    return model_row(material->model)->motion & LAW_RESIST ? 0.0 : material->recovery;
+}

@@ -9,5 +9,8 @@
 const ModelRow *model_row(int model);
 /* Law of one element of area pitch^2. */
 Law law_of(const MildMaterial *material, double pitch);
+/* [-] Share of the depth that its virgin ground springs back: the material's, but 0 in resistive
+ * force theory, whose unloading line has no other length (plate.h). */
+double recovery_of(const MildMaterial *material);
 
 #endif

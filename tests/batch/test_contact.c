@@ -33,7 +33,7 @@ static void case_law(CaseMaterial *c, const MildMaterial *m, double pitch) {
     const Law law = law_of(m, pitch);
     memcpy(c->law, &law, sizeof c->law);
     c->curves = law_curves(&law) | model_row(m->model)->motion;
-    c->recovery = law_recovery(&law, m->recovery);
+    c->recovery = law_recovery(&law, recovery_of(m));
     c->mu = m->mu;
     c->k_drift = m->k_drift;
     c->b_drift = m->b_drift;

@@ -55,16 +55,20 @@ static void test_rows(void **state) {
 }
 
 /* Sum of the wrench's numbers, each with a weight of its own, over a foot led by hand: down to 16
- * mm and sideways, up, down again to where the bed is, and out. */
+ * mm and sideways, up, down again to where the bed is, out, and into its imprint. */
 static double led(const MildMaterial *m, const MildSole *plate, const MildSole *one) {
     const MildSole *sole = mild_model_is_concentric((MildModel)m->model) ? one : plate;
-    static const double depths[5] = {-0.002, 0.016, 0.013, 0.019, -0.005};
-    enum { STEPS = 40 };
+    enum { STEPS = 40, WAYS = 5, TILES = 8 };
+    static const double depths[WAYS + 1] = {-0.002, 0.016, 0.013, 0.019, -0.005, 0.016};
     Kit kit;
     double sum = 0.0;
     kit_open(&kit, 1, (MildSole *)(uintptr_t)sole, NULL, m, 1e-3);
+    free(kit.ground);
+    kit.bytes = mild_ground_bytes_imprints(kit.soles, 1, TILES);
+    kit.ground = mild_ground_init_imprints(aligned_alloc(64, (kit.bytes + 63) / 64 * 64), kit.soles,
+                                           1, TILES);
     kit.input.position[0][2] -= depths[0];
-    for (int s = 0; s < 4 * STEPS; s++) {
+    for (int s = 0; s < WAYS * STEPS; s++) {
         const double down = (depths[s / STEPS + 1] - depths[s / STEPS]) / (STEPS * kit.input.dt);
         kit.input.free_velocity[0] = 0.03;
         kit.input.free_velocity[2] = -down;
