@@ -145,7 +145,7 @@ static DenseLaw law_material(const MildMaterial *m, double pitch) {
            c_d = m->passive ? fmax(m->c_d, 0.5) : m->c_d;
     DenseLaw law = {.bed = m->bed_depth,
                     .bed_stiffness = LAW_BED_STRESS * area,
-                    .recovery = m->recovery,
+                    .recovery = is_resistive(m) ? 0.0 : m->recovery,
                     .mu = m->mu,
                     .k_drift = m->k_drift,
                     .b_drift = m->b_drift};
