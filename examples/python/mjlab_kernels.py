@@ -18,7 +18,8 @@ def approach(body: wp.array[int], root: wp.array[int], center: wp.array[wp.vec3]
              xpos: wp.array2d[wp.vec3], xmat: wp.array2d[wp.mat33], com: wp.array2d[wp.vec3], cdof: wp.array2d[wp.spatial_vector],
              passive: wp.array2d[float], bias: wp.array2d[float], actuator: wp.array2d[float],
              place: wp.array2d[wp.vec3], turn: wp.array2d[wp.mat33], jacobian: wp.array3d[float]):
-    """Poses of the soles, and J^T, `size` columns a foot, with f in its last column. The sole of a sphere is a disc that stays level below its center."""
+    """Poses of the soles, and J^T, `size` columns a foot, with f in its last column. The sole of a sphere is a disc that stays level
+    below its center."""
     w, f, i = wp.tid()
     at = xpos[w, body[f]]
     if is_round:

@@ -55,7 +55,7 @@ MildStatus batch_copy(int device, void *to, const void *from, size_t bytes, Mild
 
 /* ---- a map: map.c ---- */
 /* Makes a view of a map whose arrays are copies in the memory of a device. Fails for a map that a
- * batch does not know yet. */
+ * batch does not know yet. error: not NULL. */
 MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildError *error);
 void batch_map_close(const MapView *view, int device);
 

@@ -39,8 +39,6 @@ void batch_map_close(const MapView *view, int device) {
 }
 
 MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildError *error) {
-    MildError own = {0};
-    error = error ? error : &own; /* says which status */
     MapView opened = map_view(map);
     const size_t points = (size_t)(opened.x.cells + 1) * (size_t)(opened.y.cells + 1);
     const size_t cells = (size_t)opened.label_x.cells * (size_t)opened.label_y.cells;

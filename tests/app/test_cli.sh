@@ -166,14 +166,17 @@ expect 0 'newton' "$mild" info models
 # a policy walks as it was trained to, from its own file; what --config or an override says goes before
 walked() { "$mild" eval --ground rubber --speed 0.5 --trials 1 --seconds 3 "$@"; }
 go1=$root/policies/go1.safetensors
-as=(--robot go1 --policy "$go1" --task.physics_dt=0.005 --task.shell_depth=0.06)
+as=(--robot go1 --policy "$go1" --task.physics_dt=0.005)
 own=$(walked "${as[@]}")
 [ "$own" = "$(walked --policy "$go1" --config "$root/configs/go1.ini")" ] || fail "not as with its config: $own"
 [ "$own" = "$(walked "${as[@]}" --task.gait_period=0.5)" ] && [ "$own" != "$(walked "${as[@]}" --task.gait_period=0.8)" ] || fail "the gait's period"
-[ "$own" = "$(walked --policy "$go1" --task.physics_dt=0.005 --task.shell_depth=0.06)" ] || fail "the policy's robot"
+[ "$own" = "$(walked --policy "$go1" --task.physics_dt=0.005)" ] || fail "the policy's robot"
 [ "$(walked --robot go1 --controller stand)" = "$(walked --robot go1 --controller stand --task.gait_period=0.8)" ] || fail "a controller without a policy"
-printf '[train]\nrobot = go1\n[task]\nphysics_dt = 0.005\nshell_depth = 0.06\n' >few.ini
+printf '[train]\nrobot = go1\n[task]\nphysics_dt = 0.005\n' >few.ini
 [ "$own" = "$(walked --policy "$go1" --config few.ini)" ] || fail "a config that says nothing of how it walks"
+# its shanks dip into loose sand, which its file allows
+expect 0 '1/1' "$mild" eval --policy "$go1" --ground sand_loose --speed 0.6 --trials 1 --seconds 4
+expect 0 '0/1' "$mild" eval --policy "$go1" --ground sand_loose --speed 0.6 --trials 1 --seconds 4 --task.shell_depth=0
 printf '[task]\ngait_period = 0.7\n' >gait.ini
 "$mild" train --config gait.ini --out gait --train.envs=4 --train.iterations=1 --ppo.steps=4 --ppo.minibatches=1 --task.action_scale=0.3 >/dev/null 2>&1
 file=gait/policy.safetensors

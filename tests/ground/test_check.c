@@ -179,6 +179,7 @@ static void another_scratch(void **state) {
     const MildMaterial foam = kit_material(&random);
     MildSole *small = kit_plate(4, 5);
     const MildSole *const others[] = {small, small};
+    const MildSole *const three[] = {soles[0], soles[1], small};
     kit_open(&kit, 2, soles[0], soles[1], &foam, 1e-3);
     kit_random_state(&kit, &random);
     kit_random_inertia(&kit, &random, 12);
@@ -187,8 +188,8 @@ static void another_scratch(void **state) {
     kit_advance(&kit);
     char *before = malloc(kit.bytes);
     memcpy(before, kit.ground, kit.bytes);
-    for (int feet = 1; feet <= 2; feet++) {
-        MildScratch *scratch = mild_scratch_create(others, feet, NULL);
+    for (int feet = 1; feet <= 3; feet++) {
+        MildScratch *scratch = mild_scratch_create(feet < 3 ? others : three, feet, NULL);
         mild_ground_solve(kit.ground, &kit.terrain, &kit.input, scratch, &kit.result);
         assert_int_equal(kit.result.converged, 0);
         assert_memory_equal(kit.result.velocity, kit.input.free_velocity,
