@@ -117,7 +117,6 @@ def main():
     args = arguments()
     mujoco.mj_loadPluginLibrary(PLUGIN)
     ini = read(ROOT / "robots" / args.robot / "robot.ini")
-    period = read(ROOT / "configs" / f"{args.robot}.ini").get("task", "gait_period", fallback="0.8")
     feet = [ini[section] for section in ini.sections() if section.startswith("foot.")]
     model, names = build(args, ini, feet)
     joints = np.array([model.joint(name).qposadr[0] for name in names])
@@ -125,7 +124,7 @@ def main():
     for trial in range(args.trials):
         random = np.random.default_rng(trial)
         file = "mild" if args.robot == "sa01" else args.robot
-        policy = Policy(ROOT / "policies" / f"{file}.safetensors", pose=pose, period=float(period))
+        policy = Policy(ROOT / "policies" / f"{file}.safetensors", pose=pose)
         policy.phase = random.choice([0, 0.5])
         speeds.append(walk(model, joints, args, ini, policy, start(model, joints, pose, feet, random)))
     stood = [speed for speed in speeds if speed is not None]

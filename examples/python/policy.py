@@ -7,19 +7,22 @@ POSE = np.array([0, 0, -0.24, 0.48, -0.24, 0] * 2)  # [rad] default pose of SA01
 
 
 def read(path):
-    """The tensors of a safetensors file by name."""
+    """The tensors of a policy's file by name, and the keys of the task that it was trained for."""
     raw = open(path, "rb").read()
     end = 8 + int.from_bytes(raw[:8], "little")
     header = json.loads(raw[8:end])
-    header.pop("__metadata__")
+    task = header.pop("__metadata__")["task"]
     return {k: np.frombuffer(raw[end + v["data_offsets"][0] : end + v["data_offsets"][1]],
                              {"F32": "<f4", "F16": "<f2"}[v["dtype"]]).astype(np.float32)
-            .reshape(v["shape"]) for k, v in header.items()}
+            .reshape(v["shape"]) for k, v in header.items()}, dict(key.split(" = ") for key in task.split("; "))
 
 
 class Policy:
-    def __init__(self, path, pose=POSE, stride=8, period=0.8, clip=8.0):
-        self.tensors, self.pose, self.stride, self.period, self.clip = read(path), pose, stride, period, clip
+    def __init__(self, path, pose=POSE):
+        (self.tensors, task), self.pose = read(path), pose
+        self.stride, self.clip = int(task["history_stride"]), float(task["action_clip"])
+        self.period, self.slowing = float(task["gait_period"]), float(task.get("gait_slowing", 0))
+        self.slow_below = float(task.get("gait_slow_below", 1.2))
         self.frames = None  # the last 5 * stride frames, oldest first; none before the first
         self.phase, self.last = 0.0, np.zeros(12)
 
@@ -52,5 +55,6 @@ class Policy:
         action = self.network("actor", np.concatenate([frame, estimates, z]))
         self.last = np.clip(action, -self.clip, self.clip)
         self.frames = np.vstack([self.frames[1:], frame])
-        self.phase = (self.phase + 0.01 / self.period) % 1
+        slow = max(0, 1 - np.abs(frame[3:6]) @ [0.5, 1.5, 1] / self.slow_below)  # the clock slows with the command
+        self.phase = (self.phase + 0.01 / (self.period * (1 + self.slowing * slow))) % 1
         return self.last  # the joints' targets are POSE + 0.5 * action

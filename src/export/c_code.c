@@ -143,6 +143,9 @@ static void print_numbers(FILE *file, const Export *export) {
     print_int(file, "CLOCK", task->clock, "bool: the frame has the gait clock, else 0, 0");
     print_number(file, "PERIOD", TASK_PERIOD, "", "[s] of a step");
     print_number(file, "GAIT_PERIOD", task->gait_period, "", "[s] of the gait clock");
+    print_number(file, "GAIT_SLOWING", task->gait_slowing, "", "[-] of a command of no speed");
+    print_number(file, "GAIT_SLOW_BELOW", task->gait_slow_below, "",
+                 "[m/s] speed from which the clock is not slowed");
     print_number(file, "STANDING_BELOW", task->standing_below, "f",
                  "a command whose parts are all below this is to stand");
     print_number(file, "ACTION_SCALE", task_action_scale(task, export->robot), "f",

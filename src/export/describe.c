@@ -71,9 +71,13 @@ static void add_rules(Description *d, const Export *export) {
         TASK_FRAMES - 1, stride, (TASK_FRAMES - 1) * stride);
     add(d, "clock", "%d", task->clock);
     add(d, "gait_period", "%.9g", task->gait_period);
+    add(d, "gait_slowing", "%.9g", task->gait_slowing);
+    add(d, "gait_slow_below", "%.9g", task->gait_slow_below);
     add(d, "standing_below", "%.9g", task->standing_below);
     add(d, "clock_rule",
-        "sin, cos of 2 pi phase, which grows by policy_period / gait_period a step; 0, 0 when "
+        "sin, cos of 2 pi phase, which grows by policy_period / period a step, period = gait_period "
+        "(1 + gait_slowing max(0, 1 - v / gait_slow_below)), v = |forward| + 3 |left| + |turning| of "
+        "the frame's command; 0, 0 when "
         "clock is 0 or all parts of the command are below standing_below");
     add(d, "estimate_rule",
         "base velocity times %g, velocity of each foot [m/s], in the base's axes; height of each "

@@ -9,6 +9,19 @@ TASK_FN int task_is_standing(const TaskDef *def, const TaskReal command[3]) {
     return fabs(command[0]) < below && fabs(command[1]) < below && fabs(command[2]) < below;
 }
 
+/* T = gait_period (1 + gait_slowing max(0, 1 - v / gait_slow_below)),  v = |v_x| + 3 |v_y| + 1 m |w_z|
+ *
+ * A slow walk at the period of a fast one takes many short steps, each of which pays for a lifted
+ * leg and, on soft ground, for an imprint: with 1.0 s in the place of 0.8 s, 0.3 m/s in loose sand
+ * costs a sixth less. v weighs steps to the side and turns as their ranges are smaller: they take
+ * no longer steps. */
+TASK_FN double task_gait_period(const TaskDef *def, const TaskReal command[3]) {
+    const double forward = command[0], left = command[1], turning = command[2];
+    const double v = fabs(forward) + 3 * fabs(left) + fabs(turning);
+    const double slow = 1 - v / def->gait_slow_below;
+    return def->gait_period * (1 + def->gait_slowing * (slow > 0 ? slow : 0));
+}
+
 /* [-] Progress of the foot's swing, the half of the period before its stance; -1 in stance. */
 static inline MILD_BOTH double swing_progress(const Robot *robot, double phase, int foot) {
     double offset = robot_gait_offset(robot, foot);

@@ -3,19 +3,11 @@
 #include <stdio.h>
 #include <string.h>
 
-static const char *const keys[] = {"gait_period",
-                                   "standing_below",
-                                   "clock",
-                                   "history_stride",
-                                   "velocity_scale",
-                                   "height_scale",
-                                   "action_scale",
-                                   "action_clip",
-                                   "torque_share",
-                                   "torque_hold",
-                                   "shell_depth",
-                                   "kp",
-                                   "kd"};
+static const char *const keys[] = {"gait_period",    "gait_slowing", "gait_slow_below",
+                                   "standing_below", "clock",        "history_stride",
+                                   "velocity_scale", "height_scale", "action_scale",
+                                   "action_clip",    "torque_share", "torque_hold",
+                                   "shell_depth",    "kp",           "kd"};
 
 enum { KEYS = sizeof keys / sizeof *keys };
 

@@ -210,6 +210,15 @@ static inline MILD_BOTH TaskReal reward_joint_acceleration(const TaskMotion *m) 
     return place_sum(sum);
 }
 
+/* What the cost of transport counts. */
+static inline MILD_BOTH TaskReal reward_power(const TaskMotion *m) {
+    TaskReal sum = 0;
+    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
+        sum += TASK_REAL(fabs(m->torque[i] * m->qd[i]));
+    }
+    return place_sum(sum);
+}
+
 /* Penalises legs that are too close, because the engine computes no contact between them. */
 static inline MILD_BOTH TaskReal reward_collision(const TaskMotion *m) {
     int close = (m->foot_distance < robot_feet_least(m->robot)) +

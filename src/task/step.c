@@ -226,6 +226,7 @@ TASK_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int s
 
 static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                          const RobotSim *sim, TaskMotion *m) {
+    const double half_period = 0.5 * task_gait_period(def, env->command_seen);
     TaskReal stance_height = 0;
     int stances = 0;
     for (int f = 0; f < env->shape.feet; f++) {
@@ -240,7 +241,7 @@ static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const
         m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
         m->wanted_height[f] = task_gait_height(def, robot, env->phase, m->standing, f);
         if (m->contact[f]) {
-            m->landed_air_time += fmin((double)env->air_time[f], 0.5 * def->gait_period);
+            m->landed_air_time += fmin((double)env->air_time[f], half_period);
         }
         if (m->stance[f]) {
             stance_height += foot->sole_center[2];
@@ -317,9 +318,9 @@ static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
 TASK_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {
     env->tick++;
     env->step++;
-    see_command(env);
-    env->phase += TASK_PERIOD / def->gait_period;
+    env->phase += TASK_PERIOD / task_gait_period(def, env->command_seen);
     env->phase -= floor(env->phase);
+    see_command(env);
     uint32_t interval = (uint32_t)(def->command_interval / TASK_PERIOD + 0.5);
     if (!env->command_frozen && interval && env->step % interval == 0) {
         task_draw_command(env, def);

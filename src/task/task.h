@@ -280,6 +280,8 @@ TASK_FN double task_assist_pose(const TaskEnv *env, const TaskDef *def, const Ro
 /* Gait clock (gait.c): a foot is in stance during the half of the period that starts at its
  * offset. */
 TASK_FN int task_is_standing(const TaskDef *def, const TaskReal command[3]);
+/* [s] Period of the clock under a command. */
+TASK_FN double task_gait_period(const TaskDef *def, const TaskReal command[3]);
 TASK_FN int task_gait_stance(const Robot *robot, double phase, int standing, int foot);
 TASK_FN double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
                                 int foot);

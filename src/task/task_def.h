@@ -42,6 +42,7 @@
     X(torque, -1e-10, "the sum of squared torques [N^2 m^2] (vendor)")                             \
     X(joint_speed, -1e-5, "the sum of squared joint speeds [rad^2/s^2] (vendor)")                  \
     X(joint_acceleration, -5e-9, "the sum of squared joint accelerations [rad^2/s^4] (vendor)")    \
+    X(power, 0, "the sum of |torque times speed| of the joints [W] (field)")                       \
     X(collision, -1.0,                                                                             \
       "feet or knees being closer than feet_least, knee_least of robot.ini (vendor)")
 
@@ -127,8 +128,9 @@ typedef struct {
     double vx[2], vy[2], wz[2];
     double backward_share, backward_vx[2], standing_share, straight_share;
     double standing_below; /* [m/s, rad/s] a command whose parts are all below this is to stand */
-    double gait_period;    /* [s] */
-    double swing_apex;     /* [m] */
+    double gait_period;    /* [s] of fast commands, see task_gait_period */
+    double gait_slowing, gait_slow_below; /* [-], [m/s] of slow ones */
+    double swing_apex;                    /* [m] */
     double double_support; /* [-] |sin(2 pi phase)| below which either contact state is right */
     int history_stride;    /* policy steps that each older frame of the history is the mean of */
     int clock;             /* bool: clock in the observation */

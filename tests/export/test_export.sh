@@ -14,7 +14,8 @@ printf '[task]\nphysics_dt = 0.005\nobserve_noise = false\n[randomize]\nlatency 
 
 # another policy: other widths, one theta for each dimension of z, another task; every tensor random, so that nothing is 0 or 1
 "$python" "$tests/make_policy.py" "$root/policies/mild.safetensors" other.safetensors || fail "make_policy.py"
-other=(--task.history_stride=3 --task.gait_period=0.7 --task.action_clip=0.6 --task.action_scale=0.3 --task.standing_below=0.5)
+other=(--task.history_stride=3 --task.gait_period=0.7 --task.action_clip=0.6 --task.action_scale=0.3 --task.standing_below=0.5 --task.gait_slowing=0.4
+    --task.gait_slow_below=0.9)
 "$mild" eval --policy other.safetensors "${other[@]}" --config exact.ini --ground foam45 --trials 2 --seconds 1 --stop 0.2 \
     --actions other.csv >/dev/null || fail "eval of another policy"
 
@@ -59,7 +60,10 @@ fault "ReLU" 'expf(x) - 1' '0' policy.c
 fault "no last action" 'last[i] = state->action[i]' 'last[i] = 0' policy.c
 fault "no clip" 'a > clip ? clip : a;' 'a;' policy.c
 fault "other pose" 'readings->angle[i] - policy_pose[i]' 'readings->angle[i]' policy.c
-fault "gait period" 'POLICY_PERIOD / POLICY_GAIT_PERIOD' 'POLICY_PERIOD / 0.8' policy.c
+fault "gait period" 'return POLICY_GAIT_PERIOD' 'return 0.8' policy.c
+fault "slow clock" 'POLICY_GAIT_SLOWING * (slow' '0 * (slow' policy.c
+fault "its speed" 'v / POLICY_GAIT_SLOW_BELOW' 'v / 1.2' policy.c
+fault "the frame's command" '0.5 * fabs(observation[3])' 'fabs(observation[3])' policy.c
 fault "stride" '#define POLICY_STRIDE 3' '#define POLICY_STRIDE 2' policy.h
 fault "standing" 'fabsf(command[1]) < below' 'fabsf(command[1]) < 0' policy.c
 
@@ -84,7 +88,7 @@ fi
 "$mild" export --policy other.safetensors "${other[@]}" --onnx other.onnx || fail "export --onnx of another policy"
 "$python" "$tests/test_onnx.py" "$root" walk.onnx exact.csv noisy.csv || fail "walk.onnx"
 "$python" "$tests/test_onnx.py" - other.onnx other.csv policy_period=0.01 history_stride=3 gait_period=0.7 action_clip=0.6 \
-    action_scale=0.3 standing_below=0.5 clock=1 || fail "other.onnx"
+    action_scale=0.3 standing_below=0.5 clock=1 gait_slowing=0.4 gait_slow_below=0.9 || fail "other.onnx"
 "$mild" export --onnx walk_double.onnx --double || fail "export --onnx --double"
 "$mild" export --policy other.safetensors "${other[@]}" --onnx other_double.onnx --double || fail "--double of another policy"
 "$python" "$tests/test_onnx.py" --double "$root" walk_double.onnx exact.csv noisy.csv || fail "walk_double.onnx"

@@ -35,8 +35,8 @@ class Rivals(unittest.TestCase):
         import train_ht2
         path = root / "policies/mild.safetensors"
         frames = np.random.default_rng(1).normal(0, 0.3, (1, 6, 47)).astype(np.float32)
-        ours = policy.Policy(path, stride=1, clip=1e9)
-        ours.frames = frames[0, :5]
+        ours = policy.Policy(path)
+        ours.stride, ours.clip, ours.frames = 1, 1e9, frames[0, :5]
         action = train_ht2.Teacher(path, "cpu").act(torch.from_numpy(frames))
         np.testing.assert_allclose(action[0].numpy(), ours.act(frames[0, 5]), atol=2e-5)
 

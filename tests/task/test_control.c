@@ -408,6 +408,17 @@ static void clock_runs(void **unused) {
     double before = rig.env->phase;
     rig_step(&rig, NULL);
     expect_near("a shorter period", rig.env->phase, before + 0.02, 1e-12);
+    /* the command that the action answers to slows it, not one that came after */
+    const double seen[3] = {0.3, 0, 0}, later[3] = {1.2, 0, 0};
+    rig.def.gait_slowing = 0.6;
+    memcpy(rig.env->command_seen, seen, sizeof seen);
+    memcpy(rig.env->command, later, sizeof later);
+    before = rig.env->phase;
+    rig_step(&rig, NULL);
+    expect_near("a slow command", rig.env->phase, before + 0.02 / 1.45, 1e-12);
+    before = rig.env->phase;
+    rig_step(&rig, NULL);
+    expect_near("a fast command", rig.env->phase, before + 0.02, 1e-12);
     rig_close(&rig);
 }
 

@@ -22,6 +22,28 @@ static void standing_commands(void **unused) {
     assert_false(task_is_standing(&def, none));
 }
 
+/* T = 0.8 (1 + 0.5 (1 - v/1.2)) s by hand, below 1.2 m/s and above. */
+static void slow_clock(void **unused) {
+    (void)unused;
+    const struct {
+        double command[3], period;
+    } rows[] = {{{0, 0, 0}, 1.2},        {{0.3, 0, 0}, 1.1},  {{-0.6, 0, 0}, 1.0},
+                {{0, 0.2, 0}, 1.0},      {{0, -0.1, 0}, 1.1}, {{0, 0, 0.9}, 0.9},
+                {{0.3, 0.1, -0.3}, 0.9}, {{1.2, 0, 0}, 0.8},  {{-1.3, 0, 0}, 0.8},
+                {{0.3, 0.3, 0.6}, 0.8}};
+    TaskDef def = task_def_default();
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        def.gait_slowing = 0;
+        expect_near("as it is", task_gait_period(&def, rows[i].command), 0.8, 0);
+        def.gait_slowing = 0.5;
+        expect_entry("slow", (int)i, task_gait_period(&def, rows[i].command), rows[i].period,
+                     1e-12);
+    }
+    def.gait_slow_below = 0.6;
+    const double command[3] = {0.3, 0, 0};
+    expect_near("below", task_gait_period(&def, command), 1.0, 1e-12);
+}
+
 /* Left stands in the first half of the period, right in the second. */
 static void schedule(void **unused) {
     (void)unused;
@@ -97,9 +119,8 @@ static void reference(void **unused) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(standing_commands),
-        cmocka_unit_test(schedule),
-        cmocka_unit_test(wanted_height),
+        cmocka_unit_test(standing_commands), cmocka_unit_test(slow_clock),
+        cmocka_unit_test(schedule),          cmocka_unit_test(wanted_height),
         cmocka_unit_test(reference),
     };
     return cmocka_run_group_tests(tests, kit_setup, kit_teardown);

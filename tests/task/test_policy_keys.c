@@ -16,6 +16,8 @@
 static TaskDef changed(void) {
     TaskDef def = task_def_default();
     def.gait_period = 0.7;
+    def.gait_slowing = 0.4;
+    def.gait_slow_below = 0.9;
     def.standing_below = 0.2;
     def.clock = 0;
     def.history_stride = 3;
@@ -41,6 +43,7 @@ static void printed_and_read(void **state) {
     print_message("%s\n", text);
     assert_int_equal(task_policy_keys_read(&to, text, &error), MILD_OK);
     assert_true(to.gait_period == 0.7 && to.standing_below == 0.2 && to.clock == 0);
+    assert_true(to.gait_slowing == 0.4 && to.gait_slow_below == 0.9);
     assert_true(to.history_stride == 3 && to.velocity_scale == 2 && to.height_scale == 5);
     assert_true(to.action_scale == 0.3 && to.action_clip == 7);
     assert_true(to.torque_share == 0.6 && to.torque_hold == 1 && to.shell_depth == 0.04);

@@ -402,6 +402,10 @@ static void efforts(void **unused) {
     m->qd_before[0] = 2.7;   /* 30 rad/s^2 */
     m->qd_before[11] = -3.6; /* -40 rad/s^2 */
     expect_term(REWARD_joint_acceleration, "30, -40 rad/s^2", -1.25e-5);
+    m->qd[0] = -3; /* a joint that gives 90 W, one that takes 160 */
+    expect_term(REWARD_power, "no weight", 0);
+    scene.def.reward.weight[REWARD_power] = -0.01;
+    expect_term(REWARD_power, "90 and 160 W", -2.5);
 }
 
 static void collision(void **unused) {
@@ -441,7 +445,7 @@ static void sum_is_clipped(void **unused) {
 /* The order of enum, names and functions is one. */
 static void names_follow_the_enum(void **unused) {
     (void)unused;
-    assert_int_equal(TASK_REWARD_COUNT, 20);
+    assert_int_equal(TASK_REWARD_COUNT, 21);
     assert_string_equal(task_reward_names[REWARD_linear_velocity], "linear_velocity");
     assert_string_equal(task_reward_names[REWARD_reference_motion], "reference_motion");
     assert_string_equal(task_reward_names[REWARD_collision], "collision");

@@ -141,6 +141,13 @@ static void write_history(PolicyState *state, const float *observation, float *h
     state->started = 1;
 }
 
+/* [s] Period of the gait clock under the command of a frame, in which speeds are doubled. */
+static double gait_period(const float *observation) {
+    const double v = 0.5 * fabs(observation[3]) + 1.5 * fabs(observation[4]) + fabs(observation[5]);
+    const double slow = 1 - v / POLICY_GAIT_SLOW_BELOW;
+    return POLICY_GAIT_PERIOD * (1 + POLICY_GAIT_SLOWING * (slow > 0 ? slow : 0));
+}
+
 void policy_step(PolicyState *state, const float *observation, float *action) {
     float history[(POLICY_MEANS + 1) * POLICY_OBSERVATION];
     write_history(state, observation, history);
@@ -150,7 +157,7 @@ void policy_step(PolicyState *state, const float *observation, float *action) {
         action[i] = !(a > -clip) ? -clip : a > clip ? clip : a; /* not a number: -clip */
         state->action[i] = action[i];
     }
-    state->phase += POLICY_PERIOD / POLICY_GAIT_PERIOD;
+    state->phase += POLICY_PERIOD / gait_period(observation);
     state->phase -= floor(state->phase);
 }
 
