@@ -2,7 +2,7 @@
 #ifndef POINTS_KIT_H
 #define POINTS_KIT_H
 
-#include "ground_kit.h"
+#include "ground/ground_kit.h"
 
 static inline void kit_points(Kit *kit, uint64_t *random) {
     const int n = 6 * kit->feet;
