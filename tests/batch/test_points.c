@@ -257,6 +257,14 @@ static void check_air(void) {
     }
 }
 
+/* The version for points does not read what A has for moments: it is not a number here. */
+static void fill_moments(int rows) {
+    for (int i = 0; i < ROBOTS * rows * rows; i++) {
+        const int moment = i / rows % rows % 6 >= 3 || i % rows % 6 >= 3;
+        arrays.inverse_inertia[i] = moment ? NAN : arrays.inverse_inertia[i];
+    }
+}
+
 /* ---- tests ---- */
 
 /* A walk of all robots; both sides move on with the kits. */
@@ -286,6 +294,7 @@ static void walk_on(const Walk *walk, int device) {
         over = arrays;
         memcpy(arrays.velocity, other.velocity, sizeof arrays.velocity);
         memcpy(arrays.free_velocity, other.free_velocity, sizeof arrays.free_velocity);
+        fill_moments(6 * walk->feet);
         side_step(&alone, &arrays, 1, 0);
         const size_t bytes = ROBOTS * 6 * (size_t)walk->feet * sizeof(float);
         assert_memory_equal(over.velocity, arrays.wrench, bytes);
@@ -302,9 +311,9 @@ static void walk_on(const Walk *walk, int device) {
     if (!walk->limit) {
         check_errors(walk->name, "the ground", &ground, 2e-5, 3e-2);
     }
-    check_errors(walk->name, "all rows", &rows, 1e-6, 1e-2);
+    check_errors(walk->name, "all rows", &rows, 5e-6, 1e-2);
     print_message("%d Newton steps in the place of %d\n", steps, other_steps);
-    assert_true(steps > 0 && abs(steps - other_steps) <= 2 + other_steps / 500);
+    assert_true(steps > 0 && abs(steps - other_steps) <= 2 + other_steps / 100);
     side_close(&alone);
     side_close(&all);
     for (int r = 0; r < ROBOTS; r++) {
