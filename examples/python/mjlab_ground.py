@@ -25,7 +25,7 @@ class SoftGround:
         geoms = [[g for g in range(model.ngeom) if model.geom_bodyid[g] == b and "_foot" in model.geom(g).name] for b in body]
         self.radius = float(model.geom_size[geoms[0][0], 0])
         self.soles = [sole_of(model, g, self.radius, self.round) for g in geoms]
-        self.batch = mild.Batch(n, self.soles, model.opt.timestep, device=str(env.device))
+        self.batch = mild.Batch(n, self.soles, model.opt.timestep, device=str(env.device), points=self.round)
         self.batch.set_materials(grounds)
         self.material = (torch.arange(n, device=env.device) % len(grounds)).int()
         feet, dofs, rows, self.size = len(body), model.nv, 6 * len(body), 3 if self.round else 6

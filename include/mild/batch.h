@@ -48,6 +48,9 @@ typedef struct {
     double tolerance;             /* [-] of the residual, below 1; 0: 1e-4 */
     int max_iterations;           /* bound of Newton steps; 0: 20 */
     int device;                   /* a CUDA device, from 0, or MILD_BATCH_HOST */
+    /* bool: no foot transmits a moment, as a ball does: rows and columns of moments in every
+     * inverse_inertia are 0. The results are the same without, but take longer. */
+    int points;
 } MildBatchDef;
 
 /* What the engine knows before the step. Arrays in the memory of the device. */

@@ -47,10 +47,10 @@ static int device_of(const std::string &name) {
 }
 
 static void make(Batch *at, int robots, const nb::sequence &soles, double dt, double tolerance,
-                 int max_iterations, const std::string &device) {
+                 int max_iterations, const std::string &device, bool points) {
     const std::vector<const MildSole *> made = soles_of(soles);
-    const MildBatchDef def = {robots,    (int)made.size(), made.data(),      dt,
-                              tolerance, max_iterations,   device_of(device)};
+    const MildBatchDef def = {robots,    (int)made.size(), made.data(),       dt,
+                              tolerance, max_iterations,   device_of(device), points};
     MildError error = {};
     MildBatch *batch = mild_batch_create(&def, &error);
     check(batch ? MILD_OK : error.status, error);
@@ -210,11 +210,13 @@ void bind_batch(nb::module_ &module) {
         module, "Batch",
         "Ground under many robots at once, in float (include/mild/batch.h).\n\n"
         "robots; soles: a list of 1 .. 4 Sole, of each robot; dt [s]; tolerance [-] and "
-        "max_iterations\nof Newton's method, 0: the defaults; device: cpu, cuda or cuda:N. Raises "
-        "ValueError for a\nnumber out of range, for a sole with too many elements, and without the "
-        "device.")
+        "max_iterations\nof Newton's method, 0: the defaults; device: cpu, cuda or cuda:N; points: "
+        "no foot transmits a\nmoment, so that the rows and columns of moments of every "
+        "inverse_inertia are 0 (faster). Raises\nValueError for a number out of range, for a sole "
+        "with too many elements, and without the device.")
         .def("__init__", make, nb::arg("robots"), nb::arg("soles"), nb::arg("dt"), nb::kw_only(),
-             nb::arg("tolerance") = 0.0, nb::arg("max_iterations") = 0, nb::arg("device") = "cpu")
+             nb::arg("tolerance") = 0.0, nb::arg("max_iterations") = 0, nb::arg("device") = "cpu",
+             nb::arg("points") = false)
         .def("set_materials", set_materials, nb::arg("materials"),
              "The table that `material` of step points into: Material or presets. Waits for the "
              "device.")

@@ -96,6 +96,7 @@ static void shape_def(MildBatch *batch, const MildBatchDef *def) {
     batch->device = def->device;
     shape->robots = def->robots;
     shape->feet = def->feet;
+    shape->points = def->points;
     shape->dt = (float)def->dt;
     shape->tolerance = (float)(def->tolerance > 0.0 ? def->tolerance : BATCH_TOLERANCE);
     shape->limit = def->max_iterations > 0 ? def->max_iterations : BATCH_LIMIT;

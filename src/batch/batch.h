@@ -18,6 +18,7 @@ typedef struct {
     int limit;
     int materials;               /* in the table; behind them one that is not a number */
     int map;                     /* bool: on BatchArrays.map, not on level ground */
+    int points;                  /* bool: as MildBatchDef.points */
     int elements[MILD_FEET_MAX]; /* of a sole */
     float z[MILD_FEET_MAX];      /* [m] of its plane */
     float area[MILD_FEET_MAX];   /* [m^2] of an element */

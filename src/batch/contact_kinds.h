@@ -9,6 +9,7 @@
     KIND(1, 1)                                                                                     \
     KIND(1, 3) KIND(1, 8) KIND(2, 1) KIND(2, 5) KIND(2, 8) KIND(4, 1) KIND(4, 4) KIND(4, 8)
 
+#define CONTACT_POINTS 0
 #define CONTACT_CURVES LAW_ALL
 #define CONTACT_FEET 1
 #define CONTACT_PER 1
@@ -46,14 +47,30 @@
 #define CONTACT_PER 8
 #define CONTACT(name) contact_##name##_4_8
 #include "batch/contact.inc"
+#undef CONTACT_POINTS
+
+/* For feet that transmit no moment, in the shape that those of quadrupeds have. */
+#define CONTACT_POINT_KINDS(KIND) KIND(4, 1)
+
+#define CONTACT_POINTS 1
+#define CONTACT_FEET 4
+#define CONTACT_PER 1
+#define CONTACT(name) contact_##name##_4_1_points
+#include "batch/contact.inc"
 #undef CONTACT_CURVES
 
-/* On a GPU also for ground that is all cones and lines: half the text, and fewer registers. Not for
- * one element a lane, where there is little to gain. */
+/* On a GPU also for ground that is all cones and lines: half the text, and fewer registers. Of one
+ * element a lane only for points; there is little to gain otherwise. */
 #ifdef __CUDACC__
 #define CONTACT_CONE_KINDS(KIND) KIND(1, 3) KIND(1, 8) KIND(2, 5) KIND(2, 8) KIND(4, 4) KIND(4, 8)
 
 #define CONTACT_CURVES LAW_CONE
+#define CONTACT_FEET 4
+#define CONTACT_PER 1
+#define CONTACT(name) contact_##name##_4_1_points_cone
+#include "batch/contact.inc"
+#undef CONTACT_POINTS
+#define CONTACT_POINTS 0
 #define CONTACT_FEET 1
 #define CONTACT_PER 3
 #define CONTACT(name) contact_##name##_1_3_cone
@@ -94,5 +111,6 @@
 #include "batch/contact.inc"
 #undef CONTACT_CURVES
 #endif
+#undef CONTACT_POINTS
 
 #endif

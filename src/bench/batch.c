@@ -82,7 +82,8 @@ static MildBatch *open_batch(const BatchBench *bench, int robots, MildError *err
                               .feet = robot_feet(bench->robot),
                               .soles = robot_soles(bench->robot),
                               .dt = bench->dt,
-                              .device = bench->device};
+                              .device = bench->device,
+                              .points = robot_points(bench->robot)};
     return mild_batch_create(&def, error);
 }
 

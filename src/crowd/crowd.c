@@ -64,7 +64,8 @@ static MildStatus open_ground(Crowd *crowd, const CrowdDef *def, const TaskGroun
                                 .dt = def->task->physics_dt,
                                 .tolerance = def->task->contact_tolerance,
                                 .max_iterations = def->task->contact_iterations,
-                                .device = def->device};
+                                .device = def->device,
+                                .points = robot_points(def->robot)};
     MildMaterial *materials = malloc((size_t)grounds->count * sizeof *materials);
     if (!materials) {
         return mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d grounds", grounds->count);

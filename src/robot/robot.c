@@ -405,6 +405,14 @@ int robot_feet(const Robot *robot) {
     return robot->def.feet;
 }
 
+int robot_points(const Robot *robot) {
+    int points = 1;
+    for (int f = 0; f < robot->def.feet; f++) {
+        points = points && robot->limb[f].round;
+    }
+    return points;
+}
+
 const char *robot_joint_name(const Robot *robot, int joint) {
     return robot->def.joint[joint];
 }

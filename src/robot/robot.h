@@ -31,6 +31,7 @@ const char *robot_source(const Robot *robot);     /* whose numbers, which licenc
 const char *robot_model_path(const Robot *robot); /* MJCF */
 int robot_joints(const Robot *robot);
 int robot_feet(const Robot *robot);
+int robot_points(const Robot *robot); /* bool: no foot transmits a moment to soft ground */
 const char *robot_joint_name(const Robot *robot, int joint);
 const char *robot_foot_name(const Robot *robot, int foot);
 double robot_total_mass(const Robot *robot);     /* [kg] */

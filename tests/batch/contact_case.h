@@ -14,6 +14,7 @@ typedef struct {
 
 typedef struct {
     int feet, groups, per;
+    int points; /* bool: by the version for feet that transmit no moment */
     int elements[CASE_FEET];
     double x[CASE_FEET][CASE_ELEMENTS], y[CASE_FEET][CASE_ELEMENTS], z[CASE_FEET];
     double area[CASE_FEET];

@@ -6,6 +6,7 @@
 #include "ground/map_kit.h"
 #include "ground/models.h"
 #include "ground/scratch.h"
+#include "points_kit.h"
 
 static MildSole *left, *right, *centers[2], *plate, *small_plate;
 
@@ -190,6 +191,7 @@ static void compare(Worst *worst, const ContactCase *c, Kit *kit) {
 static void run_with_rows(Worst *worst, const ContactCase *c, void (*run)(ContactCase *)) {
     static ContactCase rows;
     rows = *c;
+    rows.points = 0;
     rows.per = c->groups == 4 ? 4 : c->groups == 2 ? 5 : 3;
     run(&rows);
     worst->iterations_rows += rows.iterations;
@@ -253,22 +255,11 @@ static void as_float(double *x, int count) {
     }
 }
 
-/* Feet that transmit no moment: nothing changes how they turn. A force on one moves the others. */
-static void make_points(Kit *kit, uint64_t *random) {
-    const int n = 6 * kit->feet;
-    double together[6 * MILD_FEET_MAX];
-    for (int i = 0; i < n; i++) {
-        together[i] = i % 6 < 3 ? kit_uniform(random, -0.2, 0.2) : 0; /* [kg^-1/2] */
-    }
-    for (int i = 0; i < n * n; i++) {
-        const int row = i / n, column = i % n;
-        double *at = &kit->input.inverse_inertia[i];
-        *at = row % 6 < 3 && column % 6 < 3 ? *at + together[row] * together[column] : 0;
-    }
-}
+/* Feet transmit moments; none does, in the version for all feet; in that for such feet alone. */
+enum { MOMENTS, POINTS, POINTS_ALONE };
 
-/* A foot that is pressed, slides and turns on random material for a while. points: bool, it
- * transmits no moment. exact: bool, at places that a float can tell. */
+/* A foot that is pressed, slides and turns on random material for a while. points: one of the
+ * above. exact: bool, at places that a float can tell. */
 static void walk(Kit *kit, uint64_t *random, int steps, double tolerance, int groups, int per,
                  int points, int exact, void (*run)(ContactCase *), Worst *worst) {
     static ContactCase c;
@@ -286,9 +277,10 @@ static void walk(Kit *kit, uint64_t *random, int steps, double tolerance, int gr
         kit_inverse_inertia(kit);
         kit_free(kit, (const double(*)[3])force);
         if (points) {
-            make_points(kit, random);
+            kit_points(kit, random);
         }
         case_of(&c, kit, groups, per, tolerance);
+        c.points = points == POINTS_ALONE;
         kit_solve(kit);
         if (points) {
             run_with_rows(worst, &c, run);
@@ -313,30 +305,34 @@ typedef struct {
     const char *name;
     int feet, groups, per;
     MildModel model;
-    int points; /* bool: the feet transmit no moment */
+    int points; /* MOMENTS, POINTS or POINTS_ALONE */
 } Shape;
 
 static const Shape shapes[] = {
-    {"two feet of 77", 2, 2, 5, MILD_MODEL_MILD, 0},
-    {"one foot of 77", 1, 1, 3, MILD_MODEL_MILD, 0},
-    {"one foot of 77, few lanes", 1, 2, 5, MILD_MODEL_MILD, 0},
-    {"four plates of 20", 4, 4, 4, MILD_MODEL_MILD, 0},
-    {"three plates of 20", 3, 4, 4, MILD_MODEL_MILD, 0},
-    {"two feet, spare lanes", 2, 2, 8, MILD_MODEL_MILD, 0},
-    {"four points", 4, 4, 1, MILD_MODEL_MILD, 1},
-    {"three points", 3, 4, 1, MILD_MODEL_MILD, 1},
-    {"two points", 2, 2, 1, MILD_MODEL_MILD, 1},
-    {"one point", 1, 1, 1, MILD_MODEL_MILD, 1},
-    {"four points, bekker", 4, 4, 1, MILD_MODEL_BEKKER, 1},
-    {"four small plates", 4, 4, 1, MILD_MODEL_MILD, 0},
-    {"con_cone", 2, 2, 1, MILD_MODEL_CON_CONE, 0},
-    {"con_spring", 2, 2, 1, MILD_MODEL_CON_SPRING, 0},
-    {"ecc_spring", 2, 2, 5, MILD_MODEL_ECC_SPRING, 0},
-    {"ecc_quasi", 2, 2, 5, MILD_MODEL_ECC_QUASI, 0},
-    {"ecc_quasi_3d", 2, 2, 5, MILD_MODEL_ECC_QUASI_3D, 0},
-    {"ecc_quasi_3d, four plates", 4, 4, 4, MILD_MODEL_ECC_QUASI_3D, 0},
-    {"bekker", 2, 2, 5, MILD_MODEL_BEKKER, 0},
-    {"hunt_crossley", 2, 2, 5, MILD_MODEL_HUNT_CROSSLEY, 0},
+    {"two feet of 77", 2, 2, 5, MILD_MODEL_MILD, MOMENTS},
+    {"one foot of 77", 1, 1, 3, MILD_MODEL_MILD, MOMENTS},
+    {"one foot of 77, few lanes", 1, 2, 5, MILD_MODEL_MILD, MOMENTS},
+    {"four plates of 20", 4, 4, 4, MILD_MODEL_MILD, MOMENTS},
+    {"three plates of 20", 3, 4, 4, MILD_MODEL_MILD, MOMENTS},
+    {"two feet, spare lanes", 2, 2, 8, MILD_MODEL_MILD, MOMENTS},
+    {"four points", 4, 4, 1, MILD_MODEL_MILD, POINTS},
+    {"three points", 3, 4, 1, MILD_MODEL_MILD, POINTS},
+    {"two points", 2, 2, 1, MILD_MODEL_MILD, POINTS},
+    {"one point", 1, 1, 1, MILD_MODEL_MILD, POINTS},
+    {"four points, bekker", 4, 4, 1, MILD_MODEL_BEKKER, POINTS},
+    {"four points alone", 4, 4, 1, MILD_MODEL_MILD, POINTS_ALONE},
+    {"three points alone", 3, 4, 1, MILD_MODEL_MILD, POINTS_ALONE},
+    {"four points alone, bekker", 4, 4, 1, MILD_MODEL_BEKKER, POINTS_ALONE},
+    {"four points alone, ecc_quasi_3d", 4, 4, 1, MILD_MODEL_ECC_QUASI_3D, POINTS_ALONE},
+    {"four small plates", 4, 4, 1, MILD_MODEL_MILD, MOMENTS},
+    {"con_cone", 2, 2, 1, MILD_MODEL_CON_CONE, MOMENTS},
+    {"con_spring", 2, 2, 1, MILD_MODEL_CON_SPRING, MOMENTS},
+    {"ecc_spring", 2, 2, 5, MILD_MODEL_ECC_SPRING, MOMENTS},
+    {"ecc_quasi", 2, 2, 5, MILD_MODEL_ECC_QUASI, MOMENTS},
+    {"ecc_quasi_3d", 2, 2, 5, MILD_MODEL_ECC_QUASI_3D, MOMENTS},
+    {"ecc_quasi_3d, four plates", 4, 4, 4, MILD_MODEL_ECC_QUASI_3D, MOMENTS},
+    {"bekker", 2, 2, 5, MILD_MODEL_BEKKER, MOMENTS},
+    {"hunt_crossley", 2, 2, 5, MILD_MODEL_HUNT_CROSSLEY, MOMENTS},
 };
 enum { SHAPES = sizeof shapes / sizeof *shapes };
 
@@ -426,38 +422,47 @@ typedef struct {
     double far;      /* [m] of the feet from the origin */
     int exact;       /* bool: they are where a float can tell */
     MildModel other; /* of the material of label 1 */
+    int points;      /* as in Shape */
 } Relief;
 
 static const Relief reliefs[] = {
-    {"slope", 2, 2, 5, MILD_MAP_SLOPE, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
-    {"steps", 2, 2, 5, MILD_MAP_STEPS, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
-    {"waves", 1, 1, 3, MILD_MAP_WAVES, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
-    {"rough", 4, 4, 4, MILD_MAP_ROUGH, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
-    {"image", 3, 4, 4, MILD_MAP_IMAGE, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
-    {"mixed", 2, 2, 5, MILD_MAP_MIXED, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD},
-    {"level, stripes", 2, 2, 8, MILD_MAP_FLAT, MILD_PATTERN_STRIPES, 0, 1, MILD_MODEL_MILD},
-    {"rough, checker", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_MILD},
-    {"image, image", 2, 2, 5, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 0, 1, MILD_MODEL_MILD},
+    {"slope", 2, 2, 5, MILD_MAP_SLOPE, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
+    {"steps", 2, 2, 5, MILD_MAP_STEPS, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
+    {"waves", 1, 1, 3, MILD_MAP_WAVES, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
+    {"rough", 4, 4, 4, MILD_MAP_ROUGH, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
+    {"image", 3, 4, 4, MILD_MAP_IMAGE, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
+    {"mixed", 2, 2, 5, MILD_MAP_MIXED, MILD_PATTERN_NONE, 0, 1, MILD_MODEL_MILD, MOMENTS},
+    {"level, stripes", 2, 2, 8, MILD_MAP_FLAT, MILD_PATTERN_STRIPES, 0, 1, MILD_MODEL_MILD,
+     MOMENTS},
+    {"rough, checker", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_MILD,
+     MOMENTS},
+    {"image, image", 2, 2, 5, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 0, 1, MILD_MODEL_MILD, MOMENTS},
     {"waves, springs too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_ECC_SPRING},
+     MILD_MODEL_ECC_SPRING, MOMENTS},
     {"waves, ecc_quasi too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_ECC_QUASI},
+     MILD_MODEL_ECC_QUASI, MOMENTS},
     {"rough, ecc_quasi_3d too", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_ECC_QUASI_3D},
-    {"waves, bekker too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_BEKKER},
+     MILD_MODEL_ECC_QUASI_3D, MOMENTS},
+    {"waves, bekker too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_BEKKER,
+     MOMENTS},
     {"waves, hunt_crossley too", 2, 2, 5, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
-     MILD_MODEL_HUNT_CROSSLEY},
-    {"slope, 50 m away", 2, 2, 5, MILD_MAP_SLOPE, MILD_PATTERN_STRIPES, 50, 1, MILD_MODEL_MILD},
-    {"rough, 50 m away", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 50, 1, MILD_MODEL_MILD},
-    {"image, 50 m away", 2, 2, 5, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 50, 1, MILD_MODEL_MILD},
-    {"rough, 50 m, anywhere", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_NONE, 50, 0, MILD_MODEL_MILD},
-    {"rough, four points", 4, 4, 1, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_MILD},
+     MILD_MODEL_HUNT_CROSSLEY, MOMENTS},
+    {"slope, 50 m away", 2, 2, 5, MILD_MAP_SLOPE, MILD_PATTERN_STRIPES, 50, 1, MILD_MODEL_MILD,
+     MOMENTS},
+    {"rough, 50 m away", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 50, 1, MILD_MODEL_MILD,
+     MOMENTS},
+    {"image, 50 m away", 2, 2, 5, MILD_MAP_IMAGE, MILD_PATTERN_IMAGE, 50, 1, MILD_MODEL_MILD,
+     MOMENTS},
+    {"rough, 50 m, anywhere", 2, 2, 5, MILD_MAP_ROUGH, MILD_PATTERN_NONE, 50, 0, MILD_MODEL_MILD,
+     MOMENTS},
+    {"rough, four points", 4, 4, 1, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1, MILD_MODEL_MILD,
+     POINTS},
+    {"rough, four points alone", 4, 4, 1, MILD_MAP_ROUGH, MILD_PATTERN_CHECKER, 0, 1,
+     MILD_MODEL_MILD, POINTS_ALONE},
+    {"waves, four points alone, bekker too", 4, 4, 1, MILD_MAP_WAVES, MILD_PATTERN_CHECKER, 0, 1,
+     MILD_MODEL_BEKKER, POINTS_ALONE},
 };
 enum { RELIEFS = sizeof reliefs / sizeof *reliefs };
-
-static int is_points(const Relief *relief) {
-    return relief->per == 1;
-}
 
 enum { IMAGE = 24 };
 
@@ -528,7 +533,7 @@ static void run_relief(const Relief *relief, int walks, double tolerance,
                        void (*run)(ContactCase *), Worst *worst) {
     static const double steps[3] = {1e-3, 2.5e-3, 5e-3};
     uint64_t random = 12;
-    MildSole *const many = is_points(relief) ? small_plate : plate;
+    MildSole *const many = relief->points ? small_plate : plate;
     MildSole *const soles[2] = {relief->feet > 2 ? many : left, relief->feet > 2 ? many : right};
     for (int w = 0; w < walks; w++) {
         Kit kit;
@@ -544,7 +549,7 @@ static void run_relief(const Relief *relief, int walks, double tolerance,
         kit.input.tolerance = 1e-11;
         kit_random_state(&kit, &random);
         stand_above(&kit, relief, &random);
-        walk(&kit, &random, WALK_STEPS, tolerance, relief->groups, relief->per, is_points(relief),
+        walk(&kit, &random, WALK_STEPS, tolerance, relief->groups, relief->per, relief->points,
              relief->exact, run, worst);
         kit_close(&kit);
         mild_map_destroy(map);
@@ -560,8 +565,7 @@ static void double_text_is_the_ground_on_maps(void **state) {
         worst_print(reliefs[i].name, &worst);
         assert_true(worst.wrench < 1e-10 && worst.twist < 1e-10 && worst.foot < 1e-10);
         assert_true(worst.element < 1e-6 && worst.memory < 1e-7);
-        assert_true(worst.unsolved < worst.steps / 20 &&
-                    same_steps(is_points(&reliefs[i]), &worst));
+        assert_true(worst.unsolved < worst.steps / 20 && same_steps(reliefs[i].points, &worst));
     }
 }
 

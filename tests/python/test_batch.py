@@ -58,6 +58,18 @@ class Batch(unittest.TestCase):
             self.assertTrue((arrays.outputs["residual"] >= 0).all() and arrays.outputs["residual"].max() < 1e-3)
             self.assertGreater(np.abs(arrays.outputs["wrench"]).max(), 10)
 
+    def test_points(self):
+        """Feet that transmit no moment: what A has for moments does not count, and is not read."""
+        soles, moment = [mild.Sole.plate(0.07, 0.04)] * 4, np.arange(24) % 6 >= 3
+        arrays = Arrays(mild.Batch(6, soles, 0.002), self.rng)
+        wrench, A = [], arrays.inputs["inverse_inertia"]
+        for points, value in (False, 0), (True, np.nan):
+            A[:, moment] = A[:, :, moment] = value
+            mild.Batch(6, soles, 0.002, points=points).step(**arrays.all())
+            wrench.append(arrays.outputs["wrench"].copy())
+        self.assertGreater(np.abs(wrench[0]).max(), 10)
+        np.testing.assert_allclose(wrench[1], wrench[0], rtol=1e-4, atol=1e-4 * np.abs(wrench[0]).max())
+
     def test_load_and_store(self):
         """A robot goes on where a ground of the CPU is, and back."""
         self.batch.set_materials(["sand_loose"])

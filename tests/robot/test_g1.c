@@ -301,6 +301,7 @@ static void the_pose_by_hand(void **unused) {
     const double y = 0.064452 + 0.052 + 0.0021489 - 9.4445e-5;
     assert_int_equal(robot_joints(robot), JOINTS);
     assert_int_equal(robot_feet(robot), FEET);
+    assert_int_equal(robot_points(robot), 0);
     expect_near("height", robot_stand_height(robot), drop, 1e-6);
     RobotSim *sim = new_sim(0.001);
     RobotState state = stand_state(stand, 0, 0.0);

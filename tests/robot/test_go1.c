@@ -32,6 +32,7 @@ static void the_pose_by_hand(void **unused) {
     const double side[FEET] = {1, -1, 1, -1}, front[FEET] = {1, 1, -1, -1};
     assert_int_equal(robot_joints(robot), JOINTS);
     assert_int_equal(robot_feet(robot), FEET);
+    assert_int_equal(robot_points(robot), 1);
     expect_near("mass", robot_total_mass(robot), MASS, 1e-9);
     expect_near("load of a foot", robot_foot_load(robot), WEIGHT / FEET, 1e-6);
     expect_near("height", robot_stand_height(robot), height, 1e-9);
