@@ -13,20 +13,19 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVR
 from threadpoolctl import threadpool_limits
 
-PERIOD = 0.8   # [s] of the gait
 START = 2.0    # [s] of a trial that are left out
 MOMENTS = 2100  # decisions in an embedding
 PHASES = 8
 
 
 def read(paths):
-    """Columns of CSVs of --latent or --actions, one after the other: {name: array}."""
+    """Columns of CSVs of --latent or --actions, one after the other: {name: array}; file: which of them."""
     rows = []
-    for path in paths:
+    for place, path in enumerate(paths):
         with open(path, newline="", encoding="utf-8") as file:
             reader = csv.reader(file)
-            names = next(reader)
-            rows += [row for row in reader if float(row[3]) >= START]
+            names = [*next(reader), "file"]
+            rows += [[*row, place] for row in reader if float(row[3]) >= START]
     columns = list(zip(*rows))
     return {name: np.array(column) if name == "ground" else np.array(column, float) for name, column in zip(names, columns)}
 
@@ -35,16 +34,29 @@ def wide(data, prefix):
     return np.stack([column for name, column in data.items() if name.startswith(prefix)], axis=1)
 
 
+def clock(data):
+    """Number of the gait period that each row is in, and how many rows a whole one of its walk has."""
+    number, rows = np.zeros(len(data["phase"])), np.zeros(len(data["phase"]))
+    walks = np.unique(np.stack([data["file"], data["trial"], data["speed_m_s"]]), axis=1, return_inverse=True)[1].reshape(-1)
+    for walk in range(walks.max() + 1):
+        own = np.flatnonzero(walks == walk)
+        own = own[np.argsort(data["time_s"][own], kind="stable")]
+        number[own] = np.cumsum(np.diff(data["phase"][own], prepend=0) < 0)
+        rows[own] = 1 / np.median(np.diff(data["phase"][own]) % 1)
+    return number, rows
+
+
 def periods(data, values):
     """Means over one gait period: values, ground, speed, trial, time, of each."""
-    key = np.stack([data["trial"], data["speed_m_s"], np.floor((data["time_s"] - START) / PERIOD)], axis=1)
+    number, rows = clock(data)
+    key = np.stack([data["file"], data["trial"], data["speed_m_s"], number], axis=1)
     _, index, inverse = np.unique(np.column_stack([key, np.unique(data["ground"], return_inverse=True)[1]]), axis=0,
                                   return_index=True, return_inverse=True)
     inverse = inverse.reshape(-1)
     sums = np.zeros((len(index), values.shape[1]))
     np.add.at(sums, inverse, values)
     count = np.bincount(inverse)
-    whole = count > 0.9 * count.max()  # the last of a trial, or one across a border, is a piece
+    whole = count > 0.9 * rows[index]  # the first and the last of a trial, or one across a border, is a piece
     index, means = index[whole], (sums / count[:, None])[whole]
     return means, data["ground"][index], data["speed_m_s"][index], data["trial"][index], data["time_s"][index]
 

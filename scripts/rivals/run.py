@@ -11,7 +11,8 @@ CONFIG = ROOT / "configs" / "walk.ini"  # our task: commands, rewards, randomisa
 # The stages of scripts/train_walk.sh, whose rewards the rivals get too.
 GAIT = {
     "terrain__kind": "flat", "task__wz": [-1, 1], "randomize__push_linear": 0.3, "randomize__push_angular": 0.3,
-    "reward__linear_velocity": 5, "reward__yaw_rate": 1.5, "reward__reference_motion": 2.2, "reward__torque": -1e-10}
+    "reward__linear_velocity": 5, "reward__yaw_rate": 1.5, "reward__reference_motion": 2.2, "reward__torque": -1e-10,
+    "reward__power": 0}
 RIGID = {"randomize__model": "rigid", "train__grounds": 16}
 
 

@@ -34,7 +34,9 @@ FAULTS = [
     ("0] * 2)", "0.1] * 2)", "observation"),
     ("self.last, clock", "0 * self.last, clock", "observation"),
     ("np.sin(turn), np.cos(turn)", "np.cos(turn), np.sin(turn)", "observation"),
-    ("0.01 / self.period", "0.02 / self.period", "observation"),
+    ("0.01 / (self.period", "0.02 / (self.period", "observation"),
+    ("self.slowing * slow", "0 * slow", "observation"),  # the clock of a fast command
+    ("[0.5, 1.5, 1]", "[1, 3, 1]", "observation"),  # the frame's command for the command
     ("< 0.1)", "< 1)", "observation"),
     ("1]), gravity,", "1]), -gravity,", "observation"),
 ]
@@ -61,7 +63,7 @@ def check_shapes():
     """The table of tensors on the page."""
     names = {}
     exec(compile(text, "policy.py", "exec"), names)
-    tensors = names["read"](policy)
+    tensors, _ = names["read"](policy)
     for net in "encoder", "modulation", "actor":
         weights = [name for name in tensors if name.startswith(net) and name.endswith("weight")]
         places = f"`{net}.0 " + " ".join("." + name.split(".")[1] for name in weights[1:]) + "`"
