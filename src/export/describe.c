@@ -75,9 +75,9 @@ static void add_rules(Description *d, const Export *export) {
     add(d, "gait_slow_below", "%.9g", task->gait_slow_below);
     add(d, "standing_below", "%.9g", task->standing_below);
     add(d, "clock_rule",
-        "sin, cos of 2 pi phase, which grows by policy_period / period a step, period = gait_period "
-        "(1 + gait_slowing max(0, 1 - v / gait_slow_below)), v = |forward| + 3 |left| + |turning| of "
-        "the frame's command; 0, 0 when "
+        "sin, cos of 2 pi phase, which grows by policy_period / period a step, period = "
+        "gait_period (1 + gait_slowing max(0, 1 - v / gait_slow_below)), v = |forward| + 3 |left| "
+        "+ |turning| of the frame's command; 0, 0 when "
         "clock is 0 or all parts of the command are below standing_below");
     add(d, "estimate_rule",
         "base velocity times %g, velocity of each foot [m/s], in the base's axes; height of each "

@@ -9,7 +9,8 @@ TASK_FN int task_is_standing(const TaskDef *def, const TaskReal command[3]) {
     return fabs(command[0]) < below && fabs(command[1]) < below && fabs(command[2]) < below;
 }
 
-/* T = gait_period (1 + gait_slowing max(0, 1 - v / gait_slow_below)),  v = |v_x| + 3 |v_y| + 1 m |w_z|
+/* T = gait_period (1 + gait_slowing max(0, 1 - v / gait_slow_below)),
+ * v = |v_x| + 3 |v_y| + 1 m |w_z|
  *
  * A slow walk at the period of a fast one takes many short steps, each of which pays for a lifted
  * leg and, on soft ground, for an imprint: with 1.0 s in the place of 0.8 s, 0.3 m/s in loose sand
