@@ -226,7 +226,8 @@ int main(int argc, char **argv) {
     }
     Robot *robot = robot_create(argv[1], &error);
     Policy *policy = robot ? policy_load(argv[2], NULL, 0, &error) : NULL;
-    const int ready = policy && experiment_task(&task, 0, unused, argv[3], NULL, &error) == MILD_OK;
+    const int ready =
+        policy && experiment_task(&task, 0, unused, argv[3], argv[2], &error) == MILD_OK;
     const int code = ready ? pack(robot, policy, &task, argv[4], &error) : stop(error.text);
     policy_destroy(policy);
     robot_destroy(robot);

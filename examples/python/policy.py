@@ -11,17 +11,17 @@ def read(path):
     raw = open(path, "rb").read()
     end = 8 + int.from_bytes(raw[:8], "little")
     header = json.loads(raw[8:end])
-    task = header.pop("__metadata__")["task"]
+    task = header.pop("__metadata__").get("task")
     return {k: np.frombuffer(raw[end + v["data_offsets"][0] : end + v["data_offsets"][1]],
                              {"F32": "<f4", "F16": "<f2"}[v["dtype"]]).astype(np.float32)
-            .reshape(v["shape"]) for k, v in header.items()}, dict(key.split(" = ") for key in task.split("; "))
+            .reshape(v["shape"]) for k, v in header.items()}, dict(key.split(" = ") for key in task.split("; ")) if task else {}
 
 
 class Policy:
     def __init__(self, path, pose=POSE):
         (self.tensors, task), self.pose = read(path), pose
-        self.stride, self.clip = int(task["history_stride"]), float(task["action_clip"])
-        self.period, self.slowing = float(task["gait_period"]), float(task.get("gait_slowing", 0))
+        self.stride, self.clip = int(task.get("history_stride", 8)), float(task.get("action_clip", 8))
+        self.period, self.slowing = float(task.get("gait_period", 0.8)), float(task.get("gait_slowing", 0))
         self.slow_below = float(task.get("gait_slow_below", 1.2))
         self.frames = None  # the last 5 * stride frames, oldest first; none before the first
         self.phase, self.last = 0.0, np.zeros(12)

@@ -49,7 +49,8 @@ typedef struct {
     int max_iterations;           /* bound of Newton steps; 0: 20 */
     int device;                   /* a CUDA device, from 0, or MILD_BATCH_HOST */
     /* bool: no foot transmits a moment, as a ball does: rows and columns of moments in every
-     * inverse_inertia are 0. The results are the same without, but take longer. */
+     * inverse_inertia are 0. On three or four feet of up to eight elements they are then not read,
+     * and a step is faster; otherwise the flag changes nothing. */
     int points;
 } MildBatchDef;
 

@@ -12,6 +12,7 @@
 #include "app/report.h"
 #include "app/robots.h"
 #include "base/file.h"
+#include "config/experiment_keys.h"
 #include "eval/motor_log.h"
 
 /* actuator.png is drawn from actuator_held.csv, because actuator.csv may be the log. */
@@ -209,11 +210,13 @@ static MildStatus run_log(LogCommand *c, MildError *error) {
     if (!robot) {
         return error->status;
     }
-    const double pushes = c->task.randomize.push_interval;
-    task_def_make_nominal(&c->task);
-    c->task.randomize.push_interval = pushes;
+    char named[TRAIN_ROBOT_SIZE];
+    MildStatus status = experiment_task(&c->task, 0, named, NULL, c->policy, error);
+    c->task.randomize.push_interval = task_def_default().randomize.push_interval;
     const ControllerDef def = {c->policy, &c->task, robot, NULL, 1};
-    MildStatus status = controller_make(c->controller, &def, &c->walker, error);
+    if (status == MILD_OK) {
+        status = controller_make(c->controller, &def, &c->walker, error);
+    }
     if (status == MILD_OK) {
         status = write_log(c, robot, error);
     }
@@ -224,11 +227,9 @@ static MildStatus run_log(LogCommand *c, MildError *error) {
 
 static int cmd_log_actuator(int argc, char **argv) {
     char shipped[PATH_SIZE], controller_help[ROBOTS_CONTROLLER_HELP];
-    LogCommand c = {.policy = path_data("policies/mild.safetensors", shipped),
-                    .controller = "learned",
+    LogCommand c = {.controller = "learned",
                     .motor = motor_def_default(),
-                    .log = {.seconds = 60, .shake = 0.1, .seed = 1},
-                    .task = task_def_default()};
+                    .log = {.seconds = 60, .shake = 0.1, .seed = 1}};
     const CliOption options[] = {
         {"out", CLI_OUTPUT, &c.out, 0, 0, "LOG.csv",
          "where the log is written; - for standard "
@@ -237,7 +238,7 @@ static int cmd_log_actuator(int argc, char **argv) {
         {"controller", CLI_TEXT, &c.controller, 0, 0, "NAME",
          robots_controller_help(controller_help, sizeof controller_help)},
         {"policy", CLI_INPUT, &c.policy, 0, 0, "FILE",
-         "policy that walks (default policies/mild.safetensors)"},
+         "policy that walks (default policies/mild.safetensors, or that of --robot)"},
         {"seconds", CLI_NUMBER, &c.log.seconds, 0.1, 3600, "T", "[s] of the log (default 60)"},
         {"shake", CLI_NUMBER, &c.log.shake, 0, 1, "A",
          "[rad] greatest amplitude of the sines of 0.5 to 8 Hz that are added to the targets "
@@ -272,6 +273,7 @@ static int cmd_log_actuator(int argc, char **argv) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
     MildError error = {0};
+    c.policy = c.policy ? c.policy : robot_policy(c.robot, shipped);
     return run_log(&c, &error) == MILD_OK ? 0 : cli_fail("actuator log", &error);
 }
 

@@ -304,14 +304,13 @@ int cmd_drive(int argc, char **argv) {
     static Drive d;
     static CliArgs args;
     char shipped[PATH_SIZE], model_help[320];
-    d.policy = path_data("policies/mild.safetensors", shipped);
     d.terrain = terrain_def_default();
     d.runner = (RunnerDef){
         .late = 0.02, .damp_after = 0.1, .speed_limit = 30, .angle_limit = 0.2, .torque_share = 1};
     d.simulated = (SimulatedDef){.patience = 30, .seed = 1};
     const CliOption options[] = {
         {"policy", CLI_INPUT, &d.policy, 0, 0, "FILE",
-         "policy to run (default policies/mild.safetensors)"},
+         "policy to run (default policies/mild.safetensors, or that of --robot)"},
         {"robot", CLI_TEXT, &d.robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
         {"config", CLI_INPUT, &d.config, 0, 0, "FILE",
@@ -383,5 +382,6 @@ int cmd_drive(int argc, char **argv) {
         return bad;
     }
     MildError error = {0};
+    d.policy = d.policy ? d.policy : robot_policy(d.robot, shipped);
     return run_drive(&d, &args, &error) == MILD_OK ? 0 : cli_fail("drive", &error);
 }

@@ -405,7 +405,6 @@ int cmd_eval(int argc, char **argv) {
         return cli_fail_text("eval", "out of memory");
     }
     char shipped[PATH_SIZE], model_help[320], controller_help[ROBOTS_CONTROLLER_HELP];
-    e->policy = path_data("policies/mild.safetensors", shipped);
     e->controller = "learned";
     e->eval = (EvalDef){.trials = 10, .seconds = 20, .seed = 1};
     e->patch = 2.5;
@@ -418,7 +417,7 @@ int cmd_eval(int argc, char **argv) {
     strcpy(e->grounds.name[2], "sand_loose");
     const CliOption options[] = {
         {"policy", CLI_INPUT, &e->policy, 0, 0, "FILE",
-         "policy to measure (default policies/mild.safetensors)"},
+         "policy to measure (default policies/mild.safetensors, or that of --robot)"},
         {"robot", CLI_TEXT, &e->robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
         {"controller", CLI_TEXT, &e->controller, 0, 0, "NAME",
@@ -494,6 +493,7 @@ int cmd_eval(int argc, char **argv) {
         .examples =
             "  mild eval --ground rigid,foam45,sand_loose --speed 0.3,0.6\n"
             "  mild eval --ground sand_loose --terrain.kind=rough --terrain.amplitude=0.02\n"
+            "  mild eval --robot go1\n"
             "  mild eval --robot go1 --controller stand --speed 0\n"
             "  mild eval --train.device=cuda --trials 1000\n",
     };
@@ -501,6 +501,7 @@ int cmd_eval(int argc, char **argv) {
     int code = outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     if (outcome == CLI_RUN) {
         MildError error = {0};
+        e->policy = e->policy ? e->policy : robot_policy(e->robot, shipped);
         code = run_eval(e, args, &error) == MILD_OK ? 0 : cli_fail("eval", &error);
     }
     free(e);

@@ -51,10 +51,10 @@ static MildStatus run_export(Exporting *e, const CliArgs *args, MildError *error
 
 int cmd_export(int argc, char **argv) {
     char shipped[PATH_SIZE];
-    Exporting e = {.policy = path_data("policies/mild.safetensors", shipped)};
+    Exporting e = {0};
     const CliOption options[] = {
         {"policy", CLI_INPUT, &e.policy, 0, 0, "FILE",
-         "policy to export (default policies/mild.safetensors)"},
+         "policy to export (default policies/mild.safetensors, or that of --robot)"},
         {"robot", CLI_TEXT, &e.robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
         {"config", CLI_INPUT, &e.config, 0, 0, "FILE",
@@ -98,5 +98,6 @@ int cmd_export(int argc, char **argv) {
         return bad;
     }
     MildError error = {0};
+    e.policy = e.policy ? e.policy : robot_policy(e.robot, shipped);
     return run_export(&e, &args, &error) == MILD_OK ? 0 : cli_fail("export", &error);
 }

@@ -308,10 +308,10 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
 }
 
 static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
-    char model_help[320], controller_help[ROBOTS_CONTROLLER_HELP];
+    char shipped[PATH_SIZE], model_help[320], controller_help[ROBOTS_CONTROLLER_HELP];
     const CliOption options[] = {
         {"policy", CLI_INPUT, &c->policy, 0, 0, "FILE",
-         "policy to watch (default policies/mild.safetensors)"},
+         "policy to watch (default policies/mild.safetensors, or that of --robot)"},
         {"robot", CLI_TEXT, &c->robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP " (default: the config's, the policy's, or sa01)"},
         {"controller", CLI_TEXT, &c->controller, 0, 0, "NAME",
@@ -368,6 +368,7 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
     MildError error = {0};
+    c->policy = c->policy ? c->policy : robot_policy(c->robot, shipped);
     return run_play(c, args, &error) == MILD_OK ? 0 : cli_fail("play", &error);
 }
 
@@ -376,8 +377,6 @@ int cmd_play(int argc, char **argv) {
     CliArgs *args = calloc(1, sizeof *args);
     int code = CLI_EXIT_BAD_INPUT;
     if (c && args) {
-        char shipped[PATH_SIZE];
-        c->policy = path_data("policies/mild.safetensors", shipped);
         c->controller = "learned";
         c->patch = 2;
         c->terrain = terrain_def_default();

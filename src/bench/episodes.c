@@ -3,9 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "base/paths.h"
 #include "batch/batch.h"
 #include "bench/bench.h"
+#include "bench/record.h"
 #include "control/controller.h"
 #include "train/envs.h"
 
@@ -198,7 +198,6 @@ static MildStatus compare(const ExperimentDef *def, const Robot *robot, Pool *po
 }
 
 MildStatus bench_episodes(const ExperimentDef *def, BenchReport *report, MildError *error) {
-    char path[PATH_SIZE];
     ExperimentDef local = *def;
     Controller controller = {0};
     local.task.assist = 0;
@@ -212,8 +211,7 @@ MildStatus bench_episodes(const ExperimentDef *def, BenchReport *report, MildErr
     if (status == MILD_OK) {
         experiment_fit_robot(&local, robot);
         robot_set_model(robot, (MildModel)local.task.randomize.model);
-        status = controller_learned(path_data("policies/mild.safetensors", path), robot, pool,
-                                    DEVICE_EPISODES, &controller, error);
+        status = bench_walker(robot, pool, DEVICE_EPISODES, &local.task, &controller, error);
     }
     if (status == MILD_OK) {
         status = compare(&local, robot, pool, &controller, report, error);

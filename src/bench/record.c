@@ -4,8 +4,9 @@
 #include <string.h>
 
 #include "base/paths.h"
-#include "control/controller.h"
 #include "eval/eval.h"
+#include "learn/policy.h"
+#include "task/policy_keys.h"
 
 static const double walk_speed = 0.6,
                     walk_settle = 1.0; /* [m/s] commanded, [s] before the record begins */
@@ -54,16 +55,26 @@ static int walk_step(Walk *walk, ReplayPeriod *period) {
     return !step.done;
 }
 
-static MildStatus walk_open(Walk *walk, MildError *error) {
+MildStatus bench_walker(const Robot *robot, Pool *pool, int envs, TaskDef *task,
+                        Controller *controller, MildError *error) {
     char path[PATH_SIZE];
+    const char *file = robot_policy(robot_name(robot), path);
+    Policy *policy = policy_load(file, NULL, 0, error);
+    MildStatus status =
+        policy ? task_policy_keys_read(task, policy_def(policy)->task, error) : error->status;
+    policy_destroy(policy);
+    return status == MILD_OK ? controller_learned(file, robot, pool, envs, controller, error)
+                             : status;
+}
+
+static MildStatus walk_open(Walk *walk, MildError *error) {
     walk->pool = pool_create(1);
     walk->sim = robot_sim_create(walk->robot, walk->def.physics_dt, error);
     walk->env = aligned_alloc(64, task_env_bytes(&walk->def, walk->robot));
     if (!walk->pool || !walk->sim || !walk->env) {
         return mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     }
-    return controller_learned(path_data("policies/mild.safetensors", path), walk->robot, walk->pool,
-                              1, &walk->controller, error);
+    return bench_walker(walk->robot, walk->pool, 1, &walk->def, &walk->controller, error);
 }
 
 static void walk_close(Walk *walk) {

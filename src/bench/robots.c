@@ -1,9 +1,9 @@
 #include <stdlib.h>
 
 #include "base/clock.h"
-#include "base/paths.h"
 #include "batch/batch.h"
 #include "bench/bench.h"
+#include "bench/record.h"
 #include "control/controller.h"
 #include "crowd/crowd.h"
 
@@ -219,7 +219,6 @@ static MildStatus with_rows(const ExperimentDef *def, const Robot *robot, Pool *
 MildStatus bench_robots(const ExperimentDef *def, BenchReport *report, MildError *error) {
     ExperimentDef local = *def;
     local.task.randomize.patch_share = 0;
-    char path[PATH_SIZE];
     Controller controller;
     MildError unused;
     Robot *robot = robot_open(def->train.robot, error);
@@ -233,10 +232,9 @@ MildStatus bench_robots(const ExperimentDef *def, BenchReport *report, MildError
         robot_set_model(robot, (MildModel)local.task.randomize.model);
         status = with_rows(&local, robot, pool, NULL, report, error);
     }
-    /* a robot that the shipped policy does not know only marches */
+    /* a robot for which no policy ships only marches */
     if (status == MILD_OK &&
-        controller_learned(path_data("policies/mild.safetensors", path), robot, pool,
-                           local.train.envs, &controller, &unused) == MILD_OK) {
+        bench_walker(robot, pool, local.train.envs, &local.task, &controller, &unused) == MILD_OK) {
         local.task.assist = 0;
         status = with_rows(&local, robot, pool, &controller, report, error);
         controller_destroy(&controller);

@@ -37,6 +37,17 @@ int robot_list(char names[][ROBOT_LISTED_SIZE], int most) {
     return count;
 }
 
+const char *robot_policy(const char *name, char *path) {
+    char relative[ROBOT_LISTED_SIZE + 32];
+    if (name && !strchr(name, '/') && strlen(name) < ROBOT_LISTED_SIZE) {
+        snprintf(relative, sizeof relative, "policies/%s.safetensors", name);
+        if (access(path_data(relative, path), R_OK) == 0) {
+            return path;
+        }
+    }
+    return path_data("policies/mild.safetensors", path);
+}
+
 Robot *robot_open(const char *name, MildError *error) {
     char path[PATH_SIZE], names[ROBOT_LISTED_MAX][ROBOT_LISTED_SIZE];
     if (strchr(name, '/') || strcmp(name, ".") == 0) {

@@ -23,6 +23,9 @@ Robot *robot_open(const char *name, MildError *error);
 enum { ROBOT_LISTED_MAX = 64, ROBOT_LISTED_SIZE = 64 };
 /* Writes the sorted names of the folders under robots/, at most `most`. Returns their number. */
 int robot_list(char names[][ROBOT_LISTED_SIZE], int most);
+/* File in `path` [PATH_SIZE] of the policy that ships for a robot's name: that of the name in
+ * policies/, or that of SA01. name: NULL: none is given. */
+const char *robot_policy(const char *name, char *path);
 void robot_destroy(Robot *robot); /* may be NULL */
 
 /* ---- constants from the folder ---- */

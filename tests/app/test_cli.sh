@@ -171,6 +171,7 @@ own=$(walked "${as[@]}")
 [ "$own" = "$(walked --policy "$go1" --config "$root/configs/go1.ini")" ] || fail "not as with its config: $own"
 [ "$own" = "$(walked "${as[@]}" --task.gait_period=0.5)" ] && [ "$own" != "$(walked "${as[@]}" --task.gait_period=0.8)" ] || fail "the gait's period"
 [ "$own" = "$(walked --policy "$go1" --task.physics_dt=0.005)" ] || fail "the policy's robot"
+[ "$own" = "$(walked --robot go1 --task.physics_dt=0.005)" ] || fail "the policy that ships for a robot"
 [ "$(walked --robot go1 --controller stand)" = "$(walked --robot go1 --controller stand --task.gait_period=0.8)" ] || fail "a controller without a policy"
 printf '[train]\nrobot = go1\n[task]\nphysics_dt = 0.005\n' >few.ini
 [ "$own" = "$(walked --policy "$go1" --config few.ini)" ] || fail "a config that says nothing of how it walks"
@@ -198,7 +199,8 @@ bad "no blanks around it" "$mild" train --robot ' ./x' --out run
 bad "too long" "$mild" train --robot "./$(printf '%600s' | tr ' ' x)" --out run
 [ ! -e run ] || fail "a refused robot left a folder"
 bad "./nowhere/robot.ini" "$mild" eval --robot ./nowhere
-bad "this policy is for robot sa01, not for go1; give --robot sa01 or another --policy" "$mild" eval --robot go1
+bad "this policy is for robot sa01, not for go1; give --robot sa01 or another --policy" "$mild" eval --robot go1 \
+    --policy "$root/policies/mild.safetensors"
 bad "unknown controller 'stnad'; nearest is 'stand'" "$mild" eval --controller stnad
 bad "unknown controller 'stnad'; nearest is 'stand'" "$mild" play --controller stnad
 expect 0 'foam45 .* 2/2' "$mild" eval --robot go1 --controller stand --ground foam45 --speed 0 --trials 2 --seconds 3 \

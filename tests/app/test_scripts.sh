@@ -19,7 +19,7 @@ bad "latent.py: words: could not convert string to float: 'x'; give" latent word
 printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3\n' >short
 bad "latent.py: short: .*; give what mild eval --latent wrote" latent short
 printf 'ground,trial,speed_m_s,time_s,modulated0\nrigid,0,0.6,3,1\n' >one
-bad "latent.py: one: trials are shorter than 2.8 s or fewer than 2" latent one
+bad "latent.py: one: trials are shorter than 3 s or fewer than 2" latent one
 row='"trials": 2, "torque_max": 9, "clearance": 0.1, "penetration": 0.2'
 printf '{"rows": [{"ground": "snow", "speed": 0.6, "success": 0, "velocity": 0, "cot": 0, "measured": 0, %s}]}' "$row" >fell.json
 printf '{"rows": [{"ground": "snow", "speed": 0.6, "success": 2, "velocity": 0.5, "cot": 0.7, "measured": 2, %s}]}' "$row" >went.json

@@ -219,7 +219,7 @@ bad "$address: .* in use; end the program" "$mild" drive --listen "$address"
 kill -INT "$runner"
 wait "$runner"
 bad "no_such.safetensors" "$mild" drive --policy no_such.safetensors
-bad "is for robot sa01, not for go1" "$mild" drive --robot go1
+bad "is for robot sa01, not for go1" "$mild" drive --robot go1 --policy "$tests/../../policies/mild.safetensors"
 bad "/dev/input/none" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/input/none
 bad "/dev/null is no gamepad" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/null
 bad "\. is no gamepad" "$mild" drive --listen 127.0.0.1:0 --gamepad .

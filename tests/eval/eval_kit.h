@@ -14,23 +14,29 @@
 #include <cmocka.h>
 
 #include "eval/eval.h"
+#include "learn/policy.h"
 #include "sa01.h"
+#include "task/policy_keys.h"
 
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"
 
 static Robot *robot;
-static TaskDef def; /* nominal; what a test changes it puts back */
+static TaskDef def; /* nominal, of the policy's file; what a test changes it puts back */
 
 static inline int kit_setup(void **state) {
     (void)state;
     MildError error = {0};
     robot = robot_create(SA01, &error);
+    Policy *policy = policy_load(POLICY, NULL, 0, &error);
     def = task_def_default();
     task_def_make_nominal(&def);
-    if (!robot) {
+    const int ready =
+        robot && policy && task_policy_keys_read(&def, policy_def(policy)->task, &error) == MILD_OK;
+    policy_destroy(policy);
+    if (!ready) {
         fprintf(stderr, "%s\n", error.text);
     }
-    return robot == NULL;
+    return !ready;
 }
 
 static inline int kit_teardown(void **state) {

@@ -71,7 +71,7 @@ bad "walk exists already" "$mild" export --c walk
 bad "give --onnx FILE or --c FOLDER" "$mild" export
 bad "--double is for the graph" "$mild" export --c new --double
 bad "no_such" "$mild" export --policy no_such.safetensors --c new
-bad "is for robot sa01, not for go1" "$mild" export --robot go1 --c new
+bad "is for robot sa01, not for go1" "$mild" export --robot go1 --policy "$root/policies/mild.safetensors" --c new
 bad "nearest is 'task.gait_period'" "$mild" export --c new --task.gait_perod=0.7
 bad "unknown section\|nearest is 'task'" "$mild" export --c new --train.envs=7
 bad "outside" "$mild" export --c new --task.gait_period=9

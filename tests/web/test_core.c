@@ -46,7 +46,7 @@ static int setup(void **state) {
     policy = policy_load(POLICY, NULL, 0, &error);
     assert_non_null(robot);
     assert_non_null(policy);
-    return (int)experiment_task(&task, 0, unused, WALK, NULL, &error);
+    return (int)experiment_task(&task, 0, unused, WALK, POLICY, &error);
 }
 
 static int teardown(void **state) {
