@@ -212,8 +212,9 @@ void bind_batch(nb::module_ &module) {
         "robots; soles: a list of 1 .. 4 Sole, of each robot; dt [s]; tolerance [-] and "
         "max_iterations\nof Newton's method, 0: the defaults; device: cpu, cuda or cuda:N; points: "
         "no foot transmits a\nmoment, so that the rows and columns of moments of every "
-        "inverse_inertia are 0 (faster\non three or four feet of up to eight elements). Raises\nValueError for a number out of range, for a sole "
-        "with too many elements, and without the device.")
+        "inverse_inertia are 0 (faster\non three or four feet of up to eight "
+        "elements). Raises ValueError for a number out of\nrange, for a sole with too many "
+        "elements, and without the device.")
         .def("__init__", make, nb::arg("robots"), nb::arg("soles"), nb::arg("dt"), nb::kw_only(),
              nb::arg("tolerance") = 0.0, nb::arg("max_iterations") = 0, nb::arg("device") = "cpu",
              nb::arg("points") = false)
