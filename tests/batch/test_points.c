@@ -265,6 +265,25 @@ static void fill_moments(int rows) {
     }
 }
 
+/* On a material that does not exist: the wrench of a robot that touches it is not a number. */
+static void check_no_material(const Side *side) {
+    int touch = 0;
+    for (int i = 0; i < ROBOTS * LABELS; i++) {
+        arrays.material[i] = LABELS;
+    }
+    side_step(side, &arrays, 0, 0);
+    for (int r = 0; r < ROBOTS; r++) {
+        const int rows = 6 * kits[r].feet;
+        int number = 1;
+        for (int i = 0; i < rows; i++) {
+            number = number && isfinite(arrays.wrench[rows * r + i]);
+        }
+        assert_true(number == in_air(r) || kits[r].result.iterations == 0);
+        touch += !number;
+    }
+    assert_true(touch > ROBOTS / 2);
+}
+
 /* ---- tests ---- */
 
 /* A walk of all robots; both sides move on with the kits. */
@@ -314,6 +333,7 @@ static void walk_on(const Walk *walk, int device) {
     check_errors(walk->name, "all rows", &rows, 5e-6, 1e-2);
     print_message("%d Newton steps in the place of %d\n", steps, other_steps);
     assert_true(steps > 0 && abs(steps - other_steps) <= 2 + other_steps / 100);
+    check_no_material(&alone);
     side_close(&alone);
     side_close(&all);
     for (int r = 0; r < ROBOTS; r++) {
