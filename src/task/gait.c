@@ -14,8 +14,8 @@ TASK_FN int task_is_standing(const TaskDef *def, const TaskReal command[3]) {
  *
  * A slow walk at the period of a fast one takes many short steps, each of which pays for a lifted
  * leg and, on soft ground, for an imprint: with 1.0 s in the place of 0.8 s, 0.3 m/s in loose sand
- * costs a sixth less. v weighs steps to the side and turns as their ranges are smaller: they take
- * no longer steps. */
+ * costs a sixth less. Steps to the side and turns weigh more, because they reach the end of their
+ * range at a lower speed. */
 TASK_FN double task_gait_period(const TaskDef *def, const TaskReal command[3]) {
     const double forward = command[0], left = command[1], turning = command[2];
     const double v = fabs(forward) + 3 * fabs(left) + fabs(turning);

@@ -1,6 +1,6 @@
 /* mild/batch.h on the CPU and, where there is one, on a GPU: against mild/ground.h, against each
  * other, and what it refuses. */
-#include "batch/batch.h"
+#include "batch_kit.h"
 #include "ground/map_kit.h"
 #include "ground/state.h"
 
@@ -28,15 +28,6 @@ static int close_soles(void **state) {
         mild_sole_destroy(all[i]);
     }
     return 0;
-}
-
-static int has_device(void) {
-    MildError error = {0};
-    const int there = device_open(0, &error) == MILD_OK;
-    if (!there) {
-        print_message("no device: %s\n", error.text);
-    }
-    return there;
 }
 
 /* ---- robots that walk at random, by mild/ground.h ---- */
@@ -174,12 +165,6 @@ static void crowd_close(Crowd *crowd) {
     mild_map_destroy(crowd->map);
 }
 
-static void to_float(float *to, const double *from, int count) {
-    for (int i = 0; i < count; i++) {
-        to[i] = (float)from[i];
-    }
-}
-
 /* Solves the next step of all robots by mild/ground.h, and hands the problem over. */
 static void crowd_solve(Crowd *crowd, Arrays *a) {
     const int feet = crowd->feet, rows = 6 * feet;
@@ -279,11 +264,6 @@ typedef struct {
     int count;
     double error[ROBOTS * STEPS * SHAPES];
 } Errors;
-
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 static void add_error(Errors *errors, const double *found, const double *wanted, int count) {
     double apart = 0.0, size = 0.0;

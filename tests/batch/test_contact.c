@@ -1,5 +1,6 @@
 /* The contact step as a warp does it against mild_ground_solve and mild_ground_advance: the same
  * text in double and in float, of one, two and four feet, on level ground and on maps. */
+#include "batch_kit.h"
 #include "contact_case.h"
 #include "ground/begin.h"
 #include "ground/grid.h"
@@ -116,11 +117,6 @@ typedef struct {
     int iterations_rows; /* of the text that has all rows; see run_with_rows */
     double force[STEPS_MAX];
 } Worst;
-
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
 
 /* Of the forces' errors, the one that a share of them does not exceed. */
 static double quantile(Worst *w, double share) {

@@ -1,7 +1,7 @@
 /* MildBatchDef.points: quadrupeds whose feet transmit no moment, by the version for such feet, on
  * the CPU and, where there is one, on a GPU. Against mild_ground_solve, against the version for all
  * feet, in the air, and with few Newton steps. */
-#include "batch/batch.h"
+#include "batch_kit.h"
 #include "ground/map_kit.h"
 #include "points_kit.h"
 
@@ -56,15 +56,6 @@ typedef struct {
 static Kit kits[ROBOTS];
 static Arrays arrays, other;
 
-static int has_device(void) {
-    MildError error = {0};
-    const int there = device_open(0, &error) == MILD_OK;
-    if (!there) {
-        print_message("no device: %s\n", error.text);
-    }
-    return there;
-}
-
 /* ---- robots, by mild/ground.h ---- */
 
 static int in_air(int robot) {
@@ -98,12 +89,6 @@ static void robots_open(const Walk *walk, MildSole *sole, const MildMaterial *ma
             kit->mass[f] = kit_uniform(random, 2.0, 10.0);
             kit->inertia[f] = 0.05 * kit->mass[f];
         }
-    }
-}
-
-static void to_float(float *to, const double *from, int count) {
-    for (int i = 0; i < count; i++) {
-        to[i] = (float)from[i];
     }
 }
 
@@ -228,11 +213,6 @@ static void against_rows(Errors *errors) {
         errors->error[errors->count++] = worst;
         assert_true(arrays.residual[r] >= 0.0f);
     }
-}
-
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 static void check_errors(const char *name, const char *what, Errors *errors, double median,

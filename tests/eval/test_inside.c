@@ -69,9 +69,11 @@ static void the_columns(void **state) {
     (void)state;
     InsideLog log = {.task = &def};
     Controller controller = learned();
+    const double slowing = def.gait_slowing;
+    def.gait_slowing = 0; /* or the period follows the turning that holds the heading */
     char *text = log_walk(&log, &controller), *at = strchr(text, '\n') + 1;
+    def.gait_slowing = slowing;
     int commas = 0, border[TRIALS] = {0};
-    const double command[3] = {0.5, 0, 0}, pace = 0.01 / task_gait_period(&def, command);
     double forward = 0, before[TRIALS] = {0};
     for (const char *c = text; *c != '\n'; c++) {
         commas += *c == ',';
@@ -92,7 +94,7 @@ static void the_columns(void **state) {
             }
             if (k > 0) {
                 const double turned = v[PHASE] - before[i] + (v[PHASE] < before[i]);
-                assert_true(fabs(turned / pace - 1) < 0.03); /* turns hold the heading */
+                assert_true(fabs(turned - 0.01 / def.gait_period) < 1e-5);
             }
             before[i] = v[PHASE];
             border[i] += strcmp(line.ground, "rigid") == 0;

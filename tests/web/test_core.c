@@ -311,44 +311,48 @@ static void test_prints(void **state) {
     assert_true(pressed() == 0);
 }
 
-/* [m^2] The same between two places along x. */
-static double pressed_between(double low, double high) {
+/* [m^2] Deeper than `depth` between two places along x. */
+static double pressed_between(double low, double high, float depth) {
     const double cell = (double)web_view()->cell;
     int cells = 0;
     for (int i = (int)floor(low / cell); i < (int)floor(high / cell); i++) {
         for (int j = 0; j < WEB_WINDOW; j++) {
-            cells += web_window()[j * WEB_WINDOW + (i & (WEB_WINDOW - 1))] > 0.01f;
+            cells += web_window()[j * WEB_WINDOW + (i & (WEB_WINDOW - 1))] > depth;
         }
     }
     return cells * cell * cell;
 }
 
 /* The window follows the robot: what left it and comes back is what the ground remembers, which
- * standing up again leaves as it is. Elements are coarser than the outline that is drawn first. */
+ * standing up again leaves as it is. The slope around a print, which is drawn first, is no part of
+ * that: so what lies deeper than 30 mm. */
 static void test_window(void **state) {
     (void)state;
     start(preset("sand_loose"), WEB_LEVEL, 1);
     walk(5, 0.6f);
-    const double before = pressed_between(0.2, 1.2);
+    const double before = pressed_between(0.2, 1.2, 0.03f);
     web_again();
     walk(12, 1.0f);
     const double far = (double)web_view()->link[0][3];
-    const double ahead = pressed_between(far + 1, far + 4);
+    const double ahead = pressed_between(far + 1, far + 4, 0);
     walk(12, -1.0f);
-    const double back = (double)web_view()->link[0][3], after = pressed_between(0.2, 1.2);
+    const double back = (double)web_view()->link[0][3], after = pressed_between(0.2, 1.2, 0.03f);
     printf("  %.3f m^2 pressed; after a way to %.2f m and back to %.2f m %.3f m^2\n", before, far,
            back, after);
     assert_true(far > 10 && back > 2 && back < 4.5 && before > 0.05);
-    assert_true(fabs(after / before - 1) < 0.25 && ahead == 0);
+    assert_true(fabs(after / before - 1) < 0.1 && ahead == 0);
 }
 
-/* [m] The deepest elements of the two feet of a robot that stands. */
+/* [m] The deepest elements of the two feet of a robot that stands: means over six of eight seconds,
+ * in which it sways. */
 static double standing_depth(double stiffness) {
+    double sum = 0;
     web_change(stiffness, 1);
-    for (int t = 0; t < 4 * SECOND; t++) {
+    for (int t = 0; t < 8 * SECOND; t++) {
         assert_false(web_step(0, 0, 0));
+        sum += t < 2 * SECOND ? 0 : (double)(web_view()->depth[0] + web_view()->depth[1]) / 2;
     }
-    return (double)(web_view()->depth[0] + web_view()->depth[1]) / 2;
+    return sum / (6 * SECOND);
 }
 
 /* [N] The sum of what the elements press. */
@@ -405,9 +409,9 @@ static void test_stripes(void **state) {
     const double foam = preset("foam28") * WEB_STRIPE, sand = preset("sand_loose") * WEB_STRIPE;
     start(WEB_STRIPES, WEB_LEVEL, 1);
     walk_to(foam + 2 * WEB_STRIPE);
-    const double left = pressed_between(foam + 0.3, foam + WEB_STRIPE - 0.3);
+    const double left = pressed_between(foam + 0.3, foam + WEB_STRIPE - 0.3, 0.01f);
     walk_to(sand + 1.5 * WEB_STRIPE);
-    const double kept = pressed_between(sand + 0.3, sand + WEB_STRIPE - 0.3);
+    const double kept = pressed_between(sand + 0.3, sand + WEB_STRIPE - 0.3, 0.01f);
     printf("  pressed behind it: %.3f m^2 of foam, %.3f m^2 of sand\n", left, kept);
     assert_true(left == 0 && kept > 0.1);
 }
@@ -415,34 +419,41 @@ static void test_stripes(void **state) {
 /* The same of the crowd's robot on a material of that stiffness. */
 static double rival_depth(double stiffness) {
     Rival rival = {0};
+    double sum = 0;
     rival_start(&rival, preset("foam45"), stiffness, 0);
     CrowdSample sample[16];
     assert_true(crowd_samples(rival.crowd) <= 16);
     crowd_watch(rival.crowd, sample);
-    for (int t = 0; t < 4 * SECOND; t++) {
+    for (int t = 0; t < 8 * SECOND; t++) {
         float action[SA01_JOINTS];
         web_act(rival.history, action);
         rival_step(&rival, action);
         assert_false(rival.done);
+        sum += t < 2 * SECOND ? 0 : (double)(sample[0].foot[0].depth + sample[0].foot[1].depth) / 2;
     }
     crowd_destroy(rival.crowd);
-    return (double)(sample[0].foot[0].depth + sample[0].foot[1].depth) / 2;
+    return sum / (6 * SECOND);
 }
 
 static void test_sliders(void **state) {
     (void)state;
     double load = 0;
     start(preset("foam45"), WEB_LEVEL, 1);
-    const double hard = standing_depth(3), plain = standing_depth(1), soft = standing_depth(0.7);
-    const double hard_rival = rival_depth(3), soft_rival = rival_depth(0.7);
-    printf(
-        "  depth on foam45 at 0.7, 1, 3 times its stiffness: %.1f, %.1f, %.1f mm; of the crowd's "
-        "robot %.1f, -, %.1f mm\n",
-        1e3 * soft, 1e3 * plain, 1e3 * hard, 1e3 * soft_rival, 1e3 * hard_rival);
-    /* with k_pen alone three times as large the feet are twice as deep */
-    assert_true(fabs(hard - hard_rival) < 0.15 * hard_rival);
-    assert_true(fabs(soft - soft_rival) < 0.15 * soft_rival);
-    assert_true(soft > 1.5 * plain); /* a level sole at rest: 1.8 */
+    const double stiffness[3] = {3, 1, 0.7};
+    double depth[3];
+    for (int i = 0; i < 3; i++) {
+        depth[i] = standing_depth(stiffness[i]);
+    }
+    for (int i = 0; i < 3; i++) {
+        const double rival = rival_depth(stiffness[i]);
+        printf(
+            "  depth on foam45 at %.1f times its stiffness: %.1f mm; of the crowd's robot %.1f\n",
+            stiffness[i], 1e3 * depth[i], 1e3 * rival);
+        /* with k_pen alone three times as large the feet are twice as deep */
+        assert_true(fabs(depth[i] - rival) < 0.15 * rival);
+    }
+    /* what softer ground adds to the depth of a stiff one; a level sole at rest: 2.0 */
+    assert_true(depth[2] - depth[0] > 1.6 * (depth[1] - depth[0]));
     for (int t = 0; t < 4 * SECOND; t++) {
         web_step(0, 0, 0);
         load += carried() / (4 * SECOND);
