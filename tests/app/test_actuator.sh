@@ -22,6 +22,8 @@ for option in '' --shake --delay --coulomb --viscous; do # each does something, 
     "$mild" actuator log --out - --seconds 1 ${option:+$option 0.015} 2>/dev/null | md5sum
 done | sort -u | wc -l | grep -x 5 >/dev/null || fail "an option of log does what another does, or nothing"
 bad "outside" "$mild" actuator log --out x.csv --peak 0
+# a policy of another robot walks by its own clock, from which it does not fall
+"$mild" actuator log --robot go1 --out go1.csv --seconds 8 | grep -q '8 s, 0 falls' || fail "the Go1 does not walk"
 bad "policy is for robot sa01\|robot" "$mild" actuator log --out x.csv --robot go1 --policy "$root/policies/mild.safetensors"
 bad "cannot be written" "$mild" actuator log --out none/x.csv
 

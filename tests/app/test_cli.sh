@@ -175,6 +175,7 @@ own=$(walked "${as[@]}")
 [ "$(walked --robot go1 --controller stand)" = "$(walked --robot go1 --controller stand --task.gait_period=0.8)" ] || fail "a controller without a policy"
 printf '[train]\nrobot = go1\n[task]\nphysics_dt = 0.005\n' >few.ini
 [ "$own" = "$(walked --policy "$go1" --config few.ini)" ] || fail "a config that says nothing of how it walks"
+expect 0 'problems' "$mild" bench batch --robot go1
 # its shanks dip into loose sand, which its file allows
 expect 0 '1/1' "$mild" eval --policy "$go1" --ground sand_loose --speed 0.6 --trials 1 --seconds 4
 expect 0 '0/1' "$mild" eval --policy "$go1" --ground sand_loose --speed 0.6 --trials 1 --seconds 4 --task.shell_depth=0

@@ -200,6 +200,12 @@ static void contact_and_air_time(void **unused) {
     rig.env->air_time[1] = 0.7; /* at most half a gait period, 0.4 s */
     oracle_set_force(rig.sim, 1, 0, 0, 300);
     expect_near("both landed", describe().landed_air_time, 0.6, TOLERANCE);
+    rig.env->air_time[0] = 0.2;
+    rig.env->air_time[1] = 0.7; /* of the period that the command slows, 1.1 s */
+    rig.env->command_seen[0] = 0.3;
+    rig.env->command_seen[1] = rig.env->command_seen[2] = 0;
+    rig.def.gait_slowing = 0.5;
+    expect_near("under a slow clock", describe().landed_air_time, 0.75, TOLERANCE);
     rig_close(&rig);
 }
 
