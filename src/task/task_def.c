@@ -146,8 +146,7 @@ const MildField task_fields[] = {
       "[m/s, rad/s] a command whose three parts are all below this is to stand; 0: none is"),
     T(gait_period, D, 1, 0.2, 3, "[s] period of the gait clock"),
     T(gait_slowing, D, 1, 0, 3,
-      "[-] a slow command's period is longer: by this share at no speed, by less up to "
-      "gait_slow_below"),
+      "[-] share by which the clock's period grows at no speed; at gait_slow_below it does not"),
     T(gait_slow_below, D, 1, 0.01, 10,
       "[m/s] speed |vx| + 3 |vy| + 1 m |wz| from which the period is gait_period"),
     T(swing_apex, D, 1, 0.01, 0.4,
