@@ -41,7 +41,7 @@ static struct {
     /* the crowd */
     CrowdTask task;
     CrowdGround drawn; /* the only ground to draw */
-    CrowdTrial trial;
+    EnvsTrial trial;
     CrowdRobot *robot;
     CrowdPlace *place;
     CrowdArrays all;

@@ -60,7 +60,7 @@ class Env(VecEnv):
         return self.get_observations(), tensors["reward"], tensors["done"].long(), extras
 
     def statistics(self):
-        """Means over the episodes that ended since the last call or log: a dict, see MildEnvsStatistics of src/envs/envs.h.
+        """Means over the episodes that ended since the last call or log: a dict, see EnvsStats of src/crowd/envs_step.h.
         Waits for the device."""
         return self._envs.statistics(stream=self._stream())
 

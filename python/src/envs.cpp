@@ -15,7 +15,7 @@ extern "C" {
 
 /* Where results of a step go. Its arrays are kept as long as it is. */
 struct Buffers {
-    MildEnvsStep step = {};
+    EnvsStep step = {};
     std::vector<Array> arrays;
 };
 
@@ -96,7 +96,7 @@ static std::unique_ptr<Buffers> make_buffers(const Envs &envs, nb::handle histor
     const int where = shape.device;
     const std::vector<int64_t> frames = {n, shape.frames, shape.observation};
     auto buffers = std::make_unique<Buffers>();
-    MildEnvsStep &step = buffers->step;
+    EnvsStep &step = buffers->step;
     if (history.is_none() || reward.is_none()) {
         raise(PyExc_TypeError, "history, reward: they must be arrays");
     }
@@ -150,7 +150,7 @@ static void step(Envs &envs, nb::handle action, Buffers &buffers, uintptr_t stre
     const Array actions = take_array(
         action,
         {"action", nb::dtype<float>(), {envs.shape.envs, envs.shape.actions}, envs.shape.device});
-    MildEnvsStep call = buffers.step;
+    EnvsStep call = buffers.step;
     call.action = pointer<float>(actions);
     MildError error = {};
     MildStatus status;
@@ -163,9 +163,9 @@ static void step(Envs &envs, nb::handle action, Buffers &buffers, uintptr_t stre
 
 static nb::dict statistics(Envs &envs, uintptr_t stream) {
     Entered entered(envs.busy, "Envs.statistics");
-    MildEnvsStatistics of = {};
+    EnvsStats of = {};
     MildError error = {};
-    check(mild_envs_statistics(open_envs(envs), &of, (void *)stream, &error), error);
+    check(mild_envs_stats(open_envs(envs), &of, (void *)stream, &error), error);
     nb::dict all;
     all["episodes"] = of.episodes;
     all["falls"] = of.falls;

@@ -49,7 +49,7 @@ def load_library(path=None):
     library.mild_envs_mirror.argtypes = [c_void_p, POINTER(c_int), POINTER(c_float), POINTER(c_int), POINTER(c_float)]
     library.mild_envs_reset.argtypes = [c_void_p, POINTER(View), c_void_p, POINTER(Error)]
     library.mild_envs_step.argtypes = [c_void_p, POINTER(Step), c_void_p, POINTER(Error)]
-    library.mild_envs_statistics.argtypes = [c_void_p, POINTER(Statistics), c_void_p, POINTER(Error)]
+    library.mild_envs_stats.argtypes = [c_void_p, POINTER(Statistics), c_void_p, POINTER(Error)]
     return library
 
 
@@ -103,9 +103,9 @@ class Envs:
         self.check(self.library.mild_envs_step(self.envs, self.call, self.stream(), self.error))
 
     def statistics(self):
-        """A dict; see MildEnvsStatistics."""
+        """A dict; see EnvsStats."""
         numbers = Statistics()
-        self.check(self.library.mild_envs_statistics(self.envs, numbers, self.stream(), self.error))
+        self.check(self.library.mild_envs_stats(self.envs, numbers, self.stream(), self.error))
         found = {name: getattr(numbers, name) for name in Statistics.COUNTS + Statistics.MEANS}
         for i in range(self.shape.rewards):
             found["reward." + self.library.mild_envs_reward_name(i).decode()] = numbers.terms[i]

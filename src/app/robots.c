@@ -5,7 +5,7 @@
 
 #include "config/experiment_keys.h"
 #include "control/controller.h"
-#include "crowd/crowd.h"
+#include "crowd/envs.h"
 
 enum { LINE = 100 }; /* characters */
 
@@ -43,7 +43,7 @@ MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error) 
 void robots_tell_slow(const char *command, const TrainDef *def, const char *robot) {
     MildError unused;
     Robot *is = train_is_batch(def) && train_device(def) >= 0 ? robot_open(robot, &unused) : NULL;
-    if (is && crowd_is_slow(is)) {
+    if (is && envs_are_slow(is)) {
         fprintf(stderr,
                 "mild %s: this build has no CUDA kernels of %s's size, and those for any robot are "
                 "several times slower; build with -DMILD_CUDA_ROBOTS=FOLDER (docs/gpu.md)\n",

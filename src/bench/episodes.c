@@ -11,11 +11,13 @@
 
 enum { DEVICE_EPISODES = 1000, HOST_EPISODES = 40 };
 
-/* One kind of environments. Rows 0 and 1 of the batch are present and next. */
+/* One kind of environments. */
 typedef struct {
     int device, count;
-    TrainEnvs *envs;
-    PpoBatch batch;
+    ExperimentDef def;
+    TrainEnvs envs;
+    EnvsStep call;                    /* its arrays on the device */
+    float *device_action;             /* that of call */
     float *history, *action, *reward; /* copies on the host */
     uint8_t *done, *timeout;
     double *returns; /* [count] of each environment's first episode */
@@ -25,20 +27,20 @@ typedef struct {
 
 static MildStatus open_arrays(Side *side, const PolicyDef *p, MildError *error) {
     const size_t n = (size_t)side->count;
-    PpoBatch *b = &side->batch;
+    EnvsStep *call = &side->call;
     struct {
         float **at;
         int width;
-    } floats[] = {{&b->history, p->frames * p->observation},
-                  {&b->critic, p->critic_input},
-                  {&b->target, p->estimates},
-                  {&b->frame, p->observation},
-                  {&b->action, p->actions},
-                  {&b->reward, 1}};
-    uint8_t **bytes[] = {&b->done, &b->timeout, &b->valid};
+    } floats[] = {{&call->next.history, p->frames * p->observation},
+                  {&call->next.critic, p->critic_input},
+                  {&call->next.estimate, p->estimates},
+                  {&call->next.frame, p->observation},
+                  {&side->device_action, p->actions},
+                  {&call->reward, 1}};
+    uint8_t **bytes[] = {&call->done, &call->timeout, &call->valid};
     MildStatus status = MILD_OK;
     for (size_t i = 0; i < sizeof floats / sizeof *floats; i++) {
-        const size_t size = 2 * n * (size_t)floats[i].width * sizeof(float);
+        const size_t size = n * (size_t)floats[i].width * sizeof(float);
         *floats[i].at = status == MILD_OK ? batch_alloc(side->device, size, error) : NULL;
         status = *floats[i].at ? MILD_OK : error->status;
     }
@@ -46,6 +48,7 @@ static MildStatus open_arrays(Side *side, const PolicyDef *p, MildError *error) 
         *bytes[i] = status == MILD_OK ? batch_alloc(side->device, n, error) : NULL;
         status = *bytes[i] ? MILD_OK : error->status;
     }
+    call->action = side->device_action;
     side->history = calloc(n * (size_t)(p->frames * p->observation), sizeof *side->history);
     side->action = calloc(n * (size_t)p->actions, sizeof *side->action);
     side->reward = calloc(n, sizeof *side->reward);
@@ -61,9 +64,10 @@ static MildStatus open_arrays(Side *side, const PolicyDef *p, MildError *error) 
 }
 
 static void close_side(Side *side) {
-    const PpoBatch *b = &side->batch;
-    void *const there[] = {b->history, b->critic, b->target,  b->frame, b->action,
-                           b->reward,  b->done,   b->timeout, b->valid};
+    const EnvsStep *call = &side->call;
+    void *const there[] = {call->next.history, call->next.critic,   call->next.estimate,
+                           call->next.frame,   side->device_action, call->reward,
+                           call->done,         call->timeout,       call->valid};
     void *const here[] = {side->history, side->action,  side->reward,
                           side->done,    side->returns, side->steps};
     for (size_t i = 0; i < sizeof there / sizeof *there; i++) {
@@ -72,7 +76,7 @@ static void close_side(Side *side) {
     for (size_t i = 0; i < sizeof here / sizeof *here; i++) {
         free(here[i]);
     }
-    train_envs_destroy(side->envs);
+    train_envs_close(&side->envs);
 }
 
 /* Adds a step's rewards. Returns the episodes that still last. */
@@ -94,27 +98,26 @@ static int take_step(Side *side) {
 }
 
 /* A policy step of all; *lasting as take_step. */
-static MildStatus step(Side *side, const Controller *controller, const PolicyDef *p, int row,
-                       int *lasting, MildError *error) {
+static MildStatus step(Side *side, const Controller *controller, const PolicyDef *p, int *lasting,
+                       MildError *error) {
     const size_t n = (size_t)side->count, size = sizeof(float);
     const size_t history = n * (size_t)(p->frames * p->observation);
     const struct {
         void *to;
         const void *from;
         size_t bytes;
-    } back[] = {{side->reward, side->batch.reward, n * size},
-                {side->done, side->batch.done, n},
-                {side->timeout, side->batch.timeout, n}};
+    } back[] = {{side->reward, side->call.reward, n * size},
+                {side->done, side->call.done, n},
+                {side->timeout, side->call.timeout, n}};
     MildStatus status =
-        batch_copy(side->device, side->history, side->batch.history + (size_t)row * history,
-                   history * size, error);
+        batch_copy(side->device, side->history, side->call.next.history, history * size, error);
     if (status == MILD_OK) {
         controller->act_on(controller->self, side->count, side->history, side->action);
-        status = batch_copy(side->device, side->batch.action, side->action,
+        status = batch_copy(side->device, side->device_action, side->action,
                             n * (size_t)p->actions * size, error);
     }
     if (status == MILD_OK) {
-        status = train_envs_step(side->envs, &side->batch, 0, NULL, error);
+        status = envs_step(side->envs.envs, &side->call, NULL, error);
     }
     for (int i = 0; i < 3 && status == MILD_OK; i++) {
         status = batch_copy(side->device, back[i].to, back[i].from, back[i].bytes, error);
@@ -125,15 +128,15 @@ static MildStatus step(Side *side, const Controller *controller, const PolicyDef
 
 static MildStatus run(Side *side, const ExperimentDef *def, const Robot *robot, Pool *pool,
                       const Controller *controller, MildError *error) {
-    side->batch.envs = side->count;
-    side->batch.steps = 1;
-    side->envs = train_envs_create(def, 0, robot, pool, side->count, 0, error);
-    MildStatus status = side->envs ? open_arrays(side, &def->policy, error) : error->status;
+    side->def = *def;
+    MildStatus status =
+        train_envs_open(&side->envs, &side->def, robot, pool, side->count, 0, error);
+    status = status == MILD_OK ? open_arrays(side, &def->policy, error) : status;
     if (status == MILD_OK) {
-        status = train_envs_reset(side->envs, &side->batch, NULL, error);
+        status = envs_reset(side->envs.envs, &side->call.next, NULL, error);
     }
-    for (int t = 0, lasting = 1; status == MILD_OK && lasting; t++) {
-        status = step(side, controller, &def->policy, t > 0, &lasting, error);
+    for (int lasting = 1; status == MILD_OK && lasting;) {
+        status = step(side, controller, &def->policy, &lasting, error);
     }
     return status;
 }

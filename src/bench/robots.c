@@ -5,7 +5,7 @@
 #include "bench/bench.h"
 #include "bench/record.h"
 #include "control/controller.h"
-#include "crowd/crowd.h"
+#include "crowd/envs.h"
 
 /* Rows of the environments, in the memory of the device. */
 typedef struct {
@@ -53,26 +53,33 @@ static int timed_steps(const Rows *rows) {
     return rows->device == MILD_BATCH_HOST ? 20 : 200;
 }
 
+static EnvsView view_of(const Rows *rows) {
+    return (EnvsView){rows->history, rows->critic, rows->estimate, rows->frame};
+}
+
 /* One policy step. script: the actions of every step, [steps][envs][actions]; NULL: nobody acts. */
-static MildStatus step(Crowd *crowd, const Rows *rows, const ExperimentDef *def,
-                       const float *script, int t, MildError *error) {
-    const VecView view = {rows->history, rows->critic, rows->estimate, rows->frame};
-    const size_t envs = (size_t)def->train.envs;
-    const float *action =
-        script ? script + (size_t)t * envs * (size_t)def->policy.actions : rows->action;
-    return crowd_step(crowd, action, rows->reward, rows->flags, rows->flags + envs,
-                      rows->flags + 2 * envs, &view, NULL, error);
+static MildStatus step(Envs *envs, const Rows *rows, const ExperimentDef *def, const float *script,
+                       int t, MildError *error) {
+    const size_t count = (size_t)def->train.envs;
+    const EnvsStep call = {
+        .action = script ? script + (size_t)t * count * (size_t)def->policy.actions : rows->action,
+        .reward = rows->reward,
+        .done = rows->flags,
+        .timeout = rows->flags + count,
+        .valid = rows->flags + 2 * count,
+        .next = view_of(rows)};
+    return envs_step(envs, &call, NULL, error);
 }
 
 /* From the first episodes on: seconds of the timed steps, between which the host does not wait. */
-static MildStatus time_steps(Crowd *crowd, const Rows *rows, const ExperimentDef *def,
+static MildStatus time_steps(Envs *envs, const Rows *rows, const ExperimentDef *def,
                              const float *script, double *seconds, MildError *error) {
-    const VecView view = {rows->history, rows->critic, rows->estimate, rows->frame};
+    const EnvsView view = view_of(rows);
     const int warm = warm_steps(rows), all = warm + timed_steps(rows);
-    MildStatus status = crowd_reset(crowd, &view, NULL, error);
+    MildStatus status = envs_reset(envs, &view, NULL, error);
     double start = clock_seconds();
     for (int t = 0; t < all && status == MILD_OK; t++) {
-        status = step(crowd, rows, def, script, t, error);
+        status = step(envs, rows, def, script, t, error);
         if (rows->device != MILD_BATCH_HOST && status == MILD_OK &&
             (t == warm - 1 || t == all - 1)) {
             status = device_wait(rows->device, error);
@@ -83,26 +90,26 @@ static MildStatus time_steps(Crowd *crowd, const Rows *rows, const ExperimentDef
     return status;
 }
 
-static MildStatus measure(Crowd *crowd, const Rows *rows, const ExperimentDef *def,
-                          const float *script, double *rate, VecStats *stats, MildError *error) {
+static MildStatus measure(Envs *envs, const Rows *rows, const ExperimentDef *def,
+                          const float *script, double *rate, EnvsStats *stats, MildError *error) {
     double seconds = 0;
-    MildStatus status = time_steps(crowd, rows, def, script, &seconds, error);
+    MildStatus status = time_steps(envs, rows, def, script, &seconds, error);
     *rate = (double)def->train.envs * timed_steps(rows) / seconds;
-    return status == MILD_OK ? crowd_take_sums(crowd, stats, NULL, error) : status;
+    return status == MILD_OK ? envs_sums(envs, stats, NULL, error) : status;
 }
 
-static MildStatus march(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
-                        BenchReport *report, MildError *error) {
+static MildStatus march(Envs *envs, const ExperimentDef *def, const Rows *rows, BenchReport *report,
+                        MildError *error) {
     double rate = 0;
-    VecStats stats;
-    MildStatus status = measure(crowd, rows, def, NULL, &rate, &stats, error);
+    EnvsStats stats;
+    MildStatus status = measure(envs, rows, def, NULL, &rate, &stats, error);
     if (status == MILD_OK) {
-        const CrowdMemory memory = crowd_memory(crowd);
+        const EnvsMemory memory = envs_memory(envs);
         bench_add(report, "robots", "envs", def->train.envs, "-");
         bench_add(report, "robots", "policy_steps_per_s", rate, "1/s");
         bench_add(report, "robots", "episodes_ended", stats.episodes, "-");
         bench_add(report, "robots", "diverged", stats.diverged, "-");
-        bench_add(report, "robots", "memory_per_robot", (double)crowd_robot_bytes(crowd), "B");
+        bench_add(report, "robots", "memory_per_robot", (double)envs_robot_bytes(envs), "B");
         bench_add(report, "robots", "memory_task", (double)memory.task, "B");
         bench_add(report, "robots", "memory_engine", (double)memory.engine, "B");
         bench_add(report, "robots", "memory_ground", (double)memory.ground, "B");
@@ -119,47 +126,46 @@ typedef struct {
 } Walker;
 
 /* Writes the actions of the policy to the script. */
-static MildStatus write_script(Crowd *crowd, const Rows *rows, const ExperimentDef *def,
+static MildStatus write_script(Envs *envs, const Rows *rows, const ExperimentDef *def,
                                const Controller *controller, const Walker *walker, float *script,
                                MildError *error) {
-    const VecView view = {rows->history, rows->critic, rows->estimate, rows->frame};
+    const EnvsView view = view_of(rows);
     const PolicyDef *p = &def->policy;
-    const size_t envs = (size_t)def->train.envs, actions = envs * (size_t)p->actions;
-    MildStatus status = crowd_reset(crowd, &view, NULL, error);
+    const size_t count = (size_t)def->train.envs, actions = count * (size_t)p->actions;
+    MildStatus status = envs_reset(envs, &view, NULL, error);
     for (int t = 0; t < warm_steps(rows) + timed_steps(rows) && status == MILD_OK; t++) {
         status = batch_copy(rows->device, walker->history, rows->history,
-                            envs * (size_t)(p->frames * p->observation) * sizeof(float), error);
+                            count * (size_t)(p->frames * p->observation) * sizeof(float), error);
         if (status == MILD_OK) {
             controller->act_on(controller->self, def->train.envs, walker->history, walker->action);
             status = batch_copy(rows->device, script + (size_t)t * actions, walker->action,
                                 actions * sizeof(float), error);
         }
-        status = status == MILD_OK ? step(crowd, rows, def, script, t, error) : status;
+        status = status == MILD_OK ? step(envs, rows, def, script, t, error) : status;
     }
     return status;
 }
 
-static MildStatus record(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
-                         const Controller *controller, float *script, VecStats *stats,
+static MildStatus record(Envs *envs, const ExperimentDef *def, const Rows *rows,
+                         const Controller *controller, float *script, EnvsStats *stats,
                          MildError *error) {
     const PolicyDef *p = &def->policy;
-    const size_t envs = (size_t)def->train.envs;
-    const Walker walker = {calloc(envs * (size_t)(p->frames * p->observation), sizeof(float)),
-                           calloc(envs * (size_t)p->actions, sizeof(float))};
+    const size_t count = (size_t)def->train.envs;
+    const Walker walker = {calloc(count * (size_t)(p->frames * p->observation), sizeof(float)),
+                           calloc(count * (size_t)p->actions, sizeof(float))};
     MildStatus status = walker.history && walker.action
-                            ? write_script(crowd, rows, def, controller, &walker, script, error)
+                            ? write_script(envs, rows, def, controller, &walker, script, error)
                             : mild_fail(error, MILD_ERROR_MEMORY, "bench: out of memory");
     free(walker.history);
     free(walker.action);
-    return status == MILD_OK ? crowd_take_sums(crowd, stats, NULL, error) : status;
+    return status == MILD_OK ? envs_sums(envs, stats, NULL, error) : status;
 }
 
-static MildStatus walk(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
-                       const float *script, const VecStats *recorded, BenchReport *report,
-                       MildError *error) {
+static MildStatus walk(Envs *envs, const ExperimentDef *def, const Rows *rows, const float *script,
+                       const EnvsStats *recorded, BenchReport *report, MildError *error) {
     double rate = 0;
-    VecStats stats = {0};
-    MildStatus status = measure(crowd, rows, def, script, &rate, &stats, error);
+    EnvsStats stats = {0};
+    MildStatus status = measure(envs, rows, def, script, &rate, &stats, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -173,21 +179,21 @@ static MildStatus walk(Crowd *crowd, const ExperimentDef *def, const Rows *rows,
 
 /* ---- both ---- */
 
-static MildStatus walk_twice(const CrowdDef *of, const ExperimentDef *def, const Rows *rows,
+static MildStatus walk_twice(const EnvsDef *of, const ExperimentDef *def, const Rows *rows,
                              const Controller *controller, BenchReport *report, MildError *error) {
     const int steps = warm_steps(rows) + timed_steps(rows);
     const size_t numbers = (size_t)steps * (size_t)def->train.envs * (size_t)def->policy.actions;
     float *script = batch_alloc(rows->device, numbers * sizeof *script, error);
-    VecStats recorded = {0};
-    Crowd *crowd = script ? crowd_create(of, error) : NULL;
+    EnvsStats recorded = {0};
+    Envs *envs = script ? envs_create(of, error) : NULL;
     MildStatus status =
-        crowd ? record(crowd, def, rows, controller, script, &recorded, error) : error->status;
-    crowd_destroy(crowd);
-    crowd = status == MILD_OK ? crowd_create(of, error) : NULL;
+        envs ? record(envs, def, rows, controller, script, &recorded, error) : error->status;
+    envs_destroy(envs);
+    envs = status == MILD_OK ? envs_create(of, error) : NULL;
     if (status == MILD_OK) {
-        status = crowd ? walk(crowd, def, rows, script, &recorded, report, error) : error->status;
+        status = envs ? walk(envs, def, rows, script, &recorded, report, error) : error->status;
     }
-    crowd_destroy(crowd);
+    envs_destroy(envs);
     batch_free(rows->device, script);
     return status;
 }
@@ -197,20 +203,21 @@ static MildStatus with_rows(const ExperimentDef *def, const Robot *robot, Pool *
                             const Controller *controller, BenchReport *report, MildError *error) {
     const int device = train_device(&def->train);
     Rows rows = {.device = device < 0 ? MILD_BATCH_HOST : device};
-    const CrowdDef of = {.task = &def->task,
-                         .robot = robot,
-                         .pool = pool,
-                         .device = rows.device,
-                         .envs = def->train.envs,
-                         .grounds = 4096,
-                         .seed = def->train.seed};
+    const EnvsDef of = {.task = &def->task,
+                        .robot = robot,
+                        .pool = pool,
+                        .batch = 1,
+                        .device = rows.device,
+                        .count = def->train.envs,
+                        .grounds = 4096,
+                        .seed = def->train.seed};
     MildStatus status = rows_open(&rows, def, rows.device, error);
     if (status == MILD_OK && controller) {
         status = walk_twice(&of, def, &rows, controller, report, error);
     } else if (status == MILD_OK) {
-        Crowd *crowd = crowd_create(&of, error);
-        status = crowd ? march(crowd, def, &rows, report, error) : error->status;
-        crowd_destroy(crowd);
+        Envs *envs = envs_create(&of, error);
+        status = envs ? march(envs, def, &rows, report, error) : error->status;
+        envs_destroy(envs);
     }
     rows_close(&rows);
     return status;

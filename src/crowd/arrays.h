@@ -8,8 +8,8 @@
 #include "task/ground.h"
 #include "task/task.h"
 
-/* Sums over the episodes of an environment that ended since the last crowd_take_stats; see
- * VecStats. */
+/* Sums over the episodes of an environment that ended since the last envs_sums; see
+ * EnvsStats. */
 enum {
     TALLY_EPISODES,
     TALLY_FALLS,
@@ -61,20 +61,20 @@ typedef struct {
 
 typedef struct {
     int envs;
-    size_t stride;     /* [B] of a TaskEnv and its frames */
-    char *env;         /* [envs][stride] */
-    void *robot;       /* [envs] CrowdRobot of crowd.inc */
-    int32_t *material; /* [envs][labels] of the ground's table */
-    Real *map_origin;  /* [envs][2] [m] */
-    uint8_t *fresh;    /* [envs] bool: an episode began */
-    uint8_t *rigid;    /* [envs] bool: of the episode */
-    int32_t *order;    /* [envs] in which a GPU steps them: those on rigid ground first */
-    TaskKept *kept;    /* [envs] or NULL, in crowd_keep and crowd_restore */
-    double *tally;     /* [TALLY_NUMBERS] sums over the environments */
+    size_t stride;      /* [B] of a TaskEnv and its frames */
+    char *env;          /* [envs][stride] */
+    void *robot;        /* [envs] CrowdRobot of crowd.inc */
+    int32_t *material;  /* [envs][labels] of the ground's table */
+    Real *map_origin;   /* [envs][2] [m] */
+    uint8_t *fresh;     /* [envs] bool: an episode began */
+    uint8_t *rigid;     /* [envs] bool: of the episode */
+    int32_t *order;     /* [envs] in which a GPU steps them: those on rigid ground first */
+    TaskProgress *kept; /* [envs] or NULL, in envs_save_progress and envs_load_progress */
+    double *tally;      /* [TALLY_NUMBERS] sums over the environments */
     CrowdContact contact;
-    const CrowdTrial *trial; /* [envs] or NULL */
-    double *command;         /* [envs][3] of the trials */
-    CrowdSample *sample;     /* [envs][physics steps] or NULL */
+    const EnvsTrial *trial; /* [envs] or NULL */
+    double *command;        /* [envs][3] of the trials */
+    EnvsSample *sample;     /* [envs][physics steps] or NULL */
     const CrowdTask *task;
     const EngineModel *model;
 } CrowdArrays;
@@ -84,7 +84,7 @@ typedef struct {
     const float *action;
     float *reward;
     uint8_t *done, *timeout, *valid;
-    float *history, *critic, *estimate, *frame; /* of VecView */
+    float *history, *critic, *estimate, *frame; /* of EnvsView */
 } CrowdStep;
 
 #endif

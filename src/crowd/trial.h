@@ -13,7 +13,7 @@ typedef struct {
     uint32_t stream; /* number that selects its random numbers */
     int ground;      /* of the crowd's */
     int rigid;       /* bool: on the engine's own contact, with TASK_RIGID_FRICTION */
-} CrowdTrial;
+} EnvsTrial;
 
 /* A physics step, for the measures of an evaluation. */
 typedef struct {
@@ -29,6 +29,6 @@ typedef struct {
         float height;    /* [m] lowest sole point above the undisturbed ground */
         float depth;     /* [m] deepest element; 0 on rigid ground */
     } foot[ROBOT_FEET_MAX];
-} CrowdSample;
+} EnvsSample;
 
 #endif

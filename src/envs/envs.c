@@ -3,7 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "actuator/actuator.h"
 #include "config/experiment_keys.h"
 #include "train/envs.h"
 
@@ -11,17 +10,12 @@ struct MildEnvs {
     ExperimentDef def;
     Robot *robot;
     Pool *pool;
-    MildMap *map;       /* NULL: level ground */
-    Actuator *actuator; /* NULL: the joints' PD */
     TaskShape shape;
-    TrainEnvs *envs;
+    TrainEnvs envs;
 };
-
-_Static_assert((int)TASK_REWARD_COUNT <= (int)MILD_ENVS_REWARDS_MAX, "room for every term");
 
 static MildStatus build(MildEnvs *envs, MildError *error) {
     ExperimentDef *def = &envs->def;
-    int striped = 0;
     envs->robot = robot_open(def->train.robot, error);
     if (!envs->robot) {
         return error->status;
@@ -33,17 +27,7 @@ static MildStatus build(MildEnvs *envs, MildError *error) {
     if (!envs->pool) {
         return mild_fail(error, MILD_ERROR_MEMORY, "cannot start %d threads", def->train.threads);
     }
-    if (train_make_map(def, &envs->map, &striped, error) != MILD_OK) {
-        return error->status;
-    }
-    def->task.map = envs->map;
-    def->task.print_tiles = terrain_print_tiles(&def->terrain);
-    if (actuator_open(&def->task, envs->robot, &envs->actuator, error) != MILD_OK) {
-        return error->status;
-    }
-    envs->envs =
-        train_envs_create(def, striped, envs->robot, envs->pool, def->train.envs, 0, error);
-    return envs->envs ? MILD_OK : error->status;
+    return train_envs_open(&envs->envs, def, envs->robot, envs->pool, def->train.envs, 0, error);
 }
 
 /* Networks on a device would not see robots on the CPU. */
@@ -78,9 +62,7 @@ MildEnvs *mild_envs_open(const char *config, const char *const *overrides, int c
 
 void mild_envs_close(MildEnvs *envs) {
     if (envs) {
-        train_envs_destroy(envs->envs);
-        mild_map_destroy(envs->map);
-        actuator_destroy(envs->actuator);
+        train_envs_close(&envs->envs);
         pool_destroy(envs->pool);
         robot_destroy(envs->robot);
         free(envs);
@@ -117,47 +99,19 @@ void mild_envs_mirror(const MildEnvs *envs, int *observation_index, float *obser
     memcpy(action_sign, mirror.action_sign, actions * sizeof *action_sign);
 }
 
-static VecView rows_of(const MildEnvsView *view) {
-    return (VecView){view->history, view->critic, view->estimate, view->frame};
+MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, void *stream, MildError *error) {
+    return envs_reset(envs->envs.envs, first, stream, error);
 }
 
-MildStatus mild_envs_reset(MildEnvs *envs, const MildEnvsView *first, void *stream,
-                           MildError *error) {
-    const VecView rows = rows_of(first);
-    return train_envs_reset_into(envs->envs, &rows, stream, error);
+MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, void *stream, MildError *error) {
+    return envs_step(envs->envs.envs, step, stream, error);
 }
 
-MildStatus mild_envs_step(MildEnvs *envs, const MildEnvsStep *step, void *stream,
-                          MildError *error) {
-    const VecView next = rows_of(&step->next), last = rows_of(&step->last);
-    if (last.history || step->terms) {
-        MildStatus status =
-            train_envs_watch_ends(envs->envs, last.history ? &last : NULL, step->terms, error);
-        if (status != MILD_OK) {
-            return status;
-        }
+MildStatus mild_envs_stats(MildEnvs *envs, EnvsStats *stats, void *stream, MildError *error) {
+    EnvsStats sums;
+    MildStatus status = envs_sums(envs->envs.envs, &sums, stream, error);
+    if (status == MILD_OK) {
+        *stats = envs_means(sums, envs->def.train.envs);
     }
-    return train_envs_step_into(envs->envs, step->action, step->reward, step->done, step->timeout,
-                                step->valid, &next, stream, error);
-}
-
-MildStatus mild_envs_statistics(MildEnvs *envs, MildEnvsStatistics *statistics, void *stream,
-                                MildError *error) {
-    VecStats sums;
-    MildStatus status = train_envs_take_sums(envs->envs, &sums, stream, error);
-    if (status != MILD_OK) {
-        return status;
-    }
-    const VecStats stats = vec_stats_from(sums, envs->def.train.envs);
-    *statistics = (MildEnvsStatistics){.episodes = stats.episodes,
-                                       .falls = stats.falls,
-                                       .diverged = stats.diverged,
-                                       .steps = stats.steps,
-                                       .paid = stats.paid,
-                                       .length = stats.length,
-                                       .reward = stats.reward,
-                                       .speed_error = stats.speed_error,
-                                       .assist = stats.assist};
-    memcpy(statistics->terms, stats.terms, sizeof stats.terms);
-    return MILD_OK;
+    return status;
 }

@@ -21,8 +21,7 @@
 #ifndef MILD_ENVS_H
 #define MILD_ENVS_H
 
-#include <stdint.h>
-
+#include "crowd/envs_step.h"
 #include "mild/error.h"
 
 MILD_API_BEGIN
@@ -45,46 +44,6 @@ typedef struct {
     double clip;     /* [-] actions are clipped to -clip .. clip */
 } MildEnvsShape;
 
-/* Where to write the next observation; one row for each environment. All but history may be
- * NULL. */
-typedef struct {
-    float *history;  /* [envs][frames][observation] with sensor noise */
-    float *critic;   /* [envs][critic] without */
-    float *estimate; /* [envs][estimates] without */
-    float *frame;    /* [envs][observation] the newest frame of the history */
-} MildEnvsView;
-
-/* A policy step. */
-typedef struct {
-    const float *action; /* [envs][actions] in units of the action scale */
-    float *reward;       /* [envs] */
-    uint8_t *done;       /* [envs] bool: the episode ended in this step, fallen or by time */
-    uint8_t *timeout;    /* [envs] bool: it ended by time; bootstrap from the value before it */
-    uint8_t *valid;      /* [envs] bool: 0: the simulation diverged; give the sample no weight */
-    MildEnvsView next;   /* the observation after it */
-    /* Of environments that ended, others are left alone; where MuJoCo steps the robots, else NULL.
-     */
-    MildEnvsView last; /* the observation at the end of the episode; 0 where it diverged. Not of a
-                          NULL history */
-    float *terms;      /* [envs][rewards] sum of each term over the episode */
-} MildEnvsStep;
-
-enum { MILD_ENVS_REWARDS_MAX = 32 };
-
-/* Of the episodes that ended since the last call. */
-typedef struct {
-    int episodes;                        /* that ended */
-    int falls;                           /* of these, not by time */
-    int diverged;                        /* steps */
-    double steps;                        /* [-] policy steps of all environments */
-    double paid;                         /* [-] sum of all rewards of these steps */
-    double length;                       /* [s] mean */
-    double reward;                       /* [-] mean sum of an episode */
-    double speed_error;                  /* [m/s] mean */
-    double assist;                       /* [-] mean level of help of all robots now */
-    double terms[MILD_ENVS_REWARDS_MAX]; /* [1/s] mean of each term while alive */
-} MildEnvsStatistics;
-
 /* config: a file over configs/default.ini, or NULL. overrides: [count] "section.key=value". Their
  * data are found under $MILD_HOME, or where the library was built. Returns NULL with one line in
  * *error. */
@@ -105,15 +64,13 @@ void mild_envs_mirror(const MildEnvs *envs, int *observation_index, float *obser
                       int *action_index, float *action_sign);
 
 /* New episodes in all environments, and their first observations. */
-MildStatus mild_envs_reset(MildEnvs *envs, const MildEnvsView *first, void *stream,
-                           MildError *error);
+MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, void *stream, MildError *error);
 
 /* A policy step of all environments. */
-MildStatus mild_envs_step(MildEnvs *envs, const MildEnvsStep *step, void *stream, MildError *error);
+MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, void *stream, MildError *error);
 
-/* Waits for the device. */
-MildStatus mild_envs_statistics(MildEnvs *envs, MildEnvsStatistics *statistics, void *stream,
-                                MildError *error);
+/* Means over the episodes that ended since the last call. Waits for the device. */
+MildStatus mild_envs_stats(MildEnvs *envs, EnvsStats *stats, void *stream, MildError *error);
 
 MILD_API_END
 

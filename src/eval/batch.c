@@ -1,26 +1,26 @@
-/* Trials of all rows as one crowd. A policy step of all is one step of the crowd, and one copy of
+/* Trials of all rows as one set of environments. A policy step is one step of all, and one copy of
  * what the host needs of it: the samples of the measures, the histories, and who fell. */
 #include "batch/batch.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "crowd/crowd.h"
+#include "crowd/envs.h"
 #include "eval/eval.h"
 #include "task/ground.h"
 
 /* What the device writes in a policy step, one block there and its copy here. */
 typedef struct {
-    CrowdSample *sample; /* [trials][samples] */
-    float *history;      /* [trials][TaskShape.history] */
-    float *reward;       /* [trials] */
+    EnvsSample *sample; /* [trials][samples] */
+    float *history;     /* [trials][TaskShape.history] */
+    float *reward;      /* [trials] */
     uint8_t *done, *timeout, *valid;
 } Results;
 
 typedef struct {
     const EvalBatch *def;
     TaskDef task;
-    Crowd *crowd;
+    Envs *envs;
     int rows, trials; /* trials of all rows */
     int samples;      /* physics steps of a policy step */
     size_t bytes;     /* of the block */
@@ -77,10 +77,10 @@ static TaskGround *make_grounds(const EvalBatch *def) {
     return ground;
 }
 
-static MildStatus open_crowd(Batch *b, MildError *error) {
+static MildStatus open_envs(Batch *b, MildError *error) {
     const EvalBatch *def = b->def;
     TaskGround *ground = make_grounds(def);
-    CrowdTrial *trial = calloc((size_t)b->trials, sizeof *trial);
+    EnvsTrial *trial = calloc((size_t)b->trials, sizeof *trial);
     if (!ground || !trial) {
         free(ground);
         free(trial);
@@ -89,23 +89,24 @@ static MildStatus open_crowd(Batch *b, MildError *error) {
     }
     for (int i = 0; i < b->trials; i++) {
         const int scene = i / def->eval.trials / def->speed_count;
-        trial[i] = (CrowdTrial){.stream = (uint32_t)(i % def->eval.trials),
-                                .ground = scene,
-                                .rigid = def->scenes[scene].rigid};
+        trial[i] = (EnvsTrial){.stream = (uint32_t)(i % def->eval.trials),
+                               .ground = scene,
+                               .rigid = def->scenes[scene].rigid};
     }
     const TaskGrounds grounds = {def->scene_count, ground};
-    const CrowdDef crowd = {.task = &b->task,
-                            .robot = def->robot,
-                            .pool = def->pool,
-                            .device = def->device,
-                            .envs = b->trials,
-                            .seed = def->eval.seed,
-                            .chosen = &grounds,
-                            .trial = trial};
-    b->crowd = crowd_create(&crowd, error);
+    const EnvsDef envs = {.task = &b->task,
+                          .robot = def->robot,
+                          .pool = def->pool,
+                          .batch = 1,
+                          .device = def->device,
+                          .count = b->trials,
+                          .seed = def->eval.seed,
+                          .chosen = &grounds,
+                          .trial = trial};
+    b->envs = envs_create(&envs, error);
     free(ground);
     free(trial);
-    return b->crowd ? MILD_OK : error->status;
+    return b->envs ? MILD_OK : error->status;
 }
 
 static Results carve(const Batch *b, void *block) {
@@ -123,8 +124,8 @@ static Results carve(const Batch *b, void *block) {
 static MildStatus open_arrays(Batch *b, MildError *error) {
     const size_t trials = (size_t)b->trials, joints = (size_t)robot_joints(b->def->robot);
     const size_t history = (size_t)task_shape(b->def->robot).history;
-    b->samples = crowd_samples(b->crowd);
-    b->bytes = trials * ((size_t)b->samples * sizeof(CrowdSample) + (history + 1) * sizeof(float) +
+    b->samples = envs_physics_steps(b->envs);
+    b->bytes = trials * ((size_t)b->samples * sizeof(EnvsSample) + (history + 1) * sizeof(float) +
                          3 * sizeof(uint8_t));
     b->block = calloc(1, b->bytes);
     b->action = calloc(trials * joints, sizeof *b->action);
@@ -150,7 +151,7 @@ static MildStatus open_arrays(Batch *b, MildError *error) {
 static void close_batch(Batch *b) {
     batch_free(b->def->device, b->device_block);
     batch_free(b->def->device, b->device_action);
-    crowd_destroy(b->crowd);
+    envs_destroy(b->envs);
     free(b->block);
     free(b->action);
     free(b->command);
@@ -178,7 +179,7 @@ static void start_trial(void *context, int trial, int thread) {
 }
 
 /* quaternion: written, the orientation after the step. */
-static void take_sample(Measure *measure, const CrowdSample *from, const TaskShape *shape,
+static void take_sample(Measure *measure, const EnvsSample *from, const TaskShape *shape,
                         double quaternion[4]) {
     double torque[ROBOT_JOINTS_MAX], speed[ROBOT_JOINTS_MAX];
     for (int i = 0; i < 4; i++) {
@@ -214,7 +215,7 @@ static void take_trial(void *context, int trial, int thread) {
         return;
     }
     const TaskShape shape = task_shape(b->def->robot);
-    const CrowdSample *sample = b->host.sample + (size_t)trial * (size_t)b->samples;
+    const EnvsSample *sample = b->host.sample + (size_t)trial * (size_t)b->samples;
     double quaternion[4] = {1, 0, 0, 0};
     for (int k = 0; k < b->samples && sample[k].valid; k++) {
         take_sample(&b->measure[trial], &sample[k], &shape, quaternion);
@@ -224,12 +225,12 @@ static void take_trial(void *context, int trial, int thread) {
 }
 
 static MildStatus start(Batch *b, MildError *error) {
-    const VecView first = {.history = b->device.history};
+    const EnvsView first = {.history = b->device.history};
     pool_run(b->def->pool, b->trials, start_trial, b);
-    crowd_watch(b->crowd, b->device.sample);
-    MildStatus status = crowd_command(b->crowd, b->command, error);
+    MildStatus status = envs_set_samples(b->envs, b->device.sample, error);
+    status = status == MILD_OK ? envs_set_commands(b->envs, b->command, error) : status;
     if (status == MILD_OK) {
-        status = crowd_reset(b->crowd, &first, NULL, error);
+        status = envs_reset(b->envs, &first, NULL, error);
     }
     return status == MILD_OK
                ? batch_copy(b->def->device, b->block, b->device_block, b->bytes, error)
@@ -240,19 +241,23 @@ static MildStatus step(Batch *b, MildError *error) {
     const EvalBatch *def = b->def;
     const size_t bytes = (size_t)b->trials * (size_t)robot_joints(def->robot) * sizeof *b->action;
     const Results *at = &b->device;
-    const VecView next = {.history = at->history};
+    const EnvsStep call = {.action = b->device_action,
+                           .reward = at->reward,
+                           .done = at->done,
+                           .timeout = at->timeout,
+                           .valid = at->valid,
+                           .next = {.history = at->history}};
     def->controller->act_on(def->controller->self, b->trials, b->host.history, b->action);
     MildStatus status = batch_copy(def->device, b->device_action, b->action, bytes, error);
     if (status == MILD_OK) {
-        status = crowd_step(b->crowd, b->device_action, at->reward, at->done, at->timeout,
-                            at->valid, &next, NULL, error);
+        status = envs_step(b->envs, &call, NULL, error);
     }
     if (status == MILD_OK) {
         status = batch_copy(def->device, b->block, b->device_block, b->bytes, error);
     }
     if (status == MILD_OK) {
         pool_run(def->pool, b->trials, take_trial, b);
-        status = crowd_command(b->crowd, b->command, error);
+        status = envs_set_commands(b->envs, b->command, error);
     }
     return status;
 }
@@ -279,7 +284,7 @@ MildStatus eval_run_batch(const EvalBatch *def, EvalRow *rows, MildError *error)
     Batch b = {.def = def, .task = *def->task, .rows = def->scene_count * def->speed_count};
     b.trials = b.rows * def->eval.trials;
     b.task.episode = def->eval.seconds;
-    status = open_crowd(&b, error);
+    status = open_envs(&b, error);
     status = status == MILD_OK ? open_arrays(&b, error) : status;
     status = status == MILD_OK ? start(&b, error) : status;
     const int steps = (int)(def->eval.seconds / TASK_PERIOD + 0.5);

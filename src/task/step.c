@@ -72,12 +72,12 @@ TASK_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shap
     env->assist_level = 1;
 }
 
-TASK_FN TaskKept task_keep(const TaskEnv *env) {
-    const TaskKept kept = {env->assist_level, env->tick};
+TASK_FN TaskProgress task_progress(const TaskEnv *env) {
+    const TaskProgress kept = {env->assist_level, env->tick};
     return kept;
 }
 
-TASK_FN void task_restore(TaskEnv *env, TaskKept kept) {
+TASK_FN void task_set_progress(TaskEnv *env, TaskProgress kept) {
     env->assist_level = kept.assist_level;
     env->tick = env->tick_first = (uint32_t)kept.tick;
 }

@@ -100,7 +100,7 @@ typedef struct {
 typedef struct {
     double assist_level;
     uint64_t tick;
-} TaskKept;
+} TaskProgress;
 
 /* Result of one policy step. */
 typedef struct {
@@ -219,8 +219,8 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
 TASK_FN TaskReal task_reward(const TaskMotion *motion, TaskReal terms[TASK_REWARD_COUNT]);
 
 /* What an environment keeps, and back, before a new episode (step.c). */
-TASK_FN TaskKept task_keep(const TaskEnv *env);
-TASK_FN void task_restore(TaskEnv *env, TaskKept kept);
+TASK_FN TaskProgress task_progress(const TaskEnv *env);
+TASK_FN void task_set_progress(TaskEnv *env, TaskProgress kept);
 
 /* Draws ground, robot and sensors of an episode (randomize.c). */
 TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot);

@@ -74,7 +74,7 @@ static void fill_row(const TrainRun *run, const TrainReport *r, double row[COLUM
                                          per_iteration * (double)train_iteration(run->trainer),
                                          r->episodes.assist};
     memcpy(row, fixed, sizeof fixed);
-    memcpy(row + COLUMNS_FIXED, r->episodes.terms, sizeof r->episodes.terms);
+    memcpy(row + COLUMNS_FIXED, r->episodes.terms, TASK_REWARD_COUNT * sizeof *row);
 }
 
 /* ---- several processes: rank 0 has the folder, and all agree on every step that can fail ---- */

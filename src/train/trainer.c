@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "actuator/actuator.h"
 #include "base/clock.h"
 #include "base/paths.h"
 #include "gpu/learner.h"
@@ -13,14 +12,12 @@
 
 struct Trainer {
     ExperimentDef def;
-    Ranks *ranks;       /* NULL: alone */
-    MildMap *map;       /* NULL: level ground */
-    Actuator *actuator; /* NULL: the joints' PD */
+    Ranks *ranks; /* NULL: alone */
     Robot *robot;
     Pool *pool;
     Policy *policy;
     Ppo *ppo;
-    TrainEnvs *envs;
+    TrainEnvs envs;
     void *stream; /* of the learner's device; NULL: none */
 };
 
@@ -28,9 +25,7 @@ void train_destroy(Trainer *trainer) {
     if (!trainer) {
         return;
     }
-    train_envs_destroy(trainer->envs);
-    mild_map_destroy(trainer->map);
-    actuator_destroy(trainer->actuator);
+    train_envs_close(&trainer->envs);
     ppo_destroy(trainer->ppo);
     policy_destroy(trainer->policy);
     pool_destroy(trainer->pool);
@@ -118,24 +113,30 @@ static MildStatus move_learner(Trainer *trainer, MildError *error) {
     return mild_fail(error, cause.status, "train.device = %s: %s", def->device, cause.text);
 }
 
+/* The rows of the batch at time t. */
+static EnvsView view_at(const Trainer *trainer, int t) {
+    const PolicyDef *policy = &trainer->def.policy;
+    const PpoBatch *batch = ppo_batch(trainer->ppo);
+    const size_t row = (size_t)t * (size_t)batch->envs;
+    return (EnvsView){
+        .history = batch->history + row * (size_t)(policy->frames * policy->observation),
+        .critic = batch->critic + row * (size_t)policy->critic_input,
+        .estimate = batch->target + row * (size_t)policy->estimates,
+        .frame = batch->frame + row * (size_t)policy->observation,
+    };
+}
+
+static MildStatus reset_envs(Trainer *trainer, MildError *error) {
+    const EnvsView first = view_at(trainer, 0);
+    return envs_reset(trainer->envs.envs, &first, trainer->stream, error);
+}
+
 static MildStatus make_envs(Trainer *trainer, MildError *error) {
-    const ExperimentDef *def = &trainer->def;
-    int striped = 0;
-    if (train_make_map(def, &trainer->map, &striped, error) != MILD_OK) {
-        return error->status;
-    }
     trainer->stream = gpu_learner_stream(trainer->ppo);
-    trainer->def.task.map = trainer->map;
-    trainer->def.task.print_tiles = terrain_print_tiles(&def->terrain);
-    if (actuator_open(&trainer->def.task, trainer->robot, &trainer->actuator, error) != MILD_OK) {
-        return error->status;
-    }
-    trainer->envs =
-        train_envs_create(def, striped, trainer->robot, trainer->pool,
-                          ppo_batch(trainer->ppo)->envs, ppo_first_env(trainer->ppo), error);
-    return trainer->envs
-               ? train_envs_reset(trainer->envs, ppo_batch(trainer->ppo), trainer->stream, error)
-               : error->status;
+    MildStatus status =
+        train_envs_open(&trainer->envs, &trainer->def, trainer->robot, trainer->pool,
+                        ppo_batch(trainer->ppo)->envs, ppo_first_env(trainer->ppo), error);
+    return status == MILD_OK ? reset_envs(trainer, error) : status;
 }
 
 static MildStatus build(Trainer *trainer, MildError *error) {
@@ -171,22 +172,22 @@ Trainer *train_create_part(const ExperimentDef *def, Ranks *ranks, MildError *er
 /* ---- several processes ---- */
 
 /* Sums over the environments of all. Their last bits depend on the number of processes. */
-static void sum_over_ranks(Ranks *ranks, VecStats *sums) {
+static void sum_over_ranks(Ranks *ranks, EnvsStats *sums) {
     double numbers[9 + TASK_REWARD_COUNT] = {sums->episodes,    sums->falls,  sums->diverged,
                                              sums->steps,       sums->length, sums->reward,
                                              sums->speed_error, sums->assist, sums->paid};
-    memcpy(numbers + 9, sums->terms, sizeof sums->terms);
+    memcpy(numbers + 9, sums->terms, TASK_REWARD_COUNT * sizeof *numbers);
     ranks_sum_double(ranks, numbers, 9 + TASK_REWARD_COUNT);
-    *sums = (VecStats){.episodes = (int)numbers[0],
-                       .falls = (int)numbers[1],
-                       .diverged = (int)numbers[2],
-                       .steps = numbers[3],
-                       .length = numbers[4],
-                       .reward = numbers[5],
-                       .speed_error = numbers[6],
-                       .assist = numbers[7],
-                       .paid = numbers[8]};
-    memcpy(sums->terms, numbers + 9, sizeof sums->terms);
+    *sums = (EnvsStats){.episodes = (int)numbers[0],
+                        .falls = (int)numbers[1],
+                        .diverged = (int)numbers[2],
+                        .steps = numbers[3],
+                        .length = numbers[4],
+                        .reward = numbers[5],
+                        .speed_error = numbers[6],
+                        .assist = numbers[7],
+                        .paid = numbers[8]};
+    memcpy(sums->terms, numbers + 9, TASK_REWARD_COUNT * sizeof *numbers);
 }
 
 /* Every process applies the same sums to the same parameters. Another kind of processor or GPU may
@@ -204,21 +205,34 @@ static MildStatus check_same(Trainer *trainer, MildError *error) {
                                      "same program on processors of the same kind");
 }
 
+/* A policy step from time t, with the batch's actions. */
+static MildStatus step_envs(Trainer *trainer, int t, MildError *error) {
+    const PpoBatch *batch = ppo_batch(trainer->ppo);
+    const size_t row = (size_t)t * (size_t)batch->envs;
+    const EnvsStep step = {.action = batch->action + row * (size_t)trainer->def.policy.actions,
+                           .reward = batch->reward + row,
+                           .done = batch->done + row,
+                           .timeout = batch->timeout + row,
+                           .valid = batch->valid + row,
+                           .next = view_at(trainer, t + 1)};
+    return envs_step(trainer->envs.envs, &step, trainer->stream, error);
+}
+
 /* One rollout. On a GPU actions and environments are only enqueued, and take their time
  * together. */
 static MildStatus roll_out(Trainer *trainer, TrainTimes *times, MildError *error) {
-    PpoBatch *batch = ppo_batch(trainer->ppo);
+    const int steps = ppo_batch(trainer->ppo)->steps;
     MildStatus status = MILD_OK;
-    for (int t = 0; t < batch->steps && status == MILD_OK; t++) {
+    for (int t = 0; t < steps && status == MILD_OK; t++) {
         double before = clock_seconds();
         ppo_act(trainer->ppo, t);
         double between = clock_seconds();
-        status = train_envs_step(trainer->envs, batch, t, trainer->stream, error);
+        status = step_envs(trainer, t, error);
         times->inference += between - before;
         times->environments += clock_seconds() - between;
     }
     double before = clock_seconds();
-    status = status == MILD_OK ? train_envs_wait(trainer->envs, error) : status;
+    status = status == MILD_OK ? envs_wait(trainer->envs.envs, error) : status;
     times->environments += clock_seconds() - before;
     return status;
 }
@@ -226,7 +240,7 @@ static MildStatus roll_out(Trainer *trainer, TrainTimes *times, MildError *error
 MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error) {
     const double samples = (double)trainer->def.train.envs * trainer->def.ppo.steps;
     TrainTimes times = {0};
-    VecStats sums;
+    EnvsStats sums;
     double start = clock_seconds();
     MildStatus status = ranks_agree(trainer->ranks, roll_out(trainer, &times, error), error);
     if (status != MILD_OK) {
@@ -239,15 +253,15 @@ MildStatus train_iterate(Trainer *trainer, TrainReport *report, MildError *error
     }
     double wall = clock_seconds() - start;
     times.update = wall - times.rollout;
-    train_envs_take_times(trainer->envs, &times.physics, &times.ground);
+    envs_times(trainer->envs.envs, &times.physics, &times.ground);
     report->times = times;
     status = ranks_agree(trainer->ranks,
-                         train_envs_take_sums(trainer->envs, &sums, trainer->stream, error), error);
+                         envs_sums(trainer->envs.envs, &sums, trainer->stream, error), error);
     if (status != MILD_OK) {
         return status;
     }
     sum_over_ranks(trainer->ranks, &sums);
-    report->episodes = vec_stats_from(sums, trainer->def.train.envs);
+    report->episodes = envs_means(sums, trainer->def.train.envs);
     report->steps_per_s = samples / wall;
     report->reward_per_step = sums.paid / samples;
     status = check_same(trainer, error);
@@ -263,7 +277,7 @@ Policy *train_policy(Trainer *trainer) {
 }
 
 size_t train_bytes(const Trainer *trainer) {
-    return train_envs_bytes(trainer->envs) + ppo_bytes(trainer->ppo) +
+    return envs_bytes(trainer->envs.envs) + ppo_bytes(trainer->ppo) +
            gpu_learner_bytes(trainer->ppo);
 }
 
@@ -273,45 +287,46 @@ int train_threads(const Trainer *trainer) {
 
 MildStatus train_save(Trainer *trainer, const char *path, const char *note, MildError *error) {
     size_t bytes;
-    void *state = train_envs_state(trainer->envs, &bytes);
+    void *state = envs_state(trainer->envs.envs, &bytes);
     if (state) {
         return ppo_save(trainer->ppo, path, state, bytes, note, error);
     }
-    bytes = (size_t)ppo_batch(trainer->ppo)->envs * sizeof(TaskKept);
-    TaskKept *kept = malloc(bytes);
-    MildStatus status = kept ? train_envs_keep(trainer->envs, kept, error)
-                             : mild_fail(error, MILD_ERROR_MEMORY, "no memory for a checkpoint");
+    bytes = (size_t)ppo_batch(trainer->ppo)->envs * sizeof(TaskProgress);
+    TaskProgress *progress = malloc(bytes);
+    MildStatus status = progress
+                            ? envs_save_progress(trainer->envs.envs, progress, error)
+                            : mild_fail(error, MILD_ERROR_MEMORY, "no memory for a checkpoint");
     status = ranks_agree(trainer->ranks, status, error);
-    status =
-        status == MILD_OK ? ppo_save_learner(trainer->ppo, path, kept, bytes, note, error) : status;
-    free(kept);
+    status = status == MILD_OK ? ppo_save_learner(trainer->ppo, path, progress, bytes, note, error)
+                               : status;
+    free(progress);
     return status;
 }
 
 /* The learner alone: the environments begin new episodes. */
 static MildStatus load_learner(Trainer *trainer, const char *path, MildError *error) {
-    const size_t bytes = (size_t)ppo_batch(trainer->ppo)->envs * sizeof(TaskKept);
-    TaskKept *kept = malloc(bytes);
+    const size_t bytes = (size_t)ppo_batch(trainer->ppo)->envs * sizeof(TaskProgress);
+    TaskProgress *progress = malloc(bytes);
     int found = 0;
     MildStatus status =
-        kept ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "no memory for a checkpoint");
+        progress ? MILD_OK : mild_fail(error, MILD_ERROR_MEMORY, "no memory for a checkpoint");
     status = ranks_agree(trainer->ranks, status, error);
     if (status == MILD_OK) {
-        status = ppo_load_learner(trainer->ppo, path, kept, bytes, &found, error);
+        status = ppo_load_learner(trainer->ppo, path, progress, bytes, &found, error);
     }
     if (status == MILD_OK && found) {
-        status = train_envs_restore(trainer->envs, kept, error);
+        status = envs_load_progress(trainer->envs.envs, progress, error);
     }
-    free(kept);
+    free(progress);
     if (status == MILD_OK) {
-        status = train_envs_reset(trainer->envs, ppo_batch(trainer->ppo), trainer->stream, error);
+        status = reset_envs(trainer, error);
     }
     return ranks_agree(trainer->ranks, status, error);
 }
 
 MildStatus train_load(Trainer *trainer, const char *path, MildError *error) {
     size_t bytes;
-    void *state = train_envs_state(trainer->envs, &bytes);
+    void *state = envs_state(trainer->envs.envs, &bytes);
     const int leads = ranks_number(trainer->ranks) == 0,
               whole = ranks_any(trainer->ranks, leads && state && ppo_file_is_whole(path));
     return whole ? ppo_load(trainer->ppo, path, state, bytes, error)

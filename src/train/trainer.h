@@ -3,9 +3,9 @@
 #ifndef TRAIN_TRAINER_H
 #define TRAIN_TRAINER_H
 
+#include "crowd/envs.h"
 #include "learn/ppo.h"
 #include "ranks/ranks.h"
-#include "task/vec.h"
 #include "train/experiment.h"
 
 typedef struct Trainer Trainer;
@@ -19,7 +19,7 @@ typedef struct {
 
 typedef struct {
     PpoReport ppo;
-    VecStats episodes;
+    EnvsStats episodes;
     TrainTimes times;
     double steps_per_s;
     double reward_per_step; /* mean over the batch */

@@ -19,7 +19,7 @@ typedef struct {
     double kp_scale[ROBOT_JOINTS_MAX];
 } Episode;
 
-/* env: of crowd_env. */
+/* env: of envs_batch_env. */
 Episode episode_of(const void *env);
 /* Gives the base a speed [m/s] forward. */
 void episode_throw(void *env, double speed);

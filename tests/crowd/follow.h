@@ -14,7 +14,7 @@
 #include <cmocka.h>
 
 #include "batch/batch.h"
-#include "crowd/crowd.h"
+#include "crowd/backend.h"
 #include "episode.h"
 #include "sa01.h"
 #include "task/ground.h"
@@ -40,11 +40,11 @@ typedef struct {
     TaskDef def;
     TaskShape shape;
     TaskGrounds *grounds;
-    Vec *vec;
-    Crowd *crowd;
+    Envs *mujoco;
+    Envs *batch;
     int device;
-    Rows a, b;     /* of vec, of crowd */
-    Rows *on_side; /* of crowd, in the memory of its device */
+    Rows a, b;     /* of mujoco, of batch */
+    Rows *on_side; /* of batch, in the memory of its device */
 } Pair;
 
 static Pair pair;
@@ -75,17 +75,15 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     assert_non_null(pair.grounds);
     TaskDef with = *def;
     with.grounds = pair.grounds;
-    pair.vec = vec_create(&with, pair.robot, pair.pool, ENVS, 7, &error);
-    assert_non_null(pair.vec);
-    const CrowdDef crowd = {.task = def,
-                            .robot = pair.robot,
-                            .pool = pair.pool,
-                            .device = device,
-                            .envs = ENVS,
-                            .grounds = GROUNDS,
-                            .seed = 7};
-    pair.crowd = crowd_create(&crowd, &error);
-    pair.on_side = pair.crowd ? batch_alloc(device, sizeof(Rows), &error) : NULL;
+    EnvsDef of = {.task = &with, .robot = pair.robot, .pool = pair.pool, .count = ENVS, .seed = 7};
+    pair.mujoco = envs_create(&of, &error);
+    assert_non_null(pair.mujoco);
+    of.task = def;
+    of.batch = 1;
+    of.device = device;
+    of.grounds = GROUNDS;
+    pair.batch = envs_create(&of, &error);
+    pair.on_side = pair.batch ? batch_alloc(device, sizeof(Rows), &error) : NULL;
     if (!pair.on_side) {
         fail_msg("%s", error.text);
     }
@@ -93,18 +91,18 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
 
 static void pair_close(void) {
     batch_free(pair.device, pair.on_side);
-    crowd_destroy(pair.crowd);
-    vec_destroy(pair.vec);
+    envs_destroy(pair.batch);
+    envs_destroy(pair.mujoco);
     task_grounds_destroy(pair.grounds);
     pool_destroy(pair.pool);
     robot_destroy(pair.robot);
 }
 
-static VecView view_of(Rows *rows) {
-    return (VecView){rows->history, rows->critic, rows->estimate, rows->frame};
+static EnvsView view_of(Rows *rows) {
+    return (EnvsView){rows->history, rows->critic, rows->estimate, rows->frame};
 }
 
-/* The crowd's rows to b, once the device has them. */
+/* The batch engine's rows to b, once the device has them. */
 static void fetch(void) {
     MildError error = {0};
     assert_true(pair.device == MILD_BATCH_HOST || device_wait(pair.device, &error) == MILD_OK);
@@ -114,23 +112,31 @@ static void fetch(void) {
 
 static void pair_reset(void) {
     MildError error = {0};
-    VecView a = view_of(&pair.a), b = view_of(pair.on_side);
-    vec_reset(pair.vec, &a);
-    if (crowd_reset(pair.crowd, &b, NULL, &error) != MILD_OK) {
+    const EnvsView a = view_of(&pair.a), b = view_of(pair.on_side);
+    envs_reset(pair.mujoco, &a, NULL, &error);
+    if (envs_reset(pair.batch, &b, NULL, &error) != MILD_OK) {
         fail_msg("%s", error.text);
     }
     fetch();
 }
 
+static EnvsStep step_of(Rows *rows) {
+    return (EnvsStep){.action = rows->action,
+                      .reward = rows->reward,
+                      .done = rows->done,
+                      .timeout = rows->timeout,
+                      .valid = rows->valid,
+                      .next = view_of(rows)};
+}
+
 static void pair_step(void) {
     MildError error = {0};
-    VecView a = view_of(&pair.a), b = view_of(pair.on_side);
     Rows *s = pair.on_side;
-    vec_step(pair.vec, pair.a.action, pair.a.reward, pair.a.done, pair.a.timeout, pair.a.valid, &a);
+    const EnvsStep a = step_of(&pair.a), b = step_of(s);
+    envs_step(pair.mujoco, &a, NULL, &error);
     assert_int_equal(
         batch_copy(pair.device, s->action, pair.a.action, sizeof pair.a.action, &error), MILD_OK);
-    if (crowd_step(pair.crowd, s->action, s->reward, s->done, s->timeout, s->valid, &b, NULL,
-                   &error) != MILD_OK) {
+    if (envs_step(pair.batch, &b, NULL, &error) != MILD_OK) {
         fail_msg("%s", error.text);
     }
     fetch();
@@ -191,9 +197,9 @@ static void assert_near(double a, double b, double tolerance) {
 /* The episode of an environment is that of the CPU, rounded. */
 static void same_episode(int e) {
     size_t bytes;
-    const char *envs = vec_state(pair.vec, &bytes);
+    const char *envs = envs_state(pair.mujoco, &bytes);
     const TaskEnv *a = (const TaskEnv *)(const void *)(envs + (size_t)e * (bytes / ENVS));
-    const Episode b = episode_of(crowd_env(pair.crowd, e));
+    const Episode b = episode_of(envs_batch_env(pair.batch, e));
     assert_true(a->index == b.index && a->step == b.step);
     assert_true(a->ground[0] == b.ground[0] && a->variation.rigid == b.rigid);
     assert_near(a->variation.rigid_friction, b.friction, 1e-7);

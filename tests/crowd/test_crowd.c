@@ -72,13 +72,13 @@ static void one_diverges(void **unused) {
     const TaskDef def = some_def();
     pair_open(SA01, &def, MILD_BATCH_HOST);
     pair_reset();
-    episode_throw(crowd_env(pair.crowd, 5), 1e4);
+    episode_throw(envs_batch_env(pair.batch, 5), 1e4);
     pair_step();
     for (int e = 0; e < ENVS; e++) {
         assert_int_equal(pair.b.valid[e], e != 5);
         assert_true(e != 5 || (pair.b.done[e] && !pair.b.timeout[e] && pair.b.reward[e] == 0));
     }
-    const Episode next = episode_of(crowd_env(pair.crowd, 5));
+    const Episode next = episode_of(envs_batch_env(pair.batch, 5));
     assert_true(next.step == 0 && next.qpos[0] == 0);
     pair_close();
 }
@@ -100,7 +100,7 @@ static void device_follows_mujoco(void **unused) {
 }
 
 /* The sample of a physics step above the map. */
-static void check_sample(const CrowdSample *sample, const MildTerrain *terrain) {
+static void check_sample(const EnvsSample *sample, const MildTerrain *terrain) {
     const double x = (double)sample->base[0], y = (double)sample->base[1];
     const double above = (double)sample->base[2] - mild_terrain_height_at(terrain, x, y);
     assert_true(sample->valid && fabs((double)sample->above - above) < 1e-5);
@@ -118,12 +118,18 @@ static void trials_are_chosen(void **unused) {
     MildMap *map = mild_map_create(&waves, &error);
     TaskGround ground[3];
     const TaskGrounds chosen = {3, ground};
-    CrowdTrial trial[TRIALS];
+    EnvsTrial trial[TRIALS];
     double command[TRIALS][3];
     static float history[TRIALS][SA01_HISTORY], action[TRIALS][SA01_JOINTS], reward[TRIALS];
-    static CrowdSample sample[TRIALS][2];
+    static EnvsSample sample[TRIALS][2];
     uint8_t flags[3][TRIALS];
-    const VecView view = {.history = history[0]};
+    const EnvsView view = {.history = history[0]};
+    const EnvsStep step = {.action = action[0],
+                           .reward = reward,
+                           .done = flags[0],
+                           .timeout = flags[1],
+                           .valid = flags[2],
+                           .next = view};
     if (!map) {
         fail_msg("%s", error.text);
     }
@@ -139,30 +145,31 @@ static void trials_are_chosen(void **unused) {
         ground[i].depth = 0.01 * i;
     }
     for (int i = 0; i < TRIALS; i++) {
-        trial[i] = (CrowdTrial){.stream = (uint32_t)(i % 2), .ground = i / 2, .rigid = i == 3};
+        trial[i] = (EnvsTrial){.stream = (uint32_t)(i % 2), .ground = i / 2, .rigid = i == 3};
         command[i][0] = 0.1 * i;
         command[i][1] = -0.2;
         command[i][2] = 0.3;
     }
-    const CrowdDef of = {.task = &def,
-                         .robot = robot,
-                         .pool = pool,
-                         .device = MILD_BATCH_HOST,
-                         .envs = TRIALS,
-                         .seed = 7,
-                         .chosen = &chosen,
-                         .trial = trial};
-    Crowd *crowd = crowd_create(&of, &error);
-    if (!crowd) {
+    const EnvsDef of = {.task = &def,
+                        .robot = robot,
+                        .pool = pool,
+                        .batch = 1,
+                        .device = MILD_BATCH_HOST,
+                        .count = TRIALS,
+                        .seed = 7,
+                        .chosen = &chosen,
+                        .trial = trial};
+    Envs *envs = envs_create(&of, &error);
+    if (!envs) {
         fail_msg("%s", error.text);
     }
-    assert_int_equal(crowd_samples(crowd), 2);
-    crowd_watch(crowd, sample[0]);
-    assert_int_equal(crowd_command(crowd, command[0], &error), MILD_OK);
-    assert_int_equal(crowd_reset(crowd, &view, NULL, &error), MILD_OK);
+    assert_int_equal(envs_physics_steps(envs), 2);
+    assert_int_equal(envs_set_samples(envs, sample[0], &error), MILD_OK);
+    assert_int_equal(envs_set_commands(envs, command[0], &error), MILD_OK);
+    assert_int_equal(envs_reset(envs, &view, NULL, &error), MILD_OK);
     for (int t = 0; t <= 130; t++) { /* falls and time limits begin further episodes */
         for (int i = 0; i < TRIALS; i++) {
-            const Episode is = episode_of(crowd_env(crowd, i));
+            const Episode is = episode_of(envs_batch_env(envs, i));
             assert_true(is.index == (uint32_t)(i % 2) && is.ground[0] == i / 2);
             assert_true(is.map[0] == 0 && is.map[1] == 0);
             assert_true(is.rigid == (i == 3));
@@ -172,26 +179,22 @@ static void trials_are_chosen(void **unused) {
             }
             assert_true(t > 0 || (is.step == 0 && is.qpos[6] == 0));
         }
-        const Episode first = episode_of(crowd_env(crowd, 0));
-        const Episode fourth = episode_of(crowd_env(crowd, 4));
+        const Episode first = episode_of(envs_batch_env(envs, 0));
+        const Episode fourth = episode_of(envs_batch_env(envs, 4));
         assert_true(t > 0 || memcmp(first.kp_scale, fourth.kp_scale, sizeof first.kp_scale) == 0);
-        assert_int_equal(
-            crowd_step(crowd, action[0], reward, flags[0], flags[1], flags[2], &view, NULL, &error),
-            MILD_OK);
+        assert_int_equal(envs_step(envs, &step, NULL, &error), MILD_OK);
         for (int i = 0; i < TRIALS; i++) {
             check_sample(&sample[i][0], &terrain);
             check_sample(&sample[i][1], &terrain);
         }
     }
     /* one that is thrown diverges in the first physics step of the next policy step */
-    episode_throw(crowd_env(crowd, 2), 1e4);
-    assert_int_equal(
-        crowd_step(crowd, action[0], reward, flags[0], flags[1], flags[2], &view, NULL, &error),
-        MILD_OK);
+    episode_throw(envs_batch_env(envs, 2), 1e4);
+    assert_int_equal(envs_step(envs, &step, NULL, &error), MILD_OK);
     for (int i = 0; i < TRIALS; i++) {
         assert_true(flags[2][i] == (i != 2) && sample[i][0].valid == (i != 2));
     }
-    crowd_destroy(crowd);
+    envs_destroy(envs);
     pool_destroy(pool);
     robot_destroy(robot);
     mild_map_destroy(map);

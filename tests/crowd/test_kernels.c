@@ -1,4 +1,4 @@
-/* Which kernels of a build a robot takes: the first that fit, and crowd_is_slow says when those are
+/* Which kernels of a build a robot takes: the first that fit, and envs_are_slow says when those are
  * for any robot. The table of the build is not linked here, this one stands in its place. */
 #include <setjmp.h>
 #include <stdarg.h>
@@ -8,7 +8,7 @@
 #include <cmocka.h>
 
 #define MILD_REAL_FLOAT
-#include "crowd/crowd.h"
+#include "crowd/backend.h"
 #include "crowd/text.h"
 
 static int fits_none(const EngineTree *tree) {
@@ -42,7 +42,7 @@ static void is_slow(const char *folder, int wanted) {
     if (!robot) {
         fail_msg("%s", error.text);
     }
-    assert_int_equal(crowd_is_slow(robot), wanted);
+    assert_int_equal(envs_are_slow(robot), wanted);
     robot_destroy(robot);
 }
 
@@ -51,7 +51,7 @@ static void robots_of_another_size_are_slow(void **unused) {
     any_fits = 1;
     is_slow(MILD_SOURCE_DIR "/robots/go1", 0);
     is_slow(MILD_SOURCE_DIR "/robots/sa01", 1);
-    any_fits = 0; /* nothing steps it: crowd_create says so */
+    any_fits = 0; /* nothing steps it: envs_create says so */
     is_slow(MILD_SOURCE_DIR "/robots/sa01", 0);
 }
 

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "crowd/crowd.h"
+#include "crowd/backend.h"
 #include "mild/batch.h"
 #include "sa01.h"
 
@@ -23,22 +23,23 @@ static size_t measure(const MildMapDef *on) {
     def.randomize.patch_share = 0;
     Robot *robot = robot_create(SA01, &error);
     Pool *pool = pool_create(2);
-    const CrowdDef of = {.task = &def,
-                         .robot = robot,
-                         .pool = pool,
-                         .device = MILD_BATCH_HOST,
-                         .envs = ENVS,
-                         .grounds = GROUNDS,
-                         .seed = 7};
-    Crowd *crowd = crowd_create(&of, &error);
-    if (!crowd) {
+    const EnvsDef of = {.task = &def,
+                        .robot = robot,
+                        .pool = pool,
+                        .batch = 1,
+                        .device = MILD_BATCH_HOST,
+                        .count = ENVS,
+                        .grounds = GROUNDS,
+                        .seed = 7};
+    Envs *envs = envs_create(&of, &error);
+    if (!envs) {
         fail_msg("%s", error.text);
     }
-    const CrowdMemory memory = crowd_memory(crowd);
-    const size_t bytes = crowd_robot_bytes(crowd);
+    const EnvsMemory memory = envs_memory(envs);
+    const size_t bytes = envs_robot_bytes(envs);
     printf("%s: %zu B: task %zu, engine %zu, ground %zu, rest %zu\n", on ? "map" : "level", bytes,
            memory.task, memory.engine, memory.ground, memory.rest);
-    crowd_destroy(crowd);
+    envs_destroy(envs);
     pool_destroy(pool);
     robot_destroy(robot);
     mild_map_destroy(map);

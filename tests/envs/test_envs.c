@@ -1,4 +1,4 @@
-/* The environments for other learners: the numbers of Vec, and errors. */
+/* The environments for other learners: the numbers of Envs, and errors. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -11,8 +11,8 @@
 
 #include "config/experiment_keys.h"
 #include "envs/envs.h"
+#include "envs_kit.h"
 #include "sa01.h"
-#include "task/vec.h"
 
 enum { ENVS = 5, STEPS = 60 };
 
@@ -27,8 +27,8 @@ typedef struct {
     uint8_t done[ENVS], timeout[ENVS], valid[ENVS];
 } Rows;
 
-static MildEnvsView view_of(Rows *rows) {
-    return (MildEnvsView){rows->history[0], rows->critic[0], rows->estimate[0], rows->frame[0]};
+static EnvsView view_of(Rows *rows) {
+    return (EnvsView){rows->history[0], rows->critic[0], rows->estimate[0], rows->frame[0]};
 }
 
 /* The same environments without the interface. */
@@ -37,7 +37,7 @@ typedef struct {
     MildMap *map;
     Robot *robot;
     Pool *pool;
-    Vec *vec;
+    Envs *envs;
 } Plain;
 
 static void open_plain(Plain *plain) {
@@ -49,12 +49,12 @@ static void open_plain(Plain *plain) {
     assert_int_equal(terrain_make(&plain->def.terrain, 3, &plain->map, &error), MILD_OK);
     assert_non_null(plain->map);
     plain->def.task.map = plain->map;
-    plain->vec = vec_create(&plain->def.task, plain->robot, plain->pool, ENVS, 7, &error);
-    assert_non_null(plain->vec);
+    plain->envs = kit_mujoco(&plain->def.task, plain->robot, plain->pool, ENVS, 7, &error);
+    assert_non_null(plain->envs);
 }
 
 static void close_plain(Plain *plain) {
-    vec_destroy(plain->vec);
+    envs_destroy(plain->envs);
     mild_map_destroy(plain->map);
     pool_destroy(plain->pool);
     robot_destroy(plain->robot);
@@ -75,7 +75,7 @@ static MildEnvs *open_envs(const char *const *overrides, int count) {
     return envs;
 }
 
-static void numbers_of_vec(void **state) {
+static void numbers_of_the_environments(void **state) {
     (void)state;
     static Plain plain;
     static Rows a, b;
@@ -86,40 +86,46 @@ static void numbers_of_vec(void **state) {
     assert_true(shape.observation == SA01_OBSERVATION && shape.frames == TASK_FRAMES);
     assert_true(shape.critic == SA01_CRITIC && shape.estimates == SA01_ESTIMATES);
     assert_true(shape.period == 0.01 && shape.rewards == TASK_REWARD_COUNT);
-    const MildEnvsView view = view_of(&a);
-    const VecView plain_view = {b.history[0], b.critic[0], b.estimate[0], b.frame[0]};
+    const EnvsView view = view_of(&a);
+    const EnvsView plain_view = {b.history[0], b.critic[0], b.estimate[0], b.frame[0]};
     assert_int_equal(mild_envs_reset(envs, &view, NULL, NULL), MILD_OK);
-    vec_reset(plain.vec, &plain_view);
+    envs_reset(plain.envs, &plain_view, NULL, NULL);
     double paid = 0;
     int ended = 0;
     for (int t = 0; t < STEPS; t++) {
         float action[ENVS][SA01_JOINTS];
         draw_actions(t, action);
-        const MildEnvsStep step = {.action = action[0],
-                                   .reward = a.reward,
-                                   .done = a.done,
-                                   .timeout = a.timeout,
-                                   .valid = a.valid,
-                                   .next = view};
+        const EnvsStep step = {.action = action[0],
+                               .reward = a.reward,
+                               .done = a.done,
+                               .timeout = a.timeout,
+                               .valid = a.valid,
+                               .next = view};
         assert_int_equal(mild_envs_step(envs, &step, NULL, NULL), MILD_OK);
-        vec_step(plain.vec, action[0], b.reward, b.done, b.timeout, b.valid, &plain_view);
+        const EnvsStep plain_step = {.action = action[0],
+                                     .reward = b.reward,
+                                     .done = b.done,
+                                     .timeout = b.timeout,
+                                     .valid = b.valid,
+                                     .next = plain_view};
+        envs_step(plain.envs, &plain_step, NULL, NULL);
         assert_memory_equal(&a, &b, sizeof a);
         for (int e = 0; e < ENVS; e++) {
             paid += (double)a.reward[e];
             ended += a.done[e];
         }
     }
-    MildEnvsStatistics statistics;
-    assert_int_equal(mild_envs_statistics(envs, &statistics, NULL, NULL), MILD_OK);
+    EnvsStats statistics;
+    assert_int_equal(mild_envs_stats(envs, &statistics, NULL, NULL), MILD_OK);
     assert_true(ended > 0 && statistics.episodes == ended && statistics.steps == ENVS * STEPS);
     assert_true(fabs(statistics.paid - paid) < 1e-4 && statistics.length > 0);
-    const VecStats wanted = vec_take_stats(plain.vec);
+    const EnvsStats wanted = kit_stats(plain.envs, ENVS);
     assert_true(statistics.falls == wanted.falls && statistics.reward == wanted.reward);
     for (int i = 0; i < TASK_REWARD_COUNT; i++) {
         assert_true(statistics.terms[i] == wanted.terms[i]);
         assert_string_equal(mild_envs_reward_name(i), task_reward_names[i]);
     }
-    assert_int_equal(mild_envs_statistics(envs, &statistics, NULL, NULL), MILD_OK);
+    assert_int_equal(mild_envs_stats(envs, &statistics, NULL, NULL), MILD_OK);
     assert_true(statistics.episodes == 0 && statistics.steps == 0);
     close_plain(&plain);
     mild_envs_close(envs);
@@ -133,7 +139,7 @@ static void batch_engine(void **state) {
     memcpy(batch, keys, sizeof batch);
     batch[KEYS - 1] = "train.robots=batch";
     MildEnvs *mujoco = open_envs(keys, KEYS), *engine = open_envs(batch, KEYS);
-    const MildEnvsView first = view_of(&a), second = {b.history[0], NULL, NULL, b.frame[0]};
+    const EnvsView first = view_of(&a), second = {b.history[0], NULL, NULL, b.frame[0]};
     assert_int_equal(mild_envs_reset(mujoco, &first, NULL, NULL), MILD_OK);
     assert_int_equal(mild_envs_reset(engine, &second, NULL, NULL), MILD_OK);
     for (int n = 0; n < ENVS * SA01_OBSERVATION; n++) {
@@ -172,7 +178,7 @@ static void ends(void **state) {
     static Rows a, b, last;
     static float terms[ENVS][TASK_REWARD_COUNT];
     MildEnvs *told = open_envs(keys, KEYS), *untold = open_envs(keys, KEYS);
-    const MildEnvsView first = view_of(&a), second = view_of(&b), end = view_of(&last);
+    const EnvsView first = view_of(&a), second = view_of(&b), end = view_of(&last);
     assert_int_equal(mild_envs_reset(told, &first, NULL, NULL), MILD_OK);
     assert_int_equal(mild_envs_reset(untold, &second, NULL, NULL), MILD_OK);
     open_plain(&plain);
@@ -180,15 +186,15 @@ static void ends(void **state) {
     for (int t = 0; t < 2 * STEPS; t++) {
         float action[ENVS][SA01_JOINTS];
         draw_actions(t, action);
-        const MildEnvsStep step = {action[0], a.reward, a.done, a.timeout,
-                                   a.valid,   first,    end,    terms[0]};
-        MildEnvsStep plainly = step;
+        const EnvsStep step = {action[0], a.reward, a.done, a.timeout,
+                               a.valid,   first,    end,    terms[0]};
+        EnvsStep plainly = step;
         plainly.reward = b.reward;
         plainly.done = b.done;
         plainly.timeout = b.timeout;
         plainly.valid = b.valid;
         plainly.next = second;
-        plainly.last = (MildEnvsView){0};
+        plainly.last = (EnvsView){0};
         plainly.terms = NULL;
         memset(&last, 0xff, sizeof last);
         assert_int_equal(mild_envs_step(told, &step, NULL, NULL), MILD_OK);
@@ -225,8 +231,8 @@ static void no_ends(void **state) {
     batch[KEYS - 1] = "train.robots=batch";
     MildEnvs *envs = open_envs(batch, KEYS);
     float action[ENVS][SA01_JOINTS] = {{0}};
-    const MildEnvsStep step = {action[0],  rows.reward,    rows.done,      rows.timeout,
-                               rows.valid, view_of(&rows), view_of(&last), NULL};
+    const EnvsStep step = {action[0],  rows.reward,    rows.done,      rows.timeout,
+                           rows.valid, view_of(&rows), view_of(&last), NULL};
     MildError error = {0};
     assert_int_equal(mild_envs_reset(envs, &step.next, NULL, NULL), MILD_OK);
     assert_int_equal(mild_envs_step(envs, &step, NULL, &error), MILD_ERROR_ARGUMENT);
@@ -280,9 +286,12 @@ static void one_clear_line(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(numbers_of_vec), cmocka_unit_test(batch_engine),
-        cmocka_unit_test(ends),           cmocka_unit_test(no_ends),
-        cmocka_unit_test(mirror),         cmocka_unit_test(one_clear_line),
+        cmocka_unit_test(numbers_of_the_environments),
+        cmocka_unit_test(batch_engine),
+        cmocka_unit_test(ends),
+        cmocka_unit_test(no_ends),
+        cmocka_unit_test(mirror),
+        cmocka_unit_test(one_clear_line),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

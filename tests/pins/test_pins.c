@@ -2,11 +2,11 @@
  * they were. Whoever changes a result on purpose renews that file: scripts/pin.sh "reason". */
 #include <string.h>
 
+#include "envs_kit.h"
 #include "lab/press.h"
 #include "learn/toy.h"
 #include "pins.h"
 #include "task/task_kit.h"
-#include "task/vec.h"
 #include "train/trainer.h"
 
 /* ---- press ---- */
@@ -65,29 +65,30 @@ enum { ENVS = 6, STEPS = 100 };
 static uint64_t hash_rollout(const TaskDef *def) {
     static float history[ENVS * SA01_HISTORY], critic[ENVS * SA01_CRITIC], reward[ENVS];
     static float action[ENVS * SA01_JOINTS];
-    static uint8_t done[ENVS], timeout[ENVS], valid[ENVS];
+    static uint8_t flags[3 * ENVS];
     MildError error = {0};
     Pool *pool = pool_create(1);
-    Vec *vec = vec_create(def, robot, pool, ENVS, 7, &error);
-    const VecView view = {history, critic, NULL, NULL};
+    Envs *envs = kit_mujoco(def, robot, pool, ENVS, 7, &error);
+    const EnvsView view = {history, critic, NULL, NULL};
+    const EnvsStep step = kit_step(action, reward, flags, ENVS, view);
     uint64_t hash = PIN_HASH_START;
-    assert_non_null(vec);
-    vec_reset(vec, &view);
+    assert_non_null(envs);
+    envs_reset(envs, &view, NULL, &error);
     for (int t = 0; t < STEPS; t++) {
         for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
             Random random = random_at(99, (uint32_t)i, (uint32_t)t);
             action[i] = (float)(1.2 * random_normal(&random));
         }
-        vec_step(vec, action, reward, done, timeout, valid, &view);
+        envs_step(envs, &step, NULL, &error);
         hash = pin_hash(hash, history, sizeof history);
         hash = pin_hash(hash, critic, sizeof critic);
         hash = pin_hash(hash, reward, sizeof reward);
-        hash = pin_hash(hash, done, sizeof done);
+        hash = pin_hash(hash, flags, ENVS); /* done */
     }
-    const VecStats stats = vec_take_stats(vec);
+    const EnvsStats stats = kit_stats(envs, ENVS);
     printf("%d falls in %d robots x %d steps\n", stats.falls, ENVS, STEPS);
     assert_true(stats.falls > 0 && stats.diverged == 0); /* new episodes are part of it */
-    vec_destroy(vec);
+    envs_destroy(envs);
     pool_destroy(pool);
     return hash;
 }

@@ -1,8 +1,8 @@
 /* The task as a whole: determinism over thread counts, mirrored motion, ground models. */
 #include "task_kit.h"
 
+#include "envs_kit.h"
 #include "sa01.h"
-#include "task/vec.h"
 
 enum { ENVS = 12, STEPS = 100 };
 
@@ -15,35 +15,36 @@ static void random_actions(float *action, int envs, int t, double size) {
     }
 }
 
-static uint64_t rollout(int threads, int envs, int steps, MildModel model, VecStats *stats) {
+static uint64_t rollout(int threads, int envs, int steps, MildModel model, EnvsStats *stats) {
     TaskDef def = task_def_default();
     def.randomize.model = (int)model;
     def.episode = 0.5; /* every robot begins a second episode */
     robot_set_model(robot, model);
     Pool *pool = pool_create(threads);
     MildError error = {0};
-    Vec *vec = vec_create(&def, robot, pool, envs, 7, &error);
-    assert_non_null(vec);
+    Envs *all = kit_mujoco(&def, robot, pool, envs, 7, &error);
+    assert_non_null(all);
     float *history = calloc((size_t)envs * SA01_HISTORY, sizeof *history);
     float *critic = calloc((size_t)envs * SA01_CRITIC, sizeof *critic);
     float *action = calloc((size_t)envs * SA01_JOINTS, sizeof *action),
           *reward = calloc((size_t)envs, sizeof *reward);
     uint8_t *flags = calloc((size_t)envs, 3);
-    VecView view = {history, critic, NULL, NULL};
-    vec_reset(vec, &view);
+    const EnvsView view = {history, critic, NULL, NULL};
+    const EnvsStep step = kit_step(action, reward, flags, envs, view);
+    envs_reset(all, &view, NULL, &error);
     for (int t = 0; t < steps; t++) {
         random_actions(action, envs, t, 0.6);
-        vec_step(vec, action, reward, flags, flags + envs, flags + 2 * envs, &view);
+        envs_step(all, &step, NULL, &error);
     }
-    uint64_t hash = vec_hash(vec);
+    uint64_t hash = envs_hash(all);
     for (size_t i = 0; i < (size_t)envs * SA01_HISTORY; i++) {
         assert_true(isfinite(history[i]));
     }
     for (size_t i = 0; i < (size_t)envs * SA01_CRITIC; i++) {
         assert_true(isfinite(critic[i]) && fabsf(critic[i]) < 100);
     }
-    *stats = vec_take_stats(vec);
-    vec_destroy(vec);
+    *stats = kit_stats(all, envs);
+    envs_destroy(all);
     pool_destroy(pool);
     robot_set_model(robot, MILD_MODEL_MILD);
     free(history);
@@ -57,7 +58,7 @@ static uint64_t rollout(int threads, int envs, int steps, MildModel model, VecSt
 /* What the numbers are is pinned by tests/pins. */
 static void same_numbers_whatever_the_thread_count(void **state) {
     (void)state;
-    VecStats stats;
+    EnvsStats stats;
     uint64_t one = rollout(1, ENVS, STEPS, MILD_MODEL_MILD, &stats);
     printf("hash of %d robots x %d steps: %016llx; %d episodes, %d falls, %d diverged\n", ENVS,
            STEPS, (unsigned long long)one, stats.episodes, stats.falls, stats.diverged);

@@ -12,8 +12,8 @@
 #include <cmocka.h>
 
 #include "base/random.h"
+#include "envs_kit.h"
 #include "sa01.h"
-#include "task/vec.h"
 
 enum { ENVS = 6, STEPS = 60, TILES = 64 };
 
@@ -52,7 +52,7 @@ static TaskDef task_on_map(void) {
 
 typedef struct {
     Pool *pool;
-    Vec *vec;
+    Envs *envs;
     float *action, *reward;
     uint8_t *flags;
     int step;
@@ -62,29 +62,29 @@ static void run_open(Run *run, int threads) {
     TaskDef def = task_on_map();
     MildError error = {0};
     *run = (Run){.pool = pool_create(threads)};
-    run->vec = vec_create(&def, robot, run->pool, ENVS, 7, &error);
-    assert_non_null(run->vec);
+    run->envs = kit_mujoco(&def, robot, run->pool, ENVS, 7, &error);
+    assert_non_null(run->envs);
     run->action = calloc(ENVS * SA01_JOINTS, sizeof *run->action);
     run->reward = calloc(ENVS, sizeof *run->reward);
     run->flags = calloc(ENVS, 3);
-    VecView none = {0};
-    vec_reset(run->vec, &none);
+    const EnvsView none = {0};
+    envs_reset(run->envs, &none, NULL, &error);
 }
 
 static void run_steps(Run *run, int steps) {
-    VecView none = {0};
+    const EnvsView none = {0};
+    const EnvsStep step = kit_step(run->action, run->reward, run->flags, ENVS, none);
     for (int t = 0; t < steps; t++, run->step++) {
         for (int i = 0; i < ENVS * SA01_JOINTS; i++) {
             Random r = random_at(5, (uint32_t)i, (uint32_t)run->step);
             run->action[i] = (float)(0.5 * random_normal(&r));
         }
-        vec_step(run->vec, run->action, run->reward, run->flags, run->flags + ENVS,
-                 run->flags + 2 * ENVS, &none);
+        envs_step(run->envs, &step, NULL, NULL);
     }
 }
 
 static void run_close(Run *run) {
-    vec_destroy(run->vec);
+    envs_destroy(run->envs);
     pool_destroy(run->pool);
     free(run->action);
     free(run->reward);
@@ -98,7 +98,7 @@ static void test_threads(void **state) {
         Run run;
         run_open(&run, i == 0 ? 1 : 3);
         run_steps(&run, STEPS);
-        hash[i] = vec_hash(run.vec);
+        hash[i] = envs_hash(run.envs);
         run_close(&run);
     }
     printf("map and prints, 1, 3 and 3 threads: %016llx\n", (unsigned long long)hash[0]);
@@ -113,7 +113,7 @@ static void test_save(void **state) {
     size_t bytes;
     run_open(&a, 2);
     run_steps(&a, STEPS / 2);
-    void *block = vec_state(a.vec, &bytes);
+    void *block = envs_state(a.envs, &bytes);
     char *saved = malloc(bytes);
     memcpy(saved, block, bytes);
     for (size_t at = 0; at + sizeof map <= bytes; at += sizeof(int32_t)) {
@@ -124,9 +124,9 @@ static void test_save(void **state) {
     run_steps(&b, STEPS / 2);
     run_steps(&b, 7);
     b.step = STEPS / 2;
-    memcpy(vec_state(b.vec, &bytes), saved, bytes);
+    memcpy(envs_state(b.envs, &bytes), saved, bytes);
     run_steps(&b, STEPS / 2);
-    assert_true(vec_hash(a.vec) == vec_hash(b.vec));
+    assert_true(envs_hash(a.envs) == envs_hash(b.envs));
     printf("%zu bytes a robot, %d tiles of prints among them\n", bytes / ENVS, TILES);
     free(saved);
     run_close(&a);

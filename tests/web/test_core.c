@@ -1,4 +1,4 @@
-/* The core of the page, compiled for this machine, beside what it stands for: the crowd on the CPU
+/* The core of the page, compiled for this machine, beside what it stands for: the batch engine on the CPU
  * and the policy on oneDNN. */
 #include <math.h>
 #include <setjmp.h>
@@ -13,7 +13,7 @@
 
 #define MILD_REAL_FLOAT
 #include "config/experiment_keys.h"
-#include "crowd/crowd.h"
+#include "crowd/envs.h"
 #include "learn/policy.h"
 #include "mild/batch.h"
 #include "sa01.h"
@@ -129,10 +129,10 @@ static void test_policy(void **state) {
     assert_true(worst < 0.01f && worst > 0);
 }
 
-/* ---- beside the crowd ---- */
+/* ---- beside the batch engine ---- */
 
 typedef struct {
-    Crowd *crowd;
+    Envs *envs;
     float history[SA01_HISTORY], reward;
     uint8_t done, timeout, valid;
 } Rival;
@@ -149,30 +149,34 @@ static void rival_start(Rival *rival, int ground, double stiffness, double speed
     material.material.sigma_cone *= stiffness;
     material.depth = rigid ? 0 : task_standing_depth(robot, &material.material);
     const TaskGrounds grounds = {1, &material};
-    const CrowdTrial trial = {.rigid = rigid};
-    const CrowdDef def = {.task = &task,
-                          .robot = robot,
-                          .pool = pool,
-                          .device = MILD_BATCH_HOST,
-                          .envs = 1,
-                          .seed = 1,
-                          .chosen = &grounds,
-                          .trial = &trial};
+    const EnvsTrial trial = {.rigid = rigid};
+    const EnvsDef def = {.task = &task,
+                         .robot = robot,
+                         .pool = pool,
+                         .batch = 1,
+                         .device = MILD_BATCH_HOST,
+                         .count = 1,
+                         .seed = 1,
+                         .chosen = &grounds,
+                         .trial = &trial};
     const double stand[3] = {0, 0, 0}, walk[3] = {speed, 0, 0};
-    const VecView view = {.history = rival->history};
-    rival->crowd = crowd_create(&def, &error);
-    assert_non_null(rival->crowd);
-    assert_int_equal(crowd_command(rival->crowd, stand, &error), MILD_OK);
-    assert_int_equal(crowd_reset(rival->crowd, &view, NULL, &error), MILD_OK);
-    assert_int_equal(crowd_command(rival->crowd, walk, &error), MILD_OK);
+    const EnvsView view = {.history = rival->history};
+    rival->envs = envs_create(&def, &error);
+    assert_non_null(rival->envs);
+    assert_int_equal(envs_set_commands(rival->envs, stand, &error), MILD_OK);
+    assert_int_equal(envs_reset(rival->envs, &view, NULL, &error), MILD_OK);
+    assert_int_equal(envs_set_commands(rival->envs, walk, &error), MILD_OK);
 }
 
 static void rival_step(Rival *rival, const float *action) {
     MildError error = {0};
-    const VecView view = {.history = rival->history};
-    assert_int_equal(crowd_step(rival->crowd, action, &rival->reward, &rival->done, &rival->timeout,
-                                &rival->valid, &view, NULL, &error),
-                     MILD_OK);
+    const EnvsStep step = {.action = action,
+                           .reward = &rival->reward,
+                           .done = &rival->done,
+                           .timeout = &rival->timeout,
+                           .valid = &rival->valid,
+                           .next = {.history = rival->history}};
+    assert_int_equal(envs_step(rival->envs, &step, NULL, &error), MILD_OK);
 }
 
 /* Largest difference of two histories. */
@@ -207,7 +211,7 @@ static void test_same_steps(void **state) {
         printf("  ground %d: after a step %.1e apart (bound 2e-4), in 60 steps %.1e (bound 0.02)\n",
                grounds[g], first, worst);
         assert_true(first < 2e-4 && worst < 0.02);
-        crowd_destroy(rival.crowd);
+        envs_destroy(rival.envs);
     }
 }
 
@@ -230,10 +234,10 @@ static double walk(double seconds, float speed) {
 
 static double rival_walk(int ground) {
     Rival rival = {0};
-    CrowdSample sample[8];
+    EnvsSample sample[8];
     double before[2] = {0, 0};
     rival_start(&rival, ground, 1, 0.6);
-    crowd_watch(rival.crowd, sample);
+    assert_int_equal(envs_set_samples(rival.envs, sample, NULL), MILD_OK);
     for (int t = 0; t < 10 * SECOND; t++) {
         float action[SA01_JOINTS];
         policy_act(policy, NULL, 1, rival.history, action, NULL, NULL);
@@ -246,7 +250,7 @@ static double rival_walk(int ground) {
     }
     const double x = (double)sample[0].base[0] - before[0];
     const double y = (double)sample[0].base[1] - before[1];
-    crowd_destroy(rival.crowd);
+    envs_destroy(rival.envs);
     return hypot(x, y) / 8;
 }
 
@@ -263,7 +267,7 @@ static void test_walks(void **state) {
     const int sand = preset("sand_loose");
     start(sand, WEB_LEVEL, 0);
     const double mine = walk(10, 0.6f), theirs = rival_walk(sand);
-    printf("  sand_loose: %.4f m/s, the crowd %.4f (bound 2 %%)\n", mine, theirs);
+    printf("  sand_loose: %.4f m/s, the batch engine %.4f (bound 2 %%)\n", mine, theirs);
     assert_true(fabs(mine / theirs - 1) < 0.02);
 }
 
@@ -416,14 +420,14 @@ static void test_stripes(void **state) {
     assert_true(left == 0 && kept > 0.1);
 }
 
-/* The same of the crowd's robot on a material of that stiffness. */
+/* The same of the batch engine's robot on a material of that stiffness. */
 static double rival_depth(double stiffness) {
     Rival rival = {0};
     double sum = 0;
     rival_start(&rival, preset("foam45"), stiffness, 0);
-    CrowdSample sample[16];
-    assert_true(crowd_samples(rival.crowd) <= 16);
-    crowd_watch(rival.crowd, sample);
+    EnvsSample sample[16];
+    assert_true(envs_physics_steps(rival.envs) <= 16);
+    assert_int_equal(envs_set_samples(rival.envs, sample, NULL), MILD_OK);
     for (int t = 0; t < 8 * SECOND; t++) {
         float action[SA01_JOINTS];
         web_act(rival.history, action);
@@ -431,7 +435,7 @@ static double rival_depth(double stiffness) {
         assert_false(rival.done);
         sum += t < 2 * SECOND ? 0 : (double)(sample[0].foot[0].depth + sample[0].foot[1].depth) / 2;
     }
-    crowd_destroy(rival.crowd);
+    envs_destroy(rival.envs);
     return sum / (6 * SECOND);
 }
 
@@ -447,7 +451,7 @@ static void test_sliders(void **state) {
     for (int i = 0; i < 3; i++) {
         const double rival = rival_depth(stiffness[i]);
         printf(
-            "  depth on foam45 at %.1f times its stiffness: %.1f mm; of the crowd's robot %.1f\n",
+            "  depth on foam45 at %.1f times its stiffness: %.1f mm; of the batch engine's robot %.1f\n",
             stiffness[i], 1e3 * depth[i], 1e3 * rival);
         /* with k_pen alone three times as large the feet are twice as deep */
         assert_true(fabs(depth[i] - rival) < 0.15 * rival);

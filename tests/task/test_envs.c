@@ -4,13 +4,13 @@
 
 #include <malloc.h>
 
-#include "task/vec.h"
+#include "envs_kit.h"
 
 enum { ENVS = 6 };
 
 typedef struct {
     Pool *pool;
-    Vec *vec;
+    Envs *envs;
     float history[ENVS][SA01_HISTORY];
     float critic[ENVS][SA01_CRITIC];
     float estimate[ENVS][SA01_ESTIMATES];
@@ -24,29 +24,35 @@ typedef struct {
 
 static Many many;
 
-static VecView all_views(void) {
-    return (VecView){many.history[0], many.critic[0], many.estimate[0], many.frame[0]};
+static EnvsView all_views(void) {
+    return (EnvsView){many.history[0], many.critic[0], many.estimate[0], many.frame[0]};
 }
 
-static void open_many(const TaskDef *def, int threads) {
+static void open_from(const TaskDef *def, int threads, uint32_t first) {
     MildError error = {0};
     memset(&many, 0, sizeof many);
     many.pool = pool_create(threads);
-    many.vec = vec_create(def, robot, many.pool, ENVS, 21, &error);
-    assert_non_null(many.vec);
-    VecView view = all_views();
-    vec_reset(many.vec, &view);
+    const EnvsDef of = {
+        .task = def, .robot = robot, .pool = many.pool, .count = ENVS, .first = first, .seed = 21};
+    many.envs = envs_create(&of, &error);
+    assert_non_null(many.envs);
+    const EnvsView view = all_views();
+    envs_reset(many.envs, &view, NULL, &error);
+}
+
+static void open_many(const TaskDef *def, int threads) {
+    open_from(def, threads, 0);
 }
 
 static void close_many(void) {
-    vec_destroy(many.vec);
+    envs_destroy(many.envs);
     pool_destroy(many.pool);
 }
 
 /* Environment e of the block. */
 static TaskEnv *env_of(int e) {
     size_t bytes;
-    char *state = vec_state(many.vec, &bytes);
+    char *state = envs_state(many.envs, &bytes);
     return (TaskEnv *)(void *)(state + (size_t)e * (bytes / ENVS));
 }
 
@@ -59,9 +65,18 @@ static void draw_actions(int step) {
     }
 }
 
+static void step_into(EnvsView next) {
+    const EnvsStep step = {.action = many.action[0],
+                           .reward = many.reward,
+                           .done = many.done,
+                           .timeout = many.timeout,
+                           .valid = many.valid,
+                           .next = next};
+    assert_int_equal(envs_step(many.envs, &step, NULL, NULL), MILD_OK);
+}
+
 static void step_many(void) {
-    VecView view = all_views();
-    vec_step(many.vec, many.action[0], many.reward, many.done, many.timeout, many.valid, &view);
+    step_into(all_views());
 }
 
 /* ---- each as alone ---- */
@@ -117,7 +132,7 @@ static void views_may_be_missing(void **unused) {
     TaskDef def = task_def_default();
     for (int missing = 0; missing <= 4; missing++) {
         open_many(&def, 1);
-        VecView view = all_views();
+        EnvsView view = all_views();
         float **member[4] = {&view.history, &view.critic, &view.estimate, &view.frame};
         float *kept[4];
         for (int i = 0; i < 4; i++) {
@@ -128,7 +143,7 @@ static void views_may_be_missing(void **unused) {
             }
         }
         draw_actions(0);
-        vec_step(many.vec, many.action[0], many.reward, many.done, many.timeout, many.valid, &view);
+        step_into(view);
         for (int i = 0; i < 4; i++) {
             assert_int_equal(kept[i][0] == -77, i == missing || missing == 4);
         }
@@ -201,7 +216,7 @@ static void statistics(void **unused) {
         env->assist_level = 0.1 * (e + 1);
         level += env->assist_level * env->assist_draw / ENVS;
     }
-    VecStats stats = vec_take_stats(many.vec);
+    EnvsStats stats = kit_stats(many.envs, ENVS);
     print_message("%d episodes, %d falls, %d diverged\n", stats.episodes, stats.falls,
                   stats.diverged);
     assert_true(sum.falls >= 2 && sum.diverged >= 1 && sum.episodes > sum.falls);
@@ -216,7 +231,7 @@ static void statistics(void **unused) {
     for (int i = 0; i < TASK_REWARD_COUNT; i++) {
         expect_near(task_reward_names[i], stats.terms[i], sum.terms[i] / sum.length, 1e-12);
     }
-    stats = vec_take_stats(many.vec); /* all taken; help is of now */
+    stats = kit_stats(many.envs, ENVS); /* all taken; help is of now */
     assert_true(stats.episodes == 0 && stats.falls == 0 && stats.diverged == 0);
     assert_true(stats.steps == 0 && stats.length == 0 && stats.reward == 0);
     assert_true(stats.speed_error == 0 && stats.terms[0] == 0);
@@ -234,7 +249,7 @@ static void an_episode_of_one_step(void **unused) {
     env->step = env->step_first = env->step_limit - 1;
     step_many();
     assert_true(many.done[4] && many.timeout[4] && !many.done[3] && !many.timeout[3]);
-    VecStats stats = vec_take_stats(many.vec);
+    EnvsStats stats = kit_stats(many.envs, ENVS);
     assert_int_equal(stats.episodes, 1);
     assert_int_equal(stats.falls, 0);
     expect_near("length", stats.length, 0.01, 1e-15);
@@ -255,15 +270,15 @@ static void times(void **unused) {
     TaskDef def = kit_quiet_def();
     open_many(&def, 2);
     double physics, ground;
-    vec_take_times(many.vec, &physics, &ground);
+    envs_times(many.envs, &physics, &ground);
     assert_true(physics == 0 && ground == 0); /* a start takes no physics step */
     for (int t = 0; t < 5; t++) {
         step_many();
     }
-    vec_take_times(many.vec, &physics, &ground);
+    envs_times(many.envs, &physics, &ground);
     print_message("physics %.2g s, ground %.2g s of it\n", physics, ground);
     assert_true(ground > 1e-6 && physics > ground && physics < 60);
-    vec_take_times(many.vec, &physics, &ground);
+    envs_times(many.envs, &physics, &ground);
     assert_true(physics == 0 && ground == 0);
     close_many();
 }
@@ -273,10 +288,10 @@ static void bytes(void **unused) {
     TaskDef def = kit_quiet_def();
     open_many(&def, 1);
     size_t size;
-    assert_non_null(vec_state(many.vec, &size));
+    assert_non_null(envs_state(many.envs, &size));
     assert_int_equal(size, ENVS * task_env_bytes(&def, robot));
-    assert_int_equal(vec_bytes(many.vec), size + ENVS * sizeof(TaskStep));
-    assert_int_equal((uintptr_t)vec_state(many.vec, &size) % 64, 0);
+    assert_int_equal(envs_bytes(many.envs), size + ENVS * sizeof(TaskStep));
+    assert_int_equal((uintptr_t)envs_state(many.envs, &size) % 64, 0);
     close_many();
 }
 
@@ -306,7 +321,7 @@ static void hash(void **unused) {
         wanted = fnv(wanted, &env->reward_sum, sizeof env->reward_sum);
         wanted = fnv(wanted, task_env_ground(env), mild_ground_size(task_env_ground(env)));
     }
-    assert_true(vec_hash(many.vec) == wanted);
+    assert_true(envs_hash(many.envs) == wanted);
     close_many();
 }
 
@@ -334,10 +349,10 @@ static void refused(void **unused) {
     Pool *pool = pool_create(1);
     TaskDef def = task_def_default();
     def.physics_dt = 0.003;
-    assert_null(vec_create(&def, robot, pool, 1, 0, &error));
+    assert_null(kit_mujoco(&def, robot, pool, 1, 0, &error));
     assert_int_equal(error.status, MILD_ERROR_RANGE);
     assert_non_null(strstr(error.text, "physics_dt"));
-    vec_destroy(NULL);
+    envs_destroy(NULL);
     pool_destroy(pool);
 }
 
@@ -345,10 +360,7 @@ static void refused(void **unused) {
 static void numbered_from(void **unused) {
     (void)unused;
     const TaskDef def = task_def_default();
-    open_many(&def, 2);
-    VecView view = all_views();
-    vec_number_from(many.vec, 70);
-    vec_reset(many.vec, &view);
+    open_from(&def, 2, 70);
     for (int e = 0; e < ENVS; e++) {
         Rig alone;
         rig_open(&alone, &def, 21, (uint32_t)(70 + e));
@@ -362,12 +374,12 @@ static void numbered_from(void **unused) {
 /* The means of two groups of robots together. */
 static void statistics_of_two(void **unused) {
     (void)unused;
-    VecStats stats = {.episodes = 3 + 1, .falls = 2, .steps = 50, .assist = 1.5 + 0.5};
+    EnvsStats stats = {.episodes = 3 + 1, .falls = 2, .steps = 50, .assist = 1.5 + 0.5};
     stats.length = 6 + 2;
     stats.reward = 30 + 10;
     stats.speed_error = 0.6 + 0.6;
     stats.terms[1] = 4;
-    stats = vec_stats_from(stats, 4);
+    stats = envs_means(stats, 4);
     assert_int_equal(stats.episodes, 4);
     assert_int_equal(stats.falls, 2);
     expect_near("steps", stats.steps, 50, 0);

@@ -1,5 +1,5 @@
 #define MILD_REAL_FLOAT
-#include "crowd/crowd.h"
+#include "crowd/backend.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +14,8 @@ _Static_assert(CROWD_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fi
  * them. */
 enum { SHARES = 3 };
 
-struct Crowd {
+typedef struct {
+    Envs base;
     CrowdArrays arrays; /* their memory is the device's */
     MildBatch *ground;
     DeviceFork *fork; /* streams of all shares but the first, on a GPU; else NULL */
@@ -26,11 +27,18 @@ struct Crowd {
     CrowdGround *drawn;          /* of the device: the grounds of CrowdTask */
     void *trials;                /* where those of trials are */
     Pool *pool;                  /* of the host */
-    int steps;                   /* of physics in a policy step */
     int device;
     size_t robot; /* [B] of CrowdRobot */
     size_t bytes; /* of the device, without the ground */
-};
+} Crowd;
+
+static Crowd *own(Envs *envs) {
+    return (Crowd *)(void *)envs;
+}
+
+static const Crowd *own_const(const Envs *envs) {
+    return (const Crowd *)(const void *)envs;
+}
 
 static MildStatus checked(const char *why, MildError *error) {
     return why ? mild_fail(error, MILD_ERROR_IO, "GPU: robots: %s", why) : MILD_OK;
@@ -38,7 +46,7 @@ static MildStatus checked(const char *why, MildError *error) {
 
 /* ---- creation ---- */
 
-static MildStatus check_def(const CrowdDef *def, MildError *error) {
+static MildStatus check_def(const EnvsDef *def, MildError *error) {
     const TaskDef *task = def->task;
     MildStatus status = task_def_check_robot(task, def->robot, error);
     const int patches = task->randomize.patch_share > 0 && !def->striped &&
@@ -56,9 +64,9 @@ static MildStatus check_def(const CrowdDef *def, MildError *error) {
                : status;
 }
 
-static MildStatus open_ground(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
+static MildStatus open_ground(Crowd *crowd, const EnvsDef *def, const TaskGrounds *grounds,
                               MildError *error) {
-    const MildBatchDef batch = {.robots = def->envs,
+    const MildBatchDef batch = {.robots = def->count,
                                 .feet = robot_feet(def->robot),
                                 .soles = robot_soles(def->robot),
                                 .dt = def->task->physics_dt,
@@ -136,21 +144,21 @@ static MildStatus take_arrays(Crowd *crowd, const TaskDef *task, MildError *erro
 }
 
 /* Trials and their commands. */
-static MildStatus copy_trials(Crowd *crowd, const CrowdDef *def, MildError *error) {
+static MildStatus copy_trials(Crowd *crowd, const EnvsDef *def, MildError *error) {
     CrowdArrays *all = &crowd->arrays;
-    const size_t envs = (size_t)def->envs, commands = 3 * envs * sizeof *all->command;
+    const size_t envs = (size_t)def->count, commands = 3 * envs * sizeof *all->command;
     crowd->trials = take(crowd, commands + envs * sizeof *all->trial, error);
     if (!crowd->trials) {
         return MILD_ERROR_MEMORY;
     }
-    CrowdTrial *trial = (void *)((char *)crowd->trials + commands);
+    EnvsTrial *trial = (void *)((char *)crowd->trials + commands);
     all->command = crowd->trials;
     all->trial = trial;
     return batch_copy(crowd->device, trial, def->trial, envs * sizeof *trial, error);
 }
 
 /* What is drawn of the grounds. */
-static MildStatus copy_grounds(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
+static MildStatus copy_grounds(Crowd *crowd, const EnvsDef *def, const TaskGrounds *grounds,
                                MildError *error) {
     const size_t bytes = (size_t)grounds->count * sizeof *crowd->drawn;
     CrowdGround *made = malloc(bytes);
@@ -168,7 +176,7 @@ static MildStatus copy_grounds(Crowd *crowd, const CrowdDef *def, const TaskGrou
     return status;
 }
 
-static MildStatus copy_task(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
+static MildStatus copy_task(Crowd *crowd, const EnvsDef *def, const TaskGrounds *grounds,
                             MildError *error) {
     CrowdTask task = {.task = *def->task,
                       .ground = crowd->drawn,
@@ -214,7 +222,7 @@ static MildStatus choose_kernels(Crowd *crowd, const Robot *robot, const EngineT
 }
 
 /* The robot as the engine knows it, and what steps it. */
-static MildStatus copy_model(Crowd *crowd, const CrowdDef *def, MildError *error) {
+static MildStatus copy_model(Crowd *crowd, const EnvsDef *def, MildError *error) {
     EngineModel *model = calloc(1, sizeof *model);
     double *number = calloc(ENGINE_NUMBERS, sizeof *number);
     EngineTree tree = {0};
@@ -236,17 +244,6 @@ static MildStatus copy_model(Crowd *crowd, const CrowdDef *def, MildError *error
     free(model);
     free(number);
     return status;
-}
-
-int crowd_is_slow(const Robot *robot) {
-    double *number = calloc(ENGINE_NUMBERS, sizeof *number);
-    EngineTree tree;
-    MildError unused;
-    const int read =
-        number && engine_model_read(robot, TASK_PERIOD, &tree, number, &unused) == MILD_OK;
-    const CrowdKernels *kernels = read ? kernels_for(&tree) : NULL;
-    free(number);
-    return kernels && !kernels->fixed;
 }
 
 static void create_piece(void *context, int piece, int thread) {
@@ -273,14 +270,13 @@ static MildStatus open_shares(Crowd *crowd, MildError *error) {
     return crowd->fork ? MILD_OK : error->status;
 }
 
-static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGrounds *grounds,
+static MildStatus open_crowd(Crowd *crowd, const EnvsDef *def, const TaskGrounds *grounds,
                              MildError *error) {
     crowd->shape = task_shape(def->robot);
     crowd->device = def->device;
     crowd->pool = def->pool;
-    crowd->steps = (int)(TASK_PERIOD / def->task->physics_dt + 0.5);
     crowd->labels = (size_t)labels_of(def->task);
-    crowd->arrays.envs = def->envs;
+    crowd->arrays.envs = def->count;
     MildStatus status = open_ground(crowd, def, grounds, error);
     status = status == MILD_OK ? open_shares(crowd, error) : status;
     status = status == MILD_OK ? copy_model(crowd, def, error) : status;
@@ -291,30 +287,8 @@ static MildStatus open_crowd(Crowd *crowd, const CrowdDef *def, const TaskGround
     return status == MILD_OK ? create_envs(crowd, error) : status;
 }
 
-Crowd *crowd_create(const CrowdDef *def, MildError *error) {
-    if (check_def(def, error) != MILD_OK) {
-        return NULL;
-    }
-    TaskGrounds *drawn = def->chosen ? NULL
-                                     : task_grounds_create(def->task, def->robot, def->grounds,
-                                                           def->seed, def->pool, error);
-    const TaskGrounds *grounds = def->chosen ? def->chosen : drawn;
-    Crowd *crowd = grounds ? calloc(1, sizeof *crowd) : NULL;
-    if (grounds && !crowd) {
-        mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
-    }
-    if (crowd && open_crowd(crowd, def, grounds, error) != MILD_OK) {
-        crowd_destroy(crowd);
-        crowd = NULL;
-    }
-    task_grounds_destroy(drawn);
-    return crowd;
-}
-
-void crowd_destroy(Crowd *crowd) {
-    if (!crowd) {
-        return;
-    }
+static void destroy(Envs *envs) {
+    Crowd *crowd = own(envs);
     const CrowdArrays *all = &crowd->arrays;
     batch_free(crowd->device, crowd->drawn);
     batch_free(crowd->device, crowd->block);
@@ -326,17 +300,13 @@ void crowd_destroy(Crowd *crowd) {
     free(crowd);
 }
 
-CrowdMemory crowd_memory(const Crowd *crowd) {
+static EnvsMemory memory(const Envs *envs) {
+    const Crowd *crowd = own_const(envs);
     const size_t task = crowd->arrays.stride, engine = crowd->robot;
-    return (CrowdMemory){.task = task,
-                         .engine = engine,
-                         .ground = mild_batch_robot_bytes(crowd->ground),
-                         .rest = crowd->bytes / (size_t)crowd->arrays.envs - task - engine};
-}
-
-size_t crowd_robot_bytes(const Crowd *crowd) {
-    const CrowdMemory memory = crowd_memory(crowd);
-    return memory.task + memory.engine + memory.ground + memory.rest;
+    return (EnvsMemory){.task = task,
+                        .engine = engine,
+                        .ground = mild_batch_robot_bytes(crowd->ground),
+                        .rest = crowd->bytes / (size_t)crowd->arrays.envs - task - engine};
 }
 
 /* ---- shares ---- */
@@ -396,7 +366,7 @@ static CrowdArrays arrays_from(const Crowd *crowd, size_t first, int count) {
     all.contact = contact_from(&all.contact, first, (size_t)crowd->shape.feet);
     all.trial = all.trial ? all.trial + first : NULL;
     all.command = all.command ? all.command + 3 * first : NULL;
-    all.sample = all.sample ? all.sample + first * (size_t)crowd->steps : NULL;
+    all.sample = all.sample ? all.sample + first * (size_t)crowd->base.physics_steps : NULL;
     return all;
 }
 
@@ -450,7 +420,7 @@ static void first_piece(void *context, int piece, int thread) {
 
 /* ---- steps ---- */
 
-static CrowdStep step_into(const VecView *view) {
+static CrowdStep step_into(const EnvsView *view) {
     return (CrowdStep){.history = view->history,
                        .critic = view->critic,
                        .estimate = view->estimate,
@@ -479,7 +449,7 @@ static MildStatus step_share(const Crowd *crowd, Share *share, MildError *error)
     const CrowdArrays *all = &share->arrays;
     Call call = {&share->arrays, &share->step, 0};
     MildStatus status = MILD_OK;
-    for (call.part = 0; status == MILD_OK && call.part <= crowd->steps; call.part++) {
+    for (call.part = 0; status == MILD_OK && call.part <= crowd->base.physics_steps; call.part++) {
         status = call.part > 0 ? step_ground(share, error) : MILD_OK;
         if (status == MILD_OK && crowd->kernels) {
             status =
@@ -533,24 +503,33 @@ static MildStatus each_share(const Crowd *crowd, const CrowdStep *step, void *st
     return status == MILD_OK && crowd->fork ? device_join(crowd->fork, stream, error) : status;
 }
 
-MildStatus crowd_reset(Crowd *crowd, const VecView *first, void *stream, MildError *error) {
+static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
     const CrowdStep step = step_into(first);
-    return each_share(crowd, &step, stream, begin_share, error);
+    return each_share(own(envs), &step, stream, begin_share, error);
 }
 
-MildStatus crowd_step(Crowd *crowd, const float *action, float *reward, uint8_t *done,
-                      uint8_t *timeout, uint8_t *valid, const VecView *next, void *stream,
-                      MildError *error) {
-    CrowdStep step = step_into(next);
-    step.action = action;
-    step.reward = reward;
-    step.done = done;
-    step.timeout = timeout;
-    step.valid = valid;
-    return each_share(crowd, &step, stream, step_share, error);
+static MildStatus step(Envs *envs, const EnvsStep *call, void *stream, MildError *error) {
+    CrowdStep step = step_into(&call->next);
+    if (call->last.history || call->terms) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "the batch engine does not keep the end of an episode; train.robots = "
+                         "mujoco does");
+    }
+    step.action = call->action;
+    step.reward = call->reward;
+    step.done = call->done;
+    step.timeout = call->timeout;
+    step.valid = call->valid;
+    return each_share(own(envs), &step, stream, step_share, error);
 }
 
-MildStatus crowd_take_sums(Crowd *crowd, VecStats *sums, void *stream, MildError *error) {
+static MildStatus wait(Envs *envs, MildError *error) {
+    const Crowd *crowd = own(envs);
+    return crowd->device == MILD_BATCH_HOST ? MILD_OK : device_wait(crowd->device, error);
+}
+
+static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+    const Crowd *crowd = own(envs);
     const CrowdArrays *all = &crowd->arrays;
     double sum[TALLY_NUMBERS];
     if (crowd->device != MILD_BATCH_HOST) {
@@ -566,16 +545,16 @@ MildStatus crowd_take_sums(Crowd *crowd, VecStats *sums, void *stream, MildError
     if (status != MILD_OK) {
         return status;
     }
-    *sums = (VecStats){.episodes = (int)sum[TALLY_EPISODES],
-                       .falls = (int)sum[TALLY_FALLS],
-                       .diverged = (int)sum[TALLY_DIVERGED],
-                       .steps = sum[TALLY_STEPS],
-                       .paid = sum[TALLY_PAID],
-                       .length = sum[TALLY_LENGTH],
-                       .reward = sum[TALLY_REWARD],
-                       .speed_error = sum[TALLY_SPEED_ERROR],
-                       .assist = sum[TALLY_ASSIST]};
-    memcpy(sums->terms, sum + TALLY_TERMS, sizeof sums->terms);
+    *sums = (EnvsStats){.episodes = (int)sum[TALLY_EPISODES],
+                        .falls = (int)sum[TALLY_FALLS],
+                        .diverged = (int)sum[TALLY_DIVERGED],
+                        .steps = sum[TALLY_STEPS],
+                        .paid = sum[TALLY_PAID],
+                        .length = sum[TALLY_LENGTH],
+                        .reward = sum[TALLY_REWARD],
+                        .speed_error = sum[TALLY_SPEED_ERROR],
+                        .assist = sum[TALLY_ASSIST]};
+    memcpy(sums->terms, sum + TALLY_TERMS, TASK_REWARD_COUNT * sizeof *sum);
     return MILD_OK;
 }
 
@@ -591,7 +570,8 @@ static MildStatus move_kept(const Crowd *crowd, const CrowdArrays *all, int back
     return status == MILD_OK ? device_wait(crowd->device, error) : status;
 }
 
-MildStatus crowd_keep(Crowd *crowd, TaskKept *kept, MildError *error) {
+static MildStatus save_progress(Envs *envs, TaskProgress *kept, MildError *error) {
+    const Crowd *crowd = own(envs);
     const size_t bytes = (size_t)crowd->arrays.envs * sizeof *kept;
     CrowdArrays all = crowd->arrays;
     all.kept = batch_alloc(crowd->device, bytes, error);
@@ -601,7 +581,8 @@ MildStatus crowd_keep(Crowd *crowd, TaskKept *kept, MildError *error) {
     return status;
 }
 
-MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
+static MildStatus load_progress(Envs *envs, const TaskProgress *kept, MildError *error) {
+    const Crowd *crowd = own(envs);
     const size_t bytes = (size_t)crowd->arrays.envs * sizeof *kept;
     CrowdArrays all = crowd->arrays;
     all.kept = batch_alloc(crowd->device, bytes, error);
@@ -612,7 +593,8 @@ MildStatus crowd_restore(Crowd *crowd, const TaskKept *kept, MildError *error) {
     return status;
 }
 
-MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error) {
+static MildStatus set_commands(Envs *envs, const double *command, MildError *error) {
+    const Crowd *crowd = own(envs);
     const CrowdArrays *all = &crowd->arrays;
     Call call = {all, NULL, 0};
     MildStatus status = batch_copy(crowd->device, all->command, command,
@@ -626,18 +608,58 @@ MildStatus crowd_command(Crowd *crowd, const double *command, MildError *error) 
     return status;
 }
 
-void crowd_watch(Crowd *crowd, CrowdSample *sample) {
-    crowd->arrays.sample = sample;
+static void set_samples(Envs *envs, EnvsSample *sample) {
+    own(envs)->arrays.sample = sample;
 }
 
-int crowd_samples(const Crowd *crowd) {
-    return crowd->steps;
+static const EnvsBackend backend = {.destroy = destroy,
+                                    .reset = reset,
+                                    .step = step,
+                                    .wait = wait,
+                                    .sums = sums,
+                                    .save_progress = save_progress,
+                                    .load_progress = load_progress,
+                                    .memory = memory,
+                                    .set_commands = set_commands,
+                                    .set_samples = set_samples};
+
+Envs *envs_create_batch(const EnvsDef *def, MildError *error) {
+    if (check_def(def, error) != MILD_OK) {
+        return NULL;
+    }
+    TaskGrounds *drawn = def->chosen ? NULL
+                                     : task_grounds_create(def->task, def->robot, def->grounds,
+                                                           def->seed, def->pool, error);
+    const TaskGrounds *grounds = def->chosen ? def->chosen : drawn;
+    Crowd *crowd = grounds ? calloc(1, sizeof *crowd) : NULL;
+    if (grounds && !crowd) {
+        mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
+    }
+    if (crowd) {
+        crowd->base.backend = &backend;
+    }
+    if (crowd && open_crowd(crowd, def, grounds, error) != MILD_OK) {
+        destroy(&crowd->base);
+        crowd = NULL;
+    }
+    task_grounds_destroy(drawn);
+    return crowd ? &crowd->base : NULL;
 }
 
-size_t crowd_bytes(const Crowd *crowd) {
-    return crowd_robot_bytes(crowd) * (size_t)crowd->arrays.envs;
+/* ---- tests ---- */
+
+int envs_are_slow(const Robot *robot) {
+    double *number = calloc(ENGINE_NUMBERS, sizeof *number);
+    EngineTree tree;
+    MildError unused;
+    const int read =
+        number && engine_model_read(robot, TASK_PERIOD, &tree, number, &unused) == MILD_OK;
+    const CrowdKernels *kernels = read ? kernels_for(&tree) : NULL;
+    free(number);
+    return kernels && !kernels->fixed;
 }
 
-void *crowd_env(const Crowd *crowd, int i) {
+void *envs_batch_env(const Envs *envs, int i) {
+    const Crowd *crowd = own_const(envs);
     return crowd->arrays.env + (size_t)i * crowd->arrays.stride;
 }
