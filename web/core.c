@@ -45,7 +45,7 @@ static struct {
     CrowdRobot *robot;
     CrowdPlace *place;
     CrowdArrays all;
-    CrowdStep call;
+    EnvsStep call;
     float history[TASK_HISTORY_MAX];
     /* the ground */
     int feet;
@@ -757,7 +757,7 @@ const char *web_open(const WebModel *file, size_t bytes) {
     web.all.task = task;
     web.all.model = &file->model;
     web.all.trial = &web.trial;
-    web.call.history = web.history;
+    web.call.next.history = web.history;
     crowd_create_env(&web.all, 0);
     return NULL;
 }

@@ -3,6 +3,7 @@
 #define CROWD_ARRAYS_H
 
 #include "batch/batch.h"
+#include "crowd/envs_step.h"
 #include "crowd/trial.h"
 #include "engine/model.h"
 #include "task/ground.h"
@@ -78,13 +79,5 @@ typedef struct {
     const CrowdTask *task;
     const EngineModel *model;
 } CrowdArrays;
-
-/* Arguments of a policy step. */
-typedef struct {
-    const float *action;
-    float *reward;
-    uint8_t *done, *timeout, *valid;
-    float *history, *critic, *estimate, *frame; /* of EnvsView */
-} CrowdStep;
 
 #endif

@@ -315,7 +315,7 @@ static EnvsMemory memory(const Envs *envs) {
  * share's kernel leave places free, the next kernel of another takes them. */
 typedef struct {
     CrowdArrays arrays;
-    CrowdStep step;
+    EnvsStep step;
     MildBatch ground;
     void *stream;
 } Share;
@@ -328,17 +328,20 @@ static uint8_t *flag_from(uint8_t *flags, size_t first) {
     return flags ? flags + first : NULL;
 }
 
-static CrowdStep step_from(const CrowdStep *step, const TaskShape *shape, size_t first) {
-    return (CrowdStep){.action =
-                           step->action ? step->action + first * (size_t)shape->actions : NULL,
-                       .reward = row_from(step->reward, first, 1),
-                       .done = flag_from(step->done, first),
-                       .timeout = flag_from(step->timeout, first),
-                       .valid = flag_from(step->valid, first),
-                       .history = row_from(step->history, first, shape->history),
-                       .critic = row_from(step->critic, first, shape->critic),
-                       .estimate = row_from(step->estimate, first, shape->estimates),
-                       .frame = row_from(step->frame, first, shape->observation)};
+static EnvsView view_from(const EnvsView *view, const TaskShape *shape, size_t first) {
+    return (EnvsView){.history = row_from(view->history, first, shape->history),
+                      .critic = row_from(view->critic, first, shape->critic),
+                      .estimate = row_from(view->estimate, first, shape->estimates),
+                      .frame = row_from(view->frame, first, shape->observation)};
+}
+
+static EnvsStep step_from(const EnvsStep *step, const TaskShape *shape, size_t first) {
+    return (EnvsStep){.action = step->action ? step->action + first * (size_t)shape->actions : NULL,
+                      .reward = row_from(step->reward, first, 1),
+                      .done = flag_from(step->done, first),
+                      .timeout = flag_from(step->timeout, first),
+                      .valid = flag_from(step->valid, first),
+                      .next = view_from(&step->next, shape, first)};
 }
 
 static CrowdContact contact_from(const CrowdContact *c, size_t first, size_t feet) {
@@ -370,7 +373,7 @@ static CrowdArrays arrays_from(const Crowd *crowd, size_t first, int count) {
     return all;
 }
 
-static Share share_of(const Crowd *crowd, const CrowdStep *step, int i, void *stream) {
+static Share share_of(const Crowd *crowd, const EnvsStep *step, int i, void *stream) {
     const long envs = crowd->arrays.envs;
     const long first = envs * i / crowd->shares, end = envs * (i + 1) / crowd->shares;
     const int count = (int)(end - first);
@@ -386,7 +389,7 @@ static Share share_of(const Crowd *crowd, const CrowdStep *step, int i, void *st
 /* One call, for the threads of the host. */
 typedef struct {
     const CrowdArrays *arrays;
-    const CrowdStep *step;
+    const EnvsStep *step;
     int part;
 } Call;
 
@@ -419,13 +422,6 @@ static void first_piece(void *context, int piece, int thread) {
 }
 
 /* ---- steps ---- */
-
-static CrowdStep step_into(const EnvsView *view) {
-    return (CrowdStep){.history = view->history,
-                       .critic = view->critic,
-                       .estimate = view->estimate,
-                       .frame = view->frame};
-}
 
 /* One step of the ground under the robots of a share. */
 static MildStatus step_ground(Share *share, MildError *error) {
@@ -491,7 +487,7 @@ static MildStatus see_share(const Crowd *crowd, Share *share, MildError *error) 
     return status;
 }
 
-static MildStatus each_share(const Crowd *crowd, const CrowdStep *step, void *stream,
+static MildStatus each_share(const Crowd *crowd, const EnvsStep *step, void *stream,
                              MildStatus (*work)(const Crowd *, Share *, MildError *),
                              MildError *error) {
     MildStatus status = crowd->fork ? device_fork(crowd->fork, stream, error) : MILD_OK;
@@ -504,23 +500,16 @@ static MildStatus each_share(const Crowd *crowd, const CrowdStep *step, void *st
 }
 
 static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
-    const CrowdStep step = step_into(first);
-    return each_share(own(envs), &step, stream, begin_share, error);
+    const EnvsStep none = {.next = *first};
+    return each_share(own(envs), &none, stream, begin_share, error);
 }
 
-static MildStatus step(Envs *envs, const EnvsStep *call, void *stream, MildError *error) {
-    CrowdStep step = step_into(&call->next);
-    if (call->last.history || call->terms) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "the batch engine does not keep the end of an episode; train.robots = "
-                         "mujoco does");
-    }
-    step.action = call->action;
-    step.reward = call->reward;
-    step.done = call->done;
-    step.timeout = call->timeout;
-    step.valid = call->valid;
-    return each_share(own(envs), &step, stream, step_share, error);
+static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+    return step->last.history || step->terms
+               ? mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "the batch engine does not keep the end of an episode; train.robots = "
+                           "mujoco does")
+               : each_share(own(envs), step, stream, step_share, error);
 }
 
 static MildStatus wait(Envs *envs, MildError *error) {

@@ -43,7 +43,7 @@ static int lanes_blocks(int envs) {
 
 template <int WATCHED>
 static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
-    part(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call, int k) {
+    part(const __grid_constant__ CrowdArrays all, const __grid_constant__ EnvsStep call, int k) {
     extern __shared__ __align__(16) Real shared[];
     const long place = warp_robot();
     if (place < all.envs) {
@@ -53,7 +53,7 @@ static __global__ void __launch_bounds__(WARP_THREADS, CROWD_BLOCKS)
 }
 
 static __global__ void __launch_bounds__(TASK_THREADS, TASK_BLOCKS)
-    end(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call) {
+    end(const __grid_constant__ CrowdArrays all, const __grid_constant__ EnvsStep call) {
     const long robot = lanes_robot();
     if (robot < all.envs) {
         crowd_end(&all, &call, robot);
@@ -86,7 +86,7 @@ static __global__ void __launch_bounds__(WARP_THREADS)
 }
 
 static __global__ void __launch_bounds__(TASK_THREADS, TASK_BLOCKS)
-    observe(const __grid_constant__ CrowdArrays all, const __grid_constant__ CrowdStep call) {
+    observe(const __grid_constant__ CrowdArrays all, const __grid_constant__ EnvsStep call) {
     const long robot = lanes_robot();
     if (robot < all.envs) {
         crowd_observe(&all, &call, robot);
@@ -191,8 +191,7 @@ static const char *kernels_begin(const CrowdArrays *all, void *stream) {
     return launched();
 }
 
-static const char *kernels_part(const CrowdArrays *all, const CrowdStep *call, int k,
-                                void *stream) {
+static const char *kernels_part(const CrowdArrays *all, const EnvsStep *call, int k, void *stream) {
     (all->sample
          ? part<1>
          : part<0>)<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(
@@ -200,12 +199,12 @@ static const char *kernels_part(const CrowdArrays *all, const CrowdStep *call, i
     return launched();
 }
 
-static const char *kernels_end(const CrowdArrays *all, const CrowdStep *call, void *stream) {
+static const char *kernels_end(const CrowdArrays *all, const EnvsStep *call, void *stream) {
     end<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     return launched();
 }
 
-static const char *kernels_first(const CrowdArrays *all, const CrowdStep *call, void *stream) {
+static const char *kernels_first(const CrowdArrays *all, const EnvsStep *call, void *stream) {
     pose<<<warp_blocks(all->envs), WARP_THREADS, place_bytes, (cudaStream_t)stream>>>(*all);
     observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
     arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);

@@ -16,13 +16,13 @@ void crowd_host_begin(const CrowdArrays *all, long robot) {
     crowd_begin(all, robot);
 }
 
-void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot) {
+void crowd_host_first(const CrowdArrays *all, const EnvsStep *call, long robot) {
     CrowdPlace place;
     crowd_pose(all, robot, &place);
     crowd_observe(all, call, robot);
 }
 
-void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long robot) {
+void crowd_host_part(const CrowdArrays *all, const EnvsStep *call, int k, long robot) {
     CrowdPlace place;
     crowd_part(all, call, robot, k, all->sample != NULL, &place);
 }
@@ -31,7 +31,7 @@ void crowd_host_tell(const CrowdArrays *all, long robot) {
     crowd_tell(all, robot);
 }
 
-void crowd_host_end(const CrowdArrays *all, const CrowdStep *call, long robot) {
+void crowd_host_end(const CrowdArrays *all, const EnvsStep *call, long robot) {
     crowd_end(all, call, robot);
 }
 

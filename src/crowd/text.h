@@ -22,10 +22,10 @@ void crowd_host_create(const CrowdArrays *all, long robot);
 /* Draws the first episode. */
 void crowd_host_begin(const CrowdArrays *all, long robot);
 /* Part k of a policy step, and what follows the last one up to the next episode. */
-void crowd_host_part(const CrowdArrays *all, const CrowdStep *call, int k, long robot);
-void crowd_host_end(const CrowdArrays *all, const CrowdStep *call, long robot);
+void crowd_host_part(const CrowdArrays *all, const EnvsStep *call, int k, long robot);
+void crowd_host_end(const CrowdArrays *all, const EnvsStep *call, long robot);
 /* Pose of a new episode, and the observation. */
-void crowd_host_first(const CrowdArrays *all, const CrowdStep *call, long robot);
+void crowd_host_first(const CrowdArrays *all, const EnvsStep *call, long robot);
 /* From arrays.command to the environment. */
 void crowd_host_tell(const CrowdArrays *all, long robot);
 /* From the environment to arrays.kept, or back. */
@@ -44,9 +44,9 @@ typedef struct {
     CrowdBytes (*bytes)(const TaskDef *def, const TaskShape *shape);
     const char *(*create)(const CrowdArrays *all, void *stream);
     const char *(*begin)(const CrowdArrays *all, void *stream);
-    const char *(*first)(const CrowdArrays *all, const CrowdStep *call, void *stream);
-    const char *(*part)(const CrowdArrays *all, const CrowdStep *call, int k, void *stream);
-    const char *(*end)(const CrowdArrays *all, const CrowdStep *call, void *stream);
+    const char *(*first)(const CrowdArrays *all, const EnvsStep *call, void *stream);
+    const char *(*part)(const CrowdArrays *all, const EnvsStep *call, int k, void *stream);
+    const char *(*end)(const CrowdArrays *all, const EnvsStep *call, void *stream);
     const char *(*keep)(const CrowdArrays *all, int back, void *stream);
     const char *(*tell)(const CrowdArrays *all, void *stream);
     const char *(*tally)(const CrowdArrays *all, void *stream);
