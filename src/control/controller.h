@@ -28,16 +28,21 @@ typedef struct {
 } ControllerRow;
 void controller_row_torque(void *row, const TaskEnv *env, RobotSim *sim, double *torque);
 
-/* Name and summary; the file defines controller_make_NAME. */
+/* Properties of a controller, as bits. */
+enum {
+    CONTROLLER_OWN_GAINS = 1 /* gains or torques of its own: task.actuator would have no effect */
+};
+
+/* Name, properties and summary; the file defines controller_make_NAME. */
 #define CONTROLLER_LIST(X)                                                                         \
-    X(clock, "a network that sees one frame, at 40 Hz (Singh et al. 2024), of --policy")           \
-    X(ht2, "a transformer (Radosavovic et al. 2024), of --policy")                                 \
-    X(learned, "the policy of --policy")                                                           \
-    X(passivity,                                                                                   \
+    X(clock, 0, "a network that sees one frame, at 40 Hz (Singh et al. 2024), of --policy")        \
+    X(ht2, 0, "a transformer (Radosavovic et al. 2024), of --policy")                              \
+    X(learned, 0, "the policy of --policy")                                                        \
+    X(passivity, CONTROLLER_OWN_GAINS,                                                             \
       "a biped that knows its true state: a DCM plan and whole-body impedances command torques")   \
-    X(stand,                                                                                       \
+    X(stand, CONTROLLER_OWN_GAINS,                                                                 \
       "stands still and balances, ignores the command; gains stand_kp, stand_kd of robot.ini")     \
-    X(zero, "takes no action, so the joints hold the default pose")
+    X(zero, 0, "takes no action, so the joints hold the default pose")
 
 /* What a controller may need. It is borrowed and must outlive the controller. */
 typedef struct {
@@ -48,7 +53,7 @@ typedef struct {
     int rows_max; /* most environments in one call */
 } ControllerDef;
 
-#define CONTROLLER_MAKE(name, summary)                                                             \
+#define CONTROLLER_MAKE(name, properties, summary)                                                 \
     MildStatus controller_make_##name(const ControllerDef *def, Controller *controller,            \
                                       MildError *error);
 CONTROLLER_LIST(CONTROLLER_MAKE)

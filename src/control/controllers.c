@@ -4,9 +4,10 @@
 #include "base/text.h"
 #include "control/controller.h"
 
-#define ROW(name, summary) {#name, summary, controller_make_##name},
+#define ROW(name, properties, summary) {#name, summary, properties, controller_make_##name},
 static const struct {
     const char *name, *summary;
+    int properties;
     MildStatus (*make)(const ControllerDef *def, Controller *controller, MildError *error);
 } controllers[] = {CONTROLLER_LIST(ROW)};
 #undef ROW
@@ -42,7 +43,7 @@ MildStatus controller_make(const char *name, const ControllerDef *def, Controlle
         if (strcmp(name, controllers[i].name) != 0) {
             continue;
         }
-        if (def->task->motors && (strcmp(name, "stand") == 0 || strcmp(name, "passivity") == 0)) {
+        if (def->task->motors && (controllers[i].properties & CONTROLLER_OWN_GAINS)) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
                              "task.actuator has no effect on controller %s, which has gains or "
                              "torques of its own; leave out one of them",
