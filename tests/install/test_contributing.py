@@ -17,7 +17,7 @@ import tempfile
 BLOCK = re.compile(r"^(?P<fence>```)(?P<kind>c|sh)\n(?P<text>.*?)^```$", re.M | re.S)
 PLACE = re.compile(r"(?:In \[(?P<file>[^\]]+)\]\([^)]*\),\s+before\s+`(?P<before>[^`]+)`|New file \[(?P<new>[^\]]+)\]\([^)]*\)):\n\n$")
 RECIPES = ["A reward", "A ground model", "A terrain", "A controller", "A command"]
-LEFT_OUT = {".git", ".venv", "build", "out", "runs", "node_modules", "__pycache__", "docs"}
+LEFT_OUT = {".git", ".venv", "out", "runs", "docs"}
 NVCC = ["nvcc", "/usr/local/cuda/bin/nvcc"]
 
 
@@ -78,8 +78,11 @@ def apply(tree, steps):
 
 
 def copy(source, tree):
-    shutil.copytree(source, tree, symlinks=True,
-                    ignore=lambda folder, names: [n for n in names if n in LEFT_OUT or n.startswith("build")])
+    """The tree without what it ignores at its top and without its pages, which nothing here compiles."""
+    def left_out(folder, names):
+        top = pathlib.Path(folder) == source
+        return [name for name in names if name == "__pycache__" or top and (name in LEFT_OUT or name.startswith("build"))]
+    shutil.copytree(source, tree, symlinks=True, ignore=left_out)
     (tree / "docs").symlink_to(source / "docs")
     if (source / ".venv").exists():
         (tree / ".venv").symlink_to((source / ".venv").resolve())
