@@ -125,7 +125,7 @@ def compile_cuda(tree, nvcc):
     """The environments and the batch ground as a GPU has them; PTX only, because that is where a recipe can be wrong."""
     unit = tree / "recipe.cu"
     unit.write_text('#define CROWD_KERNELS crowd_kernels_any\n#include "crowd/device.cu"\n', encoding="utf-8")
-    call([nvcc, "-std=c++17", "-O0", "-arch=sm_90", "--expt-relaxed-constexpr", *include_flags(tree), "-ptx", unit.name, "-o", os.devnull],
+    call([nvcc, "-std=c++17", "-O0", "-arch=sm_90", "-Werror", "cross-execution-space-call", *include_flags(tree), "-ptx", unit.name, "-o", os.devnull],
          tree)
 
 
