@@ -25,6 +25,15 @@ const char *controller_summary(int index) {
     return controllers[index].summary;
 }
 
+int controller_follows(const char *name) {
+    int follows = 0;
+    for (int i = 0; i < CONTROLLERS; i++) {
+        follows |= controllers[i].properties & CONTROLLER_FOLLOWS &&
+                   strcmp(name, controllers[i].name) == 0;
+    }
+    return follows;
+}
+
 MildStatus controller_check(const char *name, MildError *error) {
     const char *names[CONTROLLERS];
     for (int i = 0; i < CONTROLLERS; i++) {

@@ -63,6 +63,8 @@ static void names(void **unused) {
         MildError error = {0};
         assert_int_equal(controller_check(wanted[i], &error), MILD_OK);
     }
+    assert_true(controller_follows("learned") && controller_follows("passivity"));
+    assert_false(controller_follows("stand") || controller_follows("nobody"));
     for (int i = 0; i < controller_count(); i++) {
         MildError error = {0};
         assert_true(strlen(controller_summary(i)) > 5);

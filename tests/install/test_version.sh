@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# One version: CMakeLists.txt, pyproject.toml, CITATION.cff and CHANGELOG.md agree, and the program's version follows commit and tag as
+# One version: CMakeLists.txt, CITATION.cff and CHANGELOG.md agree, and the program's version follows commit and tag as
 # cmake/Version.cmake says. Usage: test_version.sh SOURCE_FOLDER
 source "$(dirname "$0")/../kit.sh" "$1"
 source=$mild # no program here
@@ -7,7 +7,6 @@ source=$mild # no program here
 version=$(sed -n 's/^project(mild VERSION \([0-9.]*\) .*/\1/p' "$source/CMakeLists.txt")
 [[ $version =~ ^[0-9]+\.[0-9]+\.[0-9]+$ ]] || fail "version of CMakeLists.txt: '$version'"
 [ "$(sed -n 's/^version: //p' "$source/CITATION.cff")" = "$version" ] || fail "CITATION.cff does not say $version"
-[ "$(sed -n 's/^version = "\(.*\)"$/\1/p' "$source/pyproject.toml")" = "$version" ] || fail "pyproject.toml does not say $version"
 [ "$(sed -n 's/^## \[\([0-9.]*\)\].*/\1/p' "$source/CHANGELOG.md" | head -1)" = "$version" ] ||
     fail "the newest version in CHANGELOG.md is not $version"
 
