@@ -19,7 +19,7 @@ MILD_API_BEGIN
 #define MILD_MAP_LIST(ROW)                                                                         \
     ROW(FLAT, flat)   /* 0 */                                                                      \
     ROW(SLOPE, slope) /* slope x */                                                                \
-    ROW(STEPS, steps) /* amplitude where frac(x/wavelength - 1/4) is below 1/2, else 0 */            \
+    ROW(STEPS, steps) /* amplitude where frac(x/wavelength - 1/4) is below 1/2, else 0 */          \
     ROW(WAVES, waves) /* amplitude (sin(2 pi x/wavelength) + sin(2 pi y/wavelength))/2 */          \
     ROW(ROUGH, rough) /* random heights in [-amplitude, amplitude] about one wavelength apart,     \
                          interpolated smoothly; repeats after `size` */                            \
