@@ -7,7 +7,7 @@ expect 0 'usage: mild COMMAND' "$mild" --help
 expect 0 'mild [0-9]*\.[0-9]*\.[0-9]*' "$mild" --version
 expect 2 'usage: mild COMMAND' "$mild"
 bad "nearest is 'press'" "$mild" pres
-commands=$("$mild" --help | sed -n 's/^  \([a-z]*\)  *[a-z].*/\1/p')
+commands=$("$mild" --help | sed -n 's/^  \([a-z]*\)   *[a-z].*/\1/p')
 [ "$(wc -w <<<"$commands")" -ge 12 ] || fail "commands of mild --help: $commands"
 for command in $commands; do
     expect 0 "usage: mild $command" "$mild" "$command" --help
