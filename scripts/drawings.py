@@ -8,6 +8,7 @@ import html
 import math
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 
@@ -60,6 +61,8 @@ def stamp(graph):
 
 def dot(text):
     """The SVG of a graph in graphviz's language."""
+    if not shutil.which("dot"):
+        sys.exit("drawings: there is no graphviz here, which lays them out: apt-get install graphviz")
     done = subprocess.run(["dot", "-Tsvg"], input=text, check=True, capture_output=True, text=True).stdout
     return done[done.index("<svg"):]
 
