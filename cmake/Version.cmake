@@ -1,5 +1,5 @@
 # Version of the program: the project's (CMakeLists.txt says it, CITATION.cff and CHANGELOG.md repeat it), and the commit it
-# was built from when git knows it: 0.1.0+g1234567ab. On a commit with the tag v0.1.0 it is 0.1.0; a tag that says something
+# was built from when git knows it: 0.2.0+g1234567ab. On a commit with the tag v0.2.0 it is 0.2.0; a tag that says something
 # else is an error.
 # Included: makes the target `version`, which runs this same file at every build; as a script it writes the header,
 # and only when something changed, so that nothing is compiled again without need.

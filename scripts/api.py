@@ -3,6 +3,7 @@
 
     api.py HEADER...            prints the page (Markdown)
     api.py --check HEADER...    exit 1 and a line for each gap
+    api.py --names HEADER...    every declaration without its remarks: what tests/install/api.txt keeps (VERSIONING.md)
 
 A remark stands directly above a declaration, or behind a field. What it must say: a double's unit in brackets; an array's shape
 in brackets (or "array of ..."); what happens on failure where there is a MildError; and, once at a header's top, thread safety.
@@ -171,7 +172,32 @@ def page(paths):
                     print("| `" + code.replace("|", "\\|") + "` | " + " ".join(remark.split()).replace("|", "\\|") + " |")
 
 
+def names(paths):
+    """Each header's declarations, members and rows of lists in their order, because order is layout and numbers."""
+    for path in sorted(paths):
+        print("mild/" + path.rsplit("/", 1)[-1])
+        with open(path, encoding="utf-8") as file:
+            text = re.sub(r"/\*.*?\*/", "", file.read(), flags=re.S)
+        for item in read(path)[1]:
+            if item.kind == "section" or item.name.startswith("MILD_API_"):
+                continue
+            rows = re.search(rf"#define {item.name}\(ROW\)((?:[^\n\\]|\\\n)*)", text)
+            if rows:
+                print(f"  list {item.name}: " + ", ".join(re.sub(r"\s+", " ", row) for row in re.findall(r"ROW\(([^)]*)\)", rows.group(1))))
+            elif item.kind == "constant":
+                print(f"  constant {item.name} {' '.join(item.code.split())}".rstrip())
+            elif item.kind in ("struct", "enum"):
+                print(f"  {item.kind} {item.name}")
+                for code, *_ in item.fields:
+                    print(f"    {code}")
+            else:
+                print(f"  {item.code}")
+
+
 def main(arguments):
+    if arguments[:1] == ["--names"]:
+        names(arguments[1:])
+        return 0
     if arguments[:1] != ["--check"]:
         page(arguments)
         return 0

@@ -7,6 +7,7 @@
 #   thread    gcc, warnings as errors, thread sanitizer: pool, task, evaluation, training
 #   aarch64   the library for another processor, run under qemu
 #   wheel     the Python package, made and installed as a user would; three of its examples
+#   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a model, a terrain, a controller, a command
 set -euo pipefail
 cd "$(dirname "$0")/.."
 jobs=${JOBS:-$(nproc)} root=$PWD/build/check
@@ -123,7 +124,11 @@ stage_wheel() {
     done
 }
 
-for stage in ${*:-format sanitize tidy thread aarch64 wheel}; do
+stage_recipes() {
+    tests/install/test_contributing.py . --run --jobs "$jobs"
+}
+
+for stage in ${*:-format sanitize tidy thread aarch64 wheel recipes}; do
     begin=$SECONDS
     echo "check: $stage"
     "stage_$stage"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Draws the figures of docs/ again: figures.sh [presets] [recovery] [impact] [sinkage] [eccentric] [terrain] [walk]
-# [robots] [actuator]; without a name all.
+# [robots] [actuator] [motion]; without a name all. The drawings are scripts/drawings.py's.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 mild=build/mild
@@ -70,6 +70,14 @@ walk() {
         "select='eq(n,40)+eq(n,109)+eq(n,150)+eq(n,205)+eq(n,255)+eq(n,300)',scale=640:-1:flags=area,tile=3x2"
 }
 
+# The README's moving picture: eight seconds over rubber, foam and sand, with imprints and the pressure under the soles.
+motion() {
+    "$mild" play --ground rubber,foam45,sand_loose --patch 1.8 --speed 0.7 --seconds 9 --terrain.memory=true \
+        --width 1280 --height 720 --video "$work/motion.mp4"
+    ffmpeg -loglevel error -y -ss 1 -t 8 -i "$work/motion.mp4" -vf "scale=640:-1:flags=area" \
+        -c:v libwebp_anim -loop 0 -q:v 50 -compression_level 4 docs/walk.webp
+}
+
 # The other robots, a moment of each.
 robots() {
     "$mild" play --robot go1 --config configs/go1.ini --policy policies/go1.safetensors --ground grass --seconds 4 --video "$work/go1.mp4"
@@ -97,9 +105,9 @@ actuator() {
 for name in "${@:-all}"; do
     case $name in
     presets | recovery | impact | eccentric) "$name" && "$python" scripts/curves.py "$name" "$work" "docs/$name.png" ;;
-    terrain | walk | robots | actuator) "$name" ;;
+    terrain | walk | robots | actuator | motion) "$name" ;;
     sinkage) presets && "$python" scripts/curves.py sinkage "$work" docs/sinkage.png ;;
-    all) for each in presets recovery impact sinkage eccentric terrain walk robots actuator; do "$0" "$each"; done ;;
-    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots actuator" >&2 && exit 2 ;;
+    all) for each in presets recovery impact sinkage eccentric terrain walk robots actuator motion; do "$0" "$each"; done ;;
+    *) echo "figures: unknown figure '$name'; choose from presets recovery impact sinkage eccentric terrain walk robots actuator motion" >&2 && exit 2 ;;
     esac
 done

@@ -12,7 +12,7 @@ import markdown
 
 import links
 
-FIRST = ["README.md", "docs/report.md", "docs/install.md", "docs/robots.md", "docs/task.md", "docs/model.md"]
+FIRST = ["README.md", "docs/README.md", "docs/results.md", "docs/install.md", "docs/python.md", "docs/your-robot.md", "docs/task.md", "docs/model.md"]
 STYLE = """body{font:16px/1.55 system-ui,sans-serif;color:#222;margin:0;display:flex}
 nav{flex:0 0 14rem;padding:1rem;background:#f4f4f2;min-height:100vh;font-size:.9rem}nav a{display:block;padding:.15rem 0}
 main{max-width:60rem;min-width:0;padding:1rem 2rem 4rem}a{color:#0b4f8a;text-decoration:none}a:hover{text-decoration:underline}
@@ -47,7 +47,8 @@ def way(page, target):
 class Site:
     def __init__(self, folder):
         self.folder = folder
-        self.texts = {str(p.relative_to(links.ROOT)): p.read_text(encoding="utf-8") for p in links.pages()}
+        self.texts = {str(p.relative_to(links.ROOT)): p.read_text(encoding="utf-8") for p in links.pages()
+                      if not str(p.relative_to(links.ROOT)).startswith(".")}  # not the forms of a code host
         self.texts["docs/api.md"] = subprocess.run(
             [sys.executable, "scripts/api.py", *map(str, sorted(pathlib.Path("include/mild").glob("*.h")))],
             cwd=links.ROOT, check=True, capture_output=True, text=True).stdout
@@ -73,7 +74,7 @@ class Site:
             return url
         there = ((links.ROOT / name).parent / file).resolve().relative_to(links.ROOT)
         if str(there) not in self.texts:
-            self.shown[str(there)] = str(there) if there.suffix in (".png", ".mp4", ".svg") else page_name(str(there))
+            self.shown[str(there)] = str(there) if there.suffix in (".png", ".webp", ".mp4", ".svg") else page_name(str(there))
         to = page_name(str(there)) if str(there) in self.texts else self.shown[str(there)]
         return way(page, to) + (f"#{anchor}" if anchor else "")
 

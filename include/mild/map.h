@@ -13,22 +13,31 @@
 
 MILD_API_BEGIN
 
-/* Shape of the undisturbed surface h0(x, y) in terms of the fields of MildMapDef. */
+/* Shapes of the undisturbed surface h0(x, y) in terms of the fields of MildMapDef. A name in
+ * capitals makes the enumerator, MILD_MAP_WAVES, and a name as users write it. */
+/* clang-format off */
+#define MILD_MAP_LIST(ROW)                                                                         \
+    ROW(FLAT, flat)   /* 0 */                                                                      \
+    ROW(SLOPE, slope) /* slope x */                                                                \
+    ROW(STEPS, steps) /* amplitude where frac(x/wavelength - 1/4) is below 1/2, else 0 */          \
+    ROW(WAVES, waves) /* amplitude (sin(2 pi x/wavelength) + sin(2 pi y/wavelength))/2 */          \
+    ROW(ROUGH, rough) /* random heights in [-amplitude, amplitude] about one wavelength apart,     \
+                         interpolated smoothly; repeats after `size` */                            \
+    ROW(IMAGE, image) /* amplitude heights[row][column]; row 0 has the largest y, the middle of    \
+                         the image lies at the origin, and its border heights extend outward */    \
+    ROW(MIXED, mixed) /* MILD_MAP_TILES x MILD_MAP_TILES square tiles of height 0 at their edges;  \
+                         repeats after `size`. A quarter of the tiles are level. The others are in \
+                         equal shares pyramids, up or down, whose sides rise by a share of `slope` \
+                         per metre, and waves, steps and rough ground of a share of `amplitude`,   \
+                         which fade out over the last half metre. Seed and tile give relief and    \
+                         share, which is uniform in [0.25, 1]. */
+/* clang-format on */
+
+/* A row's enumerator: MILD_MAP_FLAT and so on. */
+#define MILD_MAP_ID(id, name) MILD_MAP_##id,
+/* A shape, in the list's order. */
 typedef enum {
-    MILD_MAP_FLAT,  /* 0 */
-    MILD_MAP_SLOPE, /* slope x */
-    MILD_MAP_STEPS, /* amplitude where the fraction of x/wavelength - 1/4 is below 1/2, else 0 */
-    MILD_MAP_WAVES, /* amplitude (sin(2 pi x/wavelength) + sin(2 pi y/wavelength))/2 */
-    MILD_MAP_ROUGH, /* random heights in [-amplitude, amplitude] about one wavelength apart,
-                       interpolated smoothly; repeats after `size` */
-    MILD_MAP_IMAGE, /* amplitude heights[row][column]; row 0 has the largest y, the middle of the
-                       image lies at the origin, and its border heights extend outward */
-    MILD_MAP_MIXED  /* MILD_MAP_TILES x MILD_MAP_TILES square tiles of height 0 at their edges;
-                       repeats after `size`. A quarter of the tiles are level. The others are in
-                       equal shares pyramids, up or down, whose sides rise by a share of `slope`
-                       per metre, and waves, steps and rough ground of a share of `amplitude`, which
-                       fade out over the last half metre. Seed and tile give relief and share, which
-                       is uniform in [0.25, 1]. */
+    MILD_MAP_LIST(MILD_MAP_ID) /* one for each row */
 } MildMapKind;
 
 #define MILD_MAP_TILES 5 /* tiles of MILD_MAP_MIXED along x, and along y */

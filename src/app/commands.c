@@ -21,20 +21,9 @@ const char commands_examples[] =
 
 static const char *const actuator_parts[] = {"fit", "log", NULL};
 
-const AppCommand commands[] = {
-    {"train", cmd_train, "train a walking policy on soft ground", NULL},
-    {"eval", cmd_eval, "measure how a policy walks on several grounds and at several speeds", NULL},
-    {"play", cmd_play, "watch a policy walk, in a window or as a video", NULL},
-    {"press", cmd_press, "press a plate or a sole into a ground and record the force", NULL},
-    {"fit", cmd_fit, "find the parameters of a ground from recorded presses", NULL},
-    {"actuator", cmd_actuator, "fit a network to logs of a robot's motors", actuator_parts},
-    {"export", cmd_export, "write a policy as an ONNX graph or as C, to run it elsewhere", NULL},
-    {"drive", cmd_drive, "run a policy for a robot over UDP, or be that robot, simulated", NULL},
-    {"report", cmd_report, "draw the curves of training runs on one page", NULL},
-    {"bench", cmd_bench, "measure speed and memory on this machine", NULL},
-    {"info", cmd_info, "list grounds, models, config keys, versions and devices", NULL},
-    {"web", cmd_web, "serve the walk in a browser that `make web` builds", NULL},
-};
+#define ROW(name, help, parts) {#name, cmd_##name, help, parts},
+const AppCommand commands[] = {COMMAND_LIST(ROW)};
+#undef ROW
 const int command_count = sizeof commands / sizeof *commands;
 _Static_assert(sizeof commands / sizeof *commands <= COMMANDS_MAX, "main has room for their names");
 

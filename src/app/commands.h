@@ -1,9 +1,29 @@
 /* One function per command, one file per function: cmd_NAME.c. argv[0] is the command's name;
- * returns the exit code. */
+ * returns the exit code. A command has one row, in COMMAND_LIST. */
 #ifndef MILD_COMMANDS_H
 #define MILD_COMMANDS_H
 
 #include "app/cli.h"
+
+/* Name, help, and first words with a help of their own (commands.c) or NULL; a file cmd_NAME.c
+ * defines cmd_NAME. */
+#define COMMAND_LIST(X)                                                                            \
+    X(train, "train a walking policy on soft ground", NULL)                                        \
+    X(eval, "measure how a policy walks on several grounds and at several speeds", NULL)           \
+    X(play, "watch a policy walk, in a window or as a video", NULL)                                \
+    X(press, "press a plate or a sole into a ground and record the force", NULL)                   \
+    X(fit, "find the parameters of a ground from recorded presses", NULL)                          \
+    X(actuator, "fit a network to logs of a robot's motors", actuator_parts)                       \
+    X(export, "write a policy as an ONNX graph or as C, to run it elsewhere", NULL)                \
+    X(drive, "run a policy for a robot over UDP, or be that robot, simulated", NULL)               \
+    X(report, "draw the curves of training runs on one page", NULL)                                \
+    X(bench, "measure speed and memory on this machine", NULL)                                     \
+    X(info, "list grounds, models, config keys, versions and devices", NULL)                       \
+    X(web, "serve the walk in a browser that `make web` builds", NULL)
+
+#define COMMAND_DECLARE(name, help, parts) int cmd_##name(int argc, char **argv);
+COMMAND_LIST(COMMAND_DECLARE)
+#undef COMMAND_DECLARE
 
 typedef struct {
     const char *name;
@@ -25,18 +45,5 @@ void commands_describe(void (*print)(const CliCommand *command));
  * code. */
 int manual_print(void);
 int completion_print(void);
-
-int cmd_train(int argc, char **argv);
-int cmd_eval(int argc, char **argv);
-int cmd_play(int argc, char **argv);
-int cmd_press(int argc, char **argv);
-int cmd_fit(int argc, char **argv);
-int cmd_report(int argc, char **argv);
-int cmd_actuator(int argc, char **argv);
-int cmd_export(int argc, char **argv);
-int cmd_drive(int argc, char **argv);
-int cmd_bench(int argc, char **argv);
-int cmd_info(int argc, char **argv);
-int cmd_web(int argc, char **argv);
 
 #endif

@@ -4,9 +4,10 @@
 #include "base/text.h"
 #include "control/controller.h"
 
-#define ROW(name, summary) {#name, summary, controller_make_##name},
+#define ROW(name, properties, summary) {#name, summary, properties, controller_make_##name},
 static const struct {
     const char *name, *summary;
+    int properties;
     MildStatus (*make)(const ControllerDef *def, Controller *controller, MildError *error);
 } controllers[] = {CONTROLLER_LIST(ROW)};
 #undef ROW
@@ -22,6 +23,15 @@ const char *controller_name(int index) {
 
 const char *controller_summary(int index) {
     return controllers[index].summary;
+}
+
+int controller_follows(const char *name) {
+    int follows = 0;
+    for (int i = 0; i < CONTROLLERS; i++) {
+        follows |= controllers[i].properties & CONTROLLER_FOLLOWS &&
+                   strcmp(name, controllers[i].name) == 0;
+    }
+    return follows;
 }
 
 MildStatus controller_check(const char *name, MildError *error) {
@@ -42,7 +52,7 @@ MildStatus controller_make(const char *name, const ControllerDef *def, Controlle
         if (strcmp(name, controllers[i].name) != 0) {
             continue;
         }
-        if (def->task->motors && (strcmp(name, "stand") == 0 || strcmp(name, "passivity") == 0)) {
+        if (def->task->motors && (controllers[i].properties & CONTROLLER_OWN_GAINS)) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
                              "task.actuator has no effect on controller %s, which has gains or "
                              "torques of its own; leave out one of them",

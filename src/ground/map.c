@@ -9,7 +9,8 @@
 #define FIELD(member, low, high, help)                                                             \
     MILD_FIELD(MildMapDef, member, MILD_FIELD_DOUBLE, 1, low, high, help)
 #define COUNT(names) ((int)(sizeof(names) / sizeof *(names)))
-static const char *const kinds[] = {"flat", "slope", "steps", "waves", "rough", "image", "mixed"};
+#define KIND(id, name) #name,
+static const char *const kinds[] = {MILD_MAP_LIST(KIND)};
 static const char *const patterns[] = {"none", "stripes", "checker", "image"};
 const MildField mild_map_fields[] = {
     MILD_FIELD_CHOICE(MildMapDef, kind, kinds, COUNT(kinds), "[-] shape of the surface"),

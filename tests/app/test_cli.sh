@@ -7,7 +7,9 @@ expect 0 'usage: mild COMMAND' "$mild" --help
 expect 0 'mild [0-9]*\.[0-9]*\.[0-9]*' "$mild" --version
 expect 2 'usage: mild COMMAND' "$mild"
 bad "nearest is 'press'" "$mild" pres
-for command in train eval play press fit actuator export drive report bench info web; do
+commands=$("$mild" --help | sed -n 's/^  \([a-z]*\)   *[a-z].*/\1/p')
+[ "$(wc -w <<<"$commands")" -ge 12 ] || fail "commands of mild --help: $commands"
+for command in $commands; do
     expect 0 "usage: mild $command" "$mild" "$command" --help
     bad "unknown option --no-such" "$mild" "$command" --no-such
 done

@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# The front door: a README that is read in 20 seconds, whose code compiles; an index that names every page; drawings that are the tree.
+# Usage: test_front.sh SOURCE_FOLDER
+source "$(dirname "$0")/../kit.sh" "$1"
+source=$mild # no program here
+
+lines=$(wc -l <"$source/README.md") words=$(wc -w <"$source/README.md")
+[ "$lines" -le 90 ] || fail "README.md has $lines lines, more than 90: tables go to docs/results.md"
+[ "$words" -le 600 ] || fail "README.md has $words words, more than 600"
+bytes=$(stat -c %s "$source/docs/walk.webp")
+[ "$bytes" -lt 4000000 ] || fail "docs/walk.webp has $bytes bytes: a page that is slow to load"
+for page in "$source"/docs/*.md; do
+    name=$(basename "$page")
+    [ "$name" = README.md ] || grep -q "($name" "$source/docs/README.md" || fail "docs/README.md does not name $name"
+done
+for folder in "$source"/src/*/; do
+    grep -q "^| \`$(basename "$folder")\` |" "$source/src/README.md" || fail "src/README.md has no sentence for $folder"
+done
+
+sed -n '/^```c$/,/^```$/{/^```/d;p}' "$source/README.md" >front.c
+[ -s front.c ] || fail "README.md has no block of C"
+"${CC:-cc}" -std=c17 -Wall -Wextra -Wconversion -Werror -I"$source/include" -fsyntax-only front.c || fail "the C of README.md"
+sed -n '/^```python$/,/^```$/{/^```/d;p}' "$source/README.md" >front.py
+python3 -c 'compile(open("front.py").read(), "README.md", "exec")' || fail "the Python of README.md"
+grep -q 'mild.attach(spec, feet=\[.*ground=' front.py && grep -q 'def attach(spec, feet, ground' "$source/python/mild/spec.py" ||
+    fail "README.md calls mild.attach in a way that python/mild/spec.py does not have"
+
+python3 "$source/scripts/drawings.py" --check || fail "drawings"
+mkdir -p tree/docs tree/scripts
+cp "$source/scripts/drawings.py" tree/scripts/
+cp "$source"/docs/*.svg tree/docs/
+cp -r "$source/src" tree/src
+sees() {
+    python3 tree/scripts/drawings.py --check 2>said && fail "the check does not see: $1"
+    grep -q "$1" said || fail "the check says $(cat said) of: $1"
+}
+echo '#include "base/csv.h"' >>tree/src/ranks/ranks.h
+sees 'house.svg is not what src is'
+mkdir tree/src/attic
+sees 'attic: a folder of src without a row'
+finish "README.md: $lines lines, $words words; $(ls "$source"/docs/*.md | wc -l) pages"
