@@ -11,9 +11,8 @@ typedef struct {
     double angle; /* [rad] of a joint beyond its range; negative: none */
 } SensorLimits;
 
-/* Bool: a number is beyond its limit, or the orientation or an angle has changed since the state
- * `before` (NULL: there is none) by more than the limits allow in that time. `why` names the
- * number. */
+/* Bool: a number is beyond its limit, or has changed since the state `before` (NULL: there is
+ * none) by more than the speeds of the two allow in that time. `why` names the number. */
 int sensor_is_impossible(const Robot *robot, const SensorLimits *limits, const StatePacket *before,
                          const StatePacket *state, char *why, size_t size);
 

@@ -372,26 +372,32 @@ static void a_dead_robot(void **unused) {
 
 /* What can be wrong with a state that a sensor made, and what the runner says of it. */
 typedef struct {
-    float omega, speed, angle, pitch; /* angle: added to that of joint 9, which is 0.48 */
-    double clock;                     /* [s] */
-    const char *why;                  /* NULL: nothing is wrong */
+    float omega;        /* of each axis */
+    float speed;        /* of joint 4 */
+    float angle, along; /* of joint 9: added to its 0.48, and its speed */
+    float pitch;
+    double clock;    /* [s] */
+    const char *why; /* NULL: nothing is wrong */
 } Fault;
 
 static const Fault faults[] = {
-    {.omega = 5.7f},
-    {.omega = 5.9f, .why = "the base turns at 10.2 rad/s, the limit is 10"},
-    {.omega = 1e5f, .why = "the base turns at 173205.1 rad/s"},
+    {.omega = 2.8f},
+    {.omega = 2.95f, .why = "the turning of the base changed by 5.1 rad/s in 0.010 s"},
+    {.omega = 1e5f, .why = "the base turns at 173205.1 rad/s, the limit is 10"},
     {.omega = -1e6f, .why = "the base turns at"},
+    {.omega = 5.9f, .why = "the base turns at 10.2 rad/s, the limit is 10"},
     {.speed = -29},
     {.speed = -31, .why = "leg_l5_joint moves at 31.0 rad/s, the limit is 30"},
     {.speed = 1e6f, .why = "leg_l5_joint moves at"},
-    {.angle = 0.44f}, /* in 10 ms; the limits allow 0.45 */
-    {.angle = 0.46f, .why = "leg_r4_joint moved by 0.46 rad in 0.010 s"},
+    {.angle = 0.09f},
+    {.angle = 0.11f, .why = "leg_r4_joint moved by 0.11 rad in 0.010 s, and says 0.0 rad/s"},
+    {.angle = 0.37f, .along = 28},
+    {.angle = 0.39f, .along = 28, .why = "leg_r4_joint moved by 0.39 rad in 0.010 s"},
     {.angle = -1, .why = "leg_r4_joint is 0.37 rad beyond its range, the limit is 0.2"},
     {.angle = 9e5f, .why = "beyond its range"},
-    {.pitch = 0.14f},
-    {.pitch = -0.16f, .why = "the base turned by 0.16 rad in 0.010 s"},
-    {.pitch = 3, .why = "the base turned by 3.00 rad"},
+    {.pitch = 0.045f},
+    {.pitch = -0.055f, .why = "the base tipped by 0.05 rad in 0.010 s"},
+    {.pitch = 3, .why = "the base tipped by 3.00 rad"},
     {.clock = 0.9},
     {.clock = 1.1, .why = "its clock jumped forward by 1.1 s"},
     {.clock = 1e9, .why = "its clock jumped forward by 1e+09 s"},
@@ -405,6 +411,7 @@ static StatePacket with_fault(const Fault *fault, uint32_t sequence, double time
     }
     state.speed[4] = fault->speed;
     state.angle[9] += fault->angle;
+    state.speed[9] = fault->along;
     state.quaternion[0] = (float)cos((double)fault->pitch / 2);
     state.quaternion[2] = (float)sin((double)fault->pitch / 2);
     return state;
@@ -461,7 +468,7 @@ static void impossible_states(void **unused) {
             state = with_fault(&faults[f], k + 1, 0.01 * k);
             take(runner, &state, 0.01 * k);
             const TargetPacket target = tick(runner, 0.01 * k, forward);
-            /* a jump of the base by 0.16 rad is possible after 20 ms */
+            /* some jumps are possible after 20 ms */
             const int possible = k > 1 && strstr(faults[f].why, " in 0.010 s") != NULL;
             assert_int_equal(target.mode, possible ? PACKET_walk
                                           : k < 4  ? PACKET_hold
@@ -537,6 +544,7 @@ static void a_tilt(void **unused) {
             StatePacket state = standing(k + 1, 0.01 * k);
             state.quaternion[0] = (float)cos(pitch / 2);
             state.quaternion[2] = (float)(sign * sin(pitch / 2));
+            state.angular_velocity[1] = (float)(5 * sign);
             give(runner, &state, 0.01 * k);
             const TargetPacket target = tick(runner, 0.01 * k, forward);
             assert_int_equal(target.mode, pitch < 1 ? PACKET_walk : PACKET_damp);
