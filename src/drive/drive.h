@@ -25,8 +25,8 @@ typedef struct {
     const char *end; /* what ended it: "time", "signal", "robot", "damped" */
 } DriveReport;
 
-/* From now on SIGINT, SIGTERM, SIGHUP, SIGQUIT and SIGTSTP end the run, with packets that say so, and
- * a broken pipe ends nothing. Before input_open, so that the terminal is always restored. */
+/* From now on SIGINT, SIGTERM, SIGHUP, SIGQUIT and SIGTSTP end the run, with packets that say so,
+ * and a broken pipe ends nothing. Before input_open, so that the terminal is always restored. */
 void drive_catch_signals(void);
 void drive_run(const DriveDef *def, DriveReport *report);
 

@@ -294,7 +294,7 @@ def targets_of_a_stranger():
     heard.bind(("127.0.0.1", 0))
     heard.settimeout(60)
     port = heard.getsockname()[1]
-    command = [MILD, "drive", "--simulate", "--connect", f"127.0.0.1:{port}", "--seconds", "2", "--patience", "3", "--json", "simulated.json"]
+    command = [MILD, "drive", "--simulate", "--connect", f"127.0.0.1:{port}", "--seconds", "2", "--patience", "3"]
     robot = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     packet, address = heard.recvfrom(4096)
     session = HEAD.unpack(packet[: HEAD.size])[8]
