@@ -102,15 +102,15 @@ class Robot:
 
 
 class Runner:
-    """A process of `mild drive`."""
+    """A process of `mild drive`, by default with so much patience that a busy machine does not damp the robot."""
 
     count = 0
 
-    def __init__(self, mild, *options, **how):
+    def __init__(self, mild, *options, patience=("--damp-after", "1", "--late", "1", "--stall-after", "20"), **how):
         Runner.count += 1
         self.json = pathlib.Path(f"runner{Runner.count}.json")
         self.process = subprocess.Popen(
-            [mild, "drive", "--no-keys", "--listen", "127.0.0.1:0", "--json", str(self.json), *options],
+            [mild, "drive", "--no-keys", "--listen", "127.0.0.1:0", "--json", str(self.json), *patience, *options],
             stdin=subprocess.DEVNULL,
             stdout=how.pop("stdout", subprocess.PIPE),
             stderr=subprocess.PIPE,
