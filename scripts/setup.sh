@@ -6,7 +6,7 @@ cd "$(dirname "$0")/.."
 
 packages=(
     build-essential cmake
-    libdnnl-dev libinih-dev libcjson-dev libpng-dev zlib1g-dev
+    libdnnl-dev libinih-dev libcjson-dev libpng-dev libsodium-dev zlib1g-dev
     libopenmpi-dev openmpi-bin
     libprotobuf-c-dev protobuf-c-compiler libonnx-dev
     libcmocka-dev

@@ -19,13 +19,14 @@
 
 typedef struct {
     const char *policy, *robot, *config, *json, *gamepad;
-    const char *listen, *connect, *ground, *model; /* NULL: not given */
+    const char *listen, *connect, *bind, *peer, *key, *ground, *model; /* NULL: not given */
     CliNumbers command, delay;
     int simulate, no_keys, lockstep;
     TaskDef task;
     TerrainDef terrain;
     RunnerDef runner;
     SimulatedDef simulated;
+    Key secret; /* of --key */
     double seconds;
 } Drive;
 
@@ -62,7 +63,8 @@ static cJSON *runner_json(const Drive *d, const Robot *robot, const DriveReport 
     } counts[] = {{"seconds", report->seconds},
                   {"ticks", (double)report->ticks},
                   {"missed_ticks", (double)report->missed},
-                  {"strangers", (double)report->strangers},
+                  {"strangers", (double)runner->refused[PACKET_FAULT_stranger]},
+                  {"ends_ignored", (double)runner->ends_ignored},
                   {"received", (double)runner->received},
                   {"lost", (double)runner->lost},
                   {"reordered", (double)runner->reordered},
@@ -112,18 +114,30 @@ static void print_histogram(FILE *file, const Times *times) {
     }
 }
 
-static void print_runner(FILE *file, const DriveReport *report, const RunnerReport *runner) {
+/* How many packets were refused, and of these how many for each reason. */
+static void print_refused(FILE *file, const RunnerReport *runner) {
     long refused = 0;
     for (int i = PACKET_FAULT_none + 1; i < PACKET_FAULTS; i++) {
         refused += runner->refused[i];
     }
+    fprintf(file, "refused %ld", refused);
+    for (int i = PACKET_FAULT_none + 1; i < PACKET_FAULTS; i++) {
+        if (runner->refused[i] > 0) {
+            fprintf(file, ", %s %ld", packet_faults[i], runner->refused[i]);
+        }
+    }
+    fprintf(file, "; ends ignored %ld\n", runner->ends_ignored);
+}
+
+static void print_runner(FILE *file, const DriveReport *report, const RunnerReport *runner) {
     fprintf(file,
             "%.2f s, %ld ticks, %ld missed; %ld steps, %ld holds, %ld damped; targets limited %ld\n"
-            "states %ld, lost %ld, reordered %ld, late %ld, refused %ld, of strangers %ld\n"
-            "[us]            median         p99       p99.9     longest\n",
+            "states %ld, lost %ld, reordered %ld, late %ld, ",
             report->seconds, report->ticks, report->missed, runner->steps, runner->holds,
             runner->damps, runner->targets_limited, runner->received, runner->lost,
-            runner->reordered, runner->late, refused, report->strangers);
+            runner->reordered, runner->late);
+    print_refused(file, runner);
+    fprintf(file, "[us]            median         p99       p99.9     longest\n");
     print_times(file, "wake-up", &report->wakeup);
     print_times(file, "compute", &report->compute);
     print_times(file, "reply", &report->reply);
@@ -139,11 +153,17 @@ static cJSON *simulated_json(const SimulatedReport *report) {
     const struct {
         const char *name;
         double value;
-    } values[] = {{"seconds", report->seconds},         {"way_x_m", report->way[0]},
-                  {"way_y_m", report->way[1]},          {"real_time_factor", report->rate},
-                  {"damped_s", report->damped},         {"sent", (double)report->sent},
-                  {"dropped", (double)report->dropped}, {"delayed", (double)report->delayed},
-                  {"targets", (double)report->targets}, {"refused", (double)report->refused}};
+    } values[] = {{"seconds", report->seconds},
+                  {"way_x_m", report->way[0]},
+                  {"way_y_m", report->way[1]},
+                  {"real_time_factor", report->rate},
+                  {"damped_s", report->damped},
+                  {"sent", (double)report->sent},
+                  {"dropped", (double)report->dropped},
+                  {"delayed", (double)report->delayed},
+                  {"targets", (double)report->targets},
+                  {"refused", (double)report->refused},
+                  {"strangers", (double)report->strangers}};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
         cJSON_AddNumberToObject(root, values[i].name, values[i].value);
     }
@@ -156,6 +176,10 @@ static double greater(double a, double b) {
     return a > b ? a : b;
 }
 
+static void tell(const char *refusal) {
+    fprintf(stderr, "mild drive: refused a packet: %s\n", refusal);
+}
+
 static MildStatus run_on(Drive *d, const Robot *robot, Runner *runner, Udp *udp, MildError *error) {
     const TaskDef *t = &d->task;
     const double range[3] = {t->vx[1], greater(t->vy[1], -t->vy[0]), greater(t->wz[1], -t->wz[0])};
@@ -163,13 +187,15 @@ static MildStatus run_on(Drive *d, const Robot *robot, Runner *runner, Udp *udp,
     char text[32];
     Input input;
     DriveReport report;
+    drive_catch_signals();
     MildStatus status = input_open(&input, d->command.value, range, !d->no_keys, d->gamepad, error);
     if (status != MILD_OK) {
         return status;
     }
-    fprintf(stderr, "mild drive: %s at %s; %s\n", robot_name(robot), udp_text(&udp->own, text),
+    fprintf(stderr, "mild drive: %s at %s; robot %08x; %s\n", robot_name(robot),
+            udp_text(&udp->own, text), (unsigned)packet_robot(robot),
             input.keys ? INPUT_KEYS : "Ctrl-C ends");
-    const DriveDef def = {runner, udp, &input, d->seconds};
+    const DriveDef def = {runner, udp, &input, d->seconds, tell};
     drive_run(&def, &report);
     input_close(&input);
     const RunnerReport *counts = runner_report(runner);
@@ -187,8 +213,12 @@ static MildStatus run_runner(Drive *d, const Robot *robot, MildError *error) {
     d->runner.policy = d->policy;
     d->runner.robot = robot;
     d->runner.task = &d->task;
-    Runner *runner = runner_create(&d->runner, error);
-    MildStatus status = runner ? MILD_OK : error->status;
+    MildStatus status = key_draw_session(&d->runner.session, error);
+    if (status == MILD_OK && d->peer) {
+        status = udp_find_sender("peer", d->peer, &d->runner.peer, error);
+    }
+    Runner *runner = status == MILD_OK ? runner_create(&d->runner, error) : NULL;
+    status = runner ? MILD_OK : error->status;
     if (status == MILD_OK) {
         status = udp_listen(&udp, "listen", d->listen ? d->listen : ADDRESS, error);
     }
@@ -216,7 +246,10 @@ static MildStatus walk_on(const Drive *d, const Robot *robot, const Scene *scene
     def.seconds = d->seconds > 0 ? d->seconds : 3600;
     def.delay_share = d->delay.value[0];
     def.delay = d->delay.value[1];
-    MildStatus status = udp_connect(&udp, "connect", d->connect ? d->connect : ADDRESS, error);
+    MildStatus status = key_draw_session(&def.session, error);
+    if (status == MILD_OK) {
+        status = udp_connect(&udp, "connect", d->connect ? d->connect : ADDRESS, d->bind, error);
+    }
     if (status == MILD_OK) {
         status = simulated_run(&def, &report, error);
     }
@@ -226,10 +259,10 @@ static MildStatus walk_on(const Drive *d, const Robot *robot, const Scene *scene
     }
     fprintf(d->json && strcmp(d->json, "-") == 0 ? stderr : stdout,
             "%s on %s: %s after %.2f s and %.2f m, %.2f of real time; states %ld, dropped %ld, "
-            "delayed %ld; targets %ld, refused %ld; damped %.2f s\n",
+            "delayed %ld; targets %ld, refused %ld, of strangers %ld; damped %.2f s\n",
             robot_name(robot), scene->name, report.end, report.seconds, report.way[0], report.rate,
             report.sent, report.dropped, report.delayed, report.targets, report.refused,
-            report.damped);
+            report.strangers, report.damped);
     return d->json ? report_save(simulated_json(&report), d->json, error) : MILD_OK;
 }
 
@@ -264,9 +297,10 @@ static MildStatus run_simulated(Drive *d, Robot *robot, const CliArgs *args, Mil
 static int refuse_other_half(const CliCommand *command, const CliArgs *args, int simulate) {
     static const char *const runner[] = {"policy",      "listen",       "command",    "gamepad",
                                          "no-keys",     "late",         "damp-after", "speed-limit",
-                                         "angle-limit", "torque-share", NULL},
-                             *const robot[] = {"connect", "ground", "model", "lockstep", "patience",
-                                               "drop",    "delay",  "seed",  NULL};
+                                         "angle-limit", "torque-share", "peer",       "turn-limit",
+                                         "glitch",      "stall-after",  NULL},
+                             *const robot[] = {"connect",  "bind", "ground", "model", "lockstep",
+                                               "patience", "drop", "delay",  "seed",  NULL};
     const char *other = cli_first_given(command, args, simulate ? runner : robot);
     return !other     ? 0
            : simulate ? cli_fail_text("drive", "--%s is for the runner, not for --simulate", other)
@@ -287,6 +321,10 @@ static MildStatus check_options(const Drive *d, MildError *error) {
 
 static MildStatus run_drive(Drive *d, const CliArgs *args, MildError *error) {
     MildStatus status = check_options(d, error);
+    if (status == MILD_OK && d->key) {
+        status = key_read(d->key, &d->secret, error);
+        d->runner.key = d->simulated.key = &d->secret;
+    }
     if (status != MILD_OK) {
         return status;
     }
@@ -305,8 +343,14 @@ int cmd_drive(int argc, char **argv) {
     static CliArgs args;
     char shipped[PATH_SIZE], model_help[320];
     d.terrain = terrain_def_default();
-    d.runner = (RunnerDef){
-        .late = 0.02, .damp_after = 0.1, .speed_limit = 30, .angle_limit = 0.2, .torque_share = 1};
+    d.runner = (RunnerDef){.late = 0.02,
+                           .damp_after = 0.1,
+                           .stall_after = 0.05,
+                           .glitch = 0.02,
+                           .turn_limit = 10,
+                           .speed_limit = 30,
+                           .angle_limit = 0.2,
+                           .torque_share = 1};
     d.simulated = (SimulatedDef){.patience = 30, .seed = 1};
     const CliOption options[] = {
         {"policy", CLI_INPUT, &d.policy, 0, 0, "FILE",
@@ -318,6 +362,12 @@ int cmd_drive(int argc, char **argv) {
          "its training"},
         {"listen", CLI_TEXT, &d.listen, 0, 0, "HOST:PORT",
          "where states arrive; targets go to where they come from (default " ADDRESS ")"},
+        {"peer", CLI_TEXT, &d.peer, 0, 0, "HOST[:PORT]",
+         "the robot; packets of others are not heard (default: whoever first sends five good "
+         "states in a row)"},
+        {"key", CLI_INPUT, &d.key, 0, 0, "FILE",
+         "32 to 64 bytes that the robot has, too: packets that are not sealed with them are "
+         "refused"},
         {"command", CLI_NUMBERS, &d.command, -10, 10, "VX,VY,WZ",
          "[m/s, m/s, rad/s] forward, to the left, turning left; brought into the ranges of section "
          "[task] (default 0,0,0)"},
@@ -328,18 +378,31 @@ int cmd_drive(int argc, char **argv) {
          "[s] a state that took so much longer than the fastest one is not used (default 0.02)"},
         {"damp-after", CLI_NUMBER, &d.runner.damp_after, 0.01, 60, "T",
          "[s] without a state until the robot is damped, for good (default 0.1)"},
+        {"stall-after", CLI_NUMBER, &d.runner.stall_after, 0.015, 60, "T",
+         "[s] between two ticks of the runner until the robot is damped, for good (default 0.05)"},
+        {"turn-limit", CLI_NUMBER, &d.runner.turn_limit, 0, 1000, "W",
+         "[rad/s] a state whose base is faster, or turned faster since the last one, is not used; "
+         "0: none (default 10)"},
         {"speed-limit", CLI_NUMBER, &d.runner.speed_limit, 0, 1000, "W",
-         "[rad/s] a joint that is faster damps the robot; 0: none (default 30)"},
+         "[rad/s] a state with a joint that is faster, or moved faster since the last one, is not "
+         "used; 0: none (default 30)"},
         {"angle-limit", CLI_NUMBER, &d.runner.angle_limit, -1, 10, "A",
-         "[rad] a joint so far beyond its range damps the robot; negative: none (default 0.2)"},
+         "[rad] a state with a joint so far beyond its range is not used; negative: none (default "
+         "0.2)"},
+        {"glitch", CLI_NUMBER, &d.runner.glitch, 0, 10, "T",
+         "[s] states beyond these limits may come for so long; then the robot is damped, for good "
+         "(default 0.02)"},
         {"torque-share", CLI_NUMBER, &d.runner.torque_share, 0.01, 1, "S",
          "[-] of the torque limit of the task that targets may ask for (default 1)"},
         {"seconds", CLI_NUMBER, &d.seconds, 0, 86400, "T",
-         "[s] from the first state on; 0: until Ctrl-C (default 0)"},
+         "[s] from the first target on; 0: until Ctrl-C (default 0)"},
         {"simulate", CLI_FLAG, &d.simulate, 0, 0, NULL,
          "be the robot, simulated in MuJoCo, and send states to --connect"},
         {"connect", CLI_TEXT, &d.connect, 0, 0, "HOST:PORT",
          "simulated robot: where the runner listens (default " ADDRESS ")"},
+        {"bind", CLI_TEXT, &d.bind, 0, 0, "HOST[:PORT]",
+         "simulated robot: its own address, needed when --connect names another machine (default "
+         "127.0.0.1)"},
         {"ground", CLI_TEXT, &d.ground, 0, 0, "NAME[+NAME]",
          "simulated robot: ground, or a course of them (default rigid)"},
         {"model", CLI_TEXT, &d.model, 0, 0, "NAME",

@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+enum { EVENTS = 64 }; /* taken at once, so that a flood does not keep a tick from its time */
 #define STEP 0.1      /* [m/s, rad/s] of a key */
 #define STICK 32767   /* an axis at its end */
 #define DEAD_ZONE 0.1 /* [-] of a stick at rest */
@@ -90,20 +91,32 @@ static int take_event(Input *input, const struct js_event *event) {
     if (kind == JS_EVENT_AXIS && event->number < 4 && parts[event->number] >= 0) {
         const int part = parts[event->number];
         const double stick = -(double)event->value / STICK;
-        input->command[part] = fabs(stick) < DEAD_ZONE ? 0 : fmax(stick, -1) * input->range[part];
+        const int rests = fabs(stick) < DEAD_ZONE;
+        if (input->rested[event->number]) {
+            input->command[part] = rests ? 0 : fmax(stick, -1) * input->range[part];
+        }
+        input->rested[event->number] = input->rested[event->number] || rests;
     }
     return kind == JS_EVENT_BUTTON && event->number == 1 && event->value != 0 &&
            !(event->type & JS_EVENT_INIT);
 }
 
+/* Bool: the other end of a file from which nothing more came is gone. */
+static int is_gone(int file) {
+    struct pollfd asked = {file, POLLIN, 0};
+    return poll(&asked, 1, 0) > 0 && (asked.revents & (POLLHUP | POLLERR | POLLNVAL));
+}
+
 static int poll_gamepad(Input *input) {
+    const ssize_t whole = sizeof(struct js_event);
     struct js_event event;
-    ssize_t got = 0;
+    ssize_t got = whole;
     int damp = 0;
-    while ((got = read(input->gamepad, &event, sizeof event)) == (ssize_t)sizeof event) {
-        damp = take_event(input, &event) || damp;
+    for (int i = 0; i < EVENTS && got == whole; i++) {
+        got = read(input->gamepad, &event, sizeof event);
+        damp = (got == whole && take_event(input, &event)) || damp;
     }
-    if (got < 0 && errno != EAGAIN && errno != EINTR) {
+    if (got != whole && is_gone(input->gamepad)) {
         close(input->gamepad);
         input->gamepad = -1;
         stand(input);
@@ -111,14 +124,25 @@ static int poll_gamepad(Input *input) {
     return damp;
 }
 
-int input_poll(Input *input) {
-    int damp = 0;
+static int poll_keys(Input *input) {
     char key;
     struct pollfd terminal = {STDIN_FILENO, POLLIN, 0};
-    while (input->keys && poll(&terminal, 1, 0) > 0 && read(STDIN_FILENO, &key, 1) == 1) {
-        damp = take_key(input, key) || damp;
+    int more = 1, damp = 0;
+    for (int i = 0; i < EVENTS && more; i++) {
+        more = poll(&terminal, 1, 0) > 0 && read(STDIN_FILENO, &key, 1) == 1;
+        damp = (more && take_key(input, key)) || damp;
     }
-    return input->gamepad >= 0 ? poll_gamepad(input) || damp : damp;
+    if (!more && is_gone(STDIN_FILENO)) {
+        input->keys = 0;
+        stand(input);
+    }
+    return damp;
+}
+
+int input_poll(Input *input) {
+    const int key = input->keys && poll_keys(input);
+    const int button = input->gamepad >= 0 && poll_gamepad(input);
+    return key || button;
 }
 
 void input_close(Input *input) {

@@ -5,22 +5,43 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drive/sensor.h"
+
 #define CLOCK_DRIFT 1e-3 /* [-] by which two clocks may run apart */
+#define CLOCK_JUMP 1.0   /* [s] by which no state is faster than the fastest */
+#define GREETING 1.0     /* [s] in which a sender must answer with this runner's session */
+enum { GOOD = 5 };       /* states in a row before the first answer */
 
 struct Runner {
     RunnerDef def;
     TaskDef task; /* without noise */
+    PacketFormat format;
+    SensorLimits limits;
     Controller controller;
     TaskEnv *env; /* its sensors are packets, its physics is elsewhere */
-    PacketMode mode;
-    StatePacket state; /* the newest that was in time */
-    uint32_t newest;   /* sequence of the newest, also of one that was late */
     int joints;
-    int fresh;           /* bool: the policy has not seen it */
-    int peer_ended;      /* bool */
-    double arrived;      /* [s] when it came */
-    double fastest;      /* [s] smallest difference of arrival and sending, by two clocks */
-    TargetPacket target; /* the last */
+    PacketMode mode;
+
+    /* the robot */
+    uint64_t sender;  /* whose states are taken; 0: nobody's */
+    uint64_t session; /* of that sender */
+    double greeted;   /* [s] when its first state came */
+    int good;         /* its good states in a row, up to GOOD */
+    int confirmed;    /* bool: it knows this runner's session */
+    int peer_ended;   /* bool */
+
+    /* its states */
+    StatePacket state; /* the newest that was in time and possible */
+    uint32_t newest;   /* sequence of the newest, also of one that was late or impossible */
+    int fresh;         /* bool: the policy has not seen `state` */
+    double arrived;    /* [s] when it came */
+    double fastest;    /* [s] smallest difference of arrival and sending, by two clocks */
+    int glitches;      /* impossible ones since then */
+    double glitch[2];  /* [s] when the first and the last of them came */
+    char glitch_why[160];
+
+    double ticked; /* [s] the last tick; negative: none since a robot is there */
+    TargetPacket target;
     float action[ROBOT_JOINTS_MAX];
     RunnerReport report;
 };
@@ -57,6 +78,11 @@ Runner *runner_create(const RunnerDef *def, MildError *error) {
     r->task = *def->task;
     r->task.observe_noise = 0;
     r->joints = robot_joints(def->robot);
+    r->format = (PacketFormat){r->joints, packet_robot(def->robot), def->key};
+    r->limits = (SensorLimits){def->turn_limit, def->speed_limit, def->angle_limit};
+    r->target.session = def->session;
+    r->ticked = -1;
+    r->format = (PacketFormat){r->joints, packet_robot(def->robot), def->key};
     if (controller_learned(def->policy, def->robot, NULL, 1, &r->controller, error) != MILD_OK) {
         free(r);
         return NULL;
@@ -80,63 +106,138 @@ void runner_destroy(Runner *runner) {
     }
 }
 
+/* ---- who speaks ---- */
+
+static void forget_robot(Runner *r) {
+    r->sender = r->session = 0;
+    r->good = r->confirmed = r->fresh = r->glitches = 0;
+}
+
+/* Nobody keeps a runner waiting who falls silent or never answers it. */
+static void check_greeting(Runner *r, double now) {
+    if (r->sender && !r->confirmed &&
+        (now - r->arrived > r->def.damp_after ||
+         now - r->greeted > fmax(GREETING, r->def.damp_after))) {
+        forget_robot(r);
+    }
+}
+
+static int is_stranger(const Runner *r, uint64_t sender) {
+    const uint64_t only = r->def.peer, any_port = only & RUNNER_PORT ? 0 : RUNNER_PORT;
+    return (only && (sender | any_port) != (only | any_port)) || (r->sender && r->sender != sender);
+}
+
+/* Bool: the state belongs to the session with this robot, or greets while there is none. */
+static int is_of_session(const Runner *r, const StatePacket *state) {
+    if (r->confirmed) {
+        return state->session == r->session && state->peer == r->def.session;
+    }
+    return state->session != 0 && (state->peer == 0 || state->peer == r->def.session);
+}
+
 /* ---- states ---- */
 
-/* Bool: this state took longer than the fastest by more than `late`. The clocks differ by what the
- * fastest packet shows, and drift. */
-static int is_late(Runner *r, const StatePacket *state, double now) {
+/* Bool: newer than all before it, by its number and by the robot's clock. */
+static int is_newer(const Runner *r, const StatePacket *state) {
+    return r->good == 0 ||
+           ((int32_t)(state->sequence - r->newest) > 0 && state->time >= r->state.time);
+}
+
+/* [s] by which this state took longer than the fastest one. The clocks differ by what the fastest
+ * packet shows, and drift. */
+static double lateness(const Runner *r, const StatePacket *state, double now) {
     const double took = now - 1e-6 * (double)state->time;
-    if (r->report.received == 0) {
+    return r->good == 0 ? 0 : took - r->fastest - CLOCK_DRIFT * (now - r->arrived);
+}
+
+static void take_end(Runner *r, const StatePacket *state, double now) {
+    if (r->confirmed && is_newer(r, state) && lateness(r, state, now) <= r->def.late) {
+        r->peer_ended = 1;
+    } else {
+        r->report.ends_ignored++;
+    }
+}
+
+/* Bool: refused, because it cannot be true. */
+static int is_impossible(Runner *r, const StatePacket *state, double late, double now) {
+    char *why = r->report.refusal;
+    const size_t size = sizeof r->report.refusal;
+    if (late < -CLOCK_JUMP) {
+        snprintf(why, size, "its clock jumped forward by %.3g s", -late);
+    } else if (!sensor_is_impossible(r->def.robot, &r->limits, r->good > 0 ? &r->state : NULL,
+                                     state, why, size)) {
+        return 0;
+    }
+    if (!r->confirmed) {
+        forget_robot(r);
+    }
+    snprintf(r->glitch_why, sizeof r->glitch_why, "%s", why);
+    r->glitch[r->glitches > 0] = now;
+    r->glitches++;
+    return 1;
+}
+
+static void use_state(Runner *r, const StatePacket *state, uint64_t sender, double now) {
+    const double took = now - 1e-6 * (double)state->time;
+    if (r->good == 0) {
+        r->greeted = now;
         r->fastest = took;
     }
     r->fastest = fmin(took, r->fastest + CLOCK_DRIFT * (now - r->arrived));
-    return took - r->fastest > r->def.late;
-}
-
-PacketFault runner_take(Runner *r, const uint8_t *bytes, size_t size, double now) {
-    RunnerReport *report = &r->report;
-    StatePacket state = {0};
-    const PacketFault fault = packet_read_state(bytes, size, r->joints, &state);
-    if (fault != PACKET_FAULT_none) {
-        report->refused[fault]++;
-        return fault;
-    }
-    r->peer_ended = r->peer_ended || state.mode == PACKET_end;
-    const int32_t ahead = (int32_t)(state.sequence - r->newest);
-    const int late = is_late(r, &state, now);
-    const int first = report->received++ == 0;
-    if (!first && ahead <= 0) {
-        report->reordered++;
-        return fault;
-    }
-    report->lost += first ? 0 : ahead - 1;
-    r->newest = state.sequence;
-    if (late) {
-        report->late++;
-        return fault;
-    }
-    r->state = state;
+    r->sender = sender;
+    r->session = state->session;
+    r->good += r->good < GOOD;
+    r->confirmed = r->confirmed || (r->good == GOOD && state->peer == r->def.session);
+    r->state = *state;
     r->arrived = now;
     r->fresh = 1;
-    return fault;
+    r->glitches = 0;
 }
 
-/* Minus the third row of the rotation that the quaternion stands for. */
-static TaskReading read_state(const StatePacket *state, int joints) {
-    TaskReading reading = {{0}, {0}, {0}, {0}};
-    const double w = (double)state->quaternion[0], x = (double)state->quaternion[1],
-                 y = (double)state->quaternion[2], z = (double)state->quaternion[3];
-    reading.gravity[0] = -2 * (x * z - w * y);
-    reading.gravity[1] = -2 * (y * z + w * x);
-    reading.gravity[2] = 2 * (x * x + y * y) - 1;
-    for (int i = 0; i < 3; i++) {
-        reading.omega[i] = (double)state->angular_velocity[i];
+/* A state of the session, which is no end. */
+static PacketFault take_state(Runner *r, const StatePacket *state, uint64_t sender, double now) {
+    RunnerReport *report = &r->report;
+    if (!r->confirmed && state->session != r->session) {
+        forget_robot(r);
     }
-    for (int i = 0; i < joints; i++) {
-        reading.q[i] = (double)state->angle[i];
-        reading.qd[i] = (double)state->speed[i];
+    const int first = r->good == 0;
+    const double late = lateness(r, state, now);
+    if (!is_newer(r, state)) {
+        report->received++;
+        report->reordered++;
+        return PACKET_FAULT_none;
     }
-    return reading;
+    report->lost += first ? 0 : (int32_t)(state->sequence - r->newest) - 1;
+    r->newest = state->sequence;
+    if (late <= r->def.late && is_impossible(r, state, late, now)) {
+        return PACKET_FAULT_implausible;
+    }
+    report->received++;
+    if (late > r->def.late) {
+        report->late++;
+    } else {
+        use_state(r, state, sender, now);
+    }
+    return PACKET_FAULT_none;
+}
+
+PacketFault runner_take(Runner *r, const uint8_t *bytes, size_t size, uint64_t sender, double now) {
+    RunnerReport *report = &r->report;
+    StatePacket state;
+    check_greeting(r, now);
+    PacketFault fault = is_stranger(r, sender) ? PACKET_FAULT_stranger
+                                               : packet_read_state(bytes, size, &r->format, &state);
+    packet_explain(fault, bytes, &r->format, report->refusal, sizeof report->refusal);
+    if (fault == PACKET_FAULT_none && !is_of_session(r, &state)) {
+        fault = PACKET_FAULT_session;
+    }
+    if (fault == PACKET_FAULT_none && state.mode == PACKET_end) {
+        take_end(r, &state, now);
+    } else if (fault == PACKET_FAULT_none) {
+        fault = take_state(r, &state, sender, now);
+    }
+    report->refused[fault] += fault != PACKET_FAULT_none;
+    return fault;
 }
 
 /* ---- limits ---- */
@@ -148,30 +249,37 @@ void runner_damp(Runner *r, const char *why) {
     }
 }
 
-/* Damps a robot that is beyond what its joints and the task allow. */
-static void check_robot(Runner *r, const TaskReading *reading) {
-    const Robot *robot = r->def.robot;
+/* Damps a robot that has tipped over. */
+static void check_tilt(Runner *r, const TaskReading *reading) {
     char why[sizeof r->report.why];
-    for (int i = 0; i < r->joints; i++) {
-        const double q = reading->q[i], qd = fabs(reading->qd[i]);
-        const double beyond = fmax(robot_joint_low(robot)[i] - q, q - robot_joint_high(robot)[i]);
-        if (r->def.speed_limit > 0 && qd > r->def.speed_limit) {
-            snprintf(why, sizeof why, "%s moves at %.1f rad/s, the limit is %g",
-                     robot_joint_name(robot, i), qd, r->def.speed_limit);
-            runner_damp(r, why);
-        }
-        if (r->def.angle_limit >= 0 && beyond > r->def.angle_limit) {
-            snprintf(why, sizeof why, "%s is %.2f rad beyond its range, the limit is %g",
-                     robot_joint_name(robot, i), beyond, r->def.angle_limit);
-            runner_damp(r, why);
-        }
-    }
     const double tilt = acos(fmin(fmax(-reading->gravity[2], -1), 1));
     if (tilt > r->task.tilt_limit) {
         snprintf(why, sizeof why, "the base is tilted by %.2f rad, the limit is %g", tilt,
                  r->task.tilt_limit);
         runner_damp(r, why);
     }
+}
+
+/* Damps when there was no usable state for too long, or no tick. */
+static void check_times(Runner *r, double now) {
+    char why[sizeof r->report.why];
+    const double age = now - r->arrived, stall = r->ticked < 0 ? 0 : now - r->ticked,
+                 glitch = r->glitches > 0 ? r->glitch[r->glitches > 1] - r->glitch[0] : 0;
+    if (stall > r->def.stall_after) {
+        snprintf(why, sizeof why, "the runner itself stood still for %.3f s, the limit is %g",
+                 stall, r->def.stall_after);
+        runner_damp(r, why);
+    }
+    if (glitch > r->def.glitch) {
+        snprintf(why, sizeof why, "impossible states for %.3f s: %s", glitch, r->glitch_why);
+        runner_damp(r, why);
+    }
+    if (age > r->def.damp_after) {
+        snprintf(why, sizeof why, "no %sstate for %.3f s, the limit is %g",
+                 r->glitches > 0 ? "possible " : "", age, r->def.damp_after);
+        runner_damp(r, why);
+    }
+    r->ticked = now;
 }
 
 /* The target whose PD asks for no more than the limit at this angle and speed:
@@ -227,11 +335,13 @@ static int is_finite(const Runner *r) {
  * tick before it. */
 static void step_policy(Runner *r, const TaskReading *reading, const double command[3]) {
     const TaskView none = {0};
+    TaskReading shown = *reading;
+    sensor_clip(r->def.robot, &shown);
     if (r->report.steps == 0) {
         set_command(r, command);
         memcpy(r->env->command_seen, r->env->command, sizeof r->env->command);
     }
-    task_observe(r->env, &r->task, r->def.robot, NULL, reading, r->report.steps == 0, &none);
+    task_observe(r->env, &r->task, r->def.robot, NULL, &shown, r->report.steps == 0, &none);
     r->controller.act(r->controller.self, 1, &r->env, r->action);
     if (!is_finite(r)) {
         runner_damp(r, "the policy's action is not finite");
@@ -245,42 +355,41 @@ static void step_policy(Runner *r, const TaskReading *reading, const double comm
 }
 
 static void walk(Runner *r, double now, const double command[3]) {
-    const TaskReading reading = read_state(&r->state, r->joints);
-    check_robot(r, &reading);
+    const TaskReading reading = sensor_read(&r->state, r->joints);
+    check_tilt(r, &reading);
     if (r->mode == PACKET_damp) {
         return;
     }
     r->mode = PACKET_walk;
-    r->fresh = 0;
     times_add(&r->report.age, now - r->arrived);
     step_policy(r, &reading, command);
 }
 
+/* Without stiffness in every mode in which the policy does not walk. */
 static size_t write_target(Runner *r, double now, uint8_t *bytes) {
     r->target.mode = r->mode;
     r->target.sequence++;
     r->target.answers = r->state.sequence;
     r->target.time = (uint64_t)(1e6 * now);
-    for (int i = 0; i < r->joints && r->mode >= PACKET_damp; i++) {
-        r->target.angle[i] = r->state.angle[i];
-        r->target.kp[i] = 0;
+    r->target.peer = r->session;
+    TargetPacket packet = r->target;
+    for (int i = 0; i < r->joints && r->mode != PACKET_walk && r->mode != PACKET_hold; i++) {
+        packet.angle[i] = r->state.angle[i];
+        packet.kp[i] = 0;
     }
-    return packet_write_target(&r->target, r->joints, bytes);
+    return packet_write_target(&packet, &r->format, bytes);
 }
 
 size_t runner_tick(Runner *r, double now, const double command[3], uint8_t *bytes) {
-    char why[sizeof r->report.why];
-    if (r->report.received == 0) {
-        return 0;
+    const int fresh = r->fresh;
+    r->fresh = 0;
+    if (!r->confirmed) { /* no more packets than came */
+        return r->good == GOOD && fresh && r->mode == PACKET_wait ? write_target(r, now, bytes) : 0;
     }
-    if (now - r->arrived > r->def.damp_after) {
-        snprintf(why, sizeof why, "no state for %.3f s, the limit is %g", now - r->arrived,
-                 r->def.damp_after);
-        runner_damp(r, why);
-    }
+    check_times(r, now);
     if (r->mode == PACKET_damp) {
         r->report.damps++;
-    } else if (r->fresh) {
+    } else if (fresh) {
         walk(r, now, command);
     } else {
         r->mode = PACKET_hold;
@@ -291,11 +400,15 @@ size_t runner_tick(Runner *r, double now, const double command[3], uint8_t *byte
 
 size_t runner_end(Runner *r, double now, uint8_t *bytes) {
     r->mode = PACKET_end;
-    return write_target(r, now, bytes);
+    return r->good == GOOD ? write_target(r, now, bytes) : 0;
 }
 
 PacketMode runner_mode(const Runner *r) {
     return r->mode;
+}
+
+uint64_t runner_sender(const Runner *r) {
+    return r->sender;
 }
 
 int runner_peer_ended(const Runner *r) {

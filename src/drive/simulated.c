@@ -11,6 +11,7 @@
 #define SILENCE 0.1 /* [s] without a target after which the robot damps itself */
 #define RESEND 0.01 /* [s] between the states that wait for the first target */
 #define END_PACKETS 3
+#define PACKETS 512 /* taken at once */
 #define RANDOM_USE_LOSS 0x4c4f5353u
 enum { PENDING = 64 }; /* delayed states, at most */
 
@@ -26,6 +27,8 @@ typedef struct {
     TaskEnv *env;
     RobotSim *sim;
     int joints;
+    PacketFormat format;
+    uint64_t runner;   /* its session; 0: not known yet */
     double time;       /* [s] its own, since the first target */
     uint32_t sequence; /* of the newest state */
     TargetPacket target;
@@ -43,7 +46,9 @@ static StatePacket make_state(Simulated *s, PacketMode mode) {
     StatePacket state = {.mode = mode,
                          .sequence = ++s->sequence,
                          .answers = s->target.sequence,
-                         .time = (uint64_t)(1e6 * clock_seconds())};
+                         .time = (uint64_t)(1e6 * clock_seconds()),
+                         .session = s->def->session,
+                         .peer = s->runner};
     for (int i = 0; i < 4; i++) {
         state.quaternion[i] = (float)qpos[3 + i];
     }
@@ -74,7 +79,7 @@ static int send_state(Simulated *s) {
     const SimulatedDef *def = s->def;
     uint8_t bytes[PACKET_MAX];
     const StatePacket state = make_state(s, PACKET_walk);
-    const size_t size = packet_write_state(&state, s->joints, bytes);
+    const size_t size = packet_write_state(&state, &s->format, bytes);
     Random r = random_at(def->seed ^ RANDOM_USE_LOSS, 0, s->sequence);
     s->report->sent++;
     send_pending(s);
@@ -94,20 +99,39 @@ static int send_state(Simulated *s) {
     return 1;
 }
 
+/* Bool: the target speaks to this robot, and is of the session that its first one began. */
+static int is_of_session(Simulated *s, const TargetPacket *target) {
+    if (target->peer != s->def->session || target->session == 0) {
+        return 0;
+    }
+    s->runner = s->runner ? s->runner : target->session;
+    return s->runner == target->session;
+}
+
+static void take_target(Simulated *s, const uint8_t *bytes, size_t size) {
+    TargetPacket target;
+    if (packet_read_target(bytes, size, &s->format, &target) != PACKET_FAULT_none ||
+        !is_of_session(s, &target)) {
+        s->report->refused++;
+    } else if (!s->has_target || (int32_t)(target.sequence - s->target.sequence) > 0) {
+        s->target = target;
+        s->target_time = s->time;
+        s->has_target = 1;
+        s->silent = 0;
+        s->report->targets++;
+    }
+}
+
 static void take_targets(Simulated *s) {
     uint8_t bytes[PACKET_MAX + 1];
     struct sockaddr_in from;
-    TargetPacket target = {0};
     int size;
-    while ((size = udp_receive(s->def->udp, bytes, sizeof bytes, &from)) >= 0) {
-        if (packet_read_target(bytes, (size_t)size, s->joints, &target) != PACKET_FAULT_none) {
-            s->report->refused++;
-        } else if (!s->has_target || (int32_t)(target.sequence - s->target.sequence) > 0) {
-            s->target = target;
-            s->target_time = s->time;
-            s->has_target = 1;
-            s->silent = 0;
-            s->report->targets++;
+    for (int i = 0;
+         i < PACKETS && (size = udp_receive(s->def->udp, bytes, sizeof bytes, &from)) >= 0; i++) {
+        if (udp_sender(&from) == udp_sender(&s->def->udp->peer)) {
+            take_target(s, bytes, (size_t)size);
+        } else {
+            s->report->strangers++;
         }
     }
 }
@@ -182,7 +206,7 @@ static MildStatus wait_for_runner(Simulated *s, MildError *error) {
         }
         const StatePacket state = make_state(s, PACKET_walk);
         uint8_t bytes[PACKET_MAX];
-        udp_send(s->def->udp, bytes, packet_write_state(&state, s->joints, bytes));
+        udp_send(s->def->udp, bytes, packet_write_state(&state, &s->format, bytes));
         wait_for_answer(s, RESEND);
     }
     return MILD_OK;
@@ -223,7 +247,7 @@ static void say_end(Simulated *s) {
     uint8_t bytes[PACKET_MAX];
     for (int i = 0; i < END_PACKETS; i++) {
         const StatePacket state = make_state(s, PACKET_end);
-        udp_send(s->def->udp, bytes, packet_write_state(&state, s->joints, bytes));
+        udp_send(s->def->udp, bytes, packet_write_state(&state, &s->format, bytes));
     }
 }
 
@@ -241,7 +265,8 @@ MildStatus simulated_run(const SimulatedDef *def, SimulatedReport *report, MildE
                          .report = report,
                          .env = env,
                          .sim = sim,
-                         .joints = robot_joints(def->robot)};
+                         .joints = robot_joints(def->robot),
+                         .format = {robot_joints(def->robot), packet_robot(def->robot), def->key}};
         task_env_init(env, def->task, def->robot, def->seed, 0);
         env->command_frozen = 1;
         task_env_reset_on(env, def->task, def->robot, sim, def->terrain, def->rigid, &none);

@@ -3,6 +3,7 @@
 #ifndef DRIVE_SIMULATED_H
 #define DRIVE_SIMULATED_H
 
+#include "drive/key.h"
 #include "drive/udp.h"
 #include "task/task.h"
 
@@ -20,6 +21,8 @@ typedef struct {
     double delay_share; /* [-] share of the states that are sent `delay` too late */
     double delay;       /* [s] */
     uint64_t seed;      /* of its start, of what is lost */
+    uint64_t session;   /* a fresh random number, not 0 */
+    const Key *key;     /* borrowed; NULL: none */
 } SimulatedDef;
 
 typedef struct {
@@ -30,6 +33,7 @@ typedef struct {
     double damped;  /* [s] without stiffness, told so or because no target came */
     long sent, dropped, delayed;
     long targets, refused;
+    long strangers;  /* packets of others than the peer */
     const char *end; /* "time", "fallen", "runner", "diverged", "silence" */
 } SimulatedReport;
 

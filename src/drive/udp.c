@@ -12,29 +12,38 @@
 
 #include "base/text.h"
 
-static MildStatus find_address(const char *option, const char *text, struct sockaddr_in *address,
-                               MildError *error) {
-    char host[256];
-    int port;
-    const char *colon = strrchr(text, ':');
+static MildStatus find_host(const char *option, const char *host, struct sockaddr_in *address,
+                            MildError *error) {
     const struct addrinfo wanted = {.ai_family = AF_INET, .ai_socktype = SOCK_DGRAM};
     struct addrinfo *found;
-    if (!colon || colon == text || colon - text >= (long)sizeof host ||
-        !text_int(colon + 1, &port) || port < 0 || port > 65535) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "--%s: '%.100s' is not HOST:PORT, as 127.0.0.1:9870", option, text);
-    }
-    memcpy(host, text, (size_t)(colon - text));
-    host[colon - text] = '\0';
     const int failed = getaddrinfo(host, NULL, &wanted, &found);
     if (failed) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "--%s: %.100s: %s", option, host,
                          gai_strerror(failed));
     }
     memcpy(address, found->ai_addr, sizeof *address);
-    address->sin_port = htons((uint16_t)port);
     freeaddrinfo(found);
     return MILD_OK;
+}
+
+/* HOST:PORT, or with an optional port, which is 0 then. */
+static MildStatus find_address(const char *option, const char *text, int optional,
+                               struct sockaddr_in *address, MildError *error) {
+    char host[256];
+    int port = 0;
+    const char *colon = strrchr(text, ':');
+    const size_t length = colon ? (size_t)(colon - text) : strlen(text);
+    if ((!colon && !optional) || length == 0 || length >= sizeof host ||
+        (colon && (!text_int(colon + 1, &port) || port < 0 || port > 65535))) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "--%s: '%.100s' is not %s", option, text,
+                         optional ? "HOST or HOST:PORT, as 192.168.1.10"
+                                  : "HOST:PORT, as 127.0.0.1:9870");
+    }
+    memcpy(host, text, length);
+    host[length] = '\0';
+    MildStatus status = find_host(option, host, address, error);
+    address->sin_port = htons((uint16_t)port);
+    return status;
 }
 
 /* What the user can do about a failed bind, or "". */
@@ -61,20 +70,41 @@ static MildStatus open_bound(Udp *udp, const char *option, const char *text, Mil
 }
 
 MildStatus udp_listen(Udp *udp, const char *option, const char *address, MildError *error) {
-    MildStatus status = find_address(option, address, &udp->own, error);
+    MildStatus status = find_address(option, address, 0, &udp->own, error);
     return status == MILD_OK ? open_bound(udp, option, address, error) : status;
 }
 
-MildStatus udp_connect(Udp *udp, const char *option, const char *address, MildError *error) {
+MildStatus udp_connect(Udp *udp, const char *option, const char *address, const char *bind,
+                       MildError *error) {
     struct sockaddr_in peer;
-    MildStatus status = find_address(option, address, &peer, error);
-    memset(&udp->own, 0, sizeof udp->own);
-    udp->own.sin_family = AF_INET;
+    MildStatus status = find_address(option, address, 0, &peer, error);
     if (status == MILD_OK) {
-        status = open_bound(udp, option, address, error);
+        status = find_address("bind", bind ? bind : "127.0.0.1", 1, &udp->own, error);
+    }
+    if (status == MILD_OK && !bind && ntohl(peer.sin_addr.s_addr) >> 24 != IN_LOOPBACKNET) {
+        status = mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "--%s: %.100s is another machine; name an address of this one that it "
+                           "can reach, --bind HOST[:PORT]",
+                           option, address);
+    }
+    if (status == MILD_OK) {
+        status = open_bound(udp, bind ? "bind" : option, bind ? bind : address, error);
     }
     udp->peer = peer;
     udp->has_peer = status == MILD_OK;
+    return status;
+}
+
+MildStatus udp_find_sender(const char *option, const char *text, uint64_t *sender,
+                           MildError *error) {
+    struct sockaddr_in address;
+    const MildStatus status = find_address(option, text, 1, &address, error);
+    if (status == MILD_OK && address.sin_addr.s_addr == htonl(INADDR_ANY)) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--%s: %.100s is no robot's address; leave the option out to hear any",
+                         option, text);
+    }
+    *sender = status == MILD_OK ? udp_sender(&address) : 0;
     return status;
 }
 
@@ -107,8 +137,8 @@ int udp_receive(const Udp *udp, uint8_t *bytes, size_t most, struct sockaddr_in 
     return got < 0 ? -1 : (int)got; /* -1 also for a peer's port that is closed */
 }
 
-int udp_same(const struct sockaddr_in *a, const struct sockaddr_in *b) {
-    return a->sin_addr.s_addr == b->sin_addr.s_addr && a->sin_port == b->sin_port;
+uint64_t udp_sender(const struct sockaddr_in *address) {
+    return (uint64_t)ntohl(address->sin_addr.s_addr) << 16 | ntohs(address->sin_port);
 }
 
 void udp_send(const Udp *udp, const uint8_t *bytes, size_t size) {

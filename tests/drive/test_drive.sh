@@ -10,7 +10,7 @@ config=$(realpath "$tests/../../configs/walk.ini")
 start() {
     local name=$1
     shift
-    "$mild" drive --config "$config" --listen 127.0.0.1:0 --late 10 --damp-after 20 --json "$name.json" "$@" \
+    "$mild" drive --config "$config" --listen 127.0.0.1:0 --late 10 --damp-after 20 --stall-after 20 --json "$name.json" "$@" \
         >"$name.out" 2>"$name.err" </dev/null &
     runner=$!
     for ((i = 0; i < 600; i++)); do
@@ -97,7 +97,7 @@ host, port = sys.argv[1].split(":")
 sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 random.seed(1)
 for k in range(600):
-    head = b"MILD\1\1\14\1" if k % 3 == 0 else b""
+    head = b"MILD\2\1\14\1" if k % 3 == 0 else b""
     sender.sendto(head + os.urandom(random.randrange(0, 2000 if k % 5 == 0 else 200)), (host, int(port)))
     time.sleep(0.002)
 PY
@@ -162,30 +162,55 @@ holds stopped.json ticks "100 * $(value stopped.json seconds) - x - $(value stop
 holds stopped_robot.json end 'x == "runner"'
 
 # a state as docs/drive.md makes it in Python: taken, and answered
-start snippet --damp-after 0.1
-"$python" - "$address" "$tests/../../docs/drive.md" <<'PY' || fail "the packet of docs/drive.md"
+start snippet --damp-after 2
+"$python" - "$address" "$tests/../../docs/drive.md" "$tests/../../robots/sa01/robot.ini" <<'PY' || fail "the packet of docs/drive.md"
 import re, socket, struct, sys, zlib
 host, port = sys.argv[1].split(":")
 sequence, answers, microseconds = 5, 0, 123456
 quaternion, omega = [1, 0, 0, 0], [0, 0, 0]
 angles, speeds = [0, 0, -0.24, 0.48, -0.24, 0] * 2, [0] * 12
 page = open(sys.argv[2], encoding="utf-8").read()
-lines = re.findall(r"^    ((?:body|packet) .*)", page, re.M)
-assert len(lines) == 3
-exec("\n".join(lines))
-robot = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-robot.settimeout(60)
-robot.sendto(packet, (host, int(port)))
-target = robot.recv(4096)
-assert len(packet) == 152 and len(target) == 220
-assert target[:4] == b"MILD" and target[4:8] == bytes([1, 2, 12, 1])
-assert struct.unpack("<I", target[12:16])[0] == sequence
-assert struct.unpack("<I", target[-4:])[0] == zlib.crc32(target[:-4])
-kp = struct.unpack("<12f", target[24 + 48 : 24 + 96])
-assert kp == (50, 50, 70, 70, 20, 20) * 2
+lines = re.findall(r"^    ((?:robot|head|body|packet) = .*)", page, re.M)
+assert len(lines) == 4
+code = compile("\n".join(lines), sys.argv[2], "exec")
+ini = open(sys.argv[3], encoding="utf-8").read()
+names = re.search(r"^names\s*=((?:.*\n)(?:[ \t]+.*\n)*)", ini, re.M).group(1).split()
+session, peer = 0x0123456789ABCDEF, 0
+link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+link.settimeout(60)
+for mode in (0, 1):  # a greeting of five, and the walk
+    for k in range(5 if mode == 0 else 1):
+        sequence, microseconds = sequence + 1, microseconds + 10000
+        exec(code)
+        link.sendto(packet, (host, int(port)))
+    target = link.recv(4096)
+    while target[7] != mode:
+        target = link.recv(4096)
+    assert len(packet) == 172 and len(target) == 240
+    assert target[:4] == b"MILD" and target[4:8] == bytes([2, 2, 12, mode])
+    assert struct.unpack("<I", target[12:16])[0] == sequence
+    assert struct.unpack("<I", target[-4:])[0] == zlib.crc32(target[:-4])
+    assert struct.unpack("<Q", target[32:40])[0] == session
+    assert struct.unpack("<I", target[40:44])[0] == zlib.crc32("\n".join(names).encode())
+    kp = struct.unpack("<12f", target[44 + 48 : 44 + 96])
+    assert kp == ((50, 50, 70, 70, 20, 20) * 2 if mode else (0,) * 12)
+    peer = struct.unpack("<Q", target[24:32])[0]
 PY
 ended 2
-holds snippet.json received 'x == 1'
+holds snippet.json received 'x == 6'
+
+# both with one key; without it, or with another, they do not find each other
+(umask 077 && head -c 32 /dev/urandom >key && head -c 32 /dev/urandom >other)
+start sealed --command 0.3,0,0 --key key
+bad "no answer from $address" "$mild" drive --simulate --connect "$address" --patience 0.5 --json x.json
+bad "no answer from $address" "$mild" drive --simulate --connect "$address" --patience 0.5 --json x.json --key other
+robot sealed --key key --seconds 1 || fail "the robot of sealed"
+ended 0
+holds sealed_robot.json fallen 'x == "false"'
+holds sealed_robot.json refused 'x == 0'
+holds sealed.json steps 'x >= 100'
+holds sealed.json key 'x > 20'
+[ "$(grep -c 'refused a packet: it is not sealed with the key' sealed.err)" = 1 ] || fail "sealed: $(cat sealed.err)"
 
 # keys of a terminal: x damps
 "$python" - "$mild" <<'PY' || fail "keys"
@@ -220,14 +245,25 @@ kill -INT "$runner"
 wait "$runner"
 bad "no_such.safetensors" "$mild" drive --policy no_such.safetensors
 bad "is for robot sa01, not for go1" "$mild" drive --robot go1 --policy "$tests/../../policies/mild.safetensors"
+head -c 31 key >short
+cp key open && chmod 644 open
+bad "short has 31 bytes, a key has 32 to 64; make one with" "$mild" drive --key short
+bad "chmod 600 open" "$mild" drive --simulate --key open
+bad "no_such: " "$mild" drive --key no_such
+bad "drive: .*: " "$mild" drive --key .
+bad "is not HOST or HOST:PORT" "$mild" drive --peer 127.0.0.1:x
+bad "is no robot's address" "$mild" drive --peer 0.0.0.0
+bad "192.0.2.1:9870 is another machine; .* --bind HOST" "$mild" drive --simulate --connect 192.0.2.1:9870
+bad "192.0.2.1.*; name an address of this machine" "$mild" drive --simulate --bind 192.0.2.1
+rm key other short open
 bad "/dev/input/none" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/input/none
 bad "/dev/null is no gamepad" "$mild" drive --listen 127.0.0.1:0 --gamepad /dev/null
 bad "\. is no gamepad" "$mild" drive --listen 127.0.0.1:0 --gamepad .
 for given in --policy=x --listen=x --command=0,0,0 --gamepad=x --no-keys --late=0.02 --damp-after=1 --speed-limit=30 --angle-limit=0.2 \
-    --torque-share=1; do
+    --torque-share=1 --peer=127.0.0.1 --turn-limit=1 --glitch=0.1 --stall-after=1; do
     bad "${given%=*} is for the runner" "$mild" drive --simulate $given
 done
-for given in --connect=x --ground=foam45 --model=mild --lockstep --patience=1 --drop=0 --delay=0,0 --seed=1; do
+for given in --connect=x --bind=x --ground=foam45 --model=mild --lockstep --patience=1 --drop=0 --delay=0,0 --seed=1; do
     bad "${given%=*} needs --simulate" "$mild" drive $given
 done
 bad "as 0.5,0,0" "$mild" drive --command 0.5
@@ -235,7 +271,7 @@ bad "as 0.05,0.02" "$mild" drive --simulate --delay 0.05
 bad "unknown ground 'foma45'" "$mild" drive --simulate --ground foma45
 bad "nearest is 'task.gait_period'" "$mild" drive --task.gait_perod=0.7
 bad "no_such_folder" "$mild" drive --json no_such_folder/x.json
-for option in late damp-after speed-limit angle-limit torque-share seconds patience drop; do
+for option in late damp-after stall-after glitch turn-limit speed-limit angle-limit torque-share seconds patience drop; do
     bad "--$option" "$mild" drive "--$option" -7
 done
 finish "two processes walk, and end as they should"
