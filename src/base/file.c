@@ -427,6 +427,16 @@ MildStatus file_lock(FileLock *lock, const char *path, MildError *error) {
     }
 }
 
+long file_lock_holder(const char *path) {
+    struct flock holder = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+    const int file = open(path, O_RDONLY | O_NONBLOCK | O_NOFOLLOW | O_CLOEXEC);
+    const int held = file >= 0 && fcntl(file, F_GETLK, &holder) == 0 && holder.l_type != F_UNLCK;
+    if (file >= 0) {
+        close(file);
+    }
+    return held ? (long)holder.l_pid : 0;
+}
+
 void file_unlock(FileLock *lock) {
     if (lock->file >= 0) {
         unlink(lock->path);

@@ -57,6 +57,8 @@ typedef struct {
  * names, and with MILD_ERROR_FORMAT when the file is there and was not made for this purpose: it
  * would be removed with the lock. */
 MildStatus file_lock(FileLock *lock, const char *path, MildError *error);
+/* The process that holds the lock, or 0. Not for a process that may hold it: asking ends its lock. */
+long file_lock_holder(const char *path);
 /* Removes the file and releases the lock. Does nothing when it is not held. */
 void file_unlock(FileLock *lock);
 

@@ -239,34 +239,6 @@ static void remove_leftovers(const char *folder) {
     }
 }
 
-/* Locks the folder for this run. Checks it again, because another run may have started there
- * since. */
-static MildStatus take_folder(TrainRun *run, MildError *error) {
-    const char *folder = run->def.folder;
-    char path[PATH_SIZE];
-    MildError cause = {0};
-    MildStatus status = path_make_folder(folder, error);
-    if (status == MILD_OK) {
-        status = path_join(folder, "lock", path, error);
-    }
-    if (status != MILD_OK) {
-        return status;
-    }
-    status = file_lock(&run->lock, path, &cause);
-    if (status == MILD_ERROR_FORMAT) {
-        return mild_fail(error, status, "%.300s, or choose another --out", cause.text);
-    }
-    if (status == MILD_ERROR_ARGUMENT) {
-        return mild_fail(error, status, "%.250s, which trains in this folder; choose another --out",
-                         cause.text);
-    }
-    if (status != MILD_OK) {
-        return mild_fail(error, status, "%s", cause.text);
-    }
-    remove_leftovers(folder);
-    return train_run_check_folder(folder, run->def.resume, error);
-}
-
 /* What a run writes beside checkpoints and the TensorBoard file. */
 static const char *const run_names[] = {"policy.safetensors", "log.csv", "config.ini",
                                         "version.txt"};
@@ -294,7 +266,7 @@ static MildStatus check_names(const char *folder, int resume, MildError *error) 
     return status;
 }
 
-MildStatus train_run_check_folder(const char *folder, int resume, MildError *error) {
+static MildStatus check_folder(const char *folder, int resume, MildError *error) {
     int64_t oldest;
     int count;
     newest_checkpoint(folder, INT64_MAX, &oldest, &count);
@@ -316,6 +288,19 @@ MildStatus train_run_check_folder(const char *folder, int resume, MildError *err
     return check_names(folder, resume, error);
 }
 
+MildStatus train_run_check_folder(const char *folder, int resume, MildError *error) {
+    char lock[PATH_SIZE];
+    const long holder =
+        path_join(folder, "lock", lock, NULL) == MILD_OK ? file_lock_holder(lock) : 0;
+    if (holder) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "%.200s: in use by process %ld, which trains in this folder; choose "
+                         "another --out",
+                         folder, holder);
+    }
+    return check_folder(folder, resume, error);
+}
+
 MildStatus train_run_claim(const char *folder, int resume, MildError *error) {
     MildStatus status = MILD_OK;
     for (int i = 0; i < RUN_NAMES && status == MILD_OK; i++) {
@@ -327,6 +312,34 @@ MildStatus train_run_claim(const char *folder, int resume, MildError *error) {
         status = status == MILD_OK ? file_claim(path, "--out", error) : status;
     }
     return status;
+}
+
+/* Locks the folder for this run. Checks it again, because another run may have started there
+ * since. */
+static MildStatus take_folder(TrainRun *run, MildError *error) {
+    const char *folder = run->def.folder;
+    char path[PATH_SIZE];
+    MildError cause = {0};
+    MildStatus status = path_make_folder(folder, error);
+    if (status == MILD_OK) {
+        status = path_join(folder, "lock", path, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    status = file_lock(&run->lock, path, &cause);
+    if (status == MILD_ERROR_FORMAT) {
+        return mild_fail(error, status, "%.300s, or choose another --out", cause.text);
+    }
+    if (status == MILD_ERROR_ARGUMENT) {
+        return mild_fail(error, status, "%.250s, which trains in this folder; choose another --out",
+                         cause.text);
+    }
+    if (status != MILD_OK) {
+        return mild_fail(error, status, "%s", cause.text);
+    }
+    remove_leftovers(folder);
+    return check_folder(folder, run->def.resume, error);
 }
 
 static MildStatus open_log(TrainRun *run, MildError *error) {
