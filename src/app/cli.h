@@ -22,8 +22,8 @@ typedef struct {
  * double *, NUMBERS CliNumbers *, NAMES CliNames *. The value that it holds before parsing is
  * the default. Files are const char ** too. INPUT is read. OUTPUT is written and may be `-`; an
  * output that cannot be written is refused before the command runs. OUTPUT_LATER is written to a
- * folder that the command makes, so the command checks it. Outputs are claimed (file_claim): they may
- * be neither another output nor any file that the command reads. */
+ * folder that the command makes, so the command checks it. Outputs are claimed (file_claim): they
+ * may be neither another output nor any file that the command reads. */
 typedef enum {
     CLI_FLAG,
     CLI_TEXT,

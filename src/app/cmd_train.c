@@ -232,7 +232,8 @@ int cmd_train(int argc, char **argv) {
         {"config", CLI_INPUT, &run->config, 0, 0, "FILE.ini",
          "config file; it needs only the keys that differ from configs/default.ini"},
         {"out", CLI_TEXT, &run->out, 0, 0, "FOLDER",
-         "run folder, for config, log, checkpoints and policy.safetensors"},
+         "run folder, for config, log, checkpoints and policy.safetensors; a new run overwrites no "
+         "file of another"},
         {"robot", CLI_TEXT, &run->robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP "; sets train.robot (default: the config's, or sa01)"},
         {"resume", CLI_FLAG, &run->resume, 0, 0, NULL,

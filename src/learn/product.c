@@ -2,6 +2,7 @@
 #include "learn/product.h"
 
 #include <dlfcn.h>
+#include <execinfo.h>
 #include <math.h>
 #include <oneapi/dnnl/dnnl.h>
 #include <string.h>
@@ -24,6 +25,8 @@ void product_leave(int entered) {
 void product_on_exception(void (*fatal)(void)) {
     void (*(*set_terminate)(void (*)(void)))(void);
     void *symbol = dlsym(RTLD_DEFAULT, "_ZSt13set_terminatePFvvE"); /* std::set_terminate */
+    void *frame;
+    backtrace(&frame, 1); /* glibc loads its unwinder at the first use, which needs memory */
     if (symbol) {
         memcpy(&set_terminate, &symbol, sizeof symbol);
         set_terminate(fatal);
