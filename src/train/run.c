@@ -266,6 +266,23 @@ static MildStatus check_names(const char *folder, int resume, MildError *error) 
     return status;
 }
 
+/* A checkpoint's name may be written again: after a damaged one, or when nothing is left to do. */
+static MildStatus check_checkpoints(const char *folder, MildError *error) {
+    MildStatus status = MILD_OK;
+    DIR *dir = opendir(folder);
+    for (struct dirent *entry; status == MILD_OK && dir && (entry = readdir(dir));) {
+        char path[PATH_SIZE];
+        if (checkpoint_number(entry->d_name) >= 0) {
+            status = path_join(folder, entry->d_name, path, error);
+            status = status == MILD_OK ? file_check_own(path, error) : status;
+        }
+    }
+    if (dir) {
+        closedir(dir);
+    }
+    return status;
+}
+
 static MildStatus check_folder(const char *folder, int resume, MildError *error) {
     int64_t oldest;
     int count;
@@ -285,7 +302,8 @@ static MildStatus check_folder(const char *folder, int resume, MildError *error)
                          "another --out",
                          folder);
     }
-    return check_names(folder, resume, error);
+    MildStatus status = resume ? check_checkpoints(folder, error) : MILD_OK;
+    return status == MILD_OK ? check_names(folder, resume, error) : status;
 }
 
 MildStatus train_run_check_folder(const char *folder, int resume, MildError *error) {
@@ -342,15 +360,22 @@ static MildStatus take_folder(TrainRun *run, MildError *error) {
     return check_folder(folder, run->def.resume, error);
 }
 
+/* A log of other columns ends a resumed run before anything is written; a new one begins with its
+ * config, because a log alone is in the way of the next. */
 static MildStatus open_log(TrainRun *run, MildError *error) {
-    MildStatus status = write_config(run, error);
+    const int resume = run->def.resume;
+    MildStatus status = resume ? MILD_OK : write_config(run, error);
     if (status != MILD_OK) {
         return status;
     }
     name_columns(run);
     run->log = log_open(run->def.folder, run->column, COLUMNS,
-                        run->def.resume ? train_iteration(run->trainer) : -1, error);
-    return run->log ? log_config(run->log, run->def.config, error) : error->status;
+                        resume ? train_iteration(run->trainer) : -1, error);
+    status = run->log ? MILD_OK : error->status;
+    if (status == MILD_OK && resume) {
+        status = write_config(run, error);
+    }
+    return status == MILD_OK ? log_config(run->log, run->def.config, error) : status;
 }
 
 /* A resumed run has its networks from its checkpoint. */

@@ -63,6 +63,17 @@ for name in policy.safetensors log.csv config.ini version.txt; do
     whole o "o/$name: it is a pipe" "$mild" train --out o --resume --train.iterations=2 --config first/config.ini
     rm outside
 done
+for number in 1 2; do
+    rm -rf o
+    cp -r first o
+    rm -f o/checkpoint_00000000$number.safetensors
+    mkfifo o/checkpoint_00000000$number.safetensors
+    whole o "checkpoint_00000000$number.safetensors: it is a pipe" "$mild" train --out o --resume --train.iterations=2
+done
+rm -rf o
+cp -r first o
+echo "iteration,mine" >o/log.csv
+whole o "its columns are not this version" "$mild" train --out o --resume --train.iterations=2
 rm -rf o
 cp -r first o
 ln o/log.csv outside
