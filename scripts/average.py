@@ -49,9 +49,12 @@ def main():
         share = float(sys.argv[3])
     except ValueError:
         fail(f"{sys.argv[3]}: not a number; give the share of the second policy, 0 .. 1")
+    out = pathlib.Path(sys.argv[4])
+    if any(out.exists() and pathlib.Path(name).exists() and out.samefile(name) for name in sys.argv[1:3]):
+        fail(f"{out}: is also an input and would be overwritten; name another file")
     whole = average(sys.argv[1], sys.argv[2], share)
     try:
-        pathlib.Path(sys.argv[4]).write_bytes(whole)
+        out.write_bytes(whole)
     except OSError as error:
         fail(f"{sys.argv[4]}: {error.strerror}")
 

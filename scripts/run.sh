@@ -6,7 +6,11 @@ minutes=${MINUTES:-5}
 mild=build/mild
 shipped=policies/mild.safetensors
 start=${START:-policies/paper/mild-1.safetensors} # half a minute of training on a GPU, by configs/models.ini
-run=runs/tour # its own folder: it is replaced each time
+run=runs/tour # its own folder, a new one each time
+for ((n = 2; ; n++)); do
+    [ -e "$run" ] || break
+    run=runs/tour$n
+done
 trained=$run/policy.safetensors
 course=(--ground rubber,foam45,sand_loose --speed 0.3,0.6 --trials 5 --seconds 20)
 
@@ -28,7 +32,6 @@ else
     echo "2/3  A policy of your own, in $minutes minutes, from $start."
 fi
 echo "     Ctrl-C ends the training early and keeps what it has."
-rm -rf "$run"
 set -m # the training is a job of its own: Ctrl-C reaches it alone, and this script goes on
 "$mild" train --config configs/quick.ini --train.minutes="$minutes" --out "$run" "${begin[@]}"
 set +m

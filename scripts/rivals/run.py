@@ -1,6 +1,7 @@
 """What the training scripts of the rivals share: options, phases, the log, saving."""
 import argparse
 import pathlib
+import sys
 import time
 
 import torch
@@ -31,6 +32,8 @@ def options(text, minutes):
 
 def begin(arguments):
     """Sets PyTorch up and returns the device."""
+    if (arguments.out / "log.csv").exists():
+        sys.exit(f"{arguments.out} holds a run, which would be overwritten; choose another --out")
     arguments.out.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(arguments.seed)
     torch.backends.cuda.matmul.allow_tf32 = True

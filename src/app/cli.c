@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/file.h"
 #include "base/text.h"
@@ -296,85 +297,62 @@ static int take_word(const CliCommand *command, int argc, char **argv, int *inde
 
 /* ---- files ---- */
 
-static const char *option_file(const CliOption *option) {
-    return option->type == CLI_INPUT || option->type == CLI_OUTPUT ||
-                   option->type == CLI_OUTPUT_LATER
-               ? *(const char *const *)option->target
-               : NULL;
+static int claim(const CliCommand *command, const char *path, const char *what) {
+    MildError error = {0};
+    return file_claim(path, what, &error) == MILD_OK ? 0 : cli_fail(command->name, &error);
 }
 
-static int fail_overwrite(const CliCommand *command, const CliOption *option, const char *output,
-                          const char *input) {
-    return cli_fail_text(command->name,
-                         "--%s: %.150s is also an input (%.80s) and would be overwritten; name "
-                         "another file",
-                         option->name, output, input);
-}
-
-/* Fails when `output`, the file of the option, is a file that the command reads. */
-static int check_output(const CliCommand *command, const CliArgs *args, const CliOption *option,
-                        const char *output) {
+/* Whether the command writes its numbers to the file of --csv. */
+static int has_csv(const CliCommand *command) {
     for (int i = 0; i < command->option_count; i++) {
-        const CliOption *other = &command->options[i];
-        const char *input = other->type == CLI_INPUT ? option_file(other) : NULL;
-        if (input && file_same(output, input)) {
-            char name[64];
-            snprintf(name, sizeof name, "--%s", other->name);
-            return fail_overwrite(command, option, output, name);
-        }
-    }
-    for (int i = 0; command->positional_input && i < args->positional_count; i++) {
-        if (file_same(output, args->positional[i])) {
-            return fail_overwrite(command, option, output, args->positional[i]);
-        }
-    }
-    for (int i = 0; i < args->override_count; i++) { /* a terrain's image, for example */
-        const char *equals = strchr(args->overrides[i], '=');
-        if (equals && file_same(output, equals + 1)) {
-            return fail_overwrite(command, option, output, args->overrides[i]);
+        const CliOption *option = &command->options[i];
+        if (option->type == CLI_OUTPUT && strcmp(option->name, "csv") == 0) {
+            return *(const char *const *)option->target != NULL;
         }
     }
     return 0;
 }
 
-static int check_numbers(const CliCommand *command, const CliArgs *args, const CliOption *option,
-                         const char *picture) {
-    char numbers[PATH_SIZE];
+/* A picture gets a file of its numbers beside it, which nobody named. If it is there without the
+ * picture, it is not from an earlier call. */
+static int claim_numbers(const CliCommand *command, const char *name, const char *picture) {
+    char numbers[PATH_SIZE], what[80];
     MildError error = {0};
-    if (!command->picture || strcmp(command->picture, option->name) != 0) {
+    if (!command->picture || strcmp(command->picture, name) != 0 || has_csv(command)) {
         return 0;
     }
     if (path_beside(picture, command->numbers, numbers, &error) != MILD_OK) {
         return cli_fail(command->name, &error);
     }
-    return check_output(command, args, option, numbers);
+    if (strcmp(numbers, picture) == 0) {
+        return 0;
+    }
+    if (access(numbers, F_OK) == 0 && access(picture, F_OK) != 0) {
+        return cli_fail_text(command->name,
+                             "--%s: %.150s exists and would be overwritten by the picture's "
+                             "numbers; name another picture, or move it away",
+                             name, numbers);
+    }
+    snprintf(what, sizeof what, "--%s (its numbers)", name);
+    return claim(command, numbers, what);
 }
 
-/* Compares every output with every input and with the outputs before it. */
-static int check_files(const CliCommand *command, const CliArgs *args) {
-    for (int i = 0; i < command->option_count; i++) {
+/* Claims every output, so that no input can be one. */
+static int claim_outputs(const CliCommand *command) {
+    int bad = 0;
+    for (int i = 0; i < command->option_count && !bad; i++) {
         const CliOption *option = &command->options[i];
-        const char *output = option->type == CLI_INPUT ? NULL : option_file(option);
-        if (!output) {
-            continue;
-        }
-        int bad = check_output(command, args, option, output);
-        if (!bad) {
-            bad = check_numbers(command, args, option, output);
-        }
-        for (int k = 0; k < i && !bad; k++) {
-            const CliOption *other = &command->options[k];
-            if (other->type != CLI_INPUT && option_file(other) &&
-                file_same(output, option_file(other))) {
-                bad = cli_fail_text(command->name, "--%s and --%s name the same file, %.200s",
-                                    other->name, option->name, output);
-            }
-        }
-        if (bad) {
-            return bad;
+        const char *output = option->type == CLI_OUTPUT || option->type == CLI_OUTPUT_LATER
+                                 ? *(const char *const *)option->target
+                                 : NULL;
+        if (output && strcmp(output, "-") != 0) {
+            char what[64];
+            snprintf(what, sizeof what, "--%s", option->name);
+            bad = claim(command, output, what);
+            bad = bad ? bad : claim_numbers(command, option->name, output);
         }
     }
-    return 0;
+    return bad;
 }
 
 const char *cli_first_given(const CliCommand *command, const CliArgs *args,
@@ -403,5 +381,5 @@ CliOutcome cli_parse(const CliCommand *command, int argc, char **argv, CliArgs *
             return CLI_BAD;
         }
     }
-    return check_files(command, args) ? CLI_BAD : CLI_RUN;
+    return claim_outputs(command) ? CLI_BAD : CLI_RUN;
 }

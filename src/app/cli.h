@@ -22,8 +22,8 @@ typedef struct {
  * double *, NUMBERS CliNumbers *, NAMES CliNames *. The value that it holds before parsing is
  * the default. Files are const char ** too. INPUT is read. OUTPUT is written and may be `-`; an
  * output that cannot be written is refused before the command runs. OUTPUT_LATER is written to a
- * folder that the command makes, so the command checks it. An output may be neither an input nor
- * another output. */
+ * folder that the command makes, so the command checks it. Outputs are claimed (file_claim): they
+ * may be neither another output nor any file that the command reads. */
 typedef enum {
     CLI_FLAG,
     CLI_TEXT,
@@ -65,7 +65,6 @@ typedef struct {
     const char *sections;  /* of these, for completion: "task ground"; NULL: those of a training */
     const char *examples;  /* whole lines, or NULL */
     int positional_max;    /* largest number of words without dashes */
-    int positional_input;  /* bool: these words are files that the command reads */
     const char *picture;   /* option whose picture gets a file of its numbers; NULL: none */
     const char *numbers;   /* that file's name ends in this instead of the picture's ".png" */
 } CliCommand;

@@ -148,7 +148,6 @@ static int cmd_fit_actuator(int argc, char **argv) {
                     "  mild actuator fit motor.csv --out motor.safetensors --figure motor.png\n"
                     "  mild eval --task.actuator=motor.safetensors\n",
         .positional_max = CLI_LIST_MAX,
-        .positional_input = 1,
         .picture = "figure",
         .numbers = NUMBERS_END,
     };

@@ -80,7 +80,6 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
                     "  mild fit slow.csv fast.csv --plate 0.2,0.1 --hold-from sand_loose\n"
                     "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n",
         .positional_max = CLI_LIST_MAX,
-        .positional_input = 1,
         .picture = "figure",
         .numbers = NUMBERS_END,
     };

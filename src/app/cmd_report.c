@@ -1,6 +1,8 @@
 /* mild report: one page about training runs. */
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 #include "app/cli.h"
 #include "app/commands.h"
@@ -39,6 +41,28 @@ static MildStatus write_page(const RunFiles *runs, int count, const char *path, 
     return status;
 }
 
+/* The page that nobody named: only an earlier one is overwritten. */
+static MildStatus claim_page(const char *path, MildError *error) {
+    char start[512] = "";
+    MildStatus status = file_check_own(path, error);
+    FILE *page = NULL;
+    if (status == MILD_OK && access(path, F_OK) == 0) {
+        page = file_open(path, error);
+        status = page ? MILD_OK : error->status;
+    }
+    if (page) {
+        start[fread(start, 1, sizeof start - 1, page)] = '\0';
+        fclose(page);
+        if (!strstr(start, RUN_PAGE_TITLE)) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "%.200s: exists, and is no earlier report; name the page with --out "
+                             "FILE.html",
+                             path);
+        }
+    }
+    return status == MILD_OK ? file_claim(path, "the report", error) : status;
+}
+
 static MildStatus report(const CliArgs *args, const char *out, MildError *error) {
     static RunFiles runs[CLI_LIST_MAX];
     char beside[PATH_SIZE];
@@ -46,16 +70,12 @@ static MildStatus report(const CliArgs *args, const char *out, MildError *error)
     MildStatus status = MILD_OK;
     if (!out) {
         status = path_join(args->positional[0], "report.html", beside, error);
+        status = status == MILD_OK ? claim_page(beside, error) : status;
         out = beside;
     }
     while (status == MILD_OK && count < args->positional_count) {
         status = run_files_read(args->positional[count], &runs[count], error);
-        if (status == MILD_OK && run_files_hold(&runs[count++], out)) {
-            status = mild_fail(error, MILD_ERROR_ARGUMENT,
-                               "--out: %.200s is read for the report and would be overwritten; "
-                               "name another file",
-                               out);
-        }
+        count += status == MILD_OK;
     }
     if (status == MILD_OK) {
         status = write_page(runs, count, out, error);

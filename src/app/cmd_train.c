@@ -9,7 +9,7 @@
 #include "app/commands.h"
 #include "app/progress.h"
 #include "app/robots.h"
-#include "base/file.h"
+#include "base/paths.h"
 #include "config/experiment_keys.h"
 #include "ranks/ranks.h"
 #include "train/run.h"
@@ -43,19 +43,6 @@ static void write_note(Command *run, const CliArgs *args) {
         snprintf(run->note + used, (size_t)(size - used), ", seed %" PRIu64 ", version %s",
                  run->def.train.seed, build_version());
     }
-}
-
-/* A new run writes its whole config into its folder. */
-static MildStatus check_config_kept(const Command *run, MildError *error) {
-    char path[PATH_SIZE];
-    if (run->resume || !run->config || path_join(run->out, "config.ini", path, NULL) != MILD_OK ||
-        !file_same(run->config, path)) {
-        return MILD_OK;
-    }
-    return mild_fail(error, MILD_ERROR_ARGUMENT,
-                     "--config: the new run would overwrite %.150s; copy it out of the run folder, "
-                     "or choose another --out",
-                     run->config);
 }
 
 /* A resumed run keeps the config that it began with, unless --config or overrides change it. */
@@ -169,7 +156,7 @@ static MildStatus train(const Command *command, MildError *error) {
 static MildStatus prepare(Command *run, const CliArgs *args, MildError *error) {
     MildStatus status = train_run_check_folder(run->out, run->resume, error);
     if (status == MILD_OK) {
-        status = check_config_kept(run, error);
+        status = train_run_claim(run->out, run->resume, error);
     }
     if (status == MILD_OK) {
         status = read_config(run, args, error);
@@ -245,7 +232,8 @@ int cmd_train(int argc, char **argv) {
         {"config", CLI_INPUT, &run->config, 0, 0, "FILE.ini",
          "config file; it needs only the keys that differ from configs/default.ini"},
         {"out", CLI_TEXT, &run->out, 0, 0, "FOLDER",
-         "run folder, for config, log, checkpoints and policy.safetensors"},
+         "run folder, for config, log, checkpoints and policy.safetensors; a new run overwrites no "
+         "file of another"},
         {"robot", CLI_TEXT, &run->robot, 0, 0, "NAME|DIR",
          ROBOTS_HELP "; sets train.robot (default: the config's, or sa01)"},
         {"resume", CLI_FLAG, &run->resume, 0, 0, NULL,

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "base/paths.h"
 
 extern char **environ;
@@ -15,6 +16,11 @@ MildStatus figure_draw(const char *script, const char *data, const char *picture
     char python[PATH_SIZE], code_path[PATH_SIZE], from[PATH_SIZE], to[PATH_SIZE], above[256];
     path_data(".venv/bin/python", python);
     path_data(script, code_path);
+    FILE *text = file_open(code_path, error); /* as an input, it cannot be the output, too */
+    if (!text) {
+        return error->status;
+    }
+    fclose(text);
     snprintf(from, sizeof from, "%s", data);
     snprintf(to, sizeof to, "%s", picture);
     snprintf(above, sizeof above, "%s", title ? title : "");

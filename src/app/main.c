@@ -8,7 +8,9 @@
 #include "app/build.h"
 #include "app/cli.h"
 #include "app/commands.h"
+#include "app/plain.h"
 #include "base/text.h"
+#include "learn/product.h"
 #include "robot/engine.h"
 
 static void print_help(FILE *file) {
@@ -42,8 +44,17 @@ static void end_for_engine(const char *text) {
     _exit(CLI_EXIT_BAD_INPUT);
 }
 
+/* oneDNN is C++ inside, and throws when memory runs out. */
+static void end_for_exception(void) {
+    static const char text[] = "mild: out of memory\n";
+    (void)!write(STDERR_FILENO, text, sizeof text - 1);
+    _exit(CLI_EXIT_BAD_INPUT);
+}
+
 int main(int argc, char **argv) {
+    plain_streams();
     engine_on_error(end_for_engine);
+    product_on_exception(end_for_exception);
     if (argc < 2) {
         print_help(stderr);
         return CLI_EXIT_BAD_INPUT;

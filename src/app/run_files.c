@@ -19,6 +19,10 @@ static MildStatus read_text(const char *folder, const char *name, char path[PATH
     if (status != MILD_OK || (access(path, F_OK) != 0 && errno == ENOENT)) {
         return status;
     }
+    status = file_check_own(path, error);
+    if (status != MILD_OK) {
+        return status;
+    }
     *text = file_read(path, TEXT_MAX, &size, error);
     return *text ? MILD_OK : error->status;
 }
@@ -75,6 +79,9 @@ static MildStatus read_log(RunFiles *run, MildError *error) {
                          "%.300s: cannot read: %s; name a run folder of mild train", path,
                          strerror(errno));
     }
+    if (status == MILD_OK) {
+        status = file_check_own(path, error);
+    }
     return status == MILD_OK ? history_read(path, &run->history, error) : status;
 }
 
@@ -106,20 +113,6 @@ void run_files_free(RunFiles *run) {
     free(run->version);
     cJSON_Delete(run->eval);
     *run = (RunFiles){0};
-}
-
-static int holds(const RunFiles *run, const char *name, const char *path) {
-    char own[PATH_SIZE];
-    return path_join(run->folder, name, own, NULL) == MILD_OK && file_same(path, own);
-}
-
-int run_files_hold(const RunFiles *run, const char *path) {
-    int found = holds(run, "log.csv", path) || holds(run, "config.ini", path) ||
-                holds(run, "version.txt", path) || holds(run, "eval.json", path);
-    for (int i = 0; i < run->videos && !found; i++) {
-        found = holds(run, run->video[i], path);
-    }
-    return found;
 }
 
 int run_files_alike(const RunFiles *a, const RunFiles *b) {

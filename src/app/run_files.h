@@ -21,12 +21,10 @@ typedef struct {
     char video[RUN_VIDEOS_MAX][256]; /* names of the first *.mp4 of the folder */
 } RunFiles;
 
-/* Only log.csv must be there. There is nothing to free after a failure. */
+/* Only log.csv must be there. Links are refused: a report is for others, and must not publish what
+ * a link in a folder from elsewhere leads to. There is nothing to free after a failure. */
 MildStatus run_files_read(const char *folder, RunFiles *run, MildError *error);
 void run_files_free(RunFiles *run);
-
-/* Whether `path` is one of the files that a report reads. */
-int run_files_hold(const RunFiles *run, const char *path);
 
 /* Whether two runs have the same config but for train.seed. Runs without a config never do. */
 int run_files_alike(const RunFiles *a, const RunFiles *b);

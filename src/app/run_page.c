@@ -479,7 +479,7 @@ static void write_configs(const Page *page) {
 
 static const char head[] =
     "<!doctype html>\n<html lang=en><head><meta charset=utf-8>\n"
-    "<meta name=viewport content=\"width=device-width\"><title>mild report</title>\n<style>\n"
+    "<meta name=viewport content=\"width=device-width\">" RUN_PAGE_TITLE "\n<style>\n"
     "body{font:15px/1.45 system-ui,sans-serif;max-width:75rem;margin:1.5rem auto;padding:0 "
     "1rem;color:#222}\n"
     "h2{margin-top:2.2rem}table{border-collapse:collapse;font-size:.9rem;display:block;"

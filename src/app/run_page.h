@@ -7,6 +7,7 @@
 #include "app/run_files.h"
 
 enum { RUN_PAGE_RUNS_MAX = 16 };
+#define RUN_PAGE_TITLE "<title>mild report</title>" /* by which a page is known again */
 
 /* Runs that differ in train.seed alone are one curve, their mean, with a band from the least to
  * the greatest. runs: [count]. defaults: the keys of configs/default.ini. path: where the page will

@@ -85,6 +85,11 @@ static MildStatus write_part(const char *path, FILE *html, MildError *error) {
 
 static MildStatus write_link(const char *path, const char *page, FILE *html, MildError *error) {
     char folder[PATH_SIZE];
+    FILE *video = file_open(path, error); /* as an input, it cannot be the page */
+    if (!video) {
+        return error->status;
+    }
+    fclose(video);
     MildStatus status = page_folder(page, folder, error);
     char *file = status == MILD_OK ? realpath(path, NULL) : NULL;
     if (file) {
@@ -102,7 +107,8 @@ MildStatus run_video_write(const RunFiles *run, const char *page, FILE *html, Mi
         char path[PATH_SIZE];
         struct stat info;
         status = path_join(run->folder, run->video[i], path, error);
-        if (status != MILD_OK || stat(path, &info) != 0 || !S_ISREG(info.st_mode)) {
+        status = status == MILD_OK ? file_check_own(path, error) : status;
+        if (status != MILD_OK || stat(path, &info) != 0) {
             continue;
         }
         fputs("<h2>", html);

@@ -12,11 +12,14 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/time.h>
 #include <unistd.h>
 
-#define PATIENCE 10 /* [s] for a client that says or takes nothing */
-#define CLIENTS 64  /* at once; browsers open a few ahead of need */
+#include "base/clock.h"
+
+#define REQUEST_TIME 5  /* [s] for a whole request, however slowly its bytes come */
+#define ANSWER_TIME 120 /* [s] for a whole answer: some MB through a poor network */
+#define CLIENTS 64      /* at once; browsers open a few ahead of need */
+#define STACK (256 << 10)
 #define LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-"
 
 /* ---- requests ---- */
@@ -88,14 +91,29 @@ typedef struct {
     atomic_int *clients;
 } Client;
 
-static int send_all(int socket, const char *bytes, size_t count) {
+/* Waits until the socket is ready. Returns 0 when the time is over. */
+static int wait_for(int socket, short event, double deadline) {
+    for (;;) {
+        struct pollfd poll_for = {.fd = socket, .events = event};
+        const double left = deadline - clock_seconds();
+        const int ready = left > 0 ? poll(&poll_for, 1, (int)(1000 * left) + 1) : 0;
+        if (ready >= 0 || errno != EINTR) {
+            return ready > 0;
+        }
+    }
+}
+
+static int send_all(int socket, const char *bytes, size_t count, double deadline) {
     while (count > 0) {
-        const ssize_t sent = send(socket, bytes, count, MSG_NOSIGNAL);
-        if (sent <= 0) {
+        if (!wait_for(socket, POLLOUT, deadline)) {
             return 0;
         }
-        bytes += sent;
-        count -= (size_t)sent;
+        const ssize_t sent = send(socket, bytes, count, MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (sent <= 0 && errno != EAGAIN && errno != EINTR) {
+            return 0;
+        }
+        bytes += sent > 0 ? sent : 0;
+        count -= sent > 0 ? (size_t)sent : 0;
     }
     return 1;
 }
@@ -112,39 +130,52 @@ static int is_whole(const char *request, size_t size) {
     return 0;
 }
 
-/* Up to the empty line; what follows it is not wanted. Returns the bytes. */
-static size_t receive(int socket, char *request) {
+/* Up to the empty line; what follows it is not wanted. Returns the bytes. *late: they were not all
+ * there in time. */
+static size_t receive(int socket, char *request, int *late) {
+    const double deadline = clock_seconds() + REQUEST_TIME;
     size_t size = 0;
+    *late = 0;
     while (size < SERVE_REQUEST && !is_whole(request, size)) {
-        const ssize_t got = recv(socket, request + size, SERVE_REQUEST - size, 0);
-        if (got <= 0) {
+        *late = !wait_for(socket, POLLIN, deadline);
+        const ssize_t got =
+            *late ? 0 : recv(socket, request + size, SERVE_REQUEST - size, MSG_DONTWAIT);
+        if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) {
             break;
         }
-        size += (size_t)got;
+        size += got > 0 ? (size_t)got : 0;
     }
     return size;
 }
 
-static void send_head(int socket, const ServeAnswer *answer, long long bytes) {
-    char head[320];
-    const char *say = answer->status == 200   ? "OK"
-                      : answer->status == 404 ? "Not Found"
-                      : answer->status == 405 ? "Method Not Allowed"
-                                              : "Bad Request";
-    const int length =
-        snprintf(head, sizeof head,
-                 "HTTP/1.1 %d %s\r\nContent-Type: %s\r\nContent-Length: %lld\r\n"
-                 "Cache-Control: no-cache\r\nX-Content-Type-Options: nosniff\r\n"
-                 "Connection: close\r\n\r\n",
-                 answer->status, say, answer->type ? answer->type : "text/plain", bytes);
-    send_all(socket, head, (size_t)length);
+static const char *status_text(int status) {
+    switch (status) {
+    case 200: return "OK";
+    case 404: return "Not Found";
+    case 405: return "Method Not Allowed";
+    case 408: return "Request Timeout";
+    case 503: return "Service Unavailable";
+    default: return "Bad Request";
+    }
 }
 
-static void send_file(int socket, int file) {
+static void send_head(int socket, const ServeAnswer *answer, long long bytes, double deadline) {
+    char head[320];
+    const int length = snprintf(head, sizeof head,
+                                "HTTP/1.1 %d %s\r\nContent-Type: %s\r\nContent-Length: %lld\r\n"
+                                "Cache-Control: no-cache\r\nX-Content-Type-Options: nosniff\r\n"
+                                "%sConnection: close\r\n\r\n",
+                                answer->status, status_text(answer->status),
+                                answer->type ? answer->type : "text/plain", bytes,
+                                answer->status == 503 ? "Retry-After: 5\r\n" : "");
+    send_all(socket, head, (size_t)length, deadline);
+}
+
+static void send_file(int socket, int file, double deadline) {
     char block[16384];
     for (ssize_t got = 1; got > 0;) {
         got = read(file, block, sizeof block);
-        if (got > 0 && !send_all(socket, block, (size_t)got)) {
+        if (got > 0 && !send_all(socket, block, (size_t)got, deadline)) {
             return;
         }
     }
@@ -153,7 +184,13 @@ static void send_file(int socket, int file) {
 static void answer_client(const Client *client) {
     char request[SERVE_REQUEST];
     struct stat about = {0};
-    ServeAnswer answer = serve_read(request, receive(client->socket, request));
+    int late;
+    const size_t size = receive(client->socket, request, &late);
+    const double deadline = clock_seconds() + ANSWER_TIME;
+    ServeAnswer answer = serve_read(request, size);
+    if (late) {
+        answer = (ServeAnswer){.status = 408};
+    }
     const int file = answer.status == 200 ? openat(client->folder, answer.name,
                                                    O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)
                                           : -1;
@@ -162,9 +199,9 @@ static void answer_client(const Client *client) {
         answer.status = 404;
         answer.type = NULL;
     }
-    send_head(client->socket, &answer, found ? (long long)about.st_size : 0);
+    send_head(client->socket, &answer, found ? (long long)about.st_size : 0, deadline);
     if (found && !answer.head) {
-        send_file(client->socket, file);
+        send_file(client->socket, file, deadline);
     }
     if (file >= 0) {
         close(file);
@@ -181,23 +218,41 @@ static void *run_client(void *context) {
     return NULL;
 }
 
-static void take_client(int socket, int folder, atomic_int *clients) {
-    const struct timeval patience = {.tv_sec = PATIENCE};
+/* Says so at once, without a thread, and reads what has come: closing with unread bytes would lose
+ * the answer on its way. */
+static void refuse_client(int socket) {
+    const ServeAnswer busy = {.status = 503};
+    char unread[SERVE_REQUEST];
+    send_head(socket, &busy, 0, clock_seconds() + 0.01);
+    shutdown(socket, SHUT_WR);
+    (void)!recv(socket, unread, sizeof unread, MSG_DONTWAIT);
+    close(socket);
+}
+
+static int start_thread(Client *client) {
+    pthread_attr_t attributes;
     pthread_t thread;
+    if (pthread_attr_init(&attributes) != 0) {
+        return 0;
+    }
+    pthread_attr_setstacksize(&attributes, STACK);
+    pthread_attr_setdetachstate(&attributes, PTHREAD_CREATE_DETACHED);
+    const int started = pthread_create(&thread, &attributes, run_client, client) == 0;
+    pthread_attr_destroy(&attributes);
+    return started;
+}
+
+static void take_client(int socket, int folder, atomic_int *clients) {
     Client *client = malloc(sizeof *client);
     const int many = atomic_fetch_add(clients, 1) >= CLIENTS;
-    setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-    setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
     if (client) {
         *client = (Client){socket, folder, clients};
     }
-    if (many || !client || pthread_create(&thread, NULL, run_client, client) != 0) {
+    if (many || !client || !start_thread(client)) {
         atomic_fetch_sub(clients, 1);
         free(client);
-        close(socket);
-        return;
+        refuse_client(socket);
     }
-    pthread_detach(thread);
 }
 
 /* ---- the server ---- */

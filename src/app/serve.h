@@ -23,7 +23,8 @@ ServeAnswer serve_read(const char *request, size_t size);
 /* Listens at an address, an IPv4 number. port: 0 takes a free one; *port is the one that it is.
  * Returns the socket, or -1. */
 int serve_listen(const char *address, int *port, MildError *error);
-/* Answers until the process ends, or until the socket fails. */
+/* Answers until the process ends, or until the socket fails. A request has some seconds, and so
+ * many are answered at once; the others are told to come again (503). */
 MildStatus serve_folder(int listening, const char *folder, MildError *error);
 
 #endif

@@ -15,8 +15,16 @@ FILE *file_open(const char *path, MildError *error);
  * '\0', and their number in *size. Returns NULL on failure, with the reason in *error. */
 char *file_read(const char *path, size_t limit, size_t *size, MildError *error);
 
-/* Fails when `path` exists and is not a regular file. */
-MildStatus file_check_regular(const char *path, MildError *error);
+/* Fails when `path` exists and is a link or no regular file: for a file in a folder that the
+ * program writes or publishes by itself, where nobody named the file that a link leads to. */
+MildStatus file_check_own(const char *path, MildError *error);
+
+/* Tells that the program will write `path`, before it reads anything. From then on a file that is
+ * the same on disk cannot be opened for reading by file_open or file_read: an output never replaces
+ * what it was made from, whoever named that. what: the output in messages, "--json". Fails when
+ * another output has the file. For one thread, at the start of a program. */
+MildStatus file_claim(const char *path, const char *what, MildError *error);
+void file_claims_drop(void); /* for tests */
 
 /* Fails if file_write could not start. Call it before long work, so that a wrong path does not cost
  * the result. Leaves nothing behind. */
@@ -26,11 +34,11 @@ MildStatus file_check_write(const char *path, MildError *error);
  * or on a full disk the old file is still whole. Devices and pipes are written to directly. */
 MildStatus file_write(const char *path, const void *data, size_t size, MildError *error);
 
-/* Creates an empty file PATH.PID-N.tmp with a name that is not in use, for a writer that cannot use
- * file_write. The caller renames or removes it. */
+/* Creates an empty file PATH.PID-N-SUM.tmp with a name that is not in use, for a writer that cannot
+ * use file_write. The caller renames or removes it. */
 MildStatus file_temporary(const char *path, char temporary[PATH_SIZE], MildError *error);
-/* Whether `name` has the form PREFIX.PID-N.tmp, like a temporary file that a killed process left
- * behind. */
+/* Whether `name` (without a folder) is that of a temporary file, which a killed process left
+ * behind. SUM is a checksum of the rest, so that no file of a user has such a name by chance. */
 int file_is_temporary(const char *name);
 
 /* Whether two paths name the same file. If both exist, they must be the same file on disk (links
@@ -46,8 +54,12 @@ typedef struct {
 } FileLock;
 
 /* Takes the lock. Fails with MILD_ERROR_ARGUMENT when another process holds it, which the message
- * names. */
+ * names, and with MILD_ERROR_FORMAT when the file is there and was not made for this purpose: it
+ * would be removed with the lock. */
 MildStatus file_lock(FileLock *lock, const char *path, MildError *error);
+/* The process that holds the lock, or 0. Not for a process that may hold it: asking ends its
+ * lock. */
+long file_lock_holder(const char *path);
 /* Removes the file and releases the lock. Does nothing when it is not held. */
 void file_unlock(FileLock *lock);
 

@@ -83,6 +83,45 @@ int text_uint64(const char *text, uint64_t *value) {
     return 1;
 }
 
+/* Bytes of the character at `text`: 0: none begins here, -1: it ends behind `size`. */
+static int character(const unsigned char *text, size_t size) {
+    static const unsigned least[5] = {0, 0, 0x80, 0x800, 0x10000};
+    const int length = text[0] < 0x80             ? 1
+                       : (text[0] & 0xe0) == 0xc0 ? 2
+                       : (text[0] & 0xf0) == 0xe0 ? 3
+                       : (text[0] & 0xf8) == 0xf0 ? 4
+                                                  : 0;
+    unsigned code = length > 1 ? text[0] & (0xffU >> (length + 1)) : text[0];
+    for (int i = 1; i < length; i++) {
+        if ((size_t)i == size) {
+            return -1;
+        }
+        if ((text[i] & 0xc0) != 0x80) {
+            return 0;
+        }
+        code = code << 6 | (text[i] & 0x3fU);
+    }
+    const int control = code < 0x20 || (code >= 0x7f && code < 0xa0) || code == 0x2028 ||
+                        code == 0x2029 || (code >= 0x202a && code <= 0x202e) ||
+                        (code >= 0x2066 && code <= 0x2069); /* the last: order of writing */
+    return control || (length > 0 && code < least[length]) || code > 0x10ffff ? 0 : length;
+}
+
+size_t text_plain(char *text, size_t size, const char *keep) {
+    size_t i = 0;
+    while (i < size) {
+        const int length = character((const unsigned char *)text + i, size - i);
+        if (length < 0) {
+            return size - i;
+        }
+        if (length == 0 && (!text[i] || !strchr(keep, text[i]))) {
+            text[i] = '?';
+        }
+        i += length > 0 ? (size_t)length : 1;
+    }
+    return 0;
+}
+
 const char *text_bytes(double bytes, char *text, size_t size) {
     static const char *const units[] = {"B", "KiB", "MiB", "GiB", "TiB"};
     int unit = 0;

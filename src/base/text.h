@@ -17,6 +17,11 @@ int text_double(const char *text, double *value);
 int text_int(const char *text, int *value);
 int text_uint64(const char *text, uint64_t *value);
 
+/* Replaces by '?', in place, what a terminal may obey (control characters, also those above ASCII)
+ * and what is no UTF-8; the characters of `keep` stay. Returns how many bytes at the end, left as
+ * they are, begin a character that is not complete: 0 .. 3. */
+size_t text_plain(char *text, size_t size, const char *keep);
+
 /* Bytes as "1.23 GiB" and a duration as "1 h 02 min", "4 min 05 s" or "12 s"; return `text`. */
 const char *text_bytes(double bytes, char *text, size_t size);
 const char *text_duration(double seconds, char *text, size_t size);

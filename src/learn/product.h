@@ -9,6 +9,10 @@
 int product_enter(void);
 void product_leave(int entered);
 
+/* oneDNN also throws when memory runs out, which no C function can catch. From now on `fatal` is
+ * called then, on the thread that threw; it must not return. */
+void product_on_exception(void (*fatal)(void));
+
 /* c[m][n] = op(a) op(b) + beta c; op transposes where the flag is 'T'. ld*: floats between rows as
  * stored. When oneDNN fails (out of memory), c is filled with NaN, and the learner drops and counts
  * the minibatch. */

@@ -4,19 +4,13 @@
 #include <string.h>
 
 #include "robot/description.h"
+#include "robot/files.h"
 
 /* Largest hinge range [rad] that is usual in radians. A robot whose hinges all turn less than this
  * many degrees is not plausible. */
 #define FULL_TURN 6.3
 
-/* Joins the lines of MuJoCo's messages, because ours have a single line. */
-static void one_line(char *text) {
-    for (char *c = text; *c; c++) {
-        if (*c == '\n' || *c == '\r') {
-            *c = ' ';
-        }
-    }
-}
+#define COPIES_MAX 2e6 /* elements that mjs_delete may copy in all: one or two seconds */
 
 /* Refuses features that our step does not compute. Ignoring them silently would simulate a
  * different robot. */
@@ -94,20 +88,64 @@ static void fix_inertia(mjSpec *spec, const mjModel *m) {
     }
 }
 
-/* Removes everything but bodies and joints. A step computes the pose of every geom, and every
- * workspace copies the model. */
-static void strip(mjSpec *spec) {
-    static const mjtObj dropped[] = {mjOBJ_SENSOR,   mjOBJ_ACTUATOR, mjOBJ_KEY,    mjOBJ_PAIR,
-                                     mjOBJ_EXCLUDE,  mjOBJ_SITE,     mjOBJ_CAMERA, mjOBJ_LIGHT,
-                                     mjOBJ_GEOM,     mjOBJ_SKIN,     mjOBJ_MESH,   mjOBJ_HFIELD,
-                                     mjOBJ_MATERIAL, mjOBJ_TEXTURE};
-    for (size_t k = 0; k < sizeof dropped / sizeof dropped[0]; k++) {
-        mjsElement *next = NULL;
-        for (mjsElement *e = mjs_firstElement(spec, dropped[k]); e; e = next) {
-            next = mjs_nextElement(spec, e);
-            mjs_delete(spec, e);
+/* Whether mjs_delete must remove it. Other geoms are left to the compiler (drop_geoms), which keeps
+ * height fields. */
+static int is_deleted(mjsElement *element) {
+    return element->elemtype != mjOBJ_GEOM || mjs_asGeom(element)->type == mjGEOM_HFIELD;
+}
+
+static const mjtObj stripped[] = {mjOBJ_SENSOR,  mjOBJ_ACTUATOR, mjOBJ_KEY,    mjOBJ_PAIR,
+                                  mjOBJ_EXCLUDE, mjOBJ_SITE,     mjOBJ_CAMERA, mjOBJ_LIGHT,
+                                  mjOBJ_SKIN,    mjOBJ_GEOM,     mjOBJ_HFIELD};
+enum { STRIPPED = sizeof stripped / sizeof stripped[0] };
+
+/* mjs_delete copies the whole description each time: minutes for 20 000 sites. */
+static MildStatus check_size(mjSpec *spec, const char *path, MildError *error) {
+    double elements = 0, deleted = 0;
+    for (int k = 0; k < STRIPPED; k++) {
+        mjsElement *e = mjs_firstElement(spec, stripped[k]);
+        for (; e; e = mjs_nextElement(spec, e)) {
+            elements++;
+            deleted += is_deleted(e);
         }
     }
+    return deleted * elements <= COPIES_MAX
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_RANGE,
+                           "%.200s: %g sites, sensors, actuators, keyframes, pairs, cameras and "
+                           "lights besides %g geoms are too many; remove what the robot does not "
+                           "need (the product of the first number and their sum may be %g)",
+                           path, deleted, elements - deleted, COPIES_MAX);
+}
+
+/* Marks every geom as one that is only seen, which the compiler drops with its mesh and material,
+ * and frees its name. */
+static void drop_geoms(mjSpec *spec) {
+    for (mjsElement *e = mjs_firstElement(spec, mjOBJ_GEOM); e; e = mjs_nextElement(spec, e)) {
+        mjsGeom *geom = mjs_asGeom(e);
+        geom->contype = geom->conaffinity = 0;
+        mjs_setName(e, "");
+    }
+    spec->compiler.discardvisual = 1;
+}
+
+/* Removes everything but bodies and joints. A step computes the pose of every geom, and every
+ * workspace copies the model. */
+static MildStatus strip(mjSpec *spec, const char *path, MildError *error) {
+    if (check_size(spec, path, error) != MILD_OK) {
+        return error->status;
+    }
+    for (int k = 0; k < STRIPPED; k++) {
+        mjsElement *next = NULL;
+        for (mjsElement *e = mjs_firstElement(spec, stripped[k]); e; e = next) {
+            next = mjs_nextElement(spec, e);
+            if (is_deleted(e)) {
+                mjs_delete(spec, e);
+            }
+        }
+    }
+    drop_geoms(spec);
+    return MILD_OK;
 }
 
 static mjsGeom *add_geom(mjsBody *body, const char *name, mjtGeom type) {
@@ -148,41 +186,35 @@ static MildStatus add_rigid_ground(const RobotDef *def, const char *path, mjSpec
     return MILD_OK;
 }
 
-static MildStatus compile(Robot *robot, mjSpec *spec, MildError *error) {
-    robot->visual = mj_compile(spec, NULL);
-    if (robot->visual) {
-        MildStatus status = check_supported(robot->visual, robot->path, error);
-        if (status == MILD_OK) {
-            status = check_angles(spec, robot->visual, robot->path, error);
-        }
-        if (status != MILD_OK) {
-            return status;
-        }
-        fix_inertia(spec, robot->visual);
-        strip(spec);
+static MildStatus compile(Robot *robot, RobotFiles *files, mjSpec *spec, MildError *error) {
+    robot->visual = robot_files_compile(files, spec, robot->path, error);
+    if (!robot->visual) {
+        return error->status;
+    }
+    MildStatus status = check_supported(robot->visual, robot->path, error);
+    if (status == MILD_OK) {
+        status = check_angles(spec, robot->visual, robot->path, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    fix_inertia(spec, robot->visual);
+    status = strip(spec, robot->path, error);
+    if (status == MILD_OK) {
         status = add_rigid_ground(&robot->def, robot->path, spec, error);
-        if (status != MILD_OK) {
-            return status;
-        }
-        robot->model = mj_compile(spec, NULL);
     }
-    if (!robot->model) {
-        char text[300];
-        snprintf(text, sizeof text, "%s", mjs_getError(spec));
-        one_line(text);
-        return mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", robot->path, text);
+    if (status != MILD_OK) {
+        return status;
     }
-    return MILD_OK;
+    robot->model = robot_files_compile(files, spec, robot->path, error);
+    return robot->model ? MILD_OK : error->status;
 }
 
 MildStatus robot_load_models(Robot *robot, MildError *error) {
-    char text[300] = "";
-    mjSpec *spec = mj_parseXML(robot->path, NULL, text, (int)sizeof text);
-    if (!spec) {
-        one_line(text);
-        return mild_fail(error, MILD_ERROR_IO, "%s: %s", robot->path, text);
-    }
-    MildStatus status = compile(robot, spec, error);
+    RobotFiles files;
+    mjSpec *spec = robot_files_parse(&files, robot->path, error);
+    MildStatus status = spec ? compile(robot, &files, spec, error) : error->status;
     mj_deleteSpec(spec);
+    robot_files_end(&files);
     return status;
 }

@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/file.h"
 #include "robot/description.h"
 #include "robot/engine.h"
 #include "robot/robot.h"
@@ -338,7 +337,6 @@ static MildStatus read_robot(Robot *robot, const char *folder, MildError *error)
         (int)sizeof robot->path) {
         return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", folder);
     }
-    status = file_check_regular(robot->path, error);
     static MildStatus (*const parts[])(Robot *, MildError *) = {
         robot_load_models, check_models,      robot_read_bodies, robot_read_joints,
         robot_read_limbs,  robot_read_shells, robot_read_soles,  robot_read_stand};

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -25,6 +26,18 @@ static double wall_time(void) {
 
 static MildStatus io_fail(const char *path, MildError *error) {
     return mild_fail(error, MILD_ERROR_IO, "%s: cannot write the log: %s", path, strerror(errno));
+}
+
+MildStatus log_check(const char *path, MildError *error) {
+    struct stat info;
+    MildStatus status = file_check_own(path, error);
+    if (status == MILD_OK && lstat(path, &info) == 0 && info.st_nlink > 1) {
+        return mild_fail(error, MILD_ERROR_IO,
+                         "%.200s: has a second name (a hard link), whose file would change, too; "
+                         "put a copy in its place",
+                         path);
+    }
+    return status;
 }
 
 static char *header_line(const char *const *columns, int count) {
@@ -83,7 +96,7 @@ static MildStatus csv_open(Log *log, int64_t resume_after, MildError *error) {
     if (!header) {
         return mild_fail(error, MILD_ERROR_MEMORY, "log: out of memory");
     }
-    MildStatus status = file_check_regular(log->csv_path, error);
+    MildStatus status = log_check(log->csv_path, error);
     if (status != MILD_OK) {
         free(header);
         return status;
@@ -92,7 +105,7 @@ static MildStatus csv_open(Log *log, int64_t resume_after, MildError *error) {
     if (log->csv) {
         status = csv_cut(log->csv, log->csv_path, header, resume_after, error);
     } else {
-        log->csv = fopen(log->csv_path, "w");
+        log->csv = fopen(log->csv_path, "wx");
         if (!log->csv || fputs(header, log->csv) < 0 || fflush(log->csv) != 0) {
             status = io_fail(log->csv_path, error);
         }
@@ -111,7 +124,7 @@ static MildStatus events_open(Log *log, const char *folder, int64_t resume_after
     if (status != MILD_OK) {
         return status;
     }
-    log->events = fopen(log->events_path, "wb");
+    log->events = fopen(log->events_path, "wbx");
     if (!log->events || events_write_version(log->events, now) != 0 ||
         (resume_after >= 0 && events_write_start(log->events, now, resume_after + 1) != 0)) {
         return io_fail(log->events_path, error);

@@ -9,6 +9,10 @@
 
 typedef struct Log Log;
 
+/* Fails when there is something at the path of log.csv that must not be written in place: a link,
+ * also a hard one, as in the folder of another run that was copied by hard links. */
+MildStatus log_check(const char *path, MildError *error);
+
 /* columns: [count] names such as "reward/gait"; TensorBoard groups them by the part before the
  * slash. They are not copied and must outlive the log. The first column of the CSV is
  * "iteration". resume_after < 0: a new log. Otherwise the log is continued with the same

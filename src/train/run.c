@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "base/clock.h"
 #include "base/file.h"
@@ -135,6 +136,7 @@ static int64_t newest_checkpoint(const char *folder, int64_t limit, int64_t *old
 static MildStatus save_policy(TrainRun *run, MildError *error) {
     char path[PATH_SIZE];
     MildStatus status = path_join(run->def.folder, "policy.safetensors", path, error);
+    status = status == MILD_OK ? file_check_own(path, error) : status;
     if (status == MILD_OK) {
         status = policy_save(train_policy(run->trainer), path, run->def.note, error);
     }
@@ -169,6 +171,7 @@ static MildStatus write_text(const TrainRun *run, const char *name, const char *
                              MildError *error) {
     char path[PATH_SIZE];
     MildStatus status = path_join(run->def.folder, name, path, error);
+    status = status == MILD_OK ? file_check_own(path, error) : status;
     return status == MILD_OK ? file_write(path, text, strlen(text), error) : status;
 }
 
@@ -219,7 +222,7 @@ static MildStatus resume(TrainRun *run, MildError *error) {
 /* Removes temporary files of runs that were killed while saving. */
 static void remove_leftovers(const char *folder) {
     static const char *const ours[] = {"checkpoint_", "policy.safetensors.", "config.ini.",
-                                       "version.txt."};
+                                       "version.txt."}; /* file_is_temporary knows the rest */
     DIR *dir = opendir(folder);
     for (struct dirent *entry; dir && (entry = readdir(dir));) {
         char path[PATH_SIZE];
@@ -236,32 +239,51 @@ static void remove_leftovers(const char *folder) {
     }
 }
 
-/* Locks the folder for this run. Checks it again, because another run may have started there
- * since. */
-static MildStatus take_folder(TrainRun *run, MildError *error) {
-    const char *folder = run->def.folder;
-    char path[PATH_SIZE];
-    MildError cause = {0};
-    MildStatus status = path_make_folder(folder, error);
-    if (status == MILD_OK) {
-        status = path_join(folder, "lock", path, error);
+/* What a run writes beside checkpoints and the TensorBoard file. */
+static const char *const run_names[] = {"policy.safetensors", "log.csv", "config.ini",
+                                        "version.txt"};
+enum { RUN_NAMES = sizeof run_names / sizeof *run_names };
+
+/* A new run overwrites nothing, whoever made it. A resumed one writes into its own files only, not
+ * into what a link or a pipe leads to. */
+static MildStatus check_names(const char *folder, int resume, MildError *error) {
+    MildStatus status = MILD_OK;
+    for (int i = 0; i < RUN_NAMES && status == MILD_OK; i++) {
+        char path[PATH_SIZE];
+        struct stat info;
+        status = path_join(folder, run_names[i], path, error);
+        if (status == MILD_OK && resume) {
+            status = strcmp(run_names[i], "log.csv") == 0 ? log_check(path, error)
+                                                          : file_check_own(path, error);
+        } else if (status == MILD_OK && lstat(path, &info) == 0) {
+            status = mild_fail(error, MILD_ERROR_ARGUMENT,
+                               "%.200s exists and would be overwritten, and without a checkpoint "
+                               "--resume cannot go on from it: choose another --out, or move it "
+                               "away",
+                               path);
+        }
     }
-    if (status != MILD_OK) {
-        return status;
-    }
-    status = file_lock(&run->lock, path, &cause);
-    if (status == MILD_ERROR_ARGUMENT) {
-        return mild_fail(error, status, "%.250s, which trains in this folder; choose another --out",
-                         cause.text);
-    }
-    if (status != MILD_OK) {
-        return mild_fail(error, status, "%s", cause.text);
-    }
-    remove_leftovers(folder);
-    return train_run_check_folder(folder, run->def.resume, error);
+    return status;
 }
 
-MildStatus train_run_check_folder(const char *folder, int resume, MildError *error) {
+/* A checkpoint's name may be written again: after a damaged one, or when nothing is left to do. */
+static MildStatus check_checkpoints(const char *folder, MildError *error) {
+    MildStatus status = MILD_OK;
+    DIR *dir = opendir(folder);
+    for (struct dirent *entry; status == MILD_OK && dir && (entry = readdir(dir));) {
+        char path[PATH_SIZE];
+        if (checkpoint_number(entry->d_name) >= 0) {
+            status = path_join(folder, entry->d_name, path, error);
+            status = status == MILD_OK ? file_check_own(path, error) : status;
+        }
+    }
+    if (dir) {
+        closedir(dir);
+    }
+    return status;
+}
+
+static MildStatus check_folder(const char *folder, int resume, MildError *error) {
     int64_t oldest;
     int count;
     newest_checkpoint(folder, INT64_MAX, &oldest, &count);
@@ -276,20 +298,84 @@ MildStatus train_run_check_folder(const char *folder, int resume, MildError *err
     }
     if (resume && count == 0) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "%s: no checkpoint to resume from; drop --resume to start anew", folder);
+                         "%s: no checkpoint to resume from; start anew, without --resume, in "
+                         "another --out",
+                         folder);
     }
-    return MILD_OK;
+    MildStatus status = resume ? check_checkpoints(folder, error) : MILD_OK;
+    return status == MILD_OK ? check_names(folder, resume, error) : status;
 }
 
+MildStatus train_run_check_folder(const char *folder, int resume, MildError *error) {
+    char lock[PATH_SIZE];
+    const long holder =
+        path_join(folder, "lock", lock, NULL) == MILD_OK ? file_lock_holder(lock) : 0;
+    if (holder) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "%.200s: in use by process %ld, which trains in this folder; choose "
+                         "another --out",
+                         folder, holder);
+    }
+    return check_folder(folder, resume, error);
+}
+
+MildStatus train_run_claim(const char *folder, int resume, MildError *error) {
+    MildStatus status = MILD_OK;
+    for (int i = 0; i < RUN_NAMES && status == MILD_OK; i++) {
+        char path[PATH_SIZE];
+        if (resume && strcmp(run_names[i], "config.ini") == 0) {
+            continue; /* it is read, and written again with what has changed */
+        }
+        status = path_join(folder, run_names[i], path, error);
+        status = status == MILD_OK ? file_claim(path, "--out", error) : status;
+    }
+    return status;
+}
+
+/* Locks the folder for this run. Checks it again, because another run may have started there
+ * since. */
+static MildStatus take_folder(TrainRun *run, MildError *error) {
+    const char *folder = run->def.folder;
+    char path[PATH_SIZE];
+    MildError cause = {0};
+    MildStatus status = path_make_folder(folder, error);
+    if (status == MILD_OK) {
+        status = path_join(folder, "lock", path, error);
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    status = file_lock(&run->lock, path, &cause);
+    if (status == MILD_ERROR_FORMAT) {
+        return mild_fail(error, status, "%.300s, or choose another --out", cause.text);
+    }
+    if (status == MILD_ERROR_ARGUMENT) {
+        return mild_fail(error, status, "%.250s, which trains in this folder; choose another --out",
+                         cause.text);
+    }
+    if (status != MILD_OK) {
+        return mild_fail(error, status, "%s", cause.text);
+    }
+    remove_leftovers(folder);
+    return check_folder(folder, run->def.resume, error);
+}
+
+/* A log of other columns ends a resumed run before anything is written; a new one begins with its
+ * config, because a log alone is in the way of the next. */
 static MildStatus open_log(TrainRun *run, MildError *error) {
-    MildStatus status = write_config(run, error);
+    const int resume = run->def.resume;
+    MildStatus status = resume ? MILD_OK : write_config(run, error);
     if (status != MILD_OK) {
         return status;
     }
     name_columns(run);
     run->log = log_open(run->def.folder, run->column, COLUMNS,
-                        run->def.resume ? train_iteration(run->trainer) : -1, error);
-    return run->log ? log_config(run->log, run->def.config, error) : error->status;
+                        resume ? train_iteration(run->trainer) : -1, error);
+    status = run->log ? MILD_OK : error->status;
+    if (status == MILD_OK && resume) {
+        status = write_config(run, error);
+    }
+    return status == MILD_OK ? log_config(run->log, run->def.config, error) : status;
 }
 
 /* A resumed run has its networks from its checkpoint. */

@@ -28,8 +28,12 @@ typedef struct {
 
 typedef struct TrainRun TrainRun;
 
-/* Fails unless a new run finds no checkpoints in the folder, and a resumed run finds some. */
+/* Fails unless a new run finds neither checkpoints nor any other file that it would write in the
+ * folder, and a resumed run finds checkpoints, and no links in the place of its files. */
 MildStatus train_run_check_folder(const char *folder, int resume, MildError *error);
+
+/* Claims (file_claim) the run's files, so that nothing can be read that the run would overwrite. */
+MildStatus train_run_claim(const char *folder, int resume, MildError *error);
 
 /* Makes the folder or continues in it. Borrows what `def` and `watch` point to. Returns NULL on
  * failure, with the reason in *error. */

@@ -3,6 +3,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "robot/files.h"
+
 #define VIEW_SHADOW 768       /* [pixels] edge of the shadow map */
 #define VIEW_SHADOW_CLIP 1.3F /* [-] half of what it covers, in extents of the robot */
 #define VIEW_SLICES 14        /* sides of a drawn cylinder */
@@ -90,10 +92,10 @@ static void add_sky(mjSpec *spec) {
 
 mjModel *view_model(const char *xml, const int size[2], const Relief *relief,
                     const Surfaces *surfaces, MildError *error) {
-    char text[300] = "";
-    mjSpec *spec = mj_parseXML(xml, NULL, text, sizeof text);
+    RobotFiles files;
+    mjSpec *spec = robot_files_parse(&files, xml, error);
     if (!spec) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: %s", xml, text);
+        robot_files_end(&files);
         return NULL;
     }
     spec->visual.global.offwidth = size[0];
@@ -107,11 +109,8 @@ mjModel *view_model(const char *xml, const int size[2], const Relief *relief,
     spec->visual.quality.numquads = 1;
     add_sky(spec);
     add_ground(spec, relief, surfaces);
-    mjModel *model = mj_compile(spec, NULL);
-    if (!model) {
-        mild_fail(error, MILD_ERROR_FORMAT, "%s: cannot add the visible ground: %s", xml,
-                  mjs_getError(spec));
-    }
+    mjModel *model = robot_files_compile(&files, spec, xml, error);
     mj_deleteSpec(spec);
+    robot_files_end(&files);
     return model;
 }

@@ -106,7 +106,17 @@ killed=$!
 wait_for shared/lock
 kill -9 $killed
 wait $killed 2>/dev/null
-cp shared/config.ini shared/checkpoint_000000009.safetensors.123-0.tmp
+# temporary NAME: as the program makes it: process, number, and their FNV-1a hash with the name
+temporary() {
+    local text=$1.123-0- sum=$((0xcbf29ce484222325)) i c
+    for ((i = 0; i < ${#text}; i++)); do
+        printf -v c %d "'${text:i:1}"
+        sum=$(((sum ^ c) * 1099511628211))
+    done
+    printf '%s%016x.tmp' "$text" $sum
+}
+cp shared/config.ini "shared/$(temporary checkpoint_000000009.safetensors)"
+cp shared/config.ini "shared/$(temporary policy.safetensors)"
 echo mine >shared/notes.tmp
 iterations=$(($(ls shared/checkpoint_* | sed -n 's/.*_0*\([0-9]*\)\.safetensors$/\1/p' | sort -n | tail -1) + 1))
 expect 0 resumed "$mild" train --out shared "${tiny[@]}" --resume --train.iterations=$iterations

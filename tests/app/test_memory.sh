@@ -69,4 +69,20 @@ for n in $(seq $((total - 40)) 2 "$total"); do
     [ ! -e new ] || { diff -r made new >/dev/null || fail "allocation $n: a folder that is not whole"; rm -r new; }
 done
 
+# a training, whose matrix products are a C++ library's: no abort
+tiny=(--train.envs=4 --train.minutes=0 --train.threads=1 --train.iterations=1 --ppo.steps=4 --policy.actor_hidden=32,0,0,0
+    --policy.critic_hidden=32,0,0,0 --policy.encoder_hidden=32,0,0,0 --policy.decoder_hidden=32,0,0,0)
+train=("$mild" train --out trained "${tiny[@]}")
+total=$(count "${train[@]}")
+for share in {1..40}; do # the networks work in the last tenth of its allocations
+    for on in '' 1; do
+        rm -rf trained
+        { errors=$(env ${on:+FAIL_ON=1} FAIL_AT=$((total - total * share / 400)) LD_PRELOAD="$shim" "${train[@]}" 2>&1 >/dev/null </dev/null); } 2>/dev/null
+        got=$?
+        [ "$got" = 2 ] || fail "training, allocation $((total - total * share / 400)): exit $got: $errors"
+        grep -qi memory <<<"$errors" || fail "training: '$errors' does not say that memory ran out"
+    done
+done
+rm -rf trained
+
 finish "memory: $tried allocations failed, $refused of them refused in one line each"

@@ -89,8 +89,8 @@ grep -qF 'plain (2 seeds)' alike.html || fail "runs without a seed are not one g
 
 bad 'nowhere/log.csv: cannot read: No such file.*; name a run folder' "$mild" report nowhere
 bad 'no run given' "$mild" report
-bad 'seed1/config.ini is read' "$mild" report seed1 --out seed1/config.ini
-bad 'seed2/eval.json is read' "$mild" report seed1 seed2 --out seed2/eval.json
+bad 'seed1/config.ini is also an input' "$mild" report seed1 --out seed1/config.ini
+bad 'seed2/eval.json is also an input' "$mild" report seed1 seed2 --out seed2/eval.json
 bad 'No space left' "$mild" report seed1 --out /dev/full
 bad 'no/where.html' "$mild" report seed1 --out no/where.html
 mkdir new torn foreign odd folder folder/log.csv

@@ -28,6 +28,7 @@ expect 0 '0.60  *went  *2 of 2  *0.50  *0.70  *9 ' "$python" "$root/scripts/comp
 average() { "$python" "$root/scripts/average.py" "$@"; }
 bad "average: usage: average.py" average
 bad "average: none: No such file" average none none 0.5 mean
+bad "average: foreign: is also an input" average none foreign 0.5 ./foreign
 bad "average: foreign: not a whole policy" average foreign foreign 0.5 mean
 bad "average: .*mild.safetensors: weights are not F32" average "$root/policies/mild.safetensors" "$root/policies/mild.safetensors" 0.5 mean
 "$python" "$root/tests/export/make_policy.py" "$root/policies/mild.safetensors" a 1

@@ -72,5 +72,28 @@ gets 400 "$(printf 'x%.0s' $(seq 5000))"
 exec 4<>"/dev/tcp/127.0.0.1/$port"
 gets 200 'GET / HTTP/1.1\r\n\r\n'
 exec 4>&-
+
+# many who say one byte a second: others are told to come again, and are served when the time of those is over
+trap '' PIPE
+slow=()
+for _ in {1..64}; do
+    exec {one}<>"/dev/tcp/127.0.0.1/$port" && slow+=("$one")
+done
+sleep 0.5
+ask 'GET / HTTP/1.1\r\n\r\n'
+grep -q '^HTTP/1.1 503 ' head && grep -q '^Retry-After: ' head || fail "not refused in words: $(head -1 head)"
+for _ in {1..8}; do
+    for one in "${slow[@]}"; do printf G >&"$one"; done 2>/dev/null
+    sleep 1
+done
+gets 200 'GET / HTTP/1.1\r\n\r\n'
+late=0
+for one in "${slow[@]}"; do
+    read -r -t 1 line <&"$one" && [[ $line = 'HTTP/1.1 408 '* ]] && late=$((late + 1))
+    exec {one}>&-
+done 2>/dev/null
+[ $late -ge 60 ] || fail "only $late of 64 are told that their time is over"
+memory=$(sed -n 's/^VmHWM:[[:space:]]*\([0-9]*\) kB/\1/p' /proc/$server/status) # [KiB]
+[ -n "${ASAN_OPTIONS:-}" ] || [ "$memory" -lt 200000 ] || fail "the server took $memory KiB"
 kill -0 $server || fail "the server has gone"
 finish "web: served"

@@ -91,6 +91,11 @@ static void test_temporaries(void **state) {
     assert_true(file_is_temporary(first) && file_is_temporary(second));
     assert_false(file_is_temporary("out.tmp") || file_is_temporary("out") ||
                  file_is_temporary("a-b.tmp") || file_is_temporary("out.12-3.tmp.gz"));
+    assert_false(file_is_temporary("policy.safetensors.2026-11.tmp") || file_is_temporary("") ||
+                 file_is_temporary("out.1-2-0123456789abcdef.tmp"));
+    char renamed[PATH_SIZE + 1];
+    snprintf(renamed, sizeof renamed, "x%s", first);
+    assert_false(file_is_temporary(renamed));
     assert_int_equal(file_write(first, "taken", 5, &error), MILD_OK);
     assert_int_equal(file_check_write("out", &error), MILD_OK);
     assert_int_equal(file_write("out", "text", 4, &error), MILD_OK);
@@ -112,6 +117,49 @@ static void test_same_file(void **state) {
     assert_true(file_same("new", "./new") && file_same("sub/new", "sub/../sub/new"));
     assert_false(file_same("one", "two") || file_same("new", "sub/new") || file_same("new", "one"));
     assert_false(file_same("/dev/null", "/dev/null") || file_same("sub", "sub"));
+}
+
+/* What is claimed as an output cannot be read, by whatever name, nor be claimed twice. */
+static void test_claims(void **state) {
+    (void)state;
+    MildError error = {0};
+    size_t size;
+    assert_int_equal(file_write("claimed", "1", 1, &error), MILD_OK);
+    assert_int_equal(file_write("free", "1", 1, &error), MILD_OK);
+    assert_int_equal(symlink("claimed", "claimed_soft"), 0);
+    assert_int_equal(link("claimed", "claimed_hard"), 0);
+    assert_int_equal(file_claim("claimed", "--json", &error), MILD_OK);
+    assert_int_equal(file_claim("to_come", "--csv", &error), MILD_OK);
+    assert_int_equal(file_claim("./claimed_hard", "--onnx", &error), MILD_ERROR_ARGUMENT);
+    assert_int_equal(file_claim("./to_come", "--onnx", &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "--csv and --onnx name the same file"));
+    static const char *const refused[] = {"claimed", "./claimed", "claimed_soft", "claimed_hard"};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        error = (MildError){0};
+        assert_null(file_read(refused[i], 10, &size, &error));
+        assert_null(file_open(refused[i], &error));
+        assert_int_equal(error.status, MILD_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.text, "--json"));
+    }
+    assert_holds("free", "1");
+    file_claims_drop();
+    assert_holds("claimed_soft", "1");
+}
+
+/* Files that the program writes by itself are written in no other place. */
+static void test_own(void **state) {
+    (void)state;
+    MildError error = {0};
+    assert_int_equal(file_write("own", "1", 1, &error), MILD_OK);
+    assert_int_equal(symlink("own", "own_soft"), 0);
+    assert_int_equal(symlink("nowhere", "own_dangling"), 0);
+    assert_int_equal(mkfifo("own_pipe", 0600), 0);
+    assert_int_equal(file_check_own("own", &error), MILD_OK);
+    assert_int_equal(file_check_own("not_there", &error), MILD_OK);
+    static const char *const refused[] = {"own_soft", "own_dangling", "own_pipe", "/dev/null", "/"};
+    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
+        assert_int_equal(file_check_own(refused[i], &error), MILD_ERROR_IO);
+    }
 }
 
 static void test_beside(void **state) {
@@ -153,6 +201,27 @@ static void test_lock(void **state) {
     assert_int_equal(file_lock(&lock, "no/folder/lock", &error), MILD_ERROR_IO);
 }
 
+/* Somebody else's file of that name stays. */
+static void test_foreign_lock(void **state) {
+    (void)state;
+    static const char *const texts[] = {"", "mine", "A lock of mild."};
+    FileLock lock;
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+        MildError error = {0};
+        assert_int_equal(file_write("foreign", texts[i], strlen(texts[i]), &error), MILD_OK);
+        assert_int_equal(file_lock(&lock, "foreign", &error), MILD_ERROR_FORMAT);
+        assert_non_null(strstr(error.text, "foreign: somebody else's file"));
+        file_unlock(&lock);
+        assert_holds("foreign", texts[i]);
+    }
+    MildError error = {0};
+    assert_int_equal(symlink("elsewhere", "linked_lock"), 0);
+    assert_int_equal(mkfifo("lock_pipe", 0600), 0);
+    assert_int_not_equal(file_lock(&lock, "linked_lock", &error), MILD_OK);
+    assert_int_equal(file_lock(&lock, "lock_pipe", &error), MILD_ERROR_FORMAT);
+    assert_int_equal(access("elsewhere", F_OK), -1);
+}
+
 static void test_text(void **state) {
     (void)state;
     char text[32];
@@ -172,8 +241,11 @@ int main(void) {
         cmocka_unit_test(test_write_whole_or_not),
         cmocka_unit_test(test_temporaries),
         cmocka_unit_test(test_same_file),
+        cmocka_unit_test(test_claims),
+        cmocka_unit_test(test_own),
         cmocka_unit_test(test_beside),
         cmocka_unit_test(test_lock),
+        cmocka_unit_test(test_foreign_lock),
         cmocka_unit_test(test_text),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

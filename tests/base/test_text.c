@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "base/text.h"
+#include "mild/error.h"
 
 static void test_distance(void **state) {
     (void)state;
@@ -130,11 +131,56 @@ static void test_duration(void **state) {
     }
 }
 
+/* What a terminal obeys, or what is no UTF-8, becomes '?', byte by byte. */
+static void test_plain(void **state) {
+    (void)state;
+    static const struct {
+        const char *text, *keep, *plain;
+        size_t torn;
+    } rows[] = {
+        {"plain, \xc3\xa4, \xe2\x82\xac, \xf0\x9f\x90\x95", "", NULL, 0},
+        {"\x1b[2J\x1b]0;title\x07", "", "?[2J?]0;title?", 0},
+        {"a\nb\tc\rd\be\x7f", "\n\t", "a\nb\tc?d?e?", 0},
+        {"a\nb", "", "a?b", 0},
+        {"C1: \xc2\x9b"
+         "31m, \x9b"
+         "31m",
+         "", "C1: ??31m, ?31m", 0},
+        {"\xe2\x80\xae"
+         "reversed \xe2\x81\xa6",
+         "", "???reversed ???", 0},
+        {"overlong \xc0\x9b \xe0\x80\x9b \xf8\x80", "", "overlong ?? ??? ??", 0},
+        {"\xf4\x90\x80\x80 \xff\xfe", "", "???? ??", 0},
+        {"torn \xe2\x82", "", NULL, 2},
+        {"torn \xc2", "", NULL, 1},
+        {"\xe2"
+         "ab",
+         "", "?ab", 0},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char text[64];
+        snprintf(text, sizeof text, "%s", rows[i].text);
+        assert_int_equal(text_plain(text, strlen(text), rows[i].keep), rows[i].torn);
+        assert_string_equal(text, rows[i].plain ? rows[i].plain : rows[i].text);
+    }
+    char zero[3] = {'a', '\0', 'b'};
+    assert_int_equal(text_plain(zero, 3, "\n"), 0);
+    assert_memory_equal(zero, "a?b", 3);
+    MildError error = {0};
+    char name[sizeof error.text];
+    memset(name, 'x', sizeof name);
+    strcpy(name + sizeof name - 3, "\xc3"); /* cut in the middle of a character */
+    mild_fail(&error, MILD_ERROR_IO, "%s\xa4 and more", name);
+    assert_int_equal(strlen(error.text), sizeof error.text - 1);
+    mild_fail(&error, MILD_ERROR_IO, "no file '%s'", "\x1b[31mred\n");
+    assert_string_equal(error.text, "no file '?[31mred?'");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_distance), cmocka_unit_test(test_nearest),
         cmocka_unit_test(test_numbers),  cmocka_unit_test(test_bytes),
-        cmocka_unit_test(test_duration),
+        cmocka_unit_test(test_duration), cmocka_unit_test(test_plain),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
