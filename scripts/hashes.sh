@@ -12,6 +12,6 @@ fi
 [ $# -gt 0 ] || set -- scripts/{requirements,pip-tools,site,wheel,learners}.in scripts/paper/requirements.in tests/export/requirements.in
 for file; do
     CUSTOM_COMPILE_COMMAND="scripts/hashes.sh $file" build/pip-tools/bin/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras \
-        --no-emit-index-url --no-emit-trusted-host "${upgrade[@]}" --output-file "${file%.in}.txt" "$file"
+        --no-emit-index-url --no-emit-trusted-host --no-emit-find-links "${upgrade[@]}" --output-file "${file%.in}.txt" "$file"
     echo "hashes: ${file%.in}.txt"
 done

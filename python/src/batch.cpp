@@ -253,8 +253,8 @@ void bind_batch(nb::module_ &module) {
             "new_velocity (robots, feet, 6); foot (robots, feet, 6): pressure centre,\n"
             "depth_max, depth_mean [m], area [m^2]; elements (robots, 4, feet, stride); residual "
             "(robots,);\niterations int32 (robots,). stream: a cudaStream_t as a number, e.g.\n"
-            "torch.cuda.current_stream().cuda_stream; the call only puts work into it. wrench may be "
-            "the\narray of velocity and new_velocity that of free_velocity; else outputs share "
+            "torch.cuda.current_stream().cuda_stream; the call only puts work into it. wrench "
+            "may be the\narray of velocity and new_velocity that of free_velocity; else outputs share "
             "no memory with\nany array. Raises TypeError or ValueError with the name of the array "
             "that does not fit.")
         .def("reset", reset, nb::arg("which").none() = nb::none(), nb::arg("stream") = 0,

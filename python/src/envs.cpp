@@ -268,8 +268,8 @@ NB_MODULE(_envs, module) {
             "critic\n(envs, critic), frame (envs, observation), estimate (envs, estimates), last "
             "and\nlast_critic: as history and critic at the end of episodes, terms (envs, "
             "rewards): of these,\nreward (envs,). bool or uint8 (envs,): done, timeout, valid. On "
-            "the device of the\nenvironments, no two in the same memory. Raises TypeError or ValueError with the name of the "
-            "array that does not fit.")
+            "the device of the\nenvironments, no two in the same memory. Raises TypeError or "
+            "ValueError with the name of the array that does not fit.")
         .def("reset", reset, nb::arg("buffers"), nb::arg("stream") = 0,
              "New episodes; writes history, critic, frame and estimate.")
         .def("step", step, nb::arg("action").none(), nb::arg("buffers"), nb::arg("stream") = 0,
