@@ -234,29 +234,28 @@ void bind_batch(nb::module_ &module) {
         .def("set_map", set_map, nb::arg("map").none(),
              "Puts the robots on a Map; None: on level ground. All forget what the ground "
              "remembers.")
-        .def(
-            "step", step, nb::arg("position").none(), nb::arg("rotation").none(),
-            nb::arg("velocity").none(), nb::arg("inverse_inertia").none(),
-            nb::arg("free_velocity").none(), nb::kw_only(), nb::arg("wrench").none(),
-            nb::arg("new_velocity").none(), nb::arg("material").none() = nb::none(),
-            nb::arg("height").none() = nb::none(), nb::arg("map_origin").none() = nb::none(),
-            nb::arg("foot").none() = nb::none(), nb::arg("elements").none() = nb::none(),
-            nb::arg("residual").none() = nb::none(), nb::arg("iterations").none() = nb::none(),
-            nb::arg("advance") = true, nb::arg("stream") = 0,
-            "Solves a contact step of every robot and, with `advance`, keeps it.\n\n"
-            "Arrays, float32 but where said, contiguous, on the device of the batch: NumPy, or "
-            "what has\n__dlpack__. None is copied. Inputs: position (robots, feet, 3) [m]; "
-            "rotation (robots, feet,\n3, 3); velocity (robots, feet, 6) [m/s, rad/s]; "
-            "inverse_inertia (robots, 6 feet, 6 feet);\nfree_velocity (robots, feet, 6); material "
-            "int32 (robots,), with a map of several labels\n(robots, labels); height (robots,) "
-            "[m]; map_origin (robots, 2) [m]. Outputs: wrench (robots,\nfeet, 6) [N, N m]; "
-            "new_velocity (robots, feet, 6); foot (robots, feet, 6): pressure centre,\n"
-            "depth_max, depth_mean [m], area [m^2]; elements (robots, 4, feet, stride); residual "
-            "(robots,);\niterations int32 (robots,). stream: a cudaStream_t as a number, e.g.\n"
-            "torch.cuda.current_stream().cuda_stream; the call only puts work into it. wrench "
-            "may be the\narray of velocity and new_velocity that of free_velocity; else outputs share "
-            "no memory with\nany array. Raises TypeError or ValueError with the name of the array "
-            "that does not fit.")
+        .def("step", step, nb::arg("position").none(), nb::arg("rotation").none(),
+             nb::arg("velocity").none(), nb::arg("inverse_inertia").none(),
+             nb::arg("free_velocity").none(), nb::kw_only(), nb::arg("wrench").none(),
+             nb::arg("new_velocity").none(), nb::arg("material").none() = nb::none(),
+             nb::arg("height").none() = nb::none(), nb::arg("map_origin").none() = nb::none(),
+             nb::arg("foot").none() = nb::none(), nb::arg("elements").none() = nb::none(),
+             nb::arg("residual").none() = nb::none(), nb::arg("iterations").none() = nb::none(),
+             nb::arg("advance") = true, nb::arg("stream") = 0,
+             "Solves a contact step of every robot and, with `advance`, keeps it.\n\n"
+             "Arrays, float32 but where said, contiguous, on the device of the batch: NumPy, or "
+             "what has\n__dlpack__. None is copied. Inputs: position (robots, feet, 3) [m]; "
+             "rotation (robots, feet,\n3, 3); velocity (robots, feet, 6) [m/s, rad/s]; "
+             "inverse_inertia (robots, 6 feet, 6 feet);\nfree_velocity (robots, feet, 6); material "
+             "int32 (robots,), with a map of several labels\n(robots, labels); height (robots,) "
+             "[m]; map_origin (robots, 2) [m]. Outputs: wrench (robots,\nfeet, 6) [N, N m]; "
+             "new_velocity (robots, feet, 6); foot (robots, feet, 6): pressure centre,\n"
+             "depth_max, depth_mean [m], area [m^2]; elements (robots, 4, feet, stride); residual "
+             "(robots,);\niterations int32 (robots,). stream: a cudaStream_t as a number, e.g.\n"
+             "torch.cuda.current_stream().cuda_stream; the call only puts work into it. wrench may "
+             "be the\narray of velocity and new_velocity that of free_velocity; else outputs share "
+             "no memory with\nany array. Raises TypeError or ValueError with the name of the array "
+             "that does not fit.")
         .def("reset", reset, nb::arg("which").none() = nb::none(), nb::arg("stream") = 0,
              "Robots whose flag in `which`, (robots,) bool or uint8 on the device, is not 0 forget "
              "all;\nNone: all robots.")

@@ -257,19 +257,18 @@ NB_MODULE(_envs, module) {
         "train.envs environments. config: a file, or None; overrides: texts section.key=value.\n"
         "Raises ValueError with the key that is wrong.");
     type.def("__init__", make, nb::arg("config").none(), nb::arg("overrides"))
-        .def(
-            "buffers", make_buffers, nb::kw_only(), nb::arg("history").none(),
-            nb::arg("reward").none(), nb::arg("done").none(), nb::arg("timeout").none(),
-            nb::arg("valid").none(), nb::arg("critic").none() = nb::none(),
-            nb::arg("frame").none() = nb::none(), nb::arg("estimate").none() = nb::none(),
-            nb::arg("last").none() = nb::none(), nb::arg("last_critic").none() = nb::none(),
-            nb::arg("terms").none() = nb::none(),
-            "Checks arrays once, for many steps. float32: history (envs, frames, observation), "
-            "critic\n(envs, critic), frame (envs, observation), estimate (envs, estimates), last "
-            "and\nlast_critic: as history and critic at the end of episodes, terms (envs, "
-            "rewards): of these,\nreward (envs,). bool or uint8 (envs,): done, timeout, valid. On "
-            "the device of the\nenvironments, no two in the same memory. Raises TypeError or "
-            "ValueError with the name of the array that does not fit.")
+        .def("buffers", make_buffers, nb::kw_only(), nb::arg("history").none(),
+             nb::arg("reward").none(), nb::arg("done").none(), nb::arg("timeout").none(),
+             nb::arg("valid").none(), nb::arg("critic").none() = nb::none(),
+             nb::arg("frame").none() = nb::none(), nb::arg("estimate").none() = nb::none(),
+             nb::arg("last").none() = nb::none(), nb::arg("last_critic").none() = nb::none(),
+             nb::arg("terms").none() = nb::none(),
+             "Checks arrays once, for many steps. float32: history (envs, frames, observation), "
+             "critic\n(envs, critic), frame (envs, observation), estimate (envs, estimates), last "
+             "and\nlast_critic: as history and critic at the end of episodes, terms (envs, "
+             "rewards): of these,\nreward (envs,). bool or uint8 (envs,): done, timeout, valid. On "
+             "the device of the\nenvironments, no two in the same memory. Raises TypeError or "
+             "ValueError with the name of the array that does not fit.")
         .def("reset", reset, nb::arg("buffers"), nb::arg("stream") = 0,
              "New episodes; writes history, critic, frame and estimate.")
         .def("step", step, nb::arg("action").none(), nb::arg("buffers"), nb::arg("stream") = 0,
