@@ -27,7 +27,7 @@ help:
 	@echo "make bench   set up, build, measure speed and memory"
 	@echo "make install libmild alone into PREFIX=$(PREFIX), for MARCH=$(MARCH) (x86-64-v3: for other machines too)"
 	@echo "make plugin  the MuJoCo plugin into PREFIX, for MUJOCO_ROOT= (docs/plugin.md)"
-	@echo "make plugin-check  VERSION=3.3.7: the plugin in that version of MuJoCo (installs it) as in ours"
+	@echo "make plugin-check  a wheel beside every MuJoCo that it supports; VERSION=3.3.7: the plugin built for that one (network)"
 	@echo "make export-check  what mild export --onnx writes, in ONNX Runtime (installs it into build/onnxruntime)"
 	@echo "make fuzz    RUNS=$(RUNS) random inputs for everything that reads (clang; 2 to 25 minutes a target, an hour for model)"
 	@echo "make mutants N=$(N) random faults in src/LAYER=$(LAYER): how many do its tests catch? (docs/testing.md)"
@@ -65,11 +65,12 @@ check:
 	@JOBS=$(JOBS) scripts/check.sh $(STAGES)
 
 plugin-check: build
-	@tests/plugin/test_version.sh "$(VERSION)" build
+	@if [ -n "$(VERSION)" ]; then tests/plugin/test_version.sh "$(VERSION)" build; else $(MAKE) --no-print-directory wheel && \
+		scripts/headers.py --check && tests/plugin/test_wheel.sh build/dist/mild-*.whl build; fi
 
 export-check: build
 	@.venv/bin/python -m venv build/onnxruntime
-	@build/onnxruntime/bin/python -m pip install --quiet --disable-pip-version-check -r tests/export/requirements.txt
+	@build/onnxruntime/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r tests/export/requirements.txt
 	@RUNTIME=1 tests/export/test_export.sh build/mild $(CURDIR)/build/onnxruntime/bin/python ON
 
 run: program
@@ -102,7 +103,7 @@ mutants: setup
 
 # Trains only where there is a GPU (a build with CMAKE_FLAGS=-DMILD_CUDA=ON); keeps what runs/paper has. QUICK: the shipped weights.
 paper: build
-	@.venv/bin/pip install -q -r scripts/paper/requirements.txt
+	@.venv/bin/pip install -q --require-hashes -r scripts/paper/requirements.txt
 	@$(if $(QUICK),:,if nvidia-smi >/dev/null 2>&1; then scripts/paper/train.sh runs/paper; fi)
 	@.venv/bin/python scripts/paper/paper.py $(if $(QUICK),--trials 3 --models policies/paper)
 
@@ -128,19 +129,19 @@ deb: setup
 # Its own Python environment, for one package more than the program needs.
 site:
 	@[ -x build/site-venv/bin/markdown_py ] || { python3 -m venv build/site-venv && \
-		build/site-venv/bin/pip install -q --disable-pip-version-check markdown==3.11.3; }
+		build/site-venv/bin/pip install -q --disable-pip-version-check --require-hashes -r scripts/site.txt; }
 	@build/site-venv/bin/python scripts/site.py build/site
 	@echo build/site/index.html
 
 wheel: setup
-	@.venv/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps -w build/dist . \
+	@.venv/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w build/dist . \
 		--config-settings=cmake.define.MILD_MARCH=$(if $(filter native,$(MARCH)),x86-64-v3,$(MARCH))
 	@ls build/dist/*.whl
 
 # Learners are large: an environment of its own, with the wheel as a user has it.
 python-check: wheel
 	@[ -x build/python-venv/bin/python ] || python3 -m venv build/python-venv
-	@build/python-venv/bin/pip install --quiet --disable-pip-version-check -r scripts/learners.txt
+	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --require-hashes -r scripts/learners.txt
 	@build/python-venv/bin/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall build/dist/mild-*.whl
 	@build/python-venv/bin/python tests/python/check_learners.py
 	@build/python-venv/bin/python tests/python/check_cuda.py

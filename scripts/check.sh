@@ -118,7 +118,9 @@ stage_wheel() {
     make --no-print-directory wheel >"$root/wheel.log" 2>&1 || { tail -30 "$root/wheel.log" >&2; return 1; }
     wheel=$(echo "$here"/build/dist/mild-*.whl)
     .venv/bin/python -m venv "$root/wheel"
-    "$root/wheel/bin/pip" install --quiet --disable-pip-version-check "$wheel[gym]"
+    "$root/wheel/bin/pip" install --quiet --disable-pip-version-check --require-hashes -r scripts/wheel.txt
+    "$root/wheel/bin/pip" install --quiet --disable-pip-version-check --no-deps "$wheel"
+    "$root/wheel/bin/pip" check # scripts/wheel.txt has all that the wheel asks for
     for example in plate gym_random walk; do
         (cd "$root/wheel" && PYTHONPATH='' bin/python "$here/examples/python/$example.py")
     done

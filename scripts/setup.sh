@@ -54,11 +54,11 @@ fi
 # The private environment holds the MuJoCo wheel (library and headers), matplotlib (figures), and what the Python package
 # is built and tested with. The copy of the requirements inside it is written last, so that an interrupted installation is repeated.
 if ! cmp -s scripts/requirements.txt .venv/requirements.installed; then
-    echo "setup: preparing .venv ($(paste -sd' ' scripts/requirements.txt))"
+    echo "setup: preparing .venv ($(paste -sd' ' scripts/requirements.in))"
     python=/usr/bin/python3
     [ -x "$python" ] || python=python3
     "$python" -m venv --clear .venv # from nothing: two MuJoCo wheels side by side would be ambiguous
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check -r scripts/requirements.txt
+    .venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r scripts/requirements.txt
     cp scripts/requirements.txt .venv/requirements.installed
 fi
 

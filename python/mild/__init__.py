@@ -2,7 +2,7 @@
 
 Units are SI and radians, z points up. What is wrong with an argument is raised as one ValueError, TypeError or
 RuntimeError that names it."""
-from ._ground import Batch, Ground, Map, Material, Press, Sole, Terrain, models, presets, press
+from ._ground import Batch, Ground, Map, Material, Press, Sole, Terrain, __version__, models, presets, press
 from .fit import GroundFit, loading
 from .spec import attach, load_plugin
 

@@ -1,41 +1,50 @@
 """Opens the environments of the task (docs/task.md) for the adapters gym, rsl_rl and sb3."""
 import collections.abc
+import importlib
+import importlib.util
 import numbers
 import os
 import pathlib
 
+import mild
+
+from . import _mujoco
+
+FILES = "_envs.*.so"  # of the module
 DATA = pathlib.Path(os.path.abspath(__file__)).parent / "data"
 
 
-def open_envs(num_envs, *, config=None, overrides=None, robot="sa01", device="cpu", seed=1, threads=0):
+def open_envs(num_envs=None, *, config=None, overrides=None, robot=None, device=None, seed=None, threads=None):
     """_envs.Envs with `num_envs` environments.
 
     config: a file over configs/default.ini, one of the package such as configs/quick.ini, or None. overrides: {"task.vx":
-    "0 1"} or {"task.vx": (0, 1)}. robot: a name, or a folder with a slash. device: cpu, cuda or cuda:N. seed: 0 .. 2^64 - 1.
-    threads: 0: one per core. Raises ValueError that names the key, ImportError without the module or its MuJoCo."""
+    "0 1"} or {"task.vx": (0, 1)}. The others are the config's keys train.envs, train.robot and so on; None leaves them as it
+    says. robot: a name, or a folder with a slash. device: cpu, cuda or cuda:N. seed: 0 .. 2^64 - 1. threads: 0: one per core.
+    Raises ValueError that names the key, ImportError without the module or its MuJoCo."""
     module = load()
     if not isinstance(overrides, (collections.abc.Mapping, type(None))):
         raise TypeError(f"overrides: a {type(overrides).__name__}, but it must be a dict of keys")
     keys = dict(overrides or {})
     for name, value in (("envs", num_envs), ("robot", robot), ("device", device), ("seed", seed), ("threads", threads)):
+        if value is None:
+            continue
         if f"train.{name}" in keys:
-            raise ValueError(f"overrides: train.{name} is an argument of its own")
+            raise ValueError(f"overrides: train.{name} is an argument of its own, which is given too")
         keys[f"train.{name}"] = value
     return module.Envs(config_path(config), [f"{key}={text_of(key, value)}" for key, value in keys.items()])
 
 
 def load():
-    """The module _envs."""
+    """The module _envs: a build tree's, or in an installed package that for the MuJoCo that is imported."""
     os.environ.setdefault("MILD_HOME", str(DATA))  # where the library finds configs and robots
-    try:
-        from . import _envs
-    except ImportError as error:
-        if "libmujoco" in str(error):
-            raise ImportError(f"mild's environments need the MuJoCo that mild was built with: {error}; "
-                              "reinstall mild, which brings it") from error
-        raise ImportError("this build of mild has no environments: install libinih-dev and libpng-dev, then mild again"
-                          ) from error
-    return _envs
+    if importlib.util.find_spec("mild._envs") is None:
+        if not _mujoco.versions(FILES):
+            raise ImportError("this build of mild has no environments: install libinih-dev and libpng-dev, then mild again")
+        try:
+            mild.__path__.append(str(_mujoco.folder(FILES, "environments")))
+        except RuntimeError as error:
+            raise ImportError(str(error)) from error
+    return importlib.import_module("mild._envs")
 
 
 def config_path(config):

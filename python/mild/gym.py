@@ -23,6 +23,7 @@ class _Task:
         self._envs, self._count, self._observation, self._keys = None, num_envs, observation, keys
         self._seed(int(self.np_random.integers(2**63)))
         shape = self._envs
+        self._count = shape.envs
         width = shape.observation * (shape.frames if observation == "history" else 1)
         high = np.full(width, np.inf, np.float32)
         clip = np.full(shape.actions, shape.clip, np.float32)
@@ -30,6 +31,9 @@ class _Task:
 
     def _seed(self, seed):
         opened = open_envs(self._count, seed=seed, **self._keys)
+        if opened.device >= 0:
+            opened.close()
+            raise ValueError("train.device: Gymnasium's environments have arrays of NumPy; set device='cpu'")
         self._shut()
         self._envs = opened
 
@@ -72,11 +76,13 @@ class _Task:
 
 
 class VectorEnv(gymnasium.vector.VectorEnv, _Task):
-    """`num_envs` robots on soft ground (docs/task.md).
+    """`num_envs` robots on soft ground (docs/task.md); None: as many as the config's train.envs. (Gymnasium's make_vec gives a
+    number, 1 if it was told none.)
 
     observation: "history", (num_envs, frames * observation) float32, oldest numbers first, or "frame", the newest only;
-    noisy, as the policy sees it. Actions: (num_envs, actions) float32 in units of the action scale. config, overrides,
-    robot, device, threads: see mild.envs.open_envs; device: cpu, with train.robots=mujoco.
+    noisy, as the policy sees it. Actions: (num_envs, actions) float32 in units of the action scale; ValueError for one that
+    is not finite. config, overrides, robot, device, threads: see mild.envs.open_envs; device: cpu, with train.robots=mujoco.
+    The seed is Gymnasium's, reset(seed=), never the config's train.seed.
 
     Every step returns new arrays, into which the library writes without a copy. Environments that ended begin anew in the
     same step (SAME_STEP): the observation is the first of the new episode, info["final_obs"] (num_envs, ...) has the last of
@@ -86,11 +92,11 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
 
     metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
 
-    def __init__(self, num_envs=1, *, observation="history", render_mode=None, **keys):
+    def __init__(self, num_envs=None, *, observation="history", render_mode=None, **keys):
         if render_mode is not None:
             raise ValueError("render_mode: there is none; `mild play` shows robots")
-        self.num_envs = num_envs
         self._open(num_envs, observation, keys)
+        self.num_envs = num_envs = self._count
         self.single_observation_space, self.single_action_space = self._single
         self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, num_envs)
         self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
@@ -127,8 +133,8 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
 
 
 class Env(gymnasium.Env, _Task):
-    """One robot; arguments and spaces as those of VectorEnv. info["reward_terms"] of the last step of an episode are the
-    sums of the reward's terms over it."""
+    """One robot; arguments and spaces as those of VectorEnv; one thread, unless `threads` says otherwise.
+    info["reward_terms"] of the last step of an episode are the sums of the reward's terms over it."""
 
     metadata = {"render_modes": []}
 

@@ -7,23 +7,25 @@ from .envs import open_envs
 
 
 class Env(VecEnv):
-    """`num_envs` robots on soft ground (docs/task.md) for rsl_rl 5.4 and 5.5.
+    """`num_envs` robots on soft ground (docs/task.md) for rsl_rl 5.4 and 5.5; None: as many as the config's train.envs.
 
     Observation groups: "policy" (num_envs, frames * observation), noisy, and "critic" (num_envs, critic), noiseless; the
     runner's obs_groups choose. extras: "time_outs" (num_envs,) bool, and every `log_every` steps "log", means over the
     episodes that ended since; that waits for the device. device: cpu or cuda:N, where all tensors are. config, overrides,
-    robot, seed, threads: see mild.envs.open_envs."""
+    robot, seed, threads: see mild.envs.open_envs. Actions that are not finite raise ValueError, on a GPU at the next log."""
 
-    def __init__(self, num_envs=4096, *, device="cpu", config=None, overrides=None, robot="sa01", seed=1, threads=0,
+    def __init__(self, num_envs=None, *, device=None, config=None, overrides=None, robot=None, seed=None, threads=None,
                  log_every=24):
-        self._envs = open_envs(num_envs, config=config, overrides=overrides, robot=robot, device=str(device), seed=seed,
-                               threads=threads)
-        self.num_envs, self.num_actions = num_envs, self._envs.actions
+        self._envs = open_envs(num_envs, config=config, overrides=overrides, robot=robot, seed=seed, threads=threads,
+                               device=None if device is None else str(device))
+        num_envs = self.num_envs = self._envs.envs
+        self.num_actions = self._envs.actions
         self.max_episode_length = round(self._envs.episode / self._envs.period)
         self.device = torch.device(f"cuda:{self._envs.device}" if self._envs.device >= 0 else "cpu")
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.long, device=self.device)
         self.cfg = {"config": str(config), "overrides": dict(overrides or {}), "robot": robot, "seed": seed}
         self.log_every, self._steps = log_every, 0
+        self._finite = torch.ones((), dtype=torch.bool, device=self.device)  # all actions since the last log
         self._tensors = self._new()
         self._envs.reset(self._envs.buffers(**self._tensors), stream=self._stream())
 
@@ -49,6 +51,8 @@ class Env(VecEnv):
         (num_envs,) long, extras)."""
         tensors = self._new()
         actions = actions.detach().to(self.device, torch.float32).contiguous()
+        if self.device.type == "cuda":  # without waiting for it; on the CPU the library looks
+            self._finite &= actions.isfinite().all()
         self._envs.step(actions, self._envs.buffers(**tensors), stream=self._stream())
         self._tensors, self._actions = tensors, actions  # kept until the device has read them
         self.episode_length_buf += 1
@@ -62,6 +66,8 @@ class Env(VecEnv):
     def statistics(self):
         """Means over the episodes that ended since the last call or log: a dict, see EnvsStats of src/crowd/envs_step.h.
         Waits for the device."""
+        if not self._finite:
+            raise ValueError(f"actions: some were not finite by step {self._steps}")
         return self._envs.statistics(stream=self._stream())
 
     def _log(self):

@@ -11,9 +11,9 @@ class Env(VecEnv):
     infos[i] of an environment that ended has "terminal_observation", "TimeLimit.truncated" and "reward_terms". Actions are
     clipped by Stable-Baselines3 to the space, which is what the task does too."""
 
-    def __init__(self, num_envs=1, **keys):
+    def __init__(self, num_envs=None, **keys):
         self.envs = VectorEnv(num_envs, **keys)
-        super().__init__(num_envs, self.envs.single_observation_space, self.envs.single_action_space)
+        super().__init__(self.envs.num_envs, self.envs.single_observation_space, self.envs.single_action_space)
 
     def reset(self):
         """Observations (num_envs, ...); with the seed of the last call of seed()."""

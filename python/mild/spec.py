@@ -2,7 +2,9 @@
 import os
 import pathlib
 
-PLUGIN = "mild.ground"
+from . import _mujoco
+
+PLUGIN, FILE = "mild.ground", "libmild_plugin.so"
 
 
 def attach(spec, feet, ground="sand_loose", *, exclude=True, sensor=None, name="ground", library=None, **attributes):
@@ -51,17 +53,19 @@ def exclude_world(spec, feet):
 
 
 def load_plugin(library=None):
-    """Loads the engine plugin, for models whose XML names it: `library`, else $MILD_PLUGIN, else the package's own. A process
-    that has it may do so again. Raises RuntimeError when there is no such file, or when it is for another MuJoCo."""
+    """Loads the engine plugin, for models whose XML names it: `library`, else $MILD_PLUGIN, else the package's own for the
+    MuJoCo that is imported. A process that has it may do so again. Raises RuntimeError when there is no such file, or when it
+    is for another MuJoCo."""
     import mujoco
 
-    path = pathlib.Path(library or os.environ.get("MILD_PLUGIN") or pathlib.Path(__file__).parent / "lib" / "libmild_plugin.so")
+    named = library or os.environ.get("MILD_PLUGIN")
+    path = pathlib.Path(named) if named else _mujoco.folder(FILE, "plugin") / FILE
     if not path.is_file():
         raise RuntimeError(f"library: there is no plugin '{path}'; `make plugin` builds it")
     try:
         mujoco.mj_loadPluginLibrary(str(path.resolve()))
     except Exception as error:
-        raise RuntimeError(f"library: {path} does not go with MuJoCo {mujoco.__version__}: {error}") from None
+        raise RuntimeError(f"library: {path} does not go with MuJoCo {mujoco.mj_versionString()}: {error}") from None
 
 
 def ground_of(ground):

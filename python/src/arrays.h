@@ -104,6 +104,9 @@ struct Array {
     nb::ndarray<> writable;
     nb::ndarray<nb::ro> readable;
     void *data = nullptr; /* NULL: no array */
+    size_t bytes = 0;
+    const char *name = nullptr; /* of the argument */
+    bool write = false;
 };
 
 template <typename Any> void check_array(const Any &array, const Wanted &wanted) {
@@ -143,9 +146,12 @@ template <typename Any> void check_array(const Any &array, const Wanted &wanted)
 /* The array of an argument. */
 inline Array take_array(nb::handle object, const Wanted &wanted) {
     Array array;
+    array.name = wanted.name;
+    array.write = wanted.write;
     if (wanted.write && nb::try_cast<nb::ndarray<>>(object, array.writable, false)) {
         check_array(array.writable, wanted);
         array.data = array.writable.data();
+        array.bytes = array.writable.nbytes();
         return array;
     }
     if (!nb::try_cast<nb::ndarray<nb::ro>>(object, array.readable, false)) {
@@ -157,6 +163,7 @@ inline Array take_array(nb::handle object, const Wanted &wanted) {
         raise(PyExc_ValueError, std::string(wanted.name) + ": it is read-only");
     }
     array.data = const_cast<void *>(static_cast<const void *>(array.readable.data()));
+    array.bytes = array.readable.nbytes();
     return array;
 }
 
@@ -167,6 +174,26 @@ inline Array take_optional(nb::handle object, const Wanted &wanted) {
 
 template <typename T> T *pointer(const Array &array) {
     return static_cast<T *>(array.data);
+}
+
+/* Raises ValueError when both have a byte in common, and one of them is written. */
+inline void check_apart(const Array &one, const Array &other) {
+    const uintptr_t a = (uintptr_t)one.data, b = (uintptr_t)other.data;
+    if ((one.write || other.write) && one.bytes && other.bytes && a < b + other.bytes &&
+        b < a + one.bytes) {
+        raise(PyExc_ValueError, std::string(one.name) + ", " + other.name +
+                                    ": they share memory; give " +
+                                    (other.write ? other.name : one.name) + " an array of its own");
+    }
+}
+
+/* Of every two of them. */
+inline void check_apart(const std::vector<const Array *> &arrays) {
+    for (size_t i = 0; i < arrays.size(); i++) {
+        for (size_t k = 0; k < i; k++) {
+            check_apart(*arrays[k], *arrays[i]);
+        }
+    }
 }
 
 /* One thread at a time: raises RuntimeError when another is inside. */

@@ -1,6 +1,7 @@
 /* The module mild._envs: environments of the task (src/envs/envs.h) on arrays of the caller. */
 #include "arrays.h"
 
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -15,6 +16,7 @@ extern "C" {
 
 /* Where results of a step go. Its arrays are kept as long as it is. */
 struct Buffers {
+    MildEnvsShape shape = {}; /* of the environments that they are for */
     EnvsStep step = {};
     std::vector<Array> arrays;
 };
@@ -111,6 +113,12 @@ static std::unique_ptr<Buffers> make_buffers(const Envs &envs, nb::handle histor
     step.done = flag_row(*buffers, done, "done", envs);
     step.timeout = flag_row(*buffers, timeout, "timeout", envs);
     step.valid = flag_row(*buffers, valid, "valid", envs);
+    buffers->shape = shape;
+    std::vector<const Array *> arrays;
+    for (const Array &array : buffers->arrays) {
+        arrays.push_back(&array);
+    }
+    check_apart(arrays);
     return buffers;
 }
 
@@ -118,10 +126,10 @@ static std::unique_ptr<Buffers> make_buffers(const Envs &envs, nb::handle histor
 
 /* Buffers are of these environments when they were made with their shape. */
 static void check_buffers(const Envs &envs, const Buffers &buffers) {
-    const MildEnvsShape &shape = envs.shape;
-    const nb::ndarray<> &history = buffers.arrays[0].writable;
-    if ((int)history.shape(0) != shape.envs || (int)history.shape(1) != shape.frames ||
-        (int)history.shape(2) != shape.observation) {
+    const MildEnvsShape &a = envs.shape, &b = buffers.shape;
+    if (a.envs != b.envs || a.frames != b.frames || a.observation != b.observation ||
+        a.critic != b.critic || a.estimates != b.estimates || a.rewards != b.rewards ||
+        a.device != b.device) {
         raise(PyExc_ValueError, "buffers: they were made for environments of another shape");
     }
 }
@@ -140,6 +148,21 @@ static void reset(Envs &envs, Buffers &buffers, uintptr_t stream) {
     envs.begun = true;
 }
 
+/* On the CPU; on a device the caller's. One NaN would spread over the robot and into statistics. */
+static void check_action(const Envs &envs, const Array &action) {
+    const MildEnvsShape &shape = envs.shape;
+    const float *at = pointer<float>(action);
+    for (int i = 0; shape.device < 0 && i < shape.envs; i++) {
+        for (int k = 0; k < shape.actions; k++, at++) {
+            if (!std::isfinite(*at)) {
+                raise(PyExc_ValueError, "action: " + std::to_string(*at) + " at [" +
+                                            std::to_string(i) + ", " + std::to_string(k) +
+                                            "], but it must be finite");
+            }
+        }
+    }
+}
+
 static void step(Envs &envs, nb::handle action, Buffers &buffers, uintptr_t stream) {
     Entered entered(envs.busy, "Envs.step");
     MildEnvs *at = open_envs(envs);
@@ -150,6 +173,10 @@ static void step(Envs &envs, nb::handle action, Buffers &buffers, uintptr_t stre
     const Array actions = take_array(
         action,
         {"action", nb::dtype<float>(), {envs.shape.envs, envs.shape.actions}, envs.shape.device});
+    check_action(envs, actions);
+    for (const Array &array : buffers.arrays) {
+        check_apart(actions, array);
+    }
     EnvsStep call = buffers.step;
     call.action = pointer<float>(actions);
     MildError error = {};
@@ -240,13 +267,14 @@ NB_MODULE(_envs, module) {
              "critic\n(envs, critic), frame (envs, observation), estimate (envs, estimates), last "
              "and\nlast_critic: as history and critic at the end of episodes, terms (envs, "
              "rewards): of these,\nreward (envs,). bool or uint8 (envs,): done, timeout, valid. On "
-             "the device of the\nenvironments. Raises TypeError or ValueError with the name of the "
-             "array that does not fit.")
+             "the device of the\nenvironments, no two in the same memory. Raises TypeError or "
+             "ValueError with the name of the array that does not fit.")
         .def("reset", reset, nb::arg("buffers"), nb::arg("stream") = 0,
              "New episodes; writes history, critic, frame and estimate.")
         .def("step", step, nb::arg("action").none(), nb::arg("buffers"), nb::arg("stream") = 0,
-             "A policy step. action: (envs, actions) float32 in units of the action scale. "
-             "Environments\nthat ended begin anew in the same step.")
+             "A policy step. action: (envs, actions) float32 in units of the action scale; on the "
+             "CPU\nValueError for one that is not finite. Environments that ended begin anew in "
+             "the same step.")
         .def("statistics", statistics, nb::arg("stream") = 0,
              "Means over the episodes that ended since the last call.")
         .def("mirror", mirror,

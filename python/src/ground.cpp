@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include <nanobind/stl/tuple.h>
+
 struct Ground {
     nb::object soles; /* tuple of Sole */
     Terrain terrain;
@@ -26,8 +28,8 @@ struct Ground {
     }
 };
 
-MildGround *block_of(Ground &ground) {
-    return ground.ground;
+MildGround *block_of(nb::handle ground) {
+    return made_of<Ground>(ground, "ground").ground;
 }
 
 /* ---- creation ---- */
@@ -41,7 +43,8 @@ static void set_solver(Ground &ground, const std::string &solver) {
 
 static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, double dt, int tiles,
                  const std::string &solver, double tolerance, int max_iterations) {
-    const std::vector<const MildSole *> made = soles_of(soles);
+    const nb::tuple kept(soles); /* a sequence may give others the next time */
+    const std::vector<const MildSole *> made = soles_of(kept);
     if (tiles < 0 || tiles > MILD_IMPRINT_TILES_MAX) {
         raise(PyExc_ValueError, "tiles = " + std::to_string(tiles) + " is outside 0 .. " +
                                     std::to_string(MILD_IMPRINT_TILES_MAX));
@@ -63,7 +66,7 @@ static void make(Ground *at, const nb::sequence &soles, nb::handle terrain, doub
             raise(PyExc_MemoryError, "Ground: out of memory");
         }
         ground->ground = mild_ground_init_imprints(ground->block, made.data(), ground->feet, tiles);
-        ground->soles = nb::tuple(soles);
+        ground->soles = kept;
         ground->terrain = under;
         ground->tiles = tiles;
         ground->input.dt = dt;
@@ -139,18 +142,34 @@ static nb::tuple keep(Ground &ground) {
                           nb::bytes(&input, sizeof input));
 }
 
-static void restore(Ground *ground, const nb::tuple &kept) {
-    make(ground, nb::borrow<nb::sequence>(kept[0]), kept[1], nb::cast<double>(kept[2]),
-         nb::cast<int>(kept[3]), nb::cast<std::string>(kept[4]), nb::cast<double>(kept[5]),
-         nb::cast<int>(kept[6]));
-    const nb::bytes numbers = nb::borrow<nb::bytes>(kept[8]);
-    set_state(*ground, nb::borrow<nb::bytes>(kept[7]));
-    if (numbers.size() == sizeof ground->input) {
-        const MildContactInput made = ground->input;
-        std::memcpy(&ground->input, numbers.c_str(), sizeof ground->input);
-        ground->input.feet = made.feet;
-        ground->input.solver = made.solver;
-        ground->input.dt = made.dt;
+/* What `keep` made: soles, terrain, dt, tiles, solver, tolerance, max_iterations, state, input. */
+using Kept = std::tuple<nb::sequence, nb::object, double, int, std::string, double, int, nb::bytes,
+                        nb::bytes>;
+
+/* Takes the numbers that a caller can write; the others are arguments. */
+static void restore_input(Ground &ground, const nb::bytes &numbers) {
+    const MildContactInput made = ground.input;
+    if (numbers.size() != sizeof made) {
+        raise(PyExc_ValueError, "Ground: an input of " + std::to_string(numbers.size()) +
+                                    " bytes, but it must have " + std::to_string(sizeof made));
+    }
+    std::memcpy(&ground.input, numbers.c_str(), sizeof made);
+    ground.input.feet = made.feet;
+    ground.input.dt = made.dt;
+    ground.input.solver = made.solver;
+    ground.input.tolerance = made.tolerance;
+    ground.input.max_iterations = made.max_iterations;
+}
+
+static void restore(Ground *ground, const Kept &kept) {
+    const auto &[soles, terrain, dt, tiles, solver, tolerance, iterations, state, input] = kept;
+    make(ground, soles, terrain, dt, tiles, solver, tolerance, iterations);
+    try {
+        restore_input(*ground, input);
+        set_state(*ground, state);
+    } catch (...) {
+        ground->~Ground();
+        throw;
     }
 }
 
@@ -162,7 +181,7 @@ using Results = nb::ndarray<nb::numpy, const double>;
 template <typename Choose>
 static auto input_array(Choose choose, std::vector<size_t> (*shape)(size_t feet)) {
     return [choose, shape](nb::handle self) {
-        Ground &ground = nb::cast<Ground &>(self);
+        Ground &ground = made_of<Ground>(self, "self");
         const std::vector<size_t> wanted = shape((size_t)ground.feet);
         return Numbers(choose(ground.input), wanted.size(), wanted.data(), self);
     };
@@ -171,7 +190,7 @@ static auto input_array(Choose choose, std::vector<size_t> (*shape)(size_t feet)
 /* A number or a vector of every MildFootResult. */
 template <typename Choose> static auto foot_array(Choose choose, size_t width) {
     return [choose, width](nb::handle self) {
-        Ground &ground = nb::cast<Ground &>(self);
+        Ground &ground = made_of<Ground>(self, "self");
         const size_t shape[] = {(size_t)ground.feet, width};
         const int64_t strides[] = {sizeof(MildFootResult) / sizeof(double), 1};
         static_assert(sizeof(MildFootResult) % sizeof(double) == 0, "strides are in doubles");
@@ -180,7 +199,7 @@ template <typename Choose> static auto foot_array(Choose choose, size_t width) {
 }
 
 static nb::dict elements(nb::handle self, int foot) {
-    Ground &ground = nb::cast<Ground &>(self);
+    Ground &ground = made_of<Ground>(self, "self");
     Entered entered(ground.busy, "Ground.elements");
     if (foot < 0 || foot >= ground.feet) {
         raise(PyExc_IndexError,
@@ -210,7 +229,7 @@ static nb::dict elements(nb::handle self, int foot) {
 }
 
 static Results depths(nb::handle self, int foot) {
-    Ground &ground = nb::cast<Ground &>(self);
+    Ground &ground = made_of<Ground>(self, "self");
     if (foot < 0 || foot >= ground.feet) {
         raise(PyExc_IndexError,
               "foot = " + std::to_string(foot) + ", but there are " + std::to_string(ground.feet));
@@ -286,7 +305,7 @@ static void bind_result(nb::class_<Ground> &type) {
         .def_prop_ro(
             "new_velocity",
             [](nb::handle self) {
-                Ground &ground = nb::cast<Ground &>(self);
+                Ground &ground = made_of<Ground>(self, "self");
                 return Results(ground.result.velocity, {(size_t)ground.feet, 6}, self);
             },
             "Twists at the ankles after the step [m/s, rad/s]: (feet, 6).")
@@ -355,6 +374,7 @@ void bind_ground(nb::module_ &module) {
 
 NB_MODULE(_ground, module) {
     module.doc() = "The ground of mild (include/mild), without copies of arrays.";
+    module.attr("__version__") = MILD_VERSION;
     bind_material(module);
     bind_terrain(module);
     bind_ground(module);

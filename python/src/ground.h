@@ -49,11 +49,22 @@ void set_fields(const MildField *fields, int count, void *def, const nb::kwargs 
 const MildMap *map_of(nb::handle object);
 /* A terrain or the material of a uniform one. */
 Terrain terrain_of(nb::handle object);
-/* Soles from a sequence. */
-std::vector<const MildSole *> soles_of(const nb::sequence &soles);
+/* Soles of a tuple, which keeps them. */
+std::vector<const MildSole *> soles_of(const nb::tuple &soles);
 double positive(double value, const char *name);
-/* The ground in a block, for mild_batch_load. */
-MildGround *block_of(Ground &ground);
+/* The ground in the block of a Ground, for mild_batch_load. */
+MildGround *block_of(nb::handle ground);
+/* What an argument holds. Raises TypeError for another type, and for an object that was made by
+ * __new__ alone. */
+template <typename T> T &made_of(nb::handle object, const char *name) {
+    if (!nb::isinstance<T>(object) || !nb::inst_ready(object)) {
+        raise(PyExc_TypeError, std::string(name) + ": a " + type_text(object) +
+                                   (nb::isinstance<T>(object) ? " that was never made" : "") +
+                                   ", but it must be a " +
+                                   utf8(nb::type_name(nb::type<T>()), "type"));
+    }
+    return *nb::inst_ptr<T>(object);
+}
 
 void bind_material(nb::module_ &module);
 void bind_terrain(nb::module_ &module);

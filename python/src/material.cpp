@@ -57,7 +57,7 @@ void set_fields(const MildField *fields, int count, void *def, const nb::kwargs 
 
 MildMaterial material_of(nb::handle object, const char *name) {
     if (nb::isinstance<Material>(object)) {
-        return nb::cast<Material &>(object).numbers;
+        return made_of<Material>(object, name).numbers;
     }
     MildMaterial material = mild_material_default();
     if (!nb::isinstance<nb::str>(object)) {
@@ -170,7 +170,8 @@ static Material match(const Material &material, const std::string &model, const 
 }
 
 static bool equal(const Material &a, nb::object b) {
-    return nb::isinstance<Material>(b) && all_fields(a).equal(all_fields(nb::cast<Material &>(b)));
+    return nb::isinstance<Material>(b) &&
+           all_fields(a).equal(all_fields(made_of<Material>(b, "other")));
 }
 
 void bind_material(nb::module_ &module) {

@@ -124,7 +124,7 @@ static Press run(nb::handle material, const Sole &sole, nb::handle depth, nb::ha
 
 template <typename T> static auto column(T PressRow::*member) {
     return [member](nb::handle self) {
-        const PressResult &result = nb::cast<Press &>(self).result;
+        const PressResult &result = made_of<Press>(self, "self").result;
         const size_t shape[] = {(size_t)result.count};
         const int64_t strides[] = {(int64_t)(sizeof(PressRow) / sizeof(T))};
         static_assert(sizeof(PressRow) % sizeof(T) == 0, "strides are in elements");

@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include <nanobind/stl/tuple.h>
+
 extern "C" {
 #include "lab/press.h"
 }
@@ -14,14 +16,10 @@ static nb::object again(const char *name) {
 
 /* ---- soles ---- */
 
-std::vector<const MildSole *> soles_of(const nb::sequence &soles) {
+std::vector<const MildSole *> soles_of(const nb::tuple &soles) {
     std::vector<const MildSole *> made;
     for (nb::handle sole : soles) {
-        if (!nb::isinstance<Sole>(sole)) {
-            raise(PyExc_TypeError,
-                  std::string("soles: a ") + type_text(sole) + " among them, but all must be Sole");
-        }
-        made.push_back(nb::cast<Sole &>(sole).made);
+        made.push_back(made_of<Sole>(sole, "soles").made);
     }
     if (made.empty() || made.size() > MILD_FEET_MAX) {
         raise(PyExc_ValueError, "soles: " + std::to_string(made.size()) +
@@ -56,7 +54,7 @@ static Sole make_plate(double length, double width) {
 }
 
 static Sole make_concentric(nb::handle self) {
-    const Sole &sole = nb::cast<Sole &>(self);
+    const Sole &sole = made_of<Sole>(self, "self");
     MildError error = {};
     MildSole *made = mild_sole_concentric(sole.made, &error);
     check(made ? MILD_OK : error.status, error);
@@ -66,7 +64,7 @@ static Sole make_concentric(nb::handle self) {
 using Centres = nb::ndarray<nb::numpy, const double, nb::ndim<1>>;
 
 static Centres centres(nb::handle self, const double *at) {
-    return Centres(at, {(size_t)mild_sole_elements(nb::cast<Sole &>(self).made)}, self);
+    return Centres(at, {(size_t)mild_sole_elements(made_of<Sole>(self, "self").made)}, self);
 }
 
 static void bind_sole(nb::module_ &module) {
@@ -102,11 +100,15 @@ static void bind_sole(nb::module_ &module) {
             "Plane of the sole in the foot frame [m].")
         .def_prop_ro(
             "x",
-            [](nb::handle self) { return centres(self, mild_sole_x(nb::cast<Sole &>(self).made)); },
+            [](nb::handle self) {
+                return centres(self, mild_sole_x(made_of<Sole>(self, "self").made));
+            },
             "Centres of the elements in the foot frame: (elements,) float64 [m], read-only.")
         .def_prop_ro(
             "y",
-            [](nb::handle self) { return centres(self, mild_sole_y(nb::cast<Sole &>(self).made)); },
+            [](nb::handle self) {
+                return centres(self, mild_sole_y(made_of<Sole>(self, "self").made));
+            },
             "The same along y.")
         .def("__reduce__", [](const Sole &sole) { return sole.recipe; });
 }
@@ -203,10 +205,7 @@ static std::vector<MildMaterial> materials_of(nb::handle object) {
 }
 
 const MildMap *map_of(nb::handle object) {
-    if (!object.is_none() && !nb::isinstance<Map>(object)) {
-        raise(PyExc_TypeError, "map: it must be a Map or None");
-    }
-    return object.is_none() ? nullptr : nb::cast<Map &>(object).made;
+    return object.is_none() ? nullptr : made_of<Map>(object, "map").made;
 }
 
 static void set_map(Terrain &terrain, nb::object map) {
@@ -233,7 +232,7 @@ static Terrain make_terrain(nb::handle materials, nb::object map, double height,
 
 Terrain terrain_of(nb::handle object) {
     if (nb::isinstance<Terrain>(object)) {
-        return nb::cast<Terrain &>(object);
+        return made_of<Terrain>(object, "terrain");
     }
     return make_terrain(object, nb::none(), 0, 0, 0);
 }
@@ -271,12 +270,16 @@ static nb::tuple keep_terrain(const Terrain &terrain) {
                           patches);
 }
 
-static void restore_terrain(Terrain *terrain, const nb::tuple &kept) {
-    Terrain made = make_terrain(kept[0], kept[1], nb::cast<double>(kept[2]),
-                                nb::cast<double>(kept[3]), nb::cast<double>(kept[4]));
-    for (nb::handle patch : nb::borrow<nb::sequence>(kept[5])) {
-        add_patch(made, nb::cast<double>(patch[0]), nb::cast<double>(patch[1]),
-                  nb::cast<double>(patch[2]), nb::cast<double>(patch[3]), nb::cast<int>(patch[4]));
+/* What keep_terrain made: materials, map, height, map_x, map_y, patches. */
+using KeptPatch = std::tuple<double, double, double, double, int>;
+using KeptTerrain =
+    std::tuple<nb::object, nb::object, double, double, double, std::vector<KeptPatch>>;
+
+static void restore_terrain(Terrain *terrain, const KeptTerrain &kept) {
+    const auto &[materials, map, height, x, y, patches] = kept;
+    Terrain made = make_terrain(materials, map, height, x, y);
+    for (const auto &[x_min, x_max, y_min, y_max, material] : patches) {
+        add_patch(made, x_min, x_max, y_min, y_max, material);
     }
     new (terrain) Terrain(made);
 }

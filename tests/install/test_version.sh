@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# One version: CMakeLists.txt, CITATION.cff and CHANGELOG.md agree, and the program's version follows commit and tag as
+# One version: CMakeLists.txt, CITATION.cff and CHANGELOG.md agree, the Python package takes it from the first, and the program's version follows commit and tag as
 # cmake/Version.cmake says. Usage: test_version.sh SOURCE_FOLDER
 source "$(dirname "$0")/../kit.sh" "$1"
 source=$mild # no program here
@@ -9,6 +9,17 @@ version=$(sed -n 's/^project(mild VERSION \([0-9.]*\) .*/\1/p' "$source/CMakeLis
 [ "$(sed -n 's/^version: //p' "$source/CITATION.cff")" = "$version" ] || fail "CITATION.cff does not say $version"
 [ "$(sed -n 's/^## \[\([0-9.]*\)\].*/\1/p' "$source/CHANGELOG.md" | head -1)" = "$version" ] ||
     fail "the newest version in CHANGELOG.md is not $version"
+
+# What pip and `mild.__version__` say comes from CMakeLists.txt (tests/python/test_spec.py asks the package).
+python3 - "$source" <<'END' >package || fail "pyproject.toml: $(cat package)"
+import pathlib, re, sys, tomllib
+source = pathlib.Path(sys.argv[1])
+table = tomllib.loads((source / "pyproject.toml").read_text())
+assert "version" not in table["project"] and table["project"]["dynamic"] == ["version"], "a version of its own"
+said = table["tool"]["scikit-build"]["metadata"]["version"]
+print(re.search(said["regex"], (source / said["input"]).read_text())["value"])
+END
+[ "$(cat package)" = "$version" ] || fail "pyproject.toml finds $(cat package), not $version"
 
 # says PATTERN: what the header says of the folder `tree`.
 says() {

@@ -7,7 +7,7 @@ root=$(cd "$(dirname "$0")/../.." && pwd)
 folder=$(realpath "$2")/mujoco-$1
 export PYTHONDONTWRITEBYTECODE=1
 "$root/.venv/bin/python" -m venv "$folder/venv"
-"$folder/venv/bin/python" -m pip install --quiet --disable-pip-version-check "mujoco==$1"
+"$folder/venv/bin/python" -m pip install --quiet --disable-pip-version-check "mujoco==$1" # any, so without a hash
 mujoco=$("$folder/venv/bin/python" -c 'import mujoco; print(mujoco.__path__[0])')
 cmake -S "$root" -B "$folder/plugin" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_APP=OFF -DMILD_TESTS=OFF \
     -DMILD_PLUGIN=ON "-DMUJOCO_ROOT=$mujoco"

@@ -1,6 +1,8 @@
 """The environments under rsl_rl and Stable-Baselines3; needs PyTorch. `make python-check` runs it."""
+import copy
 import importlib.metadata
 import pathlib
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -10,6 +12,7 @@ import torch
 from rsl_rl.runners import OnPolicyRunner
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
+from stable_baselines3.common.vec_env import VecNormalize
 
 import mild
 from mild import gym, rsl_rl, sb3
@@ -91,6 +94,33 @@ class RslRl(unittest.TestCase):
         self.assertFalse(torch.equal(moves[4:], actions))
         env.close()
 
+    def test_statistics_are_saved(self):
+        """A runner that loads a model_N.pt acts as the one that saved it: the statistics of observations are among the weights."""
+        env, actions = rsl_rl.Env(8, overrides=SHORT), []
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+            config = {**CONFIG, "logger": "tensorboard"}
+            trained, fresh = (OnPolicyRunner(env, copy.deepcopy(config), log_dir=folder, device="cpu") for _ in range(2))
+            trained.learn(2)
+            trained.save(folder + "/m.pt")
+            fresh.load(folder + "/m.pt")
+            for runner in (trained, fresh):
+                actions.append(runner.get_inference_policy(device="cpu")(env.get_observations()))
+        self.assertTrue(torch.equal(*actions))
+        env.close()
+
+    def test_config_holds(self):
+        """configs/go1.ini is a Go1, with its number of environments unless an argument says otherwise."""
+        env, other = (rsl_rl.Env(4, config="configs/go1.ini", **keys) for keys in ({}, {"robot": "sa01"}))
+        for _ in range(5):
+            one, two = (each.step(torch.full((4, 12), 0.3))[0]["policy"] for each in (env, other))
+        self.assertFalse(torch.equal(one, two))
+        with self.assertRaisesRegex(ValueError, r"action: nan at \[1, 7\]"):
+            actions = torch.zeros(4, 12)
+            actions[1, 7] = torch.nan
+            env.step(actions)
+        env.close()
+        other.close()
+
     def test_misuse(self):
         env = rsl_rl.Env(2)
         with self.assertRaisesRegex(ValueError, "action"):
@@ -131,6 +161,32 @@ class StableBaselines(unittest.TestCase):
         self.assertGreater(ended, 4)
         env.close()
         other.close()
+
+
+    def test_example(self):
+        """What examples/python/train_sb3.py saves walks as what it has trained: policy and statistics of the observations. A folder
+        that is there is left alone."""
+        example = pathlib.Path(__file__).parents[2] / "examples/python/train_sb3.py"
+        with tempfile.TemporaryDirectory() as folder:
+            def run(*arguments):
+                return subprocess.run([sys.executable, example, *arguments], cwd=folder, capture_output=True, text=True)
+            trained = run("2000", "--envs", "8", "--out", "o")
+            self.assertEqual(trained.returncode, 0, trained.stderr)
+            said = trained.stdout.splitlines()[-1]
+            self.assertRegex(said, "of 10 stay on their feet for 20 s")
+            self.assertEqual(run("--load", "o").stdout.splitlines()[-1], said)
+            kept = {path.name: path.read_bytes() for path in pathlib.Path(folder, "o").iterdir()}
+            self.assertEqual(set(kept), {"policy.zip", "normalize.pkl"})
+            again = run("2000", "--out", "o")
+            self.assertEqual((again.returncode, "o exists" in again.stderr), (2, True))
+            self.assertEqual(kept, {path.name: path.read_bytes() for path in pathlib.Path(folder, "o").iterdir()})
+            model, env = PPO.load(pathlib.Path(folder, "o/policy.zip")), sb3.Env(2, config="configs/quick.ini")
+            scaled = VecNormalize.load(pathlib.Path(folder, "o/normalize.pkl"), env)
+            self.assertGreater(scaled.obs_rms.count, 1999)
+            raw = env.reset()
+            self.assertGreater(np.abs(model.predict(scaled.normalize_obs(raw), deterministic=True)[0]
+                                      - model.predict(raw, deterministic=True)[0]).max(), 0.001)
+            env.close()
 
 
 class Tensors(unittest.TestCase):

@@ -105,6 +105,35 @@ class Batch(unittest.TestCase):
                 with self.assertRaisesRegex((ValueError, TypeError), "^" + name + ":"):
                     self.batch.step(**Arrays(self.batch, self.rng).all(**{name: bad}))
 
+    def test_shared_memory(self):
+        """Every two arrays of which one is written: refused by name when they have a byte in common, but for the two pairs that
+        batch.h allows, with the numbers that they have apart."""
+        extra = {"material": np.zeros(6, np.int32), "height": np.zeros(6, np.float32), "map_origin": np.zeros((6, 2), np.float32)}
+        plain = Arrays(self.batch, self.rng).all(**extra)
+        outputs = list(Arrays(self.batch, self.rng).outputs)
+        allowed, pairs = (("velocity", "wrench"), ("free_velocity", "new_velocity")), 0
+        self.batch.step(**{name: array.copy() for name, array in plain.items()} | {name: plain[name] for name in outputs}, advance=False)
+        for name in plain:
+            for out in outputs:
+                if name == out:
+                    continue
+                for shift in (0, 4):  # the same, and from its second number on
+                    memory = np.zeros(plain[name].nbytes + plain[out].nbytes + 8, np.uint8)
+                    call = {key: array.copy() for key, array in plain.items()}
+                    for key, start in ((name, 0), (out, shift)):
+                        view = memory[start : start + plain[key].nbytes].view(plain[key].dtype).reshape(plain[key].shape)
+                        if key == name:
+                            view[...] = plain[key] if key not in outputs else 0
+                        call[key] = view
+                    if (name, out) in allowed and not shift:
+                        self.batch.step(**call, advance=False)
+                        np.testing.assert_array_equal(call[out], plain[out])
+                        continue
+                    with self.assertRaisesRegex(ValueError, rf"^({name}, {out}|{out}, {name}): they share memory"):
+                        self.batch.step(**call)
+                    pairs += 1
+        self.assertEqual(pairs, 2 * len(outputs) * (len(plain) - 1) - 2)
+
     def test_arguments(self):
         arrays = Arrays(self.batch, self.rng)
         with self.assertRaisesRegex(ValueError, "material: 5"):

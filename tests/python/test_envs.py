@@ -1,6 +1,7 @@
 """The Gymnasium environments: Gymnasium's checkers, episodes, seeds, rewards, memory, misuse."""
 import os
 import pickle
+import tempfile
 import unittest
 import warnings
 
@@ -22,6 +23,24 @@ def make_vec(count=8, overrides=None, **keys):
 def actions_of(env, step):
     return (1.5 * np.sin(0.3 * step + np.arange(env.action_space.shape[0] * env.action_space.shape[-1]))).reshape(
         env.action_space.shape).astype(np.float32)
+
+
+def run_of(task):
+    """Observations of environments after five steps, which robots tell apart; the environments are closed."""
+    arrays = {name: np.empty(task.envs, bool) for name in ("done", "timeout", "valid")}
+    history = np.empty((task.envs, task.frames, task.observation), np.float32)
+    buffers = task.buffers(history=history, reward=np.empty(task.envs, np.float32), **arrays)
+    task.reset(buffers)
+    for _ in range(5):
+        task.step(np.full((task.envs, task.actions), 0.3, np.float32), buffers)
+    task.close()
+    return history
+
+
+def stepped(env, seed):
+    """The same of a Gymnasium environment."""
+    env.reset(seed=seed)
+    return [env.step(np.full(env.action_space.shape, 0.3, np.float32))[0] for _ in range(5)][-1]
 
 
 class Checkers(unittest.TestCase):
@@ -227,7 +246,6 @@ class Misuse(unittest.TestCase):
         for action in ("fast", None, [[object()] * 12] * 2):
             with self.assertRaises((ValueError, TypeError)):
                 env.step(action)
-        env.step(np.full((2, 12), np.nan))
         for seed in (-1, 2**64, 1.5, "one", [1, 2]):
             with self.assertRaisesRegex((ValueError, TypeError), "seed"):
                 env.reset(seed=seed)
@@ -238,6 +256,59 @@ class Misuse(unittest.TestCase):
         for call in (lambda: env.step(actions_of(env, 0)), env.reset, env.statistics):
             with self.assertRaisesRegex(RuntimeError, "closed"):
                 call()
+
+    def test_actions(self):
+        """An action that is not finite is refused with its place, and the step was not made."""
+        for bad in (np.nan, np.inf, -np.inf):
+            env, twin = make_vec(3), make_vec(3)
+            env.reset(seed=1), twin.reset(seed=1)
+            wrong = actions_of(env, 0)
+            wrong[1, 7] = bad
+            with self.assertRaisesRegex(ValueError, r"^action: -?(nan|inf) at \[1, 7\], but it must be finite$"):
+                env.step(wrong)
+            np.testing.assert_array_equal(env.step(actions_of(env, 1))[0], twin.step(actions_of(env, 1))[0])
+            env.close(), twin.close()
+            single = gymnasium.make("mild/SA01-v0", overrides=SHORT, disable_env_checker=True)
+            single.reset()
+            with self.assertRaisesRegex(ValueError, r"action: .* at \[0, 7\]"):
+                single.step(wrong[1])
+            single.close()
+
+    def test_config_holds(self):
+        """What a config says of robot, number, threads and seed holds unless an argument says otherwise."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "mine.ini")
+            with open(path, "w", encoding="utf-8") as file:
+                file.write("[train]\nrobot = go1\nenvs = 3\nseed = 77\nthreads = 1\n")
+            runs = {name: run_of(envs.open_envs(**keys)) for name, keys in (
+                ("config", {"config": path}), ("said", {"num_envs": 3, "robot": "go1", "seed": 77, "config": path}),
+                ("sa01", {"config": path, "robot": "sa01"}), ("seed", {"config": path, "seed": 78}),
+                ("two", {"config": path, "num_envs": 2}), ("other", {"num_envs": 3, "threads": 1}))}
+            np.testing.assert_array_equal(runs["config"], runs["said"])
+            self.assertEqual((len(runs["config"]), len(runs["two"])), (3, 2))
+            self.assertFalse(np.array_equal(runs["config"], runs["sa01"]) or np.array_equal(runs["config"], runs["seed"]))
+            self.assertFalse(np.array_equal(runs["sa01"], runs["other"]))  # its seed
+            env = gym.VectorEnv(config=path)
+            self.assertEqual((env.num_envs, env.action_space.shape), (3, (3, 12)))
+            np.testing.assert_array_equal(stepped(env, 77).reshape(runs["config"].shape), runs["config"])
+            env.close()
+            with self.assertRaisesRegex(ValueError, "train.robot"):
+                envs.open_envs(robot="go1", overrides={"train.robot": "sa01"})
+            np.testing.assert_array_equal(run_of(envs.open_envs(config=path, overrides={"train.seed": 78})), runs["seed"])
+            with open(path, "a", encoding="utf-8") as file:
+                file.write("robots = batch\ndevice = cuda\n")
+            with self.assertRaisesRegex(ValueError, "train.device|CUDA|cuda"):
+                gym.VectorEnv(config=path)
+
+    def test_robot_of_the_shipped_config(self):
+        """configs/go1.ini is a Go1, by every way to open it."""
+        seen = [gym.VectorEnv(2, config="configs/go1.ini", **keys) for keys in ({}, {"robot": "go1"}, {"robot": "sa01"})]
+        seen.append(gymnasium.make_vec("mild/SA01-v0", num_envs=2, config="configs/go1.ini"))
+        first, named, other, made = (stepped(env, 3) for env in seen)
+        np.testing.assert_array_equal(first, named)
+        np.testing.assert_array_equal(first, made)
+        self.assertFalse(np.array_equal(first, other))
+        [env.close() for env in seen]
 
     def test_batch_engine(self):
         """Its environments cannot tell the end of an episode, and say so."""
@@ -259,6 +330,14 @@ class Misuse(unittest.TestCase):
                         np.asfortranarray(array) if array.ndim > 1 else array[None]):
                 with self.assertRaisesRegex((ValueError, TypeError), "^" + name + ":"):
                     task.buffers(**{**good, name: bad})
+        names = list(good)
+        for one, other in ((a, b) for i, a in enumerate(names) for b in names[:i]):
+            memory = np.zeros(good[one].nbytes + good[other].nbytes, np.uint8)
+            shared = {name: memory[: good[name].nbytes].view(good[name].dtype).reshape(good[name].shape) for name in (one, other)}
+            with self.assertRaisesRegex(ValueError, rf"^({one}, {other}|{other}, {one}): they share memory"):
+                task.buffers(**{**good, **shared})
+        with self.assertRaisesRegex(ValueError, "action.*share memory"):
+            task.step(good["history"].reshape(-1)[:36].reshape(3, 12), task.buffers(**good))
         with self.assertRaisesRegex(ValueError, "buffers"):
             task.step(np.zeros((3, 12), np.float32), envs.open_envs(2).buffers(**gym.VectorEnv(2)._arrays()))
         with self.assertRaises(TypeError):

@@ -4,12 +4,17 @@ import pathlib
 import re
 import subprocess
 import sys
+import tarfile
+import tempfile
+import tomllib
 import unittest
+import unittest.mock
 
 import mujoco
 import numpy as np
 
 import mild
+from mild import _mujoco
 
 PLATE = """<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbody>
   <body name="plate" pos="0 0 0.02"><freejoint/>
@@ -17,6 +22,51 @@ PLATE = """<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbod
     <site name="under" pos="0 0 -0.01"/></body></worldbody></mujoco>"""
 WALK = pathlib.Path(__file__).resolve().parents[2] / "examples/python/walk.py"
 PLUGIN = os.environ.get("MILD_PLUGIN", "")
+
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+class Versions(unittest.TestCase):
+    def test_version(self):
+        """mild.__version__ is that of CMakeLists.txt."""
+        wanted = re.search(r"^project\(mild VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text(), re.M)[1]
+        self.assertEqual(mild.__version__, wanted)
+
+    def test_mujoco(self):
+        """The plugin that is loaded is that of the MuJoCo in use; without one, one line names what there is and what to do."""
+        with tempfile.TemporaryDirectory() as folder, unittest.mock.patch.object(_mujoco, "FOLDER", pathlib.Path(folder)):
+            for version in ("3.9.0", "3.10.0", "4.0.0"):
+                (pathlib.Path(folder) / version).mkdir()
+                (pathlib.Path(folder) / version / "libmild_plugin.so").touch()
+            for version in ("3.9.0", "4.0.0"):
+                with unittest.mock.patch.object(mujoco, "mj_versionString", lambda: version):
+                    self.assertEqual(_mujoco.folder("libmild_plugin.so", "plugin").name, version)
+            for version in ("4.1.0", "3.11.0", "3.1.0"):
+                with unittest.mock.patch.object(mujoco, "mj_versionString", lambda: version), unittest.mock.patch.dict(os.environ):
+                    os.environ.pop("MILD_PLUGIN", None)
+                    with self.assertRaisesRegex(RuntimeError, rf"^plugin: .* MuJoCo {version}, but for 3.9.0, 3.10.0, 4.0.0; "
+                                                r"`pip install 'mujoco>=3.9.0,<=4.0.0'`[^\n]*$"):
+                        mild.load_plugin()
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_own(self):
+        """Without a name the package's own is loaded."""
+        with unittest.mock.patch.dict(os.environ):
+            os.environ.pop("MILD_PLUGIN")
+            mild.load_plugin()
+        self.assertEqual(_mujoco.versions("libmild_plugin.so"), [mujoco.__version__])
+
+    def test_range(self):
+        """The range of pyproject.toml is that of the headers that a wheel builds plugins with."""
+        project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+        with tarfile.open(ROOT / "plugin/headers.tar.xz") as archive:
+            found = {name.split("/")[0] for name in archive.getnames()}
+        found = sorted(found, key=lambda version: [int(number) for number in version.split(".")])
+        self.assertIn(f"mujoco>={found[0]},<={found[-1]}", project["project"]["dependencies"])
+        self.assertIn("mujoco-core==" + found[-1], project["build-system"]["requires"])
+        lines = (ROOT / "scripts/mujoco.txt").read_text().split()
+        self.assertEqual([line.split("==")[1] for line in lines if "==" in line], found)
 
 
 class Attach(unittest.TestCase):
