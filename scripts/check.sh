@@ -5,6 +5,7 @@
 #   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: every test
 #   tidy      clang-tidy 14 over src/, only files that changed since they last passed
 #   thread    gcc, warnings as errors, thread sanitizer: pool, task, evaluation, training
+#   vectors   the numeric layers for AVX2 and for AVX-512 with vectors of 256 and 512 bits: their tests
 #   aarch64   the library for another processor, run under qemu
 #   wheel     the Python package, made and installed as a user would; three of its examples
 set -euo pipefail
@@ -99,6 +100,33 @@ stage_thread() {
         --parallel "$jobs" --timeout 900 -R '^(base/test_pool|task/|eval/|app/train)'
 }
 
+# vectors PROCESSOR BITS: the tests of the numeric layers, compiled for that processor with vectors of that many bits. Fewer
+# random draws, because it is the compiler that is tested. Skipped where glibc says that the processor here is another.
+vectors() {
+    local layer source name=vectors-$1-$2 layers=(base ground batch lab learn engine robot task) targets=()
+    if ! /lib64/ld-linux-x86-64.so.2 --help 2>/dev/null | grep -q "$1 (supported"; then
+        echo "check: vectors: $1 with $2 bits skipped, this processor cannot run it"
+        return
+    fi
+    for layer in "${layers[@]}"; do
+        for source in tests/"$layer"/test_*.c; do
+            source=${source##*/}
+            targets+=("${layer}_${source%.c}")
+        done
+    done
+    configure "$name" -DMILD_MARCH="$1" -DCMAKE_C_FLAGS="-mprefer-vector-width=$2" -DCMAKE_BUILD_TYPE=Release \
+        -DMILD_VIEW=OFF -DMILD_PYTHON=OFF
+    build "$name" "${targets[@]}"
+    MILD_TEST_DRAWS=0.1 ctest --test-dir "$root/$name" --output-on-failure --parallel "$jobs" --timeout 900 \
+        -R "^($(IFS='|'; echo "${layers[*]}"))/test_"
+}
+
+stage_vectors() {
+    vectors x86-64-v3 256
+    vectors x86-64-v4 256
+    vectors x86-64-v4 512
+}
+
 # Replays the fuzzers' corpus, because those programs need only a C library for that processor.
 stage_aarch64() {
     local target
@@ -123,7 +151,7 @@ stage_wheel() {
     done
 }
 
-for stage in ${*:-format sanitize tidy thread aarch64 wheel}; do
+for stage in ${*:-format sanitize tidy thread vectors aarch64 wheel}; do
     begin=$SECONDS
     echo "check: $stage"
     "stage_$stage"
