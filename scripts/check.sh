@@ -100,31 +100,35 @@ stage_thread() {
         --parallel "$jobs" --timeout 900 -R '^(base/test_pool|task/|eval/|app/train)'
 }
 
-# vectors PROCESSOR BITS: the tests of the numeric layers, compiled for that processor with vectors of that many bits. Fewer
-# random draws, because it is the compiler that is tested. Skipped where glibc says that the processor here is another.
+# vectors PROCESSOR BITS LAYER...: the layers' tests, compiled for that processor with vectors of that many bits. Fewer random
+# draws, because it is the compiler that is tested. Skipped where glibc says that the processor here is another.
 vectors() {
-    local layer source name=vectors-$1-$2 layers=(base ground batch lab learn engine robot task) targets=()
-    if ! /lib64/ld-linux-x86-64.so.2 --help 2>/dev/null | grep -q "$1 (supported"; then
-        echo "check: vectors: $1 with $2 bits skipped, this processor cannot run it"
+    local layer source processor=$1 bits=$2 name=vectors-$1-$2 targets=()
+    shift 2
+    if ! /lib64/ld-linux-x86-64.so.2 --help 2>/dev/null | grep "$processor (supported" >/dev/null; then
+        echo "check: vectors: $processor with $bits bits skipped, this processor cannot run it"
         return
     fi
-    for layer in "${layers[@]}"; do
+    for layer in "$@"; do
         for source in tests/"$layer"/test_*.c; do
             source=${source##*/}
             targets+=("${layer}_${source%.c}")
         done
     done
-    configure "$name" -DMILD_MARCH="$1" -DCMAKE_C_FLAGS="-mprefer-vector-width=$2" -DCMAKE_BUILD_TYPE=Release \
-        -DMILD_VIEW=OFF -DMILD_PYTHON=OFF
+    configure "$name" -DMILD_MARCH="$processor" -DCMAKE_C_FLAGS="-mprefer-vector-width=$bits" \
+        -DCMAKE_BUILD_TYPE=Release -DMILD_VIEW=OFF -DMILD_PYTHON=OFF
     build "$name" "${targets[@]}"
     MILD_TEST_DRAWS=0.1 ctest --test-dir "$root/$name" --output-on-failure --parallel "$jobs" --timeout 900 \
-        -R "^($(IFS='|'; echo "${layers[*]}"))/test_"
+        -R "^($(IFS='|'; echo "$*"))/test_"
 }
 
+# The widest vectors are what `make test` runs on no processor by itself. The lanes of batch and engine, which take as long to
+# compile as all the rest, are tried with these alone.
 stage_vectors() {
-    vectors x86-64-v3 256
-    vectors x86-64-v4 256
-    vectors x86-64-v4 512
+    local layers=(base ground lab learn robot task)
+    vectors x86-64-v4 512 "${layers[@]}" batch engine
+    vectors x86-64-v4 256 "${layers[@]}"
+    vectors x86-64-v3 256 "${layers[@]}"
 }
 
 # Replays the fuzzers' corpus, because those programs need only a C library for that processor.
