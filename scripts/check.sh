@@ -5,6 +5,7 @@
 #   sanitize  clang, warnings as errors, address and undefined-behaviour sanitizers: every test
 #   tidy      clang-tidy 14 over src/, only files that changed since they last passed
 #   thread    gcc, warnings as errors, thread sanitizer: pool, task, evaluation, training
+#   vectors   the numeric layers for AVX2 and for AVX-512 with vectors of 256 and 512 bits: their tests
 #   aarch64   the library for another processor, run under qemu
 #   wheel     the Python package, made and installed as a user would; three of its examples
 #   recipes   what CONTRIBUTING.md says, done in a copy of the tree: a reward, a model, a terrain, a controller, a command
@@ -100,6 +101,37 @@ stage_thread() {
         --parallel "$jobs" --timeout 900 -R '^(base/test_pool|task/|eval/|app/train)'
 }
 
+# vectors PROCESSOR BITS LAYER...: the layers' tests, compiled for that processor with vectors of that many bits. Fewer random
+# draws, because it is the compiler that is tested. Skipped where glibc says that the processor here is another.
+vectors() {
+    local layer source processor=$1 bits=$2 name=vectors-$1-$2 targets=()
+    shift 2
+    if ! /lib64/ld-linux-x86-64.so.2 --help 2>/dev/null | grep "$processor (supported" >/dev/null; then
+        echo "check: vectors: $processor with $bits bits skipped, this processor cannot run it"
+        return
+    fi
+    for layer in "$@"; do
+        for source in tests/"$layer"/test_*.c; do
+            source=${source##*/}
+            targets+=("${layer}_${source%.c}")
+        done
+    done
+    configure "$name" -DMILD_MARCH="$processor" -DCMAKE_C_FLAGS="-mprefer-vector-width=$bits" \
+        -DCMAKE_BUILD_TYPE=Release -DMILD_VIEW=OFF -DMILD_PYTHON=OFF
+    build "$name" "${targets[@]}"
+    MILD_TEST_DRAWS=0.1 ctest --test-dir "$root/$name" --output-on-failure --parallel "$jobs" --timeout 900 \
+        -R "^($(IFS='|'; echo "$*"))/test_"
+}
+
+# The widest vectors are what `make test` runs on no processor by itself. The lanes of batch and engine, which take as long to
+# compile as all the rest, are tried with these alone.
+stage_vectors() {
+    local layers=(base ground lab learn robot task)
+    vectors x86-64-v4 512 "${layers[@]}" batch engine
+    vectors x86-64-v4 256 "${layers[@]}"
+    vectors x86-64-v3 256 "${layers[@]}"
+}
+
 # Replays the fuzzers' corpus, because those programs need only a C library for that processor.
 stage_aarch64() {
     local target
@@ -130,7 +162,7 @@ stage_recipes() {
     tests/install/test_contributing.py . --run --jobs "$jobs"
 }
 
-for stage in ${*:-format sanitize tidy thread aarch64 wheel recipes}; do
+for stage in ${*:-format sanitize tidy thread vectors aarch64 wheel recipes}; do
     begin=$SECONDS
     echo "check: $stage"
     "stage_$stage"

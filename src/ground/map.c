@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 
+#include "base/float.h"
 #include "ground/map_view.h"
 #include "ground/pattern.h"
 #include "ground/shape.h"
@@ -169,8 +170,8 @@ Label map_label(const MildMap *map, double x, double y) {
 }
 
 static MapNumber map_number_of(double number) {
-    const float high = (float)number;
-    return (MapNumber){high, (float)(number - (double)high)};
+    const double high = float_rounded(number);
+    return (MapNumber){(float)high, (float)(number - high)};
 }
 
 /* begin: [m] where the first cell begins. */

@@ -1,5 +1,6 @@
 /* The contact step as a warp does it against mild_ground_solve and mild_ground_advance: the same
  * text in double and in float, of one, two and four feet, on level ground and on maps. */
+#include "base/float.h"
 #include "batch_kit.h"
 #include "contact_case.h"
 #include "ground/begin.h"
@@ -243,14 +244,6 @@ static void worst_print(const char *name, Worst *w) {
         (double)w->iterations_ground / w->steps);
 }
 
-/* Rounds to float. (volatile: gcc 12 drops the two conversions of a lone number at -O3) */
-static void as_float(double *x, int count) {
-    for (int i = 0; i < count; i++) {
-        const volatile float rounded = (float)x[i];
-        x[i] = (double)rounded;
-    }
-}
-
 /* Feet transmit moments; none does, in the version for all feet; in that for such feet alone. */
 enum { MOMENTS, POINTS, POINTS_ALONE };
 
@@ -268,7 +261,7 @@ static void walk(Kit *kit, uint64_t *random, int steps, double tolerance, int gr
             }
         }
         if (exact) {
-            as_float(kit->input.position[0], 3 * kit->feet);
+            float_round_all(kit->input.position[0], 3 * (size_t)kit->feet);
         }
         kit_inverse_inertia(kit);
         kit_free(kit, (const double(*)[3])force);
@@ -511,9 +504,9 @@ static void stand_above(Kit *kit, const Relief *relief, uint64_t *random) {
         kit->mass[f] = kit_uniform(random, 3.0, 40.0);
         kit->inertia[f] = kit->mass[f] * kit_uniform(random, 0.02, 0.1);
     }
-    as_float(&kit->terrain.height, 1);
-    as_float(&kit->terrain.map_x, 1);
-    as_float(&kit->terrain.map_y, 1);
+    float_round_all(&kit->terrain.height, 1);
+    float_round_all(&kit->terrain.map_x, 1);
+    float_round_all(&kit->terrain.map_y, 1);
 }
 
 static MildMaterial relief_material(const Relief *relief, int label, uint64_t *random) {

@@ -9,23 +9,16 @@
 
 #include "engine_text.h"
 
+#include "base/float.h"
 #include "base/random.h"
 #include "robot/sim.h"
 
-/* Rounds to float. (volatile: at -O3 gcc 12 drops the two conversions of neighbours) */
-static inline void round_numbers(double *number, size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        const volatile float rounded = (float)number[i];
-        number[i] = (double)rounded;
-    }
-}
-
 /* Float takes these numbers as they are, so that its error is that of its arithmetic. */
 static inline void round_case(EngineCase *in) {
-    round_numbers((double *)in, offsetof(EngineCase, variation) / sizeof(double));
-    round_numbers(&in->height, 1);
-    round_numbers(in->slope, 2);
-    round_numbers(in->map_origin, 2);
+    float_round_all((double *)in, offsetof(EngineCase, variation) / sizeof(double));
+    float_round_all(&in->height, 1);
+    float_round_all(in->slope, 2);
+    float_round_all(in->map_origin, 2);
 }
 
 static inline void spread(Random *random, double *x, int count, double size) {

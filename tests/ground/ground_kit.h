@@ -250,6 +250,19 @@ static inline void kit_solve(Kit *kit) {
     mild_ground_solve(kit->ground, &kit->terrain, &kit->input, kit->scratch, &kit->result);
 }
 
+/* [J] Work of the ground on a foot over the step just solved, at the mean of its twist after and
+ * `before`: exactly what the ground's impulses change the kinetic energy by. */
+static inline double kit_work(const Kit *kit, int f, const double *before) {
+    const MildFootResult *foot = &kit->result.foot[f];
+    const double *after = kit->result.velocity + 6 * f;
+    double sum = 0.0;
+    for (int k = 0; k < 3; k++) {
+        sum += foot->force[k] * (before[k] + after[k]) +
+               foot->torque[k] * (before[3 + k] + after[3 + k]);
+    }
+    return 0.5 * kit->input.dt * sum;
+}
+
 /* Semi-implicit, as engines do. */
 static inline void kit_advance(Kit *kit) {
     mild_ground_advance(kit->ground, &kit->terrain, &kit->input, kit->scratch, &kit->result);

@@ -2,6 +2,8 @@
  * message. */
 #include "map_kit.h"
 
+#include "base/float.h"
+
 static MildSole *soles[2]; /* left, right */
 
 static int open_soles(void **state) {
@@ -58,9 +60,7 @@ static void random_problems(void **state) {
         if (check(&kit, &error) != MILD_OK) {
             fail_msg("draw %d: %s", draw, error.text);
         }
-        for (int i = 0; i < 36 * kit.feet * kit.feet; i++) {
-            kit.input.inverse_inertia[i] = (float)kit.input.inverse_inertia[i];
-        }
+        float_round_all(kit.input.inverse_inertia, (size_t)(36 * kit.feet * kit.feet));
         if (check(&kit, &error) != MILD_OK) {
             fail_msg("draw %d in float: %s", draw, error.text);
         }

@@ -2,6 +2,7 @@
 #include "ground_kit.h"
 
 #define ELEMENT_STEP element_step_double
+#include "base/float.h"
 #include "element_step.inc"
 #include "ground/models.h"
 
@@ -10,18 +11,8 @@
 #define MEMORY(field)                                                                              \
     (offsetof(ElementMemory, field) / sizeof(double)) /* index in a case's memory */
 
-/* A float's number, so that both begin with the same. */
-static double rounded(double x) {
-    return (double)(float)x;
-}
-
-static void round_all(double *x, int count) {
-    for (int k = 0; k < count; k++) {
-        x[k] = rounded(x[k]);
-    }
-}
-
-/* A material and a motion of one element on it. Of five grounds one has its bed within reach, one
+/* A material and a motion of one element on it, in numbers that a float holds, so that both begin
+ * with the same. Of five grounds one has its bed within reach, one
  * an element that has slid nearly as far as counts, one an impulse that creates energy, one an
  * element that is not deeper than the least elastic travel. */
 static ElementCase random_case(int n, uint64_t *random) {
@@ -34,20 +25,20 @@ static ElementCase random_case(int n, uint64_t *random) {
     Law law = law_of(&m, KIT_PITCH);
     law.bed_depth = n % 5 == 0 ? 0.01 : law.bed_depth;
     ElementCase c = {.curves = kit_index(random, 2) ? law_curves(&law) : LAW_ALL,
-                     .recovery = rounded(m.recovery),
-                     .mu = rounded(m.mu),
-                     .k_drift = rounded(m.k_drift),
-                     .b_drift = rounded(m.b_drift),
-                     .dt = rounded(steps[kit_index(random, 3)]),
-                     .depth = rounded(n % 5 == 3 ? kit_uniform(random, 0.0, 1e-4)
-                                                 : kit_uniform(random, -0.001, 0.02)),
-                     .now = rounded(n % 5 == 3 ? kit_uniform(random, -0.02, 0.02)
-                                               : kit_uniform(random, -0.3, 0.7)),
-                     .gain = rounded(0.01),
-                     .explicit_impulse = n % 5 == 1 ? rounded(-1e-3) : 0.0};
-    c.memory[MEMORY(drift)] = n % 5 == 2 ? rounded((double)REMEMBER_DRIFT - 1e-3) : 0.0;
+                     .recovery = float_rounded(m.recovery),
+                     .mu = float_rounded(m.mu),
+                     .k_drift = float_rounded(m.k_drift),
+                     .b_drift = float_rounded(m.b_drift),
+                     .dt = float_rounded(steps[kit_index(random, 3)]),
+                     .depth = float_rounded(n % 5 == 3 ? kit_uniform(random, 0.0, 1e-4)
+                                                       : kit_uniform(random, -0.001, 0.02)),
+                     .now = float_rounded(n % 5 == 3 ? kit_uniform(random, -0.02, 0.02)
+                                                     : kit_uniform(random, -0.3, 0.7)),
+                     .gain = float_rounded(0.01),
+                     .explicit_impulse = n % 5 == 1 ? float_rounded(-1e-3) : 0.0};
+    c.memory[MEMORY(drift)] = n % 5 == 2 ? float_rounded((double)REMEMBER_DRIFT - 1e-3) : 0.0;
     memcpy(c.law, &law, sizeof c.law);
-    round_all(c.law, ELEMENT_LAW);
+    float_round_all(c.law, ELEMENT_LAW);
     return c;
 }
 
@@ -55,9 +46,9 @@ static ElementCase random_case(int n, uint64_t *random) {
 static void case_push(ElementCase *c, uint64_t *random) {
     double turn = kit_index(random, 6) == 0 ? -0.5 : 1.0, fast = kit_index(random, 3) ? 0.01 : 0.3;
     for (int k = 0; k < 2; k++) {
-        c->after[k] = rounded(fast * kit_uniform(random, -1.0, 1.0));
+        c->after[k] = float_rounded(fast * kit_uniform(random, -1.0, 1.0));
     }
-    c->after[2] = rounded(turn * c->now + kit_uniform(random, -0.05, 0.05));
+    c->after[2] = float_rounded(turn * c->now + kit_uniform(random, -0.05, 0.05));
 }
 
 /* Goes on from the end of the step. Of eight steps one begins deeper or less deep than the step
@@ -65,9 +56,9 @@ static void case_push(ElementCase *c, uint64_t *random) {
 static void case_move(ElementCase *c, const ElementResult *result, uint64_t *random) {
     const double shift = kit_index(random, 8) == 0 ? kit_uniform(random, -1e-4, 1e-4) : 0.0;
     memcpy(c->memory, result->memory, sizeof c->memory);
-    round_all(c->memory, ELEMENT_MEMORY);
+    float_round_all(c->memory, ELEMENT_MEMORY);
     c->now = c->after[2];
-    c->depth = rounded(c->depth + c->dt * c->now + shift);
+    c->depth = float_rounded(c->depth + c->dt * c->now + shift);
 }
 
 /* Worst of |a - b| by |b| + scale. */

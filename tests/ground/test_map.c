@@ -1,6 +1,9 @@
 /* Height maps and patterns against their formulas. */
 #include "map_kit.h"
 
+#include "ground/map.h"
+#include "ground/map_view.h"
+
 /* Waves and steps at random points: at grid points the formula, between them within the error of
  * bilinear interpolation, (2 pi/wavelength)^2 amplitude cell^2/8. */
 static void test_shapes(void **state) {
@@ -324,6 +327,36 @@ static void test_refused(void **state) {
     }
 }
 
+/* number as the nearest float and the rest. Two floats hold 48 bits at the least. */
+static void assert_number(MapNumber found, double number) {
+    const volatile float nearest = (float)number;
+    assert_true(found.high == nearest);
+    assert_true(fabs((double)found.high + (double)found.low - number) <= 0x1p-48 * fabs(number));
+}
+
+/* A GPU's view of a map has the lengths of the map. */
+static void test_view(void **state) {
+    (void)state;
+    uint64_t random = 3;
+    for (int draw = 0; draw < 500; draw++) {
+        MildMapDef def = shape(MILD_MAP_WAVES, 0.03, kit_uniform(&random, 0.3, 2.0));
+        def.slope = kit_uniform(&random, -0.3, 0.3);
+        def.patches = MILD_PATTERN_CHECKER;
+        def.patch_size = kit_uniform(&random, 0.3, 3.0);
+        def.patch_count = 2;
+        MildMap *map = make_map(&def);
+        const MapView view = map_view(map);
+        assert_number(view.slope, map->slope);
+        assert_number(view.x.cell, map->heights.cell_x);
+        assert_number(view.x.inverse, 1 / map->heights.cell_x);
+        assert_number(view.y.cell, map->heights.cell_y);
+        assert_number(view.y.inverse, 1 / map->heights.cell_y);
+        assert_number(view.label_x.cell, map->labels.cell_x);
+        assert_number(view.label_y.inverse, 1 / map->labels.cell_y);
+        mild_map_destroy(map);
+    }
+}
+
 static void test_bytes(void **state) {
     (void)state;
     MildMapDef waves = shape(MILD_MAP_WAVES, 0.03, 0.8), rough = shape(MILD_MAP_ROUGH, 0.03, 0.4);
@@ -345,6 +378,6 @@ int main(void) {
         cmocka_unit_test(test_rough_between), cmocka_unit_test(test_measures),
         cmocka_unit_test(test_defaults),      cmocka_unit_test(test_plane),
         cmocka_unit_test(test_patterns),      cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_bytes)};
+        cmocka_unit_test(test_bytes),         cmocka_unit_test(test_view)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -392,19 +392,6 @@ static void test_impact(void **state) {
 
 /* ---- energy ---- */
 
-/* Work of the ground on the foot over one step, at the mean twist: exactly the change of kinetic
- * energy it causes. */
-static double ground_work(const Kit *kit, const double *before) {
-    const MildFootResult *result = &kit->result.foot[0];
-    double work = 0.0;
-    for (int k = 0; k < 3; k++) {
-        work += 0.5 * kit->input.dt * result->force[k] * (before[k] + kit->result.velocity[k]);
-        work +=
-            0.5 * kit->input.dt * result->torque[k] * (before[3 + k] + kit->result.velocity[3 + k]);
-    }
-    return work;
-}
-
 static int untouched(const Kit *kit) {
     int touched = 0;
     for (int e = 0; e < mild_sole_elements(kit->soles[0]); e++) {
@@ -437,7 +424,7 @@ static int thrown(int model, uint64_t *random, double *worst) {
         force[0][1] = weight * shake[1] * sin(31.0 * t);
         force[0][2] = weight * (1.5 * sin(spring * t * 6.28) + 0.8 * shake[2] * t);
         kit_step(&kit, (const double(*)[3])force);
-        double w = ground_work(&kit, before);
+        double w = kit_work(&kit, 0, before);
         work += w;
         taken += fabs(w);
         if (kit.result.foot[0].contacts == 0 && taken > 0.0 && untouched(&kit)) {

@@ -11,20 +11,6 @@ static uint64_t draw_seed(uint64_t seed, int draw, int numbers) {
     return seed + (uint64_t)draw * (uint64_t)numbers * 0x9e3779b97f4a7c15u;
 }
 
-/* Work of the ground on the foot over one step, at the mean twist: exactly the change of kinetic
- * energy it causes. */
-static double ground_work(const Kit *kit, int f, const double *before) {
-    const MildFootResult *result = &kit->result.foot[f];
-    double work = 0.0;
-    for (int k = 0; k < 3; k++) {
-        work +=
-            0.5 * kit->input.dt * result->force[k] * (before[k] + kit->result.velocity[6 * f + k]);
-        work += 0.5 * kit->input.dt * result->torque[k] *
-                (before[3 + k] + kit->result.velocity[6 * f + 3 + k]);
-    }
-    return work;
-}
-
 /* No element is in the ground or remembers it. */
 static int lifted(const Kit *kit) {
     int touched = kit->result.foot[0].contacts;
@@ -65,7 +51,7 @@ static void throw_foot(int draw, MildSole *sole, Thrown *thrown) {
                                   : shake[k] * sin(20 * t));
         }
         kit_step(&kit, (const double(*)[3])force);
-        double w = ground_work(&kit, 0, before);
+        double w = kit_work(&kit, 0, before);
         missed += !kit.result.converged;
         work += w;
         taken += fabs(w);
@@ -154,7 +140,7 @@ static void test_passive_by_hand(void **state) {
             z = next;
             kit_solve(&kit);
             double w = kit.result.foot[0].force[2] * kit.result.velocity[2] * dt;
-            work += ground_work(&kit, 0, kit.input.velocity[0]);
+            work += kit_work(&kit, 0, kit.input.velocity[0]);
             kit_advance(&kit);
             way += w;
             taken += fabs(w);
@@ -187,7 +173,7 @@ static double loop_step(Kit *kit, const double size[3], const double phase[3], d
         at[k] = next;
     }
     kit_solve(kit);
-    double work = ground_work(kit, 0, kit->input.velocity[0]);
+    double work = kit_work(kit, 0, kit->input.velocity[0]);
     kit_advance(kit);
     return work;
 }

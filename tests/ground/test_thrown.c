@@ -74,17 +74,6 @@ static void draw_stick(Kit *kit, uint64_t *random) {
     draw_vector(random, 5.0, kit->input.velocity[0] + 3);
 }
 
-/* [J] What the ground's impulses change the body's kinetic energy by. */
-static double ground_work(const Kit *kit, const double *before) {
-    const MildFootResult *result = &kit->result.foot[0];
-    double sum = 0.0;
-    for (int k = 0; k < 3; k++) {
-        sum += result->force[k] * (before[k] + kit->result.velocity[k]) +
-               result->torque[k] * (before[3 + k] + kit->result.velocity[3 + k]);
-    }
-    return 0.5 * kit->input.dt * sum;
-}
-
 /* [J] */
 static double kinetic_energy(const Kit *kit, const double *V) {
     double r[3], swing[3], sum = 0.0;
@@ -151,7 +140,7 @@ static void throw_body(Kit *kit, Thrown *thrown, int draw, double seconds) {
         thrown->hard += kit->result.iterations > HARD;
         thrown->effort += kit->result.iterations > HARD ? kit->result.iterations : 0;
         missed += !solved;
-        work += ground_work(kit, before);
+        work += kit_work(kit, 0, before);
         kit_advance(kit);
         touched |= work != 0.0;
         if (!touched || !lifted(kit)) {
