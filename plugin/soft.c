@@ -15,8 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "ground/state.h"
-
 #define ROUNDS_MAX 30    /* solves of ground and constraints in one step */
 #define ROUNDS_ACTIVE 12 /* of them with the response of the active constraints */
 #define AGREEMENT 1e-6   /* [m/s, rad/s] difference of the twists at which they agree */
@@ -53,6 +51,10 @@ static MildStatus lay_map(Soft *soft, MildError *error) {
     return soft->map ? mild_terrain_set_map(&soft->terrain, soft->map, error) : MILD_ERROR_ARGUMENT;
 }
 
+static size_t ground_bytes(const Soft *soft) {
+    return mild_ground_bytes_imprints(soft->soles, soft->feet, soft->def.prints);
+}
+
 static int alloc_arrays(Soft *soft, const mjModel *m) {
     const size_t nv = (size_t)m->nv;
     soft->jacobian = calloc(FOOT_ROWS * nv + 1, sizeof *soft->jacobian);
@@ -63,15 +65,16 @@ static int alloc_arrays(Soft *soft, const mjModel *m) {
            metric_alloc(&soft->metric, m);
 }
 
-/* What the size of the state follows from. */
-static MildStatus make_feet(Soft *soft, const mjModel *m, int instance, MildError *error) {
+/* What the size of the state follows from. compiling: bool, as for feet_create. */
+static MildStatus make_feet(Soft *soft, const mjModel *m, int instance, int compiling,
+                            MildError *error) {
     MildModel model = MILD_MODEL_MILD;
     MildStatus status = plugin_def_read(m, instance, &soft->def, error);
     if (status == MILD_OK) {
         status = plugin_def_model(m, instance, &soft->def, &model, error);
     }
     if (status == MILD_OK) {
-        status = feet_create(m, &soft->def, model, soft->foot, &soft->feet, error);
+        status = feet_create(m, &soft->def, model, compiling, soft->foot, &soft->feet, error);
     }
     for (int f = 0; f < soft->feet && status == MILD_OK; f++) {
         soft->soles[f] = soft->foot[f].sole;
@@ -80,9 +83,9 @@ static MildStatus make_feet(Soft *soft, const mjModel *m, int instance, MildErro
 }
 
 static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *error) {
-    MildStatus status = make_feet(soft, m, instance, error);
+    MildStatus status = make_feet(soft, m, instance, 0, error);
     if (status == MILD_OK &&
-        (size_t)m->plugin_statenum[instance] * sizeof(mjtNum) != soft_bytes(soft)) {
+        (size_t)m->plugin_statenum[instance] * sizeof(mjtNum) < ground_bytes(soft)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "the model was compiled with other feet, soles or prints; compile it "
                          "again");
@@ -101,6 +104,7 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
     if (!soft->scratch || !alloc_arrays(soft, m)) {
         return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     }
+    soft->layout = ground_layout(soft->soles, soft->feet, soft->def.prints);
     soft->fresh = 1;
     return MILD_OK;
 }
@@ -133,17 +137,17 @@ void soft_destroy(Soft *soft) {
     free(soft);
 }
 
-/* Number of feet, 0 when they cannot be made, and the bytes of their ground. */
+/* Number of feet, 0 when they cannot be made, and the room for their ground. */
 static int measure_feet(const mjModel *m, int instance, size_t *bytes) {
     Soft *soft = calloc(1, sizeof *soft);
-    const int good = soft && make_feet(soft, m, instance, NULL) == MILD_OK;
+    const int good = soft && make_feet(soft, m, instance, 1, NULL) == MILD_OK;
     const int feet = good ? soft->feet : 0;
-    *bytes = good ? soft_bytes(soft) : 0;
+    *bytes = good ? ground_bytes(soft) : 0;
     soft_destroy(soft);
     return feet;
 }
 
-size_t soft_state_bytes(const mjModel *m, int instance) {
+size_t soft_room(const mjModel *m, int instance) {
     size_t bytes;
     measure_feet(m, instance, &bytes);
     return bytes;
@@ -154,11 +158,8 @@ int soft_feet(const mjModel *m, int instance) {
     return measure_feet(m, instance, &bytes);
 }
 
-size_t soft_bytes(const Soft *soft) {
-    return mild_ground_bytes_imprints(soft->soles, soft->feet, soft->def.prints);
-}
-
-void soft_reset(Soft *soft, void *state) {
+void soft_reset(Soft *soft, void *state, size_t bytes) {
+    memset(state, 0, bytes);
     mild_ground_init_imprints(state, soft->soles, soft->feet, soft->def.prints);
     soft->known = soft->solved = soft->warned = 0;
 }
@@ -170,16 +171,7 @@ static int is_material(const MildTerrain *terrain, int32_t code) {
 }
 
 int soft_owns(const Soft *soft, const MildGround *ground) {
-    if (ground->feet != soft->feet) {
-        return 0;
-    }
-    for (int f = 0; f < soft->feet; f++) {
-        if (ground->elements[f] != mild_sole_elements(soft->soles[f]) ||
-            ground->padded[f] != sole_padded(soft->soles[f])) {
-            return 0;
-        }
-    }
-    if (ground->tiles < 0 || mild_ground_size(ground) != soft_bytes(soft)) {
+    if (!ground_is_valid(ground, &soft->layout)) {
         return 0;
     }
     for (int f = 0; f < soft->feet; f++) {

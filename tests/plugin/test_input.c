@@ -7,7 +7,7 @@
     "<worldbody><geom name='floor' type='plane' size='1 1 .1' %s/><body name='pole'><geom "        \
     "name='post' size='.01'/></body><body name='foot' pos='0 0 .1' %s><freejoint/><geom "          \
     "name='box' mass='1' %s/><site name='sole' pos='0 0 -.01'/>"                                   \
-    "<site name='end' euler='0 90 0'/></body></worldbody>"
+    "<site name='end' euler='0 90 0'/><body name='toe_a'/><body name='toe_b'/></body></worldbody>"
 #define BOX "type='box' size='.1 .05 .01' "
 
 /* The model of the keys, with attributes of floor, body and foot and an end. */
@@ -38,14 +38,18 @@ static void check_refused(const char *option, const char *configs, const char *w
     assert_null(m);
     assert_non_null(strstr(kit_said, word));
     assert_non_null(strstr(kit_said, other));
+    const char *first = strstr(kit_said, "mild.ground"); /* said once */
+    assert_true(!first || !strstr(first + 1, "mild.ground 'soft': "));
 }
 
 static void refuses_what_is_wrong(void **state) {
     (void)state;
     check_refused("", "", "no feet", "feet");
     check_refused("", CONFIG("feet", "fool"), "'fool'", "nearest is 'foot'");
-    check_refused("", CONFIG("feet", "foot sole end pole world"), "more than 4", "feet");
-    check_refused("", CONFIG("feet", "foot sole foot"), "twice", "feet");
+    check_refused("", CONFIG("feet", "foot pole toe_a toe_b world"), "more than 4", "feet");
+    check_refused("", CONFIG("feet", "pole foot foot"), "'foot' and 'foot'", "one body, 'foot'");
+    check_refused("", CONFIG("feet", "foot sole"), "'foot' and 'sole'", "one body, 'foot'");
+    check_refused("", CONFIG("feet", "end pole sole"), "'end' and 'sole'", "one body, 'foot'");
     check_refused("", CONFIG("feet", "foot " LONG_NAME), "'leg_of_", "nearest is");
     check_refused("", CONFIG("feet", "pole"), "'pole'", "fixed to the world");
     check_refused("", CONFIG("feet", "world"), "'world'", "fixed to the world");
@@ -71,6 +75,15 @@ static void refuses_what_is_wrong(void **state) {
     check_refused("", FOOT CONFIG("terrain.kind", "hills"), "terrain.kind", "hills");
     check_refused("", FOOT CONFIG("terrain.kind", "image"), "image", "");
     check_refused("integrator='RK4'", FOOT, "RK4", "implicitfast");
+}
+
+/* A sensor of a ground that cannot be made does not hide why. */
+static void a_sensor_hides_no_reason(void **state) {
+    (void)state;
+    assert_null(compile("", CONFIG("feet", "fool"), OFF, "", BOX OFF,
+                        "<sensor><plugin plugin='mild.ground' instance='soft'/></sensor>"));
+    print_message("%s\n", kit_said);
+    assert_non_null(strstr(kit_said, "'fool'"));
 }
 
 /* Without passive forces MuJoCo leaves out a stage. */
@@ -222,9 +235,10 @@ static void soles_follow_the_shapes(void **state) {
 
 /* The ground of the keys, to be freed with its model. */
 static const Soft *soft_of_keys(const char *configs, mjModel **m, mjData **d) {
-    *m = compile("", configs, OFF, "", BOX OFF,
-                 "<worldbody><body pos='3 0 1'><freejoint/><geom size='.1' mass='50'/></body>"
-                 "</worldbody>");
+    *m = compile(
+        "", configs, OFF, "", BOX OFF,
+        "<worldbody><body name='other' pos='3 0 1'><freejoint/><geom size='.1' mass='50'/></body>"
+        "</worldbody>");
     if (!*m) {
         fail_msg("%s", kit_said);
     }
@@ -286,7 +300,7 @@ static void models_are_matched(void **state) {
         soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.model", "bekker"), &m, &d);
     check_match(soft, &grass, 9.81);
     free_both(m, d);
-    soft = soft_of_keys(CONFIG("feet", "foot sole") CONFIG("ground", "grass")
+    soft = soft_of_keys(CONFIG("feet", "foot other") CONFIG("ground", "grass")
                             CONFIG("ground.model", "bekker"),
                         &m, &d);
     check_match(soft, &grass, 9.81 / 2);
@@ -305,6 +319,7 @@ static void models_are_matched(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(refuses_what_is_wrong),
+        cmocka_unit_test(a_sensor_hides_no_reason),
         cmocka_unit_test(disabled_flags),
         cmocka_unit_test(refuses_a_second_instance),
         cmocka_unit_test(warns_of_a_rigid_floor),

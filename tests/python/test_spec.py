@@ -23,7 +23,9 @@ class Attach(unittest.TestCase):
     def test_arguments(self):
         spec = mujoco.MjSpec.from_string(PLATE)
         for arguments, name in ((("plate", ["plate"]), "spec"), ((spec, ["foot"]), "foot"), ((spec, []), "feet"),
-                                ((spec, ["plate"] * 5), "feet"), ((spec, ["left foot"]), "blanks"), ((spec, [5]), "feet: 5"),
+                                ((spec, ["plate"] * 5), "feet"), ((spec, ["plate"] * 2), "'plate' and 'plate' are on one body, 'plate'"),
+                                ((spec, ["plate", "under"]), "'plate' and 'under' are on one body, 'plate'"),
+                                ((spec, ["left foot"]), "blanks"), ((spec, [5]), "feet: 5"),
                                 ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground")):
             with self.assertRaisesRegex((TypeError, ValueError), name):
                 mild.attach(*arguments)
