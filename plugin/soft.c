@@ -4,17 +4,24 @@
  *
  *     V = V_free + h A W,    A = J N^-1 J^T    (N: metric.h)
  *
- * Constraints (joint limits, contacts of other bodies) respond to the ground's force, and the
- * ground to theirs. Both are solved in turn until the twists agree, with an A that holds the
- * constraints' response while the same ones stay active. Two sets of active constraints may follow
- * each other for ever: A of the one makes the other active. The A without constraints ends that.
- * No set of them responds by more, so the ground never counts with too little. */
+ * Constraints (joint limits, friction losses, contacts of other bodies) respond to the ground's
+ * force, and the ground to theirs. Those of rows.h are solved with the ground, and MuJoCo's solver
+ * then starts at the solution. What is left, cones of friction of other contacts, is solved with the
+ * ground in turn until the twists agree, with an A that holds the constraints' response while the
+ * same ones stay active. Two sets of active constraints may follow each other for ever: A of the one
+ * makes the other active. The A without constraints ends that. No set of them responds by more, so
+ * the ground never counts with too little. */
 #include "plugin/soft.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "plugin/rows.h"
+
+#define JOINT_ROUNDS 30  /* solves of the ground with the constraints in its response */
+#define JOINT_TRIES 12   /* of them in the same zones */
+#define JOINT_CLOSE 1e-9 /* [m/s, rad/s] difference of the twists at which they end */
 #define ROUNDS_MAX 30    /* solves of ground and constraints in one step */
 #define ROUNDS_ACTIVE 12 /* of them with the response of the active constraints */
 #define AGREEMENT 1e-6   /* [m/s, rad/s] difference of the twists at which they agree */
@@ -264,6 +271,17 @@ static void apply(const Soft *soft, const mjModel *m, mjData *d, const double *w
     }
 }
 
+/* twist += h J a. a: [dofs] */
+static void add_rates(const Soft *soft, int nv, const double *a, double *twist) {
+    const Metric *metric = &soft->metric;
+    for (int r = 0; r < 6 * soft->feet; r++) {
+        const double *row = soft->jacobian + (size_t)r * (size_t)nv;
+        for (int i = 0; i < metric->dofs; i++) {
+            twist[r] += soft->input.dt * row[metric->dof[i]] * a[i];
+        }
+    }
+}
+
 /* Twists of the feet after the step that MuJoCo would do now. */
 static void outcome(Soft *soft, const mjModel *m, const mjData *d, double *twist) {
     const Metric *metric = &soft->metric;
@@ -277,12 +295,7 @@ static void outcome(Soft *soft, const mjModel *m, const mjData *d, double *twist
         metric_integrate(metric, m, a);
     }
     twists(soft, nv, d->qvel, twist);
-    for (int r = 0; r < 6 * soft->feet; r++) {
-        const double *row = soft->jacobian + (size_t)r * (size_t)nv;
-        for (int i = 0; i < metric->dofs; i++) {
-            twist[r] += soft->input.dt * row[metric->dof[i]] * a[i];
-        }
-    }
+    add_rates(soft, nv, a, twist);
 }
 
 static void read_wrench(const Soft *soft, double *wrench) {
@@ -305,14 +318,16 @@ static void free_twists(Soft *soft, const double *twist, const double *wrench) {
 /* Everything up to qacc and qfrc_constraint: the clamped actuator forces, which are not there yet,
  * and what follows from them. The metric of `discrete` is complete only between MuJoCo's stages, so
  * there they run as a whole, with mjcb_control. */
-static void forces_without_ground(const mjModel *m, mjData *d) {
+static void forces_without_ground(const mjModel *m, mjData *d, int constrain) {
     if (metric_is_discrete(m)) {
         mj_forwardSkip(m, d, mjSTAGE_VEL, 1);
         return;
     }
     mj_fwdActuation(m, d);
     mj_fwdAcceleration(m, d);
-    mj_fwdConstraint(m, d);
+    if (constrain) {
+        mj_fwdConstraint(m, d);
+    }
 }
 
 /* change = what MuJoCo gives beyond what the ground counts with; [6 feet]. Returns its largest
@@ -325,6 +340,91 @@ static double disagreement(const Soft *soft, const double *twist, double *change
     }
     return most;
 }
+
+/* ---- ground and constraints together ---- */
+
+/* push = J^T W of the metric's degrees of freedom. */
+static void push_of(const Soft *soft, int nv, const double *wrench, double *push) {
+    const Metric *metric = &soft->metric;
+    for (int i = 0; i < metric->dofs; i++) {
+        push[i] = 0;
+        for (int r = 0; r < 6 * soft->feet; r++) {
+            push[i] += soft->jacobian[(size_t)r * (size_t)nv + (size_t)metric->dof[i]] * wrench[r];
+        }
+    }
+}
+
+/* Twists after the step with the acceleration rows->trial: J (v + h N^-1 M a). */
+static void joint_outcome(Soft *soft, const mjModel *m, const mjData *d, const Rows *rows,
+                          double *twist) {
+    const Metric *metric = &soft->metric;
+    const int n = metric->dofs, nv = (int)m->nv;
+    double *a = soft->acceleration;
+    if (metric_is_step(m, d)) {
+        mju_copy(a, rows->trial, n);
+    } else {
+        mju_mulMatVec(a, metric->mass, rows->trial, n, n);
+        metric_integrate(metric, m, a);
+    }
+    twists(soft, nv, d->qvel, twist);
+    add_rates(soft, nv, a, twist);
+}
+
+/* Solves the ground with the response of the constraints in their zones, and finds those zones.
+ * Leaves the wrench, and the acceleration in rows->trial. They follow from the zones alone, so that
+ * a step that is evaluated again ends at the same. */
+static void joint_solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground,
+                        Rows *rows, double *wrench) {
+    Metric *metric = &soft->metric;
+    double twist[FOOT_ROWS], change[FOOT_ROWS], *push = mj_stackAllocNum(d, (size_t)metric->dofs);
+    int tries = 0; /* with these zones */
+    for (int round = 0; round < JOINT_ROUNDS; round++) {
+        if (tries++ == 0) {
+            rows_enter(rows, metric, m, d);
+            metric_hold(metric, m, d, rows->stiffness);
+            inverse_inertia(soft, metric->stiff, (int)m->nv);
+            mju_zero(push, metric->dofs);
+            mju_zero(wrench, 6 * soft->feet);
+            rows_solve(rows, metric, push);
+            joint_outcome(soft, m, d, rows, twist);
+            free_twists(soft, twist, wrench);
+            mix_start(&soft->mix, 6 * soft->feet);
+        } else {
+            mix_next(&soft->mix, soft->input.free_velocity, change);
+        }
+        mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
+        read_wrench(soft, wrench);
+        push_of(soft, (int)m->nv, wrench, push);
+        rows_solve(rows, metric, push);
+        joint_outcome(soft, m, d, rows, twist);
+        if (disagreement(soft, twist, change) > JOINT_CLOSE && tries < JOINT_TRIES) {
+            continue;
+        }
+        if (rows_stay(rows, metric, m, d)) {
+            break;
+        }
+        rows_move(rows, metric, m, d, push);
+        tries = 0;
+    }
+}
+
+/* MuJoCo's solver then starts at the solution, here and when it is called for the step. Elsewhere it
+ * would end within its own tolerance of it, 1e-5 m/s at times. */
+static void solve_jointly(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground,
+                          double *wrench) {
+    const Metric *metric = &soft->metric;
+    Rows rows;
+    mj_markStack(d);
+    rows_start(&rows, metric, m, d);
+    joint_solve(soft, m, d, ground, &rows, wrench);
+    for (int i = 0; i < metric->dofs; i++) {
+        d->qacc_warmstart[metric->dof[i]] = rows.trial[i];
+    }
+    mj_freeStack(d);
+    apply(soft, m, d, wrench, 1);
+}
+
+/* ---- in turn ---- */
 
 /* A and V_free for the constraints that are active now, and after ROUNDS_ACTIVE without any. While
  * A stays the same, V_free moves by the disagreement. */
@@ -350,8 +450,9 @@ static void warn_of_disagreement(Soft *soft, const mjModel *m, const mjData *d) 
         return;
     }
     mju_warning(PLUGIN_NAME
-                ": ground and constraints disagree by %.1e m/s at %g s, after %d rounds; a shorter "
-                "time step or more iterations of the solver may help; said once until a reset",
+                ": ground and constraints disagree by %.1e m/s at %g s, after %d rounds; <option "
+                "cone=\"pyramidal\"/>, more iterations of the solver or a shorter time step may "
+                "help; said once until a reset",
                 most, d->time, ROUNDS_MAX);
     soft->warned = 1;
 }
@@ -360,10 +461,14 @@ static void warn_of_disagreement(Soft *soft, const mjModel *m, const mjData *d) 
  * final. */
 static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
     const int exact = d->nefc == 0 && m->opt.integrator != mjINT_IMPLICIT;
+    const int jointly = rows_are_simple(d);
     double wrench[FOOT_ROWS] = {0}, twist[FOOT_ROWS], change[FOOT_ROWS];
-    forces_without_ground(m, d);
+    forces_without_ground(m, d, !jointly);
     metric_build(&soft->metric, m, d);
-    for (soft->rounds = 0; soft->rounds < ROUNDS_MAX; soft->rounds++) {
+    if (jointly) {
+        solve_jointly(soft, m, d, ground, wrench);
+    }
+    for (soft->rounds = jointly; soft->rounds < ROUNDS_MAX; soft->rounds++) {
         outcome(soft, m, d, twist);
         if (soft->rounds > 0 && disagreement(soft, twist, change) < AGREEMENT) {
             break;
