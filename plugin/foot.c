@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/text.h"
+#include "plugin/wheel.h"
 
 #define WORD 128          /* bytes of a name */
 #define SOLE_BAND 0.01    /* [m] what lies higher above the lowest point is not the sole */
@@ -135,8 +136,7 @@ static int has_primitive(const mjModel *m, int body) {
     return 0;
 }
 
-/* Bool: the geom is part of the foot's sole. */
-static int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom) {
+int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom) {
     const char *text = def->sole;
     char word[WORD];
     if (m->geom_bodyid[geom] != foot->body) {
@@ -559,6 +559,9 @@ MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, 
     }
     for (int f = 0; status == MILD_OK && f < *count; f++) {
         status = make_sole(m, def, model, compiling, f, &feet[f], error);
+        if (status == MILD_OK && !compiling) {
+            status = wheel_check(m, def, &feet[f], error);
+        }
     }
     return status;
 }

@@ -24,6 +24,7 @@
 #define JOINT_CLOSE 1e-9 /* [m/s, rad/s] difference of the twists at which they end */
 #define ROUNDS_MAX 30    /* solves of ground and constraints in one step */
 #define ROUNDS_ACTIVE 12 /* of them with the response of the active constraints */
+#define STANDS 0.5       /* [-] least cosine of a sole's tilt */
 #define AGREEMENT 1e-6   /* [m/s, rad/s] difference of the twists at which they agree */
 
 /* ---- making one ---- */
@@ -168,7 +169,7 @@ int soft_feet(const mjModel *m, int instance) {
 void soft_reset(Soft *soft, void *state, size_t bytes) {
     memset(state, 0, bytes);
     mild_ground_init_imprints(state, soft->soles, soft->feet, soft->def.prints);
-    soft->known = soft->solved = soft->warned = 0;
+    soft->known = soft->solved = soft->warned = soft->tilted = 0;
 }
 
 /* Bool: a material as Memory encodes it (ground/state.h) is one of the terrain. */
@@ -201,6 +202,7 @@ void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
     soft->fresh = from->fresh;
     soft->rounds = from->rounds;
     soft->warned = from->warned;
+    soft->tilted = from->tilted;
     memcpy(soft->passive, from->passive, nv);
     memcpy(soft->jacobian, from->jacobian, FOOT_ROWS * nv);
 }
@@ -457,6 +459,21 @@ static void warn_of_disagreement(Soft *soft, const mjModel *m, const mjData *d) 
     soft->warned = 1;
 }
 
+/* Warns of a loaded foot that has turned so far that its sole is no longer what touches. */
+static void warn_of_tilt(Soft *soft, const mjModel *m, const mjData *d) {
+    for (int f = 0; f < soft->feet && !soft->tilted; f++) {
+        const double up = fabs(soft->input.rotation[f][8]);
+        if (soft->contact.foot[f].contacts > 0 && up < STANDS) {
+            mju_warning(PLUGIN_NAME
+                        ": foot '%s' stands on the ground with its sole tilted by %.0f "
+                        "degrees at %g s; beyond 60 what touches is no longer the sole; "
+                        "said once until a reset",
+                        foot_name(m, &soft->foot[f]), acos(up) * 180 / mjPI, d->time);
+            soft->tilted = 1;
+        }
+    }
+}
+
 /* Ground and constraints in turn. Where the response is linear and known the first solve is
  * final. */
 static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
@@ -484,6 +501,7 @@ static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *gro
     if (soft->rounds == ROUNDS_MAX) {
         warn_of_disagreement(soft, m, d);
     }
+    warn_of_tilt(soft, m, d);
     soft->known = soft->solved = 1;
 }
 

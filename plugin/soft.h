@@ -30,6 +30,7 @@ typedef struct {
     int known;            /* bool: `input` and `contact` are those of a solve */
     int refused;          /* bool: the integrator has been complained about */
     int warned;           /* bool: a disagreement has been warned of since the last reset */
+    int tilted;           /* bool: a foot on its side has been warned of since the last reset */
     int rounds;           /* of ground and constraints in the last solve */
     MildGround layout;    /* header of a ground that remembers nothing */
     MildContactInput input;

@@ -173,6 +173,85 @@ static void warns_of_a_foot_that_lies_on_its_side(void **state) {
     mj_deleteModel(m);
 }
 
+#define WHEEL                                                                                      \
+    "<mesh name='wheel' vertex='.1 .03 0 .0707 .03 .0707 0 .03 .1 -.0707 .03 .0707 -.1 .03 0 "     \
+    "-.0707 .03 -.0707 0 .03 -.1 .0707 .03 -.0707 .0924 -.03 .0383 .0383 -.03 .0924 -.0383 -.03 "  \
+    ".0924 -.0924 -.03 .0383 -.0924 -.03 -.0383 -.0383 -.03 -.0924 .0383 -.03 -.0924 .0924 -.03 "  \
+    "-.0383'/>"
+
+/* A sole that turns with a wheel is soon on top: refused with foot, and joint or geom. What only
+ * looks like one is not. */
+static void wheels_are_refused(void **state) {
+    (void)state;
+    static const struct {
+        const char *joint, *geom, *said;
+    } cases[] = {
+        {"<freejoint/>", "type='cylinder' size='.1 .03' euler='90 0 0'", "rolls on geom 'shape'"},
+        {"<freejoint/>", "type='capsule' size='.1 .03' euler='0 90 0'", "rolls on geom 'shape'"},
+        {"<freejoint/>", "type='ellipsoid' size='.1 .03 .1'", "rolls on geom 'shape'"},
+        {"<freejoint/>", "type='mesh' mesh='wheel'", "rolls on geom 'shape'"},
+        {"<freejoint/>", "type='sphere' size='.1'", NULL}, /* a round foot */
+        {"<freejoint/>", "type='cylinder' size='.1 .03'", NULL},
+        {"<freejoint/>", "type='ellipsoid' size='.1 .1 .02'", NULL},
+        {"<joint name='axle' axis='0 1 0'/>", "type='cylinder' size='.1 .03' euler='90 0 0'",
+         "turns about joint 'axle'"},
+        {"<joint name='axle' axis='0 1 0' range='-40 40'/>",
+         "type='cylinder' size='.1 .03' euler='90 0 0'", "turns about joint 'axle'"},
+        {"<joint name='axle' axis='0 1 0' range='-20 20'/>",
+         "type='cylinder' size='.1 .03' euler='90 0 0'", NULL}, /* an ankle */
+        {"<joint name='axle' axis='0 0 1'/>", "type='cylinder' size='.1 .03'", NULL},
+        {"<joint name='knee' axis='0 1 0' pos='0 0 .3'/>",
+         "type='cylinder' size='.03 .03' euler='90 0 0'", NULL}, /* at the end of a leg */
+        {"<joint name='knee' axis='0 1 0' pos='0 0 .3'/>", "size='.03'", NULL},
+        {"<joint name='ankle' axis='0 1 0' pos='0 0 .05'/>", "type='box' size='.1 .05 .01'", NULL},
+        {"<joint name='ankle' axis='1 0 0'/>",
+         "type='capsule' size='.01 .1' euler='0 90 0' "
+         "pos='0 .04 -.04' " OFF "/><geom type='capsule' size='.01 .1' euler='0 90 0' pos='0 -.04 "
+         "-.04'",
+         NULL},
+    };
+    for (int c = 0; c < (int)(sizeof cases / sizeof *cases); c++) {
+        char text[3000];
+        snprintf(text, sizeof text,
+                 "<mujoco><extension><plugin plugin='mild.ground'><instance name='soft'>" FOOT
+                 "</instance></plugin></extension><asset>" WHEEL "</asset><worldbody><body "
+                 "name='foot'>%s<geom name='shape' mass='1' %s " OFF
+                 "/></body></worldbody></mujoco>",
+                 cases[c].joint, cases[c].geom);
+        kit_said[0] = '\0';
+        mjModel *m = kit_compile(text);
+        print_message("%d: %s\n", c, kit_said);
+        assert_int_equal(m == NULL, cases[c].said != NULL);
+        if (cases[c].said) {
+            assert_non_null(strstr(kit_said, "'foot'"));
+            assert_non_null(strstr(kit_said, cases[c].said));
+        }
+        mj_deleteModel(m);
+    }
+}
+
+/* A foot that falls over is said by name, once. */
+static void warns_of_a_tilted_sole(void **state) {
+    (void)state;
+    mjModel *m = compile("", FOOT, OFF, "", BOX OFF, "");
+    mjData *d = mj_makeData(m);
+    for (int run = 1; run <= 2; run++) {
+        mj_resetData(m, d);
+        d->qpos[2] = 0.03;
+        kit_run(m, d, 0.1);
+        assert_int_equal(kit_messages, run - 1);
+        d->qpos[2] = 0.04;
+        d->qpos[3] = cos(0.55);
+        d->qpos[4] = sin(0.55); /* 63 degrees */
+        kit_run(m, d, 0.1);
+        print_message("%s\n", kit_said);
+        assert_int_equal(kit_messages, run);
+        assert_non_null(strstr(kit_said, "foot 'foot'"));
+    }
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
 /* The integrator may be changed after compilation. */
 static void rk4_at_run_time(void **state) {
     (void)state;
@@ -226,7 +305,10 @@ static void soles_follow_the_shapes(void **state) {
     assert_in_range(elements_of(FOOT, "type='cylinder' size='.06 .02' " OFF), 0.93 * round,
                     1.07 * round);
     const double capsule = (0.2 * 0.1 + 3.1416 * 0.05 * 0.05) / element;
-    assert_in_range(elements_of(FOOT, "type='capsule' size='.05 .1' euler='0 90 0' " OFF),
+    /* with a ledge, without which it would roll */
+    assert_in_range(elements_of(FOOT,
+                                "type='capsule' size='.05 .1' euler='0 90 0' " OFF
+                                "/><geom type='box' size='.01 .05 .001' pos='0 0 -.049' " OFF),
                     0.93 * capsule, 1.07 * capsule);
     assert_in_range(elements_of(FOOT, "type='ellipsoid' size='.12 .12 .01' " OFF), 40, 130);
 }
@@ -324,6 +406,8 @@ int main(void) {
         cmocka_unit_test(refuses_a_second_instance),
         cmocka_unit_test(warns_of_a_rigid_floor),
         cmocka_unit_test(warns_of_a_foot_that_lies_on_its_side),
+        cmocka_unit_test(wheels_are_refused),
+        cmocka_unit_test(warns_of_a_tilted_sole),
         cmocka_unit_test(rk4_at_run_time),
         cmocka_unit_test(soles_follow_the_shapes),
         cmocka_unit_test(keys_reach_the_ground),

@@ -64,6 +64,14 @@ class Attach(unittest.TestCase):
         self.assertGreater(heights["plate", False], 0.0095)
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_wheel(self):
+        """A foot that rolls is refused by name when the model is compiled."""
+        spec = mujoco.MjSpec.from_string(PLATE.replace('type="box" size="0.1 0.05 0.01"', 'type="cylinder" size=".1 .03" euler="90 0 0"'))
+        mild.attach(spec, "plate")
+        with self.assertRaisesRegex(Exception, "'plate' is a wheel"):
+            spec.compile()
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_sensor(self):
         """It reads the weight and the depth of a plate at rest, beside a sensor of the model's own."""
         spec = mujoco.MjSpec.from_string(PLATE)
