@@ -56,22 +56,19 @@ void rows_start(Rows *rows, const Metric *metric, const mjModel *m, mjData *d) {
     mju_mulMatVec(rows->force, metric->mass, rows->trial, metric->dofs, metric->dofs);
     for (int i = 0; i < rows->count; i++) {
         rows->x[i] = metric_row_times(metric, m, d, i, rows->a) - d->efc_aref[i];
-        rows->zone[i] = -1;
+        rows->zone[i] = 0;
     }
 }
 
-int rows_enter(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d) {
-    int changed = 0;
+void rows_enter(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d) {
     memcpy(rows->load, rows->force, (size_t)metric->dofs * sizeof *rows->load);
     for (int i = 0; i < rows->count; i++) {
         const int zone = zone_of(d, i, rows->x[i]);
-        changed |= zone != rows->zone[i];
         rows->zone[i] = zone;
         rows->stiffness[i] = zone == 1 ? d->efc_D[i] : 0;
         /* the force at a = 0: x = -aref */
         metric_row_add(metric, m, d, i, force_in(d, i, zone, -d->efc_aref[i]), rows->load);
     }
-    return changed;
 }
 
 void rows_solve(Rows *rows, const Metric *metric, const double *push) {

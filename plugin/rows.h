@@ -36,8 +36,8 @@ int rows_are_simple(const mjData *d);
 /* Starts at the acceleration of the last step. The arrays are on MuJoCo's stack: between
  * mj_markStack and mj_freeStack. */
 void rows_start(Rows *rows, const Metric *metric, const mjModel *m, mjData *d);
-/* Takes over the zones of a. Returns whether they changed. */
-int rows_enter(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d);
+/* Takes over the zones of a. */
+void rows_enter(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d);
 /* trial = K^-1 (load + push), with metric->held; push: J^T W, [dofs]. */
 void rows_solve(Rows *rows, const Metric *metric, const double *push);
 /* Bool: trial is in the zones that it was computed with. */

@@ -6,11 +6,11 @@
  *
  * Constraints (joint limits, friction losses, contacts of other bodies) respond to the ground's
  * force, and the ground to theirs. Those of rows.h are solved with the ground, and MuJoCo's solver
- * then starts at the solution. What is left, cones of friction of other contacts, is solved with the
- * ground in turn until the twists agree, with an A that holds the constraints' response while the
- * same ones stay active. Two sets of active constraints may follow each other for ever: A of the one
- * makes the other active. The A without constraints ends that. No set of them responds by more, so
- * the ground never counts with too little. */
+ * then starts at the solution. What is left, cones of friction of other contacts, is solved with
+ * the ground in turn until the twists agree, with an A that holds the constraints' response while
+ * the same ones stay active. Two sets of active constraints may follow each other for ever: A of
+ * the one makes the other active. The A without constraints ends that. No set of them responds by
+ * more, so the ground never counts with too little. */
 #include "plugin/soft.h"
 
 #include <math.h>
@@ -372,6 +372,20 @@ static void joint_outcome(Soft *soft, const mjModel *m, const mjData *d, const R
     add_rates(soft, nv, a, twist);
 }
 
+/* A and V_free for the zones of rows->a. */
+static void joint_enter(Soft *soft, const mjModel *m, const mjData *d, Rows *rows, double *push) {
+    double twist[FOOT_ROWS];
+    const double none[FOOT_ROWS] = {0};
+    rows_enter(rows, &soft->metric, m, d);
+    metric_hold(&soft->metric, m, d, rows->stiffness);
+    inverse_inertia(soft, soft->metric.stiff, (int)m->nv);
+    mju_zero(push, soft->metric.dofs);
+    rows_solve(rows, &soft->metric, push);
+    joint_outcome(soft, m, d, rows, twist);
+    free_twists(soft, twist, none);
+    mix_start(&soft->mix, 6 * soft->feet);
+}
+
 /* Solves the ground with the response of the constraints in their zones, and finds those zones.
  * Leaves the wrench, and the acceleration in rows->trial. They follow from the zones alone, so that
  * a step that is evaluated again ends at the same. */
@@ -382,15 +396,7 @@ static void joint_solve(Soft *soft, const mjModel *m, mjData *d, const MildGroun
     int tries = 0; /* with these zones */
     for (int round = 0; round < JOINT_ROUNDS; round++) {
         if (tries++ == 0) {
-            rows_enter(rows, metric, m, d);
-            metric_hold(metric, m, d, rows->stiffness);
-            inverse_inertia(soft, metric->stiff, (int)m->nv);
-            mju_zero(push, metric->dofs);
-            mju_zero(wrench, 6 * soft->feet);
-            rows_solve(rows, metric, push);
-            joint_outcome(soft, m, d, rows, twist);
-            free_twists(soft, twist, wrench);
-            mix_start(&soft->mix, 6 * soft->feet);
+            joint_enter(soft, m, d, rows, push);
         } else {
             mix_next(&soft->mix, soft->input.free_velocity, change);
         }
@@ -410,8 +416,8 @@ static void joint_solve(Soft *soft, const mjModel *m, mjData *d, const MildGroun
     }
 }
 
-/* MuJoCo's solver then starts at the solution, here and when it is called for the step. Elsewhere it
- * would end within its own tolerance of it, 1e-5 m/s at times. */
+/* MuJoCo's solver then starts at the solution, here and when it is called for the step. From
+ * elsewhere it would end within its own tolerance of it, 1e-5 m/s at times. */
 static void solve_jointly(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground,
                           double *wrench) {
     const Metric *metric = &soft->metric;

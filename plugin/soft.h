@@ -65,8 +65,8 @@ void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *gro
 int soft_without_actuation(const mjModel *m);
 int soft_without_passive(const mjModel *m);
 
-/* Bool: the state is that of this ground, and not one of another model, zeros or NaN. Everything that
- * reads the state asks first, because MuJoCo lets anybody write it at any time. */
+/* Bool: the state is that of this ground, and not one of another model, zeros or NaN. Everything
+ * that reads the state asks first, because MuJoCo lets anybody write it at any time. */
 int soft_owns(const Soft *soft, const MildGround *ground);
 
 #endif

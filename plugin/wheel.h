@@ -1,5 +1,5 @@
-/* Private to the plugin: feet that turn, such as wheels and rollers. A sole is cut once, in the pose
- * of the file, and turns with its body; that of a wheel would soon be on top. */
+/* Private to the plugin: feet that turn, such as wheels and rollers. A sole is cut once, in the
+ * pose of the file, and turns with its body; that of a wheel would soon be on top. */
 #ifndef PLUGIN_WHEEL_H
 #define PLUGIN_WHEEL_H
 

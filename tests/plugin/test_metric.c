@@ -6,16 +6,17 @@
 
 #include "plugin_kit.h"
 
-#define LEG                                                                                                     \
-    "<worldbody><body name='trunk' pos='0 0 0.62'><freejoint/><geom name='trunk' type='box' size='.1 .08 .05' " \
-    "mass='8' contype='0' conaffinity='0'/>"                                                                    \
-    "<body pos='0 0 -0.05'><joint name='hip' axis='0 1 0' range='-90 90' %s/><geom "                            \
-    "type='capsule' fromto='0 0 0 0.1 0 -.25' size='.03' mass='.8' contype='0' conaffinity='0'/>"               \
-    "<body pos='0.1 0 -0.25'><joint name='knee' axis='0 1 0' range='-2 120' %s/><geom "                         \
-    "type='capsule' fromto='0 0 0 -0.1 0 -.28' size='.025' mass='.4' contype='0' "                              \
-    "conaffinity='0'/>"                                                                                         \
-    "<body name='foot' pos='-0.1 0 -0.28'><joint name='ankle' axis='0 1 0' range='-60 60' %s/>"                 \
-    "<geom type='box' size='.11 .08 .01' pos='0.02 0 -.03' mass='.2' contype='0' "                              \
+#define LEG                                                                                        \
+    "<worldbody><body name='trunk' pos='0 0 0.62'><freejoint/><geom name='trunk' "                 \
+    "type='box' size='.1 .08 .05' "                                                                \
+    "mass='8' contype='0' conaffinity='0'/>"                                                       \
+    "<body pos='0 0 -0.05'><joint name='hip' axis='0 1 0' range='-90 90' %s/><geom "               \
+    "type='capsule' fromto='0 0 0 0.1 0 -.25' size='.03' mass='.8' contype='0' conaffinity='0'/>"  \
+    "<body pos='0.1 0 -0.25'><joint name='knee' axis='0 1 0' range='-2 120' %s/><geom "            \
+    "type='capsule' fromto='0 0 0 -0.1 0 -.28' size='.025' mass='.4' contype='0' "                 \
+    "conaffinity='0'/>"                                                                            \
+    "<body name='foot' pos='-0.1 0 -0.28'><joint name='ankle' axis='0 1 0' range='-60 60' %s/>"    \
+    "<geom type='box' size='.11 .08 .01' pos='0.02 0 -.03' mass='.2' contype='0' "                 \
     "conaffinity='0'/></body></body></body></body></worldbody>"
 #define PD(kp, kv)                                                                                 \
     "<actuator><position joint='hip' kp='" kp "' kv='" kv "'/><position joint='knee' kp='" kp      \
@@ -165,8 +166,8 @@ static void cycles_end(void **state) {
     }
 }
 
-/* Cones of friction of other contacts are solved in turn with the ground. A constraint solver of one
- * iteration does not come to rest, and this is said once, and once more after a reset. */
+/* Cones of friction of other contacts are solved in turn with the ground. A constraint solver of
+ * one iteration does not come to rest, and this is said once, and once more after a reset. */
 static void disagreement_is_said(void **state) {
     (void)state;
     const Case table = {"",
@@ -258,7 +259,8 @@ static void friction_is_solved_with_the_ground(void **state) {
          ""},
         {"tendon",
          {"", "", ""},
-         "<tendon><fixed name='t' frictionloss='3'><joint joint='hip' coef='1'/><joint joint='knee' "
+         "<tendon><fixed name='t' frictionloss='3'><joint joint='hip' coef='1'/><joint "
+         "joint='knee' "
          "coef='-.7'/></fixed></tendon>" PD("90", "4")}};
     static const char *const integrators[] = {"Euler", "implicitfast", "implicit", "discrete"};
     for (int n = 0; n < 4 * 4 * 2; n++) {
