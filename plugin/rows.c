@@ -1,6 +1,7 @@
 #include "plugin/rows.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define HALVINGS 40 /* of the way to the trial */
@@ -38,17 +39,53 @@ static double force_in(const mjData *d, int i, int zone, double x) {
     }
 }
 
-void rows_start(Rows *rows, const Metric *metric, const mjModel *m, mjData *d) {
-    const size_t n = (size_t)metric->dofs, count = (size_t)d->nefc;
-    rows->count = (int)count;
-    rows->zone = mj_stackAllocInt(d, count);
-    rows->stiffness = mj_stackAllocNum(d, count);
-    rows->x = mj_stackAllocNum(d, count);
-    rows->change = mj_stackAllocNum(d, count);
-    rows->a = mj_stackAllocNum(d, n);
-    rows->trial = mj_stackAllocNum(d, n);
-    rows->force = mj_stackAllocNum(d, n);
-    rows->load = mj_stackAllocNum(d, n);
+int rows_alloc(Rows *rows, const mjModel *m) {
+    const size_t nv = (size_t)m->nv + 1;
+    rows->a = calloc(nv, sizeof *rows->a);
+    rows->trial = calloc(nv, sizeof *rows->trial);
+    rows->force = calloc(nv, sizeof *rows->force);
+    rows->load = calloc(nv, sizeof *rows->load);
+    rows->push = calloc(nv, sizeof *rows->push);
+    return rows->a && rows->trial && rows->force && rows->load && rows->push;
+}
+
+static void free_rows(Rows *rows) {
+    free(rows->zone);
+    free(rows->stiffness);
+    free(rows->x);
+    free(rows->change);
+}
+
+void rows_free(Rows *rows) {
+    free_rows(rows);
+    free(rows->a);
+    free(rows->trial);
+    free(rows->force);
+    free(rows->load);
+    free(rows->push);
+}
+
+/* Room for `count` rows, whose contents are lost. */
+static int reserve(Rows *rows, int count) {
+    if (count <= rows->room) {
+        return 1;
+    }
+    const size_t room = 2 * (size_t)count;
+    free_rows(rows);
+    rows->zone = calloc(room, sizeof *rows->zone);
+    rows->stiffness = calloc(room, sizeof *rows->stiffness);
+    rows->x = calloc(room, sizeof *rows->x);
+    rows->change = calloc(room, sizeof *rows->change);
+    const int good = rows->zone && rows->stiffness && rows->x && rows->change;
+    rows->room = good ? (int)room : 0;
+    return good;
+}
+
+int rows_start(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d) {
+    if (!reserve(rows, (int)d->nefc)) {
+        return 0;
+    }
+    rows->count = (int)d->nefc;
     for (int i = 0; i < metric->dofs; i++) {
         rows->a[i] = d->qacc_warmstart[metric->dof[i]];
         rows->trial[i] = d->qacc_smooth[metric->dof[i]];
@@ -58,6 +95,7 @@ void rows_start(Rows *rows, const Metric *metric, const mjModel *m, mjData *d) {
         rows->x[i] = metric_row_times(metric, m, d, i, rows->a) - d->efc_aref[i];
         rows->zone[i] = 0;
     }
+    return 1;
 }
 
 void rows_enter(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d) {
@@ -71,9 +109,9 @@ void rows_enter(Rows *rows, const Metric *metric, const mjModel *m, const mjData
     }
 }
 
-void rows_solve(Rows *rows, const Metric *metric, const double *push) {
+void rows_solve(Rows *rows, const Metric *metric) {
     for (int i = 0; i < metric->dofs; i++) {
-        rows->trial[i] = rows->load[i] + push[i];
+        rows->trial[i] = rows->load[i] + rows->push[i];
     }
     metric_solve(metric, metric->held, rows->trial);
 }
@@ -101,8 +139,7 @@ static double slope(const Rows *rows, const mjData *d, double inertial, double g
 /* The ground's energy is convex, and its slope at the trial is that of the wrench there. So it lies
  * below a line of that slope through its value at the trial, and less of the sum is less of the
  * energy. */
-void rows_move(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d,
-               const double *push) {
+void rows_move(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d) {
     const int n = metric->dofs;
     double inertial = 0, growth = 0, low = 0, high = 1;
     for (int i = 0; i < n; i++) {
@@ -110,7 +147,7 @@ void rows_move(Rows *rows, const Metric *metric, const mjModel *m, const mjData 
     }
     for (int i = 0; i < n; i++) {
         const double *row = metric->mass + (size_t)i * (size_t)n;
-        inertial += rows->trial[i] * (mju_dot(row, rows->a, n) - rows->force[i] - push[i]);
+        inertial += rows->trial[i] * (mju_dot(row, rows->a, n) - rows->force[i] - rows->push[i]);
         growth += rows->trial[i] * mju_dot(row, rows->trial, n);
     }
     for (int i = 0; i < rows->count; i++) {

@@ -21,6 +21,7 @@
 
 typedef struct {
     int count;         /* of rows */
+    int room;          /* for rows */
     int *zone;         /* [count] of the force: 0 constant and 0, 1 linear, 2 and 3 at a bound */
     double *stiffness; /* [count] D in the zone 1, else 0 */
     double *x;         /* [count] J a - aref */
@@ -29,21 +30,24 @@ typedef struct {
     double *trial;     /* [dofs] that of rows_solve */
     double *force;     /* [dofs] without ground and constraints */
     double *load;      /* [dofs] force, with what the zones add that does not depend on a */
+    double *push;      /* [dofs] J^T W */
 } Rows;
 
 /* Bool: the rows are of the kinds above, and not cones of contacts. */
 int rows_are_simple(const mjData *d);
-/* Starts at the acceleration of the last step. The arrays are on MuJoCo's stack: between
- * mj_markStack and mj_freeStack. */
-void rows_start(Rows *rows, const Metric *metric, const mjModel *m, mjData *d);
+/* Returns 0 when out of memory; free with rows_free. */
+int rows_alloc(Rows *rows, const mjModel *m);
+void rows_free(Rows *rows);
+/* Starts at the acceleration of the last step. Allocates only for more rows than ever before, and
+ * returns 0 when that fails. */
+int rows_start(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d);
 /* Takes over the zones of a. */
 void rows_enter(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d);
-/* trial = K^-1 (load + push), with metric->held; push: J^T W, [dofs]. */
-void rows_solve(Rows *rows, const Metric *metric, const double *push);
+/* trial = K^-1 (load + push), with metric->held. */
+void rows_solve(Rows *rows, const Metric *metric);
 /* Bool: trial is in the zones that it was computed with. */
 int rows_stay(const Rows *rows, const Metric *metric, const mjModel *m, const mjData *d);
 /* Goes from a towards trial, to the least sum of energies on the way. */
-void rows_move(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d,
-               const double *push);
+void rows_move(Rows *rows, const Metric *metric, const mjModel *m, const mjData *d);
 
 #endif

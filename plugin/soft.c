@@ -17,8 +17,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "plugin/rows.h"
-
 #define JOINT_ROUNDS 30  /* solves of the ground with the constraints in its response */
 #define JOINT_TRIES 12   /* of them in the same zones */
 #define JOINT_CLOSE 1e-9 /* [m/s, rad/s] difference of the twists at which they end */
@@ -70,7 +68,7 @@ static int alloc_arrays(Soft *soft, const mjModel *m) {
     soft->passive = calloc(nv + 1, sizeof *soft->passive);
     soft->acceleration = calloc(nv + 1, sizeof *soft->acceleration);
     return soft->jacobian && soft->response && soft->passive && soft->acceleration &&
-           metric_alloc(&soft->metric, m);
+           metric_alloc(&soft->metric, m) && rows_alloc(&soft->rows, m);
 }
 
 /* What the size of the state follows from. compiling: bool, as for feet_create. */
@@ -138,6 +136,7 @@ void soft_destroy(Soft *soft) {
     mild_map_destroy(soft->map);
     feet_destroy(soft->foot, soft->feet);
     metric_free(&soft->metric);
+    rows_free(&soft->rows);
     free(soft->jacobian);
     free(soft->response);
     free(soft->passive);
@@ -373,14 +372,14 @@ static void joint_outcome(Soft *soft, const mjModel *m, const mjData *d, const R
 }
 
 /* A and V_free for the zones of rows->a. */
-static void joint_enter(Soft *soft, const mjModel *m, const mjData *d, Rows *rows, double *push) {
+static void joint_enter(Soft *soft, const mjModel *m, const mjData *d, Rows *rows) {
     double twist[FOOT_ROWS];
     const double none[FOOT_ROWS] = {0};
     rows_enter(rows, &soft->metric, m, d);
     metric_hold(&soft->metric, m, d, rows->stiffness);
     inverse_inertia(soft, soft->metric.stiff, (int)m->nv);
-    mju_zero(push, soft->metric.dofs);
-    rows_solve(rows, &soft->metric, push);
+    mju_zero(rows->push, soft->metric.dofs);
+    rows_solve(rows, &soft->metric);
     joint_outcome(soft, m, d, rows, twist);
     free_twists(soft, twist, none);
     mix_start(&soft->mix, 6 * soft->feet);
@@ -392,18 +391,18 @@ static void joint_enter(Soft *soft, const mjModel *m, const mjData *d, Rows *row
 static void joint_solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground,
                         Rows *rows, double *wrench) {
     Metric *metric = &soft->metric;
-    double twist[FOOT_ROWS], change[FOOT_ROWS], *push = mj_stackAllocNum(d, (size_t)metric->dofs);
+    double twist[FOOT_ROWS], change[FOOT_ROWS];
     int tries = 0; /* with these zones */
     for (int round = 0; round < JOINT_ROUNDS; round++) {
         if (tries++ == 0) {
-            joint_enter(soft, m, d, rows, push);
+            joint_enter(soft, m, d, rows);
         } else {
             mix_next(&soft->mix, soft->input.free_velocity, change);
         }
         mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
         read_wrench(soft, wrench);
-        push_of(soft, (int)m->nv, wrench, push);
-        rows_solve(rows, metric, push);
+        push_of(soft, (int)m->nv, wrench, rows->push);
+        rows_solve(rows, metric);
         joint_outcome(soft, m, d, rows, twist);
         if (disagreement(soft, twist, change) > JOINT_CLOSE && tries < JOINT_TRIES) {
             continue;
@@ -411,7 +410,7 @@ static void joint_solve(Soft *soft, const mjModel *m, mjData *d, const MildGroun
         if (rows_stay(rows, metric, m, d)) {
             break;
         }
-        rows_move(rows, metric, m, d, push);
+        rows_move(rows, metric, m, d);
         tries = 0;
     }
 }
@@ -421,14 +420,10 @@ static void joint_solve(Soft *soft, const mjModel *m, mjData *d, const MildGroun
 static void solve_jointly(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground,
                           double *wrench) {
     const Metric *metric = &soft->metric;
-    Rows rows;
-    mj_markStack(d);
-    rows_start(&rows, metric, m, d);
-    joint_solve(soft, m, d, ground, &rows, wrench);
+    joint_solve(soft, m, d, ground, &soft->rows, wrench);
     for (int i = 0; i < metric->dofs; i++) {
-        d->qacc_warmstart[metric->dof[i]] = rows.trial[i];
+        d->qacc_warmstart[metric->dof[i]] = soft->rows.trial[i];
     }
-    mj_freeStack(d);
     apply(soft, m, d, wrench, 1);
 }
 
@@ -484,10 +479,14 @@ static void warn_of_tilt(Soft *soft, const mjModel *m, const mjData *d) {
  * final. */
 static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
     const int exact = d->nefc == 0 && m->opt.integrator != mjINT_IMPLICIT;
-    const int jointly = rows_are_simple(d);
+    const int simple = rows_are_simple(d);
     double wrench[FOOT_ROWS] = {0}, twist[FOOT_ROWS], change[FOOT_ROWS];
-    forces_without_ground(m, d, !jointly);
+    forces_without_ground(m, d, !simple);
     metric_build(&soft->metric, m, d);
+    const int jointly = simple && rows_start(&soft->rows, &soft->metric, m, d);
+    if (simple && !jointly) { /* out of memory */
+        mj_fwdConstraint(m, d);
+    }
     if (jointly) {
         solve_jointly(soft, m, d, ground, wrench);
     }

@@ -7,6 +7,7 @@
 #include "plugin/foot.h"
 #include "plugin/metric.h"
 #include "plugin/mix.h"
+#include "plugin/rows.h"
 
 #define FOOT_ROWS (6 * MILD_FEET_MAX)
 
@@ -19,6 +20,7 @@ typedef struct {
     MildTerrain terrain;
     MildScratch *scratch;
     Metric metric;
+    Rows rows;
     Mix mix;
     double *jacobian; /* [6 feet][nv] twist of each foot: linear, angular; world axes */
     double *response; /* [6 feet][nv] of the metric's degrees of freedom: N^-1 J^T, transposed */
