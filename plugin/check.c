@@ -108,8 +108,7 @@ int check_feet(const mjModel *m, const Soft *soft, char *text, size_t size) {
             snprintf(text, size,
                      "the z axis of foot '%.60s' is not vertical in the pose of the file; its sole "
                      "lies across z: name a site whose z axis points up from the sole",
-                     foot->site < 0 ? foot_body_name(m, foot)
-                                    : mj_id2name(m, mjOBJ_SITE, foot->site));
+                     foot_name(m, foot));
             return 1;
         }
     }

@@ -7,12 +7,14 @@
 #include <string.h>
 
 #include "base/text.h"
+#include "plugin/wheel.h"
 
-#define WORD 128         /* bytes of a name */
-#define SOLE_BAND 0.01   /* [m] what lies higher above the lowest point is not the sole */
-#define CIRCLE_POINTS 32 /* corners of a round outline */
-#define SINKS 0.05       /* [m] depth to which a foot is expected to sink */
-#define OUTLINE_MAX 4096 /* corners of an outline, the limit of MildSoleDef */
+#define WORD 128          /* bytes of a name */
+#define SOLE_BAND 0.01    /* [m] what lies higher above the lowest point is not the sole */
+#define CIRCLE_POINTS 32  /* corners of a round outline */
+#define SINKS 0.05        /* [m] depth to which a foot is expected to sink */
+#define OUTLINE_MAX 4096  /* corners of an outline, the limit of MildSoleDef */
+#define BOUNDS_SLACK 1e-3 /* [-] of an element; vertices are rounded to floats, boxes are not */
 #define PI 3.141592653589793
 
 /* ---- names ---- */
@@ -43,17 +45,27 @@ const char *foot_body_name(const mjModel *m, const Foot *foot) {
     return name ? name : "";
 }
 
-static MildStatus add_foot(Foot *feet, int *count, int body, int site, MildError *error) {
+const char *foot_name(const mjModel *m, const Foot *foot) {
+    return foot->site < 0 ? foot_body_name(m, foot) : mj_id2name(m, mjOBJ_SITE, foot->site);
+}
+
+/* Two feet on one body would each count the ground under it. */
+static MildStatus add_foot(const mjModel *m, Foot *feet, int *count, int body, int site,
+                           MildError *error) {
+    const Foot added = {.body = body, .site = site};
     if (*count == MILD_FEET_MAX) {
         return mild_fail(error, MILD_ERROR_RANGE, "more than %d feet", MILD_FEET_MAX);
     }
     for (int f = 0; f < *count; f++) {
-        if (feet[f].body == body && feet[f].site == site) {
-            return mild_fail(error, MILD_ERROR_ARGUMENT,
-                             "feet: one body or site is there twice; name each foot once");
+        if (feet[f].body == body) {
+            return mild_fail(
+                error, MILD_ERROR_ARGUMENT,
+                "feet: '%.60s' and '%.60s' are on one body, '%.60s', which would stand "
+                "on the ground twice; name it once",
+                foot_name(m, &feet[f]), foot_name(m, &added), foot_body_name(m, &added));
         }
     }
-    feet[(*count)++] = (Foot){.body = body, .site = site};
+    feet[(*count)++] = added;
     return MILD_OK;
 }
 
@@ -68,7 +80,7 @@ static MildStatus find_feet(const mjModel *m, const PluginDef *def, Foot *feet, 
             return unknown(m, mjOBJ_BODY, (int)m->nbody, "feet", name, error);
         }
         MildStatus status =
-            add_foot(feet, count, site < 0 ? body : m->site_bodyid[site], site, error);
+            add_foot(m, feet, count, site < 0 ? body : m->site_bodyid[site], site, error);
         if (status != MILD_OK) {
             return status;
         }
@@ -95,7 +107,7 @@ static MildStatus find_geoms(const mjModel *m, const PluginDef *def, Foot *feet,
                              "sole: geom '%.60s' is on no body of feet; name its body there", name);
         }
         MildStatus status =
-            known ? MILD_OK : add_foot(feet, count, m->geom_bodyid[geom], -1, error);
+            known ? MILD_OK : add_foot(m, feet, count, m->geom_bodyid[geom], -1, error);
         if (status != MILD_OK) {
             return status;
         }
@@ -124,8 +136,7 @@ static int has_primitive(const mjModel *m, int body) {
     return 0;
 }
 
-/* Bool: the geom is part of the foot's sole. */
-static int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom) {
+int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom) {
     const char *text = def->sole;
     char word[WORD];
     if (m->geom_bodyid[geom] != foot->body) {
@@ -164,6 +175,8 @@ typedef struct {
     int count, room;
     double turn[9];   /* frame of the body -> frame of the foot */
     double origin[3]; /* [m] of the foot's frame in that of the body */
+    int compiling;    /* bool: meshes have no vertices yet */
+    int bounds;       /* bool: some points are those of a mesh's bounding box */
 } Cloud;
 
 static int cloud_add(Cloud *cloud, const double point[3]) {
@@ -232,9 +245,26 @@ static int cloud_add_rings(Cloud *cloud, const mjModel *m, int geom) {
     return good;
 }
 
+/* Corners of the bounding box, which the compiler knows before it has the vertices. */
+static int cloud_add_bounds(Cloud *cloud, const mjModel *m, int geom) {
+    const double *middle = m->geom_aabb + 6 * geom, *half = middle + 3;
+    int good = 1;
+    for (int corner = 0; good && corner < 8; corner++) {
+        const double local[3] = {middle[0] + (corner & 1 ? half[0] : -half[0]),
+                                 middle[1] + (corner & 2 ? half[1] : -half[1]),
+                                 middle[2] + (corner & 4 ? half[2] : -half[2])};
+        good = cloud_add_local(cloud, m, geom, local);
+    }
+    return good;
+}
+
 static int cloud_add_mesh(Cloud *cloud, const mjModel *m, int geom) {
     const int mesh = m->geom_dataid[geom];
     int good = 1;
+    if (cloud->compiling) {
+        cloud->bounds = 1;
+        return cloud_add_bounds(cloud, m, geom);
+    }
     for (int v = 0; good && mesh >= 0 && v < m->mesh_vertnum[mesh]; v++) {
         const float *vertex = m->mesh_vert + 3 * (m->mesh_vertadr[mesh] + v);
         const double local[3] = {vertex[0], vertex[1], vertex[2]};
@@ -339,33 +369,65 @@ static MildStatus no_shape(const mjModel *m, const Foot *foot, MildError *error)
                      foot_body_name(m, foot));
 }
 
-/* The sole under the geoms of the foot: the convex hull of what lies lowest. */
-static MildStatus sole_from_geoms(const mjModel *m, const PluginDef *def, Foot *foot,
-                                  MildError *error) {
-    Cloud cloud = {0};
-    int good = 1;
-    cloud_frame(m, foot, &cloud);
-    for (int g = 0; g < m->ngeom; g++) {
-        if (foot_has_geom(m, def, foot, g)) {
-            good = good && cloud_add_geom(&cloud, m, g);
+/* A rectangle of whole elements, in which a sole of any shape within the cloud has no more: of the
+ * element centres on a line of length L at most L/pitch + 1 are inside. */
+static MildStatus sole_of_bounds(const PluginDef *def, const Cloud *cloud, Foot *foot,
+                                 MildError *error) {
+    double low[2] = {DBL_MAX, DBL_MAX}, high[2] = {-DBL_MAX, -DBL_MAX}, half[2], middle[2];
+    for (int k = 0; k < 2; k++) {
+        for (int i = 0; i < cloud->count; i++) {
+            low[k] = fmin(low[k], cloud->at[i][k]);
+            high[k] = fmax(high[k], cloud->at[i][k]);
         }
+        half[k] = 0.5 * def->pitch * (floor((high[k] - low[k]) / def->pitch + BOUNDS_SLACK) + 1);
+        middle[k] = 0.5 * (low[k] + high[k]);
     }
-    const double z = good ? keep_lowest(&cloud) : 0;
-    double *hull = malloc((size_t)(cloud.count + 1) * 4 * sizeof *hull);
-    const int corners = good && hull && cloud.count ? convex_hull(cloud.at, cloud.count, hull) : 0;
+    const double outline[8] = {middle[0] - half[0], middle[1] - half[1], middle[0] + half[0],
+                               middle[1] - half[1], middle[0] + half[0], middle[1] + half[1],
+                               middle[0] - half[0], middle[1] + half[1]};
+    return make_raster(def, outline, 4, 0, foot, error);
+}
+
+/* The convex hull of what lies lowest. */
+static MildStatus sole_of_cloud(const mjModel *m, const PluginDef *def, Cloud *cloud, Foot *foot,
+                                MildError *error) {
+    const double z = keep_lowest(cloud);
+    double *hull = malloc((size_t)(cloud->count + 1) * 4 * sizeof *hull);
+    const int corners = hull && cloud->count ? convex_hull(cloud->at, cloud->count, hull) : 0;
     MildStatus status;
-    if (!good || !hull) {
+    if (!hull) {
         status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     } else if (corners < 3 || corners > OUTLINE_MAX) {
         status = no_shape(m, foot, error);
     } else {
         status = make_raster(def, hull, corners, z, foot, error);
     }
-    free(cloud.at);
     free(hull);
     return status;
 }
 
+/* The sole under the geoms of the foot. */
+static MildStatus sole_from_geoms(const mjModel *m, const PluginDef *def, int compiling, Foot *foot,
+                                  MildError *error) {
+    Cloud cloud = {.compiling = compiling};
+    int good = 1;
+    MildStatus status;
+    cloud_frame(m, foot, &cloud);
+    for (int g = 0; g < m->ngeom; g++) {
+        if (foot_has_geom(m, def, foot, g)) {
+            good = good && cloud_add_geom(&cloud, m, g);
+        }
+    }
+    if (!good) {
+        status = mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
+    } else if (cloud.bounds) {
+        status = sole_of_bounds(def, &cloud, foot, error);
+    } else {
+        status = sole_of_cloud(m, def, &cloud, foot, error);
+    }
+    free(cloud.at);
+    return status;
+}
 /* A round foot stands on a disc of its own radius: a polygon of the same area. */
 static MildStatus sole_of_sphere(const mjModel *m, const PluginDef *def, int geom, Foot *foot,
                                  MildError *error) {
@@ -457,8 +519,8 @@ static MildStatus check_outlines(const PluginDef *def, int feet, MildError *erro
 
 /* ---- feet ---- */
 
-static MildStatus make_sole(const mjModel *m, const PluginDef *def, MildModel model, int f,
-                            Foot *foot, MildError *error) {
+static MildStatus make_sole(const mjModel *m, const PluginDef *def, MildModel model, int compiling,
+                            int f, Foot *foot, MildError *error) {
     const int sphere = only_sphere(m, def, foot);
     MildStatus status;
     if (m->body_weldid[foot->body] == 0) {
@@ -471,7 +533,7 @@ static MildStatus make_sole(const mjModel *m, const PluginDef *def, MildModel mo
     } else if (sphere >= 0) {
         status = sole_of_sphere(m, def, sphere, foot, error);
     } else {
-        status = sole_from_geoms(m, def, foot, error);
+        status = sole_from_geoms(m, def, compiling, foot, error);
     }
     if (status != MILD_OK) {
         return status;
@@ -481,8 +543,8 @@ static MildStatus make_sole(const mjModel *m, const PluginDef *def, MildModel mo
     return foot->sole ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
-MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, Foot *feet,
-                       int *count, MildError *error) {
+MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, int compiling,
+                       Foot *feet, int *count, MildError *error) {
     *count = 0;
     MildStatus status = find_feet(m, def, feet, count, error);
     if (status == MILD_OK) {
@@ -496,7 +558,10 @@ MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, 
         status = check_outlines(def, *count, error);
     }
     for (int f = 0; status == MILD_OK && f < *count; f++) {
-        status = make_sole(m, def, model, f, &feet[f], error);
+        status = make_sole(m, def, model, compiling, f, &feet[f], error);
+        if (status == MILD_OK && !compiling) {
+            status = wheel_check(m, def, &feet[f], error);
+        }
     }
     return status;
 }

@@ -17,14 +17,21 @@ typedef struct {
 } Foot;
 
 /* Finds the feet of an instance and makes their soles. feet: [MILD_FEET_MAX], zeroed. Writes their
- * number, also on failure, when those made so far must be destroyed. */
-MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, Foot *feet,
-                       int *count, MildError *error);
+ * number, also on failure, when those made so far must be destroyed.
+ *
+ * compiling: bool, the compiler asks for the size of the state. Meshes have no vertices yet. A sole
+ * of meshes is then a rectangle under their bounding boxes, with at least as many elements. */
+MildStatus feet_create(const mjModel *m, const PluginDef *def, MildModel model, int compiling,
+                       Foot *feet, int *count, MildError *error);
 void feet_destroy(Foot *feet, int count);
 
+/* Name of the foot's site or body. */
+const char *foot_name(const mjModel *m, const Foot *foot);
 /* Name of the foot's body; empty when it has none. */
 const char *foot_body_name(const mjModel *m, const Foot *foot);
 
+/* Bool: the geom is part of the foot's sole. */
+int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom);
 /* Bool: the geom is on the foot's body and would meet a floor that the sole sinks into. */
 int foot_may_meet_floor(const mjModel *m, const Foot *foot, int geom);
 

@@ -22,11 +22,13 @@ int metric_alloc(Metric *metric, const mjModel *m) {
     metric->tree = calloc((size_t)m->ntree + 1, sizeof *metric->tree);
     metric->inertia = calloc(square + 1, sizeof *metric->inertia);
     metric->factor = calloc(square + 1, sizeof *metric->factor);
+    metric->mass = calloc(square + 1, sizeof *metric->mass);
     metric->stiff = calloc(square + 1, sizeof *metric->stiff);
+    metric->held = calloc(square + 1, sizeof *metric->held);
     metric->full = calloc(square + 1, sizeof *metric->full);
     metric->pivot = calloc(nv + 1, sizeof *metric->pivot);
     return metric->dof && metric->place && metric->tree && metric->inertia && metric->factor &&
-           metric->stiff && metric->full && metric->pivot;
+           metric->mass && metric->stiff && metric->held && metric->full && metric->pivot;
 }
 
 void metric_free(Metric *metric) {
@@ -35,7 +37,9 @@ void metric_free(Metric *metric) {
     free(metric->tree);
     free(metric->inertia);
     free(metric->factor);
+    free(metric->mass);
     free(metric->stiff);
+    free(metric->held);
     free(metric->full);
     free(metric->pivot);
 }
@@ -321,6 +325,10 @@ void metric_build(Metric *metric, const mjModel *m, mjData *d) {
     add_sparse(metric, m, d->M, 1);
     if (metric_is_discrete(m)) {
         add_discrete(metric, m, d);
+    }
+    memcpy(metric->mass, metric->inertia, square * sizeof *metric->mass);
+    if (metric_is_discrete(m)) {
+        /* its solver divides by N, too */
     } else if (m->opt.integrator == mjINT_EULER) {
         add_euler(metric, m, d);
     } else {
@@ -388,6 +396,64 @@ static uint64_t active_set(const mjData *d) {
     return hash | 1;
 }
 
+/* N/M of the degrees of freedom of a row. */
+static double inertia_ratio(const Metric *metric, const Row *row) {
+    double integrator = 0, solver = 0;
+    for (int k = 0; k < row->count; k++) {
+        const int i = metric->place[row_dof(row, k)];
+        if (i >= 0) {
+            const double square = row->value[k] * row->value[k];
+            integrator += square * metric->inertia[i * metric->dofs + i];
+            solver += square * metric->mass[i * metric->dofs + i];
+        }
+    }
+    return solver > 0 ? integrator / solver : 1;
+}
+
+static void stiffen_row(Metric *metric, const mjModel *m, const mjData *d, int i, double D) {
+    const Row row = constraint_row(m, d, i);
+    if (D > 0) {
+        row_add(metric, metric->stiff, &row, D * inertia_ratio(metric, &row));
+    }
+}
+
+void metric_hold(Metric *metric, const mjModel *m, const mjData *d, const double *stiffness) {
+    const size_t square = (size_t)metric->dofs * (size_t)metric->dofs;
+    memcpy(metric->stiff, metric->inertia, square * sizeof *metric->stiff);
+    memcpy(metric->held, metric->mass, square * sizeof *metric->held);
+    for (int i = 0; i < d->nefc; i++) {
+        const Row row = constraint_row(m, d, i);
+        stiffen_row(metric, m, d, i, stiffness[i]);
+        if (stiffness[i] > 0) {
+            row_add(metric, metric->held, &row, stiffness[i]);
+        }
+    }
+    mju_cholFactor(metric->stiff, metric->dofs, PIVOT);
+    mju_cholFactor(metric->held, metric->dofs, PIVOT);
+}
+
+double metric_row_times(const Metric *metric, const mjModel *m, const mjData *d, int i,
+                        const double *x) {
+    const Row row = constraint_row(m, d, i);
+    double sum = 0;
+    for (int k = 0; k < row.count; k++) {
+        const int at = metric->place[row_dof(&row, k)];
+        sum += at >= 0 ? row.value[k] * x[at] : 0;
+    }
+    return sum;
+}
+
+void metric_row_add(const Metric *metric, const mjModel *m, const mjData *d, int i, double scale,
+                    double *vector) {
+    const Row row = constraint_row(m, d, i);
+    for (int k = 0; k < row.count && scale != 0; k++) {
+        const int at = metric->place[row_dof(&row, k)];
+        if (at >= 0) {
+            vector[at] += scale * row.value[k];
+        }
+    }
+}
+
 int metric_stiffen(Metric *metric, const mjModel *m, const mjData *d) {
     const size_t square = (size_t)metric->dofs * (size_t)metric->dofs;
     const uint64_t active = active_set(d);
@@ -397,11 +463,7 @@ int metric_stiffen(Metric *metric, const mjModel *m, const mjData *d) {
     metric->active = active;
     memcpy(metric->stiff, metric->inertia, square * sizeof *metric->stiff);
     for (int i = 0; i < d->nefc; i++) {
-        const double D = active_stiffness(d, i);
-        const Row row = constraint_row(m, d, i);
-        if (D > 0) {
-            row_add(metric, metric->stiff, &row, D);
-        }
+        stiffen_row(metric, m, d, i, active_stiffness(d, i));
     }
     mju_cholFactor(metric->stiff, metric->dofs, PIVOT);
     return 1;

@@ -23,7 +23,9 @@ typedef struct {
     int *tree;       /* [ntree] bool: in use */
     double *inertia; /* [dofs][dofs] N, symmetric */
     double *factor;  /* [dofs][dofs] its Cholesky factor, lower */
-    double *stiff;   /* [dofs][dofs] factor of N + J_c^T D_c J_c */
+    double *mass;    /* [dofs][dofs] M of MuJoCo's constraint solver: N where it gives the step */
+    double *stiff;   /* [dofs][dofs] factor of N + J_c^T D_c' J_c, see metric_stiffen */
+    double *held;    /* [dofs][dofs] factor of M + J_c^T D_c J_c */
     double *full;    /* [dofs][dofs] LU factors of N with Coriolis terms: `implicit` */
     int *pivot;      /* [dofs] rows that were exchanged */
     uint64_t active; /* hash of the constraints in `stiff`; 0: none yet */
@@ -42,11 +44,21 @@ int metric_is_step(const mjModel *m, const mjData *d);
 void metric_build(Metric *metric, const mjModel *m, mjData *d);
 /* x = N^-1 x in place, with the N of the integrator; [dofs]. */
 void metric_integrate(const Metric *metric, const mjModel *m, double *x);
-/* Factors N + J_c^T D_c J_c: how the velocity after the step responds to a force while the
+/* Factors N + J_c^T D_c' J_c: how the velocity after the step responds to a force while the
  * constraints that are active now stay active. Needs the constraint forces. Returns 0 when the
- * constraints are those of the last call. */
+ * constraints are those of the last call.
+ *
+ * The exact response N^-1 M (M + J_c^T D_c J_c)^-1 is not symmetric where M is not N. That with
+ * D_c' = D_c N/M, the ratio of the row's degrees of freedom, is; it is exact for one alone. */
 int metric_stiffen(Metric *metric, const mjModel *m, const mjData *d);
-/* x = factor^-1 x in place. factor: metric->factor or metric->stiff; x: [dofs]. */
+/* The same with given stiffnesses of the rows, [nefc]; and factors `held`. */
+void metric_hold(Metric *metric, const mjModel *m, const mjData *d, const double *stiffness);
+/* Row i of the constraints times x, and vector += scale times the row; [dofs]. */
+double metric_row_times(const Metric *metric, const mjModel *m, const mjData *d, int i,
+                        const double *x);
+void metric_row_add(const Metric *metric, const mjModel *m, const mjData *d, int i, double scale,
+                    double *vector);
+/* x = factor^-1 x in place. factor: metric->factor, stiff or held; x: [dofs]. */
 void metric_solve(const Metric *metric, const double *factor, double *x);
 
 #endif

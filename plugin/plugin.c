@@ -2,6 +2,7 @@
  * MuJoCo has a stage of actuation only in models with actuators (soft.h); at a third it says what
  * it did (sensor.h). */
 #include <stdatomic.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "plugin/check.h"
@@ -18,11 +19,33 @@ static MildGround *ground_of(const mjModel *m, const mjData *d, int instance) {
     return (MildGround *)(void *)(d->plugin_state + m->plugin_stateadr[instance]);
 }
 
-/* MuJoCo's warnings are the channel for what is wrong with a plugin's attributes. */
-static void say(const mjModel *m, int instance, const char *text) {
+/* A message that names the instance. */
+static const char *name_it(const mjModel *m, int instance, const char *text, char *line,
+                           size_t size) {
     const char *name = mj_id2name(m, mjOBJ_PLUGIN, instance);
-    mju_warning(PLUGIN_NAME "%s%s%s: %s", name ? " '" : "", name ? name : "", name ? "'" : "",
-                text);
+    snprintf(line, size, PLUGIN_NAME "%s%.60s%s: %s", name ? " '" : "", name ? name : "",
+             name ? "'" : "", text);
+    return line;
+}
+
+static void say(const mjModel *m, int instance, const char *text) {
+    char line[600];
+    mju_warning("%s", name_it(m, instance, text, line, sizeof line));
+}
+
+/* Does not return. MuJoCo would free the mjData and end with an error of its own if `init` failed;
+ * a warning beside it is said twice since MuJoCo 3.10. */
+static void refuse(const mjModel *m, mjData *d, int instance, const char *text) {
+    char line[600];
+    name_it(m, instance, text, line, sizeof line);
+    mju_free(d->buffer);
+    mju_free(d->arena);
+    mju_free(d);
+    mju_error("%s", line);
+}
+
+static size_t state_bytes(const mjModel *m, int instance) {
+    return (size_t)m->plugin_statenum[instance] * sizeof(mjtNum);
 }
 
 static Soft *create(const mjModel *m, int instance, MildError *error) {
@@ -35,13 +58,15 @@ static atomic_int warned;
 /* Called first, when the model is compiled; what is wrong is said by `init`. */
 static int state_size(const mjModel *m, int instance) {
     atomic_store(&warned, 0);
-    return (int)(soft_state_bytes(m, instance) / sizeof(mjtNum));
+    return (int)(soft_room(m, instance) / sizeof(mjtNum));
 }
 
-/* Called when a model with a sensor of the instance is compiled. */
+/* Called when a model with a sensor of the instance is compiled. A sensor of no numbers would end
+ * the compilation before `init` can say what is wrong. */
 static int sensor_size(const mjModel *m, int instance, int sensor) {
+    const int feet = soft_feet(m, instance);
     (void)sensor;
-    return SENSOR_NUMBERS * soft_feet(m, instance);
+    return SENSOR_NUMBERS * (feet > 0 ? feet : 1);
 }
 
 static int init(const mjModel *m, mjData *d, int instance) {
@@ -50,8 +75,7 @@ static int init(const mjModel *m, mjData *d, int instance) {
     Soft *soft = create(m, instance, &error);
     d->plugin_data[instance] = (uintptr_t)soft;
     if (!soft) {
-        say(m, instance, error.text);
-        return -1;
+        refuse(m, d, instance, error.text);
     }
     /* the compiler makes an mjData of its own, for which the model has no signature yet */
     if (m->signature && check_feet(m, soft, text, sizeof text) && !atomic_exchange(&warned, 1)) {
@@ -72,16 +96,23 @@ static void copy(mjData *to, const mjModel *m, const mjData *from, int instance)
 }
 
 static void reset(const mjModel *m, mjtNum *state, void *data, int instance) {
-    (void)m;
-    (void)instance;
     if (data) {
-        soft_reset(data, state);
+        soft_reset(data, state, state_bytes(m, instance));
     }
+}
+
+/* The ground's memory. What is not one of this ground is said and replaced. */
+static MildGround *own_state(Soft *soft, const mjModel *m, const mjData *d, int instance) {
+    MildGround *ground = ground_of(m, d, instance);
+    if (!soft_owns(soft, ground)) {
+        say(m, instance, "its state is not one of this ground; it was reset");
+        soft_reset(soft, ground, state_bytes(m, instance));
+    }
+    return ground;
 }
 
 static void compute(const mjModel *m, mjData *d, int instance, int capability) {
     Soft *soft = soft_of(d, instance);
-    MildGround *ground = ground_of(m, d, instance);
     if (!soft) {
         return;
     }
@@ -89,10 +120,7 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability) {
         sensor_write(soft, m, d, instance);
         return;
     }
-    if (!soft_owns(soft, ground)) {
-        say(m, instance, "its state is not one of this ground; it was reset");
-        soft_reset(soft, ground);
-    }
+    MildGround *ground = own_state(soft, m, d, instance);
     if (capability == mjPLUGIN_PASSIVE) {
         soft_passive(soft, m, d, ground);
     } else {
@@ -101,8 +129,9 @@ static void compute(const mjModel *m, mjData *d, int instance, int capability) {
 }
 
 static void advance(const mjModel *m, mjData *d, int instance) {
-    if (soft_of(d, instance)) {
-        soft_advance(soft_of(d, instance), m, d, ground_of(m, d, instance));
+    Soft *soft = soft_of(d, instance);
+    if (soft) {
+        soft_advance(soft, m, d, own_state(soft, m, d, instance));
     }
 }
 

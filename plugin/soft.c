@@ -4,21 +4,25 @@
  *
  *     V = V_free + h A W,    A = J N^-1 J^T    (N: metric.h)
  *
- * Constraints (joint limits, contacts of other bodies) respond to the ground's force, and the
- * ground to theirs. Both are solved in turn until the twists agree, with an A that holds the
- * constraints' response while the same ones stay active. Two sets of active constraints may follow
- * each other for ever: A of the one makes the other active. The A without constraints ends that.
- * No set of them responds by more, so the ground never counts with too little. */
+ * Constraints (joint limits, friction losses, contacts of other bodies) respond to the ground's
+ * force, and the ground to theirs. Those of rows.h are solved with the ground, and MuJoCo's solver
+ * then starts at the solution. What is left, cones of friction of other contacts, is solved with
+ * the ground in turn until the twists agree, with an A that holds the constraints' response while
+ * the same ones stay active. Two sets of active constraints may follow each other for ever: A of
+ * the one makes the other active. The A without constraints ends that. No set of them responds by
+ * more, so the ground never counts with too little. */
 #include "plugin/soft.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "ground/state.h"
-
+#define JOINT_ROUNDS 30  /* solves of the ground with the constraints in its response */
+#define JOINT_TRIES 12   /* of them in the same zones */
+#define JOINT_CLOSE 1e-9 /* [m/s, rad/s] difference of the twists at which they end */
 #define ROUNDS_MAX 30    /* solves of ground and constraints in one step */
 #define ROUNDS_ACTIVE 12 /* of them with the response of the active constraints */
+#define STANDS 0.5       /* [-] least cosine of a sole's tilt */
 #define AGREEMENT 1e-6   /* [m/s, rad/s] difference of the twists at which they agree */
 
 /* ---- making one ---- */
@@ -53,6 +57,10 @@ static MildStatus lay_map(Soft *soft, MildError *error) {
     return soft->map ? mild_terrain_set_map(&soft->terrain, soft->map, error) : MILD_ERROR_ARGUMENT;
 }
 
+static size_t ground_bytes(const Soft *soft) {
+    return mild_ground_bytes_imprints(soft->soles, soft->feet, soft->def.prints);
+}
+
 static int alloc_arrays(Soft *soft, const mjModel *m) {
     const size_t nv = (size_t)m->nv;
     soft->jacobian = calloc(FOOT_ROWS * nv + 1, sizeof *soft->jacobian);
@@ -60,18 +68,19 @@ static int alloc_arrays(Soft *soft, const mjModel *m) {
     soft->passive = calloc(nv + 1, sizeof *soft->passive);
     soft->acceleration = calloc(nv + 1, sizeof *soft->acceleration);
     return soft->jacobian && soft->response && soft->passive && soft->acceleration &&
-           metric_alloc(&soft->metric, m);
+           metric_alloc(&soft->metric, m) && rows_alloc(&soft->rows, m);
 }
 
-/* What the size of the state follows from. */
-static MildStatus make_feet(Soft *soft, const mjModel *m, int instance, MildError *error) {
+/* What the size of the state follows from. compiling: bool, as for feet_create. */
+static MildStatus make_feet(Soft *soft, const mjModel *m, int instance, int compiling,
+                            MildError *error) {
     MildModel model = MILD_MODEL_MILD;
     MildStatus status = plugin_def_read(m, instance, &soft->def, error);
     if (status == MILD_OK) {
         status = plugin_def_model(m, instance, &soft->def, &model, error);
     }
     if (status == MILD_OK) {
-        status = feet_create(m, &soft->def, model, soft->foot, &soft->feet, error);
+        status = feet_create(m, &soft->def, model, compiling, soft->foot, &soft->feet, error);
     }
     for (int f = 0; f < soft->feet && status == MILD_OK; f++) {
         soft->soles[f] = soft->foot[f].sole;
@@ -80,9 +89,9 @@ static MildStatus make_feet(Soft *soft, const mjModel *m, int instance, MildErro
 }
 
 static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *error) {
-    MildStatus status = make_feet(soft, m, instance, error);
+    MildStatus status = make_feet(soft, m, instance, 0, error);
     if (status == MILD_OK &&
-        (size_t)m->plugin_statenum[instance] * sizeof(mjtNum) != soft_bytes(soft)) {
+        (size_t)m->plugin_statenum[instance] * sizeof(mjtNum) < ground_bytes(soft)) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
                          "the model was compiled with other feet, soles or prints; compile it "
                          "again");
@@ -101,6 +110,7 @@ static MildStatus make(Soft *soft, const mjModel *m, int instance, MildError *er
     if (!soft->scratch || !alloc_arrays(soft, m)) {
         return mild_fail(error, MILD_ERROR_MEMORY, "out of memory");
     }
+    soft->layout = ground_layout(soft->soles, soft->feet, soft->def.prints);
     soft->fresh = 1;
     return MILD_OK;
 }
@@ -126,6 +136,7 @@ void soft_destroy(Soft *soft) {
     mild_map_destroy(soft->map);
     feet_destroy(soft->foot, soft->feet);
     metric_free(&soft->metric);
+    rows_free(&soft->rows);
     free(soft->jacobian);
     free(soft->response);
     free(soft->passive);
@@ -133,17 +144,17 @@ void soft_destroy(Soft *soft) {
     free(soft);
 }
 
-/* Number of feet, 0 when they cannot be made, and the bytes of their ground. */
+/* Number of feet, 0 when they cannot be made, and the room for their ground. */
 static int measure_feet(const mjModel *m, int instance, size_t *bytes) {
     Soft *soft = calloc(1, sizeof *soft);
-    const int good = soft && make_feet(soft, m, instance, NULL) == MILD_OK;
+    const int good = soft && make_feet(soft, m, instance, 1, NULL) == MILD_OK;
     const int feet = good ? soft->feet : 0;
-    *bytes = good ? soft_bytes(soft) : 0;
+    *bytes = good ? ground_bytes(soft) : 0;
     soft_destroy(soft);
     return feet;
 }
 
-size_t soft_state_bytes(const mjModel *m, int instance) {
+size_t soft_room(const mjModel *m, int instance) {
     size_t bytes;
     measure_feet(m, instance, &bytes);
     return bytes;
@@ -154,13 +165,10 @@ int soft_feet(const mjModel *m, int instance) {
     return measure_feet(m, instance, &bytes);
 }
 
-size_t soft_bytes(const Soft *soft) {
-    return mild_ground_bytes_imprints(soft->soles, soft->feet, soft->def.prints);
-}
-
-void soft_reset(Soft *soft, void *state) {
+void soft_reset(Soft *soft, void *state, size_t bytes) {
+    memset(state, 0, bytes);
     mild_ground_init_imprints(state, soft->soles, soft->feet, soft->def.prints);
-    soft->known = soft->solved = soft->warned = 0;
+    soft->known = soft->solved = soft->warned = soft->tilted = 0;
 }
 
 /* Bool: a material as Memory encodes it (ground/state.h) is one of the terrain. */
@@ -170,16 +178,7 @@ static int is_material(const MildTerrain *terrain, int32_t code) {
 }
 
 int soft_owns(const Soft *soft, const MildGround *ground) {
-    if (ground->feet != soft->feet) {
-        return 0;
-    }
-    for (int f = 0; f < soft->feet; f++) {
-        if (ground->elements[f] != mild_sole_elements(soft->soles[f]) ||
-            ground->padded[f] != sole_padded(soft->soles[f])) {
-            return 0;
-        }
-    }
-    if (ground->tiles < 0 || mild_ground_size(ground) != soft_bytes(soft)) {
+    if (!ground_is_valid(ground, &soft->layout)) {
         return 0;
     }
     for (int f = 0; f < soft->feet; f++) {
@@ -202,6 +201,7 @@ void soft_copy(Soft *soft, const mjModel *m, const Soft *from) {
     soft->fresh = from->fresh;
     soft->rounds = from->rounds;
     soft->warned = from->warned;
+    soft->tilted = from->tilted;
     memcpy(soft->passive, from->passive, nv);
     memcpy(soft->jacobian, from->jacobian, FOOT_ROWS * nv);
 }
@@ -272,6 +272,17 @@ static void apply(const Soft *soft, const mjModel *m, mjData *d, const double *w
     }
 }
 
+/* twist += h J a. a: [dofs] */
+static void add_rates(const Soft *soft, int nv, const double *a, double *twist) {
+    const Metric *metric = &soft->metric;
+    for (int r = 0; r < 6 * soft->feet; r++) {
+        const double *row = soft->jacobian + (size_t)r * (size_t)nv;
+        for (int i = 0; i < metric->dofs; i++) {
+            twist[r] += soft->input.dt * row[metric->dof[i]] * a[i];
+        }
+    }
+}
+
 /* Twists of the feet after the step that MuJoCo would do now. */
 static void outcome(Soft *soft, const mjModel *m, const mjData *d, double *twist) {
     const Metric *metric = &soft->metric;
@@ -285,12 +296,7 @@ static void outcome(Soft *soft, const mjModel *m, const mjData *d, double *twist
         metric_integrate(metric, m, a);
     }
     twists(soft, nv, d->qvel, twist);
-    for (int r = 0; r < 6 * soft->feet; r++) {
-        const double *row = soft->jacobian + (size_t)r * (size_t)nv;
-        for (int i = 0; i < metric->dofs; i++) {
-            twist[r] += soft->input.dt * row[metric->dof[i]] * a[i];
-        }
-    }
+    add_rates(soft, nv, a, twist);
 }
 
 static void read_wrench(const Soft *soft, double *wrench) {
@@ -313,14 +319,16 @@ static void free_twists(Soft *soft, const double *twist, const double *wrench) {
 /* Everything up to qacc and qfrc_constraint: the clamped actuator forces, which are not there yet,
  * and what follows from them. The metric of `discrete` is complete only between MuJoCo's stages, so
  * there they run as a whole, with mjcb_control. */
-static void forces_without_ground(const mjModel *m, mjData *d) {
+static void forces_without_ground(const mjModel *m, mjData *d, int constrain) {
     if (metric_is_discrete(m)) {
         mj_forwardSkip(m, d, mjSTAGE_VEL, 1);
         return;
     }
     mj_fwdActuation(m, d);
     mj_fwdAcceleration(m, d);
-    mj_fwdConstraint(m, d);
+    if (constrain) {
+        mj_fwdConstraint(m, d);
+    }
 }
 
 /* change = what MuJoCo gives beyond what the ground counts with; [6 feet]. Returns its largest
@@ -333,6 +341,93 @@ static double disagreement(const Soft *soft, const double *twist, double *change
     }
     return most;
 }
+
+/* ---- ground and constraints together ---- */
+
+/* push = J^T W of the metric's degrees of freedom. */
+static void push_of(const Soft *soft, int nv, const double *wrench, double *push) {
+    const Metric *metric = &soft->metric;
+    for (int i = 0; i < metric->dofs; i++) {
+        push[i] = 0;
+        for (int r = 0; r < 6 * soft->feet; r++) {
+            push[i] += soft->jacobian[(size_t)r * (size_t)nv + (size_t)metric->dof[i]] * wrench[r];
+        }
+    }
+}
+
+/* Twists after the step with the acceleration rows->trial: J (v + h N^-1 M a). */
+static void joint_outcome(Soft *soft, const mjModel *m, const mjData *d, const Rows *rows,
+                          double *twist) {
+    const Metric *metric = &soft->metric;
+    const int n = metric->dofs, nv = (int)m->nv;
+    double *a = soft->acceleration;
+    if (metric_is_step(m, d)) {
+        mju_copy(a, rows->trial, n);
+    } else {
+        mju_mulMatVec(a, metric->mass, rows->trial, n, n);
+        metric_integrate(metric, m, a);
+    }
+    twists(soft, nv, d->qvel, twist);
+    add_rates(soft, nv, a, twist);
+}
+
+/* A and V_free for the zones of rows->a. */
+static void joint_enter(Soft *soft, const mjModel *m, const mjData *d, Rows *rows) {
+    double twist[FOOT_ROWS];
+    const double none[FOOT_ROWS] = {0};
+    rows_enter(rows, &soft->metric, m, d);
+    metric_hold(&soft->metric, m, d, rows->stiffness);
+    inverse_inertia(soft, soft->metric.stiff, (int)m->nv);
+    mju_zero(rows->push, soft->metric.dofs);
+    rows_solve(rows, &soft->metric);
+    joint_outcome(soft, m, d, rows, twist);
+    free_twists(soft, twist, none);
+    mix_start(&soft->mix, 6 * soft->feet);
+}
+
+/* Solves the ground with the response of the constraints in their zones, and finds those zones.
+ * Leaves the wrench, and the acceleration in rows->trial. They follow from the zones alone, so that
+ * a step that is evaluated again ends at the same. */
+static void joint_solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground,
+                        Rows *rows, double *wrench) {
+    Metric *metric = &soft->metric;
+    double twist[FOOT_ROWS], change[FOOT_ROWS];
+    int tries = 0; /* with these zones */
+    for (int round = 0; round < JOINT_ROUNDS; round++) {
+        if (tries++ == 0) {
+            joint_enter(soft, m, d, rows);
+        } else {
+            mix_next(&soft->mix, soft->input.free_velocity, change);
+        }
+        mild_ground_solve(ground, &soft->terrain, &soft->input, soft->scratch, &soft->contact);
+        read_wrench(soft, wrench);
+        push_of(soft, (int)m->nv, wrench, rows->push);
+        rows_solve(rows, metric);
+        joint_outcome(soft, m, d, rows, twist);
+        if (disagreement(soft, twist, change) > JOINT_CLOSE && tries < JOINT_TRIES) {
+            continue;
+        }
+        if (rows_stay(rows, metric, m, d)) {
+            break;
+        }
+        rows_move(rows, metric, m, d);
+        tries = 0;
+    }
+}
+
+/* MuJoCo's solver then starts at the solution, here and when it is called for the step. From
+ * elsewhere it would end within its own tolerance of it, 1e-5 m/s at times. */
+static void solve_jointly(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground,
+                          double *wrench) {
+    const Metric *metric = &soft->metric;
+    joint_solve(soft, m, d, ground, &soft->rows, wrench);
+    for (int i = 0; i < metric->dofs; i++) {
+        d->qacc_warmstart[metric->dof[i]] = soft->rows.trial[i];
+    }
+    apply(soft, m, d, wrench, 1);
+}
+
+/* ---- in turn ---- */
 
 /* A and V_free for the constraints that are active now, and after ROUNDS_ACTIVE without any. While
  * A stays the same, V_free moves by the disagreement. */
@@ -358,20 +453,44 @@ static void warn_of_disagreement(Soft *soft, const mjModel *m, const mjData *d) 
         return;
     }
     mju_warning(PLUGIN_NAME
-                ": ground and constraints disagree by %.1e m/s at %g s, after %d rounds; a shorter "
-                "time step or more iterations of the solver may help; said once until a reset",
+                ": ground and constraints disagree by %.1e m/s at %g s, after %d rounds; <option "
+                "cone=\"pyramidal\"/>, more iterations of the solver or a shorter time step may "
+                "help; said once until a reset",
                 most, d->time, ROUNDS_MAX);
     soft->warned = 1;
+}
+
+/* Warns of a loaded foot that has turned so far that its sole is no longer what touches. */
+static void warn_of_tilt(Soft *soft, const mjModel *m, const mjData *d) {
+    for (int f = 0; f < soft->feet && !soft->tilted; f++) {
+        const double up = fabs(soft->input.rotation[f][8]);
+        if (soft->contact.foot[f].contacts > 0 && up < STANDS) {
+            mju_warning(PLUGIN_NAME
+                        ": foot '%s' stands on the ground with its sole tilted by %.0f "
+                        "degrees at %g s; beyond 60 what touches is no longer the sole; "
+                        "said once until a reset",
+                        foot_name(m, &soft->foot[f]), acos(up) * 180 / mjPI, d->time);
+            soft->tilted = 1;
+        }
+    }
 }
 
 /* Ground and constraints in turn. Where the response is linear and known the first solve is
  * final. */
 static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground) {
     const int exact = d->nefc == 0 && m->opt.integrator != mjINT_IMPLICIT;
+    const int simple = rows_are_simple(d);
     double wrench[FOOT_ROWS] = {0}, twist[FOOT_ROWS], change[FOOT_ROWS];
-    forces_without_ground(m, d);
+    forces_without_ground(m, d, !simple);
     metric_build(&soft->metric, m, d);
-    for (soft->rounds = 0; soft->rounds < ROUNDS_MAX; soft->rounds++) {
+    const int jointly = simple && rows_start(&soft->rows, &soft->metric, m, d);
+    if (simple && !jointly) { /* out of memory */
+        mj_fwdConstraint(m, d);
+    }
+    if (jointly) {
+        solve_jointly(soft, m, d, ground, wrench);
+    }
+    for (soft->rounds = jointly; soft->rounds < ROUNDS_MAX; soft->rounds++) {
         outcome(soft, m, d, twist);
         if (soft->rounds > 0 && disagreement(soft, twist, change) < AGREEMENT) {
             break;
@@ -387,6 +506,7 @@ static void solve(Soft *soft, const mjModel *m, mjData *d, const MildGround *gro
     if (soft->rounds == ROUNDS_MAX) {
         warn_of_disagreement(soft, m, d);
     }
+    warn_of_tilt(soft, m, d);
     soft->known = soft->solved = 1;
 }
 

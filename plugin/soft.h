@@ -3,9 +3,11 @@
 #ifndef PLUGIN_SOFT_H
 #define PLUGIN_SOFT_H
 
+#include "ground/state.h"
 #include "plugin/foot.h"
 #include "plugin/metric.h"
 #include "plugin/mix.h"
+#include "plugin/rows.h"
 
 #define FOOT_ROWS (6 * MILD_FEET_MAX)
 
@@ -18,6 +20,7 @@ typedef struct {
     MildTerrain terrain;
     MildScratch *scratch;
     Metric metric;
+    Rows rows;
     Mix mix;
     double *jacobian; /* [6 feet][nv] twist of each foot: linear, angular; world axes */
     double *response; /* [6 feet][nv] of the metric's degrees of freedom: N^-1 J^T, transposed */
@@ -29,7 +32,9 @@ typedef struct {
     int known;            /* bool: `input` and `contact` are those of a solve */
     int refused;          /* bool: the integrator has been complained about */
     int warned;           /* bool: a disagreement has been warned of since the last reset */
+    int tilted;           /* bool: a foot on its side has been warned of since the last reset */
     int rounds;           /* of ground and constraints in the last solve */
+    MildGround layout;    /* header of a ground that remembers nothing */
     MildContactInput input;
     MildContactResult contact;
 } Soft;
@@ -38,14 +43,14 @@ typedef struct {
 Soft *soft_create(const mjModel *m, int instance, MildError *error);
 void soft_destroy(Soft *soft); /* may be NULL */
 
-/* [B] Memory of the ground that soft_create would make; 0 when it would fail. */
-size_t soft_state_bytes(const mjModel *m, int instance);
+/* [B] Room for the memory of the ground that soft_create will make, a multiple of 8; 0 when it
+ * would fail. While a model is compiled, where meshes have no vertices yet, so that a sole of
+ * meshes gets the room that their bounding boxes may need. */
+size_t soft_room(const mjModel *m, int instance);
 /* Number of its feet; 0 when it would fail. */
 int soft_feet(const mjModel *m, int instance);
-/* [B] Memory of the ground, a multiple of 8. */
-size_t soft_bytes(const Soft *soft);
-/* Initialises the state: a ground that remembers nothing. */
-void soft_reset(Soft *soft, void *state);
+/* Initialises the state, [bytes]: a ground that remembers nothing. */
+void soft_reset(Soft *soft, void *state, size_t bytes);
 /* Takes over what a solve left in `from`, of the same model; the scratch is filled again when it is
  * needed. */
 void soft_copy(Soft *soft, const mjModel *m, const Soft *from);
@@ -54,7 +59,7 @@ void soft_copy(Soft *soft, const mjModel *m, const Soft *from);
 void soft_passive(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground);
 /* Called where actuator forces are computed: adds the ground's force to qfrc_passive. */
 void soft_actuation(Soft *soft, const mjModel *m, mjData *d, const MildGround *ground);
-/* Called when MuJoCo has stepped: moves the ground's memory. */
+/* Called when MuJoCo has stepped: moves the ground's memory, which must be of this ground. */
 void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *ground);
 
 /* Bool: MuJoCo leaves the stage of actuation out, for there are no actuators or they are disabled;
@@ -62,7 +67,8 @@ void soft_advance(Soft *soft, const mjModel *m, const mjData *d, MildGround *gro
 int soft_without_actuation(const mjModel *m);
 int soft_without_passive(const mjModel *m);
 
-/* Bool: the state is that of this ground, and not one of another model or zeros. */
+/* Bool: the state is that of this ground, and not one of another model, zeros or NaN. Everything
+ * that reads the state asks first, because MuJoCo lets anybody write it at any time. */
 int soft_owns(const Soft *soft, const MildGround *ground);
 
 #endif

@@ -29,6 +29,11 @@ def attach(spec, feet, ground="sand_loose", *, exclude=True, sensor=None, name="
             raise ValueError(f"feet: the spec has no body or site '{foot}'")
     if not 1 <= len(feet) <= 4:
         raise ValueError(f"feet: {len(feet)} of them, but there must be 1 .. 4")
+    bodies = [spec.body(foot) or spec.site(foot).parent for foot in feet]
+    for k, body in enumerate(bodies):
+        if body in bodies[:k]:
+            raise ValueError(f"feet: '{feet[bodies.index(body)]}' and '{feet[k]}' are on one body, '{body.name}', which would stand "
+                             "on the ground twice; name it once")
     config = {"feet": " ".join(feet), **ground_of(ground)}
     config.update((key.replace("__", "."), text_of(value)) for key, value in attributes.items())
     load_plugin(library)

@@ -73,6 +73,17 @@ Imprints ground_imprints(const MildGround *ground) {
                       1.0 / ground->imprint_cell, ground->imprint_time};
 }
 
+MildGround ground_layout(const MildSole *const *soles, int feet, int tiles) {
+    MildGround layout = {.feet = feet};
+    for (int f = 0; f < feet; f++) {
+        layout.elements[f] = mild_sole_elements(soles[f]);
+        layout.padded[f] = sole_padded(soles[f]);
+    }
+    layout.tiles = imprints_round(tiles, MILD_IMPRINT_TILES_MAX);
+    layout.imprint_cell = 0.5 * mild_sole_pitch(soles[0]);
+    return layout;
+}
+
 MildGround *mild_ground_init_imprints(void *block, const MildSole *const *soles, int feet,
                                       int tiles) {
     const size_t bytes = mild_ground_bytes_imprints(soles, feet, tiles);
@@ -81,13 +92,7 @@ MildGround *mild_ground_init_imprints(void *block, const MildSole *const *soles,
     }
     memset(block, 0, bytes);
     MildGround *ground = block;
-    ground->feet = feet;
-    for (int f = 0; f < feet; f++) {
-        ground->elements[f] = mild_sole_elements(soles[f]);
-        ground->padded[f] = sole_padded(soles[f]);
-    }
-    ground->tiles = imprints_round(tiles, MILD_IMPRINT_TILES_MAX);
-    ground->imprint_cell = 0.5 * mild_sole_pitch(soles[0]);
+    *ground = ground_layout(soles, feet, tiles);
     mild_ground_reset(ground);
     return ground;
 }
@@ -166,6 +171,14 @@ static int layouts_agree(const MildGround *a, const MildGround *b) {
            a->imprint_cell == b->imprint_cell;
 }
 
+int ground_is_valid(const MildGround *ground, const MildGround *layout) {
+    int valid = layouts_agree(ground, layout);
+    for (int f = 0; valid && f < layout->feet; f++) {
+        valid = foot_is_valid(ground, f);
+    }
+    return valid;
+}
+
 MildStatus mild_ground_restore(MildGround *ground, const void *block, size_t bytes,
                                MildError *error) {
     const MildGround *saved = block;
@@ -175,11 +188,7 @@ MildStatus mild_ground_restore(MildGround *ground, const void *block, size_t byt
                          "same soles and tiles",
                          bytes, mild_ground_size(ground));
     }
-    int valid = layouts_agree(ground, saved);
-    for (int f = 0; valid && f < ground->feet; f++) {
-        valid = foot_is_valid(saved, f);
-    }
-    if (!valid) {
+    if (!ground_is_valid(saved, ground)) {
         return mild_fail(error, MILD_ERROR_FORMAT,
                          "state: these bytes are not the memory of a ground with these soles");
     }

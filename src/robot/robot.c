@@ -274,6 +274,28 @@ static double sole_height(const Robot *robot, int f, const mjData *data) {
     return z + turn[6] * c[0] + turn[7] * c[1] + turn[8] * c[2] - foot->radius;
 }
 
+/* A flat sole does not roll: refuses a hinge above it that turns all the way round about a
+ * horizontal axis, such as a wheel's. */
+static MildStatus check_wheels(const Robot *robot, const mjData *data, MildError *error) {
+    for (int f = 0; f < robot->def.feet; f++) {
+        const RobotLimb *limb = &robot->limb[f];
+        for (int k = 6; k < limb->dofs && !limb->round; k++) {
+            const int joint = robot->model->dof_jntid[limb->dof[k]];
+            const double *range = robot->model->jnt_range + 2 * joint;
+            if (range[1] - range[0] >= 2 * mjPI && fabs(data->xaxis[3 * joint + 2]) < 0.5) {
+                return mild_fail(
+                    error, MILD_ERROR_FORMAT,
+                    "%s: joint '%s' turns the sole of [foot.%s] all the way round, but "
+                    "a sole does not roll; give it a range of less than a turn, or the "
+                    "foot shape = round",
+                    robot->path, mj_id2name(robot->model, mjOBJ_JOINT, joint),
+                    robot->def.foot[f].name);
+            }
+        }
+    }
+    return MILD_OK;
+}
+
 static MildStatus measure_stand(Robot *robot, const mjData *data, MildError *error) {
     double lowest = DBL_MAX, base = data->xpos[3 * robot->base_body + 2];
     for (int f = 0; f < robot->def.feet; f++) {
@@ -318,7 +340,10 @@ MildStatus robot_read_stand(Robot *robot, MildError *error) {
         data->qpos[robot->dof[i] + 1] = pose;
     }
     mj_kinematics(m, data);
-    MildStatus status = measure_stand(robot, data, error);
+    MildStatus status = check_wheels(robot, data, error);
+    if (status == MILD_OK) {
+        status = measure_stand(robot, data, error);
+    }
     mj_deleteData(data);
     return status;
 }

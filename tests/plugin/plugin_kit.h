@@ -16,9 +16,16 @@
 
 static char kit_said[1000]; /* MuJoCo's last warning or error, from compilation or after */
 static int kit_messages;
+static int kit_tilts; /* warnings of a foot on its side, which are not among them */
+static char kit_tilted[200];
 
 static inline void kit_listen(const mjLogMessage *message) {
     if (message->level < mjLOG_WARNING) {
+        return;
+    }
+    if (strstr(message->subject, "sole tilted")) {
+        snprintf(kit_tilted, sizeof kit_tilted, "%.190s", message->subject);
+        kit_tilts++;
         return;
     }
     snprintf(kit_said, sizeof kit_said, "%.900s", message->subject);

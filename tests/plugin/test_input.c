@@ -7,7 +7,7 @@
     "<worldbody><geom name='floor' type='plane' size='1 1 .1' %s/><body name='pole'><geom "        \
     "name='post' size='.01'/></body><body name='foot' pos='0 0 .1' %s><freejoint/><geom "          \
     "name='box' mass='1' %s/><site name='sole' pos='0 0 -.01'/>"                                   \
-    "<site name='end' euler='0 90 0'/></body></worldbody>"
+    "<site name='end' euler='0 90 0'/><body name='toe_a'/><body name='toe_b'/></body></worldbody>"
 #define BOX "type='box' size='.1 .05 .01' "
 
 /* The model of the keys, with attributes of floor, body and foot and an end. */
@@ -38,14 +38,18 @@ static void check_refused(const char *option, const char *configs, const char *w
     assert_null(m);
     assert_non_null(strstr(kit_said, word));
     assert_non_null(strstr(kit_said, other));
+    const char *first = strstr(kit_said, "mild.ground"); /* said once */
+    assert_true(!first || !strstr(first + 1, "mild.ground 'soft': "));
 }
 
 static void refuses_what_is_wrong(void **state) {
     (void)state;
     check_refused("", "", "no feet", "feet");
     check_refused("", CONFIG("feet", "fool"), "'fool'", "nearest is 'foot'");
-    check_refused("", CONFIG("feet", "foot sole end pole world"), "more than 4", "feet");
-    check_refused("", CONFIG("feet", "foot sole foot"), "twice", "feet");
+    check_refused("", CONFIG("feet", "foot pole toe_a toe_b world"), "more than 4", "feet");
+    check_refused("", CONFIG("feet", "pole foot foot"), "'foot' and 'foot'", "one body, 'foot'");
+    check_refused("", CONFIG("feet", "foot sole"), "'foot' and 'sole'", "one body, 'foot'");
+    check_refused("", CONFIG("feet", "end pole sole"), "'end' and 'sole'", "one body, 'foot'");
     check_refused("", CONFIG("feet", "foot " LONG_NAME), "'leg_of_", "nearest is");
     check_refused("", CONFIG("feet", "pole"), "'pole'", "fixed to the world");
     check_refused("", CONFIG("feet", "world"), "'world'", "fixed to the world");
@@ -71,6 +75,15 @@ static void refuses_what_is_wrong(void **state) {
     check_refused("", FOOT CONFIG("terrain.kind", "hills"), "terrain.kind", "hills");
     check_refused("", FOOT CONFIG("terrain.kind", "image"), "image", "");
     check_refused("integrator='RK4'", FOOT, "RK4", "implicitfast");
+}
+
+/* A sensor of a ground that cannot be made does not hide why. */
+static void a_sensor_hides_no_reason(void **state) {
+    (void)state;
+    assert_null(compile("", CONFIG("feet", "fool"), OFF, "", BOX OFF,
+                        "<sensor><plugin plugin='mild.ground' instance='soft'/></sensor>"));
+    print_message("%s\n", kit_said);
+    assert_non_null(strstr(kit_said, "'fool'"));
 }
 
 /* Without passive forces MuJoCo leaves out a stage. */
@@ -160,6 +173,85 @@ static void warns_of_a_foot_that_lies_on_its_side(void **state) {
     mj_deleteModel(m);
 }
 
+#define WHEEL                                                                                      \
+    "<mesh name='wheel' vertex='.1 .03 0 .0707 .03 .0707 0 .03 .1 -.0707 .03 .0707 -.1 .03 0 "     \
+    "-.0707 .03 -.0707 0 .03 -.1 .0707 .03 -.0707 .0924 -.03 .0383 .0383 -.03 .0924 -.0383 -.03 "  \
+    ".0924 -.0924 -.03 .0383 -.0924 -.03 -.0383 -.0383 -.03 -.0924 .0383 -.03 -.0924 .0924 -.03 "  \
+    "-.0383'/>"
+
+/* A sole that turns with a wheel is soon on top: refused with foot, and joint or geom. What only
+ * looks like one is not. */
+static void wheels_are_refused(void **state) {
+    (void)state;
+    static const struct {
+        const char *joint, *geom, *said;
+    } cases[] = {
+        {"<freejoint/>", "type='cylinder' size='.1 .03' euler='90 0 0'", "rolls on geom 'shape'"},
+        {"<freejoint/>", "type='capsule' size='.1 .03' euler='0 90 0'", "rolls on geom 'shape'"},
+        {"<freejoint/>", "type='ellipsoid' size='.1 .03 .1'", "rolls on geom 'shape'"},
+        {"<freejoint/>", "type='mesh' mesh='wheel'", "rolls on geom 'shape'"},
+        {"<freejoint/>", "type='sphere' size='.1'", NULL}, /* a round foot */
+        {"<freejoint/>", "type='cylinder' size='.1 .03'", NULL},
+        {"<freejoint/>", "type='ellipsoid' size='.1 .1 .02'", NULL},
+        {"<joint name='axle' axis='0 1 0'/>", "type='cylinder' size='.1 .03' euler='90 0 0'",
+         "turns about joint 'axle'"},
+        {"<joint name='axle' axis='0 1 0' range='-40 40'/>",
+         "type='cylinder' size='.1 .03' euler='90 0 0'", "turns about joint 'axle'"},
+        {"<joint name='axle' axis='0 1 0' range='-20 20'/>",
+         "type='cylinder' size='.1 .03' euler='90 0 0'", NULL}, /* an ankle */
+        {"<joint name='axle' axis='0 0 1'/>", "type='cylinder' size='.1 .03'", NULL},
+        {"<joint name='knee' axis='0 1 0' pos='0 0 .3'/>",
+         "type='cylinder' size='.03 .03' euler='90 0 0'", NULL}, /* at the end of a leg */
+        {"<joint name='knee' axis='0 1 0' pos='0 0 .3'/>", "size='.03'", NULL},
+        {"<joint name='ankle' axis='0 1 0' pos='0 0 .05'/>", "type='box' size='.1 .05 .01'", NULL},
+        {"<joint name='ankle' axis='1 0 0'/>",
+         "type='capsule' size='.01 .1' euler='0 90 0' "
+         "pos='0 .04 -.04' " OFF "/><geom type='capsule' size='.01 .1' euler='0 90 0' pos='0 -.04 "
+         "-.04'",
+         NULL},
+    };
+    for (int c = 0; c < (int)(sizeof cases / sizeof *cases); c++) {
+        char text[3000];
+        snprintf(text, sizeof text,
+                 "<mujoco><extension><plugin plugin='mild.ground'><instance name='soft'>" FOOT
+                 "</instance></plugin></extension><asset>" WHEEL "</asset><worldbody><body "
+                 "name='foot'>%s<geom name='shape' mass='1' %s " OFF
+                 "/></body></worldbody></mujoco>",
+                 cases[c].joint, cases[c].geom);
+        kit_said[0] = '\0';
+        mjModel *m = kit_compile(text);
+        print_message("%d: %s\n", c, kit_said);
+        assert_int_equal(m == NULL, cases[c].said != NULL);
+        if (cases[c].said) {
+            assert_non_null(strstr(kit_said, "'foot'"));
+            assert_non_null(strstr(kit_said, cases[c].said));
+        }
+        mj_deleteModel(m);
+    }
+}
+
+/* A foot that falls over is said by name, once. */
+static void warns_of_a_tilted_sole(void **state) {
+    (void)state;
+    mjModel *m = compile("", FOOT, OFF, "", BOX OFF, "");
+    mjData *d = mj_makeData(m);
+    for (int run = 1; run <= 2; run++) {
+        mj_resetData(m, d);
+        d->qpos[2] = 0.03;
+        kit_run(m, d, 0.1);
+        assert_int_equal(kit_tilts, run - 1);
+        d->qpos[2] = 0.04;
+        d->qpos[3] = cos(0.55);
+        d->qpos[4] = sin(0.55); /* 63 degrees */
+        kit_run(m, d, 0.1);
+        print_message("%s\n", kit_tilted);
+        assert_int_equal(kit_tilts, run);
+        assert_non_null(strstr(kit_tilted, "foot 'foot'"));
+    }
+    mj_deleteData(d);
+    mj_deleteModel(m);
+}
+
 /* The integrator may be changed after compilation. */
 static void rk4_at_run_time(void **state) {
     (void)state;
@@ -213,7 +305,10 @@ static void soles_follow_the_shapes(void **state) {
     assert_in_range(elements_of(FOOT, "type='cylinder' size='.06 .02' " OFF), 0.93 * round,
                     1.07 * round);
     const double capsule = (0.2 * 0.1 + 3.1416 * 0.05 * 0.05) / element;
-    assert_in_range(elements_of(FOOT, "type='capsule' size='.05 .1' euler='0 90 0' " OFF),
+    /* with a ledge, without which it would roll */
+    assert_in_range(elements_of(FOOT,
+                                "type='capsule' size='.05 .1' euler='0 90 0' " OFF
+                                "/><geom type='box' size='.01 .05 .001' pos='0 0 -.049' " OFF),
                     0.93 * capsule, 1.07 * capsule);
     assert_in_range(elements_of(FOOT, "type='ellipsoid' size='.12 .12 .01' " OFF), 40, 130);
 }
@@ -222,9 +317,10 @@ static void soles_follow_the_shapes(void **state) {
 
 /* The ground of the keys, to be freed with its model. */
 static const Soft *soft_of_keys(const char *configs, mjModel **m, mjData **d) {
-    *m = compile("", configs, OFF, "", BOX OFF,
-                 "<worldbody><body pos='3 0 1'><freejoint/><geom size='.1' mass='50'/></body>"
-                 "</worldbody>");
+    *m = compile(
+        "", configs, OFF, "", BOX OFF,
+        "<worldbody><body name='other' pos='3 0 1'><freejoint/><geom size='.1' mass='50'/></body>"
+        "</worldbody>");
     if (!*m) {
         fail_msg("%s", kit_said);
     }
@@ -286,7 +382,7 @@ static void models_are_matched(void **state) {
         soft_of_keys(FOOT CONFIG("ground", "grass") CONFIG("ground.model", "bekker"), &m, &d);
     check_match(soft, &grass, 9.81);
     free_both(m, d);
-    soft = soft_of_keys(CONFIG("feet", "foot sole") CONFIG("ground", "grass")
+    soft = soft_of_keys(CONFIG("feet", "foot other") CONFIG("ground", "grass")
                             CONFIG("ground.model", "bekker"),
                         &m, &d);
     check_match(soft, &grass, 9.81 / 2);
@@ -305,10 +401,13 @@ static void models_are_matched(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(refuses_what_is_wrong),
+        cmocka_unit_test(a_sensor_hides_no_reason),
         cmocka_unit_test(disabled_flags),
         cmocka_unit_test(refuses_a_second_instance),
         cmocka_unit_test(warns_of_a_rigid_floor),
         cmocka_unit_test(warns_of_a_foot_that_lies_on_its_side),
+        cmocka_unit_test(wheels_are_refused),
+        cmocka_unit_test(warns_of_a_tilted_sole),
         cmocka_unit_test(rk4_at_run_time),
         cmocka_unit_test(soles_follow_the_shapes),
         cmocka_unit_test(keys_reach_the_ground),

@@ -7,7 +7,8 @@
 #include "plugin_kit.h"
 
 #define LEG                                                                                        \
-    "<worldbody><body name='trunk' pos='0 0 0.62'><freejoint/><geom type='box' size='.1 .08 .05' " \
+    "<worldbody><body name='trunk' pos='0 0 0.62'><freejoint/><geom name='trunk' "                 \
+    "type='box' size='.1 .08 .05' "                                                                \
     "mass='8' contype='0' conaffinity='0'/>"                                                       \
     "<body pos='0 0 -0.05'><joint name='hip' axis='0 1 0' range='-90 90' %s/><geom "               \
     "type='capsule' fromto='0 0 0 0.1 0 -.25' size='.03' mass='.8' contype='0' conaffinity='0'/>"  \
@@ -165,12 +166,17 @@ static void cycles_end(void **state) {
     }
 }
 
-/* A constraint solver of one iteration does not come to rest, and this is said once, and once more
- * after a reset. */
+/* Cones of friction of other contacts are solved in turn with the ground. A constraint solver of
+ * one iteration does not come to rest, and this is said once, and once more after a reset. */
 static void disagreement_is_said(void **state) {
     (void)state;
-    mjModel *m = leg(find_case("nothing"), 0.002, "Euler", "sand_loose");
+    const Case table = {"",
+                        {"", "", ""},
+                        "<worldbody><geom name='table' type='plane' size='1 1 1' pos='0 0 .52'/>"
+                        "</worldbody><contact><pair geom1='trunk' geom2='table'/></contact>"};
+    mjModel *m = leg(&table, 0.002, "Euler", "sand_loose");
     mjData *d = mj_makeData(m);
+    m->opt.cone = mjCONE_ELLIPTIC;
     m->opt.solver = mjSOL_CG;
     m->opt.iterations = 1;
     for (int run = 1; run <= 2; run++) {
@@ -181,13 +187,124 @@ static void disagreement_is_said(void **state) {
             steps += plugin_soft(m, d)->rounds == 30;
         }
         print_message("%d of 300 steps without agreement: %s\n", steps, kit_said);
-        assert_in_range(steps, 2, 299);
+        assert_in_range(steps, 1, 299);
         assert_int_equal(kit_messages, run);
         assert_non_null(strstr(kit_said, "disagree"));
+        assert_non_null(strstr(kit_said, "pyramidal"));
         mj_resetData(m, d);
     }
     mj_deleteData(d);
     mj_deleteModel(m);
+}
+
+/* ---- friction losses ---- */
+
+/* A model without the plugin, at the same state, with J^T W as an applied force and a solver that
+ * goes on until nothing changes: the twists that it steps to. */
+static void reference_twists(mjModel *bare, mjData *e, const mjModel *m, const mjData *d,
+                             double *twist) {
+    const Soft *soft = plugin_soft(m, d);
+    const int nv = (int)m->nv;
+    mju_copy(e->qpos, d->qpos, (int)m->nq);
+    mju_copy(e->qvel, d->qvel, nv);
+    mju_copy(e->ctrl, d->ctrl, (int)m->nu);
+    mju_zero(e->qfrc_applied, nv);
+    mju_zero(e->qacc_warmstart, nv);
+    for (int r = 0; r < 6; r++) {
+        const MildFootResult *foot = &soft->contact.foot[0];
+        const double w = r < 3 ? foot->force[r] : foot->torque[r - 3];
+        mju_addToScl(e->qfrc_applied, soft->jacobian + r * nv, w, nv);
+    }
+    mj_step(bare, e);
+    for (int r = 0; r < 6; r++) {
+        twist[r] = mju_dot(soft->jacobian + r * nv, e->qvel, nv);
+    }
+}
+
+/* Solves the ground anew with another response, which agrees at the solution: the same wrench. */
+static double ground_apart(const mjModel *m, const mjData *d, const double *twist) {
+    const Soft *soft = plugin_soft(m, d);
+    MildContactInput input = soft->input;
+    MildContactResult result;
+    MildScratch *scratch = mild_scratch_create(soft->soles, 1, NULL);
+    double worst = 0, wrench[6];
+    memcpy(wrench, soft->contact.foot[0].force, 3 * sizeof(double));
+    memcpy(wrench + 3, soft->contact.foot[0].torque, 3 * sizeof(double));
+    for (int r = 0; r < 36; r++) {
+        input.inverse_inertia[r] *= 1.5;
+    }
+    for (int r = 0; r < 6; r++) {
+        input.free_velocity[r] =
+            twist[r] - input.dt * mju_dot(input.inverse_inertia + 6 * r, wrench, 6);
+    }
+    mild_ground_solve((const MildGround *)(void *)d->plugin_state, &soft->terrain, &input, scratch,
+                      &result);
+    for (int r = 0; r < 6; r++) {
+        worst = fmax(worst, fabs(result.velocity[r] - twist[r]));
+    }
+    mild_scratch_destroy(scratch);
+    return worst;
+}
+
+/* Joints with friction from the first step on: what the ground gives and what MuJoCo alone makes of
+ * it are a fixed point, found in a single round. Dry friction as makers publish it, strong, and on
+ * tendons. */
+static void friction_is_solved_with_the_ground(void **state) {
+    (void)state;
+    static const Case rubbing[] = {
+        {"0.1 N m", {"frictionloss='.1'", "frictionloss='.1'", "frictionloss='.1'"}, PD("90", "4")},
+        {"20 N m", {"frictionloss='20'", "frictionloss='20'", "frictionloss='20'"}, ""},
+        {"limits",
+         {"frictionloss='.1' armature='.01'", "frictionloss='.1'", "frictionloss='.5' damping='1'"},
+         ""},
+        {"tendon",
+         {"", "", ""},
+         "<tendon><fixed name='t' frictionloss='3'><joint joint='hip' coef='1'/><joint "
+         "joint='knee' "
+         "coef='-.7'/></fixed></tendon>" PD("90", "4")}};
+    static const char *const integrators[] = {"Euler", "implicitfast", "implicit", "discrete"};
+    for (int n = 0; n < 4 * 4 * 2; n++) {
+        const Case *c = &rubbing[n % 4];
+        const char *integrator = integrators[n / 4 % 4];
+        if (n / 4 % 4 == 0 && !is_mild(c)) {
+            continue;
+        }
+        mjModel *m = leg(c, 0.002, integrator, n / 16 ? "foam45" : "rubber");
+        char body[4000], text[6000];
+        snprintf(body, sizeof body, LEG, c->joints[0], c->joints[1], c->joints[2]);
+        snprintf(text, sizeof text,
+                 "<mujoco><option timestep='.002' integrator='%s' iterations='500' "
+                 "tolerance='0'/>%s%s</mujoco>",
+                 integrator, body, c->rest);
+        mjModel *bare = kit_model(text);
+        mjData *d = mj_makeData(m), *e = mj_makeData(bare);
+        double apart = 0, ground = 0;
+        int rounds = 0, loaded = 0;
+        start(m, d);
+        d->qpos[2] = 0.59; /* in the ground at once */
+        for (int i = 0; i < 250; i++) {
+            double twist[6];
+            mj_forward(m, d);
+            const Soft *soft = plugin_soft(m, d);
+            reference_twists(bare, e, m, d, twist);
+            for (int r = 0; r < 6; r++) {
+                apart = fmax(apart, fabs(twist[r] - soft->contact.velocity[r]));
+            }
+            ground = fmax(ground, ground_apart(m, d, soft->contact.velocity));
+            loaded += soft->contact.foot[0].contacts > 0;
+            rounds = soft->rounds > rounds ? soft->rounds : rounds;
+            mj_step(m, d);
+        }
+        print_message("%-12s %-8s MuJoCo apart by %.1e, ground by %.1e, %d loaded, %d rounds\n",
+                      integrator, c->name, apart, ground, loaded, rounds);
+        assert_true(loaded > 20);
+        assert_true(apart < 2e-9 && ground < 1e-7);
+        assert_int_equal(rounds, 1);
+        mj_deleteData(d);
+        mj_deleteData(e);
+        mj_deleteModel(m);
+        mj_deleteModel(bare);
+    }
 }
 
 /* In the air a model moves as it does without the plugin. */
@@ -260,8 +377,11 @@ static void strong_feedback_is_stable(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(step_is_as_expected),       cmocka_unit_test(cycles_end),
-        cmocka_unit_test(disagreement_is_said),      cmocka_unit_test(air_is_as_without),
+        cmocka_unit_test(step_is_as_expected),
+        cmocka_unit_test(cycles_end),
+        cmocka_unit_test(disagreement_is_said),
+        cmocka_unit_test(friction_is_solved_with_the_ground),
+        cmocka_unit_test(air_is_as_without),
         cmocka_unit_test(strong_feedback_is_stable),
     };
     return cmocka_run_group_tests(tests, kit_setup, NULL);

@@ -241,6 +241,102 @@ static void foreign_state_is_reset(void **state) {
     mj_deleteModel(m);
 }
 
+/* ---- a state that changes at any moment ---- */
+
+static uint64_t random_bits(uint64_t *seed) {
+    *seed += 0x9e3779b97f4a7c15u; /* splitmix64 */
+    uint64_t z = *seed;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+/* Changes words, pieces or all of the state: any bits, small numbers, bytes moved from elsewhere in
+ * it, a state of another moment, one of another model. */
+static void change_state(const mjModel *m, mjData *d, const mjData *past, const mjData *other,
+                         size_t others, uint64_t *seed) {
+    const size_t words = (size_t)m->npluginstate * 2, bytes = words * 4;
+    const size_t head = sizeof(MildGround) / 4;
+    int32_t *state = (int32_t *)(void *)d->plugin_state;
+    const uint64_t draw = random_bits(seed);
+    const size_t at = (draw >> 8) % (draw & 8 ? words : head);
+    const size_t length = (draw >> 40) % (words - at) + 1;
+    switch (draw % 7) {
+    case 0: state[at] = (int32_t)random_bits(seed); break;
+    case 1: state[at] = (int32_t)(random_bits(seed) % 300) - 3; break;
+    case 2: d->plugin_state[at / 2] = 1e300 * (double)(int64_t)random_bits(seed); break;
+    case 3: memmove(state, state + at, 4 * length); break;
+    case 4: memcpy(state, past->plugin_state, 4 * length); break;
+    case 5: memcpy(state, other->plugin_state, others < bytes ? others : bytes); break;
+    default: ((uint8_t *)state)[4 * at] ^= (uint8_t)(1u << (draw >> 60 & 7)); break;
+    }
+}
+
+/* A step in its stages, with something done to the state between two of them. */
+static void step_changed(const mjModel *m, mjData *d, const mjData *past, const mjData *other,
+                         size_t others, mjvScene *scene, uint64_t *seed) {
+    static mjvOption option;
+    mjvCamera camera;
+    const int moment = (int)(random_bits(seed) % 5);
+    mjv_defaultCamera(&camera);
+    mjv_defaultOption(&option);
+    for (int stage = 0; stage < 5; stage++) {
+        if (stage == moment) {
+            change_state(m, d, past, other, others, seed);
+        }
+        switch (stage) {
+        case 0: mj_step1(m, d); break;
+        case 1: mj_forward(m, d); break;
+        case 2: mj_forwardSkip(m, d, mjSTAGE_VEL, 0); break;
+        case 3: mjv_updateScene(m, d, &option, NULL, &camera, mjCAT_ALL, scene); break;
+        default: mj_implicit(m, d); break;
+        }
+    }
+}
+
+/* MILD_TEST_CHANGES: number of changes, MILD_TEST_SEED: first seed. */
+static void changed_states_are_survived(void **state) {
+    (void)state;
+    const char *count = getenv("MILD_TEST_CHANGES"), *first = getenv("MILD_TEST_SEED");
+    const int changes = count ? atoi(count) : 2000;
+    uint64_t seed = first ? (uint64_t)strtoull(first, NULL, 10) : 1;
+    char head[1000], text[1500];
+    kit_head(head, sizeof head, 0.002, "implicitfast", "plate", "rubber", CONFIG("prints", "128"));
+    snprintf(text, sizeof text,
+             "%s<worldbody><body name='plate' pos='0 0 .01'><freejoint/><geom type='box' size='.1 "
+             ".07 .01' mass='3' contype='0' conaffinity='0'/></body></worldbody></mujoco>",
+             head);
+    mjModel *m = hopper(MOTOR), *n = kit_model(text);
+    mjData *d = mj_makeData(m), *past = mj_makeData(m), *other = mj_makeData(n);
+    mjvScene scene;
+    int resets = 0, loaded = 0;
+    mjv_defaultScene(&scene);
+    mjv_makeScene(m, &scene, 2000);
+    steps(n, other, 150);
+    for (int c = 0; c < changes; c++) {
+        if (c % 8 == 0) {
+            mj_resetData(m, d);
+            d->qpos[2] += 1e-3 * (double)(c % 64);
+            steps(m, d, 20 + c % 50);
+            mj_copyData(past, m, d);
+        }
+        kit_messages = 0;
+        step_changed(m, d, past, other, (size_t)n->npluginstate * sizeof(mjtNum), &scene, &seed);
+        resets += kit_messages > 0;
+        loaded += pressed(m, d) > 0;
+        mj_step(m, d);
+    }
+    print_message("%d changes: %d said, %d times loaded after it\n", changes, resets, loaded);
+    assert_in_range(resets, changes / 20, changes);
+    assert_in_range(loaded, changes / 20, changes);
+    mjv_freeScene(&scene);
+    mj_deleteData(d);
+    mj_deleteData(past);
+    mj_deleteData(other);
+    mj_deleteModel(m);
+    mj_deleteModel(n);
+}
+
 static int count_decor(const mjvScene *scene, int type) {
     int count = 0;
     for (int i = 0; i < scene->ngeom; i++) {
@@ -320,6 +416,7 @@ int main(void) {
         cmocka_unit_test(ways_through_the_stages_agree),
         cmocka_unit_test(threads_agree),
         cmocka_unit_test(foreign_state_is_reset),
+        cmocka_unit_test(changed_states_are_survived),
         cmocka_unit_test(prints_are_drawn),
     };
     return cmocka_run_group_tests(tests, kit_setup, NULL);

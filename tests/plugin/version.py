@@ -11,17 +11,22 @@ LEG = """<mujoco><option timestep="0.002" integrator="{integrator}"/><extension>
 <worldbody><body pos="0 0 0.6"><freejoint/><geom type="box" size=".1 .08 .05" mass="8"/>
 <body pos="0 0 -.05"><joint name="hip" range="-90 90" {joint}/><geom type="capsule" fromto="0 0 0 .1 0 -.25" size=".03" mass=".8"/>
 <body pos=".1 0 -.25"><joint name="knee" range="-2 {bend}" {joint}/><geom type="capsule" fromto="0 0 0 -.1 0 -.28" size=".025" mass=".4"/>
-<body name="foot" pos="-.1 0 -.28"><joint name="ankle" range="-60 60" {joint}/><geom type="box" size=".11 .08 .01" pos=".02 0 -.03"
-mass=".2"/></body></body></body></body></worldbody>{rest}</mujoco>"""
+<body name="foot" pos="-.1 0 -.28"><joint name="ankle" range="-60 60" {joint}/><geom {sole} mass=".2"/></body></body></body></body>
+</worldbody>{rest}</mujoco>"""
+BOX = 'type="box" size=".11 .08 .01" pos=".02 0 -.03"'
+VERTICES = " ".join(f"{x} {y} {z}" for x in (-0.11, 0.11) for y in (-0.08, 0.08) for z in (-0.01, 0.01))
+MESH = f'<asset><mesh name="sole" vertex="{VERTICES}"/></asset><sensor><plugin plugin="mild.ground" instance="soft"/></sensor>'
 PD = "<actuator>" + "".join(f'<position joint="{j}" kp="300" kv="10"/>' for j in ("hip", "knee", "ankle")) + "</actuator>"
 CASES = {"damping": ('damping="4"', 120, ""), "PD": ('armature=".02"', 120, PD), "springs": ('stiffness="60"', 120, ""), "limit": ("", 60, ""),
          "friction": ('frictionloss="1" armature=".02"', 120, PD),
-         "equality": ("", 120, '<equality><joint joint1="knee" joint2="hip" polycoef="0 -1 0 0 0"/></equality>')}
+         "equality": ("", 120, '<equality><joint joint1="knee" joint2="hip" polycoef="0 -1 0 0 0"/></equality>'), "mesh": ("", 120, MESH)}
 
 
 def fall(case, integrator, ground):
     joint, bend, rest = CASES[case]
-    model = mujoco.MjModel.from_xml_string(LEG.format(integrator=integrator, ground=ground, joint=joint, bend=bend, rest=rest))
+    sole = 'type="mesh" mesh="sole" pos=".02 0 -.03"' if rest is MESH else BOX
+    model = mujoco.MjModel.from_xml_string(
+        LEG.format(integrator=integrator, ground=ground, joint=joint, bend=bend, sole=sole, rest=rest))
     data = mujoco.MjData(model)
     data.qpos[7:10] = -0.4, 0.9, -0.5
     data.qvel[0] = 0.3

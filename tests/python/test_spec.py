@@ -73,7 +73,9 @@ class Attach(unittest.TestCase):
     def test_arguments(self):
         spec = mujoco.MjSpec.from_string(PLATE)
         for arguments, name in ((("plate", ["plate"]), "spec"), ((spec, ["foot"]), "foot"), ((spec, []), "feet"),
-                                ((spec, ["plate"] * 5), "feet"), ((spec, ["left foot"]), "blanks"), ((spec, [5]), "feet: 5"),
+                                ((spec, ["plate"] * 5), "feet"), ((spec, ["plate"] * 2), "'plate' and 'plate' are on one body, 'plate'"),
+                                ((spec, ["plate", "under"]), "'plate' and 'under' are on one body, 'plate'"),
+                                ((spec, ["left foot"]), "blanks"), ((spec, [5]), "feet: 5"),
                                 ((spec, ["plate"], 3), "ground"), ((spec, ["plate"], [3]), "ground")):
             with self.assertRaisesRegex((TypeError, ValueError), name):
                 mild.attach(*arguments)
@@ -110,6 +112,14 @@ class Attach(unittest.TestCase):
         self.assertAlmostEqual(depth, fall(mild.Material("foam45")), delta=0.01 * depth)
         self.assertAlmostEqual(heights["under", True], heights["plate", True], delta=1e-9)
         self.assertGreater(heights["plate", False], 0.0095)
+
+    @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
+    def test_wheel(self):
+        """A foot that rolls is refused by name when the model is compiled."""
+        spec = mujoco.MjSpec.from_string(PLATE.replace('type="box" size="0.1 0.05 0.01"', 'type="cylinder" size=".1 .03" euler="90 0 0"'))
+        mild.attach(spec, "plate")
+        with self.assertRaisesRegex(Exception, "'plate' is a wheel"):
+            spec.compile()
 
     @unittest.skipUnless(PLUGIN, "MILD_PLUGIN names no plugin")
     def test_sensor(self):

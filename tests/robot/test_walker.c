@@ -670,6 +670,10 @@ static void test_refused(void **unused) {
     try_robot("knee = shank_l", "knee = none",
               "body 'none' is missing; robot.ini names it in [foot.");
     try_robot("body = toe_r", "body = foot_l", "feet 'flat' and 'ball' are on the same body");
+    try_robot("name='ankle_l'", "name='ankle_l' range='-3.2 3.2'",
+              "joint 'ankle_l' turns the sole of [foot.flat] all the way round");
+    try_robot("name='ankle_l'", "name='ankle_l' range='-3.1 3.1'", NULL);
+    try_robot("name='knee_r'", "name='knee_r' range='-4 4'", NULL); /* above a round foot */
     try_robot("body = toe_r", "body = torso", "no joint between the base and body 'torso'");
     try_robot("body = toe_r", "body = world", "no joint between the base and body 'world'");
     try_robot("body = toe_r", "body = pelvis", NULL); /* one joint is enough */
