@@ -21,4 +21,9 @@ int text_uint64(const char *text, uint64_t *value);
 const char *text_bytes(double bytes, char *text, size_t size);
 const char *text_duration(double seconds, char *text, size_t size);
 
+enum { TEXT_CELL = 24 };
+/* A number in the format of its column, such as "%.2f"; "-" for NaN, because nothing was measured.
+ * Returns `text`. */
+const char *text_cell(const char *format, double value, char text[TEXT_CELL]);
+
 #endif

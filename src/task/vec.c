@@ -1,5 +1,6 @@
 #include "task/vec.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -198,15 +199,14 @@ VecStats vec_take_sums(Vec *vec) {
 VecStats vec_stats_from(VecStats sums, int envs) {
     VecStats stats = sums;
     stats.assist /= envs;
-    if (stats.episodes) {
-        double lived = stats.length > 0 ? stats.length : 1;
-        for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-            stats.terms[i] /= lived;
-        }
-        stats.length /= stats.episodes;
-        stats.reward /= stats.episodes;
-        stats.speed_error /= stats.episodes;
+    const double ended = stats.episodes ? (double)stats.episodes : (double)NAN;
+    const double lived = stats.episodes && !(stats.length > 0) ? 1 : stats.length;
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        stats.terms[i] = stats.episodes ? stats.terms[i] / lived : (double)NAN;
     }
+    stats.length /= ended;
+    stats.reward /= ended;
+    stats.speed_error /= ended;
     return stats;
 }
 
