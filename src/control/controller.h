@@ -28,16 +28,16 @@ typedef struct {
 } ControllerRow;
 void controller_row_torque(void *row, const TaskEnv *env, RobotSim *sim, double *torque);
 
-/* Name and summary; the file defines controller_make_NAME. */
+/* Name, whether it follows the command, and summary; the file defines controller_make_NAME. */
 #define CONTROLLER_LIST(X)                                                                         \
-    X(clock, "a network that sees one frame, at 40 Hz (Singh et al. 2024), of --policy")           \
-    X(ht2, "a transformer (Radosavovic et al. 2024), of --policy")                                 \
-    X(learned, "the policy of --policy")                                                           \
-    X(passivity,                                                                                   \
+    X(clock, 1, "a network that sees one frame, at 40 Hz (Singh et al. 2024), of --policy")        \
+    X(ht2, 1, "a transformer (Radosavovic et al. 2024), of --policy")                              \
+    X(learned, 1, "the policy of --policy")                                                        \
+    X(passivity, 1,                                                                                \
       "a biped that knows its true state: a DCM plan and whole-body impedances command torques")   \
-    X(stand,                                                                                       \
+    X(stand, 0,                                                                                    \
       "stands still and balances, ignores the command; gains stand_kp, stand_kd of robot.ini")     \
-    X(zero, "takes no action, so the joints hold the default pose")
+    X(zero, 0, "takes no action, so the joints hold the default pose")
 
 /* What a controller may need. It is borrowed and must outlive the controller. */
 typedef struct {
@@ -48,7 +48,7 @@ typedef struct {
     int rows_max; /* most environments in one call */
 } ControllerDef;
 
-#define CONTROLLER_MAKE(name, summary)                                                             \
+#define CONTROLLER_MAKE(name, follows, summary)                                                    \
     MildStatus controller_make_##name(const ControllerDef *def, Controller *controller,            \
                                       MildError *error);
 CONTROLLER_LIST(CONTROLLER_MAKE)
@@ -57,6 +57,8 @@ CONTROLLER_LIST(CONTROLLER_MAKE)
 int controller_count(void);
 const char *controller_name(int index); /* index < controller_count() */
 const char *controller_summary(int index);
+/* Bool: a controller of this name walks as it is told. The others stand. */
+int controller_follows(const char *name);
 /* Fails when there is no controller of this name. The message contains the nearest name. */
 MildStatus controller_check(const char *name, MildError *error);
 /* The caller must destroy *controller. */

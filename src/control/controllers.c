@@ -4,9 +4,10 @@
 #include "base/text.h"
 #include "control/controller.h"
 
-#define ROW(name, summary) {#name, summary, controller_make_##name},
+#define ROW(name, follows, summary) {#name, summary, follows, controller_make_##name},
 static const struct {
     const char *name, *summary;
+    int follows; /* bool */
     MildStatus (*make)(const ControllerDef *def, Controller *controller, MildError *error);
 } controllers[] = {CONTROLLER_LIST(ROW)};
 #undef ROW
@@ -22,6 +23,14 @@ const char *controller_name(int index) {
 
 const char *controller_summary(int index) {
     return controllers[index].summary;
+}
+
+int controller_follows(const char *name) {
+    int follows = 0;
+    for (int i = 0; i < CONTROLLERS; i++) {
+        follows |= controllers[i].follows && strcmp(name, controllers[i].name) == 0;
+    }
+    return follows;
 }
 
 MildStatus controller_check(const char *name, MildError *error) {

@@ -48,8 +48,8 @@ void fit_range(const MildField *field, double *low, double *high);
 /* The number of a material. */
 double *fit_number(MildMaterial *material, const MildField *field);
 
-/* [N] The force in every row on its plate: force[count]. plates: those that the rows name. `passive`
- * and plate_width of the material are ignored. */
+/* [N] The force in every row on its plate: force[count]. plates: those that the rows name. The
+ * material's `passive` and plate_width are ignored. */
 void fit_forces(const FitPlate *plates, const MildMaterial *material, const FitPoint *points,
                 int count, double *force);
 

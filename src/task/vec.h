@@ -15,8 +15,8 @@ typedef struct {
     float *history, *critic, *estimate, *frame;
 } VecView;
 
-/* Statistics of the episodes that ended since the last vec_take_stats. Their means are NaN where none
- * ended. */
+/* Statistics of the episodes that ended since the last vec_take_stats. Their means are NaN where
+ * none ended. */
 typedef struct {
     int episodes, falls, diverged;
     double steps;                    /* policy steps */

@@ -203,7 +203,7 @@ static void test_drop(void **state) {
     assert_true(fabs(end->tilt) < 0.03 && result.rest_speed < 1e-3);
 }
 
-/* (k_c/b + k_phi) u^n of the area, b the shorter side of the plate: through the step of the ground. */
+/* (k_c/b + k_phi) u^n of the area, b the plate's shorter side: through the ground's step. */
 static void test_width(void **state) {
     (void)state;
     static const double sides[][2] = {{0.3, 0.2}, {0.2, 0.1}, {0.06, 0.15}};
