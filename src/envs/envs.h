@@ -71,8 +71,8 @@ typedef struct {
 
 enum { MILD_ENVS_REWARDS_MAX = 32 };
 
-/* Of the episodes that ended since the last call. Means of length, reward, speed_error and terms are
- * NaN where none ended. */
+/* Of the episodes that ended since the last call. Means of length, reward, speed_error and terms
+ * are NaN where none ended. */
 typedef struct {
     int episodes;                        /* that ended */
     int falls;                           /* of these, not by time */

@@ -4,7 +4,7 @@
 
 #include "ground/model.h"
 
-/* [m] Least plate_width, given or of a sole, because Bekker's pressure grows beyond bounds with 1/b. */
+/* [m] Least plate_width, given or of a sole, because Bekker's pressure grows with k_c/b. */
 #define MATERIAL_PLATE_MIN 0.005
 
 /* The row of a material's model. Returns the row of mild for an unknown model and for one without a
