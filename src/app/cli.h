@@ -25,7 +25,8 @@ typedef struct {
 
 /* Type of the target: FLAG int *, TEXT const char **, INT int *, UINT64 uint64_t *, NUMBER
  * double *, NUMBERS CliNumbers *, NUMBERS_EACH CliNumbersEach *, NAMES CliNames *. Only a
- * NUMBERS_EACH may be given more than once, and a flag, which says the same twice. The value that it holds before parsing is
+ * NUMBERS_EACH may be given more than once, and a flag, which says the same twice. The value
+ * that it holds before parsing is
  * the default. Files are const char ** too. INPUT is read. OUTPUT is written and may be `-`; an
  * output that cannot be written is refused before the command runs. OUTPUT_LATER is written to a
  * folder that the command makes, so the command checks it. An output may be neither an input nor

@@ -72,8 +72,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
             "columns depth_m and force_n, and time_s or speed_m_s where speed matters. "
             "Several files may differ in speed, which c_d and dissipation need; c_g also "
             "needs a record that brakes, such as a drop. They may differ in their plate, "
-            "which k_c of bekker needs (--plate once for each file). Rows that are not deeper than all "
-            "before them (unloading) are ignored.",
+            "which k_c of bekker needs (--plate once for each file). Rows that are not deeper than "
+            "all before them (unloading) are ignored.",
         .options = table,
         .option_count = sizeof table / sizeof *table,
         .examples = "  mild press --ground grass --depth 0.04 --csv grass.csv\n"
