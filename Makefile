@@ -50,11 +50,12 @@ build: setup
 	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
 	@cmake --build build --parallel $(JOBS)
 
-# The program alone; tests, plugin and Python module come with `build`, and take longer than it.
+# The program alone; tests, plugin and Python module come with `build`, and take longer than it. VERBOSE=1 shows the compiler.
 .PHONY: program
 program: setup
-	@cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
-	@cmake --build build --parallel $(JOBS) --target mild
+	@scripts/quietly.sh build/log/configure.log "configuring the build" \
+		cmake -S . -B build -DCMAKE_BUILD_TYPE=Release --log-level=WARNING $(CMAKE_FLAGS)
+	@scripts/quietly.sh build/log/compile.log "building build/mild" cmake --build build --parallel $(JOBS) --target mild
 
 test: build
 	@ctest --test-dir build --output-on-failure --parallel $(JOBS) --timeout 280

@@ -9,6 +9,7 @@ install(DIRECTORY ${CMAKE_SOURCE_DIR}/robots ${CMAKE_SOURCE_DIR}/configs ${CMAKE
 install(FILES ${CMAKE_SOURCE_DIR}/scripts/press.py ${CMAKE_SOURCE_DIR}/scripts/fit.py
   ${CMAKE_SOURCE_DIR}/scripts/pressure.py DESTINATION share/mild/scripts COMPONENT program) # --figure, --pressure
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/docs/schema DESTINATION share/mild COMPONENT program)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/web DESTINATION share/mild/build COMPONENT program OPTIONAL) # where scripts/web.sh ran
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE DESTINATION share/doc/mild RENAME copyright COMPONENT program)
 install(FILES ${CMAKE_SOURCE_DIR}/NOTICE ${CMAKE_SOURCE_DIR}/README.md ${CMAKE_SOURCE_DIR}/CHANGELOG.md
   DESTINATION share/doc/mild COMPONENT program)

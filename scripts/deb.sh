@@ -12,7 +12,12 @@ make_package() {
     cmake -S . -B "$root" -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_MARCH=x86-64-v3 -DMILD_MPI=OFF \
         -DMILD_TESTS=OFF -DMILD_DATA_DIR=/usr/share/mild -DCMAKE_INSTALL_PREFIX=/usr "${launcher[@]}"
     cmake --build "$root" --parallel "$jobs" --target mild mild_shared mild_static mild_envs >/dev/null
-    rm -f "$root"/mild_*.deb
+    rm -rf "$root"/mild_*.deb "$root/web"
+    if command -v emcc >/dev/null; then
+        scripts/web.sh "$root"
+    else
+        echo "deb: without the page of \`mild web\`, because emcc is missing; \`scripts/setup.sh web\` installs it" >&2
+    fi
     (cd "$root" && cpack -D CPACK_PACKAGE_VERSION="$(./mild --version | cut -d' ' -f2)" >/dev/null)
     package=$(echo "$root"/mild_*.deb)
     echo "deb: $package, $(du -h "$package" | cut -f1)"
@@ -49,6 +54,11 @@ test_package() {
     inside 'zcat /usr/share/man/man1/mild.1.gz' | grep '^\.SS mild report' >/dev/null
     inside 'source /usr/share/bash-completion/completions/mild && COMP_WORDS=(mild tra) COMP_CWORD=1 && _mild && echo $COMPREPLY' |
         grep -x train >/dev/null
+    if [ -e "$root/web" ]; then
+        inside '{ timeout 2 mild web --port 0 || true; }' | grep '^mild web: http' >/dev/null
+    else
+        inside '{ mild web 2>&1 || true; }' | grep 'this installation has no page' >/dev/null
+    fi
     # nothing but the package's own folders, no path of the machine that built it, and all gone in the end
     ! chroot "$chroot" dpkg -L mild | grep -vE '^(/\.|/usr(/bin|/include|/lib|/share)?(/.*)?)$' || return 1
     ! grep -rlF "$PWD" "$chroot/usr/bin/mild" "$chroot/usr/share/mild" "$chroot/usr/share/doc/mild" "$chroot/usr/lib/mild" || return 1

@@ -9,6 +9,7 @@ import csv
 import sys
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
@@ -39,14 +40,13 @@ def main():
         millions = [x / 1e6 for x in runs[0][0][:length]]
         for i, (name, each) in enumerate(zip(names, axes[0])):
             curves = [columns[i][:length] for _, columns in runs]
-            low, high = [[f(values) for values in zip(*curves)] for f in (min, max)]
-            middle = [sum(values) / len(values) for values in zip(*curves)]
+            low, high, middle = (f(curves, axis=0) for f in (np.nanmin, np.nanmax, np.nanmean))
             line = each.plot(millions, middle, label=f"{label}, {len(runs)} seeds")
             each.fill_between(millions, low, high, alpha=0.25, color=line[0].get_color())
             each.set(xlabel="policy steps [million]", title=name)
             each.spines[["top", "right"]].set_visible(False)
             tail = max(1, length // 10)
-            print(f"{name:24} {label:12}", " ".join(f"{sum(curve[-tail:]) / tail:.4g}" for curve in curves))
+            print(f"{name:24} {label:12}", " ".join(f"{np.nanmean(curve[-tail:]):.4g}" for curve in curves))
     axes[0][-1].legend(frameon=False)
     figure.savefig(given.picture, dpi=120)
 

@@ -45,28 +45,29 @@ if ((${#missing[@]})); then
         echo >&2
         exit 1
     fi
-    echo "setup: installing ${missing[*]}"
+    echo "setup: installing ${#missing[@]} Debian packages: ${missing[*]}"
     export DEBIAN_FRONTEND=noninteractive
-    apt-get -qq update
-    apt-get -qq install --no-install-recommends -y "${missing[@]}"
+    scripts/quietly.sh build/log/update.log "setup: lists of packages" apt-get -q update
+    scripts/quietly.sh build/log/packages.log "setup: Debian packages" \
+        apt-get -q install --no-install-recommends -y "${missing[@]}"
 fi
 
 # The private environment holds the MuJoCo wheel (library and headers), matplotlib (figures), and what the Python package
 # is built and tested with. The copy of the requirements inside it is written last, so that an interrupted installation is repeated.
 if ! cmp -s scripts/requirements.txt .venv/requirements.installed; then
-    echo "setup: preparing .venv ($(paste -sd' ' scripts/requirements.in))"
     python=/usr/bin/python3
     [ -x "$python" ] || python=python3
     "$python" -m venv --clear .venv # from nothing: two MuJoCo wheels side by side would be ambiguous
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r scripts/requirements.txt
+    scripts/quietly.sh build/log/venv.log "setup: .venv, the private Python environment" \
+        .venv/bin/python -m pip install --progress-bar off --disable-pip-version-check --require-hashes -r scripts/requirements.txt
     cp scripts/requirements.txt .venv/requirements.installed
 fi
 
 # Sources that are built with ours: the archives of the package index, unpacked into .venv.
 if ! cmp -s scripts/sources.txt .venv/sources.installed; then
-    echo "setup: fetching $(cut -d' ' -f1 scripts/sources.txt | paste -sd' ')"
     rm -rf .venv/sources .venv/daqp-*
-    .venv/bin/python -m pip download --quiet --disable-pip-version-check --no-deps --no-binary daqp --require-hashes \
+    scripts/quietly.sh build/log/sources.log "setup: sources of $(cut -d' ' -f1 scripts/sources.txt | paste -sd' ')" \
+        .venv/bin/python -m pip download --progress-bar off --disable-pip-version-check --no-deps --no-binary daqp --require-hashes \
         -d .venv/sources -r scripts/sources.txt
     tar -xzf .venv/sources/daqp-*.tar.gz -C .venv
     cp scripts/sources.txt .venv/sources.installed

@@ -118,7 +118,7 @@ typedef struct {
                            at a small impact speed v */
     double k_c;          /* [N/m^(n+1)] bekker: cohesive modulus, divided by plate_width */
     double k_phi;        /* [N/m^(n+2)] bekker: frictional modulus */
-    double plate_width;  /* [m] bekker: b, smaller side of the loaded plate */
+    double plate_width;  /* [m] bekker: b, shorter side of the loaded plate; 0: of the sole */
     double cohesion;     /* [N/m^2] bekker: c, shear strength without load */
     double shear_length; /* [m] bekker: K, slip over which the shear strength builds up */
 } MildMaterial;
@@ -224,6 +224,9 @@ void mild_sole_destroy(MildSole *sole);
 int mild_sole_elements(const MildSole *sole);
 /* [m] Edge of an element. The area of an element is its square. */
 double mild_sole_pitch(const MildSole *sole);
+/* Shorter side [m] of the outline's bounding box in the foot frame: Bekker's b, unless the material
+ * has a plate_width of its own. That of mild_sole_concentric is that of its sole. */
+double mild_sole_width(const MildSole *sole);
 /* Centres of the elements in the foot frame [m]: arrays of mild_sole_elements() numbers for x and
  * y, owned by the sole, and the common height z. */
 const double *mild_sole_x(const MildSole *sole);
@@ -247,7 +250,7 @@ typedef struct {
     double added_mass_per_depth; /* dm_a/du [kg/m] */
 } MildElementLaw;
 /* The law of an element of area pitch^2 [m^2] at a depth u >= 0 [m] in virgin ground. The firm bed
- * is part of it. */
+ * is part of it. A plate_width of 0 is `pitch` here, because the element is the whole plate. */
 MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth);
 /* [m] Depth at which a level sole that is pressed slowly into virgin ground carries `load` [N]. */
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load);

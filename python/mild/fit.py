@@ -17,15 +17,17 @@ def loading(time, depth, force, speed=None):
     columns.append(np.full_like(columns[1], np.nan) if speed is None else _column("speed", speed))
     if len({len(column) for column in columns}) != 1:
         raise ValueError("time, depth, force, speed: they have different lengths")
-    rows = _ground._loading(np.column_stack([*columns, np.zeros_like(columns[0])]))
+    nought = np.zeros_like(columns[0])
+    rows = _ground._loading(np.column_stack([*columns, nought, nought]))
     return rows[:, [1, 3, 4]], rows[:, 2].copy()
 
 
 class GroundFit:
     """Fits a ground model to forces on a level plate that is pressed straight down (docs/model.md section 12).
 
-    plate: (length, width) [m] or a Sole. model: its name. hold: {parameter: number} that is known. fill: a Material or
-    preset that gives what the data do not tell; None: such parameters get no value.
+    plate: (length, width) [m] or a Sole; a list of these for records with plates of their own, and then fit, predict and
+    score take as many arrays X and y, in a list. model: its name. hold: {parameter: number} that is known. fill: a Material
+    or preset that gives what the data do not tell; None: such parameters get no value.
 
     After fit(X, y): parameters_ {name: number, NaN where the data do not tell it}, intervals_ {name: (low, high)} of 95 %,
     states_ {name: held, filled, fitted, limit, open, tied or no_effect}, combinations_ {name: (number, low, high)} of tied
@@ -54,13 +56,15 @@ class GroundFit:
     def fit(self, X, y):
         """X: (n, 1 .. 3) depth [m], speed [m/s] down, acceleration [m/s^2] of loading rows, see `loading`; what is left
         out is 0. y: (n,) force [N] up on the plate. Raises ValueError when they are not finite, too few, or do not match."""
-        X, y = _table(X), _column("y", y)
-        if len(X) != len(y):
-            raise ValueError(f"y: {len(y)} numbers for {len(X)} rows of X")
+        soles = self._soles()
+        tables = self._records("X", X)
+        columns = [_column("y", part) for part in (y if self._several() else [y])]
+        if [len(table) for table in tables] != [len(column) for column in columns]:
+            lengths = ", ".join(str(len(column)) for column in columns)
+            raise ValueError(f"y: {lengths} numbers for {', '.join(str(len(table)) for table in tables)} rows of X")
         if not isinstance(self.hold, (collections.abc.Mapping, type(None))):
             raise TypeError(f"hold: a {type(self.hold).__name__}, but it must be a dict of numbers")
-        sole, width = self._plate()
-        found = _ground._fit(sole, width, _rows(X, y), self.model, dict(self.hold or {}), self.fill)
+        found = _ground._fit(soles, _rows(tables, columns), self.model, dict(self.hold or {}), self.fill)
         values = found["parameters"]
         self.parameters_ = {name: value["value"] for name, value in values.items()}
         self.intervals_ = {name: (value["low"], value["high"]) for name, value in values.items()}
@@ -69,40 +73,46 @@ class GroundFit:
         self.combinations_ = {name: (value["value"], value["low"], value["high"])
                               for name, value in found["combinations"].items()}
         self.material_, self.residual_ = found["curve"], found["residual"]
-        self.n_features_in_ = X.shape[1]
+        self.n_features_in_ = tables[0].shape[1]
         return self
 
     def predict(self, X):
-        """Forces [N] of the fitted curve: (n,). X as for fit. Raises RuntimeError before fit."""
+        """Forces [N] of the fitted curve: (n,), or a list of these. X as for fit. Raises RuntimeError before fit."""
         if not hasattr(self, "material_"):
             raise RuntimeError("GroundFit.predict: nothing is fitted; call fit(X, y) first")
-        X = _table(X)
-        return _ground._fit_forces(self._plate()[0], self.material_, _rows(X, np.zeros(len(X))))
+        soles, tables = self._soles(), self._records("X", X)
+        forces = _ground._fit_forces(soles, self.material_, _rows(tables, [np.zeros(len(table)) for table in tables]))
+        return np.split(forces, np.cumsum([len(table) for table in tables])[:-1]) if self._several() else forces
 
     def score(self, X, y):
         """Coefficient of determination R^2 of predict(X) against y, in scikit-learn's convention: where all of y are the same, 1 if
         they are predicted exactly, else 0; NaN for a single row."""
+        predicted = self.predict(X)
+        if self._several():
+            y, predicted = np.concatenate([_column("y", part) for part in y]), np.concatenate(predicted)
         y = _column("y", y)
-        missed, spread = y - self.predict(X), y - y.mean()
+        missed, spread = y - predicted, y - y.mean()
         if len(y) < 2:
             return math.nan
         if np.ptp(y) == 0:
             return float(not missed.any())
         return 1 - float(missed @ missed) / float(spread @ spread)
 
-    def _plate(self):
-        """The plate in the elements of the model, and its smaller side [m]."""
-        plate = self.plate
-        if isinstance(plate, _ground.Sole):
-            sole, width = plate, min(np.ptp(plate.x), np.ptp(plate.y)) + plate.pitch
-        else:
-            try:
-                length, width = (float(side) for side in plate)
-            except (TypeError, ValueError):
-                raise TypeError("plate: it must be (length, width) in metres or a Sole") from None
-            sole, width = _ground.Sole.plate(length, width), min(length, width)
-        concentric = self.model in ("con_cone", "con_spring") and sole.elements > 1
-        return (sole.concentric() if concentric else sole), float(width)
+    def _several(self):
+        """Whether each record has a plate of its own."""
+        return isinstance(self.plate, (list, tuple)) and any(
+            isinstance(part, (list, tuple, np.ndarray, _ground.Sole)) for part in self.plate)
+
+    def _soles(self):
+        """The plates in the elements of the model."""
+        return [_sole(plate, self.model) for plate in (self.plate if self._several() else [self.plate])]
+
+    def _records(self, name, X):
+        """A table for each plate."""
+        tables = [_table(part) for part in (X if self._several() else [X])]
+        if self._several() and len(tables) != len(self.plate):
+            raise ValueError(f"{name}: {len(tables)} records for {len(self.plate)} plates")
+        return tables
 
     def __repr__(self):
         params = ", ".join(f"{name}={value!r}" for name, value in self.get_params().items())
@@ -112,6 +122,19 @@ class GroundFit:
         from sklearn.utils import Tags, TargetTags, RegressorTags  # only scikit-learn asks for it
 
         return Tags(estimator_type="regressor", target_tags=TargetTags(required=True), regressor_tags=RegressorTags())
+
+
+def _sole(plate, model):
+    if isinstance(plate, _ground.Sole):
+        sole = plate
+    else:
+        try:
+            length, width = (float(side) for side in plate)
+        except (TypeError, ValueError):
+            raise TypeError("plate: it must be (length, width) in metres or a Sole, or a list of these") from None
+        sole = _ground.Sole.plate(length, width)
+    concentric = model in ("con_cone", "con_spring") and sole.elements > 1
+    return sole.concentric() if concentric else sole
 
 
 def _numbers(name, values):
@@ -138,8 +161,12 @@ def _table(X):
     return X
 
 
-def _rows(X, y):
-    """What the module takes: time, depth, force, speed, acceleration."""
-    motion = np.zeros((len(X), 3))
-    motion[:, : X.shape[1]] = X
-    return np.column_stack([np.full(len(X), math.nan), motion[:, 0], y, motion[:, 1], motion[:, 2]])
+def _rows(tables, columns):
+    """What the module takes: time, depth, force, speed, acceleration, number of the plate."""
+    parts = []
+    for plate, (X, y) in enumerate(zip(tables, columns)):
+        motion = np.zeros((len(X), 3))
+        motion[:, : X.shape[1]] = X
+        parts.append(np.column_stack(
+            [np.full(len(X), math.nan), motion[:, 0], y, motion[:, 1], motion[:, 2], np.full(len(X), plate)]))
+    return np.concatenate(parts)

@@ -8,19 +8,41 @@ extern "C" {
 }
 
 static FitPlate plate_of(const Sole &sole) {
-    return {mild_sole_elements(sole.made), mild_sole_pitch(sole.made)};
+    return {mild_sole_elements(sole.made), mild_sole_pitch(sole.made), mild_sole_width(sole.made)};
 }
 
-/* rows: (n, 5) time, depth, force, speed, acceleration; NaN where unknown. */
+/* Fills plates[FIT_PLATES_MAX]; returns their number. */
+static int plates_of(const nb::sequence &soles, FitPlate *plates) {
+    const size_t count = nb::len(soles);
+    if (count < 1 || count > FIT_PLATES_MAX) {
+        raise(PyExc_ValueError,
+              "plate: it must be 1 .. " + std::to_string((int)FIT_PLATES_MAX) + " plates");
+    }
+    for (size_t i = 0; i < count; i++) {
+        const nb::object sole = soles[i];
+        if (!nb::isinstance<Sole>(sole)) {
+            raise(PyExc_TypeError, "plate: it must be a Sole");
+        }
+        plates[i] = plate_of(nb::cast<const Sole &>(sole));
+    }
+    return (int)count;
+}
+
+/* A number that is none, or is far too large, names no plate. */
+static int plate_number(double number) {
+    return number >= 0 && number < FIT_PLATES_MAX ? (int)number : -1;
+}
+
+/* rows: (n, 6) time, depth, force, speed, acceleration, number of the plate; NaN where unknown. */
 static std::vector<FitPoint> points_of(nb::handle rows) {
     const auto numbers = numbers_of(rows, "rows", 2);
-    if (numbers.shape(1) != 5 || numbers.shape(0) > 1000000) {
-        raise(PyExc_ValueError, "rows: they must have the shape (at most 1000000, 5)");
+    if (numbers.shape(1) != 6 || numbers.shape(0) > 1000000) {
+        raise(PyExc_ValueError, "rows: they must have the shape (at most 1000000, 6)");
     }
     std::vector<FitPoint> points;
     for (size_t i = 0; i < numbers.shape(0); i++) {
-        const double *row = numbers.data() + 5 * i;
-        points.push_back({row[0], row[1], row[2], row[3], row[4]});
+        const double *row = numbers.data() + 6 * i;
+        points.push_back({row[0], row[1], row[2], row[3], row[4], plate_number(row[5])});
     }
     return points;
 }
@@ -52,7 +74,8 @@ static void hold(FitDef &def, const std::string &name, double value) {
     const int count = fit_parameters((MildModel)def.material.model, fields);
     const MildField *field =
         mild_field_find(mild_material_fields, mild_material_field_count, name.c_str(), nullptr);
-    bool known = field && fit_is_geometry((MildModel)def.material.model, name.c_str());
+    bool known = field && name != "plate_width" &&
+                 fit_is_geometry((MildModel)def.material.model, name.c_str());
     for (int i = 0; i < count; i++) {
         if (name == fields[i]->name) {
             def.held[i] = 1;
@@ -73,7 +96,7 @@ static void hold(FitDef &def, const std::string &name, double value) {
     *fit_number(&def.material, field) = value;
 }
 
-static FitDef def_of(const Sole &sole, const std::string &model, double width, const nb::dict &held,
+static FitDef def_of(const nb::sequence &soles, const std::string &model, const nb::dict &held,
                      const MildMaterial *fill) {
     FitDef def = {};
     MildModel number;
@@ -83,10 +106,9 @@ static FitDef def_of(const Sole &sole, const std::string &model, double width, c
     if (fill && fill->model != (int)number) {
         raise(PyExc_ValueError, "fill: it is a material of another model");
     }
-    def.plate = plate_of(sole);
+    def.plates = plates_of(soles, def.plate);
     def.material = fill ? *fill : mild_material_default();
     def.material.model = (int)number;
-    def.material.plate_width = positive(width, "plate");
     if (!fill) {
         def.material.bed_depth =
             mild_field_find(mild_material_fields, mild_material_field_count, "bed_depth", nullptr)
@@ -103,14 +125,13 @@ static FitDef def_of(const Sole &sole, const std::string &model, double width, c
     return def;
 }
 
-static nb::dict run(const Sole &sole, double width, nb::handle rows, const std::string &model,
+static nb::dict run(const nb::sequence &soles, nb::handle rows, const std::string &model,
                     const nb::dict &held, nb::handle fill) {
     MildMaterial filled;
     if (!fill.is_none()) {
         filled = material_of(fill, "fill");
-        filled.plate_width = positive(width, "plate");
     }
-    const FitDef def = def_of(sole, model, width, held, fill.is_none() ? nullptr : &filled);
+    const FitDef def = def_of(soles, model, held, fill.is_none() ? nullptr : &filled);
     const std::vector<FitPoint> points = points_of(rows);
     FitResult result = {};
     MildError error = {};
@@ -144,12 +165,18 @@ static nb::object array_of(std::vector<double> numbers, std::vector<size_t> shap
         nb::ndarray<nb::numpy, double>(kept->data(), shape.size(), shape.data(), owner));
 }
 
-static nb::object forces(const Sole &sole, const Material &material, nb::handle rows) {
+static nb::object forces(const nb::sequence &soles, const Material &material, nb::handle rows) {
     const std::vector<FitPoint> points = points_of(rows);
-    const FitPlate plate = plate_of(sole);
+    FitPlate plates[FIT_PLATES_MAX];
+    const int count = plates_of(soles, plates);
+    for (const FitPoint &point : points) {
+        if (point.plate < 0 || point.plate >= count) {
+            raise(PyExc_ValueError, "rows: one names a plate that is not there");
+        }
+    }
     std::vector<double> force(points.size());
     if (!points.empty()) {
-        fit_forces(&plate, &material.numbers, points.data(), (int)points.size(), force.data());
+        fit_forces(plates, &material.numbers, points.data(), (int)points.size(), force.data());
     }
     return array_of(std::move(force), {points.size()});
 }
@@ -169,9 +196,9 @@ static nb::object loading(nb::handle rows) {
 }
 
 void bind_fit(nb::module_ &module) {
-    module.def("_fit", run, nb::arg("sole"), nb::arg("width"), nb::arg("rows"), nb::arg("model"),
-               nb::arg("hold"), nb::arg("fill").none(), "See mild.GroundFit.");
-    module.def("_fit_forces", forces, nb::arg("sole"), nb::arg("material"), nb::arg("rows"),
+    module.def("_fit", run, nb::arg("soles"), nb::arg("rows"), nb::arg("model"), nb::arg("hold"),
+               nb::arg("fill").none(), "See mild.GroundFit.");
+    module.def("_fit_forces", forces, nb::arg("soles"), nb::arg("material"), nb::arg("rows"),
                "Forces [N] in every row: (n,).");
     module.def("_loading", loading, nb::arg("rows"),
                "The loading part of a record, with speeds and accelerations: (n, 5).");

@@ -96,6 +96,9 @@ static void bind_sole(nb::module_ &module) {
             "pitch", [](const Sole &sole) { return mild_sole_pitch(sole.made); },
             "Edge of an element [m].")
         .def_prop_ro(
+            "width", [](const Sole &sole) { return mild_sole_width(sole.made); },
+            "Shorter side of the outline [m]; bekker's b where plate_width is 0.")
+        .def_prop_ro(
             "z", [](const Sole &sole) { return mild_sole_z(sole.made); },
             "Plane of the sole in the foot frame [m].")
         .def_prop_ro(

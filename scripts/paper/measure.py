@@ -33,10 +33,11 @@ def together(given, work, items):
 
 
 def evaluate(given, policy, grounds, speeds, *more):
-    """Rows of `mild eval`; no policy: --controller says who walks."""
+    """Rows of `mild eval`; no policy: --controller says who walks. NaN: not measured."""
     who = ["--policy", policy] if policy else []
-    return json.loads(mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)),
+    rows = json.loads(mild("eval", *who, "--ground", ",".join(grounds), "--speed=" + ",".join(map(str, speeds)),
                            "--trials", given.trials, "--threads", 1, "--json", "-", *more))["rows"]
+    return [{key: float("nan") if value is None else value for key, value in row.items()} for row in rows]
 
 
 def save(given, name, rows):
@@ -53,7 +54,8 @@ def read(path):
 
 
 def mean(values):
-    values = list(values)
+    """Of what was measured."""
+    values = [value for value in values if value == value]
     return sum(values) / len(values) if values else float("nan")
 
 

@@ -173,6 +173,21 @@ static int set_list(const CliCommand *command, const CliOption *option, const ch
     return 0;
 }
 
+/* Stores one more list of an option that may be given several times. */
+static int add_list(const CliCommand *command, const CliOption *option, const char *text) {
+    CliNumbersEach *lists = option->target;
+    if (lists->count >= CLI_LIST_MAX) {
+        return cli_fail_text(command->name, "--%s: given more than %d times", option->name,
+                             (int)CLI_LIST_MAX);
+    }
+    CliOption one = *option;
+    one.type = CLI_NUMBERS;
+    one.target = &lists->each[lists->count];
+    const int failed = set_list(command, &one, text);
+    lists->count += !failed;
+    return failed;
+}
+
 /* Checks an output before the command runs, because a missing folder must not cost an hour of
  * trials. */
 static int set_output(const CliCommand *command, const CliOption *option, const char *path) {
@@ -201,6 +216,7 @@ static int set_option(const CliCommand *command, const CliOption *option, const 
     case CLI_NUMBER: return set_number(command, option, text, option->target);
     case CLI_NUMBERS:
     case CLI_NAMES: return set_list(command, option, text);
+    case CLI_NUMBERS_EACH: return add_list(command, option, text);
     }
     return CLI_EXIT_BAD_INPUT;
 }
@@ -249,6 +265,9 @@ static int take_option(const CliCommand *command, int argc, char **argv, int *in
         const CliOption *option = &command->options[i];
         if (strcmp(option->name, name) != 0) {
             continue;
+        }
+        if (args->given >> i & 1 && option->type != CLI_FLAG && option->type != CLI_NUMBERS_EACH) {
+            return cli_fail_text(command->name, "--%s is given twice; leave out one", name);
         }
         args->given |= UINT64_C(1) << i;
         if (option->type == CLI_FLAG) {

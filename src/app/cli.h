@@ -18,8 +18,15 @@ typedef struct {
     char name[CLI_LIST_MAX][64];
 } CliNames; /* "rubber,foam45" */
 
+typedef struct {
+    int count;
+    CliNumbers each[CLI_LIST_MAX];
+} CliNumbersEach; /* of an option that is given several times */
+
 /* Type of the target: FLAG int *, TEXT const char **, INT int *, UINT64 uint64_t *, NUMBER
- * double *, NUMBERS CliNumbers *, NAMES CliNames *. The value that it holds before parsing is
+ * double *, NUMBERS CliNumbers *, NUMBERS_EACH CliNumbersEach *, NAMES CliNames *. Only a
+ * NUMBERS_EACH may be given more than once, and a flag, which says the same twice. The value
+ * that it holds before parsing is
  * the default. Files are const char ** too. INPUT is read. OUTPUT is written and may be `-`; an
  * output that cannot be written is refused before the command runs. OUTPUT_LATER is written to a
  * folder that the command makes, so the command checks it. Outputs are claimed (file_claim): they
@@ -34,6 +41,7 @@ typedef enum {
     CLI_UINT64,
     CLI_NUMBER,
     CLI_NUMBERS,
+    CLI_NUMBERS_EACH,
     CLI_NAMES
 } CliType;
 
@@ -72,7 +80,7 @@ typedef struct {
 typedef struct {
     const char *positional[CLI_LIST_MAX];
     int positional_count;
-    const char *overrides[CLI_OVERRIDES_MAX]; /* "section.key=value" */
+    const char *overrides[CLI_OVERRIDES_MAX]; /* "section.key=value"; of one key the last counts */
     int override_count;
     uint64_t given;                      /* bit i: options[i] of the command is on the line */
     char joined[CLI_OVERRIDES_MAX][160]; /* storage of overrides given as two words */

@@ -27,6 +27,7 @@ typedef struct {
     char config_robot[TRAIN_ROBOT_SIZE];
     CliNames grounds;
     CliNumbers speeds;
+    int speed_given; /* bool */
     double patch;
     const char *latent, *ablate, *stances, *actions, *track; /* NULL: not given */
     Ablation ablation;
@@ -351,6 +352,21 @@ static MildStatus check_place(const Eval *e, MildError *error) {
                : MILD_OK;
 }
 
+/* A controller that follows no command is told to stand, so that no speed is shown as asked. */
+static MildStatus check_command(Eval *e, MildError *error) {
+    if (!e->speed_given && !controller_follows(e->controller)) {
+        e->speeds.value[0] = 0;
+    }
+    MildStatus status = robots_check_command(e->controller, "sideways", e->eval.sideways, error);
+    if (status == MILD_OK) {
+        status = robots_check_command(e->controller, "turn", e->eval.turn, error);
+    }
+    for (int i = 0; i < e->speeds.count && status == MILD_OK; i++) {
+        status = robots_check_command(e->controller, "speed", e->speeds.value[i], error);
+    }
+    return status;
+}
+
 static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
     MildModel model;
     const char *policy = strcmp(e->controller, "learned") == 0 ? e->policy : NULL;
@@ -358,6 +374,9 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
         experiment_task(&e->task, e->randomize, e->config_robot, e->config, policy, error);
     if (status == MILD_OK) {
         status = controller_check(e->controller, error);
+    }
+    if (status == MILD_OK) {
+        status = check_command(e, error);
     }
     if (status == MILD_OK && e->ablate) {
         status = ablation_find(e->ablate, &e->ablation, error);
@@ -431,7 +450,8 @@ int cmd_eval(int argc, char **argv) {
         {"model", CLI_TEXT, &e->model, 0, 0, "NAME",
          grounds_model_help(model_help, sizeof model_help)},
         {"speed", CLI_NUMBERS, &e->speeds, -3, 3, "V[,V]",
-         "[m/s] commanded forward speeds, one row each (default 0.6)"},
+         "[m/s] commanded forward speeds, one row each (default 0.6; 0 for a controller that "
+         "stands)"},
         {"sideways", CLI_NUMBER, &e->eval.sideways, -1.5, 1.5, "V",
          "[m/s] commanded speed to the left (default 0)"},
         {"turn", CLI_NUMBER, &e->eval.turn, -1.5, 1.5, "W",
@@ -476,14 +496,16 @@ int cmd_eval(int argc, char **argv) {
     const CliCommand command = {
         .name = "eval",
         .usage = "[--policy FILE] [--ground NAME[,NAME]] [--speed V[,V]] [options]",
-        .summary = "Lets a policy walk on every ground at every speed and prints one row for "
-                   "each: trials without a fall, measured speed with its 95 % interval, cost of "
-                   "transport (COT), largest torque of a joint, clearance of the swinging foot "
-                   "above the undisturbed ground, deepest element (sink) and way of the sole "
-                   "(drift) in a stance, and power of the joints. A - is what cannot be measured, "
-                   "such as the speed of trials that fell within 2.5 s. The sensors have the noise "
-                   "and delay of training. The robot has its nominal parameters, and nobody pushes "
-                   "it, without --randomize or --push.",
+        .summary =
+            "Lets a policy walk on every ground at every speed and prints one row for "
+            "each: trials without a fall, measured speed with its 95 % interval, cost of "
+            "transport (COT), largest torque of a joint, clearance of the swinging foot "
+            "above the undisturbed ground, deepest element (sink) and way of the sole "
+            "(drift) in a stance, and power of the joints. A - is what cannot be measured, "
+            "such as the speed of trials that fell within 2.5 s; the JSON has null there. The "
+            "sensors have the noise "
+            "and delay of training. The robot has its nominal parameters, and nobody pushes "
+            "it, without --randomize or --push.",
         .options = options,
         .option_count = sizeof options / sizeof *options,
         .sections = "task ground terrain",
@@ -502,6 +524,8 @@ int cmd_eval(int argc, char **argv) {
     if (outcome == CLI_RUN) {
         MildError error = {0};
         e->policy = e->policy ? e->policy : robot_policy(e->robot, shipped);
+        e->speed_given =
+            cli_first_given(&command, args, (const char *const[]){"speed", NULL}) != NULL;
         code = run_eval(e, args, &error) == MILD_OK ? 0 : cli_fail("eval", &error);
     }
     free(e);

@@ -18,7 +18,7 @@
 
 typedef struct {
     const char *model, *from, *json, *figure;
-    CliNumbers plate;
+    CliNumbersEach plate;
     CliNames fit, hold; /* hold: NAME=VALUE */
 } FitOptions;
 
@@ -44,8 +44,8 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
     char model_help[300];
     snprintf(model_help, sizeof model_help, "ground model (default mild): one of%s", models);
     const CliOption table[] = {
-        {"plate", CLI_NUMBERS, &options->plate, 0.0195, 1, "L,W",
-         "[m] length and width of the plate"},
+        {"plate", CLI_NUMBERS_EACH, &options->plate, 0.0195, 1, "L,W",
+         "[m] length and width of the plate; once for all files, or once for each, in their order"},
         {"model", CLI_TEXT, &options->model, 0, 0, "NAME", model_help},
         {"hold", CLI_NAMES, &options->hold, 0, 0, "NAME=VALUE[,...]",
          "hold parameters at values that are known, e.g. alpha=1.05; also bed_depth, the depth of "
@@ -63,21 +63,24 @@ static int options_read(int argc, char **argv, FitOptions *options, CliArgs *arg
     const CliCommand command = {
         .name = "fit",
         .usage = "DATA.csv [DATA2.csv ...] --plate L,W [options]",
-        .summary = "Finds the parameters of a ground from presses of a level plate: all those that "
-                   "the data determine, each with its 95 % interval by profile likelihood. Nothing "
-                   "is held unless --hold or --hold-from says so. A parameter that the data do not "
-                   "determine gets no value; where they tell a combination, such as "
-                   "sigma_cone/cos(alpha), that is printed. A CSV file has a header line with the "
-                   "columns depth_m and force_n, and time_s or speed_m_s where speed matters. "
-                   "Several files may differ in speed, which c_d and dissipation need; c_g also "
-                   "needs a record that brakes, such as a drop. Rows that are not deeper than all "
-                   "before them (unloading) are ignored.",
+        .summary =
+            "Finds the parameters of a ground from presses of a level plate: all those that "
+            "the data determine, each with its 95 % interval by profile likelihood. Nothing "
+            "is held unless --hold or --hold-from says so. A parameter that the data do not "
+            "determine gets no value; where they tell a combination, such as "
+            "sigma_cone/cos(alpha), that is printed. A CSV file has a header line with the "
+            "columns depth_m and force_n, and time_s or speed_m_s where speed matters. "
+            "Several files may differ in speed, which c_d and dissipation need; c_g also "
+            "needs a record that brakes, such as a drop. They may differ in their plate, "
+            "which k_c of bekker needs (--plate once for each file). Rows that are not deeper than "
+            "all before them (unloading) are ignored.",
         .options = table,
         .option_count = sizeof table / sizeof *table,
         .examples = "  mild press --ground grass --depth 0.04 --csv grass.csv\n"
                     "  mild fit grass.csv --plate 0.2,0.1 --figure grass.png\n"
                     "  mild fit grass.csv --plate 0.2,0.1 --hold alpha=1.1\n"
                     "  mild fit slow.csv fast.csv --plate 0.2,0.1 --hold-from sand_loose\n"
+                    "  mild fit small.csv large.csv --plate 0.15,0.1 --plate 0.3,0.2\n"
                     "  mild fit slow.csv --plate 0.2,0.1 --model bekker --json out.json\n",
         .positional_max = CLI_LIST_MAX,
         .picture = "figure",
@@ -123,6 +126,10 @@ static MildStatus hold_one(const char *text, FitWork *work, MildError *error) {
                          "--hold: '%s' is not NAME=VALUE, such as alpha=1.05", text);
     }
     snprintf(name, sizeof name, "%.*s", (int)(equals - text), text);
+    if (strcmp(name, "plate_width") == 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "--hold plate_width: it is the shorter side of --plate; leave it out");
+    }
     const int geometry = fit_is_geometry((MildModel)def->material.model, name);
     const int index = geometry ? -1 : parameter_find(def, "hold", name, error);
     if (!geometry && index < 0) {
@@ -157,7 +164,6 @@ static MildStatus from_read(const FitOptions *options, FitWork *work, MildError 
                          options->from, mild_model_names[work->preset.model],
                          mild_model_names[model]);
     }
-    work->preset.plate_width = def->material.plate_width;
     def->material = work->preset;
     def->fill = options->fit.count ? NULL : &work->preset;
     work->from = options->from;
@@ -237,20 +243,31 @@ static MildStatus held_read(const FitOptions *options, FitWork *work, MildError 
     return status;
 }
 
-/* The plate in the elements of the model, as press lays it out. */
-static MildStatus plate_lay(const FitOptions *options, FitDef *def, MildError *error) {
-    MildSole *plate = press_plate_create(options->plate.value[0], options->plate.value[1], error);
+/* A plate in the elements of the model, as press lays it out. */
+static MildStatus plate_lay(const CliNumbers *size, int concentric, FitPlate *laid,
+                            MildError *error) {
+    MildSole *plate = press_plate_create(size->value[0], size->value[1], error);
     MildSole *sole = plate;
-    if (plate && mild_model_is_concentric((MildModel)def->material.model)) {
+    if (plate && concentric) {
         sole = mild_sole_concentric(plate, error);
         mild_sole_destroy(plate);
     }
     if (!sole) {
         return error->status;
     }
-    def->plate = (FitPlate){mild_sole_elements(sole), mild_sole_pitch(sole)};
+    *laid = (FitPlate){mild_sole_elements(sole), mild_sole_pitch(sole), mild_sole_width(sole)};
     mild_sole_destroy(sole);
     return MILD_OK;
+}
+
+static MildStatus plates_lay(const FitOptions *options, FitDef *def, MildError *error) {
+    const int concentric = mild_model_is_concentric((MildModel)def->material.model);
+    MildStatus status = MILD_OK;
+    def->plates = options->plate.count;
+    for (int i = 0; i < def->plates && status == MILD_OK; i++) {
+        status = plate_lay(&options->plate.each[i], concentric, &def->plate[i], error);
+    }
+    return status;
 }
 
 static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitWork *work,
@@ -271,24 +288,18 @@ static MildStatus def_make(const FitOptions *options, const CliArgs *args, FitWo
     def->material = mild_material_default();
     def->material.model = (int)model;
     def->material.bed_depth = bed->max;
-    def->material.plate_width = fmin(options->plate.value[0], options->plate.value[1]);
-    status = plate_lay(options, def, error);
+    status = plates_lay(options, def, error);
     return status == MILD_OK ? held_read(options, work, error) : status;
 }
 
 /* ---- the printed result ---- */
 
-static const char *number_text(double value, char text[16]) {
-    snprintf(text, 16, isfinite(value) ? "%.5g" : "-", value);
-    return text;
-}
-
 static void value_print(const FitValue *value) {
-    char number[16], low[16], high[16];
+    char number[TEXT_CELL], low[TEXT_CELL], high[TEXT_CELL];
     const int held = value->state == FIT_HELD || value->state == FIT_FILLED;
-    printf("%-24s %12s %12s %12s  %s\n", value->name, number_text(value->value, number),
-           held ? "held" : number_text(value->low, low), held ? "" : number_text(value->high, high),
-           value->unit);
+    printf("%-24s %12s %12s %12s  %s\n", value->name, text_cell("%.5g", value->value, number),
+           held ? "held" : text_cell("%.5g", value->low, low),
+           held ? "" : text_cell("%.5g", value->high, high), value->unit);
 }
 
 /* Prints "name, name" of the parameters in a set of states, after `title`; nothing for none. With
@@ -397,8 +408,18 @@ static void untold_print(const FitWork *work) {
     never_print(work);
 }
 
+/* "55", or "44, 77" of several plates. */
+static const char *elements_text(const FitDef *def, char text[8 * FIT_PLATES_MAX]) {
+    int length = 0;
+    for (int i = 0; i < def->plates; i++) {
+        length += sprintf(text + length, i ? ", %d" : "%d", def->plate[i].elements);
+    }
+    return text;
+}
+
 static void table_print(const FitWork *work, int files) {
     const FitResult *result = &work->result;
+    char elements[8 * FIT_PLATES_MAX];
     printf("%-24s %12s %12s %12s  %s\n", "parameter", "value", "low 95 %", "high 95 %", "unit");
     for (int i = 0; i < result->parameters; i++) {
         value_print(&result->parameter[i]);
@@ -407,10 +428,10 @@ static void table_print(const FitWork *work, int files) {
         value_print(&result->combination[i]);
     }
     printf("residual %.4g N, %.2f %% of the force (root mean square); %d loading rows of %d "
-           "file%s, %d element%s\n",
+           "file%s, %s element%s\n",
            result->residual, 100 * result->residual_share, result->points, files,
-           files == 1 ? "" : "s", work->def.plate.elements,
-           work->def.plate.elements == 1 ? "" : "s");
+           files == 1 ? "" : "s", elements_text(&work->def, elements),
+           work->def.plates == 1 && work->def.plate[0].elements == 1 ? "" : "s");
     assumptions_print(work);
     untold_print(work);
 }
@@ -481,7 +502,7 @@ static MildStatus data_write(const FitWork *work, const CliArgs *args, const cha
         for (int i = work->first[f]; i < work->first[f + 1]; i++) {
             const FitPoint *p = &work->points[i];
             double force;
-            fit_forces(&work->def.plate, &result->curve, p, 1, &force);
+            fit_forces(work->def.plate, &result->curve, p, 1, &force);
             fprintf(memory, "%d,%.9g,%.9g,%.9g,%.9g\n", f + 1, p->depth, p->force, p->speed, force);
         }
     }
@@ -516,6 +537,9 @@ static MildStatus fit_report(const FitOptions *options, const CliArgs *args, Fit
     for (int f = 0; f < args->positional_count && status == MILD_OK; f++) {
         status = fit_csv_read(args->positional[f], &work->points, &work->count, error);
         work->first[f + 1] = work->count;
+        for (int i = work->first[f]; i < work->count && work->def.plates > 1; i++) {
+            work->points[i].plate = f;
+        }
     }
     if (status == MILD_OK) {
         status = fit_run(&work->def, work->points, work->count, &work->result, error);
@@ -535,6 +559,27 @@ static MildStatus fit_report(const FitOptions *options, const CliArgs *args, Fit
     return status;
 }
 
+/* One plate for all files, or one for each. */
+static int plates_check(const CliNumbersEach *plates, int files) {
+    for (int i = 0; i < plates->count; i++) {
+        if (plates->each[i].count != 2) {
+            return cli_fail_text("fit", "--plate: %d number%s; it takes LENGTH,WIDTH in metres",
+                                 plates->each[i].count, plates->each[i].count == 1 ? "" : "s");
+        }
+    }
+    if (!plates->count) {
+        return cli_fail_text("fit",
+                             "--plate LENGTH,WIDTH is missing: the size of the plate in metres");
+    }
+    if (plates->count != 1 && plates->count != files) {
+        return cli_fail_text("fit",
+                             "--plate: %d plates for %d file%s; give one for all files, or one for "
+                             "each in their order",
+                             plates->count, files, files == 1 ? "" : "s");
+    }
+    return 0;
+}
+
 int cmd_fit(int argc, char **argv) {
     FitOptions options = {0};
     CliArgs args;
@@ -546,9 +591,9 @@ int cmd_fit(int argc, char **argv) {
         return cli_fail_text(
             "fit", "no record given: mild fit DATA.csv --plate L,W (mild press --csv writes one)");
     }
-    if (options.plate.count != 2) {
-        return cli_fail_text("fit",
-                             "--plate LENGTH,WIDTH is missing: the size of the plate in metres");
+    code = plates_check(&options.plate, args.positional_count);
+    if (code) {
+        return code;
     }
     MildError error;
     FitWork work = {0};

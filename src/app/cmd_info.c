@@ -27,26 +27,43 @@ static const struct {
     {"sand_loose", "loose dry sand",
      "inside the paper's ranges; inertia (c_g, c_d, phi) after Choi et al. 2023"},
     {"sand_dense", "packed dry sand", "as sand_loose, denser"},
+    {"dry_sand", "dry sand", "Wong 2008, table 2.3, Land Locomotion Laboratory"},
+    {"sandy_loam", "sandy loam, 15 % moisture", "as dry_sand"},
+    {"clay", "clayey soil, 38 % moisture", "Wong 2008, table 2.3, Thailand"},
+    {"snow", "snow (U.S.)", "Wong 2008, table 2.3"},
+    {"lunar_soil", "lunar soil", "Carrier, Olhoeft, Mendell 1991, section 9.1"},
 };
 enum { SOURCES = sizeof sources / sizeof *sources };
 
-static void print_preset_table(void) {
-    int presets = mild_material_preset_count();
-    printf("%-12s", "");
-    for (int p = 0; p < presets; p++) {
-        printf("%11s", mild_material_preset_name(p));
+static void print_cells(const char *title, const char *const *cells, int count) {
+    printf("  %-12s", title);
+    for (int i = 0; i < count; i++) {
+        printf(" %10s", cells[i]);
     }
     printf("\n");
-    for (int f = 0; f < mild_material_field_count; f++) {
-        printf("  %-10s", mild_material_fields[f].name);
-        for (int p = 0; p < presets; p++) {
+}
+
+/* The grounds of a model, with the parameters that it reads. */
+static void print_preset_table(MildModel model, const char *const *grounds, int count) {
+    const MildModelInfo *info = mild_model_info(model);
+    print_cells("", grounds, count);
+    for (int f = 0; f < MILD_MODEL_FIELDS && info->fields[f]; f++) {
+        const MildField *field =
+            mild_field_find(mild_material_fields, mild_material_field_count, info->fields[f], NULL);
+        char value[GROUNDS_MAX][64];
+        const char *cells[GROUNDS_MAX];
+        for (int p = 0; p < count; p++) {
             MildMaterial material;
-            char value[64];
-            mild_material_preset(mild_material_preset_name(p), &material);
-            mild_field_print(&mild_material_fields[f], &material, value, sizeof value);
-            printf("%11s", value);
+            mild_material_preset(grounds[p], &material);
+            if (field->type == MILD_FIELD_DOUBLE) {
+                snprintf(value[p], sizeof value[p], "%.5g",
+                         *(const double *)(const void *)((const char *)&material + field->offset));
+            } else {
+                mild_field_print(field, &material, value[p], sizeof value[p]);
+            }
+            cells[p] = value[p];
         }
-        printf("\n");
+        print_cells(field->name, cells, count);
     }
 }
 
@@ -60,16 +77,32 @@ static MildSole *paper_sole(void) {
 }
 static const double paper_weight = 40 * 9.81; /* [N] */
 
-static void print_sinkage(const MildSole *sole) {
+static void print_sinkage(const MildSole *sole, const char *const *grounds, int count) {
     printf("\nsinkage of 40 kg at rest [mm]\n");
     for (int feet = 2; feet >= 1; feet--) {
-        printf("  %-10s", feet == 2 ? "two feet" : "one foot");
-        for (int p = 0; p < mild_material_preset_count(); p++) {
+        char value[GROUNDS_MAX][64];
+        const char *cells[GROUNDS_MAX];
+        for (int p = 0; p < count; p++) {
             MildMaterial material;
-            mild_material_preset(mild_material_preset_name(p), &material);
-            printf("%11.1f", 1e3 * mild_sole_sinkage(sole, &material, paper_weight / feet));
+            mild_material_preset(grounds[p], &material);
+            snprintf(value[p], sizeof value[p], "%.1f",
+                     1e3 * mild_sole_sinkage(sole, &material, paper_weight / feet));
+            cells[p] = value[p];
         }
-        printf("\n");
+        print_cells(feet == 2 ? "two feet" : "one foot", cells, count);
+    }
+}
+
+/* The grounds of every model that has some. */
+static void print_grounds(const MildSole *sole) {
+    for (int m = 0; m < MILD_MODELS; m++) {
+        const char *grounds[GROUNDS_MAX];
+        const int count = grounds_of((MildModel)m, grounds);
+        if (count > 0) {
+            printf("%sgrounds of %s (--ground NAME)\n\n", m ? "\n" : "", mild_model_names[m]);
+            print_preset_table((MildModel)m, grounds, count);
+            print_sinkage(sole, grounds, count);
+        }
     }
 }
 
@@ -77,14 +110,14 @@ static void print_sinkage(const MildSole *sole) {
 static void print_matched(const MildSole *sole, MildModel model, const char *key) {
     const MildField *field =
         mild_field_find(mild_material_fields, mild_material_field_count, key, NULL);
-    printf("  %-12s %-10s", mild_model_names[model], key);
+    printf("  %-13s %-10s", mild_model_names[model], key);
     for (int p = 0; p < mild_material_preset_count(); p++) {
         MildMaterial mild, rival;
         mild_material_preset(mild_material_preset_name(p), &mild);
         if (mild_model_match(model, &mild, sole, paper_weight / 2, &rival, NULL) != MILD_OK) {
             continue;
         }
-        printf("%11.4g", *(const double *)(const void *)((const char *)&rival + field->offset));
+        printf(" %10.4g", *(const double *)(const void *)((const char *)&rival + field->offset));
     }
     printf("\n");
 }
@@ -94,18 +127,6 @@ static void print_models(void) {
     for (int m = 0; m < MILD_MODELS; m++) {
         const MildModelInfo *info = mild_model_info((MildModel)m);
         printf("  %-13s  %s; %s\n", mild_model_names[m], info->summary, info->source);
-    }
-    for (int m = 0; m < MILD_MODELS; m++) {
-        const MildModelInfo *info = mild_model_info((MildModel)m);
-        if (info->presets[0]) {
-            printf("grounds of %s's own (--ground NAME):", mild_model_names[m]);
-        }
-        for (int k = 0; k < MILD_MODEL_PRESETS && info->presets[k]; k++) {
-            printf(" %s", info->presets[k]);
-        }
-        if (info->presets[0]) {
-            printf("\n");
-        }
     }
 }
 
@@ -136,8 +157,7 @@ static int info_grounds(void) {
     }
     printf("presets, SI units; any value can be replaced on the command line, e.g. "
            "--ground.k_pen=500\n\n");
-    print_preset_table();
-    print_sinkage(sole);
+    print_grounds(sole);
     printf("\n");
     print_models();
     print_rivals(sole);

@@ -13,7 +13,8 @@
 #include "app/play.h"
 #include "app/progress.h"
 #include "app/robots.h"
-#include "base/file.h"
+#include "base/paths.h"
+#include "base/text.h"
 #include "config/config.h"
 #include "config/experiment_keys.h"
 
@@ -90,21 +91,6 @@ static MildStatus add_presets(Command *c, MildError *error) {
     return status;
 }
 
-/* Makes the file's folder. Fails before the walk when the file cannot be written. */
-static MildStatus make_place(const char *path, MildError *error) {
-    char folder[PATH_SIZE];
-    if (snprintf(folder, sizeof folder, "%s", path) >= (int)sizeof folder) {
-        return mild_fail(error, MILD_ERROR_ARGUMENT, "path too long: %.200s...", path);
-    }
-    char *slash = strrchr(folder, '/');
-    MildStatus status = MILD_OK;
-    if (slash && slash != folder) {
-        *slash = '\0';
-        status = path_make_folder(folder, error);
-    }
-    return status == MILD_OK ? file_check_write(path, error) : status;
-}
-
 static MildStatus make_view(Command *c, MildError *error) {
     ViewDef def = view_def_default();
     Play *play = &c->play;
@@ -134,29 +120,32 @@ static MildStatus make_view(Command *c, MildError *error) {
 
 /* ---- results ---- */
 
-static void print_table(const Command *c) {
-    const Play *play = &c->play;
+/* A number of a leg's table: 1e3 sum/count, "-" of none. */
+static const char *millimetres(const char *format, double sum, int count, char text[TEXT_CELL]) {
+    return text_cell(format, count ? 1e3 * sum / count : NAN, text);
+}
+
+static void print_table(Command *c) {
+    Play *play = &c->play;
     double weight = robot_total_mass(play->robot) * GRAVITY;
     printf("%-12s %9s %7s %9s %8s %10s %9s %5s\n", "ground", "distance", "time", "speed", "upright",
            "clearance", "sinkage", "COT");
     for (int i = 0; i < c->grounds.count; i++) {
-        const PlayLeg *leg = &play->leg[i];
-        const Measure *m = &leg->measure;
+        PlayLeg *leg = &play->leg[i];
+        Measure *m = &leg->measure;
+        char clearance[TEXT_CELL], sinkage[TEXT_CELL], cot[TEXT_CELL];
         if (leg->steps == 0) {
             printf("%-12s   not reached\n", c->names[i]);
             continue;
         }
         double distance = leg->end_x - leg->start_x, time = leg->steps * c->task.physics_dt;
         double steady = fabs(m->end[0] - m->start[0]);
-        printf("%-12s %7.2f m %5.1f s %5.2f m/s %8s %7.0f mm %6.1f mm ", c->names[i], distance,
+        measure_finish(m); /* a robot that stands has stances too */
+        printf("%-12s %7.2f m %5.1f s %5.2f m/s %8s %7s mm %6s mm %5s\n", c->names[i], distance,
                time, distance / time, leg->fell ? "fell" : "yes",
-               m->swings ? 1e3 * m->apex_sum / m->swings : 0.0,
-               m->stances ? 1e3 * m->deepest_sum / m->stances : 0.0);
-        if (steady > 0.1) {
-            printf("%5.2f\n", m->work / (weight * steady));
-        } else {
-            printf("%5s\n", "-");
-        }
+               millimetres("%.0f", m->apex_sum, m->swings, clearance),
+               millimetres("%.1f", m->deepest_sum, m->stances, sinkage),
+               text_cell("%.2f", steady > 0.1 ? m->work / (weight * steady) : NAN, cot));
     }
 }
 
@@ -239,12 +228,6 @@ static MildStatus prepare(Command *c, MildError *error) {
     if (status == MILD_OK) {
         status = controller_make(c->controller, &def, play->controller, error);
     }
-    if (status == MILD_OK && c->video) {
-        status = make_place(c->video, error);
-    }
-    if (status == MILD_OK && c->pressure) {
-        status = make_place(c->pressure, error);
-    }
     if (status == MILD_OK && c->pressure) {
         play->pressure = pressure_create(play->robot, c->scene.terrain.material_count,
                                          c->task.physics_dt, error);
@@ -268,6 +251,11 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
         status = controller_check(c->controller, error);
     }
     if (status == MILD_OK) {
+        const int still = isnan(play->speed) && !controller_follows(c->controller);
+        play->speed = still ? 0 : isnan(play->speed) ? 0.6 : play->speed;
+        status = robots_check_command(c->controller, "speed", play->speed, error);
+    }
+    if (status == MILD_OK) {
         status = grounds_model(c->model, args, &model, error);
     }
     if (status != MILD_OK) {
@@ -275,7 +263,8 @@ static MildStatus run_play(Command *c, const CliArgs *args, MildError *error) {
     }
     if (play->seconds == 0) {
         double course = c->grounds.count * c->patch / fmax(fabs(play->speed), 0.1) + COURSE_EXTRA;
-        play->seconds = fmax(course, COURSE_LEAST);
+        play->seconds =
+            controller_follows(c->controller) ? fmax(course, COURSE_LEAST) : COURSE_LEAST;
     }
     Robot *robot = robots_open(c->robot, c->config_robot, error);
     if (!robot) {
@@ -322,12 +311,12 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
          grounds_model_help(model_help, sizeof model_help)},
         {"patch", CLI_NUMBER, &c->patch, 0.5, 100, "L",
          "[m] length of each ground of a course (default 2)"},
-        {"video", CLI_OUTPUT_LATER, &c->video, 0, 0, "FILE.mp4",
+        {"video", CLI_OUTPUT, &c->video, 0, 0, "FILE.mp4",
          "write a video; without this and --pressure a window opens"},
-        {"pressure", CLI_OUTPUT_LATER, &c->pressure, 0, 0, "FILE.png",
+        {"pressure", CLI_OUTPUT, &c->pressure, 0, 0, "FILE.png",
          "draw the sole pressure on each ground; the numbers go to FILE.csv beside it"},
         {"speed", CLI_NUMBER, &c->play.speed, -1.3, 1.3, "V",
-         "[m/s] commanded forward speed (default 0.6)"},
+         "[m/s] commanded forward speed (default 0.6; 0 for a controller that stands)"},
         {"seconds", CLI_NUMBER, &c->play.seconds, 0, 3600, "T",
          "[s] length of the walk; 0: long enough for the course (default 0)"},
         {"seed", CLI_UINT64, &c->play.seed, 0, 0, "S",
@@ -357,17 +346,22 @@ static int parse_and_run(Command *c, CliArgs *args, int argc, char **argv) {
         .sections = "task ground terrain",
         .overrides = "any key of sections [task], [ground] and [terrain], e.g. --ground.mu=0.4 "
                      "--terrain.kind=waves --terrain.memory=true",
-        .examples = "  mild play --ground rubber,foam45,sand_loose --video out/walk.mp4 --pressure "
-                    "out/pressure.png\n"
+        .examples = "  mild play --ground rubber,foam45,sand_loose --video walk.mp4 --pressure "
+                    "pressure.png\n"
                     "  mild play --ground foam28 --speed 0.4\n"
                     "  mild play --ground sand_loose --terrain.kind=waves --terrain.memory=true "
-                    "--video out/waves.mp4\n",
+                    "--video waves.mp4\n",
     };
     CliOutcome outcome = cli_parse(&command, argc, argv, args);
     if (outcome != CLI_RUN) {
         return outcome == CLI_DONE ? 0 : CLI_EXIT_BAD_INPUT;
     }
     MildError error = {0};
+    int code = cli_refuse_dash("play", "video", c->video);
+    code = code ? code : cli_refuse_dash("play", "pressure", c->pressure);
+    if (code) {
+        return code;
+    }
     c->policy = c->policy ? c->policy : robot_policy(c->robot, shipped);
     return run_play(c, args, &error) == MILD_OK ? 0 : cli_fail("play", &error);
 }
@@ -381,7 +375,7 @@ int cmd_play(int argc, char **argv) {
         c->patch = 2;
         c->terrain = terrain_def_default();
         c->width = 960, c->height = 540;
-        c->play.speed = 0.6;
+        c->play.speed = NAN; /* not given */
         c->play.seed = 1;
         c->grounds.count = 1;
         strcpy(c->grounds.name[0], "sand_loose");

@@ -346,9 +346,8 @@ static CliOutcome options_parse(const CliOption *table, int count, int argc, cha
 }
 
 static int options_read(int argc, char **argv, PressOptions *options, CliArgs *args) {
-    char grounds[200], ground_help[320], model_help[320];
-    snprintf(ground_help, sizeof ground_help, "one of %s, or one of bekker's: `mild info grounds`",
-             grounds_names(grounds, sizeof grounds));
+    char grounds[300], ground_help[320], model_help[320];
+    snprintf(ground_help, sizeof ground_help, "one of %s", grounds_names(grounds, sizeof grounds));
     const CliOption table[] = {
         {"ground", CLI_TEXT, &options->ground, 0, 0, "NAME", ground_help},
         {"model", CLI_TEXT, &options->model, 0, 0, "NAME",

@@ -1,5 +1,6 @@
 /* mild train: from a config to a run folder. */
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 #include "app/progress.h"
 #include "app/robots.h"
 #include "base/paths.h"
+#include "base/text.h"
 #include "config/experiment_keys.h"
 #include "ranks/ranks.h"
 #include "train/run.h"
@@ -73,28 +75,33 @@ static MildStatus make_config_text(Command *run, MildError *error) {
 
 typedef struct {
     Progress bar;
-    double steps_per_s, reward, length, falls; /* smoothed, except falls */
-    int64_t iteration, iterations;             /* of the whole run, of this session */
+    double steps_per_s, reward, length, falls; /* smoothed, except falls; NaN: no episode yet */
+    int64_t iteration;                         /* of the whole run */
     int64_t bad;                               /* diverged environments and skipped minibatches */
 } Display;
 
+/* A running mean; NaN before its first number. */
+static double smoothed(double before, double now) {
+    return isnan(before) ? now : 0.9 * before + 0.1 * now;
+}
+
 static void display_take(void *self, int64_t iteration, const TrainReport *r, double share) {
     Display *display = self;
-    double keep = display->iterations++ ? 0.9 : 0;
     display->iteration = iteration;
-    display->steps_per_s = keep * display->steps_per_s + (1 - keep) * r->steps_per_s;
-    display->reward = keep * display->reward + (1 - keep) * r->reward_per_step / TASK_PERIOD;
+    display->steps_per_s = smoothed(display->steps_per_s, r->steps_per_s);
+    display->reward = smoothed(display->reward, r->reward_per_step / TASK_PERIOD);
     if (r->episodes.episodes) {
-        display->length = display->length > 0 ? 0.9 * display->length + 0.1 * r->episodes.length
-                                              : r->episodes.length;
+        display->length = smoothed(display->length, r->episodes.length);
         display->falls = (double)r->episodes.falls / r->episodes.episodes;
     }
+    char length[TEXT_CELL], falls[TEXT_CELL];
     display->bad += r->episodes.diverged + r->ppo.skipped;
     progress_show(&display->bar, share,
                   "iteration %" PRId64
-                  "  %.0f steps/s  reward %.2f/s  episode %.1f s  falls %.0f %%  diverged %" PRId64,
-                  iteration, display->steps_per_s, display->reward, display->length,
-                  100 * display->falls, display->bad);
+                  "  %.0f steps/s  reward %.2f/s  episode %s s  falls %s %%  diverged %" PRId64,
+                  iteration, display->steps_per_s, display->reward,
+                  text_cell("%.1f", display->length, length),
+                  text_cell("%.0f", 100 * display->falls, falls), display->bad);
 }
 
 static void tell_resumed(void *self, const char *checkpoint) {
@@ -115,7 +122,7 @@ static int stop(void *self) {
 /* ---- the command ---- */
 
 static MildStatus train(const Command *command, MildError *error) {
-    Display display = {0};
+    Display display = {.steps_per_s = NAN, .reward = NAN, .length = NAN, .falls = NAN};
     const int leads = ranks_number(command->ranks) == 0;
     const TrainRunDef def = {.ranks = command->ranks,
                              .folder = command->out,
@@ -144,10 +151,13 @@ static MildStatus train(const Command *command, MildError *error) {
     display.iteration = train_run_iteration(run);
     MildStatus status = train_run_loop(run, error);
     if (leads) {
-        progress_end(
-            &display.bar,
-            "iteration %" PRId64 "  %.0f steps/s  reward %.2f/s  episode %.1f s  diverged %" PRId64,
-            display.iteration, display.steps_per_s, display.reward, display.length, display.bad);
+        char rate[TEXT_CELL], reward[TEXT_CELL], length[TEXT_CELL];
+        progress_end(&display.bar,
+                     "iteration %" PRId64
+                     "  %s steps/s  reward %s/s  episode %s s  diverged %" PRId64,
+                     display.iteration, text_cell("%.0f", display.steps_per_s, rate),
+                     text_cell("%.2f", display.reward, reward),
+                     text_cell("%.1f", display.length, length), display.bad);
     }
     train_run_close(run);
     return status;

@@ -23,8 +23,12 @@ static MildStatus check_built(const char *folder, MildError *error) {
             return status;
         }
         if (!is_served(path)) {
-            return mild_fail(error, MILD_ERROR_IO,
-                             "no file %.200s to read: the page is not built; run `make web`", path);
+            return mild_fail(
+                error, MILD_ERROR_IO,
+                "no file %.200s to read: this installation has no page; `make web` in the "
+                "source tree builds it (it installs emscripten), then `mild web --folder "
+                "build/web`",
+                path);
         }
     }
     return MILD_OK;

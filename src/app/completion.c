@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "app/commands.h"
+#include "app/grounds.h"
 #include "config/experiment_keys.h"
 #include "control/controller.h"
 #include "robot/robot.h"
@@ -53,14 +54,10 @@ static const char tail[] = "    if [[ $before == --* && \" $files \" == *\" $bef
 /* ---- the values of options, by the option's name ---- */
 
 static void print_grounds(void) {
-    for (int i = 0; i < mild_material_preset_count(); i++) {
-        printf("%s ", mild_material_preset_name(i));
-    }
-    for (int m = 0; m < MILD_MODELS; m++) {
-        const MildModelInfo *info = mild_model_info((MildModel)m);
-        for (int k = 0; k < MILD_MODEL_PRESETS && info->presets[k]; k++) {
-            printf("%s ", info->presets[k]);
-        }
+    const char *names[GROUNDS_MAX];
+    const int count = grounds_all(names);
+    for (int i = 0; i < count; i++) {
+        printf("%s ", names[i]);
     }
     fputs("rigid", stdout);
 }

@@ -4,7 +4,29 @@
 
 #include "base/text.h"
 
-enum { NAMES_MAX = 32 };
+int grounds_of(MildModel model, const char *names[GROUNDS_MAX]) {
+    const MildModelInfo *info = mild_model_info(model);
+    int count = 0;
+    for (int i = 0; model == MILD_MODEL_MILD && i < mild_material_preset_count(); i++) {
+        names[count++] = mild_material_preset_name(i);
+    }
+    for (int i = 0; i < MILD_MODEL_PRESETS && info->presets[i]; i++) {
+        names[count++] = info->presets[i];
+    }
+    return count;
+}
+
+int grounds_all(const char *names[GROUNDS_MAX]) {
+    int count = 0;
+    for (int m = 0; m < MILD_MODELS; m++) {
+        const char *some[GROUNDS_MAX];
+        const int more = grounds_of((MildModel)m, some);
+        for (int i = 0; i < more && count < GROUNDS_MAX; i++) {
+            names[count++] = some[i];
+        }
+    }
+    return count;
+}
 
 MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, MildError *error) {
     int is_rigid = strcmp(name, "rigid") == 0;
@@ -21,11 +43,8 @@ MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, Mi
     if (mild_material_preset(name, material)) {
         return MILD_OK;
     }
-    const char *names[NAMES_MAX];
-    int count = 0;
-    for (; count < mild_material_preset_count() && count < NAMES_MAX - 1; count++) {
-        names[count] = mild_material_preset_name(count);
-    }
+    const char *names[GROUNDS_MAX + 1];
+    int count = grounds_all(names);
     if (rigid) {
         names[count++] = "rigid";
     }
@@ -147,11 +166,11 @@ MildStatus grounds_lay_map(const GroundsDef *def, Scene *scene, MildMap **map, M
     return MILD_OK;
 }
 
-static const char *list_names(int count, const char *(*name)(int), char *text, size_t size) {
+static const char *list_names(int count, const char *const *names, char *text, size_t size) {
     size_t length = 0;
     text[0] = '\0';
     for (int i = 0; i < count; i++) {
-        int added = snprintf(text + length, size - length, "%s%s", i ? " " : "", name(i));
+        int added = snprintf(text + length, size - length, "%s%s", i ? " " : "", names[i]);
         if (added < 0 || (size_t)added >= size - length) {
             break;
         }
@@ -160,17 +179,14 @@ static const char *list_names(int count, const char *(*name)(int), char *text, s
     return text;
 }
 
-static const char *model_name(int index) {
-    return mild_model_names[index];
-}
-
 const char *grounds_names(char *text, size_t size) {
-    return list_names(mild_material_preset_count(), mild_material_preset_name, text, size);
+    const char *names[GROUNDS_MAX];
+    return list_names(grounds_all(names), names, text, size);
 }
 
 const char *grounds_model_help(char *text, size_t size) {
     char names[240];
-    list_names(MILD_MODELS, model_name, names, sizeof names);
+    list_names(MILD_MODELS, mild_model_names, names, sizeof names);
     snprintf(text, size, "ground model, matched to the sinkage of mild (default mild): %s", names);
     return text;
 }

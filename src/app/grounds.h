@@ -9,6 +9,11 @@
 #include "task/task_def.h"
 #include "task/terrain.h"
 
+enum { GROUNDS_MAX = 32 };
+/* The names of the grounds of a model, and of all models. They return how many there are. */
+int grounds_of(MildModel model, const char *names[GROUNDS_MAX]);
+int grounds_all(const char *names[GROUNDS_MAX]);
+
 /* The material of a preset. For an unknown name the message names the nearest preset. `rigid` has
  * no material: it sets *rigid, or fails when that is NULL. */
 MildStatus grounds_find(const char *name, MildMaterial *material, int *rigid, MildError *error);

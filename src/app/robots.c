@@ -106,3 +106,12 @@ int robots_print(void) {
     }
     return 0;
 }
+
+MildStatus robots_check_command(const char *controller, const char *option, double value,
+                                MildError *error) {
+    return value == 0 || controller_follows(controller)
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "--%s %g: controller %s follows no command; leave it out", option, value,
+                           controller);
+}

@@ -163,6 +163,11 @@ char *file_read(const char *path, size_t limit, size_t *size, MildError *error) 
 /* ---- writing ---- */
 
 static MildStatus cannot_write(const char *path, int failure, MildError *error) {
+    const char *slash = strrchr(path, '/');
+    if (failure == ENOENT && slash) {
+        return mild_fail(error, MILD_ERROR_IO, "%.200s: there is no folder %.*s; make it first",
+                         path, slash - path < 200 ? (int)(slash - path) : 200, path);
+    }
     return mild_fail(error, MILD_ERROR_IO, "%.200s: cannot be written: %s", path,
                      strerror(failure));
 }

@@ -144,3 +144,8 @@ const char *text_duration(double seconds, char *text, size_t size) {
     }
     return text;
 }
+
+const char *text_cell(const char *format, double value, char text[TEXT_CELL]) {
+    snprintf(text, TEXT_CELL, isfinite(value) ? format : "-", value);
+    return text;
+}

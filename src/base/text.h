@@ -26,4 +26,9 @@ size_t text_plain(char *text, size_t size, const char *keep);
 const char *text_bytes(double bytes, char *text, size_t size);
 const char *text_duration(double seconds, char *text, size_t size);
 
+enum { TEXT_CELL = 24 };
+/* A number in the format of its column, such as "%.2f"; "-" for NaN, because nothing was measured.
+ * Returns `text`. */
+const char *text_cell(const char *format, double value, char text[TEXT_CELL]);
+
 #endif

@@ -102,6 +102,7 @@ static void shape_def(MildBatch *batch, const MildBatchDef *def) {
     shape->limit = def->max_iterations > 0 ? def->max_iterations : BATCH_LIMIT;
     for (int f = 0; f < def->feet; f++) {
         batch->pitch[f] = mild_sole_pitch(def->soles[f]);
+        batch->width[f] = mild_sole_width(def->soles[f]);
         shape->elements[f] = mild_sole_elements(def->soles[f]);
         shape->z[f] = (float)mild_sole_z(def->soles[f]);
         shape->area[f] = (float)(batch->pitch[f] * batch->pitch[f]);
@@ -205,8 +206,8 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
         return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
     }
     for (int i = 0; i < count * feet && status == MILD_OK; i++) {
-        status = material_numbers(&materials[i / feet], batch->pitch[i % feet], i / feet,
-                                  &numbers[i], error);
+        status = material_numbers(&materials[i / feet], batch->pitch[i % feet],
+                                  batch->width[i % feet], i / feet, &numbers[i], error);
         curves |= status == MILD_OK ? numbers[i].curves : 0;
     }
     memset(numbers + count * feet, 0xff, (size_t)feet * sizeof *numbers); /* not a number */

@@ -38,6 +38,7 @@ struct MildBatch {
     int device;
     int curves;                  /* LawCurve bits of all materials */
     double pitch[MILD_FEET_MAX]; /* [m] */
+    double width[MILD_FEET_MAX]; /* [m] shorter side of the sole */
 };
 
 /* [numbers] of a robot's memory. */

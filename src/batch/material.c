@@ -7,13 +7,13 @@
 enum { LAW_NUMBERS(MATERIAL_LAW_INDEX) MATERIAL_LAW_COUNT };
 _Static_assert(MATERIAL_LAW_COUNT == MATERIAL_LAW_NUMBERS, "all numbers");
 
-MildStatus material_numbers(const MildMaterial *material, double pitch, int index,
+MildStatus material_numbers(const MildMaterial *material, double pitch, double width, int index,
                             MaterialNumbers *numbers, MildError *error) {
     MildError cause = {0};
     if (mild_material_check(material, &cause) != MILD_OK) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: material %d: %s", index, cause.text);
     }
-    const Law law = law_of(material, pitch);
+    const Law law = law_of(material, pitch, width);
     int n = 0;
 #define MATERIAL_LAW_STORE(name) numbers->law[n++] = (float)law.name;
     LAW_NUMBERS(MATERIAL_LAW_STORE)

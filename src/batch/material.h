@@ -14,9 +14,9 @@ typedef struct {
     int curves;
 } MaterialNumbers;
 
-/* Under an element of area pitch^2. Fails for a material that mild_material_check refuses. index:
- * of the material, for the message. */
-MildStatus material_numbers(const MildMaterial *material, double pitch, int index,
+/* Under an element of area pitch^2 of a sole whose shorter side is `width`. Fails for a material
+ * that mild_material_check refuses. index: of the material, for the message. */
+MildStatus material_numbers(const MildMaterial *material, double pitch, double width, int index,
                             MaterialNumbers *numbers, MildError *error);
 
 #endif

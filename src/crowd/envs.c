@@ -1,5 +1,7 @@
 #include "crowd/envs.h"
 
+#include <math.h>
+
 #include "crowd/backend.h"
 
 _Static_assert((int)TASK_REWARD_COUNT <= (int)ENVS_TERMS_MAX, "room for every term");
@@ -38,15 +40,14 @@ MildStatus envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error
 EnvsStats envs_means(EnvsStats sums, int count) {
     EnvsStats means = sums;
     means.assist /= count;
-    if (means.episodes) {
-        const double lived = means.length > 0 ? means.length : 1;
-        for (int i = 0; i < TASK_REWARD_COUNT; i++) {
-            means.terms[i] /= lived;
-        }
-        means.length /= means.episodes;
-        means.reward /= means.episodes;
-        means.speed_error /= means.episodes;
+    const double ended = means.episodes ? (double)means.episodes : (double)NAN;
+    const double lived = means.episodes && !(means.length > 0) ? 1 : means.length;
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        means.terms[i] = means.episodes ? means.terms[i] / lived : (double)NAN;
     }
+    means.length /= ended;
+    means.reward /= ended;
+    means.speed_error /= ended;
     return means;
 }
 

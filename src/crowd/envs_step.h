@@ -31,7 +31,8 @@ typedef struct {
 
 enum { ENVS_TERMS_MAX = 32 };
 
-/* Of the episodes that ended since the last call. */
+/* Of the episodes that ended since the last call. Means of length, reward, speed_error and terms
+ * are NaN where none ended. */
 typedef struct {
     int episodes;                 /* that ended */
     int falls;                    /* of these, not by time */

@@ -34,13 +34,14 @@ typedef struct {
     FILE *track;            /* one for each policy step of each trial (track.h), by MuJoCo */
 } EvalDef;
 
-/* Means over the trials, SI units. */
+/* Means over the trials, SI units. NaN: nothing was measured, as the speed of trials that fell at
+ * once, the sinkage without a stance, or a deviation of one trial. */
 typedef struct {
     char ground[160];
     double speed;         /* [m/s] commanded, forward */
     int trials;           /* number of trials */
     int success;          /* trials without termination */
-    int measured;         /* trials that velocity and cot are means of; 0: all fell too early */
+    int measured;         /* trials that velocity and cot are means of; 0: all were too short */
     double velocity;      /* [m/s] forward, after the first 2 s, of trials that lasted longer: along
                         world x, or along the robot's heading when it is told to turn */
     double velocity_low;  /* [m/s] 95 % interval of the mean over trials: lower end */
@@ -50,7 +51,7 @@ typedef struct {
     double turn;               /* [rad/s] commanded */
     double velocity_turn;      /* [rad/s] measured */
     double push;               /* [m/s] */
-    double cot;                /* [-] sum |tau qd| / (m g v) */
+    double cot;                /* [-] sum |tau qd| / (m g v); NaN when told to stand */
     double torque_max;         /* [N m] largest over joints and time, mean over trials */
     double velocity_deviation; /* [m/s] standard deviation over the trials of velocity */
     double cot_deviation;      /* [-] of cot */

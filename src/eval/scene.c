@@ -30,6 +30,13 @@ static MildStatus find_preset(const char *name, MildMaterial *material, MildErro
         size_t used = strlen(known);
         snprintf(known + used, sizeof known - used, ", %s", mild_material_preset_name(i));
     }
+    for (int m = 0; m < MILD_MODELS; m++) {
+        const MildModelInfo *info = mild_model_info((MildModel)m);
+        for (int k = 0; k < MILD_MODEL_PRESETS && info->presets[k]; k++) {
+            size_t used = strlen(known);
+            snprintf(known + used, sizeof known - used, ", %s", info->presets[k]);
+        }
+    }
     return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown ground '%s'; known: %s", name, known);
 }
 

@@ -3,21 +3,29 @@
 #include <stdio.h>
 
 #include "base/student.h"
+#include "base/text.h"
 #include "eval/eval.h"
 
 #define STEADY_LEAST 0.5    /* [s] a shorter steady part is too short to measure speed */
 #define DISTANCE_LEAST 1e-3 /* [m] keeps the cost of transport of a standing robot finite */
 
-/* Standard deviation of `count` numbers with this mean and this mean of their squares. */
+/* Standard deviation of `count` numbers with this mean and this mean of their squares; NaN for one.
+ */
 static double deviation(double mean, double square, int count) {
-    return sqrt(fmax(square - mean * mean, 0) * count / fmax(count - 1, 1));
+    return count > 1 ? sqrt(fmax(square - mean * mean, 0) * count / (count - 1)) : NAN;
+}
+
+/* A mean; NaN where nothing was measured. */
+static double mean(double sum, int count) {
+    return count ? sum / count : NAN;
 }
 
 /* Speed, cost of transport and base motion over the steady part of the trials without a fall,
  * because a robot that dives forward and falls is not fast. If all trials fell, of all trials. */
 static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_t *fallen,
                              double weight) {
-    double v_sum = 0, v_square = 0, cot_square = 0;
+    double v_sum = 0, v_square = 0, cot_sum = 0, cot_square = 0, left_sum = 0, turn_sum = 0;
+    double oscillation = 0;
     int steady = 0;
     for (int i = 0; i < row->trials; i++) {
         const Measure *m = &measures[i];
@@ -31,28 +39,27 @@ static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_
         double way = row->sideways != 0 ? hypot(distance, left) : fabs(distance);
         v_sum += v;
         v_square += v * v;
-        row->velocity_sideways += left / m->steady_time;
-        row->velocity_turn += m->turned / m->steady_time;
+        left_sum += left / m->steady_time;
+        turn_sum += m->turned / m->steady_time;
         const double cot = m->work / (weight * fmax(way, DISTANCE_LEAST));
-        row->cot += cot;
+        cot_sum += cot;
         cot_square += cot * cot;
-        row->base_oscillation += m->base_high - m->base_low;
+        oscillation += m->base_high - m->base_low;
         steady++;
     }
+    const int walks = row->speed != 0 || row->sideways != 0; /* standing has no cost of transport */
     row->measured = steady;
-    if (!steady) {
-        return;
-    }
-    row->velocity = v_sum / steady;
-    row->velocity_deviation = deviation(row->velocity, v_square / steady, steady);
-    double half = steady > 1 ? student_95(steady - 1) * row->velocity_deviation / sqrt(steady) : 0;
+    row->velocity = mean(v_sum, steady);
+    row->velocity_deviation = deviation(row->velocity, mean(v_square, steady), steady);
+    double half =
+        steady > 1 ? student_95(steady - 1) * row->velocity_deviation / sqrt(steady) : NAN;
     row->velocity_low = row->velocity - half;
     row->velocity_high = row->velocity + half;
-    row->velocity_sideways /= steady;
-    row->velocity_turn /= steady;
-    row->cot /= steady;
-    row->cot_deviation = deviation(row->cot, cot_square / steady, steady);
-    row->base_oscillation /= steady;
+    row->velocity_sideways = mean(left_sum, steady);
+    row->velocity_turn = mean(turn_sum, steady);
+    row->cot = walks ? mean(cot_sum, steady) : NAN;
+    row->cot_deviation = deviation(row->cot, mean(cot_square, steady), steady);
+    row->base_oscillation = mean(oscillation, steady);
 }
 
 void eval_print_stances_header(FILE *csv) {
@@ -106,11 +113,11 @@ MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval,
     }
     row->torque_deviation = deviation(row->torque_max, torque_square, trials);
     summarise_motion(row, measures, fallen, weight);
-    row->clearance = swings ? apex / swings : 0;
-    row->penetration = stances ? deepest / stances : 0;
-    row->drift = stances ? drift / stances : 0;
-    row->drift_forward = stances ? way[0] / stances : 0;
-    row->drift_left = stances ? way[1] / stances : 0;
+    row->clearance = mean(apex, swings);
+    row->penetration = mean(deepest, stances);
+    row->drift = mean(drift, stances);
+    row->drift_forward = mean(way[0], stances);
+    row->drift_left = mean(way[1], stances);
     return status;
 }
 
@@ -132,22 +139,22 @@ static void print_speed(const EvalRow *row, char *text, size_t size) {
 }
 
 void eval_print_row(const EvalRow *row, char *text, int size) {
-    char velocity[32], cot[16] = "-", sideways[48] = "", turning[48] = "";
+    char velocity[32], sideways[64] = "", turning[64] = "";
+    char cot[TEXT_CELL], clearance[TEXT_CELL], sink[TEXT_CELL], drift[TEXT_CELL], part[TEXT_CELL];
     print_speed(row, velocity, sizeof velocity);
-    if (row->measured && (row->speed != 0 || row->sideways != 0)) { /* none for standing */
-        snprintf(cot, sizeof cot, "%.2f", row->cot);
-    }
     if (row->sideways != 0) {
-        snprintf(sideways, sizeof sideways, "  sideways %.3f of %.2f m/s", row->velocity_sideways,
-                 row->sideways);
+        snprintf(sideways, sizeof sideways, "  sideways %s of %.2f m/s",
+                 text_cell("%.3f", row->velocity_sideways, part), row->sideways);
     }
     if (row->turn != 0) {
-        snprintf(turning, sizeof turning, "  turning %.3f of %.2f rad/s", row->velocity_turn,
-                 row->turn);
+        snprintf(turning, sizeof turning, "  turning %s of %.2f rad/s",
+                 text_cell("%.3f", row->velocity_turn, part), row->turn);
     }
-    snprintf(text, (size_t)size,
-             "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4.0f mm %4.1f mm %4.1f mm %7.0f%s%s", row->ground,
-             row->speed, row->success, row->trials, velocity, cot, row->torque_max,
-             1e3 * row->clearance, 1e3 * row->penetration, 1e3 * row->drift,
-             row->seconds > 0 ? row->energy / row->seconds : 0, sideways, turning);
+    snprintf(text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7.0f%s%s",
+             row->ground, row->speed, row->success, row->trials, velocity,
+             text_cell("%.2f", row->cot, cot), row->torque_max,
+             text_cell("%.0f", 1e3 * row->clearance, clearance),
+             text_cell("%.1f", 1e3 * row->penetration, sink),
+             text_cell("%.1f", 1e3 * row->drift, drift), row->energy / row->seconds, sideways,
+             turning);
 }

@@ -4,8 +4,9 @@
 
 #include <math.h>
 
-MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth) {
-    const Law law = law_of(material, pitch);
+static MildElementLaw element_law(const MildMaterial *material, double pitch, double width,
+                                  double depth) {
+    const Law law = law_of(material, pitch, width);
     const int curves = law_curves(&law);
     const double elastic = law_elastic_force(&law, curves, depth);
     return (MildElementLaw){
@@ -17,9 +18,13 @@ MildElementLaw mild_element_law(const MildMaterial *material, double pitch, doub
     };
 }
 
+MildElementLaw mild_element_law(const MildMaterial *material, double pitch, double depth) {
+    return element_law(material, pitch, pitch, depth);
+}
+
 static double sole_force(const MildSole *sole, const MildMaterial *material, double depth) {
     return mild_sole_elements(sole) *
-           mild_element_law(material, mild_sole_pitch(sole), depth).force;
+           element_law(material, mild_sole_pitch(sole), mild_sole_width(sole), depth).force;
 }
 
 double mild_sole_sinkage(const MildSole *sole, const MildMaterial *material, double load) {
@@ -50,12 +55,12 @@ static double *material_number(MildMaterial *m, const char *key) {
 
 /* Above the bed, a law is proportional to its `scaled` fields, so a single factor matches it.
  * pressure: [N/m^2] that the ground above the bed carries. area: [m^2] of one element of the
- * rival. */
+ * rival. width: [m] of the sole. */
 static void rival_scale(MildMaterial *m, const ModelRow *row, double pressure, double area,
-                        double depth) {
+                        double width, double depth) {
     MildMaterial bottomless = *m;
     bottomless.bed_depth = INFINITY;
-    const double scale = pressure * area / mild_element_law(&bottomless, sqrt(area), depth).force;
+    const double scale = pressure * area / element_law(&bottomless, sqrt(area), width, depth).force;
     for (int k = 0; k < MILD_MODEL_SCALED && row->info.scaled[k]; k++) {
         *material_number(m, row->info.scaled[k]) *= scale;
     }
@@ -104,7 +109,7 @@ MildStatus mild_model_match(MildModel model, const MildMaterial *mild, const Mil
         row->reference(&matched, area);
     }
     if (row->info.scaled[0]) {
-        rival_scale(&matched, row, pressure, area, depth);
+        rival_scale(&matched, row, pressure, area, mild_sole_width(sole), depth);
     }
     MildError why;
     status = mild_material_check(&matched, &why);

@@ -32,7 +32,7 @@ const MildField mild_material_fields[] = {
           "[s/m] hunt_crossley: damping; the coefficient of restitution is 1 - dissipation v"),
     FIELD(k_c, 0.0, 1e10, "[N/m^(n+1)] bekker: cohesive modulus, divided by plate_width"),
     FIELD(k_phi, 0.0, 1e12, "[N/m^(n+2)] bekker: frictional modulus"),
-    FIELD(plate_width, 0.005, 1.0, "[m] bekker: smaller side of the loaded plate"),
+    FIELD(plate_width, 0.0, 1.0, "[m] bekker: b, shorter side of the loaded plate; 0: of the sole"),
     FIELD(cohesion, 0.0, 1e6, "[N/m^2] bekker: shear strength without load"),
     FIELD(shear_length, 0.001, 0.1, "[m] bekker: slip over which the shear strength builds up"),
 };
@@ -94,7 +94,7 @@ static const Preset *find_preset(const char *name) {
 }
 
 /* The material of a preset. Only bekker and hunt_crossley read the numbers from exponent on. They
- * are those of the dry sand of Wong 2008, table 2.3, under a foot 0.1 m wide, with some damping. */
+ * are those of the dry sand of Wong 2008, table 2.3, with some damping. */
 static MildMaterial preset_material(const Preset *preset) {
     return (MildMaterial){
         .k_pen = preset->k_pen,
@@ -117,7 +117,7 @@ static MildMaterial preset_material(const Preset *preset) {
         .dissipation = 0.3,
         .k_c = 990.0,
         .k_phi = 1528430.0,
-        .plate_width = 0.1,
+        .plate_width = 0.0,
         .cohesion = 1040.0,
         .shear_length = 0.01,
     };
@@ -162,6 +162,14 @@ MildStatus mild_material_check(const MildMaterial *material, MildError *error) {
                          "contact: choose one of %s",
                          soft_names(names, sizeof names));
     }
-    return mild_fields_check(mild_material_fields, mild_material_field_count, material, "ground",
-                             error);
+    const MildStatus status = mild_fields_check(mild_material_fields, mild_material_field_count,
+                                                material, "ground", error);
+    if (status == MILD_OK && material->plate_width > 0.0 &&
+        material->plate_width < MATERIAL_PLATE_MIN) {
+        return mild_fail(
+            error, MILD_ERROR_RANGE,
+            "ground.plate_width = %g is below %g; 0 takes the shorter side of the sole",
+            material->plate_width, MATERIAL_PLATE_MIN);
+    }
+    return status;
 }

@@ -25,7 +25,7 @@ void foot_laws(FootScratch *foot, const MildTerrain *terrain) {
         const MildMaterial *wanted = &terrain->materials[m];
         // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): a difference costs time only
         if (!derived->known || memcmp(&derived->material, wanted, sizeof *wanted) != 0) {
-            const Law law = law_of(wanted, foot->pitch);
+            const Law law = law_of(wanted, foot->pitch, foot->width);
             *derived = (DerivedLaw){.material = *wanted,
                                     .law = law,
                                     .curves = law_curves(&law),

@@ -1,6 +1,7 @@
 /* The table of MILD_MODEL_LIST. Each model's file defines its row. */
 #include "ground/models.h"
 
+#include <math.h>
 #include <string.h>
 
 #define MODEL_DECLARE(id, name) extern const ModelRow model_##name;
@@ -35,8 +36,12 @@ const ModelRow *model_row(int model) {
     return rows[known ? model : MILD_MODEL_MILD];
 }
 
-Law law_of(const MildMaterial *material, double pitch) {
-    return model_row(material->model)->law(material, pitch);
+Law law_of(const MildMaterial *material, double pitch, double width) {
+    MildMaterial loaded = *material;
+    if (loaded.plate_width == 0.0) {
+        loaded.plate_width = fmax(width, MATERIAL_PLATE_MIN);
+    }
+    return model_row(material->model)->law(&loaded, pitch);
 }
 
 double recovery_of(const MildMaterial *material) {

@@ -4,11 +4,14 @@
 
 #include "ground/model.h"
 
+/* [m] Least plate_width, given or of a sole, because Bekker's pressure grows with k_c/b. */
+#define MATERIAL_PLATE_MIN 0.005
+
 /* The row of a material's model. Returns the row of mild for an unknown model and for one without a
  * law, because the ground must survive unchecked materials. */
 const ModelRow *model_row(int model);
-/* Law of one element of area pitch^2. */
-Law law_of(const MildMaterial *material, double pitch);
+/* Law of one element of area pitch^2 of a sole whose shorter side is `width`. */
+Law law_of(const MildMaterial *material, double pitch, double width);
 /* [-] Share of the depth that its virgin ground springs back: the material's, but 0 in resistive
  * force theory, whose unloading line has no other length (plate.h). */
 double recovery_of(const MildMaterial *material);

@@ -20,6 +20,7 @@ static void foot_set(FootScratch *foot, const MildSole *sole, double **at) {
     foot->padded = sole_padded(sole);
     foot->z = mild_sole_z(sole);
     foot->pitch = mild_sole_pitch(sole);
+    foot->width = mild_sole_width(sole);
     double *x = take(at, foot->padded);
     double *y = take(at, foot->padded);
     memcpy(x, mild_sole_x(sole), (size_t)foot->elements * sizeof *x);

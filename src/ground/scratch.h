@@ -25,6 +25,7 @@ typedef struct FootScratch {
     double *y;       /* [padded] [m] */
     double z;        /* [m] sole plane in the foot frame */
     double pitch;    /* [m] edge of an element */
+    double width;    /* [m] shorter side of the sole */
     double center_x; /* [m] centroid in the foot frame */
     double center_y; /* [m] */
     double radius;   /* [m] distance from the ankle to the farthest element */

@@ -12,6 +12,7 @@
 struct MildSole {
     int elements;
     double pitch;    /* [m] */
+    double width;    /* [m] shorter side of the outline's bounding box */
     double z;        /* [m] */
     double values[]; /* [m] x[elements], then y[elements] */
 };
@@ -282,14 +283,15 @@ static int cells_choose(const MildSoleDef *def, const Raster *raster, Cell *cell
     return 1;
 }
 
-static MildSole *sole_from_cells(const MildSoleDef *def, const Raster *raster, const Cell *cells,
-                                 int count) {
+static MildSole *sole_from_cells(const MildSoleDef *def, const Outline *outline,
+                                 const Raster *raster, const Cell *cells, int count) {
     MildSole *sole = malloc(sizeof *sole + 2 * (size_t)count * sizeof(double));
     if (!sole) {
         return NULL;
     }
     sole->elements = count;
     sole->pitch = def->pitch;
+    sole->width = fmin(outline->high[0] - outline->low[0], outline->high[1] - outline->low[1]);
     sole->z = def->sole_z;
     for (int i = 0; i < count; i++) {
         sole->values[i] = raster->origin[0] + (cells[i].cell / raster->rows + 0.5) * def->pitch;
@@ -315,7 +317,7 @@ MildSole *mild_sole_create(const MildSoleDef *def, MildError *error) {
     if (work && cells) {
         reached = cells_choose(def, &raster, cells, work, &chosen);
         if (reached) {
-            sole = sole_from_cells(def, &raster, cells, chosen);
+            sole = sole_from_cells(def, &outline, &raster, cells, chosen);
         }
     }
     free(cells);
@@ -338,8 +340,10 @@ MildSole *mild_sole_concentric(const MildSole *sole, MildError *error) {
         mild_fail(error, MILD_ERROR_MEMORY, "sole: out of memory for one element");
         return NULL;
     }
-    *one = (MildSole){
-        .elements = 1, .pitch = sole->pitch * sqrt((double)sole->elements), .z = sole->z};
+    *one = (MildSole){.elements = 1,
+                      .pitch = sole->pitch * sqrt((double)sole->elements),
+                      .width = sole->width,
+                      .z = sole->z};
     one->values[0] = one->values[1] = 0.0;
     for (int i = 0; i < sole->elements; i++) {
         one->values[0] += sole->values[i] / sole->elements;
@@ -358,6 +362,10 @@ int mild_sole_elements(const MildSole *sole) {
 
 double mild_sole_pitch(const MildSole *sole) {
     return sole->pitch;
+}
+
+double mild_sole_width(const MildSole *sole) {
+    return sole->width;
 }
 
 const double *mild_sole_x(const MildSole *sole) {

@@ -217,10 +217,21 @@ static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count
         return mild_fail(error, MILD_ERROR_ARGUMENT, "fit: %d loading rows, at least %d are needed",
                          count, FIT_POINTS_MIN);
     }
-    if (def->plate.elements < 1 || !(def->plate.pitch > 0)) {
-        return mild_fail(error, MILD_ERROR_RANGE, "fit: the plate has no element");
+    if (def->plates < 1 || def->plates > FIT_PLATES_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE, "fit: %d plates; 1 .. %d are possible",
+                         def->plates, (int)FIT_PLATES_MAX);
+    }
+    for (int i = 0; i < def->plates; i++) {
+        const FitPlate *plate = &def->plate[i];
+        if (plate->elements < 1 || !(plate->pitch > 0) || !(plate->width > 0)) {
+            return mild_fail(error, MILD_ERROR_RANGE, "fit: plate %d has no element", i + 1);
+        }
     }
     for (int i = 0; i < count; i++) {
+        if (points[i].plate < 0 || points[i].plate >= def->plates) {
+            return mild_fail(error, MILD_ERROR_RANGE, "fit: row %d is of plate %d of %d", i + 1,
+                             points[i].plate + 1, def->plates);
+        }
         if (isfinite(points[i].depth) && isfinite(points[i].force) && isfinite(points[i].speed) &&
             isfinite(points[i].acceleration)) {
             continue;
@@ -230,6 +241,16 @@ static MildStatus fit_check(const FitDef *def, const FitPoint *points, int count
     return MILD_OK;
 }
 
+/* [m] The width that all plates share, else 0. */
+static double plates_width(const FitDef *def) {
+    for (int i = 1; i < def->plates; i++) {
+        if (def->plate[i].width != def->plate[0].width) {
+            return 0;
+        }
+    }
+    return def->plate[0].width;
+}
+
 /* Names, units and states before the fit, and the numbers of what is held. */
 static void run_open(Run *run) {
     const FitDef *def = run->def;
@@ -237,6 +258,7 @@ static void run_open(Run *run) {
     MildMaterial *base = &run->fit.base, held = def->material, unheld = probe;
     FitResult *result = run->result;
     *result = (FitResult){.points = run->fit.count};
+    held.plate_width = def->plate[0].width; /* of the combination, which needs one */
     *base = held;
     result->parameters = fit_parameters((MildModel)held.model, run->field);
     for (int i = 0; i < result->parameters; i++) {
@@ -260,6 +282,7 @@ static void run_finish(Run *run) {
         force += run->fit.points[i].force * run->fit.points[i].force;
     }
     result->curve = fit_material(&run->fit);
+    result->curve.plate_width = plates_width(run->def);
     result->residual = sqrt(run->fit.least / result->points);
     result->residual_share = force > 0 ? sqrt(run->fit.least / force) : 0;
     result->neighbours = run->fit.neighbours;
@@ -282,10 +305,10 @@ static void run_finish(Run *run) {
 static int rows_mean(const FitPoint *points, int count, int group, FitPoint *means) {
     int kept = 0;
     for (int i = 0, n = 0; i < count; i += n) {
-        FitPoint sum = {.time = NAN};
+        FitPoint sum = {.time = NAN, .plate = points[i].plate};
         for (n = 0; n < group && i + n < count; n++) {
             const FitPoint *row = &points[i + n];
-            if (n && row->depth < row[-1].depth) {
+            if (n && (row->depth < row[-1].depth || row->plate != row[-1].plate)) {
                 break;
             }
             sum.depth += row->depth;
@@ -306,7 +329,7 @@ static MildStatus run_rows(const FitDef *def, const FitPoint *points, int count,
                            MildError *error) {
     Run run = {.def = def,
                .result = result,
-               .fit = {.plate = def->plate, .points = points, .count = count, .fixed = -1}};
+               .fit = {.plates = def->plate, .points = points, .count = count, .fixed = -1}};
     run_open(&run);
     if (count <= result->parameters) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,

@@ -12,11 +12,12 @@
 
 #include "lab/fit_law.h"
 
-enum { FIT_COMBINATIONS_MAX = 4 };
+enum { FIT_COMBINATIONS_MAX = 4, FIT_PLATES_MAX = 16 };
 
 typedef struct {
-    FitPlate plate;
-    MildMaterial material; /* the model, the numbers that are held, bed_depth and plate_width */
+    FitPlate plate[FIT_PLATES_MAX];
+    int plates;                   /* at least 1; each row names one of them */
+    MildMaterial material;        /* the model, the numbers that are held, and bed_depth */
     int held[FIT_PARAMETERS_MAX]; /* bool, in the order of fit_parameters */
     const MildMaterial *fill;     /* where the data neither tell a parameter nor contradict this
                                  material's number, hold it there; NULL: do not */
@@ -45,7 +46,8 @@ typedef struct {
     int parameters;
     FitValue combination[FIT_COMBINATIONS_MAX]; /* of tied parameters */
     int combinations;
-    MildMaterial curve;    /* gives the fitted forces; numbers of tied parameters mean nothing */
+    MildMaterial curve;    /* gives the fitted forces; numbers of tied parameters mean nothing;
+                              plate_width is 0 where the plates' widths differ */
     double residual;       /* [N] root mean square */
     double residual_share; /* of the root mean square force */
     double neighbours;     /* correlation of the residuals of neighbouring rows; 0 if by chance */

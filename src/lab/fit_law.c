@@ -74,7 +74,7 @@ void fit_range(const MildField *field, double *low, double *high) {
 
 /* Bool: the force at some depth changes with the parameter. */
 static int is_sensed(MildModel model, const MildField *field, double speed, double acceleration) {
-    const FitPlate plate = {1, 0.0195};
+    const FitPlate plate = {1, 0.0195, 0.1};
     const FitPoint point = {.depth = 0.005, .speed = speed, .acceleration = acceleration};
     MildMaterial material = mild_material_default();
     double before, after;
@@ -114,11 +114,10 @@ int fit_is_rate(MildModel model, const MildField *field) {
 
 /* ---- force ---- */
 
-void fit_forces(const FitPlate *plate, const MildMaterial *material, const FitPoint *points,
-                int count, double *force) {
-    MildMaterial raw = *material;
-    raw.passive = 0;
-    const Law law = law_of(&raw, plate->pitch);
+/* The forces of neighbouring rows that share a plate. */
+static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const FitPoint *points,
+                         int count, double *force) {
+    const Law law = law_of(raw, plate->pitch, plate->width);
     const int curves = law_curves(&law);
     for (int i = 0; i < count; i++) {
         const double depth = fmax(points[i].depth, 0);
@@ -130,5 +129,19 @@ void fit_forces(const FitPlate *plate, const MildMaterial *material, const FitPo
             sum += law.mass_rate * law_recruited(&law, depth) * points[i].acceleration;
         }
         force[i] = plate->elements * sum;
+    }
+}
+
+void fit_forces(const FitPlate *plates, const MildMaterial *material, const FitPoint *points,
+                int count, double *force) {
+    MildMaterial raw = *material;
+    raw.passive = 0;
+    raw.plate_width = 0;
+    for (int first = 0, end; first < count; first = end) {
+        for (end = first + 1; end < count && points[end].plate == points[first].plate; end++) {
+            continue;
+        }
+        plate_forces(&plates[points[first].plate], &raw, points + first, end - first,
+                     force + first);
     }
 }

@@ -13,10 +13,11 @@
 
 enum { FIT_PARAMETERS_MAX = MILD_MODEL_FIELDS };
 
-/* The plate, in the elements of its model. */
+/* A plate, in the elements of its model. */
 typedef struct {
     int elements;
     double pitch; /* [m] */
+    double width; /* [m] its shorter side: plate_width of bekker */
 } FitPlate;
 
 /* What the data tell where they do not tell a parameter by itself. */
@@ -38,7 +39,8 @@ const FitCombination *fit_combination(const char *carrier);
 int fit_parameters(MildModel model, const MildField *fields[FIT_PARAMETERS_MAX]);
 /* Bool: the force depends on it only through speed or acceleration. */
 int fit_is_rate(MildModel model, const MildField *field);
-/* Bool: a number that is never fitted and may be held, bed_depth, or bekker's plate_width. */
+/* Bool: a number that is never fitted: bed_depth, which may be held, or bekker's plate_width, which
+ * is the plate's. */
 int fit_is_geometry(MildModel model, const char *name);
 /* Range in which a parameter is fitted or held: the material's. Ground that creates no energy has
  * c_d >= 1/2 and c_g >= 0. */
@@ -46,8 +48,9 @@ void fit_range(const MildField *field, double *low, double *high);
 /* The number of a material. */
 double *fit_number(MildMaterial *material, const MildField *field);
 
-/* [N] The force on the plate in every row: force[count]. `passive` of the material is ignored. */
-void fit_forces(const FitPlate *plate, const MildMaterial *material, const FitPoint *points,
+/* [N] The force in every row on its plate: force[count]. plates: those that the rows name. The
+ * material's `passive` and plate_width are ignored. */
+void fit_forces(const FitPlate *plates, const MildMaterial *material, const FitPoint *points,
                 int count, double *force);
 
 #endif

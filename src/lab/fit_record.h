@@ -12,6 +12,7 @@ typedef struct {
     double force;        /* [N] up, on the plate */
     double speed;        /* [m/s] down */
     double acceleration; /* [m/s^2] down */
+    int plate;           /* number of its plate among those of the fit */
 } FitPoint;
 
 /* Keeps the loading part, in place: rows below the surface that are at least as deep as all rows

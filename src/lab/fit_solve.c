@@ -76,7 +76,7 @@ static double dot(const double *a, const double *b, int count) {
 
 static void forces(const Fit *fit, double *force) {
     const MildMaterial material = fit_material(fit);
-    fit_forces(&fit->plate, &material, fit->points, fit->count, force);
+    fit_forces(fit->plates, &material, fit->points, fit->count, force);
 }
 
 static double fit_miss(Fit *fit) {

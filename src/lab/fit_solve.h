@@ -16,7 +16,7 @@ typedef struct {
 } FitCoordinate;
 
 typedef struct {
-    FitPlate plate;
+    const FitPlate *plates;
     const FitPoint *points;
     int count;
     MildMaterial base; /* all that is not a coordinate */

@@ -1,5 +1,6 @@
 #include "train/events.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -139,6 +140,9 @@ int events_write_scalars(FILE *file, double wall_time, int64_t step, const char 
             unsigned char value_data[SCALAR_BYTES];
             Buffer value = {value_data,
                             0}; /* Summary.Value: tag = 1 string, simple_value = 2 float */
+            if (isnan(values[taken])) {
+                continue;
+            }
             put_bytes(&value, 1, tags[taken], strnlen(tags[taken], EVENTS_TAG_MAX));
             put_float(&value, 2, (float)values[taken]);
             put_bytes(&summary, 1, value.data, value.size);

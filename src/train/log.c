@@ -1,6 +1,7 @@
 #include "train/log.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -189,7 +190,8 @@ MildStatus log_config(Log *log, const char *config, MildError *error) {
 MildStatus log_row(Log *log, int64_t iteration, const double *values, MildError *error) {
     int failed = fprintf(log->csv, "%lld", (long long)iteration) < 0;
     for (int i = 0; i < log->count && !failed; i++) {
-        failed = fprintf(log->csv, ",%.9g", values[i]) < 0;
+        failed = (isnan(values[i]) ? fputs(",nan", log->csv) /* whatever its sign */
+                                   : fprintf(log->csv, ",%.9g", values[i])) < 0;
     }
     if (failed || fputc('\n', log->csv) == EOF || fflush(log->csv) != 0) {
         return io_fail(log->csv_path, error);

@@ -6,20 +6,28 @@ import re
 import sys
 
 REMARKS = {"$schema", "$defs", "title", "description"}
-TYPES = {"object": dict, "array": list, "string": str, "number": (int, float), "integer": int, "boolean": bool}
+TYPES = {"object": dict, "array": list, "string": str, "number": (int, float), "integer": int, "boolean": bool,
+         "null": type(None)}
 
 
 def fits(value, schema, root):
     return next(faults(value, schema, root, ""), None) is None
 
 
+def names_of(names):
+    return [names] if isinstance(names, str) else names
+
+
+def is_a(value, name):
+    return isinstance(value, TYPES[name]) and isinstance(value, bool) == (name == "boolean")
+
+
 def faults(value, schema, root, where):
     """Yields what is wrong with a value."""
     checks = {
         "$ref": lambda ref: faults(value, resolve(root, ref), root, where),
-        "type": lambda name: () if isinstance(value, TYPES[name]) and isinstance(value, bool) == (name == "boolean")
-        else [f"{where}: no {name}"],
-        "minimum": lambda least: () if value >= least else [f"{where}: below {least}"],
+        "type": lambda names: () if any(is_a(value, name) for name in names_of(names)) else [f"{where}: no {' or '.join(names_of(names))}"],
+        "minimum": lambda least: () if value is None or value >= least else [f"{where}: below {least}"],
         "pattern": lambda form: () if re.search(form, value) else [f"{where}: not of the form {form}"],
         "minItems": lambda least: () if len(value) >= least else [f"{where}: fewer than {least} items"],
         "required": lambda names: [f"{where}: no {name}" for name in names if name not in value],

@@ -25,7 +25,7 @@ bad "outside" "$mild" actuator log --out x.csv --peak 0
 # a policy of another robot walks by its own clock, from which it does not fall
 "$mild" actuator log --robot go1 --out go1.csv --seconds 8 | grep -q '8 s, 0 falls' || fail "the Go1 does not walk"
 bad "policy is for robot sa01\|robot" "$mild" actuator log --out x.csv --robot go1 --policy "$root/policies/mild.safetensors"
-bad "cannot be written" "$mild" actuator log --out none/x.csv
+bad "none/x.csv: there is no folder none; make it first" "$mild" actuator log --out none/x.csv
 
 # fits
 expect 0 'leg_l5_joint .* kp ' "$mild" actuator fit motor.csv --out motor.safetensors --spacing 0.005 --steps 300 --figure torque.png

@@ -66,7 +66,14 @@ expect 0 '^ *3 .* 300.000 ' "$mild" press --ground foam45 --force 300,50 --cycle
 peak() { "$mild" press --ground sand_loose "$@" | sed -n 's/^peak \([0-9.]*\) N.*/\1/p'; }
 awk "BEGIN { exit !($(peak --ground.k_pen=500) > $(peak) && $(peak --ground.k_pen=380) == $(peak)) }" ||
     fail "--ground.k_pen does not change the force"
-# the last override wins
+# of an option only one counts, so a second is refused; of an override's key the last counts
+bad "speed is given twice; leave out one" "$mild" press --ground foam45 --speed 0.1 --depth 0.01 --speed=0.2
+bad "ground is given twice" "$mild" eval --ground foam45 --ground rubber
+bad "json is given twice" "$mild" eval --json a.json --json b.json
+bad "policy is given twice" "$mild" export --policy a --policy a --c out
+bad "out is given twice" "$mild" train --out a --out b
+bad "threads is given twice" "$mild" eval --threads 1 --threads 1
+expect 0 'randomize' "$mild" eval --randomize --randomize --help
 [ "$(peak --ground.k_pen=380 --ground.k_pen=500)" = "$(peak --ground.k_pen=500)" ] || fail "order of overrides"
 
 # ground models: the same by --model and by override; overrides are laid over the matched numbers
@@ -139,10 +146,11 @@ expect 0 'foam45 .*2/2 ' "${batch[@]}" --ground rigid,foam45 --speed 0.3,0.6 --t
 cmp -s one.json two.json || fail "rows of the batch engine depend on --threads"
 expect 0 'grass .*2/2 ' "${batch[@]}" --ground rigid,grass --terrain.kind=waves
 expect 0 'clay .*2/2 ' "${batch[@]}" --ground clay
-for option in "--controller stand" "--ground rubber+grass" "--terrain.memory=true" "--task.newton=0" "--trials 9999 --speed 0.1,0.2,0.3,0.4" \
+for option in "--controller stand" "--ground rubber+grass" "--terrain.memory=true" "--task.newton=0" \
     "--push 0.5" "--latent latent.csv" "--ablate z"; do
     bad "train.robots *= *mujoco" "${batch[@]}" $option
 done
+bad "train.robots *= *mujoco" "$mild" eval --train.robots=batch --trials 9999 --seconds 0.3 --speed 0.1,0.2,0.3,0.4
 bad "train.device = gpu: neither cpu, cuda nor cuda:N" "${batch[@]}" --train.device=gpu
 bad "train.device = cuda:15: ." "$mild" train --out no_gpu --train.device=cuda:15 --train.envs=8
 bad "leave it out, or give --train.robots=batch" "$mild" eval --train.device=cuda --train.robots=mujoco
@@ -166,7 +174,7 @@ expect 0 'k_pen .*\[N/m\]' "$mild" info grounds
 expect 0 'newton' "$mild" info models
 
 # a policy walks as it was trained to, from its own file; what --config or an override says goes before
-walked() { "$mild" eval --ground rubber --speed 0.5 --trials 1 --seconds 3 "$@"; }
+walked() { "$mild" eval --ground rubber --trials 1 --seconds 3 "$@"; } # at 0.6 m/s
 go1=$root/policies/go1.safetensors
 as=(--robot go1 --policy "$go1" --task.physics_dt=0.005)
 own=$(walked "${as[@]}")
@@ -235,4 +243,32 @@ for key in machine version rows bench case value unit; do
     grep -q "\"$key\":" bench.json || fail "bench.json lacks $key"
 done
 
+# a file is written into a folder that is there; nobody else's folder is made
+for option in "play --video" "play --pressure" "press --ground foam45 --csv" "press --ground foam45 --figure" "eval --json" "eval --track" "bench step --json" \
+    "report . --out" "actuator log --out" "export --onnx"; do
+    bad "nope/x.png: there is no folder nope; make it first" "$mild" $option nope/x.png
+done
+bad "video: - is no file" "$mild" play --video -
+bad "pressure: - is no file" "$mild" play --pressure -
+
+# a controller that stands follows no command: none is shown as asked, and none is taken
+expect 0 'grass *0.00 .* - ' "$mild" eval --controller stand --ground grass --trials 1 --seconds 0.3
+bad "speed 0.5: controller stand follows no command" "$mild" eval --controller stand --speed 0,0.5
+bad "turn 0.1: controller zero follows no command" "$mild" eval --controller zero --turn 0.1
+bad "sideways 0.1: controller stand follows no command" "$mild" eval --controller stand --sideways 0.1
+bad "speed 0.3: controller stand follows no command" "$mild" play --controller stand --speed 0.3 --pressure x.png
+
+# the table of play: a robot that stands has a sinkage, but no swing and no cost
+expect 2 'sand_loose .* - mm  *[1-9][0-9]*\.[0-9] mm  *-$' "$mild" play --controller stand --ground sand_loose --seconds 2.2 --pressure stood.csv
+
+# grounds of every model: in the table with the numbers that the model reads, in help and in errors, columns apart
+"$mild" info grounds >grounds.txt
+for ground in rubber sand_dense dry_sand sandy_loam clay snow lunar_soil; do
+    [ "$(grep -c "\b$ground\b" grounds.txt)" -ge 2 ] || fail "info grounds lacks $ground in a table or in the sources"
+    "$mild" press --help | grep -q "\b$ground\b" || fail "press --help lacks $ground"
+done
+awk '/^  [a-z]+_?[a-z]* / && NF > 3 && /[0-9][a-z]*e[+-][0-9]+[0-9.]+e/ { exit 1 }' grounds.txt || fail "columns run together"
+[ "$(awk '$1 == "k_phi" { print NF; exit }' grounds.txt)" = 6 ] || fail "the row of k_phi: $(grep k_phi grounds.txt)"
+bad "nearest is 'clay'" "$mild" press --ground clai
+bad "known: rigid, .*clay, snow, lunar_soil" "$mild" eval --ground lunar_soi
 finish "command line: all as expected"

@@ -121,9 +121,26 @@ near "hunt_crossley: dissipation" "$(value hunt_crossley.json dissipation)" 0.3 
 "$mild" fit clay.csv "${plate[@]}" --model bekker --hold-from clay --json clay.json >/dev/null
 near "clay: k_phi" "$(value clay.json k_phi)" 692150 0.1
 near "clay: exponent" "$(value clay.json exponent)" 0.5 0.1
-"$mild" press --ground clay --plate 0.3,0.2 --ground.plate_width=0.2 --depth 0.04 --csv wide.csv >/dev/null
+"$mild" press --ground clay --plate 0.3,0.2 --depth 0.04 --csv wide.csv >/dev/null
 "$mild" fit wide.csv --plate 0.3,0.2 --model bekker --hold-from clay --json clay.json >/dev/null
 near "clay, a plate 0.2 m wide: k_phi" "$(value clay.json k_phi)" 692150 0.1
+
+# a plate for each file, in order: the numbers of one plate, and of bekker k_c and k_phi each by itself
+"$mild" press --ground foam45 --plate 0.15,0.1 --depth 0.04 --csv small.csv >/dev/null
+"$mild" press --ground foam45 --plate 0.3,0.1 --depth 0.04 --csv large.csv >/dev/null
+"$mild" fit small.csv large.csv --plate 0.15,0.1 --plate 0.3,0.1 --json fit.json >table.txt
+near "two plates: k_pen" "$(value fit.json k_pen)" 480 0.1
+"$mild" fit large.csv small.csv --plate 0.3,0.1 --plate 0.15,0.1 --figure plates.png --json fit.json >/dev/null
+near "two plates, the other way round: k_pen" "$(value fit.json k_pen)" 480 0.1
+awk -F, 'NR > 1 && ($3 - $5) ^ 2 > 1 { exit 1 }' plates_fit.csv || fail "the figure's forces are those of another plate"
+"$mild" press --ground clay --plate 0.15,0.1 --depth 0.04 --csv narrow.csv >/dev/null
+"$mild" fit narrow.csv wide.csv --plate 0.15,0.1 --plate 0.3,0.2 --model bekker --json clay.json >/dev/null
+near "two plates: k_c" "$(value clay.json k_c)" 13190 0.5
+near "two plates: k_phi" "$(value clay.json k_phi)" 692150 0.5
+refuse '--plate: 2 plates for 1 file; give one' "$mild" fit small.csv --plate 0.15,0.1 --plate 0.3,0.1
+refuse '--plate: 2 plates for 3 files' "$mild" fit small.csv large.csv small.csv --plate 0.15,0.1 --plate 0.3,0.1
+refuse '--plate: 3 numbers; it takes LENGTH,WIDTH' "$mild" fit small.csv --plate 0.15,0.1,0.1
+refuse '--hold plate_width: it is the shorter side' "$mild" fit wide.csv --plate 0.3,0.2 --model bekker --hold plate_width=0.1
 
 # the columns may stand in any order, with remarks and Windows line ends
 printf '\xef\xbb\xbf# a remark\r\nforce_n, depth_m\r\n' >order.csv

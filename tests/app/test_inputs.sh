@@ -70,7 +70,7 @@ head -c 4096 "$mild" >binary.safetensors
 head -c 300 /dev/zero >zeros.ini
 for file in text binary; do
     bad "$file.safetensors" "$mild" eval --policy "$file.safetensors"
-    bad "$file.safetensors" "$mild" play --policy "$file.safetensors" --video film/walk.mp4
+    bad "$file.safetensors" "$mild" play --policy "$file.safetensors" --video walk.mp4
 done
 bad "zeros.ini" "$mild" train --config zeros.ini --out run
 bad "zeros.ini" "$mild" eval --config zeros.ini

@@ -13,12 +13,19 @@ unfit() {
     "${check[@]}" "$source/docs/schema/$1.json" bad.json | grep -- "$2" >/dev/null || fail "$1: '$2' is not seen in $(cat bad.json)"
 }
 
-eval=("$mild" eval --trials 1 --seconds 0.3)
-"${eval[@]}" --ground rigid,rubber+foam45 --speed 0,0.6 --json walk.json >/dev/null || fail "eval"
-"${eval[@]}" --ground grass --ablate z --turn 0.4 --json ablate.json >/dev/null || fail "eval --ablate"
+eval=("$mild" eval --trials 1)
+short=("${eval[@]}" --seconds 0.3)
+"${short[@]}" --ground rigid,rubber+foam45 --speed 0,0.6 --json walk.json >/dev/null || fail "eval"
+"${short[@]}" --ground grass --ablate z --turn 0.4 --json ablate.json >/dev/null || fail "eval --ablate"
 "${eval[@]}" --ground grass --controller stand --speed 0 --seconds 3 --json stand.json >/dev/null || fail "eval --controller"
-"${eval[@]}" --ground grass --train.robots=batch --json batch.json >/dev/null || fail "eval in the batch engine"
+"${short[@]}" --ground grass --train.robots=batch --json batch.json >/dev/null || fail "eval in the batch engine"
 fit eval walk.json ablate.json stand.json batch.json
+# what the table shows as "-" is null: of trials of 0.3 s all that needs 2.5 s, and without a step the swing
+for key in velocity velocity_low velocity_high velocity_deviation velocity_sideways velocity_turn cot cot_deviation torque_deviation base_oscillation; do
+    grep -c "\"$key\":[[:space:]]*null" walk.json | grep -qx 4 || fail "$key of a trial that is too short: $(grep "\"$key\"" walk.json)"
+done
+grep -q '"clearance":[[:space:]]*null' stand.json || fail "clearance without a swing: $(grep clearance stand.json)"
+grep -q '"cot":[[:space:]]*null' stand.json || fail "cost of transport of a robot that stands"
 
 "$mild" bench memory --train.envs=16 --json bench.json >/dev/null || fail "bench"
 fit bench bench.json
@@ -32,7 +39,8 @@ fit fit foam.json sand.json bekker.json
 
 # each kind of fault, in a copy of what fits
 sed 's/"trials":.*/"trials": 1.5,/' walk.json >bad.json && unfit eval '.rows\[0\].trials: no integer'
-sed 's/"cot":.*/"cot": null,/' walk.json >bad.json && unfit eval '.rows\[0\].cot: no number'
+sed 's/"cot":.*/"cot": "-",/' walk.json >bad.json && unfit eval '.rows\[0\].cot: no number or null'
+sed 's/"energy":.*/"energy": null,/' walk.json >bad.json && unfit eval '.rows\[0\].energy: no number'
 sed '/"speed":/d' walk.json >bad.json && unfit eval '.rows\[3\]: no speed'
 sed 's/"energy":/"energie":/' walk.json >bad.json && unfit eval '.rows\[0\].energie: not in the schema'
 sed 's/"torque_max":.*/"torque_max": -1,/' walk.json >bad.json && unfit eval 'torque_max: below 0'
@@ -40,5 +48,12 @@ sed 's/"version":.*/"version": "new",/' walk.json >bad.json && unfit eval '.vers
 sed '/"policy":/d' walk.json >bad.json && unfit eval ': not one of'
 printf '{"machine": "m", "version": "0.1.0", "rows": []}' >bad.json && unfit bench '.rows: fewer than 1'
 sed 's/"value":.*/"value": "much",/' foam.json >bad.json && unfit fit '.value: no number'
+
+# its numbers are those that the table, the stances and the track tell, each under its own name
+side=("$mild" eval --ground grass --speed 0.5 --sideways 0.1 --seconds 5)
+"${side[@]}" --trials 2 --json two.json --stances stances.csv --track track.csv >two.txt || fail "eval of two trials"
+"${side[@]}" --trials 1 --json first.json >/dev/null || fail "eval of one trial"
+"$mild" eval --ground grass --turn 0.3 --trials 1 --seconds 4 --json turn.json >turn.txt || fail "eval --turn"
+python3 "$source/tests/app/numbers.py" two.txt two.json stances.csv track.csv first.json turn.txt turn.json || fail "numbers of eval --json"
 
 finish "every JSON fits its schema"

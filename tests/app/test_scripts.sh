@@ -45,11 +45,21 @@ def numbers(path):
     return numpy.frombuffer(whole[8 + int.from_bytes(whole[:8], "little"):], "<f4")
 assert numpy.abs(0.75 * numbers("a") + 0.25 * numbers("b") - numbers("mean")).max() < 1e-6 < numpy.abs(numbers("a") - numbers("b")).max()
 CHECK
-good "$mild" eval --policy mean --ground rigid --trials 1 --seconds 0.1
+expect 0 rigid "$mild" eval --policy mean --ground rigid --trials 1 --seconds 0.1
 worth() { "$python" "$root/scripts/paper/worth.py" "$@"; }
 bad "worth: no NAME-SEED.json in ." worth .
 echo '{' >torn-1.json
 bad "worth: torn-1.json: not a table" worth .
 # its figures need what scripts/paper/requirements.txt names
 "$python" -c 'import sklearn' 2>/dev/null && bad "paper.py: unknown experiment nosuch; there are table2 " "$python" -B "$root/scripts/paper/paper.py" nosuch
+
+# a long command in one line, with a log; of a failure the last lines and the exit code
+quietly() { "$root/scripts/quietly.sh" "$@"; }
+said=$(quietly logs/fine.log "counting" seq 1000 2>&1) || fail "quietly fails"
+[ "$said" = "counting (log: logs/fine.log)" ] && [ "$(wc -l <logs/fine.log)" = 1000 ] || fail "quietly says: $said"
+said=$(quietly logs/bad.log "breaking" bash -c 'seq 1000; echo "error: no such thing" >&2; exit 3' 2>&1)
+[ $? = 3 ] || fail "quietly loses the exit code"
+[ "$(wc -l <<<"$said")" = 22 ] && grep -q '^error: no such thing$' <<<"$said" && grep -q 'code 3; the last lines of logs/bad.log' <<<"$said" ||
+    fail "quietly hides a failure: $said"
+[ "$(VERBOSE=1 quietly logs/none.log "counting" seq 3 | tr '\n' ' ')" = "1 2 3 " ] && [ ! -e logs/none.log ] || fail "VERBOSE"
 finish "scripts: bad input"

@@ -4,7 +4,7 @@ source "$(dirname "$0")/../kit.sh" "$1"
 
 expect 0 'usage: mild web' "$mild" web --help
 bad "unknown option --no-such" "$mild" web --no-such
-bad "run .make web" "$mild" web --folder nowhere
+bad "has no page; .make web. in the source tree builds it (it installs emscripten)" "$mild" web --folder nowhere
 bad "outside" "$mild" web --port 70000
 mkdir -p page folder/index.html link
 touch {folder,link}/{mild.wasm,robot.bin}

@@ -32,8 +32,8 @@ static int close_soles(void **state) {
     return 0;
 }
 
-static void case_law(CaseMaterial *c, const MildMaterial *m, double pitch) {
-    const Law law = law_of(m, pitch);
+static void case_law(CaseMaterial *c, const MildMaterial *m, const MildSole *sole) {
+    const Law law = law_of(m, mild_sole_pitch(sole), mild_sole_width(sole));
     memcpy(c->law, &law, sizeof c->law);
     c->curves = law_curves(&law) | model_row(m->model)->motion;
     c->recovery = law_recovery(&law, recovery_of(m));
@@ -104,7 +104,7 @@ static void case_of(ContactCase *c, const Kit *kit, int groups, int per, double 
     memcpy(c->inverse_inertia, kit->input.inverse_inertia, (size_t)(n * n) * sizeof(double));
     memcpy(c->free_velocity, kit->input.free_velocity, (size_t)n * sizeof(double));
     for (int m = 0; m < kit->terrain.material_count; m++) {
-        case_law(&c->material[m], &kit->terrain.materials[m], mild_sole_pitch(kit->soles[0]));
+        case_law(&c->material[m], &kit->terrain.materials[m], kit->soles[0]);
     }
     case_memory(c, kit->ground, 1);
 }

@@ -156,12 +156,23 @@ static void short_trials_succeed(void **state) {
     EvalRow row = run(&zero, "rubber", eval, 1);
     assert_int_equal(zero.calls, 30);
     assert_int_equal(row.success, 2);
-    assert_true(fabs(row.seconds - 0.3) < 1e-9 && row.velocity == 0 && row.cot == 0);
+    assert_true(fabs(row.seconds - 0.3) < 1e-9 && row.measured == 0 && row.torque_deviation > 0);
+    const double unmeasured[] = {
+        row.velocity,          row.velocity_low,  row.velocity_high, row.velocity_deviation,
+        row.velocity_sideways, row.velocity_turn, row.cot,           row.cot_deviation,
+        row.base_oscillation};
+    for (size_t i = 0; i < sizeof unmeasured / sizeof *unmeasured; i++) {
+        assert_true(isnan(unmeasured[i]));
+    }
+    char line[256];
+    eval_print_row(&row, line, sizeof line);
+    assert_non_null(strstr(line, "- +-     -     -")); /* no speed, no cost */
     assert_true(row.energy > 0 && row.penetration > 1e-4 && row.drift > 0);
     other.seed = 2;
     one.trials = 1;
     assert_true(run(&zero, "rubber", other, 1).energy != row.energy);
-    assert_true(run(&zero, "rubber", one, 1).energy != row.energy);
+    const EvalRow alone = run(&zero, "rubber", one, 1);
+    assert_true(alone.energy != row.energy && isnan(alone.torque_deviation));
     EvalRow hard = run(&zero, "rigid", eval, 1);
     assert_true(hard.penetration == 0 && hard.success == 2 && hard.energy > 0);
     assert_true(run(&zero, "sand_loose", eval, 1).penetration > 2 * row.penetration);

@@ -127,6 +127,8 @@ static void test_published(void **state) {
         MildError error = {0};
         assert_true(mild_material_preset(table[i].name, &m));
         assert_int_equal(mild_material_check(&m, &error), MILD_OK);
+        assert_true(m.plate_width == 0); /* that of the sole */
+        m.plate_width = 0.1;
         assert_int_equal(m.model, MILD_MODEL_BEKKER);
         const double got = pressure(&m, table[i].depth);
         print_message("%-10s %.0f mm: %.3f kPa, published %.3f\n", table[i].name,
@@ -134,6 +136,49 @@ static void test_published(void **state) {
         worst = fmax(worst, fabs(got / table[i].pressure - 1.0));
     }
     assert_true(worst < 2e-4);
+}
+
+static MildSole *rectangle(double length, double width) {
+    const double x = 0.5 * length, y = 0.5 * width, outline[] = {-x, -y, x, -y, x, y, -x, y};
+    const MildSoleDef def = {.outline = outline, .points = 4, .pitch = KIT_PITCH};
+    MildError error = {0};
+    MildSole *sole = mild_sole_create(&def, &error);
+    assert_non_null(sole);
+    return sole;
+}
+
+/* Bekker's b is the shorter side of the sole, whichever way it lies, and of the one element in its
+ * place, unless the material names another. */
+static void test_width(void **state) {
+    (void)state;
+    static const double sides[][2] = {{0.3, 0.2}, {0.2, 0.3}, {0.15, 0.1}, {0.1, 0.1}};
+    MildError error = {0};
+    MildMaterial clay;
+    assert_true(mild_material_preset("clay", &clay));
+    for (size_t i = 0; i < sizeof sides / sizeof *sides; i++) {
+        const double b = fmin(sides[i][0], sides[i][1]), load = 3000.0;
+        MildSole *sole = rectangle(sides[i][0], sides[i][1]);
+        MildSole *one = mild_sole_concentric(sole, &error);
+        assert_true(fabs(mild_sole_width(sole) - b) < 1e-12);
+        assert_true(mild_sole_width(one) == mild_sole_width(sole));
+        const double area = mild_sole_elements(sole) * KIT_PITCH * KIT_PITCH;
+        const double z = pow(load / (area * (clay.k_c / b + clay.k_phi)), 1.0 / clay.exponent);
+        const double got = mild_sole_sinkage(sole, &clay, load);
+        print_message("b = %.2f m: %.4f mm under %.0f N, by hand %.4f\n", b, 1e3 * got, load,
+                      1e3 * z);
+        assert_true(fabs(got / z - 1.0) < 1e-3);
+        MildMaterial given = clay;
+        given.plate_width = 0.1;
+        const double own = mild_sole_sinkage(sole, &given, load);
+        assert_true(b == 0.1 ? fabs(own - got) < 1e-9 : own < 0.98 * got);
+        mild_sole_destroy(one);
+        mild_sole_destroy(sole);
+    }
+    clay.plate_width = 0.004;
+    assert_int_equal(mild_material_check(&clay, &error), MILD_ERROR_RANGE);
+    assert_non_null(strstr(error.text, "0 takes the shorter side of the sole"));
+    clay.plate_width = 0.005;
+    assert_int_equal(mild_material_check(&clay, &error), MILD_OK);
 }
 
 /* A level plate 20 mm deep, dragged along x at a constant speed: friction by load against
@@ -316,9 +361,10 @@ static void test_together(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pow),       cmocka_unit_test(test_way),
-        cmocka_unit_test(test_published), cmocka_unit_test(test_soils),
-        cmocka_unit_test(test_shear),     cmocka_unit_test(test_restitution),
-        cmocka_unit_test(test_no_memory), cmocka_unit_test(test_together)};
+        cmocka_unit_test(test_pow),         cmocka_unit_test(test_way),
+        cmocka_unit_test(test_published),   cmocka_unit_test(test_width),
+        cmocka_unit_test(test_soils),       cmocka_unit_test(test_shear),
+        cmocka_unit_test(test_restitution), cmocka_unit_test(test_no_memory),
+        cmocka_unit_test(test_together)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -22,7 +22,7 @@ static ElementCase random_case(int n, uint64_t *random) {
     MildMaterial m = kit_material(random);
     m.model = (int)models[kit_index(random, 4)];
     m.exponent = kit_uniform(random, 0.1, 2.0);
-    Law law = law_of(&m, KIT_PITCH);
+    Law law = law_of(&m, KIT_PITCH, 0.1);
     law.bed_depth = n % 5 == 0 ? 0.01 : law.bed_depth;
     ElementCase c = {.curves = kit_index(random, 2) ? law_curves(&law) : LAW_ALL,
                      .recovery = float_rounded(m.recovery),

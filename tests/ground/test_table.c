@@ -92,7 +92,7 @@ static void change(MildMaterial *m, const MildField *field) {
     }
     double value;
     memcpy(&value, at, sizeof value);
-    value = 1.1 * value <= field->max ? 1.1 * value : 0.9 * value;
+    value = value == 0 ? 0.5 * field->max : 1.1 * value <= field->max ? 1.1 * value : 0.9 * value;
     memcpy(at, &value, sizeof value);
 }
 

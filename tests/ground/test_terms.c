@@ -33,7 +33,7 @@ static Element random_element(uint64_t *random, int *curves, double *dt) {
     m.model = (int)models[kit_index(random, 4)];
     m.exponent = kit_uniform(random, 0.5, 2.0);
     m.bed_depth = kit_index(random, 5) ? 1.0 : 0.012;
-    Element e = {.law = law_of(&m, KIT_PITCH),
+    Element e = {.law = law_of(&m, KIT_PITCH, 0.1),
                  .recovery = m.recovery,
                  .mu = m.mu,
                  .k_drift = m.k_drift,

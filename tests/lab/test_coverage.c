@@ -50,10 +50,12 @@ static FitPoint row_at(int record, double depth) {
 
 /* eq 5, by the library's public law. */
 static double force_of(const FitDef *def, const FitPoint *row) {
-    const MildMaterial *m = &def->material;
-    const MildElementLaw law = mild_element_law(m, def->plate.pitch, row->depth);
-    const double drag = fmax(m->c_d, 0.5) * law.added_mass_per_depth * row->speed * row->speed;
-    return def->plate.elements *
+    const FitPlate *plate = &def->plate[row->plate];
+    MildMaterial m = def->material;
+    m.plate_width = plate->width;
+    const MildElementLaw law = mild_element_law(&m, plate->pitch, row->depth);
+    const double drag = fmax(m.c_d, 0.5) * law.added_mass_per_depth * row->speed * row->speed;
+    return plate->elements *
            (law.force + law.damping * row->speed + drag + law.added_mass * row->acceleration);
 }
 
@@ -73,12 +75,12 @@ static void noise_add(FitPoint *rows, Noise noise, Random *random) {
 }
 
 static FitResult press_and_fit(const Case *c, Noise noise, int draw) {
-    FitDef def = {.plate = {55, 0.0195}, .material = c->material};
+    FitDef def = {.plate = {{55, 0.0195, 0.1}}, .plates = 1, .material = c->material};
     Random random = random_at((uint64_t)(1000 + draw), (uint32_t)noise, (uint32_t)c->number);
     FitResult result;
     MildError error = {0};
     if (mild_model_is_concentric((MildModel)c->material.model)) {
-        def.plate = (FitPlate){1, sqrt(55) * 0.0195};
+        def.plate[0] = (FitPlate){1, sqrt(55) * 0.0195, 0.1};
     }
     for (int r = 0; r < c->records; r++) {
         for (int i = 0; i < ROWS; i++) {

@@ -25,7 +25,7 @@ typedef enum {
 static FitPoint points[3 * ROWS], many[50 * ROWS];
 
 static FitDef plate(const char *ground) {
-    FitDef def = {.plate = {55, 0.0195}};
+    FitDef def = {.plate = {{55, 0.0195, 0.1}}, .plates = 1};
     assert_true(mild_material_preset(ground, &def.material));
     def.material.bed_depth = 10;
     return def;
@@ -60,10 +60,12 @@ static void hold(FitDef *def, const char *names) {
 
 /* eq 5, by the library's public law. */
 static double force_of(const FitDef *def, const FitPoint *row) {
-    const MildMaterial *m = &def->material;
-    const MildElementLaw law = mild_element_law(m, def->plate.pitch, row->depth);
-    const double drag = fmax(m->c_d, 0.5) * law.added_mass_per_depth * row->speed * row->speed;
-    return def->plate.elements *
+    const FitPlate *plate = &def->plate[row->plate];
+    MildMaterial m = def->material;
+    m.plate_width = plate->width;
+    const MildElementLaw law = mild_element_law(&m, plate->pitch, row->depth);
+    const double drag = fmax(m.c_d, 0.5) * law.added_mass_per_depth * row->speed * row->speed;
+    return plate->elements *
            (law.force + law.damping * row->speed + drag + law.added_mass * row->acceleration);
 }
 
@@ -154,7 +156,7 @@ static void exact(void **state) {
     double worst = 0;
     for (int g = 0; g < mild_material_preset_count(); g++) {
         const FitDef truth = plate(mild_material_preset_name(g));
-        FitDef def = {.plate = truth.plate, .material = mild_material_default()};
+        FitDef def = {.plate = {truth.plate[0]}, .plates = 1, .material = mild_material_default()};
         const MildMaterial *m = &truth.material;
         def.material.bed_depth = 10;
         press_exactly(&truth, points, ROWS, 0.04, 0.01, 0);
@@ -289,6 +291,44 @@ static void models(void **state) {
     is_near(&result, "exponent", 0.5);
     is_near(&result, "k_c/plate_width + k_phi", 13190 / 0.1 + 692150);
     assert_int_equal(value_of(&result, "k_phi")->state, FIT_TIED);
+}
+
+/* A record on each of two plates, one twice as long and wide as the other: the second's rows stand
+ * behind the first's. Every number comes back, and of bekker k_c and k_phi each by itself, because
+ * b differs. With one plate for both nothing fits. */
+static void plates(void **state) {
+    (void)state;
+    static const char *const grounds[] = {"foam45", "clay", "sandy_loam"};
+    for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
+        FitDef truth = plate(grounds[g]);
+        truth.plate[0] = (FitPlate){40, 0.0195, 0.1};
+        truth.plate[1] = (FitPlate){160, 0.0195, 0.2};
+        truth.plates = 2;
+        for (int i = 0; i < 2 * ROWS; i++) {
+            points[i] =
+                (FitPoint){.time = NAN, .depth = 0.04 * (i % ROWS + 1) / ROWS, .speed = 0.01};
+            points[i].plate = i / ROWS;
+            points[i].force = force_of(&truth, &points[i]);
+        }
+        FitResult result = run(&truth, 2 * ROWS);
+        if (truth.material.model == MILD_MODEL_BEKKER) {
+            is_near(&result, "k_c", truth.material.k_c);
+            is_near(&result, "k_phi", truth.material.k_phi);
+            is_near(&result, "exponent", truth.material.exponent);
+            assert_true(result.curve.plate_width ==
+                        0); /* the sole's, because there is no single one */
+        } else {
+            is_near(&result, "k_pen", truth.material.k_pen);
+        }
+        assert_true(result.residual_share < 1e-4);
+        for (int i = 0; i < 2 * ROWS; i++) {
+            points[i].plate = 1;
+        }
+        result = run(&truth, 2 * ROWS);
+        print_message("%s: residual with one plate for both %.2f of the force\n", grounds[g],
+                      result.residual_share);
+        assert_true(result.residual_share > 0.1);
+    }
 }
 
 /* ---- intervals ---- */
@@ -568,19 +608,33 @@ static void refused(void **state) {
     def.material.model = MILD_MODEL_RIGID;
     assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_ARGUMENT);
     def = plate("grass");
-    def.plate.elements = 0;
+    def.plate[0].elements = 0;
     assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_RANGE);
+    press(&def, points, ROWS, 0.04, 0.01, NOISE_OF_ROW, 1);
+    for (int plates = 0; plates < 18; plates += 17) {
+        def = plate("grass");
+        def.plates = plates;
+        assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_RANGE);
+        assert_non_null(strstr(error.text, "plates"));
+    }
+    for (int number = -1; number < 2; number += 2) {
+        def = plate("grass");
+        points[7].plate = number;
+        assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_RANGE);
+        assert_non_null(strstr(error.text, "row 8 is of plate"));
+    }
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(recovery),         cmocka_unit_test(exact),
-        cmocka_unit_test(shapes),           cmocka_unit_test(held),
-        cmocka_unit_test(models),           cmocka_unit_test(interval_linear),
-        cmocka_unit_test(interval_profile), cmocka_unit_test(interval_many),
-        cmocka_unit_test(untold),           cmocka_unit_test(filled),
-        cmocka_unit_test(not_filled),       cmocka_unit_test(neighbours),
-        cmocka_unit_test(loading),          cmocka_unit_test(refused),
+        cmocka_unit_test(recovery),        cmocka_unit_test(exact),
+        cmocka_unit_test(shapes),          cmocka_unit_test(held),
+        cmocka_unit_test(models),          cmocka_unit_test(plates),
+        cmocka_unit_test(interval_linear), cmocka_unit_test(interval_profile),
+        cmocka_unit_test(interval_many),   cmocka_unit_test(untold),
+        cmocka_unit_test(filled),          cmocka_unit_test(not_filled),
+        cmocka_unit_test(neighbours),      cmocka_unit_test(loading),
+        cmocka_unit_test(refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

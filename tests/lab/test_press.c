@@ -203,6 +203,28 @@ static void test_drop(void **state) {
     assert_true(fabs(end->tilt) < 0.03 && result.rest_speed < 1e-3);
 }
 
+/* (k_c/b + k_phi) u^n of the area, b the plate's shorter side: through the ground's step. */
+static void test_width(void **state) {
+    (void)state;
+    static const double sides[][2] = {{0.3, 0.2}, {0.2, 0.1}, {0.06, 0.15}};
+    double worst = 0;
+    for (int i = 0; i < 3; i++) {
+        MildError error = {0};
+        PressDef def = definition("clay");
+        const double b = fmin(sides[i][0], sides[i][1]);
+        MildSole *plate = press_plate_create(sides[i][0], sides[i][1], &error);
+        press_result_close(&result);
+        assert_int_equal(press_run(&def, plate, &result, &error), MILD_OK);
+        const PressRow *end = turn_of(0);
+        const double p = (def.material.k_c / b + def.material.k_phi) * pow(end->depth, 0.5);
+        worst = fmax(worst, fabs(end->force / (p * result.area) - 1));
+        mild_sole_destroy(plate);
+    }
+    printf("bekker under plates of three widths: %.1e off\n", worst);
+    assert_true(worst < 1e-3);
+    press_result_close(&result);
+}
+
 static void test_bad_material(void **state) {
     (void)state;
     MildError error = {0};
@@ -222,10 +244,11 @@ static void test_bad_material(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_law),     cmocka_unit_test(test_energy),
-        cmocka_unit_test(test_moments), cmocka_unit_test(test_reload),
-        cmocka_unit_test(test_cycles),  cmocka_unit_test(test_drag),
-        cmocka_unit_test(test_drop),    cmocka_unit_test(test_bad_material),
+        cmocka_unit_test(test_law),          cmocka_unit_test(test_energy),
+        cmocka_unit_test(test_moments),      cmocka_unit_test(test_reload),
+        cmocka_unit_test(test_cycles),       cmocka_unit_test(test_drag),
+        cmocka_unit_test(test_drop),         cmocka_unit_test(test_width),
+        cmocka_unit_test(test_bad_material),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -96,8 +96,8 @@ class Fuzz(unittest.TestCase):
                   (mild.Ground, ("soles", "terrain", "dt", "tiles", "solver", "tolerance", "max_iterations")),
                   (mild.Batch, ("robots", "soles", "dt", "tolerance", "max_iterations", "device")),
                   (mild.loading, ("time", "depth", "force", "speed")), (_ground._loading, ("rows",)),
-                  (_ground._fit, ("sole", "width", "rows", "model", "hold", "fill")),
-                  (_ground._fit_forces, ("sole", "material", "rows")))
+                  (_ground._fit, ("soles", "rows", "model", "hold", "fill")),
+                  (_ground._fit_forces, ("soles", "material", "rows")))
         methods = {mild.Sole: ("sinkage", "concentric"), mild.Terrain: ("add_patch", "height_at", "slope_at", "material_at"),
                    mild.Material: ("match", "__eq__", "__setstate__"), mild.Map: (),
                    mild.Ground: ("solve", "check", "advance", "reset", "elements", "element_depths", "print_at", "__setstate__"),

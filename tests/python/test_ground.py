@@ -35,13 +35,14 @@ def fall(ground, steps, twist=np.zeros(6)):
 class Press(unittest.TestCase):
     def test_bekker_law(self):
         """F = area (k_c/b + k_phi) u^n, Bekker 1969, for a slow press; near the surface ours is straight."""
-        sole = mild.Sole.plate(0.2, 0.1)
-        for name in ("clay", "dry_sand", "snow"):
-            soil = mild.Material(name)
+        for name, length, width in (("clay", 0.2, 0.1), ("dry_sand", 0.3, 0.2), ("snow", 0.06, 0.2)):
+            sole, soil = mild.Sole.plate(length, width), mild.Material(name)
+            self.assertEqual(soil.plate_width, 0)  # b is the shorter side of the sole
+            self.assertAlmostEqual(sole.width, min(length, width), places=12)
             press = mild.press(soil, sole, depth=0.02, speed=1e-4)
             down = (press.way == 0) & (press.depth > 2e-3)
             u = press.depth[down]
-            law = press.area * (soil.k_c / soil.plate_width + soil.k_phi) * u**soil.exponent
+            law = press.area * (soil.k_c / min(length, width) + soil.k_phi) * u**soil.exponent
             np.testing.assert_allclose(press.force[down], law, rtol=1e-3)
             self.assertGreater(down.sum(), 800)
 
@@ -347,6 +348,28 @@ class Fit(unittest.TestCase):
         fast = slice(len(y) // 2, None)
         np.testing.assert_allclose(fit.predict(X)[fast], y[fast], atol=0.01 * y.max())
         self.assertGreater(np.abs(fit.predict(X[fast, :1]) - y[fast]).max(), 0.05 * y.max())
+
+    def test_plates(self):
+        """A record on each of two plates: their numbers, and of bekker k_c and k_phi apart, because b differs."""
+        sizes = [(0.15, 0.1), (0.3, 0.2)]
+        for ground, model, names in (("foam45", "mild", ("k_pen",)), ("clay", "bekker", ("k_c", "k_phi", "exponent"))):
+            truth = mild.Material(ground)
+            records = [mild.press(truth, mild.Sole.plate(*size), depth=0.04) for size in sizes]
+            X, y = zip(*(mild.loading(press.time, press.depth, press.force) for press in records))
+            for plates in (sizes, tuple(mild.Sole.plate(*size) for size in sizes)):
+                fit = mild.GroundFit(plate=plates, model=model).fit(X, y)
+                for name in names:
+                    self.assertLess(abs(fit.parameters_[name] / getattr(truth, name) - 1), 1e-3, name)
+                predicted = fit.predict(X)
+                for own, force in zip(predicted, y):
+                    np.testing.assert_allclose(own, force, atol=0.01 * force.max())
+                self.assertGreater(fit.score(X, y), 0.999)
+            with self.assertRaisesRegex(ValueError, "3 records for 2 plates"):
+                fit.fit([*X, X[0]], [*y, y[0]])
+            with self.assertRaisesRegex(ValueError, "y: "):
+                fit.fit(X, y[:1])
+        with self.assertRaisesRegex(ValueError, "plate_width"):
+            mild.GroundFit(model="bekker", hold={"plate_width": 0.1}).fit(X[0], y[0])
 
     def test_estimator(self):
         fit = mild.GroundFit(model="bekker")

@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""Holds the numbers of `mild eval --json` to what the program says elsewhere: numbers.py TABLE JSON STANCES TRACK FIRST TURN TURN_JSON.
+Table and JSON of two trials, their stances and track as CSV, JSON of the first trial alone, table and JSON of a walk that turns."""
+import csv
+import json
+import math
+import re
+import sys
+
+failures = 0
+
+
+def near(what, is_, wanted, within):
+    global failures
+    if not abs(is_ - wanted) <= within:
+        print(f"{what}: {is_}, but {wanted} +- {within} is told elsewhere")
+        failures += 1
+
+
+def cells(path):
+    """The numbers of the table's last line, behind the ground's name."""
+    with open(path, encoding="utf-8") as file:
+        return [float(n) for n in re.findall(r"-?\d+\.?\d*", file.read().strip().splitlines()[-1].split(None, 1)[1])]
+
+
+def rows(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def row(path):
+    with open(path, encoding="utf-8") as file:
+        return json.load(file)["rows"][0]
+
+
+def mean(values):
+    values = list(values)
+    return sum(values) / len(values)
+
+
+table, both, stances, track, first, turn_table, turning = sys.argv[1:]
+one, r, s, t = row(first), row(both), rows(stances), rows(track)
+speed, upright, trials, velocity, half, cot, torque, clearance, sink, drift, power, sideways, asked_sideways = cells(table)
+for what, is_, wanted, within in (
+        ("speed", r["speed"], speed, 0.005), ("success", r["success"], upright, 0), ("trials", r["trials"], trials, 0),
+        ("velocity", r["velocity"], velocity, 5e-4), ("cot", r["cot"], cot, 0.005), ("torque_max", r["torque_max"], torque, 0.05),
+        ("velocity_low", r["velocity_low"], r["velocity"] - half, 5e-4), ("velocity_high", r["velocity_high"], r["velocity"] + half, 5e-4),
+        ("clearance", 1e3 * r["clearance"], clearance, 0.5), ("penetration", 1e3 * r["penetration"], sink, 0.05),
+        ("drift", 1e3 * r["drift"], drift, 0.05), ("energy", r["energy"] / r["seconds"], power, 0.5),
+        ("velocity_sideways", r["velocity_sideways"], sideways, 5e-4), ("sideways", r["sideways"], asked_sideways, 0.005),
+        ("measured", r["measured"], 2, 0), ("turn", r["turn"], 0, 0), ("push", r["push"], 0, 0)):
+    near(what, is_, wanted, within)
+
+# the stances: what the means are of
+near("penetration of the stances", r["penetration"], mean(float(x["depth_m"]) for x in s), 1e-6)
+near("drift_forward", r["drift_forward"], mean(abs(float(x["forward_m"])) for x in s), 1e-6)
+near("drift_left", r["drift_left"], mean(abs(float(x["left_m"])) for x in s), 1e-6)
+near("drift of the stances", r["drift"], mean(math.hypot(float(x["forward_m"]), float(x["left_m"])) for x in s), 2e-6)
+
+# the track: speed, sideways speed, time, and how far the base goes up and down after 2 s
+trial = [[x for x in t if x["trial"] == str(k)] for k in range(2)]
+steady = [[x for x in own if float(x["time_s"]) >= 2] for own in trial]
+
+
+def rate(own, column):
+    return (float(own[-1][column]) - float(own[0][column])) / (float(own[-1]["time_s"]) - float(own[0]["time_s"]))
+
+
+height = [[float(x["base_z_m"]) for x in own] for own in steady]
+near("seconds", r["seconds"], mean(float(own[-1]["time_s"]) for own in trial), 0.011)
+near("velocity of the track", r["velocity"], mean(rate(own, "base_x_m") for own in steady), 0.005)
+near("velocity_sideways of the track", r["velocity_sideways"], mean(rate(own, "base_y_m") for own in steady), 0.005)
+near("base_oscillation", r["base_oscillation"], mean(max(own) - min(own) for own in height), 2e-3)
+
+# of two trials the first is known by itself; so the deviation is known: |x0 - mean| times the root of 2
+for name, key in (("velocity_deviation", "velocity"), ("cot_deviation", "cot"), ("torque_deviation", "torque_max")):
+    near(name, r[name], math.sqrt(2) * abs(one[key] - r[key]), 1e-5 * r[name])
+    if one[name] is not None:
+        near(f"{name} of one trial", 1, 0, 0)
+
+told, asked = cells(turn_table)[-2:]
+near("velocity_turn", row(turning)["velocity_turn"], told, 5e-4)
+near("turn", row(turning)["turn"], asked, 0.005)
+sys.exit(failures > 0)

@@ -1,0 +1,99 @@
+/* The times that the training bench and the log of a training tell, by a clock that ticks once each
+ * time it is read: nothing is left out and nothing counts twice. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/clock.h"
+#include "bench/bench.h"
+#include "train/trainer.h"
+
+#define TICK 0.0009765625 /* [s] 1/1024, so that sums are exact */
+enum { ENVS = 6, STEPS = 4 };
+
+static double now;         /* [s] of the clock */
+static double first_after; /* [s] when the first iteration was over */
+static int iterations;
+static TrainTimes told; /* sums of all iterations but the first */
+
+double __wrap_clock_seconds(void);
+MildStatus __real_train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
+MildStatus __wrap_train_iterate(Trainer *trainer, TrainReport *report, MildError *error);
+
+double __wrap_clock_seconds(void) {
+    return now += TICK;
+}
+
+/* An iteration reads the clock first and last: its rate and its parts fill the time between. */
+MildStatus __wrap_train_iterate(Trainer *trainer, TrainReport *report, MildError *error) {
+    const double before = now;
+    const MildStatus status = __real_train_iterate(trainer, report, error);
+    const double wall = now - before - TICK;
+    assert_int_equal(status, MILD_OK);
+    const TrainTimes *t = &report->times;
+    assert_true(fabs(ENVS * STEPS / report->steps_per_s - wall) < 1e-9);
+    assert_true(fabs(t->rollout + t->update - wall) < 1e-9 && t->update >= TICK);
+    assert_true(t->environments >= STEPS * TICK && t->inference >= STEPS * TICK);
+    assert_true(t->environments + t->inference <= t->rollout && t->ground <= t->physics);
+    if (iterations++ == 0) {
+        first_after = now;
+    } else {
+        told.environments += t->environments;
+        told.inference += t->inference;
+        told.update += t->update;
+    }
+    return status;
+}
+
+static double value_of(const BenchReport *report, const char *name) {
+    for (int i = 0; i < report->count; i++) {
+        if (strcmp(report->rows[i].name, name) == 0) {
+            return report->rows[i].value;
+        }
+    }
+    fail_msg("no row %s", name);
+    return NAN;
+}
+
+static void the_parts_are_the_whole(void **state) {
+    (void)state;
+    static BenchReport report;
+    MildError error = {0};
+    ExperimentDef def = experiment_def_default();
+    def.train.envs = ENVS;
+    def.train.threads = 1;
+    def.ppo.steps = STEPS;
+    def.ppo.minibatches = 2;
+    assert_int_equal(bench_train(&def, &report, &error), MILD_OK);
+    const double steps = (iterations - 1) * ENVS * STEPS;
+    const double wall = now - first_after - TICK; /* the bench's own first and last reading */
+    const double step = 1e6 / value_of(&report, "policy_steps_per_s");
+    static const char *const names[] = {"physics",   "ground", "task",
+                                        "inference", "update", "other"};
+    double sum = 0;
+    for (int i = 0; i < 6; i++) {
+        const double part = value_of(&report, names[i]);
+        print_message("%-10s %12.1f us of %.1f\n", names[i], part, step);
+        assert_true(part >= 0);
+        sum += part;
+    }
+    assert_true(iterations > 2);
+    assert_true(fabs(step - 1e6 * wall / steps) < 1e-6 * step);
+    assert_true(fabs(sum - step) < 1e-9 * step);
+    assert_true(fabs(value_of(&report, "inference") - 1e6 * told.inference / steps) < 1e-6 * step);
+    assert_true(fabs(value_of(&report, "update") - 1e6 * told.update / steps) < 1e-6 * step);
+    const double inside =
+        value_of(&report, "physics") + value_of(&report, "ground") + value_of(&report, "task");
+    assert_true(fabs(inside - 1e6 * told.environments / steps) < 1e-6 * step);
+    assert_true(value_of(&report, "threads") == 1);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_parts_are_the_whole)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
