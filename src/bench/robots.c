@@ -6,6 +6,7 @@
 #include "bench/record.h"
 #include "control/controller.h"
 #include "crowd/crowd.h"
+#include "device/device.h"
 
 /* Rows of the environments, in the memory of the device. */
 typedef struct {
@@ -29,10 +30,10 @@ static MildStatus rows_open(Rows *rows, const ExperimentDef *def, int device, Mi
     rows->device = device;
     int good = 1;
     for (size_t i = 0; good && i < sizeof all / sizeof *all; i++) {
-        *all[i].at = batch_alloc(device, envs * (size_t)all[i].width * sizeof(float), error);
+        *all[i].at = device_alloc(device, envs * (size_t)all[i].width * sizeof(float), error);
         good = *all[i].at != NULL;
     }
-    rows->flags = good ? batch_alloc(device, 3 * envs, error) : NULL;
+    rows->flags = good ? device_alloc(device, 3 * envs, error) : NULL;
     return rows->flags ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
@@ -40,7 +41,7 @@ static void rows_close(Rows *rows) {
     void *const all[] = {rows->history, rows->critic, rows->estimate, rows->frame,
                          rows->action,  rows->reward, rows->flags};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
-        batch_free(rows->device, all[i]);
+        device_free(rows->device, all[i]);
     }
 }
 
@@ -127,12 +128,12 @@ static MildStatus write_script(Crowd *crowd, const Rows *rows, const ExperimentD
     const size_t envs = (size_t)def->train.envs, actions = envs * (size_t)p->actions;
     MildStatus status = crowd_reset(crowd, &view, NULL, error);
     for (int t = 0; t < warm_steps(rows) + timed_steps(rows) && status == MILD_OK; t++) {
-        status = batch_copy(rows->device, walker->history, rows->history,
-                            envs * (size_t)(p->frames * p->observation) * sizeof(float), error);
+        status = device_copy(rows->device, walker->history, rows->history,
+                             envs * (size_t)(p->frames * p->observation) * sizeof(float), error);
         if (status == MILD_OK) {
             controller->act_on(controller->self, def->train.envs, walker->history, walker->action);
-            status = batch_copy(rows->device, script + (size_t)t * actions, walker->action,
-                                actions * sizeof(float), error);
+            status = device_copy(rows->device, script + (size_t)t * actions, walker->action,
+                                 actions * sizeof(float), error);
         }
         status = status == MILD_OK ? step(crowd, rows, def, script, t, error) : status;
     }
@@ -177,7 +178,7 @@ static MildStatus walk_twice(const CrowdDef *of, const ExperimentDef *def, const
                              const Controller *controller, BenchReport *report, MildError *error) {
     const int steps = warm_steps(rows) + timed_steps(rows);
     const size_t numbers = (size_t)steps * (size_t)def->train.envs * (size_t)def->policy.actions;
-    float *script = batch_alloc(rows->device, numbers * sizeof *script, error);
+    float *script = device_alloc(rows->device, numbers * sizeof *script, error);
     VecStats recorded = {0};
     Crowd *crowd = script ? crowd_create(of, error) : NULL;
     MildStatus status =
@@ -188,7 +189,7 @@ static MildStatus walk_twice(const CrowdDef *of, const ExperimentDef *def, const
         status = crowd ? walk(crowd, def, rows, script, &recorded, report, error) : error->status;
     }
     crowd_destroy(crowd);
-    batch_free(rows->device, script);
+    device_free(rows->device, script);
     return status;
 }
 

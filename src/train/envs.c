@@ -2,8 +2,8 @@
 
 #include <stdlib.h>
 
-#include "batch/batch.h"
 #include "crowd/crowd.h"
+#include "device/device.h"
 
 enum { TRAIN_MATERIALS = 3 }; /* drawn for the pattern of a terrain, as for stripes */
 
@@ -38,7 +38,7 @@ static int make(TrainEnvs *envs, const ExperimentDef *def, int striped, const Ro
     const CrowdDef crowd = {.task = &def->task,
                             .robot = robot,
                             .pool = pool,
-                            .device = envs->device < 0 ? MILD_BATCH_HOST : envs->device,
+                            .device = envs->device < 0 ? DEVICE_HOST : envs->device,
                             .envs = count,
                             .first = (uint32_t)first,
                             .grounds = def->train.grounds,
@@ -126,7 +126,7 @@ MildStatus train_envs_step(TrainEnvs *envs, PpoBatch *batch, int t, void *stream
 }
 
 MildStatus train_envs_wait(const TrainEnvs *envs, MildError *error) {
-    return envs->crowd && envs->device >= 0 ? device_wait(envs->device, error) : MILD_OK;
+    return envs->crowd ? device_wait(envs->device, error) : MILD_OK;
 }
 
 MildStatus train_envs_take_sums(TrainEnvs *envs, VecStats *sums, void *stream, MildError *error) {

@@ -17,6 +17,7 @@
 #include "crowd/crowd.h"
 #include "episode.h"
 #include "sa01.h"
+#include "device/device.h"
 #include "task/ground.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
@@ -85,14 +86,14 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
                             .grounds = GROUNDS,
                             .seed = 7};
     pair.crowd = crowd_create(&crowd, &error);
-    pair.on_side = pair.crowd ? batch_alloc(device, sizeof(Rows), &error) : NULL;
+    pair.on_side = pair.crowd ? device_alloc(device, sizeof(Rows), &error) : NULL;
     if (!pair.on_side) {
         fail_msg("%s", error.text);
     }
 }
 
 static void pair_close(void) {
-    batch_free(pair.device, pair.on_side);
+    device_free(pair.device, pair.on_side);
     crowd_destroy(pair.crowd);
     vec_destroy(pair.vec);
     task_grounds_destroy(pair.grounds);
@@ -107,8 +108,8 @@ static VecView view_of(Rows *rows) {
 /* The crowd's rows to b, once the device has them. */
 static void fetch(void) {
     MildError error = {0};
-    assert_true(pair.device == MILD_BATCH_HOST || device_wait(pair.device, &error) == MILD_OK);
-    assert_int_equal(batch_copy(pair.device, &pair.b, pair.on_side, sizeof pair.b, &error),
+    assert_true(device_wait(pair.device, &error) == MILD_OK);
+    assert_int_equal(device_copy(pair.device, &pair.b, pair.on_side, sizeof pair.b, &error),
                      MILD_OK);
 }
 
@@ -128,7 +129,7 @@ static void pair_step(void) {
     Rows *s = pair.on_side;
     vec_step(pair.vec, pair.a.action, pair.a.reward, pair.a.done, pair.a.timeout, pair.a.valid, &a);
     assert_int_equal(
-        batch_copy(pair.device, s->action, pair.a.action, sizeof pair.a.action, &error), MILD_OK);
+        device_copy(pair.device, s->action, pair.a.action, sizeof pair.a.action, &error), MILD_OK);
     if (crowd_step(pair.crowd, s->action, s->reward, s->done, s->timeout, s->valid, &b, NULL,
                    &error) != MILD_OK) {
         fail_msg("%s", error.text);
