@@ -1,4 +1,5 @@
 #include "batch/batch.h"
+#include "batch/contact_shapes.h"
 #include "device/device.h"
 
 #include <stdlib.h>
@@ -8,8 +9,8 @@
 #define BATCH_LIMIT 20
 #define BATCH_MATERIALS_MAX 1000000
 
-/* The shapes of contact_kinds.h. */
-static const int batch_pers[][3] = {{1, 3, 8}, {1, 5, 8}, {1, 4, 8}}; /* of 1, 2, 4 groups */
+#define BATCH_SIZE(groups, per) {groups, per},
+static const int batch_sizes[][2] = {CONTACT_KINDS(BATCH_SIZE)};
 _Static_assert(MILD_BATCH_HOST == DEVICE_HOST, "the same number");
 _Static_assert(MILD_FEET_MAX == 4, "feet take 1, 2 or 4 groups");
 
@@ -43,21 +44,21 @@ static MildStatus check_def(const MildBatchDef *def, MildError *error) {
 
 /* How the elements are dealt to lanes. */
 static MildStatus shape_lanes(BatchShape *shape, MildError *error) {
-    int kind = 0, most = 1;
+    int most = 1;
     shape->groups = 1;
     while (shape->groups < shape->feet) {
         shape->groups *= 2;
-        kind++;
     }
-    const int lanes = 32 / shape->groups;
     for (int f = 0; f < shape->feet; f++) {
         most = shape->elements[f] > most ? shape->elements[f] : most;
     }
-    for (int i = 0; i < 3; i++) {
-        shape->per = batch_pers[kind][i];
-        shape->stride = lanes * shape->per;
-        if (shape->stride >= most) {
-            return MILD_OK;
+    for (size_t i = 0; i < sizeof batch_sizes / sizeof *batch_sizes; i++) {
+        if (batch_sizes[i][0] == shape->groups) {
+            shape->per = batch_sizes[i][1];
+            shape->stride = 32 / shape->groups * shape->per;
+            if (shape->stride >= most) {
+                return MILD_OK;
+            }
         }
     }
     return mild_fail(error, MILD_ERROR_RANGE,
@@ -208,6 +209,20 @@ MildBatch batch_share(const MildBatch *batch, int first, int count) {
     share.shape.robots = count;
     share.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
     return share;
+}
+
+static MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *input,
+                                 const MildBatchOutput *output, int advance, void *stream,
+                                 MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    for (int i = 0; batch_kernels[i]; i++) {
+        const BatchKernel *k = batch_kernels[i];
+        if (k->groups == shape->groups && k->per == shape->per && (shape->points || !k->points) &&
+            !(batch->curves & ~k->curves)) {
+            return k->step(batch, input, output, advance, stream, error);
+        }
+    }
+    return device_open(batch->device, error);
 }
 
 MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,

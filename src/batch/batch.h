@@ -56,17 +56,21 @@ void batch_map_close(const MapView *view, int device);
 void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
                const MildBatchOutput *output, int advance);
 
-/* ---- a GPU: device.cu and device_map.cu, or without_cuda.c ---- */
-MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *input,
-                          const MildBatchOutput *output, int advance, void *stream,
-                          MildError *error);
-/* The two that batch_gpu_step is one of: without and with a map. */
-MildStatus batch_gpu_step_level(const MildBatch *batch, const MildBatchInput *input,
+/* ---- a GPU: kernel.cu and reset.cu, or without_cuda.c ---- */
+/* A step in `stream`. */
+typedef MildStatus (*BatchStep)(const MildBatch *batch, const MildBatchInput *input,
                                 const MildBatchOutput *output, int advance, void *stream,
                                 MildError *error);
-MildStatus batch_gpu_step_map(const MildBatch *batch, const MildBatchInput *input,
-                              const MildBatchOutput *output, int advance, void *stream,
-                              MildError *error);
+/* The step compiled for one size of a batch. */
+typedef struct {
+    int groups; /* as in BatchShape */
+    int per;
+    int points; /* bool: only for such a batch */
+    int curves; /* LawCurve and LawMotion bits that the materials may have */
+    BatchStep step;
+} BatchKernel;
+/* Those of this build, NULL behind them. A batch takes the first that fits (cmake/Batch.cmake). */
+extern const BatchKernel *const batch_kernels[];
 MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, void *stream,
                            MildError *error);
 

@@ -1,16 +1,15 @@
-/* Steps on level ground, and forgetting. */
-#define CONTACT_MAP 0
-#define DEVICE_STEP batch_gpu_step_level
-#include "batch/device.inc"
+/* Robots of a batch on a GPU forget. */
+#define MILD_REAL_FLOAT
 
-extern "C" MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *input,
-                                     const MildBatchOutput *output, int advance, void *stream,
-                                     MildError *error) {
-    return batch->shape.map ? batch_gpu_step_map(batch, input, output, advance, stream, error)
-                            : batch_gpu_step_level(batch, input, output, advance, stream, error);
+extern "C" {
+#include "batch/batch.h"
 }
 
-__global__ void forget(BatchShape shape, BatchArrays arrays, const uint8_t *which) {
+#include "batch/contact.h"
+#include "batch/robot.inc"
+#include "device/cuda.h"
+
+static __global__ void forget(BatchShape shape, BatchArrays arrays, const uint8_t *which) {
     const long robot = blockIdx.x;
     if (which && !which[robot]) {
         return;
