@@ -84,7 +84,7 @@ bench: program
 install:
 	@cmake -S . -B build/library -DCMAKE_BUILD_TYPE=Release --log-level=WARNING -DMILD_APP=OFF -DMILD_TESTS=OFF \
 		-DMILD_MARCH=$(MARCH) -DCMAKE_INSTALL_PREFIX=$(PREFIX) $(CMAKE_FLAGS)
-	@cmake --build build/library --parallel $(JOBS) --target mild_shared mild_static
+	@cmake --build build/library --parallel $(JOBS) --target mild_shared mild_static mild_batch_shared mild_batch_static
 	@cmake --install build/library
 
 # For the MuJoCo of .venv, or for any other, which needs no setup. MUJOCO_ROOT: docs/plugin.md.

@@ -1,12 +1,107 @@
 # The layer batch, with its steps on a GPU when MILD_CUDA is on.
-mild_layer(batch layer_ground)
+
+# Kernels of a robot's contact step, one unit each: groups of lanes, at least as many as feet; elements of a lane; feet,
+# `flat` for any or `points` for those that transmit no moment; curves of the ground, `all` or the only ones, which is less
+# text and fewer registers; blocks of a multiprocessor. A batch takes the first that fits. The rows `flat all` are the sizes
+# that a batch can have, smallest first, on the CPU too.
+#
+# Two blocks fit a multiprocessor; three would be 1 % faster at 65 536 robots, and 12 % slower at 4096, for they spill
+# registers. Of points three fit, four on cones. Of one element a lane only points have kernels for cones: there is little to
+# gain otherwise. Resistive force theory has those for the feet of most robots.
+set(batch_kernels
+  "4 1 points cone   4"
+  "4 1 points all    3"
+  "1 3 flat   cone   2"
+  "1 8 flat   cone   2"
+  "2 5 flat   cone   2"
+  "2 8 flat   cone   2"
+  "4 4 flat   cone   2"
+  "4 8 flat   cone   2"
+  "2 5 flat   resist 2"
+  "4 4 flat   resist 2"
+  "1 1 flat   all    2"
+  "1 3 flat   all    2"
+  "1 8 flat   all    2"
+  "2 1 flat   all    2"
+  "2 5 flat   all    2"
+  "2 8 flat   all    2"
+  "4 1 flat   all    2"
+  "4 4 flat   all    2"
+  "4 8 flat   all    2")
+set(generated ${CMAKE_BINARY_DIR}/generated/batch)
+mild_layer(batch layer_ground layer_device)
+target_include_directories(layer_batch PUBLIC ${generated})
+
+# contact_kinds.h: contact.inc for the CPU, in each size, and lists of them
+set(contact_texts "")
+set(contact_flat "")
+set(contact_points "")
+set(units "")
+set(kernel_names "")
+set(kernel_list "")
+foreach(row ${batch_kernels})
+  separate_arguments(row UNIX_COMMAND ${row})
+  list(GET row 0 groups)
+  list(GET row 1 per)
+  list(GET row 2 feet)
+  list(GET row 3 curves)
+  list(GET row 4 blocks)
+  set(points 0)
+  set(name ${groups}_${per})
+  if(feet STREQUAL "points")
+    set(points 1)
+    string(APPEND name _points)
+  endif()
+  if(curves STREQUAL "all")
+    string(APPEND contact_${feet} " KIND(${groups}, ${per})")
+    string(APPEND contact_texts "#define CONTACT_POINTS ${points}\n#define CONTACT_FEET ${groups}\n"
+      "#define CONTACT_PER ${per}\n#define CONTACT(name) contact_##name##_${name}\n#include \"batch/contact.inc\"\n"
+      "#undef CONTACT_POINTS\n")
+  else()
+    string(APPEND name _${curves})
+  endif()
+  set(unit ${generated}/contact_${name}.cu)
+  string(TOUPPER ${curves} curves)
+  file(CONFIGURE OUTPUT ${unit} CONTENT [=[
+#define KERNEL contact_@name@
+#define KERNEL_GROUPS @groups@
+#define KERNEL_PER @per@
+#define KERNEL_POINTS @points@
+#define KERNEL_CURVES LAW_@curves@
+#define KERNEL_BLOCKS @blocks@
+#include "batch/kernel.cu"
+]=] @ONLY)
+  list(APPEND units ${unit})
+  string(APPEND kernel_names "extern const BatchKernel contact_${name};\n")
+  string(APPEND kernel_list " &contact_${name},")
+endforeach()
+file(CONFIGURE OUTPUT ${generated}/batch/contact_shapes.h @ONLY CONTENT [=[
+/* Groups of lanes and elements of a lane that a batch can have. */
+#define CONTACT_KINDS(KIND)@contact_flat@
+#define CONTACT_POINT_KINDS(KIND)@contact_points@
+]=])
+file(CONFIGURE OUTPUT ${generated}/batch/contact_kinds.h @ONLY CONTENT [=[
+/* contact.inc for the CPU in each of these sizes. Before the inclusion: CONTACT_MAP. */
+#include "batch/contact.h"
+#include "batch/contact_shapes.h"
+
+#define CONTACT_CURVES LAW_ALL
+@contact_texts@#undef CONTACT_CURVES
+]=])
+
 if(MILD_CUDA)
-  add_library(batch_device STATIC ${CMAKE_SOURCE_DIR}/src/batch/device.cu
-    ${CMAKE_SOURCE_DIR}/src/batch/device_map.cu)
+  add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/batch/reset.cu)
   target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch)
-  target_link_libraries(batch_device PRIVATE layer_ground)
+  target_link_libraries(batch_device PRIVATE layer_ground layer_device)
   # quotients and roots within two units in the last place, and no denormal numbers
   target_compile_options(batch_device PRIVATE -ftz=true -prec-div=false -prec-sqrt=false)
   set_target_properties(batch_device PROPERTIES CUDA_STANDARD 17 POSITION_INDEPENDENT_CODE ON)
   target_link_libraries(layer_batch PUBLIC batch_device CUDA::cudart_static stdc++)
+  file(CONFIGURE OUTPUT ${generated}/kernels.c @ONLY CONTENT [=[
+#include "batch/batch.h"
+
+@kernel_names@
+const BatchKernel *const batch_kernels[] = {@kernel_list@ NULL};
+]=])
+  target_sources(layer_batch PRIVATE ${generated}/kernels.c)
 endif()

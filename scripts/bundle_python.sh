@@ -15,10 +15,10 @@ suffix=$("$other" -c 'import sysconfig; print(sysconfig.get_config_var("EXT_SUFF
 
 # Archives of the build that the bundle is made of, with its kernels where it has some.
 build=${BUILD:-build/x86-64-v3}/src
-archives=("$build"/liblayer_{lab,batch,ground,base}.a)
+archives=("$build"/liblayer_{lab,batch,ground,device,base}.a)
 cuda=()
 if [ -e "$build/libbatch_device.a" ]; then
-    archives+=("$build/libbatch_device.a")
+    archives+=("$build"/lib{batch_device,device_gpu}.a)
     cuda=(-L"$(dirname "$(readlink -f "$(command -v nvcc || echo /usr/local/cuda/bin/nvcc)")")/../lib64" -lcudart_static -ldl -lrt)
 fi
 

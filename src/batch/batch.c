@@ -1,4 +1,6 @@
 #include "batch/batch.h"
+#include "batch/contact_shapes.h"
+#include "device/device.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -7,36 +9,10 @@
 #define BATCH_LIMIT 20
 #define BATCH_MATERIALS_MAX 1000000
 
-/* The shapes of contact_kinds.h. */
-static const int batch_pers[][3] = {{1, 3, 8}, {1, 5, 8}, {1, 4, 8}}; /* of 1, 2, 4 groups */
+#define BATCH_SIZE(groups, per) {groups, per},
+static const int batch_sizes[][2] = {CONTACT_KINDS(BATCH_SIZE)};
+_Static_assert(MILD_BATCH_HOST == DEVICE_HOST, "the same number");
 _Static_assert(MILD_FEET_MAX == 4, "feet take 1, 2 or 4 groups");
-
-void *batch_alloc(int device, size_t bytes, MildError *error) {
-    if (device != MILD_BATCH_HOST) {
-        return device_alloc(device, bytes, error);
-    }
-    void *memory = calloc(1, bytes);
-    if (!memory) {
-        mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory: %zu bytes are needed", bytes);
-    }
-    return memory;
-}
-
-void batch_free(int device, void *memory) {
-    if (device != MILD_BATCH_HOST) {
-        device_free(device, memory);
-    } else {
-        free(memory);
-    }
-}
-
-MildStatus batch_copy(int device, void *to, const void *from, size_t bytes, MildError *error) {
-    if (device != MILD_BATCH_HOST) {
-        return device_copy(device, to, from, bytes, error);
-    }
-    memcpy(to, from, bytes);
-    return MILD_OK;
-}
 
 static MildStatus check_def(const MildBatchDef *def, MildError *error) {
     if (def->robots < 1) {
@@ -68,21 +44,21 @@ static MildStatus check_def(const MildBatchDef *def, MildError *error) {
 
 /* How the elements are dealt to lanes. */
 static MildStatus shape_lanes(BatchShape *shape, MildError *error) {
-    int kind = 0, most = 1;
+    int most = 1;
     shape->groups = 1;
     while (shape->groups < shape->feet) {
         shape->groups *= 2;
-        kind++;
     }
-    const int lanes = 32 / shape->groups;
     for (int f = 0; f < shape->feet; f++) {
         most = shape->elements[f] > most ? shape->elements[f] : most;
     }
-    for (int i = 0; i < 3; i++) {
-        shape->per = batch_pers[kind][i];
-        shape->stride = lanes * shape->per;
-        if (shape->stride >= most) {
-            return MILD_OK;
+    for (size_t i = 0; i < sizeof batch_sizes / sizeof *batch_sizes; i++) {
+        if (batch_sizes[i][0] == shape->groups) {
+            shape->per = batch_sizes[i][1];
+            shape->stride = 32 / shape->groups * shape->per;
+            if (shape->stride >= most) {
+                return MILD_OK;
+            }
         }
     }
     return mild_fail(error, MILD_ERROR_RANGE,
@@ -123,14 +99,13 @@ static MildStatus store_centers(MildBatch *batch, const MildSole *const *soles, 
             centers[(feet + f) * stride + (size_t)i] = (float)mild_sole_y(soles[f])[i];
         }
     }
-    MildStatus status = batch_copy(batch->device, batch->arrays.centers, centers, bytes, error);
+    MildStatus status = device_copy(batch->device, batch->arrays.centers, centers, bytes, error);
     free(centers);
     return status;
 }
 
 static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildError *error) {
-    MildStatus status =
-        batch->device == MILD_BATCH_HOST ? MILD_OK : device_open(batch->device, error);
+    MildStatus status = device_open(batch->device, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -139,10 +114,10 @@ static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildErro
     const size_t feet = (size_t)shape->feet, robots = (size_t)shape->robots;
     arrays->map.labels = 1;
     arrays->centers =
-        batch_alloc(batch->device, 2 * feet * (size_t)shape->stride * sizeof(float), error);
+        device_alloc(batch->device, 2 * feet * (size_t)shape->stride * sizeof(float), error);
     arrays->memory = arrays->centers
-                         ? batch_alloc(batch->device,
-                                       robots * batch_memory_numbers(shape) * sizeof(float), error)
+                         ? device_alloc(batch->device,
+                                        robots * batch_memory_numbers(shape) * sizeof(float), error)
                          : NULL;
     if (!arrays->memory) {
         return MILD_ERROR_MEMORY;
@@ -176,9 +151,9 @@ void mild_batch_destroy(MildBatch *batch) {
     if (!batch) {
         return;
     }
-    batch_free(batch->device, batch->arrays.centers);
-    batch_free(batch->device, batch->arrays.materials);
-    batch_free(batch->device, batch->arrays.memory);
+    device_free(batch->device, batch->arrays.centers);
+    device_free(batch->device, batch->arrays.materials);
+    device_free(batch->device, batch->arrays.memory);
     batch_map_close(&batch->arrays.map, batch->device);
     free(batch);
 }
@@ -211,19 +186,19 @@ MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materi
         curves |= status == MILD_OK ? numbers[i].curves : 0;
     }
     memset(numbers + count * feet, 0xff, (size_t)feet * sizeof *numbers); /* not a number */
-    void *table = status == MILD_OK ? batch_alloc(batch->device, bytes, error) : NULL;
+    void *table = status == MILD_OK ? device_alloc(batch->device, bytes, error) : NULL;
     if (status == MILD_OK && !table) {
         status = MILD_ERROR_MEMORY;
     }
     if (status == MILD_OK) {
-        status = batch_copy(batch->device, table, numbers, bytes, error);
+        status = device_copy(batch->device, table, numbers, bytes, error);
     }
     free(numbers);
     if (status != MILD_OK) {
-        batch_free(batch->device, table);
+        device_free(batch->device, table);
         return status;
     }
-    batch_free(batch->device, batch->arrays.materials); /* waits until no step reads it */
+    device_free(batch->device, batch->arrays.materials); /* waits until no step reads it */
     batch->arrays.materials = table;
     batch->shape.materials = count;
     batch->curves = curves;
@@ -237,11 +212,25 @@ MildBatch batch_share(const MildBatch *batch, int first, int count) {
     return share;
 }
 
+static MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *input,
+                                 const MildBatchOutput *output, int advance, void *stream,
+                                 MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    for (int i = 0; batch_kernels[i]; i++) {
+        const BatchKernel *k = batch_kernels[i];
+        if (k->groups == shape->groups && k->per == shape->per && (shape->points || !k->points) &&
+            !(batch->curves & ~k->curves)) {
+            return k->step(batch, input, output, advance, stream, error);
+        }
+    }
+    return device_open(batch->device, error);
+}
+
 MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
                            const MildBatchOutput *output, int advance, void *stream,
                            MildError *error) {
     if (batch->device != MILD_BATCH_HOST) {
-        return device_step(batch, input, output, advance, stream, error);
+        return batch_gpu_step(batch, input, output, advance, stream, error);
     }
     host_step(&batch->shape, &batch->arrays, input, output, advance);
     return MILD_OK;
@@ -250,7 +239,7 @@ MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
 MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, void *stream,
                             MildError *error) {
     if (batch->device != MILD_BATCH_HOST) {
-        return device_reset(batch, which, stream, error);
+        return batch_gpu_reset(batch, which, stream, error);
     }
     const size_t numbers = batch_memory_numbers(&batch->shape);
     for (size_t robot = 0; robot < (size_t)batch->shape.robots; robot++) {

@@ -1,5 +1,4 @@
-/* Inside of a batch, for the layers that step it together with an engine, and the memory and
- * streams of its device. */
+/* Inside of a batch, for the layers that step it together with an engine. */
 #ifndef MILD_BATCH_PRIVATE_H
 #define MILD_BATCH_PRIVATE_H
 
@@ -48,13 +47,6 @@ void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *m
 /* `count` robots of a batch from `first` on, as a batch that borrows its memory. */
 MildBatch batch_share(const MildBatch *batch, int first, int count);
 
-/* ---- memory of a device or of MILD_BATCH_HOST ---- */
-/* All 0. NULL with a message that says how much was asked for. */
-void *batch_alloc(int device, size_t bytes, MildError *error);
-void batch_free(int device, void *memory); /* may be NULL */
-/* Copies to, from or within the device and waits. */
-MildStatus batch_copy(int device, void *to, const void *from, size_t bytes, MildError *error);
-
 /* ---- a map: map.c ---- */
 /* Makes a view of a map whose arrays are copies in the memory of a device. Fails for a map that a
  * batch does not know yet. error: not NULL. */
@@ -65,36 +57,22 @@ void batch_map_close(const MapView *view, int device);
 void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
                const MildBatchOutput *output, int advance);
 
-/* ---- a GPU: device.cu and device_map.cu, or without_cuda.c ---- */
-/* Opens the device. */
-MildStatus device_open(int device, MildError *error);
-/* Device memory, all 0; NULL with a message that says how much was asked for. */
-void *device_alloc(int device, size_t bytes, MildError *error);
-void device_free(int device, void *memory);
-/* Copies to, from or within the device and waits. */
-MildStatus device_copy(int device, void *to, const void *from, size_t bytes, MildError *error);
-/* Until all that was asked of the device is done. */
-MildStatus device_wait(int device, MildError *error);
-MildStatus device_step(const MildBatch *batch, const MildBatchInput *input,
-                       const MildBatchOutput *output, int advance, void *stream, MildError *error);
-/* The two that device_step is one of: without and with a map. */
-MildStatus device_step_level(const MildBatch *batch, const MildBatchInput *input,
-                             const MildBatchOutput *output, int advance, void *stream,
-                             MildError *error);
-MildStatus device_step_map(const MildBatch *batch, const MildBatchInput *input,
-                           const MildBatchOutput *output, int advance, void *stream,
+/* ---- a GPU: kernel.cu and reset.cu, or without_cuda.c ---- */
+/* A step in `stream`. */
+typedef MildStatus (*BatchStep)(const MildBatch *batch, const MildBatchInput *input,
+                                const MildBatchOutput *output, int advance, void *stream,
+                                MildError *error);
+/* The step compiled for one size of a batch. */
+typedef struct {
+    int groups; /* as in BatchShape */
+    int per;
+    int points; /* bool: only for such a batch */
+    int curves; /* LawCurve and LawMotion bits that the materials may have */
+    BatchStep step;
+} BatchKernel;
+/* Those of this build, NULL behind them. A batch takes the first that fits (cmake/Batch.cmake). */
+extern const BatchKernel *const batch_kernels[];
+MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, void *stream,
                            MildError *error);
-MildStatus device_reset(const MildBatch *batch, const uint8_t *which, void *stream,
-                        MildError *error);
-
-/* ---- streams beside that of a caller ---- */
-typedef struct DeviceFork DeviceFork;
-DeviceFork *device_fork_create(int device, int streams, MildError *error);
-void device_fork_destroy(DeviceFork *fork); /* may be NULL */
-void *device_fork_stream(const DeviceFork *fork, int i);
-/* Work put into the streams from now on waits for what is in the caller's; after device_join the
- * caller's waits for what is in them. A graph may capture both. */
-MildStatus device_fork(DeviceFork *fork, void *stream, MildError *error);
-MildStatus device_join(DeviceFork *fork, void *stream, MildError *error);
 
 #endif

@@ -2,7 +2,9 @@
 #include <stdlib.h>
 
 #include "batch/batch.h"
+#include "device/device.h"
 #include "ground/grid.h"
+#include "ground/inside.h"
 
 /* First labels of all cells; NULL when out of memory or when a border is blended. */
 static unsigned char *first_labels(const MildMap *map, size_t cells, MildError *error) {
@@ -25,21 +27,21 @@ static unsigned char *first_labels(const MildMap *map, size_t cells, MildError *
 }
 
 static void *copy_of(const void *from, size_t bytes, int device, MildError *error) {
-    void *to = batch_alloc(device, bytes, error);
-    if (to && batch_copy(device, to, from, bytes, error) != MILD_OK) {
-        batch_free(device, to);
+    void *to = device_alloc(device, bytes, error);
+    if (to && device_copy(device, to, from, bytes, error) != MILD_OK) {
+        device_free(device, to);
         return NULL;
     }
     return to;
 }
 
 void batch_map_close(const MapView *view, int device) {
-    batch_free(device, (void *)view->height);
-    batch_free(device, (void *)view->label);
+    device_free(device, (void *)view->height);
+    device_free(device, (void *)view->label);
 }
 
 MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildError *error) {
-    MapView opened = map_view(map);
+    MapView opened = mild_inside_map(map);
     const size_t points = (size_t)(opened.x.cells + 1) * (size_t)(opened.y.cells + 1);
     const size_t cells = (size_t)opened.label_x.cells * (size_t)opened.label_y.cells;
     opened.height = NULL;
@@ -81,12 +83,12 @@ MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *e
         }
     }
     const size_t numbers = (size_t)shape.robots * batch_memory_numbers(&shape);
-    arrays.memory = batch_alloc(batch->device, numbers * sizeof(float), error);
+    arrays.memory = device_alloc(batch->device, numbers * sizeof(float), error);
     if (!arrays.memory) {
         batch_map_close(&arrays.map, batch->device);
         return error->status;
     }
-    batch_free(batch->device, batch->arrays.memory); /* waits until no step uses it */
+    device_free(batch->device, batch->arrays.memory); /* waits until no step uses it */
     batch_map_close(&batch->arrays.map, batch->device);
     batch->arrays = arrays;
     batch->shape = shape;

@@ -1,7 +1,7 @@
 #include "batch/material.h"
 
 #include "ground/begin.h"
-#include "ground/models.h"
+#include "ground/inside.h"
 
 #define MATERIAL_LAW_INDEX(name) MATERIAL_LAW_##name,
 enum { LAW_NUMBERS(MATERIAL_LAW_INDEX) MATERIAL_LAW_COUNT };
@@ -13,11 +13,12 @@ MildStatus material_numbers(const MildMaterial *material, double pitch, double w
     if (mild_material_check(material, &cause) != MILD_OK) {
         return mild_fail(error, MILD_ERROR_RANGE, "batch: material %d: %s", index, cause.text);
     }
-    const Law law = law_of(material, pitch, width);
+    const InsideLaw inside = mild_inside_law(material, pitch, width);
+    const Law law = inside.law;
     int n = 0;
 #define MATERIAL_LAW_STORE(name) numbers->law[n++] = (float)law.name;
     LAW_NUMBERS(MATERIAL_LAW_STORE)
-    numbers->recovery = (float)law_recovery(&law, recovery_of(material));
+    numbers->recovery = (float)inside.recovery;
     numbers->mu = (float)material->mu;
     numbers->k_drift = (float)material->k_drift;
     numbers->b_drift = (float)material->b_drift;
@@ -25,6 +26,6 @@ MildStatus material_numbers(const MildMaterial *material, double pitch, double w
     numbers->entry_drag = (float)law_entry_drag(&law);
     numbers->cohesion = (float)material->cohesion;
     numbers->shear_length = (float)material->shear_length;
-    numbers->curves = law_curves(&law) | model_row(material->model)->motion;
+    numbers->curves = inside.curves;
     return MILD_OK;
 }

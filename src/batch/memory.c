@@ -5,7 +5,8 @@
 
 #include "batch/batch.h"
 #include "batch/contact.h"
-#include "ground/state.h"
+#include "device/device.h"
+#include "ground/inside.h"
 
 enum { MEMORY_ROBOTS = 256 }; /* copied at once */
 
@@ -53,7 +54,7 @@ static void planes_of(const BatchShape *shape, const MildGround *ground, const M
 void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory) {
     memset(memory, 0, batch_memory_numbers(shape) * sizeof *memory);
     for (int f = 0; f < shape->feet; f++) {
-        const Memory of = ground_memory(ground, f);
+        const Memory of = mild_inside_memory(ground, f);
         const double *const all[CONTACT_MEMORY] = MEMORY_ARRAYS(of);
         for (int n = 0; n < CONTACT_MEMORY; n++) {
             float *to = numbers_at(shape, memory, n, f);
@@ -96,7 +97,7 @@ static void ground_remember(const BatchShape *shape, const MapView *map, float *
                             MildGround *ground) {
     mild_ground_reset(ground);
     for (int f = 0; f < shape->feet; f++) {
-        const Memory of = ground_memory(ground, f);
+        const Memory of = mild_inside_memory(ground, f);
         double *const all[CONTACT_MEMORY] = MEMORY_ARRAYS(of);
         int loaded = 0;
         for (int n = 0; n < CONTACT_MEMORY; n++) {
@@ -155,7 +156,7 @@ static MildStatus check_memory(const MildBatch *batch, int robot, const MildGrou
     const BatchShape *shape = &batch->shape;
     const int labels = shape->map ? batch->arrays.map.labels : 1;
     for (int f = 0; f < shape->feet; f++) {
-        const Memory memory = ground_memory(ground, f);
+        const Memory memory = mild_inside_memory(ground, f);
         if (ground->uneven[f] && !(shape->map && batch->arrays.map.uneven)) {
             return mild_fail(error, MILD_ERROR_ARGUMENT,
                              "batch: the ground of robot %d is uneven, the batch's is not: call "
@@ -217,8 +218,8 @@ MildStatus mild_batch_load_robots(MildBatch *batch, int first, int count,
         for (int k = 0; k < some; k++) {
             batch_memory_of(shape, grounds[i + k], memory + (size_t)k * numbers);
         }
-        status = batch_copy(batch->device, batch->arrays.memory + (size_t)(first + i) * numbers,
-                            memory, (size_t)some * numbers * sizeof *memory, error);
+        status = device_copy(batch->device, batch->arrays.memory + (size_t)(first + i) * numbers,
+                             memory, (size_t)some * numbers * sizeof *memory, error);
     }
     free(memory);
     return status;
@@ -239,8 +240,8 @@ MildStatus mild_batch_store_robots(const MildBatch *batch, int first, int count,
     for (int i = 0; i < count && status == MILD_OK; i += MEMORY_ROBOTS) {
         const int some = count - i < MEMORY_ROBOTS ? count - i : MEMORY_ROBOTS;
         status =
-            batch_copy(batch->device, memory, batch->arrays.memory + (size_t)(first + i) * numbers,
-                       (size_t)some * numbers * sizeof *memory, error);
+            device_copy(batch->device, memory, batch->arrays.memory + (size_t)(first + i) * numbers,
+                        (size_t)some * numbers * sizeof *memory, error);
         for (int k = 0; k < some && status == MILD_OK; k++) {
             ground_remember(shape, &batch->arrays.map, memory + (size_t)k * numbers,
                             grounds[i + k]);

@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "bench/bench.h"
 #include "bench/record.h"
+#include "device/device.h"
 
 enum { PERIODS = 300, GROUNDS = 2, PROBLEMS_MAX = 4000, ARRAYS_MAX = 12 };
 enum { HOST_REPEATS = 3, REPEATS = 20 };
@@ -110,13 +111,13 @@ static MildStatus record(BatchBench *bench, const ExperimentDef *def, MildError 
 /* An array of the device; from: on the host, or NULL. */
 static void *device_array(BatchCase *c, int device, const void *from, size_t bytes,
                           MildError *error) {
-    void *array = batch_alloc(device, bytes, error);
+    void *array = device_alloc(device, bytes, error);
     if (!array) {
         return NULL;
     }
     assert(c->arrays < ARRAYS_MAX);
     c->array[c->arrays++] = array;
-    if (from && batch_copy(device, array, from, bytes, error) != MILD_OK) {
+    if (from && device_copy(device, array, from, bytes, error) != MILD_OK) {
         return NULL; /* freed with the case */
     }
     return array;
@@ -124,7 +125,7 @@ static void *device_array(BatchCase *c, int device, const void *from, size_t byt
 
 static void close_case(BatchCase *c) {
     for (int i = 0; i < c->arrays; i++) {
-        batch_free(c->batch->device, c->array[i]);
+        device_free(c->batch->device, c->array[i]);
     }
     mild_batch_destroy(c->batch);
 }
@@ -216,13 +217,13 @@ static double time_step(BatchCase *c, int advance, MildError *error) {
     double least = INFINITY;
     const int repeats = device == MILD_BATCH_HOST ? HOST_REPEATS : REPEATS;
     for (int r = 0; r < repeats; r++) {
-        if (batch_copy(device, c->batch->arrays.memory, c->memory, bytes, error) != MILD_OK ||
-            (device != MILD_BATCH_HOST && device_wait(device, error) != MILD_OK)) {
+        if (device_copy(device, c->batch->arrays.memory, c->memory, bytes, error) != MILD_OK ||
+            device_wait(device, error) != MILD_OK) {
             return -1.0;
         }
         const double start = clock_seconds();
         if (mild_batch_step(c->batch, &c->input, &c->output, advance, NULL, error) != MILD_OK ||
-            (device != MILD_BATCH_HOST && device_wait(device, error) != MILD_OK)) {
+            device_wait(device, error) != MILD_OK) {
             return -1.0;
         }
         least = fmin(least, clock_seconds() - start);
@@ -239,12 +240,12 @@ static MildStatus force_errors(const BatchCase *c, const BatchBench *bench, size
     int32_t *steps = malloc(count * sizeof *steps);
     MildStatus status = wrench && steps ? MILD_OK : MILD_ERROR_MEMORY;
     if (status == MILD_OK) {
-        status = batch_copy(bench->device, wrench, c->output.wrench,
-                            count * 6 * (size_t)feet * sizeof *wrench, error);
+        status = device_copy(bench->device, wrench, c->output.wrench,
+                             count * 6 * (size_t)feet * sizeof *wrench, error);
     }
     if (status == MILD_OK) {
         status =
-            batch_copy(bench->device, steps, c->output.iterations, count * sizeof *steps, error);
+            device_copy(bench->device, steps, c->output.iterations, count * sizeof *steps, error);
     }
     *iterations = 0.0;
     for (size_t p = 0; status == MILD_OK && p < count; p++) {

@@ -7,6 +7,7 @@
 #include "bench/bench.h"
 #include "bench/record.h"
 #include "control/controller.h"
+#include "device/device.h"
 #include "train/envs.h"
 
 enum { DEVICE_EPISODES = 1000, HOST_EPISODES = 40 };
@@ -41,11 +42,11 @@ static MildStatus open_arrays(Side *side, const PolicyDef *p, MildError *error) 
     MildStatus status = MILD_OK;
     for (size_t i = 0; i < sizeof floats / sizeof *floats; i++) {
         const size_t size = n * (size_t)floats[i].width * sizeof(float);
-        *floats[i].at = status == MILD_OK ? batch_alloc(side->device, size, error) : NULL;
+        *floats[i].at = status == MILD_OK ? device_alloc(side->device, size, error) : NULL;
         status = *floats[i].at ? MILD_OK : error->status;
     }
     for (int i = 0; i < 3; i++) {
-        *bytes[i] = status == MILD_OK ? batch_alloc(side->device, n, error) : NULL;
+        *bytes[i] = status == MILD_OK ? device_alloc(side->device, n, error) : NULL;
         status = *bytes[i] ? MILD_OK : error->status;
     }
     call->action = side->device_action;
@@ -71,7 +72,7 @@ static void close_side(Side *side) {
     void *const here[] = {side->history, side->action,  side->reward,
                           side->done,    side->returns, side->steps};
     for (size_t i = 0; i < sizeof there / sizeof *there; i++) {
-        batch_free(side->device, there[i]);
+        device_free(side->device, there[i]);
     }
     for (size_t i = 0; i < sizeof here / sizeof *here; i++) {
         free(here[i]);
@@ -110,17 +111,17 @@ static MildStatus step(Side *side, const Controller *controller, const PolicyDef
                 {side->done, side->call.done, n},
                 {side->timeout, side->call.timeout, n}};
     MildStatus status =
-        batch_copy(side->device, side->history, side->call.next.history, history * size, error);
+        device_copy(side->device, side->history, side->call.next.history, history * size, error);
     if (status == MILD_OK) {
         controller->act_on(controller->self, side->count, side->history, side->action);
-        status = batch_copy(side->device, side->device_action, side->action,
+        status = device_copy(side->device, side->device_action, side->action,
                             n * (size_t)p->actions * size, error);
     }
     if (status == MILD_OK) {
         status = envs_step(side->envs.envs, &side->call, NULL, error);
     }
     for (int i = 0; i < 3 && status == MILD_OK; i++) {
-        status = batch_copy(side->device, back[i].to, back[i].from, back[i].bytes, error);
+        status = device_copy(side->device, back[i].to, back[i].from, back[i].bytes, error);
     }
     *lasting = take_step(side);
     return status;

@@ -6,6 +6,7 @@
 #include "bench/record.h"
 #include "control/controller.h"
 #include "crowd/envs.h"
+#include "device/device.h"
 
 /* Rows of the environments, in the memory of the device. */
 typedef struct {
@@ -29,10 +30,10 @@ static MildStatus rows_open(Rows *rows, const ExperimentDef *def, int device, Mi
     rows->device = device;
     int good = 1;
     for (size_t i = 0; good && i < sizeof all / sizeof *all; i++) {
-        *all[i].at = batch_alloc(device, envs * (size_t)all[i].width * sizeof(float), error);
+        *all[i].at = device_alloc(device, envs * (size_t)all[i].width * sizeof(float), error);
         good = *all[i].at != NULL;
     }
-    rows->flags = good ? batch_alloc(device, 3 * envs, error) : NULL;
+    rows->flags = good ? device_alloc(device, 3 * envs, error) : NULL;
     return rows->flags ? MILD_OK : MILD_ERROR_MEMORY;
 }
 
@@ -40,7 +41,7 @@ static void rows_close(Rows *rows) {
     void *const all[] = {rows->history, rows->critic, rows->estimate, rows->frame,
                          rows->action,  rows->reward, rows->flags};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
-        batch_free(rows->device, all[i]);
+        device_free(rows->device, all[i]);
     }
 }
 
@@ -134,12 +135,12 @@ static MildStatus write_script(Envs *envs, const Rows *rows, const ExperimentDef
     const size_t count = (size_t)def->train.envs, actions = count * (size_t)p->actions;
     MildStatus status = envs_reset(envs, &view, NULL, error);
     for (int t = 0; t < warm_steps(rows) + timed_steps(rows) && status == MILD_OK; t++) {
-        status = batch_copy(rows->device, walker->history, rows->history,
+        status = device_copy(rows->device, walker->history, rows->history,
                             count * (size_t)(p->frames * p->observation) * sizeof(float), error);
         if (status == MILD_OK) {
             controller->act_on(controller->self, def->train.envs, walker->history, walker->action);
-            status = batch_copy(rows->device, script + (size_t)t * actions, walker->action,
-                                actions * sizeof(float), error);
+            status = device_copy(rows->device, script + (size_t)t * actions, walker->action,
+                                 actions * sizeof(float), error);
         }
         status = status == MILD_OK ? step(envs, rows, def, script, t, error) : status;
     }
@@ -183,7 +184,7 @@ static MildStatus walk_twice(const EnvsDef *of, const ExperimentDef *def, const 
                              const Controller *controller, BenchReport *report, MildError *error) {
     const int steps = warm_steps(rows) + timed_steps(rows);
     const size_t numbers = (size_t)steps * (size_t)def->train.envs * (size_t)def->policy.actions;
-    float *script = batch_alloc(rows->device, numbers * sizeof *script, error);
+    float *script = device_alloc(rows->device, numbers * sizeof *script, error);
     EnvsStats recorded = {0};
     Envs *envs = script ? envs_create(of, error) : NULL;
     MildStatus status =
@@ -194,7 +195,7 @@ static MildStatus walk_twice(const EnvsDef *of, const ExperimentDef *def, const 
         status = envs ? walk(envs, def, rows, script, &recorded, report, error) : error->status;
     }
     envs_destroy(envs);
-    batch_free(rows->device, script);
+    device_free(rows->device, script);
     return status;
 }
 

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "crowd/text.h"
+#include "device/device.h"
 #include "engine/read.h"
 
 _Static_assert(CROWD_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fills");
@@ -95,7 +96,7 @@ static MildStatus open_ground(Crowd *crowd, const EnvsDef *def, const TaskGround
 /* Memory of the device, counted. */
 static void *take(Crowd *crowd, size_t bytes, MildError *error) {
     crowd->bytes += bytes;
-    return batch_alloc(crowd->device, bytes, error);
+    return device_alloc(crowd->device, bytes, error);
 }
 
 static int labels_of(const TaskDef *task) {
@@ -154,7 +155,7 @@ static MildStatus copy_trials(Crowd *crowd, const EnvsDef *def, MildError *error
     EnvsTrial *trial = (void *)((char *)crowd->trials + commands);
     all->command = crowd->trials;
     all->trial = trial;
-    return batch_copy(crowd->device, trial, def->trial, envs * sizeof *trial, error);
+    return device_copy(crowd->device, trial, def->trial, envs * sizeof *trial, error);
 }
 
 /* What is drawn of the grounds. */
@@ -170,7 +171,7 @@ static MildStatus copy_grounds(Crowd *crowd, const EnvsDef *def, const TaskGroun
         task_ground_numbers(def->robot, &grounds->ground[i].material, made[i].numbers);
     }
     crowd->drawn = take(crowd, bytes, error);
-    MildStatus status = crowd->drawn ? batch_copy(crowd->device, crowd->drawn, made, bytes, error)
+    MildStatus status = crowd->drawn ? device_copy(crowd->device, crowd->drawn, made, bytes, error)
                                      : MILD_ERROR_MEMORY;
     free(made);
     return status;
@@ -196,7 +197,7 @@ static MildStatus copy_task(Crowd *crowd, const EnvsDef *def, const TaskGrounds 
     MildStatus status = task_gains(def->task, def->robot, task.gains.kp, task.gains.kd, error);
     CrowdTask *at = status == MILD_OK ? take(crowd, sizeof *at, error) : NULL;
     crowd->arrays.task = at;
-    return at ? batch_copy(crowd->device, at, &task, sizeof task, error) : MILD_ERROR_MEMORY;
+    return at ? device_copy(crowd->device, at, &task, sizeof task, error) : MILD_ERROR_MEMORY;
 }
 
 /* The first that fit; NULL if none do. */
@@ -237,7 +238,7 @@ static MildStatus copy_model(Crowd *crowd, const EnvsDef *def, MildError *error)
     crowd->arrays.model = at;
     if (at) {
         crowd_model_fill(&tree, number, model);
-        status = batch_copy(crowd->device, at, model, sizeof *model, error);
+        status = device_copy(crowd->device, at, model, sizeof *model, error);
     } else if (status == MILD_OK) {
         status = MILD_ERROR_MEMORY;
     }
@@ -290,11 +291,11 @@ static MildStatus open_crowd(Crowd *crowd, const EnvsDef *def, const TaskGrounds
 static void destroy(Envs *envs) {
     Crowd *crowd = own(envs);
     const CrowdArrays *all = &crowd->arrays;
-    batch_free(crowd->device, crowd->drawn);
-    batch_free(crowd->device, crowd->block);
-    batch_free(crowd->device, crowd->trials);
-    batch_free(crowd->device, (void *)all->task);
-    batch_free(crowd->device, (void *)all->model);
+    device_free(crowd->device, crowd->drawn);
+    device_free(crowd->device, crowd->block);
+    device_free(crowd->device, crowd->trials);
+    device_free(crowd->device, (void *)all->task);
+    device_free(crowd->device, (void *)all->model);
     mild_batch_destroy(crowd->ground);
     device_fork_destroy(crowd->fork);
     free(crowd);
@@ -530,7 +531,7 @@ static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *err
     } else {
         crowd_host_tally(all);
     }
-    MildStatus status = batch_copy(crowd->device, sum, all->tally, sizeof sum, error);
+    MildStatus status = device_copy(crowd->device, sum, all->tally, sizeof sum, error);
     if (status != MILD_OK) {
         return status;
     }
@@ -563,10 +564,10 @@ static MildStatus save_progress(Envs *envs, TaskProgress *kept, MildError *error
     const Crowd *crowd = own(envs);
     const size_t bytes = (size_t)crowd->arrays.envs * sizeof *kept;
     CrowdArrays all = crowd->arrays;
-    all.kept = batch_alloc(crowd->device, bytes, error);
+    all.kept = device_alloc(crowd->device, bytes, error);
     MildStatus status = all.kept ? move_kept(crowd, &all, 0, error) : MILD_ERROR_MEMORY;
-    status = status == MILD_OK ? batch_copy(crowd->device, kept, all.kept, bytes, error) : status;
-    batch_free(crowd->device, all.kept);
+    status = status == MILD_OK ? device_copy(crowd->device, kept, all.kept, bytes, error) : status;
+    device_free(crowd->device, all.kept);
     return status;
 }
 
@@ -574,11 +575,11 @@ static MildStatus load_progress(Envs *envs, const TaskProgress *kept, MildError 
     const Crowd *crowd = own(envs);
     const size_t bytes = (size_t)crowd->arrays.envs * sizeof *kept;
     CrowdArrays all = crowd->arrays;
-    all.kept = batch_alloc(crowd->device, bytes, error);
+    all.kept = device_alloc(crowd->device, bytes, error);
     MildStatus status =
-        all.kept ? batch_copy(crowd->device, all.kept, kept, bytes, error) : MILD_ERROR_MEMORY;
+        all.kept ? device_copy(crowd->device, all.kept, kept, bytes, error) : MILD_ERROR_MEMORY;
     status = status == MILD_OK ? move_kept(crowd, &all, 1, error) : status;
-    batch_free(crowd->device, all.kept);
+    device_free(crowd->device, all.kept);
     return status;
 }
 
@@ -586,8 +587,8 @@ static MildStatus set_commands(Envs *envs, const double *command, MildError *err
     const Crowd *crowd = own(envs);
     const CrowdArrays *all = &crowd->arrays;
     Call call = {all, NULL, 0};
-    MildStatus status = batch_copy(crowd->device, all->command, command,
-                                   3 * (size_t)all->envs * sizeof *command, error);
+    MildStatus status = device_copy(crowd->device, all->command, command,
+                                    3 * (size_t)all->envs * sizeof *command, error);
     if (status == MILD_OK && crowd->device != MILD_BATCH_HOST) {
         return checked(crowd->kernels->tell(all, NULL), error);
     }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "crowd/envs.h"
+#include "device/device.h"
 #include "eval/eval.h"
 #include "task/ground.h"
 
@@ -136,9 +137,9 @@ static MildStatus open_arrays(Batch *b, MildError *error) {
         return mild_fail(error, MILD_ERROR_MEMORY, "evaluation: out of memory for %d trials",
                          b->trials);
     }
-    b->device_block = batch_alloc(b->def->device, b->bytes, error);
+    b->device_block = device_alloc(b->def->device, b->bytes, error);
     if (b->device_block) {
-        b->device_action = batch_alloc(b->def->device, trials * joints * sizeof *b->action, error);
+        b->device_action = device_alloc(b->def->device, trials * joints * sizeof *b->action, error);
     }
     if (!b->device_action) {
         return MILD_ERROR_MEMORY;
@@ -149,8 +150,8 @@ static MildStatus open_arrays(Batch *b, MildError *error) {
 }
 
 static void close_batch(Batch *b) {
-    batch_free(b->def->device, b->device_block);
-    batch_free(b->def->device, b->device_action);
+    device_free(b->def->device, b->device_block);
+    device_free(b->def->device, b->device_action);
     envs_destroy(b->envs);
     free(b->block);
     free(b->action);
@@ -233,7 +234,7 @@ static MildStatus start(Batch *b, MildError *error) {
         status = envs_reset(b->envs, &first, NULL, error);
     }
     return status == MILD_OK
-               ? batch_copy(b->def->device, b->block, b->device_block, b->bytes, error)
+               ? device_copy(b->def->device, b->block, b->device_block, b->bytes, error)
                : status;
 }
 
@@ -248,12 +249,12 @@ static MildStatus step(Batch *b, MildError *error) {
                            .valid = at->valid,
                            .next = {.history = at->history}};
     def->controller->act_on(def->controller->self, b->trials, b->host.history, b->action);
-    MildStatus status = batch_copy(def->device, b->device_action, b->action, bytes, error);
+    MildStatus status = device_copy(def->device, b->device_action, b->action, bytes, error);
     if (status == MILD_OK) {
         status = envs_step(b->envs, &call, NULL, error);
     }
     if (status == MILD_OK) {
-        status = batch_copy(def->device, b->block, b->device_block, b->bytes, error);
+        status = device_copy(def->device, b->block, b->device_block, b->bytes, error);
     }
     if (status == MILD_OK) {
         pool_run(def->pool, b->trials, take_trial, b);

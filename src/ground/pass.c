@@ -28,29 +28,29 @@ ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Moti
     }
 }
 
-/* Picks the loop compiled for the curves and the slope of the ground under the foot. */
+/* Picks the loop compiled for the curves and the slope of the ground under the foot. On level ground
+ * the slopes are 0, so a loop for uneven ground does for both where a second one would gain little. */
 static void foot_normals(const FootScratch *foot, double dt, const Motion *motion) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
-    if (foot->uneven) {
-        switch (law_variant(foot->curves)) {
-        case LAW_LINE: foot_normal(s, end, dt, motion, 1, LAW_LINE, 0); return;
-        case LAW_CONE: foot_normal(s, end, dt, motion, 1, LAW_CONE, 1); return;
-        default: foot_normal(s, end, dt, motion, 1, LAW_ALL, 1); return;
-        }
-    }
     switch (law_variant(foot->curves)) {
-    case LAW_LINE: foot_normal(s, end, dt, motion, 0, LAW_LINE, 0); return;
+    case LAW_LINE:
+        if (foot->uneven) {
+            foot_normal(s, end, dt, motion, 1, LAW_LINE, 0);
+        } else {
+            foot_normal(s, end, dt, motion, 0, LAW_LINE, 0);
+        }
+        return;
     case LAW_CONE:
-        if (foot->stops) {
-            foot_normal(s, end, dt, motion, 0, LAW_CONE, 1);
+        if (foot->uneven || foot->stops) {
+            foot_normal(s, end, dt, motion, 1, LAW_CONE, 1);
         } else {
             foot_normal(s, end, dt, motion, 0, LAW_CONE, 0);
         }
         return;
-    case LAW_POWER: foot_normal(s, end, dt, motion, 0, LAW_POWER, 0); return;
-    case LAW_ELASTIC: foot_normal(s, end, dt, motion, 0, LAW_ELASTIC, 0); return;
-    default: foot_normal(s, end, dt, motion, 0, LAW_ALL, 1); return;
+    case LAW_POWER: foot_normal(s, end, dt, motion, 1, LAW_POWER, 0); return;
+    case LAW_ELASTIC: foot_normal(s, end, dt, motion, 1, LAW_ELASTIC, 0); return;
+    default: foot_normal(s, end, dt, motion, 1, LAW_ALL, 1); return;
     }
 }
 
@@ -135,7 +135,20 @@ static inline void cross_add(const double *p, const double *I, double *torque) {
     torque[2] += p[0] * I[1] - p[1] * I[0];
 }
 
-ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, int first, int held) {
+/* Picks the loop compiled for the ground under the foot. Reversals and held bounds are seldom: one
+ * loop does for both. */
+static void foot_frictions(const FootScratch *foot, const Motion *motion, int held,
+                           double sums[9]) {
+    if (held || foot->turned) {
+        foot_friction(&foot->slot, foot_end(foot), motion, 1, held, 1, sums);
+    } else if (foot->uneven) {
+        foot_friction(&foot->slot, foot_end(foot), motion, 1, 0, 0, sums);
+    } else {
+        foot_friction(&foot->slot, foot_end(foot), motion, 0, 0, 0, sums);
+    }
+}
+
+static void pass(MildScratch *scratch, double dt, const double *twist, int first, int held) {
     for (int f = 0; f < scratch->feet; f++) {
         const FootScratch *foot = &scratch->foot[f];
         if (foot->active == 0) {
@@ -145,13 +158,7 @@ ALWAYS_INLINE void pass(MildScratch *scratch, double dt, const double *twist, in
         double *wrench = scratch->wrench + 6 * f;
         const Motion motion = foot_motion(foot, twist + (6 * f - first));
         foot_normals(foot, dt, &motion);
-        if (foot->turned) {
-            foot_friction(&foot->slot, foot_end(foot), &motion, 1, held, 1, sums);
-        } else if (foot->uneven) {
-            foot_friction(&foot->slot, foot_end(foot), &motion, 1, held, 0, sums);
-        } else {
-            foot_friction(&foot->slot, foot_end(foot), &motion, 0, held, 0, sums);
-        }
+        foot_frictions(foot, &motion, held, sums);
         /* sum of B^T I = (sum I, sum p x I), p = arm0 + x arm1 + y arm2 */
         memcpy(wrench, sums, 3 * sizeof *sums);
         memset(wrench + 3, 0, 3 * sizeof *wrench);

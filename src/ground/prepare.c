@@ -10,8 +10,8 @@
 #include "ground/terrain.h"
 
 ALWAYS_INLINE void slot_begin(const Slots *s, int i, double dt, double rate, const Motion *motion,
-                              int curves, int uneven) {
-    const SlotVelocity v = slot_velocity(s, i, motion, uneven);
+                              int curves) {
+    const SlotVelocity v = slot_velocity(s, i, motion, 1); /* on level ground the slopes are 0 */
     const ElementMemory memory = slot_memory(s, i);
     Element element = slot_element(s, i);
     element_begin(&element, &memory, curves, dt, rate, v.descent);
@@ -19,34 +19,27 @@ ALWAYS_INLINE void slot_begin(const Slots *s, int i, double dt, double rate, con
 }
 
 /* Calls element_begin for all slots. */
-ALWAYS_INLINE void slots_begin(const Slots *slot, int end, double dt, const Motion *now, int curves,
-                               int uneven) {
+ALWAYS_INLINE void slots_begin(const Slots *slot, int end, double dt, const Motion *now,
+                               int curves) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
 #pragma omp simd
     for (int i = 0; i < end; i++) {
-        slot_begin(s, i, dt, rate, &motion, curves, uneven);
+        slot_begin(s, i, dt, rate, &motion, curves);
     }
 }
 
-/* Picks the loop compiled for the curves and the slope of the ground under the foot. */
+/* Picks the loop compiled for the curves of the ground under the foot. */
 static void foot_begin(const FootScratch *foot, double dt, const Motion *now) {
     const Slots *s = &foot->slot;
     const int end = foot_end(foot);
-    if (foot->uneven) {
-        switch (law_variant(foot->curves)) {
-        case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE, 1); return;
-        case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 1); return;
-        default: slots_begin(s, end, dt, now, LAW_ALL, 1); return;
-        }
-    }
     switch (law_variant(foot->curves)) {
-    case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE, 0); return;
-    case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE, 0); return;
-    case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER, 0); return;
-    case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC, 0); return;
-    default: slots_begin(s, end, dt, now, LAW_ALL, 0); return;
+    case LAW_LINE: slots_begin(s, end, dt, now, LAW_LINE); return;
+    case LAW_CONE: slots_begin(s, end, dt, now, LAW_CONE); return;
+    case LAW_POWER: slots_begin(s, end, dt, now, LAW_POWER); return;
+    case LAW_ELASTIC: slots_begin(s, end, dt, now, LAW_ELASTIC); return;
+    default: slots_begin(s, end, dt, now, LAW_ALL); return;
     }
 }
 

@@ -36,16 +36,16 @@ ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, co
     slot_store(s, i, &element);
 }
 
-/* The same for slots start .. end - 1. */
-ALWAYS_INLINE void slots_resist(const Slots *slot, int start, int end, double dt, const Plate *sole,
-                                const Motion *now, int in_space, int curves) {
+/* The same for all slots of a foot on this theory alone. */
+ALWAYS_INLINE void slots_resist(const Slots *slot, int end, double dt, const Plate *sole,
+                                const Motion *now, int in_space) {
     const Slots local = *slot, *s = &local;
     const Plate plate = *sole;
     const Motion motion = *now;
     const double rate = 1.0 / dt;
 #pragma omp simd
-    for (int i = start; i < end; i++) {
-        slot_resist(s, i, dt, rate, &plate, &motion, in_space, curves);
+    for (int i = 0; i < end; i++) {
+        slot_resist(s, i, dt, rate, &plate, &motion, in_space, LAW_LINE);
     }
 }
 
@@ -58,15 +58,10 @@ static int terrain_only(const MildTerrain *terrain, int model) {
     return only;
 }
 
-/* The foot's slots on `model`. in_space: bool, a constant. */
-ALWAYS_INLINE void foot_resist(const FootScratch *foot, const MildTerrain *terrain, int model,
-                               double dt, const double *rotation, const Motion *now, int in_space) {
+/* The foot's slots on `model`, among slots on others. in_space: bool. */
+static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain, int model,
+                             double dt, const Plate *plate, const Motion *now, int in_space) {
     const Slots *s = &foot->slot;
-    const Plate plate = plate_of(rotation);
-    if (terrain_only(terrain, model)) {
-        slots_resist(s, 0, foot->active, dt, &plate, now, in_space, LAW_LINE);
-        return;
-    }
     for (int i = 0; i < foot->active; i++) {
         if (terrain->materials[foot->slot_material[i] & 0xff].model != model) {
             continue; /* the nearer material decides */
@@ -74,7 +69,18 @@ ALWAYS_INLINE void foot_resist(const FootScratch *foot, const MildTerrain *terra
         if (s->flat_stiffness[i] != 0.0 || s->power_force[i] != 0.0) {
             continue; /* blended with another curve: stays a level plate */
         }
-        slots_resist(s, i, i + 1, dt, &plate, now, in_space, foot->curves);
+        slot_resist(s, i, dt, 1.0 / dt, plate, now, in_space, foot->curves);
+    }
+}
+
+/* The foot's slots on `model`. in_space: bool, a constant. The padding has no strength. */
+ALWAYS_INLINE void foot_resist(const FootScratch *foot, const MildTerrain *terrain, int model,
+                               double dt, const double *rotation, const Motion *now, int in_space) {
+    const Plate plate = plate_of(rotation);
+    if (terrain_only(terrain, model)) {
+        slots_resist(&foot->slot, foot_end(foot), dt, &plate, now, in_space);
+    } else {
+        foot_resist_some(foot, terrain, model, dt, &plate, now, in_space);
     }
 }
 

@@ -62,11 +62,16 @@ static void element_inverse_mass(const Sweep *sweep, int f, const double *p, dou
     }
 }
 
+/* Normal impulse of one slot at the downward speed w. */
+static Impulse slot_impulse(const Slots *s, int i, int curves, double dt, double w) {
+    const Element element = slot_element(s, i);
+    return element_impulse(&element, curves, 1, dt, w);
+}
+
 /* Implicit normal impulse: one Newton step on I - I(w). An impulse dI slows the element by G_zz
  * dI. */
 static double element_normal(const Slots *s, int i, int curves, double dt, double w, double G) {
-    const Element element = slot_element(s, i);
-    const Impulse target = element_impulse(&element, curves, 1, dt, w);
+    const Impulse target = slot_impulse(s, i, curves, dt, w);
     return fmax(s->iz[i] + (target.value - s->iz[i]) / (1.0 + G * target.slope), 0.0);
 }
 
@@ -148,11 +153,10 @@ static void sweep_start(Sweep *sweep, MildScratch *scratch, const MildContactInp
         const Motion motion = foot_motion(foot, input->velocity[f]);
         for (int i = 0; i < foot_end(foot); i++) { /* clears the padding too */
             double p[3];
-            const Element element = slot_element(s, i);
             const SlotVelocity v = slot_velocity(s, i, &motion, 1);
             slot_arm(foot, s, i, p);
             s->fx[i] = s->fy[i] = 0.0;
-            s->iz[i] = element_impulse(&element, foot->curves, 1, input->dt, v.descent).value;
+            s->iz[i] = slot_impulse(s, i, foot->curves, input->dt, v.descent).value;
             s->ix[i] = -s->slope_x[i] * s->iz[i];
             s->iy[i] = -s->slope_y[i] * s->iz[i];
             sweep_apply(sweep, f, p, (const double[3]){s->ix[i], s->iy[i], s->iz[i]});

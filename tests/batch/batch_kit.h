@@ -3,6 +3,7 @@
 #define BATCH_KIT_H
 
 #include "batch/batch.h"
+#include "device/device.h"
 #include "ground/ground_kit.h"
 
 /* Bool, said when it is not there. */

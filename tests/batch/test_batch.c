@@ -1,6 +1,7 @@
 /* mild/batch.h on the CPU and, where there is one, on a GPU: against mild/ground.h, against each
  * other, and what it refuses. */
 #include "batch_kit.h"
+#include "device/device.h"
 #include "ground/map_kit.h"
 #include "ground/state.h"
 

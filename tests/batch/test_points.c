@@ -2,6 +2,7 @@
  * the CPU and, where there is one, on a GPU. Against mild_ground_solve, against the version for all
  * feet, in the air, and with few Newton steps. */
 #include "batch_kit.h"
+#include "device/device.h"
 #include "ground/map_kit.h"
 #include "points_kit.h"
 
@@ -138,18 +139,18 @@ static void side_open(Side *side, const Walk *walk, MildSole *sole, const MildMa
         fail_msg("%s", error.text);
     }
     assert_int_equal(mild_batch_stride(side->batch), ELEMENTS);
-    side->arrays = batch_alloc(device, sizeof(Arrays), &error);
+    side->arrays = device_alloc(device, sizeof(Arrays), &error);
     assert_non_null(side->arrays);
 }
 
 static void side_close(Side *side) {
-    batch_free(side->batch->device, side->arrays);
+    device_free(side->batch->device, side->arrays);
     mild_batch_destroy(side->batch);
 }
 
 static void side_copy(const Side *side, void *to, const void *from, size_t bytes) {
     MildError error = {0};
-    assert_int_equal(batch_copy(side->batch->device, to, from, bytes, &error), MILD_OK);
+    assert_int_equal(device_copy(side->batch->device, to, from, bytes, &error), MILD_OK);
 }
 
 /* Poisons the results, steps, and fetches all. over: bool, wrenches and twists go over the input,

@@ -17,6 +17,7 @@
 #include "crowd/backend.h"
 #include "episode.h"
 #include "sa01.h"
+#include "device/device.h"
 #include "task/ground.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
@@ -83,14 +84,14 @@ static void pair_open(const char *robot, const TaskDef *def, int device) {
     of.device = device;
     of.grounds = GROUNDS;
     pair.batch = envs_create(&of, &error);
-    pair.on_side = pair.batch ? batch_alloc(device, sizeof(Rows), &error) : NULL;
+    pair.on_side = pair.batch ? device_alloc(device, sizeof(Rows), &error) : NULL;
     if (!pair.on_side) {
         fail_msg("%s", error.text);
     }
 }
 
 static void pair_close(void) {
-    batch_free(pair.device, pair.on_side);
+    device_free(pair.device, pair.on_side);
     envs_destroy(pair.batch);
     envs_destroy(pair.mujoco);
     task_grounds_destroy(pair.grounds);
@@ -105,8 +106,8 @@ static EnvsView view_of(Rows *rows) {
 /* The batch engine's rows to b, once the device has them. */
 static void fetch(void) {
     MildError error = {0};
-    assert_true(pair.device == MILD_BATCH_HOST || device_wait(pair.device, &error) == MILD_OK);
-    assert_int_equal(batch_copy(pair.device, &pair.b, pair.on_side, sizeof pair.b, &error),
+    assert_true(device_wait(pair.device, &error) == MILD_OK);
+    assert_int_equal(device_copy(pair.device, &pair.b, pair.on_side, sizeof pair.b, &error),
                      MILD_OK);
 }
 
@@ -135,7 +136,7 @@ static void pair_step(void) {
     const EnvsStep a = step_of(&pair.a), b = step_of(s);
     envs_step(pair.mujoco, &a, NULL, &error);
     assert_int_equal(
-        batch_copy(pair.device, s->action, pair.a.action, sizeof pair.a.action, &error), MILD_OK);
+        device_copy(pair.device, s->action, pair.a.action, sizeof pair.a.action, &error), MILD_OK);
     if (envs_step(pair.batch, &b, NULL, &error) != MILD_OK) {
         fail_msg("%s", error.text);
     }

@@ -2,6 +2,7 @@
  * same observations and rewards. By the same text on the CPU; with MILD_CUDA on the device too. */
 #include "follow.h"
 
+#include "device/device.h"
 #include "mild/batch.h"
 
 static int has_device(void) {

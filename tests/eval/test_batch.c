@@ -3,6 +3,7 @@
 #include "eval_kit.h"
 
 #include "batch/batch.h"
+#include "device/device.h"
 
 enum { ROWS = 4 };
 

@@ -23,15 +23,40 @@ lib=$(dirname "$(find prefix -name libmild.so)")
 export PKG_CONFIG_PATH="$work/$lib/pkgconfig"
 [ -f "$lib/libmild.a" ] || fail "no static library"
 
-# Only the interface is visible.
-foreign=$(nm -D --defined-only "$lib/libmild.so" | awk '$3 !~ /^mild_/ { print $3 }')
-[ -z "$foreign" ] || fail "libmild.so exports $foreign"
-foreign=$(nm -g --defined-only "$lib/libmild.a" | awk 'NF == 3 && $3 !~ /^mild_/ { print $3 }')
-[ -z "$foreign" ] || fail "libmild.a exports $foreign"
-for library in so a; do
-    nm -g --defined-only "$lib/libmild.$library" | awk '$3 ~ /^mild_/ { print $3 }' | sort >"$library.names"
+# names FILE: what it exports.
+names() {
+    nm -g --defined-only $([[ $1 != *.so ]] || echo -D) "$1" | awk 'NF == 3 { print $3 }' | sort -u
+}
+# Only the interface is visible, and of an archive's members what carries the library's name.
+for library in mild mild_batch; do
+    for file in "$lib/lib$library.so" "$lib/lib$library.a"; do
+        foreign=$(names "$file" | grep -v '^mild_' || true)
+        [ -z "$foreign" ] || fail "$file exports $foreign"
+        names "$file" | grep -v '^mild_\(batch_\)\?inside_' >"${file##*.}.names"
+    done
+    cmp so.names a.names || fail "lib$library.so and lib$library.a export different functions"
 done
-cmp so.names a.names || fail "libmild.so and libmild.a export different functions"
+# The ground is a library of its own: no batch in it, nothing but libc and libm behind it.
+batch=$(names "$lib/libmild.so" | grep '^mild_batch' || true)
+[ -z "$batch" ] || fail "libmild.so exports $batch"
+foreign=$(names "$lib/libmild_batch.so" | grep -v '^mild_batch_' || true)
+[ -z "$foreign" ] || fail "libmild_batch.so exports $foreign"
+foreign=$(readelf -d "$lib/libmild.so" | sed -n 's/.*NEEDED.*\[\(.*\)\]/\1/p' | grep -vE '^lib[cm]\.so|^ld-linux' || true)
+[ -z "$foreign" ] || fail "libmild.so needs $foreign"
+# A static link takes what it calls.
+cat >material.c <<'END'
+#include <mild/ground.h>
+int main(void) {
+    MildError error = {0};
+    const MildMaterial sand = mild_material_default();
+    return mild_material_check(&sand, &error) != MILD_OK;
+}
+END
+"$cc" "${flags[@]}" material.c -Iprefix/include "$lib/libmild.a" -lm -o material
+./material || fail "the default material"
+size=$(size material | awk 'NR == 2 { print $1 }')
+echo "a program that checks a material has $size B of code; at most 40000"
+[ "$size" -le 40000 ] || fail "a static link takes more than it calls"
 
 # Every header compiles alone, in C and in C++, and C++ finds the functions.
 for header in prefix/include/mild/*.h; do
@@ -70,6 +95,50 @@ for program in "${programs[@]}"; do
     ./static | cmp - "$program.txt" || fail "$program with the static library"
     ! grep -qiE 'nan|inf' "$program.txt" || fail "$program: $(cat "$program.txt")"
 done
+
+# The batch, beside the ground: by pkg-config, by CMake and statically.
+cat >batch.c <<'END'
+#include <mild/batch.h>
+#include <stdio.h>
+int main(void) {
+    MildError error = {0};
+    static const double outline[] = {-0.1, -0.05, 0.1, -0.05, 0.1, 0.05, -0.1, 0.05};
+    const MildSoleDef plate = {.outline = outline, .points = 4, .pitch = 0.02};
+    MildSole *sole = mild_sole_create(&plate, &error);
+    const MildSole *soles[] = {sole};
+    const MildBatchDef def = {
+        .robots = 2, .feet = 1, .soles = soles, .dt = 0.002, .device = MILD_BATCH_HOST};
+    MildBatch *batch = sole ? mild_batch_create(&def, &error) : NULL;
+    if (!batch) {
+        fprintf(stderr, "%s\n", error.text);
+        return 1;
+    }
+    printf("%zu B a robot\n", mild_batch_robot_bytes(batch));
+    mild_batch_destroy(batch);
+    mild_sole_destroy(sole);
+    return 0;
+}
+END
+mkdir batch
+cat >batch/CMakeLists.txt <<'END'
+cmake_minimum_required(VERSION 3.20)
+project(batch LANGUAGES C)
+find_package(mild 0.1 REQUIRED)
+add_executable(batch ../batch.c)
+target_link_libraries(batch PRIVATE mild::batch)
+END
+{ cmake -S batch -B batch/build -DCMAKE_C_COMPILER="$cc" -DCMAKE_PREFIX_PATH="$work/prefix" &&
+    cmake --build batch/build; } >cmake.log 2>&1 || fail "mild::batch: $(cat cmake.log)"
+batch/build/batch >batch.txt || fail "mild::batch exits $?"
+if command -v pkg-config >/dev/null; then
+    read -ra found < <(pkg-config --cflags --libs mild-batch)
+    "$cc" "${flags[@]}" batch.c "${found[@]}" -lm -o shared || fail "pkg-config mild-batch"
+    LD_LIBRARY_PATH="$work/$lib" ./shared | cmp - batch.txt || fail "pkg-config mild-batch"
+fi
+if ! grep -q cudart "$lib"/cmake/mild/*.cmake; then # CUDA's runtime has more to link
+    "$cc" "${flags[@]}" batch.c -Iprefix/include "$lib/libmild_batch.a" "$lib/libmild.a" -lm -o static
+    ./static | cmp - batch.txt || fail "the static batch"
+fi
 
 # check PROGRAM WHAT AWK: the awk program exits 0 when the table is plausible.
 check() {

@@ -1,48 +1,19 @@
-/* Steps on level ground, and the memory and the streams of a GPU. */
-#define CONTACT_MAP 0
-#define DEVICE_STEP device_step_level
-#include "batch/device.inc"
+/* Memory and streams of a GPU. */
+#include <stdlib.h>
 
-extern "C" MildStatus device_step(const MildBatch *batch, const MildBatchInput *input,
-                                  const MildBatchOutput *output, int advance, void *stream,
-                                  MildError *error) {
-    return batch->shape.map ? device_step_map(batch, input, output, advance, stream, error)
-                            : device_step_level(batch, input, output, advance, stream, error);
+extern "C" {
+#include "device/device.h"
+#include "device/gpu.h"
 }
 
-/* ---- memory ---- */
+#include "device/cuda.h"
 
-extern "C" MildStatus device_wait(int device, MildError *error) {
-    OnDevice on(device);
-    return checked(cudaDeviceSynchronize(), "step", error);
-}
-
-__global__ void device_forget(BatchShape shape, BatchArrays arrays, const uint8_t *which) {
-    const long robot = blockIdx.x;
-    if (which && !which[robot]) {
-        return;
-    }
-    Real *memory = batch_memory(&shape, &arrays, robot);
-    const int numbers = contact_memory_numbers(shape.groups * shape.stride, shape.map);
-    for (int i = (int)threadIdx.x; i < numbers; i += (int)blockDim.x) {
-        memory[i] = 0;
-    }
-}
-
-extern "C" MildStatus device_reset(const MildBatch *batch, const uint8_t *which, void *stream,
-                                   MildError *error) {
-    OnDevice on(batch->device);
-    device_forget<<<batch->shape.robots, 256, 0, (cudaStream_t)stream>>>(batch->shape,
-                                                                         batch->arrays, which);
-    return checked(cudaGetLastError(), "reset", error);
-}
-
-extern "C" MildStatus device_open(int device, MildError *error) {
+extern "C" MildStatus gpu_open(int device, MildError *error) {
     int count = 0;
     const cudaError_t status = cudaGetDeviceCount(&count);
     if (status != cudaSuccess || device >= count) {
         return mild_fail(error, MILD_ERROR_ARGUMENT,
-                         "batch: device %d is not there (%d found, %s); use MILD_BATCH_HOST for "
+                         "device %d is not there (%d found, %s); use MILD_BATCH_HOST for "
                          "the CPU",
                          device, count, cudaGetErrorString(status));
     }
@@ -50,7 +21,7 @@ extern "C" MildStatus device_open(int device, MildError *error) {
     return checked(on.status, "device", error);
 }
 
-extern "C" void *device_alloc(int device, size_t bytes, MildError *error) {
+extern "C" void *gpu_alloc(int device, size_t bytes, MildError *error) {
     void *memory = NULL;
     size_t free_bytes = 0, all = 0;
     OnDevice on(device);
@@ -58,7 +29,7 @@ extern "C" void *device_alloc(int device, size_t bytes, MildError *error) {
     if (cudaMalloc(&memory, bytes) != cudaSuccess) {
         cudaGetLastError(); /* it is told here */
         mild_fail(error, MILD_ERROR_MEMORY,
-                  "batch: out of memory on device %d: %zu MiB are needed, %zu MiB are free; take "
+                  "out of memory on device %d: %zu MiB are needed, %zu MiB are free; take "
                   "fewer robots",
                   device, bytes >> 20, free_bytes >> 20);
         return NULL;
@@ -70,15 +41,15 @@ extern "C" void *device_alloc(int device, size_t bytes, MildError *error) {
     return memory;
 }
 
-extern "C" void device_free(int device, void *memory) {
+extern "C" void gpu_free(int device, void *memory) {
     if (memory) {
         OnDevice on(device);
         cudaFree(memory);
     }
 }
 
-extern "C" MildStatus device_copy(int device, void *to, const void *from, size_t bytes,
-                                  MildError *error) {
+extern "C" MildStatus gpu_copy(int device, void *to, const void *from, size_t bytes,
+                               MildError *error) {
     OnDevice on(device);
     return checked(cudaMemcpy(to, from, bytes, cudaMemcpyDefault), "copy", error);
 }
@@ -157,4 +128,9 @@ extern "C" MildStatus device_join(DeviceFork *fork, void *stream, MildError *err
         }
     }
     return checked(status, "streams", error);
+}
+
+extern "C" MildStatus gpu_wait(int device, MildError *error) {
+    OnDevice on(device);
+    return checked(cudaDeviceSynchronize(), "wait", error);
 }

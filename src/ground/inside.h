@@ -1,0 +1,28 @@
+/* What libmild_batch calls of the ground beside its public headers. libmild exports these functions
+ * but they are no part of its interface: both libraries are of one version. */
+#ifndef MILD_GROUND_INSIDE_H
+#define MILD_GROUND_INSIDE_H
+
+#include "ground/law.h"
+#include "ground/map_view.h"
+#include "ground/state.h"
+
+/* The law of a material under one element. */
+typedef struct {
+    Law law;
+    double recovery; /* [-] */
+    int curves;      /* LawCurve and LawMotion bits */
+} InsideLaw;
+
+MILD_API_BEGIN
+
+/* pitch: [m] edge of the element. width: [m] shorter side of the sole. */
+InsideLaw mild_inside_law(const MildMaterial *material, double pitch, double width);
+/* See ground_memory. */
+Memory mild_inside_memory(const MildGround *ground, int foot);
+/* See map_view. */
+MapView mild_inside_map(const MildMap *map);
+
+MILD_API_END
+
+#endif
