@@ -2,7 +2,7 @@
 mild_layer(crowd layer_task layer_engine)
 # lanes in loops: nothing gains from -O3 but the time to compile
 # an environment keeps floats, and computes in double where it reads a definition
-set_source_files_properties(crowd/host.c PROPERTIES COMPILE_OPTIONS
+set_source_files_properties(crowd/batch_host.c PROPERTIES COMPILE_OPTIONS
     "-O2;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
 if(MILD_CUDA)
   # The kernels, compiled once for each robot, whose sizes the program `engine_sizes` reads from its folder, and once for
@@ -15,18 +15,18 @@ if(MILD_CUDA)
     add_executable(engine_sizes engine/sizes.c)
     target_link_libraries(engine_sizes PRIVATE layer_engine mild_options)
   endif()
-  add_library(crowd_device STATIC)
+  add_library(envs_device STATIC)
   set(generated ${CMAKE_BINARY_DIR}/generated/crowd)
-  function(crowd_kernels name sizes) # sizes: text that includes those of a robot
+  function(envs_kernels name sizes) # sizes: text that includes those of a robot
     set(file ${generated}/${name}.cu)
     file(CONFIGURE OUTPUT ${file} CONTENT [=[
 @sizes@
-#define CROWD_KERNELS crowd_kernels_@name@
-#include "crowd/device.cu"
+#define ENVS_KERNELS envs_kernels_@name@
+#include "crowd/batch_device.cu"
 ]=] @ONLY)
-    target_sources(crowd_device PRIVATE ${file} ${ARGN})
-    set(crowd_list "${crowd_list} &crowd_kernels_${name}," PARENT_SCOPE)
-    set(crowd_names "${crowd_names}extern const CrowdKernels crowd_kernels_${name};\n" PARENT_SCOPE)
+    target_sources(envs_device PRIVATE ${file} ${ARGN})
+    set(envs_list "${envs_list} &envs_kernels_${name}," PARENT_SCOPE)
+    set(envs_names "${envs_names}extern const EnvsKernels envs_kernels_${name};\n" PARENT_SCOPE)
   endfunction()
   file(GLOB robots CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/robots/*/robot.ini)
   list(TRANSFORM robots REPLACE "/robot.ini$" "")
@@ -41,27 +41,27 @@ if(MILD_CUDA)
     endif()
     get_filename_component(name ${folder} NAME)
     string(MAKE_C_IDENTIFIER ${name} name)
-    if(crowd_list MATCHES "_kernels_${name}," OR name STREQUAL "any")
+    if(envs_list MATCHES "_kernels_${name}," OR name STREQUAL "any")
       message(FATAL_ERROR "MILD_CUDA_ROBOTS: a second robot has the folder name ${name}; rename ${folder}")
     endif()
     file(GLOB sources CONFIGURE_DEPENDS ${folder}/robot.ini ${folder}/*.xml)
     add_custom_command(OUTPUT ${generated}/${name}.h
       COMMAND ${MILD_ENGINE_SIZES} ${folder} ${generated}/${name}.h DEPENDS ${MILD_ENGINE_SIZES} ${sources} VERBATIM)
-    crowd_kernels(${name} "#include \"${generated}/${name}.h\"" ${generated}/${name}.h)
+    envs_kernels(${name} "#include \"${generated}/${name}.h\"" ${generated}/${name}.h)
   endforeach()
-  crowd_kernels(any "/* sizes: the largest */")
+  envs_kernels(any "/* sizes: the largest */")
   file(CONFIGURE OUTPUT ${generated}/kernels.c CONTENT [=[
 #define MILD_REAL_FLOAT
-#include "crowd/text.h"
+#include "crowd/batch_kernels.h"
 
-@crowd_names@
-const CrowdKernels *const crowd_kernels[] = {@crowd_list@ NULL};
+@envs_names@
+const EnvsKernels *const envs_kernels[] = {@envs_list@ NULL};
 ]=] @ONLY)
-  target_sources(layer_crowd PRIVATE ${generated}/kernels.c)
-  target_include_directories(crowd_device PRIVATE ${CMAKE_BINARY_DIR}/layers/crowd)
-  target_link_libraries(crowd_device PRIVATE layer_task layer_engine)
+  target_sources(layer_env PRIVATE ${generated}/kernels.c)
+  target_include_directories(envs_device PRIVATE ${CMAKE_BINARY_DIR}/layers/crowd)
+  target_link_libraries(envs_device PRIVATE layer_task layer_engine)
   # as the kernels of the layer batch
-  target_compile_options(crowd_device PRIVATE -ftz=true -prec-div=false -prec-sqrt=false)
-  set_target_properties(crowd_device PROPERTIES CUDA_STANDARD 17 POSITION_INDEPENDENT_CODE ON)
-  target_link_libraries(layer_crowd PUBLIC crowd_device CUDA::cudart_static stdc++)
+  target_compile_options(envs_device PRIVATE -ftz=true -prec-div=false -prec-sqrt=false)
+  set_target_properties(envs_device PROPERTIES CUDA_STANDARD 17 POSITION_INDEPENDENT_CODE ON)
+  target_link_libraries(layer_env PUBLIC envs_device CUDA::cudart_static stdc++)
 endif()

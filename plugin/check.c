@@ -68,7 +68,7 @@ static const char *geom_name(const mjModel *m, int geom, char *text, size_t size
 static int standing_on(const mjModel *m, const Foot *foot, char *text, size_t size) {
     char a[80], b[80];
     for (int g = 0; g < m->ngeom; g++) {
-        for (int w = 0; w < m->ngeom && foot_may_meet_floor(m, foot, g); w++) {
+        for (int w = 0; w < m->ngeom && foot_may_touch_floor(m, foot, g); w++) {
             const int floor = m->geom_type[w] == mjGEOM_PLANE || m->geom_type[w] == mjGEOM_HFIELD;
             if (!floor || m->body_weldid[m->geom_bodyid[w]] != 0 || !may_touch(m, g, w)) {
                 continue;

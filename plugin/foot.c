@@ -148,7 +148,7 @@ int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int 
     return m->geom_type[geom] != mjGEOM_MESH || !has_primitive(m, foot->body);
 }
 
-int foot_may_meet_floor(const mjModel *m, const Foot *foot, int geom) {
+int foot_may_touch_floor(const mjModel *m, const Foot *foot, int geom) {
     double arm[3], local[3];
     if (m->geom_bodyid[geom] != foot->body) {
         return 0;

@@ -33,7 +33,7 @@ const char *foot_body_name(const mjModel *m, const Foot *foot);
 /* Bool: the geom is part of the foot's sole. */
 int foot_has_geom(const mjModel *m, const PluginDef *def, const Foot *foot, int geom);
 /* Bool: the geom is on the foot's body and would meet a floor that the sole sinks into. */
-int foot_may_meet_floor(const mjModel *m, const Foot *foot, int geom);
+int foot_may_touch_floor(const mjModel *m, const Foot *foot, int geom);
 
 /* Present place of the foot's frame. */
 void foot_pose(const mjData *d, const Foot *foot, double position[3], double rotation[9]);

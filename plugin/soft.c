@@ -217,7 +217,7 @@ static void twists(const Soft *soft, int nv, const double *velocity, double *twi
 
 /* Pose, Jacobian and twist of the feet. A round foot transmits no moment, so that its angular rows
  * are 0. */
-static void place_feet(Soft *soft, const mjModel *m, const mjData *d) {
+static void update_feet(Soft *soft, const mjModel *m, const mjData *d) {
     const int nv = (int)m->nv;
     double twist[FOOT_ROWS];
     soft->input.feet = soft->feet;
@@ -554,7 +554,7 @@ static void ground_step(Soft *soft, const mjModel *m, mjData *d, const MildGroun
     soft->fresh = 0;
     mju_copy(d->qfrc_passive, soft->passive, (int)m->nv); /* if the stage is evaluated again */
     soft->inside = 1;
-    place_feet(soft, m, d);
+    update_feet(soft, m, d);
     memset(soft->metric.tree, 0, (size_t)m->ntree * sizeof *soft->metric.tree);
     for (int f = 0; f < soft->feet; f++) {
         soft->metric.tree[m->body_treeid[soft->foot[f].body]] = 1;

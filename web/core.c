@@ -1,8 +1,8 @@
-/* A crowd of one robot (crowd/crowd.inc) on the ground of mild/ground.h, whose solver is much
+/* A crowd of one robot (crowd/batch_step.inc) on the ground of mild/ground.h, whose solver is much
  * faster on one processor than the batch's and which remembers prints. */
 #define MILD_REAL_FLOAT
 
-#include "crowd/crowd.inc"
+#include "crowd/batch_step.inc"
 
 #include <stdlib.h>
 
@@ -39,12 +39,12 @@ static struct {
     float *weight;
     float *wide[2]; /* [widest layer] */
     /* the crowd */
-    CrowdTask task;
-    CrowdGround drawn; /* the only ground to draw */
+    EnvsTask task;
+    EnvsGround drawn; /* the only ground to draw */
     EnvsTrial trial;
-    CrowdRobot *robot;
-    CrowdPlace *place;
-    CrowdArrays all;
+    EnvRobot *robot;
+    EnvWork *place;
+    EnvsArrays all;
     EnvsStep call;
     float history[TASK_HISTORY_MAX];
     /* the ground */
@@ -69,7 +69,7 @@ static struct {
 } web;
 
 static TaskEnv *web_env(void) {
-    return crowd_env_at(&web.all, 0);
+    return env_at(&web.all, 0);
 }
 
 /* ---- the policy ---- */
@@ -396,7 +396,7 @@ static void widen(const float *from, int count, double *to) {
 
 /* From the engine's feet to the ground. */
 static void give_feet(void) {
-    const CrowdContact *contact = &web.all.contact;
+    const EnvsContact *contact = &web.all.contact;
     const int feet = web.feet;
     MildContactInput *input = &web.input;
     widen(contact->position, 3 * feet, input->position[0]);
@@ -413,7 +413,7 @@ static void solve_ground(void) {
 
 /* And back, as mild_batch_step. */
 static void take_feet(void) {
-    const CrowdContact *contact = &web.all.contact;
+    const EnvsContact *contact = &web.all.contact;
     for (int f = 0; f < web.feet; f++) {
         const MildFootResult *foot = &web.result.foot[f];
         for (int k = 0; k < 3; k++) {
@@ -442,7 +442,7 @@ static void lift_feet(void) {
 
 int web_move(const float *action, const float command[3]) {
     TaskEnv *env = web_env();
-    const int steps = crowd_physics_steps(&web.task);
+    const int steps = env_physics_steps(&web.task);
     const TaskView view = {.history = web.history};
     memcpy(env->command, command, sizeof env->command);
     web.call.action = action;
@@ -452,7 +452,7 @@ int web_move(const float *action, const float command[3]) {
             solve_ground();
             take_feet();
         }
-        crowd_part(&web.all, &web.call, 0, k, 0, web.place);
+        env_part(&web.all, &web.call, 0, k, 0, web.place);
     }
     const TaskStep step = task_end_step(env, &web.task.task, &web.task.robot, &web.robot->sim,
                                         env->torque, web.robot->diverged);
@@ -496,14 +496,14 @@ static void stand_up(double x, double y, double yaw) {
     memset(env->command, 0, sizeof env->command);
     env->command_frozen = 1;
     web.drawn.depth = mild_sole_sinkage(web.sole[0], material_at(x, y), load);
-    crowd_begin(&web.all, 0);
+    env_begin(&web.all, 0);
     env->step_limit = UINT32_MAX;
     env->robot.qpos[0] = (float)x;
     env->robot.qpos[1] = (float)y;
     env->robot.qpos[3] = (float)cos(0.5 * yaw);
     env->robot.qpos[6] = (float)sin(0.5 * yaw);
-    crowd_pose(&web.all, 0, web.place);
-    crowd_observe(&web.all, &web.call, 0);
+    env_pose(&web.all, 0, web.place);
+    env_observe(&web.all, &web.call, 0);
     web_change(web.stiffness, web.friction);
     lift_feet();
     show_links();
@@ -647,7 +647,7 @@ static int open_policy(const WebModel *file) {
     web.wide[0] = malloc((size_t)wide * sizeof(float));
     web.wide[1] = malloc((size_t)wide * sizeof(float));
     for (int32_t i = 0; i < file->weights && web.weight; i++) {
-        web.weight[i] = place_unpack(half[i]);
+        web.weight[i] = frame_unpack(half[i]);
     }
     return web.weight && web.wide[0] && web.wide[1];
 }
@@ -677,11 +677,11 @@ static int open_soles(const WebModel *file) {
 
 /* The arrays of a crowd of one; all 0. */
 static int open_arrays(void) {
-    CrowdArrays *all = &web.all;
-    CrowdContact *contact = &all->contact;
+    EnvsArrays *all = &web.all;
+    EnvsContact *contact = &all->contact;
     const size_t feet = (size_t)web.feet, labels = MILD_MATERIALS_MAX;
     all->envs = 1;
-    all->stride = crowd_stride(&web.task.task, &web.task.shape);
+    all->stride = env_stride(&web.task.task, &web.task.shape);
     all->env = calloc(1, all->stride);
     all->robot = web.robot = aligned_alloc(16, (sizeof *web.robot + 15) / 16 * 16);
     web.place = aligned_alloc(16, (sizeof *web.place + 15) / 16 * 16);
@@ -740,7 +740,7 @@ const char *web_open(const WebModel *file, size_t bytes) {
     if (wrong) {
         return wrong;
     }
-    CrowdTask *task = &web.task;
+    EnvsTask *task = &web.task;
     close_all();
     memcpy(&task->task, file->task, sizeof file->task);
     task->robot = file->robot;
@@ -758,7 +758,7 @@ const char *web_open(const WebModel *file, size_t bytes) {
     web.all.model = &file->model;
     web.all.trial = &web.trial;
     web.call.next.history = web.history;
-    crowd_create_env(&web.all, 0);
+    env_create(&web.all, 0);
     return NULL;
 }
 

@@ -10,7 +10,7 @@
 
 #include "base/file.h"
 #include "config/experiment_keys.h"
-#include "crowd/text.h"
+#include "crowd/batch_kernels.h"
 #include "engine/read.h"
 #include "learn/network.h"
 #include "learn/policy.h"
@@ -31,7 +31,7 @@ static MildStatus pack_model(const Robot *robot, const TaskDef *task, WebModel *
     static EngineTree tree;
     MildStatus status = engine_model_read(robot, task->physics_dt, &tree, number, error);
     if (status == MILD_OK) {
-        crowd_model_fill(&tree, number, &file->model);
+        envs_model_fill(&tree, number, &file->model);
         robot_fill_table(robot, &file->robot);
         file->shape = task_shape(robot);
         file->gravity = -robot->model->opt.gravity[2];

@@ -107,7 +107,7 @@ static MildStatus run_benches(const CliArgs *args, const char *robot, FILE *file
     char machine[256];
     if (status == MILD_OK) {
         fprintf(file, "%s, mild %s\n", build_machine(machine, sizeof machine), build_version());
-        robots_tell_slow("bench", &def.train, def.train.robot);
+        robots_warn_slow("bench", &def.train, def.train.robot);
     }
     fflush(file);
     for (int i = 0; i < BENCHES && status == MILD_OK; i++) {

@@ -405,7 +405,7 @@ static MildStatus run_eval(Eval *e, const CliArgs *args, MildError *error) {
         status = controller_make(e->controller, &def, &controller, error);
     }
     if (status == MILD_OK) {
-        robots_tell_slow("eval", &e->train, e->robot ? e->robot : e->config_robot);
+        robots_warn_slow("eval", &e->train, e->robot ? e->robot : e->config_robot);
         status = evaluate(e, robot, pool, &controller, error);
     }
     controller_destroy(&controller);

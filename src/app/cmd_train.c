@@ -104,12 +104,12 @@ static void display_take(void *self, int64_t iteration, const TrainReport *r, do
                   text_cell("%.0f", 100 * display->falls, falls), display->bad);
 }
 
-static void tell_resumed(void *self, const char *checkpoint) {
+static void print_resumed(void *self, const char *checkpoint) {
     (void)self;
     printf("resumed %s\n", checkpoint);
 }
 
-static void tell_passed_over(void *self, const char *why) {
+static void print_passed_over(void *self, const char *why) {
     (void)self;
     fprintf(stderr, "mild train: %s; trying the checkpoint before\n", why);
 }
@@ -132,8 +132,8 @@ static MildStatus train(const Command *command, MildError *error) {
                              .version = build_version(),
                              .note = command->note};
     const TrainWatch watch = {.self = &display,
-                              .resumed = tell_resumed,
-                              .passed_over = tell_passed_over,
+                              .resumed = print_resumed,
+                              .passed_over = print_passed_over,
                               .stop = stop,
                               .iterated = display_take};
     if (leads && ranks_count(command->ranks) > 1) {
@@ -176,7 +176,7 @@ static MildStatus prepare(Command *run, const CliArgs *args, MildError *error) {
         status = make_config_text(run, error);
     }
     if (status == MILD_OK) {
-        robots_tell_slow("train", &run->def.train, run->def.train.robot);
+        robots_warn_slow("train", &run->def.train, run->def.train.robot);
     }
     return status;
 }

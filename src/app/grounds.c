@@ -100,7 +100,7 @@ static MildStatus overlay(const GroundsDef *def, MildMaterial *material, MildErr
     }
     if (def->train) {
         sections[count++] =
-            (ConfigSection){"train", train_place_fields, train_place_field_count, def->train};
+            (ConfigSection){"train", train_machine_fields, train_machine_field_count, def->train};
     }
     return config_overrides(sections, count, def->args->overrides, def->args->override_count,
                             error);

@@ -59,7 +59,7 @@ void live_apply(const Live *live, MildTerrain *terrain) {
     terrain->patch_count = live->terrain.patch_count;
 }
 
-const char *live_tell(const Live *live, int material, char *text, size_t size) {
+const char *live_describe(const Live *live, int material, char *text, size_t size) {
     MildMaterial now = live->terrain.materials[material];
     const char *name = stiffness_of(now.model)[0];
     snprintf(text, size, "friction %.2f (F V), %s %.4g (K M)", now.mu, name,

@@ -27,6 +27,6 @@ int live_take(Live *live, int material, const WindowInput *input);
 void live_apply(const Live *live, MildTerrain *terrain);
 
 /* "friction 0.60 (F V), k_pen 380 (K M)"; returns `text`. */
-const char *live_tell(const Live *live, int material, char *text, size_t size);
+const char *live_describe(const Live *live, int material, char *text, size_t size);
 
 #endif

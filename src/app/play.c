@@ -120,7 +120,7 @@ static MildStatus frame(Walk *walk, MildError *error) {
     memcpy(info.command, walk->env->command, sizeof info.command);
     if (play->window) {
         if (!play->scene->rigid) {
-            live_tell(&walk->live, walk->ground, ground, sizeof ground);
+            live_describe(&walk->live, walk->ground, ground, sizeof ground);
         }
         snprintf(note, sizeof note, "%s%s\n%.2f x real time (- =)", ground,
                  play->presets ? ", other ground (1 2 3 ...)" : "", walk->pace.factor);

@@ -40,7 +40,7 @@ MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error) 
     return config_overrides(sections, EXPERIMENT_SECTIONS, &override, 1, error);
 }
 
-void robots_tell_slow(const char *command, const TrainDef *def, const char *robot) {
+void robots_warn_slow(const char *command, const TrainDef *def, const char *robot) {
     MildError unused;
     Robot *is = train_is_batch(def) && train_device(def) >= 0 ? robot_open(robot, &unused) : NULL;
     if (is && envs_are_slow(is)) {

@@ -17,7 +17,7 @@ Robot *robots_open_task(TaskDef *task, const char *config, const char *policy, c
 /* Sets train.robot from --robot. Refuses names that a config file cannot hold, like an override. */
 MildStatus robots_set(ExperimentDef *def, const char *option, MildError *error);
 /* Says on standard error, in one line, that a GPU steps the robot by kernels for any robot. */
-void robots_tell_slow(const char *command, const TrainDef *def, const char *robot);
+void robots_warn_slow(const char *command, const TrainDef *def, const char *robot);
 /* Help on --controller in `text` [ROBOTS_CONTROLLER_HELP], which is returned. */
 #define ROBOTS_CONTROLLER_HELP 800
 const char *robots_controller_help(char *text, size_t size);

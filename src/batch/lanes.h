@@ -1,7 +1,7 @@
 /* One text for a warp of a GPU and for the CPU.
  *
  * LANES lanes work together on one robot. On a GPU they are the threads of a warp; on the CPU one
- * thread does the work of all. A function of this kind is marked LANE_FN and is a sequence of
+ * thread does the work of all. A function of this kind is marked WARP_FN and is a sequence of
  * blocks:
  *
  *     EACH_LANE(l) {
@@ -26,7 +26,7 @@ enum { LANES = 32 };
 
 #ifdef __CUDACC__
 
-#define LANE_FN static __device__ __forceinline__
+#define WARP_FN static __device__ __forceinline__
 #define LANE_COPIES 1
 #define EACH_LANE(l) for (int l = 0; l < 1; l++)
 #define LANE(l) ((int)(threadIdx.x % LANES))
@@ -34,42 +34,42 @@ enum { LANES = 32 };
 #define LANE_ROLLED _Pragma("unroll 1")
 
 /* Makes what each lane wrote to memory visible to the others. */
-LANE_FN void lanes_meet(void) {
+WARP_FN void lanes_sync(void) {
     __syncwarp();
 }
 
 /* x of lane `from`. */
-LANE_FN Real lane_read(const Real *x, int from) {
+WARP_FN Real lane_read(const Real *x, int from) {
     return __shfl_sync(0xffffffffu, x[0], from);
 }
 
 /* To each lane, x of lane `at` of its group. y may be x. */
-LANE_FN void group_read(const Real *x, int at, int size, Real *y) {
+WARP_FN void group_read(const Real *x, int at, int size, Real *y) {
     y[0] = __shfl_sync(0xffffffffu, x[0], at, size);
 }
 
 /* x of the lane whose number differs in the bit `step`. */
-LANE_FN void lane_swap(const Real *x, int step, Real *y) {
+WARP_FN void lane_swap(const Real *x, int step, Real *y) {
     y[0] = __shfl_xor_sync(0xffffffffu, x[0], step);
 }
 
 #else
 
-#define LANE_FN static inline
+#define WARP_FN static inline
 #define LANE_COPIES LANES
 #define EACH_LANE(l) for (int l = 0; l < LANES; l++)
 #define LANE(l) (l)
 #define LANE_UNROLL
 #define LANE_ROLLED
 
-LANE_FN void lanes_meet(void) {
+WARP_FN void lanes_sync(void) {
 }
 
-LANE_FN Real lane_read(const Real *x, int from) {
+WARP_FN Real lane_read(const Real *x, int from) {
     return x[from];
 }
 
-LANE_FN void group_read(const Real *x, int at, int size, Real *y) {
+WARP_FN void group_read(const Real *x, int at, int size, Real *y) {
     for (int begin = 0; begin < LANES; begin += size) {
         const Real value = x[begin + at];
         for (int l = begin; l < begin + size; l++) {
@@ -78,7 +78,7 @@ LANE_FN void group_read(const Real *x, int at, int size, Real *y) {
     }
 }
 
-LANE_FN void lane_swap(const Real *x, int step, Real *y) {
+WARP_FN void lane_swap(const Real *x, int step, Real *y) {
     for (int l = 0; l < LANES; l++) {
         y[l] = x[l ^ step];
     }
@@ -87,7 +87,7 @@ LANE_FN void lane_swap(const Real *x, int step, Real *y) {
 #endif
 
 /* To each lane, the sum over its group. */
-LANE_FN void group_sum(Real *x, int size) {
+WARP_FN void group_sum(Real *x, int size) {
     LANE_UNROLL
     for (int step = size / 2; step > 0; step /= 2) {
         Real other[LANE_COPIES];
@@ -99,7 +99,7 @@ LANE_FN void group_sum(Real *x, int size) {
 }
 
 /* To each lane, the largest of its group. */
-LANE_FN void group_max(Real *x, int size) {
+WARP_FN void group_max(Real *x, int size) {
     LANE_UNROLL
     for (int step = size / 2; step > 0; step /= 2) {
         Real other[LANE_COPIES];
@@ -116,7 +116,7 @@ LANE_FN void group_max(Real *x, int size) {
  * whose number has the bits of i % size in reverse, and all read it there. About 2 count values
  * pass from lane to lane instead of count log2(size). x is overwritten. The inner loop has the
  * bound `count` too, because nvcc keeps x in registers only where bounds are constants. */
-LANE_FN void group_sums(Real (*x)[LANE_COPIES], int count, int size, Real (*sum)[LANE_COPIES]) {
+WARP_FN void group_sums(Real (*x)[LANE_COPIES], int count, int size, Real (*sum)[LANE_COPIES]) {
     int entries = count;
     LANE_UNROLL
     for (int step = size / 2; step > 0; step /= 2) {
@@ -148,13 +148,13 @@ LANE_FN void group_sums(Real (*x)[LANE_COPIES], int count, int size, Real (*sum)
 }
 
 /* The sum over all lanes. x is overwritten. */
-LANE_FN Real lane_sum(Real *x) {
+WARP_FN Real lane_sum(Real *x) {
     group_sum(x, LANES);
     return x[0];
 }
 
 /* The largest of all lanes. x is overwritten. */
-LANE_FN Real lane_max(Real *x) {
+WARP_FN Real lane_max(Real *x) {
     group_max(x, LANES);
     return x[0];
 }

@@ -1,7 +1,7 @@
 /* Trials of an evaluation in a crowd: what each has instead of what an episode draws, and what is
  * measured of it. */
-#ifndef CROWD_TRIAL_H
-#define CROWD_TRIAL_H
+#ifndef ENVS_TRIAL_H
+#define ENVS_TRIAL_H
 
 #include <stdint.h>
 

@@ -64,7 +64,7 @@ MILD_HD void engine_link_force(const Real *inertia, const EngineMotion *motion, 
 
 /* Inertia and force of each link by itself. A lane follows the motion down to its link, because
  * that takes no more instructions than a level of the tree after the other. */
-LANE_FN void engine_link_forces(const EngineModel *model, const EngineVariation *variation,
+WARP_FN void engine_link_forces(const EngineModel *model, const EngineVariation *variation,
                                 EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
@@ -79,7 +79,7 @@ LANE_FN void engine_link_forces(const EngineModel *model, const EngineVariation 
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* Force of a push on the base's centre of mass along degree of freedom d < 6. push: force and
@@ -101,7 +101,7 @@ MILD_HD Real engine_push_force(const EngineModel *model, const EngineVariation *
 
 /* work->acceleration <- force: joint torques [joints] in the order of robot.ini, less gyroscopic,
  * Coriolis and gravity forces and damping, and the push [6] or NULL. After engine_gather. */
-LANE_FN void engine_smooth_force(const EngineModel *model, const EngineVariation *variation,
+WARP_FN void engine_smooth_force(const EngineModel *model, const EngineVariation *variation,
                                  const Real *torque, const Real *push, EngineWork *work) {
     const EngineTree *tree = &model->tree;
     const Real *R = work->rotation[0];
@@ -126,7 +126,7 @@ LANE_FN void engine_smooth_force(const EngineModel *model, const EngineVariation
             work->acceleration[d] = sum;
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 #endif

@@ -55,7 +55,7 @@ MILD_HD void limit_row(const EngineLink *link, EngineWork *work, int i, Real sid
 }
 
 /* Limits that are reached. Returns whether there are any. */
-LANE_FN int engine_limits(const EngineModel *model, EngineWork *work) {
+WARP_FN int engine_limits(const EngineModel *model, EngineWork *work) {
     Real any[LANE_COPIES];
     EACH_LANE(l) {
         any[l] = 0;
@@ -72,7 +72,7 @@ LANE_FN int engine_limits(const EngineModel *model, EngineWork *work) {
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
     return lane_max(any) > 0;
 }
 
@@ -96,7 +96,7 @@ MILD_HD int limit_pushes(const EngineWork *work, int i) {
  *
  * with the side s, reference r and weight 1/R of a row, and the ground that is solved with N and f'
  * agrees with the limits. none: bool, hold none. Before the forces. */
-LANE_FN void engine_choose_held(const EngineModel *model, EngineWork *work, int none) {
+WARP_FN void engine_choose_held(const EngineModel *model, EngineWork *work, int none) {
     const int links = engine_links(&model->tree);
     const int beyond = engine_limits(model, work);
     EACH_LANE(l) {
@@ -111,7 +111,7 @@ LANE_FN void engine_choose_held(const EngineModel *model, EngineWork *work, int 
             work->held[n] = (Real)bits;
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* bool: the limit of link i is held; of link 0: some joint is beyond its limit. */
@@ -120,7 +120,7 @@ MILD_HD int limit_held(const EngineWork *work, int i) {
 }
 
 /* M <- N and f <- f'. */
-LANE_FN void engine_hold(const EngineTree *tree, EngineWork *work) {
+WARP_FN void engine_hold(const EngineTree *tree, EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
@@ -132,11 +132,11 @@ LANE_FN void engine_hold(const EngineTree *tree, EngineWork *work) {
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* bool: the limits that push at the acceleration are those held. */
-LANE_FN int engine_held_push(const EngineTree *tree, const EngineWork *work) {
+WARP_FN int engine_held_push(const EngineTree *tree, const EngineWork *work) {
     Real others[LANE_COPIES];
     EACH_LANE(l) {
         others[l] = 0;
@@ -239,7 +239,7 @@ MILD_HD void corner_edges(const EngineModel *model, EngineRigid rigid, const Eng
 }
 
 /* J x of all feet. */
-LANE_FN void engine_twists(const EngineTree *tree, EngineSupport *support, const Real *x,
+WARP_FN void engine_twists(const EngineTree *tree, EngineSupport *support, const Real *x,
                            Real (*twist)[6]) {
     EACH_LANE(l) {
         LANE_ROLLED
@@ -247,11 +247,11 @@ LANE_FN void engine_twists(const EngineTree *tree, EngineSupport *support, const
             twist[n / 6][n % 6] = foot_twist(tree, support, x, n / 6, n % 6);
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* surface: [corners], or one for all of them when `level`. */
-LANE_FN void engine_collide(const EngineModel *model, EngineRigid rigid,
+WARP_FN void engine_collide(const EngineModel *model, EngineRigid rigid,
                             const EngineSurface *surface, int level, EngineWork *work) {
     EngineSupport *support = &work->now.support;
     engine_twists(&model->tree, support, work->rate, support->ground.contact.twist);
@@ -261,11 +261,11 @@ LANE_FN void engine_collide(const EngineModel *model, EngineRigid rigid,
             corner_edges(model, rigid, surface + (level ? 0 : c), work, c);
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* The same on any ground. A corner touches the tangent plane under its centre. */
-LANE_FN void engine_collide_on(const EngineModel *model, EngineRigid rigid,
+WARP_FN void engine_collide_on(const EngineModel *model, EngineRigid rigid,
                                const EngineGround *ground, EngineWork *work) {
     engine_twists(&model->tree, &work->now.support, work->rate,
                   work->now.support.ground.contact.twist);
@@ -279,7 +279,7 @@ LANE_FN void engine_collide_on(const EngineModel *model, EngineRigid rigid,
             corner_edges(model, rigid, &surface, work, c);
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* ---- one Newton step ---- */
@@ -289,7 +289,7 @@ MILD_HD Real edge_along(const EngineContact *contact, int row, const Real *twist
 }
 
 /* x of all edges at the acceleration. */
-LANE_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
+WARP_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
     EngineContact *contact = &work->now.support.ground.contact;
     engine_twists(tree, &work->now.support, work->acceleration, contact->twist);
     EACH_LANE(l) {
@@ -299,7 +299,7 @@ LANE_FN void engine_residuals(const EngineTree *tree, EngineWork *work) {
             contact->residual[row] = edge_along(contact, row, twist) - contact->reference[row];
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* Number n of the sums over a foot's pushing edges: six of the wrench of their forces, also the
@@ -329,7 +329,7 @@ MILD_HD void engine_push_number(const EngineTree *tree, EngineWork *work, int f,
 }
 
 /* For each foot, the wrench of its pushing edges, and their stiffness if that is wanted. */
-LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, int stiffness) {
+WARP_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, int stiffness) {
     const int feet = engine_feet(tree);
     const int count = feet * (stiffness ? 6 + ENGINE_BASE_ENTRIES : 6);
     EACH_LANE(l) {
@@ -338,7 +338,7 @@ LANE_FN void engine_push_of_edges(const EngineTree *tree, EngineWork *work, int 
             engine_push_number(tree, work, n % feet, n / feet);
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* Row r of a foot's stiffness times x [6]. */
@@ -352,7 +352,7 @@ MILD_HD Real stiffness_times(const Real *stiffness, int r, const Real *x) {
 }
 
 /* half <- stiffness J^T of the feet. */
-LANE_FN void engine_stiffen_rows(const EngineTree *tree, EngineSupport *support) {
+WARP_FN void engine_stiffen_rows(const EngineTree *tree, EngineSupport *support) {
     EACH_LANE(l) {
         LANE_ROLLED
         for (int f = 0; f < engine_feet(tree); f++) {
@@ -363,7 +363,7 @@ LANE_FN void engine_stiffen_rows(const EngineTree *tree, EngineSupport *support)
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* Entry of J^T stiffness J of the feet that move with degree of freedom d. */
@@ -383,7 +383,7 @@ MILD_HD Real stiffened_entry(const EngineTree *tree, const EngineSupport *suppor
 
 /* factor <- L of M + J^T weight J over the pushing rows; change <- the residue and what is left of
  * the rows, which is the descent of the cost. After engine_push_of_edges. */
-LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int edges) {
+WARP_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int edges) {
     EngineSupport *support = &work->now.support;
     if (edges) {
         engine_stiffen_rows(tree, support);
@@ -415,7 +415,7 @@ LANE_FN void engine_newton_system(const EngineTree *tree, EngineWork *work, int 
             support->change[d] = sum;
         }
     }
-    lanes_meet();
+    lanes_sync();
     engine_factorise(tree, work->factor[0], work->factor[0], work->inverse);
 }
 
@@ -438,7 +438,7 @@ MILD_HD void line_row(LinePoint *point, Real weight, Real x, Real change, Real t
 }
 
 /* The rows' part of a point of the line. */
-LANE_FN LinePoint engine_line_rows(const EngineTree *tree, EngineWork *work, int edges, Real t) {
+WARP_FN LinePoint engine_line_rows(const EngineTree *tree, EngineWork *work, int edges, Real t) {
     EngineSupport *support = &work->now.support;
     EngineContact *contact = &support->ground.contact;
     Real slope[LANE_COPIES];
@@ -471,7 +471,7 @@ LANE_FN LinePoint engine_line_rows(const EngineTree *tree, EngineWork *work, int
 
 /* The smooth part at t = 0: slope (a - a0)^T M change, and curvature change^T M change. product <-
  * M change. */
-LANE_FN LinePoint engine_line_smooth(const EngineTree *tree, EngineWork *work) {
+WARP_FN LinePoint engine_line_smooth(const EngineTree *tree, EngineWork *work) {
     EngineSupport *support = &work->now.support;
     Real slope[LANE_COPIES];
     Real curvature[LANE_COPIES];
@@ -491,7 +491,7 @@ LANE_FN LinePoint engine_line_smooth(const EngineTree *tree, EngineWork *work) {
 
 /* Length of the step at which the cost is least: the zero of an increasing, piecewise linear slope,
  * by Newton's method between bounds. */
-LANE_FN Real engine_line_search(const EngineTree *tree, EngineWork *work, int edges) {
+WARP_FN Real engine_line_search(const EngineTree *tree, EngineWork *work, int edges) {
     const LinePoint smooth = engine_line_smooth(tree, work);
     Real low = 0;
     Real high = REAL(1e30);
@@ -513,7 +513,7 @@ LANE_FN Real engine_line_search(const EngineTree *tree, EngineWork *work, int ed
 
 /* acceleration <- acceleration + t change; the residue follows when the product is there. Returns
  * the largest change over the largest acceleration then. */
-LANE_FN Real engine_move(const EngineTree *tree, EngineWork *work, Real t, int product) {
+WARP_FN Real engine_move(const EngineTree *tree, EngineWork *work, Real t, int product) {
     Real moved[LANE_COPIES];
     Real size[LANE_COPIES];
     EACH_LANE(l) {
@@ -529,14 +529,14 @@ LANE_FN Real engine_move(const EngineTree *tree, EngineWork *work, Real t, int p
             size[l] = real_max(size[l], REAL_ABS(work->acceleration[d]));
         }
     }
-    lanes_meet();
+    lanes_sync();
     const Real most = lane_max(moved);
     return most / (lane_max(size) + REAL_LEAST);
 }
 
 /* mass <- M of the factor of N, and what the held limits have done to the acceleration: its
  * residue. */
-LANE_FN void engine_start(const EngineTree *tree, EngineWork *work) {
+WARP_FN void engine_start(const EngineTree *tree, EngineWork *work) {
     engine_multiply_out(tree, work->factor[0], work->inverse, work->mass[0]);
     EACH_LANE(l) {
         LANE_ROLLED
@@ -550,7 +550,7 @@ LANE_FN void engine_start(const EngineTree *tree, EngineWork *work) {
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* From the acceleration with the held limits to that with all rows; `edges`: engine_collide was
@@ -560,7 +560,7 @@ LANE_FN void engine_start(const EngineTree *tree, EngineWork *work) {
  *
  * Needs the factor of N, limits and J; overwrites it, mass, half and, with edges, the wrench.
  * Returns Newton steps. */
-LANE_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges) {
+WARP_FN int engine_constrain(const EngineTree *tree, EngineWork *work, int edges) {
     EngineSupport *support = &work->now.support;
     EngineContact *contact = &support->ground.contact;
     int step = 0;

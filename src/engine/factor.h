@@ -23,7 +23,7 @@ typedef EnginePath EngineBits;
  *     L_dd^2 = M_dd - sum_k L_kd^2,   L_di = (M_di - sum_k L_kd L_ki)/L_dd
  *
  * A lane has an entry, and finds L_dd for itself. own: place of L_dd. */
-LANE_FN void engine_factorise_level(const EngineTree *tree, int own, int begin, int end,
+WARP_FN void engine_factorise_level(const EngineTree *tree, int own, int begin, int end,
                                     const Real *matrix, Real *factor, Real *inverse) {
     EACH_LANE(l) {
         LANE_ROLLED
@@ -50,12 +50,12 @@ LANE_FN void engine_factorise_level(const EngineTree *tree, int own, int begin, 
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* The base's rows, after all hinges. A lane has an entry M_ij; the row k takes its part from those
  * above it: M_ij -= L_ki L_kj. */
-LANE_FN void engine_factorise_base(const EngineTree *tree, const Real *matrix, Real *factor,
+WARP_FN void engine_factorise_base(const EngineTree *tree, const Real *matrix, Real *factor,
                                    Real *inverse) {
     Real x[LANE_COPIES];
     int row[LANE_COPIES], place[LANE_COPIES];
@@ -72,7 +72,7 @@ LANE_FN void engine_factorise_base(const EngineTree *tree, const Real *matrix, R
             factor[i * ENGINE_STRIDE + j] = x[l];
         }
     }
-    lanes_meet();
+    lanes_sync();
     LANE_ROLLED
     for (int k = 5; k >= 0; k--) {
         const Real *from = factor + k * ENGINE_STRIDE; /* L_kk L_k */
@@ -86,18 +86,18 @@ LANE_FN void engine_factorise_base(const EngineTree *tree, const Real *matrix, R
                 inverse[k] = scale;
             }
         }
-        lanes_meet();
+        lanes_sync();
     }
     EACH_LANE(l) {
         if (LANE(l) < ENGINE_BASE_ENTRIES) {
             factor[row[l] * ENGINE_STRIDE + place[l]] = x[l] * inverse[row[l]];
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* factor and inverse <- L of a matrix with the sparsity of M, which may be `factor` itself. */
-LANE_FN void engine_factorise(const EngineTree *tree, const Real *matrix, Real *factor,
+WARP_FN void engine_factorise(const EngineTree *tree, const Real *matrix, Real *factor,
                               Real *inverse) {
     int end = engine_entries(tree);
     LANE_ROLLED
@@ -110,7 +110,7 @@ LANE_FN void engine_factorise(const EngineTree *tree, const Real *matrix, Real *
 }
 
 /* mass <- M = L^T L again: M_ij is the sum of L_ki L_kj over k, i and what is behind it. */
-LANE_FN void engine_multiply_out(const EngineTree *tree, const Real *factor, const Real *inverse,
+WARP_FN void engine_multiply_out(const EngineTree *tree, const Real *factor, const Real *inverse,
                                  Real *mass) {
     EACH_LANE(l) {
         LANE_ROLLED
@@ -134,11 +134,11 @@ LANE_FN void engine_multiply_out(const EngineTree *tree, const Real *factor, con
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* x <- L^-T x, leaves first. A lane has x of its degrees of freedom in registers. */
-LANE_FN void engine_solve_transposed(const EngineTree *tree, const Real *factor,
+WARP_FN void engine_solve_transposed(const EngineTree *tree, const Real *factor,
                                      const Real *inverse, Real *x) {
     const int dofs = engine_dofs(tree);
     Real own[DOF_SLOTS][LANE_COPIES], scale[DOF_SLOTS][LANE_COPIES];
@@ -183,11 +183,11 @@ LANE_FN void engine_solve_transposed(const EngineTree *tree, const Real *factor,
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* x <- L^-1 x, root first: what a lane takes is the next entry of its row. */
-LANE_FN void engine_solve(const EngineTree *tree, const Real *factor, const Real *inverse,
+WARP_FN void engine_solve(const EngineTree *tree, const Real *factor, const Real *inverse,
                           Real *x) {
     Real own[DOF_SLOTS][LANE_COPIES], scale[DOF_SLOTS][LANE_COPIES];
     EngineBits ancestors[DOF_SLOTS][LANE_COPIES];
@@ -229,7 +229,7 @@ LANE_FN void engine_solve(const EngineTree *tree, const Real *factor, const Real
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* Row d of M x. */

@@ -69,7 +69,7 @@ MILD_HD Real foot_twist(const EngineTree *tree, const EngineSupport *support, co
 }
 
 /* Poses and twists of the feet, and J. */
-LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
+WARP_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
     const EngineTree *tree = &model->tree;
     const int feet = engine_feet(tree);
     const int chain = engine_chain(tree);
@@ -79,7 +79,7 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
             foot_pose_number(model, work, n / 12, n % 12);
         }
     }
-    lanes_meet();
+    lanes_sync();
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = LANE(l); n < chain * feet; n += LANES) {
@@ -89,7 +89,7 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
     EACH_LANE(l) {
         LANE_ROLLED
         for (int n = LANE(l); n < 6 * feet; n += LANES) {
@@ -103,13 +103,13 @@ LANE_FN void engine_feet_pose(const EngineModel *model, EngineWork *work) {
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* half <- L^-T J^T, and V_free = J (qvel + dt L^-1 y) = J qvel + dt half^T y, where y = L^-T force.
  * A lane has a column of a foot, whose chain is a path, so it needs no other lane. As in
  * engine_solve_transposed, a solved entry is taken from those above it. */
-LANE_FN void engine_half_solve(const EngineModel *model, EngineWork *work) {
+WARP_FN void engine_half_solve(const EngineModel *model, EngineWork *work) {
     const EngineTree *tree = &model->tree;
     EngineSupport *support = &work->now.support;
     EACH_LANE(l) {
@@ -142,12 +142,12 @@ LANE_FN void engine_half_solve(const EngineModel *model, EngineWork *work) {
             support->free_velocity[f][c] = work->foot_velocity[f][c] + model->number.dt * gain;
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* A = J M^-1 J^T, of two feet over the degrees of freedom that move both. A lane has a tile of two
  * rows and three columns. */
-LANE_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
+WARP_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
     EngineSupport *support = &work->now.support;
     const int feet = engine_feet(tree);
     EACH_LANE(l) {
@@ -176,7 +176,7 @@ LANE_FN void engine_foot_inertia(const EngineTree *tree, EngineWork *work) {
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* bool: foot f moves with degree of freedom d. */
@@ -203,7 +203,7 @@ MILD_HD Real wrench_along(const EngineTree *tree, const EngineWork *work, const 
 
 /* acceleration <- L^-1 (L^-T force + the sum over the feet of half wrench): qacc with the wrenches
  * of soft ground, or without ground. wrenches: bool. */
-LANE_FN void engine_accelerate(const EngineTree *tree, EngineWork *work, int wrenches) {
+WARP_FN void engine_accelerate(const EngineTree *tree, EngineWork *work, int wrenches) {
     if (wrenches) {
         EACH_LANE(l) {
             LANE_ROLLED
@@ -211,7 +211,7 @@ LANE_FN void engine_accelerate(const EngineTree *tree, EngineWork *work, int wre
                 work->acceleration[d] += wrench_along(tree, work, work->now.support.half[0], d);
             }
         }
-        lanes_meet();
+        lanes_sync();
     }
     engine_solve(tree, work->factor[0], work->inverse, work->acceleration);
 }

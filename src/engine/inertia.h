@@ -125,7 +125,7 @@ MILD_HD void engine_gather_links(const EngineWork *work, int i, int begin, int e
 
 /* Inertia and force of each link with all that hangs on it, rigid. The base would be the longest
  * sum, so it is taken in as many parts as links hang on it. */
-LANE_FN void engine_gather(const EngineTree *tree, EngineWork *work) {
+WARP_FN void engine_gather(const EngineTree *tree, EngineWork *work) {
     EngineDynamics *now = &work->now.dynamics;
     const int links = engine_links(tree);
     EACH_LANE(l) {
@@ -135,7 +135,7 @@ LANE_FN void engine_gather(const EngineTree *tree, EngineWork *work) {
             engine_gather_links(work, n < links ? n : 0, begin, tree->end[begin], now->of.total[n]);
         }
     }
-    lanes_meet();
+    lanes_sync();
     EACH_LANE(l) {
         if (LANE(l) < LINK_NUMBERS) {
             Real sum = now->link[0][LANE(l)];
@@ -146,7 +146,7 @@ LANE_FN void engine_gather(const EngineTree *tree, EngineWork *work) {
             now->of.total[0][LANE(l)] = sum;
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* What accelerates degree of freedom d by 1 with all behind it rigid: force, and torque about its
@@ -196,7 +196,7 @@ MILD_HD void engine_mass_row(const EngineModel *model, const EngineVariation *va
     }
 }
 
-LANE_FN void engine_mass_matrix(const EngineModel *model, const EngineVariation *variation,
+WARP_FN void engine_mass_matrix(const EngineModel *model, const EngineVariation *variation,
                                 EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
@@ -204,7 +204,7 @@ LANE_FN void engine_mass_matrix(const EngineModel *model, const EngineVariation 
             engine_mass_row(model, variation, work, d);
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 #endif

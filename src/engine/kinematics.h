@@ -41,7 +41,7 @@ MILD_HD void engine_hinge(const EngineLink *link, Real angle, Real *local) {
 }
 
 /* The base in the world, and each link in its parent's frame. */
-LANE_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
+WARP_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = LANE(l); i < engine_links(&model->tree); i += LANES) {
@@ -57,7 +57,7 @@ LANE_FN void engine_hinges(const EngineModel *model, EngineWork *work) {
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* Row k of the rotations, and component k of the positions, from the base down to a leaf. */
@@ -90,7 +90,7 @@ MILD_HD void engine_chain_row(const EngineTree *tree, EngineWork *work, int leaf
 
 /* A row of a rotation follows from the same row of the parent's, so a lane takes one down a chain
  * without the others. Links that several chains share get the same numbers several times. */
-LANE_FN void engine_kinematics(const EngineModel *model, EngineWork *work) {
+WARP_FN void engine_kinematics(const EngineModel *model, EngineWork *work) {
     const EngineTree *tree = &model->tree;
     engine_hinges(model, work);
     EACH_LANE(l) {
@@ -99,14 +99,14 @@ LANE_FN void engine_kinematics(const EngineModel *model, EngineWork *work) {
             engine_chain_row(tree, work, tree->leaf[n / 3], n % 3);
         }
     }
-    lanes_meet();
+    lanes_sync();
     EACH_LANE(l) {
         LANE_ROLLED
         for (int i = 1 + LANE(l); i < engine_links(tree); i += LANES) {
             turn3(work->rotation[i], model->number.link[i].axis, work->axis[i]);
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 #endif

@@ -60,7 +60,7 @@ MILD_HD Real shell_lowest(const EngineModel *model, const EngineWork *work, int 
 }
 
 /* [m] Least height of a shell's lowest point above the ground under its centre. */
-LANE_FN Real engine_body_clearance_on(const EngineModel *model, const EngineWork *work,
+WARP_FN Real engine_body_clearance_on(const EngineModel *model, const EngineWork *work,
                                       const EngineGround *ground) {
     Real most[LANE_COPIES];
     EACH_LANE(l) {
@@ -78,7 +78,7 @@ LANE_FN Real engine_body_clearance_on(const EngineModel *model, const EngineWork
 }
 
 /* The same above level ground at `height`. */
-LANE_FN Real engine_body_clearance(const EngineModel *model, const EngineWork *work, Real height) {
+WARP_FN Real engine_body_clearance(const EngineModel *model, const EngineWork *work, Real height) {
     const EngineGround level = {NULL, NULL, height};
     return engine_body_clearance_on(model, work, &level);
 }
@@ -93,7 +93,7 @@ MILD_HD Real point_depth(const EngineGround *ground, const EngineWork *work, con
 
 /* [m] Least height of a point of a sole's outline above the ground under it; of a round foot that
  * of its reference point. */
-LANE_FN Real engine_sole_height_on(const EngineModel *model, const EngineWork *work, int foot,
+WARP_FN Real engine_sole_height_on(const EngineModel *model, const EngineWork *work, int foot,
                                    const EngineGround *ground) {
     Real most[LANE_COPIES];
     EACH_LANE(l) {
@@ -112,7 +112,7 @@ LANE_FN Real engine_sole_height_on(const EngineModel *model, const EngineWork *w
 }
 
 /* The same above level ground at `height`. */
-LANE_FN Real engine_sole_height(const EngineModel *model, const EngineWork *work, int foot,
+WARP_FN Real engine_sole_height(const EngineModel *model, const EngineWork *work, int foot,
                                 Real height) {
     const EngineGround level = {NULL, NULL, height};
     return engine_sole_height_on(model, work, foot, &level);

@@ -40,7 +40,7 @@ typedef struct {
 } Workplace;
 
 /* The torques of a step within the joints' efforts. */
-LANE_FN void motors(const EngineModel *model, const EngineRobots *robots, long robot,
+WARP_FN void motors(const EngineModel *model, const EngineRobots *robots, long robot,
                     Workplace *place) {
     const EngineTree *tree = &model->tree;
     EACH_LANE(l) {
@@ -54,15 +54,15 @@ LANE_FN void motors(const EngineModel *model, const EngineRobots *robots, long r
             place->torque[j] = real_max(-effort, real_min(effort, wanted));
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
-LANE_FN const Real *origin_of(const EngineRobots *robots, long robot) {
+WARP_FN const Real *origin_of(const EngineRobots *robots, long robot) {
     return robots->map_origin ? robots->map_origin + 2 * robot : NULL;
 }
 
 /* In the air or on rigid ground. map: of that, or NULL. */
-LANE_FN int step(const EngineModel *model, const EngineRobots *robots, const MapView *map,
+WARP_FN int step(const EngineModel *model, const EngineRobots *robots, const MapView *map,
                  long robot, Workplace *place) {
     EngineWork *work = &place->work;
     const EngineAction action = {&robots->variation[robot], place->torque,
@@ -78,13 +78,13 @@ LANE_FN int step(const EngineModel *model, const EngineRobots *robots, const Map
                 work->wrench[n / 6][n % 6] = 0;
             }
         }
-        lanes_meet();
+        lanes_sync();
     }
     return engine_end(model, robots->rigid, work);
 }
 
 /* What a robot's ground is made of. */
-LANE_FN void material_of(const EngineRobots *robots, const BatchShape *shape,
+WARP_FN void material_of(const EngineRobots *robots, const BatchShape *shape,
                          const BatchArrays *arrays, long robot, ContactProblem *problem) {
     const long labels = shape->map ? arrays->map.labels : 1;
     const int *materials = robots->material ? robots->material + robot * labels : NULL;
@@ -99,7 +99,7 @@ LANE_FN void material_of(const EngineRobots *robots, const BatchShape *shape,
 /* On soft ground: from the feet's pose, A and V_free to the wrenches. problem: what stays the same
  * from step to step. */
 template <int MAP>
-LANE_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
+WARP_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
                       const ContactSetup *setup, ContactProblem problem, long robot, Real *memory,
                       ground_Shared *shared, Workplace *place) {
     EngineWork *work = &place->work;
@@ -119,12 +119,12 @@ LANE_FN int step_soft(const EngineModel *model, const EngineRobots *robots,
     } else {
         ground_robot(setup, &problem, shared, memory, 1, &result);
     }
-    lanes_meet();
+    lanes_sync();
     return engine_end(model, 0, work);
 }
 
 /* What a comparison wants of the last step. */
-LANE_FN void report(const EngineModel *model, const EngineRobots *robots, long robot,
+WARP_FN void report(const EngineModel *model, const EngineRobots *robots, long robot,
                     const EngineWork *work) {
     const int dofs = engine_dofs(&model->tree);
     const int rows = 6 * engine_feet(&model->tree);

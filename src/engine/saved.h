@@ -26,7 +26,7 @@ MILD_HD Real *link_pose_number(EngineWork *work, int link, int e) {
 #define ENGINE_ACCELERATION ((int)(offsetof(EngineWork, acceleration) / sizeof(Real)))
 
 /* The acceleration alone, from one call of steps to the next. */
-LANE_FN void engine_save_acceleration(const EngineTree *tree, const EngineWork *work,
+WARP_FN void engine_save_acceleration(const EngineTree *tree, const EngineWork *work,
                                       EngineSaved *saved) {
     EACH_LANE(l) {
         LANE_ROLLED
@@ -36,7 +36,7 @@ LANE_FN void engine_save_acceleration(const EngineTree *tree, const EngineWork *
     }
 }
 
-LANE_FN void engine_restore_acceleration(const EngineTree *tree, const EngineSaved *saved,
+WARP_FN void engine_restore_acceleration(const EngineTree *tree, const EngineSaved *saved,
                                          EngineWork *work) {
     EACH_LANE(l) {
         LANE_ROLLED
@@ -44,11 +44,11 @@ LANE_FN void engine_restore_acceleration(const EngineTree *tree, const EngineSav
             work->acceleration[d] = saved->state[ENGINE_ACCELERATION + d];
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* From work to saved. rigid: bool, on rigid ground. */
-LANE_FN void engine_save(const EngineTree *tree, int rigid, EngineWork *work, EngineSaved *saved) {
+WARP_FN void engine_save(const EngineTree *tree, int rigid, EngineWork *work, EngineSaved *saved) {
     EngineSupport *support = &work->now.support;
     const Real *state = (const Real *)(const void *)work;
     const Real *rows = rigid ? support->jacobian[0][0] : support->half[0][0];
@@ -76,7 +76,7 @@ LANE_FN void engine_save(const EngineTree *tree, int rigid, EngineWork *work, En
 }
 
 /* And back. */
-LANE_FN void engine_restore(const EngineTree *tree, int rigid, const EngineSaved *saved,
+WARP_FN void engine_restore(const EngineTree *tree, int rigid, const EngineSaved *saved,
                             EngineWork *work) {
     EngineSupport *support = &work->now.support;
     Real *state = (Real *)(void *)work;
@@ -105,7 +105,7 @@ LANE_FN void engine_restore(const EngineTree *tree, int rigid, const EngineSaved
             *link_pose_number(work, tree->foot_link[n / 12], n % 12) = saved->foot_link[n];
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 #endif

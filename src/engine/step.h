@@ -35,7 +35,7 @@ MILD_HD void unit_quaternion(const Real *q, Real *unit) {
 
 /* From the order of RobotState, qpos [7 + joints] and qvel [6 + joints], to the tree's, as if the
  * robot had not accelerated before. */
-LANE_FN void engine_load(const EngineModel *model, const Real *qpos, const Real *qvel,
+WARP_FN void engine_load(const EngineModel *model, const Real *qpos, const Real *qvel,
                          EngineWork *work) {
     const EngineTree *tree = &model->tree;
     EACH_LANE(l) {
@@ -56,10 +56,10 @@ LANE_FN void engine_load(const EngineModel *model, const Real *qpos, const Real 
             unit_quaternion(qpos + 3, work->quaternion);
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
-LANE_FN void engine_store(const EngineModel *model, const EngineWork *work, Real *qpos,
+WARP_FN void engine_store(const EngineModel *model, const EngineWork *work, Real *qpos,
                           Real *qvel) {
     const EngineTree *tree = &model->tree;
     EACH_LANE(l) {
@@ -80,7 +80,7 @@ LANE_FN void engine_store(const EngineModel *model, const EngineWork *work, Real
             }
         }
     }
-    lanes_meet();
+    lanes_sync();
 }
 
 /* What acts on a robot in a step. */
@@ -93,7 +93,7 @@ typedef struct {
 
 /* N and its factor, and half of the way to the acceleration, which engine_accelerate goes on with:
  * L^-T force. After engine_kinematics. */
-LANE_FN void engine_smooth(const EngineModel *model, const EngineAction *action, EngineWork *work) {
+WARP_FN void engine_smooth(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     const EngineTree *tree = &model->tree;
     engine_link_forces(model, action->variation, work);
     engine_gather(tree, work);
@@ -108,7 +108,7 @@ LANE_FN void engine_smooth(const EngineModel *model, const EngineAction *action,
 
 /* Poses and twists of links and feet; with an action also what engine_end needs, and what soft
  * ground asks for. */
-LANE_FN void engine_begin(const EngineModel *model, const EngineAction *action, EngineWork *work) {
+WARP_FN void engine_begin(const EngineModel *model, const EngineAction *action, EngineWork *work) {
     engine_kinematics(model, work);
     if (action) {
         engine_choose_held(model, work, action->rigid);
@@ -139,7 +139,7 @@ MILD_HD void turn_quaternion(Real *q, const Real *turn) {
 
 /* Semi-implicit Euler: velocity first, then the pose with the new velocity. Returns 1, and leaves
  * the pose, when a velocity went bad. */
-LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
+WARP_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
     const EngineTree *tree = &model->tree;
     const Real dt = model->number.dt;
     Real bad[LANE_COPIES];
@@ -151,7 +151,7 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
             bad[l] = REAL_ABS(work->rate[d]) < ENGINE_RATE_MAX ? bad[l] : 1; /* NaN included */
         }
     }
-    lanes_meet();
+    lanes_sync();
     if (lane_max(bad) > 0) {
         return 1;
     }
@@ -168,13 +168,13 @@ LANE_FN int engine_integrate(const EngineModel *model, EngineWork *work) {
             turn_quaternion(work->quaternion, turn);
         }
     }
-    lanes_meet();
+    lanes_sync();
     return 0;
 }
 
 /* The wrenches of soft ground, or rigid ground where engine_collide was called; limits; the next
  * state. Returns 1 when a velocity went bad. */
-LANE_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
+WARP_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
     engine_accelerate(&model->tree, work, !rigid);
     int newton = 0;
     if (rigid || limit_held(work, 0)) {
@@ -188,7 +188,7 @@ LANE_FN int engine_end(const EngineModel *model, int rigid, EngineWork *work) {
             work->newton = newton;
         }
     }
-    lanes_meet();
+    lanes_sync();
     return engine_integrate(model, work);
 }
 

@@ -98,7 +98,7 @@ static void step_trial(void *context, int trial, int thread) {
     push_trial(env, t->eval->push);
 }
 
-static void tell_watch(const Trials *t, int step) {
+static void call_watch(const Trials *t, int step) {
     const EvalWatch *watch = t->eval->watch;
     for (int i = 0; watch && i < t->eval->trials; i++) {
         if (!t->over[i]) {
@@ -177,7 +177,7 @@ MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controll
         pool_run(pool, eval->trials, start_trial, &t);
         for (int step = 0; step < steps; step++) {
             controller->act(controller->self, eval->trials, t.env, t.action);
-            tell_watch(&t, step);
+            call_watch(&t, step);
             print_actions(&t, step);
             pool_run(pool, eval->trials, step_trial, &t);
         }

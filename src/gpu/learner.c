@@ -113,8 +113,8 @@ static size_t layout(GpuLearner *g, char *block) {
     g->batch.steps = g->ppo->batch.steps;
     g->batch.envs = g->envs;
     const Network *tight = &g->ppo->policy->network;
-    g->rollout = carve(block, &used, ppo_place_batch(&g->batch, tight, NULL));
-    ppo_place_batch(&g->batch, tight, g->rollout);
+    g->rollout = carve(block, &used, ppo_carve_batch(&g->batch, tight, NULL));
+    ppo_carve_batch(&g->batch, tight, g->rollout);
     const size_t floats = gpu_chunk_carve(n, &g->widths, g->rows, g->images, NULL, &g->chunk);
     float *chunk = carve(block, &used, floats * sizeof(float));
     gpu_chunk_carve(n, &g->widths, g->rows, g->images, chunk, &g->chunk);
@@ -675,7 +675,7 @@ static MildStatus copy_rollout(const Ppo *ppo, void *to, const void *from, enum 
     PpoBatch shape = g->batch;
     const int before = enter(g);
     cudaMemcpyAsync(to ? to : g->rollout, from ? from : g->rollout,
-                    ppo_place_batch(&shape, &ppo->policy->network, NULL), kind, g->queue.stream);
+                    ppo_carve_batch(&shape, &ppo->policy->network, NULL), kind, g->queue.stream);
     const MildStatus status = finish(g, "copy of the rollout", error);
     leave(before);
     return status;

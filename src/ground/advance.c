@@ -13,7 +13,7 @@ typedef struct {
     double height;            /* [m] of the terrain, without its map */
 } Advance;
 
-ALWAYS_INLINE void memory_store(const Memory *memory, int e, const ElementMemory *after) {
+MILD_HD void memory_store(const Memory *memory, int e, const ElementMemory *after) {
     memory->depth_max[e] = after->depth_max;
     memory->middle[e] = after->middle;
     memory->front_speed[e] = after->front_speed;
@@ -88,7 +88,7 @@ static void foot_peaks(const Advance *a, const Memory *memory) {
 }
 
 /* Stores the plane that the step assumed for the ground under the element. */
-ALWAYS_INLINE void slot_plane(const FootScratch *foot, double height, const Slots *s,
+MILD_HD void slot_plane(const FootScratch *foot, double height, const Slots *s,
                               const Memory *memory, int i, int e) {
     const double slope_x = s->slope_x[i];
     const double slope_y = s->slope_y[i];
@@ -100,7 +100,7 @@ ALWAYS_INLINE void slot_plane(const FootScratch *foot, double height, const Slot
 
 /* Vector loop for a foot with all elements listed, on ground without imprints. Returns how many
  * elements remember something. */
-ALWAYS_INLINE int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
+MILD_HD int foot_advance_all(const Advance *a, const Memory *all, const int32_t *material,
                                    int uneven) {
     const FootScratch foot = *a->foot;
     const Slots local = a->slot, *s = &local;

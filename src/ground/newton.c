@@ -5,7 +5,7 @@
 #define NEWTON_ITERATIONS 400 /* Newton steps in all, unless the caller sets a limit */
 #define NEWTON_PLAIN 20       /* plain steps before the friction bounds are held fixed */
 
-ALWAYS_INLINE void system_open(System *system, const MildScratch *scratch,
+MILD_HD void system_open(System *system, const MildScratch *scratch,
                                const MildContactInput *input, int first, int n, int parts) {
     int stride = 6 * scratch->feet;
     system->first = first;
@@ -19,7 +19,7 @@ ALWAYS_INLINE void system_open(System *system, const MildScratch *scratch,
 }
 
 /* Solves for the n rows from `first` on. */
-ALWAYS_INLINE void system_solve(MildScratch *scratch, const MildContactInput *input, int first,
+MILD_HD void system_solve(MildScratch *scratch, const MildContactInput *input, int first,
                                 MildContactResult *result, int n, int parts) {
     System opened, *system = &opened;
     Point best = {.residual = INFINITY};

@@ -44,25 +44,25 @@ typedef struct {
     int rests;       /* bool: Newton's step from here is no longer than rounding */
 } Point;
 
-ALWAYS_INLINE void row_clear(Row *row, int parts) {
+MILD_HD void row_clear(Row *row, int parts) {
     for (int p = 0; p < parts; p++) {
         row->part[p] = (Vector){0.0};
     }
 }
 
 /* Sets the first n numbers of a row and clears the rest. */
-ALWAYS_INLINE void row_load(Row *row, const double *values, int n, int parts) {
+MILD_HD void row_load(Row *row, const double *values, int n, int parts) {
     row_clear(row, parts);
     memcpy(row->at, values, (size_t)n * sizeof *values);
 }
 
-ALWAYS_INLINE void row_copy(Row *to, const Row *from, int parts) {
+MILD_HD void row_copy(Row *to, const Row *from, int parts) {
     for (int p = 0; p < parts; p++) {
         to->part[p] = from->part[p];
     }
 }
 
-ALWAYS_INLINE void point_copy(Point *to, const Point *from, int parts) {
+MILD_HD void point_copy(Point *to, const Point *from, int parts) {
     row_copy(&to->impulse, &from->impulse, parts);
     row_copy(&to->twist, &from->twist, parts);
     to->residual = from->residual;
@@ -71,13 +71,13 @@ ALWAYS_INLINE void point_copy(Point *to, const Point *from, int parts) {
 
 /* Row i of a unit matrix, from a window over one 1 among zeros: a 1 stored into a cleared row would
  * delay the load of its vector. */
-ALWAYS_INLINE void row_unit(Row *row, int i, int parts) {
+MILD_HD void row_unit(Row *row, int i, int parts) {
     static const double window[2 * NEWTON_LANES] = {[NEWTON_LANES] = 1.0};
     memcpy(row->part, window + NEWTON_LANES - i, (size_t)parts * sizeof row->part[0]);
 }
 
 /* y += A x; A is symmetric. */
-ALWAYS_INLINE void system_times(const System *system, const double *x, Row *y, int n, int parts) {
+MILD_HD void system_times(const System *system, const double *x, Row *y, int n, int parts) {
     for (int j = 0; j < n; j++) {
         for (int p = 0; p < parts; p++) {
             y->part[p] += x[j] * system->A[j].part[p];
@@ -86,7 +86,7 @@ ALWAYS_INLINE void system_times(const System *system, const double *x, Row *y, i
 }
 
 /* sqrt(x^T A x), the norm of an impulse in the metric of kinetic energy. */
-ALWAYS_INLINE double system_norm(const System *system, const double *x, int n, int parts) {
+MILD_HD double system_norm(const System *system, const double *x, int n, int parts) {
     Row y;
     double sum = 0.0;
     row_clear(&y, parts);
@@ -97,7 +97,7 @@ ALWAYS_INLINE double system_norm(const System *system, const double *x, int n, i
     return sqrt(fmax(sum, 0.0));
 }
 
-ALWAYS_INLINE void point_evaluate(const System *system, MildScratch *scratch, Point *point, int n,
+MILD_HD void point_evaluate(const System *system, MildScratch *scratch, Point *point, int n,
                                   int parts) {
     double apart[TWIST_MAX];
     contact_pass(scratch, system->dt, point->twist.at, system->first);
@@ -113,7 +113,7 @@ int rows_pivot(Row *M, int k, int n);
 
 /* Solves M x = right by Gaussian elimination. The right-hand side is column n of the rows. The
  * diagonal serves as the pivot unless a factor exceeds NEWTON_GROWTH. */
-ALWAYS_INLINE int rows_eliminate(Row *M, double *x, int n, int parts) {
+MILD_HD int rows_eliminate(Row *M, double *x, int n, int parts) {
     double inverse[TWIST_MAX];
     for (int k = 0; k < n; k++) {
         double grown = 0.0, own = 1.0 / M[k].at[k];
@@ -157,7 +157,7 @@ ALWAYS_INLINE int rows_eliminate(Row *M, double *x, int n, int parts) {
  *
  * V then moves by A dP, and the rounding error is proportional to dP rather than to P. Returns
  * false when the matrix is singular. */
-ALWAYS_INLINE int point_step(const System *system, MildScratch *scratch, const Point *at,
+MILD_HD int point_step(const System *system, MildScratch *scratch, const Point *at,
                              Point *next, int correct, int n, int parts) {
     Row M[TWIST_MAX];
     Row last;
@@ -196,7 +196,7 @@ ALWAYS_INLINE int point_step(const System *system, MildScratch *scratch, const P
     return 1;
 }
 
-ALWAYS_INLINE void point_between(const Point *from, const Point *to, double t, Point *point,
+MILD_HD void point_between(const Point *from, const Point *to, double t, Point *point,
                                  int n) {
     for (int i = 0; i < n; i++) {
         point->impulse.at[i] = from->impulse.at[i] + t * (to->impulse.at[i] - from->impulse.at[i]);
@@ -214,14 +214,14 @@ void point_halve(const System *system, MildScratch *scratch, const Point *at, Po
 void point_correct(const System *system, MildScratch *scratch, Point *at, Point *next, int n,
                    int parts);
 
-ALWAYS_INLINE int point_solves(const System *system, const Point *point, int n, int parts) {
+MILD_HD int point_solves(const System *system, const Point *point, int n, int parts) {
     return point->rests ||
            point->residual <= system->tolerance * system_norm(system, point->impulse.at, n, parts);
 }
 
 /* Plain Newton steps from `best`, at which the last pass was made. Leaves the best point seen in
  * `best`. Returns the number of steps. */
-ALWAYS_INLINE int newton_plain(const System *system, MildScratch *scratch, Point *best, int limit,
+MILD_HD int newton_plain(const System *system, MildScratch *scratch, Point *best, int limit,
                                int n, int parts) {
     Point at, next;
     int steps = 0, solved = 0;

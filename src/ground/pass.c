@@ -8,7 +8,7 @@
 #include "ground/friction.h"
 #include "ground/impulse.h"
 
-ALWAYS_INLINE void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int uneven,
+MILD_HD void slot_normal(const Slots *s, int i, double dt, const Motion *motion, int uneven,
                                int curves, int stops) {
     const Element element = slot_element(s, i);
     const SlotVelocity v = slot_velocity(s, i, motion, uneven);
@@ -18,7 +18,7 @@ ALWAYS_INLINE void slot_normal(const Slots *s, int i, double dt, const Motion *m
 }
 
 /* Normal impulses and their derivatives. */
-ALWAYS_INLINE void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven,
+MILD_HD void foot_normal(const Slots *slot, int end, double dt, const Motion *m, int uneven,
                                int curves, int stops) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *m;
@@ -66,7 +66,7 @@ static void foot_normals(const FootScratch *foot, double dt, const Motion *motio
  *
  * sums: of I, x I and y I. held: bool, the friction bounds are slot.bound. turned: bool, some
  * elements have a reversal velocity in slot.turn (energy.c). */
-ALWAYS_INLINE void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
+MILD_HD void foot_friction(const Slots *slot, int end, const Motion *m, int uneven, int held,
                                  int turned, double sums[9]) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *m;

@@ -6,10 +6,10 @@
 #include "ground/gather.h"
 #include "ground/mixture.h"
 #include "ground/models.h"
-#include "ground/place.h"
+#include "ground/locate.h"
 #include "ground/terrain.h"
 
-ALWAYS_INLINE void slot_begin(const Slots *s, int i, double dt, double rate, const Motion *motion,
+MILD_HD void slot_begin(const Slots *s, int i, double dt, double rate, const Motion *motion,
                               int curves) {
     const SlotVelocity v = slot_velocity(s, i, motion, 1); /* on level ground the slopes are 0 */
     const ElementMemory memory = slot_memory(s, i);
@@ -19,7 +19,7 @@ ALWAYS_INLINE void slot_begin(const Slots *s, int i, double dt, double rate, con
 }
 
 /* Calls element_begin for all slots. */
-ALWAYS_INLINE void slots_begin(const Slots *slot, int end, double dt, const Motion *now,
+MILD_HD void slots_begin(const Slots *slot, int end, double dt, const Motion *now,
                                int curves) {
     const Slots local = *slot, *s = &local;
     const Motion motion = *now;
@@ -57,7 +57,7 @@ static int slots_sink(const Slots *slot, int end, double dt) {
     return sinking > 0.0;
 }
 
-ALWAYS_INLINE void slot_drag(const Slots *s, int i, double dt, const Motion *now,
+MILD_HD void slot_drag(const Slots *s, int i, double dt, const Motion *now,
                              const Motion *free, int curves) {
     const double slower = slot_velocity(s, i, now, 1).descent;
     const double faster = slot_velocity(s, i, free, 1).descent;
@@ -69,7 +69,7 @@ ALWAYS_INLINE void slot_drag(const Slots *s, int i, double dt, const Motion *now
 }
 
 /* Calls element_drag for all slots. */
-ALWAYS_INLINE void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
+MILD_HD void slots_drag(const Slots *slot, int end, double dt, const Motion *now,
                               const Motion *free, int curves) {
     const Slots local = *slot, *s = &local;
     const Motion before = *now;
@@ -166,7 +166,7 @@ int contact_prepare(const MildGround *ground, const MildTerrain *terrain,
         if (foot->uneven && terrain_is_level(terrain)) {
             slots_level(foot);
         }
-        foot_place(foot, terrain, ground->tiles > 0, input->position[f], input->rotation[f]);
+        foot_locate(foot, terrain, ground->tiles > 0, input->position[f], input->rotation[f]);
         foot_list(foot, input, foot->uneven ? terrain_steepest(terrain) : 0.0, f);
         if (foot->active > 0) {
             foot_prepare(foot, ground, f, terrain, input);

@@ -25,7 +25,7 @@ void mild_resist_space(const double normal[3], const double direction[3], double
 }
 
 /* Adapts the law of one slot to its motion at the start of the step. */
-ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, const Plate *plate,
+MILD_HD void slot_resist(const Slots *s, int i, double dt, double rate, const Plate *plate,
                                const Motion *motion, int in_space, int curves) {
     const SlotVelocity v = slot_velocity(s, i, motion, 1);
     const ElementMemory memory = slot_memory(s, i);
@@ -37,7 +37,7 @@ ALWAYS_INLINE void slot_resist(const Slots *s, int i, double dt, double rate, co
 }
 
 /* The same for all slots of a foot on this theory alone. */
-ALWAYS_INLINE void slots_resist(const Slots *slot, int end, double dt, const Plate *sole,
+MILD_HD void slots_resist(const Slots *slot, int end, double dt, const Plate *sole,
                                 const Motion *now, int in_space) {
     const Slots local = *slot, *s = &local;
     const Plate plate = *sole;
@@ -74,7 +74,7 @@ static void foot_resist_some(const FootScratch *foot, const MildTerrain *terrain
 }
 
 /* The foot's slots on `model`. in_space: bool, a constant. The padding has no strength. */
-ALWAYS_INLINE void foot_resist(const FootScratch *foot, const MildTerrain *terrain, int model,
+MILD_HD void foot_resist(const FootScratch *foot, const MildTerrain *terrain, int model,
                                double dt, const double *rotation, const Motion *now, int in_space) {
     const Plate plate = plate_of(rotation);
     if (terrain_only(terrain, model)) {

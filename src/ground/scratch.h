@@ -30,7 +30,7 @@ typedef struct FootScratch {
     double center_y; /* [m] */
     double radius;   /* [m] distance from the ankle to the farthest element */
 
-    /* Pose: foot_place. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
+    /* Pose: foot_locate. The vector from the ankle to an element is p = arm[0] + x arm[1] + y
      * arm[2]. */
     double origin[3]; /* [m] the ankle, world */
     double arm[3][3]; /* world: the frame's point (0, 0, z) [m], its x axis [-], its y axis [-] */

@@ -11,7 +11,7 @@
 #include "ground/element.h"
 #include "ground/motion.h"
 
-#define ALWAYS_INLINE static inline __attribute__((always_inline))
+#define MILD_HD static inline __attribute__((always_inline))
 
 /* Arrays of a foot's slots [padded]. Meaning and symbol are at the field of the same name of
  * Element or ElementMemory. Given here are the unit and the function that writes the array. */
@@ -101,7 +101,7 @@ typedef struct {
 #define SLOT_LAW_LOAD(name) .name = s->name[i],
 /* The element of a slot, by value. The compiler does not load fields that the caller does not
  * use. */
-ALWAYS_INLINE Element slot_element(const Slots *s, int i) {
+MILD_HD Element slot_element(const Slots *s, int i) {
     return (Element){
         .law = {LAW_NUMBERS(SLOT_LAW_LOAD)},
         .recovery = s->recovery[i],
@@ -134,7 +134,7 @@ ALWAYS_INLINE Element slot_element(const Slots *s, int i) {
 }
 
 /* What the element of a slot remembers. */
-ALWAYS_INLINE ElementMemory slot_memory(const Slots *s, int i) {
+MILD_HD ElementMemory slot_memory(const Slots *s, int i) {
     return (ElementMemory){
         .depth_max = s->depth_max[i],
         .middle = s->last_middle[i],
@@ -149,7 +149,7 @@ ALWAYS_INLINE ElementMemory slot_memory(const Slots *s, int i) {
 }
 
 /* Stores the fields that element_begin sets. */
-ALWAYS_INLINE void slot_store(const Slots *s, int i, const Element *e) {
+MILD_HD void slot_store(const Slots *s, int i, const Element *e) {
     s->middle[i] = e->middle;
     s->yield_depth[i] = e->yield_depth;
     s->virgin_depth[i] = e->virgin_depth;
@@ -174,7 +174,7 @@ typedef struct {
 } SlotVelocity;
 
 /* uneven: bool, the ground slopes. It must be a constant in a loop over slots. */
-ALWAYS_INLINE SlotVelocity slot_velocity(const Slots *s, int i, const Motion *motion, int uneven) {
+MILD_HD SlotVelocity slot_velocity(const Slots *s, int i, const Motion *motion, int uneven) {
     SlotVelocity v;
     v.x = motion_at(motion->x, s->x[i], s->y[i]);
     v.y = motion_at(motion->y, s->x[i], s->y[i]);

@@ -10,7 +10,7 @@
 #include "learn/ppo_step.h"
 #include "learn/returns.h"
 
-size_t ppo_place_batch(PpoBatch *b, const Network *n, void *block) {
+size_t ppo_carve_batch(PpoBatch *b, const Network *n, void *block) {
     const size_t samples = (size_t)b->steps * (size_t)b->envs, more = samples + (size_t)b->envs;
     struct {
         float **at;
@@ -79,7 +79,7 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
     LossChunk chunk;
     ppo->stride = (count + 15) / 16 * 16;
     ppo->scratch_floats = loss_carve(n, PPO_CHUNK, ppo->mirror_rows, NULL, &chunk);
-    ppo->batch_bytes = ppo_place_batch(&ppo->batch, n, NULL);
+    ppo->batch_bytes = ppo_carve_batch(&ppo->batch, n, NULL);
     ppo->batch_block = take(ppo, ppo->batch_bytes);
     ppo->gradient = take(ppo, (size_t)ppo->part.shards * ppo->stride * sizeof(float));
     ppo->first = take(ppo, count * sizeof(float));
@@ -107,7 +107,7 @@ static int take_all(Ppo *ppo, const PpoMirror *mirror) {
         return 0;
     }
     memset(ppo->batch_block, 0, ppo->batch_bytes);
-    ppo_place_batch(&ppo->batch, n, ppo->batch_block);
+    ppo_carve_batch(&ppo->batch, n, ppo->batch_block);
     memset(ppo->batch.valid, 1, samples);
     ppo->start = ppo->batch;
     memset(ppo->first, 0, count * sizeof(float));
@@ -246,14 +246,14 @@ static void copy_rows(const Network *n, const PpoBatch *to, const PpoBatch *from
 MildStatus ppo_move_rollout(Ppo *ppo, const PpoBatch *device, MildError *error) {
     const Network *n = &ppo->policy->network;
     PpoBatch start = {.steps = 0, .envs = ppo->batch.envs};
-    const size_t bytes = ppo_place_batch(&start, n, NULL), before = ppo->bytes;
+    const size_t bytes = ppo_carve_batch(&start, n, NULL), before = ppo->bytes;
     void *block = take(ppo, bytes);
     if (!block) {
         ppo->bytes = before;
         return mild_fail(error, MILD_ERROR_MEMORY, "no memory for the observations of %d robots",
                          start.envs);
     }
-    ppo_place_batch(&start, n, block);
+    ppo_carve_batch(&start, n, block);
     copy_rows(n, &start, &ppo->start, 0);
     free(ppo->batch_block);
     ppo->bytes -= (ppo->batch_bytes + 63) / 64 * 64;
@@ -268,7 +268,7 @@ MildStatus ppo_move_rollout(Ppo *ppo, const PpoBatch *device, MildError *error) 
 size_t ppo_batch_like(const Ppo *ppo, void *block, PpoBatch *batch) {
     batch->steps = ppo->batch.steps;
     batch->envs = ppo->batch.envs;
-    return ppo_place_batch(batch, &ppo->policy->network, block);
+    return ppo_carve_batch(batch, &ppo->policy->network, block);
 }
 
 int ppo_is_resident(const Ppo *ppo) {

@@ -57,7 +57,7 @@ typedef struct Ppo {
 
 /* Places the arrays of a rollout of b->steps x b->envs in the block, which is aligned to 64 bytes,
  * and returns its bytes. NULL: only counts them. */
-size_t ppo_place_batch(PpoBatch *b, const Network *network, void *block);
+size_t ppo_carve_batch(PpoBatch *b, const Network *network, void *block);
 /* Moves the rollout to these arrays, which are the backend's. Frees its memory on the CPU but for
  * the rows of time 0. */
 MildStatus ppo_move_rollout(Ppo *ppo, const PpoBatch *device, MildError *error);

@@ -235,7 +235,7 @@ static void accelerate(RobotSim *sim) {
 
 /* Fixes the pose of the feet before the step, because forces refer to the pose in which they were
  * computed. */
-static void place_feet(RobotSim *sim) {
+static void update_feet(RobotSim *sim) {
     MildContactInput *input = &sim->input;
     for (int f = 0; f < sim->robot->def.feet; f++) {
         memcpy(input->position[f], sim->feet[f].position, sizeof input->position[f]);
@@ -316,7 +316,7 @@ int robot_sim_step(RobotSim *sim, const double *torque, const double *push,
     int rigid = sim->variation.rigid;
 
     smooth_dynamics(sim, torque, push);
-    place_feet(sim);
+    update_feet(sim);
     sim->data->ncon = 0;
     if (rigid) {
         accelerate(sim);

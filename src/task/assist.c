@@ -53,7 +53,7 @@ TASK_FN int task_assist(const TaskEnv *env, const TaskDef *def, const Robot *rob
         return 0;
     }
     const TaskReal *turn = rotation, *v = qvel;
-    double length = place_root(turn[0] * turn[0] + turn[3] * turn[3]);
+    double length = task_sqrt(turn[0] * turn[0] + turn[3] * turn[3]);
     double c = length > 0 ? turn[0] / length : 1, s = length > 0 ? turn[3] / length : 0;
     const double *hand = robot_assist(robot);
     double wanted[2] = {c * env->command[0] - s * env->command[1],

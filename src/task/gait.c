@@ -34,8 +34,8 @@ static inline MILD_BOTH double swing_progress(const Robot *robot, double phase, 
 /* The foot's clock: positive in stance, negative in swing. */
 static inline MILD_BOTH double wave(const Robot *robot, double phase, int foot) {
     double offset = robot_gait_offset(robot, foot);
-    return offset < 0.5 ? place_sin(TWO_PI * (phase - offset))
-                        : -place_sin(TWO_PI * (phase - (offset - 0.5)));
+    return offset < 0.5 ? task_sin(TWO_PI * (phase - offset))
+                        : -task_sin(TWO_PI * (phase - (offset - 0.5)));
 }
 
 TASK_FN int task_gait_stance(const Robot *robot, double phase, int standing, int foot) {
@@ -52,7 +52,7 @@ TASK_FN int task_gait_either(const TaskDef *def, const Robot *robot, double phas
 TASK_FN double task_gait_height(const TaskDef *def, const Robot *robot, double phase, int standing,
                                 int foot) {
     double s = swing_progress(robot, phase, foot);
-    return standing || s < 0 ? 0 : def->swing_apex * place_sin(0.5 * TWO_PI * s);
+    return standing || s < 0 ? 0 : def->swing_apex * task_sin(0.5 * TWO_PI * s);
 }
 
 /* The vendor's reference motion: the swing leg bends by A |sin| times `swing` of robot.ini. For

@@ -38,21 +38,21 @@ static inline MILD_BOTH void make_frame(const TaskEnv *env, const TaskDef *def, 
                                         const TaskReal *joint, const TaskReal *speed,
                                         float *frame) {
     int joints = env->shape.joints;
-    for (int i = place_lane(); i < 3; i += PLACE_LANES) {
+    for (int i = task_lane(); i < 3; i += TASK_LANES) {
         frame[i] = (float)omega[i];
         frame[3 + i] = (float)(env->command_seen[i] * (i < 2 ? 2 : 1));
         frame[6 + i] = (float)gravity[i];
     }
     float *q = frame + 9, *qd = q + joints, *action = qd + joints, *clock = action + joints;
-    for (int i = place_lane(); i < joints; i += PLACE_LANES) {
+    for (int i = task_lane(); i < joints; i += TASK_LANES) {
         q[i] = (float)(joint[i] - pose[i]);
         qd[i] = (float)(0.05 * speed[i]);
         action[i] = env->action[0][i];
     }
-    if (place_lane() == 0) {
+    if (task_lane() == 0) {
         int still = !def->clock || task_is_standing(def, env->command_seen);
-        clock[0] = still ? 0 : (float)place_sin(TWO_PI * env->phase);
-        clock[1] = still ? 0 : (float)place_cos(TWO_PI * env->phase);
+        clock[0] = still ? 0 : (float)task_sin(TWO_PI * env->phase);
+        clock[1] = still ? 0 : (float)task_cos(TWO_PI * env->phase);
     }
 }
 
@@ -66,7 +66,7 @@ static inline MILD_BOTH void draw_noise(const TaskEnv *env, int pair, double noi
 
 static inline MILD_BOTH void add_noise(const TaskEnv *env, const TaskDef *def, float *frame) {
     float *q = frame + 9, *qd = q + env->shape.joints;
-    for (int pair = place_lane(); pair < 3 + env->shape.joints; pair += PLACE_LANES) {
+    for (int pair = task_lane(); pair < 3 + env->shape.joints; pair += TASK_LANES) {
         double noise[2];
         draw_noise(env, pair, noise);
         if (pair < 3) {
@@ -91,7 +91,7 @@ static inline MILD_BOTH void write_estimates(const TaskEnv *env, const TaskDef *
                                              const RobotSim *sim, float *estimate) {
     const TaskReal *rotation = robot_sim_base_rotation(sim);
     int feet = env->shape.feet;
-    for (int n = place_lane(); n <= feet; n += PLACE_LANES) {
+    for (int n = task_lane(); n <= feet; n += TASK_LANES) {
         const RobotFoot *foot = robot_sim_foot(sim, n > 0 ? n - 1 : 0);
         float *velocity = estimate + 3 * n;
         to_base(rotation, n > 0 ? foot->sole_center_velocity : robot_sim_qvel(sim), velocity);
@@ -110,7 +110,7 @@ static inline MILD_BOTH void write_feet(const TaskEnv *env, const TaskDef *def, 
                                         const RobotSim *sim, float *out) {
     int standing = task_is_standing(def, env->command);
     const float force_scale = (float)(0.6 * robot_foot_force(robot)); /* [N] */
-    for (int f = place_lane(); f < env->shape.feet; f += PLACE_LANES) {
+    for (int f = task_lane(); f < env->shape.feet; f += TASK_LANES) {
         const RobotFoot *foot = robot_sim_foot(sim, f);
         float *own = out + 6 * f;
         to_base(robot_sim_base_rotation(sim), foot->force, own);
@@ -131,21 +131,21 @@ static inline MILD_BOTH void write_episode(const TaskEnv *env, const TaskDef *de
     const float *ground = task_ground_under(env, def, robot, sim, buffer);
     const RobotVariation *variation = &env->variation;
     float *const rest = out + 10 + TASK_GROUND_NUMBERS;
-    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
+    for (int i = task_lane(); i < 6; i += TASK_LANES) {
         out[i] = (float)env->push[i];
     }
-    for (int i = place_lane(); i < 3; i += PLACE_LANES) {
+    for (int i = task_lane(); i < 3; i += TASK_LANES) {
         out[7 + i] = (float)(variation->com_offset[i] * 100);
         rest[9 + i] = (float)env->smooth_velocity[i];
     }
-    for (int i = place_lane(); i < TASK_GROUND_NUMBERS; i += PLACE_LANES) {
+    for (int i = task_lane(); i < TASK_GROUND_NUMBERS; i += TASK_LANES) {
         out[10 + i] = variation->rigid ? 0 : ground[i];
     }
-    if (place_lane() == 0) {
+    if (task_lane() == 0) {
         const double step = def->physics_dt / TASK_PERIOD;
         out[6] = (float)(variation->base_mass_add / 4);
         rest[0] = (float)variation->rigid;
-        rest[1] = (float)place_above(sim, &env->terrain);
+        rest[1] = (float)task_height_above(sim, &env->terrain);
         rest[2] = (float)env->strength[0];
         rest[3] = (float)variation->armature_scale;
         rest[4] = (float)(env->lag_command * step);
@@ -157,7 +157,7 @@ static inline MILD_BOTH void write_episode(const TaskEnv *env, const TaskDef *de
 }
 
 static inline MILD_BOTH void copy_row(const float *from, int width, float *to) {
-    for (int j = place_lane(); j < width; j += PLACE_LANES) {
+    for (int j = task_lane(); j < width; j += TASK_LANES) {
         to[j] = from[j];
     }
 }
@@ -169,22 +169,22 @@ static inline MILD_BOTH void write_history(TaskEnv *env, const TaskDef *def, int
     const int width = env->shape.observation, stride = def->history_stride;
     const uint32_t held = env->held;
     const float *frame = history + (TASK_FRAMES - 1) * width;
-    for (int j = place_lane(); j < width; j += PLACE_LANES) {
+    for (int j = task_lane(); j < width; j += TASK_LANES) {
         TaskFrame *column = task_env_frames(env) + j;
         uint32_t place = env->oldest;
         for (uint32_t k = 0; first && k < held; k++) {
-            column[k * (uint32_t)width] = place_pack(frame[j]);
+            column[k * (uint32_t)width] = frame_pack(frame[j]);
         }
         for (int i = 0; i < TASK_FRAMES - 1; i++) {
             float sum = 0;
-            PLACE_UNROLL
+            TASK_UNROLL
             for (int k = 0; k < stride; k++) {
-                sum += place_unpack(column[place * (uint32_t)width]);
+                sum += frame_unpack(column[place * (uint32_t)width]);
                 place = place + 1 < held ? place + 1 : 0;
             }
             history[i * width + j] = sum / (float)stride;
         }
-        column[place * (uint32_t)width] = place_pack(frame[j]);
+        column[place * (uint32_t)width] = frame_pack(frame[j]);
     }
 }
 
@@ -192,17 +192,17 @@ TASK_FN void task_observe(TaskEnv *env, const TaskDef *def, const Robot *robot, 
                           const TaskReading *reading, int first, const TaskView *view) {
     const double *pose = robot_default_pose(robot);
     const int width = env->shape.observation;
-    float *history = PLACE_HISTORY ? task_env_history(env) : view->history;
+    float *history = TASK_HAS_HISTORY ? task_env_history(env) : view->history;
     float *frame = history + (TASK_FRAMES - 1) * width;
     make_frame(env, def, pose, reading->omega, reading->gravity, reading->q, reading->qd, frame);
-    place_meet();
+    task_lanes_sync();
     if (def->observe_noise) {
         add_noise(env, def, frame);
-        place_meet();
+        task_lanes_sync();
     }
     write_history(env, def, first, history);
-    place_meet();
-    if (place_lane() == 0) {
+    task_lanes_sync();
+    if (task_lane() == 0) {
         env->oldest = (env->oldest + 1) % env->held;
     }
     if (view->history && view->history != history) {

@@ -35,14 +35,14 @@ TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot
     for (int i = 0; i < 3; i++) {
         env->variation.com_offset[i] = spread(&r, z->com_offset);
     }
-    for (int i = place_lane(); i <= TASK_JOINTS; i += PLACE_LANES) {
+    for (int i = task_lane(); i <= TASK_JOINTS; i += TASK_LANES) {
         Random own = random_after(r, i);
         env->variation.link_mass_scale[i] =
             i <= env->shape.joints ? (TaskReal)draw(&own, z->link_mass) : 1;
     }
     r = random_after(r, env->shape.joints + 1);
     double strength = draw(&r, z->strength);
-    for (int i = place_lane(); i < env->shape.joints; i += PLACE_LANES) {
+    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
         Random own = random_after(r, 3 * i);
         env->kp_scale[i] = draw(&own, z->gain);
         env->kd_scale[i] = draw(&own, z->gain);
@@ -58,7 +58,7 @@ TASK_FN void task_randomize(TaskEnv *env, const TaskDef *def, const Robot *robot
     env->lag_command = draw_lag(&r, def);
     env->lag_motor = draw_lag(&r, def);
     env->lag_imu = draw_lag(&r, def);
-    place_meet();
+    task_lanes_sync();
 }
 
 TASK_FN void task_draw_command(TaskEnv *env, const TaskDef *def) {

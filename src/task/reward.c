@@ -25,8 +25,8 @@ static inline MILD_BOTH TaskReal per_pair(const TaskMotion *m, TaskReal sum) {
 static inline MILD_BOTH TaskReal tracking(const TaskMotion *m, TaskReal error) {
     const RewardDef *def = &m->def->reward;
     const TaskReal narrow = TASK_REAL(def->tracking_narrow);
-    return (1 - narrow) * place_exp(-def->tracking_sharpness * square(error)) +
-           narrow * place_exp(-fabs(error) / def->tracking_width);
+    return (1 - narrow) * task_exp(-def->tracking_sharpness * square(error)) +
+           narrow * task_exp(-fabs(error) / def->tracking_width);
 }
 
 /* Forward and sideways errors count separately. In the norm of both, a little sway would hide a
@@ -97,26 +97,26 @@ static inline MILD_BOTH TaskReal reward_slip(const TaskMotion *m) {
 }
 
 static inline MILD_BOTH TaskReal reward_base_acceleration(const TaskMotion *m) {
-    return place_exp(-3 * m->twist_change);
+    return task_exp(-3 * m->twist_change);
 }
 
 static inline MILD_BOTH TaskReal reward_action_smoothness(const TaskMotion *m) {
     TaskReal sum = 0;
-    for (int i = place_lane(); i < m->env->shape.actions; i += PLACE_LANES) {
+    for (int i = task_lane(); i < m->env->shape.actions; i += TASK_LANES) {
         TaskReal a = m->env->action[0][i], a1 = m->env->action[1][i], a2 = m->env->action[2][i];
         sum += square(a - a1) + square(a - 2 * a1 + a2);
     }
-    return place_sum(sum);
+    return task_lanes_sum(sum);
 }
 
 static inline MILD_BOTH TaskReal reward_reference_motion(const TaskMotion *m) {
     TaskReal sum = 0;
-    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
+    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum +=
             square(m->q[i] - task_gait_reference(m->def, m->robot, m->env->phase, m->standing, i));
     }
-    TaskReal d = place_root(place_sum(sum));
-    return place_exp(-2 * d) - TASK_REAL(0.2) * clamp(d, 0, 0.5);
+    TaskReal d = task_sqrt(task_lanes_sum(sum));
+    return task_exp(-2 * d) - TASK_REAL(0.2) * clamp(d, 0, 0.5);
 }
 
 /* The vendor's exp(-100 x) alone is flat beyond a fifth of a radian, and so gives no signal
@@ -126,22 +126,22 @@ static inline MILD_BOTH TaskReal reward_default_pose(const TaskMotion *m) {
     TaskReal away = 0, all = 0;
     for (int f = -1; f < m->env->shape.feet; f++) { /* -1: the trunk's joints */
         TaskReal leg = 0;
-        for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
+        for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
             int same = robot_joint_foot(m->robot)[i] == f;
             leg += same ? square(still[i] * (m->q[i] - pose[i])) : 0;
         }
-        away += place_root(place_sum(leg));
+        away += task_sqrt(task_lanes_sum(leg));
     }
-    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
+    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         all += square(m->q[i] - pose[i]);
     }
     return TASK_REAL(0.5) *
-               (place_exp(-100 * clamp(away - TASK_REAL(0.1), 0, 50)) + place_exp(-3 * away)) -
-           TASK_REAL(0.01) * place_root(place_sum(all));
+               (task_exp(-100 * clamp(away - TASK_REAL(0.1), 0, 50)) + task_exp(-3 * away)) -
+           TASK_REAL(0.01) * task_sqrt(task_lanes_sum(all));
 }
 
 static inline MILD_BOTH TaskReal reward_base_height(const TaskMotion *m) {
-    return place_exp(-100 * fabs(m->base_height - task_nominal_height(m->def, m->robot)));
+    return task_exp(-100 * fabs(m->base_height - task_nominal_height(m->def, m->robot)));
 }
 
 static inline MILD_BOTH TaskReal within(TaskReal distance, const double wanted[2],
@@ -149,7 +149,7 @@ static inline MILD_BOTH TaskReal within(TaskReal distance, const double wanted[2
     const double *limits = wanted[1] > 0 ? wanted : own;
     TaskReal below = clamp(limits[0] - distance, 0, 0.5),
              above = clamp(distance - limits[1], 0, 0.5);
-    return TASK_REAL(0.5) * (place_exp(-100 * below) + place_exp(-100 * above));
+    return TASK_REAL(0.5) * (task_exp(-100 * below) + task_exp(-100 * above));
 }
 
 static inline MILD_BOTH TaskReal reward_feet_distance(const TaskMotion *m) {
@@ -161,9 +161,9 @@ static inline MILD_BOTH TaskReal reward_knee_distance(const TaskMotion *m) {
 }
 
 static inline MILD_BOTH TaskReal reward_orientation(const TaskMotion *m) {
-    TaskReal tilt = place_root(square(m->gravity[0]) + square(m->gravity[1]));
+    TaskReal tilt = task_sqrt(square(m->gravity[0]) + square(m->gravity[1]));
     return TASK_REAL(0.5) *
-           (place_exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + place_exp(-4 * tilt));
+           (task_exp(-10 * (fabs(m->gravity[0]) + fabs(m->gravity[1]))) + task_exp(-4 * tilt));
 }
 
 /* Paid once, at touchdown. It is divided by the period, because rewards are rates that are
@@ -174,8 +174,8 @@ static inline MILD_BOTH TaskReal reward_air_time(const TaskMotion *m) {
 }
 
 static inline MILD_BOTH TaskReal reward_base_motion(const TaskMotion *m) {
-    return TASK_REAL(0.5) * (place_exp(-10 * square(m->velocity[2])) +
-                             place_exp(-5 * place_root(square(m->omega[0]) + square(m->omega[1]))));
+    return TASK_REAL(0.5) * (task_exp(-10 * square(m->velocity[2])) +
+                             task_exp(-5 * task_sqrt(square(m->omega[0]) + square(m->omega[1]))));
 }
 
 static inline MILD_BOTH TaskReal reward_contact_force(const TaskMotion *m) {
@@ -188,35 +188,35 @@ static inline MILD_BOTH TaskReal reward_contact_force(const TaskMotion *m) {
 
 static inline MILD_BOTH TaskReal reward_torque(const TaskMotion *m) {
     TaskReal sum = 0;
-    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
+    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum += square(m->torque[i]);
     }
-    return place_sum(sum);
+    return task_lanes_sum(sum);
 }
 
 static inline MILD_BOTH TaskReal reward_joint_speed(const TaskMotion *m) {
     TaskReal sum = 0;
-    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
+    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum += square(m->qd[i]);
     }
-    return place_sum(sum);
+    return task_lanes_sum(sum);
 }
 
 static inline MILD_BOTH TaskReal reward_joint_acceleration(const TaskMotion *m) {
     TaskReal sum = 0;
-    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
+    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum += square((m->qd[i] - m->qd_before[i]) / TASK_REAL(TASK_PERIOD));
     }
-    return place_sum(sum);
+    return task_lanes_sum(sum);
 }
 
 /* What the cost of transport counts. */
 static inline MILD_BOTH TaskReal reward_power(const TaskMotion *m) {
     TaskReal sum = 0;
-    for (int i = place_lane(); i < m->env->shape.joints; i += PLACE_LANES) {
+    for (int i = task_lane(); i < m->env->shape.joints; i += TASK_LANES) {
         sum += TASK_REAL(fabs(m->torque[i] * m->qd[i]));
     }
-    return place_sum(sum);
+    return task_lanes_sum(sum);
 }
 
 /* Penalises legs that are too close, because the engine computes no contact between them. */

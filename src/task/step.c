@@ -18,7 +18,7 @@ static inline MILD_BOTH size_t whole_lines(size_t bytes) {
 }
 
 static inline MILD_BOTH size_t history_bytes(const TaskShape *shape) {
-    return PLACE_HISTORY ? (size_t)shape->history * sizeof(float) : 0;
+    return TASK_HAS_HISTORY ? (size_t)shape->history * sizeof(float) : 0;
 }
 
 TASK_FN uint32_t task_frames_held(const TaskDef *def) {
@@ -27,7 +27,7 @@ TASK_FN uint32_t task_frames_held(const TaskDef *def) {
 
 /* A device has no history, and the frames right behind TaskEnv. */
 static inline MILD_BOTH size_t history_place(void) {
-    return PLACE_HISTORY ? whole_lines(sizeof(TaskEnv)) : sizeof(TaskEnv);
+    return TASK_HAS_HISTORY ? whole_lines(sizeof(TaskEnv)) : sizeof(TaskEnv);
 }
 
 TASK_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held) {
@@ -93,16 +93,16 @@ static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const 
     const double *pose = robot_default_pose(robot);
     double yaw = env->command_frozen ? 0 : PI * (2 * random_unit(&r) - 1);
     env->robot.qpos[2] = env->terrain.height + robot_stand_height(robot) - depth + 0.002;
-    env->robot.qpos[3] = place_cos(0.5 * yaw);
-    env->robot.qpos[6] = place_sin(0.5 * yaw);
-    for (int i = place_lane(); i < env->shape.joints; i += PLACE_LANES) {
+    env->robot.qpos[3] = task_cos(0.5 * yaw);
+    env->robot.qpos[6] = task_sin(0.5 * yaw);
+    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
         Random own = random_after(r, i);
         double q = pose[i] + z->initial_joint * (2 * random_unit(&own) - 1);
         env->robot.qpos[7 + i] =
             fmin(fmax(q, robot_joint_low(robot)[i]), robot_joint_high(robot)[i]);
     }
     r = random_after(r, env->shape.joints);
-    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
+    for (int i = task_lane(); i < 6; i += TASK_LANES) {
         Random own = random_after(r, i);
         env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&own) - 1);
     }
@@ -124,27 +124,27 @@ static inline MILD_BOTH void see_command(TaskEnv *env) {
 
 /* What an episode knows of the one before, and its command. */
 static inline MILD_BOTH void clear(TaskEnv *env, const TaskDef *def) {
-    place_clear(&env->robot, sizeof env->robot);
-    place_clear(env->action, sizeof env->action);
-    place_clear(env->air_time, sizeof env->air_time);
-    place_clear(env->joint_speed, sizeof env->joint_speed);
-    place_clear(env->smooth_velocity, sizeof env->smooth_velocity);
-    place_clear(env->push, sizeof env->push);
-    place_clear(env->term_sum, sizeof env->term_sum);
+    task_clear(&env->robot, sizeof env->robot);
+    task_clear(env->action, sizeof env->action);
+    task_clear(env->air_time, sizeof env->air_time);
+    task_clear(env->joint_speed, sizeof env->joint_speed);
+    task_clear(env->smooth_velocity, sizeof env->smooth_velocity);
+    task_clear(env->push, sizeof env->push);
+    task_clear(env->term_sum, sizeof env->term_sum);
     env->reward_sum = env->speed_error_sum = 0;
-    if (place_lane() == 0 && !env->command_frozen) {
+    if (task_lane() == 0 && !env->command_frozen) {
         task_draw_command(env, def);
     }
-    place_meet();
+    task_lanes_sync();
     see_command(env);
 }
 
 TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot,
                                 double depth) {
     clear(env, def);
-    place_meet();
+    task_lanes_sync();
     draw_start(env, def, robot, depth);
-    place_meet();
+    task_lanes_sync();
 }
 
 TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *reading) {
@@ -159,7 +159,7 @@ TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *
 
 static inline MILD_BOTH void accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
     float limit = (float)def->action_clip;
-    for (int i = place_lane(); i < env->shape.actions; i += PLACE_LANES) {
+    for (int i = task_lane(); i < env->shape.actions; i += TASK_LANES) {
         float a = action[i];
         env->action[2][i] = env->action[1][i];
         env->action[1][i] = env->action[0][i];
@@ -169,7 +169,7 @@ static inline MILD_BOTH void accept_action(TaskEnv *env, const TaskDef *def, con
 
 static inline MILD_BOTH void push_base(TaskEnv *env, const TaskDef *def) {
     const RandomizeDef *z = &def->randomize;
-    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
+    for (int i = task_lane(); i < 6; i += TASK_LANES) {
         env->push[i] *= 0.95;
     }
     uint32_t interval = (uint32_t)(z->push_interval / TASK_PERIOD + 0.5);
@@ -177,7 +177,7 @@ static inline MILD_BOTH void push_base(TaskEnv *env, const TaskDef *def) {
         return;
     }
     Random r = random_at(env->seed ^ RANDOM_USE_PUSH, env->index, env->tick);
-    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
+    for (int i = task_lane(); i < 6; i += TASK_LANES) {
         Random own = random_after(r, i);
         double size = i == 2 ? 0 : i < 3 ? z->push_linear : z->push_angular;
         env->push[i] = size * (2 * random_unit(&own) - 1);
@@ -233,9 +233,9 @@ static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const
         const RobotFoot *foot = robot_sim_foot(sim, f);
         const TaskReal *v = foot->sole_center_velocity, *force = foot->force;
         m->foot_height[f] = foot->sole_height;
-        m->foot_speed[f] = place_root(v[0] * v[0] + v[1] * v[1]);
+        m->foot_speed[f] = task_sqrt(v[0] * v[0] + v[1] * v[1]);
         m->foot_force[f] =
-            place_root(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
+            task_sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
         m->contact[f] = force[2] > CONTACT_FORCE;
         m->stance[f] = task_gait_stance(robot, env->phase, m->standing, f);
         m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
@@ -249,8 +249,8 @@ static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const
         }
     }
     m->base_height = robot_sim_qpos(sim)[2] - stance_height / (TaskReal)(stances ? stances : 1);
-    place_meet();
-    for (int f = place_lane(); f < env->shape.feet; f += PLACE_LANES) {
+    task_lanes_sync();
+    for (int f = task_lane(); f < env->shape.feet; f += TASK_LANES) {
         env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + TASK_REAL(TASK_PERIOD);
     }
 }
@@ -261,7 +261,7 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     memset(&m, 0, sizeof m);
     m.def = def, m.robot = robot, m.env = env;
     const TaskReal *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
-    TaskReal length = place_root(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
+    TaskReal length = task_sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
     TaskReal c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
     TaskReal twist[6], change = 0;
     m.standing = task_is_standing(def, env->command);
@@ -279,18 +279,18 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     for (int i = 0; i < parts; i++) {
         change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
     }
-    m.twist_change = place_root(change);
-    place_meet();
-    for (int i = place_lane(); i < 3; i += PLACE_LANES) {
+    m.twist_change = task_sqrt(change);
+    task_lanes_sync();
+    for (int i = task_lane(); i < 3; i += TASK_LANES) {
         const TaskReal now = i < 2 ? m.velocity[i] : m.omega[2];
         env->smooth_velocity[i] += TASK_REAL(TASK_PERIOD) / TASK_REAL(def->reward.tracking_time) *
                                    (now - env->smooth_velocity[i]);
     }
-    for (int i = place_lane(); i < 6; i += PLACE_LANES) {
+    for (int i = task_lane(); i < 6; i += TASK_LANES) {
         env->base_twist[i] = twist[i];
     }
     const TaskReal *q = robot_sim_qpos(sim) + 7;
-    for (int i = place_lane(); i < env->shape.joints; i += PLACE_LANES) {
+    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
         m.q[i] = q[i];
         m.qd[i] = qvel[6 + i];
         m.qd_before[i] = env->joint_speed[i];
@@ -300,7 +300,7 @@ TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const 
     m.foot_distance = robot_sim_foot_distance(sim);
     m.knee_distance = robot_sim_knee_distance(sim);
     feet_motion(env, def, robot, sim, &m);
-    place_meet();
+    task_lanes_sync();
     return m;
 }
 
@@ -311,7 +311,7 @@ static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
                                        const RobotSim *sim) {
     const double depth = env->variation.rigid ? 0 : def->shell_depth;
     return robot_sim_foot_distance(sim) < def->crossing_limit ||
-           robot_sim_base_rotation(sim)[8] < place_cos(def->tilt_limit) ||
+           robot_sim_base_rotation(sim)[8] < task_cos(def->tilt_limit) ||
            robot_sim_body_clearance(sim, &env->terrain) < -depth;
 }
 
@@ -347,12 +347,12 @@ static inline MILD_BOTH int take_reward(TaskEnv *env, const TaskDef *def, const 
     if (!isfinite(*reward)) {
         return 0;
     }
-    if (place_lane() == 0) {
+    if (task_lane() == 0) {
         env->speed_error_sum += hypot(env->smooth_velocity[0] - env->command[0],
                                       env->smooth_velocity[1] - env->command[1]);
         env->reward_sum += (TaskReal)*reward;
     }
-    for (int i = place_lane(); i < TASK_REWARD_COUNT; i += PLACE_LANES) {
+    for (int i = task_lane(); i < TASK_REWARD_COUNT; i += TASK_LANES) {
         env->term_sum[i] += terms[i] * TASK_REAL(TASK_PERIOD);
     }
     return 1;
@@ -368,12 +368,12 @@ TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *ro
     }
     out.valid = !bad;
     int fallen = bad || has_fallen(env, def, sim);
-    place_meet();
-    if (place_lane() == 0) {
+    task_lanes_sync();
+    if (task_lane() == 0) {
         task_advance_clock(env, def);
         task_assist_adapt(env, fallen);
     }
-    place_meet();
+    task_lanes_sync();
     out.timeout = !fallen && env->step >= env->step_limit;
     out.done = fallen || out.timeout;
     if (out.done) {

@@ -6,7 +6,7 @@
 #include "mild/error.h"
 #include "mild/field.h"
 #include "mild/map.h"
-#include "task/place.h"
+#include "task/lanes.h"
 
 #define TASK_PERIOD 0.01   /* [s] policy step: 100 Hz (paper) */
 #define TASK_STRIDE_MAX 16 /* greatest task.history_stride */

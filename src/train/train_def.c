@@ -35,14 +35,14 @@ TrainDef train_def_default(void) {
 
 #define FIELD(member, type, min, max, help) MILD_FIELD(TrainDef, member, type, 1, min, max, help)
 static const char *const robots_names[TRAIN_ROBOTS] = {"auto", "mujoco", "batch"};
-#define PLACE_FIELDS                                                                               \
+#define MACHINE_FIELDS                                                                               \
     MILD_FIELD(TrainDef, device, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->device, 0, 0,             \
                "[-] where the networks run: cpu, cuda or cuda:N (docs/gpu.md)"),                   \
         MILD_FIELD_CHOICE(TrainDef, robots, robots_names, TRAIN_ROBOTS,                            \
                           "[-] what steps the robots: mujoco on the cpu; batch, the batch engine " \
                           "(docs/engine.md), on train.device; auto: batch on a GPU, else mujoco")
-const MildField train_place_fields[] = {PLACE_FIELDS};
-const int train_place_field_count = sizeof train_place_fields / sizeof *train_place_fields;
+const MildField train_machine_fields[] = {MACHINE_FIELDS};
+const int train_machine_field_count = sizeof train_machine_fields / sizeof *train_machine_fields;
 const MildField train_fields[] = {
     MILD_FIELD(TrainDef, robot, MILD_FIELD_TEXT, sizeof((TrainDef *)0)->robot, 0, 0,
                "[-] name of a folder under robots/, or a folder of your own, with a slash"),
@@ -56,7 +56,7 @@ const MildField train_fields[] = {
           "[-] the same seed and config give the same numbers"),
     FIELD(threads, MILD_FIELD_INT, 0, 1024,
           "[-] threads; 0: one per core; the results do not depend on it"),
-    PLACE_FIELDS,
+    MACHINE_FIELDS,
     FIELD(grounds, MILD_FIELD_INT, 1, 1000000,
           "[-] grounds drawn at the start, from which the episodes of the batch engine choose"),
     MILD_FIELD(

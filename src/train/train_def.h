@@ -41,7 +41,7 @@ TrainDef train_def_default(void);
 extern const MildField train_fields[];
 extern const int train_field_count;
 /* Of these, device and robots, which evaluation has too. */
-extern const MildField train_place_fields[];
-extern const int train_place_field_count;
+extern const MildField train_machine_fields[];
+extern const int train_machine_field_count;
 
 #endif

@@ -69,7 +69,7 @@ static void keys_scale(void **state) {
     char text[96], wanted[96];
     snprintf(wanted, sizeof wanted, "friction %.2f (F V), k_pen %.4g (K M)", 1.21 * was->mu,
              was->k_pen / 1.1);
-    assert_string_equal(live_tell(&live, 0, text, sizeof text), wanted);
+    assert_string_equal(live_describe(&live, 0, text, sizeof text), wanted);
 
     for (int i = 0; i < 200; i++) { /* never out of the range of a material */
         live_take(&live, 0, &(WindowInput){.friction = 3, .stiffness = 3});

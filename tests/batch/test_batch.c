@@ -77,7 +77,7 @@ typedef struct {
     int labels;
     Kit kit[ROBOTS];
     uint64_t random;
-} Crowd;
+} Herd;
 
 /* What goes to a batch and what comes back, of all robots. */
 typedef struct {
@@ -97,7 +97,7 @@ static int material_of(int robot, int label) {
     return (robot + 5 * label) % MATERIALS;
 }
 
-static MildMap *crowd_map(const Shape *of, int *labels) {
+static MildMap *herd_map(const Shape *of, int *labels) {
     MildMapDef def = shape(of->kind, 0.03, 0.5);
     def.size = of->kind == MILD_MAP_MIXED ? 10.0 : 4.0;
     def.slope = 0.2;
@@ -109,14 +109,14 @@ static MildMap *crowd_map(const Shape *of, int *labels) {
 }
 
 /* Puts robot r somewhere on the map. */
-static void crowd_place(Crowd *crowd, int r) {
-    Kit *kit = &crowd->kit[r];
-    kit->terrain.map = crowd->map;
+static void herd_place(Herd *herd, int r) {
+    Kit *kit = &herd->kit[r];
+    kit->terrain.map = herd->map;
     kit->terrain.map_x = (double)(r % 16) / 8.0;
     kit->terrain.map_y = (double)(r % 7) / -4.0;
-    kit->terrain.material_count = crowd->labels;
-    for (int label = 0; label < crowd->labels; label++) {
-        kit->terrain.materials[label] = crowd->material[material_of(r, label)];
+    kit->terrain.material_count = herd->labels;
+    for (int label = 0; label < herd->labels; label++) {
+        kit->terrain.materials[label] = herd->material[material_of(r, label)];
     }
     for (int f = 0; f < kit->feet; f++) {
         double *at = kit->input.position[f];
@@ -124,57 +124,57 @@ static void crowd_place(Crowd *crowd, int r) {
     }
 }
 
-static void crowd_open(Crowd *crowd, const Shape *shape) {
+static void herd_open(Herd *herd, const Shape *shape) {
     static const double heights[3] = {0.0, 0.3, -0.2};
     const int concentric = mild_model_is_concentric(shape->model);
-    crowd->feet = shape->feet;
-    crowd->random = 5;
-    crowd->map = crowd_map(shape, &crowd->labels);
+    herd->feet = shape->feet;
+    herd->random = 5;
+    herd->map = herd_map(shape, &herd->labels);
     for (int f = 0; f < shape->feet; f++) {
-        crowd->soles[f] = concentric ? center : shape->feet > 2 ? plate : f ? right : left;
+        herd->soles[f] = concentric ? center : shape->feet > 2 ? plate : f ? right : left;
     }
     for (int m = 0; m < MATERIALS; m++) {
-        crowd->material[m] = kit_material(&crowd->random);
+        herd->material[m] = kit_material(&herd->random);
         if (shape->model != MILD_MODEL_MILD) {
             MildMaterial sand;
             mild_material_preset(mild_material_preset_name(m % mild_material_preset_count()),
                                  &sand);
             assert_int_equal(
-                mild_model_match(shape->model, &sand, left, 150.0, &crowd->material[m], NULL),
+                mild_model_match(shape->model, &sand, left, 150.0, &herd->material[m], NULL),
                 MILD_OK);
         }
     }
     for (int r = 0; r < ROBOTS; r++) {
-        Kit *kit = &crowd->kit[r];
-        kit_open(kit, shape->feet, (MildSole *)crowd->soles[0],
-                 (MildSole *)crowd->soles[shape->feet > 1], &crowd->material[r % MATERIALS], 5e-3);
-        kit_random_state(kit, &crowd->random);
+        Kit *kit = &herd->kit[r];
+        kit_open(kit, shape->feet, (MildSole *)herd->soles[0],
+                 (MildSole *)herd->soles[shape->feet > 1], &herd->material[r % MATERIALS], 5e-3);
+        kit_random_state(kit, &herd->random);
         kit->terrain.height = heights[r % 3];
         for (int f = 0; f < kit->feet; f++) {
             kit->input.position[f][2] += heights[r % 3] + 0.01;
-            kit->mass[f] = kit_uniform(&crowd->random, 3.0, 40.0);
-            kit->inertia[f] = kit->mass[f] * kit_uniform(&crowd->random, 0.02, 0.1);
+            kit->mass[f] = kit_uniform(&herd->random, 3.0, 40.0);
+            kit->inertia[f] = kit->mass[f] * kit_uniform(&herd->random, 0.02, 0.1);
         }
-        crowd_place(crowd, r);
+        herd_place(herd, r);
     }
 }
 
-static void crowd_close(Crowd *crowd) {
+static void herd_close(Herd *herd) {
     for (int r = 0; r < ROBOTS; r++) {
-        kit_close(&crowd->kit[r]);
+        kit_close(&herd->kit[r]);
     }
-    mild_map_destroy(crowd->map);
+    mild_map_destroy(herd->map);
 }
 
 /* Solves the next step of all robots by mild/ground.h, and hands the problem over. */
-static void crowd_solve(Crowd *crowd, Arrays *a) {
-    const int feet = crowd->feet, rows = 6 * feet;
+static void herd_solve(Herd *herd, Arrays *a) {
+    const int feet = herd->feet, rows = 6 * feet;
     for (int r = 0; r < ROBOTS; r++) {
-        Kit *kit = &crowd->kit[r];
+        Kit *kit = &herd->kit[r];
         double force[MILD_FEET_MAX][3];
         for (int f = 0; f < feet; f++) {
             for (int k = 0; k < 3; k++) {
-                force[f][k] = kit->mass[f] * kit_uniform(&crowd->random, -4, k == 2 ? 8 : 4);
+                force[f][k] = kit->mass[f] * kit_uniform(&herd->random, -4, k == 2 ? 8 : 4);
             }
         }
         kit_inverse_inertia(kit);
@@ -188,15 +188,15 @@ static void crowd_solve(Crowd *crowd, Arrays *a) {
         a->height[r] = (float)kit->terrain.height;
         a->map_origin[2 * r] = (float)kit->terrain.map_x;
         a->map_origin[2 * r + 1] = (float)kit->terrain.map_y;
-        for (int label = 0; label < crowd->labels; label++) {
-            a->material[r * crowd->labels + label] = material_of(r, label);
+        for (int label = 0; label < herd->labels; label++) {
+            a->material[r * herd->labels + label] = material_of(r, label);
         }
     }
 }
 
-static void crowd_advance(Crowd *crowd) {
+static void herd_advance(Herd *herd) {
     for (int r = 0; r < ROBOTS; r++) {
-        kit_advance(&crowd->kit[r]);
+        kit_advance(&herd->kit[r]);
     }
 }
 
@@ -207,13 +207,13 @@ typedef struct {
     Arrays *arrays; /* on the device */
 } Side;
 
-static void side_open(Side *side, const Crowd *crowd, int device) {
+static void side_open(Side *side, const Herd *herd, int device) {
     MildError error = {0};
     const MildBatchDef def = {
-        .robots = ROBOTS, .feet = crowd->feet, .soles = crowd->soles, .dt = 5e-3, .device = device};
+        .robots = ROBOTS, .feet = herd->feet, .soles = herd->soles, .dt = 5e-3, .device = device};
     side->batch = mild_batch_create(&def, &error);
-    if (!side->batch || mild_batch_set_materials(side->batch, crowd->material, MATERIALS, &error) ||
-        mild_batch_set_map(side->batch, crowd->map, &error)) {
+    if (!side->batch || mild_batch_set_materials(side->batch, herd->material, MATERIALS, &error) ||
+        mild_batch_set_map(side->batch, herd->map, &error)) {
         fail_msg("%s", error.text);
     }
     side->arrays = device == MILD_BATCH_HOST ? calloc(1, sizeof(Arrays))
@@ -285,17 +285,17 @@ static void check_errors(const char *name, Errors *errors, double median, double
 }
 
 /* Forces of a step against the kits'. */
-static void against_ground(Errors *errors, const Crowd *crowd, const Arrays *a) {
+static void against_ground(Errors *errors, const Herd *herd, const Arrays *a) {
     for (int r = 0; r < ROBOTS; r++) {
         double found[3 * MILD_FEET_MAX], wanted[3 * MILD_FEET_MAX];
-        if (!crowd->kit[r].result.converged || crowd->kit[r].result.iterations > 15) {
+        if (!herd->kit[r].result.converged || herd->kit[r].result.iterations > 15) {
             continue;
         }
-        for (int i = 0; i < 3 * crowd->feet; i++) {
-            found[i] = a->wrench[6 * crowd->feet * r + i / 3 * 6 + i % 3];
-            wanted[i] = crowd->kit[r].result.foot[i / 3].force[i % 3];
+        for (int i = 0; i < 3 * herd->feet; i++) {
+            found[i] = a->wrench[6 * herd->feet * r + i / 3 * 6 + i % 3];
+            wanted[i] = herd->kit[r].result.foot[i / 3].force[i % 3];
         }
-        add_error(errors, found, wanted, 3 * crowd->feet);
+        add_error(errors, found, wanted, 3 * herd->feet);
     }
 }
 
@@ -314,7 +314,7 @@ static void against_other(Errors *errors, int feet, const Arrays *a, const Array
 
 /* ---- tests ---- */
 
-static Crowd crowd;
+static Herd herd;
 static Arrays arrays, other;
 
 static void steps_are_those_of_the_ground(void **state) {
@@ -327,20 +327,20 @@ static void steps_are_those_of_the_ground(void **state) {
             static Errors errors;
             Side side;
             errors.count = 0;
-            crowd_open(&crowd, &shapes[i]);
-            side_open(&side, &crowd, device);
+            herd_open(&herd, &shapes[i]);
+            side_open(&side, &herd, device);
             for (int s = 0; s < STEPS; s++) {
-                crowd_solve(&crowd, &arrays);
+                herd_solve(&herd, &arrays);
                 side_step(&side, &arrays, 0);
                 const float once = arrays.wrench[2];
                 side_step(&side, &arrays, 1); /* a step without `advance` leaves no trace */
                 assert_memory_equal(&once, &arrays.wrench[2], sizeof once);
-                against_ground(&errors, &crowd, &arrays);
-                crowd_advance(&crowd);
+                against_ground(&errors, &herd, &arrays);
+                herd_advance(&herd);
             }
             check_errors(shapes[i].name, &errors, 2e-5, 3e-2);
             side_close(&side);
-            crowd_close(&crowd);
+            herd_close(&herd);
         }
     }
 }
@@ -354,46 +354,46 @@ static void device_and_host_agree(void **state) {
         static Errors errors;
         Side host, device, again;
         errors.count = 0;
-        crowd_open(&crowd, &shapes[i]);
-        side_open(&host, &crowd, MILD_BATCH_HOST);
-        side_open(&device, &crowd, 0);
-        side_open(&again, &crowd, 0);
+        herd_open(&herd, &shapes[i]);
+        side_open(&host, &herd, MILD_BATCH_HOST);
+        side_open(&device, &herd, 0);
+        side_open(&again, &herd, 0);
         for (int s = 0; s < STEPS; s++) {
-            crowd_solve(&crowd, &arrays);
+            herd_solve(&herd, &arrays);
             side_step(&again, &arrays, 1);
             other = arrays;
             side_step(&device, &arrays, 1);
             assert_memory_equal(arrays.wrench, other.wrench, sizeof arrays.wrench);
             assert_memory_equal(arrays.after, other.after, sizeof arrays.after);
             side_step(&host, &other, 1);
-            against_other(&errors, crowd.feet, &arrays, &other);
-            crowd_advance(&crowd);
+            against_other(&errors, herd.feet, &arrays, &other);
+            herd_advance(&herd);
         }
         check_errors(shapes[i].name, &errors, 1e-5, 3e-2);
         side_close(&host);
         side_close(&device);
         side_close(&again);
-        crowd_close(&crowd);
+        herd_close(&herd);
     }
 }
 
 /* Twenty steps of all robots by the kits and by a batch, and the problem of the next. */
 static void walk_together(Side *walked) {
     for (int s = 0; s < 20; s++) {
-        crowd_solve(&crowd, &arrays);
+        herd_solve(&herd, &arrays);
         side_step(walked, &arrays, 1);
-        crowd_advance(&crowd);
+        herd_advance(&herd);
     }
-    crowd_solve(&crowd, &arrays);
+    herd_solve(&herd, &arrays);
 }
 
 /* After a reset of some they step as on untouched ground, the others as without it. */
 static void reset_on(const Shape *shape, int device) {
     MildError error = {0};
     Side walked, fresh;
-    crowd_open(&crowd, shape);
-    side_open(&walked, &crowd, device);
-    side_open(&fresh, &crowd, device);
+    herd_open(&herd, shape);
+    side_open(&walked, &herd, device);
+    side_open(&fresh, &herd, device);
     walk_together(&walked);
     side_step(&walked, &arrays, 0);
     static Arrays before;
@@ -412,12 +412,12 @@ static void reset_on(const Shape *shape, int device) {
     }
     /* and all forget when the map is set, the same or another */
     assert_int_equal(mild_batch_set_map(walked.batch, NULL, &error), MILD_OK);
-    assert_int_equal(mild_batch_set_map(walked.batch, crowd.map, &error), MILD_OK);
+    assert_int_equal(mild_batch_set_map(walked.batch, herd.map, &error), MILD_OK);
     side_step(&walked, &arrays, 0);
     assert_memory_equal(arrays.wrench, other.wrench, sizeof(float) * 12 * ROBOTS);
     side_close(&walked);
     side_close(&fresh);
-    crowd_close(&crowd);
+    herd_close(&herd);
 }
 
 /* The memory of a ground is that of a batch that walked with it. */
@@ -427,18 +427,18 @@ static void load_on(const Shape *shape, int device) {
     const MildGround *grounds[ROBOTS];
     static Errors errors;
     errors.count = 0;
-    crowd_open(&crowd, shape);
-    side_open(&walked, &crowd, device);
-    side_open(&one, &crowd, device);
-    side_open(&many, &crowd, device);
+    herd_open(&herd, shape);
+    side_open(&walked, &herd, device);
+    side_open(&one, &herd, device);
+    side_open(&many, &herd, device);
     walk_together(&walked);
     for (int r = 0; r < ROBOTS; r++) {
-        grounds[r] = crowd.kit[r].ground;
+        grounds[r] = herd.kit[r].ground;
         assert_int_equal(mild_batch_load(one.batch, r, grounds[r], &error), MILD_OK);
     }
     side_step(&one, &arrays, 0);
     other = arrays;
-    against_ground(&errors, &crowd, &arrays);
+    against_ground(&errors, &herd, &arrays);
     check_errors("loaded", &errors, 2e-5, 3e-2);
     assert_int_equal(mild_batch_load_robots(many.batch, 1, ROBOTS - 1, grounds + 1, &error),
                      MILD_OK);
@@ -448,7 +448,7 @@ static void load_on(const Shape *shape, int device) {
     side_close(&walked);
     side_close(&one);
     side_close(&many);
-    crowd_close(&crowd);
+    herd_close(&herd);
 }
 
 /* Memory of a foot's element e against another ground's, [m] and [-]. */
@@ -476,13 +476,13 @@ static void store_on(const Shape *shape, int device) {
     static Errors errors;
     int off = 0, planes = 0;
     errors.count = 0;
-    crowd_open(&crowd, shape);
-    side_open(&walked, &crowd, device);
-    side_open(&again, &crowd, device);
+    herd_open(&herd, shape);
+    side_open(&walked, &herd, device);
+    side_open(&again, &herd, device);
     walk_together(&walked);
     for (int r = 0; r < ROBOTS; r++) {
-        void *block = aligned_alloc(64, crowd.kit[r].bytes);
-        grounds[r] = mild_ground_init(block, crowd.kit[r].soles, crowd.feet);
+        void *block = aligned_alloc(64, herd.kit[r].bytes);
+        grounds[r] = mild_ground_init(block, herd.kit[r].soles, herd.feet);
     }
     assert_int_equal(mild_batch_store_robots(walked.batch, 0, ROBOTS - 1, grounds, &error),
                      MILD_OK);
@@ -491,7 +491,7 @@ static void store_on(const Shape *shape, int device) {
     side_step(&walked, &arrays, 0);
     other = arrays;
     for (int r = 0; r < ROBOTS; r++) {
-        Kit *kit = &crowd.kit[r];
+        Kit *kit = &herd.kit[r];
         for (int n = 0; n < kit->feet * mild_sole_elements(kit->soles[0]); n++) {
             const double apart =
                 planes_apart(grounds[r], kit->ground, n % kit->feet, n / kit->feet);
@@ -500,7 +500,7 @@ static void store_on(const Shape *shape, int device) {
         }
         mild_ground_solve(grounds[r], &kit->terrain, &kit->input, kit->scratch, &kit->result);
     }
-    against_ground(&errors, &crowd, &other);
+    against_ground(&errors, &herd, &other);
     check_errors("stored", &errors, 2e-5, 3e-2);
     print_message("%d of %d planes off\n", off, planes);
     assert_true(off <= planes / 500);
@@ -509,12 +509,12 @@ static void store_on(const Shape *shape, int device) {
         mild_batch_load_robots(again.batch, 0, ROBOTS, (const MildGround *const *)grounds, &error),
         MILD_OK);
     side_step(&again, &arrays, 0);
-    if (!crowd.map) {
+    if (!herd.map) {
         assert_memory_equal(arrays.wrench, other.wrench, sizeof(float) * 12 * ROBOTS);
     }
     /* what they remember is forgotten in the air */
     for (int r = 0; r < ROBOTS; r++) {
-        Kit *kit = &crowd.kit[r];
+        Kit *kit = &herd.kit[r];
         for (int f = 0; f < kit->feet; f++) {
             kit->input.position[f][2] += 1.0;
         }
@@ -527,7 +527,7 @@ static void store_on(const Shape *shape, int device) {
     }
     side_close(&walked);
     side_close(&again);
-    crowd_close(&crowd);
+    herd_close(&herd);
 }
 
 static void reset_load_and_store(void **state) {
@@ -548,17 +548,17 @@ static void reset_load_and_store(void **state) {
 /* A robot whose materials are not in the table gets no numbers; the others are left alone. */
 static void unknown_on(const Shape *shape, int device) {
     Side side;
-    crowd_open(&crowd, shape);
+    herd_open(&herd, shape);
     for (int r = 0; r < ROBOTS; r++) {
-        crowd.kit[r].input.position[0][2] -= 0.04; /* in the ground */
+        herd.kit[r].input.position[0][2] -= 0.04; /* in the ground */
     }
-    side_open(&side, &crowd, device);
-    crowd_solve(&crowd, &arrays);
+    side_open(&side, &herd, device);
+    herd_solve(&herd, &arrays);
     side_step(&side, &arrays, 0);
     other = arrays;
-    for (int label = 0; label < crowd.labels; label++) {
-        arrays.material[3 * crowd.labels + label] = MATERIALS;
-        arrays.material[4 * crowd.labels + label] = -1;
+    for (int label = 0; label < herd.labels; label++) {
+        arrays.material[3 * herd.labels + label] = MATERIALS;
+        arrays.material[4 * herd.labels + label] = -1;
     }
     side_step(&side, &arrays, 0);
     for (int r = 0; r < ROBOTS; r++) {
@@ -570,7 +570,7 @@ static void unknown_on(const Shape *shape, int device) {
         }
     }
     side_close(&side);
-    crowd_close(&crowd);
+    herd_close(&herd);
 }
 
 static void unknown_material(void **state) {
@@ -596,9 +596,9 @@ static void step_is_captured(void **state) {
     cudaStream_t stream;
     cudaGraph_t graph;
     cudaGraphExec_t ready;
-    crowd_open(&crowd, uneven);
-    side_open(&side, &crowd, 0);
-    crowd_solve(&crowd, &arrays);
+    herd_open(&herd, uneven);
+    side_open(&side, &herd, 0);
+    herd_solve(&herd, &arrays);
     side_step(&side, &arrays, 0);
     other = arrays;
     memset(arrays.wrench, 0xff, sizeof arrays.wrench);
@@ -622,7 +622,7 @@ static void step_is_captured(void **state) {
     cudaGraphDestroy(graph);
     cudaStreamDestroy(stream);
     side_close(&side);
-    crowd_close(&crowd);
+    herd_close(&herd);
 }
 #endif
 

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #define TASK_ON_DEVICE
-#include "task/place.h"
+#include "task/lanes.h"
 #undef TASK_FN
 #define TASK_FN /* the functions are not here */
 #include "task/task.h"

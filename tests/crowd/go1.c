@@ -7,6 +7,6 @@
 #define ENGINE_CHAIN 9
 
 /* NOLINTBEGIN(bugprone-suspicious-include) */
-#include "crowd/host.c"
+#include "crowd/batch_host.c"
 #include "episode.c"
 /* NOLINTEND(bugprone-suspicious-include) */

@@ -6,4 +6,4 @@
 #define ENGINE_CHAIN 12
 
 /* NOLINTNEXTLINE(bugprone-suspicious-include) */
-#include "crowd/host.c"
+#include "crowd/batch_host.c"

@@ -7,7 +7,7 @@
 #include <cmocka.h>
 
 #define TASK_ON_DEVICE
-#include "task/place.h"
+#include "task/lanes.h"
 
 /* Numbers and their bits by the tables of IEEE 754-2008 binary16; ties go to even. */
 static void known_numbers(void **unused) {
@@ -21,7 +21,7 @@ static void known_numbers(void **unused) {
                  {0x1.ffep0f, 0x4000}, {1e-9f, 0x0000}};
     (void)unused;
     for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
-        assert_int_equal(place_pack(known[i].number), known[i].bits);
+        assert_int_equal(frame_pack(known[i].number), known[i].bits);
     }
 }
 
@@ -30,11 +30,11 @@ static void rounding(void **unused) {
     for (float x = 1e-4f; x < 6e4f; x *= 1.0007f) {
         for (int sign = -1; sign <= 1; sign += 2) {
             const float y = (float)sign * x;
-            assert_true(fabsf(place_unpack(place_pack(y)) - y) <= 0x1p-11f * x);
+            assert_true(fabsf(frame_unpack(frame_pack(y)) - y) <= 0x1p-11f * x);
         }
     }
     for (unsigned bits = 0; bits < 0x7c00; bits++) { /* what has 16 bits comes back */
-        assert_int_equal(place_pack(place_unpack((uint16_t)bits)), bits);
+        assert_int_equal(frame_pack(frame_unpack((uint16_t)bits)), bits);
     }
 }
 

@@ -9,7 +9,7 @@
 
 #define MILD_REAL_FLOAT
 #include "crowd/backend.h"
-#include "crowd/text.h"
+#include "crowd/batch_kernels.h"
 
 static int fits_none(const EngineTree *tree) {
     (void)tree;
@@ -30,11 +30,11 @@ static int fits_any(const EngineTree *tree) {
     return any_fits;
 }
 
-static const CrowdKernels none = {.fixed = 1, .fits = fits_none};
-static const CrowdKernels go1 = {.fixed = 1, .fits = fits_go1};
-static const CrowdKernels any = {.fixed = 0, .fits = fits_any};
+static const EnvsKernels none = {.fixed = 1, .fits = fits_none};
+static const EnvsKernels go1 = {.fixed = 1, .fits = fits_go1};
+static const EnvsKernels any = {.fixed = 0, .fits = fits_any};
 
-const CrowdKernels *const crowd_kernels[] = {&none, &go1, &any, NULL};
+const EnvsKernels *const envs_kernels[] = {&none, &go1, &any, NULL};
 
 static void is_slow(const char *folder, int wanted) {
     MildError error = {0};

@@ -124,7 +124,7 @@ def compile_c(tree, names):
 def compile_cuda(tree, nvcc):
     """The environments and the batch ground as a GPU has them; PTX only, because that is where a recipe can be wrong."""
     unit = tree / "recipe.cu"
-    unit.write_text('#define CROWD_KERNELS crowd_kernels_any\n#include "crowd/device.cu"\n', encoding="utf-8")
+    unit.write_text('#define ENVS_KERNELS envs_kernels_any\n#include "crowd/batch_device.cu"\n', encoding="utf-8")
     call([nvcc, "-std=c++17", "-O0", "-arch=sm_90", "-Werror", "cross-execution-space-call", *include_flags(tree), "-ptx", unit.name, "-o", os.devnull],
          tree)
 

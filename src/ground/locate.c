@@ -1,11 +1,11 @@
-#include "ground/place.h"
+#include "ground/locate.h"
 
 #include "ground/terrain.h"
 
-#define PLACE_MARGIN 1e-3 /* [m] elements this close to the ground are listed */
+#define LISTED_MARGIN 1e-3 /* [m] elements this close to the ground are listed */
 /* [m/s] Allowance for an impact at the heel, which may swing the toe down faster than its free
  * motion. */
-#define PLACE_EXTRA_SPEED 2.0
+#define LISTED_EXTRA_SPEED 2.0
 
 /* Depth of every element, and the gradient of the ground under it. */
 static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
@@ -18,7 +18,7 @@ static void foot_surface(FootScratch *foot, const MildTerrain *terrain) {
     }
 }
 
-void foot_place(FootScratch *foot, const MildTerrain *terrain, int imprints, const double *position,
+void foot_locate(FootScratch *foot, const MildTerrain *terrain, int imprints, const double *position,
                 const double *R) {
     for (int k = 0; k < 3; k++) {
         foot->origin[k] = position[k];
@@ -61,7 +61,7 @@ static double foot_descent(const FootScratch *foot, const double *V, double stee
 void foot_list(FootScratch *foot, const MildContactInput *input, double steepest, int f) {
     const double descent = real_max(foot_descent(foot, input->velocity[f], steepest),
                                     foot_descent(foot, input->free_velocity + 6 * f, steepest));
-    const double least = -PLACE_MARGIN - input->dt * (descent + PLACE_EXTRA_SPEED);
+    const double least = -LISTED_MARGIN - input->dt * (descent + LISTED_EXTRA_SPEED);
     const double *depth = foot->depth;
     double near = 0.0;
     /* Count whole vectors, unless that would count the padding. */

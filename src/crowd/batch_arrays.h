@@ -1,6 +1,6 @@
 /* What a crowd keeps on its device. Include it after task.h. */
-#ifndef CROWD_ARRAYS_H
-#define CROWD_ARRAYS_H
+#ifndef ENVS_ARRAYS_H
+#define ENVS_ARRAYS_H
 
 #include "batch/batch.h"
 #include "crowd/envs_step.h"
@@ -30,13 +30,13 @@ enum {
 typedef struct {
     double depth; /* [m] that the robot stands in it */
     float numbers[TASK_GROUND_NUMBERS];
-} CrowdGround;
+} EnvsGround;
 
 /* The same for all environments; the task comes first. */
 typedef struct {
     TaskDef task;
     RobotTable robot;
-    const CrowdGround *ground; /* [grounds] to draw from */
+    const EnvsGround *ground; /* [grounds] to draw from */
     int grounds;
     MapView map;          /* its arrays are the ground's */
     double map_extent[2]; /* [m] */
@@ -49,7 +49,7 @@ typedef struct {
     TaskGains gains;
     uint64_t seed;
     uint32_t first; /* number of the first environment */
-} CrowdTask;
+} EnvsTask;
 
 /* What passes between engine and ground; see MildBatchInput and MildBatchOutput. The ground writes
  * over what it has read: the wrenches over velocity, the twists after the step over free_velocity.
@@ -57,14 +57,14 @@ typedef struct {
 typedef struct {
     float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
     MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */
-} CrowdContact;
-#define CROWD_FAR 1000 /* [m] below a robot on rigid ground: the soft one does not touch it */
+} EnvsContact;
+#define ENVS_FAR 1000 /* [m] below a robot on rigid ground: the soft one does not touch it */
 
 typedef struct {
     int envs;
     size_t stride;      /* [B] of a TaskEnv and its frames */
     char *env;          /* [envs][stride] */
-    void *robot;        /* [envs] CrowdRobot of crowd.inc */
+    void *robot;        /* [envs] EnvRobot of crowd.inc */
     int32_t *material;  /* [envs][labels] of the ground's table */
     Real *map_origin;   /* [envs][2] [m] */
     uint8_t *fresh;     /* [envs] bool: an episode began */
@@ -72,12 +72,12 @@ typedef struct {
     int32_t *order;     /* [envs] in which a GPU steps them: those on rigid ground first */
     TaskProgress *kept; /* [envs] or NULL, in envs_save_progress and envs_load_progress */
     double *tally;      /* [TALLY_NUMBERS] sums over the environments */
-    CrowdContact contact;
+    EnvsContact contact;
     const EnvsTrial *trial; /* [envs] or NULL */
     double *command;        /* [envs][3] of the trials */
     EnvsSample *sample;     /* [envs][physics steps] or NULL */
-    const CrowdTask *task;
+    const EnvsTask *task;
     const EngineModel *model;
-} CrowdArrays;
+} EnvsArrays;
 
 #endif

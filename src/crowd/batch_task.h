@@ -1,6 +1,6 @@
-/* The files of the task that a device runs, compiled for it; see task/place.h. */
-#ifndef CROWD_TASK_TEXT_H
-#define CROWD_TASK_TEXT_H
+/* The files of the task that a device runs, compiled for it; see task/lanes.h. */
+#ifndef ENVS_TASK_TEXT_H
+#define ENVS_TASK_TEXT_H
 
 #include "task/task.h"
 

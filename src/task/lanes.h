@@ -2,8 +2,8 @@
  * assist.c, observe.c, reward.c, draw.c) are compiled twice: as they are for the CPU, where robots
  * are stepped by RobotSim, and with TASK_ON_DEVICE by crowd.inc, where Robot and RobotSim are plain
  * numbers on a device. TASK_FN marks the functions that one file of them calls in another. */
-#ifndef TASK_PLACE_H
-#define TASK_PLACE_H
+#ifndef TASK_LANES_H
+#define TASK_LANES_H
 
 #include <math.h>
 #include <stdint.h>
@@ -34,10 +34,10 @@ typedef MildTerrain TaskTerrain;
 #endif
 #define TASK_REAL(number) ((TaskReal)(number))
 
-#define PLACE_TURN 0.3183098861837907 /* 1/pi */
+#define TASK_PER_TURN 0.3183098861837907 /* 1/pi */
 
 /* On a GPU to the accuracy of float, for a tenth of the instructions. */
-static inline MILD_BOTH TaskReal place_exp(double x) {
+static inline MILD_BOTH TaskReal task_exp(double x) {
 #ifdef __CUDA_ARCH__
     return expf((float)x);
 #else
@@ -45,23 +45,23 @@ static inline MILD_BOTH TaskReal place_exp(double x) {
 #endif
 }
 
-static inline MILD_BOTH TaskReal place_sin(double x) {
+static inline MILD_BOTH TaskReal task_sin(double x) {
 #ifdef __CUDA_ARCH__
-    return sinpif((float)(x * PLACE_TURN)); /* sinf has a long path for large x */
+    return sinpif((float)(x * TASK_PER_TURN)); /* sinf has a long path for large x */
 #else
     return (TaskReal)sin(x);
 #endif
 }
 
-static inline MILD_BOTH TaskReal place_cos(double x) {
+static inline MILD_BOTH TaskReal task_cos(double x) {
 #ifdef __CUDA_ARCH__
-    return cospif((float)(x * PLACE_TURN));
+    return cospif((float)(x * TASK_PER_TURN));
 #else
     return (TaskReal)cos(x);
 #endif
 }
 
-static inline MILD_BOTH TaskReal place_root(double x) {
+static inline MILD_BOTH TaskReal task_sqrt(double x) {
 #ifdef __CUDA_ARCH__
     return sqrtf((float)x);
 #else
@@ -71,13 +71,13 @@ static inline MILD_BOTH TaskReal place_root(double x) {
 
 /* Lets a GPU wait for several numbers at once. */
 #ifdef __CUDACC__
-#define PLACE_UNROLL _Pragma("unroll 8")
+#define TASK_UNROLL _Pragma("unroll 8")
 #else
-#define PLACE_UNROLL
+#define TASK_UNROLL
 #endif
 
 /* [m] Height of the base above the undisturbed surface. */
-static inline MILD_BOTH double place_above(const RobotSim *sim, const TaskTerrain *terrain) {
+static inline MILD_BOTH double task_height_above(const RobotSim *sim, const TaskTerrain *terrain) {
 #ifdef TASK_ON_DEVICE
     (void)terrain;
     return sim->above;
@@ -93,7 +93,7 @@ static inline MILD_BOTH double place_above(const RobotSim *sim, const TaskTerrai
 #ifdef TASK_ON_DEVICE
 typedef uint16_t TaskFrame;
 
-static inline MILD_BOTH TaskFrame place_pack(float x) {
+static inline MILD_BOTH TaskFrame frame_pack(float x) {
 #ifdef __CUDA_ARCH__
     return __half_as_ushort(__float2half_rn(fminf(fmaxf(x, -65504.0f), 65504.0f)));
 #else
@@ -104,7 +104,7 @@ static inline MILD_BOTH TaskFrame place_pack(float x) {
 #endif
 }
 
-static inline MILD_BOTH float place_unpack(TaskFrame frame) {
+static inline MILD_BOTH float frame_unpack(TaskFrame frame) {
 #ifdef __CUDA_ARCH__
     return __half2float(__ushort_as_half(frame));
 #else
@@ -117,61 +117,61 @@ static inline MILD_BOTH float place_unpack(TaskFrame frame) {
 #else
 typedef float TaskFrame;
 
-static inline TaskFrame place_pack(float x) {
+static inline TaskFrame frame_pack(float x) {
     return x;
 }
 
-static inline float place_unpack(TaskFrame frame) {
+static inline float frame_unpack(TaskFrame frame) {
     return frame;
 }
 #endif
 
 /* Bool: the environment keeps its history for controllers. */
 #ifdef TASK_ON_DEVICE
-enum { PLACE_HISTORY = 0 };
+enum { TASK_HAS_HISTORY = 0 };
 #else
-enum { PLACE_HISTORY = 1 };
+enum { TASK_HAS_HISTORY = 1 };
 #endif
 
 /* On a GPU so many threads, the lanes of an environment, call the functions of a policy step
  * together and take the same way through them. Each has its share of a loop
  *
- *     for (int i = place_lane(); i < count; i += PLACE_LANES)
+ *     for (int i = task_lane(); i < count; i += TASK_LANES)
  *
  * and lane 0 adds to what is not in such a loop; what all write is the same number. What one lane
- * writes another reads after place_meet. */
+ * writes another reads after task_lanes_sync. */
 #ifdef __CUDACC__
-enum { PLACE_LANES = 8 };
+enum { TASK_LANES = 8 };
 #else
-enum { PLACE_LANES = 1 };
+enum { TASK_LANES = 1 };
 #endif
 
-static inline MILD_BOTH int place_lane(void) {
+static inline MILD_BOTH int task_lane(void) {
 #ifdef __CUDA_ARCH__
-    return (int)(threadIdx.x % PLACE_LANES);
+    return (int)(threadIdx.x % TASK_LANES);
 #else
     return 0;
 #endif
 }
 
 #ifdef __CUDA_ARCH__
-static inline __device__ unsigned place_mask(void) {
-    return ((1u << PLACE_LANES) - 1) << (threadIdx.x % 32 / PLACE_LANES * PLACE_LANES);
+static inline __device__ unsigned task_lane_mask(void) {
+    return ((1u << TASK_LANES) - 1) << (threadIdx.x % 32 / TASK_LANES * TASK_LANES);
 }
 #endif
 
 /* Makes what each lane wrote visible to the others. */
-static inline MILD_BOTH void place_meet(void) {
+static inline MILD_BOTH void task_lanes_sync(void) {
 #ifdef __CUDA_ARCH__
-    __syncwarp(place_mask());
+    __syncwarp(task_lane_mask());
 #endif
 }
 
 /* Sets numbers of TaskReal, or of float, to 0. */
-static inline MILD_BOTH void place_clear(void *numbers, size_t bytes) {
+static inline MILD_BOTH void task_clear(void *numbers, size_t bytes) {
 #ifdef TASK_ON_DEVICE
     float *number = (float *)numbers;
-    for (size_t i = (size_t)place_lane(); i < bytes / sizeof *number; i += PLACE_LANES) {
+    for (size_t i = (size_t)task_lane(); i < bytes / sizeof *number; i += TASK_LANES) {
         number[i] = 0;
     }
 #else
@@ -180,10 +180,10 @@ static inline MILD_BOTH void place_clear(void *numbers, size_t bytes) {
 }
 
 /* The sum over the lanes. */
-static inline MILD_BOTH TaskReal place_sum(TaskReal x) {
+static inline MILD_BOTH TaskReal task_lanes_sum(TaskReal x) {
 #ifdef __CUDA_ARCH__
-    for (int step = PLACE_LANES / 2; step > 0; step /= 2) {
-        x += __shfl_xor_sync(place_mask(), x, step);
+    for (int step = TASK_LANES / 2; step > 0; step /= 2) {
+        x += __shfl_xor_sync(task_lane_mask(), x, step);
     }
 #endif
     return x;
