@@ -29,7 +29,7 @@ set(batch_kernels
   "4 4 flat   all    2"
   "4 8 flat   all    2")
 set(generated ${CMAKE_BINARY_DIR}/generated/batch)
-mild_layer(batch layer_ground layer_device)
+mild_layer(ground/batch layer_ground layer_device)
 target_include_directories(layer_batch PUBLIC ${generated})
 
 # contact_kinds.h: contact.inc for the CPU, in each size, and lists of them
@@ -55,7 +55,7 @@ foreach(row ${batch_kernels})
   if(curves STREQUAL "all")
     string(APPEND contact_${feet} " KIND(${groups}, ${per})")
     string(APPEND contact_texts "#define CONTACT_POINTS ${points}\n#define CONTACT_FEET ${groups}\n"
-      "#define CONTACT_PER ${per}\n#define CONTACT(name) contact_##name##_${name}\n#include \"batch/contact.inc\"\n"
+      "#define CONTACT_PER ${per}\n#define CONTACT(name) contact_##name##_${name}\n#include \"ground/batch/contact.inc\"\n"
       "#undef CONTACT_POINTS\n")
   else()
     string(APPEND name _${curves})
@@ -69,28 +69,28 @@ foreach(row ${batch_kernels})
 #define KERNEL_POINTS @points@
 #define KERNEL_CURVES LAW_@curves@
 #define KERNEL_BLOCKS @blocks@
-#include "batch/kernel.cu"
+#include "ground/batch/kernel.cu"
 ]=] @ONLY)
   list(APPEND units ${unit})
   string(APPEND kernel_names "extern const BatchKernel contact_${name};\n")
   string(APPEND kernel_list " &contact_${name},")
 endforeach()
-file(CONFIGURE OUTPUT ${generated}/batch/contact_shapes.h @ONLY CONTENT [=[
+file(CONFIGURE OUTPUT ${generated}/ground/batch/contact_shapes.h @ONLY CONTENT [=[
 /* Groups of lanes and elements of a lane that a batch can have. */
 #define CONTACT_KINDS(KIND)@contact_flat@
 #define CONTACT_POINT_KINDS(KIND)@contact_points@
 ]=])
-file(CONFIGURE OUTPUT ${generated}/batch/contact_kinds.h @ONLY CONTENT [=[
+file(CONFIGURE OUTPUT ${generated}/ground/batch/contact_kinds.h @ONLY CONTENT [=[
 /* contact.inc for the CPU in each of these sizes. Before the inclusion: CONTACT_MAP. */
-#include "batch/contact.h"
-#include "batch/contact_shapes.h"
+#include "ground/batch/contact.h"
+#include "ground/batch/contact_shapes.h"
 
 #define CONTACT_CURVES LAW_ALL
 @contact_texts@#undef CONTACT_CURVES
 ]=])
 
 if(MILD_CUDA)
-  add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/batch/reset.cu)
+  add_library(batch_device STATIC ${units} ${CMAKE_SOURCE_DIR}/src/ground/batch/reset.cu)
   target_include_directories(batch_device PRIVATE ${CMAKE_BINARY_DIR}/layers/batch)
   target_link_libraries(batch_device PRIVATE layer_ground layer_device)
   # quotients and roots within two units in the last place, and no denormal numbers
@@ -98,7 +98,7 @@ if(MILD_CUDA)
   set_target_properties(batch_device PROPERTIES CUDA_STANDARD 17 POSITION_INDEPENDENT_CODE ON)
   target_link_libraries(layer_batch PUBLIC batch_device CUDA::cudart_static stdc++)
   file(CONFIGURE OUTPUT ${generated}/kernels.c @ONLY CONTENT [=[
-#include "batch/batch.h"
+#include "ground/batch/batch.h"
 
 @kernel_names@
 const BatchKernel *const batch_kernels[] = {@kernel_list@ NULL};

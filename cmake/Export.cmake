@@ -10,14 +10,14 @@ else()
   list(APPEND left_out "/export/onnx\\.c$")
 endif()
 set(mild_onnx ${mild_onnx} CACHE INTERNAL "") # for the tests
-mild_layer(export layer_control)
+mild_layer(deploy/export layer_control)
 set(export_generated ${CMAKE_BINARY_DIR}/generated/export)
 target_include_directories(layer_export PRIVATE ${export_generated})
 
 # c_text.h: the files of c/ as texts
 set(texts "")
 foreach(name policy.h policy.c example.c)
-  set(file ${CMAKE_CURRENT_SOURCE_DIR}/export/c/${name})
+  set(file ${CMAKE_CURRENT_SOURCE_DIR}/deploy/export/c/${name})
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
   file(READ ${file} bytes HEX)
   string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")

@@ -6,7 +6,7 @@ target_include_directories(web_pack PRIVATE ${CMAKE_SOURCE_DIR})
 add_library(web_core STATIC ${CMAKE_SOURCE_DIR}/web/core.c)
 target_link_libraries(web_core PUBLIC layer_env PRIVATE mild_options)
 target_include_directories(web_core PUBLIC ${CMAKE_SOURCE_DIR} PRIVATE ${CMAKE_BINARY_DIR}/layers/learn)
-# as crowd/batch_host.c; options of the file, which come behind those of mild_options
+# as env/batch_host.c; options of the file, which come behind those of mild_options
 set_source_files_properties(${CMAKE_SOURCE_DIR}/web/core.c PROPERTIES COMPILE_OPTIONS
   "-O2;-Wno-float-conversion;$<$<C_COMPILER_ID:Clang>:-Wno-implicit-float-conversion>")
 set(web_robot ${CMAKE_BINARY_DIR}/generated/web/robot.bin)

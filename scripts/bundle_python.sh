@@ -29,7 +29,7 @@ ln -s ../.. "$package/data"
 flags=(-O2 -std=c++17 -fPIC -shared -fvisibility=hidden -march=x86-64-v3 -Iinclude -I"$include" -I"$nanobind/include"
     -I"$nanobind/ext/robin_map/include" "$nanobind/src/nb_combined.cpp"
     -DMILD_VERSION="\"$(sed -n 's/^project(mild VERSION \([0-9.]*\) .*/\1/p' CMakeLists.txt)\"")
-g++ "${flags[@]}" -Isrc python/src/envs.cpp -o "$package/_envs$suffix" -L"$bundle/lib" -lmild_envs -Wl,-rpath,'$ORIGIN/../../lib' \
+g++ "${flags[@]}" -Isrc python/src/run/envs.cpp -o "$package/_envs$suffix" -L"$bundle/lib" -lmild_envs -Wl,-rpath,'$ORIGIN/../../lib' \
     -Wl,--allow-shlib-undefined &
 g++ "${flags[@]}" -Isrc python/src/{ground,material,terrain,press,fit,batch}.cpp -o "$package/_ground$suffix" \
     -Wl,--start-group "${archives[@]}" -Wl,--end-group "${cuda[@]}" -Wl,--exclude-libs,ALL

@@ -2,7 +2,7 @@
 #ifndef TEST_ENVS_KIT_H
 #define TEST_ENVS_KIT_H
 
-#include "crowd/envs.h"
+#include "env/envs.h"
 
 static inline Envs *kit_mujoco(const TaskDef *task, const Robot *robot, Pool *pool, int count,
                                uint64_t seed, MildError *error) {

@@ -2,7 +2,7 @@
  * faster on one processor than the batch's and which remembers prints. */
 #define MILD_REAL_FLOAT
 
-#include "crowd/batch_step.inc"
+#include "env/batch_step.inc"
 
 #include <stdlib.h>
 

@@ -9,9 +9,9 @@
 #include <string.h>
 
 #include "base/file.h"
-#include "config/experiment_keys.h"
-#include "crowd/batch_kernels.h"
-#include "engine/read.h"
+#include "run/config/experiment_keys.h"
+#include "env/batch_kernels.h"
+#include "robot/engine/read.h"
 #include "learn/network.h"
 #include "learn/policy.h"
 #include "robot/description.h"

@@ -123,7 +123,7 @@ class VectorEnv(gymnasium.vector.VectorEnv, _Task):
         return {"final_obs": self._seen(arrays["last"]), "_final_obs": done, "final_info": final, "_final_info": done}
 
     def statistics(self):
-        """Means over the episodes that ended since the last call: a dict, see EnvsStats of src/crowd/envs_step.h."""
+        """Means over the episodes that ended since the last call: a dict, see EnvsStats of src/env/envs_step.h."""
         if self._envs is None:
             raise RuntimeError("statistics: the environment is closed")
         return self._envs.statistics()

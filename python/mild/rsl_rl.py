@@ -64,7 +64,7 @@ class Env(VecEnv):
         return self.get_observations(), tensors["reward"], tensors["done"].long(), extras
 
     def statistics(self):
-        """Means over the episodes that ended since the last call or log: a dict, see EnvsStats of src/crowd/envs_step.h.
+        """Means over the episodes that ended since the last call or log: a dict, see EnvsStats of src/env/envs_step.h.
         Waits for the device."""
         if not self._finite:
             raise ValueError(f"actions: some were not finite by step {self._steps}")

@@ -1,4 +1,4 @@
-/* The module mild._envs: environments of the task (src/envs/envs.h) on arrays of the caller. */
+/* The module mild._envs: environments of the task (src/run/envs/envs.h) on arrays of the caller. */
 #include "arrays.h"
 
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 extern "C" {
-#include "envs/envs.h"
+#include "run/envs/envs.h"
 }
 
 /* Where results of a step go. Its arrays are kept as long as it is. */

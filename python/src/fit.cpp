@@ -1,10 +1,10 @@
-/* What mild.GroundFit calls (src/lab/fit.h). */
+/* What mild.GroundFit calls (src/identify/fit.h). */
 #include "ground.h"
 
 #include <cmath>
 
 extern "C" {
-#include "lab/fit.h"
+#include "identify/fit.h"
 }
 
 static FitPlate plate_of(const Sole &sole) {

@@ -1,10 +1,10 @@
-/* mild.press: what `mild press` does (src/lab/press.h). */
+/* mild.press: what `mild press` does (src/identify/press.h). */
 #include "ground.h"
 
 #include <cmath>
 
 extern "C" {
-#include "lab/press.h"
+#include "identify/press.h"
 }
 
 struct Press {

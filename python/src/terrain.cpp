@@ -6,7 +6,7 @@
 #include <nanobind/stl/tuple.h>
 
 extern "C" {
-#include "lab/press.h"
+#include "identify/press.h"
 }
 
 /* A function of mild._again. */

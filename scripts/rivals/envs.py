@@ -1,4 +1,4 @@
-"""The environments of mild as tensors of PyTorch: src/envs/envs.h through ctypes, without copies."""
+"""The environments of mild as tensors of PyTorch: src/run/envs/envs.h through ctypes, without copies."""
 import ctypes
 import os
 import pathlib

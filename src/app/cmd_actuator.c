@@ -4,16 +4,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "actuator/fit.h"
-#include "actuator/motor.h"
+#include "env/actuator/fit.h"
+#include "env/actuator/motor.h"
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/figure.h"
 #include "app/report.h"
 #include "app/robots.h"
 #include "base/file.h"
-#include "config/experiment_keys.h"
-#include "eval/motor_log.h"
+#include "run/config/experiment_keys.h"
+#include "run/eval/motor_log.h"
 
 /* actuator.png is drawn from actuator_held.csv, because actuator.csv may be the log. */
 #define NUMBERS_END "_held.csv"

@@ -8,8 +8,8 @@
 #include "app/report.h"
 #include "app/robots.h"
 #include "base/text.h"
-#include "bench/bench.h"
-#include "config/experiment_keys.h"
+#include "run/bench/bench.h"
+#include "run/config/experiment_keys.h"
 
 /* memory comes first, because it reports the peak of the whole process so far. */
 static const struct {

@@ -11,9 +11,9 @@
 #include "app/report.h"
 #include "app/robots.h"
 #include "base/paths.h"
-#include "drive/drive.h"
-#include "drive/simulated.h"
-#include "eval/scene.h"
+#include "deploy/drive/drive.h"
+#include "deploy/drive/simulated.h"
+#include "run/eval/scene.h"
 
 #define ADDRESS "127.0.0.1:9870"
 

@@ -1,5 +1,5 @@
 /* mild export: a policy for programs that are not ours, as an ONNX graph and as C. */
-#include "export/export.h"
+#include "deploy/export/export.h"
 
 #include <stdio.h>
 

@@ -12,9 +12,9 @@
 #include "app/report.h"
 #include "base/file.h"
 #include "base/text.h"
-#include "lab/fit.h"
-#include "lab/fit_csv.h"
-#include "lab/press.h"
+#include "identify/fit.h"
+#include "identify/fit_csv.h"
+#include "identify/press.h"
 
 typedef struct {
     const char *model, *from, *json, *figure;

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "actuator/actuator.h"
+#include "env/actuator/actuator.h"
 #include "app/cli.h"
 #include "app/commands.h"
 #include "app/figure.h"
@@ -15,8 +15,8 @@
 #include "app/robots.h"
 #include "base/paths.h"
 #include "base/text.h"
-#include "config/config.h"
-#include "config/experiment_keys.h"
+#include "run/config/config.h"
+#include "run/config/experiment_keys.h"
 
 #define GRAVITY 9.81
 #define AREA_MARGIN 2.0   /* [m] ground drawn beyond the walk */

@@ -11,7 +11,7 @@
 #include "app/robots.h"
 #include "base/paths.h"
 #include "base/text.h"
-#include "lab/press.h"
+#include "identify/press.h"
 #include "robot/robot.h"
 
 /* NaN: the option was not given. */

@@ -9,7 +9,7 @@
 #include "app/report.h"
 #include "app/run_page.h"
 #include "base/file.h"
-#include "config/experiment_keys.h"
+#include "run/config/experiment_keys.h"
 
 _Static_assert((int)CLI_LIST_MAX <= (int)RUN_PAGE_RUNS_MAX, "a page has room for all runs");
 

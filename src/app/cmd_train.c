@@ -12,9 +12,9 @@
 #include "app/robots.h"
 #include "base/paths.h"
 #include "base/text.h"
-#include "config/experiment_keys.h"
-#include "ranks/ranks.h"
-#include "train/run.h"
+#include "run/config/experiment_keys.h"
+#include "device/ranks/ranks.h"
+#include "run/train/run.h"
 
 typedef struct {
     Ranks *ranks; /* NULL: alone */

@@ -4,7 +4,7 @@
 
 #include "app/commands.h"
 #include "app/grounds.h"
-#include "config/experiment_keys.h"
+#include "run/config/experiment_keys.h"
 #include "control/controller.h"
 #include "robot/robot.h"
 

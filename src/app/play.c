@@ -9,7 +9,7 @@
 #include "app/live.h"
 #include "app/progress.h"
 #include "base/clock.h"
-#include "eval/eval.h"
+#include "run/eval/eval.h"
 
 #define START_TIME 1.0  /* [s] time for starting, not counted in speeds and pressures */
 #define FALL_TIME 1.0   /* [s] how long the picture stays after a fall */

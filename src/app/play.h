@@ -3,8 +3,8 @@
 #define MILD_PLAY_H
 
 #include "control/controller.h"
-#include "eval/measure.h"
-#include "eval/scene.h"
+#include "run/eval/measure.h"
+#include "run/eval/scene.h"
 #include "view/pressure.h"
 #include "view/video.h"
 #include "view/view.h"

@@ -3,9 +3,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "config/experiment_keys.h"
+#include "run/config/experiment_keys.h"
 #include "control/controller.h"
-#include "crowd/envs.h"
+#include "env/envs.h"
 
 enum { LINE = 100 }; /* characters */
 

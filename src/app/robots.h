@@ -6,7 +6,7 @@
 
 #include "app/cli.h"
 #include "robot/robot.h"
-#include "train/experiment.h"
+#include "run/train/experiment.h"
 
 /* `option` of --robot, or `otherwise` where it is NULL. */
 Robot *robots_open(const char *option, const char *otherwise, MildError *error);

@@ -5,8 +5,8 @@
 #include <cjson/cJSON.h>
 
 #include "base/paths.h"
-#include "train/history.h"
-#include "train/settings.h"
+#include "run/train/history.h"
+#include "run/train/settings.h"
 
 enum { RUN_VIDEOS_MAX = 4 };
 

@@ -4,7 +4,7 @@
 #define MILD_CONTROLLER_H
 
 #include "base/pool.h"
-#include "task/task.h"
+#include "env/task/task.h"
 
 typedef struct {
     void *self;

@@ -7,7 +7,7 @@
 #include "learn/policy.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
-#include "ranks/ranks.h"
+#include "device/ranks/ranks.h"
 
 typedef struct Ppo Ppo;
 /* Borrows policy and pool. mirror: NULL for none; it is copied. */

@@ -9,7 +9,7 @@
 #include "learn/policy_private.h"
 #include "learn/ppo_batch.h"
 #include "learn/ppo_def.h"
-#include "ranks/ranks.h"
+#include "device/ranks/ranks.h"
 
 /* A minibatch consists of PPO_SHARDS runs of samples, each with its own gradient, and a shard is
  * cut into chunks. Sums are taken in the order of the shards. So no result depends on the number of

@@ -4,8 +4,8 @@
 
 #include <unistd.h>
 
-#include "actuator/actuator.h"
-#include "actuator/motor.h"
+#include "env/actuator/actuator.h"
+#include "env/actuator/motor.h"
 #include "base/file.h"
 #include "learn/safetensors.h"
 

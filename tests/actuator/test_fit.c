@@ -1,7 +1,7 @@
 /* Logs as CSV, and fits to logs whose law is known. */
 #include "actuator_kit.h"
 
-#include "actuator/fit.h"
+#include "env/actuator/fit.h"
 
 #define INTERVAL 0.005 /* [s] between rows */
 #define TEXT_SIZE 400

@@ -2,7 +2,7 @@
 #ifndef BATCH_KIT_H
 #define BATCH_KIT_H
 
-#include "batch/batch.h"
+#include "ground/batch/batch.h"
 #include "device/device.h"
 #include "ground/ground_kit.h"
 

@@ -7,8 +7,8 @@
 
 #include <cmocka.h>
 
-#include "bench/record.h"
-#include "bench/step.h"
+#include "run/bench/record.h"
+#include "run/bench/step.h"
 
 /* The benchmark runs and reports positive times; how long they are is not a test's business. */
 static void test_bench(void **unused) {

@@ -10,8 +10,8 @@
 #include <cmocka.h>
 
 #include "base/clock.h"
-#include "bench/bench.h"
-#include "train/trainer.h"
+#include "run/bench/bench.h"
+#include "run/train/trainer.h"
 
 #define TICK 0.0009765625 /* [s] 1/1024, so that sums are exact */
 enum { ENVS = 6, STEPS = 4 };

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "config/experiment_keys.h"
+#include "run/config/experiment_keys.h"
 
 typedef struct {
     double stiffness, pair[2];

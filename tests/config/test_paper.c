@@ -10,9 +10,9 @@
 
 #include <cmocka.h>
 
-#include "config/experiment_keys.h"
+#include "run/config/experiment_keys.h"
 #include "sa01.h"
-#include "train/trainer.h"
+#include "run/train/trainer.h"
 
 #define PAPER MILD_SOURCE_DIR "/configs/paper.ini"
 

@@ -15,9 +15,9 @@
 #include <cmocka.h>
 
 #include "base/random.h"
-#include "drive/input.h"
-#include "drive/packet.h"
-#include "drive/times.h"
+#include "deploy/drive/input.h"
+#include "deploy/drive/packet.h"
+#include "deploy/drive/times.h"
 
 #define SA01_CRC 0x974b2030u
 #define SA01_TEXT "974b2030"

@@ -11,8 +11,8 @@
 #include <cmocka.h>
 
 #include "base/random.h"
-#include "drive/runner.h"
-#include "eval/scene.h"
+#include "deploy/drive/runner.h"
+#include "run/eval/scene.h"
 #include "sa01.h"
 
 #define POLICY MILD_SOURCE_DIR "/policies/mild.safetensors"

@@ -15,11 +15,11 @@
 #include <vector>
 
 extern "C" {
-#include "batch/batch.h"
+#include "ground/batch/batch.h"
 #include "device_cases.h"
 }
 
-#include "engine/robots.h"
+#include "robot/engine/robots.h"
 
 static const double dt = 0.0025; /* [s] */
 

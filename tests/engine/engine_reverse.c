@@ -1,4 +1,4 @@
-#include "batch/lanes.h"
+#include "ground/batch/lanes.h"
 
 #undef EACH_LANE
 #define EACH_LANE(l) for (int l = LANES - 1; l >= 0; l--)

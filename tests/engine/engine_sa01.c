@@ -7,7 +7,7 @@
 #define ENGINE_CHAIN 12
 #include "engine_text.h"
 
-#include "engine/step.h"
+#include "robot/engine/step.h"
 
 size_t engine_work_bytes_sa01(void) {
     return sizeof(EngineWork);

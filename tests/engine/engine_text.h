@@ -3,7 +3,7 @@
 #ifndef TESTS_ENGINE_TEXT_H
 #define TESTS_ENGINE_TEXT_H
 
-#include "engine/read.h"
+#include "robot/engine/read.h"
 
 /* State and everything that acts on it in one step. Joints in the order of robot.ini. */
 typedef struct {

@@ -9,8 +9,8 @@
 
 #include <cmocka.h>
 
-#include "config/experiment_keys.h"
-#include "envs/envs.h"
+#include "run/config/experiment_keys.h"
+#include "run/envs/envs.h"
 #include "envs_kit.h"
 #include "sa01.h"
 

@@ -2,7 +2,7 @@
  * few trials, whatever the number of threads and of other rows. */
 #include "eval_kit.h"
 
-#include "batch/batch.h"
+#include "ground/batch/batch.h"
 #include "device/device.h"
 
 enum { ROWS = 4 };

@@ -2,7 +2,7 @@
  * the formulas of the paper, and the means of an ablation. */
 #include "eval_kit.h"
 
-#include "eval/inside.h"
+#include "run/eval/inside.h"
 #include "learn/policy.h"
 
 enum { TRIALS = 2, STEPS = 150, LATENT = 16, TEXTS = 2, COLUMNS = 5 + 2 * LATENT + 2 + 11 };

@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "eval/eval.h"
+#include "run/eval/eval.h"
 #include "sa01.h"
 
 /* A power of two: sums of it are exact, so the script meets every threshold where it should. */

@@ -2,9 +2,9 @@
  * the network as it does with the motor. */
 #include "eval_kit.h"
 
-#include "actuator/fit.h"
-#include "actuator/motor.h"
-#include "eval/motor_log.h"
+#include "env/actuator/fit.h"
+#include "env/actuator/motor.h"
+#include "run/eval/motor_log.h"
 
 enum { KINDS = 3, SECONDS = 20, TRIALS = 4, GROUNDS = 3, DRIVES = 3 };
 

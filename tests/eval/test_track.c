@@ -12,7 +12,7 @@
 #include <cmocka.h>
 #include <mujoco/mujoco.h>
 
-#include "eval/track.h"
+#include "run/eval/track.h"
 #include "sa01.h"
 
 /* Turned by 0.7 rad about z, then pitched by 0.3 and rolled by -0.2 rad, knees bent. */

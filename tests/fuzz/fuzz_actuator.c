@@ -1,6 +1,6 @@
 /* Any bytes as the file of an actuator network, with the checksum put right so that the fuzzer gets
  * past it. Refused with a message, or a network that gives torques. */
-#include "actuator/file.h"
+#include "env/actuator/file.h"
 #include "fuzz.h"
 
 static Robot *robot;

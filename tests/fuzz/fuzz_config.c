@@ -1,6 +1,6 @@
 /* Any text as a config file, and as an override. It may fail, never crash, and what it accepts must
  * print and read back to the same values. */
-#include "config/experiment_keys.h"
+#include "run/config/experiment_keys.h"
 #include "fuzz.h"
 
 enum { SECTIONS = EXPERIMENT_SECTIONS + 1 };

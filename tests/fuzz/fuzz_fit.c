@@ -3,8 +3,8 @@
 #include <stdio.h>
 
 #include "fuzz.h"
-#include "lab/fit.h"
-#include "lab/fit_csv.h"
+#include "identify/fit.h"
+#include "identify/fit_csv.h"
 
 static void check(const FitValue *value) {
     if (value->state == FIT_FITTED) {

@@ -1,8 +1,8 @@
 /* Any bytes as a log.csv and as a config.ini. Refused with a message, or rows whose iterations
  * rise, means within their extremes, and every key found again. */
 #include "fuzz.h"
-#include "train/history.h"
-#include "train/settings.h"
+#include "run/train/history.h"
+#include "run/train/settings.h"
 
 enum { POINTS = 7 };
 

@@ -2,7 +2,7 @@
  * one without: refused, or every number that it sends back is finite and within its bounds. */
 #include <unistd.h>
 
-#include "drive/runner.h"
+#include "deploy/drive/runner.h"
 #include "fuzz.h"
 #include "learn/policy.h"
 

@@ -4,7 +4,7 @@
 #include <zlib.h>
 
 #include "fuzz.h"
-#include "task/image.h"
+#include "env/task/image.h"
 
 enum { SIGNATURE = 8, FRAME = 12, PIXELS = 1 << 12, PIXELS_REFUSED = 1 << 27 };
 

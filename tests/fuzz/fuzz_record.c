@@ -2,7 +2,7 @@
  * refuses so few of them or gives finite errors. */
 #include <stdio.h>
 
-#include "actuator/fit.h"
+#include "env/actuator/fit.h"
 #include "fuzz.h"
 
 static Robot *robot;

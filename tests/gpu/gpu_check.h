@@ -8,8 +8,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "gpu/learner.h"
-#include "gpu/learner_private.h"
+#include "learn/cuda/learner.h"
+#include "learn/cuda/learner_private.h"
 #include "learn/ppo_gradient.h"
 #include "learn/ppo_returns.h"
 

@@ -103,7 +103,7 @@ def include_flags(tree):
 
 def units(tree, touched):
     """The units that see what the recipes changed: each file, and for a header those that its rows make."""
-    made = {"src/task/task_def.h": ["src/task/task_def.c"], "include/mild/ground.h": ["src/ground/models.c", "src/ground/material.c"],
+    made = {"src/env/task/task_def.h": ["src/env/task/task_def.c"], "include/mild/ground.h": ["src/ground/models.c", "src/ground/material.c"],
             "include/mild/map.h": ["src/ground/map.c"], "src/control/controller.h": ["src/control/controllers.c"],
             "src/app/commands.h": ["src/app/commands.c"]}
     found = []
@@ -124,7 +124,7 @@ def compile_c(tree, names):
 def compile_cuda(tree, nvcc):
     """The environments and the batch ground as a GPU has them; PTX only, because that is where a recipe can be wrong."""
     unit = tree / "recipe.cu"
-    unit.write_text('#define ENVS_KERNELS envs_kernels_any\n#include "crowd/batch_device.cu"\n', encoding="utf-8")
+    unit.write_text('#define ENVS_KERNELS envs_kernels_any\n#include "env/batch_device.cu"\n', encoding="utf-8")
     call([nvcc, "-std=c++17", "-O0", "-arch=sm_90", "-Werror", "cross-execution-space-call", *include_flags(tree), "-ptx", unit.name, "-o", os.devnull],
          tree)
 

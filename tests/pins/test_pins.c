@@ -3,11 +3,11 @@
 #include <string.h>
 
 #include "envs_kit.h"
-#include "lab/press.h"
+#include "identify/press.h"
 #include "learn/toy.h"
 #include "pins.h"
 #include "task/task_kit.h"
-#include "train/trainer.h"
+#include "run/train/trainer.h"
 
 /* ---- press ---- */
 

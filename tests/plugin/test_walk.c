@@ -5,9 +5,9 @@
 
 #include "plugin_kit.h"
 
-#include "config/experiment_keys.h"
+#include "run/config/experiment_keys.h"
 #include "control/stand.h"
-#include "eval/eval.h"
+#include "run/eval/eval.h"
 #include "robot/sim.h"
 
 /* The robot in MuJoCo. NULL: robot_sim_step makes our own step. */

@@ -12,8 +12,8 @@
 #include <cmocka.h>
 
 #include "base/random.h"
-#include "ranks/device.h"
-#include "ranks/ranks.h"
+#include "device/ranks/device.h"
+#include "device/ranks/ranks.h"
 
 enum { SHARDS = 8, COUNT = 40001 }; /* more than one block, and no multiple of one */
 

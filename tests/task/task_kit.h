@@ -17,7 +17,7 @@
 #include "base/random.h"
 #include "robot/robot.h"
 #include "sa01.h"
-#include "task/task.h"
+#include "env/task/task.h"
 
 #define KIT_MODEL SA01
 #define KIT_PI 3.141592653589793

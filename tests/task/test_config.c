@@ -1,7 +1,7 @@
 /* Defaults and ranges of the task's keys: configs/default.ini says them once more, in figures. */
 #include "task_kit.h"
 
-#include "task/terrain.h"
+#include "env/task/terrain.h"
 
 static FILE *ini;
 

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "base/random.h"
-#include "task/task.h"
+#include "env/task/task.h"
 
 #define GO1 MILD_SOURCE_DIR "/robots/go1"
 

@@ -8,7 +8,7 @@
 
 #include <cmocka.h>
 
-#include "task/policy_keys.h"
+#include "env/task/policy_keys.h"
 
 #define GAINS "50 50 70 70 20 20 50 50 70 70 20 20"
 

@@ -13,8 +13,8 @@
 #include <png.h>
 
 #include "mild/ground.h"
-#include "task/image.h"
-#include "task/terrain.h"
+#include "env/task/image.h"
+#include "env/task/terrain.h"
 
 enum { COLUMNS = 37, ROWS = 23 };
 

@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "train/trainer.h"
+#include "run/train/trainer.h"
 
 #define CHECKPOINT "build_test_batch_checkpoint.safetensors"
 

@@ -15,9 +15,9 @@
 #include <cmocka.h>
 
 #include "base/paths.h"
-#include "train/events.h"
-#include "train/history.h"
-#include "train/log.h"
+#include "run/train/events.h"
+#include "run/train/history.h"
+#include "run/train/log.h"
 
 static char folder[64];
 

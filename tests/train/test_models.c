@@ -11,7 +11,7 @@
 
 #include <cmocka.h>
 
-#include "train/trainer.h"
+#include "run/train/trainer.h"
 
 enum { ITERATIONS = 2 };
 

@@ -11,7 +11,7 @@
 #include <cmocka.h>
 
 #include "control/controller.h"
-#include "train/trainer.h"
+#include "run/train/trainer.h"
 
 #define POLICY "build_test_robot.safetensors"
 #define CHECKPOINT "build_test_robot_checkpoint.safetensors"

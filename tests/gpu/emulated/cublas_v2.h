@@ -1,4 +1,4 @@
-/* A stand-in for cuBLAS as far as src/gpu calls it. */
+/* A stand-in for cuBLAS as far as src/learn/cuda calls it. */
 #ifndef MILD_EMULATED_CUBLAS_H
 #define MILD_EMULATED_CUBLAS_H
 

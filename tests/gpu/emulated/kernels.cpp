@@ -6,8 +6,8 @@
 #include <functional>
 #include <vector>
 
-#include "gpu/kernels.h"
-#include "gpu/update.h"
+#include "learn/cuda/kernels.h"
+#include "learn/cuda/update.h"
 
 int emulated_failure;
 size_t emulated_memory = (size_t)1 << 34;
@@ -120,5 +120,5 @@ void __syncthreads() {
 #define LAUNCH(kernel, grid, block, stream, ...)                                                   \
     ((void)(stream), launch(grid, block, [&] { kernel(__VA_ARGS__); }))
 
-#include "gpu/kernels.cu"
-#include "gpu/update.cu"
+#include "learn/cuda/kernels.cu"
+#include "learn/cuda/update.cu"

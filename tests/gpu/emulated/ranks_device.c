@@ -1,5 +1,5 @@
 /* ranks/device.h where the device's memory is memory. */
-#include "ranks/device.h"
+#include "device/ranks/device.h"
 
 MildStatus ranks_open_device(Ranks *ranks, size_t bytes, MildError *error) {
     (void)ranks, (void)bytes, (void)error;

@@ -1,0 +1,99 @@
+#include "deploy/export/describe.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* Adds a text; a long one ends where there is no more room. */
+static void add(Description *d, const char *key, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    snprintf(d->key[d->count], DESCRIBE_KEY, "%s", key);
+    vsnprintf(d->value[d->count++], DESCRIBE_VALUE, format, arguments);
+    va_end(arguments);
+}
+
+static void add_numbers(Description *d, const char *key, const double *numbers, int count,
+                        double scale) {
+    char *value = d->value[d->count];
+    size_t used = 0;
+    for (int i = 0; i < count; i++) {
+        used += (size_t)snprintf(value + used, DESCRIBE_VALUE - used, "%s%.6g", i ? "," : "",
+                                 scale * numbers[i]);
+    }
+    snprintf(d->key[d->count++], DESCRIBE_KEY, "%s", key);
+}
+
+static void add_joint_names(Description *d, const Robot *robot) {
+    char *value = d->value[d->count];
+    size_t used = 0;
+    for (int i = 0; i < robot_joints(robot); i++) {
+        used += (size_t)snprintf(value + used, DESCRIBE_VALUE - used, "%s%s", i ? "," : "",
+                                 robot_joint_name(robot, i));
+    }
+    snprintf(d->key[d->count++], DESCRIBE_KEY, "joint_names");
+}
+
+static void add_robot(Description *d, const Export *export, const TaskGains *gains) {
+    const Robot *robot = export->robot;
+    const int joints = robot_joints(robot);
+    add(d, "robot", "%s", robot_name(robot));
+    add_joint_names(d, robot);
+    add_numbers(d, "default_joint_pos", robot_default_pose(robot), joints, 1);
+    add_numbers(d, "joint_stiffness", gains->kp, joints, 1);
+    add_numbers(d, "joint_damping", gains->kd, joints, 1);
+    add_numbers(d, "joint_effort_limit", robot_effort(robot), joints, export->task->torque_share);
+    add_numbers(d, "joint_velocity_limit", robot_speed(robot), joints, 1);
+    add_numbers(d, "joint_pos_low", robot_joint_low(robot), joints, 1);
+    add_numbers(d, "joint_pos_high", robot_joint_high(robot), joints, 1);
+}
+
+static void add_rules(Description *d, const Export *export) {
+    const TaskDef *task = export->task;
+    const int stride = task->history_stride;
+    add(d, "policy_period", "%g", TASK_PERIOD);
+    add(d, "action_scale", "%.9g", task_action_scale(task, export->robot));
+    add(d, "action_clip", "%.9g", task->action_clip);
+    add(d, "action_rule", "joint target [rad] = default_joint_pos + action_scale * action");
+    add(d, "observation_names",
+        "base_ang_vel,command,projected_gravity,joint_pos,joint_vel,last_action,clock");
+    add(d, "observation_widths", "3,3,3,%d,%d,%d,2", robot_joints(export->robot),
+        robot_joints(export->robot), robot_joints(export->robot));
+    add(d, "observation_rule",
+        "angular velocity [rad/s] and unit gravity in the base's axes; command (forward, left "
+        "[m/s], turning left [rad/s]) times 2, 2, 1; joint_pos minus default_joint_pos [rad]; "
+        "joint_vel times 0.05; last action after its clip");
+    add(d, "history_means", "%d", TASK_FRAMES - 1);
+    add(d, "history_stride", "%d", stride);
+    add(d, "history_rule",
+        "%d means of %d frames each, oldest first, of the %d frames before the newest, then the "
+        "newest; before the first step all are the first frame",
+        TASK_FRAMES - 1, stride, (TASK_FRAMES - 1) * stride);
+    add(d, "clock", "%d", task->clock);
+    add(d, "gait_period", "%.9g", task->gait_period);
+    add(d, "gait_slowing", "%.9g", task->gait_slowing);
+    add(d, "gait_slow_below", "%.9g", task->gait_slow_below);
+    add(d, "standing_below", "%.9g", task->standing_below);
+    add(d, "clock_rule",
+        "sin, cos of 2 pi phase, which grows by policy_period / period a step, period = "
+        "gait_period (1 + gait_slowing max(0, 1 - v / gait_slow_below)), v = |forward| + 3 |left| "
+        "+ |turning| of the frame's command; 0, 0 when "
+        "clock is 0 or all parts of the command are below standing_below");
+    add(d, "estimate_rule",
+        "base velocity times %g, velocity of each foot [m/s], in the base's axes; height of each "
+        "foot times %g",
+        task->velocity_scale, task->height_scale);
+}
+
+MildStatus describe(const Export *export, Description *description, MildError *error) {
+    TaskGains gains;
+    MildStatus status = task_gains(export->task, export->robot, gains.kp, gains.kd, error);
+    description->count = 0;
+    if (status == MILD_OK) {
+        add(description, "producer", "mild %s", export->version);
+        add(description, "note", "%s", export->note);
+        add_robot(description, export, &gains);
+        add_rules(description, export);
+    }
+    return status;
+}

@@ -1,0 +1,41 @@
+/* What steps the robots of a set of environments: MuJoCo (mujoco.c) or the batch engine
+ * (batch.c). */
+#ifndef ENVS_BACKEND_H
+#define ENVS_BACKEND_H
+
+#include "env/envs.h"
+
+/* See the functions of envs.h of these names. */
+typedef struct {
+    void (*destroy)(Envs *envs);
+    MildStatus (*reset)(Envs *envs, const EnvsView *first, void *stream, MildError *error);
+    MildStatus (*step)(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
+    MildStatus (*wait)(Envs *envs, MildError *error);
+    MildStatus (*sums)(Envs *envs, EnvsStats *sums, void *stream, MildError *error);
+    MildStatus (*save_progress)(Envs *envs, TaskProgress *progress, MildError *error);
+    MildStatus (*load_progress)(Envs *envs, const TaskProgress *progress, MildError *error);
+    EnvsMemory (*memory)(const Envs *envs);
+    /* of MuJoCo, else NULL */
+    void (*times)(Envs *envs, double *physics, double *ground);
+    void *(*state)(Envs *envs, size_t *bytes);
+    uint64_t (*hash)(const Envs *envs);
+    /* of the batch engine, else NULL */
+    MildStatus (*set_commands)(Envs *envs, const double *command, MildError *error);
+    void (*set_samples)(Envs *envs, EnvsSample *sample);
+} EnvsBackend;
+
+/* The first member of each backend's own struct. */
+struct Envs {
+    const EnvsBackend *backend;
+    int count;         /* environments */
+    int physics_steps; /* of a policy step */
+};
+
+/* NULL with one line in *error. */
+Envs *envs_create_mujoco(const EnvsDef *def, MildError *error);
+Envs *envs_create_batch(const EnvsDef *def, MildError *error);
+
+/* The TaskEnv of an environment as a device has it (task/lanes.h), on the host only: for tests. */
+void *envs_batch_env(const Envs *envs, int i);
+
+#endif

@@ -1,0 +1,655 @@
+#define MILD_REAL_FLOAT
+#include "env/backend.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "env/batch_kernels.h"
+#include "device/device.h"
+#include "robot/engine/read.h"
+
+_Static_assert(ENVS_MODEL_NUMBERS == ENGINE_NUMBERS, "what engine_model_read fills");
+
+/* Shares of the robots. One NVIDIA H200: three make 5 % more steps with 16 384 robots, 7 % with
+ * 4096 and 2 % with 65 536; four are no faster. The CPU steps them in turn, so that its tests see
+ * them. */
+enum { SHARES = 3 };
+
+typedef struct {
+    Envs base;
+    EnvsArrays arrays; /* their memory is the device's */
+    MildBatch *ground;
+    DeviceFork *fork; /* streams of all shares but the first, on a GPU; else NULL */
+    int shares;       /* of the robots */
+    TaskShape shape;
+    size_t labels;               /* of the map, 1 without */
+    const EnvsKernels *kernels; /* NULL: on the host */
+    void *block;                 /* where the arrays are, but for task and model */
+    EnvsGround *drawn;          /* of the device: the grounds of EnvsTask */
+    void *trials;                /* where those of trials are */
+    Pool *pool;                  /* of the host */
+    int device;
+    size_t robot; /* [B] of EnvRobot */
+    size_t bytes; /* of the device, without the ground */
+} Batch;
+
+static Batch *own(Envs *envs) {
+    return (Batch *)(void *)envs;
+}
+
+static const Batch *own_const(const Envs *envs) {
+    return (const Batch *)(const void *)envs;
+}
+
+static MildStatus checked(const char *why, MildError *error) {
+    return why ? mild_fail(error, MILD_ERROR_IO, "GPU: robots: %s", why) : MILD_OK;
+}
+
+/* ---- creation ---- */
+
+static MildStatus check_def(const EnvsDef *def, MildError *error) {
+    const TaskDef *task = def->task;
+    MildStatus status = task_def_check_robot(task, def->robot, error);
+    const int patches = task->randomize.patch_share > 0 && !def->striped &&
+                        !(task->map && mild_map_label_count(task->map) > 1);
+    const char *missing = patches             ? "randomize.patch_share above 0"
+                          : task->print_tiles ? "terrain.memory"
+                          : !task->newton     ? "task.newton = 0"
+                          : task->motors      ? "task.actuator"
+                          : def->trial && task->map && mild_map_label_count(task->map) > 1
+                              ? "terrain.patches"
+                              : NULL;
+    return status == MILD_OK && missing
+               ? mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "%s is not there on a device yet; train.robots = mujoco has it", missing)
+               : status;
+}
+
+static MildStatus open_ground(Batch *b, const EnvsDef *def, const TaskGrounds *grounds,
+                              MildError *error) {
+    const MildBatchDef batch = {.robots = def->count,
+                                .feet = robot_feet(def->robot),
+                                .soles = robot_soles(def->robot),
+                                .dt = def->task->physics_dt,
+                                .tolerance = def->task->contact_tolerance,
+                                .max_iterations = def->task->contact_iterations,
+                                .device = def->device,
+                                .points = robot_points(def->robot)};
+    MildMaterial *materials = malloc((size_t)grounds->count * sizeof *materials);
+    if (!materials) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d grounds", grounds->count);
+    }
+    for (int i = 0; i < grounds->count; i++) {
+        materials[i] = grounds->ground[i].material;
+    }
+    b->ground = mild_batch_create(&batch, error);
+    MildStatus status =
+        b->ground ? mild_batch_set_materials(b->ground, materials, grounds->count, error)
+                      : MILD_ERROR_ARGUMENT;
+    free(materials);
+    if (status == MILD_OK && def->task->map) {
+        status = mild_batch_set_map(b->ground, def->task->map, error);
+    }
+    return status;
+}
+
+/* Memory of the device, counted. */
+static void *take(Batch *b, size_t bytes, MildError *error) {
+    b->bytes += bytes;
+    return device_alloc(b->device, bytes, error);
+}
+
+static int labels_of(const TaskDef *task) {
+    return task->map ? mild_map_label_count(task->map) : 1;
+}
+
+static MildStatus take_arrays(Batch *b, const TaskDef *task, MildError *error) {
+    const TaskShape *shape = &b->shape;
+    EnvsArrays *all = &b->arrays;
+    EnvsContact *contact = &all->contact;
+    const EnvsBytes of =
+        b->kernels ? b->kernels->bytes(task, shape) : envs_host_bytes(task, shape);
+    const size_t envs = (size_t)all->envs;
+    const size_t feet = (size_t)shape->feet, rows = envs * feet;
+    all->stride = of.stride;
+    b->robot = of.robot;
+    const struct {
+        void *at; /* pointer to the array's pointer */
+        size_t bytes;
+    } arrays[] = {{&all->env, envs * all->stride},
+                  {&all->robot, envs * b->robot},
+                  {&all->material, envs * b->labels * sizeof *all->material},
+                  {&all->map_origin, 2 * envs * sizeof *all->map_origin},
+                  {&all->fresh, envs},
+                  {&all->rigid, envs},
+                  {&all->order, envs * sizeof *all->order},
+                  {&all->tally, TALLY_NUMBERS * sizeof *all->tally},
+                  {&contact->position, 3 * rows * sizeof(float)},
+                  {&contact->rotation, 9 * rows * sizeof(float)},
+                  {&contact->velocity, 6 * rows * sizeof(float)},
+                  {&contact->inverse_inertia, 36 * rows * feet * sizeof(float)},
+                  {&contact->free_velocity, 6 * rows * sizeof(float)},
+                  {&contact->height, envs * sizeof(float)},
+                  {&contact->foot, rows * sizeof *contact->foot}};
+    size_t bytes = 0;
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        bytes += (arrays[i].bytes + 255) / 256 * 256;
+    }
+    b->block = take(b, bytes, error);
+    char *at = b->block;
+    for (size_t i = 0; at && i < sizeof arrays / sizeof *arrays; i++) {
+        memcpy(arrays[i].at, &at, sizeof at);
+        at += (arrays[i].bytes + 255) / 256 * 256;
+    }
+    return b->block ? MILD_OK : MILD_ERROR_MEMORY;
+}
+
+/* Trials and their commands. */
+static MildStatus copy_trials(Batch *b, const EnvsDef *def, MildError *error) {
+    EnvsArrays *all = &b->arrays;
+    const size_t envs = (size_t)def->count, commands = 3 * envs * sizeof *all->command;
+    b->trials = take(b, commands + envs * sizeof *all->trial, error);
+    if (!b->trials) {
+        return MILD_ERROR_MEMORY;
+    }
+    EnvsTrial *trial = (void *)((char *)b->trials + commands);
+    all->command = b->trials;
+    all->trial = trial;
+    return device_copy(b->device, trial, def->trial, envs * sizeof *trial, error);
+}
+
+/* What is drawn of the grounds. */
+static MildStatus copy_grounds(Batch *b, const EnvsDef *def, const TaskGrounds *grounds,
+                               MildError *error) {
+    const size_t bytes = (size_t)grounds->count * sizeof *b->drawn;
+    EnvsGround *made = malloc(bytes);
+    if (!made) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d grounds", grounds->count);
+    }
+    for (int i = 0; i < grounds->count; i++) {
+        made[i].depth = grounds->ground[i].depth;
+        task_ground_numbers(def->robot, &grounds->ground[i].material, made[i].numbers);
+    }
+    b->drawn = take(b, bytes, error);
+    MildStatus status = b->drawn ? device_copy(b->device, b->drawn, made, bytes, error)
+                                     : MILD_ERROR_MEMORY;
+    free(made);
+    return status;
+}
+
+static MildStatus copy_task(Batch *b, const EnvsDef *def, const TaskGrounds *grounds,
+                            MildError *error) {
+    EnvsTask task = {.task = *def->task,
+                      .ground = b->drawn,
+                      .grounds = grounds->count,
+                      .map = b->ground->arrays.map,
+                      .has_map = def->task->map != NULL,
+                      .labels = labels_of(def->task),
+                      .striped = def->striped,
+                      .shape = task_shape(def->robot),
+                      .seed = def->seed,
+                      .first = def->first};
+    if (task.has_map) {
+        mild_map_extent(def->task->map, &task.map_extent[0], &task.map_extent[1]);
+        task.uneven = !mild_map_is_level(def->task->map);
+    }
+    robot_fill_table(def->robot, &task.robot);
+    MildStatus status = task_gains(def->task, def->robot, task.gains.kp, task.gains.kd, error);
+    EnvsTask *at = status == MILD_OK ? take(b, sizeof *at, error) : NULL;
+    b->arrays.task = at;
+    return at ? device_copy(b->device, at, &task, sizeof task, error) : MILD_ERROR_MEMORY;
+}
+
+/* The first that fit; NULL if none do. */
+static const EnvsKernels *kernels_for(const EngineTree *tree) {
+    const EnvsKernels *const *at = envs_kernels;
+    while (*at && !(*at)->fits(tree)) {
+        at++;
+    }
+    return *at;
+}
+
+static MildStatus choose_kernels(Batch *b, const Robot *robot, const EngineTree *tree,
+                                 MildError *error) {
+    if (b->device == MILD_BATCH_HOST) {
+        return MILD_OK;
+    }
+    b->kernels = kernels_for(tree);
+    return b->kernels ? checked(b->kernels->open(), error)
+                          : mild_fail(error, MILD_ERROR_ARGUMENT,
+                                      "%s: this build has no kernels for a robot of its size; "
+                                      "train.robots = mujoco steps it",
+                                      robot_name(robot));
+}
+
+/* The robot as the engine knows it, and what steps it. */
+static MildStatus copy_model(Batch *b, const EnvsDef *def, MildError *error) {
+    EngineModel *model = calloc(1, sizeof *model);
+    double *number = calloc(ENGINE_NUMBERS, sizeof *number);
+    EngineTree tree = {0};
+    MildStatus status = MILD_ERROR_MEMORY;
+    if (!model || !number) {
+        mild_fail(error, status, "no memory for the model of the robot");
+    } else {
+        status = engine_model_read(def->robot, def->task->physics_dt, &tree, number, error);
+    }
+    status = status == MILD_OK ? choose_kernels(b, def->robot, &tree, error) : status;
+    EngineModel *at = status == MILD_OK ? take(b, sizeof *at, error) : NULL;
+    b->arrays.model = at;
+    if (at) {
+        envs_model_fill(&tree, number, model);
+        status = device_copy(b->device, at, model, sizeof *model, error);
+    } else if (status == MILD_OK) {
+        status = MILD_ERROR_MEMORY;
+    }
+    free(model);
+    free(number);
+    return status;
+}
+
+static void create_piece(void *context, int piece, int thread) {
+    (void)thread;
+    envs_host_create(context, piece);
+}
+
+static MildStatus create_envs(Batch *b, MildError *error) {
+    EnvsArrays *all = &b->arrays;
+    if (b->device != MILD_BATCH_HOST) {
+        MildStatus status = checked(b->kernels->create(all, NULL), error);
+        return status == MILD_OK ? device_wait(b->device, error) : status;
+    }
+    pool_run(b->pool, all->envs, create_piece, all);
+    return MILD_OK;
+}
+
+static MildStatus open_shares(Batch *b, MildError *error) {
+    b->shares = b->arrays.envs >= SHARES ? SHARES : 1;
+    if (b->device == MILD_BATCH_HOST || b->shares == 1) {
+        return MILD_OK;
+    }
+    b->fork = device_fork_create(b->device, b->shares - 1, error);
+    return b->fork ? MILD_OK : error->status;
+}
+
+static MildStatus open_batch(Batch *b, const EnvsDef *def, const TaskGrounds *grounds,
+                             MildError *error) {
+    b->shape = task_shape(def->robot);
+    b->device = def->device;
+    b->pool = def->pool;
+    b->labels = (size_t)labels_of(def->task);
+    b->arrays.envs = def->count;
+    MildStatus status = open_ground(b, def, grounds, error);
+    status = status == MILD_OK ? open_shares(b, error) : status;
+    status = status == MILD_OK ? copy_model(b, def, error) : status;
+    status = status == MILD_OK ? take_arrays(b, def->task, error) : status;
+    status = status == MILD_OK ? copy_grounds(b, def, grounds, error) : status;
+    status = status == MILD_OK && def->trial ? copy_trials(b, def, error) : status;
+    status = status == MILD_OK ? copy_task(b, def, grounds, error) : status;
+    return status == MILD_OK ? create_envs(b, error) : status;
+}
+
+static void destroy(Envs *envs) {
+    Batch *b = own(envs);
+    const EnvsArrays *all = &b->arrays;
+    device_free(b->device, b->drawn);
+    device_free(b->device, b->block);
+    device_free(b->device, b->trials);
+    device_free(b->device, (void *)all->task);
+    device_free(b->device, (void *)all->model);
+    mild_batch_destroy(b->ground);
+    device_fork_destroy(b->fork);
+    free(b);
+}
+
+static EnvsMemory memory(const Envs *envs) {
+    const Batch *b = own_const(envs);
+    const size_t task = b->arrays.stride, engine = b->robot;
+    return (EnvsMemory){.task = task,
+                        .engine = engine,
+                        .ground = mild_batch_robot_bytes(b->ground),
+                        .rest = b->bytes / (size_t)b->arrays.envs - task - engine};
+}
+
+/* ---- shares ---- */
+
+/* A part of the robots, which a GPU steps in a stream of its own: while the last robots of one
+ * share's kernel leave places free, the next kernel of another takes them. */
+typedef struct {
+    EnvsArrays arrays;
+    EnvsStep step;
+    MildBatch ground;
+    void *stream;
+} Share;
+
+static float *row_from(float *rows, size_t first, int width) {
+    return rows ? rows + first * (size_t)width : NULL;
+}
+
+static uint8_t *flag_from(uint8_t *flags, size_t first) {
+    return flags ? flags + first : NULL;
+}
+
+static EnvsView view_from(const EnvsView *view, const TaskShape *shape, size_t first) {
+    return (EnvsView){.history = row_from(view->history, first, shape->history),
+                      .critic = row_from(view->critic, first, shape->critic),
+                      .estimate = row_from(view->estimate, first, shape->estimates),
+                      .frame = row_from(view->frame, first, shape->observation)};
+}
+
+static EnvsStep step_from(const EnvsStep *step, const TaskShape *shape, size_t first) {
+    return (EnvsStep){.action = step->action ? step->action + first * (size_t)shape->actions : NULL,
+                      .reward = row_from(step->reward, first, 1),
+                      .done = flag_from(step->done, first),
+                      .timeout = flag_from(step->timeout, first),
+                      .valid = flag_from(step->valid, first),
+                      .next = view_from(&step->next, shape, first)};
+}
+
+static EnvsContact contact_from(const EnvsContact *c, size_t first, size_t feet) {
+    const size_t row = first * feet;
+    return (EnvsContact){.position = c->position + 3 * row,
+                          .rotation = c->rotation + 9 * row,
+                          .velocity = c->velocity + 6 * row,
+                          .inverse_inertia = c->inverse_inertia + 36 * row * feet,
+                          .free_velocity = c->free_velocity + 6 * row,
+                          .height = c->height + first,
+                          .foot = c->foot + row};
+}
+
+/* `count` robots from `first` on. */
+static EnvsArrays arrays_from(const Batch *b, size_t first, int count) {
+    EnvsArrays all = b->arrays;
+    all.envs = count;
+    all.env += first * all.stride;
+    all.robot = (char *)all.robot + first * b->robot;
+    all.material += first * b->labels;
+    all.map_origin += 2 * first;
+    all.fresh += first;
+    all.rigid += first;
+    all.order += first;
+    all.contact = contact_from(&all.contact, first, (size_t)b->shape.feet);
+    all.trial = all.trial ? all.trial + first : NULL;
+    all.command = all.command ? all.command + 3 * first : NULL;
+    all.sample = all.sample ? all.sample + first * (size_t)b->base.physics_steps : NULL;
+    return all;
+}
+
+static Share share_of(const Batch *b, const EnvsStep *step, int i, void *stream) {
+    const long envs = b->arrays.envs;
+    const long first = envs * i / b->shares, end = envs * (i + 1) / b->shares;
+    const int count = (int)(end - first);
+    return (Share){.arrays = arrays_from(b, (size_t)first, count),
+                   .step = step_from(step, &b->shape, (size_t)first),
+                   .ground = batch_share(b->ground, (int)first, count),
+                   .stream =
+                       i > 0 && b->fork ? device_fork_stream(b->fork, i - 1) : stream};
+}
+
+/* ---- steps on the CPU ---- */
+
+/* One call, for the threads of the host. */
+typedef struct {
+    const EnvsArrays *arrays;
+    const EnvsStep *step;
+    int part;
+} Call;
+
+static void begin_piece(void *context, int piece, int thread) {
+    (void)thread;
+    envs_host_begin(((const Call *)context)->arrays, piece);
+}
+
+static void part_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    envs_host_part(call->arrays, call->step, call->part, piece);
+}
+
+static void command_piece(void *context, int piece, int thread) {
+    (void)thread;
+    envs_host_set_command(((const Call *)context)->arrays, piece);
+}
+
+static void end_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    envs_host_end(call->arrays, call->step, piece);
+}
+
+static void first_piece(void *context, int piece, int thread) {
+    const Call *call = context;
+    (void)thread;
+    envs_host_first(call->arrays, call->step, piece);
+}
+
+/* ---- steps ---- */
+
+/* One step of the ground under the robots of a share. */
+static MildStatus step_ground(Share *share, MildError *error) {
+    const EnvsArrays *all = &share->arrays;
+    const EnvsContact *c = &all->contact;
+    const MildBatchInput input = {.position = c->position,
+                                  .rotation = c->rotation,
+                                  .velocity = c->velocity,
+                                  .inverse_inertia = c->inverse_inertia,
+                                  .free_velocity = c->free_velocity,
+                                  .material = all->material,
+                                  .map_origin = all->map_origin,
+                                  .height = c->height};
+    const MildBatchOutput output = {
+        .wrench = c->velocity, .velocity = c->free_velocity, .foot = c->foot};
+    return mild_batch_step(&share->ground, &input, &output, 1, share->stream, error);
+}
+
+/* The physics steps of a policy step: parts with the ground between them. Then the task. */
+static MildStatus step_share(const Batch *b, Share *share, MildError *error) {
+    const EnvsArrays *all = &share->arrays;
+    Call call = {&share->arrays, &share->step, 0};
+    MildStatus status = MILD_OK;
+    for (call.part = 0; status == MILD_OK && call.part <= b->base.physics_steps; call.part++) {
+        status = call.part > 0 ? step_ground(share, error) : MILD_OK;
+        if (status == MILD_OK && b->kernels) {
+            status =
+                checked(b->kernels->part(all, &share->step, call.part, share->stream), error);
+        } else if (status == MILD_OK) {
+            pool_run(b->pool, all->envs, part_piece, &call);
+        }
+    }
+    if (status == MILD_OK && b->kernels) {
+        return checked(b->kernels->end(all, &share->step, share->stream), error);
+    }
+    if (status == MILD_OK) {
+        pool_run(b->pool, all->envs, end_piece, &call);
+    }
+    return status;
+}
+
+/* The first episodes. */
+static MildStatus begin_share(const Batch *b, Share *share, MildError *error) {
+    Call call = {&share->arrays, &share->step, 0};
+    if (b->kernels) {
+        return checked(b->kernels->begin(&share->arrays, share->stream), error);
+    }
+    pool_run(b->pool, share->arrays.envs, begin_piece, &call);
+    return MILD_OK;
+}
+
+/* New episodes forget their ground, and all are seen. */
+static MildStatus see_share(const Batch *b, Share *share, MildError *error) {
+    const EnvsArrays *all = &share->arrays;
+    Call call = {&share->arrays, &share->step, 0};
+    MildStatus status = mild_batch_reset(&share->ground, all->fresh, share->stream, error);
+    if (status == MILD_OK && b->kernels) {
+        return checked(b->kernels->first(all, &share->step, share->stream), error);
+    }
+    if (status == MILD_OK) {
+        pool_run(b->pool, all->envs, first_piece, &call);
+    }
+    return status;
+}
+
+static MildStatus each_share(const Batch *b, const EnvsStep *step, void *stream,
+                             MildStatus (*work)(const Batch *, Share *, MildError *),
+                             MildError *error) {
+    MildStatus status = b->fork ? device_fork(b->fork, stream, error) : MILD_OK;
+    for (int i = 0; status == MILD_OK && i < b->shares; i++) {
+        Share share = share_of(b, step, i, stream);
+        status = work(b, &share, error);
+        status = status == MILD_OK ? see_share(b, &share, error) : status;
+    }
+    return status == MILD_OK && b->fork ? device_join(b->fork, stream, error) : status;
+}
+
+static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
+    const EnvsStep none = {.next = *first};
+    return each_share(own(envs), &none, stream, begin_share, error);
+}
+
+static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+    return step->last.history || step->terms
+               ? mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "the batch engine does not keep the end of an episode; train.robots = "
+                           "mujoco does")
+               : each_share(own(envs), step, stream, step_share, error);
+}
+
+static MildStatus wait(Envs *envs, MildError *error) {
+    const Batch *b = own(envs);
+    return b->device == MILD_BATCH_HOST ? MILD_OK : device_wait(b->device, error);
+}
+
+static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+    const Batch *b = own(envs);
+    const EnvsArrays *all = &b->arrays;
+    double sum[TALLY_NUMBERS];
+    if (b->device != MILD_BATCH_HOST) {
+        MildStatus status = checked(b->kernels->tally(all, stream), error);
+        status = status == MILD_OK ? device_wait(b->device, error) : status;
+        if (status != MILD_OK) {
+            return status;
+        }
+    } else {
+        envs_host_tally(all);
+    }
+    MildStatus status = device_copy(b->device, sum, all->tally, sizeof sum, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    *sums = (EnvsStats){.episodes = (int)sum[TALLY_EPISODES],
+                        .falls = (int)sum[TALLY_FALLS],
+                        .diverged = (int)sum[TALLY_DIVERGED],
+                        .steps = sum[TALLY_STEPS],
+                        .paid = sum[TALLY_PAID],
+                        .length = sum[TALLY_LENGTH],
+                        .reward = sum[TALLY_REWARD],
+                        .speed_error = sum[TALLY_SPEED_ERROR],
+                        .assist = sum[TALLY_ASSIST]};
+    memcpy(sums->terms, sum + TALLY_TERMS, TASK_REWARD_COUNT * sizeof *sum);
+    return MILD_OK;
+}
+
+/* Between the environments and `all->kept`. */
+static MildStatus move_kept(const Batch *b, const EnvsArrays *all, int back,
+                            MildError *error) {
+    if (b->device == MILD_BATCH_HOST) {
+        envs_host_move_progress(all, back);
+        return MILD_OK;
+    }
+    MildStatus status = device_wait(b->device, error);
+    status = status == MILD_OK ? checked(b->kernels->keep(all, back, NULL), error) : status;
+    return status == MILD_OK ? device_wait(b->device, error) : status;
+}
+
+static MildStatus save_progress(Envs *envs, TaskProgress *kept, MildError *error) {
+    const Batch *b = own(envs);
+    const size_t bytes = (size_t)b->arrays.envs * sizeof *kept;
+    EnvsArrays all = b->arrays;
+    all.kept = device_alloc(b->device, bytes, error);
+    MildStatus status = all.kept ? move_kept(b, &all, 0, error) : MILD_ERROR_MEMORY;
+    status = status == MILD_OK ? device_copy(b->device, kept, all.kept, bytes, error) : status;
+    device_free(b->device, all.kept);
+    return status;
+}
+
+static MildStatus load_progress(Envs *envs, const TaskProgress *kept, MildError *error) {
+    const Batch *b = own(envs);
+    const size_t bytes = (size_t)b->arrays.envs * sizeof *kept;
+    EnvsArrays all = b->arrays;
+    all.kept = device_alloc(b->device, bytes, error);
+    MildStatus status =
+        all.kept ? device_copy(b->device, all.kept, kept, bytes, error) : MILD_ERROR_MEMORY;
+    status = status == MILD_OK ? move_kept(b, &all, 1, error) : status;
+    device_free(b->device, all.kept);
+    return status;
+}
+
+static MildStatus set_commands(Envs *envs, const double *command, MildError *error) {
+    const Batch *b = own(envs);
+    const EnvsArrays *all = &b->arrays;
+    Call call = {all, NULL, 0};
+    MildStatus status = device_copy(b->device, all->command, command,
+                                    3 * (size_t)all->envs * sizeof *command, error);
+    if (status == MILD_OK && b->device != MILD_BATCH_HOST) {
+        return checked(b->kernels->tell(all, NULL), error);
+    }
+    if (status == MILD_OK) {
+        pool_run(b->pool, all->envs, command_piece, &call);
+    }
+    return status;
+}
+
+static void set_samples(Envs *envs, EnvsSample *sample) {
+    own(envs)->arrays.sample = sample;
+}
+
+static const EnvsBackend backend = {.destroy = destroy,
+                                    .reset = reset,
+                                    .step = step,
+                                    .wait = wait,
+                                    .sums = sums,
+                                    .save_progress = save_progress,
+                                    .load_progress = load_progress,
+                                    .memory = memory,
+                                    .set_commands = set_commands,
+                                    .set_samples = set_samples};
+
+Envs *envs_create_batch(const EnvsDef *def, MildError *error) {
+    if (check_def(def, error) != MILD_OK) {
+        return NULL;
+    }
+    TaskGrounds *drawn = def->chosen ? NULL
+                                     : task_grounds_create(def->task, def->robot, def->grounds,
+                                                           def->seed, def->pool, error);
+    const TaskGrounds *grounds = def->chosen ? def->chosen : drawn;
+    Batch *b = grounds ? calloc(1, sizeof *b) : NULL;
+    if (grounds && !b) {
+        mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
+    }
+    if (b) {
+        b->base.backend = &backend;
+    }
+    if (b && open_batch(b, def, grounds, error) != MILD_OK) {
+        destroy(&b->base);
+        b = NULL;
+    }
+    task_grounds_destroy(drawn);
+    return b ? &b->base : NULL;
+}
+
+/* ---- tests ---- */
+
+int envs_are_slow(const Robot *robot) {
+    double *number = calloc(ENGINE_NUMBERS, sizeof *number);
+    EngineTree tree;
+    MildError unused;
+    const int read =
+        number && engine_model_read(robot, TASK_PERIOD, &tree, number, &unused) == MILD_OK;
+    const EnvsKernels *kernels = read ? kernels_for(&tree) : NULL;
+    free(number);
+    return kernels && !kernels->fixed;
+}
+
+void *envs_batch_env(const Envs *envs, int i) {
+    const Batch *b = own_const(envs);
+    return b->arrays.env + (size_t)i * b->arrays.stride;
+}

@@ -1,0 +1,83 @@
+/* What a crowd keeps on its device. Include it after task.h. */
+#ifndef ENVS_ARRAYS_H
+#define ENVS_ARRAYS_H
+
+#include "ground/batch/batch.h"
+#include "env/envs_step.h"
+#include "env/trial.h"
+#include "robot/engine/model.h"
+#include "env/task/ground.h"
+#include "env/task/task.h"
+
+/* Sums over the episodes of an environment that ended since the last envs_sums; see
+ * EnvsStats. */
+enum {
+    TALLY_EPISODES,
+    TALLY_FALLS,
+    TALLY_DIVERGED,
+    TALLY_STEPS,
+    TALLY_PAID,
+    TALLY_LENGTH,
+    TALLY_REWARD,
+    TALLY_SPEED_ERROR,
+    TALLY_TERMS,
+    TALLY_KEPT = TALLY_TERMS + TASK_REWARD_COUNT,
+    TALLY_ASSIST = TALLY_KEPT, /* not kept: the level of assistance now */
+    TALLY_NUMBERS
+};
+
+/* A ground to draw. */
+typedef struct {
+    double depth; /* [m] that the robot stands in it */
+    float numbers[TASK_GROUND_NUMBERS];
+} EnvsGround;
+
+/* The same for all environments; the task comes first. */
+typedef struct {
+    TaskDef task;
+    RobotTable robot;
+    const EnvsGround *ground; /* [grounds] to draw from */
+    int grounds;
+    MapView map;          /* its arrays are the ground's */
+    double map_extent[2]; /* [m] */
+    int has_map;          /* bool */
+    int uneven;           /* bool: the map is */
+    int labels;           /* of the map; 1 without */
+    int striped;          /* bool: the labels are stripes of the share patch_share of episodes */
+    /* what environments are made from, see task_env_init_head */
+    TaskShape shape;
+    TaskGains gains;
+    uint64_t seed;
+    uint32_t first; /* number of the first environment */
+} EnvsTask;
+
+/* What passes between engine and ground; see MildBatchInput and MildBatchOutput. The ground writes
+ * over what it has read: the wrenches over velocity, the twists after the step over free_velocity.
+ */
+typedef struct {
+    float *position, *rotation, *velocity, *inverse_inertia, *free_velocity, *height;
+    MildBatchFoot *foot; /* of which depth_mean is the engine's on rigid ground */
+} EnvsContact;
+#define ENVS_FAR 1000 /* [m] below a robot on rigid ground: the soft one does not touch it */
+
+typedef struct {
+    int envs;
+    size_t stride;      /* [B] of a TaskEnv and its frames */
+    char *env;          /* [envs][stride] */
+    void *robot;        /* [envs] EnvRobot of crowd.inc */
+    int32_t *material;  /* [envs][labels] of the ground's table */
+    Real *map_origin;   /* [envs][2] [m] */
+    uint8_t *fresh;     /* [envs] bool: an episode began */
+    uint8_t *rigid;     /* [envs] bool: of the episode */
+    int32_t *order;     /* [envs] in which a GPU steps them: those on rigid ground first */
+    TaskProgress *kept; /* [envs] or NULL, in envs_save_progress and envs_load_progress */
+    double *tally;      /* [TALLY_NUMBERS] sums over the environments */
+    EnvsContact contact;
+    const EnvsTrial *trial; /* [envs] or NULL */
+    double *command;        /* [envs][3] of the trials */
+    EnvsSample *sample;     /* [envs][physics steps] or NULL */
+    const EnvsTask *task;
+    const EngineModel *model;
+} EnvsArrays;
+
+#endif

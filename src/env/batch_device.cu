@@ -1,0 +1,234 @@
+/* A crowd on a GPU. The text is compiled for robots of one size (ENGINE_JOINTS ... of model.h), or
+ * without these definitions for any, by cmake/Crowd.cmake. Before the inclusion: ENVS_KERNELS, the
+ * name of what it gives. */
+#define MILD_REAL_FLOAT
+#include <cuda_runtime.h>
+
+#include "env/batch_step.inc"
+#include "env/batch_kernels.h"
+
+#ifndef ENVS_WARPS
+#define ENVS_WARPS (ENGINE_FIXED ? 4 : 1) /* robots of a block */
+#endif
+#ifndef ENVS_BLOCKS
+#define ENVS_BLOCKS (ENGINE_FIXED ? 6 : 1) /* blocks of a multiprocessor, at least */
+#endif
+enum {
+    WARP_THREADS = LANES * ENVS_WARPS,
+    TASK_THREADS = 128,
+    TASK_ROBOTS = TASK_THREADS / TASK_LANES, /* of a block */
+    TASK_BLOCKS = 8,                          /* blocks of a multiprocessor, at least */
+    TALLY_THREADS = 256,
+    ORDER_THREADS = 1024
+};
+
+static const size_t work_bytes = ENVS_WARPS * sizeof(EnvWork);
+
+static __device__ long warp_robot(void) {
+    return (long)blockIdx.x * ENVS_WARPS + threadIdx.x / LANES;
+}
+
+/* TASK_LANES threads have a robot. */
+static __device__ long lanes_robot(void) {
+    return (long)blockIdx.x * TASK_ROBOTS + threadIdx.x / TASK_LANES;
+}
+
+static int warp_blocks(int envs) {
+    return (envs + ENVS_WARPS - 1) / ENVS_WARPS;
+}
+
+static int lanes_blocks(int envs) {
+    return (envs + TASK_ROBOTS - 1) / TASK_ROBOTS;
+}
+
+template <int WATCHED>
+static __global__ void __launch_bounds__(WARP_THREADS, ENVS_BLOCKS)
+    part(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsStep call, int k) {
+    extern __shared__ __align__(16) Real shared[];
+    const long place = warp_robot();
+    if (place < all.envs) {
+        env_part(&all, &call, all.order[place], k, WATCHED,
+                   (EnvWork *)shared + threadIdx.x / LANES);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS, TASK_BLOCKS)
+    end(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsStep call) {
+    const long robot = lanes_robot();
+    if (robot < all.envs) {
+        env_end(&all, &call, robot);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    create(const __grid_constant__ EnvsArrays all) {
+    const long robot = lanes_robot();
+    if (robot < all.envs) {
+        env_create(&all, robot);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    begin(const __grid_constant__ EnvsArrays all) {
+    const long robot = lanes_robot();
+    if (robot < all.envs) {
+        env_begin(&all, robot);
+    }
+}
+
+static __global__ void __launch_bounds__(WARP_THREADS)
+    pose(const __grid_constant__ EnvsArrays all) {
+    extern __shared__ __align__(16) Real shared[];
+    const long robot = warp_robot();
+    if (robot < all.envs) {
+        env_pose(&all, robot, (EnvWork *)shared + threadIdx.x / LANES);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS, TASK_BLOCKS)
+    observe(const __grid_constant__ EnvsArrays all, const __grid_constant__ EnvsStep call) {
+    const long robot = lanes_robot();
+    if (robot < all.envs) {
+        env_observe(&all, &call, robot);
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    tell(const __grid_constant__ EnvsArrays all) {
+    const long robot = lanes_robot();
+    if (robot < all.envs) {
+        env_set_command(&all, robot);
+    }
+}
+
+/* The order in which the robots are stepped, by one block: a warp on rigid ground takes other paths
+ * than one on soft ground, so that a block has but one kind. */
+static __global__ void __launch_bounds__(ORDER_THREADS)
+    arrange(const __grid_constant__ EnvsArrays all) {
+    __shared__ int rigid[ORDER_THREADS + 1];
+    const int t = (int)threadIdx.x;
+    const int begin = (int)((long)all.envs * t / ORDER_THREADS);
+    const int end = (int)((long)all.envs * (t + 1) / ORDER_THREADS);
+    int count = 0;
+    for (int i = begin; i < end; i++) {
+        count += all.rigid[i];
+    }
+    rigid[t + 1] = count;
+    rigid[0] = 0;
+    for (int step = 1; step < ORDER_THREADS; step *= 2) { /* sums up to each thread */
+        __syncthreads();
+        const int before = t + 1 > step ? rigid[t + 1 - step] : 0;
+        __syncthreads();
+        rigid[t + 1] += before;
+    }
+    __syncthreads();
+    int first = rigid[t];
+    int rest = rigid[ORDER_THREADS] + begin - first;
+    for (int i = begin; i < end; i++) {
+        all.order[all.rigid[i] ? first++ : rest++] = i;
+    }
+}
+
+static __global__ void __launch_bounds__(TASK_THREADS)
+    keep(const __grid_constant__ EnvsArrays all, int back) {
+    const long robot = lanes_robot();
+    if (robot < all.envs) {
+        env_move_progress(&all, robot, back);
+    }
+}
+
+/* Block n sums number n of all tallies, in a fixed order. */
+static __global__ void __launch_bounds__(TALLY_THREADS)
+    tally(const __grid_constant__ EnvsArrays all) {
+    __shared__ double part[TALLY_THREADS];
+    double sum = 0;
+    for (long robot = threadIdx.x; robot < all.envs; robot += TALLY_THREADS) {
+        sum += env_tally(&all, robot, (int)blockIdx.x);
+    }
+    part[threadIdx.x] = sum;
+    for (int half = TALLY_THREADS / 2; half > 0; half /= 2) {
+        __syncthreads();
+        if ((int)threadIdx.x < half) {
+            part[threadIdx.x] += part[threadIdx.x + half];
+        }
+    }
+    if (threadIdx.x == 0) {
+        all.tally[blockIdx.x] = part[0];
+    }
+}
+
+/* NULL, or the last error. */
+static const char *launched(void) {
+    const cudaError_t status = cudaGetLastError();
+    return status == cudaSuccess ? NULL : cudaGetErrorString(status);
+}
+
+static EnvsBytes kernels_bytes(const TaskDef *def, const TaskShape *shape) {
+    const EnvsBytes bytes = {env_stride(def, shape), sizeof(EnvRobot)};
+    return bytes;
+}
+
+static int kernels_fits(const EngineTree *tree) {
+    return !ENGINE_FIXED || (tree->joints == ENGINE_JOINTS && tree->feet == ENGINE_FEET &&
+                             tree->corners == ENGINE_CORNERS && tree->entries == ENGINE_ENTRIES &&
+                             tree->chain == ENGINE_CHAIN);
+}
+
+static const char *kernels_open(void) {
+    cudaFuncSetAttribute(part<0>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)work_bytes);
+    cudaFuncSetAttribute(pose, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)work_bytes);
+    cudaFuncSetAttribute(part<1>, cudaFuncAttributeMaxDynamicSharedMemorySize, (int)work_bytes);
+    return launched();
+}
+
+static const char *kernels_create(const EnvsArrays *all, void *stream) {
+    create<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    return launched();
+}
+
+static const char *kernels_begin(const EnvsArrays *all, void *stream) {
+    begin<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    return launched();
+}
+
+static const char *kernels_part(const EnvsArrays *all, const EnvsStep *call, int k, void *stream) {
+    (all->sample
+         ? part<1>
+         : part<0>)<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(
+        *all, *call, k);
+    return launched();
+}
+
+static const char *kernels_end(const EnvsArrays *all, const EnvsStep *call, void *stream) {
+    end<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
+    return launched();
+}
+
+static const char *kernels_first(const EnvsArrays *all, const EnvsStep *call, void *stream) {
+    pose<<<warp_blocks(all->envs), WARP_THREADS, work_bytes, (cudaStream_t)stream>>>(*all);
+    observe<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, *call);
+    arrange<<<1, ORDER_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    return launched();
+}
+
+static const char *kernels_move_progress(const EnvsArrays *all, int back, void *stream) {
+    keep<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all, back);
+    return launched();
+}
+
+static const char *kernels_set_command(const EnvsArrays *all, void *stream) {
+    tell<<<lanes_blocks(all->envs), TASK_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    return launched();
+}
+
+static const char *kernels_tally(const EnvsArrays *all, void *stream) {
+    tally<<<TALLY_NUMBERS, TALLY_THREADS, 0, (cudaStream_t)stream>>>(*all);
+    return launched();
+}
+
+extern "C" {
+extern const EnvsKernels ENVS_KERNELS;
+const EnvsKernels ENVS_KERNELS = {ENGINE_FIXED,   kernels_fits,  kernels_open,  kernels_bytes,
+                                    kernels_create, kernels_begin, kernels_first, kernels_part,
+                                    kernels_end,    kernels_move_progress,  kernels_set_command,  kernels_tally};
+}

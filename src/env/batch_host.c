@@ -1,0 +1,59 @@
+/* A crowd on the CPU: the text of the GPU, environment after environment. */
+#define MILD_REAL_FLOAT
+
+#include "env/batch_step.inc"
+#include "env/batch_kernels.h"
+
+EnvsBytes envs_host_bytes(const TaskDef *def, const TaskShape *shape) {
+    return (EnvsBytes){env_stride(def, shape), sizeof(EnvRobot)};
+}
+
+void envs_host_create(const EnvsArrays *all, long robot) {
+    env_create(all, robot);
+}
+
+void envs_host_begin(const EnvsArrays *all, long robot) {
+    env_begin(all, robot);
+}
+
+void envs_host_first(const EnvsArrays *all, const EnvsStep *call, long robot) {
+    EnvWork place;
+    env_pose(all, robot, &place);
+    env_observe(all, call, robot);
+}
+
+void envs_host_part(const EnvsArrays *all, const EnvsStep *call, int k, long robot) {
+    EnvWork place;
+    env_part(all, call, robot, k, all->sample != NULL, &place);
+}
+
+void envs_host_set_command(const EnvsArrays *all, long robot) {
+    env_set_command(all, robot);
+}
+
+void envs_host_end(const EnvsArrays *all, const EnvsStep *call, long robot) {
+    env_end(all, call, robot);
+}
+
+void envs_host_move_progress(const EnvsArrays *all, int back) {
+    for (long robot = 0; robot < all->envs; robot++) {
+        env_move_progress(all, robot, back);
+    }
+}
+
+void envs_host_tally(const EnvsArrays *all) {
+    for (int n = 0; n < TALLY_NUMBERS; n++) {
+        all->tally[n] = 0;
+        for (long robot = 0; robot < all->envs; robot++) {
+            all->tally[n] += env_tally(all, robot, n);
+        }
+    }
+}
+
+void envs_model_fill(const EngineTree *tree, const double *number, EngineModel *model) {
+    Real *to = (Real *)(void *)&model->number;
+    model->tree = *tree;
+    for (int i = 0; i < ENVS_MODEL_NUMBERS; i++) {
+        to[i] = (Real)number[i];
+    }
+}

@@ -1,0 +1,59 @@
+/* What the text of a crowd gives to crowd.c: on the CPU (host.c), and on a GPU (device.cu, or
+ * without_cuda.c). */
+#ifndef ENVS_TEXT_H
+#define ENVS_TEXT_H
+
+#include "env/batch_arrays.h"
+
+#define ENVS_MODEL_NUMBERS ((int)(sizeof(EngineNumbers) / sizeof(Real)))
+
+/* [B] of an environment in EnvsArrays, by the text of the CPU or of a device, which may be
+ * compiled for one robot. */
+typedef struct {
+    size_t stride;
+    size_t robot;
+} EnvsBytes;
+EnvsBytes envs_host_bytes(const TaskDef *def, const TaskShape *shape);
+/* From what engine_model_read fills. */
+void envs_model_fill(const EngineTree *tree, const double *number, EngineModel *model);
+
+/* ---- the CPU, environment by environment ---- */
+void envs_host_create(const EnvsArrays *all, long robot);
+/* Draws the first episode. */
+void envs_host_begin(const EnvsArrays *all, long robot);
+/* Part k of a policy step, and what follows the last one up to the next episode. */
+void envs_host_part(const EnvsArrays *all, const EnvsStep *call, int k, long robot);
+void envs_host_end(const EnvsArrays *all, const EnvsStep *call, long robot);
+/* Pose of a new episode, and the observation. */
+void envs_host_first(const EnvsArrays *all, const EnvsStep *call, long robot);
+/* From arrays.command to the environment. */
+void envs_host_set_command(const EnvsArrays *all, long robot);
+/* From the environment to arrays.kept, or back. */
+void envs_host_move_progress(const EnvsArrays *all, int back);
+/* Fills arrays.tally. */
+void envs_host_tally(const EnvsArrays *all);
+
+/* ---- a GPU ---- */
+
+/* The same on a GPU, compiled for robots of one size or for any (device.cu). Functions put their
+ * work into the stream and return NULL, or what went wrong. */
+typedef struct {
+    int fixed;                           /* bool: for robots of one size */
+    int (*fits)(const EngineTree *tree); /* bool: for such a robot */
+    const char *(*open)(void);           /* before all that follow; waits */
+    EnvsBytes (*bytes)(const TaskDef *def, const TaskShape *shape);
+    const char *(*create)(const EnvsArrays *all, void *stream);
+    const char *(*begin)(const EnvsArrays *all, void *stream);
+    const char *(*first)(const EnvsArrays *all, const EnvsStep *call, void *stream);
+    const char *(*part)(const EnvsArrays *all, const EnvsStep *call, int k, void *stream);
+    const char *(*end)(const EnvsArrays *all, const EnvsStep *call, void *stream);
+    const char *(*keep)(const EnvsArrays *all, int back, void *stream);
+    const char *(*tell)(const EnvsArrays *all, void *stream);
+    const char *(*tally)(const EnvsArrays *all, void *stream);
+} EnvsKernels;
+
+/* Those of this build, NULL behind them: cmake/Crowd.cmake, or without_cuda.c. A robot takes the
+ * first that fit. */
+extern const EnvsKernels *const envs_kernels[];
+
+#endif

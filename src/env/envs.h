@@ -1,0 +1,103 @@
+/* Vectorised environments: many robots on the task (src/env/task), stepped together. Training,
+ * evaluation, bench, Python and other learners use this and nothing below it. One of two backends
+ * steps the robots (backend.h): MuJoCo on the CPU, or the batch engine (docs/engine.md) on a GPU or
+ * the CPU. Both draw the same random numbers and give the same observations and rewards, the batch
+ * engine's within the rounding of float.
+ *
+ *     Envs *envs = envs_create(&def, &error);
+ *     envs_reset(envs, &view, stream, &error);
+ *     for (;;) { ... actions ...; envs_step(envs, &step, stream, &error); }
+ *     envs_destroy(envs);
+ *
+ * Arrays are where the environments are: on the CPU, or in the memory of the device. On a GPU reset
+ * and step only put work into the stream (a cudaStream_t; NULL: the default one), so that a graph
+ * may capture them. One thread and one stream at a time. */
+#ifndef ENVS_H
+#define ENVS_H
+
+#include <stddef.h>
+
+#include "base/pool.h"
+#include "env/envs_step.h"
+#include "env/trial.h"
+#include "env/task/ground.h"
+#include "env/task/task.h"
+
+typedef struct Envs Envs;
+
+typedef struct {
+    const TaskDef *task; /* copied; its map and motors are borrowed */
+    const Robot *robot;  /* borrowed */
+    Pool *pool;          /* borrowed; threads of the CPU */
+    int count;           /* environments */
+    uint32_t first;      /* number of the first one, which selects its random numbers */
+    uint64_t seed;
+    int batch; /* bool: the batch engine steps the robots; else MuJoCo, with none of the following */
+    int device;  /* a CUDA device, or MILD_BATCH_HOST */
+    int grounds; /* drawn beforehand; episodes choose among them */
+    int striped; /* bool: the labels of task->map are stripes, which only the share patch_share of
+                    the soft episodes has; the others are uniform */
+    const TaskGrounds *chosen; /* copied; NULL: `grounds` are drawn */
+    const EnvsTrial *trial;    /* [count] copied; NULL: episodes draw their ground and command */
+} EnvsDef;
+
+/* NULL, with one line in *error, for what the batch engine does not have (imprints, blended borders,
+ * patches other than stripes of a map), and when device or memory is missing. */
+Envs *envs_create(const EnvsDef *def, MildError *error);
+void envs_destroy(Envs *envs); /* may be NULL */
+
+/* New episodes in all environments, and their first observations. */
+MildStatus envs_reset(Envs *envs, const EnvsView *first, void *stream, MildError *error);
+/* A policy step of all environments. */
+MildStatus envs_step(Envs *envs, const EnvsStep *step, void *stream, MildError *error);
+/* Until the steps are done. */
+MildStatus envs_wait(Envs *envs, MildError *error);
+
+/* Sums over the episodes that ended since the last call (`assist`: over the robots), which may be
+ * added to those of other Envs, and the means from them. Waits for the device. count: environments
+ * of all. */
+MildStatus envs_sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error);
+EnvsStats envs_means(EnvsStats sums, int count);
+/* [s] Thread time in physics since the last call, and the ground's part of it; 0 for the batch
+ * engine. */
+void envs_times(Envs *envs, double *physics, double *ground);
+
+/* Everything that persists, as one block without pointers, so that saving and loading are copies;
+ * NULL for the batch engine. */
+void *envs_state(Envs *envs, size_t *bytes);
+/* What lasts beyond an episode, [count] on the CPU, and back, before envs_reset. Waits for the
+ * device. */
+MildStatus envs_save_progress(Envs *envs, TaskProgress *progress, MildError *error);
+MildStatus envs_load_progress(Envs *envs, const TaskProgress *progress, MildError *error);
+
+/* [B] Of one robot. */
+typedef struct {
+    size_t task;   /* its TaskEnv and the frames of its history, for MuJoCo also its ground */
+    size_t engine; /* between the parts of a step, and what the task reads of it */
+    size_t ground; /* of mild/batch.h */
+    size_t rest;   /* what passes between engine and ground; shares of model, task and grounds */
+} EnvsMemory;
+EnvsMemory envs_memory(const Envs *envs);
+size_t envs_robot_bytes(const Envs *envs); /* their sum */
+size_t envs_bytes(const Envs *envs);       /* of all */
+
+/* ---- trials, of the batch engine ---- */
+
+/* With EnvsDef.trial. Commands from the next policy step on, [count][3] on the CPU, see
+ * TaskEnv.command; the first ones before envs_reset. Waits for the device. */
+MildStatus envs_set_commands(Envs *envs, const double *command, MildError *error);
+/* From now on the physics steps of each policy step are written to `sample`,
+ * [count][envs_physics_steps] in the memory of the device; NULL: no longer. */
+MildStatus envs_set_samples(Envs *envs, EnvsSample *sample, MildError *error);
+int envs_physics_steps(const Envs *envs); /* of a policy step */
+
+/* ---- tests ---- */
+
+/* FNV-1a of everything that moves: robots, histories, commands, reward sums, ground memory; 0 for
+ * the batch engine. */
+uint64_t envs_hash(const Envs *envs);
+/* Bool: on a GPU this build has no kernels of the robot's own size, and those for any robot,
+ * several times slower, step it. */
+int envs_are_slow(const Robot *robot);
+
+#endif

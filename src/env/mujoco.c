@@ -1,0 +1,306 @@
+/* Environments that MuJoCo steps on all cores of the CPU, each writing directly into the learner's
+ * rows. */
+#include "env/backend.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "robot/phases.h"
+
+typedef struct {
+    Envs base;
+    TaskDef def;
+    TaskShape shape;
+    const Robot *robot;
+    Pool *pool;
+    size_t stride;
+    char *state;         /* [count][stride] TaskEnv and ground memory */
+    TaskStep *result;    /* [count] of the last step */
+    RobotSim **sim;      /* [threads] */
+    RobotPhases *phases; /* [threads] */
+    EnvsStats stats;     /* sums */
+    /* arguments of the call in flight */
+    const EnvsStep *step;
+    const EnvsView *view;
+} Mujoco;
+
+static Mujoco *own(Envs *envs) {
+    return (Mujoco *)(void *)envs;
+}
+
+static const Mujoco *own_const(const Envs *envs) {
+    return (const Mujoco *)(const void *)envs;
+}
+
+static TaskEnv *env_at(const Mujoco *m, int i) {
+    return (TaskEnv *)(void *)(m->state + (size_t)i * m->stride);
+}
+
+static float *row_at(float *rows, int i, int width) {
+    return rows ? rows + (size_t)i * (size_t)width : NULL;
+}
+
+static TaskView view_at(const Mujoco *m, const EnvsView *view, int i) {
+    const TaskShape *shape = &m->shape;
+    return (TaskView){
+        .history = row_at(view->history, i, shape->history),
+        .critic = row_at(view->critic, i, shape->critic),
+        .estimate = row_at(view->estimate, i, shape->estimates),
+        .frame = row_at(view->frame, i, shape->observation),
+    };
+}
+
+/* ---- creation ---- */
+
+static void destroy(Envs *envs) {
+    Mujoco *m = own(envs);
+    for (int i = 0; m->sim && i < pool_threads(m->pool); i++) {
+        robot_sim_destroy(m->sim[i]);
+    }
+    free(m->sim);
+    free(m->phases);
+    free(m->result);
+    free(m->state);
+    free(m);
+}
+
+static MildStatus open_arrays(Mujoco *m, MildError *error) {
+    const size_t count = (size_t)m->base.count, threads = (size_t)pool_threads(m->pool);
+    m->state = aligned_alloc(64, count * m->stride);
+    m->result = calloc(count, sizeof *m->result);
+    m->sim = calloc(threads, sizeof(RobotSim *));
+    m->phases = calloc(threads, sizeof *m->phases);
+    return m->state && m->result && m->sim && m->phases
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory for %d",
+                           m->base.count);
+}
+
+static MildStatus open_sims(Mujoco *m, MildError *error) {
+    for (int i = 0; i < pool_threads(m->pool); i++) {
+        m->sim[i] = robot_sim_create(m->robot, m->def.physics_dt, error);
+        if (!m->sim[i]) {
+            return error->status;
+        }
+        robot_sim_time_phases(m->sim[i], &m->phases[i]);
+    }
+    return MILD_OK;
+}
+
+static void init_envs(Mujoco *m, const EnvsDef *def) {
+    for (int i = 0; i < def->count; i++) {
+        task_env_init(env_at(m, i), &m->def, m->robot, def->seed, def->first + (uint32_t)i);
+    }
+}
+
+/* ---- steps ---- */
+
+static void reset_piece(void *context, int piece, int thread) {
+    Mujoco *m = context;
+    TaskView view = view_at(m, m->view, piece);
+    task_env_reset(env_at(m, piece), &m->def, m->robot, m->sim[thread], &view);
+}
+
+static MildStatus reset(Envs *envs, const EnvsView *first, void *stream, MildError *error) {
+    Mujoco *m = own(envs);
+    (void)stream;
+    (void)error;
+    m->view = first;
+    pool_run(m->pool, m->base.count, reset_piece, m);
+    return MILD_OK;
+}
+
+static void copy_row(const float *from, int width, int valid, float *to) {
+    if (from && to) {
+        memset(to, 0, (size_t)width * sizeof *to);
+        memcpy(to, from, valid ? (size_t)width * sizeof *to : 0);
+    }
+}
+
+/* The end of an episode is seen where the next observation will be, and copied from there. */
+static void copy_last(const Mujoco *m, int piece, const TaskView *view) {
+    const TaskShape *shape = &m->shape;
+    const TaskView last = view_at(m, &m->step->last, piece);
+    const int valid = m->result[piece].valid;
+    copy_row(view->history, shape->history, valid, last.history);
+    copy_row(view->critic, shape->critic, valid, last.critic);
+    copy_row(view->estimate, shape->estimates, valid, last.estimate);
+    copy_row(view->frame, shape->observation, valid, last.frame);
+}
+
+static void step_piece(void *context, int piece, int thread) {
+    Mujoco *m = context;
+    const EnvsStep *step = m->step;
+    TaskView view = view_at(m, &step->next, piece);
+    TaskEnv *env = env_at(m, piece);
+    TaskStep *result = &m->result[piece];
+    const float *action = step->action + (size_t)piece * (size_t)m->shape.actions;
+    const int last = step->last.history != NULL;
+    *result = task_env_step(env, &m->def, m->robot, m->sim[thread], action, !last, &view, NULL);
+    if (result->done && last) {
+        copy_last(m, piece, &view);
+        task_env_reset(env, &m->def, m->robot, m->sim[thread], &view);
+    }
+    if (result->done && step->terms) {
+        memcpy(step->terms + (size_t)piece * TASK_REWARD_COUNT, result->episode_terms,
+               sizeof result->episode_terms);
+    }
+}
+
+static void add_episode(EnvsStats *stats, const TaskStep *result) {
+    stats->episodes++;
+    stats->falls += !result->timeout;
+    stats->length += result->length * TASK_PERIOD;
+    stats->reward += (double)result->episode_reward;
+    stats->speed_error += (double)result->episode_speed_error;
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        stats->terms[i] += (double)result->episode_terms[i];
+    }
+}
+
+static MildStatus step(Envs *envs, const EnvsStep *step, void *stream, MildError *error) {
+    Mujoco *m = own(envs);
+    EnvsStats *stats = &m->stats;
+    (void)stream;
+    (void)error;
+    m->step = step;
+    pool_run(m->pool, m->base.count, step_piece, m);
+    for (int i = 0; i < m->base.count; i++) {
+        const TaskStep *result = &m->result[i];
+        step->reward[i] = result->reward;
+        step->done[i] = result->done;
+        step->timeout[i] = result->timeout;
+        step->valid[i] = result->valid;
+        stats->diverged += !result->valid;
+        stats->paid += (double)result->reward;
+        if (result->done) {
+            add_episode(stats, result);
+        }
+    }
+    stats->steps += m->base.count;
+    return MILD_OK;
+}
+
+static MildStatus wait(Envs *envs, MildError *error) {
+    (void)envs;
+    (void)error;
+    return MILD_OK;
+}
+
+/* ---- statistics ---- */
+
+static MildStatus sums(Envs *envs, EnvsStats *sums, void *stream, MildError *error) {
+    Mujoco *m = own(envs);
+    (void)stream;
+    (void)error;
+    *sums = m->stats;
+    for (int i = 0; i < m->base.count; i++) {
+        sums->assist += task_assist_share(env_at(m, i), &m->def);
+    }
+    memset(&m->stats, 0, sizeof m->stats);
+    return MILD_OK;
+}
+
+static void times(Envs *envs, double *physics, double *ground) {
+    Mujoco *m = own(envs);
+    for (int i = 0; i < pool_threads(m->pool); i++) {
+        RobotPhases *phases = &m->phases[i];
+        *physics += phases->smooth + phases->map + phases->ground + phases->finish;
+        *ground += phases->ground;
+        memset(phases, 0, sizeof *phases);
+    }
+}
+
+static EnvsMemory memory(const Envs *envs) {
+    const Mujoco *m = own_const(envs);
+    return (EnvsMemory){.task = m->stride, .rest = sizeof *m->result};
+}
+
+/* ---- state ---- */
+
+static void *state(Envs *envs, size_t *bytes) {
+    Mujoco *m = own(envs);
+    *bytes = (size_t)m->base.count * m->stride;
+    return m->state;
+}
+
+static MildStatus save_progress(Envs *envs, TaskProgress *progress, MildError *error) {
+    const Mujoco *m = own(envs);
+    (void)error;
+    for (int i = 0; i < m->base.count; i++) {
+        progress[i] = task_progress(env_at(m, i));
+    }
+    return MILD_OK;
+}
+
+static MildStatus load_progress(Envs *envs, const TaskProgress *progress, MildError *error) {
+    const Mujoco *m = own(envs);
+    (void)error;
+    for (int i = 0; i < m->base.count; i++) {
+        task_set_progress(env_at(m, i), progress[i]);
+    }
+    return MILD_OK;
+}
+
+static uint64_t hash_bytes(uint64_t hash, const void *data, size_t size) {
+    const unsigned char *bytes = data;
+    for (size_t i = 0; i < size; i++) {
+        hash = (hash ^ bytes[i]) * 0x100000001b3u;
+    }
+    return hash;
+}
+
+/* Hashes member by member, because padding and entries beyond the robot's joints are not part of
+ * the state. */
+static uint64_t hash(const Envs *envs) {
+    const Mujoco *m = own_const(envs);
+    uint64_t sum = 0xcbf29ce484222325u;
+    for (int i = 0; i < m->base.count; i++) {
+        TaskEnv *env = env_at(m, i);
+        size_t joints = (size_t)m->shape.joints, speeds = (6 + joints) * sizeof(double);
+        sum = hash_bytes(sum, env->robot.qpos, (7 + joints) * sizeof(double));
+        sum = hash_bytes(sum, env->robot.qvel, speeds);
+        sum = hash_bytes(sum, env->robot.qacc, speeds);
+        sum = hash_bytes(sum, task_env_history(env), (size_t)m->shape.history * sizeof(float));
+        sum = hash_bytes(sum, env->command, sizeof env->command);
+        sum = hash_bytes(sum, &env->reward_sum, sizeof env->reward_sum);
+        sum = hash_bytes(sum, task_env_ground(env), mild_ground_size(task_env_ground(env)));
+        sum = hash_bytes(sum, task_env_motors(env), m->def.motors ? m->def.motors->bytes : 0);
+    }
+    return sum;
+}
+
+static const EnvsBackend backend = {.destroy = destroy,
+                                    .reset = reset,
+                                    .step = step,
+                                    .wait = wait,
+                                    .sums = sums,
+                                    .save_progress = save_progress,
+                                    .load_progress = load_progress,
+                                    .memory = memory,
+                                    .times = times,
+                                    .state = state,
+                                    .hash = hash};
+
+Envs *envs_create_mujoco(const EnvsDef *def, MildError *error) {
+    if (task_def_check_robot(def->task, def->robot, error) != MILD_OK) {
+        return NULL;
+    }
+    Mujoco *m = calloc(1, sizeof *m);
+    if (!m) {
+        mild_fail(error, MILD_ERROR_MEMORY, "environments: out of memory");
+        return NULL;
+    }
+    *m = (Mujoco){.base = {.backend = &backend, .count = def->count},
+                  .def = *def->task,
+                  .shape = task_shape(def->robot),
+                  .robot = def->robot,
+                  .pool = def->pool,
+                  .stride = task_env_bytes(def->task, def->robot)};
+    if (open_arrays(m, error) != MILD_OK || open_sims(m, error) != MILD_OK) {
+        destroy(&m->base);
+        return NULL;
+    }
+    init_envs(m, def);
+    return &m->base;
+}

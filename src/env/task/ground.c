@@ -1,0 +1,223 @@
+/* The ground of an episode on the CPU, and a collection of grounds to draw from. */
+#include "env/task/ground.h"
+
+#include <assert.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "env/task/task.h"
+
+#define DRAW_TRIES 100 /* of a material that the model can match */
+#define RANDOM_USE_GROUNDS 0x47524e44u
+#define RANDOM_USE_DRIFT 0x44524654u
+
+static double draw(Random *r, const double range[2]) {
+    return random_uniform(r, range[0], range[1]);
+}
+
+static double spread(Random *r, double half_width) {
+    return half_width * (2 * random_unit(r) - 1);
+}
+
+/* A preset with each of its numbers changed a little. */
+static MildMaterial draw_preset(Random *r, const RandomizeDef *def) {
+    MildMaterial m = mild_material_default();
+    mild_material_preset(
+        mild_material_preset_name((int)random_index(r, (uint32_t)mild_material_preset_count())),
+        &m);
+    double *const jittered[] = {&m.k_pen, &m.sigma_cone, &m.mu,     &m.c_d,
+                                &m.c_g,   &m.k_drift,    &m.b_drift};
+    for (size_t i = 0; i < sizeof jittered / sizeof *jittered; i++) {
+        *jittered[i] *= 1 + spread(r, def->preset_jitter);
+    }
+    return m;
+}
+
+/* Makes a ground that is too soft stiffer, so that half of the robot's feet carry it at
+ * sinkage_max. One factor suffices, because the quasistatic force is linear in (k_pen, sigma_cone).
+ * Without this, a fifth of the paper's draws would swallow the foot (docs/task.md section 11). */
+static void limit_sinkage(MildMaterial *m, const Robot *robot, double sinkage) {
+    const MildSole *sole = robot_rasters(robot)[0];
+    MildMaterial bottomless = *m;
+    bottomless.bed_depth = 1e3;
+    double feet = 0.5 * robot_feet(robot); /* half of them are in stance */
+    double wanted = robot_total_mass(robot) * 9.81 / feet / mild_sole_elements(sole);
+    double force = mild_element_law(&bottomless, mild_sole_pitch(sole), sinkage).force;
+    if (force < wanted && force > 0) {
+        m->k_pen *= wanted / force;
+        m->sigma_cone *= wanted / force;
+    }
+}
+
+static MildMaterial draw_ranges(Random *r, const RandomizeDef *def, const Robot *robot) {
+    MildMaterial m = mild_material_default();
+    Random drift = *r; /* apart, so that it moves no other draw */
+    drift.seed ^= RANDOM_USE_DRIFT;
+    m.k_pen = draw(r, def->k_pen);
+    m.sigma_cone = draw(r, def->sigma_cone);
+    m.alpha = draw(r, def->alpha);
+    m.nu = draw(r, def->nu);
+    m.c_g = draw(r, def->c_g);
+    m.c_d = draw(r, def->c_d);
+    m.phi = draw(r, def->phi);
+    m.mu = draw(r, def->mu);
+    m.rho = draw(r, def->rho);
+    m.k_drift = draw(&drift, def->k_drift);
+    m.b_drift = draw(&drift, def->b_drift);
+    m.recovery = draw(r, def->recovery);
+    m.bed_depth = draw(r, def->bed_depth);
+    limit_sinkage(&m, robot, def->sinkage_max);
+    return m;
+}
+
+/* Draws a material for the model. If its match would be out of range (mild_model_match), another
+ * one is drawn. */
+static MildMaterial draw_new(Random *r, const RandomizeDef *def, const Robot *robot) {
+    double preset = def->rigid_share < 1 ? def->preset_share / (1 - def->rigid_share) : 0;
+    MildMaterial m, rival;
+    for (int tries = 0; tries < DRAW_TRIES; tries++) {
+        m = random_unit(r) < preset ? draw_preset(r, def) : draw_ranges(r, def, robot);
+        m.passive = def->passive;
+        if (def->model == MILD_MODEL_RIGID) {
+            return m; /* the engine's contact does not use it */
+        }
+        if (robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL) == MILD_OK) {
+            return rival;
+        }
+    }
+    m = mild_material_default();
+    MildStatus status = robot_match_model(robot, (MildModel)def->model, &m, &rival, NULL);
+    assert(status == MILD_OK);
+    (void)status;
+    return rival;
+}
+
+/* index: among the grounds that were drawn beforehand, or NULL. */
+static MildMaterial draw_material(Random *r, const TaskDef *def, const Robot *robot, int *index) {
+    const TaskGrounds *from = def->grounds;
+    if (!from) {
+        return draw_new(r, &def->randomize, robot);
+    }
+    int at = (int)random_index(r, (uint32_t)from->count);
+    if (index) {
+        *index = at;
+    }
+    return from->ground[at].material;
+}
+
+/* Stripes across x around the start, three materials in random order. */
+static void draw_stripes(Random *r, const TaskDef *task, const Robot *robot, MildTerrain *terrain) {
+    const RandomizeDef *def = &task->randomize;
+    while (terrain->material_count < 3) {
+        terrain->materials[terrain->material_count++] = draw_material(r, task, robot, NULL);
+    }
+    double x = -0.5 * MILD_PATCHES_MAX * 0.5 * (def->patch_length[0] + def->patch_length[1]);
+    for (int i = 0; i < MILD_PATCHES_MAX; i++) {
+        double length = draw(r, def->patch_length);
+        MildPatch patch;
+        /* Clears the padding too, because environments are saved and compared byte by byte. */
+        memset(&patch, 0, sizeof patch);
+        patch.x_min = x;
+        patch.x_max = x + length;
+        patch.y_min = -1e3;
+        patch.y_max = 1e3;
+        patch.material = (int)random_index(r, 3);
+        mild_terrain_add_patch(terrain, &patch, NULL);
+        x += length;
+    }
+}
+
+/* Starts somewhere on the map and draws a material for each of its labels. */
+void task_draw_on_map(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r) {
+    MildTerrain *terrain = &env->terrain;
+    double x, y;
+    mild_map_extent(def->map, &x, &y);
+    terrain->map_x = spread(r, 0.5 * x);
+    terrain->map_y = spread(r, 0.5 * y);
+    while (terrain->material_count < mild_map_label_count(def->map)) {
+        terrain->materials[terrain->material_count++] = draw_material(r, def, robot, NULL);
+    }
+}
+
+void task_draw_ground(TaskEnv *env, const TaskDef *def, const Robot *robot, Random *r) {
+    MildMaterial material = draw_material(r, def, robot, &env->ground[0]);
+    env->terrain = mild_terrain_uniform(&material);
+    int striped = random_unit(r) < def->randomize.patch_share;
+    if (striped && !(def->map && mild_map_label_count(def->map) > 1)) {
+        draw_stripes(r, def, robot, &env->terrain);
+    }
+}
+
+/* Parameters of an element that represents a whole sole are converted to those of one of its
+ * cells. */
+void task_ground_numbers(const Robot *robot, const MildMaterial *m, float *numbers) {
+    double cells = mild_model_is_concentric((MildModel)m->model)
+                       ? mild_sole_elements(robot_rasters(robot)[0])
+                       : 1;
+    const double values[TASK_GROUND_NUMBERS] = {m->k_pen / 500 / cells,
+                                                m->sigma_cone / 1e5,
+                                                m->alpha,
+                                                m->nu,
+                                                m->c_g / 4,
+                                                m->c_d / 20,
+                                                m->phi,
+                                                m->mu,
+                                                m->k_drift / 500 / cells,
+                                                m->b_drift * 10 / cells,
+                                                m->recovery,
+                                                m->bed_depth * 10};
+    for (int i = 0; i < TASK_GROUND_NUMBERS; i++) {
+        numbers[i] = (float)values[i];
+    }
+}
+
+const float *task_ground_under(const TaskEnv *env, const TaskDef *def, const Robot *robot,
+                               const RobotSim *sim, float *buffer) {
+    (void)def;
+    const double *qpos = robot_sim_qpos(sim);
+    const int material = mild_terrain_material_at(&env->terrain, qpos[0], qpos[1]);
+    task_ground_numbers(robot, &env->terrain.materials[material], buffer);
+    return buffer;
+}
+
+double task_standing_depth(const Robot *robot, const MildMaterial *material) {
+    return mild_sole_sinkage(robot_soles(robot)[0], material, robot_foot_load(robot));
+}
+
+typedef struct {
+    const TaskDef *def;
+    const Robot *robot;
+    uint64_t seed;
+    TaskGrounds *grounds;
+} GroundJob;
+
+static void make_ground(void *context, int piece, int thread) {
+    (void)thread;
+    const GroundJob *job = context;
+    Random r = random_at(job->seed ^ RANDOM_USE_GROUNDS, (uint32_t)piece, 0);
+    TaskGround *ground = &job->grounds->ground[piece];
+    ground->material = draw_new(&r, &job->def->randomize, job->robot);
+    ground->depth = task_standing_depth(job->robot, &ground->material);
+}
+
+TaskGrounds *task_grounds_create(const TaskDef *def, const Robot *robot, int count, uint64_t seed,
+                                 Pool *pool, MildError *error) {
+    TaskGrounds *grounds = malloc(sizeof *grounds);
+    TaskGround *ground = calloc((size_t)count, sizeof *ground);
+    if (!grounds || !ground) {
+        free(grounds);
+        free(ground);
+        mild_fail(error, MILD_ERROR_MEMORY, "no memory for %d grounds", count);
+        return NULL;
+    }
+    *grounds = (TaskGrounds){count, ground};
+    pool_run(pool, count, make_ground, &(GroundJob){def, robot, seed, grounds});
+    return grounds;
+}
+
+void task_grounds_destroy(TaskGrounds *grounds) {
+    if (grounds) {
+        free(grounds->ground);
+        free(grounds);
+    }
+}

@@ -1,0 +1,24 @@
+/* A collection of grounds that were drawn beforehand. Matching a material to a ground model and
+ * finding how deep a robot stands in it take long and need the CPU; a device draws an index. */
+#ifndef TASK_GROUND_H
+#define TASK_GROUND_H
+
+#include "base/pool.h"
+#include "env/task/task_def.h"
+
+typedef struct {
+    MildMaterial material;
+    double depth; /* [m] that the robot stands in it */
+} TaskGround;
+
+struct TaskGrounds {
+    int count;
+    TaskGround *ground; /* [count] */
+};
+
+/* Draws `count` grounds as an episode would; a function of the def and the seed. */
+TaskGrounds *task_grounds_create(const TaskDef *def, const Robot *robot, int count, uint64_t seed,
+                                 Pool *pool, MildError *error);
+void task_grounds_destroy(TaskGrounds *grounds); /* may be NULL */
+
+#endif

@@ -1,0 +1,66 @@
+#include "env/task/policy_keys.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const char *const keys[] = {"gait_period",    "gait_slowing", "gait_slow_below",
+                                   "standing_below", "clock",        "history_stride",
+                                   "velocity_scale", "height_scale", "action_scale",
+                                   "action_clip",    "torque_share", "torque_hold",
+                                   "shell_depth",    "kp",           "kd"};
+
+enum { KEYS = sizeof keys / sizeof *keys };
+
+void task_policy_keys_print(const TaskDef *def, char *text, size_t size) {
+    size_t used = 0;
+    for (int i = 0; i < KEYS && used < size; i++) {
+        const MildField *field = mild_field_find(task_fields, task_field_count, keys[i], NULL);
+        used += (size_t)snprintf(text + used, size - used, "%s%s = ", i > 0 ? "; " : "", keys[i]);
+        if (used < size) {
+            used += (size_t)mild_field_print(field, def, text + used, size - used);
+        }
+    }
+    if (used >= size) {
+        text[0] = '\0';
+    }
+}
+
+static int is_policy_key(const char *name) {
+    int found = 0;
+    for (int i = 0; i < KEYS && !found; i++) {
+        found = strcmp(name, keys[i]) == 0;
+    }
+    return found;
+}
+
+/* One "key = value" of `length` characters. */
+static MildStatus take_key(TaskDef *def, const char *text, size_t length, MildError *error) {
+    char line[32 + TASK_GAINS_SIZE];
+    char *equals = NULL;
+    if (length < sizeof line) {
+        memcpy(line, text, length);
+        line[length] = '\0';
+        equals = strstr(line, " = ");
+    }
+    if (equals) {
+        *equals = '\0';
+    }
+    if (!equals || !is_policy_key(line)) {
+        return mild_fail(error, MILD_ERROR_FORMAT,
+                         "'%.*s' is no key that a policy of this program has",
+                         (int)(length < 40 ? length : 40), text);
+    }
+    const MildField *field = mild_field_find(task_fields, task_field_count, line, NULL);
+    return mild_field_parse(field, def, equals + strlen(" = "), "task", error);
+}
+
+MildStatus task_policy_keys_read(TaskDef *def, const char *text, MildError *error) {
+    MildStatus status = MILD_OK;
+    while (status == MILD_OK && *text) {
+        const char *end = strstr(text, "; ");
+        const size_t length = end ? (size_t)(end - text) : strlen(text);
+        status = take_key(def, text, length, error);
+        text += length + (end ? strlen("; ") : 0);
+    }
+    return status == MILD_OK ? task_def_check(def, error) : status;
+}

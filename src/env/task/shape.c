@@ -1,0 +1,46 @@
+/* Widths of a robot's observations, and their mirror image. */
+#include "env/task/task.h"
+
+TaskShape task_shape(const Robot *robot) {
+    int joints = robot_joints(robot), feet = robot_feet(robot);
+    TaskShape shape = {.joints = joints,
+                       .feet = feet,
+                       .observation = 9 + 3 * joints + 2,
+                       .actions = joints,
+                       .estimates = 3 + 4 * feet};
+    shape.history = TASK_FRAMES * shape.observation;
+    shape.critic = shape.observation + shape.estimates + 6 * feet + 34;
+    return shape;
+}
+
+int task_critic_ground(const TaskShape *shape) {
+    return shape->observation + shape->estimates + 6 * shape->feet + 10; /* push 6, masses 4 */
+}
+
+/* Mirror image in the x-z plane. y components, roll, yaw and their rates change sign, and the
+ * joints swap sides. If left and right legs alternate, the clock shifts by half a period, (sin,
+ * cos) -> (-sin, -cos). If they move together, it does not change. */
+TaskMirror task_mirror(const Robot *robot) {
+    static const float head[9] = {-1, 1, -1, 1, -1, -1, 1, -1, 1};
+    TaskMirror mirror = {.observation_index = {0}};
+    int joints = robot_joints(robot), clock = 9 + 3 * joints;
+    for (int i = 0; i < 9; i++) {
+        mirror.observation_index[i] = i;
+        mirror.observation_sign[i] = head[i];
+    }
+    for (int i = 0; i < joints; i++) {
+        int other = robot_mirror_joint(robot)[i];
+        float sign = (float)robot_mirror_sign(robot)[i];
+        mirror.action_index[i] = other;
+        mirror.action_sign[i] = sign;
+        for (int block = 0; block < 3; block++) { /* angles, speeds, actions */
+            mirror.observation_index[9 + block * joints + i] = 9 + block * joints + other;
+            mirror.observation_sign[9 + block * joints + i] = sign;
+        }
+    }
+    for (int i = clock; i < clock + 2; i++) {
+        mirror.observation_index[i] = i;
+        mirror.observation_sign[i] = robot_mirror_shift(robot) > 0 ? -1 : 1;
+    }
+    return mirror;
+}

@@ -1,0 +1,383 @@
+/* The policy step but for its physics, read top to bottom: the text for the CPU and for a device
+ * (place.h). */
+#include <math.h>
+#include <string.h>
+
+#include "base/random.h"
+#include "env/task/task.h"
+
+#define RANDOM_USE_START 0x53544152u
+#define RANDOM_USE_PUSH 0x50555348u
+#define CONTACT_FORCE 5.0 /* [N] */
+#define PI 3.141592653589793
+
+/* ---- the block: TaskEnv, history, ring of frames ---- */
+
+static inline MILD_BOTH size_t whole_lines(size_t bytes) {
+    return (bytes + 63) / 64 * 64;
+}
+
+static inline MILD_BOTH size_t history_bytes(const TaskShape *shape) {
+    return TASK_HAS_HISTORY ? (size_t)shape->history * sizeof(float) : 0;
+}
+
+TASK_FN uint32_t task_frames_held(const TaskDef *def) {
+    return (uint32_t)((TASK_FRAMES - 1) * def->history_stride);
+}
+
+/* A device has no history, and the frames right behind TaskEnv. */
+static inline MILD_BOTH size_t history_place(void) {
+    return TASK_HAS_HISTORY ? whole_lines(sizeof(TaskEnv)) : sizeof(TaskEnv);
+}
+
+TASK_FN size_t task_env_head_bytes(const TaskShape *shape, uint32_t held) {
+    const size_t frames = held * (size_t)shape->observation * sizeof(TaskFrame);
+    return whole_lines(history_place() + history_bytes(shape) + frames);
+}
+
+TASK_FN float *task_env_history(TaskEnv *env) {
+    return (float *)(void *)((char *)env + history_place());
+}
+
+TASK_FN TaskFrame *task_env_frames(TaskEnv *env) {
+    return (TaskFrame *)(void *)((char *)env + history_place() + history_bytes(&env->shape));
+}
+
+static inline MILD_BOTH const TaskGains *gains_of(const TaskEnv *env) {
+#ifdef TASK_ON_DEVICE
+    return env->gains;
+#else
+    return &env->gains;
+#endif
+}
+
+static inline MILD_BOTH void set_gains(TaskEnv *env, const TaskGains *gains) {
+#ifdef TASK_ON_DEVICE
+    env->gains = gains;
+#else
+    env->gains = *gains;
+#endif
+}
+
+TASK_FN void task_env_init_head(TaskEnv *env, const TaskDef *def, TaskShape shape,
+                                const TaskGains *gains, uint64_t seed, uint32_t index) {
+    const uint32_t held = task_frames_held(def);
+    memset(env, 0, task_env_head_bytes(&shape, held));
+    env->shape = shape;
+    env->held = held;
+    set_gains(env, gains);
+    env->seed = seed;
+    env->index = index;
+    env->step_limit = (uint32_t)(def->episode / TASK_PERIOD + 0.5);
+    env->assist_level = 1;
+}
+
+TASK_FN TaskProgress task_progress(const TaskEnv *env) {
+    const TaskProgress kept = {env->assist_level, env->tick};
+    return kept;
+}
+
+TASK_FN void task_set_progress(TaskEnv *env, TaskProgress kept) {
+    env->assist_level = kept.assist_level;
+    env->tick = env->tick_first = (uint32_t)kept.tick;
+}
+
+/* ---- start of an episode ---- */
+
+/* depth: [m] how deep the feet stand in this ground, so that episodes start neither in the air nor
+ * buried. */
+static inline MILD_BOTH void draw_start(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                        double depth) {
+    const RandomizeDef *z = &def->randomize;
+    Random r = random_at(env->seed ^ RANDOM_USE_START, env->index, env->tick);
+    const double *pose = robot_default_pose(robot);
+    double yaw = env->command_frozen ? 0 : PI * (2 * random_unit(&r) - 1);
+    env->robot.qpos[2] = env->terrain.height + robot_stand_height(robot) - depth + 0.002;
+    env->robot.qpos[3] = task_cos(0.5 * yaw);
+    env->robot.qpos[6] = task_sin(0.5 * yaw);
+    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
+        Random own = random_after(r, i);
+        double q = pose[i] + z->initial_joint * (2 * random_unit(&own) - 1);
+        env->robot.qpos[7 + i] =
+            fmin(fmax(q, robot_joint_low(robot)[i]), robot_joint_high(robot)[i]);
+    }
+    r = random_after(r, env->shape.joints);
+    for (int i = task_lane(); i < 6; i += TASK_LANES) {
+        Random own = random_after(r, i);
+        env->robot.qvel[i] = z->initial_velocity * (2 * random_unit(&own) - 1);
+    }
+    r = random_after(r, 6);
+    env->phase = random_unit(&r) < 0.5 ? 0 : 0.5;
+    /* The first episodes end at different times, so that the environments do not reset in
+     * lockstep. */
+    env->step = env->tick == env->tick_first && !env->command_frozen
+                    ? (uint32_t)(random_unit(&r) * 0.9 * env->step_limit)
+                    : 0;
+    env->step_first = env->step;
+}
+
+static inline MILD_BOTH void see_command(TaskEnv *env) {
+    for (int i = 0; i < 3; i++) {
+        env->command_seen[i] = env->command[i];
+    }
+}
+
+/* What an episode knows of the one before, and its command. */
+static inline MILD_BOTH void clear(TaskEnv *env, const TaskDef *def) {
+    task_clear(&env->robot, sizeof env->robot);
+    task_clear(env->action, sizeof env->action);
+    task_clear(env->air_time, sizeof env->air_time);
+    task_clear(env->joint_speed, sizeof env->joint_speed);
+    task_clear(env->smooth_velocity, sizeof env->smooth_velocity);
+    task_clear(env->push, sizeof env->push);
+    task_clear(env->term_sum, sizeof env->term_sum);
+    env->reward_sum = env->speed_error_sum = 0;
+    if (task_lane() == 0 && !env->command_frozen) {
+        task_draw_command(env, def);
+    }
+    task_lanes_sync();
+    see_command(env);
+}
+
+TASK_FN void task_begin_episode(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                double depth) {
+    clear(env, def);
+    task_lanes_sync();
+    draw_start(env, def, robot, depth);
+    task_lanes_sync();
+}
+
+TASK_FN void task_first_reading(TaskEnv *env, const RobotSim *sim, TaskReading *reading) {
+    for (int i = 0; i < 6; i++) {
+        env->base_twist[i] = robot_sim_qvel(sim)[i];
+    }
+    task_read_imu(sim, reading);
+    task_read_motors(sim, reading);
+}
+
+/* ---- before the physics ---- */
+
+static inline MILD_BOTH void accept_action(TaskEnv *env, const TaskDef *def, const float *action) {
+    float limit = (float)def->action_clip;
+    for (int i = task_lane(); i < env->shape.actions; i += TASK_LANES) {
+        float a = action[i];
+        env->action[2][i] = env->action[1][i];
+        env->action[1][i] = env->action[0][i];
+        env->action[0][i] = !(a > -limit) ? -limit : a > limit ? limit : a;
+    }
+}
+
+static inline MILD_BOTH void push_base(TaskEnv *env, const TaskDef *def) {
+    const RandomizeDef *z = &def->randomize;
+    for (int i = task_lane(); i < 6; i += TASK_LANES) {
+        env->push[i] *= 0.95;
+    }
+    uint32_t interval = (uint32_t)(z->push_interval / TASK_PERIOD + 0.5);
+    if (interval == 0 || env->step == 0 || (env->step + env->index * 97u) % interval != 0) {
+        return;
+    }
+    Random r = random_at(env->seed ^ RANDOM_USE_PUSH, env->index, env->tick);
+    for (int i = task_lane(); i < 6; i += TASK_LANES) {
+        Random own = random_after(r, i);
+        double size = i == 2 ? 0 : i < 3 ? z->push_linear : z->push_angular;
+        env->push[i] = size * (2 * random_unit(&own) - 1);
+        env->robot.qvel[i] += env->push[i];
+    }
+}
+
+TASK_FN void task_begin_step(TaskEnv *env, const TaskDef *def, const float *action) {
+    accept_action(env, def, action);
+    push_base(env, def);
+}
+
+/* ---- motors ---- */
+
+TASK_FN TaskMotor task_motor(const TaskEnv *env, const TaskDef *def, const Robot *robot, int i) {
+    const TaskGains *gains = gains_of(env);
+    TaskMotor motor;
+    double rest = task_assist_pose(env, def, robot, i), scale = task_action_scale(def, robot);
+    for (int late = 0; late < 2; late++) {
+        motor.target[late] = rest + scale * (double)env->action[late][i] + env->motor_offset[i];
+    }
+    motor.kp = env->strength[i] * TASK_REAL(gains->kp[i]) * env->kp_scale[i];
+    motor.kd = env->strength[i] * TASK_REAL(gains->kd[i]) * env->kd_scale[i];
+    motor.limit = def->torque_share * robot_effort(robot)[i];
+    motor.fastest = robot_speed(robot)[i];
+    return motor;
+}
+
+/* tau = clip(strength (Kp (q0 + scale a - q + offset) - Kd qd)). A motor at its speed limit gives
+ * no torque in the direction of motion. */
+TASK_FN double task_torque(const TaskMotor *motor, int late, double q, double qd) {
+    double tau = motor->kp * (motor->target[late] - q) - motor->kd * qd;
+    tau = tau > motor->limit ? motor->limit : tau < -motor->limit ? -motor->limit : tau;
+    int over = motor->fastest > 0 && fabs(qd) >= motor->fastest && tau * qd > 0;
+    return over ? 0 : tau;
+}
+
+/* With torque_hold the torque is computed when the action arrives, after lag_command steps, and
+ * held for a whole policy period. A new episode has none to hold. */
+TASK_FN int task_motors_act(const TaskEnv *env, const TaskDef *def, int k, int steps) {
+    const int begins = k == 0 && env->step == env->step_first;
+    return !def->torque_hold || begins || k == env->lag_command % steps;
+}
+
+/* ---- after the physics ---- */
+
+static inline MILD_BOTH void feet_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                         const RobotSim *sim, TaskMotion *m) {
+    const double half_period = 0.5 * task_gait_period(def, env->command_seen);
+    TaskReal stance_height = 0;
+    int stances = 0;
+    for (int f = 0; f < env->shape.feet; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        const TaskReal *v = foot->sole_center_velocity, *force = foot->force;
+        m->foot_height[f] = foot->sole_height;
+        m->foot_speed[f] = task_sqrt(v[0] * v[0] + v[1] * v[1]);
+        m->foot_force[f] =
+            task_sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
+        m->contact[f] = force[2] > CONTACT_FORCE;
+        m->stance[f] = task_gait_stance(robot, env->phase, m->standing, f);
+        m->either[f] = task_gait_either(def, robot, env->phase, m->standing, f);
+        m->wanted_height[f] = task_gait_height(def, robot, env->phase, m->standing, f);
+        if (m->contact[f]) {
+            m->landed_air_time += fmin((double)env->air_time[f], half_period);
+        }
+        if (m->stance[f]) {
+            stance_height += foot->sole_center[2];
+            stances++;
+        }
+    }
+    m->base_height = robot_sim_qpos(sim)[2] - stance_height / (TaskReal)(stances ? stances : 1);
+    task_lanes_sync();
+    for (int f = task_lane(); f < env->shape.feet; f += TASK_LANES) {
+        env->air_time[f] = m->contact[f] ? 0 : env->air_time[f] + TASK_REAL(TASK_PERIOD);
+    }
+}
+
+TASK_FN TaskMotion task_describe_motion(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                        const RobotSim *sim, const TaskReal *torque) {
+    TaskMotion m;
+    memset(&m, 0, sizeof m);
+    m.def = def, m.robot = robot, m.env = env;
+    const TaskReal *rotation = robot_sim_base_rotation(sim), *qvel = robot_sim_qvel(sim);
+    TaskReal length = task_sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3]);
+    TaskReal c = length > 0 ? rotation[0] / length : 1, s = length > 0 ? rotation[3] / length : 0;
+    TaskReal twist[6], change = 0;
+    m.standing = task_is_standing(def, env->command);
+    m.velocity[0] = c * qvel[0] + s * qvel[1];
+    m.velocity[1] = -s * qvel[0] + c * qvel[1];
+    m.velocity[2] = qvel[2];
+    for (int i = 0; i < 3; i++) {
+        m.omega[i] = qvel[3 + i];
+        m.gravity[i] = -rotation[6 + i];
+    }
+    const int parts = def->reward.acceleration_form == TASK_ACCELERATION_LINEAR ? 3 : 6;
+    for (int i = 0; i < 6; i++) {
+        twist[i] = qvel[i];
+    }
+    for (int i = 0; i < parts; i++) {
+        change += (twist[i] - env->base_twist[i]) * (twist[i] - env->base_twist[i]);
+    }
+    m.twist_change = task_sqrt(change);
+    task_lanes_sync();
+    for (int i = task_lane(); i < 3; i += TASK_LANES) {
+        const TaskReal now = i < 2 ? m.velocity[i] : m.omega[2];
+        env->smooth_velocity[i] += TASK_REAL(TASK_PERIOD) / TASK_REAL(def->reward.tracking_time) *
+                                   (now - env->smooth_velocity[i]);
+    }
+    for (int i = task_lane(); i < 6; i += TASK_LANES) {
+        env->base_twist[i] = twist[i];
+    }
+    const TaskReal *q = robot_sim_qpos(sim) + 7;
+    for (int i = task_lane(); i < env->shape.joints; i += TASK_LANES) {
+        m.q[i] = q[i];
+        m.qd[i] = qvel[6 + i];
+        m.qd_before[i] = env->joint_speed[i];
+        env->joint_speed[i] = m.qd[i];
+        m.torque[i] = torque[i];
+    }
+    m.foot_distance = robot_sim_foot_distance(sim);
+    m.knee_distance = robot_sim_knee_distance(sim);
+    feet_motion(env, def, robot, sim, &m);
+    task_lanes_sync();
+    return m;
+}
+
+/* Bool: the base tilts too much, a shell touches the ground or is too deep in soft ground, or a
+ * foot has passed through the other leg, because the engine computes no contact between the
+ * legs. */
+static inline MILD_BOTH int has_fallen(const TaskEnv *env, const TaskDef *def,
+                                       const RobotSim *sim) {
+    const double depth = env->variation.rigid ? 0 : def->shell_depth;
+    return robot_sim_foot_distance(sim) < def->crossing_limit ||
+           robot_sim_base_rotation(sim)[8] < task_cos(def->tilt_limit) ||
+           robot_sim_body_clearance(sim, &env->terrain) < -depth;
+}
+
+TASK_FN void task_advance_clock(TaskEnv *env, const TaskDef *def) {
+    env->tick++;
+    env->step++;
+    env->phase += TASK_PERIOD / task_gait_period(def, env->command_seen);
+    env->phase -= floor(env->phase);
+    see_command(env);
+    uint32_t interval = (uint32_t)(def->command_interval / TASK_PERIOD + 0.5);
+    if (!env->command_frozen && interval && env->step % interval == 0) {
+        task_draw_command(env, def);
+    }
+}
+
+static inline MILD_BOTH void report_episode(const TaskEnv *env, TaskStep *out) {
+    out->length = env->step - env->step_first;
+    out->episode_reward = (float)env->reward_sum;
+    out->episode_speed_error =
+        (float)(env->speed_error_sum / (out->length ? (TaskReal)out->length : 1));
+    for (int i = 0; i < TASK_REWARD_COUNT; i++) {
+        out->episode_terms[i] = (float)env->term_sum[i];
+    }
+}
+
+/* Computes the reward of the step just made. Returns 0 when it is not finite. */
+static inline MILD_BOTH int take_reward(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                                        const RobotSim *sim, const TaskReal *torque,
+                                        float *reward) {
+    TaskReal terms[TASK_REWARD_COUNT];
+    TaskMotion motion = task_describe_motion(env, def, robot, sim, torque);
+    *reward = (float)task_reward(&motion, terms);
+    if (!isfinite(*reward)) {
+        return 0;
+    }
+    if (task_lane() == 0) {
+        env->speed_error_sum += hypot(env->smooth_velocity[0] - env->command[0],
+                                      env->smooth_velocity[1] - env->command[1]);
+        env->reward_sum += (TaskReal)*reward;
+    }
+    for (int i = task_lane(); i < TASK_REWARD_COUNT; i += TASK_LANES) {
+        env->term_sum[i] += terms[i] * TASK_REAL(TASK_PERIOD);
+    }
+    return 1;
+}
+
+TASK_FN TaskStep task_end_step(TaskEnv *env, const TaskDef *def, const Robot *robot,
+                               const RobotSim *sim, const TaskReal *torque, int diverged) {
+    TaskStep out;
+    memset(&out, 0, sizeof out);
+    int bad = diverged || !take_reward(env, def, robot, sim, torque, &out.reward);
+    if (bad) {
+        out.reward = 0;
+    }
+    out.valid = !bad;
+    int fallen = bad || has_fallen(env, def, sim);
+    task_lanes_sync();
+    if (task_lane() == 0) {
+        task_advance_clock(env, def);
+        task_assist_adapt(env, fallen);
+    }
+    task_lanes_sync();
+    out.timeout = !fallen && env->step >= env->step_limit;
+    out.done = fallen || out.timeout;
+    if (out.done) {
+        report_episode(env, &out);
+    }
+    return out;
+}

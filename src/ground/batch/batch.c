@@ -1,0 +1,251 @@
+#include "ground/batch/batch.h"
+#include "ground/batch/contact_shapes.h"
+#include "device/device.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define BATCH_TOLERANCE 1e-4
+#define BATCH_LIMIT 20
+#define BATCH_MATERIALS_MAX 1000000
+
+#define BATCH_SIZE(groups, per) {groups, per},
+static const int batch_sizes[][2] = {CONTACT_KINDS(BATCH_SIZE)};
+_Static_assert(MILD_BATCH_HOST == DEVICE_HOST, "the same number");
+_Static_assert(MILD_FEET_MAX == 4, "feet take 1, 2 or 4 groups");
+
+static MildStatus check_def(const MildBatchDef *def, MildError *error) {
+    if (def->robots < 1) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: robots = %d; it must be at least 1",
+                         def->robots);
+    }
+    if (def->feet < 1 || def->feet > MILD_FEET_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: feet = %d is outside 1 .. %d", def->feet,
+                         MILD_FEET_MAX);
+    }
+    if (!(def->dt > 0.0 && def->dt <= 0.1)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: dt = %g s is outside 0 .. 0.1", def->dt);
+    }
+    if (!(def->tolerance >= 0.0 && def->tolerance < 1.0)) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: tolerance = %g is outside 0 .. 1",
+                         def->tolerance);
+    }
+    if (def->max_iterations < 0) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: max_iterations = %d is negative",
+                         def->max_iterations);
+    }
+    if (def->device < MILD_BATCH_HOST) {
+        return mild_fail(error, MILD_ERROR_RANGE,
+                         "batch: device = %d; devices count from 0, MILD_BATCH_HOST is the CPU",
+                         def->device);
+    }
+    return MILD_OK;
+}
+
+/* How the elements are dealt to lanes. */
+static MildStatus shape_lanes(BatchShape *shape, MildError *error) {
+    int most = 1;
+    shape->groups = 1;
+    while (shape->groups < shape->feet) {
+        shape->groups *= 2;
+    }
+    for (int f = 0; f < shape->feet; f++) {
+        most = shape->elements[f] > most ? shape->elements[f] : most;
+    }
+    for (size_t i = 0; i < sizeof batch_sizes / sizeof *batch_sizes; i++) {
+        if (batch_sizes[i][0] == shape->groups) {
+            shape->per = batch_sizes[i][1];
+            shape->stride = 32 / shape->groups * shape->per;
+            if (shape->stride >= most) {
+                return MILD_OK;
+            }
+        }
+    }
+    return mild_fail(error, MILD_ERROR_RANGE,
+                     "batch: a sole of %d elements; a robot of %d feet has at most %d a foot: take "
+                     "a larger pitch",
+                     most, shape->feet, shape->stride);
+}
+
+static void shape_def(MildBatch *batch, const MildBatchDef *def) {
+    BatchShape *shape = &batch->shape;
+    batch->device = def->device;
+    shape->robots = def->robots;
+    shape->feet = def->feet;
+    shape->points = def->points;
+    shape->dt = (float)def->dt;
+    shape->tolerance = (float)(def->tolerance > 0.0 ? def->tolerance : BATCH_TOLERANCE);
+    shape->limit = def->max_iterations > 0 ? def->max_iterations : BATCH_LIMIT;
+    for (int f = 0; f < def->feet; f++) {
+        batch->pitch[f] = mild_sole_pitch(def->soles[f]);
+        batch->width[f] = mild_sole_width(def->soles[f]);
+        shape->elements[f] = mild_sole_elements(def->soles[f]);
+        shape->z[f] = (float)mild_sole_z(def->soles[f]);
+        shape->area[f] = (float)(batch->pitch[f] * batch->pitch[f]);
+    }
+}
+
+static MildStatus store_centers(MildBatch *batch, const MildSole *const *soles, MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    const size_t feet = (size_t)shape->feet, stride = (size_t)shape->stride;
+    const size_t bytes = 2 * feet * stride * sizeof(float);
+    float *centers = calloc(1, bytes);
+    if (!centers) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
+    }
+    for (size_t f = 0; f < feet; f++) {
+        for (int i = 0; i < shape->elements[f]; i++) {
+            centers[f * stride + (size_t)i] = (float)mild_sole_x(soles[f])[i];
+            centers[(feet + f) * stride + (size_t)i] = (float)mild_sole_y(soles[f])[i];
+        }
+    }
+    MildStatus status = device_copy(batch->device, batch->arrays.centers, centers, bytes, error);
+    free(centers);
+    return status;
+}
+
+static MildStatus batch_open(MildBatch *batch, const MildBatchDef *def, MildError *error) {
+    MildStatus status = device_open(batch->device, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    const BatchShape *shape = &batch->shape;
+    BatchArrays *arrays = &batch->arrays;
+    const size_t feet = (size_t)shape->feet, robots = (size_t)shape->robots;
+    arrays->map.labels = 1;
+    arrays->centers =
+        device_alloc(batch->device, 2 * feet * (size_t)shape->stride * sizeof(float), error);
+    arrays->memory = arrays->centers
+                         ? device_alloc(batch->device,
+                                        robots * batch_memory_numbers(shape) * sizeof(float), error)
+                         : NULL;
+    if (!arrays->memory) {
+        return MILD_ERROR_MEMORY;
+    }
+    status = store_centers(batch, def->soles, error);
+    if (status != MILD_OK) {
+        return status;
+    }
+    const MildMaterial sand = mild_material_default();
+    return mild_batch_set_materials(batch, &sand, 1, error);
+}
+
+MildBatch *mild_batch_create(const MildBatchDef *def, MildError *error) {
+    if (check_def(def, error) != MILD_OK) {
+        return NULL;
+    }
+    MildBatch *batch = calloc(1, sizeof *batch);
+    if (!batch) {
+        mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
+        return NULL;
+    }
+    shape_def(batch, def);
+    if (shape_lanes(&batch->shape, error) != MILD_OK || batch_open(batch, def, error) != MILD_OK) {
+        mild_batch_destroy(batch);
+        return NULL;
+    }
+    return batch;
+}
+
+void mild_batch_destroy(MildBatch *batch) {
+    if (!batch) {
+        return;
+    }
+    device_free(batch->device, batch->arrays.centers);
+    device_free(batch->device, batch->arrays.materials);
+    device_free(batch->device, batch->arrays.memory);
+    batch_map_close(&batch->arrays.map, batch->device);
+    free(batch);
+}
+
+size_t mild_batch_robot_bytes(const MildBatch *batch) {
+    return batch_memory_numbers(&batch->shape) * sizeof(float);
+}
+
+int mild_batch_stride(const MildBatch *batch) {
+    return batch->shape.stride;
+}
+
+MildStatus mild_batch_set_materials(MildBatch *batch, const MildMaterial *materials, int count,
+                                    MildError *error) {
+    if (count < 1 || count > BATCH_MATERIALS_MAX) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: %d materials; 1 .. %d are possible",
+                         count, BATCH_MATERIALS_MAX);
+    }
+    const int feet = batch->shape.feet;
+    const size_t bytes = (size_t)((count + 1) * feet) * sizeof(MaterialNumbers);
+    MaterialNumbers *numbers = malloc(bytes);
+    MildStatus status = MILD_OK;
+    int curves = 0;
+    if (!numbers) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
+    }
+    for (int i = 0; i < count * feet && status == MILD_OK; i++) {
+        status = material_numbers(&materials[i / feet], batch->pitch[i % feet],
+                                  batch->width[i % feet], i / feet, &numbers[i], error);
+        curves |= status == MILD_OK ? numbers[i].curves : 0;
+    }
+    memset(numbers + count * feet, 0xff, (size_t)feet * sizeof *numbers); /* not a number */
+    void *table = status == MILD_OK ? device_alloc(batch->device, bytes, error) : NULL;
+    if (status == MILD_OK && !table) {
+        status = MILD_ERROR_MEMORY;
+    }
+    if (status == MILD_OK) {
+        status = device_copy(batch->device, table, numbers, bytes, error);
+    }
+    free(numbers);
+    if (status != MILD_OK) {
+        device_free(batch->device, table);
+        return status;
+    }
+    device_free(batch->device, batch->arrays.materials); /* waits until no step reads it */
+    batch->arrays.materials = table;
+    batch->shape.materials = count;
+    batch->curves = curves;
+    return MILD_OK;
+}
+
+MildBatch batch_share(const MildBatch *batch, int first, int count) {
+    MildBatch share = *batch;
+    share.shape.robots = count;
+    share.arrays.memory += (size_t)first * batch_memory_numbers(&batch->shape);
+    return share;
+}
+
+static MildStatus batch_gpu_step(const MildBatch *batch, const MildBatchInput *input,
+                                 const MildBatchOutput *output, int advance, void *stream,
+                                 MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    for (int i = 0; batch_kernels[i]; i++) {
+        const BatchKernel *k = batch_kernels[i];
+        if (k->groups == shape->groups && k->per == shape->per && (shape->points || !k->points) &&
+            !(batch->curves & ~k->curves)) {
+            return k->step(batch, input, output, advance, stream, error);
+        }
+    }
+    return device_open(batch->device, error);
+}
+
+MildStatus mild_batch_step(MildBatch *batch, const MildBatchInput *input,
+                           const MildBatchOutput *output, int advance, void *stream,
+                           MildError *error) {
+    if (batch->device != MILD_BATCH_HOST) {
+        return batch_gpu_step(batch, input, output, advance, stream, error);
+    }
+    host_step(&batch->shape, &batch->arrays, input, output, advance);
+    return MILD_OK;
+}
+
+MildStatus mild_batch_reset(MildBatch *batch, const uint8_t *which, void *stream,
+                            MildError *error) {
+    if (batch->device != MILD_BATCH_HOST) {
+        return batch_gpu_reset(batch, which, stream, error);
+    }
+    const size_t numbers = batch_memory_numbers(&batch->shape);
+    for (size_t robot = 0; robot < (size_t)batch->shape.robots; robot++) {
+        if (!which || which[robot]) {
+            memset(batch->arrays.memory + robot * numbers, 0, numbers * sizeof(float));
+        }
+    }
+    return MILD_OK;
+}

@@ -1,0 +1,78 @@
+/* Inside of a batch, for the layers that step it together with an engine. */
+#ifndef MILD_BATCH_PRIVATE_H
+#define MILD_BATCH_PRIVATE_H
+
+#include "ground/batch/material.h"
+#include "ground/map_view.h"
+#include "mild/batch.h"
+
+/* The same for all robots; in float whatever Real is. */
+typedef struct {
+    int robots;
+    int feet;
+    int groups; /* of lanes in a warp: feet rounded up to a power of two */
+    int per;    /* elements of a lane */
+    int stride; /* elements of a foot in memory */
+    float dt, tolerance;
+    int limit;
+    int materials;               /* in the table; behind them one that is not a number */
+    int map;                     /* bool: on BatchArrays.map, not on level ground */
+    int points;                  /* bool: as MildBatchDef.points */
+    int elements[MILD_FEET_MAX]; /* of a sole */
+    float z[MILD_FEET_MAX];      /* [m] of its plane */
+    float area[MILD_FEET_MAX];   /* [m^2] of an element */
+} BatchShape;
+
+/* Where a batch keeps what; on its device. */
+typedef struct {
+    float *centers;             /* [2][feet][stride] [m] x and y of the elements */
+    MaterialNumbers *materials; /* [materials + 1][feet] */
+    float *memory;              /* [robots] of contact.h */
+    MapView map;                /* all 0 without a map */
+} BatchArrays;
+
+struct MildBatch {
+    BatchShape shape;
+    BatchArrays arrays;
+    int device;
+    int curves;                  /* LawCurve bits of all materials */
+    double pitch[MILD_FEET_MAX]; /* [m] */
+    double width[MILD_FEET_MAX]; /* [m] shorter side of the sole */
+};
+
+/* [numbers] of a robot's memory. */
+size_t batch_memory_numbers(const BatchShape *shape);
+/* The memory of a ground as that of one robot, [batch_memory_numbers]. */
+void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory);
+/* `count` robots of a batch from `first` on, as a batch that borrows its memory. */
+MildBatch batch_share(const MildBatch *batch, int first, int count);
+
+/* ---- a map: map.c ---- */
+/* Makes a view of a map whose arrays are copies in the memory of a device. Fails for a map that a
+ * batch does not know yet. error: not NULL. */
+MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildError *error);
+void batch_map_close(const MapView *view, int device);
+
+/* ---- the CPU: host.c ---- */
+void host_step(const BatchShape *shape, const BatchArrays *arrays, const MildBatchInput *input,
+               const MildBatchOutput *output, int advance);
+
+/* ---- a GPU: kernel.cu and reset.cu, or without_cuda.c ---- */
+/* A step in `stream`. */
+typedef MildStatus (*BatchStep)(const MildBatch *batch, const MildBatchInput *input,
+                                const MildBatchOutput *output, int advance, void *stream,
+                                MildError *error);
+/* The step compiled for one size of a batch. */
+typedef struct {
+    int groups; /* as in BatchShape */
+    int per;
+    int points; /* bool: only for such a batch */
+    int curves; /* LawCurve and LawMotion bits that the materials may have */
+    BatchStep step;
+} BatchKernel;
+/* Those of this build, NULL behind them. A batch takes the first that fits (cmake/Batch.cmake). */
+extern const BatchKernel *const batch_kernels[];
+MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, void *stream,
+                           MildError *error);
+
+#endif

@@ -1,0 +1,149 @@
+/* The contact step of one robot as the work of a warp: what contact.inc needs and gives.
+ *
+ * Arrays of a robot lie one behind the other, feet first. A foot's elements are dealt to the lanes
+ * of its group: element s is the (s / group)-th one of lane s % group. */
+#ifndef MILD_BATCH_CONTACT_H
+#define MILD_BATCH_CONTACT_H
+
+#include "ground/batch/lanes.h"
+#include "ground/begin.h"
+#include "ground/impulse.h"
+#include "ground/map_view.h"
+#include "ground/motion.h"
+#include "ground/plate.h"
+#include "ground/remember.h"
+#include "ground/shear.h"
+
+#define CONTACT_FEET_MAX 4
+#define CONTACT_PADDING REAL(-1e3) /* [m] depth of elements that a foot does not have */
+#define CONTACT_HALVINGS 6         /* of one Newton step */
+
+/* What a step needs of a material under one element of a foot. */
+typedef struct {
+    Law law;
+    Real recovery;     /* [-] as in Element */
+    Real mu;           /* [-] */
+    Real k_drift;      /* [N/m^2] */
+    Real b_drift;      /* [N s/m] */
+    Real exit_drag;    /* [kg/m] */
+    Real entry_drag;   /* [kg/m] */
+    Real cohesion;     /* [N/m^2] as in Shear */
+    Real shear_length; /* [m] */
+    int curves;        /* LawCurve and LawMotion bits of the law */
+} ContactMaterial;
+
+/* One foot's sole. */
+typedef struct {
+    const Real *x; /* [stride] [m] element centres in the foot frame; beyond `elements` 0 */
+    const Real *y; /* [stride] [m] */
+    Real z;        /* [m] sole plane in the foot frame */
+    Real area;     /* [m^2] of an element */
+    int elements;
+} ContactSole;
+
+/* The same for all robots and steps. */
+typedef struct {
+    ContactSole sole[CONTACT_FEET_MAX];
+    int feet;
+    Real dt;        /* [s] */
+    Real tolerance; /* [-] of the residual, in the metric of kinetic energy */
+    int limit;      /* of Newton steps */
+    MapView map;    /* in a version with CONTACT_MAP */
+} ContactSetup;
+
+/* What a robot's engine knows before the step; see MildContactInput. */
+typedef struct {
+    const Real *position;            /* [feet][3] [m] */
+    const Real *rotation;            /* [feet][9] [-] */
+    const Real *velocity;            /* [feet][6] [m/s, rad/s] */
+    const Real *inverse_inertia;     /* [6 feet][6 feet] [1/kg, 1/(kg m), 1/(kg m^2)] */
+    const Real *free_velocity;       /* [6 feet] [m/s, rad/s] */
+    const ContactMaterial *material; /* [feet] without a map */
+    Real height;                     /* [m] of the surface */
+    /* With a map. */
+    const ContactMaterial *table; /* [materials + 1][feet]; the last is no material */
+    const int *label_material;    /* [labels] index of a label's material; NULL: 0 */
+    int materials;
+    const Real *map_origin; /* [2] [m] world; NULL: 0 */
+} ContactProblem;
+
+/* Memory of a robot: CONTACT_MEMORY numbers of each element, in the order of ElementMemory, as
+ * [number][foot][stride].
+ *
+ * With a map four more of each follow: number `plane` [m] and the gradient [-] along x and y of the
+ * plane that the last step had for the ground, and the label that a loaded element touched down on.
+ * The depth below this plane at the way r [m] from where the foot's reference point was is plane +
+ * gradient . (r_x, r_y) - r_z. Then [5][foot] follow: x, y and z of that point and the height of
+ * the ground [m], and whether there was a step, 1 or 0. */
+enum {
+    CONTACT_MEMORY = sizeof(ElementMemory) / sizeof(Real),
+    CONTACT_MAP_MEMORY = CONTACT_MEMORY + 4,
+    CONTACT_FOOT_MEMORY = LANES /* numbers that [5][foot] have room in */
+};
+#define CONTACT_LABELS 256 /* a map has at most as many */
+#define CONTACT_NO_PLANE                                                                           \
+    REAL(1e6) /* [m] `plane` of an element that was not there in the last step */
+
+/* [numbers] of the memory of a robot with room for `elements` elements. map: bool. */
+MILD_HD int contact_memory_numbers(int elements, int map) {
+    return map ? elements * CONTACT_MAP_MEMORY + CONTACT_FOOT_MEMORY : elements * CONTACT_MEMORY;
+}
+
+/* Velocity of an element, along the world's axes. descent: speed at which its depth grows. */
+typedef struct {
+    Real x, y;    /* [m/s] */
+    Real descent; /* [m/s] */
+} ContactVelocity;
+
+/* Gives an element its material. */
+MILD_HD void contact_stand_on(const ContactMaterial *material, Element *e) {
+    e->law = material->law;
+    e->recovery = material->recovery;
+    e->mu = material->mu;
+    e->k_drift = material->k_drift;
+    e->b_drift = material->b_drift;
+    e->exit_drag = material->exit_drag;
+    e->entry_drag = material->entry_drag;
+}
+
+/* Adapts an element to its motion at the start of the step, after element_begin. rotation: [9] of
+ * the foot. area: [m^2] of the element. */
+MILD_HD void contact_direct(const ContactMaterial *material, const Real *rotation, Real area,
+                            const ContactVelocity *now, Real dt, const ElementMemory *memory,
+                            Element *e) {
+    const int curves = material->curves;
+    if (curves & LAW_RESIST) {
+        const Plate plate = plate_of(rotation);
+        element_resist(e, memory, &plate, (curves & LAW_SPACE) != 0, curves, dt, 1 / dt,
+                       material->law.line_stiffness, now->x, now->y, now->descent);
+        /* Not before `middle`, where float may round it to: on a way of no length the force would
+         * be infinite. The text in double is that of mild/ground.h. */
+        if (sizeof(Real) < sizeof(double)) {
+            e->yield_depth = real_max(e->yield_depth, e->middle);
+        }
+    }
+    if (curves & LAW_SHEAR) {
+        const Shear shear = {material->mu, material->cohesion, material->shear_length, area};
+        element_shear(e, memory, &shear, curves, dt, 1 / dt);
+    }
+}
+
+/* What the ground does to a foot, mean over the step. */
+typedef struct {
+    Real pressure_center[3]; /* [m] world, as in MildFootResult; 0 without load */
+    Real depth_max;          /* [m] over the loaded elements */
+    Real depth_mean;         /* [m] */
+    Real area;               /* [m^2] of the loaded elements */
+} ContactFoot;
+
+/* Where a step puts its results. NULL where it may be said: not wanted. */
+typedef struct {
+    Real *wrench;      /* [feet][6] [N, N m] force and torque on the foot at the reference point */
+    Real *velocity;    /* [feet][6] [m/s, rad/s] after the step */
+    ContactFoot *foot; /* [feet] or NULL */
+    Real *elements;    /* [4][feet][stride] or NULL: depth [m], normal, tangent_x, tangent_y [N] */
+    Real *residual;    /* [1] [-] relative, in the metric of kinetic energy */
+    int *iterations;   /* [1] Newton steps */
+} ContactResult;
+
+#endif

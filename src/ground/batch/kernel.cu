@@ -1,0 +1,71 @@
+/* The contact step of a batch on a GPU: a warp a robot. cmake/Batch.cmake makes a unit of each
+ * size. Before the inclusion: KERNEL, the name of what it gives; KERNEL_GROUPS, KERNEL_PER,
+ * KERNEL_POINTS and KERNEL_CURVES, what they are for (contact.inc); KERNEL_BLOCKS of a
+ * multiprocessor. */
+#define MILD_REAL_FLOAT
+
+extern "C" {
+#include "ground/batch/batch.h"
+}
+
+#include "ground/batch/contact.h"
+#include "device/cuda.h"
+
+#define CONTACT_CURVES KERNEL_CURVES
+#define CONTACT_POINTS KERNEL_POINTS
+#define CONTACT_MAP 0
+#define CONTACT_FEET KERNEL_GROUPS
+#define CONTACT_PER KERNEL_PER
+#define CONTACT(name) level_##name
+#include "ground/batch/contact.inc"
+#undef CONTACT_MAP
+#define CONTACT_MAP 1
+#define CONTACT_FEET KERNEL_GROUPS
+#define CONTACT_PER KERNEL_PER
+#define CONTACT(name) map_##name
+#include "ground/batch/contact.inc"
+#include "ground/batch/robot.inc"
+
+static_assert(sizeof(ContactMaterial) == sizeof(MaterialNumbers), "the same numbers");
+static_assert(sizeof(ContactFoot) == sizeof(MildBatchFoot), "the same numbers");
+
+enum { WARPS = 4, THREADS = WARPS * LANES }; /* robots of a block */
+
+#define CONTACT_TURN(version)                                                                      \
+    static __global__ void __launch_bounds__(THREADS, KERNEL_BLOCKS) contact_##version(            \
+        const __grid_constant__ ContactSetup setup, const __grid_constant__ BatchShape shape,      \
+        const __grid_constant__ BatchArrays arrays, const __grid_constant__ MildBatchInput input,  \
+        const __grid_constant__ MildBatchOutput output, int advance) {                             \
+        __shared__ version##_Shared shared[WARPS];                                                 \
+        const int warp = (int)(threadIdx.x / LANES);                                               \
+        const long robot = (long)blockIdx.x * WARPS + warp;                                        \
+        if (robot >= shape.robots) {                                                               \
+            return;                                                                                \
+        }                                                                                          \
+        ContactProblem problem;                                                                    \
+        ContactResult result;                                                                      \
+        batch_problem(&shape, &arrays, &input, robot, &problem);                                   \
+        batch_result(&shape, &output, robot, &result);                                             \
+        version##_robot(&setup, &problem, &shared[warp], batch_memory(&shape, &arrays, robot),     \
+                        advance, &result);                                                         \
+    }
+CONTACT_TURN(level)
+CONTACT_TURN(map)
+
+static MildStatus step(const MildBatch *batch, const MildBatchInput *input,
+                       const MildBatchOutput *output, int advance, void *stream, MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    const int blocks = (shape->robots + WARPS - 1) / WARPS;
+    ContactSetup setup;
+    OnDevice on(batch->device);
+    batch_setup(shape, &batch->arrays, &setup);
+    (shape->map ? contact_map : contact_level)<<<blocks, THREADS, 0, (cudaStream_t)stream>>>(
+        setup, *shape, batch->arrays, *input, *output, advance);
+    return checked(cudaGetLastError(), "step", error);
+}
+
+extern "C" {
+extern const BatchKernel KERNEL;
+const BatchKernel KERNEL = {KERNEL_GROUPS, KERNEL_PER, KERNEL_POINTS,
+                            KERNEL_CURVES == LAW_ALL ? ~0 : KERNEL_CURVES, step};
+}

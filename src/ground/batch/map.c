@@ -1,0 +1,96 @@
+/* The map that the robots of a batch stand on, in the memory of its device. */
+#include <stdlib.h>
+
+#include "ground/batch/batch.h"
+#include "device/device.h"
+#include "ground/grid.h"
+#include "ground/inside.h"
+
+/* First labels of all cells; NULL when out of memory or when a border is blended. */
+static unsigned char *first_labels(const MildMap *map, size_t cells, MildError *error) {
+    unsigned char *labels = malloc(cells);
+    if (!labels) {
+        mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory: %zu bytes are needed", cells);
+        return NULL;
+    }
+    for (size_t i = 0; i < cells; i++) {
+        labels[i] = map->label[i].first;
+        if (map->label[i].share > 0) {
+            mild_fail(error, MILD_ERROR_ARGUMENT,
+                      "batch: a map whose materials blend at their borders is not there in batches "
+                      "yet; use terrain.border = 0");
+            free(labels);
+            return NULL;
+        }
+    }
+    return labels;
+}
+
+static void *copy_of(const void *from, size_t bytes, int device, MildError *error) {
+    void *to = device_alloc(device, bytes, error);
+    if (to && device_copy(device, to, from, bytes, error) != MILD_OK) {
+        device_free(device, to);
+        return NULL;
+    }
+    return to;
+}
+
+void batch_map_close(const MapView *view, int device) {
+    device_free(device, (void *)view->height);
+    device_free(device, (void *)view->label);
+}
+
+MildStatus batch_map_open(MapView *view, const MildMap *map, int device, MildError *error) {
+    MapView opened = mild_inside_map(map);
+    const size_t points = (size_t)(opened.x.cells + 1) * (size_t)(opened.y.cells + 1);
+    const size_t cells = (size_t)opened.label_x.cells * (size_t)opened.label_y.cells;
+    opened.height = NULL;
+    if (map->label) {
+        unsigned char *labels = first_labels(map, cells, error);
+        opened.label = labels ? copy_of(labels, cells, device, error) : NULL;
+        free(labels);
+        if (!opened.label) {
+            return error->status;
+        }
+    }
+    if (map->height) {
+        opened.height = copy_of(map->height, points * sizeof *map->height, device, error);
+        if (!opened.height) {
+            batch_map_close(&opened, device);
+            return error->status;
+        }
+    }
+    *view = opened;
+    return MILD_OK;
+}
+
+/* Bool: nothing differs from place to place. */
+static int map_is_plain(const MildMap *map) {
+    return !map || (mild_map_is_level(map) && !map->label);
+}
+
+MildStatus mild_batch_set_map(MildBatch *batch, const MildMap *map, MildError *error) {
+    MildError own = {0};
+    error = error ? error : &own; /* says which status */
+    BatchShape shape = batch->shape;
+    BatchArrays arrays = batch->arrays;
+    shape.map = !map_is_plain(map);
+    arrays.map = (MapView){.labels = 1};
+    if (shape.map) {
+        MildStatus status = batch_map_open(&arrays.map, map, batch->device, error);
+        if (status != MILD_OK) {
+            return status;
+        }
+    }
+    const size_t numbers = (size_t)shape.robots * batch_memory_numbers(&shape);
+    arrays.memory = device_alloc(batch->device, numbers * sizeof(float), error);
+    if (!arrays.memory) {
+        batch_map_close(&arrays.map, batch->device);
+        return error->status;
+    }
+    device_free(batch->device, batch->arrays.memory); /* waits until no step uses it */
+    batch_map_close(&batch->arrays.map, batch->device);
+    batch->arrays = arrays;
+    batch->shape = shape;
+    return MILD_OK;
+}

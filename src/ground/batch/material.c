@@ -1,0 +1,31 @@
+#include "ground/batch/material.h"
+
+#include "ground/begin.h"
+#include "ground/inside.h"
+
+#define MATERIAL_LAW_INDEX(name) MATERIAL_LAW_##name,
+enum { LAW_NUMBERS(MATERIAL_LAW_INDEX) MATERIAL_LAW_COUNT };
+_Static_assert(MATERIAL_LAW_COUNT == MATERIAL_LAW_NUMBERS, "all numbers");
+
+MildStatus material_numbers(const MildMaterial *material, double pitch, double width, int index,
+                            MaterialNumbers *numbers, MildError *error) {
+    MildError cause = {0};
+    if (mild_material_check(material, &cause) != MILD_OK) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: material %d: %s", index, cause.text);
+    }
+    const InsideLaw inside = mild_inside_law(material, pitch, width);
+    const Law law = inside.law;
+    int n = 0;
+#define MATERIAL_LAW_STORE(name) numbers->law[n++] = (float)law.name;
+    LAW_NUMBERS(MATERIAL_LAW_STORE)
+    numbers->recovery = (float)inside.recovery;
+    numbers->mu = (float)material->mu;
+    numbers->k_drift = (float)material->k_drift;
+    numbers->b_drift = (float)material->b_drift;
+    numbers->exit_drag = (float)law_exit_drag(&law);
+    numbers->entry_drag = (float)law_entry_drag(&law);
+    numbers->cohesion = (float)material->cohesion;
+    numbers->shear_length = (float)material->shear_length;
+    numbers->curves = inside.curves;
+    return MILD_OK;
+}

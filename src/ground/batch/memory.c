@@ -1,0 +1,262 @@
+/* What the ground of a batch remembers, from and to mild/ground.h. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "ground/batch/batch.h"
+#include "ground/batch/contact.h"
+#include "device/device.h"
+#include "ground/inside.h"
+
+enum { MEMORY_ROBOTS = 256 }; /* copied at once */
+
+size_t batch_memory_numbers(const BatchShape *shape) {
+    return (size_t)contact_memory_numbers(shape->groups * shape->stride, shape->map);
+}
+
+/* The arrays of a foot's memory in the order of ElementMemory. */
+#define MEMORY_ARRAYS(of)                                                                          \
+    {                                                                                              \
+        (of).depth_max, (of).middle, (of).front_speed, (of).drift, (of).pending_x, (of).pending_y, \
+            (of).held_x, (of).held_y, (of).held_stiffness                                          \
+    }
+
+/* Number n of a foot's elements, or with a map of what follows them. */
+static float *numbers_at(const BatchShape *shape, float *memory, int n, int foot) {
+    return memory + (n * shape->groups + foot) * shape->stride;
+}
+
+/* The five numbers of a foot, `groups` apart. */
+static float *foot_at(const BatchShape *shape, float *memory, int foot) {
+    return numbers_at(shape, memory, CONTACT_MAP_MEMORY, 0) + foot;
+}
+
+/* What the ground remembers of its unevenness and materials. Planes count from the world's origin
+ * there, and from where the foot was here; so that the first step finds them the same, the foot was
+ * at the origin. */
+static void planes_of(const BatchShape *shape, const MildGround *ground, const Memory *of, int f,
+                      float *memory) {
+    float *plane = numbers_at(shape, memory, CONTACT_MEMORY, f);
+    float *slope_x = numbers_at(shape, memory, CONTACT_MEMORY + 1, f);
+    float *slope_y = numbers_at(shape, memory, CONTACT_MEMORY + 2, f);
+    float *label = numbers_at(shape, memory, CONTACT_MEMORY + 3, f);
+    const int uneven = ground->uneven[f];
+    foot_at(shape, memory, f)[4 * shape->groups] = uneven ? 1.0f : 0.0f;
+    for (int e = 0; e < shape->elements[f]; e++) {
+        const int there = uneven && of->material[e] != MATERIAL_NONE;
+        plane[e] = there ? (float)of->plane[e] : (float)CONTACT_NO_PLANE;
+        slope_x[e] = there ? (float)of->slope_x[e] : 0.0f;
+        slope_y[e] = there ? (float)of->slope_y[e] : 0.0f;
+        label[e] = of->material[e] > 0 ? (float)(of->material[e] & 0xff) : 0.0f;
+    }
+}
+
+void batch_memory_of(const BatchShape *shape, const MildGround *ground, float *memory) {
+    memset(memory, 0, batch_memory_numbers(shape) * sizeof *memory);
+    for (int f = 0; f < shape->feet; f++) {
+        const Memory of = mild_inside_memory(ground, f);
+        const double *const all[CONTACT_MEMORY] = MEMORY_ARRAYS(of);
+        for (int n = 0; n < CONTACT_MEMORY; n++) {
+            float *to = numbers_at(shape, memory, n, f);
+            for (int e = 0; e < shape->elements[f]; e++) {
+                to[e] = (float)all[n][e];
+            }
+        }
+        if (shape->map) {
+            planes_of(shape, ground, &of, f, memory);
+        }
+    }
+}
+
+/* The other way: planes from where the foot was to the world's origin. */
+static int store_planes(const BatchShape *shape, float *memory, int f, const Memory *of) {
+    const float *plane = numbers_at(shape, memory, CONTACT_MEMORY, f);
+    const float *slope_x = numbers_at(shape, memory, CONTACT_MEMORY + 1, f);
+    const float *slope_y = numbers_at(shape, memory, CONTACT_MEMORY + 2, f);
+    const float *label = numbers_at(shape, memory, CONTACT_MEMORY + 3, f);
+    const float *last = foot_at(shape, memory, f);
+    const double x = (double)last[0];
+    const double y = (double)last[shape->groups];
+    const double z = (double)last[2 * shape->groups] - (double)last[3 * shape->groups];
+    const int stepped = last[4 * shape->groups] > 0.0f;
+    for (int e = 0; e < shape->elements[f]; e++) {
+        const int there = stepped && (double)plane[e] < CONTACT_NO_PLANE / 2;
+        of->slope_x[e] = there ? (double)slope_x[e] : 0.0;
+        of->slope_y[e] = there ? (double)slope_y[e] : 0.0;
+        of->plane[e] = (double)plane[e] - of->slope_x[e] * x - of->slope_y[e] * y + z;
+        of->plane[e] = there ? of->plane[e] : 0.0;
+        of->material[e] = of->depth_max[e] > 0.0 ? (int32_t)label[e]
+                          : there                ? MATERIAL_FREE
+                                                 : MATERIAL_NONE;
+    }
+    return stepped;
+}
+
+/* Moves the memory of a robot to a ground. */
+static void ground_remember(const BatchShape *shape, const MapView *map, float *memory,
+                            MildGround *ground) {
+    mild_ground_reset(ground);
+    for (int f = 0; f < shape->feet; f++) {
+        const Memory of = mild_inside_memory(ground, f);
+        double *const all[CONTACT_MEMORY] = MEMORY_ARRAYS(of);
+        int loaded = 0;
+        for (int n = 0; n < CONTACT_MEMORY; n++) {
+            const float *from = numbers_at(shape, memory, n, f);
+            for (int e = 0; e < shape->elements[f]; e++) {
+                all[n][e] = (double)from[e];
+            }
+        }
+        for (int e = 0; e < shape->elements[f]; e++) {
+            of.material[e] = of.depth_max[e] > 0.0 ? 0 : MATERIAL_NONE;
+            loaded += of.depth_max[e] > 0.0;
+        }
+        const int stepped = shape->map && store_planes(shape, memory, f, &of);
+        ground->uneven[f] = stepped && map->uneven;
+        ground->touched[f] = ground->uneven[f] ? shape->elements[f] : loaded;
+    }
+}
+
+/* ---- what fits ---- */
+
+static MildStatus check_robots(const BatchShape *shape, int first, int count, MildError *error) {
+    if (first < 0 || first >= shape->robots) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: robot %d is outside 0 .. %d", first,
+                         shape->robots - 1);
+    }
+    if (count < 0 || count > shape->robots - first) {
+        return mild_fail(error, MILD_ERROR_RANGE, "batch: %d robots from %d on; there are %d",
+                         count, first, shape->robots);
+    }
+    return MILD_OK;
+}
+
+/* Whether a ground may take part: the same soles, no imprints. */
+static MildStatus check_soles(const BatchShape *shape, int robot, const MildGround *ground,
+                              MildError *error) {
+    int same = ground->feet == shape->feet;
+    for (int f = 0; same && f < shape->feet; f++) {
+        same = ground->elements[f] == shape->elements[f];
+    }
+    if (!same) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "batch: the ground of robot %d was made for other soles", robot);
+    }
+    if (ground->tiles > 0) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT,
+                         "batch: the ground of robot %d keeps imprints, which batches do not yet; "
+                         "use mild_ground_init",
+                         robot);
+    }
+    return MILD_OK;
+}
+
+/* Whether a batch knows everything that a ground remembers. */
+static MildStatus check_memory(const MildBatch *batch, int robot, const MildGround *ground,
+                               MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    const int labels = shape->map ? batch->arrays.map.labels : 1;
+    for (int f = 0; f < shape->feet; f++) {
+        const Memory memory = mild_inside_memory(ground, f);
+        if (ground->uneven[f] && !(shape->map && batch->arrays.map.uneven)) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT,
+                             "batch: the ground of robot %d is uneven, the batch's is not: call "
+                             "mild_batch_set_map",
+                             robot);
+        }
+        for (int e = 0; e < shape->elements[f]; e++) {
+            const int32_t material = memory.material[e];
+            if (material >> 16 > 0) {
+                return mild_fail(error, MILD_ERROR_ARGUMENT,
+                                 "batch: robot %d stands on a mixture of materials, which is not "
+                                 "there in batches yet",
+                                 robot);
+            }
+            if (material >= 0 && (material & 0xff) >= labels) {
+                return mild_fail(error, MILD_ERROR_ARGUMENT,
+                                 "batch: robot %d stands on material %d; the batch's ground has "
+                                 "%d: call mild_batch_set_map",
+                                 robot, material & 0xff, labels);
+            }
+        }
+    }
+    return MILD_OK;
+}
+
+/* ---- load and store ---- */
+
+/* Numbers for the robots that are copied at once; NULL when out of memory. */
+static float *some_robots(const BatchShape *shape, int count, MildError *error) {
+    const int most = count < MEMORY_ROBOTS ? count : MEMORY_ROBOTS;
+    float *memory =
+        malloc((size_t)(most > 0 ? most : 1) * batch_memory_numbers(shape) * sizeof *memory);
+    if (!memory) {
+        mild_fail(error, MILD_ERROR_MEMORY, "batch: out of memory");
+    }
+    return memory;
+}
+
+MildStatus mild_batch_load_robots(MildBatch *batch, int first, int count,
+                                  const MildGround *const *grounds, MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    const size_t numbers = batch_memory_numbers(shape);
+    MildStatus status = check_robots(shape, first, count, error);
+    for (int i = 0; i < count && status == MILD_OK; i++) {
+        status = check_soles(shape, first + i, grounds[i], error);
+        if (status == MILD_OK) {
+            status = check_memory(batch, first + i, grounds[i], error);
+        }
+    }
+    if (status != MILD_OK) {
+        return status;
+    }
+    float *memory = some_robots(shape, count, error);
+    if (!memory) {
+        return MILD_ERROR_MEMORY;
+    }
+    for (int i = 0; i < count && status == MILD_OK; i += MEMORY_ROBOTS) {
+        const int some = count - i < MEMORY_ROBOTS ? count - i : MEMORY_ROBOTS;
+        for (int k = 0; k < some; k++) {
+            batch_memory_of(shape, grounds[i + k], memory + (size_t)k * numbers);
+        }
+        status = device_copy(batch->device, batch->arrays.memory + (size_t)(first + i) * numbers,
+                             memory, (size_t)some * numbers * sizeof *memory, error);
+    }
+    free(memory);
+    return status;
+}
+
+MildStatus mild_batch_store_robots(const MildBatch *batch, int first, int count,
+                                   MildGround *const *grounds, MildError *error) {
+    const BatchShape *shape = &batch->shape;
+    const size_t numbers = batch_memory_numbers(shape);
+    MildStatus status = check_robots(shape, first, count, error);
+    for (int i = 0; i < count && status == MILD_OK; i++) {
+        status = check_soles(shape, first + i, grounds[i], error);
+    }
+    float *memory = status == MILD_OK ? some_robots(shape, count, error) : NULL;
+    if (!memory) {
+        return status == MILD_OK ? MILD_ERROR_MEMORY : status;
+    }
+    for (int i = 0; i < count && status == MILD_OK; i += MEMORY_ROBOTS) {
+        const int some = count - i < MEMORY_ROBOTS ? count - i : MEMORY_ROBOTS;
+        status =
+            device_copy(batch->device, memory, batch->arrays.memory + (size_t)(first + i) * numbers,
+                        (size_t)some * numbers * sizeof *memory, error);
+        for (int k = 0; k < some && status == MILD_OK; k++) {
+            ground_remember(shape, &batch->arrays.map, memory + (size_t)k * numbers,
+                            grounds[i + k]);
+        }
+    }
+    free(memory);
+    return status;
+}
+
+MildStatus mild_batch_load(MildBatch *batch, int robot, const MildGround *ground,
+                           MildError *error) {
+    return mild_batch_load_robots(batch, robot, 1, &ground, error);
+}
+
+MildStatus mild_batch_store(const MildBatch *batch, int robot, MildGround *ground,
+                            MildError *error) {
+    return mild_batch_store_robots(batch, robot, 1, &ground, error);
+}

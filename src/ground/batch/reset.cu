@@ -1,0 +1,30 @@
+/* Robots of a batch on a GPU forget. */
+#define MILD_REAL_FLOAT
+
+extern "C" {
+#include "ground/batch/batch.h"
+}
+
+#include "ground/batch/contact.h"
+#include "ground/batch/robot.inc"
+#include "device/cuda.h"
+
+static __global__ void forget(BatchShape shape, BatchArrays arrays, const uint8_t *which) {
+    const long robot = blockIdx.x;
+    if (which && !which[robot]) {
+        return;
+    }
+    Real *memory = batch_memory(&shape, &arrays, robot);
+    const int numbers = contact_memory_numbers(shape.groups * shape.stride, shape.map);
+    for (int i = (int)threadIdx.x; i < numbers; i += (int)blockDim.x) {
+        memory[i] = 0;
+    }
+}
+
+extern "C" MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, void *stream,
+                                      MildError *error) {
+    OnDevice on(batch->device);
+    forget<<<batch->shape.robots, 256, 0, (cudaStream_t)stream>>>(batch->shape, batch->arrays,
+                                                                  which);
+    return checked(cudaGetLastError(), "reset", error);
+}

@@ -1,0 +1,12 @@
+/* In the place of the kernels in a build without CUDA. */
+#include "ground/batch/batch.h"
+#include "device/device.h"
+
+const BatchKernel *const batch_kernels[] = {NULL};
+
+MildStatus batch_gpu_reset(const MildBatch *batch, const uint8_t *which, void *stream,
+                           MildError *error) {
+    (void)which;
+    (void)stream;
+    return device_open(batch->device, error);
+}

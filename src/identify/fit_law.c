@@ -1,0 +1,147 @@
+#include "identify/fit_law.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "ground/models.h"
+
+/* ---- combinations ---- */
+
+static double cone_stress(const MildMaterial *m) {
+    return m->sigma_cone / cos(m->alpha);
+}
+
+static void cone_stress_set(MildMaterial *m, double value) {
+    m->sigma_cone = value * cos(m->alpha);
+}
+
+static double cone_shape(const MildMaterial *m) {
+    return tan(m->alpha) / m->nu;
+}
+
+static void cone_shape_set(MildMaterial *m, double value) {
+    m->nu = tan(m->alpha) / value;
+}
+
+static double drag(const MildMaterial *m) {
+    return m->c_g * m->c_d * m->phi * m->rho * m->nu;
+}
+
+static void drag_set_c_g(MildMaterial *m, double value) {
+    m->c_g = value / (m->c_d * m->phi * m->rho * m->nu);
+}
+
+static void drag_set_c_d(MildMaterial *m, double value) {
+    m->c_d = value / (m->c_g * m->phi * m->rho * m->nu);
+}
+
+static double modulus(const MildMaterial *m) {
+    return m->k_c / m->plate_width + m->k_phi;
+}
+
+static void modulus_set(MildMaterial *m, double value) {
+    m->k_phi = value - m->k_c / m->plate_width;
+}
+
+static const FitCombination combinations[] = {
+    {"tan(alpha)/nu", "-", "nu", 0.01, 141, 0, cone_shape, cone_shape_set},
+    {"sigma_cone/cos(alpha)", "N/m^3", "sigma_cone", 0, 7.1e7, 1, cone_stress, cone_stress_set},
+    {"c_g c_d phi rho nu", "kg/m^3", "c_g", 0, 3.75e7, 1, drag, drag_set_c_g},
+    {"c_g c_d phi rho nu", "kg/m^3", "c_d", 0, 3.75e7, 1, drag, drag_set_c_d},
+    {"k_c/plate_width + k_phi", "N/m^(n+2)", "k_phi", 0, 3e12, 1, modulus, modulus_set},
+};
+
+const FitCombination *fit_combination(const char *carrier) {
+    for (size_t i = 0; i < sizeof combinations / sizeof *combinations; i++) {
+        if (strcmp(combinations[i].carrier, carrier) == 0) {
+            return &combinations[i];
+        }
+    }
+    return NULL;
+}
+
+/* ---- parameters ---- */
+
+double *fit_number(MildMaterial *material, const MildField *field) {
+    return (double *)((uintptr_t)material + field->offset);
+}
+
+void fit_range(const MildField *field, double *low, double *high) {
+    *low = strcmp(field->name, "c_d") == 0 ? 0.5 : strcmp(field->name, "c_g") == 0 ? 0 : field->min;
+    *high = field->max;
+}
+
+/* Bool: the force at some depth changes with the parameter. */
+static int is_sensed(MildModel model, const MildField *field, double speed, double acceleration) {
+    const FitPlate plate = {1, 0.0195, 0.1};
+    const FitPoint point = {.depth = 0.005, .speed = speed, .acceleration = acceleration};
+    MildMaterial material = mild_material_default();
+    double before, after;
+    material.model = (int)model;
+    fit_forces(&plate, &material, &point, 1, &before);
+    *fit_number(&material, field) *= 1.01;
+    fit_forces(&plate, &material, &point, 1, &after);
+    return after != before;
+}
+
+int fit_is_geometry(MildModel model, const char *name) {
+    const MildModelInfo *info = mild_model_info(model);
+    int read = 0;
+    for (int i = 0; i < MILD_MODEL_FIELDS && info->fields[i]; i++) {
+        read |= strcmp(info->fields[i], name) == 0;
+    }
+    return read && (strcmp(name, "bed_depth") == 0 || strcmp(name, "plate_width") == 0);
+}
+
+int fit_parameters(MildModel model, const MildField *fields[FIT_PARAMETERS_MAX]) {
+    const MildModelInfo *info = mild_model_info(model);
+    int count = 0;
+    for (int i = 0; i < MILD_MODEL_FIELDS && info->fields[i]; i++) {
+        const MildField *field =
+            mild_field_find(mild_material_fields, mild_material_field_count, info->fields[i], NULL);
+        if (field->type == MILD_FIELD_DOUBLE && !fit_is_geometry(model, field->name) &&
+            is_sensed(model, field, 1, 1)) {
+            fields[count++] = field;
+        }
+    }
+    return count;
+}
+
+int fit_is_rate(MildModel model, const MildField *field) {
+    return !is_sensed(model, field, 0, 0);
+}
+
+/* ---- force ---- */
+
+/* The forces of neighbouring rows that share a plate. */
+static void plate_forces(const FitPlate *plate, const MildMaterial *raw, const FitPoint *points,
+                         int count, double *force) {
+    const Law law = law_of(raw, plate->pitch, plate->width);
+    const int curves = law_curves(&law);
+    for (int i = 0; i < count; i++) {
+        const double depth = fmax(points[i].depth, 0);
+        const double speed = points[i].speed;
+        const double elastic = law_elastic_force(&law, curves, depth);
+        double sum = law_force(&law, curves, depth) + elastic * (1 + law.elastic_damping * speed);
+        if (curves & LAW_CONE) {
+            sum += law.drag_rate * law_flat_share(&law, depth) * speed * speed;
+            sum += law.mass_rate * law_recruited(&law, depth) * points[i].acceleration;
+        }
+        force[i] = plate->elements * sum;
+    }
+}
+
+void fit_forces(const FitPlate *plates, const MildMaterial *material, const FitPoint *points,
+                int count, double *force) {
+    MildMaterial raw = *material;
+    raw.passive = 0;
+    raw.plate_width = 0;
+    for (int first = 0, end; first < count; first = end) {
+        for (end = first + 1; end < count && points[end].plate == points[first].plate; end++) {
+            continue;
+        }
+        plate_forces(&plates[points[first].plate], &raw, points + first, end - first,
+                     force + first);
+    }
+}

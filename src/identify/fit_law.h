@@ -1,0 +1,56 @@
+/* What a press straight down tells of a model's parameters, and the force that it meets.
+ *
+ * A level plate of n elements that goes down at the speed w into virgin ground meets
+ *     F(u, w) = n (F_g(u) + d F_e(u) w + c_d m_a'(u) w^2 + m_a(u) dw/dt)
+ * (eqs 4 and 5; F_e, d: hunt_crossley alone). Some parameters act in a combination only: of the
+ * developing cone k_pen, sigma_cone/cos(alpha), u_f = R tan(alpha)/nu and the drag's
+ * c_g c_d phi rho nu; of bekker exponent and k_c/b + k_phi. Pure functions: thread safe. */
+#ifndef LAB_FIT_LAW_H
+#define LAB_FIT_LAW_H
+
+#include "identify/fit_record.h"
+#include "mild/ground.h"
+
+enum { FIT_PARAMETERS_MAX = MILD_MODEL_FIELDS };
+
+/* A plate, in the elements of its model. */
+typedef struct {
+    int elements;
+    double pitch; /* [m] */
+    double width; /* [m] its shorter side: plate_width of bekker */
+} FitPlate;
+
+/* What the data tell where they do not tell a parameter by itself. */
+typedef struct {
+    const char *name;
+    const char *unit;
+    const char *carrier; /* the parameter that follows from it when all others are known */
+    double low, high;    /* range that those of the parameters allow */
+    int last;            /* bool: `set` needs the others to be set */
+    double (*get)(const MildMaterial *material);
+    void (*set)(MildMaterial *material, double value); /* sets the carrier */
+} FitCombination;
+
+/* The combination that a parameter carries, or NULL. */
+const FitCombination *fit_combination(const char *carrier);
+
+/* The parameters of a model that a press straight down can sense, in the order of its fields.
+ * Returns their count; 0 for rigid. */
+int fit_parameters(MildModel model, const MildField *fields[FIT_PARAMETERS_MAX]);
+/* Bool: the force depends on it only through speed or acceleration. */
+int fit_is_rate(MildModel model, const MildField *field);
+/* Bool: a number that is never fitted: bed_depth, which may be held, or bekker's plate_width, which
+ * is the plate's. */
+int fit_is_geometry(MildModel model, const char *name);
+/* Range in which a parameter is fitted or held: the material's. Ground that creates no energy has
+ * c_d >= 1/2 and c_g >= 0. */
+void fit_range(const MildField *field, double *low, double *high);
+/* The number of a material. */
+double *fit_number(MildMaterial *material, const MildField *field);
+
+/* [N] The force in every row on its plate: force[count]. plates: those that the rows name. The
+ * material's `passive` and plate_width are ignored. */
+void fit_forces(const FitPlate *plates, const MildMaterial *material, const FitPoint *points,
+                int count, double *force);
+
+#endif

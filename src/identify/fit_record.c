@@ -1,0 +1,71 @@
+#include "identify/fit_record.h"
+
+#include <float.h>
+#include <math.h>
+
+#include "identify/inverse.h"
+
+enum { LOCAL_ROWS = 200, TERMS = 5 };
+
+int fit_loading(FitPoint *points, int count) {
+    int kept = 0;
+    double deepest = DBL_MIN; /* at depth 0 the law gives no information */
+    for (int i = 0; i < count; i++) {
+        if (!(points[i].depth >= deepest)) {
+            continue;
+        }
+        deepest = points[i].depth;
+        points[kept++] = points[i];
+    }
+    return kept;
+}
+
+/* Speed and acceleration of row `i` from a least-squares polynomial through the depths around it.
+ * It is a quartic through a twentieth of the rows, because a decelerating plate needs its small
+ * bias, or a parabola when there are few rows. Both are 0 when the times are missing. At most
+ * LOCAL_ROWS rows of the window are used, so that the cost grows only with the length of the
+ * record. */
+static void local_motion(const FitPoint *points, int count, int i, double *speed,
+                         double *acceleration) {
+    int half = count / 40 > 4 ? count / 40 : 4, rows = 2 * half + 1 < count ? 2 * half + 1 : count;
+    int first = i - half > 0 ? (i + half < count ? i - half : count - rows) : 0,
+        stride = 1 + rows / LOCAL_ROWS;
+    int terms = rows >= 15 ? TERMS : 3;
+    double now = points[i].time,
+           reach = fmax(now - points[first].time, points[first + rows - 1].time - now);
+    double moment[2 * TERMS] = {0}, depth[TERMS] = {0};
+    double normal[INVERSE_MAX][INVERSE_MAX], inverse[INVERSE_MAX][INVERSE_MAX];
+    for (int k = first; k < first + rows; k += stride) {
+        double t = (points[k].time - now) / reach, power = 1;
+        for (int n = 0; n < 2 * terms - 1; n++, power *= t) {
+            moment[n] += power / rows;
+            if (n < terms) {
+                depth[n] += power * (points[k].depth - points[i].depth) / rows;
+            }
+        }
+    }
+    *speed = *acceleration = 0;
+    for (int a = 0; a < terms; a++) {
+        for (int b = 0; b < terms; b++) {
+            normal[a][b] = moment[a + b];
+        }
+    }
+    if (!(reach > 0) || !inverse_find(normal, terms, inverse)) {
+        return;
+    }
+    for (int a = 0; a < terms; a++) {
+        *speed += inverse[1][a] * depth[a] / reach;
+        *acceleration += 2 * inverse[2][a] * depth[a] / (reach * reach);
+    }
+    *speed = fmax(*speed, 0);
+}
+
+void fit_speeds(FitPoint *points, int count) {
+    for (int i = 0; i < count; i++) {
+        double speed;
+        local_motion(points, count, i, &speed, &points[i].acceleration);
+        if (!isfinite(points[i].speed)) {
+            points[i].speed = speed;
+        }
+    }
+}

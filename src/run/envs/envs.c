@@ -1,0 +1,117 @@
+#include "run/envs/envs.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "run/config/experiment_keys.h"
+#include "run/train/envs.h"
+
+struct MildEnvs {
+    ExperimentDef def;
+    Robot *robot;
+    Pool *pool;
+    TaskShape shape;
+    TrainEnvs envs;
+};
+
+static MildStatus build(MildEnvs *envs, MildError *error) {
+    ExperimentDef *def = &envs->def;
+    envs->robot = robot_open(def->train.robot, error);
+    if (!envs->robot) {
+        return error->status;
+    }
+    experiment_fit_robot(def, envs->robot);
+    robot_set_model(envs->robot, (MildModel)def->task.randomize.model);
+    envs->shape = task_shape(envs->robot);
+    envs->pool = pool_create(def->train.threads);
+    if (!envs->pool) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "cannot start %d threads", def->train.threads);
+    }
+    return train_envs_open(&envs->envs, def, envs->robot, envs->pool, def->train.envs, 0, error);
+}
+
+/* Networks on a device would not see robots on the CPU. */
+static MildStatus check_place(const ExperimentDef *def, MildError *error) {
+    return train_device(&def->train) < 0 || train_is_batch(&def->train)
+               ? MILD_OK
+               : mild_fail(error, MILD_ERROR_ARGUMENT,
+                           "train.device = %s with train.robots = mujoco: MuJoCo's robots are on "
+                           "the CPU; write train.device = cpu",
+                           def->train.device);
+}
+
+MildEnvs *mild_envs_open(const char *config, const char *const *overrides, int count,
+                         MildError *error) {
+    MildError local = {0};
+    MildError *cause = error ? error : &local;
+    MildEnvs *envs = calloc(1, sizeof *envs);
+    if (!envs) {
+        mild_fail(cause, MILD_ERROR_MEMORY, "environments: out of memory");
+        return NULL;
+    }
+    envs->def = experiment_def_default();
+    MildStatus status = experiment_read(&envs->def, config, overrides, count, cause);
+    status = status == MILD_OK ? check_place(&envs->def, cause) : status;
+    status = status == MILD_OK ? build(envs, cause) : status;
+    if (status != MILD_OK) {
+        mild_envs_close(envs);
+        return NULL;
+    }
+    return envs;
+}
+
+void mild_envs_close(MildEnvs *envs) {
+    if (envs) {
+        train_envs_close(&envs->envs);
+        pool_destroy(envs->pool);
+        robot_destroy(envs->robot);
+        free(envs);
+    }
+}
+
+MildEnvsShape mild_envs_shape(const MildEnvs *envs) {
+    const TaskShape *shape = &envs->shape;
+    return (MildEnvsShape){.envs = envs->def.train.envs,
+                           .actions = shape->actions,
+                           .observation = shape->observation,
+                           .frames = TASK_FRAMES,
+                           .critic = shape->critic,
+                           .estimates = shape->estimates,
+                           .rewards = TASK_REWARD_COUNT,
+                           .device = train_device(&envs->def.train),
+                           .period = TASK_PERIOD,
+                           .episode = envs->def.task.episode,
+                           .clip = envs->def.task.action_clip};
+}
+
+const char *mild_envs_reward_name(int index) {
+    return task_reward_names[index];
+}
+
+void mild_envs_mirror(const MildEnvs *envs, int *observation_index, float *observation_sign,
+                      int *action_index, float *action_sign) {
+    const TaskMirror mirror = task_mirror(envs->robot);
+    const size_t observation = (size_t)envs->shape.observation,
+                 actions = (size_t)envs->shape.actions;
+    memcpy(observation_index, mirror.observation_index, observation * sizeof *observation_index);
+    memcpy(observation_sign, mirror.observation_sign, observation * sizeof *observation_sign);
+    memcpy(action_index, mirror.action_index, actions * sizeof *action_index);
+    memcpy(action_sign, mirror.action_sign, actions * sizeof *action_sign);
+}
+
+MildStatus mild_envs_reset(MildEnvs *envs, const EnvsView *first, void *stream, MildError *error) {
+    return envs_reset(envs->envs.envs, first, stream, error);
+}
+
+MildStatus mild_envs_step(MildEnvs *envs, const EnvsStep *step, void *stream, MildError *error) {
+    return envs_step(envs->envs.envs, step, stream, error);
+}
+
+MildStatus mild_envs_stats(MildEnvs *envs, EnvsStats *stats, void *stream, MildError *error) {
+    EnvsStats sums;
+    MildStatus status = envs_sums(envs->envs.envs, &sums, stream, error);
+    if (status == MILD_OK) {
+        *stats = envs_means(sums, envs->def.train.envs);
+    }
+    return status;
+}

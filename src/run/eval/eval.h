@@ -1,0 +1,117 @@
+/* Trials and measures (docs/task.md section 12): one definition, used everywhere. */
+#ifndef MILD_EVAL_H
+#define MILD_EVAL_H
+
+#define EVAL_GRAVITY 9.81 /* [m/s^2] of a robot's weight */
+
+#include <stdio.h>
+
+#include "base/pool.h"
+#include "control/controller.h"
+#include "run/eval/measure.h"
+#include "run/eval/scene.h"
+
+/* Called after each decision of the controller for a trial that is not over, `trial` by `trial`, at
+ * `time` [s]. */
+typedef struct {
+    void (*decided)(void *context, const Scene *scene, double speed, int trial, double time,
+                    const TaskEnv *env);
+    void *context;
+} EvalWatch;
+
+typedef struct {
+    double speed;    /* [m/s] commanded, forward */
+    double sideways; /* [m/s] commanded, to the left */
+    double turn;     /* [rad/s] commanded; 0: the heading is held */
+    double push;     /* [m/s] added to the base in a random direction, every 4 s; by MuJoCo */
+    int trials;
+    double seconds; /* [s] per trial */
+    double stop;    /* [s] when the command becomes 0 and speed measurement ends; 0: never */
+    uint64_t seed;  /* trial k uses stream k */
+    const EvalWatch *watch; /* NULL: nobody; by MuJoCo */
+    FILE *stances;          /* a row of CSV for each stance of each trial; NULL: none */
+    FILE *actions;          /* one for each decision, see eval/actions.h; NULL: none; by MuJoCo */
+    FILE *track;            /* one for each policy step of each trial (track.h), by MuJoCo */
+} EvalDef;
+
+/* Means over the trials, SI units. NaN: nothing was measured, as the speed of trials that fell at
+ * once, the sinkage without a stance, or a deviation of one trial. */
+typedef struct {
+    char ground[160];
+    double speed;         /* [m/s] commanded, forward */
+    int trials;           /* number of trials */
+    int success;          /* trials without termination */
+    int measured;         /* trials that velocity and cot are means of; 0: all were too short */
+    double velocity;      /* [m/s] forward, after the first 2 s, of trials that lasted longer: along
+                        world x, or along the robot's heading when it is told to turn */
+    double velocity_low;  /* [m/s] 95 % interval of the mean over trials: lower end */
+    double velocity_high; /* [m/s] upper end */
+    double sideways;      /* [m/s] commanded, to the left */
+    double velocity_sideways;  /* [m/s] measured, to the left */
+    double turn;               /* [rad/s] commanded */
+    double velocity_turn;      /* [rad/s] measured */
+    double push;               /* [m/s] */
+    double cot;                /* [-] sum |tau qd| / (m g v); NaN when told to stand */
+    double torque_max;         /* [N m] largest over joints and time, mean over trials */
+    double velocity_deviation; /* [m/s] standard deviation over the trials of velocity */
+    double cot_deviation;      /* [-] of cot */
+    double torque_deviation;   /* [N m] of torque_max */
+    double clearance;          /* [m] swing apex of the lowest sole point above h0 */
+    double penetration;        /* [m] deepest element of each stance */
+    double drift;            /* [m] horizontal travel of the sole between touchdown and lift-off */
+    double drift_forward;    /* [m] magnitude of its part along the robot's heading */
+    double drift_left;       /* [m] and across it */
+    double energy;           /* [J] integral |tau . qd| dt */
+    double base_oscillation; /* [m] peak to peak of the base height over the steady part */
+    double seconds;          /* [s] mean time until a fall or the end */
+} EvalRow;
+
+/* Runs the trials of one row. `def` gives control, gait and sensors. Its randomisation should be
+ * nominal (task_def_make_nominal). Trials run in parallel over the pool. The results depend only on
+ * (def, scene, seed). */
+MildStatus eval_run(const TaskDef *def, const Robot *robot, Pool *pool, Controller *controller,
+                    const Scene *scene, const EvalDef *eval, EvalRow *row, MildError *error);
+
+/* The same for all rows at once, by the batch engine. */
+typedef struct {
+    const TaskDef *task;
+    const Robot *robot;
+    Pool *pool;
+    Controller *controller; /* one that acts on histories alone */
+    int device;             /* a CUDA device, or MILD_BATCH_HOST */
+    const Scene *scenes;    /* [scene_count] of one material each, on the map of `task` */
+    int scene_count;
+    const double *speeds; /* [m/s] [speed_count] of each scene, in the place of eval.speed */
+    int speed_count;
+    EvalDef eval;
+} EvalBatch;
+
+/* Robots of a batch, at most. */
+#define EVAL_ROBOTS_MAX 65536
+/* rows: [scene_count][speed_count]. The same measures; the same random numbers, but for the
+ * latencies. Fails for what the batch engine has not, and for more robots. */
+MildStatus eval_run_batch(const EvalBatch *def, EvalRow *rows, MildError *error);
+
+/* Finishes the measures of the trials, summarises them in a row, and prints the stances that they
+ * kept. measures, fallen (bool):
+ * [eval->trials]. weight: [N] of the robot. */
+MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
+                          const uint8_t *fallen, double weight, MildError *error);
+
+/* [m/s, m/s, rad/s] The command at a time of a trial [s] for a robot with the orientation
+ * `quaternion` (w x y z): that of eval_command, with `turn` where it is not 0, and none from the
+ * stop on. */
+void eval_direct(const EvalDef *eval, double time, const double quaternion[4], double command[3]);
+/* Heading hold of eval and play: sets a command that turns the robot back to world x. speed,
+ * sideways [m/s]: forward and to the left. If both are 0 the robot stands, without heading hold.
+ * Writes env->command and freezes it. */
+void eval_command(TaskEnv *env, double speed, double sideways);
+
+/* The names of the columns of EvalDef.stances, SI units. */
+void eval_print_stances_header(FILE *csv);
+
+/* Text table. */
+void eval_print_header(char *text, int size);
+void eval_print_row(const EvalRow *row, char *text, int size);
+
+#endif

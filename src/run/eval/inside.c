@@ -1,0 +1,78 @@
+#include "run/eval/inside.h"
+
+void inside_print_header(const InsideLog *log) {
+    static const char axes[] = "xyz";
+    const LearnedInside *in = log->inside;
+    fprintf(log->csv, "trial,ground,speed_m_s,time_s,phase");
+    for (int j = 0; j < in->latent; j++) {
+        fprintf(log->csv, ",z%d", j);
+    }
+    for (int j = 0; j < in->latent; j++) {
+        fprintf(log->csv, ",modulated%d", j);
+    }
+    for (int n = 1; n <= 2; n++) {
+        for (int j = 0; j < in->theta / 2; j++) {
+            fprintf(log->csv, in->theta == 2 ? ",theta%d" : ",theta%d_%d", n, j);
+        }
+    }
+    for (int i = 0; i < 3; i++) {
+        fprintf(log->csv, ",velocity_%c_m_s", axes[i]);
+    }
+    for (int f = 0; f < log->feet; f++) {
+        for (int i = 0; i < 3; i++) {
+            fprintf(log->csv, ",foot%d_velocity_%c_m_s", f, axes[i]);
+        }
+    }
+    for (int f = 0; f < log->feet; f++) {
+        fprintf(log->csv, ",foot%d_height_m", f);
+    }
+    fprintf(log->csv, "\n");
+}
+
+static void print_numbers(FILE *csv, const float *numbers, int count, double scale) {
+    for (int i = 0; i < count; i++) {
+        fprintf(csv, ",%.6g", (double)numbers[i] / scale);
+    }
+}
+
+static void print_row(const InsideLog *log, const Scene *scene, double speed, int trial,
+                      double time, const TaskEnv *env) {
+    const LearnedInside *in = log->inside;
+    const PolicyInside *rows = &in->rows;
+    const float *estimates = rows->estimates + (size_t)trial * (size_t)in->estimates;
+    const double *at = env->robot.qpos;
+    char ground[sizeof scene->name];
+    scene_ground_at(scene, at[0], at[1], ground, sizeof ground);
+    fprintf(log->csv, "%d,%s,%g,%.2f,%.6g", trial, ground, speed, time, env->phase);
+    print_numbers(log->csv, rows->latent + (size_t)trial * (size_t)in->latent, in->latent, 1);
+    print_numbers(log->csv, rows->modulated + (size_t)trial * (size_t)in->latent, in->latent, 1);
+    print_numbers(log->csv, rows->theta + (size_t)trial * (size_t)in->theta, in->theta, 1);
+    print_numbers(log->csv, estimates, 3, log->task->velocity_scale);
+    print_numbers(log->csv, estimates + 3, 3 * log->feet, 1);
+    print_numbers(log->csv, estimates + 3 + 3 * log->feet, log->feet, log->task->height_scale);
+    fprintf(log->csv, "\n");
+}
+
+void inside_decided(void *context, const Scene *scene, double speed, int trial, double time,
+                    const TaskEnv *env) {
+    InsideLog *log = context;
+    const LearnedInside *in = log->inside;
+    const float *latent = in->rows.latent + (size_t)trial * (size_t)in->latent;
+    const float *estimates = in->rows.estimates + (size_t)trial * (size_t)in->estimates;
+    log->decisions++;
+    for (int j = 0; log->sum && j < in->latent; j++) {
+        log->sum[j] += (double)latent[j];
+    }
+    for (int i = 0; log->sum && i < in->estimates; i++) {
+        log->sum[in->latent + i] += (double)estimates[i];
+    }
+    if (log->csv) {
+        print_row(log, scene, speed, trial, time, env);
+    }
+}
+
+void inside_means(const InsideLog *log, float *means) {
+    for (int i = 0; i < log->inside->latent + log->inside->estimates; i++) {
+        means[i] = (float)(log->sum[i] / (double)log->decisions);
+    }
+}

@@ -1,0 +1,27 @@
+/* What a learned controller computes inside during the trials: as a CSV, and as means. */
+#ifndef MILD_INSIDE_H
+#define MILD_INSIDE_H
+
+#include <stdio.h>
+
+#include "control/learned.h"
+#include "run/eval/eval.h"
+
+typedef struct {
+    const LearnedInside *inside;
+    const TaskDef *task; /* of the policy: the scales of its estimates */
+    int feet;
+    FILE *csv;   /* a row per decision; NULL: none */
+    double *sum; /* [latent] of z, then [estimates], over the decisions; NULL: none */
+    long decisions;
+} InsideLog;
+
+/* An EvalWatch.decided; context: an InsideLog. */
+void inside_decided(void *context, const Scene *scene, double speed, int trial, double time,
+                    const TaskEnv *env);
+/* The names of the columns. SI units, but for the phase and for what the networks alone know. */
+void inside_print_header(const InsideLog *log);
+/* [latent + estimates] */
+void inside_means(const InsideLog *log, float *means);
+
+#endif

@@ -1,0 +1,166 @@
+#include "run/eval/measure.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CONTACT_FORCE 5.0  /* [N] */
+#define SWING_HEIGHT 0.005 /* [m] a lower lift does not count as a swing */
+#define TWO_PI 6.283185307179586
+#define CHATTER_TIME 0.03 /* [s] a shorter loss of contact does not end a stance */
+
+double measure_yaw(const double q[4]) {
+    return atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
+}
+
+void measure_start(Measure *measure, double dt) {
+    memset(measure, 0, sizeof *measure);
+    measure->dt = dt;
+    measure->base_low = 1e9;
+    measure->base_high = -1e9;
+}
+
+static void start_stance(Measure *m, int f, const double *at) {
+    m->swing[f] = 0;
+    if (m->apex[f] > SWING_HEIGHT) {
+        m->apex_sum += m->swing[f] = m->apex[f];
+        m->swings++;
+    }
+    m->in_stance[f] = 1;
+    m->began[f] = m->time - m->dt;
+    m->touchdown[f][0] = at[0];
+    m->touchdown[f][1] = at[1];
+    m->deepest[f] = 0;
+}
+
+static void keep_stance(Measure *m, const MeasureStance *stance) {
+    if (m->stances == m->room) {
+        MeasureStance *more = m->stances == 0 || m->kept
+                                  ? realloc(m->kept, (size_t)(2 * m->room + 16) * sizeof *more)
+                                  : NULL;
+        if (!more) {
+            free(m->kept);
+        }
+        m->kept = more;
+        m->room = 2 * m->room + 16;
+    }
+    if (m->kept) {
+        m->kept[m->stances] = *stance;
+    }
+}
+
+static void end_stance(Measure *m, int f) {
+    const double x = m->last[f][0] - m->touchdown[f][0], y = m->last[f][1] - m->touchdown[f][1];
+    const double c = cos(m->yaw), s = sin(m->yaw);
+    const MeasureStance stance = {.foot = f,
+                                  .start = m->began[f],
+                                  .duration = m->lasted[f],
+                                  .depth = m->deepest[f],
+                                  .way = {c * x + s * y, c * y - s * x},
+                                  .apex = m->swing[f]};
+    m->in_stance[f] = 0;
+    m->deepest_sum += stance.depth;
+    m->drift_sum += hypot(x, y);
+    m->way_sum[0] += fabs(stance.way[0]);
+    m->way_sum[1] += fabs(stance.way[1]);
+    if (m->keep) {
+        keep_stance(m, &stance);
+    }
+    m->stances++;
+}
+
+static void measure_foot(Measure *m, int f, const MeasureFoot *foot) {
+    if (foot->load > CONTACT_FORCE) {
+        if (!m->in_stance[f]) {
+            start_stance(m, f, foot->center);
+        }
+        m->air_time[f] = m->apex[f] = 0;
+        m->last[f][0] = foot->center[0];
+        m->last[f][1] = foot->center[1];
+        m->lasted[f] = m->time - m->began[f];
+        m->deepest[f] = fmax(m->deepest[f], foot->depth);
+        return;
+    }
+    m->air_time[f] += m->dt;
+    m->apex[f] = fmax(m->apex[f], foot->height);
+    if (m->in_stance[f] && m->air_time[f] > CHATTER_TIME) {
+        end_stance(m, f);
+    }
+}
+
+/* The steady part starts at the position of the base before its first step, so that distance and
+ * time match. */
+static void measure_steady(Measure *m, const MeasureSample *sample, double power_abs) {
+    if (m->steady_time == 0) {
+        memcpy(m->start, m->base, sizeof m->start);
+    }
+    memcpy(m->end, sample->base, sizeof m->end);
+    double x = sample->base[0] - m->base[0], y = sample->base[1] - m->base[1];
+    double c = cos(m->yaw), s = sin(m->yaw);
+    m->way[0] += c * x + s * y;
+    m->way[1] += c * y - s * x;
+    m->turned += remainder(sample->yaw - m->yaw, TWO_PI);
+    m->steady_time += m->dt;
+    m->work += power_abs * m->dt;
+    m->base_low = fmin(m->base_low, sample->base_height);
+    m->base_high = fmax(m->base_high, sample->base_height);
+}
+
+void measure_sample(Measure *m, const MeasureSample *sample) {
+    double power = 0, power_abs = 0;
+    for (int i = 0; i < sample->joints; i++) {
+        double joint_power = sample->torque[i] * sample->joint_speed[i];
+        power += joint_power;
+        power_abs += fabs(joint_power);
+        m->torque_max = fmax(m->torque_max, fabs(sample->torque[i]));
+    }
+    m->energy += fabs(power) * m->dt;
+    if (m->time >= MEASURE_STEADY && (m->steady_end == 0 || m->time < m->steady_end)) {
+        measure_steady(m, sample, power_abs);
+    }
+    m->time += m->dt;
+    memcpy(m->base, sample->base, sizeof m->base);
+    m->yaw = sample->yaw;
+    for (int f = 0; f < sample->feet; f++) {
+        measure_foot(m, f, &sample->foot[f]);
+    }
+}
+
+void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque) {
+    const double *qpos = robot_sim_qpos(sim);
+    MeasureSample sample = {
+        .torque = torque,
+        .joint_speed = robot_sim_qvel(sim) + 6,
+        .joints = env->shape.joints,
+        .feet = env->shape.feet,
+        .base = {qpos[0], qpos[1]},
+        .yaw = measure_yaw(qpos + 3),
+        .base_height = qpos[2] - mild_terrain_height_at(&env->terrain, qpos[0], qpos[1]),
+    };
+    for (int f = 0; f < sample.feet; f++) {
+        const RobotFoot *foot = robot_sim_foot(sim, f);
+        sample.foot[f] = (MeasureFoot){
+            .load = foot->force[2],
+            .center = {foot->sole_center[0], foot->sole_center[1]},
+            .height = foot->sole_height,
+            .depth = env->variation.rigid ? 0 : foot->result.depth_max,
+        };
+    }
+    measure_sample(measure, &sample);
+}
+
+void measure_finish(Measure *m) {
+    int lifted = m->stances > 0;
+    for (int f = 0; f < ROBOT_FEET_MAX && !lifted; f++) {
+        if (m->in_stance[f]) {
+            end_stance(m, f);
+        }
+    }
+}
+
+void measure_free(Measure *measures, int count) {
+    for (int i = 0; measures && i < count; i++) {
+        free(measures[i].kept);
+    }
+    free(measures);
+}

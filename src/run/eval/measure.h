@@ -1,0 +1,89 @@
+/* Measures of one trial, updated at every physics step. */
+#ifndef MILD_MEASURE_H
+#define MILD_MEASURE_H
+
+#include "env/task/task.h"
+
+#define MEASURE_STEADY 2.0 /* [s] start of the steady part */
+
+/* What the measures read of a foot. */
+typedef struct {
+    double load;      /* [N] vertical force of the ground on the foot */
+    double center[2]; /* [m] centre of the sole, world */
+    double height;    /* [m] lowest sole point above the undisturbed ground */
+    double depth;     /* [m] deepest element; 0 on rigid ground */
+} MeasureFoot;
+
+/* One physics step in plain numbers. */
+typedef struct {
+    const double *torque;      /* [N m] [joints] */
+    const double *joint_speed; /* [rad/s] [joints] */
+    int joints;
+    double base[2];     /* [m] world x (along the walk) and y */
+    double base_height; /* [m] above the undisturbed ground */
+    double yaw;         /* [rad] of the base */
+    int feet;
+    MeasureFoot foot[ROBOT_FEET_MAX]; /* [feet] */
+} MeasureSample;
+
+/* A finished stance. */
+typedef struct {
+    int foot;
+    double start, duration; /* [s] first contact; until the last one */
+    double depth;           /* [m] deepest element */
+    double way[2]; /* [m] of the sole's centre, along the robot's heading and to the left */
+    double apex;   /* [m] of the swing before it; 0: none */
+} MeasureStance;
+
+/* A stance begins when the ground carries the foot and ends with the last contact before a pause of
+ * CHATTER_TIME. */
+typedef struct {
+    double dt;         /* [s] physics step */
+    double time;       /* [s] since the start */
+    double energy;     /* [J] integral |sum tau qd| dt */
+    double torque_max; /* [N m] */
+    double base[2];    /* [m] after the latest step */
+    double yaw;        /* [rad] after the latest step */
+
+    /* steady part */
+    double steady_end;          /* [s] where it ends; 0: with the trial */
+    double steady_time;         /* [s] */
+    double start[2];            /* [m] base at the start of the steady part */
+    double end[2];              /* [m] base at its end */
+    double way[2];              /* [m] sum of the base's steps, forward and to the left */
+    double turned;              /* [rad] */
+    double work;                /* [J] integral sum |tau qd| dt */
+    double base_low, base_high; /* [m] */
+
+    /* the running stance or swing of each foot */
+    int in_stance[ROBOT_FEET_MAX];       /* bool */
+    double touchdown[ROBOT_FEET_MAX][2]; /* [m] sole centre at the first contact */
+    double last[ROBOT_FEET_MAX][2];      /* [m] sole centre at the latest contact */
+    double air_time[ROBOT_FEET_MAX];     /* [s] since the latest contact */
+    double apex[ROBOT_FEET_MAX];         /* [m] highest of the foot since then */
+    double deepest[ROBOT_FEET_MAX];      /* [m] */
+    double began[ROBOT_FEET_MAX];        /* [s] */
+    double lasted[ROBOT_FEET_MAX];       /* [s] */
+    double swing[ROBOT_FEET_MAX];        /* [m] apex of the swing before */
+
+    /* finished ones */
+    int swings, stances;
+    double apex_sum, deepest_sum, drift_sum; /* [m] */
+    double way_sum[2];                       /* [m] of the magnitudes of MeasureStance.way */
+    int keep;            /* bool: each of them is kept; the owner frees `kept` */
+    MeasureStance *kept; /* [stances]; NULL if memory ran out */
+    int room;            /* of kept */
+} Measure;
+
+/* [rad] Heading of a base with this orientation (w x y z). */
+double measure_yaw(const double quaternion[4]);
+void measure_start(Measure *measure, double dt);
+void measure_sample(Measure *measure, const MeasureSample *sample);
+/* The same from a robot: a TaskProbe. */
+void measure_step(void *measure, const TaskEnv *env, const RobotSim *sim, const double *torque);
+/* Ends the trial. If no foot was ever lifted, the open stances count, so that sinkage and drift are
+ * still measured. */
+void measure_finish(Measure *measure);
+void measure_free(Measure *measures, int count); /* measures: from calloc; may be NULL */
+
+#endif

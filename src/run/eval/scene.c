@@ -1,0 +1,99 @@
+#include "run/eval/scene.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define SCENE_FAR 1e4 /* [m] */
+
+/* `rigid` inside a course, because the engine's own floor is under both feet or under none: rubber
+ * 70 times as hard, into which the edge of a sole sinks 5 mm, with the friction of rigid ground. */
+static MildMaterial hard_ground(void) {
+    MildMaterial hard = mild_material_default();
+    mild_material_preset("rubber", &hard);
+    hard.k_pen = 1e5;
+    hard.k_drift = 1e4;
+    hard.mu = 0.8;
+    return hard;
+}
+
+static MildStatus find_preset(const char *name, MildMaterial *material, MildError *error) {
+    if (mild_material_preset(name, material)) {
+        return MILD_OK;
+    }
+    if (strcmp(name, "rigid") == 0) {
+        *material = hard_ground();
+        return MILD_OK;
+    }
+    char known[256] = "rigid";
+    for (int i = 0; i < mild_material_preset_count(); i++) {
+        size_t used = strlen(known);
+        snprintf(known + used, sizeof known - used, ", %s", mild_material_preset_name(i));
+    }
+    for (int m = 0; m < MILD_MODELS; m++) {
+        const MildModelInfo *info = mild_model_info((MildModel)m);
+        for (int k = 0; k < MILD_MODEL_PRESETS && info->presets[k]; k++) {
+            size_t used = strlen(known);
+            snprintf(known + used, sizeof known - used, ", %s", info->presets[k]);
+        }
+    }
+    return mild_fail(error, MILD_ERROR_ARGUMENT, "unknown ground '%s'; known: %s", name, known);
+}
+
+MildStatus scene_make(Scene *scene, const char *name, double patch_length, MildError *error) {
+    memset(scene, 0, sizeof *scene);
+    if (strlen(name) >= sizeof scene->name) {
+        return mild_fail(error, MILD_ERROR_ARGUMENT, "ground name is too long: %.40s...", name);
+    }
+    strcpy(scene->name, name);
+    if (strcmp(name, "rigid") == 0) {
+        MildMaterial any = mild_material_default();
+        scene->terrain = mild_terrain_uniform(&any);
+        scene->rigid = 1;
+        return MILD_OK;
+    }
+    char parts[sizeof scene->name];
+    strcpy(parts, name);
+    const int back = patch_length < 0;
+    double start = -SCENE_FAR, end = fabs(patch_length);
+    int count = 0;
+    for (char *part = parts, *next; part; part = next, count++) {
+        next = strchr(part, '+');
+        if (next) {
+            *next++ = 0;
+        }
+        MildMaterial material;
+        MildStatus status = find_preset(part, &material, error);
+        if (status != MILD_OK) {
+            return status;
+        }
+        if (count == 0) {
+            scene->terrain = mild_terrain_uniform(&material);
+        } else if (count >= MILD_MATERIALS_MAX) {
+            return mild_fail(error, MILD_ERROR_ARGUMENT, "a course has at most %d grounds: %s",
+                             MILD_MATERIALS_MAX, name);
+        } else {
+            scene->terrain.materials[scene->terrain.material_count++] = material;
+        }
+        const double far = next ? end : SCENE_FAR;
+        MildPatch patch = {back ? -far : start, back ? -start : far, -SCENE_FAR, SCENE_FAR, count};
+        status = count > 0 ? mild_terrain_add_patch(&scene->terrain, &patch, error) : MILD_OK;
+        if (status != MILD_OK) {
+            return status;
+        }
+        start = end;
+        end += fabs(patch_length);
+    }
+    return MILD_OK;
+}
+
+const char *scene_ground_at(const Scene *scene, double x, double y, char *text, int size) {
+    int index = mild_terrain_material_at(&scene->terrain, x, y);
+    const char *part = scene->name;
+    for (int i = 0; i < index && part; i++) {
+        part = strchr(part, '+');
+        part = part ? part + 1 : NULL;
+    }
+    snprintf(text, (size_t)size, "%.*s", part ? (int)strcspn(part, "+") : 0, part ? part : "");
+    return text;
+}

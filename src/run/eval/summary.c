@@ -1,0 +1,160 @@
+/* Turns the measures of the trials into a row of the table. */
+#include <math.h>
+#include <stdio.h>
+
+#include "base/student.h"
+#include "base/text.h"
+#include "run/eval/eval.h"
+
+#define STEADY_LEAST 0.5    /* [s] a shorter steady part is too short to measure speed */
+#define DISTANCE_LEAST 1e-3 /* [m] keeps the cost of transport of a standing robot finite */
+
+/* Standard deviation of `count` numbers with this mean and this mean of their squares; NaN for one.
+ */
+static double deviation(double mean, double square, int count) {
+    return count > 1 ? sqrt(fmax(square - mean * mean, 0) * count / (count - 1)) : NAN;
+}
+
+/* A mean; NaN where nothing was measured. */
+static double mean(double sum, int count) {
+    return count ? sum / count : NAN;
+}
+
+/* Speed, cost of transport and base motion over the steady part of the trials without a fall,
+ * because a robot that dives forward and falls is not fast. If all trials fell, of all trials. */
+static void summarise_motion(EvalRow *row, const Measure *measures, const uint8_t *fallen,
+                             double weight) {
+    double v_sum = 0, v_square = 0, cot_sum = 0, cot_square = 0, left_sum = 0, turn_sum = 0;
+    double oscillation = 0;
+    int steady = 0;
+    for (int i = 0; i < row->trials; i++) {
+        const Measure *m = &measures[i];
+        if (m->steady_time <= STEADY_LEAST || (row->success && fallen[i])) {
+            continue;
+        }
+        const int turns = row->turn != 0; /* world x is then nobody's direction */
+        double distance = turns ? m->way[0] : m->end[0] - m->start[0];
+        double left = turns ? m->way[1] : m->end[1] - m->start[1];
+        double v = distance / m->steady_time;
+        double way = row->sideways != 0 ? hypot(distance, left) : fabs(distance);
+        v_sum += v;
+        v_square += v * v;
+        left_sum += left / m->steady_time;
+        turn_sum += m->turned / m->steady_time;
+        const double cot = m->work / (weight * fmax(way, DISTANCE_LEAST));
+        cot_sum += cot;
+        cot_square += cot * cot;
+        oscillation += m->base_high - m->base_low;
+        steady++;
+    }
+    const int walks = row->speed != 0 || row->sideways != 0; /* standing has no cost of transport */
+    row->measured = steady;
+    row->velocity = mean(v_sum, steady);
+    row->velocity_deviation = deviation(row->velocity, mean(v_square, steady), steady);
+    double half =
+        steady > 1 ? student_95(steady - 1) * row->velocity_deviation / sqrt(steady) : NAN;
+    row->velocity_low = row->velocity - half;
+    row->velocity_high = row->velocity + half;
+    row->velocity_sideways = mean(left_sum, steady);
+    row->velocity_turn = mean(turn_sum, steady);
+    row->cot = walks ? mean(cot_sum, steady) : NAN;
+    row->cot_deviation = deviation(row->cot, mean(cot_square, steady), steady);
+    row->base_oscillation = mean(oscillation, steady);
+}
+
+void eval_print_stances_header(FILE *csv) {
+    fprintf(csv,
+            "ground,speed_m_s,trial,foot,start_s,duration_s,depth_m,forward_m,left_m,apex_m\n");
+}
+
+static MildStatus print_stances(const EvalRow *row, int trial, const Measure *m, FILE *csv,
+                                MildError *error) {
+    if (m->stances && !m->kept) {
+        return mild_fail(error, MILD_ERROR_MEMORY, "out of memory for %d stances", m->stances);
+    }
+    for (int i = 0; i < m->stances; i++) {
+        const MeasureStance *s = &m->kept[i];
+        fprintf(csv, "%s,%g,%d,%d,%.4f,%.4f,%.6f,%.6f,%.6f,%.6f\n", row->ground, row->speed, trial,
+                s->foot, s->start, s->duration, s->depth, s->way[0], s->way[1], s->apex);
+    }
+    return MILD_OK;
+}
+
+MildStatus eval_summarise(EvalRow *row, const char *ground, const EvalDef *eval, Measure *measures,
+                          const uint8_t *fallen, double weight, MildError *error) {
+    const int trials = eval->trials;
+    MildStatus status = MILD_OK;
+    int swings = 0, stances = 0;
+    double apex = 0, deepest = 0, drift = 0, way[2] = {0, 0}, torque_square = 0;
+    *row = (EvalRow){.speed = eval->speed,
+                     .sideways = eval->sideways,
+                     .turn = eval->turn,
+                     .push = eval->push,
+                     .trials = trials};
+    snprintf(row->ground, sizeof row->ground, "%s", ground);
+    for (int i = 0; i < trials; i++) {
+        Measure *m = &measures[i];
+        measure_finish(m);
+        row->success += !fallen[i];
+        row->energy += m->energy / trials;
+        row->seconds += m->time / trials;
+        row->torque_max += m->torque_max / trials;
+        torque_square += m->torque_max * m->torque_max / trials;
+        apex += m->apex_sum;
+        swings += m->swings;
+        deepest += m->deepest_sum;
+        drift += m->drift_sum;
+        way[0] += m->way_sum[0];
+        way[1] += m->way_sum[1];
+        stances += m->stances;
+        if (eval->stances && status == MILD_OK) {
+            status = print_stances(row, i, m, eval->stances, error);
+        }
+    }
+    row->torque_deviation = deviation(row->torque_max, torque_square, trials);
+    summarise_motion(row, measures, fallen, weight);
+    row->clearance = mean(apex, swings);
+    row->penetration = mean(deepest, stances);
+    row->drift = mean(drift, stances);
+    row->drift_forward = mean(way[0], stances);
+    row->drift_left = mean(way[1], stances);
+    return status;
+}
+
+void eval_print_header(char *text, int size) {
+    snprintf(text, (size_t)size, "%-26s %5s %7s %14s %5s %7s %7s %7s %7s %7s", "ground", "m/s",
+             "upright", "measured m/s", "COT", "Nm max", "clear", "sink", "drift", "J/s");
+}
+
+/* The measured speed, and its interval if there are two trials at least. */
+static void print_speed(const EvalRow *row, char *text, size_t size) {
+    const double half = 0.5 * (row->velocity_high - row->velocity_low);
+    if (row->measured > 1) {
+        snprintf(text, size, "%6.3f +- %5.3f", row->velocity, half);
+    } else if (row->measured == 1) {
+        snprintf(text, size, "%6.3f +-     -", row->velocity);
+    } else {
+        snprintf(text, size, "     - +-     -");
+    }
+}
+
+void eval_print_row(const EvalRow *row, char *text, int size) {
+    char velocity[32], sideways[64] = "", turning[64] = "";
+    char cot[TEXT_CELL], clearance[TEXT_CELL], sink[TEXT_CELL], drift[TEXT_CELL], part[TEXT_CELL];
+    print_speed(row, velocity, sizeof velocity);
+    if (row->sideways != 0) {
+        snprintf(sideways, sizeof sideways, "  sideways %s of %.2f m/s",
+                 text_cell("%.3f", row->velocity_sideways, part), row->sideways);
+    }
+    if (row->turn != 0) {
+        snprintf(turning, sizeof turning, "  turning %s of %.2f rad/s",
+                 text_cell("%.3f", row->velocity_turn, part), row->turn);
+    }
+    snprintf(text, (size_t)size, "%-26s %5.2f %4d/%-2d %s %5s %7.1f %4s mm %4s mm %4s mm %7.0f%s%s",
+             row->ground, row->speed, row->success, row->trials, velocity,
+             text_cell("%.2f", row->cot, cot), row->torque_max,
+             text_cell("%.0f", 1e3 * row->clearance, clearance),
+             text_cell("%.1f", 1e3 * row->penetration, sink),
+             text_cell("%.1f", 1e3 * row->drift, drift), row->energy / row->seconds, sideways,
+             turning);
+}

@@ -1,0 +1,64 @@
+/* Memory of a robot: what SA01 takes of a device under the default task, by the text that is
+ * compiled for it (sa01.c), and not more than it may. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+#include "env/backend.h"
+#include "mild/batch.h"
+#include "sa01.h"
+
+enum { ENVS = 2048, GROUNDS = 2 };
+
+static size_t measure(const MildMapDef *on) {
+    MildError error = {0};
+    TaskDef def = task_def_default();
+    MildMap *map = on ? mild_map_create(on, &error) : NULL;
+    def.map = map;
+    def.physics_dt = 0.005;
+    def.randomize.patch_share = 0;
+    Robot *robot = robot_create(SA01, &error);
+    Pool *pool = pool_create(2);
+    const EnvsDef of = {.task = &def,
+                        .robot = robot,
+                        .pool = pool,
+                        .batch = 1,
+                        .device = MILD_BATCH_HOST,
+                        .count = ENVS,
+                        .grounds = GROUNDS,
+                        .seed = 7};
+    Envs *envs = envs_create(&of, &error);
+    if (!envs) {
+        fail_msg("%s", error.text);
+    }
+    const EnvsMemory memory = envs_memory(envs);
+    const size_t bytes = envs_robot_bytes(envs);
+    printf("%s: %zu B: task %zu, engine %zu, ground %zu, rest %zu\n", on ? "map" : "level", bytes,
+           memory.task, memory.engine, memory.ground, memory.rest);
+    envs_destroy(envs);
+    pool_destroy(pool);
+    robot_destroy(robot);
+    mild_map_destroy(map);
+    return bytes;
+}
+
+/* With a share of 16 B of what all these robots have in common. */
+static void sizes(void **unused) {
+    (void)unused;
+    MildMapDef waves = mild_map_def_default();
+    waves.kind = MILD_MAP_WAVES;
+    const size_t level = measure(NULL), map = measure(&waves);
+    assert_true(level <= 13260 && map <= 15950);
+    assert_int_equal(map - level, (4 * 160 + 32) * sizeof(float)); /* the ground's */
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sizes),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

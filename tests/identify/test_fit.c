@@ -1,0 +1,640 @@
+/* Parameters from noisy presses: they come back, their intervals are those of formulas and of a
+ * search that knows nothing of the fit, and what the data cannot tell has no value. Every noise is
+ * seeded. test_coverage.c counts how often the intervals hold the truth. */
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "base/random.h"
+#include "base/student.h"
+#include "identify/fit.h"
+
+enum { ROWS = 1000, SEEDS = 5 };
+typedef enum {
+    NOISE_OF_PEAK,
+    NOISE_OF_ROW
+} Noise; /* the same on every row, or in proportion to its force */
+
+static FitPoint points[3 * ROWS], many[50 * ROWS];
+
+static FitDef plate(const char *ground) {
+    FitDef def = {.plate = {{55, 0.0195, 0.1}}, .plates = 1};
+    assert_true(mild_material_preset(ground, &def.material));
+    def.material.bed_depth = 10;
+    return def;
+}
+
+static FitValue *value_of(FitResult *result, const char *name) {
+    for (int i = 0; i < result->parameters; i++) {
+        if (strcmp(result->parameter[i].name, name) == 0) {
+            return &result->parameter[i];
+        }
+    }
+    for (int i = 0; i < result->combinations; i++) {
+        if (strcmp(result->combination[i].name, name) == 0) {
+            return &result->combination[i];
+        }
+    }
+    fail_msg("no %s", name);
+    return NULL;
+}
+
+/* Holds "name name ..." at the numbers of the material. */
+static void hold(FitDef *def, const char *names) {
+    const MildField *fields[FIT_PARAMETERS_MAX];
+    const int count = fit_parameters((MildModel)def->material.model, fields);
+    char padded[200], name[64];
+    snprintf(padded, sizeof padded, " %s ", names);
+    for (int i = 0; i < count; i++) {
+        snprintf(name, sizeof name, " %s ", fields[i]->name);
+        def->held[i] = strstr(padded, name) != NULL;
+    }
+}
+
+/* eq 5, by the library's public law. */
+static double force_of(const FitDef *def, const FitPoint *row) {
+    const FitPlate *plate = &def->plate[row->plate];
+    MildMaterial m = def->material;
+    m.plate_width = plate->width;
+    const MildElementLaw law = mild_element_law(&m, plate->pitch, row->depth);
+    const double drag = fmax(m.c_d, 0.5) * law.added_mass_per_depth * row->speed * row->speed;
+    return plate->elements *
+           (law.force + law.damping * row->speed + drag + law.added_mass * row->acceleration);
+}
+
+/* A press of the true ground to `depth` at constant speed; with `brakes` it slows down from
+ * `speed`, w^2 falling to a fifth on the way. */
+static void press_exactly(const FitDef *truth, FitPoint *out, int rows, double depth, double speed,
+                          int brakes) {
+    const double fall = brakes ? 0.8 * speed * speed / depth : 0; /* of w^2 per depth */
+    for (int i = 0; i < rows; i++) {
+        const double u = depth * (i + 1) / rows;
+        out[i] = (FitPoint){.time = NAN, .depth = u, .speed = sqrt(speed * speed - fall * u)};
+        out[i].acceleration = -fall / 2;
+        out[i].force = force_of(truth, &out[i]);
+    }
+}
+
+/* The same at constant speed with noise of 2 %. */
+static void press(const FitDef *truth, FitPoint *out, int rows, double depth, double speed,
+                  Noise noise, uint64_t seed) {
+    Random random = random_at(seed, (uint32_t)noise, 0);
+    double peak = 0;
+    press_exactly(truth, out, rows, depth, speed, 0);
+    for (int i = 0; i < rows; i++) {
+        peak = fmax(peak, out[i].force);
+    }
+    for (int i = 0; i < rows; i++) {
+        out[i].force +=
+            0.02 * (noise == NOISE_OF_PEAK ? peak : out[i].force) * random_normal(&random);
+    }
+}
+
+static FitResult run(const FitDef *def, int count) {
+    FitResult result;
+    MildError error = {0};
+    if (fit_run(def, points, count, &result, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
+    return result;
+}
+
+/* ---- values ---- */
+
+#define SHAPE_AND_MASS "alpha nu c_g c_d phi rho"
+
+static void recovery(void **state) {
+    (void)state;
+    double worst[2] = {0, 0};
+    for (int g = 0; g < mild_material_preset_count(); g++) {
+        for (int run_index = 0; run_index < 2 * SEEDS; run_index++) {
+            FitDef truth = plate(mild_material_preset_name(g));
+            hold(&truth, SHAPE_AND_MASS);
+            press(&truth, points, ROWS, 0.04, 0.01, (Noise)(run_index % 2),
+                  (uint64_t)(1 + run_index / 2));
+            FitResult result = run(&truth, ROWS);
+            const FitValue *k_pen = value_of(&result, "k_pen");
+            const FitValue *sigma_cone = value_of(&result, "sigma_cone");
+            assert_true(k_pen->state == FIT_FITTED && sigma_cone->state == FIT_FITTED);
+            worst[0] = fmax(worst[0], fabs(k_pen->value / truth.material.k_pen - 1));
+            worst[1] = fmax(worst[1], fabs(sigma_cone->value / truth.material.sigma_cone - 1));
+            assert_true(result.residual_share > 0.01 && result.residual_share < 0.05);
+        }
+    }
+    printf("2 %% noise, seeds 1 .. %d: worst error k_pen %.2f %%, sigma_cone %.2f %%\n", SEEDS,
+           100 * worst[0], 100 * worst[1]);
+    assert_true(worst[0] < 0.05 && worst[1] < 0.05);
+}
+
+static double is_within(FitResult *result, const char *name, double truth, double share) {
+    const FitValue *value = value_of(result, name);
+    const double error = fabs(value->value / truth - 1);
+    if (value->state != FIT_FITTED || !(error < share) || value->low > truth ||
+        value->high < truth) {
+        fail_msg("%s = %g in %g .. %g, state %d, not %g", name, value->value, value->low,
+                 value->high, (int)value->state, truth);
+    }
+    return error;
+}
+
+static double is_near(FitResult *result, const char *name, double truth) {
+    return is_within(result, name, truth, 1e-4);
+}
+
+/* Without noise and with nothing held, the truth comes back as far as a slow press tells it: the
+ * two combinations of the cone, and no value for its parts. */
+static void exact(void **state) {
+    static const char *const untold[] = {"sigma_cone", "alpha", "nu", "c_g", "c_d", "phi", "rho"};
+    (void)state;
+    double worst = 0;
+    for (int g = 0; g < mild_material_preset_count(); g++) {
+        const FitDef truth = plate(mild_material_preset_name(g));
+        FitDef def = {.plate = {truth.plate[0]}, .plates = 1, .material = mild_material_default()};
+        const MildMaterial *m = &truth.material;
+        def.material.bed_depth = 10;
+        press_exactly(&truth, points, ROWS, 0.04, 0.01, 0);
+        FitResult result = run(&def, ROWS);
+        worst = fmax(worst, is_near(&result, "k_pen", m->k_pen));
+        worst =
+            fmax(worst, is_near(&result, "sigma_cone/cos(alpha)", m->sigma_cone / cos(m->alpha)));
+        worst = fmax(worst, is_near(&result, "tan(alpha)/nu", tan(m->alpha) / m->nu));
+        for (int i = 0; i < 7; i++) {
+            const FitValue *value = value_of(&result, untold[i]);
+            assert_int_equal(value->state, FIT_TIED);
+            assert_true(isnan(value->value) && isnan(value->low) && isnan(value->high));
+        }
+    }
+    printf("no noise, nothing held: worst error %.1e\n", worst);
+}
+
+/* Far from the start: cones that are complete at 0.5 mm to 0.1 m, stiffer or softer than their
+ * surroundings. Of the first, ten rows tell k_pen. */
+static void shapes(void **state) {
+    static const double alphas[] = {0.1, 0.7, 1.047, 1.4, 1.45}, nus[] = {2, 3, 0.5, 1, 0.9};
+    (void)state;
+    for (int i = 0; i < 10; i++) {
+        FitDef truth = plate("grass");
+        MildMaterial *m = &truth.material;
+        m->alpha = alphas[i / 2];
+        m->nu = nus[i / 2];
+        m->sigma_cone = (i % 2 ? 3 : 0.3) * m->k_pen * cos(m->alpha) / (0.0195 * 0.0195);
+        hold(&truth, "c_g c_d phi rho");
+        press_exactly(&truth, points, ROWS, 0.04, 0.01, 0);
+        FitResult result = run(&truth, ROWS);
+        is_within(&result, "k_pen", m->k_pen, 0.01);
+        is_within(&result, "tan(alpha)/nu", tan(m->alpha) / m->nu, 0.01);
+        is_within(&result, "sigma_cone/cos(alpha)", m->sigma_cone / cos(m->alpha), 0.01);
+    }
+}
+
+/* What is held turns the combinations into parameters: with alpha both parts of the cone, with phi
+ * and rho the mass, of which a record that brakes tells c_d. */
+static void held(void **state) {
+    (void)state;
+    const FitDef truth = plate("sand_loose");
+    const MildMaterial *m = &truth.material;
+    press_exactly(&truth, points, ROWS, 0.04, 0.01, 0);
+    press_exactly(&truth, points + ROWS, ROWS, 0.04, 1, 0);
+    press_exactly(&truth, points + 2 * ROWS, ROWS, 0.04, 1, 1);
+    FitDef def = truth;
+    hold(&def, "alpha phi rho");
+    FitResult two = run(&def, 2 * ROWS);
+    is_near(&two, "sigma_cone", m->sigma_cone);
+    is_near(&two, "nu", m->nu);
+    is_near(&two, "c_g c_d phi rho nu", m->c_g * m->c_d * m->phi * m->rho * m->nu);
+    assert_int_equal(value_of(&two, "c_g")->state, FIT_TIED);
+    assert_int_equal(value_of(&two, "c_d")->state, FIT_TIED);
+    assert_int_equal(value_of(&two, "alpha")->state, FIT_HELD);
+    assert_true(value_of(&two, "alpha")->value == m->alpha);
+
+    FitResult three = run(&def, 3 * ROWS);
+    is_near(&three, "c_g", m->c_g);
+    is_near(&three, "c_d", m->c_d);
+    assert_int_equal(three.combinations, 0);
+
+    hold(&def, "nu");
+    FitResult shape = run(&def, 3 * ROWS);
+    is_near(&shape, "alpha", m->alpha);
+    is_near(&shape, "sigma_cone", m->sigma_cone);
+    is_near(&shape, "c_d", m->c_d);
+    hold(&def, "sigma_cone");
+    FitResult stress = run(&def, 3 * ROWS);
+    is_near(&stress, "alpha", m->alpha);
+    is_near(&stress, "nu", m->nu);
+
+    /* at another value of what is held, another answer: nothing else is assumed */
+    def.material.alpha = 1.2;
+    hold(&def, "alpha phi rho");
+    FitResult other = run(&def, 3 * ROWS);
+    is_near(&other, "sigma_cone", m->sigma_cone * cos(1.2) / cos(m->alpha));
+    is_near(&other, "nu", m->nu * tan(1.2) / tan(m->alpha));
+    is_near(&other, "c_g", m->c_g * tan(m->alpha) / tan(1.2));
+}
+
+/* Every model in its own parameters. */
+static void models(void **state) {
+    static const struct {
+        MildModel model;
+        const char *names;
+    } rows[] = {
+        {MILD_MODEL_MILD, "k_pen sigma_cone alpha nu c_g c_d phi rho "},
+        {MILD_MODEL_CON_CONE, "k_pen sigma_cone alpha nu c_g c_d phi rho "},
+        {MILD_MODEL_CON_SPRING, "k_pen "},
+        {MILD_MODEL_ECC_SPRING, "k_pen "},
+        {MILD_MODEL_ECC_QUASI, "zeta "},
+        {MILD_MODEL_ECC_QUASI_3D, "zeta "},
+        {MILD_MODEL_BEKKER, "k_c k_phi exponent "},
+        {MILD_MODEL_HUNT_CROSSLEY, "k_pen exponent dissipation "},
+        {MILD_MODEL_RIGID, ""},
+    };
+    (void)state;
+    assert_int_equal(sizeof rows / sizeof *rows, MILD_MODELS);
+    for (int r = 0; r < MILD_MODELS; r++) {
+        const MildField *fields[FIT_PARAMETERS_MAX];
+        const int count = fit_parameters(rows[r].model, fields);
+        char names[200] = "";
+        for (int i = 0; i < count; i++) {
+            snprintf(names + strlen(names), sizeof names - strlen(names), "%s ", fields[i]->name);
+        }
+        assert_string_equal(names, rows[r].names);
+        if (rows[r].model == MILD_MODEL_RIGID) {
+            continue;
+        }
+        FitDef truth = plate("grass"), def;
+        truth.material.model = (int)rows[r].model;
+        truth.material.k_c = 13190; /* clay */
+        truth.material.k_phi = 692150;
+        truth.material.exponent = 0.7;
+        truth.material.zeta = 0.4;
+        truth.material.dissipation = 0.8;
+        press_exactly(&truth, points, ROWS, 0.04, 0.01, 0);
+        press_exactly(&truth, points + ROWS, ROWS, 0.04, 1, 0);
+        def = truth;
+        hold(&def, "k_c nu c_g phi rho");
+        FitResult result = run(&def, 2 * ROWS);
+        for (int i = 0; i < count; i++) {
+            if (!def.held[i]) {
+                is_near(&result, fields[i]->name, *fit_number(&truth.material, fields[i]));
+            }
+        }
+    }
+    FitDef clay = plate("clay");
+    press_exactly(&clay, points, ROWS, 0.04, 0.01, 0);
+    FitResult result = run(&clay, ROWS);
+    is_near(&result, "exponent", 0.5);
+    is_near(&result, "k_c/plate_width + k_phi", 13190 / 0.1 + 692150);
+    assert_int_equal(value_of(&result, "k_phi")->state, FIT_TIED);
+}
+
+/* A record on each of two plates, one twice as long and wide as the other: the second's rows stand
+ * behind the first's. Every number comes back, and of bekker k_c and k_phi each by itself, because
+ * b differs. With one plate for both nothing fits. */
+static void plates(void **state) {
+    (void)state;
+    static const char *const grounds[] = {"foam45", "clay", "sandy_loam"};
+    for (size_t g = 0; g < sizeof grounds / sizeof *grounds; g++) {
+        FitDef truth = plate(grounds[g]);
+        truth.plate[0] = (FitPlate){40, 0.0195, 0.1};
+        truth.plate[1] = (FitPlate){160, 0.0195, 0.2};
+        truth.plates = 2;
+        for (int i = 0; i < 2 * ROWS; i++) {
+            points[i] =
+                (FitPoint){.time = NAN, .depth = 0.04 * (i % ROWS + 1) / ROWS, .speed = 0.01};
+            points[i].plate = i / ROWS;
+            points[i].force = force_of(&truth, &points[i]);
+        }
+        FitResult result = run(&truth, 2 * ROWS);
+        if (truth.material.model == MILD_MODEL_BEKKER) {
+            is_near(&result, "k_c", truth.material.k_c);
+            is_near(&result, "k_phi", truth.material.k_phi);
+            is_near(&result, "exponent", truth.material.exponent);
+            assert_true(result.curve.plate_width ==
+                        0); /* the sole's, because there is no single one */
+        } else {
+            is_near(&result, "k_pen", truth.material.k_pen);
+        }
+        assert_true(result.residual_share < 1e-4);
+        for (int i = 0; i < 2 * ROWS; i++) {
+            points[i].plate = 1;
+        }
+        result = run(&truth, 2 * ROWS);
+        print_message("%s: residual with one plate for both %.2f of the force\n", grounds[g],
+                      result.residual_share);
+        assert_true(result.residual_share > 0.1);
+    }
+}
+
+/* ---- intervals ---- */
+
+/* A spring is linear: F = n k u. Its interval is that of a regression through the origin with the
+ * variance HC3, b -+ t sqrt(sum (x r/(1 - h))^2)/sum x^2, h = x^2/sum x^2. */
+static void interval_linear(void **state) {
+    (void)state;
+    for (int noise = 0; noise < 2; noise++) {
+        FitDef truth = plate("grass");
+        double xx = 0, xy = 0, spread = 0;
+        truth.material.model = MILD_MODEL_ECC_SPRING;
+        press(&truth, points, 10, 0.04, 0.01, (Noise)noise, 3);
+        for (int i = 0; i < 10; i++) {
+            const double x = 55 * points[i].depth;
+            xx += x * x;
+            xy += x * points[i].force;
+        }
+        for (int i = 0; i < 10; i++) {
+            const double x = 55 * points[i].depth, miss = points[i].force - x * xy / xx;
+            const double share = x * miss / (1 - x * x / xx);
+            spread += share * share;
+        }
+        const double half = student_95(9) * sqrt(spread) / xx;
+        FitResult result = run(&truth, 10);
+        const FitValue *k_pen = value_of(&result, "k_pen");
+        const double low = (k_pen->value - k_pen->low) / half,
+                     high = (k_pen->high - k_pen->value) / half;
+        printf("a spring: half widths %.4f and %.4f of the formula's\n", low, high);
+        assert_true(fabs(k_pen->value / (xy / xx) - 1) < 1e-9);
+        assert_true(fabs(low - 1) < 5e-3 && fabs(high - 1) < 5e-3);
+    }
+}
+
+/* Of 50 000 rows the means of three are fitted, to the same end: the interval of a spring is that
+ * of the formula for all rows. Two records, of which the first ends within a group. */
+static void interval_many(void **state) {
+    (void)state;
+    enum { FIRST = 20 * ROWS + 1, COUNT = 50 * ROWS };
+    FitDef truth = plate("grass");
+    FitResult result;
+    MildError error = {0};
+    double xx = 0, xy = 0, yy = 0;
+    truth.material.model = MILD_MODEL_ECC_SPRING;
+    press(&truth, many, FIRST, 0.04, 0.01, NOISE_OF_PEAK, 5);
+    press(&truth, many + FIRST, COUNT - FIRST, 0.04, 0.01, NOISE_OF_PEAK, 6);
+    for (int i = 0; i < COUNT; i++) {
+        const double x = 55 * many[i].depth, y = many[i].force;
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+    }
+    assert_int_equal(fit_run(&truth, many, COUNT, &result, &error), MILD_OK);
+    const FitValue *k_pen = value_of(&result, "k_pen");
+    const double half = 1.95996 * sqrt((yy - xy * xy / xx) / COUNT / xx);
+    printf("50 000 rows: %.4f of the width\n", (k_pen->high - k_pen->low) / (2 * half));
+    assert_true(fabs(k_pen->value / (xy / xx) - 1) < 1e-6);
+    assert_true(fabs((k_pen->high - k_pen->low) / (2 * half) - 1) < 0.03);
+    assert_true(result.points == COUNT && fabs(result.rows / COUNT - 1) < 1e-9);
+
+    /* fifty records of a curve: no mean is of the end of one and the start of the next */
+    truth = plate("grass");
+    for (int record = 0; record < 50; record++) {
+        press_exactly(&truth, many + record * ROWS, ROWS, 0.04, 0.01, 0);
+    }
+    assert_int_equal(fit_run(&truth, many, COUNT, &result, &error), MILD_OK);
+    printf("fifty records: residual %.1e of the force\n", result.residual_share);
+    assert_true(result.residual_share < 1e-6);
+}
+
+/* Least sum of squares of a slow press for a given u_f, and the coefficients: the force is linear
+ * in k_pen and kappa, F = n (k_pen P + kappa (u - P)), P = u_f (t - t^2 + t^3/3). */
+static double sum_at(double u_f, int count) {
+    double aa = 0, ab = 0, bb = 0, ay = 0, by = 0, yy = 0;
+    for (int i = 0; i < count; i++) {
+        const double u = points[i].depth, t = fmin(u / u_f, 1), y = points[i].force;
+        const double a = 55 * u_f * (t - t * t + t * t * t / 3), b = 55 * u - a;
+        aa += a * a;
+        ab += a * b;
+        bb += b * b;
+        ay += a * y;
+        by += b * y;
+        yy += y * y;
+    }
+    const double determinant = aa * bb - ab * ab;
+    const double k = (bb * ay - ab * by) / determinant, kappa = (aa * by - ab * ay) / determinant;
+    return yy - k * ay - kappa * by;
+}
+
+/* The interval of tan(alpha)/nu = u_f/R, against a search over u_f with the rest solved exactly.
+ * The noise is the same on all rows, so that the variance is S/(n - 3). Shallow enough to be far
+ * from linear: the interval reaches further up than down. */
+static void interval_profile(void **state) {
+    (void)state;
+    const double R = 0.0195 / sqrt(acos(-1.0));
+    FitDef truth = plate("foam60");
+    double best = 0, least = INFINITY, end[2];
+    hold(&truth, "c_g c_d phi rho");
+    press(&truth, points, ROWS, 0.02, 0.01, NOISE_OF_PEAK, 4);
+    for (double u_f = 0.005; u_f < 0.2; u_f *= 1.0005) {
+        const double sum = sum_at(u_f, ROWS);
+        best = sum < least ? u_f : best;
+        least = fmin(sum, least);
+    }
+    const double t = student_95(ROWS - 3), allowed = least * (1 + t * t / (ROWS - 3));
+    for (int side = 0; side < 2; side++) {
+        end[side] = best;
+        while (sum_at(end[side], ROWS) < allowed) {
+            end[side] *= side ? 1.0005 : 1 / 1.0005;
+        }
+    }
+    FitResult result = run(&truth, ROWS);
+    const FitValue *shape = value_of(&result, "tan(alpha)/nu");
+    printf("tan(alpha)/nu %.4f in %.4f .. %.4f; a search finds %.4f in %.4f .. %.4f\n",
+           shape->value, shape->low, shape->high, best / R, end[0] / R, end[1] / R);
+    assert_int_equal(shape->state, FIT_FITTED);
+    assert_true(fabs(shape->value / (best / R) - 1) < 1e-3);
+    assert_true(fabs((shape->value - shape->low) / (best - end[0]) * R - 1) < 0.05);
+    assert_true(fabs((shape->high - shape->value) / (end[1] - best) * R - 1) < 0.05);
+    assert_true(shape->high - shape->value > 1.05 * (shape->value - shape->low));
+}
+
+/* ---- what the data do not tell ---- */
+
+static void untold(void **state) {
+    (void)state;
+    /* a ground without added mass: the drag has a limit and no value */
+    FitDef def = plate("foam45");
+    press(&def, points, ROWS, 0.04, 0.01, NOISE_OF_ROW, 7);
+    press(&def, points + ROWS, ROWS, 0.04, 1, NOISE_OF_ROW, 10);
+    FitResult result = run(&def, 2 * ROWS);
+    const FitValue *drag = value_of(&result, "c_g c_d phi rho nu");
+    assert_int_equal(drag->state, FIT_LIMIT);
+    assert_true(isnan(drag->value) && isnan(drag->low) && drag->high > 0 && drag->high < 500);
+
+    /* without speeds nothing of it is said */
+    for (int i = 0; i < ROWS; i++) {
+        points[i].speed = 0;
+    }
+    result = run(&def, ROWS);
+    assert_int_equal(value_of(&result, "c_g")->state, FIT_NO_EFFECT);
+    assert_int_equal(value_of(&result, "rho")->state, FIT_NO_EFFECT);
+    assert_int_equal(result.combinations, 2);
+
+    /* a shallow press sees one stiffness, and does not say whose */
+    int fitted = 0;
+    def = plate("rubber");
+    hold(&def, "c_g c_d phi rho");
+    for (uint64_t seed = 1; seed <= 20; seed++) {
+        press(&def, points, 50, 0.002, 0.01, NOISE_OF_PEAK, seed);
+        result = run(&def, 50);
+        assert_int_equal(value_of(&result, "alpha")->state, FIT_TIED);
+        fitted += value_of(&result, "tan(alpha)/nu")->state == FIT_FITTED;
+    }
+    printf("2 mm deep: tan(alpha)/nu seems to be determined in %d of 20\n", fitted);
+    assert_true(fitted <= 4);
+}
+
+/* Filled are those that the data do not tell, and only those. */
+static void filled(void **state) {
+    (void)state;
+    FitDef def = plate("sand_loose");
+    const MildMaterial fill = def.material;
+    def.fill = &fill;
+    press_exactly(&def, points, ROWS, 0.04, 0.01, 0);
+    press_exactly(&def, points + ROWS, ROWS, 0.04, 1, 0);
+    def.material.alpha = 0.7; /* not held, so not read */
+    FitResult result = run(&def, 2 * ROWS);
+    is_near(&result, "k_pen", fill.k_pen);
+    is_near(&result, "sigma_cone", fill.sigma_cone);
+    is_near(&result, "nu", fill.nu);
+    is_near(&result, "c_g", fill.c_g);
+    assert_int_equal(value_of(&result, "alpha")->state, FIT_FILLED);
+    assert_true(value_of(&result, "alpha")->value == fill.alpha);
+    assert_int_equal(value_of(&result, "c_d")->state, FIT_FILLED);
+
+    def = plate("rubber"); /* shallow: all but one stiffness */
+    const MildMaterial rubber = def.material;
+    def.fill = &rubber;
+    press(&def, points, 50, 0.002, 0.01, NOISE_OF_PEAK, 8);
+    result = run(&def, 50);
+    assert_int_equal(value_of(&result, "k_pen")->state, FIT_FITTED);
+    assert_true(fabs(value_of(&result, "k_pen")->value / 1400 - 1) < 0.05);
+    for (int i = 1; i < result.parameters; i++) {
+        assert_int_equal(result.parameter[i].state, FIT_FILLED);
+    }
+}
+
+/* A limit that contradicts the filling stays a limit: foam is not given the mass of sand. */
+static void not_filled(void **state) {
+    (void)state;
+    FitDef def = plate("foam45");
+    MildMaterial sand;
+    assert_true(mild_material_preset("sand_loose", &sand));
+    def.fill = &sand;
+    press_exactly(&def, points, ROWS, 0.04, 0.01, 0);
+    press_exactly(&def, points + ROWS, ROWS, 0.04, 1, 0);
+    FitResult result = run(&def, 2 * ROWS);
+    const FitValue *c_g = value_of(&result, "c_g");
+    assert_int_equal(c_g->state, FIT_LIMIT);
+    assert_true(isnan(c_g->value) && c_g->high < 0.01);
+    is_near(&result, "k_pen", 480);
+    assert_int_equal(value_of(&result, "alpha")->state, FIT_FILLED);
+}
+
+/* Noise with a correlation of 0.8 between neighbours, and a law that misses the curve: the rows
+ * count for less, and the interval is wider. */
+static void neighbours(void **state) {
+    (void)state;
+    Random random = random_at(5, 0, 0);
+    FitDef def = plate("grass");
+    double drift = random_normal(&random);
+    hold(&def, SHAPE_AND_MASS);
+    press_exactly(&def, points, ROWS, 0.04, 0.01, 0);
+    for (int i = 0; i < ROWS; i++) {
+        drift = 0.8 * drift + 0.6 * random_normal(&random);
+        points[i].force += 5 * drift;
+    }
+    FitResult slow = run(&def, ROWS);
+    press(&def, points, ROWS, 0.04, 0.01, NOISE_OF_PEAK, 5);
+    FitResult white = run(&def, ROWS);
+    printf("slow noise: correlation %.3f, %.0f rows of %d\n", slow.neighbours, slow.rows, ROWS);
+    assert_true(fabs(slow.neighbours - 0.8) < 0.06);
+    assert_true(fabs(slow.rows / (ROWS / 9.0) - 1) < 0.35);
+    assert_true(white.neighbours == 0 && white.rows == ROWS);
+
+    def.material.model = MILD_MODEL_ECC_SPRING; /* concave data */
+    assert_true(run(&def, ROWS).neighbours > 0.5);
+}
+
+/* Down, up, down deeper: what counts is the way down on virgin ground; the speed comes from the
+ * times. */
+static void loading(void **state) {
+    (void)state;
+    static const double depths[] = {-0.001, 0,     0.001, 0.002, 0.003, 0.002,
+                                    0.001,  0.002, 0.003, 0.004, 0.005, 0.004};
+    enum { COUNT = sizeof depths / sizeof *depths };
+    for (int i = 0; i < COUNT; i++) {
+        points[i] = (FitPoint){.time = i, .depth = depths[i], .speed = NAN};
+    }
+    assert_int_equal(fit_loading(points, COUNT), 6); /* 3 mm counts both times */
+    assert_true(points[3].time == 8 && points[5].depth == 0.005);
+    for (int i = 0; i < ROWS; i++) {
+        points[i] = (FitPoint){.time = 0.01 * i, .depth = 0.002 * i, .speed = NAN};
+    }
+    points[3].speed = 7;
+    fit_speeds(points, ROWS);
+    for (int i = 0; i < ROWS; i++) {
+        assert_true(fabs(points[i].speed - (i == 3 ? 7 : 0.2)) < 1e-9);
+    }
+    points[0].speed = points[0].time = NAN;
+    fit_speeds(points, 1);
+    assert_true(points[0].speed == 0);
+}
+
+static void refused(void **state) {
+    (void)state;
+    FitDef def = plate("grass");
+    FitResult result;
+    MildError error = {0};
+    press(&def, points, ROWS, 0.04, 0.01, NOISE_OF_ROW, 1);
+    assert_int_equal(fit_run(&def, points, FIT_POINTS_MIN - 1, &result, &error),
+                     MILD_ERROR_ARGUMENT);
+    assert_int_equal(fit_run(&def, points, 8, &result, &error), MILD_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.text, "8 loading rows for 8 parameters"));
+    points[5].force = NAN;
+    assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_RANGE);
+    assert_non_null(strstr(error.text, "row 6"));
+    def.material.alpha = -1;
+    assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_RANGE);
+    def = plate("grass");
+    MildMaterial fill = def.material;
+    fill.nu = 0;
+    def.fill = &fill;
+    assert_int_equal(fit_run(&def, points, 5, &result, &error), MILD_ERROR_RANGE);
+    def = plate("grass");
+    def.material.model = MILD_MODEL_RIGID;
+    assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_ARGUMENT);
+    def = plate("grass");
+    def.plate[0].elements = 0;
+    assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_RANGE);
+    press(&def, points, ROWS, 0.04, 0.01, NOISE_OF_ROW, 1);
+    for (int plates = 0; plates < 18; plates += 17) {
+        def = plate("grass");
+        def.plates = plates;
+        assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_RANGE);
+        assert_non_null(strstr(error.text, "plates"));
+    }
+    for (int number = -1; number < 2; number += 2) {
+        def = plate("grass");
+        points[7].plate = number;
+        assert_int_equal(fit_run(&def, points, ROWS, &result, &error), MILD_ERROR_RANGE);
+        assert_non_null(strstr(error.text, "row 8 is of plate"));
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(recovery),        cmocka_unit_test(exact),
+        cmocka_unit_test(shapes),          cmocka_unit_test(held),
+        cmocka_unit_test(models),          cmocka_unit_test(plates),
+        cmocka_unit_test(interval_linear), cmocka_unit_test(interval_profile),
+        cmocka_unit_test(interval_many),   cmocka_unit_test(untold),
+        cmocka_unit_test(filled),          cmocka_unit_test(not_filled),
+        cmocka_unit_test(neighbours),      cmocka_unit_test(loading),
+        cmocka_unit_test(refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

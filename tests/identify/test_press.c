@@ -1,0 +1,254 @@
+/* The press against the closed law of its elements, and what each kind of ground gives back. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include "identify/press.h"
+
+static PressResult result;
+
+static PressDef definition(const char *ground) {
+    PressDef def = {.turns = 1, .turn = {0.03}, .speed = 1e-3};
+    assert_true(mild_material_preset(ground, &def.material));
+    return def;
+}
+
+/* A plate of 0.2 x 0.1 m: 55 elements. */
+static void press(const PressDef *def) {
+    MildError error = {0};
+    MildSole *plate = press_plate_create(0.2, 0.1, &error);
+    assert_non_null(plate);
+    press_result_close(&result);
+    if (press_run(def, plate, &result, &error) != MILD_OK) {
+        fail_msg("%s", error.text);
+    }
+    mild_sole_destroy(plate);
+}
+
+static const PressRow *turn_of(int way) {
+    const PressRow *last = result.rows;
+    for (int i = 0; i < result.count; i++) {
+        if (result.rows[i].way == way) {
+            last = &result.rows[i];
+        }
+    }
+    return last;
+}
+
+/* F_g + c_d m_a' w^2 of all elements: at constant speed the added mass does not accelerate. */
+static double law(const MildMaterial *material, double depth, double speed) {
+    MildElementLaw element = mild_element_law(material, 0.0195, depth);
+    return result.elements *
+           (element.force + material->c_d * element.added_mass_per_depth * speed * speed);
+}
+
+/* Force and depth of a row belong together, at any speed. */
+static void test_law(void **state) {
+    (void)state;
+    static const double speeds[] = {1e-4, 1e-2, 1};
+    for (int v = 0; v < 3; v++) {
+        double worst = 0;
+        for (int p = 0; p < mild_material_preset_count(); p++) {
+            PressDef def = definition(mild_material_preset_name(p));
+            def.speed = speeds[v];
+            press(&def);
+            assert_true(result.rows[1000].depth == 0.03);
+            for (int i = 2; i <= 1000; i++) {
+                double expected = law(&def.material, result.rows[i].depth, def.speed);
+                worst = fmax(worst,
+                             fabs(result.rows[i].force - expected) / law(&def.material, 0.03, 0));
+            }
+        }
+        printf("%g m/s: worst difference from the law %.2g of the slow peak\n", speeds[v], worst);
+        assert_true(worst < 1e-5);
+    }
+}
+
+static void test_energy(void **state) {
+    (void)state;
+    PressDef def = definition("foam45");
+    press(&def);
+    printf("foam45 gives back %.4f of %.4f J\n", result.work_out, result.work_in);
+    assert_true(result.work_out <= result.work_in * (1 + 1e-3) &&
+                result.work_out > 0.5 * result.work_in);
+    assert_true(result.print_depth < 1e-3);
+    def = definition("sand_loose");
+    press(&def);
+    printf("sand_loose gives back %.4f of %.4f J\n", result.work_out, result.work_in);
+    assert_true(result.work_out < 0.01 * result.work_in);
+    assert_true(result.print_depth > 0.029);
+}
+
+/* A level plate has no moment and its zero moment point in the middle; the front edge down moves
+ * both forward. */
+static void test_moments(void **state) {
+    (void)state;
+    PressDef def = definition("sand_loose");
+    press(&def);
+    const PressRow *level = turn_of(0);
+    double lever = fabs(level->moment_x) + fabs(level->moment_y);
+    printf("level: %.2g N m at %.1f N\n", lever, level->force);
+    assert_true(lever < 1e-3 * level->force);
+    assert_true(fabs(level->zmp_x) < 1e-3 && fabs(level->zmp_y) < 1e-3);
+    def.tilt = 0.1;
+    press(&def);
+    const PressRow *tilted = turn_of(0);
+    printf("tilted: zmp %.4f m, moment %.3f N m\n", tilted->zmp_x, tilted->moment_y);
+    assert_true(result.rows[0].depth < 0 && result.rows[1].force >= 0);
+    assert_true(tilted->zmp_x > 0.002 && tilted->moment_y < 0);
+    assert_true(fabs(tilted->zmp_y) < 1e-3);
+}
+
+/* Down again past the old turn, the force goes on along the law. */
+static void test_reload(void **state) {
+    (void)state;
+    double worst = 0;
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        PressDef def = definition(mild_material_preset_name(p));
+        def.turns = 3;
+        def.turn[0] = 0.01;
+        def.turn[1] = 0.002;
+        def.turn[2] = 0.02;
+        press(&def);
+        assert_true(turn_of(0)->depth == 0.01 && turn_of(1)->depth == 0.002 &&
+                    turn_of(2)->depth == 0.02);
+        assert_int_equal(result.ways, 4); /* and out */
+        double before = law(&def.material, 0.01, 0), after = law(&def.material, 0.02, 0);
+        worst = fmax(
+            worst, fmax(fabs(turn_of(0)->force / before - 1), fabs(turn_of(2)->force / after - 1)));
+    }
+    printf("loaded, unloaded, loaded deeper: worst %.1e\n", worst);
+    assert_true(worst < 1e-4);
+}
+
+/* Cycles between two depths give back what the line holds; between two forces they turn at those
+ * forces. */
+static void test_cycles(void **state) {
+    (void)state;
+    PressDef def = definition("foam45");
+    def.cycles = 4;
+    def.turns = 2;
+    def.turn[1] = 0.01;
+    press(&def);
+    assert_int_equal(turn_of(8)->way, 8); /* four times down and back, then out */
+    for (int cycle = 1; cycle < 4; cycle++) {
+        assert_true(fabs(turn_of(2 * cycle)->force / turn_of(0)->force - 1) < 1e-9);
+        assert_true(turn_of(2 * cycle + 1)->depth == 0.01);
+    }
+    double worst = 0;
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        def = definition(mild_material_preset_name(p));
+        def.by_force = 1;
+        def.turns = 2;
+        def.turn[0] = 300;
+        def.turn[1] = 50;
+        def.cycles = 3;
+        press(&def);
+        for (int way = 0; way < 6; way++) {
+            worst = fmax(worst, fabs(turn_of(way)->force / (way % 2 ? 50 : 300) - 1));
+        }
+    }
+    printf("turns at 300 and 50 N: worst %.1e\n", worst);
+    assert_true(worst < 1e-9);
+}
+
+/* Sideways at constant depth u over the way d: friction mu F, drift k_D d u and damping b_D v of
+ * every element (eq 14). */
+static void test_drag(void **state) {
+    (void)state;
+    double worst = 0;
+    for (int p = 0; p < mild_material_preset_count(); p++) {
+        PressDef def = definition(mild_material_preset_name(p));
+        def.drag = 0.05;
+        def.drag_speed = 0.1;
+        press(&def);
+        const PressRow *end = turn_of(1);
+        const MildMaterial *m = &def.material;
+        double before = 0.05; /* the row is of the step that begins there */
+        double expected = m->mu * law(m, 0.03, 0) +
+                          result.elements * (m->k_drift * before * 0.03 + m->b_drift * 0.1);
+        worst = fmax(worst, fabs(-end->force_x / expected - 1));
+        assert_true(fabs(end->x - 0.05) < 1e-9 && fabs(end->force_y) < 1e-9);
+        assert_true(result.work_drag > 0);
+    }
+    printf("dragged: worst difference from the closed form %.1e\n", worst);
+    assert_true(worst < 1e-4);
+}
+
+/* What falls comes to rest: the ground takes the weight times the whole height; a tilted plate
+ * lands flat. */
+static void test_drop(void **state) {
+    (void)state;
+    PressDef def = {.mass = 5, .height = 0.1, .seconds = 1};
+    mild_material_preset("sand_dense", &def.material);
+    press(&def);
+    const PressRow *end = &result.rows[result.count - 1];
+    double fallen = def.mass * 9.81 * (def.height + end->depth),
+           taken = result.work_in - result.work_out;
+    printf("dropped: stop %.3f mm, work %.4f J of %.4f J\n", 1e3 * result.stop_depth, taken,
+           fallen);
+    assert_true(fabs(taken / fallen - 1) < 0.01);
+    assert_true(fabs(end->force / (def.mass * 9.81) - 1) < 1e-3 && result.rest_speed < 1e-4);
+    def.tilt = 0.1;
+    press(&def);
+    end = &result.rows[result.count - 1];
+    printf("tilted 0.1 rad it comes to rest at %.4f rad\n", end->tilt);
+    assert_true(fabs(end->tilt) < 0.03 && result.rest_speed < 1e-3);
+}
+
+/* (k_c/b + k_phi) u^n of the area, b the plate's shorter side: through the ground's step. */
+static void test_width(void **state) {
+    (void)state;
+    static const double sides[][2] = {{0.3, 0.2}, {0.2, 0.1}, {0.06, 0.15}};
+    double worst = 0;
+    for (int i = 0; i < 3; i++) {
+        MildError error = {0};
+        PressDef def = definition("clay");
+        const double b = fmin(sides[i][0], sides[i][1]);
+        MildSole *plate = press_plate_create(sides[i][0], sides[i][1], &error);
+        press_result_close(&result);
+        assert_int_equal(press_run(&def, plate, &result, &error), MILD_OK);
+        const PressRow *end = turn_of(0);
+        const double p = (def.material.k_c / b + def.material.k_phi) * pow(end->depth, 0.5);
+        worst = fmax(worst, fabs(end->force / (p * result.area) - 1));
+        mild_sole_destroy(plate);
+    }
+    printf("bekker under plates of three widths: %.1e off\n", worst);
+    assert_true(worst < 1e-3);
+    press_result_close(&result);
+}
+
+static void test_bad_material(void **state) {
+    (void)state;
+    MildError error = {0};
+    PressDef def = {.material = mild_material_default(), .turns = 1, .turn = {0.03}, .speed = 0.01};
+    def.material.k_pen = NAN;
+    MildSole *plate = press_plate_create(0.1, 0.1, &error);
+    press_result_close(&result);
+    assert_int_equal(press_run(&def, plate, &result, &error), MILD_ERROR_RANGE);
+    def = definition("foam25");
+    def.by_force = 1;
+    def.turn[0] = 1e6;
+    assert_int_equal(press_run(&def, plate, &result, &error), MILD_ERROR_RANGE);
+    assert_non_null(strstr(error.text, "--force"));
+    mild_sole_destroy(plate);
+    press_result_close(&result);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_law),          cmocka_unit_test(test_energy),
+        cmocka_unit_test(test_moments),      cmocka_unit_test(test_reload),
+        cmocka_unit_test(test_cycles),       cmocka_unit_test(test_drag),
+        cmocka_unit_test(test_drop),         cmocka_unit_test(test_width),
+        cmocka_unit_test(test_bad_material),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
